@@ -1,0 +1,19 @@
+# tetwarp_library(NAME SOURCES ...): the library target tetwarp_NAME, alias tetwarp::NAME.
+#
+# The flags that bits depend on are the target's own, so that every build type and every user has them: no fused
+# multiply-add unless the source spells it.
+function(tetwarp_library name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES")
+  add_library(tetwarp_${name} STATIC ${arg_SOURCES})
+  add_library(tetwarp::${name} ALIAS tetwarp_${name})
+  tetwarp_configure(tetwarp_${name})
+  set_target_properties(tetwarp_${name} PROPERTIES EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
+endfunction()
+
+# What every target of the project is compiled with.
+function(tetwarp_configure target)
+  target_compile_features(${target} PUBLIC cxx_std_20)
+  target_include_directories(${target} PUBLIC "$<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>"
+                                              "$<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/tetwarp>")
+  target_compile_options(${target} PRIVATE "$<$<COMPILE_LANGUAGE:CXX>:-ffp-contract=off>")
+endfunction()

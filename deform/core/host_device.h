@@ -1,0 +1,15 @@
+#pragma once
+
+// The one place that includes GLM: GLM 0.9.9.8 wants <cuda.h> first under nvcc, and GLM_FORCE_CUDA (a definition of the
+// target, the same for every file) makes its functions callable on the device.
+#if defined(__CUDACC__)
+#include <cuda.h>
+#define TETWARP_HD __host__ __device__
+#else
+#define TETWARP_HD
+#endif
+
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
+#include <glm/ext/vector_int3_sized.hpp>
+#include <glm/ext/vector_uint4_sized.hpp>

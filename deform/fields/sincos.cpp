@@ -1,0 +1,48 @@
+#include "deform/fields/sincos.h"
+
+#include <cmath>
+
+namespace tetwarp {
+
+namespace {
+
+// Pi / 2 in three parts (Cody and Waite 1980): the first two have 33 bits each, so multiples up to 2^20 of them are exact.
+constexpr double kHalfPi1 = 0x1.921fb544p+0, kHalfPi2 = 0x1.0b4611a6p-34, kHalfPi3 = 0x1.3198a2e037073p-69;
+constexpr double kTwoOverPi = 0x1.45f306dc9c883p-1;
+
+/// Taylor series, |r| <= pi / 4: the first term left out is below 1e-19.
+double sine_near_zero(double r) {
+  const double x = r * r;
+  double sum = 1.0 / 355687428096000.0;
+  for (const double term : {-1.0 / 1307674368000.0, 1.0 / 6227020800.0, -1.0 / 39916800.0, 1.0 / 362880.0, -1.0 / 5040.0,
+                            1.0 / 120.0, -1.0 / 6.0}) {
+    sum = sum * x + term;
+  }
+  return r + r * (x * sum);
+}
+
+double cosine_near_zero(double r) {
+  const double x = r * r;
+  double sum = -1.0 / 6402373705728000.0;
+  for (const double term : {1.0 / 20922789888000.0, -1.0 / 87178291200.0, 1.0 / 479001600.0, -1.0 / 3628800.0,
+                            1.0 / 40320.0, -1.0 / 720.0, 1.0 / 24.0}) {
+    sum = sum * x + term;
+  }
+  return (1.0 - 0.5 * x) + x * (x * sum);
+}
+
+}  // namespace
+
+SinCos sin_cos(double angle) {
+  const double quarter = std::nearbyint(angle * kTwoOverPi);
+  const double r = ((angle - quarter * kHalfPi1) - quarter * kHalfPi2) - quarter * kHalfPi3;
+  const double s = sine_near_zero(r), c = cosine_near_zero(r);
+  switch (static_cast<long long>(quarter) & 3) {
+    case 0: return {s, c};
+    case 1: return {c, -s};
+    case 2: return {-s, -c};
+    default: return {-c, s};
+  }
+}
+
+}  // namespace tetwarp

@@ -1,0 +1,102 @@
+#include "deform/geometry.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include "deform/errors.h"
+
+namespace tetwarp {
+
+AffineMap point_from_index(const Geometry& geometry) {
+  glm::dmat3 linear = geometry.direction;
+  for (int axis = 0; axis < 3; ++axis) linear[axis] *= geometry.spacing[axis];
+  return {linear, geometry.origin};
+}
+
+AffineMap index_from_point(const Geometry& geometry) {
+  const AffineMap forward = point_from_index(geometry);
+  const double volume = glm::determinant(forward.linear);
+  require(std::isfinite(volume) && volume != 0, "the grid's spacing and direction have no inverse");
+  const glm::dmat3 inverse = glm::inverse(forward.linear);
+  return {inverse, -(inverse * forward.offset)};
+}
+
+std::int64_t voxel_count(const Geometry& geometry) { return geometry.size.x * geometry.size.y * geometry.size.z; }
+
+std::int64_t voxel_count(const Region& region) {
+  if (is_empty(region)) return 0;
+  const glm::i64vec3 size = region.end - region.begin;
+  return size.x * size.y * size.z;
+}
+
+Region whole(const Geometry& geometry) { return {glm::i64vec3(0), geometry.size}; }
+
+bool is_empty(const Region& region) {
+  return region.end.x <= region.begin.x || region.end.y <= region.begin.y || region.end.z <= region.begin.z;
+}
+
+bool contains(const Region& outer, const Region& inner) {
+  return is_empty(inner) || intersection(outer, inner) == inner;
+}
+
+Region intersection(const Region& a, const Region& b) { return {glm::max(a.begin, b.begin), glm::min(a.end, b.end)}; }
+
+glm::dvec3 centre(const Geometry& geometry) {
+  return point_from_index(geometry)(0.5 * glm::dvec3(geometry.size - std::int64_t{1}));
+}
+
+bool same_grid(const Geometry& a, const Geometry& b, double tolerance_mm) {
+  if (a.size != b.size) return false;
+  const AffineMap point_a = point_from_index(a), point_b = point_from_index(b);
+  for (int corner = 0; corner < 8; ++corner) {
+    const glm::dvec3 index = glm::dvec3(corner & 1, corner >> 1 & 1, corner >> 2) * glm::dvec3(a.size - std::int64_t{1});
+    if (!(glm::distance(point_a(index), point_b(index)) <= tolerance_mm)) return false;
+  }
+  return true;
+}
+
+Geometry lattice_over(const Geometry& volume, std::int64_t cell_size) {
+  require(cell_size >= 1, "cell size " + std::to_string(cell_size) + ", expected at least 1 voxel");
+  for (int axis = 0; axis < 3; ++axis) {
+    require(volume.size[axis] >= 2, "a volume of " + to_string(volume.size) +
+                                        " voxels has no cell: deforming needs at least 2 on every axis");
+  }
+  Geometry lattice = volume;
+  lattice.size = (volume.size - std::int64_t{1} + (cell_size - 1)) / cell_size + std::int64_t{1};
+  lattice.spacing = volume.spacing * static_cast<double>(cell_size);
+  return lattice;
+}
+
+std::string orientation_code(const Geometry& geometry) {
+  constexpr std::array<const char*, 3> kLetters = {"LR", "PA", "SI"};
+  std::string code;
+  for (int axis = 0; axis < 3; ++axis) {
+    const glm::dvec3 direction = geometry.direction[axis], size = glm::abs(direction);
+    const int patient = size.x >= size.y && size.x >= size.z ? 0 : (size.y >= size.z ? 1 : 2);
+    code += kLetters[static_cast<std::size_t>(patient)][direction[patient] < 0 ? 1 : 0];
+  }
+  return code;
+}
+
+void require_valid(const Geometry& geometry, const std::string& what) {
+  for (int axis = 0; axis < 3; ++axis) {
+    require(geometry.size[axis] >= 1, what + ": size " + to_string(geometry.size) + ", expected at least 1 on every axis");
+    require(std::isfinite(geometry.spacing[axis]) && geometry.spacing[axis] > 0,
+            what + ": spacing " + std::to_string(geometry.spacing[axis]) + " mm on axis " + std::to_string(axis) +
+                ", expected a positive number");
+    require(std::isfinite(geometry.origin[axis]), what + ": the origin is not finite");
+  }
+  const double determinant = glm::determinant(geometry.direction);
+  require(std::isfinite(determinant) && std::abs(determinant) > 1e-6,
+          what + ": the direction's columns do not span space (determinant " + std::to_string(determinant) + ")");
+}
+
+std::string to_string(const glm::i64vec3& size) {
+  return std::to_string(size.x) + " x " + std::to_string(size.y) + " x " + std::to_string(size.z);
+}
+
+}  // namespace tetwarp

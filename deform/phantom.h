@@ -1,0 +1,15 @@
+#pragma once
+
+#include "deform/volume.h"
+
+namespace tetwarp {
+
+/// A plausible CT of a trunk that never was: skin, fat, muscle, lungs with vessels, heart, liver, spine, ribs, table, noise;
+/// HU from -1024 to about 1500. A function of its arguments alone (own sine, own random numbers): the same bits everywhere.
+///
+/// @param size     voxels along i, j, k; each at least 2
+/// @param spacing  mm; the body scales with the field of view, the grid is axial LPS with its middle at the origin
+/// @param seed     noise, and small variations of the anatomy
+Volume<std::int16_t> make_phantom(const glm::i64vec3& size, const glm::dvec3& spacing, std::uint64_t seed);
+
+}  // namespace tetwarp

@@ -1,0 +1,57 @@
+#include "deform/resampler.h"
+
+namespace tetwarp {
+
+namespace {
+
+void require_one_each(const Geometry& grid, std::size_t vectors) {
+  require(static_cast<std::size_t>(voxel_count(grid)) == vectors,
+          "a field on " + to_string(grid.size) + " vertices needs " + std::to_string(voxel_count(grid)) +
+              " displacements, found " + std::to_string(vectors));
+}
+
+}  // namespace
+
+FieldView view(const VertexField& field, Outside outside) {
+  require_one_each(field.lattice, field.displacement.size());
+  return {&field.lattice, field.displacement.data(), outside};
+}
+
+PullFieldView view(const PullField& field, Outside outside) {
+  require_one_each(field.grid, field.displacement.size());
+  return {&field.grid, field.displacement.data(), outside};
+}
+
+Resampler::Resampler(Geometry output) : output_(output) {
+  require_valid(output_, "output grid");
+  for (int axis = 0; axis < 3; ++axis) {
+    require(output_.size[axis] >= 2, "output grid of " + to_string(output_.size) +
+                                         " voxels: deforming needs at least 2 on every axis");
+    require(output_.size[axis] <= std::int64_t{1} << 18,
+            "output grid of " + to_string(output_.size) + " voxels: at most 262144 on an axis");
+  }
+}
+
+void Resampler::set_field(const FieldView&, const Control&) {
+  throw InputError("a forward field was given to a resampler of pull fields");
+}
+
+void Resampler::set_field(const PullFieldView&, const Control&) {
+  throw InputError("a pull field was given to a resampler of forward fields");
+}
+
+Report& Report::operator+=(const Report& other) {
+  covered += other.covered;
+  uncovered += other.uncovered;
+  clamped += other.clamped;
+  padded += other.padded;
+  conflicts += other.conflicts;
+  inverted = std::max(inverted, other.inverted);
+  degenerate = std::max(degenerate, other.degenerate);
+  if (other.multiply_owned) multiply_owned = multiply_owned.value_or(0) + *other.multiply_owned;
+  jacobian_min = std::min(jacobian_min, other.jacobian_min);
+  jacobian_max = std::max(jacobian_max, other.jacobian_max);
+  return *this;
+}
+
+}  // namespace tetwarp

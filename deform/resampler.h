@@ -1,0 +1,118 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <stop_token>
+
+#include "deform/vertex_field.h"
+#include "deform/volume.h"
+
+namespace tetwarp {
+
+enum class Interpolation : std::uint8_t { nearest, linear, cubic };
+
+/// Stored values from `low` to `high` are no data (DICOM Pixel Padding Value and Range Limit, PS3.3 C.7.5.1.1.2).
+struct PaddingRange {
+  double low = 0, high = 0;
+};
+
+/// First and last slice (k) of the source that some voxel of an output slice was interpolated from; empty while first > last.
+struct SliceRange {
+  std::int64_t first = INT64_MAX, last = INT64_MIN;
+};
+
+/// One volume through the field. Any number of them share owner and undeformed coordinate.
+struct Target {
+  ConstVolumeView source;                     ///< must buffer `Resampler::source_region`
+  VolumeView output;                          ///< on the resampler's geometry, of the source's type; must buffer the region asked for
+  Interpolation interpolation = Interpolation::linear;
+  double background = 0;                      ///< where nothing maps; rounded and saturated to the voxel type
+  std::optional<PaddingRange> padding = {};   ///< never mixed into tissue: see core/sample.h
+  std::span<SliceRange> sampled_slices = {};  ///< one per slice of the output geometry, or none: grown by each call
+};
+
+/// Further results on the output geometry. A view without voxels is not wanted.
+struct Maps {
+  VolumeView coverage = {};    ///< u8: 1 where the voxel got a value through the field (from the first target's source), else 0
+  VolumeView inverse_mm = {};  ///< f32, 3 components: undeformed minus deformed point, LPS mm; NaN where nothing owns
+  VolumeView jacobian = {};    ///< f32: determinant of the owner's forward map, negative where inverted; NaN where nothing owns
+  VolumeView owners = {};      ///< u16: tetrahedra that own the voxel; more than 1 is a fold; saturates
+};
+
+/// What happened. Voxel counts are of the region asked for and the first target; the rest describes the whole field.
+struct Report {
+  std::uint64_t covered = 0;     ///< voxels that got a value through the field
+  std::uint64_t uncovered = 0;   ///< voxels that got the background
+  std::uint64_t clamped = 0;     ///< voxels whose value did not fit the voxel type and was saturated
+  std::uint64_t padded = 0;      ///< voxels with padding among the samples that count: value of the nearest sample
+  std::uint64_t conflicts = 0;   ///< Outside::rest only: voxels outside the undeformed lattice that a tetrahedron moved into
+  std::uint64_t inverted = 0;    ///< tetrahedra of the field turned inside out
+  std::uint64_t degenerate = 0;  ///< tetrahedra of the field without volume: they own nothing
+  std::optional<std::uint64_t> multiply_owned = {};  ///< voxels with more than one owner, where Maps::owners was asked for
+  double jacobian_min = 1, jacobian_max = 1;         ///< over all tetrahedra of the field
+
+  /// Regions of one field add up to the same report, whatever the split.
+  Report& operator+=(const Report& other);
+};
+
+/// Progress and cancellation. Never changes a bit of the result.
+struct Control {
+  std::function<void(double)> progress = {};  ///< 0 to 1, monotone, one call at a time, from any thread
+  std::stop_token stop = {};                  ///< asked between tiles: the call throws Cancelled
+};
+
+/// Sends volumes through a field onto one output geometry; takes field after field.
+///
+/// The result is a function of source, field and output alone (docs/algorithm.md): the same bits for any number of
+/// threads, any split into regions and any backend.
+class Resampler {
+ public:
+  virtual ~Resampler() = default;
+  const Geometry& output() const { return output_; }
+
+  /// Checks the field and takes its bounds. The view is kept: its vertices must stay as they are until the next call.
+  /// @throws InputError for a field that is not finite, too far away, too fine, or that does not reach over the output
+  ///         (Outside::refuse); or of the other direction than this resampler's
+  virtual void set_field(const FieldView& field, const Control& control = {});
+  virtual void set_field(const PullFieldView& field, const Control& control = {});
+
+  /// The part of a source grid that `resample(output)` may read: what a streaming reader must hold.
+  virtual Region source_region(const Geometry& source, Region output) const = 0;
+
+  /// Writes `region` of every target and map. @throws InputError for views that do not fit; Cancelled
+  virtual Report resample(Region region, std::span<const Target> targets, const Maps& maps = {}, const Control& control = {}) = 0;
+
+ protected:
+  explicit Resampler(Geometry output);
+
+ private:
+  Geometry output_;
+};
+
+struct Limits {
+  int threads = 0;  ///< 0: all that this process may use
+};
+
+/// Forward fields on the CPU. @throws InputError for an output with fewer than two voxels or more than 2^18 on an axis
+std::unique_ptr<Resampler> make_cpu_resampler(Geometry output, Limits limits = {});
+/// Pull fields on the CPU: the same Resampler, fed with PullFieldView.
+std::unique_ptr<Resampler> make_cpu_pull_resampler(Geometry output, Limits limits = {});
+
+/// One whole volume through one field, onto the resampler's geometry; the background is the smallest value present.
+template <class V>
+Volume<V> resample(Resampler& resampler, const Volume<V>& source, const VertexField& field, Report* report = nullptr) {
+  require(!source.voxels.empty(), "the source volume is empty");
+  Volume<V> output{resampler.output(), std::vector<V>(static_cast<std::size_t>(voxel_count(resampler.output())))};
+  resampler.set_field(view(field));
+  const V smallest = *std::min_element(source.voxels.begin(), source.voxels.end());
+  const Target target{.source = view(source), .output = view(output), .background = static_cast<double>(smallest)};
+  const Report result = resampler.resample(whole(output.geometry), {&target, 1});
+  if (report) *report = result;
+  return output;
+}
+
+}  // namespace tetwarp

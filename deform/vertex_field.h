@@ -1,0 +1,47 @@
+#pragma once
+
+#include <vector>
+
+#include "deform/geometry.h"
+
+namespace tetwarp {
+
+/// Forward deformation: a regular lattice of vertices and where each goes. A value; simulators, files and formulas return it.
+///
+/// Every cell of the lattice is split into five tetrahedra (core/five_tetrahedra.h); inside each the map is affine.
+struct VertexField {
+  Geometry lattice;                     ///< of the undeformed vertices; its last cells may overhang a volume
+  std::vector<glm::vec3> displacement;  ///< LPS mm, deformed minus rest, i fastest, 12 bytes each (1.9 GB at 512x512x600); zero rests exactly
+};
+
+/// Deformation the other way round, as registration tools write it: what lies at output point p comes from p + d(p).
+/// Another type, for the two never convert silently.
+struct PullField {
+  Geometry grid;                        ///< samples of d; trilinear between them
+  std::vector<glm::vec3> displacement;  ///< LPS mm, input point minus output point, i fastest
+};
+
+/// What becomes of a voxel that lies outside the undeformed lattice (or the grid of a pull field), where no tetrahedron owns it.
+enum class Outside : std::uint8_t {
+  refuse,     ///< the field must reach over the whole output: `set_field` throws otherwise
+  rest,       ///< the voxel stays where it is
+  background  ///< the voxel gets the background, its coverage is 0
+};
+
+/// Not an owner: the field must outlive the view, and the Resampler that the view was given to.
+struct FieldView {
+  const Geometry* lattice = nullptr;
+  const glm::vec3* displacement = nullptr;
+  Outside outside = Outside::refuse;
+};
+struct PullFieldView {
+  const Geometry* grid = nullptr;
+  const glm::vec3* displacement = nullptr;
+  Outside outside = Outside::refuse;
+};
+
+/// @throws InputError unless there is one displacement for each vertex
+FieldView view(const VertexField& field, Outside outside = Outside::refuse);
+PullFieldView view(const PullField& field, Outside outside = Outside::refuse);
+
+}  // namespace tetwarp

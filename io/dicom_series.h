@@ -1,0 +1,92 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "deform/resampler.h"
+#include "deform/volume.h"
+
+namespace tetwarp {
+
+/// One file of a series, from its header alone.
+struct DicomSlice {
+  std::filesystem::path file;
+  std::string sop_instance_uid;
+  std::string transfer_syntax_uid;
+  int instance_number = 0;
+  double position_mm = 0;  ///< Image Position (Patient) along the slice normal
+};
+
+/// The files that share a Series Instance UID, and the one volume that they make, if they do.
+/// Files of the series that cannot belong to a CT volume (localizers, secondary captures, dose, structures) are set aside.
+struct DicomSeries {
+  std::string series_uid, study_uid, frame_of_reference_uid, modality;
+  std::vector<DicomSlice> slices;      ///< sorted by position along the normal, row x column
+  Geometry geometry;                   ///< from Image Position and Orientation (Patient) and Pixel Spacing alone
+  std::vector<std::string> set_aside;  ///< "FILE: reason", one a file
+  std::optional<std::string> refusal;  ///< why the slices are not a volume: what, where, expected and found
+  std::vector<std::string> warnings;   ///< worth knowing, harmless to the volume
+};
+
+struct DicomScan {
+  std::vector<DicomSeries> series;   ///< in the order of Series Number, then UID: the numbers that `--series` takes, from 1
+  std::vector<std::string> skipped;  ///< "FILE: reason" for files that are not DICOM images at all
+};
+
+/// Reads the headers of every file under a folder, once (sub-folders included, symbolic links followed, each real folder
+/// once); or of one file and the series beside it; or, with `single`, of that file alone.
+/// @throws InputError when the path does not exist or cannot be read
+DicomScan scan_dicom(const std::filesystem::path& path, bool single = false, const Control& control = {});
+
+/// The headers of a series' slices, k-th slice first to last: what a derived series carries over. Hides DCMTK.
+struct DicomHeaders;
+
+struct DicomVolume {
+  Volume<std::int16_t> volume;          ///< HU, each slice through its own Rescale Slope and Intercept
+  std::optional<PaddingRange> padding;  ///< Pixel Padding Value and Range Limit in HU, when all slices agree
+  std::uint64_t rounded = 0;            ///< voxels whose HU was fractional and was rounded half to even
+  std::string series_uid;
+  std::string sha256;                   ///< of the files' bytes, in slice order
+  std::shared_ptr<const DicomHeaders> headers;
+};
+
+/// Reads and decodes the slices in parallel; each file is read and parsed once.
+/// @throws InputError for a series with a refusal, a file that changed or is truncated, a transfer syntax that cannot be
+///         decoded, HU beyond int16: naming the file, the tag, expected and found
+DicomVolume load_dicom(const DicomSeries& series, int threads = 0, const Control& control = {});
+
+/// What a derived series says of how it came to be.
+struct DicomDerivation {
+  std::string field_sha256;     ///< hex: the frame of reference depends on it and on the source's frame alone
+  std::string parameters;       ///< the options that decide voxels, in one canonical line
+  std::string description;      ///< Derivation Description: "Deformed by ..."; no paths, no names
+  bool deformed = true;         ///< false for identity: the frame of reference is kept
+  double background_hu = -1024;
+  std::vector<SliceRange> sampled_slices;  ///< per output slice: the source slices that it was interpolated from
+};
+
+/// What the writer had to add or could not carry over, for the report.
+struct DicomWriteReport {
+  std::string series_uid, frame_of_reference_uid;
+  std::vector<std::string> added_empty;  ///< missing type 2 attributes: "(0008,0090) ReferringPhysicianName"
+};
+
+/// Writes a derived CT series (PS3.3 A.3; docs/dicom.md has the table of attributes) of one file a slice into the folder
+/// `folder`, which exists and is empty. `volume` is int16 HU with as many slices as the source.
+/// Reads no clock: the same input gives the same bytes and the same UIDs.
+/// @throws InputError, Error when a file cannot be written
+DicomWriteReport write_derived_series(const std::filesystem::path& folder, const ConstVolumeView& volume,
+                                      const DicomHeaders& source, const DicomDerivation& derivation, int threads = 0,
+                                      const Control& control = {});
+
+/// Writes a made-up CT series for a volume of int16 HU that never was a patient (tetwarp phantom).
+void write_phantom_series(const std::filesystem::path& folder, const ConstVolumeView& volume, std::uint64_t seed,
+                          const Control& control = {});
+
+/// Whether a DICOM file says that Tetwarp wrote it (Contributing Equipment or Manufacturer).
+bool is_tetwarp_dicom(const std::filesystem::path& file);
+
+}  // namespace tetwarp
