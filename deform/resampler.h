@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -53,7 +54,8 @@ struct Report {
   std::uint64_t inverted = 0;    ///< tetrahedra of the field turned inside out
   std::uint64_t degenerate = 0;  ///< tetrahedra of the field without volume: they own nothing
   std::optional<std::uint64_t> multiply_owned = {};  ///< voxels with more than one owner, where Maps::owners was asked for
-  double jacobian_min = 1, jacobian_max = 1;         ///< over all tetrahedra of the field
+  double jacobian_min = std::numeric_limits<double>::infinity();   ///< over all tetrahedra of the field
+  double jacobian_max = -std::numeric_limits<double>::infinity();
 
   /// Regions of one field add up to the same report, whatever the split.
   Report& operator+=(const Report& other);

@@ -1,6 +1,7 @@
 #include "deform/fields/sincos.h"
 
 #include <cmath>
+#include <initializer_list>
 
 namespace tetwarp {
 

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+
+/// The folder of an unpacked set of real series ($TETWARP_TEST_DATA/SET), or an empty path where it is absent.
+inline std::filesystem::path real_data(const std::string& set) {
+  const char* root = std::getenv("TETWARP_TEST_DATA");
+  if (!root) return {};
+  const std::filesystem::path folder = std::filesystem::path(root) / set;
+  return std::filesystem::exists(folder) ? folder : std::filesystem::path();
+}
+
+/// Skips the test with a reason where the set is absent; defines `folder` where it is there.
+#define TETWARP_REAL_DATA(folder, set)                                                              \
+  const std::filesystem::path folder = real_data(set);                                              \
+  if (folder.empty()) GTEST_SKIP() << "no real data: " << (set) << " is not in $TETWARP_TEST_DATA"
