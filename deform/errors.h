@@ -5,7 +5,8 @@
 
 namespace tetwarp {
 
-/// Root of everything that Tetwarp throws. The text is one line: WHAT, WHERE; WHAT TO DO, with expected and found values.
+/// Root of everything that Tetwarp throws. The text is one line: WHAT, WHERE; WHAT TO DO, with expected and found
+/// values.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

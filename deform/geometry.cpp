@@ -53,7 +53,8 @@ bool same_grid(const Geometry& a, const Geometry& b, double tolerance_mm) {
   if (a.size != b.size) return false;
   const AffineMap point_a = point_from_index(a), point_b = point_from_index(b);
   for (int corner = 0; corner < 8; ++corner) {
-    const glm::dvec3 index = glm::dvec3(corner & 1, corner >> 1 & 1, corner >> 2) * glm::dvec3(a.size - std::int64_t{1});
+    const glm::dvec3 index =
+        glm::dvec3(corner & 1, corner >> 1 & 1, corner >> 2) * glm::dvec3(a.size - std::int64_t{1});
     if (!(glm::distance(point_a(index), point_b(index)) <= tolerance_mm)) return false;
   }
   return true;
@@ -62,8 +63,8 @@ bool same_grid(const Geometry& a, const Geometry& b, double tolerance_mm) {
 Geometry lattice_over(const Geometry& volume, std::int64_t cell_size) {
   require(cell_size >= 1, "cell size " + std::to_string(cell_size) + ", expected at least 1 voxel");
   for (int axis = 0; axis < 3; ++axis) {
-    require(volume.size[axis] >= 2, "a volume of " + to_string(volume.size) +
-                                        " voxels has no cell: deforming needs at least 2 on every axis");
+    require(volume.size[axis] >= 2,
+            "a volume of " + to_string(volume.size) + " voxels has no cell: deforming needs at least 2 on every axis");
   }
   Geometry lattice = volume;
   lattice.size = (volume.size - std::int64_t{1} + (cell_size - 1)) / cell_size + std::int64_t{1};
@@ -84,7 +85,8 @@ std::string orientation_code(const Geometry& geometry) {
 
 void require_valid(const Geometry& geometry, const std::string& what) {
   for (int axis = 0; axis < 3; ++axis) {
-    require(geometry.size[axis] >= 1, what + ": size " + to_string(geometry.size) + ", expected at least 1 on every axis");
+    require(geometry.size[axis] >= 1,
+            what + ": size " + to_string(geometry.size) + ", expected at least 1 on every axis");
     require(std::isfinite(geometry.spacing[axis]) && geometry.spacing[axis] > 0,
             what + ": spacing " + std::to_string(geometry.spacing[axis]) + " mm on axis " + std::to_string(axis) +
                 ", expected a positive number");

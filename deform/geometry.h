@@ -12,10 +12,10 @@ namespace tetwarp {
 /// A voxel is a point sample at its centre: continuous index (i, j, k) lies at
 /// `origin + direction * (spacing * index)`; column c of `direction` is the unit vector along which index c grows.
 struct Geometry {
-  glm::i64vec3 size{0};        ///< samples along i, j, k
-  glm::dvec3 spacing{1};       ///< mm between neighbours along i, j, k, each > 0
-  glm::dvec3 origin{0};        ///< LPS mm of the centre of sample (0, 0, 0)
-  glm::dmat3 direction{1};     ///< columns: directions of i, j, k in LPS
+  glm::i64vec3 size{0};     ///< samples along i, j, k
+  glm::dvec3 spacing{1};    ///< mm between neighbours along i, j, k, each > 0
+  glm::dvec3 origin{0};     ///< LPS mm of the centre of sample (0, 0, 0)
+  glm::dmat3 direction{1};  ///< columns: directions of i, j, k in LPS
 
   friend bool operator==(const Geometry&, const Geometry&) = default;
 };

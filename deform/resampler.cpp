@@ -25,8 +25,8 @@ PullFieldView view(const PullField& field, Outside outside) {
 Resampler::Resampler(Geometry output) : output_(output) {
   require_valid(output_, "output grid");
   for (int axis = 0; axis < 3; ++axis) {
-    require(output_.size[axis] >= 2, "output grid of " + to_string(output_.size) +
-                                         " voxels: deforming needs at least 2 on every axis");
+    require(output_.size[axis] >= 2,
+            "output grid of " + to_string(output_.size) + " voxels: deforming needs at least 2 on every axis");
     require(output_.size[axis] <= std::int64_t{1} << 18,
             "output grid of " + to_string(output_.size) + " voxels: at most 262144 on an axis");
   }

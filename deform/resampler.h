@@ -21,15 +21,16 @@ struct PaddingRange {
   double low = 0, high = 0;
 };
 
-/// First and last slice (k) of the source that some voxel of an output slice was interpolated from; empty while first > last.
+/// First and last slice (k) of the source that some voxel of an output slice was interpolated from; empty while first >
+/// last.
 struct SliceRange {
   std::int64_t first = INT64_MAX, last = INT64_MIN;
 };
 
 /// One volume through the field. Any number of them share owner and undeformed coordinate.
 struct Target {
-  ConstVolumeView source;                     ///< must buffer `Resampler::source_region`
-  VolumeView output;                          ///< on the resampler's geometry, of the source's type; must buffer the region asked for
+  ConstVolumeView source;  ///< must buffer `Resampler::source_region`
+  VolumeView output;       ///< on the resampler's geometry, of the source's type; must buffer the region asked for
   Interpolation interpolation = Interpolation::linear;
   double background = 0;                      ///< where nothing maps; rounded and saturated to the voxel type
   std::optional<PaddingRange> padding = {};   ///< never mixed into tissue: see core/sample.h
@@ -38,23 +39,27 @@ struct Target {
 
 /// Further results on the output geometry. A view without voxels is not wanted.
 struct Maps {
-  VolumeView coverage = {};    ///< u8: 1 where the voxel got a value through the field (from the first target's source), else 0
-  VolumeView inverse_mm = {};  ///< f32, 3 components: undeformed minus deformed point, LPS mm; NaN where nothing owns
-  VolumeView jacobian = {};    ///< f32: determinant of the owner's forward map, negative where inverted; NaN where nothing owns
-  VolumeView owners = {};      ///< u16: tetrahedra that own the voxel; more than 1 is a fold; saturates
+  VolumeView coverage =
+      {};  ///< u8: 1 where the voxel got a value through the field (from the first target's source), else 0
+  VolumeView inverse_mm = {};  ///< f32, 3 components: undeformed minus deformed point, LPS mm; NaN where nothing maps
+  VolumeView jacobian =
+      {};  ///< f32: determinant of the owner's forward map, negative where inverted; NaN where nothing maps
+  VolumeView owners = {};  ///< u16: tetrahedra that own the voxel; more than 1 is a fold; saturates
 };
 
 /// What happened. Voxel counts are of the region asked for and the first target; the rest describes the whole field.
 struct Report {
-  std::uint64_t covered = 0;     ///< voxels that got a value through the field
-  std::uint64_t uncovered = 0;   ///< voxels that got the background
-  std::uint64_t clamped = 0;     ///< voxels whose value did not fit the voxel type and was saturated
-  std::uint64_t padded = 0;      ///< voxels with padding among the samples that count: value of the nearest sample
-  std::uint64_t conflicts = 0;   ///< Outside::rest only: voxels outside the undeformed lattice that a tetrahedron moved into
+  std::uint64_t covered = 0;    ///< voxels that got a value through the field
+  std::uint64_t uncovered = 0;  ///< voxels that got the background
+  std::uint64_t clamped = 0;    ///< voxels whose value did not fit the voxel type and was saturated
+  std::uint64_t padded = 0;     ///< voxels with padding among the samples that count: value of the nearest sample
+  std::uint64_t conflicts =
+      0;  ///< Outside::rest only: voxels outside the undeformed lattice that a tetrahedron moved into
   std::uint64_t inverted = 0;    ///< tetrahedra of the field turned inside out
   std::uint64_t degenerate = 0;  ///< tetrahedra of the field without volume: they own nothing
-  std::optional<std::uint64_t> multiply_owned = {};  ///< voxels with more than one owner, where Maps::owners was asked for
-  double jacobian_min = std::numeric_limits<double>::infinity();   ///< over all tetrahedra of the field
+  std::optional<std::uint64_t> multiply_owned =
+      {};  ///< voxels with more than one owner, where Maps::owners was asked for
+  double jacobian_min = std::numeric_limits<double>::infinity();  ///< over all tetrahedra of the field
   double jacobian_max = -std::numeric_limits<double>::infinity();
 
   /// Regions of one field add up to the same report, whatever the split.
@@ -86,7 +91,8 @@ class Resampler {
   virtual Region source_region(const Geometry& source, Region output) const = 0;
 
   /// Writes `region` of every target and map. @throws InputError for views that do not fit; Cancelled
-  virtual Report resample(Region region, std::span<const Target> targets, const Maps& maps = {}, const Control& control = {}) = 0;
+  virtual Report resample(Region region, std::span<const Target> targets, const Maps& maps = {},
+                          const Control& control = {}) = 0;
 
  protected:
   explicit Resampler(Geometry output);

@@ -6,12 +6,14 @@
 
 namespace tetwarp {
 
-/// Forward deformation: a regular lattice of vertices and where each goes. A value; simulators, files and formulas return it.
+/// Forward deformation: a regular lattice of vertices and where each goes. A value; simulators, files and formulas
+/// return it.
 ///
 /// Every cell of the lattice is split into five tetrahedra (core/five_tetrahedra.h); inside each the map is affine.
 struct VertexField {
   Geometry lattice;                     ///< of the undeformed vertices; its last cells may overhang a volume
-  std::vector<glm::vec3> displacement;  ///< LPS mm, deformed minus rest, i fastest, 12 bytes each (1.9 GB at 512x512x600); zero rests exactly
+  std::vector<glm::vec3> displacement;  ///< LPS mm, deformed minus rest, i fastest, 12 bytes each (1.9 GB at
+                                        ///< 512x512x600); zero rests exactly
 };
 
 /// Deformation the other way round, as registration tools write it: what lies at output point p comes from p + d(p).
@@ -21,7 +23,8 @@ struct PullField {
   std::vector<glm::vec3> displacement;  ///< LPS mm, input point minus output point, i fastest
 };
 
-/// What becomes of a voxel that lies outside the undeformed lattice (or the grid of a pull field), where no tetrahedron owns it.
+/// What becomes of a voxel that lies outside the undeformed lattice (or the grid of a pull field), where no tetrahedron
+/// owns it.
 enum class Outside : std::uint8_t {
   refuse,     ///< the field must reach over the whole output: `set_field` throws otherwise
   rest,       ///< the voxel stays where it is

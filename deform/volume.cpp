@@ -13,17 +13,18 @@ std::string to_string(VoxelType type) {
 
 AnyVolume::AnyVolume(Geometry geometry, VoxelType type, int components)
     : geometry_(geometry), type_(type), components_(components) {
-  voxels_ = std::make_unique_for_overwrite<std::byte[]>(size_bytes());
+  voxels_ = std::shared_ptr<std::byte>(new std::byte[size_bytes()], std::default_delete<std::byte[]>());
 }
 
 void AnyVolume::set_geometry(const Geometry& geometry) {
-  require(geometry.size == geometry_.size, "a volume of " + to_string(geometry_.size) + " voxels cannot take a grid of " +
-                                               to_string(geometry.size));
+  require(geometry.size == geometry_.size,
+          "a volume of " + to_string(geometry_.size) + " voxels cannot take a grid of " + to_string(geometry.size));
   geometry_ = geometry;
 }
 
 std::size_t AnyVolume::size_bytes() const {
-  return static_cast<std::size_t>(voxel_count(geometry_)) * static_cast<std::size_t>(components_) * tetwarp::size_bytes(type_);
+  return static_cast<std::size_t>(voxel_count(geometry_)) * static_cast<std::size_t>(components_) *
+         tetwarp::size_bytes(type_);
 }
 
 VolumeView AnyVolume::view() { return {&geometry_, whole(geometry_), type_, components_, data()}; }

@@ -21,13 +21,20 @@ std::string to_string(VoxelType type);
 /// The VoxelType of a C++ type.
 template <class V>
 constexpr VoxelType voxel_type_of() {
-  if constexpr (std::is_same_v<V, std::uint8_t>) return VoxelType::u8;
-  else if constexpr (std::is_same_v<V, std::int8_t>) return VoxelType::i8;
-  else if constexpr (std::is_same_v<V, std::uint16_t>) return VoxelType::u16;
-  else if constexpr (std::is_same_v<V, std::int16_t>) return VoxelType::i16;
-  else if constexpr (std::is_same_v<V, std::uint32_t>) return VoxelType::u32;
-  else if constexpr (std::is_same_v<V, std::int32_t>) return VoxelType::i32;
-  else if constexpr (std::is_same_v<V, float>) return VoxelType::f32;
+  if constexpr (std::is_same_v<V, std::uint8_t>)
+    return VoxelType::u8;
+  else if constexpr (std::is_same_v<V, std::int8_t>)
+    return VoxelType::i8;
+  else if constexpr (std::is_same_v<V, std::uint16_t>)
+    return VoxelType::u16;
+  else if constexpr (std::is_same_v<V, std::int16_t>)
+    return VoxelType::i16;
+  else if constexpr (std::is_same_v<V, std::uint32_t>)
+    return VoxelType::u32;
+  else if constexpr (std::is_same_v<V, std::int32_t>)
+    return VoxelType::i32;
+  else if constexpr (std::is_same_v<V, float>)
+    return VoxelType::f32;
   else {
     static_assert(std::is_same_v<V, double>, "not a voxel type");
     return VoxelType::f64;
@@ -57,8 +64,12 @@ struct BasicView {
   const Geometry* geometry = nullptr;
   Region buffered;
   VoxelType type = VoxelType::i16;
-  int components = 1;     ///< values a voxel, side by side
+  int components = 1;      ///< values a voxel, side by side
   Byte* voxels = nullptr;  ///< null: no volume
+
+  operator BasicView<const Byte>() const requires(!std::is_const_v<Byte>) {
+    return {geometry, buffered, type, components, voxels};
+  }
 };
 using VolumeView = BasicView<std::byte>;
 using ConstVolumeView = BasicView<const std::byte>;
@@ -72,11 +83,13 @@ struct Volume {
 
 template <class V>
 VolumeView view(Volume<V>& volume) {
-  return {&volume.geometry, whole(volume.geometry), voxel_type_of<V>(), 1, std::as_writable_bytes(std::span(volume.voxels)).data()};
+  return {&volume.geometry, whole(volume.geometry), voxel_type_of<V>(), 1,
+          std::as_writable_bytes(std::span(volume.voxels)).data()};
 }
 template <class V>
 ConstVolumeView view(const Volume<V>& volume) {
-  return {&volume.geometry, whole(volume.geometry), voxel_type_of<V>(), 1, std::as_bytes(std::span(volume.voxels)).data()};
+  return {&volume.geometry, whole(volume.geometry), voxel_type_of<V>(), 1,
+          std::as_bytes(std::span(volume.voxels)).data()};
 }
 
 /// Owner of a whole volume whose voxel type is known at run time only: what a file holds.
@@ -85,6 +98,14 @@ class AnyVolume {
  public:
   AnyVolume() = default;
   AnyVolume(Geometry geometry, VoxelType type, int components = 1);
+  /// Takes the voxels over.
+  template <class V>
+  explicit AnyVolume(Volume<V>&& volume) : geometry_(volume.geometry), type_(voxel_type_of<V>()) {
+    auto owner = std::make_shared<std::vector<V>>(std::move(volume.voxels));
+    voxels_ = std::shared_ptr<std::byte>(owner, reinterpret_cast<std::byte*>(owner->data()));
+  }
+  AnyVolume(AnyVolume&&) noexcept = default;
+  AnyVolume& operator=(AnyVolume&&) noexcept = default;
 
   const Geometry& geometry() const { return geometry_; }
   void set_geometry(const Geometry& geometry);  ///< same size as before, other place. @throws InputError
@@ -113,7 +134,7 @@ class AnyVolume {
   Geometry geometry_;
   VoxelType type_ = VoxelType::i16;
   int components_ = 1;
-  std::unique_ptr<std::byte[]> voxels_;
+  std::shared_ptr<std::byte> voxels_;  // of this volume alone: the type lets it own a buffer or a vector
 };
 
 }  // namespace tetwarp

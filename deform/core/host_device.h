@@ -9,7 +9,7 @@
 #define TETWARP_HD
 #endif
 
-#include <glm/mat3x3.hpp>
-#include <glm/vec3.hpp>
 #include <glm/ext/vector_int3_sized.hpp>
 #include <glm/ext/vector_uint4_sized.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>

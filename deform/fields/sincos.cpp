@@ -7,7 +7,8 @@ namespace tetwarp {
 
 namespace {
 
-// Pi / 2 in three parts (Cody and Waite 1980): the first two have 33 bits each, so multiples up to 2^20 of them are exact.
+// Pi / 2 in three parts (Cody and Waite 1980): the first two have 33 bits each, so multiples up to 2^20 of them are
+// exact.
 constexpr double kHalfPi1 = 0x1.921fb544p+0, kHalfPi2 = 0x1.0b4611a6p-34, kHalfPi3 = 0x1.3198a2e037073p-69;
 constexpr double kTwoOverPi = 0x1.45f306dc9c883p-1;
 
@@ -15,8 +16,8 @@ constexpr double kTwoOverPi = 0x1.45f306dc9c883p-1;
 double sine_near_zero(double r) {
   const double x = r * r;
   double sum = 1.0 / 355687428096000.0;
-  for (const double term : {-1.0 / 1307674368000.0, 1.0 / 6227020800.0, -1.0 / 39916800.0, 1.0 / 362880.0, -1.0 / 5040.0,
-                            1.0 / 120.0, -1.0 / 6.0}) {
+  for (const double term : {-1.0 / 1307674368000.0, 1.0 / 6227020800.0, -1.0 / 39916800.0, 1.0 / 362880.0,
+                            -1.0 / 5040.0, 1.0 / 120.0, -1.0 / 6.0}) {
     sum = sum * x + term;
   }
   return r + r * (x * sum);

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "deform/resampler.h"
+
+namespace tetwarp::apps {
+
+enum class Direction { forward, pull };
+
+struct Backend {
+  std::string name;  ///< the one that runs: never "auto"
+  std::unique_ptr<Resampler> resampler;
+};
+
+/// @param wanted  auto, cpu or cuda
+/// @throws NotCompiled for a backend that this build does not have, DeviceError for one that does not work here
+Backend make_backend(const std::string& wanted, Direction direction, const Geometry& output, const Limits& limits);
+
+/// One line a backend: its name, and whether it can be used on this machine.
+std::vector<std::string> describe_backends();
+
+}  // namespace tetwarp::apps

@@ -1,0 +1,172 @@
+#include <CLI/CLI.hpp>
+#include <map>
+
+#include <tbb/global_control.h>
+
+#include "apps/backend.h"
+#include "apps/options.h"
+#include "deform/version.h"
+
+namespace tetwarp::apps {
+
+namespace {
+
+/// The options of every subcommand; one of them was given.
+struct Commands {
+  PhantomOptions phantom;
+  InfoOptions info;
+  FieldOptions field;
+  DeformOptions deform;
+};
+
+void add_common(CLI::App& command, CommonOptions& common, bool writes) {
+  command.add_option("--threads", common.threads, "Threads; 0 is all")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command.add_flag("--quiet", common.quiet, "Say nothing unless something is wrong");
+  command.add_flag("--verbose", common.verbose, "Say how long each stage takes");
+  if (writes) command.add_flag("--overwrite", common.overwrite, "Replace an output that exists");
+}
+
+void add_series(CLI::App& command, InputOptions& input) {
+  command.add_option("--series", input.series, "Series Instance UID, or the number that `tetwarp info` prints")
+      ->type_name("UID");
+  command.add_flag("--single", input.single, "Read the one DICOM file alone, not its series");
+}
+
+constexpr const char* kInputHelp = "Folder of DICOM files, one DICOM file, or .nii .nii.gz .nrrd .mha";
+constexpr const char* kFieldHelp =
+    "Forward field: a file (.mha .nrrd .nii .nii.gz) or identity, wave:amplitude=,wavelength=[,phase=,axis=,along=], "
+    "twist:angle=[,axis=], bubble:radius=,strength=[,center=X/Y/Z], bubble-paper:shift=[,center=], translate:by=X/Y/Z; "
+    "mm, "
+    "or voxels with the suffix vox; degrees. Several compose, the first is applied first";
+
+void add_phantom(CLI::App& app, PhantomOptions& options) {
+  CLI::App* command = app.add_subcommand("phantom", "Make a CT of a trunk that never was");
+  command->add_option("-o,--output", options.output, "A folder (DICOM series), or .nii .nii.gz .nrrd .mha")->required();
+  command->add_option("--size", options.size, "Voxels along i, j, k")
+      ->expected(3)
+      ->delimiter(',')
+      ->capture_default_str();
+  command->add_option("--spacing", options.spacing, "Millimetres along i, j, k")
+      ->expected(3)
+      ->delimiter(',')
+      ->capture_default_str();
+  command->add_option("--seed", options.seed, "Noise and small variations of the anatomy")->capture_default_str();
+  add_common(*command, options.common, true);
+  command->footer("Example: tetwarp phantom -o phantom_dicom --size 512,512,100 --spacing 0.8,0.8,3");
+}
+
+void add_info(CLI::App& app, InfoOptions& options) {
+  CLI::App* command = app.add_subcommand("info", "Say what an input or a field file holds");
+  command->add_option("INPUT", options.input.path, std::string(kInputHelp) + ", or a field file")->required();
+  command->add_flag("--single", options.input.single, "Look at the one DICOM file alone, not its series");
+  command->add_flag("--json", options.json, "One JSON document on standard output");
+  add_common(*command, options.common, false);
+  command->footer("Example: tetwarp info study_folder");
+}
+
+void add_field(CLI::App& app, FieldOptions& options) {
+  CLI::App* command = app.add_subcommand("field", "Write a field as a file");
+  command->add_option("FIELD", options.fields, kFieldHelp)->required();
+  command->add_option("--like", options.like.path, "The volume that the field is for")->required();
+  command->add_option("-o,--output", options.output, ".mha .nrrd .nii .nii.gz, three components, LPS mm")->required();
+  command->add_option("--cell-size", options.cell_size, "Vertices every B voxels, for formulas only (default 1)")
+      ->type_name("B");
+  add_series(*command, options.like);
+  add_common(*command, options.common, true);
+  command->footer("Example: tetwarp field twist:angle=30 --like ct.nii.gz -o twist.mha --cell-size 4");
+}
+
+void add_deform(CLI::App& app, DeformOptions& options) {
+  CLI::App* command = app.add_subcommand("deform", "Deform a volume");
+  command->add_option("INPUT", options.input.path, kInputHelp)->required();
+  auto* field =
+      command->add_option("-f,--field", options.fields, kFieldHelp)->allow_extra_args(false)->type_name("FIELD");
+  command
+      ->add_option("--pull-field", options.pull_field,
+                   "A field that maps output to input, as registration tools write it")
+      ->type_name("FILE")
+      ->excludes(field);
+  command
+      ->add_option("-o,--output", options.output,
+                   "A folder (DICOM series; INPUT must be DICOM), or .nii .nii.gz .nrrd .mha")
+      ->required();
+  add_series(*command, options.input);
+  command->add_option("--backend", options.backend, "auto, cuda or cpu: the bits are the same")
+      ->check(CLI::IsMember({"auto", "cuda", "cpu"}))
+      ->capture_default_str();
+  const std::map<std::string, Interpolation> interpolations = {
+      {"nearest", Interpolation::nearest}, {"linear", Interpolation::linear}, {"cubic", Interpolation::cubic}};
+  command->add_option("--interpolation", options.interpolation, "linear (default), nearest or cubic")
+      ->transform(CLI::Transformer(interpolations).description(""))
+      ->type_name("NAME");
+  const std::map<std::string, Outside> outsides = {
+      {"refuse", Outside::refuse}, {"rest", Outside::rest}, {"background", Outside::background}};
+  command
+      ->add_option("--outside", options.outside,
+                   "A field that does not cover the volume: refuse (default), rest or background")
+      ->transform(CLI::Transformer(outsides).description(""))
+      ->type_name("NAME");
+  command->add_option(
+      "--background", options.background,
+      "Value where nothing maps (default: DICOM padding value or -1024 HU; else the smallest value present)");
+  command->add_option("--cell-size", options.cell_size, "Vertices every B voxels, for formulas only (default 1)")
+      ->type_name("B");
+  command->add_option("--memory", options.memory_bytes, "Refuse to start if more is needed: 8G, 500M")
+      ->transform(CLI::AsSizeValue(true))
+      ->type_name("SIZE");
+  command->add_option("--compress", options.compression, "Level 0 to 9 for .nii.gz .nrrd .mha")
+      ->check(CLI::Range(0, 9));
+  command->add_option("--coverage", options.coverage, "Mask of the voxels that got a value through the field")
+      ->type_name("FILE");
+  command->add_option("--report", options.report, "What happened, with times, as JSON")->type_name("FILE.json");
+  command->add_option("--preview", options.preview, "Three slices before, after and their difference")
+      ->type_name("FILE.png");
+  command->add_flag("--dry-run", options.dry_run, "Check everything and say what would be done");
+  add_common(*command, options.common, true);
+  command->footer(
+      "Example: tetwarp deform ct_folder -f wave:amplitude=8,wavelength=64 -o deformed_dicom --preview look.png");
+}
+
+std::string version_text() {
+  std::string text = std::string("tetwarp ") + version() + " (" + commit() + ")";
+  for (const std::string& line : describe_backends()) text += "\n  " + line;
+  return text;
+}
+
+template <class Options>
+int run(int (*command)(const Options&), const Options& options) {
+  std::optional<tbb::global_control> limit;
+  if (options.common.threads > 0) {
+    limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(options.common.threads));
+  }
+  return command(options);
+}
+
+}  // namespace
+
+int run_command_line(int argc, char** argv) {
+  CLI::App app("Deform medical volumes exactly: CT series in, deformed series out");
+  app.name("tetwarp");
+  app.require_subcommand(1);
+  app.set_version_flag("--version", version_text);
+  Commands commands;
+  add_phantom(app, commands.phantom);
+  add_info(app, commands.info);
+  add_deform(app, commands.deform);
+  add_field(app, commands.field);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& help) {
+    return app.exit(help);
+  } catch (const CLI::Error& error) {
+    throw UsageError(std::string(error.what()) + "; see tetwarp --help");
+  }
+  if (app.got_subcommand("phantom")) return run(run_phantom, commands.phantom);
+  if (app.got_subcommand("info")) return run(run_info, commands.info);
+  if (app.got_subcommand("field")) return run(run_field, commands.field);
+  return run(run_deform, commands.deform);
+}
+
+}  // namespace tetwarp::apps

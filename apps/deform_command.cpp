@@ -1,0 +1,347 @@
+#include <future>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "apps/backend.h"
+#include "apps/field_source.h"
+#include "apps/input.h"
+#include "apps/output.h"
+#include "io/field_file.h"
+#include "io/image_file.h"
+#include "io/preview.h"
+
+namespace tetwarp::apps {
+
+namespace {
+
+using nlohmann::json;
+
+/// Program, libraries and what a pass keeps per thread, beside volumes and field.
+constexpr std::uint64_t kOverheadBytes = 200'000'000;
+
+const char* name_of(Interpolation interpolation) {
+  constexpr const char* kNames[] = {"nearest", "linear", "cubic"};
+  return kNames[static_cast<int>(interpolation)];
+}
+
+const char* name_of(Outside outside) {
+  constexpr const char* kNames[] = {"refuse", "rest", "background"};
+  return kNames[static_cast<int>(outside)];
+}
+
+/// Where the results go while they are made.
+struct Outputs {
+  bool series = false;
+  OutputSet set;
+  std::filesystem::path volume, sidecar, coverage, report, preview;
+};
+
+/// The field of either direction, with what is said about it.
+struct AnyField {
+  Direction direction = Direction::forward;
+  ForwardField forward;
+  PullField pull;
+  std::vector<std::string> notes;
+
+  const Geometry& lattice() const { return direction == Direction::pull ? pull.grid : forward.field.lattice; }
+  const std::vector<glm::vec3>& displacement() const {
+    return direction == Direction::pull ? pull.displacement : forward.field.displacement;
+  }
+};
+
+/// One run of the command, stage by stage.
+class Deformation {
+ public:
+  explicit Deformation(const DeformOptions& options) : options_(options), outputs_(begin_outputs()) {}
+
+  int run();
+
+ private:
+  Outputs begin_outputs() const;
+  std::uint64_t plan_bytes(const InputHeader& input) const;
+  void check_memory(std::uint64_t planned) const;
+  void print_plan(const Geometry& volume, std::uint64_t planned) const;
+  void read();
+  void read_field();
+  void resample();
+  void write();
+  void write_series();
+  json canonical_options() const;
+  json sidecar() const;
+  json report_with_times() const;
+  std::string summary() const;
+
+  const DeformOptions& options_;
+  Outputs outputs_;
+  InputVolume input_;
+  AnyField field_;
+  std::string input_sha256_, field_sha256_, backend_;
+  double background_ = 0;
+  std::uint64_t planned_bytes_ = 0;
+  AnyVolume output_, coverage_;
+  std::vector<SliceRange> sampled_slices_;
+  Report report_;
+  std::optional<DicomWriteReport> dicom_report_;
+  std::vector<std::pair<std::string, double>> stages_;
+};
+
+Outputs Deformation::begin_outputs() const {
+  const DeformOptions& o = options_;
+  if (o.pull_field.empty()) {
+    check_fields(o.fields, o.cell_size);
+  } else if (o.cell_size) {
+    throw UsageError("--cell-size is for formulas, --pull-field has its own grid");
+  }
+  std::vector<std::filesystem::path> inputs{o.input.path};
+  for (const std::string& text : o.fields) {
+    if (std::filesystem::exists(text)) inputs.emplace_back(text);
+  }
+  if (!o.pull_field.empty()) inputs.push_back(o.pull_field);
+  const bool series = is_series_output(o.output);
+  if (series && has_image_suffix(o.input.path)) {
+    throw UsageError("a DICOM series can only be derived from DICOM, not from " + o.input.path.string() +
+                     "; name the output .nii.gz, .nii, .nrrd or .mha");
+  }
+  if (!o.coverage.empty() && !has_image_suffix(o.coverage)) {
+    throw UsageError("unknown suffix of --coverage \"" + o.coverage.string() + "\"; use .nii .nii.gz .nrrd .mha");
+  }
+  if (o.compression && (series || o.output.extension() == ".nii")) {
+    throw UsageError("--compress is for .nii.gz, .nrrd and .mha, not for " + o.output.string());
+  }
+  if (o.dry_run) {
+    check_apart(o.output, inputs);
+    return {series, OutputSet({}, true), {}, {}, {}, {}, {}};
+  }
+  Outputs outputs{series, OutputSet(inputs, o.common.overwrite), {}, {}, {}, {}, {}};
+  outputs.volume = outputs.set.add(o.output);
+  outputs.sidecar = outputs.set.add(sidecar_of(o.output));
+  outputs.coverage = outputs.set.add(o.coverage);
+  outputs.report = outputs.set.add(o.report);
+  outputs.preview = outputs.set.add(o.preview);
+  return outputs;
+}
+
+std::uint64_t Deformation::plan_bytes(const InputHeader& input) const {
+  const glm::i64vec3 lattice = options_.pull_field.empty()
+                                   ? lattice_size(options_.fields, input.geometry, options_.cell_size)
+                                   : read_field_header(options_.pull_field).grid.size;
+  const auto voxels = static_cast<std::uint64_t>(voxel_count(input.geometry));
+  const auto vertices = static_cast<std::uint64_t>(lattice.x * lattice.y * lattice.z);
+  return voxels * (2 * size_bytes(input.type) + (options_.coverage.empty() ? 0 : 1)) + vertices * sizeof(glm::vec3) +
+         kOverheadBytes;
+}
+
+void Deformation::check_memory(std::uint64_t planned) const {
+  if (options_.memory_bytes && planned > *options_.memory_bytes) {
+    throw Error("about " + format_bytes(planned) + " of memory are needed, --memory allows " +
+                format_bytes(*options_.memory_bytes) + "; a larger --cell-size needs less");
+  }
+}
+
+void Deformation::print_plan(const Geometry& volume, std::uint64_t planned) const {
+  say(options_.common, "would write " + options_.output.string() + ": " + to_string(volume.size) + " voxels as " +
+                           (outputs_.series ? "a DICOM series" : "a file") + "; about " + format_bytes(planned) +
+                           " of memory");
+}
+
+void Deformation::read() {
+  Stage stage(options_.common, "read");
+  const InputHeader header = open_input(options_.input, options_.common, {.stop = interrupt_token()});
+  planned_bytes_ = plan_bytes(header);
+  check_memory(planned_bytes_);
+  input_ = read_input(options_.input, header, options_.common, stage.control());
+  background_ = options_.background.value_or(input_.background);
+  stages_.emplace_back("read", stage.seconds());
+}
+
+void Deformation::read_field() {
+  Stage stage(options_.common, "field");
+  const Geometry& grid = input_.volume.geometry();
+  if (options_.pull_field.empty()) {
+    field_.forward = read_forward_field(options_.fields, grid, options_.cell_size, options_.common, stage.control());
+    field_.notes = field_.forward.notes;
+  } else {
+    field_.direction = Direction::pull;
+    if (!read_field_header(options_.pull_field).direction) {
+      field_.notes.push_back(options_.pull_field.string() + " does not say its direction: taken as output to input");
+    }
+    field_.pull = read_pull_field(options_.pull_field);
+  }
+  for (const std::string& note : field_.notes) say(options_.common, "tetwarp: note: " + note);
+  stages_.emplace_back("field", stage.seconds());
+}
+
+void Deformation::resample() {
+  Stage stage(options_.common, "resample");
+  // Hashes read what the resampler reads, so they run beside it.
+  auto field_hash = std::async(std::launch::async, [&] {
+    return hash_field(field_.lattice(), field_.displacement(),
+                      field_.direction == Direction::pull ? "pull" : "forward");
+  });
+  auto input_hash = std::async(
+      std::launch::async, [&] { return input_.is_dicom() ? input_.dicom->sha256 : hash_file(options_.input.path); });
+  const Geometry& grid = input_.volume.geometry();
+  Backend backend = make_backend(options_.backend, field_.direction, grid, {.threads = options_.common.threads});
+  backend_ = backend.name;
+  if (field_.direction == Direction::pull) {
+    backend.resampler->set_field(view(field_.pull, options_.outside), {.stop = interrupt_token()});
+  } else {
+    backend.resampler->set_field(view(field_.forward.field, options_.outside), {.stop = interrupt_token()});
+  }
+  output_ = AnyVolume(grid, input_.volume.type());
+  sampled_slices_.resize(outputs_.series ? static_cast<std::size_t>(grid.size.z) : 0);
+  Maps maps;
+  if (!outputs_.coverage.empty()) {
+    coverage_ = AnyVolume(grid, VoxelType::u8);
+    maps.coverage = coverage_.view();
+  }
+  const Target target{.source = std::as_const(input_.volume).view(),
+                      .output = output_.view(),
+                      .interpolation = options_.interpolation,
+                      .background = background_,
+                      .padding = input_.is_dicom() ? input_.dicom->padding : std::nullopt,
+                      .sampled_slices = sampled_slices_};
+  report_ = backend.resampler->resample(whole(grid), {&target, 1}, maps, stage.control());
+  field_sha256_ = field_hash.get();
+  input_sha256_ = input_hash.get();
+  stages_.emplace_back("resample", stage.seconds());
+}
+
+json Deformation::canonical_options() const {
+  json options = {{"interpolation", name_of(options_.interpolation)},
+                  {"outside", name_of(options_.outside)},
+                  {"background", background_}};
+  if (field_.direction == Direction::pull) {
+    options["pull_field"] = options_.pull_field.string();
+  } else {
+    options["field"] = options_.fields;
+    if (options_.cell_size) options["cell_size"] = *options_.cell_size;
+  }
+  return options;
+}
+
+void Deformation::write_series() {
+  Stage stage(options_.common, "write");
+  const std::string parameters = "interpolation=" + std::string(name_of(options_.interpolation)) +
+                                 " outside=" + name_of(options_.outside) + " background=" + json(background_).dump() +
+                                 (field_.direction == Direction::pull ? " direction=pull" : " direction=forward");
+  const DicomDerivation derivation{.field_sha256 = field_sha256_,
+                                   .parameters = parameters,
+                                   .description = std::string("Deformed by a field of vertices, ") +
+                                                  name_of(options_.interpolation) + " interpolation",
+                                   .deformed = !field_.forward.identity || field_.direction == Direction::pull,
+                                   .background_hu = background_,
+                                   .sampled_slices = sampled_slices_};
+  dicom_report_ = write_derived_series(outputs_.volume, std::as_const(output_).view(), *input_.dicom->headers,
+                                       derivation, options_.common.threads, stage.control());
+}
+
+json Deformation::sidecar() const {
+  json document = provenance("deform");
+  document["options"] = canonical_options();
+  document["backend"] = backend_;
+  document["input"] = {{"path", options_.input.path.string()}, {"sha256", input_sha256_}};
+  if (input_.is_dicom()) {
+    document["input"]["series_instance_uid"] = input_.dicom->series_uid;
+    document["input"]["rounded_voxels"] = input_.dicom->rounded;
+    if (input_.dicom->padding)
+      document["input"]["padding_hu"] = {input_.dicom->padding->low, input_.dicom->padding->high};
+  }
+  document["field"] = {{"sha256", field_sha256_},
+                       {"direction", field_.direction == Direction::pull ? "pull" : "forward"},
+                       {"lattice", to_json(field_.lattice())},
+                       {"notes", field_.notes}};
+  document["output"] = {{"path", options_.output.string()},
+                        {"voxel_type", to_string(output_.type())},
+                        {"geometry", to_json(output_.geometry())}};
+  if (dicom_report_) {
+    document["output"]["series_instance_uid"] = dicom_report_->series_uid;
+    document["output"]["frame_of_reference_uid"] = dicom_report_->frame_of_reference_uid;
+    document["output"]["added_empty_attributes"] = dicom_report_->added_empty;
+  }
+  document["report"] = {{"covered", report_.covered},      {"uncovered", report_.uncovered},
+                        {"clamped", report_.clamped},      {"padded", report_.padded},
+                        {"conflicts", report_.conflicts},  {"inverted", report_.inverted},
+                        {"degenerate", report_.degenerate}};
+  if (field_.direction == Direction::forward)
+    document["report"]["jacobian"] = {report_.jacobian_min, report_.jacobian_max};
+  return document;
+}
+
+json Deformation::report_with_times() const {
+  json document = sidecar();
+  double total = 0;
+  for (const auto& [name, seconds] : stages_) {
+    document["stages"][name]["seconds"] = seconds;
+    total += seconds;
+  }
+  document["total_seconds"] = total;
+  document["threads"] =
+      options_.common.threads > 0 ? options_.common.threads : static_cast<int>(std::thread::hardware_concurrency());
+  document["memory"] = {{"peak_bytes", peak_memory_bytes()},
+                        {"planned_bytes", planned_bytes_},
+                        {"source_bytes", input_.volume.size_bytes()},
+                        {"output_bytes", output_.size_bytes()},
+                        {"field_bytes", field_.displacement().size() * sizeof(glm::vec3)}};
+  return document;
+}
+
+void Deformation::write() {
+  const auto start = std::chrono::steady_clock::now();
+  if (outputs_.series) {
+    write_series();
+  } else {
+    Stage stage(options_.common, "write");
+    write_image(outputs_.volume, std::as_const(output_).view(),
+                {.compression = options_.compression.value_or(-1),
+                 .metadata = {{"descrip", std::string("tetwarp field ") + field_sha256_.substr(0, 16)}}});
+  }
+  if (!outputs_.coverage.empty()) write_image(outputs_.coverage, std::as_const(coverage_).view());
+  if (!outputs_.preview.empty()) {
+    write_preview(outputs_.preview, std::as_const(input_.volume).view(), std::as_const(output_).view(),
+                  options_.pull_field.empty() ? options_.fields.front() : "pull field");
+  }
+  write_json(outputs_.sidecar, sidecar());
+  stages_.emplace_back("write", std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  if (!outputs_.report.empty()) write_json(outputs_.report, report_with_times());
+  outputs_.set.commit();
+}
+
+std::string Deformation::summary() const {
+  char share[32];
+  std::snprintf(
+      share, sizeof share, "%.2f %%",
+      100.0 * static_cast<double>(report_.covered) / static_cast<double>(report_.covered + report_.uncovered));
+  std::string line = "wrote " + options_.output.string() + ": " + to_string(output_.geometry().size) + " voxels, " +
+                     share + " covered, backend " + backend_;
+  if (report_.inverted + report_.degenerate > 0) {
+    line += "; the field folds: " + std::to_string(report_.inverted) + " tetrahedra inverted, " +
+            std::to_string(report_.degenerate) + " flat";
+  }
+  if (report_.clamped > 0) line += "; " + std::to_string(report_.clamped) + " values clamped";
+  if (report_.conflicts > 0)
+    line += "; " + std::to_string(report_.conflicts) + " voxels outside the lattice were moved into";
+  return line;
+}
+
+int Deformation::run() {
+  if (options_.dry_run) {
+    const InputHeader header = open_input(options_.input, options_.common, {.stop = interrupt_token()});
+    const std::uint64_t planned = plan_bytes(header);
+    print_plan(header.geometry, planned);
+    check_memory(planned);
+    return 0;
+  }
+  read();
+  read_field();
+  resample();
+  write();
+  say(options_.common, summary());
+  return 0;
+}
+
+}  // namespace
+
+int run_deform(const DeformOptions& options) { return Deformation(options).run(); }
+
+}  // namespace tetwarp::apps

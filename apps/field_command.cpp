@@ -1,0 +1,33 @@
+#include "apps/field_source.h"
+#include "apps/input.h"
+#include "apps/output.h"
+#include "io/field_file.h"
+#include "io/image_file.h"
+
+namespace tetwarp::apps {
+
+int run_field(const FieldOptions& options) {
+  if (!has_image_suffix(options.output)) {
+    throw UsageError("unknown suffix of \"" + options.output.string() +
+                     "\"; a field is written as .mha .nrrd .nii .nii.gz");
+  }
+  check_fields(options.fields, options.cell_size);
+  std::vector<std::filesystem::path> inputs{options.like.path};
+  for (const std::string& text : options.fields) {
+    if (std::filesystem::exists(text)) inputs.emplace_back(text);
+  }
+  OutputSet outputs(inputs, options.common.overwrite);
+  const std::filesystem::path output = outputs.add(options.output);
+  Stage stage(options.common, "field");
+  const Geometry volume = open_input(options.like, options.common, {.stop = interrupt_token()}).geometry;
+  const ForwardField source =
+      read_forward_field(options.fields, volume, options.cell_size, options.common, stage.control());
+  for (const std::string& note : source.notes) say(options.common, "tetwarp: note: " + note);
+  write_field_file(output, source.field);
+  outputs.commit();
+  say(options.common,
+      "wrote " + options.output.string() + ": forward field, " + to_string(source.field.lattice.size) + " vertices");
+  return 0;
+}
+
+}  // namespace tetwarp::apps

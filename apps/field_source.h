@@ -1,0 +1,39 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/console.h"
+#include "deform/vertex_field.h"
+
+namespace tetwarp::apps {
+
+/// A forward field from the command line.
+struct ForwardField {
+  VertexField field;
+  bool identity = false;           ///< nothing moves, by its formula
+  std::vector<std::string> notes;  ///< for people: what was assumed
+};
+
+/// Formulas and files, composed vertex by vertex, the first applied first. The lattice is that of the first if it is a
+/// file, else one over `volume` with a vertex every `cell_size` voxels.
+/// @throws UsageError for a text that is no formula and no file, or a cell size with a file; InputError for unusable
+/// files
+ForwardField read_forward_field(const std::vector<std::string>& fields, const Geometry& volume,
+                                std::optional<std::int64_t> cell_size, const CommonOptions& common,
+                                const Control& control);
+
+/// Checks texts and files' names without reading vectors: for a command that fails early. @throws as above
+void check_fields(const std::vector<std::string>& fields, std::optional<std::int64_t> cell_size);
+
+/// Size of the lattice that `read_forward_field` will make.
+glm::i64vec3 lattice_size(const std::vector<std::string>& fields, const Geometry& volume,
+                          std::optional<std::int64_t> cell_size);
+
+/// SHA-256 over direction, lattice geometry and displacements, hexadecimal: the same for a formula and the file it was
+/// written to.
+std::string hash_field(const Geometry& lattice, const std::vector<glm::vec3>& displacement,
+                       const std::string& direction);
+
+}  // namespace tetwarp::apps

@@ -1,0 +1,133 @@
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "apps/input.h"
+#include "apps/output.h"
+#include "io/field_file.h"
+#include "io/image_file.h"
+
+namespace tetwarp::apps {
+
+namespace {
+
+using nlohmann::json;
+
+json describe_series(const DicomSeries& series, std::size_t number) {
+  json document = {{"number", number},
+                   {"series_instance_uid", series.series_uid},
+                   {"study_instance_uid", series.study_uid},
+                   {"frame_of_reference_uid", series.frame_of_reference_uid},
+                   {"modality", series.modality},
+                   {"slices", series.slices.size()},
+                   {"usable", !series.refusal},
+                   {"set_aside", series.set_aside},
+                   {"warnings", series.warnings}};
+  if (series.refusal) {
+    document["refusal"] = *series.refusal;
+  } else {
+    document["geometry"] = to_json(series.geometry);
+  }
+  return document;
+}
+
+json describe_dicom(const InputOptions& input, const Control& control) {
+  const DicomScan scan = scan_dicom(input.path, input.single, control);
+  json document = {
+      {"path", input.path.string()}, {"kind", "dicom"}, {"series", json::array()}, {"skipped", scan.skipped}};
+  for (std::size_t n = 0; n < scan.series.size(); ++n)
+    document["series"].push_back(describe_series(scan.series[n], n + 1));
+  return document;
+}
+
+json describe_field(const std::filesystem::path& path) {
+  const FieldFileHeader header = read_field_header(path);
+  return {{"path", path.string()},
+          {"kind", "field"},
+          {"direction", header.direction ? to_string(*header.direction) : "not stated"},
+          {"frame", header.frame},
+          {"units", header.units},
+          {"absolute", header.absolute},
+          {"lattice", to_json(header.grid)}};
+}
+
+json describe_image(const std::filesystem::path& path) {
+  const ImageHeader header = read_image_header(path);
+  return {{"path", path.string()},
+          {"kind", "volume"},
+          {"voxel_type", to_string(header.type)},
+          {"components", header.components},
+          {"geometry", to_json(header.geometry)}};
+}
+
+std::string triple(const json& values) {
+  std::string text;
+  for (const json& value : values) text += (text.empty() ? "" : " x ") + value.dump();
+  return text;
+}
+
+void print_grid(const json& grid) {
+  std::printf("  size         %s\n", triple(grid["size"]).c_str());
+  std::printf("  spacing      %s mm\n", triple(grid["spacing_mm"]).c_str());
+  std::printf("  origin       %s mm (LPS)\n", grid["origin_lps_mm"].dump().c_str());
+  std::printf("  orientation  %s\n", grid["orientation"].get<std::string>().c_str());
+}
+
+void print_lines(const char* title, const json& lines) {
+  if (lines.empty()) return;
+  std::printf("  %s\n", title);
+  for (const json& line : lines) std::printf("    %s\n", line.get<std::string>().c_str());
+}
+
+void print_dicom(const json& document) {
+  std::printf("%s: %zu series\n", document["path"].get<std::string>().c_str(), document["series"].size());
+  for (const json& series : document["series"]) {
+    std::printf("\nseries %zu: %s, %zu slices\n", series["number"].get<std::size_t>(),
+                series["modality"].get<std::string>().c_str(), series["slices"].get<std::size_t>());
+    std::printf("  UID          %s\n", series["series_instance_uid"].get<std::string>().c_str());
+    if (series["usable"].get<bool>()) {
+      print_grid(series["geometry"]);
+    } else {
+      std::printf("  not usable   %s\n", series["refusal"].get<std::string>().c_str());
+    }
+    print_lines("set aside:", series["set_aside"]);
+    print_lines("warnings:", series["warnings"]);
+  }
+  if (!document["skipped"].empty()) std::printf("\n");
+  print_lines("skipped:", document["skipped"]);
+}
+
+void print_file(const json& document) {
+  std::printf("%s: %s\n", document["path"].get<std::string>().c_str(), document["kind"].get<std::string>().c_str());
+  if (document["kind"] == "field") {
+    std::printf("  direction    %s\n", document["direction"].get<std::string>().c_str());
+    std::printf("  vectors      %s, frame %s, %s\n", document["absolute"].get<bool>() ? "positions" : "displacements",
+                document["frame"].get<std::string>().c_str(), document["units"].get<std::string>().c_str());
+    print_grid(document["lattice"]);
+  } else {
+    std::printf("  voxels       %s, %d a voxel\n", document["voxel_type"].get<std::string>().c_str(),
+                document["components"].get<int>());
+    print_grid(document["geometry"]);
+  }
+}
+
+}  // namespace
+
+int run_info(const InfoOptions& options) {
+  const std::filesystem::path& path = options.input.path;
+  const bool dicom = !has_image_suffix(path);
+  const json document = [&] {
+    Stage stage(options.common, "scan");
+    if (dicom) return describe_dicom(options.input, stage.control());
+    return is_field_file(path) ? describe_field(path) : describe_image(path);
+  }();
+  if (options.json) {
+    std::printf("%s\n", document.dump(2, ' ', false, json::error_handler_t::replace).c_str());
+  } else if (dicom) {
+    print_dicom(document);
+  } else {
+    print_file(document);
+  }
+  return 0;
+}
+
+}  // namespace tetwarp::apps

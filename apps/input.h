@@ -1,0 +1,42 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/console.h"
+#include "apps/options.h"
+#include "io/dicom_series.h"
+
+namespace tetwarp::apps {
+
+/// What is known of an input from its headers.
+struct InputHeader {
+  Geometry geometry;
+  VoxelType type = VoxelType::i16;
+  std::optional<DicomSeries> series;  ///< of a DICOM input
+};
+
+/// A volume as read, from a DICOM series or a file.
+struct InputVolume {
+  AnyVolume volume;
+  std::optional<DicomVolume> dicom;  ///< what travels beside the voxels of a series; its own volume is moved out
+  double background = 0;             ///< where nothing maps, unless an option says otherwise
+
+  bool is_dicom() const { return dicom.has_value(); }
+};
+
+/// Reads headers alone. @throws InputError when there is not one usable volume (several series: lists them)
+InputHeader open_input(const InputOptions& options, const CommonOptions& common, const Control& control);
+
+/// Reads the voxels of what `open_input` found.
+InputVolume read_input(const InputOptions& options, const InputHeader& header, const CommonOptions& common,
+                       const Control& control);
+
+/// One line a series: number, UID, modality, size, spacing, what is wrong.
+std::string describe(const DicomSeries& series, std::size_t number);
+
+/// SHA-256 of a file's bytes, hexadecimal. @throws InputError when it cannot be read
+std::string hash_file(const std::filesystem::path& path);
+
+}  // namespace tetwarp::apps

@@ -1,0 +1,35 @@
+#include <cstdio>
+#include <exception>
+#include <new>
+
+#include "apps/console.h"
+#include "apps/options.h"
+
+namespace {
+
+constexpr int kFailed = 1, kWrongCommandLine = 2, kInputRefused = 4, kInterrupted = 130;
+
+int fail(int status, const char* what) {
+  std::fprintf(stderr, "tetwarp: error: %s\n", what);
+  return status;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  using namespace tetwarp;
+  try {
+    apps::watch_interrupts();
+    return apps::run_command_line(argc, argv);
+  } catch (const apps::UsageError& error) {
+    return fail(kWrongCommandLine, error.what());
+  } catch (const InputError& error) {
+    return fail(kInputRefused, error.what());
+  } catch (const Cancelled&) {
+    return fail(kInterrupted, "interrupted; nothing was written");
+  } catch (const std::bad_alloc&) {
+    return fail(kFailed, "not enough memory; try a larger --cell-size, or see --dry-run for what is needed");
+  } catch (const std::exception& error) {
+    return fail(kFailed, error.what());
+  }
+}

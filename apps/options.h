@@ -1,0 +1,80 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "deform/errors.h"
+#include "deform/resampler.h"
+
+namespace tetwarp::apps {
+
+/// The command line is wrong: exit status 2.
+class UsageError : public Error {
+ public:
+  using Error::Error;
+};
+
+/// What every subcommand takes.
+struct CommonOptions {
+  bool quiet = false, verbose = false, overwrite = false;
+  int threads = 0;
+};
+
+/// A volume to read: a file, or a DICOM series of a folder.
+struct InputOptions {
+  std::filesystem::path path;
+  std::string series;   ///< UID, or the number that `info` prints; empty: the only one
+  bool single = false;  ///< read the one DICOM file alone
+};
+
+struct PhantomOptions {
+  CommonOptions common;
+  std::filesystem::path output;
+  std::vector<std::int64_t> size{512, 512, 300};
+  std::vector<double> spacing{0.8, 0.8, 1.0};
+  std::uint64_t seed = 1;
+};
+
+struct InfoOptions {
+  CommonOptions common;
+  InputOptions input;
+  bool json = false;
+};
+
+struct FieldOptions {
+  CommonOptions common;
+  std::vector<std::string> fields;  ///< formulas and files, the first applied first
+  InputOptions like;
+  std::filesystem::path output;
+  std::optional<std::int64_t> cell_size;
+};
+
+struct DeformOptions {
+  CommonOptions common;
+  InputOptions input;
+  std::vector<std::string> fields;
+  std::filesystem::path pull_field;
+  std::filesystem::path output;
+  std::string backend = "auto";
+  Interpolation interpolation = Interpolation::linear;
+  Outside outside = Outside::refuse;
+  std::optional<double> background;
+  std::optional<std::int64_t> cell_size;
+  std::optional<int> compression;
+  std::optional<std::uint64_t> memory_bytes;
+  std::filesystem::path coverage, report, preview;
+  bool dry_run = false;
+};
+
+/// Parses the command line and runs the subcommand. @return the exit status (README has the table)
+int run_command_line(int argc, char** argv);
+
+int run_phantom(const PhantomOptions& options);
+int run_info(const InfoOptions& options);
+int run_field(const FieldOptions& options);
+int run_deform(const DeformOptions& options);
+
+}  // namespace tetwarp::apps

@@ -1,0 +1,82 @@
+#include "apps/output.h"
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "deform/version.h"
+#include "io/image_file.h"
+
+namespace tetwarp::apps {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+/// Without a trailing slash.
+fs::path plain(const fs::path& path) { return path.has_filename() ? path : path.parent_path(); }
+
+bool is_inside(const fs::path& inner, const fs::path& outer) {
+  const fs::path a = plain(fs::weakly_canonical(inner)), b = plain(fs::weakly_canonical(outer));
+  return std::mismatch(b.begin(), b.end(), a.begin(), a.end()).first == b.end();
+}
+
+}  // namespace
+
+bool is_series_output(const fs::path& output) {
+  if (has_image_suffix(output)) return false;
+  if (output.has_filename() && output.has_extension()) {
+    throw UsageError("unknown suffix of \"" + output.string() +
+                     "\"; use .nii .nii.gz .nrrd .mha, or a folder name for DICOM");
+  }
+  return true;
+}
+
+void check_apart(const fs::path& output, const std::vector<fs::path>& inputs) {
+  for (const fs::path& input : inputs) {
+    if (is_inside(output, input) || is_inside(input, output)) {
+      throw UsageError("the output " + output.string() + " is, is inside, or is around the input " + input.string() +
+                       "; choose another place");
+    }
+  }
+}
+
+fs::path OutputSet::add(const fs::path& target) {
+  if (target.empty()) return {};
+  check_apart(target, inputs_);
+  inputs_.push_back(target);  // outputs must be apart from each other too
+  const bool folder = !target.has_filename() || (!target.has_extension() && target.filename().string().front() != '.');
+  staged_.push_back(std::make_unique<StagedOutput>(plain(target),
+                                                   folder ? StagedOutput::Kind::folder : StagedOutput::Kind::file,
+                                                   overwrite_, folder ? is_tetwarp_dicom : nullptr));
+  return staged_.back()->path();
+}
+
+void OutputSet::commit() {
+  for (const auto& output : staged_) output->commit();
+}
+
+fs::path sidecar_of(const fs::path& output) { return plain(output).string() + ".json"; }
+
+void write_json(const fs::path& path, const nlohmann::json& document) {
+  std::ofstream file(path, std::ios::binary | std::ios::trunc);
+  file << document.dump(2) << "\n";
+  file.close();
+  if (!file) throw Error("cannot be written whole, " + path.string() + "; is the disk full?");
+}
+
+nlohmann::json to_json(const Geometry& geometry) {
+  const auto list = [](const auto& v) { return nlohmann::json::array({v.x, v.y, v.z}); };
+  return {
+      {"size", list(geometry.size)},
+      {"spacing_mm", list(geometry.spacing)},
+      {"origin_lps_mm", list(geometry.origin)},
+      {"direction_columns", {list(geometry.direction[0]), list(geometry.direction[1]), list(geometry.direction[2])}},
+      {"orientation", orientation_code(geometry)}};
+}
+
+nlohmann::json provenance(const std::string& command) {
+  return {{"program", "tetwarp"}, {"version", version()}, {"commit", commit()}, {"command", command}};
+}
+
+}  // namespace tetwarp::apps

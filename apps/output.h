@@ -1,0 +1,49 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <vector>
+
+#include "apps/console.h"
+#include "io/dicom_series.h"
+#include "io/staged_output.h"
+
+namespace tetwarp::apps {
+
+/// Whether an output's name means a folder that receives a DICOM series: no suffix, or a trailing slash.
+/// @throws UsageError for a suffix that is not one of a volume file
+bool is_series_output(const std::filesystem::path& output);
+
+/// @throws UsageError where an output is equal to, inside or around an input
+void check_apart(const std::filesystem::path& output, const std::vector<std::filesystem::path>& inputs);
+
+/// The outputs of one command: checked and begun before any work, given their names together at its end.
+class OutputSet {
+ public:
+  OutputSet(std::vector<std::filesystem::path> inputs, bool overwrite)
+      : inputs_(std::move(inputs)), overwrite_(overwrite) {}
+
+  /// @return where to write it; empty for an empty target, which is not wanted. @throws UsageError, Error
+  std::filesystem::path add(const std::filesystem::path& target);
+  void commit();
+
+ private:
+  std::vector<std::filesystem::path> inputs_;
+  bool overwrite_;
+  std::vector<std::unique_ptr<StagedOutput>> staged_;
+};
+
+/// OUTPUT.json beside OUTPUT.
+std::filesystem::path sidecar_of(const std::filesystem::path& output);
+
+/// @throws Error when it cannot be written whole
+void write_json(const std::filesystem::path& path, const nlohmann::json& document);
+
+nlohmann::json to_json(const Geometry& geometry);
+
+/// Version, commit, command: what every sidecar and report begins with.
+nlohmann::json provenance(const std::string& command);
+
+}  // namespace tetwarp::apps

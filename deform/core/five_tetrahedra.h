@@ -1,0 +1,96 @@
+#pragma once
+
+#include "deform/core/fixed_point.h"
+
+namespace tetwarp {
+
+/// A lattice vertex: where it is in the deformed volume and u = rest minus deformed, both in 2^-12 voxel of output
+/// index.
+struct Vertex {
+  glm::i32vec3 deformed, u;
+};
+
+/// The eight corners of a cell; corner c is at (c & 1, c >> 1 & 1, c >> 2) of it.
+struct Cell {
+  Vertex corner[8];
+};
+
+/// Corners A, B, C and the reference corner D (the paper's names).
+struct Tetrahedron {
+  Vertex a, b, c, d;
+};
+
+constexpr int kTetrahedraPerCell = 5;
+
+/// Which corners of a cell its tetrahedron t has (semantics section 2).
+///
+/// Number 0 is the centre, {1, 2, 4, 7} in even cells (i + j + k even) and {0, 3, 5, 6} in odd ones; 1 to 4 are those
+/// at the remaining corners in rising order. The parity must alternate: only then do the face diagonals of neighbouring
+/// cells agree. D of a corner tetrahedron is its corner, and A, B, C lie from it along i, j, k. D of the centre is
+/// corner 7 or 0, and A, B, C are across the faces i, j, k from it: so c ^ 6, c ^ 5, c ^ 3.
+struct TetrahedronCorners {
+  int a, b, c, d;
+};
+TETWARP_HD constexpr TetrahedronCorners tetrahedron_corners(int t, bool odd) {
+  if (t == 0) {
+    const int d = odd ? 0 : 7;
+    return {d ^ 6, d ^ 5, d ^ 3, d};
+  }
+  const int d = (odd ? 0x7421 : 0x6530) >> (4 * (t - 1)) & 7;
+  return {d ^ 1, d ^ 2, d ^ 4, d};
+}
+
+TETWARP_HD inline Tetrahedron tetrahedron_of(const Cell& cell, int t, bool odd) {
+  const TetrahedronCorners corners = tetrahedron_corners(t, odd);
+  return {cell.corner[corners.a], cell.corner[corners.b], cell.corner[corners.c], cell.corner[corners.d]};
+}
+
+/// Six times the signed volume of (A, B, C, D) about D, exact. Int must hold it: see `fits_int64`.
+template <class Int>
+TETWARP_HD Int signed_volume(const glm::i32vec3& a, const glm::i32vec3& b, const glm::i32vec3& c,
+                             const glm::i32vec3& d) {
+  const Int ax = Int(a.x) - d.x, ay = Int(a.y) - d.y, az = Int(a.z) - d.z;
+  const Int bx = Int(b.x) - d.x, by = Int(b.y) - d.y, bz = Int(b.z) - d.z;
+  const Int cx = Int(c.x) - d.x, cy = Int(c.y) - d.y, cz = Int(c.z) - d.z;
+  return ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx);
+}
+
+/// Box of a tetrahedron or cell in 2^-12 voxel, closed.
+struct Box {
+  glm::i32vec3 low, high;
+
+  TETWARP_HD void grow(const glm::i32vec3& point) {
+    for (int axis = 0; axis < 3; ++axis) {
+      low[axis] = point[axis] < low[axis] ? point[axis] : low[axis];
+      high[axis] = point[axis] > high[axis] ? point[axis] : high[axis];
+    }
+  }
+};
+
+TETWARP_HD inline Box box_of(const Tetrahedron& t) {
+  Box box{t.a.deformed, t.a.deformed};
+  box.grow(t.b.deformed);
+  box.grow(t.c.deformed);
+  box.grow(t.d.deformed);
+  return box;
+}
+
+/// Whether determinants of points in the box, relative to one of its voxels and with the nudge, fit 64 bits: with
+/// coordinates below 2^18 (64 voxels) they stay below 2^62.
+TETWARP_HD inline bool fits_int64(const Box& box) {
+  constexpr std::int64_t kLimit = std::int64_t{1} << 18;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (std::int64_t{box.high[axis]} - box.low[axis] + kStepsPerVoxel > kLimit) return false;
+  }
+  return true;
+}
+
+/// Forward Jacobian determinant of a tetrahedron: deformed over rest volume; both exact before the division.
+TETWARP_HD inline double jacobian(const Tetrahedron& t) {
+  const Wide deformed = signed_volume<Wide>(t.a.deformed, t.b.deformed, t.c.deformed, t.d.deformed);
+  const Wide rest =
+      signed_volume<Wide>(t.a.deformed + t.a.u, t.b.deformed + t.b.u, t.c.deformed + t.c.u, t.d.deformed + t.d.u);
+  return to_double(deformed) / to_double(rest);
+}
+
+}  // namespace tetwarp

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "deform/core/host_device.h"
+
+namespace tetwarp {
+
+/// Vertices are held as integers in units of 2^-12 voxel of the output grid (semantics section 1): 2^18 voxels an axis
+/// fit with room for differences. All that decides ownership is integer arithmetic on them.
+constexpr int kStepsPerVoxel = 1 << 12;
+constexpr double kLargestIndex = 1 << 18;
+constexpr float kVoxelsPerStep = 1.0f / kStepsPerVoxel;
+
+/// Nearest multiple of 2^-12 voxel, ties to even. @param index  finite, |index| < kLargestIndex
+TETWARP_HD inline std::int32_t snap(double index) {
+  return static_cast<std::int32_t>(std::rint(index * kStepsPerVoxel));
+}
+
+TETWARP_HD inline glm::i32vec3 snap(const glm::dvec3& index) { return {snap(index.x), snap(index.y), snap(index.z)}; }
+
+/// The nudge: a voxel p is owned by the tetrahedron around p + d, d = (15 sx, 7 sy, 4 sz) / 65536 voxel, each sign
+/// pointing to the middle of the undeformed lattice.
+///
+/// Voxel centres exactly on faces are the common case (any field that keeps a coordinate plane in place), and three
+/// unequal small steps leave hardly any of them on a face. What still is exactly on one is settled as if the point were
+/// p + d + (sx e, sy e^2, sz e^3), e > 0 infinitesimal. All three steps are shorter than 2^-12 voxel, so a box of
+/// snapped vertices contains p + d just when it contains p and is closed only on the side that the nudge points away
+/// from.
+constexpr int kNudgeSteps = 16;  ///< nudge units (2^-16 voxel) in a step of 2^-12
+constexpr int kNudgeX = 15, kNudgeY = 7, kNudgeZ = 4;
+
+/// Which way a voxel is nudged, on each axis: +1 below the middle, else -1.
+struct Nudge {
+  glm::dvec3 middle{0};  ///< of the undeformed lattice's box, continuous output index
+
+  TETWARP_HD int sign(int axis, std::int64_t voxel) const { return static_cast<double>(voxel) < middle[axis] ? 1 : -1; }
+  TETWARP_HD glm::i32vec3 signs(const glm::i64vec3& voxel) const {
+    return {sign(0, voxel.x), sign(1, voxel.y), sign(2, voxel.z)};
+  }
+};
+
+/// d in units of 2^-16 voxel.
+TETWARP_HD inline glm::i32vec3 nudge_steps(const glm::i32vec3& signs) {
+  return {kNudgeX * signs.x, kNudgeY * signs.y, kNudgeZ * signs.z};
+}
+
+/// Wide exact integer: products of three coordinates of any tetrahedron that fits the grid (below 2^100).
+__extension__ typedef __int128 Wide;
+
+/// Rounded to double in two steps, the same on host and device.
+TETWARP_HD inline double to_double(Wide value) {
+  const bool negative = value < 0;
+  const Wide size = negative ? -value : value;
+  const double high = static_cast<double>(static_cast<std::uint64_t>(size >> 64));
+  const double low = static_cast<double>(static_cast<std::uint64_t>(size));
+  const double result = high * 18446744073709551616.0 + low;
+  return negative ? -result : result;
+}
+
+}  // namespace tetwarp

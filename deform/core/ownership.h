@@ -1,0 +1,65 @@
+#pragma once
+
+#include "deform/core/five_tetrahedra.h"
+
+namespace tetwarp {
+
+/// Side of the face (a, b, c) on which the nudged voxel lies: +1 or -1; 0 only for a face without area.
+///
+/// The sign of det(a - q, b - q, c - q) = (a - q) . N with N = (b - a) x (c - a), q = p + d; on an exact tie the first
+/// non-zero of -sx Nx, -sy Ny, -sz Nz, which is what an infinitesimal step from q towards the middle gives.
+/// Two tetrahedra that share a face call this with the same corners, in an order that flips the sign exactly.
+///
+/// @param a, b, c  corners relative to the voxel, 2^-12 voxel
+template <class Int>
+TETWARP_HD int side_of_face(const glm::i32vec3& a, const glm::i32vec3& b, const glm::i32vec3& c,
+                            const glm::i32vec3& signs) {
+  const Int ux = Int(b.x) - a.x, uy = Int(b.y) - a.y, uz = Int(b.z) - a.z;
+  const Int vx = Int(c.x) - a.x, vy = Int(c.y) - a.y, vz = Int(c.z) - a.z;
+  const Int nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx;
+  const glm::i32vec3 d = nudge_steps(signs);
+  const Int e =
+      (Int(a.x) * kNudgeSteps - d.x) * nx + (Int(a.y) * kNudgeSteps - d.y) * ny + (Int(a.z) * kNudgeSteps - d.z) * nz;
+  if (e != 0) return e > 0 ? 1 : -1;
+  if (nx != 0) return (nx > 0) == (signs.x > 0) ? -1 : 1;
+  if (ny != 0) return (ny > 0) == (signs.y > 0) ? -1 : 1;
+  if (nz != 0) return (nz > 0) == (signs.z > 0) ? -1 : 1;
+  return 0;
+}
+
+/// Whether the tetrahedron owns a voxel: its four faces agree (semantics section 3). Inverted ones own like any other;
+/// one without volume never does, for its four determinants sum to zero.
+///
+/// @param steps  the voxel, 2^-12 voxel
+template <class Int>
+TETWARP_HD bool owns(const Tetrahedron& t, const glm::i32vec3& steps, const glm::i32vec3& signs) {
+  const glm::i32vec3 a = t.a.deformed - steps, b = t.b.deformed - steps, c = t.c.deformed - steps,
+                     d = t.d.deformed - steps;
+  const int side = side_of_face<Int>(b, c, d, signs);
+  return side != 0 && side_of_face<Int>(a, d, c, signs) == side && side_of_face<Int>(a, b, d, signs) == side &&
+         side_of_face<Int>(a, c, b, signs) == side;
+}
+
+/// A face of a tetrahedron as a function of the voxel: twice-area normal and value, for walking many voxels.
+///
+/// value(p) = constant - 2^16 (p - first) . normal - d . normal, in units of 2^-40, positive inside.
+template <class Int>
+struct Face {
+  Int normal[3], constant;
+};
+
+/// @param a, b, c      corners relative to the first voxel, 2^-12 voxel, ordered as in `owns`
+/// @param orientation  +1 or -1, so that inside is positive
+template <class Int>
+TETWARP_HD Face<Int> make_face(const glm::i32vec3& a, const glm::i32vec3& b, const glm::i32vec3& c, int orientation) {
+  const Int ux = Int(b.x) - a.x, uy = Int(b.y) - a.y, uz = Int(b.z) - a.z;
+  const Int vx = Int(c.x) - a.x, vy = Int(c.y) - a.y, vz = Int(c.z) - a.z;
+  Face<Int> face;
+  face.normal[0] = (uy * vz - uz * vy) * orientation;
+  face.normal[1] = (uz * vx - ux * vz) * orientation;
+  face.normal[2] = (ux * vy - uy * vx) * orientation;
+  face.constant = (Int(a.x) * face.normal[0] + Int(a.y) * face.normal[1] + Int(a.z) * face.normal[2]) * kNudgeSteps;
+  return face;
+}
+
+}  // namespace tetwarp

@@ -1,0 +1,209 @@
+#pragma once
+
+#include <limits>
+#include <type_traits>
+
+#include "deform/core/fixed_point.h"
+
+namespace tetwarp {
+
+/// A place in a source volume: whole voxel and the rest, 0 <= fraction < 1. Kept apart, so that no precision is lost
+/// far from the origin and a whole shift copies exactly.
+struct Place {
+  glm::i64vec3 base;
+  glm::vec3 fraction;
+};
+
+/// @param offset  from `voxel`, in voxels
+TETWARP_HD inline Place place_at(const glm::i64vec3& voxel, const glm::vec3& offset) {
+  Place place;
+  for (int axis = 0; axis < 3; ++axis) {
+    const float whole = std::floor(offset[axis]);
+    const float rest = offset[axis] - whole;
+    const bool next = rest >= 1.0f;  // a negative offset below half a unit in the last place rounds up to 1
+    place.base[axis] = voxel[axis] + static_cast<std::int64_t>(whole) + (next ? 1 : 0);
+    place.fraction[axis] = next ? 0.0f : rest;
+  }
+  return place;
+}
+
+/// @param index  continuous source index, finite and within +-2^62
+TETWARP_HD inline Place place_at(const glm::dvec3& index) {
+  Place place;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double whole = std::floor(index[axis]);
+    const float rest = static_cast<float>(index[axis] - whole);
+    const bool next = rest >= 1.0f;
+    place.base[axis] = static_cast<std::int64_t>(whole) + (next ? 1 : 0);
+    place.fraction[axis] = next ? 0.0f : rest;
+  }
+  return place;
+}
+
+/// Moves a place up to half a voxel outside the outermost centres onto them. @return false if it is further out
+TETWARP_HD inline bool clamp_to_grid(Place& place, const glm::i64vec3& size) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::int64_t last = size[axis] - 1;
+    if (place.base[axis] == -1 && place.fraction[axis] >= 0.5f) {
+      place.base[axis] = 0;
+      place.fraction[axis] = 0;
+    } else if (place.base[axis] == last && place.fraction[axis] <= 0.5f) {
+      place.fraction[axis] = 0;
+    } else if (place.base[axis] < 0 || place.base[axis] >= last) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/// What voxels of type V are computed in: float where it holds them exactly, else double.
+template <class V>
+using Working = std::conditional_t<(sizeof(V) < 4 || std::is_same_v<V, float>), float, double>;
+
+/// The voxels of a source, or of the part of it that is buffered.
+template <class V>
+struct SourceVoxels {
+  const V* voxels;
+  glm::i64vec3 size;    ///< of the whole grid: indices are clamped to it
+  glm::i64vec3 begin;   ///< first voxel that is buffered
+  glm::i64vec3 stride;  ///< in voxels
+
+  TETWARP_HD V at(std::int64_t i, std::int64_t j, std::int64_t k) const {
+    return voxels[(i - begin.x) * stride.x + (j - begin.y) * stride.y + (k - begin.z) * stride.z];
+  }
+};
+
+/// Values from `low` to `high` are no data.
+template <class V>
+struct Padding {
+  bool present;
+  V low, high;
+
+  TETWARP_HD bool holds(V value) const { return value >= low && value <= high; }
+};
+
+template <class V>
+struct Sample {
+  Working<V> value;
+  bool padded;
+};
+
+/// floor(x + 0.5) on every axis.
+template <class V>
+TETWARP_HD V nearest_voxel(const SourceVoxels<V>& source, const Place& place) {
+  return source.at(place.base.x + (place.fraction.x >= 0.5f), place.base.y + (place.fraction.y >= 0.5f),
+                   place.base.z + (place.fraction.z >= 0.5f));
+}
+
+template <class V>
+TETWARP_HD Sample<V> sample_nearest(const SourceVoxels<V>& source, const Place& place, const Padding<V>& padding) {
+  const V value = nearest_voxel(source, place);
+  return {static_cast<Working<V>>(value), padding.present && padding.holds(value)};
+}
+
+/// The corner of largest weight, ties to the lowest index: what a sample that would mix padding into tissue takes.
+template <class V>
+TETWARP_HD Sample<V> heaviest_voxel(const SourceVoxels<V>& source, const Place& place) {
+  return {static_cast<Working<V>>(source.at(place.base.x + (place.fraction.x > 0.5f),
+                                            place.base.y + (place.fraction.y > 0.5f),
+                                            place.base.z + (place.fraction.z > 0.5f))),
+          true};
+}
+
+/// Along x, then y, then z: each a + t (b - a). Voxels of weight zero are not looked at.
+template <class V>
+TETWARP_HD Sample<V> sample_linear(const SourceVoxels<V>& source, const Place& place, const Padding<V>& padding) {
+  using W = Working<V>;
+  const int nx = place.fraction.x != 0, ny = place.fraction.y != 0, nz = place.fraction.z != 0;
+  W along_z[2] = {};
+  for (int z = 0; z <= nz; ++z) {
+    W along_y[2] = {};
+    for (int y = 0; y <= ny; ++y) {
+      const V low = source.at(place.base.x, place.base.y + y, place.base.z + z);
+      if (padding.present && padding.holds(low)) return heaviest_voxel(source, place);
+      along_y[y] = static_cast<W>(low);
+      if (nx) {
+        const V high = source.at(place.base.x + 1, place.base.y + y, place.base.z + z);
+        if (padding.present && padding.holds(high)) return heaviest_voxel(source, place);
+        along_y[y] = along_y[y] + static_cast<W>(place.fraction.x) * (static_cast<W>(high) - along_y[y]);
+      }
+    }
+    along_z[z] = ny ? along_y[0] + static_cast<W>(place.fraction.y) * (along_y[1] - along_y[0]) : along_y[0];
+  }
+  return {nz ? along_z[0] + static_cast<W>(place.fraction.z) * (along_z[1] - along_z[0]) : along_z[0], false};
+}
+
+/// Catmull-Rom weights of the voxels -1, 0, 1, 2 (Keys 1981 with a = -1/2); at t = 0 only voxel 0 counts.
+template <class W>
+struct CubicTaps {
+  int first, last;  ///< taps with weight, of -1 .. 2
+  W weight[4];      ///< of taps -1 .. 2
+};
+
+template <class W>
+TETWARP_HD CubicTaps<W> cubic_taps(float fraction) {
+  const W t = static_cast<W>(fraction);
+  if (t == 0) return {0, 0, {0, 1, 0, 0}};
+  return {-1,
+          2,
+          {((W(-0.5) * t + W(1)) * t - W(0.5)) * t, (W(1.5) * t - W(2.5)) * t * t + W(1),
+           ((W(-1.5) * t + W(2)) * t + W(0.5)) * t, (W(0.5) * t - W(0.5)) * t * t}};
+}
+
+TETWARP_HD inline std::int64_t clamp_index(std::int64_t index, std::int64_t size) {
+  return index < 0 ? 0 : (index >= size ? size - 1 : index);
+}
+
+/// Catmull-Rom along x, then y, then z, indices clamped to the grid; each sum from the lowest tap up.
+template <class V>
+TETWARP_HD Sample<V> sample_cubic(const SourceVoxels<V>& source, const Place& place, const Padding<V>& padding) {
+  using W = Working<V>;
+  const CubicTaps<W> x = cubic_taps<W>(place.fraction.x), y = cubic_taps<W>(place.fraction.y),
+                     z = cubic_taps<W>(place.fraction.z);
+  W sum_z = 0;
+  for (int k = z.first; k <= z.last; ++k) {
+    W sum_y = 0;
+    for (int j = y.first; j <= y.last; ++j) {
+      W sum_x = 0;
+      for (int i = x.first; i <= x.last; ++i) {
+        const V value =
+            source.at(clamp_index(place.base.x + i, source.size.x), clamp_index(place.base.y + j, source.size.y),
+                      clamp_index(place.base.z + k, source.size.z));
+        if (padding.present && padding.holds(value)) return heaviest_voxel(source, place);
+        const W term = x.weight[i + 1] * static_cast<W>(value);
+        sum_x = i == x.first ? term : sum_x + term;
+      }
+      const W term = y.weight[j + 1] * sum_x;
+      sum_y = j == y.first ? term : sum_y + term;
+    }
+    const W term = z.weight[k + 1] * sum_y;
+    sum_z = k == z.first ? term : sum_z + term;
+  }
+  return {sum_z, false};
+}
+
+/// The voxel value of a working value: integers are rounded to nearest, ties to even, and saturate.
+template <class V>
+TETWARP_HD V to_voxel(Working<V> value, bool* saturated) {
+  using W = Working<V>;
+  if constexpr (std::is_floating_point_v<V>) {
+    return static_cast<V>(value);
+  } else {
+    constexpr W kLowest = static_cast<W>(std::numeric_limits<V>::lowest()),
+                kHighest = static_cast<W>(std::numeric_limits<V>::max());
+    if (!(value > kLowest - 1)) {  // NaN too: there is none in integers, but a background may be
+      *saturated = true;
+      return std::numeric_limits<V>::lowest();
+    }
+    if (value >= kHighest + 1) {
+      *saturated = true;
+      return std::numeric_limits<V>::max();
+    }
+    const W rounded = std::rint(value);
+    *saturated = rounded < kLowest || rounded > kHighest;
+    return rounded < kLowest ? std::numeric_limits<V>::lowest()
+                             : (rounded > kHighest ? std::numeric_limits<V>::max() : static_cast<V>(rounded));
+  }
+}
+
+}  // namespace tetwarp

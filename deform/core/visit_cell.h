@@ -1,0 +1,146 @@
+#pragma once
+
+#include "deform/core/barycentric.h"
+#include "deform/core/ownership.h"
+
+namespace tetwarp {
+
+/// Box of voxels, half open.
+struct VoxelBox {
+  glm::i64vec3 begin, end;
+};
+
+namespace detail {
+
+TETWARP_HD inline std::int64_t floor_voxel(std::int32_t steps) { return steps >> 12; }
+
+/// Voxels whose nudged centre can lie in [low, high] on one axis: closed on the side that the nudge points away from,
+/// open on the other.
+TETWARP_HD inline void candidates(const Nudge& nudge, int axis, std::int32_t low, std::int32_t high,
+                                  std::int64_t* begin, std::int64_t* end) {
+  std::int64_t first = floor_voxel(low), last = floor_voxel(high);
+  if (first * kStepsPerVoxel != low || nudge.sign(axis, first) < 0) ++first;
+  if (last * kStepsPerVoxel == high && nudge.sign(axis, last) > 0) --last;
+  *begin = *begin > first ? *begin : first;
+  *end = *end < last + 1 ? *end : last + 1;
+}
+
+/// The part of `region` that a tetrahedron or cell with this box may own.
+TETWARP_HD inline VoxelBox candidates(const Nudge& nudge, const Box& box, VoxelBox region) {
+  for (int axis = 0; axis < 3; ++axis) {
+    candidates(nudge, axis, box.low[axis], box.high[axis], &region.begin[axis], &region.end[axis]);
+  }
+  return region;
+}
+
+TETWARP_HD inline bool is_empty(const VoxelBox& box) {
+  return box.end.x <= box.begin.x || box.end.y <= box.begin.y || box.end.z <= box.begin.z;
+}
+
+TETWARP_HD inline glm::i32vec3 to_steps(const glm::i64vec3& voxel) {
+  return {static_cast<std::int32_t>(voxel.x << 12), static_cast<std::int32_t>(voxel.y << 12),
+          static_cast<std::int32_t>(voxel.z << 12)};
+}
+
+template <class Int>
+TETWARP_HD Int floor_divide(Int a, Int b) {  // b > 0
+  return a >= 0 ? a / b : -((b - 1 - a) / b);
+}
+
+/// Narrows [begin, end) of a row, in which the nudge is constant, to the voxels on the inner side of a face.
+/// `value` is the face's value at offset 0 of the row with the nudge taken off.
+template <class Int>
+TETWARP_HD void clip_row(const Face<Int>& face, Int value, const glm::i32vec3& signs, std::int64_t* begin,
+                         std::int64_t* end) {
+  bool tie_inside = false;  // does a voxel exactly on the face count as inside?
+  for (int axis = 2; axis >= 0; --axis) {
+    if (face.normal[axis] != 0) tie_inside = (face.normal[axis] < 0) == (signs[axis] > 0);
+  }
+  const Int least = tie_inside ? 0 : 1;  // inside: value - slope * offset >= least
+  const Int slope = face.normal[0] * (Int(kStepsPerVoxel) * kNudgeSteps);
+  if (slope == 0) {
+    if (value < least) *end = *begin;
+  } else if (slope > 0) {
+    const Int last = floor_divide<Int>(value - least, slope);
+    if (last < Int(*end) - 1) *end = static_cast<std::int64_t>(last) + 1;
+  } else {
+    const Int first = -floor_divide<Int>(value - least, -slope);
+    if (first > Int(*begin)) *begin = static_cast<std::int64_t>(first);
+  }
+}
+
+/// Walks the rows of `box`: in each, the voxels of the tetrahedron are an interval between its faces.
+template <class Int, class Visit>
+TETWARP_HD void walk_rows(const Tetrahedron& t, int number, const VoxelBox& box, const Nudge& nudge, Visit& visit) {
+  const glm::i32vec3 first = to_steps(box.begin);
+  const glm::i32vec3 a = t.a.deformed - first, b = t.b.deformed - first, c = t.c.deformed - first,
+                     d = t.d.deformed - first;
+  const Int volume = signed_volume<Int>(a, b, c, d);
+  if (volume == 0) return;
+  const int orientation = volume > 0 ? -1 : 1;  // the determinants of `owns` have the other sign
+  const Face<Int> faces[4] = {make_face<Int>(b, c, d, orientation), make_face<Int>(a, d, c, orientation),
+                              make_face<Int>(a, b, d, orientation), make_face<Int>(a, c, b, orientation)};
+  for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {
+    for (std::int64_t y = box.begin.y; y < box.end.y; ++y) {
+      std::int64_t x = box.begin.x;
+      while (x < box.end.x) {  // twice where the middle, and so the nudge's sign, lies within the row
+        const glm::i32vec3 signs = nudge.signs({x, y, z}), nudged = nudge_steps(signs);
+        std::int64_t begin = x - box.begin.x, end = box.end.x - box.begin.x;
+        if (signs.x > 0 && nudge.sign(0, box.end.x - 1) < 0) {
+          end = static_cast<std::int64_t>(std::ceil(nudge.middle.x)) - box.begin.x;
+        }
+        x = box.begin.x + end;
+        for (const Face<Int>& face : faces) {
+          const Int value = face.constant - face.normal[0] * nudged.x -
+                            face.normal[1] * (Int(y - box.begin.y) * (kStepsPerVoxel * kNudgeSteps) + nudged.y) -
+                            face.normal[2] * (Int(z - box.begin.z) * (kStepsPerVoxel * kNudgeSteps) + nudged.z);
+          clip_row<Int>(face, value, signs, &begin, &end);
+        }
+        for (std::int64_t offset = begin; offset < end; ++offset) {
+          visit(glm::i64vec3(box.begin.x + offset, y, z), signs, number, t);
+        }
+      }
+    }
+  }
+}
+
+template <class Int, class Visit>
+TETWARP_HD void visit_tetrahedron(const Tetrahedron& t, int number, const VoxelBox& box, const Nudge& nudge,
+                                  Visit& visit) {
+  const glm::i64vec3 extent = box.end - box.begin;
+  if (extent.x * extent.y * extent.z > 2) return walk_rows<Int>(t, number, box, nudge, visit);
+  for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {
+    for (std::int64_t y = box.begin.y; y < box.end.y; ++y) {
+      for (std::int64_t x = box.begin.x; x < box.end.x; ++x) {
+        const glm::i64vec3 voxel(x, y, z);
+        const glm::i32vec3 signs = nudge.signs(voxel);
+        if (owns<Int>(t, to_steps(voxel), signs)) visit(voxel, signs, number, t);
+      }
+    }
+  }
+}
+
+}  // namespace detail
+
+/// Calls `visit(voxel, signs, t, tetrahedron)` for every voxel of `region` that tetrahedron t of the cell owns, t
+/// rising.
+///
+/// The body that every backend runs for one cell: which voxels it reports is the definition of ownership
+/// (semantics section 3), what becomes of them is the backend's. A voxel in a fold is reported by several tetrahedra,
+/// of this cell or of others: the one with the lowest number 5 * cell + t is its owner.
+template <class Visit>
+TETWARP_HD void visit_cell(const Cell& cell, bool odd, const VoxelBox& region, const Nudge& nudge, Visit&& visit) {
+  for (int number = 0; number < kTetrahedraPerCell; ++number) {
+    const Tetrahedron t = tetrahedron_of(cell, number, odd);
+    const Box box = box_of(t);
+    const VoxelBox voxels = detail::candidates(nudge, box, region);
+    if (detail::is_empty(voxels)) continue;
+    if (fits_int64(box)) {
+      detail::visit_tetrahedron<std::int64_t>(t, number, voxels, nudge, visit);
+    } else {
+      detail::visit_tetrahedron<Wide>(t, number, voxels, nudge, visit);
+    }
+  }
+}
+
+}  // namespace tetwarp

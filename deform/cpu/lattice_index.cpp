@@ -1,0 +1,214 @@
+#include "deform/cpu/lattice_index.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <string>
+
+namespace tetwarp::cpu {
+
+namespace {
+
+constexpr double kFarthest = 1 << 17;         ///< voxels that a vertex may be displaced on an axis
+constexpr double kSmallestCell = 1.0 / 1024;  ///< voxels; snapping would leave smaller cells no shape
+constexpr double kReachTolerance = 1.0 / kStepsPerVoxel;
+
+bool usable(const glm::dvec3& index, double limit) {
+  return std::abs(index.x) < limit && std::abs(index.y) < limit && std::abs(index.z) < limit;  // false for NaN
+}
+
+}  // namespace
+
+void FieldStatistics::add(const FieldStatistics& other) {
+  inverted += other.inverted;
+  degenerate += other.degenerate;
+  jacobian_min = std::min(jacobian_min, other.jacobian_min);
+  jacobian_max = std::max(jacobian_max, other.jacobian_max);
+}
+
+Cell LatticeIndex::Block::cell(const glm::i32vec3& at) const {
+  const int row = cells.x + 1, slice = row * (cells.y + 1);
+  const Vertex* first = vertices + at.z * slice + at.y * row + at.x;
+  return {{first[0], first[1], first[row], first[row + 1], first[slice], first[slice + 1], first[slice + row],
+           first[slice + row + 1]}};
+}
+
+glm::i64vec3 LatticeIndex::unravel(std::size_t number, const glm::i64vec3& size) {
+  const auto n = static_cast<std::int64_t>(number);
+  return {n % size.x, n / size.x % size.y, n / (size.x * size.y)};
+}
+
+bool LatticeIndex::reaches(const Box& box, const Region& region) {
+  for (int axis = 0; axis < 3; ++axis) {
+    if (std::int64_t{box.high[axis]} < region.begin[axis] * kStepsPerVoxel ||
+        std::int64_t{box.low[axis]} > (region.end[axis] - 1) * kStepsPerVoxel) {
+      return false;
+    }
+  }
+  return true;
+}
+
+bool LatticeIndex::inside_undeformed(const glm::i64vec3& voxel) const {
+  const glm::dvec3 nudge = glm::dvec3(nudge_steps(nudge_.signs(voxel))) * (1.0 / (kStepsPerVoxel * kNudgeSteps));
+  const glm::dvec3 at = lattice_from_output_(glm::dvec3(voxel) + nudge);
+  return at.x >= 0 && at.y >= 0 && at.z >= 0 && at.x <= static_cast<double>(cells_.x) &&
+         at.y <= static_cast<double>(cells_.y) && at.z <= static_cast<double>(cells_.z);
+}
+
+void LatticeIndex::check_geometry(const Geometry& output) const {
+  const Geometry& lattice = *field_.lattice;
+  require_valid(lattice, "field lattice");
+  for (int axis = 0; axis < 3; ++axis) {
+    require(lattice.size[axis] >= 2,
+            "field lattice of " + to_string(lattice.size) + " vertices, expected at least 2 on every axis");
+    const double length = glm::length(output_from_lattice_.linear[axis]);
+    require(length >= kSmallestCell, "the field's cells are " + std::to_string(length) +
+                                         " voxels of the output along axis " + std::to_string(axis) +
+                                         ", expected at least 1/1024");
+  }
+  for (int corner = 0; corner < 8; ++corner) {
+    const glm::dvec3 at = glm::dvec3(corner & 1, corner >> 1 & 1, corner >> 2);
+    require(usable(output_from_lattice_(at * glm::dvec3(cells_)), kLargestIndex),
+            "the field's lattice lies more than 262144 voxels from the output grid");
+    if (field_.outside != Outside::refuse) continue;
+    const glm::dvec3 vertex = lattice_from_output_(at * glm::dvec3(output.size - std::int64_t{1}));
+    for (int axis = 0; axis < 3; ++axis) {
+      const double slack = kReachTolerance / glm::length(output_from_lattice_.linear[axis]);
+      require(vertex[axis] >= -slack && vertex[axis] <= static_cast<double>(cells_[axis]) + slack,
+              "the field's lattice of " + to_string(lattice.size) +
+                  " vertices does not reach over the whole output grid: a corner of the output lies at vertex index " +
+                  std::to_string(vertex[axis]) + " of axis " + std::to_string(axis) + ", expected 0 to " +
+                  std::to_string(cells_[axis]));
+    }
+  }
+}
+
+void LatticeIndex::build(const Geometry& output, const FieldView& field, const Control& control) {
+  field_ = field;
+  require(field_.lattice && field_.displacement, "the field is empty");
+  cells_ = field_.lattice->size - std::int64_t{1};
+  output_from_lattice_ = index_from_point(output) * point_from_index(*field_.lattice);
+  lattice_from_output_ = index_from_point(*field_.lattice) * point_from_index(output);
+  output_from_mm_ = index_from_point(output).linear;
+  check_geometry(output);
+  nudge_.middle = output_from_lattice_(0.5 * glm::dvec3(cells_));
+
+  const double cell_voxels =
+      std::min({glm::length(output_from_lattice_.linear[0]), glm::length(output_from_lattice_.linear[1]),
+                glm::length(output_from_lattice_.linear[2])});
+  cells_per_block_ = std::clamp<std::int64_t>(static_cast<std::int64_t>(kMostCells / cell_voxels), 1, kMostCells);
+  blocks_ = (cells_ + (cells_per_block_ - 1)) / cells_per_block_;
+  groups_ = (blocks_ + (kGroup - 1)) / kGroup;
+  boxes_.resize(static_cast<std::size_t>(blocks_.x * blocks_.y * blocks_.z));
+  group_boxes_.resize(static_cast<std::size_t>(groups_.x * groups_.y * groups_.z));
+
+  tbb::enumerable_thread_specific<FieldStatistics> statistics;
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, boxes_.size(), 64), [&](const auto& range) {
+    if (control.stop.stop_requested()) throw Cancelled();
+    Block scratch;
+    for (std::size_t block = range.begin(); block < range.end(); ++block)
+      scan_block(block, scratch, statistics.local());
+  });
+  statistics_ = {};
+  for (const FieldStatistics& part : statistics) statistics_.add(part);
+  group_boxes();
+}
+
+void LatticeIndex::refuse_vertex(const glm::i64vec3& vertex) const {
+  throw InputError("the field's displacement at vertex (" + std::to_string(vertex.x) + ", " + std::to_string(vertex.y) +
+                   ", " + std::to_string(vertex.z) + ") is not finite or moves it by more than 131072 voxels");
+}
+
+void LatticeIndex::load(std::size_t block, Block& into) const {
+  into.first_cell = unravel(block, blocks_) * cells_per_block_;
+  into.cells = glm::i32vec3(glm::min(glm::i64vec3(cells_per_block_), cells_ - into.first_cell));
+  into.at_rest = true;
+  const glm::i64vec3& size = field_.lattice->size;
+  Vertex* vertex = into.vertices;
+  for (int z = 0; z <= into.cells.z; ++z) {
+    for (int y = 0; y <= into.cells.y; ++y) {
+      const glm::i64vec3 first = into.first_cell + glm::i64vec3(0, y, z);
+      const glm::vec3* displacement = field_.displacement + ((first.z * size.y + first.y) * size.x + first.x);
+      for (int x = 0; x <= into.cells.x; ++x, ++vertex, ++displacement) {
+        const glm::dvec3 rest = output_from_lattice_(glm::dvec3(first + glm::i64vec3(x, 0, 0)));
+        const glm::i32vec3 snapped = snap(rest);
+        if (*displacement == glm::vec3(0)) {
+          *vertex = {snapped, glm::i32vec3(0)};
+          continue;
+        }
+        const glm::dvec3 shift = output_from_mm_ * glm::dvec3(*displacement);
+        if (!usable(shift, kFarthest) || !usable(rest + shift, kLargestIndex))
+          refuse_vertex(first + glm::i64vec3(x, 0, 0));
+        const glm::i32vec3 deformed = snap(rest + shift);
+        *vertex = {deformed, snapped - deformed};
+        into.at_rest = into.at_rest && vertex->u == glm::i32vec3(0);
+      }
+    }
+  }
+}
+
+void LatticeIndex::scan_block(std::size_t number, Block& block, FieldStatistics& statistics) {
+  load(number, block);
+  Box box{block.vertices[0].deformed, block.vertices[0].deformed};
+  const int vertices = (block.cells.x + 1) * (block.cells.y + 1) * (block.cells.z + 1);
+  for (int vertex = 1; vertex < vertices; ++vertex) box.grow(block.vertices[vertex].deformed);
+  boxes_[number] = box;
+  if (block.at_rest) {
+    statistics.jacobian_min = std::min(statistics.jacobian_min, 1.0);
+    statistics.jacobian_max = std::max(statistics.jacobian_max, 1.0);
+    return;
+  }
+  for (int z = 0; z < block.cells.z; ++z) {
+    for (int y = 0; y < block.cells.y; ++y) {
+      for (int x = 0; x < block.cells.x; ++x) {
+        const Cell cell = block.cell({x, y, z});
+        const bool odd = ((block.first_cell.x + block.first_cell.y + block.first_cell.z + x + y + z) & 1) != 0;
+        for (int t = 0; t < kTetrahedraPerCell; ++t) {
+          const double determinant = jacobian(tetrahedron_of(cell, t, odd));
+          statistics.inverted += determinant < 0;
+          statistics.degenerate += determinant == 0;
+          statistics.jacobian_min = std::min(statistics.jacobian_min, determinant);
+          statistics.jacobian_max = std::max(statistics.jacobian_max, determinant);
+        }
+      }
+    }
+  }
+}
+
+void LatticeIndex::group_boxes() {
+  for (std::size_t group = 0; group < group_boxes_.size(); ++group) {
+    const glm::i64vec3 begin = unravel(group, groups_) * kGroup;
+    const glm::i64vec3 end = glm::min(begin + kGroup, blocks_);
+    Box& box = group_boxes_[group];
+    box = boxes_[static_cast<std::size_t>((begin.z * blocks_.y + begin.y) * blocks_.x + begin.x)];
+    for (std::int64_t z = begin.z; z < end.z; ++z) {
+      for (std::int64_t y = begin.y; y < end.y; ++y) {
+        for (std::int64_t x = begin.x; x < end.x; ++x) {
+          const Box& member = boxes_[static_cast<std::size_t>((z * blocks_.y + y) * blocks_.x + x)];
+          box.grow(member.low);
+          box.grow(member.high);
+        }
+      }
+    }
+  }
+}
+
+void LatticeIndex::rest_box(std::size_t block, glm::dvec3* low, glm::dvec3* high) const {
+  const glm::i64vec3 begin = unravel(block, blocks_) * cells_per_block_;
+  const glm::i64vec3 end = glm::min(begin + cells_per_block_, cells_);
+  for (int corner = 0; corner < 8; ++corner) {
+    const glm::dvec3 vertex(corner & 1 ? end.x : begin.x, corner >> 1 & 1 ? end.y : begin.y,
+                            corner >> 2 ? end.z : begin.z);
+    const glm::dvec3 at = output_from_lattice_(vertex);
+    *low = glm::min(*low, at);
+    *high = glm::max(*high, at);
+  }
+}
+
+}  // namespace tetwarp::cpu

@@ -1,0 +1,93 @@
+#pragma once
+
+#include <atomic>
+#include <span>
+#include <vector>
+
+#include "deform/core/visit_cell.h"
+#include "deform/resampler.h"
+
+namespace tetwarp::cpu {
+
+/// What a pass over all tetrahedra of a field found.
+struct FieldStatistics {
+  std::uint64_t inverted = 0, degenerate = 0;
+  double jacobian_min = std::numeric_limits<double>::infinity();
+  double jacobian_max = -std::numeric_limits<double>::infinity();
+
+  void add(const FieldStatistics& other);
+};
+
+/// The vertices of a field, snapped on demand, and boxes by which to find the cells that may reach a part of the
+/// output.
+///
+/// Cells are held in blocks of up to 8 x 8 x 8, blocks in groups of 8 x 8 x 8; each has the box of its deformed
+/// vertices. Nothing of the field is copied: a block's vertices are snapped each time that it is visited.
+class LatticeIndex {
+ public:
+  static constexpr int kMostCells = 8, kMostVertices = kMostCells + 1;
+
+  /// Vertices of one block, i fastest.
+  struct Block {
+    glm::i64vec3 first_cell;
+    glm::i32vec3 cells;  ///< cells on each axis
+    bool at_rest;        ///< every u is zero
+    Vertex vertices[kMostVertices * kMostVertices * kMostVertices];
+
+    Cell cell(const glm::i32vec3& at) const;
+  };
+
+  /// Checks the field and builds the boxes, in parallel in the calling task arena. @throws InputError, Cancelled
+  void build(const Geometry& output, const FieldView& field, const Control& control);
+
+  const FieldView& field() const { return field_; }
+  const Nudge& nudge() const { return nudge_; }
+  const FieldStatistics& statistics() const { return statistics_; }
+  const glm::i64vec3& cells() const { return cells_; }
+  /// Whether a voxel, nudged, lies inside the undeformed lattice.
+  bool inside_undeformed(const glm::i64vec3& voxel) const;
+
+  /// Calls `visit(block)` for the number of every block whose box may reach the region.
+  template <class Visit>
+  void find_blocks(const Region& region, Visit&& visit) const {
+    for (std::size_t group = 0; group < group_boxes_.size(); ++group) {
+      if (!reaches(group_boxes_[group], region)) continue;
+      const glm::i64vec3 begin = glm::i64vec3(unravel(group, groups_)) * kGroup;
+      const glm::i64vec3 end = glm::min(begin + kGroup, blocks_);
+      for (std::int64_t z = begin.z; z < end.z; ++z) {
+        for (std::int64_t y = begin.y; y < end.y; ++y) {
+          for (std::int64_t x = begin.x; x < end.x; ++x) {
+            const auto block = static_cast<std::size_t>((z * blocks_.y + y) * blocks_.x + x);
+            if (reaches(boxes_[block], region)) visit(block);
+          }
+        }
+      }
+    }
+  }
+
+  void load(std::size_t block, Block& into) const;
+  /// Box of the undeformed vertices of a block, in continuous output index.
+  void rest_box(std::size_t block, glm::dvec3* low, glm::dvec3* high) const;
+
+ private:
+  static constexpr std::int64_t kGroup = 8;
+
+  static bool reaches(const Box& box, const Region& region);
+  static glm::i64vec3 unravel(std::size_t number, const glm::i64vec3& size);
+  void check_geometry(const Geometry& output) const;
+  void scan_block(std::size_t block, Block& scratch, FieldStatistics& statistics);
+  void group_boxes();
+  [[noreturn]] void refuse_vertex(const glm::i64vec3& vertex) const;
+
+  FieldView field_;
+  Nudge nudge_;
+  AffineMap output_from_lattice_;
+  AffineMap lattice_from_output_;
+  glm::dmat3 output_from_mm_{1};
+  glm::i64vec3 cells_{0}, blocks_{0}, groups_{0};
+  std::int64_t cells_per_block_ = kMostCells;
+  std::vector<Box> boxes_, group_boxes_;
+  FieldStatistics statistics_;
+};
+
+}  // namespace tetwarp::cpu

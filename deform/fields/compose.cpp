@@ -1,0 +1,95 @@
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+
+#include "deform/core/five_tetrahedra.h"
+#include "deform/cpu/tiles.h"
+#include "deform/fields/point_map.h"
+
+namespace tetwarp {
+
+namespace {
+
+/// Replaces the displacement at every vertex by `change(rest point, displacement)`.
+template <class Change>
+void for_each_vertex(VertexField& field, const Limits& limits, const Control& control, Change&& change) {
+  const AffineMap point = point_from_index(field.lattice);
+  const glm::i64vec3 size = field.lattice.size;
+  cpu::Progress progress(control, size.z);
+  tbb::task_arena arena = cpu::make_arena(limits);
+  arena.execute([&] {
+    tbb::parallel_for(std::int64_t{0}, size.z, [&](std::int64_t z) {
+      for (std::int64_t y = 0; y < size.y; ++y) {
+        glm::vec3* row = field.displacement.data() + (z * size.y + y) * size.x;
+        for (std::int64_t x = 0; x < size.x; ++x) row[x] = change(point(glm::dvec3(x, y, z)), row[x]);
+      }
+      progress.done(1);
+    });
+  });
+}
+
+/// Weights of corners A, B, C of the tetrahedron of a cell that holds a place in it; D has the rest.
+struct Weights {
+  TetrahedronCorners corners;
+  double a, b, c;
+};
+
+/// @param at  place in the cell, 0 to 1 on each axis
+Weights weights_in_cell(const glm::dvec3& at, bool odd) {
+  for (int t = 1; t < kTetrahedraPerCell; ++t) {
+    const TetrahedronCorners corners = tetrahedron_corners(t, odd);
+    const glm::dvec3 from = glm::abs(at - glm::dvec3(corners.d & 1, corners.d >> 1 & 1, corners.d >> 2));
+    if (from.x + from.y + from.z <= 1) return {corners, from.x, from.y, from.z};
+  }
+  const TetrahedronCorners corners = tetrahedron_corners(0, odd);
+  const glm::dvec3 from = glm::abs(at - glm::dvec3(corners.d & 1, corners.d >> 1 & 1, corners.d >> 2));
+  return {corners, 0.5 * (from.y + from.z - from.x), 0.5 * (from.x + from.z - from.y),
+          0.5 * (from.x + from.y - from.z)};
+}
+
+}  // namespace
+
+VertexField sample_on(const Geometry& lattice, const PointMap& map, Limits limits, const Control& control) {
+  require_valid(lattice, "field lattice");
+  VertexField field{lattice, std::vector<glm::vec3>(static_cast<std::size_t>(voxel_count(lattice)))};
+  for_each_vertex(field, limits, control,
+                  [&](const glm::dvec3& rest, const glm::vec3&) { return glm::vec3(map(rest)); });
+  return field;
+}
+
+void compose(VertexField& field, const PointMap& next, Limits limits, const Control& control) {
+  for_each_vertex(field, limits, control, [&](const glm::dvec3& rest, const glm::vec3& moved) {
+    const glm::dvec3 displacement(moved);
+    return glm::vec3(displacement + next(rest + displacement));
+  });
+}
+
+PointMap piecewise_affine(const VertexField& field) {
+  const AffineMap lattice_from_point = index_from_point(field.lattice);
+  return [&field, lattice_from_point](const glm::dvec3& point) {
+    constexpr double kSlack = 1e-6;  // of a cell
+    const glm::dvec3 index = lattice_from_point(point);
+    const glm::i64vec3 size = field.lattice.size;
+    glm::i64vec3 cell;
+    for (int axis = 0; axis < 3; ++axis) {
+      require(index[axis] >= -kSlack && index[axis] <= static_cast<double>(size[axis] - 1) + kSlack,
+              "a vertex is moved to (" + std::to_string(point.x) + ", " + std::to_string(point.y) + ", " +
+                  std::to_string(point.z) + ") mm, outside the lattice of the field that follows");
+      cell[axis] = std::clamp<std::int64_t>(static_cast<std::int64_t>(std::floor(index[axis])), 0, size[axis] - 2);
+    }
+    const Weights w =
+        weights_in_cell(glm::clamp(index - glm::dvec3(cell), 0.0, 1.0), ((cell.x + cell.y + cell.z) & 1) != 0);
+    const auto at = [&](int corner) {
+      const glm::i64vec3 vertex = cell + glm::i64vec3(corner & 1, corner >> 1 & 1, corner >> 2);
+      return glm::dvec3(
+          field.displacement[static_cast<std::size_t>((vertex.z * size.y + vertex.y) * size.x + vertex.x)]);
+    };
+    const glm::dvec3 d = at(w.corners.d);
+    return d + w.a * (at(w.corners.a) - d) + w.b * (at(w.corners.b) - d) + w.c * (at(w.corners.c) - d);
+  };
+}
+
+}  // namespace tetwarp

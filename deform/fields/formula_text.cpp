@@ -1,0 +1,219 @@
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <glm/common.hpp>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "deform/fields/formula.h"
+
+namespace tetwarp {
+
+namespace {
+
+constexpr double kRadiansPerDegree = 0.017453292519943295769;
+constexpr std::string_view kVoxels = "vox";
+
+std::vector<std::string_view> split(std::string_view text, char separator) {
+  std::vector<std::string_view> parts;
+  for (;;) {
+    const std::size_t end = text.find(separator);
+    parts.push_back(text.substr(0, end));
+    if (end == std::string_view::npos) return parts;
+    text.remove_prefix(end + 1);
+  }
+}
+
+std::string_view name_of(std::string_view text) { return text.substr(0, text.find(':')); }
+
+/// A length as typed: mm, or voxels where the suffix says so.
+struct Length {
+  double value;
+  bool in_voxels;
+};
+
+/// The parameters of one formula: each is asked for once, and none may be left over.
+class Parameters {
+ public:
+  Parameters(std::string_view text, const Geometry& volume) : text_(text), volume_(volume) {
+    const std::string_view name = name_of(text);
+    if (name.size() == text.size()) return;
+    for (const std::string_view part : split(text.substr(name.size() + 1), ',')) {
+      const std::size_t equals = part.find('=');
+      if (equals == std::string_view::npos) fail("\"" + std::string(part) + "\" is not of the form key=value");
+      if (!values_.emplace(part.substr(0, equals), part.substr(equals + 1)).second) {
+        fail(std::string(part.substr(0, equals)) + " is given twice");
+      }
+    }
+  }
+
+  [[noreturn]] void fail(const std::string& what) const {
+    throw InputError("formula \"" + std::string(text_) + "\": " + what);
+  }
+
+  void require_all_used() const {
+    if (!values_.empty()) fail("unknown parameter \"" + std::string(values_.begin()->first) + "\"");
+  }
+
+  double number(const std::string& key, std::optional<double> otherwise = {}) {
+    const std::string_view text = take(key, otherwise.has_value());
+    return text.empty() ? *otherwise : parse(key, text);
+  }
+
+  /// mm; one `vox` is the spacing of the grid axis nearest to patient axis `along`, or the smallest where that is -1.
+  double length(const std::string& key, int along) {
+    const Length length = parse_length(key, take(key, false));
+    return length.in_voxels ? length.value * voxel_mm(along) : length.value;
+  }
+
+  double positive_length(const std::string& key, int along) {
+    const double value = length(key, along);
+    if (!(value > 0)) fail(key + " must be greater than 0");
+    return value;
+  }
+
+  int axis(const std::string& key, int otherwise) {
+    const std::string_view text = take(key, true);
+    if (text.empty()) return otherwise;
+    if (text == "x") return 0;
+    if (text == "y") return 1;
+    if (text == "z") return 2;
+    fail(key + " is \"" + std::string(text) + "\", expected x, y or z");
+  }
+
+  glm::dvec3 position(const std::string& key, const glm::dvec3& otherwise) {
+    const std::string_view text = take(key, true);
+    if (text.empty()) return otherwise;
+    const std::array<std::string_view, 3> parts = three(key, text);
+    return {parse(key, parts[0]), parse(key, parts[1]), parse(key, parts[2])};
+  }
+
+  /// DX/DY/DZ mm along L, P, S; with `vox` (after the last, or after each) voxels along i, j, k.
+  glm::dvec3 shift(const std::string& key) {
+    const std::array<std::string_view, 3> parts = three(key, take(key, false));
+    std::array<Length, 3> lengths{};
+    for (std::size_t axis = 0; axis < 3; ++axis) lengths[axis] = parse_length(key, parts[axis]);
+    const glm::dvec3 by(lengths[0].value, lengths[1].value, lengths[2].value);
+    if (!lengths[2].in_voxels && (lengths[0].in_voxels || lengths[1].in_voxels)) fail(key + " mixes mm and vox");
+    return lengths[2].in_voxels ? point_from_index(volume_).linear * by : by;
+  }
+
+ private:
+  std::string_view take(const std::string& key, bool optional) {
+    const auto found = values_.find(key);
+    if (found == values_.end()) {
+      if (!optional) fail(key + " is missing");
+      return {};
+    }
+    const std::string_view value = found->second;
+    if (value.empty()) fail(key + " is empty");
+    values_.erase(found);
+    return value;
+  }
+
+  double parse(const std::string& key, std::string_view text) const {
+    double value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) {
+      fail(key + " is \"" + std::string(text) + "\", expected a number");
+    }
+    return value;
+  }
+
+  Length parse_length(const std::string& key, std::string_view text) const {
+    const bool in_voxels = text.ends_with(kVoxels);
+    if (in_voxels) text.remove_suffix(kVoxels.size());
+    return {parse(key, text), in_voxels};
+  }
+
+  std::array<std::string_view, 3> three(const std::string& key, std::string_view text) const {
+    const std::vector<std::string_view> parts = split(text, '/');
+    if (parts.size() != 3) fail(key + " is \"" + std::string(text) + "\", expected three numbers X/Y/Z");
+    return {parts[0], parts[1], parts[2]};
+  }
+
+  double voxel_mm(int along) const {
+    const glm::dvec3& spacing = volume_.spacing;
+    if (along < 0) return std::min({spacing.x, spacing.y, spacing.z});
+    int nearest = 0;
+    for (int axis = 1; axis < 3; ++axis) {
+      if (std::abs(volume_.direction[axis][along]) > std::abs(volume_.direction[nearest][along])) nearest = axis;
+    }
+    return spacing[nearest];
+  }
+
+  std::string_view text_;
+  const Geometry& volume_;
+  std::map<std::string_view, std::string_view> values_;
+};
+
+PointMap parse_identity(Parameters&, const Geometry&) {
+  return [](const glm::dvec3&) { return glm::dvec3(0); };
+}
+
+PointMap parse_wave(Parameters& given, const Geometry& volume) {
+  Wave wave{.amplitude = 0, .wavelength = 0, .centre = centre(volume)};
+  wave.axis = given.axis("axis", 0);
+  wave.along = given.axis("along", 2);
+  wave.amplitude = given.length("amplitude", wave.axis);
+  wave.wavelength = given.positive_length("wavelength", wave.along);
+  wave.phase = given.number("phase", 0.0) * kRadiansPerDegree;
+  return wave;
+}
+
+PointMap parse_twist(Parameters& given, const Geometry& volume) {
+  const int axis = given.axis("axis", 2);
+  return Twist{given.number("angle") * kRadiansPerDegree, half_length(volume, axis), axis, centre(volume)};
+}
+
+PointMap parse_bubble(Parameters& given, const Geometry& volume) {
+  const double radius = given.positive_length("radius", -1);
+  return Bubble{radius, given.number("strength"), given.position("center", centre(volume))};
+}
+
+PointMap parse_paper_bubble(Parameters& given, const Geometry& volume) {
+  return PaperBubble{given.length("shift", -1), given.position("center", centre(volume))};
+}
+
+PointMap parse_translate(Parameters& given, const Geometry&) {
+  return [by = given.shift("by")](const glm::dvec3&) { return by; };
+}
+
+struct Formula {
+  std::string_view name;
+  PointMap (*parse)(Parameters&, const Geometry&);
+};
+constexpr Formula kFormulas[] = {{"identity", parse_identity},
+                                 {"wave", parse_wave},
+                                 {"twist", parse_twist},
+                                 {"bubble", parse_bubble},
+                                 {"bubble-paper", parse_paper_bubble},
+                                 {"translate", parse_translate}};
+
+const Formula* find_formula(std::string_view text) {
+  const auto* found = std::find_if(std::begin(kFormulas), std::end(kFormulas),
+                                   [&](const Formula& formula) { return formula.name == name_of(text); });
+  return found == std::end(kFormulas) ? nullptr : found;
+}
+
+}  // namespace
+
+bool is_formula(std::string_view text) { return find_formula(text) != nullptr; }
+
+PointMap parse_formula(std::string_view text, const Geometry& volume) {
+  const Formula* formula = find_formula(text);
+  if (!formula) {
+    std::string names;
+    for (const Formula& known : kFormulas) names += (names.empty() ? "" : ", ") + std::string(known.name);
+    throw InputError("formula \"" + std::string(text) + "\" is unknown; choose one of " + names);
+  }
+  require_valid(volume, "volume");
+  Parameters parameters(text, volume);
+  PointMap map = formula->parse(parameters, volume);
+  parameters.require_all_used();
+  return map;
+}
+
+}  // namespace tetwarp

@@ -1,0 +1,107 @@
+#include "deform/phantom/painter.h"
+
+namespace tetwarp::phantom {
+
+namespace {
+
+constexpr float kAir = -1000, kSkin = 10, kFat = -102, kMuscle = 52, kInsideFat = -92, kLung = -868, kPleura = 20, kFissure = -650;
+
+/// How much of a voxel at signed distance `d` lies inside: 1 deep inside, 0 outside, smooth over `edge` mm.
+float coverage(float d, float edge) {
+  const float t = std::clamp(0.5f - d / edge, 0.0f, 1.0f);
+  return t * t * (3 - 2 * t);
+}
+
+void blend(float& hu, float with, float share) { hu += share * (with - hu); }
+
+/// Share of a layer from `outer` inwards to `inner`, of which a coarse voxel sees just its part.
+float layer(float outer, float inner, float edge) { return std::max(coverage(outer, edge) - coverage(inner, edge), 0.0f); }
+
+/// The lung is denser at the back, where somebody who lies on the back has the blood.
+float lung_hu(Point p) { return kLung + 0.35f * (p.y + 20); }
+
+/// Distance to the nearest fissure: the oblique one of either lung, and the level one of the right lung in front of it.
+float fissure(Point p) {
+  const float oblique = (p.z - 8 - 1.05f * p.y - 0.0016f * p.x * p.x) * 0.69f;
+  const float level = p.x < 0 && oblique > 0 ? std::abs(p.z - 14 + 0.0012f * p.y * p.y) : 1000.0f;
+  return std::min(std::abs(oblique), level);
+}
+
+void paint_inside(const Row& row, const Trunk& trunk, Point p, const Walls& walls, float& hu) {
+  const float edge = row.edge;
+  const float beside = std::max(1 - p.y * p.y * 2.2e-4f, 0.0f);  // fat under the broad muscles of the flank
+  if (p.z > -130 && p.z < 132) blend(hu, kFat + 20, layer(walls.cage - 10 - 3 * beside, walls.cage - 10, edge));
+  if (walls.cage < 12) {
+    const Trunk::Rib rib = trunk.rib(p, walls);
+    blend(hu, rib.cartilage ? 105.0f : 720.0f, std::min(1.0f, 5 / edge) * coverage(rib.distance, edge));
+    if (!rib.cartilage) blend(hu, 230, std::min(1.0f, 3 / edge) * coverage(rib.distance + 1.3f, edge));
+  }
+  if (walls.cage > edge) return;
+  blend(hu, kInsideFat, coverage(walls.cage, edge));
+  if (walls.diaphragm > -6) {
+    const float lungs = trunk.lungs(p, walls);
+    blend(hu, kPleura, layer(lungs - 1.2f, lungs, edge));
+    blend(hu, lung_hu(p), coverage(lungs, edge));
+    blend(hu, kFissure, std::min(1.0f, 1.2f / edge) * coverage(std::max(lungs + 1, fissure(p) - 0.6f), edge));
+  }
+  blend(hu, kMuscle, coverage(walls.cage + 1, edge) * layer(walls.diaphragm - 1.5f, walls.diaphragm + 1.5f, edge));
+}
+
+template <class S>
+void paint_shape(const Row& row, const S& shape, const Organ& organ, const Box& reach, const Trunk& trunk) {
+  const float share = std::min(1.0f, (shape.thickness() + 2 * organ.grow) / row.edge), half_edge = 0.5f * row.edge;
+  if (share <= 0) return;
+  for (std::size_t i = 0; i < row.points.size(); ++i) {
+    const Point p = row.points[i];
+    if (p.x < reach.low.x || p.x > reach.high.x) continue;
+    float d = shape.distance(p) - organ.grow;
+    if (d >= half_edge) continue;
+    if (organ.within == Within::chest) d = std::max(d, 2 - diaphragm(p));
+    if (organ.within == Within::abdomen) d = std::max({d, diaphragm(p) + 1.3f, trunk.walls(p).cage + 1.5f});
+    if (organ.level_y != kNoLevel) d = std::max(d, row.straight_y - organ.level_y);
+    blend(row.hu[i], organ.hu, share * coverage(d, row.edge));
+  }
+}
+
+}  // namespace
+
+Box reach(const Organ& organ, float edge) {
+  Box box = std::visit([](const auto& shape) { return shape.bounds(); }, organ.shape);
+  const float more = std::max(organ.grow, 0.0f) + edge;
+  return {box.low - more, box.high + more};
+}
+
+void paint_surroundings(const Row& row) {
+  // A curved table top: hull and foam between two arcs about a line far above.
+  constexpr float kRadius = 520, kTop = 117, kHalfThickness = 15, kHalfWidth = 196, kHull = 2.2f;
+  std::fill(row.hu.begin(), row.hu.end(), kAir);
+  if (row.straight_y < kTop - 60) return;
+  for (std::size_t i = 0; i < row.hu.size(); ++i) {
+    const float x = row.straight_x[i], y = row.straight_y - (kTop - kRadius);
+    const float across = std::abs(std::sqrt(x * x + y * y) - kRadius - kHalfThickness) - kHalfThickness;
+    const float d = std::max(across, std::abs(x) - kHalfWidth);
+    blend(row.hu[i], -180, std::min(1.0f, 2 * kHull / row.edge) * coverage(d, row.edge));
+    blend(row.hu[i], -955, coverage(d + kHull, row.edge));
+  }
+}
+
+void paint_trunk(const Row& row, const Trunk& trunk) {
+  for (std::size_t i = 0; i < row.points.size(); ++i) {
+    const Point p = row.points[i];
+    const Walls walls = trunk.walls(p);
+    if (walls.skin > row.edge) continue;
+    float& hu = row.hu[i];
+    blend(hu, kSkin, coverage(walls.skin, row.edge));
+    blend(hu, kFat, coverage(walls.skin + 2, row.edge));
+    blend(hu, kMuscle, coverage(walls.muscle, row.edge));
+    if (walls.muscle < row.edge) paint_inside(row, trunk, p, walls, hu);
+  }
+}
+
+void paint_organ(const Row& row, const Organ& organ, const Trunk& trunk) {
+  const Box box = reach(organ, row.edge);
+  if (!overlap(box, row.box)) return;
+  std::visit([&](const auto& shape) { paint_shape(row, shape, organ, box, trunk); }, organ.shape);
+}
+
+}  // namespace tetwarp::phantom
