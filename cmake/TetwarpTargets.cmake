@@ -12,8 +12,14 @@ endfunction()
 
 # What every target of the project is compiled with.
 function(tetwarp_configure target)
-  target_compile_features(${target} PUBLIC cxx_std_20)
+  target_compile_features(${target} PUBLIC "$<$<COMPILE_LANGUAGE:CXX>:cxx_std_20>")
   target_include_directories(${target} PUBLIC "$<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>"
                                               "$<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/tetwarp>")
   target_compile_options(${target} PRIVATE "$<$<COMPILE_LANGUAGE:CXX>:-ffp-contract=off>")
+  if(TETWARP_WITH_CUDA)
+    # CMake 3.25 does not know the dialects of CUDA 13, so the dialect is given as an option.
+    target_compile_options(${target} PRIVATE
+      "$<$<COMPILE_LANGUAGE:CUDA>:-std=c++20;--fmad=false;--expt-relaxed-constexpr;--diag-suppress=20012;-Xcompiler=-ffp-contract=off>")
+    target_compile_definitions(${target} PUBLIC GLM_FORCE_CUDA)
+  endif()
 endfunction()

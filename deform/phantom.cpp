@@ -28,7 +28,8 @@ class Bending {
     }
   }
   Point at(std::int64_t i, std::int64_t j, std::int64_t k) const {
-    return tables_[0][static_cast<std::size_t>(i)] + tables_[1][static_cast<std::size_t>(j)] + tables_[2][static_cast<std::size_t>(k)];
+    return tables_[0][static_cast<std::size_t>(i)] + tables_[1][static_cast<std::size_t>(j)] +
+           tables_[2][static_cast<std::size_t>(k)];
   }
 
  private:
@@ -79,7 +80,9 @@ class Texture {
     return {static_cast<std::int32_t>(down), t * t * (3 - 2 * t)};
   }
   float value(std::int32_t i, std::int32_t j, std::int32_t k) const {
-    const auto part = [](std::int32_t n) { return static_cast<std::uint64_t>(static_cast<std::uint32_t>(n) & 0xfffffu); };
+    const auto part = [](std::int32_t n) {
+      return static_cast<std::uint64_t>(static_cast<std::uint32_t>(n) & 0xfffffu);
+    };
     return uniform(seed_ ^ (part(i) | part(j) << 20 | part(k) << 40));
   }
   float edge(std::int32_t i, Cell y, Cell z) const {
@@ -95,9 +98,9 @@ class Texture {
 /// How tissue of some HU varies from place to place: `texture` is about -1 to 1.
 float textured(float hu, float texture) {
   if (hu < -950) return hu;
-  if (hu < -400) return hu + 26 * texture;  // lung
-  if (hu < -40) return hu + 9 * texture;    // fat
-  if (hu > 160) return hu + 55 * texture;   // bone
+  if (hu < -400) return hu + 26 * texture;                                             // lung
+  if (hu < -40) return hu + 9 * texture;                                               // fat
+  if (hu > 160) return hu + 55 * texture;                                              // bone
   const float marbling = hu > 46 && hu < 58 ? std::max(texture - 0.45f, 0.0f) : 0.0f;  // muscle has fat in it
   return hu + 7 * texture - 110 * marbling;
 }
@@ -149,9 +152,15 @@ struct Scene {
   float edge;
 
   Scene(const Geometry& grid, std::uint64_t seed_)
-      : geometry(grid), seed(seed_), organs(make_organs(trunk, seed_)), bending(grid.size, seed_ + 21), coarse(17, seed_ + 22), fine(3.4f, seed_ + 23) {
+      : geometry(grid),
+        seed(seed_),
+        organs(make_organs(trunk, seed_)),
+        bending(grid.size, seed_ + 21),
+        coarse(17, seed_ + 22),
+        fine(3.4f, seed_ + 23) {
     for (std::int64_t i = 0; i < grid.size.x; ++i) x.push_back(position(0, i));
-    edge = 1.4f * static_cast<float>(std::max(kBodySpace.x / static_cast<double>(grid.size.x), kBodySpace.y / static_cast<double>(grid.size.y)));
+    edge = 1.4f * static_cast<float>(std::max(kBodySpace.x / static_cast<double>(grid.size.x),
+                                              kBodySpace.y / static_cast<double>(grid.size.y)));
   }
   /// Body space of a voxel's centre along one axis.
   float position(int axis, std::int64_t voxel) const {
@@ -182,7 +191,8 @@ void paint_slice(const Scene& scene, std::int64_t k, std::span<std::int16_t> sli
   GrainRows grain_rows(scene.geometry.size, k, scene.seed + 24);
   for (std::int64_t j = 0; j < scene.geometry.size.y; ++j) {
     const float y = scene.position(1, j);
-    for (std::size_t i = 0; i < columns; ++i) points[i] = Point(scene.x[i], y, z) + scene.bending.at(static_cast<std::int64_t>(i), j, k);
+    for (std::size_t i = 0; i < columns; ++i)
+      points[i] = Point(scene.x[i], y, z) + scene.bending.at(static_cast<std::int64_t>(i), j, k);
     const Row row{scene.x, y, points, box_of(points), scene.edge, hu};
     paint_surroundings(row);
     paint_trunk(row, scene.trunk);

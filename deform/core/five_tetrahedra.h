@@ -75,15 +75,29 @@ TETWARP_HD inline Box box_of(const Tetrahedron& t) {
   return box;
 }
 
+TETWARP_HD inline Box box_of(const Cell& cell) {
+  Box box{cell.corner[0].deformed, cell.corner[0].deformed};
+  for (int corner = 1; corner < 8; ++corner) box.grow(cell.corner[corner].deformed);
+  return box;
+}
+
+/// Longest side of a box, in 2^-12 voxel, with one voxel more.
+TETWARP_HD inline std::int64_t reach_of(const Box& box) {
+  std::int64_t longest = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::int64_t side = std::int64_t{box.high[axis]} - box.low[axis] + kStepsPerVoxel;
+    longest = side > longest ? side : longest;
+  }
+  return longest;
+}
+
+/// Whether determinants of points in the box, relative to one of its voxels and with the nudge, are exact in double:
+/// with coordinates below 2^15 (8 voxels) they stay below 2^53.
+TETWARP_HD inline bool fits_double(const Box& box) { return reach_of(box) <= std::int64_t{1} << 15; }
+
 /// Whether determinants of points in the box, relative to one of its voxels and with the nudge, fit 64 bits: with
 /// coordinates below 2^18 (64 voxels) they stay below 2^62.
-TETWARP_HD inline bool fits_int64(const Box& box) {
-  constexpr std::int64_t kLimit = std::int64_t{1} << 18;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (std::int64_t{box.high[axis]} - box.low[axis] + kStepsPerVoxel > kLimit) return false;
-  }
-  return true;
-}
+TETWARP_HD inline bool fits_int64(const Box& box) { return reach_of(box) <= std::int64_t{1} << 18; }
 
 /// Forward Jacobian determinant of a tetrahedron: deformed over rest volume; both exact before the division.
 TETWARP_HD inline double jacobian(const Tetrahedron& t) {

@@ -8,7 +8,11 @@ namespace tetwarp {
 ///
 /// The sign of det(a - q, b - q, c - q) = (a - q) . N with N = (b - a) x (c - a), q = p + d; on an exact tie the first
 /// non-zero of -sx Nx, -sy Ny, -sz Nz, which is what an infinitesimal step from q towards the middle gives.
-/// Two tetrahedra that share a face call this with the same corners, in an order that flips the sign exactly.
+/// A tetrahedron (A, B, C, D) owns the voxel when its faces BCD, ADC, ABD, ACB agree (semantics section 3); inverted
+/// ones own like any other, and one without volume never does, for its four determinants sum to zero. Two tetrahedra
+/// that share a face call this with the same corners, and the order of the corners flips the sign exactly.
+///
+/// Int is any type that holds the determinants exactly: double (`fits_double`), 64 bits (`fits_int64`) or Wide.
 ///
 /// @param a, b, c  corners relative to the voxel, 2^-12 voxel
 template <class Int>
@@ -27,19 +31,6 @@ TETWARP_HD int side_of_face(const glm::i32vec3& a, const glm::i32vec3& b, const 
   return 0;
 }
 
-/// Whether the tetrahedron owns a voxel: its four faces agree (semantics section 3). Inverted ones own like any other;
-/// one without volume never does, for its four determinants sum to zero.
-///
-/// @param steps  the voxel, 2^-12 voxel
-template <class Int>
-TETWARP_HD bool owns(const Tetrahedron& t, const glm::i32vec3& steps, const glm::i32vec3& signs) {
-  const glm::i32vec3 a = t.a.deformed - steps, b = t.b.deformed - steps, c = t.c.deformed - steps,
-                     d = t.d.deformed - steps;
-  const int side = side_of_face<Int>(b, c, d, signs);
-  return side != 0 && side_of_face<Int>(a, d, c, signs) == side && side_of_face<Int>(a, b, d, signs) == side &&
-         side_of_face<Int>(a, c, b, signs) == side;
-}
-
 /// A face of a tetrahedron as a function of the voxel: twice-area normal and value, for walking many voxels.
 ///
 /// value(p) = constant - 2^16 (p - first) . normal - d . normal, in units of 2^-40, positive inside.
@@ -48,7 +39,7 @@ struct Face {
   Int normal[3], constant;
 };
 
-/// @param a, b, c      corners relative to the first voxel, 2^-12 voxel, ordered as in `owns`
+/// @param a, b, c      corners relative to the first voxel, 2^-12 voxel
 /// @param orientation  +1 or -1, so that inside is positive
 template <class Int>
 TETWARP_HD Face<Int> make_face(const glm::i32vec3& a, const glm::i32vec3& b, const glm::i32vec3& c, int orientation) {

@@ -77,7 +77,7 @@ TETWARP_HD void walk_rows(const Tetrahedron& t, int number, const VoxelBox& box,
                      d = t.d.deformed - first;
   const Int volume = signed_volume<Int>(a, b, c, d);
   if (volume == 0) return;
-  const int orientation = volume > 0 ? -1 : 1;  // the determinants of `owns` have the other sign
+  const int orientation = volume > 0 ? -1 : 1;  // the determinants of `side_of_face` have the other sign
   const Face<Int> faces[4] = {make_face<Int>(b, c, d, orientation), make_face<Int>(a, d, c, orientation),
                               make_face<Int>(a, b, d, orientation), make_face<Int>(a, c, b, orientation)};
   for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {
@@ -104,17 +104,36 @@ TETWARP_HD void walk_rows(const Tetrahedron& t, int number, const VoxelBox& box,
   }
 }
 
+/// Walks the voxels of a small box one by one: at each, the four faces of the centre are looked at once for all five
+/// tetrahedra. A corner tetrahedron shares the face opposite its D with the centre, corners in the same cyclic order,
+/// so the side is the same number.
 template <class Int, class Visit>
-TETWARP_HD void visit_tetrahedron(const Tetrahedron& t, int number, const VoxelBox& box, const Nudge& nudge,
-                                  Visit& visit) {
-  const glm::i64vec3 extent = box.end - box.begin;
-  if (extent.x * extent.y * extent.z > 2) return walk_rows<Int>(t, number, box, nudge, visit);
+TETWARP_HD void walk_voxels(const Cell& cell, bool odd, const VoxelBox& box, const Nudge& nudge, Visit& visit) {
   for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {
     for (std::int64_t y = box.begin.y; y < box.end.y; ++y) {
       for (std::int64_t x = box.begin.x; x < box.end.x; ++x) {
         const glm::i64vec3 voxel(x, y, z);
-        const glm::i32vec3 signs = nudge.signs(voxel);
-        if (owns<Int>(t, to_steps(voxel), signs)) visit(voxel, signs, number, t);
+        const glm::i32vec3 steps = to_steps(voxel), signs = nudge.signs(voxel);
+        glm::i32vec3 at[8];
+        for (int corner = 0; corner < 8; ++corner) at[corner] = cell.corner[corner].deformed - steps;
+        int shared[4];
+        for (int number = 0; number < kTetrahedraPerCell; ++number) {
+          const TetrahedronCorners of = tetrahedron_corners(number, odd);
+          const glm::i32vec3 &a = at[of.a], &b = at[of.b], &c = at[of.c], &d = at[of.d];
+          bool inside;
+          if (number == 0) {
+            shared[0] = side_of_face<Int>(b, c, d, signs);
+            shared[1] = side_of_face<Int>(a, d, c, signs);
+            shared[2] = side_of_face<Int>(a, b, d, signs);
+            shared[3] = side_of_face<Int>(a, c, b, signs);
+            inside = shared[0] != 0 && shared[1] == shared[0] && shared[2] == shared[0] && shared[3] == shared[0];
+          } else {
+            const int side = shared[odd ? number - 1 : 4 - number];
+            inside = side != 0 && side_of_face<Int>(b, c, d, signs) == side &&
+                     side_of_face<Int>(a, d, c, signs) == side && side_of_face<Int>(a, b, d, signs) == side;
+          }
+          if (inside) visit(voxel, signs, number, tetrahedron_of(cell, number, odd));
+        }
       }
     }
   }
@@ -122,23 +141,32 @@ TETWARP_HD void visit_tetrahedron(const Tetrahedron& t, int number, const VoxelB
 
 }  // namespace detail
 
-/// Calls `visit(voxel, signs, t, tetrahedron)` for every voxel of `region` that tetrahedron t of the cell owns, t
-/// rising.
+/// Calls `visit(voxel, signs, t, tetrahedron)` for every voxel of `region` that tetrahedron t of the cell owns.
 ///
 /// The body that every backend runs for one cell: which voxels it reports is the definition of ownership
 /// (semantics section 3), what becomes of them is the backend's. A voxel in a fold is reported by several tetrahedra,
 /// of this cell or of others: the one with the lowest number 5 * cell + t is its owner.
 template <class Visit>
 TETWARP_HD void visit_cell(const Cell& cell, bool odd, const VoxelBox& region, const Nudge& nudge, Visit&& visit) {
+  constexpr std::int64_t kFewVoxels = 8;  // up to here, looking at each voxel beats setting up rows
+  const Box cell_box = box_of(cell);
+  const VoxelBox all = detail::candidates(nudge, cell_box, region);
+  if (detail::is_empty(all)) return;
+  const glm::i64vec3 extent = all.end - all.begin;
+  if (extent.x * extent.y * extent.z <= kFewVoxels) {
+    if (fits_double(cell_box)) return detail::walk_voxels<double>(cell, odd, all, nudge, visit);
+    if (fits_int64(cell_box)) return detail::walk_voxels<std::int64_t>(cell, odd, all, nudge, visit);
+    return detail::walk_voxels<Wide>(cell, odd, all, nudge, visit);
+  }
   for (int number = 0; number < kTetrahedraPerCell; ++number) {
     const Tetrahedron t = tetrahedron_of(cell, number, odd);
     const Box box = box_of(t);
-    const VoxelBox voxels = detail::candidates(nudge, box, region);
+    const VoxelBox voxels = detail::candidates(nudge, box, all);
     if (detail::is_empty(voxels)) continue;
     if (fits_int64(box)) {
-      detail::visit_tetrahedron<std::int64_t>(t, number, voxels, nudge, visit);
+      detail::walk_rows<std::int64_t>(t, number, voxels, nudge, visit);
     } else {
-      detail::visit_tetrahedron<Wide>(t, number, voxels, nudge, visit);
+      detail::walk_rows<Wide>(t, number, voxels, nudge, visit);
     }
   }
 }

@@ -18,21 +18,28 @@ bool in_right_lobe(const Trunk& trunk, Point p) {
 void add_liver(std::vector<Organ>& organs, const Trunk& trunk, std::uint64_t seed) {
   organs.push_back({kRightLobe, kLiver, Within::abdomen});
   organs.push_back({Ellipsoid{{-4, -48, -82}, {66, 34, 30}, rotation({0, 10, 6})}, kLiver, Within::abdomen});
-  const VesselTree portal{.root = {-34, -2, -100}, .box = {{-135, -85, -150}, {-15, 75, -35}}, .count = 60, .end_radius = 0.75f,
-                          .hu = kLiver + 38, .within = Within::abdomen};
+  const VesselTree portal{.root = {-34, -2, -100},
+                          .box = {{-135, -85, -150}, {-15, 75, -35}},
+                          .count = 60,
+                          .end_radius = 0.75f,
+                          .hu = kLiver + 38,
+                          .within = Within::abdomen};
   VesselTree hepatic = portal;
   hepatic.root = {-22, 6, -54};
   hepatic.count = 45;
   add_vessels(organs, portal, in_right_lobe, trunk, seed + 11);
   add_vessels(organs, hepatic, in_right_lobe, trunk, seed + 12);
   organs.push_back({Rod{{-36, -62, -96}, {-34, -2, -102}, 2.5f, 4}, kFat, Within::abdomen});  // fissure to the hilum
-  organs.push_back({Ellipsoid{{-50, -58, -128}, {14, 15, 27}, rotation({20, 0, 0})}, 8, Within::abdomen});  // gallbladder
+  organs.push_back(
+      {Ellipsoid{{-50, -58, -128}, {14, 15, 27}, rotation({20, 0, 0})}, 8, Within::abdomen});  // gallbladder
 }
 
 void add_kidney(std::vector<Organ>& organs, float side) {
   const Point centre(side * 62, 40, side < 0 ? -124 : -112);
   const glm::mat3 axes = rotation({8, side * 8, side * 32});
-  const auto part = [&](Point offset, Point semi_axes) { return Ellipsoid{centre + axes * (offset * Point(side, 1, 1)), semi_axes, axes}; };
+  const auto part = [&](Point offset, Point semi_axes) {
+    return Ellipsoid{centre + axes * (offset * Point(side, 1, 1)), semi_axes, axes};
+  };
   organs.push_back({part({0, 0, 0}, {33, 29, 58}), kFat - 8, Within::abdomen});
   organs.push_back({part({0, 0, 0}, {26, 22, 50}), 125, Within::abdomen});
   for (const float z : {-30.0f, -15.0f, 0.0f, 15.0f, 30.0f}) {  // pyramids
@@ -41,7 +48,8 @@ void add_kidney(std::vector<Organ>& organs, float side) {
     organs.push_back({part({-3, -9 * inner, z}, {12 * inner, 6.5f, 5}), 75, Within::abdomen});
   }
   organs.push_back({part({-17, 0, 0}, {17, 9, 24}), kFat + 10, Within::abdomen});  // sinus
-  organs.push_back({Rod{centre + axes * Point(-side * 16, 0, 0), {side * 12, 20, centre.z + 4}, 4, 4.5f}, 120, Within::abdomen});
+  organs.push_back(
+      {Rod{centre + axes * Point(-side * 16, 0, 0), {side * 12, 20, centre.z + 4}, 4, 4.5f}, 120, Within::abdomen});
 }
 
 /// A hollow organ: wall, fluid, and gas in front of the level.
@@ -60,7 +68,8 @@ void add_bowel(std::vector<Organ>& organs, Random& random) {
     organs.push_back({Rod{a, b, radius, radius}, random.between(5, 45), Within::abdomen, -2});
   }
   const auto colon = [&](Point a, Point b, float level_y) {
-    add_hollow(organs, Rod{a, b, random.between(16, 19), random.between(16, 20)}, 2.5f, random.between(-20, 50), level_y);
+    add_hollow(organs, Rod{a, b, random.between(16, 19), random.between(16, 20)}, 2.5f, random.between(-20, 50),
+               level_y);
   };
   colon({-100, -4, -190}, {-102, -14, -146}, -22);
   colon({-102, -14, -146}, {-72, -58, -140}, -52);
@@ -82,12 +91,14 @@ void add_abdomen(std::vector<Organ>& organs, const Trunk& trunk, std::uint64_t s
   add_bowel(organs, random);
   add_kidney(organs, -1);
   add_kidney(organs, 1);
-  add_tube(organs, {{{-14, 22, -190}, 11}, {{-18, 18, -110}, 11.5f}, {{-21, 6, -58}, 12}, {{-22, -4, -30}, 12}}, {.shape = {}, .hu = 95});
+  add_tube(organs, {{{-14, 22, -190}, 11}, {{-18, 18, -110}, 11.5f}, {{-21, 6, -58}, 12}, {{-22, -4, -30}, 12}},
+           {.shape = {}, .hu = 95});
   organs.push_back({Ellipsoid{{96, 38, -84}, {26, 44, 46}, rotation({10, 12, 24})}, kSpleen, Within::abdomen});
   add_hollow(organs, Ellipsoid{{60, -22, -84}, {44, 42, 36}, rotation({0, 22, -24})}, 3.5f, kFluid, -34);
   add_tube(organs, {{{-30, -12, -124}, 13}, {{-6, -22, -116}, 9}, {{24, -16, -108}, 9}, {{62, 12, -98}, 8}},
            {.shape = {}, .hu = 48, .within = Within::abdomen});
-  add_tube(organs, {{{2, -8, -120}, 6}, {{-16, -8, -110}, 7}, {{-34, -2, -100}, 7}}, {.shape = {}, .hu = 105, .within = Within::abdomen});
+  add_tube(organs, {{{2, -8, -120}, 6}, {{-16, -8, -110}, 7}, {{-34, -2, -100}, 7}},
+           {.shape = {}, .hu = 105, .within = Within::abdomen});
   add_liver(organs, trunk, seed);
 }
 

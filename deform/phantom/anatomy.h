@@ -21,7 +21,7 @@ struct Organ {
   Shape shape;
   float hu = 0;
   Within within = Within::everything;
-  float grow = 0;           ///< mm that the shape is grown by: the marrow is the bone, shrunk
+  float grow = 0;            ///< mm that the shape is grown by: the marrow is the bone, shrunk
   float level_y = kNoLevel;  ///< only what lies in front of this: gas above fluid in somebody who lies on the back
 };
 
@@ -49,7 +49,7 @@ struct VesselTree {
   float hu;
   Within within = Within::everything;
 };
-void add_vessels(std::vector<Organ>& organs, const VesselTree& tree, bool (*inside)(const Trunk&, Point), const Trunk& trunk,
-                 std::uint64_t seed);
+void add_vessels(std::vector<Organ>& organs, const VesselTree& tree, bool (*inside)(const Trunk&, Point),
+                 const Trunk& trunk, std::uint64_t seed);
 
 }  // namespace tetwarp::phantom

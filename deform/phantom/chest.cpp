@@ -20,21 +20,40 @@ void add_heart(std::vector<Organ>& organs) {
   };
   add(fat, -70, -1);
   add(part({-1, 0, 0}, {61, 41, 42}), kMyocardium);
-  add(part({14, 13, 0}, {38, 17, 19}), kBlood);       // left ventricle
+  add(part({14, 13, 0}, {38, 17, 19}), kBlood);        // left ventricle
   add(part({10, -21, -4}, {42, 13, 28}), kVein + 10);  // right ventricle
-  add(part({-38, 18, 12}, {20, 19, 20}), kBlood);     // left atrium
+  add(part({-38, 18, 12}, {20, 19, 20}), kBlood);      // left atrium
   add(part({-38, -16, -2}, {20, 18, 27}), kVein + 5);  // right atrium
 }
 
 void add_great_vessels(std::vector<Organ>& organs) {
   const Organ artery{.shape = {}, .hu = kBlood}, vein{.shape = {}, .hu = kVein}, lung_artery{.shape = {}, .hu = 130};
-  add_tube(organs, {{{-24, -14, 20}, 11}, {{-25, -16, 60}, 9.5f}, {{-23, -20, 92}, 8.5f}, {{-34, -34, 116}, 7}, {{-50, -30, 150}, 6.5f}}, vein);
+  add_tube(organs,
+           {{{-24, -14, 20}, 11},
+            {{-25, -16, 60}, 9.5f},
+            {{-23, -20, 92}, 8.5f},
+            {{-34, -34, 116}, 7},
+            {{-50, -30, 150}, 6.5f}},
+           vein);
   add_tube(organs, {{{-23, -20, 94}, 7}, {{8, -40, 104}, 7}, {{36, -38, 118}, 6.5f}, {{50, -26, 150}, 6.5f}}, vein);
-  add_tube(organs, {{{18, -52, 12}, 14}, {{19, -42, 34}, 14}, {{20, -22, 50}, 13}, {{32, -4, 54}, 11}, {{44, 8, 50}, 9}}, lung_artery);
+  add_tube(organs,
+           {{{18, -52, 12}, 14}, {{19, -42, 34}, 14}, {{20, -22, 50}, 13}, {{32, -4, 54}, 11}, {{44, 8, 50}, 9}},
+           lung_artery);
   add_tube(organs, {{{20, -24, 48}, 12}, {{-4, -6, 46}, 11}, {{-30, 2, 42}, 10}, {{-43, 6, 36}, 8.5f}}, lung_artery);
-  add_tube(organs, {{{2, -34, 10}, 15}, {{-7, -40, 34}, 16}, {{-8, -36, 60}, 15.5f}, {{-1, -24, 78}, 14.5f}, {{10, -8, 86}, 14},
-                    {{20, 10, 83}, 13}, {{25, 24, 70}, 12.5f}, {{25, 32, 45}, 12}, {{22, 33, 0}, 11.5f}, {{17, 30, -50}, 11},
-                    {{9, 22, -95}, 10}, {{5, 10, -150}, 9.5f}, {{4, 4, -185}, 9.5f}},
+  add_tube(organs,
+           {{{2, -34, 10}, 15},
+            {{-7, -40, 34}, 16},
+            {{-8, -36, 60}, 15.5f},
+            {{-1, -24, 78}, 14.5f},
+            {{10, -8, 86}, 14},
+            {{20, 10, 83}, 13},
+            {{25, 24, 70}, 12.5f},
+            {{25, 32, 45}, 12},
+            {{22, 33, 0}, 11.5f},
+            {{17, 30, -50}, 11},
+            {{9, 22, -95}, 10},
+            {{5, 10, -150}, 9.5f},
+            {{4, 4, -185}, 9.5f}},
            artery);
   add_tube(organs, {{{-4, -20, 88}, 6}, {{-16, -18, 112}, 5.5f}, {{-22, -10, 185}, 4}}, artery);
   add_tube(organs, {{{8, -10, 94}, 4}, {{14, -8, 118}, 3.8f}, {{22, -6, 185}, 3.8f}}, artery);
@@ -59,10 +78,10 @@ void add_airways(std::vector<Organ>& organs) {
 void add_chest_wall(std::vector<Organ>& organs) {
   for (const float side : {-1.0f, 1.0f}) {
     const auto at = [&](float x, float y, float z) { return Point(side * x, y, z); };
-    organs.push_back({Ellipsoid{at(116, -2, 98), {13, 44, 54}, rotation({0, side * 14, side * -12})}, kFat});     // armpit
+    organs.push_back({Ellipsoid{at(116, -2, 98), {13, 44, 54}, rotation({0, side * 14, side * -12})}, kFat});  // armpit
     organs.push_back({Ellipsoid{at(112, 62, 70), {7, 30, 62}, rotation({0, side * 6, side * 50})}, kFat + 15});
     organs.push_back({Ellipsoid{at(80, -73, 64), {52, 5.0f, 44}, rotation({-14, 0, side * 16})}, kFat + 10});
-    organs.push_back({Ellipsoid{at(76, -77, 68), {56, 6.5f, 46}, rotation({-14, 0, side * 16})}, kMuscle});       // pectoral
+    organs.push_back({Ellipsoid{at(76, -77, 68), {56, 6.5f, 46}, rotation({-14, 0, side * 16})}, kMuscle});  // pectoral
     const Ellipsoid back{at(33, 87, -70), {27, 13, 230}, rotation({3, 0, side * -9})};
     organs.push_back({back, kFat + 40, Within::everything, 1.1f});
     organs.push_back({back, kMuscle});
@@ -73,7 +92,8 @@ void add_chest_wall(std::vector<Organ>& organs) {
 
 void add_chest(std::vector<Organ>& organs, const Trunk& trunk, std::uint64_t seed) {
   add_chest_wall(organs);
-  const VesselTree right{.root = {-42, 8, 34}, .box = {{-135, -90, -120}, {-20, 85, 142}}, .count = 900, .end_radius = 0.4f, .hu = 45};
+  const VesselTree right{
+      .root = {-42, 8, 34}, .box = {{-135, -90, -120}, {-20, 85, 142}}, .count = 900, .end_radius = 0.4f, .hu = 45};
   VesselTree left = right;
   left.root = {44, 10, 42};
   left.box = {{15, -90, -120}, {135, 85, 142}};
@@ -81,7 +101,8 @@ void add_chest(std::vector<Organ>& organs, const Trunk& trunk, std::uint64_t see
   add_vessels(organs, left, in_left_lung, trunk, seed + 2);
   add_heart(organs);
   add_great_vessels(organs);
-  add_tube(organs, {{{5, 22, 185}, 7}, {{5, 28, 60}, 7}, {{8, 22, 0}, 7}, {{22, 8, -58}, 8}}, {.shape = {}, .hu = kWall});
+  add_tube(organs, {{{5, 22, 185}, 7}, {{5, 28, 60}, 7}, {{8, 22, 0}, 7}, {{22, 8, -58}, 8}},
+           {.shape = {}, .hu = kWall});
   add_tube(organs, {{{5, 21, 185}, 1.5f}, {{5, 27, 60}, 2}, {{8, 21, 0}, 1.5f}}, {.shape = {}, .hu = -600});
   add_airways(organs);
   for (const float side : {-1.0f, 1.0f}) {

@@ -4,7 +4,8 @@ namespace tetwarp::phantom {
 
 namespace {
 
-constexpr float kAir = -1000, kSkin = 10, kFat = -102, kMuscle = 52, kInsideFat = -92, kLung = -868, kPleura = 20, kFissure = -650;
+constexpr float kAir = -1000, kSkin = 10, kFat = -102, kMuscle = 52, kInsideFat = -92, kLung = -868, kPleura = 20,
+                kFissure = -650;
 
 /// How much of a voxel at signed distance `d` lies inside: 1 deep inside, 0 outside, smooth over `edge` mm.
 float coverage(float d, float edge) {
@@ -15,7 +16,9 @@ float coverage(float d, float edge) {
 void blend(float& hu, float with, float share) { hu += share * (with - hu); }
 
 /// Share of a layer from `outer` inwards to `inner`, of which a coarse voxel sees just its part.
-float layer(float outer, float inner, float edge) { return std::max(coverage(outer, edge) - coverage(inner, edge), 0.0f); }
+float layer(float outer, float inner, float edge) {
+  return std::max(coverage(outer, edge) - coverage(inner, edge), 0.0f);
+}
 
 /// The lung is denser at the back, where somebody who lies on the back has the blood.
 float lung_hu(Point p) { return kLung + 0.35f * (p.y + 20); }

@@ -8,12 +8,12 @@ namespace tetwarp::phantom {
 
 /// One row of voxels along x, in body space. The body is a little uneven: `x`, and y and z of each voxel, are bent.
 struct Row {
-  std::span<const float> straight_x;       ///< before bending: where the table is
+  std::span<const float> straight_x;  ///< before bending: where the table is
   float straight_y;
-  std::span<const Point> points;           ///< bent
-  Box box;                                 ///< around `points`
-  float edge;                              ///< mm over which an edge goes from one tissue to the next: about one voxel
-  std::span<float> hu;                     ///< painted on
+  std::span<const Point> points;  ///< bent
+  Box box;                        ///< around `points`
+  float edge;                     ///< mm over which an edge goes from one tissue to the next: about one voxel
+  std::span<float> hu;            ///< painted on
 };
 
 /// Air and the table.
@@ -29,8 +29,8 @@ void paint_organ(const Row& row, const Organ& organ, const Trunk& trunk);
 Box reach(const Organ& organ, float edge);
 
 inline bool overlap(const Box& a, const Box& b) {
-  return a.low.x <= b.high.x && b.low.x <= a.high.x && a.low.y <= b.high.y && b.low.y <= a.high.y && a.low.z <= b.high.z &&
-         b.low.z <= a.high.z;
+  return a.low.x <= b.high.x && b.low.x <= a.high.x && a.low.y <= b.high.y && b.low.y <= a.high.y &&
+         a.low.z <= b.high.z && b.low.z <= a.high.z;
 }
 
 }  // namespace tetwarp::phantom

@@ -19,7 +19,8 @@ constexpr float uniform(std::uint64_t key) { return static_cast<float>(hash(key)
 /// Nearly normal, mean 0 and variance 1: the sum of four uniform numbers of 16 bits (Irwin-Hall), within +-3.5.
 constexpr float normal(std::uint64_t key) {
   const std::uint64_t bits = hash(key);
-  const auto sum = static_cast<std::int32_t>((bits & 0xffff) + (bits >> 16 & 0xffff) + (bits >> 32 & 0xffff) + (bits >> 48));
+  const auto sum =
+      static_cast<std::int32_t>((bits & 0xffff) + (bits >> 16 & 0xffff) + (bits >> 32 & 0xffff) + (bits >> 48));
   constexpr float kScale = 1.7320508f / 65536.0f;  // the variance of the sum is 4 / 12
   return static_cast<float>(sum - 2 * 65536) * kScale;
 }

@@ -11,8 +11,8 @@
 
 namespace tetwarp::phantom {
 
-/// Solid shapes by signed distance in mm (negative inside; approximate away from the surface, which is all that blending
-/// at edges needs). Float throughout, only + - * / and square root: the same bits on every machine.
+/// Solid shapes by signed distance in mm (negative inside; approximate away from the surface, which is all that
+/// blending at edges needs). Float throughout, only + - * / and square root: the same bits on every machine.
 ///
 /// Points are in body space: LPS mm of a field of view of 410 x 410 x 300 mm with its middle at the origin.
 using Point = glm::vec3;

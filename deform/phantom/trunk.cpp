@@ -25,20 +25,23 @@ constexpr Section kSections[] = {
 using Member = float Outline::*;
 
 /// Catmull-Rom through the values at uneven heights (tangents by central differences).
-float smooth(float z, Outline Section::* wall, Member member) {
+float smooth(float z, Outline Section::*wall, Member member) {
   const std::span<const Section> rows(kSections);
   std::size_t right = 1;
   while (right + 1 < rows.size() && rows[right].z < z) ++right;
   const std::size_t left = right - 1, before = left ? left - 1 : left, after = std::min(right + 1, rows.size() - 1);
   const auto value = [&](std::size_t row) { return rows[row].*wall.*member; };
-  const auto slope = [&](std::size_t from, std::size_t to) { return (value(to) - value(from)) / (rows[to].z - rows[from].z); };
+  const auto slope = [&](std::size_t from, std::size_t to) {
+    return (value(to) - value(from)) / (rows[to].z - rows[from].z);
+  };
   const float width = rows[right].z - rows[left].z, t = (z - rows[left].z) / width, s = 1 - t;
   return s * s * (1 + 2 * t) * value(left) + t * t * (1 + 2 * s) * value(right) +
          s * t * width * (s * slope(before, right) - t * slope(left, after));
 }
 
-Outline outline_at(float z, Outline Section::* wall) {
-  const Outline here{smooth(z, wall, &Outline::half_width), smooth(z, wall, &Outline::front), smooth(z, wall, &Outline::back)};
+Outline outline_at(float z, Outline Section::*wall) {
+  const Outline here{smooth(z, wall, &Outline::half_width), smooth(z, wall, &Outline::front),
+                     smooth(z, wall, &Outline::back)};
   const float slope = 0.5f * (smooth(z + 1, wall, &Outline::half_width) - smooth(z - 1, wall, &Outline::half_width));
   return {here.half_width, here.front, here.back, 1 / std::sqrt(1 + slope * slope)};
 }

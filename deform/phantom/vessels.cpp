@@ -25,16 +25,16 @@ std::size_t best_parent(const std::vector<Node>& nodes, Point end) {
   return best;
 }
 
-std::vector<Point> spread_ends(const VesselTree& tree, bool (*inside)(const Trunk&, Point), const Trunk& trunk, Random& random) {
+std::vector<Point> spread_ends(const VesselTree& tree, bool (*inside)(const Trunk&, Point), const Trunk& trunk,
+                               Random& random) {
   std::vector<Point> ends;
   for (int tries = 0; tries < 200 * tree.count && std::ssize(ends) < tree.count; ++tries) {
     Point p;
     for (int axis = 0; axis < 3; ++axis) p[axis] = random.between(tree.box.low[axis], tree.box.high[axis]);
     if (inside(trunk, p)) ends.push_back(p);
   }
-  std::stable_sort(ends.begin(), ends.end(), [&](Point a, Point b) {
-    return glm::distance(a, tree.root) < glm::distance(b, tree.root);
-  });
+  std::stable_sort(ends.begin(), ends.end(),
+                   [&](Point a, Point b) { return glm::distance(a, tree.root) < glm::distance(b, tree.root); });
   return ends;
 }
 
@@ -48,8 +48,8 @@ void add_tube(std::vector<Organ>& organs, const std::vector<TubePoint>& points, 
   }
 }
 
-void add_vessels(std::vector<Organ>& organs, const VesselTree& tree, bool (*inside)(const Trunk&, Point), const Trunk& trunk,
-                 std::uint64_t seed) {
+void add_vessels(std::vector<Organ>& organs, const VesselTree& tree, bool (*inside)(const Trunk&, Point),
+                 const Trunk& trunk, std::uint64_t seed) {
   Random random(seed);
   std::vector<Node> nodes = {{tree.root, 0, 0}};
   for (const Point end : spread_ends(tree, inside, trunk, random)) {

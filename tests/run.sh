@@ -1,0 +1,21 @@
+#!/usr/bin/env bash
+# Runs the tests of the build that examples/quickstart.sh made.
+#
+#   tests/run.sh [CTEST ARGUMENTS]
+#
+# Real series: $TETWARP_TEST_DATA names a folder of unpacked sets; without it, sets packed in ../shared/data are unpacked
+# into the build folder. Tests that find no data skip and say so.
+set -euo pipefail
+source_dir=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+preset=$("$source_dir/cmake/preset.sh")
+packed="$source_dir/../shared/data"
+if [ -z "${TETWARP_TEST_DATA:-}" ] && [ -f "$packed/unpack.sh" ]; then
+  export TETWARP_TEST_DATA="$source_dir/build/test-data"
+  if [ ! -f "$TETWARP_TEST_DATA/complete" ]; then
+    mkdir -p "$TETWARP_TEST_DATA"
+    bash "$packed/unpack.sh" "$TETWARP_TEST_DATA" >/dev/null
+    touch "$TETWARP_TEST_DATA/complete"
+  fi
+fi
+cd "$source_dir"
+exec ctest --preset "$preset" "$@"
