@@ -29,8 +29,12 @@ VertexField read_file(const std::string& path, std::vector<std::string>& notes) 
 
 void check_fields(const std::vector<std::string>& fields, std::optional<std::int64_t> cell_size) {
   if (fields.empty()) throw UsageError("no field; give -f FIELD or --pull-field FILE");
+  Geometry any;
+  any.size = glm::i64vec3(2);
   for (const std::string& text : fields) {
-    if (!is_formula(text) && !std::filesystem::exists(text)) {
+    if (is_formula(text)) {
+      formula_map(text, any);  // a misspelled one is known before anything is read
+    } else if (!std::filesystem::exists(text)) {
       throw UsageError("\"" + text + "\" is neither a formula nor a file that exists; see tetwarp deform --help");
     }
   }

@@ -12,7 +12,7 @@ endfunction()
 
 # What every target of the project is compiled with.
 function(tetwarp_configure target)
-  target_compile_features(${target} PUBLIC "$<$<COMPILE_LANGUAGE:CXX>:cxx_std_20>")
+  target_compile_features(${target} PUBLIC cxx_std_20)
   target_include_directories(${target} PUBLIC "$<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>"
                                               "$<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/tetwarp>")
   target_compile_options(${target} PRIVATE "$<$<COMPILE_LANGUAGE:CXX>:-ffp-contract=off>")

@@ -34,7 +34,7 @@ class Bending {
 
  private:
   void add_wave(int axis, std::int64_t size, double waves, double amplitude_mm, Random& random) {
-    const glm::dvec3 phase(random.uniform(), random.uniform(), random.uniform());
+    const glm::dvec3 phase{random.uniform(), random.uniform(), random.uniform()};
     for (std::int64_t i = 0; i < size; ++i) {
       const double turn = 2 * kPi * waves * (static_cast<double>(i) + 0.5) / static_cast<double>(size);
       for (int moved = 0; moved < 3; ++moved) {

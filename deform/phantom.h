@@ -5,7 +5,7 @@
 namespace tetwarp {
 
 /// A plausible CT of a trunk that never was: skin, fat, muscle, lungs with vessels, heart, liver, spine, ribs, table,
-/// noise; HU from -1024 to about 1500. A function of its arguments alone (own sine, own random numbers): the same bits
+/// noise; HU from -1024 to about 1300. A function of its arguments alone (own sine, own random numbers): the same bits
 /// everywhere.
 ///
 /// @param size     voxels along i, j, k; each at least 2

@@ -25,7 +25,8 @@ struct DicomSlice {
 struct DicomSeries {
   std::string series_uid, study_uid, frame_of_reference_uid, modality;
   std::vector<DicomSlice> slices;      ///< sorted by position along the normal, row x column
-  Geometry geometry;                   ///< from Image Position and Orientation (Patient) and Pixel Spacing alone
+  Geometry geometry;                   ///< from Image Position and Orientation (Patient) and Pixel Spacing alone; of a
+                                       ///< refused series: size 0, or as far as it is known
   std::vector<std::string> set_aside;  ///< "FILE: reason", one a file
   std::optional<std::string> refusal;  ///< why the slices are not a volume: what, where, expected and found
   std::vector<std::string> warnings;   ///< worth knowing, harmless to the volume
@@ -49,7 +50,7 @@ struct DicomVolume {
   std::optional<PaddingRange> padding;  ///< Pixel Padding Value and Range Limit in HU, when all slices agree
   std::uint64_t rounded = 0;            ///< voxels whose HU was fractional and was rounded half to even
   std::string series_uid;
-  std::string sha256;                   ///< of the files' bytes, in slice order
+  std::string sha256;                   ///< of the SHA-256 digests of the files, in slice order
   std::shared_ptr<const DicomHeaders> headers;
 };
 

@@ -13,15 +13,18 @@ bool has_image_suffix(const std::filesystem::path& path);
 
 /// What a volume file says before its voxels are read.
 struct ImageHeader {
-  Geometry geometry;                            ///< LPS, whatever the file's own frame
+  Geometry geometry;  ///< LPS, whatever the file's own frame
   VoxelType type = VoxelType::i16;
-  int components = 1;                           ///< 3 for a displacement field
-  std::map<std::string, std::string> metadata;  ///< keys and values as the file has them; NIfTI's descrip is "descrip"
+  int components = 1;  ///< 3 for a displacement field
+  /// Keys and values as the file has them. NIfTI: "descrip"; and "scaled" where scl_slope and scl_inter made float of
+  /// it.
+  std::map<std::string, std::string> metadata;
 };
 
 struct ImageWriteOptions {
-  int compression = -1;                         ///< 0 none, 1 to 9; -1: 6 for .nii.gz, none for .nrrd and .mha
-  std::map<std::string, std::string> metadata;  ///< NRRD and MHA: key and value; NIfTI keeps only "descrip" (79 characters)
+  int compression = -1;  ///< 0 none, 1 to 9; -1: 6 for .nii.gz, none else; .nii never is
+  std::map<std::string, std::string>
+      metadata;  ///< NRRD and MHA: key and value; NIfTI keeps only "descrip" (79 characters)
 };
 
 /// @throws InputError naming the file: missing, unreadable, truncated, an unknown suffix, not 3-D, a voxel type that
@@ -32,6 +35,7 @@ AnyVolume read_image(const std::filesystem::path& path);
 /// Writes the whole volume with its own voxel type; NIfTI with qform and sform both set (code 1), mm.
 /// Writes to `path` directly: io/staged_output.h is what makes an output appear only when complete.
 /// @throws InputError for an unknown suffix, Error when the file cannot be written whole
-void write_image(const std::filesystem::path& path, const ConstVolumeView& volume, const ImageWriteOptions& options = {});
+void write_image(const std::filesystem::path& path, const ConstVolumeView& volume,
+                 const ImageWriteOptions& options = {});
 
 }  // namespace tetwarp

@@ -7,9 +7,9 @@
 
 namespace tetwarp {
 
-/// Writes a PNG for a person to judge: rows before, after, difference; columns axial, coronal, sagittal through the middle,
-/// in true proportions (mm), head up and patient's right on the left; orientation letters, window and level, scale bar
-/// and a legend of the difference colours.
+/// Writes a PNG for a person to judge: rows before, after, difference; columns axial, coronal, sagittal through the
+/// middle, in true proportions (mm), head up and patient's right on the left; orientation letters, window and level,
+/// scale bar and a legend of the difference colours.
 ///
 /// @param before, after  volumes on the same grid, any voxel type, any direction
 /// @param title          one line at the top; no patient data

@@ -33,11 +33,18 @@ constexpr int kNudgeX = 15, kNudgeY = 7, kNudgeZ = 4;
 
 /// Which way a voxel is nudged, on each axis: +1 below the middle, else -1.
 struct Nudge {
-  glm::dvec3 middle{0};  ///< of the undeformed lattice's box, continuous output index
+  glm::i64vec3 low_plus_high{0};  ///< twice the middle of the undeformed lattice's box of snapped vertices, 2^-12 voxel
 
-  TETWARP_HD int sign(int axis, std::int64_t voxel) const { return static_cast<double>(voxel) < middle[axis] ? 1 : -1; }
+  TETWARP_HD int sign(int axis, std::int64_t voxel) const {
+    return 2 * kStepsPerVoxel * voxel < low_plus_high[axis] ? 1 : -1;
+  }
   TETWARP_HD glm::i32vec3 signs(const glm::i64vec3& voxel) const {
     return {sign(0, voxel.x), sign(1, voxel.y), sign(2, voxel.z)};
+  }
+  /// The first voxel of an axis that is nudged down.
+  TETWARP_HD std::int64_t first_down(int axis) const {
+    const std::int64_t voxel = low_plus_high[axis] >> 13;  // floor of the middle
+    return sign(axis, voxel) < 0 ? voxel : voxel + 1;
   }
 };
 

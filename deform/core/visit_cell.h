@@ -87,7 +87,7 @@ TETWARP_HD void walk_rows(const Tetrahedron& t, int number, const VoxelBox& box,
         const glm::i32vec3 signs = nudge.signs({x, y, z}), nudged = nudge_steps(signs);
         std::int64_t begin = x - box.begin.x, end = box.end.x - box.begin.x;
         if (signs.x > 0 && nudge.sign(0, box.end.x - 1) < 0) {
-          end = static_cast<std::int64_t>(std::ceil(nudge.middle.x)) - box.begin.x;
+          end = nudge.first_down(0) - box.begin.x;
         }
         x = box.begin.x + end;
         for (const Face<Int>& face : faces) {

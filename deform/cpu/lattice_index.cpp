@@ -61,7 +61,7 @@ bool LatticeIndex::inside_undeformed(const glm::i64vec3& voxel) const {
          at.y <= static_cast<double>(cells_.y) && at.z <= static_cast<double>(cells_.z);
 }
 
-void LatticeIndex::check_geometry(const Geometry& output) const {
+void LatticeIndex::take_geometry(const Geometry& output) {
   const Geometry& lattice = *field_.lattice;
   require_valid(lattice, "field lattice");
   for (int axis = 0; axis < 3; ++axis) {
@@ -72,10 +72,12 @@ void LatticeIndex::check_geometry(const Geometry& output) const {
                                          " voxels of the output along axis " + std::to_string(axis) +
                                          ", expected at least 1/1024");
   }
+  Box rest{glm::i32vec3(INT32_MAX), glm::i32vec3(INT32_MIN)};
   for (int corner = 0; corner < 8; ++corner) {
     const glm::dvec3 at = glm::dvec3(corner & 1, corner >> 1 & 1, corner >> 2);
     require(usable(output_from_lattice_(at * glm::dvec3(cells_)), kLargestIndex),
             "the field's lattice lies more than 262144 voxels from the output grid");
+    rest.grow(snap(output_from_lattice_(at * glm::dvec3(cells_))));
     if (field_.outside != Outside::refuse) continue;
     const glm::dvec3 vertex = lattice_from_output_(at * glm::dvec3(output.size - std::int64_t{1}));
     for (int axis = 0; axis < 3; ++axis) {
@@ -87,6 +89,7 @@ void LatticeIndex::check_geometry(const Geometry& output) const {
                   std::to_string(cells_[axis]));
     }
   }
+  nudge_.low_plus_high = glm::i64vec3(rest.low) + glm::i64vec3(rest.high);
 }
 
 void LatticeIndex::build(const Geometry& output, const FieldView& field, const Control& control) {
@@ -96,9 +99,7 @@ void LatticeIndex::build(const Geometry& output, const FieldView& field, const C
   output_from_lattice_ = index_from_point(output) * point_from_index(*field_.lattice);
   lattice_from_output_ = index_from_point(*field_.lattice) * point_from_index(output);
   output_from_mm_ = index_from_point(output).linear;
-  check_geometry(output);
-  nudge_.middle = output_from_lattice_(0.5 * glm::dvec3(cells_));
-
+  take_geometry(output);
   const double cell_voxels =
       std::min({glm::length(output_from_lattice_.linear[0]), glm::length(output_from_lattice_.linear[1]),
                 glm::length(output_from_lattice_.linear[2])});
@@ -202,12 +203,14 @@ void LatticeIndex::group_boxes() {
 void LatticeIndex::rest_box(std::size_t block, glm::dvec3* low, glm::dvec3* high) const {
   const glm::i64vec3 begin = unravel(block, blocks_) * cells_per_block_;
   const glm::i64vec3 end = glm::min(begin + cells_per_block_, cells_);
+  const glm::dmat3& linear = output_from_lattice_.linear;
+  const glm::dvec3 margin = 4 * kWeightSlack * (glm::abs(linear[0]) + glm::abs(linear[1]) + glm::abs(linear[2]));
   for (int corner = 0; corner < 8; ++corner) {
     const glm::dvec3 vertex(corner & 1 ? end.x : begin.x, corner >> 1 & 1 ? end.y : begin.y,
                             corner >> 2 ? end.z : begin.z);
     const glm::dvec3 at = output_from_lattice_(vertex);
-    *low = glm::min(*low, at);
-    *high = glm::max(*high, at);
+    *low = glm::min(*low, at - margin);
+    *high = glm::max(*high, at + margin);
   }
 }
 

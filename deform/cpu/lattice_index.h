@@ -66,7 +66,8 @@ class LatticeIndex {
   }
 
   void load(std::size_t block, Block& into) const;
-  /// Box of the undeformed vertices of a block, in continuous output index.
+  /// Grows a box in continuous output index to hold every undeformed place that a block's tetrahedra can give, weights
+  /// that leave [0, 1] by the slack included.
   void rest_box(std::size_t block, glm::dvec3* low, glm::dvec3* high) const;
 
  private:
@@ -74,7 +75,7 @@ class LatticeIndex {
 
   static bool reaches(const Box& box, const Region& region);
   static glm::i64vec3 unravel(std::size_t number, const glm::i64vec3& size);
-  void check_geometry(const Geometry& output) const;
+  void take_geometry(const Geometry& output);
   void scan_block(std::size_t block, Block& scratch, FieldStatistics& statistics);
   void group_boxes();
   [[noreturn]] void refuse_vertex(const glm::i64vec3& vertex) const;

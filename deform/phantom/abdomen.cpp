@@ -61,15 +61,15 @@ void add_hollow(std::vector<Organ>& organs, const Shape& shape, float wall_mm, f
 
 void add_bowel(std::vector<Organ>& organs, Random& random) {
   for (int loop = 0; loop < 26; ++loop) {  // small bowel
-    const Point a(random.between(-55, 75), random.between(-72, -8), random.between(-190, -128));
-    const Point b = a + Point(random.between(-26, 26), random.between(-14, 14), random.between(-12, 12));
+    const Point a{random.between(-55, 75), random.between(-72, -8), random.between(-190, -128)};
+    const Point b = a + Point{random.between(-26, 26), random.between(-14, 14), random.between(-12, 12)};
     const float radius = random.between(8, 11.5f);
     organs.push_back({Rod{a, b, radius, radius}, kWall + random.between(0, 25), Within::abdomen});
     organs.push_back({Rod{a, b, radius, radius}, random.between(5, 45), Within::abdomen, -2});
   }
   const auto colon = [&](Point a, Point b, float level_y) {
-    add_hollow(organs, Rod{a, b, random.between(16, 19), random.between(16, 20)}, 2.5f, random.between(-20, 50),
-               level_y);
+    const Rod tube{a, b, random.between(16, 19), random.between(16, 20)};
+    add_hollow(organs, tube, 2.5f, random.between(-20, 50), level_y);
   };
   colon({-100, -4, -190}, {-102, -14, -146}, -22);
   colon({-102, -14, -146}, {-72, -58, -140}, -52);

@@ -36,7 +36,7 @@ void paint_inside(const Row& row, const Trunk& trunk, Point p, const Walls& wall
   if (p.z > -130 && p.z < 132) blend(hu, kFat + 20, layer(walls.cage - 10 - 3 * beside, walls.cage - 10, edge));
   if (walls.cage < 12) {
     const Trunk::Rib rib = trunk.rib(p, walls);
-    blend(hu, rib.cartilage ? 105.0f : 720.0f, std::min(1.0f, 5 / edge) * coverage(rib.distance, edge));
+    blend(hu, rib.cartilage ? 105.0f : 850.0f, std::min(1.0f, 5 / edge) * coverage(rib.distance, edge));
     if (!rib.cartilage) blend(hu, 230, std::min(1.0f, 3 / edge) * coverage(rib.distance + 1.3f, edge));
   }
   if (walls.cage > edge) return;
@@ -54,9 +54,11 @@ template <class S>
 void paint_shape(const Row& row, const S& shape, const Organ& organ, const Box& reach, const Trunk& trunk) {
   const float share = std::min(1.0f, (shape.thickness() + 2 * organ.grow) / row.edge), half_edge = 0.5f * row.edge;
   if (share <= 0) return;
-  for (std::size_t i = 0; i < row.points.size(); ++i) {
+  const auto begin = row.points.begin(), end = row.points.end();
+  const auto first = std::partition_point(begin, end, [&](const Point& p) { return p.x < reach.low.x; });
+  for (auto i = static_cast<std::size_t>(first - begin); i < row.points.size(); ++i) {
     const Point p = row.points[i];
-    if (p.x < reach.low.x || p.x > reach.high.x) continue;
+    if (p.x > reach.high.x) break;
     float d = shape.distance(p) - organ.grow;
     if (d >= half_edge) continue;
     if (organ.within == Within::chest) d = std::max(d, 2 - diaphragm(p));
@@ -89,8 +91,11 @@ void paint_surroundings(const Row& row) {
 }
 
 void paint_trunk(const Row& row, const Trunk& trunk) {
+  constexpr float kWidest = 182, kFront = -124, kBack = 116;  // no skin is further out
+  if (row.box.high.y < kFront - row.edge || row.box.low.y > kBack + row.edge) return;
   for (std::size_t i = 0; i < row.points.size(); ++i) {
     const Point p = row.points[i];
+    if (std::abs(p.x) > kWidest + row.edge) continue;
     const Walls walls = trunk.walls(p);
     if (walls.skin > row.edge) continue;
     float& hu = row.hu[i];

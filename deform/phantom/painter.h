@@ -10,7 +10,7 @@ namespace tetwarp::phantom {
 struct Row {
   std::span<const float> straight_x;  ///< before bending: where the table is
   float straight_y;
-  std::span<const Point> points;  ///< bent
+  std::span<const Point> points;  ///< bent, x rising
   Box box;                        ///< around `points`
   float edge;                     ///< mm over which an edge goes from one tissue to the next: about one voxel
   std::span<float> hu;            ///< painted on

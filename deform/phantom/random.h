@@ -25,7 +25,8 @@ constexpr float normal(std::uint64_t key) {
   return static_cast<float>(sum - 2 * 65536) * kScale;
 }
 
-/// A stream of keys for building things one after another.
+/// A stream of numbers for building things one after another. Draw them in braces or one to a statement: the order in
+/// which a call's arguments are evaluated differs between compilers.
 class Random {
  public:
   explicit Random(std::uint64_t seed) : key_(hash(seed)) {}

@@ -4,7 +4,7 @@ namespace tetwarp::phantom {
 
 namespace {
 
-constexpr float kCortical = 900, kMarrow = 210, kDisc = 85, kCanal = 15, kCord = 38;
+constexpr float kCortical = 1100, kMarrow = 210, kDisc = 85, kCanal = 15, kCord = 38;
 
 /// Bones that touch share their marrow: all of the outsides are painted first, then all of the insides.
 void add_bones(std::vector<Organ>& organs, const std::vector<Shape>& bones, float cortex_mm, float cortical = kCortical,
@@ -76,7 +76,7 @@ std::vector<Shape> shoulder_girdle() {
 void add_skeleton(std::vector<Organ>& organs) {
   add_spine(organs);
   add_bones(organs, sternum(), 1.2f, 600, 130);
-  add_bones(organs, shoulder_girdle(), 1.6f, 950, 240);
+  add_bones(organs, shoulder_girdle(), 1.6f, 1050, 240);
 }
 
 }  // namespace tetwarp::phantom

@@ -51,13 +51,16 @@ Outline mix(const Outline& a, const Outline& b, float t) {
           a.back + t * (b.back - a.back), a.tilt + t * (b.tilt - a.tilt)};
 }
 
-/// (f - 1) / |grad f| for the squircle f = u^2 + v^2 - s u^2 v^2.
+/// (f - 1) / |grad f| for the squircle f = u^2 + v^2 - s u^2 v^2; far outside, where f would fall again, without growth
+/// of its last term.
 float distance(const Outline& o, Point p) {
   constexpr float kSquareness = 0.33f;
   const float a = o.half_width, b = 0.5f * (o.back - o.front);
   const float u = p.x / a, v = (p.y - 0.5f * (o.front + o.back)) / b, uu = u * u, vv = v * v;
-  const float du = u * (1 - kSquareness * vv) / a, dv = v * (1 - kSquareness * uu) / b;
-  return o.tilt * 0.5f * (uu + vv - kSquareness * uu * vv - 1) / (std::sqrt(du * du + dv * dv) + 1e-4f);
+  const float near_uu = std::min(uu, 1.0f), near_vv = std::min(vv, 1.0f);
+  const float du = u * (1 - kSquareness * near_vv) / a, dv = v * (1 - kSquareness * near_uu) / b;
+  const float f = uu + vv - kSquareness * near_uu * near_vv;
+  return o.tilt * 0.5f * (f - 1) / (std::sqrt(du * du + dv * dv) + 1e-4f);
 }
 
 /// Half width of the mediastinum at depth y: narrow in front, wide at the hila, the spine behind.

@@ -59,7 +59,7 @@ void add_vessels(std::vector<Organ>& organs, const VesselTree& tree, bool (*insi
     constexpr int kPieces = 3;  // a branch of three pieces, bent a little, on which later branches may sit
     for (int piece = 1; piece <= kPieces; ++piece) {
       Point p = glm::mix(start, end, static_cast<float>(piece) / kPieces);
-      if (piece < kPieces) p += 0.09f * length * Point(random.uniform(), random.uniform(), random.uniform());
+      if (piece < kPieces) p += 0.09f * length * Point{random.uniform(), random.uniform(), random.uniform()};
       nodes.push_back({p, from, nodes[from].path + glm::distance(nodes[from].point, p)});
       from = nodes.size() - 1;
     }

@@ -33,7 +33,7 @@ TETWARP_HD inline void answer_cell(const Cell& cell, bool odd, const std::int16_
     answer.u[i] = glm::vec3(0);
     answer.value[i] = 0;
   }
-  const Nudge nudge{glm::dvec3(3.25, 4.0, 3.5)};
+  const Nudge nudge{glm::i64vec3(6 * kStepsPerVoxel + 100, 8 * kStepsPerVoxel, 7 * kStepsPerVoxel)};
   const SourceVoxels<std::int16_t> voxels{source, glm::i64vec3(kSide), glm::i64vec3(0), glm::i64vec3(1, kSide, kSide * kSide)};
   visit_cell(cell, odd, {glm::i64vec3(0), glm::i64vec3(kSide)}, nudge,
              [&](const glm::i64vec3& voxel, const glm::i32vec3& signs, int t, const Tetrahedron& tetrahedron) {

@@ -1,0 +1,34 @@
+#pragma once
+
+// Private to io/: which attributes of the source a derived series keeps.
+#include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmdata/dcdatset.h>
+
+#include <set>
+#include <vector>
+
+namespace tetwarp {
+
+/// Attributes of acquisition (group 0018) that do not have one value for the whole series: tube current, exposure,
+/// table position. After a deformation a slice shows tissue of several source slices, so these would be false.
+std::set<DcmTagKey> varying_acquisition(const std::vector<DcmDataset*>& slices);
+
+/// Copies into `target` what stays true of a derived slice.
+///
+/// By group, because groups have a subject, and a standard that grows adds to groups:
+/// - 0010, 0012, 0032, 0038, 0040 (patient, trial, request, visit, procedure): everything but maps of stored values;
+/// - 0008, 0018, 0020 (identification, acquisition, relationship): everything but what is about one instance, other
+///   images, or the place of the slice, and but `varying`;
+/// - 0028 (what the pixels mean): only a list of attributes that are about the displayed values or the patient, for all
+///   the others describe stored values that no longer exist;
+/// - all other groups go: private ones, overlays 60xx, curves 50xx, icons 0088, presentation 2050, signatures and
+/// padding
+///   fffa and fffc, and what belongs to no CT.
+///
+/// Private attributes within sequences go too. An attribute of VR UN is copied as it is: nobody can look into it.
+void carry_over(DcmItem& target, DcmDataset& source, const std::set<DcmTagKey>& varying);
+
+/// Type 2 attributes of the CT Image IOD (PS3.3 A.3), in ascending order: may be empty, may not be missing.
+std::vector<DcmTagKey> type_2_attributes();
+
+}  // namespace tetwarp

@@ -1,0 +1,210 @@
+#include "io/dicom_derive.h"
+
+#include <dcmtk/dcmdata/dcdeftag.h>
+#include <dcmtk/dcmdata/dcuid.h>
+#include <dcmtk/dcmdata/dcvrui.h>
+#include <dcmtk/dcmdata/dcxfer.h>
+
+#include <algorithm>
+#include <numeric>
+
+#include "deform/version.h"
+#include "io/dicom_carry.h"
+#include "io/dicom_file.h"
+#include "io/dicom_header.h"
+#include "io/dicom_put.h"
+#include "io/hash.h"
+
+namespace tetwarp {
+
+namespace {
+
+std::string uid_of(const Sha256& hash) { return uid_from_digest(hash.digest()); }
+
+/// Stands in for a UID that the source should have and has not: a hash of all its headers, so that two sources without
+/// UIDs are not taken for one.
+std::string uid_from_headers(const DicomHeaders& source, const std::string& what) {
+  Sha256 hash;
+  hash.add(what);
+  for (const auto& slice : source.slices) {
+    DcmDataset copy(*slice);  // encoding takes group lengths away
+    hash.add(encoded(copy));
+  }
+  return uid_of(hash);
+}
+
+std::string uid_or_made_up(const DicomHeaders& source, const DcmTagKey& tag) {
+  const std::string uid = text_of(*source.slices.front(), tag);
+  return uid.empty() ? uid_from_headers(source, tag_name(tag)) : uid;
+}
+
+std::string series_uid(const DicomHeaders& source, const DicomDerivation& derivation, const DerivedSeries& series) {
+  Sha256 hash;
+  hash.add("tetwarp derived series").add(uid_or_made_up(source, DCM_SeriesInstanceUID));
+  for (const std::string& uid : series.sop_instance) hash.add(uid);  // part of a series is another source
+  hash.add(derivation.field_sha256).add(derivation.parameters).add(version()).add(commit());
+  return uid_of(hash);
+}
+
+std::string frame_uid(const DicomHeaders& source, const DicomDerivation& derivation) {
+  const std::string frame = uid_or_made_up(source, DCM_FrameOfReferenceUID);
+  if (!derivation.deformed) return frame;
+  return uid_of(Sha256().add("tetwarp deformed frame of reference").add(frame).add(derivation.field_sha256));
+}
+
+/// Series Number of the source plus 1000: beside it in a list, and seldom taken.
+std::string series_number(DcmDataset& slice) {
+  Sint32 number = 0;
+  slice.findAndGetSint32(DCM_SeriesNumber, number);
+  return std::to_string(number > INT32_MAX - 1000 ? number : number + 1000);
+}
+
+/// "deformed: " and the source's own description, cut to the 64 characters of VR LO. A text of several bytes a
+/// character that is too long is left out, as cutting it could break a character.
+std::string series_description(DcmDataset& slice, bool deformed) {
+  constexpr std::size_t kLongest = 64;
+  const std::string mine = deformed ? "deformed" : "resampled", source = text_of(slice, DCM_SeriesDescription);
+  if (source.empty()) return mine;
+  const std::string text = mine + ": " + source;
+  if (text.size() <= kLongest) return text;
+  const bool one_byte = std::all_of(source.begin(), source.end(), [](char c) { return c >= ' ' && c <= '~'; }) ||
+                        text_of(slice, DCM_SpecificCharacterSet).starts_with("ISO_IR 1");
+  if (!one_byte || text_of(slice, DCM_SpecificCharacterSet) == "ISO_IR 192") return mine;
+  return text.substr(0, kLongest);
+}
+
+/// The source's instance numbers where each is there once and is fit for a file name, else 1 to n.
+std::vector<int> instance_numbers(const std::vector<DicomFileHeader>& headers) {
+  std::vector<int> numbers;
+  for (const DicomFileHeader& header : headers) numbers.push_back(header.instance_number);
+  std::vector<int> sorted = numbers;
+  std::sort(sorted.begin(), sorted.end());
+  const bool distinct = std::adjacent_find(sorted.begin(), sorted.end()) == sorted.end();
+  if (!distinct || sorted.front() < 0) std::iota(numbers.begin(), numbers.end(), 1);
+  return numbers;
+}
+
+std::optional<PaddingRange> common_padding(const std::vector<DicomFileHeader>& headers) {
+  const std::optional<PaddingRange> first = padding_hu(headers.front().pixels);
+  for (const DicomFileHeader& header : headers) {
+    const std::optional<PaddingRange> other = padding_hu(header.pixels);
+    if (!first || !other || first->low != other->low || first->high != other->high) return {};
+  }
+  return first;
+}
+
+/// Values 1 to 3 of Image Type are those of a cross-section that was computed; vendors' own ones follow.
+std::string image_type(DcmDataset& source) {
+  std::string type = "DERIVED\\SECONDARY\\AXIAL";
+  OFString value;
+  for (unsigned long i = 3; source.findAndGetOFString(DCM_ImageType, value, i).good(); ++i) {
+    type += '\\';
+    type += value.c_str();
+  }
+  return type;
+}
+
+bool is_uid(const std::string& text) {
+  return !text.empty() && DcmUniqueIdentifier::checkStringValue(text.c_str(), "1").good();
+}
+
+/// Source Image Sequence; images without a usable UID cannot be named.
+void put_references(DcmItem& target, const DerivedSeries& series, const SliceRange& sampled, bool deformed) {
+  for (std::int64_t k = sampled.first; k <= sampled.last; ++k) {
+    const std::size_t slice = static_cast<std::size_t>(k);
+    if (!is_uid(series.sop_instance.at(slice))) continue;
+    DcmItem& image = append_item(target, DCM_SourceImageSequence);
+    const std::string& sop_class = series.sop_class.at(slice);
+    put(image, DCM_ReferencedSOPClassUID, is_uid(sop_class) ? sop_class : UID_CTImageStorage);
+    put(image, DCM_ReferencedSOPInstanceUID, series.sop_instance[slice]);
+    append_code(image, DCM_PurposeOfReferenceCodeSequence, "121322", "Source image for image processing operation");
+    put(image, DCM_SpatialLocationsPreserved, deformed ? "NO" : "YES");
+  }
+}
+
+/// General Image (PS3.3 C.7.6.1) and Contributing Equipment (C.12.1.1): what was done to which images, and by what.
+void put_derivation(DcmItem& target, DcmDataset& source, const DerivedSeries& series, const DicomDerivation& derivation,
+                    std::size_t k) {
+  put(target, DCM_ImageType, image_type(source));
+  put(target, DCM_DerivationDescription, ascii(derivation.description, 1024));
+  append_code(target, DCM_DerivationCodeSequence, "113085", "Spatial resampling");
+  if (!derivation.sampled_slices.empty())
+    put_references(target, series, derivation.sampled_slices.at(k), derivation.deformed);
+  DcmItem& equipment = append_item(target, DCM_ContributingEquipmentSequence);
+  append_code(equipment, DCM_PurposeOfReferenceCodeSequence, "109103", "Modifying Equipment");
+  put_tetwarp(equipment, "tetwarp");
+  put(equipment, DCM_ContributionDescription,
+      ascii("field sha256 " + derivation.field_sha256 + "; " + derivation.parameters, 1024));
+}
+
+/// Position along the normal, and the distance of slices: only where the source tells them.
+void put_slice_place(DcmItem& target, DcmDataset& source, const Geometry& geometry, std::size_t k) {
+  if (source.tagExists(DCM_SpacingBetweenSlices)) {
+    put_decimals(target, DCM_SpacingBetweenSlices, std::vector{geometry.spacing.z}, 1e-6);
+  }
+  if (source.tagExists(DCM_SliceLocation)) {
+    const glm::dvec3 position = point_from_index(geometry)(glm::dvec3(0, 0, static_cast<double>(k)));
+    put_decimals(target, DCM_SliceLocation,
+                 std::vector{glm::dot(position, glm::cross(geometry.direction[0], geometry.direction[1]))}, 0);
+  }
+}
+
+void put_padding(DcmItem& target, const PaddingRange& padding) {
+  put(target, DCM_PixelPaddingValue, static_cast<std::int16_t>(padding.low));
+  if (padding.high != padding.low) put(target, DCM_PixelPaddingRangeLimit, static_cast<std::int16_t>(padding.high));
+}
+
+}  // namespace
+
+DerivedSeries derive_series(const DicomHeaders& source, const DicomDerivation& derivation) {
+  require(!source.slices.empty(), "the source series has no slices; a derived series needs their headers");
+  std::vector<DicomFileHeader> headers;
+  std::vector<DcmDataset*> slices;
+  for (const auto& slice : source.slices) {
+    DcmFileFormat copy(slice.get());
+    headers.push_back(header_of(copy, {}));
+    slices.push_back(slice.get());
+  }
+  DerivedSeries series;
+  for (const DicomFileHeader& header : headers) {
+    series.sop_class.push_back(header.sop_class_uid);
+    series.sop_instance.push_back(header.sop_instance_uid);
+  }
+  series.study_uid = uid_or_made_up(source, DCM_StudyInstanceUID);
+  series.series_uid = series_uid(source, derivation, series);
+  series.frame_of_reference_uid = frame_uid(source, derivation);
+  series.number = series_number(*slices.front());
+  series.description = series_description(*slices.front(), derivation.deformed);
+  series.instance_number = instance_numbers(headers);
+  series.varying = varying_acquisition(slices);
+  series.padding = common_padding(headers);
+  return series;
+}
+
+std::vector<DcmTagKey> derive_slice(DcmItem& target, DcmDataset& source, const DerivedSeries& series,
+                                    const DicomDerivation& derivation, const Geometry& geometry, std::size_t k) {
+  carry_over(target, source, series.varying);
+  put(target, DCM_SOPClassUID, UID_CTImageStorage);
+  put(target, DCM_Modality, "CT");
+  put(target, DCM_StudyInstanceUID, series.study_uid);
+  put(target, DCM_SeriesInstanceUID, series.series_uid);
+  put(target, DCM_SeriesNumber, series.number);
+  put(target, DCM_SeriesDescription, series.description);
+  put(target, DCM_FrameOfReferenceUID, series.frame_of_reference_uid);
+  put(target, DCM_InstanceNumber, std::to_string(series.instance_number.at(k)));
+  put_derivation(target, source, series, derivation, k);
+  put_image_plane(target, geometry, static_cast<std::int64_t>(k));
+  put_slice_place(target, source, geometry, k);
+  if (series.padding) put_padding(target, *series.padding);
+  // Pixels that were once compressed with loss stay so, also where their file says it by its transfer syntax alone.
+  if (DcmXfer(source.getOriginalXfer()).isLossy()) put(target, DCM_LossyImageCompression, "01");
+  std::vector<DcmTagKey> added;
+  for (const DcmTagKey& tag : type_2_attributes()) {
+    if (target.tagExists(tag)) continue;
+    put(target, tag, "");
+    added.push_back(tag);
+  }
+  return added;
+}
+
+}  // namespace tetwarp

@@ -1,0 +1,35 @@
+#pragma once
+
+// Private to io/: the data set of a derived slice.
+#include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmdata/dcdatset.h>
+
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "io/dicom_headers.h"
+
+namespace tetwarp {
+
+/// What the slices of a derived series share, and what a slice has to know of the others: taken from the source once,
+/// so that slices can then be made in parallel.
+struct DerivedSeries {
+  std::string study_uid, series_uid, frame_of_reference_uid;
+  std::string number, description;                   ///< Series Number and Description
+  std::vector<std::string> sop_class, sop_instance;  ///< of the source's slices
+  std::vector<int> instance_number;                  ///< of the output's slices, each once
+  std::set<DcmTagKey> varying;                       ///< see varying_acquisition
+  std::optional<PaddingRange> padding;               ///< HU: the source's, where all slices agree and int16 can hold it
+};
+
+/// @throws InputError for headers without slices
+DerivedSeries derive_series(const DicomHeaders& source, const DicomDerivation& derivation);
+
+/// Puts everything of slice k but Pixel Data and SOP Instance UID into the empty item `target`.
+/// @return type 2 attributes that were missing and are now there, empty
+std::vector<DcmTagKey> derive_slice(DcmItem& target, DcmDataset& source, const DerivedSeries& series,
+                                    const DicomDerivation& derivation, const Geometry& geometry, std::size_t k);
+
+}  // namespace tetwarp

@@ -1,0 +1,229 @@
+#include "io/dicom_header.h"
+
+#include <dcmtk/dcmdata/dcistrmf.h>
+#include <dcmtk/dcmdata/dcrledrg.h>
+#include <dcmtk/dcmdata/dcuid.h>
+#include <dcmtk/dcmjpeg/djdecode.h>
+#include <dcmtk/dcmjpls/djdecode.h>
+#include <dcmtk/oflog/oflog.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <mutex>
+
+namespace tetwarp {
+namespace {
+
+std::vector<std::string> split(const std::string& text) {
+  std::vector<std::string> values(1);
+  for (const char c : text) {
+    if (c == '\\')
+      values.emplace_back();
+    else
+      values.back() += c;
+  }
+  for (std::string& value : values) {
+    const auto first = value.find_first_not_of(' ');
+    const auto last = value.find_last_not_of(' ');
+    value = first == std::string::npos ? "" : value.substr(first, last - first + 1);
+  }
+  return values;
+}
+
+/// A Decimal String (PS3.5 6.2) whatever the locale; none unless all of it is one finite number.
+std::optional<double> decimal(std::string text) {
+  if (text.starts_with('+')) text.erase(0, 1);
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+/// Digits after the point: 3 for "1.250", -1 for "5E1" (tens).
+int decimals_of(const std::string& text) {
+  const auto exponent_at = text.find_first_of("eE");
+  const std::string mantissa = text.substr(0, exponent_at);
+  const auto point = mantissa.find('.');
+  const int digits = point == std::string::npos ? 0 : static_cast<int>(mantissa.size() - point - 1);
+  if (exponent_at == std::string::npos) return digits;
+  return digits - static_cast<int>(decimal(text.substr(exponent_at + 1)).value_or(0));
+}
+
+/// Exactly `count` numbers, or none.
+std::optional<std::vector<double>> decimals(DcmItem& item, const DcmTagKey& tag, std::size_t count) {
+  const std::vector<std::string> texts = split(text_of(item, tag));
+  if (texts.size() != count) return std::nullopt;
+  std::vector<double> values;
+  for (const std::string& text : texts) {
+    const auto value = decimal(text);
+    if (!value) return std::nullopt;
+    values.push_back(*value);
+  }
+  return values;
+}
+
+std::optional<double> decimal_of(DcmItem& item, const DcmTagKey& tag) {
+  const auto values = decimals(item, tag, 1);
+  return values ? std::optional(values->front()) : std::nullopt;
+}
+
+std::optional<int> integer_of(DcmItem& item, const DcmTagKey& tag) {
+  const auto value = decimal_of(item, tag);
+  if (!value || std::abs(*value) > 2e9) return std::nullopt;
+  return static_cast<int>(*value);
+}
+
+/// The 16 bits of a US or SS attribute.
+std::optional<int> word_of(DcmItem& item, const DcmTagKey& tag) {
+  DcmElement* element = nullptr;
+  Uint16 word = 0;
+  Sint16 signed_word = 0;
+  if (item.findAndGetElement(tag, element).bad()) return std::nullopt;
+  if (element->getUint16(word).good()) return word;
+  if (element->getSint16(signed_word).good()) return static_cast<Uint16>(signed_word);
+  return std::nullopt;
+}
+
+PixelFormat pixel_format_of(DcmItem& data) {
+  PixelFormat pixels;
+  pixels.rows = word_of(data, DCM_Rows).value_or(0);
+  pixels.columns = word_of(data, DCM_Columns).value_or(0);
+  pixels.samples = word_of(data, DCM_SamplesPerPixel).value_or(1);
+  pixels.bits_allocated = word_of(data, DCM_BitsAllocated).value_or(0);
+  pixels.bits_stored = word_of(data, DCM_BitsStored).value_or(pixels.bits_allocated);
+  pixels.high_bit = word_of(data, DCM_HighBit).value_or(pixels.bits_stored - 1);
+  pixels.is_signed = word_of(data, DCM_PixelRepresentation).value_or(0) == 1;
+  pixels.photometric = text_of(data, DCM_PhotometricInterpretation);
+  if (!text_of(data, DCM_NumberOfFrames).empty()) pixels.frames = integer_of(data, DCM_NumberOfFrames).value_or(-1);
+  pixels.slope = decimal_of(data, DCM_RescaleSlope);
+  pixels.intercept = decimal_of(data, DCM_RescaleIntercept);
+  pixels.rescale_type = text_of(data, DCM_RescaleType);
+  pixels.padding_word = word_of(data, DCM_PixelPaddingValue);
+  pixels.padding_limit_word = word_of(data, DCM_PixelPaddingRangeLimit);
+  return pixels;
+}
+
+void read_geometry(DcmItem& data, DicomFileHeader& header) {
+  if (const auto position = decimals(data, DCM_ImagePositionPatient, 3)) {
+    header.position = glm::dvec3((*position)[0], (*position)[1], (*position)[2]);
+    const std::vector<std::string> texts = split(text_of(data, DCM_ImagePositionPatient));
+    std::transform(texts.begin(), texts.end(), header.position_decimals.begin(), decimals_of);
+  }
+  if (const auto cosines = decimals(data, DCM_ImageOrientationPatient, 6)) {
+    header.orientation.emplace();
+    std::copy(cosines->begin(), cosines->end(), header.orientation->begin());
+  }
+  // Pixel Spacing is the distance of rows, then of columns (PS3.3 10.7.1.3).
+  if (const auto spacing = decimals(data, DCM_PixelSpacing, 2))
+    header.spacing = glm::dvec2((*spacing)[1], (*spacing)[0]);
+  header.thickness = decimal_of(data, DCM_SliceThickness);
+  header.slice_spacing = decimal_of(data, DCM_SpacingBetweenSlices);
+}
+
+/// Whether a file of at least these bytes may be DICOM: the prefix "DICM", or a data set that starts without one.
+bool looks_like_dicom(const std::array<char, 132>& start, std::size_t size) {
+  if (size == start.size() && std::memcmp(start.data() + 128, "DICM", 4) == 0) return true;
+  if (size < 8) return false;
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(start[i]); };
+  const bool little = (byte(0) == 2 || byte(0) == 8) && byte(1) == 0 && byte(3) == 0;
+  const bool big = byte(0) == 0 && (byte(1) == 2 || byte(1) == 8) && byte(2) == 0;
+  return little || big;
+}
+
+/// Why the object is nothing that scanning has to tell apart; empty for images and for what might be one.
+std::string no_image_reason(const DicomFileHeader& header) {
+  const bool is_ct = header.sop_class_uid == UID_CTImageStorage;
+  if (header.sop_class_uid == UID_MediaStorageDirectoryStorage) return "a DICOM directory, not an image";
+  if (is_ct || header.pixels.rows != 0) return {};
+  if (!header.sop_class_uid.empty()) return uid_with_name(header.sop_class_uid) + ", not an image";
+  if (header.damage.empty()) return "DICOM without an image";
+  return header.series_uid.empty() ? "damaged, or not DICOM: " + header.damage : std::string();
+}
+
+/// The first bytes of the file decide whether DCMTK is asked at all: it would take much for a data set without prefix.
+std::string sniff(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) return std::string("cannot be read: ") + std::strerror(errno);
+  std::array<char, 132> start{};
+  stream.read(start.data(), start.size());
+  const auto size = static_cast<std::size_t>(stream.gcount());
+  if (size == 0) return "an empty file";
+  return looks_like_dicom(start, size) ? "" : "not DICOM: no prefix DICM at byte 128, no data set at the start";
+}
+
+}  // namespace
+
+void prepare_dcmtk() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    OFLog::configure(OFLogger::OFF_LOG_LEVEL);
+    dcmEnableUnknownVRConversion.set(OFTrue);  // standard attributes written as UN are read as what they are
+    DcmRLEDecoderRegistration::registerCodecs();
+    DJDecoderRegistration::registerCodecs();
+    DJLSDecoderRegistration::registerCodecs();
+  });
+}
+
+std::string text_of(DcmItem& item, const DcmTagKey& tag) {
+  OFString value;
+  if (item.findAndGetOFStringArray(tag, value).bad()) return {};
+  std::string text(value.c_str());  // stops at a padding zero
+  const auto last = text.find_last_not_of(' ');
+  return last == std::string::npos ? "" : text.substr(0, last + 1);
+}
+
+DicomFileHeader header_of(DcmFileFormat& format, const std::filesystem::path& file) {
+  DcmDataset& data = *format.getDataset();
+  DcmMetaInfo& meta = *format.getMetaInfo();
+  DicomFileHeader header;
+  header.file = file;
+  header.transfer_syntax_uid = text_of(meta, DCM_TransferSyntaxUID);
+  header.encoding = data.getOriginalXfer();
+  if (header.transfer_syntax_uid.empty())
+    header.transfer_syntax_uid = DcmXfer(header.encoding).getXferID();
+  else
+    header.encoding = DcmXfer(header.transfer_syntax_uid.c_str()).getXfer();
+  header.sop_class_uid = text_of(data, DCM_SOPClassUID);
+  if (header.sop_class_uid.empty()) header.sop_class_uid = text_of(meta, DCM_MediaStorageSOPClassUID);
+  if (header.sop_class_uid == UID_PrivateGenericFileSOPClass) header.sop_class_uid.clear();  // DCMTK's word for unknown
+  header.sop_instance_uid = text_of(data, DCM_SOPInstanceUID);
+  header.series_uid = text_of(data, DCM_SeriesInstanceUID);
+  header.study_uid = text_of(data, DCM_StudyInstanceUID);
+  header.frame_of_reference_uid = text_of(data, DCM_FrameOfReferenceUID);
+  header.modality = text_of(data, DCM_Modality);
+  header.image_type = split(text_of(data, DCM_ImageType));
+  header.series_number = integer_of(data, DCM_SeriesNumber);
+  header.instance_number = integer_of(data, DCM_InstanceNumber).value_or(0);
+  header.private_compression = text_of(data, DcmTagKey(0x07a1, 0x1011));
+  read_geometry(data, header);
+  header.pixels = pixel_format_of(data);
+  return header;
+}
+
+DicomFileHeader read_dicom_header(const std::filesystem::path& file) {
+  prepare_dcmtk();
+  DicomFileHeader header;
+  header.file = file;
+  header.skip = sniff(file);
+  if (!header.skip.empty()) return header;
+
+  DcmInputFileStream stream(OFFilename(file.c_str()));
+  DcmFileFormat format;
+  format.transferInit();
+  const OFCondition result = format.readUntilTag(stream, EXS_Unknown, EGL_noChange, DCM_MaxReadLength, DCM_PixelData);
+  format.transferEnd();
+  const bool at_end = stream.eos();
+  header = header_of(format, file);
+  if (result.bad()) header.damage = result.text();
+  std::error_code no_size;
+  header.file_bytes = std::filesystem::file_size(file, no_size);
+  if (result.good() && !at_end) header.pixel_bytes = header.file_bytes - static_cast<std::uint64_t>(stream.tell());
+  header.skip = no_image_reason(header);
+  return header;
+}
+
+}  // namespace tetwarp

@@ -1,0 +1,100 @@
+#pragma once
+
+// Private to io/: what scanning and loading need to know of one DICOM file, and where the tags are read.
+#include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmdata/dctk.h>
+
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "deform/geometry.h"
+#include "deform/resampler.h"
+
+namespace tetwarp {
+
+/// How stored values are laid out and what they mean (PS3.3 C.7.6.3.1, C.7.5.1.1.2, C.11.1).
+struct PixelFormat {
+  int rows = 0, columns = 0, samples = 1, frames = 1;  ///< 0: missing; frames -1: not a number
+  int bits_allocated = 0, bits_stored = 0, high_bit = 0;
+  bool is_signed = false;
+  std::string photometric;
+  std::optional<double> slope, intercept;
+  std::string rescale_type;
+  std::optional<int> padding_word, padding_limit_word;  ///< the 16 bits as read, whatever VR the file gave them
+
+  friend bool operator==(const PixelFormat&, const PixelFormat&) = default;
+};
+
+struct DicomFileHeader {
+  std::filesystem::path file;
+  std::string skip;    ///< why the file is no DICOM object at all; empty: it is one
+  std::string damage;  ///< why the data set could not be read to its end; empty: it could
+  E_TransferSyntax encoding = EXS_Unknown;
+  std::string transfer_syntax_uid;  ///< as the file states it, or as found where it has no meta header
+  std::string sop_class_uid, sop_instance_uid, series_uid, study_uid, frame_of_reference_uid, modality;
+  std::vector<std::string> image_type;
+  std::optional<int> series_number;
+  int instance_number = 0;
+  std::optional<glm::dvec3> position;                ///< Image Position (Patient), LPS mm
+  std::array<int, 3> position_decimals{};            ///< digits after the point of each component as written
+  std::optional<std::array<double, 6>> orientation;  ///< Image Orientation (Patient)
+  std::optional<glm::dvec2> spacing;                 ///< along i (second value of Pixel Spacing), then along j, mm
+  std::optional<double> thickness, slice_spacing;    ///< (0018,0050), (0018,0088): never geometry but for one slice
+  std::string private_compression;                   ///< ELSCINT1 (07a1,xx11): vendor's own pixel coding
+  PixelFormat pixels;
+  std::optional<std::uint64_t> pixel_bytes;  ///< from Pixel Data's value to the end of the file; none: no Pixel Data
+  std::uint64_t file_bytes = 0;
+};
+
+/// Registers DCMTK's decoders and turns off its messages (a library does not print), once for the process.
+void prepare_dcmtk();
+
+/// Fills a header from a data set that was read, wholly or up to Pixel Data.
+DicomFileHeader header_of(DcmFileFormat& format, const std::filesystem::path& file);
+
+/// Reads a file up to Pixel Data. Never throws for what the file holds: see `skip` and `damage`.
+DicomFileHeader read_dicom_header(const std::filesystem::path& file);
+
+/// Text of an attribute without padding, values separated by backslashes; empty if missing.
+std::string text_of(DcmItem& item, const DcmTagKey& tag);
+
+/// "JPEG 2000 (Lossless only) (1.2.840.10008.1.2.4.90)"; the UID alone where it has no name.
+std::string uid_with_name(const std::string& uid);
+
+/// Why this object is no slice of a CT volume by its kind (localizer, dose, MR, ...); empty if it may be one.
+std::string other_kind(const DicomFileHeader& header);
+
+/// Why Image Plane attributes of this slice cannot be used, "WHAT, FILE; WHAT TO DO"; empty if they can.
+std::string geometry_problem(const DicomFileHeader& header);
+
+/// Why its pixels cannot be turned into HU; empty if they can, as far as the header tells.
+std::string pixel_problem(const DicomFileHeader& header);
+
+/// Padding in HU, rounded half to even and saturated to int16; none if the slice has no usable Pixel Padding Value.
+std::optional<PaddingRange> padding_hu(const PixelFormat& pixels);
+
+/// Padding as stored values, low <= high.
+struct StoredRange {
+  int low = 0, high = 0;
+};
+/// Reads the padding words with the pixels' own signedness: 63536 of signed 16 bit pixels is -2000. None where the
+/// value cannot occur among the pixels.
+std::optional<StoredRange> stored_padding(const PixelFormat& pixels);
+
+/// slope * stored + intercept, not rounded.
+double hu_of(const PixelFormat& pixels, int stored);
+
+/// The stored value in a word of Pixel Data: the Bits Stored below High Bit, with the sign of Pixel Representation.
+/// What other bits hold (overlays, garbage) is no part of it.
+int stored_value(const PixelFormat& pixels, unsigned word);
+
+/// Bytes of one frame, uncompressed.
+std::uint64_t slice_bytes(const PixelFormat& pixels);
+
+/// "512 x 512", rows first.
+std::string size_text(const PixelFormat& pixels);
+
+}  // namespace tetwarp

@@ -1,0 +1,204 @@
+#include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmdata/dcuid.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "io/dicom_header.h"
+#include "io/dicom_text.h"
+
+namespace tetwarp {
+namespace {
+
+// A CT slice has 512 to 4096 voxels an axis; what a compressed file may unfold to is bounded before memory is asked
+// for.
+constexpr int kLargestAxis = 16384;
+constexpr std::uint64_t kLargestExpansion = 1000, kSmallFile = 1 << 20;
+
+/// The transfer syntaxes whose pixels DCMTK 3.6.7 decodes.
+bool can_decode(E_TransferSyntax encoding) {
+  switch (encoding) {
+    case EXS_LittleEndianImplicit:
+    case EXS_LittleEndianExplicit:
+    case EXS_BigEndianExplicit:
+    case EXS_DeflatedLittleEndianExplicit:
+    case EXS_RLELossless:
+    case EXS_JPEGProcess1:
+    case EXS_JPEGProcess2_4:
+    case EXS_JPEGProcess6_8:
+    case EXS_JPEGProcess10_12:
+    case EXS_JPEGProcess14:
+    case EXS_JPEGProcess14SV1:
+    case EXS_JPEGLSLossless:
+    case EXS_JPEGLSLossy: return true;
+    default: return false;
+  }
+}
+
+std::string where(const DicomFileHeader& header) { return ", " + header.file.string(); }
+
+std::string missing_or_bad(const std::string& attribute, const DicomFileHeader& header, const std::string& expected) {
+  return attribute + " is missing or malformed" + where(header) + "; expected " + expected +
+         ", correct the file or leave it out";
+}
+
+bool is_localizer(const DicomFileHeader& header) {
+  return std::any_of(header.image_type.begin(), header.image_type.end(),
+                     [](const std::string& value) { return value == "LOCALIZER"; });
+}
+
+std::string encoding_problem(const DicomFileHeader& header) {
+  const PixelFormat& pixels = header.pixels;
+  if (!header.pixel_bytes && !header.private_compression.empty()) {
+    return "pixels in the private compression " + header.private_compression +
+           " of the attribute (07A1,1011) cannot be decoded" + where(header) +
+           "; expected Pixel Data (7FE0,0010), export the series again without it";
+  }
+  if (!header.pixel_bytes) return "Pixel Data (7FE0,0010) is missing" + where(header) + "; export the file again";
+  if (!can_decode(header.encoding)) {
+    return "transfer syntax " + uid_with_name(header.transfer_syntax_uid) + " cannot be decoded" + where(header) +
+           "; decompress the series first, for example with gdcmconv --raw";
+  }
+  const std::uint64_t needed = slice_bytes(pixels);
+  const bool compressed =
+      DcmXfer(header.encoding).isEncapsulated() || header.encoding == EXS_DeflatedLittleEndianExplicit;
+  if (!compressed && *header.pixel_bytes < needed) {
+    return "Pixel Data is truncated" + where(header) + ": expected " + std::to_string(needed) + " bytes, found " +
+           std::to_string(*header.pixel_bytes) + "; copy the file again";
+  }
+  if (compressed && needed > kLargestExpansion * header.file_bytes + kSmallFile) {
+    return "Rows x Columns " + size_text(pixels) + " cannot come from a file of " + std::to_string(header.file_bytes) +
+           " bytes" + where(header) + "; copy the file again";
+  }
+  return {};
+}
+
+std::string layout_problem(const DicomFileHeader& header) {
+  const PixelFormat& pixels = header.pixels;
+  const auto found = [&](const std::string& what, const std::string& expected, const std::string& value) {
+    return what + ", expected " + expected + ", found " + value + where(header) + "; convert the file first";
+  };
+  if (pixels.rows < 1 || pixels.columns < 1 || pixels.rows > kLargestAxis || pixels.columns > kLargestAxis) {
+    return found("Rows x Columns", "1 to " + std::to_string(kLargestAxis), size_text(pixels));
+  }
+  if (pixels.samples != 1) return found("Samples per Pixel (0028,0002)", "1", std::to_string(pixels.samples));
+  if (!pixels.photometric.empty() && !pixels.photometric.starts_with("MONOCHROME")) {
+    return found("Photometric Interpretation (0028,0004)", "MONOCHROME2", pixels.photometric);
+  }
+  if (pixels.frames != 1 && pixels.frames != 0) {
+    return found("Number of Frames (0028,0008)", "1", pixels.frames < 0 ? "no number" : std::to_string(pixels.frames));
+  }
+  if (pixels.bits_allocated != 8 && pixels.bits_allocated != 16) {
+    return found("Bits Allocated (0028,0100)", "8 or 16", std::to_string(pixels.bits_allocated));
+  }
+  if (pixels.bits_stored < 1 || pixels.bits_stored > pixels.bits_allocated) {
+    return found("Bits Stored (0028,0101)", "1 to " + std::to_string(pixels.bits_allocated),
+                 std::to_string(pixels.bits_stored));
+  }
+  if (pixels.high_bit < pixels.bits_stored - 1 || pixels.high_bit >= pixels.bits_allocated) {
+    return found("High Bit (0028,0102)", std::to_string(pixels.bits_stored - 1), std::to_string(pixels.high_bit));
+  }
+  return {};
+}
+
+/// Without slope and intercept HU cannot be known: 0 and -1024 are both common intercepts, so neither is assumed.
+std::string rescale_problem(const DicomFileHeader& header) {
+  const PixelFormat& pixels = header.pixels;
+  if (!pixels.slope || *pixels.slope == 0) {
+    return missing_or_bad("Rescale Slope (0028,1053)", header, "a number other than 0");
+  }
+  if (!pixels.intercept) return missing_or_bad("Rescale Intercept (0028,1052)", header, "a number");
+  return {};
+}
+
+}  // namespace
+
+std::string uid_with_name(const std::string& uid) {
+  const DcmXfer syntax(uid.c_str());
+  const char* name = dcmFindNameOfUID(uid.c_str());
+  if (syntax.getXfer() != EXS_Unknown) name = syntax.getXferName();
+  return name ? std::string(name) + " (" + uid + ")" : uid;
+}
+
+std::string other_kind(const DicomFileHeader& header) {
+  const std::string& kind = header.sop_class_uid;
+  if (kind == UID_EnhancedCTImageStorage || kind == UID_LegacyConvertedEnhancedCTImageStorage) {
+    return uid_with_name(kind) + ", multi-frame CT is not read: convert it to CT Image Storage first";
+  }
+  if (!kind.empty() && kind != UID_CTImageStorage) return uid_with_name(kind) + ", expected CT Image Storage";
+  if (is_localizer(header)) return "a localizer (Image Type), not a slice";
+  const bool placed = header.position && header.orientation && header.spacing;
+  if (kind.empty() && !(header.modality == "CT" && placed)) {
+    return "no SOP Class UID (0008,0016), and not Modality CT with a position in space either";
+  }
+  return {};
+}
+
+std::string geometry_problem(const DicomFileHeader& header) {
+  if (!header.damage.empty()) return "damaged file" + where(header) + ": " + header.damage + "; copy it again";
+  if (!header.position) return missing_or_bad("Image Position (0020,0032)", header, "three numbers");
+  if (!header.orientation) return missing_or_bad("Image Orientation (0020,0037)", header, "six numbers");
+  if (!header.spacing || header.spacing->x <= 0 || header.spacing->y <= 0) {
+    return missing_or_bad("Pixel Spacing (0028,0030)", header, "two positive numbers");
+  }
+  const std::array<double, 6>& c = *header.orientation;
+  const double row = std::hypot(c[0], c[1], c[2]), column = std::hypot(c[3], c[4], c[5]);
+  const double across = c[0] * c[3] + c[1] * c[4] + c[2] * c[5];
+  // Three digits (.707) are round-off; more is no rotation.
+  if (std::abs(row - 1) > 1e-3 || std::abs(column - 1) > 1e-3 || std::abs(across) > 1e-3) {
+    return "Image Orientation (0020,0037) is no rotation" + where(header) +
+           ": expected lengths 1, 1 and product 0, found " + number(row) + ", " + number(column) + " and " +
+           number(across) + "; correct the file or leave it out";
+  }
+  return {};
+}
+
+std::string pixel_problem(const DicomFileHeader& header) {
+  for (const auto& check : {layout_problem, encoding_problem, rescale_problem}) {
+    if (std::string problem = check(header); !problem.empty()) return problem;
+  }
+  return {};
+}
+
+std::string size_text(const PixelFormat& pixels) {
+  return std::to_string(pixels.rows) + " x " + std::to_string(pixels.columns);
+}
+
+std::uint64_t slice_bytes(const PixelFormat& pixels) {
+  return std::uint64_t(pixels.rows) * std::uint64_t(pixels.columns) * std::uint64_t(pixels.bits_allocated / 8);
+}
+
+int stored_value(const PixelFormat& pixels, unsigned word) {
+  const unsigned mask = (1u << pixels.bits_stored) - 1;
+  const unsigned value = (word >> (pixels.high_bit + 1 - pixels.bits_stored)) & mask;
+  const bool negative = pixels.is_signed && (value >> (pixels.bits_stored - 1)) != 0;
+  return static_cast<int>(value) - (negative ? 1 << pixels.bits_stored : 0);
+}
+
+double hu_of(const PixelFormat& pixels, int stored) { return *pixels.slope * stored + *pixels.intercept; }
+
+std::optional<StoredRange> stored_padding(const PixelFormat& pixels) {
+  if (!pixels.padding_word) return std::nullopt;
+  const int smallest = pixels.is_signed ? -(1 << (pixels.bits_stored - 1)) : 0;
+  const int largest = smallest + (1 << pixels.bits_stored) - 1;
+  const auto value = [&](int word) {
+    if (!pixels.is_signed) return word;
+    if (word > largest && word < 1 << pixels.bits_stored) return word - (1 << pixels.bits_stored);  // stored bits only
+    return static_cast<int>(static_cast<std::int16_t>(word));
+  };
+  int low = value(*pixels.padding_word);
+  int high = value(pixels.padding_limit_word.value_or(*pixels.padding_word));
+  if (low > high) std::swap(low, high);
+  if (high < smallest || low > largest) return std::nullopt;
+  return StoredRange{low, high};
+}
+
+std::optional<PaddingRange> padding_hu(const PixelFormat& pixels) {
+  const auto stored = stored_padding(pixels);
+  if (!stored) return std::nullopt;
+  const auto hu = [&](int value) { return std::clamp(std::nearbyint(hu_of(pixels, value)), -32768.0, 32767.0); };
+  const auto [low, high] = std::minmax({hu(stored->low), hu(stored->high)});
+  return PaddingRange{low, high};
+}
+
+}  // namespace tetwarp

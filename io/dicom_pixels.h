@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <vector>
+
+#include "io/dicom_header.h"
+
+namespace tetwarp {
+
+/// Decodes Pixel Data of a single-frame object whose header passed `pixel_problem`.
+/// @return one word a pixel, rows top to bottom, every bit as stored
+/// @throws InputError naming the file for data that are truncated, damaged or of another size than the header says
+std::vector<std::uint16_t> decode_pixels(DcmDataset& data, const DicomFileHeader& header);
+
+/// Words of Pixel Data to HU. Built once for slices of the same format.
+struct HuTable {
+  enum Kind : std::uint8_t { exact = 0, rounded = 1, beyond = 2, saturated_padding = 4 };
+  PixelFormat format;
+  std::vector<std::int16_t> hu;    ///< per word
+  std::vector<std::uint8_t> kind;  ///< per word; `beyond`: HU does not fit int16
+};
+std::shared_ptr<const HuTable> make_hu_table(const PixelFormat& format);
+
+/// Keeps the last table for whoever needs the same next.
+class HuTableCache {
+ public:
+  std::shared_ptr<const HuTable> table_for(const PixelFormat& format);
+
+ private:
+  std::mutex mutex_;
+  std::shared_ptr<const HuTable> last_;
+};
+
+struct HuCount {
+  std::uint64_t rounded = 0;            ///< pixels with a fractional HU
+  std::uint64_t saturated_padding = 0;  ///< pixels of padding whose HU does not fit int16
+};
+/// @throws InputError naming `file` for a pixel whose HU does not fit int16
+HuCount convert_to_hu(std::span<const std::uint16_t> words, const HuTable& table, const std::filesystem::path& file,
+                      std::span<std::int16_t> hu);
+
+}  // namespace tetwarp

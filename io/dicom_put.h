@@ -1,0 +1,62 @@
+#pragma once
+
+// Private to io/: writing attributes with DCMTK.
+#include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmdata/dcdatset.h>
+#include <dcmtk/dcmdata/dcdeftag.h>
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "deform/volume.h"
+
+namespace tetwarp {
+
+/// DICOM decimal string (PS3.5 6.2, VR DS): at most 16 characters, the shortest that read back as `value`; where 16 do
+/// not suffice, the nearest that do. @throws InputError for a value that is not finite
+std::string decimal_string(double value);
+
+/// "(0008,0090) ReferringPhysicianName".
+std::string tag_name(const DcmTagKey& tag);
+
+/// Sets an attribute, replacing what it held. @throws Error naming the tag when DCMTK refuses
+void put(DcmItem& item, const DcmTagKey& tag, const std::string& value);
+void put(DcmItem& item, const DcmTagKey& tag, std::uint16_t value);
+void put(DcmItem& item, const DcmTagKey& tag, std::int16_t value);  ///< for attributes of VR "US or SS"
+/// Sets decimal strings, unless those that are there mean the same within `tolerance`: nothing drifts.
+void put_decimals(DcmItem& item, const DcmTagKey& tag, std::span<const double> values, double tolerance);
+
+/// Removes an attribute, if it is there.
+void drop(DcmItem& item, const DcmTagKey& tag);
+
+/// Appends an empty item to a sequence, which is made if there is none (or if what is there could not be parsed).
+DcmItem& append_item(DcmItem& item, const DcmTagKey& sequence);
+
+/// Appends a code (PS3.3 8.8) of scheme DCM (PS3.16 annex D) to a code sequence.
+void append_code(DcmItem& item, const DcmTagKey& sequence, const std::string& value, const std::string& meaning);
+
+/// Image Plane (PS3.3 C.7.6.2): spacing, orientation, and the position of slice k. Decimal strings that are there
+/// already and mean the same (1e-6 mm in position, 1e-7 in direction cosines and spacing) are left as they are: nothing
+/// drifts.
+void put_image_plane(DcmItem& item, const Geometry& geometry, std::int64_t k);
+
+/// The geometry of a volume that can be written as CT slices: whole, int16, one component, at most 65535 rows and
+/// columns.
+/// @throws InputError for any other
+const Geometry& require_hu_volume(const ConstVolumeView& volume);
+
+/// Voxels of slice k.
+std::span<const std::int16_t> slice_of(const ConstVolumeView& volume, std::size_t k);
+
+/// Image Pixel (PS3.3 C.7.6.3) and the Modality LUT: signed 16-bit words that are HU. `voxels`: columns x rows, i
+/// fastest.
+void put_hu_pixels(DcmItem& item, const Geometry& geometry, std::span<const std::int16_t> voxels);
+
+/// Manufacturer, model and software versions of this program.
+void put_tetwarp(DcmItem& item, const std::string& model);
+
+/// The first characters of a text, where what is not printable ASCII becomes '?'.
+std::string ascii(const std::string& text, std::size_t characters);
+
+}  // namespace tetwarp

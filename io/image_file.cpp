@@ -1,0 +1,203 @@
+#include "io/image_file.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <sstream>
+
+#include "deform/errors.h"
+#include "io/image_reader.h"
+#include "io/raw_image.h"
+#ifdef TETWARP_WITH_ITK
+#include "io/nifti_file.h"
+#include "io/text_header.h"
+#include "itkbridge/image_io.h"
+#endif
+
+namespace tetwarp {
+namespace {
+
+/// Columns of unit length at right angles, within what the formats' digits (float32 in NIfTI) can hold.
+void require_orthogonal(const Geometry& geometry, const std::string& file) {
+  const glm::dmat3& d = geometry.direction;
+  for (int a = 0; a < 3; ++a) {
+    const int b = (a + 1) % 3;
+    require(std::abs(glm::length(d[a]) - 1) <= 1e-4, "a direction of axis " + std::to_string(a) + " with length " +
+                                                         std::to_string(glm::length(d[a])) + ", " + file +
+                                                         "; expected 1");
+    require(std::abs(glm::dot(d[a], d[b])) <= 1e-4,
+            "a sheared grid (cosine between axes " + std::to_string(a) + " and " + std::to_string(b) + " is " +
+                std::to_string(glm::dot(d[a], d[b])) + "), " + file + "; expected right angles");
+  }
+}
+
+/// A header that promises more voxels than the file can hold is not believed: nothing is allocated for it.
+void require_file_holds(const std::filesystem::path& path, const ImageHeader& header, const Stored& stored) {
+  constexpr double kDeflateAtMost = 1040;  // deflate cannot do better than 1032 to 1
+  double expected = static_cast<double>(header.components) * static_cast<double>(stored.value_bytes);
+  for (int axis = 0; axis < 3; ++axis) expected *= static_cast<double>(header.geometry.size[axis]);
+  const double held =
+      static_cast<double>(std::filesystem::file_size(path)) - (stored.encoded ? 0 : static_cast<double>(stored.offset));
+  std::ostringstream text;
+  text.precision(17);
+  text << "truncated, or a header that promises too much, " << path.string() << ": " << std::max(held, 0.0)
+       << " bytes, but " << to_string(header.geometry.size) << " voxels of " << header.components << " x "
+       << stored.value_bytes << " bytes" << (stored.encoded ? ", compressed," : "") << " need "
+       << std::ceil(stored.encoded ? expected / kDeflateAtMost : expected);
+  require(held >= (stored.encoded ? expected / kDeflateAtMost : expected), text.str());
+}
+
+#ifdef TETWARP_WITH_ITK
+ItkFormat itk_format(ImageFormat format) { return format == ImageFormat::nrrd ? ItkFormat::nrrd : ItkFormat::meta; }
+
+class ItkReader final : public ImageReader {
+ public:
+  ItkReader(const std::filesystem::path& path, ImageHeader header, Stored stored, ItkFormat format)
+      : ImageReader(path, std::move(header), stored), format_(format) {}
+  void read(std::span<std::byte> voxels) const override { itk_read_voxels(path_, format_, voxels); }
+
+ private:
+  ItkFormat format_;
+};
+
+std::unique_ptr<ImageReader> open_format(const std::filesystem::path& path, ImageFormat format) {
+  if (format == ImageFormat::nifti) return open_nifti(path);
+  const TextHeader text = read_text_header(path, format);
+  const ItkImageInfo info = itk_read_info(path, itk_format(format));
+  const Stored stored{text.data_offset, size_bytes(info.type), is_encoded(text, format)};
+  ImageHeader header{info.geometry, info.type, info.components, text.metadata};
+  if (is_zlib(text, format)) return make_raw_reader(path, std::move(header), stored);
+  require(format == ImageFormat::nrrd || !stored.encoded, "voxels that are text, or compressed big-endian, " +
+                                                              path.string() +
+                                                              "; expected binary, compressed only in little endian");
+  return std::make_unique<ItkReader>(path, std::move(header), stored, itk_format(format));
+}
+
+/// MetaIO of ITK 5.2.1 reports success when the disk is full.
+bool is_whole_mha(const std::filesystem::path& path, const ConstVolumeView& volume) {
+  try {
+    const TextHeader header = read_text_header(path, ImageFormat::mha);
+    const std::uint64_t voxels = static_cast<std::uint64_t>(voxel_count(*volume.geometry)) *
+                                 static_cast<std::uint64_t>(volume.components) * size_bytes(volume.type);
+    const std::uint64_t stored = is_zlib(header, ImageFormat::mha) ? std::stoull(header["compresseddatasize"]) : voxels;
+    return std::filesystem::file_size(path) == header.data_offset + stored;
+  } catch (const std::exception&) {
+    return false;
+  }
+}
+
+/// NRRD and MHA. ITK knows its suffixes in lower case alone, and writes elsewhere when it does not find them.
+void write_with_itk(const std::filesystem::path& path, ImageFormat format, const ConstVolumeView& volume,
+                    const ImageWriteOptions& options) {
+  const std::string suffix = format == ImageFormat::mha ? ".mha" : ".nrrd";
+  if (path.extension() != suffix) {
+    const TemporaryFile named(path.string() + suffix);
+    write_with_itk(named.path(), format, volume, options);
+    return std::filesystem::rename(named.path(), path);
+  }
+  itk_write(path, itk_format(format), volume, options.compression, options.metadata);
+  if (format == ImageFormat::mha && !is_whole_mha(path, volume)) {
+    throw Error("cannot write the whole file, " + path.string() + "; check free space");
+  }
+}
+
+void write_format(const std::filesystem::path& path, ImageFormat format, const ConstVolumeView& volume,
+                  const ImageWriteOptions& options) {
+  if (format == ImageFormat::nifti) {
+    const auto descrip = options.metadata.find("descrip");
+    write_nifti(path, volume, descrip == options.metadata.end() ? "" : descrip->second,
+                options.compression < 0 ? 6 : options.compression);
+  } else {
+    write_with_itk(path, format, volume, options);
+  }
+}
+#else
+[[noreturn]] void no_nifti(const std::filesystem::path& path) {
+  throw NotCompiled("NIfTI needs ITK, which this build does not have, " + path.string() + "; use .nrrd or .mha");
+}
+
+std::unique_ptr<ImageReader> open_format(const std::filesystem::path& path, ImageFormat format) {
+  if (format == ImageFormat::nifti) no_nifti(path);
+  return open_raw_image(path, format);
+}
+
+void write_format(const std::filesystem::path& path, ImageFormat format, const ConstVolumeView& volume,
+                  const ImageWriteOptions& options) {
+  if (format == ImageFormat::nifti) no_nifti(path);
+  if (options.compression > 0)
+    throw NotCompiled("compression needs ITK, which this build does not have, " + path.string());
+  write_raw_image(path, format, volume, options.metadata);
+}
+#endif
+
+ImageFormat required_format(const std::filesystem::path& path) {
+  const auto format = image_format(path);
+  require(format.has_value(), "an unknown suffix, " + path.string() + "; expected .nii, .nii.gz, .nrrd or .mha");
+  return *format;
+}
+
+}  // namespace
+
+std::optional<ImageFormat> image_format(const std::filesystem::path& path) {
+  std::string name = path.filename().string();
+  for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (name.ends_with(".nii") || name.ends_with(".nii.gz")) return ImageFormat::nifti;
+  if (name.ends_with(".nrrd")) return ImageFormat::nrrd;
+  if (name.ends_with(".mha")) return ImageFormat::mha;
+  return std::nullopt;
+}
+
+bool has_image_suffix(const std::filesystem::path& path) { return image_format(path).has_value(); }
+
+std::size_t ImageReader::value_count() const {
+  return static_cast<std::size_t>(voxel_count(header_.geometry)) * static_cast<std::size_t>(header_.components);
+}
+
+std::unique_ptr<ImageReader> open_image(const std::filesystem::path& path) {
+  const std::string file = path.string();
+  const ImageFormat format = required_format(path);
+  std::error_code error;
+  const auto status = std::filesystem::status(path, error);
+  require(std::filesystem::exists(status), "no such file, " + file);
+  require(std::filesystem::is_regular_file(status), "not a file, " + file);
+  require(std::filesystem::file_size(path) > 0, "an empty file, " + file);
+  require(::access(path.c_str(), R_OK) == 0, "a file that may not be read, " + file + "; check its rights");
+  auto reader = open_format(path, format);
+  require_valid(reader->header().geometry, file);
+  require_orthogonal(reader->header().geometry, file);
+  require_file_holds(path, reader->header(), reader->stored());
+  return reader;
+}
+
+ImageHeader read_image_header(const std::filesystem::path& path) { return open_image(path)->header(); }
+
+AnyVolume read_image(const std::filesystem::path& path) {
+  const auto reader = open_image(path);
+  const ImageHeader& header = reader->header();
+  AnyVolume volume(header.geometry, header.type, header.components);
+  reader->read({volume.data(), volume.size_bytes()});
+  return volume;
+}
+
+void write_image(const std::filesystem::path& path, const ConstVolumeView& volume, const ImageWriteOptions& options) {
+  const std::string file = path.string();
+  const ImageFormat format = required_format(path);
+  require(volume.geometry && volume.voxels && volume.buffered == whole(*volume.geometry),
+          "only a whole volume can be written, " + file);
+  require(options.compression >= -1 && options.compression <= 9,
+          "compression level " + std::to_string(options.compression) + ", " + file + "; expected 0 to 9");
+  require_valid(*volume.geometry, file);
+  require_orthogonal(*volume.geometry, file);
+  for (const auto& [key, value] : options.metadata) {
+    const auto control = [](char c) { return static_cast<unsigned char>(c) < 32; };
+    require(!key.empty() && std::ranges::none_of(key, [&](char c) { return control(c) || c == ':' || c == '='; }) &&
+                std::ranges::none_of(value, control),
+            "the key \"" + key + "\", " + file + "; keys and values are one line, keys without ':' and '='");
+  }
+  write_format(path, format, volume, options);
+}
+
+}  // namespace tetwarp

@@ -1,0 +1,67 @@
+#pragma once
+
+// Private to io/: what image_file.cpp, the formats and field_file.cpp share.
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "io/image_file.h"
+
+namespace tetwarp {
+
+enum class ImageFormat : std::uint8_t { nifti, nrrd, mha };
+
+/// The format that a suffix names, in upper or lower case.
+std::optional<ImageFormat> image_format(const std::filesystem::path& path);
+
+/// A file of ours that must not outlive this object, whatever happens.
+class TemporaryFile {
+ public:
+  explicit TemporaryFile(std::filesystem::path path) : path_(std::move(path)) {}
+  ~TemporaryFile() {
+    std::error_code ignored;
+    std::filesystem::remove(path_, ignored);
+  }
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// How the voxels lie in the file.
+struct Stored {
+  std::uint64_t offset = 0;     ///< of the first byte (of the decompressed stream, for NIfTI)
+  std::size_t value_bytes = 0;  ///< of one number
+  bool encoded = false;         ///< compressed, or text
+};
+
+/// A volume file whose header was read; its voxels go straight into the caller's buffer.
+class ImageReader {
+ public:
+  ImageReader(std::filesystem::path path, ImageHeader header, Stored stored)
+      : path_(std::move(path)), header_(std::move(header)), stored_(stored) {}
+  virtual ~ImageReader() = default;
+
+  const ImageHeader& header() const { return header_; }
+  const Stored& stored() const { return stored_; }
+  std::size_t value_count() const;  ///< voxels times components
+  /// Fills the buffer of `value_count()` values of the header's type: components side by side, i fastest, native byte
+  /// order. @throws InputError for a file that is truncated or damaged
+  virtual void read(std::span<std::byte> voxels) const = 0;
+
+ protected:
+  std::filesystem::path path_;
+  ImageHeader header_;
+  Stored stored_;
+};
+
+/// Reads and checks the header; a header that promises more than the file can hold is refused here, before anything is
+/// allocated. @throws InputError as `read_image_header`
+std::unique_ptr<ImageReader> open_image(const std::filesystem::path& path);
+
+}  // namespace tetwarp

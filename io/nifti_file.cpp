@@ -1,0 +1,219 @@
+#include "io/nifti_file.h"
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <utility>
+
+#include "deform/errors.h"
+#include "io/gzip_pieces.h"
+#include "itkbridge/image_io.h"
+
+namespace tetwarp {
+namespace {
+
+constexpr std::size_t kPieceBytes = std::size_t{1} << 20;
+constexpr std::size_t kHeaderBytes = 352;  // 348, and four zeros: no extension follows
+constexpr std::pair<int, VoxelType> kDatatypes[] = {
+    {2, VoxelType::u8},    {256, VoxelType::i8}, {512, VoxelType::u16}, {4, VoxelType::i16},
+    {768, VoxelType::u32}, {8, VoxelType::i32},  {16, VoxelType::f32},  {64, VoxelType::f64},
+};
+
+VoxelType disk_type(const NiftiHeader& header, const std::string& file) {
+  for (const auto& [code, type] : kDatatypes) {
+    if (code == header.datatype) return type;
+  }
+  constexpr std::pair<int, const char*> kRefused[] = {{1, "1 bit"},         {32, "complex64"},    {128, "RGB24"},
+                                                      {1024, "int64"},      {1280, "uint64"},     {1536, "float128"},
+                                                      {1792, "complex128"}, {2048, "complex256"}, {2304, "RGBA32"}};
+  std::string name = "unknown type";
+  for (const auto& [code, text] : kRefused) {
+    if (code == header.datatype) name = text;
+  }
+  throw InputError("voxels of " + name + " (datatype " + std::to_string(header.datatype) + "), " + file +
+                   "; expected integers of 8 to 32 bits, float32 or float64");
+}
+
+/// nifti1.h, "DATA SCALING": slope 0 (and, as niftilib has it, a slope that is not finite) means none.
+bool is_scaled(const NiftiHeader& header) {
+  return std::isfinite(header.scl_slope) && header.scl_slope != 0 &&
+         (header.scl_slope != 1 || (std::isfinite(header.scl_inter) && header.scl_inter != 0));
+}
+
+bool starts_like_gzip(const std::filesystem::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  char magic[2] = {};
+  stream.read(magic, 2);
+  return magic[0] == '\x1f' && magic[1] == '\x8b';
+}
+
+template <class V>
+void reverse_bytes(std::span<V> values) {
+  for (V& value : values) {
+    auto* bytes = reinterpret_cast<std::byte*>(&value);
+    std::reverse(bytes, bytes + sizeof(V));
+  }
+}
+
+class NiftiReader final : public ImageReader {
+ public:
+  NiftiReader(const std::filesystem::path& path, ImageHeader image, Stored stored, NiftiHeader header, VoxelType disk)
+      : ImageReader(path, std::move(image), stored), nifti_(std::move(header)), disk_(disk) {}
+
+  void read(std::span<std::byte> voxels) const override {
+    const std::unique_ptr<gzFile_s, int (*)(gzFile)> file(gzopen(path_.c_str(), "rb"), gzclose);
+    require(file != nullptr, "cannot open, " + path_.string());
+    gzbuffer(file.get(), 1 << 18);
+    if (gzseek(file.get(), static_cast<z_off_t>(stored_.offset), SEEK_SET) < 0) fail(file.get());
+    dispatch(disk_, [&](auto v) { read_planes<decltype(v)>(file.get(), voxels); });
+    std::byte rest;
+    if (gzread(file.get(), &rest, 1) < 0) fail(file.get());  // checks the CRC when the voxels end the file
+  }
+
+ private:
+  [[noreturn]] void fail(gzFile file) const {
+    int code = 0;
+    const std::string text = gzerror(file, &code);
+    throw InputError("truncated or damaged voxels (" + (code == Z_OK || text.empty() ? "the file ends early" : text) +
+                     "), " + path_.string() + "; is the file whole?");
+  }
+
+  /// NIfTI has one plane a component, one after the other; memory has the components of a voxel side by side.
+  template <class Disk>
+  void read_planes(gzFile file, std::span<std::byte> voxels) const {
+    using Scaled = std::conditional_t<std::is_same_v<Disk, double>, double, float>;
+    const auto components = static_cast<std::size_t>(header_.components);
+    const std::size_t count = static_cast<std::size_t>(voxel_count(header_.geometry));
+    const bool scaled = is_scaled(nifti_), direct = !scaled && components == 1;
+    std::vector<Disk> piece(direct ? 0 : kPieceBytes / sizeof(Disk));
+    for (std::size_t c = 0; c < components; ++c) {
+      for (std::size_t begin = 0, n = 0; begin < count; begin += n) {
+        n = std::min(count - begin, kPieceBytes / sizeof(Disk));
+        auto* const values = direct ? reinterpret_cast<Disk*>(voxels.data()) + begin : piece.data();
+        const int bytes = static_cast<int>(n * sizeof(Disk));
+        if (gzread(file, values, static_cast<unsigned>(bytes)) != bytes) fail(file);
+        if (nifti_.swapped) reverse_bytes(std::span(values, n));
+        if (scaled) {
+          scale(values, n, reinterpret_cast<Scaled*>(voxels.data()) + begin * components + c, components);
+        } else if (!direct) {
+          auto* const to = reinterpret_cast<Disk*>(voxels.data()) + begin * components + c;
+          for (std::size_t i = 0; i < n; ++i) to[i * components] = values[i];
+        }
+      }
+    }
+  }
+
+  template <class Disk, class Scaled>
+  void scale(const Disk* values, std::size_t n, Scaled* to, std::size_t stride) const {
+    const double inter = std::isfinite(nifti_.scl_inter) ? nifti_.scl_inter : 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      to[i * stride] = static_cast<Scaled>(static_cast<double>(values[i]) * nifti_.scl_slope + inter);
+    }
+  }
+
+  NiftiHeader nifti_;
+  VoxelType disk_;
+};
+
+/// ITK makes the header, of one voxel in a file of its own beside the output; size and description are filled in here.
+std::array<char, kHeaderBytes> make_header(const std::filesystem::path& path, const ConstVolumeView& volume,
+                                           const std::string& descrip) {
+  Geometry one = *volume.geometry;
+  one.size = glm::i64vec3(1);
+  constexpr std::array<std::byte, 64> kZeros{};
+  require(static_cast<std::size_t>(volume.components) * size_bytes(volume.type) <= kZeros.size(),
+          std::to_string(volume.components) + " values a voxel, " + path.string() + "; NIfTI is written with 1 or 3");
+  const TemporaryFile made(path.string() + ".header.nii");
+  itk_write(made.path(), ItkFormat::nifti, {&one, whole(one), volume.type, volume.components, kZeros.data()}, 0, {});
+  std::array<char, kHeaderBytes> header{};
+  std::ifstream(made.path(), std::ios::binary).read(header.data(), header.size());
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto size = static_cast<std::int16_t>(volume.geometry->size[axis]);
+    std::memcpy(header.data() + 42 + 2 * axis, &size, sizeof(size));
+  }
+  descrip.copy(header.data() + 148, 79);
+  return header;
+}
+
+/// One plane a component, in pieces of `kPieceBytes`.
+std::span<const std::byte> plane_piece(const ConstVolumeView& volume, std::size_t component, std::size_t begin,
+                                       std::size_t n, std::vector<std::byte>& scratch) {
+  const std::size_t width = size_bytes(volume.type), components = static_cast<std::size_t>(volume.components);
+  if (components == 1) return {volume.voxels + begin * width, n * width};
+  scratch.resize(n * width);
+  const std::byte* from = volume.voxels + (begin * components + component) * width;
+  for (std::size_t i = 0; i < n; ++i) std::memcpy(scratch.data() + i * width, from + i * components * width, width);
+  return scratch;
+}
+
+}  // namespace
+
+std::unique_ptr<ImageReader> open_nifti(const std::filesystem::path& path) {
+  const std::string file = path.string();
+  NiftiHeader header = read_nifti_header(path);
+  const VoxelType disk = disk_type(header, file);
+  const bool compressed = starts_like_gzip(path);
+  require(!compressed || path.extension() != ".nii", "gzip data under a name in .nii, " + file + "; name it .nii.gz");
+  ImageHeader image;
+  const ItkImageInfo info = itk_read_info(path, ItkFormat::nifti);
+  image.geometry = info.geometry;
+  image.components = header.dim[0] >= 5 ? static_cast<int>(header.dim[5]) : 1;
+  const glm::i64vec3& size = info.geometry.size;
+  const double tolerance_mm =
+      0.01 + 1e-3 * static_cast<double>(std::max({size.x, size.y, size.z}));  // pixdim may be rounded
+  const bool as_sform = header.sform_code > 0 && same_grid(info.geometry, header.sform, tolerance_mm);
+  const bool as_qform = header.qform_code > 0 && same_grid(info.geometry, header.qform, tolerance_mm);
+  require(as_sform || (as_qform && !sform_decides(header)),
+          "a header that ITK places elsewhere than its sform or qform, " + file + "; correct the header");
+  if (as_sform) image.geometry = header.sform;
+  image.type = disk;
+  image.metadata["descrip"] = header.descrip;
+  if (is_scaled(header)) {
+    image.type = disk == VoxelType::f64 ? VoxelType::f64 : VoxelType::f32;
+    image.metadata["scaled"] = to_string(image.type) + " from " + to_string(disk) + ", scl_slope " +
+                               std::to_string(header.scl_slope) + ", scl_inter " + std::to_string(header.scl_inter);
+  }
+  require(header.vox_offset >= 348 && header.vox_offset < 1e9,
+          "vox_offset " + std::to_string(header.vox_offset) + ", " + file + "; expected 352");
+  const Stored stored{static_cast<std::uint64_t>(header.vox_offset), size_bytes(disk), compressed};
+  return std::make_unique<NiftiReader>(path, std::move(image), stored, std::move(header), disk);
+}
+
+void write_nifti(const std::filesystem::path& path, const ConstVolumeView& volume, const std::string& descrip,
+                 int level) {
+  const std::string file = path.string();
+  const Geometry& grid = *volume.geometry;
+  for (int axis = 0; axis < 3; ++axis) {
+    require(grid.size[axis] <= INT16_MAX,
+            "a size of " + to_string(grid.size) + ", " + file + "; NIfTI-1 holds up to 32767 an axis");
+  }
+  require(descrip.size() <= 79,
+          "a description of " + std::to_string(descrip.size()) + " characters, " + file + "; NIfTI holds 79");
+  std::ofstream out(path, std::ios::binary | std::ios::trunc);
+  if (!out) throw Error("cannot write, " + file + "; check folder and rights");
+  const auto header = make_header(path, volume, descrip);
+  const auto count = static_cast<std::size_t>(voxel_count(grid)), step = kPieceBytes / size_bytes(volume.type);
+  const std::size_t pieces_a_plane = (count + step - 1) / step;
+  const std::size_t pieces = 1 + pieces_a_plane * static_cast<std::size_t>(volume.components);
+  const PieceSource piece = [&](std::size_t i, std::vector<std::byte>& scratch) -> std::span<const std::byte> {
+    if (i == 0) return std::as_bytes(std::span(header));
+    const std::size_t begin = (i - 1) % pieces_a_plane * step;
+    return plane_piece(volume, (i - 1) / pieces_a_plane, begin, std::min(step, count - begin), scratch);
+  };
+  if (path.extension() != ".nii" && path.extension() != ".NII") {
+    write_gzip(out, pieces, piece, level);
+  } else {
+    std::vector<std::byte> scratch;
+    for (std::size_t i = 0; i < pieces && out; ++i) {
+      const auto bytes = piece(i, scratch);
+      out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    }
+  }
+  out.close();
+  if (!out) throw Error("cannot write, " + file + "; check folder, rights and free space");
+}
+
+}  // namespace tetwarp

@@ -1,0 +1,166 @@
+#include <zlib.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "deform/errors.h"
+#include "io/nifti_file.h"
+
+namespace tetwarp {
+namespace {
+
+using Bytes = std::array<unsigned char, 348>;
+
+/// The number at `offset` (nifti1.h), in native byte order.
+template <class T>
+T number(const Bytes& bytes, std::size_t offset, bool swapped) {
+  std::array<unsigned char, sizeof(T)> raw;
+  std::copy_n(bytes.begin() + static_cast<std::ptrdiff_t>(offset), sizeof(T), raw.begin());
+  if (swapped) std::reverse(raw.begin(), raw.end());
+  T value;
+  std::memcpy(&value, raw.data(), sizeof(T));
+  return value;
+}
+
+Bytes read_bytes(const std::filesystem::path& path) {
+  const std::unique_ptr<gzFile_s, int (*)(gzFile)> file(gzopen(path.c_str(), "rb"), gzclose);
+  require(file != nullptr, "cannot open, " + path.string());
+  Bytes bytes{};
+  const int read = gzread(file.get(), bytes.data(), bytes.size());
+  require(read == static_cast<int>(bytes.size()), "a header of " + std::to_string(std::max(read, 0)) + " bytes, " +
+                                                      path.string() + "; a NIfTI-1 header has 348");
+  return bytes;
+}
+
+/// Columns in RAS mm to an LPS geometry.
+Geometry from_ras(const std::array<glm::dvec3, 4>& columns, const glm::i64vec3& size) {
+  constexpr glm::dvec3 kLps(-1, -1, 1);
+  Geometry grid;
+  grid.size = size;
+  for (int axis = 0; axis < 3; ++axis) {
+    const glm::dvec3 step = kLps * columns[static_cast<std::size_t>(axis)] + 0.0;  // no -0
+    grid.spacing[axis] = glm::length(step);
+    grid.direction[axis] = step / grid.spacing[axis];
+  }
+  grid.origin = kLps * columns[3] + 0.0;
+  return grid;
+}
+
+/// Method 2 of nifti1.h: unit quaternion (a, b, c, d), pixdim, qfac = pixdim[0].
+Geometry qform(const Bytes& bytes, bool swapped, const glm::i64vec3& size) {
+  const auto f = [&](std::size_t offset) { return static_cast<double>(number<float>(bytes, offset, swapped)); };
+  const double b = f(256), c = f(260), d = f(264), a = std::sqrt(std::max(0.0, 1 - (b * b + c * c + d * d)));
+  const double flip = f(76) < 0 ? -1 : 1;
+  return from_ras({glm::dvec3(a * a + b * b - c * c - d * d, 2 * (b * c + a * d), 2 * (b * d - a * c)) * f(80),
+                   glm::dvec3(2 * (b * c - a * d), a * a + c * c - b * b - d * d, 2 * (c * d + a * b)) * f(84),
+                   glm::dvec3(2 * (b * d + a * c), 2 * (c * d - a * b), a * a + d * d - b * b - c * c) * (f(88) * flip),
+                   glm::dvec3(f(268), f(272), f(276))},
+                  size);
+}
+
+/// Method 3 of nifti1.h: srow_x, srow_y, srow_z.
+Geometry sform(const Bytes& bytes, bool swapped, const glm::i64vec3& size) {
+  std::array<glm::dvec3, 4> columns;
+  for (std::size_t column = 0; column < 4; ++column) {
+    for (std::size_t row = 0; row < 3; ++row) {
+      columns[column][static_cast<int>(row)] =
+          static_cast<double>(number<float>(bytes, 280 + 16 * row + 4 * column, swapped));
+    }
+  }
+  return from_ras(columns, size);
+}
+
+std::string text(const glm::dvec3& v) {
+  return std::to_string(v.x) + ", " + std::to_string(v.y) + ", " + std::to_string(v.z);
+}
+
+void require_one_volume(const NiftiHeader& header, const std::string& file) {
+  const auto& dim = header.dim;
+  std::string dims;
+  for (std::size_t i = 1; i < 8 && static_cast<std::int64_t>(i) <= dim[0]; ++i)
+    dims += (i > 1 ? " x " : "") + std::to_string(dim[i]);
+  require(dim[0] >= 3 && dim[0] <= 7, "an image of " + std::to_string(dim[0]) + " axes, " + file + "; expected 3");
+  for (std::size_t i = 1; i < 8; ++i) {
+    require(static_cast<std::int64_t>(i) > dim[0] || dim[i] >= 1,
+            "a size of " + dims + ", " + file + "; expected at least 1 on every axis");
+  }
+  const auto beyond = [&](std::size_t i) { return static_cast<std::int64_t>(i) <= dim[0] ? dim[i] : 1; };
+  require(beyond(4) == 1, std::to_string(beyond(4)) + " time points (" + dims + "), " + file +
+                              "; split the file, one volume is expected");
+  require(header.intent_code != 1006,
+          "a displacement field of intent code 1006 (DISPVECT), " + file +
+              "; its vectors' frame differs between tools: convert it to intent code 1007 (VECTOR) in LPS mm");
+  const bool vector = beyond(5) > 1;
+  require(!vector || header.intent_code == 1007, std::to_string(beyond(5)) + " values a voxel with intent code " +
+                                                     std::to_string(header.intent_code) + ", " + file +
+                                                     "; expected 1 value, or vectors with intent code 1007");
+  require(beyond(6) == 1 && beyond(7) == 1, "a size of " + dims + ", " + file + "; expected 3 axes and no more");
+}
+
+/// The transforms must be there, in mm, and the sform orthogonal and as large as pixdim says: ITK ignores a sform that
+/// is not, and would place the volume elsewhere without a word.
+void require_known_place(const NiftiHeader& header, const glm::dvec3& pixdim, const std::string& file) {
+  constexpr int kMillimetres = 2;
+  require(header.units == 0 || header.units == kMillimetres, "lengths in " +
+                                                                 std::string(header.units == 1   ? "metres"
+                                                                             : header.units == 3 ? "micrometres"
+                                                                                                 : "unknown units") +
+                                                                 " (xyzt_units), " + file + "; expected mm");
+  require(header.qform_code > 0 || header.sform_code > 0,
+          "no orientation (qform_code 0 and sform_code 0), " + file + "; set the qform or the sform");
+  if (header.sform_code <= 0) return;
+  const glm::dmat3& d = header.sform.direction;
+  const glm::dvec3 cosines(glm::dot(d[0], d[1]), glm::dot(d[0], d[2]), glm::dot(d[1], d[2]));
+  const bool orthogonal = std::abs(cosines.x) <= 1e-4 && std::abs(cosines.y) <= 1e-4 && std::abs(cosines.z) <= 1e-4;
+  require(orthogonal, "a sheared or singular sform (cosines between its axes " + text(cosines) + ", expected 0), " +
+                          file + "; resample it onto an orthogonal grid");
+  const glm::dvec3 difference = glm::abs(header.sform.spacing - pixdim);
+  require(!sform_decides(header) || (difference.x <= 1e-3 && difference.y <= 1e-3 && difference.z <= 1e-3),
+          "a voxel size of " + text(header.sform.spacing) + " mm by the sform and " + text(pixdim) + " mm by pixdim, " +
+              file + "; correct the header");
+}
+
+}  // namespace
+
+bool sform_decides(const NiftiHeader& header) {
+  return header.sform_code == 1 || (header.sform_code > 0 && header.qform_code <= 0);
+}
+
+NiftiHeader read_nifti_header(const std::filesystem::path& path) {
+  const std::string file = path.string();
+  const Bytes bytes = read_bytes(path);
+  NiftiHeader header;
+  const auto size = number<std::int32_t>(bytes, 0, false);
+  require(size != 540 && size != 0x1c020000, "a NIfTI-2 file, " + file + "; expected NIfTI-1: convert it");
+  header.swapped = size != 348 && number<std::int32_t>(bytes, 0, true) == 348;
+  require(size == 348 || header.swapped,
+          "not a NIfTI file (header size " + std::to_string(size) + ", expected 348), " + file);
+  const std::string magic(bytes.begin() + 344, bytes.begin() + 347);
+  require(magic == "n+1",
+          "not NIfTI-1 in one file (magic \"" + (magic == "ni1" ? magic : "?") + "\", expected \"n+1\"), " + file);
+  const auto i16 = [&](std::size_t offset) { return number<std::int16_t>(bytes, offset, header.swapped); };
+  const auto f32 = [&](std::size_t offset) {
+    return static_cast<double>(number<float>(bytes, offset, header.swapped));
+  };
+  for (std::size_t i = 0; i < 8; ++i) header.dim[i] = i16(40 + 2 * i);
+  header.intent_code = i16(68);
+  header.datatype = i16(70);
+  header.vox_offset = f32(108);
+  header.scl_slope = f32(112);
+  header.scl_inter = f32(116);
+  header.units = bytes[123] & 7;
+  header.descrip.assign(bytes.begin() + 148, std::find(bytes.begin() + 148, bytes.begin() + 228, 0));
+  header.qform_code = i16(252);
+  header.sform_code = i16(254);
+  require_one_volume(header, file);
+  const glm::i64vec3 voxels(header.dim[1], header.dim[2], header.dim[3]);
+  header.qform = qform(bytes, header.swapped, voxels);
+  header.sform = sform(bytes, header.swapped, voxels);
+  require_known_place(header, {f32(80), f32(84), f32(88)}, file);
+  return header;
+}
+
+}  // namespace tetwarp

@@ -1,0 +1,73 @@
+#include "io/parallel.h"
+
+#include <tbb/info.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <atomic>
+#include <exception>
+#include <mutex>
+
+namespace tetwarp {
+namespace {
+
+/// The exception of the lowest index.
+class FirstFailure {
+ public:
+  bool is_before(std::size_t index) const { return lowest_.load() < index; }
+  void record(std::size_t index, std::exception_ptr failure) {
+    const std::lock_guard lock(mutex_);
+    if (index >= lowest_.load()) return;
+    lowest_ = index;
+    failure_ = std::move(failure);
+  }
+  void rethrow() const {
+    if (failure_) std::rethrow_exception(failure_);
+  }
+
+ private:
+  std::mutex mutex_;
+  std::atomic<std::size_t> lowest_{SIZE_MAX};
+  std::exception_ptr failure_;
+};
+
+/// Calls Control::progress from one thread at a time, with rising numbers.
+class Progress {
+ public:
+  Progress(const Control& control, std::size_t count) : control_(control), count_(count) {}
+  void one_more() {
+    if (!control_.progress) return;
+    const std::lock_guard lock(mutex_);
+    control_.progress(static_cast<double>(++done_) / static_cast<double>(count_));
+  }
+
+ private:
+  const Control& control_;
+  std::size_t count_, done_ = 0;
+  std::mutex mutex_;
+};
+
+}  // namespace
+
+void for_each_index(std::size_t count, int threads, const Control& control,
+                    const std::function<void(std::size_t)>& body) {
+  FirstFailure failure;
+  Progress progress(control, count);
+  const auto one = [&](std::size_t i) {
+    if (control.stop.stop_requested() || failure.is_before(i)) return;
+    try {
+      body(i);
+      progress.one_more();
+    } catch (...) {
+      failure.record(i, std::current_exception());
+    }
+  };
+  const int usable = tbb::info::default_concurrency();  // asking for more would make oneTBB print a warning
+  tbb::task_arena arena(threads > 0 ? std::min(threads, usable) : usable);
+  arena.execute([&] { tbb::parallel_for(std::size_t{0}, count, one, tbb::simple_partitioner()); });
+  failure.rethrow();
+  if (control.stop.stop_requested()) throw Cancelled();
+}
+
+}  // namespace tetwarp

@@ -1,0 +1,273 @@
+#include "io/raw_image.h"
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <glm/geometric.hpp>
+#include <sstream>
+#include <utility>
+
+#include "deform/errors.h"
+#include "io/text_header.h"
+
+namespace tetwarp {
+namespace {
+
+std::string lower(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
+
+/// The whole text as numbers; parentheses and commas (NRRD vectors) count as spaces. @throws InputError
+std::vector<double> numbers(const TextHeader& header, const std::string& name, const std::string& file) {
+  std::string text = header[name];
+  std::ranges::replace_if(
+      text, [](char c) { return c == '(' || c == ')' || c == ','; }, ' ');
+  std::vector<double> values;
+  std::istringstream words(text);
+  for (std::string word; words >> word;) {
+    if (word == "none") continue;
+    char* end = nullptr;
+    values.push_back(std::strtod(word.c_str(), &end));
+    require(*end == '\0', "\"" + word + "\" in the field \"" + name + "\", " + file + "; expected a number");
+  }
+  return values;
+}
+
+std::vector<double> numbers(const TextHeader& header, const std::string& name, std::size_t count,
+                            const std::string& file) {
+  const auto values = numbers(header, name, file);
+  require(values.size() == count, std::to_string(values.size()) + " numbers in the field \"" + name + "\", " + file +
+                                      "; expected " + std::to_string(count));
+  return values;
+}
+
+std::int64_t whole_number(double value, const std::string& file) {
+  require(value >= 1 && value < 9e15 && value == static_cast<double>(static_cast<std::int64_t>(value)),
+          "a size of " + std::to_string(value) + ", " + file + "; expected a positive whole number");
+  return static_cast<std::int64_t>(value);
+}
+
+void expect(const TextHeader& header, const std::string& name, const std::string& value, bool may_be_absent,
+            const std::string& file) {
+  const std::string found = header[name];
+  require(
+      lower(found) == value || (may_be_absent && found.empty()),
+      "the field \"" + name + "\" is \"" + found + "\", " + file + "; without ITK only \"" + value + "\" can be read");
+}
+
+struct MetaType {
+  VoxelType type;
+  const char *mha, *nrrd;
+};
+constexpr std::array<MetaType, 8> kTypes = {{{VoxelType::u8, "MET_UCHAR", "uint8"},
+                                             {VoxelType::i8, "MET_CHAR", "int8"},
+                                             {VoxelType::u16, "MET_USHORT", "uint16"},
+                                             {VoxelType::i16, "MET_SHORT", "int16"},
+                                             {VoxelType::u32, "MET_UINT", "uint32"},
+                                             {VoxelType::i32, "MET_INT", "int32"},
+                                             {VoxelType::f32, "MET_FLOAT", "float"},
+                                             {VoxelType::f64, "MET_DOUBLE", "double"}}};
+
+/// NRRD has several names a type: "unsigned short int", "ushort", "uint16_t" are all uint16.
+std::string nrrd_type(const std::string& text) {
+  static const std::map<std::string, std::string> kNames = {{"uchar", "uint8"},
+                                                            {"unsigned char", "uint8"},
+                                                            {"uint8_t", "uint8"},
+                                                            {"signed char", "int8"},
+                                                            {"int8_t", "int8"},
+                                                            {"ushort", "uint16"},
+                                                            {"unsigned short", "uint16"},
+                                                            {"unsigned short int", "uint16"},
+                                                            {"uint16_t", "uint16"},
+                                                            {"short", "int16"},
+                                                            {"short int", "int16"},
+                                                            {"signed short", "int16"},
+                                                            {"signed short int", "int16"},
+                                                            {"int16_t", "int16"},
+                                                            {"uint", "uint32"},
+                                                            {"unsigned int", "uint32"},
+                                                            {"uint32_t", "uint32"},
+                                                            {"int", "int32"},
+                                                            {"signed int", "int32"},
+                                                            {"int32_t", "int32"}};
+  const auto found = kNames.find(text);
+  return found == kNames.end() ? text : found->second;
+}
+
+VoxelType voxel_type(const std::string& name, ImageFormat format, const std::string& file) {
+  for (const MetaType& entry : kTypes) {
+    if (name == (format == ImageFormat::mha ? entry.mha : entry.nrrd)) return entry.type;
+  }
+  throw InputError("voxels of type \"" + name + "\", " + file + "; expected integers of 8 to 32 bits, float or double");
+}
+
+ImageHeader parse_mha(const TextHeader& text, const std::string& file) {
+  expect(text, "ndims", "3", false, file);
+  expect(text, "binarydatabyteordermsb", "false", true, file);
+  expect(text, "elementbyteordermsb", "false", true, file);
+  expect(text, "headersize", "0", true, file);
+  ImageHeader header;
+  header.metadata = text.metadata;
+  header.type = voxel_type(text["elementtype"], ImageFormat::mha, file);
+  if (!text["elementnumberofchannels"].empty()) {
+    header.components = static_cast<int>(whole_number(numbers(text, "elementnumberofchannels", 1, file)[0], file));
+  }
+  const auto size = numbers(text, "dimsize", 3, file), spacing = numbers(text, "elementspacing", 3, file);
+  const auto offset = numbers(text, "offset", 3, file), matrix = numbers(text, "transformmatrix", 9, file);
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<std::size_t>(axis);
+    header.geometry.size[axis] = whole_number(size[a], file);
+    header.geometry.spacing[axis] = spacing[a];
+    header.geometry.origin[axis] = offset[a];
+    header.geometry.direction[axis] = glm::dvec3(matrix[3 * a], matrix[3 * a + 1], matrix[3 * a + 2]);
+  }
+  return header;
+}
+
+ImageHeader parse_nrrd(const TextHeader& text, const std::string& file) {
+  const std::string space = lower(text["space"]);
+  const bool ras = space == "right-anterior-superior" || space == "ras";
+  require(ras || space == "left-posterior-superior" || space == "lps",
+          "the space \"" + space + "\", " + file +
+              "; without ITK only left-posterior-superior and right-anterior-superior can be read");
+  ImageHeader header;
+  header.metadata = text.metadata;
+  header.type = voxel_type(nrrd_type(lower(text["type"])), ImageFormat::nrrd, file);
+  if (size_bytes(header.type) > 1) expect(text, "endian", "little", false, file);
+  auto size = numbers(text, "sizes", file);
+  require(size.size() == 3 || (size.size() == 4 && text["space directions"].starts_with("none")),
+          std::to_string(size.size()) + " axes, " + file + "; expected 3, or 4 with the vectors' components first");
+  if (size.size() == 4) {
+    header.components = static_cast<int>(whole_number(size[0], file));
+    size.erase(size.begin());
+  }
+  const auto steps = numbers(text, "space directions", 9, file), origin = numbers(text, "space origin", 3, file);
+  const glm::dvec3 lps = ras ? glm::dvec3(-1, -1, 1) : glm::dvec3(1);
+  header.geometry.origin = lps * glm::dvec3(origin[0], origin[1], origin[2]) + 0.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<std::size_t>(axis);
+    const glm::dvec3 step = lps * glm::dvec3(steps[3 * a], steps[3 * a + 1], steps[3 * a + 2]) + 0.0;
+    header.geometry.size[axis] = whole_number(size[a], file);
+    header.geometry.spacing[axis] = glm::length(step);
+    header.geometry.direction[axis] = step / header.geometry.spacing[axis];
+  }
+  return header;
+}
+
+class RawReader final : public ImageReader {
+ public:
+  using ImageReader::ImageReader;
+
+  void read(std::span<std::byte> voxels) const override {
+    std::ifstream stream(path_, std::ios::binary);
+    stream.seekg(static_cast<std::streamoff>(stored_.offset));
+    if (stored_.encoded) return inflate_into(stream, voxels);
+    stream.read(reinterpret_cast<char*>(voxels.data()), static_cast<std::streamsize>(voxels.size()));
+    require(stream.good(), "truncated voxels, " + path_.string() + "; is the file whole?");
+  }
+
+ private:
+  void inflate_into(std::istream& stream, std::span<std::byte> voxels) const {
+    z_stream inflater{};
+    if (inflateInit(&inflater) != Z_OK) throw Error("zlib: inflateInit failed");
+    const std::unique_ptr<z_stream, int (*)(z_stream*)> end(&inflater, inflateEnd);
+    std::vector<char> input(std::size_t{1} << 18);
+    int status = Z_OK;
+    for (std::size_t done = 0; status == Z_OK;) {
+      if (inflater.avail_in == 0) {
+        stream.read(input.data(), static_cast<std::streamsize>(input.size()));
+        inflater.next_in = reinterpret_cast<Bytef*>(input.data());
+        inflater.avail_in = static_cast<uInt>(stream.gcount());
+      }
+      const std::size_t room = std::min(voxels.size() - done, std::size_t{1} << 30);
+      inflater.next_out = reinterpret_cast<Bytef*>(voxels.data() + done);
+      inflater.avail_out = static_cast<uInt>(room);
+      status = inflate(&inflater, Z_NO_FLUSH);
+      done += room - inflater.avail_out;
+    }
+    const std::string file = path_.string();
+    require(status == Z_STREAM_END, std::string("truncated or damaged voxels (") +
+                                        (inflater.msg ? inflater.msg : "the stream does not end with them") + "), " +
+                                        file + "; is the file whole?");
+    require(inflater.total_out == voxels.size(), std::to_string(inflater.total_out) + " bytes of voxels, " + file +
+                                                     "; the header says " + std::to_string(voxels.size()));
+  }
+};
+
+/// As many digits as bring the same double back.
+std::string exact(const glm::dvec3& v, const char* separator) {
+  std::array<char, 96> text;
+  std::snprintf(text.data(), text.size(), "%.17g%s%.17g%s%.17g", v.x, separator, v.y, separator, v.z);
+  return text.data();
+}
+
+std::string mha_header(const ConstVolumeView& volume, const std::map<std::string, std::string>& metadata) {
+  const Geometry& grid = *volume.geometry;
+  const glm::dmat3& d = grid.direction;
+  std::ostringstream out;
+  out << "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData = False\n"
+      << "TransformMatrix = " << exact(d[0], " ") << ' ' << exact(d[1], " ") << ' ' << exact(d[2], " ") << '\n'
+      << "Offset = " << exact(grid.origin, " ") << "\nElementSpacing = " << exact(grid.spacing, " ") << '\n';
+  for (const auto& [key, value] : metadata) out << key << " = " << value << '\n';
+  out << "DimSize = " << grid.size.x << ' ' << grid.size.y << ' ' << grid.size.z << '\n';
+  if (volume.components > 1) out << "ElementNumberOfChannels = " << volume.components << '\n';
+  out << "ElementType = " << kTypes[static_cast<std::size_t>(volume.type)].mha << "\nElementDataFile = LOCAL\n";
+  return out.str();
+}
+
+std::string nrrd_header(const ConstVolumeView& volume, const std::map<std::string, std::string>& metadata) {
+  const Geometry& grid = *volume.geometry;
+  const bool vectors = volume.components > 1;
+  std::ostringstream out;
+  out << "NRRD0004\ntype: " << kTypes[static_cast<std::size_t>(volume.type)].nrrd
+      << "\ndimension: " << (vectors ? 4 : 3) << "\nspace: left-posterior-superior\nsizes:";
+  if (vectors) out << ' ' << volume.components;
+  out << ' ' << grid.size.x << ' ' << grid.size.y << ' ' << grid.size.z
+      << "\nspace directions:" << (vectors ? " none" : "");
+  for (int axis = 0; axis < 3; ++axis) out << " (" << exact(grid.spacing[axis] * grid.direction[axis], ",") << ')';
+  out << "\nkinds:" << (vectors ? " vector" : "")
+      << " domain domain domain\nendian: little\nencoding: raw\nspace origin: (" << exact(grid.origin, ",") << ")\n";
+  for (const auto& [key, value] : metadata) out << key << ":=" << value << '\n';
+  out << '\n';
+  return out.str();
+}
+
+}  // namespace
+
+std::unique_ptr<ImageReader> make_raw_reader(const std::filesystem::path& path, ImageHeader header,
+                                             const Stored& stored) {
+  return std::make_unique<RawReader>(path, std::move(header), stored);
+}
+
+std::unique_ptr<ImageReader> open_raw_image(const std::filesystem::path& path, ImageFormat format) {
+  const TextHeader text = read_text_header(path, format);
+  const std::string file = path.string();
+  const bool zlib = is_zlib(text, format);
+  require(zlib || !is_encoded(text, format),
+          "voxels that are compressed or text, " + file + "; without ITK only raw voxels can be read");
+  require(text["byte skip"].empty() && text["line skip"].empty(),
+          "a field \"byte skip\" or \"line skip\", " + file + "; without ITK neither can be read");
+  ImageHeader header = format == ImageFormat::mha ? parse_mha(text, file) : parse_nrrd(text, file);
+  const Stored stored{text.data_offset, size_bytes(header.type), zlib};
+  return make_raw_reader(path, std::move(header), stored);
+}
+
+void write_raw_image(const std::filesystem::path& path, ImageFormat format, const ConstVolumeView& volume,
+                     const std::map<std::string, std::string>& metadata) {
+  std::ofstream out(path, std::ios::binary | std::ios::trunc);
+  out << (format == ImageFormat::mha ? mha_header(volume, metadata) : nrrd_header(volume, metadata));
+  const auto voxels =
+      static_cast<std::size_t>(voxel_count(*volume.geometry)) * static_cast<std::size_t>(volume.components);
+  out.write(reinterpret_cast<const char*>(volume.voxels),
+            static_cast<std::streamsize>(voxels * size_bytes(volume.type)));
+  out.close();
+  if (!out) throw Error("cannot write, " + path.string() + "; check folder, rights and free space");
+}
+
+}  // namespace tetwarp

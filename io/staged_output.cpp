@@ -1,0 +1,190 @@
+#include "io/staged_output.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <system_error>
+
+#include "deform/errors.h"
+
+namespace fs = std::filesystem;
+
+namespace tetwarp {
+
+namespace {
+
+std::string reason(int error) { return std::generic_category().message(error); }
+std::string reason(const std::error_code& error) { return error.message(); }
+
+/// The path with "..", "." and a trailing slash resolved in the text; always with a last component.
+fs::path named(const fs::path& target) {
+  fs::path path = target.lexically_normal();
+  if (!path.has_filename()) path = path.parent_path();
+  if (!path.has_filename() || path.filename() == "." || path.filename() == "..") {
+    throw Error("'" + target.string() + "' names no file or folder to create; give the output a name");
+  }
+  return path;
+}
+
+fs::path folder_of(const fs::path& path) { return path.has_parent_path() ? path.parent_path() : fs::path("."); }
+
+/// Whether there is something under the name that would be lost. Throws where it may not be replaced at all.
+bool occupied(const fs::path& path, StagedOutput::Kind kind) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (status.type() == fs::file_type::not_found) return false;
+  if (status.type() == fs::file_type::none) throw Error("cannot look at " + path.string() + ": " + reason(error));
+  if (kind == StagedOutput::Kind::file) {
+    if (fs::is_directory(status))
+      throw Error(path.string() + " is a folder, a file is to be written; choose another name");
+    if (!fs::is_regular_file(status)) throw Error(path.string() + " is no regular file; choose another name");
+    return true;
+  }
+  if (!fs::is_directory(status)) {
+    throw Error(path.string() + " is a file, a folder is to be written; choose another name");
+  }
+  const bool empty = fs::is_empty(path, error);
+  if (error) throw Error("cannot list " + path.string() + ": " + reason(error));
+  return !empty;
+}
+
+/// Throws unless the folder holds nothing but regular files that are ours.
+void require_ours(const fs::path& folder, bool (*is_ours)(const fs::path&)) {
+  std::error_code error;
+  for (fs::recursive_directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    const fs::file_status status = entry->symlink_status(error);
+    if (error) break;
+    if (fs::is_directory(status)) continue;
+    if (!is_ours || !fs::is_regular_file(status) || !is_ours(entry->path())) {
+      throw Error(entry->path().string() +
+                  " was not written by Tetwarp, so its folder is not replaced; choose another name");
+    }
+  }
+  if (error) throw Error("cannot list " + folder.string() + ": " + reason(error));
+}
+
+/// Creates an empty file or folder beside `target` under a hidden name that nobody has. A leftover of a killed run with
+/// the same process id (or of another machine on a shared disk) is left alone.
+fs::path create_sibling(const fs::path& target, StagedOutput::Kind kind, const std::string& word) {
+  const std::string process = ".tetwarp-" + word + "-" + std::to_string(::getpid());
+  for (int attempt = 0;; ++attempt) {
+    std::string name = process;
+    if (attempt > 0) name += '-' + std::to_string(attempt);
+    name += '-';
+    name += target.filename().string();
+    const fs::path path = folder_of(target) / name;
+    int result;
+    if (kind == StagedOutput::Kind::folder) {
+      result = ::mkdir(path.c_str(), 0777);
+    } else {
+      result = ::open(path.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666);
+      if (result >= 0) ::close(result);
+    }
+    if (result >= 0) return path;
+    if (errno != EEXIST || attempt == 1000) {
+      throw Error("cannot write " + target.string() + ": " + reason(errno) + "; choose a place that can be written to");
+    }
+  }
+}
+
+/// Flushes one file or folder to disk; a file system that cannot flush folders (EINVAL) is no error.
+void flush(const fs::path& path, const fs::path& target) {
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  const bool good = file >= 0 && (::fsync(file) == 0 || errno == EINVAL);
+  const int error = errno;
+  if (file >= 0) ::close(file);
+  if (!good) throw Error("cannot write " + target.string() + " to disk: " + reason(error) + "; free some space");
+}
+
+void flush_all(const fs::path& staged, StagedOutput::Kind kind, const fs::path& target) {
+  if (kind == StagedOutput::Kind::folder) {
+    std::error_code error;
+    fs::recursive_directory_iterator entry(staged, error);
+    for (; !error && entry != fs::recursive_directory_iterator(); entry.increment(error)) flush(entry->path(), target);
+    if (error) throw Error("cannot list " + staged.string() + ": " + reason(error));
+  }
+  flush(staged, target);
+}
+
+int move(const fs::path& from, const fs::path& to) { return ::rename(from.c_str(), to.c_str()) == 0 ? 0 : errno; }
+
+/// Renames where nothing (or an empty folder) has the new name, and nothing that has it meanwhile is lost. 0 or errno.
+int move_to_free(const fs::path& from, const fs::path& to, StagedOutput::Kind kind) {
+  if (kind == StagedOutput::Kind::folder) return move(from, to);  // rename(2) refuses a folder that is not empty
+  if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
+  if (errno != EINVAL && errno != ENOSYS) return errno;  // else: the file system cannot, so look and then rename
+  std::error_code ignored;
+  return fs::exists(to, ignored) ? EEXIST : move(from, to);
+}
+
+/// Moves the old folder aside, the new one in, and removes the old one last. 0 or errno.
+int replace_folder(const fs::path& staged, const fs::path& target) {
+  const fs::path aside = create_sibling(target, StagedOutput::Kind::folder, "replaced");
+  std::error_code ignored;
+  if (const int error = move(target, aside)) {
+    fs::remove(aside, ignored);
+    return error;
+  }
+  if (const int error = move(staged, target)) {
+    if (move(aside, target) == 0) return error;
+    throw Error("cannot replace " + target.string() + ": " + reason(error) + "; what it held is now " + aside.string());
+  }
+  fs::remove_all(aside, ignored);
+  return 0;
+}
+
+}  // namespace
+
+StagedOutput::StagedOutput(fs::path target, Kind kind, bool overwrite, bool (*is_ours)(const fs::path&))
+    : target_(named(target)), kind_(kind), overwrite_(overwrite), is_ours_(is_ours) {
+  std::error_code error;
+  if (fs::is_symlink(target_, error)) {
+    target_ = fs::weakly_canonical(target_, error);  // the link stays: what it names is written
+    if (error) throw Error("cannot follow the link " + target.string() + ": " + reason(error));
+  }
+  const fs::path parent = folder_of(target_);
+  if (!fs::exists(parent, error)) {
+    throw Error("folder " + parent.string() + " does not exist, so " + target_.filename().string() +
+                " cannot be written into it; create it first");
+  }
+  if (!fs::is_directory(parent, error)) {
+    throw Error(parent.string() + " is not a folder, so " + target_.filename().string() +
+                " cannot be written into it; choose another name");
+  }
+  check_target();
+  staged_ = create_sibling(target_, kind_, "partial");
+}
+
+StagedOutput::~StagedOutput() {
+  if (done_) return;
+  std::error_code ignored;
+  fs::remove_all(staged_, ignored);
+}
+
+bool StagedOutput::check_target() const {
+  const bool replaces = occupied(target_, kind_);
+  if (replaces && !overwrite_) throw Error(target_.string() + " exists; choose another name or add --overwrite");
+  if (replaces && kind_ == Kind::folder) require_ours(target_, is_ours_);
+  return replaces;
+}
+
+void StagedOutput::commit() {
+  flush_all(staged_, kind_, target_);
+  const bool replaces = check_target();  // again: hours may have passed
+  int error = 0;
+  if (!replaces)
+    error = move_to_free(staged_, target_, kind_);
+  else if (kind_ == Kind::file)
+    error = move(staged_, target_);
+  else
+    error = replace_folder(staged_, target_);
+  if (error != 0)
+    throw Error("cannot give " + target_.string() + " its name: " + reason(error) + "; nothing was replaced");
+  done_ = true;
+  flush(folder_of(target_), target_);
+}
+
+}  // namespace tetwarp

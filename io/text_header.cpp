@@ -1,0 +1,141 @@
+#include "io/text_header.h"
+
+#include <cctype>
+#include <fstream>
+#include <set>
+#include <sstream>
+
+#include "deform/errors.h"
+
+namespace tetwarp {
+namespace {
+
+constexpr std::size_t kLongestHeader = std::size_t{1} << 20;
+
+/// The fields of MetaIO (metaObject.cxx, metaImage.cxx), in lower case: what is left is the user's.
+const std::set<std::string>& meta_fields() {
+  static const std::set<std::string> kFields = {"objecttype",
+                                                "objectsubtype",
+                                                "transformtype",
+                                                "ndims",
+                                                "name",
+                                                "id",
+                                                "parentid",
+                                                "acquisitiondate",
+                                                "color",
+                                                "comment",
+                                                "compresseddata",
+                                                "compresseddatasize",
+                                                "compressionlevel",
+                                                "binarydata",
+                                                "binarydatabyteordermsb",
+                                                "elementbyteordermsb",
+                                                "transformmatrix",
+                                                "rotation",
+                                                "orientation",
+                                                "offset",
+                                                "position",
+                                                "origin",
+                                                "centerofrotation",
+                                                "anatomicalorientation",
+                                                "distanceunits",
+                                                "elementspacing",
+                                                "elementsize",
+                                                "dimsize",
+                                                "headersize",
+                                                "modality",
+                                                "sequenceid",
+                                                "elementmin",
+                                                "elementmax",
+                                                "elementnumberofchannels",
+                                                "elementnbits",
+                                                "elementtype",
+                                                "elementtointensityfunctionslope",
+                                                "elementtointensityfunctionoffset",
+                                                "elementdatafile"};
+  return kFields;
+}
+
+std::string lower(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
+
+std::string trimmed(const std::string& text) {
+  const auto begin = text.find_first_not_of(" \t\r"), end = text.find_last_not_of(" \t\r");
+  return begin == std::string::npos ? "" : text.substr(begin, end - begin + 1);
+}
+
+/// Takes one line of a header; true after the last.
+bool take_line(const std::string& line, ImageFormat format, TextHeader& header) {
+  if (format == ImageFormat::nrrd) {
+    if (trimmed(line).empty()) return true;
+    if (line[0] == '#') return false;
+    const auto pair = line.find(":="), field = line.find(": ");
+    if (pair != std::string::npos && pair < field)
+      header.metadata[line.substr(0, pair)] = trimmed(line.substr(pair + 2));
+    else if (field != std::string::npos)
+      header.fields[lower(line.substr(0, field))] = trimmed(line.substr(field + 2));
+    return false;
+  }
+  const auto equals = line.find('=');
+  if (equals == std::string::npos) return false;
+  const std::string name = trimmed(line.substr(0, equals)), value = trimmed(line.substr(equals + 1));
+  if (meta_fields().contains(lower(name)))
+    header.fields[lower(name)] = value;
+  else
+    header.metadata[name] = value;
+  return lower(name) == "elementdatafile";
+}
+
+}  // namespace
+
+std::string TextHeader::operator[](const std::string& name) const {
+  const auto found = fields.find(name);
+  return found == fields.end() ? "" : found->second;
+}
+
+TextHeader read_text_header(const std::filesystem::path& path, ImageFormat format) {
+  const std::string file = path.string();
+  std::ifstream stream(path, std::ios::binary);
+  require(stream.good(), "cannot open, " + file);
+  TextHeader header;
+  bool ended = false, first = true;
+  for (char c; !ended && header.data_offset < kLongestHeader;) {
+    std::string line;
+    for (; stream.get(c) && c != '\n' && line.size() < kLongestHeader;) line += c;
+    if (!stream) break;
+    header.data_offset += line.size() + 1;
+    if (first && format == ImageFormat::nrrd)
+      require(line.starts_with("NRRD000"), "not an NRRD file (it does not begin with NRRD000), " + file);
+    else
+      ended = take_line(line, format, header);
+    first = false;
+  }
+  const char* name = format == ImageFormat::nrrd ? "NRRD" : "MHA";
+  require(ended, std::string("a header that does not end, ") + file + "; is this a whole " + name + " file?");
+  const std::string elsewhere =
+      format == ImageFormat::nrrd ? header["data file"] + header["datafile"] : header["elementdatafile"];
+  require(format == ImageFormat::nrrd ? elsewhere.empty() : elsewhere == "LOCAL",
+          "voxels in another file (\"" + elsewhere + "\"), " + file + "; expected them after the header");
+  const std::string units = format == ImageFormat::nrrd ? header["space units"] : header["distanceunits"];
+  std::istringstream words(units);
+  for (std::string word; words >> word;) {
+    require(word == "mm" || word == "\"mm\"" || word == "?" || word == "\"\"",
+            "lengths in " + units + ", " + file + "; expected mm");
+  }
+  return header;
+}
+
+bool is_encoded(const TextHeader& header, ImageFormat format) {
+  if (format == ImageFormat::nrrd) return header["encoding"] != "raw";
+  return lower(header["compresseddata"]) == "true" || lower(header["binarydata"]) == "false";
+}
+
+bool is_zlib(const TextHeader& header, ImageFormat format) {
+  return format == ImageFormat::mha && lower(header["compresseddata"]) == "true" &&
+         lower(header["binarydata"]) != "false" && lower(header["binarydatabyteordermsb"]) != "true" &&
+         lower(header["elementbyteordermsb"]) != "true";
+}
+
+}  // namespace tetwarp

@@ -1,0 +1,34 @@
+#pragma once
+
+// Private to io/. The text headers of MHA (https://itk.org/Wiki/MetaIO/Documentation) and NRRD
+// (https://teem.sourceforge.net/nrrd/format.html).
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+
+#include "io/image_reader.h"
+
+namespace tetwarp {
+
+/// The lines before the voxels.
+struct TextHeader {
+  std::map<std::string, std::string> fields;    ///< names in lower case; NRRD: the basic fields ("name: value")
+  std::map<std::string, std::string> metadata;  ///< NRRD: "key:=value"; MHA: the fields that MetaIO does not define
+  std::uint64_t data_offset = 0;                ///< of the first byte after the header
+
+  /// The field's value; empty where it is absent.
+  std::string operator[](const std::string& name) const;
+};
+
+/// @throws InputError for a file that is not of the format, whose header does not end, whose voxels lie in another
+/// file, or
+///         whose lengths are not mm
+TextHeader read_text_header(const std::filesystem::path& path, ImageFormat format);
+
+/// Whether the voxels are stored as something else than the plain bytes.
+bool is_encoded(const TextHeader& header, ImageFormat format);
+/// Whether they are one zlib stream: compressed MHA, little endian.
+bool is_zlib(const TextHeader& header, ImageFormat format);
+
+}  // namespace tetwarp

@@ -1,0 +1,127 @@
+// `tetwarp deform` on files: what comes out, and that it is the same whichever way the field goes in.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "deform/fields/formula.h"
+#include "io/field_file.h"
+#include "io/image_file.h"
+#include "tests/support/program.h"
+#include "tests/support/scratch.h"
+
+namespace {
+
+using namespace tetwarp;
+
+void expect_run(const Scratch& scratch, const std::string& arguments) {
+  const Outcome run = run_tetwarp(scratch.path(), arguments);
+  ASSERT_EQ(run.status, 0) << arguments << "\n" << run.err;
+}
+
+void make_phantom_file(const Scratch& scratch, const std::string& name) {
+  expect_run(scratch, "phantom --size 40,36,24 --spacing 3,3,4 --quiet -o " + name);
+}
+
+bool same_voxels(const std::filesystem::path& a, const std::filesystem::path& b) {
+  const AnyVolume first = read_image(a), second = read_image(b);
+  return first.type() == second.type() && first.size_bytes() == second.size_bytes() &&
+         std::equal(first.data(), first.data() + first.size_bytes(), second.data());
+}
+
+TEST(Deform, IdentityReturnsTheSourceInEveryFormat) {
+  const Scratch scratch;
+  make_phantom_file(scratch, "in.mha");
+  for (const std::string name : {"out.nii", "out.nii.gz", "out.nrrd", "out.mha"}) {
+    expect_run(scratch, "deform in.mha -f identity -o " + name);
+    EXPECT_TRUE(same_voxels(scratch / "in.mha", scratch / name)) << name;
+    EXPECT_TRUE(
+        same_grid(read_image_header(scratch / "in.mha").geometry, read_image_header(scratch / name).geometry, 1e-4))
+        << name;
+  }
+}
+
+TEST(Deform, AFormulaAndItsFileGiveTheSameVoxels) {
+  const Scratch scratch;
+  make_phantom_file(scratch, "in.mha");
+  for (const std::string formula :
+       {"wave:amplitude=9,wavelength=70", "twist:angle=40", "bubble:radius=50,strength=0.8"}) {
+    for (const std::string cell : {"1", "5"}) {
+      expect_run(scratch, "deform in.mha -f " + formula + " --cell-size " + cell + " -o a.mha --overwrite");
+      for (const std::string file : {"field.mha", "field.nrrd", "field.nii", "field.nii.gz"}) {
+        expect_run(scratch, "field " + formula + " --like in.mha --cell-size " + cell + " --overwrite -o " + file);
+        expect_run(scratch, "deform in.mha -f " + file + " -o b.mha --overwrite");
+        EXPECT_TRUE(same_voxels(scratch / "a.mha", scratch / "b.mha")) << formula << " cell " << cell << " " << file;
+      }
+    }
+  }
+}
+
+TEST(Deform, TwoRunsWriteTheSameBytesForAnyNumberOfThreads) {
+  const Scratch scratch;
+  make_phantom_file(scratch, "in.nii.gz");
+  expect_run(scratch, "deform in.nii.gz -f twist:angle=30 -o out.nii.gz --threads 1");
+  const std::string volume = read_text(scratch / "out.nii.gz"), sidecar = read_text(scratch / "out.nii.gz.json");
+  expect_run(scratch, "deform in.nii.gz -f twist:angle=30 -o out.nii.gz --threads 2 --overwrite");
+  EXPECT_EQ(volume, read_text(scratch / "out.nii.gz"));
+  EXPECT_EQ(sidecar, read_text(scratch / "out.nii.gz.json"));
+  EXPECT_FALSE(volume.empty());
+}
+
+TEST(Deform, ComposedFormulasActOneAfterTheOther) {
+  const Scratch scratch;
+  make_phantom_file(scratch, "in.mha");
+  expect_run(scratch, "deform in.mha -f translate:by=3/0/0 -f translate:by=3/-3/8 -o a.mha");
+  expect_run(scratch, "deform in.mha -f translate:by=2/-1/2vox -o b.mha");
+  EXPECT_TRUE(same_voxels(scratch / "a.mha", scratch / "b.mha"));
+  EXPECT_FALSE(same_voxels(scratch / "a.mha", scratch / "in.mha"));
+}
+
+TEST(Deform, APullFieldIsNeverTakenForAForwardOne) {
+  const Scratch scratch;
+  make_phantom_file(scratch, "in.mha");
+  const Geometry grid = read_image_header(scratch / "in.mha").geometry;
+  const VertexField shift = sample_on(grid, parse_formula("translate:by=2/0/0vox", grid));
+  write_field_file(scratch / "pull.mha", PullField{shift.lattice, shift.displacement});
+  write_field_file(scratch / "forward.mha", shift);
+  expect_run(scratch, "deform in.mha --pull-field pull.mha -o a.mha --outside background");
+  expect_run(scratch, "deform in.mha -f translate:by=-2/0/0vox -o b.mha");
+  EXPECT_TRUE(same_voxels(scratch / "a.mha", scratch / "b.mha"));
+  EXPECT_EQ(run_tetwarp(scratch.path(), "deform in.mha -f pull.mha -o c.mha").status, 4);
+  EXPECT_EQ(run_tetwarp(scratch.path(), "deform in.mha --pull-field forward.mha -o c.mha").status, 4);
+  EXPECT_FALSE(std::filesystem::exists(scratch / "c.mha"));
+}
+
+TEST(Deform, TheReportTellsWhatHappenedAndTheSidecarHasNoClock) {
+  const Scratch scratch;
+  make_phantom_file(scratch, "in.mha");
+  expect_run(scratch,
+             "deform in.mha -f translate:by=2/0/0vox -o out.mha --coverage mask.nii.gz --report report.json --preview "
+             "look.png");
+  const auto report = nlohmann::json::parse(read_text(scratch / "report.json"));
+  EXPECT_EQ(report["report"]["covered"], 38 * 36 * 24);
+  EXPECT_EQ(report["report"]["uncovered"], 2 * 36 * 24);
+  EXPECT_EQ(report["backend"], "cpu");
+  for (const std::string stage : {"read", "field", "resample", "write"})
+    EXPECT_GE(report["stages"][stage]["seconds"], 0.0) << stage;
+  EXPECT_GT(report["memory"]["peak_bytes"], report["memory"]["source_bytes"]);
+  const auto sidecar = nlohmann::json::parse(read_text(scratch / "out.mha.json"));
+  EXPECT_FALSE(sidecar.contains("stages"));
+  EXPECT_EQ(sidecar["field"]["sha256"].get<std::string>().size(), 64u);
+  const AnyVolume mask = read_image(scratch / "mask.nii.gz");
+  EXPECT_EQ(std::count(mask.as<std::uint8_t>().begin(), mask.as<std::uint8_t>().end(), 1), 38 * 36 * 24);
+  EXPECT_EQ(read_text(scratch / "look.png").substr(1, 3), "PNG");
+}
+
+TEST(Deform, AFieldThatDoesNotCoverTheVolumeIsRefusedUnlessAskedFor) {
+  const Scratch scratch;
+  make_phantom_file(scratch, "in.mha");
+  expect_run(scratch, "phantom --size 20,36,24 --spacing 3,3,4 --quiet -o half.mha");
+  expect_run(scratch, "field identity --like half.mha -o field.mha");
+  EXPECT_EQ(run_tetwarp(scratch.path(), "deform in.mha -f field.mha -o out.mha").status, 4);
+  expect_run(scratch, "deform in.mha -f field.mha -o out.mha --outside rest");
+  EXPECT_TRUE(same_voxels(scratch / "in.mha", scratch / "out.mha"));
+  expect_run(scratch, "deform in.mha -f field.mha -o out.mha --outside background --background 7 --overwrite");
+  EXPECT_EQ(read_image(scratch / "out.mha").as<std::int16_t>()[0], 7);
+}
+
+}  // namespace

@@ -1,0 +1,162 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/common.hpp>
+
+#include "tests/support/backends.h"
+#include "tests/support/oracle.h"
+#include "tests/support/shifted.h"
+
+namespace tetwarp {
+namespace {
+
+using namespace test;
+
+TETWARP_BACKEND_SUITE(OutsideTheLattice);
+
+/// A lattice over the box from `low` to `high`, output index.
+Geometry lattice_between(const Geometry& grid, const glm::dvec3& low, const glm::dvec3& high, std::int64_t cells) {
+  Geometry lattice = grid;
+  lattice.size = glm::i64vec3(cells + 1);
+  lattice.origin = point_from_index(grid)(low);
+  lattice.spacing = grid.spacing * (high - low) / static_cast<double>(cells);
+  return lattice;
+}
+
+/// Vertices thrown about by up to `inner` voxels, those of the border by up to `border`.
+VertexField shaken(const Geometry& grid, const Geometry& lattice, Random& random, double inner, double border) {
+  const AffineMap vertex = index_from_point(lattice) * point_from_index(grid);
+  return field_in_voxels(grid, lattice, [&](const glm::dvec3& at) {
+    const glm::dvec3 v = glm::round(vertex(at)), last(lattice.size - std::int64_t{1});
+    const bool inside = glm::all(glm::lessThan(glm::dvec3(0), v)) && glm::all(glm::lessThan(v, last));
+    const double amplitude = inside ? inner : border;
+    return amplitude * glm::dvec3(random.real(-1, 1), random.real(-1, 1), random.real(-1, 1));
+  });
+}
+
+TEST_P(OutsideTheLattice, RefuseAcceptsLatticesMadeOverTheVolume) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE(seed_text(seed));
+  Random random(seed);
+  for (int number = 0; number < 300; ++number) {
+    Geometry grid = unit_grid({random.integer(2, 40), random.integer(2, 40), random.integer(2, 40)});
+    grid.spacing = {random.real(0.1, 3), random.real(0.1, 3), random.real(0.1, 3)};
+    grid.origin = {random.real(-500, 500), random.real(-500, 500), random.real(-2000, 500)};
+    grid.direction = rotation({random.real(-1, 1), random.real(-1, 1), 1}, random.real(-3, 3));
+    const VertexField field = uniform_field(lattice_over(grid, random.integer(1, 9)), glm::vec3(0));
+    EXPECT_NO_THROW(make(grid)->set_field(view(field)));
+  }
+}
+
+TEST_P(OutsideTheLattice, RefuseThrowsWhereABorderLiesInside) {
+  const Geometry grid = oblique_grid({10, 11, 12});
+  const glm::dvec3 last(grid.size - std::int64_t{1});
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const bool upper : {false, true}) {
+      glm::dvec3 low(0), high(last);
+      (upper ? high : low)[axis] += upper ? -0.01 : 0.01;
+      const VertexField field = uniform_field(lattice_between(grid, low, high, 3), glm::vec3(0));
+      const auto resampler = make(grid);
+      EXPECT_THROW(resampler->set_field(view(field)), InputError);
+      EXPECT_NO_THROW(resampler->set_field(view(field, Outside::rest)));
+      EXPECT_NO_THROW(resampler->set_field(view(field, Outside::background)));
+    }
+  }
+}
+
+TEST_P(OutsideTheLattice, RestKeepsTheSourceRoundAFieldWhoseBorderRests) {
+  const std::uint64_t seed = test_seed();
+  for (std::uint64_t number = 0; number < 30; ++number) {
+    SCOPED_TRACE(seed_text(seed) + ", field " + std::to_string(number));
+    Random random(seed, number);
+    const Geometry grid = random.chance(0.5) ? unit_grid({14, 13, 12}) : oblique_grid({14, 13, 12});
+    const glm::dvec3 low =
+        glm::round(4.0 * glm::dvec3(random.real(-0.2, 1), random.real(0, 1), random.real(0, 1))) * 1.25;
+    const Geometry lattice = lattice_between(grid, low, low + 6.5, 4);
+    const VertexField field = shaken(grid, lattice, random, 0.3, 0);
+    const auto source = random_values<float>(grid, random, -1000, 1000);
+    const auto resampler = make(grid);
+    resampler->set_field(view(field, Outside::rest));
+    const auto found = run(*resampler, source);
+    const Oracle oracle(grid, field);
+    for_each_voxel(grid, [&](const glm::i64vec3& voxel, std::size_t n) {
+      const glm::dvec3 p(voxel);
+      const bool inside = glm::all(glm::lessThanEqual(low, p)) && glm::all(glm::lessThanEqual(p, low + 6.5));
+      ASSERT_EQ(found.owners.voxels[n], inside ? 1 : 0) << to_string(voxel);
+      ASSERT_EQ(found.owners.voxels[n], oracle.owners(voxel).count) << to_string(voxel);
+      ASSERT_EQ(found.coverage.voxels[n], 1);
+      if (inside) return;
+      ASSERT_EQ(found.output.voxels[n], source.voxels[n]) << to_string(voxel);
+      ASSERT_EQ(found.inverse_mm.voxels[n], glm::vec3(0));
+      ASSERT_EQ(found.jacobian.voxels[n], 1.0f);
+    });
+    EXPECT_EQ(found.report.conflicts, 0u);
+    EXPECT_EQ(found.report.covered, source.voxels.size());
+  }
+}
+
+TEST_P(OutsideTheLattice, RestCountsTheVoxelsThatAMovedBorderReaches) {
+  const std::uint64_t seed = test_seed();
+  for (std::uint64_t number = 0; number < 30; ++number) {
+    SCOPED_TRACE(seed_text(seed) + ", field " + std::to_string(number));
+    Random random(seed, 100 + number);
+    const Geometry grid = unit_grid({14, 13, 12});
+    const glm::dvec3 low(3.5, 3, 2.25), high(9.5, 9, 8.5);
+    const VertexField field = shaken(grid, lattice_between(grid, low, high, 3), random, 1, 2);
+    const auto source = random_values<float>(grid, random, -1000, 1000);
+    const auto resampler = make(grid);
+    resampler->set_field(view(field, Outside::rest));
+    const auto found = run(*resampler, source);
+    const Oracle oracle(grid, field);
+    std::uint64_t conflicts = 0, uncovered = 0;
+    for_each_voxel(grid, [&](const glm::i64vec3& voxel, std::size_t n) {
+      const glm::dvec3 p(voxel);
+      const bool inside = glm::all(glm::lessThanEqual(low, p)) && glm::all(glm::lessThanEqual(p, high));
+      const bool owned = oracle.owners(voxel).count > 0;
+      conflicts += owned && !inside;
+      uncovered += !owned && inside;
+      ASSERT_EQ(found.coverage.voxels[n], owned || !inside) << to_string(voxel);
+      ASSERT_EQ(std::isnan(found.inverse_mm.voxels[n].x), !owned && inside) << to_string(voxel);
+      if (owned) return;
+      ASSERT_EQ(found.output.voxels[n], inside ? -7 : source.voxels[n]) << to_string(voxel);
+    });
+    EXPECT_EQ(found.report.conflicts, conflicts);
+    EXPECT_EQ(found.report.uncovered, uncovered);
+    EXPECT_GT(conflicts, 0u);
+  }
+}
+
+TEST_P(OutsideTheLattice, AFieldThatCarriesEverythingAwayLeavesTheBackground) {
+  const Geometry grid = unit_grid({9, 8, 7});
+  Random random(2);
+  const auto source = random_values<std::int16_t>(grid, random, 0, 100);
+  const auto resampler = make(grid);
+  for (const glm::vec3& mm : {glm::vec3(30, 0, 0), glm::vec3(0, -9, 0), glm::vec3(1000, 2000, -100000)}) {
+    const VertexField field = uniform_field(lattice_over(grid, 2), mm);
+    resampler->set_field(view(field));
+    const auto found = run(*resampler, source);
+    EXPECT_TRUE(same_bits(std::vector<std::int16_t>(source.voxels.size(), -7), found.output.voxels));
+    EXPECT_EQ(found.report.uncovered, source.voxels.size());
+    EXPECT_TRUE(is_empty(resampler->source_region(grid, whole(grid))));
+  }
+}
+
+TEST_P(OutsideTheLattice, AStretchedFieldReachesFarBeyondTheOutputAndFillsIt) {
+  const Geometry grid = unit_grid({16, 15, 14});
+  Random random(3);
+  const auto source = random_values<float>(grid, random, 0, 1);
+  const glm::dvec3 middle(7, 7, 6);
+  const VertexField field =
+      field_in_voxels(grid, lattice_over(grid, 1), [&](const glm::dvec3& x) { return 63.0 * (x - middle); });
+  const auto resampler = make(grid);
+  resampler->set_field(view(field));
+  const auto found = run(*resampler, source);
+  EXPECT_EQ(found.report.covered, source.voxels.size());
+  for_each_voxel(grid, [&](const glm::i64vec3& voxel, std::size_t n) {
+    const auto expected = reference_sample(source, middle + (glm::dvec3(voxel) - middle) / 64.0, Interpolation::linear);
+    ASSERT_NEAR(found.output.voxels[n], expected.value, 1e-5) << to_string(voxel);
+  });
+}
+
+}  // namespace
+}  // namespace tetwarp

@@ -1,0 +1,199 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/matrix.hpp>
+
+#include "tests/support/backends.h"
+#include "tests/support/fields.h"
+#include "tests/support/oracle.h"
+#include "tests/support/reference_sample.h"
+#include "tests/support/run.h"
+
+namespace tetwarp {
+namespace {
+
+using namespace test;
+
+TETWARP_BACKEND_SUITE(Ownership);
+
+/// A source whose linear interpolation is smooth: rounding of coordinates shows as a small error.
+Volume<float> smooth_source(const Geometry& geometry) {
+  Volume<float> source{geometry, {}};
+  for_each_voxel(geometry, [&](const glm::i64vec3& voxel, std::size_t) {
+    const glm::dvec3 x(voxel);
+    source.voxels.push_back(static_cast<float>(100 * std::sin(x.x) + 30 * x.y - 20 * x.z));
+  });
+  return source;
+}
+
+/// How far u, in voxels, may be from the exact one: float arithmetic with the owner's edges.
+double u_tolerance(const Undeformed& exact) { return 1e-7 * (exact.reach * exact.condition + 16); }
+
+double distance(const glm::dvec3& u, const glm::dvec3& v) {
+  const glm::dvec3 d = glm::abs(u - v);
+  return std::max({d.x, d.y, d.z});
+}
+
+/// Owners, inverse, Jacobian, coverage and value of every voxel against the oracle.
+void expect_like_oracle(const Outcome<float>& found, const Volume<float>& source, const Oracle& oracle) {
+  const Geometry& grid = found.output.geometry;
+  const glm::dmat3 index_from_mm = index_from_point(grid).linear;
+  std::uint64_t covered = 0;
+  int failures = 0;
+  for_each_voxel(grid, [&](const glm::i64vec3& voxel, std::size_t n) {
+    if (failures > 3) return;
+    SCOPED_TRACE("voxel " + to_string(voxel));
+    const Owners& owners = oracle.owners(voxel);
+    EXPECT_EQ(found.owners.voxels[n], owners.count);
+    covered += found.coverage.voxels[n];
+    if (owners.count == 0) {
+      EXPECT_TRUE(std::isnan(found.inverse_mm.voxels[n].x) && std::isnan(found.jacobian.voxels[n]));
+      EXPECT_EQ(found.coverage.voxels[n], 0);
+      EXPECT_EQ(found.output.voxels[n], -7);
+    } else if (found.owners.voxels[n] > 0) {
+      const Undeformed exact = oracle.undeformed(voxel);
+      const glm::dvec3 u = index_from_mm * glm::dvec3(found.inverse_mm.voxels[n]);
+      const double tolerance = u_tolerance(exact);
+      EXPECT_LE(std::min(distance(u, exact.u), distance(u, exact.alternative)), tolerance)
+          << "u " << u.x << " " << u.y << " " << u.z << ", exact " << exact.u.x << " " << exact.u.y << " " << exact.u.z
+          << ", condition " << exact.condition;
+      EXPECT_NEAR(found.jacobian.voxels[n], exact.jacobian, 1e-6 * std::abs(exact.jacobian));
+      const ReferenceSample sample = reference_sample(source, glm::dvec3(voxel) + u, Interpolation::linear);
+      if (sample.jump > 1e-3) {
+        EXPECT_EQ(found.coverage.voxels[n], sample.inside);
+        EXPECT_NEAR(found.output.voxels[n], sample.inside ? sample.value : -7, 1e-2);
+      }
+    }
+    failures += testing::Test::HasFailure();
+  });
+  EXPECT_EQ(found.report.covered, covered);
+  EXPECT_EQ(found.report.covered + found.report.uncovered, found.output.voxels.size());
+  EXPECT_EQ(found.report.inverted, oracle.inverted);
+  EXPECT_EQ(found.report.degenerate, oracle.degenerate);
+  EXPECT_EQ(found.report.multiply_owned, oracle.multiply_owned);
+  EXPECT_NEAR(found.report.jacobian_min, oracle.jacobian_min, 1e-12 * std::abs(oracle.jacobian_min));
+  EXPECT_NEAR(found.report.jacobian_max, oracle.jacobian_max, 1e-12 * std::abs(oracle.jacobian_max));
+}
+
+/// Without the oracle: one owner inside the image of the lattice's box, none outside, at most one on its border.
+void expect_one_owner_inside(const Outcome<float>& found, const FieldCase& test) {
+  const AffineMap index = index_from_point(test.output) * point_from_index(test.field.lattice);
+  const glm::dvec3 last = glm::round(index(glm::dvec3(test.field.lattice.size - std::int64_t{1})));
+  const glm::dmat3 inverse = glm::inverse(test.image.linear);
+  const bool kept = test.image.linear == glm::dmat3(1) && test.image.offset == glm::dvec3(0);
+  for_each_voxel(test.output, [&](const glm::i64vec3& voxel, std::size_t n) {
+    const glm::dvec3 x = inverse * (glm::dvec3(voxel) - test.image.offset);
+    const double depth = std::min({x.x, x.y, x.z, last.x - x.x, last.y - x.y, last.z - x.z});
+    if (depth > 1e-9 || (kept && depth > -1e-9)) {
+      ASSERT_EQ(found.owners.voxels[n], 1) << to_string(voxel);
+    } else if (depth < -1e-9) {
+      ASSERT_EQ(found.owners.voxels[n], 0) << to_string(voxel);
+    } else {
+      ASSERT_LE(found.owners.voxels[n], 1) << to_string(voxel);
+    }
+  });
+}
+
+TEST_P(Ownership, EveryVoxelOfAnInjectiveFieldHasOneOwnerInsideAndNoneOutside) {
+  const std::uint64_t seed = test_seed();
+  for (std::uint64_t number = 0; number < 2000 && !HasFailure(); ++number) {
+    Random random(seed, number);
+    const FieldCase test = random_injective_case(random);
+    SCOPED_TRACE(seed_text(seed) + ", field " + std::to_string(number) + ": " + test.description);
+    const Volume<float> source = smooth_source(test.output);
+    const auto resampler = make(test.output);
+    resampler->set_field(view(test.field));
+    const Outcome<float> found = run(*resampler, source);
+    expect_one_owner_inside(found, test);
+    expect_like_oracle(found, source, Oracle(test.output, test.field));
+    EXPECT_EQ(found.report.multiply_owned, 0u);
+    EXPECT_EQ(found.report.degenerate, 0u);
+  }
+}
+
+TEST_P(Ownership, FoldsGoToTheLowestNumberAndFlatTetrahedraOwnNothing) {
+  const std::uint64_t seed = test_seed();
+  std::uint64_t folds = 0, degenerate = 0;
+  for (std::uint64_t number = 0; number < 1000 && !HasFailure(); ++number) {
+    Random random(seed, 1'000'000 + number);
+    const FieldCase test = random_folding_case(random);
+    SCOPED_TRACE(seed_text(seed) + ", field " + std::to_string(number) + ": " + test.description);
+    const Volume<float> source = smooth_source(test.output);
+    const auto resampler = make(test.output);
+    resampler->set_field(view(test.field));
+    const Oracle oracle(test.output, test.field);
+    expect_like_oracle(run(*resampler, source), source, oracle);
+    folds += oracle.multiply_owned;
+    degenerate += oracle.degenerate;
+  }
+  EXPECT_GT(folds, 1000u);
+  EXPECT_GT(degenerate, 1000u);
+}
+
+TEST_P(Ownership, TinyTetrahedraAreInterpolatedWhereTheirWeightsAreWithinTheSlack) {
+  // Everything is pressed into some 2^-12 voxels round one voxel, so that the nudge is as long as a tetrahedron.
+  const std::uint64_t seed = test_seed();
+  const Geometry output = unit_grid({3, 3, 3});
+  const Volume<float> source = smooth_source(output);
+  const auto resampler = make(output);
+  std::uint64_t owned = 0;
+  for (std::uint64_t number = 0; number < 3000 && !HasFailure(); ++number) {
+    Random random(seed, 4'000'000 + number);
+    SCOPED_TRACE(seed_text(seed) + ", field " + std::to_string(number));
+    const double size = random.real(2, 300), jitter = random.real(0, 0.4);
+    const VertexField field = field_in_voxels(output, lattice_over(output, 1), [&](const glm::dvec3& x) {
+      const glm::dvec3 shaken(random.real(-jitter, jitter), random.real(-jitter, jitter), random.real(-jitter, jitter));
+      return glm::dvec3(1) + size / 4096 * (x - 1.0 + shaken) - x;
+    });
+    resampler->set_field(view(field));
+    const Oracle oracle(output, field);
+    expect_like_oracle(run(*resampler, source), source, oracle);
+    owned += oracle.owners({1, 1, 1}).count;
+  }
+  EXPECT_GT(owned, 1500u);
+}
+
+TEST_P(Ownership, LatticesOffTheGridHaveTheOraclesOwners) {
+  const std::uint64_t seed = test_seed();
+  for (std::uint64_t number = 0; number < 200 && !HasFailure(); ++number) {
+    Random random(seed, 2'000'000 + number);
+    SCOPED_TRACE(seed_text(seed) + ", field " + std::to_string(number));
+    const Geometry output = random.chance(0.5) ? oblique_grid({9, 8, 7}) : unit_grid({9, 8, 7});
+    Geometry lattice;
+    lattice.size = {random.integer(2, 6), random.integer(2, 6), random.integer(2, 6)};
+    lattice.spacing = {random.real(0.4, 4), random.real(0.4, 4), random.real(0.4, 4)};
+    lattice.direction = rotation({random.real(-1, 1), random.real(-1, 1), 1}, random.real(-3, 3));
+    if (random.chance(0.3)) lattice.direction[0] *= -1.0;
+    lattice.origin = centre(output) -
+                     lattice.direction * (lattice.spacing * 0.5 * glm::dvec3(lattice.size - std::int64_t{1})) +
+                     glm::dvec3(random.real(-1, 1), random.real(-1, 1), random.real(-1, 1));
+    const double amplitude = random.real(0, 1);
+    const VertexField field = field_in_voxels(output, lattice, [&](const glm::dvec3&) {
+      return amplitude * glm::dvec3(random.real(-1, 1), random.real(-1, 1), random.real(-1, 1));
+    });
+    const Volume<float> source = smooth_source(output);
+    const auto resampler = make(output);
+    resampler->set_field(view(field, Outside::background));
+    expect_like_oracle(run(*resampler, source), source, Oracle(output, field));
+  }
+}
+
+TEST_P(Ownership, OneResamplerTakesFieldAfterField) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE(seed_text(seed));
+  const Geometry output = unit_grid({9, 8, 10});
+  const Volume<float> source = smooth_source(output);
+  const auto resampler = make(output);
+  Random random(seed, 3'000'000);
+  for (const std::int64_t cell : {1, 4, 2, 9, 3}) {
+    const VertexField field = field_in_voxels(output, lattice_over(output, cell), [&](const glm::dvec3&) {
+      return glm::dvec3(random.real(-1, 1), random.real(-1, 1), random.real(-1, 1));
+    });
+    resampler->set_field(view(field));
+    expect_like_oracle(run(*resampler, source), source, Oracle(output, field));
+  }
+}
+
+}  // namespace
+}  // namespace tetwarp

@@ -1,0 +1,193 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/common.hpp>
+
+#include "tests/support/backends.h"
+#include "tests/support/shifted.h"
+
+namespace tetwarp {
+namespace {
+
+using namespace test;
+
+class Pull : public BackendTest {
+ protected:
+  void SetUp() override {
+    BackendTest::SetUp();
+    if (!IsSkipped() && !GetParam().make_pull) GTEST_SKIP() << GetParam().name << " has no pull fields";
+  }
+  std::unique_ptr<Resampler> make_pull(const Geometry& output, int threads = 0) const {
+    return GetParam().make_pull(output, Limits{.threads = threads});
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Backends, Pull, testing::ValuesIn(backends()), backend_name);
+
+PullField uniform_pull(const Geometry& grid, const glm::dvec3& mm) {
+  return {grid, std::vector<glm::vec3>(static_cast<std::size_t>(voxel_count(grid)), glm::vec3(mm))};
+}
+
+TEST_P(Pull, WholeShiftsCopyExactly) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE(seed_text(seed));
+  Random random(seed);
+  for (const Geometry& grid : {unit_grid({14, 11, 9}), oblique_grid({12, 13, 10})}) {
+    const auto resampler = make_pull(grid);
+    for (const glm::i64vec3& shift : {glm::i64vec3(0), glm::i64vec3(3, 0, -2), glm::i64vec3(-5, 4, 1)}) {
+      const PullField field = uniform_pull(grid, point_from_index(grid).linear * glm::dvec3(shift));
+      resampler->set_field(view(field));
+      for (int type = 0; type < 8; ++type) {
+        dispatch(static_cast<VoxelType>(type), [&](auto voxel) {
+          using V = decltype(voxel);
+          const auto source = random_values<V>(grid, random, 0, 120);
+          const auto found = run(*resampler, source, {.background = 3, .pull = true});
+          std::uint64_t covered = 0;
+          for_each_voxel(grid, [&](const glm::i64vec3& v, std::size_t n) {
+            const bool inside = is_voxel(grid, v + shift);
+            ASSERT_EQ(found.output.voxels[n], inside ? source.voxels[offset_of(grid, v + shift)] : V(3));
+            ASSERT_EQ(found.coverage.voxels[n], inside);
+            covered += inside;
+          });
+          EXPECT_EQ(found.report.covered, covered);
+          EXPECT_EQ(found.report.uncovered, source.voxels.size() - covered);
+        });
+      }
+    }
+  }
+}
+
+/// Displacement of a pull field at a place of its grid, mm: eight products of weights, in double.
+glm::dvec3 trilinear(const PullField& field, const glm::dvec3& index) {
+  glm::dvec3 sum(0);
+  const glm::dvec3 base = glm::min(glm::floor(index), glm::dvec3(field.grid.size - std::int64_t{2}));
+  for (int corner = 0; corner < 8; ++corner) {
+    const glm::dvec3 step(corner & 1, corner >> 1 & 1, corner >> 2);
+    const glm::dvec3 t = glm::abs(1.0 - step - (index - base));
+    sum += t.x * t.y * t.z * glm::dvec3(field.displacement[offset_of(field.grid, glm::i64vec3(base + step))]);
+  }
+  return sum;
+}
+
+struct PullCase {
+  Geometry output = oblique_grid({13, 12, 11});
+  PullField field;
+  Volume<float> source;
+
+  /// A coarse, turned grid of samples whose box, widened by `margin` mm, holds the output's.
+  explicit PullCase(Random& random, double half_mm) {
+    field.grid.size = {6, 7, 5};
+    field.grid.direction = rotation({0.2, -1, 0.4}, 0.7);
+    field.grid.spacing = 2 * half_mm / glm::dvec3(field.grid.size - std::int64_t{1});
+    field.grid.origin = centre(output) - field.grid.direction * glm::dvec3(half_mm);
+    for (std::int64_t n = 0; n < voxel_count(field.grid); ++n) {
+      field.displacement.emplace_back(random.real(-2, 2), random.real(-2, 2), random.real(-2, 2));
+    }
+    source = random_values<float>(output, random, 0, 1);
+  }
+};
+
+TEST_P(Pull, DisplacementIsTrilinearBetweenSamples) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE(seed_text(seed));
+  Random random(seed);
+  const PullCase test(random, 15);
+  const auto resampler = make_pull(test.output);
+  resampler->set_field(view(test.field));
+  const AffineMap sample = index_from_point(test.field.grid) * point_from_index(test.output);
+  const glm::dmat3 voxels = index_from_point(test.output).linear;
+  for (const Interpolation interpolation : kInterpolations) {
+    const auto found = run(*resampler, test.source, {.interpolation = interpolation, .pull = true});
+    for_each_voxel(test.output, [&](const glm::i64vec3& voxel, std::size_t n) {
+      const glm::dvec3 mm = trilinear(test.field, sample(glm::dvec3(voxel)));
+      ASSERT_LE(glm::length(glm::dvec3(found.inverse_mm.voxels[n]) - mm), 4e-4) << to_string(voxel);
+      const auto expected = reference_sample(test.source, glm::dvec3(voxel) + voxels * mm, interpolation);
+      if (expected.jump < 1e-3) return;
+      ASSERT_EQ(found.coverage.voxels[n], expected.inside);
+      ASSERT_NEAR(found.output.voxels[n], expected.inside ? expected.value : -7, 2e-3) << to_string(voxel);
+    });
+  }
+}
+
+TEST_P(Pull, OutsideItsGridVoxelsRestOrGetTheBackgroundOrAreRefused) {
+  Random random(8);
+  const PullCase test(random, 4);
+  const auto resampler = make_pull(test.output);
+  EXPECT_THROW(resampler->set_field(view(test.field)), InputError);
+  const AffineMap sample = index_from_point(test.field.grid) * point_from_index(test.output);
+  const glm::dvec3 last(test.field.grid.size - std::int64_t{1});
+  for (const Outside outside : {Outside::rest, Outside::background}) {
+    resampler->set_field(view(test.field, outside));
+    const auto found = run(*resampler, test.source, {.pull = true});
+    int outsiders = 0;
+    for_each_voxel(test.output, [&](const glm::i64vec3& voxel, std::size_t n) {
+      const glm::dvec3 at = sample(glm::dvec3(voxel)), room = glm::min(at, last - at);
+      if (std::min({room.x, room.y, room.z}) > -1e-3) return;
+      ++outsiders;
+      const bool rest = outside == Outside::rest;
+      ASSERT_EQ(found.coverage.voxels[n], rest);
+      ASSERT_EQ(found.output.voxels[n], rest ? test.source.voxels[n] : -7);
+      ASSERT_EQ(found.inverse_mm.voxels[n] == glm::vec3(0), rest);
+      ASSERT_EQ(std::isnan(found.inverse_mm.voxels[n].x), !rest);
+    });
+    EXPECT_GT(outsiders, 100);
+    EXPECT_LT(outsiders, 1600);
+  }
+}
+
+TEST_P(Pull, ThreadsAndRegionsChangeNothing) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE(seed_text(seed));
+  Random random(seed);
+  PullCase test(random, 30);
+  test.output.size = {41, 35, 39};
+  test.source = random_values<float>(test.output, random, 0, 1);
+  const auto one = make_pull(test.output, 1), two = make_pull(test.output, 2);
+  one->set_field(view(test.field, Outside::rest));
+  two->set_field(view(test.field, Outside::rest));
+  const auto expected = run(*one, test.source, {.pull = true});
+  const auto found = run(*two, test.source, {.pull = true});
+  expect_same_outcome(expected, found);
+  expect_same_report(expected.report, found.report);
+  const Region part{{3, 30, 7}, {40, 35, 38}}, needed = two->source_region(test.output, part);
+  std::vector<float> source, output(static_cast<std::size_t>(voxel_count(part)));
+  const auto for_each_in = [](const Region& region, auto&& visit) {
+    for (std::int64_t k = region.begin.z; k < region.end.z; ++k) {
+      for (std::int64_t j = region.begin.y; j < region.end.y; ++j) {
+        for (std::int64_t i = region.begin.x; i < region.end.x; ++i) visit(glm::i64vec3(i, j, k));
+      }
+    }
+  };
+  for_each_in(needed, [&](const glm::i64vec3& v) { source.push_back(test.source.voxels[offset_of(test.output, v)]); });
+  const Target target{
+      .source = {&test.output, needed, VoxelType::f32, 1, reinterpret_cast<const std::byte*>(source.data())},
+      .output = {&test.output, part, VoxelType::f32, 1, reinterpret_cast<std::byte*>(output.data())},
+      .background = -7};
+  two->resample(part, {&target, 1});
+  std::size_t n = 0;
+  for_each_in(part, [&](const glm::i64vec3& v) {
+    ASSERT_EQ(output[n++], expected.output.voxels[offset_of(test.output, v)]) << to_string(v);
+  });
+}
+
+TEST_P(Pull, DirectionsAreNeverMistaken) {
+  const Geometry grid = unit_grid({5, 5, 5});
+  const VertexField forward = uniform_field(lattice_over(grid, 1), glm::vec3(0));
+  const PullField pull = uniform_pull(grid, glm::dvec3(0));
+  EXPECT_THROW(make_pull(grid)->set_field(view(forward)), InputError);
+  EXPECT_THROW(make(grid)->set_field(view(pull)), InputError);
+}
+
+TEST_P(Pull, FieldsThatAreNotFiniteAreRefused) {
+  const Geometry grid = unit_grid({5, 5, 5});
+  for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), 1e30f}) {
+    PullField pull = uniform_pull(grid, glm::dvec3(0));
+    pull.displacement[77].y = bad;
+    EXPECT_THROW(make_pull(grid)->set_field(view(pull)), InputError);
+  }
+  PullField few = uniform_pull(grid, glm::dvec3(0));
+  few.displacement.pop_back();
+  EXPECT_THROW(view(few), InputError);
+}
+
+}  // namespace
+}  // namespace tetwarp

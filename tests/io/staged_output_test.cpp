@@ -1,0 +1,251 @@
+#include "io/staged_output.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "deform/errors.h"
+#include "tests/support/scratch.h"
+#include "tests/support/write_file.h"
+
+namespace fs = std::filesystem;
+using tetwarp::Error;
+using tetwarp::StagedOutput;
+using Kind = tetwarp::StagedOutput::Kind;
+
+namespace {
+
+std::string content(const fs::path& path) {
+  std::ostringstream text;
+  text << std::ifstream(path).rdbuf();
+  return text.str();
+}
+
+bool is_ours(const fs::path& path) { return content(path).starts_with("ours"); }
+
+std::size_t entries(const fs::path& folder) {
+  return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
+}
+
+/// The text of the error, which must be thrown.
+template <class F>
+std::string error_of(F&& f) {
+  try {
+    f();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  ADD_FAILURE() << "no error was thrown";
+  return {};
+}
+
+std::string refusal(const fs::path& target, Kind kind, bool overwrite = false) {
+  return error_of([&] { StagedOutput(target, kind, overwrite, is_ours); });
+}
+
+void make_folder(const fs::path& folder, const std::string& name, const std::string& text) {
+  fs::create_directories(folder);
+  write_file(folder / name, text);
+}
+
+TEST(StagedFile, AppearsOnlyWhenCommitted) {
+  const Scratch scratch;
+  StagedOutput output(scratch / "out.nii.gz", Kind::file, false);
+  write_file(output.path(), "new");
+  EXPECT_FALSE(fs::exists(scratch / "out.nii.gz"));
+  output.commit();
+  EXPECT_EQ(content(scratch / "out.nii.gz"), "new");
+  EXPECT_EQ(entries(scratch.path()), 1U);
+}
+
+TEST(StagedFile, IsWrittenUnderAHiddenNameOfTheSameSuffix) {
+  const Scratch scratch;
+  const StagedOutput output(scratch / "out.nii.gz", Kind::file, false);
+  const std::string name = output.path().filename().string();
+  EXPECT_EQ(output.path().parent_path(), scratch.path());
+  EXPECT_TRUE(name.starts_with(".tetwarp-partial-" + std::to_string(::getpid()))) << name;
+  EXPECT_TRUE(name.ends_with("out.nii.gz")) << name;
+}
+
+TEST(StagedFile, LeavesNothingWhenNotCommitted) {
+  const Scratch scratch;
+  {
+    const StagedOutput output(scratch / "out.nii", Kind::file, false);
+    write_file(output.path(), "half");
+    EXPECT_EQ(entries(scratch.path()), 1U);
+  }
+  EXPECT_EQ(entries(scratch.path()), 0U);
+}
+
+TEST(StagedFile, RefusesAnExistingTargetWithoutOverwrite) {
+  const Scratch scratch;
+  write_file(scratch / "out.nii.gz", "old");
+  EXPECT_EQ(refusal(scratch / "out.nii.gz", Kind::file),
+            (scratch / "out.nii.gz").string() + " exists; choose another name or add --overwrite");
+  EXPECT_EQ(content(scratch / "out.nii.gz"), "old");
+  EXPECT_EQ(entries(scratch.path()), 1U);
+}
+
+TEST(StagedFile, ReplacesAnExistingTargetWithOverwriteOnlyAtCommit) {
+  const Scratch scratch;
+  write_file(scratch / "out.nii", "old");
+  StagedOutput output(scratch / "out.nii", Kind::file, true);
+  write_file(output.path(), "new");
+  EXPECT_EQ(content(scratch / "out.nii"), "old");
+  output.commit();
+  EXPECT_EQ(content(scratch / "out.nii"), "new");
+}
+
+TEST(StagedFile, DoesNotReplaceATargetThatAppearedMeanwhile) {
+  const Scratch scratch;
+  StagedOutput output(scratch / "out.nii", Kind::file, false);
+  write_file(output.path(), "new");
+  write_file(scratch / "out.nii", "of someone else");
+  EXPECT_THROW(output.commit(), Error);
+  EXPECT_EQ(content(scratch / "out.nii"), "of someone else");
+}
+
+TEST(StagedFile, RefusesAFolderAndADevice) {
+  const Scratch scratch;
+  fs::create_directory(scratch / "out.nii");
+  EXPECT_NE(refusal(scratch / "out.nii", Kind::file, true).find("is a folder"), std::string::npos);
+  EXPECT_NE(refusal("/dev/null", Kind::file, true).find("is no regular file"), std::string::npos);
+}
+
+TEST(StagedFile, WritesThroughASymbolicLink) {
+  const Scratch scratch;
+  fs::create_directory(scratch / "disk");
+  write_file(scratch / "disk" / "real.nii", "old");
+  fs::create_symlink(scratch / "disk" / "real.nii", scratch / "out.nii");
+  EXPECT_THROW(StagedOutput(scratch / "out.nii", Kind::file, false), Error);
+  StagedOutput output(scratch / "out.nii", Kind::file, true);
+  write_file(output.path(), "new");
+  output.commit();
+  EXPECT_TRUE(fs::is_symlink(scratch / "out.nii"));
+  EXPECT_EQ(content(scratch / "disk" / "real.nii"), "new");
+}
+
+TEST(StagedFile, RefusesALinkThatGoesInCircles) {
+  const Scratch scratch;
+  fs::create_symlink(scratch / "b.nii", scratch / "a.nii");
+  fs::create_symlink(scratch / "a.nii", scratch / "b.nii");
+  EXPECT_NE(refusal(scratch / "a.nii", Kind::file, true).find("cannot follow the link"), std::string::npos);
+}
+
+TEST(StagedFile, TwoOfTheSameNameDoNotShareTheirWork) {
+  const Scratch scratch;
+  const StagedOutput first(scratch / "out.nii", Kind::file, false), second(scratch / "out.nii", Kind::file, false);
+  EXPECT_NE(first.path(), second.path());
+}
+
+TEST(StagedOutputPlace, MustHaveAParentFolder) {
+  const Scratch scratch;
+  write_file(scratch / "file", "x");
+  EXPECT_NE(refusal(scratch / "missing" / "out.nii", Kind::file).find("does not exist"), std::string::npos);
+  EXPECT_NE(refusal(scratch / "file" / "out", Kind::folder).find("is not a folder"), std::string::npos);
+}
+
+TEST(StagedOutputPlace, MustHaveAName) {
+  EXPECT_NE(refusal("", Kind::folder).find("names no file or folder"), std::string::npos);
+  EXPECT_NE(refusal("..", Kind::folder).find("names no file or folder"), std::string::npos);
+  EXPECT_NE(refusal("/", Kind::folder).find("names no file or folder"), std::string::npos);
+}
+
+TEST(StagedOutputPlace, MustBeWritableAndIsKnownBeforeTheWork) {
+  const Scratch scratch;
+  fs::create_directory(scratch / "locked");
+  fs::permissions(scratch / "locked", fs::perms::owner_read | fs::perms::owner_exec | fs::perms::others_exec);
+  const auto as_a_user = [&] {  // root may write everywhere
+    if (::geteuid() == 0 && ::setuid(65534) != 0) std::_Exit(2);
+    const std::string message = refusal(scratch / "locked" / "out.nii", Kind::file);
+    std::_Exit(message.find("Permission denied") == std::string::npos ? 1 : 0);
+  };
+  EXPECT_EXIT(as_a_user(), testing::ExitedWithCode(0), "");
+  fs::permissions(scratch / "locked", fs::perms::owner_all);
+}
+
+TEST(StagedFolder, AppearsOnlyWhenCommitted) {
+  const Scratch scratch;
+  StagedOutput output((scratch / "series").string() + "/", Kind::folder, false);
+  EXPECT_EQ(output.target(), scratch / "series");
+  write_file(output.path() / "IM00001.dcm", "ours");
+  EXPECT_FALSE(fs::exists(scratch / "series"));
+  output.commit();
+  EXPECT_EQ(content(scratch / "series" / "IM00001.dcm"), "ours");
+  EXPECT_EQ(entries(scratch.path()), 1U);
+}
+
+TEST(StagedFolder, LeavesNothingWhenNotCommitted) {
+  const Scratch scratch;
+  {
+    const StagedOutput output(scratch / "series", Kind::folder, false);
+    write_file(output.path() / "IM00001.dcm", "half");
+  }
+  EXPECT_EQ(entries(scratch.path()), 0U);
+}
+
+TEST(StagedFolder, CountsAnEmptyFolderAsAbsent) {
+  const Scratch scratch;
+  fs::create_directory(scratch / "series");
+  StagedOutput output(scratch / "series", Kind::folder, false);
+  write_file(output.path() / "a", "ours");
+  output.commit();
+  EXPECT_EQ(content(scratch / "series" / "a"), "ours");
+  EXPECT_NE(refusal(scratch / "series", Kind::folder).find("exists"), std::string::npos);
+}
+
+TEST(StagedFolder, RefusesAFile) {
+  const Scratch scratch;
+  write_file(scratch / "series", "ours");
+  EXPECT_NE(refusal(scratch / "series", Kind::folder, true).find("is a file"), std::string::npos);
+}
+
+TEST(StagedFolder, ReplacesAFolderOfOursWhole) {
+  const Scratch scratch;
+  make_folder(scratch / "series", "IM00009.dcm", "ours, old");
+  StagedOutput output(scratch / "series", Kind::folder, true, is_ours);
+  write_file(output.path() / "IM00001.dcm", "ours, new");
+  EXPECT_TRUE(fs::exists(scratch / "series" / "IM00009.dcm"));
+  output.commit();
+  EXPECT_EQ(entries(scratch / "series"), 1U);
+  EXPECT_EQ(content(scratch / "series" / "IM00001.dcm"), "ours, new");
+  EXPECT_EQ(entries(scratch.path()), 1U);
+}
+
+TEST(StagedFolder, RefusesToReplaceWhatIsNotOurs) {
+  const Scratch scratch;
+  make_folder(scratch / "series", "IM00009.dcm", "ours");
+  write_file(scratch / "series" / "notes.txt", "mine");
+  EXPECT_NE(refusal(scratch / "series", Kind::folder, true).find("notes.txt was not written by Tetwarp"),
+            std::string::npos);
+  fs::remove(scratch / "series" / "notes.txt");
+  make_folder(scratch / "series" / "deeper", "scan.dcm", "mine");
+  EXPECT_NE(refusal(scratch / "series", Kind::folder, true).find("scan.dcm was not written by Tetwarp"),
+            std::string::npos);
+  fs::remove_all(scratch / "series" / "deeper");
+  fs::create_symlink(scratch / "series" / "IM00009.dcm", scratch / "series" / "link.dcm");
+  EXPECT_NE(refusal(scratch / "series", Kind::folder, true).find("link.dcm was not written by Tetwarp"),
+            std::string::npos);
+  EXPECT_EQ(entries(scratch.path()), 1U);
+}
+
+TEST(StagedFolder, LooksAgainBeforeItReplaces) {
+  const Scratch scratch;
+  make_folder(scratch / "series", "IM00009.dcm", "ours");
+  StagedOutput output(scratch / "series", Kind::folder, true, is_ours);
+  write_file(scratch / "series" / "notes.txt", "mine");
+  EXPECT_THROW(output.commit(), Error);
+  EXPECT_EQ(content(scratch / "series" / "notes.txt"), "mine");
+}
+
+TEST(StagedFolder, DoesNotReplaceOneThatWasFilledMeanwhile) {
+  const Scratch scratch;
+  StagedOutput output(scratch / "series", Kind::folder, false);
+  make_folder(scratch / "series", "notes.txt", "mine");
+  EXPECT_THROW(output.commit(), Error);
+  EXPECT_EQ(content(scratch / "series" / "notes.txt"), "mine");
+}
+
+}  // namespace

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <memory>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "deform/resampler.h"
+
+namespace tetwarp::test {
+
+/// One way to run a Resampler. The contract tests are one source that runs over all of them.
+struct Backend {
+  using Make = std::function<std::unique_ptr<Resampler>(const Geometry& output, Limits limits)>;
+
+  std::string name;
+  std::string cannot_run;  ///< why it cannot run here; empty: it can
+  Make make;               ///< forward fields
+  Make make_pull;          ///< pull fields; null: this backend has none
+
+  friend void PrintTo(const Backend& backend, std::ostream* stream) { *stream << backend.name; }
+};
+
+/// Every backend of this build; a new one is one more line.
+const std::vector<Backend>& backends();
+
+/// A test that runs once a backend, and is skipped, with the reason, for those that cannot run here.
+class BackendTest : public testing::TestWithParam<Backend> {
+ protected:
+  void SetUp() override {
+    if (!GetParam().cannot_run.empty()) GTEST_SKIP() << GetParam().name << ": " << GetParam().cannot_run;
+  }
+  std::unique_ptr<Resampler> make(const Geometry& output, int threads = 0) const {
+    return GetParam().make(output, Limits{.threads = threads});
+  }
+};
+
+inline std::string backend_name(const testing::TestParamInfo<Backend>& info) { return info.param.name; }
+
+}  // namespace tetwarp::test
+
+/// Defines the test suite `suite`, instantiated for every backend: write its tests with TEST_P(suite, ...).
+#define TETWARP_BACKEND_SUITE(suite)                                                        \
+  class suite : public ::tetwarp::test::BackendTest {};                                     \
+  INSTANTIATE_TEST_SUITE_P(Backends, suite, testing::ValuesIn(::tetwarp::test::backends()), \
+                           ::tetwarp::test::backend_name)

@@ -1,0 +1,255 @@
+#include "tests/support/oracle.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace tetwarp::test {
+
+namespace {
+
+__extension__ typedef __int128 Int;
+
+constexpr std::int64_t kOne = 1 << 16;          // a voxel
+constexpr std::int64_t kNudge[3] = {15, 7, 4};  // d, in units of 2^-16 voxel
+
+int sign(Int x) { return x > 0 ? 1 : (x < 0 ? -1 : 0); }
+
+/// Nearest multiple of 2^-12 voxel, in units of 2^-16.
+glm::i64vec3 snapped(const glm::dvec3& index) {
+  glm::i64vec3 result;
+  for (int axis = 0; axis < 3; ++axis)
+    result[axis] = 16 * static_cast<std::int64_t>(std::nearbyint(index[axis] * 4096));
+  return result;
+}
+
+/// Rows are corners in homogeneous coordinates (x, y, z, 1): the transposed matrix of Eq. 6.
+struct Matrix {
+  Int entry[4][4];
+
+  explicit Matrix(const glm::i64vec3 (&corner)[4]) {
+    for (int row = 0; row < 4; ++row) {
+      for (int axis = 0; axis < 3; ++axis) entry[row][axis] = corner[row][axis];
+      entry[row][3] = 1;
+    }
+  }
+
+  Int cofactor(int row, int column) const {
+    int r[3], c[3];
+    for (int i = 0, n = 0, m = 0; i < 4; ++i) {
+      if (i != row) r[n++] = i;
+      if (i != column) c[m++] = i;
+    }
+    const auto at = [&](int i, int j) { return entry[r[i]][c[j]]; };
+    const Int minor = at(0, 0) * (at(1, 1) * at(2, 2) - at(1, 2) * at(2, 1)) -
+                      at(0, 1) * (at(1, 0) * at(2, 2) - at(1, 2) * at(2, 0)) +
+                      at(0, 2) * (at(1, 0) * at(2, 1) - at(1, 1) * at(2, 0));
+    return (row + column) % 2 == 0 ? minor : -minor;
+  }
+};
+
+/// Cramer's rule for every right-hand side: weight i of a point is (cofactor[i] . (point, 1)) / determinant.
+struct Cramer {
+  Int cofactor[4][4];
+  Int determinant = 0;
+
+  explicit Cramer(const glm::i64vec3 (&corner)[4]) {
+    const Matrix matrix(corner);
+    for (int row = 0; row < 4; ++row) {
+      for (int column = 0; column < 4; ++column) cofactor[row][column] = matrix.cofactor(row, column);
+    }
+    for (int column = 0; column < 4; ++column) determinant += cofactor[0][column] * matrix.entry[0][column];
+  }
+
+  Int numerator(int i, const glm::i64vec3& point) const {
+    return cofactor[i][0] * point.x + cofactor[i][1] * point.y + cofactor[i][2] * point.z + cofactor[i][3];
+  }
+
+  /// Sign of the numerator at point + (sx e, sy e^2, sz e^3).
+  int sign_beside(int i, const glm::i64vec3& point, const glm::i64vec3& signs) const {
+    const int at_point = sign(numerator(i, point));
+    if (at_point != 0) return at_point;
+    for (int power = 0; power < 3; ++power) {
+      if (cofactor[i][power] != 0) return sign(cofactor[i][power] * signs[power]);
+    }
+    return 0;
+  }
+
+  bool contains_beside(const glm::i64vec3& point, const glm::i64vec3& signs) const {
+    for (int i = 0; i < 4; ++i) {
+      if (sign_beside(i, point, signs) != sign(determinant)) return false;
+    }
+    return determinant != 0;
+  }
+};
+
+glm::i64vec3 nudged(const glm::i64vec3& voxel, const glm::i64vec3& signs) {
+  return voxel * kOne + glm::i64vec3(kNudge[0], kNudge[1], kNudge[2]) * signs;
+}
+
+std::int64_t floor_div(std::int64_t a, std::int64_t b) { return a / b - (a % b < 0 ? 1 : 0); }
+
+/// Sum of the absolute values of the six products of a determinant.
+long double permanent(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
+  return a.x * (b.y * c.z + b.z * c.y) + a.y * (b.x * c.z + b.z * c.x) + a.z * (b.x * c.y + b.y * c.x);
+}
+
+/// The largest, over the choices of the reference corner, of what a relative rounding error of the products in Cramer's
+/// 3x3 rule is multiplied with in the weights of a point inside.
+double condition(const glm::i64vec3 (&corner)[4], long double determinant) {
+  long double worst = 0;
+  for (int reference = 0; reference < 4; ++reference) {
+    glm::dvec3 edge[3];
+    for (int n = 0, m = 0; n < 4; ++n) {
+      if (n != reference) edge[m++] = glm::abs(glm::dvec3(corner[n] - corner[reference]));
+    }
+    const glm::dvec3 inside = edge[0] + edge[1] + edge[2];
+    worst = std::max({worst, permanent(inside, edge[1], edge[2]), permanent(edge[0], inside, edge[2]),
+                      permanent(edge[0], edge[1], inside)});
+  }
+  return static_cast<double>(worst / std::abs(determinant));
+}
+
+}  // namespace
+
+Oracle::Oracle(const Geometry& output, const VertexField& field, const Region& region)
+    : jacobian_min(std::numeric_limits<double>::infinity()),
+      jacobian_max(-std::numeric_limits<double>::infinity()),
+      region_(region),
+      owners_(static_cast<std::size_t>(voxel_count(region))) {
+  take_vertices(output, field);
+  const std::uint64_t tetrahedra = 5 * static_cast<std::uint64_t>(cells_.x * cells_.y * cells_.z);
+  for (std::uint64_t number = 0; number < tetrahedra; ++number) visit(number);
+  for (const Owners& voxel : owners_) multiply_owned += voxel.count > 1;
+}
+
+void Oracle::take_vertices(const Geometry& output, const VertexField& field) {
+  vertices_ = field.lattice.size;
+  cells_ = vertices_ - std::int64_t{1};
+  const AffineMap index = index_from_point(output) * point_from_index(field.lattice);
+  const glm::dmat3 linear = index_from_point(output).linear;
+  vertex_.reserve(field.displacement.size());
+  for (std::int64_t k = 0, n = 0; k < vertices_.z; ++k) {
+    for (std::int64_t j = 0; j < vertices_.y; ++j) {
+      for (std::int64_t i = 0; i < vertices_.x; ++i, ++n) {
+        const glm::dvec3 rest = index(glm::dvec3(i, j, k));
+        const glm::dvec3 moved = linear * glm::dvec3(field.displacement[static_cast<std::size_t>(n)]);
+        vertex_.push_back({snapped(rest), snapped(rest + moved)});
+      }
+    }
+  }
+  glm::i64vec3 low(INT64_MAX), high(INT64_MIN);
+  for (const Vertex& vertex : vertex_) {
+    low = glm::min(low, vertex.rest);
+    high = glm::max(high, vertex.rest);
+  }
+  middle_doubled_ = low + high;
+}
+
+void Oracle::corners(std::uint64_t tetrahedron, Vertex (&result)[4]) const {
+  const auto cell = static_cast<std::int64_t>(tetrahedron / 5);
+  const int number = static_cast<int>(tetrahedron % 5);
+  const glm::i64vec3 first(cell % cells_.x, cell / cells_.x % cells_.y, cell / (cells_.x * cells_.y));
+  const bool odd = (first.x + first.y + first.z) % 2 != 0;
+  // The centre's corners; the corner tetrahedra stand at the others, which are the centre's of the other parity.
+  constexpr int kCentre[2][4] = {{1, 2, 4, 7}, {0, 3, 5, 6}};
+  const int apex = kCentre[odd ? 0 : 1][number == 0 ? 0 : number - 1];
+  const int around[4] = {apex, apex ^ 1, apex ^ 2, apex ^ 4};
+  for (int n = 0; n < 4; ++n) {
+    const int corner = number == 0 ? kCentre[odd ? 1 : 0][n] : around[n];
+    const glm::i64vec3 at = first + glm::i64vec3(corner & 1, corner >> 1 & 1, corner >> 2);
+    result[n] = vertex_[static_cast<std::size_t>(at.x + vertices_.x * (at.y + vertices_.y * at.z))];
+  }
+}
+
+glm::i64vec3 Oracle::signs(const glm::i64vec3& voxel) const {
+  glm::i64vec3 result;
+  for (int axis = 0; axis < 3; ++axis) result[axis] = voxel[axis] * 2 * kOne < middle_doubled_[axis] ? 1 : -1;
+  return result;
+}
+
+std::size_t Oracle::offset(const glm::i64vec3& voxel) const {
+  const glm::i64vec3 at = voxel - region_.begin, size = region_.end - region_.begin;
+  return static_cast<std::size_t>(at.x + size.x * (at.y + size.y * at.z));
+}
+
+const Owners& Oracle::owners(const glm::i64vec3& voxel) const { return owners_.at(offset(voxel)); }
+
+void Oracle::visit(std::uint64_t tetrahedron) {
+  Vertex corner[4];
+  corners(tetrahedron, corner);
+  const glm::i64vec3 rest[4] = {corner[0].rest, corner[1].rest, corner[2].rest, corner[3].rest};
+  const glm::i64vec3 deformed[4] = {corner[0].deformed, corner[1].deformed, corner[2].deformed, corner[3].deformed};
+  const Cramer cramer(deformed);
+  const Int rest_determinant = Cramer(rest).determinant;
+  const int orientation = sign(cramer.determinant) * sign(rest_determinant);
+  inverted += orientation < 0;
+  degenerate += orientation == 0;
+  const auto jacobian =
+      static_cast<double>(static_cast<long double>(cramer.determinant) / static_cast<long double>(rest_determinant));
+  jacobian_min = std::min(jacobian_min, jacobian);
+  jacobian_max = std::max(jacobian_max, jacobian);
+
+  glm::i64vec3 low = deformed[0], high = deformed[0];
+  for (const glm::i64vec3& point : deformed) {
+    low = glm::min(low, point);
+    high = glm::max(high, point);
+  }
+  Region box;
+  for (int axis = 0; axis < 3; ++axis) {  // a voxel more all round: the nudge is shorter than that
+    box.begin[axis] = std::max(region_.begin[axis], floor_div(low[axis], kOne) - 1);
+    box.end[axis] = std::min(region_.end[axis], floor_div(high[axis], kOne) + 3);
+  }
+  const auto within = [&](const glm::i64vec3& q) {
+    return glm::all(glm::lessThanEqual(low, q)) && glm::all(glm::lessThanEqual(q, high));
+  };
+  for (std::int64_t k = box.begin.z; k < box.end.z; ++k) {
+    for (std::int64_t j = box.begin.y; j < box.end.y; ++j) {
+      for (std::int64_t i = box.begin.x; i < box.end.x; ++i) {
+        const glm::i64vec3 voxel(i, j, k), step = signs(voxel), q = nudged(voxel, step);
+        if (!within(q) || !cramer.contains_beside(q, step)) continue;
+        Owners& owners = owners_[offset(voxel)];
+        ++owners.count;
+        owners.lowest = std::min(owners.lowest, tetrahedron);
+      }
+    }
+  }
+}
+
+Undeformed Oracle::undeformed(const glm::i64vec3& voxel) const {
+  Vertex corner[4];
+  corners(owners(voxel).lowest, corner);
+  const glm::i64vec3 rest[4] = {corner[0].rest, corner[1].rest, corner[2].rest, corner[3].rest};
+  const glm::i64vec3 deformed[4] = {corner[0].deformed, corner[1].deformed, corner[2].deformed, corner[3].deformed};
+  const Cramer cramer(deformed);
+  const auto determinant = static_cast<long double>(cramer.determinant);
+  const auto u_at = [&](const glm::i64vec3& point) {
+    glm::dvec3 u;
+    for (int axis = 0; axis < 3; ++axis) {
+      Int sum = 0;
+      for (int n = 0; n < 4; ++n) sum += cramer.numerator(n, point) * (rest[n][axis] - deformed[n][axis]);
+      u[axis] = static_cast<double>(static_cast<long double>(sum) / determinant / kOne);
+    }
+    return u;
+  };
+  const glm::i64vec3 p = voxel * kOne, q = nudged(voxel, signs(voxel));
+  long double outside = 0;  // how far a weight at p is below 0
+  for (int n = 0; n < 4; ++n) {
+    outside = std::max(outside, -static_cast<long double>(cramer.numerator(n, p)) / determinant);
+  }
+  constexpr long double kSlack = 1.0L / 64;
+  Undeformed result;
+  result.u = u_at(outside > kSlack ? q : p);
+  result.alternative = std::abs(outside - kSlack) < 1e-3L ? u_at(outside > kSlack ? p : q) : result.u;
+  result.jacobian = static_cast<double>(determinant / static_cast<long double>(Cramer(rest).determinant));
+  result.condition = condition(deformed, determinant);
+  for (int n = 0; n < 3; ++n) {
+    const glm::i64vec3 difference = glm::abs((rest[n] - deformed[n]) - (rest[3] - deformed[3]));
+    for (int axis = 0; axis < 3; ++axis) {
+      result.reach = std::max(result.reach, static_cast<double>(difference[axis]) / kOne);
+    }
+  }
+  return result;
+}
+
+}  // namespace tetwarp::test

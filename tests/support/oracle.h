@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "deform/vertex_field.h"
+
+namespace tetwarp::test {
+
+/// Who owns a voxel: how many tetrahedra, and the lowest of their numbers.
+struct Owners {
+  std::uint32_t count = 0;
+  std::uint64_t lowest = UINT64_MAX;
+};
+
+/// Where a voxel comes from, through its owner of lowest number.
+struct Undeformed {
+  glm::dvec3 u{0};  ///< undeformed minus deformed, voxels of output index
+  glm::dvec3 alternative{
+      0};                ///< another u that is as right where rounding decides between the voxel and the nudged point
+  double jacobian = 0;   ///< deformed over rest volume of the owner
+  double condition = 1;  ///< how much a relative rounding error of float products may grow in the weights
+  double reach = 0;      ///< largest component of the difference of u between two corners, voxels
+};
+
+/// Brute force, in other mathematics than the backends: the paper's 4x4 system (Eq. 6) solved by Cramer's rule in
+/// 128-bit integers, for every tetrahedron and every voxel whose nudged point lies in its box.
+///
+/// Coordinates are integers in units of 2^-16 voxel of output index. The point is (q, 1), q = p + d, with the
+/// infinitesimal step carried along as a polynomial in e: each numerator is c0 + c1 e + c2 e^2 + c3 e^3, signed
+/// lexicographically. A tetrahedron owns the voxel when no numerator is zero and all have the sign of its determinant.
+class Oracle {
+ public:
+  /// @param region  voxels to find owners of; Report values are of the whole field all the same
+  Oracle(const Geometry& output, const VertexField& field, const Region& region);
+  Oracle(const Geometry& output, const VertexField& field) : Oracle(output, field, whole(output)) {}
+
+  /// @param voxel  in the region
+  const Owners& owners(const glm::i64vec3& voxel) const;
+  /// @param voxel  in the region, with an owner
+  Undeformed undeformed(const glm::i64vec3& voxel) const;
+
+  std::uint64_t inverted = 0, degenerate = 0, multiply_owned = 0;
+  double jacobian_min, jacobian_max;
+
+ private:
+  struct Vertex {
+    glm::i64vec3 rest, deformed;  ///< 2^-16 voxel
+  };
+
+  void take_vertices(const Geometry& output, const VertexField& field);
+  void visit(std::uint64_t tetrahedron);
+  void corners(std::uint64_t tetrahedron, Vertex (&result)[4]) const;
+  glm::i64vec3 signs(const glm::i64vec3& voxel) const;
+  std::size_t offset(const glm::i64vec3& voxel) const;
+
+  glm::i64vec3 vertices_{0}, cells_{0};
+  std::vector<Vertex> vertex_;
+  glm::i64vec3 middle_doubled_{0};  ///< of the undeformed lattice's box, 2^-17 voxel
+  Region region_;
+  std::vector<Owners> owners_;
+};
+
+}  // namespace tetwarp::test

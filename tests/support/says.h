@@ -1,0 +1,16 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+/// Whether a message holds all of the words; shows the message where it does not.
+inline testing::AssertionResult says(const std::string& text, const std::vector<std::string>& words) {
+  for (const std::string& word : words) {
+    if (text.find(word) == std::string::npos) {
+      return testing::AssertionFailure() << "no \"" << word << "\" in: " << text;
+    }
+  }
+  return testing::AssertionSuccess();
+}
