@@ -26,7 +26,7 @@ std::string list_series(const DicomScan& scan) {
   return list;
 }
 
-/// The series that --series names, or the only one that is a volume.
+/// The series that --series names, or the only one that holds CT slices, usable or not.
 const DicomSeries& choose_series(const DicomScan& scan, const InputOptions& options) {
   const std::string where = options.path.string();
   require(!scan.series.empty(),
@@ -44,7 +44,14 @@ const DicomSeries& choose_series(const DicomScan& scan, const InputOptions& opti
             "no series \"" + options.series + "\", " + where + "; choose one of" + list_series(scan));
     return *found;
   }
-  if (scan.series.size() == 1) return scan.series.front();
+  const DicomSeries* only = &scan.series.front();
+  std::size_t holding_slices = 0;
+  for (const DicomSeries& series : scan.series) {
+    if (series.slices.empty()) continue;  // localizers, captures, doses: nothing to choose
+    only = &series;
+    ++holding_slices;
+  }
+  if (holding_slices == 1 || scan.series.size() == 1) return *only;
   throw InputError(std::to_string(scan.series.size()) + " series found, " + where + "; choose one with --series" +
                    list_series(scan));
 }

@@ -3,8 +3,10 @@
 #include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
+#include <tbb/info.h>
 #include <tbb/task_arena.h>
 
+#include <algorithm>
 #include <mutex>
 
 #include "deform/resampler.h"
@@ -37,7 +39,8 @@ class Progress {
 
 inline tbb::task_arena make_arena(const Limits& limits) {
   require(limits.threads >= 0, "threads is " + std::to_string(limits.threads) + ", expected 0 (all) or more");
-  return tbb::task_arena(limits.threads > 0 ? limits.threads : tbb::task_arena::automatic);
+  const int most = tbb::info::default_concurrency();
+  return tbb::task_arena(limits.threads > 0 ? std::min(limits.threads, most) : most);
 }
 
 /// Runs `work(tile, scratch)` for every tile of the region, each thread with a Scratch of its own, and adds up the

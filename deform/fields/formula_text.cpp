@@ -96,7 +96,8 @@ class Parameters {
     std::array<Length, 3> lengths{};
     for (std::size_t axis = 0; axis < 3; ++axis) lengths[axis] = parse_length(key, parts[axis]);
     const glm::dvec3 by(lengths[0].value, lengths[1].value, lengths[2].value);
-    if (!lengths[2].in_voxels && (lengths[0].in_voxels || lengths[1].in_voxels)) fail(key + " mixes mm and vox");
+    const int marked = lengths[0].in_voxels + lengths[1].in_voxels + lengths[2].in_voxels;
+    if (marked != 0 && marked != 3 && !(marked == 1 && lengths[2].in_voxels)) fail(key + " mixes mm and vox");
     return lengths[2].in_voxels ? point_from_index(volume_).linear * by : by;
   }
 

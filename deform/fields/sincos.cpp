@@ -37,8 +37,12 @@ double cosine_near_zero(double r) {
 
 SinCos sin_cos(double angle) {
   const double quarter = std::nearbyint(angle * kTwoOverPi);
-  const double r = ((angle - quarter * kHalfPi1) - quarter * kHalfPi2) - quarter * kHalfPi3;
-  const double s = sine_near_zero(r), c = cosine_near_zero(r);
+  const double high = (angle - quarter * kHalfPi1) - quarter * kHalfPi2;
+  // What the second subtraction rounded away, and the third part of pi / 2, are carried beside r.
+  const double lost = ((angle - quarter * kHalfPi1) - high) - quarter * kHalfPi2 - quarter * kHalfPi3;
+  const double r = high + lost, low = (high - r) + lost;
+  const double near_sine = sine_near_zero(r), near_cosine = cosine_near_zero(r);
+  const double s = near_sine + low * near_cosine, c = near_cosine - low * near_sine;
   switch (static_cast<long long>(quarter) & 3) {
     case 0: return {s, c};
     case 1: return {c, -s};
