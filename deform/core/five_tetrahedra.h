@@ -45,14 +45,54 @@ TETWARP_HD inline Tetrahedron tetrahedron_of(const Cell& cell, int t, bool odd) 
   return {cell.corner[corners.a], cell.corner[corners.b], cell.corner[corners.c], cell.corner[corners.d]};
 }
 
-/// Six times the signed volume of (A, B, C, D) about D, exact. Int must hold it: see `fits_int64`.
+/// A point relative to a voxel or vertex nearby, 2^-12 voxel. Int is any type that holds the determinants of such
+/// points exactly: double
+/// (`fits_double`), 64 bits (`fits_int64`) or Wide.
 template <class Int>
-TETWARP_HD Int signed_volume(const glm::i32vec3& a, const glm::i32vec3& b, const glm::i32vec3& c,
-                             const glm::i32vec3& d) {
-  const Int ax = Int(a.x) - d.x, ay = Int(a.y) - d.y, az = Int(a.z) - d.z;
-  const Int bx = Int(b.x) - d.x, by = Int(b.y) - d.y, bz = Int(b.z) - d.z;
-  const Int cx = Int(c.x) - d.x, cy = Int(c.y) - d.y, cz = Int(c.z) - d.z;
+struct Relative {
+  Int x, y, z;
+
+  Relative() = default;
+  TETWARP_HD explicit Relative(const glm::i32vec3& steps)
+      : x(static_cast<Int>(steps.x)), y(static_cast<Int>(steps.y)), z(static_cast<Int>(steps.z)) {}
+};
+
+/// Six times the signed volume of (A, B, C, D) about D, exact.
+template <class Int>
+TETWARP_HD Int signed_volume(const Relative<Int>& a, const Relative<Int>& b, const Relative<Int>& c,
+                             const Relative<Int>& d) {
+  const Int ax = a.x - d.x, ay = a.y - d.y, az = a.z - d.z;
+  const Int bx = b.x - d.x, by = b.y - d.y, bz = b.z - d.z;
+  const Int cx = c.x - d.x, cy = c.y - d.y, cz = c.z - d.z;
   return ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx);
+}
+
+/// Forward Jacobian determinants of the five tetrahedra of a cell: deformed over rest volume, both exact before the
+/// division.
+template <class Int, bool kOdd>
+TETWARP_HD void cell_jacobians(const Cell& cell, double (&determinant)[kTetrahedraPerCell]) {
+  const glm::i32vec3 origin = cell.corner[0].deformed, rest_origin = origin + cell.corner[0].u;
+  Relative<Int> deformed[8], rest[8];
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vertex& vertex = cell.corner[corner];
+    deformed[corner] = Relative<Int>(vertex.deformed - origin);
+    rest[corner] = Relative<Int>(vertex.deformed + vertex.u - rest_origin);
+  }
+  for (int t = 0; t < kTetrahedraPerCell; ++t) {
+    const TetrahedronCorners of = tetrahedron_corners(t, kOdd);
+    const Int after = signed_volume(deformed[of.a], deformed[of.b], deformed[of.c], deformed[of.d]);
+    const Int before = signed_volume(rest[of.a], rest[of.b], rest[of.c], rest[of.d]);
+    determinant[t] = to_double(after) / to_double(before);
+  }
+}
+
+/// The same of one tetrahedron.
+TETWARP_HD inline double jacobian(const Tetrahedron& t) {
+  const auto volume = [](const glm::i32vec3& a, const glm::i32vec3& b, const glm::i32vec3& c, const glm::i32vec3& d) {
+    return to_double(signed_volume(Relative<Wide>(a), Relative<Wide>(b), Relative<Wide>(c), Relative<Wide>(d)));
+  };
+  return volume(t.a.deformed, t.b.deformed, t.c.deformed, t.d.deformed) /
+         volume(t.a.deformed + t.a.u, t.b.deformed + t.b.u, t.c.deformed + t.c.u, t.d.deformed + t.d.u);
 }
 
 /// Box of a tetrahedron or cell in 2^-12 voxel, closed.
@@ -98,13 +138,5 @@ TETWARP_HD inline bool fits_double(const Box& box) { return reach_of(box) <= std
 /// Whether determinants of points in the box, relative to one of its voxels and with the nudge, fit 64 bits: with
 /// coordinates below 2^18 (64 voxels) they stay below 2^62.
 TETWARP_HD inline bool fits_int64(const Box& box) { return reach_of(box) <= std::int64_t{1} << 18; }
-
-/// Forward Jacobian determinant of a tetrahedron: deformed over rest volume; both exact before the division.
-TETWARP_HD inline double jacobian(const Tetrahedron& t) {
-  const Wide deformed = signed_volume<Wide>(t.a.deformed, t.b.deformed, t.c.deformed, t.d.deformed);
-  const Wide rest =
-      signed_volume<Wide>(t.a.deformed + t.a.u, t.b.deformed + t.b.u, t.c.deformed + t.c.u, t.d.deformed + t.d.u);
-  return to_double(deformed) / to_double(rest);
-}
 
 }  // namespace tetwarp

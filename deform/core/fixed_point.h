@@ -66,4 +66,6 @@ TETWARP_HD inline double to_double(Wide value) {
   return negative ? -result : result;
 }
 
+TETWARP_HD inline double to_double(double value) { return value; }
+
 }  // namespace tetwarp

@@ -4,6 +4,15 @@
 
 namespace tetwarp {
 
+/// The nudge of one voxel: its signs, and d in units of 2^-16 voxel.
+template <class Int>
+struct VoxelNudge {
+  glm::i32vec3 signs;
+  Relative<Int> d;
+
+  TETWARP_HD explicit VoxelNudge(const glm::i32vec3& s) : signs(s), d(nudge_steps(s)) {}
+};
+
 /// Side of the face (a, b, c) on which the nudged voxel lies: +1 or -1; 0 only for a face without area.
 ///
 /// The sign of det(a - q, b - q, c - q) = (a - q) . N with N = (b - a) x (c - a), q = p + d; on an exact tie the first
@@ -11,23 +20,18 @@ namespace tetwarp {
 /// A tetrahedron (A, B, C, D) owns the voxel when its faces BCD, ADC, ABD, ACB agree (semantics section 3); inverted
 /// ones own like any other, and one without volume never does, for its four determinants sum to zero. Two tetrahedra
 /// that share a face call this with the same corners, and the order of the corners flips the sign exactly.
-///
-/// Int is any type that holds the determinants exactly: double (`fits_double`), 64 bits (`fits_int64`) or Wide.
-///
-/// @param a, b, c  corners relative to the voxel, 2^-12 voxel
 template <class Int>
-TETWARP_HD int side_of_face(const glm::i32vec3& a, const glm::i32vec3& b, const glm::i32vec3& c,
-                            const glm::i32vec3& signs) {
-  const Int ux = Int(b.x) - a.x, uy = Int(b.y) - a.y, uz = Int(b.z) - a.z;
-  const Int vx = Int(c.x) - a.x, vy = Int(c.y) - a.y, vz = Int(c.z) - a.z;
+TETWARP_HD inline int side_of_face(const Relative<Int>& a, const Relative<Int>& b, const Relative<Int>& c,
+                                   const VoxelNudge<Int>& nudge) {
+  const Int ux = b.x - a.x, uy = b.y - a.y, uz = b.z - a.z;
+  const Int vx = c.x - a.x, vy = c.y - a.y, vz = c.z - a.z;
   const Int nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx;
-  const glm::i32vec3 d = nudge_steps(signs);
-  const Int e =
-      (Int(a.x) * kNudgeSteps - d.x) * nx + (Int(a.y) * kNudgeSteps - d.y) * ny + (Int(a.z) * kNudgeSteps - d.z) * nz;
+  const Int e = (a.x * kNudgeSteps - nudge.d.x) * nx + (a.y * kNudgeSteps - nudge.d.y) * ny +
+                (a.z * kNudgeSteps - nudge.d.z) * nz;
   if (e != 0) return e > 0 ? 1 : -1;
-  if (nx != 0) return (nx > 0) == (signs.x > 0) ? -1 : 1;
-  if (ny != 0) return (ny > 0) == (signs.y > 0) ? -1 : 1;
-  if (nz != 0) return (nz > 0) == (signs.z > 0) ? -1 : 1;
+  if (nx != 0) return (nx > 0) == (nudge.signs.x > 0) ? -1 : 1;
+  if (ny != 0) return (ny > 0) == (nudge.signs.y > 0) ? -1 : 1;
+  if (nz != 0) return (nz > 0) == (nudge.signs.z > 0) ? -1 : 1;
   return 0;
 }
 

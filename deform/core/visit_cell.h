@@ -75,7 +75,7 @@ TETWARP_HD void walk_rows(const Tetrahedron& t, int number, const VoxelBox& box,
   const glm::i32vec3 first = to_steps(box.begin);
   const glm::i32vec3 a = t.a.deformed - first, b = t.b.deformed - first, c = t.c.deformed - first,
                      d = t.d.deformed - first;
-  const Int volume = signed_volume<Int>(a, b, c, d);
+  const Int volume = signed_volume(Relative<Int>(a), Relative<Int>(b), Relative<Int>(c), Relative<Int>(d));
   if (volume == 0) return;
   const int orientation = volume > 0 ? -1 : 1;  // the determinants of `side_of_face` have the other sign
   const Face<Int> faces[4] = {make_face<Int>(b, c, d, orientation), make_face<Int>(a, d, c, orientation),
@@ -104,35 +104,49 @@ TETWARP_HD void walk_rows(const Tetrahedron& t, int number, const VoxelBox& box,
   }
 }
 
-/// Walks the voxels of a small box one by one: at each, the four faces of the centre are looked at once for all five
-/// tetrahedra. A corner tetrahedron shares the face opposite its D with the centre, corners in the same cyclic order,
-/// so the side is the same number.
+/// Whether corner tetrahedron kNumber owns a voxel. Its face opposite D is the centre's too, with the corners in the
+/// same cyclic order, so `shared` holds the side already.
+template <class Int, bool kOdd, int kNumber>
+TETWARP_HD bool corner_owns(const Relative<Int> (&at)[8], const int (&shared)[4], const VoxelNudge<Int>& nudge) {
+  constexpr TetrahedronCorners kOf = tetrahedron_corners(kNumber, kOdd);
+  const Relative<Int>&a = at[kOf.a], &b = at[kOf.b], &c = at[kOf.c], &d = at[kOf.d];
+  const int side = shared[kOdd ? kNumber - 1 : 4 - kNumber];
+  return side != 0 && side_of_face(b, c, d, nudge) == side && side_of_face(a, d, c, nudge) == side &&
+         side_of_face(a, b, d, nudge) == side;
+}
+
+/// Asks all five tetrahedra of a cell for one voxel.
+template <class Int, bool kOdd, class Visit>
+TETWARP_HD void visit_voxel(const Cell& cell, const glm::i64vec3& voxel, const glm::i32vec3& signs, Visit& visit) {
+  const glm::i32vec3 steps = to_steps(voxel);
+  const VoxelNudge<Int> nudge(signs);
+  Relative<Int> at[8];
+  for (int corner = 0; corner < 8; ++corner) at[corner] = Relative<Int>(cell.corner[corner].deformed - steps);
+  constexpr TetrahedronCorners kOf = tetrahedron_corners(0, kOdd);
+  const Relative<Int>&a = at[kOf.a], &b = at[kOf.b], &c = at[kOf.c], &d = at[kOf.d];
+  const int shared[4] = {side_of_face(b, c, d, nudge), side_of_face(a, d, c, nudge), side_of_face(a, b, d, nudge),
+                         side_of_face(a, c, b, nudge)};
+  if (shared[0] != 0 && shared[1] == shared[0] && shared[2] == shared[0] && shared[3] == shared[0]) {
+    visit(voxel, signs, 0, tetrahedron_of(cell, 0, kOdd));
+  }
+  if (corner_owns<Int, kOdd, 1>(at, shared, nudge)) visit(voxel, signs, 1, tetrahedron_of(cell, 1, kOdd));
+  if (corner_owns<Int, kOdd, 2>(at, shared, nudge)) visit(voxel, signs, 2, tetrahedron_of(cell, 2, kOdd));
+  if (corner_owns<Int, kOdd, 3>(at, shared, nudge)) visit(voxel, signs, 3, tetrahedron_of(cell, 3, kOdd));
+  if (corner_owns<Int, kOdd, 4>(at, shared, nudge)) visit(voxel, signs, 4, tetrahedron_of(cell, 4, kOdd));
+}
+
+/// Walks the voxels of a small box one by one.
 template <class Int, class Visit>
 TETWARP_HD void walk_voxels(const Cell& cell, bool odd, const VoxelBox& box, const Nudge& nudge, Visit& visit) {
   for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {
     for (std::int64_t y = box.begin.y; y < box.end.y; ++y) {
       for (std::int64_t x = box.begin.x; x < box.end.x; ++x) {
         const glm::i64vec3 voxel(x, y, z);
-        const glm::i32vec3 steps = to_steps(voxel), signs = nudge.signs(voxel);
-        glm::i32vec3 at[8];
-        for (int corner = 0; corner < 8; ++corner) at[corner] = cell.corner[corner].deformed - steps;
-        int shared[4];
-        for (int number = 0; number < kTetrahedraPerCell; ++number) {
-          const TetrahedronCorners of = tetrahedron_corners(number, odd);
-          const glm::i32vec3 &a = at[of.a], &b = at[of.b], &c = at[of.c], &d = at[of.d];
-          bool inside;
-          if (number == 0) {
-            shared[0] = side_of_face<Int>(b, c, d, signs);
-            shared[1] = side_of_face<Int>(a, d, c, signs);
-            shared[2] = side_of_face<Int>(a, b, d, signs);
-            shared[3] = side_of_face<Int>(a, c, b, signs);
-            inside = shared[0] != 0 && shared[1] == shared[0] && shared[2] == shared[0] && shared[3] == shared[0];
-          } else {
-            const int side = shared[odd ? number - 1 : 4 - number];
-            inside = side != 0 && side_of_face<Int>(b, c, d, signs) == side &&
-                     side_of_face<Int>(a, d, c, signs) == side && side_of_face<Int>(a, b, d, signs) == side;
-          }
-          if (inside) visit(voxel, signs, number, tetrahedron_of(cell, number, odd));
+        const glm::i32vec3 signs = nudge.signs(voxel);
+        if (odd) {
+          visit_voxel<Int, true>(cell, voxel, signs, visit);
+        } else {
+          visit_voxel<Int, false>(cell, voxel, signs, visit);
         }
       }
     }

@@ -88,9 +88,8 @@ class ForwardResampler final : public Resampler {
             const glm::i64vec3 at = block.first_cell + glm::i64vec3(x, y, z);
             const std::uint64_t first =
                 kTetrahedraPerCell * static_cast<std::uint64_t>((at.z * cells.y + at.y) * cells.x + at.x);
-            const bool odd = ((at.x + at.y + at.z) & 1) != 0;
             visit_cell(
-                block.cell({x, y, z}), odd, voxels, lattice_.nudge(),
+                block.cell({x, y, z}), block.is_odd({x, y, z}), voxels, lattice_.nudge(),
                 [&](const glm::i64vec3& voxel, const glm::i32vec3& signs, int t, const Tetrahedron& tetrahedron) {
                   const glm::i64vec3 in = voxel - box.begin;
                   const auto place = static_cast<std::size_t>((in.z * size.y + in.y) * size.x + in.x);

@@ -18,12 +18,36 @@ namespace {
 constexpr double kFarthest = 1 << 17;         ///< voxels that a vertex may be displaced on an axis
 constexpr double kSmallestCell = 1.0 / 1024;  ///< voxels; snapping would leave smaller cells no shape
 constexpr double kReachTolerance = 1.0 / kStepsPerVoxel;
+/// Volumes of tetrahedra within a box of 16 voxels are exact in double: six products of three differences below 2^16.
+constexpr std::int64_t kExactInDouble = 1 << 16;
 
 bool usable(const glm::dvec3& index, double limit) {
   return std::abs(index.x) < limit && std::abs(index.y) < limit && std::abs(index.z) < limit;  // false for NaN
 }
 
 }  // namespace
+
+template <class Int>
+void FieldStatistics::add_cells(const LatticeBlock& block) {
+  for (int z = 0; z < block.cells.z; ++z) {
+    for (int y = 0; y < block.cells.y; ++y) {
+      for (int x = 0; x < block.cells.x; ++x) {
+        double determinants[kTetrahedraPerCell];
+        if (block.is_odd({x, y, z})) {
+          cell_jacobians<Int, true>(block.cell({x, y, z}), determinants);
+        } else {
+          cell_jacobians<Int, false>(block.cell({x, y, z}), determinants);
+        }
+        for (const double determinant : determinants) {
+          inverted += determinant < 0;
+          degenerate += determinant == 0;
+          jacobian_min = std::min(jacobian_min, determinant);
+          jacobian_max = std::max(jacobian_max, determinant);
+        }
+      }
+    }
+  }
+}
 
 void FieldStatistics::add(const FieldStatistics& other) {
   inverted += other.inverted;
@@ -32,7 +56,7 @@ void FieldStatistics::add(const FieldStatistics& other) {
   jacobian_max = std::max(jacobian_max, other.jacobian_max);
 }
 
-Cell LatticeIndex::Block::cell(const glm::i32vec3& at) const {
+Cell LatticeBlock::cell(const glm::i32vec3& at) const {
   const int row = cells.x + 1, slice = row * (cells.y + 1);
   const Vertex* first = vertices + at.z * slice + at.y * row + at.x;
   return {{first[0], first[1], first[row], first[row + 1], first[slice], first[slice + 1], first[slice + row],
@@ -103,7 +127,8 @@ void LatticeIndex::build(const Geometry& output, const FieldView& field, const C
   const double cell_voxels =
       std::min({glm::length(output_from_lattice_.linear[0]), glm::length(output_from_lattice_.linear[1]),
                 glm::length(output_from_lattice_.linear[2])});
-  cells_per_block_ = std::clamp<std::int64_t>(static_cast<std::int64_t>(kMostCells / cell_voxels), 1, kMostCells);
+  cells_per_block_ =
+      std::clamp<std::int64_t>(static_cast<std::int64_t>(Block::kMostCells / cell_voxels), 1, Block::kMostCells);
   blocks_ = (cells_ + (cells_per_block_ - 1)) / cells_per_block_;
   groups_ = (blocks_ + (kGroup - 1)) / kGroup;
   boxes_.resize(static_cast<std::size_t>(blocks_.x * blocks_.y * blocks_.z));
@@ -156,29 +181,25 @@ void LatticeIndex::load(std::size_t block, Block& into) const {
 
 void LatticeIndex::scan_block(std::size_t number, Block& block, FieldStatistics& statistics) {
   load(number, block);
-  Box box{block.vertices[0].deformed, block.vertices[0].deformed};
+  const Vertex& first = block.vertices[0];
+  Box box{first.deformed, first.deformed}, rest{first.deformed + first.u, first.deformed + first.u};
   const int vertices = (block.cells.x + 1) * (block.cells.y + 1) * (block.cells.z + 1);
-  for (int vertex = 1; vertex < vertices; ++vertex) box.grow(block.vertices[vertex].deformed);
+  for (int n = 1; n < vertices; ++n) {
+    const Vertex& vertex = block.vertices[n];
+    box.grow(vertex.deformed);
+    rest.grow(vertex.deformed + vertex.u);
+  }
   boxes_[number] = box;
   if (block.at_rest) {
     statistics.jacobian_min = std::min(statistics.jacobian_min, 1.0);
     statistics.jacobian_max = std::max(statistics.jacobian_max, 1.0);
     return;
   }
-  for (int z = 0; z < block.cells.z; ++z) {
-    for (int y = 0; y < block.cells.y; ++y) {
-      for (int x = 0; x < block.cells.x; ++x) {
-        const Cell cell = block.cell({x, y, z});
-        const bool odd = ((block.first_cell.x + block.first_cell.y + block.first_cell.z + x + y + z) & 1) != 0;
-        for (int t = 0; t < kTetrahedraPerCell; ++t) {
-          const double determinant = jacobian(tetrahedron_of(cell, t, odd));
-          statistics.inverted += determinant < 0;
-          statistics.degenerate += determinant == 0;
-          statistics.jacobian_min = std::min(statistics.jacobian_min, determinant);
-          statistics.jacobian_max = std::max(statistics.jacobian_max, determinant);
-        }
-      }
-    }
+  const std::int64_t extent = std::max(reach_of(box), reach_of(rest));
+  if (extent <= kExactInDouble) {
+    statistics.add_cells<double>(block);
+  } else {
+    statistics.add_cells<Wide>(block);
   }
 }
 

@@ -9,6 +9,21 @@
 
 namespace tetwarp::cpu {
 
+/// Vertices of a block of up to 8 x 8 x 8 cells, i fastest, snapped.
+struct LatticeBlock {
+  static constexpr int kMostCells = 8, kMostVertices = kMostCells + 1;
+
+  glm::i64vec3 first_cell;
+  glm::i32vec3 cells;  ///< cells on each axis
+  bool at_rest;        ///< every u is zero
+  Vertex vertices[kMostVertices * kMostVertices * kMostVertices];
+
+  Cell cell(const glm::i32vec3& at) const;
+  bool is_odd(const glm::i32vec3& at) const {
+    return ((first_cell.x + first_cell.y + first_cell.z + at.x + at.y + at.z) & 1) != 0;
+  }
+};
+
 /// What a pass over all tetrahedra of a field found.
 struct FieldStatistics {
   std::uint64_t inverted = 0, degenerate = 0;
@@ -16,6 +31,9 @@ struct FieldStatistics {
   double jacobian_max = -std::numeric_limits<double>::infinity();
 
   void add(const FieldStatistics& other);
+  /// Counts the tetrahedra of a block. Int holds their volumes exactly.
+  template <class Int>
+  void add_cells(const LatticeBlock& block);
 };
 
 /// The vertices of a field, snapped on demand, and boxes by which to find the cells that may reach a part of the
@@ -25,17 +43,7 @@ struct FieldStatistics {
 /// vertices. Nothing of the field is copied: a block's vertices are snapped each time that it is visited.
 class LatticeIndex {
  public:
-  static constexpr int kMostCells = 8, kMostVertices = kMostCells + 1;
-
-  /// Vertices of one block, i fastest.
-  struct Block {
-    glm::i64vec3 first_cell;
-    glm::i32vec3 cells;  ///< cells on each axis
-    bool at_rest;        ///< every u is zero
-    Vertex vertices[kMostVertices * kMostVertices * kMostVertices];
-
-    Cell cell(const glm::i32vec3& at) const;
-  };
+  using Block = LatticeBlock;
 
   /// Checks the field and builds the boxes, in parallel in the calling task arena. @throws InputError, Cancelled
   void build(const Geometry& output, const FieldView& field, const Control& control);
@@ -86,7 +94,7 @@ class LatticeIndex {
   AffineMap lattice_from_output_;
   glm::dmat3 output_from_mm_{1};
   glm::i64vec3 cells_{0}, blocks_{0}, groups_{0};
-  std::int64_t cells_per_block_ = kMostCells;
+  std::int64_t cells_per_block_ = Block::kMostCells;
   std::vector<Box> boxes_, group_boxes_;
   FieldStatistics statistics_;
 };
