@@ -1,4 +1,7 @@
+#include <algorithm>
+#include <cmath>
 #include <future>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -27,6 +30,19 @@ const char* name_of(Interpolation interpolation) {
 const char* name_of(Outside outside) {
   constexpr const char* kNames[] = {"refuse", "rest", "background"};
   return kNames[static_cast<int>(outside)];
+}
+
+std::filesystem::path folder_of(const std::filesystem::path& file) {
+  return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
+}
+
+/// Whether a value can be stored as a voxel of this type, rounded.
+bool fits(VoxelType type, double value) {
+  return dispatch(type, [&](auto voxel) {
+    using V = decltype(voxel);
+    return value >= static_cast<double>(std::numeric_limits<V>::lowest()) &&
+           value <= static_cast<double>(std::numeric_limits<V>::max());
+  });
 }
 
 /// Where the results go while they are made.
@@ -59,8 +75,8 @@ class Deformation {
  private:
   Outputs begin_outputs() const;
   std::uint64_t plan_bytes(const InputHeader& input) const;
-  void check_memory(std::uint64_t planned) const;
-  void print_plan(const Geometry& volume, std::uint64_t planned) const;
+  void check_input(const InputHeader& input);
+  void print_plan(const Geometry& volume) const;
   void read();
   void read_field();
   void resample();
@@ -78,6 +94,7 @@ class Deformation {
   std::string input_sha256_, field_sha256_, backend_;
   double background_ = 0;
   std::uint64_t planned_bytes_ = 0;
+  std::vector<std::string> notes_, set_aside_;
   AnyVolume output_, coverage_;
   std::vector<SliceRange> sampled_slices_;
   Report report_;
@@ -108,12 +125,15 @@ Outputs Deformation::begin_outputs() const {
   if (o.compression && (series || o.output.extension() == ".nii")) {
     throw UsageError("--compress is for .nii.gz, .nrrd and .mha, not for " + o.output.string());
   }
-  if (o.dry_run) {
-    check_apart(o.output, inputs);
-    return {series, OutputSet({}, true), {}, {}, {}, {}, {}};
+  if (!o.preview.empty() && o.preview.extension() != ".png") {
+    throw UsageError("unknown suffix of --preview \"" + o.preview.string() + "\"; use .png");
   }
+  if (o.background && !std::isfinite(*o.background)) throw UsageError("--background is not a finite number");
+  // The series of a single file is read from its folder, so a derived series must not land there.
+  if (series && !o.input.single && !std::filesystem::is_directory(o.input.path))
+    inputs.push_back(folder_of(o.input.path));
   Outputs outputs{series, OutputSet(inputs, o.common.overwrite), {}, {}, {}, {}, {}};
-  outputs.volume = outputs.set.add(o.output);
+  outputs.volume = outputs.set.add(o.output, series ? StagedOutput::Kind::folder : StagedOutput::Kind::file);
   outputs.sidecar = outputs.set.add(sidecar_of(o.output));
   outputs.coverage = outputs.set.add(o.coverage);
   outputs.report = outputs.set.add(o.report);
@@ -131,24 +151,34 @@ std::uint64_t Deformation::plan_bytes(const InputHeader& input) const {
          kOverheadBytes;
 }
 
-void Deformation::check_memory(std::uint64_t planned) const {
-  if (options_.memory_bytes && planned > *options_.memory_bytes) {
-    throw Error("about " + format_bytes(planned) + " of memory are needed, --memory allows " +
+void Deformation::check_input(const InputHeader& input) {
+  const glm::i64vec3& size = input.geometry.size;
+  require(std::min({size.x, size.y, size.z}) >= 2,
+          "a volume of " + to_string(size) + " voxels has no cell to deform, " + options_.input.path.string() +
+              "; give one with at least 2 on every axis");
+  if (options_.background && !fits(input.type, *options_.background)) {
+    throw UsageError("--background " + json(*options_.background).dump() + " does not fit the voxels, " +
+                     to_string(input.type) + "; choose a value in their range");
+  }
+  planned_bytes_ = plan_bytes(input);
+  if (options_.memory_bytes && planned_bytes_ > *options_.memory_bytes) {
+    throw Error("about " + format_bytes(planned_bytes_) + " of memory are needed, --memory allows " +
                 format_bytes(*options_.memory_bytes) + "; a larger --cell-size needs less");
   }
+  if (input.series) set_aside_ = input.series->set_aside;
 }
 
-void Deformation::print_plan(const Geometry& volume, std::uint64_t planned) const {
+void Deformation::print_plan(const Geometry& volume) const {
   say(options_.common, "would write " + options_.output.string() + ": " + to_string(volume.size) + " voxels as " +
-                           (outputs_.series ? "a DICOM series" : "a file") + "; about " + format_bytes(planned) +
+                           (outputs_.series ? "a DICOM series" : "a file") + "; about " + format_bytes(planned_bytes_) +
                            " of memory");
 }
 
 void Deformation::read() {
   Stage stage(options_.common, "read");
-  const InputHeader header = open_input(options_.input, options_.common, {.stop = interrupt_token()});
-  planned_bytes_ = plan_bytes(header);
-  check_memory(planned_bytes_);
+  const InputHeader header = open_input(options_.input, {.stop = interrupt_token()});
+  check_input(header);
+  if (header.series) notes_ = header.series->warnings;
   input_ = read_input(options_.input, header, options_.common, stage.control());
   background_ = options_.background.value_or(input_.background);
   stages_.emplace_back("read", stage.seconds());
@@ -167,7 +197,6 @@ void Deformation::read_field() {
     }
     field_.pull = read_pull_field(options_.pull_field);
   }
-  for (const std::string& note : field_.notes) say(options_.common, "tetwarp: note: " + note);
   stages_.emplace_back("field", stage.seconds());
 }
 
@@ -225,13 +254,16 @@ void Deformation::write_series() {
   const std::string parameters = "interpolation=" + std::string(name_of(options_.interpolation)) +
                                  " outside=" + name_of(options_.outside) + " background=" + json(background_).dump() +
                                  (field_.direction == Direction::pull ? " direction=pull" : " direction=forward");
-  const DicomDerivation derivation{.field_sha256 = field_sha256_,
-                                   .parameters = parameters,
-                                   .description = std::string("Deformed by a field of vertices, ") +
-                                                  name_of(options_.interpolation) + " interpolation",
-                                   .deformed = !field_.forward.identity || field_.direction == Direction::pull,
-                                   .background_hu = background_,
-                                   .sampled_slices = sampled_slices_};
+  const bool pull = field_.direction == Direction::pull, deformed = pull || !field_.forward.identity;
+  const char* what =
+      !deformed ? "Resampled by the identity" : (pull ? "Deformed by a pull field" : "Deformed by a field of vertices");
+  const DicomDerivation derivation{
+      .field_sha256 = field_sha256_,
+      .parameters = parameters,
+      .description = std::string(what) + ", " + name_of(options_.interpolation) + " interpolation",
+      .deformed = deformed,
+      .background_hu = background_,
+      .sampled_slices = sampled_slices_};
   dicom_report_ = write_derived_series(outputs_.volume, std::as_const(output_).view(), *input_.dicom->headers,
                                        derivation, options_.common.threads, stage.control());
 }
@@ -244,6 +276,7 @@ json Deformation::sidecar() const {
   if (input_.is_dicom()) {
     document["input"]["series_instance_uid"] = input_.dicom->series_uid;
     document["input"]["rounded_voxels"] = input_.dicom->rounded;
+    document["input"]["set_aside"] = set_aside_;
     if (input_.dicom->padding)
       document["input"]["padding_hu"] = {input_.dicom->padding->low, input_.dicom->padding->high};
   }
@@ -326,16 +359,21 @@ std::string Deformation::summary() const {
 
 int Deformation::run() {
   if (options_.dry_run) {
-    const InputHeader header = open_input(options_.input, options_.common, {.stop = interrupt_token()});
-    const std::uint64_t planned = plan_bytes(header);
-    print_plan(header.geometry, planned);
-    check_memory(planned);
+    const InputHeader header = open_input(options_.input, {.stop = interrupt_token()});
+    check_input(header);
+    print_plan(header.geometry);
     return 0;
   }
   read();
   read_field();
   resample();
-  write();
+  outputs_.set.write([&] { write(); });
+  for (const std::string& note : notes_) say(options_.common, "tetwarp: warning: " + note);
+  for (const std::string& note : field_.notes) say(options_.common, "tetwarp: note: " + note);
+  if (!set_aside_.empty()) {
+    say(options_.common, "tetwarp: note: " + std::to_string(set_aside_.size()) +
+                             " files of the series are no slices of it; OUTPUT.json names them");
+  }
   say(options_.common, summary());
   return 0;
 }

@@ -19,12 +19,12 @@ int run_field(const FieldOptions& options) {
   OutputSet outputs(inputs, options.common.overwrite);
   const std::filesystem::path output = outputs.add(options.output);
   Stage stage(options.common, "field");
-  const Geometry volume = open_input(options.like, options.common, {.stop = interrupt_token()}).geometry;
+  const InputHeader like = open_input(options.like, {.stop = interrupt_token()});
   const ForwardField source =
-      read_forward_field(options.fields, volume, options.cell_size, options.common, stage.control());
-  for (const std::string& note : source.notes) say(options.common, "tetwarp: note: " + note);
-  write_field_file(output, source.field);
+      read_forward_field(options.fields, like.geometry, options.cell_size, options.common, stage.control());
+  outputs.write([&] { write_field_file(output, source.field); });
   outputs.commit();
+  for (const std::string& note : source.notes) say(options.common, "tetwarp: note: " + note);
   say(options.common,
       "wrote " + options.output.string() + ": forward field, " + to_string(source.field.lattice.size) + " vertices");
   return 0;

@@ -83,7 +83,8 @@ void print_dicom(const json& document) {
   for (const json& series : document["series"]) {
     std::printf("\nseries %zu: %s, %zu slices\n", series["number"].get<std::size_t>(),
                 series["modality"].get<std::string>().c_str(), series["slices"].get<std::size_t>());
-    std::printf("  UID          %s\n", series["series_instance_uid"].get<std::string>().c_str());
+    const auto uid = series["series_instance_uid"].get<std::string>();
+    std::printf("  UID          %s\n", uid.empty() ? "(none)" : uid.c_str());
     if (series["usable"].get<bool>()) {
       print_grid(series["geometry"]);
     } else {

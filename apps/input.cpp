@@ -52,8 +52,10 @@ const DicomSeries& choose_series(const DicomScan& scan, const InputOptions& opti
     ++holding_slices;
   }
   if (holding_slices == 1 || scan.series.size() == 1) return *only;
-  throw InputError(std::to_string(scan.series.size()) + " series found, " + where + "; choose one with --series" +
-                   list_series(scan));
+  const bool usable =
+      std::any_of(scan.series.begin(), scan.series.end(), [](const DicomSeries& series) { return !series.refusal; });
+  throw InputError(std::to_string(scan.series.size()) + " series found, " + where +
+                   (usable ? "; choose one with --series" : "; none of them is a usable volume") + list_series(scan));
 }
 
 double smallest_value(const AnyVolume& volume) {
@@ -83,18 +85,22 @@ std::string describe(const DicomSeries& series, std::size_t number) {
          number_text(spacing.y) + " x " + number_text(spacing.z) + " mm";
 }
 
-InputHeader open_input(const InputOptions& options, const CommonOptions& common, const Control& control) {
+InputHeader open_input(const InputOptions& options, const Control& control) {
   if (has_image_suffix(options.path)) {
-    require(options.series.empty() && !options.single, "--series and --single are for DICOM, " + options.path.string());
+    if (!options.series.empty() || options.single) {
+      throw UsageError("--series and --single are for DICOM, " + options.path.string() + "; leave them out");
+    }
     const ImageHeader header = read_image_header(options.path);
     require(header.components == 1, std::to_string(header.components) + " components a voxel, " +
                                         options.path.string() + "; expected a volume with one");
     return {header.geometry, header.type, {}};
   }
+  if (options.single && std::filesystem::is_directory(options.path)) {
+    throw UsageError("--single is for one DICOM file, " + options.path.string() + " is a folder; name a file in it");
+  }
   const DicomScan scan = scan_dicom(options.path, options.single, control);
   const DicomSeries& series = choose_series(scan, options);
   require(!series.refusal, series.refusal.value_or(""));
-  for (const std::string& warning : series.warnings) say(common, "tetwarp: warning: " + warning);
   return {series.geometry, VoxelType::i16, series};
 }
 

@@ -14,7 +14,7 @@ namespace tetwarp::apps {
 struct InputHeader {
   Geometry geometry;
   VoxelType type = VoxelType::i16;
-  std::optional<DicomSeries> series;  ///< of a DICOM input
+  std::optional<DicomSeries> series;  ///< of a DICOM input; its warnings are for people
 };
 
 /// A volume as read, from a DICOM series or a file.
@@ -26,8 +26,9 @@ struct InputVolume {
   bool is_dicom() const { return dicom.has_value(); }
 };
 
-/// Reads headers alone. @throws InputError when there is not one usable volume (several series: lists them)
-InputHeader open_input(const InputOptions& options, const CommonOptions& common, const Control& control);
+/// Reads headers alone. @throws InputError when there is not one usable volume (several series: lists them), UsageError
+/// for DICOM options with a file, or --single with a folder
+InputHeader open_input(const InputOptions& options, const Control& control);
 
 /// Reads the voxels of what `open_input` found.
 InputVolume read_input(const InputOptions& options, const InputHeader& header, const CommonOptions& common,

@@ -1,5 +1,6 @@
 #include <cstdio>
 #include <exception>
+#include <iostream>
 #include <new>
 
 #include "apps/console.h"
@@ -20,7 +21,11 @@ int main(int argc, char** argv) {
   using namespace tetwarp;
   try {
     apps::watch_interrupts();
-    return apps::run_command_line(argc, argv);
+    const int status = apps::run_command_line(argc, argv);
+    std::cout.flush();
+    if (std::fflush(stdout) != 0 || std::ferror(stdout) || !std::cout)
+      throw Error("standard output cannot be written; is the disk full?");
+    return status;
   } catch (const apps::UsageError& error) {
     return fail(kWrongCommandLine, error.what());
   } catch (const InputError& error) {

@@ -32,24 +32,43 @@ bool is_series_output(const fs::path& output) {
   return true;
 }
 
-void check_apart(const fs::path& output, const std::vector<fs::path>& inputs) {
-  for (const fs::path& input : inputs) {
-    if (is_inside(output, input) || is_inside(input, output)) {
-      throw UsageError("the output " + output.string() + " is, is inside, or is around the input " + input.string() +
+fs::path OutputSet::add(const fs::path& target, StagedOutput::Kind kind) {
+  if (target.empty()) return {};
+  for (const fs::path& input : inputs_) {
+    if (is_inside(target, input) || is_inside(input, target)) {
+      throw UsageError("the output " + target.string() + " is, is inside, or is around the input " + input.string() +
                        "; choose another place");
     }
   }
+  for (const fs::path& other : targets_) {
+    if (is_inside(target, other) || is_inside(other, target)) {
+      throw UsageError("two outputs have the same place, " + other.string() + " and " + target.string() +
+                       "; choose another name for one");
+    }
+  }
+  targets_.push_back(target);
+  staged_.push_back(std::make_unique<StagedOutput>(plain(target), kind, overwrite_,
+                                                   kind == StagedOutput::Kind::folder ? is_tetwarp_dicom : nullptr));
+  return staged_.back()->path();
 }
 
-fs::path OutputSet::add(const fs::path& target) {
-  if (target.empty()) return {};
-  check_apart(target, inputs_);
-  inputs_.push_back(target);  // outputs must be apart from each other too
-  const bool folder = !target.has_filename() || (!target.has_extension() && target.filename().string().front() != '.');
-  staged_.push_back(std::make_unique<StagedOutput>(plain(target),
-                                                   folder ? StagedOutput::Kind::folder : StagedOutput::Kind::file,
-                                                   overwrite_, folder ? is_tetwarp_dicom : nullptr));
-  return staged_.back()->path();
+void OutputSet::write(const std::function<void()>& write) {
+  try {
+    write();
+  } catch (const InputError&) {
+    throw;
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const Error& error) {
+    std::string message = error.what();
+    for (const auto& output : staged_) {
+      const std::string staged = output->path().string();
+      for (auto at = message.find(staged); at != std::string::npos; at = message.find(staged)) {
+        message.replace(at, staged.size(), output->target().string());
+      }
+    }
+    throw Error(message + "; nothing was written");
+  }
 }
 
 void OutputSet::commit() {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
@@ -16,21 +17,23 @@ namespace tetwarp::apps {
 /// @throws UsageError for a suffix that is not one of a volume file
 bool is_series_output(const std::filesystem::path& output);
 
-/// @throws UsageError where an output is equal to, inside or around an input
-void check_apart(const std::filesystem::path& output, const std::vector<std::filesystem::path>& inputs);
-
 /// The outputs of one command: checked and begun before any work, given their names together at its end.
 class OutputSet {
  public:
   OutputSet(std::vector<std::filesystem::path> inputs, bool overwrite)
       : inputs_(std::move(inputs)), overwrite_(overwrite) {}
 
-  /// @return where to write it; empty for an empty target, which is not wanted. @throws UsageError, Error
-  std::filesystem::path add(const std::filesystem::path& target);
+  /// @return where to write it; empty for an empty target, which is not wanted.
+  /// @throws UsageError where it is equal to, inside or around an input or another output; Error where it cannot be
+  /// begun
+  std::filesystem::path add(const std::filesystem::path& target, StagedOutput::Kind kind = StagedOutput::Kind::file);
   void commit();
 
+  /// Runs `write`; an Error that names the place where an output is staged names the output itself instead.
+  void write(const std::function<void()>& write);
+
  private:
-  std::vector<std::filesystem::path> inputs_;
+  std::vector<std::filesystem::path> inputs_, targets_;
   bool overwrite_;
   std::vector<std::unique_ptr<StagedOutput>> staged_;
 };

@@ -28,18 +28,21 @@ int run_phantom(const PhantomOptions& options) {
   check(options);
   const bool series = is_series_output(options.output);
   OutputSet outputs({}, options.common.overwrite);
-  const std::filesystem::path output = outputs.add(options.output);
+  const std::filesystem::path output =
+      outputs.add(options.output, series ? StagedOutput::Kind::folder : StagedOutput::Kind::file);
   const glm::i64vec3 size(options.size[0], options.size[1], options.size[2]);
   const Volume<std::int16_t> phantom = [&] {
     Stage stage(options.common, "phantom");
     return make_phantom(size, {options.spacing[0], options.spacing[1], options.spacing[2]}, options.seed);
   }();
   Stage stage(options.common, "write");
-  if (series) {
-    write_phantom_series(output, view(phantom), options.seed, stage.control());
-  } else {
-    write_image(output, view(phantom));
-  }
+  outputs.write([&] {
+    if (series) {
+      write_phantom_series(output, view(phantom), options.seed, stage.control());
+    } else {
+      write_image(output, view(phantom));
+    }
+  });
   outputs.commit();
   say(options.common, "wrote " + options.output.string() + ": " + to_string(size) + " voxels");
   return 0;

@@ -27,7 +27,8 @@ double median(std::vector<double> values) {
 }
 
 /// Medians over `repeats`, in ns a voxel of the output.
-Times measure(const Volume<std::int16_t>& ct, const std::string& formula, std::int64_t cell_size, int threads, int repeats) {
+Times measure(const Volume<std::int16_t>& ct, const std::string& formula, std::int64_t cell_size, int threads,
+              int repeats) {
   const Limits limits{.threads = threads};
   const auto per_voxel = [&](Clock::time_point from, Clock::time_point to) {
     return std::chrono::duration<double, std::nano>(to - from).count() / static_cast<double>(voxel_count(ct.geometry));
@@ -37,7 +38,8 @@ Times measure(const Volume<std::int16_t>& ct, const std::string& formula, std::i
   Volume<std::int16_t> output{ct.geometry, std::vector<std::int16_t>(ct.voxels.size())};
   for (int n = 0; n < repeats; ++n) {
     const auto start = Clock::now();
-    const VertexField field = sample_on(lattice_over(ct.geometry, cell_size), parse_formula(formula, ct.geometry), limits);
+    const VertexField field =
+        sample_on(lattice_over(ct.geometry, cell_size), parse_formula(formula, ct.geometry), limits);
     const auto made = Clock::now();
     resampler->set_field(view(field));
     const auto set = Clock::now();
@@ -63,13 +65,17 @@ int main(int argc, char** argv) {
   const Volume<std::int16_t> ct = make_phantom({512, 512, slices}, {1, 1, 1}, 1);
   nlohmann::json results = {{"commit", commit()}, {"slices", slices}, {"threads", threads}, {"repeats", repeats}};
   std::printf("512 x 512 x %lld, ns a voxel: formula, set_field, resample\n", static_cast<long long>(slices));
-  for (const std::string formula : {"identity", "wave:amplitude=8,wavelength=64", "twist:angle=28.6", "bubble:radius=128,strength=0.3"}) {
+  for (const std::string formula :
+       {"identity", "wave:amplitude=8,wavelength=64", "twist:angle=28.6", "bubble:radius=128,strength=0.3"}) {
     for (const std::int64_t cell_size : {1, 4, 16}) {
       const Times times = measure(ct, formula, cell_size, threads, repeats);
-      std::printf("%-34s cell %2lld  %7.1f %7.1f %7.1f\n", formula.c_str(), static_cast<long long>(cell_size), times.formula_ns,
-                  times.set_field_ns, times.resample_ns);
-      results["runs"].push_back({{"field", formula}, {"cell_size", cell_size}, {"formula_ns", times.formula_ns},
-                                 {"set_field_ns", times.set_field_ns}, {"resample_ns", times.resample_ns}});
+      std::printf("%-34s cell %2lld  %7.1f %7.1f %7.1f\n", formula.c_str(), static_cast<long long>(cell_size),
+                  times.formula_ns, times.set_field_ns, times.resample_ns);
+      results["runs"].push_back({{"field", formula},
+                                 {"cell_size", cell_size},
+                                 {"formula_ns", times.formula_ns},
+                                 {"set_field_ns", times.set_field_ns},
+                                 {"resample_ns", times.resample_ns}});
     }
   }
   std::printf("%s\n", results.dump().c_str());

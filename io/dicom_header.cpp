@@ -145,14 +145,22 @@ std::string no_image_reason(const DicomFileHeader& header) {
 }
 
 /// The first bytes of the file decide whether DCMTK is asked at all: it would take much for a data set without prefix.
-std::string sniff(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) return std::string("cannot be read: ") + std::strerror(errno);
+void sniff(DicomFileHeader& header) {
+  std::ifstream stream(header.file, std::ios::binary);
   std::array<char, 132> start{};
   stream.read(start.data(), start.size());
   const auto size = static_cast<std::size_t>(stream.gcount());
-  if (size == 0) return "an empty file";
-  return looks_like_dicom(start, size) ? "" : "not DICOM: no prefix DICM at byte 128, no data set at the start";
+  const bool blank =
+      std::all_of(start.begin(), start.begin() + std::min<std::size_t>(size, 128), [](char c) { return c == 0; });
+  if (!stream.is_open() || stream.bad()) {
+    header.skip = std::string("cannot be read: ") + std::strerror(errno);
+  } else if (size == 0) {
+    header.skip = "an empty file";
+  } else if (!looks_like_dicom(start, size)) {
+    header.skip = blank ? "cut short: nothing but zeros where DICOM begins"
+                        : "not DICOM: no prefix DICM at byte 128, no data set at the start";
+  }
+  header.broken = !header.skip.empty() && (blank || !stream.is_open() || stream.bad());
 }
 
 }  // namespace
@@ -208,7 +216,7 @@ DicomFileHeader read_dicom_header(const std::filesystem::path& file) {
   prepare_dcmtk();
   DicomFileHeader header;
   header.file = file;
-  header.skip = sniff(file);
+  sniff(header);
   if (!header.skip.empty()) return header;
 
   DcmInputFileStream stream(OFFilename(file.c_str()));
@@ -223,6 +231,7 @@ DicomFileHeader read_dicom_header(const std::filesystem::path& file) {
   header.file_bytes = std::filesystem::file_size(file, no_size);
   if (result.good() && !at_end) header.pixel_bytes = header.file_bytes - static_cast<std::uint64_t>(stream.tell());
   header.skip = no_image_reason(header);
+  header.broken = !header.skip.empty() && !header.damage.empty() && header.sop_class_uid.empty();
   return header;
 }
 

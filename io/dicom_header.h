@@ -30,8 +30,9 @@ struct PixelFormat {
 
 struct DicomFileHeader {
   std::filesystem::path file;
-  std::string skip;    ///< why the file is no DICOM object at all; empty: it is one
-  std::string damage;  ///< why the data set could not be read to its end; empty: it could
+  std::string skip;     ///< why the file is no DICOM object at all; empty: it is one
+  bool broken = false;  ///< skipped although it may have been a slice: unreadable, empty, cut short or damaged
+  std::string damage;   ///< why the data set could not be read to its end; empty: it could
   E_TransferSyntax encoding = EXS_Unknown;
   std::string transfer_syntax_uid;  ///< as the file states it, or as found where it has no meta header
   std::string sop_class_uid, sop_instance_uid, series_uid, study_uid, frame_of_reference_uid, modality;

@@ -80,6 +80,16 @@ SeriesKey key_of(const DicomFileHeader& header) {
   return {"", header.study_uid, header.series_number, header.file.parent_path()};
 }
 
+/// Names a file that nobody can know: it bears the suffix of the slices beside it, and may be one of them.
+std::string lost_slice(const std::vector<DicomFileHeader>& broken, const std::set<fs::path>& suffixes) {
+  for (const DicomFileHeader& header : broken) {
+    const fs::path name = header.file.filename();
+    if (name.string().front() == '.' || !suffixes.contains(name.extension())) continue;
+    return header.skip + ", " + header.file.string() + "; it may be a slice of this series: mend it, or take it away";
+  }
+  return {};
+}
+
 struct NumberedSeries {
   int number;
   DicomSeries series;
@@ -89,8 +99,12 @@ DicomScan group(std::vector<DicomFileHeader> headers, const std::optional<fs::pa
   DicomScan scan;
   std::map<SeriesKey, std::vector<DicomFileHeader>> groups;
   std::optional<SeriesKey> wanted_key;
+  std::vector<DicomFileHeader> broken;
+  std::set<fs::path> suffixes;
   for (DicomFileHeader& header : headers) {
     const bool is_wanted = wanted && header.file == *wanted;
+    if (header.broken) broken.push_back(header);
+    if (header.skip.empty()) suffixes.insert(header.file.extension());
     if (!header.skip.empty()) {
       if (!wanted || is_wanted) scan.skipped.push_back(header.file.string() + ": " + header.skip);
       continue;
@@ -108,7 +122,11 @@ DicomScan group(std::vector<DicomFileHeader> headers, const std::optional<fs::pa
   std::stable_sort(numbered.begin(), numbered.end(), [](const NumberedSeries& a, const NumberedSeries& b) {
     return std::tie(a.number, a.series.series_uid) < std::tie(b.number, b.series.series_uid);
   });
-  for (NumberedSeries& one : numbered) scan.series.push_back(std::move(one.series));
+  const std::string lost = lost_slice(broken, suffixes);
+  for (NumberedSeries& one : numbered) {
+    if (!lost.empty() && !one.series.slices.empty() && !one.series.refusal) one.series.refusal = lost;
+    scan.series.push_back(std::move(one.series));
+  }
   return scan;
 }
 

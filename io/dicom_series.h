@@ -21,7 +21,8 @@ struct DicomSlice {
 };
 
 /// The files that share a Series Instance UID, and the one volume that they make, if they do.
-/// Files of the series that cannot belong to a CT volume (localizers, secondary captures, dose, structures) are set aside.
+/// Files of the series that cannot belong to a CT volume (localizers, secondary captures, dose, structures) are set
+/// aside.
 struct DicomSeries {
   std::string series_uid, study_uid, frame_of_reference_uid, modality;
   std::vector<DicomSlice> slices;      ///< sorted by position along the normal, row x column
@@ -33,12 +34,13 @@ struct DicomSeries {
 };
 
 struct DicomScan {
-  std::vector<DicomSeries> series;   ///< in the order of Series Number, then UID: the numbers that `--series` takes, from 1
+  std::vector<DicomSeries>
+      series;  ///< in the order of Series Number, then UID: the numbers that `--series` takes, from 1
   std::vector<std::string> skipped;  ///< "FILE: reason" for files that are not DICOM images at all
 };
 
-/// Reads the headers of every file under a folder, once (sub-folders included, symbolic links followed, each real folder
-/// once); or of one file and the series beside it; or, with `single`, of that file alone.
+/// Reads the headers of every file under a folder, once (sub-folders included, symbolic links followed, each real
+/// folder once); or of one file and the series beside it; or, with `single`, of that file alone.
 /// @throws InputError when the path does not exist or cannot be read
 DicomScan scan_dicom(const std::filesystem::path& path, bool single = false, const Control& control = {});
 
@@ -50,21 +52,22 @@ struct DicomVolume {
   std::optional<PaddingRange> padding;  ///< Pixel Padding Value and Range Limit in HU, when all slices agree
   std::uint64_t rounded = 0;            ///< voxels whose HU was fractional and was rounded half to even
   std::string series_uid;
-  std::string sha256;                   ///< of the SHA-256 digests of the files, in slice order
+  std::string sha256;  ///< of the SHA-256 digests of the files, in slice order
   std::shared_ptr<const DicomHeaders> headers;
 };
 
 /// Reads and decodes the slices in parallel; each file is read and parsed once.
-/// @throws InputError for a series with a refusal, a file that changed or is truncated, a transfer syntax that cannot be
+/// @throws InputError for a series with a refusal, a file that changed or is truncated, a transfer syntax that cannot
+/// be
 ///         decoded, HU beyond int16: naming the file, the tag, expected and found
 DicomVolume load_dicom(const DicomSeries& series, int threads = 0, const Control& control = {});
 
 /// What a derived series says of how it came to be.
 struct DicomDerivation {
-  std::string field_sha256;     ///< hex: the frame of reference depends on it and on the source's frame alone
-  std::string parameters;       ///< the options that decide voxels, in one canonical line
-  std::string description;      ///< Derivation Description: "Deformed by ..."; no paths, no names
-  bool deformed = true;         ///< false for identity: the frame of reference is kept
+  std::string field_sha256;  ///< hex: the frame of reference depends on it and on the source's frame alone
+  std::string parameters;    ///< the options that decide voxels, in one canonical line
+  std::string description;   ///< Derivation Description: "Deformed by ..."; no paths, no names
+  bool deformed = true;      ///< false for identity: the frame of reference is kept
   double background_hu = -1024;
   std::vector<SliceRange> sampled_slices;  ///< per output slice: the source slices that it was interpolated from
 };
@@ -75,9 +78,9 @@ struct DicomWriteReport {
   std::vector<std::string> added_empty;  ///< missing type 2 attributes: "(0008,0090) ReferringPhysicianName"
 };
 
-/// Writes a derived CT series (PS3.3 A.3; docs/dicom.md has the table of attributes) of one file a slice into the folder
-/// `folder`, which exists and is empty. `volume` is int16 HU with as many slices as the source.
-/// Reads no clock: the same input gives the same bytes and the same UIDs.
+/// Writes a derived CT series (PS3.3 A.3; docs/dicom.md has the table of attributes) of one file a slice into the
+/// folder `folder`, which exists and is empty. `volume` is int16 HU with as many slices as the source. Reads no clock:
+/// the same input gives the same bytes and the same UIDs.
 /// @throws InputError, Error when a file cannot be written
 DicomWriteReport write_derived_series(const std::filesystem::path& folder, const ConstVolumeView& volume,
                                       const DicomHeaders& source, const DicomDerivation& derivation, int threads = 0,

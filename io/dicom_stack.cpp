@@ -73,7 +73,7 @@ std::optional<std::string> same_position(const Headers& files, const glm::dvec3&
   if (worst_count > 4) names += " and " + std::to_string(worst_count - 4) + " more";
   if (crowded > 1) names += " (likewise at " + std::to_string(crowded - 1) + " other positions)";
   return std::to_string(worst_count) + " slices at the same position " + point_text(*files[worst].position) +
-         ", expected one: " + names + "; keep one phase or acquisition, or read one file with --single";
+         ", expected one: " + names + "; keep one phase or acquisition in the folder";
 }
 
 /// Whether slices lie beside the line through the first one along the normal.
@@ -209,9 +209,10 @@ std::optional<std::string> stack_slices(Headers& files, DicomSeries& series) {
   } else {
     geometry.spacing.z = (along(last, normal) - along(first, normal)) / static_cast<double>(files.size() - 1);
     const auto tilted = tilt(files, normal), uneven = unevenness(files, normal);
-    const std::string advice = "; add what is missing, or resample the series to a straight and even stack first";
-    if (tilted && uneven) return *tilted + "; also " + *uneven + advice;
-    if (tilted || uneven) return (tilted ? *tilted : *uneven) + advice;
+    const std::string straighten = "; resample the series to a straight stack first";
+    if (tilted && uneven) return *tilted + "; also " + *uneven + straighten;
+    if (tilted) return *tilted + straighten;
+    if (uneven) return *uneven + "; add what is missing, or resample the series to even slices first";
   }
   warn_of_rotation(files, geometry, series);
   return std::nullopt;

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iostream>
 #include <sstream>
 #include <utility>
 
@@ -20,16 +21,22 @@ constexpr std::pair<VoxelType, Component> kComponents[] = {
     {VoxelType::f32, Component::FLOAT}, {VoxelType::f64, Component::DOUBLE},
 };
 
-/// ITK's warnings go to standard error; a library does not print.
+/// ITK's warnings and MetaIO's complaints go to standard error; a library does not print.
 class QuietItk {
  public:
-  QuietItk() : before_(itk::Object::GetGlobalWarningDisplay()) { itk::Object::SetGlobalWarningDisplay(false); }
-  ~QuietItk() { itk::Object::SetGlobalWarningDisplay(before_); }
+  QuietItk() : before_(itk::Object::GetGlobalWarningDisplay()), cerr_(std::cerr.rdbuf(nullptr)) {
+    itk::Object::SetGlobalWarningDisplay(false);
+  }
+  ~QuietItk() {
+    itk::Object::SetGlobalWarningDisplay(before_);
+    std::cerr.rdbuf(cerr_);  // clears the error state that writing to nothing left
+  }
   QuietItk(const QuietItk&) = delete;
   QuietItk& operator=(const QuietItk&) = delete;
 
  private:
   bool before_;
+  std::streambuf* cerr_;
 };
 
 /// The sentence in an ITK exception: one line, without source file, class and address.

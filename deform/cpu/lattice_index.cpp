@@ -110,7 +110,7 @@ void LatticeIndex::take_geometry(const Geometry& output) {
               "the field's lattice of " + to_string(lattice.size) +
                   " vertices does not reach over the whole output grid: a corner of the output lies at vertex index " +
                   std::to_string(vertex[axis]) + " of axis " + std::to_string(axis) + ", expected 0 to " +
-                  std::to_string(cells_[axis]));
+                  std::to_string(cells_[axis]) + "; choose rest or background for what lies outside it");
     }
   }
   nudge_.low_plus_high = glm::i64vec3(rest.low) + glm::i64vec3(rest.high);

@@ -65,6 +65,10 @@ TEST(Program, WrongCommandLinesExitWithTwoAndWriteNothing) {
                 {"deform in.nii -f identity -o out.nii --compress 3", "--compress"},
                 {"deform in.nii -f identity -o out.nii --coverage out.nii", "out.nii"},
                 {"deform in.nii -f identity -o out.nii --no-such-option", "no-such-option"},
+                {"deform in.nii -f identity -o out.nii --background nan", "--background"},
+                {"deform in.nii -f identity -o out.nii --background 40000", "40000"},
+                {"deform in.nii -f identity -o out.nii --preview look.jpg", "look.jpg"},
+                {"deform in.nii -f identity -o out.nii --series 1", "--series"},
                 {"phantom -o out.nii --size 1,20,16", "--size"},
                 {"phantom -o out.nii --spacing 0,1,1", "--spacing"},
                 {"field identity --like in.nii -o out.txt", "out.txt"}};
@@ -108,6 +112,7 @@ TEST(Program, FailuresExitWithOneAndLoseNothing) {
   write_file(scratch / "out.nii", "precious");
   expect_error(run_tetwarp(scratch.path(), "deform in.nii -f identity -o out.nii"), 1, "out.nii exists");
   EXPECT_EQ(read_text(scratch / "out.nii"), "precious");
+  expect_error(run_tetwarp(scratch.path(), "deform in.nii -f identity -o out.nii --dry-run"), 1, "out.nii exists");
   expect_error(run_tetwarp(scratch.path(), "deform in.nii -f identity -o no_folder/out.nii"), 1, "no_folder");
   expect_error(run_tetwarp(scratch.path(), "deform in.nii -f identity -o new.nii --backend cuda"), 1, "CUDA");
   expect_error(run_tetwarp(scratch.path(), "deform in.nii -f identity -o new.nii --memory 1M"), 1, "--memory");
@@ -128,8 +133,39 @@ TEST(Program, AFullDiskFailsAndLeavesNothing) {
   const int status =
       std::system(("cd '" + scratch.path().string() + "' && " + limited + " > .stdout 2> .stderr").c_str());
   EXPECT_EQ(WEXITSTATUS(status), 1);
-  EXPECT_NE(read_text(scratch / ".stderr").find("tetwarp: error: "), std::string::npos);
+  const std::string said = read_text(scratch / ".stderr");
+  EXPECT_EQ(said.rfind("tetwarp: error: ", 0), 0u) << said;
+  EXPECT_EQ(said.find("partial"), std::string::npos) << "names the place where it was staged: " << said;
   EXPECT_EQ(count_files(scratch), 1u);
+}
+
+TEST(Program, StandardOutputThatCannotBeWrittenFails) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full on this machine";
+  const Scratch scratch;
+  ASSERT_EQ(run_tetwarp(scratch.path(), kPhantom + std::string("in.nii")).status, 0);
+  for (const std::string arguments : {"info in.nii", "info in.nii --json", "--version", "deform --help"}) {
+    const int status = std::system(
+        ("cd '" + scratch.path().string() + "' && \"" TETWARP_PROGRAM "\" " + arguments + " > /dev/full 2> .stderr")
+            .c_str());
+    EXPECT_EQ(WEXITSTATUS(status), 1) << arguments;
+  }
+}
+
+TEST(Program, ADicomOutputNeverLandsAmongTheSlicesOfItsSource) {
+  const Scratch scratch;
+  ASSERT_EQ(run_tetwarp(scratch.path(), kPhantom + std::string("in")).status, 0);
+  const auto first = std::filesystem::directory_iterator(scratch / "in")->path().filename().string();
+  expect_error(run_tetwarp(scratch.path(), "deform in/" + first + " -f identity -o in/derived"), 2, "in/derived");
+  expect_error(run_tetwarp(scratch.path(), "deform in -f identity -o in/derived"), 2, "in/derived");
+  EXPECT_EQ(run_tetwarp(scratch.path(), "deform in/" + first + " -f identity -o derived").status, 0);
+  EXPECT_FALSE(std::filesystem::exists(scratch / "in/derived"));
+}
+
+TEST(Program, ABrokenEndSliceIsNotPassedOver) {
+  const Scratch scratch;
+  ASSERT_EQ(run_tetwarp(scratch.path(), kPhantom + std::string("in")).status, 0);
+  std::filesystem::resize_file(scratch / "in/IM00001.dcm", 100);
+  expect_error(run_tetwarp(scratch.path(), "deform in -f identity -o out.nii"), 4, "IM00001.dcm");
 }
 
 TEST(Program, QuietIsSilentAndTheDryRunWritesNothing) {

@@ -44,7 +44,7 @@ TEST(DicomFolder, JunkIsSkippedWithTheReason) {
   const Scratch folder;
   write_stack(folder.path(), 3);
   write_file(folder / "a-notes.txt", "not an image at all");
-  write_file(folder / "b-empty.dcm", "");
+  write_file(folder / "b-empty.log", "");
   write_file(folder / "c-noise", std::string(5000, '\b'));
   fs::create_symlink("nowhere", folder / "d-link");
   ASSERT_EQ(::mkfifo((folder / "e-pipe").c_str(), 0600), 0);
@@ -53,10 +53,25 @@ TEST(DicomFolder, JunkIsSkippedWithTheReason) {
   EXPECT_EQ(scan.series[0].refusal, std::nullopt);
   ASSERT_EQ(scan.skipped.size(), 5u);
   EXPECT_TRUE(says(scan.skipped[0], {"a-notes.txt: not DICOM"}));
-  EXPECT_TRUE(says(scan.skipped[1], {"b-empty.dcm: an empty file"}));
+  EXPECT_TRUE(says(scan.skipped[1], {"b-empty.log: an empty file"}));
   EXPECT_TRUE(says(scan.skipped[2], {"c-noise: not DICOM"}));
   EXPECT_TRUE(says(scan.skipped[3], {"d-link: a link that leads nowhere"}));
   EXPECT_TRUE(says(scan.skipped[4], {"e-pipe: not a regular file"}));
+}
+
+TEST(DicomFolder, AFileThatMayHaveBeenASliceIsNotPassedOver) {
+  const std::string preamble(100, '\0');
+  for (const std::string& content : {std::string(), preamble}) {
+    const Scratch folder;
+    write_stack(folder.path(), 3);
+    write_file(folder / "s03.dcm", content);
+    const DicomScan scan = scan_dicom(folder.path());
+    ASSERT_EQ(scan.series.size(), 1u);
+    ASSERT_TRUE(scan.series[0].refusal);
+    EXPECT_TRUE(says(*scan.series[0].refusal, {"s03.dcm", "it may be a slice"}));
+    EXPECT_TRUE(scan_dicom(folder / "s00.dcm").series.at(0).refusal) << "also for the series beside one file";
+    EXPECT_EQ(scan_dicom(folder / "s00.dcm", true).series.at(0).refusal, std::nullopt);
+  }
 }
 
 TEST(DicomFolder, LinksAreFollowedAndEachRealFolderAndFileCountsOnce) {
