@@ -9,6 +9,7 @@
 #include "apps/field_source.h"
 #include "apps/input.h"
 #include "apps/output.h"
+#include "deform/fields/formula.h"
 #include "io/field_file.h"
 #include "io/image_file.h"
 #include "io/preview.h"
@@ -85,6 +86,7 @@ class Deformation {
   json canonical_options() const;
   json sidecar() const;
   json report_with_times() const;
+  std::string title() const;
   std::string summary() const;
 
   const DeformOptions& options_;
@@ -331,13 +333,23 @@ void Deformation::write() {
   }
   if (!outputs_.coverage.empty()) write_image(outputs_.coverage, std::as_const(coverage_).view());
   if (!outputs_.preview.empty()) {
-    write_preview(outputs_.preview, std::as_const(input_.volume).view(), std::as_const(output_).view(),
-                  options_.pull_field.empty() ? options_.fields.front() : "pull field");
+    write_preview(outputs_.preview, std::as_const(input_.volume).view(), std::as_const(output_).view(), title());
   }
   write_json(outputs_.sidecar, sidecar());
   stages_.emplace_back("write", std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   if (!outputs_.report.empty()) write_json(outputs_.report, report_with_times());
   outputs_.set.commit();
+}
+
+/// What the preview says above the pictures: the fields by name, files without their folders.
+std::string Deformation::title() const {
+  if (!options_.pull_field.empty()) return "pull field " + options_.pull_field.filename().string();
+  std::string text;
+  for (const std::string& field : options_.fields) {
+    text += (text.empty() ? "" : ", then ") +
+            (is_formula(field) ? field : std::filesystem::path(field).filename().string());
+  }
+  return text;
 }
 
 std::string Deformation::summary() const {

@@ -20,6 +20,8 @@ struct RealSeries {
   glm::i64vec3 size;
 };
 
+void PrintTo(const RealSeries& series, std::ostream* out) { *out << series.set; }
+
 class RealCt : public testing::TestWithParam<RealSeries> {};
 
 DicomVolume load_only_series(const std::filesystem::path& folder) {

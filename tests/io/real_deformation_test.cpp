@@ -22,6 +22,8 @@ struct RealCt {
   const char *set, *folder;
 };
 
+void PrintTo(const RealCt& series, std::ostream* out) { *out << series.set; }
+
 using Inverse = std::function<glm::dvec3(const glm::dvec3& point)>;
 
 /// The point that a bubble moves to `point`: its radial profile r' = r (1 + a (1 - r/R)^2) by bisection.
