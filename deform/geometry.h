@@ -32,7 +32,7 @@ struct AffineMap {
   glm::dmat3 linear{1};
   glm::dvec3 offset{0};
 
-  glm::dvec3 operator()(const glm::dvec3& x) const { return linear * x + offset; }
+  TETWARP_HD glm::dvec3 operator()(const glm::dvec3& x) const { return linear * x + offset; }
   AffineMap operator*(const AffineMap& first) const { return {linear * first.linear, linear * first.offset + offset}; }
 };
 

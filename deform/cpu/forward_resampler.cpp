@@ -89,7 +89,7 @@ class ForwardResampler final : public Resampler {
             const std::uint64_t first =
                 kTetrahedraPerCell * static_cast<std::uint64_t>((at.z * cells.y + at.y) * cells.x + at.x);
             visit_cell(
-                block.cell({x, y, z}), block.is_odd({x, y, z}), voxels, lattice_.nudge(),
+                block.cell({x, y, z}), block.is_odd({x, y, z}), voxels, lattice_.frame().nudge,
                 [&](const glm::i64vec3& voxel, const glm::i32vec3& signs, int t, const Tetrahedron& tetrahedron) {
                   const glm::i64vec3 in = voxel - box.begin;
                   const auto place = static_cast<std::size_t>((in.z * size.y + in.y) * size.x + in.x);
@@ -136,7 +136,7 @@ class ForwardResampler final : public Resampler {
       const std::size_t place = first + static_cast<std::size_t>(i);
       const bool owned = tile.owner[place] != kNobody;
       tile.mapped[i] = owned;
-      if (!rest || lattice_.inside_undeformed(row.voxel + glm::i64vec3(i, 0, 0))) continue;
+      if (!rest || lattice_.frame().holds(row.voxel + glm::i64vec3(i, 0, 0))) continue;
       report.conflicts += owned;
       if (owned) continue;
       tile.mapped[i] = 1;

@@ -11,19 +11,14 @@
 #include <glm/matrix.hpp>
 #include <string>
 
+#include "deform/field_check.h"
+
 namespace tetwarp::cpu {
 
 namespace {
 
-constexpr double kFarthest = 1 << 17;         ///< voxels that a vertex may be displaced on an axis
-constexpr double kSmallestCell = 1.0 / 1024;  ///< voxels; snapping would leave smaller cells no shape
-constexpr double kReachTolerance = 1.0 / kStepsPerVoxel;
 /// Volumes of tetrahedra within a box of 16 voxels are exact in double: six products of three differences below 2^16.
 constexpr std::int64_t kExactInDouble = 1 << 16;
-
-bool usable(const glm::dvec3& index, double limit) {
-  return std::abs(index.x) < limit && std::abs(index.y) < limit && std::abs(index.z) < limit;  // false for NaN
-}
 
 }  // namespace
 
@@ -78,55 +73,14 @@ bool LatticeIndex::reaches(const Box& box, const Region& region) {
   return true;
 }
 
-bool LatticeIndex::inside_undeformed(const glm::i64vec3& voxel) const {
-  const glm::dvec3 nudge = glm::dvec3(nudge_steps(nudge_.signs(voxel))) * (1.0 / (kStepsPerVoxel * kNudgeSteps));
-  const glm::dvec3 at = lattice_from_output_(glm::dvec3(voxel) + nudge);
-  return at.x >= 0 && at.y >= 0 && at.z >= 0 && at.x <= static_cast<double>(cells_.x) &&
-         at.y <= static_cast<double>(cells_.y) && at.z <= static_cast<double>(cells_.z);
-}
-
-void LatticeIndex::take_geometry(const Geometry& output) {
-  const Geometry& lattice = *field_.lattice;
-  require_valid(lattice, "field lattice");
-  for (int axis = 0; axis < 3; ++axis) {
-    require(lattice.size[axis] >= 2,
-            "field lattice of " + to_string(lattice.size) + " vertices, expected at least 2 on every axis");
-    const double length = glm::length(output_from_lattice_.linear[axis]);
-    require(length >= kSmallestCell, "the field's cells are " + std::to_string(length) +
-                                         " voxels of the output along axis " + std::to_string(axis) +
-                                         ", expected at least 1/1024");
-  }
-  Box rest{glm::i32vec3(INT32_MAX), glm::i32vec3(INT32_MIN)};
-  for (int corner = 0; corner < 8; ++corner) {
-    const glm::dvec3 at = glm::dvec3(corner & 1, corner >> 1 & 1, corner >> 2);
-    require(usable(output_from_lattice_(at * glm::dvec3(cells_)), kLargestIndex),
-            "the field's lattice lies more than 262144 voxels from the output grid");
-    rest.grow(snap(output_from_lattice_(at * glm::dvec3(cells_))));
-    if (field_.outside != Outside::refuse) continue;
-    const glm::dvec3 vertex = lattice_from_output_(at * glm::dvec3(output.size - std::int64_t{1}));
-    for (int axis = 0; axis < 3; ++axis) {
-      const double slack = kReachTolerance / glm::length(output_from_lattice_.linear[axis]);
-      require(vertex[axis] >= -slack && vertex[axis] <= static_cast<double>(cells_[axis]) + slack,
-              "the field's lattice of " + to_string(lattice.size) +
-                  " vertices does not reach over the whole output grid: a corner of the output lies at vertex index " +
-                  std::to_string(vertex[axis]) + " of axis " + std::to_string(axis) + ", expected 0 to " +
-                  std::to_string(cells_[axis]) + "; choose rest or background for what lies outside it");
-    }
-  }
-  nudge_.low_plus_high = glm::i64vec3(rest.low) + glm::i64vec3(rest.high);
-}
-
 void LatticeIndex::build(const Geometry& output, const FieldView& field, const Control& control) {
   field_ = field;
-  require(field_.lattice && field_.displacement, "the field is empty");
-  cells_ = field_.lattice->size - std::int64_t{1};
-  output_from_lattice_ = index_from_point(output) * point_from_index(*field_.lattice);
-  lattice_from_output_ = index_from_point(*field_.lattice) * point_from_index(output);
-  output_from_mm_ = index_from_point(output).linear;
-  take_geometry(output);
+  frame_ = make_lattice_frame(output, field);
+  cells_ = frame_.cells;
+
   const double cell_voxels =
-      std::min({glm::length(output_from_lattice_.linear[0]), glm::length(output_from_lattice_.linear[1]),
-                glm::length(output_from_lattice_.linear[2])});
+      std::min({glm::length(frame_.output_from_lattice.linear[0]), glm::length(frame_.output_from_lattice.linear[1]),
+                glm::length(frame_.output_from_lattice.linear[2])});
   cells_per_block_ =
       std::clamp<std::int64_t>(static_cast<std::int64_t>(Block::kMostCells / cell_voxels), 1, Block::kMostCells);
   blocks_ = (cells_ + (cells_per_block_ - 1)) / cells_per_block_;
@@ -146,11 +100,6 @@ void LatticeIndex::build(const Geometry& output, const FieldView& field, const C
   group_boxes();
 }
 
-void LatticeIndex::refuse_vertex(const glm::i64vec3& vertex) const {
-  throw InputError("the field's displacement at vertex (" + std::to_string(vertex.x) + ", " + std::to_string(vertex.y) +
-                   ", " + std::to_string(vertex.z) + ") is not finite or moves it by more than 131072 voxels");
-}
-
 void LatticeIndex::load(std::size_t block, Block& into) const {
   into.first_cell = unravel(block, blocks_) * cells_per_block_;
   into.cells = glm::i32vec3(glm::min(glm::i64vec3(cells_per_block_), cells_ - into.first_cell));
@@ -162,17 +111,8 @@ void LatticeIndex::load(std::size_t block, Block& into) const {
       const glm::i64vec3 first = into.first_cell + glm::i64vec3(0, y, z);
       const glm::vec3* displacement = field_.displacement + ((first.z * size.y + first.y) * size.x + first.x);
       for (int x = 0; x <= into.cells.x; ++x, ++vertex, ++displacement) {
-        const glm::dvec3 rest = output_from_lattice_(glm::dvec3(first + glm::i64vec3(x, 0, 0)));
-        const glm::i32vec3 snapped = snap(rest);
-        if (*displacement == glm::vec3(0)) {
-          *vertex = {snapped, glm::i32vec3(0)};
-          continue;
-        }
-        const glm::dvec3 shift = output_from_mm_ * glm::dvec3(*displacement);
-        if (!usable(shift, kFarthest) || !usable(rest + shift, kLargestIndex))
-          refuse_vertex(first + glm::i64vec3(x, 0, 0));
-        const glm::i32vec3 deformed = snap(rest + shift);
-        *vertex = {deformed, snapped - deformed};
+        const glm::i64vec3 at = first + glm::i64vec3(x, 0, 0);
+        if (!frame_.snap_vertex(at, *displacement, *vertex)) refuse_vertex(at);
         into.at_rest = into.at_rest && vertex->u == glm::i32vec3(0);
       }
     }
@@ -224,12 +164,12 @@ void LatticeIndex::group_boxes() {
 void LatticeIndex::rest_box(std::size_t block, glm::dvec3* low, glm::dvec3* high) const {
   const glm::i64vec3 begin = unravel(block, blocks_) * cells_per_block_;
   const glm::i64vec3 end = glm::min(begin + cells_per_block_, cells_);
-  const glm::dmat3& linear = output_from_lattice_.linear;
+  const glm::dmat3& linear = frame_.output_from_lattice.linear;
   const glm::dvec3 margin = 4 * kWeightSlack * (glm::abs(linear[0]) + glm::abs(linear[1]) + glm::abs(linear[2]));
   for (int corner = 0; corner < 8; ++corner) {
     const glm::dvec3 vertex(corner & 1 ? end.x : begin.x, corner >> 1 & 1 ? end.y : begin.y,
                             corner >> 2 ? end.z : begin.z);
-    const glm::dvec3 at = output_from_lattice_(vertex);
+    const glm::dvec3 at = frame_.output_from_lattice(vertex);
     *low = glm::min(*low, at - margin);
     *high = glm::max(*high, at + margin);
   }

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "deform/core/lattice_vertex.h"
 #include "deform/core/visit_cell.h"
 #include "deform/resampler.h"
 
@@ -49,11 +50,9 @@ class LatticeIndex {
   void build(const Geometry& output, const FieldView& field, const Control& control);
 
   const FieldView& field() const { return field_; }
-  const Nudge& nudge() const { return nudge_; }
+  const LatticeFrame& frame() const { return frame_; }
   const FieldStatistics& statistics() const { return statistics_; }
   const glm::i64vec3& cells() const { return cells_; }
-  /// Whether a voxel, nudged, lies inside the undeformed lattice.
-  bool inside_undeformed(const glm::i64vec3& voxel) const;
 
   /// Calls `visit(block)` for the number of every block whose box may reach the region.
   template <class Visit>
@@ -83,16 +82,11 @@ class LatticeIndex {
 
   static bool reaches(const Box& box, const Region& region);
   static glm::i64vec3 unravel(std::size_t number, const glm::i64vec3& size);
-  void take_geometry(const Geometry& output);
   void scan_block(std::size_t block, Block& scratch, FieldStatistics& statistics);
   void group_boxes();
-  [[noreturn]] void refuse_vertex(const glm::i64vec3& vertex) const;
 
   FieldView field_;
-  Nudge nudge_;
-  AffineMap output_from_lattice_;
-  AffineMap lattice_from_output_;
-  glm::dmat3 output_from_mm_{1};
+  LatticeFrame frame_;
   glm::i64vec3 cells_{0}, blocks_{0}, groups_{0};
   std::int64_t cells_per_block_ = Block::kMostCells;
   std::vector<Box> boxes_, group_boxes_;

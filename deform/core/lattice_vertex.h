@@ -1,0 +1,44 @@
+#pragma once
+
+#include "deform/core/five_tetrahedra.h"
+#include "deform/geometry.h"
+
+namespace tetwarp {
+
+/// How a lattice lies over an output grid: what turns its vertices into snapped ones.
+struct LatticeFrame {
+  static constexpr double kFarthest = 1 << 17;  ///< voxels that a vertex may be displaced on an axis
+
+  AffineMap output_from_lattice, lattice_from_output;
+  glm::dmat3 output_from_mm{1};
+  glm::i64vec3 cells{0};
+  Nudge nudge;
+
+  TETWARP_HD static bool is_usable(const glm::dvec3& index, double limit) {  // false for NaN
+    return std::fabs(index.x) < limit && std::fabs(index.y) < limit && std::fabs(index.z) < limit;
+  }
+
+  /// Both ends of a vertex in output index, in double, then snapped; u is zero exactly where the displacement is.
+  /// @return false where the displacement is not finite or too long
+  TETWARP_HD bool snap_vertex(const glm::i64vec3& at, const glm::vec3& displacement, Vertex& vertex) const {
+    const glm::dvec3 rest = output_from_lattice(glm::dvec3(at));
+    const glm::i32vec3 snapped = snap(rest);
+    vertex = {snapped, glm::i32vec3(0)};
+    if (displacement.x == 0 && displacement.y == 0 && displacement.z == 0) return true;
+    const glm::dvec3 shift = output_from_mm * glm::dvec3(displacement);
+    if (!is_usable(shift, kFarthest) || !is_usable(rest + shift, kLargestIndex)) return false;
+    vertex.deformed = snap(rest + shift);
+    vertex.u = snapped - vertex.deformed;
+    return true;
+  }
+
+  /// Whether a voxel, nudged, lies inside the undeformed lattice.
+  TETWARP_HD bool holds(const glm::i64vec3& voxel) const {
+    const glm::dvec3 step = glm::dvec3(nudge_steps(nudge.signs(voxel))) * (1.0 / (kStepsPerVoxel * kNudgeSteps));
+    const glm::dvec3 at = lattice_from_output(glm::dvec3(voxel) + step);
+    return at.x >= 0 && at.y >= 0 && at.z >= 0 && at.x <= static_cast<double>(cells.x) &&
+           at.y <= static_cast<double>(cells.y) && at.z <= static_cast<double>(cells.z);
+  }
+};
+
+}  // namespace tetwarp

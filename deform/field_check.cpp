@@ -1,0 +1,59 @@
+#include "deform/field_check.h"
+
+#include <glm/geometric.hpp>
+
+#include "deform/errors.h"
+
+namespace tetwarp {
+
+namespace {
+
+constexpr double kSmallestCell = 1.0 / 1024;  ///< voxels; snapping would leave smaller cells no shape
+constexpr double kReachTolerance = 1.0 / kStepsPerVoxel;
+
+}  // namespace
+
+LatticeFrame make_lattice_frame(const Geometry& output, const FieldView& field) {
+  require(field.lattice && field.displacement, "the field is empty");
+  const Geometry& lattice = *field.lattice;
+  require_valid(lattice, "field lattice");
+  LatticeFrame frame;
+  frame.cells = lattice.size - std::int64_t{1};
+  frame.output_from_lattice = index_from_point(output) * point_from_index(lattice);
+  frame.lattice_from_output = index_from_point(lattice) * point_from_index(output);
+  frame.output_from_mm = index_from_point(output).linear;
+  for (int axis = 0; axis < 3; ++axis) {
+    require(lattice.size[axis] >= 2,
+            "field lattice of " + to_string(lattice.size) + " vertices, expected at least 2 on every axis");
+    const double length = glm::length(frame.output_from_lattice.linear[axis]);
+    require(length >= kSmallestCell, "the field's cells are " + std::to_string(length) +
+                                         " voxels of the output along axis " + std::to_string(axis) +
+                                         ", expected at least 1/1024");
+  }
+  Box rest{glm::i32vec3(INT32_MAX), glm::i32vec3(INT32_MIN)};
+  for (int corner = 0; corner < 8; ++corner) {
+    const glm::dvec3 at = glm::dvec3(corner & 1, corner >> 1 & 1, corner >> 2);
+    require(LatticeFrame::is_usable(frame.output_from_lattice(at * glm::dvec3(frame.cells)), kLargestIndex),
+            "the field's lattice lies more than 262144 voxels from the output grid");
+    rest.grow(snap(frame.output_from_lattice(at * glm::dvec3(frame.cells))));
+    if (field.outside != Outside::refuse) continue;
+    const glm::dvec3 vertex = frame.lattice_from_output(at * glm::dvec3(output.size - std::int64_t{1}));
+    for (int axis = 0; axis < 3; ++axis) {
+      const double slack = kReachTolerance / glm::length(frame.output_from_lattice.linear[axis]);
+      require(vertex[axis] >= -slack && vertex[axis] <= static_cast<double>(frame.cells[axis]) + slack,
+              "the field's lattice of " + to_string(lattice.size) +
+                  " vertices does not reach over the whole output grid: a corner of the output lies at vertex index " +
+                  std::to_string(vertex[axis]) + " of axis " + std::to_string(axis) + ", expected 0 to " +
+                  std::to_string(frame.cells[axis]) + "; choose rest or background for what lies outside it");
+    }
+  }
+  frame.nudge.low_plus_high = glm::i64vec3(rest.low) + glm::i64vec3(rest.high);
+  return frame;
+}
+
+void refuse_vertex(const glm::i64vec3& vertex) {
+  throw InputError("the field's displacement at vertex (" + std::to_string(vertex.x) + ", " + std::to_string(vertex.y) +
+                   ", " + std::to_string(vertex.z) + ") is not finite or moves it by more than 131072 voxels");
+}
+
+}  // namespace tetwarp

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <string>
+
+#include "deform/core/lattice_vertex.h"
+#include "deform/vertex_field.h"
+
+namespace tetwarp {
+
+/// Checks everything about a forward field but its displacements. Every backend begins `set_field` with it.
+/// @throws InputError for a lattice that is empty, too far, too fine, or does not reach over the output
+/// (Outside::refuse)
+LatticeFrame make_lattice_frame(const Geometry& output, const FieldView& field);
+
+/// @throws InputError for the vertex that `LatticeFrame::snap_vertex` could not use
+[[noreturn]] void refuse_vertex(const glm::i64vec3& vertex);
+
+}  // namespace tetwarp
