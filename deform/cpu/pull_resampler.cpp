@@ -11,6 +11,7 @@
 #include "deform/cpu/map_writer.h"
 #include "deform/cpu/sampler.h"
 #include "deform/cpu/tiles.h"
+#include "deform/target_check.h"
 
 namespace tetwarp {
 

@@ -1,0 +1,95 @@
+#include "deform/target_check.h"
+
+#include <glm/common.hpp>
+
+namespace tetwarp {
+
+namespace {
+
+constexpr int kWidestReach = 2;  // voxels from its place that an interpolation (cubic) reads
+
+std::string describe(const Region& region) {
+  const auto corner = [](const glm::i64vec3& at) {
+    return "(" + std::to_string(at.x) + ", " + std::to_string(at.y) + ", " + std::to_string(at.z) + ")";
+  };
+  return corner(region.begin) + " to " + corner(region.end);
+}
+
+template <class View>
+void check_view(const View& view, const std::string& name) {
+  require(view.geometry && view.voxels, name + " is empty");
+  require(view.components == 1, name + " has " + std::to_string(view.components) + " components, expected 1");
+  require(contains(whole(*view.geometry), view.buffered), name + " buffers " + describe(view.buffered) +
+                                                              ", which is not part of its grid of " +
+                                                              to_string(view.geometry->size));
+}
+
+void check_target(const Target& target, const Geometry& output, const Region& region, const Region& needed) {
+  check_view(target.source, "the source");
+  check_view(target.output, "the output");
+  require_valid(*target.source.geometry, "source grid");
+  require(*target.output.geometry == output, "the output of " + to_string(target.output.geometry->size) +
+                                                 " voxels is not on the resampler's grid of " + to_string(output.size));
+  require(target.output.type == target.source.type, "the output holds " + to_string(target.output.type) +
+                                                        ", the source " + to_string(target.source.type) +
+                                                        ": they must be the same");
+  require(contains(target.output.buffered, region),
+          "the output buffers " + describe(target.output.buffered) + ", the region asked for is " + describe(region));
+  require(contains(target.source.buffered, needed),
+          "the source buffers " + describe(target.source.buffered) + ", needed is " + describe(needed));
+  require(target.sampled_slices.empty() || static_cast<std::int64_t>(target.sampled_slices.size()) == output.size.z,
+          "sampled_slices has " + std::to_string(target.sampled_slices.size()) + " entries, expected one for each of " +
+              std::to_string(output.size.z) + " slices");
+}
+
+void check_map(const VolumeView& map, const std::string& name, VoxelType type, int components, const Geometry& output,
+               const Region& region) {
+  if (!map.voxels) return;
+  require(map.geometry && *map.geometry == output, "the " + name + " map is not on the resampler's grid");
+  require(map.type == type && map.components == components,
+          "the " + name + " map holds " + std::to_string(map.components) + " x " + to_string(map.type) + ", expected " +
+              std::to_string(components) + " x " + to_string(type));
+  require(contains(map.buffered, region), "the " + name + " map does not buffer the region asked for");
+}
+
+}  // namespace
+
+void check_targets(const Resampler& resampler, std::span<const Target> targets, const Region& region) {
+  const Geometry& output = resampler.output();
+  require(contains(whole(output), region),
+          "the region asked for is not part of the output grid of " + to_string(output.size));
+  for (const Target& target : targets) {
+    const Geometry* grid = target.source.geometry;
+    const bool all = !grid || target.source.buffered == whole(*grid);
+    check_target(target, output, region, all ? Region{} : resampler.source_region(*grid, region));
+  }
+}
+
+void check_maps(const Maps& maps, const Geometry& output, const Region& region) {
+  check_map(maps.coverage, "coverage", VoxelType::u8, 1, output, region);
+  check_map(maps.inverse_mm, "inverse", VoxelType::f32, 3, output, region);
+  check_map(maps.jacobian, "jacobian", VoxelType::f32, 1, output, region);
+  check_map(maps.owners, "owners", VoxelType::u16, 1, output, region);
+}
+
+SourceRelation relate(const Geometry& source, const Geometry& output) {
+  return {source == output, index_from_point(source) * point_from_index(output)};
+}
+
+Region source_box(const Geometry& source, const Geometry& output, const glm::dvec3& low, const glm::dvec3& high) {
+  if (!(low.x <= high.x)) return {};
+  const AffineMap source_from_output = index_from_point(source) * point_from_index(output);
+  glm::dvec3 least(INFINITY), most(-INFINITY);
+  for (int corner = 0; corner < 8; ++corner) {
+    const glm::dvec3 at(corner & 1 ? high.x : low.x, corner >> 1 & 1 ? high.y : low.y, corner >> 2 ? high.z : low.z);
+    const glm::dvec3 index = source_from_output(at);
+    least = glm::min(least, index);
+    most = glm::max(most, index);
+  }
+  const glm::dvec3 last(source.size);
+  least = glm::clamp(glm::floor(least) - double{kWidestReach}, glm::dvec3(0), last);
+  most = glm::clamp(glm::floor(most) + double{kWidestReach + 1}, glm::dvec3(0), last);
+  return {glm::i64vec3(least), glm::i64vec3(most)};
+}
+
+}  // namespace tetwarp
