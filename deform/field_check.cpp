@@ -51,6 +51,33 @@ LatticeFrame make_lattice_frame(const Geometry& output, const FieldView& field) 
   return frame;
 }
 
+PullFrame make_pull_frame(const Geometry& output, const PullFieldView& field) {
+  require(field.grid && field.displacement, "the pull field is empty");
+  require_valid(*field.grid, "pull field grid");
+  PullFrame frame;
+  frame.grid_from_output = index_from_point(*field.grid) * point_from_index(output);
+  frame.output_from_mm = index_from_point(output).linear;
+  frame.size = field.grid->size;
+  frame.displacement = field.displacement;
+  frame.rest_outside = field.outside == Outside::rest;
+  for (int corner = 0; corner < 8 && field.outside == Outside::refuse; ++corner) {
+    const glm::dvec3 at = glm::dvec3(corner & 1, corner >> 1 & 1, corner >> 2);
+    const glm::dvec3 found = frame.grid_from_output(at * glm::dvec3(output.size - std::int64_t{1}));
+    glm::dvec3 index = found;
+    require(frame.clamp_to_samples(index),
+            "the pull field's grid of " + to_string(frame.size) +
+                " samples does not reach over the whole output grid: a corner of the output lies at (" +
+                std::to_string(found.x) + ", " + std::to_string(found.y) + ", " + std::to_string(found.z) +
+                ") of it; choose rest or background for what lies outside it");
+  }
+  return frame;
+}
+
+void refuse_sample(const glm::i64vec3& sample) {
+  throw InputError("the pull field's displacement at (" + std::to_string(sample.x) + ", " + std::to_string(sample.y) +
+                   ", " + std::to_string(sample.z) + ") is not finite or longer than 262144 voxels");
+}
+
 void refuse_vertex(const glm::i64vec3& vertex) {
   throw InputError("the field's displacement at vertex (" + std::to_string(vertex.x) + ", " + std::to_string(vertex.y) +
                    ", " + std::to_string(vertex.z) + ") is not finite or moves it by more than 131072 voxels");

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "deform/core/lattice_vertex.h"
+#include "deform/core/pull_frame.h"
 #include "deform/vertex_field.h"
 
 namespace tetwarp {
@@ -12,7 +13,12 @@ namespace tetwarp {
 /// (Outside::refuse)
 LatticeFrame make_lattice_frame(const Geometry& output, const FieldView& field);
 
+/// The same for a pull field.
+PullFrame make_pull_frame(const Geometry& output, const PullFieldView& field);
+
 /// @throws InputError for the vertex that `LatticeFrame::snap_vertex` could not use
 [[noreturn]] void refuse_vertex(const glm::i64vec3& vertex);
+/// @throws InputError for the sample of a pull field whose vector is not finite or too long
+[[noreturn]] void refuse_sample(const glm::i64vec3& sample);
 
 }  // namespace tetwarp
