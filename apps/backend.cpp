@@ -2,17 +2,28 @@
 
 #include <thread>
 
+#include "cuda/devices.h"
+
 namespace tetwarp::apps {
 
-Backend make_backend(const std::string& wanted, Direction direction, const Geometry& output, const Limits& limits) {
-  if (wanted == "cuda")
-    throw NotCompiled("--backend cuda: CUDA is not in this build; use --backend cpu, the bits are the same");
-  return {"cpu",
-          direction == Direction::pull ? make_cpu_pull_resampler(output, limits) : make_cpu_resampler(output, limits)};
+Backend make_backend(const std::string& wanted, Direction direction, const Geometry& output, int device,
+                     const Limits& limits) {
+  const bool pull = direction == Direction::pull;
+  if (wanted == "cuda" || (wanted == "auto" && cuda_device_count() > 0)) {
+    return {"cuda",
+            pull ? make_cuda_pull_resampler(output, device, limits) : make_cuda_resampler(output, device, limits)};
+  }
+  return {"cpu", pull ? make_cpu_pull_resampler(output, limits) : make_cpu_resampler(output, limits)};
 }
 
 std::vector<std::string> describe_backends() {
-  return {"cpu: usable, " + std::to_string(std::thread::hardware_concurrency()) + " threads"};
+  std::vector<std::string> lines = {"cpu: usable, " + std::to_string(std::thread::hardware_concurrency()) + " threads"};
+  if (!has_cuda()) lines.emplace_back("cuda: not in this build");
+  if (has_cuda() && cuda_device_count() == 0) lines.emplace_back("cuda: built in, no device on this machine");
+  for (int device = 0; device < cuda_device_count(); ++device) {
+    lines.push_back("cuda: usable, device " + std::to_string(device) + " " + describe_cuda_device(device));
+  }
+  return lines;
 }
 
 }  // namespace tetwarp::apps

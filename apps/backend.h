@@ -15,9 +15,10 @@ struct Backend {
   std::unique_ptr<Resampler> resampler;
 };
 
-/// @param wanted  auto, cpu or cuda
+/// @param wanted  auto (CUDA where a device works, else the CPU), cpu or cuda
 /// @throws NotCompiled for a backend that this build does not have, DeviceError for one that does not work here
-Backend make_backend(const std::string& wanted, Direction direction, const Geometry& output, const Limits& limits);
+Backend make_backend(const std::string& wanted, Direction direction, const Geometry& output, int device,
+                     const Limits& limits);
 
 /// One line a backend: its name, and whether it can be used on this machine.
 std::vector<std::string> describe_backends();

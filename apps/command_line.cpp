@@ -96,6 +96,10 @@ void add_deform(CLI::App& app, DeformOptions& options) {
   command->add_option("--backend", options.backend, "auto, cuda or cpu: the bits are the same")
       ->check(CLI::IsMember({"auto", "cuda", "cpu"}))
       ->capture_default_str();
+  command->add_option("--device", options.device, "CUDA device, as `tetwarp --version` numbers them")
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("N")
+      ->capture_default_str();
   const std::map<std::string, Interpolation> interpolations = {
       {"nearest", Interpolation::nearest}, {"linear", Interpolation::linear}, {"cubic", Interpolation::cubic}};
   command->add_option("--interpolation", options.interpolation, "linear (default), nearest or cubic")

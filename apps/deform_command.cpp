@@ -212,7 +212,8 @@ void Deformation::resample() {
   auto input_hash = std::async(
       std::launch::async, [&] { return input_.is_dicom() ? input_.dicom->sha256 : hash_file(options_.input.path); });
   const Geometry& grid = input_.volume.geometry();
-  Backend backend = make_backend(options_.backend, field_.direction, grid, {.threads = options_.common.threads});
+  Backend backend =
+      make_backend(options_.backend, field_.direction, grid, options_.device, {.threads = options_.common.threads});
   backend_ = backend.name;
   if (field_.direction == Direction::pull) {
     backend.resampler->set_field(view(field_.pull, options_.outside), {.stop = interrupt_token()});

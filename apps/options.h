@@ -59,6 +59,7 @@ struct DeformOptions {
   std::filesystem::path pull_field;
   std::filesystem::path output;
   std::string backend = "auto";
+  int device = 0;  ///< of CUDA
   Interpolation interpolation = Interpolation::linear;
   Outside outside = Outside::refuse;
   std::optional<double> background;

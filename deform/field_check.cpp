@@ -1,8 +1,10 @@
 #include "deform/field_check.h"
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include "deform/errors.h"
+#include "deform/target_check.h"
 
 namespace tetwarp {
 
@@ -71,6 +73,25 @@ PullFrame make_pull_frame(const Geometry& output, const PullFieldView& field) {
                 ") of it; choose rest or background for what lies outside it");
   }
   return frame;
+}
+
+Region pull_source_region(const PullFrame& frame, const Geometry& grid, const Geometry& output, const Geometry& source,
+                          Region region) {
+  region = intersection(region, whole(output));
+  if (tetwarp::is_empty(region)) return {};
+  const glm::dvec3 first(region.begin), last(region.end - std::int64_t{1});
+  Region samples = source_box(grid, output, first, last);
+  glm::dvec3 least(0), most(0);
+  for (std::int64_t z = samples.begin.z; z < samples.end.z; ++z) {
+    for (std::int64_t y = samples.begin.y; y < samples.end.y; ++y) {
+      for (std::int64_t x = samples.begin.x; x < samples.end.x; ++x) {
+        const glm::dvec3 shift = frame.sample({x, y, z});
+        least = glm::min(least, shift);
+        most = glm::max(most, shift);
+      }
+    }
+  }
+  return source_box(source, output, first + least, last + most);
 }
 
 void refuse_sample(const glm::i64vec3& sample) {

@@ -16,6 +16,11 @@ LatticeFrame make_lattice_frame(const Geometry& output, const FieldView& field);
 /// The same for a pull field.
 PullFrame make_pull_frame(const Geometry& output, const PullFieldView& field);
 
+/// The part of a source that a pull field's voxels of a region may be sampled from. The frame's samples are on the
+/// host.
+Region pull_source_region(const PullFrame& frame, const Geometry& grid, const Geometry& output, const Geometry& source,
+                          Region region);
+
 /// @throws InputError for the vertex that `LatticeFrame::snap_vertex` could not use
 [[noreturn]] void refuse_vertex(const glm::i64vec3& vertex);
 /// @throws InputError for the sample of a pull field whose vector is not finite or too long

@@ -110,6 +110,10 @@ std::unique_ptr<Resampler> make_cpu_resampler(Geometry output, Limits limits = {
 /// Pull fields on the CPU: the same Resampler, fed with PullFieldView.
 std::unique_ptr<Resampler> make_cpu_pull_resampler(Geometry output, Limits limits = {});
 
+/// The same on a CUDA device: the same bits. @throws DeviceError without a device, NotCompiled in a build without CUDA
+std::unique_ptr<Resampler> make_cuda_resampler(Geometry output, int device = 0, Limits limits = {});
+std::unique_ptr<Resampler> make_cuda_pull_resampler(Geometry output, int device = 0, Limits limits = {});
+
 /// One whole volume through one field, onto the resampler's geometry; the background is the smallest value present.
 template <class V>
 Volume<V> resample(Resampler& resampler, const Volume<V>& source, const VertexField& field, Report* report = nullptr) {

@@ -67,7 +67,8 @@ struct BasicView {
   int components = 1;      ///< values a voxel, side by side
   Byte* voxels = nullptr;  ///< null: no volume
 
-  operator BasicView<const Byte>() const requires(!std::is_const_v<Byte>) {
+  template <class Other>
+  requires(std::is_same_v<Other, const Byte> && !std::is_same_v<Other, Byte>) operator BasicView<Other>() const {
     return {geometry, buffered, type, components, voxels};
   }
 };

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "deform/core/five_tetrahedra.h"
+#include "deform/core/barycentric.h"
 #include "deform/geometry.h"
 
 namespace tetwarp {
@@ -30,6 +30,16 @@ struct LatticeFrame {
     vertex.deformed = snap(rest + shift);
     vertex.u = snapped - vertex.deformed;
     return true;
+  }
+
+  /// How far beyond the rest box of its cell an undeformed place may lie, for weights leave [0, 1] by the slack.
+  glm::dvec3 beyond_rest() const {
+    const glm::dmat3& m = output_from_lattice.linear;
+    glm::dvec3 reach(0);
+    for (int axis = 0; axis < 3; ++axis) {
+      for (int row = 0; row < 3; ++row) reach[row] += 4 * kWeightSlack * std::fabs(m[axis][row]);
+    }
+    return reach;
   }
 
   /// Whether a voxel, nudged, lies inside the undeformed lattice.

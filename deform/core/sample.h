@@ -187,7 +187,8 @@ template <class V>
 TETWARP_HD V to_voxel(Working<V> value, bool* saturated) {
   using W = Working<V>;
   if constexpr (std::is_floating_point_v<V>) {
-    return static_cast<V>(value);
+    // One NaN for all: which payload arithmetic leaves differs between processors.
+    return value == value ? static_cast<V>(value) : std::numeric_limits<V>::quiet_NaN();
   } else {
     constexpr W kLowest = static_cast<W>(std::numeric_limits<V>::lowest()),
                 kHighest = static_cast<W>(std::numeric_limits<V>::max());

@@ -41,6 +41,10 @@ TETWARP_HD SampledVoxel<V> sample_voxel(const SamplePlan<V>& plan, const glm::i6
                     ? place_at(voxel, offset)
                     : place_at(plan.relation.source_from_output(glm::dvec3(voxel) + glm::dvec3(offset)));
   if (!clamp_to_grid(place, plan.source.size)) return nothing;
+  if (place.fraction.x == 0 && place.fraction.y == 0 && place.fraction.z == 0) {  // a copy, to the bit
+    const V value = plan.source.at(place.base.x, place.base.y, place.base.z);
+    return {value, true, false, plan.padding.present && plan.padding.holds(value), place.base.z, place.base.z};
+  }
   Sample<V> sample;
   std::int64_t first = place.base.z, last = place.base.z + (place.fraction.z != 0);
   if constexpr (kInterpolation == Interpolation::nearest) {

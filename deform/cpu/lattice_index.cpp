@@ -164,8 +164,7 @@ void LatticeIndex::group_boxes() {
 void LatticeIndex::rest_box(std::size_t block, glm::dvec3* low, glm::dvec3* high) const {
   const glm::i64vec3 begin = unravel(block, blocks_) * cells_per_block_;
   const glm::i64vec3 end = glm::min(begin + cells_per_block_, cells_);
-  const glm::dmat3& linear = frame_.output_from_lattice.linear;
-  const glm::dvec3 margin = 4 * kWeightSlack * (glm::abs(linear[0]) + glm::abs(linear[1]) + glm::abs(linear[2]));
+  const glm::dvec3 margin = frame_.beyond_rest();
   for (int corner = 0; corner < 8; ++corner) {
     const glm::dvec3 vertex(corner & 1 ? end.x : begin.x, corner >> 1 & 1 ? end.y : begin.y,
                             corner >> 2 ? end.z : begin.z);

@@ -39,21 +39,7 @@ class PullResampler final : public Resampler {
 
   Region source_region(const Geometry& source, Region region) const override {
     require(ready_, "source_region needs a field: call set_field first");
-    region = intersection(region, whole(output()));
-    if (tetwarp::is_empty(region)) return {};
-    const glm::dvec3 first(region.begin), last(region.end - std::int64_t{1});
-    Region samples = source_box(grid_, output(), first, last);
-    glm::dvec3 least(0), most(0);
-    for (std::int64_t z = samples.begin.z; z < samples.end.z; ++z) {
-      for (std::int64_t y = samples.begin.y; y < samples.end.y; ++y) {
-        for (std::int64_t x = samples.begin.x; x < samples.end.x; ++x) {
-          const glm::dvec3 shift = frame_.sample({x, y, z});
-          least = glm::min(least, shift);
-          most = glm::max(most, shift);
-        }
-      }
-    }
-    return source_box(source, output(), first + least, last + most);
+    return pull_source_region(frame_, grid_, output(), source, region);
   }
 
   Report resample(Region region, std::span<const Target> targets, const Maps& maps, const Control& control) override {

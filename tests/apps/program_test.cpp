@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "cuda/devices.h"
 #include "tests/support/program.h"
 #include "tests/support/scratch.h"
 #include "tests/support/write_file.h"
@@ -114,13 +115,23 @@ TEST(Program, FailuresExitWithOneAndLoseNothing) {
   EXPECT_EQ(read_text(scratch / "out.nii"), "precious");
   expect_error(run_tetwarp(scratch.path(), "deform in.nii -f identity -o out.nii --dry-run"), 1, "out.nii exists");
   expect_error(run_tetwarp(scratch.path(), "deform in.nii -f identity -o no_folder/out.nii"), 1, "no_folder");
-  expect_error(run_tetwarp(scratch.path(), "deform in.nii -f identity -o new.nii --backend cuda"), 1, "CUDA");
   expect_error(run_tetwarp(scratch.path(), "deform in.nii -f identity -o new.nii --memory 1M"), 1, "--memory");
   std::filesystem::create_directory(scratch / "other");
   write_file(scratch / "other/letter.txt", "precious");
   expect_error(run_tetwarp(scratch.path(), kPhantom + std::string("other --overwrite")), 1, "other");
   EXPECT_EQ(read_text(scratch / "other/letter.txt"), "precious");
   EXPECT_EQ(count_files(scratch), 3u);
+}
+
+TEST(Program, CudaByNameFailsWhereNoDeviceIsAndAutoUsesTheCpu) {
+  if (tetwarp::cuda_device_count() > 0) GTEST_SKIP() << "this machine has a CUDA device";
+  const Scratch scratch;
+  ASSERT_EQ(run_tetwarp(scratch.path(), kPhantom + std::string("in.nii")).status, 0);
+  expect_error(run_tetwarp(scratch.path(), "deform in.nii -f identity -o out.nii --backend cuda"), 1, "CUDA");
+  EXPECT_EQ(count_files(scratch), 1u);
+  const Outcome run = run_tetwarp(scratch.path(), "deform in.nii -f identity -o out.nii --backend auto");
+  EXPECT_EQ(run.status, 0);
+  EXPECT_NE(run.err.find("backend cpu"), std::string::npos) << run.err;
 }
 
 TEST(Program, AFullDiskFailsAndLeavesNothing) {

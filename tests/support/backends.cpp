@@ -1,10 +1,19 @@
 #include "tests/support/backends.h"
 
+#include "cuda/devices.h"
+
 namespace tetwarp::test {
 
 const std::vector<Backend>& backends() {
+  const auto on_cuda = [](const Geometry& output, Limits limits) { return make_cuda_resampler(output, 0, limits); };
+  const auto pull_on_cuda = [](const Geometry& output, Limits limits) {
+    return make_cuda_pull_resampler(output, 0, limits);
+  };
+  const std::string no_cuda =
+      !has_cuda() ? "CUDA is not in this build" : (cuda_device_count() == 0 ? "no CUDA device on this machine" : "");
   static const std::vector<Backend> all = {
       {.name = "cpu", .cannot_run = "", .make = make_cpu_resampler, .make_pull = make_cpu_pull_resampler},
+      {.name = "cuda", .cannot_run = no_cuda, .make = on_cuda, .make_pull = pull_on_cuda},
   };
   return all;
 }

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <string>
+
+namespace tetwarp {
+
+/// Devices that this process can use; 0 without a driver, and in a build without CUDA.
+int cuda_device_count();
+/// Name and memory of a device, "NVIDIA H200, 150 GB". @throws DeviceError, NotCompiled
+std::string describe_cuda_device(int device);
+/// Whether CUDA is in this build.
+bool has_cuda();
+
+}  // namespace tetwarp

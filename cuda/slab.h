@@ -1,0 +1,77 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "cuda/device_buffer.h"
+#include "deform/resampler.h"
+
+namespace tetwarp::cuda_detail {
+
+constexpr int kThreads = 128;
+/// Voxels that are worked on at a time: bounds what is kept of each voxel on the device (about 30 bytes).
+constexpr std::int64_t kSlabVoxels = std::int64_t{1} << 25;
+
+inline unsigned blocks_for(std::int64_t count) { return static_cast<unsigned>((count + kThreads - 1) / kThreads); }
+
+/// A box of voxels, as a kernel sees it.
+struct SlabBox {
+  glm::i64vec3 begin, size;
+
+  __host__ __device__ std::int64_t count() const { return size.x * size.y * size.z; }
+  __device__ glm::i64vec3 voxel(std::int64_t n) const {
+    return begin + glm::i64vec3(n % size.x, n / size.x % size.y, n / (size.x * size.y));
+  }
+  __device__ std::int64_t offset(const glm::i64vec3& voxel) const {
+    const glm::i64vec3 at = voxel - begin;
+    return (at.z * size.y + at.y) * size.x + at.x;
+  }
+};
+
+/// Counts of a report, on the device.
+struct Counts {
+  unsigned long long covered, uncovered, clamped, padded, conflicts, multiply_owned;
+};
+
+/// What the field says of each voxel of a slab: where it comes from, and what maps may want to know.
+struct Mapped {
+  DeviceBuffer<std::uint8_t> mapped;
+  DeviceBuffer<glm::vec3> offset;
+  DeviceBuffer<float> jacobian;
+  DeviceBuffer<std::uint16_t> owners;
+};
+
+/// Samples targets and writes maps of slabs whose Mapped is known. Knows nothing of fields.
+class SlabWriter {
+ public:
+  /// Uploads the sources. Targets and maps are checked. @throws DeviceError
+  SlabWriter(const Geometry& output, std::span<const Target> targets, const Maps& maps);
+  ~SlabWriter();
+
+  bool wants_jacobian() const { return maps_.jacobian.voxels != nullptr; }
+  bool wants_owners() const { return maps_.owners.voxels != nullptr; }
+
+  void write(const SlabBox& slab, const Mapped& mapped, Counts* counts);
+  /// Gives the source slices that were read to the targets.
+  void finish();
+
+ private:
+  struct DeviceTarget;
+
+  void write_target(DeviceTarget& target, const SlabBox& slab, const Mapped& mapped, std::uint8_t* coverage,
+                    Counts* counts);
+  void write_maps(const SlabBox& slab, const Mapped& mapped);
+  template <class V>
+  void copy_out(const VolumeView& view, const SlabBox& slab, const V* device, int components);
+
+  const Geometry& output_;
+  Maps maps_;
+  std::vector<std::unique_ptr<DeviceTarget>> targets_;
+  DeviceBuffer<std::uint8_t> coverage_;
+  DeviceBuffer<glm::vec3> inverse_mm_;
+  DeviceBuffer<std::byte> voxels_;
+  std::vector<std::byte> staging_;
+};
+
+}  // namespace tetwarp::cuda_detail
