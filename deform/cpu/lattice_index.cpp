@@ -8,7 +8,6 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <glm/matrix.hpp>
 #include <string>
 
 #include "deform/field_check.h"
@@ -76,14 +75,13 @@ bool LatticeIndex::reaches(const Box& box, const Region& region) {
 void LatticeIndex::build(const Geometry& output, const FieldView& field, const Control& control) {
   field_ = field;
   frame_ = make_lattice_frame(output, field);
-  cells_ = frame_.cells;
 
   const double cell_voxels =
       std::min({glm::length(frame_.output_from_lattice.linear[0]), glm::length(frame_.output_from_lattice.linear[1]),
                 glm::length(frame_.output_from_lattice.linear[2])});
   cells_per_block_ =
       std::clamp<std::int64_t>(static_cast<std::int64_t>(Block::kMostCells / cell_voxels), 1, Block::kMostCells);
-  blocks_ = (cells_ + (cells_per_block_ - 1)) / cells_per_block_;
+  blocks_ = (frame_.cells + (cells_per_block_ - 1)) / cells_per_block_;
   groups_ = (blocks_ + (kGroup - 1)) / kGroup;
   boxes_.resize(static_cast<std::size_t>(blocks_.x * blocks_.y * blocks_.z));
   group_boxes_.resize(static_cast<std::size_t>(groups_.x * groups_.y * groups_.z));
@@ -102,7 +100,7 @@ void LatticeIndex::build(const Geometry& output, const FieldView& field, const C
 
 void LatticeIndex::load(std::size_t block, Block& into) const {
   into.first_cell = unravel(block, blocks_) * cells_per_block_;
-  into.cells = glm::i32vec3(glm::min(glm::i64vec3(cells_per_block_), cells_ - into.first_cell));
+  into.cells = glm::i32vec3(glm::min(glm::i64vec3(cells_per_block_), frame_.cells - into.first_cell));
   into.at_rest = true;
   const glm::i64vec3& size = field_.lattice->size;
   Vertex* vertex = into.vertices;
@@ -163,7 +161,7 @@ void LatticeIndex::group_boxes() {
 
 void LatticeIndex::rest_box(std::size_t block, glm::dvec3* low, glm::dvec3* high) const {
   const glm::i64vec3 begin = unravel(block, blocks_) * cells_per_block_;
-  const glm::i64vec3 end = glm::min(begin + cells_per_block_, cells_);
+  const glm::i64vec3 end = glm::min(begin + cells_per_block_, frame_.cells);
   const glm::dvec3 margin = frame_.beyond_rest();
   for (int corner = 0; corner < 8; ++corner) {
     const glm::dvec3 vertex(corner & 1 ? end.x : begin.x, corner >> 1 & 1 ? end.y : begin.y,

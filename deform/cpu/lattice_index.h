@@ -1,7 +1,5 @@
 #pragma once
 
-#include <atomic>
-#include <span>
 #include <vector>
 
 #include "deform/core/lattice_vertex.h"
@@ -52,7 +50,7 @@ class LatticeIndex {
   const FieldView& field() const { return field_; }
   const LatticeFrame& frame() const { return frame_; }
   const FieldStatistics& statistics() const { return statistics_; }
-  const glm::i64vec3& cells() const { return cells_; }
+  const glm::i64vec3& cells() const { return frame_.cells; }
 
   /// Calls `visit(block)` for the number of every block whose box may reach the region.
   template <class Visit>
@@ -87,7 +85,7 @@ class LatticeIndex {
 
   FieldView field_;
   LatticeFrame frame_;
-  glm::i64vec3 cells_{0}, blocks_{0}, groups_{0};
+  glm::i64vec3 blocks_{0}, groups_{0};
   std::int64_t cells_per_block_ = Block::kMostCells;
   std::vector<Box> boxes_, group_boxes_;
   FieldStatistics statistics_;

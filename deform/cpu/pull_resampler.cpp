@@ -1,17 +1,11 @@
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include <algorithm>
-#include <cmath>
-#include <glm/common.hpp>
-#include <glm/geometric.hpp>
 #include <vector>
 
 #include "deform/cpu/map_writer.h"
 #include "deform/cpu/sampler.h"
 #include "deform/cpu/tiles.h"
 #include "deform/field_check.h"
-#include "deform/target_check.h"
 
 namespace tetwarp {
 
