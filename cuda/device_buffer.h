@@ -8,6 +8,9 @@
 namespace tetwarp::cuda_detail {
 
 /// Owner of device memory for `size` elements; it only grows, so repeated sizes allocate nothing.
+///
+/// Copies and fills are queued on a stream. `upload` from pageable memory and `download` have read or written the host
+/// when they return.
 template <class T>
 class DeviceBuffer {
  public:
@@ -28,15 +31,19 @@ class DeviceBuffer {
   }
   T* data() const { return data_; }
 
-  void upload(const T* host, std::size_t size) {
+  void upload(const T* host, std::size_t size, cudaStream_t stream) {
     reserve(size);
-    TETWARP_CUDA_TRY(cudaMemcpy(data_, host, size * sizeof(T), cudaMemcpyHostToDevice));
+    TETWARP_CUDA_TRY(cudaMemcpyAsync(data_, host, size * sizeof(T), cudaMemcpyHostToDevice, stream));
+    TETWARP_CUDA_TRY(cudaStreamSynchronize(stream));
   }
-  void download(T* host, std::size_t size) const {
-    TETWARP_CUDA_TRY(cudaMemcpy(host, data_, size * sizeof(T), cudaMemcpyDeviceToHost));
+  void download(T* host, std::size_t size, cudaStream_t stream) const {
+    TETWARP_CUDA_TRY(cudaMemcpyAsync(host, data_, size * sizeof(T), cudaMemcpyDeviceToHost, stream));
+    TETWARP_CUDA_TRY(cudaStreamSynchronize(stream));
   }
   /// Sets every byte of the first `size` elements.
-  void fill(int byte, std::size_t size) { TETWARP_CUDA_TRY(cudaMemset(reserve(size), byte, size * sizeof(T))); }
+  void fill(int byte, std::size_t size, cudaStream_t stream) {
+    TETWARP_CUDA_TRY(cudaMemsetAsync(reserve(size), byte, size * sizeof(T), stream));
+  }
 
  private:
   T* data_ = nullptr;

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "cuda/pointer_check.h"
 #include "cuda/slab.h"
 #include "deform/core/visit_cell.h"
 #include "deform/field_check.h"
@@ -185,9 +186,10 @@ class CudaResampler : public Resampler {
     check_wanted(maps);
     if (tetwarp::is_empty(region)) return report_of({}, maps);
     const DeviceScope scope(device_);
+    stream_ = static_cast<cudaStream_t>(control.stream);
     if (control.stop.stop_requested()) throw Cancelled();
-    SlabWriter writer(output(), targets, maps);
-    counts_.fill(0, 1);
+    SlabWriter writer(output(), targets, maps, stream_);
+    counts_.fill(0, 1, stream_);
     const glm::i64vec3 size = region.end - region.begin;
     const std::int64_t rows = std::clamp<std::int64_t>(kSlabVoxels / size.x, 1, size.y);
     const std::int64_t slices =
@@ -207,7 +209,7 @@ class CudaResampler : public Resampler {
     }
     writer.finish();
     Counts counts;
-    counts_.download(&counts, 1);
+    counts_.download(&counts, 1, stream_);  // waits for all that was queued
     return report_of(counts, maps);
   }
 
@@ -217,8 +219,17 @@ class CudaResampler : public Resampler {
   virtual void map_slab(const SlabBox& slab, const SlabWriter& writer) = 0;
   virtual void describe_field(Report&) const {}
 
+  /// The displacements on the device: uploaded, or where they are already.
+  const glm::vec3* on_device(const glm::vec3* displacement, Memory memory, std::int64_t vectors) {
+    require_memory(displacement, memory, "the field");
+    if (memory == Memory::device) return displacement;
+    displacement_.upload(displacement, static_cast<std::size_t>(vectors), stream_);
+    return displacement_.data();
+  }
+
   int device_;
   bool ready_ = false;
+  cudaStream_t stream_ = nullptr;  ///< of the latest call
   Mapped mapped_;
   DeviceBuffer<Counts> counts_;
   DeviceBuffer<glm::vec3> displacement_;
@@ -248,20 +259,21 @@ class ForwardResampler final : public CudaResampler {
     rest_outside_ = field.outside == Outside::rest;
     if (control.stop.stop_requested()) throw Cancelled();
     const DeviceScope scope(device_);
+    stream_ = static_cast<cudaStream_t>(control.stream);
     const glm::i64vec3 size = field.lattice->size;
     const std::int64_t vertices = size.x * size.y * size.z;
-    displacement_.upload(field.displacement, static_cast<std::size_t>(vertices));
+    const glm::vec3* displacement = on_device(field.displacement, field.memory, vertices);
     field_.vertices = vertices_.reserve(static_cast<std::size_t>(vertices));
     statistics_ = {0, 0, ~0ULL, 0, ~0ULL};
-    on_device_.upload(&statistics_, 1);
-    snap_kernel<<<blocks_for(vertices), kThreads>>>(field_.frame, displacement_.data(), vertices, vertices_.data(),
-                                                    on_device_.data());
+    found_.upload(&statistics_, 1, stream_);
+    snap_kernel<<<blocks_for(vertices), kThreads, 0, stream_>>>(field_.frame, displacement, vertices, vertices_.data(),
+                                                                found_.data());
     TETWARP_CUDA_TRY(cudaGetLastError());
-    on_device_.download(&statistics_, 1);
+    found_.download(&statistics_, 1, stream_);
     if (statistics_.bad_vertex != ~0ULL) refuse_vertex(unravel(statistics_.bad_vertex, size));
-    statistics_kernel<<<blocks_for(field_.cell_count()), kThreads>>>(field_, on_device_.data());
+    statistics_kernel<<<blocks_for(field_.cell_count()), kThreads, 0, stream_>>>(field_, found_.data());
     TETWARP_CUDA_TRY(cudaGetLastError());
-    on_device_.download(&statistics_, 1);
+    found_.download(&statistics_, 1, stream_);
     ready_ = true;
   }
 
@@ -270,10 +282,11 @@ class ForwardResampler final : public CudaResampler {
     const DeviceScope scope(device_);
     int low_high[6] = {INT32_MAX, INT32_MAX, INT32_MAX, INT32_MIN, INT32_MIN, INT32_MIN};
     DeviceBuffer<int> found;
-    found.upload(low_high, 6);
-    reach_kernel<<<blocks_for(field_.cell_count()), kThreads>>>(field_, {region.begin, region.end}, found.data());
+    found.upload(low_high, 6, stream_);
+    reach_kernel<<<blocks_for(field_.cell_count()), kThreads, 0, stream_>>>(field_, {region.begin, region.end},
+                                                                            found.data());
     TETWARP_CUDA_TRY(cudaGetLastError());
-    found.download(low_high, 6);
+    found.download(low_high, 6, stream_);
     glm::dvec3 low(region.begin), high(region.end - std::int64_t{1});  // Outside::rest: voxels that stay where they are
     for (int axis = 0; axis < 3; ++axis) {
       const double least = low_high[axis] * (1.0 / kStepsPerVoxel) - field_.frame.beyond_rest()[axis];
@@ -287,16 +300,16 @@ class ForwardResampler final : public CudaResampler {
 
   void map_slab(const SlabBox& slab, const SlabWriter& writer) override {
     const auto voxels = static_cast<std::size_t>(slab.count());
-    owner_.fill(0xFF, voxels);
-    if (writer.wants_owners()) owners_.fill(0, voxels);
+    owner_.fill(0xFF, voxels, stream_);
+    if (writer.wants_owners()) owners_.fill(0, voxels, stream_);
     unsigned* owners = writer.wants_owners() ? owners_.data() : nullptr;
-    claim_kernel<<<blocks_for(field_.cell_count()), kThreads>>>(field_, slab, owner_.data(), owners);
+    claim_kernel<<<blocks_for(field_.cell_count()), kThreads, 0, stream_>>>(field_, slab, owner_.data(), owners);
     TETWARP_CUDA_TRY(cudaGetLastError());
     const Settled settled{mapped_.mapped.reserve(voxels), mapped_.offset.reserve(voxels),
                           writer.wants_jacobian() ? mapped_.jacobian.reserve(voxels) : nullptr,
                           writer.wants_owners() ? mapped_.owners.reserve(voxels) : nullptr};
-    settle_kernel<<<blocks_for(slab.count()), kThreads>>>(field_, rest_outside_, slab, owner_.data(), owners, settled,
-                                                          counts_.data());
+    settle_kernel<<<blocks_for(slab.count()), kThreads, 0, stream_>>>(field_, rest_outside_, slab, owner_.data(),
+                                                                      owners, settled, counts_.data());
     TETWARP_CUDA_TRY(cudaGetLastError());
   }
 
@@ -311,7 +324,7 @@ class ForwardResampler final : public CudaResampler {
   bool rest_outside_ = false;
   Statistics statistics_{};
   DeviceBuffer<Vertex> vertices_;
-  DeviceBuffer<Statistics> on_device_;
+  DeviceBuffer<Statistics> found_;
   DeviceBuffer<unsigned long long> owner_;
   DeviceBuffer<unsigned> owners_;
 };
@@ -323,25 +336,36 @@ class PullResampler final : public CudaResampler {
 
   void set_field(const PullFieldView& field, const Control& control) override {
     ready_ = false;
-    frame_ = on_host_ = make_pull_frame(output(), field);
+    frame_ = make_pull_frame(output(), field);
     grid_ = *field.grid;
+    given_ = field.displacement;
+    given_in_ = field.memory;
     if (control.stop.stop_requested()) throw Cancelled();
     const DeviceScope scope(device_);
+    stream_ = static_cast<cudaStream_t>(control.stream);
     const std::int64_t samples = frame_.size.x * frame_.size.y * frame_.size.z;
-    displacement_.upload(field.displacement, static_cast<std::size_t>(samples));
-    frame_.displacement = displacement_.data();
-    bad_.fill(0xFF, 1);
-    check_pull_kernel<<<blocks_for(samples), kThreads>>>(frame_, samples, bad_.data());
+    frame_.displacement = on_device(field.displacement, field.memory, samples);
+    bad_.fill(0xFF, 1, stream_);
+    check_pull_kernel<<<blocks_for(samples), kThreads, 0, stream_>>>(frame_, samples, bad_.data());
     TETWARP_CUDA_TRY(cudaGetLastError());
     unsigned long long bad = 0;
-    bad_.download(&bad, 1);
+    bad_.download(&bad, 1, stream_);
     if (bad != ~0ULL) refuse_sample(unravel(bad, frame_.size));
     ready_ = true;
   }
 
  private:
   Region source_extent(const Geometry& source, const Region& region) const override {
-    return pull_source_region(on_host_, grid_, output(), source, region);
+    PullFrame frame = frame_;
+    std::vector<glm::vec3> samples;
+    frame.displacement = given_;
+    if (given_in_ == Memory::device) {
+      samples.resize(static_cast<std::size_t>(voxel_count(grid_)));
+      const DeviceScope scope(device_);
+      TETWARP_CUDA_TRY(cudaMemcpy(samples.data(), given_, samples.size() * sizeof(glm::vec3), cudaMemcpyDeviceToHost));
+      frame.displacement = samples.data();
+    }
+    return pull_source_region(frame, grid_, output(), source, region);
   }
 
   void check_wanted(const Maps& maps) const override {
@@ -350,13 +374,15 @@ class PullResampler final : public CudaResampler {
 
   void map_slab(const SlabBox& slab, const SlabWriter&) override {
     const auto voxels = static_cast<std::size_t>(slab.count());
-    pull_kernel<<<blocks_for(slab.count()), kThreads>>>(frame_, slab, mapped_.mapped.reserve(voxels),
-                                                        mapped_.offset.reserve(voxels));
+    pull_kernel<<<blocks_for(slab.count()), kThreads, 0, stream_>>>(frame_, slab, mapped_.mapped.reserve(voxels),
+                                                                    mapped_.offset.reserve(voxels));
     TETWARP_CUDA_TRY(cudaGetLastError());
   }
 
-  PullFrame frame_, on_host_;  ///< they differ in where the samples are
+  PullFrame frame_;
   Geometry grid_;
+  const glm::vec3* given_ = nullptr;  ///< the samples where the caller has them
+  Memory given_in_ = Memory::host;
   DeviceBuffer<unsigned long long> bad_;
 };
 

@@ -1,4 +1,6 @@
 #include "cuda/slab.h"
+
+#include "cuda/pointer_check.h"
 #include "deform/target_check.h"
 
 namespace tetwarp::cuda_detail {
@@ -20,12 +22,12 @@ struct DeviceSlices {
 
 template <class V, Interpolation kInterpolation>
 __global__ void sample_kernel(SamplePlan<V> plan, SlabBox slab, const std::uint8_t* mapped, const glm::vec3* offset,
-                              V* output, std::uint8_t* coverage, DeviceSlices slices, Counts* counts) {
+                              Destination<V> output, std::uint8_t* coverage, DeviceSlices slices, Counts* counts) {
   const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
   if (n >= slab.count()) return;
   const glm::i64vec3 at = slab.voxel(n);
   const SampledVoxel<V> voxel = sample_voxel<V, kInterpolation>(plan, at, mapped[n] != 0, offset[n]);
-  output[n] = voxel.value;
+  output.at(at) = voxel.value;
   if (coverage) coverage[n] = voxel.inside;
   if (counts) {
     count(&counts->covered, voxel.inside);
@@ -56,12 +58,18 @@ __global__ void inverse_kernel(SlabBox slab, glm::dmat3 mm_from_index, const std
 }
 
 template <class V, class... Arguments>
-void launch_sample(Interpolation interpolation, std::int64_t voxels, Arguments... arguments) {
+void launch_sample(cudaStream_t stream, Interpolation interpolation, std::int64_t voxels, Arguments... arguments) {
   const unsigned blocks = blocks_for(voxels);
   switch (interpolation) {
-    case Interpolation::nearest: sample_kernel<V, Interpolation::nearest><<<blocks, kThreads>>>(arguments...); break;
-    case Interpolation::linear: sample_kernel<V, Interpolation::linear><<<blocks, kThreads>>>(arguments...); break;
-    case Interpolation::cubic: sample_kernel<V, Interpolation::cubic><<<blocks, kThreads>>>(arguments...); break;
+    case Interpolation::nearest:
+      sample_kernel<V, Interpolation::nearest><<<blocks, kThreads, 0, stream>>>(arguments...);
+      break;
+    case Interpolation::linear:
+      sample_kernel<V, Interpolation::linear><<<blocks, kThreads, 0, stream>>>(arguments...);
+      break;
+    case Interpolation::cubic:
+      sample_kernel<V, Interpolation::cubic><<<blocks, kThreads, 0, stream>>>(arguments...);
+      break;
   }
   TETWARP_CUDA_TRY(cudaGetLastError());
 }
@@ -71,26 +79,35 @@ void launch_sample(Interpolation interpolation, std::int64_t voxels, Arguments..
 struct SlabWriter::DeviceTarget {
   Target target;
   SourceRelation relation;
-  DeviceBuffer<std::byte> source;
+  const std::byte* source;
+  DeviceBuffer<std::byte> uploaded;  ///< the source, where it was on the host
   DeviceBuffer<long long> first, last;
 };
 
-SlabWriter::SlabWriter(const Geometry& output, std::span<const Target> targets, const Maps& maps)
-    : output_(output), maps_(maps) {
+SlabWriter::SlabWriter(const Geometry& output, std::span<const Target> targets, const Maps& maps, cudaStream_t stream)
+    : output_(output), maps_(maps), stream_(stream) {
+  for (const VolumeView& map : {maps.coverage, maps.inverse_mm, maps.jacobian, maps.owners})
+    require_memory(map.voxels, map.memory, "a map");
   for (const Target& target : targets) {
     auto on_device = std::make_unique<DeviceTarget>();
     on_device->target = target;
     on_device->relation = relate(*target.source.geometry, output);
-    const auto bytes = static_cast<std::size_t>(voxel_count(target.source.buffered)) * size_bytes(target.source.type);
-    on_device->source.upload(target.source.voxels, bytes);
+    require_memory(target.source.voxels, target.source.memory, "the source");
+    require_memory(target.output.voxels, target.output.memory, "the output");
+    on_device->source = target.source.voxels;
+    if (target.source.memory == Memory::host) {
+      const auto bytes = static_cast<std::size_t>(voxel_count(target.source.buffered)) * size_bytes(target.source.type);
+      on_device->uploaded.upload(target.source.voxels, bytes, stream_);
+      on_device->source = on_device->uploaded.data();
+    }
     if (!target.sampled_slices.empty()) {
       std::vector<long long> first, last;
       for (const SliceRange& range : target.sampled_slices) {
         first.push_back(range.first);
         last.push_back(range.last);
       }
-      on_device->first.upload(first.data(), first.size());
-      on_device->last.upload(last.data(), last.size());
+      on_device->first.upload(first.data(), first.size(), stream_);
+      on_device->last.upload(last.data(), last.size(), stream_);
     }
     targets_.push_back(std::move(on_device));
   }
@@ -104,7 +121,7 @@ void SlabWriter::write(const SlabBox& slab, const Mapped& mapped, Counts* counts
     write_target(*targets_[n], slab, mapped, n == 0 ? coverage : nullptr, n == 0 ? counts : nullptr);
   }
   if (targets_.empty()) {
-    count_kernel<<<blocks_for(slab.count()), kThreads>>>(slab, mapped.mapped.data(), coverage, counts);
+    count_kernel<<<blocks_for(slab.count()), kThreads, 0, stream_>>>(slab, mapped.mapped.data(), coverage, counts);
     TETWARP_CUDA_TRY(cudaGetLastError());
   }
   write_maps(slab, mapped);
@@ -116,41 +133,52 @@ void SlabWriter::write_target(DeviceTarget& on_device, const SlabBox& slab, cons
   const DeviceSlices slices{on_device.first.data(), on_device.last.data()};
   dispatch(target.source.type, [&](auto voxel) {
     using V = decltype(voxel);
-    V* output = reinterpret_cast<V*>(voxels_.reserve(static_cast<std::size_t>(slab.count()) * sizeof(V)));
-    const auto plan = plan_target(target, on_device.relation, reinterpret_cast<const V*>(on_device.source.data()));
-    launch_sample<V>(target.interpolation, slab.count(), plan, slab,
+    const bool in_place = target.output.memory == Memory::device;
+    Destination<V> output{nullptr, slab.begin, slab.size.x, slab.size.x * slab.size.y};
+    if (in_place) {
+      const glm::i64vec3 held = target.output.buffered.end - target.output.buffered.begin;
+      output = {reinterpret_cast<V*>(target.output.voxels), target.output.buffered.begin, held.x, held.x * held.y};
+    } else {
+      output.voxels = reinterpret_cast<V*>(voxels_.reserve(static_cast<std::size_t>(slab.count()) * sizeof(V)));
+    }
+    const auto plan = plan_target(target, on_device.relation, reinterpret_cast<const V*>(on_device.source));
+    launch_sample<V>(stream_, target.interpolation, slab.count(), plan, slab,
                      static_cast<const std::uint8_t*>(mapped.mapped.data()),
                      static_cast<const glm::vec3*>(mapped.offset.data()), output, coverage, slices, counts);
-    copy_out(target.output, slab, output, 1);
+    if (!in_place) copy_out(target.output, slab, output.voxels);
   });
 }
 
 void SlabWriter::write_maps(const SlabBox& slab, const Mapped& mapped) {
-  if (maps_.coverage.voxels) copy_out(maps_.coverage, slab, coverage_.data(), 1);
+  if (maps_.coverage.voxels) copy_out(maps_.coverage, slab, coverage_.data());
   if (maps_.inverse_mm.voxels) {
     glm::vec3* inverse_mm = inverse_mm_.reserve(static_cast<std::size_t>(slab.count()));
-    inverse_kernel<<<blocks_for(slab.count()), kThreads>>>(slab, point_from_index(output_).linear, mapped.mapped.data(),
-                                                           mapped.offset.data(), inverse_mm);
+    inverse_kernel<<<blocks_for(slab.count()), kThreads, 0, stream_>>>(
+        slab, point_from_index(output_).linear, mapped.mapped.data(), mapped.offset.data(), inverse_mm);
     TETWARP_CUDA_TRY(cudaGetLastError());
-    copy_out(maps_.inverse_mm, slab, reinterpret_cast<const float*>(inverse_mm), 3);
+    copy_out(maps_.inverse_mm, slab, inverse_mm);
   }
-  if (wants_jacobian()) copy_out(maps_.jacobian, slab, mapped.jacobian.data(), 1);
-  if (wants_owners()) copy_out(maps_.owners, slab, mapped.owners.data(), 1);
+  if (wants_jacobian()) copy_out(maps_.jacobian, slab, mapped.jacobian.data());
+  if (wants_owners()) copy_out(maps_.owners, slab, mapped.owners.data());
 }
 
-template <class V>
-void SlabWriter::copy_out(const VolumeView& view, const SlabBox& slab, const V* device, int components) {
-  const auto row = static_cast<std::size_t>(slab.size.x * components);
-  staging_.resize(static_cast<std::size_t>(slab.count() * components) * sizeof(V));
-  TETWARP_CUDA_TRY(cudaMemcpy(staging_.data(), device, staging_.size(), cudaMemcpyDeviceToHost));
-  const V* from = reinterpret_cast<const V*>(staging_.data());
-  for (std::int64_t z = 0; z < slab.size.z; ++z) {
-    for (std::int64_t y = 0; y < slab.size.y; ++y, from += row) {
-      const std::size_t to =
-          buffer_index(view, slab.begin + glm::i64vec3(0, y, z)) * static_cast<std::size_t>(components);
-      std::copy_n(from, row, reinterpret_cast<V*>(view.voxels) + to);
-    }
-  }
+/// From a buffer of the slab alone into its place in a view, on the host or the device.
+void SlabWriter::copy_out(const VolumeView& view, const SlabBox& slab, const void* device) {
+  const glm::i64vec3 held = view.buffered.end - view.buffered.begin, at = slab.begin - view.buffered.begin;
+  const std::size_t voxel = size_bytes(view.type) * static_cast<std::size_t>(view.components);
+  cudaMemcpy3DParms copy{};
+  const auto pitched = [&](const void* bytes, const glm::i64vec3& size) {
+    const auto width = static_cast<std::size_t>(size.x);
+    return make_cudaPitchedPtr(const_cast<void*>(bytes), width * voxel, width, static_cast<std::size_t>(size.y));
+  };
+  copy.srcPtr = pitched(device, slab.size);
+  copy.dstPtr = pitched(view.voxels, held);
+  copy.dstPos = make_cudaPos(static_cast<std::size_t>(at.x) * voxel, static_cast<std::size_t>(at.y),
+                             static_cast<std::size_t>(at.z));
+  copy.extent = make_cudaExtent(static_cast<std::size_t>(slab.size.x) * voxel, static_cast<std::size_t>(slab.size.y),
+                                static_cast<std::size_t>(slab.size.z));
+  copy.kind = view.memory == Memory::host ? cudaMemcpyDeviceToHost : cudaMemcpyDeviceToDevice;
+  TETWARP_CUDA_TRY(cudaMemcpy3DAsync(&copy, stream_));
 }
 
 void SlabWriter::finish() {
@@ -158,8 +186,8 @@ void SlabWriter::finish() {
     const std::span<SliceRange> ranges = on_device->target.sampled_slices;
     if (ranges.empty()) continue;
     std::vector<long long> first(ranges.size()), last(ranges.size());
-    on_device->first.download(first.data(), first.size());
-    on_device->last.download(last.data(), last.size());
+    on_device->first.download(first.data(), first.size(), stream_);
+    on_device->last.download(last.data(), last.size(), stream_);
     for (std::size_t k = 0; k < ranges.size(); ++k) ranges[k] = {first[k], last[k]};
   }
 }

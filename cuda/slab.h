@@ -29,6 +29,18 @@ struct SlabBox {
   }
 };
 
+/// Where a kernel writes the voxels of a slab: a part of a larger volume, or a buffer of the slab's own.
+template <class V>
+struct Destination {
+  V* voxels;  ///< of `begin`
+  glm::i64vec3 begin;
+  std::int64_t row, slice;
+
+  __device__ V& at(const glm::i64vec3& voxel) const {
+    return voxels[(voxel.z - begin.z) * slice + (voxel.y - begin.y) * row + (voxel.x - begin.x)];
+  }
+};
+
 /// Counts of a report, on the device.
 struct Counts {
   unsigned long long covered, uncovered, clamped, padded, conflicts, multiply_owned;
@@ -45,8 +57,8 @@ struct Mapped {
 /// Samples targets and writes maps of slabs whose Mapped is known. Knows nothing of fields.
 class SlabWriter {
  public:
-  /// Uploads the sources. Targets and maps are checked. @throws DeviceError
-  SlabWriter(const Geometry& output, std::span<const Target> targets, const Maps& maps);
+  /// Uploads the sources that are on the host. Targets and maps are checked. @throws DeviceError
+  SlabWriter(const Geometry& output, std::span<const Target> targets, const Maps& maps, cudaStream_t stream);
   ~SlabWriter();
 
   bool wants_jacobian() const { return maps_.jacobian.voxels != nullptr; }
@@ -62,16 +74,15 @@ class SlabWriter {
   void write_target(DeviceTarget& target, const SlabBox& slab, const Mapped& mapped, std::uint8_t* coverage,
                     Counts* counts);
   void write_maps(const SlabBox& slab, const Mapped& mapped);
-  template <class V>
-  void copy_out(const VolumeView& view, const SlabBox& slab, const V* device, int components);
+  void copy_out(const VolumeView& view, const SlabBox& slab, const void* device);
 
   const Geometry& output_;
   Maps maps_;
+  cudaStream_t stream_;
   std::vector<std::unique_ptr<DeviceTarget>> targets_;
   DeviceBuffer<std::uint8_t> coverage_;
   DeviceBuffer<glm::vec3> inverse_mm_;
   DeviceBuffer<std::byte> voxels_;
-  std::vector<std::byte> staging_;
 };
 
 }  // namespace tetwarp::cuda_detail

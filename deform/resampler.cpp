@@ -14,12 +14,12 @@ void require_one_each(const Geometry& grid, std::size_t vectors) {
 
 FieldView view(const VertexField& field, Outside outside) {
   require_one_each(field.lattice, field.displacement.size());
-  return {&field.lattice, field.displacement.data(), outside};
+  return {&field.lattice, field.displacement.data(), outside, Memory::host};
 }
 
 PullFieldView view(const PullField& field, Outside outside) {
   require_one_each(field.grid, field.displacement.size());
-  return {&field.grid, field.displacement.data(), outside};
+  return {&field.grid, field.displacement.data(), outside, Memory::host};
 }
 
 Resampler::Resampler(Geometry output) : output_(output) {

@@ -70,9 +70,16 @@ struct Report {
 struct Control {
   std::function<void(double)> progress = {};  ///< 0 to 1, monotone, one call at a time, from any thread
   std::stop_token stop = {};                  ///< asked between tiles: the call throws Cancelled
+  /// A cudaStream_t (deform/ knows no CUDA): the work is queued there, after what is queued already, and the call
+  /// returns when it is done. Null: the default stream. Ignored by the CPU.
+  void* stream = nullptr;
 };
 
 /// Sends volumes through a field onto one output geometry; takes field after field.
+///
+/// A CUDA resampler takes fields, sources, outputs and maps in host or device memory, any mixture; device memory must
+/// be of its own device, and is used where it is. The CPU refuses device memory. One object is for one thread at a
+/// time.
 ///
 /// The result is a function of source, field and output alone (docs/algorithm.md): the same bits for any number of
 /// threads, any split into regions and any backend.

@@ -72,6 +72,10 @@ void check_maps(const Maps& maps, const Geometry& output, const Region& region) 
   check_map(maps.owners, "owners", VoxelType::u16, 1, output, region);
 }
 
+void require_host(Memory memory, const std::string& name) {
+  require(memory == Memory::host, name + " is in device memory, which the CPU cannot read; use make_cuda_resampler");
+}
+
 SourceRelation relate(const Geometry& source, const Geometry& output) {
   return {source == output, index_from_point(source) * point_from_index(output)};
 }

@@ -13,6 +13,9 @@ namespace tetwarp {
 void check_targets(const Resampler& resampler, std::span<const Target> targets, const Region& region);
 void check_maps(const Maps& maps, const Geometry& output, const Region& region);
 
+/// What a backend without device memory begins with. @throws InputError naming the view that is on a device
+void require_host(Memory memory, const std::string& name);
+
 /// The part of the source grid that any interpolation may read for places in a box of continuous output index, clipped.
 Region source_box(const Geometry& source, const Geometry& output, const glm::dvec3& low, const glm::dvec3& high);
 

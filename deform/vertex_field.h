@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "deform/geometry.h"
+#include "deform/volume.h"
 
 namespace tetwarp {
 
@@ -36,11 +36,13 @@ struct FieldView {
   const Geometry* lattice = nullptr;
   const glm::vec3* displacement = nullptr;
   Outside outside = Outside::refuse;
+  Memory memory = Memory::host;  ///< of `displacement`; the lattice is always the host's
 };
 struct PullFieldView {
   const Geometry* grid = nullptr;
   const glm::vec3* displacement = nullptr;
   Outside outside = Outside::refuse;
+  Memory memory = Memory::host;
 };
 
 /// @throws InputError unless there is one displacement for each vertex

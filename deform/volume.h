@@ -14,6 +14,8 @@
 namespace tetwarp {
 
 enum class VoxelType : std::uint8_t { u8, i8, u16, i16, u32, i32, f32, f64 };
+/// Where a view's values lie. `device` is memory of the CUDA device that the resampler was made for.
+enum class Memory : std::uint8_t { host, device };
 
 std::size_t size_bytes(VoxelType type);
 /// "int16", "float32" and so on.
@@ -66,10 +68,11 @@ struct BasicView {
   VoxelType type = VoxelType::i16;
   int components = 1;      ///< values a voxel, side by side
   Byte* voxels = nullptr;  ///< null: no volume
+  Memory memory = Memory::host;
 
   template <class Other>
   requires(std::is_same_v<Other, const Byte> && !std::is_same_v<Other, Byte>) operator BasicView<Other>() const {
-    return {geometry, buffered, type, components, voxels};
+    return {geometry, buffered, type, components, voxels, memory};
   }
 };
 using VolumeView = BasicView<std::byte>;
@@ -84,13 +87,18 @@ struct Volume {
 
 template <class V>
 VolumeView view(Volume<V>& volume) {
-  return {&volume.geometry, whole(volume.geometry), voxel_type_of<V>(), 1,
-          std::as_writable_bytes(std::span(volume.voxels)).data()};
+  return {&volume.geometry,
+          whole(volume.geometry),
+          voxel_type_of<V>(),
+          1,
+          std::as_writable_bytes(std::span(volume.voxels)).data(),
+          Memory::host};
 }
 template <class V>
 ConstVolumeView view(const Volume<V>& volume) {
-  return {&volume.geometry, whole(volume.geometry), voxel_type_of<V>(), 1,
-          std::as_bytes(std::span(volume.voxels)).data()};
+  return {
+      &volume.geometry, whole(volume.geometry), voxel_type_of<V>(), 1, std::as_bytes(std::span(volume.voxels)).data(),
+      Memory::host};
 }
 
 /// Owner of a whole volume whose voxel type is known at run time only: what a file holds.

@@ -41,6 +41,7 @@ class ForwardResampler final : public Resampler {
 
   void set_field(const FieldView& field, const Control& control) override {
     ready_ = false;
+    require_host(field.memory, "the field");
     arena_.execute([&] { lattice_.build(output(), field, control); });
     ready_ = true;
   }

@@ -20,6 +20,8 @@ V* row_of(const VolumeView& map, const glm::i64vec3& voxel) {
 MapWriter::MapWriter(const Maps& maps, const Geometry& output, const Region& region)
     : maps_(maps), mm_from_index_(point_from_index(output).linear) {
   check_maps(maps, output, region);
+  for (const VolumeView& map : {maps.coverage, maps.inverse_mm, maps.jacobian, maps.owners})
+    require_host(map.memory, "a map");
 }
 
 void MapWriter::write(const Row& row, const std::uint8_t* coverage, const float* jacobian,

@@ -25,6 +25,7 @@ class PullResampler final : public Resampler {
 
   void set_field(const PullFieldView& field, const Control& control) override {
     ready_ = false;
+    require_host(field.memory, "the pull field");
     frame_ = make_pull_frame(output(), field);
     grid_ = *field.grid;
     check_samples(control);

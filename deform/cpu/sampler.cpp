@@ -11,7 +11,11 @@ std::vector<TargetSampler> make_samplers(const Resampler& resampler, std::span<c
                                          const Region& region) {
   check_targets(resampler, targets, region);
   std::vector<TargetSampler> samplers;
-  for (const Target& target : targets) samplers.emplace_back(target, resampler.output());
+  for (const Target& target : targets) {
+    require_host(target.source.memory, "the source");
+    require_host(target.output.memory, "the output");
+    samplers.emplace_back(target, resampler.output());
+  }
   return samplers;
 }
 

@@ -150,6 +150,25 @@ TEST_P(Refusals, MapsOfAnotherTypeOrPlace) {
   }
 }
 
+TEST_P(Refusals, HostMemoryThatIsSaidToBeOnADevice) {
+  const Geometry grid = unit_grid({7, 6, 5});
+  auto outcome = poisoned_outcome<std::int16_t>(grid);
+  const auto refuse = [&](auto&& spoil) {
+    Call call(make(grid));
+    call.maps = maps_of(outcome);
+    EXPECT_NO_THROW(call());
+    spoil(call);
+    expect_refused("memory", call);
+  };
+  refuse([](Call& c) { c.target.source.memory = Memory::device; });
+  refuse([](Call& c) { c.target.output.memory = Memory::device; });
+  refuse([](Call& c) { c.maps.owners.memory = Memory::device; });
+  const VertexField field = uniform_field(lattice_over(grid, 1), glm::vec3(0));
+  FieldView lying = view(field);
+  lying.memory = Memory::device;
+  expect_refused("memory", [&] { make(grid)->set_field(lying); });
+}
+
 TEST_P(Refusals, AnEmptyRegionIsNoError) {
   Call call(make(unit_grid({7, 6, 5})));
   call.region = {{2, 2, 2}, {2, 4, 4}};

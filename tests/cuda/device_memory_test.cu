@@ -1,0 +1,157 @@
+// Fields, volumes and maps in device memory: the bits of host memory, and refusals instead of a lost context.
+#include <cuda_runtime.h>
+#include <gtest/gtest.h>
+
+#include "cuda/device_buffer.h"
+#include "cuda/devices.h"
+#include "tests/support/fields.h"
+#include "tests/support/shifted.h"
+
+namespace tetwarp {
+namespace {
+
+using namespace test;
+
+class DeviceMemory : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (cuda_device_count() == 0) GTEST_SKIP() << "no CUDA device";
+  }
+};
+
+/// A copy of a host vector on the device.
+template <class T>
+class OnDevice {
+ public:
+  explicit OnDevice(const std::vector<T>& host) : size_(host.size()) { buffer_.upload(host.data(), size_, nullptr); }
+  T* data() const { return buffer_.data(); }
+  std::vector<T> download() const {
+    std::vector<T> host(size_);
+    buffer_.download(host.data(), size_, nullptr);
+    return host;
+  }
+
+ private:
+  cuda_detail::DeviceBuffer<T> buffer_;
+  std::size_t size_;
+};
+
+template <class View>
+View on_device(View view, const void* voxels) {
+  view.voxels = static_cast<decltype(view.voxels)>(const_cast<void*>(voxels));
+  view.memory = Memory::device;
+  return view;
+}
+
+/// A field with folds, and a source on another grid.
+struct Scene {
+  Random random;
+  Geometry grid = unit_grid({41, 30, 23});
+  VertexField field;
+  Volume<std::int16_t> source;
+
+  explicit Scene(std::uint64_t stream) : random(test_seed(), stream), source{grid, {}} {
+    field = field_in_voxels(grid, lattice_over(grid, random.integer(1, 4)), [&](const glm::dvec3&) {
+      return 2.0 * glm::dvec3(random.real(-1, 1), random.real(-1, 1), random.real(-1, 1));
+    });
+    source.voxels.resize(static_cast<std::size_t>(voxel_count(grid)));
+    for (std::int16_t& voxel : source.voxels) voxel = static_cast<std::int16_t>(random.integer(-1000, 3000));
+  }
+};
+
+TEST_F(DeviceMemory, GivesTheBitsOfHostMemoryOnAnyStream) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  for (std::uint64_t n = 0; n < 6; ++n) {
+    Scene scene(n);
+    const Region region{{1, 2, 3}, {40, 29, 22}};
+    const auto cpu = make_cpu_resampler(scene.grid);
+    cpu->set_field(view(scene.field));
+    auto expected = poisoned<std::int16_t>(scene.grid);
+    auto maps = poisoned_outcome<std::int16_t>(scene.grid);
+    const Target host_target{.source = view(scene.source), .output = view(expected), .background = -7};
+    const Report expected_report = cpu->resample(region, {&host_target, 1}, maps_of(maps));
+
+    const OnDevice displacement(scene.field.displacement);
+    const OnDevice source(scene.source.voxels);
+    const OnDevice output(poisoned<std::int16_t>(scene.grid).voxels);
+    const auto fresh = poisoned_outcome<std::int16_t>(scene.grid);
+    const OnDevice coverage(fresh.coverage.voxels);
+    const OnDevice inverse(fresh.inverse_mm.voxels);
+    const OnDevice jacobian(fresh.jacobian.voxels);
+    const OnDevice owners(fresh.owners.voxels);
+    cudaStream_t stream = nullptr;
+    ASSERT_EQ(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), cudaSuccess);
+    const Control control{.stream = n % 2 == 0 ? stream : nullptr};
+    const auto cuda = make_cuda_resampler(scene.grid);
+    FieldView field = view(scene.field);
+    field.displacement = displacement.data();
+    field.memory = Memory::device;
+    cuda->set_field(field, control);
+    const Target target{.source = on_device(host_target.source, source.data()),
+                        .output = on_device(host_target.output, output.data()),
+                        .background = -7};
+    const Maps host_maps = maps_of(maps);
+    const Maps device_maps{on_device(host_maps.coverage, coverage.data()),
+                           on_device(host_maps.inverse_mm, inverse.data()),
+                           on_device(host_maps.jacobian, jacobian.data()), on_device(host_maps.owners, owners.data())};
+    const Report report = cuda->resample(region, {&target, 1}, device_maps, control);
+    EXPECT_EQ(cudaStreamDestroy(stream), cudaSuccess);
+
+    EXPECT_TRUE(same_bits(expected.voxels, output.download()));
+    EXPECT_TRUE(same_bits(maps.coverage.voxels, coverage.download()));
+    EXPECT_TRUE(same_bits(maps.inverse_mm.voxels, inverse.download()));
+    EXPECT_TRUE(same_bits(maps.jacobian.voxels, jacobian.download()));
+    EXPECT_TRUE(same_bits(maps.owners.voxels, owners.download()));
+    EXPECT_EQ(report.covered, expected_report.covered);
+    EXPECT_EQ(report.multiply_owned, expected_report.multiply_owned);
+  }
+}
+
+TEST_F(DeviceMemory, PullFieldsToo) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  Scene scene(17);
+  const PullField field{scene.field.lattice, scene.field.displacement};
+  const auto cpu = make_cpu_pull_resampler(scene.grid);
+  cpu->set_field(view(field));
+  auto expected = poisoned<std::int16_t>(scene.grid);
+  const Target host_target{.source = view(scene.source), .output = view(expected)};
+  cpu->resample(whole(scene.grid), {&host_target, 1});
+  const OnDevice displacement(field.displacement);
+  PullFieldView device_field = view(field);
+  device_field.displacement = displacement.data();
+  device_field.memory = Memory::device;
+  const auto cuda = make_cuda_pull_resampler(scene.grid);
+  cuda->set_field(device_field);
+  auto found = poisoned<std::int16_t>(scene.grid);
+  const Target target{.source = view(scene.source), .output = view(found)};
+  cuda->resample(whole(scene.grid), {&target, 1});
+  EXPECT_TRUE(same_bits(expected.voxels, found.voxels));
+  const Region part{{3, 4, 5}, {20, 21, 9}};
+  EXPECT_EQ(cuda->source_region(scene.grid, part), cpu->source_region(scene.grid, part));
+}
+
+TEST_F(DeviceMemory, PointersThatAreNotWhereTheViewSaysAreRefused) {
+  Scene scene(3);
+  const auto cuda = make_cuda_resampler(scene.grid);
+  FieldView lying = view(scene.field);
+  lying.memory = Memory::device;
+  EXPECT_THROW(cuda->set_field(lying), InputError);
+  const OnDevice displacement(scene.field.displacement);
+  lying = view(scene.field);
+  lying.displacement = displacement.data();
+  EXPECT_THROW(cuda->set_field(lying), InputError);
+
+  cuda->set_field(view(scene.field));
+  auto output = poisoned<std::int16_t>(scene.grid);
+  const Target good{.source = view(scene.source), .output = view(output)};
+  Target bad = good;
+  bad.source.memory = Memory::device;
+  EXPECT_THROW(cuda->resample(whole(scene.grid), {&bad, 1}), InputError);
+  bad = good;
+  bad.output.memory = Memory::device;
+  EXPECT_THROW(cuda->resample(whole(scene.grid), {&bad, 1}), InputError);
+  EXPECT_NO_THROW(cuda->resample(whole(scene.grid), {&good, 1}));  // the context lives on
+}
+
+}  // namespace
+}  // namespace tetwarp
