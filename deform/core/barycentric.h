@@ -21,13 +21,8 @@ TETWARP_HD inline glm::vec3 to_voxels(const glm::i32vec3& steps) {
 
 TETWARP_HD inline float magnitude(float x) { return x < 0 ? -x : x; }
 
-/// Sum of the absolute values of the six products of det(a, b, c): what its rounding error is proportional to.
-TETWARP_HD inline float permanent(const glm::vec3& a, const glm::vec3& b, const glm::vec3& c) {
-  const float x = magnitude(b.y * c.z) + magnitude(b.z * c.y);
-  const float y = magnitude(b.z * c.x) + magnitude(b.x * c.z);
-  const float z = magnitude(b.x * c.y) + magnitude(b.y * c.x);
-  return (magnitude(a.x) * x + magnitude(a.y) * y) + magnitude(a.z) * z;
-}
+/// Length of a vector in the sum norm; the product of three bounds what a determinant's rounding error grows with.
+TETWARP_HD inline float norm1(const glm::vec3& v) { return (magnitude(v.x) + magnitude(v.y)) + magnitude(v.z); }
 
 /// det of three differences about D, exact; `r` in nudge units or steps.
 TETWARP_HD inline Wide determinant(const glm::i64vec3& a, const glm::i64vec3& b, const glm::i64vec3& c) {
@@ -39,8 +34,52 @@ TETWARP_HD inline Wide determinant(const glm::i64vec3& a, const glm::i64vec3& b,
 
 /// How far a weight may leave [0, 1] at the voxel before u is taken at the nudged point, where it cannot.
 constexpr double kWeightSlack = 1.0 / 64;
-/// Below this part of its permanent, a float determinant has too few right digits.
+/// Below this part of the product of its columns' sum norms, a float determinant has too few right digits.
 constexpr float kThin = 1.0f / 256;
+
+/// Cramer's rule for [A-D B-D C-D] (b_A, b_B, b_C)^T = r (paper Eq. 13), in float, in any unit of length.
+///
+/// About D each entry is about one cell long, so float suffices: for the corners of Eq. 8 the determinant is 1.216
+/// here, and 2.01 when the 4x4 form of Eq. 6 is evaluated in float.
+struct Cramer {
+  detail::Cross bc, ca, ab;
+  float det;
+
+  TETWARP_HD Cramer(const glm::vec3& a, const glm::vec3& b, const glm::vec3& c)
+      : bc(detail::cross(b, c)), ca(detail::cross(c, a)), ab(detail::cross(a, b)), det(detail::dot(a, bc)) {}
+};
+
+/// Whether float has too few right digits for the weights.
+TETWARP_HD inline bool is_thin(const Cramer& m, const glm::vec3& a, const glm::vec3& b, const glm::vec3& c) {
+  return !(detail::magnitude(m.det) > kThin * ((detail::norm1(a) * detail::norm1(b)) * detail::norm1(c)));
+}
+
+/// Weights of A, B and C; that of D is what is left of 1.
+struct Weights {
+  float a, b, c;
+
+  TETWARP_HD float d() const { return ((1.0f - a) - b) - c; }
+  /// Whether none is below -kWeightSlack.
+  TETWARP_HD bool within_slack() const {
+    constexpr float kLeast = -static_cast<float>(kWeightSlack);
+    return a >= kLeast && b >= kLeast && c >= kLeast && d() >= kLeast;
+  }
+};
+
+/// @param a, b, c  the numerators: dot of r and m.bc, m.ca, m.ab
+TETWARP_HD inline Weights weights_of(const Cramer& m, float a, float b, float c) {
+  const float reciprocal = 1.0f / m.det;
+  return {a * reciprocal, b * reciprocal, c * reciprocal};
+}
+
+/// u = u_D + b_A (u_A - u_D) + b_B (u_B - u_D) + b_C (u_C - u_D) (Eq. 7 rewritten).
+///
+/// @param ud, a, b, c  u at D, and the differences from it at A, B, C
+TETWARP_HD inline glm::vec3 blend(const Weights& w, const glm::vec3& ud, const glm::vec3& a, const glm::vec3& b,
+                                  const glm::vec3& c) {
+  return {((ud.x + w.a * a.x) + w.b * b.x) + w.c * c.x, ((ud.y + w.a * a.y) + w.b * b.y) + w.c * c.y,
+          ((ud.z + w.a * a.z) + w.b * b.z) + w.c * c.z};
+}
 
 /// u at a voxel of a thin or very small tetrahedron: weights exact before their division, about D.
 ///
@@ -73,11 +112,8 @@ TETWARP_HD inline glm::vec3 interpolate_u_exactly(const Tetrahedron& t, const gl
 
 /// u = undeformed minus deformed position at a voxel that the tetrahedron owns, in voxels of output index.
 ///
-/// Barycentric weights about D solve [A-D B-D C-D] (b_A, b_B, b_C)^T = p - D (paper Eq. 13), here by Cramer's rule.
-/// About D each entry is about one cell long, so float suffices: for the corners of Eq. 8 the determinant is 1.216
-/// here, and 2.01 when the 4x4 form of Eq. 6 is evaluated in float. Then u = u_D + b_A (u_A - u_D) + b_B (u_B - u_D) +
-/// b_C (u_C - u_D) (Eq. 7 rewritten): a tetrahedron that is only translated gives its translation exactly, whatever the
-/// weights' rounding.
+/// Weights in float by `Cramer`, blended by `blend`: a tetrahedron that is only translated gives its translation
+/// exactly, whatever the weights' rounding.
 ///
 /// @param steps  the voxel, 2^-12 voxel
 /// @param signs  which way it is nudged
@@ -85,20 +121,12 @@ TETWARP_HD inline glm::vec3 interpolate_u(const Tetrahedron& t, const glm::i32ve
   const glm::vec3 a = detail::to_voxels(t.a.deformed - t.d.deformed),
                   b = detail::to_voxels(t.b.deformed - t.d.deformed);
   const glm::vec3 c = detail::to_voxels(t.c.deformed - t.d.deformed), r = detail::to_voxels(steps - t.d.deformed);
-  const detail::Cross bc = detail::cross(b, c);
-  const float det = detail::dot(a, bc);
-  if (!(detail::magnitude(det) > kThin * detail::permanent(a, b, c))) return interpolate_u_exactly(t, steps, signs);
-  const float wa = detail::dot(r, bc) / det;
-  const float wb = detail::dot(r, detail::cross(c, a)) / det;
-  const float wc = detail::dot(r, detail::cross(a, b)) / det;
-  const float wd = ((1.0f - wa) - wb) - wc;
-  constexpr float kLeast = -static_cast<float>(kWeightSlack);
-  if (!(wa >= kLeast && wb >= kLeast && wc >= kLeast && wd >= kLeast)) return interpolate_u_exactly(t, steps, signs);
-  const glm::vec3 ud = detail::to_voxels(t.d.u);
-  const glm::vec3 ua = detail::to_voxels(t.a.u - t.d.u), ub = detail::to_voxels(t.b.u - t.d.u),
-                  uc = detail::to_voxels(t.c.u - t.d.u);
-  return {((ud.x + wa * ua.x) + wb * ub.x) + wc * uc.x, ((ud.y + wa * ua.y) + wb * ub.y) + wc * uc.y,
-          ((ud.z + wa * ua.z) + wb * ub.z) + wc * uc.z};
+  const Cramer m(a, b, c);
+  if (is_thin(m, a, b, c)) return interpolate_u_exactly(t, steps, signs);
+  const Weights w = weights_of(m, detail::dot(r, m.bc), detail::dot(r, m.ca), detail::dot(r, m.ab));
+  if (!w.within_slack()) return interpolate_u_exactly(t, steps, signs);
+  return blend(w, detail::to_voxels(t.d.u), detail::to_voxels(t.a.u - t.d.u), detail::to_voxels(t.b.u - t.d.u),
+               detail::to_voxels(t.c.u - t.d.u));
 }
 
 }  // namespace tetwarp
