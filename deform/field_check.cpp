@@ -53,6 +53,32 @@ LatticeFrame make_lattice_frame(const Geometry& output, const FieldView& field) 
   return frame;
 }
 
+StepLattice make_step_lattice(const LatticeFrame& frame, const Geometry& output) {
+  constexpr double kMostSteps = 1 << 24, kNegligible = 1e-6;
+  const glm::dmat3& linear = frame.output_from_lattice.linear;
+  const glm::ivec3 first = snap(frame.output_from_lattice(glm::dvec3(0)));
+  StepLattice lattice;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double step = std::rint(linear[axis][axis] * kStepsPerVoxel);
+    for (int other = 0; other < 3; ++other) {
+      const double meant = other == axis ? step / kStepsPerVoxel : 0;
+      if (std::fabs(linear[axis][other] - meant) * static_cast<double>(frame.cells[axis]) > kNegligible) return {};
+    }
+    const double last = first[axis] + step * static_cast<double>(frame.cells[axis]);
+    const double grid = static_cast<double>(output.size[axis]) * kStepsPerVoxel;
+    if (step < 1 || std::fabs(double(first[axis])) >= kMostSteps || last >= kMostSteps || grid >= kMostSteps) return {};
+    lattice.first[axis] = static_cast<float>(first[axis]);
+    lattice.cell[axis] = static_cast<float>(step);
+    lattice.voxel[axis] = static_cast<float>(kStepsPerVoxel / step);
+  }
+  const glm::i64vec3 size = frame.cells + std::int64_t{1};
+  if (size.x * size.y * size.z > INT32_MAX) return {};
+  lattice.cells = glm::ivec3(frame.cells);
+  lattice.row = static_cast<int>(size.x);
+  lattice.slice = static_cast<int>(size.x * size.y);
+  return lattice;
+}
+
 PullFrame make_pull_frame(const Geometry& output, const PullFieldView& field) {
   require(field.grid && field.displacement, "the pull field is empty");
   require_valid(*field.grid, "pull field grid");

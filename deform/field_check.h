@@ -4,6 +4,7 @@
 
 #include "deform/core/lattice_vertex.h"
 #include "deform/core/pull_frame.h"
+#include "deform/core/step_lattice.h"
 #include "deform/vertex_field.h"
 
 namespace tetwarp {
@@ -12,6 +13,14 @@ namespace tetwarp {
 /// @throws InputError for a lattice that is empty, too far, too fine, or does not reach over the output
 /// (Outside::refuse)
 LatticeFrame make_lattice_frame(const Geometry& output, const FieldView& field);
+
+/// The lattice of a frame as a gather reads it, without its vertices; cells are 0 where it is not along the grid's
+/// axes, its vertices are not at whole steps, or it or the grid is too large for that (4096 voxels an axis, 2^31
+/// vertices).
+///
+/// Rounding may still put a vertex a step beside its place: whoever snaps the vertices compares
+/// (`StepLattice::vertex`).
+StepLattice make_step_lattice(const LatticeFrame& frame, const Geometry& output);
 
 /// The same for a pull field.
 PullFrame make_pull_frame(const Geometry& output, const PullFieldView& field);

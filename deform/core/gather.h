@@ -1,0 +1,162 @@
+#pragma once
+
+#include "deform/core/barycentric.h"
+#include "deform/core/ownership.h"
+#include "deform/core/step_lattice.h"
+
+namespace tetwarp {
+
+/// The other way round from `visit_cell`: from a voxel to the tetrahedron that owns it.
+///
+/// Nothing here decides ownership by itself. A tetrahedron is accepted where float arithmetic proves what
+/// `side_of_face` would say, or exact integers say it; whatever cannot be settled is left to `visit_cell`. That the
+/// owner found is the only one, and so the lowest, must be known before (docs/algorithm.md, "Gather").
+
+/// A voxel centre and its nudge, 2^-12 voxel, whole numbers and quarters in float.
+struct GatherPoint {
+  glm::vec3 steps, nudge;
+
+  TETWARP_HD GatherPoint(const glm::ivec3& voxel, const glm::i32vec3& signs)
+      : steps(glm::vec3(voxel) * float{kStepsPerVoxel}), nudge(glm::vec3(nudge_steps(signs)) * (1.0f / kNudgeSteps)) {}
+};
+
+/// What one tetrahedron says of a voxel.
+struct Trial {
+  bool owns;            ///< certainly, and its weights need no exact arithmetic
+  glm::vec3 u;          ///< where it owns: undeformed minus deformed place, voxels; the bits of `interpolate_u`
+  glm::vec3 place;      ///< where its affine map takes the nudged voxel from, cells
+  glm::vec3 per_slice;  ///< how far that moves from one voxel to the next along k, cells
+};
+
+namespace detail {
+
+/// a b + c; fused on the device. For what need not be the same bits everywhere.
+TETWARP_HD inline float multiply_add(float a, float b, float c) {
+#ifdef __CUDA_ARCH__
+  return fmaf(a, b, c);
+#else
+  return a * b + c;
+#endif
+}
+
+TETWARP_HD inline float nudged(float value, const glm::vec3& nudge, const Cross& n) {
+  return multiply_add(nudge.x, n.x, multiply_add(nudge.y, n.y, multiply_add(nudge.z, n.z, value)));
+}
+
+TETWARP_HD inline float least(float a, float b) { return a < b ? a : b; }
+
+/// Bound of the rounding errors of the four values that `try_tetrahedron` compares with it, times 2^24.
+///
+/// With unit roundoff 2^-24 and P the product of the sum norms of the three columns: a component of a cross product is
+/// off by at most 2 units of its two products, a dot product by 3 more of its terms, the nudge adds 3 fused or 6 plain
+/// operations; so det by 5 P, a numerator by 11 (|r| + |d|) times the norms of its two columns, and the value at D, the
+/// difference of all four, by their sum and 3 roundings of at most the sum of their sizes.
+TETWARP_HD inline float error_bound(float a, float b, float c, float r) {
+  const float bc = b * c;
+  return 9.0f * (a * bc) + 15.0f * (r * (bc + a * (b + c)));
+}
+
+}  // namespace detail
+
+/// Asks one tetrahedron for one voxel, in float.
+///
+/// Its corners relative to D, and the voxel relative to D, are exact. The numerators of the weights at p + d and what
+/// they leave of the determinant are six times the volumes that decide ownership: it owns where all are positive by
+/// more than their error. (An inverted tetrahedron is never accepted here.)
+TETWARP_HD inline Trial try_tetrahedron(const StepLattice& lattice, const LatticeTetrahedron& t,
+                                        const GatherPoint& point) {
+  const glm::ivec3 direction = t.direction();
+  const int dx = direction.x, dy = direction.y * lattice.row, dz = direction.z * lattice.slice;
+  const int sum = t.centre ? dx + dy + dz : 0;
+  const glm::vec3* at_d = lattice.moved + lattice.offset(t.d);
+  const glm::vec3 moved = at_d[0], moved_a = at_d[t.centre ? sum - dx : dx] - moved,
+                  moved_b = at_d[t.centre ? sum - dy : dy] - moved, moved_c = at_d[t.centre ? sum - dz : dz] - moved;
+  const glm::vec3 edge = glm::vec3(direction) * lattice.cell;  // to the next vertex on each axis
+  const glm::vec3 along = t.centre ? glm::vec3(0) : edge, across = t.centre ? edge : glm::vec3(0);
+  const glm::vec3 a(along.x + moved_a.x, across.y + moved_a.y, across.z + moved_a.z);
+  const glm::vec3 b(across.x + moved_b.x, along.y + moved_b.y, across.z + moved_b.z);
+  const glm::vec3 c(across.x + moved_c.x, across.y + moved_c.y, along.z + moved_c.z);
+  const glm::vec3 d_index(t.d);
+  const glm::vec3 r = (point.steps - (lattice.first + d_index * lattice.cell)) - moved;
+
+  const Cramer m(a, b, c);
+  const float na = detail::dot(r, m.bc), nb = detail::dot(r, m.ca), nc = detail::dot(r, m.ab);
+  const float qa = detail::nudged(na, point.nudge, m.bc), qb = detail::nudged(nb, point.nudge, m.ca),
+              qc = detail::nudged(nc, point.nudge, m.ab);
+  const float qd = ((m.det - qa) - qb) - qc;
+  const float la = detail::norm1(a), lb = detail::norm1(b), lc = detail::norm1(c);
+  const float lr = detail::norm1(r) + 6.5f;  // 15 + 7 + 4 sixteenths, with no cancellation
+  const float error = detail::error_bound(la, lb, lc, lr) * (1.0f / (1 << 24));
+  const float turn = ((t.down.x ^ t.down.y ^ t.down.z) & 1) != 0 ? -1.0f : 1.0f;  // of A, B, C when undeformed
+  const float least = detail::least(detail::least(qa * turn, qb * turn), detail::least(qc * turn, qd * turn));
+
+  Trial trial;
+  const float reciprocal = 1.0f / m.det;
+  const Weights w{na * reciprocal, nb * reciprocal, nc * reciprocal};
+  trial.owns = least > error && !is_thin(m, a, b, c) && w.within_slack();
+  trial.u = 0.0f - blend(w, moved, moved_a, moved_b, moved_c) * kVoxelsPerStep;  // never -0
+  const glm::vec3 at_q = glm::vec3(qa, qb, qc) * reciprocal;
+  const glm::vec3 slope = glm::vec3(m.bc.z, m.ca.z, m.ab.z) * (reciprocal * float{kStepsPerVoxel});
+  const float all_q = (at_q.x + at_q.y) + at_q.z, all_slope = (slope.x + slope.y) + slope.z;
+  const glm::vec3 to(direction);
+  trial.place = d_index + to * (t.centre ? all_q - at_q : at_q);
+  trial.per_slice = to * (t.centre ? all_slope - slope : slope);
+  return trial;
+}
+
+/// Whether a tetrahedron owns a voxel, exactly. @param sides  the four sides that decide it, of the faces opposite A,
+/// B, C, D
+template <class Int>
+TETWARP_HD bool owns_exactly(const Tetrahedron& t, const glm::i32vec3& steps, const glm::i32vec3& signs,
+                             int (&sides)[4]) {
+  const Relative<Int> a(t.a.deformed - steps), b(t.b.deformed - steps), c(t.c.deformed - steps),
+      d(t.d.deformed - steps);
+  const VoxelNudge<Int> nudge(signs);
+  sides[0] = side_of_face(b, c, d, nudge);
+  sides[1] = side_of_face(a, d, c, nudge);
+  sides[2] = side_of_face(a, b, d, nudge);
+  sides[3] = side_of_face(a, c, b, nudge);
+  return sides[0] != 0 && sides[1] == sides[0] && sides[2] == sides[0] && sides[3] == sides[0];
+}
+
+TETWARP_HD inline bool owns_exactly(const Tetrahedron& t, const glm::i32vec3& steps, const glm::i32vec3& signs,
+                                    int (&sides)[4]) {
+  Box box = box_of(t);
+  box.grow(steps);
+  if (fits_double(box)) return owns_exactly<double>(t, steps, signs, sides);
+  if (fits_int64(box)) return owns_exactly<std::int64_t>(t, steps, signs, sides);
+  return owns_exactly<Wide>(t, steps, signs, sides);
+}
+
+/// Walks from tetrahedron to tetrahedron, across a face that the voxel lies beyond, until one owns it, exactly.
+///
+/// @param start  where to begin  @param owner  the owner, where found  @return whether one was found within `most`
+/// steps
+TETWARP_HD inline bool walk_to_owner(const StepLattice& lattice, LatticeTetrahedron start, const glm::i32vec3& steps,
+                                     const glm::i32vec3& signs, int most, LatticeTetrahedron& owner) {
+  for (int n = 0; n < most; ++n) {
+    const Tetrahedron t = vertices_of(lattice, start);
+    int sides[4];
+    if (owns_exactly(t, steps, signs, sides)) {
+      owner = start;
+      return true;
+    }
+    const Wide volume = signed_volume(Relative<Wide>(t.a.deformed), Relative<Wide>(t.b.deformed),
+                                      Relative<Wide>(t.c.deformed), Relative<Wide>(t.d.deformed));
+    const int inner = volume > 0 ? -1 : 1;
+    bool moved = false;
+    for (int k = 0; k < 4 && !moved; ++k) {
+      const int face = (n + k) & 3;  // another one first each time: no voxel goes round in circles for long
+      if (sides[face] == inner) continue;
+      const LatticeTetrahedron next = start.across(face);
+      const glm::ivec3 cell = next.cell();
+      moved = cell.x >= 0 && cell.y >= 0 && cell.z >= 0 && cell.x < lattice.cells.x && cell.y < lattice.cells.y &&
+              cell.z < lattice.cells.z;
+      if (moved) start = next;
+    }
+    if (!moved) return false;
+  }
+  return false;
+}
+
+}  // namespace tetwarp

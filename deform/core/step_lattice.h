@@ -1,0 +1,122 @@
+#pragma once
+
+#include "deform/core/five_tetrahedra.h"
+
+namespace tetwarp {
+
+/// A lattice along the axes of the output grid, whose undeformed vertices lie at whole steps: what a gather reads.
+///
+/// Lattices over a volume with cells of B voxels are such. All that is held of a vertex is how far it moved, as whole
+/// numbers in float: exact below 2^24 steps (4096 voxels), and a difference of two needs no conversion.
+struct StepLattice {
+  glm::ivec3 cells{0};               ///< on each axis
+  glm::vec3 first{0}, cell{0};       ///< rest place of vertex (0, 0, 0), and from one vertex to the next; 2^-12 voxel
+  glm::vec3 voxel{0};                ///< one voxel, in cells
+  int row = 0, slice = 0;            ///< vertices from one row, and one slice, to the next
+  const glm::vec3* moved = nullptr;  ///< deformed minus rest of each vertex, 2^-12 voxel, i fastest, 12 bytes each
+
+  TETWARP_HD std::int64_t offset(const glm::ivec3& vertex) const {
+    return std::int64_t{vertex.z} * slice + vertex.y * row + vertex.x;
+  }
+  TETWARP_HD Vertex vertex(const glm::ivec3& at) const {
+    const glm::vec3 rest = first + glm::vec3(at) * cell, by = moved[offset(at)];
+    return {glm::ivec3(rest + by), glm::ivec3(-by)};
+  }
+  /// The lattice index of an undeformed voxel.
+  TETWARP_HD glm::vec3 place(const glm::vec3& voxel_index) const {
+    return (voxel_index * float{kStepsPerVoxel} - first) * (voxel * (1.0f / kStepsPerVoxel));
+  }
+};
+
+/// One tetrahedron of the lattice, by its corner D.
+///
+/// With alternating parity the corner tetrahedra are octahedra around the even vertices (i + j + k even): D is an even
+/// vertex, and A, B, C are its neighbours along i, j, k, up or down. What is left in each cell is its centre, with odd
+/// vertices only: D is the cell's corner 7 (even cells; all directions down) or 0 (odd cells; up), and A, B, C are
+/// across the faces i, j, k from it. So vertex, three directions and one flag name a tetrahedron, and a step across a
+/// face that D lies on turns one direction round.
+struct LatticeTetrahedron {
+  glm::ivec3 d;     ///< vertex
+  glm::ivec3 down;  ///< 1 where A, B, C lie down from D on that axis, else 0
+  bool centre;
+
+  TETWARP_HD glm::ivec3 direction() const { return 1 - 2 * down; }
+  TETWARP_HD glm::ivec3 cell() const { return d - down; }
+  TETWARP_HD glm::ivec3 a() const { return corner(0); }
+  TETWARP_HD glm::ivec3 b() const { return corner(1); }
+  TETWARP_HD glm::ivec3 c() const { return corner(2); }
+
+  /// The centre tetrahedron of a cell.
+  TETWARP_HD static LatticeTetrahedron centre_of(const glm::ivec3& cell) {
+    const int even = (cell.x + cell.y + cell.z + 1) & 1;
+    return {cell + even, glm::ivec3(even), true};
+  }
+
+  /// The tetrahedron across the face opposite A, B, C or D (face 0 to 3). Its cell may lie outside the lattice.
+  TETWARP_HD LatticeTetrahedron across(int face) const {
+    if (!centre) {
+      if (face == 3) return centre_of(cell());
+      LatticeTetrahedron next = *this;
+      next.down[face] ^= 1;
+      return next;
+    }
+    const glm::ivec3 towards = direction();
+    if (face == 3) return {d + towards, 1 - down, false};
+    LatticeTetrahedron next{d, down, false};
+    next.d[face] += towards[face];
+    next.down[face] ^= 1;
+    return next;
+  }
+
+  /// 0 to 4 within its cell (`tetrahedron_corners`).
+  TETWARP_HD int number() const {
+    if (centre) return 0;
+    const int corner = down.x + 2 * down.y + 4 * down.z;
+    const bool odd = ((d.x + d.y + d.z + down.x + down.y + down.z) & 1) != 0;
+    for (int t = 1; t < kTetrahedraPerCell; ++t) {
+      if (tetrahedron_corners(t, odd).d == corner) return t;
+    }
+    return -1;
+  }
+
+ private:
+  TETWARP_HD glm::ivec3 corner(int axis) const {
+    const glm::ivec3 towards = direction();
+    if (centre) {
+      glm::ivec3 vertex = d + towards;
+      vertex[axis] -= towards[axis];
+      return vertex;
+    }
+    glm::ivec3 vertex = d;
+    vertex[axis] += towards[axis];
+    return vertex;
+  }
+};
+
+/// The tetrahedron of the undeformed lattice that holds a place, in cells; places outside are moved inside.
+TETWARP_HD inline LatticeTetrahedron tetrahedron_at(const StepLattice& lattice, const glm::vec3& place) {
+  glm::ivec3 cell;
+  glm::vec3 in;  // the cell
+  for (int axis = 0; axis < 3; ++axis) {
+    const float whole = std::floor(place[axis]);
+    const float last = static_cast<float>(lattice.cells[axis] - 1);
+    const float kept = whole < last ? (whole > 0.0f ? whole : 0.0f) : last;  // NaN: the last cell
+    cell[axis] = static_cast<int>(kept);
+    in[axis] = place[axis] - kept;
+  }
+  const int odd = (cell.x + cell.y + cell.z) & 1;
+  const float x = odd ? 1.0f - in.x : in.x;  // mirrored, an odd cell is an even one
+  const float more = in.y + in.z, less = in.y - in.z;
+  const bool corner0 = x + more<1.0f, corner3 = x + less> 1.0f, corner5 = x - less > 1.0f, corner6 = more - x > 1.0f;
+  if (!(corner0 || corner3 || corner5 || corner6)) return {cell + (odd ^ 1), glm::ivec3(odd ^ 1), true};
+  const int down_x = (corner3 || corner5) ^ odd;
+  const glm::ivec3 down(down_x, corner3 || corner6, corner5 || corner6);
+  return {cell + down, down, false};
+}
+
+/// With its snapped vertices, for exact arithmetic.
+TETWARP_HD inline Tetrahedron vertices_of(const StepLattice& lattice, const LatticeTetrahedron& t) {
+  return {lattice.vertex(t.a()), lattice.vertex(t.b()), lattice.vertex(t.c()), lattice.vertex(t.d)};
+}
+
+}  // namespace tetwarp
