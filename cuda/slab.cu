@@ -133,20 +133,65 @@ void SlabWriter::write_target(DeviceTarget& on_device, const SlabBox& slab, cons
   const DeviceSlices slices{on_device.first.data(), on_device.last.data()};
   dispatch(target.source.type, [&](auto voxel) {
     using V = decltype(voxel);
-    const bool in_place = target.output.memory == Memory::device;
-    Destination<V> output{nullptr, slab.begin, slab.size.x, slab.size.x * slab.size.y};
-    if (in_place) {
-      const glm::i64vec3 held = target.output.buffered.end - target.output.buffered.begin;
-      output = {reinterpret_cast<V*>(target.output.voxels), target.output.buffered.begin, held.x, held.x * held.y};
-    } else {
-      output.voxels = reinterpret_cast<V*>(voxels_.reserve(static_cast<std::size_t>(slab.count()) * sizeof(V)));
-    }
+    const Destination<V> output = destination<V>(target, slab);
     const auto plan = plan_target(target, on_device.relation, reinterpret_cast<const V*>(on_device.source));
     launch_sample<V>(stream_, target.interpolation, slab.count(), plan, slab,
                      static_cast<const std::uint8_t*>(mapped.mapped.data()),
                      static_cast<const glm::vec3*>(mapped.offset.data()), output, coverage, slices, counts);
-    if (!in_place) copy_out(target.output, slab, output.voxels);
+    if (target.output.memory == Memory::host) copy_out(target.output, slab, output.voxels);
   });
+}
+
+template <class V>
+Destination<V> SlabWriter::destination(const Target& target, const SlabBox& slab) {
+  if (target.output.memory == Memory::device) {
+    const glm::i64vec3 held = target.output.buffered.end - target.output.buffered.begin;
+    return {reinterpret_cast<V*>(target.output.voxels), target.output.buffered.begin, held.x, held.x * held.y};
+  }
+  V* buffer = reinterpret_cast<V*>(voxels_.reserve(static_cast<std::size_t>(slab.count()) * sizeof(V)));
+  return {buffer, slab.begin, slab.size.x, slab.size.x * slab.size.y};
+}
+
+bool SlabWriter::is_plain() const {
+  if (targets_.size() != 1 || maps_.coverage.voxels || maps_.inverse_mm.voxels || wants_jacobian() || wants_owners())
+    return false;
+  const Target& target = targets_.front()->target;
+  const VoxelType type = target.source.type;
+  const bool background_fits = dispatch(type, [&](auto voxel) {
+    using V = decltype(voxel);
+    return target.background >= double(std::numeric_limits<V>::lowest()) &&
+           target.background <= double(std::numeric_limits<V>::max());
+  });
+  return background_fits && target.interpolation == Interpolation::linear && !target.padding &&
+         target.sampled_slices.empty() && targets_.front()->relation.same_grid &&
+         voxel_count(target.source.buffered) < INT32_MAX &&
+         (type == VoxelType::u8 || type == VoxelType::i16 || type == VoxelType::u16);
+}
+
+AnyVoxelSink SlabWriter::plain_sink(const SlabBox& slab) {
+  const DeviceTarget& on_device = *targets_.front();
+  const Target& target = on_device.target;
+  const auto make = [&](auto voxel) {
+    using V = decltype(voxel);
+    const auto plan = plan_target(target, on_device.relation, reinterpret_cast<const V*>(on_device.source));
+    return VoxelSink<V>{plan.source.voxels,
+                        glm::ivec3(plan.source.begin),
+                        glm::ivec3(plan.source.size) - 1,
+                        static_cast<int>(plan.source.stride.y),
+                        static_cast<int>(plan.source.stride.z),
+                        plan.background,
+                        destination<V>(target, slab)};
+  };
+  switch (target.source.type) {
+    case VoxelType::u8: return make(std::uint8_t{});
+    case VoxelType::u16: return make(std::uint16_t{});
+    default: return make(std::int16_t{});
+  }
+}
+
+void SlabWriter::finish_plain(const SlabBox& slab) {
+  const Target& target = targets_.front()->target;
+  if (target.output.memory == Memory::host) copy_out(target.output, slab, voxels_.data());
 }
 
 void SlabWriter::write_maps(const SlabBox& slab, const Mapped& mapped) {

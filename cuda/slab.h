@@ -2,18 +2,16 @@
 
 #include <cstdint>
 #include <span>
+#include <variant>
 #include <vector>
 
-#include "cuda/device_buffer.h"
+#include "cuda/lattice.h"
 #include "deform/resampler.h"
 
 namespace tetwarp::cuda_detail {
 
-constexpr int kThreads = 128;
 /// Voxels that are worked on at a time: bounds what is kept of each voxel on the device (about 30 bytes).
 constexpr std::int64_t kSlabVoxels = std::int64_t{1} << 25;
-
-inline unsigned blocks_for(std::int64_t count) { return static_cast<unsigned>((count + kThreads - 1) / kThreads); }
 
 /// A box of voxels, as a kernel sees it.
 struct SlabBox {
@@ -54,6 +52,24 @@ struct Mapped {
   DeviceBuffer<std::uint16_t> owners;
 };
 
+/// Samples voxels one by one: linear, integers that float holds, no padding, source and output on one grid. The bits of
+/// `sample_voxel`.
+template <class V>
+struct VoxelSink {
+  const V* source;          ///< of `source_begin`
+  glm::ivec3 source_begin;  ///< first voxel that is buffered
+  glm::ivec3 last;          ///< of the whole source grid
+  int row, slice;           ///< of what is buffered
+  V background;
+  Destination<V> output;
+
+  /// A voxel that a tetrahedron owns. @return whether it comes from inside the source
+  __device__ bool write(const glm::ivec3& voxel, const glm::vec3& u) const;
+  __device__ void nothing(const glm::ivec3& voxel) const { output.at(glm::i64vec3(voxel)) = background; }
+};
+
+using AnyVoxelSink = std::variant<VoxelSink<std::uint8_t>, VoxelSink<std::int16_t>, VoxelSink<std::uint16_t>>;
+
 /// Samples targets and writes maps of slabs whose Mapped is known. Knows nothing of fields.
 class SlabWriter {
  public:
@@ -65,6 +81,12 @@ class SlabWriter {
   bool wants_owners() const { return maps_.owners.voxels != nullptr; }
 
   void write(const SlabBox& slab, const Mapped& mapped, Counts* counts);
+
+  /// Whether all that is wanted is one volume that a VoxelSink can sample, and no maps.
+  bool is_plain() const;
+  /// What writes the voxels of a slab, where `is_plain`; `finish_plain` gives them to the target.
+  AnyVoxelSink plain_sink(const SlabBox& slab);
+  void finish_plain(const SlabBox& slab);
   /// Gives the source slices that were read to the targets.
   void finish();
 
@@ -74,6 +96,8 @@ class SlabWriter {
   void write_target(DeviceTarget& target, const SlabBox& slab, const Mapped& mapped, std::uint8_t* coverage,
                     Counts* counts);
   void write_maps(const SlabBox& slab, const Mapped& mapped);
+  template <class V>
+  Destination<V> destination(const Target& target, const SlabBox& slab);
   void copy_out(const VolumeView& view, const SlabBox& slab, const void* device);
 
   const Geometry& output_;

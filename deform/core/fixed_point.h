@@ -67,5 +67,6 @@ TETWARP_HD inline double to_double(Wide value) {
 }
 
 TETWARP_HD inline double to_double(double value) { return value; }
+TETWARP_HD inline double to_double(std::int64_t value) { return static_cast<double>(value); }
 
 }  // namespace tetwarp

@@ -98,11 +98,11 @@ TETWARP_HD inline LatticeTetrahedron tetrahedron_at(const StepLattice& lattice, 
   glm::ivec3 cell;
   glm::vec3 in;  // the cell
   for (int axis = 0; axis < 3; ++axis) {
-    const float whole = std::floor(place[axis]);
-    const float last = static_cast<float>(lattice.cells[axis] - 1);
-    const float kept = whole < last ? (whole > 0.0f ? whole : 0.0f) : last;  // NaN: the last cell
-    cell[axis] = static_cast<int>(kept);
-    in[axis] = place[axis] - kept;
+    const float end = static_cast<float>(lattice.cells[axis]);
+    const float inside = place[axis] > 0.0f ? (place[axis] < end ? place[axis] : end) : 0.0f;  // NaN: 0
+    const float whole = std::floor(inside < end ? inside : end - 1.0f);
+    cell[axis] = static_cast<int>(whole);
+    in[axis] = inside - whole;  // 0 to 1: at most one of the four corners below is near
   }
   const int odd = (cell.x + cell.y + cell.z) & 1;
   const float x = odd ? 1.0f - in.x : in.x;  // mirrored, an odd cell is an even one

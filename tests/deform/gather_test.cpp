@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <limits>
 #include <map>
 #include <set>
 
@@ -103,6 +104,23 @@ TEST(StepLattice, FindsTheTetrahedronOfAnUndeformedPlace) {
     const glm::dvec3 w = glm::inverse(edges) * (glm::dvec3(glm::vec3(place)) - d);
     for (const double weight : {w.x, w.y, w.z, 1 - w.x - w.y - w.z})
       ASSERT_GE(weight, -1e-6) << to_string(glm::i64vec3(t.d));
+    const glm::ivec3 cell = t.cell();
+    ASSERT_TRUE(cell.x >= 0 && cell.y >= 0 && cell.z >= 0 && cell.x < 5 && cell.y < 4 && cell.z < 6);
+  }
+}
+
+TEST(StepLattice, MovesPlacesOutsideIntoATetrahedronOfTheLattice) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  Random random(test_seed(), 2);
+  StepLattice lattice;
+  lattice.cells = {5, 4, 6};
+  constexpr float kNaN = std::numeric_limits<float>::quiet_NaN(), kInfinity = std::numeric_limits<float>::infinity();
+  for (int n = 0; n < 20000; ++n) {
+    glm::vec3 place(random.real(-3, 9), random.real(-3, 9), random.real(-3, 9));
+    if (n % 10 == 0) place[random.axis()] = random.one_of({kNaN, kInfinity, -kInfinity, 0.0f, 4.0f, 5.0f, 6.0f});
+    const LatticeTetrahedron t = tetrahedron_at(lattice, place);
+    ASSERT_NE(t.number(), -1);
+    ASSERT_EQ(corners(t), corners(named(t.cell(), t.number())));
     const glm::ivec3 cell = t.cell();
     ASSERT_TRUE(cell.x >= 0 && cell.y >= 0 && cell.z >= 0 && cell.x < 5 && cell.y < 4 && cell.z < 6);
   }

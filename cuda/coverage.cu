@@ -1,0 +1,148 @@
+#include "cuda/coverage.h"
+#include "deform/core/border.h"
+#include "deform/core/visit_cell.h"
+
+namespace tetwarp::cuda_detail {
+
+namespace {
+
+struct Crossings {
+  std::uint32_t *ins, *outs;
+  int *start, *collided;
+  int words;
+};
+
+template <class Int>
+__device__ void cross_rows(const BorderTriangle& t, const Nudge& nudge, const SlabBox& box, const glm::ivec2& low,
+                           const glm::ivec2& high, const Crossings& out) {
+  const int begin = static_cast<int>(box.begin.x), end = static_cast<int>(box.begin.x + box.size.x);
+  for (int z = low.y; z <= high.y; ++z) {
+    for (int y = low.x; y <= high.x; ++y) {
+      int first = 0;
+      const int sign = cross_border<Int>(t, nudge, y, z, begin, end, first);
+      if (sign == 0 || first == end) continue;
+      const std::int64_t row = (z - box.begin.z) * box.size.y + (y - box.begin.y);
+      if (first == begin) {
+        atomicAdd(&out.start[row], sign);
+        continue;
+      }
+      const std::uint32_t bit = 1u << ((first - begin) & 31);
+      std::uint32_t* words = sign > 0 ? out.ins : out.outs;
+      if (atomicOr(&words[row * out.words + (first - begin) / 32], bit) & bit) out.collided[row] = 1;
+    }
+  }
+}
+
+/// One thread a triangle of one side of the border.
+__global__ void border_kernel(StepLattice lattice, Nudge nudge, SlabBox box, int axis, bool high, Crossings out) {
+  const int next = (axis + 1) % 3, last = (axis + 2) % 3;
+  const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
+  const std::int64_t faces = std::int64_t{lattice.cells[next]} * lattice.cells[last];
+  if (n >= 2 * faces) return;
+  const auto face = static_cast<int>(n >> 1);
+  const BorderTriangle t = border_triangle(
+      lattice, axis, high, {face % lattice.cells[next], face / lattice.cells[next]}, static_cast<int>(n & 1));
+  Box around{t.a, t.a};
+  around.grow(t.b);
+  around.grow(t.c);
+  if (around.low.y == around.high.y || around.low.z == around.high.z) return;  // no row passes through
+  VoxelBox rows{box.begin, box.begin + box.size};
+  for (int i = 1; i < 3; ++i) detail::candidates(nudge, i, around.low[i], around.high[i], &rows.begin[i], &rows.end[i]);
+  if (rows.end.y <= rows.begin.y || rows.end.z <= rows.begin.z) return;
+  const glm::ivec2 from(rows.begin.y, rows.begin.z), to(rows.end.y - 1, rows.end.z - 1);
+  if (fits_double(around)) {
+    cross_rows<double>(t, nudge, box, from, to, out);
+  } else if (fits_int64(around)) {
+    cross_rows<std::int64_t>(t, nudge, box, from, to, out);
+  } else {
+    cross_rows<Wide>(t, nudge, box, from, to, out);
+  }
+}
+
+/// One warp a row: from crossings to the winding number of every voxel.
+__global__ void wind_kernel(Crossings in, std::int64_t rows, int width, std::uint32_t* single, std::uint32_t* several) {
+  const std::int64_t row = (std::int64_t{blockIdx.x} * kThreads + threadIdx.x) / 32;
+  const int lane = static_cast<int>(threadIdx.x & 31);
+  if (row >= rows) return;
+  const bool collided = in.collided[row] != 0;
+  int carried = in.start[row];
+  for (int first = 0; first < in.words; first += 32) {
+    const int word = first + lane;
+    const bool here = word < in.words;
+    const std::uint32_t ins = here ? in.ins[row * in.words + word] : 0;
+    const std::uint32_t outs = here ? in.outs[row * in.words + word] : 0;
+    const int change = __popc(ins) - __popc(outs);
+    int sum = change;
+    for (int step = 1; step < 32; step *= 2) {
+      const int below = __shfl_up_sync(~0u, sum, step);
+      if (lane >= step) sum += below;
+    }
+    int winding = carried + sum - change;
+    std::uint32_t one = winding == 1 ? ~0u : 0, more = winding != 1 && winding != 0 ? ~0u : 0;
+    if ((ins | outs) != 0) {
+      one = more = 0;
+      for (int bit = 0; bit < 32; ++bit) {
+        winding += static_cast<int>(ins >> bit & 1) - static_cast<int>(outs >> bit & 1);
+        one |= (winding == 1 ? 1u : 0u) << bit;
+        more |= (winding != 1 && winding != 0 ? 1u : 0u) << bit;
+      }
+    }
+    const int left = width - word * 32;
+    const std::uint32_t valid = left >= 32 ? ~0u : (left > 0 ? (1u << left) - 1 : 0);
+    if (here) {
+      single[row * in.words + word] = collided ? 0 : one & valid;
+      several[row * in.words + word] = collided ? valid : more & valid;
+    }
+    carried += __shfl_sync(~0u, sum, 31);
+  }
+}
+
+/// One thread 32 cells: voxels that an inverted tetrahedron owns go from `single` to `several`.
+__global__ void inverted_kernel(DeviceField field, const std::uint32_t* inverted_cells, SlabBox box, int words,
+                                std::uint32_t* single, std::uint32_t* several) {
+  const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
+  if (n * 32 >= field.cell_count()) return;
+  const VoxelBox region{box.begin, box.begin + box.size};
+  for (std::uint32_t left = inverted_cells[n]; left != 0; left &= left - 1) {
+    const glm::i64vec3 at = field.cell_at(n * 32 + __ffs(static_cast<int>(left)) - 1);
+    visit_cell(field.cell(at), DeviceField::is_odd(at), region, field.frame.nudge,
+               [&](const glm::i64vec3& voxel, const glm::i32vec3&, int, const Tetrahedron& t) {
+                 if (jacobian(t) > 0) return;
+                 const glm::i64vec3 in = voxel - box.begin;
+                 const std::int64_t word = (in.z * box.size.y + in.y) * words + in.x / 32;
+                 const std::uint32_t bit = 1u << (in.x & 31);
+                 atomicAnd(&single[word], ~bit);
+                 atomicOr(&several[word], bit);
+               });
+  }
+}
+
+}  // namespace
+
+void Coverage::find(const DeviceField& field, const std::uint32_t* inverted_cells, bool any_inverted,
+                    const SlabBox& box, cudaStream_t stream) {
+  words_ = static_cast<int>((box.size.x + 31) / 32);
+  const std::int64_t rows = box.size.y * box.size.z;
+  const auto words = static_cast<std::size_t>(rows * words_);
+  ins_.fill(0, words, stream);
+  outs_.fill(0, words, stream);
+  start_.fill(0, static_cast<std::size_t>(rows), stream);
+  collided_.fill(0, static_cast<std::size_t>(rows), stream);
+  const Crossings crossings{ins_.data(), outs_.data(), start_.data(), collided_.data(), words_};
+  for (int side = 0; side < 6; ++side) {
+    const int axis = side / 2, next = (axis + 1) % 3, last = (axis + 2) % 3;
+    const std::int64_t triangles = 2 * std::int64_t{field.steps.cells[next]} * field.steps.cells[last];
+    border_kernel<<<blocks_for(triangles), kThreads, 0, stream>>>(field.steps, field.frame.nudge, box, axis,
+                                                                  side % 2 == 1, crossings);
+  }
+  std::uint32_t *single = single_.reserve(words), *several = several_.reserve(words);
+  wind_kernel<<<blocks_for(rows * 32), kThreads, 0, stream>>>(crossings, rows, static_cast<int>(box.size.x), single,
+                                                              several);
+  if (any_inverted) {
+    inverted_kernel<<<blocks_for((field.cell_count() + 31) / 32), kThreads, 0, stream>>>(field, inverted_cells, box,
+                                                                                         words_, single, several);
+  }
+  TETWARP_CUDA_TRY(cudaGetLastError());
+}
+
+}  // namespace tetwarp::cuda_detail

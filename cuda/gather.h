@@ -1,0 +1,58 @@
+#pragma once
+
+#include "cuda/claim.h"
+#include "cuda/coverage.h"
+
+namespace tetwarp::cuda_detail {
+
+/// Where a gather puts what it finds: for each voxel of a box, whether a tetrahedron owns it and where it comes from.
+struct OffsetSink {
+  SlabBox box;
+  std::uint8_t* mapped;
+  glm::vec3* offset;
+
+  /// @return whether the voxel counts as covered
+  __device__ bool write(const glm::ivec3& voxel, const glm::vec3& u) const {
+    const std::int64_t n = box.offset(glm::i64vec3(voxel));
+    mapped[n] = 1;
+    offset[n] = u;
+    return true;
+  }
+  __device__ void nothing(const glm::ivec3& voxel) const {
+    const std::int64_t n = box.offset(glm::i64vec3(voxel));
+    mapped[n] = 0;
+    offset[n] = glm::vec3(0);
+  }
+};
+
+/// From voxels to their owners: marches along k, and predicts each owner from the last one.
+///
+/// Voxels that the march cannot settle in float go to a queue, and there to a walk with exact integers; voxels that may
+/// have several owners, and what is left, are claimed. So every field with whole steps may take this way.
+class Gather {
+ public:
+  /// Finds the voxels of `box`; waits for the stream. @return how many are covered
+  template <class Sink>
+  std::uint64_t run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream);
+
+  struct Entry {
+    int voxel;  ///< offset in the box
+    float x, y, z;
+  };
+  struct Counters {
+    unsigned long long covered;
+    unsigned queued, several;
+  };
+
+ private:
+  template <class Sink>
+  void settle_several(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream);
+
+  Coverage coverage_;
+  Claims claims_;
+  DeviceBuffer<glm::vec3> seeds_;
+  DeviceBuffer<Entry> queue_;
+  DeviceBuffer<Counters> counters_;
+};
+
+}  // namespace tetwarp::cuda_detail

@@ -1,0 +1,75 @@
+#pragma once
+
+#include "cuda/device_buffer.h"
+#include "deform/core/lattice_vertex.h"
+#include "deform/core/step_lattice.h"
+#include "deform/vertex_field.h"
+
+namespace tetwarp::cuda_detail {
+
+constexpr int kThreads = 128;
+inline unsigned blocks_for(std::int64_t count) { return static_cast<unsigned>((count + kThreads - 1) / kThreads); }
+
+/// A field as kernels see it: its vertices, snapped, in one of two forms.
+struct DeviceField {
+  LatticeFrame frame;
+  StepLattice steps;                 ///< where `moved` is not null
+  const Vertex* vertices = nullptr;  ///< otherwise
+
+  bool has_steps() const { return steps.moved != nullptr; }
+  __device__ glm::i64vec3 cell_at(std::int64_t number) const {
+    return {number % frame.cells.x, number / frame.cells.x % frame.cells.y, number / (frame.cells.x * frame.cells.y)};
+  }
+  __device__ Cell cell(const glm::i64vec3& at) const {
+    Cell cell;
+    if (vertices) {
+      const std::int64_t row = frame.cells.x + 1, slice = row * (frame.cells.y + 1);
+      const Vertex* first = vertices + at.z * slice + at.y * row + at.x;
+#pragma unroll
+      for (int c = 0; c < 8; ++c) cell.corner[c] = first[(c & 1) + (c >> 1 & 1) * row + (c >> 2) * slice];
+    } else {
+#pragma unroll
+      for (int c = 0; c < 8; ++c) cell.corner[c] = steps.vertex(glm::ivec3(at) + glm::ivec3(c & 1, c >> 1 & 1, c >> 2));
+    }
+    return cell;
+  }
+  __host__ __device__ static bool is_odd(const glm::i64vec3& at) { return ((at.x + at.y + at.z) & 1) != 0; }
+  __host__ __device__ std::int64_t cell_count() const { return frame.cells.x * frame.cells.y * frame.cells.z; }
+};
+
+/// What one pass over the cells finds.
+struct FieldStatistics {
+  std::uint64_t inverted = 0, degenerate = 0;
+  double jacobian_min = 0, jacobian_max = 0;
+};
+
+struct LatticeFindings;  // lattice.cu
+
+/// Owner of a field on the device: snaps its vertices and describes its cells.
+class LatticeOnDevice {
+ public:
+  /// @param displacement  on the device  @throws InputError for a vertex that is not finite or too far away
+  void set(const LatticeFrame& frame, const Geometry& output, const glm::vec3* displacement, cudaStream_t stream);
+
+  const DeviceField& field() const { return field_; }
+  const FieldStatistics& statistics() const { return statistics_; }
+  /// One bit a cell, i fastest, of cells with an inverted tetrahedron.
+  const std::uint32_t* inverted_cells() const { return inverted_.data(); }
+
+  /// Box of the rest places of all cells that may reach a region: low and high, 2^-12 voxel; low > high where none
+  /// does.
+  void reach(const glm::i64vec3& begin, const glm::i64vec3& end, int (&low_high)[6], cudaStream_t stream) const;
+
+ private:
+  void snap_steps(const StepLattice& lattice, const glm::vec3* displacement, std::int64_t vertices,
+                  LatticeFindings* found, cudaStream_t stream);
+
+  DeviceField field_;
+  FieldStatistics statistics_;
+  DeviceBuffer<Vertex> vertices_;
+  DeviceBuffer<glm::vec3> moved_;
+  DeviceBuffer<std::uint32_t> inverted_;
+  DeviceBuffer<LatticeFindings> found_;
+};
+
+}  // namespace tetwarp::cuda_detail

@@ -1,0 +1,123 @@
+// Every way that the CUDA backend may take, against the CPU, bit for bit.
+#include <gtest/gtest.h>
+
+#include "cuda/devices.h"
+#include "deform/fields/formula.h"
+#include "tests/support/fields.h"
+#include "tests/support/shifted.h"
+
+namespace tetwarp {
+namespace {
+
+using namespace test;
+
+class GatherPaths : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (cuda_device_count() == 0) GTEST_SKIP() << "no CUDA device";
+  }
+};
+
+/// The volume alone (found and sampled in one go), or with coverage and inverse (found, then sampled).
+template <class V>
+Outcome<V> run_on(Resampler& resampler, const FieldCase& test, const Volume<V>& source, const Region& region,
+                  bool maps) {
+  resampler.set_field(view(test.field, Outside::background));
+  Outcome<V> outcome = poisoned_outcome<V>(test.output);
+  Maps wanted = maps_of(outcome);
+  wanted.jacobian = wanted.owners = {};
+  if (!maps) wanted = {};
+  const Target target{.source = view(source), .output = view(outcome.output), .background = 7};
+  outcome.report = resampler.resample(region, {&target, 1}, wanted);
+  return outcome;
+}
+
+template <class V>
+void expect_same(const FieldCase& test, Random& random) {
+  const Volume<V> source =
+      random_values<V>(test.output, random, std::numeric_limits<V>::lowest(), std::numeric_limits<V>::max());
+  const auto cpu = make_cpu_resampler(test.output);
+  const auto cuda = make_cuda_resampler(test.output);
+  const glm::i64vec3 size = test.output.size;
+  const Region part{{random.integer(0, size.x / 3), random.integer(0, size.y / 3), random.integer(0, size.z / 3)},
+                    {size.x - random.integer(0, size.x / 3), size.y - random.integer(0, size.y / 3), size.z}};
+  for (const bool maps : {false, true}) {
+    for (const Region& region : {whole(test.output), part}) {
+      const auto expected = run_on<V>(*cpu, test, source, region, maps);
+      const auto found = run_on<V>(*cuda, test, source, region, maps);
+      ASSERT_TRUE(same_bits(expected.output.voxels, found.output.voxels)) << "maps " << maps;
+      ASSERT_TRUE(same_bits(expected.coverage.voxels, found.coverage.voxels));
+      ASSERT_TRUE(same_bits(expected.inverse_mm.voxels, found.inverse_mm.voxels));
+      ASSERT_EQ(expected.report.covered, found.report.covered);
+      ASSERT_EQ(expected.report.uncovered, found.report.uncovered);
+      ASSERT_EQ(expected.report.inverted, found.report.inverted);
+      ASSERT_EQ(expected.report.degenerate, found.report.degenerate);
+      ASSERT_EQ(expected.report.jacobian_min, found.report.jacobian_min);
+      ASSERT_EQ(expected.report.jacobian_max, found.report.jacobian_max);
+    }
+  }
+}
+
+TEST_F(GatherPaths, RandomFieldsWithAndWithoutFolds) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  for (std::uint64_t n = 0; n < 200; ++n) {
+    Random random(test_seed(), 5000 + n);
+    const FieldCase test = n % 2 == 0 ? random_injective_case(random) : random_folding_case(random);
+    SCOPED_TRACE(std::to_string(n) + ": " + test.description);
+    ASSERT_NO_FATAL_FAILURE(expect_same<std::int16_t>(test, random));
+    if (n % 4 == 0) {
+      ASSERT_NO_FATAL_FAILURE(expect_same<std::uint8_t>(test, random));
+    }
+    if (n % 4 == 2) {
+      ASSERT_NO_FATAL_FAILURE(expect_same<std::uint16_t>(test, random));
+    }
+  }
+}
+
+TEST_F(GatherPaths, FormulasOnCellsOfAnySize) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  const Geometry grid = unit_grid({130, 70, 75});
+  for (const char* formula : {"identity", "wave:amplitude=5,wavelength=40", "twist:angle=40",
+                              "bubble:radius=30,strength=0.9", "translate:by=3/0/0.5", "bubble-paper:shift=6",
+                              "bubble-paper:shift=-6", "wave:amplitude=9,wavelength=30,along=x"}) {
+    for (const std::int64_t cell_size : {1, 2, 4, 7, 16, 40}) {
+      SCOPED_TRACE(std::string(formula) + ", cells of " + std::to_string(cell_size));
+      Random random(test_seed(), static_cast<std::uint64_t>(cell_size));
+      FieldCase test{grid, sample_on(lattice_over(grid, cell_size), parse_formula(formula, grid)), formula, {}};
+      ASSERT_NO_FATAL_FAILURE(expect_same<std::int16_t>(test, random));
+    }
+  }
+}
+
+TEST_F(GatherPaths, NoiseAndSharpTurns) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  const Geometry grid = unit_grid({100, 66, 70});
+  for (const double amplitude : {0.01, 0.2, 0.6, 3.0}) {
+    for (const std::int64_t cell_size : {1, 3, 8}) {
+      Random random(test_seed(), 900 + static_cast<std::uint64_t>(cell_size));
+      SCOPED_TRACE("noise of " + std::to_string(amplitude) + ", cells of " + std::to_string(cell_size));
+      const auto noise = [&](const glm::dvec3&) {
+        return amplitude * static_cast<double>(cell_size) *
+               glm::dvec3(random.real(-1, 1), random.real(-1, 1), random.real(-1, 1));
+      };
+      const FieldCase test{grid, field_in_voxels(grid, lattice_over(grid, cell_size), noise), "noise", {}};
+      ASSERT_NO_FATAL_FAILURE(expect_same<std::int16_t>(test, random));
+    }
+  }
+  const Geometry cube = unit_grid({64, 64, 64});
+  for (const int axis : {0, 1, 2}) {
+    for (const double turn : {90.0, 180.0, 37.0}) {
+      SCOPED_TRACE("rotation of " + std::to_string(turn) + " about " + std::to_string(axis));
+      Random random(test_seed(), 950);
+      glm::dvec3 about(0);
+      about[axis] = 1;
+      const glm::dmat3 r = rotation(about, turn * 3.14159265358979323846 / 180);
+      const auto rotate = [&](const glm::dvec3& x) { return r * (x - 31.5) + 31.5 - x; };
+      const FieldCase test{cube, field_in_voxels(cube, lattice_over(cube, 1), rotate), "rotation", {}};
+      ASSERT_NO_FATAL_FAILURE(expect_same<std::int16_t>(test, random));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tetwarp
