@@ -98,13 +98,15 @@ __global__ void wind_kernel(Crossings in, std::int64_t rows, int width, std::uin
 }
 
 /// One thread 32 cells: voxels that an inverted tetrahedron owns go from `single` to `several`.
-__global__ void inverted_kernel(DeviceField field, const std::uint32_t* inverted_cells, SlabBox box, int words,
+__global__ void inverted_kernel(DeviceField field, BitRows inverted_cells, SlabBox box, int words,
                                 std::uint32_t* single, std::uint32_t* several) {
   const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
-  if (n * 32 >= field.cell_count()) return;
+  const std::int64_t per_row = inverted_cells.words_per_row, rows = field.frame.cells.y * field.frame.cells.z;
+  if (n >= per_row * rows) return;
   const VoxelBox region{box.begin, box.begin + box.size};
-  for (std::uint32_t left = inverted_cells[n]; left != 0; left &= left - 1) {
-    const glm::i64vec3 at = field.cell_at(n * 32 + __ffs(static_cast<int>(left)) - 1);
+  const glm::i64vec3 first(n % per_row * 32, n / per_row % field.frame.cells.y, n / per_row / field.frame.cells.y);
+  for (std::uint32_t left = inverted_cells.words[n]; left != 0; left &= left - 1) {
+    const glm::i64vec3 at = first + glm::i64vec3(__ffs(static_cast<int>(left)) - 1, 0, 0);
     visit_cell(field.cell(at), DeviceField::is_odd(at), region, field.frame.nudge,
                [&](const glm::i64vec3& voxel, const glm::i32vec3&, int, const Tetrahedron& t) {
                  if (jacobian(t) > 0) return;
@@ -119,8 +121,8 @@ __global__ void inverted_kernel(DeviceField field, const std::uint32_t* inverted
 
 }  // namespace
 
-void Coverage::find(const DeviceField& field, const std::uint32_t* inverted_cells, bool any_inverted,
-                    const SlabBox& box, cudaStream_t stream) {
+void Coverage::find(const DeviceField& field, const BitRows& inverted_cells, bool any_inverted, const SlabBox& box,
+                    cudaStream_t stream) {
   words_ = static_cast<int>((box.size.x + 31) / 32);
   const std::int64_t rows = box.size.y * box.size.z;
   const auto words = static_cast<std::size_t>(rows * words_);
@@ -139,8 +141,8 @@ void Coverage::find(const DeviceField& field, const std::uint32_t* inverted_cell
   wind_kernel<<<blocks_for(rows * 32), kThreads, 0, stream>>>(crossings, rows, static_cast<int>(box.size.x), single,
                                                               several);
   if (any_inverted) {
-    inverted_kernel<<<blocks_for((field.cell_count() + 31) / 32), kThreads, 0, stream>>>(field, inverted_cells, box,
-                                                                                         words_, single, several);
+    inverted_kernel<<<blocks_for(inverted_cells.words_per_row * field.frame.cells.y * field.frame.cells.z), kThreads, 0,
+                      stream>>>(field, inverted_cells, box, words_, single, several);
   }
   TETWARP_CUDA_TRY(cudaGetLastError());
 }

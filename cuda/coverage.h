@@ -4,12 +4,6 @@
 
 namespace tetwarp::cuda_detail {
 
-/// One bit a voxel of a box; rows begin at a word.
-struct BitRows {
-  const std::uint32_t* words;
-  int words_per_row;
-};
-
 /// Which voxels of a box have exactly one owner, so that any owner found is the one; and which need the slow path.
 ///
 /// The winding number of the deformed border is the number of owners, inverted ones counted as -1. Where no inverted
@@ -17,7 +11,7 @@ struct BitRows {
 class Coverage {
  public:
   /// For a field with whole steps. Queued on the stream.
-  void find(const DeviceField& field, const std::uint32_t* inverted_cells, bool any_inverted, const SlabBox& box,
+  void find(const DeviceField& field, const BitRows& inverted_cells, bool any_inverted, const SlabBox& box,
             cudaStream_t stream);
 
   /// Voxels with one owner.

@@ -34,12 +34,6 @@ struct Task {
   }
 };
 
-/// Sum over a whole warp, in every lane.
-__device__ unsigned warp_sum(unsigned value) {
-  for (int step = 16; step > 0; step /= 2) value += __shfl_xor_sync(~0u, value, step);
-  return value;
-}
-
 __device__ bool is_finite(const glm::vec3& v) { return isfinite(v.x + v.y + v.z); }
 
 /// A guess for every march: where the first voxel of a column comes from, by repeated prediction.
@@ -95,6 +89,7 @@ __global__ void __launch_bounds__(32 * kWarps) march_kernel(Task task, const glm
   glm::ivec3 in(blockIdx.x * 32 + lane, blockIdx.y * kWarps + warp, blockIdx.z * kMarch);
   if (in.y >= size.y) return;  // the whole warp
   const int last = min(in.z + kMarch, size.z);
+  int first_down = static_cast<int>(task.nudge.first_down(2) - task.box.begin.z);
   const bool in_row = in.x < size.x;
   unsigned covered = 0;
   int waiting = 0;  // the same in all lanes
@@ -105,10 +100,13 @@ __global__ void __launch_bounds__(32 * kWarps) march_kernel(Task task, const glm
       seeds[(seed.z * task.seeds.y + seed.y) * task.seeds.x + seed.x] + glm::vec3(in - seeded) * task.lattice.voxel;
   std::int64_t word = task.word({blockIdx.x * 32, in.y, in.z});
   const std::int64_t words_per_slice = std::int64_t{size.y} * task.single.words_per_row;
-  for (; in.z < last; ++in.z, word += words_per_slice) {
+  GatherPoint point = task.point(in + task.begin());
+  if (in.z >= first_down) first_down = -1;  // turned already
+  for (; in.z < last; ++in.z, word += words_per_slice, point.steps.z += float{kStepsPerVoxel}) {
     const glm::ivec3 voxel = in + task.begin();
+    if (in.z == first_down) point.nudge.z = -point.nudge.z;
     const bool single = (task.single.words[word] >> lane & 1) != 0;
-    const Trial trial = try_tetrahedron(task.lattice, tetrahedron_at(task.lattice, place), task.point(voxel));
+    const Trial trial = try_tetrahedron(task.lattice, tetrahedron_at(task.lattice, place), point);
     const bool again = single && !trial.owns;
     if (single && trial.owns) {
       covered += sink.write(voxel, trial.u);
@@ -128,7 +126,6 @@ __global__ void __launch_bounds__(32 * kWarps) march_kernel(Task task, const glm
       __syncwarp();
     }
     place = trial.place + trial.per_slice;
-    if (!is_finite(place)) place = task.lattice.place(glm::vec3(voxel));
   }
   if (lane < waiting) covered += try_again(task, sink, queue[lane]);
   covered = warp_sum(covered);
@@ -159,7 +156,7 @@ __global__ void queue_kernel(Task task, Sink sink) {
     if (!is_finite(place)) place = task.lattice.place(glm::vec3(voxel));
     const glm::i32vec3 steps = detail::to_steps(glm::i64vec3(voxel)), signs = task.nudge.signs(glm::i64vec3(voxel));
     LatticeTetrahedron owner;
-    if (walk_to_owner(task.lattice, tetrahedron_at(task.lattice, place), steps, signs, kWalk, owner)) {
+    if (walk_to_owner(task.lattice, as_lattice(tetrahedron_at(task.lattice, place)), steps, signs, kWalk, owner)) {
       covered += sink.write(voxel, interpolate_u(vertices_of(task.lattice, owner), steps, signs));
     } else {
       atomicOr(&task.several[task.word(in)], 1u << (in.x & 31));

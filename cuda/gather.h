@@ -35,6 +35,9 @@ class Gather {
   template <class Sink>
   std::uint64_t run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream);
 
+  /// To be called when the field is another one.
+  void forget_field() { claims_.forget_field(); }
+
   struct Entry {
     int voxel;  ///< offset in the box
     float x, y, z;

@@ -47,11 +47,11 @@ __global__ void snap_kernel(LatticeFrame frame, const glm::vec3* displacement, s
 }
 
 __global__ void snap_steps_kernel(LatticeFrame frame, StepLattice lattice, const glm::vec3* displacement,
-                                  std::int64_t vertices, glm::vec3* moved, LatticeFindings* found) {
+                                  glm::vec3* moved, LatticeFindings* found) {
   constexpr int kMost = 1 << 23;  // a difference of two is exact in float
-  const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
-  if (n >= vertices) return;
-  const glm::i64vec3 at = vertex_at(frame, n);
+  const glm::i64vec3 at(blockIdx.x * kThreads + threadIdx.x, blockIdx.y, blockIdx.z);
+  if (at.x > lattice.cells.x) return;
+  const std::int64_t n = lattice.offset(glm::ivec3(at));
   const Vertex vertex = snapped(frame, displacement, n, at, &found->bad_vertex);
   const glm::i32vec3 rest(lattice.first + glm::vec3(at) * lattice.cell), u = vertex.u;
   const bool near = u.x > -kMost && u.x < kMost && u.y > -kMost && u.y < kMost && u.z > -kMost && u.z < kMost;
@@ -59,40 +59,106 @@ __global__ void snap_steps_kernel(LatticeFrame frame, StepLattice lattice, const
   moved[n] = -glm::vec3(u);
 }
 
-template <class Int>
-__device__ void jacobians(const Cell& cell, bool odd, double (&determinants)[kTetrahedraPerCell]) {
-  if (odd) {
-    cell_jacobians<Int, true>(cell, determinants);
-  } else {
-    cell_jacobians<Int, false>(cell, determinants);
+/// Smallest and largest of a warp go to the findings; only where they are news.
+__device__ void note_range(float least, float most, LatticeFindings* found) {
+  for (int step = 16; step > 0; step /= 2) {
+    least = fminf(least, __shfl_xor_sync(~0u, least, step));
+    most = fmaxf(most, __shfl_xor_sync(~0u, most, step));
   }
+  if ((threadIdx.x & 31) != 0) return;
+  if (ordered(least) < found->jacobian_min) atomicMin(&found->jacobian_min, ordered(least));
+  if (ordered(most) > found->jacobian_max) atomicMax(&found->jacobian_max, ordered(most));
 }
 
-__global__ void statistics_kernel(DeviceField field, LatticeFindings* found, std::uint32_t* inverted) {
+__device__ void note_counts(unsigned inverted, unsigned degenerate, LatticeFindings* found) {
+  inverted = warp_sum(inverted);
+  degenerate = warp_sum(degenerate);
+  if ((threadIdx.x & 31) != 0) return;
+  if (inverted != 0) atomicAdd(&found->inverted, static_cast<unsigned long long>(inverted));
+  if (degenerate != 0) atomicAdd(&found->degenerate, static_cast<unsigned long long>(degenerate));
+}
+
+/// One warp 32 cells of a row; any lattice.
+__global__ void describe_kernel(DeviceField field, LatticeFindings* found) {
   const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
-  bool any_inverted = false;
+  float least = INFINITY, most = -INFINITY;
+  unsigned inverted = 0, degenerate = 0;
   if (n < field.cell_count()) {
     const glm::i64vec3 at = field.cell_at(n);
-    const Cell cell = field.cell(at);
-    Box rest{cell.corner[0].deformed + cell.corner[0].u, cell.corner[0].deformed + cell.corner[0].u};
-    for (const Vertex& corner : cell.corner) rest.grow(corner.deformed + corner.u);
-    double determinants[kTetrahedraPerCell];
-    if (fits_double(box_of(cell)) && fits_double(rest)) {
-      jacobians<double>(cell, DeviceField::is_odd(at), determinants);
-    } else {
-      jacobians<Wide>(cell, DeviceField::is_odd(at), determinants);
-    }
-    for (const double determinant : determinants) {
-      if (determinant < 0) atomicAdd(&found->inverted, 1ULL);
-      if (determinant == 0) atomicAdd(&found->degenerate, 1ULL);
-      any_inverted = any_inverted || determinant < 0;
-      const unsigned long long key = ordered(determinant);
-      if (key < found->jacobian_min) atomicMin(&found->jacobian_min, key);
-      if (key > found->jacobian_max) atomicMax(&found->jacobian_max, key);
+    float jacobians[kTetrahedraPerCell];
+    cell_jacobians(field.cell(at), DeviceField::is_odd(at), jacobians);
+    for (const float jacobian : jacobians) {
+      inverted += jacobian < 0;
+      degenerate += jacobian == 0;
+      least = fminf(least, jacobian);
+      most = fmaxf(most, jacobian);
     }
   }
-  const unsigned votes = __ballot_sync(~0u, any_inverted);
-  if ((threadIdx.x & 31) == 0 && n < field.cell_count()) inverted[n / 32] = votes;
+  note_range(least, most, found);
+  note_counts(inverted, degenerate, found);
+}
+
+constexpr int kDescribed = 16;  ///< cells along k that a thread goes
+constexpr int kRows = 4;        ///< of a thread block
+
+/// What a thread has seen of one kind of tetrahedron.
+struct Seen {
+  float least = INFINITY, most = -INFINITY;
+  unsigned inverted = 0, degenerate = 0;
+
+  /// @param turn  sign of the determinant when undeformed
+  __device__ void add(float determinant, float turn) {
+    const float volume = determinant * turn;
+    least = fminf(least, volume);
+    most = fmaxf(most, volume);
+    inverted += volume < 0;
+    degenerate += volume == 0;
+  }
+};
+
+/// The same for whole steps: volumes of a kind share their rest volume, so the division waits until the end.
+__global__ void __launch_bounds__(32 * kRows)
+    describe_steps_kernel(StepLattice lattice, float corner_rest, float centre_rest, LatticeFindings* found,
+                          std::uint32_t* inverted_cells, int words_per_row) {
+  const glm::ivec3 at(blockIdx.x * 32 + threadIdx.x, blockIdx.y * kRows + threadIdx.y, blockIdx.z * kDescribed);
+  if (at.y >= lattice.cells.y) return;  // the whole warp
+  const bool here = at.x < lattice.cells.x;
+  const glm::vec3* next = lattice.moved + lattice.offset({here ? at.x : lattice.cells.x - 1, at.y, at.z});
+  const int last = min(at.z + kDescribed, lattice.cells.z), row = lattice.row;
+  const glm::vec3 cell = lattice.cell;
+  glm::vec3 moved[8];
+  for (int c = 0; c < 4; ++c) moved[4 + c] = next[(c & 1) + (c >> 1) * row];
+  Seen corners, centres;
+  for (int z = at.z; z < last; ++z) {
+    next += lattice.slice;
+#pragma unroll
+    for (int c = 0; c < 4; ++c) {
+      moved[c] = moved[4 + c];
+      moved[4 + c] = next[(c & 1) + (c >> 1) * row];
+    }
+    const bool odd = ((at.x + at.y + z) & 1) != 0;
+    glm::vec3 p[8];  // of an odd cell the mirror image through its middle: an even one
+#pragma unroll
+    for (int c = 0; c < 8; ++c) {
+      const glm::vec3 rest(c & 1 ? cell.x : 0.0f, c & 2 ? cell.y : 0.0f, c & 4 ? cell.z : 0.0f);
+      p[c] = (odd ? moved[c ^ 7] + (cell - rest) : moved[c] + rest);
+    }
+    const unsigned before = corners.inverted + centres.inverted;
+    centres.add(detail::edge_determinant(p[1] - p[7], p[2] - p[7], p[4] - p[7]), odd ? 1.0f : -1.0f);
+#pragma unroll
+    for (int number = 1; number < kTetrahedraPerCell; ++number) {
+      constexpr int kD[] = {7, 0, 3, 5, 6};
+      const int d = kD[number];
+      corners.add(detail::edge_determinant(p[d ^ 1] - p[d], p[d ^ 2] - p[d], p[d ^ 4] - p[d]), odd ? -1.0f : 1.0f);
+    }
+    const unsigned votes = __ballot_sync(~0u, here && corners.inverted + centres.inverted != before);
+    if (threadIdx.x == 0)
+      inverted_cells[(std::int64_t{z} * lattice.cells.y + at.y) * words_per_row + blockIdx.x] = votes;
+  }
+  if (!here) corners = centres = {};
+  note_range(corners.least / corner_rest + 0.0f, corners.most / corner_rest + 0.0f, found);
+  note_range(centres.least / centre_rest + 0.0f, centres.most / centre_rest + 0.0f, found);
+  note_counts(corners.inverted + centres.inverted, corners.degenerate + centres.degenerate, found);
 }
 
 __global__ void reach_kernel(DeviceField field, VoxelBox region, int* low_high) {
@@ -115,14 +181,33 @@ void LatticeOnDevice::snap_steps(const StepLattice& lattice, const glm::vec3* di
                                  LatticeFindings* found, cudaStream_t stream) {
   if (lattice.cells.x == 0) return;
   glm::vec3* moved = moved_.reserve(static_cast<std::size_t>(vertices));
-  snap_steps_kernel<<<blocks_for(vertices), kThreads, 0, stream>>>(field_.frame, lattice, displacement, vertices, moved,
-                                                                   found);
+  const dim3 blocks(blocks_for(lattice.row), static_cast<unsigned>(lattice.cells.y + 1),
+                    static_cast<unsigned>(lattice.cells.z + 1));
+  snap_steps_kernel<<<blocks, kThreads, 0, stream>>>(field_.frame, lattice, displacement, moved, found);
   TETWARP_CUDA_TRY(cudaGetLastError());
   LatticeFindings seen;
   found_.download(&seen, 1, stream);
   if (seen.beside != 0) return;
   field_.steps = lattice;
   field_.steps.moved = moved;
+}
+
+void LatticeOnDevice::describe(LatticeFindings* found, cudaStream_t stream) {
+  if (!field_.has_steps()) {
+    describe_kernel<<<blocks_for(field_.cell_count()), kThreads, 0, stream>>>(field_, found);
+  } else {
+    const StepLattice& lattice = field_.steps;
+    const glm::vec3 x(lattice.cell.x, 0, 0), y(0, lattice.cell.y, 0), z(0, 0, lattice.cell.z);
+    const float corner = detail::edge_determinant(x, y, z), centre = detail::edge_determinant(y + z, x + z, x + y);
+    words_per_row_ = (lattice.cells.x + 31) / 32;
+    const std::size_t words = std::size_t(words_per_row_) * std::size_t(lattice.cells.y) * std::size_t(lattice.cells.z);
+    const dim3 blocks(static_cast<unsigned>(words_per_row_),
+                      static_cast<unsigned>((lattice.cells.y + kRows - 1) / kRows),
+                      static_cast<unsigned>((lattice.cells.z + kDescribed - 1) / kDescribed));
+    describe_steps_kernel<<<blocks, dim3(32, kRows), 0, stream>>>(lattice, corner, centre, found,
+                                                                  inverted_.reserve(words), words_per_row_);
+  }
+  TETWARP_CUDA_TRY(cudaGetLastError());
 }
 
 void LatticeOnDevice::set(const LatticeFrame& frame, const Geometry& output, const glm::vec3* displacement,
@@ -139,9 +224,7 @@ void LatticeOnDevice::set(const LatticeFrame& frame, const Geometry& output, con
                                                                found_.data());
     TETWARP_CUDA_TRY(cudaGetLastError());
   }
-  std::uint32_t* inverted = inverted_.reserve(static_cast<std::size_t>((cells + 31) / 32));
-  statistics_kernel<<<blocks_for(cells), kThreads, 0, stream>>>(field_, found_.data(), inverted);
-  TETWARP_CUDA_TRY(cudaGetLastError());
+  describe(found_.data(), stream);
   found_.download(&found, 1, stream);
   if (found.bad_vertex != ~0ULL) {
     const auto n = static_cast<std::int64_t>(found.bad_vertex);

@@ -10,6 +10,18 @@ namespace tetwarp::cuda_detail {
 constexpr int kThreads = 128;
 inline unsigned blocks_for(std::int64_t count) { return static_cast<unsigned>((count + kThreads - 1) / kThreads); }
 
+/// One bit an element of a box; rows begin at a word.
+struct BitRows {
+  const std::uint32_t* words;
+  int words_per_row;
+};
+
+/// Sum over a whole warp, in every lane.
+__device__ inline unsigned warp_sum(unsigned value) {
+  for (int step = 16; step > 0; step /= 2) value += __shfl_xor_sync(~0u, value, step);
+  return value;
+}
+
 /// A field as kernels see it: its vertices, snapped, in one of two forms.
 struct DeviceField {
   LatticeFrame frame;
@@ -20,17 +32,14 @@ struct DeviceField {
   __device__ glm::i64vec3 cell_at(std::int64_t number) const {
     return {number % frame.cells.x, number / frame.cells.x % frame.cells.y, number / (frame.cells.x * frame.cells.y)};
   }
+  __device__ Vertex vertex(const glm::i64vec3& at) const {
+    if (!vertices) return steps.vertex(glm::ivec3(at));
+    return vertices[(at.z * (frame.cells.y + 1) + at.y) * (frame.cells.x + 1) + at.x];
+  }
   __device__ Cell cell(const glm::i64vec3& at) const {
     Cell cell;
-    if (vertices) {
-      const std::int64_t row = frame.cells.x + 1, slice = row * (frame.cells.y + 1);
-      const Vertex* first = vertices + at.z * slice + at.y * row + at.x;
 #pragma unroll
-      for (int c = 0; c < 8; ++c) cell.corner[c] = first[(c & 1) + (c >> 1 & 1) * row + (c >> 2) * slice];
-    } else {
-#pragma unroll
-      for (int c = 0; c < 8; ++c) cell.corner[c] = steps.vertex(glm::ivec3(at) + glm::ivec3(c & 1, c >> 1 & 1, c >> 2));
-    }
+    for (int c = 0; c < 8; ++c) cell.corner[c] = vertex(at + glm::i64vec3(c & 1, c >> 1 & 1, c >> 2));
     return cell;
   }
   __host__ __device__ static bool is_odd(const glm::i64vec3& at) { return ((at.x + at.y + at.z) & 1) != 0; }
@@ -53,8 +62,8 @@ class LatticeOnDevice {
 
   const DeviceField& field() const { return field_; }
   const FieldStatistics& statistics() const { return statistics_; }
-  /// One bit a cell, i fastest, of cells with an inverted tetrahedron.
-  const std::uint32_t* inverted_cells() const { return inverted_.data(); }
+  /// Cells with an inverted tetrahedron, where the vertices rest at whole steps.
+  BitRows inverted_cells() const { return {inverted_.data(), words_per_row_}; }
 
   /// Box of the rest places of all cells that may reach a region: low and high, 2^-12 voxel; low > high where none
   /// does.
@@ -64,11 +73,14 @@ class LatticeOnDevice {
   void snap_steps(const StepLattice& lattice, const glm::vec3* displacement, std::int64_t vertices,
                   LatticeFindings* found, cudaStream_t stream);
 
+  void describe(LatticeFindings* found, cudaStream_t stream);
+
   DeviceField field_;
   FieldStatistics statistics_;
   DeviceBuffer<Vertex> vertices_;
   DeviceBuffer<glm::vec3> moved_;
   DeviceBuffer<std::uint32_t> inverted_;
+  int words_per_row_ = 0;
   DeviceBuffer<LatticeFindings> found_;
 };
 

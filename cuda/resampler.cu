@@ -175,6 +175,8 @@ class ForwardResampler final : public CudaResampler {
     const DeviceScope scope(device_);
     stream_ = static_cast<cudaStream_t>(control.stream);
     const glm::i64vec3 size = field.lattice->size;
+    gather_.forget_field();
+    claims_.forget_field();
     lattice_.set(frame, output(), on_device(field.displacement, field.memory, size.x * size.y * size.z), stream_);
     ready_ = true;
   }

@@ -174,13 +174,16 @@ AnyVoxelSink SlabWriter::plain_sink(const SlabBox& slab) {
   const auto make = [&](auto voxel) {
     using V = decltype(voxel);
     const auto plan = plan_target(target, on_device.relation, reinterpret_cast<const V*>(on_device.source));
+    const Destination<V> output = destination<V>(target, slab);
     return VoxelSink<V>{plan.source.voxels,
                         glm::ivec3(plan.source.begin),
                         glm::ivec3(plan.source.size) - 1,
                         static_cast<int>(plan.source.stride.y),
                         static_cast<int>(plan.source.stride.z),
                         plan.background,
-                        destination<V>(target, slab)};
+                        output.voxels - (output.begin.z * output.slice + output.begin.y * output.row + output.begin.x),
+                        static_cast<int>(output.row),
+                        static_cast<int>(output.slice)};
   };
   switch (target.source.type) {
     case VoxelType::u8: return make(std::uint8_t{});

@@ -61,11 +61,15 @@ struct VoxelSink {
   glm::ivec3 last;          ///< of the whole source grid
   int row, slice;           ///< of what is buffered
   V background;
-  Destination<V> output;
+  V* output;  ///< of voxel (0, 0, 0), were it held
+  int output_row, output_slice;
 
   /// A voxel that a tetrahedron owns. @return whether it comes from inside the source
   __device__ bool write(const glm::ivec3& voxel, const glm::vec3& u) const;
-  __device__ void nothing(const glm::ivec3& voxel) const { output.at(glm::i64vec3(voxel)) = background; }
+  __device__ void nothing(const glm::ivec3& voxel) const { at(voxel) = background; }
+  __device__ V& at(const glm::ivec3& voxel) const {
+    return output[std::int64_t{voxel.z} * output_slice + (voxel.y * output_row + voxel.x)];
+  }
 };
 
 using AnyVoxelSink = std::variant<VoxelSink<std::uint8_t>, VoxelSink<std::int16_t>, VoxelSink<std::uint16_t>>;

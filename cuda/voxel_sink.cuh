@@ -31,8 +31,8 @@ __device__ bool VoxelSink<V>::write(const glm::ivec3& voxel, const glm::vec3& u)
   }
   // With a fraction of 0 the neighbour has no weight: any finite value will do, so the voxel itself stands in for it.
   const int dx = t.x != 0, dy = t.y != 0 ? row : 0, dz = t.z != 0 ? slice : 0;
-  const glm::ivec3 at = base - source_begin;
-  const V* v = source + ((std::int64_t{at.z} * slice) + (at.y * row + at.x));
+  const glm::ivec3 held = base - source_begin;
+  const V* v = source + ((std::int64_t{held.z} * slice) + (held.y * row + held.x));
   const auto along_x = [&](const V* from) {
     const float a = static_cast<float>(from[0]);
     return a + t.x * (static_cast<float>(from[dx]) - a);
@@ -43,7 +43,7 @@ __device__ bool VoxelSink<V>::write(const glm::ivec3& voxel, const glm::vec3& u)
   };
   const float a = along_y(v);
   const float value = a + t.z * (along_y(v + dz) - a);
-  output.at(glm::i64vec3(voxel)) = static_cast<V>(__float2int_rn(value));  // between the corners: never saturates
+  at(voxel) = static_cast<V>(__float2int_rn(value));  // between the corners: never saturates
   return true;
 }
 

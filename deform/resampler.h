@@ -59,7 +59,8 @@ struct Report {
   std::uint64_t degenerate = 0;  ///< tetrahedra of the field without volume: they own nothing
   std::optional<std::uint64_t> multiply_owned =
       {};  ///< voxels with more than one owner, where Maps::owners was asked for
-  double jacobian_min = std::numeric_limits<double>::infinity();  ///< over all tetrahedra of the field
+  double jacobian_min =
+      std::numeric_limits<double>::infinity();  ///< over all tetrahedra of the field; computed in float
   double jacobian_max = -std::numeric_limits<double>::infinity();
 
   /// Regions of one field add up to the same report, whatever the split.

@@ -67,26 +67,7 @@ TETWARP_HD Int signed_volume(const Relative<Int>& a, const Relative<Int>& b, con
   return ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx);
 }
 
-/// Forward Jacobian determinants of the five tetrahedra of a cell: deformed over rest volume, both exact before the
-/// division.
-template <class Int, bool kOdd>
-TETWARP_HD void cell_jacobians(const Cell& cell, double (&determinant)[kTetrahedraPerCell]) {
-  const glm::i32vec3 origin = cell.corner[0].deformed, rest_origin = origin + cell.corner[0].u;
-  Relative<Int> deformed[8], rest[8];
-  for (int corner = 0; corner < 8; ++corner) {
-    const Vertex& vertex = cell.corner[corner];
-    deformed[corner] = Relative<Int>(vertex.deformed - origin);
-    rest[corner] = Relative<Int>(vertex.deformed + vertex.u - rest_origin);
-  }
-  for (int t = 0; t < kTetrahedraPerCell; ++t) {
-    const TetrahedronCorners of = tetrahedron_corners(t, kOdd);
-    const Int after = signed_volume(deformed[of.a], deformed[of.b], deformed[of.c], deformed[of.d]);
-    const Int before = signed_volume(rest[of.a], rest[of.b], rest[of.c], rest[of.d]);
-    determinant[t] = to_double(after) / to_double(before);
-  }
-}
-
-/// The same of one tetrahedron.
+/// Forward Jacobian determinant of a tetrahedron: deformed over rest volume, both exact before the division.
 TETWARP_HD inline double jacobian(const Tetrahedron& t) {
   const auto volume = [](const glm::i32vec3& a, const glm::i32vec3& b, const glm::i32vec3& c, const glm::i32vec3& d) {
     return to_double(signed_volume(Relative<Wide>(a), Relative<Wide>(b), Relative<Wide>(c), Relative<Wide>(d)));

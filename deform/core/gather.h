@@ -43,17 +43,28 @@ TETWARP_HD inline float nudged(float value, const glm::vec3& nudge, const Cross&
   return multiply_add(nudge.x, n.x, multiply_add(nudge.y, n.y, multiply_add(nudge.z, n.z, value)));
 }
 
+/// u in voxels from how far a place has moved in steps: scaling by a power of two is exact; never -0.
+TETWARP_HD inline glm::vec3 to_offset(const glm::vec3& moved) {
+#ifdef __CUDA_ARCH__
+  return {fmaf(moved.x, -kVoxelsPerStep, 0.0f), fmaf(moved.y, -kVoxelsPerStep, 0.0f),
+          fmaf(moved.z, -kVoxelsPerStep, 0.0f)};
+#else
+  return 0.0f - moved * kVoxelsPerStep;
+#endif
+}
+
 TETWARP_HD inline float least(float a, float b) { return a < b ? a : b; }
 
-/// Bound of the rounding errors of the four values that `try_tetrahedron` compares with it, times 2^24.
+/// Bound of the rounding errors of the four values that `try_tetrahedron` compares with it.
 ///
 /// With unit roundoff 2^-24 and P the product of the sum norms of the three columns: a component of a cross product is
 /// off by at most 2 units of its two products, a dot product by 3 more of its terms, the nudge adds 3 fused or 6 plain
 /// operations; so det by 5 P, a numerator by 11 (|r| + |d|) times the norms of its two columns, and the value at D, the
 /// difference of all four, by their sum and 3 roundings of at most the sum of their sizes.
 TETWARP_HD inline float error_bound(float a, float b, float c, float r) {
+  constexpr float kUnit = 1.0f / (1 << 24);
   const float bc = b * c;
-  return 9.0f * (a * bc) + 15.0f * (r * (bc + a * (b + c)));
+  return (9.0f * kUnit) * (a * bc) + (15.0f * kUnit) * (r * (bc + a * (b + c)));
 }
 
 }  // namespace detail
@@ -63,45 +74,49 @@ TETWARP_HD inline float error_bound(float a, float b, float c, float r) {
 /// Its corners relative to D, and the voxel relative to D, are exact. The numerators of the weights at p + d and what
 /// they leave of the determinant are six times the volumes that decide ownership: it owns where all are positive by
 /// more than their error. (An inverted tetrahedron is never accepted here.)
-TETWARP_HD inline Trial try_tetrahedron(const StepLattice& lattice, const LatticeTetrahedron& t,
+TETWARP_HD inline Trial try_tetrahedron(const StepLattice& lattice, const FloatTetrahedron& t,
                                         const GatherPoint& point) {
-  const glm::ivec3 direction = t.direction();
-  const int dx = direction.x, dy = direction.y * lattice.row, dz = direction.z * lattice.slice;
-  const int sum = t.centre ? dx + dy + dz : 0;
-  const glm::vec3* at_d = lattice.moved + lattice.offset(t.d);
+  const int dx = t.to.x < 0 ? -1 : 1, dy = t.to.y < 0 ? -lattice.row : lattice.row,
+            dz = t.to.z < 0 ? -lattice.slice : lattice.slice;
+  const int sum = dx + dy + dz;
+  const glm::vec3* at_d = lattice.moved + t.offset;
   const glm::vec3 moved = at_d[0], moved_a = at_d[t.centre ? sum - dx : dx] - moved,
                   moved_b = at_d[t.centre ? sum - dy : dy] - moved, moved_c = at_d[t.centre ? sum - dz : dz] - moved;
-  const glm::vec3 edge = glm::vec3(direction) * lattice.cell;  // to the next vertex on each axis
+  const glm::vec3 edge = t.to * lattice.cell;  // to the next vertex on each axis
   const glm::vec3 along = t.centre ? glm::vec3(0) : edge, across = t.centre ? edge : glm::vec3(0);
   const glm::vec3 a(along.x + moved_a.x, across.y + moved_a.y, across.z + moved_a.z);
   const glm::vec3 b(across.x + moved_b.x, along.y + moved_b.y, across.z + moved_b.z);
   const glm::vec3 c(across.x + moved_c.x, across.y + moved_c.y, along.z + moved_c.z);
-  const glm::vec3 d_index(t.d);
-  const glm::vec3 r = (point.steps - (lattice.first + d_index * lattice.cell)) - moved;
+  const glm::vec3 r = (point.steps - (lattice.first + t.d * lattice.cell)) - moved;
 
   const Cramer m(a, b, c);
   const float na = detail::dot(r, m.bc), nb = detail::dot(r, m.ca), nc = detail::dot(r, m.ab);
   const float qa = detail::nudged(na, point.nudge, m.bc), qb = detail::nudged(nb, point.nudge, m.ca),
               qc = detail::nudged(nc, point.nudge, m.ab);
   const float qd = ((m.det - qa) - qb) - qc;
-  const float la = detail::norm1(a), lb = detail::norm1(b), lc = detail::norm1(c);
-  const float lr = detail::norm1(r) + 6.5f;  // 15 + 7 + 4 sixteenths, with no cancellation
-  const float error = detail::error_bound(la, lb, lc, lr) * (1.0f / (1 << 24));
-  const float turn = ((t.down.x ^ t.down.y ^ t.down.z) & 1) != 0 ? -1.0f : 1.0f;  // of A, B, C when undeformed
+  const float turn = t.to.x * t.to.y * t.to.z;  // of A, B, C when undeformed
   const float least = detail::least(detail::least(qa * turn, qb * turn), detail::least(qc * turn, qd * turn));
+  const float error = detail::error_bound(detail::norm1(a), detail::norm1(b), detail::norm1(c),
+                                          detail::norm1(r) + 6.5f);  // 15 + 7 + 4 sixteenths of a step
 
   Trial trial;
   const float reciprocal = 1.0f / m.det;
   const Weights w{na * reciprocal, nb * reciprocal, nc * reciprocal};
   trial.owns = least > error && !is_thin(m, a, b, c) && w.within_slack();
-  trial.u = 0.0f - blend(w, moved, moved_a, moved_b, moved_c) * kVoxelsPerStep;  // never -0
+  trial.u = detail::to_offset(blend(w, moved, moved_a, moved_b, moved_c));
   const glm::vec3 at_q = glm::vec3(qa, qb, qc) * reciprocal;
   const glm::vec3 slope = glm::vec3(m.bc.z, m.ca.z, m.ab.z) * (reciprocal * float{kStepsPerVoxel});
   const float all_q = (at_q.x + at_q.y) + at_q.z, all_slope = (slope.x + slope.y) + slope.z;
-  const glm::vec3 to(direction);
-  trial.place = d_index + to * (t.centre ? all_q - at_q : at_q);
-  trial.per_slice = to * (t.centre ? all_slope - slope : slope);
+  const glm::vec3 shift = t.centre ? all_q - at_q : at_q, along_k = t.centre ? all_slope - slope : slope;
+  trial.place = {detail::multiply_add(t.to.x, shift.x, t.d.x), detail::multiply_add(t.to.y, shift.y, t.d.y),
+                 detail::multiply_add(t.to.z, shift.z, t.d.z)};
+  trial.per_slice = t.to * along_k;
   return trial;
+}
+
+TETWARP_HD inline Trial try_tetrahedron(const StepLattice& lattice, const LatticeTetrahedron& t,
+                                        const GatherPoint& point) {
+  return try_tetrahedron(lattice, as_float(lattice, t), point);
 }
 
 /// Whether a tetrahedron owns a voxel, exactly. @param sides  the four sides that decide it, of the faces opposite A,

@@ -12,6 +12,7 @@ struct StepLattice {
   glm::ivec3 cells{0};               ///< on each axis
   glm::vec3 first{0}, cell{0};       ///< rest place of vertex (0, 0, 0), and from one vertex to the next; 2^-12 voxel
   glm::vec3 voxel{0};                ///< one voxel, in cells
+  glm::vec3 end{0};                  ///< `cells`
   int row = 0, slice = 0;            ///< vertices from one row, and one slice, to the next
   const glm::vec3* moved = nullptr;  ///< deformed minus rest of each vertex, 2^-12 voxel, i fastest, 12 bytes each
 
@@ -93,25 +94,47 @@ struct LatticeTetrahedron {
   }
 };
 
+/// A tetrahedron of the lattice as float arithmetic wants it.
+struct FloatTetrahedron {
+  glm::vec3 d;   ///< vertex D
+  glm::vec3 to;  ///< +1 or -1: where A, B, C lie from D
+  int offset;    ///< of D among the vertices
+  bool centre;
+};
+
+TETWARP_HD inline FloatTetrahedron as_float(const StepLattice& lattice, const LatticeTetrahedron& t) {
+  return {glm::vec3(t.d), glm::vec3(t.direction()), static_cast<int>(lattice.offset(t.d)), t.centre};
+}
+
+TETWARP_HD inline LatticeTetrahedron as_lattice(const FloatTetrahedron& t) {
+  return {glm::ivec3(t.d), glm::ivec3(t.to.x < 0, t.to.y < 0, t.to.z < 0), t.centre};
+}
+
 /// The tetrahedron of the undeformed lattice that holds a place, in cells; places outside are moved inside.
-TETWARP_HD inline LatticeTetrahedron tetrahedron_at(const StepLattice& lattice, const glm::vec3& place) {
-  glm::ivec3 cell;
-  glm::vec3 in;  // the cell
+TETWARP_HD inline FloatTetrahedron tetrahedron_at(const StepLattice& lattice, const glm::vec3& place) {
+  glm::vec3 cell, in;
   for (int axis = 0; axis < 3; ++axis) {
-    const float end = static_cast<float>(lattice.cells[axis]);
+    const float end = lattice.end[axis];
     const float inside = place[axis] > 0.0f ? (place[axis] < end ? place[axis] : end) : 0.0f;  // NaN: 0
-    const float whole = std::floor(inside < end ? inside : end - 1.0f);
-    cell[axis] = static_cast<int>(whole);
-    in[axis] = inside - whole;  // 0 to 1: at most one of the four corners below is near
+    const float whole = std::floor(inside), last = end - 1.0f;
+    cell[axis] = whole < last ? whole : last;
+    in[axis] = inside - cell[axis];  // 0 to 1: at most one of the four corners below is near
   }
-  const int odd = (cell.x + cell.y + cell.z) & 1;
-  const float x = odd ? 1.0f - in.x : in.x;  // mirrored, an odd cell is an even one
+  const int x = static_cast<int>(cell.x), y = static_cast<int>(cell.y), z = static_cast<int>(cell.z);
+  const bool odd = ((x ^ y ^ z) & 1) != 0;
+  const float mirrored = odd ? 1.0f - in.x : in.x;  // mirrored, an odd cell is an even one
   const float more = in.y + in.z, less = in.y - in.z;
-  const bool corner0 = x + more<1.0f, corner3 = x + less> 1.0f, corner5 = x - less > 1.0f, corner6 = more - x > 1.0f;
-  if (!(corner0 || corner3 || corner5 || corner6)) return {cell + (odd ^ 1), glm::ivec3(odd ^ 1), true};
-  const int down_x = (corner3 || corner5) ^ odd;
-  const glm::ivec3 down(down_x, corner3 || corner6, corner5 || corner6);
-  return {cell + down, down, false};
+  const bool corner0 = mirrored + more<1.0f, corner3 = mirrored + less> 1.0f, corner5 = mirrored - less > 1.0f,
+             corner6 = more - mirrored > 1.0f;
+  const bool centre = !(corner0 || corner3 || corner5 || corner6);
+  const bool down_x = centre ? !odd : (corner3 || corner5) != odd, down_y = centre ? !odd : corner3 || corner6,
+             down_z = centre ? !odd : corner5 || corner6;
+  FloatTetrahedron t;
+  t.d = {down_x ? cell.x + 1.0f : cell.x, down_y ? cell.y + 1.0f : cell.y, down_z ? cell.z + 1.0f : cell.z};
+  t.to = {down_x ? -1.0f : 1.0f, down_y ? -1.0f : 1.0f, down_z ? -1.0f : 1.0f};
+  t.offset = (z + down_z) * lattice.slice + (y + down_y) * lattice.row + (x + down_x);
+  t.centre = centre;
+  return t;
 }
 
 /// With its snapped vertices, for exact arithmetic.

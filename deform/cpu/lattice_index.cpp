@@ -14,29 +14,17 @@
 
 namespace tetwarp::cpu {
 
-namespace {
-
-/// Volumes of tetrahedra within a box of 16 voxels are exact in double: six products of three differences below 2^16.
-constexpr std::int64_t kExactInDouble = 1 << 16;
-
-}  // namespace
-
-template <class Int>
 void FieldStatistics::add_cells(const LatticeBlock& block) {
   for (int z = 0; z < block.cells.z; ++z) {
     for (int y = 0; y < block.cells.y; ++y) {
       for (int x = 0; x < block.cells.x; ++x) {
-        double determinants[kTetrahedraPerCell];
-        if (block.is_odd({x, y, z})) {
-          cell_jacobians<Int, true>(block.cell({x, y, z}), determinants);
-        } else {
-          cell_jacobians<Int, false>(block.cell({x, y, z}), determinants);
-        }
-        for (const double determinant : determinants) {
-          inverted += determinant < 0;
-          degenerate += determinant == 0;
-          jacobian_min = std::min(jacobian_min, determinant);
-          jacobian_max = std::max(jacobian_max, determinant);
+        float jacobians[kTetrahedraPerCell];
+        cell_jacobians(block.cell({x, y, z}), block.is_odd({x, y, z}), jacobians);
+        for (const double jacobian : jacobians) {
+          inverted += jacobian < 0;
+          degenerate += jacobian == 0;
+          jacobian_min = std::min(jacobian_min, jacobian);
+          jacobian_max = std::max(jacobian_max, jacobian);
         }
       }
     }
@@ -133,12 +121,7 @@ void LatticeIndex::scan_block(std::size_t number, Block& block, FieldStatistics&
     statistics.jacobian_max = std::max(statistics.jacobian_max, 1.0);
     return;
   }
-  const std::int64_t extent = std::max(reach_of(box), reach_of(rest));
-  if (extent <= kExactInDouble) {
-    statistics.add_cells<double>(block);
-  } else {
-    statistics.add_cells<Wide>(block);
-  }
+  statistics.add_cells(block);
 }
 
 void LatticeIndex::group_boxes() {

@@ -30,8 +30,7 @@ struct FieldStatistics {
   double jacobian_max = -std::numeric_limits<double>::infinity();
 
   void add(const FieldStatistics& other);
-  /// Counts the tetrahedra of a block. Int holds their volumes exactly.
-  template <class Int>
+  /// Counts the tetrahedra of a block.
   void add_cells(const LatticeBlock& block);
 };
 

@@ -96,9 +96,10 @@ TEST(StepLattice, FindsTheTetrahedronOfAnUndeformedPlace) {
   Random random(test_seed(), 1);
   StepLattice lattice;
   lattice.cells = {5, 4, 6};
+  lattice.end = {5, 4, 6};
   for (int n = 0; n < 20000; ++n) {
     const glm::dvec3 place(random.real(0, 5), random.real(0, 4), random.real(0, 6));
-    const LatticeTetrahedron t = tetrahedron_at(lattice, glm::vec3(place));
+    const LatticeTetrahedron t = as_lattice(tetrahedron_at(lattice, glm::vec3(place)));
     const glm::dvec3 d(t.d);
     const glm::dmat3 edges(glm::dvec3(t.a()) - d, glm::dvec3(t.b()) - d, glm::dvec3(t.c()) - d);
     const glm::dvec3 w = glm::inverse(edges) * (glm::dvec3(glm::vec3(place)) - d);
@@ -114,11 +115,12 @@ TEST(StepLattice, MovesPlacesOutsideIntoATetrahedronOfTheLattice) {
   Random random(test_seed(), 2);
   StepLattice lattice;
   lattice.cells = {5, 4, 6};
+  lattice.end = {5, 4, 6};
   constexpr float kNaN = std::numeric_limits<float>::quiet_NaN(), kInfinity = std::numeric_limits<float>::infinity();
   for (int n = 0; n < 20000; ++n) {
     glm::vec3 place(random.real(-3, 9), random.real(-3, 9), random.real(-3, 9));
     if (n % 10 == 0) place[random.axis()] = random.one_of({kNaN, kInfinity, -kInfinity, 0.0f, 4.0f, 5.0f, 6.0f});
-    const LatticeTetrahedron t = tetrahedron_at(lattice, place);
+    const LatticeTetrahedron t = as_lattice(tetrahedron_at(lattice, place));
     ASSERT_NE(t.number(), -1);
     ASSERT_EQ(corners(t), corners(named(t.cell(), t.number())));
     const glm::ivec3 cell = t.cell();
