@@ -1,5 +1,5 @@
 #include "cuda/claim.h"
-#include "deform/core/visit_cell.h"
+#include "deform/core/gather.h"
 
 namespace tetwarp::cuda_detail {
 
@@ -78,29 +78,59 @@ __global__ void clear_kernel(SlabBox slab, const std::uint32_t* only, unsigned l
     owner[n / words * slab.size.x + n % words * 32 + __ffs(static_cast<int>(left)) - 1] = kNobody;
 }
 
-__global__ void claim_kernel(DeviceField field, Blocks blocks, const unsigned* chosen, const unsigned* count,
-                             SlabBox slab, const std::uint32_t* only, unsigned long long* owner, unsigned* owners) {
-  const VoxelBox region{slab.begin, slab.begin + slab.size};
-  const std::int64_t words = (slab.size.x + 31) / 32;
-  for (unsigned n = blockIdx.x; n < *count; n += gridDim.x) {
+/// The claims on the voxels of a slab.
+struct Slate {
+  SlabBox slab;
+  const std::uint32_t* only;
+  unsigned long long* owner;
+  unsigned* owners;
+
+  __device__ VoxelBox region() const { return {slab.begin, slab.begin + slab.size}; }
+  __device__ void claim(const glm::i64vec3& voxel, unsigned long long number) const {
+    const glm::i64vec3 at = voxel - slab.begin;
+    const std::int64_t row = at.z * slab.size.y + at.y;
+    if (only && (only[row * ((slab.size.x + 31) / 32) + at.x / 32] >> (at.x & 31) & 1) == 0) return;
+    atomicMin(&owner[row * slab.size.x + at.x], number);
+    if (owners) atomicAdd(&owners[row * slab.size.x + at.x], 1u);
+  }
+};
+
+/// Calls `visit(cell, number of its first tetrahedron)` for the cells of the chosen blocks.
+template <class Visit>
+__device__ void for_each_chosen(const Blocks& blocks, const unsigned* chosen, unsigned count, Visit&& visit) {
+  for (unsigned n = blockIdx.x; n < count; n += gridDim.x) {
     const glm::i64vec3 first = blocks.first_cell(chosen[n]);
     for (int in = static_cast<int>(threadIdx.x); in < Blocks::kX * Blocks::kY * Blocks::kZ; in += kThreads) {
       const glm::i64vec3 at =
           first + glm::i64vec3(in % Blocks::kX, in / Blocks::kX % Blocks::kY, in / (Blocks::kX * Blocks::kY));
       if (at.x >= blocks.cells.x || at.y >= blocks.cells.y || at.z >= blocks.cells.z) continue;
-      const std::int64_t number = (at.z * blocks.cells.y + at.y) * blocks.cells.x + at.x;
-      visit_cell(field.cell(at), DeviceField::is_odd(at), region, field.frame.nudge,
-                 [&](const glm::i64vec3& voxel, const glm::i32vec3&, int t, const Tetrahedron&) {
-                   const glm::i64vec3 place = voxel - slab.begin;
-                   const std::int64_t row = place.z * slab.size.y + place.y;
-                   if (only && (only[row * words + place.x / 32] >> (place.x & 31) & 1) == 0) return;
-                   const std::int64_t offset = row * slab.size.x + place.x;
-                   atomicMin(&owner[offset],
-                             static_cast<unsigned long long>(number) * kTetrahedraPerCell + static_cast<unsigned>(t));
-                   if (owners) atomicAdd(&owners[offset], 1u);
-                 });
+      visit(at, static_cast<unsigned long long>((at.z * blocks.cells.y + at.y) * blocks.cells.x + at.x) *
+                    kTetrahedraPerCell);
     }
   }
+}
+
+__global__ void claim_kernel(DeviceField field, Blocks blocks, const unsigned* chosen, const unsigned* count,
+                             Slate slate) {
+  for_each_chosen(blocks, chosen, *count, [&](const glm::i64vec3& at, unsigned long long number) {
+    visit_cell(field.cell(at), DeviceField::is_odd(at), slate.region(), field.frame.nudge,
+               [&](const glm::i64vec3& voxel, const glm::i32vec3&, int t, const Tetrahedron&) {
+                 slate.claim(voxel, number + static_cast<unsigned>(t));
+               });
+  });
+}
+
+/// The same for whole steps, with a float test in front of the exact one.
+__global__ void claim_steps_kernel(StepLattice lattice, Nudge nudge, Blocks blocks, const unsigned* chosen,
+                                   const unsigned* count, Slate slate) {
+  for_each_chosen(blocks, chosen, *count, [&](const glm::i64vec3& at, unsigned long long number) {
+#pragma unroll 1
+    for (int t = 0; t < kTetrahedraPerCell; ++t) {
+      visit_tetrahedron(
+          lattice, LatticeTetrahedron::of_cell(glm::ivec3(at), t), slate.region(), nudge,
+          [&](const glm::ivec3& voxel) { slate.claim(glm::i64vec3(voxel), number + static_cast<unsigned>(t)); });
+    }
+  });
 }
 
 }  // namespace
@@ -132,8 +162,13 @@ void Claims::claim(const DeviceField& field, const SlabBox& slab, const std::uin
   const Blocks blocks(field);
   choose_kernel<<<blocks_for(blocks.total()), kThreads, 0, stream>>>(bounds_.data(), blocks.total(), slab, only,
                                                                      chosen_.data(), count_.data());
-  claim_kernel<<<kAtOnce, kThreads, 0, stream>>>(field, blocks, chosen_.data(), count_.data(), slab, only,
-                                                 owner_.data(), count_owners ? owners_.data() : nullptr);
+  const Slate slate{slab, only, owner_.data(), count_owners ? owners_.data() : nullptr};
+  if (field.has_steps()) {
+    claim_steps_kernel<<<kAtOnce, kThreads, 0, stream>>>(field.steps, field.frame.nudge, blocks, chosen_.data(),
+                                                         count_.data(), slate);
+  } else {
+    claim_kernel<<<kAtOnce, kThreads, 0, stream>>>(field, blocks, chosen_.data(), count_.data(), slate);
+  }
   TETWARP_CUDA_TRY(cudaGetLastError());
 }
 

@@ -33,15 +33,27 @@ __device__ void cross_rows(const BorderTriangle& t, const Nudge& nudge, const Sl
   }
 }
 
-/// One thread a triangle of one side of the border.
-__global__ void border_kernel(StepLattice lattice, Nudge nudge, SlabBox box, int axis, bool high, Crossings out) {
-  const int next = (axis + 1) % 3, last = (axis + 2) % 3;
-  const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
-  const std::int64_t faces = std::int64_t{lattice.cells[next]} * lattice.cells[last];
-  if (n >= 2 * faces) return;
-  const auto face = static_cast<int>(n >> 1);
-  const BorderTriangle t = border_triangle(
-      lattice, axis, high, {face % lattice.cells[next], face / lattice.cells[next]}, static_cast<int>(n & 1));
+/// How the triangles of the six sides of the border are numbered.
+struct Sides {
+  std::int64_t first[7];  ///< of each side; the last is their number
+
+  explicit Sides(const glm::ivec3& cells) : first{} {
+    for (int side = 0; side < 6; ++side) {
+      const int axis = side / 2;
+      first[side + 1] = first[side] + 2 * std::int64_t{cells[(axis + 1) % 3]} * cells[(axis + 2) % 3];
+    }
+  }
+};
+
+/// One thread a triangle of the border.
+__global__ void border_kernel(StepLattice lattice, Sides sides, Nudge nudge, SlabBox box, Crossings out) {
+  const std::int64_t number = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
+  if (number >= sides.first[6]) return;
+  int side = 0;
+  while (number >= sides.first[side + 1]) ++side;
+  const auto n = static_cast<int>(number - sides.first[side]);
+  const int axis = side / 2, across = lattice.cells[(axis + 1) % 3];
+  const BorderTriangle t = border_triangle(lattice, axis, side % 2 == 1, {n / 2 % across, n / 2 / across}, n % 2);
   Box around{t.a, t.a};
   around.grow(t.b);
   around.grow(t.c);
@@ -78,14 +90,15 @@ __global__ void wind_kernel(Crossings in, std::int64_t rows, int width, std::uin
       if (lane >= step) sum += below;
     }
     int winding = carried + sum - change;
-    std::uint32_t one = winding == 1 ? ~0u : 0, more = winding != 1 && winding != 0 ? ~0u : 0;
-    if ((ins | outs) != 0) {
-      one = more = 0;
-      for (int bit = 0; bit < 32; ++bit) {
-        winding += static_cast<int>(ins >> bit & 1) - static_cast<int>(outs >> bit & 1);
-        one |= (winding == 1 ? 1u : 0u) << bit;
-        more |= (winding != 1 && winding != 0 ? 1u : 0u) << bit;
-      }
+    std::uint32_t one = 0, more = 0;
+    int from = 0;  // bits from here on have the winding number so far
+    for (std::uint32_t events = ins | outs; from < 32; events &= events - 1) {
+      const int next = events != 0 ? __ffs(static_cast<int>(events)) - 1 : 32;
+      const std::uint32_t bits = (next == 32 ? ~0u : (1u << next) - 1) & (~0u << from);
+      one |= winding == 1 ? bits : 0;
+      more |= winding != 1 && winding != 0 ? bits : 0;
+      if (next < 32) winding += static_cast<int>(ins >> next & 1) - static_cast<int>(outs >> next & 1);
+      from = next;
     }
     const int left = width - word * 32;
     const std::uint32_t valid = left >= 32 ? ~0u : (left > 0 ? (1u << left) - 1 : 0);
@@ -104,9 +117,10 @@ __global__ void inverted_kernel(DeviceField field, BitRows inverted_cells, SlabB
   const std::int64_t per_row = inverted_cells.words_per_row, rows = field.frame.cells.y * field.frame.cells.z;
   if (n >= per_row * rows) return;
   const VoxelBox region{box.begin, box.begin + box.size};
-  const glm::i64vec3 first(n % per_row * 32, n / per_row % field.frame.cells.y, n / per_row / field.frame.cells.y);
+  const glm::i64vec3 first(n % per_row / 2 * 64 + n % per_row % 2, n / per_row % field.frame.cells.y,
+                           n / per_row / field.frame.cells.y);
   for (std::uint32_t left = inverted_cells.words[n]; left != 0; left &= left - 1) {
-    const glm::i64vec3 at = first + glm::i64vec3(__ffs(static_cast<int>(left)) - 1, 0, 0);
+    const glm::i64vec3 at = first + glm::i64vec3(2 * (__ffs(static_cast<int>(left)) - 1), 0, 0);
     visit_cell(field.cell(at), DeviceField::is_odd(at), region, field.frame.nudge,
                [&](const glm::i64vec3& voxel, const glm::i32vec3&, int, const Tetrahedron& t) {
                  if (jacobian(t) > 0) return;
@@ -131,12 +145,9 @@ void Coverage::find(const DeviceField& field, const BitRows& inverted_cells, boo
   start_.fill(0, static_cast<std::size_t>(rows), stream);
   collided_.fill(0, static_cast<std::size_t>(rows), stream);
   const Crossings crossings{ins_.data(), outs_.data(), start_.data(), collided_.data(), words_};
-  for (int side = 0; side < 6; ++side) {
-    const int axis = side / 2, next = (axis + 1) % 3, last = (axis + 2) % 3;
-    const std::int64_t triangles = 2 * std::int64_t{field.steps.cells[next]} * field.steps.cells[last];
-    border_kernel<<<blocks_for(triangles), kThreads, 0, stream>>>(field.steps, field.frame.nudge, box, axis,
-                                                                  side % 2 == 1, crossings);
-  }
+  const Sides sides(field.steps.cells);
+  border_kernel<<<blocks_for(sides.first[6]), kThreads, 0, stream>>>(field.steps, sides, field.frame.nudge, box,
+                                                                     crossings);
   std::uint32_t *single = single_.reserve(words), *several = several_.reserve(words);
   wind_kernel<<<blocks_for(rows * 32), kThreads, 0, stream>>>(crossings, rows, static_cast<int>(box.size.x), single,
                                                               several);

@@ -11,6 +11,7 @@ constexpr int kMarch = 32;      ///< voxels along k that a thread goes
 constexpr int kWarps = 4;       ///< of a block, side by side along j
 constexpr int kSeedTile = 8;    ///< voxels along i and j that share a seed
 constexpr int kSeedTries = 40;  ///< from an undeformed guess
+constexpr int kWarpTries = 3;   ///< of a voxel within its warp, after the first
 constexpr int kQueueTries = 6;  ///< in float, before the exact walk
 constexpr int kWalk = 64;       ///< tetrahedra that the exact walk may pass
 constexpr unsigned kQueueSize = 1u << 22;
@@ -23,16 +24,35 @@ struct Task {
   BitRows single;
   std::uint32_t* several;
   glm::ivec3 seeds;  ///< how many on each axis
+  int first_down;    ///< first slice of the box that is nudged down
   Gather::Entry* queue;
   Gather::Counters* counters;
 
   __device__ glm::ivec3 begin() const { return glm::ivec3(box.begin); }
   __device__ glm::ivec3 size() const { return glm::ivec3(box.size); }
-  __device__ GatherPoint point(const glm::ivec3& voxel) const { return {voxel, nudge.signs(glm::i64vec3(voxel))}; }
+  __device__ GatherPoint point(const glm::ivec3& voxel) const {
+    return {lattice, voxel, nudge.signs(glm::i64vec3(voxel))};
+  }
+  /// Leaves a voxel to the walk or, where its queue is full, to the claims.
+  __device__ void put_aside(const glm::ivec3& in, const glm::vec3& place) const {
+    const unsigned n = atomicAdd(&counters->queued, 1u);
+    if (n < kQueueSize) {
+      queue[n] = {(in.z * size().y + in.y) * size().x + in.x, place.x, place.y, place.z};
+    } else {
+      leave_to_claims(in);
+    }
+  }
+  __device__ void leave_to_claims(const glm::ivec3& in) const {
+    atomicOr(&several[word(in)], 1u << (in.x & 31));
+    atomicAdd(&counters->several, 1u);
+  }
   __device__ std::int64_t word(const glm::ivec3& in) const {
     return (std::int64_t{in.z} * size().y + in.y) * single.words_per_row + in.x / 32;
   }
 };
+
+/// Keeps the compiler from computing a value again at every use.
+__device__ void keep(float& value) { asm volatile("" : "+f"(value)); }
 
 __device__ bool is_finite(const glm::vec3& v) { return isfinite(v.x + v.y + v.z); }
 
@@ -57,42 +77,67 @@ __global__ void seed_kernel(Task task, glm::vec3* seeds) {
   seeds[n] = place;
 }
 
-/// What a warp could not settle at once, to be tried again when a warp full has come together.
+/// What a warp could not settle at once. It is tried again when a warp full has come together, so that all lanes work.
+template <class Sink>
 struct WarpQueue {
-  Gather::Entry entries[64];
+  struct Entry {
+    int voxel;  ///< lane, voxels along k from the first of the march << 5, and failed attempts << 10
+    float x, y, z;
+  };
+
+  Entry* entries;    ///< 64, in shared memory
+  glm::ivec3 first;  ///< voxel of lane 0 at the beginning of the march
+  int lane, waiting = 0;
+
+  /// Called by the whole warp.
+  __device__ void push(bool wanted, int voxel, const glm::vec3& place) {
+    const unsigned votes = __ballot_sync(~0u, wanted);
+    if (wanted) entries[waiting + __popc(votes & ((1u << lane) - 1))] = {voxel, place.x, place.y, place.z};
+    waiting += __popc(votes);
+    __syncwarp();
+  }
+
+  /// Tries up to 32 of them once more. @return how many of this lane are covered
+  __device__ unsigned drain(const Task& task, const Sink& sink) {
+    const int taken = min(waiting, 32);
+    waiting -= taken;
+    bool again = false;
+    unsigned covered = 0;
+    int voxel = 0;
+    glm::vec3 place(0);
+    if (lane < taken) {
+      const Entry entry = entries[waiting + lane];
+      const glm::ivec3 in = first + glm::ivec3(entry.voxel & 31, 0, entry.voxel >> 5 & 31);
+      const Trial trial = try_tetrahedron(task.lattice, tetrahedron_at(task.lattice, {entry.x, entry.y, entry.z}),
+                                          task.point(in + task.begin()));
+      if (trial.owns) {
+        covered = sink.write(in + task.begin(), trial.u);
+      } else if (entry.voxel >> 10 < kWarpTries) {
+        again = true;
+        voxel = entry.voxel + (1 << 10);
+        place = trial.place;
+      } else {
+        task.put_aside(in, trial.place);
+      }
+    }
+    __syncwarp();
+    push(again, voxel, place);
+    return covered;
+  }
 };
 
 template <class Sink>
-__device__ unsigned try_again(const Task& task, const Sink& sink, const Gather::Entry& entry) {
-  const glm::ivec3 size = task.size();
-  const glm::ivec3 in(entry.voxel % size.x, entry.voxel / size.x % size.y, entry.voxel / (size.x * size.y));
-  const glm::ivec3 voxel = in + task.begin();
-  const Trial trial =
-      try_tetrahedron(task.lattice, tetrahedron_at(task.lattice, {entry.x, entry.y, entry.z}), task.point(voxel));
-  if (trial.owns) return sink.write(voxel, trial.u);
-  const unsigned place = atomicAdd(&task.counters->queued, 1u);
-  if (place < kQueueSize) {
-    task.queue[place] = {entry.voxel, trial.place.x, trial.place.y, trial.place.z};
-  } else {
-    atomicOr(&task.several[task.word(in)], 1u << (in.x & 31));
-    atomicAdd(&task.counters->several, 1u);
-  }
-  return 0;
-}
-
-template <class Sink>
-__global__ void __launch_bounds__(32 * kWarps) march_kernel(Task task, const glm::vec3* seeds, Sink sink) {
-  __shared__ WarpQueue queues[kWarps];
+__global__ void __launch_bounds__(32 * kWarps, 8) march_kernel(Task task, const glm::vec3* seeds, Sink sink) {
+  __shared__ typename WarpQueue<Sink>::Entry entries[kWarps][64];
   const int lane = static_cast<int>(threadIdx.x), warp = static_cast<int>(threadIdx.y);
-  Gather::Entry* queue = queues[warp].entries;
   const glm::ivec3 size = task.size();
   glm::ivec3 in(blockIdx.x * 32 + lane, blockIdx.y * kWarps + warp, blockIdx.z * kMarch);
   if (in.y >= size.y) return;  // the whole warp
   const int last = min(in.z + kMarch, size.z);
-  int first_down = static_cast<int>(task.nudge.first_down(2) - task.box.begin.z);
+  int first_down = task.first_down;
   const bool in_row = in.x < size.x;
   unsigned covered = 0;
-  int waiting = 0;  // the same in all lanes
+  WarpQueue<Sink> queue{entries[warp], {in.x - lane, in.y, in.z}, lane};
   const glm::ivec3 seed(min(in.x, size.x - 1) / kSeedTile, in.y / kSeedTile, blockIdx.z);
   const glm::ivec3 seeded =
       glm::min(seed * glm::ivec3(kSeedTile, kSeedTile, kMarch) + glm::ivec3(kSeedTile / 2, kSeedTile / 2, 0), size - 1);
@@ -102,6 +147,8 @@ __global__ void __launch_bounds__(32 * kWarps) march_kernel(Task task, const glm
   const std::int64_t words_per_slice = std::int64_t{size.y} * task.single.words_per_row;
   GatherPoint point = task.point(in + task.begin());
   if (in.z >= first_down) first_down = -1;  // turned already
+  keep(point.nudge.x);
+  keep(point.nudge.y);
   for (; in.z < last; ++in.z, word += words_per_slice, point.steps.z += float{kStepsPerVoxel}) {
     const glm::ivec3 voxel = in + task.begin();
     if (in.z == first_down) point.nudge.z = -point.nudge.z;
@@ -113,21 +160,13 @@ __global__ void __launch_bounds__(32 * kWarps) march_kernel(Task task, const glm
     } else if (!single && in_row) {
       sink.nothing(voxel);
     }
-    const unsigned votes = __ballot_sync(~0u, again);
-    if (again) {
-      const int at = waiting + __popc(votes & ((1u << lane) - 1));
-      queue[at] = {(in.z * size.y + in.y) * size.x + in.x, trial.place.x, trial.place.y, trial.place.z};
-    }
-    waiting += __popc(votes);
-    __syncwarp();
-    if (waiting >= 32) {
-      waiting -= 32;
-      covered += try_again(task, sink, queue[waiting + lane]);
-      __syncwarp();
+    if (__any_sync(~0u, again)) {
+      queue.push(again, lane | (in.z - queue.first.z) << 5, trial.place);
+      while (queue.waiting >= 32) covered += queue.drain(task, sink);
     }
     place = trial.place + trial.per_slice;
   }
-  if (lane < waiting) covered += try_again(task, sink, queue[lane]);
+  while (queue.waiting > 0) covered += queue.drain(task, sink);
   covered = warp_sum(covered);
   if (lane == 0 && covered != 0) atomicAdd(&task.counters->covered, static_cast<unsigned long long>(covered));
 }
@@ -159,8 +198,7 @@ __global__ void queue_kernel(Task task, Sink sink) {
     if (walk_to_owner(task.lattice, as_lattice(tetrahedron_at(task.lattice, place)), steps, signs, kWalk, owner)) {
       covered += sink.write(voxel, interpolate_u(vertices_of(task.lattice, owner), steps, signs));
     } else {
-      atomicOr(&task.several[task.word(in)], 1u << (in.x & 31));
-      atomicAdd(&task.counters->several, 1u);
+      task.leave_to_claims(in);
     }
   }
   if (covered != 0) atomicAdd(&task.counters->covered, static_cast<unsigned long long>(covered));
@@ -202,6 +240,7 @@ std::uint64_t Gather::run(const LatticeOnDevice& lattice, const SlabBox& box, co
             coverage_.single(),
             coverage_.several(),
             (size + tile - 1) / tile,
+            static_cast<int>(field.frame.nudge.first_down(2) - box.begin.z),
             queue_.reserve(kQueueSize),
             counters_.reserve(1)};
   counters_.fill(0, 1, stream);

@@ -48,7 +48,7 @@ __global__ void snap_kernel(LatticeFrame frame, const glm::vec3* displacement, s
 
 __global__ void snap_steps_kernel(LatticeFrame frame, StepLattice lattice, const glm::vec3* displacement,
                                   glm::vec3* moved, LatticeFindings* found) {
-  constexpr int kMost = 1 << 23;  // a difference of two is exact in float
+  constexpr int kMost = 1 << 22;  // a difference of two, and a cell, is exact in float
   const glm::i64vec3 at(blockIdx.x * kThreads + threadIdx.x, blockIdx.y, blockIdx.z);
   if (at.x > lattice.cells.x) return;
   const std::int64_t n = lattice.offset(glm::ivec3(at));
@@ -98,7 +98,7 @@ __global__ void describe_kernel(DeviceField field, LatticeFindings* found) {
   note_counts(inverted, degenerate, found);
 }
 
-constexpr int kDescribed = 16;  ///< cells along k that a thread goes
+constexpr int kDescribed = 16;  ///< cells along k that a thread goes, two side by side along i
 constexpr int kRows = 4;        ///< of a thread block
 
 /// What a thread has seen of one kind of tetrahedron.
@@ -106,54 +106,94 @@ struct Seen {
   float least = INFINITY, most = -INFINITY;
   unsigned inverted = 0, degenerate = 0;
 
-  /// @param turn  sign of the determinant when undeformed
-  __device__ void add(float determinant, float turn) {
-    const float volume = determinant * turn;
+  /// @param volume  with the sign of the undeformed one taken out
+  __device__ void add(float volume) {
     least = fminf(least, volume);
     most = fmaxf(most, volume);
-    inverted += volume < 0;
-    degenerate += volume == 0;
+    if (volume <= 0) {
+      inverted += volume < 0;
+      degenerate += volume == 0;
+    }
   }
 };
 
-/// The same for whole steps: volumes of a kind share their rest volume, so the division waits until the end.
+/// Adds the five tetrahedra of a cell. @param m0 to m7  how far its corners moved
+template <bool kOdd>
+__device__ void add_cell(const glm::vec3& cell, const glm::vec3& m0, const glm::vec3& m1, const glm::vec3& m2,
+                         const glm::vec3& m3, const glm::vec3& m4, const glm::vec3& m5, const glm::vec3& m6,
+                         const glm::vec3& m7, Seen& corners, Seen& centres) {
+  const glm::vec3 p[8] = {m0,
+                          {m1.x + cell.x, m1.y, m1.z},
+                          {m2.x, m2.y + cell.y, m2.z},
+                          {m3.x + cell.x, m3.y + cell.y, m3.z},
+                          {m4.x, m4.y, m4.z + cell.z},
+                          {m5.x + cell.x, m5.y, m5.z + cell.z},
+                          {m6.x, m6.y + cell.y, m6.z + cell.z},
+                          {m7.x + cell.x, m7.y + cell.y, m7.z + cell.z}};
+#pragma unroll
+  for (int number = 0; number < kTetrahedraPerCell; ++number) {
+    const TetrahedronCorners of = tetrahedron_corners(number, kOdd);
+    const float volume = detail::edge_determinant(p[of.a] - p[of.d], p[of.b] - p[of.d], p[of.c] - p[of.d]);
+    if (number == 0) {
+      centres.add(kOdd ? volume : -volume);
+    } else {
+      corners.add(kOdd ? -volume : volume);
+    }
+  }
+}
+
+/// The same for whole steps: volumes of a kind share their rest volume, so the division waits until the end. A thread
+/// has two cells of a row side by side, one even and one odd, so that threads do not part over parity.
 __global__ void __launch_bounds__(32 * kRows)
     describe_steps_kernel(StepLattice lattice, float corner_rest, float centre_rest, LatticeFindings* found,
                           std::uint32_t* inverted_cells, int words_per_row) {
-  const glm::ivec3 at(blockIdx.x * 32 + threadIdx.x, blockIdx.y * kRows + threadIdx.y, blockIdx.z * kDescribed);
+  const glm::ivec3 at(blockIdx.x * 64 + 2 * threadIdx.x, blockIdx.y * kRows + threadIdx.y, blockIdx.z * kDescribed);
   if (at.y >= lattice.cells.y) return;  // the whole warp
-  const bool here = at.x < lattice.cells.x;
-  const glm::vec3* next = lattice.moved + lattice.offset({here ? at.x : lattice.cells.x - 1, at.y, at.z});
-  const int last = min(at.z + kDescribed, lattice.cells.z), row = lattice.row;
-  const glm::vec3 cell = lattice.cell;
-  glm::vec3 moved[8];
-  for (int c = 0; c < 4; ++c) moved[4 + c] = next[(c & 1) + (c >> 1) * row];
+  const bool here = at.x < lattice.cells.x, next_too = at.x + 1 < lattice.cells.x;
+  const int x = here ? at.x : lattice.cells.x - 1, step = here && next_too ? 2 : 1;  // stay within the row
+  const glm::vec3* row = lattice.moved + lattice.offset({x, at.y, at.z});
+  const int last = min(at.z + kDescribed, lattice.cells.z);
+  const auto load = [&](glm::vec3(&plane)[6]) {
+    plane[0] = row[0];
+    plane[1] = row[1];
+    plane[2] = row[step];
+    plane[3] = row[lattice.row];
+    plane[4] = row[lattice.row + 1];
+    plane[5] = row[lattice.row + step];
+  };
+  glm::vec3 a[6], b[6];
+  load(a);
   Seen corners, centres;
+  unsigned inverted = 0;
   for (int z = at.z; z < last; ++z) {
-    next += lattice.slice;
-#pragma unroll
-    for (int c = 0; c < 4; ++c) {
-      moved[c] = moved[4 + c];
-      moved[4 + c] = next[(c & 1) + (c >> 1) * row];
+    row += lattice.slice;
+    load(b);
+    Seen first_corners = corners, first_centres = centres;
+    const glm::vec3& cell = lattice.cell;
+    if (((at.y + z) & 1) == 0) {
+      add_cell<false>(cell, a[0], a[1], a[3], a[4], b[0], b[1], b[3], b[4], first_corners, first_centres);
+      corners = first_corners;
+      centres = first_centres;
+      if (next_too) add_cell<true>(cell, a[1], a[2], a[4], a[5], b[1], b[2], b[4], b[5], corners, centres);
+    } else {
+      add_cell<true>(cell, a[0], a[1], a[3], a[4], b[0], b[1], b[3], b[4], first_corners, first_centres);
+      corners = first_corners;
+      centres = first_centres;
+      if (next_too) add_cell<false>(cell, a[1], a[2], a[4], a[5], b[1], b[2], b[4], b[5], corners, centres);
     }
-    const bool odd = ((at.x + at.y + z) & 1) != 0;
-    glm::vec3 p[8];  // of an odd cell the mirror image through its middle: an even one
-#pragma unroll
-    for (int c = 0; c < 8; ++c) {
-      const glm::vec3 rest(c & 1 ? cell.x : 0.0f, c & 2 ? cell.y : 0.0f, c & 4 ? cell.z : 0.0f);
-      p[c] = (odd ? moved[c ^ 7] + (cell - rest) : moved[c] + rest);
+    const unsigned before = inverted;
+    inverted = corners.inverted + centres.inverted;
+    const unsigned of_first = first_corners.inverted + first_centres.inverted;
+    const unsigned first_votes = __ballot_sync(~0u, here && of_first != before);
+    const unsigned second_votes = __ballot_sync(~0u, next_too && inverted != of_first);
+    if (threadIdx.x == 0) {
+      std::uint32_t* words =
+          inverted_cells + (std::int64_t{z} * lattice.cells.y + at.y) * words_per_row + 2 * blockIdx.x;
+      words[0] = first_votes;
+      words[1] = second_votes;
     }
-    const unsigned before = corners.inverted + centres.inverted;
-    centres.add(detail::edge_determinant(p[1] - p[7], p[2] - p[7], p[4] - p[7]), odd ? 1.0f : -1.0f);
 #pragma unroll
-    for (int number = 1; number < kTetrahedraPerCell; ++number) {
-      constexpr int kD[] = {7, 0, 3, 5, 6};
-      const int d = kD[number];
-      corners.add(detail::edge_determinant(p[d ^ 1] - p[d], p[d ^ 2] - p[d], p[d ^ 4] - p[d]), odd ? -1.0f : 1.0f);
-    }
-    const unsigned votes = __ballot_sync(~0u, here && corners.inverted + centres.inverted != before);
-    if (threadIdx.x == 0)
-      inverted_cells[(std::int64_t{z} * lattice.cells.y + at.y) * words_per_row + blockIdx.x] = votes;
+    for (int n = 0; n < 6; ++n) a[n] = b[n];
   }
   if (!here) corners = centres = {};
   note_range(corners.least / corner_rest + 0.0f, corners.most / corner_rest + 0.0f, found);
@@ -199,9 +239,9 @@ void LatticeOnDevice::describe(LatticeFindings* found, cudaStream_t stream) {
     const StepLattice& lattice = field_.steps;
     const glm::vec3 x(lattice.cell.x, 0, 0), y(0, lattice.cell.y, 0), z(0, 0, lattice.cell.z);
     const float corner = detail::edge_determinant(x, y, z), centre = detail::edge_determinant(y + z, x + z, x + y);
-    words_per_row_ = (lattice.cells.x + 31) / 32;
+    words_per_row_ = (lattice.cells.x + 63) / 64 * 2;
     const std::size_t words = std::size_t(words_per_row_) * std::size_t(lattice.cells.y) * std::size_t(lattice.cells.z);
-    const dim3 blocks(static_cast<unsigned>(words_per_row_),
+    const dim3 blocks(static_cast<unsigned>(words_per_row_ / 2),
                       static_cast<unsigned>((lattice.cells.y + kRows - 1) / kRows),
                       static_cast<unsigned>((lattice.cells.z + kDescribed - 1) / kDescribed));
     describe_steps_kernel<<<blocks, dim3(32, kRows), 0, stream>>>(lattice, corner, centre, found,

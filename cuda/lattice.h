@@ -62,7 +62,8 @@ class LatticeOnDevice {
 
   const DeviceField& field() const { return field_; }
   const FieldStatistics& statistics() const { return statistics_; }
-  /// Cells with an inverted tetrahedron, where the vertices rest at whole steps.
+  /// Cells with an inverted tetrahedron, where the vertices rest at whole steps: of 64 cells of a row, the first word
+  /// has those at even places, the second the others.
   BitRows inverted_cells() const { return {inverted_.data(), words_per_row_}; }
 
   /// Box of the rest places of all cells that may reach a region: low and high, 2^-12 voxel; low > high where none

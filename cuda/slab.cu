@@ -164,7 +164,7 @@ bool SlabWriter::is_plain() const {
   });
   return background_fits && target.interpolation == Interpolation::linear && !target.padding &&
          target.sampled_slices.empty() && targets_.front()->relation.same_grid &&
-         voxel_count(target.source.buffered) < INT32_MAX &&
+         voxel_count(*target.source.geometry) < INT32_MAX && voxel_count(output_) < INT32_MAX &&
          (type == VoxelType::u8 || type == VoxelType::i16 || type == VoxelType::u16);
 }
 
@@ -175,8 +175,8 @@ AnyVoxelSink SlabWriter::plain_sink(const SlabBox& slab) {
     using V = decltype(voxel);
     const auto plan = plan_target(target, on_device.relation, reinterpret_cast<const V*>(on_device.source));
     const Destination<V> output = destination<V>(target, slab);
-    return VoxelSink<V>{plan.source.voxels,
-                        glm::ivec3(plan.source.begin),
+    const glm::i64vec3 &begin = plan.source.begin, &stride = plan.source.stride;
+    return VoxelSink<V>{plan.source.voxels - (begin.z * stride.z + begin.y * stride.y + begin.x),
                         glm::ivec3(plan.source.size) - 1,
                         static_cast<int>(plan.source.stride.y),
                         static_cast<int>(plan.source.stride.z),

@@ -56,19 +56,18 @@ struct Mapped {
 /// `sample_voxel`.
 template <class V>
 struct VoxelSink {
-  const V* source;          ///< of `source_begin`
-  glm::ivec3 source_begin;  ///< first voxel that is buffered
-  glm::ivec3 last;          ///< of the whole source grid
-  int row, slice;           ///< of what is buffered
+  const V* source;  ///< of voxel (0, 0, 0), were it held; likewise `output`
+  glm::ivec3 last;  ///< of the whole source grid
+  int row, slice;   ///< of what is buffered
   V background;
-  V* output;  ///< of voxel (0, 0, 0), were it held
+  V* output;
   int output_row, output_slice;
 
   /// A voxel that a tetrahedron owns. @return whether it comes from inside the source
   __device__ bool write(const glm::ivec3& voxel, const glm::vec3& u) const;
   __device__ void nothing(const glm::ivec3& voxel) const { at(voxel) = background; }
   __device__ V& at(const glm::ivec3& voxel) const {
-    return output[std::int64_t{voxel.z} * output_slice + (voxel.y * output_row + voxel.x)];
+    return output[voxel.z * output_slice + voxel.y * output_row + voxel.x];
   }
 };
 

@@ -66,7 +66,9 @@ StepLattice make_step_lattice(const LatticeFrame& frame, const Geometry& output)
     }
     const double last = first[axis] + step * static_cast<double>(frame.cells[axis]);
     const double grid = static_cast<double>(output.size[axis]) * kStepsPerVoxel;
-    if (step < 1 || std::fabs(double(first[axis])) >= kMostSteps || last >= kMostSteps || grid >= kMostSteps) return {};
+    if (step < 1 || step > kMostSteps / 4 || std::fabs(double(first[axis])) >= kMostSteps || last >= kMostSteps ||
+        grid >= kMostSteps)
+      return {};
     lattice.first[axis] = static_cast<float>(first[axis]);
     lattice.cell[axis] = static_cast<float>(step);
     lattice.voxel[axis] = static_cast<float>(kStepsPerVoxel / step);
@@ -75,6 +77,7 @@ StepLattice make_step_lattice(const LatticeFrame& frame, const Geometry& output)
   if (size.x * size.y * size.z > INT32_MAX) return {};
   lattice.cells = glm::ivec3(frame.cells);
   lattice.end = glm::vec3(frame.cells);
+  lattice.last = lattice.end - 1.0f;
   lattice.row = static_cast<int>(size.x);
   lattice.slice = static_cast<int>(size.x * size.y);
   return lattice;

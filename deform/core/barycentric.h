@@ -1,5 +1,7 @@
 #pragma once
 
+#include <initializer_list>
+
 #include "deform/core/five_tetrahedra.h"
 
 namespace tetwarp {
@@ -19,7 +21,7 @@ TETWARP_HD inline glm::vec3 to_voxels(const glm::i32vec3& steps) {
           static_cast<float>(steps.z) * kVoxelsPerStep};
 }
 
-TETWARP_HD inline float magnitude(float x) { return x < 0 ? -x : x; }
+TETWARP_HD inline float magnitude(float x) { return std::fabs(x); }
 
 /// Length of a vector in the sum norm; the product of three bounds what a determinant's rounding error grows with.
 TETWARP_HD inline float norm1(const glm::vec3& v) { return (magnitude(v.x) + magnitude(v.y)) + magnitude(v.z); }
@@ -34,23 +36,29 @@ TETWARP_HD inline Wide determinant(const glm::i64vec3& a, const glm::i64vec3& b,
 
 namespace detail {
 
-/// Determinant of three edges, whole numbers of steps: in float where that is certain to have the right sign, else
-/// exact before it is rounded. So its sign and its zero are always right.
+/// Determinant of three edges, exact before it is rounded. Rarely called, so kept out of loops.
+TETWARP_NOINLINE_HD inline float exact_determinant(glm::i64vec3 a, glm::i64vec3 b, glm::i64vec3 c) {
+  return static_cast<float>(to_double(determinant(a, b, c)));
+}
+
+/// Determinant of three edges, whole numbers of steps below 2^24: in float where that is certain to have the right
+/// sign, else exact. So its sign and its zero are always right.
 ///
 /// A component of a cross product is off by at most 2 units (2^-24) of its two products, the dot product by 3 more.
 TETWARP_HD inline float edge_determinant(const glm::vec3& a, const glm::vec3& b, const glm::vec3& c) {
-  constexpr float kExact = 1 << 24, kError = 8.0f / (1 << 24);
-  const float la = norm1(a), lb = norm1(b), lc = norm1(c), det = dot(a, cross(b, c));
-  if (magnitude(det) > kError * ((la * lb) * lc) && la < kExact && lb < kExact && lc < kExact) return det;
-  return static_cast<float>(to_double(determinant(glm::i64vec3(a), glm::i64vec3(b), glm::i64vec3(c))));
+  constexpr float kError = 8.0f / (1 << 24);
+  const float det = dot(a, cross(b, c));
+  if (magnitude(det) > kError * ((norm1(a) * norm1(b)) * norm1(c))) return det;
+  return exact_determinant(glm::i64vec3(a), glm::i64vec3(b), glm::i64vec3(c));
 }
 
+/// The same of any edges.
 TETWARP_HD inline float edge_determinant(const glm::i32vec3& a, const glm::i32vec3& b, const glm::i32vec3& c) {
   constexpr int kExact = 1 << 24;  // in float
   for (const glm::i32vec3& edge : {a, b, c}) {
     if (edge.x <= -kExact || edge.x >= kExact || edge.y <= -kExact || edge.y >= kExact || edge.z <= -kExact ||
         edge.z >= kExact) {
-      return static_cast<float>(to_double(determinant(glm::i64vec3(a), glm::i64vec3(b), glm::i64vec3(c))));
+      return exact_determinant(glm::i64vec3(a), glm::i64vec3(b), glm::i64vec3(c));
     }
   }
   return edge_determinant(glm::vec3(a), glm::vec3(b), glm::vec3(c));

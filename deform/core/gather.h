@@ -3,6 +3,7 @@
 #include "deform/core/barycentric.h"
 #include "deform/core/ownership.h"
 #include "deform/core/step_lattice.h"
+#include "deform/core/visit_cell.h"
 
 namespace tetwarp {
 
@@ -12,12 +13,13 @@ namespace tetwarp {
 /// `side_of_face` would say, or exact integers say it; whatever cannot be settled is left to `visit_cell`. That the
 /// owner found is the only one, and so the lowest, must be known before (docs/algorithm.md, "Gather").
 
-/// A voxel centre and its nudge, 2^-12 voxel, whole numbers and quarters in float.
+/// A voxel centre, from the first vertex at rest, and its nudge; 2^-12 voxel, whole numbers and quarters in float.
 struct GatherPoint {
   glm::vec3 steps, nudge;
 
-  TETWARP_HD GatherPoint(const glm::ivec3& voxel, const glm::i32vec3& signs)
-      : steps(glm::vec3(voxel) * float{kStepsPerVoxel}), nudge(glm::vec3(nudge_steps(signs)) * (1.0f / kNudgeSteps)) {}
+  TETWARP_HD GatherPoint(const StepLattice& lattice, const glm::ivec3& voxel, const glm::i32vec3& signs)
+      : steps(glm::vec3(voxel) * float{kStepsPerVoxel} - lattice.first),
+        nudge(glm::vec3(nudge_steps(signs)) * (1.0f / kNudgeSteps)) {}
 };
 
 /// What one tetrahedron says of a voxel.
@@ -39,6 +41,17 @@ TETWARP_HD inline float multiply_add(float a, float b, float c) {
 #endif
 }
 
+/// 1 / x, rounded to nearest, for x of at least 2^-100 and at most 2^100 in size.
+TETWARP_HD inline float reciprocal(float x) {
+#ifdef __CUDA_ARCH__
+  float guess;
+  asm("rcp.approx.ftz.f32 %0, %1;" : "=f"(guess) : "f"(x));
+  return fmaf(guess, fmaf(-x, guess, 1.0f), guess);  // what the division does once it knows the range
+#else
+  return 1.0f / x;
+#endif
+}
+
 TETWARP_HD inline float nudged(float value, const glm::vec3& nudge, const Cross& n) {
   return multiply_add(nudge.x, n.x, multiply_add(nudge.y, n.y, multiply_add(nudge.z, n.z, value)));
 }
@@ -52,8 +65,6 @@ TETWARP_HD inline glm::vec3 to_offset(const glm::vec3& moved) {
   return 0.0f - moved * kVoxelsPerStep;
 #endif
 }
-
-TETWARP_HD inline float least(float a, float b) { return a < b ? a : b; }
 
 /// Bound of the rounding errors of the four values that `try_tetrahedron` compares with it.
 ///
@@ -87,7 +98,10 @@ TETWARP_HD inline Trial try_tetrahedron(const StepLattice& lattice, const FloatT
   const glm::vec3 a(along.x + moved_a.x, across.y + moved_a.y, across.z + moved_a.z);
   const glm::vec3 b(across.x + moved_b.x, along.y + moved_b.y, across.z + moved_b.z);
   const glm::vec3 c(across.x + moved_c.x, across.y + moved_c.y, along.z + moved_c.z);
-  const glm::vec3 r = (point.steps - (lattice.first + t.d * lattice.cell)) - moved;
+  const glm::vec3 r = glm::vec3(detail::multiply_add(-t.d.x, lattice.cell.x, point.steps.x),
+                                detail::multiply_add(-t.d.y, lattice.cell.y, point.steps.y),
+                                detail::multiply_add(-t.d.z, lattice.cell.z, point.steps.z)) -
+                      moved;  // exact
 
   const Cramer m(a, b, c);
   const float na = detail::dot(r, m.bc), nb = detail::dot(r, m.ca), nc = detail::dot(r, m.ab);
@@ -95,12 +109,12 @@ TETWARP_HD inline Trial try_tetrahedron(const StepLattice& lattice, const FloatT
               qc = detail::nudged(nc, point.nudge, m.ab);
   const float qd = ((m.det - qa) - qb) - qc;
   const float turn = t.to.x * t.to.y * t.to.z;  // of A, B, C when undeformed
-  const float least = detail::least(detail::least(qa * turn, qb * turn), detail::least(qc * turn, qd * turn));
+  const float least = std::fmin(std::fmin(qa * turn, qb * turn), std::fmin(qc * turn, qd * turn));
   const float error = detail::error_bound(detail::norm1(a), detail::norm1(b), detail::norm1(c),
                                           detail::norm1(r) + 6.5f);  // 15 + 7 + 4 sixteenths of a step
 
   Trial trial;
-  const float reciprocal = 1.0f / m.det;
+  const float reciprocal = detail::reciprocal(m.det);
   const Weights w{na * reciprocal, nb * reciprocal, nc * reciprocal};
   trial.owns = least > error && !is_thin(m, a, b, c) && w.within_slack();
   trial.u = detail::to_offset(blend(w, moved, moved_a, moved_b, moved_c));
@@ -141,6 +155,42 @@ TETWARP_HD inline bool owns_exactly(const Tetrahedron& t, const glm::i32vec3& st
   if (fits_double(box)) return owns_exactly<double>(t, steps, signs, sides);
   if (fits_int64(box)) return owns_exactly<std::int64_t>(t, steps, signs, sides);
   return owns_exactly<Wide>(t, steps, signs, sides);
+}
+
+/// Calls `visit(voxel)` for every voxel of `region` that a tetrahedron of the lattice owns: what `visit_cell` reports
+/// of it, with a float test in front of the exact one.
+///
+/// With the faces' values at q as in `try_tetrahedron`: inside where all are clear of their error on the inner side,
+/// outside where one is clear of it on the other, exact integers in between. Inverted tetrahedra own like any other.
+template <class Visit>
+TETWARP_HD void visit_tetrahedron(const StepLattice& lattice, const LatticeTetrahedron& t, const VoxelBox& region,
+                                  const Nudge& nudge, Visit&& visit) {
+  const Tetrahedron exact = vertices_of(lattice, t);
+  const VoxelBox voxels = detail::candidates(nudge, box_of(exact), region);
+  if (detail::is_empty(voxels)) return;
+  const glm::vec3 a(exact.a.deformed - exact.d.deformed), b(exact.b.deformed - exact.d.deformed),
+      c(exact.c.deformed - exact.d.deformed);
+  const Cramer m(a, b, c);
+  const float turn = m.det < 0 ? -1.0f : 1.0f;
+  const float la = detail::norm1(a), lb = detail::norm1(b), lc = detail::norm1(c);
+  const glm::ivec3 begin(voxels.begin), end(voxels.end);
+  for (int z = begin.z; z < end.z; ++z) {
+    for (int y = begin.y; y < end.y; ++y) {
+      for (int x = begin.x; x < end.x; ++x) {
+        const glm::ivec3 voxel(x, y, z);
+        const glm::i32vec3 steps = voxel * kStepsPerVoxel, signs = nudge.signs(glm::i64vec3(voxel));
+        const glm::vec3 r(steps - exact.d.deformed), d = glm::vec3(nudge_steps(signs)) * (1.0f / kNudgeSteps);
+        const float qa = detail::nudged(detail::dot(r, m.bc), d, m.bc),
+                    qb = detail::nudged(detail::dot(r, m.ca), d, m.ca),
+                    qc = detail::nudged(detail::dot(r, m.ab), d, m.ab), qd = ((m.det - qa) - qb) - qc;
+        const float least = std::fmin(std::fmin(qa * turn, qb * turn), std::fmin(qc * turn, qd * turn));
+        const float error = detail::error_bound(la, lb, lc, detail::norm1(r) + 6.5f);
+        if (least < -error && detail::magnitude(m.det) > error) continue;
+        int sides[4];
+        if (least > error || owns_exactly(exact, steps, signs, sides)) visit(voxel);
+      }
+    }
+  }
 }
 
 /// Walks from tetrahedron to tetrahedron, across a face that the voxel lies beyond, until one owns it, exactly.

@@ -5,8 +5,10 @@
 #if defined(__CUDACC__)
 #include <cuda.h>
 #define TETWARP_HD __host__ __device__
+#define TETWARP_NOINLINE_HD __noinline__ __host__ __device__
 #else
 #define TETWARP_HD
+#define TETWARP_NOINLINE_HD [[gnu::noinline]]
 #endif
 
 #include <glm/ext/vector_int3_sized.hpp>

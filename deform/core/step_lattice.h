@@ -12,7 +12,7 @@ struct StepLattice {
   glm::ivec3 cells{0};               ///< on each axis
   glm::vec3 first{0}, cell{0};       ///< rest place of vertex (0, 0, 0), and from one vertex to the next; 2^-12 voxel
   glm::vec3 voxel{0};                ///< one voxel, in cells
-  glm::vec3 end{0};                  ///< `cells`
+  glm::vec3 end{0}, last{0};         ///< `cells`, and the last cell
   int row = 0, slice = 0;            ///< vertices from one row, and one slice, to the next
   const glm::vec3* moved = nullptr;  ///< deformed minus rest of each vertex, 2^-12 voxel, i fastest, 12 bytes each
 
@@ -51,6 +51,14 @@ struct LatticeTetrahedron {
   TETWARP_HD static LatticeTetrahedron centre_of(const glm::ivec3& cell) {
     const int even = (cell.x + cell.y + cell.z + 1) & 1;
     return {cell + even, glm::ivec3(even), true};
+  }
+
+  /// The tetrahedron of a cell with this number, 0 to 4 (`tetrahedron_corners`).
+  TETWARP_HD static LatticeTetrahedron of_cell(const glm::ivec3& cell, int number) {
+    if (number == 0) return centre_of(cell);
+    const int corner = tetrahedron_corners(number, ((cell.x + cell.y + cell.z) & 1) != 0).d;
+    const glm::ivec3 down(corner & 1, corner >> 1 & 1, corner >> 2);
+    return {cell + down, down, false};
   }
 
   /// The tetrahedron across the face opposite A, B, C or D (face 0 to 3). Its cell may lie outside the lattice.
@@ -114,10 +122,8 @@ TETWARP_HD inline LatticeTetrahedron as_lattice(const FloatTetrahedron& t) {
 TETWARP_HD inline FloatTetrahedron tetrahedron_at(const StepLattice& lattice, const glm::vec3& place) {
   glm::vec3 cell, in;
   for (int axis = 0; axis < 3; ++axis) {
-    const float end = lattice.end[axis];
-    const float inside = place[axis] > 0.0f ? (place[axis] < end ? place[axis] : end) : 0.0f;  // NaN: 0
-    const float whole = std::floor(inside), last = end - 1.0f;
-    cell[axis] = whole < last ? whole : last;
+    const float inside = std::fmin(std::fmax(place[axis], 0.0f), lattice.end[axis]);  // NaN: 0
+    cell[axis] = std::fmin(std::floor(inside), lattice.last[axis]);
     in[axis] = inside - cell[axis];  // 0 to 1: at most one of the four corners below is near
   }
   const int x = static_cast<int>(cell.x), y = static_cast<int>(cell.y), z = static_cast<int>(cell.z);

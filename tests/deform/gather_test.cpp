@@ -42,14 +42,6 @@ struct Scene {
   }
 };
 
-/// The tetrahedron of the lattice with this number in a cell.
-LatticeTetrahedron named(const glm::ivec3& cell, int number) {
-  if (number == 0) return LatticeTetrahedron::centre_of(cell);
-  const int corner = tetrahedron_corners(number, ((cell.x + cell.y + cell.z) & 1) != 0).d;
-  const glm::ivec3 down(corner & 1, corner >> 1 & 1, corner >> 2);
-  return {cell + down, down, false};
-}
-
 std::set<std::array<int, 3>> corners(const LatticeTetrahedron& t) {
   std::set<std::array<int, 3>> all;
   for (const glm::ivec3& v : {t.a(), t.b(), t.c(), t.d}) all.insert({v.x, v.y, v.z});
@@ -60,7 +52,7 @@ TEST(StepLattice, NamesTheTetrahedraOfEveryCellWithTheirCorners) {
   for (int n = 0; n < 64; ++n) {
     const glm::ivec3 cell(n & 3, n >> 2 & 3, n >> 4);
     for (int number = 0; number < kTetrahedraPerCell; ++number) {
-      const LatticeTetrahedron t = named(cell, number);
+      const LatticeTetrahedron t = LatticeTetrahedron::of_cell(cell, number);
       const TetrahedronCorners of = tetrahedron_corners(number, ((cell.x + cell.y + cell.z) & 1) != 0);
       const auto corner = [&](int c) { return cell + glm::ivec3(c & 1, c >> 1 & 1, c >> 2); };
       EXPECT_EQ(t.number(), number);
@@ -76,7 +68,7 @@ TEST(StepLattice, NamesTheTetrahedraOfEveryCellWithTheirCorners) {
 TEST(StepLattice, AcrossAFaceIsTheOtherTetrahedronWithItsThreeCorners) {
   for (int n = 0; n < 64; ++n) {
     for (int number = 0; number < kTetrahedraPerCell; ++number) {
-      const LatticeTetrahedron t = named({n & 3, n >> 2 & 3, n >> 4}, number);
+      const LatticeTetrahedron t = LatticeTetrahedron::of_cell({n & 3, n >> 2 & 3, n >> 4}, number);
       const glm::ivec3 opposite[4] = {t.a(), t.b(), t.c(), t.d};
       for (int face = 0; face < 4; ++face) {
         const LatticeTetrahedron next = t.across(face);
@@ -97,6 +89,7 @@ TEST(StepLattice, FindsTheTetrahedronOfAnUndeformedPlace) {
   StepLattice lattice;
   lattice.cells = {5, 4, 6};
   lattice.end = {5, 4, 6};
+  lattice.last = {4, 3, 5};
   for (int n = 0; n < 20000; ++n) {
     const glm::dvec3 place(random.real(0, 5), random.real(0, 4), random.real(0, 6));
     const LatticeTetrahedron t = as_lattice(tetrahedron_at(lattice, glm::vec3(place)));
@@ -116,13 +109,14 @@ TEST(StepLattice, MovesPlacesOutsideIntoATetrahedronOfTheLattice) {
   StepLattice lattice;
   lattice.cells = {5, 4, 6};
   lattice.end = {5, 4, 6};
+  lattice.last = {4, 3, 5};
   constexpr float kNaN = std::numeric_limits<float>::quiet_NaN(), kInfinity = std::numeric_limits<float>::infinity();
   for (int n = 0; n < 20000; ++n) {
     glm::vec3 place(random.real(-3, 9), random.real(-3, 9), random.real(-3, 9));
     if (n % 10 == 0) place[random.axis()] = random.one_of({kNaN, kInfinity, -kInfinity, 0.0f, 4.0f, 5.0f, 6.0f});
     const LatticeTetrahedron t = as_lattice(tetrahedron_at(lattice, place));
     ASSERT_NE(t.number(), -1);
-    ASSERT_EQ(corners(t), corners(named(t.cell(), t.number())));
+    ASSERT_EQ(corners(t), corners(LatticeTetrahedron::of_cell(t.cell(), t.number())));
     const glm::ivec3 cell = t.cell();
     ASSERT_TRUE(cell.x >= 0 && cell.y >= 0 && cell.z >= 0 && cell.x < 5 && cell.y < 4 && cell.z < 6);
   }
@@ -140,7 +134,7 @@ std::multimap<std::size_t, LatticeTetrahedron> owners_of(const Scene& scene, con
           cell.corner[c] = scene.lattice.vertex({x + (c & 1), y + (c >> 1 & 1), z + (c >> 2)});
         visit_cell(cell, ((x + y + z) & 1) != 0, {glm::i64vec3(0), grid.size}, scene.frame.nudge,
                    [&](const glm::i64vec3& voxel, const glm::i32vec3&, int number, const Tetrahedron&) {
-                     owners.emplace(offset_of(grid, voxel), named({x, y, z}, number));
+                     owners.emplace(offset_of(grid, voxel), LatticeTetrahedron::of_cell({x, y, z}, number));
                    });
       }
     }
@@ -168,7 +162,7 @@ TEST(Gather, AcceptsNoTetrahedronThatDoesNotOwnTheVoxelAndGivesTheBitsOfInterpol
     for (const auto& [offset, owner] : owners_of(scene, test.output)) {
       const glm::i64vec3 voxel = Scene::at(static_cast<std::int64_t>(offset), test.output.size);
       const glm::i32vec3 signs = scene.frame.nudge.signs(voxel), steps = detail::to_steps(voxel);
-      const GatherPoint point(glm::ivec3(voxel), signs);
+      const GatherPoint point(scene.lattice, glm::ivec3(voxel), signs);
       for (int face = -1; face < 4; ++face) {  // the owner and its neighbours
         const LatticeTetrahedron t = face < 0 ? owner : owner.across(face);
         const glm::ivec3 cell = t.cell();
@@ -191,6 +185,32 @@ TEST(Gather, AcceptsNoTetrahedronThatDoesNotOwnTheVoxelAndGivesTheBitsOfInterpol
     }
   }
   EXPECT_GT(accepted, refused) << "the float test settles hardly anything";
+}
+
+TEST(Gather, VisitsTheVoxelsOfATetrahedronThatVisitCellReports) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  for (std::uint64_t n = 0; n < 200; ++n) {
+    Random random(test_seed(), 400 + n);
+    const FieldCase test = step_case(random, n % 2 == 0);
+    SCOPED_TRACE(test.description);
+    const Scene scene(test.output, test.field);
+    std::vector<int> expected(static_cast<std::size_t>(voxel_count(test.output))), found = expected;
+    for (const auto& [offset, owner] : owners_of(scene, test.output)) expected[offset] += 1 + owner.number() * 100;
+    const glm::ivec3 cells = scene.lattice.cells;
+    for (int z = 0; z < cells.z; ++z) {
+      for (int y = 0; y < cells.y; ++y) {
+        for (int x = 0; x < cells.x; ++x) {
+          for (int number = 0; number < kTetrahedraPerCell; ++number) {
+            visit_tetrahedron(scene.lattice, LatticeTetrahedron::of_cell({x, y, z}, number),
+                              {glm::i64vec3(0), test.output.size}, scene.frame.nudge, [&](const glm::ivec3& voxel) {
+                                found[offset_of(test.output, glm::i64vec3(voxel))] += 1 + number * 100;
+                              });
+          }
+        }
+      }
+    }
+    ASSERT_EQ(found, expected);
+  }
 }
 
 TEST(Gather, WalksToTheOwnerInInjectiveFields) {
@@ -276,7 +296,7 @@ TEST(Gather, SettlesNearlyAllVoxelsOfStructuredFieldsInFloat) {
       std::size_t settled = 0, all = 0;
       for (const auto& [offset, owner] : owners_of(scene, grid)) {
         const glm::i64vec3 voxel = Scene::at(static_cast<std::int64_t>(offset), grid.size);
-        const GatherPoint point(glm::ivec3(voxel), scene.frame.nudge.signs(voxel));
+        const GatherPoint point(scene.lattice, glm::ivec3(voxel), scene.frame.nudge.signs(voxel));
         glm::vec3 place = scene.lattice.place(glm::vec3(voxel));
         bool owns = false;
         for (int attempt = 0; attempt < 12 && !owns; ++attempt) {
