@@ -1,5 +1,6 @@
 #include <CLI/CLI.hpp>
 #include <map>
+#include <string_view>
 
 #include <tbb/global_control.h>
 
@@ -133,6 +134,11 @@ void add_deform(CLI::App& app, DeformOptions& options) {
       "Example: tetwarp deform ct_folder -f wave:amplitude=8,wavelength=64 -o deformed_dicom --preview look.png");
 }
 
+/// Only for `tetwarp --help`: what follows `bench` is never parsed here.
+void add_bench(CLI::App& app) {
+  app.add_subcommand("bench", "Time the paper's methods and Tetwarp (runs tetwarp-bench, see `tetwarp bench --help`)");
+}
+
 std::string version_text() {
   std::string text = std::string("tetwarp ") + version() + " (" + commit() + ")";
   for (const std::string& line : describe_backends()) text += "\n  " + line;
@@ -151,6 +157,8 @@ int run(int (*command)(const Options&), const Options& options) {
 }  // namespace
 
 int run_command_line(int argc, char** argv) {
+  // Ahead of CLI11, which takes words such as `--` and `--help` away even from a prefix command.
+  if (argc > 1 && argv[1] == std::string_view("bench")) return run_bench({argv + 2, argv + argc});
   CLI::App app("Deform medical volumes exactly: CT series in, deformed series out");
   app.name("tetwarp");
   app.require_subcommand(1);
@@ -160,6 +168,7 @@ int run_command_line(int argc, char** argv) {
   add_info(app, commands.info);
   add_deform(app, commands.deform);
   add_field(app, commands.field);
+  add_bench(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& help) {

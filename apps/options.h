@@ -78,4 +78,9 @@ int run_info(const InfoOptions& options);
 int run_field(const FieldOptions& options);
 int run_deform(const DeformOptions& options);
 
+/// Becomes the program tetwarp-bench that lies beside this one; returns only by an exception.
+/// @param arguments  given to it as they are
+/// @throws Error when it is not there or cannot be run
+int run_bench(const std::vector<std::string>& arguments);
+
 }  // namespace tetwarp::apps

@@ -1,20 +1,22 @@
-// tetwarp-bench: what the stages of one deformation cost on this machine, per voxel.
+// tetwarp-bench cpu: what the stages of one deformation cost on this machine, per voxel.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
-#include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "bench/options.h"
+#include "bench/output_file.h"
 #include "deform/fields/formula.h"
 #include "deform/phantom.h"
 #include "deform/resampler.h"
 #include "deform/version.h"
 
+namespace tetwarp::bench {
+
 namespace {
 
-using namespace tetwarp;
 using Clock = std::chrono::steady_clock;
 
 struct Times {
@@ -53,31 +55,40 @@ Times measure(const Volume<std::int16_t>& ct, const std::string& formula, std::i
   return {median(formula_ns), median(set_field_ns), median(resample_ns)};
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  const std::int64_t slices = argc > 1 ? std::atoll(argv[1]) : 300;
-  const int threads = argc > 2 ? std::atoi(argv[2]) : 0, repeats = argc > 3 ? std::atoi(argv[3]) : 3;
-  if (slices < 2 || threads < 0 || repeats < 1) {
-    std::fprintf(stderr, "usage: tetwarp-bench [SLICES [THREADS [REPEATS]]]   512 x 512 x SLICES, int16, linear\n");
-    return 2;
-  }
-  const Volume<std::int16_t> ct = make_phantom({512, 512, slices}, {1, 1, 1}, 1);
-  nlohmann::json results = {{"commit", commit()}, {"slices", slices}, {"threads", threads}, {"repeats", repeats}};
-  std::printf("512 x 512 x %lld, ns a voxel: formula, set_field, resample\n", static_cast<long long>(slices));
+/// Every formula with cells of three sizes, a line each.
+nlohmann::json measure_all(const Volume<std::int16_t>& ct, const CpuOptions& options) {
+  nlohmann::json runs = nlohmann::json::array();
   for (const std::string formula :
        {"identity", "wave:amplitude=8,wavelength=64", "twist:angle=28.6", "bubble:radius=128,strength=0.3"}) {
     for (const std::int64_t cell_size : {1, 4, 16}) {
-      const Times times = measure(ct, formula, cell_size, threads, repeats);
+      const Times times = measure(ct, formula, cell_size, options.threads, options.repeats);
       std::printf("%-34s cell %2lld  %7.1f %7.1f %7.1f\n", formula.c_str(), static_cast<long long>(cell_size),
                   times.formula_ns, times.set_field_ns, times.resample_ns);
-      results["runs"].push_back({{"field", formula},
-                                 {"cell_size", cell_size},
-                                 {"formula_ns", times.formula_ns},
-                                 {"set_field_ns", times.set_field_ns},
-                                 {"resample_ns", times.resample_ns}});
+      runs.push_back({{"field", formula},
+                      {"cell_size", cell_size},
+                      {"formula_ns", times.formula_ns},
+                      {"set_field_ns", times.set_field_ns},
+                      {"resample_ns", times.resample_ns}});
     }
   }
-  std::printf("%s\n", results.dump().c_str());
+  return runs;
+}
+
+}  // namespace
+
+int run_cpu(const CpuOptions& options) {
+  require_writable(options.json);
+  const Volume<std::int16_t> ct = make_phantom({512, 512, options.slices}, {1, 1, 1}, 1);
+  nlohmann::json results = {
+      {"commit", commit()}, {"slices", options.slices}, {"threads", options.threads}, {"repeats", options.repeats}};
+  std::printf("512 x 512 x %lld, ns a voxel: formula, set_field, resample\n", static_cast<long long>(options.slices));
+  results["runs"] = measure_all(ct, options);
+  if (options.json.empty()) {
+    std::printf("%s\n", results.dump().c_str());
+  } else {
+    write_text(options.json, results.dump() + "\n");
+  }
   return 0;
 }
+
+}  // namespace tetwarp::bench

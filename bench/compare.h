@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "bench/backend.h"
+
+namespace tetwarp::bench {
+
+/// A method's result against Tetwarp's.
+struct Tally {
+  std::uint64_t writes = 0;       ///< of any voxel, several of one counted each
+  std::uint64_t lost = 0;         ///< covered, and never written
+  std::uint64_t multiple = 0;     ///< written more than once
+  std::uint64_t spilled = 0;      ///< written, and not covered
+  std::uint64_t covered = 0;      ///< by Tetwarp
+  double largest_difference = 0;  ///< absolute, stored units, over voxels both covered and written
+  double mean_difference = 0;
+
+  friend bool operator==(const Tally&, const Tally&) = default;
+};
+
+/// @param output, writes  of the method; all of one size. @throws InputError where they are not
+Tally compare(const Exact& exact, const std::vector<std::int16_t>& output, const std::vector<std::uint32_t>& writes);
+
+}  // namespace tetwarp::bench

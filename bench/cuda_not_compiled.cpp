@@ -1,0 +1,15 @@
+#include "bench/backend.h"
+
+namespace tetwarp::bench {
+
+namespace {
+
+[[noreturn]] void not_compiled() { throw NotCompiled("CUDA is not in this build; use --backend cpu"); }
+
+}  // namespace
+
+std::unique_ptr<Backend> make_cuda_backend(int, InverseIn) { not_compiled(); }
+
+CudaFacts describe_cuda(int) { not_compiled(); }
+
+}  // namespace tetwarp::bench

@@ -1,0 +1,39 @@
+#include "bench/machine.h"
+
+#include <tbb/task_arena.h>
+
+#include <fstream>
+
+#include "bench/backend.h"
+
+namespace tetwarp::bench {
+
+namespace {
+
+/// The first "model name" of /proc/cpuinfo; where there is none (not x86), its first "Model", or "unknown".
+std::string cpu_name() {
+  std::ifstream file("/proc/cpuinfo");
+  std::string line, fallback = "unknown";
+  while (std::getline(file, line)) {
+    const std::size_t colon = line.find(':');
+    if (colon == std::string::npos || colon + 2 > line.size()) continue;
+    if (line.starts_with("model name")) return line.substr(colon + 2);
+    if (line.starts_with("Model")) fallback = line.substr(colon + 2);
+  }
+  return fallback;
+}
+
+}  // namespace
+
+Machine describe_machine(int device, int threads) {
+  Machine machine{.cpu = cpu_name(), .threads = threads > 0 ? threads : tbb::this_task_arena::max_concurrency()};
+  if (device < 0) return machine;
+  const CudaFacts facts = describe_cuda(device);
+  machine.gpu = facts.name;
+  machine.driver = facts.driver;
+  machine.cuda_runtime = facts.runtime;
+  machine.compute_capability = facts.compute_capability;
+  return machine;
+}
+
+}  // namespace tetwarp::bench

@@ -1,0 +1,167 @@
+// tetwarp-bench: what the paper compares, and what the stages of a deformation cost.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <iostream>
+#include <new>
+
+#include "bench/options.h"
+#include "deform/version.h"
+
+namespace tetwarp::bench {
+
+namespace {
+
+constexpr int kFailed = 1, kWrongCommandLine = 2, kInputRefused = 4;
+
+/// As they were typed; `run_command_line` makes Method and InverseIn of them.
+struct Words {
+  std::vector<std::string> methods{"inverse4x4-double", "inverse3x3-double", "inverse3x3-float", "paper", "tetwarp"};
+  std::string cell_sizes = "4,8,16";
+  bool per_voxel_inverse = false;
+};
+
+void add_input(CLI::App& command, InputOptions& input) {
+  auto* path = command.add_option("INPUT", input.path,
+                                  "Folder of DICOM files, or .nii .nii.gz .nrrd .mha, int16, instead of the phantom");
+  command.add_option("--series", input.series, "Series Instance UID, or the number that `tetwarp info` prints")
+      ->type_name("UID")
+      ->needs(path);
+  auto* raw = command.add_option("--raw", input.raw, "int16 voxels, little endian, no header")
+                  ->type_name("FILE")
+                  ->excludes(path);
+  auto* size = command.add_option("--size", input.size, "Columns, rows and slices of --raw")
+                   ->expected(3)
+                   ->delimiter(',')
+                   ->check(CLI::PositiveNumber)
+                   ->needs(raw);
+  raw->needs(size);
+  command.add_option("--slices", input.slices, "Slices of the phantoms")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(CLI::Range(2, 100000))
+      ->capture_default_str();
+  command.add_option("--width", input.width, "Columns and rows of the phantoms")
+      ->check(CLI::Range(2, 100000))
+      ->capture_default_str();
+}
+
+void add_paper(CLI::App& app, PaperOptions& options, Words& words) {
+  CLI::App* command = app.add_subcommand("paper", "The tables of the paper, with Tetwarp beside its methods");
+  add_input(*command, options.input);
+  command->add_option("--fields", options.fields, "Deformations")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(CLI::IsMember({"identity", "wave", "twist", "bubble"}))
+      ->capture_default_str();
+  command->add_option("--methods", words.methods, "Methods on cells of one voxel")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(CLI::IsMember(words.methods))
+      ->capture_default_str();
+  command
+      ->add_option("--cell-sizes", words.cell_sizes,
+                   "Cells of the coarse table (paper, gascon, tetwarp); none: no such table")
+      ->capture_default_str();
+  command->add_option("--frames", options.frames, "Timed frames")->check(CLI::Range(1, 1000000))->capture_default_str();
+  command->add_option("--warmup", options.warmup, "Frames before them")
+      ->check(CLI::Range(0, 1000000))
+      ->capture_default_str();
+  command->add_flag("--per-voxel-inverse", words.per_voxel_inverse,
+                    "Keep the compiler from moving the inverse out of the loop over voxels");
+  command->add_option("--backend", options.backend, "cpu: the same loops in plain C++, sampling in software")
+      ->check(CLI::IsMember({"auto", "cuda", "cpu"}))
+      ->capture_default_str();
+  command->add_option("--device", options.device, "CUDA device")->check(CLI::NonNegativeNumber)->capture_default_str();
+  command->add_option("--threads", options.threads, "Threads; 0 is all")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_option("--json", options.json, "Every number, as JSON")->type_name("FILE");
+  command->add_option("--csv", options.csv, "Every number, a line a run")->type_name("FILE");
+  command->add_flag("--verbose", options.verbose, "A line on standard error for every run");
+  command->footer("Example: tetwarp bench paper --slices 300 --fields twist --json twist.json");
+}
+
+void add_cpu(CLI::App& app, CpuOptions& options) {
+  CLI::App* command = app.add_subcommand("cpu", "What the stages of one deformation cost on the CPU, per voxel");
+  command->add_option("--slices", options.slices, "Slices of 512 x 512")
+      ->check(CLI::Range(2, 100000))
+      ->capture_default_str();
+  command->add_option("--threads", options.threads, "Threads; 0 is all")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_option("--repeats", options.repeats, "Repeats; the median counts")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  command->add_option("--json", options.json, "The numbers, as JSON")->type_name("FILE");
+  command->footer("Example: tetwarp bench cpu --slices 100 --threads 2");
+}
+
+/// "4,8,16", "none" or nothing.
+std::vector<std::int64_t> parse_cell_sizes(const std::string& text) {
+  std::vector<std::int64_t> sizes;
+  if (text.empty() || text == "none") return sizes;
+  for (const std::string& word : CLI::detail::split(text, ',')) {
+    std::int64_t size = 0;
+    if (!CLI::detail::lexical_cast(word, size) || size < 2 || size > 1000) {
+      throw UsageError("--cell-sizes " + text + "; expected whole numbers from 2 to 1000, as in 4,8,16");
+    }
+    sizes.push_back(size);
+  }
+  return sizes;
+}
+
+int run_command_line(int argc, char** argv) {
+  CLI::App app("Time the paper's methods and Tetwarp, and say what each result is worth");
+  app.name("tetwarp-bench");
+  app.require_subcommand(1);
+  app.set_version_flag("--version", std::string("tetwarp-bench ") + version() + " (" + commit() + ")");
+  PaperOptions paper;
+  CpuOptions cpu;
+  Words words;
+  add_paper(app, paper, words);
+  add_cpu(app, cpu);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& help) {
+    return app.exit(help);
+  } catch (const CLI::Error& error) {
+    throw UsageError(std::string(error.what()) + "; see tetwarp-bench --help");
+  }
+  if (app.got_subcommand("cpu")) return run_cpu(cpu);
+  paper.methods.clear();
+  for (const std::string& name : words.methods) paper.methods.push_back(parse_method(name));
+  paper.cell_sizes = parse_cell_sizes(words.cell_sizes);
+  paper.inverse = words.per_voxel_inverse ? InverseIn::every_voxel : InverseIn::loop_as_compiled;
+  return run_paper(paper);
+}
+
+int fail(int status, const char* what) {
+  std::fprintf(stderr, "tetwarp-bench: error: %s\n", what);
+  return status;
+}
+
+}  // namespace
+
+}  // namespace tetwarp::bench
+
+int main(int argc, char** argv) {
+  using namespace tetwarp;
+  using namespace tetwarp::bench;
+  try {
+    const int status = run_command_line(argc, argv);
+    std::cout.flush();
+    if (std::fflush(stdout) != 0 || std::ferror(stdout) || !std::cout) {
+      throw Error("standard output cannot be written; is the disk full?");
+    }
+    return status;
+  } catch (const UsageError& error) {
+    return fail(kWrongCommandLine, error.what());
+  } catch (const InputError& error) {
+    return fail(kInputRefused, error.what());
+  } catch (const std::bad_alloc&) {
+    return fail(kFailed, "not enough memory; try smaller --slices or --width");
+  } catch (const std::exception& error) {
+    return fail(kFailed, error.what());
+  }
+}

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "bench/method.h"
+#include "deform/errors.h"
+
+namespace tetwarp::bench {
+
+/// The command line is wrong: exit status 2.
+class UsageError : public Error {
+ public:
+  using Error::Error;
+};
+
+constexpr std::uint64_t kPhantomSeed = 1;
+
+/// What `paper` deforms: one volume, or phantoms of several lengths.
+struct InputOptions {
+  std::filesystem::path path;      ///< DICOM folder, .nii .nii.gz .nrrd .mha; empty: phantom or `raw`
+  std::string series;              ///< UID, or the number that `tetwarp info` prints
+  std::filesystem::path raw;       ///< int16, little endian, no header
+  std::vector<std::int64_t> size;  ///< of `raw`
+  std::int64_t width = 512;        ///< columns and rows of the phantom
+  std::vector<std::int64_t> slices{141, 300, 316, 600};
+
+  bool is_phantom() const { return path.empty() && raw.empty(); }
+};
+
+struct PaperOptions {
+  InputOptions input;
+  std::vector<std::string> fields{"identity", "wave", "twist", "bubble"};
+  std::vector<Method> methods{Method::inverse4x4_double, Method::inverse3x3_double, Method::inverse3x3_float,
+                              Method::paper, Method::tetwarp};
+  std::vector<std::int64_t> cell_sizes{4, 8, 16};  ///< of the coarse table
+  int frames = 50, warmup = 3;
+  InverseIn inverse = InverseIn::loop_as_compiled;
+  std::string backend = "auto";
+  int device = 0, threads = 0;
+  std::filesystem::path json, csv;
+  bool verbose = false;  ///< a line to standard error for every run
+};
+
+struct CpuOptions {
+  std::int64_t slices = 300;
+  int threads = 0, repeats = 3;
+  std::filesystem::path json;
+};
+
+/// The tables of the paper, to standard output. @return the exit status
+int run_paper(const PaperOptions& options);
+/// What the stages of one deformation cost on the CPU, per voxel.
+int run_cpu(const CpuOptions& options);
+
+}  // namespace tetwarp::bench

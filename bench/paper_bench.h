@@ -1,0 +1,19 @@
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "bench/backend.h"
+#include "bench/results.h"
+
+namespace tetwarp::bench {
+
+/// Runs what the options ask for on one backend: every field of every volume with every method, and the coarse cells
+/// on one volume (300 slices where that is among them, else the first).
+///
+/// @param say  is told of every run, one line
+/// @throws InputError for a volume of one value and the like
+std::vector<Run> run_all(const PaperOptions& options, Backend& backend,
+                         const std::function<void(const std::string&)>& say);
+
+}  // namespace tetwarp::bench

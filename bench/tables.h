@@ -1,0 +1,12 @@
+#pragma once
+
+#include <string>
+
+#include "bench/results.h"
+
+namespace tetwarp::bench {
+
+/// The tables of the paper with Tetwarp's rows, what each result is worth, and Appendix A, in Markdown.
+std::string to_markdown(const Results& results);
+
+}  // namespace tetwarp::bench

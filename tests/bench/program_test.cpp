@@ -1,0 +1,67 @@
+// tetwarp-bench on the command line: exit statuses, and files that appear whole.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/support/program.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch.h"
+#include "tests/support/write_file.h"
+
+namespace {
+
+constexpr const char* kTiny = "paper --backend cpu --width 12 --slices 9 --frames 1 --warmup 0 --fields wave ";
+
+Outcome run_bench(const Scratch& scratch, const std::string& arguments) {
+  return run_tetwarp(scratch.path(), arguments);  // TETWARP_PROGRAM is tetwarp-bench here
+}
+
+void expect_error(const Outcome& run, int status, const std::string& names) {
+  EXPECT_EQ(run.status, status) << run.err;
+  EXPECT_EQ(run.err.rfind("tetwarp-bench: error: ", 0), 0u) << run.err;
+  EXPECT_TRUE(says(run.err, {names}));
+  EXPECT_EQ(run.out, "");
+}
+
+TEST(BenchProgram, PrintsTablesAndWritesTheNumbers) {
+  const Scratch scratch;
+  const Outcome run = run_bench(scratch, kTiny + std::string("--cell-sizes none --json r.json --csv r.csv"));
+  ASSERT_EQ(run.status, 0) << run.err;
+  EXPECT_TRUE(says(run.out, {"# tetwarp-bench paper", "## Table 2", "12 x 12 x 9", "plain C++"}));
+  EXPECT_EQ(nlohmann::json::parse(read_text(scratch / "r.json"))["runs"].size(), 10u);
+  EXPECT_TRUE(
+      says(read_text(scratch / "r.csv"), {"12,12,9,wave,\"wave:amplitude=0.375,wavelength=3\",1,paper,memory"}));
+}
+
+TEST(BenchProgram, WrongCommandLinesExitWithTwo) {
+  const Scratch scratch;
+  expect_error(run_bench(scratch, ""), 2, "subcommand");
+  expect_error(run_bench(scratch, "paper --methods fastest"), 2, "fastest");
+  expect_error(run_bench(scratch, "paper --fields swirl"), 2, "swirl");
+  expect_error(run_bench(scratch, "paper --cell-sizes 1"), 2, "--cell-sizes");
+  expect_error(run_bench(scratch, "paper --cell-sizes 4,x"), 2, "--cell-sizes");
+  expect_error(run_bench(scratch, "paper --raw some.raw"), 2, "--size");
+}
+
+TEST(BenchProgram, AVolumeOfZerosExitsWithFourAndWritesNothing) {
+  const Scratch scratch;
+  write_file(scratch / "zeros.raw", std::string(2 * 5 * 4 * 3, '\0'));
+  expect_error(run_bench(scratch, "paper --backend cpu --raw zeros.raw --size 5,4,3 --json r.json"), 4, "zeros");
+  EXPECT_FALSE(std::filesystem::exists(scratch / "r.json"));
+}
+
+TEST(BenchProgram, AnUnwritableResultIsKnownBeforeTheWork) {
+  const Scratch scratch;
+  expect_error(run_bench(scratch, kTiny + std::string("--json missing/r.json")), 1, "missing");
+}
+
+TEST(BenchProgram, HelpHasAnExample) {
+  const Scratch scratch;
+  for (const std::string command : {"paper", "cpu"}) {
+    const Outcome run = run_bench(scratch, command + " --help");
+    EXPECT_EQ(run.status, 0);
+    EXPECT_TRUE(says(run.out, {"Example: tetwarp bench " + command}));
+  }
+}
+
+}  // namespace
