@@ -1,5 +1,6 @@
 #include "io/dicom_header.h"
 
+#include <dcmtk/dcmdata/dcdict.h>
 #include <dcmtk/dcmdata/dcistrmf.h>
 #include <dcmtk/dcmdata/dcrledrg.h>
 #include <dcmtk/dcmdata/dcuid.h>
@@ -174,6 +175,11 @@ void prepare_dcmtk() {
     DJDecoderRegistration::registerCodecs();
     DJLSDecoderRegistration::registerCodecs();
   });
+  if (!dcmDataDict.isDictionaryLoaded()) {
+    throw Error(
+        "DCMTK's data dictionary is not found, without it DICOM is neither read nor written; "
+        "install DCMTK, or set DCMDICTPATH to its dicom.dic");
+  }
 }
 
 std::string text_of(DcmItem& item, const DcmTagKey& tag) {

@@ -51,6 +51,7 @@ struct DicomFileHeader {
 };
 
 /// Registers DCMTK's decoders and turns off its messages (a library does not print), once for the process.
+/// @throws Error without DCMTK's data dictionary
 void prepare_dcmtk();
 
 /// Fills a header from a data set that was read, wholly or up to Pixel Data.

@@ -179,6 +179,18 @@ TEST(Program, ABrokenEndSliceIsNotPassedOver) {
   expect_error(run_tetwarp(scratch.path(), "deform in -f identity -o out.nii"), 4, "IM00001.dcm");
 }
 
+TEST(Program, WithoutDcmtksDictionaryDicomIsRefusedByName) {
+  const Scratch scratch;
+  ASSERT_EQ(run_tetwarp(scratch.path(), std::string(kPhantom) + "series").status, 0);
+  ASSERT_EQ(setenv("DCMDICTPATH", "/nonexistent/dicom.dic", 1), 0);
+  const Outcome read = run_tetwarp(scratch.path(), "deform series -f identity -o out.nii");
+  const Outcome written = run_tetwarp(scratch.path(), std::string(kPhantom) + "other");
+  unsetenv("DCMDICTPATH");
+  expect_error(read, 1, "DCMDICTPATH");
+  expect_error(written, 1, "DCMDICTPATH");
+  EXPECT_FALSE(std::filesystem::exists(scratch.path() / "other"));
+}
+
 TEST(Program, QuietIsSilentAndTheDryRunWritesNothing) {
   const Scratch scratch;
   EXPECT_EQ(run_tetwarp(scratch.path(), kPhantom + std::string("in.nii")).err, "");

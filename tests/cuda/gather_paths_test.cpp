@@ -60,7 +60,7 @@ void expect_same(const FieldCase& test, Random& random) {
 
 TEST_F(GatherPaths, RandomFieldsWithAndWithoutFolds) {
   SCOPED_TRACE(seed_text(test_seed()));
-  for (std::uint64_t n = 0; n < 200; ++n) {
+  for (std::uint64_t n = 0; n < test_cases(200); ++n) {
     Random random(test_seed(), 5000 + n);
     const FieldCase test = n % 2 == 0 ? random_injective_case(random) : random_folding_case(random);
     SCOPED_TRACE(std::to_string(n) + ": " + test.description);

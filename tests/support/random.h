@@ -17,6 +17,13 @@ inline std::uint64_t test_seed() {
   return seed;
 }
 
+/// How many cases a random test looks at: `usual`, or $TETWARP_TEST_CASES where that is fewer (under slow tools).
+inline std::uint64_t test_cases(std::uint64_t usual) {
+  const char* text = std::getenv("TETWARP_TEST_CASES");
+  const std::uint64_t wanted = text ? std::strtoull(text, nullptr, 10) : usual;
+  return wanted == 0 || wanted > usual ? usual : wanted;
+}
+
 inline std::string seed_text(std::uint64_t seed) { return "TETWARP_TEST_SEED=" + std::to_string(seed); }
 
 /// Random numbers for case number `stream` of a test.
