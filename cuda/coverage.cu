@@ -1,6 +1,6 @@
 #include "cuda/coverage.h"
 #include "deform/core/border.h"
-#include "deform/core/visit_cell.h"
+#include "deform/core/gather.h"
 
 namespace tetwarp::cuda_detail {
 
@@ -110,26 +110,28 @@ __global__ void wind_kernel(Crossings in, std::int64_t rows, int width, std::uin
   }
 }
 
-/// One thread 32 cells: voxels that an inverted tetrahedron owns go from `single` to `several`.
-__global__ void inverted_kernel(DeviceField field, BitRows inverted_cells, SlabBox box, int words,
+/// One warp a word of flagged cells: voxels that an inverted tetrahedron owns go from `single` to `several`.
+__global__ void inverted_kernel(StepLattice lattice, Nudge nudge, BitRows inverted_cells, SlabBox box, int words,
                                 std::uint32_t* single, std::uint32_t* several) {
-  const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
-  const std::int64_t per_row = inverted_cells.words_per_row, rows = field.frame.cells.y * field.frame.cells.z;
-  if (n >= per_row * rows) return;
+  const std::int64_t n = (std::int64_t{blockIdx.x} * kThreads + threadIdx.x) / 32;
+  const std::int64_t per_row = inverted_cells.words_per_row;
+  if (n >= per_row * lattice.cells.y * lattice.cells.z) return;
+  const int lane = static_cast<int>(threadIdx.x & 31);
+  if ((inverted_cells.words[n] >> lane & 1) == 0) return;
+  const glm::ivec3 at(n % per_row / 2 * 64 + n % per_row % 2 + 2 * lane, n / per_row % lattice.cells.y,
+                      n / per_row / lattice.cells.y);
   const VoxelBox region{box.begin, box.begin + box.size};
-  const glm::i64vec3 first(n % per_row / 2 * 64 + n % per_row % 2, n / per_row % field.frame.cells.y,
-                           n / per_row / field.frame.cells.y);
-  for (std::uint32_t left = inverted_cells.words[n]; left != 0; left &= left - 1) {
-    const glm::i64vec3 at = first + glm::i64vec3(2 * (__ffs(static_cast<int>(left)) - 1), 0, 0);
-    visit_cell(field.cell(at), DeviceField::is_odd(at), region, field.frame.nudge,
-               [&](const glm::i64vec3& voxel, const glm::i32vec3&, int, const Tetrahedron& t) {
-                 if (jacobian(t) > 0) return;
-                 const glm::i64vec3 in = voxel - box.begin;
-                 const std::int64_t word = (in.z * box.size.y + in.y) * words + in.x / 32;
-                 const std::uint32_t bit = 1u << (in.x & 31);
-                 atomicAnd(&single[word], ~bit);
-                 atomicOr(&several[word], bit);
-               });
+#pragma unroll 1
+  for (int number = 0; number < kTetrahedraPerCell; ++number) {
+    const LatticeTetrahedron t = LatticeTetrahedron::of_cell(at, number);
+    if (jacobian(vertices_of(lattice, t)) > 0) continue;
+    visit_tetrahedron(lattice, t, region, nudge, [&](const glm::ivec3& voxel) {
+      const glm::i64vec3 in = glm::i64vec3(voxel) - box.begin;
+      const std::int64_t word = (in.z * box.size.y + in.y) * words + in.x / 32;
+      const std::uint32_t bit = 1u << (in.x & 31);
+      atomicAnd(&single[word], ~bit);
+      atomicOr(&several[word], bit);
+    });
   }
 }
 
@@ -152,8 +154,9 @@ void Coverage::find(const DeviceField& field, const BitRows& inverted_cells, boo
   wind_kernel<<<blocks_for(rows * 32), kThreads, 0, stream>>>(crossings, rows, static_cast<int>(box.size.x), single,
                                                               several);
   if (any_inverted) {
-    inverted_kernel<<<blocks_for(inverted_cells.words_per_row * field.frame.cells.y * field.frame.cells.z), kThreads, 0,
-                      stream>>>(field, inverted_cells, box, words_, single, several);
+    const std::int64_t flags = inverted_cells.words_per_row * field.frame.cells.y * field.frame.cells.z;
+    inverted_kernel<<<blocks_for(flags * 32), kThreads, 0, stream>>>(field.steps, field.frame.nudge, inverted_cells,
+                                                                     box, words_, single, several);
   }
   TETWARP_CUDA_TRY(cudaGetLastError());
 }

@@ -219,7 +219,7 @@ __global__ void settle_kernel(DeviceField field, SlabBox slab, const std::uint32
   if (n >= slab.count()) return;
   const glm::i64vec3 in(n % slab.size.x, n / slab.size.x % slab.size.y, n / (slab.size.x * slab.size.y));
   const std::int64_t word = (in.z * slab.size.y + in.y) * ((slab.size.x + 31) / 32) + in.x / 32;
-  if ((several[word] >> (in.x & 31) & 1) == 0) return;
+  if (several && (several[word] >> (in.x & 31) & 1) == 0) return;
   const glm::i64vec3 voxel = in + slab.begin;
   if (owner[n] == kNobody) return sink.nothing(glm::ivec3(voxel));
   const Tetrahedron t = tetrahedron_numbered(field, owner[n]);
@@ -232,6 +232,12 @@ __global__ void settle_kernel(DeviceField field, SlabBox slab, const std::uint32
 template <class Sink>
 std::uint64_t Gather::run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream) {
   const DeviceField& field = lattice.field();
+  counters_.reserve(1);
+  counters_.fill(0, 1, stream);
+  if (is_mostly_folded(lattice)) {
+    claim_box(lattice, box, nullptr, sink, stream);
+    return covered(stream);
+  }
   coverage_.find(field, lattice.inverted_cells(), lattice.statistics().inverted != 0, box, stream);
   const glm::ivec3 size(box.size), tile(kSeedTile, kSeedTile, kMarch);
   Task task{field.steps,
@@ -256,23 +262,34 @@ std::uint64_t Gather::run(const LatticeOnDevice& lattice, const SlabBox& box, co
   TETWARP_CUDA_TRY(cudaGetLastError());
   Counters counters;
   counters_.download(&counters, 1, stream);
-  if (counters.several != 0) {
-    settle_several(lattice, box, sink, stream);
-    counters_.download(&counters, 1, stream);
-  }
+  if (counters.several != 0) claim_box(lattice, box, coverage_.several(), sink, stream);
+  return covered(stream);
+}
+
+bool Gather::is_mostly_folded(const LatticeOnDevice& lattice) {
+  constexpr std::int64_t kFew = 256;  // one inverted tetrahedron in so many
+  const std::int64_t tetrahedra = kTetrahedraPerCell * lattice.field().cell_count();
+  return static_cast<std::int64_t>(lattice.statistics().inverted) > tetrahedra / kFew;
+}
+
+std::uint64_t Gather::covered(cudaStream_t stream) const {
+  Counters counters;
+  counters_.download(&counters, 1, stream);
   return counters.covered;
 }
 
 template <class Sink>
-void Gather::settle_several(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream) {
-  constexpr std::int64_t kClaimedAtOnce = std::int64_t{1} << 22;
+void Gather::claim_box(const LatticeOnDevice& lattice, const SlabBox& box, const std::uint32_t* several,
+                       const Sink& sink, cudaStream_t stream) {
+  constexpr std::int64_t kClaimedAtOnce = std::int64_t{1} << 23;
   const std::int64_t slice = box.size.x * box.size.y, slices = std::max<std::int64_t>(1, kClaimedAtOnce / slice);
+  const std::int64_t words_per_slice = (box.size.x + 31) / 32 * box.size.y;
   for (std::int64_t z = 0; z < box.size.z; z += slices) {
     const SlabBox slab{box.begin + glm::i64vec3(0, 0, z), {box.size.x, box.size.y, std::min(slices, box.size.z - z)}};
-    const std::uint32_t* several = coverage_.several() + z * box.size.y * coverage_.words_per_row();
-    claims_.claim(lattice.field(), slab, several, false, stream);
-    settle_kernel<<<blocks_for(slab.count()), kThreads, 0, stream>>>(lattice.field(), slab, several, claims_.owner(),
-                                                                     sink, counters_.data());
+    const std::uint32_t* only = several ? several + z * words_per_slice : nullptr;
+    claims_.claim(lattice.field(), slab, only, false, stream);
+    settle_kernel<<<blocks_for(slab.count()), kThreads, 0, stream>>>(lattice.field(), slab, only, claims_.owner(), sink,
+                                                                     counters_.data());
     TETWARP_CUDA_TRY(cudaGetLastError());
   }
 }

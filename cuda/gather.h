@@ -48,8 +48,13 @@ class Gather {
   };
 
  private:
+  /// Whether so much is inverted that predictions would mostly fail: then all voxels are claimed.
+  static bool is_mostly_folded(const LatticeOnDevice& lattice);
+  /// Claims the voxels of a box that `several` names, or all.
   template <class Sink>
-  void settle_several(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream);
+  void claim_box(const LatticeOnDevice& lattice, const SlabBox& box, const std::uint32_t* several, const Sink& sink,
+                 cudaStream_t stream);
+  std::uint64_t covered(cudaStream_t stream) const;
 
   Coverage coverage_;
   Claims claims_;

@@ -114,7 +114,7 @@ TETWARP_HD inline Trial try_tetrahedron(const StepLattice& lattice, const FloatT
                                           detail::norm1(r) + 6.5f);  // 15 + 7 + 4 sixteenths of a step
 
   Trial trial;
-  const float reciprocal = detail::reciprocal(m.det);
+  const float reciprocal = m.det != 0 ? detail::reciprocal(m.det) : 0.0f;  // flat: the next guess is D
   const Weights w{na * reciprocal, nb * reciprocal, nc * reciprocal};
   trial.owns = least > error && !is_thin(m, a, b, c) && w.within_slack();
   trial.u = detail::to_offset(blend(w, moved, moved_a, moved_b, moved_c));
