@@ -185,7 +185,7 @@ class ForwardResampler final : public CudaResampler {
   Region source_extent(const Geometry& source, const Region& region) const override {
     const DeviceScope scope(device_);
     int low_high[6];
-    lattice_.reach(region.begin, region.end, low_high, stream_);
+    lattice_.reach(region.begin, region.end, low_high, nullptr);  // the stream of set_field may be gone
     const glm::dvec3 beyond = lattice_.field().frame.beyond_rest();
     glm::dvec3 low(region.begin), high(region.end - std::int64_t{1});  // Outside::rest: voxels that stay where they are
     for (int axis = 0; axis < 3; ++axis) {

@@ -64,11 +64,11 @@ StepLattice make_step_lattice(const LatticeFrame& frame, const Geometry& output)
       const double meant = other == axis ? step / kStepsPerVoxel : 0;
       if (std::fabs(linear[axis][other] - meant) * static_cast<double>(frame.cells[axis]) > kNegligible) return {};
     }
-    const double last = first[axis] + step * static_cast<double>(frame.cells[axis]);
+    // From the first vertex, all places of vertices and voxels must be whole numbers that float holds.
+    const double far = step * static_cast<double>(frame.cells[axis]);
     const double grid = static_cast<double>(output.size[axis]) * kStepsPerVoxel;
-    if (step < 1 || step > kMostSteps / 4 || std::fabs(double(first[axis])) >= kMostSteps || last >= kMostSteps ||
-        grid >= kMostSteps)
-      return {};
+    const double before = std::fabs(static_cast<double>(first[axis]));
+    if (step < 1 || step > kMostSteps / 4 || before + far >= kMostSteps || before + grid >= kMostSteps) return {};
     lattice.first[axis] = static_cast<float>(first[axis]);
     lattice.cell[axis] = static_cast<float>(step);
     lattice.voxel[axis] = static_cast<float>(kStepsPerVoxel / step);

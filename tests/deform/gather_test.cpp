@@ -122,6 +122,24 @@ TEST(StepLattice, MovesPlacesOutsideIntoATetrahedronOfTheLattice) {
   }
 }
 
+TEST(StepLattice, IsMadeOnlyWhereFloatHoldsEveryPlaceExactly) {
+  const Geometry grid = unit_grid({9, 8, 7});
+  const auto cells = [&](auto&& change) {
+    Geometry lattice = grid;
+    change(lattice);
+    const VertexField field = uniform_field(lattice, glm::vec3(0));
+    return make_step_lattice(make_lattice_frame(grid, view(field, Outside::background)), grid).cells;
+  };
+  EXPECT_EQ(cells([](Geometry&) {}), glm::ivec3(8, 7, 6));
+  EXPECT_EQ(cells([](Geometry& l) { l.origin.x = -2.3; }), glm::ivec3(8, 7, 6));  // snapped, but in equal steps
+  EXPECT_EQ(cells([](Geometry& l) { l.spacing = {4, 0.5, 2}; }), glm::ivec3(8, 7, 6));
+  EXPECT_EQ(cells([](Geometry& l) { l.spacing.y = 0.3; }), glm::ivec3(0));  // steps of 1228 and 1229
+  EXPECT_EQ(cells([](Geometry& l) { l.direction[0].x = -1; }), glm::ivec3(0));
+  EXPECT_EQ(cells([](Geometry& l) { l.direction = rotation({0, 0, 1}, 0.1); }), glm::ivec3(0));
+  EXPECT_EQ(cells([](Geometry& l) { l.spacing.z = 1100; }), glm::ivec3(0));
+  EXPECT_EQ(cells([](Geometry& l) { l.origin.y = -4095; }), glm::ivec3(0));
+}
+
 /// Every owner of every voxel of the grid, by `visit_cell`.
 std::multimap<std::size_t, LatticeTetrahedron> owners_of(const Scene& scene, const Geometry& grid) {
   std::multimap<std::size_t, LatticeTetrahedron> owners;
