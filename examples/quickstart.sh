@@ -14,7 +14,7 @@ packages=(
   libtbb-dev libglm-dev libgtest-dev libcli11-dev nlohmann-json3-dev
   libinsighttoolkit5-dev libdcmtk-dev                         # NIfTI, NRRD, MHA; DICOM
   libpng-dev zlib1g-dev libssl-dev
-  dicom3tools dcm2niix python3-pydicom python3-numpy          # independent readers that the tests ask
+  dicom3tools dcm2niix python3-pydicom python3-numpy python3-nibabel  # independent readers that the tests ask
 )
 missing=()
 for package in "${packages[@]}"; do
