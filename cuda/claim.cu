@@ -15,7 +15,7 @@ struct Blocks {
       : cells(field.frame.cells), count((cells + glm::i64vec3(kX - 1, kY - 1, kZ - 1)) / glm::i64vec3(kX, kY, kZ)) {}
   __host__ __device__ std::int64_t total() const { return count.x * count.y * count.z; }
   __device__ glm::i64vec3 first_cell(std::int64_t block) const {
-    return glm::i64vec3(block % count.x * kX, block / count.x % count.y * kY, block / (count.x * count.y) * kZ);
+    return unravel(block, count) * glm::i64vec3(kX, kY, kZ);
   }
 };
 

@@ -217,7 +217,7 @@ __global__ void settle_kernel(DeviceField field, SlabBox slab, const std::uint32
                               const unsigned long long* owner, Sink sink, Gather::Counters* counters) {
   const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
   if (n >= slab.count()) return;
-  const glm::i64vec3 in(n % slab.size.x, n / slab.size.x % slab.size.y, n / (slab.size.x * slab.size.y));
+  const glm::i64vec3 in = unravel(n, slab.size);
   const std::int64_t word = (in.z * slab.size.y + in.y) * ((slab.size.x + 31) / 32) + in.x / 32;
   if (several && (several[word] >> (in.x & 31) & 1) == 0) return;
   const glm::i64vec3 voxel = in + slab.begin;
@@ -232,7 +232,6 @@ __global__ void settle_kernel(DeviceField field, SlabBox slab, const std::uint32
 template <class Sink>
 std::uint64_t Gather::run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream) {
   const DeviceField& field = lattice.field();
-  counters_.reserve(1);
   counters_.fill(0, 1, stream);
   if (is_mostly_folded(lattice)) {
     claim_box(lattice, box, nullptr, sink, stream);
@@ -248,8 +247,7 @@ std::uint64_t Gather::run(const LatticeOnDevice& lattice, const SlabBox& box, co
             (size + tile - 1) / tile,
             static_cast<int>(field.frame.nudge.first_down(2) - box.begin.z),
             queue_.reserve(kQueueSize),
-            counters_.reserve(1)};
-  counters_.fill(0, 1, stream);
+            counters_.data()};
   const std::int64_t seeds = std::int64_t{task.seeds.x} * task.seeds.y * task.seeds.z;
   glm::vec3* seeded = seeds_.reserve(static_cast<std::size_t>(seeds));
   const std::int64_t words = std::int64_t{size.y} * size.z * coverage_.words_per_row();
@@ -262,7 +260,8 @@ std::uint64_t Gather::run(const LatticeOnDevice& lattice, const SlabBox& box, co
   TETWARP_CUDA_TRY(cudaGetLastError());
   Counters counters;
   counters_.download(&counters, 1, stream);
-  if (counters.several != 0) claim_box(lattice, box, coverage_.several(), sink, stream);
+  if (counters.several == 0) return counters.covered;
+  claim_box(lattice, box, coverage_.several(), sink, stream);
   return covered(stream);
 }
 

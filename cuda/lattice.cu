@@ -36,7 +36,7 @@ __device__ Vertex snapped(const LatticeFrame& frame, const glm::vec3* displaceme
 
 __device__ glm::i64vec3 vertex_at(const LatticeFrame& frame, std::int64_t n) {
   const glm::i64vec3 size = frame.cells + std::int64_t{1};
-  return {n % size.x, n / size.x % size.y, n / (size.x * size.y)};
+  return unravel(n, size);
 }
 
 __global__ void snap_kernel(LatticeFrame frame, const glm::vec3* displacement, std::int64_t vertices, Vertex* out,
@@ -254,7 +254,7 @@ void LatticeOnDevice::set(const LatticeFrame& frame, const Geometry& output, con
                           cudaStream_t stream) {
   field_ = {frame, {}, nullptr};
   const glm::i64vec3 size = frame.cells + std::int64_t{1};
-  const std::int64_t vertices = size.x * size.y * size.z, cells = field_.cell_count();
+  const std::int64_t vertices = size.x * size.y * size.z;
   LatticeFindings found{0, 0, ~0ULL, 0, ~0ULL, 0};
   found_.upload(&found, 1, stream);
   snap_steps(make_step_lattice(frame, output), displacement, vertices, found_.data(), stream);
@@ -266,10 +266,7 @@ void LatticeOnDevice::set(const LatticeFrame& frame, const Geometry& output, con
   }
   describe(found_.data(), stream);
   found_.download(&found, 1, stream);
-  if (found.bad_vertex != ~0ULL) {
-    const auto n = static_cast<std::int64_t>(found.bad_vertex);
-    refuse_vertex({n % size.x, n / size.x % size.y, n / (size.x * size.y)});
-  }
+  if (found.bad_vertex != ~0ULL) refuse_vertex(unravel(static_cast<std::int64_t>(found.bad_vertex), size));
   statistics_ = {found.inverted, found.degenerate, from_ordered(found.jacobian_min), from_ordered(found.jacobian_max)};
 }
 

@@ -16,6 +16,11 @@ struct BitRows {
   int words_per_row;
 };
 
+/// The place of an element that is number n in a box of this size, i fastest.
+__host__ __device__ inline glm::i64vec3 unravel(std::int64_t n, const glm::i64vec3& size) {
+  return {n % size.x, n / size.x % size.y, n / (size.x * size.y)};
+}
+
 /// Sum over a whole warp, in every lane.
 __device__ inline unsigned warp_sum(unsigned value) {
   for (int step = 16; step > 0; step /= 2) value += __shfl_xor_sync(~0u, value, step);
@@ -29,9 +34,7 @@ struct DeviceField {
   const Vertex* vertices = nullptr;  ///< otherwise
 
   bool has_steps() const { return steps.moved != nullptr; }
-  __device__ glm::i64vec3 cell_at(std::int64_t number) const {
-    return {number % frame.cells.x, number / frame.cells.x % frame.cells.y, number / (frame.cells.x * frame.cells.y)};
-  }
+  __device__ glm::i64vec3 cell_at(std::int64_t number) const { return unravel(number, frame.cells); }
   __device__ Vertex vertex(const glm::i64vec3& at) const {
     if (!vertices) return steps.vertex(glm::ivec3(at));
     return vertices[(at.z * (frame.cells.y + 1) + at.y) * (frame.cells.x + 1) + at.x];

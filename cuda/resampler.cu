@@ -259,11 +259,7 @@ class PullResampler final : public CudaResampler {
     TETWARP_CUDA_TRY(cudaGetLastError());
     unsigned long long bad = 0;
     bad_.download(&bad, 1, stream_);
-    if (bad != ~0ULL) {
-      const auto n = static_cast<std::int64_t>(bad);
-      const glm::i64vec3& size = frame_.size;
-      refuse_sample({n % size.x, n / size.x % size.y, n / (size.x * size.y)});
-    }
+    if (bad != ~0ULL) refuse_sample(unravel(static_cast<std::int64_t>(bad), frame_.size));
     ready_ = true;
   }
 

@@ -18,9 +18,7 @@ struct SlabBox {
   glm::i64vec3 begin, size;
 
   __host__ __device__ std::int64_t count() const { return size.x * size.y * size.z; }
-  __device__ glm::i64vec3 voxel(std::int64_t n) const {
-    return begin + glm::i64vec3(n % size.x, n / size.x % size.y, n / (size.x * size.y));
-  }
+  __device__ glm::i64vec3 voxel(std::int64_t n) const { return begin + unravel(n, size); }
   __device__ std::int64_t offset(const glm::i64vec3& voxel) const {
     const glm::i64vec3 at = voxel - begin;
     return (at.z * size.y + at.y) * size.x + at.x;
