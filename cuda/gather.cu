@@ -230,12 +230,15 @@ __global__ void settle_kernel(DeviceField field, SlabBox slab, const std::uint32
 }  // namespace
 
 template <class Sink>
-std::uint64_t Gather::run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream) {
+Gather::Counters Gather::run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink,
+                             cudaStream_t stream) {
   const DeviceField& field = lattice.field();
   counters_.fill(0, 1, stream);
   if (is_mostly_folded(lattice)) {
     claim_box(lattice, box, nullptr, sink, stream);
-    return covered(stream);
+    Counters all = counters(stream);
+    all.several = static_cast<unsigned>(box.count());
+    return all;
   }
   coverage_.find(field, lattice.inverted_cells(), lattice.statistics().inverted != 0, box, stream);
   const glm::ivec3 size(box.size), tile(kSeedTile, kSeedTile, kMarch);
@@ -258,11 +261,10 @@ std::uint64_t Gather::run(const LatticeOnDevice& lattice, const SlabBox& box, co
   march_kernel<<<blocks, dim3(32, kWarps), 0, stream>>>(task, seeded, sink);
   queue_kernel<<<1024, kThreads, 0, stream>>>(task, sink);
   TETWARP_CUDA_TRY(cudaGetLastError());
-  Counters counters;
-  counters_.download(&counters, 1, stream);
-  if (counters.several == 0) return counters.covered;
+  const Counters found = counters(stream);
+  if (found.several == 0) return found;
   claim_box(lattice, box, coverage_.several(), sink, stream);
-  return covered(stream);
+  return counters(stream);
 }
 
 bool Gather::is_mostly_folded(const LatticeOnDevice& lattice) {
@@ -271,10 +273,10 @@ bool Gather::is_mostly_folded(const LatticeOnDevice& lattice) {
   return static_cast<std::int64_t>(lattice.statistics().inverted) > tetrahedra / kFew;
 }
 
-std::uint64_t Gather::covered(cudaStream_t stream) const {
+Gather::Counters Gather::counters(cudaStream_t stream) const {
   Counters counters;
   counters_.download(&counters, 1, stream);
-  return counters.covered;
+  return counters;
 }
 
 template <class Sink>
@@ -293,12 +295,12 @@ void Gather::claim_box(const LatticeOnDevice& lattice, const SlabBox& box, const
   }
 }
 
-template std::uint64_t Gather::run(const LatticeOnDevice&, const SlabBox&, const OffsetSink&, cudaStream_t);
-template std::uint64_t Gather::run(const LatticeOnDevice&, const SlabBox&, const VoxelSink<std::uint8_t>&,
-                                   cudaStream_t);
-template std::uint64_t Gather::run(const LatticeOnDevice&, const SlabBox&, const VoxelSink<std::int16_t>&,
-                                   cudaStream_t);
-template std::uint64_t Gather::run(const LatticeOnDevice&, const SlabBox&, const VoxelSink<std::uint16_t>&,
-                                   cudaStream_t);
+template Gather::Counters Gather::run(const LatticeOnDevice&, const SlabBox&, const OffsetSink&, cudaStream_t);
+template Gather::Counters Gather::run(const LatticeOnDevice&, const SlabBox&, const VoxelSink<std::uint8_t>&,
+                                      cudaStream_t);
+template Gather::Counters Gather::run(const LatticeOnDevice&, const SlabBox&, const VoxelSink<std::int16_t>&,
+                                      cudaStream_t);
+template Gather::Counters Gather::run(const LatticeOnDevice&, const SlabBox&, const VoxelSink<std::uint16_t>&,
+                                      cudaStream_t);
 
 }  // namespace tetwarp::cuda_detail

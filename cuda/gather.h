@@ -31,9 +31,15 @@ struct OffsetSink {
 /// have several owners, and what is left, are claimed. So every field with whole steps may take this way.
 class Gather {
  public:
-  /// Finds the voxels of `box`; waits for the stream. @return how many are covered
+  struct Counters {
+    unsigned long long covered;
+    unsigned queued;   ///< voxels that the march left to the queue and the exact walk
+    unsigned several;  ///< voxels that were claimed
+  };
+
+  /// Finds the voxels of `box`; waits for the stream.
   template <class Sink>
-  std::uint64_t run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream);
+  Counters run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream);
 
   /// To be called when the field is another one.
   void forget_field() { claims_.forget_field(); }
@@ -41,10 +47,6 @@ class Gather {
   struct Entry {
     int voxel;  ///< offset in the box
     float x, y, z;
-  };
-  struct Counters {
-    unsigned long long covered;
-    unsigned queued, several;
   };
 
  private:
@@ -54,7 +56,7 @@ class Gather {
   template <class Sink>
   void claim_box(const LatticeOnDevice& lattice, const SlabBox& box, const std::uint32_t* several, const Sink& sink,
                  cudaStream_t stream);
-  std::uint64_t covered(cudaStream_t stream) const;
+  Counters counters(cudaStream_t stream) const;
 
   Coverage coverage_;
   Claims claims_;

@@ -56,7 +56,7 @@ __global__ void snap_steps_kernel(LatticeFrame frame, StepLattice lattice, const
   const glm::i32vec3 rest(lattice.first + glm::vec3(at) * lattice.cell), u = vertex.u;
   const bool near = u.x > -kMost && u.x < kMost && u.y > -kMost && u.y < kMost && u.z > -kMost && u.z < kMost;
   if (!near || vertex.deformed + u != rest) found->beside = 1;
-  moved[n] = -glm::vec3(u);
+  if (moved) moved[n] = -glm::vec3(u);
 }
 
 /// Smallest and largest of a warp go to the findings; only where they are news.
@@ -217,17 +217,18 @@ __global__ void reach_kernel(DeviceField field, VoxelBox region, int* low_high) 
 
 }  // namespace
 
-void LatticeOnDevice::snap_steps(const StepLattice& lattice, const glm::vec3* displacement, std::int64_t vertices,
+void LatticeOnDevice::snap_steps(const StepLattice& lattice, const glm::vec3* displacement, glm::vec3* moved,
                                  LatticeFindings* found, cudaStream_t stream) {
-  if (lattice.cells.x == 0) return;
-  glm::vec3* moved = moved_.reserve(static_cast<std::size_t>(vertices));
   const dim3 blocks(blocks_for(lattice.row), static_cast<unsigned>(lattice.cells.y + 1),
                     static_cast<unsigned>(lattice.cells.z + 1));
-  snap_steps_kernel<<<blocks, kThreads, 0, stream>>>(field_.frame, lattice, displacement, moved, found);
+  const bool in_place = moved == displacement;  // look first: what is not at whole steps needs its displacement
+  snap_steps_kernel<<<blocks, kThreads, 0, stream>>>(field_.frame, lattice, displacement, in_place ? nullptr : moved,
+                                                     found);
   TETWARP_CUDA_TRY(cudaGetLastError());
   LatticeFindings seen;
   found_.download(&seen, 1, stream);
   if (seen.beside != 0) return;
+  if (in_place) snap_steps_kernel<<<blocks, kThreads, 0, stream>>>(field_.frame, lattice, displacement, moved, found);
   field_.steps = lattice;
   field_.steps.moved = moved;
 }
@@ -251,13 +252,17 @@ void LatticeOnDevice::describe(LatticeFindings* found, cudaStream_t stream) {
 }
 
 void LatticeOnDevice::set(const LatticeFrame& frame, const Geometry& output, const glm::vec3* displacement,
-                          cudaStream_t stream) {
+                          glm::vec3* room, cudaStream_t stream) {
   field_ = {frame, {}, nullptr};
   const glm::i64vec3 size = frame.cells + std::int64_t{1};
   const std::int64_t vertices = size.x * size.y * size.z;
   LatticeFindings found{0, 0, ~0ULL, 0, ~0ULL, 0};
   found_.upload(&found, 1, stream);
-  snap_steps(make_step_lattice(frame, output), displacement, vertices, found_.data(), stream);
+  const StepLattice steps = make_step_lattice(frame, output);
+  if (steps.cells.x != 0) {
+    if (!room) room = moved_.reserve(static_cast<std::size_t>(vertices));
+    snap_steps(steps, displacement, room, found_.data(), stream);
+  }
   if (!field_.has_steps()) {
     field_.vertices = vertices_.reserve(static_cast<std::size_t>(vertices));
     snap_kernel<<<blocks_for(vertices), kThreads, 0, stream>>>(frame, displacement, vertices, vertices_.data(),

@@ -60,8 +60,12 @@ struct LatticeFindings;  // lattice.cu
 /// Owner of a field on the device: snaps its vertices and describes its cells.
 class LatticeOnDevice {
  public:
-  /// @param displacement  on the device  @throws InputError for a vertex that is not finite or too far away
-  void set(const LatticeFrame& frame, const Geometry& output, const glm::vec3* displacement, cudaStream_t stream);
+  /// @param displacement  on the device
+  /// @param room          null, or room for as many vectors, which may be `displacement` itself and must then stay:
+  ///                      what is held of the vertices goes there where it can
+  /// @throws InputError for a vertex that is not finite or too far away
+  void set(const LatticeFrame& frame, const Geometry& output, const glm::vec3* displacement, glm::vec3* room,
+           cudaStream_t stream);
 
   const DeviceField& field() const { return field_; }
   const FieldStatistics& statistics() const { return statistics_; }
@@ -74,8 +78,8 @@ class LatticeOnDevice {
   void reach(const glm::i64vec3& begin, const glm::i64vec3& end, int (&low_high)[6], cudaStream_t stream) const;
 
  private:
-  void snap_steps(const StepLattice& lattice, const glm::vec3* displacement, std::int64_t vertices,
-                  LatticeFindings* found, cudaStream_t stream);
+  void snap_steps(const StepLattice& lattice, const glm::vec3* displacement, glm::vec3* moved, LatticeFindings* found,
+                  cudaStream_t stream);
 
   void describe(LatticeFindings* found, cudaStream_t stream);
 

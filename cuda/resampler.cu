@@ -177,7 +177,13 @@ class ForwardResampler final : public CudaResampler {
     const glm::i64vec3 size = field.lattice->size;
     gather_.forget_field();
     claims_.forget_field();
-    lattice_.set(frame, output(), on_device(field.displacement, field.memory, size.x * size.y * size.z), stream_);
+    if (field.memory == Memory::device) {
+      require_memory(field.displacement, field.memory, "the field");
+      lattice_.set(frame, output(), field.displacement, nullptr, stream_);
+    } else {
+      on_device(field.displacement, field.memory, size.x * size.y * size.z);
+      lattice_.set(frame, output(), displacement_.data(), displacement_.data(), stream_);
+    }
     ready_ = true;
   }
 
@@ -202,7 +208,7 @@ class ForwardResampler final : public CudaResampler {
   bool can_write_plainly() const override { return can_gather(); }
 
   void write_plainly(const SlabBox& slab, SlabWriter& writer) override {
-    std::visit([&](const auto& sink) { plainly_covered_ += gather_.run(lattice_, slab, sink, stream_); },
+    std::visit([&](const auto& sink) { plainly_covered_ += gather_.run(lattice_, slab, sink, stream_).covered; },
                writer.plain_sink(slab));
     writer.finish_plain(slab);
   }
