@@ -69,29 +69,17 @@ __global__ void choose_kernel(const VoxelBounds* bounds, std::int64_t blocks, Sl
   if (wanted) chosen[atomicAdd(count, 1u)] = static_cast<unsigned>(n);
 }
 
-/// One thread 32 voxels: nobody owns those that are asked for yet.
-__global__ void clear_kernel(SlabBox slab, const std::uint32_t* only, unsigned long long* owner) {
-  const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
-  const std::int64_t words = (slab.size.x + 31) / 32;
-  if (n >= words * slab.size.y * slab.size.z) return;
-  for (std::uint32_t left = only[n]; left != 0; left &= left - 1)
-    owner[n / words * slab.size.x + n % words * 32 + __ffs(static_cast<int>(left)) - 1] = kNobody;
-}
-
-/// The claims on the voxels of a slab.
+/// The claims on all voxels of a slab.
 struct Slate {
   SlabBox slab;
-  const std::uint32_t* only;
   unsigned long long* owner;
   unsigned* owners;
 
   __device__ VoxelBox region() const { return {slab.begin, slab.begin + slab.size}; }
   __device__ void claim(const glm::i64vec3& voxel, unsigned long long number) const {
-    const glm::i64vec3 at = voxel - slab.begin;
-    const std::int64_t row = at.z * slab.size.y + at.y;
-    if (only && (only[row * ((slab.size.x + 31) / 32) + at.x / 32] >> (at.x & 31) & 1) == 0) return;
-    atomicMin(&owner[row * slab.size.x + at.x], number);
-    if (owners) atomicAdd(&owners[row * slab.size.x + at.x], 1u);
+    const std::int64_t n = slab.offset(voxel);
+    atomicMin(&owner[n], number);
+    if (owners) atomicAdd(&owners[n], 1u);
   }
 };
 
@@ -120,55 +108,119 @@ __global__ void claim_kernel(DeviceField field, Blocks blocks, const unsigned* c
   });
 }
 
-/// The same for whole steps, with a float test in front of the exact one.
-__global__ void claim_steps_kernel(StepLattice lattice, Nudge nudge, Blocks blocks, const unsigned* chosen,
-                                   const unsigned* count, Slate slate) {
-  for_each_chosen(blocks, chosen, *count, [&](const glm::i64vec3& at, unsigned long long number) {
-#pragma unroll 1
-    for (int t = 0; t < kTetrahedraPerCell; ++t) {
-      visit_tetrahedron(
-          lattice, LatticeTetrahedron::of_cell(glm::ivec3(at), t), slate.region(), nudge,
-          [&](const glm::ivec3& voxel) { slate.claim(glm::i64vec3(voxel), number + static_cast<unsigned>(t)); });
+/// What the cells of a block claim of the voxels that are wanted.
+struct WantedSlate {
+  StepLattice lattice;
+  NudgeTurns turns;
+  IntBox region;
+  Wanted wanted;
+  unsigned long long* owner;
+
+  __device__ std::int64_t word(const glm::ivec3& in) const {
+    const int words = (region.end.x - region.begin.x + 31) / 32;
+    return (std::int64_t{in.z} * (region.end.y - region.begin.y) + in.y) * words + in.x / 32;
+  }
+  /// Whether a cell may reach a wanted voxel.
+  __device__ bool may_claim(const glm::ivec3& cell) const {
+    Box box{glm::i32vec3(INT32_MAX), glm::i32vec3(INT32_MIN)};
+#pragma unroll
+    for (int corner = 0; corner < 8; ++corner)
+      box.grow(lattice.vertex(cell + glm::ivec3(corner & 1, corner >> 1 & 1, corner >> 2)).deformed);
+    const IntBox voxels = candidates(turns, box.low, box.high, region);
+    if (voxels.is_empty()) return false;
+    const glm::ivec3 first = voxels.begin - region.begin, last = voxels.end - region.begin - 1;
+    for (int z = first.z; z <= last.z; ++z) {
+      for (int y = first.y; y <= last.y; ++y) {
+        for (int x = first.x / 32; x <= last.x / 32; ++x) {
+          std::uint32_t mask = wanted.bits[word({32 * x, y, z})];
+          if (x == first.x / 32) mask &= ~0u << (first.x & 31);
+          if (x == last.x / 32) mask &= ~0u >> (31 - (last.x & 31));
+          if (mask != 0) return true;
+        }
+      }
     }
-  });
+    return false;
+  }
+  __device__ void claim(const glm::ivec3& cell, int t) const {
+    const glm::i64vec3 at(cell), cells(lattice.cells);
+    const auto number =
+        static_cast<unsigned long long>(((at.z * cells.y + at.y) * cells.x + at.x) * kTetrahedraPerCell + t);
+    visit_tetrahedron(
+        lattice, LatticeTetrahedron::of_cell(cell, t), region, turns,
+        [&](const glm::ivec3& voxel) {
+          const glm::ivec3 in = voxel - region.begin;
+          return wanted.has(word(in), in.x & 31);
+        },
+        [&](const glm::ivec3& voxel) {
+          const glm::ivec3 in = voxel - region.begin;
+          atomicMin(&owner[wanted.number(word(in), in.x & 31)], number);
+        });
+  }
+};
+
+/// The same for whole steps, with a float test in front of the exact one; for the voxels that are wanted. First the
+/// cells of a block that may reach any are listed, then threads share out their tetrahedra, so that all have work.
+__global__ void claim_wanted_kernel(WantedSlate slate, Blocks blocks, const unsigned* chosen, const unsigned* count) {
+  constexpr int kCells = Blocks::kX * Blocks::kY * Blocks::kZ;
+  __shared__ unsigned short listed[kCells];
+  __shared__ unsigned found;
+  const auto cell_of = [](int in) {
+    return glm::ivec3(in % Blocks::kX, in / Blocks::kX % Blocks::kY, in / (Blocks::kX * Blocks::kY));
+  };
+  for (unsigned n = blockIdx.x; n < *count; n += gridDim.x) {
+    const glm::ivec3 first(blocks.first_cell(chosen[n]));
+    if (threadIdx.x == 0) found = 0;
+    __syncthreads();
+    for (int in = static_cast<int>(threadIdx.x); in < kCells; in += kThreads) {
+      const glm::ivec3 cell = first + cell_of(in);
+      const glm::ivec3& cells = slate.lattice.cells;
+      if (cell.x < cells.x && cell.y < cells.y && cell.z < cells.z && slate.may_claim(cell))
+        listed[atomicAdd(&found, 1u)] = static_cast<unsigned short>(in);
+    }
+    __syncthreads();
+    const unsigned tetrahedra = found * kTetrahedraPerCell;
+    for (unsigned in = threadIdx.x; in < tetrahedra; in += kThreads)
+      slate.claim(first + cell_of(listed[in / kTetrahedraPerCell]), static_cast<int>(in % kTetrahedraPerCell));
+    __syncthreads();
+  }
 }
+
+constexpr unsigned kAtOnce = 4096;  ///< thread blocks; each takes block after block
 
 }  // namespace
 
-void Claims::find_bounds(const DeviceField& field, cudaStream_t stream) {
-  if (has_bounds_) return;
+void Claims::choose(const DeviceField& field, const SlabBox& slab, const std::uint32_t* only, cudaStream_t stream) {
   const Blocks blocks(field);
-  VoxelBounds* bounds = bounds_.reserve(static_cast<std::size_t>(blocks.total()));
-  chosen_.reserve(static_cast<std::size_t>(blocks.total()));
-  bounds_kernel<<<static_cast<unsigned>(blocks.total()), kThreads, 0, stream>>>(field, blocks, bounds);
-  TETWARP_CUDA_TRY(cudaGetLastError());
-  has_bounds_ = true;
-}
-
-void Claims::claim(const DeviceField& field, const SlabBox& slab, const std::uint32_t* only, bool count_owners,
-                   cudaStream_t stream) {
-  constexpr unsigned kAtOnce = 4096;  // thread blocks; each takes block after block
-  find_bounds(field, stream);
-  const auto voxels = static_cast<std::size_t>(slab.count());
-  if (only) {
-    owner_.reserve(voxels);
-    clear_kernel<<<blocks_for((slab.size.x + 31) / 32 * slab.size.y * slab.size.z), kThreads, 0, stream>>>(
-        slab, only, owner_.data());
-  } else {
-    owner_.fill(0xFF, voxels, stream);
+  if (!has_bounds_) {
+    VoxelBounds* bounds = bounds_.reserve(static_cast<std::size_t>(blocks.total()));
+    chosen_.reserve(static_cast<std::size_t>(blocks.total()));
+    bounds_kernel<<<static_cast<unsigned>(blocks.total()), kThreads, 0, stream>>>(field, blocks, bounds);
+    has_bounds_ = true;
   }
-  if (count_owners) owners_.fill(0, voxels, stream);
   count_.fill(0, 1, stream);
-  const Blocks blocks(field);
   choose_kernel<<<blocks_for(blocks.total()), kThreads, 0, stream>>>(bounds_.data(), blocks.total(), slab, only,
                                                                      chosen_.data(), count_.data());
-  const Slate slate{slab, only, owner_.data(), count_owners ? owners_.data() : nullptr};
-  if (field.has_steps()) {
-    claim_steps_kernel<<<kAtOnce, kThreads, 0, stream>>>(field.steps, field.frame.nudge, blocks, chosen_.data(),
-                                                         count_.data(), slate);
-  } else {
-    claim_kernel<<<kAtOnce, kThreads, 0, stream>>>(field, blocks, chosen_.data(), count_.data(), slate);
-  }
+  TETWARP_CUDA_TRY(cudaGetLastError());
+}
+
+void Claims::claim(const DeviceField& field, const SlabBox& slab, bool count_owners, cudaStream_t stream) {
+  const auto voxels = static_cast<std::size_t>(slab.count());
+  owner_.fill(0xFF, voxels, stream);
+  if (count_owners) owners_.fill(0, voxels, stream);
+  choose(field, slab, nullptr, stream);
+  const Slate slate{slab, owner_.data(), count_owners ? owners_.data() : nullptr};
+  claim_kernel<<<kAtOnce, kThreads, 0, stream>>>(field, Blocks(field), chosen_.data(), count_.data(), slate);
+  TETWARP_CUDA_TRY(cudaGetLastError());
+}
+
+void Claims::claim(const DeviceField& field, const SlabBox& slab, const Wanted& wanted, std::size_t count,
+                   cudaStream_t stream) {
+  owner_.fill(0xFF, count, stream);
+  choose(field, slab, wanted.bits, stream);
+  const IntBox region{glm::ivec3(slab.begin), glm::ivec3(slab.begin + slab.size)};
+  claim_wanted_kernel<<<kAtOnce, kThreads, 0, stream>>>(
+      {field.steps, NudgeTurns(field.frame.nudge), region, wanted, owner_.data()}, Blocks(field), chosen_.data(),
+      count_.data());
   TETWARP_CUDA_TRY(cudaGetLastError());
 }
 

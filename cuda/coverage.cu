@@ -6,10 +6,27 @@ namespace tetwarp::cuda_detail {
 
 namespace {
 
+constexpr unsigned kMostExtra = 1u << 18;
+constexpr int kNoExtra = -1, kLostExtra = -2;
+
 struct Crossings {
   std::uint32_t *ins, *outs;
-  int *start, *collided;
+  int* start;
   int words;
+  int* extra_of_row;  ///< first of a chain
+  ExtraCrossing* extra;
+  unsigned* extra_count;
+
+  __device__ void add_extra(std::int64_t row, int voxel, int sign) const {
+    const unsigned n = atomicAdd(extra_count, 1u);
+    if (n < kMostExtra) {
+      extra[n].voxel = voxel;
+      extra[n].sign = sign;
+      extra[n].next = atomicExch(&extra_of_row[row], static_cast<int>(n));
+    } else {
+      atomicExch(&extra_of_row[row], kLostExtra);
+    }
+  }
 };
 
 template <class Int>
@@ -28,7 +45,7 @@ __device__ void cross_rows(const BorderTriangle& t, const Nudge& nudge, const Sl
       }
       const std::uint32_t bit = 1u << ((first - begin) & 31);
       std::uint32_t* words = sign > 0 ? out.ins : out.outs;
-      if (atomicOr(&words[row * out.words + (first - begin) / 32], bit) & bit) out.collided[row] = 1;
+      if (atomicOr(&words[row * out.words + (first - begin) / 32], bit) & bit) out.add_extra(row, first - begin, sign);
     }
   }
 }
@@ -71,19 +88,42 @@ __global__ void border_kernel(StepLattice lattice, Sides sides, Nudge nudge, Sla
   }
 }
 
+/// The extra crossings of a row.
+struct Chain {
+  const ExtraCrossing* extra;
+  int first;
+
+  /// What they add to the winding number within [begin, end) of the row.
+  __device__ int sum(int begin, int end) const {
+    int sum = 0;
+    for (int n = first; n >= 0; n = extra[n].next)
+      if (extra[n].voxel >= begin && extra[n].voxel < end) sum += extra[n].sign;
+    return sum;
+  }
+  __device__ bool is_whole() const {
+    int n = first;
+    while (n >= 0) n = extra[n].next;
+    return n == kNoExtra;
+  }
+};
+
 /// One warp a row: from crossings to the winding number of every voxel.
-__global__ void wind_kernel(Crossings in, std::int64_t rows, int width, std::uint32_t* single, std::uint32_t* several) {
+__global__ void wind_kernel(Crossings in, std::int64_t rows, int rows_per_slice, int width, std::uint32_t* single,
+                            std::uint32_t* several, unsigned* in_slice) {
   const std::int64_t row = (std::int64_t{blockIdx.x} * kThreads + threadIdx.x) / 32;
   const int lane = static_cast<int>(threadIdx.x & 31);
   if (row >= rows) return;
-  const bool collided = in.collided[row] != 0;
+  const Chain chain{in.extra, in.extra_of_row[row]};
+  const bool has_extra = chain.first != kNoExtra, known = !has_extra || chain.is_whole();
   int carried = in.start[row];
+  unsigned found = 0;
   for (int first = 0; first < in.words; first += 32) {
     const int word = first + lane;
     const bool here = word < in.words;
     const std::uint32_t ins = here ? in.ins[row * in.words + word] : 0;
     const std::uint32_t outs = here ? in.outs[row * in.words + word] : 0;
-    const int change = __popc(ins) - __popc(outs);
+    int change = __popc(ins) - __popc(outs);
+    if (has_extra) change += chain.sum(word * 32, word * 32 + 32);
     int sum = change;
     for (int step = 1; step < 32; step *= 2) {
       const int below = __shfl_up_sync(~0u, sum, step);
@@ -98,65 +138,118 @@ __global__ void wind_kernel(Crossings in, std::int64_t rows, int width, std::uin
       one |= winding == 1 ? bits : 0;
       more |= winding != 1 && winding != 0 ? bits : 0;
       if (next < 32) winding += static_cast<int>(ins >> next & 1) - static_cast<int>(outs >> next & 1);
+      if (next < 32 && has_extra) winding += chain.sum(word * 32 + next, word * 32 + next + 1);
       from = next;
     }
     const int left = width - word * 32;
     const std::uint32_t valid = left >= 32 ? ~0u : (left > 0 ? (1u << left) - 1 : 0);
     if (here) {
-      single[row * in.words + word] = collided ? 0 : one & valid;
-      several[row * in.words + word] = collided ? valid : more & valid;
+      more = known ? more & valid : valid;
+      single[row * in.words + word] = known ? one & valid : 0;
+      several[row * in.words + word] = more;
+      found += static_cast<unsigned>(__popc(more));
     }
     carried += __shfl_sync(~0u, sum, 31);
   }
+  found = warp_sum(found);
+  if (lane == 0 && found != 0) atomicAdd(&in_slice[row / rows_per_slice], found);
 }
 
-/// One warp a word of flagged cells: voxels that an inverted tetrahedron owns go from `single` to `several`.
-__global__ void inverted_kernel(StepLattice lattice, Nudge nudge, BitRows inverted_cells, SlabBox box, int words,
-                                std::uint32_t* single, std::uint32_t* several) {
-  const std::int64_t n = (std::int64_t{blockIdx.x} * kThreads + threadIdx.x) / 32;
-  const std::int64_t per_row = inverted_cells.words_per_row;
-  if (n >= per_row * lattice.cells.y * lattice.cells.z) return;
-  const int lane = static_cast<int>(threadIdx.x & 31);
-  if ((inverted_cells.words[n] >> lane & 1) == 0) return;
-  const glm::ivec3 at(n % per_row / 2 * 64 + n % per_row % 2 + 2 * lane, n / per_row % lattice.cells.y,
-                      n / per_row / lattice.cells.y);
-  const VoxelBox region{box.begin, box.begin + box.size};
-#pragma unroll 1
-  for (int number = 0; number < kTetrahedraPerCell; ++number) {
-    const LatticeTetrahedron t = LatticeTetrahedron::of_cell(at, number);
-    if (jacobian(vertices_of(lattice, t)) > 0) continue;
-    visit_tetrahedron(lattice, t, region, nudge, [&](const glm::ivec3& voxel) {
-      const glm::i64vec3 in = glm::i64vec3(voxel) - box.begin;
-      const std::int64_t word = (in.z * box.size.y + in.y) * words + in.x / 32;
-      const std::uint32_t bit = 1u << (in.x & 31);
-      atomicAnd(&single[word], ~bit);
-      atomicOr(&several[word], bit);
-    });
+/// The voxels that have become `several`.
+struct SeveralMarker {
+  IntBox region;
+  int words;
+  std::uint32_t *single, *several;
+  unsigned* in_slice;
+
+  __device__ void mark(const IntBox& voxels) const {
+    if (voxels.is_empty()) return;
+    const glm::ivec3 first = voxels.begin - region.begin, last = voxels.end - region.begin - 1;
+    for (int z = first.z; z <= last.z; ++z) {
+      for (int y = first.y; y <= last.y; ++y) {
+        const std::int64_t row = (std::int64_t{z} * (region.end.y - region.begin.y) + y) * words;
+        for (int word = first.x / 32; word <= last.x / 32; ++word) {
+          std::uint32_t mask = ~0u;
+          if (word == first.x / 32) mask &= ~0u << (first.x & 31);
+          if (word == last.x / 32) mask &= ~0u >> (31 - (last.x & 31));
+          if ((several[row + word] & mask) != mask) mark_word(row + word, mask, z);
+        }
+      }
+    }
+  }
+
+ private:
+  __device__ void mark_word(std::int64_t word, std::uint32_t mask, int z) const {
+    atomicAnd(&single[word], ~mask);
+    const std::uint32_t added = mask & ~atomicOr(&several[word], mask);
+    if (added != 0) atomicAdd(&in_slice[z], static_cast<unsigned>(__popc(added)));
+  }
+};
+
+/// One thread four pairs of vertices: all voxels that the inverted tetrahedra near them may reach go to `several`.
+__global__ void inverted_kernel(StepLattice lattice, NudgeTurns turns, InvertedPairs inverted, SeveralMarker marker) {
+  constexpr int kLargeBox = 1024;  // voxels: then pair by pair
+  const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
+  if (n >= inverted.word(0, lattice.cells.z + 1, 0) * 8) return;
+  const int shift = static_cast<int>(n % 8) * 4;
+  const unsigned pairs = inverted.words[n / 8] >> shift & 0xF;
+  if (pairs == 0) return;
+  const auto number = static_cast<int>(n / 8 / inverted.words_per_row);
+  const int row = number % inverted.rows, slice = number / inverted.rows;
+  const auto box_of = [&](int first, int last) {
+    const int word = static_cast<int>(n / 8 % inverted.words_per_row);
+    const glm::ivec3 from =
+        glm::max(glm::ivec3(InvertedPairs::column(row, word, shift + first), row, slice) - 1, glm::ivec3(0));
+    const glm::ivec3 to =
+        glm::min(glm::ivec3(InvertedPairs::column(row, word, shift + last) + 2, row + 1, slice + 1), lattice.cells);
+    Box box{glm::i32vec3(INT32_MAX), glm::i32vec3(INT32_MIN)};
+    for (int z = from.z; z <= to.z; ++z) {
+      for (int y = from.y; y <= to.y; ++y) {
+        for (int x = from.x; x <= to.x; ++x) box.grow(lattice.vertex({x, y, z}).deformed);
+      }
+    }
+    return candidates(turns, box.low, box.high, marker.region);
+  };
+  const int first = __ffs(static_cast<int>(pairs)) - 1, last = 31 - __clz(static_cast<int>(pairs));
+  const IntBox all = box_of(first, last);
+  if (all.is_empty()) return;
+  const glm::ivec3 size = all.end - all.begin;
+  if (std::int64_t{size.x} * size.y * size.z <= kLargeBox) return marker.mark(all);
+  for (unsigned left = pairs; left != 0; left &= left - 1) {
+    const int pair = __ffs(static_cast<int>(left)) - 1;
+    marker.mark(box_of(pair, pair));
   }
 }
 
 }  // namespace
 
-void Coverage::find(const DeviceField& field, const BitRows& inverted_cells, bool any_inverted, const SlabBox& box,
-                    cudaStream_t stream) {
+void Coverage::find(const LatticeOnDevice& lattice, const SlabBox& box, cudaStream_t stream) {
+  const DeviceField& field = lattice.field();
   words_ = static_cast<int>((box.size.x + 31) / 32);
   const std::int64_t rows = box.size.y * box.size.z;
   const auto words = static_cast<std::size_t>(rows * words_);
-  ins_.fill(0, words, stream);
-  outs_.fill(0, words, stream);
-  start_.fill(0, static_cast<std::size_t>(rows), stream);
-  collided_.fill(0, static_cast<std::size_t>(rows), stream);
-  const Crossings crossings{ins_.data(), outs_.data(), start_.data(), collided_.data(), words_};
+  crossings_.fill(0, 2 * words + static_cast<std::size_t>(rows), stream);
+  extra_of_row_.fill(0xFF, static_cast<std::size_t>(rows), stream);
+  extra_count_.fill(0, 1, stream);
+  in_slice_.fill(0, static_cast<std::size_t>(box.size.z), stream);
+  const Crossings crossings{crossings_.data(),
+                            crossings_.data() + words,
+                            reinterpret_cast<int*>(crossings_.data() + 2 * words),
+                            words_,
+                            extra_of_row_.data(),
+                            extra_.reserve(kMostExtra),
+                            extra_count_.data()};
   const Sides sides(field.steps.cells);
   border_kernel<<<blocks_for(sides.first[6]), kThreads, 0, stream>>>(field.steps, sides, field.frame.nudge, box,
                                                                      crossings);
   std::uint32_t *single = single_.reserve(words), *several = several_.reserve(words);
-  wind_kernel<<<blocks_for(rows * 32), kThreads, 0, stream>>>(crossings, rows, static_cast<int>(box.size.x), single,
-                                                              several);
-  if (any_inverted) {
-    const std::int64_t flags = inverted_cells.words_per_row * field.frame.cells.y * field.frame.cells.z;
-    inverted_kernel<<<blocks_for(flags * 32), kThreads, 0, stream>>>(field.steps, field.frame.nudge, inverted_cells,
-                                                                     box, words_, single, several);
+  wind_kernel<<<blocks_for(rows * 32), kThreads, 0, stream>>>(
+      crossings, rows, static_cast<int>(box.size.y), static_cast<int>(box.size.x), single, several, in_slice_.data());
+  if (lattice.statistics().inverted != 0) {
+    const InvertedPairs& inverted = lattice.inverted();
+    const IntBox region{glm::ivec3(box.begin), glm::ivec3(box.begin + box.size)};
+    inverted_kernel<<<blocks_for(inverted.word(0, field.steps.cells.z + 1, 0) * 8), kThreads, 0, stream>>>(
+        field.steps, NudgeTurns(field.frame.nudge), inverted, {region, words_, single, several, in_slice_.data()});
   }
   TETWARP_CUDA_TRY(cudaGetLastError());
 }

@@ -4,28 +4,41 @@
 
 namespace tetwarp::cuda_detail {
 
+/// A crossing where there is one of its kind before the same voxel already: a row has a chain of them.
+struct ExtraCrossing {
+  int next;  ///< or -1, or -2: some are missing
+  int voxel, sign;
+};
+
 /// Which voxels of a box have exactly one owner, so that any owner found is the one; and which need the slow path.
 ///
 /// The winding number of the deformed border is the number of owners, inverted ones counted as -1. Where no inverted
-/// tetrahedron owns a voxel and the number is 1, it has one owner; where it is 0, none (docs/algorithm.md, "Gather").
+/// tetrahedron can own a voxel and the number is 1, it has one owner; where it is 0, none (docs/algorithm.md,
+/// "Gather").
 class Coverage {
  public:
   /// For a field with whole steps. Queued on the stream.
-  void find(const DeviceField& field, const BitRows& inverted_cells, bool any_inverted, const SlabBox& box,
-            cudaStream_t stream);
+  void find(const LatticeOnDevice& lattice, const SlabBox& box, cudaStream_t stream);
 
   /// Voxels with one owner.
   BitRows single() const { return {single_.data(), words_}; }
-  /// Voxels that may have several: not in `single`. Others may be added.
+  /// Voxels that may have several, or none: not in `single`. Others may be added.
   std::uint32_t* several() const { return several_.data(); }
+  /// How many of these each slice of the box has; to be kept up by who adds some.
+  unsigned* several_in_slice() const { return in_slice_.data(); }
   int words_per_row() const { return words_; }
+  /// As many words as `several` has, which nobody needs any more.
+  unsigned* scratch() const { return crossings_.data(); }
 
  private:
   int words_ = 0;
-  DeviceBuffer<std::uint32_t> ins_, outs_;  ///< where rows go in and come out
-  DeviceBuffer<int> start_;                 ///< of each row: winding number at its first voxel
-  DeviceBuffer<int> collided_;              ///< of each row: not 0 where two crossings of one kind lie before one voxel
+  DeviceBuffer<std::uint32_t> crossings_;  ///< bits where rows go in and, as many words later, where they come out;
+                                           ///< after them, of each row, the winding number at its first voxel
+  DeviceBuffer<int> extra_of_row_;
+  DeviceBuffer<ExtraCrossing> extra_;
+  DeviceBuffer<unsigned> extra_count_;
   DeviceBuffer<std::uint32_t> single_, several_;
+  DeviceBuffer<unsigned> in_slice_;
 };
 
 }  // namespace tetwarp::cuda_detail

@@ -1,4 +1,8 @@
 #include "cuda/gather.h"
+
+#include <algorithm>
+#include <numeric>
+
 #include "cuda/voxel_sink.cuh"
 #include "deform/core/gather.h"
 #include "deform/core/visit_cell.h"
@@ -7,31 +11,43 @@ namespace tetwarp::cuda_detail {
 
 namespace {
 
-constexpr int kMarch = 32;      ///< voxels along k that a thread goes
-constexpr int kWarps = 4;       ///< of a block, side by side along j
-constexpr int kSeedTile = 8;    ///< voxels along i and j that share a seed
-constexpr int kSeedTries = 40;  ///< from an undeformed guess
-constexpr int kWarpTries = 3;   ///< of a voxel within its warp, after the first
-constexpr int kQueueTries = 6;  ///< in float, before the exact walk
-constexpr int kWalk = 64;       ///< tetrahedra that the exact walk may pass
-constexpr unsigned kQueueSize = 1u << 22;
+constexpr int kMarch = 32;       ///< voxels along k that a thread goes
+constexpr int kWarps = 4;        ///< of a block, side by side along j
+constexpr int kSeedTile = 8;     ///< voxels along i and j that share a seed
+constexpr int kSeedTries = 40;   ///< from an undeformed guess
+constexpr int kRounds = 6;       ///< of a whole warp in which many guesses fail, a march
+constexpr int kManyFailed = 12;  ///< lanes
+constexpr int kWarpTries = 3;    ///< of a voxel within its warp, after the first
+constexpr int kQueueTries = 6;   ///< in float, before the exact walk
+constexpr int kWalk = 24;        ///< tetrahedra that the exact walk may pass
+constexpr unsigned kQueueSize = 1u << 20;
+constexpr unsigned kClaimedAtOnce = 1u << 22;  ///< voxels, or those of a slice
 
 /// What all kernels of a gather know.
 struct Task {
   StepLattice lattice;
-  Nudge nudge;
+  NudgeTurns nudge;
   SlabBox box;
   BitRows single;
   std::uint32_t* several;
+  unsigned* several_in_slice;
+  MovingBlocks moving;
   glm::ivec3 seeds;  ///< how many on each axis
-  int first_down;    ///< first slice of the box that is nudged down
   Gather::Entry* queue;
   Gather::Counters* counters;
 
   __device__ glm::ivec3 begin() const { return glm::ivec3(box.begin); }
   __device__ glm::ivec3 size() const { return glm::ivec3(box.size); }
-  __device__ GatherPoint point(const glm::ivec3& voxel) const {
-    return {lattice, voxel, nudge.signs(glm::i64vec3(voxel))};
+  __device__ GatherPoint point(const glm::ivec3& voxel) const { return {lattice, voxel, nudge.signs(voxel)}; }
+  /// Exactly; rarely called.
+  __device__ __noinline__ bool owns(FloatTetrahedron t, glm::ivec3 voxel) const {
+    int sides[4];
+    return owns_exactly(vertices_of(lattice, as_lattice(t)), voxel * kStepsPerVoxel, nudge.signs(voxel), sides);
+  }
+  /// The voxel of the box that a seed is for.
+  __device__ glm::ivec3 seeded(const glm::ivec3& seed) const {
+    const glm::ivec3 middle(kSeedTile / 2, kSeedTile / 2, 0);
+    return glm::min(seed * glm::ivec3(kSeedTile, kSeedTile, kMarch) + middle, size() - 1);
   }
   /// Leaves a voxel to the walk or, where its queue is full, to the claims.
   __device__ void put_aside(const glm::ivec3& in, const glm::vec3& place) const {
@@ -44,7 +60,7 @@ struct Task {
   }
   __device__ void leave_to_claims(const glm::ivec3& in) const {
     atomicOr(&several[word(in)], 1u << (in.x & 31));
-    atomicAdd(&counters->several, 1u);
+    atomicAdd(&several_in_slice[in.z], 1u);
   }
   __device__ std::int64_t word(const glm::ivec3& in) const {
     return (std::int64_t{in.z} * size().y + in.y) * single.words_per_row + in.x / 32;
@@ -61,24 +77,23 @@ __global__ void seed_kernel(Task task, glm::vec3* seeds) {
   const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
   if (n >= std::int64_t{task.seeds.x} * task.seeds.y * task.seeds.z) return;
   const glm::ivec3 at(n % task.seeds.x, n / task.seeds.x % task.seeds.y, n / (task.seeds.x * task.seeds.y));
-  const glm::ivec3 voxel =
-      glm::min(at * glm::ivec3(kSeedTile, kSeedTile, kMarch) + glm::ivec3(kSeedTile / 2, kSeedTile / 2, 0),
-               task.size() - 1) +
-      task.begin();
+  const glm::ivec3 voxel = task.seeded(at) + task.begin();
   const GatherPoint point = task.point(voxel);
   const glm::vec3 undeformed = task.lattice.place(glm::vec3(voxel));
   glm::vec3 place = undeformed;
   bool found = false;
   for (int n_try = 0; n_try < kSeedTries && !found; ++n_try) {
-    const Trial trial = try_tetrahedron(task.lattice, tetrahedron_at(task.lattice, place), point);
+    const Trial trial = try_tetrahedron<Effort::full>(task.lattice, tetrahedron_at(task.lattice, place), point);
     found = trial.owns;
-    place = is_finite(trial.place) ? trial.place : undeformed;
+    place = is_finite(trial.place) ? (n_try < 8 ? trial.place : (place + trial.place) * 0.5f) : undeformed;
   }
   seeds[n] = place;
 }
 
 /// What a warp could not settle at once. It is tried again when a warp full has come together, so that all lanes work.
-template <class Sink>
+///
+/// @tparam kCoarse  cells are large, so float is often unsure: ask exact integers before another tetrahedron is tried
+template <class Sink, bool kCoarse>
 struct WarpQueue {
   struct Entry {
     int voxel;  ///< lane, voxels along k from the first of the march << 5, and failed attempts << 10
@@ -108,14 +123,16 @@ struct WarpQueue {
     if (lane < taken) {
       const Entry entry = entries[waiting + lane];
       const glm::ivec3 in = first + glm::ivec3(entry.voxel & 31, 0, entry.voxel >> 5 & 31);
-      const Trial trial = try_tetrahedron(task.lattice, tetrahedron_at(task.lattice, {entry.x, entry.y, entry.z}),
-                                          task.point(in + task.begin()));
-      if (trial.owns) {
-        covered = sink.write(in + task.begin(), trial.u);
+      const glm::ivec3 at = in + task.begin();
+      const FloatTetrahedron t = tetrahedron_at(task.lattice, {entry.x, entry.y, entry.z});
+      const Trial trial = try_tetrahedron<Effort::full>(task.lattice, t, task.point(at));
+      if (trial.owns || (kCoarse && trial.unsure && task.owns(t, at))) {
+        const glm::ivec3 voxel = at;
+        covered = sink.write(sink.place(voxel), voxel, trial.u);
       } else if (entry.voxel >> 10 < kWarpTries) {
         again = true;
         voxel = entry.voxel + (1 << 10);
-        place = trial.place;
+        place = entry.voxel >> 10 == 0 ? trial.place : (trial.place + glm::vec3(entry.x, entry.y, entry.z)) * 0.5f;
       } else {
         task.put_aside(in, trial.place);
       }
@@ -126,47 +143,118 @@ struct WarpQueue {
   }
 };
 
-template <class Sink>
-__global__ void __launch_bounds__(32 * kWarps, 8) march_kernel(Task task, const glm::vec3* seeds, Sink sink) {
-  __shared__ typename WarpQueue<Sink>::Entry entries[kWarps][64];
-  const int lane = static_cast<int>(threadIdx.x), warp = static_cast<int>(threadIdx.y);
-  const glm::ivec3 size = task.size();
-  glm::ivec3 in(blockIdx.x * 32 + lane, blockIdx.y * kWarps + warp, blockIdx.z * kMarch);
-  if (in.y >= size.y) return;  // the whole warp
-  const int last = min(in.z + kMarch, size.z);
-  int first_down = task.first_down;
-  const bool in_row = in.x < size.x;
-  unsigned covered = 0;
-  WarpQueue<Sink> queue{entries[warp], {in.x - lane, in.y, in.z}, lane};
-  const glm::ivec3 seed(min(in.x, size.x - 1) / kSeedTile, in.y / kSeedTile, blockIdx.z);
-  const glm::ivec3 seeded =
-      glm::min(seed * glm::ivec3(kSeedTile, kSeedTile, kMarch) + glm::ivec3(kSeedTile / 2, kSeedTile / 2, 0), size - 1);
-  glm::vec3 place =
-      seeds[(seed.z * task.seeds.y + seed.y) * task.seeds.x + seed.x] + glm::vec3(in - seeded) * task.lattice.voxel;
-  std::int64_t word = task.word({blockIdx.x * 32, in.y, in.z});
-  const std::int64_t words_per_slice = std::int64_t{size.y} * task.single.words_per_row;
-  GatherPoint point = task.point(in + task.begin());
-  if (in.z >= first_down) first_down = -1;  // turned already
-  keep(point.nudge.x);
-  keep(point.nudge.y);
-  for (; in.z < last; ++in.z, word += words_per_slice, point.steps.z += float{kStepsPerVoxel}) {
-    const glm::ivec3 voxel = in + task.begin();
-    if (in.z == first_down) point.nudge.z = -point.nudge.z;
-    const bool single = (task.single.words[word] >> lane & 1) != 0;
-    const Trial trial = try_tetrahedron(task.lattice, tetrahedron_at(task.lattice, place), point);
-    const bool again = single && !trial.owns;
-    if (single && trial.owns) {
-      covered += sink.write(voxel, trial.u);
-    } else if (!single && in_row) {
-      sink.nothing(voxel);
-    }
-    if (__any_sync(~0u, again)) {
-      queue.push(again, lane | (in.z - queue.first.z) << 5, trial.place);
-      while (queue.waiting >= 32) covered += queue.drain(task, sink);
-    }
-    place = trial.place + trial.per_slice;
+/// Whether nothing that a warp marches through is displaced: its tile of voxels, and what their nudges may reach.
+__device__ bool rests(const Task& task, const glm::ivec3& first, const glm::ivec3& last, int lane) {
+  const StepLattice& lattice = task.lattice;
+  constexpr float kBeyond = 1.0f / 64;  // voxels
+  const auto block = [&](const glm::vec3& place, int beyond) {
+    return glm::ivec3(detail::clamp_to(detail::floor_to_int(place.x) + beyond, lattice.cells.x),
+                      detail::clamp_to(detail::floor_to_int(place.y) + beyond, lattice.cells.y),
+                      detail::clamp_to(detail::floor_to_int(place.z) + beyond, lattice.cells.z)) /
+           MovingBlocks::kSide;
+  };
+  const glm::ivec3 low = block(lattice.place(glm::vec3(first) - kBeyond), 0),
+                   size = block(lattice.place(glm::vec3(last) + kBeyond), 1) - low + 1;
+  bool moving = false;
+  for (int n = lane; n < size.x * size.y * size.z; n += 32) {
+    const glm::ivec3 at = low + glm::ivec3(n % size.x, n / size.x % size.y, n / (size.x * size.y));
+    moving |= task.moving.moving[(at.z * task.moving.count.y + at.y) * task.moving.count.x + at.x] != 0;
   }
-  while (queue.waiting > 0) covered += queue.drain(task, sink);
+  return __any_sync(~0u, moving) == 0;
+}
+
+/// One warp: 32 voxels along i, up to kMarch along k.
+template <class Sink, bool kCoarse>
+struct March {
+  const Task& task;
+  const Sink& sink;
+  glm::ivec3 first;  ///< voxel of lane 0 in the box
+  int lane, slices;
+  bool in_row;
+  std::uint32_t singles;  ///< lane n: which voxels of slice n have one owner
+
+  __device__ bool is_single(int n) const { return (__shfl_sync(~0u, singles, n) & (1u << lane)) != 0; }
+
+  /// Voxels of cells at rest are copied. @return how many of this lane are covered
+  __device__ unsigned copy() const {
+    const glm::ivec3 voxel = first + task.begin() + glm::ivec3(lane, 0, 0);
+    unsigned covered = 0;
+#pragma unroll 4
+    for (int n = 0; n < slices; ++n) {
+      const glm::ivec3 at(voxel.x, voxel.y, voxel.z + n);
+      const bool single = is_single(n);
+      if (single) covered += sink.copy(sink.place(at), at);
+      if (!single && in_row) sink.nothing(sink.place(at));
+    }
+    return covered;
+  }
+
+  /// Predicts the owner of each voxel from that of the one before. @param place  guess for the first
+  __device__ unsigned predict(glm::vec3 place, WarpQueue<Sink, kCoarse> queue) const {
+    glm::ivec3 voxel = first + task.begin() + glm::ivec3(lane, 0, 0);
+    int out = sink.place(voxel);
+    const int out_slice = sink.per_slice();
+    GatherPoint point = task.point(voxel);
+    keep(point.steps.x);
+    keep(point.nudge.x);
+    keep(point.nudge.y);
+    const int turn = task.nudge.first_down.z - voxel.z;  // where the nudge along k turns
+    const float turned = turn > 0 ? -point.nudge.z : point.nudge.z;
+    unsigned covered = 0;
+    int rounds = 0;
+    for (int n = 0; n < slices; ++n) {
+      if (n == turn) point.nudge.z = turned;
+      const bool single = is_single(n);
+      const Trial trial = try_tetrahedron<Effort::quick>(task.lattice, tetrahedron_at(task.lattice, place), point);
+      const bool again = single && !trial.owns;
+      unsigned here = 0;
+      if (single && trial.owns) {
+        here = sink.write(out, voxel, trial.u);
+      } else if (!single && in_row) {
+        sink.nothing(out);
+      }
+      const unsigned failed = __ballot_sync(~0u, again);
+      if (failed != 0) {
+        if (rounds < kRounds && __popc(failed) > kManyFailed) {  // the guess was no good: all of this slice once more
+          const glm::vec3 better = rounds++ < 2 ? trial.place : (place + trial.place) * 0.5f;
+          if (again) place = better;
+          --n;
+          continue;
+        }
+        queue.push(again, lane | n << 5, trial.place);
+        while (queue.waiting >= 32) covered += queue.drain(task, sink);
+      }
+      covered += here;
+      place = trial.place + trial.per_slice;
+      point.steps.z += float{kStepsPerVoxel};
+      ++voxel.z;
+      out += out_slice;
+    }
+    while (queue.waiting > 0) covered += queue.drain(task, sink);
+    return covered;
+  }
+};
+
+template <class Sink, bool kCoarse>
+__global__ void __launch_bounds__(32 * kWarps, 8)
+    march_kernel(const __grid_constant__ Task task, const glm::vec3* seeds, const __grid_constant__ Sink sink) {
+  __shared__ typename WarpQueue<Sink, kCoarse>::Entry entries[kWarps][64];
+  const int lane = static_cast<int>(threadIdx.x), warp = static_cast<int>(threadIdx.y);
+  const glm::ivec3 size = task.size(), first(blockIdx.x * 32, blockIdx.y * kWarps + warp, blockIdx.z * kMarch);
+  if (first.y >= size.y) return;  // the whole warp
+  const int slices = min(kMarch, size.z - first.z), x = first.x + lane;
+  const std::uint32_t singles = lane < slices ? task.single.words[task.word({first.x, first.y, first.z + lane})] : 0;
+  const March<Sink, kCoarse> march{task, sink, first, lane, slices, x < size.x, singles};
+  const glm::ivec3 begin = first + task.begin();
+  unsigned covered = 0;
+  if (rests(task, begin, begin + glm::ivec3(min(31, size.x - 1 - first.x), 0, slices - 1), lane)) {
+    covered = march.copy();
+  } else {
+    const glm::ivec3 seed(min(x, size.x - 1) / kSeedTile, first.y / kSeedTile, blockIdx.z);
+    const glm::vec3 place = seeds[(seed.z * task.seeds.y + seed.y) * task.seeds.x + seed.x] +
+                            glm::vec3(glm::ivec3(x, first.y, first.z) - task.seeded(seed)) * task.lattice.voxel;
+    covered = march.predict(place, {entries[warp], first, lane});
+  }
   covered = warp_sum(covered);
   if (lane == 0 && covered != 0) atomicAdd(&task.counters->covered, static_cast<unsigned long long>(covered));
 }
@@ -186,17 +274,17 @@ __global__ void queue_kernel(Task task, Sink sink) {
     bool settled = false;
     for (int n_try = 0; n_try < kQueueTries && !settled; ++n_try) {
       if (!is_finite(place)) place = task.lattice.place(glm::vec3(voxel));
-      const Trial trial = try_tetrahedron(task.lattice, tetrahedron_at(task.lattice, place), point);
+      const Trial trial = try_tetrahedron<Effort::full>(task.lattice, tetrahedron_at(task.lattice, place), point);
       settled = trial.owns;
-      if (settled) covered += sink.write(voxel, trial.u);
-      place = trial.place;
+      if (settled) covered += sink.write(sink.place(voxel), voxel, trial.u);
+      place = n_try == 0 ? trial.place : (place + trial.place) * 0.5f;  // full steps may go round in circles in folds
     }
     if (settled) continue;
     if (!is_finite(place)) place = task.lattice.place(glm::vec3(voxel));
-    const glm::i32vec3 steps = detail::to_steps(glm::i64vec3(voxel)), signs = task.nudge.signs(glm::i64vec3(voxel));
+    const glm::i32vec3 steps = detail::to_steps(glm::i64vec3(voxel)), signs = task.nudge.signs(voxel);
     LatticeTetrahedron owner;
     if (walk_to_owner(task.lattice, as_lattice(tetrahedron_at(task.lattice, place)), steps, signs, kWalk, owner)) {
-      covered += sink.write(voxel, interpolate_u(vertices_of(task.lattice, owner), steps, signs));
+      covered += sink.write(sink.place(voxel), voxel, interpolate_u(vertices_of(task.lattice, owner), steps, signs));
     } else {
       task.leave_to_claims(in);
     }
@@ -204,27 +292,48 @@ __global__ void queue_kernel(Task task, Sink sink) {
   if (covered != 0) atomicAdd(&task.counters->covered, static_cast<unsigned long long>(covered));
 }
 
-/// How many voxels are to be claimed.
-__global__ void count_kernel(const std::uint32_t* several, std::int64_t words, Gather::Counters* counters) {
+/// Numbers the voxels that are to be claimed, and lists them: one thread a word.
+__global__ void number_kernel(const std::uint32_t* several, std::int64_t words, unsigned* rank, unsigned* numbered,
+                              unsigned* voxels) {
   const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
-  const unsigned bits = n < words ? static_cast<unsigned>(__popc(several[n])) : 0;
-  const unsigned sum = warp_sum(bits);
-  if ((threadIdx.x & 31) == 0 && sum != 0) atomicAdd(&counters->several, sum);
+  const std::uint32_t bits = n < words ? several[n] : 0;
+  const unsigned mine = static_cast<unsigned>(__popc(bits));
+  unsigned before = mine;  // of the warp, this one too
+  const int lane = static_cast<int>(threadIdx.x & 31);
+  for (int step = 1; step < 32; step *= 2) {
+    const unsigned below = __shfl_up_sync(~0u, before, step);
+    if (lane >= step) before += below;
+  }
+  unsigned first = 0;
+  if (lane == 31 && before != 0) first = atomicAdd(numbered, before);
+  first = __shfl_sync(~0u, first, 31) + before - mine;
+  if (bits == 0) return;
+  rank[n] = first;
+  for (std::uint32_t left = bits; left != 0; left &= left - 1)
+    voxels[first++] = static_cast<unsigned>(n * 32 + __ffs(static_cast<int>(left)) - 1);
 }
 
+/// From the owners of claimed voxels to their values.
 template <class Sink>
-__global__ void settle_kernel(DeviceField field, SlabBox slab, const std::uint32_t* several,
-                              const unsigned long long* owner, Sink sink, Gather::Counters* counters) {
-  const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
-  if (n >= slab.count()) return;
-  const glm::i64vec3 in = unravel(n, slab.size);
-  const std::int64_t word = (in.z * slab.size.y + in.y) * ((slab.size.x + 31) / 32) + in.x / 32;
-  if (several && (several[word] >> (in.x & 31) & 1) == 0) return;
-  const glm::i64vec3 voxel = in + slab.begin;
-  if (owner[n] == kNobody) return sink.nothing(glm::ivec3(voxel));
-  const Tetrahedron t = tetrahedron_numbered(field, owner[n]);
-  if (sink.write(glm::ivec3(voxel), interpolate_u(t, detail::to_steps(voxel), field.frame.nudge.signs(voxel))))
-    atomicAdd(&counters->covered, 1ULL);
+__global__ void settle_kernel(Task task, glm::ivec3 begin, const unsigned* voxels, unsigned count,
+                              const unsigned long long* owner, Sink sink) {
+  const unsigned n = blockIdx.x * kThreads + threadIdx.x;
+  if (n >= count) return;
+  const int words = task.single.words_per_row, rows = task.size().y;
+  const unsigned word = voxels[n] / 32;
+  const glm::ivec3 voxel =
+      begin + glm::ivec3(word % words * 32 + voxels[n] % 32, word / words % rows, word / words / rows);
+  const int place = sink.place(voxel);
+  if (owner[n] == kNobody) return sink.nothing(place);
+  const glm::ivec3& cells = task.lattice.cells;
+  const unsigned long long cell = owner[n] / kTetrahedraPerCell, row = cell / cells.x;
+  const LatticeTetrahedron t = LatticeTetrahedron::of_cell(
+      {static_cast<int>(cell % cells.x), static_cast<int>(row % cells.y), static_cast<int>(row / cells.y)},
+      static_cast<int>(owner[n] % kTetrahedraPerCell));
+  const bool covered = sink.write(place, voxel, offset_in(task.lattice, t, voxel, task.nudge.signs(voxel)));
+  const unsigned active = __activemask(), votes = __ballot_sync(active, covered);
+  if (votes != 0 && (threadIdx.x & 31) == __ffs(static_cast<int>(active)) - 1)
+    atomicAdd(&task.counters->covered, static_cast<unsigned long long>(__popc(votes)));
 }
 
 }  // namespace
@@ -234,43 +343,40 @@ Gather::Counters Gather::run(const LatticeOnDevice& lattice, const SlabBox& box,
                              cudaStream_t stream) {
   const DeviceField& field = lattice.field();
   counters_.fill(0, 1, stream);
-  if (is_mostly_folded(lattice)) {
-    claim_box(lattice, box, nullptr, sink, stream);
-    Counters all = counters(stream);
-    all.several = static_cast<unsigned>(box.count());
-    return all;
-  }
-  coverage_.find(field, lattice.inverted_cells(), lattice.statistics().inverted != 0, box, stream);
+  coverage_.find(lattice, box, stream);
   const glm::ivec3 size(box.size), tile(kSeedTile, kSeedTile, kMarch);
   Task task{field.steps,
-            field.frame.nudge,
+            NudgeTurns(field.frame.nudge),
             box,
             coverage_.single(),
             coverage_.several(),
+            coverage_.several_in_slice(),
+            lattice.moving_blocks(),
             (size + tile - 1) / tile,
-            static_cast<int>(field.frame.nudge.first_down(2) - box.begin.z),
             queue_.reserve(kQueueSize),
             counters_.data()};
   const std::int64_t seeds = std::int64_t{task.seeds.x} * task.seeds.y * task.seeds.z;
   glm::vec3* seeded = seeds_.reserve(static_cast<std::size_t>(seeds));
-  const std::int64_t words = std::int64_t{size.y} * size.z * coverage_.words_per_row();
-  count_kernel<<<blocks_for(words), kThreads, 0, stream>>>(coverage_.several(), words, counters_.data());
   seed_kernel<<<blocks_for(seeds), kThreads, 0, stream>>>(task, seeded);
   const dim3 blocks(static_cast<unsigned>((size.x + 31) / 32), static_cast<unsigned>((size.y + kWarps - 1) / kWarps),
                     static_cast<unsigned>((size.z + kMarch - 1) / kMarch));
-  march_kernel<<<blocks, dim3(32, kWarps), 0, stream>>>(task, seeded, sink);
+  const glm::vec3& cell = field.steps.cell;
+  const bool coarse = std::max({cell.x, cell.y, cell.z}) > 2 * kStepsPerVoxel;
+  const auto march = coarse ? march_kernel<Sink, true> : march_kernel<Sink, false>;
+  march<<<blocks, dim3(32, kWarps), 0, stream>>>(task, seeded, sink);
   queue_kernel<<<1024, kThreads, 0, stream>>>(task, sink);
   TETWARP_CUDA_TRY(cudaGetLastError());
-  const Counters found = counters(stream);
-  if (found.several == 0) return found;
-  claim_box(lattice, box, coverage_.several(), sink, stream);
-  return counters(stream);
-}
-
-bool Gather::is_mostly_folded(const LatticeOnDevice& lattice) {
-  constexpr std::int64_t kFew = 256;  // one inverted tetrahedron in so many
-  const std::int64_t tetrahedra = kTetrahedraPerCell * lattice.field().cell_count();
-  return static_cast<std::int64_t>(lattice.statistics().inverted) > tetrahedra / kFew;
+  several_in_slice_.resize(static_cast<std::size_t>(size.z));
+  TETWARP_CUDA_TRY(cudaMemcpyAsync(several_in_slice_.data(), coverage_.several_in_slice(),
+                                   several_in_slice_.size() * sizeof(unsigned), cudaMemcpyDeviceToHost, stream));
+  Counters found = counters(stream);
+  const std::uint64_t several = std::accumulate(several_in_slice_.begin(), several_in_slice_.end(), std::uint64_t{0});
+  if (several != 0) {
+    claim_several(task, field, sink, stream);
+    found = counters(stream);
+  }
+  found.claimed = several;
+  return found;
 }
 
 Gather::Counters Gather::counters(cudaStream_t stream) const {
@@ -279,18 +385,28 @@ Gather::Counters Gather::counters(cudaStream_t stream) const {
   return counters;
 }
 
-template <class Sink>
-void Gather::claim_box(const LatticeOnDevice& lattice, const SlabBox& box, const std::uint32_t* several,
-                       const Sink& sink, cudaStream_t stream) {
-  constexpr std::int64_t kClaimedAtOnce = std::int64_t{1} << 23;
-  const std::int64_t slice = box.size.x * box.size.y, slices = std::max<std::int64_t>(1, kClaimedAtOnce / slice);
-  const std::int64_t words_per_slice = (box.size.x + 31) / 32 * box.size.y;
-  for (std::int64_t z = 0; z < box.size.z; z += slices) {
-    const SlabBox slab{box.begin + glm::i64vec3(0, 0, z), {box.size.x, box.size.y, std::min(slices, box.size.z - z)}};
-    const std::uint32_t* only = several ? several + z * words_per_slice : nullptr;
-    claims_.claim(lattice.field(), slab, only, false, stream);
-    settle_kernel<<<blocks_for(slab.count()), kThreads, 0, stream>>>(lattice.field(), slab, only, claims_.owner(), sink,
-                                                                     counters_.data());
+/// So many slices at a time that memory for their claimed voxels is bounded.
+template <class Task, class Sink>
+void Gather::claim_several(const Task& task, const DeviceField& field, const Sink& sink, cudaStream_t stream) {
+  const glm::i64vec3& size = task.box.size;
+  const std::int64_t words_per_slice = coverage_.words_per_row() * size.y;
+  for (std::int64_t z = 0, end; z < size.z; z = end) {
+    std::size_t count = several_in_slice_[static_cast<std::size_t>(z)];
+    for (end = z + 1; end < size.z; ++end) {
+      const std::size_t next = several_in_slice_[static_cast<std::size_t>(end)];
+      if (count + next > kClaimedAtOnce) break;
+      count += next;
+    }
+    if (count == 0) continue;
+    const SlabBox slab{task.box.begin + glm::i64vec3(0, 0, z), {size.x, size.y, end - z}};
+    const std::int64_t words = words_per_slice * slab.size.z;
+    unsigned *rank = coverage_.scratch(), *voxels = claimed_.reserve(count);
+    const Wanted wanted{coverage_.several() + z * words_per_slice, rank};
+    numbered_.fill(0, 1, stream);
+    number_kernel<<<blocks_for(words), kThreads, 0, stream>>>(wanted.bits, words, rank, numbered_.data(), voxels);
+    claims_.claim(field, slab, wanted, count, stream);
+    settle_kernel<<<blocks_for(static_cast<std::int64_t>(count)), kThreads, 0, stream>>>(
+        task, glm::ivec3(slab.begin), voxels, static_cast<unsigned>(count), claims_.owner(), sink);
     TETWARP_CUDA_TRY(cudaGetLastError());
   }
 }

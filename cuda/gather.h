@@ -6,22 +6,26 @@
 namespace tetwarp::cuda_detail {
 
 /// Where a gather puts what it finds: for each voxel of a box, whether a tetrahedron owns it and where it comes from.
+///
+/// Like every sink of a gather it has a place for each voxel, which moves by `per_slice` along k.
 struct OffsetSink {
   SlabBox box;
   std::uint8_t* mapped;
   glm::vec3* offset;
 
+  __device__ int place(const glm::ivec3& voxel) const { return static_cast<int>(box.offset(glm::i64vec3(voxel))); }
+  __device__ int per_slice() const { return static_cast<int>(box.size.x * box.size.y); }
   /// @return whether the voxel counts as covered
-  __device__ bool write(const glm::ivec3& voxel, const glm::vec3& u) const {
-    const std::int64_t n = box.offset(glm::i64vec3(voxel));
-    mapped[n] = 1;
-    offset[n] = u;
+  __device__ bool write(int place, const glm::ivec3&, const glm::vec3& u) const {
+    mapped[place] = 1;
+    offset[place] = u;
     return true;
   }
-  __device__ void nothing(const glm::ivec3& voxel) const {
-    const std::int64_t n = box.offset(glm::i64vec3(voxel));
-    mapped[n] = 0;
-    offset[n] = glm::vec3(0);
+  /// A voxel that stays where it is.
+  __device__ bool copy(int place, const glm::ivec3& voxel) const { return write(place, voxel, glm::vec3(0)); }
+  __device__ void nothing(int place) const {
+    mapped[place] = 0;
+    offset[place] = glm::vec3(0);
   }
 };
 
@@ -33,8 +37,8 @@ class Gather {
  public:
   struct Counters {
     unsigned long long covered;
-    unsigned queued;   ///< voxels that the march left to the queue and the exact walk
-    unsigned several;  ///< voxels that were claimed
+    unsigned long long claimed;  ///< voxels that may have several owners, or whose owner was not found otherwise
+    unsigned queued;             ///< voxels that the march left to the queue and the exact walk
   };
 
   /// Finds the voxels of `box`; waits for the stream.
@@ -50,12 +54,9 @@ class Gather {
   };
 
  private:
-  /// Whether so much is inverted that predictions would mostly fail: then all voxels are claimed.
-  static bool is_mostly_folded(const LatticeOnDevice& lattice);
-  /// Claims the voxels of a box that `several` names, or all.
-  template <class Sink>
-  void claim_box(const LatticeOnDevice& lattice, const SlabBox& box, const std::uint32_t* several, const Sink& sink,
-                 cudaStream_t stream);
+  /// Claims the voxels that the coverage calls `several`.
+  template <class Task, class Sink>
+  void claim_several(const Task& task, const DeviceField& field, const Sink& sink, cudaStream_t stream);
   Counters counters(cudaStream_t stream) const;
 
   Coverage coverage_;
@@ -63,6 +64,8 @@ class Gather {
   DeviceBuffer<glm::vec3> seeds_;
   DeviceBuffer<Entry> queue_;
   DeviceBuffer<Counters> counters_;
+  DeviceBuffer<unsigned> numbered_, claimed_;
+  std::vector<unsigned> several_in_slice_;
 };
 
 }  // namespace tetwarp::cuda_detail

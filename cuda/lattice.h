@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cmath>
+
 #include "cuda/device_buffer.h"
 #include "deform/core/lattice_vertex.h"
 #include "deform/core/step_lattice.h"
@@ -49,13 +51,45 @@ struct DeviceField {
   __host__ __device__ std::int64_t cell_count() const { return frame.cells.x * frame.cells.y * frame.cells.z; }
 };
 
+/// Blocks of 8 x 8 x 8 vertices: whether any is displaced.
+struct MovingBlocks {
+  static constexpr int kSide = 8;
+
+  glm::ivec3 count{0};
+  std::uint8_t* moving = nullptr;  ///< a byte a block, i fastest; null: not known
+
+  __device__ std::uint8_t& at(const glm::ivec3& vertex) const {
+    return moving[((vertex.z / kSide) * count.y + vertex.y / kSide) * count.x + vertex.x / kSide];
+  }
+};
+
+/// Pairs of vertices side by side along i near which tetrahedra are inverted: those around either that lie between it
+/// and its neighbours on every axis, or the centres of the cells from them on.
+///
+/// A word has the pairs of 62 columns and of one more to either side; they begin one column later in odd rows.
+struct InvertedPairs {
+  static constexpr int kColumns = 62;
+
+  int words_per_row = 0, rows = 0;  ///< rows of a slice
+  std::uint32_t* words = nullptr;
+
+  InvertedPairs() = default;
+  explicit InvertedPairs(const StepLattice& lattice)
+      : words_per_row((lattice.cells.x + 1 + kColumns) / kColumns), rows(lattice.cells.y + 1) {}
+  __host__ __device__ std::int64_t word(int row, int slice, int n) const {
+    return (std::int64_t{slice} * rows + row) * words_per_row + n;
+  }
+  /// The first vertex of a pair, which may lie outside the lattice.
+  __device__ static int column(int row, int word, int bit) { return word * kColumns - 2 + 2 * bit + (row & 1); }
+};
+
 /// What one pass over the cells finds.
 struct FieldStatistics {
   std::uint64_t inverted = 0, degenerate = 0;
-  double jacobian_min = 0, jacobian_max = 0;
+  double jacobian_min = INFINITY, jacobian_max = -INFINITY;
 };
 
-struct LatticeFindings;  // lattice.cu
+struct LatticeFindings;  // findings.cuh
 
 /// Owner of a field on the device: snaps its vertices and describes its cells.
 class LatticeOnDevice {
@@ -63,32 +97,35 @@ class LatticeOnDevice {
   /// @param displacement  on the device
   /// @param room          null, or room for as many vectors, which may be `displacement` itself and must then stay:
   ///                      what is held of the vertices goes there where it can
+  /// @param wants_range   whether `statistics` has the range of Jacobian determinants
   /// @throws InputError for a vertex that is not finite or too far away
   void set(const LatticeFrame& frame, const Geometry& output, const glm::vec3* displacement, glm::vec3* room,
-           cudaStream_t stream);
+           bool wants_range, cudaStream_t stream);
 
   const DeviceField& field() const { return field_; }
   const FieldStatistics& statistics() const { return statistics_; }
-  /// Cells with an inverted tetrahedron, where the vertices rest at whole steps: of 64 cells of a row, the first word
-  /// has those at even places, the second the others.
-  BitRows inverted_cells() const { return {inverted_.data(), words_per_row_}; }
+  /// Where the vertices rest at whole steps.
+  const InvertedPairs& inverted() const { return inverted_; }
+  /// Where the vertices rest at whole steps.
+  const MovingBlocks& moving_blocks() const { return blocks_; }
 
   /// Box of the rest places of all cells that may reach a region: low and high, 2^-12 voxel; low > high where none
   /// does.
   void reach(const glm::i64vec3& begin, const glm::i64vec3& end, int (&low_high)[6], cudaStream_t stream) const;
 
  private:
-  void snap_steps(const StepLattice& lattice, const glm::vec3* displacement, glm::vec3* moved, LatticeFindings* found,
-                  cudaStream_t stream);
-
-  void describe(LatticeFindings* found, cudaStream_t stream);
+  bool set_steps(const StepLattice& lattice, const glm::vec3* displacement, glm::vec3* room, bool wants_range,
+                 LatticeFindings& found, cudaStream_t stream);
+  void set_vertices(const glm::vec3* displacement, std::int64_t vertices, LatticeFindings& found, cudaStream_t stream);
 
   DeviceField field_;
   FieldStatistics statistics_;
   DeviceBuffer<Vertex> vertices_;
   DeviceBuffer<glm::vec3> moved_;
-  DeviceBuffer<std::uint32_t> inverted_;
-  int words_per_row_ = 0;
+  DeviceBuffer<std::uint32_t> inverted_words_;
+  InvertedPairs inverted_;
+  DeviceBuffer<std::uint8_t> moving_;
+  MovingBlocks blocks_;
   DeviceBuffer<LatticeFindings> found_;
 };
 

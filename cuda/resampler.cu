@@ -179,10 +179,10 @@ class ForwardResampler final : public CudaResampler {
     claims_.forget_field();
     if (field.memory == Memory::device) {
       require_memory(field.displacement, field.memory, "the field");
-      lattice_.set(frame, output(), field.displacement, nullptr, stream_);
+      lattice_.set(frame, output(), field.displacement, nullptr, control.jacobian_range, stream_);
     } else {
       on_device(field.displacement, field.memory, size.x * size.y * size.z);
-      lattice_.set(frame, output(), displacement_.data(), displacement_.data(), stream_);
+      lattice_.set(frame, output(), displacement_.data(), displacement_.data(), control.jacobian_range, stream_);
     }
     ready_ = true;
   }
@@ -223,7 +223,7 @@ class ForwardResampler final : public CudaResampler {
       return;
     }
     const DeviceField& field = lattice_.field();
-    claims_.claim(field, slab, nullptr, writer.wants_owners(), stream_);
+    claims_.claim(field, slab, writer.wants_owners(), stream_);
     settle_kernel<<<blocks_for(slab.count()), kThreads, 0, stream_>>>(
         field, rest_outside_, slab, claims_.owner(), writer.wants_owners() ? claims_.owners() : nullptr, settled,
         counts_.data());

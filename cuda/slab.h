@@ -61,12 +61,18 @@ struct VoxelSink {
   V* output;
   int output_row, output_slice;
 
-  /// A voxel that a tetrahedron owns. @return whether it comes from inside the source
-  __device__ bool write(const glm::ivec3& voxel, const glm::vec3& u) const;
-  __device__ void nothing(const glm::ivec3& voxel) const { at(voxel) = background; }
-  __device__ V& at(const glm::ivec3& voxel) const {
-    return output[voxel.z * output_slice + voxel.y * output_row + voxel.x];
+  __device__ int place(const glm::ivec3& voxel) const {
+    return voxel.z * output_slice + voxel.y * output_row + voxel.x;
   }
+  __device__ int per_slice() const { return output_slice; }
+  /// A voxel that a tetrahedron owns. @return whether it comes from inside the source
+  __device__ bool write(int place, const glm::ivec3& voxel, const glm::vec3& u) const;
+  /// A voxel that stays where it is.
+  __device__ bool copy(int place, const glm::ivec3& voxel) const {
+    output[place] = source[voxel.z * slice + voxel.y * row + voxel.x];
+    return true;
+  }
+  __device__ void nothing(int place) const { output[place] = background; }
 };
 
 using AnyVoxelSink = std::variant<VoxelSink<std::uint8_t>, VoxelSink<std::int16_t>, VoxelSink<std::uint16_t>>;

@@ -76,8 +76,7 @@ StepLattice make_step_lattice(const LatticeFrame& frame, const Geometry& output)
   const glm::i64vec3 size = frame.cells + std::int64_t{1};
   if (size.x * size.y * size.z > INT32_MAX) return {};
   lattice.cells = glm::ivec3(frame.cells);
-  lattice.end = glm::vec3(frame.cells);
-  lattice.last = lattice.end - 1.0f;
+  lattice.last = lattice.cells - 1;
   lattice.row = static_cast<int>(size.x);
   lattice.slice = static_cast<int>(size.x * size.y);
   return lattice;

@@ -74,6 +74,8 @@ struct Control {
   /// A cudaStream_t (deform/ knows no CUDA): the work is queued there, after what is queued already, and the call
   /// returns when it is done. Null: the default stream. Ignored by the CPU.
   void* stream = nullptr;
+  /// For set_field: whether reports state jacobian_min and jacobian_max. Inverted tetrahedra are always counted.
+  bool jacobian_range = true;
 };
 
 /// Sends volumes through a field onto one output geometry; takes field after field.

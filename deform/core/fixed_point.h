@@ -48,6 +48,20 @@ struct Nudge {
   }
 };
 
+/// The same in 32 bits, for grids that fit them: voxels from `first_down` on are nudged down.
+struct NudgeTurns {
+  glm::ivec3 first_down{0};
+
+  NudgeTurns() = default;
+  explicit NudgeTurns(const Nudge& nudge)
+      : first_down(static_cast<int>(nudge.first_down(0)), static_cast<int>(nudge.first_down(1)),
+                   static_cast<int>(nudge.first_down(2))) {}
+  TETWARP_HD int sign(int axis, int voxel) const { return voxel < first_down[axis] ? 1 : -1; }
+  TETWARP_HD glm::i32vec3 signs(const glm::ivec3& voxel) const {
+    return {sign(0, voxel.x), sign(1, voxel.y), sign(2, voxel.z)};
+  }
+};
+
 /// d in units of 2^-16 voxel.
 TETWARP_HD inline glm::i32vec3 nudge_steps(const glm::i32vec3& signs) {
   return {kNudgeX * signs.x, kNudgeY * signs.y, kNudgeZ * signs.z};

@@ -25,6 +25,7 @@ struct GatherPoint {
 /// What one tetrahedron says of a voxel.
 struct Trial {
   bool owns;            ///< certainly, and its weights need no exact arithmetic
+  bool unsure;          ///< it may own, and its weights need no exact arithmetic
   glm::vec3 u;          ///< where it owns: undeformed minus deformed place, voxels; the bits of `interpolate_u`
   glm::vec3 place;      ///< where its affine map takes the nudged voxel from, cells
   glm::vec3 per_slice;  ///< how far that moves from one voxel to the next along k, cells
@@ -66,71 +67,125 @@ TETWARP_HD inline glm::vec3 to_offset(const glm::vec3& moved) {
 #endif
 }
 
-/// Bound of the rounding errors of the four values that `try_tetrahedron` compares with it.
+constexpr float kUnit = 1.0f / (1 << 24);  ///< of rounding
+
+/// Bound of the rounding errors of a determinant, of the numerators of its weights and of what they leave of it.
 ///
-/// With unit roundoff 2^-24 and P the product of the sum norms of the three columns: a component of a cross product is
-/// off by at most 2 units of its two products, a dot product by 3 more of its terms, the nudge adds 3 fused or 6 plain
-/// operations; so det by 5 P, a numerator by 11 (|r| + |d|) times the norms of its two columns, and the value at D, the
-/// difference of all four, by their sum and 3 roundings of at most the sum of their sizes.
-TETWARP_HD inline float error_bound(float a, float b, float c, float r) {
-  constexpr float kUnit = 1.0f / (1 << 24);
-  const float bc = b * c;
-  return (9.0f * kUnit) * (a * bc) + (15.0f * kUnit) * (r * (bc + a * (b + c)));
+/// With P the product of the sum norms of the three columns: a component of a cross product is off by at most 2 units
+/// of its two products, a dot product by 3 more of its terms, the nudge adds 3 fused or 6 plain operations; so det by
+/// 5 P, a numerator by 11 (|r| + |d|) times the norms of its two columns, and the value at D, the difference of all
+/// four, by their sum and 3 roundings of at most the sum of their sizes.
+///
+/// @param product  P  @param faces  sum of the products of two of the norms  @param r  |r| + |d|
+TETWARP_HD inline float error_bound(float product, float faces, float r) {
+  return (9.0f * kUnit) * product + (15.0f * kUnit) * (r * faces);
+}
+
+/// x, negated where an odd number of the signs `to` (+1 or -1) are negative.
+TETWARP_HD inline float with_sign_of(float x, const glm::vec3& to) {
+#ifdef __CUDA_ARCH__
+  const unsigned signs = __float_as_uint(to.x) ^ __float_as_uint(to.y) ^ __float_as_uint(to.z);
+  return __uint_as_float(__float_as_uint(x) ^ (signs & 0x80000000u));
+#else
+  return x * (to.x * to.y * to.z);
+#endif
 }
 
 }  // namespace detail
 
+/// A tetrahedron and a voxel relative to its corner D; 2^-12 voxel, exact.
+struct LocalTetrahedron {
+  glm::vec3 moved;                      ///< how far D is displaced
+  glm::vec3 moved_a, moved_b, moved_c;  ///< how much further A, B, C are
+  glm::vec3 a, b, c, r;
+
+  TETWARP_HD LocalTetrahedron(const StepLattice& lattice, const FloatTetrahedron& t, const GatherPoint& point) {
+    using detail::multiply_add;
+    const int dx = t.to.x < 0 ? -1 : 1, dy = t.to.y < 0 ? -lattice.row : lattice.row,
+              dz = t.to.z < 0 ? -lattice.slice : lattice.slice;
+    const int sum = dx + dy + dz;
+    const glm::vec3* at_d = lattice.moved + t.offset;
+    moved = at_d[0];
+    moved_a = at_d[t.centre ? sum - dx : dx] - moved;
+    moved_b = at_d[t.centre ? sum - dy : dy] - moved;
+    moved_c = at_d[t.centre ? sum - dz : dz] - moved;
+    const glm::vec3 edge = t.to * lattice.cell;  // to the next vertex on each axis
+    const glm::vec3 along = t.centre ? glm::vec3(0) : edge, across = t.centre ? edge : glm::vec3(0);
+    a = {along.x + moved_a.x, across.y + moved_a.y, across.z + moved_a.z};
+    b = {across.x + moved_b.x, along.y + moved_b.y, across.z + moved_b.z};
+    c = {across.x + moved_c.x, across.y + moved_c.y, along.z + moved_c.z};
+    r = glm::vec3(multiply_add(-t.d.x, lattice.cell.x, point.steps.x),
+                  multiply_add(-t.d.y, lattice.cell.y, point.steps.y),
+                  multiply_add(-t.d.z, lattice.cell.z, point.steps.z)) -
+        moved;
+  }
+};
+
+/// How much of what float allows is tried.
+enum class Effort { quick, full };
+
 /// Asks one tetrahedron for one voxel, in float.
 ///
-/// Its corners relative to D, and the voxel relative to D, are exact. The numerators of the weights at p + d and what
-/// they leave of the determinant are six times the volumes that decide ownership: it owns where all are positive by
-/// more than their error. (An inverted tetrahedron is never accepted here.)
-TETWARP_HD inline Trial try_tetrahedron(const StepLattice& lattice, const FloatTetrahedron& t,
-                                        const GatherPoint& point) {
-  const int dx = t.to.x < 0 ? -1 : 1, dy = t.to.y < 0 ? -lattice.row : lattice.row,
-            dz = t.to.z < 0 ? -lattice.slice : lattice.slice;
-  const int sum = dx + dy + dz;
-  const glm::vec3* at_d = lattice.moved + t.offset;
-  const glm::vec3 moved = at_d[0], moved_a = at_d[t.centre ? sum - dx : dx] - moved,
-                  moved_b = at_d[t.centre ? sum - dy : dy] - moved, moved_c = at_d[t.centre ? sum - dz : dz] - moved;
-  const glm::vec3 edge = t.to * lattice.cell;  // to the next vertex on each axis
-  const glm::vec3 along = t.centre ? glm::vec3(0) : edge, across = t.centre ? edge : glm::vec3(0);
-  const glm::vec3 a(along.x + moved_a.x, across.y + moved_a.y, across.z + moved_a.z);
-  const glm::vec3 b(across.x + moved_b.x, along.y + moved_b.y, across.z + moved_b.z);
-  const glm::vec3 c(across.x + moved_c.x, across.y + moved_c.y, along.z + moved_c.z);
-  const glm::vec3 r = glm::vec3(detail::multiply_add(-t.d.x, lattice.cell.x, point.steps.x),
-                                detail::multiply_add(-t.d.y, lattice.cell.y, point.steps.y),
-                                detail::multiply_add(-t.d.z, lattice.cell.z, point.steps.z)) -
-                      moved;  // exact
-
-  const Cramer m(a, b, c);
-  const float na = detail::dot(r, m.bc), nb = detail::dot(r, m.ca), nc = detail::dot(r, m.ab);
-  const float qa = detail::nudged(na, point.nudge, m.bc), qb = detail::nudged(nb, point.nudge, m.ca),
-              qc = detail::nudged(nc, point.nudge, m.ab);
-  const float qd = ((m.det - qa) - qb) - qc;
-  const float turn = t.to.x * t.to.y * t.to.z;  // of A, B, C when undeformed
-  const float least = std::fmin(std::fmin(qa * turn, qb * turn), std::fmin(qc * turn, qd * turn));
-  const float error = detail::error_bound(detail::norm1(a), detail::norm1(b), detail::norm1(c),
-                                          detail::norm1(r) + 6.5f);  // 15 + 7 + 4 sixteenths of a step
+/// The numerators of the weights at p + d and what they leave of the determinant are six times the volumes that decide
+/// ownership; here they are divided by the determinant. A quotient is off by 3 units of itself, and what all leave of 1
+/// by 7 units where all are positive; so it owns where all four are larger than the volumes' error, divided likewise,
+/// and 8 units. The determinant must have the sign of the undeformed one: an inverted tetrahedron is never accepted.
+///
+/// From p + d to p a weight changes by at most 15/16 step times the sum norms of two columns over the determinant;
+/// where that is clearly below the slack, no weight at p can leave it. With full effort the weights are looked at
+/// otherwise.
+template <Effort kEffort>
+TETWARP_HD Trial try_tetrahedron(const StepLattice& lattice, const FloatTetrahedron& t, const GatherPoint& point) {
+  using detail::multiply_add;
+  const LocalTetrahedron local(lattice, t, point);
+  const Cramer m(local.a, local.b, local.c);
+  const float na = detail::dot(local.r, m.bc), nb = detail::dot(local.r, m.ca), nc = detail::dot(local.r, m.ab);
+  const float reciprocal = m.det != 0 ? detail::reciprocal(m.det) : 0.0f;  // flat: the next guess is D
+  const glm::vec3 at_q = glm::vec3(detail::nudged(na, point.nudge, m.bc), detail::nudged(nb, point.nudge, m.ca),
+                                   detail::nudged(nc, point.nudge, m.ab)) *
+                         reciprocal;
+  const float least = std::fmin(std::fmin(at_q.x, at_q.y), std::fmin(at_q.z, ((1.0f - at_q.x) - at_q.y) - at_q.z));
+  const float la = detail::norm1(local.a), lb = detail::norm1(local.b), lc = detail::norm1(local.c);
+  const float product = (la * lb) * lc, faces = lb * lc + la * (lb + lc);
+  const float error =
+      detail::error_bound(product, faces, detail::norm1(local.r) + 6.5f);  // 15 + 7 + 4 sixteenths of a step
+  const float upright = detail::with_sign_of(m.det, t.to);                 // A, B, C turn like that when undeformed
+  const Weights w{na * reciprocal, nb * reciprocal, nc * reciprocal};
+  bool in_slack = upright > static_cast<float>(1 / kWeightSlack) * faces;
+  if (kEffort == Effort::full) in_slack = in_slack || w.within_slack();
 
   Trial trial;
-  const float reciprocal = m.det != 0 ? detail::reciprocal(m.det) : 0.0f;  // flat: the next guess is D
-  const Weights w{na * reciprocal, nb * reciprocal, nc * reciprocal};
-  trial.owns = least > error && !is_thin(m, a, b, c) && w.within_slack();
-  trial.u = detail::to_offset(blend(w, moved, moved_a, moved_b, moved_c));
-  const glm::vec3 at_q = glm::vec3(qa, qb, qc) * reciprocal;
+  const float bound = multiply_add(error, detail::magnitude(reciprocal), 8 * detail::kUnit);
+  const bool usable = (upright > kThin * product) & in_slack;
+  trial.owns = (least > bound) & usable;
+  trial.unsure = (least >= -bound) & (least <= bound) & usable;
+  trial.u = detail::to_offset(blend(w, local.moved, local.moved_a, local.moved_b, local.moved_c));
   const glm::vec3 slope = glm::vec3(m.bc.z, m.ca.z, m.ab.z) * (reciprocal * float{kStepsPerVoxel});
   const float all_q = (at_q.x + at_q.y) + at_q.z, all_slope = (slope.x + slope.y) + slope.z;
   const glm::vec3 shift = t.centre ? all_q - at_q : at_q, along_k = t.centre ? all_slope - slope : slope;
-  trial.place = {detail::multiply_add(t.to.x, shift.x, t.d.x), detail::multiply_add(t.to.y, shift.y, t.d.y),
-                 detail::multiply_add(t.to.z, shift.z, t.d.z)};
+  trial.place = {multiply_add(t.to.x, shift.x, t.d.x), multiply_add(t.to.y, shift.y, t.d.y),
+                 multiply_add(t.to.z, shift.z, t.d.z)};
   trial.per_slice = t.to * along_k;
   return trial;
 }
 
 TETWARP_HD inline Trial try_tetrahedron(const StepLattice& lattice, const LatticeTetrahedron& t,
                                         const GatherPoint& point) {
-  return try_tetrahedron(lattice, as_float(lattice, t), point);
+  return try_tetrahedron<Effort::full>(lattice, as_float(lattice, t), point);
+}
+
+/// u at a voxel that the tetrahedron owns: the bits of `interpolate_u`.
+TETWARP_HD inline glm::vec3 offset_in(const StepLattice& lattice, const LatticeTetrahedron& t, const glm::ivec3& voxel,
+                                      const glm::i32vec3& signs) {
+  const LocalTetrahedron local(lattice, as_float(lattice, t), GatherPoint(lattice, voxel, signs));
+  const Cramer m(local.a, local.b, local.c);
+  if (!is_thin(m, local.a, local.b, local.c)) {
+    const float reciprocal = detail::reciprocal(m.det);
+    const Weights w{detail::dot(local.r, m.bc) * reciprocal, detail::dot(local.r, m.ca) * reciprocal,
+                    detail::dot(local.r, m.ab) * reciprocal};
+    if (w.within_slack()) return detail::to_offset(blend(w, local.moved, local.moved_a, local.moved_b, local.moved_c));
+  }
+  return interpolate_u_exactly(vertices_of(lattice, t), voxel * kStepsPerVoxel, signs);
 }
 
 /// Whether a tetrahedron owns a voxel, exactly. @param sides  the four sides that decide it, of the faces opposite A,
@@ -157,37 +212,64 @@ TETWARP_HD inline bool owns_exactly(const Tetrahedron& t, const glm::i32vec3& st
   return owns_exactly<Wide>(t, steps, signs, sides);
 }
 
-/// Calls `visit(voxel)` for every voxel of `region` that a tetrahedron of the lattice owns: what `visit_cell` reports
-/// of it, with a float test in front of the exact one.
+/// Box of voxels in 32 bits, half open.
+struct IntBox {
+  glm::ivec3 begin, end;
+
+  TETWARP_HD bool is_empty() const { return end.x <= begin.x || end.y <= begin.y || end.z <= begin.z; }
+};
+
+/// The part of a box of voxels that something between `low` and `high` (2^-12 voxel) may own; as
+/// `detail::candidates`.
+TETWARP_HD inline IntBox candidates(const NudgeTurns& turns, const glm::i32vec3& low, const glm::i32vec3& high,
+                                    IntBox box) {
+  for (int axis = 0; axis < 3; ++axis) {
+    int first = low[axis] >> 12, last = high[axis] >> 12;
+    if ((first << 12) != low[axis] || turns.sign(axis, first) < 0) ++first;
+    if ((last << 12) == high[axis] && turns.sign(axis, last) > 0) --last;
+    box.begin[axis] = box.begin[axis] > first ? box.begin[axis] : first;
+    box.end[axis] = box.end[axis] < last + 1 ? box.end[axis] : last + 1;
+  }
+  return box;
+}
+
+/// Calls `visit(voxel)` for the voxels of `region` that a tetrahedron of the lattice owns and that are `wanted(voxel)`:
+/// what `visit_cell` reports of it, with a float test in front of the exact one.
 ///
 /// With the faces' values at q as in `try_tetrahedron`: inside where all are clear of their error on the inner side,
 /// outside where one is clear of it on the other, exact integers in between. Inverted tetrahedra own like any other.
-template <class Visit>
-TETWARP_HD void visit_tetrahedron(const StepLattice& lattice, const LatticeTetrahedron& t, const VoxelBox& region,
-                                  const Nudge& nudge, Visit&& visit) {
-  const Tetrahedron exact = vertices_of(lattice, t);
-  const VoxelBox voxels = detail::candidates(nudge, box_of(exact), region);
-  if (detail::is_empty(voxels)) return;
-  const glm::vec3 a(exact.a.deformed - exact.d.deformed), b(exact.b.deformed - exact.d.deformed),
-      c(exact.c.deformed - exact.d.deformed);
+template <class Wanted, class Visit>
+TETWARP_HD void visit_tetrahedron(const StepLattice& lattice, const LatticeTetrahedron& t, const IntBox& region,
+                                  const NudgeTurns& turns, Wanted&& wanted, Visit&& visit) {
+  const glm::vec3 moved = lattice.moved[lattice.offset(t.d)];
+  const auto edge = [&](const glm::ivec3& to) {
+    return glm::vec3(to - t.d) * lattice.cell + (lattice.moved[lattice.offset(to)] - moved);
+  };
+  const glm::vec3 a = edge(t.a()), b = edge(t.b()), c = edge(t.c());
+  const glm::vec3 low = glm::min(glm::min(a, b), glm::min(c, glm::vec3(0))),
+                  high = glm::max(glm::max(a, b), glm::max(c, glm::vec3(0)));
+  const glm::i32vec3 rest = glm::i32vec3(lattice.first) + t.d * glm::i32vec3(lattice.cell);
+  const IntBox voxels = candidates(turns, rest + glm::i32vec3(moved + low), rest + glm::i32vec3(moved + high), region);
+  if (voxels.is_empty()) return;
   const Cramer m(a, b, c);
   const float turn = m.det < 0 ? -1.0f : 1.0f;
   const float la = detail::norm1(a), lb = detail::norm1(b), lc = detail::norm1(c);
-  const glm::ivec3 begin(voxels.begin), end(voxels.end);
-  for (int z = begin.z; z < end.z; ++z) {
-    for (int y = begin.y; y < end.y; ++y) {
-      for (int x = begin.x; x < end.x; ++x) {
+  const glm::i32vec3 at_d = rest + glm::i32vec3(moved);
+  for (int z = voxels.begin.z; z < voxels.end.z; ++z) {
+    for (int y = voxels.begin.y; y < voxels.end.y; ++y) {
+      for (int x = voxels.begin.x; x < voxels.end.x; ++x) {
         const glm::ivec3 voxel(x, y, z);
-        const glm::i32vec3 steps = voxel * kStepsPerVoxel, signs = nudge.signs(glm::i64vec3(voxel));
-        const glm::vec3 r(steps - exact.d.deformed), d = glm::vec3(nudge_steps(signs)) * (1.0f / kNudgeSteps);
+        if (!wanted(voxel)) continue;
+        const glm::i32vec3 steps = voxel * kStepsPerVoxel, signs = turns.signs(voxel);
+        const glm::vec3 r(steps - at_d), d = glm::vec3(nudge_steps(signs)) * (1.0f / kNudgeSteps);
         const float qa = detail::nudged(detail::dot(r, m.bc), d, m.bc),
                     qb = detail::nudged(detail::dot(r, m.ca), d, m.ca),
                     qc = detail::nudged(detail::dot(r, m.ab), d, m.ab), qd = ((m.det - qa) - qb) - qc;
         const float least = std::fmin(std::fmin(qa * turn, qb * turn), std::fmin(qc * turn, qd * turn));
-        const float error = detail::error_bound(la, lb, lc, detail::norm1(r) + 6.5f);
+        const float error = detail::error_bound((la * lb) * lc, lb * lc + la * (lb + lc), detail::norm1(r) + 6.5f);
         if (least < -error && detail::magnitude(m.det) > error) continue;
         int sides[4];
-        if (least > error || owns_exactly(exact, steps, signs, sides)) visit(voxel);
+        if (least > error || owns_exactly(vertices_of(lattice, t), steps, signs, sides)) visit(voxel);
       }
     }
   }

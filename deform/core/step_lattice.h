@@ -12,7 +12,7 @@ struct StepLattice {
   glm::ivec3 cells{0};               ///< on each axis
   glm::vec3 first{0}, cell{0};       ///< rest place of vertex (0, 0, 0), and from one vertex to the next; 2^-12 voxel
   glm::vec3 voxel{0};                ///< one voxel, in cells
-  glm::vec3 end{0}, last{0};         ///< `cells`, and the last cell
+  glm::ivec3 last{0};                ///< cell
   int row = 0, slice = 0;            ///< vertices from one row, and one slice, to the next
   const glm::vec3* moved = nullptr;  ///< deformed minus rest of each vertex, 2^-12 voxel, i fastest, 12 bytes each
 
@@ -118,15 +118,42 @@ TETWARP_HD inline LatticeTetrahedron as_lattice(const FloatTetrahedron& t) {
   return {glm::ivec3(t.d), glm::ivec3(t.to.x < 0, t.to.y < 0, t.to.z < 0), t.centre};
 }
 
+namespace detail {
+
+/// The largest whole number not above x; NaN: 0, and too large or small ones are any large or small ones.
+TETWARP_HD inline int floor_to_int(float x) {
+#ifdef __CUDA_ARCH__
+  return __float2int_rd(x);
+#else
+  constexpr float kFar = 1 << 30;
+  return x < kFar ? (x > -kFar ? static_cast<int>(std::floor(x)) : -(1 << 30)) : (x >= kFar ? 1 << 30 : 0);
+#endif
+}
+
+/// x moved into [0, 1]; NaN: 0.
+TETWARP_HD inline float saturate(float x) {
+#ifdef __CUDA_ARCH__
+  return __saturatef(x);
+#else
+  return x > 0 ? (x < 1 ? x : 1.0f) : 0.0f;
+#endif
+}
+
+TETWARP_HD inline int clamp_to(int x, int last) {
+  const int inside = x > 0 ? x : 0;
+  return inside < last ? inside : last;
+}
+
+}  // namespace detail
+
 /// The tetrahedron of the undeformed lattice that holds a place, in cells; places outside are moved inside.
 TETWARP_HD inline FloatTetrahedron tetrahedron_at(const StepLattice& lattice, const glm::vec3& place) {
-  glm::vec3 cell, in;
-  for (int axis = 0; axis < 3; ++axis) {
-    const float inside = std::fmin(std::fmax(place[axis], 0.0f), lattice.end[axis]);  // NaN: 0
-    cell[axis] = std::fmin(std::floor(inside), lattice.last[axis]);
-    in[axis] = inside - cell[axis];  // 0 to 1: at most one of the four corners below is near
-  }
-  const int x = static_cast<int>(cell.x), y = static_cast<int>(cell.y), z = static_cast<int>(cell.z);
+  const int x = detail::clamp_to(detail::floor_to_int(place.x), lattice.last.x),
+            y = detail::clamp_to(detail::floor_to_int(place.y), lattice.last.y),
+            z = detail::clamp_to(detail::floor_to_int(place.z), lattice.last.z);
+  const glm::vec3 cell(x, y, z);
+  const glm::vec3 in(detail::saturate(place.x - cell.x), detail::saturate(place.y - cell.y),
+                     detail::saturate(place.z - cell.z));  // at most one of the four corners below is near
   const bool odd = ((x ^ y ^ z) & 1) != 0;
   const float mirrored = odd ? 1.0f - in.x : in.x;  // mirrored, an odd cell is an even one
   const float more = in.y + in.z, less = in.y - in.z;

@@ -43,6 +43,7 @@ class ForwardResampler final : public Resampler {
     ready_ = false;
     require_host(field.memory, "the field");
     arena_.execute([&] { lattice_.build(output(), field, control); });
+    wants_range_ = control.jacobian_range;
     ready_ = true;
   }
 
@@ -69,6 +70,7 @@ class ForwardResampler final : public Resampler {
     const FieldStatistics& statistics = lattice_.statistics();
     report.inverted = statistics.inverted;
     report.degenerate = statistics.degenerate;
+    if (!wants_range_) return report;
     report.jacobian_min = statistics.jacobian_min;
     report.jacobian_max = statistics.jacobian_max;
     return report;
@@ -148,7 +150,7 @@ class ForwardResampler final : public Resampler {
 
   mutable tbb::task_arena arena_;
   LatticeIndex lattice_;
-  bool ready_ = false;
+  bool ready_ = false, wants_range_ = true;
 };
 
 }  // namespace

@@ -88,7 +88,6 @@ TEST(StepLattice, FindsTheTetrahedronOfAnUndeformedPlace) {
   Random random(test_seed(), 1);
   StepLattice lattice;
   lattice.cells = {5, 4, 6};
-  lattice.end = {5, 4, 6};
   lattice.last = {4, 3, 5};
   for (int n = 0; n < 20000; ++n) {
     const glm::dvec3 place(random.real(0, 5), random.real(0, 4), random.real(0, 6));
@@ -108,7 +107,6 @@ TEST(StepLattice, MovesPlacesOutsideIntoATetrahedronOfTheLattice) {
   Random random(test_seed(), 2);
   StepLattice lattice;
   lattice.cells = {5, 4, 6};
-  lattice.end = {5, 4, 6};
   lattice.last = {4, 3, 5};
   constexpr float kNaN = std::numeric_limits<float>::quiet_NaN(), kInfinity = std::numeric_limits<float>::infinity();
   for (int n = 0; n < 20000; ++n) {
@@ -219,10 +217,13 @@ TEST(Gather, VisitsTheVoxelsOfATetrahedronThatVisitCellReports) {
       for (int y = 0; y < cells.y; ++y) {
         for (int x = 0; x < cells.x; ++x) {
           for (int number = 0; number < kTetrahedraPerCell; ++number) {
-            visit_tetrahedron(scene.lattice, LatticeTetrahedron::of_cell({x, y, z}, number),
-                              {glm::i64vec3(0), test.output.size}, scene.frame.nudge, [&](const glm::ivec3& voxel) {
-                                found[offset_of(test.output, glm::i64vec3(voxel))] += 1 + number * 100;
-                              });
+            visit_tetrahedron(
+                scene.lattice, LatticeTetrahedron::of_cell({x, y, z}, number),
+                {glm::ivec3(0), glm::ivec3(test.output.size)}, NudgeTurns(scene.frame.nudge),
+                [](const glm::ivec3&) { return true; },
+                [&](const glm::ivec3& voxel) {
+                  found[offset_of(test.output, glm::i64vec3(voxel))] += 1 + number * 100;
+                });
           }
         }
       }
@@ -318,7 +319,7 @@ TEST(Gather, SettlesNearlyAllVoxelsOfStructuredFieldsInFloat) {
         glm::vec3 place = scene.lattice.place(glm::vec3(voxel));
         bool owns = false;
         for (int attempt = 0; attempt < 12 && !owns; ++attempt) {
-          const Trial trial = try_tetrahedron(scene.lattice, tetrahedron_at(scene.lattice, place), point);
+          const Trial trial = try_tetrahedron<Effort::full>(scene.lattice, tetrahedron_at(scene.lattice, place), point);
           owns = trial.owns;
           place = trial.place;
         }
