@@ -15,8 +15,8 @@ constexpr int kMarch = 32;       ///< voxels along k that a thread goes
 constexpr int kWarps = 4;        ///< of a block, side by side along j
 constexpr int kSeedTile = 8;     ///< voxels along i and j that share a seed
 constexpr int kSeedTries = 40;   ///< from an undeformed guess
-constexpr int kRounds = 6;       ///< of a whole warp in which many guesses fail, a march
-constexpr int kManyFailed = 12;  ///< lanes
+constexpr int kRounds = 3;       ///< of a whole warp in which many guesses fail, a march
+constexpr int kManyFailed = 20;  ///< lanes
 constexpr int kWarpTries = 3;    ///< of a voxel within its warp, after the first
 constexpr int kQueueTries = 6;   ///< in float, before the exact walk
 constexpr int kWalk = 24;        ///< tetrahedra that the exact walk may pass
@@ -216,7 +216,7 @@ struct March {
       const unsigned failed = __ballot_sync(~0u, again);
       if (failed != 0) {
         if (rounds < kRounds && __popc(failed) > kManyFailed) {  // the guess was no good: all of this slice once more
-          const glm::vec3 better = rounds++ < 2 ? trial.place : (place + trial.place) * 0.5f;
+          const glm::vec3 better = rounds++ == 0 ? trial.place : (place + trial.place) * 0.5f;
           if (again) place = better;
           --n;
           continue;

@@ -288,8 +288,8 @@ TETWARP_HD inline bool walk_to_owner(const StepLattice& lattice, LatticeTetrahed
       owner = start;
       return true;
     }
-    const Wide volume = signed_volume(Relative<Wide>(t.a.deformed), Relative<Wide>(t.b.deformed),
-                                      Relative<Wide>(t.c.deformed), Relative<Wide>(t.d.deformed));
+    const float volume = detail::edge_determinant(t.a.deformed - t.d.deformed, t.b.deformed - t.d.deformed,
+                                                  t.c.deformed - t.d.deformed);  // its sign is exact
     const int inner = volume > 0 ? -1 : 1;
     bool moved = false;
     for (int k = 0; k < 4 && !moved; ++k) {
