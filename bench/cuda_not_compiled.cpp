@@ -1,4 +1,5 @@
 #include "bench/backend.h"
+#include "bench/gpu_bench.h"
 
 namespace tetwarp::bench {
 
@@ -11,5 +12,7 @@ namespace {
 std::unique_ptr<Backend> make_cuda_backend(int, InverseIn) { not_compiled(); }
 
 CudaFacts describe_cuda(int) { not_compiled(); }
+
+GpuResults measure_gpu(const GpuOptions&, const std::function<void(const std::string&)>&) { not_compiled(); }
 
 }  // namespace tetwarp::bench

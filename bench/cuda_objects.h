@@ -11,7 +11,7 @@ namespace tetwarp::bench {
 
 class Stream {
  public:
-  Stream() { TETWARP_CUDA_TRY(cudaStreamCreate(&stream_)); }
+  explicit Stream(unsigned flags = cudaStreamDefault) { TETWARP_CUDA_TRY(cudaStreamCreateWithFlags(&stream_, flags)); }
   ~Stream() { cudaStreamDestroy(stream_); }
   Stream(const Stream&) = delete;
   Stream& operator=(const Stream&) = delete;
@@ -31,6 +31,8 @@ class Event {
   Event& operator=(const Event&) = delete;
 
   void record(const Stream& stream) { TETWARP_CUDA_TRY(cudaEventRecord(event_, stream.get())); }
+  /// What is queued on a stream from now on waits for this event.
+  void hold_up(const Stream& stream) const { TETWARP_CUDA_TRY(cudaStreamWaitEvent(stream.get(), event_)); }
   /// Waits for this event, then gives the time since an earlier one.
   double ms_since(const Event& earlier) const {
     TETWARP_CUDA_TRY(cudaEventSynchronize(event_));

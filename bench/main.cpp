@@ -1,4 +1,4 @@
-// tetwarp-bench: what the paper compares, and what the stages of a deformation cost.
+// tetwarp-bench: what the paper compares, what a frame costs on a GPU, and the stages of a deformation on the CPU.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
@@ -46,6 +46,11 @@ void add_input(CLI::App& command, InputOptions& input) {
       ->capture_default_str();
 }
 
+void add_frames(CLI::App& command, int& frames, int& warmup) {
+  command.add_option("--frames", frames, "Timed frames")->check(CLI::Range(1, 1000000))->capture_default_str();
+  command.add_option("--warmup", warmup, "Frames before them")->check(CLI::Range(0, 1000000))->capture_default_str();
+}
+
 void add_paper(CLI::App& app, PaperOptions& options, Words& words) {
   CLI::App* command = app.add_subcommand("paper", "The tables of the paper, with Tetwarp beside its methods");
   add_input(*command, options.input);
@@ -63,10 +68,7 @@ void add_paper(CLI::App& app, PaperOptions& options, Words& words) {
       ->add_option("--cell-sizes", words.cell_sizes,
                    "Cells of the coarse table (paper, gascon, tetwarp); none: no such table")
       ->capture_default_str();
-  command->add_option("--frames", options.frames, "Timed frames")->check(CLI::Range(1, 1000000))->capture_default_str();
-  command->add_option("--warmup", options.warmup, "Frames before them")
-      ->check(CLI::Range(0, 1000000))
-      ->capture_default_str();
+  add_frames(*command, options.frames, options.warmup);
   command->add_flag("--per-voxel-inverse", words.per_voxel_inverse,
                     "Keep the compiler from moving the inverse out of the loop over voxels");
   command->add_option("--backend", options.backend, "cpu: the same loops in plain C++, sampling in software")
@@ -97,6 +99,24 @@ void add_cpu(CLI::App& app, CpuOptions& options) {
   command->footer("Example: tetwarp bench cpu --slices 100 --threads 2");
 }
 
+void add_gpu(CLI::App& app, GpuOptions& options, std::string& cell_sizes) {
+  CLI::App* command = app.add_subcommand("gpu", "What a frame costs on a GPU, and the floors that it should reach");
+  add_input(*command, options.input);
+  command->add_option("--fields", options.fields, "Deformations")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(CLI::IsMember(options.fields))
+      ->capture_default_str();
+  command->add_option("--cell-sizes", cell_sizes, "Larger cells, voxels; none: cells of one voxel only")
+      ->capture_default_str();
+  add_frames(*command, options.frames, options.warmup);
+  command->add_option("--device", options.device, "CUDA device")->check(CLI::NonNegativeNumber)->capture_default_str();
+  command->add_option("--json", options.json, "Every number, as JSON")->type_name("FILE");
+  command->add_flag("--check", options.check, "Exit with 1 where a floor is missed");
+  command->add_flag("--verbose", options.verbose, "A line on standard error for every step");
+  command->footer("Example: tetwarp bench gpu --slices 300 --fields wave,elastic --json gpu.json");
+}
+
 /// "4,8,16", "none" or nothing.
 std::vector<std::int64_t> parse_cell_sizes(const std::string& text) {
   std::vector<std::int64_t> sizes;
@@ -112,14 +132,17 @@ std::vector<std::int64_t> parse_cell_sizes(const std::string& text) {
 }
 
 int run_command_line(int argc, char** argv) {
-  CLI::App app("Time the paper's methods and Tetwarp, and say what each result is worth");
+  CLI::App app("Time Tetwarp and what it is compared with, and say what each result is worth");
   app.name("tetwarp-bench");
   app.require_subcommand(1);
   app.set_version_flag("--version", std::string("tetwarp-bench ") + version() + " (" + commit() + ")");
   PaperOptions paper;
+  GpuOptions gpu;
   CpuOptions cpu;
   Words words;
+  std::string gpu_cell_sizes = words.cell_sizes;
   add_paper(app, paper, words);
+  add_gpu(app, gpu, gpu_cell_sizes);
   add_cpu(app, cpu);
   try {
     app.parse(argc, argv);
@@ -129,6 +152,10 @@ int run_command_line(int argc, char** argv) {
     throw UsageError(std::string(error.what()) + "; see tetwarp-bench --help");
   }
   if (app.got_subcommand("cpu")) return run_cpu(cpu);
+  if (app.got_subcommand("gpu")) {
+    gpu.cell_sizes = parse_cell_sizes(gpu_cell_sizes);
+    return run_gpu(gpu);
+  }
   paper.methods.clear();
   for (const std::string& name : words.methods) paper.methods.push_back(parse_method(name));
   paper.cell_sizes = parse_cell_sizes(words.cell_sizes);

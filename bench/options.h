@@ -20,11 +20,11 @@ constexpr std::uint64_t kPhantomSeed = 1;
 
 /// What `paper` deforms: one volume, or phantoms of several lengths.
 struct InputOptions {
-  std::filesystem::path path;      ///< DICOM folder, .nii .nii.gz .nrrd .mha; empty: phantom or `raw`
-  std::string series;              ///< UID, or the number that `tetwarp info` prints
-  std::filesystem::path raw;       ///< int16, little endian, no header
-  std::vector<std::int64_t> size;  ///< of `raw`
-  std::int64_t width = 512;        ///< columns and rows of the phantom
+  std::filesystem::path path = {};      ///< DICOM folder, .nii .nii.gz .nrrd .mha; empty: phantom or `raw`
+  std::string series = {};              ///< UID, or the number that `tetwarp info` prints
+  std::filesystem::path raw = {};       ///< int16, little endian, no header
+  std::vector<std::int64_t> size = {};  ///< of `raw`
+  std::int64_t width = 512;             ///< columns and rows of the phantom
   std::vector<std::int64_t> slices{141, 300, 316, 600};
 
   bool is_phantom() const { return path.empty() && raw.empty(); }
@@ -50,8 +50,21 @@ struct CpuOptions {
   std::filesystem::path json;
 };
 
+struct GpuOptions {
+  InputOptions input{.slices = {300, 600}};  ///< everything on the first volume, one field on the others
+  std::vector<std::string> fields{"identity", "wave",     "twist", "bubble", "elastic",
+                                  "noise",    "rotation", "folds", "local"};
+  std::vector<std::int64_t> cell_sizes{4, 8, 16};  ///< beside cells of one voxel
+  int frames = 15, warmup = 3, device = 0;
+  std::filesystem::path json;
+  bool check = false;    ///< a missed floor is a failure
+  bool verbose = false;  ///< a line to standard error for every step
+};
+
 /// The tables of the paper, to standard output. @return the exit status
 int run_paper(const PaperOptions& options);
+/// What a frame costs on a CUDA device, against other methods, copies and memory. @return the exit status
+int run_gpu(const GpuOptions& options);
 /// What the stages of one deformation cost on the CPU, per voxel.
 int run_cpu(const CpuOptions& options);
 

@@ -10,21 +10,10 @@ namespace {
 
 using Json = nlohmann::json;
 
-template <class T>
-Json json_or_null(const std::optional<T>& value) {
-  return value ? Json(*value) : Json(nullptr);
-}
-
-Json to_json(const Summary& ms) {
-  return {{"median", ms.median}, {"q1", ms.q1}, {"q3", ms.q3}, {"min", ms.min}, {"max", ms.max}, {"frames", ms.frames}};
-}
-
-Json to_json(const std::optional<Summary>& ms) { return ms ? to_json(*ms) : Json(nullptr); }
-
-Json to_json(const glm::i64vec3& size) { return {size.x, size.y, size.z}; }
+Json json_or_null(const std::optional<std::string>& text) { return text ? Json(*text) : Json(nullptr); }
 
 Json to_json(const Run& run) {
-  return {{"size", to_json(run.size)},
+  return {{"size", size_json(run.size)},
           {"field", run.field},
           {"formula", run.formula},
           {"cell_size", run.cell_size},
@@ -43,15 +32,6 @@ Json to_json(const Run& run) {
           {"largest_difference", run.tally.largest_difference},
           {"mean_difference", run.tally.mean_difference},
           {"exact_covered", run.tally.covered}};
-}
-
-Json to_json(const Machine& machine) {
-  return {{"cpu", machine.cpu},
-          {"threads", machine.threads},
-          {"gpu", json_or_null(machine.gpu)},
-          {"driver", json_or_null(machine.driver)},
-          {"cuda_runtime", json_or_null(machine.cuda_runtime)},
-          {"compute_capability", json_or_null(machine.compute_capability)}};
 }
 
 Json to_json(const Appendix& appendix) {
@@ -108,16 +88,36 @@ std::string columns(const std::optional<Summary>& ms) {
 
 }  // namespace
 
+Json to_json(const Summary& ms) {
+  return {{"median", ms.median}, {"q1", ms.q1}, {"q3", ms.q3}, {"min", ms.min}, {"max", ms.max}, {"frames", ms.frames}};
+}
+
+Json to_json(const std::optional<Summary>& ms) { return ms ? to_json(*ms) : Json(nullptr); }
+
+Json size_json(const glm::i64vec3& size) { return {size.x, size.y, size.z}; }
+
+Json to_json(const Machine& machine) {
+  return {{"cpu", machine.cpu},
+          {"threads", machine.threads},
+          {"gpu", json_or_null(machine.gpu)},
+          {"driver", json_or_null(machine.driver)},
+          {"cuda_runtime", json_or_null(machine.cuda_runtime)},
+          {"compute_capability", json_or_null(machine.compute_capability)}};
+}
+
+Json input_json(const std::string& kind) {
+  return {{"kind", kind}, {"seed", kind == "phantom" ? Json(kPhantomSeed) : Json(nullptr)}};
+}
+
 nlohmann::json to_json(const Results& results) {
   Json document = {{"program", "tetwarp-bench paper"},
                    {"version", version()},
                    {"commit", commit()},
                    {"options", options_json(results)},
                    {"machine", to_json(results.machine)},
-                   {"input", {{"kind", results.input_kind}, {"seed", nullptr}}},
+                   {"input", input_json(results.input_kind)},
                    {"appendix_a", to_json(results.appendix)},
                    {"runs", Json::array()}};
-  if (results.input_kind == "phantom") document["input"]["seed"] = kPhantomSeed;
   for (const Run& run : results.runs) document["runs"].push_back(to_json(run));
   return document;
 }

@@ -10,6 +10,14 @@ namespace tetwarp::bench {
 /// Every number, as one document.
 nlohmann::json to_json(const Results& results);
 
+nlohmann::json to_json(const Summary& ms);
+/// null where there is none
+nlohmann::json to_json(const std::optional<Summary>& ms);
+nlohmann::json size_json(const glm::i64vec3& size);
+nlohmann::json to_json(const Machine& machine);
+/// "phantom" with its seed, or what else was read.
+nlohmann::json input_json(const std::string& kind);
+
 /// Every number, one line a run; the first line names the columns. Speed-ups compare medians; a method that was not
 /// run leaves its column empty.
 std::string to_csv(const Results& results);

@@ -1,9 +1,8 @@
 #include "bench/tables.h"
 
-#include <cstdarg>
-#include <cstdio>
 #include <span>
 
+#include "bench/markdown.h"
 #include "bench/report.h"
 #include "deform/version.h"
 
@@ -50,37 +49,6 @@ constexpr char kAppendixNote[] = R"(## Appendix A: the determinant far from the 
 The corners are ours: those of the paper's Eq. 8 are not known.
 
 )";
-
-[[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...) {
-  char text[512];
-  va_list arguments;
-  va_start(arguments, pattern);
-  std::vsnprintf(text, sizeof text, pattern, arguments);
-  va_end(arguments);
-  return text;
-}
-
-std::string ms_text(double ms) { return format("%.*f", ms < 10 ? 3 : (ms < 100 ? 2 : 1), ms); }
-
-/// "median (q1-q3)".
-std::string cell(const std::optional<Summary>& ms) {
-  if (!ms) return "-";
-  return ms_text(ms->median) + " (" + ms_text(ms->q1) + "-" + ms_text(ms->q3) + ")";
-}
-
-std::string cell(const std::optional<double>& ratio) { return ratio ? format("%.2f", *ratio) : "-"; }
-
-std::string row(const std::vector<std::string>& cells) {
-  std::string line = "|";
-  for (const std::string& text : cells) line += " " + text + " |";
-  return line + "\n";
-}
-
-std::string heading(const std::vector<std::string>& names) {
-  std::string rule = "|";
-  for (std::size_t n = 0; n < names.size(); ++n) rule += " --- |";
-  return row(names) + rule + "\n";
-}
 
 std::string size_text(const Run& run) { return to_string(run.size); }
 
@@ -230,9 +198,7 @@ std::string introduction(const Results& results) {
   const PaperOptions& options = results.options;
   std::string text = std::string("# tetwarp-bench paper, ") + version() + " (" + commit() + ")\n\n";
   if (results.backend == "cuda") {
-    text += "- CUDA: " + machine.gpu.value_or("?") + ", compute capability " +
-            machine.compute_capability.value_or("?") + ", driver " + machine.driver.value_or("?") + ", runtime " +
-            machine.cuda_runtime.value_or("?") + "\n";
+    text += "- CUDA: " + cuda_text(machine) + "\n";
   } else {
     text += "- CPU: the same loops in plain C++, sampling in software, float; no copies\n";
   }

@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "cuda/devices.h"
 #include "tests/support/program.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"
@@ -41,6 +42,35 @@ TEST(BenchProgram, WrongCommandLinesExitWithTwo) {
   expect_error(run_bench(scratch, "paper --cell-sizes 1"), 2, "--cell-sizes");
   expect_error(run_bench(scratch, "paper --cell-sizes 4,x"), 2, "--cell-sizes");
   expect_error(run_bench(scratch, "paper --raw some.raw"), 2, "--size");
+  expect_error(run_bench(scratch, "gpu --fields wave,swirl"), 2, "swirl");
+  expect_error(run_bench(scratch, "gpu --cell-sizes 4,1"), 2, "--cell-sizes");
+  expect_error(run_bench(scratch, "gpu --frames 0"), 2, "--frames");
+  expect_error(run_bench(scratch, "gpu --slices 1"), 2, "--slices");
+}
+
+constexpr const char* kTinyGpu = "gpu --width 64 --slices 20,40 --cell-sizes 4 --frames 2 --warmup 1 --json r.json ";
+
+TEST(BenchProgram, TheGpusMeasureNeedsAGpu) {
+  if (tetwarp::cuda_device_count() > 0) GTEST_SKIP() << "there is a CUDA device on this machine";
+  const Scratch scratch;
+  expect_error(run_bench(scratch, kTinyGpu), 1, "CUDA");
+  EXPECT_FALSE(std::filesystem::exists(scratch / "r.json"));
+}
+
+TEST(BenchProgram, MeasuresEveryFieldOnAGpu) {
+  if (tetwarp::cuda_device_count() == 0) GTEST_SKIP() << "no CUDA device on this machine, or CUDA is not in this build";
+  const Scratch scratch;
+  const Outcome run = run_bench(scratch, kTinyGpu);
+  ASSERT_EQ(run.status, 0) << run.err;
+  EXPECT_TRUE(says(run.out, {"# tetwarp-bench gpu", "| rotation | ", "## Frames per second", "## Floors"}));
+  const nlohmann::json document = nlohmann::json::parse(read_text(scratch / "r.json"));
+  EXPECT_EQ(document["runs"].size(), 9u + 4u + 1u);
+  EXPECT_EQ(document["frame_loops"].size(), 2u);
+  for (const nlohmann::json& found : document["runs"]) {
+    EXPECT_GT(found["report"]["covered"], 20000) << found["field"];
+    if (found["field"] == "noise") continue;  // rough enough to turn a tetrahedron over
+    EXPECT_EQ(found["report"]["inverted"] > 0, found["field"] == "folds") << found["field"];
+  }
 }
 
 TEST(BenchProgram, AVolumeOfZerosExitsWithFourAndWritesNothing) {
@@ -57,7 +87,7 @@ TEST(BenchProgram, AnUnwritableResultIsKnownBeforeTheWork) {
 
 TEST(BenchProgram, HelpHasAnExample) {
   const Scratch scratch;
-  for (const std::string command : {"paper", "cpu"}) {
+  for (const std::string command : {"paper", "gpu", "cpu"}) {
     const Outcome run = run_bench(scratch, command + " --help");
     EXPECT_EQ(run.status, 0);
     EXPECT_TRUE(says(run.out, {"Example: tetwarp bench " + command}));

@@ -1,0 +1,44 @@
+#include <cstdio>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "bench/gpu_bench.h"
+#include "bench/gpu_report.h"
+#include "bench/input.h"
+#include "bench/machine.h"
+#include "bench/output_file.h"
+#include "cuda/devices.h"
+
+namespace tetwarp::bench {
+
+namespace {
+
+/// Before a phantom is made. @throws DeviceError, NotCompiled
+void require_device(int device) {
+  if (!has_cuda())
+    throw NotCompiled("CUDA is not in this build; `tetwarp bench cpu` and `paper --backend cpu` need none");
+  const int count = cuda_device_count();
+  if (device < count) return;
+  throw DeviceError("no CUDA device " + std::to_string(device) + ", " + std::to_string(count) +
+                    " found; see tetwarp --version, or use tetwarp bench paper --backend cpu");
+}
+
+}  // namespace
+
+int run_gpu(const GpuOptions& options) {
+  require_writable(options.json);
+  require_device(options.device);
+  GpuResults results = measure_gpu(options, [&](const std::string& line) {
+    if (options.verbose) std::fprintf(stderr, "%s\n", line.c_str());
+  });
+  results.input_kind = input_kind(options.input);
+  results.machine = describe_machine(options.device, 0);
+  const std::vector<Floor> floors = find_floors(results);
+  std::cout << to_markdown(results, floors);
+  write_text(options.json, to_json(results, floors).dump(1) + "\n");
+  if (!options.check || all_met(floors)) return 0;
+  std::fprintf(stderr, "tetwarp-bench: a floor is missed; the last table says which\n");
+  return 1;
+}
+
+}  // namespace tetwarp::bench
