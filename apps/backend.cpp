@@ -6,10 +6,12 @@
 
 namespace tetwarp::apps {
 
+bool means_cuda(const std::string& wanted) { return wanted == "cuda" || (wanted == "auto" && cuda_device_count() > 0); }
+
 Backend make_backend(const std::string& wanted, Direction direction, const Geometry& output, int device,
                      const Limits& limits) {
   const bool pull = direction == Direction::pull;
-  if (wanted == "cuda" || (wanted == "auto" && cuda_device_count() > 0)) {
+  if (means_cuda(wanted)) {
     return {"cuda",
             pull ? make_cuda_pull_resampler(output, device, limits) : make_cuda_resampler(output, device, limits)};
   }

@@ -15,6 +15,9 @@ struct Backend {
   std::unique_ptr<Resampler> resampler;
 };
 
+/// Whether a wish (auto, cpu, cuda) means CUDA on this machine.
+bool means_cuda(const std::string& wanted);
+
 /// @param wanted  auto (CUDA where a device works, else the CPU), cpu or cuda
 /// @throws NotCompiled for a backend that this build does not have, DeviceError for one that does not work here
 Backend make_backend(const std::string& wanted, Direction direction, const Geometry& output, int device,

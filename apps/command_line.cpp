@@ -118,7 +118,10 @@ void add_deform(CLI::App& app, DeformOptions& options) {
       "Value where nothing maps (default: DICOM padding value or -1024 HU; else the smallest value present)");
   command->add_option("--cell-size", options.cell_size, "Vertices every B voxels, for formulas only (default 1)")
       ->type_name("B");
-  command->add_option("--memory", options.memory_bytes, "Refuse to start if more is needed: 8G, 500M")
+  command
+      ->add_option("--memory", options.memory_bytes,
+                   "8G, 500M. On the CPU: refuse to start if more is needed. On a CUDA device: volumes and field there "
+                   "take no more, what does not fit is streamed in slabs; 10 % or 128 MB of working space come on top")
       ->transform(CLI::AsSizeValue(true))
       ->type_name("SIZE");
   command->add_option("--compress", options.compression, "Level 0 to 9 for .nii.gz .nrrd .mha")

@@ -163,7 +163,7 @@ void Deformation::check_input(const InputHeader& input) {
                      to_string(input.type) + "; choose a value in their range");
   }
   planned_bytes_ = plan_bytes(input);
-  if (options_.memory_bytes && planned_bytes_ > *options_.memory_bytes) {
+  if (options_.memory_bytes && planned_bytes_ > *options_.memory_bytes && !means_cuda(options_.backend)) {
     throw Error("about " + format_bytes(planned_bytes_) + " of memory are needed, --memory allows " +
                 format_bytes(*options_.memory_bytes) + "; a larger --cell-size needs less");
   }
@@ -212,8 +212,8 @@ void Deformation::resample() {
   auto input_hash = std::async(
       std::launch::async, [&] { return input_.is_dicom() ? input_.dicom->sha256 : hash_file(options_.input.path); });
   const Geometry& grid = input_.volume.geometry();
-  Backend backend =
-      make_backend(options_.backend, field_.direction, grid, options_.device, {.threads = options_.common.threads});
+  const Limits limits{.threads = options_.common.threads, .memory = options_.memory_bytes.value_or(0)};
+  Backend backend = make_backend(options_.backend, field_.direction, grid, options_.device, limits);
   backend_ = backend.name;
   if (field_.direction == Direction::pull) {
     backend.resampler->set_field(view(field_.pull, options_.outside), {.stop = interrupt_token()});
@@ -312,6 +312,10 @@ json Deformation::report_with_times() const {
     total += seconds;
   }
   document["total_seconds"] = total;
+  if (field_.direction == Direction::forward) {
+    document["paths"] = {
+        {"gathered", report_.paths.gathered}, {"walked", report_.paths.walked}, {"claimed", report_.paths.claimed}};
+  }
   document["threads"] =
       options_.common.threads > 0 ? options_.common.threads : static_cast<int>(std::thread::hardware_concurrency());
   document["memory"] = {{"peak_bytes", peak_memory_bytes()},

@@ -22,14 +22,20 @@ class DeviceBuffer {
   /// Room for at least `size` elements; what was there may be lost. @throws DeviceError
   T* reserve(std::size_t size) {
     if (size > size_) {
-      cudaFree(std::exchange(data_, nullptr));
-      size_ = 0;
+      release();
       TETWARP_CUDA_TRY(cudaMalloc(&data_, size * sizeof(T)));
       size_ = size;
     }
     return data_;
   }
   T* data() const { return data_; }
+  /// Elements that there is room for.
+  std::size_t capacity() const { return size_; }
+  /// Gives the memory back.
+  void release() {
+    cudaFree(std::exchange(data_, nullptr));
+    size_ = 0;
+  }
 
   void upload(const T* host, std::size_t size, cudaStream_t stream) {
     reserve(size);

@@ -94,7 +94,9 @@ void LatticeOnDevice::set(const LatticeFrame& frame, const Geometry& output, con
   LatticeFindings found;
   if (!set_steps(make_step_lattice(frame, output), displacement, room, wants_range, found, stream))
     set_vertices(displacement, size.x * size.y * size.z, found, stream);
-  if (found.not_bad_vertex != 0) refuse_vertex(unravel(static_cast<std::int64_t>(~found.not_bad_vertex), size));
+  if (found.not_bad_vertex != 0)
+    refuse_vertex(unravel(static_cast<std::int64_t>(~found.not_bad_vertex), size) +
+                  glm::i64vec3(0, 0, frame.first_slice));
   statistics_ = {found.inverted, found.degenerate};
   if (!wants_range) return;
   statistics_.jacobian_min = from_ordered(~found.not_least);

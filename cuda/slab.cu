@@ -1,11 +1,25 @@
 #include "cuda/slab.h"
 
+#include <algorithm>
+
 #include "cuda/pointer_check.h"
 #include "deform/target_check.h"
 
 namespace tetwarp::cuda_detail {
 
 namespace {
+
+constexpr std::int64_t kPlainVoxels = std::int64_t{1} << 30;   ///< of a box, where nothing is kept of each
+constexpr std::int64_t kWorkBytes = std::int64_t{64} << 20;    ///< otherwise: of what is kept
+constexpr std::int64_t kResultBytes = std::int64_t{32} << 20;  ///< of a box, where results wait to be copied
+
+/// Where the next array may begin.
+std::size_t aligned(std::size_t bytes) { return (bytes + 255) / 256 * 256; }
+
+std::size_t bytes_of(const ConstVolumeView& source, const Slices& slices) {
+  const glm::i64vec3 held = source.buffered.end - source.buffered.begin;
+  return static_cast<std::size_t>(held.x * held.y * (slices.end - slices.begin)) * size_bytes(source.type);
+}
 
 /// Adds 1 for every thread of the warp whose condition holds.
 __device__ void count(unsigned long long* counter, bool condition) {
@@ -45,7 +59,7 @@ __global__ void sample_kernel(SamplePlan<V> plan, SlabBox slab, const std::uint8
 __global__ void count_kernel(SlabBox slab, const std::uint8_t* mapped, std::uint8_t* coverage, Counts* counts) {
   const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
   if (n >= slab.count()) return;
-  coverage[n] = mapped[n];
+  if (coverage) coverage[n] = mapped[n];
   count(&counts->covered, mapped[n] != 0);
   count(&counts->uncovered, mapped[n] == 0);
 }
@@ -76,80 +90,29 @@ void launch_sample(cudaStream_t stream, Interpolation interpolation, std::int64_
 
 }  // namespace
 
-struct SlabWriter::DeviceTarget {
-  Target target;
-  SourceRelation relation;
-  const std::byte* source;
-  DeviceBuffer<std::byte> uploaded;  ///< the source, where it was on the host
-  DeviceBuffer<long long> first, last;
-};
-
-SlabWriter::SlabWriter(const Geometry& output, std::span<const Target> targets, const Maps& maps, cudaStream_t stream)
-    : output_(output), maps_(maps), stream_(stream) {
+void SlabWriter::begin(std::span<const Target> targets, const Maps& maps, cudaStream_t stream) {
+  maps_ = maps;
+  stream_ = stream;
   for (const VolumeView& map : {maps.coverage, maps.inverse_mm, maps.jacobian, maps.owners})
     require_memory(map.voxels, map.memory, "a map");
-  for (const Target& target : targets) {
-    auto on_device = std::make_unique<DeviceTarget>();
-    on_device->target = target;
-    on_device->relation = relate(*target.source.geometry, output);
+  while (kept_.size() < targets.size()) kept_.push_back(std::make_unique<DeviceTarget>());
+  targets_ = std::span(kept_).first(targets.size());
+  for (std::size_t n = 0; n < targets.size(); ++n) {
+    DeviceTarget& on_device = *targets_[n];
+    const Target& target = on_device.target = targets[n];
+    on_device.source = target.source;
+    on_device.relation = relate(*target.source.geometry, output_);
     require_memory(target.source.voxels, target.source.memory, "the source");
     require_memory(target.output.voxels, target.output.memory, "the output");
-    on_device->source = target.source.voxels;
-    if (target.source.memory == Memory::host) {
-      const auto bytes = static_cast<std::size_t>(voxel_count(target.source.buffered)) * size_bytes(target.source.type);
-      on_device->uploaded.upload(target.source.voxels, bytes, stream_);
-      on_device->source = on_device->uploaded.data();
+    std::vector<long long> first, last;
+    for (const SliceRange& range : target.sampled_slices) {
+      first.push_back(range.first);
+      last.push_back(range.last);
     }
-    if (!target.sampled_slices.empty()) {
-      std::vector<long long> first, last;
-      for (const SliceRange& range : target.sampled_slices) {
-        first.push_back(range.first);
-        last.push_back(range.last);
-      }
-      on_device->first.upload(first.data(), first.size(), stream_);
-      on_device->last.upload(last.data(), last.size(), stream_);
-    }
-    targets_.push_back(std::move(on_device));
+    if (first.empty()) continue;
+    on_device.first.upload(first.data(), first.size(), stream_);
+    on_device.last.upload(last.data(), last.size(), stream_);
   }
-}
-
-SlabWriter::~SlabWriter() = default;
-
-void SlabWriter::write(const SlabBox& slab, const Mapped& mapped, Counts* counts) {
-  std::uint8_t* coverage = coverage_.reserve(static_cast<std::size_t>(slab.count()));
-  for (std::size_t n = 0; n < targets_.size(); ++n) {
-    write_target(*targets_[n], slab, mapped, n == 0 ? coverage : nullptr, n == 0 ? counts : nullptr);
-  }
-  if (targets_.empty()) {
-    count_kernel<<<blocks_for(slab.count()), kThreads, 0, stream_>>>(slab, mapped.mapped.data(), coverage, counts);
-    TETWARP_CUDA_TRY(cudaGetLastError());
-  }
-  write_maps(slab, mapped);
-}
-
-void SlabWriter::write_target(DeviceTarget& on_device, const SlabBox& slab, const Mapped& mapped,
-                              std::uint8_t* coverage, Counts* counts) {
-  const Target& target = on_device.target;
-  const DeviceSlices slices{on_device.first.data(), on_device.last.data()};
-  dispatch(target.source.type, [&](auto voxel) {
-    using V = decltype(voxel);
-    const Destination<V> output = destination<V>(target, slab);
-    const auto plan = plan_target(target, on_device.relation, reinterpret_cast<const V*>(on_device.source));
-    launch_sample<V>(stream_, target.interpolation, slab.count(), plan, slab,
-                     static_cast<const std::uint8_t*>(mapped.mapped.data()),
-                     static_cast<const glm::vec3*>(mapped.offset.data()), output, coverage, slices, counts);
-    if (target.output.memory == Memory::host) copy_out(target.output, slab, output.voxels);
-  });
-}
-
-template <class V>
-Destination<V> SlabWriter::destination(const Target& target, const SlabBox& slab) {
-  if (target.output.memory == Memory::device) {
-    const glm::i64vec3 held = target.output.buffered.end - target.output.buffered.begin;
-    return {reinterpret_cast<V*>(target.output.voxels), target.output.buffered.begin, held.x, held.x * held.y};
-  }
-  V* buffer = reinterpret_cast<V*>(voxels_.reserve(static_cast<std::size_t>(slab.count()) * sizeof(V)));
-  return {buffer, slab.begin, slab.size.x, slab.size.x * slab.size.y};
 }
 
 bool SlabWriter::is_plain() const {
@@ -168,13 +131,133 @@ bool SlabWriter::is_plain() const {
          (type == VoxelType::u8 || type == VoxelType::i16 || type == VoxelType::u16);
 }
 
-AnyVoxelSink SlabWriter::plain_sink(const SlabBox& slab) {
+bool SlabWriter::has_results_on_host() const {
+  for (const VolumeView& map : {maps_.coverage, maps_.inverse_mm, maps_.jacobian, maps_.owners}) {
+    if (map.voxels && map.memory == Memory::host) return true;
+  }
+  return std::any_of(targets_.begin(), targets_.end(),
+                     [](const auto& target) { return target->target.output.memory == Memory::host; });
+}
+
+std::int64_t SlabWriter::box_voxels(bool plain) const {
+  constexpr std::int64_t kMappedBytes = 25;  // of a voxel: Mapped, and what claims keep
+  constexpr std::int64_t kGroup = 1 << 10;
+  const std::int64_t most = plain ? kPlainVoxels : kWorkBytes / kMappedBytes;
+  const auto group_bytes = static_cast<std::int64_t>(layout(kGroup).bytes);
+  return group_bytes == 0 ? most : std::min(most, kResultBytes / group_bytes * kGroup);
+}
+
+SlabWriter::Layout SlabWriter::layout(std::int64_t voxels) const {
+  Layout layout;
+  const auto add = [&](std::size_t voxel_bytes) {
+    const std::size_t begin = layout.bytes;
+    layout.bytes += aligned(voxel_bytes * static_cast<std::size_t>(voxels));
+    return begin;
+  };
+  for (const auto& on_device : targets_) {
+    const VolumeView& output = on_device->target.output;
+    layout.voxels.push_back(output.memory == Memory::host ? add(size_bytes(output.type)) : Layout::kNone);
+  }
+  if (maps_.coverage.voxels) layout.coverage = add(sizeof(std::uint8_t));
+  if (maps_.inverse_mm.voxels) layout.inverse_mm = add(sizeof(glm::vec3));
+  if (maps_.jacobian.voxels) layout.jacobian = add(sizeof(float));
+  if (maps_.owners.voxels) layout.owners = add(sizeof(std::uint16_t));
+  return layout;
+}
+
+std::uint64_t SlabWriter::source_bytes(const std::function<Slices(const ConstVolumeView& source)>& slices_of) const {
+  std::uint64_t bytes = 0;
+  for (const auto& on_device : targets_) {
+    const ConstVolumeView& source = on_device->source;
+    if (source.memory == Memory::host) bytes += aligned(bytes_of(source, slices_of(source)));
+  }
+  return bytes;
+}
+
+void SlabWriter::release() {
+  sources_.release();
+  results_.release();
+}
+
+void SlabWriter::reserve(std::uint64_t source_bytes, std::int64_t box_voxels, int boxes) {
+  sources_.reserve(source_bytes);
+  boxes_ = boxes;
+  box_bytes_ = layout(box_voxels).bytes;
+  results_.reserve(static_cast<std::size_t>(boxes) * box_bytes_);
+}
+
+void SlabWriter::hold_sources(const std::function<Slices(const ConstVolumeView& source)>& slices_of) {
+  std::byte* to = sources_.reserve(source_bytes(slices_of));
+  for (const auto& on_device : targets_) {
+    const ConstVolumeView& source = on_device->source;
+    if (source.memory == Memory::device) continue;
+    const Slices slices = slices_of(source);
+    const std::size_t bytes = bytes_of(source, slices);
+    uploads_.copy(to, source.voxels + bytes_of(source, {source.buffered.begin.z, slices.begin}), bytes, stream_);
+    ConstVolumeView& held = on_device->target.source;
+    held.voxels = to;
+    held.memory = Memory::device;
+    held.buffered.begin.z = slices.begin;
+    held.buffered.end.z = slices.end;
+    to += aligned(bytes);
+  }
+}
+
+void SlabWriter::begin_box(const SlabBox& box) {
+  current_ = boxes_ == 1 ? 0 : 1 - current_;
+  copied_[current_].hold_back(stream_);
+  layout_ = layout(box.count());
+}
+
+void SlabWriter::write(const SlabBox& box, const Mapped& mapped, Counts* counts) {
+  auto* coverage = place<std::uint8_t>(layout_.coverage);
+  for (std::size_t n = 0; n < targets_.size(); ++n)
+    write_target(n, box, mapped, n == 0 ? coverage : nullptr, n == 0 ? counts : nullptr);
+  if (targets_.empty()) {
+    count_kernel<<<blocks_for(box.count()), kThreads, 0, stream_>>>(box, mapped.mapped.data(), coverage, counts);
+    TETWARP_CUDA_TRY(cudaGetLastError());
+  }
+  if (maps_.inverse_mm.voxels) {
+    inverse_kernel<<<blocks_for(box.count()), kThreads, 0, stream_>>>(box, point_from_index(output_).linear,
+                                                                      mapped.mapped.data(), mapped.offset.data(),
+                                                                      place<glm::vec3>(layout_.inverse_mm));
+    TETWARP_CUDA_TRY(cudaGetLastError());
+  }
+}
+
+void SlabWriter::write_target(std::size_t number, const SlabBox& box, const Mapped& mapped, std::uint8_t* coverage,
+                              Counts* counts) {
+  const DeviceTarget& on_device = *targets_[number];
+  const Target& target = on_device.target;
+  const bool slices_wanted = !target.sampled_slices.empty();
+  const DeviceSlices slices{slices_wanted ? on_device.first.data() : nullptr,
+                            slices_wanted ? on_device.last.data() : nullptr};
+  dispatch(target.source.type, [&](auto voxel) {
+    using V = decltype(voxel);
+    const auto plan = plan_target(target, on_device.relation, reinterpret_cast<const V*>(target.source.voxels));
+    launch_sample<V>(
+        stream_, target.interpolation, box.count(), plan, box, static_cast<const std::uint8_t*>(mapped.mapped.data()),
+        static_cast<const glm::vec3*>(mapped.offset.data()), destination<V>(number, box), coverage, slices, counts);
+  });
+}
+
+template <class V>
+Destination<V> SlabWriter::destination(std::size_t number, const SlabBox& box) {
+  const VolumeView& output = targets_[number]->target.output;
+  if (output.memory == Memory::device) {
+    const glm::i64vec3 held = output.buffered.end - output.buffered.begin;
+    return {reinterpret_cast<V*>(output.voxels), output.buffered.begin, held.x, held.x * held.y};
+  }
+  return {place<V>(layout_.voxels[number]), box.begin, box.size.x, box.size.x * box.size.y};
+}
+
+AnyVoxelSink SlabWriter::plain_sink(const SlabBox& box) {
   const DeviceTarget& on_device = *targets_.front();
   const Target& target = on_device.target;
   const auto make = [&](auto voxel) {
     using V = decltype(voxel);
-    const auto plan = plan_target(target, on_device.relation, reinterpret_cast<const V*>(on_device.source));
-    const Destination<V> output = destination<V>(target, slab);
+    const auto plan = plan_target(target, on_device.relation, reinterpret_cast<const V*>(target.source.voxels));
+    const Destination<V> output = destination<V>(0, box);
     const glm::i64vec3 &begin = plan.source.begin, &stride = plan.source.stride;
     return VoxelSink<V>{plan.source.voxels - (begin.z * stride.z + begin.y * stride.y + begin.x),
                         glm::ivec3(plan.source.size) - 1,
@@ -192,41 +275,28 @@ AnyVoxelSink SlabWriter::plain_sink(const SlabBox& slab) {
   }
 }
 
-void SlabWriter::finish_plain(const SlabBox& slab) {
-  const Target& target = targets_.front()->target;
-  if (target.output.memory == Memory::host) copy_out(target.output, slab, voxels_.data());
-}
-
-void SlabWriter::write_maps(const SlabBox& slab, const Mapped& mapped) {
-  if (maps_.coverage.voxels) copy_out(maps_.coverage, slab, coverage_.data());
-  if (maps_.inverse_mm.voxels) {
-    glm::vec3* inverse_mm = inverse_mm_.reserve(static_cast<std::size_t>(slab.count()));
-    inverse_kernel<<<blocks_for(slab.count()), kThreads, 0, stream_>>>(
-        slab, point_from_index(output_).linear, mapped.mapped.data(), mapped.offset.data(), inverse_mm);
-    TETWARP_CUDA_TRY(cudaGetLastError());
-    copy_out(maps_.inverse_mm, slab, inverse_mm);
+void SlabWriter::end_box(const SlabBox& box) {
+  if (has_results_on_host()) {
+    computed_.record(stream_);
+    computed_.hold_back(downloads_.stream());
   }
-  if (wants_jacobian()) copy_out(maps_.jacobian, slab, mapped.jacobian.data());
-  if (wants_owners()) copy_out(maps_.owners, slab, mapped.owners.data());
+  for (std::size_t n = 0; n < targets_.size(); ++n) give(targets_[n]->target.output, box, layout_.voxels[n]);
+  give(maps_.coverage, box, layout_.coverage);
+  give(maps_.inverse_mm, box, layout_.inverse_mm);
+  give(maps_.jacobian, box, layout_.jacobian);
+  give(maps_.owners, box, layout_.owners);
+  copied_[current_].record(downloads_.stream());
 }
 
-/// From a buffer of the slab alone into its place in a view, on the host or the device.
-void SlabWriter::copy_out(const VolumeView& view, const SlabBox& slab, const void* device) {
-  const glm::i64vec3 held = view.buffered.end - view.buffered.begin, at = slab.begin - view.buffered.begin;
-  const std::size_t voxel = size_bytes(view.type) * static_cast<std::size_t>(view.components);
-  cudaMemcpy3DParms copy{};
-  const auto pitched = [&](const void* bytes, const glm::i64vec3& size) {
-    const auto width = static_cast<std::size_t>(size.x);
-    return make_cudaPitchedPtr(const_cast<void*>(bytes), width * voxel, width, static_cast<std::size_t>(size.y));
-  };
-  copy.srcPtr = pitched(device, slab.size);
-  copy.dstPtr = pitched(view.voxels, held);
-  copy.dstPos = make_cudaPos(static_cast<std::size_t>(at.x) * voxel, static_cast<std::size_t>(at.y),
-                             static_cast<std::size_t>(at.z));
-  copy.extent = make_cudaExtent(static_cast<std::size_t>(slab.size.x) * voxel, static_cast<std::size_t>(slab.size.y),
-                                static_cast<std::size_t>(slab.size.z));
-  copy.kind = view.memory == Memory::host ? cudaMemcpyDeviceToHost : cudaMemcpyDeviceToDevice;
-  TETWARP_CUDA_TRY(cudaMemcpy3DAsync(&copy, stream_));
+void SlabWriter::give(const VolumeView& view, const SlabBox& box, std::size_t offset) {
+  const auto* from = place<std::byte>(offset);
+  if (!from) return;
+  const Region region{box.begin, box.begin + box.size};
+  if (view.memory == Memory::host) {
+    downloads_.copy(view, region, from);
+  } else {
+    copy_box(view, region, from, stream_);
+  }
 }
 
 void SlabWriter::finish() {
@@ -237,6 +307,15 @@ void SlabWriter::finish() {
     on_device->first.download(first.data(), first.size(), stream_);
     on_device->last.download(last.data(), last.size(), stream_);
     for (std::size_t k = 0; k < ranges.size(); ++k) ranges[k] = {first[k], last[k]};
+  }
+  downloads_.finish();
+}
+
+void SlabWriter::settle() noexcept {
+  cudaStreamSynchronize(stream_);
+  try {
+    downloads_.finish();
+  } catch (...) {  // what failed first is on its way already
   }
 }
 

@@ -1,17 +1,18 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <span>
 #include <variant>
 #include <vector>
 
+#include "cuda/host_copies.h"
 #include "cuda/lattice.h"
-#include "deform/resampler.h"
+#include "cuda/lattice_part.h"
+#include "deform/core/sample_voxel.h"
 
 namespace tetwarp::cuda_detail {
-
-/// Voxels that are worked on at a time: bounds what is kept of each voxel on the device (about 30 bytes).
-constexpr std::int64_t kSlabVoxels = std::int64_t{1} << 25;
 
 /// A box of voxels, as a kernel sees it.
 struct SlabBox {
@@ -42,12 +43,10 @@ struct Counts {
   unsigned long long covered, uncovered, clamped, padded, conflicts, multiply_owned;
 };
 
-/// What the field says of each voxel of a slab: where it comes from, and what maps may want to know.
+/// Where each voxel of a box comes from, one after the other.
 struct Mapped {
-  DeviceBuffer<std::uint8_t> mapped;
-  DeviceBuffer<glm::vec3> offset;
-  DeviceBuffer<float> jacobian;
-  DeviceBuffer<std::uint16_t> owners;
+  DeviceBuffer<std::uint8_t> mapped;  ///< whether it comes from anywhere
+  DeviceBuffer<glm::vec3> offset;     ///< undeformed minus deformed place, voxels
 };
 
 /// Samples voxels one by one: linear, integers that float holds, no padding, source and output on one grid. The bits of
@@ -77,43 +76,94 @@ struct VoxelSink {
 
 using AnyVoxelSink = std::variant<VoxelSink<std::uint8_t>, VoxelSink<std::int16_t>, VoxelSink<std::uint16_t>>;
 
-/// Samples targets and writes maps of slabs whose Mapped is known. Knows nothing of fields.
+/// Samples targets and writes maps, box after box, and copies to the host beside the next box. Knows nothing of fields.
+///
+/// Everything on the device is kept from call to call.
 class SlabWriter {
  public:
-  /// Uploads the sources that are on the host. Targets and maps are checked. @throws DeviceError
-  SlabWriter(const Geometry& output, std::span<const Target> targets, const Maps& maps, cudaStream_t stream);
-  ~SlabWriter();
+  SlabWriter(const Geometry& output, int device, Uploads& uploads)
+      : output_(output), uploads_(uploads), downloads_(device) {}
+
+  /// Takes the targets and maps of a call, which are checked. @throws InputError for memory that is not where a view
+  /// says
+  void begin(std::span<const Target> targets, const Maps& maps, cudaStream_t stream);
 
   bool wants_jacobian() const { return maps_.jacobian.voxels != nullptr; }
   bool wants_owners() const { return maps_.owners.voxels != nullptr; }
-
-  void write(const SlabBox& slab, const Mapped& mapped, Counts* counts);
-
   /// Whether all that is wanted is one volume that a VoxelSink can sample, and no maps.
   bool is_plain() const;
-  /// What writes the voxels of a slab, where `is_plain`; `finish_plain` gives them to the target.
-  AnyVoxelSink plain_sink(const SlabBox& slab);
-  void finish_plain(const SlabBox& slab);
-  /// Gives the source slices that were read to the targets.
+
+  /// Voxels that may be worked on at a time. @param plain  whether they go to `plain_sink`
+  std::int64_t box_voxels(bool plain) const;
+  /// Device memory for the results of boxes, of which `boxes` are held at a time.
+  std::uint64_t result_bytes(std::int64_t voxels, int boxes) const { return boxes * layout(voxels).bytes; }
+  /// Device memory for slices of the sources on the host. @param slices_of  of a source, the slices to hold
+  std::uint64_t source_bytes(const std::function<Slices(const ConstVolumeView& source)>& slices_of) const;
+
+  std::uint64_t held_source_bytes() const { return sources_.capacity(); }
+  std::uint64_t held_result_bytes() const { return results_.capacity(); }
+  void release();
+
+  void reserve(std::uint64_t source_bytes, std::int64_t box_voxels, int boxes);
+  /// Uploads slices of the sources that are on the host.
+  void hold_sources(const std::function<Slices(const ConstVolumeView& source)>& slices_of);
+
+  /// Before the voxels of a box are found.
+  void begin_box(const SlabBox& box);
+  float* jacobian() const { return place<float>(layout_.jacobian); }              ///< of the box; null: not wanted
+  std::uint16_t* owners() const { return place<std::uint16_t>(layout_.owners); }  ///< likewise
+  void write(const SlabBox& box, const Mapped& mapped, Counts* counts);
+  /// What writes the voxels of the box, where `is_plain`, in place of `write`.
+  AnyVoxelSink plain_sink(const SlabBox& box);
+  /// Gives the results of the box to the views.
+  void end_box(const SlabBox& box);
+  /// Waits until the host has everything.
   void finish();
+  /// Waits until nothing is under way, whatever became of it.
+  void settle() noexcept;
 
  private:
-  struct DeviceTarget;
+  /// One target, and what of it is on the device.
+  struct DeviceTarget {
+    Target target;           ///< its source is what the device holds
+    ConstVolumeView source;  ///< as it was given
+    SourceRelation relation;
+    DeviceBuffer<long long> first, last;  ///< its sampled slices
+  };
+  /// Where the results of a box begin, bytes; kNone: not wanted.
+  struct Layout {
+    static constexpr std::size_t kNone = SIZE_MAX;
 
-  void write_target(DeviceTarget& target, const SlabBox& slab, const Mapped& mapped, std::uint8_t* coverage,
-                    Counts* counts);
-  void write_maps(const SlabBox& slab, const Mapped& mapped);
+    std::vector<std::size_t> voxels;  ///< of each target
+    std::size_t coverage = kNone, inverse_mm = kNone, jacobian = kNone, owners = kNone;
+    std::size_t bytes = 0;
+  };
+
+  Layout layout(std::int64_t voxels) const;
+  template <class T>
+  T* place(std::size_t offset) const {
+    if (offset == Layout::kNone) return nullptr;
+    return reinterpret_cast<T*>(results_.data() + static_cast<std::size_t>(current_) * box_bytes_ + offset);
+  }
   template <class V>
-  Destination<V> destination(const Target& target, const SlabBox& slab);
-  void copy_out(const VolumeView& view, const SlabBox& slab, const void* device);
+  Destination<V> destination(std::size_t number, const SlabBox& box);
+  void write_target(std::size_t number, const SlabBox& box, const Mapped& mapped, std::uint8_t* coverage,
+                    Counts* counts);
+  void give(const VolumeView& view, const SlabBox& box, std::size_t offset);
+  bool has_results_on_host() const;
 
   const Geometry& output_;
+  Uploads& uploads_;
+  Downloads downloads_;
   Maps maps_;
-  cudaStream_t stream_;
-  std::vector<std::unique_ptr<DeviceTarget>> targets_;
-  DeviceBuffer<std::uint8_t> coverage_;
-  DeviceBuffer<glm::vec3> inverse_mm_;
-  DeviceBuffer<std::byte> voxels_;
+  cudaStream_t stream_ = nullptr;
+  std::vector<std::unique_ptr<DeviceTarget>> kept_;
+  std::span<std::unique_ptr<DeviceTarget>> targets_;  ///< of this call, the first of `kept_`
+  DeviceBuffer<std::byte> sources_, results_;
+  Layout layout_;  ///< of the box
+  std::size_t box_bytes_ = 0;
+  int boxes_ = 1, current_ = 0;
+  Event computed_, copied_[2];
 };
 
 }  // namespace tetwarp::cuda_detail

@@ -24,6 +24,7 @@ constexpr float kMost = 1 << 22;  ///< steps that a vertex may move: a differenc
 class FloatSnap {
  public:
   explicit FloatSnap(const LatticeFrame& frame, const StepLattice& lattice) {
+    const glm::dvec3 first = frame.output_from_lattice(glm::dvec3(0, 0, static_cast<double>(frame.first_slice)));
     double beside = 0;  // how far a vertex may rest from its whole step
     exact_ = true;
     for (int axis = 0; axis < 3; ++axis) {
@@ -33,7 +34,7 @@ class FloatSnap {
         beside += std::fabs(frame.output_from_lattice.linear[axis][other] * kStepsPerVoxel - meant) *
                   static_cast<double>(frame.cells[axis]);
       }
-      beside += std::fabs(frame.output_from_lattice.offset[axis] * kStepsPerVoxel - double{lattice.first[axis]});
+      beside += std::fabs(first[axis] * kStepsPerVoxel - double{lattice.first[axis]});
       const double scale = frame.output_from_mm[axis][axis] * kStepsPerVoxel;
       high_[axis] = static_cast<float>(scale);
       low_[axis] = static_cast<float>(scale - double{high_[axis]});

@@ -56,7 +56,7 @@ LatticeFrame make_lattice_frame(const Geometry& output, const FieldView& field) 
 StepLattice make_step_lattice(const LatticeFrame& frame, const Geometry& output) {
   constexpr double kMostSteps = 1 << 24, kNegligible = 1e-6;
   const glm::dmat3& linear = frame.output_from_lattice.linear;
-  const glm::ivec3 first = snap(frame.output_from_lattice(glm::dvec3(0)));
+  const glm::ivec3 first = snap(frame.output_from_lattice(glm::dvec3(0, 0, frame.first_slice)));
   StepLattice lattice;
   for (int axis = 0; axis < 3; ++axis) {
     const double step = std::rint(linear[axis][axis] * kStepsPerVoxel);

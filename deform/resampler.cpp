@@ -51,6 +51,9 @@ Report& Report::operator+=(const Report& other) {
   if (other.multiply_owned) multiply_owned = multiply_owned.value_or(0) + *other.multiply_owned;
   jacobian_min = std::min(jacobian_min, other.jacobian_min);
   jacobian_max = std::max(jacobian_max, other.jacobian_max);
+  paths.gathered += other.paths.gathered;
+  paths.walked += other.paths.walked;
+  paths.claimed += other.paths.claimed;
   return *this;
 }
 

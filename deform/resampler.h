@@ -47,6 +47,13 @@ struct Maps {
   VolumeView owners = {};  ///< u16: tetrahedra that own the voxel; more than 1 is a fold; saturates
 };
 
+/// How a backend found the owners of the voxels asked for. The result does not depend on it; pull fields have none.
+struct Paths {
+  std::uint64_t gathered = 0;  ///< predicted and proved in float, or known to have no owner
+  std::uint64_t walked = 0;    ///< no prediction held: sought with exact integers
+  std::uint64_t claimed = 0;   ///< by every tetrahedron that may own them
+};
+
 /// What happened. Voxel counts are of the region asked for and the first target; the rest describes the whole field.
 struct Report {
   std::uint64_t covered = 0;    ///< voxels that got a value through the field
@@ -62,6 +69,7 @@ struct Report {
   double jacobian_min =
       std::numeric_limits<double>::infinity();  ///< over all tetrahedra of the field; computed in float
   double jacobian_max = -std::numeric_limits<double>::infinity();
+  Paths paths;  ///< the one part that backends, limits and splits change
 
   /// Regions of one field add up to the same report, whatever the split.
   Report& operator+=(const Report& other);
@@ -113,6 +121,10 @@ class Resampler {
 
 struct Limits {
   int threads = 0;  ///< 0: all that this process may use
+  /// Bytes on the device for fields, sources and results that are on the host; 0: what is free there, less a reserve.
+  /// What does not fit is streamed in slabs. Working space comes on top: 10 % or 128 MB, whichever is more. Views of
+  /// device memory do not count. The CPU keeps nothing there.
+  std::uint64_t memory = 0;
 };
 
 /// Forward fields on the CPU. @throws InputError for an output with fewer than two voxels or more than 2^18 on an axis
@@ -121,6 +133,9 @@ std::unique_ptr<Resampler> make_cpu_resampler(Geometry output, Limits limits = {
 std::unique_ptr<Resampler> make_cpu_pull_resampler(Geometry output, Limits limits = {});
 
 /// The same on a CUDA device: the same bits. @throws DeviceError without a device, NotCompiled in a build without CUDA
+///
+/// Fields, sources and results on the host pass through pinned memory, downloads beside the kernels; repeated sizes
+/// allocate nothing. `set_field` and `resample` throw DeviceError where not even one slice fits the memory allowed.
 std::unique_ptr<Resampler> make_cuda_resampler(Geometry output, int device = 0, Limits limits = {});
 std::unique_ptr<Resampler> make_cuda_pull_resampler(Geometry output, int device = 0, Limits limits = {});
 

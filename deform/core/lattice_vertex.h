@@ -12,6 +12,9 @@ struct LatticeFrame {
   AffineMap output_from_lattice, lattice_from_output;
   glm::dmat3 output_from_mm{1};
   glm::i64vec3 cells{0};
+  /// Of a part of a lattice, slices along k that are held elsewhere: its vertices count from here, the maps and the
+  /// nudge stay those of the whole lattice. Even, so that cells keep their parity.
+  std::int64_t first_slice = 0;
   Nudge nudge;
 
   TETWARP_HD static bool is_usable(const glm::dvec3& index, double limit) {  // false for NaN
@@ -21,7 +24,7 @@ struct LatticeFrame {
   /// Both ends of a vertex in output index, in double, then snapped; u is zero exactly where the displacement is.
   /// @return false where the displacement is not finite or too long
   TETWARP_HD bool snap_vertex(const glm::i64vec3& at, const glm::vec3& displacement, Vertex& vertex) const {
-    const glm::dvec3 rest = output_from_lattice(glm::dvec3(at));
+    const glm::dvec3 rest = output_from_lattice(glm::dvec3(at.x, at.y, at.z + first_slice));
     const glm::i32vec3 snapped = snap(rest);
     vertex = {snapped, glm::i32vec3(0)};
     if (displacement.x == 0 && displacement.y == 0 && displacement.z == 0) return true;
@@ -42,7 +45,7 @@ struct LatticeFrame {
     return reach;
   }
 
-  /// Whether a voxel, nudged, lies inside the undeformed lattice.
+  /// Whether a voxel, nudged, lies inside the undeformed lattice, which must be a whole one.
   TETWARP_HD bool holds(const glm::i64vec3& voxel) const {
     const glm::dvec3 step = glm::dvec3(nudge_steps(nudge.signs(voxel))) * (1.0 / (kStepsPerVoxel * kNudgeSteps));
     const glm::dvec3 at = lattice_from_output(glm::dvec3(voxel) + step);

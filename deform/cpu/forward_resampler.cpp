@@ -67,6 +67,7 @@ class ForwardResampler final : public Resampler {
       claim(box, tile, writer);
       return gather(box, tile, samplers, writer);
     });
+    report.paths.claimed = static_cast<std::uint64_t>(voxel_count(region));
     const FieldStatistics& statistics = lattice_.statistics();
     report.inverted = statistics.inverted;
     report.degenerate = statistics.degenerate;

@@ -101,11 +101,13 @@ TEST(Deform, TheReportTellsWhatHappenedAndTheSidecarHasNoClock) {
   EXPECT_EQ(report["report"]["covered"], 38 * 36 * 24);
   EXPECT_EQ(report["report"]["uncovered"], 2 * 36 * 24);
   EXPECT_EQ(report["backend"], "cpu");
+  EXPECT_EQ(report["paths"]["claimed"], 40 * 36 * 24);
   for (const std::string stage : {"read", "field", "resample", "write"})
     EXPECT_GE(report["stages"][stage]["seconds"], 0.0) << stage;
   EXPECT_GT(report["memory"]["peak_bytes"], report["memory"]["source_bytes"]);
   const auto sidecar = nlohmann::json::parse(read_text(scratch / "out.mha.json"));
   EXPECT_FALSE(sidecar.contains("stages"));
+  EXPECT_FALSE(sidecar.contains("paths"));
   EXPECT_EQ(sidecar["field"]["sha256"].get<std::string>().size(), 64u);
   const AnyVolume mask = read_image(scratch / "mask.nii.gz");
   EXPECT_EQ(std::count(mask.as<std::uint8_t>().begin(), mask.as<std::uint8_t>().end(), 1), 38 * 36 * 24);

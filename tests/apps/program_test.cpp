@@ -115,7 +115,8 @@ TEST(Program, FailuresExitWithOneAndLoseNothing) {
   EXPECT_EQ(read_text(scratch / "out.nii"), "precious");
   expect_error(run_tetwarp(scratch.path(), "deform in.nii -f identity -o out.nii --dry-run"), 1, "out.nii exists");
   expect_error(run_tetwarp(scratch.path(), "deform in.nii -f identity -o no_folder/out.nii"), 1, "no_folder");
-  expect_error(run_tetwarp(scratch.path(), "deform in.nii -f identity -o new.nii --memory 1M"), 1, "--memory");
+  expect_error(run_tetwarp(scratch.path(), "deform in.nii -f identity -o new.nii --backend cpu --memory 1M"), 1,
+               "--memory");
   std::filesystem::create_directory(scratch / "other");
   write_file(scratch / "other/letter.txt", "precious");
   expect_error(run_tetwarp(scratch.path(), kPhantom + std::string("other --overwrite")), 1, "other");
