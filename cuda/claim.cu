@@ -28,11 +28,13 @@ __global__ void bounds_kernel(DeviceField field, Blocks blocks, VoxelBounds* bou
   }
   __syncthreads();
   const glm::i64vec3 first = blocks.first_cell(blockIdx.x);
-  const glm::ivec3 size =
-      glm::ivec3(glm::min(glm::i64vec3(Blocks::kX, Blocks::kY, Blocks::kZ), blocks.cells - first)) + 1;
+  constexpr int kX = Blocks::kX + 1, kY = Blocks::kY + 1, kZ = Blocks::kZ + 1;  // vertices
   Box box{glm::i32vec3(INT32_MAX), glm::i32vec3(INT32_MIN)};
-  for (int n = static_cast<int>(threadIdx.x); n < size.x * size.y * size.z; n += kThreads)
-    box.grow(field.vertex(first + glm::i64vec3(n % size.x, n / size.x % size.y, n / (size.x * size.y))).deformed);
+  for (int n = static_cast<int>(threadIdx.x); n < kX * kY * kZ; n += kThreads) {
+    const glm::i64vec3 at = first + glm::i64vec3(n % kX, n / kX % kY, n / (kX * kY));
+    if (at.x > blocks.cells.x || at.y > blocks.cells.y || at.z > blocks.cells.z) continue;
+    box.grow(field.vertices ? field.vertex(at).deformed : field.steps.deformed(glm::ivec3(at)));
+  }
   for (int axis = 0; axis < 3; ++axis) {
     int least = box.low[axis], most = box.high[axis];
     for (int step = 16; step > 0; step /= 2) {
@@ -125,7 +127,7 @@ struct WantedSlate {
     Box box{glm::i32vec3(INT32_MAX), glm::i32vec3(INT32_MIN)};
 #pragma unroll
     for (int corner = 0; corner < 8; ++corner)
-      box.grow(lattice.vertex(cell + glm::ivec3(corner & 1, corner >> 1 & 1, corner >> 2)).deformed);
+      box.grow(lattice.deformed(cell + glm::ivec3(corner & 1, corner >> 1 & 1, corner >> 2)));
     const IntBox voxels = candidates(turns, box.low, box.high, region);
     if (voxels.is_empty()) return false;
     const glm::ivec3 first = voxels.begin - region.begin, last = voxels.end - region.begin - 1;

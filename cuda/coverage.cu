@@ -6,14 +6,15 @@ namespace tetwarp::cuda_detail {
 
 namespace {
 
+constexpr int kBlock = 4;  ///< rows and slices of vertices that are looked at together for what is inverted
 constexpr unsigned kMostExtra = 1u << 18;
-constexpr int kNoExtra = -1, kLostExtra = -2;
+constexpr int kNoExtra = 0, kLostExtra = -1;
 
 struct Crossings {
   std::uint32_t *ins, *outs;
   int* start;
   int words;
-  int* extra_of_row;  ///< first of a chain
+  int* extra_of_row;  ///< first of a chain, numbered from 1
   ExtraCrossing* extra;
   unsigned* extra_count;
 
@@ -22,7 +23,7 @@ struct Crossings {
     if (n < kMostExtra) {
       extra[n].voxel = voxel;
       extra[n].sign = sign;
-      extra[n].next = atomicExch(&extra_of_row[row], static_cast<int>(n));
+      extra[n].next = atomicExch(&extra_of_row[row], static_cast<int>(n + 1));
     } else {
       atomicExch(&extra_of_row[row], kLostExtra);
     }
@@ -50,6 +51,13 @@ __device__ void cross_rows(const BorderTriangle& t, const Nudge& nudge, const Sl
   }
 }
 
+/// The same for large triangles, which are few: out of line, so that registers suffice for many threads.
+template <class Int>
+__device__ __noinline__ void cross_rows_apart(BorderTriangle t, const Nudge& nudge, const SlabBox& box, glm::ivec2 low,
+                                              glm::ivec2 high, const Crossings& out) {
+  cross_rows<Int>(t, nudge, box, low, high, out);
+}
+
 /// How the triangles of the six sides of the border are numbered.
 struct Sides {
   std::int64_t first[7];  ///< of each side; the last is their number
@@ -63,7 +71,10 @@ struct Sides {
 };
 
 /// One thread a triangle of the border.
-__global__ void border_kernel(StepLattice lattice, Sides sides, Nudge nudge, SlabBox box, Crossings out) {
+__global__ void __launch_bounds__(kThreads, 8)
+    border_kernel(const __grid_constant__ StepLattice lattice, const __grid_constant__ Sides sides,
+                  const __grid_constant__ Nudge nudge, const __grid_constant__ SlabBox box,
+                  const __grid_constant__ Crossings out) {
   const std::int64_t number = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
   if (number >= sides.first[6]) return;
   int side = 0;
@@ -82,9 +93,9 @@ __global__ void border_kernel(StepLattice lattice, Sides sides, Nudge nudge, Sla
   if (fits_double(around)) {
     cross_rows<double>(t, nudge, box, from, to, out);
   } else if (fits_int64(around)) {
-    cross_rows<std::int64_t>(t, nudge, box, from, to, out);
+    cross_rows_apart<std::int64_t>(t, nudge, box, from, to, out);
   } else {
-    cross_rows<Wide>(t, nudge, box, from, to, out);
+    cross_rows_apart<Wide>(t, nudge, box, from, to, out);
   }
 }
 
@@ -96,13 +107,13 @@ struct Chain {
   /// What they add to the winding number within [begin, end) of the row.
   __device__ int sum(int begin, int end) const {
     int sum = 0;
-    for (int n = first; n >= 0; n = extra[n].next)
-      if (extra[n].voxel >= begin && extra[n].voxel < end) sum += extra[n].sign;
+    for (int n = first; n > 0; n = extra[n - 1].next)
+      if (extra[n - 1].voxel >= begin && extra[n - 1].voxel < end) sum += extra[n - 1].sign;
     return sum;
   }
   __device__ bool is_whole() const {
     int n = first;
-    while (n >= 0) n = extra[n].next;
+    while (n > 0) n = extra[n - 1].next;
     return n == kNoExtra;
   }
 };
@@ -152,7 +163,7 @@ __global__ void wind_kernel(Crossings in, std::int64_t rows, int rows_per_slice,
     carried += __shfl_sync(~0u, sum, 31);
   }
   found = warp_sum(found);
-  if (lane == 0 && found != 0) atomicAdd(&in_slice[row / rows_per_slice], found);
+  if (in_slice && lane == 0 && found != 0) atomicAdd(&in_slice[row / rows_per_slice], found);
 }
 
 /// The voxels that have become `several`.
@@ -160,7 +171,6 @@ struct SeveralMarker {
   IntBox region;
   int words;
   std::uint32_t *single, *several;
-  unsigned* in_slice;
 
   __device__ void mark(const IntBox& voxels) const {
     if (voxels.is_empty()) return;
@@ -172,52 +182,66 @@ struct SeveralMarker {
           std::uint32_t mask = ~0u;
           if (word == first.x / 32) mask &= ~0u << (first.x & 31);
           if (word == last.x / 32) mask &= ~0u >> (31 - (last.x & 31));
-          if ((several[row + word] & mask) != mask) mark_word(row + word, mask, z);
+          if ((several[row + word] & mask) == mask) continue;
+          atomicAnd(&single[row + word], ~mask);
+          atomicOr(&several[row + word], mask);
         }
       }
     }
   }
-
- private:
-  __device__ void mark_word(std::int64_t word, std::uint32_t mask, int z) const {
-    atomicAnd(&single[word], ~mask);
-    const std::uint32_t added = mask & ~atomicOr(&several[word], mask);
-    if (added != 0) atomicAdd(&in_slice[z], static_cast<unsigned>(__popc(added)));
-  }
 };
 
-/// One thread four pairs of vertices: all voxels that the inverted tetrahedra near them may reach go to `several`.
+/// How many bits each slice has: some thread blocks a slice.
+__global__ void count_kernel(const std::uint32_t* bits, int words_per_slice, unsigned* in_slice) {
+  unsigned found = 0;
+  const std::uint32_t* slice = bits + std::int64_t{blockIdx.y} * words_per_slice;
+  for (int n = static_cast<int>(blockIdx.x * kThreads + threadIdx.x); n < words_per_slice; n += gridDim.x * kThreads)
+    found += static_cast<unsigned>(__popc(slice[n]));
+  found = warp_sum(found);
+  if ((threadIdx.x & 31) == 0 && found != 0) atomicAdd(&in_slice[blockIdx.y], found);
+}
+
+/// One thread four pairs of vertices on kBlock rows of as many slices: all voxels that the inverted tetrahedra near
+/// them may reach go to `several`.
 __global__ void inverted_kernel(StepLattice lattice, NudgeTurns turns, InvertedPairs inverted, SeveralMarker marker) {
-  constexpr int kLargeBox = 1024;  // voxels: then pair by pair
+  constexpr int kLargeBox = 4096;  // voxels: then row by row
+  const int groups = inverted.words_per_row * 8, rows = (inverted.rows + kBlock - 1) / kBlock,
+            slices = lattice.cells.z / kBlock + 1;
   const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
-  if (n >= inverted.word(0, lattice.cells.z + 1, 0) * 8) return;
-  const int shift = static_cast<int>(n % 8) * 4;
-  const unsigned pairs = inverted.words[n / 8] >> shift & 0xF;
-  if (pairs == 0) return;
-  const auto number = static_cast<int>(n / 8 / inverted.words_per_row);
-  const int row = number % inverted.rows, slice = number / inverted.rows;
-  const auto box_of = [&](int first, int last) {
-    const int word = static_cast<int>(n / 8 % inverted.words_per_row);
+  if (n >= std::int64_t{groups} * rows * slices) return;
+  const int word = static_cast<int>(n % groups) / 8, shift = static_cast<int>(n % 8) * 4;
+  const glm::ivec2 first(n / groups % rows * kBlock, n / groups / rows * kBlock);
+  const auto pairs_of = [&](int row, int slice) {
+    if (row >= inverted.rows || slice > lattice.cells.z) return 0u;
+    return inverted.words[inverted.word(row, slice, word)] >> shift & 0xFu;
+  };
+  const auto box_of = [&](unsigned pairs, const glm::ivec2& from_row, const glm::ivec2& to_row) {
+    const int low = __ffs(static_cast<int>(pairs)) - 1, high = 31 - __clz(static_cast<int>(pairs));
     const glm::ivec3 from =
-        glm::max(glm::ivec3(InvertedPairs::column(row, word, shift + first), row, slice) - 1, glm::ivec3(0));
-    const glm::ivec3 to =
-        glm::min(glm::ivec3(InvertedPairs::column(row, word, shift + last) + 2, row + 1, slice + 1), lattice.cells);
+        glm::max(glm::ivec3(InvertedPairs::column(0, word, shift + low), from_row.x, from_row.y) - 1, glm::ivec3(0));
+    const glm::ivec3 to = glm::min(
+        glm::ivec3(InvertedPairs::column(1, word, shift + high) + 2, to_row.x + 1, to_row.y + 1), lattice.cells);
     Box box{glm::i32vec3(INT32_MAX), glm::i32vec3(INT32_MIN)};
     for (int z = from.z; z <= to.z; ++z) {
       for (int y = from.y; y <= to.y; ++y) {
-        for (int x = from.x; x <= to.x; ++x) box.grow(lattice.vertex({x, y, z}).deformed);
+        for (int x = from.x; x <= to.x; ++x) box.grow(lattice.deformed({x, y, z}));
       }
     }
     return candidates(turns, box.low, box.high, marker.region);
   };
-  const int first = __ffs(static_cast<int>(pairs)) - 1, last = 31 - __clz(static_cast<int>(pairs));
-  const IntBox all = box_of(first, last);
+  unsigned any = 0;
+  for (int row = 0; row < kBlock * kBlock; ++row) any |= pairs_of(first.x + row % kBlock, first.y + row / kBlock);
+  if (any == 0) return;
+  const IntBox all = box_of(any, first, first + kBlock - 1);
   if (all.is_empty()) return;
   const glm::ivec3 size = all.end - all.begin;
   if (std::int64_t{size.x} * size.y * size.z <= kLargeBox) return marker.mark(all);
-  for (unsigned left = pairs; left != 0; left &= left - 1) {
-    const int pair = __ffs(static_cast<int>(left)) - 1;
-    marker.mark(box_of(pair, pair));
+  for (int row = 0; row < kBlock * kBlock; ++row) {
+    const glm::ivec2 at(first.x + row % kBlock, first.y + row / kBlock);
+    for (unsigned left = pairs_of(at.x, at.y); left != 0; left &= left - 1) {
+      const unsigned pair = left & (~left + 1);
+      marker.mark(box_of(pair, at, at));
+    }
   }
 }
 
@@ -228,28 +252,34 @@ void Coverage::find(const LatticeOnDevice& lattice, const SlabBox& box, cudaStre
   words_ = static_cast<int>((box.size.x + 31) / 32);
   const std::int64_t rows = box.size.y * box.size.z;
   const auto words = static_cast<std::size_t>(rows * words_);
-  crossings_.fill(0, 2 * words + static_cast<std::size_t>(rows), stream);
-  extra_of_row_.fill(0xFF, static_cast<std::size_t>(rows), stream);
-  extra_count_.fill(0, 1, stream);
-  in_slice_.fill(0, static_cast<std::size_t>(box.size.z), stream);
+  const auto row_count = static_cast<std::size_t>(rows), slices = static_cast<std::size_t>(box.size.z);
+  crossings_.fill(0, 2 * words + 2 * row_count + slices + 1, stream);
+  std::uint32_t *starts = crossings_.data() + 2 * words, *chains = starts + row_count;
+  in_slice_ = chains + row_count;
   const Crossings crossings{crossings_.data(),
                             crossings_.data() + words,
-                            reinterpret_cast<int*>(crossings_.data() + 2 * words),
+                            reinterpret_cast<int*>(starts),
                             words_,
-                            extra_of_row_.data(),
+                            reinterpret_cast<int*>(chains),
                             extra_.reserve(kMostExtra),
-                            extra_count_.data()};
+                            in_slice_ + slices};
   const Sides sides(field.steps.cells);
   border_kernel<<<blocks_for(sides.first[6]), kThreads, 0, stream>>>(field.steps, sides, field.frame.nudge, box,
                                                                      crossings);
   std::uint32_t *single = single_.reserve(words), *several = several_.reserve(words);
-  wind_kernel<<<blocks_for(rows * 32), kThreads, 0, stream>>>(
-      crossings, rows, static_cast<int>(box.size.y), static_cast<int>(box.size.x), single, several, in_slice_.data());
-  if (lattice.statistics().inverted != 0) {
+  const bool any_inverted = lattice.statistics().inverted != 0;
+  wind_kernel<<<blocks_for(rows * 32), kThreads, 0, stream>>>(crossings, rows, static_cast<int>(box.size.y),
+                                                              static_cast<int>(box.size.x), single, several,
+                                                              any_inverted ? nullptr : in_slice_);
+  if (any_inverted) {
     const InvertedPairs& inverted = lattice.inverted();
     const IntBox region{glm::ivec3(box.begin), glm::ivec3(box.begin + box.size)};
-    inverted_kernel<<<blocks_for(inverted.word(0, field.steps.cells.z + 1, 0) * 8), kThreads, 0, stream>>>(
-        field.steps, NudgeTurns(field.frame.nudge), inverted, {region, words_, single, several, in_slice_.data()});
+    const std::int64_t groups = std::int64_t{inverted.words_per_row} * 8 * ((inverted.rows + kBlock - 1) / kBlock) *
+                                (field.steps.cells.z / kBlock + 1);
+    inverted_kernel<<<blocks_for(groups), kThreads, 0, stream>>>(field.steps, NudgeTurns(field.frame.nudge), inverted,
+                                                                 {region, words_, single, several});
+    count_kernel<<<dim3(16, static_cast<unsigned>(box.size.z)), kThreads, 0, stream>>>(
+        several, static_cast<int>(words_ * box.size.y), in_slice_);
   }
   TETWARP_CUDA_TRY(cudaGetLastError());
 }

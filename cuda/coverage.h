@@ -6,7 +6,7 @@ namespace tetwarp::cuda_detail {
 
 /// A crossing where there is one of its kind before the same voxel already: a row has a chain of them.
 struct ExtraCrossing {
-  int next;  ///< or -1, or -2: some are missing
+  int next;  ///< numbered from 1; 0: none, -1: some are missing
   int voxel, sign;
 };
 
@@ -25,7 +25,7 @@ class Coverage {
   /// Voxels that may have several, or none: not in `single`. Others may be added.
   std::uint32_t* several() const { return several_.data(); }
   /// How many of these each slice of the box has; to be kept up by who adds some.
-  unsigned* several_in_slice() const { return in_slice_.data(); }
+  unsigned* several_in_slice() const { return in_slice_; }
   int words_per_row() const { return words_; }
   /// As many words as `several` has, which nobody needs any more.
   unsigned* scratch() const { return crossings_.data(); }
@@ -33,12 +33,11 @@ class Coverage {
  private:
   int words_ = 0;
   DeviceBuffer<std::uint32_t> crossings_;  ///< bits where rows go in and, as many words later, where they come out;
-                                           ///< after them, of each row, the winding number at its first voxel
-  DeviceBuffer<int> extra_of_row_;
+                                           ///< of each row, winding number at its first voxel and first of its chain;
+                                           ///< of each slice, `several_in_slice`; the length of `extra_`
   DeviceBuffer<ExtraCrossing> extra_;
-  DeviceBuffer<unsigned> extra_count_;
   DeviceBuffer<std::uint32_t> single_, several_;
-  DeviceBuffer<unsigned> in_slice_;
+  unsigned* in_slice_ = nullptr;
 };
 
 }  // namespace tetwarp::cuda_detail

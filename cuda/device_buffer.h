@@ -56,6 +56,31 @@ class DeviceBuffer {
   std::size_t size_ = 0;
 };
 
+/// Owner of pinned host memory, which copies may fill while the host goes on; it only grows.
+template <class T>
+class PinnedBuffer {
+ public:
+  PinnedBuffer() = default;
+  ~PinnedBuffer() { cudaFreeHost(data_); }
+  PinnedBuffer(const PinnedBuffer&) = delete;
+  PinnedBuffer& operator=(const PinnedBuffer&) = delete;
+
+  /// Room for at least `size` elements; what was there may be lost. @throws DeviceError
+  T* reserve(std::size_t size) {
+    if (size > size_) {
+      cudaFreeHost(std::exchange(data_, nullptr));
+      size_ = 0;
+      TETWARP_CUDA_TRY(cudaMallocHost(&data_, size * sizeof(T)));
+      size_ = size;
+    }
+    return data_;
+  }
+
+ private:
+  T* data_ = nullptr;
+  std::size_t size_ = 0;
+};
+
 /// Makes a device the current one of this thread, and the former one again at the end.
 class DeviceScope {
  public:

@@ -11,15 +11,15 @@ namespace tetwarp::cuda_detail {
 
 namespace {
 
-constexpr int kMarch = 32;       ///< voxels along k that a thread goes
-constexpr int kWarps = 4;        ///< of a block, side by side along j
-constexpr int kSeedTile = 8;     ///< voxels along i and j that share a seed
-constexpr int kSeedTries = 40;   ///< from an undeformed guess
-constexpr int kRounds = 3;       ///< of a whole warp in which many guesses fail, a march
-constexpr int kManyFailed = 20;  ///< lanes
-constexpr int kWarpTries = 3;    ///< of a voxel within its warp, after the first
-constexpr int kQueueTries = 6;   ///< in float, before the exact walk
-constexpr int kWalk = 24;        ///< tetrahedra that the exact walk may pass
+constexpr int kMarch = 64;      ///< voxels along k that a thread goes; a multiple of 32
+constexpr int kWarps = 4;       ///< of a block, side by side along j
+constexpr int kSeedTile = 8;    ///< voxels along i and j that share a seed
+constexpr int kSeedTries = 40;  ///< from an undeformed guess
+constexpr int kRounds = 10;     ///< at the first slice of a march, while guesses fail
+constexpr int kFewFailed = 3;   ///< lanes
+constexpr int kWarpTries = 3;   ///< of a voxel within its warp, after the first
+constexpr int kQueueTries = 6;  ///< in float, before the exact walk
+constexpr int kWalk = 24;       ///< tetrahedra that the exact walk may pass
 constexpr unsigned kQueueSize = 1u << 20;
 constexpr unsigned kClaimedAtOnce = 1u << 22;  ///< voxels, or those of a slice
 
@@ -96,18 +96,20 @@ __global__ void seed_kernel(Task task, glm::vec3* seeds) {
 template <class Sink, bool kCoarse>
 struct WarpQueue {
   struct Entry {
-    int voxel;  ///< lane, voxels along k from the first of the march << 5, and failed attempts << 10
+    int voxel;  ///< lane, voxels along k from the first of the march << 5, and failed attempts << kAttempt
     float x, y, z;
   };
+
+  static constexpr int kAttempt = 12;
 
   Entry* entries;    ///< 64, in shared memory
   glm::ivec3 first;  ///< voxel of lane 0 at the beginning of the march
   int lane, waiting = 0;
 
-  /// Called by the whole warp.
-  __device__ void push(bool wanted, int voxel, const glm::vec3& place) {
-    const unsigned votes = __ballot_sync(~0u, wanted);
-    if (wanted) entries[waiting + __popc(votes & ((1u << lane) - 1))] = {voxel, place.x, place.y, place.z};
+  /// Called by the whole warp. @param votes  lanes that have one
+  __device__ void push(unsigned votes, int voxel, const glm::vec3& place) {
+    if ((votes >> lane & 1) != 0)
+      entries[waiting + __popc(votes & ((1u << lane) - 1))] = {voxel, place.x, place.y, place.z};
     waiting += __popc(votes);
     __syncwarp();
   }
@@ -122,23 +124,23 @@ struct WarpQueue {
     glm::vec3 place(0);
     if (lane < taken) {
       const Entry entry = entries[waiting + lane];
-      const glm::ivec3 in = first + glm::ivec3(entry.voxel & 31, 0, entry.voxel >> 5 & 31);
+      const glm::ivec3 in = first + glm::ivec3(entry.voxel & 31, 0, entry.voxel >> 5 & (kMarch - 1));
       const glm::ivec3 at = in + task.begin();
       const FloatTetrahedron t = tetrahedron_at(task.lattice, {entry.x, entry.y, entry.z});
       const Trial trial = try_tetrahedron<Effort::full>(task.lattice, t, task.point(at));
       if (trial.owns || (kCoarse && trial.unsure && task.owns(t, at))) {
         const glm::ivec3 voxel = at;
         covered = sink.write(sink.place(voxel), voxel, trial.u);
-      } else if (entry.voxel >> 10 < kWarpTries) {
+      } else if (entry.voxel >> kAttempt < kWarpTries) {
         again = true;
-        voxel = entry.voxel + (1 << 10);
-        place = entry.voxel >> 10 == 0 ? trial.place : (trial.place + glm::vec3(entry.x, entry.y, entry.z)) * 0.5f;
+        voxel = entry.voxel + (1 << kAttempt);
+        place =
+            entry.voxel >> kAttempt == 0 ? trial.place : (trial.place + glm::vec3(entry.x, entry.y, entry.z)) * 0.5f;
       } else {
         task.put_aside(in, trial.place);
       }
     }
-    __syncwarp();
-    push(again, voxel, place);
+    push(__ballot_sync(~0u, again), voxel, place);
     return covered;
   }
 };
@@ -171,26 +173,35 @@ struct March {
   glm::ivec3 first;  ///< voxel of lane 0 in the box
   int lane, slices;
   bool in_row;
-  std::uint32_t singles;  ///< lane n: which voxels of slice n have one owner
 
-  __device__ bool is_single(int n) const { return (__shfl_sync(~0u, singles, n) & (1u << lane)) != 0; }
+  /// Which voxels of 32 slices have one owner: lane n knows those of slice n.
+  __device__ std::uint32_t read_singles(int from) const {
+    const int n = from + lane;
+    return n < slices ? task.single.words[task.word({first.x, first.y, first.z + n})] : 0;
+  }
+  __device__ bool is_single(std::uint32_t singles, int n) const {
+    return (__shfl_sync(~0u, singles, n & 31) & (1u << lane)) != 0;
+  }
 
   /// Voxels of cells at rest are copied. @return how many of this lane are covered
-  __device__ unsigned copy() const {
+  __device__ int copy() const {
     const glm::ivec3 voxel = first + task.begin() + glm::ivec3(lane, 0, 0);
-    unsigned covered = 0;
+    int covered = 0;
+    for (int from = 0; from < slices; from += 32) {
+      const std::uint32_t singles = read_singles(from);
 #pragma unroll 4
-    for (int n = 0; n < slices; ++n) {
-      const glm::ivec3 at(voxel.x, voxel.y, voxel.z + n);
-      const bool single = is_single(n);
-      if (single) covered += sink.copy(sink.place(at), at);
-      if (!single && in_row) sink.nothing(sink.place(at));
+      for (int n = from; n < min(from + 32, slices); ++n) {
+        const glm::ivec3 at(voxel.x, voxel.y, voxel.z + n);
+        const bool single = is_single(singles, n);
+        if (single) covered += sink.copy(sink.place(at), at);
+        if (!single && in_row) sink.nothing(sink.place(at));
+      }
     }
     return covered;
   }
 
   /// Predicts the owner of each voxel from that of the one before. @param place  guess for the first
-  __device__ unsigned predict(glm::vec3 place, WarpQueue<Sink, kCoarse> queue) const {
+  __device__ int predict(glm::vec3 place, WarpQueue<Sink, kCoarse> queue) const {
     glm::ivec3 voxel = first + task.begin() + glm::ivec3(lane, 0, 0);
     int out = sink.place(voxel);
     const int out_slice = sink.per_slice();
@@ -200,38 +211,43 @@ struct March {
     keep(point.nudge.y);
     const int turn = task.nudge.first_down.z - voxel.z;  // where the nudge along k turns
     const float turned = turn > 0 ? -point.nudge.z : point.nudge.z;
-    unsigned covered = 0;
-    int rounds = 0;
+    int covered = 0, rounds = 0;  // what is written, less than what has one owner
+    std::uint32_t singles = read_singles(0);
+    int wanted = __popc(singles);
     for (int n = 0; n < slices; ++n) {
+      if (n == 32) {
+        singles = read_singles(32);
+        wanted += __popc(singles);
+      }
       if (n == turn) point.nudge.z = turned;
-      const bool single = is_single(n);
+      const bool single = is_single(singles, n);
       const Trial trial = try_tetrahedron<Effort::quick>(task.lattice, tetrahedron_at(task.lattice, place), point);
       const bool again = single && !trial.owns;
-      unsigned here = 0;
+      bool lost = again;
       if (single && trial.owns) {
-        here = sink.write(out, voxel, trial.u);
+        lost = !sink.write(out, voxel, trial.u);
       } else if (!single && in_row) {
         sink.nothing(out);
       }
       const unsigned failed = __ballot_sync(~0u, again);
       if (failed != 0) {
-        if (rounds < kRounds && __popc(failed) > kManyFailed) {  // the guess was no good: all of this slice once more
-          const glm::vec3 better = rounds++ == 0 ? trial.place : (place + trial.place) * 0.5f;
+        if (n == 0 && rounds < kRounds && __popc(failed) > kFewFailed) {  // the seed was no good: once more
+          const glm::vec3 better = rounds++ < 3 ? trial.place : (place + trial.place) * 0.5f;
           if (again) place = better;
           --n;
           continue;
         }
-        queue.push(again, lane | n << 5, trial.place);
-        while (queue.waiting >= 32) covered += queue.drain(task, sink);
+        queue.push(failed, lane | n << 5, trial.place);
+        while (queue.waiting >= 32) covered += static_cast<int>(queue.drain(task, sink));
       }
-      covered += here;
+      if (lost) --covered;
       place = trial.place + trial.per_slice;
       point.steps.z += float{kStepsPerVoxel};
       ++voxel.z;
       out += out_slice;
     }
-    while (queue.waiting > 0) covered += queue.drain(task, sink);
-    return covered;
+    while (queue.waiting > 0) covered += static_cast<int>(queue.drain(task, sink));
+    return covered + wanted;
   }
 };
 
@@ -243,25 +259,24 @@ __global__ void __launch_bounds__(32 * kWarps, 8)
   const glm::ivec3 size = task.size(), first(blockIdx.x * 32, blockIdx.y * kWarps + warp, blockIdx.z * kMarch);
   if (first.y >= size.y) return;  // the whole warp
   const int slices = min(kMarch, size.z - first.z), x = first.x + lane;
-  const std::uint32_t singles = lane < slices ? task.single.words[task.word({first.x, first.y, first.z + lane})] : 0;
-  const March<Sink, kCoarse> march{task, sink, first, lane, slices, x < size.x, singles};
+  const March<Sink, kCoarse> march{task, sink, first, lane, slices, x < size.x};
   const glm::ivec3 begin = first + task.begin();
-  unsigned covered = 0;
+  int found = 0;
   if (rests(task, begin, begin + glm::ivec3(min(31, size.x - 1 - first.x), 0, slices - 1), lane)) {
-    covered = march.copy();
+    found = march.copy();
   } else {
     const glm::ivec3 seed(min(x, size.x - 1) / kSeedTile, first.y / kSeedTile, blockIdx.z);
     const glm::vec3 place = seeds[(seed.z * task.seeds.y + seed.y) * task.seeds.x + seed.x] +
                             glm::vec3(glm::ivec3(x, first.y, first.z) - task.seeded(seed)) * task.lattice.voxel;
-    covered = march.predict(place, {entries[warp], first, lane});
+    found = march.predict(place, {entries[warp], first, lane});
   }
-  covered = warp_sum(covered);
+  const unsigned covered = warp_sum(static_cast<unsigned>(found));
   if (lane == 0 && covered != 0) atomicAdd(&task.counters->covered, static_cast<unsigned long long>(covered));
 }
 
 /// The voxels that no prediction settled: a few more in float, then a walk with exact integers.
 template <class Sink>
-__global__ void queue_kernel(Task task, Sink sink) {
+__global__ void queue_kernel(Task task, int walk, Sink sink) {
   const unsigned count = min(task.counters->queued, kQueueSize);
   const glm::ivec3 size = task.size();
   unsigned covered = 0;
@@ -283,7 +298,7 @@ __global__ void queue_kernel(Task task, Sink sink) {
     if (!is_finite(place)) place = task.lattice.place(glm::vec3(voxel));
     const glm::i32vec3 steps = detail::to_steps(glm::i64vec3(voxel)), signs = task.nudge.signs(voxel);
     LatticeTetrahedron owner;
-    if (walk_to_owner(task.lattice, as_lattice(tetrahedron_at(task.lattice, place)), steps, signs, kWalk, owner)) {
+    if (walk_to_owner(task.lattice, as_lattice(tetrahedron_at(task.lattice, place)), steps, signs, walk, owner)) {
       covered += sink.write(sink.place(voxel), voxel, interpolate_u(vertices_of(task.lattice, owner), steps, signs));
     } else {
       task.leave_to_claims(in);
@@ -343,57 +358,68 @@ Gather::Counters Gather::run(const LatticeOnDevice& lattice, const SlabBox& box,
                              cudaStream_t stream) {
   const DeviceField& field = lattice.field();
   counters_.fill(0, 1, stream);
-  coverage_.find(lattice, box, stream);
   const glm::ivec3 size(box.size), tile(kSeedTile, kSeedTile, kMarch);
   Task task{field.steps,
             NudgeTurns(field.frame.nudge),
             box,
-            coverage_.single(),
-            coverage_.several(),
-            coverage_.several_in_slice(),
+            {},
+            nullptr,
+            nullptr,
             lattice.moving_blocks(),
             (size + tile - 1) / tile,
             queue_.reserve(kQueueSize),
             counters_.data()};
   const std::int64_t seeds = std::int64_t{task.seeds.x} * task.seeds.y * task.seeds.z;
   glm::vec3* seeded = seeds_.reserve(static_cast<std::size_t>(seeds));
-  seed_kernel<<<blocks_for(seeds), kThreads, 0, stream>>>(task, seeded);
+  if (!beside_) beside_.emplace();
+  beside_->begun.record(stream);  // seeds do not wait for the coverage
+  beside_->begun.hold_back(beside_->stream.get());
+  seed_kernel<<<blocks_for(seeds), kThreads, 0, beside_->stream.get()>>>(task, seeded);
+  beside_->seeded.record(beside_->stream.get());
+  coverage_.find(lattice, box, stream);
+  beside_->seeded.hold_back(stream);
+  task.single = coverage_.single();
+  task.several = coverage_.several();
+  task.several_in_slice = coverage_.several_in_slice();
   const dim3 blocks(static_cast<unsigned>((size.x + 31) / 32), static_cast<unsigned>((size.y + kWarps - 1) / kWarps),
                     static_cast<unsigned>((size.z + kMarch - 1) / kMarch));
   const glm::vec3& cell = field.steps.cell;
   const bool coarse = std::max({cell.x, cell.y, cell.z}) > 2 * kStepsPerVoxel;
   const auto march = coarse ? march_kernel<Sink, true> : march_kernel<Sink, false>;
   march<<<blocks, dim3(32, kWarps), 0, stream>>>(task, seeded, sink);
-  queue_kernel<<<1024, kThreads, 0, stream>>>(task, sink);
+  queue_kernel<<<1024, kThreads, 0, stream>>>(task, lattice.statistics().inverted == 0 ? kWalk : 0, sink);
   TETWARP_CUDA_TRY(cudaGetLastError());
-  several_in_slice_.resize(static_cast<std::size_t>(size.z));
-  TETWARP_CUDA_TRY(cudaMemcpyAsync(several_in_slice_.data(), coverage_.several_in_slice(),
-                                   several_in_slice_.size() * sizeof(unsigned), cudaMemcpyDeviceToHost, stream));
+  const auto slices = static_cast<std::size_t>(size.z);
+  unsigned* in_slice = several_in_slice_.reserve(slices);
+  TETWARP_CUDA_TRY(cudaMemcpyAsync(in_slice, coverage_.several_in_slice(), slices * sizeof(unsigned),
+                                   cudaMemcpyDeviceToHost, stream));
   Counters found = counters(stream);
-  const std::uint64_t several = std::accumulate(several_in_slice_.begin(), several_in_slice_.end(), std::uint64_t{0});
+  const std::uint64_t several = std::accumulate(in_slice, in_slice + slices, std::uint64_t{0});
   if (several != 0) {
-    claim_several(task, field, sink, stream);
+    claim_several(task, field, in_slice, sink, stream);
     found = counters(stream);
   }
   found.claimed = several;
   return found;
 }
 
-Gather::Counters Gather::counters(cudaStream_t stream) const {
-  Counters counters;
-  counters_.download(&counters, 1, stream);
-  return counters;
+Gather::Counters Gather::counters(cudaStream_t stream) {
+  Counters* found = found_.reserve(1);
+  TETWARP_CUDA_TRY(cudaMemcpyAsync(found, counters_.data(), sizeof *found, cudaMemcpyDeviceToHost, stream));
+  TETWARP_CUDA_TRY(cudaStreamSynchronize(stream));
+  return *found;
 }
 
 /// So many slices at a time that memory for their claimed voxels is bounded.
 template <class Task, class Sink>
-void Gather::claim_several(const Task& task, const DeviceField& field, const Sink& sink, cudaStream_t stream) {
+void Gather::claim_several(const Task& task, const DeviceField& field, const unsigned* in_slice, const Sink& sink,
+                           cudaStream_t stream) {
   const glm::i64vec3& size = task.box.size;
   const std::int64_t words_per_slice = coverage_.words_per_row() * size.y;
   for (std::int64_t z = 0, end; z < size.z; z = end) {
-    std::size_t count = several_in_slice_[static_cast<std::size_t>(z)];
+    std::size_t count = in_slice[z];
     for (end = z + 1; end < size.z; ++end) {
-      const std::size_t next = several_in_slice_[static_cast<std::size_t>(end)];
+      const std::size_t next = in_slice[end];
       if (count + next > kClaimedAtOnce) break;
       count += next;
     }

@@ -1,7 +1,10 @@
 #pragma once
 
+#include <optional>
+
 #include "cuda/claim.h"
 #include "cuda/coverage.h"
+#include "cuda/stream.h"
 
 namespace tetwarp::cuda_detail {
 
@@ -56,8 +59,9 @@ class Gather {
  private:
   /// Claims the voxels that the coverage calls `several`.
   template <class Task, class Sink>
-  void claim_several(const Task& task, const DeviceField& field, const Sink& sink, cudaStream_t stream);
-  Counters counters(cudaStream_t stream) const;
+  void claim_several(const Task& task, const DeviceField& field, const unsigned* in_slice, const Sink& sink,
+                     cudaStream_t stream);
+  Counters counters(cudaStream_t stream);
 
   Coverage coverage_;
   Claims claims_;
@@ -65,7 +69,14 @@ class Gather {
   DeviceBuffer<Entry> queue_;
   DeviceBuffer<Counters> counters_;
   DeviceBuffer<unsigned> numbered_, claimed_;
-  std::vector<unsigned> several_in_slice_;
+  PinnedBuffer<unsigned> several_in_slice_;
+  PinnedBuffer<Counters> found_;
+  /// Of the device of the first run.
+  struct Beside {
+    Stream stream;
+    Event begun, seeded;
+  };
+  std::optional<Beside> beside_;
 };
 
 }  // namespace tetwarp::cuda_detail

@@ -177,25 +177,33 @@ template <bool kRange>
 __device__ void add_around(const StepPass& pass, const glm::ivec3& at, bool inner, const Edges& edges, Seen& corners) {
   const auto longest = [](const glm::vec3(&e)[2]) { return fmaxf(detail::norm1(e[0]), detail::norm1(e[1])); };
   const float bound = kError * ((longest(edges.x) * longest(edges.y)) * longest(edges.z));
-  float least = INFINITY, most = -INFINITY;
+  float least = INFINITY, most = -INFINITY, volumes[8];
 #pragma unroll
   for (int n = 0; n < 4; ++n) {
     const detail::Cross normal = Volume<kRange>::cross(edges.y[n & 1], edges.z[n >> 1]);
     const float sign = (n & 1) != n >> 1 ? -1.0f : 1.0f;
     const float up = sign * Volume<kRange>::dot(edges.x[0], normal),
                 down = -sign * Volume<kRange>::dot(edges.x[1], normal);
+    volumes[2 * n] = up;
+    volumes[2 * n + 1] = down;
     least = fminf(least, fminf(up, down));
-    most = fmaxf(most, fmaxf(up, down));
+    if (kRange) most = fmaxf(most, fmaxf(up, down));
   }
   const bool has_all = inner && at.z > 0 && at.z < pass.lattice.cells.z;
-  if (has_all && (least > bound || most < -bound)) {
-    corners.inverted += most < 0 ? 8 : 0;
-    if (!kRange) return;
-    corners.least = fminf(corners.least, least);
-    corners.most = fmaxf(corners.most, most);
-  } else {
-    corners.add(around_exactly(pass, at, edges));
+  if (!(has_all && least > bound)) {
+    float nearest = INFINITY;
+    unsigned inverted = 0;
+#pragma unroll
+    for (const float volume : volumes) {
+      nearest = fminf(nearest, fabsf(volume));
+      inverted += volume < 0;
+    }
+    if (!(has_all && nearest > bound)) return corners.add(around_exactly(pass, at, edges));
+    corners.inverted += inverted;
   }
+  if (!kRange) return;
+  corners.least = fminf(corners.least, least);
+  corners.most = fmaxf(corners.most, most);
 }
 
 /// The centre of a cell: D is an even cell's last corner, and A, B, C are beside its first; in an odd one it is the

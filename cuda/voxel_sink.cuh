@@ -4,19 +4,11 @@
 
 namespace tetwarp::cuda_detail {
 
-/// A place as whole voxels and the rest, like `place_at`.
-__device__ inline void split_place(const glm::ivec3& voxel, const glm::vec3& offset, glm::ivec3& base,
-                                   glm::vec3& rest) {
-  const glm::ivec3 whole(__float2int_rd(offset.x), __float2int_rd(offset.y), __float2int_rd(offset.z));
-  rest = offset - glm::vec3(whole);
-  base = voxel + whole;
-  if (fmaxf(fmaxf(rest.x, rest.y), rest.z) < 1.0f) return;
-#pragma unroll
-  for (int axis = 0; axis < 3; ++axis) {  // rounded up to the next voxel
-    if (rest[axis] < 1.0f) continue;
-    ++base[axis];
-    rest[axis] = 0;
-  }
+/// One axis of a place that was rounded up to the next voxel, like `place_at`.
+__device__ inline void carry_on_axis(int& base, float& rest) {
+  if (rest < 1.0f) return;
+  ++base;
+  rest = 0;
 }
 
 /// Moves it onto the grid like `clamp_to_grid`. @return false further out
@@ -51,14 +43,16 @@ __device__ __noinline__ float interpolate_on_border(const V* v, int at, int dx, 
 
 template <class V>
 __device__ bool VoxelSink<V>::write(int place, const glm::ivec3& voxel, const glm::vec3& u) const {
-  glm::ivec3 base;
-  glm::vec3 t;
-  split_place(voxel, u, base, t);
+  const glm::ivec3 whole(__float2int_rd(u.x), __float2int_rd(u.y), __float2int_rd(u.z));
+  glm::ivec3 base = voxel + whole;
+  glm::vec3 t = u - glm::vec3(whole);
   const auto is_below = [](int index, int end) { return static_cast<unsigned>(index) < static_cast<unsigned>(end); };
   float value;
-  if (is_below(base.x, last.x) && is_below(base.y, last.y) && is_below(base.z, last.z)) {
+  if (is_below(base.x, last.x) && is_below(base.y, last.y) && is_below(base.z, last.z) &&
+      fmaxf(fmaxf(t.x, t.y), t.z) < 1.0f) {
     value = interpolate(source, base.z * slice + base.y * row + base.x, 1, row, slice, t);
   } else {
+    for (int axis = 0; axis < 3; ++axis) carry_on_axis(base[axis], t[axis]);
     const bool in_x = clamp_on_axis(last.x, base.x, t.x), in_y = clamp_on_axis(last.y, base.y, t.y);
     if (!clamp_on_axis(last.z, base.z, t.z) || !in_x || !in_y) {
       nothing(place);

@@ -23,6 +23,11 @@ struct StepLattice {
     const glm::vec3 rest = first + glm::vec3(at) * cell, by = moved[offset(at)];
     return {glm::ivec3(rest + by), glm::ivec3(-by)};
   }
+  /// The deformed place of a vertex alone.
+  TETWARP_HD glm::i32vec3 deformed(const glm::ivec3& at) const {
+    const int n = at.z * slice + at.y * row + at.x;  // make_step_lattice: fewer than 2^31
+    return glm::i32vec3(first) + at * glm::i32vec3(cell) + glm::i32vec3(moved[n]);
+  }
   /// The lattice index of an undeformed voxel.
   TETWARP_HD glm::vec3 place(const glm::vec3& voxel_index) const {
     return (voxel_index * float{kStepsPerVoxel} - first) * (voxel * (1.0f / kStepsPerVoxel));
