@@ -118,26 +118,26 @@ struct Chain {
   }
 };
 
-/// One warp a row: from crossings to the winding number of every voxel.
-__global__ void wind_kernel(Crossings in, std::int64_t rows, int rows_per_slice, int width, std::uint32_t* single,
-                            std::uint32_t* several, unsigned* in_slice) {
-  const std::int64_t row = (std::int64_t{blockIdx.x} * kThreads + threadIdx.x) / 32;
-  const int lane = static_cast<int>(threadIdx.x & 31);
-  if (row >= rows) return;
+/// From crossings to the winding number of every voxel. Some lanes of a warp, a power of two, share a row.
+__global__ void wind_kernel(Crossings in, std::int64_t rows, int rows_per_slice, int width, int lanes,
+                            std::uint32_t* single, std::uint32_t* several, unsigned* in_slice) {
+  const std::int64_t number = (std::int64_t{blockIdx.x} * kThreads + threadIdx.x) / lanes, row = min(number, rows - 1);
+  const int lane = static_cast<int>(threadIdx.x) & (lanes - 1);
+  const bool has_row = number < rows;
   const Chain chain{in.extra, in.extra_of_row[row]};
   const bool has_extra = chain.first != kNoExtra, known = !has_extra || chain.is_whole();
   int carried = in.start[row];
   unsigned found = 0;
-  for (int first = 0; first < in.words; first += 32) {
+  for (int first = 0; first < in.words; first += lanes) {
     const int word = first + lane;
-    const bool here = word < in.words;
+    const bool here = has_row && word < in.words;
     const std::uint32_t ins = here ? in.ins[row * in.words + word] : 0;
     const std::uint32_t outs = here ? in.outs[row * in.words + word] : 0;
     int change = __popc(ins) - __popc(outs);
     if (has_extra) change += chain.sum(word * 32, word * 32 + 32);
     int sum = change;
-    for (int step = 1; step < 32; step *= 2) {
-      const int below = __shfl_up_sync(~0u, sum, step);
+    for (int step = 1; step < lanes; step *= 2) {
+      const int below = __shfl_up_sync(~0u, sum, step, lanes);
       if (lane >= step) sum += below;
     }
     int winding = carried + sum - change;
@@ -160,10 +160,10 @@ __global__ void wind_kernel(Crossings in, std::int64_t rows, int rows_per_slice,
       several[row * in.words + word] = more;
       found += static_cast<unsigned>(__popc(more));
     }
-    carried += __shfl_sync(~0u, sum, 31);
+    carried += __shfl_sync(~0u, sum, lanes - 1, lanes);
   }
-  found = warp_sum(found);
-  if (in_slice && lane == 0 && found != 0) atomicAdd(&in_slice[row / rows_per_slice], found);
+  for (int step = lanes / 2; step > 0; step /= 2) found += __shfl_xor_sync(~0u, found, step);
+  if (lane == 0 && found != 0) atomicAdd(&in_slice[row / rows_per_slice], found);
 }
 
 /// The voxels that have become `several`.
@@ -267,20 +267,27 @@ void Coverage::find(const LatticeOnDevice& lattice, const SlabBox& box, cudaStre
   border_kernel<<<blocks_for(sides.first[6]), kThreads, 0, stream>>>(field.steps, sides, field.frame.nudge, box,
                                                                      crossings);
   std::uint32_t *single = single_.reserve(words), *several = several_.reserve(words);
-  const bool any_inverted = lattice.statistics().inverted != 0;
-  wind_kernel<<<blocks_for(rows * 32), kThreads, 0, stream>>>(crossings, rows, static_cast<int>(box.size.y),
-                                                              static_cast<int>(box.size.x), single, several,
-                                                              any_inverted ? nullptr : in_slice_);
-  if (any_inverted) {
+  int lanes = 32;
+  while (lanes > 1 && lanes / 2 >= words_) lanes /= 2;
+  wind_kernel<<<blocks_for(rows * lanes), kThreads, 0, stream>>>(
+      crossings, rows, static_cast<int>(box.size.y), static_cast<int>(box.size.x), lanes, single, several, in_slice_);
+  if (lattice.statistics().inverted != 0) {
     const InvertedPairs& inverted = lattice.inverted();
     const IntBox region{glm::ivec3(box.begin), glm::ivec3(box.begin + box.size)};
     const std::int64_t groups = std::int64_t{inverted.words_per_row} * 8 * ((inverted.rows + kBlock - 1) / kBlock) *
                                 (field.steps.cells.z / kBlock + 1);
     inverted_kernel<<<blocks_for(groups), kThreads, 0, stream>>>(field.steps, NudgeTurns(field.frame.nudge), inverted,
                                                                  {region, words_, single, several});
-    count_kernel<<<dim3(16, static_cast<unsigned>(box.size.z)), kThreads, 0, stream>>>(
-        several, static_cast<int>(words_ * box.size.y), in_slice_);
+    count_several(box, stream);
   }
+  TETWARP_CUDA_TRY(cudaGetLastError());
+}
+
+void Coverage::count_several(const SlabBox& box, cudaStream_t stream) {
+  const auto slices = static_cast<std::size_t>(box.size.z);
+  TETWARP_CUDA_TRY(cudaMemsetAsync(in_slice_, 0, slices * sizeof(unsigned), stream));
+  count_kernel<<<dim3(16, static_cast<unsigned>(slices)), kThreads, 0, stream>>>(
+      several_.data(), static_cast<int>(words_ * box.size.y), in_slice_);
   TETWARP_CUDA_TRY(cudaGetLastError());
 }
 

@@ -24,7 +24,9 @@ class Coverage {
   BitRows single() const { return {single_.data(), words_}; }
   /// Voxels that may have several, or none: not in `single`. Others may be added.
   std::uint32_t* several() const { return several_.data(); }
-  /// How many of these each slice of the box has; to be kept up by who adds some.
+  /// To be called where some were added.
+  void count_several(const SlabBox& box, cudaStream_t stream);
+  /// How many of these each slice of the box has.
   unsigned* several_in_slice() const { return in_slice_; }
   int words_per_row() const { return words_; }
   /// As many words as `several` has, which nobody needs any more.

@@ -30,7 +30,6 @@ struct Task {
   SlabBox box;
   BitRows single;
   std::uint32_t* several;
-  unsigned* several_in_slice;
   MovingBlocks moving;
   glm::ivec3 seeds;  ///< how many on each axis
   Gather::Entry* queue;
@@ -60,7 +59,7 @@ struct Task {
   }
   __device__ void leave_to_claims(const glm::ivec3& in) const {
     atomicOr(&several[word(in)], 1u << (in.x & 31));
-    atomicAdd(&several_in_slice[in.z], 1u);
+    atomicAdd(&counters->left, 1u);
   }
   __device__ std::int64_t word(const glm::ivec3& in) const {
     return (std::int64_t{in.z} * size().y + in.y) * single.words_per_row + in.x / 32;
@@ -364,7 +363,6 @@ Gather::Counters Gather::run(const LatticeOnDevice& lattice, const SlabBox& box,
             box,
             {},
             nullptr,
-            nullptr,
             lattice.moving_blocks(),
             (size + tile - 1) / tile,
             queue_.reserve(kQueueSize),
@@ -380,20 +378,26 @@ Gather::Counters Gather::run(const LatticeOnDevice& lattice, const SlabBox& box,
   beside_->seeded.hold_back(stream);
   task.single = coverage_.single();
   task.several = coverage_.several();
-  task.several_in_slice = coverage_.several_in_slice();
   const dim3 blocks(static_cast<unsigned>((size.x + 31) / 32), static_cast<unsigned>((size.y + kWarps - 1) / kWarps),
                     static_cast<unsigned>((size.z + kMarch - 1) / kMarch));
   const glm::vec3& cell = field.steps.cell;
   const bool coarse = std::max({cell.x, cell.y, cell.z}) > 2 * kStepsPerVoxel;
   const auto march = coarse ? march_kernel<Sink, true> : march_kernel<Sink, false>;
   march<<<blocks, dim3(32, kWarps), 0, stream>>>(task, seeded, sink);
-  queue_kernel<<<1024, kThreads, 0, stream>>>(task, lattice.statistics().inverted == 0 ? kWalk : 0, sink);
+  queue_kernel<<<1024, kThreads, 0, stream>>>(task, is_mostly_folded(lattice) ? 0 : kWalk, sink);
   TETWARP_CUDA_TRY(cudaGetLastError());
   const auto slices = static_cast<std::size_t>(size.z);
   unsigned* in_slice = several_in_slice_.reserve(slices);
-  TETWARP_CUDA_TRY(cudaMemcpyAsync(in_slice, coverage_.several_in_slice(), slices * sizeof(unsigned),
-                                   cudaMemcpyDeviceToHost, stream));
-  Counters found = counters(stream);
+  const auto count_slices = [&] {
+    TETWARP_CUDA_TRY(cudaMemcpyAsync(in_slice, coverage_.several_in_slice(), slices * sizeof(unsigned),
+                                     cudaMemcpyDeviceToHost, stream));
+    return counters(stream);
+  };
+  Counters found = count_slices();
+  if (found.left != 0) {
+    coverage_.count_several(box, stream);
+    found = count_slices();
+  }
   const std::uint64_t several = std::accumulate(in_slice, in_slice + slices, std::uint64_t{0});
   if (several != 0) {
     claim_several(task, field, in_slice, sink, stream);
@@ -401,6 +405,12 @@ Gather::Counters Gather::run(const LatticeOnDevice& lattice, const SlabBox& box,
   }
   found.claimed = several;
   return found;
+}
+
+bool Gather::is_mostly_folded(const LatticeOnDevice& lattice) {
+  constexpr std::int64_t kFew = 256;  // one inverted tetrahedron in so many
+  const std::int64_t tetrahedra = kTetrahedraPerCell * lattice.field().cell_count();
+  return static_cast<std::int64_t>(lattice.statistics().inverted) > tetrahedra / kFew;
 }
 
 Gather::Counters Gather::counters(cudaStream_t stream) {

@@ -42,6 +42,7 @@ class Gather {
     unsigned long long covered;
     unsigned long long claimed;  ///< voxels that may have several owners, or whose owner was not found otherwise
     unsigned queued;             ///< voxels that the march left to the queue and the exact walk
+    unsigned left;               ///< voxels with one owner that these left to the claims
   };
 
   /// Finds the voxels of `box`; waits for the stream.
@@ -57,6 +58,8 @@ class Gather {
   };
 
  private:
+  /// Whether so much is inverted that walks mostly fail: then what is not predicted is claimed.
+  static bool is_mostly_folded(const LatticeOnDevice& lattice);
   /// Claims the voxels that the coverage calls `several`.
   template <class Task, class Sink>
   void claim_several(const Task& task, const DeviceField& field, const unsigned* in_slice, const Sink& sink,

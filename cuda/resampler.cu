@@ -67,7 +67,8 @@ Report CudaResampler::resample(Region region, std::span<const Target> targets, c
 }
 
 Counts CudaResampler::write_region(const Region& region, const Control& control) {
-  counts_.fill(0, 1, stream_);
+  const bool plain = can_write_plainly() && writer_->is_plain();  // then the gather counts
+  if (!plain) counts_.fill(0, 1, stream_);
   const std::int64_t slices = plan(region, control);
   std::int64_t done = 0;
   for (std::int64_t z = region.begin.z; z < region.end.z; z += slices) {
@@ -81,8 +82,8 @@ Counts CudaResampler::write_region(const Region& region, const Control& control)
     });
   }
   writer_->finish();
-  Counts counts;
-  counts_.download(&counts, 1, stream_);  // waits for all that was queued
+  Counts counts{};
+  if (!plain) counts_.download(&counts, 1, stream_);  // waits for all that was queued
   return counts;
 }
 
