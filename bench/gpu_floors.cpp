@@ -95,7 +95,7 @@ void add_memory(const GpuResults& results, std::vector<Floor>& floors) {
         {"memory / allowed", use.field + ", host views", static_cast<double>(use.host_views) / allowed, false, 1, {}});
     floors.push_back({"memory / allowed",
                       use.field + ", device views",
-                      static_cast<double>(use.data + use.device_views) / allowed,
+                      static_cast<double>(use.device_views) / allowed,
                       false,
                       1,
                       {}});

@@ -32,7 +32,7 @@ Host views: source, field and output in pageable host memory, as a program witho
 constexpr char kMemoryNote[] = R"(## Memory
 
 MB (10^6 bytes). Data: source, field and output. Allowed: 10 % or 128 MB more. Host views: most that a resampler holds
-on the device, given all of it on the host. Device views: data, and most that a resampler holds besides.
+on the device, given all of it on the host. Device views: most that it holds beside data that the caller has there.
 
 )";
 
@@ -109,7 +109,7 @@ std::string memory_table(const GpuResults& results) {
   const auto mb = [](std::uint64_t bytes) { return format("%.1f", static_cast<double>(bytes) / 1e6); };
   std::string text = kMemoryNote + heading({"field", "data", "allowed", "host views", "device views"});
   for (const MemoryUse& use : results.memory) {
-    text += row({use.field, mb(use.data), mb(use.allowed()), mb(use.host_views), mb(use.data + use.device_views)});
+    text += row({use.field, mb(use.data), mb(use.allowed()), mb(use.host_views), mb(use.device_views)});
   }
   return text + "\n";
 }

@@ -207,7 +207,9 @@ class ForwardResampler final : public CudaResampler {
   bool stream_field(const Control& control) override {
     if (streamed_ || field_.memory == Memory::device) return false;
     most_bytes_ = bytes_of(all_cells()) - 1;  // so that the next one is streamed at once
+    ready_ = false;                           // unless the scan is whole
     scan_in_pieces(control);
+    ready_ = true;
     return true;
   }
   void release_field() override {
@@ -217,9 +219,13 @@ class ForwardResampler final : public CudaResampler {
     held_ = {};
   }
   void prepare_slabs() override {
-    if (reach_.empty()) {
-      reach_.resize(static_cast<std::size_t>(frame_.cells.z + 1));
+    if (!reach_.empty()) return;
+    reach_.resize(static_cast<std::size_t>(frame_.cells.z + 1));
+    try {
       find_reach(all_cells());
+    } catch (...) {
+      reach_.clear();
+      throw;
     }
   }
 

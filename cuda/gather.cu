@@ -31,17 +31,24 @@ struct Task {
   BitRows single;
   std::uint32_t* several;
   MovingBlocks moving;
-  glm::ivec3 seeds;  ///< how many on each axis
+  std::uint8_t* resting;  ///< of each march, whether all that it needs is at rest; i fastest
+  glm::ivec3 seeds;       ///< how many on each axis
   Gather::Entry* queue;
   Gather::Counters* counters;
 
   __device__ glm::ivec3 begin() const { return glm::ivec3(box.begin); }
   __device__ glm::ivec3 size() const { return glm::ivec3(box.size); }
   __device__ GatherPoint point(const glm::ivec3& voxel) const { return {lattice, voxel, nudge.signs(voxel)}; }
-  /// Exactly; rarely called.
+  /// Whether a tetrahedron owns a voxel, exactly; rarely called.
   __device__ __noinline__ bool owns(FloatTetrahedron t, glm::ivec3 voxel) const {
     int sides[4];
     return owns_exactly(vertices_of(lattice, as_lattice(t)), voxel * kStepsPerVoxel, nudge.signs(voxel), sides);
+  }
+  /// How many marches there are on each axis.
+  __device__ glm::ivec3 marches() const { return {(size().x + 31) / 32, size().y, (size().z + kMarch - 1) / kMarch}; }
+  __device__ int march_number(const glm::ivec3& at) const {
+    const glm::ivec3 count = marches();
+    return (at.z * count.y + at.y) * count.x + at.x;
   }
   /// The voxel of the box that a seed is for.
   __device__ glm::ivec3 seeded(const glm::ivec3& seed) const {
@@ -128,8 +135,7 @@ struct WarpQueue {
       const FloatTetrahedron t = tetrahedron_at(task.lattice, {entry.x, entry.y, entry.z});
       const Trial trial = try_tetrahedron<Effort::full>(task.lattice, t, task.point(at));
       if (trial.owns || (kCoarse && trial.unsure && task.owns(t, at))) {
-        const glm::ivec3 voxel = at;
-        covered = sink.write(sink.place(voxel), voxel, trial.u);
+        covered = sink.write(sink.place(at), at, trial.u);
       } else if (entry.voxel >> kAttempt < kWarpTries) {
         again = true;
         voxel = entry.voxel + (1 << kAttempt);
@@ -139,14 +145,28 @@ struct WarpQueue {
         task.put_aside(in, trial.place);
       }
     }
+    __syncwarp();
     push(__ballot_sync(~0u, again), voxel, place);
     return covered;
   }
 };
 
-/// Whether nothing that a warp marches through is displaced: its tile of voxels, and what their nudges may reach.
-__device__ bool rests(const Task& task, const glm::ivec3& first, const glm::ivec3& last, int lane) {
+/// One warp the tile of voxels of a march: whether it lies within the undeformed lattice, and nothing that it and its
+/// nudges reach there is displaced. Then the owner of a voxel that has but one is a cell at rest.
+__global__ void rest_kernel(Task task, std::int64_t marches) {
+  const std::int64_t number = (std::int64_t{blockIdx.x} * kThreads + threadIdx.x) / 32;
+  if (number >= marches) return;
   const StepLattice& lattice = task.lattice;
+  const glm::ivec3 size = task.size(), count = task.marches();
+  const glm::ivec3 first(number % count.x * 32, number / count.x % count.y, number / count.x / count.y * kMarch);
+  const glm::ivec3 low = task.begin() + first,
+                   high = task.begin() + glm::min(first + glm::ivec3(32, 1, kMarch), size) - 1;
+  bool rests = true;
+  for (int axis = 0; axis < 3; ++axis) {  // exact, in 2^-12 voxel
+    const float from = static_cast<float>(low[axis]) * kStepsPerVoxel - lattice.first[axis],
+                to = static_cast<float>(high[axis]) * kStepsPerVoxel - lattice.first[axis];
+    rests = rests && from >= 0 && to <= static_cast<float>(lattice.cells[axis]) * lattice.cell[axis];
+  }
   constexpr float kBeyond = 1.0f / 64;  // voxels
   const auto block = [&](const glm::vec3& place, int beyond) {
     return glm::ivec3(detail::clamp_to(detail::floor_to_int(place.x) + beyond, lattice.cells.x),
@@ -154,14 +174,15 @@ __device__ bool rests(const Task& task, const glm::ivec3& first, const glm::ivec
                       detail::clamp_to(detail::floor_to_int(place.z) + beyond, lattice.cells.z)) /
            MovingBlocks::kSide;
   };
-  const glm::ivec3 low = block(lattice.place(glm::vec3(first) - kBeyond), 0),
-                   size = block(lattice.place(glm::vec3(last) + kBeyond), 1) - low + 1;
-  bool moving = false;
-  for (int n = lane; n < size.x * size.y * size.z; n += 32) {
-    const glm::ivec3 at = low + glm::ivec3(n % size.x, n / size.x % size.y, n / (size.x * size.y));
-    moving |= task.moving.moving[(at.z * task.moving.count.y + at.y) * task.moving.count.x + at.x] != 0;
+  const glm::ivec3 from = block(lattice.place(glm::vec3(low) - kBeyond), 0),
+                   blocks = block(lattice.place(glm::vec3(high) + kBeyond), 1) - from + 1;
+  const int lane = static_cast<int>(threadIdx.x & 31);
+  for (int n = lane; n < blocks.x * blocks.y * blocks.z; n += 32) {
+    const glm::ivec3 at = from + glm::ivec3(n % blocks.x, n / blocks.x % blocks.y, n / (blocks.x * blocks.y));
+    rests = rests && task.moving.moving[(at.z * task.moving.count.y + at.y) * task.moving.count.x + at.x] == 0;
   }
-  return __any_sync(~0u, moving) == 0;
+  const bool all = __all_sync(~0u, rests) != 0;
+  if (lane == 0) task.resting[number] = all;
 }
 
 /// One warp: 32 voxels along i, up to kMarch along k.
@@ -259,9 +280,8 @@ __global__ void __launch_bounds__(32 * kWarps, 8)
   if (first.y >= size.y) return;  // the whole warp
   const int slices = min(kMarch, size.z - first.z), x = first.x + lane;
   const March<Sink, kCoarse> march{task, sink, first, lane, slices, x < size.x};
-  const glm::ivec3 begin = first + task.begin();
   int found = 0;
-  if (rests(task, begin, begin + glm::ivec3(min(31, size.x - 1 - first.x), 0, slices - 1), lane)) {
+  if (task.resting[task.march_number({blockIdx.x, first.y, blockIdx.z})] != 0) {
     found = march.copy();
   } else {
     const glm::ivec3 seed(min(x, size.x - 1) / kSeedTile, first.y / kSeedTile, blockIdx.z);
@@ -358,28 +378,32 @@ Gather::Counters Gather::run(const LatticeOnDevice& lattice, const SlabBox& box,
   const DeviceField& field = lattice.field();
   counters_.fill(0, 1, stream);
   const glm::ivec3 size(box.size), tile(kSeedTile, kSeedTile, kMarch);
+  const glm::ivec3 marches((size.x + 31) / 32, size.y, (size.z + kMarch - 1) / kMarch);
   Task task{field.steps,
             NudgeTurns(field.frame.nudge),
             box,
             {},
             nullptr,
             lattice.moving_blocks(),
+            resting_.reserve(std::size_t(marches.x) * std::size_t(marches.y) * std::size_t(marches.z)),
             (size + tile - 1) / tile,
             queue_.reserve(kQueueSize),
             counters_.data()};
   const std::int64_t seeds = std::int64_t{task.seeds.x} * task.seeds.y * task.seeds.z;
   glm::vec3* seeded = seeds_.reserve(static_cast<std::size_t>(seeds));
   if (!beside_) beside_.emplace();
-  beside_->begun.record(stream);  // seeds do not wait for the coverage
+  beside_->begun.record(stream);  // seeds and what rests do not wait for the coverage
   beside_->begun.hold_back(beside_->stream.get());
   seed_kernel<<<blocks_for(seeds), kThreads, 0, beside_->stream.get()>>>(task, seeded);
+  const std::int64_t march_count = std::int64_t{marches.x} * marches.y * marches.z;
+  rest_kernel<<<blocks_for(march_count * 32), kThreads, 0, beside_->stream.get()>>>(task, march_count);
   beside_->seeded.record(beside_->stream.get());
   coverage_.find(lattice, box, stream);
   beside_->seeded.hold_back(stream);
   task.single = coverage_.single();
   task.several = coverage_.several();
-  const dim3 blocks(static_cast<unsigned>((size.x + 31) / 32), static_cast<unsigned>((size.y + kWarps - 1) / kWarps),
-                    static_cast<unsigned>((size.z + kMarch - 1) / kMarch));
+  const dim3 blocks(static_cast<unsigned>(marches.x), static_cast<unsigned>((marches.y + kWarps - 1) / kWarps),
+                    static_cast<unsigned>(marches.z));
   const glm::vec3& cell = field.steps.cell;
   const bool coarse = std::max({cell.x, cell.y, cell.z}) > 2 * kStepsPerVoxel;
   const auto march = coarse ? march_kernel<Sink, true> : march_kernel<Sink, false>;

@@ -69,6 +69,7 @@ class Gather {
   Coverage coverage_;
   Claims claims_;
   DeviceBuffer<glm::vec3> seeds_;
+  DeviceBuffer<std::uint8_t> resting_;
   DeviceBuffer<Entry> queue_;
   DeviceBuffer<Counters> counters_;
   DeviceBuffer<unsigned> numbered_, claimed_;

@@ -70,6 +70,7 @@ bool LatticeOnDevice::set_steps(const StepLattice& lattice, const glm::vec3* dis
   if (in_place) {
     pass.moved = room;
     snap_steps(pass, stream);
+    TETWARP_CUDA_TRY(cudaStreamSynchronize(stream));  // the next call may come on another stream
   }
   field_.steps = lattice;
   field_.steps.moved = room;

@@ -67,8 +67,7 @@ Report CudaResampler::resample(Region region, std::span<const Target> targets, c
 }
 
 Counts CudaResampler::write_region(const Region& region, const Control& control) {
-  const bool plain = can_write_plainly() && writer_->is_plain();  // then the gather counts
-  if (!plain) counts_.fill(0, 1, stream_);
+  counted_ = false;
   const std::int64_t slices = plan(region, control);
   std::int64_t done = 0;
   for (std::int64_t z = region.begin.z; z < region.end.z; z += slices) {
@@ -83,7 +82,7 @@ Counts CudaResampler::write_region(const Region& region, const Control& control)
   }
   writer_->finish();
   Counts counts{};
-  if (!plain) counts_.download(&counts, 1, stream_);  // waits for all that was queued
+  if (counted_) counts_.download(&counts, 1, stream_);  // waits for all that was queued
   return counts;
 }
 
@@ -160,6 +159,8 @@ void CudaResampler::write_box(const SlabBox& box, bool plain) {
   if (plain) {
     write_plainly(box, *writer_);
   } else {
+    if (!counted_) counts_.fill(0, 1, stream_);
+    counted_ = true;
     map_box(box, *writer_);
     writer_->write(box, mapped_, counts_.data());
   }

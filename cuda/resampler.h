@@ -80,6 +80,7 @@ class CudaResampler : public Resampler {
 
   Limits limits_;
   std::unique_ptr<SlabWriter> writer_;
+  bool counted_ = false;         ///< whether some box of the call was counted in `counts_`
   bool in_parts_ = false;        ///< of the sources, only what a slab needs is held
   std::int64_t box_voxels_ = 0;  ///< as planned
 };

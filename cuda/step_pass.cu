@@ -72,7 +72,10 @@ class FloatSnap {
 };
 
 /// How far a vertex moves, in steps, where float does not say. Rarely called, so kept out of loops.
+/// Zero outside the lattice.
 __device__ __noinline__ glm::vec3 snapped_slowly(const StepPass& pass, glm::vec3 displacement, glm::ivec3 at) {
+  const glm::ivec3& cells = pass.lattice.cells;
+  if (at.x < 0 || at.y < 0 || at.z < 0 || at.x > cells.x || at.y > cells.y || at.z > cells.z) return glm::vec3(0);
   const Vertex vertex = snapped(pass.frame, displacement, glm::i64vec3(at), pass.lattice.offset(at), pass.found);
   const glm::i32vec3 rest(pass.lattice.first + glm::vec3(at) * pass.lattice.cell), u = vertex.u;
   const glm::vec3 moved(-u);
@@ -91,10 +94,10 @@ __device__ glm::vec3 snapped_steps(const StepPass& pass, const FloatSnap& fast, 
 
 template <bool kExact>
 __global__ void snap_steps_kernel(const __grid_constant__ StepPass pass, FloatSnap fast) {
-  const glm::ivec3 at(blockIdx.x * kThreads + threadIdx.x, blockIdx.y, blockIdx.z);
-  if (at.x > pass.lattice.cells.x) return;
-  const std::int64_t n = pass.lattice.offset(at);
-  pass.moved[n] = snapped_steps<kExact>(pass, fast, pass.displacement[n], at);
+  const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
+  const glm::i64vec3 size = glm::i64vec3(pass.lattice.cells) + std::int64_t{1};
+  if (n >= size.x * size.y * size.z) return;
+  pass.moved[n] = snapped_steps<kExact>(pass, fast, pass.displacement[n], glm::ivec3(unravel(n, size)));
 }
 
 /// What is seen of tetrahedra of one kind: their volumes, the sign of the undeformed ones taken out. They share their
@@ -356,19 +359,18 @@ __global__ void __launch_bounds__(32 * kRows, kBlocks)
   here = reader.snapped();
   reader.read_next();
   int vertex = reader.vertex - pass.lattice.slice;
-  const int vertices = pass.lattice.slice * (cells.z + 1);
-  const auto read_below = [&](int even, int number) {
-    return pair.at.y > 0 && number < vertices && pair.owned[even] ? pass.displacement[number - pass.lattice.row + even]
-                                                                  : glm::vec3(0);
+  const auto read_below = [&](int even, int z) {
+    const bool has = pair.at.y > 0 && z <= cells.z && pair.owned[even];
+    return has ? pass.displacement[pass.lattice.offset({pair.at.x + even, pair.at.y - 1, z})] : glm::vec3(0);
   };
-  glm::vec3 given_below = read_below(0, vertex);
+  glm::vec3 given_below = read_below(0, pair.at.z);
   Seen corners, centres;
   unsigned moves = 0;
   const auto step = [&](auto even, const glm::vec3& before, const Plane& here, Plane& above) {
     constexpr int kEven = decltype(even)::value;
     const glm::vec3 below =
         snapped_steps<kExact>(pass, fast, given_below, {pair.at.x + kEven, pair.at.y - 1, pair.at.z});
-    given_below = read_below(1 - kEven, vertex + pass.lattice.slice);
+    given_below = read_below(1 - kEven, pair.at.z + 1);
     above = reader.snapped();
     reader.read_next();
     if (pass.moved) {
@@ -428,11 +430,10 @@ void run_step_pass(const StepPass& pass, cudaStream_t stream) {
 }
 
 void snap_steps(const StepPass& pass, cudaStream_t stream) {
-  const glm::ivec3 vertices = pass.lattice.cells + 1;
-  const dim3 blocks(blocks_for(vertices.x), static_cast<unsigned>(vertices.y), static_cast<unsigned>(vertices.z));
+  const std::int64_t vertices = std::int64_t{pass.lattice.slice} * (pass.lattice.cells.z + 1);
   const FloatSnap fast(pass.frame, pass.lattice);
   const auto kernel = fast.is_exact() ? snap_steps_kernel<true> : snap_steps_kernel<false>;
-  kernel<<<blocks, kThreads, 0, stream>>>(pass, fast);
+  kernel<<<blocks_for(vertices), kThreads, 0, stream>>>(pass, fast);
   TETWARP_CUDA_TRY(cudaGetLastError());
 }
 

@@ -25,7 +25,7 @@ struct GatherPoint {
 /// What one tetrahedron says of a voxel.
 struct Trial {
   bool owns;            ///< certainly, and its weights need no exact arithmetic
-  bool unsure;          ///< it may own, and its weights need no exact arithmetic
+  bool unsure;          ///< it may own, and with full effort its weights need no exact arithmetic
   glm::vec3 u;          ///< where it owns: undeformed minus deformed place, voxels; the bits of `interpolate_u`
   glm::vec3 place;      ///< where its affine map takes the nudged voxel from, cells
   glm::vec3 per_slice;  ///< how far that moves from one voxel to the next along k, cells
@@ -151,8 +151,8 @@ TETWARP_HD Trial try_tetrahedron(const StepLattice& lattice, const FloatTetrahed
       detail::error_bound(product, faces, detail::norm1(local.r) + 6.5f);  // 15 + 7 + 4 sixteenths of a step
   const float upright = detail::with_sign_of(m.det, t.to);                 // A, B, C turn like that when undeformed
   const Weights w{na * reciprocal, nb * reciprocal, nc * reciprocal};
-  bool in_slack = upright > static_cast<float>(1 / kWeightSlack) * faces;
-  if (kEffort == Effort::full) in_slack = in_slack || w.within_slack();
+  const bool in_slack =
+      kEffort == Effort::full ? w.within_slack() : upright > static_cast<float>(1 / kWeightSlack) * faces;
 
   Trial trial;
   const float bound = multiply_add(error, detail::magnitude(reciprocal), 8 * detail::kUnit);

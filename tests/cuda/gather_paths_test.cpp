@@ -18,15 +18,18 @@ class GatherPaths : public testing::Test {
   }
 };
 
-/// The volume alone (found and sampled in one go), or with coverage and inverse (found, then sampled).
+/// The volume alone is found and sampled in one go; with coverage and inverse it is found, then sampled; for all maps,
+/// and for voxels that stay where they are outside the lattice, every tetrahedron is rasterised.
+enum class Wanted { volume, places, everything };
+
 template <class V>
 Outcome<V> run_on(Resampler& resampler, const FieldCase& test, const Volume<V>& source, const Region& region,
-                  bool maps) {
+                  Wanted what) {
   resampler.set_field(view(test.field, Outside::background));
   Outcome<V> outcome = poisoned_outcome<V>(test.output);
   Maps wanted = maps_of(outcome);
-  wanted.jacobian = wanted.owners = {};
-  if (!maps) wanted = {};
+  if (what == Wanted::places) wanted.jacobian = wanted.owners = {};
+  if (what == Wanted::volume) wanted = {};
   const Target target{.source = view(source), .output = view(outcome.output), .background = 7};
   outcome.report = resampler.resample(region, {&target, 1}, wanted);
   return outcome;
@@ -41,13 +44,15 @@ void expect_same(const FieldCase& test, Random& random) {
   const glm::i64vec3 size = test.output.size;
   const Region part{{random.integer(0, size.x / 3), random.integer(0, size.y / 3), random.integer(0, size.z / 3)},
                     {size.x - random.integer(0, size.x / 3), size.y - random.integer(0, size.y / 3), size.z}};
-  for (const bool maps : {false, true}) {
+  for (const Wanted what : {Wanted::volume, Wanted::places, Wanted::everything}) {
     for (const Region& region : {whole(test.output), part}) {
-      const auto expected = run_on<V>(*cpu, test, source, region, maps);
-      const auto found = run_on<V>(*cuda, test, source, region, maps);
-      ASSERT_TRUE(same_bits(expected.output.voxels, found.output.voxels)) << "maps " << maps;
+      const auto expected = run_on<V>(*cpu, test, source, region, what);
+      const auto found = run_on<V>(*cuda, test, source, region, what);
+      ASSERT_TRUE(same_bits(expected.output.voxels, found.output.voxels)) << "maps " << static_cast<int>(what);
       ASSERT_TRUE(same_bits(expected.coverage.voxels, found.coverage.voxels));
       ASSERT_TRUE(same_bits(expected.inverse_mm.voxels, found.inverse_mm.voxels));
+      ASSERT_TRUE(same_bits(expected.jacobian.voxels, found.jacobian.voxels));
+      ASSERT_TRUE(same_bits(expected.owners.voxels, found.owners.voxels));
       ASSERT_EQ(expected.report.covered, found.report.covered);
       ASSERT_EQ(expected.report.uncovered, found.report.uncovered);
       ASSERT_EQ(expected.report.inverted, found.report.inverted);
@@ -84,6 +89,28 @@ TEST_F(GatherPaths, FormulasOnCellsOfAnySize) {
       SCOPED_TRACE(std::string(formula) + ", cells of " + std::to_string(cell_size));
       Random random(test_seed(), static_cast<std::uint64_t>(cell_size));
       FieldCase test{grid, sample_on(lattice_over(grid, cell_size), parse_formula(formula, grid)), formula, {}};
+      ASSERT_NO_FATAL_FAILURE(expect_same<std::int16_t>(test, random));
+    }
+  }
+}
+
+/// A part of a small lattice is pulled out of it, slantwise, past neighbours at rest: voxels there lie beside resting
+/// cells, but do not come from them.
+TEST_F(GatherPaths, TonguesBesideALatticeAtRest) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  const Geometry grid = unit_grid({100, 60, 70});
+  for (const std::int64_t cell_size : {1, 2, 5}) {
+    for (const double side : {-1.0, 1.0}) {
+      SCOPED_TRACE("cells of " + std::to_string(cell_size) + ", side " + std::to_string(side));
+      Random random(test_seed(), 970 + static_cast<std::uint64_t>(cell_size));
+      Geometry lattice = unit_grid(glm::i64vec3(30, 40, 50) / cell_size + std::int64_t{1});
+      lattice.spacing *= static_cast<double>(cell_size);
+      lattice.origin = {35, 10, 10};
+      const auto pull = [&](const glm::dvec3& x) {
+        const double width = std::abs(x.y - 20) / 6;
+        return width < 1 ? (1 - width) * glm::dvec3(side * 28, 13, 5) : glm::dvec3(0);
+      };
+      const FieldCase test{grid, field_in_voxels(grid, lattice, pull), "tongue", {}};
       ASSERT_NO_FATAL_FAILURE(expect_same<std::int16_t>(test, random));
     }
   }
