@@ -272,7 +272,7 @@ struct March {
 };
 
 template <class Sink, bool kCoarse>
-__global__ void __launch_bounds__(32 * kWarps, 8)
+__global__ void __launch_bounds__(32 * kWarps, 7)
     march_kernel(const __grid_constant__ Task task, const glm::vec3* seeds, const __grid_constant__ Sink sink) {
   __shared__ typename WarpQueue<Sink, kCoarse>::Entry entries[kWarps][64];
   const int lane = static_cast<int>(threadIdx.x), warp = static_cast<int>(threadIdx.y);
