@@ -18,8 +18,8 @@ class GatherPaths : public testing::Test {
   }
 };
 
-/// The volume alone is found and sampled in one go; with coverage and inverse it is found, then sampled; for all maps,
-/// and for voxels that stay where they are outside the lattice, every tetrahedron is rasterised.
+/// The volume alone is found and sampled in one go; with coverage and inverse it is found, then sampled; for all maps
+/// every tetrahedron is rasterised.
 enum class Wanted { volume, places, everything };
 
 template <class V>
@@ -94,25 +94,29 @@ TEST_F(GatherPaths, FormulasOnCellsOfAnySize) {
   }
 }
 
-/// A part of a small lattice is pulled out of it, slantwise, past neighbours at rest: voxels there lie beside resting
-/// cells, but do not come from them.
-TEST_F(GatherPaths, TonguesBesideALatticeAtRest) {
+/// A finger is pulled out of a side of a small lattice, slantwise and without a fold, past neighbours at rest: voxels
+/// there lie beside resting cells, but do not come from them.
+TEST_F(GatherPaths, FingersBesideALatticeAtRest) {
   SCOPED_TRACE(seed_text(test_seed()));
   const Geometry grid = unit_grid({100, 60, 70});
-  for (const std::int64_t cell_size : {1, 2, 5}) {
-    for (const double side : {-1.0, 1.0}) {
-      SCOPED_TRACE("cells of " + std::to_string(cell_size) + ", side " + std::to_string(side));
-      Random random(test_seed(), 970 + static_cast<std::uint64_t>(cell_size));
-      Geometry lattice = unit_grid(glm::i64vec3(30, 40, 50) / cell_size + std::int64_t{1});
-      lattice.spacing *= static_cast<double>(cell_size);
-      lattice.origin = {35, 10, 10};
-      const auto pull = [&](const glm::dvec3& x) {
-        const double width = std::abs(x.y - 20) / 6;
-        return width < 1 ? (1 - width) * glm::dvec3(side * 28, 13, 5) : glm::dvec3(0);
-      };
-      const FieldCase test{grid, field_in_voxels(grid, lattice, pull), "tongue", {}};
-      ASSERT_NO_FATAL_FAILURE(expect_same<std::int16_t>(test, random));
-    }
+  Geometry lattice = unit_grid({31, 38, 51});
+  lattice.origin = {35, 13, 10};
+  for (const double side : {-1.0, 1.0}) {
+    SCOPED_TRACE("side " + std::to_string(side));
+    Random random(test_seed(), 970);
+    const auto pull = [&](const glm::dvec3& x) {
+      const double depth = (side < 0 ? x.x - 35 : 65 - x.x) / 8, width = std::abs(x.y - 20) / 9;
+      if (depth >= 1 || width >= 1) return glm::dvec3(0);
+      return (1 - depth) * (1 - width) * (1 - width) * glm::dvec3(side * 28, 13, 0);
+    };
+    const FieldCase test{grid, field_in_voxels(grid, lattice, pull), "finger", {}};
+    const auto cpu = make_cpu_resampler(grid);
+    const Outcome<std::int16_t> there = run_on<std::int16_t>(
+        *cpu, test, random_values<std::int16_t>(grid, random, -1000, 1000), whole(grid), Wanted::everything);
+    ASSERT_EQ(there.report.inverted, 0u);
+    const std::int64_t beside = (30 * 60 + 31) * 100 + (side < 0 ? 13 : 87);
+    ASSERT_EQ(there.owners.voxels[static_cast<std::size_t>(beside)], 1) << "the finger does not reach there";
+    ASSERT_NO_FATAL_FAILURE(expect_same<std::int16_t>(test, random));
   }
 }
 
