@@ -1,0 +1,293 @@
+#pragma once
+
+#include "cuda/gather.h"
+#include "cuda/voxel_sink.cuh"
+#include "deform/core/gather.h"
+
+/// The march of a gather: seeds, what rests, and the kernel that goes along k. For gather.cu alone.
+namespace tetwarp::cuda_detail {
+
+namespace {
+
+constexpr int kMarch = 64;      ///< voxels along k that a thread goes; a multiple of 32
+constexpr int kWarps = 4;       ///< of a block, side by side along j
+constexpr int kSeedTile = 8;    ///< voxels along i and j that share a seed
+constexpr int kSeedTries = 40;  ///< from an undeformed guess
+constexpr int kRounds = 10;     ///< at the first slice of a march, while guesses fail
+constexpr int kFewFailed = 3;   ///< lanes
+constexpr int kWarpTries = 3;   ///< of a voxel within its warp, after the first
+constexpr unsigned kQueueSize = 1u << 20;
+
+/// What all kernels of a gather know.
+struct Task {
+  StepLattice lattice;
+  NudgeTurns nudge;
+  SlabBox box;
+  BitRows single;
+  std::uint32_t* several;
+  MovingBlocks moving;
+  std::uint8_t* resting;  ///< of each march, whether all that it needs is at rest; i fastest
+  glm::ivec3 seeds;       ///< how many on each axis
+  Gather::Entry* queue;
+  Gather::Counters* counters;
+
+  __device__ glm::ivec3 begin() const { return glm::ivec3(box.begin); }
+  __device__ glm::ivec3 size() const { return glm::ivec3(box.size); }
+  __device__ GatherPoint point(const glm::ivec3& voxel) const { return {lattice, voxel, nudge.signs(voxel)}; }
+  /// Whether a tetrahedron owns a voxel, exactly; rarely called.
+  __device__ __noinline__ bool owns(FloatTetrahedron t, glm::ivec3 voxel) const {
+    int sides[4];
+    return owns_exactly(vertices_of(lattice, as_lattice(t)), voxel * kStepsPerVoxel, nudge.signs(voxel), sides);
+  }
+  /// How many marches there are on each axis.
+  __device__ glm::ivec3 marches() const { return {(size().x + 31) / 32, size().y, (size().z + kMarch - 1) / kMarch}; }
+  __device__ int march_number(const glm::ivec3& at) const {
+    const glm::ivec3 count = marches();
+    return (at.z * count.y + at.y) * count.x + at.x;
+  }
+  /// The voxel of the box that a seed is for.
+  __device__ glm::ivec3 seeded(const glm::ivec3& seed) const {
+    const glm::ivec3 middle(kSeedTile / 2, kSeedTile / 2, 0);
+    return glm::min(seed * glm::ivec3(kSeedTile, kSeedTile, kMarch) + middle, size() - 1);
+  }
+  /// Leaves a voxel to the walk or, where its queue is full, to the claims.
+  __device__ void put_aside(const glm::ivec3& in, const glm::vec3& place) const {
+    const unsigned n = atomicAdd(&counters->queued, 1u);
+    if (n < kQueueSize) {
+      queue[n] = {(in.z * size().y + in.y) * size().x + in.x, place.x, place.y, place.z};
+    } else {
+      leave_to_claims(in);
+    }
+  }
+  __device__ void leave_to_claims(const glm::ivec3& in) const {
+    atomicOr(&several[word(in)], 1u << (in.x & 31));
+    atomicAdd(&counters->left, 1u);
+  }
+  __device__ std::int64_t word(const glm::ivec3& in) const {
+    return (std::int64_t{in.z} * size().y + in.y) * single.words_per_row + in.x / 32;
+  }
+};
+
+/// Keeps the compiler from computing a value again at every use.
+__device__ void keep(float& value) { asm volatile("" : "+f"(value)); }
+
+__device__ bool is_finite(const glm::vec3& v) { return isfinite(v.x + v.y + v.z); }
+
+/// A guess for every march: where the first voxel of a column comes from, by repeated prediction.
+__global__ void seed_kernel(Task task, glm::vec3* seeds) {
+  const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
+  if (n >= std::int64_t{task.seeds.x} * task.seeds.y * task.seeds.z) return;
+  const glm::ivec3 at(n % task.seeds.x, n / task.seeds.x % task.seeds.y, n / (task.seeds.x * task.seeds.y));
+  const glm::ivec3 voxel = task.seeded(at) + task.begin();
+  const GatherPoint point = task.point(voxel);
+  const glm::vec3 undeformed = task.lattice.place(glm::vec3(voxel));
+  glm::vec3 place = undeformed;
+  bool found = false;
+  for (int n_try = 0; n_try < kSeedTries && !found; ++n_try) {
+    const Trial trial = try_tetrahedron<Effort::full>(task.lattice, tetrahedron_at(task.lattice, place), point);
+    found = trial.owns;
+    place = is_finite(trial.place) ? (n_try < 8 ? trial.place : (place + trial.place) * 0.5f) : undeformed;
+  }
+  seeds[n] = place;
+}
+
+/// What a warp could not settle at once. It is tried again when a warp full has come together, so that all lanes work.
+///
+/// @tparam kCoarse  cells are large, so float is often unsure: ask exact integers before another tetrahedron is tried
+template <class Sink, bool kCoarse>
+struct WarpQueue {
+  struct Entry {
+    int voxel;  ///< lane, voxels along k from the first of the march << 5, and failed attempts << kAttempt
+    float x, y, z;
+  };
+
+  static constexpr int kAttempt = 12;
+
+  Entry* entries;    ///< 64, in shared memory
+  glm::ivec3 first;  ///< voxel of lane 0 at the beginning of the march
+  int lane, waiting = 0;
+
+  /// Called by the whole warp. @param votes  lanes that have one
+  __device__ void push(unsigned votes, int voxel, const glm::vec3& place) {
+    if ((votes >> lane & 1) != 0)
+      entries[waiting + __popc(votes & ((1u << lane) - 1))] = {voxel, place.x, place.y, place.z};
+    waiting += __popc(votes);
+    __syncwarp();
+  }
+
+  /// Tries up to 32 of them once more. @return how many of this lane are covered
+  __device__ unsigned drain(const Task& task, const Sink& sink) {
+    const int taken = min(waiting, 32);
+    waiting -= taken;
+    bool again = false;
+    unsigned covered = 0;
+    int voxel = 0;
+    glm::vec3 place(0);
+    if (lane < taken) {
+      const Entry entry = entries[waiting + lane];
+      const glm::ivec3 in = first + glm::ivec3(entry.voxel & 31, 0, entry.voxel >> 5 & (kMarch - 1));
+      const glm::ivec3 at = in + task.begin();
+      const FloatTetrahedron t = tetrahedron_at(task.lattice, {entry.x, entry.y, entry.z});
+      const Trial trial = try_tetrahedron<Effort::full>(task.lattice, t, task.point(at));
+      if (trial.owns || (kCoarse && trial.unsure && task.owns(t, at))) {
+        covered = sink.write(sink.place(at), at, trial.u);
+      } else if (entry.voxel >> kAttempt < kWarpTries) {
+        again = true;
+        voxel = entry.voxel + (1 << kAttempt);
+        place =
+            entry.voxel >> kAttempt == 0 ? trial.place : (trial.place + glm::vec3(entry.x, entry.y, entry.z)) * 0.5f;
+      } else {
+        task.put_aside(in, trial.place);
+      }
+    }
+    __syncwarp();
+    push(__ballot_sync(~0u, again), voxel, place);
+    return covered;
+  }
+};
+
+/// One warp the tile of voxels of a march: whether it lies within the undeformed lattice, and nothing that it and its
+/// nudges reach there is displaced. Then the owner of a voxel that has but one is a cell at rest.
+__global__ void rest_kernel(Task task, std::int64_t marches) {
+  const std::int64_t number = (std::int64_t{blockIdx.x} * kThreads + threadIdx.x) / 32;
+  if (number >= marches) return;
+  const StepLattice& lattice = task.lattice;
+  const glm::ivec3 size = task.size(), count = task.marches();
+  const glm::ivec3 first(number % count.x * 32, number / count.x % count.y, number / count.x / count.y * kMarch);
+  const glm::ivec3 low = task.begin() + first,
+                   high = task.begin() + glm::min(first + glm::ivec3(32, 1, kMarch), size) - 1;
+  bool rests = true;
+  for (int axis = 0; axis < 3; ++axis) {  // exact, in 2^-12 voxel
+    const float from = static_cast<float>(low[axis]) * kStepsPerVoxel - lattice.first[axis],
+                to = static_cast<float>(high[axis]) * kStepsPerVoxel - lattice.first[axis];
+    rests = rests && from >= 0 && to <= static_cast<float>(lattice.cells[axis]) * lattice.cell[axis];
+  }
+  constexpr float kBeyond = 1.0f / 64;  // voxels
+  const auto block = [&](const glm::vec3& place, int beyond) {
+    return glm::ivec3(detail::clamp_to(detail::floor_to_int(place.x) + beyond, lattice.cells.x),
+                      detail::clamp_to(detail::floor_to_int(place.y) + beyond, lattice.cells.y),
+                      detail::clamp_to(detail::floor_to_int(place.z) + beyond, lattice.cells.z)) /
+           MovingBlocks::kSide;
+  };
+  const glm::ivec3 from = block(lattice.place(glm::vec3(low) - kBeyond), 0),
+                   blocks = block(lattice.place(glm::vec3(high) + kBeyond), 1) - from + 1;
+  const int lane = static_cast<int>(threadIdx.x & 31);
+  for (int n = lane; n < blocks.x * blocks.y * blocks.z; n += 32) {
+    const glm::ivec3 at = from + glm::ivec3(n % blocks.x, n / blocks.x % blocks.y, n / (blocks.x * blocks.y));
+    rests = rests && task.moving.moving[(at.z * task.moving.count.y + at.y) * task.moving.count.x + at.x] == 0;
+  }
+  const bool all = __all_sync(~0u, rests) != 0;
+  if (lane == 0) task.resting[number] = all;
+}
+
+/// One warp: 32 voxels along i, up to kMarch along k.
+template <class Sink, bool kCoarse>
+struct March {
+  const Task& task;
+  const Sink& sink;
+  glm::ivec3 first;  ///< voxel of lane 0 in the box
+  int lane, slices;
+  bool in_row;
+
+  /// Which voxels of 32 slices have one owner: lane n knows those of slice n.
+  __device__ std::uint32_t read_singles(int from) const {
+    const int n = from + lane;
+    return n < slices ? task.single.words[task.word({first.x, first.y, first.z + n})] : 0;
+  }
+  __device__ bool is_single(std::uint32_t singles, int n) const {
+    return (__shfl_sync(~0u, singles, n & 31) & (1u << lane)) != 0;
+  }
+
+  /// Voxels of cells at rest are copied. @return how many of this lane are covered
+  __device__ int copy() const {
+    const glm::ivec3 voxel = first + task.begin() + glm::ivec3(lane, 0, 0);
+    int covered = 0;
+    for (int from = 0; from < slices; from += 32) {
+      const std::uint32_t singles = read_singles(from);
+#pragma unroll 4
+      for (int n = from; n < min(from + 32, slices); ++n) {
+        const glm::ivec3 at(voxel.x, voxel.y, voxel.z + n);
+        const bool single = is_single(singles, n);
+        if (single) covered += sink.copy(sink.place(at), at);
+        if (!single && in_row) sink.nothing(sink.place(at));
+      }
+    }
+    return covered;
+  }
+
+  /// Predicts the owner of each voxel from that of the one before. @param place  guess for the first
+  __device__ int predict(glm::vec3 place, WarpQueue<Sink, kCoarse> queue) const {
+    glm::ivec3 voxel = first + task.begin() + glm::ivec3(lane, 0, 0);
+    int out = sink.place(voxel);
+    const int out_slice = sink.per_slice();
+    GatherPoint point = task.point(voxel);
+    keep(point.steps.x);
+    keep(point.nudge.x);
+    keep(point.nudge.y);
+    const int turn = task.nudge.first_down.z - voxel.z;  // where the nudge along k turns
+    const float turned = turn > 0 ? -point.nudge.z : point.nudge.z;
+    int covered = 0, rounds = 0;  // what is written, less than what has one owner
+    std::uint32_t singles = read_singles(0);
+    int wanted = __popc(singles);
+    for (int n = 0; n < slices; ++n) {
+      if (n == 32) {
+        singles = read_singles(32);
+        wanted += __popc(singles);
+      }
+      if (n == turn) point.nudge.z = turned;
+      const bool single = is_single(singles, n);
+      const Trial trial = try_tetrahedron<Effort::quick>(task.lattice, tetrahedron_at(task.lattice, place), point);
+      const bool again = single && !trial.owns;
+      bool lost = again;
+      if (single && trial.owns) {
+        lost = !sink.write(out, voxel, trial.u);
+      } else if (!single && in_row) {
+        sink.nothing(out);
+      }
+      const unsigned failed = __ballot_sync(~0u, again);
+      if (failed != 0) {
+        if (n == 0 && rounds < kRounds && __popc(failed) > kFewFailed) {  // the seed was no good: once more
+          const glm::vec3 better = rounds++ < 3 ? trial.place : (place + trial.place) * 0.5f;
+          if (again) place = better;
+          --n;
+          continue;
+        }
+        queue.push(failed, lane | n << 5, trial.place);
+        while (queue.waiting >= 32) covered += static_cast<int>(queue.drain(task, sink));
+      }
+      if (lost) --covered;
+      place = trial.place + trial.per_slice;
+      point.steps.z += float{kStepsPerVoxel};
+      ++voxel.z;
+      out += out_slice;
+    }
+    while (queue.waiting > 0) covered += static_cast<int>(queue.drain(task, sink));
+    return covered + wanted;
+  }
+};
+
+template <class Sink, bool kCoarse>
+__global__ void __launch_bounds__(32 * kWarps, 7)
+    march_kernel(const __grid_constant__ Task task, const glm::vec3* seeds, const __grid_constant__ Sink sink) {
+  __shared__ typename WarpQueue<Sink, kCoarse>::Entry entries[kWarps][64];
+  const int lane = static_cast<int>(threadIdx.x), warp = static_cast<int>(threadIdx.y);
+  const glm::ivec3 size = task.size(), first(blockIdx.x * 32, blockIdx.y * kWarps + warp, blockIdx.z * kMarch);
+  if (first.y >= size.y) return;  // the whole warp
+  const int slices = min(kMarch, size.z - first.z), x = first.x + lane;
+  const March<Sink, kCoarse> march{task, sink, first, lane, slices, x < size.x};
+  int found = 0;
+  if (task.resting[task.march_number({blockIdx.x, first.y, blockIdx.z})] != 0) {
+    found = march.copy();
+  } else {
+    const glm::ivec3 seed(min(x, size.x - 1) / kSeedTile, first.y / kSeedTile, blockIdx.z);
+    const glm::vec3 place = seeds[(seed.z * task.seeds.y + seed.y) * task.seeds.x + seed.x] +
+                            glm::vec3(glm::ivec3(x, first.y, first.z) - task.seeded(seed)) * task.lattice.voxel;
+    found = march.predict(place, {entries[warp], first, lane});
+  }
+  const unsigned covered = warp_sum(static_cast<unsigned>(found));
+  if (lane == 0 && covered != 0) atomicAdd(&task.counters->covered, static_cast<unsigned long long>(covered));
+}
+
+}  // namespace
+
+}  // namespace tetwarp::cuda_detail
