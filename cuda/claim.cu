@@ -134,10 +134,7 @@ struct WantedSlate {
     for (int z = first.z; z <= last.z; ++z) {
       for (int y = first.y; y <= last.y; ++y) {
         for (int x = first.x / 32; x <= last.x / 32; ++x) {
-          std::uint32_t mask = wanted.bits[word({32 * x, y, z})];
-          if (x == first.x / 32) mask &= ~0u << (first.x & 31);
-          if (x == last.x / 32) mask &= ~0u >> (31 - (last.x & 31));
-          if (mask != 0) return true;
+          if ((wanted.bits[word({32 * x, y, z})] & bits_of_word(x, first.x, last.x)) != 0) return true;
         }
       }
     }

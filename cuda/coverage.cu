@@ -135,11 +135,7 @@ __global__ void wind_kernel(Crossings in, std::int64_t rows, int rows_per_slice,
     const std::uint32_t outs = here ? in.outs[row * in.words + word] : 0;
     int change = __popc(ins) - __popc(outs);
     if (has_extra) change += chain.sum(word * 32, word * 32 + 32);
-    int sum = change;
-    for (int step = 1; step < lanes; step *= 2) {
-      const int below = __shfl_up_sync(~0u, sum, step, lanes);
-      if (lane >= step) sum += below;
-    }
+    const int sum = warp_scan(change, lanes);
     int winding = carried + sum - change;
     std::uint32_t one = 0, more = 0;
     int from = 0;  // bits from here on have the winding number so far
@@ -162,7 +158,7 @@ __global__ void wind_kernel(Crossings in, std::int64_t rows, int rows_per_slice,
     }
     carried += __shfl_sync(~0u, sum, lanes - 1, lanes);
   }
-  for (int step = lanes / 2; step > 0; step /= 2) found += __shfl_xor_sync(~0u, found, step);
+  found = warp_sum(found, lanes);
   if (lane == 0 && found != 0) atomicAdd(&in_slice[row / rows_per_slice], found);
 }
 
@@ -179,9 +175,7 @@ struct SeveralMarker {
       for (int y = first.y; y <= last.y; ++y) {
         const std::int64_t row = (std::int64_t{z} * (region.end.y - region.begin.y) + y) * words;
         for (int word = first.x / 32; word <= last.x / 32; ++word) {
-          std::uint32_t mask = ~0u;
-          if (word == first.x / 32) mask &= ~0u << (first.x & 31);
-          if (word == last.x / 32) mask &= ~0u >> (31 - (last.x & 31));
+          const std::uint32_t mask = bits_of_word(word, first.x, last.x);
           if ((several[row + word] & mask) == mask) continue;
           atomicAnd(&single[row + word], ~mask);
           atomicOr(&several[row + word], mask);

@@ -52,13 +52,9 @@ __global__ void number_kernel(const std::uint32_t* several, std::int64_t words, 
                               unsigned* voxels) {
   const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
   const std::uint32_t bits = n < words ? several[n] : 0;
-  const unsigned mine = static_cast<unsigned>(__popc(bits));
-  unsigned before = mine;  // of the warp, this one too
+  const auto mine = static_cast<unsigned>(__popc(bits));
+  const auto before = static_cast<unsigned>(warp_scan(__popc(bits)));  // of the warp, this one too
   const int lane = static_cast<int>(threadIdx.x & 31);
-  for (int step = 1; step < 32; step *= 2) {
-    const unsigned below = __shfl_up_sync(~0u, before, step);
-    if (lane >= step) before += below;
-  }
   unsigned first = 0;
   if (lane == 31 && before != 0) first = atomicAdd(numbered, before);
   first = __shfl_sync(~0u, first, 31) + before - mine;
@@ -85,10 +81,8 @@ __global__ void settle_kernel(Task task, glm::ivec3 begin, const unsigned* voxel
   const LatticeTetrahedron t = LatticeTetrahedron::of_cell(
       {static_cast<int>(cell % cells.x), static_cast<int>(row % cells.y), static_cast<int>(row / cells.y)},
       static_cast<int>(owner[n] % kTetrahedraPerCell));
-  const bool covered = sink.write(place, voxel, offset_in(task.lattice, t, voxel, task.nudge.signs(voxel)));
-  const unsigned active = __activemask(), votes = __ballot_sync(active, covered);
-  if (votes != 0 && (threadIdx.x & 31) == __ffs(static_cast<int>(active)) - 1)
-    atomicAdd(&task.counters->covered, static_cast<unsigned long long>(__popc(votes)));
+  warp_count(&task.counters->covered,
+             sink.write(place, voxel, offset_in(task.lattice, t, voxel, task.nudge.signs(voxel))));
 }
 
 }  // namespace

@@ -19,19 +19,17 @@ class PinnedPiece {
  public:
   static constexpr std::size_t kBytes = std::size_t{8} << 20;
 
-  PinnedPiece() { TETWARP_CUDA_TRY(cudaMallocHost(&bytes_, kBytes)); }
-  ~PinnedPiece() {
-    cudaEventSynchronize(done.get());
-    cudaFreeHost(bytes_);
-  }
+  PinnedPiece() : bytes_(buffer_.reserve(kBytes)) {}
+  ~PinnedPiece() { cudaEventSynchronize(done.get()); }
   PinnedPiece(const PinnedPiece&) = delete;
   PinnedPiece& operator=(const PinnedPiece&) = delete;
 
-  std::byte* bytes() const { return static_cast<std::byte*>(bytes_); }
+  std::byte* bytes() const { return bytes_; }
   Event done;
 
  private:
-  void* bytes_ = nullptr;
+  PinnedBuffer<std::byte> buffer_;
+  std::byte* bytes_;
 };
 
 /// A copy from the host by the calling thread, through a small ring of pinned pieces.

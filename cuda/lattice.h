@@ -18,15 +18,42 @@ struct BitRows {
   int words_per_row;
 };
 
+/// Of a word of a row of bits, those from `first` to `last` of the row, both included; the word must reach into these.
+__device__ inline std::uint32_t bits_of_word(int word, int first, int last) {
+  std::uint32_t mask = ~0u;
+  if (word == first / 32) mask &= ~0u << (first & 31);
+  if (word == last / 32) mask &= ~0u >> (31 - (last & 31));
+  return mask;
+}
+
 /// The place of an element that is number n in a box of this size, i fastest.
 __host__ __device__ inline glm::i64vec3 unravel(std::int64_t n, const glm::i64vec3& size) {
   return {n % size.x, n / size.x % size.y, n / (size.x * size.y)};
 }
 
-/// Sum over a whole warp, in every lane.
-__device__ inline unsigned warp_sum(unsigned value) {
-  for (int step = 16; step > 0; step /= 2) value += __shfl_xor_sync(~0u, value, step);
+/// Sum over a whole warp, or over groups of so many lanes (a power of two), in every lane.
+__device__ inline unsigned warp_sum(unsigned value, int lanes = 32) {
+  for (int step = lanes / 2; step > 0; step /= 2) value += __shfl_xor_sync(~0u, value, step);
   return value;
+}
+
+/// Sum over the lanes of such a group up to this one.
+__device__ inline int warp_scan(int value, int lanes = 32) {
+  const int lane = static_cast<int>(threadIdx.x) & (lanes - 1);
+  for (int step = 1; step < lanes; step *= 2) {
+    const int below = __shfl_up_sync(~0u, value, step, lanes);
+    if (lane >= step) value += below;
+  }
+  return value;
+}
+
+/// Adds 1 for every thread of the warp whose condition holds.
+__device__ inline void warp_count(unsigned long long* counter, bool condition) {
+  const unsigned active = __activemask();
+  const unsigned votes = __ballot_sync(active, condition);
+  if (votes != 0 && (threadIdx.x & 31) == __ffs(static_cast<int>(active)) - 1) {
+    atomicAdd(counter, static_cast<unsigned long long>(__popc(votes)));
+  }
 }
 
 /// A field as kernels see it: its vertices, snapped, in one of two forms.

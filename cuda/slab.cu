@@ -21,15 +21,6 @@ std::size_t bytes_of(const ConstVolumeView& source, const Slices& slices) {
   return static_cast<std::size_t>(held.x * held.y * (slices.end - slices.begin)) * size_bytes(source.type);
 }
 
-/// Adds 1 for every thread of the warp whose condition holds.
-__device__ void count(unsigned long long* counter, bool condition) {
-  const unsigned active = __activemask();
-  const unsigned votes = __ballot_sync(active, condition);
-  if (votes != 0 && (threadIdx.x & 31) == __ffs(static_cast<int>(active)) - 1) {
-    atomicAdd(counter, static_cast<unsigned long long>(__popc(votes)));
-  }
-}
-
 struct DeviceSlices {
   long long *first, *last;  ///< one per output slice, or null
 };
@@ -44,10 +35,10 @@ __global__ void sample_kernel(SamplePlan<V> plan, SlabBox slab, const std::uint8
   output.at(at) = voxel.value;
   if (coverage) coverage[n] = voxel.inside;
   if (counts) {
-    count(&counts->covered, voxel.inside);
-    count(&counts->uncovered, !voxel.inside);
-    count(&counts->clamped, voxel.saturated);
-    count(&counts->padded, voxel.padded);
+    warp_count(&counts->covered, voxel.inside);
+    warp_count(&counts->uncovered, !voxel.inside);
+    warp_count(&counts->clamped, voxel.saturated);
+    warp_count(&counts->padded, voxel.padded);
   }
   if (slices.first && voxel.inside) {
     if (voxel.first_slice < slices.first[at.z]) atomicMin(&slices.first[at.z], voxel.first_slice);
@@ -60,8 +51,8 @@ __global__ void count_kernel(SlabBox slab, const std::uint8_t* mapped, std::uint
   const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
   if (n >= slab.count()) return;
   if (coverage) coverage[n] = mapped[n];
-  count(&counts->covered, mapped[n] != 0);
-  count(&counts->uncovered, mapped[n] == 0);
+  warp_count(&counts->covered, mapped[n] != 0);
+  warp_count(&counts->uncovered, mapped[n] == 0);
 }
 
 __global__ void inverse_kernel(SlabBox slab, glm::dmat3 mm_from_index, const std::uint8_t* mapped,

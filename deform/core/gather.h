@@ -132,8 +132,8 @@ enum class Effort { quick, full };
 /// and 8 units. The determinant must have the sign of the undeformed one: an inverted tetrahedron is never accepted.
 ///
 /// From p + d to p a weight changes by at most 15/16 step times the sum norms of two columns over the determinant;
-/// where that is clearly below the slack, no weight at p can leave it. With full effort the weights are looked at
-/// otherwise.
+/// where that is clearly below the slack, and the weights at p + d are positive, no weight at p can leave it. With full
+/// effort the weights themselves are looked at.
 template <Effort kEffort>
 TETWARP_HD Trial try_tetrahedron(const StepLattice& lattice, const FloatTetrahedron& t, const GatherPoint& point) {
   using detail::multiply_add;
