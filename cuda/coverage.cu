@@ -73,23 +73,28 @@ struct Sides {
 /// One thread a triangle of the border.
 __global__ void __launch_bounds__(kThreads, 8)
     border_kernel(const __grid_constant__ StepLattice lattice, const __grid_constant__ Sides sides,
-                  const __grid_constant__ Nudge nudge, const __grid_constant__ SlabBox box,
-                  const __grid_constant__ Crossings out) {
+                  const __grid_constant__ Nudge nudge, const __grid_constant__ NudgeTurns turns,
+                  const __grid_constant__ SlabBox box, const __grid_constant__ Crossings out) {
   const std::int64_t number = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
   if (number >= sides.first[6]) return;
   int side = 0;
   while (number >= sides.first[side + 1]) ++side;
-  const auto n = static_cast<int>(number - sides.first[side]);
-  const int axis = side / 2, across = lattice.cells[(axis + 1) % 3];
-  const BorderTriangle t = border_triangle(lattice, axis, side % 2 == 1, {n / 2 % across, n / 2 / across}, n % 2);
+  const auto n = static_cast<unsigned>(number - sides.first[side]);
+  const auto on_axis = [&](int axis) {
+    const auto across = static_cast<unsigned>(lattice.cells[(axis + 1) % 3]);
+    return border_triangle(lattice, axis, side % 2 == 1, {n / 2 % across, n / 2 / across}, n % 2);
+  };
+  // With the axis known when compiled, no vector is indexed at run time.
+  const BorderTriangle t = side < 2 ? on_axis(0) : (side < 4 ? on_axis(1) : on_axis(2));
   Box around{t.a, t.a};
   around.grow(t.b);
   around.grow(t.c);
   if (around.low.y == around.high.y || around.low.z == around.high.z) return;  // no row passes through
-  VoxelBox rows{box.begin, box.begin + box.size};
-  for (int i = 1; i < 3; ++i) detail::candidates(nudge, i, around.low[i], around.high[i], &rows.begin[i], &rows.end[i]);
-  if (rows.end.y <= rows.begin.y || rows.end.z <= rows.begin.z) return;
-  const glm::ivec2 from(rows.begin.y, rows.begin.z), to(rows.end.y - 1, rows.end.z - 1);
+  const glm::ivec3 begin(box.begin), end(box.begin + box.size);
+  glm::ivec2 from(begin.y, begin.z), to(end.y, end.z);
+  for (int i = 1; i < 3; ++i) cut_to_candidates(turns, i, around.low[i], around.high[i], from[i - 1], to[i - 1]);
+  to -= 1;
+  if (to.x < from.x || to.y < from.y) return;
   if (fits_double(around)) {
     cross_rows<double>(t, nudge, box, from, to, out);
   } else if (fits_int64(around)) {
@@ -120,7 +125,8 @@ struct Chain {
 
 /// From crossings to the winding number of every voxel. Some lanes of a warp, a power of two, share a row.
 __global__ void wind_kernel(Crossings in, std::int64_t rows, int rows_per_slice, int width, int lanes,
-                            std::uint32_t* single, std::uint32_t* several, unsigned* in_slice) {
+                            std::uint32_t* single, std::uint32_t* several, unsigned* in_slice,
+                            unsigned long long* in_box) {
   const std::int64_t number = (std::int64_t{blockIdx.x} * kThreads + threadIdx.x) / lanes, row = min(number, rows - 1);
   const int lane = static_cast<int>(threadIdx.x) & (lanes - 1);
   const bool has_row = number < rows;
@@ -159,7 +165,9 @@ __global__ void wind_kernel(Crossings in, std::int64_t rows, int rows_per_slice,
     carried += __shfl_sync(~0u, sum, lanes - 1, lanes);
   }
   found = warp_sum(found, lanes);
-  if (lane == 0 && found != 0) atomicAdd(&in_slice[row / rows_per_slice], found);
+  if (lane != 0 || found == 0) return;
+  atomicAdd(&in_slice[row / rows_per_slice], found);
+  atomicAdd(in_box, static_cast<unsigned long long>(found));
 }
 
 /// The voxels that have become `several`.
@@ -186,13 +194,16 @@ struct SeveralMarker {
 };
 
 /// How many bits each slice has: some thread blocks a slice.
-__global__ void count_kernel(const std::uint32_t* bits, int words_per_slice, unsigned* in_slice) {
+__global__ void count_kernel(const std::uint32_t* bits, int words_per_slice, unsigned* in_slice,
+                             unsigned long long* in_box) {
   unsigned found = 0;
   const std::uint32_t* slice = bits + std::int64_t{blockIdx.y} * words_per_slice;
   for (int n = static_cast<int>(blockIdx.x * kThreads + threadIdx.x); n < words_per_slice; n += gridDim.x * kThreads)
     found += static_cast<unsigned>(__popc(slice[n]));
   found = warp_sum(found);
-  if ((threadIdx.x & 31) == 0 && found != 0) atomicAdd(&in_slice[blockIdx.y], found);
+  if ((threadIdx.x & 31) != 0 || found == 0) return;
+  atomicAdd(&in_slice[blockIdx.y], found);
+  atomicAdd(in_box, static_cast<unsigned long long>(found));
 }
 
 /// One thread four pairs of vertices on kBlock rows of as many slices: all voxels that the inverted tetrahedra near
@@ -241,7 +252,8 @@ __global__ void inverted_kernel(StepLattice lattice, NudgeTurns turns, InvertedP
 
 }  // namespace
 
-void Coverage::find(const LatticeOnDevice& lattice, const SlabBox& box, cudaStream_t stream) {
+void Coverage::find(const LatticeOnDevice& lattice, const SlabBox& box, unsigned long long* several_in_box,
+                    cudaStream_t stream) {
   const DeviceField& field = lattice.field();
   words_ = static_cast<int>((box.size.x + 31) / 32);
   const std::int64_t rows = box.size.y * box.size.z;
@@ -258,13 +270,14 @@ void Coverage::find(const LatticeOnDevice& lattice, const SlabBox& box, cudaStre
                             extra_.reserve(kMostExtra),
                             in_slice_ + slices};
   const Sides sides(field.steps.cells);
-  border_kernel<<<blocks_for(sides.first[6]), kThreads, 0, stream>>>(field.steps, sides, field.frame.nudge, box,
-                                                                     crossings);
+  border_kernel<<<blocks_for(sides.first[6]), kThreads, 0, stream>>>(field.steps, sides, field.frame.nudge,
+                                                                     NudgeTurns(field.frame.nudge), box, crossings);
   std::uint32_t *single = single_.reserve(words), *several = several_.reserve(words);
   int lanes = 32;
   while (lanes > 1 && lanes / 2 >= words_) lanes /= 2;
-  wind_kernel<<<blocks_for(rows * lanes), kThreads, 0, stream>>>(
-      crossings, rows, static_cast<int>(box.size.y), static_cast<int>(box.size.x), lanes, single, several, in_slice_);
+  wind_kernel<<<blocks_for(rows * lanes), kThreads, 0, stream>>>(crossings, rows, static_cast<int>(box.size.y),
+                                                                 static_cast<int>(box.size.x), lanes, single, several,
+                                                                 in_slice_, several_in_box);
   if (lattice.statistics().inverted != 0) {
     const InvertedPairs& inverted = lattice.inverted();
     const IntBox region{glm::ivec3(box.begin), glm::ivec3(box.begin + box.size)};
@@ -272,16 +285,17 @@ void Coverage::find(const LatticeOnDevice& lattice, const SlabBox& box, cudaStre
                                 (field.steps.cells.z / kBlock + 1);
     inverted_kernel<<<blocks_for(groups), kThreads, 0, stream>>>(field.steps, NudgeTurns(field.frame.nudge), inverted,
                                                                  {region, words_, single, several});
-    count_several(box, stream);
+    count_several(box, several_in_box, stream);
   }
   TETWARP_CUDA_TRY(cudaGetLastError());
 }
 
-void Coverage::count_several(const SlabBox& box, cudaStream_t stream) {
+void Coverage::count_several(const SlabBox& box, unsigned long long* several_in_box, cudaStream_t stream) {
   const auto slices = static_cast<std::size_t>(box.size.z);
   TETWARP_CUDA_TRY(cudaMemsetAsync(in_slice_, 0, slices * sizeof(unsigned), stream));
+  TETWARP_CUDA_TRY(cudaMemsetAsync(several_in_box, 0, sizeof *several_in_box, stream));
   count_kernel<<<dim3(16, static_cast<unsigned>(slices)), kThreads, 0, stream>>>(
-      several_.data(), static_cast<int>(words_ * box.size.y), in_slice_);
+      several_.data(), static_cast<int>(words_ * box.size.y), in_slice_, several_in_box);
   TETWARP_CUDA_TRY(cudaGetLastError());
 }
 

@@ -17,15 +17,17 @@ struct ExtraCrossing {
 /// "Gather").
 class Coverage {
  public:
-  /// For a field with whole steps. Queued on the stream.
-  void find(const LatticeOnDevice& lattice, const SlabBox& box, cudaStream_t stream);
+  /// For a field with whole steps. Queued on the stream. @param several_in_box  on the device; the number of voxels
+  /// that are `several` is added to it
+  void find(const LatticeOnDevice& lattice, const SlabBox& box, unsigned long long* several_in_box,
+            cudaStream_t stream);
 
   /// Voxels with one owner.
   BitRows single() const { return {single_.data(), words_}; }
   /// Voxels that may have several, or none: not in `single`. Others may be added.
   std::uint32_t* several() const { return several_.data(); }
-  /// To be called where some were added.
-  void count_several(const SlabBox& box, cudaStream_t stream);
+  /// Counts them again, where some were added.
+  void count_several(const SlabBox& box, unsigned long long* several_in_box, cudaStream_t stream);
   /// How many of these each slice of the box has.
   unsigned* several_in_slice() const { return in_slice_; }
   int words_per_row() const { return words_; }

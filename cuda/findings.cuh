@@ -13,6 +13,7 @@ struct LatticeFindings {
   unsigned long long not_least, most;  ///< Jacobian determinants as `ordered` keys; of the smallest, the complement
   unsigned long long not_bad_vertex;   ///< complement of the number of the first vertex that cannot be used
   unsigned long long beside;  ///< not 0: some vertex does not rest at a whole step, or moved too far for floats
+  unsigned long long wide;    ///< not 0: some vertex moved further than the lattice's packing holds
 };
 
 /// Doubles as integers of the same order, so that integer atomics find the smallest and largest.

@@ -18,7 +18,7 @@ namespace cuda_detail {
 
 namespace {
 
-/// Device memory of a vertex from the host: its displacement, in place of which it is snapped, and some bits; or a
+/// Device memory of a vertex from the host: its displacement, in place of which it is packed, and some bits; or a
 /// Vertex as well.
 constexpr std::uint64_t kStepVertexBytes = sizeof(glm::vec3) + 1, kVertexBytes = kStepVertexBytes + sizeof(Vertex);
 
@@ -112,7 +112,7 @@ class ForwardResampler final : public CudaResampler {
     return static_cast<std::uint64_t>(cells.end - cells.begin + 1) * slice_vertices() * vertex_bytes_;
   }
 
-  void set_lattice(const LatticeFrame& frame, const glm::vec3* displacement, glm::vec3* room) {
+  void set_lattice(const LatticeFrame& frame, const glm::vec3* displacement, std::uint64_t* room) {
     gather_.forget_field();
     claims_.forget_field();
     lattice_->set(frame, output(), displacement, room, wants_range_, stream_);
@@ -128,7 +128,7 @@ class ForwardResampler final : public CudaResampler {
     const glm::vec3* from = field_.displacement + slice * static_cast<std::size_t>(cells.begin);
     uploads_->copy(reinterpret_cast<std::byte*>(here), reinterpret_cast<const std::byte*>(from),
                    vertices * sizeof(glm::vec3), stream_);
-    set_lattice(part_of(frame_, cells), here, here);
+    set_lattice(part_of(frame_, cells), here, reinterpret_cast<std::uint64_t*>(here));
     held_ = cells;
   }
 

@@ -1,7 +1,6 @@
 #include "cuda/gather.h"
 
 #include <algorithm>
-#include <numeric>
 
 #include "cuda/march.cuh"
 #include "deform/core/visit_cell.h"
@@ -29,10 +28,11 @@ __global__ void queue_kernel(Task task, int walk, Sink sink) {
     bool settled = false;
     for (int n_try = 0; n_try < kQueueTries && !settled; ++n_try) {
       if (!is_finite(place)) place = task.lattice.place(glm::vec3(voxel));
-      const Trial trial = try_tetrahedron<Effort::full>(task.lattice, tetrahedron_at(task.lattice, place), point);
+      const Trial trial = try_tetrahedron(task.lattice, tetrahedron_at(task.lattice, place), point);
       settled = trial.owns;
-      if (settled) covered += sink.write(sink.place(voxel), voxel, trial.u);
-      place = n_try == 0 ? trial.place : (place + trial.place) * 0.5f;  // full steps may go round in circles in folds
+      if (settled) covered += sink.write(sink.place(voxel), voxel, trial.u());
+      place =
+          n_try == 0 ? trial.place() : (place + trial.place()) * 0.5f;  // full steps may go round in circles in folds
     }
     if (settled) continue;
     if (!is_finite(place)) place = task.lattice.place(glm::vec3(voxel));
@@ -93,7 +93,7 @@ Gather::Counters Gather::run(const LatticeOnDevice& lattice, const SlabBox& box,
   const DeviceField& field = lattice.field();
   counters_.fill(0, 1, stream);
   const glm::ivec3 size(box.size), tile(kSeedTile, kSeedTile, kMarch);
-  const glm::ivec3 marches((size.x + 31) / 32, size.y, (size.z + kMarch - 1) / kMarch);
+  const glm::ivec3 marches = marches_of(size);
   Task task{field.steps,
             NudgeTurns(field.frame.nudge),
             box,
@@ -107,17 +107,19 @@ Gather::Counters Gather::run(const LatticeOnDevice& lattice, const SlabBox& box,
   const std::int64_t seeds = std::int64_t{task.seeds.x} * task.seeds.y * task.seeds.z;
   glm::vec3* seeded = seeds_.reserve(static_cast<std::size_t>(seeds));
   if (!beside_) beside_.emplace();
-  beside_->begun.record(stream);  // seeds and what rests do not wait for the coverage
-  beside_->begun.hold_back(beside_->stream.get());
+  beside_->begun.record(stream);
+  unsigned long long* several = &counters_.data()->claimed;
+  coverage_.find(lattice, box, several, stream);
+  beside_->begun.hold_back(beside_->stream.get());  // seeds and what rests do not wait for the coverage
   seed_kernel<<<blocks_for(seeds), kThreads, 0, beside_->stream.get()>>>(task, seeded);
   const std::int64_t march_count = std::int64_t{marches.x} * marches.y * marches.z;
   rest_kernel<<<blocks_for(march_count * 32), kThreads, 0, beside_->stream.get()>>>(task, march_count);
   beside_->seeded.record(beside_->stream.get());
-  coverage_.find(lattice, box, stream);
   beside_->seeded.hold_back(stream);
   task.single = coverage_.single();
   task.several = coverage_.several();
-  const dim3 blocks(static_cast<unsigned>(marches.x), static_cast<unsigned>((marches.y + kWarps - 1) / kWarps),
+  constexpr int kBlockJ = kWarps * kAlongI * kAlongJ / 32;  // voxels of a block along j
+  const dim3 blocks(static_cast<unsigned>((size.x + 31) / 32), static_cast<unsigned>((size.y + kBlockJ - 1) / kBlockJ),
                     static_cast<unsigned>(marches.z));
   const glm::vec3& cell = field.steps.cell;
   const bool coarse = std::max({cell.x, cell.y, cell.z}) > 2 * kStepsPerVoxel;
@@ -125,25 +127,19 @@ Gather::Counters Gather::run(const LatticeOnDevice& lattice, const SlabBox& box,
   march<<<blocks, dim3(32, kWarps), 0, stream>>>(task, seeded, sink);
   queue_kernel<<<1024, kThreads, 0, stream>>>(task, is_mostly_folded(lattice) ? 0 : kWalk, sink);
   TETWARP_CUDA_TRY(cudaGetLastError());
-  const auto slices = static_cast<std::size_t>(size.z);
-  unsigned* in_slice = several_in_slice_.reserve(slices);
-  const auto count_slices = [&] {
-    TETWARP_CUDA_TRY(cudaMemcpyAsync(in_slice, coverage_.several_in_slice(), slices * sizeof(unsigned),
-                                     cudaMemcpyDeviceToHost, stream));
-    return counters(stream);
-  };
-  Counters found = count_slices();
+  Counters found = counters(stream);
   if (found.left != 0) {
-    coverage_.count_several(box, stream);
-    found = count_slices();
-  }
-  const std::uint64_t several = std::accumulate(in_slice, in_slice + slices, std::uint64_t{0});
-  if (several != 0) {
-    claim_several(task, field, in_slice, sink, stream);
+    coverage_.count_several(box, several, stream);
     found = counters(stream);
   }
-  found.claimed = several;
-  return found;
+  if (found.claimed == 0) return found;
+  const auto slices = static_cast<std::size_t>(size.z);
+  unsigned* in_slice = several_in_slice_.reserve(slices);
+  TETWARP_CUDA_TRY(cudaMemcpyAsync(in_slice, coverage_.several_in_slice(), slices * sizeof(unsigned),
+                                   cudaMemcpyDeviceToHost, stream));
+  TETWARP_CUDA_TRY(cudaStreamSynchronize(stream));
+  claim_several(task, field, in_slice, sink, stream);
+  return counters(stream);
 }
 
 bool Gather::is_mostly_folded(const LatticeOnDevice& lattice) {

@@ -5,6 +5,7 @@
 #include "cuda/claim.h"
 #include "cuda/coverage.h"
 #include "cuda/stream.h"
+#include "deform/core/gather.h"
 
 namespace tetwarp::cuda_detail {
 
@@ -18,14 +19,25 @@ struct OffsetSink {
 
   __device__ int place(const glm::ivec3& voxel) const { return static_cast<int>(box.offset(glm::i64vec3(voxel))); }
   __device__ int per_slice() const { return static_cast<int>(box.size.x * box.size.y); }
+  /// Nothing waits here.
+  struct Pending {
+    bool any;
+  };
+  __device__ void start(int place, const glm::ivec3& voxel, const glm::vec3& moved, bool wanted,
+                        Pending& pending) const {
+    pending.any = wanted && write(place, voxel, detail::to_offset(moved));
+  }
+  __device__ void finish(int, const Pending&) const {}
   /// @return whether the voxel counts as covered
   __device__ bool write(int place, const glm::ivec3&, const glm::vec3& u) const {
     mapped[place] = 1;
     offset[place] = u;
     return true;
   }
-  /// A voxel that stays where it is.
-  __device__ bool copy(int place, const glm::ivec3& voxel) const { return write(place, voxel, glm::vec3(0)); }
+  /// Voxels that stay where they are: first read, then written.
+  struct Copied {};
+  __device__ Copied fetch(const glm::ivec3&) const { return {}; }
+  __device__ void put(int place, Copied) const { write(place, {}, glm::vec3(0)); }
   __device__ void nothing(int place) const {
     mapped[place] = 0;
     offset[place] = glm::vec3(0);

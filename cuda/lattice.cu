@@ -49,31 +49,53 @@ __global__ void reach_kernel(DeviceField field, VoxelBox region, int* low_high) 
 
 }  // namespace
 
-/// @return whether all vertices rest at whole steps
-bool LatticeOnDevice::set_steps(const StepLattice& lattice, const glm::vec3* displacement, glm::vec3* room,
+/// @return whether all vertices rest at whole steps, and can be packed
+bool LatticeOnDevice::set_steps(StepLattice lattice, const glm::vec3* displacement, std::uint64_t* room,
                                 bool wants_range, LatticeFindings& found, cudaStream_t stream) {
   if (lattice.cells.x == 0) return false;
-  if (!room) room = moved_.reserve(static_cast<std::size_t>(lattice.slice) * (lattice.cells.z + 1));
-  const bool in_place = room == displacement;  // look first: what is not at whole steps needs its displacement
+  const auto vertices = static_cast<std::size_t>(lattice.slice) * static_cast<std::size_t>(lattice.cells.z + 1);
+  if (!room) room = packed_.reserve(vertices);
+  const bool in_place = static_cast<const void*>(room) == displacement;  // look first, pack then
   inverted_ = InvertedPairs(lattice);
-  inverted_.words = inverted_words_.reserve(static_cast<std::size_t>(inverted_.word(0, lattice.cells.z + 1, 0)));
+  const auto words = static_cast<std::size_t>(inverted_.word(0, lattice.cells.z + 1, 0));
   blocks_.count = lattice.cells / MovingBlocks::kSide + 1;
   const auto blocks = static_cast<std::size_t>(std::int64_t{blocks_.count.x} * blocks_.count.y * blocks_.count.z);
-  moving_.fill(0, blocks, stream);
-  blocks_.moving = moving_.data();
-  found_.fill(0, 1, stream);
-  StepPass pass{field_.frame, lattice, displacement,  in_place ? nullptr : room,
-                inverted_,    blocks_, found_.data(), wants_range};
-  run_step_pass(pass, stream);
-  found_.download(&found, 1, stream);
-  if (found.beside != 0) return false;
+  StepPass pass{field_.frame, lattice, displacement, in_place ? nullptr : room, {}, {}, nullptr, wants_range};
+  const auto look = [&] {
+    pass.lattice.packing = packing_;
+    inverted_words_.fill(0, words, stream);
+    moving_.fill(0, blocks, stream);
+    found_.fill(0, 1, stream);
+    inverted_.words = inverted_words_.data();
+    blocks_.moving = moving_.data();
+    pass.inverted = inverted_;
+    pass.moving = blocks_;
+    pass.found = found_.data();
+    run_step_pass(pass, stream);
+    found_.download(&found, 1, stream);
+    return found.beside == 0 && found.not_bad_vertex == 0;
+  };
+  if (!look()) return false;
+  if (found.wide != 0) {
+    const int nothing[6] = {INT32_MAX, INT32_MAX, INT32_MAX, INT32_MIN, INT32_MIN, INT32_MIN};
+    int low_high[6];
+    DeviceBuffer<int> range;
+    range.upload(nothing, 6, stream);
+    find_range(pass, range.data(), stream);
+    range.download(low_high, 6, stream);
+    const std::optional<StepPacking> packing =
+        StepPacking::holding({low_high[0], low_high[1], low_high[2]}, {low_high[3], low_high[4], low_high[5]});
+    if (!packing) return false;
+    packing_ = *packing;
+    if (!look() || found.wide != 0) return false;
+  }
   if (in_place) {
-    pass.moved = room;
-    snap_steps(pass, stream);
+    pass.packed = room;
+    pack_steps(pass, stream);
     TETWARP_CUDA_TRY(cudaStreamSynchronize(stream));  // the next call may come on another stream
   }
-  field_.steps = lattice;
-  field_.steps.moved = room;
+  field_.steps = pass.lattice;
+  field_.steps.packed = room;
   return true;
 }
 
@@ -89,7 +111,7 @@ void LatticeOnDevice::set_vertices(const glm::vec3* displacement, std::int64_t v
 }
 
 void LatticeOnDevice::set(const LatticeFrame& frame, const Geometry& output, const glm::vec3* displacement,
-                          glm::vec3* room, bool wants_range, cudaStream_t stream) {
+                          std::uint64_t* room, bool wants_range, cudaStream_t stream) {
   field_ = {frame, {}, nullptr};
   const glm::i64vec3 size = frame.cells + std::int64_t{1};
   LatticeFindings found;

@@ -59,10 +59,10 @@ __device__ inline void warp_count(unsigned long long* counter, bool condition) {
 /// A field as kernels see it: its vertices, snapped, in one of two forms.
 struct DeviceField {
   LatticeFrame frame;
-  StepLattice steps;                 ///< where `moved` is not null
+  StepLattice steps;                 ///< where `packed` is not null
   const Vertex* vertices = nullptr;  ///< otherwise
 
-  bool has_steps() const { return steps.moved != nullptr; }
+  bool has_steps() const { return steps.packed != nullptr; }
   __device__ glm::i64vec3 cell_at(std::int64_t number) const { return unravel(number, frame.cells); }
   __device__ Vertex vertex(const glm::i64vec3& at) const {
     if (!vertices) return steps.vertex(glm::ivec3(at));
@@ -122,11 +122,11 @@ struct LatticeFindings;  // findings.cuh
 class LatticeOnDevice {
  public:
   /// @param displacement  on the device
-  /// @param room          null, or room for as many vectors, which may be `displacement` itself and must then stay:
-  ///                      what is held of the vertices goes there where it can
+  /// @param room          null, or room for 8 bytes a vertex, which may be where the displacements are: what is held of
+  ///                      the vertices goes there where it can. Where it cannot, the displacements are not touched
   /// @param wants_range   whether `statistics` has the range of Jacobian determinants
   /// @throws InputError for a vertex that is not finite or too far away
-  void set(const LatticeFrame& frame, const Geometry& output, const glm::vec3* displacement, glm::vec3* room,
+  void set(const LatticeFrame& frame, const Geometry& output, const glm::vec3* displacement, std::uint64_t* room,
            bool wants_range, cudaStream_t stream);
 
   const DeviceField& field() const { return field_; }
@@ -141,14 +141,15 @@ class LatticeOnDevice {
   void reach(const glm::i64vec3& begin, const glm::i64vec3& end, int (&low_high)[6], cudaStream_t stream) const;
 
  private:
-  bool set_steps(const StepLattice& lattice, const glm::vec3* displacement, glm::vec3* room, bool wants_range,
+  bool set_steps(StepLattice lattice, const glm::vec3* displacement, std::uint64_t* room, bool wants_range,
                  LatticeFindings& found, cudaStream_t stream);
   void set_vertices(const glm::vec3* displacement, std::int64_t vertices, LatticeFindings& found, cudaStream_t stream);
 
   DeviceField field_;
   FieldStatistics statistics_;
   DeviceBuffer<Vertex> vertices_;
-  DeviceBuffer<glm::vec3> moved_;
+  DeviceBuffer<std::uint64_t> packed_;
+  StepPacking packing_;  ///< of the last field that was packed
   DeviceBuffer<std::uint32_t> inverted_words_;
   InvertedPairs inverted_;
   DeviceBuffer<std::uint8_t> moving_;

@@ -9,14 +9,27 @@ namespace tetwarp::cuda_detail {
 
 namespace {
 
-constexpr int kMarch = 64;      ///< voxels along k that a thread goes; a multiple of 32
-constexpr int kWarps = 4;       ///< of a block, side by side along j
-constexpr int kSeedTile = 8;    ///< voxels along i and j that share a seed
-constexpr int kSeedTries = 40;  ///< from an undeformed guess
-constexpr int kRounds = 10;     ///< at the first slice of a march, while guesses fail
-constexpr int kFewFailed = 3;   ///< lanes
-constexpr int kWarpTries = 3;   ///< of a voxel within its warp, after the first
+constexpr int kAlongI = 16;            ///< voxels of a warp along i
+constexpr int kAlongJ = 32 / kAlongI;  ///< and along j
+constexpr int kMarch = 64;             ///< voxels along k that a thread goes; a multiple of 32
+constexpr int kWarps = 4;              ///< of a block: 32 voxels along i
+constexpr int kBlocks = 6;             ///< a multiprocessor
+constexpr int kCopied = 16;            ///< voxels of a lane that are on their way together
+constexpr int kSeedTile = 8;           ///< voxels along i and j that share a seed
+constexpr int kSeedTries = 40;         ///< from an undeformed guess
+constexpr int kRounds = 10;            ///< at the first slice of a march, while guesses fail
+constexpr int kFewFailed = 3;          ///< lanes
+constexpr int kWarpTries = 3;          ///< of a voxel within its warp, after the first
 constexpr unsigned kQueueSize = 1u << 20;
+
+/// Where a lane's voxels are in those of its warp.
+__device__ glm::ivec3 of_lane(int lane) { return {lane % kAlongI, lane / kAlongI, 0}; }
+
+/// How many marches a box takes on each axis.
+__host__ __device__ inline glm::ivec3 marches_of(const glm::ivec3& size) {
+  const glm::ivec3 march(kAlongI, kAlongJ, kMarch);
+  return (size + march - 1) / march;
+}
 
 /// What all kernels of a gather know.
 struct Task {
@@ -40,7 +53,7 @@ struct Task {
     return owns_exactly(vertices_of(lattice, as_lattice(t)), voxel * kStepsPerVoxel, nudge.signs(voxel), sides);
   }
   /// How many marches there are on each axis.
-  __device__ glm::ivec3 marches() const { return {(size().x + 31) / 32, size().y, (size().z + kMarch - 1) / kMarch}; }
+  __device__ glm::ivec3 marches() const { return marches_of(size()); }
   __device__ int march_number(const glm::ivec3& at) const {
     const glm::ivec3 count = marches();
     return (at.z * count.y + at.y) * count.x + at.x;
@@ -84,9 +97,9 @@ __global__ void seed_kernel(Task task, glm::vec3* seeds) {
   glm::vec3 place = undeformed;
   bool found = false;
   for (int n_try = 0; n_try < kSeedTries && !found; ++n_try) {
-    const Trial trial = try_tetrahedron<Effort::full>(task.lattice, tetrahedron_at(task.lattice, place), point);
+    const Trial trial = try_tetrahedron(task.lattice, tetrahedron_at(task.lattice, place), point);
     found = trial.owns;
-    place = is_finite(trial.place) ? (n_try < 8 ? trial.place : (place + trial.place) * 0.5f) : undeformed;
+    place = is_finite(trial.place()) ? (n_try < 8 ? trial.place() : (place + trial.place()) * 0.5f) : undeformed;
   }
   seeds[n] = place;
 }
@@ -125,19 +138,19 @@ struct WarpQueue {
     glm::vec3 place(0);
     if (lane < taken) {
       const Entry entry = entries[waiting + lane];
-      const glm::ivec3 in = first + glm::ivec3(entry.voxel & 31, 0, entry.voxel >> 5 & (kMarch - 1));
+      const glm::ivec3 in = first + of_lane(entry.voxel & 31) + glm::ivec3(0, 0, entry.voxel >> 5 & (kMarch - 1));
       const glm::ivec3 at = in + task.begin();
       const FloatTetrahedron t = tetrahedron_at(task.lattice, {entry.x, entry.y, entry.z});
-      const Trial trial = try_tetrahedron<Effort::full>(task.lattice, t, task.point(at));
+      const Trial trial = try_tetrahedron(task.lattice, t, task.point(at));
       if (trial.owns || (kCoarse && trial.unsure && task.owns(t, at))) {
-        covered = sink.write(sink.place(at), at, trial.u);
+        covered = sink.write(sink.place(at), at, trial.u());
       } else if (entry.voxel >> kAttempt < kWarpTries) {
         again = true;
         voxel = entry.voxel + (1 << kAttempt);
-        place =
-            entry.voxel >> kAttempt == 0 ? trial.place : (trial.place + glm::vec3(entry.x, entry.y, entry.z)) * 0.5f;
+        place = entry.voxel >> kAttempt == 0 ? trial.place()
+                                             : (trial.place() + glm::vec3(entry.x, entry.y, entry.z)) * 0.5f;
       } else {
-        task.put_aside(in, trial.place);
+        task.put_aside(in, trial.place());
       }
     }
     __syncwarp();
@@ -153,9 +166,9 @@ __global__ void rest_kernel(Task task, std::int64_t marches) {
   if (number >= marches) return;
   const StepLattice& lattice = task.lattice;
   const glm::ivec3 size = task.size(), count = task.marches();
-  const glm::ivec3 first(number % count.x * 32, number / count.x % count.y, number / count.x / count.y * kMarch);
-  const glm::ivec3 low = task.begin() + first,
-                   high = task.begin() + glm::min(first + glm::ivec3(32, 1, kMarch), size) - 1;
+  const glm::ivec3 march(kAlongI, kAlongJ, kMarch);
+  const glm::ivec3 first = glm::ivec3(number % count.x, number / count.x % count.y, number / count.x / count.y) * march;
+  const glm::ivec3 low = task.begin() + first, high = task.begin() + glm::min(first + march, size) - 1;
   bool rests = true;
   for (int axis = 0; axis < 3; ++axis) {  // exact, in 2^-12 voxel
     const float from = static_cast<float>(low[axis]) * kStepsPerVoxel - lattice.first[axis],
@@ -180,36 +193,68 @@ __global__ void rest_kernel(Task task, std::int64_t marches) {
   if (lane == 0) task.resting[number] = all;
 }
 
-/// One warp: 32 voxels along i, up to kMarch along k.
+/// Asks for the vertices that a march comes to next.
+__device__ inline void prefetch(const StepLattice& lattice, const FloatTetrahedron& t) {
+  const auto slice = static_cast<unsigned>(lattice.slice), last = slice * static_cast<unsigned>(lattice.cells.z);
+  const std::uint64_t* vertex = lattice.packed + min(static_cast<unsigned>(t.offset) + 2 * slice, last);
+  asm volatile("prefetch.global.L2 [%0];" ::"l"(vertex));
+}
+
+/// Bit n of lane m from bit m of lane n.
+__device__ inline std::uint32_t transposed(std::uint32_t bits, int lane) {
+  std::uint32_t mask = 0x0000FFFF;
+#pragma unroll
+  for (int step = 16; step > 0; step /= 2, mask ^= mask << step) {
+    const std::uint32_t other = __shfl_xor_sync(~0u, bits, step);
+    bits = (lane & step) != 0 ? (bits & ~mask) | (other >> step & mask) : (bits & mask) | (other << step & ~mask);
+  }
+  return bits;
+}
+
+/// One warp: kAlongI voxels along i, kAlongJ along j, up to kMarch along k.
 template <class Sink, bool kCoarse>
 struct March {
+  static constexpr Effort kEffort = kCoarse ? Effort::close : Effort::quick;
+
   const Task& task;
   const Sink& sink;
   glm::ivec3 first;  ///< voxel of lane 0 in the box
   int lane, slices;
-  bool in_row;
+  bool in_box;  ///< whether this lane has voxels
 
-  /// Which voxels of 32 slices have one owner: lane n knows those of slice n.
+  __device__ glm::ivec3 voxel(int n) const { return first + task.begin() + of_lane(lane) + glm::ivec3(0, 0, n); }
+
+  /// Which voxels of this lane have one owner: bit n for slice `from` + n.
   __device__ std::uint32_t read_singles(int from) const {
     const int n = from + lane;
-    return n < slices ? task.single.words[task.word({first.x, first.y, first.z + n})] : 0;
-  }
-  __device__ bool is_single(std::uint32_t singles, int n) const {
-    return (__shfl_sync(~0u, singles, n & 31) & (1u << lane)) != 0;
+    std::uint32_t bits = 0;
+    if (n < slices) {
+#pragma unroll
+      for (int j = 0; j < kAlongJ; ++j) {
+        if (first.y + j >= task.size().y) break;
+        const std::uint32_t word = task.single.words[task.word({first.x, first.y + j, first.z + n})];
+        bits |= (word >> first.x % 32 & (~0u >> (32 - kAlongI))) << j * kAlongI;
+      }
+    }
+    return transposed(bits, lane);
   }
 
   /// Voxels of cells at rest are copied. @return how many of this lane are covered
   __device__ int copy() const {
-    const glm::ivec3 voxel = first + task.begin() + glm::ivec3(lane, 0, 0);
     int covered = 0;
     for (int from = 0; from < slices; from += 32) {
+      const int end = min(slices, from + 32);
       const std::uint32_t singles = read_singles(from);
-#pragma unroll 4
-      for (int n = from; n < min(from + 32, slices); ++n) {
-        const glm::ivec3 at(voxel.x, voxel.y, voxel.z + n);
-        const bool single = is_single(singles, n);
-        if (single) covered += sink.copy(sink.place(at), at);
-        if (!single && in_row) sink.nothing(sink.place(at));
+      if (in_box) clear(from, end, singles);
+      covered += __popc(singles);
+      for (int n = from; n < end; n += kCopied) {
+        typename Sink::Copied copied[kCopied];
+#pragma unroll
+        for (int k = 0; k < kCopied; ++k)
+          if ((singles >> (n - from + k) & 1) != 0) copied[k] = sink.fetch(voxel(n + k));
+#pragma unroll
+        for (int k = 0; k < kCopied; ++k)
+          if ((singles >> (n - from + k) & 1) != 0) sink.put(sink.place(voxel(n + k)), copied[k]);
       }
     }
     return covered;
@@ -217,71 +262,98 @@ struct March {
 
   /// Predicts the owner of each voxel from that of the one before. @param place  guess for the first
   __device__ int predict(glm::vec3 place, WarpQueue<Sink, kCoarse> queue) const {
-    glm::ivec3 voxel = first + task.begin() + glm::ivec3(lane, 0, 0);
-    int out = sink.place(voxel);
+    const int turn = task.nudge.first_down.z - voxel(0).z;  // where the nudge along k turns
+    int covered = 0, rounds = 0;
+    for (int n = 0; n < slices;) {  // little of a run lives on while the queue is drained
+      const std::uint32_t singles = read_singles(n & ~31);
+      int end = min(slices, (n & ~31) + 32);
+      if (n % 32 == 0 && in_box) clear(n, end, singles);
+      if (n < turn) end = min(end, turn);
+      covered += run(n, end, singles >> (n & 31), rounds, place, queue);
+      while (queue.waiting >= 32) covered += static_cast<int>(queue.drain(task, sink));
+    }
+    while (queue.waiting > 0) covered += static_cast<int>(queue.drain(task, sink));
+    return covered;
+  }
+
+  /// What has no owner, or several.
+  __device__ void clear(int n, int end, std::uint32_t singles) const {
+    const std::uint32_t all = ~0u >> (32 - (end - n));
+    for (std::uint32_t left = ~singles & all; left != 0; left &= left - 1)
+      sink.nothing(sink.place(voxel(n + __ffs(static_cast<int>(left)) - 1)));
+  }
+
+  /// From slice n to slice `end`, or until the queue holds a warp full: then n is where to go on.
+  /// @param singles  which voxels of this lane have one owner, from the lowest bit on
+  /// @return how many of this lane are covered
+  __device__ int run(int& n, int end, std::uint32_t singles, int& rounds, glm::vec3& place,
+                     WarpQueue<Sink, kCoarse>& queue) const {
+    glm::ivec3 at = voxel(n);
     const int out_slice = sink.per_slice();
-    GatherPoint point = task.point(voxel);
+    int out = sink.place(at) - out_slice, failures = 0;
+    GatherPoint point = task.point(at);
     keep(point.steps.x);
+    keep(point.steps.y);
     keep(point.nudge.x);
     keep(point.nudge.y);
-    const int turn = task.nudge.first_down.z - voxel.z;  // where the nudge along k turns
-    const float turned = turn > 0 ? -point.nudge.z : point.nudge.z;
-    int covered = 0, rounds = 0;  // what is written, less than what has one owner
-    std::uint32_t singles = read_singles(0);
-    int wanted = __popc(singles);
-    for (int n = 0; n < slices; ++n) {
-      if (n == 32) {
-        singles = read_singles(32);
-        wanted += __popc(singles);
-      }
-      if (n == turn) point.nudge.z = turned;
-      const bool single = is_single(singles, n);
-      const Trial trial = try_tetrahedron<Effort::quick>(task.lattice, tetrahedron_at(task.lattice, place), point);
-      const bool again = single && !trial.owns;
-      bool lost = again;
-      if (single && trial.owns) {
-        lost = !sink.write(out, voxel, trial.u);
-      } else if (!single && in_row) {
-        sink.nothing(out);
-      }
+    keep(point.nudge.z);
+    const std::uint32_t wanted = singles;
+    const int begin = n;
+    typename Sink::Pending pending{};
+    do {
+      const FloatTetrahedron t = tetrahedron_at(task.lattice, place);
+      const LocalTetrahedron local(task.lattice, t, point);
+      if (!kCoarse) prefetch(task.lattice, t);
+      sink.finish(out, pending);
+      out += out_slice;
+      const Trial trial = try_tetrahedron<kEffort>(t, local, point);
+      const bool single = (singles & 1) != 0;
+      sink.start(out, at, trial.moved, single & trial.owns, pending);
+      const bool again = single & !pending.any;
       const unsigned failed = __ballot_sync(~0u, again);
       if (failed != 0) {
         if (n == 0 && rounds < kRounds && __popc(failed) > kFewFailed) {  // the seed was no good: once more
-          const glm::vec3 better = rounds++ < 3 ? trial.place : (place + trial.place) * 0.5f;
+          const glm::vec3 better = rounds++ < 3 ? trial.place() : (place + trial.place()) * 0.5f;
           if (again) place = better;
-          --n;
+          pending.any = false;
+          out -= out_slice;
           continue;
         }
-        queue.push(failed, lane | n << 5, trial.place);
-        while (queue.waiting >= 32) covered += static_cast<int>(queue.drain(task, sink));
+        queue.push(failed, lane | n << 5, trial.place());
+        failures += again;
+        if (queue.waiting >= 32) end = n + 1;
       }
-      if (lost) --covered;
-      place = trial.place + trial.per_slice;
+      place = trial.next_place();
       point.steps.z += float{kStepsPerVoxel};
-      ++voxel.z;
-      out += out_slice;
-    }
-    while (queue.waiting > 0) covered += static_cast<int>(queue.drain(task, sink));
-    return covered + wanted;
+      ++at.z;
+      singles >>= 1;
+      ++n;
+    } while (n < end);
+    sink.finish(out, pending);
+    return __popc(wanted & ~0u >> (32 - (n - begin))) - failures;
   }
 };
 
 template <class Sink, bool kCoarse>
-__global__ void __launch_bounds__(32 * kWarps, 7)
+__global__ void __launch_bounds__(32 * kWarps, kBlocks)
     march_kernel(const __grid_constant__ Task task, const glm::vec3* seeds, const __grid_constant__ Sink sink) {
   __shared__ typename WarpQueue<Sink, kCoarse>::Entry entries[kWarps][64];
   const int lane = static_cast<int>(threadIdx.x), warp = static_cast<int>(threadIdx.y);
-  const glm::ivec3 size = task.size(), first(blockIdx.x * 32, blockIdx.y * kWarps + warp, blockIdx.z * kMarch);
-  if (first.y >= size.y) return;  // the whole warp
-  const int slices = min(kMarch, size.z - first.z), x = first.x + lane;
-  const March<Sink, kCoarse> march{task, sink, first, lane, slices, x < size.x};
+  constexpr int kAcross = 32 / kAlongI;  // warps of a block side by side along i
+  const glm::ivec3 size = task.size(),
+                   march_at(blockIdx.x * kAcross + warp % kAcross, blockIdx.y * (kWarps / kAcross) + warp / kAcross,
+                            blockIdx.z),
+                   first = march_at * glm::ivec3(kAlongI, kAlongJ, kMarch);
+  if (first.x >= size.x || first.y >= size.y) return;  // the whole warp
+  const glm::ivec3 begin = first + of_lane(lane), inside = glm::min(begin, size - 1);
+  const March<Sink, kCoarse> march{task, sink, first, lane, min(kMarch, size.z - first.z), begin == inside};
   int found = 0;
-  if (task.resting[task.march_number({blockIdx.x, first.y, blockIdx.z})] != 0) {
+  if (task.resting[task.march_number(march_at)] != 0) {
     found = march.copy();
   } else {
-    const glm::ivec3 seed(min(x, size.x - 1) / kSeedTile, first.y / kSeedTile, blockIdx.z);
+    const glm::ivec3 seed(inside.x / kSeedTile, inside.y / kSeedTile, blockIdx.z);
     const glm::vec3 place = seeds[(seed.z * task.seeds.y + seed.y) * task.seeds.x + seed.x] +
-                            glm::vec3(glm::ivec3(x, first.y, first.z) - task.seeded(seed)) * task.lattice.voxel;
+                            glm::vec3(begin - task.seeded(seed)) * task.lattice.voxel;
     found = march.predict(place, {entries[warp], first, lane});
   }
   const unsigned covered = warp_sum(static_cast<unsigned>(found));

@@ -64,13 +64,26 @@ struct VoxelSink {
     return voxel.z * output_slice + voxel.y * output_row + voxel.x;
   }
   __device__ int per_slice() const { return output_slice; }
+  /// What a voxel well inside the source is made from, on its way.
+  struct Pending {
+    bool any = false;
+    glm::vec3 fraction;
+    V corners[8];
+  };
+
+  /// Begins to write a voxel that a tetrahedron owns, where that is `wanted` and it comes from well inside the source;
+  /// else nothing is pending. What is on the border is for `write`.
+  /// @param moved  deformed minus undeformed place, 2^-12 voxel
+  __device__ void start(int place, const glm::ivec3& voxel, const glm::vec3& moved, bool wanted,
+                        Pending& pending) const;
+  /// Writes what is pending. @param place  that it was started with
+  __device__ void finish(int place, const Pending& pending) const;
   /// A voxel that a tetrahedron owns. @return whether it comes from inside the source
   __device__ bool write(int place, const glm::ivec3& voxel, const glm::vec3& u) const;
-  /// A voxel that stays where it is.
-  __device__ bool copy(int place, const glm::ivec3& voxel) const {
-    output[place] = source[voxel.z * slice + voxel.y * row + voxel.x];
-    return true;
-  }
+  /// Voxels that stay where they are: first read, then written.
+  using Copied = V;
+  __device__ V fetch(const glm::ivec3& voxel) const { return source[voxel.z * slice + voxel.y * row + voxel.x]; }
+  __device__ void put(int place, V value) const { output[place] = value; }
   __device__ void nothing(int place) const { output[place] = background; }
 };
 

@@ -1,5 +1,6 @@
 #include "cuda/step_pass.h"
 
+#include <algorithm>
 #include <type_traits>
 
 #include "cuda/findings.cuh"
@@ -13,17 +14,18 @@ constexpr int kColumns = InvertedPairs::kColumns + 2;  ///< vertices of a warp a
 constexpr int kRows = 8;                               ///< of a thread block, a warp each
 constexpr int kBlocks = 2;                             ///< a multiprocessor
 constexpr int kPlanes = 40;                            ///< along k that a thread goes; whole MovingBlocks
-constexpr float kMost = 1 << 22;  ///< steps that a vertex may move: a difference of two, and a cell, is exact in float
+constexpr float kMost = 1 << 23;                       ///< steps that a vertex may move: all is exact in float
 
 /// Snaps displacements in float where that certainly gives what `LatticeFrame::snap_vertex` gives.
 ///
 /// With an axis of the lattice along each axis of the grid, a displacement in steps is d m, m = high + low to 48 bits.
-/// Fused multiplications round d high to whole steps and leave the rest, known to 2^-20 step; it decides wherever it is
-/// not that close to a half. Where m is a power of two and vertices rest at even steps, all of that is exact, and ties
-/// go to even here as there. Other ties, and far and unusable vertices, need double arithmetic.
+/// Adding what raises it to where floats are whole numbers (StepPacking), fused, rounds d high to whole steps; the
+/// rest, known to 2^-20 step, decides wherever it is not that close to a half. Where m is a power of two and vertices
+/// rest at even steps, all of that is exact, and ties go to even here as there. Other ties, and far and unusable
+/// vertices, need double arithmetic.
 class FloatSnap {
  public:
-  explicit FloatSnap(const LatticeFrame& frame, const StepLattice& lattice) {
+  explicit FloatSnap(const LatticeFrame& frame, const StepLattice& lattice) : lift_(lattice.packing.lift()) {
     const glm::dvec3 first = frame.output_from_lattice(glm::dvec3(0, 0, static_cast<double>(frame.first_slice)));
     double beside = 0;  // how far a vertex may rest from its whole step
     exact_ = true;
@@ -49,55 +51,79 @@ class FloatSnap {
   /// Whether ties go to even steps here as there.
   bool is_exact() const { return exact_; }
 
-  /// @return whether it is certain. No `&&`: branches would cost more than they save.
-  template <bool kExact>
-  __device__ bool snap(const glm::vec3& displacement, glm::vec3& steps) const {
-    constexpr float kToWhole = 3.0f * (1 << 22);  // adding it rounds to a whole number, ties to even
+  /// The displacement in whole steps, raised; right where it can be packed and it `is_certain`.
+  __device__ glm::vec3 raised(const glm::vec3& displacement) const {
+    return {fmaf(displacement.x, high_.x, lift_.x), fmaf(displacement.y, high_.y, lift_.y),
+            fmaf(displacement.z, high_.z, lift_.z)};
+  }
+  /// Where ties are not exact: whether there is none. No `&&`: branches would cost more than they save.
+  __device__ bool is_certain(const glm::vec3& displacement, const glm::vec3& raised) const {
     bool certain = true;
 #pragma unroll
     for (int axis = 0; axis < 3; ++axis) {
-      steps[axis] = fmaf(displacement[axis], high_[axis], kToWhole) - kToWhole;
-      certain &= fabsf(steps[axis]) < kMost;  // false for NaN
-      if (kExact) continue;
-      const float left = fmaf(displacement[axis], high_[axis], -steps[axis]);
+      const float left = fmaf(displacement[axis], high_[axis], lift_[axis] - raised[axis]);
       certain &= fabsf(fmaf(displacement[axis], low_[axis], left)) < clear_;
     }
     return certain;
   }
 
  private:
-  glm::vec3 high_{0}, low_{0};
+  glm::vec3 high_{0}, low_{0}, lift_;
   float clear_ = -1;  ///< what is left decides where it is smaller; negative: never
   bool exact_ = false;
 };
 
-/// How far a vertex moves, in steps, where float does not say. Rarely called, so kept out of loops.
-/// Zero outside the lattice.
-__device__ __noinline__ glm::vec3 snapped_slowly(const StepPass& pass, glm::vec3 displacement, glm::ivec3 at) {
-  const glm::ivec3& cells = pass.lattice.cells;
-  if (at.x < 0 || at.y < 0 || at.z < 0 || at.x > cells.x || at.y > cells.y || at.z > cells.z) return glm::vec3(0);
-  const Vertex vertex = snapped(pass.frame, displacement, glm::i64vec3(at), pass.lattice.offset(at), pass.found);
-  const glm::i32vec3 rest(pass.lattice.first + glm::vec3(at) * pass.lattice.cell), u = vertex.u;
+/// How far a vertex of the lattice moves, raised, where float does not say; what cannot be held is noted. Rarely
+/// called, so kept out of loops.
+__device__ __noinline__ glm::vec3 raised_slowly(const StepPass& pass, glm::vec3 displacement, int number) {
+  const StepLattice& lattice = pass.lattice;
+  const glm::vec3& lift = lattice.packing.lift();
+  const glm::ivec3 at(number % lattice.row, number % lattice.slice / lattice.row, number / lattice.slice);
+  const Vertex vertex = snapped(pass.frame, displacement, glm::i64vec3(at), number, pass.found);
+  const glm::i32vec3 rest(lattice.first + glm::vec3(at) * lattice.cell), u = vertex.u;
   const glm::vec3 moved(-u);
   const bool near = fabsf(moved.x) < kMost && fabsf(moved.y) < kMost && fabsf(moved.z) < kMost;
-  if (!near || vertex.deformed + u != rest) pass.found->beside = 1;
-  return moved;
+  if (!near || vertex.deformed + u != rest) {
+    pass.found->beside = 1;
+    return lift;
+  }
+  if (lattice.packing.excess(moved + lift) != 0) pass.found->wide = 1;
+  return moved + lift;
 }
 
-/// How far a vertex moves, in steps.
+/// How far a vertex moves, raised.
 template <bool kExact>
-__device__ glm::vec3 snapped_steps(const StepPass& pass, const FloatSnap& fast, const glm::vec3& displacement,
-                                   const glm::ivec3& at) {
-  glm::vec3 moved;
-  return fast.snap<kExact>(displacement, moved) ? moved : snapped_slowly(pass, displacement, at);
+__device__ glm::vec3 raised_steps(const StepPass& pass, const FloatSnap& fast, const glm::vec3& displacement,
+                                  int number) {
+  const glm::vec3 raised = fast.raised(displacement);
+  if (pass.lattice.packing.excess(raised) == 0 && (kExact || fast.is_certain(displacement, raised))) return raised;
+  return raised_slowly(pass, displacement, number);
 }
 
+/// Vertices from `begin` to `end`; a thread block reads all that is its own before it writes.
 template <bool kExact>
-__global__ void snap_steps_kernel(const __grid_constant__ StepPass pass, FloatSnap fast) {
+__global__ void pack_kernel(const __grid_constant__ StepPass pass, FloatSnap fast, std::int64_t begin,
+                            std::int64_t end) {
+  const std::int64_t n = begin + std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
+  glm::vec3 raised(0);
+  if (n < end) raised = raised_steps<kExact>(pass, fast, pass.displacement[n], static_cast<int>(n));
+  __syncthreads();
+  if (n < end) pass.packed[n] = pass.lattice.packing.pack(raised);
+}
+
+/// Least and most that vertices move on each axis, steps.
+__global__ void range_kernel(const __grid_constant__ StepPass pass, int* low_high) {
   const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
   const glm::i64vec3 size = glm::i64vec3(pass.lattice.cells) + std::int64_t{1};
-  if (n >= size.x * size.y * size.z) return;
-  pass.moved[n] = snapped_steps<kExact>(pass, fast, pass.displacement[n], glm::ivec3(unravel(n, size)));
+  const std::int64_t last = size.x * size.y * size.z - 1, at = n < last ? n : last;
+  const glm::ivec3 moved = -snapped(pass.frame, pass.displacement[at], unravel(at, size), at, pass.found).u;
+#pragma unroll
+  for (int axis = 0; axis < 3; ++axis) {
+    const int low = __reduce_min_sync(~0u, moved[axis]), high = __reduce_max_sync(~0u, moved[axis]);
+    if ((threadIdx.x & 31) != 0) continue;
+    if (low < low_high[axis]) atomicMin(&low_high[axis], low);
+    if (high > low_high[3 + axis]) atomicMax(&low_high[3 + axis], high);
+  }
 }
 
 /// What is seen of tetrahedra of one kind: their volumes, the sign of the undeformed ones taken out. They share their
@@ -174,26 +200,31 @@ struct Volume<false> {
   }
 };
 
-/// The eight corner tetrahedra around an even vertex. @param inner  whether it has neighbours along i and j
-/// @param edges  where there is no neighbour, anything
+/// The eight corner tetrahedra around an even vertex.
 template <bool kRange>
-__device__ void add_around(const StepPass& pass, const glm::ivec3& at, bool inner, const Edges& edges, Seen& corners) {
-  const auto longest = [](const glm::vec3(&e)[2]) { return fmaxf(detail::norm1(e[0]), detail::norm1(e[1])); };
-  const float bound = kError * ((longest(edges.x) * longest(edges.y)) * longest(edges.z));
-  float least = INFINITY, most = -INFINITY, volumes[8];
+struct Around {
+  float volumes[8], least = INFINITY, bound;
+
+  __device__ explicit Around(const Edges& edges) {
+    const auto both = [](const glm::vec3(&e)[2]) { return detail::norm1(e[0]) + detail::norm1(e[1]); };
+    bound = kError * ((both(edges.x) * both(edges.y)) * both(edges.z));
 #pragma unroll
-  for (int n = 0; n < 4; ++n) {
-    const detail::Cross normal = Volume<kRange>::cross(edges.y[n & 1], edges.z[n >> 1]);
-    const float sign = (n & 1) != n >> 1 ? -1.0f : 1.0f;
-    const float up = sign * Volume<kRange>::dot(edges.x[0], normal),
-                down = -sign * Volume<kRange>::dot(edges.x[1], normal);
-    volumes[2 * n] = up;
-    volumes[2 * n + 1] = down;
-    least = fminf(least, fminf(up, down));
-    if (kRange) most = fmaxf(most, fmaxf(up, down));
+    for (int n = 0; n < 4; ++n) {
+      const detail::Cross normal = Volume<kRange>::cross(edges.y[n & 1], edges.z[n >> 1]);
+      const float sign = (n & 1) != n >> 1 ? -1.0f : 1.0f;
+      volumes[2 * n] = sign * Volume<kRange>::dot(edges.x[0], normal);
+      volumes[2 * n + 1] = -sign * Volume<kRange>::dot(edges.x[1], normal);
+      least = fminf(least, fminf(volumes[2 * n], volumes[2 * n + 1]));
+    }
   }
-  const bool has_all = inner && at.z > 0 && at.z < pass.lattice.cells.z;
-  if (!(has_all && least > bound)) {
+  __device__ bool is_upright() const { return least > bound; }
+  __device__ void add_range(Seen& seen) const {
+    seen.least = fminf(seen.least, least);
+#pragma unroll
+    for (const float volume : volumes) seen.most = fmaxf(seen.most, volume);
+  }
+  /// @param has_all  whether the lattice has all of them
+  __device__ void add(const StepPass& pass, const glm::ivec3& at, bool has_all, const Edges& edges, Seen& seen) const {
     float nearest = INFINITY;
     unsigned inverted = 0;
 #pragma unroll
@@ -201,47 +232,77 @@ __device__ void add_around(const StepPass& pass, const glm::ivec3& at, bool inne
       nearest = fminf(nearest, fabsf(volume));
       inverted += volume < 0;
     }
-    if (!(has_all && nearest > bound)) return corners.add(around_exactly(pass, at, edges));
-    corners.inverted += inverted;
+    if (!(has_all && nearest > bound)) return seen.add(around_exactly(pass, at, edges));
+    seen.inverted += inverted;
+    if (kRange) add_range(seen);
   }
-  if (!kRange) return;
-  corners.least = fminf(corners.least, least);
-  corners.most = fmaxf(corners.most, most);
-}
-
-/// The centre of a cell: D is an even cell's last corner, and A, B, C are beside its first; in an odd one it is the
-/// other way round. @param a, b, c, d  how far the corners moved
-template <bool kRange, bool kEvenCell>
-__device__ void add_centre(const StepPass& pass, const glm::vec3& a, const glm::vec3& b, const glm::vec3& c,
-                           const glm::vec3& d, Seen& centres) {
-  using detail::norm1;
-  const glm::vec3 to = kEvenCell ? -pass.lattice.cell : pass.lattice.cell;
-  glm::vec3 da = a - d, db = b - d, dc = c - d;
-  da.y += to.y;
-  da.z += to.z;
-  db.x += to.x;
-  db.z += to.z;
-  dc.x += to.x;
-  dc.y += to.y;
-  const float determinant = Volume<kRange>::dot(da, Volume<kRange>::cross(db, dc));
-  const float volume = kEvenCell ? -determinant : determinant;
-  if (detail::magnitude(volume) > kError * ((norm1(da) * norm1(db)) * norm1(dc))) {
-    if (kRange) centres.add(volume);
-    centres.inverted += volume < 0;
-  } else {
-    centres.add(centre_exactly(da, db, dc, kEvenCell ? -1.0f : 1.0f));
-  }
-}
-
-/// Two columns of vertices side by side: the part of a thread.
-struct Pair {
-  glm::ivec3 at;  ///< vertex of the first, on the plane at hand
-  bool owned[2];  ///< whether the columns are in the lattice and not left to a neighbouring warp
-  bool inner[2];  ///< whether they have neighbours along i and j
-  bool cell[2];   ///< whether there are cells from them on, for this warp
 };
 
-/// How far the pair's vertices moved on one plane, in its row and the next.
+/// The centre of a cell: D is an even cell's last corner, and A, B, C are beside its first; in an odd one it is the
+/// other way round.
+template <bool kRange, bool kEvenCell>
+struct Centre {
+  glm::vec3 a, b, c;  ///< from D
+  float volume, bound;
+
+  /// @param a, b, c, d  how far the corners moved
+  __device__ Centre(const StepPass& pass, const glm::vec3& to_a, const glm::vec3& to_b, const glm::vec3& to_c,
+                    const glm::vec3& d)
+      : a(to_a - d), b(to_b - d), c(to_c - d) {
+    using detail::norm1;
+    const glm::vec3 to = kEvenCell ? -pass.lattice.cell : pass.lattice.cell;
+    a.y += to.y;
+    a.z += to.z;
+    b.x += to.x;
+    b.z += to.z;
+    c.x += to.x;
+    c.y += to.y;
+    const float determinant = Volume<kRange>::dot(a, Volume<kRange>::cross(b, c));
+    volume = kEvenCell ? -determinant : determinant;
+    bound = kError * ((norm1(a) * norm1(b)) * norm1(c));
+  }
+  __device__ bool is_upright() const { return volume > bound; }
+  __device__ void add(Seen& seen) const {
+    if (fabsf(volume) > bound) {
+      if (kRange) seen.add(volume);
+      seen.inverted += volume < 0;
+    } else {
+      seen.add(centre_exactly(a, b, c, kEvenCell ? -1.0f : 1.0f));
+    }
+  }
+};
+
+/// Two columns of vertices side by side: the part of a thread. Beyond the lattice its border vertices are repeated.
+struct Pair {
+  int y, z;        ///< row, and the plane at hand
+  unsigned flags;  ///< one register for all that is asked of the columns
+
+  static constexpr unsigned kOwned = 1;    ///< in the lattice and not left to a neighbouring warp
+  static constexpr unsigned kInner = 4;    ///< with neighbours along i and j
+  static constexpr unsigned kCell = 16;    ///< with cells from them on, for this warp
+  static constexpr unsigned kPacked = 64;  ///< owned, and to be packed
+
+  __device__ static int first_column(int y) {
+    return InvertedPairs::column(y, static_cast<int>(blockIdx.x), static_cast<int>(threadIdx.x));
+  }
+  __device__ Pair(const StepPass& pass, int row, int plane) : y(row), z(plane), flags(0) {
+    const glm::ivec3& cells = pass.lattice.cells;
+    const int lane = static_cast<int>(threadIdx.x);
+    for (int n = 0; n < 2; ++n) {
+      const int x = first_column(y) + n;
+      const bool owned = x >= 0 && x <= cells.x && lane + n > 0 && lane + n < kColumns / 2;
+      const bool inner = x > 0 && x < cells.x && y > 0 && y < cells.y;
+      const bool cell = owned && x < cells.x && y < cells.y;
+      flags |= ((owned ? kOwned : 0) | (inner ? kInner : 0) | (cell ? kCell : 0) | (owned && pass.packed ? kPacked : 0))
+               << n;
+    }
+    asm volatile("" : "+r"(flags));  // not to be computed again at every use
+  }
+  /// @param column  0 or 1
+  __device__ bool is(unsigned flag, int column) const { return (flags & flag << column) != 0; }
+};
+
+/// How far the pair's vertices moved on one plane, in its row and the next; raised.
 struct Plane {
   glm::vec3 row[2], next_row[2];
 };
@@ -254,42 +315,52 @@ __device__ glm::vec3 from_right(const glm::vec3& v) {
 }
 
 /// Corner tetrahedra around the pair's even vertex, at place kEven of the pair, and the centres of its two cells.
-/// Called by whole warps. @param below, before  the neighbours of the even vertex in the row before and on the plane
-/// before
+/// Called by whole warps. What lies beyond the lattice is taken for a rest of the border, and where that is upright it
+/// does not matter that there is nothing.
+/// @param below, before  the neighbours of the even vertex in the row before and on the plane before
+/// @return whether something of this lane is inverted
 template <bool kRange, int kEven>
-__device__ void describe_pair(const StepPass& pass, const Pair& pair, const glm::vec3& before, const glm::vec3& below,
+__device__ bool describe_pair(const StepPass& pass, const Pair& pair, const glm::vec3& before, const glm::vec3& below,
                               const Plane& here, const Plane& above, Seen& corners, Seen& centres) {
-  const glm::ivec3& at = pair.at;
   const glm::vec3& cell = pass.lattice.cell;
   const glm::vec3 beside = kEven == 0 ? from_left(here.row[1]) : from_right(here.row[0]);
-  if (pair.owned[kEven]) {
-    const glm::vec3& d = here.row[kEven];
-    Edges edges{{(kEven == 0 ? here.row[1] : beside) - d, (kEven == 0 ? beside : here.row[0]) - d},
-                {here.next_row[kEven] - d, below - d},
-                {above.row[kEven] - d, before - d}};
-    edges.x[0].x += cell.x;
-    edges.x[1].x -= cell.x;
-    edges.y[0].y += cell.y;
-    edges.y[1].y -= cell.y;
-    edges.z[0].z += cell.z;
-    edges.z[1].z -= cell.z;
-    add_around<kRange>(pass, {at.x + kEven, at.y, at.z}, pair.inner[kEven], edges, corners);
-  }
-  if (at.z >= pass.lattice.cells.z) return;
-  if (pair.cell[0]) {
-    if (kEven == 0) {
-      add_centre<kRange, true>(pass, here.row[1], here.next_row[0], above.row[0], above.next_row[1], centres);
+  const glm::vec3& d = here.row[kEven];
+  Edges edges{{(kEven == 0 ? here.row[1] : beside) - d, (kEven == 0 ? beside : here.row[0]) - d},
+              {here.next_row[kEven] - d, below - d},
+              {above.row[kEven] - d, before - d}};
+  edges.x[0].x += cell.x;
+  edges.x[1].x -= cell.x;
+  edges.y[0].y += cell.y;
+  edges.y[1].y -= cell.y;
+  edges.z[0].z += cell.z;
+  edges.z[1].z -= cell.z;
+  const Around<kRange> around(edges);
+  const auto first = [&] {
+    if constexpr (kEven == 0) {
+      return Centre<kRange, true>(pass, here.row[1], here.next_row[0], above.row[0], above.next_row[1]);
     } else {
-      add_centre<kRange, false>(pass, above.next_row[0], above.row[1], here.next_row[1], here.row[0], centres);
+      return Centre<kRange, false>(pass, above.next_row[0], above.row[1], here.next_row[1], here.row[0]);
     }
-  }
-  if (kEven == 0) {
-    const glm::vec3 b = from_right(above.row[0]), c = from_right(here.next_row[0]);
-    if (pair.cell[1]) add_centre<kRange, false>(pass, above.next_row[1], b, c, here.row[1], centres);
-  } else {
-    const glm::vec3 d = from_right(above.next_row[0]);
-    if (pair.cell[1]) add_centre<kRange, true>(pass, beside, here.next_row[1], above.row[1], d, centres);
-  }
+  }();
+  const auto second = [&] {
+    if constexpr (kEven == 0) {
+      return Centre<kRange, false>(pass, above.next_row[1], from_right(above.row[0]), from_right(here.next_row[0]),
+                                   here.row[1]);
+    } else {
+      return Centre<kRange, true>(pass, beside, here.next_row[1], above.row[1], from_right(above.next_row[0]));
+    }
+  }();
+  const bool sure = (around.is_upright() | !pair.is(Pair::kOwned, kEven)) &
+                    (first.is_upright() | !pair.is(Pair::kCell, 0)) & (second.is_upright() | !pair.is(Pair::kCell, 1));
+  if (!kRange && __all_sync(~0u, sure)) return false;
+  const unsigned inverted = corners.inverted + centres.inverted;
+  const bool has_above = pair.z < pass.lattice.cells.z,
+             has_all = pair.is(Pair::kInner, kEven) && pair.z > 0 && has_above;
+  if (pair.is(Pair::kOwned, kEven))
+    around.add(pass, {Pair::first_column(pair.y) + kEven, pair.y, pair.z}, has_all, edges, corners);
+  if (has_above && pair.is(Pair::kCell, 0)) first.add(centres);
+  if (has_above && pair.is(Pair::kCell, 1)) second.add(centres);
+  return corners.inverted + centres.inverted != inverted;
 }
 
 /// Reads displacements, a plane ahead of their use, and snaps them.
@@ -297,32 +368,36 @@ template <bool kExact>
 struct PlaneReader {
   const StepPass& pass;
   const FloatSnap& fast;
-  glm::ivec3 at;             ///< vertex of the pair's first column on the plane that was read
-  bool row[2], next_row[2];  ///< whether the lattice has them
-  int vertex;                ///< number of `at`
+  int z;              ///< the plane that was read
+  int row, next_row;  ///< number of the first column's vertex on the first plane, in its row and the next
+  int beside;         ///< how much larger the second column's is
   Plane given;
 
   __device__ void read_next() {
-    ++at.z;
-    vertex += pass.lattice.slice;
-    const bool has = at.z >= 0 && at.z <= pass.lattice.cells.z;
-#pragma unroll
-    for (int n = 0; n < 2; ++n) {
-      given.row[n] = has && row[n] ? pass.displacement[vertex + n] : glm::vec3(0);
-      given.next_row[n] = has && next_row[n] ? pass.displacement[vertex + pass.lattice.row + n] : glm::vec3(0);
-    }
+    ++z;
+    const int plane = detail::clamp_to(z, pass.lattice.cells.z) * pass.lattice.slice;
+    const glm::vec3 *here = pass.displacement + (plane + row), *there = pass.displacement + (plane + next_row);
+    given.row[0] = here[0];
+    given.row[1] = here[beside];
+    given.next_row[0] = there[0];
+    given.next_row[1] = there[beside];
   }
-  __device__ Plane snapped() const {
-    Plane moved;
-    bool certain = fast.snap<kExact>(given.row[0], moved.row[0]) & fast.snap<kExact>(given.row[1], moved.row[1]);
-    certain &= fast.snap<kExact>(given.next_row[0], moved.next_row[0]) &
-               fast.snap<kExact>(given.next_row[1], moved.next_row[1]);
-    if (!certain) {
-      moved.row[0] = snapped_slowly(pass, given.row[0], at);
-      moved.row[1] = snapped_slowly(pass, given.row[1], {at.x + 1, at.y, at.z});
-      moved.next_row[0] = snapped_slowly(pass, given.next_row[0], {at.x, at.y + 1, at.z});
-      moved.next_row[1] = snapped_slowly(pass, given.next_row[1], {at.x + 1, at.y + 1, at.z});
-    }
+  __device__ Plane raised() const {
+    Plane moved{{fast.raised(given.row[0]), fast.raised(given.row[1])},
+                {fast.raised(given.next_row[0]), fast.raised(given.next_row[1])}};
+    if (kExact) return moved;  // each is checked by the thread that packs it
+    const StepPacking& packing = pass.lattice.packing;
+    const std::uint32_t excess = packing.excess(moved.row[0]) | packing.excess(moved.row[1]) |
+                                 packing.excess(moved.next_row[0]) | packing.excess(moved.next_row[1]);
+    const bool certain = fast.is_certain(given.row[0], moved.row[0]) & fast.is_certain(given.row[1], moved.row[1]) &
+                         fast.is_certain(given.next_row[0], moved.next_row[0]) &
+                         fast.is_certain(given.next_row[1], moved.next_row[1]);
+    if (certain && excess == 0) return moved;
+    const int plane = detail::clamp_to(z, pass.lattice.cells.z) * pass.lattice.slice;
+    moved.row[0] = raised_slowly(pass, given.row[0], plane + row);
+    moved.row[1] = raised_slowly(pass, given.row[1], plane + row + beside);
+    moved.next_row[0] = raised_slowly(pass, given.next_row[0], plane + next_row);
+    moved.next_row[1] = raised_slowly(pass, given.next_row[1], plane + next_row + beside);
     return moved;
   }
 };
@@ -333,74 +408,72 @@ template <bool kExact, bool kRange>
 __global__ void __launch_bounds__(32 * kRows, kBlocks)
     step_pass_kernel(const __grid_constant__ StepPass pass, const __grid_constant__ FloatSnap fast, float corner_rest,
                      float centre_rest) {
-  const int lane = static_cast<int>(threadIdx.x);
-  const glm::ivec3& cells = pass.lattice.cells;
-  Pair pair;
-  pair.at = {0, blockIdx.y * kRows + threadIdx.y, blockIdx.z * kPlanes};
-  pair.at.x = InvertedPairs::column(pair.at.y, blockIdx.x, lane);
-  if (pair.at.y > cells.y) return;  // the whole warp
-  const int end = min(pair.at.z + kPlanes, cells.z + 1);
-  PlaneReader<kExact> reader{pass, fast, pair.at};
-#pragma unroll
-  for (int n = 0; n < 2; ++n) {
-    const int i = pair.at.x + n, j = pair.at.y;
-    reader.row[n] = i >= 0 && i <= cells.x;
-    reader.next_row[n] = reader.row[n] && j < cells.y;
-    pair.owned[n] = reader.row[n] && lane + n > 0 && lane + n < kColumns / 2;
-    pair.inner[n] = i > 0 && i < cells.x && j > 0 && j < cells.y;
-    pair.cell[n] = pair.owned[n] && i < cells.x && j < cells.y;
-  }
-  reader.vertex = static_cast<int>(pass.lattice.offset(pair.at)) - 2 * pass.lattice.slice;
-  reader.at.z -= 2;
+  const StepLattice& lattice = pass.lattice;
+  const glm::ivec3& cells = lattice.cells;
+  Pair pair(pass, static_cast<int>(blockIdx.y * kRows + threadIdx.y), static_cast<int>(blockIdx.z) * kPlanes);
+  if (pair.y > cells.y) return;  // the whole warp
+  const int end = min(pair.z + kPlanes, cells.z + 1);
+  const int left = detail::clamp_to(Pair::first_column(pair.y), cells.x),
+            beside = detail::clamp_to(Pair::first_column(pair.y) + 1, cells.x) - left;
+  PlaneReader<kExact> reader{
+      pass, fast, pair.z - 2, pair.y * lattice.row + left, min(pair.y + 1, cells.y) * lattice.row + left, beside};
   reader.read_next();
-  Plane here = reader.snapped();
+  Plane here = reader.raised();
   glm::vec3 before = here.row[0];
   reader.read_next();
-  here = reader.snapped();
+  here = reader.raised();
   reader.read_next();
-  int vertex = reader.vertex - pass.lattice.slice;
-  const auto read_below = [&](int even, int z) {
-    const bool has = pair.at.y > 0 && z <= cells.z && pair.owned[even];
-    return has ? pass.displacement[pass.lattice.offset({pair.at.x + even, pair.at.y - 1, z})] : glm::vec3(0);
+  const int row_below = max(pair.y - 1, 0) * lattice.row + left;
+  const auto below_at = [&](int even, int z) {
+    return min(z, cells.z) * lattice.slice + row_below + (even != 0 ? beside : 0);
   };
-  glm::vec3 given_below = read_below(0, pair.at.z);
+  glm::vec3 given_below = pass.displacement[below_at(0, pair.z)];
+  std::uint64_t* packed = pass.packed + (pair.z * lattice.slice + reader.row);
   Seen corners, centres;
-  unsigned moves = 0;
+  std::uint32_t moves = 0;
   const auto step = [&](auto even, const glm::vec3& before, const Plane& here, Plane& above) {
     constexpr int kEven = decltype(even)::value;
-    const glm::vec3 below =
-        snapped_steps<kExact>(pass, fast, given_below, {pair.at.x + kEven, pair.at.y - 1, pair.at.z});
-    given_below = read_below(1 - kEven, pair.at.z + 1);
-    above = reader.snapped();
+    glm::vec3 below = fast.raised(given_below);
+    if (!kExact && (lattice.packing.excess(below) != 0 || !fast.is_certain(given_below, below)))
+      below = raised_slowly(pass, given_below, below_at(kEven, pair.z));
+    given_below = pass.displacement[below_at(1 - kEven, pair.z + 1)];
+    above = reader.raised();
     reader.read_next();
-    if (pass.moved) {
+    const glm::vec3& lift = lattice.packing.lift();
+    std::uint32_t excess = 0;
 #pragma unroll
-      for (int n = 0; n < 2; ++n) {
-        if (pair.owned[n]) pass.moved[vertex + n] = here.row[n];
-      }
+    for (int n = 0; n < 2; ++n) {
+      const glm::vec3& v = here.row[n];
+#pragma unroll
+      for (int axis = 0; axis < 3; ++axis) moves |= __float_as_uint(v[axis]) ^ __float_as_uint(lift[axis]);
+      if (kExact) excess |= lattice.packing.excess(v);
+      if (pair.is(Pair::kPacked, n)) packed[n != 0 ? beside : 0] = lattice.packing.pack(v);
     }
-#pragma unroll
-    for (const glm::vec3& v : here.row) moves |= __float_as_uint(v.x) | __float_as_uint(v.y) | __float_as_uint(v.z);
-    const unsigned inverted = corners.inverted + centres.inverted;
-    describe_pair<kRange, kEven>(pass, pair, before, below, here, above, corners, centres);
-    const unsigned pairs = __ballot_sync(~0u, corners.inverted + centres.inverted != inverted);
-    if (lane == 0) pass.inverted.words[pass.inverted.word(pair.at.y, pair.at.z, blockIdx.x)] = pairs;
-    ++pair.at.z;
-    vertex += pass.lattice.slice;
+    if (kExact && excess != 0) {  // beyond the packing, or at its very end: others saw it rounded to a half
+      pass.found->wide = 1;
+      const int number = pair.z * lattice.slice + reader.row;
+      raised_slowly(pass, pass.displacement[number], number);
+      raised_slowly(pass, pass.displacement[number + beside], number + beside);
+    }
+    const unsigned pairs =
+        __ballot_sync(~0u, describe_pair<kRange, kEven>(pass, pair, before, below, here, above, corners, centres));
+    if (pairs != 0 && threadIdx.x == 0) pass.inverted.words[pass.inverted.word(pair.y, pair.z, blockIdx.x)] = pairs;
+    ++pair.z;
+    packed += lattice.slice;
   };
-  while (pair.at.z < end) {
+  while (pair.z < end) {
     Plane above, next;
     step(std::integral_constant<int, 0>(), before, here, above);
-    if (pair.at.z < end) {
+    if (pair.z < end) {
       before = here.row[1];
       step(std::integral_constant<int, 1>(), before, above, next);
     }
     before = above.row[0];
     here = next;
-    if (pair.at.z % MovingBlocks::kSide != 0 && pair.at.z < end) continue;
-    if ((moves & 0x7FFFFFFF) != 0) {
-      pass.moving.at({min(max(pair.at.x, 0), cells.x), pair.at.y, pair.at.z - 1}) = 1;
-      pass.moving.at({min(max(pair.at.x + 1, 0), cells.x), pair.at.y, pair.at.z - 1}) = 1;
+    if (pair.z % MovingBlocks::kSide != 0 && pair.z < end) continue;
+    if (moves != 0) {
+      pass.moving.at({left, pair.y, pair.z - 1}) = 1;
+      pass.moving.at({left + beside, pair.y, pair.z - 1}) = 1;
     }
     moves = 0;
   }
@@ -429,11 +502,22 @@ void run_step_pass(const StepPass& pass, cudaStream_t stream) {
   TETWARP_CUDA_TRY(cudaGetLastError());
 }
 
-void snap_steps(const StepPass& pass, cudaStream_t stream) {
+void pack_steps(const StepPass& pass, cudaStream_t stream) {
   const std::int64_t vertices = std::int64_t{pass.lattice.slice} * (pass.lattice.cells.z + 1);
   const FloatSnap fast(pass.frame, pass.lattice);
-  const auto kernel = fast.is_exact() ? snap_steps_kernel<true> : snap_steps_kernel<false>;
-  kernel<<<blocks_for(vertices), kThreads, 0, stream>>>(pass, fast);
+  const auto kernel = fast.is_exact() ? pack_kernel<true> : pack_kernel<false>;
+  const bool in_place = static_cast<const void*>(pass.packed) == pass.displacement;
+  for (std::int64_t begin = 0, end; begin < vertices; begin = end) {
+    // In place, each piece is packed over displacements that were packed before; the first by one thread block.
+    end = in_place ? std::min(std::max(begin + begin / 2, std::int64_t{kThreads}), vertices) : vertices;
+    kernel<<<blocks_for(end - begin), kThreads, 0, stream>>>(pass, fast, begin, end);
+  }
+  TETWARP_CUDA_TRY(cudaGetLastError());
+}
+
+void find_range(const StepPass& pass, int* low_high, cudaStream_t stream) {
+  const std::int64_t vertices = std::int64_t{pass.lattice.slice} * (pass.lattice.cells.z + 1);
+  range_kernel<<<blocks_for(vertices), kThreads, 0, stream>>>(pass, low_high);
   TETWARP_CUDA_TRY(cudaGetLastError());
 }
 

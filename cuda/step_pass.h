@@ -7,11 +7,11 @@ namespace tetwarp::cuda_detail {
 /// What one pass over a field whose vertices rest at whole steps reads and writes.
 struct StepPass {
   LatticeFrame frame;
-  StepLattice lattice;            ///< without `moved`
+  StepLattice lattice;            ///< without `packed`
   const glm::vec3* displacement;  ///< mm
-  glm::vec3* moved;               ///< snapped, 2^-12 voxel; null: not wanted
-  InvertedPairs inverted;
-  MovingBlocks moving;  ///< zero before
+  std::uint64_t* packed;          ///< for the lattice; null: not wanted
+  InvertedPairs inverted;         ///< zero before
+  MovingBlocks moving;            ///< zero before
   LatticeFindings* found;
   bool wants_range;  ///< of the Jacobian determinants; their signs are always known
 };
@@ -20,7 +20,10 @@ struct StepPass {
 /// inverted and what moves.
 void run_step_pass(const StepPass& pass, cudaStream_t stream);
 
-/// Snaps alone; `moved` may be where the displacements are.
-void snap_steps(const StepPass& pass, cudaStream_t stream);
+/// Packs alone; `packed` may be where the displacements are.
+void pack_steps(const StepPass& pass, cudaStream_t stream);
+
+/// Least and most that vertices move along i, j, k, 2^-12 voxel. @param low_high  grown
+void find_range(const StepPass& pass, int* low_high, cudaStream_t stream);
 
 }  // namespace tetwarp::cuda_detail

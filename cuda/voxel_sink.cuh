@@ -20,25 +20,56 @@ __device__ inline bool clamp_on_axis(int last, int& base, float& fraction) {
   return low || high;
 }
 
-/// Along x, then y, then z. Neighbours without weight may be any voxels: their finite values do not count.
-template <class V>
-__device__ float interpolate(const V* v, int at, int dx, int dy, int dz, const glm::vec3& t) {
-  const auto along_x = [&](int from) {
-    const float a = static_cast<float>(v[from]);
-    return a + t.x * (static_cast<float>(v[from + dx]) - a);
-  };
+/// Along x, then y, then z.
+__device__ inline float interpolate(const float (&v)[8], const glm::vec3& t) {
+  const auto along_x = [&](int from) { return v[from] + t.x * (v[from + 1] - v[from]); };
   const auto along_y = [&](int from) {
     const float a = along_x(from);
-    return a + t.y * (along_x(from + dy) - a);
+    return a + t.y * (along_x(from + 2) - a);
   };
-  const float a = along_y(at);
-  return a + t.z * (along_y(at + dz) - a);
+  const float a = along_y(0);
+  return a + t.z * (along_y(4) - a);
 }
 
-/// On the border of the source; out of line, so that the common case keeps its simple addresses.
+/// The eight voxels from one on.
 template <class V>
-__device__ __noinline__ float interpolate_on_border(const V* v, int at, int dx, int dy, int dz, glm::vec3 t) {
-  return interpolate(v, at, dx, dy, dz, t);
+__device__ void read_corners(const V* v, int dx, int dy, int dz, V (&corners)[8]) {
+#pragma unroll
+  for (int n = 0; n < 8; ++n)
+    corners[n] = v[((n & 1) != 0 ? dx : 0) + ((n & 2) != 0 ? dy : 0) + ((n & 4) != 0 ? dz : 0)];
+}
+
+template <class V>
+__device__ V interpolated(const V (&corners)[8], const glm::vec3& t) {
+  float v[8];
+#pragma unroll
+  for (int n = 0; n < 8; ++n) v[n] = static_cast<float>(corners[n]);
+  return static_cast<V>(__float2int_rn(interpolate(v, t)));  // between the corners: never saturates
+}
+
+template <class V>
+__device__ void VoxelSink<V>::start(int, const glm::ivec3& voxel, const glm::vec3& moved, bool wanted,
+                                    Pending& pending) const {
+  constexpr float kToWhole = 3.0f * (1 << 22);  // adding it rounds down to a whole number, to be read from the bits
+  const auto on_axis = [](int voxel, float moved, int& base, float& fraction) {
+    const float whole = __fmaf_rd(moved, -kVoxelsPerStep, kToWhole);
+    base = voxel + (__float_as_int(whole) - __float_as_int(kToWhole));
+    // It may be rounded to 1, where u is negative and small: a + 1 (b - a) is b.
+    fraction = fmaf(moved, -kVoxelsPerStep, kToWhole - whole);
+  };
+  glm::ivec3 base;
+  on_axis(voxel.x, moved.x, base.x, pending.fraction.x);
+  on_axis(voxel.y, moved.y, base.y, pending.fraction.y);
+  on_axis(voxel.z, moved.z, base.z, pending.fraction.z);
+  const auto is_below = [](int index, int end) { return static_cast<unsigned>(index) < static_cast<unsigned>(end); };
+  pending.any = wanted & is_below(base.x, last.x) & is_below(base.y, last.y) & is_below(base.z, last.z);
+  if (pending.any) read_corners(source + (base.z * slice + base.y * row + base.x), 1, row, slice, pending.corners);
+}
+
+template <class V>
+__device__ void VoxelSink<V>::finish(int place, const Pending& pending) const {
+  // A branch, so that nothing of it is moved before what is read meanwhile.
+  if (pending.any) output[place] = interpolated(pending.corners, pending.fraction);
 }
 
 template <class V>
@@ -46,22 +77,16 @@ __device__ bool VoxelSink<V>::write(int place, const glm::ivec3& voxel, const gl
   const glm::ivec3 whole(__float2int_rd(u.x), __float2int_rd(u.y), __float2int_rd(u.z));
   glm::ivec3 base = voxel + whole;
   glm::vec3 t = u - glm::vec3(whole);
-  const auto is_below = [](int index, int end) { return static_cast<unsigned>(index) < static_cast<unsigned>(end); };
-  float value;
-  if (is_below(base.x, last.x) && is_below(base.y, last.y) && is_below(base.z, last.z) &&
-      fmaxf(fmaxf(t.x, t.y), t.z) < 1.0f) {
-    value = interpolate(source, base.z * slice + base.y * row + base.x, 1, row, slice, t);
-  } else {
-    for (int axis = 0; axis < 3; ++axis) carry_on_axis(base[axis], t[axis]);
-    const bool in_x = clamp_on_axis(last.x, base.x, t.x), in_y = clamp_on_axis(last.y, base.y, t.y);
-    if (!clamp_on_axis(last.z, base.z, t.z) || !in_x || !in_y) {
-      nothing(place);
-      return false;
-    }
-    value = interpolate_on_border(source, base.z * slice + base.y * row + base.x, t.x != 0 ? 1 : 0, t.y != 0 ? row : 0,
-                                  t.z != 0 ? slice : 0, t);
+  for (int axis = 0; axis < 3; ++axis) carry_on_axis(base[axis], t[axis]);
+  const bool in_x = clamp_on_axis(last.x, base.x, t.x), in_y = clamp_on_axis(last.y, base.y, t.y);
+  if (!clamp_on_axis(last.z, base.z, t.z) || !in_x || !in_y) {
+    nothing(place);
+    return false;
   }
-  output[place] = static_cast<V>(__float2int_rn(value));  // between the corners: never saturates
+  V corners[8];  // neighbours without weight may be any voxels: their finite values do not count
+  read_corners(source + (base.z * slice + base.y * row + base.x), t.x != 0 ? 1 : 0, t.y != 0 ? row : 0,
+               t.z != 0 ? slice : 0, corners);
+  output[place] = interpolated(corners, t);
   return true;
 }
 

@@ -24,11 +24,23 @@ struct GatherPoint {
 
 /// What one tetrahedron says of a voxel.
 struct Trial {
-  bool owns;            ///< certainly, and its weights need no exact arithmetic
-  bool unsure;          ///< it may own, and with full effort its weights need no exact arithmetic
-  glm::vec3 u;          ///< where it owns: undeformed minus deformed place, voxels; the bits of `interpolate_u`
-  glm::vec3 place;      ///< where its affine map takes the nudged voxel from, cells
-  glm::vec3 per_slice;  ///< how far that moves from one voxel to the next along k, cells
+  bool owns;        ///< certainly, and its weights need no exact arithmetic
+  bool unsure;      ///< it may own, and with full effort its weights need no exact arithmetic
+  glm::vec3 moved;  ///< where it owns: deformed minus undeformed place, 2^-12 voxel
+  FloatTetrahedron t;
+  glm::vec3 weights;   ///< of A, B and C at the nudged voxel
+  glm::vec3 slope;     ///< how they change along k, times the determinant
+  float slope_factor;  ///< by this, so that it is from one voxel to the next
+
+  /// Where it owns: undeformed minus deformed place, voxels; the bits of `interpolate_u`.
+  TETWARP_HD glm::vec3 u() const;
+  /// Where its affine map takes the nudged voxel from, cells.
+  TETWARP_HD glm::vec3 place() const { return place_of(weights); }
+  /// Likewise the next voxel along k.
+  TETWARP_HD glm::vec3 next_place() const;
+
+ private:
+  TETWARP_HD glm::vec3 place_of(const glm::vec3& w) const;
 };
 
 namespace detail {
@@ -81,6 +93,20 @@ TETWARP_HD inline float error_bound(float product, float faces, float r) {
   return (9.0f * kUnit) * product + (15.0f * kUnit) * (r * faces);
 }
 
+/// The same over s^2, from the sum s of the three norms and |r|: P is at most s^3 / 27, and the sum of products of two
+/// norms at most s^2 / 3. |d| is (15 + 7 + 4) / 16 steps.
+TETWARP_HD inline float error_factor(float s, float r) {
+  return multiply_add(s, kUnit / 3, multiply_add(r, 5 * kUnit, 32.5f * kUnit));
+}
+
+/// Likewise for all r. Where the weights are positive, r is no longer than the longest column, and so than s; where the
+/// determinant is above both of the next, the weights that this is asked about are off by so little that it is so.
+TETWARP_HD inline float error_factor(float s) { return multiply_add(s, 6 * kUnit, 32.5f * kUnit); }
+
+/// A determinant above kThinSum s^3 is not thin; above kSlackSum s^2, no weight moves by more than the slack between
+/// the nudged point and the voxel.
+constexpr float kThinSum = kThin / 26, kSlackSum = 22;
+
 /// x, negated where an odd number of the signs `to` (+1 or -1) are negative.
 TETWARP_HD inline float with_sign_of(float x, const glm::vec3& to) {
 #ifdef __CUDA_ARCH__
@@ -104,16 +130,19 @@ struct LocalTetrahedron {
     const int dx = t.to.x < 0 ? -1 : 1, dy = t.to.y < 0 ? -lattice.row : lattice.row,
               dz = t.to.z < 0 ? -lattice.slice : lattice.slice;
     const int sum = dx + dy + dz;
-    const glm::vec3* at_d = lattice.moved + t.offset;
-    moved = at_d[0];
-    moved_a = at_d[t.centre ? sum - dx : dx] - moved;
-    moved_b = at_d[t.centre ? sum - dy : dy] - moved;
-    moved_c = at_d[t.centre ? sum - dz : dz] - moved;
+    const glm::vec3 raised = lattice.raised(t.offset);
+    moved = raised - lattice.packing.lift();
+    moved_a = lattice.raised(t.offset + (t.centre ? sum - dx : dx)) - raised;
+    moved_b = lattice.raised(t.offset + (t.centre ? sum - dy : dy)) - raised;
+    moved_c = lattice.raised(t.offset + (t.centre ? sum - dz : dz)) - raised;
     const glm::vec3 edge = t.to * lattice.cell;  // to the next vertex on each axis
-    const glm::vec3 along = t.centre ? glm::vec3(0) : edge, across = t.centre ? edge : glm::vec3(0);
-    a = {along.x + moved_a.x, across.y + moved_a.y, across.z + moved_a.z};
-    b = {across.x + moved_b.x, along.y + moved_b.y, across.z + moved_b.z};
-    c = {across.x + moved_c.x, across.y + moved_c.y, along.z + moved_c.z};
+    const float along = t.centre ? 0.0f : 1.0f, across = t.centre ? 1.0f : 0.0f;
+    const auto edge_to = [&edge](float x, float y, float z, const glm::vec3& by) {  // exact
+      return glm::vec3(multiply_add(edge.x, x, by.x), multiply_add(edge.y, y, by.y), multiply_add(edge.z, z, by.z));
+    };
+    a = edge_to(along, across, across, moved_a);
+    b = edge_to(across, along, across, moved_b);
+    c = edge_to(across, across, along, moved_c);
     r = glm::vec3(multiply_add(-t.d.x, lattice.cell.x, point.steps.x),
                   multiply_add(-t.d.y, lattice.cell.y, point.steps.y),
                   multiply_add(-t.d.z, lattice.cell.z, point.steps.z)) -
@@ -121,8 +150,24 @@ struct LocalTetrahedron {
   }
 };
 
-/// How much of what float allows is tried.
-enum class Effort { quick, full };
+/// How much of what float allows is tried. Closer bounds of the errors are for large cells, where voxels are often near
+/// a face; with full effort the weights are looked at too.
+enum class Effort { quick, close, full };
+
+TETWARP_HD inline glm::vec3 Trial::u() const { return detail::to_offset(moved); }
+
+TETWARP_HD inline glm::vec3 Trial::place_of(const glm::vec3& w) const {
+  using detail::multiply_add;
+  const glm::vec3 shift = t.centre ? ((w.x + w.y) + w.z) - w : w;  // A of a centre lies along j and k from D
+  return {multiply_add(t.to.x, shift.x, t.d.x), multiply_add(t.to.y, shift.y, t.d.y),
+          multiply_add(t.to.z, shift.z, t.d.z)};
+}
+
+TETWARP_HD inline glm::vec3 Trial::next_place() const {
+  using detail::multiply_add;
+  return place_of({multiply_add(slope.x, slope_factor, weights.x), multiply_add(slope.y, slope_factor, weights.y),
+                   multiply_add(slope.z, slope_factor, weights.z)});
+}
 
 /// Asks one tetrahedron for one voxel, in float.
 ///
@@ -135,43 +180,45 @@ enum class Effort { quick, full };
 /// where that is clearly below the slack, and the weights at p + d are positive, no weight at p can leave it. With full
 /// effort the weights themselves are looked at.
 template <Effort kEffort>
-TETWARP_HD Trial try_tetrahedron(const StepLattice& lattice, const FloatTetrahedron& t, const GatherPoint& point) {
+TETWARP_HD Trial try_tetrahedron(const FloatTetrahedron& t, const LocalTetrahedron& local, const GatherPoint& point) {
   using detail::multiply_add;
-  const LocalTetrahedron local(lattice, t, point);
   const Cramer m(local.a, local.b, local.c);
   const float na = detail::dot(local.r, m.bc), nb = detail::dot(local.r, m.ca), nc = detail::dot(local.r, m.ab);
-  const float reciprocal = m.det != 0 ? detail::reciprocal(m.det) : 0.0f;  // flat: the next guess is D
-  const glm::vec3 at_q = glm::vec3(detail::nudged(na, point.nudge, m.bc), detail::nudged(nb, point.nudge, m.ca),
-                                   detail::nudged(nc, point.nudge, m.ab)) *
-                         reciprocal;
-  const float least = std::fmin(std::fmin(at_q.x, at_q.y), std::fmin(at_q.z, ((1.0f - at_q.x) - at_q.y) - at_q.z));
-  const float la = detail::norm1(local.a), lb = detail::norm1(local.b), lc = detail::norm1(local.c);
-  const float product = (la * lb) * lc, faces = lb * lc + la * (lb + lc);
+  const float reciprocal = detail::reciprocal(m.det);  // flat: not finite, and owns nothing
+  const glm::vec3 weights = glm::vec3(detail::nudged(na, point.nudge, m.bc), detail::nudged(nb, point.nudge, m.ca),
+                                      detail::nudged(nc, point.nudge, m.ab)) *
+                            reciprocal;
+  const float least =
+      std::fmin(std::fmin(weights.x, weights.y), std::fmin(weights.z, ((1.0f - weights.x) - weights.y) - weights.z));
+  const float s = (detail::norm1(local.a) + detail::norm1(local.b)) + detail::norm1(local.c), squared = s * s;
   const float error =
-      detail::error_bound(product, faces, detail::norm1(local.r) + 6.5f);  // 15 + 7 + 4 sixteenths of a step
-  const float upright = detail::with_sign_of(m.det, t.to);                 // A, B, C turn like that when undeformed
+      squared * (kEffort == Effort::quick ? detail::error_factor(s) : detail::error_factor(s, detail::norm1(local.r)));
+  const float upright = detail::with_sign_of(m.det, t.to);  // A, B, C turn like that when undeformed
   const Weights w{na * reciprocal, nb * reciprocal, nc * reciprocal};
-  const bool in_slack =
-      kEffort == Effort::full ? w.within_slack() : upright > static_cast<float>(1 / kWeightSlack) * faces;
+  const bool usable = kEffort == Effort::full
+                          ? (upright > detail::kThinSum * (squared * s)) & w.within_slack()
+                          : upright > squared * multiply_add(detail::kThinSum, s, detail::kSlackSum);
 
   Trial trial;
   const float bound = multiply_add(error, detail::magnitude(reciprocal), 8 * detail::kUnit);
-  const bool usable = (upright > kThin * product) & in_slack;
   trial.owns = (least > bound) & usable;
   trial.unsure = (least >= -bound) & (least <= bound) & usable;
-  trial.u = detail::to_offset(blend(w, local.moved, local.moved_a, local.moved_b, local.moved_c));
-  const glm::vec3 slope = glm::vec3(m.bc.z, m.ca.z, m.ab.z) * (reciprocal * float{kStepsPerVoxel});
-  const float all_q = (at_q.x + at_q.y) + at_q.z, all_slope = (slope.x + slope.y) + slope.z;
-  const glm::vec3 shift = t.centre ? all_q - at_q : at_q, along_k = t.centre ? all_slope - slope : slope;
-  trial.place = {multiply_add(t.to.x, shift.x, t.d.x), multiply_add(t.to.y, shift.y, t.d.y),
-                 multiply_add(t.to.z, shift.z, t.d.z)};
-  trial.per_slice = t.to * along_k;
+  trial.moved = blend(w, local.moved, local.moved_a, local.moved_b, local.moved_c);
+  trial.t = t;
+  trial.weights = weights;
+  trial.slope = {m.bc.z, m.ca.z, m.ab.z};
+  trial.slope_factor = reciprocal * float{kStepsPerVoxel};
   return trial;
 }
 
+/// @param t  of the lattice
+TETWARP_HD inline Trial try_tetrahedron(const StepLattice& lattice, const FloatTetrahedron& t,
+                                        const GatherPoint& point) {
+  return try_tetrahedron<Effort::full>(t, LocalTetrahedron(lattice, t, point), point);
+}
 TETWARP_HD inline Trial try_tetrahedron(const StepLattice& lattice, const LatticeTetrahedron& t,
                                         const GatherPoint& point) {
-  return try_tetrahedron<Effort::full>(lattice, as_float(lattice, t), point);
+  return try_tetrahedron(lattice, as_float(lattice, t), point);
 }
 
 /// u at a voxel that the tetrahedron owns: the bits of `interpolate_u`.
@@ -219,17 +266,22 @@ struct IntBox {
   TETWARP_HD bool is_empty() const { return end.x <= begin.x || end.y <= begin.y || end.z <= begin.z; }
 };
 
-/// The part of a box of voxels that something between `low` and `high` (2^-12 voxel) may own; as
-/// `detail::candidates`.
+/// Cuts a range of voxels of one axis, half open, to those that something between `low` and `high` (2^-12 voxel) may
+/// own; as `detail::candidates`.
+TETWARP_HD inline void cut_to_candidates(const NudgeTurns& turns, int axis, std::int32_t low, std::int32_t high,
+                                         int& begin, int& end) {
+  int first = low >> 12, last = high >> 12;
+  if ((first << 12) != low || turns.sign(axis, first) < 0) ++first;
+  if ((last << 12) == high && turns.sign(axis, last) > 0) --last;
+  begin = begin > first ? begin : first;
+  end = end < last + 1 ? end : last + 1;
+}
+
+/// Likewise a box.
 TETWARP_HD inline IntBox candidates(const NudgeTurns& turns, const glm::i32vec3& low, const glm::i32vec3& high,
                                     IntBox box) {
-  for (int axis = 0; axis < 3; ++axis) {
-    int first = low[axis] >> 12, last = high[axis] >> 12;
-    if ((first << 12) != low[axis] || turns.sign(axis, first) < 0) ++first;
-    if ((last << 12) == high[axis] && turns.sign(axis, last) > 0) --last;
-    box.begin[axis] = box.begin[axis] > first ? box.begin[axis] : first;
-    box.end[axis] = box.end[axis] < last + 1 ? box.end[axis] : last + 1;
-  }
+  for (int axis = 0; axis < 3; ++axis)
+    cut_to_candidates(turns, axis, low[axis], high[axis], box.begin[axis], box.end[axis]);
   return box;
 }
 
@@ -241,9 +293,9 @@ TETWARP_HD inline IntBox candidates(const NudgeTurns& turns, const glm::i32vec3&
 template <class Wanted, class Visit>
 TETWARP_HD void visit_tetrahedron(const StepLattice& lattice, const LatticeTetrahedron& t, const IntBox& region,
                                   const NudgeTurns& turns, Wanted&& wanted, Visit&& visit) {
-  const glm::vec3 moved = lattice.moved[lattice.offset(t.d)];
+  const glm::vec3 moved = lattice.moved(lattice.offset(t.d));
   const auto edge = [&](const glm::ivec3& to) {
-    return glm::vec3(to - t.d) * lattice.cell + (lattice.moved[lattice.offset(to)] - moved);
+    return glm::vec3(to - t.d) * lattice.cell + (lattice.moved(lattice.offset(to)) - moved);
   };
   const glm::vec3 a = edge(t.a()), b = edge(t.b()), c = edge(t.c());
   const glm::vec3 low = glm::min(glm::min(a, b), glm::min(c, glm::vec3(0))),

@@ -1,32 +1,119 @@
 #pragma once
 
+#include <algorithm>
+#include <bit>
+#include <optional>
+
 #include "deform/core/five_tetrahedra.h"
 
 namespace tetwarp {
 
+/// How far a vertex moved, three whole numbers of steps, in 8 bytes: each above the least of its axis, in as many of
+/// the 64 bits as its axis needs.
+///
+/// A number below 2^23 behind the exponent bits of 2^23 is the float 2^23 + that number. So vectors are unpacked
+/// without conversions as floats with something added ("raised"), and differences of raised ones are exact.
+class StepPacking {
+ public:
+  static constexpr int kMostBits = 23;  ///< of one axis
+
+  /// From -256 to below 256 voxels along x and y, twice that along z.
+  StepPacking() : StepPacking({-(1 << 20), -(1 << 20), -(1 << 21)}, {21, 21}) {}
+
+  /// What holds all from `low` to `high`, 2^-12 voxel, and whatever is rounded to these, before it is; none where 64
+  /// bits are too few.
+  static std::optional<StepPacking> holding(const glm::ivec3& low, const glm::ivec3& high) {
+    glm::ivec3 least(0), bits(0);
+    for (int axis = 0; axis < 3; ++axis) {
+      least[axis] = (low[axis] - 2) & ~1;  // even, so that ties are rounded alike; and above it all are whole
+      bits[axis] = std::bit_width(static_cast<unsigned>(high[axis] - least[axis]));
+      if (bits[axis] > kMostBits || least[axis] < -(1 << kMostBits)) return std::nullopt;
+    }
+    if (bits.x + bits.y + bits.z > 64) return std::nullopt;
+    bits.x = std::max(bits.x, 64 - 2 * kMostBits);
+    bits.y = std::max(bits.y, 64 - kMostBits - bits.x);
+    return StepPacking(least, {bits.x, bits.y});
+  }
+
+  /// What to add to a vector to have it raised.
+  TETWARP_HD const glm::vec3& lift() const { return lift_; }
+  /// Nothing but zero bits where it can be packed. @param raised  whole numbers, or what may be no numbers at all
+  TETWARP_HD std::uint32_t excess(const glm::vec3& raised) const {
+    return ((bits_of(raised.x) ^ kTwoTo23) & ~x_mask_) | ((bits_of(raised.y) ^ kTwoTo23) & ~y_mask_) |
+           ((bits_of(raised.z) ^ kTwoTo23) & ~z_mask_);
+  }
+  TETWARP_HD std::uint64_t pack(const glm::vec3& raised) const {
+    const std::uint32_t y = bits_of(raised.y) & y_mask_;
+    const std::uint32_t low = (bits_of(raised.x) & x_mask_) | y << y_at_,
+                        high = y >> (32 - y_at_) | bits_of(raised.z) << (z_at_ - 32);
+    return std::uint64_t{high} << 32 | low;
+  }
+  TETWARP_HD glm::vec3 raised(std::uint64_t packed) const {
+    const auto low = static_cast<std::uint32_t>(packed), high = static_cast<std::uint32_t>(packed >> 32);
+    return {float_of((low & x_mask_) | kTwoTo23), float_of((middle(low, high) & y_mask_) | kTwoTo23),
+            float_of(top(high))};
+  }
+  TETWARP_HD glm::vec3 unpacked(std::uint64_t packed) const { return raised(packed) - lift_; }
+
+ private:
+  static constexpr std::uint32_t kTwoTo23 = 0x4B000000;  ///< the bits of 2^23
+
+  StepPacking(const glm::ivec3& least, const glm::ivec2& bits)
+      : y_at_(bits.x),
+        z_at_(bits.x + bits.y),
+        x_mask_((1u << bits.x) - 1),
+        y_mask_((1u << bits.y) - 1),
+        z_mask_(~0u >> (z_at_ - 32)),
+        above_z_(kTwoTo23 >> (64 - z_at_)),
+        lift_(float{1 << kMostBits} - glm::vec3(least)) {}
+
+#ifdef __CUDA_ARCH__
+  __device__ static float float_of(std::uint32_t bits) { return __uint_as_float(bits); }
+  __device__ static std::uint32_t bits_of(float value) { return __float_as_uint(value); }
+  __device__ std::uint32_t middle(std::uint32_t low, std::uint32_t high) const {
+    return __funnelshift_r(low, high, static_cast<unsigned>(y_at_));
+  }
+  __device__ std::uint32_t top(std::uint32_t high) const {
+    return __funnelshift_r(high, above_z_, static_cast<unsigned>(z_at_ - 32));
+  }
+#else
+  static float float_of(std::uint32_t bits) { return std::bit_cast<float>(bits); }
+  static std::uint32_t bits_of(float value) { return std::bit_cast<std::uint32_t>(value); }
+  std::uint32_t middle(std::uint32_t low, std::uint32_t high) const { return low >> y_at_ | high << (32 - y_at_); }
+  std::uint32_t top(std::uint32_t high) const { return high >> (z_at_ - 32) | above_z_ << (64 - z_at_); }
+#endif
+
+  int y_at_, z_at_;                         ///< their lowest bits: 18 to 23, and 41 to 46
+  std::uint32_t x_mask_, y_mask_, z_mask_;  ///< as many bits as they have
+  std::uint32_t above_z_;                   ///< what the bits of 2^23 leave above those of z
+  glm::vec3 lift_;
+};
+
 /// A lattice along the axes of the output grid, whose undeformed vertices lie at whole steps: what a gather reads.
 ///
-/// Lattices over a volume with cells of B voxels are such. All that is held of a vertex is how far it moved, as whole
-/// numbers in float: exact below 2^24 steps (4096 voxels), and a difference of two needs no conversion.
+/// Lattices over a volume with cells of B voxels are such. All that is held of a vertex is how far it moved.
 struct StepLattice {
-  glm::ivec3 cells{0};               ///< on each axis
-  glm::vec3 first{0}, cell{0};       ///< rest place of vertex (0, 0, 0), and from one vertex to the next; 2^-12 voxel
-  glm::vec3 voxel{0};                ///< one voxel, in cells
-  glm::ivec3 last{0};                ///< cell
-  int row = 0, slice = 0;            ///< vertices from one row, and one slice, to the next
-  const glm::vec3* moved = nullptr;  ///< deformed minus rest of each vertex, 2^-12 voxel, i fastest, 12 bytes each
+  glm::ivec3 cells{0};          ///< on each axis
+  glm::vec3 first{0}, cell{0};  ///< rest place of vertex (0, 0, 0), and from one vertex to the next; 2^-12 voxel
+  glm::vec3 voxel{0};           ///< one voxel, in cells
+  glm::ivec3 last{0};           ///< cell
+  int row = 0, slice = 0;       ///< vertices from one row, and one slice, to the next
+  StepPacking packing;
+  const std::uint64_t* packed = nullptr;  ///< deformed minus rest of each vertex, 2^-12 voxel, i fastest
 
   TETWARP_HD std::int64_t offset(const glm::ivec3& vertex) const {
     return std::int64_t{vertex.z} * slice + vertex.y * row + vertex.x;
   }
+  TETWARP_HD glm::vec3 moved(std::int64_t offset) const { return packing.unpacked(packed[offset]); }
+  TETWARP_HD glm::vec3 raised(std::int64_t offset) const { return packing.raised(packed[offset]); }
   TETWARP_HD Vertex vertex(const glm::ivec3& at) const {
-    const glm::vec3 rest = first + glm::vec3(at) * cell, by = moved[offset(at)];
+    const glm::vec3 rest = first + glm::vec3(at) * cell, by = moved(offset(at));
     return {glm::ivec3(rest + by), glm::ivec3(-by)};
   }
   /// The deformed place of a vertex alone.
   TETWARP_HD glm::i32vec3 deformed(const glm::ivec3& at) const {
     const int n = at.z * slice + at.y * row + at.x;  // make_step_lattice: fewer than 2^31
-    return glm::i32vec3(first) + at * glm::i32vec3(cell) + glm::i32vec3(moved[n]);
+    return glm::i32vec3(first) + at * glm::i32vec3(cell) + glm::i32vec3(moved(n));
   }
   /// The lattice index of an undeformed voxel.
   TETWARP_HD glm::vec3 place(const glm::vec3& voxel_index) const {
@@ -144,9 +231,14 @@ TETWARP_HD inline float saturate(float x) {
 #endif
 }
 
+/// x moved into [0, last].
 TETWARP_HD inline int clamp_to(int x, int last) {
+#ifdef __CUDA_ARCH__
+  return __vimin_s32_relu(x, last);
+#else
   const int inside = x > 0 ? x : 0;
   return inside < last ? inside : last;
+#endif
 }
 
 }  // namespace detail
@@ -161,16 +253,18 @@ TETWARP_HD inline FloatTetrahedron tetrahedron_at(const StepLattice& lattice, co
                      detail::saturate(place.z - cell.z));  // at most one of the four corners below is near
   const bool odd = ((x ^ y ^ z) & 1) != 0;
   const float mirrored = odd ? 1.0f - in.x : in.x;  // mirrored, an odd cell is an even one
-  const float more = in.y + in.z, less = in.y - in.z;
-  const bool corner0 = mirrored + more<1.0f, corner3 = mirrored + less> 1.0f, corner5 = mirrored - less > 1.0f,
-             corner6 = more - mirrored > 1.0f;
+  const float other = 1.0f - in.y, low = other - in.z, high = other + in.z;
+  const bool corner0 = mirrored<low, corner6 = mirrored<-low, corner3 = mirrored> high, corner5 = mirrored> 2.0f - high;
   const bool centre = !(corner0 || corner3 || corner5 || corner6);
   const bool down_x = centre ? !odd : (corner3 || corner5) != odd, down_y = centre ? !odd : corner3 || corner6,
              down_z = centre ? !odd : corner5 || corner6;
   FloatTetrahedron t;
   t.d = {down_x ? cell.x + 1.0f : cell.x, down_y ? cell.y + 1.0f : cell.y, down_z ? cell.z + 1.0f : cell.z};
   t.to = {down_x ? -1.0f : 1.0f, down_y ? -1.0f : 1.0f, down_z ? -1.0f : 1.0f};
-  t.offset = (z + down_z) * lattice.slice + (y + down_y) * lattice.row + (x + down_x);
+  t.offset = z * lattice.slice + y * lattice.row + x;
+  if (down_x) t.offset += 1;
+  if (down_y) t.offset += lattice.row;
+  if (down_z) t.offset += lattice.slice;
   t.centre = centre;
   return t;
 }

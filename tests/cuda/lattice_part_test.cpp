@@ -190,11 +190,12 @@ std::map<std::size_t, int> winding_of(const StepLattice& lattice, const Nudge& n
 /// A part as a gather reads it; no cells where it cannot.
 struct Steps {
   StepLattice lattice;
-  std::vector<glm::vec3> moved;
+  std::vector<std::uint64_t> packed;
 
   Steps(const Lattice& of, const Geometry& output) : lattice(make_step_lattice(of.frame, output)) {
-    for (const Vertex& vertex : of.vertices) moved.push_back(-glm::vec3(vertex.u));
-    lattice.moved = moved.data();
+    for (const Vertex& vertex : of.vertices)
+      packed.push_back(lattice.packing.pack(lattice.packing.lift() - glm::vec3(vertex.u)));
+    lattice.packed = packed.data();
     for (std::size_t n = 0; n < of.vertices.size() && lattice.cells.x != 0; ++n) {
       const auto at = static_cast<int>(n);
       const Vertex vertex = lattice.vertex({at % lattice.row, at % lattice.slice / lattice.row, at / lattice.slice});
