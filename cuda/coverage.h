@@ -17,8 +17,8 @@ struct ExtraCrossing {
 /// "Gather").
 class Coverage {
  public:
-  /// For a field with whole steps. Queued on the stream. @param several_in_box  on the device; the number of voxels
-  /// that are `several` is added to it
+  /// For a field with whole steps. Queued on the stream. @param several_in_box  on the device; zero, and then the
+  /// number of voxels that are `several`
   void find(const LatticeOnDevice& lattice, const SlabBox& box, unsigned long long* several_in_box,
             cudaStream_t stream);
 

@@ -66,10 +66,8 @@ __global__ void reach_kernel(DeviceField field, unsigned blocks_per_slice, Slice
     low = min(low, z);
     high = max(high, z);
   }
-  for (int step = 16; step > 0; step /= 2) {
-    low = min(low, __shfl_xor_sync(~0u, low, step));
-    high = max(high, __shfl_xor_sync(~0u, high, step));
-  }
+  low = warp_min(low);
+  high = warp_max(high);
   if ((threadIdx.x & 31) != 0) return;
   atomicMin(&reach[slice].low, low);
   atomicMax(&reach[slice].high, high);

@@ -118,9 +118,9 @@ Gather::Counters Gather::run(const LatticeOnDevice& lattice, const SlabBox& box,
   beside_->seeded.hold_back(stream);
   task.single = coverage_.single();
   task.several = coverage_.several();
-  constexpr int kBlockJ = kWarps * kAlongI * kAlongJ / 32;  // voxels of a block along j
-  const dim3 blocks(static_cast<unsigned>((size.x + 31) / 32), static_cast<unsigned>((size.y + kBlockJ - 1) / kBlockJ),
-                    static_cast<unsigned>(marches.z));
+  constexpr int kBlockI = kAcross * kAlongI, kBlockJ = kWarps / kAcross * kAlongJ;  // voxels of a block
+  const dim3 blocks(static_cast<unsigned>((size.x + kBlockI - 1) / kBlockI),
+                    static_cast<unsigned>((size.y + kBlockJ - 1) / kBlockJ), static_cast<unsigned>(marches.z));
   const glm::vec3& cell = field.steps.cell;
   const bool coarse = std::max({cell.x, cell.y, cell.z}) > 2 * kStepsPerVoxel;
   const auto march = coarse ? march_kernel<Sink, true> : march_kernel<Sink, false>;

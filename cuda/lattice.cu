@@ -79,10 +79,9 @@ bool LatticeOnDevice::set_steps(StepLattice lattice, const glm::vec3* displaceme
   if (found.wide != 0) {
     const int nothing[6] = {INT32_MAX, INT32_MAX, INT32_MAX, INT32_MIN, INT32_MIN, INT32_MIN};
     int low_high[6];
-    DeviceBuffer<int> range;
-    range.upload(nothing, 6, stream);
-    find_range(pass, range.data(), stream);
-    range.download(low_high, 6, stream);
+    range_.upload(nothing, 6, stream);
+    find_range(pass, range_.data(), stream);
+    range_.download(low_high, 6, stream);
     const std::optional<StepPacking> packing =
         StepPacking::holding({low_high[0], low_high[1], low_high[2]}, {low_high[3], low_high[4], low_high[5]});
     if (!packing) return false;
@@ -91,7 +90,7 @@ bool LatticeOnDevice::set_steps(StepLattice lattice, const glm::vec3* displaceme
   }
   if (in_place) {
     pass.packed = room;
-    pack_steps(pass, stream);
+    pack_in_place(pass, stream);
     TETWARP_CUDA_TRY(cudaStreamSynchronize(stream));  // the next call may come on another stream
   }
   field_.steps = pass.lattice;

@@ -37,6 +37,16 @@ __device__ inline unsigned warp_sum(unsigned value, int lanes = 32) {
   return value;
 }
 
+/// The smallest, and the largest, over a whole warp, in every lane.
+__device__ inline int warp_min(int value) {
+  for (int step = 16; step > 0; step /= 2) value = min(value, __shfl_xor_sync(~0u, value, step));
+  return value;
+}
+__device__ inline int warp_max(int value) {
+  for (int step = 16; step > 0; step /= 2) value = max(value, __shfl_xor_sync(~0u, value, step));
+  return value;
+}
+
 /// Sum over the lanes of such a group up to this one.
 __device__ inline int warp_scan(int value, int lanes = 32) {
   const int lane = static_cast<int>(threadIdx.x) & (lanes - 1);
@@ -150,6 +160,7 @@ class LatticeOnDevice {
   DeviceBuffer<Vertex> vertices_;
   DeviceBuffer<std::uint64_t> packed_;
   StepPacking packing_;  ///< of the last field that was packed
+  DeviceBuffer<int> range_;
   DeviceBuffer<std::uint32_t> inverted_words_;
   InvertedPairs inverted_;
   DeviceBuffer<std::uint8_t> moving_;

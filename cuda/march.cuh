@@ -12,7 +12,8 @@ namespace {
 constexpr int kAlongI = 16;            ///< voxels of a warp along i
 constexpr int kAlongJ = 32 / kAlongI;  ///< and along j
 constexpr int kMarch = 64;             ///< voxels along k that a thread goes; a multiple of 32
-constexpr int kWarps = 4;              ///< of a block: 32 voxels along i
+constexpr int kWarps = 4;              ///< of a block
+constexpr int kAcross = 2;             ///< of these side by side along i
 constexpr int kBlocks = 6;             ///< a multiprocessor
 constexpr int kCopied = 16;            ///< voxels of a lane that are on their way together
 constexpr int kSeedTile = 8;           ///< voxels along i and j that share a seed
@@ -193,7 +194,7 @@ __global__ void rest_kernel(Task task, std::int64_t marches) {
   if (lane == 0) task.resting[number] = all;
 }
 
-/// Asks for the vertices that a march comes to next.
+/// Asks for a vertex two slices on, near which a march will be.
 __device__ inline void prefetch(const StepLattice& lattice, const FloatTetrahedron& t) {
   const auto slice = static_cast<unsigned>(lattice.slice), last = slice * static_cast<unsigned>(lattice.cells.z);
   const std::uint64_t* vertex = lattice.packed + min(static_cast<unsigned>(t.offset) + 2 * slice, last);
@@ -312,9 +313,10 @@ struct March {
       const bool again = single & !pending.any;
       const unsigned failed = __ballot_sync(~0u, again);
       if (failed != 0) {
-        if (n == 0 && rounds < kRounds && __popc(failed) > kFewFailed) {  // the seed was no good: once more
+        const bool lost = single & !trial.owns;
+        if (n == 0 && rounds < kRounds && __popc(__ballot_sync(~0u, lost)) > kFewFailed) {  // no good seed: once more
           const glm::vec3 better = rounds++ < 3 ? trial.place() : (place + trial.place()) * 0.5f;
-          if (again) place = better;
+          if (lost) place = better;
           pending.any = false;
           out -= out_slice;
           continue;
@@ -339,7 +341,6 @@ __global__ void __launch_bounds__(32 * kWarps, kBlocks)
     march_kernel(const __grid_constant__ Task task, const glm::vec3* seeds, const __grid_constant__ Sink sink) {
   __shared__ typename WarpQueue<Sink, kCoarse>::Entry entries[kWarps][64];
   const int lane = static_cast<int>(threadIdx.x), warp = static_cast<int>(threadIdx.y);
-  constexpr int kAcross = 32 / kAlongI;  // warps of a block side by side along i
   const glm::ivec3 size = task.size(),
                    march_at(blockIdx.x * kAcross + warp % kAcross, blockIdx.y * (kWarps / kAcross) + warp / kAcross,
                             blockIdx.z),

@@ -119,7 +119,7 @@ __global__ void range_kernel(const __grid_constant__ StepPass pass, int* low_hig
   const glm::ivec3 moved = -snapped(pass.frame, pass.displacement[at], unravel(at, size), at, pass.found).u;
 #pragma unroll
   for (int axis = 0; axis < 3; ++axis) {
-    const int low = __reduce_min_sync(~0u, moved[axis]), high = __reduce_max_sync(~0u, moved[axis]);
+    const int low = warp_min(moved[axis]), high = warp_max(moved[axis]);
     if ((threadIdx.x & 31) != 0) continue;
     if (low < low_high[axis]) atomicMin(&low_high[axis], low);
     if (high > low_high[3 + axis]) atomicMax(&low_high[3 + axis], high);
@@ -502,14 +502,13 @@ void run_step_pass(const StepPass& pass, cudaStream_t stream) {
   TETWARP_CUDA_TRY(cudaGetLastError());
 }
 
-void pack_steps(const StepPass& pass, cudaStream_t stream) {
+void pack_in_place(const StepPass& pass, cudaStream_t stream) {
   const std::int64_t vertices = std::int64_t{pass.lattice.slice} * (pass.lattice.cells.z + 1);
   const FloatSnap fast(pass.frame, pass.lattice);
   const auto kernel = fast.is_exact() ? pack_kernel<true> : pack_kernel<false>;
-  const bool in_place = static_cast<const void*>(pass.packed) == pass.displacement;
   for (std::int64_t begin = 0, end; begin < vertices; begin = end) {
-    // In place, each piece is packed over displacements that were packed before; the first by one thread block.
-    end = in_place ? std::min(std::max(begin + begin / 2, std::int64_t{kThreads}), vertices) : vertices;
+    // Each piece is packed over displacements that were packed before; the first by one thread block.
+    end = std::min(std::max(begin + begin / 2, std::int64_t{kThreads}), vertices);
     kernel<<<blocks_for(end - begin), kThreads, 0, stream>>>(pass, fast, begin, end);
   }
   TETWARP_CUDA_TRY(cudaGetLastError());

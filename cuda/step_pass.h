@@ -20,8 +20,8 @@ struct StepPass {
 /// inverted and what moves.
 void run_step_pass(const StepPass& pass, cudaStream_t stream);
 
-/// Packs alone; `packed` may be where the displacements are.
-void pack_steps(const StepPass& pass, cudaStream_t stream);
+/// Packs the vertices of a lattice that `run_step_pass` has looked at into where their displacements are.
+void pack_in_place(const StepPass& pass, cudaStream_t stream);
 
 /// Least and most that vertices move along i, j, k, 2^-12 voxel. @param low_high  grown
 void find_range(const StepPass& pass, int* low_high, cudaStream_t stream);

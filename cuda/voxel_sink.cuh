@@ -54,7 +54,6 @@ __device__ void VoxelSink<V>::start(int, const glm::ivec3& voxel, const glm::vec
   const auto on_axis = [](int voxel, float moved, int& base, float& fraction) {
     const float whole = __fmaf_rd(moved, -kVoxelsPerStep, kToWhole);
     base = voxel + (__float_as_int(whole) - __float_as_int(kToWhole));
-    // It may be rounded to 1, where u is negative and small: a + 1 (b - a) is b.
     fraction = fmaf(moved, -kVoxelsPerStep, kToWhole - whole);
   };
   glm::ivec3 base;
@@ -62,7 +61,10 @@ __device__ void VoxelSink<V>::start(int, const glm::ivec3& voxel, const glm::vec
   on_axis(voxel.y, moved.y, base.y, pending.fraction.y);
   on_axis(voxel.z, moved.z, base.z, pending.fraction.z);
   const auto is_below = [](int index, int end) { return static_cast<unsigned>(index) < static_cast<unsigned>(end); };
-  pending.any = wanted & is_below(base.x, last.x) & is_below(base.y, last.y) & is_below(base.z, last.z);
+  // A negative u that is small gives a fraction that is rounded to 1. Along x, between whole numbers, a + 1 (b - a) is
+  // b; along y and z it need not be, so that the place must be carried to the next voxel.
+  pending.any = wanted & is_below(base.x, last.x) & is_below(base.y, last.y) & is_below(base.z, last.z) &
+                (fmaxf(pending.fraction.y, pending.fraction.z) < 1.0f);
   if (pending.any) read_corners(source + (base.z * slice + base.y * row + base.x), 1, row, slice, pending.corners);
 }
 

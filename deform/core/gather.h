@@ -93,18 +93,22 @@ TETWARP_HD inline float error_bound(float product, float faces, float r) {
   return (9.0f * kUnit) * product + (15.0f * kUnit) * (r * faces);
 }
 
+/// |d|: (15 + 7 + 4) / 16 steps.
+constexpr float kNudgeNorm = 1.625f;
+
 /// The same over s^2, from the sum s of the three norms and |r|: P is at most s^3 / 27, and the sum of products of two
-/// norms at most s^2 / 3. |d| is (15 + 7 + 4) / 16 steps.
+/// norms at most s^2 / 3.
 TETWARP_HD inline float error_factor(float s, float r) {
-  return multiply_add(s, kUnit / 3, multiply_add(r, 5 * kUnit, 32.5f * kUnit));
+  return multiply_add(s, kUnit / 3, multiply_add(r, 5 * kUnit, 5 * kNudgeNorm * kUnit));
 }
 
-/// Likewise for all r. Where the weights are positive, r is no longer than the longest column, and so than s; where the
-/// determinant is above both of the next, the weights that this is asked about are off by so little that it is so.
-TETWARP_HD inline float error_factor(float s) { return multiply_add(s, 6 * kUnit, 32.5f * kUnit); }
+/// Likewise for any r, where the voxel is found to lie inside and the determinant is above kThinSum s^3 and
+/// kSlackSum s^2. Then its weights are wrong by less than 0.3 %, and |r| is at most the longest norm by the weights, so
+/// less than 1.01 s; 6 is more than 1/3 + 5 * 1.01.
+TETWARP_HD inline float error_factor(float s) { return multiply_add(s, 6 * kUnit, 5 * kNudgeNorm * kUnit); }
 
-/// A determinant above kThinSum s^3 is not thin; above kSlackSum s^2, no weight moves by more than the slack between
-/// the nudged point and the voxel.
+/// A determinant above kThinSum s^3 is not thin: P is at most s^3 / 27, here 26. Above kSlackSum s^2, no weight moves
+/// by more than the slack between the nudged point and the voxel: 15/16 step times s^2 / 3 over 1/64 is 20 s^2.
 constexpr float kThinSum = kThin / 26, kSlackSum = 22;
 
 /// x, negated where an odd number of the signs `to` (+1 or -1) are negative.
@@ -318,7 +322,8 @@ TETWARP_HD void visit_tetrahedron(const StepLattice& lattice, const LatticeTetra
                     qb = detail::nudged(detail::dot(r, m.ca), d, m.ca),
                     qc = detail::nudged(detail::dot(r, m.ab), d, m.ab), qd = ((m.det - qa) - qb) - qc;
         const float least = std::fmin(std::fmin(qa * turn, qb * turn), std::fmin(qc * turn, qd * turn));
-        const float error = detail::error_bound((la * lb) * lc, lb * lc + la * (lb + lc), detail::norm1(r) + 6.5f);
+        const float error =
+            detail::error_bound((la * lb) * lc, lb * lc + la * (lb + lc), detail::norm1(r) + detail::kNudgeNorm);
         if (least < -error && detail::magnitude(m.det) > error) continue;
         int sides[4];
         if (least > error || owns_exactly(vertices_of(lattice, t), steps, signs, sides)) visit(voxel);

@@ -18,20 +18,35 @@ class StepPacking {
   static constexpr int kMostBits = 23;  ///< of one axis
 
   /// From -256 to below 256 voxels along x and y, twice that along z.
-  StepPacking() : StepPacking({-(1 << 20), -(1 << 20), -(1 << 21)}, {21, 21}) {}
+  StepPacking()
+      : StepPacking({-(1 << (kDefaultBits[0] - 1)), -(1 << (kDefaultBits[1] - 1)), -(1 << (kDefaultBits[2] - 1))},
+                    {kDefaultBits[0], kDefaultBits[1]}) {}
 
-  /// What holds all from `low` to `high`, 2^-12 voxel, and whatever is rounded to these, before it is; none where 64
-  /// bits are too few.
+  /// What holds all from `low` to `high`, 2^-12 voxel; none where that takes more than 23 bits on an axis, or 64 in
+  /// all.
+  ///
+  /// Room is left below and above: for the next field of a sequence, and because before it is rounded a number may be
+  /// half a step lower, and floats below 2^23 have halves.
   static std::optional<StepPacking> holding(const glm::ivec3& low, const glm::ivec3& high) {
-    glm::ivec3 least(0), bits(0);
+    glm::ivec3 bits(0);
+    bool by_default = true;
     for (int axis = 0; axis < 3; ++axis) {
-      least[axis] = (low[axis] - 2) & ~1;  // even, so that ties are rounded alike; and above it all are whole
-      bits[axis] = std::bit_width(static_cast<unsigned>(high[axis] - least[axis]));
-      if (bits[axis] > kMostBits || least[axis] < -(1 << kMostBits)) return std::nullopt;
+      if (low[axis] < kFarthest + 4 || high[axis] > -kFarthest - 4) return std::nullopt;
+      bits[axis] = std::bit_width(static_cast<unsigned>(high[axis] - low[axis] + 4));
+      if (bits[axis] > kMostBits) return std::nullopt;
+      const int most = 1 << (kDefaultBits[axis] - 1);
+      by_default = by_default && low[axis] >= 4 - most && high[axis] < most - 4;
     }
+    if (by_default) return StepPacking();
     if (bits.x + bits.y + bits.z > 64) return std::nullopt;
     bits.x = std::max(bits.x, 64 - 2 * kMostBits);
     bits.y = std::max(bits.y, 64 - kMostBits - bits.x);
+    bits.z = 64 - bits.x - bits.y;
+    glm::ivec3 least(0);
+    for (int axis = 0; axis < 3; ++axis) {
+      const int room = (1 << bits[axis]) - (high[axis] - low[axis]);  // at least 4
+      least[axis] = std::max(low[axis] - room / 2, kFarthest) & ~1;   // even, so that ties are rounded alike
+    }
     return StepPacking(least, {bits.x, bits.y});
   }
 
@@ -57,6 +72,8 @@ class StepPacking {
 
  private:
   static constexpr std::uint32_t kTwoTo23 = 0x4B000000;  ///< the bits of 2^23
+  static constexpr int kDefaultBits[3] = {21, 21, 22};
+  static constexpr int kFarthest = -(1 << kMostBits);  ///< least number that can be held
 
   StepPacking(const glm::ivec3& least, const glm::ivec2& bits)
       : y_at_(bits.x),
@@ -108,7 +125,7 @@ struct StepLattice {
   TETWARP_HD glm::vec3 raised(std::int64_t offset) const { return packing.raised(packed[offset]); }
   TETWARP_HD Vertex vertex(const glm::ivec3& at) const {
     const glm::vec3 rest = first + glm::vec3(at) * cell, by = moved(offset(at));
-    return {glm::ivec3(rest + by), glm::ivec3(-by)};
+    return {glm::ivec3(rest) + glm::ivec3(by), glm::ivec3(-by)};
   }
   /// The deformed place of a vertex alone.
   TETWARP_HD glm::i32vec3 deformed(const glm::ivec3& at) const {

@@ -123,6 +123,35 @@ TEST_F(GatherPaths, FingersBesideALatticeAtRest) {
   }
 }
 
+/// Undeformed places a little before a voxel, whose fraction is rounded to 1, between voxels of very different values.
+template <class V>
+void expect_same_before_voxels() {
+  const Geometry grid = unit_grid({40, 40, 40});
+  Random random(test_seed(), 1100);
+  const auto steps = [&](const glm::dvec3&) {
+    return glm::dvec3(2047 + random.integer(-8, 8), random.integer(0, 1), random.integer(0, 1)) * (1.0 / 4096);
+  };
+  const FieldCase test{grid, field_in_voxels(grid, lattice_over(grid, 1), steps), "steps", {}};
+  Volume<V> source{grid, {}};
+  for (std::int64_t n = 0; n < voxel_count(grid); ++n) {
+    const std::int64_t high = std::numeric_limits<V>::max(), low = std::numeric_limits<V>::lowest();
+    source.voxels.push_back(
+        static_cast<V>(n / 40 % 2 == 0 ? random.integer(low, low + 1) : random.integer(high - high / 12, high)));
+  }
+  const auto cpu = make_cpu_resampler(grid), cuda = make_cuda_resampler(grid);
+  const auto expected = run_on<V>(*cpu, test, source, whole(grid), Wanted::volume);
+  const auto found = run_on<V>(*cuda, test, source, whole(grid), Wanted::volume);
+  EXPECT_GT(found.report.paths.gathered, 60000u);
+  EXPECT_TRUE(same_bits(expected.output.voxels, found.output.voxels));
+}
+
+TEST_F(GatherPaths, PlacesJustBeforeAVoxel) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  expect_same_before_voxels<std::uint8_t>();
+  expect_same_before_voxels<std::int16_t>();
+  expect_same_before_voxels<std::uint16_t>();
+}
+
 /// Vertices are packed into 8 bytes: in halves of what they hold at first, in other parts, and not at all.
 TEST_F(GatherPaths, FieldsThatMoveFar) {
   SCOPED_TRACE(seed_text(test_seed()));

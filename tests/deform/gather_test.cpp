@@ -96,6 +96,20 @@ TEST(StepPacking, HoldsWhatItIsMadeFor) {
   EXPECT_FALSE(StepPacking::holding(glm::ivec3(0), glm::ivec3((1 << 22) - 1)).has_value());
 }
 
+TEST(StepLattice, AVertexMayGoFurtherThanFloatsAreWhole) {
+  StepLattice lattice;
+  lattice.cells = {4094, 1, 1};
+  lattice.cell = glm::vec3(kStepsPerVoxel);
+  lattice.row = 4095;
+  lattice.slice = 2 * lattice.row;
+  std::vector<std::uint64_t> packed(static_cast<std::size_t>(2 * lattice.slice));
+  packed[4094] = lattice.packing.pack(lattice.packing.lift() + glm::vec3(819201, 0, 0));
+  lattice.packed = packed.data();
+  const int expected = 4094 * kStepsPerVoxel + 819201;  // odd, above 2^24
+  EXPECT_EQ(lattice.vertex({4094, 0, 0}).deformed.x, expected);
+  EXPECT_EQ(lattice.deformed({4094, 0, 0}).x, expected);
+}
+
 TEST(StepLattice, NamesTheTetrahedraOfEveryCellWithTheirCorners) {
   for (int n = 0; n < 64; ++n) {
     const glm::ivec3 cell(n & 3, n >> 2 & 3, n >> 4);
