@@ -63,11 +63,13 @@ class ForwardResampler final : public Resampler {
     require(ready_, "resample needs a field: call set_field first");
     const std::vector<TargetSampler> samplers = make_samplers(*this, targets, region);
     const MapWriter writer(maps, output(), region);
+    const bool may_copy = !writer.wants_jacobian() && !writer.wants_owners();
     Report report = for_each_tile<Tile>(arena_, region, control, [&](const Region& box, Tile& tile) {
+      if (may_copy && rests(box)) return copy(box, tile, samplers, writer);
       claim(box, tile, writer);
       return gather(box, tile, samplers, writer);
     });
-    report.paths.claimed = static_cast<std::uint64_t>(voxel_count(region));
+    report.paths.claimed = static_cast<std::uint64_t>(voxel_count(region)) - report.paths.gathered;
     const FieldStatistics& statistics = lattice_.statistics();
     report.inverted = statistics.inverted;
     report.degenerate = statistics.degenerate;
@@ -78,6 +80,37 @@ class ForwardResampler final : public Resampler {
   }
 
  private:
+  /// Whether a tile lies within the undeformed lattice, and all that may reach it rests: then each voxel is owned by a
+  /// cell at rest, and by no other.
+  bool rests(const Region& box) const {
+    const StepLattice& steps = lattice_.steps();
+    if (steps.cells.x == 0) return false;
+    for (int axis = 0; axis < 3; ++axis) {  // exact, in 2^-12 voxel
+      const float from = static_cast<float>(box.begin[axis] * kStepsPerVoxel) - steps.first[axis],
+                  to = static_cast<float>((box.end[axis] - 1) * kStepsPerVoxel) - steps.first[axis];
+      if (from < 0 || to > static_cast<float>(steps.cells[axis]) * steps.cell[axis]) return false;
+    }
+    bool all = true;
+    lattice_.find_blocks(box, [&](std::size_t block) { all = all && lattice_.rests(block); });
+    return all;
+  }
+
+  Report copy(const Region& box, Tile& tile, const std::vector<TargetSampler>& samplers, const MapWriter& maps) const {
+    Report report;
+    report.paths.gathered = static_cast<std::uint64_t>(voxel_count(box));
+    const auto width = static_cast<int>(box.end.x - box.begin.x);
+    const glm::vec3 offset[kTile] = {};
+    std::fill_n(tile.mapped, width, std::uint8_t{1});
+    for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {
+      for (std::int64_t y = box.begin.y; y < box.end.y; ++y) {
+        const Row row{{box.begin.x, y, z}, width, tile.mapped, offset, true};
+        sample_targets(row, samplers, tile.coverage, report);
+        maps.write(row, tile.coverage, nullptr, nullptr);
+      }
+    }
+    return report;
+  }
+
   void claim(const Region& box, Tile& tile, const MapWriter& maps) const {
     tile.reset(static_cast<std::size_t>(voxel_count(box)), maps);
     const glm::i64vec3 size = box.end - box.begin;

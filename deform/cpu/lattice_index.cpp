@@ -31,6 +31,63 @@ void FieldStatistics::add_cells(const LatticeBlock& block) {
   }
 }
 
+namespace {
+
+/// Six times the signed volumes of the tetrahedra of even and odd cells of a lattice at rest at whole steps.
+void rest_volumes(const StepLattice& steps, float (&volumes)[2][kTetrahedraPerCell]) {
+  for (int odd = 0; odd < 2; ++odd) {
+    for (int number = 0; number < kTetrahedraPerCell; ++number) {
+      const TetrahedronCorners t = tetrahedron_corners(number, odd != 0);
+      const auto edge = [&](int corner) {
+        const auto at = [](int c) { return glm::vec3(c & 1, c >> 1 & 1, c >> 2); };
+        return (at(corner) - at(t.d)) * steps.cell;
+      };
+      volumes[odd][number] = detail::edge_determinant(edge(t.a), edge(t.b), edge(t.c));
+    }
+  }
+}
+
+}  // namespace
+
+void FieldStatistics::add_regular_cells(const LatticeBlock& block, const StepLattice& steps) {
+  float rest[2][kTetrahedraPerCell];
+  rest_volumes(steps, rest);
+  const int row = block.cells.x + 1, slice = row * (block.cells.y + 1), vertices = slice * (block.cells.z + 1);
+  glm::vec3 moved[LatticeBlock::kMostVertices * LatticeBlock::kMostVertices * LatticeBlock::kMostVertices];
+  for (int n = 0; n < vertices; ++n) moved[n] = glm::vec3(block.vertices[n].deformed - block.vertices[0].deformed);
+  struct Offsets {
+    int a, b, c, d;
+  } corners[2][kTetrahedraPerCell];
+  for (int odd = 0; odd < 2; ++odd) {
+    for (int number = 0; number < kTetrahedraPerCell; ++number) {
+      const TetrahedronCorners t = tetrahedron_corners(number, odd != 0);
+      const auto offset = [&](int c) { return (c & 1) + (c >> 1 & 1) * row + (c >> 2) * slice; };
+      corners[odd][number] = {offset(t.a), offset(t.b), offset(t.c), offset(t.d)};
+    }
+  }
+  float least = INFINITY, most = -INFINITY;
+  for (int z = 0; z < block.cells.z; ++z) {
+    for (int y = 0; y < block.cells.y; ++y) {
+      const glm::vec3* first = moved + z * slice + y * row;
+      for (int x = 0; x < block.cells.x; ++x, ++first) {
+        const int odd = block.is_odd({x, y, z});
+        for (int number = 0; number < kTetrahedraPerCell; ++number) {
+          const Offsets& at = corners[odd][number];
+          const glm::vec3 d = first[at.d];
+          const float jacobian =
+              detail::edge_determinant(first[at.a] - d, first[at.b] - d, first[at.c] - d) / rest[odd][number] + 0.0f;
+          inverted += jacobian < 0;
+          degenerate += jacobian == 0;
+          least = std::min(least, jacobian);
+          most = std::max(most, jacobian);
+        }
+      }
+    }
+  }
+  jacobian_min = std::min(jacobian_min, double{least});
+  jacobian_max = std::max(jacobian_max, double{most});
+}
+
 void FieldStatistics::add(const FieldStatistics& other) {
   inverted += other.inverted;
   degenerate += other.degenerate;
@@ -63,6 +120,7 @@ bool LatticeIndex::reaches(const Box& box, const Region& region) {
 void LatticeIndex::build(const Geometry& output, const FieldView& field, const Control& control) {
   field_ = field;
   frame_ = make_lattice_frame(output, field);
+  steps_ = make_step_lattice(frame_, output);
 
   const double cell_voxels =
       std::min({glm::length(frame_.output_from_lattice.linear[0]), glm::length(frame_.output_from_lattice.linear[1]),
@@ -71,6 +129,7 @@ void LatticeIndex::build(const Geometry& output, const FieldView& field, const C
       std::clamp<std::int64_t>(static_cast<std::int64_t>(Block::kMostCells / cell_voxels), 1, Block::kMostCells);
   blocks_ = (frame_.cells + (cells_per_block_ - 1)) / cells_per_block_;
   groups_ = (blocks_ + (kGroup - 1)) / kGroup;
+  resting_.assign(static_cast<std::size_t>(blocks_.x * blocks_.y * blocks_.z), 0);
   boxes_.resize(static_cast<std::size_t>(blocks_.x * blocks_.y * blocks_.z));
   group_boxes_.resize(static_cast<std::size_t>(groups_.x * groups_.y * groups_.z));
 
@@ -108,20 +167,36 @@ void LatticeIndex::load(std::size_t block, Block& into) const {
 void LatticeIndex::scan_block(std::size_t number, Block& block, FieldStatistics& statistics) {
   load(number, block);
   const Vertex& first = block.vertices[0];
-  Box box{first.deformed, first.deformed}, rest{first.deformed + first.u, first.deformed + first.u};
+  Box box{first.deformed, first.deformed};
   const int vertices = (block.cells.x + 1) * (block.cells.y + 1) * (block.cells.z + 1);
-  for (int n = 1; n < vertices; ++n) {
-    const Vertex& vertex = block.vertices[n];
-    box.grow(vertex.deformed);
-    rest.grow(vertex.deformed + vertex.u);
-  }
+  for (int n = 1; n < vertices; ++n) box.grow(block.vertices[n].deformed);
   boxes_[number] = box;
+  const bool regular = is_regular(block);
   if (block.at_rest) {
+    resting_[number] = regular;
     statistics.jacobian_min = std::min(statistics.jacobian_min, 1.0);
     statistics.jacobian_max = std::max(statistics.jacobian_max, 1.0);
-    return;
+  } else if (regular && reach_of(box) < std::int64_t{1} << 23) {  // so that edges are whole numbers in float
+    statistics.add_regular_cells(block, steps_);
+  } else {
+    statistics.add_cells(block);
   }
-  statistics.add_cells(block);
+}
+
+/// Whether the undeformed vertices of a block are snapped to where `steps` has them.
+bool LatticeIndex::is_regular(const Block& block) const {
+  if (steps_.cells.x == 0) return false;
+  const glm::i32vec3 first = glm::i32vec3(steps_.first) + glm::i32vec3(block.first_cell) * glm::i32vec3(steps_.cell),
+                     cell(steps_.cell);
+  const Vertex* vertex = block.vertices;
+  bool regular = true;
+  for (int z = 0; z <= block.cells.z; ++z) {
+    for (int y = 0; y <= block.cells.y; ++y) {
+      for (int x = 0; x <= block.cells.x; ++x, ++vertex)
+        regular &= vertex->deformed + vertex->u == first + glm::i32vec3(x, y, z) * cell;
+    }
+  }
+  return regular;
 }
 
 void LatticeIndex::group_boxes() {

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "deform/core/lattice_vertex.h"
+#include "deform/core/step_lattice.h"
 #include "deform/core/visit_cell.h"
 #include "deform/resampler.h"
 
@@ -32,6 +33,8 @@ struct FieldStatistics {
   void add(const FieldStatistics& other);
   /// Counts the tetrahedra of a block.
   void add_cells(const LatticeBlock& block);
+  /// The same where the undeformed vertices are those of `steps`, and edges are whole numbers in float.
+  void add_regular_cells(const LatticeBlock& block, const StepLattice& steps);
 };
 
 /// The vertices of a field, snapped on demand, and boxes by which to find the cells that may reach a part of the
@@ -70,6 +73,10 @@ class LatticeIndex {
   }
 
   void load(std::size_t block, Block& into) const;
+  /// Whether every vertex of a block rests, and at the whole step where `steps` has it.
+  bool rests(std::size_t block) const { return resting_[block] != 0; }
+  /// The lattice, where its undeformed vertices lie at whole steps; else no cells.
+  const StepLattice& steps() const { return steps_; }
   /// Grows a box in continuous output index to hold every undeformed place that a block's tetrahedra can give, weights
   /// that leave [0, 1] by the slack included.
   void rest_box(std::size_t block, glm::dvec3* low, glm::dvec3* high) const;
@@ -80,6 +87,7 @@ class LatticeIndex {
   static bool reaches(const Box& box, const Region& region);
   static glm::i64vec3 unravel(std::size_t number, const glm::i64vec3& size);
   void scan_block(std::size_t block, Block& scratch, FieldStatistics& statistics);
+  bool is_regular(const Block& block) const;
   void group_boxes();
 
   FieldView field_;
@@ -87,6 +95,8 @@ class LatticeIndex {
   glm::i64vec3 blocks_{0}, groups_{0};
   std::int64_t cells_per_block_ = Block::kMostCells;
   std::vector<Box> boxes_, group_boxes_;
+  std::vector<std::uint8_t> resting_;
+  StepLattice steps_;
   FieldStatistics statistics_;
 };
 

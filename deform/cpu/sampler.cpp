@@ -3,9 +3,16 @@
 #include <algorithm>
 #include <atomic>
 
+#include "deform/cpu/linear_row.h"
 #include "deform/target_check.h"
 
 namespace tetwarp::cpu {
+
+namespace {
+
+constexpr int kMostInRow = 64;  ///< voxels that are sampled together; tiles have fewer
+
+}  // namespace
 
 std::vector<TargetSampler> make_samplers(const Resampler& resampler, std::span<const Target> targets,
                                          const Region& region) {
@@ -60,12 +67,10 @@ void TargetSampler::note_slices(std::int64_t slice, const SliceRange& sampled) c
 }
 
 template <class V, Interpolation kInterpolation>
-void TargetSampler::sample_row(const TargetSampler& self, const Row& row, std::uint8_t* coverage, Report& counts) {
-  const Target& target = self.target_;
-  const SamplePlan<V> plan = plan_target(target, self.relation_, reinterpret_cast<const V*>(target.source.voxels));
-  V* output = reinterpret_cast<V*>(target.output.voxels) + buffer_index(target.output, row.voxel);
-  SliceRange sampled;
+void TargetSampler::sample_voxels(const SamplePlan<V>& plan, const Row& row, const RowState* state, V* output,
+                                  std::uint8_t* coverage, Report& counts, SliceRange& sampled) const {
   for (int i = 0; i < row.count; ++i) {
+    if (state && state[i] != RowState::left) continue;
     const SampledVoxel<V> voxel =
         sample_voxel<V, kInterpolation>(plan, row.voxel + glm::i64vec3(i, 0, 0), row.mapped[i] != 0, row.offset[i]);
     output[i] = voxel.value;
@@ -78,6 +83,47 @@ void TargetSampler::sample_row(const TargetSampler& self, const Row& row, std::u
       sampled.first = std::min(sampled.first, voxel.first_slice);
       sampled.last = std::max(sampled.last, voxel.last_slice);
     }
+  }
+}
+
+template <class V>
+bool TargetSampler::copy_row(const SamplePlan<V>& plan, const Row& row, V* output, std::uint8_t* coverage,
+                             Report& counts) const {
+  const glm::i64vec3& size = plan.source.size;
+  const glm::i64vec3 last = row.voxel + glm::i64vec3(row.count - 1, 0, 0);
+  if (!plan.relation.same_grid || plan.padding.present || last.x >= size.x || last.y >= size.y || last.z >= size.z)
+    return false;
+  const glm::i64vec3 in = row.voxel - plan.source.begin;
+  std::copy_n(plan.source.voxels + (in.z * plan.source.stride.z + in.y * plan.source.stride.y + in.x), row.count,
+              output);
+  if (coverage) std::fill_n(coverage, row.count, std::uint8_t{1});
+  counts.covered += static_cast<std::uint64_t>(row.count);
+  return true;
+}
+
+template <class V, Interpolation kInterpolation>
+void TargetSampler::sample_row(const TargetSampler& self, const Row& row, std::uint8_t* coverage, Report& counts) {
+  const Target& target = self.target_;
+  const SamplePlan<V> plan = plan_target(target, self.relation_, reinterpret_cast<const V*>(target.source.voxels));
+  V* output = reinterpret_cast<V*>(target.output.voxels) + buffer_index(target.output, row.voxel);
+  SliceRange sampled;
+  if (row.at_rest && self.copy_row(plan, row, output, coverage, counts)) {
+    sampled = {row.voxel.z, row.voxel.z};
+  } else if constexpr (kInterpolation == Interpolation::linear && kHasLinearRow<V>) {
+    LinearSource<V> source;
+    RowState state[kMostInRow];
+    if (row.count <= kMostInRow && LinearSource<V>::make(plan, voxel_count(target.source.buffered), source)) {
+      sampled = sample_linear_row(source, row, output, state);
+      const auto done = std::count(state, state + row.count, RowState::sampled);
+      counts.covered += static_cast<std::uint64_t>(done);
+      if (coverage)
+        std::transform(state, state + row.count, coverage, [](RowState s) { return s == RowState::sampled; });
+      if (done != row.count) self.sample_voxels<V, kInterpolation>(plan, row, state, output, coverage, counts, sampled);
+    } else {
+      self.sample_voxels<V, kInterpolation>(plan, row, nullptr, output, coverage, counts, sampled);
+    }
+  } else {
+    self.sample_voxels<V, kInterpolation>(plan, row, nullptr, output, coverage, counts, sampled);
   }
   if (!target.sampled_slices.empty()) self.note_slices(row.voxel.z, sampled);
 }

@@ -4,9 +4,12 @@
 #include <span>
 #include <vector>
 
+#include "deform/core/sample_voxel.h"
 #include "deform/target_check.h"
 
 namespace tetwarp::cpu {
+
+enum class RowState : std::uint8_t;  // linear_row.h
 
 /// A run of output voxels along i and what the field says of each.
 struct Row {
@@ -14,6 +17,7 @@ struct Row {
   int count;
   const std::uint8_t* mapped;  ///< 1: comes from `voxel + offset`; 0: nothing maps there
   const glm::vec3* offset;     ///< undeformed minus deformed, voxels of output index
+  bool at_rest = false;        ///< all are mapped, with an offset of zero
 };
 
 /// Samples one source at the undeformed places of rows. Its source may be on any grid.
@@ -30,8 +34,15 @@ class TargetSampler {
 
   template <class V>
   static Function choose(Interpolation interpolation);
+  /// One voxel after the other: all, or where `state` is not null those that are left.
+  template <class V, Interpolation kInterpolation>
+  void sample_voxels(const SamplePlan<V>& plan, const Row& row, const RowState* state, V* output,
+                     std::uint8_t* coverage, Report& counts, SliceRange& sampled) const;
   template <class V, Interpolation kInterpolation>
   static void sample_row(const TargetSampler& self, const Row& row, std::uint8_t* coverage, Report& counts);
+  /// A row that stays where it is. @return false where it must be sampled
+  template <class V>
+  bool copy_row(const SamplePlan<V>& plan, const Row& row, V* output, std::uint8_t* coverage, Report& counts) const;
   void note_slices(std::int64_t slice, const SliceRange& sampled) const;
 
   Target target_;

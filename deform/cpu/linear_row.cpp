@@ -1,0 +1,160 @@
+#include "deform/cpu/linear_row.h"
+
+#include <algorithm>
+
+// Compiled once for each instruction set.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "deform/cpu/linear_row.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+
+namespace tetwarp::cpu::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Floats = hn::ScalableTag<float>;
+using Ints = hn::RebindToSigned<Floats>;
+using Float = hn::Vec<Floats>;
+using Int = hn::Vec<Ints>;
+
+/// Two voxels side by side, from the 32 bits that begin with the first.
+template <class V>
+struct Voxels {
+  static constexpr int kBits = 8 * sizeof(V);
+
+  static HWY_INLINE Float low(Int bits) {
+    const Int up = hn::ShiftLeft<32 - kBits>(bits);
+    return to_float(up);
+  }
+  static HWY_INLINE Float high(Int bits) { return to_float(hn::ShiftLeft<32 - 2 * kBits>(bits)); }
+
+ private:
+  /// The topmost bits, as V.
+  static HWY_INLINE Float to_float(Int up) {
+    const hn::RebindToUnsigned<Ints> du;
+    const Int value = std::is_signed_v<V> ? hn::ShiftRight<32 - kBits>(up)
+                                          : hn::BitCast(Ints(), hn::ShiftRight<32 - kBits>(hn::BitCast(du, up)));
+    return hn::ConvertTo(Floats(), value);
+  }
+};
+
+/// Where a voxel comes from along one axis.
+struct Axis {
+  Int base;
+  Float fraction;
+  hn::Mask<Ints> inside;
+
+  HWY_INLINE Axis(Float offset, Int voxel, std::int32_t last) {
+    const Float whole = hn::Floor(offset);
+    fraction = hn::Sub(offset, whole);
+    base = hn::Add(voxel, hn::ConvertTo(Ints(), whole));
+    inside = hn::And(hn::And(hn::Gt(base, hn::Set(Ints(), -1)), hn::Lt(base, hn::Set(Ints(), last))),
+                     hn::RebindMask(Ints(), hn::Lt(fraction, hn::Set(Floats(), 1.0f))));
+  }
+};
+
+HWY_INLINE Float mix(Float a, Float b, Float t) { return hn::Add(a, hn::Mul(t, hn::Sub(b, a))); }
+
+template <class V>
+SliceRange sample(const LinearSource<V>& source, const Row& row, V* output, RowState* state) {
+  const Floats df;
+  const Ints di;
+  const hn::Rebind<std::uint8_t, Floats> d8;
+  const hn::Rebind<V, Floats> dv;
+  const auto lanes = static_cast<int>(hn::Lanes(df));
+  const auto* bytes = reinterpret_cast<const std::int32_t*>(source.voxels);
+  const Int stride_row = hn::Set(di, source.row), stride_slice = hn::Set(di, source.slice);
+  // Of the buffer's first voxel. Numbers may wrap around: their differences fit.
+  const auto begin = static_cast<std::int32_t>(std::int64_t{source.begin.z} * source.slice +
+                                               std::int64_t{source.begin.y} * source.row + source.begin.x);
+  const glm::ivec3 first(row.voxel);
+  Int least = hn::Set(di, INT32_MAX), most = hn::Set(di, INT32_MIN);
+  int i = 0;
+  for (; i + lanes <= row.count; i += lanes) {
+    Float ux, uy, uz;
+    hn::LoadInterleaved3(df, &row.offset[i].x, ux, uy, uz);
+    const Axis x(ux, hn::Iota(di, first.x + i), source.last.x), y(uy, hn::Set(di, first.y), source.last.y),
+        z(uz, hn::Set(di, first.z), source.last.z);
+    const Int at = hn::Sub(hn::Add(hn::Add(hn::Mul(z.base, stride_slice), hn::Mul(y.base, stride_row)), x.base),
+                           hn::Set(di, begin));
+    const auto mapped = hn::Gt(hn::PromoteTo(di, hn::LoadU(d8, row.mapped + i)), hn::Zero(di));
+    auto good = hn::And(hn::And(mapped, x.inside), hn::And(y.inside, z.inside));
+    if (sizeof(V) == 1) {  // four voxels are read for two: not at the buffer's end
+      const Int last = hn::Set(di, source.voxel_count - 3 - source.slice - source.row);
+      good = hn::And(good, hn::Lt(at, last));
+    }
+    const Int offset = hn::ShiftLeft<sizeof(V) - 1>(hn::IfThenElseZero(good, at));
+    const Int step_y = hn::ShiftLeft<sizeof(V) - 1>(hn::IfThenElseZero(good, stride_row)),
+              step_z = hn::ShiftLeft<sizeof(V) - 1>(hn::IfThenElseZero(good, stride_slice));
+    const auto along_x = [&](Int from) {
+      const Int bits = hn::GatherOffset(di, bytes, from);
+      return mix(Voxels<V>::low(bits), Voxels<V>::high(bits), x.fraction);
+    };
+    const auto along_y = [&](Int from) { return mix(along_x(from), along_x(hn::Add(from, step_y)), y.fraction); };
+    const Float value = mix(along_y(offset), along_y(hn::Add(offset, step_z)), z.fraction);
+    hn::StoreU(hn::DemoteTo(dv, hn::NearestInt(value)), dv, output + i);
+    hn::StoreU(hn::DemoteTo(d8, hn::IfThenElse(good, hn::Set(di, 1), hn::Set(di, 2))), d8,
+               reinterpret_cast<std::uint8_t*>(state) + i);
+    const auto between = hn::RebindMask(di, hn::Ne(z.fraction, hn::Zero(df)));
+    const Int top = hn::Add(z.base, hn::IfThenElseZero(between, hn::Set(di, 1)));
+    least = hn::Min(least, hn::IfThenElse(good, z.base, hn::Set(di, INT32_MAX)));
+    most = hn::Max(most, hn::IfThenElse(good, top, hn::Set(di, INT32_MIN)));
+  }
+  std::fill(state + i, state + row.count, RowState::left);
+  const std::int32_t low = hn::GetLane(hn::MinOfLanes(di, least)), high = hn::GetLane(hn::MaxOfLanes(di, most));
+  return low > high ? SliceRange{} : SliceRange{low, high};
+}
+
+SliceRange sample_u8(const LinearSource<std::uint8_t>& source, const Row& row, std::uint8_t* output, RowState* state) {
+  return sample(source, row, output, state);
+}
+SliceRange sample_i8(const LinearSource<std::int8_t>& source, const Row& row, std::int8_t* output, RowState* state) {
+  return sample(source, row, output, state);
+}
+SliceRange sample_u16(const LinearSource<std::uint16_t>& source, const Row& row, std::uint16_t* output,
+                      RowState* state) {
+  return sample(source, row, output, state);
+}
+SliceRange sample_i16(const LinearSource<std::int16_t>& source, const Row& row, std::int16_t* output, RowState* state) {
+  return sample(source, row, output, state);
+}
+
+}  // namespace tetwarp::cpu::HWY_NAMESPACE
+
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+
+namespace tetwarp::cpu {
+
+HWY_EXPORT(sample_u8);
+HWY_EXPORT(sample_i8);
+HWY_EXPORT(sample_u16);
+HWY_EXPORT(sample_i16);
+
+template <>
+SliceRange sample_linear_row(const LinearSource<std::uint8_t>& source, const Row& row, std::uint8_t* output,
+                             RowState* state) {
+  return HWY_DYNAMIC_DISPATCH(sample_u8)(source, row, output, state);
+}
+template <>
+SliceRange sample_linear_row(const LinearSource<std::int8_t>& source, const Row& row, std::int8_t* output,
+                             RowState* state) {
+  return HWY_DYNAMIC_DISPATCH(sample_i8)(source, row, output, state);
+}
+template <>
+SliceRange sample_linear_row(const LinearSource<std::uint16_t>& source, const Row& row, std::uint16_t* output,
+                             RowState* state) {
+  return HWY_DYNAMIC_DISPATCH(sample_u16)(source, row, output, state);
+}
+template <>
+SliceRange sample_linear_row(const LinearSource<std::int16_t>& source, const Row& row, std::int16_t* output,
+                             RowState* state) {
+  return HWY_DYNAMIC_DISPATCH(sample_i16)(source, row, output, state);
+}
+
+}  // namespace tetwarp::cpu
+
+#endif
