@@ -124,7 +124,7 @@ void add_deform(CLI::App& app, DeformOptions& options) {
                    "take no more, what does not fit is streamed in slabs; 10 % or 128 MB of working space come on top")
       ->transform(CLI::AsSizeValue(true))
       ->type_name("SIZE");
-  command->add_option("--compress", options.compression, "Level 0 to 9 for .nii.gz .nrrd .mha")
+  command->add_option("--compress", options.compression, "Level 0 to 9 for .nii.gz (default 1) .nrrd .mha (default 0)")
       ->check(CLI::Range(0, 9));
   command->add_option("--coverage", options.coverage, "Mask of the voxels that got a value through the field")
       ->type_name("FILE");

@@ -1,76 +1,84 @@
 #include "io/gzip_pieces.h"
 
-#include <tbb/parallel_for.h>
+#include <libdeflate.h>
+#include <tbb/parallel_pipeline.h>
 #include <tbb/task_arena.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <array>
+#include <atomic>
+#include <memory>
 #include <ostream>
+#include <string>
 
 #include "deform/errors.h"
+#include "io/gzip_member.h"
 
 namespace tetwarp {
 namespace {
 
-struct Deflated {
-  std::vector<std::byte> scratch, bytes;
-  uLong crc = 0;
-  std::size_t plain_bytes = 0;
+struct FreeCompressor {
+  void operator()(libdeflate_compressor* compressor) const { libdeflate_free_compressor(compressor); }
 };
 
-/// Raw deflate of one piece, flushed to a byte, or finished when it is the last.
-void deflate_piece(std::span<const std::byte> plain, int level, bool last, Deflated& result) {
-  require(plain.size() < (std::size_t{1} << 30),
-          "a piece of " + std::to_string(plain.size()) + " bytes for gzip; expected under 1 GiB");
-  z_stream stream{};
-  if (deflateInit2(&stream, level, Z_DEFLATED, -MAX_WBITS, 8, Z_DEFAULT_STRATEGY) != Z_OK)
-    throw Error("zlib: deflateInit2 failed");
-  const auto size = static_cast<uLong>(plain.size());
-  result.bytes.resize(deflateBound(&stream, size) + 16);
-  const auto* input = reinterpret_cast<const Bytef*>(plain.data());
-  stream.next_in = const_cast<Bytef*>(input);
-  stream.avail_in = static_cast<uInt>(size);
-  stream.next_out = reinterpret_cast<Bytef*>(result.bytes.data());
-  stream.avail_out = static_cast<uInt>(result.bytes.size());
-  const int status = deflate(&stream, last ? Z_FINISH : Z_SYNC_FLUSH);
-  const bool whole = status == (last ? Z_STREAM_END : Z_OK) && stream.avail_in == 0 && stream.avail_out > 0;
-  result.bytes.resize(stream.total_out);
-  deflateEnd(&stream);
-  if (!whole) throw Error("zlib: deflate failed (" + std::to_string(status) + ")");
-  result.crc = crc32(crc32(0, nullptr, 0), input, static_cast<uInt>(size));
-  result.plain_bytes = plain.size();
-}
+/// Makes one member after the other, in memory that it keeps.
+class MemberMaker {
+ public:
+  void make(const PieceSource& piece, std::size_t i, int level) {
+    const std::span<const std::byte> plain = piece(i, scratch_);
+    require(plain.size() <= kGzipPieceBytes, "a piece of " + std::to_string(plain.size()) +
+                                                 " bytes for gzip; expected at most " +
+                                                 std::to_string(kGzipPieceBytes));
+    if (!compressor_) compressor_.reset(libdeflate_alloc_compressor(level));
+    if (!compressor_) throw Error("libdeflate: no memory for a compressor of level " + std::to_string(level));
+    const std::size_t room = libdeflate_deflate_compress_bound(compressor_.get(), plain.size());
+    member_.resize(kMemberHeaderBytes + room + kMemberTrailerBytes);
+    const std::size_t deflated = libdeflate_deflate_compress(compressor_.get(), plain.data(), plain.size(),
+                                                             member_.data() + kMemberHeaderBytes, room);
+    if (deflated == 0) throw Error("libdeflate: compression failed");
+    bytes_ = kMemberHeaderBytes + deflated + kMemberTrailerBytes;
+    std::ranges::copy(kMemberStart, member_.begin());
+    put_u32(kMemberStart.size(), bytes_);
+    put_u32(bytes_ - 8, libdeflate_crc32(0, plain.data(), plain.size()));
+    put_u32(bytes_ - 4, plain.size());
+  }
+  void write(std::ostream& out) const {
+    out.write(reinterpret_cast<const char*>(member_.data()), static_cast<std::streamsize>(bytes_));
+  }
 
-void put(std::ostream& out, std::span<const std::byte> bytes) {
-  out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-}
+ private:
+  void put_u32(std::size_t at, std::uint64_t value) {
+    for (int shift = 0; shift < 32; shift += 8) member_[at++] = static_cast<std::byte>(value >> shift & 0xff);
+  }
 
-void put_u32(std::ostream& out, std::uint64_t value) {
-  for (int shift = 0; shift < 32; shift += 8) out.put(static_cast<char>(value >> shift & 0xff));
-}
+  std::unique_ptr<libdeflate_compressor, FreeCompressor> compressor_;
+  std::vector<std::byte> scratch_, member_;
+  std::size_t bytes_ = 0;
+};
 
 }  // namespace
 
 void write_gzip(std::ostream& out, std::size_t count, const PieceSource& piece, int level) {
-  constexpr std::array<char, 10> kHeader = {'\x1f', '\x8b', 8, 0, 0, 0, 0, 0, 0, '\xff'};  // no name, no time
-  out.write(kHeader.data(), kHeader.size());
-  std::vector<Deflated> batch(4 * static_cast<std::size_t>(tbb::this_task_arena::max_concurrency()));
-  uLong crc = crc32(0, nullptr, 0);
-  std::uint64_t plain_bytes = 0;
-  for (std::size_t begin = 0; begin < count && out; begin += batch.size()) {
-    const std::size_t n = std::min(batch.size(), count - begin);
-    tbb::parallel_for(std::size_t{0}, n, [&](std::size_t i) {
-      deflate_piece(piece(begin + i, batch[i].scratch), level, begin + i + 1 == count, batch[i]);
-    });
-    for (std::size_t i = 0; i < n; ++i) {
-      put(out, batch[i].bytes);
-      crc = crc32_combine(crc, batch[i].crc, static_cast<z_off_t>(batch[i].plain_bytes));
-      plain_bytes += batch[i].plain_bytes;
-    }
-  }
-  put_u32(out, crc);
-  put_u32(out, plain_bytes);
+  // At most as many pieces as makers are under way, and they leave in order: no two have the same maker.
+  std::vector<MemberMaker> makers(4 * static_cast<std::size_t>(tbb::this_task_arena::max_concurrency()));
+  std::atomic<bool> failed = false;
+  std::size_t next = 0;
+  const auto number = [&](tbb::flow_control& control) {
+    if (next == count || failed) control.stop();
+    return next++;
+  };
+  const auto compress = [&](std::size_t i) {
+    makers[i % makers.size()].make(piece, i, level);
+    return i;
+  };
+  const auto write = [&](std::size_t i) {
+    makers[i % makers.size()].write(out);
+    if (!out) failed = true;
+  };
+  tbb::parallel_pipeline(makers.size(),
+                         tbb::make_filter<void, std::size_t>(tbb::filter_mode::serial_in_order, number) &
+                             tbb::make_filter<std::size_t, std::size_t>(tbb::filter_mode::parallel, compress) &
+                             tbb::make_filter<std::size_t, void>(tbb::filter_mode::serial_in_order, write));
 }
 
 }  // namespace tetwarp

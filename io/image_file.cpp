@@ -109,7 +109,7 @@ void write_format(const std::filesystem::path& path, ImageFormat format, const C
   if (format == ImageFormat::nifti) {
     const auto descrip = options.metadata.find("descrip");
     write_nifti(path, volume, descrip == options.metadata.end() ? "" : descrip->second,
-                options.compression < 0 ? 6 : options.compression);
+                options.compression < 0 ? 1 : options.compression);
   } else {
     write_with_itk(path, format, volume, options);
   }

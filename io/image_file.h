@@ -22,7 +22,9 @@ struct ImageHeader {
 };
 
 struct ImageWriteOptions {
-  int compression = -1;  ///< 0 none, 1 to 9; -1: 6 for .nii.gz, none else; .nii never is
+  /// 0 none, 1 to 9; -1: 1 for .nii.gz, none else; .nii never is. The levels of .nii.gz are libdeflate's: its 1 makes
+  /// files about as small as zlib's 6 does, its 6 smaller ones in two to four times the time.
+  int compression = -1;
   std::map<std::string, std::string>
       metadata;  ///< NRRD and MHA: key and value; NIfTI keeps only "descrip" (79 characters)
 };

@@ -1,21 +1,23 @@
 #include "io/nifti_file.h"
 
+#include <tbb/parallel_for.h>
 #include <zlib.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstring>
 #include <fstream>
 #include <utility>
 
 #include "deform/errors.h"
+#include "io/gzip_inflate.h"
 #include "io/gzip_pieces.h"
 #include "itkbridge/image_io.h"
 
 namespace tetwarp {
 namespace {
 
-constexpr std::size_t kPieceBytes = std::size_t{1} << 20;
 constexpr std::size_t kHeaderBytes = 352;  // 348, and four zeros: no extension follows
 constexpr std::pair<int, VoxelType> kDatatypes[] = {
     {2, VoxelType::u8},    {256, VoxelType::i8}, {512, VoxelType::u16}, {4, VoxelType::i16},
@@ -64,16 +66,52 @@ class NiftiReader final : public ImageReader {
       : ImageReader(path, std::move(image), stored), nifti_(std::move(header)), disk_(disk) {}
 
   void read(std::span<std::byte> voxels) const override {
+    const PlainBytes plain =
+        stored_.encoded ? inflate_at_once(path_, stored_.offset + value_count() * stored_.value_bytes) : PlainBytes{};
+    if (!plain || !read_in_parallel(plain, voxels)) read_in_order(voxels);
+  }
+
+ private:
+  /// With libdeflate. @return  false for a damaged file
+  bool read_in_parallel(const PlainBytes& plain, std::span<std::byte> voxels) const {
+    std::atomic<bool> good = true;
+    const auto one = [&](std::size_t i) {
+      if (good && !(i == 0 ? skip(plain) : read_piece(i - 1, plain, voxels))) good = false;
+    };
+    tbb::parallel_for(std::size_t{0}, piece_count() + 1, one, tbb::simple_partitioner());
+    return good;
+  }
+
+  /// What comes before the voxels is read for its CRC.
+  bool skip(const PlainBytes& plain) const {
+    std::vector<std::byte> piece(std::min<std::uint64_t>(stored_.offset, kGzipPieceBytes));
+    for (std::uint64_t begin = 0, n = 0; begin < stored_.offset; begin += n) {
+      n = std::min<std::uint64_t>(stored_.offset - begin, piece.size());
+      if (!plain(begin, std::span(piece).first(static_cast<std::size_t>(n)))) return false;
+    }
+    return true;
+  }
+
+  /// With zlib, whatever the file. @throws InputError for a damaged file
+  void read_in_order(std::span<std::byte> voxels) const {
     const std::unique_ptr<gzFile_s, int (*)(gzFile)> file(gzopen(path_.c_str(), "rb"), gzclose);
     require(file != nullptr, "cannot open, " + path_.string());
     gzbuffer(file.get(), 1 << 18);
     if (gzseek(file.get(), static_cast<z_off_t>(stored_.offset), SEEK_SET) < 0) fail(file.get());
-    dispatch(disk_, [&](auto v) { read_planes<decltype(v)>(file.get(), voxels); });
-    std::byte rest;
-    if (gzread(file.get(), &rest, 1) < 0) fail(file.get());  // checks the CRC when the voxels end the file
+    const PlainBytes next = [&](std::uint64_t, std::span<std::byte> bytes) {
+      const int read = gzread(file.get(), bytes.data(), static_cast<unsigned>(bytes.size()));
+      if (read != static_cast<int>(bytes.size())) fail(file.get());
+      return true;
+    };
+    for (std::size_t i = 0; i < piece_count(); ++i) read_piece(i, next, voxels);
+    std::vector<std::byte> rest(std::size_t{1} << 18);
+    int read = 1;
+    while (read > 0) read = gzread(file.get(), rest.data(), static_cast<unsigned>(rest.size()));
+    int code = Z_OK;
+    gzerror(file.get(), &code);
+    if (read < 0 || code != Z_OK) fail(file.get());  // the CRC stands at the end; an early end is no failure of gzread
   }
 
- private:
   [[noreturn]] void fail(gzFile file) const {
     int code = 0;
     const std::string text = gzerror(file, &code);
@@ -81,29 +119,38 @@ class NiftiReader final : public ImageReader {
                      "), " + path_.string() + "; is the file whole?");
   }
 
+  std::size_t pieces_a_plane() const {
+    const std::size_t step = kGzipPieceBytes / stored_.value_bytes;
+    return (static_cast<std::size_t>(voxel_count(header_.geometry)) + step - 1) / step;
+  }
+  std::size_t piece_count() const { return pieces_a_plane() * static_cast<std::size_t>(header_.components); }
+
+  bool read_piece(std::size_t i, const PlainBytes& plain, std::span<std::byte> voxels) const {
+    bool read = false;
+    dispatch(disk_, [&](auto v) { read = read_piece_as<decltype(v)>(i, plain, voxels); });
+    return read;
+  }
+
   /// NIfTI has one plane a component, one after the other; memory has the components of a voxel side by side.
   template <class Disk>
-  void read_planes(gzFile file, std::span<std::byte> voxels) const {
+  bool read_piece_as(std::size_t i, const PlainBytes& plain, std::span<std::byte> voxels) const {
     using Scaled = std::conditional_t<std::is_same_v<Disk, double>, double, float>;
     const auto components = static_cast<std::size_t>(header_.components);
-    const std::size_t count = static_cast<std::size_t>(voxel_count(header_.geometry));
+    const auto count = static_cast<std::size_t>(voxel_count(header_.geometry));
+    const std::size_t step = kGzipPieceBytes / sizeof(Disk), c = i / pieces_a_plane();
+    const std::size_t begin = i % pieces_a_plane() * step, n = std::min(count - begin, step);
     const bool scaled = is_scaled(nifti_), direct = !scaled && components == 1;
-    std::vector<Disk> piece(direct ? 0 : kPieceBytes / sizeof(Disk));
-    for (std::size_t c = 0; c < components; ++c) {
-      for (std::size_t begin = 0, n = 0; begin < count; begin += n) {
-        n = std::min(count - begin, kPieceBytes / sizeof(Disk));
-        auto* const values = direct ? reinterpret_cast<Disk*>(voxels.data()) + begin : piece.data();
-        const int bytes = static_cast<int>(n * sizeof(Disk));
-        if (gzread(file, values, static_cast<unsigned>(bytes)) != bytes) fail(file);
-        if (nifti_.swapped) reverse_bytes(std::span(values, n));
-        if (scaled) {
-          scale(values, n, reinterpret_cast<Scaled*>(voxels.data()) + begin * components + c, components);
-        } else if (!direct) {
-          auto* const to = reinterpret_cast<Disk*>(voxels.data()) + begin * components + c;
-          for (std::size_t i = 0; i < n; ++i) to[i * components] = values[i];
-        }
-      }
+    std::vector<Disk> piece(direct ? 0 : n);
+    const std::span values(direct ? reinterpret_cast<Disk*>(voxels.data()) + begin : piece.data(), n);
+    if (!plain(stored_.offset + (c * count + begin) * sizeof(Disk), std::as_writable_bytes(values))) return false;
+    if (nifti_.swapped) reverse_bytes(values);
+    if (scaled) {
+      scale(values.data(), n, reinterpret_cast<Scaled*>(voxels.data()) + begin * components + c, components);
+    } else if (!direct) {
+      auto* const to = reinterpret_cast<Disk*>(voxels.data()) + begin * components + c;
+      for (std::size_t at = 0; at < n; ++at) to[at * components] = values[at];
     }
+    return true;
   }
 
   template <class Disk, class Scaled>
@@ -138,7 +185,7 @@ std::array<char, kHeaderBytes> make_header(const std::filesystem::path& path, co
   return header;
 }
 
-/// One plane a component, in pieces of `kPieceBytes`.
+/// One plane a component, in pieces of `kGzipPieceBytes`.
 std::span<const std::byte> plane_piece(const ConstVolumeView& volume, std::size_t component, std::size_t begin,
                                        std::size_t n, std::vector<std::byte>& scratch) {
   const std::size_t width = size_bytes(volume.type), components = static_cast<std::size_t>(volume.components);
@@ -195,7 +242,7 @@ void write_nifti(const std::filesystem::path& path, const ConstVolumeView& volum
   std::ofstream out(path, std::ios::binary | std::ios::trunc);
   if (!out) throw Error("cannot write, " + file + "; check folder and rights");
   const auto header = make_header(path, volume, descrip);
-  const auto count = static_cast<std::size_t>(voxel_count(grid)), step = kPieceBytes / size_bytes(volume.type);
+  const auto count = static_cast<std::size_t>(voxel_count(grid)), step = kGzipPieceBytes / size_bytes(volume.type);
   const std::size_t pieces_a_plane = (count + step - 1) / step;
   const std::size_t pieces = 1 + pieces_a_plane * static_cast<std::size_t>(volume.components);
   const PieceSource piece = [&](std::size_t i, std::vector<std::byte>& scratch) -> std::span<const std::byte> {

@@ -1,0 +1,19 @@
+#pragma once
+
+// Private to io/: the layout of the members of our gzip files, for the one that writes and the one that reads them.
+#include <array>
+#include <cstddef>
+
+namespace tetwarp {
+
+constexpr std::size_t kMemberHeaderBytes = 20;  // `kMemberStart`, then the size of the whole member
+constexpr std::size_t kMemberTrailerBytes = 8;  // CRC and plain size
+
+/// What comes before the size of the member (RFC 1952, 2.3): deflate, an extra field, no time, system unknown; 8 bytes
+/// of extra field, subfield "IG" of 4 bytes.
+constexpr std::array<std::byte, 16> kMemberStart = {std::byte{0x1f}, std::byte{0x8b}, std::byte{8}, std::byte{4},
+                                                    std::byte{0},    std::byte{0},    std::byte{0}, std::byte{0},
+                                                    std::byte{0},    std::byte{0xff}, std::byte{8}, std::byte{0},
+                                                    std::byte{'I'},  std::byte{'G'},  std::byte{4}, std::byte{0}};
+
+}  // namespace tetwarp
