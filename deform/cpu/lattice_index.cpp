@@ -121,6 +121,7 @@ void LatticeIndex::build(const Geometry& output, const FieldView& field, const C
   field_ = field;
   frame_ = make_lattice_frame(output, field);
   steps_ = make_step_lattice(frame_, output);
+  quick_ = QuickSnap(frame_, steps_);
 
   const double cell_voxels =
       std::min({glm::length(frame_.output_from_lattice.linear[0]), glm::length(frame_.output_from_lattice.linear[1]),
@@ -157,7 +158,8 @@ void LatticeIndex::load(std::size_t block, Block& into) const {
       const glm::vec3* displacement = field_.displacement + ((first.z * size.y + first.y) * size.x + first.x);
       for (int x = 0; x <= into.cells.x; ++x, ++vertex, ++displacement) {
         const glm::i64vec3 at = first + glm::i64vec3(x, 0, 0);
-        if (!frame_.snap_vertex(at, *displacement, *vertex)) refuse_vertex(at);
+        const bool done = quick_.is_usable() && quick_.snap(glm::ivec3(at), *displacement, *vertex);
+        if (!done && !frame_.snap_vertex(at, *displacement, *vertex)) refuse_vertex(at);
         into.at_rest = into.at_rest && vertex->u == glm::i32vec3(0);
       }
     }

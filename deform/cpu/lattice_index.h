@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "deform/core/lattice_vertex.h"
-#include "deform/core/step_lattice.h"
 #include "deform/core/visit_cell.h"
+#include "deform/cpu/quick_snap.h"
 #include "deform/resampler.h"
 
 namespace tetwarp::cpu {
@@ -97,6 +97,7 @@ class LatticeIndex {
   std::vector<Box> boxes_, group_boxes_;
   std::vector<std::uint8_t> resting_;
   StepLattice steps_;
+  QuickSnap quick_;
   FieldStatistics statistics_;
 };
 

@@ -58,7 +58,7 @@ struct Axis {
 HWY_INLINE Float mix(Float a, Float b, Float t) { return hn::Add(a, hn::Mul(t, hn::Sub(b, a))); }
 
 template <class V>
-SliceRange sample(const LinearSource<V>& source, const Row& row, V* output, RowState* state) {
+SliceRange sample(const LinearSource& source, const Row& row, V* output, RowState* state) {
   const Floats df;
   const Ints di;
   const hn::Rebind<std::uint8_t, Floats> d8;
@@ -107,18 +107,14 @@ SliceRange sample(const LinearSource<V>& source, const Row& row, V* output, RowS
   return low > high ? SliceRange{} : SliceRange{low, high};
 }
 
-SliceRange sample_u8(const LinearSource<std::uint8_t>& source, const Row& row, std::uint8_t* output, RowState* state) {
-  return sample(source, row, output, state);
-}
-SliceRange sample_i8(const LinearSource<std::int8_t>& source, const Row& row, std::int8_t* output, RowState* state) {
-  return sample(source, row, output, state);
-}
-SliceRange sample_u16(const LinearSource<std::uint16_t>& source, const Row& row, std::uint16_t* output,
-                      RowState* state) {
-  return sample(source, row, output, state);
-}
-SliceRange sample_i16(const LinearSource<std::int16_t>& source, const Row& row, std::int16_t* output, RowState* state) {
-  return sample(source, row, output, state);
+SliceRange sample_any(const LinearSource& source, const Row& row, void* output, RowState* state) {
+  switch (source.type) {
+    case VoxelType::u8: return sample(source, row, static_cast<std::uint8_t*>(output), state);
+    case VoxelType::i8: return sample(source, row, static_cast<std::int8_t*>(output), state);
+    case VoxelType::u16: return sample(source, row, static_cast<std::uint16_t*>(output), state);
+    case VoxelType::i16: return sample(source, row, static_cast<std::int16_t*>(output), state);
+    default: std::fill(state, state + row.count, RowState::left); return {};
+  }
 }
 
 }  // namespace tetwarp::cpu::HWY_NAMESPACE
@@ -129,30 +125,10 @@ HWY_AFTER_NAMESPACE();
 
 namespace tetwarp::cpu {
 
-HWY_EXPORT(sample_u8);
-HWY_EXPORT(sample_i8);
-HWY_EXPORT(sample_u16);
-HWY_EXPORT(sample_i16);
+HWY_EXPORT(sample_any);
 
-template <>
-SliceRange sample_linear_row(const LinearSource<std::uint8_t>& source, const Row& row, std::uint8_t* output,
-                             RowState* state) {
-  return HWY_DYNAMIC_DISPATCH(sample_u8)(source, row, output, state);
-}
-template <>
-SliceRange sample_linear_row(const LinearSource<std::int8_t>& source, const Row& row, std::int8_t* output,
-                             RowState* state) {
-  return HWY_DYNAMIC_DISPATCH(sample_i8)(source, row, output, state);
-}
-template <>
-SliceRange sample_linear_row(const LinearSource<std::uint16_t>& source, const Row& row, std::uint16_t* output,
-                             RowState* state) {
-  return HWY_DYNAMIC_DISPATCH(sample_u16)(source, row, output, state);
-}
-template <>
-SliceRange sample_linear_row(const LinearSource<std::int16_t>& source, const Row& row, std::int16_t* output,
-                             RowState* state) {
-  return HWY_DYNAMIC_DISPATCH(sample_i16)(source, row, output, state);
+SliceRange sample_linear_row(const LinearSource& source, const Row& row, void* output, RowState* state) {
+  return HWY_DYNAMIC_DISPATCH(sample_any)(source, row, output, state);
 }
 
 }  // namespace tetwarp::cpu

@@ -13,18 +13,20 @@ template <class V>
 constexpr bool kHasLinearRow = std::is_integral_v<V> && sizeof(V) <= 2;
 
 /// A source on the grid of the output, without padding, that 32-bit offsets reach.
-template <class V>
 struct LinearSource {
-  const V* voxels;
+  VoxelType type;
+  const void* voxels;
   glm::ivec3 begin, last;  ///< first voxel that is buffered, and last voxel of the whole grid
   std::int32_t row, slice, voxel_count;
 
   /// @param buffered  voxels that are buffered  @return whether there is such a source
+  template <class V>
   static bool make(const SamplePlan<V>& plan, std::int64_t buffered, LinearSource& source) {
     constexpr std::int64_t kMost = INT32_MAX / static_cast<std::int64_t>(sizeof(V));
     if (!plan.relation.same_grid || plan.padding.present || buffered > kMost || buffered < 4) return false;
     const SourceVoxels<V>& of = plan.source;
-    source = {of.voxels,
+    source = {voxel_type_of<V>(),
+              of.voxels,
               glm::ivec3(of.begin),
               glm::ivec3(of.size) - 1,
               static_cast<std::int32_t>(of.stride.y),
@@ -43,8 +45,8 @@ enum class RowState : std::uint8_t {
 /// Samples the voxels of a row that come from well inside the source: the bits of `sample_voxel` with linear
 /// interpolation, by the widest vectors that the processor has (Highway).
 ///
-/// @param state  of each voxel, written  @return slices of the source that were sampled
-template <class V>
-SliceRange sample_linear_row(const LinearSource<V>& source, const Row& row, V* output, RowState* state);
+/// @param output  of the source's type  @param state  of each voxel, written  @return slices of the source that were
+/// sampled
+SliceRange sample_linear_row(const LinearSource& source, const Row& row, void* output, RowState* state);
 
 }  // namespace tetwarp::cpu

@@ -110,9 +110,9 @@ void TargetSampler::sample_row(const TargetSampler& self, const Row& row, std::u
   if (row.at_rest && self.copy_row(plan, row, output, coverage, counts)) {
     sampled = {row.voxel.z, row.voxel.z};
   } else if constexpr (kInterpolation == Interpolation::linear && kHasLinearRow<V>) {
-    LinearSource<V> source;
+    LinearSource source;
     RowState state[kMostInRow];
-    if (row.count <= kMostInRow && LinearSource<V>::make(plan, voxel_count(target.source.buffered), source)) {
+    if (row.count <= kMostInRow && LinearSource::make(plan, voxel_count(target.source.buffered), source)) {
       sampled = sample_linear_row(source, row, output, state);
       const auto done = std::count(state, state + row.count, RowState::sampled);
       counts.covered += static_cast<std::uint64_t>(done);

@@ -52,8 +52,8 @@ TYPED_TEST(LinearRow, GivesTheBitsOfOneVoxelAfterTheOtherOnEveryInstructionSet) 
     plan.source = {voxels.data(), size, held.begin, glm::i64vec3(1, in.x, in.x * in.y)};
     plan.background = 77;
     plan.relation.same_grid = true;
-    LinearSource<V> source;
-    ASSERT_TRUE(LinearSource<V>::make(plan, static_cast<std::int64_t>(voxels.size()), source));
+    LinearSource source;
+    ASSERT_TRUE(LinearSource::make(plan, static_cast<std::int64_t>(voxels.size()), source));
     for (int n = 0; n < 400; ++n) {
       constexpr int kCount = 35;
       std::uint8_t mapped[kCount];

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cmath>
+
+#include "deform/core/lattice_vertex.h"
+#include "deform/core/step_lattice.h"
+
+namespace tetwarp::cpu {
+
+/// Snaps vertices of a lattice along the grid's axes that rest at whole steps, in few operations: the sums and products
+/// of `LatticeFrame::snap_vertex` that are not with zero, in steps. Scaling by a power of two changes no rounding.
+class QuickSnap {
+ public:
+  QuickSnap() = default;
+  /// @param steps  without cells: never usable
+  QuickSnap(const LatticeFrame& frame, const StepLattice& steps) {
+    constexpr double kApart = 0.01;  // steps: more than rest places differ from whole multiples of cells
+    usable_ = steps.cells.x != 0 && frame.first_slice == 0;
+    const glm::dvec3 first = frame.output_from_lattice(glm::dvec3(0));
+    for (int axis = 0; axis < 3; ++axis) {
+      first_[axis] = first[axis] * kStepsPerVoxel;
+      cell_[axis] = frame.output_from_lattice.linear[axis][axis] * kStepsPerVoxel;
+      scale_[axis] = frame.output_from_mm[axis][axis] * kStepsPerVoxel;
+      for (int other = 0; other < 3; ++other) {
+        usable_ = usable_ && (other == axis || (frame.output_from_mm[axis][other] == 0 &&
+                                                frame.output_from_lattice.linear[axis][other] == 0));
+      }
+      usable_ = usable_ && std::fabs(std::fabs(first_[axis] - std::rint(first_[axis])) - 0.5) > kApart;
+    }
+    rest_ = glm::ivec3(steps.first);
+    rest_cell_ = glm::ivec3(steps.cell);
+  }
+
+  bool is_usable() const { return usable_; }
+  /// @return false for a vertex that is far away, or not finite: `snap_vertex` must be asked
+  bool snap(const glm::ivec3& at, const glm::vec3& displacement, Vertex& vertex) const {
+    glm::dvec3 rounded(0);
+    bool near = true;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double shift = scale_[axis] * double{displacement[axis]},
+                   place = (at[axis] * cell_[axis] + first_[axis]) + shift;
+      rounded[axis] = (place + kToWhole) - kToWhole;
+      near &= std::fabs(shift) < kFar;  // false for NaN
+    }
+    if (!near) return false;
+    vertex.deformed = glm::i32vec3(rounded);
+    vertex.u = rest_ + at * rest_cell_ - vertex.deformed;
+    return true;
+  }
+
+ private:
+  static constexpr double kToWhole =
+      3.0 * (std::int64_t{1} << 51);       ///< adding it rounds to whole numbers, ties to even
+  static constexpr double kFar = 1 << 28;  ///< steps
+
+  bool usable_ = false;
+  glm::dvec3 first_{0}, cell_{0}, scale_{0};  ///< steps; mm to steps
+  glm::ivec3 rest_{0}, rest_cell_{0};         ///< the same, snapped
+};
+
+}  // namespace tetwarp::cpu
