@@ -60,6 +60,29 @@ void reverse_bytes(std::span<V> values) {
   }
 }
 
+/// The values of an image as a file has them: one plane a component, each in pieces of `kGzipPieceBytes`.
+class PlanePieces {
+ public:
+  struct Piece {
+    std::size_t component, begin, count;  ///< of values, in the plane
+  };
+
+  PlanePieces(const Geometry& grid, std::size_t value_bytes, int components)
+      : values_(static_cast<std::size_t>(voxel_count(grid))),
+        step_(kGzipPieceBytes / value_bytes),
+        per_plane_((values_ + step_ - 1) / step_),
+        count_(per_plane_ * static_cast<std::size_t>(components)) {}
+
+  std::size_t count() const { return count_; }
+  Piece operator[](std::size_t i) const {
+    const std::size_t begin = i % per_plane_ * step_;
+    return {i / per_plane_, begin, std::min(step_, values_ - begin)};
+  }
+
+ private:
+  std::size_t values_, step_, per_plane_, count_;
+};
+
 class NiftiReader final : public ImageReader {
  public:
   NiftiReader(const std::filesystem::path& path, ImageHeader image, Stored stored, NiftiHeader header, VoxelType disk)
@@ -78,7 +101,7 @@ class NiftiReader final : public ImageReader {
     const auto one = [&](std::size_t i) {
       if (good && !(i == 0 ? skip(plain) : read_piece(i - 1, plain, voxels))) good = false;
     };
-    tbb::parallel_for(std::size_t{0}, piece_count() + 1, one, tbb::simple_partitioner());
+    tbb::parallel_for(std::size_t{0}, pieces().count() + 1, one, tbb::simple_partitioner());
     return good;
   }
 
@@ -103,7 +126,7 @@ class NiftiReader final : public ImageReader {
       if (read != static_cast<int>(bytes.size())) fail(file.get());
       return true;
     };
-    for (std::size_t i = 0; i < piece_count(); ++i) read_piece(i, next, voxels);
+    for (std::size_t i = 0; i < pieces().count(); ++i) read_piece(i, next, voxels);
     std::vector<std::byte> rest(std::size_t{1} << 18);
     int read = 1;
     while (read > 0) read = gzread(file.get(), rest.data(), static_cast<unsigned>(rest.size()));
@@ -119,11 +142,7 @@ class NiftiReader final : public ImageReader {
                      "), " + path_.string() + "; is the file whole?");
   }
 
-  std::size_t pieces_a_plane() const {
-    const std::size_t step = kGzipPieceBytes / stored_.value_bytes;
-    return (static_cast<std::size_t>(voxel_count(header_.geometry)) + step - 1) / step;
-  }
-  std::size_t piece_count() const { return pieces_a_plane() * static_cast<std::size_t>(header_.components); }
+  PlanePieces pieces() const { return {header_.geometry, stored_.value_bytes, header_.components}; }
 
   bool read_piece(std::size_t i, const PlainBytes& plain, std::span<std::byte> voxels) const {
     bool read = false;
@@ -137,8 +156,7 @@ class NiftiReader final : public ImageReader {
     using Scaled = std::conditional_t<std::is_same_v<Disk, double>, double, float>;
     const auto components = static_cast<std::size_t>(header_.components);
     const auto count = static_cast<std::size_t>(voxel_count(header_.geometry));
-    const std::size_t step = kGzipPieceBytes / sizeof(Disk), c = i / pieces_a_plane();
-    const std::size_t begin = i % pieces_a_plane() * step, n = std::min(count - begin, step);
+    const auto [c, begin, n] = pieces()[i];
     const bool scaled = is_scaled(nifti_), direct = !scaled && components == 1;
     std::vector<Disk> piece(direct ? 0 : n);
     const std::span values(direct ? reinterpret_cast<Disk*>(voxels.data()) + begin : piece.data(), n);
@@ -185,7 +203,7 @@ std::array<char, kHeaderBytes> make_header(const std::filesystem::path& path, co
   return header;
 }
 
-/// One plane a component, in pieces of `kGzipPieceBytes`.
+/// One of `PlanePieces`.
 std::span<const std::byte> plane_piece(const ConstVolumeView& volume, std::size_t component, std::size_t begin,
                                        std::size_t n, std::vector<std::byte>& scratch) {
   const std::size_t width = size_bytes(volume.type), components = static_cast<std::size_t>(volume.components);
@@ -242,13 +260,12 @@ void write_nifti(const std::filesystem::path& path, const ConstVolumeView& volum
   std::ofstream out(path, std::ios::binary | std::ios::trunc);
   if (!out) throw Error("cannot write, " + file + "; check folder and rights");
   const auto header = make_header(path, volume, descrip);
-  const auto count = static_cast<std::size_t>(voxel_count(grid)), step = kGzipPieceBytes / size_bytes(volume.type);
-  const std::size_t pieces_a_plane = (count + step - 1) / step;
-  const std::size_t pieces = 1 + pieces_a_plane * static_cast<std::size_t>(volume.components);
+  const PlanePieces planes(grid, size_bytes(volume.type), volume.components);
+  const std::size_t pieces = 1 + planes.count();
   const PieceSource piece = [&](std::size_t i, std::vector<std::byte>& scratch) -> std::span<const std::byte> {
     if (i == 0) return std::as_bytes(std::span(header));
-    const std::size_t begin = (i - 1) % pieces_a_plane * step;
-    return plane_piece(volume, (i - 1) / pieces_a_plane, begin, std::min(step, count - begin), scratch);
+    const auto [component, begin, count] = planes[i - 1];
+    return plane_piece(volume, component, begin, count, scratch);
   };
   if (path.extension() != ".nii" && path.extension() != ".NII") {
     write_gzip(out, pieces, piece, level);

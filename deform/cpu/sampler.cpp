@@ -109,21 +109,19 @@ void TargetSampler::sample_row(const TargetSampler& self, const Row& row, std::u
   SliceRange sampled;
   if (row.at_rest && self.copy_row(plan, row, output, coverage, counts)) {
     sampled = {row.voxel.z, row.voxel.z};
-  } else if constexpr (kInterpolation == Interpolation::linear && kHasLinearRow<V>) {
-    LinearSource source;
-    RowState state[kMostInRow];
-    if (row.count <= kMostInRow && LinearSource::make(plan, voxel_count(target.source.buffered), source)) {
-      sampled = sample_linear_row(source, row, output, state);
-      const auto done = std::count(state, state + row.count, RowState::sampled);
-      counts.covered += static_cast<std::uint64_t>(done);
-      if (coverage)
-        std::transform(state, state + row.count, coverage, [](RowState s) { return s == RowState::sampled; });
-      if (done != row.count) self.sample_voxels<V, kInterpolation>(plan, row, state, output, coverage, counts, sampled);
-    } else {
-      self.sample_voxels<V, kInterpolation>(plan, row, nullptr, output, coverage, counts, sampled);
-    }
   } else {
-    self.sample_voxels<V, kInterpolation>(plan, row, nullptr, output, coverage, counts, sampled);
+    const RowState* left = nullptr;
+    RowState state[kMostInRow];
+    if constexpr (kInterpolation == Interpolation::linear && kHasLinearRow<V>) {
+      LinearSource source;
+      if (row.count <= kMostInRow && LinearSource::make(plan, voxel_count(target.source.buffered), source)) {
+        left = state;
+        sampled = sample_linear_row(source, row, output, state);
+        counts.covered += static_cast<std::uint64_t>(std::count(state, state + row.count, RowState::sampled));
+        if (coverage) std::fill_n(coverage, row.count, std::uint8_t{1});  // of those left, written below
+      }
+    }
+    self.sample_voxels<V, kInterpolation>(plan, row, left, output, coverage, counts, sampled);
   }
   if (!target.sampled_slices.empty()) self.note_slices(row.voxel.z, sampled);
 }
