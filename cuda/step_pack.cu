@@ -36,7 +36,7 @@ __global__ void range_kernel(const __grid_constant__ StepPass pass, int* low_hig
 
 void pack_in_place(const StepPass& pass, cudaStream_t stream) {
   const std::int64_t vertices = std::int64_t{pass.lattice.slice} * (pass.lattice.cells.z + 1);
-  const FloatSnap fast(pass.frame, pass.lattice);
+  const FloatSnap fast(pass.frame, pass.lattice, pass.lattice.packing.lift());
   const auto kernel = fast.is_exact() ? pack_kernel<true> : pack_kernel<false>;
   for (std::int64_t begin = 0, end; begin < vertices; begin = end) {
     // Each piece is packed over displacements that were packed before; the first by one thread block.

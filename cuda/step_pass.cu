@@ -382,7 +382,7 @@ void run_step_pass(const StepPass& pass, cudaStream_t stream) {
   const dim3 blocks(static_cast<unsigned>(pass.inverted.words_per_row),
                     static_cast<unsigned>((vertices.y + kRows - 1) / kRows),
                     static_cast<unsigned>((vertices.z + kPlanes - 1) / kPlanes));
-  const FloatSnap fast(pass.frame, pass.lattice);
+  const FloatSnap fast(pass.frame, pass.lattice, pass.lattice.packing.lift());
   const auto kernel = pass.wants_range
                           ? (fast.is_exact() ? step_pass_kernel<true, true> : step_pass_kernel<false, true>)
                           : (fast.is_exact() ? step_pass_kernel<true, false> : step_pass_kernel<false, false>);

@@ -18,9 +18,12 @@ struct BorderTriangle {
 ///
 /// Of the four corners of a face the two even ones are corners D of tetrahedra; each gives the triangle of D and its
 /// two neighbours in the face.
-/// @param face  position in the side, in cells along the two axes that follow `axis`  @param which  0 or 1
-TETWARP_HD inline BorderTriangle border_triangle(const StepLattice& lattice, int axis, bool high,
-                                                 const glm::ivec2& face, int which) {
+/// @param lattice  as of `vertices_of`  @param face  position in the side, in cells along the two axes that follow
+/// `axis`
+/// @param which  0 or 1
+template <class Lattice>
+TETWARP_HD BorderTriangle border_triangle(const Lattice& lattice, int axis, bool high, const glm::ivec2& face,
+                                          int which) {
   const int next = (axis + 1) % 3, last = (axis + 2) % 3;
   glm::ivec3 d(0);
   d[axis] = high ? lattice.cells[axis] : 0;

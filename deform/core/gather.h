@@ -334,9 +334,10 @@ TETWARP_HD void visit_tetrahedron(const StepLattice& lattice, const LatticeTetra
 
 /// Walks from tetrahedron to tetrahedron, across a face that the voxel lies beyond, until one owns it, exactly.
 ///
-/// @param start  where to begin  @param owner  the owner, where found  @return whether one was found within `most`
-/// steps
-TETWARP_HD inline bool walk_to_owner(const StepLattice& lattice, LatticeTetrahedron start, const glm::i32vec3& steps,
+/// @param lattice  as of `vertices_of`  @param start  where to begin  @param owner  the owner, where found
+/// @return whether one was found within `most` steps
+template <class Lattice>
+TETWARP_HD bool walk_to_owner(const Lattice& lattice, LatticeTetrahedron start, const glm::i32vec3& steps,
                                      const glm::i32vec3& signs, int most, LatticeTetrahedron& owner) {
   for (int n = 0; n < most; ++n) {
     const Tetrahedron t = vertices_of(lattice, start);

@@ -287,7 +287,10 @@ TETWARP_HD inline FloatTetrahedron tetrahedron_at(const StepLattice& lattice, co
 }
 
 /// With its snapped vertices, for exact arithmetic.
-TETWARP_HD inline Tetrahedron vertices_of(const StepLattice& lattice, const LatticeTetrahedron& t) {
+///
+/// @param lattice  a StepLattice, or whatever else knows the snapped vertices of one
+template <class Lattice>
+TETWARP_HD Tetrahedron vertices_of(const Lattice& lattice, const LatticeTetrahedron& t) {
   return {lattice.vertex(t.a()), lattice.vertex(t.b()), lattice.vertex(t.c()), lattice.vertex(t.d)};
 }
 

@@ -2,8 +2,11 @@
 #include <cmath>
 #include <vector>
 
+#include "deform/cpu/claims.h"
+#include "deform/cpu/coverage.h"
 #include "deform/cpu/lattice_index.h"
 #include "deform/cpu/map_writer.h"
+#include "deform/cpu/march.h"
 #include "deform/cpu/sampler.h"
 #include "deform/cpu/tiles.h"
 #include "deform/target_check.h"
@@ -14,27 +17,26 @@ namespace cpu {
 
 namespace {
 
-constexpr std::uint64_t kNobody = UINT64_MAX;
+constexpr int kWalk = 64;           ///< tetrahedra that the exact walk may pass
+constexpr int kMostlyFolded = 256;  ///< where one tetrahedron in so many is inverted, walks mostly fail
 
-/// What is known of each voxel of a tile: the lowest tetrahedron that owns it, and what that one says.
+/// What is known of each voxel of a tile.
 struct Tile {
-  LatticeIndex::Block block;
-  std::vector<std::uint64_t> owner;
-  std::vector<glm::vec3> offset;
-  std::vector<float> jacobian;
-  std::vector<std::uint16_t> owners;
+  LatticeBlock block;
+  Claims claims;
+  MarchScratch march;
+  std::vector<Owners> owners;     ///< once all are settled: none or one
+  std::vector<glm::vec3> offset;  ///< undeformed minus deformed place, voxels
   std::uint8_t mapped[kTile], coverage[kTile];
 
-  void reset(std::size_t voxels, const MapWriter& maps) {
-    owner.assign(voxels, kNobody);
-    offset.resize(voxels);
-    if (maps.wants_jacobian()) jacobian.resize(voxels);
-    if (maps.wants_owners()) owners.assign(voxels, 0);
+  void reset(std::int64_t voxels) {
+    owners.resize(static_cast<std::size_t>(voxels) + MarchScratch::kRoom);
+    offset.resize(static_cast<std::size_t>(voxels) + MarchScratch::kRoom);
   }
 };
 
-/// Scatter into a tile, then gather: every cell that may reach the tile claims its voxels (the lowest number wins,
-/// whatever the order), with the offset to the undeformed place; then rows are sampled.
+/// Tile by tile: finds for each voxel where it comes from, then samples its rows. Voxels at rest are copied; lattices
+/// at whole steps take the march, others, and what the march leaves, are claimed.
 class ForwardResampler final : public Resampler {
  public:
   ForwardResampler(Geometry output, const Limits& limits) : Resampler(output), arena_(make_arena(limits)) {}
@@ -44,6 +46,9 @@ class ForwardResampler final : public Resampler {
     require_host(field.memory, "the field");
     arena_.execute([&] { lattice_.build(output(), field, control); });
     wants_range_ = control.jacobian_range;
+    const FieldStatistics& statistics = lattice_.statistics();
+    has_coverage_ = false;
+    can_march_ = lattice_.steps().cells.x != 0 && is_near(field, statistics);
     ready_ = true;
   }
 
@@ -63,13 +68,23 @@ class ForwardResampler final : public Resampler {
     require(ready_, "resample needs a field: call set_field first");
     const std::vector<TargetSampler> samplers = make_samplers(*this, targets, region);
     const MapWriter writer(maps, output(), region);
-    const bool may_copy = !writer.wants_jacobian() && !writer.wants_owners();
+    const bool places_only = !writer.wants_jacobian() && !writer.wants_owners();
+    const bool may_march = can_march_ && places_only;
+    if (may_march && !has_coverage_ && lattice_.statistics().moving_blocks != 0) {
+      arena_.execute([&] { coverage_.find(lattice_, output()); });
+      has_coverage_ = true;
+    }
     Report report = for_each_tile<Tile>(arena_, region, control, [&](const Region& box, Tile& tile) {
-      if (may_copy && rests(box)) return copy(box, tile, samplers, writer);
-      claim(box, tile, writer);
-      return gather(box, tile, samplers, writer);
+      if (places_only && rests(box)) return copy(box, tile, samplers, writer);
+      Report of_tile;
+      if (may_march) {
+        gather(box, tile, writer, of_tile.paths);
+      } else {
+        claim_all(box, tile, writer, of_tile.paths);
+      }
+      write(box, tile, samplers, writer, of_tile);
+      return of_tile;
     });
-    report.paths.claimed = static_cast<std::uint64_t>(voxel_count(region)) - report.paths.gathered;
     const FieldStatistics& statistics = lattice_.statistics();
     report.inverted = statistics.inverted;
     report.degenerate = statistics.degenerate;
@@ -111,45 +126,111 @@ class ForwardResampler final : public Resampler {
     return report;
   }
 
-  void claim(const Region& box, Tile& tile, const MapWriter& maps) const {
-    tile.reset(static_cast<std::size_t>(voxel_count(box)), maps);
-    const glm::i64vec3 size = box.end - box.begin;
+  /// Whether vectors of float hold all that a march computes with.
+  static bool is_near(const FieldView& field, const FieldStatistics& statistics) {
+    const glm::i64vec3& size = field.lattice->size;
+    constexpr std::int64_t kMostVertices = INT32_MAX / 3;  // numbers of displacements on one axis are in 32 bits
+    return static_cast<float>(statistics.most_moved) <= VectorField::kMostMoved &&
+           size.x * size.y * size.z <= kMostVertices;
+  }
+
+  void gather(const Region& box, Tile& tile, const MapWriter& maps, Paths& paths) const {
+    const std::int64_t voxels = voxel_count(box);
+    tile.reset(voxels);
+    std::int64_t several = coverage_.owners_of(box, tile.owners.data(), tile.block);
+    if (several != 0 && voxel_count(around_several(box, tile)) > voxels / 2) return claim_all(box, tile, maps, paths);
+    const IntBox in{glm::ivec3(box.begin), glm::ivec3(box.end)};
+    const NudgeTurns turns(lattice_.frame().nudge);
+    march(lattice_.vectors(), turns, {in, tile.owners.data(), tile.offset.data()}, tile.march);
+    const std::int64_t left = walk(in, turns, tile);
+    several += left;
+    if (several != 0) claim_several(box, tile);
+    const std::int64_t walked = static_cast<std::int64_t>(tile.march.unsettled.size()) - left;
+    paths.claimed += static_cast<std::uint64_t>(several);
+    paths.walked += static_cast<std::uint64_t>(walked);
+    paths.gathered += static_cast<std::uint64_t>(voxels - several - walked);
+  }
+
+  /// Seeks the owners of what the march left. @return how many are left still, and now said to have several
+  std::int64_t walk(const IntBox& box, const NudgeTurns& turns, Tile& tile) const {
+    const FieldStatistics& statistics = lattice_.statistics();
     const glm::i64vec3& cells = lattice_.cells();
-    const VoxelBox voxels{box.begin, box.end};
-    lattice_.find_blocks(box, [&](std::size_t number) {
-      LatticeIndex::Block& block = tile.block;
-      lattice_.load(number, block);
-      for (int z = 0; z < block.cells.z; ++z) {
-        for (int y = 0; y < block.cells.y; ++y) {
-          for (int x = 0; x < block.cells.x; ++x) {
-            const glm::i64vec3 at = block.first_cell + glm::i64vec3(x, y, z);
-            const std::uint64_t first =
-                kTetrahedraPerCell * static_cast<std::uint64_t>((at.z * cells.y + at.y) * cells.x + at.x);
-            visit_cell(
-                block.cell({x, y, z}), block.is_odd({x, y, z}), voxels, lattice_.frame().nudge,
-                [&](const glm::i64vec3& voxel, const glm::i32vec3& signs, int t, const Tetrahedron& tetrahedron) {
-                  const glm::i64vec3 in = voxel - box.begin;
-                  const auto place = static_cast<std::size_t>((in.z * size.y + in.y) * size.x + in.x);
-                  if (maps.wants_owners() && tile.owners[place] != UINT16_MAX) ++tile.owners[place];
-                  const std::uint64_t owner = first + static_cast<std::uint64_t>(t);
-                  if (owner >= tile.owner[place]) return;
-                  tile.owner[place] = owner;
-                  tile.offset[place] = interpolate_u(tetrahedron, detail::to_steps(voxel), signs);
-                  if (maps.wants_jacobian()) tile.jacobian[place] = static_cast<float>(jacobian(tetrahedron));
-                });
-          }
-        }
+    const auto few = static_cast<std::uint64_t>(kTetrahedraPerCell * cells.x * cells.y * cells.z / kMostlyFolded);
+    const int most = statistics.inverted > few ? 0 : kWalk;
+    const glm::ivec3 size = box.end - box.begin;
+    const SnappedLattice lattice(lattice_);
+    std::int64_t left = 0;
+    for (const Unsettled& of : tile.march.unsettled) {
+      constexpr int kSide = static_cast<int>(kTile);
+      const glm::ivec3 in(of.voxel % kSide, of.voxel / kSide % kSide, of.voxel / (kSide * kSide)),
+          voxel = box.begin + in;
+      const glm::vec3 place =
+          std::isfinite(of.place.x + of.place.y + of.place.z) ? of.place : lattice_.steps().place(glm::vec3(voxel));
+      const glm::i32vec3 steps = voxel * kStepsPerVoxel, signs = turns.signs(voxel);
+      const auto n = static_cast<std::size_t>((in.z * size.y + in.y) * size.x + in.x);
+      LatticeTetrahedron owner;
+      if (walk_to_owner(lattice, as_lattice(tetrahedron_at(lattice_.steps(), place)), steps, signs, most, owner)) {
+        tile.offset[n] = interpolate_u(vertices_of(lattice, owner), steps, signs);
+      } else {
+        tile.owners[n] = Owners::several;
+        ++left;
       }
+    }
+    return left;
+  }
+
+  template <class Visit>
+  static void for_each_several(const Region& box, const Tile& tile, Visit&& visit) {
+    std::size_t n = 0;
+    for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {
+      for (std::int64_t y = box.begin.y; y < box.end.y; ++y) {
+        for (std::int64_t x = box.begin.x; x < box.end.x; ++x, ++n)
+          if (tile.owners[n] == Owners::several) visit(n, glm::i64vec3(x, y, z));
+      }
+    }
+  }
+
+  /// The box around what may have several owners; there must be such voxels.
+  static Region around_several(const Region& box, const Tile& tile) {
+    Region around{box.end, box.begin};
+    for_each_several(box, tile, [&](std::size_t, const glm::i64vec3& voxel) {
+      around.begin = glm::min(around.begin, voxel);
+      around.end = glm::max(around.end, voxel + std::int64_t{1});
+    });
+    return around;
+  }
+
+  void claim_several(const Region& box, Tile& tile) const {
+    const Region around = around_several(box, tile);
+    tile.claims.find(lattice_, around, false, false, tile.block);
+    const glm::i64vec3 size = around.end - around.begin;
+    for_each_several(box, tile, [&](std::size_t n, const glm::i64vec3& voxel) {
+      const glm::i64vec3 in = voxel - around.begin;
+      const auto from = static_cast<std::size_t>((in.z * size.y + in.y) * size.x + in.x);
+      const bool owned = tile.claims.owner[from] != Claims::kNobody;
+      tile.owners[n] = owned ? Owners::one : Owners::none;
+      if (owned) tile.offset[n] = tile.claims.offset[from];
     });
   }
 
-  Report gather(const Region& box, Tile& tile, const std::vector<TargetSampler>& samplers,
-                const MapWriter& maps) const {
-    Report report;
+  void claim_all(const Region& box, Tile& tile, const MapWriter& maps, Paths& paths) const {
+    const std::int64_t voxels = voxel_count(box);
+    tile.reset(voxels);
+    tile.claims.find(lattice_, box, maps.wants_jacobian(), maps.wants_owners(), tile.block);
+    for (std::size_t n = 0; n < tile.claims.owner.size(); ++n) {
+      tile.owners[n] = tile.claims.owner[n] == Claims::kNobody ? Owners::none : Owners::one;
+      tile.offset[n] = tile.claims.offset[n];
+    }
+    paths.claimed += static_cast<std::uint64_t>(voxels);
+  }
+
+  /// Samples the rows of a tile whose voxels are settled.
+  void write(const Region& box, Tile& tile, const std::vector<TargetSampler>& samplers, const MapWriter& maps,
+             Report& report) const {
+    const Claims& claims = tile.claims;
     if (maps.wants_owners()) {
-      report.multiply_owned =
-          static_cast<std::uint64_t>(std::count_if(tile.owners.begin(), tile.owners.begin() + voxel_count(box),
-                                                   [](std::uint16_t owners) { return owners > 1; }));
+      report.multiply_owned = static_cast<std::uint64_t>(
+          std::count_if(claims.owners.begin(), claims.owners.end(), [](std::uint16_t owners) { return owners > 1; }));
     }
     const auto width = static_cast<int>(box.end.x - box.begin.x);
     std::size_t first = 0;
@@ -158,33 +239,39 @@ class ForwardResampler final : public Resampler {
         const Row row{{box.begin.x, y, z}, width, tile.mapped, tile.offset.data() + first};
         settle(row, first, tile, maps, report);
         sample_targets(row, samplers, tile.coverage, report);
-        maps.write(row, tile.coverage, maps.wants_jacobian() ? tile.jacobian.data() + first : nullptr,
-                   maps.wants_owners() ? tile.owners.data() + first : nullptr);
+        maps.write(row, tile.coverage, maps.wants_jacobian() ? claims.jacobian.data() + first : nullptr,
+                   maps.wants_owners() ? claims.owners.data() + first : nullptr);
       }
     }
-    return report;
   }
 
   /// Decides for a row which voxels come through the field; those outside the undeformed lattice may stay where they
   /// are.
   void settle(const Row& row, std::size_t first, Tile& tile, const MapWriter& maps, Report& report) const {
     const bool rest = lattice_.field().outside == Outside::rest;
+    if (!rest) {
+      std::transform(tile.owners.data() + first, tile.owners.data() + first + row.count, tile.mapped,
+                     [](Owners owners) { return static_cast<std::uint8_t>(owners); });
+      return;
+    }
     for (int i = 0; i < row.count; ++i) {
       const std::size_t place = first + static_cast<std::size_t>(i);
-      const bool owned = tile.owner[place] != kNobody;
+      const bool owned = tile.owners[place] == Owners::one;
       tile.mapped[i] = owned;
-      if (!rest || lattice_.frame().holds(row.voxel + glm::i64vec3(i, 0, 0))) continue;
+      if (lattice_.frame().holds(row.voxel + glm::i64vec3(i, 0, 0))) continue;
       report.conflicts += owned;
       if (owned) continue;
       tile.mapped[i] = 1;
       tile.offset[place] = glm::vec3(0);
-      if (maps.wants_jacobian()) tile.jacobian[place] = 1.0f;
+      if (maps.wants_jacobian()) tile.claims.jacobian[place] = 1.0f;
     }
   }
 
   mutable tbb::task_arena arena_;
   LatticeIndex lattice_;
+  Coverage coverage_;
   bool ready_ = false, wants_range_ = true;
+  bool can_march_ = false, has_coverage_ = false;
 };
 
 }  // namespace

@@ -10,8 +10,6 @@
 #include <glm/geometric.hpp>
 #include <string>
 
-#include "deform/field_check.h"
-
 namespace tetwarp::cpu {
 
 void FieldStatistics::add_cells(const LatticeBlock& block) {
@@ -31,66 +29,21 @@ void FieldStatistics::add_cells(const LatticeBlock& block) {
   }
 }
 
-namespace {
-
-/// Six times the signed volumes of the tetrahedra of even and odd cells of a lattice at rest at whole steps.
-void rest_volumes(const StepLattice& steps, float (&volumes)[2][kTetrahedraPerCell]) {
-  for (int odd = 0; odd < 2; ++odd) {
-    for (int number = 0; number < kTetrahedraPerCell; ++number) {
-      const TetrahedronCorners t = tetrahedron_corners(number, odd != 0);
-      const auto edge = [&](int corner) {
-        const auto at = [](int c) { return glm::vec3(c & 1, c >> 1 & 1, c >> 2); };
-        return (at(corner) - at(t.d)) * steps.cell;
-      };
-      volumes[odd][number] = detail::edge_determinant(edge(t.a), edge(t.b), edge(t.c));
-    }
+void FieldStatistics::add_scanned(const BlockScan& block, const StepLattice& steps) {
+  inverted += block.inverted;
+  most_moved = std::max(most_moved, block.most_moved);
+  for (int kind = 0; kind < 2; ++kind) {  // corners and centres
+    const float rest = static_cast<float>(kind + 1) * (steps.cell.x * (steps.cell.y * steps.cell.z));
+    jacobian_min = std::min(jacobian_min, double{block.least[kind] / rest});
+    jacobian_max = std::max(jacobian_max, double{block.most[kind] / rest});
   }
-}
-
-}  // namespace
-
-void FieldStatistics::add_regular_cells(const LatticeBlock& block, const StepLattice& steps) {
-  float rest[2][kTetrahedraPerCell];
-  rest_volumes(steps, rest);
-  const int row = block.cells.x + 1, slice = row * (block.cells.y + 1), vertices = slice * (block.cells.z + 1);
-  glm::vec3 moved[LatticeBlock::kMostVertices * LatticeBlock::kMostVertices * LatticeBlock::kMostVertices];
-  for (int n = 0; n < vertices; ++n) moved[n] = glm::vec3(block.vertices[n].deformed - block.vertices[0].deformed);
-  struct Offsets {
-    int a, b, c, d;
-  } corners[2][kTetrahedraPerCell];
-  for (int odd = 0; odd < 2; ++odd) {
-    for (int number = 0; number < kTetrahedraPerCell; ++number) {
-      const TetrahedronCorners t = tetrahedron_corners(number, odd != 0);
-      const auto offset = [&](int c) { return (c & 1) + (c >> 1 & 1) * row + (c >> 2) * slice; };
-      corners[odd][number] = {offset(t.a), offset(t.b), offset(t.c), offset(t.d)};
-    }
-  }
-  float least = INFINITY, most = -INFINITY;
-  for (int z = 0; z < block.cells.z; ++z) {
-    for (int y = 0; y < block.cells.y; ++y) {
-      const glm::vec3* first = moved + z * slice + y * row;
-      for (int x = 0; x < block.cells.x; ++x, ++first) {
-        const int odd = block.is_odd({x, y, z});
-        for (int number = 0; number < kTetrahedraPerCell; ++number) {
-          const Offsets& at = corners[odd][number];
-          const glm::vec3 d = first[at.d];
-          const float jacobian =
-              detail::edge_determinant(first[at.a] - d, first[at.b] - d, first[at.c] - d) / rest[odd][number] + 0.0f;
-          inverted += jacobian < 0;
-          degenerate += jacobian == 0;
-          least = std::min(least, jacobian);
-          most = std::max(most, jacobian);
-        }
-      }
-    }
-  }
-  jacobian_min = std::min(jacobian_min, double{least});
-  jacobian_max = std::max(jacobian_max, double{most});
 }
 
 void FieldStatistics::add(const FieldStatistics& other) {
   inverted += other.inverted;
   degenerate += other.degenerate;
+  moving_blocks += other.moving_blocks;
+  most_moved = std::max(most_moved, other.most_moved);
   jacobian_min = std::min(jacobian_min, other.jacobian_min);
   jacobian_max = std::max(jacobian_max, other.jacobian_max);
 }
@@ -122,15 +75,18 @@ void LatticeIndex::build(const Geometry& output, const FieldView& field, const C
   frame_ = make_lattice_frame(output, field);
   steps_ = make_step_lattice(frame_, output);
   quick_ = QuickSnap(frame_, steps_);
+  if (!quick_.rests_at_steps()) steps_ = {};
+  if (steps_.cells.x != 0) vectors_ = {field.displacement, frame_, steps_};
 
   const double cell_voxels =
       std::min({glm::length(frame_.output_from_lattice.linear[0]), glm::length(frame_.output_from_lattice.linear[1]),
                 glm::length(frame_.output_from_lattice.linear[2])});
-  cells_per_block_ =
-      std::clamp<std::int64_t>(static_cast<std::int64_t>(Block::kMostCells / cell_voxels), 1, Block::kMostCells);
-  blocks_ = (frame_.cells + (cells_per_block_ - 1)) / cells_per_block_;
+  const glm::dvec3 most(Block::kMostCells);
+  cells_per_block_ = glm::i64vec3(glm::clamp(glm::floor(most / cell_voxels), glm::dvec3(1), most));
+  blocks_ = (frame_.cells + (cells_per_block_ - std::int64_t{1})) / cells_per_block_;
   groups_ = (blocks_ + (kGroup - 1)) / kGroup;
   resting_.assign(static_cast<std::size_t>(blocks_.x * blocks_.y * blocks_.z), 0);
+  inverted_.assign(resting_.size(), 0);
   boxes_.resize(static_cast<std::size_t>(blocks_.x * blocks_.y * blocks_.z));
   group_boxes_.resize(static_cast<std::size_t>(groups_.x * groups_.y * groups_.z));
 
@@ -138,8 +94,7 @@ void LatticeIndex::build(const Geometry& output, const FieldView& field, const C
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, boxes_.size(), 64), [&](const auto& range) {
     if (control.stop.stop_requested()) throw Cancelled();
     Block scratch;
-    for (std::size_t block = range.begin(); block < range.end(); ++block)
-      scan_block(block, scratch, statistics.local());
+    for (std::size_t block = range.begin(); block < range.end(); ++block) look_at(block, scratch, statistics.local());
   });
   statistics_ = {};
   for (const FieldStatistics& part : statistics) statistics_.add(part);
@@ -147,8 +102,8 @@ void LatticeIndex::build(const Geometry& output, const FieldView& field, const C
 }
 
 void LatticeIndex::load(std::size_t block, Block& into) const {
-  into.first_cell = unravel(block, blocks_) * cells_per_block_;
-  into.cells = glm::i32vec3(glm::min(glm::i64vec3(cells_per_block_), frame_.cells - into.first_cell));
+  into.first_cell = first_cell(block);
+  into.cells = glm::i32vec3(glm::min(cells_per_block_, frame_.cells - into.first_cell));
   into.at_rest = true;
   const glm::i64vec3& size = field_.lattice->size;
   Vertex* vertex = into.vertices;
@@ -166,39 +121,41 @@ void LatticeIndex::load(std::size_t block, Block& into) const {
   }
 }
 
-void LatticeIndex::scan_block(std::size_t number, Block& block, FieldStatistics& statistics) {
+void LatticeIndex::look_at(std::size_t number, Block& block, FieldStatistics& statistics) {
+  const std::uint64_t inverted = statistics.inverted;
+  if (!look_with_vectors(number, statistics)) look_closely(number, block, statistics);
+  inverted_[number] = statistics.inverted != inverted;
+  statistics.moving_blocks += resting_[number] == 0;
+}
+
+bool LatticeIndex::look_with_vectors(std::size_t number, FieldStatistics& statistics) {
+  BlockScan scan;
+  const glm::ivec3 first(first_cell(number)), cells(glm::min(cells_per_block_, frame_.cells - glm::i64vec3(first)));
+  if (steps_.cells.x == 0 || !scan_block(vectors_, first, cells, scan)) return false;
+  boxes_[number] = scan.box;
+  resting_[number] = scan.at_rest;
+  statistics.add_scanned(scan, steps_);
+  return true;
+}
+
+void LatticeIndex::look_closely(std::size_t number, Block& block, FieldStatistics& statistics) {
   load(number, block);
   const Vertex& first = block.vertices[0];
   Box box{first.deformed, first.deformed};
   const int vertices = (block.cells.x + 1) * (block.cells.y + 1) * (block.cells.z + 1);
-  for (int n = 1; n < vertices; ++n) box.grow(block.vertices[n].deformed);
+  for (int n = 0; n < vertices; ++n) {
+    box.grow(block.vertices[n].deformed);
+    const glm::i32vec3 u = glm::abs(block.vertices[n].u);
+    statistics.most_moved = std::max({statistics.most_moved, u.x, u.y, u.z});
+  }
   boxes_[number] = box;
-  const bool regular = is_regular(block);
+  resting_[number] = block.at_rest && steps_.cells.x != 0;
   if (block.at_rest) {
-    resting_[number] = regular;
     statistics.jacobian_min = std::min(statistics.jacobian_min, 1.0);
     statistics.jacobian_max = std::max(statistics.jacobian_max, 1.0);
-  } else if (regular && reach_of(box) < std::int64_t{1} << 23) {  // so that edges are whole numbers in float
-    statistics.add_regular_cells(block, steps_);
   } else {
     statistics.add_cells(block);
   }
-}
-
-/// Whether the undeformed vertices of a block are snapped to where `steps` has them.
-bool LatticeIndex::is_regular(const Block& block) const {
-  if (steps_.cells.x == 0) return false;
-  const glm::i32vec3 first = glm::i32vec3(steps_.first) + glm::i32vec3(block.first_cell) * glm::i32vec3(steps_.cell),
-                     cell(steps_.cell);
-  const Vertex* vertex = block.vertices;
-  bool regular = true;
-  for (int z = 0; z <= block.cells.z; ++z) {
-    for (int y = 0; y <= block.cells.y; ++y) {
-      for (int x = 0; x <= block.cells.x; ++x, ++vertex)
-        regular &= vertex->deformed + vertex->u == first + glm::i32vec3(x, y, z) * cell;
-    }
-  }
-  return regular;
 }
 
 void LatticeIndex::group_boxes() {
@@ -220,8 +177,7 @@ void LatticeIndex::group_boxes() {
 }
 
 void LatticeIndex::rest_box(std::size_t block, glm::dvec3* low, glm::dvec3* high) const {
-  const glm::i64vec3 begin = unravel(block, blocks_) * cells_per_block_;
-  const glm::i64vec3 end = glm::min(begin + cells_per_block_, frame_.cells);
+  const glm::i64vec3 begin = first_cell(block), end = glm::min(begin + cells_per_block_, frame_.cells);
   const glm::dvec3 margin = frame_.beyond_rest();
   for (int corner = 0; corner < 8; ++corner) {
     const glm::dvec3 vertex(corner & 1 ? end.x : begin.x, corner >> 1 & 1 ? end.y : begin.y,

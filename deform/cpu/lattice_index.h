@@ -4,19 +4,22 @@
 
 #include "deform/core/lattice_vertex.h"
 #include "deform/core/visit_cell.h"
+#include "deform/cpu/block_scan.h"
 #include "deform/cpu/quick_snap.h"
+#include "deform/field_check.h"
 #include "deform/resampler.h"
 
 namespace tetwarp::cpu {
 
-/// Vertices of a block of up to 8 x 8 x 8 cells, i fastest, snapped.
+/// Vertices of a block of cells, i fastest, snapped.
 struct LatticeBlock {
-  static constexpr int kMostCells = 8, kMostVertices = kMostCells + 1;
+  static constexpr glm::ivec3 kMostCells = kMostScanned;
+  static constexpr int kMostVertices = (kMostCells.x + 1) * (kMostCells.y + 1) * (kMostCells.z + 1);
 
   glm::i64vec3 first_cell;
   glm::i32vec3 cells;  ///< cells on each axis
   bool at_rest;        ///< every u is zero
-  Vertex vertices[kMostVertices * kMostVertices * kMostVertices];
+  Vertex vertices[kMostVertices];
 
   Cell cell(const glm::i32vec3& at) const;
   bool is_odd(const glm::i32vec3& at) const {
@@ -24,23 +27,43 @@ struct LatticeBlock {
   }
 };
 
+/// Calls `visit(tetrahedron)` for what is inverted in a block.
+template <class Visit>
+void for_each_inverted(const LatticeBlock& block, Visit&& visit) {
+  for (int z = 0; z < block.cells.z; ++z) {
+    for (int y = 0; y < block.cells.y; ++y) {
+      for (int x = 0; x < block.cells.x; ++x) {
+        const Cell cell = block.cell({x, y, z});
+        const bool odd = block.is_odd({x, y, z});
+        float jacobians[kTetrahedraPerCell];
+        cell_jacobians(cell, odd, jacobians);
+        for (int number = 0; number < kTetrahedraPerCell; ++number) {
+          if (jacobians[number] < 0) visit(tetrahedron_of(cell, number, odd));
+        }
+      }
+    }
+  }
+}
+
 /// What a pass over all tetrahedra of a field found.
 struct FieldStatistics {
   std::uint64_t inverted = 0, degenerate = 0;
+  std::int64_t moving_blocks = 0;  ///< that do not rest (`LatticeIndex::rests`)
+  std::int32_t most_moved = 0;     ///< steps that a vertex is displaced on an axis
   double jacobian_min = std::numeric_limits<double>::infinity();
   double jacobian_max = -std::numeric_limits<double>::infinity();
 
   void add(const FieldStatistics& other);
   /// Counts the tetrahedra of a block.
   void add_cells(const LatticeBlock& block);
-  /// The same where the undeformed vertices are those of `steps`, and edges are whole numbers in float.
-  void add_regular_cells(const LatticeBlock& block, const StepLattice& steps);
+  /// Counts the tetrahedra of a block that was scanned. @param steps  the lattice that it is of
+  void add_scanned(const BlockScan& block, const StepLattice& steps);
 };
 
 /// The vertices of a field, snapped on demand, and boxes by which to find the cells that may reach a part of the
 /// output.
 ///
-/// Cells are held in blocks of up to 8 x 8 x 8, blocks in groups of 8 x 8 x 8; each has the box of its deformed
+/// Cells are held in blocks of up to 16 x 8 x 8, blocks in groups of 8 x 8 x 8; each has the box of its deformed
 /// vertices. Nothing of the field is copied: a block's vertices are snapped each time that it is visited.
 class LatticeIndex {
  public:
@@ -73,10 +96,26 @@ class LatticeIndex {
   }
 
   void load(std::size_t block, Block& into) const;
+  /// @throws InputError for a vertex that is not finite or too far away
+  Vertex vertex(const glm::i64vec3& at) const {
+    Vertex vertex;
+    const glm::i64vec3& size = field_.lattice->size;
+    const glm::vec3& displacement = field_.displacement[(at.z * size.y + at.y) * size.x + at.x];
+    const bool done = quick_.is_usable() && quick_.snap(glm::ivec3(at), displacement, vertex);
+    if (!done && !frame_.snap_vertex(at, displacement, vertex)) refuse_vertex(at);
+    return vertex;
+  }
+  std::size_t block_of(const glm::i64vec3& cell) const {
+    const glm::i64vec3 at = cell / cells_per_block_;
+    return static_cast<std::size_t>((at.z * blocks_.y + at.y) * blocks_.x + at.x);
+  }
+  bool has_inverted(std::size_t block) const { return inverted_[block] != 0; }
   /// Whether every vertex of a block rests, and at the whole step where `steps` has it.
   bool rests(std::size_t block) const { return resting_[block] != 0; }
   /// The lattice, where its undeformed vertices lie at whole steps; else no cells.
   const StepLattice& steps() const { return steps_; }
+  /// The field for vectors, where `steps` has cells.
+  const VectorField& vectors() const { return vectors_; }
   /// Grows a box in continuous output index to hold every undeformed place that a block's tetrahedra can give, weights
   /// that leave [0, 1] by the slack included.
   void rest_box(std::size_t block, glm::dvec3* low, glm::dvec3* high) const;
@@ -86,19 +125,32 @@ class LatticeIndex {
 
   static bool reaches(const Box& box, const Region& region);
   static glm::i64vec3 unravel(std::size_t number, const glm::i64vec3& size);
-  void scan_block(std::size_t block, Block& scratch, FieldStatistics& statistics);
-  bool is_regular(const Block& block) const;
+  void look_at(std::size_t block, Block& scratch, FieldStatistics& statistics);
+  bool look_with_vectors(std::size_t block, FieldStatistics& statistics);
+  void look_closely(std::size_t block, Block& scratch, FieldStatistics& statistics);
+  glm::i64vec3 first_cell(std::size_t block) const { return unravel(block, blocks_) * cells_per_block_; }
   void group_boxes();
 
   FieldView field_;
   LatticeFrame frame_;
   glm::i64vec3 blocks_{0}, groups_{0};
-  std::int64_t cells_per_block_ = Block::kMostCells;
+  glm::i64vec3 cells_per_block_{1};
   std::vector<Box> boxes_, group_boxes_;
-  std::vector<std::uint8_t> resting_;
+  std::vector<std::uint8_t> resting_, inverted_;
   StepLattice steps_;
   QuickSnap quick_;
+  VectorField vectors_;
   FieldStatistics statistics_;
+};
+
+/// The vertices of a lattice at whole steps, snapped when they are asked for: for what takes any lattice
+/// (`vertices_of`).
+struct SnappedLattice {
+  const LatticeIndex& index;
+  glm::ivec3 cells;
+
+  explicit SnappedLattice(const LatticeIndex& of) : index(of), cells(of.steps().cells) {}
+  Vertex vertex(const glm::ivec3& at) const { return index.vertex(glm::i64vec3(at)); }
 };
 
 }  // namespace tetwarp::cpu

@@ -6,6 +6,8 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "deform/cpu/linear_row.cpp"
 #include <hwy/foreach_target.h>
+// After it, as Highway asks.
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
@@ -55,6 +57,15 @@ struct Axis {
   }
 };
 
+/// Asks for what the same voxels of the next slice will be sampled from, if they come from beside these.
+template <class V>
+HWY_INLINE void prefetch(const LinearSource& source, std::int64_t at, int lanes) {
+  const auto* line = reinterpret_cast<const char*>(static_cast<const V*>(source.voxels)) +
+                     (at + 2 * std::int64_t{source.slice}) * static_cast<std::int64_t>(sizeof(V));
+  hwy::Prefetch(line);
+  hwy::Prefetch(line + lanes * static_cast<int>(sizeof(V)));
+}
+
 HWY_INLINE Float mix(Float a, Float b, Float t) { return hn::Add(a, hn::Mul(t, hn::Sub(b, a))); }
 
 template <class V>
@@ -85,6 +96,7 @@ SliceRange sample(const LinearSource& source, const Row& row, V* output, RowStat
       const Int last = hn::Set(di, source.voxel_count - 3 - source.slice - source.row);
       good = hn::And(good, hn::Lt(at, last));
     }
+    prefetch<V>(source, hn::GetLane(at), lanes);
     const Int offset = hn::ShiftLeft<sizeof(V) - 1>(hn::IfThenElseZero(good, at));
     const Int step_y = hn::ShiftLeft<sizeof(V) - 1>(hn::IfThenElseZero(good, stride_row)),
               step_z = hn::ShiftLeft<sizeof(V) - 1>(hn::IfThenElseZero(good, stride_slice));

@@ -15,7 +15,8 @@ class QuickSnap {
   /// @param steps  without cells: never usable
   QuickSnap(const LatticeFrame& frame, const StepLattice& steps) {
     constexpr double kApart = 0.01;  // steps: more than rest places differ from whole multiples of cells
-    usable_ = steps.cells.x != 0 && frame.first_slice == 0;
+    rests_at_steps_ = steps.cells.x != 0 && frame.first_slice == 0;
+    usable_ = rests_at_steps_;
     const glm::dvec3 first = frame.output_from_lattice(glm::dvec3(0));
     for (int axis = 0; axis < 3; ++axis) {
       first_[axis] = first[axis] * kStepsPerVoxel;
@@ -25,13 +26,16 @@ class QuickSnap {
         usable_ = usable_ && (other == axis || (frame.output_from_mm[axis][other] == 0 &&
                                                 frame.output_from_lattice.linear[axis][other] == 0));
       }
-      usable_ = usable_ && std::fabs(std::fabs(first_[axis] - std::rint(first_[axis])) - 0.5) > kApart;
+      rests_at_steps_ = rests_at_steps_ && std::fabs(std::fabs(first_[axis] - std::rint(first_[axis])) - 0.5) > kApart;
     }
+    usable_ = usable_ && rests_at_steps_;
     rest_ = glm::ivec3(steps.first);
     rest_cell_ = glm::ivec3(steps.cell);
   }
 
   bool is_usable() const { return usable_; }
+  /// Whether every vertex at rest is snapped to where the StepLattice has it, for all grids.
+  bool rests_at_steps() const { return rests_at_steps_; }
   /// @return false for a vertex that is far away, or not finite: `snap_vertex` must be asked
   bool snap(const glm::ivec3& at, const glm::vec3& displacement, Vertex& vertex) const {
     glm::dvec3 rounded(0);
@@ -53,7 +57,7 @@ class QuickSnap {
       3.0 * (std::int64_t{1} << 51);       ///< adding it rounds to whole numbers, ties to even
   static constexpr double kFar = 1 << 28;  ///< steps
 
-  bool usable_ = false;
+  bool usable_ = false, rests_at_steps_ = false;
   glm::dvec3 first_{0}, cell_{0}, scale_{0};  ///< steps; mm to steps
   glm::ivec3 rest_{0}, rest_cell_{0};         ///< the same, snapped
 };

@@ -1,0 +1,76 @@
+#pragma once
+
+#include "deform/core/lattice_vertex.h"
+#include "deform/core/step_lattice.h"
+
+namespace tetwarp {
+
+/// Snaps displacements in float where that certainly gives what `LatticeFrame::snap_vertex` gives.
+///
+/// With an axis of the lattice along each axis of the grid, a displacement in steps is d m, m = high + low to 48 bits.
+/// Adding what raises it to where floats are whole numbers (StepPacking), fused, rounds d high to whole steps; the
+/// rest, known to 2^-20 step, decides wherever it is not that close to a half. Where m is a power of two and vertices
+/// rest at even steps, all of that is exact, and ties go to even here as there. Other ties, and far and unusable
+/// vertices, need double arithmetic.
+class FloatSnap {
+ public:
+  FloatSnap() = default;
+  /// @param lift  even whole numbers above 2^23
+  FloatSnap(const LatticeFrame& frame, const StepLattice& lattice, const glm::vec3& lift) : lift_(lift) {
+    const glm::dvec3 first = frame.output_from_lattice(glm::dvec3(0, 0, static_cast<double>(frame.first_slice)));
+    double beside = 0;  // how far a vertex may rest from its whole step
+    exact_ = true;
+    for (int axis = 0; axis < 3; ++axis) {
+      for (int other = 0; other < 3; ++other) {
+        if (other != axis && frame.output_from_mm[axis][other] != 0) beside = 1;
+        const double meant = axis == other ? double{lattice.cell[axis]} : 0.0;
+        beside += std::fabs(frame.output_from_lattice.linear[axis][other] * kStepsPerVoxel - meant) *
+                  static_cast<double>(frame.cells[axis]);
+      }
+      beside += std::fabs(first[axis] * kStepsPerVoxel - double{lattice.first[axis]});
+      const double scale = frame.output_from_mm[axis][axis] * kStepsPerVoxel;
+      high_[axis] = static_cast<float>(scale);
+      low_[axis] = static_cast<float>(scale - double{high_[axis]});
+      int exponent = 0;
+      exact_ = exact_ && std::fabs(std::frexp(scale, &exponent)) == 0.5 && std::fmod(lattice.first[axis], 2.0f) == 0 &&
+               std::fmod(lattice.cell[axis], 2.0f) == 0;
+    }
+    exact_ = exact_ && beside == 0;
+    clear_ = static_cast<float>(0.5 - 1.0 / (1 << 16) - beside);
+  }
+
+  /// Whether anything is ever certain.
+  bool is_usable() const { return clear_ > 0; }
+  /// Whether ties go to even steps here as there.
+  bool is_exact() const { return exact_; }
+  /// What is left decides where it is smaller than `clear`.
+  float clear() const { return clear_; }
+  const glm::vec3& high() const { return high_; }
+  const glm::vec3& low() const { return low_; }
+  const glm::vec3& lift() const { return lift_; }
+
+  /// The displacement in whole steps, raised; right where it can be packed and it `is_certain`.
+  TETWARP_HD glm::vec3 raised(const glm::vec3& displacement) const {
+    return {fmaf(displacement.x, high_.x, lift_.x), fmaf(displacement.y, high_.y, lift_.y),
+            fmaf(displacement.z, high_.z, lift_.z)};
+  }
+  /// Where ties are not exact: whether there is none. No `&&`: branches would cost more than they save.
+  TETWARP_HD bool is_certain(const glm::vec3& displacement, const glm::vec3& raised) const {
+    bool certain = true;
+#ifdef __CUDA_ARCH__
+#pragma unroll
+#endif
+    for (int axis = 0; axis < 3; ++axis) {
+      const float left = fmaf(displacement[axis], high_[axis], lift_[axis] - raised[axis]);
+      certain &= std::fabs(fmaf(displacement[axis], low_[axis], left)) < clear_;
+    }
+    return certain;
+  }
+
+ private:
+  glm::vec3 high_{0}, low_{0}, lift_{0};
+  float clear_ = -1;  ///< negative: never
+  bool exact_ = false;
+};
+
+}  // namespace tetwarp

@@ -1,0 +1,28 @@
+#pragma once
+
+#include "deform/core/five_tetrahedra.h"
+#include "deform/cpu/vector_field.h"
+
+namespace tetwarp::cpu {
+
+/// What vectors find out about a block of cells.
+struct BlockScan {
+  Box box;                  ///< of the deformed vertices, 2^-12 voxel
+  bool at_rest;             ///< no vertex moved
+  std::int32_t most_moved;  ///< steps that a vertex is displaced on an axis
+  std::uint64_t inverted;   ///< tetrahedra; none is degenerate
+  /// Least and most of six times the volumes, positive where upright, of corner tetrahedra and of centres, in float.
+  float least[2], most[2];
+};
+
+/// Largest block along i, j and k.
+constexpr glm::ivec3 kMostScanned(16, 8, 8);
+
+/// Snaps the vertices of a block and takes the volumes of its tetrahedra, by the widest vectors that the processor has
+/// (Highway): the floats of `edge_determinant`.
+///
+/// @param cells  up to kMostScanned  @param scan  written
+/// @return false where float is not certain of a sign, or a vertex is far away or not finite
+bool scan_block(const VectorField& field, const glm::ivec3& first_cell, const glm::ivec3& cells, BlockScan& scan);
+
+}  // namespace tetwarp::cpu

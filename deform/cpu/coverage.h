@@ -1,0 +1,40 @@
+#pragma once
+
+#include <vector>
+
+#include "deform/cpu/lattice_index.h"
+#include "deform/cpu/march.h"
+
+namespace tetwarp::cpu {
+
+/// How many tetrahedra own each voxel: the winding number of the deformed border (docs/algorithm.md, "Gather"), held as
+/// the places where rows of voxels pass through it; and, tile by tile, what inverted tetrahedra may reach.
+class Coverage {
+ public:
+  /// Looks at the whole border, in parallel in the calling task arena. @param index  with `steps`; must stay as it is
+  void find(const LatticeIndex& index, const Geometry& output);
+
+  /// @param owners  of each voxel of the box, i fastest, written  @param block  scratch  @return how many are `several`
+  std::int64_t owners_of(const Region& box, Owners* owners, LatticeBlock& block) const;
+
+ private:
+  /// From this voxel of its row on, the winding number is another one.
+  struct Crossing {
+    std::int32_t voxel, change;
+  };
+  struct CrossingInRow {
+    std::int64_t row;
+    Crossing crossing;
+  };
+
+  void look_at_row(int axis, bool high, int last, std::vector<CrossingInRow>& found) const;
+  void sort_into_rows(const std::vector<const std::vector<CrossingInRow>*>& found);
+  std::int64_t add_inverted(const Region& box, Owners* owners, LatticeBlock& block) const;
+
+  const LatticeIndex* index_ = nullptr;
+  glm::i64vec3 size_{0};
+  std::vector<std::int64_t> first_;  ///< crossing of each row, and of the row after the last
+  std::vector<Crossing> crossings_;  ///< in each row by voxel
+};
+
+}  // namespace tetwarp::cpu

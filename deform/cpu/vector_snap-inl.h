@@ -1,0 +1,136 @@
+// Snapping of vertices with vectors; included once for each instruction set (Highway's -inl.h files).
+#if defined(TETWARP_VECTOR_SNAP_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef TETWARP_VECTOR_SNAP_INL_H_
+#undef TETWARP_VECTOR_SNAP_INL_H_
+#else
+#define TETWARP_VECTOR_SNAP_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include "deform/cpu/vector_field.h"
+
+HWY_BEFORE_NAMESPACE();
+
+namespace tetwarp::cpu::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Floats = hn::ScalableTag<float>;
+using Ints = hn::RebindToSigned<Floats>;
+#if HWY_TARGET == HWY_SCALAR
+using HalfFloats = Floats;  // one lane: there are no halves
+#else
+using HalfFloats = hn::Half<Floats>;
+#endif
+using Doubles = hn::Rebind<double, HalfFloats>;
+using Float = hn::Vec<Floats>;
+using Int = hn::Vec<Ints>;
+using Double = hn::Vec<Doubles>;
+using FloatMask = hn::Mask<Floats>;
+
+/// Whether `MulAdd` rounds once.
+#if HWY_ARCH_X86
+constexpr bool kFused = HWY_TARGET <= HWY_AVX2;
+#else
+constexpr bool kFused = HWY_ARCH_ARM_A64 != 0;
+#endif
+
+struct Vec3 {
+  Float x, y, z;
+};
+
+HWY_INLINE Float set(float value) { return hn::Set(Floats(), value); }
+HWY_INLINE Vec3 set(const glm::vec3& v) { return {set(v.x), set(v.y), set(v.z)}; }
+HWY_INLINE Vec3 operator-(const Vec3& a, const Vec3& b) {
+  return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
+}
+
+/// How displacements are snapped. In float only where `MulAdd` is fused and `FloatSnap` is usable.
+enum class Snapping {
+  float_with_ties,  ///< ties are exact: `FloatSnap::is_exact`
+  in_float,         ///< what is not certain is said
+  in_double         ///< as `LatticeFrame::snap_vertex` does; always certain
+};
+
+template <Snapping kSnapping>
+HWY_INLINE Float snap_axis(const FloatSnap& snap, int axis, Float displacement, FloatMask& certain) {
+  const Float high = set(snap.high()[axis]), lift = set(VectorField::kLift);
+  const Float moved = hn::Sub(hn::MulAdd(displacement, high, lift), lift);
+  if constexpr (kSnapping == Snapping::in_float) {
+    const Float left = hn::MulAdd(displacement, set(snap.low()[axis]), hn::MulSub(displacement, high, moved));
+    certain = hn::And(certain, hn::Lt(hn::Abs(left), set(snap.clear())));
+  }
+  return moved;
+}
+
+/// Half of the lanes of three vectors, in double.
+struct DoubleVec3 {
+  Double x, y, z;
+};
+
+HWY_INLINE DoubleVec3 promoted(hn::Vec<HalfFloats> x, hn::Vec<HalfFloats> y, hn::Vec<HalfFloats> z) {
+  const Doubles dd;
+  return {hn::PromoteTo(dd, x), hn::PromoteTo(dd, y), hn::PromoteTo(dd, z)};
+}
+
+/// One axis of what `AffineMap` and `LatticeFrame::snap_vertex` compute, operation by operation; steps moved.
+HWY_INLINE hn::Vec<HalfFloats> moved_in_double(const VectorField& field, int axis, const DoubleVec3& displacement,
+                                               const DoubleVec3& at) {
+  const Doubles dd;
+  const auto times = [&](const glm::dmat3& m, const DoubleVec3& v) {
+    return hn::Add(hn::Add(hn::Mul(hn::Set(dd, m[0][axis]), v.x), hn::Mul(hn::Set(dd, m[1][axis]), v.y)),
+                   hn::Mul(hn::Set(dd, m[2][axis]), v.z));
+  };
+  const Double rest =
+      hn::Add(times(field.output_from_lattice.linear, at), hn::Set(dd, field.output_from_lattice.offset[axis]));
+  const Double place = hn::Add(rest, times(field.output_from_mm, displacement));
+  const Double deformed = hn::Round(hn::Mul(place, hn::Set(dd, double{kStepsPerVoxel})));
+  const Double along = axis == 0 ? at.x : (axis == 1 ? at.y : at.z);
+  const Double from = hn::Add(hn::Mul(along, hn::Set(dd, double{field.lattice.cell[axis]})),
+                              hn::Set(dd, double{field.lattice.first[axis]}));
+  return hn::DemoteTo(HalfFloats(), hn::Sub(deformed, from));
+}
+
+/// How many steps vertices move. @param at  vertices  @param certain  taken from lanes that are not
+template <Snapping kSnapping>
+HWY_INLINE Vec3 moved_steps(const VectorField& field, const Vec3& displacement, const Vec3& at, FloatMask& certain) {
+  if constexpr (kSnapping == Snapping::in_double) {
+#if HWY_TARGET == HWY_SCALAR
+    const DoubleVec3 d = promoted(displacement.x, displacement.y, displacement.z), v = promoted(at.x, at.y, at.z);
+    return {moved_in_double(field, 0, d, v), moved_in_double(field, 1, d, v), moved_in_double(field, 2, d, v)};
+#else
+    const auto low = [](const Vec3& v) { return promoted(hn::LowerHalf(v.x), hn::LowerHalf(v.y), hn::LowerHalf(v.z)); };
+    const auto high = [](const Vec3& v) {
+      const HalfFloats dh;
+      return promoted(hn::UpperHalf(dh, v.x), hn::UpperHalf(dh, v.y), hn::UpperHalf(dh, v.z));
+    };
+    const DoubleVec3 low_d = low(displacement), high_d = high(displacement), low_at = low(at), high_at = high(at);
+    const auto axis = [&](int n) {
+      return hn::Combine(Floats(), moved_in_double(field, n, high_d, high_at),
+                         moved_in_double(field, n, low_d, low_at));
+    };
+    return {axis(0), axis(1), axis(2)};
+#endif
+  } else {
+    return {snap_axis<kSnapping>(field.snap, 0, displacement.x, certain),
+            snap_axis<kSnapping>(field.snap, 1, displacement.y, certain),
+            snap_axis<kSnapping>(field.snap, 2, displacement.z, certain)};
+  }
+}
+
+/// Calls `f` with the fastest Snapping that a field allows, as a constant.
+template <class F>
+HWY_INLINE auto with_snapping(const VectorField& field, F&& f) {
+  if constexpr (kFused) {
+    if (field.snap.is_exact()) return f(std::integral_constant<Snapping, Snapping::float_with_ties>());
+    if (field.snap.is_usable()) return f(std::integral_constant<Snapping, Snapping::in_float>());
+  }
+  return f(std::integral_constant<Snapping, Snapping::in_double>());
+}
+
+}  // namespace tetwarp::cpu::HWY_NAMESPACE
+
+HWY_AFTER_NAMESPACE();
+
+#endif  // the toggle
