@@ -25,6 +25,30 @@ void cross_rows(const BorderTriangle& t, const Nudge& nudge, const IntBox& rows,
   }
 }
 
+/// The vertices of a row of faces, snapped once: all that `border_triangle` asks for.
+class RowOfFaces {
+ public:
+  glm::ivec3 cells;
+
+  RowOfFaces(const LatticeIndex& index, int axis, bool high, int last)
+      : cells(index.steps().cells), next_((axis + 1) % 3), after_((axis + 2) % 3), last_(last) {
+    glm::i64vec3 at(0);
+    at[axis] = high ? cells[axis] : 0;
+    for (int side = 0; side < 2; ++side) {
+      at[after_] = last + side;
+      for (at[next_] = 0; at[next_] <= cells[next_]; ++at[next_]) vertices_[side].push_back(index.vertex(at));
+    }
+  }
+
+  const Vertex& vertex(const glm::ivec3& at) const {
+    return vertices_[at[after_] - last_][static_cast<std::size_t>(at[next_])];
+  }
+
+ private:
+  int next_, after_, last_;
+  std::vector<Vertex> vertices_[2];
+};
+
 }  // namespace
 
 void Coverage::find(const LatticeIndex& index, const Geometry& output) {
@@ -51,16 +75,11 @@ void Coverage::find(const LatticeIndex& index, const Geometry& output) {
 
 /// A row of faces of one side of the lattice. @param last  their place on the second axis after `axis`
 void Coverage::look_at_row(int axis, bool high, int last, std::vector<CrossingInRow>& found) const {
-  const SnappedLattice lattice(*index_);
+  const RowOfFaces lattice(*index_, axis, high, last);
   const Nudge& nudge = index_->frame().nudge;
   const NudgeTurns turns(nudge);
   const int next = (axis + 1) % 3;
   for (int n = 0; n < 2 * lattice.cells[next]; ++n) {
-    glm::ivec3 cell(0);
-    cell[axis] = high ? lattice.cells[axis] - 1 : 0;
-    cell[next] = n / 2;
-    cell[(axis + 2) % 3] = last;
-    if (axis != 0 && index_->rests(index_->block_of(glm::i64vec3(cell)))) continue;  // no row passes through
     const BorderTriangle t = border_triangle(lattice, axis, high, {n / 2, last}, n % 2);
     Box around{t.a, t.a};
     around.grow(t.b);

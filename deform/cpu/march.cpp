@@ -132,7 +132,40 @@ struct Trials {
   }
 };
 
-/// `try_tetrahedron`, one a lane.
+/// The numerators of the weights at nudged voxels and what they leave of the determinant, in double: how far the least
+/// of them is above its rounding error. Of coordinates below 2^24 steps only the last sums are rounded.
+/// @param error  bound of the rounding errors in float
+HWY_INLINE hn::Vec<HalfFloats> clearance(const DoubleVec3& a, const DoubleVec3& b, const DoubleVec3& c,
+                                         const DoubleVec3& q, Double turn, Double error) {
+  const Doubles dd;
+  const auto cross = [](const DoubleVec3& u, const DoubleVec3& v) {
+    return DoubleVec3{hn::Sub(hn::Mul(u.y, v.z), hn::Mul(u.z, v.y)), hn::Sub(hn::Mul(u.z, v.x), hn::Mul(u.x, v.z)),
+                      hn::Sub(hn::Mul(u.x, v.y), hn::Mul(u.y, v.x))};
+  };
+  const auto times = [](const DoubleVec3& u, const DoubleVec3& v) {
+    return hn::Add(hn::Add(hn::Mul(u.x, v.x), hn::Mul(u.y, v.y)), hn::Mul(u.z, v.z));
+  };
+  const DoubleVec3 bc = cross(b, c);
+  const Double det = times(a, bc), qa = times(q, bc), qb = times(q, cross(c, a)), qc = times(q, cross(a, b));
+  const Double qd = hn::Sub(hn::Sub(hn::Sub(det, qa), qb), qc);
+  const auto turned = [&](Double v) { return hn::Mul(v, turn); };
+  const Double least = hn::Min(hn::Min(turned(qa), turned(qb)), hn::Min(turned(qc), turned(qd)));
+  constexpr double kFiner = 1.0 / (1 << 29);  // units of rounding
+  return hn::DemoteTo(HalfFloats(), hn::Sub(least, hn::Mul(error, hn::Set(dd, kFiner))));
+}
+
+/// Where that is above zero. @param turn  1 or -1: sign of an upright determinant
+HWY_INLINE FloatMask inside_in_double(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& r, const Vec3& nudge,
+                                      Float turn, Float error) {
+  const Vec3 q{hn::Add(r.x, nudge.x), hn::Add(r.y, nudge.y), hn::Add(r.z, nudge.z)};
+  const Float clear =
+      in_halves([](const DoubleVec3& da, const DoubleVec3& db, const DoubleVec3& dc, const DoubleVec3& dq,
+                   const DoubleVec3& dt) { return clearance(da, db, dc, dq, dt.x, dt.y); },
+                a, b, c, q, Vec3{turn, error, error});
+  return hn::Gt(clear, hn::Zero(Floats()));
+}
+
+/// `try_tetrahedron`, one a lane. With full effort what float leaves open is decided in double.
 /// @param steps, nudge  as of `GatherPoint`
 template <Snapping kSnapping, Effort kEffort>
 HWY_INLINE Trials try_tetrahedra(const VectorField& field, const Vec3& place, const Vec3& steps, const Vec3& nudge) {
@@ -188,12 +221,17 @@ HWY_INLINE Trials try_tetrahedra(const VectorField& field, const Vec3& place, co
   } else {
     usable = hn::Gt(upright, hn::Mul(squared, hn::MulAdd(set(detail::kThinSum), s, set(detail::kSlackSum))));
   }
-  const Float bound = hn::MulAdd(error, hn::Abs(reciprocal), set(8 * detail::kUnit));
+  FloatMask inside;
+  if constexpr (kEffort == Effort::full) {
+    inside = inside_in_double(a, b, c, r, nudge, hn::IfThenElse(turned, set(-1.0f), set(1.0f)), error);
+  } else {
+    inside = hn::Gt(least_of(weights), hn::MulAdd(error, hn::Abs(reciprocal), set(8 * detail::kUnit)));
+  }
   const auto blended = [&](Float of_d, Float of_a, Float of_b, Float of_c) {
     return hn::Add(hn::Add(hn::Add(of_d, hn::Mul(w.x, of_a)), hn::Mul(w.y, of_b)), hn::Mul(w.z, of_c));
   };
   return {
-      hn::And(hn::And(hn::Gt(least_of(weights), bound), usable), certain),
+      hn::And(hn::And(inside, usable), certain),
       {blended(moved.x, further_a.x, further_b.x, further_c.x), blended(moved.y, further_a.y, further_b.y, further_c.y),
        blended(moved.z, further_a.z, further_b.z, further_c.z)},
       t,
@@ -336,10 +374,12 @@ class Marcher {
     const Ints di;
     MarchScratch::Queue& queue = scratch_.queue;
     const FloatMask of_floats = hn::RebindMask(df, which);
-    hn::CompressStore(place.x, of_floats, df, queue.x + queue.count);
-    hn::CompressStore(place.y, of_floats, df, queue.y + queue.count);
-    hn::CompressStore(place.z, of_floats, df, queue.z + queue.count);
-    queue.count += static_cast<int>(hn::CompressStore(voxels, which, di, queue.voxel + queue.count));
+    // Compressed in registers: some processors are very slow to compress into memory.
+    hn::StoreU(hn::Compress(place.x, of_floats), df, queue.x + queue.count);
+    hn::StoreU(hn::Compress(place.y, of_floats), df, queue.y + queue.count);
+    hn::StoreU(hn::Compress(place.z, of_floats), df, queue.z + queue.count);
+    hn::StoreU(hn::Compress(voxels, which), di, queue.voxel + queue.count);
+    queue.count += static_cast<int>(hn::CountTrue(di, which));
   }
 
   /// Tries all that is in the queue once more. @tparam kWrite  offsets too; otherwise only places

@@ -74,6 +74,19 @@ HWY_INLINE DoubleVec3 promoted(hn::Vec<HalfFloats> x, hn::Vec<HalfFloats> y, hn:
   return {hn::PromoteTo(dd, x), hn::PromoteTo(dd, y), hn::PromoteTo(dd, z)};
 }
 
+/// Calls `f` with both halves of vectors, and puts together the floats that it gives.
+template <class F, class... Vectors>
+HWY_INLINE Float in_halves(F&& f, const Vectors&... v) {
+#if HWY_TARGET == HWY_SCALAR
+  return f(promoted(v.x, v.y, v.z)...);
+#else
+  const HalfFloats dh;
+  const auto low = f(promoted(hn::LowerHalf(v.x), hn::LowerHalf(v.y), hn::LowerHalf(v.z))...);
+  const auto high = f(promoted(hn::UpperHalf(dh, v.x), hn::UpperHalf(dh, v.y), hn::UpperHalf(dh, v.z))...);
+  return hn::Combine(Floats(), high, low);
+#endif
+}
+
 /// One axis of what `AffineMap` and `LatticeFrame::snap_vertex` compute, operation by operation; steps moved.
 HWY_INLINE hn::Vec<HalfFloats> moved_in_double(const VectorField& field, int axis, const DoubleVec3& displacement,
                                                const DoubleVec3& at) {
@@ -96,22 +109,11 @@ HWY_INLINE hn::Vec<HalfFloats> moved_in_double(const VectorField& field, int axi
 template <Snapping kSnapping>
 HWY_INLINE Vec3 moved_steps(const VectorField& field, const Vec3& displacement, const Vec3& at, FloatMask& certain) {
   if constexpr (kSnapping == Snapping::in_double) {
-#if HWY_TARGET == HWY_SCALAR
-    const DoubleVec3 d = promoted(displacement.x, displacement.y, displacement.z), v = promoted(at.x, at.y, at.z);
-    return {moved_in_double(field, 0, d, v), moved_in_double(field, 1, d, v), moved_in_double(field, 2, d, v)};
-#else
-    const auto low = [](const Vec3& v) { return promoted(hn::LowerHalf(v.x), hn::LowerHalf(v.y), hn::LowerHalf(v.z)); };
-    const auto high = [](const Vec3& v) {
-      const HalfFloats dh;
-      return promoted(hn::UpperHalf(dh, v.x), hn::UpperHalf(dh, v.y), hn::UpperHalf(dh, v.z));
-    };
-    const DoubleVec3 low_d = low(displacement), high_d = high(displacement), low_at = low(at), high_at = high(at);
     const auto axis = [&](int n) {
-      return hn::Combine(Floats(), moved_in_double(field, n, high_d, high_at),
-                         moved_in_double(field, n, low_d, low_at));
+      return in_halves([&](const DoubleVec3& d, const DoubleVec3& v) { return moved_in_double(field, n, d, v); },
+                       displacement, at);
     };
     return {axis(0), axis(1), axis(2)};
-#endif
   } else {
     return {snap_axis<kSnapping>(field.snap, 0, displacement.x, certain),
             snap_axis<kSnapping>(field.snap, 1, displacement.y, certain),
