@@ -96,7 +96,8 @@ class ForwardResampler final : public Resampler {
 
  private:
   /// Whether a tile lies within the undeformed lattice, and all that may reach it rests: then each voxel is owned by a
-  /// cell at rest, and by no other.
+  /// cell at rest, and by no other. (Something must reach it: what lay there may have moved away as a whole. Where one
+  /// of its blocks rests, those beside it share vertices with it, and so on, and reach it too.)
   bool rests(const Region& box) const {
     const StepLattice& steps = lattice_.steps();
     if (steps.cells.x == 0) return false;
@@ -105,9 +106,12 @@ class ForwardResampler final : public Resampler {
                   to = static_cast<float>((box.end[axis] - 1) * kStepsPerVoxel) - steps.first[axis];
       if (from < 0 || to > static_cast<float>(steps.cells[axis]) * steps.cell[axis]) return false;
     }
-    bool all = true;
-    lattice_.find_blocks(box, [&](std::size_t block) { all = all && lattice_.rests(block); });
-    return all;
+    bool any = false, all = true;
+    lattice_.find_blocks(box, [&](std::size_t block) {
+      any = true;
+      all = all && lattice_.rests(block);
+    });
+    return any && all;
   }
 
   Report copy(const Region& box, Tile& tile, const std::vector<TargetSampler>& samplers, const MapWriter& maps) const {

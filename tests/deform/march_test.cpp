@@ -1,0 +1,165 @@
+// The march of the CPU, for every instruction set that the processor has, against claims: bit for bit.
+#include "deform/cpu/march.h"
+
+#include <gtest/gtest.h>
+
+#include <hwy/targets.h>
+
+#include "tests/support/fields.h"
+#include "tests/support/shifted.h"
+
+namespace tetwarp::cpu {
+namespace {
+
+using namespace test;
+
+class March : public testing::Test {
+ protected:
+  ~March() override { hwy::SetSupportedTargetsForTest(0); }
+
+  /// What the marches of a test did: the claims never march, for they are asked how many owners a voxel has.
+  Paths paths;
+
+  /// Sends a volume through a field on every instruction set. @return false where the march is not for the field
+  void expect_what_claims_give(const FieldCase& test, Random& random) {
+    const Volume<std::int16_t> source = random_values<std::int16_t>(test.output, random, -2000, 2000);
+    const auto claims = make_cpu_resampler(test.output);
+    claims->set_field(view(test.field, Outside::background));
+    const Outcome<std::int16_t> expected = run(*claims, source, {.background = 7});
+    for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+      SCOPED_TRACE(hwy::TargetName(target));
+      hwy::SetSupportedTargetsForTest(target);
+      const auto resampler = make_cpu_resampler(test.output);
+      resampler->set_field(view(test.field, Outside::background));
+      Outcome<std::int16_t> found = poisoned_outcome<std::int16_t>(test.output);
+      Maps maps = maps_of(found);
+      maps.jacobian = maps.owners = {};
+      const Target of{.source = view(source), .output = view(found.output), .background = 7};
+      found.report = resampler->resample(whole(test.output), {&of, 1}, maps);
+      ASSERT_TRUE(same_bits(expected.output.voxels, found.output.voxels));
+      ASSERT_TRUE(same_bits(expected.coverage.voxels, found.coverage.voxels));
+      ASSERT_TRUE(same_bits(expected.inverse_mm.voxels, found.inverse_mm.voxels));
+      ASSERT_EQ(expected.report.covered, found.report.covered);
+      ASSERT_EQ(expected.report.uncovered, found.report.uncovered);
+      paths.gathered += found.report.paths.gathered;
+      paths.walked += found.report.paths.walked;
+      paths.claimed += found.report.paths.claimed;
+      ASSERT_EQ(found.report.paths.gathered + found.report.paths.walked + found.report.paths.claimed,
+                static_cast<std::uint64_t>(voxel_count(test.output)));
+    }
+    hwy::SetSupportedTargetsForTest(0);
+  }
+};
+
+/// Sines in general directions: smooth, and without folds where the amplitude is small. In voxels.
+glm::dvec3 elastic(const glm::dvec3& rest, double amplitude) {
+  return amplitude * glm::dvec3(std::sin(0.11 * rest.x + 0.07 * rest.y - 0.05 * rest.z),
+                                std::sin(0.06 * rest.x - 0.12 * rest.y + 0.08 * rest.z),
+                                std::sin(0.09 * rest.z + 0.10 * rest.y + 0.04 * rest.x));
+}
+
+FieldCase elastic_case(const Geometry& output, std::int64_t cell, double amplitude) {
+  return {output,
+          field_in_voxels(output, lattice_over(output, cell),
+                          [&](const glm::dvec3& rest) { return elastic(rest, amplitude); }),
+          "elastic",
+          {}};
+}
+
+TEST_F(March, SmoothFieldsOverSeveralTiles) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  Random random(test_seed(), 900);
+  for (const std::int64_t cell : {1, 2, 5, 16}) {
+    SCOPED_TRACE(cell);
+    ASSERT_NO_FATAL_FAILURE(expect_what_claims_give(elastic_case(unit_grid({70, 45, 40}), cell, 3.3), random));
+  }
+  EXPECT_LT(100 * paths.walked, paths.gathered);
+  EXPECT_EQ(paths.claimed, 0u);
+}
+
+TEST_F(March, SpacingsThatAreNoPowersOfTwoAndGridsThatAreTurned) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  Random random(test_seed(), 910);
+  Geometry uneven = unit_grid({50, 37, 35});
+  uneven.spacing = {0.7, 0.83, 1.25};
+  uneven.origin = {-171.3, -160.1, 33.7};
+  for (const std::int64_t cell : {1, 3}) {
+    ASSERT_NO_FATAL_FAILURE(expect_what_claims_give(elastic_case(uneven, cell, 2.1), random));
+    ASSERT_NO_FATAL_FAILURE(expect_what_claims_give(elastic_case(oblique_grid({50, 37, 35}), cell, 2.1), random));
+  }
+  EXPECT_LT(100 * paths.walked, paths.gathered);
+  EXPECT_EQ(paths.claimed, 0u);
+}
+
+TEST_F(March, DisplacementsThatLieBetweenTwoSteps) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  Random random(test_seed(), 920);
+  for (const double spacing : {1.0, 0.7}) {
+    Geometry output = unit_grid({40, 34, 10});
+    output.spacing = glm::dvec3(spacing);
+    const auto halves = [&](const glm::dvec3& rest) {
+      return (glm::floor(elastic(rest, 2.0) * 4096.0) + 0.5) / 4096.0;
+    };
+    ASSERT_NO_FATAL_FAILURE(expect_what_claims_give(
+        {output, field_in_voxels(output, lattice_over(output, 1), halves), "halves", {}}, random));
+  }
+  EXPECT_GT(paths.gathered, 0u);
+}
+
+TEST_F(March, RandomFieldsWithAndWithoutFolds) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  for (std::uint64_t n = 0; n < test_cases(120); ++n) {
+    Random random(test_seed(), 1000 + n);
+    const FieldCase test = n % 2 == 0 ? random_injective_case(random) : random_folding_case(random);
+    SCOPED_TRACE(std::to_string(n) + ": " + test.description);
+    ASSERT_NO_FATAL_FAILURE(expect_what_claims_give(test, random));
+  }
+  EXPECT_GT(paths.gathered, 0u);
+  EXPECT_GT(paths.claimed, 0u);
+}
+
+TEST_F(March, FieldsThatLeaveTheVolumeAndFieldsThatAreTooFarAway) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  Random random(test_seed(), 930);
+  const Geometry output = unit_grid({36, 34, 9});
+  for (const double far : {20.0, 900.0, 1200.0, 5000.0}) {
+    SCOPED_TRACE(far);
+    const auto moved = [&](const glm::dvec3& rest) {  // a corner that goes far, and drags its cells with it
+      return elastic(rest, 1.0) + (rest.x + rest.y + rest.z < 4 ? glm::dvec3(far, -far, far / 2) : glm::dvec3(0));
+    };
+    ASSERT_NO_FATAL_FAILURE(
+        expect_what_claims_give({output, field_in_voxels(output, lattice_over(output, 1), moved), "far", {}}, random));
+  }
+}
+
+/// A part of the output is made as the whole is.
+TEST_F(March, RegionsBeginAnywhere) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  Random random(test_seed(), 940);
+  const FieldCase test = elastic_case(unit_grid({70, 45, 40}), 1, 3.3);
+  const Volume<std::int16_t> source = random_values<std::int16_t>(test.output, random, -2000, 2000);
+  const auto resampler = make_cpu_resampler(test.output);
+  resampler->set_field(view(test.field, Outside::background));
+  const auto resample = [&](const Region& region) {
+    Outcome<std::int16_t> found = poisoned_outcome<std::int16_t>(test.output);
+    const Target of{.source = view(source), .output = view(found.output), .background = 7};
+    resampler->resample(region, {&of, 1});
+    return found.output;
+  };
+  const Volume<std::int16_t> all = resample(whole(test.output));
+  for (int n = 0; n < 20; ++n) {
+    Region part;
+    for (int axis = 0; axis < 3; ++axis) {
+      part.begin[axis] = random.integer(0, test.output.size[axis] - 1);
+      part.end[axis] = random.integer(part.begin[axis] + 1, test.output.size[axis]);
+    }
+    const Volume<std::int16_t> found = resample(part), untouched = poisoned<std::int16_t>(test.output);
+    for_each_voxel(test.output, [&](const glm::i64vec3& voxel, std::size_t at) {
+      const bool inside = contains(part, Region{voxel, voxel + std::int64_t{1}});
+      ASSERT_EQ(found.voxels[at], (inside ? all : untouched).voxels[at]);
+    });
+  }
+}
+
+}  // namespace
+}  // namespace tetwarp::cpu
