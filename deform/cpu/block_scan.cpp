@@ -209,10 +209,10 @@ class Scanner {
     const glm::vec3 low(x_.lowest(), y_.lowest(), z_.lowest()), high(x_.highest(), y_.highest(), z_.highest());
     const glm::i32vec3 rest = glm::i32vec3(field_.lattice.first) + first_ * glm::i32vec3(field_.lattice.cell);
     scan.box = {rest + glm::i32vec3(low), rest + glm::i32vec3(high)};
-    if (reach_of(scan.box) >= std::int64_t{1} << 23) return false;  // edges must be whole numbers in float
     const glm::vec3 least(moved_x_.lowest(), moved_y_.lowest(), moved_z_.lowest()),
         most(moved_x_.highest(), moved_y_.highest(), moved_z_.highest());
-    // No sum norm of an edge is larger; the error of its determinants as in `edge_determinant`.
+    // Edges are whole numbers below 2^24: cells have up to 2^22 steps. No sum norm of one is larger; the error of its
+    // determinants as in `edge_determinant`.
     const glm::vec3 longest = field_.lattice.cell + (most - least);
     const float norm = (longest.x + longest.y) + longest.z;
     constexpr float kError = 9.0f / (1 << 24);

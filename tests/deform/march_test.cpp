@@ -106,6 +106,28 @@ TEST_F(March, DisplacementsThatLieBetweenTwoSteps) {
   EXPECT_GT(paths.gathered, 0u);
 }
 
+/// In such large cells the nudge is as small as the rounding errors of float, and many voxels lie on a slanted face of
+/// the centre tetrahedron.
+TEST_F(March, LargeCellsWhoseFacesPassThroughVoxels) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  Random random(test_seed(), 950);
+  constexpr double kCell = 997;  // its products need more digits than float has
+  const Geometry output = unit_grid({100, 70, 40});
+  Geometry lattice = unit_grid({2, 2, 2});
+  lattice.spacing = glm::dvec3(kCell);
+  const glm::dvec3 on_faces[] = {{332, 333, 332}, {665, 664, 332}, {665, 332, 664}, {332, 665, 664}};
+  for (const glm::dvec3& place : on_faces) {
+    lattice.origin = glm::dvec3(50, 35, 20) - place;
+    const glm::vec3 shift(random.integer(-3, 3), random.integer(-3, 3), 1);
+    ASSERT_NO_FATAL_FAILURE(expect_what_claims_give({output, uniform_field(lattice, shift), "", {}}, random));
+    VertexField stretched = uniform_field(lattice, shift);
+    for (const std::size_t corner : {0, 3, 5, 6})  // not those of the centre
+      stretched.displacement[corner].x += static_cast<float>(random.integer(1, 9));
+    ASSERT_NO_FATAL_FAILURE(expect_what_claims_give({output, stretched, "", {}}, random));
+  }
+  EXPECT_GT(paths.gathered, 0u);
+}
+
 TEST_F(March, RandomFieldsWithAndWithoutFolds) {
   SCOPED_TRACE(seed_text(test_seed()));
   for (std::uint64_t n = 0; n < test_cases(120); ++n) {
