@@ -31,7 +31,9 @@ class RowOfFaces {
   glm::ivec3 cells;
 
   RowOfFaces(const LatticeIndex& index, int axis, bool high, int last)
-      : cells(index.steps().cells), next_((axis + 1) % 3), after_((axis + 2) % 3), last_(last) {
+      : cells(index.steps().cells), next_((axis + 1) % 3), after_((axis + 2) % 3), last_(last), first_cell_(0) {
+    first_cell_[axis] = high ? cells[axis] - 1 : 0;
+    first_cell_[after_] = last;
     glm::i64vec3 at(0);
     at[axis] = high ? cells[axis] : 0;
     for (int side = 0; side < 2; ++side) {
@@ -40,12 +42,19 @@ class RowOfFaces {
     }
   }
 
+  /// That face n of the row belongs to.
+  glm::i64vec3 cell(int n) const {
+    glm::i64vec3 cell = first_cell_;
+    cell[next_] = n;
+    return cell;
+  }
   const Vertex& vertex(const glm::ivec3& at) const {
     return vertices_[at[after_] - last_][static_cast<std::size_t>(at[next_])];
   }
 
  private:
   int next_, after_, last_;
+  glm::i64vec3 first_cell_;
   std::vector<Vertex> vertices_[2];
 };
 
@@ -80,6 +89,7 @@ void Coverage::look_at_row(int axis, bool high, int last, std::vector<CrossingIn
   const NudgeTurns turns(nudge);
   const int next = (axis + 1) % 3;
   for (int n = 0; n < 2 * lattice.cells[next]; ++n) {
+    if (axis != 0 && index_->rests(index_->block_of(lattice.cell(n / 2)))) continue;  // flat: no row passes through
     const BorderTriangle t = border_triangle(lattice, axis, high, {n / 2, last}, n % 2);
     Box around{t.a, t.a};
     around.grow(t.b);

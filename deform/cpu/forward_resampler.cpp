@@ -66,7 +66,7 @@ class ForwardResampler final : public Resampler {
 
   Report resample(Region region, std::span<const Target> targets, const Maps& maps, const Control& control) override {
     require(ready_, "resample needs a field: call set_field first");
-    const std::vector<TargetSampler> samplers = make_samplers(*this, targets, region);
+    const TargetSamplers samplers = make_samplers(*this, targets, region);
     const MapWriter writer(maps, output(), region);
     const bool places_only = !writer.wants_jacobian() && !writer.wants_owners();
     const bool may_march = can_march_ && places_only;
@@ -114,7 +114,7 @@ class ForwardResampler final : public Resampler {
     return any && all;
   }
 
-  Report copy(const Region& box, Tile& tile, const std::vector<TargetSampler>& samplers, const MapWriter& maps) const {
+  Report copy(const Region& box, Tile& tile, const TargetSamplers& samplers, const MapWriter& maps) const {
     Report report;
     report.paths.gathered = static_cast<std::uint64_t>(voxel_count(box));
     const auto width = static_cast<int>(box.end.x - box.begin.x);
@@ -229,7 +229,7 @@ class ForwardResampler final : public Resampler {
   }
 
   /// Samples the rows of a tile whose voxels are settled.
-  void write(const Region& box, Tile& tile, const std::vector<TargetSampler>& samplers, const MapWriter& maps,
+  void write(const Region& box, Tile& tile, const TargetSamplers& samplers, const MapWriter& maps,
              Report& report) const {
     const Claims& claims = tile.claims;
     if (maps.wants_owners()) {

@@ -40,7 +40,7 @@ class PullResampler final : public Resampler {
   Report resample(Region region, std::span<const Target> targets, const Maps& maps, const Control& control) override {
     require(ready_, "resample needs a field: call set_field first");
     require(!maps.jacobian.voxels && !maps.owners.voxels, "a pull field has no tetrahedra: no Jacobian or owners map");
-    const std::vector<TargetSampler> samplers = make_samplers(*this, targets, region);
+    const TargetSamplers samplers = make_samplers(*this, targets, region);
     const MapWriter writer(maps, output(), region);
     return for_each_tile<RowScratch>(arena_, region, control, [&](const Region& box, RowScratch& scratch) {
       Report report;
