@@ -252,16 +252,32 @@ __global__ void inverted_kernel(StepLattice lattice, NudgeTurns turns, InvertedP
 
 }  // namespace
 
+/// Room for all of a box, zero but for the bits of voxels.
+void Coverage::reserve(const SlabBox& box, cudaStream_t stream) {
+  words_ = static_cast<int>((box.size.x + 31) / 32);
+  const auto rows = static_cast<std::size_t>(box.size.y * box.size.z), slices = static_cast<std::size_t>(box.size.z);
+  const std::size_t words = rows * static_cast<std::size_t>(words_);
+  crossings_.fill(0, 2 * words + 2 * rows + slices + 1, stream);
+  in_slice_ = crossings_.data() + 2 * words + 2 * rows;
+  single_.reserve(words);
+  several_.reserve(words);
+}
+
+void Coverage::forget(const SlabBox& box, cudaStream_t stream) {
+  reserve(box, stream);
+  const auto words = static_cast<std::size_t>(box.size.y * box.size.z * words_);
+  single_.fill(0, words, stream);
+  several_.fill(0, words, stream);
+}
+
 void Coverage::find(const LatticeOnDevice& lattice, const SlabBox& box, unsigned long long* several_in_box,
                     cudaStream_t stream) {
   const DeviceField& field = lattice.field();
-  words_ = static_cast<int>((box.size.x + 31) / 32);
+  reserve(box, stream);
   const std::int64_t rows = box.size.y * box.size.z;
   const auto words = static_cast<std::size_t>(rows * words_);
   const auto row_count = static_cast<std::size_t>(rows), slices = static_cast<std::size_t>(box.size.z);
-  crossings_.fill(0, 2 * words + 2 * row_count + slices + 1, stream);
   std::uint32_t *starts = crossings_.data() + 2 * words, *chains = starts + row_count;
-  in_slice_ = chains + row_count;
   const Crossings crossings{crossings_.data(),
                             crossings_.data() + words,
                             reinterpret_cast<int*>(starts),
@@ -272,7 +288,7 @@ void Coverage::find(const LatticeOnDevice& lattice, const SlabBox& box, unsigned
   const Sides sides(field.steps.cells);
   border_kernel<<<blocks_for(sides.first[6]), kThreads, 0, stream>>>(field.steps, sides, field.frame.nudge,
                                                                      NudgeTurns(field.frame.nudge), box, crossings);
-  std::uint32_t *single = single_.reserve(words), *several = several_.reserve(words);
+  std::uint32_t *single = single_.data(), *several = several_.data();
   int lanes = 32;
   while (lanes > 1 && lanes / 2 >= words_) lanes /= 2;
   wind_kernel<<<blocks_for(rows * lanes), kThreads, 0, stream>>>(crossings, rows, static_cast<int>(box.size.y),

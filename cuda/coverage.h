@@ -22,6 +22,9 @@ class Coverage {
   void find(const LatticeOnDevice& lattice, const SlabBox& box, unsigned long long* several_in_box,
             cudaStream_t stream);
 
+  /// None has an owner as yet: no voxel is `single`, and none `several`. Queued on the stream.
+  void forget(const SlabBox& box, cudaStream_t stream);
+
   /// Voxels with one owner.
   BitRows single() const { return {single_.data(), words_}; }
   /// Voxels that may have several, or none: not in `single`. Others may be added.
@@ -35,6 +38,8 @@ class Coverage {
   unsigned* scratch() const { return crossings_.data(); }
 
  private:
+  void reserve(const SlabBox& box, cudaStream_t stream);
+
   int words_ = 0;
   DeviceBuffer<std::uint32_t> crossings_;  ///< bits where rows go in and, as many words later, where they come out;
                                            ///< of each row, winding number at its first voxel and first of its chain;

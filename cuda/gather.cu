@@ -92,6 +92,7 @@ Gather::Counters Gather::run(const LatticeOnDevice& lattice, const SlabBox& box,
                              cudaStream_t stream) {
   const DeviceField& field = lattice.field();
   counters_.fill(0, 1, stream);
+  if (IntervalRaster::suits(field.steps, is_mostly_folded(lattice))) return run_intervals(lattice, box, sink, stream);
   const glm::ivec3 size(box.size), tile(kSeedTile, kSeedTile, kMarch);
   const glm::ivec3 marches = marches_of(size);
   Task task{field.steps,
@@ -133,13 +134,27 @@ Gather::Counters Gather::run(const LatticeOnDevice& lattice, const SlabBox& box,
     found = counters(stream);
   }
   if (found.claimed == 0) return found;
-  const auto slices = static_cast<std::size_t>(size.z);
-  unsigned* in_slice = several_in_slice_.reserve(slices);
-  TETWARP_CUDA_TRY(cudaMemcpyAsync(in_slice, coverage_.several_in_slice(), slices * sizeof(unsigned),
-                                   cudaMemcpyDeviceToHost, stream));
-  TETWARP_CUDA_TRY(cudaStreamSynchronize(stream));
-  claim_several(task, field, in_slice, sink, stream);
+  claim_several(task, field, sink, stream);
   return counters(stream);
+}
+
+/// Tiles that too many tetrahedra reach are claimed.
+template <class Sink>
+Gather::Counters Gather::run_intervals(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink,
+                                       cudaStream_t stream) {
+  intervals_.run(lattice, box, sink, stream);
+  const IntervalRaster::Counters settled = intervals_.counters(stream);
+  if (settled.left == 0) return {settled.covered, 0, 0, 0};
+  coverage_.forget(box, stream);
+  intervals_.mark_left(lattice, box, coverage_.several(), stream);
+  coverage_.count_several(box, &counters_.data()->claimed, stream);
+  Task task{lattice.field().steps, NudgeTurns(lattice.field().frame.nudge), box};
+  task.single = coverage_.single();
+  task.counters = counters_.data();
+  claim_several(task, lattice.field(), sink, stream);
+  Counters found = counters(stream);
+  found.covered += settled.covered;
+  return found;
 }
 
 bool Gather::is_mostly_folded(const LatticeOnDevice& lattice) {
@@ -157,9 +172,13 @@ Gather::Counters Gather::counters(cudaStream_t stream) {
 
 /// So many slices at a time that memory for their claimed voxels is bounded.
 template <class Task, class Sink>
-void Gather::claim_several(const Task& task, const DeviceField& field, const unsigned* in_slice, const Sink& sink,
-                           cudaStream_t stream) {
+void Gather::claim_several(const Task& task, const DeviceField& field, const Sink& sink, cudaStream_t stream) {
   const glm::i64vec3& size = task.box.size;
+  const auto slices = static_cast<std::size_t>(size.z);
+  unsigned* in_slice = several_in_slice_.reserve(slices);
+  TETWARP_CUDA_TRY(cudaMemcpyAsync(in_slice, coverage_.several_in_slice(), slices * sizeof(unsigned),
+                                   cudaMemcpyDeviceToHost, stream));
+  TETWARP_CUDA_TRY(cudaStreamSynchronize(stream));
   const std::int64_t words_per_slice = coverage_.words_per_row() * size.y;
   for (std::int64_t z = 0, end; z < size.z; z = end) {
     std::size_t count = in_slice[z];

@@ -4,6 +4,7 @@
 
 #include "cuda/claim.h"
 #include "cuda/coverage.h"
+#include "cuda/interval_raster.h"
 #include "cuda/stream.h"
 #include "deform/core/gather.h"
 
@@ -62,7 +63,10 @@ class Gather {
   Counters run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream);
 
   /// To be called when the field is another one.
-  void forget_field() { claims_.forget_field(); }
+  void forget_field() {
+    claims_.forget_field();
+    intervals_.forget_field();
+  }
 
   struct Entry {
     int voxel;  ///< offset in the box
@@ -72,14 +76,17 @@ class Gather {
  private:
   /// Whether so much is inverted that walks mostly fail: then what is not predicted is claimed.
   static bool is_mostly_folded(const LatticeOnDevice& lattice);
+  /// The way for large cells.
+  template <class Sink>
+  Counters run_intervals(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream);
   /// Claims the voxels that the coverage calls `several`.
   template <class Task, class Sink>
-  void claim_several(const Task& task, const DeviceField& field, const unsigned* in_slice, const Sink& sink,
-                     cudaStream_t stream);
+  void claim_several(const Task& task, const DeviceField& field, const Sink& sink, cudaStream_t stream);
   Counters counters(cudaStream_t stream);
 
   Coverage coverage_;
   Claims claims_;
+  IntervalRaster intervals_;
   DeviceBuffer<glm::vec3> seeds_;
   DeviceBuffer<std::uint8_t> resting_;
   DeviceBuffer<Entry> queue_;

@@ -49,7 +49,7 @@ struct Maps {
 
 /// How a backend found the owners of the voxels asked for. The result does not depend on it; pull fields have none.
 struct Paths {
-  std::uint64_t gathered = 0;  ///< predicted and proved in float, or known to have no owner
+  std::uint64_t gathered = 0;  ///< predicted and proved in float, rasterised tile by tile, or known to have no owner
   std::uint64_t walked = 0;    ///< no prediction held: sought with exact integers
   std::uint64_t claimed = 0;   ///< by every tetrahedron that may own them
 };

@@ -47,8 +47,8 @@ struct Face {
 /// @param orientation  +1 or -1, so that inside is positive
 template <class Int>
 TETWARP_HD Face<Int> make_face(const glm::i32vec3& a, const glm::i32vec3& b, const glm::i32vec3& c, int orientation) {
-  const Int ux = Int(b.x) - a.x, uy = Int(b.y) - a.y, uz = Int(b.z) - a.z;
-  const Int vx = Int(c.x) - a.x, vy = Int(c.y) - a.y, vz = Int(c.z) - a.z;
+  const Int ux = b.x - a.x, uy = b.y - a.y, uz = b.z - a.z;  // in 32 bits, so that products are cheap
+  const Int vx = c.x - a.x, vy = c.y - a.y, vz = c.z - a.z;
   Face<Int> face;
   face.normal[0] = (uy * vz - uz * vy) * orientation;
   face.normal[1] = (uz * vx - ux * vz) * orientation;

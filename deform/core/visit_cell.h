@@ -69,33 +69,52 @@ TETWARP_HD void clip_row(const Face<Int>& face, Int value, const glm::i32vec3& s
   }
 }
 
-/// Walks the rows of `box`: in each, the voxels of the tetrahedron are an interval between its faces.
-template <class Int, class Visit>
-TETWARP_HD void walk_rows(const Tetrahedron& t, int number, const VoxelBox& box, const Nudge& nudge, Visit& visit) {
-  const glm::i32vec3 first = to_steps(box.begin);
+/// The faces of a tetrahedron, opposite A, B, C and D. @param first  the voxel that they count from, 2^-12 voxel
+/// @return false for a tetrahedron without volume, which owns nothing
+template <class Int>
+TETWARP_HD bool make_faces(const Tetrahedron& t, const glm::i32vec3& first, Face<Int> (&faces)[4]) {
   const glm::i32vec3 a = t.a.deformed - first, b = t.b.deformed - first, c = t.c.deformed - first,
                      d = t.d.deformed - first;
   const Int volume = signed_volume(Relative<Int>(a), Relative<Int>(b), Relative<Int>(c), Relative<Int>(d));
-  if (volume == 0) return;
+  if (volume == 0) return false;
   const int orientation = volume > 0 ? -1 : 1;  // the determinants of `side_of_face` have the other sign
-  const Face<Int> faces[4] = {make_face<Int>(b, c, d, orientation), make_face<Int>(a, d, c, orientation),
-                              make_face<Int>(a, b, d, orientation), make_face<Int>(a, c, b, orientation)};
+  faces[0] = make_face<Int>(b, c, d, orientation);
+  faces[1] = make_face<Int>(a, d, c, orientation);
+  faces[2] = make_face<Int>(a, b, d, orientation);
+  faces[3] = make_face<Int>(a, c, b, orientation);
+  return true;
+}
+
+/// Narrows [begin, end) of a row, in which the nudge is constant, to what a tetrahedron owns.
+/// @param y, z  the row, in voxels from the one that the faces count from
+template <class Int>
+TETWARP_HD void clip_row(const Face<Int> (&faces)[4], std::int64_t y, std::int64_t z, const glm::i32vec3& signs,
+                         std::int64_t* begin, std::int64_t* end) {
+  const glm::i32vec3 nudged = nudge_steps(signs);
+  for (const Face<Int>& face : faces) {
+    const Int value = face.constant - face.normal[0] * nudged.x -
+                      face.normal[1] * (Int(y) * (kStepsPerVoxel * kNudgeSteps) + nudged.y) -
+                      face.normal[2] * (Int(z) * (kStepsPerVoxel * kNudgeSteps) + nudged.z);
+    clip_row<Int>(face, value, signs, begin, end);
+  }
+}
+
+/// Walks the rows of `box`: in each, the voxels of the tetrahedron are an interval between its faces.
+template <class Int, class Visit>
+TETWARP_HD void walk_rows(const Tetrahedron& t, int number, const VoxelBox& box, const Nudge& nudge, Visit& visit) {
+  Face<Int> faces[4];
+  if (!make_faces<Int>(t, to_steps(box.begin), faces)) return;
   for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {
     for (std::int64_t y = box.begin.y; y < box.end.y; ++y) {
       std::int64_t x = box.begin.x;
       while (x < box.end.x) {  // twice where the middle, and so the nudge's sign, lies within the row
-        const glm::i32vec3 signs = nudge.signs({x, y, z}), nudged = nudge_steps(signs);
+        const glm::i32vec3 signs = nudge.signs({x, y, z});
         std::int64_t begin = x - box.begin.x, end = box.end.x - box.begin.x;
         if (signs.x > 0 && nudge.sign(0, box.end.x - 1) < 0) {
           end = nudge.first_down(0) - box.begin.x;
         }
         x = box.begin.x + end;
-        for (const Face<Int>& face : faces) {
-          const Int value = face.constant - face.normal[0] * nudged.x -
-                            face.normal[1] * (Int(y - box.begin.y) * (kStepsPerVoxel * kNudgeSteps) + nudged.y) -
-                            face.normal[2] * (Int(z - box.begin.z) * (kStepsPerVoxel * kNudgeSteps) + nudged.z);
-          clip_row<Int>(face, value, signs, &begin, &end);
-        }
+        clip_row<Int>(faces, y - box.begin.y, z - box.begin.z, signs, &begin, &end);
         for (std::int64_t offset = begin; offset < end; ++offset) {
           visit(glm::i64vec3(box.begin.x + offset, y, z), signs, number, t);
         }

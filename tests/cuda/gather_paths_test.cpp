@@ -178,6 +178,36 @@ TEST_F(GatherPaths, FieldsThatMoveFar) {
   }
 }
 
+/// Large cells: pressed together so that more tetrahedra reach a tile than are prepared at once, or than there is room
+/// for; thrown about, so that many own a voxel; and on either side of the sizes that are rasterised.
+TEST_F(GatherPaths, LargeCellsPressedTogether) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  const Geometry grid = unit_grid({133, 75, 91});
+  const glm::dvec3 middle(60.3, 40.7, 45.1);
+  constexpr double kThrown[] = {0.0, 0.1, 2.0};
+  for (const double left : {0.6, 0.3, 0.0}) {
+    for (const std::int64_t cell_size : {5, 8, 40, 41}) {
+      SCOPED_TRACE("left " + std::to_string(left) + ", cells of " + std::to_string(cell_size));
+      Random random(test_seed(), 1200 + static_cast<std::uint64_t>(cell_size));
+      const double thrown = kThrown[random.integer(0, 2)] * static_cast<double>(cell_size);
+      const auto press = [&](const glm::dvec3& x) {
+        return (middle - x) * (1 - left) +
+               thrown * glm::dvec3(random.real(-1, 1), random.real(-1, 1), random.real(-1, 1));
+      };
+      const FieldCase test{grid, field_in_voxels(grid, lattice_over(grid, cell_size), press), "pressed", {}};
+      ASSERT_NO_FATAL_FAILURE(expect_same<std::int16_t>(test, random));
+    }
+  }
+  Random random(test_seed(), 1300);
+  const auto press = [&](const glm::dvec3& x) { return (middle - x) * 0.8; };
+  const FieldCase test{grid, field_in_voxels(grid, lattice_over(grid, 8), press), "pressed", {}};
+  const auto cuda = make_cuda_resampler(grid);
+  const auto source = random_values<std::int16_t>(grid, random, -1000, 1000);
+  const Paths paths = run_on<std::int16_t>(*cuda, test, source, whole(grid), Wanted::volume).report.paths;
+  EXPECT_GT(paths.claimed, 0u) << "there was room for all";
+  EXPECT_EQ(paths.gathered + paths.walked + paths.claimed, static_cast<std::uint64_t>(voxel_count(grid)));
+}
+
 TEST_F(GatherPaths, NoiseAndSharpTurns) {
   SCOPED_TRACE(seed_text(test_seed()));
   const Geometry grid = unit_grid({100, 66, 70});

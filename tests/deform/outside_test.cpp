@@ -48,6 +48,24 @@ TEST_P(OutsideTheLattice, RefuseAcceptsLatticesMadeOverTheVolume) {
   }
 }
 
+/// The volume alone is asked for: that is where whole tiles at rest may be copied.
+TEST_P(OutsideTheLattice, PlacesThatTheLatticeHasLeftAreBackground) {
+  const Geometry grid = unit_grid({130, 70, 70});
+  for (const std::int64_t cell_size : {1, 8, 16}) {
+    SCOPED_TRACE("cells of " + std::to_string(cell_size));
+    const VertexField field =
+        field_in_voxels(grid, lattice_over(grid, cell_size), [](const glm::dvec3&) { return glm::dvec3(89.5, 0, 0); });
+    Volume<std::int16_t> source{grid, std::vector<std::int16_t>(static_cast<std::size_t>(voxel_count(grid)), 100)};
+    Volume<std::int16_t> output = poisoned<std::int16_t>(grid);
+    const auto resampler = make(grid);
+    resampler->set_field(view(field, Outside::background));
+    const Target target{.source = view(source), .output = view(output), .background = -7};
+    resampler->resample(whole(grid), {&target, 1}, {});
+    for (std::size_t n = 0; n < output.voxels.size(); ++n)
+      ASSERT_EQ(output.voxels[n], n % 130 < 90 ? -7 : 100) << "voxel " << n;
+  }
+}
+
 TEST_P(OutsideTheLattice, RefuseThrowsWhereABorderLiesInside) {
   const Geometry grid = oblique_grid({10, 11, 12});
   const glm::dvec3 last(grid.size - std::int64_t{1});

@@ -1,0 +1,168 @@
+// The intervals of rows against the definition of ownership, voxel by voxel.
+#include "deform/core/row_interval.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/random.h"
+
+namespace tetwarp {
+namespace {
+
+using test::Random;
+
+/// A tile of voxels that are all nudged alike.
+struct Tile {
+  glm::ivec3 first, size;
+  glm::i32vec3 signs;
+};
+
+struct Checked {
+  int rows = 0, unsure = 0, owned = 0;
+};
+
+RowFaces faces_of(const Tetrahedron& t, const Tile& tile, bool& has_volume) {
+  const glm::i32vec3 first = tile.first * kStepsPerVoxel;
+  const glm::i32vec3 at[4] = {t.a.deformed - first, t.b.deformed - first, t.c.deformed - first, t.d.deformed - first};
+  RowFaces faces{};
+  int lower = 0, upper = 4;
+  for (int n = 0; n < 4; ++n) {
+    Face<std::int64_t> face;
+    has_volume = make_face_towards(at[(n + 1) % 4], at[(n + 2) % 4], at[(n + 3) % 4], at[n], face);
+    bool is_lower = false;
+    const RowFace crossing = detail::row_face(face, tile.signs, tile.size, is_lower);
+    faces.faces[is_lower ? lower++ : --upper] = crossing;
+  }
+  faces.lower = lower;
+  return faces;
+}
+
+/// Every voxel of every row: whether it is in the interval just where the tetrahedron owns it.
+void expect_intervals(const Tetrahedron& t, const Tile& tile, Checked& checked) {
+  ASSERT_TRUE(has_int64_rows(t));
+  bool has_volume = false;
+  const RowFaces faces = faces_of(t, tile, has_volume);
+  for (int y = 0; y < tile.size.y; ++y) {
+    for (int z = 0; z < tile.size.z; ++z) {
+      const RowInterval exact = exact_row(t, tile.first, tile.signs, y, z, tile.size.x);
+      RowInterval found = exact;
+      bool is_certain = has_volume;
+      if (has_volume) {
+        ASSERT_TRUE(faces.lower >= 1 && faces.lower <= 3);
+        found = RowsAlongZ(faces, y).interval(z, tile.size.x, is_certain);
+      }
+      ++checked.rows;
+      checked.unsure += !is_certain;
+      for (int x = 0; x < tile.size.x; ++x) {
+        int sides[4];
+        const glm::ivec3 voxel = tile.first + glm::ivec3(x, y, z);
+        const bool owns = owns_exactly(t, voxel * kStepsPerVoxel, tile.signs, sides);
+        checked.owned += owns;
+        ASSERT_EQ(owns, x >= exact.begin && x < exact.end) << "exact, voxel " << x << ' ' << y << ' ' << z;
+        if (is_certain) {
+          ASSERT_EQ(owns, x >= found.begin && x < found.end) << "float, voxel " << x << ' ' << y << ' ' << z;
+        }
+      }
+    }
+  }
+}
+
+glm::i32vec3 random_signs(Random& random) {
+  const auto sign = [&] { return random.chance(0.5) ? 1 : -1; };
+  return {sign(), sign(), sign()};
+}
+
+/// Vertices anywhere near a tile; `unit` in 2^-12 voxel: with whole voxels, halves and so on most rows have ties.
+Tetrahedron random_tetrahedron(Random& random, const Tile& tile, int length, int unit) {
+  const glm::ivec3 from = (tile.first - length / 3) * (kStepsPerVoxel / unit);
+  const auto vertex = [&] {
+    const auto along = [&](int axis) {
+      return static_cast<std::int32_t>(from[axis] + random.integer(0, std::int64_t{length} * kStepsPerVoxel / unit)) *
+             unit;
+    };
+    return Vertex{{along(0), along(1), along(2)}, {0, 0, 0}};
+  };
+  return {vertex(), vertex(), vertex(), vertex()};
+}
+
+TEST(RowInterval, RandomTetrahedraOfAnySizeAndOrientation) {
+  SCOPED_TRACE(test::seed_text(test::test_seed()));
+  Checked checked;
+  for (std::uint64_t n = 0; n < test::test_cases(3000); ++n) {
+    Random random(test::test_seed(), n);
+    const Tile tile{{static_cast<int>(random.integer(-100, 600)), static_cast<int>(random.integer(-100, 600)),
+                     static_cast<int>(random.integer(-100, 600))},
+                    {static_cast<int>(random.integer(1, kMostRowTile)), 8, 16},
+                    random_signs(random)};
+    const int lengths[] = {2, 8, 16, 30, 62}, units[] = {1, 1, 64, 1024, 2048, 4096};
+    const Tetrahedron t = random_tetrahedron(random, tile, random.one_of(lengths), random.one_of(units));
+    SCOPED_TRACE("case " + std::to_string(n));
+    ASSERT_NO_FATAL_FAILURE(expect_intervals(t, tile, checked));
+  }
+  EXPECT_GT(checked.owned, 20000);
+  EXPECT_LT(checked.unsure, checked.rows / 20);
+}
+
+/// Faces in the planes of voxels, and flat tetrahedra: only the nudge and the tie rule decide.
+TEST(RowInterval, FacesThroughVoxels) {
+  SCOPED_TRACE(test::seed_text(test::test_seed()));
+  Checked checked;
+  for (std::uint64_t n = 0; n < test::test_cases(2000); ++n) {
+    Random random(test::test_seed(), 10000 + n);
+    const Tile tile{{0, 0, 0}, {32, 8, 16}, random_signs(random)};
+    const auto whole = [&] {
+      return Vertex{
+          kStepsPerVoxel * glm::i32vec3(random.integer(-1, 4) * 8, random.integer(0, 2) * 4, random.integer(0, 4) * 4),
+          {0, 0, 0}};
+    };
+    const Tetrahedron t{whole(), whole(), whole(), whole()};
+    SCOPED_TRACE("case " + std::to_string(n));
+    ASSERT_NO_FATAL_FAILURE(expect_intervals(t, tile, checked));
+  }
+  EXPECT_GT(checked.owned, 20000);
+}
+
+/// A vertex that lies so beside a voxel that a face passes through its nudged centre, or just not.
+TEST(RowInterval, FacesThroughNudgedVoxels) {
+  SCOPED_TRACE(test::seed_text(test::test_seed()));
+  Checked checked;
+  for (std::uint64_t n = 0; n < test::test_cases(2000); ++n) {
+    Random random(test::test_seed(), 20000 + n);
+    const Tile tile{{64, 32, 16}, {32, 8, 16}, random_signs(random)};
+    // The plane through c that is spanned by two vectors whose cross product is at right angles to d and (1, 0, 0).
+    const glm::i32vec3 centre = kStepsPerVoxel * (tile.first + glm::ivec3(9, 3, 7));
+    const int scale = static_cast<int>(random.integer(1, 500)), slip = static_cast<int>(random.integer(-1, 1));
+    const glm::i32vec3 along(15 * scale * tile.signs.x, 7 * scale * tile.signs.y, 4 * scale * tile.signs.z);
+    const Vertex a{centre + along, {0, 0, 0}}, b{centre - along, {0, 0, 0}};
+    const Vertex c{centre + glm::i32vec3(random.integer(-9000, 9000), random.integer(-9000, 9000), 9000 + slip), {}};
+    const Vertex d{centre + glm::i32vec3(random.integer(-9000, 9000), 9000, random.integer(-9000, 9000)), {}};
+    SCOPED_TRACE("case " + std::to_string(n));
+    ASSERT_NO_FATAL_FAILURE(expect_intervals({a, b, c, d}, tile, checked));
+  }
+  EXPECT_GT(checked.unsure, 100);  // exact ties are left to integers
+}
+
+/// Five tetrahedra of an undeformed cell of any size share out the voxels around it: none twice, none left.
+TEST(RowInterval, CellsHaveNoGaps) {
+  for (const int cell : {4, 8, 16, 33, 62}) {
+    for (const bool odd : {false, true}) {
+      Cell corners;
+      for (int c = 0; c < 8; ++c)
+        corners.corner[c] = {kStepsPerVoxel * cell * glm::i32vec3(c & 1, c >> 1 & 1, c >> 2), {0, 0, 0}};
+      const Tile tile{{0, 0, 0}, {std::min(cell, kMostRowTile), 8, 16}, {1, 1, 1}};
+      for (int y = 0; y < std::min(cell, tile.size.y); ++y) {
+        for (int z = 0; z < std::min(cell, tile.size.z); ++z) {
+          int owned = 0;
+          for (int number = 0; number < kTetrahedraPerCell; ++number) {
+            const RowInterval in =
+                exact_row(tetrahedron_of(corners, number, odd), tile.first, tile.signs, y, z, tile.size.x);
+            owned += std::max(in.end - in.begin, 0);
+          }
+          ASSERT_EQ(owned, tile.size.x) << "cell " << cell << ", row " << y << ' ' << z;
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tetwarp
