@@ -60,4 +60,17 @@ Tally compare(const Exact& exact, const std::vector<std::int16_t>& output, const
   return sums.tally;
 }
 
+double differing_fraction(const Exact& exact, std::span<const std::int16_t> output) {
+  const std::size_t voxels = exact.output.size();
+  require(exact.coverage.size() == voxels && output.size() == voxels, "results of different sizes cannot be compared");
+  std::size_t covered = 0, differing = 0;
+  for (std::size_t n = 0; n < voxels; ++n) {
+    if (exact.coverage[n] == 0) continue;
+    ++covered;
+    differing += std::abs(exact.output[n] - output[n]) > 1;
+  }
+  require(covered > 0, "no voxel is covered, so there is nothing to compare");
+  return static_cast<double>(differing) / static_cast<double>(covered);
+}
+
 }  // namespace tetwarp::bench

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "bench/backend.h"
@@ -22,5 +23,9 @@ struct Tally {
 
 /// @param output, writes  of the method; all of one size. @throws InputError where they are not
 Tally compare(const Exact& exact, const std::vector<std::int16_t>& output, const std::vector<std::uint32_t>& writes);
+
+/// Of the voxels that Tetwarp covers, the fraction whose value in `output` differs by more than 1, stored units: more
+/// than truncating instead of rounding explains. @throws InputError for another size, or where nothing is covered
+double differing_fraction(const Exact& exact, std::span<const std::int16_t> output);
 
 }  // namespace tetwarp::bench

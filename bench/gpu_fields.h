@@ -14,7 +14,7 @@ struct Sine {
 
 constexpr int kSines = 3;
 
-/// A deformation that `gpu` measures, in float and voxels: a function of the place where a vertex rests.
+/// A deformation that `gpu` and `cpu` measure, in float and voxels: a function of the place where a vertex rests.
 struct TestField {
   enum class Kind : std::uint8_t { formula, elastic, noise, rotation, folds };
 

@@ -1,7 +1,5 @@
 #include "bench/gpu_floors.h"
 
-#include <algorithm>
-
 namespace tetwarp::bench {
 
 namespace {
@@ -108,11 +106,6 @@ std::vector<Floor> find_floors(const GpuResults& results) {
   std::vector<Floor> floors;
   for (const auto add : {add_dense, add_hard, add_local, add_coarse, add_long, add_memory}) add(results, floors);
   return floors;
-}
-
-bool all_met(const std::vector<Floor>& floors) {
-  return std::all_of(floors.begin(), floors.end(),
-                     [](const Floor& floor) { return !floor.required || floor.meets(*floor.required); });
 }
 
 }  // namespace tetwarp::bench

@@ -54,19 +54,6 @@ Json to_json(const MemoryUse& use) {
           {"device_views_bytes", use.device_views}};
 }
 
-Json limit_json(const Floor& floor, const std::optional<double>& limit) {
-  return limit ? Json{{"limit", *limit}, {"met", floor.meets(*limit)}} : Json(nullptr);
-}
-
-Json to_json(const Floor& floor) {
-  return {{"ratio", floor.ratio},
-          {"where", floor.where},
-          {"value", floor.value},
-          {"at_least", floor.at_least},
-          {"required", limit_json(floor, floor.required)},
-          {"aim", limit_json(floor, floor.aim)}};
-}
-
 template <class T>
 Json list(const std::vector<T>& items) {
   Json array = Json::array();
@@ -96,7 +83,7 @@ nlohmann::json to_json(const GpuResults& results, const std::vector<Floor>& floo
           {"runs", list(results.runs)},
           {"frame_loops", list(results.loops)},
           {"memory", list(results.memory)},
-          {"floors", list(floors)}};
+          {"floors", to_json(floors)}};
 }
 
 }  // namespace tetwarp::bench

@@ -36,12 +36,6 @@ on the device, given all of it on the host. Device views: most that it holds bes
 
 )";
 
-constexpr char kFloorsNote[] = R"(## Floors
-
-Ratios of medians in this run. A floor is required, an aim is not.
-
-)";
-
 std::string introduction(const GpuResults& results) {
   const GpuOptions& options = results.options;
   return std::string("# tetwarp-bench gpu, ") + version() + " (" + commit() +
@@ -114,28 +108,11 @@ std::string memory_table(const GpuResults& results) {
   return text + "\n";
 }
 
-std::string limit_cell(const Floor& floor, const std::optional<double>& limit) {
-  return limit ? format("%s %g", floor.at_least ? "at least" : "at most", *limit) : "";
-}
-
-std::string floor_table(const std::vector<Floor>& floors) {
-  std::string text = kFloorsNote + heading({"ratio", "where", "value", "required", "", "aim", ""});
-  for (const Floor& floor : floors) {
-    const auto word = [&](const std::optional<double>& limit, const char* yes, const char* no) -> std::string {
-      return limit ? (floor.meets(*limit) ? yes : no) : "";
-    };
-    text += row({floor.ratio, floor.where, format("%.3f", floor.value), limit_cell(floor, floor.required),
-                 word(floor.required, "met", "missed"), limit_cell(floor, floor.aim),
-                 word(floor.aim, "reached", "not reached")});
-  }
-  return text;
-}
-
 }  // namespace
 
 std::string to_markdown(const GpuResults& results, const std::vector<Floor>& floors) {
   return introduction(results) + dense_table(results) + coarse_table(results) + long_table(results) +
-         loop_table(results) + memory_table(results) + floor_table(floors);
+         loop_table(results) + memory_table(results) + to_markdown(floors);
 }
 
 }  // namespace tetwarp::bench

@@ -3,6 +3,7 @@
 #include <tbb/task_arena.h>
 
 #include <fstream>
+#include <limits>
 
 #include "bench/backend.h"
 
@@ -34,6 +35,17 @@ Machine describe_machine(int device, int threads) {
   machine.cuda_runtime = facts.runtime;
   machine.compute_capability = facts.compute_capability;
   return machine;
+}
+
+std::uint64_t available_bytes() {
+  std::ifstream file("/proc/meminfo");
+  std::string key;
+  std::uint64_t kib = 0;
+  while (file >> key) {
+    if (key == "MemAvailable:" && file >> kib) return kib * 1024;
+    file.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
+  }
+  return std::numeric_limits<std::uint64_t>::max();
 }
 
 }  // namespace tetwarp::bench

@@ -1,4 +1,4 @@
-// tetwarp-bench: what the paper compares, what a frame costs on a GPU, and the stages of a deformation on the CPU.
+// tetwarp-bench: what the paper compares, and what a deformation costs on a GPU and on the CPU.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
@@ -84,19 +84,40 @@ void add_paper(CLI::App& app, PaperOptions& options, Words& words) {
   command->footer("Example: tetwarp bench paper --slices 300 --fields twist --json twist.json");
 }
 
-void add_cpu(CLI::App& app, CpuOptions& options) {
-  CLI::App* command = app.add_subcommand("cpu", "What the stages of one deformation cost on the CPU, per voxel");
-  command->add_option("--slices", options.slices, "Slices of 512 x 512")
+void add_cpu(CLI::App& app, CpuOptions& options, std::string& cell_sizes) {
+  CLI::App* command =
+      app.add_subcommand("cpu", "What a deformation costs on the CPU, and the floors that it should reach");
+  command->add_option("--fields", options.fields, "Deformations")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(CLI::IsMember(options.fields))
+      ->capture_default_str();
+  command->add_option("--peers", options.peers, "What is measured beside Tetwarp; none: nothing")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(CLI::IsMember({"paper", "itk-warp", "itk-invert", "vtk-probe", "none"}))
+      ->capture_default_str();
+  command->add_option("--cell-sizes", cell_sizes, "Larger cells, voxels; none: cells of one voxel only")
+      ->capture_default_str();
+  command->add_option("--slices", options.slices, "Slices of the phantom")
       ->check(CLI::Range(2, 100000))
       ->capture_default_str();
-  command->add_option("--threads", options.threads, "Threads; 0 is all")
+  command->add_option("--slow-slices", options.slow_slices, "Slices of the phantom for itk-invert and vtk-probe")
+      ->check(CLI::Range(2, 100000))
+      ->capture_default_str();
+  command->add_option("--width", options.width, "Columns and rows of the phantoms")
+      ->check(CLI::Range(8, 100000))
+      ->capture_default_str();
+  command->add_option("--threads", options.threads, "Threads of everything; 0 is all")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  command->add_option("--repeats", options.repeats, "Repeats; the median counts")
+  command->add_option("--repeats", options.repeats, "Timed repeats; itk-invert and vtk-probe run once")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
-  command->add_option("--json", options.json, "The numbers, as JSON")->type_name("FILE");
-  command->footer("Example: tetwarp bench cpu --slices 100 --threads 2");
+  command->add_option("--json", options.json, "Every number, as JSON")->type_name("FILE");
+  command->add_flag("--check", options.check, "Exit with 1 where a floor is missed");
+  command->add_flag("--verbose", options.verbose, "A line on standard error for every step");
+  command->footer("Example: tetwarp bench cpu --slices 100 --fields wave,elastic --threads 2 --json cpu.json");
 }
 
 void add_gpu(CLI::App& app, GpuOptions& options, std::string& cell_sizes) {
@@ -140,10 +161,10 @@ int run_command_line(int argc, char** argv) {
   GpuOptions gpu;
   CpuOptions cpu;
   Words words;
-  std::string gpu_cell_sizes = words.cell_sizes;
+  std::string gpu_cell_sizes = words.cell_sizes, cpu_cell_sizes = words.cell_sizes;
   add_paper(app, paper, words);
   add_gpu(app, gpu, gpu_cell_sizes);
-  add_cpu(app, cpu);
+  add_cpu(app, cpu, cpu_cell_sizes);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& help) {
@@ -151,7 +172,10 @@ int run_command_line(int argc, char** argv) {
   } catch (const CLI::Error& error) {
     throw UsageError(std::string(error.what()) + "; see tetwarp-bench --help");
   }
-  if (app.got_subcommand("cpu")) return run_cpu(cpu);
+  if (app.got_subcommand("cpu")) {
+    cpu.cell_sizes = parse_cell_sizes(cpu_cell_sizes);
+    return run_cpu(cpu);
+  }
   if (app.got_subcommand("gpu")) {
     gpu.cell_sizes = parse_cell_sizes(gpu_cell_sizes);
     return run_gpu(gpu);

@@ -45,9 +45,15 @@ struct PaperOptions {
 };
 
 struct CpuOptions {
-  std::int64_t slices = 300;
+  std::vector<std::string> fields{"identity", "wave", "twist", "bubble", "elastic", "local"};
+  std::vector<std::string> peers{"paper", "itk-warp", "itk-invert", "vtk-probe"};
+  std::vector<std::int64_t> cell_sizes{4, 8, 16};  ///< beside cells of one voxel, Tetwarp alone
+  std::int64_t width = 512, slices = 300;          ///< of the phantom
+  std::int64_t slow_slices = 40;                   ///< of the volume for peers that take minutes
   int threads = 0, repeats = 3;
   std::filesystem::path json;
+  bool check = false;    ///< a missed floor is a failure
+  bool verbose = false;  ///< a line to standard error for every step
 };
 
 struct GpuOptions {
@@ -65,7 +71,7 @@ struct GpuOptions {
 int run_paper(const PaperOptions& options);
 /// What a frame costs on a CUDA device, against other methods, copies and memory. @return the exit status
 int run_gpu(const GpuOptions& options);
-/// What the stages of one deformation cost on the CPU, per voxel.
+/// What a new field costs on the CPU, against the paper, ITK, VTK and memory. @return the exit status
 int run_cpu(const CpuOptions& options);
 
 }  // namespace tetwarp::bench

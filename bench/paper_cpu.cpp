@@ -1,3 +1,5 @@
+#include "bench/paper_cpu.h"
+
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
@@ -190,6 +192,14 @@ class CpuBackend final : public Backend {
 };
 
 }  // namespace
+
+void run_paper_loop(const Volume<std::int16_t>& volume, const VertexField& field, std::int64_t cell_size,
+                    std::int16_t* output) {
+  const Grid grid = make_grid(volume.geometry, field.lattice, cell_size);
+  run_method<InverseIn::loop_as_compiled>(Method::paper, grid,
+                                          MemoryField{field.displacement.data(), grid.vertices_x, grid.vertices_y},
+                                          SoftwareTexture{volume.voxels.data(), grid}, SetValue{output, nullptr, grid});
+}
 
 std::unique_ptr<Backend> make_cpu_backend(int threads, InverseIn inverse) {
   return std::make_unique<CpuBackend>(threads, inverse);

@@ -31,5 +31,19 @@ TEST(BenchCompare, OtherSizesAreRefused) {
   EXPECT_THROW(compare(exact, {1, 2}, {1}), InputError);
 }
 
+TEST(BenchCompare, OneMoreOrLessIsRoundingAndOnlyCoveredVoxelsCount) {
+  //                 same, one more, one less, two more, far off, not covered
+  const Exact exact{{10, 20, 30, 40, -32768, 50}, {1, 1, 1, 1, 1, 0}};
+  const std::vector<std::int16_t> output = {10, 21, 29, 42, 32767, 0};
+  EXPECT_DOUBLE_EQ(differing_fraction(exact, output), 0.4);
+}
+
+TEST(BenchCompare, ADifferenceNeedsTheSameSizeAndACoveredVoxel) {
+  const std::vector<std::int16_t> output = {1, 2};
+  EXPECT_THROW(differing_fraction({{1}, {1}}, output), InputError);
+  EXPECT_THROW(differing_fraction({{1, 2}, {1}}, output), InputError);
+  EXPECT_THROW(differing_fraction({{1, 2}, {0, 0}}, output), InputError);
+}
+
 }  // namespace
 }  // namespace tetwarp::bench

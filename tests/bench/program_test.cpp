@@ -46,6 +46,10 @@ TEST(BenchProgram, WrongCommandLinesExitWithTwo) {
   expect_error(run_bench(scratch, "gpu --cell-sizes 4,1"), 2, "--cell-sizes");
   expect_error(run_bench(scratch, "gpu --frames 0"), 2, "--frames");
   expect_error(run_bench(scratch, "gpu --slices 1"), 2, "--slices");
+  expect_error(run_bench(scratch, "cpu --fields wave,swirl"), 2, "swirl");
+  expect_error(run_bench(scratch, "cpu --peers gpu"), 2, "gpu");
+  expect_error(run_bench(scratch, "cpu --cell-sizes 4,1"), 2, "--cell-sizes");
+  expect_error(run_bench(scratch, "cpu --repeats 0"), 2, "--repeats");
 }
 
 constexpr const char* kTinyGpu = "gpu --width 64 --slices 20,40 --cell-sizes 4 --frames 2 --warmup 1 --json r.json ";
@@ -71,6 +75,42 @@ TEST(BenchProgram, MeasuresEveryFieldOnAGpu) {
     if (found["field"] == "noise") continue;  // rough enough to turn a tetrahedron over
     EXPECT_EQ(found["report"]["inverted"] > 0, found["field"] == "folds") << found["field"];
   }
+}
+
+constexpr const char* kTinyCpu = "cpu --width 32 --slices 8 --slow-slices 6 --repeats 1 --threads 2 --json r.json ";
+
+TEST(BenchProgram, MeasuresEveryFieldOnTheCpu) {
+  const Scratch scratch;
+  const Outcome run = run_bench(scratch, std::string(kTinyCpu) + "--cell-sizes 4");
+  ASSERT_EQ(run.status, 0) << run.err;
+  EXPECT_TRUE(says(run.out, {"# tetwarp-bench cpu", "32 x 32 x 8", "| elastic | ", "## From small to large",
+                             "## Threads", "## Floors", "| paper / new field | wave |"}));
+  const nlohmann::json document = nlohmann::json::parse(read_text(scratch / "r.json"));
+  EXPECT_EQ(document["machine"]["threads"], 2);
+  ASSERT_EQ(document["runs"].size(), 6u);
+  for (const nlohmann::json& found : document["runs"]) {
+    EXPECT_GT(found["new_field_ms"]["median"], 0) << found["field"];
+    EXPECT_GT(found["bytes_ms"]["median"], 0) << found["field"];
+    EXPECT_EQ(found["paper"].is_null(), found["field"] == "local");
+    EXPECT_EQ(found["itk_warp"].is_null(), found["field"] == "local" || document["itk"].is_null());
+  }
+  EXPECT_EQ(document["slow_peers"].size(), document["itk"].is_null() && document["vtk"].is_null() ? 0u : 5u);
+  EXPECT_EQ(document["larger_cells"].size(), 4u);
+  EXPECT_EQ(document["growth"].size(), 4u);
+  EXPECT_GT(document["scaling"]["efficiency"], 0);
+}
+
+TEST(BenchProgram, AMissedFloorIsAFailureWhereItIsAskedFor) {
+  const Scratch scratch;
+  const std::string alone = std::string(kTinyCpu) + "--peers none --cell-sizes none --fields ";
+  EXPECT_EQ(run_bench(scratch, alone + "identity").status, 0);
+  // 8192 voxels are moved in microseconds: no new field is made in twice that
+  const Outcome missed = run_bench(scratch, alone + "identity --check");
+  EXPECT_EQ(missed.status, 1);
+  EXPECT_TRUE(says(missed.err, {"a floor is missed"}));
+  EXPECT_TRUE(says(missed.out, {"at most 2 | missed"}));
+  EXPECT_TRUE(says(read_text(scratch / "r.json"), {"floors"}));
+  EXPECT_EQ(run_bench(scratch, alone + "local --check").status, 0) << "nothing is required of it";
 }
 
 TEST(BenchProgram, AVolumeOfZerosExitsWithFourAndWritesNothing) {

@@ -1,0 +1,12 @@
+#pragma once
+
+#include "bench/cpu_results.h"
+#include "bench/floors.h"
+
+namespace tetwarp::bench {
+
+/// Every ratio whose runs are there, of medians. "New field" counts set_field, "resample" does not; "bytes" is moving
+/// field, source and output once.
+std::vector<Floor> find_floors(const CpuResults& results);
+
+}  // namespace tetwarp::bench

@@ -1,0 +1,9 @@
+#include "bench/peers.h"
+
+namespace tetwarp::bench {
+
+std::optional<std::string> itk_version() { return {}; }
+std::unique_ptr<Peer> make_itk_warp(const PeerInput&, const PullField&) { return nullptr; }
+std::unique_ptr<Peer> make_itk_invert_and_warp(const PeerInput&, const VertexField&) { return nullptr; }
+
+}  // namespace tetwarp::bench

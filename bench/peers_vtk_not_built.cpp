@@ -1,0 +1,8 @@
+#include "bench/peers.h"
+
+namespace tetwarp::bench {
+
+std::optional<std::string> vtk_version() { return {}; }
+std::unique_ptr<Peer> make_vtk_probe(const PeerInput&, const VertexField&) { return nullptr; }
+
+}  // namespace tetwarp::bench

@@ -1,0 +1,10 @@
+#include "bench/vtk_threads.h"
+
+#include <vtkSMPTools.h>
+
+namespace tetwarp::bench {
+
+void set_vtk_threads(int threads) { vtkSMPTools::Initialize(threads); }
+const char* vtk_threads_backend() { return vtkSMPTools::GetBackend(); }
+
+}  // namespace tetwarp::bench

@@ -1,0 +1,23 @@
+#include "bench/machine.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+namespace tetwarp::bench {
+namespace {
+
+TEST(BenchMachine, AvailableMemoryIsSomeAndNotMoreThanThereIs) {
+  const std::uint64_t all =
+      static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+  EXPECT_GT(available_bytes(), std::uint64_t{1} << 20);
+  EXPECT_LE(available_bytes(), all);
+}
+
+TEST(BenchMachine, ThreadsAreThoseAskedForOrAll) {
+  EXPECT_EQ(describe_machine(-1, 3).threads, 3);
+  EXPECT_GE(describe_machine(-1, 0).threads, 1);
+  EXPECT_FALSE(describe_machine(-1, 0).cpu.empty());
+}
+
+}  // namespace
+}  // namespace tetwarp::bench
