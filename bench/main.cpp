@@ -1,4 +1,4 @@
-// tetwarp-bench: what the paper compares, and what a deformation costs on a GPU and on the CPU.
+// tetwarp-bench: what the paper compares, what a deformation costs on a GPU and on the CPU, and files.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
@@ -138,6 +138,42 @@ void add_gpu(CLI::App& app, GpuOptions& options, std::string& cell_sizes) {
   command->footer("Example: tetwarp bench gpu --slices 300 --fields wave,elastic --json gpu.json");
 }
 
+void add_io(CLI::App& app, IoOptions& options) {
+  CLI::App* command = app.add_subcommand("io", "What files cost beside ITK and DCMTK, and the floors to reach");
+  command->add_option("--slices", options.slices, "Slices of the phantom")
+      ->check(CLI::Range(2, 100000))
+      ->capture_default_str();
+  command->add_option("--width", options.width, "Columns and rows of the phantom")
+      ->check(CLI::Range(2, 4096))
+      ->capture_default_str();
+  command->add_option("--steps", options.steps, "DICOM series in and out, .nii.gz, the whole job")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(CLI::IsMember(options.steps))
+      ->capture_default_str();
+  command->add_option("--cell-sizes", options.cell_sizes, "Cells of the fields of the whole jobs, voxels")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  command->add_option("--threads", options.threads, "Threads; 0 is all")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_option("--repeats", options.repeats, "Repeats; the median counts")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  command
+      ->add_option("--folder", options.folder,
+                   "Where a folder for about 12 bytes a voxel of files is made, removed at the end (default: the "
+                   "system's folder for temporary files)")
+      ->type_name("DIR")
+      ->check(CLI::ExistingDirectory);
+  command->add_option("--json", options.json, "Every number, as JSON")->type_name("FILE");
+  command->add_flag("--check", options.check, "Exit with 1 where a floor is missed");
+  command->add_flag("--verbose", options.verbose, "A line on standard error for every step");
+  command->footer("Example: tetwarp bench io --repeats 5 --json io.json");
+}
+
 /// "4,8,16", "none" or nothing.
 std::vector<std::int64_t> parse_cell_sizes(const std::string& text) {
   std::vector<std::int64_t> sizes;
@@ -160,11 +196,13 @@ int run_command_line(int argc, char** argv) {
   PaperOptions paper;
   GpuOptions gpu;
   CpuOptions cpu;
+  IoOptions io;
   Words words;
   std::string gpu_cell_sizes = words.cell_sizes, cpu_cell_sizes = words.cell_sizes;
   add_paper(app, paper, words);
   add_gpu(app, gpu, gpu_cell_sizes);
   add_cpu(app, cpu, cpu_cell_sizes);
+  add_io(app, io);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& help) {
@@ -176,6 +214,7 @@ int run_command_line(int argc, char** argv) {
     cpu.cell_sizes = parse_cell_sizes(cpu_cell_sizes);
     return run_cpu(cpu);
   }
+  if (app.got_subcommand("io")) return run_io(io);
   if (app.got_subcommand("gpu")) {
     gpu.cell_sizes = parse_cell_sizes(gpu_cell_sizes);
     return run_gpu(gpu);

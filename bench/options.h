@@ -67,10 +67,23 @@ struct GpuOptions {
   bool verbose = false;  ///< a line to standard error for every step
 };
 
+struct IoOptions {
+  std::int64_t width = 512, slices = 300;  ///< of the phantom
+  std::vector<std::string> steps{"in", "out", "nifti", "job"};
+  std::vector<std::int64_t> cell_sizes{1, 16};  ///< of the whole jobs' fields
+  int threads = 0, repeats = 5;
+  std::filesystem::path folder;  ///< where a folder for the files is made, and removed at the end; empty: the system's
+  std::filesystem::path json;
+  bool check = false;    ///< a missed floor is a failure
+  bool verbose = false;  ///< a line to standard error for every step
+};
+
 /// The tables of the paper, to standard output. @return the exit status
 int run_paper(const PaperOptions& options);
 /// What a frame costs on a CUDA device, against other methods, copies and memory. @return the exit status
 int run_gpu(const GpuOptions& options);
+/// Files in and out beside ITK and DCMTK, from and to the page cache. @return the exit status
+int run_io(const IoOptions& options);
 /// What a new field costs on the CPU, against the paper, ITK, VTK and memory. @return the exit status
 int run_cpu(const CpuOptions& options);
 

@@ -161,8 +161,7 @@ DerivedSeries derive_series(const DicomHeaders& source, const DicomDerivation& d
   std::vector<DicomFileHeader> headers;
   std::vector<DcmDataset*> slices;
   for (const auto& slice : source.slices) {
-    DcmFileFormat copy(slice.get());
-    headers.push_back(header_of(copy, {}));
+    headers.push_back(header_of(*slice));
     slices.push_back(slice.get());
   }
   DerivedSeries series;

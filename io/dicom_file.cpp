@@ -8,9 +8,10 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <array>
+#include <bit>
 #include <cerrno>
 #include <cstdio>
-#include <span>
 #include <system_error>
 
 #include "deform/errors.h"
@@ -61,6 +62,17 @@ std::vector<std::byte> encoded_meta(const std::string& sop_class, const std::str
   return written(meta, meta.calcElementLength(kSyntax, EET_ExplicitLength));
 }
 
+/// Tag, value representation and length of Pixel Data (PS3.5 7.1.2), as `kSyntax` has them.
+std::array<std::byte, 12> pixel_data_start(std::size_t value_bytes) {
+  constexpr std::uint64_t kLargest = 0xfffffffe;
+  require(value_bytes <= kLargest, "a slice of " + std::to_string(value_bytes) +
+                                       " bytes; Pixel Data of DICOM hold at most " + std::to_string(kLargest));
+  std::array<std::byte, 12> bytes{std::byte{0xe0}, std::byte{0x7f}, std::byte{0x10},
+                                  std::byte{0},    std::byte{'O'},  std::byte{'W'}};
+  for (std::size_t n = 0; n < 4; ++n) bytes[8 + n] = static_cast<std::byte>(value_bytes >> (8 * n));
+  return bytes;
+}
+
 void write_bytes(int file, std::span<const std::byte> bytes, const std::filesystem::path& path) {
   while (!bytes.empty()) {
     const ssize_t count = ::write(file, bytes.data(), bytes.size());
@@ -77,18 +89,25 @@ std::vector<std::byte> encoded(DcmDataset& dataset) {
   return written(dataset, dataset.calcElementLength(kSyntax, EET_ExplicitLength));
 }
 
-void write_dicom_file(const std::filesystem::path& path, DcmDataset& dataset) {
+void write_dicom_file(const std::filesystem::path& path, DcmDataset& dataset, std::span<const std::int16_t> voxels) {
+  static_assert(std::endian::native == std::endian::little);
+  const std::span<const std::byte> pixels = std::as_bytes(voxels);
+  const std::array<std::byte, 12> pixel_start = pixel_data_start(pixels.size());
   drop(dataset, DCM_SOPInstanceUID);
-  const std::string uid = uid_from_digest(Sha256().add("tetwarp instance").add(encoded(dataset)).digest());
+  const std::vector<std::byte> nameless = encoded(dataset);
+  const std::string uid =
+      uid_from_digest(Sha256().add("tetwarp instance").add(nameless).add(pixel_start).add(pixels).digest());
   put(dataset, DCM_SOPInstanceUID, uid);
-  const std::vector<std::byte> meta = encoded_meta(text_of(dataset, DCM_SOPClassUID), uid);
+  std::vector<std::byte> start = encoded_meta(text_of(dataset, DCM_SOPClassUID), uid);
   const std::vector<std::byte> data = encoded(dataset);
+  start.insert(start.end(), data.begin(), data.end());
+  start.insert(start.end(), pixel_start.begin(), pixel_start.end());
 
   const int file = ::open(path.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666);
   if (file < 0) throw Error("cannot create " + path.string() + ": " + std::generic_category().message(errno));
   try {
-    write_bytes(file, meta, path);
-    write_bytes(file, data, path);
+    write_bytes(file, start, path);
+    write_bytes(file, pixels, path);
   } catch (...) {
     ::close(file);
     throw;

@@ -5,7 +5,9 @@
 #include <dcmtk/dcmdata/dcfilefo.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -15,10 +17,13 @@ namespace tetwarp {
 /// @throws Error when DCMTK cannot encode it
 std::vector<std::byte> encoded(DcmDataset& dataset);
 
-/// Gives the data set its SOP Instance UID, a hash of everything else that it holds, and writes it as a DICOM file
-/// (PS3.10). Every byte is a function of the data set. @throws Error naming the file and the system's reason (disk full
-/// and so on)
-void write_dicom_file(const std::filesystem::path& path, DcmDataset& dataset);
+/// Gives the data set its SOP Instance UID, a hash of everything else in the file, and writes it as a DICOM file
+/// (PS3.10) with `voxels` as its Pixel Data. Every byte is a function of both.
+///
+/// The voxels are hashed and written from where they lie: DCMTK, which would copy them four times, encodes the rest.
+/// @param dataset  without Pixel Data (7FE0,0010) and what would follow it
+/// @throws Error naming the file and the system's reason (disk full and so on)
+void write_dicom_file(const std::filesystem::path& path, DcmDataset& dataset, std::span<const std::int16_t> voxels);
 
 /// "IM00042.dcm": names sort as their numbers do.
 std::string dicom_file_name(int instance_number);

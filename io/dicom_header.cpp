@@ -190,9 +190,9 @@ std::string text_of(DcmItem& item, const DcmTagKey& tag) {
   return last == std::string::npos ? "" : text.substr(0, last + 1);
 }
 
-DicomFileHeader header_of(DcmFileFormat& format, const std::filesystem::path& file) {
-  DcmDataset& data = *format.getDataset();
-  DcmMetaInfo& meta = *format.getMetaInfo();
+namespace {
+
+DicomFileHeader header_of(DcmDataset& data, DcmMetaInfo& meta, const std::filesystem::path& file) {
   DicomFileHeader header;
   header.file = file;
   header.transfer_syntax_uid = text_of(meta, DCM_TransferSyntaxUID);
@@ -216,6 +216,17 @@ DicomFileHeader header_of(DcmFileFormat& format, const std::filesystem::path& fi
   read_geometry(data, header);
   header.pixels = pixel_format_of(data);
   return header;
+}
+
+}  // namespace
+
+DicomFileHeader header_of(DcmFileFormat& format, const std::filesystem::path& file) {
+  return header_of(*format.getDataset(), *format.getMetaInfo(), file);
+}
+
+DicomFileHeader header_of(DcmDataset& data) {
+  DcmMetaInfo none;
+  return header_of(data, none, {});
 }
 
 DicomFileHeader read_dicom_header(const std::filesystem::path& file) {

@@ -56,6 +56,8 @@ void prepare_dcmtk();
 
 /// Fills a header from a data set that was read, wholly or up to Pixel Data.
 DicomFileHeader header_of(DcmFileFormat& format, const std::filesystem::path& file);
+/// The same without a meta header and a name.
+DicomFileHeader header_of(DcmDataset& data);
 
 /// Reads a file up to Pixel Data. Never throws for what the file holds: see `skip` and `damage`.
 DicomFileHeader read_dicom_header(const std::filesystem::path& file);

@@ -1,12 +1,9 @@
-#include <dcmtk/config/osconfig.h>
-#include <dcmtk/dcmdata/dcistrmb.h>
+#include <tbb/enumerable_thread_specific.h>
 
 #include <glm/geometric.hpp>
 
-#include <cerrno>
-#include <cstring>
-#include <fstream>
-
+#include "deform/large_memory.h"
+#include "io/dicom_bytes.h"
 #include "io/dicom_header.h"
 #include "io/dicom_headers.h"
 #include "io/dicom_pixels.h"
@@ -17,36 +14,6 @@
 
 namespace tetwarp {
 namespace {
-
-std::vector<std::byte> read_bytes(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary | std::ios::ate);
-  require(stream.good(), "cannot be read, " + file.string() + ": " + std::strerror(errno) + "; check the file");
-  std::vector<std::byte> bytes(static_cast<std::size_t>(stream.tellg()));
-  stream.seekg(0);
-  stream.read(reinterpret_cast<char*>(bytes.data()), std::ssize(bytes));
-  require(stream.gcount() == std::ssize(bytes), "cannot be read whole, " + file.string() + "; check the file");
-  return bytes;
-}
-
-std::unique_ptr<DcmFileFormat> parse(const std::vector<std::byte>& bytes, const std::filesystem::path& file) {
-  DcmInputBufferStream stream;
-  stream.setBuffer(bytes.data(), std::ssize(bytes));
-  stream.setEos();
-  auto format = std::make_unique<DcmFileFormat>();
-  format->transferInit();
-  const OFCondition result = format->read(stream);
-  format->transferEnd();
-  require(result.good(),
-          "truncated or damaged file, " + file.string() + ": " + result.text() + "; copy the file again");
-  return format;
-}
-
-/// Bytes of Pixel Data that are there; compressed: of the file.
-std::optional<std::uint64_t> pixel_bytes_of(DcmDataset& data, std::uint64_t file_bytes) {
-  DcmElement* element = nullptr;
-  if (data.findAndGetElement(DCM_PixelData, element).bad()) return std::nullopt;
-  return DcmXfer(data.getOriginalXfer()).isEncapsulated() ? file_bytes : element->getLength();
-}
 
 /// A file that was listed may have been replaced since.
 void require_unchanged(const DicomFileHeader& header, const DicomSlice& slice, const Geometry& geometry) {
@@ -73,25 +40,21 @@ struct LoadedSlice {
   HuCount count;
 };
 
-LoadedSlice load_slice(const DicomSlice& slice, const Geometry& geometry, HuTableCache& tables,
+LoadedSlice load_slice(const DicomSlice& slice, const Geometry& geometry, HuTableCache& tables, FileBuffer& buffer,
                        std::span<std::int16_t> hu) {
   LoadedSlice loaded;
-  std::unique_ptr<DcmFileFormat> format;
-  DicomFileHeader header;
-  {
-    const std::vector<std::byte> bytes = read_bytes(slice.file);
-    loaded.digest = Sha256().add(bytes).digest();
-    format = parse(bytes, slice.file);
-    header = header_of(*format, slice.file);
-    header.file_bytes = bytes.size();
-    header.pixel_bytes = pixel_bytes_of(*format->getDataset(), bytes.size());
-  }
+  const std::span<const std::byte> bytes = buffer.read(slice.file);
+  loaded.digest = Sha256().add(bytes).digest();
+  ParsedSlice parsed = parse_slice(bytes, slice.file);
+  const DicomFileHeader& header = parsed.header;
   for (const auto& problem : {geometry_problem(header), pixel_problem(header)}) require(problem.empty(), problem);
   require_unchanged(header, slice, geometry);
-  const std::vector<std::uint16_t> words = decode_pixels(*format->getDataset(), header);
-  loaded.count = convert_to_hu(words, *tables.table_for(header.pixels), slice.file, hu);
+  const std::shared_ptr<const HuTable> table = tables.table_for(header.pixels);
+  loaded.count = parsed.native.empty()
+                     ? convert_to_hu(decode_pixels(*parsed.format->getDataset(), header), *table, slice.file, hu)
+                     : convert_to_hu(parsed.native, *table, slice.file, hu);
   loaded.pixels = header.pixels;
-  loaded.header.reset(format->getAndRemoveDataset());
+  loaded.header.reset(parsed.format->getAndRemoveDataset());
   delete loaded.header->remove(DCM_PixelData);
   return loaded;
 }
@@ -123,14 +86,15 @@ DicomVolume load_dicom(const DicomSeries& series, int threads, const Control& co
   DicomVolume result;
   result.series_uid = series.series_uid;
   result.volume.geometry = series.geometry;
-  result.volume.voxels.resize(static_cast<std::size_t>(voxel_count(series.geometry)));
+  resize_large(result.volume.voxels, static_cast<std::size_t>(voxel_count(series.geometry)), threads);
   const std::size_t slice_size = result.volume.voxels.size() / series.slices.size();
 
   std::vector<LoadedSlice> slices(series.slices.size());
   HuTableCache tables;
+  tbb::enumerable_thread_specific<FileBuffer> buffers;  // one file a thread, however long the series
   for_each_index(slices.size(), threads, control, [&](std::size_t k) {
     const std::span<std::int16_t> hu = std::span(result.volume.voxels).subspan(k * slice_size, slice_size);
-    slices[k] = load_slice(series.slices[k], series.geometry, tables, hu);
+    slices[k] = load_slice(series.slices[k], series.geometry, tables, buffers.local(), hu);
   });
 
   result.padding = common_padding(series, slices);

@@ -87,8 +87,8 @@ void write_phantom_series(const std::filesystem::path& folder, const ConstVolume
     for (const DcmTagKey& tag : type_2_attributes()) {
       if (!slice.tagExists(tag)) put(slice, tag, "");
     }
-    put_hu_pixels(slice, geometry, slice_of(volume, k));
-    write_dicom_file(folder / dicom_file_name(static_cast<int>(k + 1)), slice);
+    put_hu_format(slice, geometry);
+    write_dicom_file(folder / dicom_file_name(static_cast<int>(k + 1)), slice, slice_of(volume, k));
   });
 }
 

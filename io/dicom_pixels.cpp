@@ -20,16 +20,17 @@ namespace {
                    "; copy or export the file again");
 }
 
-/// The bytes of all fragments, without the offset table.
-std::vector<Uint8> codestream_of(DcmPixelSequence& sequence) {
-  std::vector<Uint8> bytes;
+/// The bytes of all fragments, without the offset table. @param joined  holds them where there are several
+std::span<const Uint8> codestream_of(DcmPixelSequence& sequence, std::vector<Uint8>& joined) {
+  std::span<const Uint8> only;
   for (unsigned long i = 1; i < sequence.card(); ++i) {
     DcmPixelItem* item = nullptr;
     Uint8* data = nullptr;
     if (sequence.getItem(item, i).bad() || item->getUint8Array(data).bad() || !data) continue;
-    bytes.insert(bytes.end(), data, data + item->getLength());
+    only = {data, item->getLength()};
+    if (sequence.card() > 2) joined.insert(joined.end(), only.begin(), only.end());
   }
-  return bytes;
+  return sequence.card() > 2 ? joined : only;
 }
 
 struct JpegFrame {
@@ -75,21 +76,29 @@ void check_jpeg(std::span<const Uint8> bytes, const DicomFileHeader& header) {
   }
 }
 
-/// Bytes that an RLE segment unfolds to (PS3.5 G.3.2); the last literal run counts as far as it is there.
-std::uint64_t unfolded_bytes(std::span<const Uint8> segment) {
-  std::uint64_t count = 0;
-  for (std::size_t at = 0; at + 1 < segment.size();) {
-    const std::size_t control = segment[at];
-    const std::size_t literals = std::min(control + 1, segment.size() - at - 1);
-    if (control < 128) count += literals;
-    if (control > 128) count += 257 - control;
-    at += control < 128 ? 1 + literals : (control == 128 ? 1 : 2);
+/// Unfolds an RLE segment (PS3.5 G.3.2); the last literal run counts as far as it is there.
+/// @return how many bytes of `plane` were set
+std::size_t unfold(std::span<const Uint8> segment, std::span<Uint8> plane) {
+  std::size_t done = 0;
+  for (std::size_t at = 0; at + 1 < segment.size() && done < plane.size();) {
+    const std::size_t control = segment[at++], room = plane.size() - done;
+    if (control < 128) {
+      const std::size_t count = std::min({control + 1, segment.size() - at, room});
+      std::copy_n(segment.begin() + at, count, plane.begin() + done);
+      at += count;
+      done += count;
+    } else if (control > 128) {
+      const std::size_t count = std::min(257 - control, room);
+      std::fill_n(plane.begin() + done, count, segment[at++]);
+      done += count;
+    }
   }
-  return count;
+  return done;
 }
 
-/// DCMTK fills up what an RLE segment lacks; so each must unfold to a whole byte plane (PS3.5 G.4, G.5).
-void check_rle(std::span<const Uint8> bytes, const DicomFileHeader& header) {
+/// Unfolds the byte planes of a frame, the high bytes first (PS3.5 G.4, G.5). DCMTK fills up what a segment lacks, and
+/// takes twice as long; so it is done here.
+std::vector<std::uint16_t> decode_rle(std::span<const Uint8> bytes, const DicomFileHeader& header) {
   constexpr std::size_t header_bytes = 64;
   const auto word = [&](std::size_t i) {
     return bytes[4 * i] | std::size_t{bytes[4 * i + 1]} << 8 | std::size_t{bytes[4 * i + 2]} << 16 |
@@ -101,18 +110,23 @@ void check_rle(std::span<const Uint8> bytes, const DicomFileHeader& header) {
     refuse_pixels(header, "expected " + std::to_string(planes) + " RLE segments, found " +
                               (bytes.size() < header_bytes ? "none" : std::to_string(word(0))));
   }
+  std::vector<std::uint16_t> words(expected);
+  std::vector<Uint8> bytes_of_plane(expected);
   for (std::size_t plane = 1; plane <= planes; ++plane) {
     const std::size_t begin = std::min(word(plane), bytes.size());
     const std::size_t end = plane < planes ? std::clamp(word(plane + 1), begin, bytes.size()) : bytes.size();
-    const std::uint64_t found = unfolded_bytes(bytes.subspan(begin, end - begin));
+    const std::uint64_t found = unfold(bytes.subspan(begin, end - begin), bytes_of_plane);
     if (found < expected) {
       refuse_pixels(header, "expected " + std::to_string(expected) + " bytes of RLE segment " + std::to_string(plane) +
                                 ", found " + std::to_string(found));
     }
+    for (std::size_t i = 0; i < expected; ++i) words[i] = static_cast<std::uint16_t>(words[i] << 8 | bytes_of_plane[i]);
   }
+  return words;
 }
 
-void check_encapsulated(DcmPixelData& pixels, const DicomFileHeader& header) {
+/// The fragments of a compressed frame. @param joined  see codestream_of
+std::span<const Uint8> fragments_of(DcmPixelData& pixels, const DicomFileHeader& header, std::vector<Uint8>& joined) {
   E_TransferSyntax encoding = EXS_Unknown;
   const DcmRepresentationParameter* parameter = nullptr;
   DcmPixelSequence* sequence = nullptr;
@@ -120,11 +134,47 @@ void check_encapsulated(DcmPixelData& pixels, const DicomFileHeader& header) {
   if (pixels.getEncapsulatedRepresentation(encoding, parameter, sequence).bad() || !sequence) {
     refuse_pixels(header, "expected compressed fragments, found none");
   }
-  const std::vector<Uint8> bytes = codestream_of(*sequence);
-  if (header.encoding == EXS_RLELossless)
-    check_rle(bytes, header);
-  else
-    check_jpeg(bytes, header);
+  return codestream_of(*sequence, joined);
+}
+
+/// HU of words that all fit int16 with an offset. @return whether they do; if not, `hu` holds anything
+template <class Stored>
+bool add_offset(std::span<const std::uint16_t> words, const HuTable& table, std::span<std::int16_t> hu) {
+  const int above = 15 - table.format.high_bit, below = 16 - table.format.bits_stored, offset = *table.offset;
+  int misfits = 0;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    const int value = (static_cast<Stored>(words[i] << above) >> below) + offset;
+    hu[i] = static_cast<std::int16_t>(value);
+    misfits |= hu[i] ^ value;
+  }
+  return misfits == 0;
+}
+
+bool add_offset(std::span<const std::uint16_t> words, const HuTable& table, std::span<std::int16_t> hu) {
+  if (!table.offset) return false;
+  return table.format.is_signed ? add_offset<std::int16_t>(words, table, hu)
+                                : add_offset<std::uint16_t>(words, table, hu);
+}
+
+HuCount look_up(std::span<const std::uint16_t> words, const HuTable& table, const std::filesystem::path& file,
+                std::span<std::int16_t> hu) {
+  HuCount count;
+  std::uint8_t kinds = 0;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    const std::uint8_t kind = table.kind[words[i]];
+    hu[i] = table.hu[words[i]];
+    kinds |= kind;
+    count.rounded += kind & HuTable::rounded;
+    count.saturated_padding += (kind & HuTable::saturated_padding) != 0;
+  }
+  if ((kinds & HuTable::beyond) == 0) return count;
+  const auto first =
+      std::find_if(words.begin(), words.end(), [&](std::uint16_t w) { return table.kind[w] & HuTable::beyond; });
+  const int stored = stored_value(table.format, *first);
+  throw InputError("HU beyond int16, " + file.string() + ": stored value " + std::to_string(stored) + " gives " +
+                   number(hu_of(table.format, stored)) +
+                   " HU, expected -32768 to 32767; check Rescale Slope (0028,1053) " + number(*table.format.slope) +
+                   " and Intercept (0028,1052) " + number(*table.format.intercept));
 }
 
 }  // namespace
@@ -134,22 +184,24 @@ std::vector<std::uint16_t> decode_pixels(DcmDataset& data, const DicomFileHeader
   data.findAndGetElement(DCM_PixelData, element);
   auto* pixels = dynamic_cast<DcmPixelData*>(element);
   if (!pixels) refuse_pixels(header, "expected Pixel Data (7FE0,0010), found none");
-  if (DcmXfer(header.encoding).isEncapsulated()) check_encapsulated(*pixels, header);
+  if (DcmXfer(header.encoding).isEncapsulated()) {
+    std::vector<Uint8> joined;
+    const std::span<const Uint8> bytes = fragments_of(*pixels, header, joined);
+    if (header.encoding == EXS_RLELossless) return decode_rle(bytes, header);
+    check_jpeg(bytes, header);
+  }
 
   const std::uint64_t needed = slice_bytes(header.pixels);
-  std::vector<Uint8> bytes(needed + needed % 2);
+  std::vector<std::uint16_t> words((needed + 1) / 2);
   Uint32 fragment = 0;
   OFString color_model;
-  const OFCondition result =
-      pixels->getUncompressedFrame(&data, 0, fragment, bytes.data(), static_cast<Uint32>(bytes.size()), color_model);
+  const OFCondition result = pixels->getUncompressedFrame(&data, 0, fragment, words.data(),
+                                                          static_cast<Uint32>(2 * words.size()), color_model);
   if (result.bad()) refuse_pixels(header, result.text());
-
-  std::vector<std::uint16_t> words(needed / static_cast<unsigned>(header.pixels.bits_allocated / 8));
-  if (header.pixels.bits_allocated == 8)
-    std::copy_n(bytes.begin(), words.size(), words.begin());
-  else
-    std::memcpy(words.data(), bytes.data(), needed);
-  return words;
+  if (header.pixels.bits_allocated == 16) return words;
+  std::vector<Uint8> bytes(needed);
+  std::memcpy(bytes.data(), words.data(), needed);
+  return {bytes.begin(), bytes.end()};
 }
 
 std::shared_ptr<const HuTable> make_hu_table(const PixelFormat& format) {
@@ -168,6 +220,11 @@ std::shared_ptr<const HuTable> make_hu_table(const PixelFormat& format) {
     if (exact_hu != whole_hu) table->kind[word] |= HuTable::rounded;
     if (fitting != whole_hu) table->kind[word] |= is_padding ? HuTable::saturated_padding : HuTable::beyond;
   }
+  const double intercept = *format.intercept;
+  if (format.bits_allocated == 16 && *format.slope == 1 && intercept == std::nearbyint(intercept) &&
+      std::abs(intercept) <= 65536) {
+    table->offset = static_cast<int>(intercept);
+  }
   return table;
 }
 
@@ -177,25 +234,26 @@ std::shared_ptr<const HuTable> HuTableCache::table_for(const PixelFormat& format
   return last_;
 }
 
-HuCount convert_to_hu(std::span<const std::uint16_t> words, const HuTable& table, const std::filesystem::path& file,
+HuCount convert_to_hu(std::span<const std::byte> words, const HuTable& table, const std::filesystem::path& file,
                       std::span<std::int16_t> hu) {
   HuCount count;
-  std::uint8_t kinds = 0;
-  for (std::size_t i = 0; i < words.size(); ++i) {
-    const std::uint8_t kind = table.kind[words[i]];
-    hu[i] = table.hu[words[i]];
-    kinds |= kind;
-    count.rounded += kind & HuTable::rounded;
-    count.saturated_padding += (kind & HuTable::saturated_padding) != 0;
+  std::array<std::uint16_t, 4096> aligned;
+  for (std::size_t begin = 0; begin < hu.size(); begin += aligned.size()) {
+    const std::size_t size = std::min(aligned.size(), hu.size() - begin);
+    std::memcpy(aligned.data(), words.data() + 2 * begin, 2 * size);
+    const std::span<std::int16_t> part = hu.subspan(begin, size);
+    const std::span<const std::uint16_t> from(aligned.data(), size);
+    if (add_offset(from, table, part)) continue;
+    const HuCount more = look_up(from, table, file, part);
+    count.rounded += more.rounded;
+    count.saturated_padding += more.saturated_padding;
   }
-  if ((kinds & HuTable::beyond) == 0) return count;
-  const auto first =
-      std::find_if(words.begin(), words.end(), [&](std::uint16_t w) { return table.kind[w] & HuTable::beyond; });
-  const int stored = stored_value(table.format, *first);
-  throw InputError("HU beyond int16, " + file.string() + ": stored value " + std::to_string(stored) + " gives " +
-                   number(hu_of(table.format, stored)) +
-                   " HU, expected -32768 to 32767; check Rescale Slope (0028,1053) " + number(*table.format.slope) +
-                   " and Intercept (0028,1052) " + number(*table.format.intercept));
+  return count;
+}
+
+HuCount convert_to_hu(std::span<const std::uint16_t> words, const HuTable& table, const std::filesystem::path& file,
+                      std::span<std::int16_t> hu) {
+  return convert_to_hu(std::as_bytes(words), table, file, hu);
 }
 
 }  // namespace tetwarp

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -21,6 +22,7 @@ struct HuTable {
   PixelFormat format;
   std::vector<std::int16_t> hu;    ///< per word
   std::vector<std::uint8_t> kind;  ///< per word; `beyond`: HU does not fit int16
+  std::optional<int> offset;       ///< HU less the stored value, where slope and intercept add a whole number only
 };
 std::shared_ptr<const HuTable> make_hu_table(const PixelFormat& format);
 
@@ -40,6 +42,9 @@ struct HuCount {
 };
 /// @throws InputError naming `file` for a pixel whose HU does not fit int16
 HuCount convert_to_hu(std::span<const std::uint16_t> words, const HuTable& table, const std::filesystem::path& file,
+                      std::span<std::int16_t> hu);
+/// The same of words as they lie in a file, little endian, at any address.
+HuCount convert_to_hu(std::span<const std::byte> words, const HuTable& table, const std::filesystem::path& file,
                       std::span<std::int16_t> hu);
 
 }  // namespace tetwarp

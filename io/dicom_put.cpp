@@ -114,7 +114,7 @@ std::span<const std::int16_t> slice_of(const ConstVolumeView& volume, std::size_
   return {reinterpret_cast<const std::int16_t*>(volume.voxels) + k * count, count};
 }
 
-void put_hu_pixels(DcmItem& item, const Geometry& geometry, std::span<const std::int16_t> voxels) {
+void put_hu_format(DcmItem& item, const Geometry& geometry) {
   put(item, DCM_SamplesPerPixel, std::uint16_t{1});
   put(item, DCM_PhotometricInterpretation, "MONOCHROME2");
   put(item, DCM_Rows, static_cast<std::uint16_t>(geometry.size.y));
@@ -126,9 +126,6 @@ void put_hu_pixels(DcmItem& item, const Geometry& geometry, std::span<const std:
   put(item, DCM_RescaleIntercept, "0");
   put(item, DCM_RescaleSlope, "1");
   put(item, DCM_RescaleType, "HU");
-  check(item.putAndInsertUint16Array(DCM_PixelData, reinterpret_cast<const Uint16*>(voxels.data()),
-                                     static_cast<unsigned long>(voxels.size())),
-        DCM_PixelData);
 }
 
 void put_tetwarp(DcmItem& item, const std::string& model) {

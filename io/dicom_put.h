@@ -49,9 +49,8 @@ const Geometry& require_hu_volume(const ConstVolumeView& volume);
 /// Voxels of slice k.
 std::span<const std::int16_t> slice_of(const ConstVolumeView& volume, std::size_t k);
 
-/// Image Pixel (PS3.3 C.7.6.3) and the Modality LUT: signed 16-bit words that are HU. `voxels`: columns x rows, i
-/// fastest.
-void put_hu_pixels(DcmItem& item, const Geometry& geometry, std::span<const std::int16_t> voxels);
+/// Image Pixel (PS3.3 C.7.6.3) but Pixel Data, and the Modality LUT: signed 16-bit words that are HU.
+void put_hu_format(DcmItem& item, const Geometry& geometry);
 
 /// Manufacturer, model and software versions of this program.
 void put_tetwarp(DcmItem& item, const std::string& model);

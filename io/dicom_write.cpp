@@ -45,8 +45,8 @@ DicomWriteReport write_derived_series(const std::filesystem::path& folder, const
   for_each_index(source.slices.size(), threads, control, [&](std::size_t k) {
     DcmDataset slice;
     const auto added_here = derive_slice(slice, *source.slices[k], series, derivation, *volume.geometry, k);
-    put_hu_pixels(slice, *volume.geometry, slice_of(volume, k));
-    write_dicom_file(folder / dicom_file_name(series.instance_number[k]), slice);
+    put_hu_format(slice, *volume.geometry);
+    write_dicom_file(folder / dicom_file_name(series.instance_number[k]), slice, slice_of(volume, k));
     const std::lock_guard lock(mutex);
     added.insert(added_here.begin(), added_here.end());
   });

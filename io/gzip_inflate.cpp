@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "deform/errors.h"
+#include "deform/large_memory.h"
 #include "io/gzip_member.h"
 #include "io/gzip_pieces.h"
 
@@ -198,6 +199,7 @@ PlainBytes inflate_at_once(const std::filesystem::path& path, std::uint64_t size
   if (auto members = stated_members(*file, size); !members.empty()) return StatedMembers(file, std::move(members));
   if (size > kInflateAtMost) return {};
   const auto held = std::make_shared<const Buffer>(static_cast<std::size_t>(size));
+  prepare_memory(held->bytes(), 0);  // one thread inflates
   if (!inflate_in_order(*file, held->bytes())) return {};
   return [held](std::uint64_t offset, std::span<std::byte> bytes) {
     const std::span<const std::byte> all = held->bytes();

@@ -4,11 +4,17 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <cstdio>
+#include <exception>
 #include <system_error>
+#include <thread>
+#include <vector>
 
 #include "deform/errors.h"
+#include "io/parallel.h"
 
 namespace fs = std::filesystem;
 
@@ -51,19 +57,31 @@ bool occupied(const fs::path& path, StagedOutput::Kind kind) {
   return !empty;
 }
 
-/// Throws unless the folder holds nothing but regular files that are ours.
-void require_ours(const fs::path& folder, bool (*is_ours)(const fs::path&)) {
+/// Everything in a folder and below, by name.
+std::vector<fs::path> entries_of(const fs::path& folder) {
+  std::vector<fs::path> entries;
   std::error_code error;
-  for (fs::recursive_directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
-    const fs::file_status status = entry->symlink_status(error);
-    if (error) break;
-    if (fs::is_directory(status)) continue;
-    if (!is_ours || !fs::is_regular_file(status) || !is_ours(entry->path())) {
-      throw Error(entry->path().string() +
+  fs::recursive_directory_iterator entry(folder, error);
+  for (; !error && entry != fs::recursive_directory_iterator(); entry.increment(error))
+    entries.push_back(entry->path());
+  if (error) throw Error("cannot list " + folder.string() + ": " + reason(error));
+  std::sort(entries.begin(), entries.end());
+  return entries;
+}
+
+/// Throws unless the folder holds nothing but regular files that are ours; names the first that is not.
+void require_ours(const fs::path& folder, bool (*is_ours)(const fs::path&)) {
+  const std::vector<fs::path> entries = entries_of(folder);
+  for_each_index(entries.size(), 0, {}, [&](std::size_t n) {
+    std::error_code error;
+    const fs::file_status status = fs::symlink_status(entries[n], error);
+    if (error) throw Error("cannot look at " + entries[n].string() + ": " + reason(error));
+    if (fs::is_directory(status)) return;
+    if (!is_ours || !fs::is_regular_file(status) || !is_ours(entries[n])) {
+      throw Error(entries[n].string() +
                   " was not written by Tetwarp, so its folder is not replaced; choose another name");
     }
-  }
-  if (error) throw Error("cannot list " + folder.string() + ": " + reason(error));
+  });
 }
 
 /// Creates an empty file or folder beside `target` under a hidden name that nobody has. A leftover of a killed run with
@@ -99,13 +117,33 @@ void flush(const fs::path& path, const fs::path& target) {
   if (!good) throw Error("cannot write " + target.string() + " to disk: " + reason(error) + "; free some space");
 }
 
-void flush_all(const fs::path& staged, StagedOutput::Kind kind, const fs::path& target) {
-  if (kind == StagedOutput::Kind::folder) {
-    std::error_code error;
-    fs::recursive_directory_iterator entry(staged, error);
-    for (; !error && entry != fs::recursive_directory_iterator(); entry.increment(error)) flush(entry->path(), target);
-    if (error) throw Error("cannot list " + staged.string() + ": " + reason(error));
+/// Flushes many files at once: a file system then writes its journal once for several of them. Threads that wait for
+/// the disk take no time of a processor, so their number is none of --threads. Of several failures the first file's.
+void flush_each(const std::vector<fs::path>& files, const fs::path& target) {
+  constexpr std::size_t kMostThreads = 16;
+  std::vector<std::exception_ptr> failures(files.size());
+  std::atomic<std::size_t> next = 0;
+  const auto work = [&] {
+    for (std::size_t n = next++; n < files.size(); n = next++) {
+      try {
+        flush(files[n], target);
+      } catch (...) {
+        failures[n] = std::current_exception();
+      }
+    }
+  };
+  {
+    std::vector<std::jthread> threads;
+    while (threads.size() + 1 < std::min(kMostThreads, files.size())) threads.emplace_back(work);
+    work();
   }
+  for (const std::exception_ptr& failure : failures) {
+    if (failure) std::rethrow_exception(failure);
+  }
+}
+
+void flush_all(const fs::path& staged, StagedOutput::Kind kind, const fs::path& target) {
+  if (kind == StagedOutput::Kind::folder) flush_each(entries_of(staged), target);
   flush(staged, target);
 }
 

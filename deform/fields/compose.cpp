@@ -8,6 +8,7 @@
 #include "deform/core/five_tetrahedra.h"
 #include "deform/cpu/tiles.h"
 #include "deform/fields/point_map.h"
+#include "deform/large_memory.h"
 
 namespace tetwarp {
 
@@ -54,7 +55,8 @@ Weights weights_in_cell(const glm::dvec3& at, bool odd) {
 
 VertexField sample_on(const Geometry& lattice, const PointMap& map, Limits limits, const Control& control) {
   require_valid(lattice, "field lattice");
-  VertexField field{lattice, std::vector<glm::vec3>(static_cast<std::size_t>(voxel_count(lattice)))};
+  VertexField field{lattice, {}};
+  resize_large(field.displacement, static_cast<std::size_t>(voxel_count(lattice)), limits.threads);
   for_each_vertex(field, limits, control,
                   [&](const glm::dvec3& rest, const glm::vec3&) { return glm::vec3(map(rest)); });
   return field;

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "cuda/devices.h"
 #include "tests/support/program.h"
@@ -50,6 +51,9 @@ TEST(BenchProgram, WrongCommandLinesExitWithTwo) {
   expect_error(run_bench(scratch, "cpu --peers gpu"), 2, "gpu");
   expect_error(run_bench(scratch, "cpu --cell-sizes 4,1"), 2, "--cell-sizes");
   expect_error(run_bench(scratch, "cpu --repeats 0"), 2, "--repeats");
+  expect_error(run_bench(scratch, "io --slices 1"), 2, "--slices");
+  expect_error(run_bench(scratch, "io --steps in,through"), 2, "through");
+  expect_error(run_bench(scratch, "io --folder missing"), 2, "missing");
 }
 
 constexpr const char* kTinyGpu = "gpu --width 64 --slices 20,40 --cell-sizes 4 --frames 2 --warmup 1 --json r.json ";
@@ -113,6 +117,50 @@ TEST(BenchProgram, AMissedFloorIsAFailureWhereItIsAskedFor) {
   EXPECT_EQ(run_bench(scratch, alone + "local --check").status, 0) << "nothing is required of it";
 }
 
+#ifdef TETWARP_BENCH_IO
+constexpr const char* kTinyIo = "io --width 32 --slices 6 --repeats 2 --cell-sizes 4 --folder . --json r.json ";
+
+TEST(BenchProgram, MeasuresFilesAndLeavesNoneBehind) {
+  const Scratch scratch;
+  const Outcome run = run_bench(scratch, kTinyIo);
+  ASSERT_EQ(run.status, 0) << run.err;
+  EXPECT_TRUE(says(run.out, {"# tetwarp-bench io", "32 x 32 x 6", "page cache", "## Floors"}));
+  const nlohmann::json document = nlohmann::json::parse(read_text(scratch / "r.json"));
+  std::set<std::string> runs, floors;
+  for (const nlohmann::json& time : document["times"]) {
+    runs.insert(time["step"].get<std::string>() + ", " + time["by"].get<std::string>());
+    EXPECT_GT(time["ms"]["min"], 0) << time["step"];
+    EXPECT_EQ(time["ms"]["frames"], 2) << time["step"];
+  }
+  for (const nlohmann::json& floor : document["floors"]) floors.insert(floor["where"]);
+  for (const std::string coding : {"uncompressed", "JPEG lossless", "JPEG-LS", "RLE"}) {
+    for (const std::string by : {"tetwarp", "ITK", "DCMTK"}) {
+      EXPECT_TRUE(runs.contains("DICOM in, " + coding + ", " + by)) << coding << by;
+    }
+    EXPECT_TRUE(floors.contains("DICOM in, " + coding));
+  }
+  for (const std::string where : {"DICOM out", ".nii.gz out", ".nii.gz in, written by ITK", "whole job, cells of 4"}) {
+    EXPECT_TRUE(floors.contains(where)) << where;
+  }
+  EXPECT_GT(document["sizes"].size(), 1u);
+  for (const auto& entry : std::filesystem::directory_iterator(scratch.path())) {
+    EXPECT_FALSE(entry.is_directory()) << entry.path();
+  }
+}
+
+TEST(BenchProgram, AJobThatMissesItsFloorFailsOnlyWhereItIsAsked) {
+  // To start the program takes longer than to deform so little.
+  const Scratch scratch;
+  const std::string job = std::string(kTinyIo) + "--steps job ";
+  EXPECT_EQ(run_bench(scratch, job).status, 0);
+  const Outcome checked = run_bench(scratch, job + "--check");
+  EXPECT_EQ(checked.status, 1);
+  EXPECT_TRUE(says(checked.err, {"a floor is missed"}));
+  EXPECT_TRUE(says(checked.out, {"| program / sum of its stages | whole job, cells of 4 |", "missed"}));
+  EXPECT_EQ(nlohmann::json::parse(read_text(scratch / "r.json"))["floors"][0]["required"]["met"], false);
+}
+#endif
+
 TEST(BenchProgram, AVolumeOfZerosExitsWithFourAndWritesNothing) {
   const Scratch scratch;
   write_file(scratch / "zeros.raw", std::string(2 * 5 * 4 * 3, '\0'));
@@ -127,7 +175,7 @@ TEST(BenchProgram, AnUnwritableResultIsKnownBeforeTheWork) {
 
 TEST(BenchProgram, HelpHasAnExample) {
   const Scratch scratch;
-  for (const std::string command : {"paper", "gpu", "cpu"}) {
+  for (const std::string command : {"paper", "gpu", "cpu", "io"}) {
     const Outcome run = run_bench(scratch, command + " --help");
     EXPECT_EQ(run.status, 0);
     EXPECT_TRUE(says(run.out, {"Example: tetwarp bench " + command}));

@@ -8,6 +8,7 @@
 #include <dcmtk/dcmjpeg/djencode.h>
 #include <dcmtk/dcmjpls/djencode.h>
 
+#include <algorithm>
 #include <array>
 #include <fstream>
 
@@ -198,6 +199,84 @@ TEST(DicomLoad, HashIsThatOfTheFilesHashesInSliceOrder) {
   EXPECT_EQ(load_folder(folder.path()).sha256, expected.hex());
 }
 
+/// A stack of 100 x 96 slices, more than is converted at once, whose words take all 12 bits.
+void write_large_stack(const fs::path& folder, const std::function<void(MadeSlice&)>& change) {
+  write_stack(folder, 3, [&](int k, MadeSlice& slice) {
+    slice.rows = 96;
+    slice.columns = 100;
+    for (int i = 0; i < 9600; ++i) slice.words.push_back(static_cast<std::uint16_t>((i * 7919 + k) % 4096));
+    change(slice);
+  });
+}
+
+TEST(DicomLoad, PixelsAreTheSameFromTheFileAndThroughDcmtk) {
+  const std::vector<std::function<void(MadeSlice&)>> ways = {
+      [](MadeSlice&) {},
+      [](MadeSlice& slice) { slice.encoding = EXS_LittleEndianImplicit; },
+      [](MadeSlice& slice) { slice.encoding = EXS_BigEndianExplicit; },
+      // What follows Pixel Data, or is longer than the slice, is not taken for pixels.
+      [](MadeSlice& slice) {
+        const std::vector<Uint8> padding(300, 0x55);
+        slice.edit = [=](DcmDataset& data) {
+          data.putAndInsertUint8Array(DCM_DataSetTrailingPadding, padding.data(), padding.size());
+        };
+      },
+      [](MadeSlice& slice) { slice.words.insert(slice.words.end(), 7, 0x5555); },
+  };
+  Hu expected;
+  for (int n = 0; n < 3 * 9600; ++n)
+    expected.push_back(static_cast<std::int16_t>((n % 9600 * 7919 + n / 9600) % 4096 - 1024));
+  for (std::size_t way = 0; way < ways.size(); ++way) {
+    const Scratch folder;
+    write_large_stack(folder.path(), ways[way]);
+    const DicomVolume loaded = load_folder(folder.path());
+    EXPECT_EQ(loaded.volume.voxels, expected) << way;
+    EXPECT_EQ(loaded.headers->slices[1]->tagExists(DCM_DataSetTrailingPadding), way == 3) << way;
+    EXPECT_FALSE(loaded.headers->slices[1]->tagExists(DCM_PixelData)) << way;
+  }
+}
+
+TEST(DicomLoad, PixelsAreFoundWherePixelDataAlsoOccurWithinASequence) {
+  const Scratch folder;
+  write_large_stack(folder.path(), [](MadeSlice& slice) {
+    slice.edit = [](DcmDataset& data) {
+      DcmItem* icon = nullptr;
+      data.findOrCreateSequenceItem(DCM_IconImageSequence, icon);
+      const std::vector<Uint16> words(8, 0x7777);
+      icon->putAndInsertUint16Array(DCM_PixelData, words.data(), words.size());
+    };
+  });
+  const DicomVolume loaded = load_folder(folder.path());
+  EXPECT_EQ(loaded.volume.voxels[0], -1024);
+  EXPECT_EQ(loaded.volume.voxels[1], 7919 % 4096 - 1024);
+  EXPECT_TRUE(loaded.headers->slices[0]->tagExists(DCM_IconImageSequence));
+}
+
+TEST(DicomLoad, OneWordThatDoesNotFitIsFoundAmongMany) {
+  const Scratch folder;
+  const auto with_word = [&](bool is_padding) {
+    write_large_stack(folder.path(), [&](MadeSlice& slice) {
+      slice.words[5000] = 32768_s;
+      slice.words[9000] = 32000_s;
+      if (is_padding) {
+        slice.words[9000] = 32767_s;
+        slice.edit = [](DcmDataset& data) {
+          data.putAndInsertSint16(DCM_PixelPaddingValue, -32768);
+          data.putAndInsertSint16(DCM_PixelPaddingRangeLimit, -32767);
+        };
+      }
+    });
+  };
+  with_word(false);
+  EXPECT_TRUE(says(error_of([&] { load_folder(folder.path()); }), {"s00.dcm", "stored value -32768 gives -33792 HU"}));
+  with_word(true);
+  const DicomVolume loaded = load_folder(folder.path());
+  EXPECT_EQ(loaded.volume.voxels[5000], -32768);
+  EXPECT_EQ(loaded.volume.voxels[9000], -32768);
+  EXPECT_EQ(loaded.volume.voxels[4999], 4999 * 7919 % 4096 - 1024);
+  EXPECT_EQ(loaded.volume.voxels[9599], 9599 * 7919 % 4096 - 1024);
+}
+
 TEST(DicomLoad, ResultIsIndependentOfThreadCount) {
   const Scratch folder;
   write_stack(folder.path(), 20, [](int k, MadeSlice& slice) { slice.slope = k % 2 ? "1" : "1.5"; });
@@ -342,6 +421,57 @@ TEST_P(DicomTruncated, FrameOfAnotherSizeIsRefused) {
 
 INSTANTIATE_TEST_SUITE_P(Syntax, DicomTruncated,
                          testing::Values(EXS_RLELossless, EXS_JPEGProcess14, EXS_JPEGProcess14SV1, EXS_JPEGLSLossless));
+
+/// One slice of 2 rows and 4 columns whose RLE frame is `frame`.
+DicomVolume load_rle(const std::vector<Uint8>& frame) {
+  const Scratch folder;
+  MadeSlice slice;
+  slice.encoding = EXS_RLELossless;
+  slice.rows = 2;
+  slice.columns = 4;
+  slice.intercept = "0";
+  write_slice(folder / "slice.dcm", slice);
+  DcmFileFormat format;
+  format.loadFile((folder / "slice.dcm").c_str());
+  DcmElement* element = nullptr;
+  DcmPixelSequence* sequence = nullptr;
+  DcmPixelItem* item = nullptr;
+  format.getDataset()->findAndGetElement(DCM_PixelData, element);
+  dynamic_cast<DcmPixelData&>(*element).getEncapsulatedRepresentation(EXS_RLELossless, nullptr, sequence);
+  if (!sequence || sequence->getItem(item, 1).bad()) throw std::runtime_error("no RLE frame");
+  item->putUint8Array(frame.data(), frame.size());
+  format.saveFile((folder / "slice.dcm").c_str(), EXS_RLELossless);
+  return load_folder(folder.path());
+}
+
+/// The header of a frame of two segments, the second after `first` bytes, and these.
+std::vector<Uint8> rle_frame(const std::vector<Uint8>& first, const std::vector<Uint8>& second) {
+  std::vector<Uint8> frame(64 + first.size() + second.size());
+  frame[0] = 2;
+  frame[4] = 64;
+  frame[8] = static_cast<Uint8>(64 + first.size());
+  std::ranges::copy(second, std::ranges::copy(first, frame.begin() + 64).out);
+  return frame;
+}
+
+class DicomRle : public DicomLossless {};
+
+TEST_F(DicomRle, RunsLiteralsNoOpsAndWhatIsLeftOver) {
+  // High bytes: a run of 8. Low bytes: nothing (128), 3 literals, a run of 127 where 5 are left, padding.
+  const DicomVolume loaded = load_rle(rle_frame({249, 1}, {128, 2, 10, 20, 30, 130, 40, 0}));
+  EXPECT_EQ(loaded.volume.voxels, (Hu{266, 276, 286, 296, 296, 296, 296, 296}));
+}
+
+TEST_F(DicomRle, SegmentsThatLackBytesAreRefusedWithTheirCount) {
+  EXPECT_TRUE(says(error_of([] {
+                     load_rle(rle_frame({249, 1}, {2, 10, 20, 30, 254, 40}));
+                   }),
+                   {"slice.dcm", "expected 8 bytes of RLE segment 2, found 6"}));
+  EXPECT_TRUE(says(error_of([] {
+                     load_rle(rle_frame({5, 1, 2}, {249, 40}));
+                   }),
+                   {"expected 8 bytes of RLE segment 1, found 2"}));
+}
 
 }  // namespace
 }  // namespace tetwarp

@@ -7,6 +7,8 @@
 
 #include "deform/errors.h"
 #include "deform/version.h"
+#include "io/dicom_file.h"
+#include "io/hash.h"
 #include "tests/io/derived_source.h"
 #include "tests/support/dicom_maker.h"
 #include "tests/support/scratch.h"
@@ -42,6 +44,25 @@ TEST(DerivedSeries, StoredValueIsHu) {
     EXPECT_EQ(file[DCM_PixelRepresentation], "1");
     EXPECT_EQ(file[DCM_BitsAllocated] + file[DCM_BitsStored] + file[DCM_HighBit], "161615");
     EXPECT_EQ(file[DCM_Rows] + "x" + file[DCM_Columns], "6x8");
+  }
+}
+
+/// The voxels pass by DCMTK when a file is written; the file must be the one that DCMTK would make.
+TEST(DerivedSeries, BytesAndInstanceUidAreThoseOfTheDataSetEncodedByDcmtk) {
+  const Scratch scratch;
+  DerivedSource source;
+  source.write(scratch.path());
+  for (const char* name : kNames) {
+    Written file(scratch / name);
+    ASSERT_TRUE(file.data().loadAllDataIntoMemory().good());
+    const std::vector<std::byte> bytes = encoded(file.data());
+    const std::string text = file_bytes(scratch / name);
+    const auto whole = std::as_bytes(std::span(text));
+    ASSERT_GT(whole.size(), bytes.size());
+    EXPECT_TRUE(std::ranges::equal(whole.last(bytes.size()), bytes)) << name;
+    const std::string uid = file[DCM_SOPInstanceUID];
+    file.data().findAndDeleteElement(DCM_SOPInstanceUID);
+    EXPECT_EQ(uid, uid_from_digest(Sha256().add("tetwarp instance").add(encoded(file.data())).digest())) << name;
   }
 }
 

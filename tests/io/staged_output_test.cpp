@@ -162,6 +162,7 @@ TEST(StagedOutputPlace, MustBeWritableAndIsKnownBeforeTheWork) {
     const std::string message = refusal(scratch / "locked" / "out.nii", Kind::file);
     std::_Exit(message.find("Permission denied") == std::string::npos ? 1 : 0);
   };
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
   EXPECT_EXIT(as_a_user(), testing::ExitedWithCode(0), "");
   fs::permissions(scratch / "locked", fs::perms::owner_all);
 }
@@ -246,6 +247,32 @@ TEST(StagedFolder, DoesNotReplaceOneThatWasFilledMeanwhile) {
   make_folder(scratch / "series", "notes.txt", "mine");
   EXPECT_THROW(output.commit(), Error);
   EXPECT_EQ(content(scratch / "series" / "notes.txt"), "mine");
+}
+
+std::string numbered(int n) { return "IM000" + std::to_string(10 + n) + ".dcm"; }
+
+TEST(StagedFolder, OfManyForeignFilesTheFirstIsNamed) {
+  const Scratch scratch;
+  for (int n = 0; n < 60; ++n) make_folder(scratch / "series", numbered(n), n % 20 == 7 ? "mine" : "ours");
+  for (int attempt = 0; attempt < 5; ++attempt) {
+    EXPECT_NE(refusal(scratch / "series", Kind::folder, true).find(numbered(7) + " was not written"),
+              std::string::npos);
+  }
+}
+
+TEST(StagedFolder, OneFileOfManyThatCannotBeFlushedStopsAll) {
+  const Scratch scratch;
+  {
+    StagedOutput output(scratch / "series", Kind::folder, false);
+    for (int n = 0; n < 60; ++n) write_file(output.path() / numbered(n), "ours");
+    fs::create_directory(output.path() / "deeper");
+    fs::create_symlink("nowhere", output.path() / "deeper" / "lost.dcm");
+    EXPECT_NE(error_of([&] { output.commit(); }).find("cannot write " + (scratch / "series").string() + " to disk"),
+              std::string::npos);
+    fs::remove(output.path() / "deeper" / "lost.dcm");
+    output.commit();
+  }
+  EXPECT_EQ(entries(scratch / "series"), 61U);
 }
 
 }  // namespace

@@ -1,0 +1,11 @@
+#pragma once
+
+#include "bench/floors.h"
+#include "bench/io_results.h"
+
+namespace tetwarp::bench {
+
+/// Every ratio whose runs are there, of medians.
+std::vector<Floor> find_floors(const IoResults& results);
+
+}  // namespace tetwarp::bench

@@ -1,0 +1,10 @@
+#include "bench/options.h"
+
+namespace tetwarp::bench {
+
+int run_io(const IoOptions&) {
+  throw NotCompiled(
+      "`tetwarp bench io` compares with ITK and DCMTK, and this build lacks one of them; build with both");
+}
+
+}  // namespace tetwarp::bench

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <filesystem>
+
+#include "io/dicom_series.h"
+
+namespace tetwarp::bench {
+
+/// Lists the folder and reads its one series, as `tetwarp deform` does.
+/// @throws InputError
+DicomVolume read_series(const std::filesystem::path& folder, int threads);
+
+/// Writes a derived series with full provenance. @param sampled  source slices of each slice
+/// @throws Error
+void write_series(const std::filesystem::path& folder, const DicomVolume& source, const ConstVolumeView& volume,
+                  const std::vector<SliceRange>& sampled, int threads);
+
+}  // namespace tetwarp::bench
