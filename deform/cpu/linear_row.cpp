@@ -1,6 +1,7 @@
 #include "deform/cpu/linear_row.h"
 
 #include <algorithm>
+#include <cstring>
 
 // Compiled once for each instruction set.
 #undef HWY_TARGET_INCLUDE
@@ -68,6 +69,38 @@ HWY_INLINE void prefetch(const LinearSource& source, std::int64_t at, int lanes)
 
 HWY_INLINE Float mix(Float a, Float b, Float t) { return hn::Add(a, hn::Mul(t, hn::Sub(b, a))); }
 
+/// What a row is interpolated from.
+template <class V>
+struct Samples {
+  HWY_ALIGN float x[kMostInRow], y[kMostInRow], z[kMostInRow];  ///< fractions
+  HWY_ALIGN std::int32_t at[kMostInRow];                        ///< voxel of the buffer; 0 where it is left
+  /// Of each the voxel and the next along i; of the next row, the next slice, and both.
+  HWY_ALIGN std::uint32_t pairs[4][kMostInRow];
+
+  /// One after the other: cheaper than gathers, which some processors make of many steps, and no vector waits for it.
+  void read(const LinearSource& source, int count) {
+    const std::int64_t steps[4] = {0, source.row, source.slice, std::int64_t{source.slice} + source.row};
+    for (int i = 0; i < count; ++i) {
+      const V* from = static_cast<const V*>(source.voxels) + at[i];
+      for (int n = 0; n < 4; ++n) {
+        pairs[n][i] = 0;
+        std::memcpy(&pairs[n][i], from + steps[n], 2 * sizeof(V));
+      }
+    }
+  }
+
+  HWY_INLINE Float along_x(int n, int i, Float fraction) const {
+    const Ints di;
+    const Int bits = hn::BitCast(di, hn::Load(hn::RebindToUnsigned<Ints>(), pairs[n] + i));
+    return mix(Voxels<V>::low(bits), Voxels<V>::high(bits), fraction);
+  }
+  HWY_INLINE Float interpolated(int i) const {
+    const Floats df;
+    const Float fx = hn::Load(df, x + i), fy = hn::Load(df, y + i), fz = hn::Load(df, z + i);
+    return mix(mix(along_x(0, i, fx), along_x(1, i, fx), fy), mix(along_x(2, i, fx), along_x(3, i, fx), fy), fz);
+  }
+};
+
 template <class V>
 SliceRange sample(const LinearSource& source, const Row& row, V* output, RowState* state) {
   const Floats df;
@@ -75,48 +108,42 @@ SliceRange sample(const LinearSource& source, const Row& row, V* output, RowStat
   const hn::Rebind<std::uint8_t, Floats> d8;
   const hn::Rebind<V, Floats> dv;
   const auto lanes = static_cast<int>(hn::Lanes(df));
-  const auto* bytes = reinterpret_cast<const std::int32_t*>(source.voxels);
   const Int stride_row = hn::Set(di, source.row), stride_slice = hn::Set(di, source.slice);
   // Of the buffer's first voxel. Numbers may wrap around: their differences fit.
   const auto begin = static_cast<std::int32_t>(std::int64_t{source.begin.z} * source.slice +
                                                std::int64_t{source.begin.y} * source.row + source.begin.x);
   const glm::ivec3 first(row.voxel);
   Int least = hn::Set(di, INT32_MAX), most = hn::Set(di, INT32_MIN);
-  int i = 0;
-  for (; i + lanes <= row.count; i += lanes) {
+  Samples<V> samples;
+  int count = 0;
+  for (; count + lanes <= row.count; count += lanes) {
     Float ux, uy, uz;
-    hn::LoadInterleaved3(df, &row.offset[i].x, ux, uy, uz);
-    const Axis x(ux, hn::Iota(di, first.x + i), source.last.x), y(uy, hn::Set(di, first.y), source.last.y),
+    hn::LoadInterleaved3(df, &row.offset[count].x, ux, uy, uz);
+    const Axis x(ux, hn::Iota(di, first.x + count), source.last.x), y(uy, hn::Set(di, first.y), source.last.y),
         z(uz, hn::Set(di, first.z), source.last.z);
     const Int at = hn::Sub(hn::Add(hn::Add(hn::Mul(z.base, stride_slice), hn::Mul(y.base, stride_row)), x.base),
                            hn::Set(di, begin));
-    const auto mapped = hn::Gt(hn::PromoteTo(di, hn::LoadU(d8, row.mapped + i)), hn::Zero(di));
-    auto good = hn::And(hn::And(mapped, x.inside), hn::And(y.inside, z.inside));
-    if (sizeof(V) == 1) {  // four voxels are read for two: not at the buffer's end
-      const Int last = hn::Set(di, source.voxel_count - 3 - source.slice - source.row);
-      good = hn::And(good, hn::Lt(at, last));
-    }
+    const auto mapped = hn::Gt(hn::PromoteTo(di, hn::LoadU(d8, row.mapped + count)), hn::Zero(di));
+    const auto good = hn::And(hn::And(mapped, x.inside), hn::And(y.inside, z.inside));
     prefetch<V>(source, hn::GetLane(at), lanes);
-    const Int offset = hn::ShiftLeft<sizeof(V) - 1>(hn::IfThenElseZero(good, at));
-    const Int step_y = hn::ShiftLeft<sizeof(V) - 1>(hn::IfThenElseZero(good, stride_row)),
-              step_z = hn::ShiftLeft<sizeof(V) - 1>(hn::IfThenElseZero(good, stride_slice));
-    const auto along_x = [&](Int from) {
-      const Int bits = hn::GatherOffset(di, bytes, from);
-      return mix(Voxels<V>::low(bits), Voxels<V>::high(bits), x.fraction);
-    };
-    const auto along_y = [&](Int from) { return mix(along_x(from), along_x(hn::Add(from, step_y)), y.fraction); };
-    const Float value = mix(along_y(offset), along_y(hn::Add(offset, step_z)), z.fraction);
-    hn::StoreU(hn::DemoteTo(dv, hn::NearestInt(value)), dv, output + i);
+    hn::Store(hn::IfThenElseZero(good, at), di, samples.at + count);
+    hn::Store(x.fraction, df, samples.x + count);
+    hn::Store(y.fraction, df, samples.y + count);
+    hn::Store(z.fraction, df, samples.z + count);
     hn::StoreU(hn::DemoteTo(d8, hn::IfThenElse(good, hn::Set(di, 1), hn::Set(di, 2))), d8,
-               reinterpret_cast<std::uint8_t*>(state) + i);
+               reinterpret_cast<std::uint8_t*>(state) + count);
     const auto between = hn::RebindMask(di, hn::Ne(z.fraction, hn::Zero(df)));
     const Int top = hn::Add(z.base, hn::IfThenElseZero(between, hn::Set(di, 1)));
     least = hn::Min(least, hn::IfThenElse(good, z.base, hn::Set(di, INT32_MAX)));
     most = hn::Max(most, hn::IfThenElse(good, top, hn::Set(di, INT32_MIN)));
   }
-  std::fill(state + i, state + row.count, RowState::left);
+  for (int i = count; i < row.count; ++i) state[i] = RowState::left;
   const std::int32_t low = hn::GetLane(hn::MinOfLanes(di, least)), high = hn::GetLane(hn::MaxOfLanes(di, most));
-  return low > high ? SliceRange{} : SliceRange{low, high};
+  if (low > high) return {};  // and nothing that a voxel left might read instead
+  samples.read(source, count);
+  for (int i = 0; i < count; i += lanes)
+    hn::StoreU(hn::DemoteTo(dv, hn::NearestInt(samples.interpolated(i))), dv, output + i);
+  return {low, high};
 }
 
 SliceRange sample_any(const LinearSource& source, const Row& row, void* output, RowState* state) {

@@ -36,6 +36,8 @@ struct LinearSource {
   }
 };
 
+constexpr int kMostInRow = 64;  ///< voxels that are sampled together; tiles have fewer
+
 /// What became of a voxel of a row.
 enum class RowState : std::uint8_t {
   sampled = 1,  ///< written
@@ -45,8 +47,8 @@ enum class RowState : std::uint8_t {
 /// Samples the voxels of a row that come from well inside the source: the bits of `sample_voxel` with linear
 /// interpolation, by the widest vectors that the processor has (Highway).
 ///
-/// @param output  of the source's type  @param state  of each voxel, written  @return slices of the source that were
-/// sampled
+/// @param row  of up to kMostInRow voxels  @param output  of the source's type  @param state  of each voxel, written
+/// @return slices of the source that were sampled
 SliceRange sample_linear_row(const LinearSource& source, const Row& row, void* output, RowState* state);
 
 }  // namespace tetwarp::cpu

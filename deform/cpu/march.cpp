@@ -93,15 +93,58 @@ struct Tetrahedra {
   }
 };
 
+#if HWY_TARGET != HWY_SCALAR
+/// Blocks of four floats, `load(n)`, `load(n + 4)` and so on.
+template <class D, class Load>
+HWY_INLINE auto every_fourth(D d, const Load& load, int n) {
+  if constexpr (hn::MaxLanes(D()) <= 4) {
+    return load(n);
+  } else {
+    const hn::Half<D> half;
+    constexpr int kNext = static_cast<int>(hn::MaxLanes(D()) / 2);
+    return hn::Combine(d, every_fourth(half, load, n + kNext), every_fourth(half, load, n));
+  }
+}
+#endif
+
+HWY_INLINE Vec3 gathered(const glm::vec3* displacement, Int number) {
+  const Floats df;
+  const Int index = hn::Add(hn::Add(number, number), number);
+  const float* first = &displacement->x;
+  return {hn::GatherIndex(df, first, index), hn::GatherIndex(df, first + 1, index),
+          hn::GatherIndex(df, first + 2, index)};
+}
+
+/// The displacements of the vertices with these numbers. Vertex by vertex, four floats at a time: some processors make
+/// gathers of so many steps that nothing else runs beside them.
+/// @param last  number of the last vertex, after which nothing may be read
+HWY_INLINE Vec3 displacements(const glm::vec3* displacement, Int number, int last) {
+#if HWY_TARGET == HWY_SCALAR
+  static_cast<void>(last);
+  return gathered(displacement, number);
+#else
+  const Floats df;
+  if (HWY_UNLIKELY(!hn::AllFalse(Ints(), hn::Eq(number, set(last))))) return gathered(displacement, number);
+  HWY_ALIGN std::int32_t at[MarchScratch::kRoom];
+  hn::Store(number, Ints(), at);
+  const hn::Full128<float> block;
+  const auto load = [&](int n) { return hn::LoadU(block, &displacement[at[n]].x); };
+  const Float r0 = every_fourth(df, load, 0), r1 = every_fourth(df, load, 1), r2 = every_fourth(df, load, 2),
+              r3 = every_fourth(df, load, 3);
+  const hn::RepartitionToWide<Floats> pairs;
+  const auto wide = [&](Float v) { return hn::BitCast(pairs, v); };
+  const Float low0 = hn::InterleaveLower(df, r0, r1), low1 = hn::InterleaveLower(df, r2, r3),
+              high0 = hn::InterleaveUpper(df, r0, r1), high1 = hn::InterleaveUpper(df, r2, r3);
+  return {hn::BitCast(df, hn::InterleaveLower(pairs, wide(low0), wide(low1))),
+          hn::BitCast(df, hn::InterleaveUpper(pairs, wide(low0), wide(low1))),
+          hn::BitCast(df, hn::InterleaveLower(pairs, wide(high0), wide(high1)))};
+#endif
+}
+
 /// How far the vertices with these numbers moved, steps.
 template <Snapping kSnapping>
 HWY_INLINE Vec3 moved_vertices(const VectorField& field, Int number, const Vec3& at, FloatMask& certain) {
-  const Floats df;
-  const Int index = hn::Add(hn::Add(number, number), number);
-  const float* first = &field.displacement->x;
-  const Vec3 displacement{hn::GatherIndex(df, first, index), hn::GatherIndex(df, first + 1, index),
-                          hn::GatherIndex(df, first + 2, index)};
-  return moved_steps<kSnapping>(field, displacement, at, certain);
+  return moved_steps<kSnapping>(field, displacements(field.displacement, number, field.last_vertex()), at, certain);
 }
 
 /// `Trial`, one a lane.

@@ -10,8 +10,6 @@ namespace tetwarp::cpu {
 
 namespace {
 
-constexpr int kMostInRow = 64;  ///< voxels that are sampled together; tiles have fewer
-
 /// The same for one type of voxel and one interpolation.
 template <class V, Interpolation kInterpolation>
 class TypedSampler final : public TargetSampler {

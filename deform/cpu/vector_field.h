@@ -26,6 +26,9 @@ struct VectorField {
         snap(frame, steps, glm::vec3(kLift)),
         output_from_lattice(frame.output_from_lattice),
         output_from_mm(frame.output_from_mm) {}
+
+  /// Its number.
+  int last_vertex() const { return lattice.slice * (lattice.cells.z + 1) - 1; }
 };
 
 }  // namespace tetwarp::cpu
