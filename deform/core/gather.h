@@ -338,7 +338,7 @@ TETWARP_HD void visit_tetrahedron(const StepLattice& lattice, const LatticeTetra
 /// @return whether one was found within `most` steps
 template <class Lattice>
 TETWARP_HD bool walk_to_owner(const Lattice& lattice, LatticeTetrahedron start, const glm::i32vec3& steps,
-                                     const glm::i32vec3& signs, int most, LatticeTetrahedron& owner) {
+                              const glm::i32vec3& signs, int most, LatticeTetrahedron& owner) {
   for (int n = 0; n < most; ++n) {
     const Tetrahedron t = vertices_of(lattice, start);
     int sides[4];

@@ -207,6 +207,8 @@ class Scanner {
   bool report(BlockScan& scan) const {
     if (!hn::AllTrue(Floats(), usable_)) return false;
     const glm::vec3 low(x_.lowest(), y_.lowest(), z_.lowest()), high(x_.highest(), y_.highest(), z_.highest());
+    constexpr float kExact = 1 << 24;  // whole numbers up to here are floats
+    if (std::max({high.x, high.y, high.z}) > kExact) return false;
     const glm::i32vec3 rest = glm::i32vec3(field_.lattice.first) + first_ * glm::i32vec3(field_.lattice.cell);
     scan.box = {rest + glm::i32vec3(low), rest + glm::i32vec3(high)};
     const glm::vec3 least(moved_x_.lowest(), moved_y_.lowest(), moved_z_.lowest()),
@@ -226,17 +228,12 @@ class Scanner {
     for (int kind = 0; kind < 2; ++kind) {
       scan.least[kind] = volumes_[kind].lowest();
       scan.most[kind] = volumes_[kind].highest();
-      const float at_rest = rest_volume(kind);
+      const float at_rest = rest_volume(field_.lattice, kind);
       if (!any_rests_) continue;
       scan.least[kind] = std::min(scan.least[kind], at_rest);
       scan.most[kind] = std::max(scan.most[kind], at_rest);
     }
     return true;
-  }
-
-  float rest_volume(int kind) const {
-    const glm::vec3& cell = field_.lattice.cell;
-    return static_cast<float>(kind + 1) * (cell.x * (cell.y * cell.z));
   }
 
   const VectorField& field_;

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "deform/core/five_tetrahedra.h"
+#include "deform/core/barycentric.h"
 #include "deform/cpu/vector_field.h"
 
 namespace tetwarp::cpu {
@@ -15,6 +15,12 @@ struct BlockScan {
   float least[2], most[2];
 };
 
+/// Six times the volume at rest of a corner tetrahedron (kind 0) or a centre (1), in float as `cell_jacobians` has it.
+inline float rest_volume(const StepLattice& lattice, int kind) {
+  const glm::vec3 x(lattice.cell.x, 0, 0), y(0, lattice.cell.y, 0), z(0, 0, lattice.cell.z);
+  return kind == 0 ? detail::edge_determinant(x, y, z) : detail::edge_determinant(y + z, x + z, x + y);
+}
+
 /// Largest block along i, j and k.
 constexpr glm::ivec3 kMostScanned(16, 8, 8);
 
@@ -22,7 +28,7 @@ constexpr glm::ivec3 kMostScanned(16, 8, 8);
 /// (Highway): the floats of `edge_determinant`.
 ///
 /// @param cells  up to kMostScanned  @param scan  written
-/// @return false where float is not certain of a sign, or a vertex is far away or not finite
+/// @return false where float is not certain of a sign or a place, or a vertex is far away or not finite
 bool scan_block(const VectorField& field, const glm::ivec3& first_cell, const glm::ivec3& cells, BlockScan& scan);
 
 }  // namespace tetwarp::cpu

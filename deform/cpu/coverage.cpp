@@ -31,9 +31,7 @@ class RowOfFaces {
   glm::ivec3 cells;
 
   RowOfFaces(const LatticeIndex& index, int axis, bool high, int last)
-      : cells(index.steps().cells), next_((axis + 1) % 3), after_((axis + 2) % 3), last_(last), first_cell_(0) {
-    first_cell_[axis] = high ? cells[axis] - 1 : 0;
-    first_cell_[after_] = last;
+      : cells(index.steps().cells), next_((axis + 1) % 3), after_((axis + 2) % 3), last_(last) {
     glm::i64vec3 at(0);
     at[axis] = high ? cells[axis] : 0;
     for (int side = 0; side < 2; ++side) {
@@ -42,11 +40,13 @@ class RowOfFaces {
     }
   }
 
-  /// That face n of the row belongs to.
-  glm::i64vec3 cell(int n) const {
-    glm::i64vec3 cell = first_cell_;
-    cell[next_] = n;
-    return cell;
+  /// Around the corners of face n of the row.
+  Box box(std::size_t n) const {
+    Box box{vertices_[0][n].deformed, vertices_[0][n].deformed};
+    box.grow(vertices_[0][n + 1].deformed);
+    box.grow(vertices_[1][n].deformed);
+    box.grow(vertices_[1][n + 1].deformed);
+    return box;
   }
   const Vertex& vertex(const glm::ivec3& at) const {
     return vertices_[at[after_] - last_][static_cast<std::size_t>(at[next_])];
@@ -54,7 +54,6 @@ class RowOfFaces {
 
  private:
   int next_, after_, last_;
-  glm::i64vec3 first_cell_;
   std::vector<Vertex> vertices_[2];
 };
 
@@ -87,19 +86,20 @@ void Coverage::look_at_row(int axis, bool high, int last, std::vector<CrossingIn
   const RowOfFaces lattice(*index_, axis, high, last);
   const Nudge& nudge = index_->frame().nudge;
   const NudgeTurns turns(nudge);
-  const int next = (axis + 1) % 3;
-  for (int n = 0; n < 2 * lattice.cells[next]; ++n) {
-    if (axis != 0 && index_->rests(index_->block_of(lattice.cell(n / 2)))) continue;  // flat: no row passes through
-    const BorderTriangle t = border_triangle(lattice, axis, high, {n / 2, last}, n % 2);
+  const auto rows_through = [&](const Box& around) {
+    IntBox rows{glm::ivec3(0), glm::ivec3(size_)};
+    for (int i = 1; i < 3; ++i) cut_to_candidates(turns, i, around.low[i], around.high[i], rows.begin[i], rows.end[i]);
+    return rows;
+  };
+  const auto visit = [&](int y, int z, int first, int change) {
+    found.push_back({std::int64_t{z} * size_.y + y, {first, change}});
+  };
+  const auto look_at = [&](const BorderTriangle& t) {
     Box around{t.a, t.a};
     around.grow(t.b);
     around.grow(t.c);
-    if (around.low.y == around.high.y || around.low.z == around.high.z) continue;
-    IntBox rows{glm::ivec3(0), glm::ivec3(size_)};
-    for (int i = 1; i < 3; ++i) cut_to_candidates(turns, i, around.low[i], around.high[i], rows.begin[i], rows.end[i]);
-    const auto visit = [&](int y, int z, int first, int change) {
-      found.push_back({std::int64_t{z} * size_.y + y, {first, change}});
-    };
+    const IntBox rows = rows_through(around);
+    if (rows.is_empty()) return;
     if (fits_double(around)) {
       cross_rows<double>(t, nudge, rows, visit);
     } else if (fits_int64(around)) {
@@ -107,6 +107,10 @@ void Coverage::look_at_row(int axis, bool high, int last, std::vector<CrossingIn
     } else {
       cross_rows<Wide>(t, nudge, rows, visit);
     }
+  };
+  for (int n = 0; n < lattice.cells[(axis + 1) % 3]; ++n) {
+    if (rows_through(lattice.box(static_cast<std::size_t>(n))).is_empty()) continue;  // most of those along the rows
+    for (int which = 0; which < 2; ++which) look_at(border_triangle(lattice, axis, high, {n, last}, which));
   }
 }
 

@@ -18,6 +18,7 @@ namespace cpu {
 namespace {
 
 constexpr int kWalk = 64;           ///< tetrahedra that the exact walk may pass
+constexpr int kTooManyFolds = 8;    ///< where one tetrahedron in so many is inverted, all is claimed
 constexpr int kMostlyFolded = 256;  ///< where one tetrahedron in so many is inverted, walks mostly fail
 
 /// What is known of each voxel of a tile.
@@ -48,7 +49,9 @@ class ForwardResampler final : public Resampler {
     wants_range_ = control.jacobian_range;
     const FieldStatistics& statistics = lattice_.statistics();
     has_coverage_ = false;
-    can_march_ = lattice_.steps().cells.x != 0 && is_near(field, statistics);
+    const glm::i64vec3& cells = lattice_.cells();
+    const auto many = static_cast<std::uint64_t>(kTetrahedraPerCell * cells.x * cells.y * cells.z / kTooManyFolds);
+    can_march_ = lattice_.steps().cells.x != 0 && is_near(field, statistics) && statistics.inverted <= many;
     ready_ = true;
   }
 
@@ -70,14 +73,14 @@ class ForwardResampler final : public Resampler {
     const MapWriter writer(maps, output(), region);
     const bool places_only = !writer.wants_jacobian() && !writer.wants_owners();
     const bool may_march = can_march_ && places_only;
-    if (may_march && !has_coverage_ && lattice_.statistics().moving_blocks != 0) {
+    if (may_march && !has_coverage_ && !rests(region)) {
       arena_.execute([&] { coverage_.find(lattice_, output()); });
       has_coverage_ = true;
     }
     Report report = for_each_tile<Tile>(arena_, region, control, [&](const Region& box, Tile& tile) {
       if (places_only && rests(box)) return copy(box, tile, samplers, writer);
       Report of_tile;
-      if (may_march) {
+      if (may_march && !mostly_folds(box)) {
         gather(box, tile, writer, of_tile.paths);
       } else {
         claim_all(box, tile, writer, of_tile.paths);
@@ -95,7 +98,7 @@ class ForwardResampler final : public Resampler {
   }
 
  private:
-  /// Whether a tile lies within the undeformed lattice, and all that may reach it rests: then each voxel is owned by a
+  /// Whether a box lies within the undeformed lattice, and all that may reach it rests: then each voxel is owned by a
   /// cell at rest, and by no other. (Something must reach it: what lay there may have moved away as a whole. Where one
   /// of its blocks rests, those beside it share vertices with it, and so on, and reach it too.)
   bool rests(const Region& box) const {
@@ -136,6 +139,18 @@ class ForwardResampler final : public Resampler {
     constexpr std::int64_t kMostVertices = INT32_MAX / 3;  // numbers of displacements on one axis are in 32 bits
     return static_cast<float>(statistics.most_moved) <= VectorField::kMostMoved &&
            size.x * size.y * size.z <= kMostVertices;
+  }
+
+  /// Whether most blocks that may reach a tile hold inverted tetrahedra: then nearly all of its voxels would be
+  /// claimed.
+  bool mostly_folds(const Region& box) const {
+    if (lattice_.statistics().inverted == 0) return false;
+    int blocks = 0, folded = 0;
+    lattice_.find_blocks(box, [&](std::size_t number) {
+      ++blocks;
+      folded += lattice_.has_inverted(number);
+    });
+    return 2 * folded > blocks;
   }
 
   void gather(const Region& box, Tile& tile, const MapWriter& maps, Paths& paths) const {

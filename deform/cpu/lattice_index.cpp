@@ -33,7 +33,7 @@ void FieldStatistics::add_scanned(const BlockScan& block, const StepLattice& ste
   inverted += block.inverted;
   most_moved = std::max(most_moved, block.most_moved);
   for (int kind = 0; kind < 2; ++kind) {  // corners and centres
-    const float rest = static_cast<float>(kind + 1) * (steps.cell.x * (steps.cell.y * steps.cell.z));
+    const float rest = rest_volume(steps, kind);
     jacobian_min = std::min(jacobian_min, double{block.least[kind] / rest});
     jacobian_max = std::max(jacobian_max, double{block.most[kind] / rest});
   }
@@ -42,7 +42,6 @@ void FieldStatistics::add_scanned(const BlockScan& block, const StepLattice& ste
 void FieldStatistics::add(const FieldStatistics& other) {
   inverted += other.inverted;
   degenerate += other.degenerate;
-  moving_blocks += other.moving_blocks;
   most_moved = std::max(most_moved, other.most_moved);
   jacobian_min = std::min(jacobian_min, other.jacobian_min);
   jacobian_max = std::max(jacobian_max, other.jacobian_max);
@@ -125,7 +124,6 @@ void LatticeIndex::look_at(std::size_t number, Block& block, FieldStatistics& st
   const std::uint64_t inverted = statistics.inverted;
   if (!look_with_vectors(number, statistics)) look_closely(number, block, statistics);
   inverted_[number] = statistics.inverted != inverted;
-  statistics.moving_blocks += resting_[number] == 0;
 }
 
 bool LatticeIndex::look_with_vectors(std::size_t number, FieldStatistics& statistics) {

@@ -48,8 +48,7 @@ void for_each_inverted(const LatticeBlock& block, Visit&& visit) {
 /// What a pass over all tetrahedra of a field found.
 struct FieldStatistics {
   std::uint64_t inverted = 0, degenerate = 0;
-  std::int64_t moving_blocks = 0;  ///< that do not rest (`LatticeIndex::rests`)
-  std::int32_t most_moved = 0;     ///< steps that a vertex is displaced on an axis
+  std::int32_t most_moved = 0;  ///< steps that a vertex is displaced on an axis
   double jacobian_min = std::numeric_limits<double>::infinity();
   double jacobian_max = -std::numeric_limits<double>::infinity();
 
@@ -104,10 +103,6 @@ class LatticeIndex {
     const bool done = quick_.is_usable() && quick_.snap(glm::ivec3(at), displacement, vertex);
     if (!done && !frame_.snap_vertex(at, displacement, vertex)) refuse_vertex(at);
     return vertex;
-  }
-  std::size_t block_of(const glm::i64vec3& cell) const {
-    const glm::i64vec3 at = cell / cells_per_block_;
-    return static_cast<std::size_t>((at.z * blocks_.y + at.y) * blocks_.x + at.x);
   }
   bool has_inverted(std::size_t block) const { return inverted_[block] != 0; }
   /// Whether every vertex of a block rests, and at the whole step where `steps` has it.

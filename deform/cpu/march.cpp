@@ -179,8 +179,9 @@ struct Trials {
 /// of them is above its rounding error. Of coordinates below 2^24 steps only the last sums are rounded.
 /// @param error  bound of the rounding errors in float
 HWY_INLINE hn::Vec<HalfFloats> clearance(const DoubleVec3& a, const DoubleVec3& b, const DoubleVec3& c,
-                                         const DoubleVec3& q, Double turn, Double error) {
+                                         const DoubleVec3& r, const DoubleVec3& nudge, Double turn, Double error) {
   const Doubles dd;
+  const DoubleVec3 q{hn::Add(r.x, nudge.x), hn::Add(r.y, nudge.y), hn::Add(r.z, nudge.z)};  // float may round it
   const auto cross = [](const DoubleVec3& u, const DoubleVec3& v) {
     return DoubleVec3{hn::Sub(hn::Mul(u.y, v.z), hn::Mul(u.z, v.y)), hn::Sub(hn::Mul(u.z, v.x), hn::Mul(u.x, v.z)),
                       hn::Sub(hn::Mul(u.x, v.y), hn::Mul(u.y, v.x))};
@@ -200,11 +201,10 @@ HWY_INLINE hn::Vec<HalfFloats> clearance(const DoubleVec3& a, const DoubleVec3& 
 /// Where that is above zero. @param turn  1 or -1: sign of an upright determinant
 HWY_INLINE FloatMask inside_in_double(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& r, const Vec3& nudge,
                                       Float turn, Float error) {
-  const Vec3 q{hn::Add(r.x, nudge.x), hn::Add(r.y, nudge.y), hn::Add(r.z, nudge.z)};
   const Float clear =
-      in_halves([](const DoubleVec3& da, const DoubleVec3& db, const DoubleVec3& dc, const DoubleVec3& dq,
-                   const DoubleVec3& dt) { return clearance(da, db, dc, dq, dt.x, dt.y); },
-                a, b, c, q, Vec3{turn, error, error});
+      in_halves([](const DoubleVec3& da, const DoubleVec3& db, const DoubleVec3& dc, const DoubleVec3& dr,
+                   const DoubleVec3& dn, const DoubleVec3& dt) { return clearance(da, db, dc, dr, dn, dt.x, dt.y); },
+                a, b, c, r, nudge, Vec3{turn, error, error});
   return hn::Gt(clear, hn::Zero(Floats()));
 }
 

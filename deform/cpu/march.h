@@ -37,18 +37,20 @@ struct MarchScratch {
   std::vector<Unsettled> unsettled;  ///< of the whole tile
 };
 
-/// A box of voxels, up to kTile on each axis.
+/// A box of voxels, up to kTile on each axis. Whole vectors are read and written: both arrays have
+/// `MarchScratch::kRoom` elements more than the box has voxels.
 struct MarchTile {
   IntBox box;
-  const Owners* owners;  ///< of each voxel, i fastest; vectors are read from each that lies in the box
-  glm::vec3* offset;     ///< likewise, and written: undeformed minus deformed place, voxels
+  const Owners* owners;  ///< of each voxel, i fastest
+  glm::vec3* offset;     ///< likewise, written: undeformed minus deformed place, voxels
 };
 
 /// Finds the owners of the voxels of a tile that have one, by the widest vectors that the processor has (Highway).
 ///
 /// As the march of cuda/march.cuh: along k, each owner predicted from the affine map of the one before, and accepted
-/// where float arithmetic proves it (`try_tetrahedron`, the same operations). So their offsets have the bits of
-/// `interpolate_u`. What is not found so comes out in `scratch.unsettled`; other offsets are left as anything.
+/// where float arithmetic proves it (`try_tetrahedron`) or, at a second look, double. Offsets are made by the
+/// operations of `interpolate_u`, so they have its bits. What is not found so comes out in `scratch.unsettled`; other
+/// offsets are left as anything.
 void march(const VectorField& field, const NudgeTurns& nudge, const MarchTile& tile, MarchScratch& scratch);
 
 }  // namespace tetwarp::cpu

@@ -14,7 +14,7 @@ class QuickSnap {
   QuickSnap() = default;
   /// @param steps  without cells: never usable
   QuickSnap(const LatticeFrame& frame, const StepLattice& steps) {
-    constexpr double kApart = 0.01;  // steps: more than rest places differ from whole multiples of cells
+    constexpr double kApart = 0.02;  // steps: more than rest places differ from whole multiples of cells, by all axes
     rests_at_steps_ = steps.cells.x != 0 && frame.first_slice == 0;
     usable_ = rests_at_steps_;
     const glm::dvec3 first = frame.output_from_lattice(glm::dvec3(0));

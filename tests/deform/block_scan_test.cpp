@@ -7,6 +7,7 @@
 #include <hwy/targets.h>
 
 #include "deform/core/barycentric.h"
+#include "deform/cpu/lattice_index.h"
 #include "deform/field_check.h"
 #include "tests/support/fields.h"
 
@@ -71,9 +72,10 @@ bool compare(const Geometry& output, const VertexField& field, const glm::ivec3&
   EXPECT_EQ(found.most_moved, expected.most_moved);
   EXPECT_EQ(found.inverted, expected.inverted);
   EXPECT_EQ(expected.degenerate, 0u);
-  const float rest = steps.cell.x * (steps.cell.y * steps.cell.z);
-  EXPECT_EQ(std::min(found.least[0] / rest, found.least[1] / (2 * rest)), expected.least);
-  EXPECT_EQ(std::max(found.most[0] / rest, found.most[1] / (2 * rest)), expected.most);
+  FieldStatistics statistics;
+  statistics.add_scanned(found, steps);
+  EXPECT_EQ(statistics.jacobian_min, expected.least);
+  EXPECT_EQ(statistics.jacobian_max, expected.most);
   return true;
 }
 
@@ -88,7 +90,11 @@ TEST_F(Blocks, GiveWhatTheirTetrahedraGiveOneByOneOnEveryInstructionSet) {
       SCOPED_TRACE(n);
       Geometry output = random.chance(0.2) ? oblique_grid({60, 20, 18}) : unit_grid({60, 20, 18});
       if (random.chance(0.4)) output.spacing = {random.real(0.3, 2), random.real(0.3, 2), random.real(0.3, 2)};
-      const Geometry lattice = lattice_over(output, random.integer(1, 3));
+      Geometry lattice = lattice_over(output, random.integer(1, 3));
+      if (random.chance(0.3)) {  // cells of whole steps, but not of whole voxels
+        for (int axis = 0; axis < 3; ++axis)
+          lattice.spacing[axis] = output.spacing[axis] * static_cast<double>(random.integer(4000, 9000)) / 4096;
+      }
       const double shake = random.one_of<double>({0, 1e-5, 0.01, 0.3, 1, 20}), shift = random.real(-3, 3),
                    moving = random.one_of<double>({1, 1, 0.01});
       const VertexField field = field_in_voxels(output, lattice, [&](const glm::dvec3&) {
@@ -106,6 +112,19 @@ TEST_F(Blocks, GiveWhatTheirTetrahedraGiveOneByOneOnEveryInstructionSet) {
     }
   }
   EXPECT_GT(10 * said, 9 * asked);
+}
+
+TEST_F(Blocks, HaveBoxesThatAreExactBeyondWhatFloatHolds) {
+  const Geometry output = unit_grid({20, 10, 9});
+  Geometry lattice = unit_grid({4, 4, 5});
+  lattice.spacing.z = 1000;
+  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    SCOPED_TRACE(hwy::TargetName(target));
+    hwy::SetSupportedTargetsForTest(target);
+    const glm::ivec3 first(0), cells(3, 3, 4);
+    EXPECT_TRUE(compare(output, uniform_field(lattice, glm::vec3(90 + 1 / 4096.0f)), first, cells));
+    compare(output, uniform_field(lattice, glm::vec3(900 + 1 / 4096.0f)), first, cells);
+  }
 }
 
 TEST_F(Blocks, LeaveWhatIsNoNumberFlatOrFarToOthers) {

@@ -128,6 +128,82 @@ TEST_F(March, LargeCellsWhoseFacesPassThroughVoxels) {
   EXPECT_GT(paths.gathered, 0u);
 }
 
+/// In tetrahedra of more than 256 voxels float does not hold a nudged voxel. Their faces are spanned by few directions,
+/// so many voxels lie on them, and the nudges of some axes nearly cancel.
+TEST_F(March, TetrahedraThatAreLargerThanFloatsWithANudge) {
+  for (const std::uint64_t n : {33, 134}) {
+    SCOPED_TRACE(n);
+    Random random(7, n);
+    const Geometry output = unit_grid({100, 70, 40});
+    const int unit = random.one_of<int>({60, 100, 120, 140});
+    glm::dmat3 edges(7);
+    for (int axis = 0; axis < 3; ++axis) {
+      for (int row = 0; row < 3; ++row) edges[axis][row] += static_cast<double>(random.integer(-2, 2));
+    }
+    const auto corner = [&](int c) {
+      return edges * glm::dvec3(c & 1, c >> 1 & 1, c >> 2) * static_cast<double>(unit);
+    };
+    constexpr int kFaces[4][3] = {{1, 2, 4}, {1, 2, 7}, {2, 4, 7}, {1, 4, 7}};
+    const auto& face = kFaces[random.integer(0, 3)];
+    double a = random.real(0, 1), b = random.real(0, 1);
+    if (a + b > 1) {
+      a = 1 - a;
+      b = 1 - b;
+    }
+    const glm::dvec3 on_face =
+        corner(face[0]) + a * (corner(face[1]) - corner(face[0])) + b * (corner(face[2]) - corner(face[0]));
+    const glm::dvec3 first = glm::dvec3(50, 35, 20) - glm::round(on_face);
+    Geometry lattice = unit_grid({2, 2, 2});
+    lattice.spacing = glm::dvec3(7 * unit);
+    lattice.origin =
+        first + glm::dvec3(random.integer(-200, 200), random.integer(-200, 200), random.integer(-200, 200));
+    VertexField field{lattice, {}};
+    for (int c = 0; c < 8; ++c) {
+      const glm::dvec3 rest = lattice.origin + lattice.spacing * glm::dvec3(c & 1, c >> 1 & 1, c >> 2);
+      field.displacement.emplace_back(first + corner(c) - rest);
+    }
+    ASSERT_NO_FATAL_FAILURE(expect_what_claims_give({output, field, "", {}}, random));
+  }
+  EXPECT_GT(paths.gathered, 0u);
+}
+
+TEST_F(March, FieldsAtRestInsideTheVolume) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  Random random(test_seed(), 960);
+  const Geometry output = unit_grid({70, 40, 36});
+  Geometry lattice = unit_grid({20, 21, 22});
+  lattice.origin = {3.25, 5, 7};
+  const VertexField rest = uniform_field(lattice, glm::vec3(0)), moved = uniform_field(lattice, glm::vec3(1.5f));
+  ASSERT_NO_FATAL_FAILURE(expect_what_claims_give({output, rest, "", {}}, random));
+  EXPECT_EQ(paths.claimed, 0u);
+
+  const Volume<std::int16_t> source = random_values<std::int16_t>(output, random, -2000, 2000);
+  const auto resample = [&](Resampler& resampler, const VertexField& field) {  // one field after the other
+    resampler.set_field(view(field, Outside::background));
+    Volume<std::int16_t> found = poisoned<std::int16_t>(output);
+    const Target of{.source = view(source), .output = view(found), .background = 7};
+    resampler.resample(whole(output), {&of, 1});
+    return found.voxels;
+  };
+  const auto one = make_cpu_resampler(output), both = make_cpu_resampler(output);
+  const std::vector<std::int16_t> expected = resample(*one, rest);
+  resample(*both, moved);
+  EXPECT_TRUE(same_bits(expected, resample(*both, rest)));
+}
+
+/// Each axis bends the lattice by less than what is neglected, but all of them take its last vertex over half a step.
+TEST_F(March, LatticesThatLieNearlyHalfwayBetweenSteps) {
+  Random random(1);
+  Geometry lattice = unit_grid({11, 11, 11});
+  lattice.spacing = {2 + 0.9e-7, 2, 2};
+  lattice.origin = {100.4895 / 4096, 0, 0};
+  const double angle = 0.45e-7;
+  lattice.direction = glm::dmat3({1, -angle, -angle}, {angle, 1, 0}, {angle, 0, 1});
+  VertexField field = uniform_field(lattice, glm::vec3(0));
+  for (std::size_t n = 0; n < 40; ++n) field.displacement[37 * n % field.displacement.size()].y = 0.4f;
+  ASSERT_NO_FATAL_FAILURE(expect_what_claims_give({unit_grid({23, 22, 22}), field, "", {}}, random));
+}
+
 TEST_F(March, RandomFieldsWithAndWithoutFolds) {
   SCOPED_TRACE(seed_text(test_seed()));
   for (std::uint64_t n = 0; n < test_cases(120); ++n) {
