@@ -335,7 +335,10 @@ struct TileWorker {
   __device__ void mark(const RowInterval& in, Row& row, unsigned place) const {
     if (in.is_empty()) return;
     const unsigned bits = bits_of(in);
-    if ((atomicOr(&row.covered, bits) & bits) != 0) memory.overlaps = true;
+    if ((atomicOr(&row.covered, bits) & bits) != 0) {  // then this tile is done again
+      memory.overlaps = true;
+      return;
+    }
     atomicOr(&row.starts, 1u << in.begin);
     row.owner[in.begin] = static_cast<unsigned short>(place);
   }

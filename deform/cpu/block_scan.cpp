@@ -87,19 +87,24 @@ class Scanner {
   }
 
  private:
+  /// Where to look ahead from a row of plane k: the same row of the next plane or, at last, of the first plane of the
+  /// block beside.
+  std::int64_t ahead(int k) const {
+    const std::int64_t slice = field_.lattice.slice;
+    return k < cells_.z ? slice : cells_.x - cells_.z * slice;
+  }
+
   /// Snaps plane k of the block.
   template <Snapping kSnapping>
   void read(int k, Plane& plane) {
     const Floats df;
     const StepLattice& lattice = field_.lattice;
     const int count = cells_.x + 1;
-    const std::int64_t slices = k < cells_.z ? 1 : -cells_.z;  // at last, to the first plane of the block beside
-    const std::int64_t ahead = slices * lattice.slice + (k < cells_.z ? 0 : cells_.x);
     FloatMask still = hn::Eq(hn::Zero(df), hn::Zero(df));
     for (int j = 0; j <= cells_.y; ++j) {
       const glm::ivec3 row(first_.x, first_.y + j, first_.z + k);
       const glm::vec3* given = field_.displacement + lattice.offset(row);
-      prefetch(given + ahead);
+      prefetch(given + ahead(k));
       glm::vec3 padded[Plane::kRoom];
       if (count < lanes_) {  // the last vertex again and again
         for (int n = 0; n < lanes_; ++n) padded[n] = given[std::min(n, count - 1)];

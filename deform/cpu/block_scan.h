@@ -21,6 +21,13 @@ inline float rest_volume(const StepLattice& lattice, int kind) {
   return kind == 0 ? detail::edge_determinant(x, y, z) : detail::edge_determinant(y + z, x + z, x + y);
 }
 
+/// What it is of a block at rest.
+inline BlockScan block_at_rest(const StepLattice& lattice, const glm::ivec3& first_cell, const glm::ivec3& cells) {
+  const glm::i32vec3 cell(lattice.cell), low = glm::i32vec3(lattice.first) + first_cell * cell;
+  const float corner = rest_volume(lattice, 0), centre = rest_volume(lattice, 1);
+  return {{low, low + cells * cell}, true, 0, 0, {corner, centre}, {corner, centre}};
+}
+
 /// Largest block along i, j and k.
 constexpr glm::ivec3 kMostScanned(16, 8, 8);
 

@@ -77,8 +77,14 @@ class ForwardResampler final : public Resampler {
       arena_.execute([&] { coverage_.find(lattice_, output()); });
       has_coverage_ = true;
     }
-    Report report = for_each_tile<Tile>(arena_, region, control, [&](const Region& box, Tile& tile) {
-      if (places_only && rests(box)) return copy(box, tile, samplers, writer);
+    const auto is_copied = [&](const Region& box) {
+      return !samplers.empty() && places_only && !writer.wants_any() &&
+             std::all_of(samplers.begin(), samplers.end(), [&](const auto& of) { return of->can_copy(box); }) &&
+             rests(box);
+    };
+    Report report = for_each_tile<Tile>(arena_, region, control, is_copied, [&](const Region& box, Tile& tile) {
+      if (is_copied(box)) return copy(box, samplers);
+      if (places_only && rests(box)) return stay(box, tile, samplers, writer);
       Report of_tile;
       if (may_march && !mostly_folds(box)) {
         gather(box, tile, writer, of_tile.paths);
@@ -117,7 +123,19 @@ class ForwardResampler final : public Resampler {
     return any && all;
   }
 
-  Report copy(const Region& box, Tile& tile, const TargetSamplers& samplers, const MapWriter& maps) const {
+  /// A box at rest that every target can copy.
+  static Report copy(const Region& box, const TargetSamplers& samplers) {
+    Report report;
+    report.paths.gathered = static_cast<std::uint64_t>(voxel_count(box));
+    for (std::size_t n = 0; n < samplers.size(); ++n) {
+      Report not_counted;
+      samplers[n]->copy(box, n == 0 ? report : not_counted);
+    }
+    return report;
+  }
+
+  /// Any tile at rest.
+  static Report stay(const Region& box, Tile& tile, const TargetSamplers& samplers, const MapWriter& maps) {
     Report report;
     report.paths.gathered = static_cast<std::uint64_t>(voxel_count(box));
     const auto width = static_cast<int>(box.end.x - box.begin.x);
@@ -125,7 +143,7 @@ class ForwardResampler final : public Resampler {
     std::fill_n(tile.mapped, width, std::uint8_t{1});
     for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {
       for (std::int64_t y = box.begin.y; y < box.end.y; ++y) {
-        const Row row{{box.begin.x, y, z}, width, tile.mapped, offset, true};
+        const Row row{{box.begin.x, y, z}, width, tile.mapped, offset};
         sample_targets(row, samplers, tile.coverage, report);
         maps.write(row, tile.coverage, nullptr, nullptr);
       }

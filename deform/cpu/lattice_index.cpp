@@ -5,6 +5,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -89,6 +90,7 @@ void LatticeIndex::build(const Geometry& output, const FieldView& field, const C
   boxes_.resize(static_cast<std::size_t>(blocks_.x * blocks_.y * blocks_.z));
   group_boxes_.resize(static_cast<std::size_t>(groups_.x * groups_.y * groups_.z));
 
+  if (steps_.cells.x != 0 && mostly_zero()) find_blocks_at_rest(control);
   tbb::enumerable_thread_specific<FieldStatistics> statistics;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, boxes_.size(), 64), [&](const auto& range) {
     if (control.stop.stop_requested()) throw Cancelled();
@@ -126,10 +128,54 @@ void LatticeIndex::look_at(std::size_t number, Block& block, FieldStatistics& st
   inverted_[number] = statistics.inverted != inverted;
 }
 
+/// Whether most of some vertices have displacements of zero.
+bool LatticeIndex::mostly_zero() const {
+  constexpr std::int64_t kAsked = 4096;
+  const glm::i64vec3& size = field_.lattice->size;
+  const std::int64_t vertices = size.x * size.y * size.z, step = vertices / kAsked + 1;
+  std::int64_t zero = 0;
+  for (std::int64_t n = 0; n < vertices; n += step) zero += field_.displacement[n] == glm::vec3(0);
+  return 2 * zero > vertices / step;
+}
+
+/// Reads the field from end to end, as fast as memory gives it, for blocks of which all displacements are zero.
+void LatticeIndex::find_blocks_at_rest(const Control& control) {
+  const glm::i64vec3& size = field_.lattice->size;
+  std::fill(resting_.begin(), resting_.end(), std::uint8_t{1});
+  tbb::parallel_for(tbb::blocked_range<std::int64_t>(0, size.y * size.z, 64), [&](const auto& range) {
+    if (control.stop.stop_requested()) throw Cancelled();
+    for (std::int64_t row = range.begin(); row < range.end(); ++row)
+      note_moving(field_.displacement + row * size.x, {0, row % size.y, row / size.y});
+  });
+}
+
+/// @param row  of vertices  @param vertex  the first of it
+void LatticeIndex::note_moving(const glm::vec3* row, const glm::i64vec3& vertex) {
+  for (std::int64_t x = 0; x < blocks_.x; ++x) {
+    const std::int64_t first = x * cells_per_block_.x, last = std::min(first + cells_per_block_.x, frame_.cells.x);
+    const auto* bits = reinterpret_cast<const std::uint32_t*>(row + first);
+    std::uint32_t any = 0;
+    for (std::int64_t n = 0; n < 3 * (last - first + 1); ++n) any |= bits[n];
+    if (any == 0) continue;
+    for (int corner = 0; corner < 4; ++corner) {  // blocks that have these vertices on their faces too
+      const glm::i64vec3 at = glm::max((vertex - glm::i64vec3(0, corner & 1, corner >> 1)) / cells_per_block_,
+                                       glm::i64vec3(0)),
+                         block = glm::min(at, blocks_ - std::int64_t{1});
+      std::atomic_ref(resting_[static_cast<std::size_t>((block.z * blocks_.y + block.y) * blocks_.x + x)])
+          .store(0, std::memory_order_relaxed);
+    }
+  }
+}
+
 bool LatticeIndex::look_with_vectors(std::size_t number, FieldStatistics& statistics) {
+  if (steps_.cells.x == 0) return false;
   BlockScan scan;
   const glm::ivec3 first(first_cell(number)), cells(glm::min(cells_per_block_, frame_.cells - glm::i64vec3(first)));
-  if (steps_.cells.x == 0 || !scan_block(vectors_, first, cells, scan)) return false;
+  if (resting_[number] != 0) {
+    scan = block_at_rest(steps_, first, cells);
+  } else if (!scan_block(vectors_, first, cells, scan)) {
+    return false;
+  }
   boxes_[number] = scan.box;
   resting_[number] = scan.at_rest;
   statistics.add_scanned(scan, steps_);

@@ -120,6 +120,9 @@ class LatticeIndex {
 
   static bool reaches(const Box& box, const Region& region);
   static glm::i64vec3 unravel(std::size_t number, const glm::i64vec3& size);
+  void find_blocks_at_rest(const Control& control);
+  bool mostly_zero() const;
+  void note_moving(const glm::vec3* row, const glm::i64vec3& vertex);
   void look_at(std::size_t block, Block& scratch, FieldStatistics& statistics);
   bool look_with_vectors(std::size_t block, FieldStatistics& statistics);
   void look_closely(std::size_t block, Block& scratch, FieldStatistics& statistics);

@@ -13,6 +13,9 @@ class MapWriter {
   /// @throws InputError for a map that is not on the output grid, does not buffer the region, or has the wrong type
   MapWriter(const Maps& maps, const Geometry& output, const Region& region);
 
+  bool wants_any() const {
+    return maps_.coverage.voxels != nullptr || maps_.inverse_mm.voxels != nullptr || wants_jacobian() || wants_owners();
+  }
   bool wants_jacobian() const { return maps_.jacobian.voxels != nullptr; }
   bool wants_owners() const { return maps_.owners.voxels != nullptr; }
 

@@ -25,9 +25,7 @@ class TypedSampler final : public TargetSampler {
   void sample(const Row& row, std::uint8_t* coverage, Report& counts) const override {
     V* output = reinterpret_cast<V*>(target_.output.voxels) + buffer_index(target_.output, row.voxel);
     SliceRange sampled;
-    if (row.at_rest && copy_row(row, output, coverage, counts)) {
-      sampled = {row.voxel.z, row.voxel.z};
-    } else if (has_source_ && row.count <= kMostInRow) {
+    if (has_source_ && row.count <= kMostInRow) {
       RowState state[kMostInRow];
       sampled = sample_linear_row(source_, row, output, state);
       counts.covered += static_cast<std::uint64_t>(std::count(state, state + row.count, RowState::sampled));
@@ -39,22 +37,27 @@ class TypedSampler final : public TargetSampler {
     if (!target_.sampled_slices.empty()) note_slices(row.voxel.z, sampled);
   }
 
+  bool can_copy(const Region& box) const override {
+    const Region source{glm::i64vec3(0), plan_.source.size};
+    return plan_.relation.same_grid && !plan_.padding.present && contains(source, box);
+  }
+
+  void copy(const Region& box, Report& counts) const override {
+    const glm::i64vec3& stride = plan_.source.stride;
+    const auto width = box.end.x - box.begin.x;
+    for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {
+      const glm::i64vec3 first(box.begin.x, box.begin.y, z), in = first - plan_.source.begin;
+      const V* from = plan_.source.voxels + (in.z * stride.z + in.y * stride.y + in.x);
+      V* to = reinterpret_cast<V*>(target_.output.voxels) + buffer_index(target_.output, first);
+      const std::int64_t step = target_.output.buffered.end.x - target_.output.buffered.begin.x;
+      for (std::int64_t y = box.begin.y; y < box.end.y; ++y, from += stride.y, to += step) std::copy_n(from, width, to);
+      if (!target_.sampled_slices.empty()) note_slices(z, {z, z});
+    }
+    counts.covered += static_cast<std::uint64_t>(voxel_count(box));
+  }
+
  private:
   static constexpr bool kVectors = kInterpolation == Interpolation::linear && kHasLinearRow<V>;
-
-  /// A row that stays where it is. @return false where it must be sampled
-  bool copy_row(const Row& row, V* output, std::uint8_t* coverage, Report& counts) const {
-    const glm::i64vec3& size = plan_.source.size;
-    const glm::i64vec3 last = row.voxel + glm::i64vec3(row.count - 1, 0, 0);
-    if (!plan_.relation.same_grid || plan_.padding.present || last.x >= size.x || last.y >= size.y || last.z >= size.z)
-      return false;
-    const glm::i64vec3 in = row.voxel - plan_.source.begin;
-    const glm::i64vec3& stride = plan_.source.stride;
-    std::copy_n(plan_.source.voxels + (in.z * stride.z + in.y * stride.y + in.x), row.count, output);
-    if (coverage) std::fill_n(coverage, row.count, std::uint8_t{1});
-    counts.covered += static_cast<std::uint64_t>(row.count);
-    return true;
-  }
 
   /// One voxel after the other: all, or where `state` is not null those that are left.
   void sample_voxels(const Row& row, const RowState* state, V* output, std::uint8_t* coverage, Report& counts,

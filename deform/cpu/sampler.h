@@ -16,7 +16,6 @@ struct Row {
   int count;
   const std::uint8_t* mapped;  ///< 1: comes from `voxel + offset`; 0: nothing maps there
   const glm::vec3* offset;     ///< undeformed minus deformed, voxels of output index
-  bool at_rest = false;        ///< all are mapped, with an offset of zero
 };
 
 /// Samples one source at the undeformed places of rows. Its source may be on any grid.
@@ -25,6 +24,10 @@ class TargetSampler {
   virtual ~TargetSampler() = default;
   /// Writes a row of the output; adds to the counts. `coverage`, where not null, receives 1 or 0 a voxel.
   virtual void sample(const Row& row, std::uint8_t* coverage, Report& counts) const = 0;
+  /// Whether voxels of a box that stay where they are can be copied.
+  virtual bool can_copy(const Region& box) const = 0;
+  /// Copies them; adds to the counts.
+  virtual void copy(const Region& box, Report& counts) const = 0;
 };
 
 using TargetSamplers = std::vector<std::unique_ptr<const TargetSampler>>;

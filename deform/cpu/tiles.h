@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <mutex>
+#include <utility>
 
 #include "deform/resampler.h"
 
@@ -42,27 +43,43 @@ inline tbb::task_arena make_arena(const Limits& limits) {
   return tbb::task_arena(limits.threads > 0 ? std::min(limits.threads, most) : most);
 }
 
-/// Runs `work(tile, scratch)` for every tile of the region, each thread with a Scratch of its own, and adds up the
+/// Runs `work(box, scratch)` for all tiles of the region, each thread with a Scratch of its own, and adds up the
 /// reports.
-template <class Scratch, class Work>
-Report for_each_tile(tbb::task_arena& arena, const Region& region, const Control& control, Work&& work) {
+///
+/// @param at_once  whether a row of tiles along i is one piece of work: then the box is the row
+template <class Scratch, class AtOnce, class Work>
+Report for_each_tile(tbb::task_arena& arena, const Region& region, const Control& control, AtOnce&& at_once,
+                     Work&& work) {
   Report total;
   if (is_empty(region)) return total;
   const glm::i64vec3 tiles = (region.end - region.begin + (kTile - 1)) / kTile;
   Progress progress(control, voxel_count(region));
   tbb::enumerable_thread_specific<Scratch> scratch;
   tbb::enumerable_thread_specific<Report> reports;
+  const auto run = [&](const Region& box) {
+    reports.local() += work(box, scratch.local());
+    progress.done(voxel_count(box));
+  };
   arena.execute([&] {
-    tbb::parallel_for(std::int64_t{0}, tiles.x * tiles.y * tiles.z, [&](std::int64_t number) {
-      const glm::i64vec3 at(number % tiles.x, number / tiles.x % tiles.y, number / (tiles.x * tiles.y));
-      const glm::i64vec3 begin = region.begin + at * kTile;
-      const Region tile = intersection(region, {begin, begin + kTile});
-      reports.local() += work(tile, scratch.local());
-      progress.done(voxel_count(tile));
+    tbb::parallel_for(std::int64_t{0}, tiles.y * tiles.z, [&](std::int64_t number) {
+      const glm::i64vec3 begin = region.begin + glm::i64vec3(0, number % tiles.y, number / tiles.y) * kTile;
+      const Region row = intersection(region, {begin, begin + glm::i64vec3(tiles.x, 1, 1) * kTile});
+      if (at_once(row)) return run(row);
+      tbb::parallel_for(std::int64_t{0}, tiles.x, [&](std::int64_t n) {
+        const glm::i64vec3 first = begin + glm::i64vec3(n * kTile, 0, 0);
+        run(intersection(row, {first, first + kTile}));
+      });
     });
   });
   for (const Report& report : reports) total += report;
   return total;
+}
+
+/// The same without such rows.
+template <class Scratch, class Work>
+Report for_each_tile(tbb::task_arena& arena, const Region& region, const Control& control, Work&& work) {
+  const auto never = [](const Region&) { return false; };
+  return for_each_tile<Scratch>(arena, region, control, never, std::forward<Work>(work));
 }
 
 }  // namespace tetwarp::cpu
