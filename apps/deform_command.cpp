@@ -9,6 +9,7 @@
 #include "apps/field_source.h"
 #include "apps/input.h"
 #include "apps/output.h"
+#include "cuda/devices.h"
 #include "deform/fields/formula.h"
 #include "io/field_file.h"
 #include "io/image_file.h"
@@ -381,6 +382,9 @@ int Deformation::run() {
     print_plan(header.geometry);
     return 0;
   }
+  const auto awake = std::async(std::launch::async, [&] {  // beside reading
+    if (means_cuda(options_.backend)) wake_cuda_device(options_.device);
+  });
   read();
   read_field();
   resample();

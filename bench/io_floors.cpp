@@ -1,5 +1,7 @@
 #include "bench/io_floors.h"
 
+#include <initializer_list>
+
 #include "bench/io_peers.h"
 
 namespace tetwarp::bench {
@@ -63,14 +65,21 @@ void add_nifti(const IoResults& results, std::vector<Floor>& floors) {
 
 void add_job(const IoResults& results, std::vector<Floor>& floors) {
   for (const IoTime& time : results.times) {
-    if (time.by != kJobProgram) continue;
     const std::string& step = time.step;
-    std::optional<double> sum = 0;
-    for (const char* stage : {kJobIn, kJobField, kJobDeform, kJobOut}) {
-      const auto ms = median(results, step, stage);
-      sum = sum && ms ? std::optional(*sum + *ms) : std::nullopt;
+    const auto sum_of = [&](std::initializer_list<const char*> stages) {
+      std::optional<double> sum = 0;
+      for (const char* stage : stages) {
+        const auto ms = median(results, step, stage);
+        sum = sum && ms ? std::optional(*sum + *ms) : std::nullopt;
+      }
+      return sum;
+    };
+    if (time.by == kJobProgram) {
+      add(floors, "program / sum of its stages", step, time.ms.median, sum_of({kJobIn, kJobField, kJobDeform, kJobOut}),
+          {false, 1.05, {}});
+    } else if (time.by == kJobCuda) {
+      add(floors, "program with CUDA / in and out", step, time.ms.median, sum_of({kJobIn, kJobOut}), {false, 1.3, {}});
     }
-    add(floors, "program / sum of its stages", step, time.ms.median, sum, {false, 1.05, {}});
   }
 }
 

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "bench/series.h"
+#include "cuda/devices.h"
 #include "deform/fields/formula.h"
 #include "io/hash.h"
 #include "io/staged_output.h"
@@ -84,10 +85,12 @@ void add_job(Turns& turns, const fs::path& series, const fs::path& scratch, std:
   };
   const fs::path program = tetwarp_program();
   if (!program.empty()) {
-    const std::vector<std::string> arguments{
-        program, "deform", series,      "-f",  kField,      "--cell-size",           std::to_string(cell_size),
-        "-o",    out,      "--backend", "cpu", "--threads", std::to_string(threads), "--quiet"};
-    turns.add(step, kJobProgram, nothing([=] { run_program(arguments); }), remove);
+    const auto run_on = [=](const char* backend) {
+      run_program({program, "deform", series, "-f", kField, "--cell-size", std::to_string(cell_size), "-o", out,
+                   "--backend", backend, "--threads", std::to_string(threads), "--quiet"});
+    };
+    turns.add(step, kJobProgram, nothing([=] { run_on("cpu"); }), remove);
+    if (cuda_device_count() != 0) turns.add(step, kJobCuda, nothing([=] { run_on("cuda"); }), remove);
   }
   const auto job = std::make_shared<Job>();
   turns.add(step, kJobIn, nothing([=] { job->input = read_series(series, threads); }));

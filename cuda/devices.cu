@@ -13,6 +13,10 @@ int cuda_device_count() {
   return 0;
 }
 
+void wake_cuda_device(int device) {
+  if (cudaSetDevice(device) != cudaSuccess || cudaFree(nullptr) != cudaSuccess) cudaGetLastError();  // told when used
+}
+
 std::string describe_cuda_device(int device) {
   cudaDeviceProp properties{};
   TETWARP_CUDA_TRY(cudaGetDeviceProperties(&properties, device));

@@ -6,6 +6,8 @@ namespace tetwarp {
 
 /// Devices that this process can use; 0 without a driver, and in a build without CUDA.
 int cuda_device_count();
+/// Lets the driver do what the first use of a device costs, a fraction of a second; nothing where there is none.
+void wake_cuda_device(int device);
 /// Name and memory of a device, "NVIDIA H200, 150 GB". @throws DeviceError, NotCompiled
 std::string describe_cuda_device(int device);
 /// Whether CUDA is in this build.

@@ -15,6 +15,8 @@ bool has_cuda() { return false; }
 
 int cuda_device_count() { return 0; }
 
+void wake_cuda_device(int) {}
+
 std::string describe_cuda_device(int) { not_compiled(); }
 
 std::unique_ptr<Resampler> make_cuda_resampler(Geometry, int, Limits) { not_compiled(); }

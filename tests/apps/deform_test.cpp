@@ -101,7 +101,8 @@ TEST(Deform, TheReportTellsWhatHappenedAndTheSidecarHasNoClock) {
   EXPECT_EQ(report["report"]["covered"], 38 * 36 * 24);
   EXPECT_EQ(report["report"]["uncovered"], 2 * 36 * 24);
   EXPECT_EQ(report["backend"], "cpu");
-  EXPECT_EQ(report["paths"]["claimed"], 40 * 36 * 24);
+  EXPECT_EQ(report["paths"]["gathered"], 40 * 36 * 24);
+  EXPECT_EQ(report["paths"]["claimed"], 0);
   for (const std::string stage : {"read", "field", "resample", "write"})
     EXPECT_GE(report["stages"][stage]["seconds"], 0.0) << stage;
   EXPECT_GT(report["memory"]["peak_bytes"], report["memory"]["source_bytes"]);

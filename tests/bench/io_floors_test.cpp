@@ -47,6 +47,13 @@ TEST(IoFloors, UncompressedSeriesAreHeldAgainstItkAndAgainstTheLoopOnAsManyThrea
   EXPECT_FALSE(all_met(floors));
 }
 
+TEST(IoFloors, AJobWithCudaIsHeldAgainstInAndOutAlone) {
+  const std::string step = "whole job, cells of 16";
+  const std::vector<IoTime> times{
+      {step, "tetwarp deform, CUDA", ms(280)}, {step, "in alone", ms(120)}, {step, "out alone", ms(80)}};
+  expect_floor(find_floors(results_of(times)), "program with CUDA / in and out", step, 1.4, 1.3, false);
+}
+
 TEST(IoFloors, CompressedSeriesAreHeldAgainstTheLoopOnOneThread) {
   for (const std::string coding : {"JPEG lossless", "JPEG-LS", "RLE"}) {
     const std::string step = "DICOM in, " + coding;
