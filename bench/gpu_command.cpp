@@ -1,7 +1,6 @@
 #include <cstdio>
-#include <iostream>
-#include <nlohmann/json.hpp>
 
+#include "bench/conclude.h"
 #include "bench/gpu_bench.h"
 #include "bench/gpu_report.h"
 #include "bench/input.h"
@@ -33,12 +32,7 @@ int run_gpu(const GpuOptions& options) {
   });
   results.input_kind = input_kind(options.input);
   results.machine = describe_machine(options.device, 0);
-  const std::vector<Floor> floors = find_floors(results);
-  std::cout << to_markdown(results, floors);
-  write_text(options.json, to_json(results, floors).dump(1) + "\n");
-  if (!options.check || all_met(floors)) return 0;
-  std::fprintf(stderr, "tetwarp-bench: a floor is missed; the last table says which\n");
-  return 1;
+  return conclude(results, options.json, options.check);
 }
 
 }  // namespace tetwarp::bench

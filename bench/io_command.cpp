@@ -3,10 +3,9 @@
 #include <unistd.h>
 
 #include <cstdio>
-#include <iostream>
-#include <nlohmann/json.hpp>
 #include <optional>
 
+#include "bench/conclude.h"
 #include "bench/io_bench.h"
 #include "bench/io_report.h"
 #include "bench/machine.h"
@@ -56,12 +55,7 @@ int run_io(const IoOptions& options) {
     if (options.verbose) std::fprintf(stderr, "%s\n", line.c_str());
   });
   results.machine = describe_machine(-1, options.threads > 0 ? options.threads : tbb::info::default_concurrency());
-  const std::vector<Floor> floors = find_floors(results);
-  std::cout << to_markdown(results, floors);
-  write_text(options.json, to_json(results, floors).dump(1) + "\n");
-  if (!options.check || all_met(floors)) return 0;
-  std::fprintf(stderr, "tetwarp-bench: a floor is missed; the last table says which\n");
-  return 1;
+  return conclude(results, options.json, options.check);
 }
 
 }  // namespace tetwarp::bench
