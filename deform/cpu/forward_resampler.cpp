@@ -77,14 +77,13 @@ class ForwardResampler final : public Resampler {
       arena_.execute([&] { coverage_.find(lattice_, output()); });
       has_coverage_ = true;
     }
-    const auto is_copied = [&](const Region& box) {
+    const auto can_copy = [&](const Region& box) {
       return !samplers.empty() && places_only && !writer.wants_any() &&
-             std::all_of(samplers.begin(), samplers.end(), [&](const auto& of) { return of->can_copy(box); }) &&
-             rests(box);
+             std::all_of(samplers.begin(), samplers.end(), [&](const auto& of) { return of->can_copy(box); });
     };
+    const auto is_copied = [&](const Region& box) { return can_copy(box) && rests(box); };
     Report report = for_each_tile<Tile>(arena_, region, control, is_copied, [&](const Region& box, Tile& tile) {
-      if (is_copied(box)) return copy(box, samplers);
-      if (places_only && rests(box)) return stay(box, tile, samplers, writer);
+      if (places_only && rests(box)) return can_copy(box) ? copy(box, samplers) : stay(box, tile, samplers, writer);
       Report of_tile;
       if (may_march && !mostly_folds(box)) {
         gather(box, tile, writer, of_tile.paths);

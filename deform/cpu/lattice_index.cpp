@@ -113,9 +113,7 @@ void LatticeIndex::load(std::size_t block, Block& into) const {
       const glm::i64vec3 first = into.first_cell + glm::i64vec3(0, y, z);
       const glm::vec3* displacement = field_.displacement + ((first.z * size.y + first.y) * size.x + first.x);
       for (int x = 0; x <= into.cells.x; ++x, ++vertex, ++displacement) {
-        const glm::i64vec3 at = first + glm::i64vec3(x, 0, 0);
-        const bool done = quick_.is_usable() && quick_.snap(glm::ivec3(at), *displacement, *vertex);
-        if (!done && !frame_.snap_vertex(at, *displacement, *vertex)) refuse_vertex(at);
+        *vertex = snapped(first + glm::i64vec3(x, 0, 0), *displacement);
         into.at_rest = into.at_rest && vertex->u == glm::i32vec3(0);
       }
     }

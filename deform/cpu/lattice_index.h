@@ -97,12 +97,8 @@ class LatticeIndex {
   void load(std::size_t block, Block& into) const;
   /// @throws InputError for a vertex that is not finite or too far away
   Vertex vertex(const glm::i64vec3& at) const {
-    Vertex vertex;
     const glm::i64vec3& size = field_.lattice->size;
-    const glm::vec3& displacement = field_.displacement[(at.z * size.y + at.y) * size.x + at.x];
-    const bool done = quick_.is_usable() && quick_.snap(glm::ivec3(at), displacement, vertex);
-    if (!done && !frame_.snap_vertex(at, displacement, vertex)) refuse_vertex(at);
-    return vertex;
+    return snapped(at, field_.displacement[(at.z * size.y + at.y) * size.x + at.x]);
   }
   bool has_inverted(std::size_t block) const { return inverted_[block] != 0; }
   /// Whether every vertex of a block rests, and at the whole step where `steps` has it.
@@ -120,6 +116,12 @@ class LatticeIndex {
 
   static bool reaches(const Box& box, const Region& region);
   static glm::i64vec3 unravel(std::size_t number, const glm::i64vec3& size);
+  Vertex snapped(const glm::i64vec3& at, const glm::vec3& displacement) const {
+    Vertex vertex;
+    const bool done = quick_.is_usable() && quick_.snap(glm::ivec3(at), displacement, vertex);
+    if (!done && !frame_.snap_vertex(at, displacement, vertex)) refuse_vertex(at);
+    return vertex;
+  }
   void find_blocks_at_rest(const Control& control);
   bool mostly_zero() const;
   void note_moving(const glm::vec3* row, const glm::i64vec3& vertex);
