@@ -10,14 +10,18 @@ void add_peer(const std::string& ratio, const std::string& where, const std::opt
   if (peer) floors.push_back({ratio, where, peer->ms.median / ours.median, true, required, aim});
 }
 
-/// A field that rests everywhere is held against memory. What rests of a local one is part of a run, so that its ratio
-/// is told and not held against anything.
+/// A field that rests everywhere is held against memory, and so are the slices of a local one that rest. All of a local
+/// one is told, and not held against anything.
 void add_bytes(const CpuRun& run, std::vector<Floor>& floors) {
   if (!run.bytes_ms || (run.field != "identity" && run.field != "local")) return;
   const std::optional<double> limit = run.field == "identity" ? std::optional(2.0) : std::nullopt;
   const double bytes = run.bytes_ms->median;
   floors.push_back({"new field / bytes", run.field, run.ours.new_field_ms.median / bytes, false, limit, {}});
   floors.push_back({"resample / bytes", run.field, run.ours.resample_ms.median / bytes, false, limit, {}});
+  if (!run.resting) return;
+  const std::string where = run.field + ", slices at rest";
+  const double ratio = run.resting->new_field_ms.median / (run.resting->share * bytes);
+  floors.push_back({"new field / bytes", where, ratio, false, 2, {}});
 }
 
 void add_dense(const CpuResults& results, std::vector<Floor>& floors) {

@@ -27,6 +27,9 @@ Json to_json(const CpuRun& run) {
                {"at_rest", run.at_rest},
                {"covered", run.covered},
                {"new_field_ns_a_voxel", ns_a_voxel(run.ours.new_field_ms, run.size)},
+               {"resting",
+                run.resting ? Json{{"share", run.resting->share}, {"new_field_ms", to_json(run.resting->new_field_ms)}}
+                            : Json(nullptr)},
                {"bytes_ms", to_json(run.bytes_ms)},
                {"paper", to_json(run.paper)},
                {"itk_warp", to_json(run.itk_warp)},

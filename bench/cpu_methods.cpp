@@ -26,11 +26,28 @@ double ms_between(Clock::time_point from, Clock::time_point to) {
   return std::chrono::duration<double, std::milli>(to - from).count();
 }
 
-/// A field on a lattice over a volume, and the fraction of its vertices that rest.
+/// A field on a lattice over a volume.
 struct Scene {
   VertexField field;
-  double at_rest = 0;
+  double at_rest = 0;           ///< fraction of its vertices
+  std::vector<Region> resting;  ///< slices of the volume that rest, and those beside them
 };
+
+/// Where vertices lie on voxels: slices that rest, and so do those beside them; two or more together.
+std::vector<Region> find_resting(const VertexField& field) {
+  const glm::i64vec3 size = field.lattice.size;
+  const auto rests = [&](std::int64_t k) {
+    const auto begin = field.displacement.begin() + k * size.x * size.y;
+    return std::all_of(begin, begin + size.x * size.y, [](const glm::vec3& by) { return by == glm::vec3(0); });
+  };
+  std::vector<Region> regions;
+  for (std::int64_t begin = 0, end = 0; begin < size.z; begin = end + 1) {
+    for (end = begin; end < size.z && rests(end);) ++end;
+    const std::int64_t first = begin == 0 ? 0 : begin + 1, last = end == size.z ? end : end - 1;
+    if (last - first >= 2) regions.push_back({{0, 0, first}, {size.x, size.y, last}});
+  }
+  return regions;
+}
 
 Scene make_scene(const FieldOnLattice& of, const Geometry& volume) {
   TestField test = make_test_field(of.name, of.like.value_or(volume.size));
@@ -54,12 +71,14 @@ Scene make_scene(const FieldOnLattice& of, const Geometry& volume) {
   const std::int64_t resting = tbb::parallel_reduce(tbb::blocked_range<std::int64_t>(0, size.y * size.z),
                                                     std::int64_t{0}, fill_rows, std::plus<std::int64_t>());
   scene.at_rest = static_cast<double>(resting) / static_cast<double>(voxel_count(field.lattice));
+  if (of.cell_size == 1 && scene.at_rest < 1) scene.resting = find_resting(field);
   return scene;
 }
 
 /// Milliseconds of each repeat.
 struct OwnSamples {
   std::vector<double> set_field, resample, new_field;
+  std::vector<double> resting;  ///< RestingSlices, where there are such
 
   OwnTimes summary() const { return {summarize(set_field), summarize(resample), summarize(new_field)}; }
 };
@@ -74,27 +93,38 @@ class Own {
         resampler_(make_cpu_resampler(volume.geometry, {.threads = threads})),
         output_{volume.geometry, std::vector<std::int16_t>(volume.voxels.size())} {}
 
-  void run(const VertexField& field, OwnSamples& samples) {
+  void run(const Scene& scene, OwnSamples& samples) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads_));
     const auto start = Clock::now();
-    resampler_->set_field(view(field), Control{.jacobian_range = true});
+    resampler_->set_field(view(scene.field), Control{.jacobian_range = true});
     const auto set = Clock::now();
-    report_ = resample({});
+    report_ = resample(whole(volume_.geometry));
     const auto done = Clock::now();
     samples.set_field.push_back(ms_between(start, set));
     samples.resample.push_back(ms_between(set, done));
     samples.new_field.push_back(ms_between(start, done));
+    if (scene.resting.empty()) return;
+    double resting = 0;
+    for (const Region& slices : scene.resting) resting += run_resting(scene.field, slices);
+    samples.resting.push_back(resting);
+  }
+  /// Of all slices.
+  double resting_share(const Scene& scene) const {
+    std::int64_t slices = 0;
+    for (const Region& region : scene.resting) slices += region.end.z - region.begin.z;
+    return static_cast<double>(slices) / static_cast<double>(volume_.geometry.size.z);
   }
 
   /// Of the last field that was run: `coverage`, and the inverse with 0 where nothing maps.
   Exact exact() {
     Volume<std::uint8_t> coverage{volume_.geometry, std::vector<std::uint8_t>(volume_.voxels.size())};
-    resample({.coverage = view(coverage)});
+    resample(whole(volume_.geometry), {.coverage = view(coverage)});
     return {output_.voxels, std::move(coverage.voxels)};
   }
   PullField inverse() {
     PullField inverse{volume_.geometry, std::vector<glm::vec3>(volume_.voxels.size())};
-    resample({.inverse_mm = {&inverse.grid, whole(inverse.grid), VoxelType::f32, 3,
+    resample(whole(volume_.geometry),
+             {.inverse_mm = {&inverse.grid, whole(inverse.grid), VoxelType::f32, 3,
                              std::as_writable_bytes(std::span(inverse.displacement)).data(), Memory::host}});
     for (glm::vec3& by : inverse.displacement) {
       if (std::isnan(by.x)) by = glm::vec3(0);
@@ -106,10 +136,23 @@ class Own {
   std::uint64_t covered() const { return report_.covered; }
 
  private:
-  Report resample(const Maps& maps) {
+  /// Resamples some slices of the field that was set, and sets them alone. @return ms
+  double run_resting(const VertexField& field, const Region& slices) {
+    Geometry grid = field.lattice;
+    grid.size.z = slices.end.z - slices.begin.z;
+    grid.origin.z += static_cast<double>(slices.begin.z) * grid.spacing.z;
+    const auto alone = make_cpu_resampler(grid, {.threads = threads_});
+    const glm::vec3* vertices = field.displacement.data() + slices.begin.z * grid.size.x * grid.size.y;
+    const auto start = Clock::now();
+    resample(slices);
+    alone->set_field(FieldView{&grid, vertices}, Control{.jacobian_range = true});
+    return ms_between(start, Clock::now());
+  }
+
+  Report resample(const Region& region, const Maps& maps = {}) {
     const Target target{
         .source = view(volume_), .output = view(output_), .background = static_cast<double>(background_)};
-    return resampler_->resample(whole(volume_.geometry), {&target, 1}, maps);
+    return resampler_->resample(region, {&target, 1}, maps);
   }
 
   const Volume<std::int16_t>& volume_;
@@ -208,13 +251,13 @@ CpuRun measure_run(const Volume<std::int16_t>& volume, const FieldOnLattice& fie
   const Scene scene = make_scene(field, volume.geometry);
   Own own(volume, threads);
   OwnSamples samples, untimed;
-  own.run(scene.field, untimed);
+  own.run(scene, untimed);
   const PullField inverse = beside.itk_warp && itk_version() ? own.inverse() : PullField{};
   Entrants others =
       make_entrants(beside, {volume, own.background(), threads}, scene.field, field.cell_size, inverse, repeats);
   others.run(-1);
   for (int repeat = 0; repeat < repeats; ++repeat) {
-    own.run(scene.field, samples);
+    own.run(scene, samples);
     others.run(repeat);
   }
   CpuRun run{.size = volume.geometry.size,
@@ -223,6 +266,7 @@ CpuRun measure_run(const Volume<std::int16_t>& volume, const FieldOnLattice& fie
              .at_rest = scene.at_rest,
              .covered = own.covered(),
              .ours = samples.summary()};
+  if (!scene.resting.empty()) run.resting = {own.resting_share(scene), summarize(samples.resting)};
   if (others.bytes.peer) run.bytes_ms = summarize(others.bytes.ms);
   if (!others.any_peer()) return run;
   const Exact exact = own.exact();
@@ -237,11 +281,11 @@ Scaling measure_scaling(const Volume<std::int16_t>& volume, const std::string& f
   const Scene scene = make_scene({field}, volume.geometry);
   Own one(volume, 1), all(volume, threads);
   OwnSamples of_one, of_all, untimed;
-  one.run(scene.field, untimed);
-  all.run(scene.field, untimed);
+  one.run(scene, untimed);
+  all.run(scene, untimed);
   for (int repeat = 0; repeat < repeats; ++repeat) {
-    one.run(scene.field, of_one);
-    all.run(scene.field, of_all);
+    one.run(scene, of_one);
+    all.run(scene, of_all);
   }
   return {field, threads, of_one.summary(), of_all.summary()};
 }

@@ -16,6 +16,12 @@ struct PeerTimes {
   double differing = 0;  ///< fraction of the voxels covered by Tetwarp whose values differ by more than 1
 };
 
+/// What slices of a field that moves elsewhere cost: resampling them, and set_field of them alone.
+struct RestingSlices {
+  double share = 0;  ///< of all slices
+  Summary new_field_ms;
+};
+
 /// Tetwarp, and what it is compared with, on one field of one volume; all on the same threads, in turn.
 struct CpuRun {
   glm::i64vec3 size{0};
@@ -24,9 +30,10 @@ struct CpuRun {
   double at_rest = 0;         ///< fraction of the vertices that do not move
   std::uint64_t covered = 0;  ///< voxels
   OwnTimes ours;
-  std::optional<Summary> bytes_ms = {};    ///< reading field and source once and writing the output once
-  std::optional<PeerTimes> paper = {};     ///< Algorithm 2, the field in memory, the output cleared first
-  std::optional<PeerTimes> itk_warp = {};  ///< given the inverse
+  std::optional<RestingSlices> resting = {};  ///< where part of the slices, not all, rest and have resting neighbours
+  std::optional<Summary> bytes_ms = {};       ///< reading field and source once and writing the output once
+  std::optional<PeerTimes> paper = {};        ///< Algorithm 2, the field in memory, the output cleared first
+  std::optional<PeerTimes> itk_warp = {};     ///< given the inverse
   std::optional<PeerTimes> itk_invert_and_warp = {};
   std::optional<PeerTimes> vtk_probe = {};
 };

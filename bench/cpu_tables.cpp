@@ -83,6 +83,14 @@ std::string dense_table(const CpuResults& results) {
                  cell(run.ours.resample_ms), cell(run.ours.new_field_ms), ns_cell(run.ours.new_field_ms, run.size),
                  cell(run.bytes_ms), ms_cell(run.paper), ms_cell(run.itk_warp)});
   }
+  for (const CpuRun& run : results.runs) {
+    if (!run.resting) continue;
+    text +=
+        format(
+            "\n%s: %.1f %% of the slices rest, and so do those beside them. Resampling these, and set_field of them ",
+            run.field.c_str(), 100 * run.resting->share) +
+        "alone: " + cell(run.resting->new_field_ms) + " ms.\n";
+  }
   return text + "\n";
 }
 

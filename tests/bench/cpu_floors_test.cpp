@@ -81,7 +81,9 @@ TEST(CpuFloors, IdentityIsHeldAgainstTheBytesAndALocalFieldIsToldBesideThem) {
     results.runs.push_back(make_run(field));
     results.runs.back().bytes_ms = ms(16);
   }
+  results.runs[1].resting = {0.25, ms(9)};
   const std::vector<Floor> floors = find_floors(results);
+  expect_floor(floors, "new field / bytes", "local, slices at rest", 2.25, 2, {}, false);
   expect_floor(floors, "new field / bytes", "identity", 2.5, 2, {}, false);
   expect_floor(floors, "resample / bytes", "identity", 1.875, 2, {}, true);
   expect_floor(floors, "new field / bytes", "local", 2.5, {}, {}, false);
