@@ -137,23 +137,27 @@ std::span<const Uint8> fragments_of(DcmPixelData& pixels, const DicomFileHeader&
   return codestream_of(*sequence, joined);
 }
 
-/// HU of words that all fit int16 with an offset. @return whether they do; if not, `hu` holds anything
-template <class Stored>
+/// HU of words that all fit int16 with an offset, in 16 bits, of which a vector holds most: what does not fit shows in
+/// the signs. @return whether they do, and the format allows it; if not, `hu` holds anything
 bool add_offset(std::span<const std::uint16_t> words, const HuTable& table, std::span<std::int16_t> hu) {
-  const int above = 15 - table.format.high_bit, below = 16 - table.format.bits_stored, offset = *table.offset;
-  int misfits = 0;
+  const PixelFormat& format = table.format;
+  if (!table.offset || format.high_bit + 1 != format.bits_stored) return false;
+  const int sign = 1 << (format.bits_stored - 1);
+  const bool is_raised = !format.is_signed && format.bits_stored == 16;  // by half the range, for int16 to hold it
+  const int more = *table.offset + (is_raised ? sign : 0);
+  if (more != static_cast<std::int16_t>(more)) return false;
+  const auto mask = static_cast<std::uint16_t>(2 * sign - 1),
+             flip = static_cast<std::uint16_t>(format.is_signed || is_raised ? sign : 0),
+             extend = static_cast<std::uint16_t>(format.is_signed ? sign : 0),
+             offset = static_cast<std::uint16_t>(more);
+  std::uint16_t misfits = 0;
   for (std::size_t i = 0; i < words.size(); ++i) {
-    const int value = (static_cast<Stored>(words[i] << above) >> below) + offset;
-    hu[i] = static_cast<std::int16_t>(value);
-    misfits |= hu[i] ^ value;
+    const auto value = static_cast<std::uint16_t>(((words[i] & mask) ^ flip) - extend);
+    const auto sum = static_cast<std::uint16_t>(value + offset);
+    hu[i] = static_cast<std::int16_t>(sum);
+    misfits |= static_cast<std::uint16_t>((value ^ sum) & (offset ^ sum));
   }
-  return misfits == 0;
-}
-
-bool add_offset(std::span<const std::uint16_t> words, const HuTable& table, std::span<std::int16_t> hu) {
-  if (!table.offset) return false;
-  return table.format.is_signed ? add_offset<std::int16_t>(words, table, hu)
-                                : add_offset<std::uint16_t>(words, table, hu);
+  return (misfits & 0x8000) == 0;
 }
 
 HuCount look_up(std::span<const std::uint16_t> words, const HuTable& table, const std::filesystem::path& file,
