@@ -33,9 +33,7 @@ double cosine_near_zero(double r) {
   return (1.0 - 0.5 * x) + x * (x * sum);
 }
 
-}  // namespace
-
-SinCos sin_cos(double angle) {
+SinCos find_sin_cos(double angle) {
   const double quarter = std::nearbyint(angle * kTwoOverPi);
   const double high = (angle - quarter * kHalfPi1) - quarter * kHalfPi2;
   // What the second subtraction rounded away, and the third part of pi / 2, are carried beside r.
@@ -49,6 +47,19 @@ SinCos sin_cos(double angle) {
     case 2: return {-s, -c};
     default: return {-c, s};
   }
+}
+
+}  // namespace
+
+SinCos sin_cos(double angle) {
+  // A formula asks for one angle for a whole row of a lattice, where the row lies across its axis.
+  thread_local double latest = 0;
+  thread_local SinCos result = find_sin_cos(0);
+  if (angle != latest || angle == 0) {  // not for -0, which equals 0
+    latest = angle;
+    result = find_sin_cos(angle);
+  }
+  return result;
 }
 
 }  // namespace tetwarp
