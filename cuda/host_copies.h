@@ -1,6 +1,7 @@
 #pragma once
 
 #include <condition_variable>
+#include <cstdlib>
 #include <deque>
 #include <exception>
 #include <memory>
@@ -19,17 +20,19 @@ class PinnedPiece {
  public:
   static constexpr std::size_t kBytes = std::size_t{8} << 20;
 
-  PinnedPiece() : bytes_(buffer_.reserve(kBytes)) {}
-  ~PinnedPiece() { cudaEventSynchronize(done.get()); }
+  PinnedPiece();
+  ~PinnedPiece();
   PinnedPiece(const PinnedPiece&) = delete;
   PinnedPiece& operator=(const PinnedPiece&) = delete;
 
-  std::byte* bytes() const { return bytes_; }
+  std::byte* bytes() const { return bytes_.get(); }
   Event done;
 
  private:
-  PinnedBuffer<std::byte> buffer_;
-  std::byte* bytes_;
+  struct Free {
+    void operator()(std::byte* bytes) const { std::free(bytes); }
+  };
+  std::unique_ptr<std::byte, Free> bytes_;
 };
 
 /// A copy from the host by the calling thread, through a small ring of pinned pieces.
