@@ -83,7 +83,8 @@ class Deformation {
   void read_field();
   void resample();
   void write();
-  void write_series();
+  void begin_series();
+  void write_slices(const Region& slices);
   json canonical_options() const;
   json sidecar() const;
   json report_with_times() const;
@@ -101,6 +102,7 @@ class Deformation {
   AnyVolume output_, coverage_;
   std::vector<SliceRange> sampled_slices_;
   Report report_;
+  std::optional<DerivedSeriesWriter> series_;
   std::optional<DicomWriteReport> dicom_report_;
   std::vector<std::pair<std::string, double>> stages_;
 };
@@ -205,13 +207,10 @@ void Deformation::read_field() {
 
 void Deformation::resample() {
   Stage stage(options_.common, "resample");
-  // Hashes read what the resampler reads, so they run beside it.
-  auto field_hash = std::async(std::launch::async, [&] {
-    return hash_field(field_.lattice(), field_.displacement(),
-                      field_.direction == Direction::pull ? "pull" : "forward");
-  });
   auto input_hash = std::async(
       std::launch::async, [&] { return input_.is_dicom() ? input_.dicom->sha256 : hash_file(options_.input.path); });
+  field_sha256_ = hash_field(field_.lattice(), field_.displacement(),
+                             field_.direction == Direction::pull ? "pull" : "forward", options_.common.threads);
   const Geometry& grid = input_.volume.geometry();
   const Limits limits{.threads = options_.common.threads, .memory = options_.memory_bytes.value_or(0)};
   Backend backend = make_backend(options_.backend, field_.direction, grid, options_.device, limits);
@@ -234,8 +233,12 @@ void Deformation::resample() {
                       .background = background_,
                       .padding = input_.is_dicom() ? input_.dicom->padding : std::nullopt,
                       .sampled_slices = sampled_slices_};
-  report_ = backend.resampler->resample(whole(grid), {&target, 1}, maps, stage.control());
-  field_sha256_ = field_hash.get();
+  Control control = stage.control();
+  if (outputs_.series) {
+    begin_series();
+    control.finished = [&](const Region& slices) { outputs_.set.write([&] { write_slices(slices); }); };
+  }
+  report_ = backend.resampler->resample(whole(grid), {&target, 1}, maps, control);
   input_sha256_ = input_hash.get();
   stages_.emplace_back("resample", stage.seconds());
 }
@@ -253,23 +256,26 @@ json Deformation::canonical_options() const {
   return options;
 }
 
-void Deformation::write_series() {
-  Stage stage(options_.common, "write");
+void Deformation::begin_series() {
   const std::string parameters = "interpolation=" + std::string(name_of(options_.interpolation)) +
                                  " outside=" + name_of(options_.outside) + " background=" + json(background_).dump() +
                                  (field_.direction == Direction::pull ? " direction=pull" : " direction=forward");
   const bool pull = field_.direction == Direction::pull, deformed = pull || !field_.forward.identity;
   const char* what =
       !deformed ? "Resampled by the identity" : (pull ? "Deformed by a pull field" : "Deformed by a field of vertices");
-  const DicomDerivation derivation{
-      .field_sha256 = field_sha256_,
-      .parameters = parameters,
-      .description = std::string(what) + ", " + name_of(options_.interpolation) + " interpolation",
-      .deformed = deformed,
-      .background_hu = background_,
-      .sampled_slices = sampled_slices_};
-  dicom_report_ = write_derived_series(outputs_.volume, std::as_const(output_).view(), *input_.dicom->headers,
-                                       derivation, options_.common.threads, stage.control());
+  series_.emplace(
+      outputs_.volume, input_.volume.geometry(), *input_.dicom->headers,
+      DicomDerivation{.field_sha256 = field_sha256_,
+                      .parameters = parameters,
+                      .description = std::string(what) + ", " + name_of(options_.interpolation) + " interpolation",
+                      .deformed = deformed,
+                      .background_hu = background_});
+}
+
+/// While others are resampled.
+void Deformation::write_slices(const Region& slices) {
+  series_->write(std::as_const(output_).view(), slices.begin.z, slices.end.z, sampled_slices_, options_.common.threads,
+                 {.stop = interrupt_token()});
 }
 
 json Deformation::sidecar() const {
@@ -330,7 +336,7 @@ json Deformation::report_with_times() const {
 void Deformation::write() {
   const auto start = std::chrono::steady_clock::now();
   if (outputs_.series) {
-    write_series();
+    dicom_report_ = series_->report();
   } else {
     Stage stage(options_.common, "write");
     write_image(outputs_.volume, std::as_const(output_).view(),

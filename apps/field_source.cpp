@@ -75,7 +75,7 @@ ForwardField read_forward_field(const std::vector<std::string>& fields, const Ge
 }
 
 std::string hash_field(const Geometry& lattice, const std::vector<glm::vec3>& displacement,
-                       const std::string& direction) {
+                       const std::string& direction, int threads) {
   const auto bytes_of = [](const auto& value) { return std::as_bytes(std::span(&value, 1)); };
   Sha256 hash;
   hash.add("tetwarp field").add(direction);
@@ -83,7 +83,7 @@ std::string hash_field(const Geometry& lattice, const std::vector<glm::vec3>& di
       .add(bytes_of(lattice.spacing))
       .add(bytes_of(lattice.origin))
       .add(bytes_of(lattice.direction));
-  return hash.add(std::as_bytes(std::span(displacement))).hex();
+  return hash.add_blocks(std::as_bytes(std::span(displacement)), threads).hex();
 }
 
 }  // namespace tetwarp::apps

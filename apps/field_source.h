@@ -31,9 +31,9 @@ void check_fields(const std::vector<std::string>& fields, std::optional<std::int
 glm::i64vec3 lattice_size(const std::vector<std::string>& fields, const Geometry& volume,
                           std::optional<std::int64_t> cell_size);
 
-/// SHA-256 over direction, lattice geometry and displacements, hexadecimal: the same for a formula and the file it was
-/// written to.
+/// SHA-256 over direction, lattice geometry and displacements (Sha256::add_blocks), hexadecimal: the same for a formula
+/// and the file it was written to.
 std::string hash_field(const Geometry& lattice, const std::vector<glm::vec3>& displacement,
-                       const std::string& direction);
+                       const std::string& direction, int threads);
 
 }  // namespace tetwarp::apps

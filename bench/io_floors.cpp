@@ -79,6 +79,9 @@ void add_job(const IoResults& results, std::vector<Floor>& floors) {
           {false, 1.05, {}});
     } else if (time.by == kJobCuda) {
       add(floors, "program with CUDA / in and out", step, time.ms.median, sum_of({kJobIn, kJobOut}), {false, 1.3, {}});
+    } else if (time.by == kJobAwake) {
+      add(floors, "job with CUDA awake / in and out", step, time.ms.median, sum_of({kJobIn, kJobOut}),
+          {false, 1.3, {}});
     }
   }
 }

@@ -3,7 +3,6 @@
 #include <spawn.h>
 #include <sys/wait.h>
 
-#include <future>
 #include <memory>
 
 #include "bench/series.h"
@@ -45,27 +44,38 @@ VertexField make_field(const Geometry& grid, std::int64_t cell_size, int threads
   return sample_on(lattice_over(grid, cell_size), parse_formula(kField, grid), {.threads = threads});
 }
 
-/// As the program has it: the field is hashed while the volume is deformed.
-void deform(Job& job, int threads) {
+/// As the program has it: the field is hashed, too. @param finished  told of slices that are done
+void deform(Job& job, Resampler& resampler, int threads, const std::function<void(const Region&)>& finished = {}) {
   const Geometry& grid = job.input.volume.geometry;
-  const std::future<std::string> hash = std::async(
-      std::launch::async, [&] { return Sha256().add(std::as_bytes(std::span(job.field.displacement))).hex(); });
-  const auto resampler = make_cpu_resampler(grid, {.threads = threads});
-  resampler->set_field(view(job.field));
+  Sha256().add_blocks(std::as_bytes(std::span(job.field.displacement)), threads);
+  resampler.set_field(view(job.field));
   job.output = AnyVolume(grid, VoxelType::i16);
-  job.sampled.resize(static_cast<std::size_t>(grid.size.z));
+  job.sampled.assign(static_cast<std::size_t>(grid.size.z), {});
   const Target target{.source = view(job.input.volume),
                       .output = job.output.view(),
                       .background = -1024,
                       .padding = job.input.padding,
                       .sampled_slices = job.sampled};
-  resampler->resample(whole(grid), {&target, 1});
-  hash.wait();
+  resampler.resample(whole(grid), {&target, 1}, {}, {.finished = finished});
 }
 
 void write(const Job& job, const fs::path& folder, int threads) {
   StagedOutput staged(folder, StagedOutput::Kind::folder, false);
   write_series(staged.path(), job.input, job.output.view(), job.sampled, threads);
+  staged.commit();
+}
+
+/// From series to series, slices being written while others are deformed.
+void run_with_cuda(const fs::path& series, const fs::path& folder, std::int64_t cell_size, int threads) {
+  Job job;
+  job.input = read_series(series, threads);
+  const Geometry& grid = job.input.volume.geometry;
+  job.field = make_field(grid, cell_size, threads);
+  StagedOutput staged(folder, StagedOutput::Kind::folder, false);
+  DerivedSeriesWriter writer(staged.path(), grid, *job.input.headers, made_up_derivation());
+  deform(job, *make_cuda_resampler(grid), threads, [&](const Region& slices) {
+    writer.write(job.output.view(), slices.begin.z, slices.end.z, job.sampled, threads);
+  });
   staged.commit();
 }
 
@@ -92,10 +102,15 @@ void add_job(Turns& turns, const fs::path& series, const fs::path& scratch, std:
     turns.add(step, kJobProgram, nothing([=] { run_on("cpu"); }), remove);
     if (cuda_device_count() != 0) turns.add(step, kJobCuda, nothing([=] { run_on("cuda"); }), remove);
   }
+  if (cuda_device_count() != 0) {
+    turns.add(step, kJobAwake, nothing([=] { run_with_cuda(series, out, cell_size, threads); }), remove);
+  }
   const auto job = std::make_shared<Job>();
   turns.add(step, kJobIn, nothing([=] { job->input = read_series(series, threads); }));
   turns.add(step, kJobField, nothing([=] { job->field = make_field(job->input.volume.geometry, cell_size, threads); }));
-  turns.add(step, kJobDeform, nothing([=] { deform(*job, threads); }));
+  turns.add(step, kJobDeform, nothing([=] {
+              deform(*job, *make_cpu_resampler(job->input.volume.geometry, {.threads = threads}), threads);
+            }));
   turns.add(step, kJobOut, nothing([=] { write(*job, out, threads); }), [=] {
     remove();
     *job = {};  // the program has the memory to itself

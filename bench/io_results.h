@@ -35,6 +35,7 @@ inline constexpr char kTetwarp[] = "tetwarp", kItk[] = "ITK", kDcmtk[] = "DCMTK"
 inline constexpr char kDicomIn[] = "DICOM in, ", kDicomOut[] = "DICOM out", kNiftiOut[] = ".nii.gz out",
                       kNiftiIn[] = ".nii.gz in, written by ", kJob[] = "whole job, ";
 inline constexpr char kJobIn[] = "in alone", kJobField[] = "field alone", kJobDeform[] = "deform alone",
-                      kJobOut[] = "out alone", kJobProgram[] = "tetwarp deform", kJobCuda[] = "tetwarp deform, CUDA";
+                      kJobOut[] = "out alone", kJobProgram[] = "tetwarp deform", kJobCuda[] = "tetwarp deform, CUDA",
+                      kJobAwake[] = "CUDA, awake";
 
 }  // namespace tetwarp::bench

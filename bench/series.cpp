@@ -11,15 +11,15 @@ DicomVolume read_series(const std::filesystem::path& folder, int threads) {
   return load_dicom(scan.series.front(), threads);
 }
 
+DicomDerivation made_up_derivation() {
+  return {.field_sha256 = std::string(64, '0'),
+          .parameters = "interpolation=linear outside=refuse background=-1024.0 direction=forward",
+          .description = "Deformed by a field of vertices, linear interpolation"};
+}
+
 void write_series(const std::filesystem::path& folder, const DicomVolume& source, const ConstVolumeView& volume,
                   const std::vector<SliceRange>& sampled, int threads) {
-  const DicomDerivation derivation{.field_sha256 = std::string(64, '0'),
-                                   .parameters =
-                                       "interpolation=linear outside=refuse background=-1024.0 "
-                                       "direction=forward",
-                                   .description = "Deformed by a field of vertices, linear interpolation",
-                                   .sampled_slices = sampled};
-  write_derived_series(folder, volume, *source.headers, derivation, threads);
+  write_derived_series(folder, volume, *source.headers, made_up_derivation(), sampled, threads);
 }
 
 }  // namespace tetwarp::bench

@@ -10,6 +10,9 @@ namespace tetwarp::bench {
 /// @throws InputError
 DicomVolume read_series(const std::filesystem::path& folder, int threads);
 
+/// What a derived series says of how it came to be.
+DicomDerivation made_up_derivation();
+
 /// Writes a derived series with full provenance. @param sampled  source slices of each slice
 /// @throws Error
 void write_series(const std::filesystem::path& folder, const DicomVolume& source, const ConstVolumeView& volume,

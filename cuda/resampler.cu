@@ -74,8 +74,13 @@ Counts CudaResampler::write_region(const Region& region, const Control& control)
     Region slab = region;
     slab.begin.z = z;
     slab.end.z = std::min(z + slices, region.end.z);
-    write_slab(slab, [&](std::int64_t voxels) {
-      done += voxels;
+    write_slab(slab, [&](const SlabBox& box) {
+      const glm::i64vec3 end = box.begin + box.size;
+      if (control.finished && end.y == slab.end.y) {
+        writer_->finish();
+        control.finished({{slab.begin.x, slab.begin.y, box.begin.z}, end});
+      }
+      done += box.count();
       if (control.progress) control.progress(static_cast<double>(done) / static_cast<double>(voxel_count(region)));
       if (control.stop.stop_requested()) throw Cancelled();
     });
@@ -150,7 +155,7 @@ void CudaResampler::write_slab(const Region& slab, Done&& done) {
   const std::int64_t voxels = plain ? box_voxels_ : std::min(box_voxels_, writer_->box_voxels(false));
   for_each_box(slab, std::min(voxels, voxel_count(slab)), [&](const SlabBox& box) {
     write_box(box, plain);
-    done(box.count());
+    done(box);
   });
 }
 

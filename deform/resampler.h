@@ -79,6 +79,10 @@ struct Report {
 struct Control {
   std::function<void(double)> progress = {};  ///< 0 to 1, monotone, one call at a time, from any thread
   std::stop_token stop = {};                  ///< asked between tiles: the call throws Cancelled
+  /// For resample: told of each part of the region that is done, so that it can be used while the rest is made. Parts
+  /// are whole slices of the region, none twice, together all of it; what is in host memory has its last value then,
+  /// and so have the `sampled_slices`. Called from any thread, perhaps several at a time; what it throws ends the call.
+  std::function<void(const Region&)> finished = {};
   /// A cudaStream_t (deform/ knows no CUDA): the work is queued there, after what is queued already, and the call
   /// returns when it is done. Null: the default stream. Ignored by the CPU.
   void* stream = nullptr;

@@ -124,12 +124,11 @@ void put_references(DcmItem& target, const DerivedSeries& series, const SliceRan
 
 /// General Image (PS3.3 C.7.6.1) and Contributing Equipment (C.12.1.1): what was done to which images, and by what.
 void put_derivation(DcmItem& target, DcmDataset& source, const DerivedSeries& series, const DicomDerivation& derivation,
-                    std::size_t k) {
+                    const SliceRange& sampled) {
   put(target, DCM_ImageType, image_type(source));
   put(target, DCM_DerivationDescription, ascii(derivation.description, 1024));
   append_code(target, DCM_DerivationCodeSequence, "113085", "Spatial resampling");
-  if (!derivation.sampled_slices.empty())
-    put_references(target, series, derivation.sampled_slices.at(k), derivation.deformed);
+  put_references(target, series, sampled, derivation.deformed);
   DcmItem& equipment = append_item(target, DCM_ContributingEquipmentSequence);
   append_code(equipment, DCM_PurposeOfReferenceCodeSequence, "109103", "Modifying Equipment");
   put_tetwarp(equipment, "tetwarp");
@@ -181,7 +180,8 @@ DerivedSeries derive_series(const DicomHeaders& source, const DicomDerivation& d
 }
 
 std::vector<DcmTagKey> derive_slice(DcmItem& target, DcmDataset& source, const DerivedSeries& series,
-                                    const DicomDerivation& derivation, const Geometry& geometry, std::size_t k) {
+                                    const DicomDerivation& derivation, const SliceRange& sampled,
+                                    const Geometry& geometry, std::size_t k) {
   carry_over(target, source, series.varying);
   put(target, DCM_SOPClassUID, UID_CTImageStorage);
   put(target, DCM_Modality, "CT");
@@ -191,7 +191,7 @@ std::vector<DcmTagKey> derive_slice(DcmItem& target, DcmDataset& source, const D
   put(target, DCM_SeriesDescription, series.description);
   put(target, DCM_FrameOfReferenceUID, series.frame_of_reference_uid);
   put(target, DCM_InstanceNumber, std::to_string(series.instance_number.at(k)));
-  put_derivation(target, source, series, derivation, k);
+  put_derivation(target, source, series, derivation, sampled);
   put_image_plane(target, geometry, static_cast<std::int64_t>(k));
   put_slice_place(target, source, geometry, k);
   if (series.padding) put_padding(target, *series.padding);

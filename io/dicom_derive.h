@@ -28,8 +28,10 @@ struct DerivedSeries {
 DerivedSeries derive_series(const DicomHeaders& source, const DicomDerivation& derivation);
 
 /// Puts everything of slice k but Pixel Data and SOP Instance UID into the empty item `target`.
+/// @param sampled  the source slices that it was interpolated from
 /// @return type 2 attributes that were missing and are now there, empty
 std::vector<DcmTagKey> derive_slice(DcmItem& target, DcmDataset& source, const DerivedSeries& series,
-                                    const DicomDerivation& derivation, const Geometry& geometry, std::size_t k);
+                                    const DicomDerivation& derivation, const SliceRange& sampled,
+                                    const Geometry& geometry, std::size_t k);
 
 }  // namespace tetwarp

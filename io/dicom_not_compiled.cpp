@@ -13,8 +13,20 @@ DicomScan scan_dicom(const std::filesystem::path&, bool, const Control&) { refus
 
 DicomVolume load_dicom(const DicomSeries&, int, const Control&) { refuse(); }
 
+struct DerivedSeriesWriter::State {};
+
+DerivedSeriesWriter::DerivedSeriesWriter(std::filesystem::path, const Geometry&, const DicomHeaders&, DicomDerivation) {
+  refuse();
+}
+DerivedSeriesWriter::~DerivedSeriesWriter() = default;
+void DerivedSeriesWriter::write(const ConstVolumeView&, std::int64_t, std::int64_t, std::span<const SliceRange>, int,
+                                const Control&) {
+  refuse();
+}
+DicomWriteReport DerivedSeriesWriter::report() const { refuse(); }
+
 DicomWriteReport write_derived_series(const std::filesystem::path&, const ConstVolumeView&, const DicomHeaders&,
-                                      const DicomDerivation&, int, const Control&) {
+                                      const DicomDerivation&, std::span<const SliceRange>, int, const Control&) {
   refuse();
 }
 

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -69,7 +70,6 @@ struct DicomDerivation {
   std::string description;   ///< Derivation Description: "Deformed by ..."; no paths, no names
   bool deformed = true;      ///< false for identity: the frame of reference is kept
   double background_hu = -1024;
-  std::vector<SliceRange> sampled_slices;  ///< per output slice: the source slices that it was interpolated from
 };
 
 /// What the writer had to add or could not carry over, for the report.
@@ -79,11 +79,36 @@ struct DicomWriteReport {
 };
 
 /// Writes a derived CT series (PS3.3 A.3; docs/dicom.md has the table of attributes) of one file a slice into the
-/// folder `folder`, which exists and is empty. `volume` is int16 HU with as many slices as the source. Reads no clock:
-/// the same input gives the same bytes and the same UIDs.
-/// @throws InputError, Error when a file cannot be written
+/// folder `folder`, which exists and is empty. Reads no clock: the same input gives the same bytes and the same UIDs.
+class DerivedSeriesWriter {
+ public:
+  /// The source's headers must outlive the writer. @param geometry  of the derived volume, with as many slices as the
+  ///                                                                source
+  /// @throws InputError
+  DerivedSeriesWriter(std::filesystem::path folder, const Geometry& geometry, const DicomHeaders& source,
+                      DicomDerivation derivation);
+  ~DerivedSeriesWriter();
+  DerivedSeriesWriter(const DerivedSeriesWriter&) = delete;
+  DerivedSeriesWriter& operator=(const DerivedSeriesWriter&) = delete;
+
+  /// Writes some slices of a volume of int16 HU, in parallel; of the others nothing is read. Each slice once, in any
+  /// order, by several threads at a time if need be.
+  /// @param sampled  per slice of the volume: the source slices that it was interpolated from; or empty
+  /// @throws InputError, Error when a file cannot be written, Cancelled
+  void write(const ConstVolumeView& volume, std::int64_t begin, std::int64_t end, std::span<const SliceRange> sampled,
+             int threads = 0, const Control& control = {});
+  /// Of what was written so far.
+  DicomWriteReport report() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// A whole series at once.
 DicomWriteReport write_derived_series(const std::filesystem::path& folder, const ConstVolumeView& volume,
-                                      const DicomHeaders& source, const DicomDerivation& derivation, int threads = 0,
+                                      const DicomHeaders& source, const DicomDerivation& derivation,
+                                      std::span<const SliceRange> sampled = {}, int threads = 0,
                                       const Control& control = {});
 
 /// Writes a made-up CT series for a volume of int16 HU that never was a patient (tetwarp phantom).

@@ -15,44 +15,75 @@ namespace tetwarp {
 
 namespace {
 
-void check_shapes(const ConstVolumeView& volume, const DicomHeaders& source, const DicomDerivation& derivation) {
+void check_volume(const ConstVolumeView& volume, const Geometry& expected, std::span<const SliceRange> sampled) {
   const Geometry& geometry = require_hu_volume(volume);
-  const std::string slices = std::to_string(geometry.size.z);
-  require(source.slices.size() == static_cast<std::size_t>(geometry.size.z),
-          "the volume has " + slices + " slices and the source series " + std::to_string(source.slices.size()) +
-              "; a derived series needs one header a slice");
-  const std::vector<SliceRange>& sampled = derivation.sampled_slices;
+  require(geometry == expected,
+          "the volume to write is not on the grid of the derived series; give the one begun with");
   require(sampled.empty() || sampled.size() == static_cast<std::size_t>(geometry.size.z),
-          "the volume has " + slices + " slices and there are " + std::to_string(sampled.size()) +
-              " ranges of sampled slices; give one a slice, or none");
-  for (const SliceRange& range : sampled) {
-    require(range.first > range.last || (range.first >= 0 && range.last < geometry.size.z),
-            "sampled slices " + std::to_string(range.first) + " to " + std::to_string(range.last) +
-                " are not all among the " + slices + " of the source series; check the ranges");
-  }
+          "the volume has " + std::to_string(geometry.size.z) + " slices and there are " +
+              std::to_string(sampled.size()) + " ranges of sampled slices; give one a slice, or none");
+}
+
+void check_range(const SliceRange& range, std::size_t slices) {
+  require(range.first > range.last || (range.first >= 0 && range.last < static_cast<std::int64_t>(slices)),
+          "sampled slices " + std::to_string(range.first) + " to " + std::to_string(range.last) +
+              " are not all among the " + std::to_string(slices) + " of the source series; check the ranges");
 }
 
 }  // namespace
 
-DicomWriteReport write_derived_series(const std::filesystem::path& folder, const ConstVolumeView& volume,
-                                      const DicomHeaders& source, const DicomDerivation& derivation, int threads,
-                                      const Control& control) {
+struct DerivedSeriesWriter::State {
+  std::filesystem::path folder;
+  Geometry geometry;
+  const DicomHeaders& source;
+  DicomDerivation derivation;
+  DerivedSeries series;
+  std::set<DcmTagKey> added = {};
+  std::mutex mutex = {};
+};
+
+DerivedSeriesWriter::DerivedSeriesWriter(std::filesystem::path folder, const Geometry& geometry,
+                                         const DicomHeaders& source, DicomDerivation derivation) {
   prepare_dcmtk();
-  check_shapes(volume, source, derivation);
-  const DerivedSeries series = derive_series(source, derivation);
-  std::set<DcmTagKey> added;
-  std::mutex mutex;
-  for_each_index(source.slices.size(), threads, control, [&](std::size_t k) {
+  require(source.slices.size() == static_cast<std::size_t>(geometry.size.z),
+          "the volume has " + std::to_string(geometry.size.z) + " slices and the source series " +
+              std::to_string(source.slices.size()) + "; a derived series needs one header a slice");
+  DerivedSeries series = derive_series(source, derivation);
+  state_ = std::make_unique<State>(std::move(folder), geometry, source, std::move(derivation), std::move(series));
+}
+DerivedSeriesWriter::~DerivedSeriesWriter() = default;
+
+void DerivedSeriesWriter::write(const ConstVolumeView& volume, std::int64_t begin, std::int64_t end,
+                                std::span<const SliceRange> sampled, int threads, const Control& control) {
+  State& to = *state_;
+  check_volume(volume, to.geometry, sampled);
+  for_each_index(static_cast<std::size_t>(end - begin), threads, control, [&](std::size_t n) {
+    const std::size_t k = static_cast<std::size_t>(begin) + n;
+    const SliceRange range = sampled.empty() ? SliceRange{} : sampled[k];
+    check_range(range, to.source.slices.size());
     DcmDataset slice;
-    const auto added_here = derive_slice(slice, *source.slices[k], series, derivation, *volume.geometry, k);
-    put_hu_format(slice, *volume.geometry);
-    write_dicom_file(folder / dicom_file_name(series.instance_number[k]), slice, slice_of(volume, k));
-    const std::lock_guard lock(mutex);
-    added.insert(added_here.begin(), added_here.end());
+    const auto added = derive_slice(slice, *to.source.slices[k], to.series, to.derivation, range, to.geometry, k);
+    put_hu_format(slice, to.geometry);
+    write_dicom_file(to.folder / dicom_file_name(to.series.instance_number[k]), slice, slice_of(volume, k));
+    const std::lock_guard lock(to.mutex);
+    to.added.insert(added.begin(), added.end());
   });
-  DicomWriteReport report{series.series_uid, series.frame_of_reference_uid, {}};
-  for (const DcmTagKey& tag : added) report.added_empty.push_back(tag_name(tag));
+}
+
+DicomWriteReport DerivedSeriesWriter::report() const {
+  DicomWriteReport report{state_->series.series_uid, state_->series.frame_of_reference_uid, {}};
+  const std::lock_guard lock(state_->mutex);
+  for (const DcmTagKey& tag : state_->added) report.added_empty.push_back(tag_name(tag));
   return report;
+}
+
+DicomWriteReport write_derived_series(const std::filesystem::path& folder, const ConstVolumeView& volume,
+                                      const DicomHeaders& source, const DicomDerivation& derivation,
+                                      std::span<const SliceRange> sampled, int threads, const Control& control) {
+  const Geometry& geometry = require_hu_volume(volume);
+  DerivedSeriesWriter writer(folder, geometry, source, derivation);
+  writer.write(volume, 0, geometry.size.z, sampled, threads, control);
+  return writer.report();
 }
 
 bool is_tetwarp_dicom(const std::filesystem::path& file) {

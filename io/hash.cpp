@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <vector>
 
 #include "deform/errors.h"
+#include "io/parallel.h"
 
 namespace tetwarp {
 
@@ -42,6 +44,16 @@ Sha256& Sha256::add(std::string_view text) {
   std::array<std::byte, 8> length;  // little endian on every machine
   for (std::size_t i = 0; i < length.size(); ++i) length[i] = static_cast<std::byte>(text.size() >> (8 * i));
   return add(length).add(std::as_bytes(std::span(text)));
+}
+
+Sha256& Sha256::add_blocks(std::span<const std::byte> bytes, int threads) {
+  constexpr std::size_t kBlock = std::size_t{1} << 20;
+  std::vector<Digest> digests((bytes.size() + kBlock - 1) / kBlock);
+  for_each_index(digests.size(), threads, {}, [&](std::size_t n) {
+    const std::span<const std::byte> rest = bytes.subspan(n * kBlock);
+    digests[n] = Sha256().add(rest.first(std::min(kBlock, rest.size()))).digest();
+  });
+  return add(std::as_bytes(std::span(digests)));
 }
 
 Sha256::Digest Sha256::digest() const {

@@ -22,6 +22,9 @@ class Sha256 {
   Sha256& add(std::span<const std::byte> bytes);
   /// Adds the length and then the characters, so that ("ab", "c") and ("a", "bc") differ.
   Sha256& add(std::string_view text);
+  /// Adds the digests of consecutive blocks of 1 MiB (the last may be shorter), which are found in parallel: for large
+  /// arrays. @param threads  0: all that this process may use
+  Sha256& add_blocks(std::span<const std::byte> bytes, int threads = 0);
   Digest digest() const;    ///< of everything added so far; more may follow
   std::string hex() const;  ///< digest() in 64 lower-case hexadecimal digits
 

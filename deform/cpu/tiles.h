@@ -6,8 +6,10 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <atomic>
 #include <mutex>
 #include <utility>
+#include <vector>
 
 #include "deform/resampler.h"
 
@@ -37,6 +39,28 @@ class Progress {
   std::mutex mutex_;
 };
 
+/// Tells of layers of tiles whose last row is done.
+class Layers {
+ public:
+  Layers(const Control& control, const Region& region, const glm::i64vec3& tiles)
+      : control_(control), region_(region), rows_left_(static_cast<std::size_t>(tiles.z)) {
+    for (std::atomic<std::int64_t>& rows : rows_left_) rows = tiles.y;
+  }
+
+  void row_done(std::int64_t layer) {
+    if (!control_.finished || --rows_left_[static_cast<std::size_t>(layer)] != 0) return;
+    Region slices = region_;
+    slices.begin.z += layer * kTile;
+    slices.end.z = std::min(slices.begin.z + kTile, region_.end.z);
+    control_.finished(slices);
+  }
+
+ private:
+  const Control& control_;
+  Region region_;
+  std::vector<std::atomic<std::int64_t>> rows_left_;
+};
+
 inline tbb::task_arena make_arena(const Limits& limits) {
   require(limits.threads >= 0, "threads is " + std::to_string(limits.threads) + ", expected 0 (all) or more");
   const int most = tbb::info::default_concurrency();
@@ -44,7 +68,7 @@ inline tbb::task_arena make_arena(const Limits& limits) {
 }
 
 /// Runs `work(box, scratch)` for all tiles of the region, each thread with a Scratch of its own, and adds up the
-/// reports.
+/// reports. Rows of tiles are begun in rising order of k, so that slices are finished early.
 ///
 /// @param at_once  whether a row of tiles along i is one piece of work: then the box is the row
 template <class Scratch, class AtOnce, class Work>
@@ -54,21 +78,27 @@ Report for_each_tile(tbb::task_arena& arena, const Region& region, const Control
   if (is_empty(region)) return total;
   const glm::i64vec3 tiles = (region.end - region.begin + (kTile - 1)) / kTile;
   Progress progress(control, voxel_count(region));
+  Layers layers(control, region, tiles);
   tbb::enumerable_thread_specific<Scratch> scratch;
   tbb::enumerable_thread_specific<Report> reports;
   const auto run = [&](const Region& box) {
     reports.local() += work(box, scratch.local());
     progress.done(voxel_count(box));
   };
+  const auto run_row = [&](const glm::i64vec3& begin) {
+    const Region row = intersection(region, {begin, begin + glm::i64vec3(tiles.x, 1, 1) * kTile});
+    if (at_once(row)) return run(row);
+    tbb::parallel_for(std::int64_t{0}, tiles.x, [&](std::int64_t n) {
+      const glm::i64vec3 first = begin + glm::i64vec3(n * kTile, 0, 0);
+      run(intersection(row, {first, first + kTile}));
+    });
+  };
+  std::atomic<std::int64_t> next = 0;
   arena.execute([&] {
-    tbb::parallel_for(std::int64_t{0}, tiles.y * tiles.z, [&](std::int64_t number) {
-      const glm::i64vec3 begin = region.begin + glm::i64vec3(0, number % tiles.y, number / tiles.y) * kTile;
-      const Region row = intersection(region, {begin, begin + glm::i64vec3(tiles.x, 1, 1) * kTile});
-      if (at_once(row)) return run(row);
-      tbb::parallel_for(std::int64_t{0}, tiles.x, [&](std::int64_t n) {
-        const glm::i64vec3 first = begin + glm::i64vec3(n * kTile, 0, 0);
-        run(intersection(row, {first, first + kTile}));
-      });
+    tbb::parallel_for(std::int64_t{0}, tiles.y * tiles.z, [&](std::int64_t) {
+      const std::int64_t number = next++;
+      run_row(region.begin + glm::i64vec3(0, number % tiles.y, number / tiles.y) * kTile);
+      layers.row_done(number / tiles.y);
     });
   });
   for (const Report& report : reports) total += report;

@@ -109,6 +109,60 @@ std::vector<V> cut_out(const Volume<V>& volume, const Region& part) {
   return voxels;
 }
 
+TEST_P(Regions, PartsAreToldWhenTheyAreDone) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE(seed_text(seed));
+  const Scene scene(seed);
+  const auto resampler = make(scene.grid);
+  resampler->set_field(view(scene.field));
+  Outcome<std::int16_t> expected = poisoned_outcome<std::int16_t>(scene.grid), found = expected;
+  for (const Region& region : {whole(scene.grid), Region{{3, 5, 2}, {61, 40, 36}}}) {
+    std::vector<SliceRange> expected_slices(37), slices(37);
+    const auto target_for = [&](Outcome<std::int16_t>& outcome, std::vector<SliceRange>& sampled) {
+      return Target{.source = view(scene.source),
+                    .output = view(outcome.output),
+                    .interpolation = kOptions.interpolation,
+                    .background = kOptions.background,
+                    .padding = kOptions.padding,
+                    .sampled_slices = sampled};
+    };
+    const Target full = target_for(expected, expected_slices), target = target_for(found, slices);
+    resampler->resample(region, {&full, 1}, maps_of(expected));
+    std::mutex mutex;
+    std::vector<int> told(37, 0);
+    const auto finished = [&](const Region& part) {
+      const std::scoped_lock lock(mutex);
+      EXPECT_EQ(glm::i64vec2(part.begin), glm::i64vec2(region.begin));
+      EXPECT_EQ(glm::i64vec2(part.end), glm::i64vec2(region.end));
+      EXPECT_TRUE(contains(region, part));
+      EXPECT_EQ(cut_out(found.output, part), cut_out(expected.output, part));
+      EXPECT_EQ(cut_out(found.coverage, part), cut_out(expected.coverage, part));
+      for (std::int64_t k = part.begin.z; k < part.end.z; ++k) {
+        const auto n = static_cast<std::size_t>(k);
+        ++told[n];
+        EXPECT_EQ(slices[n].first, expected_slices[n].first) << "slice " << k;
+        EXPECT_EQ(slices[n].last, expected_slices[n].last) << "slice " << k;
+      }
+    };
+    resampler->resample(region, {&target, 1}, maps_of(found), {.finished = finished});
+    for (std::int64_t k = 0; k < 37; ++k) {
+      EXPECT_EQ(told[static_cast<std::size_t>(k)], k >= region.begin.z && k < region.end.z) << "slice " << k;
+    }
+  }
+}
+
+TEST_P(Regions, WhatTheListenerThrowsEndsTheCall) {
+  const Scene scene(5);
+  const auto resampler = make(scene.grid);
+  resampler->set_field(view(scene.field));
+  const auto expected = run(*resampler, scene.source, kOptions);
+  Outcome<std::int16_t> outcome = poisoned_outcome<std::int16_t>(scene.grid);
+  const Target target{.source = view(scene.source), .output = view(outcome.output)};
+  const auto fail = [](const Region&) { throw Error("the disk is full"); };
+  EXPECT_THROW(resampler->resample(whole(scene.grid), {&target, 1}, {}, {.finished = fail}), Error);
+  expect_same_outcome(expected, run(*resampler, scene.source, kOptions));
+}
+
 /// Resamples one region with views that hold no more than they must.
 template <class V>
 std::vector<V> run_tight(Resampler& resampler, const Volume<V>& source, const Region& region, const Options& options) {

@@ -43,6 +43,7 @@ struct DerivedSource {
   Volume<std::int16_t> volume;
   DicomHeaders headers;
   DicomDerivation derivation;
+  std::vector<SliceRange> sampled;
 
   explicit DerivedSource(std::int64_t slices = 3) {
     volume.geometry = {{8, 6, slices}, {0.75, 0.5, 2.5}, {-10.5, 20.25, -7}, glm::dmat3(1)};
@@ -53,7 +54,7 @@ struct DerivedSource {
     derivation.field_sha256 = std::string(64, 'a');
     derivation.parameters = "interpolation=linear outside=refuse";
     derivation.description = "Deformed by a vertex field";
-    for (std::int64_t k = 0; k < slices; ++k) derivation.sampled_slices.push_back({k, std::min(k + 1, slices - 1)});
+    for (std::int64_t k = 0; k < slices; ++k) sampled.push_back({k, std::min(k + 1, slices - 1)});
   }
 
   DcmDataset& operator[](std::size_t k) { return *headers.slices[k]; }
@@ -66,7 +67,7 @@ struct DerivedSource {
 
   DicomWriteReport write(const std::filesystem::path& folder, int threads = 0) const {
     std::filesystem::create_directories(folder);
-    return write_derived_series(folder, view(volume), headers, derivation, threads);
+    return write_derived_series(folder, view(volume), headers, derivation, sampled, threads);
   }
 
  private:

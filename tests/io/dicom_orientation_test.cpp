@@ -55,8 +55,8 @@ TEST(DicomOrientation, GeometrySurvivesTheSeriesInAll24OrientationsOfAStack) {
     derivation.field_sha256 = std::string(64, '0');
     derivation.parameters = "interpolation=linear";
     derivation.description = "Deformed";
-    derivation.sampled_slices.resize(static_cast<std::size_t>(grid.size.z), {0, grid.size.z - 1});
-    write_derived_series(scratch / "derived", view(source.volume), *source.headers, derivation);
+    const std::vector<SliceRange> sampled(static_cast<std::size_t>(grid.size.z), {0, grid.size.z - 1});
+    write_derived_series(scratch / "derived", view(source.volume), *source.headers, derivation, sampled);
     const DicomVolume derived = load_dicom(scan_dicom(scratch / "derived").series.at(0));
     EXPECT_TRUE(same_grid(derived.volume.geometry, grid, 1e-4));
     EXPECT_TRUE(derived.volume.voxels == source.volume.voxels);

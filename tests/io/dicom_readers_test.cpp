@@ -111,11 +111,11 @@ class DerivedFromReal : public testing::TestWithParam<const char*> {
     source_ = load_dicom(series_);
     DicomDerivation derivation{.field_sha256 = std::string(64, 'a'),
                                .parameters = "interpolation=linear outside=refuse",
-                               .description = "Deformed by a vertex field",
-                               .sampled_slices = {}};
-    for (std::int64_t k = 0; k < std::ssize(series_.slices); ++k) derivation.sampled_slices.push_back({k, k});
+                               .description = "Deformed by a vertex field"};
+    std::vector<SliceRange> sampled;
+    for (std::int64_t k = 0; k < std::ssize(series_.slices); ++k) sampled.push_back({k, k});
     fs::create_directory(output_);
-    write_derived_series(output_, view(source_.volume), *source_.headers, derivation);
+    write_derived_series(output_, view(source_.volume), *source_.headers, derivation, sampled);
   }
 
   const Scratch scratch_;

@@ -317,7 +317,7 @@ TEST(DerivedSeries, LeavesOutReferencesToImagesWithoutUid) {
   DerivedSource source;
   set(source[1], DCM_SOPInstanceUID, "");
   set(source[0], DCM_SOPInstanceUID, "no uid");
-  source.derivation.sampled_slices[2] = {};
+  source.sampled[2] = {};
   source.write(scratch.path());
   EXPECT_FALSE(Written(scratch / kNames[0]).data().tagExists(DCM_SourceImageSequence));
   EXPECT_EQ(items_of(Written(scratch / kNames[1]).data(), DCM_SourceImageSequence), 1U);
@@ -350,8 +350,8 @@ TEST(DerivedSeries, RefusesWhatCannotBeWritten) {
     EXPECT_THROW(source.write(scratch.path()), InputError);
   };
   refused([](DerivedSource& source) { source.headers.slices.pop_back(); });
-  refused([](DerivedSource& source) { source.derivation.sampled_slices.pop_back(); });
-  refused([](DerivedSource& source) { source.derivation.sampled_slices[0] = {0, 3}; });
+  refused([](DerivedSource& source) { source.sampled.pop_back(); });
+  refused([](DerivedSource& source) { source.sampled[0] = {0, 3}; });
   refused([](DerivedSource& source) { source.volume.geometry.spacing.x = 0; });
   const DerivedSource source;
   Volume<float> floats{source.volume.geometry, std::vector<float>(source.volume.voxels.size())};
@@ -386,7 +386,7 @@ TEST(DerivedSeries, StopsWhenAsked) {
   const DerivedSource source;
   std::stop_source stop;
   stop.request_stop();
-  EXPECT_THROW(write_derived_series(scratch.path(), view(source.volume), source.headers, source.derivation, 0,
+  EXPECT_THROW(write_derived_series(scratch.path(), view(source.volume), source.headers, source.derivation, {}, 0,
                                     {.stop = stop.get_token()}),
                Cancelled);
 }

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <vector>
+
 using tetwarp::Sha256;
 using tetwarp::uid_from_digest;
 
@@ -38,6 +41,19 @@ TEST(Sha256, GoesOnAfterADigestWasAskedFor) {
   hash.add(bytes("ab"));
   EXPECT_EQ(hash.hex(), hash.hex());
   EXPECT_EQ(hash.add(bytes("c")).hex(), Sha256().add(bytes("abc")).hex());
+}
+
+TEST(Sha256, BlocksAreHashedByThemselvesWhateverTheThreads) {
+  constexpr std::size_t kBlock = std::size_t{1} << 20;
+  std::vector<std::byte> data(2 * kBlock + 17);
+  for (std::size_t n = 0; n < data.size(); ++n) data[n] = static_cast<std::byte>(n * 2654435761U >> 13);
+  Sha256 expected;
+  for (std::size_t begin = 0; begin < data.size(); begin += kBlock) {
+    const std::span<const std::byte> block = std::span(data).subspan(begin, std::min(kBlock, data.size() - begin));
+    expected.add(Sha256().add(block).digest());
+  }
+  for (const int threads : {1, 2, 0}) EXPECT_EQ(Sha256().add_blocks(data, threads).hex(), expected.hex());
+  EXPECT_EQ(Sha256().add_blocks({}).hex(), Sha256().hex());
 }
 
 TEST(Sha256, CanBeMoved) {
