@@ -126,7 +126,17 @@ void add_deform(CLI::App& app, DeformOptions& options) {
       ->type_name("SIZE");
   command->add_option("--compress", options.compression, "Level 0 to 9 for .nii.gz (default 1) .nrrd .mha (default 0)")
       ->check(CLI::Range(0, 9));
-  command->add_option("--coverage", options.coverage, "Mask of the voxels that got a value through the field")
+  command->add_option("--coverage", options.maps.coverage, "Mask of the voxels that got a value through the field")
+      ->type_name("FILE");
+  command
+      ->add_option("--inverse", options.maps.inverse,
+                   "Inverse displacement, LPS mm, for ITK's and other warps; NaN where nothing maps")
+      ->type_name("FILE");
+  command
+      ->add_option("--jacobian", options.maps.jacobian,
+                   "Jacobian determinant of the forward map, negative where it folds; NaN where nothing maps")
+      ->type_name("FILE");
+  command->add_option("--folds", options.maps.folds, "How many tetrahedra own each voxel: more than 1 is a fold")
       ->type_name("FILE");
   command->add_option("--report", options.report, "What happened, with times, as JSON")->type_name("FILE.json");
   command->add_option("--preview", options.preview, "Three slices before, after and their difference")

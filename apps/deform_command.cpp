@@ -8,6 +8,7 @@
 #include "apps/backend.h"
 #include "apps/field_source.h"
 #include "apps/input.h"
+#include "apps/map_outputs.h"
 #include "apps/output.h"
 #include "cuda/devices.h"
 #include "deform/fields/formula.h"
@@ -51,7 +52,8 @@ bool fits(VoxelType type, double value) {
 struct Outputs {
   bool series = false;
   OutputSet set;
-  std::filesystem::path volume, sidecar, coverage, report, preview;
+  std::optional<MapOutputs> maps;
+  std::filesystem::path volume, sidecar, report, preview;
 };
 
 /// The field of either direction, with what is said about it.
@@ -99,7 +101,7 @@ class Deformation {
   double background_ = 0;
   std::uint64_t planned_bytes_ = 0;
   std::vector<std::string> notes_, set_aside_;
-  AnyVolume output_, coverage_;
+  AnyVolume output_;
   std::vector<SliceRange> sampled_slices_;
   Report report_;
   std::optional<DerivedSeriesWriter> series_;
@@ -124,9 +126,6 @@ Outputs Deformation::begin_outputs() const {
     throw UsageError("a DICOM series can only be derived from DICOM, not from " + o.input.path.string() +
                      "; name the output .nii.gz, .nii, .nrrd or .mha");
   }
-  if (!o.coverage.empty() && !has_image_suffix(o.coverage)) {
-    throw UsageError("unknown suffix of --coverage \"" + o.coverage.string() + "\"; use .nii .nii.gz .nrrd .mha");
-  }
   if (o.compression && (series || o.output.extension() == ".nii")) {
     throw UsageError("--compress is for .nii.gz, .nrrd and .mha, not for " + o.output.string());
   }
@@ -140,7 +139,7 @@ Outputs Deformation::begin_outputs() const {
   Outputs outputs{series, OutputSet(inputs, o.common.overwrite), {}, {}, {}, {}, {}};
   outputs.volume = outputs.set.add(o.output, series ? StagedOutput::Kind::folder : StagedOutput::Kind::file);
   outputs.sidecar = outputs.set.add(sidecar_of(o.output));
-  outputs.coverage = outputs.set.add(o.coverage);
+  outputs.maps.emplace(o.maps, o.pull_field.empty() ? Direction::forward : Direction::pull, outputs.set);
   outputs.report = outputs.set.add(o.report);
   outputs.preview = outputs.set.add(o.preview);
   return outputs;
@@ -152,7 +151,7 @@ std::uint64_t Deformation::plan_bytes(const InputHeader& input) const {
                                    : read_field_header(options_.pull_field).grid.size;
   const auto voxels = static_cast<std::uint64_t>(voxel_count(input.geometry));
   const auto vertices = static_cast<std::uint64_t>(lattice.x * lattice.y * lattice.z);
-  return voxels * (2 * size_bytes(input.type) + (options_.coverage.empty() ? 0 : 1)) + vertices * sizeof(glm::vec3) +
+  return voxels * (2 * size_bytes(input.type) + outputs_.maps->bytes_a_voxel()) + vertices * sizeof(glm::vec3) +
          kOverheadBytes;
 }
 
@@ -222,11 +221,7 @@ void Deformation::resample() {
   }
   output_ = AnyVolume(grid, input_.volume.type());
   sampled_slices_.resize(outputs_.series ? static_cast<std::size_t>(grid.size.z) : 0);
-  Maps maps;
-  if (!outputs_.coverage.empty()) {
-    coverage_ = AnyVolume(grid, VoxelType::u8);
-    maps.coverage = coverage_.view();
-  }
+  const Maps maps = outputs_.maps->make(grid);
   const Target target{.source = std::as_const(input_.volume).view(),
                       .output = output_.view(),
                       .interpolation = options_.interpolation,
@@ -302,12 +297,14 @@ json Deformation::sidecar() const {
     document["output"]["frame_of_reference_uid"] = dicom_report_->frame_of_reference_uid;
     document["output"]["added_empty_attributes"] = dicom_report_->added_empty;
   }
+  if (const json maps = outputs_.maps->describe(); !maps.empty()) document["maps"] = maps;
   document["report"] = {{"covered", report_.covered},      {"uncovered", report_.uncovered},
                         {"clamped", report_.clamped},      {"padded", report_.padded},
                         {"conflicts", report_.conflicts},  {"inverted", report_.inverted},
                         {"degenerate", report_.degenerate}};
   if (field_.direction == Direction::forward)
     document["report"]["jacobian"] = {report_.jacobian_min, report_.jacobian_max};
+  if (report_.multiply_owned) document["report"]["multiply_owned"] = *report_.multiply_owned;
   return document;
 }
 
@@ -343,7 +340,7 @@ void Deformation::write() {
                 {.compression = options_.compression.value_or(-1),
                  .metadata = {{"descrip", std::string("tetwarp field ") + field_sha256_.substr(0, 16)}}});
   }
-  if (!outputs_.coverage.empty()) write_image(outputs_.coverage, std::as_const(coverage_).view());
+  outputs_.maps->write();
   if (!outputs_.preview.empty()) {
     write_preview(outputs_.preview, std::as_const(input_.volume).view(), std::as_const(output_).view(), title());
   }

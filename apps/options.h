@@ -52,6 +52,11 @@ struct FieldOptions {
   std::optional<std::int64_t> cell_size;
 };
 
+/// Where maps of the output go; an empty path: not wanted.
+struct MapOptions {
+  std::filesystem::path coverage, inverse, jacobian, folds;
+};
+
 struct DeformOptions {
   CommonOptions common;
   InputOptions input;
@@ -66,7 +71,8 @@ struct DeformOptions {
   std::optional<std::int64_t> cell_size;
   std::optional<int> compression;
   std::optional<std::uint64_t> memory_bytes;
-  std::filesystem::path coverage, report, preview;
+  MapOptions maps;
+  std::filesystem::path report, preview;
   bool dry_run = false;
 };
 

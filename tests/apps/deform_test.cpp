@@ -1,6 +1,7 @@
 // `tetwarp deform` on files: what comes out, and that it is the same whichever way the field goes in.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "deform/fields/formula.h"
@@ -74,6 +75,58 @@ TEST(Deform, ComposedFormulasActOneAfterTheOther) {
   expect_run(scratch, "deform in.mha -f translate:by=2/-1/2vox -o b.mha");
   EXPECT_TRUE(same_voxels(scratch / "a.mha", scratch / "b.mha"));
   EXPECT_FALSE(same_voxels(scratch / "a.mha", scratch / "in.mha"));
+}
+
+TEST(Deform, MapsSayWhereEachVoxelComesFromAndHowTheMapIsThere) {
+  const Scratch scratch;
+  make_phantom_file(scratch, "in.mha");
+  // A forward shift by (6, -3, 8) mm, then one along x that folds: x + 40 sin(2 pi x / 60).
+  expect_run(scratch,
+             "deform in.mha -f translate:by=6/-3/8 --outside background -o shifted.mha --coverage c.nii.gz --inverse "
+             "i.nii.gz --jacobian j.nrrd --folds f.mha");
+  const AnyVolume coverage = read_image(scratch / "c.nii.gz"), inverse = read_image(scratch / "i.nii.gz"),
+                  jacobian = read_image(scratch / "j.nrrd"), folds = read_image(scratch / "f.mha");
+  EXPECT_EQ(inverse.components(), 3);
+  std::size_t covered = 0;
+  for (std::size_t n = 0; n < coverage.as<std::uint8_t>().size(); ++n) {
+    const bool inside = coverage.as<std::uint8_t>()[n] != 0;
+    const float* by = inverse.as<float>().data() + 3 * n;
+    covered += inside;
+    EXPECT_EQ(folds.as<std::uint16_t>()[n], inside);
+    EXPECT_EQ(std::isnan(by[0]), !inside);
+    EXPECT_EQ(std::isnan(jacobian.as<float>()[n]), !inside);
+    if (!inside) continue;
+    EXPECT_EQ(jacobian.as<float>()[n], 1.0F);
+    EXPECT_EQ(glm::vec3(by[0], by[1], by[2]), glm::vec3(-6, 3, -8));
+  }
+  EXPECT_EQ(covered, 38U * 35U * 22U);
+  EXPECT_TRUE(read_field_header(scratch / "i.nii.gz").direction == FieldDirection::pull);
+
+  expect_run(
+      scratch,
+      "deform in.mha -f wave:amplitude=40,wavelength=60,along=x --outside background -o folded.mha --folds f.mha "
+      "--jacobian j.mha --overwrite");
+  const nlohmann::json sidecar = nlohmann::json::parse(read_text(scratch / "folded.mha.json"));
+  const AnyVolume owners = read_image(scratch / "f.mha"), determinants = read_image(scratch / "j.mha");
+  std::uint64_t several = 0, negative = 0;
+  for (const std::uint16_t count : owners.as<std::uint16_t>()) several += count > 1;
+  for (const float determinant : determinants.as<float>()) negative += determinant < 0;
+  EXPECT_GT(several, 0U);
+  EXPECT_GT(negative, 0U);
+  EXPECT_EQ(sidecar["report"]["multiply_owned"], several);
+  EXPECT_EQ(sidecar["maps"]["folds"], "f.mha");
+}
+
+TEST(Deform, MapsOfTetrahedraAreRefusedForAPullField) {
+  const Scratch scratch;
+  make_phantom_file(scratch, "in.mha");
+  for (const std::string map : {"--jacobian", "--folds"}) {
+    const Outcome run = run_tetwarp(scratch.path(), "deform in.mha --pull-field in.mha -o out.mha " + map + " m.mha");
+    EXPECT_EQ(run.status, 2);
+    EXPECT_NE(run.err.find(map), std::string::npos) << run.err;
+    EXPECT_FALSE(std::filesystem::exists(scratch / "m.mha"));
+  }
+  EXPECT_EQ(run_tetwarp(scratch.path(), "deform in.mha -f identity -o out.mha --inverse i.txt").status, 2);
 }
 
 TEST(Deform, APullFieldIsNeverTakenForAForwardOne) {
