@@ -119,6 +119,18 @@ void add_deform(CLI::App& app, DeformOptions& options) {
   command->add_option("--cell-size", options.cell_size, "Vertices every B voxels, for formulas only (default 1)")
       ->type_name("B");
   command
+      ->add_option("--grid", options.grid,
+                   "Output grid: INPUT's (same), INPUT's grown to hold the deformed lattice (fit), or that of a volume")
+      ->type_name("same|fit|FILE")
+      ->capture_default_str();
+  command
+      ->add_option(
+          "--with", options.with,
+          "Another volume through the same field, from its own grid onto the output grid, or back onto its own; "
+          "may be repeated")
+      ->allow_extra_args(false)
+      ->type_name("IN=OUT[:nearest|linear|cubic][:background=V][:own]");
+  command
       ->add_option("--memory", options.memory_bytes,
                    "8G, 500M. On the CPU: refuse to start if more is needed. On a CUDA device: volumes and field there "
                    "take no more, what does not fit is streamed in slabs; 10 % or 128 MB of working space come on top")

@@ -7,9 +7,11 @@
 
 #include "apps/backend.h"
 #include "apps/field_source.h"
+#include "apps/further_volumes.h"
 #include "apps/input.h"
 #include "apps/map_outputs.h"
 #include "apps/output.h"
+#include "apps/output_grid.h"
 #include "cuda/devices.h"
 #include "deform/fields/formula.h"
 #include "io/field_file.h"
@@ -25,27 +27,8 @@ using nlohmann::json;
 /// Program, libraries and what a pass keeps per thread, beside volumes and field.
 constexpr std::uint64_t kOverheadBytes = 200'000'000;
 
-const char* name_of(Interpolation interpolation) {
-  constexpr const char* kNames[] = {"nearest", "linear", "cubic"};
-  return kNames[static_cast<int>(interpolation)];
-}
-
-const char* name_of(Outside outside) {
-  constexpr const char* kNames[] = {"refuse", "rest", "background"};
-  return kNames[static_cast<int>(outside)];
-}
-
 std::filesystem::path folder_of(const std::filesystem::path& file) {
   return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
-}
-
-/// Whether a value can be stored as a voxel of this type, rounded.
-bool fits(VoxelType type, double value) {
-  return dispatch(type, [&](auto voxel) {
-    using V = decltype(voxel);
-    return value >= static_cast<double>(std::numeric_limits<V>::lowest()) &&
-           value <= static_cast<double>(std::numeric_limits<V>::max());
-  });
 }
 
 /// Where the results go while they are made.
@@ -53,6 +36,7 @@ struct Outputs {
   bool series = false;
   OutputSet set;
   std::optional<MapOutputs> maps;
+  std::optional<FurtherVolumes> further;
   std::filesystem::path volume, sidecar, report, preview;
 };
 
@@ -78,13 +62,16 @@ class Deformation {
 
  private:
   Outputs begin_outputs() const;
-  std::uint64_t plan_bytes(const InputHeader& input) const;
+  std::uint64_t plan_bytes(const InputHeader& input);
   void check_input(const InputHeader& input);
-  void print_plan(const Geometry& volume) const;
+  void print_plan() const;
   void read();
   void read_field();
   void resample();
+  void set_field(Resampler& resampler, Outside outside) const;
+  void resample_onto_own_grids();
   void write();
+  void write_preview_picture();
   void begin_series();
   void write_slices(const Region& slices);
   json canonical_options() const;
@@ -97,6 +84,7 @@ class Deformation {
   Outputs outputs_;
   InputVolume input_;
   AnyField field_;
+  Geometry grid_;  ///< of the output
   std::string input_sha256_, field_sha256_, backend_;
   double background_ = 0;
   std::uint64_t planned_bytes_ = 0;
@@ -116,7 +104,10 @@ Outputs Deformation::begin_outputs() const {
   } else if (o.cell_size) {
     throw UsageError("--cell-size is for formulas, --pull-field has its own grid");
   }
-  std::vector<std::filesystem::path> inputs{o.input.path};
+  check_grid(o.grid, !o.pull_field.empty());
+  std::vector<std::filesystem::path> inputs = FurtherVolumes::inputs(o.with);
+  inputs.push_back(o.input.path);
+  if (!is_same_grid(o.grid) && o.grid != "fit") inputs.emplace_back(o.grid);
   for (const std::string& text : o.fields) {
     if (std::filesystem::exists(text)) inputs.emplace_back(text);
   }
@@ -124,6 +115,10 @@ Outputs Deformation::begin_outputs() const {
   const bool series = is_series_output(o.output);
   if (series && has_image_suffix(o.input.path)) {
     throw UsageError("a DICOM series can only be derived from DICOM, not from " + o.input.path.string() +
+                     "; name the output .nii.gz, .nii, .nrrd or .mha");
+  }
+  if (series && !is_same_grid(o.grid)) {
+    throw UsageError("a DICOM series has the grid of the series it is derived from, not that of --grid " + o.grid +
                      "; name the output .nii.gz, .nii, .nrrd or .mha");
   }
   if (o.compression && (series || o.output.extension() == ".nii")) {
@@ -136,23 +131,27 @@ Outputs Deformation::begin_outputs() const {
   // The series of a single file is read from its folder, so a derived series must not land there.
   if (series && !o.input.single && !std::filesystem::is_directory(o.input.path))
     inputs.push_back(folder_of(o.input.path));
-  Outputs outputs{series, OutputSet(inputs, o.common.overwrite), {}, {}, {}, {}, {}};
+  Outputs outputs{series, OutputSet(inputs, o.common.overwrite), {}, {}, {}, {}, {}, {}};
   outputs.volume = outputs.set.add(o.output, series ? StagedOutput::Kind::folder : StagedOutput::Kind::file);
   outputs.sidecar = outputs.set.add(sidecar_of(o.output));
   outputs.maps.emplace(o.maps, o.pull_field.empty() ? Direction::forward : Direction::pull, outputs.set);
+  outputs.further.emplace(o.with, outputs.set);
   outputs.report = outputs.set.add(o.report);
   outputs.preview = outputs.set.add(o.preview);
   return outputs;
 }
 
-std::uint64_t Deformation::plan_bytes(const InputHeader& input) const {
+/// As far as the headers tell: --grid fit is taken for the input's grid.
+std::uint64_t Deformation::plan_bytes(const InputHeader& input) {
   const glm::i64vec3 lattice = options_.pull_field.empty()
                                    ? lattice_size(options_.fields, input.geometry, options_.cell_size)
                                    : read_field_header(options_.pull_field).grid.size;
-  const auto voxels = static_cast<std::uint64_t>(voxel_count(input.geometry));
+  if (options_.grid != "fit") grid_ = output_grid(options_.grid, input.geometry, {}, options_.outside);
+  const auto voxels = static_cast<std::uint64_t>(voxel_count(input.geometry)),
+             output_voxels = options_.grid == "fit" ? voxels : static_cast<std::uint64_t>(voxel_count(grid_));
   const auto vertices = static_cast<std::uint64_t>(lattice.x * lattice.y * lattice.z);
-  return voxels * (2 * size_bytes(input.type) + outputs_.maps->bytes_a_voxel()) + vertices * sizeof(glm::vec3) +
-         kOverheadBytes;
+  return voxels * size_bytes(input.type) + output_voxels * (size_bytes(input.type) + outputs_.maps->bytes_a_voxel()) +
+         outputs_.further->bytes(output_voxels) + vertices * sizeof(glm::vec3) + kOverheadBytes;
 }
 
 void Deformation::check_input(const InputHeader& input) {
@@ -172,10 +171,12 @@ void Deformation::check_input(const InputHeader& input) {
   if (input.series) set_aside_ = input.series->set_aside;
 }
 
-void Deformation::print_plan(const Geometry& volume) const {
-  say(options_.common, "would write " + options_.output.string() + ": " + to_string(volume.size) + " voxels as " +
-                           (outputs_.series ? "a DICOM series" : "a file") + "; about " + format_bytes(planned_bytes_) +
-                           " of memory");
+void Deformation::print_plan() const {
+  const bool fit = options_.grid == "fit";
+  say(options_.common, "would write " + options_.output.string() + ": " +
+                           (fit ? "as many voxels as the deformed lattice needs" : to_string(grid_.size) + " voxels") +
+                           " as " + (outputs_.series ? "a DICOM series" : "a file") + "; about " +
+                           format_bytes(planned_bytes_) + " of memory");
 }
 
 void Deformation::read() {
@@ -185,6 +186,7 @@ void Deformation::read() {
   if (header.series) notes_ = header.series->warnings;
   input_ = read_input(options_.input, header, options_.common, stage.control());
   background_ = options_.background.value_or(input_.background);
+  outputs_.further->read(options_.common, {.stop = interrupt_token()});
   stages_.emplace_back("read", stage.seconds());
 }
 
@@ -201,6 +203,7 @@ void Deformation::read_field() {
     }
     field_.pull = read_pull_field(options_.pull_field);
   }
+  if (options_.grid == "fit") grid_ = output_grid("fit", grid, field_.forward.field, options_.outside);
   stages_.emplace_back("field", stage.seconds());
 }
 
@@ -210,38 +213,57 @@ void Deformation::resample() {
       std::launch::async, [&] { return input_.is_dicom() ? input_.dicom->sha256 : hash_file(options_.input.path); });
   field_sha256_ = hash_field(field_.lattice(), field_.displacement(),
                              field_.direction == Direction::pull ? "pull" : "forward", options_.common.threads);
-  const Geometry& grid = input_.volume.geometry();
   const Limits limits{.threads = options_.common.threads, .memory = options_.memory_bytes.value_or(0)};
-  Backend backend = make_backend(options_.backend, field_.direction, grid, options_.device, limits);
+  Backend backend = make_backend(options_.backend, field_.direction, grid_, options_.device, limits);
   backend_ = backend.name;
-  if (field_.direction == Direction::pull) {
-    backend.resampler->set_field(view(field_.pull, options_.outside), {.stop = interrupt_token()});
-  } else {
-    backend.resampler->set_field(view(field_.forward.field, options_.outside), {.stop = interrupt_token()});
-  }
-  output_ = AnyVolume(grid, input_.volume.type());
-  sampled_slices_.resize(outputs_.series ? static_cast<std::size_t>(grid.size.z) : 0);
-  const Maps maps = outputs_.maps->make(grid);
-  const Target target{.source = std::as_const(input_.volume).view(),
-                      .output = output_.view(),
-                      .interpolation = options_.interpolation,
-                      .background = background_,
-                      .padding = input_.is_dicom() ? input_.dicom->padding : std::nullopt,
-                      .sampled_slices = sampled_slices_};
+  // What --grid fit adds lies beyond the lattice; that this reaches over INPUT is known.
+  const bool grown = options_.grid == "fit" && options_.outside == Outside::refuse;
+  set_field(*backend.resampler, grown ? Outside::background : options_.outside);
+  output_ = AnyVolume(grid_, input_.volume.type());
+  sampled_slices_.resize(outputs_.series ? static_cast<std::size_t>(grid_.size.z) : 0);
+  const Maps maps = outputs_.maps->make(grid_);
+  std::vector<Target> targets = outputs_.further->targets_on(grid_, false, options_.interpolation);
+  targets.insert(targets.begin(), Target{.source = std::as_const(input_.volume).view(),
+                                         .output = output_.view(),
+                                         .interpolation = options_.interpolation,
+                                         .background = background_,
+                                         .padding = input_.is_dicom() ? input_.dicom->padding : std::nullopt,
+                                         .sampled_slices = sampled_slices_});
   Control control = stage.control();
   if (outputs_.series) {
     begin_series();
     control.finished = [&](const Region& slices) { outputs_.set.write([&] { write_slices(slices); }); };
   }
-  report_ = backend.resampler->resample(whole(grid), {&target, 1}, maps, control);
+  report_ = backend.resampler->resample(whole(grid_), targets, maps, control);
+  resample_onto_own_grids();
   input_sha256_ = input_hash.get();
   stages_.emplace_back("resample", stage.seconds());
+}
+
+void Deformation::set_field(Resampler& resampler, Outside outside) const {
+  const Control control{.stop = interrupt_token()};
+  if (field_.direction == Direction::pull) {
+    resampler.set_field(view(field_.pull, outside), control);
+  } else {
+    resampler.set_field(view(field_.forward.field, outside), control);
+  }
+}
+
+void Deformation::resample_onto_own_grids() {
+  const Limits limits{.threads = options_.common.threads, .memory = options_.memory_bytes.value_or(0)};
+  for (const Geometry& grid : outputs_.further->own_grids()) {
+    const Backend backend = make_backend(options_.backend, field_.direction, grid, options_.device, limits);
+    set_field(*backend.resampler, options_.outside);
+    const std::vector<Target> targets = outputs_.further->targets_on(grid, true, options_.interpolation);
+    backend.resampler->resample(whole(grid), targets, {}, {.stop = interrupt_token()});
+  }
 }
 
 json Deformation::canonical_options() const {
   json options = {{"interpolation", name_of(options_.interpolation)},
                   {"outside", name_of(options_.outside)},
                   {"background", background_}};
+  if (!is_same_grid(options_.grid)) options["grid"] = options_.grid;
   if (field_.direction == Direction::pull) {
     options["pull_field"] = options_.pull_field.string();
   } else {
@@ -297,6 +319,7 @@ json Deformation::sidecar() const {
     document["output"]["frame_of_reference_uid"] = dicom_report_->frame_of_reference_uid;
     document["output"]["added_empty_attributes"] = dicom_report_->added_empty;
   }
+  if (const json further = outputs_.further->describe(); !further.empty()) document["with"] = further;
   if (const json maps = outputs_.maps->describe(); !maps.empty()) document["maps"] = maps;
   document["report"] = {{"covered", report_.covered},      {"uncovered", report_.uncovered},
                         {"clamped", report_.clamped},      {"padded", report_.padded},
@@ -341,13 +364,28 @@ void Deformation::write() {
                  .metadata = {{"descrip", std::string("tetwarp field ") + field_sha256_.substr(0, 16)}}});
   }
   outputs_.maps->write();
-  if (!outputs_.preview.empty()) {
-    write_preview(outputs_.preview, std::as_const(input_.volume).view(), std::as_const(output_).view(), title());
-  }
+  if (!outputs_.preview.empty()) write_preview_picture();
+  outputs_.further->write(options_.compression, "tetwarp field " + field_sha256_.substr(0, 16));
   write_json(outputs_.sidecar, sidecar());
   stages_.emplace_back("write", std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   if (!outputs_.report.empty()) write_json(outputs_.report, report_with_times());
   outputs_.set.commit();
+}
+
+/// Beside an output on another grid stands INPUT as it lies there.
+void Deformation::write_preview_picture() {
+  const ConstVolumeView before = std::as_const(input_.volume).view(), after = std::as_const(output_).view();
+  if (*before.geometry == grid_) return write_preview(outputs_.preview, before, after, title());
+  AnyVolume on_grid(grid_, input_.volume.type());
+  Geometry corners = grid_;  // a pull field of zeros
+  corners.size = glm::i64vec3(2);
+  corners.spacing = grid_.spacing * glm::dvec3(grid_.size - std::int64_t{1});
+  const PullField none{corners, std::vector<glm::vec3>(8, glm::vec3(0))};
+  const auto resampler = make_cpu_pull_resampler(grid_, {.threads = options_.common.threads});
+  resampler->set_field(view(none, Outside::background));
+  const Target target{.source = before, .output = on_grid.view(), .background = background_};
+  resampler->resample(whole(grid_), {&target, 1});
+  write_preview(outputs_.preview, std::as_const(on_grid).view(), after, title());
 }
 
 /// What the preview says above the pictures: the fields by name, files without their folders.
@@ -382,7 +420,7 @@ int Deformation::run() {
   if (options_.dry_run) {
     const InputHeader header = open_input(options_.input, {.stop = interrupt_token()});
     check_input(header);
-    print_plan(header.geometry);
+    print_plan();
     return 0;
   }
   const auto awake = std::async(std::launch::async, [&] {  // beside reading

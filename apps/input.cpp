@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 #include <fstream>
+#include <limits>
 
 #include "io/hash.h"
 #include "io/image_file.h"
@@ -116,6 +117,14 @@ InputVolume read_input(const InputOptions& options, const InputHeader& header, c
   input.background = input.dicom->padding ? input.dicom->padding->low : kAirHu;
   input.volume = AnyVolume(std::move(input.dicom->volume));
   return input;
+}
+
+bool fits(VoxelType type, double value) {
+  return dispatch(type, [&](auto voxel) {
+    using V = decltype(voxel);
+    return value >= static_cast<double>(std::numeric_limits<V>::lowest()) &&
+           value <= static_cast<double>(std::numeric_limits<V>::max());
+  });
 }
 
 std::string hash_file(const std::filesystem::path& path) {

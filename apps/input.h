@@ -37,6 +37,9 @@ InputVolume read_input(const InputOptions& options, const InputHeader& header, c
 /// One line a series: number, UID, modality, size, spacing, what is wrong.
 std::string describe(const DicomSeries& series, std::size_t number);
 
+/// Whether a value can be stored as a voxel of this type, rounded.
+bool fits(VoxelType type, double value);
+
 /// SHA-256 of a file's bytes, hexadecimal. @throws InputError when it cannot be read
 std::string hash_file(const std::filesystem::path& path);
 

@@ -57,6 +57,11 @@ struct MapOptions {
   std::filesystem::path coverage, inverse, jacobian, folds;
 };
 
+/// Words of the command line and of sidecars.
+const char* name_of(Outside outside);
+const char* name_of(Interpolation interpolation);
+std::optional<Interpolation> interpolation_named(std::string_view name);
+
 struct DeformOptions {
   CommonOptions common;
   InputOptions input;
@@ -71,6 +76,8 @@ struct DeformOptions {
   std::optional<std::int64_t> cell_size;
   std::optional<int> compression;
   std::optional<std::uint64_t> memory_bytes;
+  std::string grid = "same";      ///< same, fit, or a file or folder
+  std::vector<std::string> with;  ///< IN=OUT...
   MapOptions maps;
   std::filesystem::path report, preview;
   bool dry_run = false;

@@ -44,7 +44,7 @@ LatticeFrame make_lattice_frame(const Geometry& output, const FieldView& field) 
       const double slack = kReachTolerance / glm::length(frame.output_from_lattice.linear[axis]);
       require(vertex[axis] >= -slack && vertex[axis] <= static_cast<double>(frame.cells[axis]) + slack,
               "the field's lattice of " + to_string(lattice.size) +
-                  " vertices does not reach over the whole output grid: a corner of the output lies at vertex index " +
+                  " vertices does not reach over the whole grid of the volume: a corner of it lies at vertex index " +
                   std::to_string(vertex[axis]) + " of axis " + std::to_string(axis) + ", expected 0 to " +
                   std::to_string(frame.cells[axis]) + "; choose rest or background for what lies outside it");
     }
@@ -97,7 +97,7 @@ PullFrame make_pull_frame(const Geometry& output, const PullFieldView& field) {
     glm::dvec3 index = found;
     require(frame.clamp_to_samples(index),
             "the pull field's grid of " + to_string(frame.size) +
-                " samples does not reach over the whole output grid: a corner of the output lies at (" +
+                " samples does not reach over the whole grid of the volume: a corner of it lies at (" +
                 std::to_string(found.x) + ", " + std::to_string(found.y) + ", " + std::to_string(found.z) +
                 ") of it; choose rest or background for what lies outside it");
   }

@@ -70,6 +70,13 @@ TEST(Program, WrongCommandLinesExitWithTwoAndWriteNothing) {
                 {"deform in.nii -f identity -o out.nii --background 40000", "40000"},
                 {"deform in.nii -f identity -o out.nii --preview look.jpg", "look.jpg"},
                 {"deform in.nii -f identity -o out.nii --series 1", "--series"},
+                {"deform in.nii -f identity -o out.nii --grid nothing", "nothing"},
+                {"deform in.nii --pull-field in.nii -o out.nii --grid fit", "--grid"},
+                {"deform in.nii -f identity -o out.nii --with in.nii", "in.nii"},
+                {"deform in.nii -f identity -o out.nii --with in.nii=with", "with"},
+                {"deform in.nii -f identity -o out.nii --with in.nii=out.nii", "out.nii"},
+                {"deform in.nii -f identity -o out.nii --with in.nii=b.nii:quintic", "quintic"},
+                {"deform in.nii -f identity -o out.nii --with in.nii=b.nii:background=40000", "40000"},
                 {"phantom -o out.nii --size 1,20,16", "--size"},
                 {"phantom -o out.nii --spacing 0,1,1", "--spacing"},
                 {"field identity --like in.nii -o out.txt", "out.txt"}};

@@ -1,0 +1,37 @@
+#include <algorithm>
+#include <iterator>
+
+#include "apps/options.h"
+
+namespace tetwarp::apps {
+
+namespace {
+
+struct Named {
+  const char* name;
+  Interpolation interpolation;
+};
+constexpr Named kInterpolations[] = {
+    {"nearest", Interpolation::nearest}, {"linear", Interpolation::linear}, {"cubic", Interpolation::cubic}};
+
+}  // namespace
+
+const char* name_of(Outside outside) {
+  constexpr const char* kNames[] = {"refuse", "rest", "background"};
+  return kNames[static_cast<int>(outside)];
+}
+
+const char* name_of(Interpolation interpolation) {
+  return std::find_if(std::begin(kInterpolations), std::end(kInterpolations),
+                      [&](const Named& named) { return named.interpolation == interpolation; })
+      ->name;
+}
+
+std::optional<Interpolation> interpolation_named(std::string_view name) {
+  for (const Named& named : kInterpolations) {
+    if (named.name == name) return named.interpolation;
+  }
+  return {};
+}
+
+}  // namespace tetwarp::apps

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <string>
+
+#include "apps/options.h"
+#include "deform/vertex_field.h"
+
+namespace tetwarp::apps {
+
+/// Checks a --grid as far as that is possible before anything is read. @throws UsageError
+void check_grid(const std::string& wanted, bool pull);
+
+/// Whether the output has the input's grid.
+bool is_same_grid(const std::string& wanted);
+
+/// The output grid that --grid asks for.
+///
+/// @param wanted  "same": the volume's; "fit": grown by whole voxels to hold every vertex where `field` moves it;
+///                else a volume file or DICOM folder, of which it is the grid
+/// @param field   not used but for "fit"
+/// @throws InputError for a file that is no volume, or a lattice that does not reach over the volume where `outside`
+///         refuses that
+Geometry output_grid(const std::string& wanted, const Geometry& volume, const VertexField& field, Outside outside);
+
+}  // namespace tetwarp::apps

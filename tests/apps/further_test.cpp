@@ -1,0 +1,119 @@
+// `tetwarp deform --with` and `--grid`: other volumes, and other grids of the output.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+#include <nlohmann/json.hpp>
+
+#include "io/image_file.h"
+#include "tests/support/program.h"
+#include "tests/support/scratch.h"
+
+namespace {
+
+using namespace tetwarp;
+
+void expect_run(const Scratch& scratch, const std::string& arguments) {
+  const Outcome run = run_tetwarp(scratch.path(), arguments);
+  ASSERT_EQ(run.status, 0) << arguments << "\n" << run.err;
+}
+
+std::vector<std::byte> voxels_of(const std::filesystem::path& path) {
+  const AnyVolume volume = read_image(path);
+  return {volume.data(), volume.data() + volume.size_bytes()};
+}
+
+/// Along axes of its own, its values those of a plane in space: exact between voxels too.
+void write_plane(const std::filesystem::path& path, const Geometry& grid) {
+  Volume<float> volume{grid, {}};
+  const AffineMap point = point_from_index(grid);
+  for (std::int64_t k = 0; k < grid.size.z; ++k) {
+    for (std::int64_t j = 0; j < grid.size.y; ++j) {
+      for (std::int64_t i = 0; i < grid.size.x; ++i) {
+        volume.voxels.push_back(static_cast<float>(glm::dot(point(glm::dvec3(i, j, k)), glm::dvec3(0.5, -1, 2)) + 300));
+      }
+    }
+  }
+  write_image(path, view(std::as_const(volume)));
+}
+
+Geometry turned_grid() {
+  const double c = 0.8, s = 0.6;
+  return {{11, 9, 7}, {2.5, 3.5, 4.5}, {-12, -8, -9}, glm::dmat3(c, s, 0, -s, c, 0, 0, 0, 1)};
+}
+
+TEST(Further, AVolumeComesOutAsItDoesAlone) {
+  const Scratch scratch;
+  expect_run(scratch, "phantom --size 40,36,24 --spacing 3,3,4 --quiet -o ct.mha");
+  expect_run(scratch, "phantom --size 22,19,17 --spacing 5,6,5 --seed 7 --quiet -o pet.nrrd");
+  const std::string field = " -f twist:angle=20 -f translate:by=2/3/1 --outside background ";
+  expect_run(scratch, "deform ct.mha" + field +
+                          "-o out.mha --with ct.mha=again.nii --with pet.nrrd=onto.mha:cubic:background=-500 --with "
+                          "pet.nrrd=back.nii.gz:own:nearest");
+  EXPECT_EQ(voxels_of(scratch / "out.mha"), voxels_of(scratch / "again.nii"));
+  // The lattice stays that of ct.mha.
+  expect_run(scratch, "field twist:angle=20 translate:by=2/3/1 --like ct.mha -o field.mha");
+  const std::string alone = " -f field.mha --outside background ";
+  expect_run(scratch, "deform pet.nrrd" + alone + "--grid ct.mha --interpolation cubic --background -500 -o a.mha");
+  expect_run(scratch, "deform pet.nrrd" + alone + "--interpolation nearest -o b.mha");
+  EXPECT_EQ(voxels_of(scratch / "onto.mha"), voxels_of(scratch / "a.mha"));
+  EXPECT_EQ(voxels_of(scratch / "back.nii.gz"), voxels_of(scratch / "b.mha"));
+  EXPECT_EQ(read_image_header(scratch / "onto.mha").geometry.size, glm::i64vec3(40, 36, 24));
+  EXPECT_TRUE(same_grid(read_image_header(scratch / "back.nii.gz").geometry,
+                        read_image_header(scratch / "pet.nrrd").geometry, 1e-4));
+
+  const nlohmann::json with = nlohmann::json::parse(read_text(scratch / "out.mha.json"))["with"];
+  ASSERT_EQ(with.size(), 3U);
+  EXPECT_EQ(with[1]["interpolation"], "cubic");
+  EXPECT_EQ(with[1]["background"], -500.0);
+  EXPECT_EQ(with[2]["grid"], "own");
+}
+
+TEST(Grid, AnyVolumeMayLendItsGrid) {
+  const Scratch scratch;
+  write_plane(scratch / "in.mha", {{40, 36, 24}, {3, 2.5, 4}, {-58, -44, -46}, glm::dmat3(1)});
+  write_plane(scratch / "turned.mha", turned_grid());
+  expect_run(scratch, "deform in.mha -f identity --grid turned.mha -o out.mha");
+  const AnyVolume expected = read_image(scratch / "turned.mha"), found = read_image(scratch / "out.mha");
+  EXPECT_TRUE(same_grid(found.geometry(), expected.geometry(), 1e-6));
+  for (std::size_t n = 0; n < expected.as<float>().size(); ++n) {
+    ASSERT_NEAR(found.as<float>()[n], expected.as<float>()[n], 2e-3) << n;
+  }
+  // Moved by (3, -4, 2) mm, the plane is lower by its slope times that.
+  expect_run(scratch, "deform in.mha -f translate:by=3/-4/2 --grid turned.mha -o moved.mha --preview look.png");
+  const AnyVolume moved = read_image(scratch / "moved.mha");
+  for (std::size_t n = 0; n < expected.as<float>().size(); ++n) {
+    ASSERT_NEAR(moved.as<float>()[n], expected.as<float>()[n] - 9.5, 5e-3) << n;
+  }
+  EXPECT_GT(std::filesystem::file_size(scratch / "look.png"), 1000U);
+  EXPECT_EQ(nlohmann::json::parse(read_text(scratch / "moved.mha.json"))["options"]["grid"], "turned.mha");
+}
+
+TEST(Grid, FitHoldsWhateverTheFieldMovesAway) {
+  const Scratch scratch;
+  expect_run(scratch, "phantom --size 20,18,12 --spacing 3,3,4 --quiet -o in.mha");
+  expect_run(scratch, "deform in.mha -f translate:by=-6/9/8 --grid fit -o out.mha");
+  const AnyVolume in = read_image(scratch / "in.mha"), out = read_image(scratch / "out.mha");
+  ASSERT_EQ(out.geometry().size, glm::i64vec3(22, 21, 14));
+  EXPECT_NEAR(glm::distance(out.geometry().origin, in.geometry().origin - glm::dvec3(6, 0, 0)), 0, 1e-4);
+  const auto source = in.as<std::int16_t>(), moved = out.as<std::int16_t>();
+  const std::int16_t background = *std::min_element(source.begin(), source.end());
+  for (std::size_t k = 0; k < 14; ++k) {
+    for (std::size_t j = 0; j < 21; ++j) {
+      for (std::size_t i = 0; i < 22; ++i) {
+        const bool inside = i < 20 && j >= 3 && k >= 2;
+        const std::int16_t expected = inside ? source[((k - 2) * 18 + j - 3) * 20 + i] : background;
+        ASSERT_EQ(moved[(k * 21 + j) * 22 + i], expected) << i << " " << j << " " << k;
+      }
+    }
+  }
+  expect_run(scratch, "deform in.mha -f identity --grid fit -o same.mha");
+  EXPECT_EQ(voxels_of(scratch / "in.mha"), voxels_of(scratch / "same.mha"));
+  expect_run(scratch, "field identity --like out.mha --cell-size 4 -o wide.mha");  // overhangs, so it grows
+  expect_run(scratch, "deform in.mha -f wide.mha --grid fit -o wide_out.mha");
+  EXPECT_EQ(read_image_header(scratch / "wide_out.mha").geometry.size, glm::i64vec3(25, 21, 17));
+  // A field that leaves out part of the volume is refused, whatever the grid.
+  EXPECT_EQ(run_tetwarp(scratch.path(), "deform out.mha -f in.mha --grid fit -o x.mha").status, 4);
+}
+
+}  // namespace
