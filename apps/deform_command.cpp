@@ -13,6 +13,7 @@
 #include "apps/output.h"
 #include "apps/output_grid.h"
 #include "cuda/devices.h"
+#include "deform/field_quality.h"
 #include "deform/fields/formula.h"
 #include "io/field_file.h"
 #include "io/image_file.h"
@@ -342,6 +343,12 @@ json Deformation::report_with_times() const {
   if (field_.direction == Direction::forward) {
     document["paths"] = {
         {"gathered", report_.paths.gathered}, {"walked", report_.paths.walked}, {"claimed", report_.paths.claimed}};
+    const FieldQuality quality =
+        measure_quality(field_.forward.field, {.threads = options_.common.threads}, {.stop = interrupt_token()});
+    document["quality"] = {{"verdict", verdict(report_, quality)},
+                           {"largest_stretch", quality.largest_stretch},
+                           {"jacobian_edges", FieldQuality::kEdges},
+                           {"jacobian_shares", quality.shares()}};
   }
   document["threads"] =
       options_.common.threads > 0 ? options_.common.threads : static_cast<int>(std::thread::hardware_concurrency());

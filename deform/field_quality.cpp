@@ -1,0 +1,166 @@
+#include "deform/field_quality.h"
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include "deform/core/five_tetrahedra.h"
+#include "deform/cpu/tiles.h"
+
+namespace tetwarp {
+
+namespace {
+
+using glm::dmat3;
+using glm::dvec3;
+
+/// Characteristic polynomial of a symmetric matrix without negative eigenvalues.
+struct Characteristic {
+  double trace, minors, determinant;
+
+  explicit Characteristic(const dmat3& m)
+      : trace(m[0][0] + m[1][1] + m[2][2]),
+        minors(m[0][0] * m[1][1] - m[0][1] * m[1][0] + m[0][0] * m[2][2] - m[0][2] * m[2][0] + m[1][1] * m[2][2] -
+               m[1][2] * m[2][1]),
+        determinant(glm::determinant(m)) {}
+
+  double value(double x) const { return ((x - trace) * x + minors) * x - determinant; }
+  double slope(double x) const { return (3 * x - 2 * trace) * x + minors; }
+  /// Whether no eigenvalue is above x (Budan).
+  bool is_below(double x) const { return value(x) >= 0 && slope(x) >= 0 && 3 * x >= trace; }
+  /// Newton's method from the trace, which is above. IEEE 754 fixes all it uses, so the same bits everywhere.
+  double largest_root() const {
+    double x = trace;
+    for (int step = 0; step < 60; ++step) {
+      const double over = value(x), by = slope(x);
+      if (!(over > 0) || !(by > 0) || !(x - over / by < x)) break;
+      x -= over / by;
+    }
+    return x;
+  }
+};
+
+/// Adds up gradients of one thread.
+class Tally {
+ public:
+  explicit Tally(const dmat3& from_lattice)
+      : inverse_(glm::inverse(from_lattice)), over_rest_(1 / glm::determinant(from_lattice)) {}
+
+  /// @param gradient  of the deformed place by vertex index
+  void add(const dmat3& gradient, std::uint64_t sixths) {
+    const double determinant = glm::determinant(gradient) * over_rest_;
+    const auto bin = std::upper_bound(FieldQuality::kEdges.begin(), FieldQuality::kEdges.end(), determinant) -
+                     FieldQuality::kEdges.begin();
+    sixths_[static_cast<std::size_t>(bin)] += sixths;
+    const dmat3 f = gradient * inverse_;
+    const Characteristic of(glm::transpose(f) * f);
+    if (!of.is_below(largest_)) largest_ = std::max(largest_, of.largest_root());
+  }
+  void add_at_rest(std::uint64_t sixths) {
+    constexpr auto kOne =
+        std::upper_bound(FieldQuality::kEdges.begin(), FieldQuality::kEdges.end(), 1.0) - FieldQuality::kEdges.begin();
+    sixths_[static_cast<std::size_t>(kOne)] += sixths;
+    largest_ = std::max(largest_, 1.0);
+  }
+  void add_to(FieldQuality& quality) const {
+    for (std::size_t bin = 0; bin < sixths_.size(); ++bin) quality.sixths[bin] += sixths_[bin];
+    quality.largest_stretch = std::max(quality.largest_stretch, std::sqrt(largest_));
+  }
+
+ private:
+  const dmat3 inverse_;
+  const double over_rest_;
+  decltype(FieldQuality::sixths) sixths_{};
+  double largest_ = 0;
+};
+
+/// The five tetrahedra of a cell. @param u  displacements of its corners
+void add_cell(const dvec3 (&u)[8], bool odd, const dmat3& from_lattice, Tally& tally) {
+  for (int t = 1; t < kTetrahedraPerCell; ++t) {
+    const TetrahedronCorners of = tetrahedron_corners(t, odd);
+    const auto along = [&](int neighbour, int axis) {
+      return ((of.d >> axis) & 1) != 0 ? u[of.d] - u[neighbour] : u[neighbour] - u[of.d];
+    };
+    tally.add(from_lattice + dmat3(along(of.a, 0), along(of.b, 1), along(of.c, 2)), 1);
+  }
+  const TetrahedronCorners of = tetrahedron_corners(0, odd);
+  const double half = of.d == 0 ? 0.5 : -0.5;
+  const dvec3 a = half * (u[of.a] - u[of.d]), b = half * (u[of.b] - u[of.d]), c = half * (u[of.c] - u[of.d]);
+  tally.add(from_lattice + dmat3(b + c - a, a + c - b, a + b - c), 2);
+}
+
+std::string format(const char* form, double value) {
+  char text[64];
+  std::snprintf(text, sizeof text, form, value);
+  return text;
+}
+
+}  // namespace
+
+std::array<double, FieldQuality::kEdges.size() + 1> FieldQuality::shares() const {
+  std::uint64_t all = 0;
+  for (const std::uint64_t count : sixths) all += count;
+  std::array<double, kEdges.size() + 1> shares{};
+  for (std::size_t bin = 0; bin < shares.size() && all != 0; ++bin)
+    shares[bin] = static_cast<double>(sixths[bin]) / static_cast<double>(all);
+  return shares;
+}
+
+FieldQuality measure_quality(const VertexField& field, const Limits& limits, const Control& control) {
+  const glm::i64vec3 size = field.lattice.size;
+  require(std::min({size.x, size.y, size.z}) >= 2, "a field of " + to_string(size) + " vertices has no cell");
+  const dmat3 from_lattice = point_from_index(field.lattice).linear;
+  tbb::enumerable_thread_specific<Tally> tallies(from_lattice);
+  tbb::task_arena arena = cpu::make_arena(limits);
+  cpu::Progress progress(control, size.z - 1);
+  arena.execute([&] {
+    tbb::parallel_for(std::int64_t{0}, size.z - 1, [&](std::int64_t z) {
+      Tally& tally = tallies.local();
+      for (std::int64_t y = 0; y < size.y - 1; ++y) {
+        const glm::vec3* rows[4];
+        for (int n = 0; n < 4; ++n)
+          rows[n] = field.displacement.data() + ((z + (n >> 1)) * size.y + y + (n & 1)) * size.x;
+        for (std::int64_t x = 0; x < size.x - 1; ++x) {
+          dvec3 u[8];
+          bool rests = true;
+          for (int corner = 0; corner < 8; ++corner) {
+            const glm::vec3& by = rows[corner >> 1][x + (corner & 1)];
+            rests = rests && by == glm::vec3(0);
+            u[corner] = dvec3(by);
+          }
+          if (rests) {
+            tally.add_at_rest(6);
+          } else {
+            add_cell(u, ((x + y + z) & 1) != 0, from_lattice, tally);
+          }
+        }
+      }
+      progress.done(1);
+    });
+  });
+  FieldQuality quality;
+  for (const Tally& tally : tallies) tally.add_to(quality);
+  return quality;
+}
+
+std::string verdict(const Report& report, const FieldQuality& quality) {
+  const double voxels = static_cast<double>(report.covered + report.uncovered);
+  const std::string covered = format("%.2f %% of the voxels are covered",
+                                     voxels > 0 ? 100.0 * static_cast<double>(report.covered) / voxels : 0);
+  const std::string stretch = format("the largest stretch is %.2f times", quality.largest_stretch);
+  const double folded = 100 * quality.shares().front();
+  if (report.inverted + report.degenerate > 0) {
+    return "Do not trust it where it folds: " + std::to_string(report.inverted) + " tetrahedra are inverted and " +
+           std::to_string(report.degenerate) + " flat, " + format("%.3g %% of the volume; ", folded) + covered + "; " +
+           stretch + ".";
+  }
+  return "No tetrahedron folds; " + covered + "; " + stretch + ".";
+}
+
+}  // namespace tetwarp

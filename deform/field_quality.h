@@ -1,0 +1,32 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "deform/resampler.h"
+
+namespace tetwarp {
+
+/// How a forward field stretches and folds what it moves: all its tetrahedra, in double, in mm, from the displacements
+/// as they are given (a resampler snaps them to 2^-12 voxel).
+struct FieldQuality {
+  /// Between these, and below the first and from the last on, Jacobian determinants are counted.
+  static constexpr std::array<double, 7> kEdges{0, 0.25, 0.5, 0.8, 1.25, 2, 4};
+
+  std::array<std::uint64_t, kEdges.size() + 1> sixths{};  ///< of cells: a centre tetrahedron has two, the others one
+  double largest_stretch = 0;  ///< largest singular value of the forward gradient: a length in any direction, over the
+                               ///< same at rest
+
+  /// Part of the lattice's volume in each bin of determinants.
+  std::array<double, kEdges.size() + 1> shares() const;
+};
+
+/// One pass over the field, in parallel; the same result for any number of threads.
+/// @throws InputError for a field that has no cell, Cancelled
+FieldQuality measure_quality(const VertexField& field, const Limits& limits = {}, const Control& control = {});
+
+/// One sentence for a person: whether the map that a call reported on can be trusted, and what stands against it.
+std::string verdict(const Report& report, const FieldQuality& quality);
+
+}  // namespace tetwarp

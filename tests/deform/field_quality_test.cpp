@@ -1,0 +1,86 @@
+#include "deform/field_quality.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/matrix.hpp>
+#include <numeric>
+
+#include "tests/support/fields.h"
+#include "tests/support/run.h"
+
+namespace tetwarp {
+namespace {
+
+using namespace test;
+
+/// A field that moves x to `to` x.
+VertexField affine_field(const Geometry& lattice, const glm::dmat3& to) {
+  VertexField field{lattice, {}};
+  const AffineMap point = point_from_index(lattice);
+  for (std::int64_t k = 0; k < lattice.size.z; ++k) {
+    for (std::int64_t j = 0; j < lattice.size.y; ++j) {
+      for (std::int64_t i = 0; i < lattice.size.x; ++i) {
+        const glm::dvec3 x = point(glm::dvec3(i, j, k));
+        field.displacement.emplace_back(to * x - x);
+      }
+    }
+  }
+  return field;
+}
+
+TEST(FieldQuality, OfAnAffineMapIsItsDeterminantAndLargestSingularValue) {
+  const glm::dmat3 turn = rotation({1, 2, -0.5}, 0.8), other = rotation({-2, 1, 1}, 2.1);
+  for (const glm::dvec3& stretches : {glm::dvec3(1.5, 1.1, 0.7), {0.3, 0.4, 0.2}, {3, 2, 1}, {1, 1, 1}, {1, 1, -1}}) {
+    const glm::dmat3 to =
+        turn * glm::dmat3(stretches.x, 0, 0, 0, stretches.y, 0, 0, 0, stretches.z) * glm::transpose(other);
+    const Geometry lattice = oblique_grid({5, 4, 6});
+    const FieldQuality quality = measure_quality(affine_field(lattice, to));
+    const double determinant = stretches.x * stretches.y * stretches.z;
+    for (std::size_t bin = 0; bin < quality.sixths.size(); ++bin) {
+      const bool above = bin == 0 || determinant >= FieldQuality::kEdges[bin - 1] - 1e-6,
+                 below = bin == FieldQuality::kEdges.size() || determinant < FieldQuality::kEdges[bin];
+      EXPECT_EQ(quality.sixths[bin], above && below ? 6U * 4 * 3 * 5 : 0U) << determinant << " in bin " << bin;
+    }
+    EXPECT_NEAR(quality.largest_stretch, std::max({stretches.x, stretches.y, std::abs(stretches.z)}), 1e-4);
+  }
+}
+
+TEST(FieldQuality, CountsWhatTheResamplerCountsAndAddsUpToTheLattice) {
+  Random random(test_seed(), 3);
+  const Geometry grid = unit_grid({20, 17, 15});
+  VertexField field = field_in_voxels(grid, lattice_over(grid, 2), [&](const glm::dvec3& x) {
+    if (x.x > 12) return glm::dvec3(0);
+    return glm::dvec3(random.real(-1, 1), random.real(-1, 1), random.real(-1, 1));
+  });
+  const auto resampler = make_cpu_resampler(grid);
+  resampler->set_field(view(field));
+  const Report report = resampler->resample(whole(grid), {});
+  const FieldQuality one = measure_quality(field, {.threads = 1}), quality = measure_quality(field);
+  EXPECT_EQ(one.sixths, quality.sixths);
+  EXPECT_EQ(one.largest_stretch, quality.largest_stretch);
+  const glm::i64vec3 cells = field.lattice.size - std::int64_t{1};
+  EXPECT_EQ(std::accumulate(quality.sixths.begin(), quality.sixths.end(), std::uint64_t{0}),
+            static_cast<std::uint64_t>(6 * cells.x * cells.y * cells.z));
+  // A tetrahedron has one sixth or two.
+  EXPECT_GT(report.inverted, 0U);
+  EXPECT_GE(quality.sixths.front(), report.inverted);
+  EXPECT_LE(quality.sixths.front(), 2 * report.inverted);
+  EXPECT_GT(quality.sixths.back() + quality.sixths[6], 0U);
+  EXPECT_NE(verdict(report, quality).find(std::to_string(report.inverted) + " tetrahedra are inverted"),
+            std::string::npos);
+}
+
+TEST(FieldQuality, StretchOfAShearIsNotItsLongestColumn) {
+  const FieldQuality quality =
+      measure_quality(affine_field(unit_grid({3, 3, 3}), glm::dmat3(1, 0, 0, 1, 1, 0, 0, 0, 1)));
+  EXPECT_NEAR(quality.largest_stretch, (1 + std::sqrt(5.0)) / 2, 1e-6);
+  Report report;
+  report.covered = 3;
+  report.uncovered = 1;
+  EXPECT_EQ(verdict(report, quality),
+            "No tetrahedron folds; 75.00 % of the voxels are covered; the largest stretch is 1.62 times.");
+}
+
+}  // namespace
+}  // namespace tetwarp
