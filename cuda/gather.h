@@ -20,15 +20,29 @@ struct OffsetSink {
 
   __device__ int place(const glm::ivec3& voxel) const { return static_cast<int>(box.offset(glm::i64vec3(voxel))); }
   __device__ int per_slice() const { return static_cast<int>(box.size.x * box.size.y); }
-  /// Nothing waits here.
+  /// Nothing is read here.
   struct Pending {
     bool any;
+    glm::vec3 u;
   };
   __device__ void start(int place, const glm::ivec3& voxel, const glm::vec3& moved, bool wanted,
                         Pending& pending) const {
     pending.any = wanted && write(place, voxel, detail::to_offset(moved));
   }
   __device__ void finish(int, const Pending&) const {}
+  struct Origin {
+    glm::vec3 u;
+  };
+  __device__ bool surrounds(const glm::ivec3&, const glm::ivec3&) const { return false; }
+  __device__ unsigned column(const glm::ivec3&) const { return 0; }
+  __device__ unsigned per_source_slice() const { return 0; }
+  template <bool kInside>
+  __device__ bool locate(const glm::ivec3&, unsigned, const glm::vec3& moved, Origin& origin) const {
+    origin.u = detail::to_offset(moved);
+    return moved.x == moved.x;
+  }
+  __device__ void begin(const Origin& origin, bool, Pending& pending) const { pending.u = origin.u; }
+  __device__ void end(int place, const Pending& pending) const { write(place, {}, pending.u); }
   /// @return whether the voxel counts as covered
   __device__ bool write(int place, const glm::ivec3&, const glm::vec3& u) const {
     mapped[place] = 1;

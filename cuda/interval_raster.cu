@@ -1,6 +1,7 @@
 #include "cuda/interval_raster.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "cuda/gather.h"
 #include "cuda/voxel_sink.cuh"
@@ -16,8 +17,11 @@ constexpr int kTileThreads = 32 * kTileJ;  ///< a warp a column of rows
 constexpr int kTileBlocks = 4;             ///< a multiprocessor
 constexpr int kSlots = 256;                ///< tetrahedra whose arithmetic is prepared at a time
 constexpr int kMostTetrahedra = 640;       ///< of a tile
+constexpr int kMostVertices = 320;         ///< of a tile that are kept at hand
 constexpr int kMostUnsure = 256;           ///< intervals for exact integers
 constexpr int kBlockCells = 4;             ///< cells of a block along an axis
+constexpr int kStepBits = 12;
+static_assert(1 << kStepBits == kStepsPerVoxel);
 static_assert(kTileI <= kMostRowTile && kTileJ <= kMostRowTile && kTileK <= kMostRowTile);
 
 /// What all kernels know.
@@ -95,8 +99,7 @@ __global__ void cells_kernel(TileTask task) {
     return any;
   };
   glm::ivec3 from(0), to = lattice.cells - 1;
-  Box found{glm::i32vec3(INT32_MAX), glm::i32vec3(INT32_MIN)};
-  bool moving = false;
+  Box found{glm::i32vec3(INT32_MAX), glm::i32vec3(INT32_MIN)}, moved = found;
   if (cells_of(task.moves[0], from, to)) {
     const glm::ivec3 first = from / kBlockCells, size = to / kBlockCells - first + 1;
     for (int n = static_cast<int>(threadIdx.x & 31); n < size.x * size.y * size.z; n += 32) {
@@ -106,7 +109,8 @@ __global__ void cells_kernel(TileTask task) {
       if (!cells_of(moves, first_cell, last_cell)) continue;
       found.grow(first_cell);
       found.grow(last_cell);
-      moving |= moves.low != glm::ivec3(0) || moves.high != glm::ivec3(0);
+      moved.grow(moves.low);
+      moved.grow(moves.high);
     }
   }
   bool inside = true;
@@ -114,26 +118,32 @@ __global__ void cells_kernel(TileTask task) {
   for (int axis = 0; axis < 3; ++axis) {
     found.low[axis] = warp_min(found.low[axis]);
     found.high[axis] = warp_max(found.high[axis]);
+    moved.low[axis] = warp_min(moved.low[axis]);
+    moved.high[axis] = warp_max(moved.high[axis]);
     inside &= low[axis] >= 0 && high[axis] <= lattice.cells[axis] * cell[axis];
   }
-  const bool any = found.low.x <= found.high.x, rests = __all_sync(~0u, !moving) != 0 && inside && any;
   if ((threadIdx.x & 31) != 0) return;
-  task.cells[number] = {any ? found.low : glm::ivec3(0), any ? found.high - found.low + 1 : glm::ivec3(0), rests, 0};
+  const bool any = found.low.x <= found.high.x,
+             rests = moved.low == glm::i32vec3(0) && moved.high == glm::i32vec3(0) && inside && any;
+  TileCells& cells = task.cells[number];
+  cells = {any ? found.low : glm::ivec3(0), any ? found.high - found.low + 1 : glm::ivec3(0), {}, {}, rests, 0};
+  if (!any) return;
+  // Weights are at least -1/64, and wrong by less than 1/256: three move a voxel by less than 1/16 of the range.
+  const glm::ivec3 beyond = (moved.high - moved.low) / 16 + kStepsPerVoxel;
+  cells.source_begin = (voxels.begin * kStepsPerVoxel - (moved.high + beyond)) >> kStepBits;
+  cells.source_end = ((voxels.end * kStepsPerVoxel - (moved.low - beyond)) >> kStepBits) + 1;
 }
 
-/// What a tetrahedron's voxels need: their weights by Cramer's rule, and how far its vertices are displaced.
+/// What a tetrahedron's voxels need, as it lies in shared memory: their weights by Cramer's rule, and how far its
+/// vertices are displaced.
 struct Weighing {
-  glm::vec3 from_d;  ///< from D to the first voxel of the tile, 2^-12 voxel
-  float reciprocal;  ///< of the determinant; 0: not in float
-  glm::vec3 bc;
-  float moved_x;
-  glm::vec3 ca;
-  float moved_y;
-  glm::vec3 ab;
-  float moved_z;
-  glm::vec4 moved_a, moved_b, moved_c;
+  float from_d[3];   ///< from D to the first voxel of the tile, 2^-12 voxel
+  float reciprocal;  ///< of the determinant; no number: not in float
+  float bc[3], moved_x, ca[3], moved_y, ab[3], moved_z;
+  float moved_a[3], moved_b[3], moved_c[3];
 };
-constexpr int kQuads = sizeof(Weighing) / sizeof(float4);
+constexpr int kQuads = 6;  ///< whole ones of it, of four floats
+static_assert(sizeof(Weighing) == (4 * kQuads + 1) * sizeof(float));
 
 /// A row of a tile.
 struct Row {
@@ -147,21 +157,39 @@ struct Row {
 
 /// The shared memory of a tile.
 struct TileMemory {
-  float4 prepared[kSlots][kQuads];  ///< faces, and then `Weighing`
+  float4 prepared[kSlots + 1][kQuads];  ///< faces, and then `Weighing`, the last nobody's
+  float ends[kSlots + 1];               ///< the last float of each `Weighing`
   Row rows[kTileRows];
   unsigned numbers[kMostTetrahedra];      ///< in the order of their numbers: `TileWorker::number_of`
   unsigned spans[kMostTetrahedra];        ///< `Span` of each
   unsigned short items[kSlots * kTileJ];  ///< rows of one y of a tetrahedron
   unsigned unsure[kMostUnsure];
-  unsigned per_warp[kTileJ];
+  glm::i32vec3 vertices[kMostVertices];  ///< of the tile's cells, as `TileWorker::read_vertex`, i fastest
+  unsigned per_warp[2][kTileJ];          ///< of every other round
   unsigned count, item_count, unsure_count, settled;
   bool overlaps;  ///< or too many are unsure
 };
 
-/// Cells on each axis that may reach a tile, at most; powers of two.
+/// Cells on each axis that may reach a tile, at most; powers of two. And of all.
 constexpr struct { int x, y, z; } kMostCells{1 << 10, 1 << 9, 1 << 9};
+constexpr int kMostCellsInAll = 1 << 18;
+
+/// n / size and n % size, for n below 2^21.
+struct Divided {
+  int quotient, rest;
+};
+__device__ Divided divided(int n, int size) {
+  const int quotient = static_cast<int>((static_cast<float>(n) + 0.5f) * detail::reciprocal(static_cast<float>(size)));
+  return {quotient, n - quotient * size};
+}
+
+/// Where the vertices of a tetrahedron are among those of the tile's cells.
+struct Corners {
+  int a, b, c, d;
+};
 
 constexpr unsigned short kNoOwner = 0xFFFF;
+constexpr float kNoNumber = std::numeric_limits<float>::quiet_NaN();
 
 /// Rows of a tile that a tetrahedron may reach, in one word.
 struct Span {
@@ -177,13 +205,47 @@ struct Span {
   }
 };
 
+/// The `Weighing` of the tetrahedron that a lane is in.
+struct HeldWeighing {
+  float values[4 * kQuads + 1];
+
+  /// Reads it, where it is not the one that is held.
+  __device__ void hold(const TileMemory& memory, unsigned place, unsigned& held) {
+    float(&v)[4 * kQuads + 1] = values;
+    const auto from = static_cast<unsigned>(__cvta_generic_to_shared(&memory.prepared[place][0])),
+               end = static_cast<unsigned>(__cvta_generic_to_shared(&memory.ends[place]));
+    asm volatile(
+        "{\n\t"
+        ".reg .pred p;\n\t"
+        "setp.ne.u32 p, %25, %26;\n\t"
+        "@p ld.shared.v4.f32 {%0, %1, %2, %3}, [%27];\n\t"
+        "@p ld.shared.v4.f32 {%4, %5, %6, %7}, [%27+16];\n\t"
+        "@p ld.shared.v4.f32 {%8, %9, %10, %11}, [%27+32];\n\t"
+        "@p ld.shared.v4.f32 {%12, %13, %14, %15}, [%27+48];\n\t"
+        "@p ld.shared.v4.f32 {%16, %17, %18, %19}, [%27+64];\n\t"
+        "@p ld.shared.v4.f32 {%20, %21, %22, %23}, [%27+80];\n\t"
+        "@p ld.shared.f32 %24, [%28];\n\t"
+        "}"
+        : "+f"(v[0]), "+f"(v[1]), "+f"(v[2]), "+f"(v[3]), "+f"(v[4]), "+f"(v[5]), "+f"(v[6]), "+f"(v[7]), "+f"(v[8]),
+          "+f"(v[9]), "+f"(v[10]), "+f"(v[11]), "+f"(v[12]), "+f"(v[13]), "+f"(v[14]), "+f"(v[15]), "+f"(v[16]),
+          "+f"(v[17]), "+f"(v[18]), "+f"(v[19]), "+f"(v[20]), "+f"(v[21]), "+f"(v[22]), "+f"(v[23]), "+f"(v[24])
+        : "r"(place), "r"(held), "r"(from), "r"(end));
+    held = place;
+  }
+};
+
 /// Rarely called, so out of line, with everything by value.
 __device__ __noinline__ RowInterval exactly(const TileTask& task, LatticeTetrahedron t, glm::ivec3 first,
                                             glm::i32vec3 signs, int y, int z, int count) {
   return exact_row(vertices_of(task.lattice, t), first, signs, y, z, count);
 }
 
-/// A voxel that is not well inside the source, or whose weights are not for float; likewise.
+template <class Sink>
+__device__ __noinline__ bool write_out_of_line(const Sink& sink, int out, glm::ivec3 at, glm::vec3 u) {
+  return sink.write(out, at, u);
+}
+
+/// A voxel whose weights are not for float; likewise.
 template <class Sink>
 __device__ __noinline__ bool write_slowly(const TileTask& task, const Sink& sink, LatticeTetrahedron t, int out,
                                           glm::ivec3 at, glm::i32vec3 signs) {
@@ -203,9 +265,11 @@ struct TileWorker {
   int thread;
 
   /// Which tetrahedron a number of the list means.
+  __device__ static glm::ivec3 cell_of(unsigned number) {
+    return {number >> 3 & (kMostCells.x - 1), number >> 13 & (kMostCells.y - 1), number >> 22};
+  }
   __device__ LatticeTetrahedron tetrahedron(unsigned number) const {
-    const glm::ivec3 cell(number >> 3 & (kMostCells.x - 1), number >> 13 & (kMostCells.y - 1), number >> 22);
-    return LatticeTetrahedron::of_cell(first_cell + cell, static_cast<int>(number & 7));
+    return LatticeTetrahedron::of_cell(first_cell + cell_of(number), static_cast<int>(number & 7));
   }
   __device__ static unsigned number_of(const glm::ivec3& cell, int t) {
     return static_cast<unsigned>(t | cell.x << 3 | cell.y << 13 | cell.z << 22);
@@ -228,45 +292,86 @@ struct TileWorker {
     }
   }
 
+  /// The number of vertices of the tile's cells along an axis.
+  __device__ glm::ivec3 vertex_counts() const { return cells + 1; }
+  /// Whether the vertices of all cells are at hand.
+  __device__ bool has_vertices() const {
+    const glm::ivec3 counts = vertex_counts();
+    return counts.x * counts.y * counts.z <= kMostVertices;
+  }
+  /// From the first voxel of the tile to a deformed vertex, 2^-12 voxel.
+  __device__ glm::i32vec3 read_vertex(int n) const {
+    const glm::ivec3 counts = vertex_counts();
+    const Divided row = divided(n, counts.x), slice = divided(row.quotient, counts.y);
+    return task.lattice.deformed(first_cell + glm::ivec3(row.rest, slice.rest, slice.quotient)) -
+           voxels.begin * kStepsPerVoxel;
+  }
+  __device__ glm::i32vec3 vertex(int n, bool at_hand) const { return at_hand ? memory.vertices[n] : read_vertex(n); }
+  __device__ void read_vertices() const {
+    const glm::ivec3 counts = vertex_counts();
+    const int count = counts.x * counts.y * counts.z;
+#pragma unroll 1
+    for (int n = thread; n < count; n += kTileThreads) memory.vertices[n] = read_vertex(n);
+  }
+  /// The corners of a tetrahedron of the list, as `tetrahedron_corners`.
+  __device__ Corners corners(unsigned number) const {
+    const glm::ivec3 counts = vertex_counts(), cell(cell_of(number));
+    const bool centre = (number & 7) == 0,
+               odd = ((first_cell.x + cell.x + first_cell.y + cell.y + first_cell.z + cell.z) & 1) != 0;
+    const int corner = (odd ? 0x74210 : 0x65307) >> (4 * (number & 7)) & 7;
+    const int x = (corner & 1) != 0 ? -1 : 1, y = (corner & 2) != 0 ? -counts.x : counts.x,
+              z = ((corner & 4) != 0 ? -counts.x : counts.x) * counts.y;
+    const int d =
+        ((cell.z + (corner >> 2)) * counts.y + (cell.y + (corner >> 1 & 1))) * counts.x + cell.x + (corner & 1);
+    const int all = d + x + y + z;  // across the cell
+    return centre ? Corners{all - x, all - y, all - z, d} : Corners{d + x, d + y, d + z, d};
+  }
+
   /// Whether a tetrahedron may own voxels of the tile.
-  __device__ bool may_own(const LatticeTetrahedron& t, Span& span) const {
-    const StepLattice& lattice = task.lattice;
-    const glm::i32vec3 d = lattice.deformed(t.d);
+  __device__ bool may_own(unsigned number, bool at_hand, Span& span) const {
+    const Corners at = corners(number);
+    const glm::i32vec3 d = vertex(at.d, at_hand);
     Box box{d, d};
-    box.grow(lattice.deformed(t.a()));
-    box.grow(lattice.deformed(t.b()));
-    box.grow(lattice.deformed(t.c()));
-    const IntBox own = candidates(task.turns, box.low, box.high, voxels);
-    const glm::ivec3 begin = own.begin - voxels.begin, end = own.end - voxels.begin;
-    span = {begin.y, end.y, begin.z, end.z, fits_int64(box)};
+    box.grow(vertex(at.a, at_hand));
+    box.grow(vertex(at.b, at_hand));
+    box.grow(vertex(at.c, at_hand));
+    IntBox own{glm::ivec3(0), size};
+#pragma unroll
+    for (int axis = 0; axis < 3; ++axis) {  // as `cut_to_candidates`, where all voxels are nudged alike
+      const int low = box.low[axis] - (signs[axis] > 0 ? 1 : 0), high = box.high[axis] - (signs[axis] > 0 ? 1 : 0);
+      own.begin[axis] = max(own.begin[axis], (low >> kStepBits) + 1);
+      own.end[axis] = min(own.end[axis], (high >> kStepBits) + 1);
+    }
+    span = {own.begin.y, own.end.y, own.begin.z, own.end.z, fits_int64(box)};
     return !own.is_empty();
   }
 
   /// Lists the tetrahedra that may own voxels of the tile, in rising order. @return whether there is room for them
-  __device__ bool list() const {
+  __device__ bool list(bool at_hand) const {
     if (cells.x > kMostCells.x || cells.y > kMostCells.y || cells.z > kMostCells.z) return false;
+    if (cells.x * cells.y * cells.z > kMostCellsInAll) return false;
     const int total = cells.x * cells.y * cells.z * kTetrahedraPerCell, lane = thread & 31, warp = thread / 32;
     unsigned listed = 0;
 #pragma unroll 1
     for (int from = 0; from < total; from += kTileThreads) {
       const int n = from + thread, cell = n / kTetrahedraPerCell;
-      const unsigned number =
-          number_of({cell % cells.x, cell / cells.x % cells.y, cell / (cells.x * cells.y)}, n % kTetrahedraPerCell);
+      const Divided row = divided(cell, cells.x), slice = divided(row.quotient, cells.y);
+      const unsigned number = number_of({row.rest, slice.rest, slice.quotient}, n % kTetrahedraPerCell);
       Span span{};
-      const bool reaches = n < total && may_own(tetrahedron(number), span);
+      const bool reaches = n < total && may_own(number, at_hand, span);
       const unsigned votes = __ballot_sync(~0u, reaches);
-      if (lane == 0) memory.per_warp[warp] = static_cast<unsigned>(__popc(votes));
+      unsigned* per_warp = memory.per_warp[from / kTileThreads & 1];
+      if (lane == 0) per_warp[warp] = static_cast<unsigned>(__popc(votes));
       __syncthreads();
       unsigned place = listed + static_cast<unsigned>(__popc(votes & ((1u << lane) - 1)));
       for (int w = 0; w < kTileJ; ++w) {
-        if (w < warp) place += memory.per_warp[w];
-        listed += memory.per_warp[w];
+        if (w < warp) place += per_warp[w];
+        listed += per_warp[w];
       }
       if (reaches && place < kMostTetrahedra) {
         memory.numbers[place] = number;
         memory.spans[place] = span.word();
       }
-      __syncthreads();
       if (listed > kMostTetrahedra) return false;
     }
     if (thread == 0) memory.count = listed;
@@ -274,45 +379,32 @@ struct TileWorker {
     return true;
   }
 
-  /// From the first voxel of the tile to a vertex, 2^-12 voxel. @param n  0 to 3: A, B, C, D
-  __device__ glm::i32vec3 vertex(const LatticeTetrahedron& t, int n) const {
-    glm::ivec3 at = t.d;
-#pragma unroll
-    for (int axis = 0; axis < 3; ++axis)
-      if (n != 3 && (axis == n) != t.centre) at[axis] += 1 - 2 * t.down[axis];
-    return task.lattice.deformed(at) - voxels.begin * kStepsPerVoxel;
-  }
-
-  /// One face of a tetrahedron, of the four that as many lanes have; then its rows.
-  __device__ void set_face(int slot, unsigned place, int n) const {
+  /// The faces of a tetrahedron; then its rows.
+  __device__ void set_faces(int slot, unsigned place, bool at_hand) const {
     constexpr float kUnsure = 1e9f;  // the error of what is not for float
-    const unsigned quad = 0xFu << (thread & 28);
     Span span = Span::of(memory.spans[place]);
-    RowFace crossing{0, 0, 0, kUnsure};
-    bool is_lower = n < 2, has_volume = true;
+    float4* faces = memory.prepared[slot];
+    int lower = 0;
     if (span.is_small) {
-      const LatticeTetrahedron t = tetrahedron(memory.numbers[place]);
-      Face<std::int64_t> face;
-      const glm::i32vec3 mine = vertex(t, n);
-      const auto other = [&](int k) {
-        const int lane = (thread & 28) | ((n + k) & 3);
-        return glm::i32vec3(__shfl_sync(quad, mine.x, lane), __shfl_sync(quad, mine.y, lane),
-                            __shfl_sync(quad, mine.z, lane));
-      };
-      const glm::i32vec3 p = other(1), q = other(2), r = other(3);
-      has_volume = make_face_towards(p, q, r, mine, face);
-      crossing = detail::row_face(face, signs, size, is_lower);
+      const Corners at = corners(memory.numbers[place]);
+      const glm::i32vec3 d = vertex(at.d, at_hand), a = vertex(at.a, at_hand) - d, b = vertex(at.b, at_hand) - d,
+                         c = vertex(at.c, at_hand) - d;
+      lower = make_row_faces(a, b, c, d, signs, size, [faces](int n, const RowFace& face) {
+        faces[n] = make_float4(face.at, face.along_y, face.along_z, face.error);
+      });
+      if (lower == 0 && detail::edge_determinant(a, b, c) == 0) {  // owns nothing
+        span.y_end = span.y_begin;
+        memory.spans[place] = span.word();
+      }
     }
-    const unsigned before = quad & ((1u << (thread & 31)) - 1), lower = __ballot_sync(quad, is_lower) & quad;
-    const int at = is_lower ? __popc(lower & before) : 3 - __popc(before & ~lower);
-    memory.prepared[slot][at] = make_float4(crossing.at, crossing.along_y, crossing.along_z, crossing.error);
-    if (n != 0) return;
-    memory.prepared[slot][4].x = __int_as_float(__popc(lower));
-    if (!has_volume) {  // owns nothing
-      span.y_end = span.y_begin;
-      memory.spans[place] = span.word();
+    if (lower == 0) {  // exact integers must say
+      lower = 2;
+#pragma unroll
+      for (int n = 0; n < 4; ++n) faces[n] = make_float4(0, 0, 0, kUnsure);
     }
+    faces[4].x = __int_as_float(lower);
     unsigned item = atomicAdd(&memory.item_count, static_cast<unsigned>(span.y_end - span.y_begin));
+#pragma unroll 1
     for (int y = span.y_begin; y < span.y_end; ++y) memory.items[item++] = static_cast<unsigned short>(slot | y << 8);
   }
 
@@ -343,26 +435,33 @@ struct TileWorker {
     row.owner[in.begin] = static_cast<unsigned short>(place);
   }
 
-  /// Marks where intervals start: a thread some tetrahedron's rows of one y.
+  /// Marks where the intervals of a tetrahedron's rows of one y start.
+  __device__ void mark_item(unsigned batch, unsigned item) const {
+    const int slot = static_cast<int>(item & 255), y = static_cast<int>(item >> 8);
+    const unsigned place = batch + static_cast<unsigned>(slot);
+    const Span span = Span::of(memory.spans[place]);
+    const RowsAlongZ rows(faces_of(slot), y);
+    Row* row = &memory.rows[span.z_begin * kTileJ + y];
+#pragma unroll 1
+    for (int z = span.z_begin; z < span.z_end; ++z, row += kTileJ) {
+      bool is_certain = false;
+      const RowInterval in = rows.interval(z, size.x, is_certain);
+      if (is_certain) {
+        mark(in, *row, place);
+      } else {  // later: calls would cost this loop registers
+        const unsigned at = atomicAdd(&memory.unsure_count, 1u);
+        if (at < kMostUnsure) memory.unsure[at] = place << 16 | static_cast<unsigned>(z << 8 | y);
+      }
+    }
+  }
+  /// Likewise of all, an item a thread.
   __device__ void mark_all(unsigned batch) const {
     const unsigned items = memory.item_count;
 #pragma unroll 1
-    for (unsigned n = static_cast<unsigned>(thread); n < items; n += kTileThreads) {
-      const int slot = memory.items[n] & 255, y = memory.items[n] >> 8;
-      const unsigned place = batch + static_cast<unsigned>(slot);
-      const Span span = Span::of(memory.spans[place]);
-      const RowsAlongZ rows(faces_of(slot), y);
-#pragma unroll 1
-      for (int z = span.z_begin; z < span.z_end; ++z) {
-        bool is_certain = false;
-        const RowInterval in = rows.interval(z, size.x, is_certain);
-        if (is_certain) {
-          mark(in, memory.rows[z * kTileJ + y], place);
-        } else {  // later: calls would cost this loop registers
-          const unsigned at = atomicAdd(&memory.unsure_count, 1u);
-          if (at < kMostUnsure) memory.unsure[at] = place << 16 | static_cast<unsigned>(z << 8 | y);
-        }
-      }
+    for (unsigned from = static_cast<unsigned>(thread & ~31); from < items; from += kTileThreads) {
+      const unsigned n = from + static_cast<unsigned>(thread & 31);
+      if (n < items) mark_item(batch, memory.items[n]);
+      __syncwarp();  // else lanes go on by themselves
     }
     __syncthreads();
     const unsigned unsure = memory.unsure_count;
@@ -402,6 +501,7 @@ struct TileWorker {
   __device__ void clear() const {
     if (thread < kTileRows) memory.rows[thread].starts = memory.rows[thread].covered = 0;
     if (thread == 0) {
+      memory.prepared[kSlots][0] = make_float4(0, 0, 0, kNoNumber);
       memory.overlaps = false;
       memory.item_count = memory.unsure_count = 0;
     }
@@ -417,14 +517,13 @@ struct TileWorker {
   }
 
   /// All tetrahedra, as many at a time as there is room for.
-  __device__ void rasterise(bool in_order) const {
+  __device__ void rasterise(bool in_order, bool at_hand) const {
     const unsigned count = memory.count;
     for (unsigned batch = 0; batch < count; batch += kSlots) {
       const unsigned slots = min(count - batch, static_cast<unsigned>(kSlots));
       __syncthreads();
-#pragma unroll 1
-      for (int n = thread; n < static_cast<int>(4 * slots); n += kTileThreads)
-        set_face(n / 4, batch + static_cast<unsigned>(n / 4), n & 3);
+      static_assert(kSlots <= kTileThreads);
+      if (thread < static_cast<int>(slots)) set_faces(thread, batch + static_cast<unsigned>(thread), at_hand);
       __syncthreads();
       if (in_order) {
         mark_in_order(batch, slots);
@@ -438,84 +537,117 @@ struct TileWorker {
   }
 
   /// What the voxels of the first tetrahedra need.
-  __device__ void weigh() const {
+  __device__ void weigh(bool at_hand) const {
     if (thread >= static_cast<int>(min(memory.count, static_cast<unsigned>(kSlots)))) return;
     const StepLattice& lattice = task.lattice;
-    const LocalTetrahedron local(lattice, as_float(lattice, tetrahedron(memory.numbers[thread])),
-                                 GatherPoint(lattice, voxels.begin, signs));
-    const Cramer m(local.a, local.b, local.c);
-    const float s = (detail::norm1(local.a) + detail::norm1(local.b)) + detail::norm1(local.c);
+    const unsigned number = memory.numbers[thread];
+    const LatticeTetrahedron t = tetrahedron(number);
+    const Corners at = corners(number);
+    // What `LocalTetrahedron` has; all numbers are whole and exact.
+    const glm::i32vec3 d = vertex(at.d, at_hand), cell(lattice.cell), edge = t.direction() * cell;
+    const glm::i32vec3 rest = glm::i32vec3(lattice.first) + t.d * cell - voxels.begin * kStepsPerVoxel;
+    const glm::vec3 moved(d - rest);
+    const auto vertex_at = [&](int corner, int axis, glm::vec3& moved_further) {
+      const glm::i32vec3 to = vertex(corner, at_hand) - d;
+      glm::i32vec3 further = to;
+#pragma unroll
+      for (int k = 0; k < 3; ++k)
+        if ((k == axis) != t.centre) further[k] -= edge[k];
+      moved_further = further;
+      return glm::vec3(to);
+    };
+    glm::vec3 moved_a, moved_b, moved_c;
+    const glm::vec3 a = vertex_at(at.a, 0, moved_a), b = vertex_at(at.b, 1, moved_b), c = vertex_at(at.c, 2, moved_c);
+    const Cramer m(a, b, c);
+    const float s = (detail::norm1(a) + detail::norm1(b)) + detail::norm1(c);
     const bool usable = detail::magnitude(m.det) > s * s * detail::multiply_add(detail::kThinSum, s, detail::kSlackSum);
-    const auto quad = [](const glm::vec3& v, float w) { return make_float4(v.x, v.y, v.z, w); };
     const auto cross = [](const detail::Cross& v, float w) { return make_float4(v.x, v.y, v.z, w); };
     float4* to = memory.prepared[thread];
-    to[0] = quad(local.r, usable ? detail::reciprocal(m.det) : 0.0f);
-    to[1] = cross(m.bc, local.moved.x);
-    to[2] = cross(m.ca, local.moved.y);
-    to[3] = cross(m.ab, local.moved.z);
-    to[4] = quad(local.moved_a, 0);
-    to[5] = quad(local.moved_b, 0);
-    to[6] = quad(local.moved_c, 0);
+    to[0] = make_float4(static_cast<float>(-d.x), static_cast<float>(-d.y), static_cast<float>(-d.z),
+                        usable ? detail::reciprocal(m.det) : kNoNumber);
+    to[1] = cross(m.bc, moved.x);
+    to[2] = cross(m.ca, moved.y);
+    to[3] = cross(m.ab, moved.z);
+    to[4] = make_float4(moved_a.x, moved_a.y, moved_a.z, moved_b.x);
+    to[5] = make_float4(moved_b.y, moved_b.z, moved_c.x, moved_c.y);
+    memory.ends[thread] = moved_c.z;
   }
 
-  /// The voxels of one lane: a column along k. @return how many are covered
+  /// How far a voxel moved; no numbers where its weights are not for float, or it is nobody's.
+  /// @param from_first  from the first voxel of the tile, 2^-12 voxel
+  __device__ static glm::vec3 moved_by(const HeldWeighing& m, const glm::vec3& from_first) {
+    const float(&v)[4 * kQuads + 1] = m.values;
+    const float x = from_first.x + v[0], y = from_first.y + v[1], z = from_first.z + v[2];
+    const auto weight = [&](int n) { return ((x * v[n] + y * v[n + 1]) + z * v[n + 2]) * v[3]; };
+    return blend({weight(4), weight(8), weight(12)}, {v[7], v[11], v[15]}, {v[16], v[17], v[18]}, {v[19], v[20], v[21]},
+                 {v[22], v[23], v[24]});
+  }
+
+  /// The voxels of one lane: a column along k. @tparam kInside  whether all come from well inside the source
+  /// @return how many are covered
+  template <bool kInside>
   __device__ unsigned sample() const {
     const int lane = thread & 31, y = thread / 32;
     if (lane >= size.x || y >= size.y) return 0;
     const Row* row = &memory.rows[y];
-    const auto rx = static_cast<float>(lane * kStepsPerVoxel), ry = static_cast<float>(y * kStepsPerVoxel);
+    const unsigned up_to_lane = ~0u >> (31 - lane);
+    glm::vec3 from_first(lane * kStepsPerVoxel, y * kStepsPerVoxel, 0);
     glm::ivec3 at = voxels.begin + glm::ivec3(lane, y, 0);
-    const int out_slice = sink.per_slice(), end = voxels.end.z;
-    int out = sink.place(at) - out_slice;
-    unsigned held = kNoOwner, left = 0;
-    float reciprocal = 0, rz = 0, a = 0, b = 0, c = 0, az = 0, bz = 0, cz = 0, steps = 0;
-    glm::vec3 moved(0), moved_a(0), moved_b(0), moved_c(0);
+    unsigned column = sink.column(at), held = ~0u, left = 0;
+    int out = sink.place(at);
+    HeldWeighing m{};
     typename Sink::Pending pending{};
-    for (; at.z < end; ++at.z) {
-      const unsigned place = row->owner_of(lane);
+    const auto next_moved = [&] {
+      const unsigned place = row->owner[31 - __clz(static_cast<int>(row->starts & up_to_lane))];
       row += kTileJ;
-      if (place != held) {
-        held = place;
-        reciprocal = 0;
-        if (place < kSlots) {
-          const float4* from = memory.prepared[place];
-          const float4 d = from[0], bc = from[1], ca = from[2], ab = from[3], ma = from[4], mb = from[5], mc = from[6];
-          const float x = rx + d.x, yy = ry + d.y;
-          rz = d.z;
-          reciprocal = d.w;
-          a = x * bc.x + yy * bc.y;
-          b = x * ca.x + yy * ca.y;
-          c = x * ab.x + yy * ab.y;
-          az = bc.z;
-          bz = ca.z;
-          cz = ab.z;
-          moved = {bc.w, ca.w, ab.w};
-          moved_a = {ma.x, ma.y, ma.z};
-          moved_b = {mb.x, mb.y, mb.z};
-          moved_c = {mc.x, mc.y, mc.z};
-        }
-      }
-      const float r = rz + steps;
-      steps += float{kStepsPerVoxel};
-      const Weights w{(a + r * az) * reciprocal, (b + r * bz) * reciprocal, (c + r * cz) * reciprocal};
-      const glm::vec3 by = blend(w, moved, moved_a, moved_b, moved_c);
-      sink.finish(out, pending);
-      out += out_slice;
-      sink.start(out, at, by, reciprocal != 0, pending);
-      left = left << 1 | static_cast<unsigned>(!pending.any);
-    }
-    sink.finish(out, pending);
-    unsigned covered = static_cast<unsigned>(size.z - __popc(left));
-    for (; left != 0; left &= left - 1) {  // not within the loop above: calls would cost it registers
-      at.z = end - __ffs(static_cast<int>(left));
-      const unsigned place = memory.rows[(at.z - voxels.begin.z) * kTileJ + y].owner_of(lane);
-      if (place == kNoOwner) {
-        sink.nothing(sink.place(at));
+      m.hold(memory, min(place, unsigned{kSlots}), held);
+      const glm::vec3 moved = moved_by(m, from_first);
+      from_first.z += float{kStepsPerVoxel};
+      return moved;
+    };
+    const auto begin = [&](const glm::vec3& moved) {
+      typename Sink::Origin origin;
+      const bool any = sink.template locate<kInside>(at, column, moved, origin);
+      sink.begin(origin, any, pending);
+      if (!any) left |= 1;
+      column += sink.per_source_slice();
+      ++at.z;
+    };
+    begin(next_moved());
+#pragma unroll(kInside ? 3 : 1)  // fewer registers are copied
+    for (int z = 1; z < size.z; ++z) {
+      const glm::vec3 moved = next_moved();
+      left <<= 1;
+      if (moved.x == moved.x) {  // a branch, so that nothing of it is moved before what is read meanwhile
+        sink.end(out, pending);
       } else {
-        covered += write_slowly(task, sink, tetrahedron(memory.numbers[place]), sink.place(at), at, signs);
+        left |= 2;
       }
+      out += sink.per_slice();
+      begin(moved);
     }
+    sink.end(out, pending);
+    unsigned covered = static_cast<unsigned>(size.z - __popc(left));
+#pragma unroll 1
+    for (; left != 0; left &= left - 1)  // not within the loop above: calls would cost it registers
+      covered += finish_voxel(lane, y, size.z - __ffs(static_cast<int>(left)));
     return covered;
+  }
+  /// A voxel that `sample` has not written. @return whether it is covered
+  __device__ bool finish_voxel(int x, int y, int z) const {
+    const glm::ivec3 in_tile(x, y, z), at = voxels.begin + in_tile;
+    const int out = sink.place(at);
+    const unsigned place = memory.rows[z * kTileJ + y].owner_of(x);
+    if (place == kNoOwner) {
+      sink.nothing(out);
+      return false;
+    }
+    HeldWeighing m{};
+    unsigned held = ~0u;
+    m.hold(memory, min(place, unsigned{kSlots}), held);
+    const glm::vec3 moved = moved_by(m, glm::vec3(in_tile * kStepsPerVoxel));
+    if (moved.x == moved.x) return write_out_of_line(sink, out, at, detail::to_offset(moved));
+    return write_slowly(task, sink, tetrahedron(memory.numbers[place]), out, at, signs);
   }
 };
 
@@ -539,7 +671,10 @@ __global__ void __launch_bounds__(kTileThreads, kTileBlocks)
   }
   if (thread == 0) memory.settled = 0;
   worker.clear();
-  if (!worker.list()) {
+  const bool at_hand = worker.has_vertices();
+  if (at_hand) worker.read_vertices();
+  __syncthreads();
+  if (!worker.list(at_hand)) {
     if (thread == 0) {
       cells.left = 1;
       atomicAdd(&task.counters->left, 1u);
@@ -548,15 +683,16 @@ __global__ void __launch_bounds__(kTileThreads, kTileBlocks)
   }
 #pragma unroll 1
   for (int n = 0; n < 2; ++n) {
-    worker.rasterise(n != 0);
+    worker.rasterise(n != 0, at_hand);
     if (!memory.overlaps) break;
     __syncthreads();
     worker.clear();
   }
   worker.mark_holes();
-  worker.weigh();
+  worker.weigh(at_hand);
   __syncthreads();
-  const unsigned covered = warp_sum(worker.sample());
+  const bool inside = sink.surrounds(cells.source_begin, cells.source_end);
+  const unsigned covered = warp_sum(inside ? worker.template sample<true>() : worker.template sample<false>());
   if ((thread & 31) == 0) atomicAdd(&memory.settled, covered);
   __syncthreads();
   if (thread == 0 && memory.settled != 0)

@@ -12,6 +12,7 @@ struct BlockMoves {
 /// Which cells may own voxels of a tile.
 struct TileCells {
   glm::ivec3 first, size;
+  glm::ivec3 source_begin, source_end;  ///< where its voxels come from, with room to spare
   int rests;  ///< whether the tile lies within the undeformed lattice, and all that may reach it is at rest
   int left;   ///< whether it is left to the claims
 };

@@ -68,7 +68,7 @@ struct VoxelSink {
   struct Pending {
     bool any = false;
     glm::vec3 fraction;
-    V corners[8];
+    int corners[8];
   };
 
   /// Begins to write a voxel that a tetrahedron owns, where that is `wanted` and it comes from well inside the source;
@@ -78,6 +78,26 @@ struct VoxelSink {
                         Pending& pending) const;
   /// Writes what is pending. @param place  that it was started with
   __device__ void finish(int place, const Pending& pending) const;
+  /// The same in parts, for columns of voxels along k.
+  struct Origin {
+    int base;
+    glm::vec3 fraction;
+  };
+  /// Whether voxels of a box of the source, half open, are all well inside.
+  __device__ bool surrounds(const glm::ivec3& begin, const glm::ivec3& end) const {
+    return (begin.x >= 0) & (begin.y >= 0) & (begin.z >= 0) & (end.x <= last.x) & (end.y <= last.y) & (end.z <= last.z);
+  }
+  /// Where a voxel is, for `locate`; changes by `per_source_slice` along k.
+  __device__ unsigned column(const glm::ivec3& voxel) const;
+  __device__ unsigned per_source_slice() const { return static_cast<unsigned>(slice); }
+  /// Where a voxel comes from. @tparam kInside  whether that is known to be well inside the source
+  /// @param moved  may be no numbers  @return whether it is well inside, and `moved` are numbers
+  template <bool kInside>
+  __device__ bool locate(const glm::ivec3& voxel, unsigned column, const glm::vec3& moved, Origin& origin) const;
+  /// Begins to read what a voxel is made from, where that is `wanted`.
+  __device__ void begin(const Origin& origin, bool wanted, Pending& pending) const;
+  /// Writes what was begun last; any value where nothing was.
+  __device__ void end(int place, const Pending& pending) const;
   /// A voxel that a tetrahedron owns. @return whether it comes from inside the source
   __device__ bool write(int place, const glm::ivec3& voxel, const glm::vec3& u) const;
   /// Voxels that stay where they are: first read, then written.

@@ -31,47 +31,89 @@ __device__ inline float interpolate(const float (&v)[8], const glm::vec3& t) {
   return a + t.z * (along_y(4) - a);
 }
 
-/// The eight voxels from one on.
+/// The eight voxels from one on. As words: their conversion to float is a faster one.
 template <class V>
-__device__ void read_corners(const V* v, int dx, int dy, int dz, V (&corners)[8]) {
+__device__ void read_corners(const V* v, int dx, int dy, int dz, int (&corners)[8]) {
 #pragma unroll
   for (int n = 0; n < 8; ++n)
     corners[n] = v[((n & 1) != 0 ? dx : 0) + ((n & 2) != 0 ? dy : 0) + ((n & 4) != 0 ? dz : 0)];
 }
 
+/// Adding it rounds to a whole number, to be read from the lowest bits.
+constexpr float kToWhole = 3.0f * (1 << 22);
+
 template <class V>
-__device__ V interpolated(const V (&corners)[8], const glm::vec3& t) {
+__device__ V interpolated(const int (&corners)[8], const glm::vec3& t) {
   float v[8];
 #pragma unroll
   for (int n = 0; n < 8; ++n) v[n] = static_cast<float>(corners[n]);
-  return static_cast<V>(__float2int_rn(interpolate(v, t)));  // between the corners: never saturates
+  return static_cast<V>(__float_as_int(interpolate(v, t) + kToWhole));  // between the corners: never saturates
+}
+
+/// The whole voxels of minus `moved`, rounded down, as bits of a float `kToWhole` above; and what is left.
+__device__ inline int whole_bits(float moved, float& fraction) {
+  const float whole = __fmaf_rd(moved, -kVoxelsPerStep, kToWhole);
+  fraction = fmaf(moved, -kVoxelsPerStep, kToWhole - whole);
+  return __float_as_int(whole);
+}
+
+template <class V>
+__device__ unsigned VoxelSink<V>::column(const glm::ivec3& voxel) const {
+  const auto by_row = static_cast<unsigned>(row), by_slice = static_cast<unsigned>(slice);
+  const glm::uvec3 at = glm::uvec3(voxel) - static_cast<unsigned>(__float_as_int(kToWhole));
+  return at.z * by_slice + at.y * by_row + at.x;
+}
+
+template <class V>
+template <bool kInside>
+__device__ bool VoxelSink<V>::locate(const glm::ivec3& voxel, unsigned column, const glm::vec3& moved,
+                                     Origin& origin) const {
+  const auto x = static_cast<unsigned>(whole_bits(moved.x, origin.fraction.x)),
+             y = static_cast<unsigned>(whole_bits(moved.y, origin.fraction.y)),
+             z = static_cast<unsigned>(whole_bits(moved.z, origin.fraction.z));
+  origin.base = static_cast<int>(z * static_cast<unsigned>(slice) + (y * static_cast<unsigned>(row) + (x + column)));
+  // A negative u that is small gives a fraction that is rounded to 1. Along x, between whole numbers, a + 1 (b - a) is
+  // b; along y and z it need not be, so that the place must be carried to the next voxel.
+  const bool is_whole = fmaxf(origin.fraction.y, origin.fraction.z) < 1.0f;
+  if constexpr (kInside) return is_whole;
+  const auto is_below = [](int voxel, unsigned bits, int end) {
+    return static_cast<unsigned>(voxel) + (bits - static_cast<unsigned>(__float_as_int(kToWhole))) <
+           static_cast<unsigned>(end);
+  };
+  return is_whole & is_below(voxel.x, x, last.x) & is_below(voxel.y, y, last.y) & is_below(voxel.z, z, last.z);
+}
+
+template <class V>
+__device__ void VoxelSink<V>::begin(const Origin& origin, bool wanted, Pending& pending) const {
+  pending.fraction = origin.fraction;
+  if (wanted) read_corners(source + origin.base, 1, row, slice, pending.corners);
+}
+
+template <class V>
+__device__ void VoxelSink<V>::end(int place, const Pending& pending) const {
+  output[place] = interpolated<V>(pending.corners, pending.fraction);
 }
 
 template <class V>
 __device__ void VoxelSink<V>::start(int, const glm::ivec3& voxel, const glm::vec3& moved, bool wanted,
                                     Pending& pending) const {
-  constexpr float kToWhole = 3.0f * (1 << 22);  // adding it rounds down to a whole number, to be read from the bits
   const auto on_axis = [](int voxel, float moved, int& base, float& fraction) {
-    const float whole = __fmaf_rd(moved, -kVoxelsPerStep, kToWhole);
-    base = voxel + (__float_as_int(whole) - __float_as_int(kToWhole));
-    fraction = fmaf(moved, -kVoxelsPerStep, kToWhole - whole);
+    base = voxel + (whole_bits(moved, fraction) - __float_as_int(kToWhole));
   };
   glm::ivec3 base;
   on_axis(voxel.x, moved.x, base.x, pending.fraction.x);
   on_axis(voxel.y, moved.y, base.y, pending.fraction.y);
   on_axis(voxel.z, moved.z, base.z, pending.fraction.z);
   const auto is_below = [](int index, int end) { return static_cast<unsigned>(index) < static_cast<unsigned>(end); };
-  // A negative u that is small gives a fraction that is rounded to 1. Along x, between whole numbers, a + 1 (b - a) is
-  // b; along y and z it need not be, so that the place must be carried to the next voxel.
   pending.any = wanted & is_below(base.x, last.x) & is_below(base.y, last.y) & is_below(base.z, last.z) &
-                (fmaxf(pending.fraction.y, pending.fraction.z) < 1.0f);
+                (fmaxf(pending.fraction.y, pending.fraction.z) < 1.0f);  // as in `locate`
   if (pending.any) read_corners(source + (base.z * slice + base.y * row + base.x), 1, row, slice, pending.corners);
 }
 
 template <class V>
 __device__ void VoxelSink<V>::finish(int place, const Pending& pending) const {
   // A branch, so that nothing of it is moved before what is read meanwhile.
-  if (pending.any) output[place] = interpolated(pending.corners, pending.fraction);
+  if (pending.any) output[place] = interpolated<V>(pending.corners, pending.fraction);
 }
 
 template <class V>
@@ -85,10 +127,10 @@ __device__ bool VoxelSink<V>::write(int place, const glm::ivec3& voxel, const gl
     nothing(place);
     return false;
   }
-  V corners[8];  // neighbours without weight may be any voxels: their finite values do not count
+  int corners[8];  // neighbours without weight may be any voxels: their finite values do not count
   read_corners(source + (base.z * slice + base.y * row + base.x), t.x != 0 ? 1 : 0, t.y != 0 ? row : 0,
                t.z != 0 ? slice : 0, corners);
-  output[place] = interpolated(corners, t);
+  output[place] = interpolated<V>(corners, t);
   return true;
 }
 

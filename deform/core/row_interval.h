@@ -47,33 +47,40 @@ struct RowFace {
 
 namespace detail {
 
-/// A face as `make_faces` gives it, from the first voxel of a tile.
+/// From a face whose normal, out of the tetrahedron, is (x, y, z), 2^-24 voxel^2, and whose value at the first voxel of
+/// the tile, nudged, is `constant`, 2^-36 voxel^3: all rounded from doubles.
 ///
-/// The value C - x Nx - y Ny - z Nz of a face is zero at x = (C - y Ny - z Nz) / Nx. C and N are exact before they are
-/// rounded to float, so with u = 2^-24 each of the three terms is wrong by 4 u of itself (two roundings, the reciprocal
-/// and the product); adding them, and the bound, costs 3 u of their sum.
-/// Where Nx is zero, a row lies on one side as a whole: the crossing is put far away on that side.
+/// The value C - 4096 (x Nx + y Ny + z Nz) of a face is zero at x = (C / 4096 - y Ny - z Nz) / Nx. The normal is exact
+/// before it is rounded to float, so with u = 2^-24 each of the three terms is wrong by 4 u of itself (two roundings,
+/// the reciprocal and the product), and the first by the error of C; adding them, and the bound, costs 3 u of their
+/// sum. Where Nx is zero, a row lies on one side as a whole: the crossing is put far away on that side.
 ///
-/// @param signs, size  of the tile  @param is_lower  whether the voxels beyond the crossing are inside, else those
-/// before it
-TETWARP_HD inline RowFace row_face(const Face<std::int64_t>& face, const glm::i32vec3& signs, const glm::ivec3& size,
-                                   bool& is_lower) {
-  constexpr float kFar = 0x1p40f, kVoxel = kStepsPerVoxel * kNudgeSteps;
-  const glm::i32vec3 nudged = nudge_steps(signs);
-  const auto constant = static_cast<float>(face.constant - face.normal[0] * nudged.x - face.normal[1] * nudged.y -
-                                           face.normal[2] * nudged.z);
-  const float x = static_cast<float>(face.normal[0]) * kVoxel, y = static_cast<float>(face.normal[1]) * kVoxel,
-              z = static_cast<float>(face.normal[2]) * kVoxel;
-  const auto rows = glm::vec3(size - 1);
-  is_lower = face.normal[0] <= 0;
-  const float reciprocal =
-      face.normal[0] != 0 ? 1.0f / x
-                          : -kFar / ((magnitude(constant) + magnitude(y) * rows.y) + magnitude(z) * rows.z + kVoxel);
-  RowFace crossing{constant * reciprocal, -y * reciprocal, -z * reciprocal, 0};
+/// @param wrong  bound of the error of `constant`  @param size  of the tile
+TETWARP_HD inline RowFace row_face(float x, float y, float z, float constant, float wrong, const glm::vec3& size) {
+  constexpr float kFar = 0x1p40f, kVoxel = kStepsPerVoxel;
+  const float along_x = x * kVoxel, along_y = y * kVoxel, along_z = z * kVoxel;
+  const float largest = (magnitude(constant) + magnitude(along_y) * size.y) + magnitude(along_z) * size.z + kVoxel;
+  const float factor = x != 0 ? reciprocal(along_x) : -kFar * reciprocal(largest);
+  RowFace crossing{constant * factor, -along_y * factor, -along_z * factor, 0};
   crossing.error =
       8 * kUnit *
-      ((magnitude(crossing.at) + magnitude(crossing.along_y) * rows.y) + magnitude(crossing.along_z) * rows.z);
+          ((magnitude(crossing.at) + magnitude(crossing.along_y) * size.y) + magnitude(crossing.along_z) * size.z) +
+      2 * wrong * magnitude(factor);
   return crossing;
+}
+
+struct DoubleVector {
+  double x, y, z;
+};
+/// Exact for whole numbers up to 2^26.
+TETWARP_HD inline DoubleVector exact_cross(const DoubleVector& a, const DoubleVector& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+TETWARP_HD inline double dot(const DoubleVector& a, const DoubleVector& b) {
+  return (a.x * b.x + a.y * b.y) + a.z * b.z;
+}
+TETWARP_HD inline float norm1(const DoubleVector& v) {
+  return norm1(glm::vec3(static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)));
 }
 
 /// The smallest whole number not below x; too large or small ones are any large or small ones.
@@ -93,15 +100,51 @@ struct RowFaces {
   int lower;  ///< 1 to 3
 };
 
-/// The face of a tetrahedron through p, q and r, inside where s lies. For tetrahedra with `has_int64_rows`.
-/// @param p, q, r, s  from the first voxel of the tile, 2^-12 voxel  @return false where s lies on it
-TETWARP_HD inline bool make_face_towards(const glm::i32vec3& p, const glm::i32vec3& q, const glm::i32vec3& r,
-                                         const glm::i32vec3& s, Face<std::int64_t>& face) {
-  face = make_face<std::int64_t>(p, q, r, 1);
-  const std::int64_t volume =
-      face.normal[0] * (p.x - s.x) + face.normal[1] * (p.y - s.y) + face.normal[2] * (p.z - s.z);
-  if (volume < 0) face = {{-face.normal[0], -face.normal[1], -face.normal[2]}, -face.constant};
-  return volume != 0;
+/// How a tetrahedron with `has_int64_rows` crosses the rows of a tile.
+///
+/// In double: edges are whole numbers of at most 2^18, so normals are exact. Values at the first voxel are sums of at
+/// most 12 terms, so wrong by less than 16 units (2^-53) of the sum of the normals' sizes, times the largest distance.
+///
+/// @param a, b, c  from D  @param d  from the first voxel of the tile; 2^-12 voxel  @param signs, size  of the tile
+/// @param put      called four times, as put(n, face): where in `RowFaces` a face belongs
+/// @return `lower` of `RowFaces`; 0 where it may have no volume, and nothing is put
+template <class Put>
+TETWARP_HD int make_row_faces(const glm::i32vec3& a, const glm::i32vec3& b, const glm::i32vec3& c,
+                              const glm::i32vec3& d, const glm::i32vec3& signs, const glm::ivec3& size, Put&& put) {
+  using detail::DoubleVector;
+  constexpr float kWrong = 16 * 0x1p-53f;
+  const auto in_double = [](const glm::i32vec3& v) {
+    return DoubleVector{static_cast<double>(v.x), static_cast<double>(v.y), static_cast<double>(v.z)};
+  };
+  const auto largest = [](const glm::i32vec3& v) {
+    return std::fmax(std::fmax(detail::magnitude(static_cast<float>(v.x)), detail::magnitude(static_cast<float>(v.y))),
+                     detail::magnitude(static_cast<float>(v.z)));
+  };
+  const DoubleVector da = in_double(a), db = in_double(b), dc = in_double(c);
+  const DoubleVector bc = detail::exact_cross(db, dc), ca = detail::exact_cross(dc, da),
+                     ab = detail::exact_cross(da, db);
+  const double volume = detail::dot(da, bc);
+  const float sizes = (detail::norm1(bc) + detail::norm1(ca)) + detail::norm1(ab), edge = largest(a),
+              wrong = kWrong * sizes * (largest(d) + edge + 1.0f);
+  if (detail::magnitude(static_cast<float>(volume)) <= kWrong * sizes * edge) return 0;
+  constexpr double kNudge = 1.0 / kNudgeSteps;
+  const glm::i32vec3 nudged = nudge_steps(signs);
+  const DoubleVector q{d.x - nudged.x * kNudge, d.y - nudged.y * kNudge, d.z - nudged.z * kNudge};
+  const auto rows = glm::vec3(size);
+  const float out = volume > 0 ? 1.0f : -1.0f;
+  int lower = 0, upper = 4;
+  const auto add = [&](const DoubleVector& normal, double value, float to) {
+    const float x = to * static_cast<float>(normal.x);
+    const RowFace face = detail::row_face(x, to * static_cast<float>(normal.y), to * static_cast<float>(normal.z),
+                                          to * static_cast<float>(value), wrong, rows);
+    put(x <= 0 ? lower++ : --upper, face);
+  };
+  const double at_bc = detail::dot(bc, q), at_ca = detail::dot(ca, q), at_ab = detail::dot(ab, q);
+  add(bc, at_bc, -out);  // through D, away from A
+  add(ca, at_ca, -out);
+  add(ab, at_ab, -out);
+  add({(bc.x + ca.x) + ab.x, (bc.y + ca.y) + ab.y, (bc.z + ca.z) + ab.z}, ((at_bc + at_ca) + at_ab) + volume, out);
+  return lower;
 }
 
 /// The rows of a tile with the same y.
@@ -127,10 +170,7 @@ class RowsAlongZ {
     const auto row = static_cast<float>(z);
     const auto low = [&](const Line& line) { return detail::multiply_add(line.along_z, row, line.low); };
     const auto high = [&](const Line& line) { return detail::multiply_add(line.along_z, row, line.high); };
-    const auto clamped = [&](float x) {
-      const int n = detail::ceil_to_int(x);
-      return n < 0 ? 0 : (n > count ? count : n);
-    };
+    const auto clamped = [&](float x) { return detail::clamp_to(detail::ceil_to_int(x), count); };
     const int begin = clamped(std::fmax(std::fmax(low(lower_[0]), low(lower_[1])), low(lower_[2]))),
               late_begin = clamped(std::fmax(std::fmax(high(lower_[0]), high(lower_[1])), high(lower_[2]))),
               early_end = clamped(std::fmin(std::fmin(low(upper_[0]), low(upper_[1])), low(upper_[2]))),

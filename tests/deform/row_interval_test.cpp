@@ -21,18 +21,16 @@ struct Checked {
 };
 
 RowFaces faces_of(const Tetrahedron& t, const Tile& tile, bool& has_volume) {
-  const glm::i32vec3 first = tile.first * kStepsPerVoxel;
-  const glm::i32vec3 at[4] = {t.a.deformed - first, t.b.deformed - first, t.c.deformed - first, t.d.deformed - first};
+  const glm::i32vec3 d = t.d.deformed;
   RowFaces faces{};
-  int lower = 0, upper = 4;
-  for (int n = 0; n < 4; ++n) {
-    Face<std::int64_t> face;
-    has_volume = make_face_towards(at[(n + 1) % 4], at[(n + 2) % 4], at[(n + 3) % 4], at[n], face);
-    bool is_lower = false;
-    const RowFace crossing = detail::row_face(face, tile.signs, tile.size, is_lower);
-    faces.faces[is_lower ? lower++ : --upper] = crossing;
-  }
-  faces.lower = lower;
+  int put = 0;
+  faces.lower = make_row_faces(t.a.deformed - d, t.b.deformed - d, t.c.deformed - d, d - tile.first * kStepsPerVoxel,
+                               tile.signs, tile.size, [&](int n, const RowFace& face) {
+                                 faces.faces[n] = face;
+                                 put |= 1 << n;
+                               });
+  has_volume = faces.lower != 0;
+  EXPECT_EQ(put, has_volume ? 15 : 0);
   return faces;
 }
 
