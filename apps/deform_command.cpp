@@ -156,6 +156,10 @@ std::uint64_t Deformation::plan_bytes(const InputHeader& input) {
 }
 
 void Deformation::check_input(const InputHeader& input) {
+  if (outputs_.series && !input.series) {
+    throw UsageError("a DICOM series can only be derived from a CT series, not from " + options_.input.path.string() +
+                     "; name the output .nii.gz, .nii, .nrrd or .mha");
+  }
   const glm::i64vec3& size = input.geometry.size;
   require(std::min({size.x, size.y, size.z}) >= 2,
           "a volume of " + to_string(size) + " voxels has no cell to deform, " + options_.input.path.string() +

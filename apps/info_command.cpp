@@ -3,6 +3,7 @@
 
 #include "apps/input.h"
 #include "apps/output.h"
+#include "io/dicom_dose.h"
 #include "io/field_file.h"
 #include "io/image_file.h"
 
@@ -59,6 +60,12 @@ json describe_image(const std::filesystem::path& path) {
           {"geometry", to_json(header.geometry)}};
 }
 
+json describe_dose(const std::filesystem::path& path) {
+  const DicomDose dose = read_dose_header(path);
+  return {{"path", path.string()}, {"kind", "dose"},           {"voxel_type", to_string(VoxelType::f32)},
+          {"components", 1},       {"dose_units", dose.units}, {"geometry", to_json(dose.geometry)}};
+}
+
 std::string triple(const json& values) {
   std::string text;
   for (const json& value : values) text += (text.empty() ? "" : " x ") + value.dump();
@@ -107,6 +114,9 @@ void print_file(const json& document) {
   } else {
     std::printf("  voxels       %s, %d a voxel\n", document["voxel_type"].get<std::string>().c_str(),
                 document["components"].get<int>());
+    if (document.contains("dose_units")) {
+      std::printf("  dose         %s\n", document["dose_units"].get<std::string>().c_str());
+    }
     print_grid(document["geometry"]);
   }
 }
@@ -115,9 +125,10 @@ void print_file(const json& document) {
 
 int run_info(const InfoOptions& options) {
   const std::filesystem::path& path = options.input.path;
-  const bool dicom = !has_image_suffix(path);
+  const bool dose = !has_image_suffix(path) && is_dicom_dose(path), dicom = !has_image_suffix(path) && !dose;
   const json document = [&] {
     Stage stage(options.common, "scan");
+    if (dose) return describe_dose(path);
     if (dicom) return describe_dicom(options.input, stage.control());
     return is_field_file(path) ? describe_field(path) : describe_image(path);
   }();

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <limits>
 
+#include "io/dicom_dose.h"
 #include "io/hash.h"
 #include "io/image_file.h"
 
@@ -94,22 +95,23 @@ InputHeader open_input(const InputOptions& options, const Control& control) {
     const ImageHeader header = read_image_header(options.path);
     require(header.components == 1, std::to_string(header.components) + " components a voxel, " +
                                         options.path.string() + "; expected a volume with one");
-    return {header.geometry, header.type, {}};
+    return {header.geometry, header.type, {}, false};
   }
+  if (is_dicom_dose(options.path)) return {read_dose_header(options.path).geometry, VoxelType::f32, {}, true};
   if (options.single && std::filesystem::is_directory(options.path)) {
     throw UsageError("--single is for one DICOM file, " + options.path.string() + " is a folder; name a file in it");
   }
   const DicomScan scan = scan_dicom(options.path, options.single, control);
   const DicomSeries& series = choose_series(scan, options);
   require(!series.refusal, series.refusal.value_or(""));
-  return {series.geometry, VoxelType::i16, series};
+  return {series.geometry, VoxelType::i16, series, false};
 }
 
 InputVolume read_input(const InputOptions& options, const InputHeader& header, const CommonOptions& common,
                        const Control& control) {
   InputVolume input;
   if (!header.series) {
-    input.volume = read_image(options.path);
+    input.volume = header.dose ? read_dose(options.path) : read_image(options.path);
     input.background = smallest_value(input.volume);
     return input;
   }

@@ -14,7 +14,8 @@ namespace tetwarp::apps {
 struct InputHeader {
   Geometry geometry;
   VoxelType type = VoxelType::i16;
-  std::optional<DicomSeries> series;  ///< of a DICOM input; its warnings are for people
+  std::optional<DicomSeries> series;  ///< of a DICOM series; its warnings are for people
+  bool dose = false;                  ///< a DICOM RT Dose file
 };
 
 /// A volume as read, from a DICOM series or a file.

@@ -1,3 +1,4 @@
+#include "io/dicom_dose.h"
 #include "io/dicom_series.h"
 
 namespace tetwarp {
@@ -33,6 +34,12 @@ DicomWriteReport write_derived_series(const std::filesystem::path&, const ConstV
 void write_phantom_series(const std::filesystem::path&, const ConstVolumeView&, std::uint64_t, const Control&) {
   refuse();
 }
+
+bool is_dicom_dose(const std::filesystem::path&) { return false; }
+
+DicomDose read_dose_header(const std::filesystem::path&) { refuse(); }
+
+AnyVolume read_dose(const std::filesystem::path&) { refuse(); }
 
 bool is_tetwarp_dicom(const std::filesystem::path&) { refuse(); }
 

@@ -1,0 +1,156 @@
+#include "io/dicom_dose.h"
+
+#include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmdata/dcdeftag.h>
+#include <dcmtk/dcmdata/dcfilefo.h>
+#include <dcmtk/dcmdata/dcuid.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <vector>
+
+#include "io/dicom_header.h"
+#include "io/dicom_put.h"
+
+namespace tetwarp {
+
+namespace {
+
+/// One RT Dose file, parsed.
+class DoseFile {
+ public:
+  explicit DoseFile(const std::filesystem::path& path) : path_(path) {
+    prepare_dcmtk();
+    const OFCondition read = format_.loadFile(OFFilename(path.c_str()));
+    if (read.bad()) refuse(std::string("cannot be read as DICOM: ") + read.text());
+    if (text_of(data(), DCM_SOPClassUID) != UID_RTDoseStorage) refuse("is no RT Dose object");
+  }
+
+  DicomDose header() {
+    DicomDose dose;
+    dose.units = text_of(data(), DCM_DoseUnits);
+    Geometry& grid = dose.geometry;
+    grid.size = {word(DCM_Columns), word(DCM_Rows), std::max<std::int64_t>(1, whole_number(DCM_NumberOfFrames))};
+    const glm::dvec3 row(number(DCM_ImageOrientationPatient, 0), number(DCM_ImageOrientationPatient, 1),
+                         number(DCM_ImageOrientationPatient, 2));
+    const glm::dvec3 column(number(DCM_ImageOrientationPatient, 3), number(DCM_ImageOrientationPatient, 4),
+                            number(DCM_ImageOrientationPatient, 5));
+    const glm::dvec3 normal = glm::cross(row, column);
+    grid.direction = glm::dmat3(row, column, normal);
+    grid.origin = {number(DCM_ImagePositionPatient, 0), number(DCM_ImagePositionPatient, 1),
+                   number(DCM_ImagePositionPatient, 2)};
+    grid.spacing = {number(DCM_PixelSpacing, 1), number(DCM_PixelSpacing, 0), 1};
+    place_frames(grid);
+    require_valid(grid, ("the dose grid of " + path_.string()).c_str());
+    return dose;
+  }
+
+  AnyVolume doses(const Geometry& grid) {
+    const double scaling = number(DCM_DoseGridScaling, 0);
+    const int bits = static_cast<int>(word(DCM_BitsAllocated));
+    const bool is_signed = word(DCM_PixelRepresentation) == 1;
+    if (bits != 16 && bits != 32)
+      refuse("has Bits Allocated (0028,0100) " + std::to_string(bits) + ", expected 16 or 32");
+    const auto voxels = static_cast<std::size_t>(voxel_count(grid));
+    AnyVolume volume(grid, VoxelType::f32);
+    const std::span<float> doses = volume.as<float>();
+    const auto scale = [&](std::size_t n, double stored) { doses[n] = static_cast<float>(stored * scaling); };
+    // Whole words of 16 bits, the low one of a value first, on this machine's order of bytes.
+    const Uint16* words = nullptr;
+    unsigned long count = 0;
+    const E_TransferSyntax native = EXS_LittleEndianExplicit;
+    if (data().chooseRepresentation(native, nullptr).bad() ||
+        data().findAndGetUint16Array(DCM_PixelData, words, &count).bad() || words == nullptr) {
+      refuse("has no Pixel Data (7FE0,0010) that can be read");
+    }
+    const std::size_t expected = voxels * static_cast<std::size_t>(bits / 16);
+    if (count < expected) {
+      refuse("is cut short: Pixel Data hold " + std::to_string(count) + " words of 16 bits, expected " +
+             std::to_string(expected));
+    }
+    for (std::size_t n = 0; n < voxels; ++n) {
+      const std::uint32_t value =
+          bits == 16 ? words[n] : words[2 * n] | static_cast<std::uint32_t>(words[2 * n + 1]) << 16;
+      if (!is_signed) {
+        scale(n, value);
+      } else {
+        scale(n, bits == 16 ? static_cast<std::int16_t>(value) : static_cast<std::int32_t>(value));
+      }
+    }
+    return volume;
+  }
+
+ private:
+  DcmDataset& data() { return *format_.getDataset(); }
+  [[noreturn]] void refuse(const std::string& what) const { throw InputError(path_.string() + " " + what); }
+
+  double number(const DcmTagKey& tag, unsigned long n) {
+    double value = 0;
+    if (data().findAndGetFloat64(tag, value, n).bad() || !std::isfinite(value)) {
+      refuse("has no value " + std::to_string(n + 1) + " of " + tag_name(tag));
+    }
+    return value;
+  }
+  std::int64_t word(const DcmTagKey& tag) {
+    Uint16 value = 0;
+    if (data().findAndGetUint16(tag, value).bad()) refuse("has no " + tag_name(tag));
+    return value;
+  }
+  std::int64_t whole_number(const DcmTagKey& tag) {
+    Sint32 value = 0;
+    if (data().findAndGetSint32(tag, value).bad()) refuse("has no " + tag_name(tag));
+    return value;
+  }
+
+  /// Grid Frame Offset Vector (PS3.3 C.8.8.3.2): from the first frame along the normal where it begins with 0, else
+  /// the patient's z of every frame.
+  void place_frames(Geometry& grid) {
+    constexpr double kTolerance = 1e-3;  // mm
+    if (grid.size.z == 1) return;
+    const double first = number(DCM_GridFrameOffsetVector, 0), step = number(DCM_GridFrameOffsetVector, 1) - first;
+    for (std::int64_t k = 1; k < grid.size.z; ++k) {
+      const double offset = number(DCM_GridFrameOffsetVector, static_cast<unsigned long>(k));
+      if (std::abs(offset - first - static_cast<double>(k) * step) > kTolerance) {
+        refuse("has frames at uneven distances, Grid Frame Offset Vector (3004,000C): frame " + std::to_string(k + 1) +
+               " at " + std::to_string(offset) + " mm, expected " +
+               std::to_string(first + static_cast<double>(k) * step));
+      }
+    }
+    const bool absolute = first != 0;
+    if (absolute && std::abs(first - grid.origin.z) > kTolerance) {
+      refuse("begins at " + std::to_string(grid.origin.z) + " mm by Image Position (Patient), and at " +
+             std::to_string(first) + " mm by Grid Frame Offset Vector (3004,000C)");
+    }
+    // An absolute offset grows with z, whichever way the normal points.
+    const double along = absolute && grid.direction[2].z < 0 ? -step : step;
+    if (along < 0) grid.direction[2] = -grid.direction[2];
+    grid.spacing.z = std::abs(along);
+  }
+
+  std::filesystem::path path_;
+  DcmFileFormat format_;
+};
+
+}  // namespace
+
+bool is_dicom_dose(const std::filesystem::path& path) {
+  if (!std::filesystem::is_regular_file(path)) return false;
+  prepare_dcmtk();
+  DcmFileFormat format;
+  if (format
+          .loadFileUntilTag(OFFilename(path.c_str()), EXS_Unknown, EGL_noChange, DCM_MaxReadLength, ERM_autoDetect,
+                            DCM_StudyDate)
+          .bad()) {
+    return false;
+  }
+  return text_of(*format.getDataset(), DCM_SOPClassUID) == UID_RTDoseStorage;
+}
+
+DicomDose read_dose_header(const std::filesystem::path& path) { return DoseFile(path).header(); }
+
+AnyVolume read_dose(const std::filesystem::path& path) {
+  DoseFile file(path);
+  return file.doses(file.header().geometry);
+}
+
+}  // namespace tetwarp

@@ -1,0 +1,123 @@
+#include "io/dicom_dose.h"
+
+#include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmdata/dctk.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/real_data.h"
+#include "tests/support/scratch.h"
+#include "tests/support/write_file.h"
+
+namespace tetwarp {
+namespace {
+
+/// A small RT Dose file; value n is stored as 1000 n.
+struct MadeDose {
+  int bits = 32;
+  std::string frames = "3", offsets = "0\\2.5\\5", position = "-10\\20\\7", orientation = "1\\0\\0\\0\\1\\0";
+  std::string sop_class = UID_RTDoseStorage;
+  int missing_words = 0;
+
+  void write(const std::filesystem::path& path) const {
+    DcmFileFormat format;
+    DcmDataset& data = *format.getDataset();
+    for (const auto& [tag, text] :
+         std::initializer_list<std::pair<DcmTagKey, std::string>>{{DCM_SOPClassUID, sop_class},
+                                                                  {DCM_SOPInstanceUID, "1.2.3"},
+                                                                  {DCM_Modality, "RTDOSE"},
+                                                                  {DCM_DoseUnits, "GY"},
+                                                                  {DCM_NumberOfFrames, frames},
+                                                                  {DCM_GridFrameOffsetVector, offsets},
+                                                                  {DCM_ImagePositionPatient, position},
+                                                                  {DCM_ImageOrientationPatient, orientation},
+                                                                  {DCM_PixelSpacing, "2\\3"},
+                                                                  {DCM_DoseGridScaling, "0.0005"}}) {
+      data.putAndInsertString(tag, text.c_str());
+    }
+    for (const auto& [tag, value] : std::initializer_list<std::pair<DcmTagKey, int>>{{DCM_Rows, 2},
+                                                                                     {DCM_Columns, 4},
+                                                                                     {DCM_BitsAllocated, bits},
+                                                                                     {DCM_BitsStored, bits},
+                                                                                     {DCM_HighBit, bits - 1},
+                                                                                     {DCM_SamplesPerPixel, 1},
+                                                                                     {DCM_PixelRepresentation, 0}}) {
+      data.putAndInsertUint16(tag, static_cast<Uint16>(value));
+    }
+    std::vector<Uint16> words;
+    for (unsigned n = 0; n < 24; ++n) {
+      const unsigned value = 1000 * n * (bits == 32 ? 10 : 1);
+      words.push_back(static_cast<Uint16>(value));
+      if (bits == 32) words.push_back(static_cast<Uint16>(value >> 16));
+    }
+    words.resize(words.size() - static_cast<std::size_t>(missing_words));
+    data.putAndInsertUint16Array(DCM_PixelData, words.data(), words.size());
+    ASSERT_TRUE(format.saveFile(path.c_str(), EXS_LittleEndianExplicit).good());
+  }
+};
+
+TEST(Dose, IsStoredValuesTimesTheScalingOnTheGridThatTheHeaderGives) {
+  const Scratch scratch;
+  for (const int bits : {16, 32}) {
+    MadeDose{.bits = bits}.write(scratch / "dose");
+    ASSERT_TRUE(is_dicom_dose(scratch / "dose"));
+    EXPECT_EQ(read_dose_header(scratch / "dose").units, "GY");
+    const AnyVolume dose = read_dose(scratch / "dose");
+    EXPECT_EQ(dose.geometry(), (Geometry{{4, 2, 3}, {3, 2, 2.5}, {-10, 20, 7}, glm::dmat3(1)}));
+    for (std::size_t n = 0; n < 24; ++n) {
+      EXPECT_FLOAT_EQ(dose.as<float>()[n], (bits == 32 ? 5.0F : 0.5F) * static_cast<float>(n));
+    }
+  }
+}
+
+TEST(Dose, FramesMayLieAtPatientCoordinatesOrAgainstTheNormal) {
+  const Scratch scratch;
+  MadeDose{.offsets = "7\\10\\13"}.write(scratch / "absolute");
+  EXPECT_EQ(read_dose_header(scratch / "absolute").geometry,
+            (Geometry{{4, 2, 3}, {3, 2, 3}, {-10, 20, 7}, glm::dmat3(1)}));
+  MadeDose{.offsets = "0\\-2\\-4"}.write(scratch / "down");
+  const Geometry down = read_dose_header(scratch / "down").geometry;
+  EXPECT_EQ(down.spacing.z, 2);
+  EXPECT_EQ(down.direction[2], glm::dvec3(0, 0, -1));
+  MadeDose{.offsets = "7\\10\\13", .orientation = "1\\0\\0\\0\\-1\\0"}.write(scratch / "turned");  // normal: -z
+  const Geometry turned = read_dose_header(scratch / "turned").geometry;
+  EXPECT_EQ(turned.direction[2], glm::dvec3(0, 0, 1));
+  EXPECT_EQ(turned.spacing.z, 3);
+}
+
+TEST(Dose, WhatIsNoEvenGridOrCutShortIsRefused) {
+  const Scratch scratch;
+  const auto refused = [&](const MadeDose& dose, const char* names) {
+    dose.write(scratch / "dose");
+    try {
+      read_dose(scratch / "dose");
+      FAIL() << names;
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find(names), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find("dose"), std::string::npos) << error.what();
+    }
+  };
+  refused({.offsets = "0\\2.5\\6"}, "uneven");
+  refused({.offsets = "0\\2.5"}, "GridFrameOffsetVector");
+  refused({.offsets = "8\\10\\12"}, "Image Position");
+  refused({.position = "1\\2"}, "ImagePositionPatient");
+  refused({.missing_words = 2}, "cut short");
+  refused({.sop_class = UID_CTImageStorage}, "no RT Dose");
+  write_file(scratch / "text", "not DICOM");
+  EXPECT_FALSE(is_dicom_dose(scratch / "text"));
+  EXPECT_FALSE(is_dicom_dose(scratch / "missing"));
+  EXPECT_THROW(read_dose(scratch / "missing"), InputError);
+}
+
+// SOURCE.md: 1048626 at most, times 1.4e-5 Gy.
+TEST(Dose, OfARealPlanIsReadWhole) {
+  TETWARP_REAL_DATA(folder, "rt-breast");
+  const AnyVolume dose = read_dose(folder / "rtdose.dcm");
+  EXPECT_EQ(dose.geometry(),
+            (Geometry{{194, 129, 98}, {2.5, 2.5, 3}, {-228.6541915, -419.2444776, -122.4407}, glm::dmat3(1)}));
+  const auto values = dose.as<float>();
+  EXPECT_FLOAT_EQ(*std::max_element(values.begin(), values.end()), 1048626 * 1.4e-5F);
+  EXPECT_FLOAT_EQ(*std::min_element(values.begin(), values.end()), 0);
+}
+
+}  // namespace
+}  // namespace tetwarp
