@@ -17,6 +17,7 @@ struct Commands {
   PhantomOptions phantom;
   InfoOptions info;
   FieldOptions field;
+  InvertOptions invert;
   DeformOptions deform;
 };
 
@@ -79,6 +80,34 @@ void add_field(CLI::App& app, FieldOptions& options) {
   command->footer("Example: tetwarp field twist:angle=30 --like ct.nii.gz -o twist.mha --cell-size 4");
 }
 
+void add_backend(CLI::App& command, std::string& backend, int& device) {
+  command.add_option("--backend", backend, "auto, cuda or cpu: the bits are the same")
+      ->check(CLI::IsMember({"auto", "cuda", "cpu"}))
+      ->capture_default_str();
+  command.add_option("--device", device, "CUDA device, as `tetwarp --version` numbers them")
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("N")
+      ->capture_default_str();
+}
+
+void add_invert(CLI::App& app, InvertOptions& options) {
+  CLI::App* command = app.add_subcommand("invert", "Write the inverse displacement field of a forward field");
+  command->add_option("FIELD", options.fields, kFieldHelp)->required();
+  command->add_option("--like", options.like.path, "The volume on whose grid the inverse is sampled")->required();
+  command
+      ->add_option(
+          "-o,--output", options.output,
+          ".mha .nrrd .nii .nii.gz: output to input, LPS mm, for ITK's and other warps; NaN where nothing maps")
+      ->required();
+  command->add_option("--cell-size", options.cell_size, "Vertices every B voxels, for formulas only (default 1)")
+      ->type_name("B");
+  add_backend(*command, options.backend, options.device);
+  command->add_option("--report", options.report, "Residuals both ways, with times, as JSON")->type_name("FILE.json");
+  add_series(*command, options.like);
+  add_common(*command, options.common, true);
+  command->footer("Example: tetwarp invert twist:angle=30 --like ct.nii.gz -o inverse.mha");
+}
+
 void add_deform(CLI::App& app, DeformOptions& options) {
   CLI::App* command = app.add_subcommand("deform", "Deform a volume");
   command->add_option("INPUT", options.input.path, kInputHelp)->required();
@@ -94,13 +123,7 @@ void add_deform(CLI::App& app, DeformOptions& options) {
                    "A folder (DICOM series; INPUT must be DICOM), or .nii .nii.gz .nrrd .mha")
       ->required();
   add_series(*command, options.input);
-  command->add_option("--backend", options.backend, "auto, cuda or cpu: the bits are the same")
-      ->check(CLI::IsMember({"auto", "cuda", "cpu"}))
-      ->capture_default_str();
-  command->add_option("--device", options.device, "CUDA device, as `tetwarp --version` numbers them")
-      ->check(CLI::NonNegativeNumber)
-      ->type_name("N")
-      ->capture_default_str();
+  add_backend(*command, options.backend, options.device);
   const std::map<std::string, Interpolation> interpolations = {
       {"nearest", Interpolation::nearest}, {"linear", Interpolation::linear}, {"cubic", Interpolation::cubic}};
   command->add_option("--interpolation", options.interpolation, "linear (default), nearest or cubic")
@@ -193,6 +216,7 @@ int run_command_line(int argc, char** argv) {
   add_info(app, commands.info);
   add_deform(app, commands.deform);
   add_field(app, commands.field);
+  add_invert(app, commands.invert);
   add_bench(app);
   try {
     app.parse(argc, argv);
@@ -204,6 +228,7 @@ int run_command_line(int argc, char** argv) {
   if (app.got_subcommand("phantom")) return run(run_phantom, commands.phantom);
   if (app.got_subcommand("info")) return run(run_info, commands.info);
   if (app.got_subcommand("field")) return run(run_field, commands.field);
+  if (app.got_subcommand("invert")) return run(run_invert, commands.invert);
   return run(run_deform, commands.deform);
 }
 

@@ -9,12 +9,6 @@ namespace tetwarp::apps {
 
 namespace {
 
-VolumeView view_of(PullField& field) {
-  return {
-      &field.grid, whole(field.grid), VoxelType::f32, 3, std::as_writable_bytes(std::span(field.displacement)).data(),
-      Memory::host};
-}
-
 void write_if_wanted(const std::filesystem::path& path, const AnyVolume& map) {
   if (!path.empty()) write_image(path, map.view());
 }
@@ -53,7 +47,7 @@ Maps MapOutputs::make(const Geometry& grid) {
   if (!staged_.folds.empty()) maps.owners = (owners_ = AnyVolume(grid, VoxelType::u16)).view();
   if (!staged_.inverse.empty()) {
     inverse_ = {grid, std::vector<glm::vec3>(static_cast<std::size_t>(voxel_count(grid)))};
-    maps.inverse_mm = view_of(inverse_);
+    maps.inverse_mm = samples_of(inverse_);
   }
   return maps;
 }

@@ -52,6 +52,16 @@ struct FieldOptions {
   std::optional<std::int64_t> cell_size;
 };
 
+struct InvertOptions {
+  CommonOptions common;
+  std::vector<std::string> fields;  ///< formulas and files, the first applied first
+  InputOptions like;
+  std::filesystem::path output, report;
+  std::optional<std::int64_t> cell_size;
+  std::string backend = "auto";
+  int device = 0;  ///< of CUDA
+};
+
 /// Where maps of the output go; an empty path: not wanted.
 struct MapOptions {
   std::filesystem::path coverage, inverse, jacobian, folds;
@@ -89,6 +99,7 @@ int run_command_line(int argc, char** argv);
 int run_phantom(const PhantomOptions& options);
 int run_info(const InfoOptions& options);
 int run_field(const FieldOptions& options);
+int run_invert(const InvertOptions& options);
 int run_deform(const DeformOptions& options);
 
 /// Becomes the program tetwarp-bench that lies beside this one; returns only by an exception.

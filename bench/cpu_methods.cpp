@@ -123,9 +123,7 @@ class Own {
   }
   PullField inverse() {
     PullField inverse{volume_.geometry, std::vector<glm::vec3>(volume_.voxels.size())};
-    resample(whole(volume_.geometry),
-             {.inverse_mm = {&inverse.grid, whole(inverse.grid), VoxelType::f32, 3,
-                             std::as_writable_bytes(std::span(inverse.displacement)).data(), Memory::host}});
+    resample(whole(volume_.geometry), {.inverse_mm = samples_of(inverse)});
     for (glm::vec3& by : inverse.displacement) {
       if (std::isnan(by.x)) by = glm::vec3(0);
     }

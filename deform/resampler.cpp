@@ -17,6 +17,13 @@ FieldView view(const VertexField& field, Outside outside) {
   return {&field.lattice, field.displacement.data(), outside, Memory::host};
 }
 
+VolumeView samples_of(PullField& field) {
+  require_one_each(field.grid, field.displacement.size());
+  return {
+      &field.grid, whole(field.grid), VoxelType::f32, 3, std::as_writable_bytes(std::span(field.displacement)).data(),
+      Memory::host};
+}
+
 PullFieldView view(const PullField& field, Outside outside) {
   require_one_each(field.grid, field.displacement.size());
   return {&field.grid, field.displacement.data(), outside, Memory::host};

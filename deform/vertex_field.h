@@ -48,5 +48,7 @@ struct PullFieldView {
 /// @throws InputError unless there is one displacement for each vertex
 FieldView view(const VertexField& field, Outside outside = Outside::refuse);
 PullFieldView view(const PullField& field, Outside outside = Outside::refuse);
+/// The samples as a volume of three floats: for `Maps::inverse_mm`. @throws InputError as `view`
+VolumeView samples_of(PullField& field);
 
 }  // namespace tetwarp

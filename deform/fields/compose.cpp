@@ -5,7 +5,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 
-#include "deform/core/five_tetrahedra.h"
+#include "deform/core/cell_weights.h"
 #include "deform/cpu/tiles.h"
 #include "deform/fields/point_map.h"
 #include "deform/large_memory.h"
@@ -30,25 +30,6 @@ void for_each_vertex(VertexField& field, const Limits& limits, const Control& co
       progress.done(1);
     });
   });
-}
-
-/// Weights of corners A, B, C of the tetrahedron of a cell that holds a place in it; D has the rest.
-struct Weights {
-  TetrahedronCorners corners;
-  double a, b, c;
-};
-
-/// @param at  place in the cell, 0 to 1 on each axis
-Weights weights_in_cell(const glm::dvec3& at, bool odd) {
-  for (int t = 1; t < kTetrahedraPerCell; ++t) {
-    const TetrahedronCorners corners = tetrahedron_corners(t, odd);
-    const glm::dvec3 from = glm::abs(at - glm::dvec3(corners.d & 1, corners.d >> 1 & 1, corners.d >> 2));
-    if (from.x + from.y + from.z <= 1) return {corners, from.x, from.y, from.z};
-  }
-  const TetrahedronCorners corners = tetrahedron_corners(0, odd);
-  const glm::dvec3 from = glm::abs(at - glm::dvec3(corners.d & 1, corners.d >> 1 & 1, corners.d >> 2));
-  return {corners, 0.5 * (from.y + from.z - from.x), 0.5 * (from.x + from.z - from.y),
-          0.5 * (from.x + from.y - from.z)};
 }
 
 }  // namespace
@@ -82,7 +63,7 @@ PointMap piecewise_affine(const VertexField& field) {
                   std::to_string(point.z) + ") mm, outside the lattice of the field that follows");
       cell[axis] = std::clamp<std::int64_t>(static_cast<std::int64_t>(std::floor(index[axis])), 0, size[axis] - 2);
     }
-    const Weights w =
+    const CellWeights w =
         weights_in_cell(glm::clamp(index - glm::dvec3(cell), 0.0, 1.0), ((cell.x + cell.y + cell.z) & 1) != 0);
     const auto at = [&](int corner) {
       const glm::i64vec3 vertex = cell + glm::i64vec3(corner & 1, corner >> 1 & 1, corner >> 2);

@@ -1,0 +1,139 @@
+#include "deform/points.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include "deform/core/cell_weights.h"
+#include "deform/cpu/tiles.h"
+#include "deform/field_check.h"
+
+namespace tetwarp {
+
+namespace {
+
+/// How far beyond the lattice a point on its border may lie by rounding, in voxels of the output.
+constexpr double kOnBorder = 1.0 / kStepsPerVoxel;
+/// A weight that is negative by no more is rounding: the tetrahedron holds the point.
+constexpr double kRounding = 1e-9;
+
+/// A tetrahedron and the weights of its corners A, B, C at a point.
+struct Holder {
+  Tetrahedron tetrahedron{};
+  glm::dvec3 weights{0};
+  double least = -INFINITY;  ///< of all four weights: negative outside the tetrahedron
+};
+
+class PointMover {
+ public:
+  PointMover(const Geometry& output, const FieldView& field)
+      : field_(field),
+        frame_(make_lattice_frame(output, field)),
+        lattice_from_point_(index_from_point(*field.lattice)),
+        output_from_point_(index_from_point(output)),
+        mm_from_output_(point_from_index(output).linear) {
+    for (int axis = 0; axis < 3; ++axis)
+      slack_[axis] = kOnBorder / glm::length(frame_.output_from_lattice.linear[axis]);
+  }
+
+  PointStatus move(glm::dvec3& point) const;
+
+ private:
+  static bool is_odd(const glm::i64vec3& cell) { return ((cell.x + cell.y + cell.z) & 1) != 0; }
+  Vertex vertex(const glm::i64vec3& cell, int corner) const;
+  Holder hold(const glm::i64vec3& cell, const TetrahedronCorners& corners, const glm::dvec3& steps) const;
+  Holder search_around(const glm::i64vec3& cell, const glm::dvec3& steps) const;
+
+  const FieldView field_;
+  const LatticeFrame frame_;
+  const AffineMap lattice_from_point_, output_from_point_;
+  const glm::dmat3 mm_from_output_;
+  glm::dvec3 slack_{0};  ///< kOnBorder in cells
+};
+
+Vertex PointMover::vertex(const glm::i64vec3& cell, int corner) const {
+  const glm::i64vec3 at = cell + glm::i64vec3(corner & 1, corner >> 1 & 1, corner >> 2);
+  const glm::i64vec3& size = field_.lattice->size;
+  Vertex result;
+  if (!frame_.snap_vertex(at, field_.displacement[(at.z * size.y + at.y) * size.x + at.x], result)) refuse_vertex(at);
+  return result;
+}
+
+/// @param steps  a point of output index in 2^-12 voxel, not rounded
+Holder PointMover::hold(const glm::i64vec3& cell, const TetrahedronCorners& corners, const glm::dvec3& steps) const {
+  Holder holder;
+  Tetrahedron& t = holder.tetrahedron;
+  t = {vertex(cell, corners.a), vertex(cell, corners.b), vertex(cell, corners.c), vertex(cell, corners.d)};
+  const auto rest = [](const Vertex& v) { return glm::dvec3(v.deformed + v.u); };
+  const glm::dvec3 d = rest(t.d);
+  holder.weights = glm::inverse(glm::dmat3(rest(t.a) - d, rest(t.b) - d, rest(t.c) - d)) * (steps - d);
+  const glm::dvec3& w = holder.weights;
+  holder.least = std::min({w.x, w.y, w.z, 1 - w.x - w.y - w.z});
+  return holder;
+}
+
+/// The tetrahedron that holds a point best, of a cell and its neighbours: snapping moves the faces of undeformed
+/// tetrahedra by up to 2^-13 voxel, so the point may be beyond a face of the one that held it before.
+Holder PointMover::search_around(const glm::i64vec3& cell, const glm::dvec3& steps) const {
+  const glm::i64vec3 begin = glm::max(cell - std::int64_t{1}, glm::i64vec3(0));
+  const glm::i64vec3 end = glm::min(cell + std::int64_t{2}, frame_.cells);
+  Holder best;
+  for (std::int64_t z = begin.z; z < end.z; ++z) {
+    for (std::int64_t y = begin.y; y < end.y; ++y) {
+      for (std::int64_t x = begin.x; x < end.x; ++x) {
+        for (int t = 0; t < kTetrahedraPerCell; ++t) {
+          const glm::i64vec3 at(x, y, z);
+          const Holder holder = hold(at, tetrahedron_corners(t, is_odd(at)), steps);
+          if (holder.least > best.least) best = holder;
+        }
+      }
+    }
+  }
+  return best;
+}
+
+PointStatus PointMover::move(glm::dvec3& point) const {
+  const glm::dvec3 at = lattice_from_point_(point);
+  glm::i64vec3 cell;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double last = static_cast<double>(frame_.cells[axis]);
+    if (!(at[axis] >= -slack_[axis] && at[axis] <= last + slack_[axis])) return PointStatus::outside;
+    cell[axis] = std::clamp<std::int64_t>(static_cast<std::int64_t>(std::floor(at[axis])), 0, frame_.cells[axis] - 1);
+  }
+  const glm::dvec3 steps = output_from_point_(point) * double{kStepsPerVoxel};
+  const CellWeights guess = weights_in_cell(glm::clamp(at - glm::dvec3(cell), 0.0, 1.0), is_odd(cell));
+  Holder holder = hold(cell, guess.corners, steps);
+  if (!(holder.least >= -kRounding)) holder = search_around(cell, steps);
+  const Tetrahedron& t = holder.tetrahedron;
+  const glm::dvec3 d(t.d.u), &w = holder.weights;
+  const glm::dvec3 u =
+      d + w.x * (glm::dvec3(t.a.u) - d) + w.y * (glm::dvec3(t.b.u) - d) + w.z * (glm::dvec3(t.c.u) - d);
+  if (u != glm::dvec3(0)) point -= mm_from_output_ * (u * (1.0 / kStepsPerVoxel));
+  return PointStatus::moved;
+}
+
+}  // namespace
+
+std::vector<PointStatus> move_points(const Geometry& output, const FieldView& field, std::span<glm::dvec3> points,
+                                     Limits limits, const Control& control) {
+  require(field.memory == Memory::host, "points are moved by fields in host memory");
+  const PointMover mover(output, field);
+  std::vector<PointStatus> status(points.size());
+  cpu::Progress progress(control, static_cast<std::int64_t>(points.size()));
+  tbb::task_arena arena = cpu::make_arena(limits);
+  arena.execute([&] {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size(), 4096), [&](const auto& range) {
+      for (std::size_t n = range.begin(); n < range.end(); ++n) status[n] = mover.move(points[n]);
+      progress.done(static_cast<std::int64_t>(range.size()));
+    });
+  });
+  return status;
+}
+
+}  // namespace tetwarp
