@@ -147,6 +147,12 @@ void add_deform(CLI::App& app, DeformOptions& options) {
       ->type_name("same|fit|FILE")
       ->capture_default_str();
   command
+      ->add_option_function<std::string>(
+          "--preserve", [&options](const std::string&) { options.preserve_mass = true; },
+          "mass: INPUT is a CT in HU, and its density (HU + 1000) is divided by the Jacobian determinant")
+      ->check(CLI::IsMember({"mass"}))
+      ->type_name("mass");
+  command
       ->add_option(
           "--with", options.with,
           "Another volume through the same field, from its own grid onto the output grid, or back onto its own; "

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <future>
 #include <limits>
@@ -15,6 +16,7 @@
 #include "cuda/devices.h"
 #include "deform/field_quality.h"
 #include "deform/fields/formula.h"
+#include "deform/mass.h"
 #include "io/field_file.h"
 #include "io/image_file.h"
 #include "io/preview.h"
@@ -75,6 +77,8 @@ class Deformation {
   void write_preview_picture();
   void begin_series();
   void write_slices(const Region& slices);
+  Target main_target();
+  void scale_mass(const Region& slices);
   json canonical_options() const;
   json sidecar() const;
   json report_with_times() const;
@@ -91,6 +95,11 @@ class Deformation {
   std::uint64_t planned_bytes_ = 0;
   std::vector<std::string> notes_, set_aside_;
   AnyVolume output_;
+  struct {
+    AnyVolume source, resampled;
+    ConstVolumeView jacobian;
+    std::atomic<std::uint64_t> saturated = 0;
+  } mass_;  ///< with --preserve mass: in float
   std::vector<SliceRange> sampled_slices_;
   Report report_;
   std::optional<DerivedSeriesWriter> series_;
@@ -106,6 +115,9 @@ Outputs Deformation::begin_outputs() const {
     throw UsageError("--cell-size is for formulas, --pull-field has its own grid");
   }
   check_grid(o.grid, !o.pull_field.empty());
+  if (o.preserve_mass && !o.pull_field.empty()) {
+    throw UsageError("--preserve mass needs the determinant of a forward map, which --pull-field has not");
+  }
   std::vector<std::filesystem::path> inputs = FurtherVolumes::inputs(o.with);
   inputs.push_back(o.input.path);
   if (!is_same_grid(o.grid) && o.grid != "fit") inputs.emplace_back(o.grid);
@@ -151,7 +163,9 @@ std::uint64_t Deformation::plan_bytes(const InputHeader& input) {
   const auto voxels = static_cast<std::uint64_t>(voxel_count(input.geometry)),
              output_voxels = options_.grid == "fit" ? voxels : static_cast<std::uint64_t>(voxel_count(grid_));
   const auto vertices = static_cast<std::uint64_t>(lattice.x * lattice.y * lattice.z);
-  return voxels * size_bytes(input.type) + output_voxels * (size_bytes(input.type) + outputs_.maps->bytes_a_voxel()) +
+  const std::uint64_t of_mass = options_.preserve_mass ? sizeof(float) * (voxels + 2 * output_voxels) : 0;
+  return of_mass + voxels * size_bytes(input.type) +
+         output_voxels * (size_bytes(input.type) + outputs_.maps->bytes_a_voxel()) +
          outputs_.further->bytes(output_voxels) + vertices * sizeof(glm::vec3) + kOverheadBytes;
 }
 
@@ -226,23 +240,48 @@ void Deformation::resample() {
   set_field(*backend.resampler, grown ? Outside::background : options_.outside);
   output_ = AnyVolume(grid_, input_.volume.type());
   sampled_slices_.resize(outputs_.series ? static_cast<std::size_t>(grid_.size.z) : 0);
-  const Maps maps = outputs_.maps->make(grid_);
+  const Maps maps = outputs_.maps->make(grid_, options_.preserve_mass);
+  mass_.jacobian = maps.jacobian;
   std::vector<Target> targets = outputs_.further->targets_on(grid_, false, options_.interpolation);
-  targets.insert(targets.begin(), Target{.source = std::as_const(input_.volume).view(),
-                                         .output = output_.view(),
-                                         .interpolation = options_.interpolation,
-                                         .background = background_,
-                                         .padding = input_.is_dicom() ? input_.dicom->padding : std::nullopt,
-                                         .sampled_slices = sampled_slices_});
+  targets.insert(targets.begin(), main_target());
   Control control = stage.control();
-  if (outputs_.series) {
-    begin_series();
-    control.finished = [&](const Region& slices) { outputs_.set.write([&] { write_slices(slices); }); };
+  if (outputs_.series) begin_series();
+  if (outputs_.series || options_.preserve_mass) {
+    control.finished = [&](const Region& slices) {
+      if (options_.preserve_mass) scale_mass(slices);
+      if (outputs_.series) outputs_.set.write([&] { write_slices(slices); });
+    };
   }
   report_ = backend.resampler->resample(whole(grid_), targets, maps, control);
+  report_.clamped += mass_.saturated;
   resample_onto_own_grids();
   input_sha256_ = input_hash.get();
   stages_.emplace_back("resample", stage.seconds());
+}
+
+/// INPUT as it goes through the field: with --preserve mass in float, so that values are rounded once.
+Target Deformation::main_target() {
+  Target target{.source = std::as_const(input_.volume).view(),
+                .output = output_.view(),
+                .interpolation = options_.interpolation,
+                .background = background_,
+                .padding = input_.is_dicom() ? input_.dicom->padding : std::nullopt,
+                .sampled_slices = sampled_slices_};
+  if (!options_.preserve_mass) return target;
+  mass_.source = AnyVolume(input_.volume.geometry(), VoxelType::f32);
+  mass_.resampled = AnyVolume(grid_, VoxelType::f32);
+  dispatch(input_.volume.type(), [&](auto voxel) {
+    const auto from = std::as_const(input_.volume).as<decltype(voxel)>();
+    std::transform(from.begin(), from.end(), mass_.source.as<float>().begin(),
+                   [](auto value) { return static_cast<float>(value); });
+  });
+  target.source = std::as_const(mass_.source).view();
+  target.output = mass_.resampled.view();
+  return target;
+}
+
+void Deformation::scale_mass(const Region& slices) {
+  mass_.saturated += preserve_mass(std::as_const(mass_.resampled).view(), mass_.jacobian, output_.view(), slices);
 }
 
 void Deformation::set_field(Resampler& resampler, Outside outside) const {
@@ -268,6 +307,7 @@ json Deformation::canonical_options() const {
   json options = {{"interpolation", name_of(options_.interpolation)},
                   {"outside", name_of(options_.outside)},
                   {"background", background_}};
+  if (options_.preserve_mass) options["preserve"] = "mass";
   if (!is_same_grid(options_.grid)) options["grid"] = options_.grid;
   if (field_.direction == Direction::pull) {
     options["pull_field"] = options_.pull_field.string();
@@ -281,7 +321,8 @@ json Deformation::canonical_options() const {
 void Deformation::begin_series() {
   const std::string parameters = "interpolation=" + std::string(name_of(options_.interpolation)) +
                                  " outside=" + name_of(options_.outside) + " background=" + json(background_).dump() +
-                                 (field_.direction == Direction::pull ? " direction=pull" : " direction=forward");
+                                 (field_.direction == Direction::pull ? " direction=pull" : " direction=forward") +
+                                 (options_.preserve_mass ? " preserve=mass" : "");
   const bool pull = field_.direction == Direction::pull, deformed = pull || !field_.forward.identity;
   const char* what =
       !deformed ? "Resampled by the identity" : (pull ? "Deformed by a pull field" : "Deformed by a field of vertices");

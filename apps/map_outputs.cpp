@@ -40,10 +40,10 @@ std::uint64_t MapOutputs::bytes_a_voxel() const {
          (staged_.jacobian.empty() ? 0 : sizeof(float)) + (staged_.folds.empty() ? 0 : sizeof(std::uint16_t));
 }
 
-Maps MapOutputs::make(const Geometry& grid) {
+Maps MapOutputs::make(const Geometry& grid, bool jacobian) {
   Maps maps;
   if (!staged_.coverage.empty()) maps.coverage = (coverage_ = AnyVolume(grid, VoxelType::u8)).view();
-  if (!staged_.jacobian.empty()) maps.jacobian = (jacobian_ = AnyVolume(grid, VoxelType::f32)).view();
+  if (jacobian || !staged_.jacobian.empty()) maps.jacobian = (jacobian_ = AnyVolume(grid, VoxelType::f32)).view();
   if (!staged_.folds.empty()) maps.owners = (owners_ = AnyVolume(grid, VoxelType::u16)).view();
   if (!staged_.inverse.empty()) {
     inverse_ = {grid, std::vector<glm::vec3>(static_cast<std::size_t>(voxel_count(grid)))};

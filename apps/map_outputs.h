@@ -20,8 +20,8 @@ class MapOutputs {
   MapOutputs(const MapOptions& options, Direction direction, OutputSet& outputs);
 
   std::uint64_t bytes_a_voxel() const;
-  /// Makes them on a grid. They refer to this object.
-  Maps make(const Geometry& grid);
+  /// Makes them on a grid. They refer to this object. @param jacobian  whether that is needed, whatever is asked for
+  Maps make(const Geometry& grid, bool jacobian);
   void write() const;
   /// Names of the files, by option.
   nlohmann::json describe() const;

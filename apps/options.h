@@ -88,6 +88,7 @@ struct DeformOptions {
   std::optional<std::uint64_t> memory_bytes;
   std::string grid = "same";      ///< same, fit, or a file or folder
   std::vector<std::string> with;  ///< IN=OUT...
+  bool preserve_mass = false;
   MapOptions maps;
   std::filesystem::path report, preview;
   bool dry_run = false;

@@ -1,0 +1,49 @@
+#include "deform/mass.h"
+
+#include <cmath>
+#include <limits>
+
+namespace tetwarp {
+
+namespace {
+
+constexpr double kAir = -1000;  ///< HU without mass
+
+template <class V>
+V stored(double value, std::uint64_t& saturated) {
+  if constexpr (std::is_floating_point_v<V>) {
+    return static_cast<V>(value);
+  } else {
+    const double whole = std::nearbyint(value);
+    constexpr auto kLow = static_cast<double>(std::numeric_limits<V>::lowest()),
+                   kHigh = static_cast<double>(std::numeric_limits<V>::max());
+    saturated += whole < kLow || whole > kHigh;
+    return static_cast<V>(whole < kLow ? kLow : whole > kHigh ? kHigh : whole);
+  }
+}
+
+}  // namespace
+
+std::uint64_t preserve_mass(const ConstVolumeView& hu, const ConstVolumeView& jacobian, const VolumeView& output,
+                            const Region& slices) {
+  require(hu.type == VoxelType::f32 && jacobian.type == VoxelType::f32, "HU and determinants are expected as float32");
+  const Geometry& grid = *output.geometry;
+  require(*hu.geometry == grid && *jacobian.geometry == grid && hu.buffered == whole(grid) &&
+              jacobian.buffered == whole(grid) && output.buffered == whole(grid),
+          "HU, determinants and output are expected whole, on one grid");
+  const std::int64_t slice = grid.size.x * grid.size.y;
+  const auto* from = reinterpret_cast<const float*>(hu.voxels);
+  const auto* determinants = reinterpret_cast<const float*>(jacobian.voxels);
+  std::uint64_t saturated = 0;
+  dispatch(output.type, [&](auto voxel) {
+    using V = decltype(voxel);
+    V* to = reinterpret_cast<V*>(output.voxels);
+    for (std::int64_t n = slices.begin.z * slice; n < slices.end.z * slice; ++n) {
+      const double value = from[n], determinant = std::abs(determinants[n]);
+      to[n] = stored<V>(determinant > 0 ? (value - kAir) / determinant + kAir : value, saturated);
+    }
+  });
+  return saturated;
+}
+
+}  // namespace tetwarp
