@@ -167,6 +167,13 @@ void add_deform(CLI::App& app, DeformOptions& options) {
       ->type_name("SIZE");
   command->add_option("--compress", options.compression, "Level 0 to 9 for .nii.gz (default 1) .nrrd .mha (default 0)")
       ->check(CLI::Range(0, 9));
+  command
+      ->add_option("--points", options.points,
+                   "Landmarks or a surface, moved as the voxels under them: .csv (header x,y,z; LPS mm), .mrk.json, "
+                   ".fcsv, .stl, .obj or .vtk, OUT of the same form and frame. :lps or :ras is the frame of a file "
+                   "that does not say. May be repeated; not with --pull-field")
+      ->allow_extra_args(false)
+      ->type_name("IN=OUT[:lps|:ras]");
   command->add_option("--coverage", options.maps.coverage, "Mask of the voxels that got a value through the field")
       ->type_name("FILE");
   command

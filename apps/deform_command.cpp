@@ -13,6 +13,7 @@
 #include "apps/map_outputs.h"
 #include "apps/output.h"
 #include "apps/output_grid.h"
+#include "apps/points_option.h"
 #include "cuda/devices.h"
 #include "deform/field_quality.h"
 #include "deform/fields/formula.h"
@@ -41,6 +42,7 @@ struct Outputs {
   std::optional<MapOutputs> maps;
   std::optional<FurtherVolumes> further;
   std::filesystem::path volume, sidecar, report, preview;
+  std::vector<std::filesystem::path> points;
 };
 
 /// The field of either direction, with what is said about it.
@@ -59,7 +61,8 @@ struct AnyField {
 /// One run of the command, stage by stage.
 class Deformation {
  public:
-  explicit Deformation(const DeformOptions& options) : options_(options), outputs_(begin_outputs()) {}
+  explicit Deformation(const DeformOptions& options)
+      : options_(options), points_(options.points), outputs_(begin_outputs()) {}
 
   int run();
 
@@ -86,6 +89,7 @@ class Deformation {
   std::string summary() const;
 
   const DeformOptions& options_;
+  PointsOption points_;
   Outputs outputs_;
   InputVolume input_;
   AnyField field_;
@@ -125,6 +129,9 @@ Outputs Deformation::begin_outputs() const {
     if (std::filesystem::exists(text)) inputs.emplace_back(text);
   }
   if (!o.pull_field.empty()) inputs.push_back(o.pull_field);
+  if (!o.pull_field.empty() && !points_.empty())
+    throw UsageError("--points needs a forward field, --pull-field has no forward map");
+  for (const std::filesystem::path& path : points_.inputs()) inputs.push_back(path);
   const bool series = is_series_output(o.output);
   if (series && has_image_suffix(o.input.path)) {
     throw UsageError("a DICOM series can only be derived from DICOM, not from " + o.input.path.string() +
@@ -144,13 +151,14 @@ Outputs Deformation::begin_outputs() const {
   // The series of a single file is read from its folder, so a derived series must not land there.
   if (series && !o.input.single && !std::filesystem::is_directory(o.input.path))
     inputs.push_back(folder_of(o.input.path));
-  Outputs outputs{series, OutputSet(inputs, o.common.overwrite), {}, {}, {}, {}, {}, {}};
+  Outputs outputs{series, OutputSet(inputs, o.common.overwrite), {}, {}, {}, {}, {}, {}, {}};
   outputs.volume = outputs.set.add(o.output, series ? StagedOutput::Kind::folder : StagedOutput::Kind::file);
   outputs.sidecar = outputs.set.add(sidecar_of(o.output));
   outputs.maps.emplace(o.maps, o.pull_field.empty() ? Direction::forward : Direction::pull, outputs.set);
   outputs.further.emplace(o.with, outputs.set);
   outputs.report = outputs.set.add(o.report);
   outputs.preview = outputs.set.add(o.preview);
+  outputs.points = points_.add_outputs(outputs.set);
   return outputs;
 }
 
@@ -202,6 +210,7 @@ void Deformation::read() {
   Stage stage(options_.common, "read");
   const InputHeader header = open_input(options_.input, {.stop = interrupt_token()});
   check_input(header);
+  points_.read();
   if (header.series) notes_ = header.series->warnings;
   input_ = read_input(options_.input, header, options_.common, stage.control());
   background_ = options_.background.value_or(input_.background);
@@ -237,7 +246,10 @@ void Deformation::resample() {
   backend_ = backend.name;
   // What --grid fit adds lies beyond the lattice; that this reaches over INPUT is known.
   const bool grown = options_.grid == "fit" && options_.outside == Outside::refuse;
-  set_field(*backend.resampler, grown ? Outside::background : options_.outside);
+  const Outside outside = grown ? Outside::background : options_.outside;
+  set_field(*backend.resampler, outside);
+  if (!points_.empty())
+    points_.move(grid_, view(field_.forward.field, outside), limits, {.stop = interrupt_token()});
   output_ = AnyVolume(grid_, input_.volume.type());
   sampled_slices_.resize(outputs_.series ? static_cast<std::size_t>(grid_.size.z) : 0);
   const Maps maps = outputs_.maps->make(grid_, options_.preserve_mass);
@@ -367,6 +379,7 @@ json Deformation::sidecar() const {
   }
   if (const json further = outputs_.further->describe(); !further.empty()) document["with"] = further;
   if (const json maps = outputs_.maps->describe(); !maps.empty()) document["maps"] = maps;
+  if (!points_.empty()) document["points"] = points_.to_json();
   document["report"] = {{"covered", report_.covered},      {"uncovered", report_.uncovered},
                         {"clamped", report_.clamped},      {"padded", report_.padded},
                         {"conflicts", report_.conflicts},  {"inverted", report_.inverted},
@@ -418,6 +431,7 @@ void Deformation::write() {
   outputs_.maps->write();
   if (!outputs_.preview.empty()) write_preview_picture();
   outputs_.further->write(options_.compression, "tetwarp field " + field_sha256_.substr(0, 16));
+  points_.write(outputs_.points);
   write_json(outputs_.sidecar, sidecar());
   stages_.emplace_back("write", std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   if (!outputs_.report.empty()) write_json(outputs_.report, report_with_times());
@@ -472,6 +486,7 @@ int Deformation::run() {
   if (options_.dry_run) {
     const InputHeader header = open_input(options_.input, {.stop = interrupt_token()});
     check_input(header);
+    points_.read();
     print_plan();
     return 0;
   }
@@ -484,6 +499,7 @@ int Deformation::run() {
   outputs_.set.write([&] { write(); });
   for (const std::string& note : notes_) say(options_.common, "tetwarp: warning: " + note);
   for (const std::string& note : field_.notes) say(options_.common, "tetwarp: note: " + note);
+  for (const std::string& note : points_.notes()) say(options_.common, "tetwarp: note: " + note);
   if (!set_aside_.empty()) {
     say(options_.common, "tetwarp: note: " + std::to_string(set_aside_.size()) +
                              " files of the series are no slices of it; OUTPUT.json names them");

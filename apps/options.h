@@ -91,6 +91,7 @@ struct DeformOptions {
   bool preserve_mass = false;
   MapOptions maps;
   std::filesystem::path report, preview;
+  std::vector<std::string> points;  ///< IN=OUT[:lps|:ras]
   bool dry_run = false;
 };
 
