@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
@@ -114,6 +115,31 @@ TEST(Grid, FitHoldsWhateverTheFieldMovesAway) {
   EXPECT_EQ(read_image_header(scratch / "wide_out.mha").geometry.size, glm::i64vec3(25, 21, 17));
   // A field that leaves out part of the volume is refused, whatever the grid.
   EXPECT_EQ(run_tetwarp(scratch.path(), "deform out.mha -f in.mha --grid fit -o x.mha").status, 4);
+}
+
+/// Of density, HU + 1000.
+double sum_of(const std::filesystem::path& path) {
+  const AnyVolume volume = read_image(path);
+  double sum = 0;
+  for (const std::int16_t hu : volume.as<std::int16_t>()) sum += hu + 1000;
+  return sum;
+}
+
+TEST(Preserve, MassIsKeptWhereAllOfItIsCovered) {
+  const Scratch scratch;
+  expect_run(scratch, "phantom --size 96,90,60 --spacing 3,3,4 --quiet -o in.mha");
+  for (const std::string strength : {"0.6", "-0.5"}) {
+    const std::string field = "deform in.mha --overwrite -f bubble:radius=90,strength=" + strength;
+    expect_run(scratch, field + " -o plain.mha");
+    expect_run(scratch, field + " --preserve mass -o kept.mha");
+    const double before = sum_of(scratch / "in.mha");
+    EXPECT_GT(std::abs(sum_of(scratch / "plain.mha") / before - 1), 5e-3);
+    EXPECT_LT(std::abs(sum_of(scratch / "kept.mha") / before - 1), 2e-3);
+  }
+  EXPECT_EQ(nlohmann::json::parse(read_text(scratch / "kept.mha.json"))["options"]["preserve"], "mass");
+  expect_run(scratch, "deform in.mha -f identity --preserve mass -o same.mha");
+  EXPECT_EQ(voxels_of(scratch / "in.mha"), voxels_of(scratch / "same.mha"));
+  EXPECT_EQ(run_tetwarp(scratch.path(), "deform in.mha --pull-field in.mha --preserve mass -o x.mha").status, 2);
 }
 
 }  // namespace
