@@ -124,9 +124,12 @@ void add_deform(CLI::App& app, DeformOptions& options) {
       ->required();
   add_series(*command, options.input);
   add_backend(*command, options.backend, options.device);
-  const std::map<std::string, Interpolation> interpolations = {
-      {"nearest", Interpolation::nearest}, {"linear", Interpolation::linear}, {"cubic", Interpolation::cubic}};
-  command->add_option("--interpolation", options.interpolation, "linear (default), nearest or cubic")
+  const std::map<std::string, Interpolation> interpolations = {{"nearest", Interpolation::nearest},
+                                                               {"linear", Interpolation::linear},
+                                                               {"cubic", Interpolation::cubic},
+                                                               {"vote", Interpolation::vote}};
+  command
+      ->add_option("--interpolation", options.interpolation, "linear (default), nearest or cubic; vote for label maps")
       ->transform(CLI::Transformer(interpolations).description(""))
       ->type_name("NAME");
   const std::map<std::string, Outside> outsides = {
@@ -158,7 +161,7 @@ void add_deform(CLI::App& app, DeformOptions& options) {
           "Another volume through the same field, from its own grid onto the output grid, or back onto its own; "
           "may be repeated")
       ->allow_extra_args(false)
-      ->type_name("IN=OUT[:nearest|linear|cubic][:background=V][:own]");
+      ->type_name("IN=OUT[:nearest|linear|cubic|vote][:background=V][:own]");
   command
       ->add_option("--memory", options.memory_bytes,
                    "8G, 500M. On the CPU: refuse to start if more is needed. On a CUDA device: volumes and field there "

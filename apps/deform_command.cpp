@@ -248,8 +248,7 @@ void Deformation::resample() {
   const bool grown = options_.grid == "fit" && options_.outside == Outside::refuse;
   const Outside outside = grown ? Outside::background : options_.outside;
   set_field(*backend.resampler, outside);
-  if (!points_.empty())
-    points_.move(grid_, view(field_.forward.field, outside), limits, {.stop = interrupt_token()});
+  if (!points_.empty()) points_.move(grid_, view(field_.forward.field, outside), limits, {.stop = interrupt_token()});
   output_ = AnyVolume(grid_, input_.volume.type());
   sampled_slices_.resize(outputs_.series ? static_cast<std::size_t>(grid_.size.z) : 0);
   const Maps maps = outputs_.maps->make(grid_, options_.preserve_mass);

@@ -84,14 +84,15 @@ FurtherVolumes::FurtherVolumes(const std::vector<std::string>& texts, OutputSet&
 std::uint64_t FurtherVolumes::bytes(std::uint64_t output_voxels) {
   std::uint64_t bytes = 0;
   for (One& one : volumes_) {
-    one.header = open_input(one.options.input, {.stop = interrupt_token()});
+    one.header = open_input(one.options.input, {.stop = interrupt_token()}, true);
     if (one.options.background && !fits(one.header.type, *one.options.background)) {
       throw UsageError("background=" + nlohmann::json(*one.options.background).dump() + " does not fit the voxels, " +
                        to_string(one.header.type) + ", " + one.options.input.path.string() +
                        "; choose a value in their range");
     }
     const auto voxels = static_cast<std::uint64_t>(voxel_count(one.header.geometry));
-    bytes += size_bytes(one.header.type) * (voxels + (one.options.own ? voxels : output_voxels));
+    bytes += size_bytes(one.header.type) * static_cast<std::uint64_t>(one.header.components) *
+             (voxels + (one.options.own ? voxels : output_voxels));
   }
   return bytes;
 }

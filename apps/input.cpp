@@ -87,24 +87,24 @@ std::string describe(const DicomSeries& series, std::size_t number) {
          number_text(spacing.y) + " x " + number_text(spacing.z) + " mm";
 }
 
-InputHeader open_input(const InputOptions& options, const Control& control) {
+InputHeader open_input(const InputOptions& options, const Control& control, bool components) {
   if (has_image_suffix(options.path)) {
     if (!options.series.empty() || options.single) {
       throw UsageError("--series and --single are for DICOM, " + options.path.string() + "; leave them out");
     }
     const ImageHeader header = read_image_header(options.path);
-    require(header.components == 1, std::to_string(header.components) + " components a voxel, " +
-                                        options.path.string() + "; expected a volume with one");
-    return {header.geometry, header.type, {}, false};
+    require(components || header.components == 1, std::to_string(header.components) + " components a voxel, " +
+                                                      options.path.string() + "; expected a volume with one");
+    return {header.geometry, header.type, {}, false, header.components};
   }
-  if (is_dicom_dose(options.path)) return {read_dose_header(options.path).geometry, VoxelType::f32, {}, true};
+  if (is_dicom_dose(options.path)) return {read_dose_header(options.path).geometry, VoxelType::f32, {}, true, 1};
   if (options.single && std::filesystem::is_directory(options.path)) {
     throw UsageError("--single is for one DICOM file, " + options.path.string() + " is a folder; name a file in it");
   }
   const DicomScan scan = scan_dicom(options.path, options.single, control);
   const DicomSeries& series = choose_series(scan, options);
   require(!series.refusal, series.refusal.value_or(""));
-  return {series.geometry, VoxelType::i16, series, false};
+  return {series.geometry, VoxelType::i16, series, false, 1};
 }
 
 InputVolume read_input(const InputOptions& options, const InputHeader& header, const CommonOptions& common,

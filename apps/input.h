@@ -16,6 +16,7 @@ struct InputHeader {
   VoxelType type = VoxelType::i16;
   std::optional<DicomSeries> series;  ///< of a DICOM series; its warnings are for people
   bool dose = false;                  ///< a DICOM RT Dose file
+  int components = 1;                 ///< values a voxel
 };
 
 /// A volume as read, from a DICOM series or a file.
@@ -27,9 +28,10 @@ struct InputVolume {
   bool is_dicom() const { return dicom.has_value(); }
 };
 
-/// Reads headers alone. @throws InputError when there is not one usable volume (several series: lists them), UsageError
+/// Reads headers alone. @param components  whether a voxel may have several values
+/// @throws InputError when there is not one usable volume (several series: lists them), UsageError
 /// for DICOM options with a file, or --single with a folder
-InputHeader open_input(const InputOptions& options, const Control& control);
+InputHeader open_input(const InputOptions& options, const Control& control, bool components = false);
 
 /// Reads the voxels of what `open_input` found.
 InputVolume read_input(const InputOptions& options, const InputHeader& header, const CommonOptions& common,

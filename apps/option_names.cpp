@@ -11,8 +11,10 @@ struct Named {
   const char* name;
   Interpolation interpolation;
 };
-constexpr Named kInterpolations[] = {
-    {"nearest", Interpolation::nearest}, {"linear", Interpolation::linear}, {"cubic", Interpolation::cubic}};
+constexpr Named kInterpolations[] = {{"nearest", Interpolation::nearest},
+                                     {"linear", Interpolation::linear},
+                                     {"cubic", Interpolation::cubic},
+                                     {"vote", Interpolation::vote}};
 
 }  // namespace
 

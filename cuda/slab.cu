@@ -16,23 +16,36 @@ constexpr std::int64_t kResultBytes = std::int64_t{32} << 20;  ///< of a box, wh
 /// Where the next array may begin.
 std::size_t aligned(std::size_t bytes) { return (bytes + 255) / 256 * 256; }
 
+template <class View>
+std::size_t voxel_bytes(const View& view) {
+  return size_bytes(view.type) * static_cast<std::size_t>(view.components);
+}
+
 std::size_t bytes_of(const ConstVolumeView& source, const Slices& slices) {
   const glm::i64vec3 held = source.buffered.end - source.buffered.begin;
-  return static_cast<std::size_t>(held.x * held.y * (slices.end - slices.begin)) * size_bytes(source.type);
+  return static_cast<std::size_t>(held.x * held.y * (slices.end - slices.begin)) * voxel_bytes(source);
 }
 
 struct DeviceSlices {
   long long *first, *last;  ///< one per output slice, or null
 };
 
-template <class V, Interpolation kInterpolation>
-__global__ void sample_kernel(SamplePlan<V> plan, SlabBox slab, const std::uint8_t* mapped, const glm::vec3* offset,
-                              Destination<V> output, std::uint8_t* coverage, DeviceSlices slices, Counts* counts) {
+/// @param kScalars  whether there is one component
+template <class V, Interpolation kInterpolation, bool kScalars>
+__global__ void sample_kernel(SamplePlan<V> plan, int components, SlabBox slab, const std::uint8_t* mapped,
+                              const glm::vec3* offset, Destination<V> output, std::uint8_t* coverage,
+                              DeviceSlices slices, Counts* counts) {
   const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
   if (n >= slab.count()) return;
   const glm::i64vec3 at = slab.voxel(n);
-  const SampledVoxel<V> voxel = sample_voxel<V, kInterpolation>(plan, at, mapped[n] != 0, offset[n]);
-  output.at(at) = voxel.value;
+  SampledVoxel<V> voxel;
+  if constexpr (kScalars) {
+    voxel = sample_voxel<V, kInterpolation>(plan, at, mapped[n] != 0, offset[n]);
+    output.voxels[output.index(at)] = voxel.value;
+  } else {
+    voxel = sample_components<V, kInterpolation>(plan, components, at, mapped[n] != 0, offset[n],
+                                                 output.voxels + output.index(at) * components);
+  }
   if (coverage) coverage[n] = voxel.inside;
   if (counts) {
     warp_count(&counts->covered, voxel.inside);
@@ -62,21 +75,27 @@ __global__ void inverse_kernel(SlabBox slab, glm::dmat3 mm_from_index, const std
   inverse_mm[n] = mapped[n] ? glm::vec3(mm_from_index * glm::dvec3(offset[n])) : glm::vec3(__int_as_float(0x7fc00000));
 }
 
-template <class V, class... Arguments>
-void launch_sample(cudaStream_t stream, Interpolation interpolation, std::int64_t voxels, Arguments... arguments) {
+template <class V, Interpolation kInterpolation, class... Arguments>
+void launch_sample(cudaStream_t stream, std::int64_t voxels, const SamplePlan<V>& plan, int components,
+                   Arguments... arguments) {
   const unsigned blocks = blocks_for(voxels);
-  switch (interpolation) {
-    case Interpolation::nearest:
-      sample_kernel<V, Interpolation::nearest><<<blocks, kThreads, 0, stream>>>(arguments...);
-      break;
-    case Interpolation::linear:
-      sample_kernel<V, Interpolation::linear><<<blocks, kThreads, 0, stream>>>(arguments...);
-      break;
-    case Interpolation::cubic:
-      sample_kernel<V, Interpolation::cubic><<<blocks, kThreads, 0, stream>>>(arguments...);
-      break;
+  if (components == 1) {
+    sample_kernel<V, kInterpolation, true><<<blocks, kThreads, 0, stream>>>(plan, components, arguments...);
+  } else {
+    sample_kernel<V, kInterpolation, false><<<blocks, kThreads, 0, stream>>>(plan, components, arguments...);
   }
   TETWARP_CUDA_TRY(cudaGetLastError());
+}
+
+template <class V, class... Arguments>
+void launch_sample(cudaStream_t stream, Interpolation interpolation, Arguments... arguments) {
+  switch (interpolation) {
+    case Interpolation::nearest: return launch_sample<V, Interpolation::nearest>(stream, arguments...);
+    case Interpolation::linear: return launch_sample<V, Interpolation::linear>(stream, arguments...);
+    case Interpolation::cubic: return launch_sample<V, Interpolation::cubic>(stream, arguments...);
+    case Interpolation::vote: return launch_sample<V, Interpolation::vote>(stream, arguments...);
+  }
+  throw InputError("unknown interpolation " + std::to_string(static_cast<int>(interpolation)));
 }
 
 }  // namespace
@@ -116,8 +135,8 @@ bool SlabWriter::is_plain() const {
     return target.background >= double(std::numeric_limits<V>::lowest()) &&
            target.background <= double(std::numeric_limits<V>::max());
   });
-  return background_fits && target.interpolation == Interpolation::linear && !target.padding &&
-         target.sampled_slices.empty() && targets_.front()->relation.same_grid &&
+  return background_fits && target.interpolation == Interpolation::linear && target.source.components == 1 &&
+         !target.padding && target.sampled_slices.empty() && targets_.front()->relation.same_grid &&
          voxel_count(*target.source.geometry) < INT32_MAX && voxel_count(output_) < INT32_MAX &&
          (type == VoxelType::u8 || type == VoxelType::i16 || type == VoxelType::u16);
 }
@@ -147,7 +166,7 @@ SlabWriter::Layout SlabWriter::layout(std::int64_t voxels) const {
   };
   for (const auto& on_device : targets_) {
     const VolumeView& output = on_device->target.output;
-    layout.voxels.push_back(output.memory == Memory::host ? add(size_bytes(output.type)) : Layout::kNone);
+    layout.voxels.push_back(output.memory == Memory::host ? add(voxel_bytes(output)) : Layout::kNone);
   }
   if (maps_.coverage.voxels) layout.coverage = add(sizeof(std::uint8_t));
   if (maps_.inverse_mm.voxels) layout.inverse_mm = add(sizeof(glm::vec3));
@@ -226,9 +245,10 @@ void SlabWriter::write_target(std::size_t number, const SlabBox& box, const Mapp
   dispatch(target.source.type, [&](auto voxel) {
     using V = decltype(voxel);
     const auto plan = plan_target(target, on_device.relation, reinterpret_cast<const V*>(target.source.voxels));
-    launch_sample<V>(
-        stream_, target.interpolation, box.count(), plan, box, static_cast<const std::uint8_t*>(mapped.mapped.data()),
-        static_cast<const glm::vec3*>(mapped.offset.data()), destination<V>(number, box), coverage, slices, counts);
+    launch_sample<V>(stream_, target.interpolation, box.count(), plan, target.source.components, box,
+                     static_cast<const std::uint8_t*>(mapped.mapped.data()),
+                     static_cast<const glm::vec3*>(mapped.offset.data()), destination<V>(number, box), coverage, slices,
+                     counts);
   });
 }
 

@@ -31,10 +31,11 @@ template <class V>
 struct Destination {
   V* voxels;  ///< of `begin`
   glm::i64vec3 begin;
-  std::int64_t row, slice;
+  std::int64_t row, slice;  ///< in voxels
 
-  __device__ V& at(const glm::i64vec3& voxel) const {
-    return voxels[(voxel.z - begin.z) * slice + (voxel.y - begin.y) * row + (voxel.x - begin.x)];
+  /// In voxels, from `voxels` on.
+  __device__ std::int64_t index(const glm::i64vec3& voxel) const {
+    return (voxel.z - begin.z) * slice + (voxel.y - begin.y) * row + (voxel.x - begin.x);
   }
 };
 

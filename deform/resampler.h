@@ -14,7 +14,9 @@
 
 namespace tetwarp {
 
-enum class Interpolation : std::uint8_t { nearest, linear, cubic };
+/// What is made of the voxels around a place (docs/algorithm.md). `vote` is for label maps: the linear weights are
+/// summed for each label, the largest sum wins, and of equal sums the one of the smaller label. No label is made up.
+enum class Interpolation : std::uint8_t { nearest, linear, cubic, vote };
 
 /// Stored values from `low` to `high` are no data (DICOM Pixel Padding Value and Range Limit, PS3.3 C.7.5.1.1.2).
 struct PaddingRange {
@@ -28,12 +30,15 @@ struct SliceRange {
 };
 
 /// One volume through the field. Any number of them share owner and undeformed coordinate.
+///
+/// A voxel may have several values (`components` of both views): each is interpolated alone, as if it were a volume of
+/// its own. Vectors are not turned.
 struct Target {
   ConstVolumeView source;  ///< must buffer `Resampler::source_region`
-  VolumeView output;       ///< on the resampler's geometry, of the source's type; must buffer the region asked for
+  VolumeView output;       ///< on the resampler's geometry, of the source's type and components; must buffer the region
   Interpolation interpolation = Interpolation::linear;
-  double background = 0;                      ///< where nothing maps; rounded and saturated to the voxel type
-  std::optional<PaddingRange> padding = {};   ///< never mixed into tissue: see core/sample.h
+  double background = 0;  ///< of every component, where nothing maps; rounded and saturated to the voxel type
+  std::optional<PaddingRange> padding = {};   ///< never mixed into tissue: see core/sample.h; for one component only
   std::span<SliceRange> sampled_slices = {};  ///< one per slice of the output geometry, or none: grown by each call
 };
 
@@ -58,7 +63,7 @@ struct Paths {
 struct Report {
   std::uint64_t covered = 0;    ///< voxels that got a value through the field
   std::uint64_t uncovered = 0;  ///< voxels that got the background
-  std::uint64_t clamped = 0;    ///< voxels whose value did not fit the voxel type and was saturated
+  std::uint64_t clamped = 0;    ///< voxels of which a value did not fit the voxel type and was saturated
   std::uint64_t padded = 0;     ///< voxels with padding among the samples that count: value of the nearest sample
   std::uint64_t conflicts =
       0;  ///< Outside::rest only: voxels outside the undeformed lattice that a tetrahedron moved into

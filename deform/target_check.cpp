@@ -18,7 +18,7 @@ std::string describe(const Region& region) {
 template <class View>
 void check_view(const View& view, const std::string& name) {
   require(view.geometry && view.voxels, name + " is empty");
-  require(view.components == 1, name + " has " + std::to_string(view.components) + " components, expected 1");
+  require(view.components >= 1, name + " has " + std::to_string(view.components) + " components, expected 1 or more");
   require(contains(whole(*view.geometry), view.buffered), name + " buffers " + describe(view.buffered) +
                                                               ", which is not part of its grid of " +
                                                               to_string(view.geometry->size));
@@ -33,6 +33,12 @@ void check_target(const Target& target, const Geometry& output, const Region& re
   require(target.output.type == target.source.type, "the output holds " + to_string(target.output.type) +
                                                         ", the source " + to_string(target.source.type) +
                                                         ": they must be the same");
+  require(target.output.components == target.source.components,
+          "the output has " + std::to_string(target.output.components) + " components, the source " +
+              std::to_string(target.source.components) + ": they must be the same");
+  require(
+      !target.padding || target.source.components == 1,
+      "padding is for one value a voxel, the source has " + std::to_string(target.source.components) + " components");
   require(contains(target.output.buffered, region),
           "the output buffers " + describe(target.output.buffered) + ", the region asked for is " + describe(region));
   require(contains(target.source.buffered, needed),

@@ -19,7 +19,7 @@ void require_host(Memory memory, const std::string& name);
 /// The part of the source grid that any interpolation may read for places in a box of continuous output index, clipped.
 Region source_box(const Geometry& source, const Geometry& output, const glm::dvec3& low, const glm::dvec3& high);
 
-/// Where a voxel of the grid lies in what a view buffers.
+/// Where a voxel of the grid lies in what a view buffers, in voxels.
 template <class View>
 std::size_t buffer_index(const View& view, const glm::i64vec3& voxel) {
   const glm::i64vec3 at = voxel - view.buffered.begin, size = view.buffered.end - view.buffered.begin;
@@ -40,13 +40,15 @@ Padding<V> padding_of(const std::optional<PaddingRange>& range) {
 
 SourceRelation relate(const Geometry& source, const Geometry& output);
 
-/// The plan of a checked target. `voxels` are the source's, wherever the backend keeps them.
+/// The plan of a checked target, for the first value of each voxel. `voxels` are the source's, wherever the backend
+/// keeps them.
 template <class V>
 SamplePlan<V> plan_target(const Target& target, const SourceRelation& relation, const V* voxels) {
   const Region& held = target.source.buffered;
   const glm::i64vec3 size = held.end - held.begin;
   SamplePlan<V> plan;
-  plan.source = {voxels, target.source.geometry->size, held.begin, glm::i64vec3(1, size.x, size.x * size.y)};
+  plan.source = {voxels, target.source.geometry->size, held.begin,
+                 glm::i64vec3(1, size.x, size.x * size.y) * std::int64_t{target.source.components}};
   plan.padding = padding_of<V>(target.padding);
   plan.background_saturated = false;
   plan.background = to_voxel<V>(static_cast<Working<V>>(target.background), &plan.background_saturated);

@@ -5,9 +5,11 @@
 #if defined(__CUDACC__)
 #include <cuda.h>
 #define TETWARP_HD __host__ __device__
+#define TETWARP_INLINE_HD __forceinline__ __host__ __device__
 #define TETWARP_NOINLINE_HD __noinline__ __host__ __device__
 #else
 #define TETWARP_HD
+#define TETWARP_INLINE_HD [[gnu::always_inline]] inline
 #define TETWARP_NOINLINE_HD [[gnu::noinline]]
 #endif
 

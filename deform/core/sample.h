@@ -15,7 +15,7 @@ struct Place {
 };
 
 /// @param offset  from `voxel`, in voxels
-TETWARP_HD inline Place place_at(const glm::i64vec3& voxel, const glm::vec3& offset) {
+TETWARP_INLINE_HD Place place_at(const glm::i64vec3& voxel, const glm::vec3& offset) {
   Place place;
   for (int axis = 0; axis < 3; ++axis) {
     const float whole = std::floor(offset[axis]);
@@ -28,7 +28,7 @@ TETWARP_HD inline Place place_at(const glm::i64vec3& voxel, const glm::vec3& off
 }
 
 /// @param index  continuous source index, finite and within +-2^62
-TETWARP_HD inline Place place_at(const glm::dvec3& index) {
+TETWARP_INLINE_HD Place place_at(const glm::dvec3& index) {
   Place place;
   for (int axis = 0; axis < 3; ++axis) {
     const double whole = std::floor(index[axis]);
@@ -41,7 +41,7 @@ TETWARP_HD inline Place place_at(const glm::dvec3& index) {
 }
 
 /// Moves a place up to half a voxel outside the outermost centres onto them. @return false if it is further out
-TETWARP_HD inline bool clamp_to_grid(Place& place, const glm::i64vec3& size) {
+TETWARP_INLINE_HD bool clamp_to_grid(Place& place, const glm::i64vec3& size) {
   for (int axis = 0; axis < 3; ++axis) {
     const std::int64_t last = size[axis] - 1;
     if (place.base[axis] == -1 && place.fraction[axis] >= 0.5f) {
@@ -66,7 +66,7 @@ struct SourceVoxels {
   const V* voxels;
   glm::i64vec3 size;    ///< of the whole grid: indices are clamped to it
   glm::i64vec3 begin;   ///< first voxel that is buffered
-  glm::i64vec3 stride;  ///< in voxels
+  glm::i64vec3 stride;  ///< in values
 
   TETWARP_HD V at(std::int64_t i, std::int64_t j, std::int64_t k) const {
     return voxels[(i - begin.x) * stride.x + (j - begin.y) * stride.y + (k - begin.z) * stride.z];
@@ -101,13 +101,17 @@ TETWARP_HD Sample<V> sample_nearest(const SourceVoxels<V>& source, const Place& 
   return {static_cast<Working<V>>(value), padding.present && padding.holds(value)};
 }
 
-/// The corner of largest weight, ties to the lowest index: what a sample that would mix padding into tissue takes.
+/// The corner of largest weight, ties to the lowest index.
+template <class V>
+TETWARP_HD V heaviest_corner(const SourceVoxels<V>& source, const Place& place) {
+  return source.at(place.base.x + (place.fraction.x > 0.5f), place.base.y + (place.fraction.y > 0.5f),
+                   place.base.z + (place.fraction.z > 0.5f));
+}
+
+/// What a sample that would mix padding into tissue takes.
 template <class V>
 TETWARP_HD Sample<V> heaviest_voxel(const SourceVoxels<V>& source, const Place& place) {
-  return {static_cast<Working<V>>(source.at(place.base.x + (place.fraction.x > 0.5f),
-                                            place.base.y + (place.fraction.y > 0.5f),
-                                            place.base.z + (place.fraction.z > 0.5f))),
-          true};
+  return {static_cast<Working<V>>(heaviest_corner(source, place)), true};
 }
 
 /// Along x, then y, then z: each a + t (b - a). Voxels of weight zero are not looked at.
@@ -180,6 +184,65 @@ TETWARP_HD Sample<V> sample_cubic(const SourceVoxels<V>& source, const Place& pl
     sum_z = k == z.first ? term : sum_z + term;
   }
   return {sum_z, false};
+}
+
+/// Whether voxels have one label. NaN is a label too, as in `is_smaller_label`.
+template <class V>
+TETWARP_HD bool is_same_label(V a, V b) {
+  if constexpr (std::is_floating_point_v<V>) return a == b || (a != a && b != b);
+  return a == b;
+}
+
+/// NaN is larger than all others.
+template <class V>
+TETWARP_HD bool is_smaller_label(V a, V b) {
+  if constexpr (std::is_floating_point_v<V>) return a < b || (a == a && b != b);
+  return a < b;
+}
+
+/// A voxel of the source, copied.
+template <class V>
+struct Label {
+  V value;
+  bool padded;
+};
+
+/// The label that most of the weight is for. The weights are those of linear interpolation, of corner c = x + 2y + 4z
+/// the product of its factors along x, y and z, in this order, in float. Those of one label are summed from corner 0
+/// up, the largest sum wins, and among equal sums the smallest label. What is returned are the bits of the first corner
+/// with that label.
+///
+/// This is the largest of the volumes that have 1 where a label is and 0 elsewhere, each interpolated linearly, without
+/// making them. Voxels of weight zero are not looked at.
+template <class V>
+TETWARP_HD Label<V> sample_vote(const SourceVoxels<V>& source, const Place& place, const Padding<V>& padding) {
+  const glm::vec3& t = place.fraction;
+  V label[8];
+  bool uniform = true;
+  for (int corner = 0; corner < 8; ++corner) {  // without weight: its neighbour, which has some, once more
+    label[corner] =
+        source.at(place.base.x + ((corner & 1) != 0 && t.x != 0), place.base.y + ((corner & 2) != 0 && t.y != 0),
+                  place.base.z + ((corner & 4) != 0 && t.z != 0));
+    uniform = uniform && is_same_label(label[corner], label[0]);
+    if (padding.present && padding.holds(label[corner])) return {heaviest_corner(source, place), true};
+  }
+  if (uniform) return {label[0], false};
+  const float along_x[2] = {1.0f - t.x, t.x}, along_y[2] = {1.0f - t.y, t.y}, along_z[2] = {1.0f - t.z, t.z};
+  float weight[8];
+  for (int corner = 0; corner < 8; ++corner)
+    weight[corner] = along_x[corner & 1] * along_y[corner >> 1 & 1] * along_z[corner >> 2];
+  V winner = label[0];
+  float most = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    float sum = weight[corner];  // from a later corner of a label it is no larger than from the first
+    for (int other = corner + 1; other < 8; ++other)
+      sum += is_same_label(label[other], label[corner]) ? weight[other] : 0.0f;
+    if (sum > most || (sum == most && is_smaller_label(label[corner], winner))) {
+      winner = label[corner];
+      most = sum;
+    }
+  }
+  return {winner, false};
 }
 
 /// The voxel value of a working value: integers are rounded to nearest, ties to even, and saturate.

@@ -23,45 +23,106 @@ struct SamplePlan {
 };
 
 template <class V>
+struct VoxelValue {
+  V value;
+  bool saturated, padded;
+};
+
+template <class V>
 struct SampledVoxel {
   V value;
   bool inside, saturated, padded;
   std::int64_t first_slice, last_slice;  ///< of the source, with weight; where inside
 };
 
-/// The value of one output voxel (semantics section 4).
+/// Where an output voxel comes from, on the grid of the source. @return false if that is outside
+template <class V>
+TETWARP_INLINE_HD bool source_place(const SamplePlan<V>& plan, const glm::i64vec3& voxel, const glm::vec3& offset,
+                                    Place& place) {
+  place = plan.relation.same_grid ? place_at(voxel, offset)
+                                  : place_at(plan.relation.source_from_output(glm::dvec3(voxel) + glm::dvec3(offset)));
+  return clamp_to_grid(place, plan.source.size);
+}
+
+/// The value at a place on the grid of the source.
+template <class V, Interpolation kInterpolation>
+TETWARP_INLINE_HD VoxelValue<V> sample_place(const SourceVoxels<V>& source, const Place& place,
+                                             const Padding<V>& padding) {
+  if (place.fraction.x == 0 && place.fraction.y == 0 && place.fraction.z == 0) {  // a copy, to the bit
+    const V value = source.at(place.base.x, place.base.y, place.base.z);
+    return {value, false, padding.present && padding.holds(value)};
+  }
+  if constexpr (kInterpolation == Interpolation::vote) {
+    const Label<V> label = sample_vote(source, place, padding);
+    return {label.value, false, label.padded};
+  } else {
+    Sample<V> sample;
+    if constexpr (kInterpolation == Interpolation::nearest) {
+      sample = sample_nearest(source, place, padding);
+    } else if constexpr (kInterpolation == Interpolation::linear) {
+      sample = sample_linear(source, place, padding);
+    } else {
+      sample = sample_cubic(source, place, padding);
+    }
+    bool saturated = false;
+    const V value = to_voxel<V>(sample.value, &saturated);
+    return {value, saturated, sample.padded};
+  }
+}
+
+/// First and last slice of the source with weight at a place on its grid.
+template <Interpolation kInterpolation>
+TETWARP_INLINE_HD void slices_at(const Place& place, std::int64_t slices, std::int64_t& first, std::int64_t& last) {
+  first = place.base.z;
+  last = first + (place.fraction.z != 0);
+  if constexpr (kInterpolation == Interpolation::nearest) {
+    first = last = first + (place.fraction.z >= 0.5f);
+  } else if constexpr (kInterpolation == Interpolation::cubic) {
+    if (place.fraction.z != 0) {
+      first = clamp_index(first - 1, slices);
+      last = clamp_index(last + 1, slices);
+    }
+  }
+}
+
+/// The value of one output voxel (docs/algorithm.md).
 ///
 /// @param mapped  whether the field says where it comes from; @param offset  undeformed minus deformed place, voxels
 template <class V, Interpolation kInterpolation>
 TETWARP_HD SampledVoxel<V> sample_voxel(const SamplePlan<V>& plan, const glm::i64vec3& voxel, bool mapped,
                                         const glm::vec3& offset) {
-  const SampledVoxel<V> nothing{plan.background, false, plan.background_saturated, false, 0, 0};
-  if (!mapped) return nothing;
-  Place place = plan.relation.same_grid
-                    ? place_at(voxel, offset)
-                    : place_at(plan.relation.source_from_output(glm::dvec3(voxel) + glm::dvec3(offset)));
-  if (!clamp_to_grid(place, plan.source.size)) return nothing;
-  if (place.fraction.x == 0 && place.fraction.y == 0 && place.fraction.z == 0) {  // a copy, to the bit
-    const V value = plan.source.at(place.base.x, place.base.y, place.base.z);
-    return {value, true, false, plan.padding.present && plan.padding.holds(value), place.base.z, place.base.z};
+  Place place;
+  if (!mapped || !source_place(plan, voxel, offset, place))
+    return {plan.background, false, plan.background_saturated, false, 0, 0};
+  const VoxelValue<V> found = sample_place<V, kInterpolation>(plan.source, place, plan.padding);
+  SampledVoxel<V> sampled{found.value, true, found.saturated, found.padded, 0, 0};
+  slices_at<kInterpolation>(place, plan.source.size.z, sampled.first_slice, sampled.last_slice);
+  return sampled;
+}
+
+/// The same for several values a voxel, each interpolated alone at one place.
+///
+/// @param plan  of the first value of each voxel, without padding; @param output  where the values go, side by side
+/// @return  the last value; saturated if any was
+template <class V, Interpolation kInterpolation>
+TETWARP_HD SampledVoxel<V> sample_components(const SamplePlan<V>& plan, int components, const glm::i64vec3& voxel,
+                                             bool mapped, const glm::vec3& offset, V* output) {
+  SampledVoxel<V> sampled{plan.background, false, plan.background_saturated, false, 0, 0};
+  Place place;
+  if (!mapped || !source_place(plan, voxel, offset, place)) {
+    for (int n = 0; n < components; ++n) output[n] = plan.background;
+    return sampled;
   }
-  Sample<V> sample;
-  std::int64_t first = place.base.z, last = place.base.z + (place.fraction.z != 0);
-  if constexpr (kInterpolation == Interpolation::nearest) {
-    sample = sample_nearest(plan.source, place, plan.padding);
-    first = last = place.base.z + (place.fraction.z >= 0.5f);
-  } else if constexpr (kInterpolation == Interpolation::linear) {
-    sample = sample_linear(plan.source, place, plan.padding);
-  } else {
-    sample = sample_cubic(plan.source, place, plan.padding);
-    if (place.fraction.z != 0) {
-      first = clamp_index(first - 1, plan.source.size.z);
-      last = clamp_index(last + 1, plan.source.size.z);
-    }
+  sampled.inside = true;
+  sampled.saturated = false;
+  slices_at<kInterpolation>(place, plan.source.size.z, sampled.first_slice, sampled.last_slice);
+  SourceVoxels<V> source = plan.source;
+  for (int n = 0; n < components; ++n, ++source.voxels) {
+    const VoxelValue<V> found = sample_place<V, kInterpolation>(source, place, plan.padding);
+    output[n] = sampled.value = found.value;
+    sampled.saturated = sampled.saturated || found.saturated;
   }
-  bool saturated = false;
-  const V value = to_voxel<V>(sample.value, &saturated);
-  return {value, true, saturated, sample.padded, first, last};
+  return sampled;
 }
 
 }  // namespace tetwarp

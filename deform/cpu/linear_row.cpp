@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <limits>
 
 // Compiled once for each instruction set.
 #undef HWY_TARGET_INCLUDE
@@ -99,14 +100,44 @@ struct Samples {
     const Float fx = hn::Load(df, x + i), fy = hn::Load(df, y + i), fz = hn::Load(df, z + i);
     return mix(mix(along_x(0, i, fx), along_x(1, i, fx), fy), mix(along_x(2, i, fx), along_x(3, i, fx), fy), fz);
   }
+
+  void interpolate(int count, V* output) const {
+    const hn::Rebind<V, Floats> dv;
+    const auto lanes = static_cast<int>(hn::Lanes(Floats()));
+    for (int i = 0; i < count; i += lanes)
+      hn::StoreU(hn::DemoteTo(dv, hn::NearestInt(interpolated(i))), dv, output + i);
+  }
+
+  /// Copies what voxels are made of that is the same all around; leaves others.
+  void copy_uniform(int count, V* output, RowState* state) const {
+    using Bits = std::make_unsigned_t<V>;
+    const hn::RebindToUnsigned<Ints> du;
+    const hn::Rebind<Bits, Floats> dv;
+    const hn::Rebind<std::uint8_t, Floats> d8;
+    const auto lanes = static_cast<int>(hn::Lanes(du));
+    auto* const to = reinterpret_cast<Bits*>(output);
+    auto* const states = reinterpret_cast<std::uint8_t*>(state);
+    for (int i = 0; i < count; i += lanes) {
+      const auto pair = hn::Load(du, pairs[0] + i);
+      const auto low = hn::And(pair, hn::Set(du, std::numeric_limits<Bits>::max()));
+      const auto other =
+          hn::Or(hn::Or(hn::Xor(pair, hn::Load(du, pairs[1] + i)), hn::Xor(pair, hn::Load(du, pairs[2] + i))),
+                 hn::Or(hn::Xor(pair, hn::Load(du, pairs[3] + i)),
+                        hn::Xor(pair, hn::Or(low, hn::ShiftLeft<Voxels<V>::kBits>(low)))));
+      const auto was = hn::PromoteTo(du, hn::LoadU(d8, states + i));
+      const auto now =
+          hn::IfThenElse(hn::Eq(other, hn::Zero(du)), was, hn::Set(du, static_cast<std::uint32_t>(RowState::left)));
+      hn::StoreU(hn::TruncateTo(d8, now), d8, states + i);
+      hn::StoreU(hn::TruncateTo(dv, low), dv, to + i);
+    }
+  }
 };
 
 template <class V>
-SliceRange sample(const LinearSource& source, const Row& row, V* output, RowState* state) {
+SliceRange sample(const LinearSource& source, const Row& row, V* output, RowState* state, bool uniform) {
   const Floats df;
   const Ints di;
   const hn::Rebind<std::uint8_t, Floats> d8;
-  const hn::Rebind<V, Floats> dv;
   const auto lanes = static_cast<int>(hn::Lanes(df));
   const Int stride_row = hn::Set(di, source.row), stride_slice = hn::Set(di, source.slice);
   // Of the buffer's first voxel. Numbers may wrap around: their differences fit.
@@ -141,17 +172,20 @@ SliceRange sample(const LinearSource& source, const Row& row, V* output, RowStat
   const std::int32_t low = hn::GetLane(hn::MinOfLanes(di, least)), high = hn::GetLane(hn::MaxOfLanes(di, most));
   if (low > high) return {};  // and nothing that a voxel left might read instead
   samples.read(source, count);
-  for (int i = 0; i < count; i += lanes)
-    hn::StoreU(hn::DemoteTo(dv, hn::NearestInt(samples.interpolated(i))), dv, output + i);
+  if (uniform) {
+    samples.copy_uniform(count, output, state);
+  } else {
+    samples.interpolate(count, output);
+  }
   return {low, high};
 }
 
-SliceRange sample_any(const LinearSource& source, const Row& row, void* output, RowState* state) {
+SliceRange sample_any(const LinearSource& source, const Row& row, void* output, RowState* state, bool uniform) {
   switch (source.type) {
-    case VoxelType::u8: return sample(source, row, static_cast<std::uint8_t*>(output), state);
-    case VoxelType::i8: return sample(source, row, static_cast<std::int8_t*>(output), state);
-    case VoxelType::u16: return sample(source, row, static_cast<std::uint16_t*>(output), state);
-    case VoxelType::i16: return sample(source, row, static_cast<std::int16_t*>(output), state);
+    case VoxelType::u8: return sample(source, row, static_cast<std::uint8_t*>(output), state, uniform);
+    case VoxelType::i8: return sample(source, row, static_cast<std::int8_t*>(output), state, uniform);
+    case VoxelType::u16: return sample(source, row, static_cast<std::uint16_t*>(output), state, uniform);
+    case VoxelType::i16: return sample(source, row, static_cast<std::int16_t*>(output), state, uniform);
     default: std::fill(state, state + row.count, RowState::left); return {};
   }
 }
@@ -167,7 +201,11 @@ namespace tetwarp::cpu {
 HWY_EXPORT(sample_any);
 
 SliceRange sample_linear_row(const LinearSource& source, const Row& row, void* output, RowState* state) {
-  return HWY_DYNAMIC_DISPATCH(sample_any)(source, row, output, state);
+  return HWY_DYNAMIC_DISPATCH(sample_any)(source, row, output, state, false);
+}
+
+SliceRange sample_uniform_row(const LinearSource& source, const Row& row, void* output, RowState* state) {
+  return HWY_DYNAMIC_DISPATCH(sample_any)(source, row, output, state, true);
 }
 
 }  // namespace tetwarp::cpu

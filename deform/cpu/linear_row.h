@@ -12,7 +12,7 @@ namespace tetwarp::cpu {
 template <class V>
 constexpr bool kHasLinearRow = std::is_integral_v<V> && sizeof(V) <= 2;
 
-/// A source on the grid of the output, without padding, that 32-bit offsets reach.
+/// A source on the grid of the output, of one component and without padding, that 32-bit offsets reach.
 struct LinearSource {
   VoxelType type;
   const void* voxels;
@@ -50,5 +50,8 @@ enum class RowState : std::uint8_t {
 /// @param row  of up to kMostInRow voxels  @param output  of the source's type  @param state  of each voxel, written
 /// @return slices of the source that were sampled
 SliceRange sample_linear_row(const LinearSource& source, const Row& row, void* output, RowState* state);
+
+/// The same for a vote, where all voxels around have one label; where they have several, the voxel is left.
+SliceRange sample_uniform_row(const LinearSource& source, const Row& row, void* output, RowState* state);
 
 }  // namespace tetwarp::cpu

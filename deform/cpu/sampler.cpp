@@ -23,11 +23,14 @@ class TypedSampler final : public TargetSampler {
   }
 
   void sample(const Row& row, std::uint8_t* coverage, Report& counts) const override {
-    V* output = reinterpret_cast<V*>(target_.output.voxels) + buffer_index(target_.output, row.voxel);
+    V* output = output_at(row.voxel);
     SliceRange sampled;
-    if (has_source_ && row.count <= kMostInRow) {
+    if (components() > 1) {
+      sample_vectors(row, output, coverage, counts, sampled);
+    } else if (has_source_ && row.count <= kMostInRow) {
       RowState state[kMostInRow];
-      sampled = sample_linear_row(source_, row, output, state);
+      sampled = kInterpolation == Interpolation::vote ? sample_uniform_row(source_, row, output, state)
+                                                      : sample_linear_row(source_, row, output, state);
       counts.covered += static_cast<std::uint64_t>(std::count(state, state + row.count, RowState::sampled));
       if (coverage) std::fill_n(coverage, row.count, std::uint8_t{1});  // of those left, written below
       sample_voxels(row, state, output, coverage, counts, sampled);
@@ -44,12 +47,12 @@ class TypedSampler final : public TargetSampler {
 
   void copy(const Region& box, Report& counts) const override {
     const glm::i64vec3& stride = plan_.source.stride;
-    const auto width = box.end.x - box.begin.x;
+    const auto width = (box.end.x - box.begin.x) * components();
     for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {
       const glm::i64vec3 first(box.begin.x, box.begin.y, z), in = first - plan_.source.begin;
-      const V* from = plan_.source.voxels + (in.z * stride.z + in.y * stride.y + in.x);
-      V* to = reinterpret_cast<V*>(target_.output.voxels) + buffer_index(target_.output, first);
-      const std::int64_t step = target_.output.buffered.end.x - target_.output.buffered.begin.x;
+      const V* from = plan_.source.voxels + (in.z * stride.z + in.y * stride.y + in.x * stride.x);
+      V* to = output_at(first);
+      const std::int64_t step = (target_.output.buffered.end.x - target_.output.buffered.begin.x) * components();
       for (std::int64_t y = box.begin.y; y < box.end.y; ++y, from += stride.y, to += step) std::copy_n(from, width, to);
       if (!target_.sampled_slices.empty()) note_slices(z, {z, z});
     }
@@ -57,7 +60,14 @@ class TypedSampler final : public TargetSampler {
   }
 
  private:
-  static constexpr bool kVectors = kInterpolation == Interpolation::linear && kHasLinearRow<V>;
+  static constexpr bool kVectors =
+      (kInterpolation == Interpolation::linear || kInterpolation == Interpolation::vote) && kHasLinearRow<V>;
+
+  int components() const { return target_.source.components; }
+  V* output_at(const glm::i64vec3& voxel) const {
+    return reinterpret_cast<V*>(target_.output.voxels) +
+           buffer_index(target_.output, voxel) * static_cast<std::size_t>(components());
+  }
 
   /// One voxel after the other: all, or where `state` is not null those that are left.
   void sample_voxels(const Row& row, const RowState* state, V* output, std::uint8_t* coverage, Report& counts,
@@ -67,15 +77,28 @@ class TypedSampler final : public TargetSampler {
       const SampledVoxel<V> voxel =
           sample_voxel<V, kInterpolation>(plan_, row.voxel + glm::i64vec3(i, 0, 0), row.mapped[i] != 0, row.offset[i]);
       output[i] = voxel.value;
-      counts.clamped += voxel.saturated;
-      counts.padded += voxel.padded;
-      counts.covered += voxel.inside;
-      counts.uncovered += !voxel.inside;
-      if (coverage) coverage[i] = voxel.inside;
-      if (voxel.inside) {
-        sampled.first = std::min(sampled.first, voxel.first_slice);
-        sampled.last = std::max(sampled.last, voxel.last_slice);
-      }
+      note_voxel(voxel, coverage ? coverage + i : nullptr, counts, sampled);
+    }
+  }
+
+  /// All voxels of a row, of several values each.
+  void sample_vectors(const Row& row, V* output, std::uint8_t* coverage, Report& counts, SliceRange& sampled) const {
+    for (int i = 0; i < row.count; ++i, output += components()) {
+      const SampledVoxel<V> voxel = sample_components<V, kInterpolation>(
+          plan_, components(), row.voxel + glm::i64vec3(i, 0, 0), row.mapped[i] != 0, row.offset[i], output);
+      note_voxel(voxel, coverage ? coverage + i : nullptr, counts, sampled);
+    }
+  }
+
+  static void note_voxel(const SampledVoxel<V>& voxel, std::uint8_t* coverage, Report& counts, SliceRange& sampled) {
+    counts.clamped += voxel.saturated;
+    counts.padded += voxel.padded;
+    counts.covered += voxel.inside;
+    counts.uncovered += !voxel.inside;
+    if (coverage) *coverage = voxel.inside;
+    if (voxel.inside) {
+      sampled.first = std::min(sampled.first, voxel.first_slice);
+      sampled.last = std::max(sampled.last, voxel.last_slice);
     }
   }
 
@@ -101,6 +124,7 @@ std::unique_ptr<const TargetSampler> make_sampler(const Target& target, const Ge
     case Interpolation::nearest: return std::make_unique<TypedSampler<V, Interpolation::nearest>>(target, output);
     case Interpolation::linear: return std::make_unique<TypedSampler<V, Interpolation::linear>>(target, output);
     case Interpolation::cubic: return std::make_unique<TypedSampler<V, Interpolation::cubic>>(target, output);
+    case Interpolation::vote: return std::make_unique<TypedSampler<V, Interpolation::vote>>(target, output);
   }
   throw InputError("unknown interpolation " + std::to_string(static_cast<int>(target.interpolation)));
 }

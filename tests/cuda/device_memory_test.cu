@@ -130,6 +130,38 @@ TEST_F(DeviceMemory, PullFieldsToo) {
   EXPECT_EQ(cuda->source_region(scene.grid, part), cpu->source_region(scene.grid, part));
 }
 
+TEST_F(DeviceMemory, VotesAndSeveralComponentsToo) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  Scene scene(23);
+  const Region region{{1, 2, 3}, {40, 29, 22}};
+  const auto cpu = make_cpu_resampler(scene.grid), cuda = make_cuda_resampler(scene.grid);
+  cpu->set_field(view(scene.field));
+  cuda->set_field(view(scene.field));
+  for (const int components : {1, 2, 3}) {
+    const std::size_t values = scene.source.voxels.size() * static_cast<std::size_t>(components);
+    std::vector<std::int16_t> source(values), expected(values, 77);
+    for (std::int16_t& value : source) value = static_cast<std::int16_t>(scene.random.integer(0, 3));
+    const OnDevice source_there(source), output_there(expected);
+    const auto view_of = [&](auto* bytes) {
+      return BasicView<std::remove_pointer_t<decltype(bytes)>>{&scene.grid, whole(scene.grid), VoxelType::i16,
+                                                               components, bytes};
+    };
+    for (const Interpolation interpolation : kInterpolations) {
+      const Target on_host{.source = view_of(std::as_bytes(std::span(source)).data()),
+                           .output = view_of(std::as_writable_bytes(std::span(expected)).data()),
+                           .interpolation = interpolation,
+                           .background = -7};
+      Target on_gpu = on_host;
+      on_gpu.source = on_device(on_host.source, source_there.data());
+      on_gpu.output = on_device(on_host.output, output_there.data());
+      const Report report = cpu->resample(region, {&on_host, 1});
+      expect_same_report(report, cuda->resample(region, {&on_gpu, 1}));
+      EXPECT_TRUE(same_bits(expected, output_there.download()))
+          << components << " components, interpolation " << static_cast<int>(interpolation);
+    }
+  }
+}
+
 TEST_F(DeviceMemory, PointersThatAreNotWhereTheViewSaysAreRefused) {
   Scene scene(3);
   const auto cuda = make_cuda_resampler(scene.grid);

@@ -117,7 +117,9 @@ TEST_P(Refusals, ViewsThatDoNotFit) {
   refuse("the source is empty", [](Call& c) { c.target.source.voxels = nullptr; });
   refuse("the output is empty", [](Call& c) { c.target.output.geometry = nullptr; });
   refuse("int16", [](Call& c) { c.target.output.type = VoxelType::u16; });
-  refuse("components", [](Call& c) { c.target.source.components = 3; });
+  refuse("output has 1 components, the source 3", [](Call& c) { c.target.source.components = 3; });
+  refuse("output has 2 components, the source 1", [](Call& c) { c.target.output.components = 2; });
+  refuse("0 components", [](Call& c) { c.target.source.components = c.target.output.components = 0; });
   refuse("grid", [&](Call& c) { c.target.output.geometry = &other; });
   refuse("output buffers", [](Call& c) { c.target.output.buffered.end.z = 4; });
   refuse("source buffers", [](Call& c) { c.target.source.buffered.begin.x = 3; });

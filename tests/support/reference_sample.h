@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 
 #include "deform/resampler.h"
@@ -28,7 +29,8 @@ inline ReferenceTaps reference_taps(double x, Interpolation interpolation) {
   const auto low = static_cast<std::int64_t>(base);
   switch (interpolation) {
     case Interpolation::nearest: return {static_cast<std::int64_t>(std::floor(x + 0.5)), 1, {1}};
-    case Interpolation::linear: return {low, 2, {1 - t, t}};
+    case Interpolation::linear:
+    case Interpolation::vote: return {low, 2, {1 - t, t}};
     case Interpolation::cubic: break;
   }
   const auto catmull_rom = [](double s) {  // Keys 1981 with a = -1/2, distance s
@@ -36,6 +38,24 @@ inline ReferenceTaps reference_taps(double x, Interpolation interpolation) {
     return s < 2 ? -0.5 * s * s * s + 2.5 * s * s - 4 * s + 2 : 0.0;
   };
   return {low - 1, 4, {catmull_rom(1 + t), catmull_rom(t), catmull_rom(1 - t), catmull_rom(2 - t)}};
+}
+
+/// The label of the largest sum of weights, the smallest of several, and how far the second is behind.
+struct ReferenceVote {
+  double label, margin;
+};
+
+inline ReferenceVote reference_vote(const std::map<double, double>& weight_of_label) {
+  ReferenceVote vote{};
+  double most = -1, second = -1;
+  for (const auto& [label, weight] : weight_of_label) {  // rising labels
+    second = std::max(second, std::min(weight, most));
+    if (weight <= most) continue;
+    most = weight;
+    vote.label = label;
+  }
+  vote.margin = most - std::max(second, 0.0);
+  return vote;
 }
 
 template <class V>
@@ -56,6 +76,7 @@ ReferenceSample reference_sample(const Volume<V>& source, glm::dvec3 x, Interpol
   const ReferenceTaps taps[3] = {reference_taps(x.x, interpolation), reference_taps(x.y, interpolation),
                                  reference_taps(x.z, interpolation)};
   double heaviest = -1, heaviest_value = 0;
+  std::map<double, double> weight_of_label;
   for (int k = 0; k < taps[2].count; ++k) {
     for (int j = 0; j < taps[1].count; ++j) {
       for (int i = 0; i < taps[0].count; ++i) {
@@ -67,6 +88,7 @@ ReferenceSample reference_sample(const Volume<V>& source, glm::dvec3 x, Interpol
         const auto value =
             static_cast<double>(source.voxels[static_cast<std::size_t>(at.x + size.x * (at.y + size.y * at.z))]);
         sample.value += weight * value;
+        if (interpolation == Interpolation::vote) weight_of_label[value] += weight;
         if (padding && value >= padding->low && value <= padding->high) sample.padded = true;
         if (weight > heaviest) {
           heaviest = weight;
@@ -74,6 +96,11 @@ ReferenceSample reference_sample(const Volume<V>& source, glm::dvec3 x, Interpol
         }
       }
     }
+  }
+  if (interpolation == Interpolation::vote) {
+    const ReferenceVote vote = reference_vote(weight_of_label);
+    sample.value = vote.label;
+    sample.jump = std::min(sample.jump, vote.margin / 6);  // along each axis the difference of two sums falls by 2
   }
   if (sample.padded) sample.value = heaviest_value;
   return sample;

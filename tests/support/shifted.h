@@ -10,7 +10,8 @@
 
 namespace tetwarp::test {
 
-constexpr Interpolation kInterpolations[] = {Interpolation::nearest, Interpolation::linear, Interpolation::cubic};
+constexpr Interpolation kInterpolations[] = {Interpolation::nearest, Interpolation::linear, Interpolation::cubic,
+                                             Interpolation::vote};
 
 /// A lattice of cells of one voxel that reaches two voxels further than the grid on every side.
 inline Geometry wide_lattice(const Geometry& grid) {
