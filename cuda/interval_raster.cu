@@ -165,7 +165,7 @@ struct TileMemory {
   unsigned short items[kSlots * kTileJ];  ///< rows of one y of a tetrahedron
   unsigned unsure[kMostUnsure];
   glm::i32vec3 vertices[kMostVertices];  ///< of the tile's cells, as `TileWorker::read_vertex`, i fastest
-  unsigned per_warp[2][kTileJ];          ///< of every other round
+  unsigned per_warp[kTileJ];
   unsigned count, item_count, unsure_count, settled;
   bool overlaps;  ///< or too many are unsure
 };
@@ -360,18 +360,18 @@ struct TileWorker {
       Span span{};
       const bool reaches = n < total && may_own(number, at_hand, span);
       const unsigned votes = __ballot_sync(~0u, reaches);
-      unsigned* per_warp = memory.per_warp[from / kTileThreads & 1];
-      if (lane == 0) per_warp[warp] = static_cast<unsigned>(__popc(votes));
+      if (lane == 0) memory.per_warp[warp] = static_cast<unsigned>(__popc(votes));
       __syncthreads();
       unsigned place = listed + static_cast<unsigned>(__popc(votes & ((1u << lane) - 1)));
       for (int w = 0; w < kTileJ; ++w) {
-        if (w < warp) place += per_warp[w];
-        listed += per_warp[w];
+        if (w < warp) place += memory.per_warp[w];
+        listed += memory.per_warp[w];
       }
       if (reaches && place < kMostTetrahedra) {
         memory.numbers[place] = number;
         memory.spans[place] = span.word();
       }
+      __syncthreads();
       if (listed > kMostTetrahedra) return false;
     }
     if (thread == 0) memory.count = listed;
