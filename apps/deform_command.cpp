@@ -125,9 +125,7 @@ Outputs Deformation::begin_outputs() const {
   std::vector<std::filesystem::path> inputs = FurtherVolumes::inputs(o.with);
   inputs.push_back(o.input.path);
   if (!is_same_grid(o.grid) && o.grid != "fit") inputs.emplace_back(o.grid);
-  for (const std::string& text : o.fields) {
-    if (std::filesystem::exists(text)) inputs.emplace_back(text);
-  }
+  for (const std::filesystem::path& path : field_files(o.fields)) inputs.push_back(path);
   if (!o.pull_field.empty()) inputs.push_back(o.pull_field);
   if (!o.pull_field.empty() && !points_.empty())
     throw UsageError("--points needs a forward field, --pull-field has no forward map");
@@ -419,17 +417,17 @@ json Deformation::report_with_times() const {
 
 void Deformation::write() {
   const auto start = std::chrono::steady_clock::now();
+  const std::string made_by = "tetwarp field " + field_sha256_.substr(0, 16);
   if (outputs_.series) {
     dicom_report_ = series_->report();
   } else {
     Stage stage(options_.common, "write");
     write_image(outputs_.volume, std::as_const(output_).view(),
-                {.compression = options_.compression.value_or(-1),
-                 .metadata = {{"descrip", std::string("tetwarp field ") + field_sha256_.substr(0, 16)}}});
+                {.compression = options_.compression.value_or(-1), .metadata = {{"descrip", made_by}}});
   }
   outputs_.maps->write();
   if (!outputs_.preview.empty()) write_preview_picture();
-  outputs_.further->write(options_.compression, "tetwarp field " + field_sha256_.substr(0, 16));
+  outputs_.further->write(options_.compression, made_by);
   points_.write(outputs_.points);
   write_json(outputs_.sidecar, sidecar());
   stages_.emplace_back("write", std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());

@@ -12,10 +12,8 @@ int run_field(const FieldOptions& options) {
                      "\"; a field is written as .mha .nrrd .nii .nii.gz");
   }
   check_fields(options.fields, options.cell_size);
-  std::vector<std::filesystem::path> inputs{options.like.path};
-  for (const std::string& text : options.fields) {
-    if (std::filesystem::exists(text)) inputs.emplace_back(text);
-  }
+  std::vector<std::filesystem::path> inputs = field_files(options.fields);
+  inputs.push_back(options.like.path);
   OutputSet outputs(inputs, options.common.overwrite);
   const std::filesystem::path output = outputs.add(options.output);
   Stage stage(options.common, "field");

@@ -1,6 +1,8 @@
 #include "apps/field_source.h"
 
+#include <algorithm>
 #include <filesystem>
+#include <iterator>
 #include <memory>
 
 #include "deform/fields/formula.h"
@@ -42,6 +44,13 @@ void check_fields(const std::vector<std::string>& fields, std::optional<std::int
   if (*cell_size < 1) throw UsageError("--cell-size is " + std::to_string(*cell_size) + ", expected at least 1");
   if (!is_formula(fields.front()))
     throw UsageError("--cell-size is for formulas, " + fields.front() + " has its own lattice");
+}
+
+std::vector<std::filesystem::path> field_files(const std::vector<std::string>& fields) {
+  std::vector<std::filesystem::path> files;
+  std::copy_if(fields.begin(), fields.end(), std::back_inserter(files),
+               [](const std::string& text) { return std::filesystem::exists(text); });
+  return files;
 }
 
 glm::i64vec3 lattice_size(const std::vector<std::string>& fields, const Geometry& volume,

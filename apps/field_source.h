@@ -27,6 +27,9 @@ ForwardField read_forward_field(const std::vector<std::string>& fields, const Ge
 /// Checks texts and files' names without reading vectors: for a command that fails early. @throws as above
 void check_fields(const std::vector<std::string>& fields, std::optional<std::int64_t> cell_size);
 
+/// Those of the fields that are files.
+std::vector<std::filesystem::path> field_files(const std::vector<std::string>& fields);
+
 /// Size of the lattice that `read_forward_field` will make.
 glm::i64vec3 lattice_size(const std::vector<std::string>& fields, const Geometry& volume,
                           std::optional<std::int64_t> cell_size);
