@@ -114,7 +114,7 @@ class Scanner {
         const int from = std::max(std::min(i, count - lanes_), 0);  // the last vectors may overlap
         Vec3 displacement;
         hn::LoadInterleaved3(df, &given[from].x, displacement.x, displacement.y, displacement.z);
-        const Float in_row = hn::Min(hn::ConvertTo(df, hn::Iota(Ints(), from)), set(static_cast<float>(cells_.x)));
+        const Float in_row = hn::Min(hn::ConvertTo(df, numbers_from(from)), set(static_cast<float>(cells_.x)));
         const Vec3 at{hn::Add(set(static_cast<float>(row.x)), in_row), set(static_cast<float>(row.y)),
                       set(static_cast<float>(row.z))};
         FloatMask certain = hn::Eq(hn::Zero(df), hn::Zero(df));
@@ -164,7 +164,7 @@ class Scanner {
     const Ints di;
     const glm::vec3& cell = field_.lattice.cell;
     const glm::ivec3 at = first_ + in;
-    const FloatMask odd = hn::RebindMask(df, hn::TestBit(hn::Iota(di, at.x + at.y + at.z), hn::Set(di, 1)));
+    const FloatMask odd = hn::RebindMask(df, hn::TestBit(numbers_from(at.x + at.y + at.z), hn::Set(di, 1)));
     const FloatMask here =
         hn::RebindMask(df, hn::FirstN(di, static_cast<std::size_t>(std::min(cells_.x - in.x, lanes_))));
     const Vec3 c0 = low.at(in.x, in.y), c1 = low.at(in.x + 1, in.y), c2 = low.at(in.x, in.y + 1),

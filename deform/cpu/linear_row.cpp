@@ -59,30 +59,23 @@ struct Axis {
   }
 };
 
-/// Asks for what the same voxels of the next slice will be sampled from, if they come from beside these.
-template <class V>
-HWY_INLINE void prefetch(const LinearSource& source, std::int64_t at, int lanes) {
-  const auto* line = reinterpret_cast<const char*>(static_cast<const V*>(source.voxels)) +
-                     (at + 2 * std::int64_t{source.slice}) * static_cast<std::int64_t>(sizeof(V));
-  hwy::Prefetch(line);
-  hwy::Prefetch(line + lanes * static_cast<int>(sizeof(V)));
-}
-
 HWY_INLINE Float mix(Float a, Float b, Float t) { return hn::Add(a, hn::Mul(t, hn::Sub(b, a))); }
 
 /// What a row is interpolated from.
 template <class V>
 struct Samples {
-  HWY_ALIGN float x[kMostInRow], y[kMostInRow], z[kMostInRow];  ///< fractions
-  HWY_ALIGN std::int32_t at[kMostInRow];                        ///< voxel of the buffer; 0 where it is left
   /// Of each the voxel and the next along i; of the next row, the next slice, and both.
   HWY_ALIGN std::uint32_t pairs[4][kMostInRow];
 
   /// One after the other: cheaper than gathers, which some processors make of many steps, and no vector waits for it.
-  void read(const LinearSource& source, int count) {
-    const std::int64_t steps[4] = {0, source.row, source.slice, std::int64_t{source.slice} + source.row};
+  HWY_INLINE Samples(const LinearSource& source, const LinearPlaces& places) {
+    const std::int64_t row = source.layout.row, slice = source.layout.slice, steps[4] = {0, row, slice, slice + row};
+    const V* voxels = static_cast<const V*>(source.voxels);
+    const int count = places.count;
+    for (int i = 0; i < count; i += kVoxelsInLine) prefetch(voxels + places.at[i] + 2 * slice);
+    prefetch(voxels + places.at[count - 1] + 2 * slice);
     for (int i = 0; i < count; ++i) {
-      const V* from = static_cast<const V*>(source.voxels) + at[i];
+      const V* from = voxels + places.at[i];
       for (int n = 0; n < 4; ++n) {
         pairs[n][i] = 0;
         std::memcpy(&pairs[n][i], from + steps[n], 2 * sizeof(V));
@@ -95,21 +88,21 @@ struct Samples {
     const Int bits = hn::BitCast(di, hn::Load(hn::RebindToUnsigned<Ints>(), pairs[n] + i));
     return mix(Voxels<V>::low(bits), Voxels<V>::high(bits), fraction);
   }
-  HWY_INLINE Float interpolated(int i) const {
+  HWY_INLINE Float interpolated(const LinearPlaces& places, int i) const {
     const Floats df;
-    const Float fx = hn::Load(df, x + i), fy = hn::Load(df, y + i), fz = hn::Load(df, z + i);
+    const Float fx = hn::Load(df, places.x + i), fy = hn::Load(df, places.y + i), fz = hn::Load(df, places.z + i);
     return mix(mix(along_x(0, i, fx), along_x(1, i, fx), fy), mix(along_x(2, i, fx), along_x(3, i, fx), fy), fz);
   }
 
-  void interpolate(int count, V* output) const {
+  void interpolate(const LinearPlaces& places, V* output) const {
     const hn::Rebind<V, Floats> dv;
     const auto lanes = static_cast<int>(hn::Lanes(Floats()));
-    for (int i = 0; i < count; i += lanes)
-      hn::StoreU(hn::DemoteTo(dv, hn::NearestInt(interpolated(i))), dv, output + i);
+    for (int i = 0; i < places.count; i += lanes)
+      hn::StoreU(hn::DemoteTo(dv, hn::NearestInt(interpolated(places, i))), dv, output + i);
   }
 
-  /// Copies what voxels are made of that is the same all around; leaves others.
-  void copy_uniform(int count, V* output, RowState* state) const {
+  /// Copies what voxels are made of that is the same all around; leaves others. @return how many are not left
+  int copy_uniform(int count, V* output, RowState* state) const {
     using Bits = std::make_unsigned_t<V>;
     const hn::RebindToUnsigned<Ints> du;
     const hn::Rebind<Bits, Floats> dv;
@@ -117,6 +110,7 @@ struct Samples {
     const auto lanes = static_cast<int>(hn::Lanes(du));
     auto* const to = reinterpret_cast<Bits*>(output);
     auto* const states = reinterpret_cast<std::uint8_t*>(state);
+    std::size_t copied = 0;
     for (int i = 0; i < count; i += lanes) {
       const auto pair = hn::Load(du, pairs[0] + i);
       const auto low = hn::And(pair, hn::Set(du, std::numeric_limits<Bits>::max()));
@@ -125,69 +119,87 @@ struct Samples {
                  hn::Or(hn::Xor(pair, hn::Load(du, pairs[3] + i)),
                         hn::Xor(pair, hn::Or(low, hn::ShiftLeft<Voxels<V>::kBits>(low)))));
       const auto was = hn::PromoteTo(du, hn::LoadU(d8, states + i));
-      const auto now =
-          hn::IfThenElse(hn::Eq(other, hn::Zero(du)), was, hn::Set(du, static_cast<std::uint32_t>(RowState::left)));
+      const auto left = hn::Set(du, static_cast<std::uint32_t>(RowState::left));
+      const auto now = hn::IfThenElse(hn::Eq(other, hn::Zero(du)), was, left);
+      copied += hn::CountTrue(du, hn::Ne(now, left));
       hn::StoreU(hn::TruncateTo(d8, now), d8, states + i);
       hn::StoreU(hn::TruncateTo(dv, low), dv, to + i);
     }
+    return static_cast<int>(copied);
   }
+
+ private:
+  static constexpr int kVoxelsInLine = 64 / sizeof(V);
+
+  /// Asks for what the same voxels of the next slice will be sampled from, if they come from beside these.
+  static HWY_INLINE void prefetch(const V* voxels) { hwy::Prefetch(voxels); }
 };
 
-template <class V>
-SliceRange sample(const LinearSource& source, const Row& row, V* output, RowState* state, bool uniform) {
+void find_places(const LinearLayout& layout, const Row& row, LinearPlaces& places) {
   const Floats df;
   const Ints di;
   const hn::Rebind<std::uint8_t, Floats> d8;
   const auto lanes = static_cast<int>(hn::Lanes(df));
-  const Int stride_row = hn::Set(di, source.row), stride_slice = hn::Set(di, source.slice);
+  const Int stride_row = hn::Set(di, layout.row), stride_slice = hn::Set(di, layout.slice);
   // Of the buffer's first voxel. Numbers may wrap around: their differences fit.
-  const auto begin = static_cast<std::int32_t>(std::int64_t{source.begin.z} * source.slice +
-                                               std::int64_t{source.begin.y} * source.row + source.begin.x);
+  const auto begin = static_cast<std::int32_t>(std::int64_t{layout.begin.z} * layout.slice +
+                                               std::int64_t{layout.begin.y} * layout.row + layout.begin.x);
   const glm::ivec3 first(row.voxel);
+  const Int along = hn::Iota(di, 0);
   Int least = hn::Set(di, INT32_MAX), most = hn::Set(di, INT32_MIN);
-  Samples<V> samples;
+  std::size_t sampled = 0;
   int count = 0;
   for (; count + lanes <= row.count; count += lanes) {
     Float ux, uy, uz;
     hn::LoadInterleaved3(df, &row.offset[count].x, ux, uy, uz);
-    const Axis x(ux, hn::Iota(di, first.x + count), source.last.x), y(uy, hn::Set(di, first.y), source.last.y),
-        z(uz, hn::Set(di, first.z), source.last.z);
+    const Axis x(ux, hn::Add(along, hn::Set(di, first.x + count)), layout.last.x),
+        y(uy, hn::Set(di, first.y), layout.last.y), z(uz, hn::Set(di, first.z), layout.last.z);
     const Int at = hn::Sub(hn::Add(hn::Add(hn::Mul(z.base, stride_slice), hn::Mul(y.base, stride_row)), x.base),
                            hn::Set(di, begin));
     const auto mapped = hn::Gt(hn::PromoteTo(di, hn::LoadU(d8, row.mapped + count)), hn::Zero(di));
     const auto good = hn::And(hn::And(mapped, x.inside), hn::And(y.inside, z.inside));
-    prefetch<V>(source, hn::GetLane(at), lanes);
-    hn::Store(hn::IfThenElseZero(good, at), di, samples.at + count);
-    hn::Store(x.fraction, df, samples.x + count);
-    hn::Store(y.fraction, df, samples.y + count);
-    hn::Store(z.fraction, df, samples.z + count);
+    hn::Store(hn::IfThenElseZero(good, at), di, places.at + count);
+    hn::Store(x.fraction, df, places.x + count);
+    hn::Store(y.fraction, df, places.y + count);
+    hn::Store(z.fraction, df, places.z + count);
     hn::StoreU(hn::DemoteTo(d8, hn::IfThenElse(good, hn::Set(di, 1), hn::Set(di, 2))), d8,
-               reinterpret_cast<std::uint8_t*>(state) + count);
+               reinterpret_cast<std::uint8_t*>(places.state) + count);
+    sampled += hn::CountTrue(di, good);
     const auto between = hn::RebindMask(di, hn::Ne(z.fraction, hn::Zero(df)));
     const Int top = hn::Add(z.base, hn::IfThenElseZero(between, hn::Set(di, 1)));
     least = hn::Min(least, hn::IfThenElse(good, z.base, hn::Set(di, INT32_MAX)));
     most = hn::Max(most, hn::IfThenElse(good, top, hn::Set(di, INT32_MIN)));
   }
-  for (int i = count; i < row.count; ++i) state[i] = RowState::left;
-  const std::int32_t low = hn::GetLane(hn::MinOfLanes(di, least)), high = hn::GetLane(hn::MaxOfLanes(di, most));
-  if (low > high) return {};  // and nothing that a voxel left might read instead
-  samples.read(source, count);
-  if (uniform) {
-    samples.copy_uniform(count, output, state);
-  } else {
-    samples.interpolate(count, output);
-  }
-  return {low, high};
+  std::fill(places.state + count, places.state + row.count, RowState::left);
+  places.count = count;
+  places.sampled = static_cast<int>(sampled);
+  if (sampled == 0) return;
+  places.slices = {hn::GetLane(hn::MinOfLanes(di, least)), hn::GetLane(hn::MaxOfLanes(di, most))};
 }
 
-SliceRange sample_any(const LinearSource& source, const Row& row, void* output, RowState* state, bool uniform) {
-  switch (source.type) {
-    case VoxelType::u8: return sample(source, row, static_cast<std::uint8_t*>(output), state, uniform);
-    case VoxelType::i8: return sample(source, row, static_cast<std::int8_t*>(output), state, uniform);
-    case VoxelType::u16: return sample(source, row, static_cast<std::uint16_t*>(output), state, uniform);
-    case VoxelType::i16: return sample(source, row, static_cast<std::int16_t*>(output), state, uniform);
-    default: std::fill(state, state + row.count, RowState::left); return {};
+/// Calls with the voxels' type as it is in the output.
+template <class Work>
+auto with_type(VoxelType type, void* output, Work&& work) {
+  switch (type) {
+    case VoxelType::u8: return work(static_cast<std::uint8_t*>(output));
+    case VoxelType::i8: return work(static_cast<std::int8_t*>(output));
+    case VoxelType::u16: return work(static_cast<std::uint16_t*>(output));
+    default: return work(static_cast<std::int16_t*>(output));
   }
+}
+
+void sample_linear(const LinearSource& source, const LinearPlaces& places, void* output) {
+  with_type(source.type, output, [&](auto* to) {
+    using V = std::remove_pointer_t<decltype(to)>;
+    Samples<V>(source, places).interpolate(places, to);
+  });
+}
+
+int sample_uniform(const LinearSource& source, const LinearPlaces& places, void* output, RowState* state) {
+  return with_type(source.type, output, [&](auto* to) {
+    using V = std::remove_pointer_t<decltype(to)>;
+    return Samples<V>(source, places).copy_uniform(places.count, to, state);
+  });
 }
 
 }  // namespace tetwarp::cpu::HWY_NAMESPACE
@@ -198,14 +210,26 @@ HWY_AFTER_NAMESPACE();
 
 namespace tetwarp::cpu {
 
-HWY_EXPORT(sample_any);
+HWY_EXPORT(find_places);
+HWY_EXPORT(sample_linear);
+HWY_EXPORT(sample_uniform);
 
-SliceRange sample_linear_row(const LinearSource& source, const Row& row, void* output, RowState* state) {
-  return HWY_DYNAMIC_DISPATCH(sample_any)(source, row, output, state, false);
+void LinearPlaces::find(const LinearLayout& layout, const Row& row) {
+  if (found_ && layout == layout_) return;
+  slices = {};
+  HWY_DYNAMIC_DISPATCH(find_places)(layout, row, *this);
+  layout_ = layout;
+  found_ = true;
 }
 
-SliceRange sample_uniform_row(const LinearSource& source, const Row& row, void* output, RowState* state) {
-  return HWY_DYNAMIC_DISPATCH(sample_any)(source, row, output, state, true);
+void sample_linear_row(const LinearSource& source, const LinearPlaces& places, void* output) {
+  if (places.sampled == 0) return;  // and nothing that a voxel left might read instead
+  HWY_DYNAMIC_DISPATCH(sample_linear)(source, places, output);
+}
+
+int sample_uniform_row(const LinearSource& source, const LinearPlaces& places, void* output, RowState* state) {
+  if (places.sampled == 0) return 0;
+  return HWY_DYNAMIC_DISPATCH(sample_uniform)(source, places, output, state);
 }
 
 }  // namespace tetwarp::cpu

@@ -375,14 +375,14 @@ class Marcher {
           if (kFirst && j + 1 < size_.y) store(at_x + kRow, {place.x, hn::Add(place.y, step_y), place.z});
           next.z = hn::Add(place.z, set(field_.lattice.voxel.z));
         } else {
-          const PointAxis x(hn::Iota(di, tile_.box.begin.x + i), field_, turns_, 0, kNudgeX);
+          const PointAxis x(numbers_from(tile_.box.begin.x + i), field_, turns_, 0, kNudgeX);
           const auto trials = try_tetrahedra<kSnapping, Effort::close>(field_, place, {x.steps, y.steps, z.steps},
                                                                        {x.nudge, y.nudge, z.nudge});
           prefetch(trials.t.at_d);
           const Vec3 offset = to_offset(trials.moved);
           hn::StoreInterleaved3(offset.x, offset.y, offset.z, df, &tile_.offset[first + i].x);
           const IntMask failed = hn::AndNot(hn::RebindMask(di, trials.owns), wanted);
-          if (!hn::AllFalse(di, failed)) push(hn::Iota(di, column + kRow * kRow * k), trials.place(), failed);
+          if (!hn::AllFalse(di, failed)) push(numbers_from(column + kRow * kRow * k), trials.place(), failed);
           if (kFirst && j + 1 < size_.y) store(at_x + kRow, trials.next_along_j());
           next = trials.next_along_k();
         }

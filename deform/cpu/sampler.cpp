@@ -22,20 +22,26 @@ class TypedSampler final : public TargetSampler {
     if constexpr (kVectors) has_source_ = LinearSource::make(plan_, voxel_count(target.source.buffered), source_);
   }
 
-  void sample(const Row& row, std::uint8_t* coverage, Report& counts) const override {
+  void sample(const Row& row, LinearPlaces& places, std::uint8_t* coverage, Report& counts) const override {
     V* output = output_at(row.voxel);
     SliceRange sampled;
     if (components() > 1) {
       sample_vectors(row, output, coverage, counts, sampled);
     } else if (has_source_ && row.count <= kMostInRow) {
-      RowState state[kMostInRow];
-      sampled = kInterpolation == Interpolation::vote ? sample_uniform_row(source_, row, output, state)
-                                                      : sample_linear_row(source_, row, output, state);
-      counts.covered += static_cast<std::uint64_t>(std::count(state, state + row.count, RowState::sampled));
+      places.find(source_.layout, row);
+      sampled = places.slices;
       if (coverage) std::fill_n(coverage, row.count, std::uint8_t{1});  // of those left, written below
-      sample_voxels(row, state, output, coverage, counts, sampled);
+      if (kInterpolation == Interpolation::vote) {
+        RowState state[kMostInRow];
+        std::copy_n(places.state, row.count, state);
+        const int done = sample_uniform_row(source_, places, output, state);
+        sample_left(row, state, done, output, coverage, counts, sampled);
+      } else {
+        sample_linear_row(source_, places, output);
+        sample_left(row, places.state, places.sampled, output, coverage, counts, sampled);
+      }
     } else {
-      sample_voxels(row, nullptr, output, coverage, counts, sampled);
+      for (int i = 0; i < row.count; ++i) sample_one(row, i, output, coverage, counts, sampled);
     }
     if (!target_.sampled_slices.empty()) note_slices(row.voxel.z, sampled);
   }
@@ -69,16 +75,20 @@ class TypedSampler final : public TargetSampler {
            buffer_index(target_.output, voxel) * static_cast<std::size_t>(components());
   }
 
-  /// One voxel after the other: all, or where `state` is not null those that are left.
-  void sample_voxels(const Row& row, const RowState* state, V* output, std::uint8_t* coverage, Report& counts,
-                     SliceRange& sampled) const {
-    for (int i = 0; i < row.count; ++i) {
-      if (state && state[i] != RowState::left) continue;
-      const SampledVoxel<V> voxel =
-          sample_voxel<V, kInterpolation>(plan_, row.voxel + glm::i64vec3(i, 0, 0), row.mapped[i] != 0, row.offset[i]);
-      output[i] = voxel.value;
-      note_voxel(voxel, coverage ? coverage + i : nullptr, counts, sampled);
-    }
+  /// What vectors did not sample. @param done  voxels that they did
+  void sample_left(const Row& row, const RowState* state, int done, V* output, std::uint8_t* coverage, Report& counts,
+                   SliceRange& sampled) const {
+    counts.covered += static_cast<std::uint64_t>(done);
+    if (done == row.count) return;
+    for (int i = 0; i < row.count; ++i)
+      if (state[i] == RowState::left) sample_one(row, i, output, coverage, counts, sampled);
+  }
+
+  void sample_one(const Row& row, int i, V* output, std::uint8_t* coverage, Report& counts, SliceRange& sampled) const {
+    const SampledVoxel<V> voxel =
+        sample_voxel<V, kInterpolation>(plan_, row.voxel + glm::i64vec3(i, 0, 0), row.mapped[i] != 0, row.offset[i]);
+    output[i] = voxel.value;
+    note_voxel(voxel, coverage ? coverage + i : nullptr, counts, sampled);
   }
 
   /// All voxels of a row, of several values each.
@@ -151,10 +161,11 @@ void sample_targets(const Row& row, const TargetSamplers& samplers, std::uint8_t
     report.uncovered += static_cast<std::uint64_t>(row.count) - covered;
     return;
   }
-  samplers.front()->sample(row, coverage, report);
+  LinearPlaces places;
+  samplers.front()->sample(row, places, coverage, report);
   for (std::size_t n = 1; n < samplers.size(); ++n) {
     Report not_counted;
-    samplers[n]->sample(row, nullptr, not_counted);
+    samplers[n]->sample(row, places, nullptr, not_counted);
   }
 }
 

@@ -18,12 +18,15 @@ struct Row {
   const glm::vec3* offset;     ///< undeformed minus deformed, voxels of output index
 };
 
+struct LinearPlaces;  // linear_row.h
+
 /// Samples one source at the undeformed places of rows. Its source may be on any grid.
 class TargetSampler {
  public:
   virtual ~TargetSampler() = default;
   /// Writes a row of the output; adds to the counts. `coverage`, where not null, receives 1 or 0 a voxel.
-  virtual void sample(const Row& row, std::uint8_t* coverage, Report& counts) const = 0;
+  /// @param places  what samplers of the same row may share
+  virtual void sample(const Row& row, LinearPlaces& places, std::uint8_t* coverage, Report& counts) const = 0;
   /// Whether voxels of a box that stay where they are can be copied.
   virtual bool can_copy(const Region& box) const = 0;
   /// Copies them; adds to the counts.

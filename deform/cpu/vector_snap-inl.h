@@ -40,6 +40,8 @@ struct Vec3 {
   Float x, y, z;
 };
 
+/// first, first + 1, ... (Highway's Iota of what is not a constant is made lane by lane)
+HWY_INLINE Int numbers_from(int first) { return hn::Add(hn::Iota(Ints(), 0), hn::Set(Ints(), first)); }
 HWY_INLINE Float set(float value) { return hn::Set(Floats(), value); }
 HWY_INLINE Vec3 set(const glm::vec3& v) { return {set(v.x), set(v.y), set(v.z)}; }
 HWY_INLINE Vec3 operator-(const Vec3& a, const Vec3& b) {

@@ -69,12 +69,13 @@ TYPED_TEST(LinearRow, GivesTheBitsOfOneVoxelAfterTheOtherOnEveryInstructionSet) 
         mapped[i] = promised && random.integer(0, 9) != 0;
       }
       V output[kCount];
-      RowState state[kCount];
-      const SliceRange slices = sample_linear_row(source, row, output, state);
+      LinearPlaces places;
+      places.find(source.layout, row);
+      sample_linear_row(source, places, output);
       SliceRange expected_slices;
       for (int i = 0; i < kCount; ++i) {
-        if (state[i] == RowState::left) continue;
-        ASSERT_EQ(state[i], RowState::sampled);
+        if (places.state[i] == RowState::left) continue;
+        ASSERT_EQ(places.state[i], RowState::sampled);
         const SampledVoxel<V> expected =
             sample_voxel<V, Interpolation::linear>(plan, row.voxel + glm::i64vec3(i, 0, 0), mapped[i] != 0, offset[i]);
         ASSERT_TRUE(expected.inside);
@@ -83,8 +84,8 @@ TYPED_TEST(LinearRow, GivesTheBitsOfOneVoxelAfterTheOtherOnEveryInstructionSet) 
         expected_slices.last = std::max(expected_slices.last, expected.last_slice);
         ++sampled;
       }
-      ASSERT_EQ(slices.first, expected_slices.first);
-      ASSERT_EQ(slices.last, expected_slices.last);
+      ASSERT_EQ(places.slices.first, expected_slices.first);
+      ASSERT_EQ(places.slices.last, expected_slices.last);
     }
   }
   EXPECT_GT(sampled, 1000 * sets) << "hardly anything is sampled with vectors";
