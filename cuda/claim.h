@@ -23,6 +23,8 @@ struct Wanted {
 /// The plain way, for any field: every cell claims its voxels, and the lowest number wins, whatever the order.
 class Claims {
  public:
+  static constexpr std::int64_t kBytes = sizeof(unsigned long long) + sizeof(unsigned);  ///< of a voxel of a slab
+
   /// To be called when the field is another one.
   void forget_field() { has_bounds_ = false; }
 

@@ -252,34 +252,31 @@ __global__ void inverted_kernel(StepLattice lattice, NudgeTurns turns, InvertedP
 
 }  // namespace
 
-/// Room for all of a box, zero but for the bits of voxels.
-void Coverage::reserve(const SlabBox& box, cudaStream_t stream) {
+void Coverage::begin(const SlabBox& box, cudaStream_t stream) {
   words_ = static_cast<int>((box.size.x + 31) / 32);
   const auto rows = static_cast<std::size_t>(box.size.y * box.size.z), slices = static_cast<std::size_t>(box.size.z);
   const std::size_t words = rows * static_cast<std::size_t>(words_);
-  crossings_.fill(0, 2 * words + 2 * rows + slices + 1, stream);
-  in_slice_ = crossings_.data() + 2 * words + 2 * rows;
+  crossings_.fill(0, kCounterWords + 2 * words + 2 * rows + slices + 1, stream);
+  in_slice_ = ins() + 2 * words + 2 * rows;
   single_.reserve(words);
   several_.reserve(words);
 }
 
 void Coverage::forget(const SlabBox& box, cudaStream_t stream) {
-  reserve(box, stream);
+  begin(box, stream);
   const auto words = static_cast<std::size_t>(box.size.y * box.size.z * words_);
   single_.fill(0, words, stream);
   several_.fill(0, words, stream);
 }
 
-void Coverage::find(const LatticeOnDevice& lattice, const SlabBox& box, unsigned long long* several_in_box,
-                    cudaStream_t stream) {
+void Coverage::find(const LatticeOnDevice& lattice, const SlabBox& box, cudaStream_t stream) {
   const DeviceField& field = lattice.field();
-  reserve(box, stream);
   const std::int64_t rows = box.size.y * box.size.z;
   const auto words = static_cast<std::size_t>(rows * words_);
   const auto row_count = static_cast<std::size_t>(rows), slices = static_cast<std::size_t>(box.size.z);
-  std::uint32_t *starts = crossings_.data() + 2 * words, *chains = starts + row_count;
-  const Crossings crossings{crossings_.data(),
-                            crossings_.data() + words,
+  std::uint32_t *starts = ins() + 2 * words, *chains = starts + row_count;
+  const Crossings crossings{ins(),
+                            ins() + words,
                             reinterpret_cast<int*>(starts),
                             words_,
                             reinterpret_cast<int*>(chains),
@@ -293,7 +290,7 @@ void Coverage::find(const LatticeOnDevice& lattice, const SlabBox& box, unsigned
   while (lanes > 1 && lanes / 2 >= words_) lanes /= 2;
   wind_kernel<<<blocks_for(rows * lanes), kThreads, 0, stream>>>(crossings, rows, static_cast<int>(box.size.y),
                                                                  static_cast<int>(box.size.x), lanes, single, several,
-                                                                 in_slice_, several_in_box);
+                                                                 in_slice_, &counters()->claimed);
   if (lattice.statistics().inverted != 0) {
     const InvertedPairs& inverted = lattice.inverted();
     const IntBox region{glm::ivec3(box.begin), glm::ivec3(box.begin + box.size)};
@@ -301,12 +298,13 @@ void Coverage::find(const LatticeOnDevice& lattice, const SlabBox& box, unsigned
                                 (field.steps.cells.z / kBlock + 1);
     inverted_kernel<<<blocks_for(groups), kThreads, 0, stream>>>(field.steps, NudgeTurns(field.frame.nudge), inverted,
                                                                  {region, words_, single, several});
-    count_several(box, several_in_box, stream);
+    count_several(box, stream);
   }
   TETWARP_CUDA_TRY(cudaGetLastError());
 }
 
-void Coverage::count_several(const SlabBox& box, unsigned long long* several_in_box, cudaStream_t stream) {
+void Coverage::count_several(const SlabBox& box, cudaStream_t stream) {
+  unsigned long long* several_in_box = &counters()->claimed;
   const auto slices = static_cast<std::size_t>(box.size.z);
   TETWARP_CUDA_TRY(cudaMemsetAsync(in_slice_, 0, slices * sizeof(unsigned), stream));
   TETWARP_CUDA_TRY(cudaMemsetAsync(several_in_box, 0, sizeof *several_in_box, stream));

@@ -259,6 +259,12 @@ class ForwardResampler final : public CudaResampler {
 
   bool can_gather() const { return lattice_->field().has_steps() && !rest_outside_; }
   bool can_write_plainly() const override { return can_gather(); }
+  bool can_map_plainly(const SlabWriter& writer) const {
+    return can_gather() && !writer.wants_jacobian() && !writer.wants_owners();
+  }
+  std::int64_t work_bytes(const SlabWriter& writer) const override {
+    return Mapped::kBytes + (can_map_plainly(writer) ? 0 : Claims::kBytes);
+  }
 
   void write_plainly(const SlabBox& box, SlabWriter& writer) override {
     std::visit(
@@ -275,7 +281,7 @@ class ForwardResampler final : public CudaResampler {
     const auto voxels = static_cast<std::size_t>(box.count());
     const Settled settled{mapped_.mapped.reserve(voxels), mapped_.offset.reserve(voxels), writer.jacobian(),
                           writer.owners()};
-    if (can_gather() && !settled.jacobian && !settled.owners) {
+    if (can_map_plainly(writer)) {
       count_paths(box, gather_.run(*lattice_, box, OffsetSink{box, settled.mapped, settled.offset}, stream_));
       return;
     }

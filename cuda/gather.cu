@@ -91,8 +91,8 @@ template <class Sink>
 Gather::Counters Gather::run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink,
                              cudaStream_t stream) {
   const DeviceField& field = lattice.field();
-  counters_.fill(0, 1, stream);
   if (IntervalRaster::suits(field.steps, is_mostly_folded(lattice))) return run_intervals(lattice, box, sink, stream);
+  coverage_.begin(box, stream);
   const glm::ivec3 size(box.size), tile(kSeedTile, kSeedTile, kMarch);
   const glm::ivec3 marches = marches_of(size);
   Task task{field.steps,
@@ -104,13 +104,12 @@ Gather::Counters Gather::run(const LatticeOnDevice& lattice, const SlabBox& box,
             resting_.reserve(std::size_t(marches.x) * std::size_t(marches.y) * std::size_t(marches.z)),
             (size + tile - 1) / tile,
             queue_.reserve(kQueueSize),
-            counters_.data()};
+            coverage_.counters()};
   const std::int64_t seeds = std::int64_t{task.seeds.x} * task.seeds.y * task.seeds.z;
   glm::vec3* seeded = seeds_.reserve(static_cast<std::size_t>(seeds));
   if (!beside_) beside_.emplace();
   beside_->begun.record(stream);
-  unsigned long long* several = &counters_.data()->claimed;
-  coverage_.find(lattice, box, several, stream);
+  coverage_.find(lattice, box, stream);
   beside_->begun.hold_back(beside_->stream.get());  // seeds and what rests do not wait for the coverage
   seed_kernel<<<blocks_for(seeds), kThreads, 0, beside_->stream.get()>>>(task, seeded);
   const std::int64_t march_count = std::int64_t{marches.x} * marches.y * marches.z;
@@ -130,7 +129,7 @@ Gather::Counters Gather::run(const LatticeOnDevice& lattice, const SlabBox& box,
   TETWARP_CUDA_TRY(cudaGetLastError());
   Counters found = counters(stream);
   if (found.left != 0) {
-    coverage_.count_several(box, several, stream);
+    coverage_.count_several(box, stream);
     found = counters(stream);
   }
   if (found.claimed == 0) return found;
@@ -147,10 +146,10 @@ Gather::Counters Gather::run_intervals(const LatticeOnDevice& lattice, const Sla
   if (settled.left == 0) return {settled.covered, 0, 0, 0};
   coverage_.forget(box, stream);
   intervals_.mark_left(lattice, box, coverage_.several(), stream);
-  coverage_.count_several(box, &counters_.data()->claimed, stream);
+  coverage_.count_several(box, stream);
   Task task{lattice.field().steps, NudgeTurns(lattice.field().frame.nudge), box};
   task.single = coverage_.single();
-  task.counters = counters_.data();
+  task.counters = coverage_.counters();
   claim_several(task, lattice.field(), sink, stream);
   Counters found = counters(stream);
   found.covered += settled.covered;
@@ -165,7 +164,7 @@ bool Gather::is_mostly_folded(const LatticeOnDevice& lattice) {
 
 Gather::Counters Gather::counters(cudaStream_t stream) {
   Counters* found = found_.reserve(1);
-  TETWARP_CUDA_TRY(cudaMemcpyAsync(found, counters_.data(), sizeof *found, cudaMemcpyDeviceToHost, stream));
+  TETWARP_CUDA_TRY(cudaMemcpyAsync(found, coverage_.counters(), sizeof *found, cudaMemcpyDeviceToHost, stream));
   TETWARP_CUDA_TRY(cudaStreamSynchronize(stream));
   return *found;
 }
@@ -202,6 +201,9 @@ void Gather::claim_several(const Task& task, const DeviceField& field, const Sin
 }
 
 template Gather::Counters Gather::run(const LatticeOnDevice&, const SlabBox&, const OffsetSink&, cudaStream_t);
+template Gather::Counters Gather::run(const LatticeOnDevice&, const SlabBox&, const VolumesSink<void>&, cudaStream_t);
+template Gather::Counters Gather::run(const LatticeOnDevice&, const SlabBox&, const VolumesSink<std::int16_t>&,
+                                      cudaStream_t);
 template Gather::Counters Gather::run(const LatticeOnDevice&, const SlabBox&, const VoxelSink<std::uint8_t>&,
                                       cudaStream_t);
 template Gather::Counters Gather::run(const LatticeOnDevice&, const SlabBox&, const VoxelSink<std::int16_t>&,

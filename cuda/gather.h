@@ -14,6 +14,8 @@ namespace tetwarp::cuda_detail {
 ///
 /// Like every sink of a gather it has a place for each voxel, which moves by `per_slice` along k.
 struct OffsetSink {
+  static constexpr bool kIsWide = false;
+
   SlabBox box;
   std::uint8_t* mapped;
   glm::vec3* offset;
@@ -49,10 +51,12 @@ struct OffsetSink {
     offset[place] = u;
     return true;
   }
-  /// Voxels that stay where they are: first read, then written.
-  struct Copied {};
-  __device__ Copied fetch(const glm::ivec3&) const { return {}; }
-  __device__ void put(int place, Copied) const { write(place, {}, glm::vec3(0)); }
+  /// Voxels of a column along k that stay where they are.
+  template <int kCount>
+  __device__ void copy(const glm::ivec3& voxel, std::uint32_t wanted) const {
+    for (int n = 0, to = place(voxel); n < kCount; ++n, to += per_slice())
+      if ((wanted >> n & 1) != 0) write(to, {}, glm::vec3(0));
+  }
   __device__ void nothing(int place) const {
     mapped[place] = 0;
     offset[place] = glm::vec3(0);
@@ -65,12 +69,7 @@ struct OffsetSink {
 /// have several owners, and what is left, are claimed. So every field with whole steps may take this way.
 class Gather {
  public:
-  struct Counters {
-    unsigned long long covered;
-    unsigned long long claimed;  ///< voxels that may have several owners, or whose owner was not found otherwise
-    unsigned queued;             ///< voxels that the march left to the queue and the exact walk
-    unsigned left;               ///< voxels with one owner that these left to the claims
-  };
+  using Counters = GatherCounters;
 
   /// Finds the voxels of `box`; waits for the stream.
   template <class Sink>
@@ -104,7 +103,6 @@ class Gather {
   DeviceBuffer<glm::vec3> seeds_;
   DeviceBuffer<std::uint8_t> resting_;
   DeviceBuffer<Entry> queue_;
-  DeviceBuffer<Counters> counters_;
   DeviceBuffer<unsigned> numbered_, claimed_;
   PinnedBuffer<unsigned> several_in_slice_;
   PinnedBuffer<Counters> found_;

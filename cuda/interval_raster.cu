@@ -281,15 +281,8 @@ struct TileWorker {
     const int lane = thread & 31, y = thread / 32;
     if (lane >= size.x || y >= size.y) return;
     const glm::ivec3 at = voxels.begin + glm::ivec3(lane, y, 0);
-    for (int z = 0; z < size.z; z += kAtOnce) {
-      typename Sink::Copied copied[kAtOnce];
-#pragma unroll
-      for (int k = 0; k < kAtOnce; ++k)
-        if (z + k < size.z) copied[k] = sink.fetch(at + glm::ivec3(0, 0, z + k));
-#pragma unroll
-      for (int k = 0; k < kAtOnce; ++k)
-        if (z + k < size.z) sink.put(sink.place(at + glm::ivec3(0, 0, z + k)), copied[k]);
-    }
+    for (int z = 0; z < size.z; z += kAtOnce)
+      sink.template copy<kAtOnce>(at + glm::ivec3(0, 0, z), ~0u >> max(32 - (size.z - z), 0));
   }
 
   /// The number of vertices of the tile's cells along an axis.
@@ -614,7 +607,7 @@ struct TileWorker {
       ++at.z;
     };
     begin(next_moved());
-#pragma unroll(kInside ? 3 : 1)  // fewer registers are copied
+#pragma unroll(kInside && !Sink::kIsWide ? 3 : 1)  // fewer registers are copied
     for (int z = 1; z < size.z; ++z) {
       const glm::vec3 moved = next_moved();
       left <<= 1;
@@ -652,7 +645,7 @@ struct TileWorker {
 };
 
 template <class Sink>
-__global__ void __launch_bounds__(kTileThreads, kTileBlocks)
+__global__ void __launch_bounds__(kTileThreads, Sink::kIsWide ? kTileBlocks - 1 : kTileBlocks)
     tile_kernel(const __grid_constant__ TileTask task, const __grid_constant__ Sink sink) {
   __shared__ TileMemory memory;
   const glm::ivec3 tile(blockIdx.x, blockIdx.y, blockIdx.z);
@@ -780,6 +773,9 @@ void IntervalRaster::mark_left(const LatticeOnDevice& lattice, const SlabBox& bo
 }
 
 template void IntervalRaster::run(const LatticeOnDevice&, const SlabBox&, const OffsetSink&, cudaStream_t);
+template void IntervalRaster::run(const LatticeOnDevice&, const SlabBox&, const VolumesSink<void>&, cudaStream_t);
+template void IntervalRaster::run(const LatticeOnDevice&, const SlabBox&, const VolumesSink<std::int16_t>&,
+                                  cudaStream_t);
 template void IntervalRaster::run(const LatticeOnDevice&, const SlabBox&, const VoxelSink<std::uint8_t>&, cudaStream_t);
 template void IntervalRaster::run(const LatticeOnDevice&, const SlabBox&, const VoxelSink<std::int16_t>&, cudaStream_t);
 template void IntervalRaster::run(const LatticeOnDevice&, const SlabBox&, const VoxelSink<std::uint16_t>&,

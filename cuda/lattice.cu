@@ -49,6 +49,18 @@ __global__ void reach_kernel(DeviceField field, VoxelBox region, int* low_high) 
 
 }  // namespace
 
+LatticeFindings* LatticeOnDevice::clear_notes(std::size_t words, std::size_t bytes, cudaStream_t stream) {
+  notes_.fill(0, sizeof(LatticeFindings) + words * sizeof(std::uint32_t) + bytes, stream);
+  return reinterpret_cast<LatticeFindings*>(notes_.data());
+}
+
+LatticeFindings LatticeOnDevice::read_findings(cudaStream_t stream) {
+  LatticeFindings* found = found_.reserve(1);
+  TETWARP_CUDA_TRY(cudaMemcpyAsync(found, notes_.data(), sizeof *found, cudaMemcpyDeviceToHost, stream));
+  TETWARP_CUDA_TRY(cudaStreamSynchronize(stream));
+  return *found;
+}
+
 /// @return whether all vertices rest at whole steps, and can be packed
 bool LatticeOnDevice::set_steps(StepLattice lattice, const glm::vec3* displacement, std::uint64_t* room,
                                 bool wants_range, LatticeFindings& found, cudaStream_t stream) {
@@ -63,16 +75,13 @@ bool LatticeOnDevice::set_steps(StepLattice lattice, const glm::vec3* displaceme
   StepPass pass{field_.frame, lattice, displacement, in_place ? nullptr : room, {}, {}, nullptr, wants_range};
   const auto look = [&] {
     pass.lattice.packing = packing_;
-    inverted_words_.fill(0, words, stream);
-    moving_.fill(0, blocks, stream);
-    found_.fill(0, 1, stream);
-    inverted_.words = inverted_words_.data();
-    blocks_.moving = moving_.data();
+    pass.found = clear_notes(words, blocks, stream);
+    inverted_.words = reinterpret_cast<std::uint32_t*>(pass.found + 1);
+    blocks_.moving = reinterpret_cast<std::uint8_t*>(inverted_.words + words);
     pass.inverted = inverted_;
     pass.moving = blocks_;
-    pass.found = found_.data();
     run_step_pass(pass, stream);
-    found_.download(&found, 1, stream);
+    found = read_findings(stream);
     return found.beside == 0 && found.not_bad_vertex == 0;
   };
   if (!look()) return false;
@@ -100,13 +109,13 @@ bool LatticeOnDevice::set_steps(StepLattice lattice, const glm::vec3* displaceme
 
 void LatticeOnDevice::set_vertices(const glm::vec3* displacement, std::int64_t vertices, LatticeFindings& found,
                                    cudaStream_t stream) {
-  found_.fill(0, 1, stream);
+  LatticeFindings* on_device = clear_notes(0, 0, stream);
   field_.vertices = vertices_.reserve(static_cast<std::size_t>(vertices));
   snap_kernel<<<blocks_for(vertices), kThreads, 0, stream>>>(field_.frame, displacement, vertices, vertices_.data(),
-                                                             found_.data());
-  describe_kernel<<<blocks_for(field_.cell_count()), kThreads, 0, stream>>>(field_, found_.data());
+                                                             on_device);
+  describe_kernel<<<blocks_for(field_.cell_count()), kThreads, 0, stream>>>(field_, on_device);
   TETWARP_CUDA_TRY(cudaGetLastError());
-  found_.download(&found, 1, stream);
+  found = read_findings(stream);
 }
 
 void LatticeOnDevice::set(const LatticeFrame& frame, const Geometry& output, const glm::vec3* displacement,

@@ -154,6 +154,9 @@ class LatticeOnDevice {
   bool set_steps(StepLattice lattice, const glm::vec3* displacement, std::uint64_t* room, bool wants_range,
                  LatticeFindings& found, cudaStream_t stream);
   void set_vertices(const glm::vec3* displacement, std::int64_t vertices, LatticeFindings& found, cudaStream_t stream);
+  /// Room for what is found of a field, all zero, with one fill; after it so many words and bytes.
+  LatticeFindings* clear_notes(std::size_t words, std::size_t bytes, cudaStream_t stream);
+  LatticeFindings read_findings(cudaStream_t stream);
 
   DeviceField field_;
   FieldStatistics statistics_;
@@ -161,11 +164,10 @@ class LatticeOnDevice {
   DeviceBuffer<std::uint64_t> packed_;
   StepPacking packing_;  ///< of the last field that was packed
   DeviceBuffer<int> range_;
-  DeviceBuffer<std::uint32_t> inverted_words_;
+  DeviceBuffer<std::byte> notes_;  ///< LatticeFindings; then the words of `inverted_`, and the bytes of `blocks_`
+  PinnedBuffer<LatticeFindings> found_;
   InvertedPairs inverted_;
-  DeviceBuffer<std::uint8_t> moving_;
   MovingBlocks blocks_;
-  DeviceBuffer<LatticeFindings> found_;
 };
 
 }  // namespace tetwarp::cuda_detail

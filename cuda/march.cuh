@@ -248,15 +248,7 @@ struct March {
       const std::uint32_t singles = read_singles(from);
       if (in_box) clear(from, end, singles);
       covered += __popc(singles);
-      for (int n = from; n < end; n += kCopied) {
-        typename Sink::Copied copied[kCopied];
-#pragma unroll
-        for (int k = 0; k < kCopied; ++k)
-          if ((singles >> (n - from + k) & 1) != 0) copied[k] = sink.fetch(voxel(n + k));
-#pragma unroll
-        for (int k = 0; k < kCopied; ++k)
-          if ((singles >> (n - from + k) & 1) != 0) sink.put(sink.place(voxel(n + k)), copied[k]);
-      }
+      for (int n = from; n < end; n += kCopied) sink.template copy<kCopied>(voxel(n), singles >> (n - from));
     }
     return covered;
   }
@@ -337,7 +329,7 @@ struct March {
 };
 
 template <class Sink, bool kCoarse>
-__global__ void __launch_bounds__(32 * kWarps, kBlocks)
+__global__ void __launch_bounds__(32 * kWarps, Sink::kIsWide ? kBlocks - 1 : kBlocks)
     march_kernel(const __grid_constant__ Task task, const glm::vec3* seeds, const __grid_constant__ Sink sink) {
   __shared__ typename WarpQueue<Sink, kCoarse>::Entry entries[kWarps][64];
   const int lane = static_cast<int>(threadIdx.x), warp = static_cast<int>(threadIdx.y);

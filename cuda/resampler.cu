@@ -94,7 +94,7 @@ Counts CudaResampler::write_region(const Region& region, const Control& control)
 /// @return slices of a slab
 std::int64_t CudaResampler::plan(const Region& region, const Control& control) {
   const glm::i64vec3 size = region.end - region.begin;
-  box_voxels_ = std::max(writer_->box_voxels(can_write_plainly() && writer_->is_plain()), size.x);
+  box_voxels_ = std::max(most_in_box(), size.x);
   in_parts_ = is_field_streamed();
   if (in_parts_) return plan_parts(region, control);
   const SlabNeeds all = needs_of(region), had = held();
@@ -151,8 +151,8 @@ template <class Done>
 void CudaResampler::write_slab(const Region& slab, Done&& done) {
   hold_field({slab.begin.z, slab.end.z});
   writer_->hold_sources(source_slices(slab));
-  const bool plain = can_write_plainly() && writer_->is_plain();
-  const std::int64_t voxels = plain ? box_voxels_ : std::min(box_voxels_, writer_->box_voxels(false));
+  const bool plain = writes_plainly();
+  const std::int64_t voxels = std::min(box_voxels_, most_in_box());  // what is found of a part may change it
   for_each_box(slab, std::min(voxels, voxel_count(slab)), [&](const SlabBox& box) {
     write_box(box, plain);
     done(box);

@@ -25,6 +25,8 @@ class CudaResampler : public Resampler {
   virtual void check_wanted(const Maps&) const {}
   virtual void map_box(const SlabBox& box, SlabWriter& writer) = 0;
   virtual void describe_field(Report&) const {}
+  /// Device memory of a voxel that `map_box` works with.
+  virtual std::int64_t work_bytes(const SlabWriter&) const { return Mapped::kBytes; }
   /// Whether voxels can be found and sampled in one go, and how.
   virtual bool can_write_plainly() const { return false; }
   virtual void write_plainly(const SlabBox&, SlabWriter&) {}
@@ -65,6 +67,8 @@ class CudaResampler : public Resampler {
   using SlicesOf = std::function<Slices(const ConstVolumeView& source)>;
 
   Counts write_region(const Region& region, const Control& control);
+  bool writes_plainly() const { return can_write_plainly() && writer_->is_plain(); }
+  std::int64_t most_in_box() const { return writer_->box_voxels(writes_plainly() ? 0 : work_bytes(*writer_)); }
   /// Decides on slabs, and makes room for them.
   std::int64_t plan(const Region& region, const Control& control);
   std::int64_t plan_parts(const Region& region, const Control& control);

@@ -10,7 +10,7 @@ namespace tetwarp::cuda_detail {
 namespace {
 
 constexpr std::int64_t kPlainVoxels = std::int64_t{1} << 30;   ///< of a box, where nothing is kept of each
-constexpr std::int64_t kWorkBytes = std::int64_t{64} << 20;    ///< otherwise: of what is kept
+constexpr std::int64_t kWorkBytes = std::int64_t{128} << 20;   ///< otherwise: of what is kept
 constexpr std::int64_t kResultBytes = std::int64_t{32} << 20;  ///< of a box, where results wait to be copied
 
 /// Where the next array may begin.
@@ -19,6 +19,22 @@ std::size_t aligned(std::size_t bytes) { return (bytes + 255) / 256 * 256; }
 template <class View>
 std::size_t voxel_bytes(const View& view) {
   return size_bytes(view.type) * static_cast<std::size_t>(view.components);
+}
+
+/// Calls with a voxel of a type that sinks sample.
+template <class Work>
+auto dispatch_plain(VoxelType type, Work&& work) {
+  switch (type) {
+    case VoxelType::u8: return work(std::uint8_t{});
+    case VoxelType::u16: return work(std::uint16_t{});
+    default: return work(std::int16_t{});
+  }
+}
+
+/// Whether the same voxels of two volumes on one grid are held, in the same kind of memory.
+template <class View>
+bool lie_alike(const View& a, const View& b) {
+  return a.memory == b.memory && a.buffered == b.buffered;
 }
 
 std::size_t bytes_of(const ConstVolumeView& source, const Slices& slices) {
@@ -126,19 +142,23 @@ void SlabWriter::begin(std::span<const Target> targets, const Maps& maps, cudaSt
 }
 
 bool SlabWriter::is_plain() const {
-  if (targets_.size() != 1 || maps_.coverage.voxels || maps_.inverse_mm.voxels || wants_jacobian() || wants_owners())
-    return false;
-  const Target& target = targets_.front()->target;
+  const bool wants_map = maps_.coverage.voxels || maps_.inverse_mm.voxels || wants_jacobian() || wants_owners();
+  return !wants_map && !targets_.empty() && targets_.size() <= kMostSinkVolumes && voxel_count(output_) < INT32_MAX &&
+         std::all_of(targets_.begin(), targets_.end(), [&](const auto& target) { return is_plain(*target); });
+}
+
+bool SlabWriter::is_plain(const DeviceTarget& on_device) const {
+  const Target &target = on_device.target, &first = targets_.front()->target;
   const VoxelType type = target.source.type;
   const bool background_fits = dispatch(type, [&](auto voxel) {
     using V = decltype(voxel);
     return target.background >= double(std::numeric_limits<V>::lowest()) &&
            target.background <= double(std::numeric_limits<V>::max());
   });
-  return background_fits && target.interpolation == Interpolation::linear && target.source.components == 1 &&
-         !target.padding && target.sampled_slices.empty() && targets_.front()->relation.same_grid &&
-         voxel_count(*target.source.geometry) < INT32_MAX && voxel_count(output_) < INT32_MAX &&
-         (type == VoxelType::u8 || type == VoxelType::i16 || type == VoxelType::u16);
+  return background_fits && on_device.relation.same_grid && !target.padding && target.sampled_slices.empty() &&
+         target.source.components == 1 && (type == VoxelType::u8 || type == VoxelType::i16 || type == VoxelType::u16) &&
+         (target.interpolation == Interpolation::linear || target.interpolation == Interpolation::vote) &&
+         lie_alike(target.source, first.source) && lie_alike(target.output, first.output);
 }
 
 bool SlabWriter::has_results_on_host() const {
@@ -149,10 +169,9 @@ bool SlabWriter::has_results_on_host() const {
                      [](const auto& target) { return target->target.output.memory == Memory::host; });
 }
 
-std::int64_t SlabWriter::box_voxels(bool plain) const {
-  constexpr std::int64_t kMappedBytes = 25;  // of a voxel: Mapped, and what claims keep
+std::int64_t SlabWriter::box_voxels(std::int64_t work_bytes) const {
   constexpr std::int64_t kGroup = 1 << 10;
-  const std::int64_t most = plain ? kPlainVoxels : kWorkBytes / kMappedBytes;
+  const std::int64_t most = work_bytes == 0 ? kPlainVoxels : kWorkBytes / work_bytes;
   const auto group_bytes = static_cast<std::int64_t>(layout(kGroup).bytes);
   return group_bytes == 0 ? most : std::min(most, kResultBytes / group_bytes * kGroup);
 }
@@ -215,7 +234,7 @@ void SlabWriter::hold_sources(const std::function<Slices(const ConstVolumeView& 
 
 void SlabWriter::begin_box(const SlabBox& box) {
   current_ = boxes_ == 1 ? 0 : 1 - current_;
-  copied_[current_].hold_back(stream_);
+  if (has_results_on_host()) copied_[current_].hold_back(stream_);
   layout_ = layout(box.count());
 }
 
@@ -262,32 +281,65 @@ Destination<V> SlabWriter::destination(std::size_t number, const SlabBox& box) {
   return {place<V>(layout_.voxels[number]), box.begin, box.size.x, box.size.x * box.size.y};
 }
 
-AnyVoxelSink SlabWriter::plain_sink(const SlabBox& box) {
-  const DeviceTarget& on_device = *targets_.front();
+/// Of a plain target: where its voxel (0, 0, 0) would be, were it held.
+template <class V>
+SlabWriter::PlainVolume<V> SlabWriter::plain_volume(std::size_t number, const SlabBox& box) {
+  const DeviceTarget& on_device = *targets_[number];
   const Target& target = on_device.target;
-  const auto make = [&](auto voxel) {
-    using V = decltype(voxel);
-    const auto plan = plan_target(target, on_device.relation, reinterpret_cast<const V*>(target.source.voxels));
-    const Destination<V> output = destination<V>(0, box);
-    const glm::i64vec3 &begin = plan.source.begin, &stride = plan.source.stride;
-    return VoxelSink<V>{plan.source.voxels - (begin.z * stride.z + begin.y * stride.y + begin.x),
-                        glm::ivec3(plan.source.size) - 1,
-                        static_cast<int>(plan.source.stride.y),
-                        static_cast<int>(plan.source.stride.z),
-                        plan.background,
-                        output.voxels - (output.begin.z * output.slice + output.begin.y * output.row + output.begin.x),
-                        static_cast<int>(output.row),
-                        static_cast<int>(output.slice)};
-  };
-  switch (target.source.type) {
-    case VoxelType::u8: return make(std::uint8_t{});
-    case VoxelType::u16: return make(std::uint16_t{});
-    default: return make(std::int16_t{});
+  const auto plan = plan_target(target, on_device.relation, reinterpret_cast<const V*>(target.source.voxels));
+  const Destination<V> output = destination<V>(number, box);
+  const glm::i64vec3 &begin = plan.source.begin, &stride = plan.source.stride;
+  return {plan.source.voxels - (begin.z * stride.z + begin.y * stride.y + begin.x), plan.background,
+          output.voxels - (output.begin.z * output.slice + output.begin.y * output.row + output.begin.x)};
+}
+
+template <class V>
+SinkLayout SlabWriter::sink_layout(const SlabBox& box) {
+  const Target& target = targets_.front()->target;
+  const glm::i64vec3 held = target.source.buffered.end - target.source.buffered.begin;
+  const Destination<V> output = destination<V>(0, box);
+  return {glm::ivec3(target.source.geometry->size) - 1, static_cast<int>(held.x), static_cast<int>(held.x * held.y),
+          static_cast<int>(output.row), static_cast<int>(output.slice)};
+}
+
+template <class V>
+VolumesSink<V> SlabWriter::volumes_sink(const SlabBox& box) {
+  VolumesSink<V> sink{};
+  for (const auto& on_device : targets_) {
+    const Target& target = on_device->target;
+    dispatch_plain(target.source.type, [&](auto voxel) {
+      using T = decltype(voxel);
+      const auto number = static_cast<std::size_t>(sink.count);
+      const PlainVolume<T> volume = plain_volume<T>(number, box);
+      if (number == 0) static_cast<SinkLayout&>(sink) = sink_layout<T>(box);
+      sink.volumes[sink.count++] = {volume.source, volume.output, target.source.type,
+                                    target.interpolation == Interpolation::vote, volume.background};
+    });
   }
+  return sink;
+}
+
+AnyVoxelSink SlabWriter::plain_sink(const SlabBox& box) {
+  const Target& first = targets_.front()->target;
+  const auto make = [&](auto voxel) -> AnyVoxelSink {
+    using V = decltype(voxel);
+    const PlainVolume<V> volume = plain_volume<V>(0, box);
+    return VoxelSink<V>{sink_layout<V>(box), volume.source, volume.background, volume.output};
+  };
+  const auto holds_all = [&](const auto& condition) {
+    return std::all_of(targets_.begin(), targets_.end(), [&](const auto& of) { return condition(of->target); });
+  };
+  if (!holds_all([](const Target& target) { return target.interpolation == Interpolation::linear; }))
+    return volumes_sink<void>(box);
+  if (targets_.size() == 1) return dispatch_plain(first.source.type, make);
+  if (!holds_all([](const Target& target) { return target.source.type == VoxelType::i16; }))
+    return volumes_sink<void>(box);
+  return volumes_sink<std::int16_t>(box);
 }
 
 void SlabWriter::end_box(const SlabBox& box) {
-  if (has_results_on_host()) {
+  const bool on_host = has_results_on_host();
+  if (on_host) {
     computed_.record(stream_);
     computed_.hold_back(downloads_.stream());
   }
@@ -296,7 +348,7 @@ void SlabWriter::end_box(const SlabBox& box) {
   give(maps_.inverse_mm, box, layout_.inverse_mm);
   give(maps_.jacobian, box, layout_.jacobian);
   give(maps_.owners, box, layout_.owners);
-  copied_[current_].record(downloads_.stream());
+  if (on_host) copied_[current_].record(downloads_.stream());
 }
 
 void SlabWriter::give(const VolumeView& view, const SlabBox& box, std::size_t offset) {
@@ -319,7 +371,7 @@ void SlabWriter::finish() {
     on_device->last.download(last.data(), last.size(), stream_);
     for (std::size_t k = 0; k < ranges.size(); ++k) ranges[k] = {first[k], last[k]};
   }
-  downloads_.finish();
+  if (has_results_on_host()) downloads_.finish();
 }
 
 void SlabWriter::settle() noexcept {

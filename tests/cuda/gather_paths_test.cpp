@@ -37,6 +37,33 @@ Outcome<V> run_on(Resampler& resampler, const FieldCase& test, const Volume<V>& 
   return outcome;
 }
 
+/// Three volumes of different types at once, one of them labels, through the field that both have.
+template <class V>
+void expect_same_volumes(Resampler& cpu, Resampler& cuda, const Volume<V>& source, const Region& region,
+                         Random& random) {
+  const Geometry& grid = source.geometry;
+  const auto labels = random_values<std::uint8_t>(grid, random, 3, 5);
+  const auto other = random_values<std::uint16_t>(grid, random, 0, 65535);
+  Outcome<V> outputs[2] = {poisoned_outcome<V>(grid), poisoned_outcome<V>(grid)};
+  Outcome<std::uint8_t> voted[2] = {poisoned_outcome<std::uint8_t>(grid), poisoned_outcome<std::uint8_t>(grid)};
+  Outcome<std::uint16_t> others[2] = {poisoned_outcome<std::uint16_t>(grid), poisoned_outcome<std::uint16_t>(grid)};
+  Report reports[2];
+  for (const int n : {0, 1}) {
+    const Target targets[] = {{.source = view(source), .output = view(outputs[n].output), .background = 7},
+                              {.source = view(labels),
+                               .output = view(voted[n].output),
+                               .interpolation = Interpolation::vote,
+                               .background = 1},
+                              {.source = view(other), .output = view(others[n].output), .background = 9}};
+    reports[n] = (n == 0 ? cpu : cuda).resample(region, targets);
+  }
+  ASSERT_TRUE(same_bits(outputs[0].output.voxels, outputs[1].output.voxels));
+  ASSERT_TRUE(same_bits(voted[0].output.voxels, voted[1].output.voxels)) << "labels";
+  ASSERT_TRUE(same_bits(others[0].output.voxels, others[1].output.voxels)) << "the third volume";
+  ASSERT_EQ(reports[0].covered, reports[1].covered);
+  ASSERT_EQ(reports[0].uncovered, reports[1].uncovered);
+}
+
 template <class V>
 void expect_same(const FieldCase& test, Random& random) {
   const Volume<V> source =
@@ -64,6 +91,7 @@ void expect_same(const FieldCase& test, Random& random) {
       ASSERT_EQ(expected.report.jacobian_max, found.report.jacobian_max);
     }
   }
+  ASSERT_NO_FATAL_FAILURE(expect_same_volumes(*cpu, *cuda, source, part, random));
 }
 
 TEST_F(GatherPaths, RandomFieldsWithAndWithoutFolds) {
