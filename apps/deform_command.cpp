@@ -73,7 +73,9 @@ class Deformation {
   void print_plan() const;
   void read();
   void read_field();
-  void resample();
+  Backend resample();
+  bool wants_check() const { return !outputs_.report.empty() && options_.pull_field.empty(); }
+  void check(Resampler& resampler);
   void set_field(Resampler& resampler, Outside outside) const;
   void resample_onto_own_grids();
   void write();
@@ -106,6 +108,10 @@ class Deformation {
   } mass_;  ///< with --preserve mass: in float
   std::vector<SliceRange> sampled_slices_;
   Report report_;
+  struct {
+    FieldQuality quality;
+    RoundTrip trip;
+  } check_;  ///< with --report
   std::optional<DerivedSeriesWriter> series_;
   std::optional<DicomWriteReport> dicom_report_;
   std::vector<std::pair<std::string, double>> stages_;
@@ -169,8 +175,12 @@ std::uint64_t Deformation::plan_bytes(const InputHeader& input) {
   const auto voxels = static_cast<std::uint64_t>(voxel_count(input.geometry)),
              output_voxels = options_.grid == "fit" ? voxels : static_cast<std::uint64_t>(voxel_count(grid_));
   const auto vertices = static_cast<std::uint64_t>(lattice.x * lattice.y * lattice.z);
+  const auto slices = static_cast<std::uint64_t>(options_.grid == "fit" ? input.geometry.size.z : grid_.size.z);
+  const std::uint64_t of_check = wants_check() ? sizeof(glm::vec3) * output_voxels / slices *
+                                                     std::min(slices, std::uint64_t{RoundTrip::kMostSlices})
+                                               : 0;
   const std::uint64_t of_mass = options_.preserve_mass ? sizeof(float) * (voxels + 2 * output_voxels) : 0;
-  return of_mass + voxels * size_bytes(input.type) +
+  return of_mass + of_check + voxels * size_bytes(input.type) +
          output_voxels * (size_bytes(input.type) + outputs_.maps->bytes_a_voxel()) +
          outputs_.further->bytes(output_voxels) + vertices * sizeof(glm::vec3) + kOverheadBytes;
 }
@@ -233,7 +243,8 @@ void Deformation::read_field() {
   stages_.emplace_back("field", stage.seconds());
 }
 
-void Deformation::resample() {
+/// @return who holds the field
+Backend Deformation::resample() {
   Stage stage(options_.common, "resample");
   auto input_hash = std::async(
       std::launch::async, [&] { return input_.is_dicom() ? input_.dicom->sha256 : hash_file(options_.input.path); });
@@ -266,6 +277,16 @@ void Deformation::resample() {
   resample_onto_own_grids();
   input_sha256_ = input_hash.get();
   stages_.emplace_back("resample", stage.seconds());
+  return backend;
+}
+
+/// Looks at the field, and where its inverse leads. @param resampler  holds the field
+void Deformation::check(Resampler& resampler) {
+  Stage stage(options_.common, "check");
+  const Limits limits{.threads = options_.common.threads};
+  check_.quality = measure_quality(field_.forward.field, limits, stage.control());
+  check_.trip = measure_round_trip(resampler, field_.forward.field, limits, {.stop = interrupt_token()});
+  stages_.emplace_back("check", stage.seconds());
 }
 
 /// INPUT as it goes through the field: with --preserve mass in float, so that values are rounded once.
@@ -398,12 +419,16 @@ json Deformation::report_with_times() const {
   if (field_.direction == Direction::forward) {
     document["paths"] = {
         {"gathered", report_.paths.gathered}, {"walked", report_.paths.walked}, {"claimed", report_.paths.claimed}};
-    const FieldQuality quality =
-        measure_quality(field_.forward.field, {.threads = options_.common.threads}, {.stop = interrupt_token()});
-    document["quality"] = {{"verdict", verdict(report_, quality)},
+    const auto& [quality, trip] = check_;
+    document["quality"] = {{"verdict", verdict(report_, quality, trip)},
                            {"largest_stretch", quality.largest_stretch},
                            {"jacobian_edges", FieldQuality::kEdges},
-                           {"jacobian_shares", quality.shares()}};
+                           {"jacobian_shares", quality.shares()},
+                           {"round_trip",
+                            {{"slices", trip.slices},
+                             {"voxels", trip.voxels},
+                             {"forward_after_inverse", to_json(trip.forward_after_inverse)},
+                             {"inverse_after_forward", to_json(trip.inverse_after_forward)}}}};
   }
   document["threads"] =
       options_.common.threads > 0 ? options_.common.threads : static_cast<int>(std::thread::hardware_concurrency());
@@ -492,7 +517,10 @@ int Deformation::run() {
   });
   read();
   read_field();
-  resample();
+  {
+    const Backend backend = resample();
+    if (wants_check()) check(*backend.resampler);
+  }
   outputs_.set.write([&] { write(); });
   for (const std::string& note : notes_) say(options_.common, "tetwarp: warning: " + note);
   for (const std::string& note : field_.notes) say(options_.common, "tetwarp: note: " + note);

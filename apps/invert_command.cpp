@@ -5,7 +5,6 @@
 #include "apps/field_source.h"
 #include "apps/input.h"
 #include "apps/output.h"
-#include "deform/residuals.h"
 #include "io/field_file.h"
 #include "io/image_file.h"
 
@@ -14,13 +13,6 @@ namespace tetwarp::apps {
 namespace {
 
 using nlohmann::json;
-
-json to_json(const Residuals& residuals) {
-  return {{"points", residuals.points},
-          {"mean_mm", residuals.mean},
-          {"percentile_99_mm", residuals.percentile_99},
-          {"largest_mm", residuals.largest}};
-}
 
 std::string text_of(const Residuals& residuals) {
   char text[96];

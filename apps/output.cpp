@@ -94,6 +94,13 @@ nlohmann::json to_json(const Geometry& geometry) {
       {"orientation", orientation_code(geometry)}};
 }
 
+nlohmann::json to_json(const Residuals& residuals) {
+  return {{"points", residuals.points},
+          {"mean_mm", residuals.mean},
+          {"percentile_99_mm", residuals.percentile_99},
+          {"largest_mm", residuals.largest}};
+}
+
 nlohmann::json provenance(const std::string& command) {
   return {{"program", "tetwarp"}, {"version", version()}, {"commit", commit()}, {"command", command}};
 }

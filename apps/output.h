@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "apps/console.h"
+#include "deform/residuals.h"
 #include "io/dicom_series.h"
 #include "io/staged_output.h"
 
@@ -45,6 +46,7 @@ std::filesystem::path sidecar_of(const std::filesystem::path& output);
 void write_json(const std::filesystem::path& path, const nlohmann::json& document);
 
 nlohmann::json to_json(const Geometry& geometry);
+nlohmann::json to_json(const Residuals& residuals);
 
 /// Version, commit, command: what every sidecar and report begins with.
 nlohmann::json provenance(const std::string& command);

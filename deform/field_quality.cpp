@@ -96,7 +96,7 @@ void add_cell(const dvec3 (&u)[8], bool odd, const dmat3& from_lattice, Tally& t
 }
 
 std::string format(const char* form, double value) {
-  char text[64];
+  char text[96];
   std::snprintf(text, sizeof text, form, value);
   return text;
 }
@@ -149,18 +149,26 @@ FieldQuality measure_quality(const VertexField& field, const Limits& limits, con
   return quality;
 }
 
-std::string verdict(const Report& report, const FieldQuality& quality) {
+std::string verdict(const Report& report, const FieldQuality& quality, const RoundTrip& trip) {
   const double voxels = static_cast<double>(report.covered + report.uncovered);
-  const std::string covered = format("%.2f %% of the voxels are covered",
-                                     voxels > 0 ? 100.0 * static_cast<double>(report.covered) / voxels : 0);
-  const std::string stretch = format("the largest stretch is %.2f times", quality.largest_stretch);
+  std::string text = format("%.2f %% of the voxels are covered",
+                            voxels > 0 ? 100.0 * static_cast<double>(report.covered) / voxels : 0) +
+                     format("; the largest stretch is %.2f times", quality.largest_stretch);
+  if (trip.inverse_after_forward.points > 0) {
+    text += format("; a vertex sent there and back by the inverse ends at most %.2g mm from its place",
+                   trip.inverse_after_forward.largest);
+  }
   const double folded = 100 * quality.shares().front();
   if (report.inverted + report.degenerate > 0) {
     return "Do not trust it where it folds: " + std::to_string(report.inverted) + " tetrahedra are inverted and " +
-           std::to_string(report.degenerate) + " flat, " + format("%.3g %% of the volume; ", folded) + covered + "; " +
-           stretch + ".";
+           std::to_string(report.degenerate) + " flat, " + format("%.3g %% of the volume; ", folded) + text + ".";
   }
-  return "No tetrahedron folds; " + covered + "; " + stretch + ".";
+  const double beside = trip.forward_after_inverse.largest, rounding = (1 + quality.largest_stretch) * trip.step_mm;
+  if (beside > rounding) {
+    return "Do not trust it: the inverse leads up to " +
+           format("%.2g mm beside a voxel, where rounding explains ", beside) + format("%.2g; ", rounding) + text + ".";
+  }
+  return "No tetrahedron folds; " + text + ".";
 }
 
 }  // namespace tetwarp

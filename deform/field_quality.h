@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string>
 
-#include "deform/resampler.h"
+#include "deform/residuals.h"
 
 namespace tetwarp {
 
@@ -26,7 +26,9 @@ struct FieldQuality {
 /// @throws InputError for a field that has no cell, Cancelled
 FieldQuality measure_quality(const VertexField& field, const Limits& limits = {}, const Control& control = {});
 
-/// One sentence for a person: whether the map that a call reported on can be trusted, and what stands against it.
-std::string verdict(const Report& report, const FieldQuality& quality);
+/// One sentence for a person: whether the map that a call reported on can be trusted, and what stands against it:
+/// folds; or an inverse that leads further beside a voxel than (1 + largest stretch) 2^-12 of the longest edge of a
+/// voxel, which is what rounding places before and after takes.
+std::string verdict(const Report& report, const FieldQuality& quality, const RoundTrip& trip);
 
 }  // namespace tetwarp

@@ -10,6 +10,7 @@
 #include <glm/geometric.hpp>
 #include <vector>
 
+#include "deform/core/fixed_point.h"
 #include "deform/cpu/tiles.h"
 #include "deform/points.h"
 
@@ -85,8 +86,23 @@ Residuals gather_slices(std::int64_t count, const Limits& limits, const Control&
   return all;
 }
 
-/// Trilinear between samples, NaN where one of them is.
-glm::dvec3 sample(const PullField& field, const glm::dvec3& index) {
+/// An inverse of which some slices are at hand.
+struct SlicedField {
+  const Geometry& grid;
+  std::vector<const glm::vec3*> slices;  ///< one per slice of the grid; null: not at hand
+
+  explicit SlicedField(const Geometry& of) : grid(of), slices(static_cast<std::size_t>(of.size.z)) {}
+  explicit SlicedField(const PullField& whole) : SlicedField(whole.grid) {
+    for (std::int64_t k = 0; k < grid.size.z; ++k) hold(k, whole.displacement.data() + k * area());
+  }
+
+  std::int64_t area() const { return grid.size.x * grid.size.y; }
+  void hold(std::int64_t k, const glm::vec3* slice) { slices[static_cast<std::size_t>(k)] = slice; }
+  const glm::vec3* slice(std::int64_t k) const { return slices[static_cast<std::size_t>(k)]; }
+};
+
+/// Trilinear between samples, NaN where one of them is or is not at hand.
+glm::dvec3 sample(const SlicedField& field, const glm::dvec3& index) {
   const glm::i64vec3 size = field.grid.size;
   glm::i64vec3 cell;
   for (int axis = 0; axis < 3; ++axis) {
@@ -101,23 +117,25 @@ glm::dvec3 sample(const PullField& field, const glm::dvec3& index) {
     const double weight = part.x * part.y * part.z;
     if (weight == 0) continue;
     const glm::i64vec3 at = cell + step;
-    sum += weight * glm::dvec3(field.displacement[static_cast<std::size_t>((at.z * size.y + at.y) * size.x + at.x)]);
+    const glm::vec3* slice = field.slice(at.z);
+    if (!slice) return glm::dvec3(NAN);
+    sum += weight * glm::dvec3(slice[at.y * size.x + at.x]);
   }
   return sum;
 }
 
-}  // namespace
-
-Residuals forward_after_inverse(const VertexField& field, const PullField& inverse, const Limits& limits,
-                                const Control& control) {
+Residuals forward_after(const SlicedField& inverse, const VertexField& field, const Limits& limits,
+                        const Control& control) {
   const Geometry& grid = inverse.grid;
   const AffineMap point = point_from_index(grid);
   const FieldView forward = view(field, Outside::background);
   return gather_slices(grid.size.z, limits, control, [&](std::int64_t k, auto&& tell) {
+    const glm::vec3* slice = inverse.slice(k);
+    if (!slice) return;
     std::vector<glm::dvec3> meant, points;
     for (std::int64_t j = 0; j < grid.size.y; ++j) {
       for (std::int64_t i = 0; i < grid.size.x; ++i) {
-        const glm::vec3& by = inverse.displacement[static_cast<std::size_t>((k * grid.size.y + j) * grid.size.x + i)];
+        const glm::vec3& by = slice[j * grid.size.x + i];
         if (std::isnan(by.x)) continue;
         meant.push_back(point(glm::dvec3(i, j, k)));
         points.push_back(meant.back() + glm::dvec3(by));
@@ -130,8 +148,8 @@ Residuals forward_after_inverse(const VertexField& field, const PullField& inver
   });
 }
 
-Residuals inverse_after_forward(const VertexField& field, const PullField& inverse, const Limits& limits,
-                                const Control& control) {
+Residuals inverse_after(const VertexField& field, const SlicedField& inverse, const Limits& limits,
+                        const Control& control) {
   const glm::i64vec3 size = field.lattice.size;
   const AffineMap point = point_from_index(field.lattice), index = index_from_point(inverse.grid);
   return gather_slices(size.z, limits, control, [&](std::int64_t k, auto&& tell) {
@@ -145,6 +163,54 @@ Residuals inverse_after_forward(const VertexField& field, const PullField& inver
       }
     }
   });
+}
+
+/// Pairs of slices, evenly spread, none twice; of few slices, all as one part.
+std::vector<Region> sampled_parts(const Geometry& grid) {
+  constexpr std::int64_t kPairs = RoundTrip::kMostSlices / 2;
+  Region part = whole(grid);
+  if (grid.size.z <= RoundTrip::kMostSlices) return {part};
+  std::vector<Region> parts;
+  for (std::int64_t n = 0; n < kPairs; ++n) {
+    part.begin.z = (2 * n + 1) * (grid.size.z - 1) / (2 * kPairs);
+    part.end.z = part.begin.z + 2;
+    parts.push_back(part);
+  }
+  return parts;
+}
+
+}  // namespace
+
+Residuals forward_after_inverse(const VertexField& field, const PullField& inverse, const Limits& limits,
+                                const Control& control) {
+  return forward_after(SlicedField(inverse), field, limits, control);
+}
+
+Residuals inverse_after_forward(const VertexField& field, const PullField& inverse, const Limits& limits,
+                                const Control& control) {
+  return inverse_after(field, SlicedField(inverse), limits, control);
+}
+
+RoundTrip measure_round_trip(Resampler& resampler, const VertexField& field, const Limits& limits,
+                             const Control& control) {
+  const Geometry& grid = resampler.output();
+  SlicedField inverse(grid);
+  RoundTrip trip;
+  trip.step_mm = std::max({grid.spacing.x, grid.spacing.y, grid.spacing.z}) / kStepsPerVoxel;
+  std::vector<std::vector<glm::vec3>> held;
+  const Control quiet{.stop = control.stop, .stream = control.stream};
+  for (const Region& part : sampled_parts(grid)) {
+    std::vector<glm::vec3>& samples = held.emplace_back(static_cast<std::size_t>(voxel_count(part)));
+    const VolumeView map{&grid, part, VoxelType::f32, 3, std::as_writable_bytes(std::span(samples)).data()};
+    resampler.resample(part, {}, {.inverse_mm = map}, quiet);
+    for (std::int64_t k = part.begin.z; k < part.end.z; ++k)
+      inverse.hold(k, samples.data() + (k - part.begin.z) * inverse.area());
+    trip.slices += static_cast<std::uint64_t>(part.end.z - part.begin.z);
+    trip.voxels += samples.size();
+  }
+  trip.forward_after_inverse = forward_after(inverse, field, limits, quiet);
+  trip.inverse_after_forward = inverse_after(field, inverse, limits, quiet);
+  return trip;
 }
 
 }  // namespace tetwarp

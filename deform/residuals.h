@@ -28,4 +28,23 @@ Residuals forward_after_inverse(const VertexField& field, const PullField& inver
 Residuals inverse_after_forward(const VertexField& field, const PullField& inverse, const Limits& limits = {},
                                 const Control& control = {});
 
+/// Both residuals, of an inverse that is never whole: of slices of the output grid in pairs, spread evenly along k.
+struct RoundTrip {
+  static constexpr std::int64_t kMostSlices = 16;  ///< 12 bytes a voxel: 50 MB at 512 x 512; few slices: all
+
+  std::uint64_t slices = 0, voxels = 0;  ///< of the output, that were looked at
+  double step_mm = 0;                    ///< to what vertices are rounded: 2^-12 of the longest edge of a voxel
+  Residuals forward_after_inverse;       ///< of the samples in these slices
+  Residuals inverse_after_forward;       ///< of the vertices that come to lie in a slice or between the two of a pair
+};
+
+/// Looks at the same voxels and vertices, and gives the same, for every backend and any number of threads.
+///
+/// @param resampler  holds `field`; what it was given stays
+/// @param field      in host memory
+/// @param control    stop and stream; progress is not told
+/// @throws what `Resampler::resample` throws
+RoundTrip measure_round_trip(Resampler& resampler, const VertexField& field, const Limits& limits = {},
+                             const Control& control = {});
+
 }  // namespace tetwarp

@@ -168,6 +168,42 @@ TEST(Deform, TheReportTellsWhatHappenedAndTheSidecarHasNoClock) {
   EXPECT_EQ(read_text(scratch / "look.png").substr(1, 3), "PNG");
 }
 
+/// What --report says of a field's quality, of a volume with enough slices that only some are looked at.
+nlohmann::json quality_of(const Scratch& scratch, const std::string& options) {
+  expect_run(scratch, "deform in.mha -o out.mha --report report.json --overwrite " + options);
+  return nlohmann::json::parse(read_text(scratch / "report.json"))["quality"];
+}
+
+TEST(Deform, TheReportTellsWhatIsLeftAfterGoingThereAndBack) {
+  const Scratch scratch;
+  make_phantom_file(scratch, "in.mha");
+  const nlohmann::json twist = quality_of(scratch, "-f twist:angle=30 --threads 1"), trip = twist["round_trip"];
+  EXPECT_EQ(trip["slices"], 16);
+  EXPECT_EQ(trip["voxels"], 16 * 40 * 36);
+  EXPECT_GT(trip["forward_after_inverse"]["points"], 10000);
+  EXPECT_LT(trip["forward_after_inverse"]["largest_mm"], 1e-4);
+  EXPECT_GT(trip["inverse_after_forward"]["points"], 5000);
+  EXPECT_GT(trip["inverse_after_forward"]["largest_mm"], trip["forward_after_inverse"]["largest_mm"]);
+  EXPECT_LT(trip["inverse_after_forward"]["largest_mm"], 5e-3);
+  const std::string verdict = twist["verdict"];
+  EXPECT_TRUE(verdict.starts_with("No tetrahedron folds; ")) << verdict;
+  EXPECT_NE(verdict.find("; a vertex sent there and back by the inverse ends at most 0.00"), std::string::npos)
+      << verdict;
+  EXPECT_EQ(quality_of(scratch, "-f twist:angle=30 --threads 2"), twist);
+  // Part of the whole inverse, which `invert` looks at.
+  expect_run(scratch, "invert twist:angle=30 --like in.mha -o inverse.mha --report inverse.json");
+  const auto whole = nlohmann::json::parse(read_text(scratch / "inverse.json"));
+  for (const std::string way : {"forward_after_inverse", "inverse_after_forward"}) {
+    EXPECT_LT(trip[way]["points"], whole[way]["points"]);
+    EXPECT_LE(trip[way]["largest_mm"], whole[way]["largest_mm"]);
+    EXPECT_NEAR(trip[way]["mean_mm"].get<double>() / whole[way]["mean_mm"].get<double>(), 1, 0.3) << way;
+  }
+  // Where it folds, what comes back is another place.
+  const nlohmann::json fold = quality_of(scratch, "-f wave:amplitude=40,wavelength=60,along=x --outside background");
+  EXPECT_GT(fold["round_trip"]["inverse_after_forward"]["largest_mm"], 10);
+  EXPECT_TRUE(fold["verdict"].get<std::string>().starts_with("Do not trust it where it folds: "));
+}
+
 TEST(Deform, AFieldThatDoesNotCoverTheVolumeIsRefusedUnlessAskedFor) {
   const Scratch scratch;
   make_phantom_file(scratch, "in.mha");

@@ -67,7 +67,7 @@ TEST(FieldQuality, CountsWhatTheResamplerCountsAndAddsUpToTheLattice) {
   EXPECT_GE(quality.sixths.front(), report.inverted);
   EXPECT_LE(quality.sixths.front(), 2 * report.inverted);
   EXPECT_GT(quality.sixths.back() + quality.sixths[6], 0U);
-  EXPECT_NE(verdict(report, quality).find(std::to_string(report.inverted) + " tetrahedra are inverted"),
+  EXPECT_NE(verdict(report, quality, {}).find(std::to_string(report.inverted) + " tetrahedra are inverted"),
             std::string::npos);
 }
 
@@ -78,8 +78,26 @@ TEST(FieldQuality, StretchOfAShearIsNotItsLongestColumn) {
   Report report;
   report.covered = 3;
   report.uncovered = 1;
-  EXPECT_EQ(verdict(report, quality),
+  EXPECT_EQ(verdict(report, quality, {}),
             "No tetrahedron folds; 75.00 % of the voxels are covered; the largest stretch is 1.62 times.");
+}
+
+TEST(FieldQuality, TheVerdictWarnsOfAnInverseThatLeadsFurtherThanRounding) {
+  FieldQuality quality;
+  quality.largest_stretch = 3;
+  Report report;
+  report.covered = 1;
+  RoundTrip trip;
+  trip.step_mm = 0.001;
+  trip.inverse_after_forward = {.points = 9, .mean = 0.1, .percentile_99 = 0.2, .largest = 0.25};
+  trip.forward_after_inverse.largest = 0.0039;
+  const std::string rest =
+      "100.00 % of the voxels are covered; the largest stretch is 3.00 times; a vertex sent there and back by the "
+      "inverse ends at most 0.25 mm from its place.";
+  EXPECT_EQ(verdict(report, quality, trip), "No tetrahedron folds; " + rest);
+  trip.forward_after_inverse.largest = 0.5;
+  EXPECT_EQ(verdict(report, quality, trip),
+            "Do not trust it: the inverse leads up to 0.5 mm beside a voxel, where rounding explains 0.004; " + rest);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "deform/field_quality.h"
 #include "deform/fields/formula.h"
 #include "tests/support/fields.h"
 #include "tests/support/run.h"
@@ -71,6 +72,92 @@ TEST(Residuals, LeaveOutWhatHasNoInverse) {
   EXPECT_EQ(forward_after_inverse(field, none).points, 0U);
   EXPECT_EQ(inverse_after_forward(field, none).points, 0U);
   EXPECT_EQ(inverse_after_forward(field, none).percentile_99, 0);
+}
+
+void expect_same(const Residuals& expected, const Residuals& found) {
+  EXPECT_EQ(expected.points, found.points);
+  EXPECT_EQ(expected.mean, found.mean);
+  EXPECT_EQ(expected.percentile_99, found.percentile_99);
+  EXPECT_EQ(expected.largest, found.largest);
+}
+
+TEST(RoundTrip, OfFewSlicesIsThatOfTheWholeInverse) {
+  Geometry grid = unit_grid({30, 28, 16});
+  grid.spacing = {0.8, 0.9, 1.5};
+  const VertexField field = twist(grid, 0.3, 1);
+  const auto resampler = make_cpu_resampler(grid);
+  resampler->set_field(view(field));
+  const RoundTrip trip = measure_round_trip(*resampler, field);
+  EXPECT_EQ(trip.slices, 16U);
+  EXPECT_EQ(trip.voxels, 30U * 28 * 16);
+  EXPECT_EQ(trip.step_mm, 1.5 / 4096);
+  const PullField inverse = inverse_of(field, grid);
+  expect_same(forward_after_inverse(field, inverse), trip.forward_after_inverse);
+  expect_same(inverse_after_forward(field, inverse), trip.inverse_after_forward);
+  const RoundTrip one = measure_round_trip(*resampler, field, {.threads = 1});
+  expect_same(one.forward_after_inverse, trip.forward_after_inverse);
+  expect_same(one.inverse_after_forward, trip.inverse_after_forward);
+}
+
+TEST(RoundTrip, OfManySlicesIsOfEightPairsAllAlong) {
+  const Geometry grid = unit_grid({6, 5, 81});
+  const VertexField field = uniform_field(grid, {0, 0, 0});
+  const auto resampler = make_cpu_resampler(grid);
+  resampler->set_field(view(field));
+  const RoundTrip trip = measure_round_trip(*resampler, field);
+  EXPECT_EQ(trip.slices, 16U);
+  EXPECT_EQ(trip.voxels, 6U * 5 * 16);
+  EXPECT_EQ(trip.forward_after_inverse.points, trip.voxels);
+  EXPECT_EQ(trip.inverse_after_forward.points, trip.voxels);  // a vertex on each voxel
+  EXPECT_EQ(trip.inverse_after_forward.largest, 0);
+  // Vertices halfway between slices: those of the eight pairs alone have both.
+  const VertexField half = uniform_field(grid, {0, 0, 0.5F});
+  resampler->set_field(view(half));
+  EXPECT_EQ(measure_round_trip(*resampler, half).inverse_after_forward.points, 6U * 5 * 8);
+}
+
+/// Hands on what another makes, its inverse half a millimetre off along x in one slice.
+class Astray final : public Resampler {
+ public:
+  Astray(std::unique_ptr<Resampler> right, std::int64_t slice)
+      : Resampler(right->output()), right_(std::move(right)), slice_(slice) {}
+  Region source_region(const Geometry& source, Region region) const override {
+    return right_->source_region(source, region);
+  }
+  Report resample(Region region, std::span<const Target> targets, const Maps& maps, const Control& control) override {
+    const Report report = right_->resample(region, targets, maps, control);
+    if (slice_ < region.begin.z || slice_ >= region.end.z) return report;
+    const std::int64_t area = output().size.x * output().size.y;
+    auto* by =
+        reinterpret_cast<glm::vec3*>(maps.inverse_mm.voxels) + (slice_ - maps.inverse_mm.buffered.begin.z) * area;
+    for (std::int64_t n = 0; n < area; ++n) by[n].x += 0.5F;
+    return report;
+  }
+
+ private:
+  std::unique_ptr<Resampler> right_;
+  std::int64_t slice_;
+};
+
+TEST(RoundTrip, FindsAnInverseThatIsWrong) {
+  const Geometry grid = unit_grid({12, 10, 81});
+  const VertexField field = uniform_field(grid, {0, 0, 0});
+  // Slices 5 and 6 are the first pair.
+  for (const std::int64_t slice : {5, 6}) {
+    auto right = make_cpu_resampler(grid);
+    right->set_field(view(field));
+    Astray wrong(std::move(right), slice);
+    const RoundTrip trip = measure_round_trip(wrong, field);
+    EXPECT_EQ(trip.forward_after_inverse.largest, 0.5);
+    EXPECT_EQ(trip.inverse_after_forward.largest, 0.5);
+    // One of 16 slices; what leads beyond the lattice is not told.
+    EXPECT_NEAR(trip.inverse_after_forward.mean, 0.5 / 16, 1e-12);
+    EXPECT_EQ(trip.forward_after_inverse.points, trip.voxels - 10);
+    Report report;
+    report.covered = trip.voxels;
+    EXPECT_NE(verdict(report, measure_quality(field), trip).find("the inverse leads up to 0.5 mm beside a voxel"),
+              std::string::npos);
+  }
 }
 
 }  // namespace
