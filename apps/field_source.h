@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/backend.h"
 #include "apps/console.h"
 #include "deform/vertex_field.h"
 
@@ -14,6 +15,19 @@ struct ForwardField {
   VertexField field;
   bool identity = false;           ///< nothing moves, by its formula
   std::vector<std::string> notes;  ///< for people: what was assumed
+};
+
+/// The field of either direction, with what is said about it.
+struct AnyField {
+  Direction direction = Direction::forward;
+  ForwardField forward;
+  PullField pull;
+  std::vector<std::string> notes;
+
+  const Geometry& lattice() const { return direction == Direction::pull ? pull.grid : forward.field.lattice; }
+  const std::vector<glm::vec3>& displacement() const {
+    return direction == Direction::pull ? pull.displacement : forward.field.displacement;
+  }
 };
 
 /// Formulas and files, composed vertex by vertex, the first applied first. The lattice is that of the first if it is a

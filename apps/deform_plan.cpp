@@ -1,0 +1,127 @@
+#include "apps/deform_plan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "apps/field_source.h"
+#include "apps/output_grid.h"
+#include "deform/fields/formula.h"
+#include "deform/residuals.h"
+#include "io/field_file.h"
+#include "io/image_file.h"
+
+namespace tetwarp::apps {
+
+namespace {
+
+/// Program, libraries and what a pass keeps per thread, beside volumes and field.
+constexpr std::uint64_t kOverheadBytes = 200'000'000;
+
+std::filesystem::path folder_of(const std::filesystem::path& file) {
+  return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
+}
+
+/// @param grid  of the output
+std::uint64_t plan_bytes(const DeformOptions& options, DeformOutputs& outputs, const InputHeader& input,
+                         const Geometry& grid) {
+  const glm::i64vec3 lattice = options.pull_field.empty()
+                                   ? lattice_size(options.fields, input.geometry, options.cell_size)
+                                   : read_field_header(options.pull_field).grid.size;
+  const auto voxels = static_cast<std::uint64_t>(voxel_count(input.geometry)),
+             output_voxels = static_cast<std::uint64_t>(voxel_count(grid));
+  const auto vertices = static_cast<std::uint64_t>(lattice.x * lattice.y * lattice.z);
+  const auto slices = static_cast<std::uint64_t>(grid.size.z);
+  const std::uint64_t of_check = reports_quality(options) ? sizeof(glm::vec3) * output_voxels / slices *
+                                                                std::min(slices, std::uint64_t{RoundTrip::kMostSlices})
+                                                          : 0;
+  const std::uint64_t of_mass = options.preserve_mass ? sizeof(float) * (voxels + 2 * output_voxels) : 0;
+  return of_mass + of_check + voxels * size_bytes(input.type) +
+         output_voxels * (size_bytes(input.type) + outputs.maps->bytes_a_voxel()) +
+         outputs.further->bytes(output_voxels) + vertices * sizeof(glm::vec3) + kOverheadBytes;
+}
+
+}  // namespace
+
+bool reports_quality(const DeformOptions& options) { return !options.report.empty() && options.pull_field.empty(); }
+
+DeformOutputs begin_outputs(const DeformOptions& options, const PointsOption& points) {
+  if (options.pull_field.empty()) {
+    check_fields(options.fields, options.cell_size);
+  } else if (options.cell_size) {
+    throw UsageError("--cell-size is for formulas, --pull-field has its own grid");
+  }
+  check_grid(options.grid, !options.pull_field.empty());
+  if (options.preserve_mass && !options.pull_field.empty()) {
+    throw UsageError("--preserve mass needs the determinant of a forward map, which --pull-field has not");
+  }
+  std::vector<std::filesystem::path> inputs = FurtherVolumes::inputs(options.with);
+  inputs.push_back(options.input.path);
+  if (!is_same_grid(options.grid) && options.grid != "fit") inputs.emplace_back(options.grid);
+  for (const std::filesystem::path& path : field_files(options.fields)) inputs.push_back(path);
+  if (!options.pull_field.empty()) inputs.push_back(options.pull_field);
+  if (!options.pull_field.empty() && !points.empty())
+    throw UsageError("--points needs a forward field, --pull-field has no forward map");
+  for (const std::filesystem::path& path : points.inputs()) inputs.push_back(path);
+  const bool series = is_series_output(options.output);
+  if (series && has_image_suffix(options.input.path)) {
+    throw UsageError("a DICOM series can only be derived from DICOM, not from " + options.input.path.string() +
+                     "; name the output .nii.gz, .nii, .nrrd or .mha");
+  }
+  if (series && !is_same_grid(options.grid)) {
+    throw UsageError("a DICOM series has the grid of the series it is derived from, not that of --grid " +
+                     options.grid + "; name the output .nii.gz, .nii, .nrrd or .mha");
+  }
+  if (options.compression && (series || options.output.extension() == ".nii")) {
+    throw UsageError("--compress is for .nii.gz, .nrrd and .mha, not for " + options.output.string());
+  }
+  if (!options.preview.empty() && options.preview.extension() != ".png") {
+    throw UsageError("unknown suffix of --preview \"" + options.preview.string() + "\"; use .png");
+  }
+  if (options.background && !std::isfinite(*options.background))
+    throw UsageError("--background is not a finite number");
+  // The series of a single file is read from its folder, so a derived series must not land there.
+  if (series && !options.input.single && !std::filesystem::is_directory(options.input.path))
+    inputs.push_back(folder_of(options.input.path));
+  DeformOutputs outputs{series, OutputSet(inputs, options.common.overwrite), {}, {}, {}, {}, {}, {}, {}};
+  outputs.volume = outputs.set.add(options.output, series ? StagedOutput::Kind::folder : StagedOutput::Kind::file);
+  outputs.sidecar = outputs.set.add(sidecar_of(options.output));
+  outputs.maps.emplace(options.maps, options.pull_field.empty() ? Direction::forward : Direction::pull, outputs.set);
+  outputs.further.emplace(options.with, outputs.set);
+  outputs.report = outputs.set.add(options.report);
+  outputs.preview = outputs.set.add(options.preview);
+  outputs.points = points.add_outputs(outputs.set);
+  return outputs;
+}
+
+DeformPlan plan_deformation(const DeformOptions& options, DeformOutputs& outputs, const InputHeader& input) {
+  if (outputs.series && !input.series) {
+    throw UsageError("a DICOM series can only be derived from a CT series, not from " + options.input.path.string() +
+                     "; name the output .nii.gz, .nii, .nrrd or .mha");
+  }
+  const glm::i64vec3& size = input.geometry.size;
+  require(std::min({size.x, size.y, size.z}) >= 2, "a volume of " + to_string(size) +
+                                                       " voxels has no cell to deform, " + options.input.path.string() +
+                                                       "; give one with at least 2 on every axis");
+  if (options.background && !fits(input.type, *options.background)) {
+    throw UsageError("--background " + nlohmann::json(*options.background).dump() + " does not fit the voxels, " +
+                     to_string(input.type) + "; choose a value in their range");
+  }
+  DeformPlan plan;
+  if (options.grid != "fit") plan.grid = output_grid(options.grid, input.geometry, {}, options.outside);
+  plan.bytes = plan_bytes(options, outputs, input, options.grid == "fit" ? input.geometry : plan.grid);
+  if (options.memory_bytes && plan.bytes > *options.memory_bytes && !means_cuda(options.backend)) {
+    throw Error("about " + format_bytes(plan.bytes) + " of memory are needed, --memory allows " +
+                format_bytes(*options.memory_bytes) + "; a larger --cell-size needs less");
+  }
+  return plan;
+}
+
+std::string describe(const DeformPlan& plan, const DeformOptions& options, const DeformOutputs& outputs) {
+  const bool fit = options.grid == "fit";
+  return "would write " + options.output.string() + ": " +
+         (fit ? "as many voxels as the deformed lattice needs" : to_string(plan.grid.size) + " voxels") + " as " +
+         (outputs.series ? "a DICOM series" : "a file") + "; about " + format_bytes(plan.bytes) + " of memory";
+}
+
+}  // namespace tetwarp::apps

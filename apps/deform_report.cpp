@@ -1,0 +1,124 @@
+#include "apps/deform_report.h"
+
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "apps/output_grid.h"
+
+namespace tetwarp::apps {
+
+namespace {
+
+using nlohmann::json;
+
+json canonical_options(const DeformRecord& of) {
+  json options = {{"interpolation", name_of(of.options.interpolation)},
+                  {"outside", name_of(of.options.outside)},
+                  {"background", of.background}};
+  if (of.options.preserve_mass) options["preserve"] = "mass";
+  if (!is_same_grid(of.options.grid)) options["grid"] = of.options.grid;
+  if (of.field.direction == Direction::pull) {
+    options["pull_field"] = of.options.pull_field.string();
+  } else {
+    options["field"] = of.options.fields;
+    if (of.options.cell_size) options["cell_size"] = *of.options.cell_size;
+  }
+  return options;
+}
+
+/// How far the map can be trusted.
+json quality_json(const DeformRecord& of) {
+  const auto& [quality, trip] = *of.check;
+  return {{"verdict", verdict(of.report, quality, trip)},
+          {"largest_stretch", quality.largest_stretch},
+          {"jacobian_edges", FieldQuality::kEdges},
+          {"jacobian_shares", quality.shares()},
+          {"round_trip",
+           {{"slices", trip.slices},
+            {"voxels", trip.voxels},
+            {"forward_after_inverse", to_json(trip.forward_after_inverse)},
+            {"inverse_after_forward", to_json(trip.inverse_after_forward)}}}};
+}
+
+}  // namespace
+
+json sidecar(const DeformRecord& of) {
+  json document = provenance("deform");
+  document["options"] = canonical_options(of);
+  document["backend"] = of.backend;
+  document["input"] = {{"path", of.options.input.path.string()}, {"sha256", of.input_sha256}};
+  if (of.input.is_dicom()) {
+    document["input"]["series_instance_uid"] = of.input.dicom->series_uid;
+    document["input"]["rounded_voxels"] = of.input.dicom->rounded;
+    document["input"]["set_aside"] = of.set_aside;
+    if (of.input.dicom->padding)
+      document["input"]["padding_hu"] = {of.input.dicom->padding->low, of.input.dicom->padding->high};
+  }
+  document["field"] = {{"sha256", of.field_sha256},
+                       {"direction", of.field.direction == Direction::pull ? "pull" : "forward"},
+                       {"lattice", to_json(of.field.lattice())},
+                       {"notes", of.field.notes}};
+  document["output"] = {{"path", of.options.output.string()},
+                        {"voxel_type", to_string(of.output.type())},
+                        {"geometry", to_json(of.output.geometry())}};
+  if (of.dicom_report) {
+    document["output"]["series_instance_uid"] = of.dicom_report->series_uid;
+    document["output"]["frame_of_reference_uid"] = of.dicom_report->frame_of_reference_uid;
+    document["output"]["added_empty_attributes"] = of.dicom_report->added_empty;
+  }
+  if (const json further = of.outputs.further->describe(); !further.empty()) document["with"] = further;
+  if (const json maps = of.outputs.maps->describe(); !maps.empty()) document["maps"] = maps;
+  if (!of.points.empty()) document["points"] = of.points.to_json();
+  document["report"] = {{"covered", of.report.covered},      {"uncovered", of.report.uncovered},
+                        {"clamped", of.report.clamped},      {"padded", of.report.padded},
+                        {"conflicts", of.report.conflicts},  {"inverted", of.report.inverted},
+                        {"degenerate", of.report.degenerate}};
+  if (of.field.direction == Direction::forward)
+    document["report"]["jacobian"] = {of.report.jacobian_min, of.report.jacobian_max};
+  if (of.report.multiply_owned) document["report"]["multiply_owned"] = *of.report.multiply_owned;
+  return document;
+}
+
+json report_with_times(const DeformRecord& of) {
+  json document = sidecar(of);
+  double total = 0;
+  for (const auto& [name, seconds] : of.stages) {
+    document["stages"][name]["seconds"] = seconds;
+    total += seconds;
+  }
+  document["total_seconds"] = total;
+  if (of.field.direction == Direction::forward) {
+    document["paths"] = {{"gathered", of.report.paths.gathered},
+                         {"walked", of.report.paths.walked},
+                         {"claimed", of.report.paths.claimed}};
+  }
+  if (of.check) document["quality"] = quality_json(of);
+  document["threads"] =
+      of.options.common.threads > 0 ? of.options.common.threads : static_cast<int>(std::thread::hardware_concurrency());
+  document["memory"] = {{"peak_bytes", peak_memory_bytes()},
+                        {"planned_bytes", of.plan.bytes},
+                        {"source_bytes", of.input.volume.size_bytes()},
+                        {"output_bytes", of.output.size_bytes()},
+                        {"field_bytes", of.field.displacement().size() * sizeof(glm::vec3)}};
+  return document;
+}
+
+std::string summary(const DeformRecord& of) {
+  char share[32];
+  std::snprintf(
+      share, sizeof share, "%.2f %%",
+      100.0 * static_cast<double>(of.report.covered) / static_cast<double>(of.report.covered + of.report.uncovered));
+  std::string line = "wrote " + of.options.output.string() + ": " + to_string(of.output.geometry().size) + " voxels, " +
+                     share + " covered, backend " + of.backend;
+  if (of.report.inverted + of.report.degenerate > 0) {
+    line += "; the field folds: " + std::to_string(of.report.inverted) + " tetrahedra inverted, " +
+            std::to_string(of.report.degenerate) + " flat";
+  }
+  if (of.report.clamped > 0) line += "; " + std::to_string(of.report.clamped) + " values clamped";
+  if (of.report.conflicts > 0)
+    line += "; " + std::to_string(of.report.conflicts) + " voxels outside the lattice were moved into";
+  return line;
+}
+
+}  // namespace tetwarp::apps

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "apps/deform_plan.h"
+#include "apps/field_source.h"
+#include "deform/field_quality.h"
+
+namespace tetwarp::apps {
+
+/// What a forward field is like, and its inverse.
+struct FieldCheck {
+  FieldQuality quality;
+  RoundTrip trip;
+};
+
+/// One run of `deform`: what it was given, and what it did.
+struct DeformRecord {
+  explicit DeformRecord(const DeformOptions& given)
+      : options(given), points(given.points), outputs(begin_outputs(given, points)) {}
+
+  const DeformOptions& options;
+  PointsOption points;
+  DeformOutputs outputs;
+  DeformPlan plan;
+  InputVolume input;
+  std::vector<std::string> set_aside;  ///< files of the input's folder that are no slices of it
+  AnyField field;
+  std::string input_sha256, field_sha256, backend;
+  double background = 0;
+  AnyVolume output;
+  Report report;
+  std::optional<FieldCheck> check;  ///< where the report tells of it
+  std::optional<DicomWriteReport> dicom_report;
+  std::vector<std::pair<std::string, double>> stages;  ///< seconds
+};
+
+/// OUTPUT.json: without a clock.
+nlohmann::json sidecar(const DeformRecord& of);
+/// --report: the sidecar, times, memory, and what the field is like.
+nlohmann::json report_with_times(const DeformRecord& of);
+/// One line for people.
+std::string summary(const DeformRecord& of);
+
+}  // namespace tetwarp::apps
