@@ -115,7 +115,7 @@ void add_deform(CLI::App& app, DeformOptions& options) {
       command->add_option("-f,--field", options.fields, kFieldHelp)->allow_extra_args(false)->type_name("FIELD");
   command
       ->add_option("--pull-field", options.pull_field,
-                   "A field that maps output to input, as registration tools write it")
+                   "A field that maps output to input, as registration tools write it; NaN in it: no source")
       ->type_name("FILE")
       ->excludes(field);
   command

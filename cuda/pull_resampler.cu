@@ -20,11 +20,12 @@ __global__ void pull_kernel(PullFrame frame, SlabBox box, std::uint8_t* mapped, 
 
 __global__ void check_pull_kernel(PullFrame frame, std::int64_t samples, unsigned long long* bad) {
   const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
-  if (n >= samples || LatticeFrame::is_usable(frame.in_voxels(frame.displacement[n]), kLargestIndex)) return;
+  if (n >= samples || frame.is_usable(frame.displacement[n])) return;
   atomicMin(bad, static_cast<unsigned long long>(n));
 }
 
-/// How far the samples of one slice of a pull field point, at least and at most; voxels, 0 included.
+/// How far the samples of one slice of a pull field point, at least and at most; voxels, 0 included. Missing ones do
+/// not count.
 struct ShiftBounds {
   glm::dvec3 least{0}, most{0};
 };
@@ -95,6 +96,7 @@ class PullResampler final : public CudaResampler {
       ShiftBounds& bounds = shifts_[static_cast<std::size_t>(z)];
       for (std::int64_t y = 0; y < frame.size.y; ++y) {
         for (std::int64_t x = 0; x < frame.size.x; ++x) {
+          if (PullFrame::is_missing(frame.vector({x, y, z}))) continue;
           const glm::dvec3 shift = frame.sample({x, y, z});
           bounds.least = glm::min(bounds.least, shift);
           bounds.most = glm::max(bounds.most, shift);

@@ -114,6 +114,7 @@ Region pull_source_region(const PullFrame& frame, const Geometry& grid, const Ge
   for (std::int64_t z = samples.begin.z; z < samples.end.z; ++z) {
     for (std::int64_t y = samples.begin.y; y < samples.end.y; ++y) {
       for (std::int64_t x = samples.begin.x; x < samples.end.x; ++x) {
+        if (PullFrame::is_missing(frame.vector({x, y, z}))) continue;
         const glm::dvec3 shift = frame.sample({x, y, z});
         least = glm::min(least, shift);
         most = glm::max(most, shift);
@@ -125,7 +126,7 @@ Region pull_source_region(const PullFrame& frame, const Geometry& grid, const Ge
 
 void refuse_sample(const glm::i64vec3& sample) {
   throw InputError("the pull field's displacement at (" + std::to_string(sample.x) + ", " + std::to_string(sample.y) +
-                   ", " + std::to_string(sample.z) + ") is not finite or longer than 262144 voxels");
+                   ", " + std::to_string(sample.z) + ") is infinite or longer than 262144 voxels");
 }
 
 void refuse_vertex(const glm::i64vec3& vertex) {

@@ -32,7 +32,7 @@ Region pull_source_region(const PullFrame& frame, const Geometry& grid, const Ge
 
 /// @throws InputError for the vertex that `LatticeFrame::snap_vertex` could not use
 [[noreturn]] void refuse_vertex(const glm::i64vec3& vertex);
-/// @throws InputError for the sample of a pull field whose vector is not finite or too long
+/// @throws InputError for the sample of a pull field whose vector is infinite or too long
 [[noreturn]] void refuse_sample(const glm::i64vec3& sample);
 
 }  // namespace tetwarp

@@ -109,7 +109,8 @@ class Resampler {
   const Geometry& output() const { return output_; }
 
   /// Checks the field and takes its bounds. The view is kept: its vertices must stay as they are until the next call.
-  /// @throws InputError for a field that is not finite, too far away, too fine, or that does not reach over the output
+  /// @throws InputError for a field that is not finite (a pull field may have NaN: no source), too far away, too fine,
+  ///         or that does not reach over the output
   ///         (Outside::refuse); or of the other direction than this resampler's
   virtual void set_field(const FieldView& field, const Control& control = {});
   virtual void set_field(const PullFieldView& field, const Control& control = {});

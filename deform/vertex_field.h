@@ -20,7 +20,8 @@ struct VertexField {
 /// Another type, for the two never convert silently.
 struct PullField {
   Geometry grid;                        ///< samples of d; trilinear between them
-  std::vector<glm::vec3> displacement;  ///< LPS mm, input point minus output point, i fastest
+  std::vector<glm::vec3> displacement;  ///< LPS mm, input point minus output point, i fastest; NaN: there is no input
+                                        ///< point, as Maps::inverse_mm says it
 };
 
 /// What becomes of a voxel that lies outside the undeformed lattice (or the grid of a pull field), where no tetrahedron

@@ -49,10 +49,13 @@ std::unique_ptr<ImageReader> open_field(const std::filesystem::path& path) {
   return reader;
 }
 
-void require_finite(const std::vector<glm::vec3>& displacement, const Geometry& grid, const std::string& file) {
+/// @param gaps  whether a displacement may be NaN
+void require_finite(const std::vector<glm::vec3>& displacement, const Geometry& grid, bool gaps,
+                    const std::string& file) {
+  const auto is_good = [gaps](float value) { return std::isfinite(value) || (gaps && std::isnan(value)); };
   for (std::size_t v = 0; v < displacement.size(); ++v) {
     const glm::vec3& d = displacement[v];
-    if (std::isfinite(d.x) && std::isfinite(d.y) && std::isfinite(d.z)) continue;
+    if (is_good(d.x) && is_good(d.y) && is_good(d.z)) continue;
     const auto n = static_cast<std::int64_t>(v);
     throw InputError("a displacement that is not finite (" + std::to_string(d.x) + ", " + std::to_string(d.y) + ", " +
                      std::to_string(d.z) + ") at vertex (" + std::to_string(n % grid.size.x) + ", " +
@@ -81,7 +84,8 @@ FieldFile read_as(const std::filesystem::path& path, std::optional<FieldDirectio
       field.displacement[v] = glm::vec3(glm::dvec3(values[3 * v], values[3 * v + 1], values[3 * v + 2]));
     }
   }
-  require_finite(field.displacement, field.grid, file);
+  require_finite(field.displacement, field.grid,
+                 wanted.value_or(field.direction.value_or(FieldDirection::forward)) == FieldDirection::pull, file);
   return field;
 }
 

@@ -14,7 +14,7 @@ std::string to_string(FieldDirection direction);  // "forward", "pull"
 /// A displacement field as a file holds it: three float components a sample, LPS mm, relative.
 struct FieldFile {
   Geometry grid;
-  std::vector<glm::vec3> displacement;     ///< i fastest
+  std::vector<glm::vec3> displacement;      ///< i fastest
   std::optional<FieldDirection> direction;  ///< as the file states it; files of other tools do not say
 };
 
@@ -31,6 +31,8 @@ bool is_field_file(const std::filesystem::path& path);
 
 /// Reads .mha .nrrd .nii .nii.gz with vectors of three floats or doubles (doubles are rounded to float).
 /// Direction: NRRD and MHA key `tetwarp_direction`, NIfTI descrip `tetwarp_direction=forward`.
+/// A pull field may have NaN where there is no source, which a file that does not say its direction has only for
+/// `read_pull_field`.
 /// @throws InputError for a file that is no field, or with a value that is not finite (the first such vertex is named)
 FieldFileHeader read_field_header(const std::filesystem::path& path);
 FieldFile read_field_file(const std::filesystem::path& path);

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cmath>
+
 #include "deform/core/lattice_vertex.h"
 #include "deform/vertex_field.h"
 
@@ -7,9 +9,15 @@ namespace tetwarp {
 
 /// A pull field over an output grid: x0 = p + d(p), d trilinear between samples.
 ///
+/// A sample that holds a NaN is missing: nothing comes to its place, nor to a voxel that would be interpolated from it.
+/// A voxel within 2^-12 of the way from one sample to the next, on an axis, does without the next where that is
+/// missing: rounding of a grid that is meant to be the output's takes no voxel away.
+///
 /// Samples are snapped to 2^-12 voxel of output index like the vertices of a forward field, so that whole shifts copy
 /// exactly whatever the spacing.
 struct PullFrame {
+  static constexpr double kSlack = 1.0 / kStepsPerVoxel;  ///< samples: a place so near to one is taken for it
+
   AffineMap grid_from_output;
   glm::dmat3 output_from_mm{1};
   glm::i64vec3 size{0};
@@ -18,15 +26,58 @@ struct PullFrame {
 
   TETWARP_HD glm::dvec3 in_voxels(const glm::vec3& mm) const { return output_from_mm * glm::dvec3(mm); }
 
-  /// A sample in voxels of output index.
+  TETWARP_HD const glm::vec3& vector(const glm::i64vec3& at) const {
+    return displacement[(at.z * size.y + at.y) * size.x + at.x];
+  }
+
+  /// Whether a sample, or what was interpolated, says that nothing comes to its place. @param v  not infinite
+  template <class Vector>
+  TETWARP_HD static bool is_missing(const Vector& v) {
+    return v.x != v.x || v.y != v.y || v.z != v.z;
+  }
+
+  /// Whether a sample is missing or a vector that is finite and not too long.
+  TETWARP_HD bool is_usable(const glm::vec3& mm) const {
+    if (!is_missing(mm)) return LatticeFrame::is_usable(in_voxels(mm), kLargestIndex);
+    return !std::isinf(mm.x) && !std::isinf(mm.y) && !std::isinf(mm.z);
+  }
+
+  /// A sample in voxels of output index; with a NaN where it is missing. Rounded as by `snap`, whose integers have no
+  /// NaN and no -0.
   TETWARP_HD glm::dvec3 sample(const glm::i64vec3& at) const {
-    const glm::i32vec3 steps = snap(in_voxels(displacement[(at.z * size.y + at.y) * size.x + at.x]));
-    return glm::dvec3(steps) * (1.0 / kStepsPerVoxel);
+    const glm::dvec3 steps = in_voxels(vector(at)) * double{kStepsPerVoxel};
+    return glm::dvec3(std::rint(steps.x) + 0, std::rint(steps.y) + 0, std::rint(steps.z) + 0) * (1.0 / kStepsPerVoxel);
+  }
+
+  /// From a to b. @tparam kGaps  whether one may be missing at the other, to within the slack
+  template <bool kGaps>
+  TETWARP_HD static glm::dvec3 between(const glm::dvec3& a, const glm::dvec3& b, double t) {
+    const glm::dvec3 mixed = a + t * (b - a);
+    if (!kGaps || !is_missing(mixed) || (t > kSlack && t < 1 - kSlack)) return mixed;
+    return t <= kSlack ? a : b;
+  }
+
+  /// @param index  on the samples. @return missing where a sample that is needed is
+  template <bool kGaps>
+  TETWARP_HD glm::dvec3 trilinear(const glm::dvec3& index) const {
+    const glm::i64vec3 low(index);  // index >= 0
+    const glm::dvec3 t = index - glm::dvec3(low);
+    glm::i64vec3 high;
+    for (int axis = 0; axis < 3; ++axis) high[axis] = low[axis] + 1 < size[axis] ? low[axis] + 1 : size[axis] - 1;
+    glm::dvec3 along_z[2];
+    for (int z = 0; z < 2; ++z) {
+      glm::dvec3 along_y[2];
+      for (int y = 0; y < 2; ++y) {
+        const glm::i64vec3 a(low.x, y ? high.y : low.y, z ? high.z : low.z), b(high.x, a.y, a.z);
+        along_y[y] = between<kGaps>(sample(a), sample(b), t.x);
+      }
+      along_z[z] = between<kGaps>(along_y[0], along_y[1], t.y);
+    }
+    return between<kGaps>(along_z[0], along_z[1], t.z);
   }
 
   /// Takes an index up to 2^-12 sample outside the grid onto it. @return false if it is further out
   TETWARP_HD bool clamp_to_samples(glm::dvec3& index) const {
-    constexpr double kSlack = 1.0 / kStepsPerVoxel;
     for (int axis = 0; axis < 3; ++axis) {
       const auto last = static_cast<double>(size[axis] - 1);
       if (!(index[axis] >= -kSlack && index[axis] <= last + kSlack)) return false;
@@ -40,21 +91,10 @@ struct PullFrame {
     glm::dvec3 index = grid_from_output(glm::dvec3(voxel));
     offset = glm::vec3(0);
     if (!clamp_to_samples(index)) return rest_outside;
-    const glm::i64vec3 low(index);  // index >= 0
-    const glm::dvec3 t = index - glm::dvec3(low);
-    glm::i64vec3 high;
-    for (int axis = 0; axis < 3; ++axis) high[axis] = low[axis] + 1 < size[axis] ? low[axis] + 1 : size[axis] - 1;
-    glm::dvec3 along_z[2];
-    for (int z = 0; z < 2; ++z) {
-      glm::dvec3 along_y[2];
-      for (int y = 0; y < 2; ++y) {
-        const glm::i64vec3 a(low.x, y ? high.y : low.y, z ? high.z : low.z), b(high.x, a.y, a.z);
-        const glm::dvec3 first = sample(a);
-        along_y[y] = first + t.x * (sample(b) - first);
-      }
-      along_z[z] = along_y[0] + t.y * (along_y[1] - along_y[0]);
-    }
-    offset = glm::vec3(along_z[0] + t.z * (along_z[1] - along_z[0]));
+    glm::dvec3 found = trilinear<false>(index);
+    if (is_missing(found)) found = trilinear<true>(index);
+    if (is_missing(found)) return false;
+    offset = glm::vec3(found);
     return true;
   }
 };

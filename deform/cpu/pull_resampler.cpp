@@ -66,9 +66,7 @@ class PullResampler final : public Resampler {
         if (control.stop.stop_requested()) throw Cancelled();
         const glm::vec3* slice = frame_.displacement + z * size.y * size.x;
         for (std::int64_t n = 0; n < size.y * size.x; ++n) {
-          if (!LatticeFrame::is_usable(frame_.in_voxels(slice[n]), kLargestIndex)) {
-            refuse_sample({n % size.x, n / size.x, z});
-          }
+          if (!frame_.is_usable(slice[n])) refuse_sample({n % size.x, n / size.x, z});
         }
       });
     });

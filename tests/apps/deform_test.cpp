@@ -144,6 +144,44 @@ TEST(Deform, APullFieldIsNeverTakenForAForwardOne) {
   EXPECT_FALSE(std::filesystem::exists(scratch / "c.mha"));
 }
 
+TEST(Deform, AnInverseWithGapsDeformsAsTheFieldItIsOf) {
+  const Scratch scratch;
+  make_phantom_file(scratch, "in.mha");
+  for (const std::string name : {"inverse.mha", "inverse.nrrd", "inverse.nii.gz"}) {
+    expect_run(scratch,
+               "deform in.mha -f twist:angle=25 -f translate:by=7/-4/9 -o a.mha --background -1500 --coverage a_c.mha "
+               "--overwrite --inverse " +
+                   name);
+    expect_run(scratch, "deform in.mha --pull-field " + name +
+                            " -o b.mha --background -1500 --coverage b_c.mha --inverse b_i.mha --overwrite");
+    EXPECT_TRUE(same_voxels(scratch / "a_c.mha", scratch / "b_c.mha")) << name;
+    const AnyVolume a = read_image(scratch / "a.mha"), b = read_image(scratch / "b.mha");
+    const AnyVolume covered = read_image(scratch / "a_c.mha"), again = read_image(scratch / "b_i.mha");
+    std::uint64_t uncovered = 0;
+    for (std::size_t n = 0; n < a.as<std::int16_t>().size(); ++n) {
+      // 2^-13 voxel an axis of up to 3000 HU a voxel.
+      ASSERT_NEAR(a.as<std::int16_t>()[n], b.as<std::int16_t>()[n], 2) << name << " " << n;
+      ASSERT_EQ(std::isnan(again.as<float>()[3 * n]), covered.as<std::uint8_t>()[n] == 0) << name << " " << n;
+      if (covered.as<std::uint8_t>()[n] != 0) continue;
+      ++uncovered;
+      ASSERT_EQ(b.as<std::int16_t>()[n], -1500) << name << " " << n;
+    }
+    EXPECT_GT(uncovered, 2000U);
+    EXPECT_EQ(nlohmann::json::parse(read_text(scratch / "b.mha.json"))["report"]["uncovered"], uncovered);
+  }
+  expect_run(scratch, "invert twist:angle=25 --like in.mha -o whole.mha");
+  expect_run(scratch, "deform in.mha --pull-field whole.mha -o c.mha");
+  // A forward field has no gaps, and none may be infinite.
+  const AnyVolume gaps = read_image(scratch / "inverse.mha");
+  const std::vector<glm::vec3> vectors(static_cast<std::size_t>(voxel_count(gaps.geometry())), glm::vec3(NAN));
+  write_field_file(scratch / "forward.mha", VertexField{gaps.geometry(), vectors});
+  EXPECT_EQ(run_tetwarp(scratch.path(), "deform in.mha -f forward.mha -o d.mha").status, 4);
+  const std::vector<glm::vec3> infinite(vectors.size(), glm::vec3(INFINITY, 0, 0));
+  write_field_file(scratch / "infinite.mha", PullField{gaps.geometry(), infinite});
+  EXPECT_EQ(run_tetwarp(scratch.path(), "deform in.mha --pull-field infinite.mha -o d.mha").status, 4);
+  EXPECT_FALSE(std::filesystem::exists(scratch / "d.mha"));
+}
+
 TEST(Deform, TheReportTellsWhatHappenedAndTheSidecarHasNoClock) {
   const Scratch scratch;
   make_phantom_file(scratch, "in.mha");

@@ -134,11 +134,124 @@ TEST_P(Pull, OutsideItsGridVoxelsRestOrGetTheBackgroundOrAreRefused) {
   }
 }
 
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+
+/// Whether a sample around a place is missing, further than 2^-12 of the way from the others on each axis.
+bool is_missing(const PullField& field, const glm::dvec3& index) {
+  const glm::dvec3 base = glm::min(glm::floor(index), glm::dvec3(field.grid.size - std::int64_t{2}));
+  for (int corner = 0; corner < 8; ++corner) {
+    const glm::dvec3 step(corner & 1, corner >> 1 & 1, corner >> 2);
+    const glm::dvec3 t = glm::abs(1.0 - step - (index - base));
+    const glm::vec3& mm = field.displacement[offset_of(field.grid, glm::i64vec3(base + step))];
+    if (std::isnan(mm.x + mm.y + mm.z) && std::min({t.x, t.y, t.z}) > 1.0 / 4096) return true;
+  }
+  return false;
+}
+
+/// Takes a part of the samples away: one of three components is enough.
+void punch(PullField& field, double part, Random& random) {
+  for (glm::vec3& mm : field.displacement) {
+    if (random.chance(part)) mm[static_cast<int>(random.integer(0, 2))] = kNaN;
+  }
+}
+
+TEST_P(Pull, AVoxelBesideAMissingSampleIsNotCovered) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE(seed_text(seed));
+  Random random(seed);
+  PullCase test(random, 15);
+  test.field = {test.field.grid, {}};
+  test.field.grid.spacing *= glm::dvec3(test.field.grid.size - std::int64_t{1}) / 14.0;
+  test.field.grid.size = glm::i64vec3(15);
+  for (int n = 0; n < 15 * 15 * 15; ++n)
+    test.field.displacement.emplace_back(random.real(-2, 2), random.real(-2, 2), random.real(-2, 2));
+  const auto resampler = make_pull(test.output);
+  resampler->set_field(view(test.field));
+  const auto all = run(*resampler, test.source, {.pull = true});
+  punch(test.field, 0.1, random);
+  const AffineMap sample = index_from_point(test.field.grid) * point_from_index(test.output);
+  for (const Outside outside : {Outside::refuse, Outside::rest, Outside::background}) {
+    resampler->set_field(view(test.field, outside));
+    const auto found = run(*resampler, test.source, {.pull = true});
+    std::uint64_t missing = 0, covered = 0;
+    for_each_voxel(test.output, [&](const glm::i64vec3& voxel, std::size_t n) {
+      const bool none = is_missing(test.field, sample(glm::dvec3(voxel)));
+      missing += none;
+      covered += found.coverage.voxels[n];
+      ASSERT_EQ(found.coverage.voxels[n], none ? 0 : all.coverage.voxels[n]) << to_string(voxel);
+      // 2^-12 of the way to another sample, up to 6 voxels elsewhere.
+      ASSERT_NEAR(found.output.voxels[n], none ? -7 : all.output.voxels[n], none ? 0 : 5e-3) << to_string(voxel);
+      ASSERT_EQ(std::isnan(found.inverse_mm.voxels[n].x), none) << to_string(voxel);
+    });
+    EXPECT_GT(missing, 100U);
+    EXPECT_GT(covered, 100U);
+    EXPECT_EQ(found.report.covered, covered);
+    EXPECT_EQ(found.report.uncovered, found.output.voxels.size() - covered);
+  }
+}
+
+TEST_P(Pull, WhereSamplesLieOnVoxelsMissingOnesTakeTheirOwnAlone) {
+  Random random(9);
+  const Geometry grid = oblique_grid({9, 8, 7});
+  const auto source = random_values<float>(grid, random, 0, 1);
+  PullField field = uniform_pull(grid, glm::dvec3(0));
+  punch(field, 0.3, random);
+  const auto resampler = make_pull(grid);
+  resampler->set_field(view(field));
+  const auto found = run(*resampler, source, {.pull = true});
+  for_each_voxel(grid, [&](const glm::i64vec3& voxel, std::size_t n) {
+    const glm::vec3& mm = field.displacement[n];
+    const bool missing = std::isnan(mm.x + mm.y + mm.z);
+    ASSERT_EQ(found.coverage.voxels[n], !missing) << to_string(voxel);
+    ASSERT_EQ(found.output.voxels[n], missing ? -7 : source.voxels[n]) << to_string(voxel);
+  });
+}
+
+TEST_P(Pull, AFieldWithoutAnySampleLeavesTheBackground) {
+  const Geometry grid = unit_grid({6, 5, 4});
+  Random random(10);
+  const auto source = random_values<float>(grid, random, 0, 1);
+  const PullField none{grid, std::vector<glm::vec3>(120, glm::vec3(kNaN))};
+  const auto resampler = make_pull(grid);
+  resampler->set_field(view(none, Outside::rest));
+  const auto found = run(*resampler, source, {.pull = true});
+  EXPECT_EQ(found.report.uncovered, 120U);
+  EXPECT_TRUE(same_bits(found.output.voxels, std::vector<float>(120, -7)));
+}
+
+TEST_P(Pull, AnInverseThatAForwardFieldLeftDeformsLikeIt) {
+  const std::uint64_t seed = test_seed();
+  for (std::uint64_t number = 0; number < 60 && !HasFailure(); ++number) {
+    Random random(seed, number);
+    const FieldCase test = random_injective_case(random);
+    SCOPED_TRACE(seed_text(seed) + ", field " + std::to_string(number) + ": " + test.description);
+    Volume<float> ramp{test.output, {}};
+    for_each_voxel(test.output, [&](const glm::i64vec3& v, std::size_t) {
+      ramp.voxels.push_back(static_cast<float>(v.x + 3 * v.y - 2 * v.z));
+    });
+    const auto forward = make(test.output), pull = make_pull(test.output);
+    forward->set_field(view(test.field));
+    const auto expected = run(*forward, ramp);
+    PullField inverse{test.output, expected.inverse_mm.voxels};
+    pull->set_field(view(inverse));
+    const auto found = run(*pull, ramp, {.pull = true});
+    for_each_voxel(test.output, [&](const glm::i64vec3& voxel, std::size_t n) {
+      ASSERT_EQ(std::isnan(found.inverse_mm.voxels[n].x), expected.owners.voxels[n] == 0) << to_string(voxel);
+      const glm::dvec3 x0 =
+          glm::dvec3(voxel) + index_from_point(test.output).linear * glm::dvec3(expected.inverse_mm.voxels[n]);
+      if (expected.owners.voxels[n] != 0 && reference_sample(ramp, x0, Interpolation::linear).jump < 1e-3) return;
+      ASSERT_EQ(found.coverage.voxels[n], expected.coverage.voxels[n]) << to_string(voxel);
+      ASSERT_NEAR(found.output.voxels[n], expected.output.voxels[n], 1e-3) << to_string(voxel);
+    });
+  }
+}
+
 TEST_P(Pull, ThreadsAndRegionsChangeNothing) {
   const std::uint64_t seed = test_seed();
   SCOPED_TRACE(seed_text(seed));
   Random random(seed);
   PullCase test(random, 30);
+  punch(test.field, 0.1, random);
   test.output.size = {41, 35, 39};
   test.source = random_values<float>(test.output, random, 0, 1);
   const auto one = make_pull(test.output, 1), two = make_pull(test.output, 2);
@@ -179,11 +292,15 @@ TEST_P(Pull, DirectionsAreNeverMistaken) {
 
 TEST_P(Pull, FieldsThatAreNotFiniteAreRefused) {
   const Geometry grid = unit_grid({5, 5, 5});
-  for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), 1e30f}) {
+  constexpr float kInfinite = std::numeric_limits<float>::infinity();
+  for (const float bad : {kInfinite, -kInfinite, 1e30f}) {
     PullField pull = uniform_pull(grid, glm::dvec3(0));
     pull.displacement[77].y = bad;
     EXPECT_THROW(make_pull(grid)->set_field(view(pull)), InputError);
   }
+  PullField both = uniform_pull(grid, glm::dvec3(0));
+  both.displacement[77] = {kNaN, 0, kInfinite};
+  EXPECT_THROW(make_pull(grid)->set_field(view(both)), InputError);
   PullField few = uniform_pull(grid, glm::dvec3(0));
   few.displacement.pop_back();
   EXPECT_THROW(view(few), InputError);

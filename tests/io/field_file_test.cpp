@@ -95,6 +95,25 @@ TEST(FieldFile, FirstVertexThatIsNotFiniteIsNamed) {
   }
 }
 
+TEST(FieldFile, OnlyPullFieldsHaveGaps) {
+  const Scratch scratch;
+  VertexField forward = asymmetric_field(all_orientations()[0]);
+  forward.displacement[7] = glm::vec3(NAN);
+  PullField pull{forward.lattice, forward.displacement};
+  for (const std::string& name : kNames) {
+    write_field_file(scratch / name, forward);
+    EXPECT_NE(refusal([&] { read_forward_field(scratch / name); }).find("at vertex (3, 1, 0)"), std::string::npos);
+    write_field_file(scratch / name, pull);
+    for (const glm::vec3& mm :
+         {read_pull_field(scratch / name).displacement[7], read_field_file(scratch / name).displacement[7]})
+      EXPECT_TRUE(std::isnan(mm.x) && std::isnan(mm.y) && std::isnan(mm.z)) << name;
+    PullField infinite = pull;
+    infinite.displacement[9].y = -INFINITY;
+    write_field_file(scratch / name, infinite);
+    EXPECT_NE(refusal([&] { read_pull_field(scratch / name); }).find("at vertex (1, 2, 0)"), std::string::npos) << name;
+  }
+}
+
 TEST(FieldFile, DoublesAreRoundedToFloat) {
   const Scratch scratch;
   for (const std::string& name : kNames) {
