@@ -13,7 +13,7 @@ using Json = nlohmann::json;
 
 constexpr char kNote[] = R"(## Floors
 
-Ratios of medians in this run. A floor is required, an aim is not.
+Ratios, of medians where they are of times, and counts of this run. A floor is required, an aim is not.
 
 )";
 

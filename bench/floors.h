@@ -7,9 +7,9 @@
 
 namespace tetwarp::bench {
 
-/// A ratio within one run, and what it should be.
+/// A ratio within one run, or a count, and what it should be.
 struct Floor {
-  std::string ratio;  ///< "paper / resample"
+  std::string ratio;  ///< "paper / resample", "written without a source"
   std::string where;  ///< "wave", "wave, cells of 4"
   double value = 0;
   bool at_least = true;  ///< otherwise at most

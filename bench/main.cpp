@@ -1,4 +1,4 @@
-// tetwarp-bench: what the paper compares, what a deformation costs on a GPU and on the CPU, and files.
+// tetwarp-bench: what the paper compares, what a deformation and its inverse cost on a GPU and on the CPU, and files.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
@@ -120,6 +120,42 @@ void add_cpu(CLI::App& app, CpuOptions& options, std::string& cell_sizes) {
   command->footer("Example: tetwarp bench cpu --slices 100 --fields wave,elastic --threads 2 --json cpu.json");
 }
 
+void add_invert(CLI::App& app, InvertOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "invert", "The inverse displacement field on the CPU against ITK's inverters, and the floors to reach");
+  command
+      ->add_option("--fields", options.fields,
+                   "Fields with a known inverse, and one that folds: what has no source there is known")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(CLI::IsMember(options.fields))
+      ->capture_default_str();
+  command
+      ->add_option("--peers", options.peers,
+                   "InvertDisplacementField with its defaults, without its boundary condition, "
+                   "IterativeInverseDisplacementField; none: nothing beside Tetwarp")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(CLI::IsMember({"itk-invert", "itk-invert-free", "itk-iterative", "none"}))
+      ->capture_default_str();
+  command->add_option("--slices", options.slices, "Slices of the field, a vertex on every voxel")
+      ->check(CLI::Range(2, 100000))
+      ->capture_default_str();
+  command->add_option("--width", options.width, "Columns and rows of the field")
+      ->check(CLI::Range(8, 100000))
+      ->capture_default_str();
+  command->add_option("--threads", options.threads, "Threads of everything; 0 is all")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_option("--repeats", options.repeats, "Timed repeats; the median counts")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  command->add_option("--json", options.json, "Every number, as JSON")->type_name("FILE");
+  command->add_flag("--check", options.check, "Exit with 1 where a floor is missed");
+  command->add_flag("--verbose", options.verbose, "A line on standard error for every run");
+  command->footer("Example: tetwarp bench invert --fields wave,bubble --repeats 1 --json invert.json");
+}
+
 void add_gpu(CLI::App& app, GpuOptions& options, std::string& cell_sizes) {
   CLI::App* command = app.add_subcommand("gpu", "What a frame costs on a GPU, and the floors that it should reach");
   add_input(*command, options.input);
@@ -196,12 +232,14 @@ int run_command_line(int argc, char** argv) {
   PaperOptions paper;
   GpuOptions gpu;
   CpuOptions cpu;
+  InvertOptions invert;
   IoOptions io;
   Words words;
   std::string gpu_cell_sizes = words.cell_sizes, cpu_cell_sizes = words.cell_sizes;
   add_paper(app, paper, words);
   add_gpu(app, gpu, gpu_cell_sizes);
   add_cpu(app, cpu, cpu_cell_sizes);
+  add_invert(app, invert);
   add_io(app, io);
   try {
     app.parse(argc, argv);
@@ -214,6 +252,7 @@ int run_command_line(int argc, char** argv) {
     cpu.cell_sizes = parse_cell_sizes(cpu_cell_sizes);
     return run_cpu(cpu);
   }
+  if (app.got_subcommand("invert")) return run_invert(invert);
   if (app.got_subcommand("io")) return run_io(io);
   if (app.got_subcommand("gpu")) {
     gpu.cell_sizes = parse_cell_sizes(gpu_cell_sizes);

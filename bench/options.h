@@ -56,6 +56,16 @@ struct CpuOptions {
   bool verbose = false;  ///< a line to standard error for every step
 };
 
+struct InvertOptions {
+  std::vector<std::string> fields{"wave", "twist", "bubble", "folds"};
+  std::vector<std::string> peers{"itk-invert", "itk-invert-free", "itk-iterative"};
+  std::int64_t width = 256, slices = 150;  ///< of the lattice, vertices
+  int threads = 0, repeats = 3;
+  std::filesystem::path json;
+  bool check = false;    ///< a missed floor is a failure
+  bool verbose = false;  ///< a line to standard error for every run
+};
+
 struct GpuOptions {
   InputOptions input{.slices = {300, 600}};  ///< everything on the first volume, one field on the others
   std::vector<std::string> fields{"identity", "wave",     "twist", "bubble", "elastic",
@@ -86,5 +96,8 @@ int run_gpu(const GpuOptions& options);
 int run_io(const IoOptions& options);
 /// What a new field costs on the CPU, against the paper, ITK, VTK and memory. @return the exit status
 int run_cpu(const CpuOptions& options);
+/// The inverse displacement field on the CPU, against ITK's inverters: time, error and what has no source. @return the
+/// exit status
+int run_invert(const InvertOptions& options);
 
 }  // namespace tetwarp::bench

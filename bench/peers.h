@@ -40,6 +40,31 @@ std::unique_ptr<Peer> make_itk_warp(const PeerInput& input, const PullField& inv
 /// @param field  a vertex on every voxel
 std::unique_ptr<Peer> make_itk_invert_and_warp(const PeerInput& input, const VertexField& field);
 
+/// A peer that makes the inverse of a displacement field.
+class InversePeer {
+ public:
+  virtual ~InversePeer() = default;
+
+  /// Once, from the field in memory to its inverse in memory. What it allocates the first time is kept.
+  virtual void run() = 0;
+  /// Of the last run: undeformed minus deformed place, i fastest.
+  virtual std::span<const glm::vec3> inverse() const = 0;
+};
+
+/// ITK's filters that invert a displacement field on the whole grid, with their defaults. Not among them is
+/// InverseDisplacementFieldImageFilter, a thin-plate spline through every 16th vertex: the matrix of its landmarks
+/// grows with the square of their number, and the time with the cube.
+enum class ItkInverter : std::uint8_t {
+  fixed_border,  ///< InvertDisplacementFieldImageFilter: 20 iterations at most, 0 at the border
+  free_border,   ///< the same with EnforceBoundaryCondition off
+  iterative      ///< IterativeInverseDisplacementFieldImageFilter: 5 iterations, which run in one thread
+};
+
+/// Null without ITK.
+///
+/// @param field  spacing 1, origin 0; must stay while the peer is used
+std::unique_ptr<InversePeer> make_itk_inverter(ItkInverter inverter, const VertexField& field, int threads);
+
 /// "9.1.0, threads by TBB"; none where this build has no VTK.
 std::optional<std::string> vtk_version();
 /// VTK's vtkProbeFilter: the deformed vtkStructuredGrid with the volume's values at its points, probed at the voxel

@@ -1,5 +1,6 @@
 #include <itkImage.h>
 #include <itkInvertDisplacementFieldImageFilter.h>
+#include <itkIterativeInverseDisplacementFieldImageFilter.h>
 #include <itkMultiThreaderBase.h>
 #include <itkVersion.h>
 #include <itkWarpImageFilter.h>
@@ -14,6 +15,8 @@ using Image = itk::Image<std::int16_t, 3>;
 using Field = itk::Image<itk::Vector<float, 3>, 3>;
 using Warp = itk::WarpImageFilter<Image, Image, Field>;
 using Invert = itk::InvertDisplacementFieldImageFilter<Field, Field>;
+using IterativeInverse = itk::IterativeInverseDisplacementFieldImageFilter<Field, Field>;
+using FieldFilter = itk::ImageToImageFilter<Field, Field>;
 
 static_assert(sizeof(Field::PixelType) == sizeof(glm::vec3));
 
@@ -41,15 +44,45 @@ void use_threads(Filter& filter, int threads) {
   filter.ReleaseDataBeforeUpdateFlagOff();  // the output's memory is kept from run to run
 }
 
+FieldFilter::Pointer make_filter(ItkInverter inverter) {
+  if (inverter == ItkInverter::iterative) return IterativeInverse::New().GetPointer();
+  const auto invert = Invert::New();
+  invert->SetEnforceBoundaryCondition(inverter == ItkInverter::fixed_border);
+  return invert.GetPointer();
+}
+
+FieldFilter::Pointer make_inverter(ItkInverter inverter, const VertexField& field, int threads) {
+  const FieldFilter::Pointer filter = make_filter(inverter);
+  use_threads(*filter, threads);
+  filter->SetInput(wrap<Field>(field.lattice, field.displacement));
+  return filter;
+}
+
+class ItkInverse final : public InversePeer {
+ public:
+  ItkInverse(ItkInverter inverter, const VertexField& field, int threads)
+      : filter_(make_inverter(inverter, field, threads)) {}
+
+  void run() override {
+    filter_->Modified();
+    filter_->Update();
+  }
+  std::span<const glm::vec3> inverse() const override {
+    const Field* field = filter_->GetOutput();
+    return {reinterpret_cast<const glm::vec3*>(field->GetBufferPointer()), field->GetPixelContainer()->Size()};
+  }
+
+ private:
+  FieldFilter::Pointer filter_;
+};
+
 class ItkWarp final : public Peer {
  public:
   ItkWarp(const PeerInput& input, const PullField& inverse) : ItkWarp(input) {
     warp_->SetDisplacementField(wrap<Field>(inverse.grid, inverse.displacement));
   }
   ItkWarp(const PeerInput& input, const VertexField& field) : ItkWarp(input) {
-    invert_ = Invert::New();
-    use_threads(*invert_, input.threads);
-    invert_->SetDisplacementField(wrap<Field>(field.lattice, field.displacement));
+    invert_ = make_inverter(ItkInverter::fixed_border, field, input.threads);
     warp_->SetDisplacementField(invert_->GetOutput());
   }
 
@@ -73,7 +106,7 @@ class ItkWarp final : public Peer {
   }
 
   Warp::Pointer warp_;
-  Invert::Pointer invert_;
+  FieldFilter::Pointer invert_;
 };
 
 }  // namespace
@@ -86,6 +119,10 @@ std::unique_ptr<Peer> make_itk_warp(const PeerInput& input, const PullField& inv
 
 std::unique_ptr<Peer> make_itk_invert_and_warp(const PeerInput& input, const VertexField& field) {
   return std::make_unique<ItkWarp>(input, field);
+}
+
+std::unique_ptr<InversePeer> make_itk_inverter(ItkInverter inverter, const VertexField& field, int threads) {
+  return std::make_unique<ItkInverse>(inverter, field, threads);
 }
 
 }  // namespace tetwarp::bench

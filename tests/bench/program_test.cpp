@@ -51,6 +51,9 @@ TEST(BenchProgram, WrongCommandLinesExitWithTwo) {
   expect_error(run_bench(scratch, "cpu --peers gpu"), 2, "gpu");
   expect_error(run_bench(scratch, "cpu --cell-sizes 4,1"), 2, "--cell-sizes");
   expect_error(run_bench(scratch, "cpu --repeats 0"), 2, "--repeats");
+  expect_error(run_bench(scratch, "invert --fields wave,elastic"), 2, "elastic");
+  expect_error(run_bench(scratch, "invert --peers itk-warp"), 2, "itk-warp");
+  expect_error(run_bench(scratch, "invert --width 4"), 2, "--width");
   expect_error(run_bench(scratch, "io --slices 1"), 2, "--slices");
   expect_error(run_bench(scratch, "io --steps in,through"), 2, "through");
   expect_error(run_bench(scratch, "io --folder missing"), 2, "missing");
@@ -117,6 +120,38 @@ TEST(BenchProgram, AMissedFloorIsAFailureWhereItIsAskedFor) {
   EXPECT_EQ(run_bench(scratch, alone + "local --check").status, 0) << "nothing is required of it";
 }
 
+constexpr const char* kTinyInvert = "invert --width 64 --slices 12 --repeats 1 --threads 2 --json r.json ";
+
+TEST(BenchProgram, MeasuresTheInverseOfEveryFieldByEveryProgram) {
+  const Scratch scratch;
+  const Outcome run = run_bench(scratch, kTinyInvert);
+  ASSERT_EQ(run.status, 0) << run.err;
+  EXPECT_TRUE(says(run.out, {"# tetwarp-bench invert", "64 x 64 x 12", "| folds | tetwarp |", "## Sources", "## Floors",
+                             "| written without a source | folds | 0.000 | at most 0 | met |"}));
+  const nlohmann::json document = nlohmann::json::parse(read_text(scratch / "r.json"));
+  EXPECT_EQ(document["machine"]["threads"], 2);
+  ASSERT_EQ(document["runs"].size(), document["itk"].is_null() ? 4u : 16u);
+  for (const nlohmann::json& found : document["runs"]) {
+    EXPECT_GT(found["ms"]["median"], 0) << found["field"] << found["by"];
+    EXPECT_EQ(found["mean_error"].is_null(), found["field"] == "folds");
+    if (found["by"] != "tetwarp") continue;
+    EXPECT_EQ(found["written_without_source"], 0) << found["field"];
+    EXPECT_EQ(found["left_out"], 0) << found["field"];
+  }
+}
+
+TEST(BenchProgram, AnInverterThatIsMoreAccurateIsAFailureWhereItIsAskedFor) {
+  // Wave shifts whole slices: ITK's iteration finds minus the field itself, Tetwarp rounds vertices to 2^-12 voxel.
+  const Scratch scratch;
+  const std::string wave = std::string(kTinyInvert) + "--fields wave --check --peers ";
+  EXPECT_EQ(run_bench(scratch, wave + "none").status, 0);
+  const Outcome beside = run_bench(scratch, wave + "itk-iterative");
+  if (nlohmann::json::parse(read_text(scratch / "r.json"))["itk"].is_null()) GTEST_SKIP() << "ITK is not in this build";
+  EXPECT_EQ(beside.status, 1);
+  EXPECT_TRUE(says(beside.err, {"a floor is missed"}));
+  EXPECT_TRUE(says(beside.out, {"| mean error / tetwarp's | wave, ITK iterative | 0.00", "at least 1 | missed"}));
+}
+
 #ifdef TETWARP_BENCH_IO
 constexpr const char* kTinyIo = "io --width 32 --slices 6 --repeats 2 --cell-sizes 4 --folder . --json r.json ";
 
@@ -175,7 +210,7 @@ TEST(BenchProgram, AnUnwritableResultIsKnownBeforeTheWork) {
 
 TEST(BenchProgram, HelpHasAnExample) {
   const Scratch scratch;
-  for (const std::string command : {"paper", "gpu", "cpu", "io"}) {
+  for (const std::string command : {"paper", "gpu", "cpu", "invert", "io"}) {
     const Outcome run = run_bench(scratch, command + " --help");
     EXPECT_EQ(run.status, 0);
     EXPECT_TRUE(says(run.out, {"Example: tetwarp bench " + command}));

@@ -1,0 +1,11 @@
+#pragma once
+
+#include "bench/floors.h"
+#include "bench/invert_results.h"
+
+namespace tetwarp::bench {
+
+/// What was measured of what Tetwarp's inverse is held to.
+std::vector<Floor> find_floors(const InvertResults& results);
+
+}  // namespace tetwarp::bench
