@@ -45,7 +45,7 @@ int run_invert(const InvertOptions& options) {
   PullField inverse{like.geometry, std::vector<glm::vec3>(static_cast<std::size_t>(voxel_count(like.geometry)))};
   const Limits limits{.threads = options.common.threads};
   const Backend backend = make_backend(options.backend, Direction::forward, like.geometry, options.device, limits);
-  backend.resampler->set_field(view(field.field, Outside::background), stop);
+  backend.resampler->set_field(view(field.field, Outside::background), {.stop = stop.stop, .jacobian_range = false});
   const Report report = backend.resampler->resample(
       whole(like.geometry), {}, {.coverage = {}, .inverse_mm = samples_of(inverse)}, invert_stage.control());
   const double invert_seconds = invert_stage.seconds();

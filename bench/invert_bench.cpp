@@ -28,7 +28,7 @@ class OwnInverse final : public InversePeer {
         inverse_{field.lattice, std::vector<glm::vec3>(field.displacement.size())} {}
 
   void run() override {
-    resampler_->set_field(view(field_, Outside::background));
+    resampler_->set_field(view(field_, Outside::background), {.jacobian_range = false});
     resampler_->resample(whole(field_.lattice), {}, {.inverse_mm = samples_of(inverse_)});
   }
   std::span<const glm::vec3> inverse() const override { return inverse_.displacement; }

@@ -14,7 +14,7 @@ using Json = nlohmann::json;
 
 constexpr char kAccuracyNote[] = R"(## Time and error
 
-ms, median (q1-q3), and CPU ms of all threads. tetwarp: set_field (with the range of Jacobian determinants) and resample
+ms, median (q1-q3), and CPU ms of all threads. tetwarp: set_field, without the range of Jacobian determinants, and resample
 to the inverse alone. ITK invert: InvertDisplacementFieldImageFilter with its defaults; border free: with
 EnforceBoundaryCondition off. ITK iterative: IterativeInverseDisplacementFieldImageFilter with its defaults; its iterations
 run in one thread. Errors: voxels, distance from the known inverse, over all voxels with a source that have a vector.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "deform/cpu/inverse_row.h"
 #include "deform/target_check.h"
 
 namespace tetwarp::cpu {
@@ -30,9 +31,7 @@ void MapWriter::write(const Row& row, const std::uint8_t* coverage, const float*
   if (maps_.coverage.voxels) std::copy_n(coverage, row.count, row_of<std::uint8_t>(maps_.coverage, row.voxel));
   if (maps_.inverse_mm.voxels) {
     auto* out = reinterpret_cast<glm::vec3*>(row_of<float>(maps_.inverse_mm, row.voxel));
-    for (int i = 0; i < row.count; ++i) {
-      out[i] = row.mapped[i] ? glm::vec3(mm_from_index_ * glm::dvec3(row.offset[i])) : glm::vec3(kNothing);
-    }
+    write_inverse_row(mm_from_index_, row, out);
   }
   if (wants_jacobian()) {
     float* out = row_of<float>(maps_.jacobian, row.voxel);

@@ -1,0 +1,68 @@
+#include "deform/cpu/inverse_row.h"
+
+#include <limits>
+
+// Compiled once for each instruction set.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "deform/cpu/inverse_row.cpp"
+#include <hwy/foreach_target.h>
+// After it, as Highway asks.
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+
+namespace tetwarp::cpu::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Doubles = hn::ScalableTag<double>;
+using Floats = hn::Rebind<float, Doubles>;
+using Double = hn::Vec<Doubles>;
+using Float = hn::Vec<Floats>;
+
+/// The same sum from left to right as GLM's product.
+HWY_INLINE Float component(const glm::dmat3& m, int axis, Double x, Double y, Double z) {
+  const Doubles dd;
+  const Double along_x = hn::Mul(hn::Set(dd, m[0][axis]), x), along_y = hn::Mul(hn::Set(dd, m[1][axis]), y),
+               along_z = hn::Mul(hn::Set(dd, m[2][axis]), z);
+  return hn::DemoteTo(Floats(), hn::Add(hn::Add(along_x, along_y), along_z));
+}
+
+void write_row(const glm::dmat3& m, const Row& row, glm::vec3* out) {
+  constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
+  const Doubles dd;
+  const Floats df;
+  const hn::RebindToSigned<Floats> di;
+  const hn::Rebind<std::uint8_t, Floats> d8;
+  const auto lanes = static_cast<int>(hn::Lanes(dd));
+  int i = 0;
+  for (; i + lanes <= row.count; i += lanes) {
+    Float ux, uy, uz;
+    hn::LoadInterleaved3(df, &row.offset[i].x, ux, uy, uz);
+    const Double x = hn::PromoteTo(dd, ux), y = hn::PromoteTo(dd, uy), z = hn::PromoteTo(dd, uz);
+    const auto mapped = hn::RebindMask(df, hn::Ne(hn::PromoteTo(di, hn::LoadU(d8, row.mapped + i)), hn::Zero(di)));
+    const Float nothing = hn::Set(df, kNothing);
+    hn::StoreInterleaved3(hn::IfThenElse(mapped, component(m, 0, x, y, z), nothing),
+                          hn::IfThenElse(mapped, component(m, 1, x, y, z), nothing),
+                          hn::IfThenElse(mapped, component(m, 2, x, y, z), nothing), df, &out[i].x);
+  }
+  for (; i < row.count; ++i) out[i] = row.mapped[i] ? glm::vec3(m * glm::dvec3(row.offset[i])) : glm::vec3(kNothing);
+}
+
+}  // namespace tetwarp::cpu::HWY_NAMESPACE
+
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+
+namespace tetwarp::cpu {
+
+HWY_EXPORT(write_row);
+
+void write_inverse_row(const glm::dmat3& mm_from_index, const Row& row, glm::vec3* inverse_mm) {
+  HWY_DYNAMIC_DISPATCH(write_row)(mm_from_index, row, inverse_mm);
+}
+
+}  // namespace tetwarp::cpu
+
+#endif

@@ -1,0 +1,13 @@
+#pragma once
+
+#include <glm/mat3x3.hpp>
+
+#include "deform/cpu/sampler.h"
+
+namespace tetwarp::cpu {
+
+/// Writes a row of the inverse displacement by vectors (Highway): `mm_from_index` times the offsets, in double, rounded
+/// to float; NaN where nothing maps.
+void write_inverse_row(const glm::dmat3& mm_from_index, const Row& row, glm::vec3* inverse_mm);
+
+}  // namespace tetwarp::cpu
