@@ -35,7 +35,8 @@ void run_on_whole(const Volume<std::int16_t>& volume, CpuResults& results, const
   for (const std::string& field : options.fields) {
     say(field + ", a vertex on every voxel");
     const bool peers = field != kRestingField;
-    const Beside beside{.bytes = true,
+    const Beside beside{.second_volume = true,
+                        .bytes = true,
                         .paper = peers && contains(options.peers, "paper"),
                         .itk_warp = peers && contains(options.peers, "itk-warp")};
     results.runs.push_back(measure_run(volume, {field}, beside, threads, options.repeats));

@@ -1,5 +1,7 @@
 #include "bench/cpu_floors.h"
 
+#include <algorithm>
+
 namespace tetwarp::bench {
 
 namespace {
@@ -24,11 +26,21 @@ void add_bytes(const CpuRun& run, std::vector<Floor>& floors) {
   floors.push_back({"new field / bytes", where, ratio, false, 2, {}});
 }
 
+/// What a further volume may add to resample: a third of it, or 1.5 ns a voxel, whichever is more.
+void add_further(const CpuRun& run, std::vector<Floor>& floors) {
+  constexpr double kMsAVoxel = 1.5e-6;
+  if (!run.two_ms) return;
+  const double first = run.ours.resample_ms.median, voxels = static_cast<double>(run.size.x * run.size.y * run.size.z);
+  const double allowed = std::max(first / 3, kMsAVoxel * voxels);
+  floors.push_back({"further volume / allowed", run.field, (run.two_ms->median - first) / allowed, false, 1, {}});
+}
+
 void add_dense(const CpuResults& results, std::vector<Floor>& floors) {
   for (const CpuRun& run : results.runs) {
     add_peer("paper / new field", run.field, run.paper, run.ours.new_field_ms, 6, 20, floors);
     add_peer("ITK warp / resample", run.field, run.itk_warp, run.ours.resample_ms, 1, 3, floors);
     add_bytes(run, floors);
+    add_further(run, floors);
   }
 }
 

@@ -30,6 +30,7 @@ Json to_json(const CpuRun& run) {
                {"resting",
                 run.resting ? Json{{"share", run.resting->share}, {"new_field_ms", to_json(run.resting->new_field_ms)}}
                             : Json(nullptr)},
+               {"two_volumes_ms", to_json(run.two_ms)},
                {"bytes_ms", to_json(run.bytes_ms)},
                {"paper", to_json(run.paper)},
                {"itk_warp", to_json(run.itk_warp)},

@@ -93,6 +93,7 @@ class Own {
         resampler_(make_cpu_resampler(volume.geometry, {.threads = threads})),
         output_{volume.geometry, std::vector<std::int16_t>(volume.voxels.size())} {}
 
+  /// A new field, with one volume.
   void run(const Scene& scene, OwnSamples& samples) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads_));
     const auto start = Clock::now();
@@ -107,6 +108,15 @@ class Own {
     double resting = 0;
     for (const Region& slices : scene.resting) resting += run_resting(scene.field, slices);
     samples.resting.push_back(resting);
+  }
+  /// Two volumes at once through the field that was set. @return ms
+  double run_two() {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads_));
+    if (second_.voxels.empty()) second_ = second_output_ = volume_;
+    const Target targets[] = {target_of(volume_, output_), target_of(second_, second_output_)};
+    const auto start = Clock::now();
+    resampler_->resample(whole(volume_.geometry), targets);
+    return ms_between(start, Clock::now());
   }
   /// Of all slices.
   double resting_share(const Scene& scene) const {
@@ -147,9 +157,12 @@ class Own {
     return ms_between(start, Clock::now());
   }
 
+  Target target_of(const Volume<std::int16_t>& source, Volume<std::int16_t>& output) const {
+    return {.source = view(source), .output = view(output), .background = static_cast<double>(background_)};
+  }
+
   Report resample(const Region& region, const Maps& maps = {}) {
-    const Target target{
-        .source = view(volume_), .output = view(output_), .background = static_cast<double>(background_)};
+    const Target target = target_of(volume_, output_);
     return resampler_->resample(region, {&target, 1}, maps);
   }
 
@@ -157,7 +170,7 @@ class Own {
   const int threads_;
   const std::int16_t background_;
   std::unique_ptr<Resampler> resampler_;
-  Volume<std::int16_t> output_;
+  Volume<std::int16_t> output_, second_, second_output_;
   Report report_;
 };
 
@@ -254,8 +267,11 @@ CpuRun measure_run(const Volume<std::int16_t>& volume, const FieldOnLattice& fie
   Entrants others =
       make_entrants(beside, {volume, own.background(), threads}, scene.field, field.cell_size, inverse, repeats);
   others.run(-1);
+  if (beside.second_volume) own.run_two();
+  std::vector<double> two;
   for (int repeat = 0; repeat < repeats; ++repeat) {
     own.run(scene, samples);
+    if (beside.second_volume) two.push_back(own.run_two());
     others.run(repeat);
   }
   CpuRun run{.size = volume.geometry.size,
@@ -265,6 +281,7 @@ CpuRun measure_run(const Volume<std::int16_t>& volume, const FieldOnLattice& fie
              .covered = own.covered(),
              .ours = samples.summary()};
   if (!scene.resting.empty()) run.resting = {own.resting_share(scene), summarize(samples.resting)};
+  if (beside.second_volume) run.two_ms = summarize(two);
   if (others.bytes.peer) run.bytes_ms = summarize(others.bytes.ms);
   if (!others.any_peer()) return run;
   const Exact exact = own.exact();

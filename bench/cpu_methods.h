@@ -6,7 +6,8 @@ namespace tetwarp::bench {
 
 /// What is measured beside Tetwarp, in turn with it.
 struct Beside {
-  bool bytes = false, paper = false, itk_warp = false, itk_invert_and_warp = false, vtk_probe = false;
+  bool second_volume = false, bytes = false, paper = false, itk_warp = false, itk_invert_and_warp = false,
+       vtk_probe = false;
 };
 
 /// A field of `make_test_field` on a lattice.

@@ -30,6 +30,7 @@ struct CpuRun {
   double at_rest = 0;         ///< fraction of the vertices that do not move
   std::uint64_t covered = 0;  ///< voxels
   OwnTimes ours;
+  std::optional<Summary> two_ms = {};         ///< resampling two volumes at once
   std::optional<RestingSlices> resting = {};  ///< where part of the slices, not all, rest and have resting neighbours
   std::optional<Summary> bytes_ms = {};       ///< reading field and source once and writing the output once
   std::optional<PeerTimes> paper = {};        ///< Algorithm 2, the field in memory, the output cleared first

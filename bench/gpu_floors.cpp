@@ -30,6 +30,8 @@ void add_dense(const GpuResults& results, std::vector<Floor>& floors) {
       floors.push_back({"backward / resample", field, run->backward_ms->median / resample, true, {}, 1});
     }
     floors.push_back({"resample / bytes", field, resample / results.copies.bytes_floor_ms(), false, {}, 2});
+    floors.push_back(
+        {"further volume / new field", field, (run->two_ms.median - resample) / new_field, false, 1.0 / 3, {}});
   }
 }
 

@@ -25,6 +25,7 @@ Json to_json(const GpuRun& run) {
           {"set_field_ms", to_json(run.set_field_ms)},
           {"resample_ms", to_json(run.resample_ms)},
           {"new_field_ms", to_json(run.new_field_ms)},
+          {"two_volumes_ms", to_json(run.two_ms)},
           {"paper_ms", to_json(run.paper_ms)},
           {"gascon_ms", to_json(run.gascon_ms)},
           {"backward_ms", to_json(run.backward_ms)},

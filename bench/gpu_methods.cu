@@ -20,7 +20,7 @@ __global__ void __launch_bounds__(kThreads)
 
 /// Milliseconds of each frame.
 struct Times {
-  std::vector<double> set_field, resample, new_field, paper, gascon, backward;
+  std::vector<double> set_field, resample, new_field, two, paper, gascon, backward;
 };
 
 std::optional<Summary> summary_or_none(const std::vector<double>& ms) {
@@ -40,6 +40,8 @@ class GpuMethods::State {
     texture_.upload(volume.voxels.data(), stream_.get());
     source_.upload(volume.voxels.data(), volume.voxels.size(), stream_.get());
     output_.reserve(volume.voxels.size());
+    second_.upload(volume.voxels.data(), volume.voxels.size(), stream_.get());
+    second_output_.reserve(volume.voxels.size());
   }
 
   GpuRun measure(const std::string& name, std::int64_t cell_size, Others others) {
@@ -57,6 +59,7 @@ class GpuMethods::State {
             .set_field_ms = summarize(times.set_field),
             .resample_ms = summarize(times.resample),
             .new_field_ms = summarize(times.new_field),
+            .two_ms = summarize(times.two),
             .paper_ms = summary_or_none(times.paper),
             .gascon_ms = summary_or_none(times.gascon),
             .backward_ms = summary_or_none(times.backward),
@@ -67,15 +70,14 @@ class GpuMethods::State {
   /// Every method once; times from events on the stream.
   void run_frame(const Others& others, Times& times) {
     run_tetwarp(times);
+    times.two.push_back(run_two());
     if (others.paper) times.paper.push_back(run_baseline(Method::paper));
     if (others.gascon) times.gascon.push_back(run_baseline(Method::gascon));
     if (others.backward) times.backward.push_back(run_backward());
   }
 
   void run_tetwarp(Times& times) {
-    const Target target{.source = device_view(volume_.geometry, source_.data()),
-                        .output = device_view(volume_.geometry, output_.data()),
-                        .background = static_cast<double>(background_)};
+    const Target target = target_of(source_, output_);
     start_.record(stream_);
     resampler_->set_field(field_.view(), on_stream(stream_));
     middle_.record(stream_);
@@ -84,6 +86,21 @@ class GpuMethods::State {
     times.new_field.push_back(end_.ms_since(start_));
     times.set_field.push_back(middle_.ms_since(start_));
     times.resample.push_back(end_.ms_since(middle_));
+  }
+
+  Target target_of(const DeviceBuffer<std::int16_t>& source, const DeviceBuffer<std::int16_t>& output) const {
+    return {.source = device_view(volume_.geometry, source.data()),
+            .output = device_view(volume_.geometry, output.data()),
+            .background = static_cast<double>(background_)};
+  }
+
+  /// Two volumes at once through the field that was set.
+  double run_two() {
+    const Target targets[] = {target_of(source_, output_), target_of(second_, second_output_)};
+    start_.record(stream_);
+    resampler_->resample(whole(volume_.geometry), targets, {}, on_stream(stream_));
+    end_.record(stream_);
+    return end_.ms_since(start_);
   }
 
   /// The output is cleared before time is taken.

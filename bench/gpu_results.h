@@ -14,6 +14,7 @@ struct GpuRun {
   std::int64_t cell_size = 1;
   double at_rest = 0;                               ///< fraction of the vertices that do not move
   Summary set_field_ms, resample_ms, new_field_ms;  ///< the third is the first two
+  Summary two_ms;                                   ///< resampling two volumes at once
   std::optional<Summary> paper_ms, gascon_ms;       ///< the field in memory
   std::optional<Summary> backward_ms;               ///< given the inverse, float3 coordinates in memory
   Report report;                                    ///< of the last frame

@@ -54,6 +54,19 @@ TEST(CpuFloors, ThePaperCountsSetFieldAndItksWarpDoesNot) {
   EXPECT_FALSE(all_met(floors));
 }
 
+TEST(CpuFloors, AFurtherVolumeMayTakeAThirdOfTheFirstOrSoMuchAVoxel) {
+  CpuResults results;
+  results.runs = {make_run("wave", {1000, 1000, 10}), make_run("twist", {1000, 1000, 10}),
+                  make_run("identity", {1000, 1000, 100})};
+  results.runs[0].two_ms = ms(39);
+  results.runs[1].two_ms = ms(46.5);
+  results.runs[2].two_ms = ms(180);  // 1.5 ns a voxel
+  const std::vector<Floor> floors = find_floors(results);
+  expect_floor(floors, "further volume / allowed", "wave", 9 / 15.0, 1, {}, true);
+  expect_floor(floors, "further volume / allowed", "twist", 16.5 / 15, 1, {}, false);
+  expect_floor(floors, "further volume / allowed", "identity", 1, 1, {}, true);
+}
+
 TEST(CpuFloors, SlowPeersAreHeldAgainstTheRunOnTheirOwnVolume) {
   CpuResults results;
   results.runs = {make_run("twist")};

@@ -22,6 +22,7 @@ GpuRun make_run(const std::string& field, double set_field, double resample, std
   run.set_field_ms = ms(set_field);
   run.resample_ms = ms(resample);
   run.new_field_ms = ms(set_field + resample);
+  run.two_ms = ms(resample + 0.25);
   if (paper) run.paper_ms = ms(*paper);
   return run;
 }
@@ -69,6 +70,13 @@ TEST(GpuFloors, ResampleAndNewFieldHaveEachTheirRatioToThePaper) {
     expect_floor(floors, "resample / bytes", field, 5, {}, {});
     EXPECT_FALSE(all_met(floors));
   }
+}
+
+TEST(GpuFloors, AFurtherVolumeIsWhatTwoTakeMoreThanOne) {
+  std::vector<Floor> floors = find_floors(results_of({make_run("wave", 0.3, 0.7)}));
+  expect_floor(floors, "further volume / new field", "wave", 0.25, 1.0 / 3, true);
+  floors = find_floors(results_of({make_run("elastic", 0.3, 0.2)}));
+  expect_floor(floors, "further volume / new field", "elastic", 0.5, 1.0 / 3, false);
 }
 
 TEST(GpuFloors, AnAimThatIsNotReachedIsNoFailure) {
