@@ -132,7 +132,7 @@ class GpuMethods::State {
   Stream stream_;
   Event start_, middle_, end_;
   Texture texture_;
-  DeviceBuffer<std::int16_t> source_, output_;
+  DeviceBuffer<std::int16_t> source_, output_, second_, second_output_;
   FieldOnDevice field_;
   DeviceBuffer<glm::vec3> places_;
   std::unique_ptr<Resampler> resampler_;

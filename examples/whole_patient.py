@@ -20,12 +20,14 @@ def read(path):
 
 
 def make_labels(folder):
-    """1 soft tissue, 2 lung, 3 bone and contrast; the thresholds are HU."""
+    """1 soft tissue, 2 lung, 3 bone and contrast; the thresholds are HU, of means of 3 x 3 voxels."""
     hu, affine = read(folder / "ct.nii.gz")
+    near = [numpy.roll(hu.astype(numpy.float32), shift, axis=(0, 1)) for shift in numpy.ndindex(3, 3)]
+    mean = numpy.roll(numpy.mean(near, axis=0), (-1, -1), axis=(0, 1))
     labels = numpy.zeros(hu.shape, numpy.uint8)
-    labels[hu > -300] = 1
-    labels[(hu > -950) & (hu < -500)] = 2
-    labels[hu > 220] = 3
+    labels[mean > -300] = 1
+    labels[(mean > -930) & (mean < -500)] = 2
+    labels[mean > 200] = 3
     nibabel.save(nibabel.Nifti1Image(labels, affine), folder / "labels.nii.gz")
     return hu, affine
 
@@ -49,7 +51,7 @@ def landmarks_near(path, affine, k):
     with open(path, newline="") as file:
         for row in csv.DictReader(file):
             index = index_from_lps @ [float(row["x"]), float(row["y"]), float(row["z"]), 1]
-            if abs(index[2] - k) < 1:
+            if abs(index[2] - k) < 3:
                 yield index[0], index[1]
 
 
@@ -77,8 +79,8 @@ def draw(folder, k):
         for label, colour in ((2, "deepskyblue"), (3, "gold")):
             axis.contour((labels[:, :, k] == label).T, levels=[0.5], colors=colour, linewidths=0.4)
         if dose is not None and dose[:, :, k].max() > 0:
-            top = dose.max()
-            axis.contour(dose[:, :, k].T, levels=[0.1 * top, 0.3 * top, 0.6 * top], cmap="autumn", linewidths=1)
+            levels = numpy.array([0.1, 0.3, 0.6]) * dose[:, :, k].max()
+            axis.contour(dose[:, :, k].T, levels=levels, cmap="autumn", linewidths=1)
 
     window = {"cmap": "gray", "vmin": -1000, "vmax": 500}
     show(axes[0, 0], "CT, labels and landmarks", before, **window)
@@ -95,7 +97,7 @@ def draw(folder, k):
     quality = json.loads((folder / "report.json").read_text())["quality"]
     figure.suptitle(quality["verdict"], fontsize=10, wrap=True)
     figure.tight_layout()
-    figure.savefig(folder / "picture.png", dpi=70)
+    figure.savefig(folder / "picture.png", dpi=64)
 
 
 def main():

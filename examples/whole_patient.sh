@@ -18,7 +18,7 @@ echo "== the volume as NIfTI, thresholds and landmarks from it"
 /usr/bin/python3 "$here/whole_patient.py" labels "$out"
 
 echo "== one field for all"
-"$tetwarp" deform "$ct" -f bubble:radius=110,strength=0.35 -f twist:angle=4 -o "$out/deformed.nii.gz" \
+"$tetwarp" deform "$ct" -f bubble:radius=120,strength=0.5 -f twist:angle=8 -o "$out/deformed.nii.gz" \
   --with "$out/labels.nii.gz=$out/labels_deformed.nii.gz" --with "$dose=$out/dose_deformed.nii.gz" \
   --points "$out/landmarks.csv=$out/landmarks_deformed.csv" \
   --coverage "$out/coverage.nii.gz" --inverse "$out/inverse.nii.gz" --jacobian "$out/jacobian.nii.gz" --folds "$out/folds.nii.gz" \
