@@ -217,15 +217,12 @@ __device__ void VolumesSink<V>::start(int, const glm::ivec3& voxel, const glm::v
 template <class V>
 __device__ void VolumesSink<V>::finish(int place, const Pending& pending) const {
   if (!pending.any) return;
-  int next[8], corners[8];
-  if (count > kOnTheWay) read(volumes[kOnTheWay], pending.origin, {1, row, slice}, next);
 #pragma unroll
   for (int n = 0; n < kOnTheWay; ++n)
     if (n == 0 || n < count) put(volumes[n], place, pending.corners[n], pending.origin.fraction);
   for (int n = kOnTheWay; n < count; ++n) {
-#pragma unroll
-    for (int corner = 0; corner < 8; ++corner) corners[corner] = next[corner];
-    if (n + 1 < count) read(volumes[n + 1], pending.origin, {1, row, slice}, next);
+    int corners[8];
+    read(volumes[n], pending.origin, {1, row, slice}, corners);
     put(volumes[n], place, corners, pending.origin.fraction);
   }
 }
