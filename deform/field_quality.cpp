@@ -59,6 +59,7 @@ class Tally {
                      FieldQuality::kEdges.begin();
     sixths_[static_cast<std::size_t>(bin)] += sixths;
     const dmat3 f = gradient * inverse_;
+    if (bound(f) * kAboveRounding <= largest_) return;
     const Characteristic of(glm::transpose(f) * f);
     if (!of.is_below(largest_)) largest_ = std::max(largest_, of.largest_root());
   }
@@ -74,6 +75,16 @@ class Tally {
   }
 
  private:
+  static constexpr double kAboveRounding = 1 + 1e-9;
+
+  /// No eigenvalue of transpose(f) f is above (Gershgorin). Most gradients need no more.
+  static double bound(const dmat3& f) {
+    const double xx = glm::dot(f[0], f[0]), yy = glm::dot(f[1], f[1]), zz = glm::dot(f[2], f[2]);
+    const double xy = std::abs(glm::dot(f[0], f[1])), xz = std::abs(glm::dot(f[0], f[2])),
+                 yz = std::abs(glm::dot(f[1], f[2]));
+    return std::max({xx + xy + xz, yy + xy + yz, zz + xz + yz});
+  }
+
   const dmat3 inverse_;
   const double over_rest_;
   decltype(FieldQuality::sixths) sixths_{};

@@ -109,6 +109,7 @@ glm::dvec3 sample(const SlicedField& field, const glm::dvec3& index) {
     if (!(index[axis] >= 0 && index[axis] <= static_cast<double>(size[axis] - 1))) return glm::dvec3(NAN);
     cell[axis] = std::min(static_cast<std::int64_t>(index[axis]), std::max<std::int64_t>(size[axis] - 2, 0));
   }
+  if (!field.slice(cell.z) && !field.slice(std::min(cell.z + 1, size.z - 1))) return glm::dvec3(NAN);
   const glm::dvec3 t = index - glm::dvec3(cell);
   glm::dvec3 sum(0);
   for (int corner = 0; corner < 8; ++corner) {
