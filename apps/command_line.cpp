@@ -38,7 +38,10 @@ void add_series(CLI::App& command, InputOptions& input) {
 
 constexpr const char* kInputHelp = "Folder of DICOM files, one DICOM file, or .nii .nii.gz .nrrd .mha";
 constexpr const char* kFieldHelp =
-    "Forward field: a file (.mha .nrrd .nii .nii.gz) or identity, wave:amplitude=,wavelength=[,phase=,axis=,along=], "
+    "Forward field: a file (.mha .nrrd .nii .nii.gz), a transform of ITK, elastix or plastimatch (.h5 .tfm .txt; each "
+    "vertex x goes "
+    "to "
+    "T(x)), or identity, wave:amplitude=,wavelength=[,phase=,axis=,along=], "
     "twist:angle=[,axis=], bubble:radius=,strength=[,center=X/Y/Z], bubble-paper:shift=[,center=], translate:by=X/Y/Z; "
     "mm, "
     "or voxels with the suffix vox; degrees. Several compose, the first is applied first";
@@ -60,8 +63,9 @@ void add_phantom(CLI::App& app, PhantomOptions& options) {
 }
 
 void add_info(CLI::App& app, InfoOptions& options) {
-  CLI::App* command = app.add_subcommand("info", "Say what an input or a field file holds");
-  command->add_option("INPUT", options.input.path, std::string(kInputHelp) + ", or a field file")->required();
+  CLI::App* command = app.add_subcommand("info", "Say what an input, a field or a transform file holds");
+  command->add_option("INPUT", options.input.path, std::string(kInputHelp) + ", or a field or transform file")
+      ->required();
   command->add_flag("--single", options.input.single, "Look at the one DICOM file alone, not its series");
   command->add_flag("--json", options.json, "One JSON document on standard output");
   add_common(*command, options.common, false);
@@ -73,7 +77,9 @@ void add_field(CLI::App& app, FieldOptions& options) {
   command->add_option("FIELD", options.fields, kFieldHelp)->required();
   command->add_option("--like", options.like.path, "The volume that the field is for")->required();
   command->add_option("-o,--output", options.output, ".mha .nrrd .nii .nii.gz, three components, LPS mm")->required();
-  command->add_option("--cell-size", options.cell_size, "Vertices every B voxels, for formulas only (default 1)")
+  command
+      ->add_option("--cell-size", options.cell_size,
+                   "Vertices every B voxels, for formulas and transforms only (default 1)")
       ->type_name("B");
   add_series(*command, options.like);
   add_common(*command, options.common, true);
@@ -99,7 +105,9 @@ void add_invert(CLI::App& app, InvertOptions& options) {
           "-o,--output", options.output,
           ".mha .nrrd .nii .nii.gz: output to input, LPS mm, for ITK's and other warps; NaN where nothing maps")
       ->required();
-  command->add_option("--cell-size", options.cell_size, "Vertices every B voxels, for formulas only (default 1)")
+  command
+      ->add_option("--cell-size", options.cell_size,
+                   "Vertices every B voxels, for formulas and transforms only (default 1)")
       ->type_name("B");
   add_backend(*command, options.backend, options.device);
   command->add_option("--report", options.report, "Residuals both ways, with times, as JSON")->type_name("FILE.json");
@@ -114,8 +122,10 @@ void add_deform(CLI::App& app, DeformOptions& options) {
   auto* field =
       command->add_option("-f,--field", options.fields, kFieldHelp)->allow_extra_args(false)->type_name("FIELD");
   command
-      ->add_option("--pull-field", options.pull_field,
-                   "A field that maps output to input, as registration tools write it; NaN in it: no source")
+      ->add_option(
+          "--pull-field", options.pull_field,
+          "A field that maps output to input, as registration tools write it; NaN in it: no source. Or a transform "
+          "of ITK, elastix or plastimatch (.h5 .tfm .txt): output p comes from T(p)")
       ->type_name("FILE")
       ->excludes(field);
   command
@@ -142,7 +152,9 @@ void add_deform(CLI::App& app, DeformOptions& options) {
   command->add_option(
       "--background", options.background,
       "Value where nothing maps (default: DICOM padding value or -1024 HU; else the smallest value present)");
-  command->add_option("--cell-size", options.cell_size, "Vertices every B voxels, for formulas only (default 1)")
+  command
+      ->add_option("--cell-size", options.cell_size,
+                   "Vertices every B voxels, for formulas and transforms only (default 1)")
       ->type_name("B");
   command
       ->add_option("--grid", options.grid,

@@ -8,7 +8,6 @@
 #include "cuda/devices.h"
 #include "deform/fields/formula.h"
 #include "deform/mass.h"
-#include "io/field_file.h"
 #include "io/image_file.h"
 #include "io/preview.h"
 
@@ -79,11 +78,8 @@ void Deformation::read_field() {
     record_.field.notes = record_.field.forward.notes;
   } else {
     record_.field.direction = Direction::pull;
-    if (!read_field_header(options_.pull_field).direction) {
-      record_.field.notes.push_back(options_.pull_field.string() +
-                                    " does not say its direction: taken as output to input");
-    }
-    record_.field.pull = read_pull_field(options_.pull_field);
+    record_.field.pull =
+        read_pull_field(options_.pull_field, record_.plan.grid, options_.common, stage.control(), record_.field.notes);
   }
   if (options_.grid == "fit")
     record_.plan.grid = output_grid("fit", grid, record_.field.forward.field, options_.outside);

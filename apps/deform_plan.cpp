@@ -8,7 +8,6 @@
 #include "apps/output_grid.h"
 #include "deform/fields/formula.h"
 #include "deform/residuals.h"
-#include "io/field_file.h"
 #include "io/image_file.h"
 
 namespace tetwarp::apps {
@@ -27,7 +26,7 @@ std::uint64_t plan_bytes(const DeformOptions& options, DeformOutputs& outputs, c
                          const Geometry& grid) {
   const glm::i64vec3 lattice = options.pull_field.empty()
                                    ? lattice_size(options.fields, input.geometry, options.cell_size)
-                                   : read_field_header(options.pull_field).grid.size;
+                                   : pull_grid_size(options.pull_field, grid);
   const auto voxels = static_cast<std::uint64_t>(voxel_count(input.geometry)),
              output_voxels = static_cast<std::uint64_t>(voxel_count(grid));
   const auto vertices = static_cast<std::uint64_t>(lattice.x * lattice.y * lattice.z);
@@ -49,7 +48,7 @@ DeformOutputs begin_outputs(const DeformOptions& options, const PointsOption& po
   if (options.pull_field.empty()) {
     check_fields(options.fields, options.cell_size);
   } else if (options.cell_size) {
-    throw UsageError("--cell-size is for formulas, --pull-field has its own grid");
+    throw UsageError("--cell-size is for formulas and transforms with -f; --pull-field has its own grid");
   }
   check_grid(options.grid, !options.pull_field.empty());
   if (options.preserve_mass && !options.pull_field.empty()) {

@@ -8,6 +8,7 @@
 #include "deform/fields/formula.h"
 #include "io/field_file.h"
 #include "io/hash.h"
+#include "io/transform_file.h"
 
 namespace tetwarp::apps {
 
@@ -27,6 +28,39 @@ VertexField read_file(const std::string& path, std::vector<std::string>& notes) 
   return tetwarp::read_forward_field(path);
 }
 
+/// Whether the text is a file whose vertices are where the file says.
+bool has_lattice(const std::string& text) { return !is_formula(text) && !has_transform_suffix(text); }
+
+/// A bad transform is refused before volumes are read.
+void check_transform(const std::string& text) {
+  if (!is_formula(text) && has_transform_suffix(text)) read_transform_file(text);
+}
+
+/// What to say of a transform once it was evaluated at every vertex or voxel.
+void note_transform(const TransformFile& transform, const std::string& path, Direction direction,
+                    std::vector<std::string>& notes) {
+  const std::string taken = direction == Direction::pull ? "output to input" : "forward, each vertex x goes to T(x)";
+  if (!transform.pulls) notes.push_back(path + " does not say its direction: taken as " + taken);
+  if (transform.pulls && direction == Direction::forward)
+    notes.push_back(path + ": transforms of " + transform.tool + " map output to input; taken as " + taken);
+  if (const std::uint64_t outside = *transform.outside; outside > 0) {
+    notes.push_back(path + ": " + std::to_string(outside) + (direction == Direction::pull ? " voxels" : " vertices") +
+                    " lie outside its domain, where ITK does not move them");
+  }
+}
+
+/// The displacement of a formula or a transform, and what to say of it afterwards.
+struct NamedMap {
+  PointMap map;
+  std::optional<TransformFile> transform;
+};
+
+NamedMap map_of(const std::string& text, const Geometry& volume) {
+  if (is_formula(text)) return {formula_map(text, volume), {}};
+  TransformFile transform = read_transform_file(text);
+  return {transform.displacement, std::move(transform)};
+}
+
 }  // namespace
 
 void check_fields(const std::vector<std::string>& fields, std::optional<std::int64_t> cell_size) {
@@ -42,8 +76,8 @@ void check_fields(const std::vector<std::string>& fields, std::optional<std::int
   }
   if (!cell_size) return;
   if (*cell_size < 1) throw UsageError("--cell-size is " + std::to_string(*cell_size) + ", expected at least 1");
-  if (!is_formula(fields.front()))
-    throw UsageError("--cell-size is for formulas, " + fields.front() + " has its own lattice");
+  if (has_lattice(fields.front()))
+    throw UsageError("--cell-size is for formulas and transforms, " + fields.front() + " has its own lattice");
 }
 
 std::vector<std::filesystem::path> field_files(const std::vector<std::string>& fields) {
@@ -55,7 +89,8 @@ std::vector<std::filesystem::path> field_files(const std::vector<std::string>& f
 
 glm::i64vec3 lattice_size(const std::vector<std::string>& fields, const Geometry& volume,
                           std::optional<std::int64_t> cell_size) {
-  if (is_formula(fields.front())) return lattice_over(volume, cell_size.value_or(1)).size;
+  for (const std::string& text : fields) check_transform(text);
+  if (!has_lattice(fields.front())) return lattice_over(volume, cell_size.value_or(1)).size;
   return read_field_header(fields.front()).grid.size;
 }
 
@@ -69,18 +104,41 @@ ForwardField read_forward_field(const std::vector<std::string>& fields, const Ge
   for (std::size_t n = 0; n < fields.size(); ++n) {
     const std::string& text = fields[n];
     result.identity = result.identity && text == "identity";
-    if (n == 0) {
-      result.field = is_formula(text) ? sample_on(lattice_over(volume, cell_size.value_or(1)),
-                                                  formula_map(text, volume), limits, control)
-                                      : read_file(text, result.notes);
-    } else if (is_formula(text)) {
-      compose(result.field, formula_map(text, volume), limits, control);
-    } else {
-      const VertexField next = read_file(text, result.notes);
-      compose(result.field, piecewise_affine(next), limits, control);
+    if (has_lattice(text)) {
+      VertexField next = read_file(text, result.notes);
+      if (n == 0)
+        result.field = std::move(next);
+      else
+        compose(result.field, piecewise_affine(next), limits, control);
+      continue;
     }
+    const NamedMap next = map_of(text, volume);
+    if (n == 0)
+      result.field = sample_on(lattice_over(volume, cell_size.value_or(1)), next.map, limits, control);
+    else
+      compose(result.field, next.map, limits, control);
+    if (next.transform) note_transform(*next.transform, text, Direction::forward, result.notes);
   }
   return result;
+}
+
+PullField read_pull_field(const std::filesystem::path& path, const Geometry& output, const CommonOptions& common,
+                          const Control& control, std::vector<std::string>& notes) {
+  if (has_transform_suffix(path)) {
+    const TransformFile transform = read_transform_file(path);
+    VertexField sampled = sample_on(output, transform.displacement, {.threads = common.threads}, control);
+    note_transform(transform, path.string(), Direction::pull, notes);
+    return {sampled.lattice, std::move(sampled.displacement)};
+  }
+  if (!read_field_header(path).direction)
+    notes.push_back(path.string() + " does not say its direction: taken as output to input");
+  return tetwarp::read_pull_field(path);
+}
+
+glm::i64vec3 pull_grid_size(const std::filesystem::path& path, const Geometry& output) {
+  if (!has_transform_suffix(path)) return read_field_header(path).grid.size;
+  check_transform(path.string());
+  return output.size;
 }
 
 std::string hash_field(const Geometry& lattice, const std::vector<glm::vec3>& displacement,

@@ -30,10 +30,10 @@ struct AnyField {
   }
 };
 
-/// Formulas and files, composed vertex by vertex, the first applied first. The lattice is that of the first if it is a
-/// file, else one over `volume` with a vertex every `cell_size` voxels.
-/// @throws UsageError for a text that is no formula and no file, or a cell size with a file; InputError for unusable
-/// files
+/// Formulas, transforms and fields, composed vertex by vertex, the first applied first. The lattice is that of the
+/// first if it is a field file, else one over `volume` with a vertex every `cell_size` voxels.
+/// @throws UsageError for a text that is no formula and no file, or a cell size with a field file; InputError for
+/// unusable files
 ForwardField read_forward_field(const std::vector<std::string>& fields, const Geometry& volume,
                                 std::optional<std::int64_t> cell_size, const CommonOptions& common,
                                 const Control& control);
@@ -44,9 +44,17 @@ void check_fields(const std::vector<std::string>& fields, std::optional<std::int
 /// Those of the fields that are files.
 std::vector<std::filesystem::path> field_files(const std::vector<std::string>& fields);
 
-/// Size of the lattice that `read_forward_field` will make.
+/// Size of the lattice that `read_forward_field` will make. Transforms are read, so that a bad one is known early.
 glm::i64vec3 lattice_size(const std::vector<std::string>& fields, const Geometry& volume,
                           std::optional<std::int64_t> cell_size);
+
+/// The pull field of a file, or a transform sampled at every voxel centre of `output`.
+/// @param notes  receives what was assumed
+PullField read_pull_field(const std::filesystem::path& path, const Geometry& output, const CommonOptions& common,
+                          const Control& control, std::vector<std::string>& notes);
+
+/// Size of the grid that `read_pull_field` will give. A transform is read.
+glm::i64vec3 pull_grid_size(const std::filesystem::path& path, const Geometry& output);
 
 /// SHA-256 over direction, lattice geometry and displacements (Sha256::add_blocks), hexadecimal: the same for a formula
 /// and the file it was written to.

@@ -6,6 +6,7 @@
 #include "io/dicom_dose.h"
 #include "io/field_file.h"
 #include "io/image_file.h"
+#include "io/transform_file.h"
 
 namespace tetwarp::apps {
 
@@ -49,6 +50,19 @@ json describe_field(const std::filesystem::path& path) {
           {"units", header.units},
           {"absolute", header.absolute},
           {"lattice", to_json(header.grid)}};
+}
+
+json describe_transform(const std::filesystem::path& path) {
+  const TransformFile transform = read_transform_file(path);
+  return {{"path", path.string()},
+          {"kind", "transform"},
+          {"tool", transform.tool},
+          {"classes", transform.classes},
+          {"parameters", transform.parameters},
+          {"direction", transform.pulls ? "output to input (pull)" : "as the option says: -f or --pull-field"},
+          {"frame", "LPS"},
+          {"units", "mm"},
+          {"absolute", true}};
 }
 
 json describe_image(const std::filesystem::path& path) {
@@ -106,7 +120,14 @@ void print_dicom(const json& document) {
 
 void print_file(const json& document) {
   std::printf("%s: %s\n", document["path"].get<std::string>().c_str(), document["kind"].get<std::string>().c_str());
-  if (document["kind"] == "field") {
+  if (document["kind"] == "transform") {
+    std::printf("  written by   %s\n", document["tool"].get<std::string>().c_str());
+    for (const json& name : document["classes"]) std::printf("  class        %s\n", name.get<std::string>().c_str());
+    std::printf("  parameters   %s\n", document["parameters"].dump().c_str());
+    std::printf("  direction    %s\n", document["direction"].get<std::string>().c_str());
+    std::printf("  points       positions (absolute), frame %s, %s\n", document["frame"].get<std::string>().c_str(),
+                document["units"].get<std::string>().c_str());
+  } else if (document["kind"] == "field") {
     std::printf("  direction    %s\n", document["direction"].get<std::string>().c_str());
     std::printf("  vectors      %s, frame %s, %s\n", document["absolute"].get<bool>() ? "positions" : "displacements",
                 document["frame"].get<std::string>().c_str(), document["units"].get<std::string>().c_str());
@@ -125,9 +146,12 @@ void print_file(const json& document) {
 
 int run_info(const InfoOptions& options) {
   const std::filesystem::path& path = options.input.path;
-  const bool dose = !has_image_suffix(path) && is_dicom_dose(path), dicom = !has_image_suffix(path) && !dose;
+  const bool transform = has_transform_suffix(path) && !std::filesystem::is_directory(path);
+  const bool dose = !transform && !has_image_suffix(path) && is_dicom_dose(path);
+  const bool dicom = !transform && !has_image_suffix(path) && !dose;
   const json document = [&] {
     Stage stage(options.common, "scan");
+    if (transform) return describe_transform(path);
     if (dose) return describe_dose(path);
     if (dicom) return describe_dicom(options.input, stage.control());
     return is_field_file(path) ? describe_field(path) : describe_image(path);

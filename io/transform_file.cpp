@@ -1,0 +1,62 @@
+#include "io/transform_file.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+
+#include "deform/errors.h"
+#ifdef TETWARP_WITH_ITK
+#include "itkbridge/transform_file.h"
+#endif
+
+namespace tetwarp {
+
+bool has_transform_suffix(const std::filesystem::path& path) {
+  std::string suffix = path.extension().string();
+  std::ranges::transform(suffix, suffix.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  constexpr std::array<std::string_view, 4> kSuffixes = {".h5", ".hdf5", ".tfm", ".txt"};
+  return std::ranges::find(kSuffixes, suffix) != kSuffixes.end();
+}
+
+#ifdef TETWARP_WITH_ITK
+namespace {
+
+const char* name_of(TransformTool tool) {
+  if (tool == TransformTool::elastix) return "elastix";
+  return tool == TransformTool::plastimatch ? "plastimatch" : "ITK";
+}
+
+}  // namespace
+
+TransformFile read_transform_file(const std::filesystem::path& path) {
+  const StoredTransform stored = read_transform(path);
+  const std::string file = path.string();
+  TransformFile result{.tool = name_of(stored.tool),
+                       .classes = {},
+                       .pulls = stored.tool != TransformTool::itk,
+                       .displacement = {},
+                       .outside = std::make_shared<std::atomic<std::uint64_t>>(0)};
+  for (const TransformRecord& part : stored.parts) {
+    result.classes.push_back(part.type);
+    result.parameters += part.parameters.size();
+  }
+  result.displacement = [transform = make_transform(stored, file), outside = result.outside,
+                         file](const glm::dvec3& point) {
+    bool is_outside = false;
+    const glm::dvec3 by = transform(point, is_outside) - point;
+    if (is_outside) outside->fetch_add(1, std::memory_order_relaxed);
+    const glm::vec3 stored_by(by);
+    require(std::isfinite(stored_by.x) && std::isfinite(stored_by.y) && std::isfinite(stored_by.z),
+            "a point is moved to infinity, " + file);
+    return by;
+  };
+  return result;
+}
+#else
+TransformFile read_transform_file(const std::filesystem::path& path) {
+  throw NotCompiled("transform files need ITK, which this build does not have, " + path.string());
+}
+#endif
+
+}  // namespace tetwarp

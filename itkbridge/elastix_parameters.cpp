@@ -1,0 +1,169 @@
+#include "itkbridge/elastix_parameters.h"
+
+#include <algorithm>
+#include <fstream>
+#include <map>
+
+#include "deform/errors.h"
+
+namespace tetwarp {
+namespace {
+
+constexpr std::size_t kMostFiles = 100;
+
+/// A line without its comment: `//` outside quotes ends it.
+std::string_view content_of(std::string_view line) {
+  bool quoted = false;
+  for (std::size_t at = 0; at < line.size(); ++at) {
+    if (line[at] == '"') quoted = !quoted;
+    if (!quoted && line.substr(at).starts_with("//")) return trimmed(line.substr(0, at));
+  }
+  return trimmed(line);
+}
+
+/// The keys of one file, each with the text of its values.
+class Parameters {
+ public:
+  explicit Parameters(const std::filesystem::path& path) : file_(path.string()) {
+    std::ifstream stream(path, std::ios::binary);
+    std::int64_t number = 0;
+    for (std::string line; std::getline(stream, line);) {
+      ++number;
+      const std::string_view text = content_of(line);
+      if (text.empty()) continue;
+      const std::string where = "line " + std::to_string(number) + " of " + file_;
+      require(text.front() == '(' && text.back() == ')',
+              "no (Key value ...) in " + where + "; the file may be truncated");
+      const std::string_view inner = trimmed(text.substr(1, text.size() - 2));
+      const auto end = std::min(inner.find_first_of(kBlank), inner.size());
+      const bool added =
+          values_.emplace(std::string(inner.substr(0, end)), std::string(trimmed(inner.substr(end)))).second;
+      require(added, "the key " + std::string(inner.substr(0, end).substr(0, 60)) + " a second time in " + where);
+    }
+  }
+
+  const std::string& file() const { return file_; }
+  bool has(const std::string& key) const { return values_.contains(key); }
+
+  /// The one word of a key, without quotes, or `missing` where there is no such key.
+  std::string word(const std::string& key, const std::string& missing) const {
+    const auto found = values_.find(key);
+    if (found == values_.end()) return missing;
+    std::string text = found->second;
+    if (text.size() >= 2 && text.front() == '"' && text.back() == '"') text = text.substr(1, text.size() - 2);
+    return text;
+  }
+
+  std::vector<double> numbers(const std::string& key) const {
+    const auto found = values_.find(key);
+    require(found != values_.end(), "no " + key + " in " + file_);
+    return parse_numbers(found->second, key + " in " + file_);
+  }
+
+  std::vector<double> numbers(const std::string& key, std::size_t count) const {
+    std::vector<double> values = numbers(key);
+    require(values.size() == count, std::to_string(values.size()) + " values of " + key + " in " + file_ +
+                                        "; expected " + std::to_string(count));
+    return values;
+  }
+
+  void require_word(const std::string& key, const std::string& expected) const {
+    const std::string found = word(key, expected);
+    require(found == expected, "(" + key + " " + found + ") in " + file_ + "; expected " + expected);
+  }
+
+ private:
+  std::string file_;
+  std::map<std::string, std::string> values_;
+};
+
+/// Size, origin, spacing and direction as ITK's BSplineTransform has them. elastix counts samples from GridIndex and
+/// writes the direction column by column.
+std::vector<double> grid_of(const Parameters& from) {
+  const std::vector<double> size = from.numbers("GridSize", 3), index = from.numbers("GridIndex", 3),
+                            spacing = from.numbers("GridSpacing", 3), origin = from.numbers("GridOrigin", 3);
+  const std::vector<double> columns =
+      from.has("GridDirection") ? from.numbers("GridDirection", 9) : std::vector<double>{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  std::vector<double> grid = size;
+  for (std::size_t row = 0; row < 3; ++row) {
+    double first = origin[row];
+    for (std::size_t axis = 0; axis < 3; ++axis) first += columns[3 * axis + row] * index[axis] * spacing[axis];
+    grid.push_back(first);
+  }
+  grid.insert(grid.end(), spacing.begin(), spacing.end());
+  for (std::size_t row = 0; row < 3; ++row) {
+    for (std::size_t axis = 0; axis < 3; ++axis) grid.push_back(columns[3 * axis + row]);
+  }
+  return grid;
+}
+
+TransformRecord record_of(const Parameters& from) {
+  from.require_word("FixedImageDimension", "3");
+  from.require_word("MovingImageDimension", "3");
+  from.require_word("UseBinaryFormatForTransformationParameters", "false");
+  const std::string name = from.word("Transform", "");
+  TransformRecord record{"", {}, from.numbers("TransformParameters")};
+  const std::vector<double> count = from.numbers("NumberOfParameters", 1);
+  require(count.front() == static_cast<double>(record.parameters.size()),
+          std::to_string(record.parameters.size()) + " values of TransformParameters in " + from.file() +
+              "; NumberOfParameters says " + from.word("NumberOfParameters", ""));
+  if (name == "BSplineTransform" || name == "RecursiveBSplineTransform") {
+    from.require_word("BSplineTransformSplineOrder", "3");
+    from.require_word("UseCyclicTransform", "false");
+    return {"BSplineTransform_double_3_3", grid_of(from), std::move(record.parameters)};
+  }
+  if (name == "TranslationTransform") return {"TranslationTransform_double_3_3", {}, std::move(record.parameters)};
+  require(name == "EulerTransform" || name == "AffineTransform" || name == "SimilarityTransform",
+          "the transform \"" + name.substr(0, 60) + "\" of elastix, " + from.file() +
+              "; expected EulerTransform, AffineTransform, TranslationTransform, SimilarityTransform or "
+              "BSplineTransform");
+  record.fixed = from.numbers("CenterOfRotationPoint", 3);
+  if (name == "EulerTransform") record.fixed.push_back(from.word("ComputeZYX", "false") == "true" ? 1 : 0);
+  record.type =
+      (name == "AffineTransform" ? name : name.substr(0, name.find("Transform")) + "3DTransform") + "_double_3_3";
+  return record;
+}
+
+/// The file of the initial transform, or an empty path.
+std::filesystem::path initial_of(const Parameters& from) {
+  const std::string old_key = "InitialTransformParametersFileName", key = "InitialTransformParameterFileName";
+  const std::string name = from.word(from.has(key) ? key : old_key, "NoInitialTransform");
+  if (name == "NoInitialTransform") return {};
+  from.require_word("HowToCombineTransforms", "Compose");
+  const std::filesystem::path said(name), own(from.file());
+  for (const std::filesystem::path& path : {own.parent_path() / said, said}) {
+    if (std::filesystem::is_regular_file(path)) return path;
+  }
+  // Both were moved: the name alone, unless it is the same in another folder.
+  const std::filesystem::path beside = own.parent_path() / said.filename();
+  if (said.filename() != own.filename() && std::filesystem::is_regular_file(beside)) return beside;
+  throw InputError("the initial transform " + name + " is not there, " + from.file());
+}
+
+}  // namespace
+
+bool is_elastix_file(const std::filesystem::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  for (std::string line; std::getline(stream, line);) {
+    if (const std::string_view text = content_of(line); !text.empty()) return text.front() == '(';
+  }
+  return false;
+}
+
+std::vector<TransformRecord> read_elastix(const std::filesystem::path& path) {
+  std::vector<TransformRecord> records;
+  std::vector<std::filesystem::path> seen;
+  for (std::filesystem::path file = path; !file.empty();) {
+    require(std::ranges::find(seen, std::filesystem::canonical(file)) == seen.end() && seen.size() < kMostFiles,
+            "the initial transforms of " + path.string() +
+                " lead in a circle, or there are too many: " + file.string() + " again");
+    seen.push_back(std::filesystem::canonical(file));
+    require(is_elastix_file(file), "not an elastix parameter file, " + file.string() + ", named by " + path.string());
+    const Parameters parameters(file);
+    records.push_back(record_of(parameters));
+    file = initial_of(parameters);
+  }
+  return records;
+}
+
+}  // namespace tetwarp

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <glm/vec3.hpp>
+#include <string>
+#include <vector>
+
+#include "itkbridge/transform_record.h"
+
+namespace tetwarp {
+
+/// Who wrote a transform file.
+enum class TransformTool : std::uint8_t { itk, elastix, plastimatch };
+
+/// A transform as files hold it. Several parts are composed in ITK's order: the last is applied first.
+struct StoredTransform {
+  TransformTool tool = TransformTool::itk;
+  std::vector<TransformRecord> parts;
+};
+
+/// Reads an ITK transform file (HDF5, or the text of .tfm and .txt), an elastix parameter file with its initial
+/// transforms, or a B-spline of plastimatch. The content decides, not the name.
+///
+/// ITK's own reader is not used: it allocates what a B-spline's grid promises before it looks at the parameters, reads
+/// past the end of too few of them, and stops silently at what is not a number.
+/// @throws InputError naming the file
+StoredTransform read_transform(const std::filesystem::path& path);
+
+/// T(x), both LPS mm. Called from several threads. `outside` becomes true where a B-spline or displacement field on the
+/// way has no value at the point, which it then leaves where it is, as ITK does.
+using TransformFunction = std::function<glm::dvec3(const glm::dvec3& point, bool& outside)>;
+
+/// The transform, evaluated by ITK: affine ones of all kinds, B-splines of order 3, displacement fields.
+/// @param file  for errors
+/// @throws InputError for an unknown class, other than 3 dimensions, a wrong number of parameters, a value that is not
+///         finite, a grid that cannot be
+TransformFunction make_transform(const StoredTransform& stored, const std::string& file);
+
+}  // namespace tetwarp
