@@ -76,10 +76,11 @@ void Deformation::read_field() {
     record_.field.forward =
         read_forward_field(options_.fields, grid, options_.cell_size, options_.common, stage.control());
     record_.field.notes = record_.field.forward.notes;
+    record_.field.files = record_.field.forward.files;
   } else {
     record_.field.direction = Direction::pull;
     record_.field.pull =
-        read_pull_field(options_.pull_field, record_.plan.grid, options_.common, stage.control(), record_.field.notes);
+        read_pull_field(options_.pull_field, grid, record_.plan.grid, options_.common, stage.control(), record_.field);
   }
   if (options_.grid == "fit")
     record_.plan.grid = output_grid("fit", grid, record_.field.forward.field, options_.outside);
@@ -245,11 +246,11 @@ void Deformation::write_preview_picture() {
 
 /// What the preview says above the pictures: the fields by name, files without their folders.
 std::string Deformation::title() const {
-  if (!options_.pull_field.empty()) return "pull field " + options_.pull_field.filename().string();
+  if (!options_.pull_field.empty()) return "pull field " + field_source(options_.pull_field).path.filename().string();
   std::string text;
   for (const std::string& field : options_.fields) {
-    text += (text.empty() ? "" : ", then ") +
-            (is_formula(field) ? field : std::filesystem::path(field).filename().string());
+    text +=
+        (text.empty() ? "" : ", then ") + (is_formula(field) ? field : field_source(field).path.filename().string());
   }
   return text;
 }

@@ -58,7 +58,7 @@ DeformOutputs begin_outputs(const DeformOptions& options, const PointsOption& po
   inputs.push_back(options.input.path);
   if (!is_same_grid(options.grid) && options.grid != "fit") inputs.emplace_back(options.grid);
   for (const std::filesystem::path& path : field_files(options.fields)) inputs.push_back(path);
-  if (!options.pull_field.empty()) inputs.push_back(options.pull_field);
+  if (!options.pull_field.empty()) inputs.push_back(field_source(options.pull_field).path);
   if (!options.pull_field.empty() && !points.empty())
     throw UsageError("--points needs a forward field, --pull-field has no forward map");
   for (const std::filesystem::path& path : points.inputs()) inputs.push_back(path);

@@ -19,7 +19,7 @@ json canonical_options(const DeformRecord& of) {
   if (of.options.preserve_mass) options["preserve"] = "mass";
   if (!is_same_grid(of.options.grid)) options["grid"] = of.options.grid;
   if (of.field.direction == Direction::pull) {
-    options["pull_field"] = of.options.pull_field.string();
+    options["pull_field"] = of.options.pull_field;
   } else {
     options["field"] = of.options.fields;
     if (of.options.cell_size) options["cell_size"] = *of.options.cell_size;
@@ -58,7 +58,8 @@ json sidecar(const DeformRecord& of) {
   document["field"] = {{"sha256", of.field_sha256},
                        {"direction", of.field.direction == Direction::pull ? "pull" : "forward"},
                        {"lattice", to_json(of.field.lattice())},
-                       {"notes", of.field.notes}};
+                       {"notes", of.field.notes},
+                       {"files", to_json(of.field.files)}};
   document["output"] = {{"path", of.options.output.string()},
                         {"voxel_type", to_string(of.output.type())},
                         {"geometry", to_json(of.output.geometry())}};

@@ -1,9 +1,7 @@
 #include "apps/field_source.h"
 
-#include <algorithm>
 #include <filesystem>
-#include <iterator>
-#include <memory>
+#include <nlohmann/json.hpp>
 
 #include "deform/fields/formula.h"
 #include "io/field_file.h"
@@ -23,9 +21,13 @@ PointMap formula_map(const std::string& text, const Geometry& volume) {
   }
 }
 
-VertexField read_file(const std::string& path, std::vector<std::string>& notes) {
-  if (!read_field_header(path).direction) notes.push_back(path + " does not say its direction: taken as forward");
-  return tetwarp::read_forward_field(path);
+VertexField read_file(const std::string& text, const Geometry& volume, ForwardField& result) {
+  const FieldSource source = field_source(text, volume);
+  const FieldFileHeader header = read_field_header(source);
+  const std::string path = source.path.string();
+  if (!header.direction) result.notes.push_back(path + " does not say its direction: taken as forward");
+  result.files.push_back({path, header});
+  return tetwarp::read_forward_field(source);
 }
 
 /// Whether the text is a file whose vertices are where the file says.
@@ -63,6 +65,17 @@ NamedMap map_of(const std::string& text, const Geometry& volume) {
 
 }  // namespace
 
+FieldSource field_source(const std::string& text, const std::optional<Geometry>& volume) {
+  try {
+    FieldSource source = parse_field_source(text);
+    check_field_options(source);
+    source.grid = volume;
+    return source;
+  } catch (const InputError& error) {
+    throw UsageError(error.what());
+  }
+}
+
 void check_fields(const std::vector<std::string>& fields, std::optional<std::int64_t> cell_size) {
   if (fields.empty()) throw UsageError("no field; give -f FIELD or --pull-field FILE");
   Geometry any;
@@ -70,7 +83,7 @@ void check_fields(const std::vector<std::string>& fields, std::optional<std::int
   for (const std::string& text : fields) {
     if (is_formula(text)) {
       formula_map(text, any);  // a misspelled one is known before anything is read
-    } else if (!std::filesystem::exists(text)) {
+    } else if (!std::filesystem::exists(field_source(text).path)) {
       throw UsageError("\"" + text + "\" is neither a formula nor a file that exists; see tetwarp deform --help");
     }
   }
@@ -82,8 +95,9 @@ void check_fields(const std::vector<std::string>& fields, std::optional<std::int
 
 std::vector<std::filesystem::path> field_files(const std::vector<std::string>& fields) {
   std::vector<std::filesystem::path> files;
-  std::copy_if(fields.begin(), fields.end(), std::back_inserter(files),
-               [](const std::string& text) { return std::filesystem::exists(text); });
+  for (const std::string& text : fields) {
+    if (!is_formula(text)) files.push_back(field_source(text).path);
+  }
   return files;
 }
 
@@ -91,7 +105,7 @@ glm::i64vec3 lattice_size(const std::vector<std::string>& fields, const Geometry
                           std::optional<std::int64_t> cell_size) {
   for (const std::string& text : fields) check_transform(text);
   if (!has_lattice(fields.front())) return lattice_over(volume, cell_size.value_or(1)).size;
-  return read_field_header(fields.front()).grid.size;
+  return read_field_header(field_source(fields.front())).grid.size;
 }
 
 ForwardField read_forward_field(const std::vector<std::string>& fields, const Geometry& volume,
@@ -105,7 +119,7 @@ ForwardField read_forward_field(const std::vector<std::string>& fields, const Ge
     const std::string& text = fields[n];
     result.identity = result.identity && text == "identity";
     if (has_lattice(text)) {
-      VertexField next = read_file(text, result.notes);
+      VertexField next = read_file(text, volume, result);
       if (n == 0)
         result.field = std::move(next);
       else
@@ -122,23 +136,49 @@ ForwardField read_forward_field(const std::vector<std::string>& fields, const Ge
   return result;
 }
 
-PullField read_pull_field(const std::filesystem::path& path, const Geometry& output, const CommonOptions& common,
-                          const Control& control, std::vector<std::string>& notes) {
-  if (has_transform_suffix(path)) {
-    const TransformFile transform = read_transform_file(path);
+PullField read_pull_field(const std::string& text, const Geometry& volume, const Geometry& output,
+                          const CommonOptions& common, const Control& control, AnyField& found) {
+  if (has_transform_suffix(text)) {
+    const TransformFile transform = read_transform_file(text);
     VertexField sampled = sample_on(output, transform.displacement, {.threads = common.threads}, control);
-    note_transform(transform, path.string(), Direction::pull, notes);
+    note_transform(transform, text, Direction::pull, found.notes);
     return {sampled.lattice, std::move(sampled.displacement)};
   }
-  if (!read_field_header(path).direction)
-    notes.push_back(path.string() + " does not say its direction: taken as output to input");
-  return tetwarp::read_pull_field(path);
+  const FieldSource source = field_source(text, volume);
+  const std::string path = source.path.string();
+  found.files.push_back({path, read_field_header(source)});
+  if (!found.files.back().header.direction)
+    found.notes.push_back(path + " does not say its direction: taken as output to input");
+  return tetwarp::read_pull_field(source);
 }
 
-glm::i64vec3 pull_grid_size(const std::filesystem::path& path, const Geometry& output) {
-  if (!has_transform_suffix(path)) return read_field_header(path).grid.size;
-  check_transform(path.string());
+glm::i64vec3 pull_grid_size(const std::string& text, const Geometry& output) {
+  if (!has_transform_suffix(text)) return read_field_header(field_source(text)).grid.size;
+  check_transform(text);
   return output.size;
+}
+
+nlohmann::json to_json(const FieldFileHeader& header) {
+  const bool known = header.direction.has_value();
+  return {{"format", header.format},
+          {"direction", known ? to_string(*header.direction) : "not stated"},
+          {"frame", header.frame},
+          {"units", header.units},
+          {"absolute", header.absolute},
+          {"known",
+           {{"direction", known ? to_string(header.direction_basis) : "not stated"},
+            {"frame", to_string(header.frame_basis)},
+            {"units", to_string(header.units_basis)},
+            {"absolute", to_string(header.absolute_basis)}}}};
+}
+
+nlohmann::json to_json(const std::vector<ReadField>& files) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const ReadField& file : files) {
+    list.push_back(to_json(file.header));
+    list.back()["path"] = file.path;
+  }
+  return list;
 }
 
 std::string hash_field(const Geometry& lattice, const std::vector<glm::vec3>& displacement,

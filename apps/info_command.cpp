@@ -1,6 +1,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "apps/field_source.h"
 #include "apps/input.h"
 #include "apps/output.h"
 #include "io/dicom_dose.h"
@@ -41,15 +42,14 @@ json describe_dicom(const InputOptions& input, const Control& control) {
   return document;
 }
 
-json describe_field(const std::filesystem::path& path) {
-  const FieldFileHeader header = read_field_header(path);
-  return {{"path", path.string()},
-          {"kind", "field"},
-          {"direction", header.direction ? to_string(*header.direction) : "not stated"},
-          {"frame", header.frame},
-          {"units", header.units},
-          {"absolute", header.absolute},
-          {"lattice", to_json(header.grid)}};
+json describe_field(const FieldSource& source) {
+  const FieldFileHeader header = read_field_header(source);
+  json document = to_json(header);
+  document["path"] = source.path.string();
+  document["kind"] = "field";
+  const glm::i64vec3& size = header.grid.size;
+  document["lattice"] = header.has_own_grid ? to_json(header.grid) : json{{"size", {size.x, size.y, size.z}}};
+  return document;
 }
 
 json describe_transform(const std::filesystem::path& path) {
@@ -118,6 +118,21 @@ void print_dicom(const json& document) {
   print_lines("skipped:", document["skipped"]);
 }
 
+void print_field(const json& document) {
+  const auto text = [](const json& value) { return value.get<std::string>(); };
+  const json& known = document["known"];
+  const std::string direction = text(document["direction"]), basis = text(known["direction"]);
+  std::printf("  format       %s\n", text(document["format"]).c_str());
+  std::printf("  direction    %s\n", (direction + (direction == basis ? "" : " (" + basis + ")")).c_str());
+  std::printf("  vectors      %s (%s), frame %s (%s), %s (%s)\n",
+              document["absolute"].get<bool>() ? "positions" : "displacements", text(known["absolute"]).c_str(),
+              text(document["frame"]).c_str(), text(known["frame"]).c_str(), text(document["units"]).c_str(),
+              text(known["units"]).c_str());
+  if (document["lattice"].contains("origin_lps_mm")) return print_grid(document["lattice"]);
+  std::printf("  size         %s\n", triple(document["lattice"]["size"]).c_str());
+  std::printf("  place        that of the volume\n");
+}
+
 void print_file(const json& document) {
   std::printf("%s: %s\n", document["path"].get<std::string>().c_str(), document["kind"].get<std::string>().c_str());
   if (document["kind"] == "transform") {
@@ -128,10 +143,7 @@ void print_file(const json& document) {
     std::printf("  points       positions (absolute), frame %s, %s\n", document["frame"].get<std::string>().c_str(),
                 document["units"].get<std::string>().c_str());
   } else if (document["kind"] == "field") {
-    std::printf("  direction    %s\n", document["direction"].get<std::string>().c_str());
-    std::printf("  vectors      %s, frame %s, %s\n", document["absolute"].get<bool>() ? "positions" : "displacements",
-                document["frame"].get<std::string>().c_str(), document["units"].get<std::string>().c_str());
-    print_grid(document["lattice"]);
+    print_field(document);
   } else {
     std::printf("  voxels       %s, %d a voxel\n", document["voxel_type"].get<std::string>().c_str(),
                 document["components"].get<int>());
@@ -145,16 +157,18 @@ void print_file(const json& document) {
 }  // namespace
 
 int run_info(const InfoOptions& options) {
-  const std::filesystem::path& path = options.input.path;
-  const bool transform = has_transform_suffix(path) && !std::filesystem::is_directory(path);
-  const bool dose = !transform && !has_image_suffix(path) && is_dicom_dose(path);
-  const bool dicom = !transform && !has_image_suffix(path) && !dose;
+  const FieldSource source = field_source(options.input.path.string());
+  const bool field = is_field_file(source.path);
+  const std::filesystem::path& path = field ? source.path : options.input.path;
+  const bool transform = !field && has_transform_suffix(path) && !std::filesystem::is_directory(path);
+  const bool other = field || transform || has_image_suffix(path), dose = !other && is_dicom_dose(path),
+             dicom = !other && !dose;
   const json document = [&] {
     Stage stage(options.common, "scan");
     if (transform) return describe_transform(path);
     if (dose) return describe_dose(path);
     if (dicom) return describe_dicom(options.input, stage.control());
-    return is_field_file(path) ? describe_field(path) : describe_image(path);
+    return field ? describe_field(source) : describe_image(path);
   }();
   if (options.json) {
     std::printf("%s\n", document.dump(2, ' ', false, json::error_handler_t::replace).c_str());

@@ -63,7 +63,8 @@ int run_invert(const InvertOptions& options) {
     document["field"] = {
         {"sha256", hash_field(field.field.lattice, field.field.displacement, "forward", options.common.threads)},
         {"lattice", to_json(field.field.lattice)},
-        {"notes", field.notes}};
+        {"notes", field.notes},
+        {"files", to_json(field.files)}};
     document["output"] = {{"path", options.output.string()}, {"geometry", to_json(like.geometry)}};
     document["covered"] = report.covered;
     document["uncovered"] = report.uncovered;

@@ -76,7 +76,7 @@ struct DeformOptions {
   CommonOptions common;
   InputOptions input;
   std::vector<std::string> fields;
-  std::filesystem::path pull_field;
+  std::string pull_field;
   std::filesystem::path output;
   std::string backend = "auto";
   int device = 0;  ///< of CUDA

@@ -1,52 +1,36 @@
 #include "io/field_file.h"
 
 #include <cmath>
+#include <fstream>
+#include <sstream>
 #include <utility>
 
 #include "deform/errors.h"
-#include "io/image_reader.h"
-#include "io/text_header.h"
+#include "io/field_format.h"
+#include "io/field_image.h"
 
 namespace tetwarp {
 namespace {
 
-constexpr const char* kKey = "tetwarp_direction";
-
-/// Vectors whose frame is not the grid's LPS would be turned silently. NRRD is the format that can say so.
-void require_lps_vectors(const std::filesystem::path& path) {
-  if (image_format(path) != ImageFormat::nrrd) return;
-  const TextHeader text = read_text_header(path, ImageFormat::nrrd);
-  const std::string space = text["space"];
-  require(space.empty() || space == "left-posterior-superior" || space == "LPS" || space == "lps",
-          "vectors in the space \"" + space + "\", " + path.string() + "; expected left-posterior-superior");
-  std::string frame = text["measurement frame"];
-  std::erase(frame, ' ');
-  require(frame.empty() || frame == "(1,0,0)(0,1,0)(0,0,1)" || frame == "none(1,0,0)(0,1,0)(0,0,1)",
-          "vectors in the measurement frame " + frame + ", " + path.string() + "; expected the identity");
+/// The format that takes the file; null: none.
+const FieldFormat* format_of(const std::filesystem::path& path) {
+  std::string first(16, '\0');
+  std::ifstream stream(path, std::ios::binary);
+  stream.read(first.data(), static_cast<std::streamsize>(first.size()));
+  first.resize(static_cast<std::size_t>(stream.gcount()));
+  return find_field_format(path, first);
 }
 
-std::optional<FieldDirection> stated_direction(const ImageHeader& header, const std::string& file) {
-  std::string text;
-  if (const auto key = header.metadata.find(kKey); key != header.metadata.end()) text = key->second;
-  const std::string prefix = std::string(kKey) + "=";
-  if (const auto note = header.metadata.find("descrip");
-      note != header.metadata.end() && note->second.starts_with(prefix)) {
-    text = note->second.substr(prefix.size());
-  }
-  if (text.empty()) return std::nullopt;
-  if (text == "forward") return FieldDirection::forward;
-  require(text == "pull", "the direction \"" + text + "\" (" + kKey + "), " + file + "; expected forward or pull");
-  return FieldDirection::pull;
+const FieldFormat& required_format(const std::filesystem::path& path) {
+  const FieldFormat* format = format_of(path);
+  require(format != nullptr || std::filesystem::exists(path), "no such file, " + path.string());
+  require(format != nullptr, "not a field file, " + path.string() + "; expected .mha .nrrd .nii .nii.gz or .npy");
+  return *format;
 }
 
-std::unique_ptr<ImageReader> open_field(const std::filesystem::path& path) {
-  auto reader = open_image(path);
-  const ImageHeader& header = reader->header();
-  require(header.components == 3 && (header.type == VoxelType::f32 || header.type == VoxelType::f64),
-          "not a displacement field, " + path.string() + ": " + std::to_string(header.components) + " x " +
-              to_string(header.type) + " a voxel; expected 3 x float32 or float64");
-  require_lps_vectors(path);
-  return reader;
+std::unique_ptr<FieldReader> open_field(const FieldSource& source) {
+  check_field_options(source);
+  return required_format(source.path).open(source);
 }
 
 /// @param gaps  whether a displacement may be NaN
@@ -64,26 +48,17 @@ void require_finite(const std::vector<glm::vec3>& displacement, const Geometry& 
   }
 }
 
-FieldFile read_as(const std::filesystem::path& path, std::optional<FieldDirection> wanted) {
-  const std::string file = path.string();
-  const auto reader = open_field(path);
-  const ImageHeader& header = reader->header();
-  FieldFile field{header.geometry, {}, stated_direction(header, file)};
-  require(!wanted || !field.direction || *wanted == *field.direction,
-          "a " + (field.direction ? to_string(*field.direction) : "") + " field where a " +
+FieldFile read_as(const FieldSource& source, std::optional<FieldDirection> wanted) {
+  const std::string file = source.path.string();
+  const auto reader = open_field(source);
+  const FieldFileHeader& header = reader->header();
+  require(!wanted || !header.direction || *wanted == *header.direction,
+          "a " + (header.direction ? to_string(*header.direction) : "") + " field where a " +
               (wanted ? to_string(*wanted) : "") + " field is expected, " + file + "; " +
               (wanted == FieldDirection::forward ? "give it with --pull-field, or invert it" : "give it with -f"));
+  FieldFile field{header.grid, {}, header.direction};
   field.displacement.resize(static_cast<std::size_t>(voxel_count(field.grid)));
-  static_assert(sizeof(glm::vec3) == 3 * sizeof(float));
-  if (header.type == VoxelType::f32) {
-    reader->read(std::as_writable_bytes(std::span(field.displacement)));
-  } else {
-    std::vector<double> values(reader->value_count());
-    reader->read(std::as_writable_bytes(std::span(values)));
-    for (std::size_t v = 0; v < field.displacement.size(); ++v) {
-      field.displacement[v] = glm::vec3(glm::dvec3(values[3 * v], values[3 * v + 1], values[3 * v + 2]));
-    }
-  }
+  reader->read(field.displacement);
   require_finite(field.displacement, field.grid,
                  wanted.value_or(field.direction.value_or(FieldDirection::forward)) == FieldDirection::pull, file);
   return field;
@@ -96,9 +71,9 @@ void write_as(const std::filesystem::path& path, const Geometry& grid, const std
               path.string());
   ImageWriteOptions options;
   if (image_format(path) == ImageFormat::nifti)
-    options.metadata["descrip"] = std::string(kKey) + "=" + to_string(direction);
+    options.metadata["descrip"] = std::string(kDirectionKey) + "=" + to_string(direction);
   else
-    options.metadata[kKey] = to_string(direction);
+    options.metadata[kDirectionKey] = to_string(direction);
   write_image(path, {&grid, whole(grid), VoxelType::f32, 3, std::as_bytes(std::span(displacement)).data()}, options);
 }
 
@@ -106,27 +81,56 @@ void write_as(const std::filesystem::path& path, const Geometry& grid, const std
 
 std::string to_string(FieldDirection direction) { return direction == FieldDirection::forward ? "forward" : "pull"; }
 
+std::string to_string(FieldBasis basis) {
+  switch (basis) {
+    case FieldBasis::stated: return "stated";
+    case FieldBasis::by_format: return "by the format";
+    case FieldBasis::by_option: return "by an option";
+    case FieldBasis::assumed: break;
+  }
+  return "assumed";
+}
+
+FieldSource parse_field_source(const std::string& text) {
+  const std::size_t colon = text.rfind(':');
+  if (std::filesystem::exists(text) || colon == std::string::npos || text.find('=', colon) == std::string::npos)
+    return {text};
+  FieldSource source(text.substr(0, colon));
+  std::istringstream options(text.substr(colon + 1));
+  for (std::string option; std::getline(options, option, ',');) {
+    const std::size_t equals = option.find('=');
+    require(equals != std::string::npos && equals > 0 && equals + 1 < option.size(),
+            "the option \"" + option + "\" of " + source.path.string() + "; expected KEY=VALUE");
+    require(source.options.emplace(option.substr(0, equals), option.substr(equals + 1)).second,
+            "the option \"" + option.substr(0, equals) + "\" of " + source.path.string() + " is given twice");
+  }
+  return source;
+}
+
+void check_field_options(const FieldSource& source) {
+  const FieldFormat* format = format_of(source.path);
+  if (format == nullptr) return;  // refused when it is read
+  if (format->check_options) return format->check_options(source);
+  require(source.options.empty(), "the option \"" + (source.options.empty() ? "" : source.options.begin()->first) +
+                                      "\" for " + source.path.string() + "; files of its format take none");
+}
+
 bool is_field_file(const std::filesystem::path& path) {
-  return has_image_suffix(path) && read_image_header(path).components == 3;
+  const FieldFormat* format = format_of(path);
+  return format && (!format->holds_field || format->holds_field(path));
 }
 
-FieldFileHeader read_field_header(const std::filesystem::path& path) {
-  const auto reader = open_field(path);
-  FieldFileHeader header;
-  header.grid = reader->header().geometry;
-  header.direction = stated_direction(reader->header(), path.string());
-  return header;
-}
+FieldFileHeader read_field_header(const FieldSource& source) { return open_field(source)->header(); }
 
-FieldFile read_field_file(const std::filesystem::path& path) { return read_as(path, std::nullopt); }
+FieldFile read_field_file(const FieldSource& source) { return read_as(source, std::nullopt); }
 
-VertexField read_forward_field(const std::filesystem::path& path) {
-  FieldFile field = read_as(path, FieldDirection::forward);
+VertexField read_forward_field(const FieldSource& source) {
+  FieldFile field = read_as(source, FieldDirection::forward);
   return {field.grid, std::move(field.displacement)};
 }
 
-PullField read_pull_field(const std::filesystem::path& path) {
-  FieldFile field = read_as(path, FieldDirection::pull);
+PullField read_pull_field(const FieldSource& source) {
+  FieldFile field = read_as(source, FieldDirection::pull);
   return {field.grid, std::move(field.displacement)};
 }
 

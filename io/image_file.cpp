@@ -156,15 +156,20 @@ std::size_t ImageReader::value_count() const {
   return static_cast<std::size_t>(voxel_count(header_.geometry)) * static_cast<std::size_t>(header_.components);
 }
 
-std::unique_ptr<ImageReader> open_image(const std::filesystem::path& path) {
+void require_readable_file(const std::filesystem::path& path) {
   const std::string file = path.string();
-  const ImageFormat format = required_format(path);
   std::error_code error;
   const auto status = std::filesystem::status(path, error);
   require(std::filesystem::exists(status), "no such file, " + file);
   require(std::filesystem::is_regular_file(status), "not a file, " + file);
   require(std::filesystem::file_size(path) > 0, "an empty file, " + file);
   require(::access(path.c_str(), R_OK) == 0, "a file that may not be read, " + file + "; check its rights");
+}
+
+std::unique_ptr<ImageReader> open_image(const std::filesystem::path& path) {
+  const std::string file = path.string();
+  const ImageFormat format = required_format(path);
+  require_readable_file(path);
   auto reader = open_format(path, format);
   require_valid(reader->header().geometry, file);
   require_orthogonal(reader->header().geometry, file);

@@ -60,6 +60,9 @@ class ImageReader {
   Stored stored_;
 };
 
+/// @throws InputError naming the file: missing, no regular file, empty, without the right to read it
+void require_readable_file(const std::filesystem::path& path);
+
 /// Reads and checks the header; a header that promises more than the file can hold is refused here, before anything is
 /// allocated. @throws InputError as `read_image_header`
 std::unique_ptr<ImageReader> open_image(const std::filesystem::path& path);

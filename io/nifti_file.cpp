@@ -214,6 +214,22 @@ std::span<const std::byte> plane_piece(const ConstVolumeView& volume, std::size_
   return scratch;
 }
 
+/// Where ITK places the volume, with the digits of the header. ITK 5.2.1 takes displacement vectors (intent 1006) for
+/// an image of five axes: these are placed here, by its rule.
+Geometry placed_geometry(const std::filesystem::path& path, const NiftiHeader& header) {
+  const Geometry found = header.intent_code != 1006 ? itk_read_info(path, ItkFormat::nifti).geometry
+                         : sform_decides(header)    ? header.sform
+                                                    : header.qform;
+  const glm::i64vec3& size = found.size;
+  const double tolerance_mm =
+      0.01 + 1e-3 * static_cast<double>(std::max({size.x, size.y, size.z}));  // pixdim may be rounded
+  const bool as_sform = header.sform_code > 0 && same_grid(found, header.sform, tolerance_mm);
+  const bool as_qform = header.qform_code > 0 && same_grid(found, header.qform, tolerance_mm);
+  require(as_sform || (as_qform && !sform_decides(header)),
+          "a header that ITK places elsewhere than its sform or qform, " + path.string() + "; correct the header");
+  return as_sform ? header.sform : found;
+}
+
 }  // namespace
 
 std::unique_ptr<ImageReader> open_nifti(const std::filesystem::path& path) {
@@ -223,17 +239,8 @@ std::unique_ptr<ImageReader> open_nifti(const std::filesystem::path& path) {
   const bool compressed = starts_like_gzip(path);
   require(!compressed || path.extension() != ".nii", "gzip data under a name in .nii, " + file + "; name it .nii.gz");
   ImageHeader image;
-  const ItkImageInfo info = itk_read_info(path, ItkFormat::nifti);
-  image.geometry = info.geometry;
+  image.geometry = placed_geometry(path, header);
   image.components = header.dim[0] >= 5 ? static_cast<int>(header.dim[5]) : 1;
-  const glm::i64vec3& size = info.geometry.size;
-  const double tolerance_mm =
-      0.01 + 1e-3 * static_cast<double>(std::max({size.x, size.y, size.z}));  // pixdim may be rounded
-  const bool as_sform = header.sform_code > 0 && same_grid(info.geometry, header.sform, tolerance_mm);
-  const bool as_qform = header.qform_code > 0 && same_grid(info.geometry, header.qform, tolerance_mm);
-  require(as_sform || (as_qform && !sform_decides(header)),
-          "a header that ITK places elsewhere than its sform or qform, " + file + "; correct the header");
-  if (as_sform) image.geometry = header.sform;
   image.type = disk;
   image.metadata["descrip"] = header.descrip;
   if (is_scaled(header)) {

@@ -18,13 +18,14 @@ struct NiftiHeader {
   bool swapped = false;
   std::array<std::int64_t, 8> dim{};
   int intent_code = 0, datatype = 0, units = 0, qform_code = 0, sform_code = 0;
-  double vox_offset = 0, scl_slope = 0, scl_inter = 0;
-  std::string descrip;
+  double vox_offset = 0, scl_slope = 0, scl_inter = 0, intent_p1 = 0;
+  std::string descrip, intent_name;
   Geometry qform, sform;  ///< LPS; valid where the code is not 0
 };
 
-/// @throws InputError naming the file: no NIfTI-1 in one file, more than one time point, a vector that is not an intent
-///         1007, a datatype that VoxelType does not have, units other than mm, no orientation, a sheared sform
+/// @throws InputError naming the file: no NIfTI-1 in one file, more than one time point, a vector that is neither of
+///         intent 1006 nor 1007, a datatype that VoxelType does not have, units other than mm, no orientation, a
+///         sheared sform
 NiftiHeader read_nifti_header(const std::filesystem::path& path);
 
 /// Whether the sform, not the qform, places the volume, as ITK has it: it is the scanner's, or the only one.

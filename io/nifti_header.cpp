@@ -5,6 +5,7 @@
 #include <cstring>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <utility>
 
 #include "deform/errors.h"
 #include "io/nifti_file.h"
@@ -88,20 +89,24 @@ void require_one_volume(const NiftiHeader& header, const std::string& file) {
             "a size of " + dims + ", " + file + "; expected at least 1 on every axis");
   }
   const auto beyond = [&](std::size_t i) { return static_cast<std::int64_t>(i) <= dim[0] ? dim[i] : 1; };
+  require(header.intent_code < 2006 || header.intent_code > 2009,
+          "a field or coefficients of FSL (intent code " + std::to_string(header.intent_code) + "), " + file +
+              "; their mm depend on two reference images: convert it to a displacement field of ITK");
   require(beyond(4) == 1, std::to_string(beyond(4)) + " time points (" + dims + "), " + file +
                               "; split the file, one volume is expected");
-  require(header.intent_code != 1006,
-          "a displacement field of intent code 1006 (DISPVECT), " + file +
-              "; its vectors' frame differs between tools: convert it to intent code 1007 (VECTOR) in LPS mm");
-  const bool vector = beyond(5) > 1;
-  require(!vector || header.intent_code == 1007, std::to_string(beyond(5)) + " values a voxel with intent code " +
-                                                     std::to_string(header.intent_code) + ", " + file +
-                                                     "; expected 1 value, or vectors with intent code 1007");
+  const bool vector = beyond(5) > 1, may_be_vector = header.intent_code == 1006 || header.intent_code == 1007;
+  require(!vector || may_be_vector, std::to_string(beyond(5)) + " values a voxel with intent code " +
+                                        std::to_string(header.intent_code) + ", " + file +
+                                        "; expected 1 value, or vectors with intent code 1006 or 1007");
+  require(header.intent_code != 1006 || beyond(5) == 3, "displacement vectors (intent code 1006, DISPVECT) of " +
+                                                            std::to_string(beyond(5)) + " values, " + file +
+                                                            "; expected 3");
   require(beyond(6) == 1 && beyond(7) == 1, "a size of " + dims + ", " + file + "; expected 3 axes and no more");
 }
 
 /// The transforms must be there, in mm, and the sform orthogonal and as large as pixdim says: ITK ignores a sform that
-/// is not, and would place the volume elsewhere without a word.
+/// is not, and would place the volume elsewhere without a word; numbers that are not finite, or huge, end
+/// the program in ITK 5.2.1, or keep it for ever.
 void require_known_place(const NiftiHeader& header, const glm::dvec3& pixdim, const std::string& file) {
   constexpr int kMillimetres = 2;
   require(header.units == 0 || header.units == kMillimetres, "lengths in " +
@@ -111,6 +116,13 @@ void require_known_place(const NiftiHeader& header, const glm::dvec3& pixdim, co
                                                                  " (xyzt_units), " + file + "; expected mm");
   require(header.qform_code > 0 || header.sform_code > 0,
           "no orientation (qform_code 0 and sform_code 0), " + file + "; set the qform or the sform");
+  for (const auto& [code, grid] : {std::pair(header.qform_code, &header.qform), {header.sform_code, &header.sform}}) {
+    const bool near = glm::length(grid->origin) + glm::length(grid->spacing) < 1e9;  // false for NaN
+    require(code <= 0 || near,
+            "a qform or sform that is not finite, or beyond 1e9 mm, " + file + "; correct the header");
+  }
+  require(sform_decides(header) || (pixdim.x > 0 && pixdim.y > 0 && pixdim.z > 0),
+          "a voxel size of " + text(pixdim) + " mm by pixdim, " + file + "; expected more than 0");
   if (header.sform_code <= 0) return;
   const glm::dmat3& d = header.sform.direction;
   const glm::dvec3 cosines(glm::dot(d[0], d[1]), glm::dot(d[0], d[2]), glm::dot(d[1], d[2]));
@@ -151,8 +163,10 @@ NiftiHeader read_nifti_header(const std::filesystem::path& path) {
   header.vox_offset = f32(108);
   header.scl_slope = f32(112);
   header.scl_inter = f32(116);
+  header.intent_p1 = f32(56);
   header.units = bytes[123] & 7;
   header.descrip.assign(bytes.begin() + 148, std::find(bytes.begin() + 148, bytes.begin() + 228, 0));
+  header.intent_name.assign(bytes.begin() + 328, std::find(bytes.begin() + 328, bytes.begin() + 344, 0));
   header.qform_code = i16(252);
   header.sform_code = i16(254);
   require_one_volume(header, file);

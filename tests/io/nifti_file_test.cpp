@@ -94,7 +94,8 @@ TEST(Nifti, WhatCannotBeReadExactlyIsRefusedByName) {
   };
   using I16 = std::pair<std::size_t, std::int16_t>;
   using F32 = std::pair<std::size_t, float>;
-  refused(with(vectors, I16(68, 1006)), "DISPVECT");
+  refused(with(good, I16(68, 1006)), "DISPVECT");
+  refused(with(good, I16(68, 2006)), "a field or coefficients of FSL (intent code 2006)");
   refused(with(vectors, I16(68, 0)), "3 values a voxel with intent code 0");
   refused(with(good, I16(70, 1024)), "voxels of int64");
   refused(with(good, I16(70, 128)), "voxels of RGB24");
@@ -106,6 +107,9 @@ TEST(Nifti, WhatCannotBeReadExactlyIsRefusedByName) {
   refused(with(good, I16(252, 0), I16(254, 0)), "no orientation");
   refused(with(good, F32(280 + 4, 0.05f)), "a sheared or singular sform");
   refused(with(good, F32(280, 0.0f)), "a sheared or singular sform");
+  for (const std::size_t at : {256, 272, 280, 292}) {  // quatern_b, qoffset_y, srow_x[0], srow_x[3]
+    for (const float bad : {NAN, INFINITY, -INFINITY, 2.9e38F}) refused(with(good, F32(at, bad)), "that is not finite");
+  }
   refused(with(good, F32(80, 0.9f)), "by pixdim");
   refused(with(good, std::pair<std::size_t, char>(123, 1)), "lengths in metres");
   refused(with(good, std::pair<std::size_t, char>(345, 'i')), "NIfTI-1 in one file");

@@ -1,0 +1,94 @@
+#include "io/field_image.h"
+
+#include "deform/errors.h"
+#include "io/text_header.h"
+
+namespace tetwarp {
+namespace {
+
+/// Vectors whose frame is not the grid's LPS would be turned silently. NRRD is the format that can say so.
+/// @return  whether it says LPS
+bool require_lps_vectors(const std::filesystem::path& path) {
+  const TextHeader text = read_text_header(path, ImageFormat::nrrd);
+  const std::string space = text["space"];
+  require(space.empty() || space == "left-posterior-superior" || space == "LPS" || space == "lps",
+          "vectors in the space \"" + space + "\", " + path.string() + "; expected left-posterior-superior");
+  std::string frame = text["measurement frame"];
+  std::erase(frame, ' ');
+  require(frame.empty() || frame == "(1,0,0)(0,1,0)(0,0,1)" || frame == "none(1,0,0)(0,1,0)(0,0,1)",
+          "vectors in the measurement frame " + frame + ", " + path.string() + "; expected the identity");
+  return !space.empty() && !frame.empty();
+}
+
+class ImageFieldReader final : public FieldReader {
+ public:
+  ImageFieldReader(FieldFileHeader header, std::unique_ptr<ImageReader> image)
+      : FieldReader(std::move(header)), image_(std::move(image)) {}
+  void read(std::span<glm::vec3> displacement) const override { read_vectors(*image_, displacement); }
+
+ private:
+  std::unique_ptr<ImageReader> image_;
+};
+
+bool claims(const std::filesystem::path& path, std::string_view) { return has_image_suffix(path); }
+
+bool holds_field(const std::filesystem::path& path) { return read_image_header(path).components == 3; }
+
+std::unique_ptr<FieldReader> open(const FieldSource& source) {
+  auto image = open_vectors(source.path);
+  const bool nrrd = image_format(source.path) == ImageFormat::nrrd;
+  FieldFileHeader header;
+  header.grid = image->header().geometry;
+  header.format = nrrd ? "NRRD" : "MHA";
+  read_stated_direction(image->header(), source.path.string(), header);
+  if (nrrd && require_lps_vectors(source.path)) header.frame_basis = FieldBasis::stated;
+  return std::make_unique<ImageFieldReader>(std::move(header), std::move(image));
+}
+
+}  // namespace
+
+const FieldFormat kFieldFormat_image = {claims, holds_field, nullptr, open};
+
+std::unique_ptr<ImageReader> open_vectors(const std::filesystem::path& path) {
+  auto reader = open_image(path);
+  const ImageHeader& header = reader->header();
+  require(header.components == 3 && (header.type == VoxelType::f32 || header.type == VoxelType::f64),
+          "not a displacement field, " + path.string() + ": " + std::to_string(header.components) + " x " +
+              to_string(header.type) + " a voxel; expected 3 x float32 or float64");
+  return reader;
+}
+
+void read_stated_direction(const ImageHeader& image, const std::string& file, FieldFileHeader& header) {
+  std::string text;
+  if (const auto key = image.metadata.find(kDirectionKey); key != image.metadata.end()) text = key->second;
+  const std::string prefix = std::string(kDirectionKey) + "=";
+  if (const auto note = image.metadata.find("descrip");
+      note != image.metadata.end() && note->second.starts_with(prefix)) {
+    text = note->second.substr(prefix.size());
+  }
+  if (text.empty()) return;
+  require(text == "forward" || text == "pull",
+          "the direction \"" + text + "\" (" + kDirectionKey + "), " + file + "; expected forward or pull");
+  header.direction = text == "forward" ? FieldDirection::forward : FieldDirection::pull;
+  header.direction_basis = FieldBasis::stated;
+  header.frame_basis = header.units_basis = header.absolute_basis = FieldBasis::by_format;
+}
+
+void read_vectors(const ImageReader& reader, std::span<glm::vec3> vectors,
+                  const std::function<glm::dvec3(const glm::dvec3&, std::size_t)>& to_mm) {
+  static_assert(sizeof(glm::vec3) == 3 * sizeof(float));
+  if (reader.header().type == VoxelType::f32) {
+    reader.read(std::as_writable_bytes(vectors));
+    if (!to_mm) return;
+    for (std::size_t v = 0; v < vectors.size(); ++v) vectors[v] = glm::vec3(to_mm(glm::dvec3(vectors[v]), v));
+    return;
+  }
+  std::vector<double> values(reader.value_count());
+  reader.read(std::as_writable_bytes(std::span(values)));
+  for (std::size_t v = 0; v < vectors.size(); ++v) {
+    const glm::dvec3 vector(values[3 * v], values[3 * v + 1], values[3 * v + 2]);
+    vectors[v] = glm::vec3(to_mm ? to_mm(vector, v) : vector);
+  }
+}
+
+}  // namespace tetwarp

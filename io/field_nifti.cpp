@@ -1,0 +1,100 @@
+#include "io/field_nifti.h"
+
+#include <array>
+#include <cmath>
+
+#include "deform/errors.h"
+#include "io/field_image.h"
+#include "io/nifti_file.h"
+
+namespace tetwarp {
+namespace {
+
+constexpr int kDisplacementVector = 1006;
+constexpr glm::dvec3 kLpsFromRas(-1, -1, 1);
+
+/// The types of NiftyReg's files (reg-lib/cpu/_reg_maths.h, NREG_TRANS_TYPE, in intent_p1), of which those with a name
+/// here cannot be read.
+constexpr std::array<const char*, 7> kNiftyRegRefused = {nullptr,
+                                                         nullptr,
+                                                         "a cubic B-spline control point grid",
+                                                         "a velocity field of positions",
+                                                         "a velocity field of displacements",
+                                                         "a velocity control point grid",
+                                                         "a linear B-spline control point grid"};
+
+void describe_niftyreg(const NiftiHeader& nifti, const std::string& file, FieldFileHeader& header) {
+  const std::string type = std::to_string(nifti.intent_p1);
+  require(nifti.intent_name == "NREG_TRANS" && nifti.intent_p1 >= 0 && nifti.intent_p1 < kNiftyRegRefused.size() &&
+              nifti.intent_p1 == std::floor(nifti.intent_p1),
+          "a NiftyReg file of unknown kind (intent_name \"" + nifti.intent_name + "\", intent_p1 " + type + "), " +
+              file + "; expected NREG_TRANS and 0 or 1");
+  const char* refused = kNiftyRegRefused[static_cast<std::size_t>(nifti.intent_p1)];
+  require(refused == nullptr, std::string(refused ? refused : "") + " of NiftyReg (intent_p1 " + type + "), " + file +
+                                  "; make a displacement field of it with reg_transform -disp");
+  // NiftyReg goes by the sform where there is one, whatever its code.
+  require(nifti.sform_code <= 0 || same_grid(header.grid, nifti.sform, 0.01),
+          "a NiftyReg field whose qform and sform differ, " + file + "; correct the header");
+  header.absolute = nifti.intent_p1 == 0;
+  header.format = std::string("NIfTI, NiftyReg ") + (header.absolute ? "deformation field" : "displacement field");
+  header.direction = FieldDirection::pull;
+  header.frame = "RAS";
+  header.direction_basis = header.frame_basis = header.units_basis = FieldBasis::by_format;
+  header.absolute_basis = FieldBasis::stated;
+}
+
+void describe_displacement_vectors(const NiftiHeader& nifti, FieldFileHeader& header) {
+  header.format = "NIfTI, intent 1006 (DISPVECT)";
+  header.frame = "RAS";
+  header.frame_basis = header.absolute_basis = FieldBasis::by_format;
+  header.units_basis = nifti.units != 0 ? FieldBasis::stated : FieldBasis::assumed;
+}
+
+class NiftiFieldReader final : public FieldReader {
+ public:
+  NiftiFieldReader(FieldFileHeader header, std::unique_ptr<ImageReader> image)
+      : FieldReader(std::move(header)), image_(std::move(image)) {}
+
+  void read(std::span<glm::vec3> displacement) const override {
+    if (header_.frame == "LPS") return read_vectors(*image_, displacement);
+    if (!header_.absolute) {
+      return read_vectors(*image_, displacement,
+                          [](const glm::dvec3& vector, std::size_t) { return kLpsFromRas * vector + 0.0; });  // no -0
+    }
+    const AffineMap point = point_from_index(header_.grid);
+    const glm::i64vec3 size = header_.grid.size;
+    read_vectors(*image_, displacement, [&](const glm::dvec3& vector, std::size_t vertex) {
+      const auto n = static_cast<std::int64_t>(vertex);
+      return kLpsFromRas * vector - point(glm::dvec3(n % size.x, n / size.x % size.y, n / (size.x * size.y))) + 0.0;
+    });
+  }
+
+ private:
+  std::unique_ptr<ImageReader> image_;
+};
+
+bool claims(const std::filesystem::path& path, std::string_view) { return image_format(path) == ImageFormat::nifti; }
+
+bool holds_field(const std::filesystem::path& path) { return read_image_header(path).components == 3; }
+
+std::unique_ptr<FieldReader> open(const FieldSource& source) {
+  const std::string file = source.path.string();
+  auto image = open_vectors(source.path);
+  const NiftiHeader nifti = read_nifti_header(source.path);
+  FieldFileHeader header;
+  header.grid = image->header().geometry;
+  header.format = "NIfTI, intent 1007 (VECTOR)";
+  if (nifti.intent_name.starts_with("NREG_")) {
+    describe_niftyreg(nifti, file, header);
+  } else {
+    read_stated_direction(image->header(), file, header);
+    if (nifti.intent_code == kDisplacementVector) describe_displacement_vectors(nifti, header);
+  }
+  return std::make_unique<NiftiFieldReader>(std::move(header), std::move(image));
+}
+
+}  // namespace
+
+const FieldFormat kFieldFormat_nifti = {claims, holds_field, nullptr, open};
+
+}  // namespace tetwarp

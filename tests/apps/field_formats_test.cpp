@@ -1,0 +1,137 @@
+// One field, stored as other tools store it: the same deformed volume, and what `info` and the report say of the file.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "io/field_file.h"
+#include "io/image_file.h"
+#include "tests/support/foreign_field.h"
+#include "tests/support/program.h"
+#include "tests/support/scratch.h"
+#include "tests/support/write_file.h"
+
+namespace {
+
+using namespace tetwarp;
+
+/// A phantom, and a field on a grid that is turned against it: i down along z, j to the right, k to the back. All
+/// numbers of it are the same in float.
+Geometry turned_grid() {
+  Geometry grid;
+  grid.size = {4, 3, 5};
+  grid.spacing = {16, 20, 12};
+  grid.origin = {20, -30, 24};
+  grid.direction = glm::dmat3(0, 0, -1, -1, 0, 0, 0, 1, 0);
+  return grid;
+}
+
+void make_phantom_file(const Scratch& scratch, const std::string& name) {
+  ASSERT_EQ(run_tetwarp(scratch.path(), "phantom --size 40,36,24 --spacing 3,3,4 --quiet -o " + name).status, 0);
+}
+
+/// The voxels that a deformation by the field (an option and a text) leaves.
+std::string deformed(const Scratch& scratch, const std::string& field) {
+  const Outcome run = run_tetwarp(
+      scratch.path(), "deform in.mha " + field + " --outside rest -o out.mha --report out.json --overwrite");
+  EXPECT_EQ(run.status, 0) << field << "\n" << run.err;
+  return run.status == 0 ? read_text(scratch / "out.mha") : "";
+}
+
+TEST(FieldFormats, EveryFileOfOneFieldDeformsAlikeInBothDirections) {
+  const Scratch scratch;
+  make_phantom_file(scratch, "in.mha");
+  const VertexField forward{turned_grid(), corner_displacement(turned_grid())};
+  write_field_file(scratch / "forward.mha", forward);
+  write_field_file(scratch / "pull.mha", PullField{forward.lattice, forward.displacement});
+  const std::string pushed = deformed(scratch, "-f forward.mha"), pulled = deformed(scratch, "--pull-field pull.mha"),
+                    rest = deformed(scratch, "-f identity");
+  EXPECT_TRUE(pushed != rest);
+  EXPECT_TRUE(pulled != rest);
+  EXPECT_TRUE(pulled != pushed);
+  for (const std::string own : {"own.nrrd", "own.nii", "own.nii.gz"}) {
+    write_field_file(scratch / own, forward);
+    EXPECT_TRUE(deformed(scratch, "-f " + own) == pushed) << own;
+    write_field_file(scratch / own, PullField{forward.lattice, forward.displacement});
+    EXPECT_TRUE(deformed(scratch, "--pull-field " + own) == pulled) << own;
+  }
+  for (const std::string kind : {"1006", "1007", "nreg-0", "nreg-1"}) {
+    if (!make_foreign_field(kind, scratch / "pull.mha", scratch / "f.nii.gz")) GTEST_SKIP() << "python3-nibabel";
+    EXPECT_TRUE(deformed(scratch, "--pull-field f.nii.gz") == pulled) << kind;
+    const auto files = nlohmann::json::parse(read_text(scratch / "out.json"))["field"]["files"];
+    ASSERT_EQ(files.size(), 1U);
+    EXPECT_EQ(files[0]["path"], "f.nii.gz");
+    EXPECT_EQ(files[0]["frame"], kind == "1007" ? "LPS" : "RAS");
+    EXPECT_EQ(files[0]["absolute"], kind == "nreg-0");
+    if (kind.starts_with("nreg")) {
+      const Outcome run = run_tetwarp(scratch.path(), "deform in.mha -f f.nii.gz --outside rest -o no.mha");
+      EXPECT_EQ(run.status, 4);
+      EXPECT_NE(run.err.find("a pull field where a forward field is expected"), std::string::npos) << run.err;
+    } else {
+      EXPECT_TRUE(deformed(scratch, "-f f.nii.gz") == pushed) << kind;
+    }
+  }
+}
+
+TEST(FieldFormats, AnArrayLiesOnTheVolumeOnceOrderAndUnitsAreGiven) {
+  const Scratch scratch;
+  make_phantom_file(scratch, "in.mha");
+  const Geometry grid = read_image_header(scratch / "in.mha").geometry;
+  write_field_file(scratch / "forward.mha", VertexField{grid, corner_displacement(grid)});
+  write_field_file(scratch / "pull.mha", PullField{grid, corner_displacement(grid)});
+  const std::string pushed = deformed(scratch, "-f forward.mha"), pulled = deformed(scratch, "--pull-field pull.mha");
+  EXPECT_TRUE(pushed != pulled);
+  if (!make_foreign_field("npy:<f4:zyx:C", scratch / "pull.mha", scratch / "f.npy")) GTEST_SKIP() << "python3-numpy";
+  EXPECT_TRUE(deformed(scratch, "-f f.npy:order=zyx,units=mm") == pushed);
+  EXPECT_TRUE(deformed(scratch, "--pull-field f.npy:order=zyx,units=mm") == pulled);
+  EXPECT_TRUE(deformed(scratch, "--pull-field f.npy:order=zyx,units=mm,frame=ras") != pulled);
+  const auto report = nlohmann::json::parse(read_text(scratch / "out.json"));
+  EXPECT_EQ(report["field"]["files"][0]["frame"], "RAS");
+  EXPECT_EQ(report["field"]["files"][0]["known"]["frame"], "by an option");
+
+  for (const std::string option :
+       {"-f f.npy", "--pull-field f.npy", "-f f.npy:order=zyx", "-f f.npy:order=zyx,units=cm",
+        "--pull-field f.npy:order=zyx,units=mm,units=mm", "-f forward.mha:order=zyx"}) {
+    const Outcome run = run_tetwarp(scratch.path(), "deform in.mha " + option + " -o no.mha");
+    EXPECT_EQ(run.status, 2) << option << "\n" << run.err;
+    EXPECT_TRUE(run.err.starts_with("tetwarp: error: ")) << run.err;
+    EXPECT_FALSE(std::filesystem::exists(scratch / "no.mha"));
+  }
+  const std::string bytes = read_text(scratch / "f.npy");
+  write_file(scratch / "short.npy", bytes.substr(0, bytes.size() - 1));
+  write_file(scratch / "wrong.npy", "#" + bytes.substr(1));
+  for (const std::string field : {"short.npy:order=zyx,units=mm", "wrong.npy:order=zyx,units=mm",
+                                  "f.npy:order=xyz,units=mm", "none.npy:order=zyx,units=mm"}) {
+    const Outcome run = run_tetwarp(scratch.path(), "deform in.mha --pull-field " + field + " -o no.mha");
+    EXPECT_EQ(run.status, 4) << field << "\n" << run.err;
+    EXPECT_NE(run.err.find(field.substr(0, field.find(':'))), std::string::npos) << run.err;
+  }
+}
+
+TEST(FieldFormats, InfoSaysWhatIsStatedAndWhatIsAssumed) {
+  const Scratch scratch;
+  write_field_file(scratch / "own.mha", VertexField{turned_grid(), corner_displacement(turned_grid())});
+  const std::string own = run_tetwarp(scratch.path(), "info own.mha").out;
+  EXPECT_NE(own.find("direction    forward (stated)"), std::string::npos) << own;
+  EXPECT_NE(own.find("displacements (by the format), frame LPS (by the format), mm (by the format)"), std::string::npos)
+      << own;
+  if (!make_foreign_field("1007", scratch / "own.mha", scratch / "f.nii")) GTEST_SKIP() << "python3-nibabel";
+  const std::string itk = run_tetwarp(scratch.path(), "info f.nii").out;
+  EXPECT_NE(itk.find("direction    not stated\n"), std::string::npos) << itk;
+  EXPECT_NE(itk.find("displacements (assumed), frame LPS (assumed), mm (assumed)"), std::string::npos) << itk;
+  ASSERT_TRUE(make_foreign_field("nreg-0", scratch / "own.mha", scratch / "f.nii"));
+  const auto niftyreg = nlohmann::json::parse(run_tetwarp(scratch.path(), "info f.nii --json").out);
+  EXPECT_EQ(niftyreg["direction"], "pull");
+  EXPECT_EQ(niftyreg["known"]["direction"], "by the format");
+  EXPECT_EQ(niftyreg["frame"], "RAS");
+  EXPECT_EQ(niftyreg["absolute"], true);
+  EXPECT_EQ(niftyreg["lattice"]["size"], nlohmann::json::array({4, 3, 5}));
+  ASSERT_TRUE(make_foreign_field("npy:<f4:zyx:C", scratch / "own.mha", scratch / "f.npy"));
+  EXPECT_EQ(run_tetwarp(scratch.path(), "info f.npy").status, 2);
+  const std::string array = run_tetwarp(scratch.path(), "info f.npy:order=zyx,units=voxel").out;
+  EXPECT_NE(array.find("displacements (assumed), frame index (by an option), voxel (by an option)"), std::string::npos)
+      << array;
+  EXPECT_NE(array.find("size         4 x 3 x 5"), std::string::npos) << array;
+  EXPECT_NE(array.find("place        that of the volume"), std::string::npos) << array;
+}
+
+}  // namespace
