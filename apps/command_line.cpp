@@ -39,8 +39,7 @@ void add_series(CLI::App& command, InputOptions& input) {
 constexpr const char* kInputHelp = "Folder of DICOM files, one DICOM file, or .nii .nii.gz .nrrd .mha";
 constexpr const char* kFieldHelp =
     "Forward field: a file (.mha .nrrd .nii .nii.gz, or .npy:order=zyx|xyz,units=mm|voxel), a transform of ITK, "
-    "elastix or "
-    "plastimatch (.h5 .tfm .txt; each vertex x goes to T(x)), or identity, "
+    "elastix or plastimatch (.h5 .tfm .txt; each vertex x goes to T(x)), or identity, "
     "wave:amplitude=,wavelength=[,phase=,axis=,along=], "
     "twist:angle=[,axis=], bubble:radius=,strength=[,center=X/Y/Z], bubble-paper:shift=[,center=], translate:by=X/Y/Z; "
     "mm, "
@@ -124,8 +123,7 @@ void add_deform(CLI::App& app, DeformOptions& options) {
   command
       ->add_option("--pull-field", options.pull_field,
                    "A field that maps output to input, as registration tools write it (files as for -f); NaN in it: no "
-                   "source. Or a "
-                   "transform of ITK, elastix or plastimatch (.h5 .tfm .txt): output p comes from T(p)")
+                   "source. Or a transform of ITK, elastix or plastimatch (.h5 .tfm .txt): output p comes from T(p)")
       ->type_name("FILE")
       ->excludes(field);
   command

@@ -6,10 +6,13 @@
 #include <nlohmann/json.hpp>
 
 #include "bench/cpu_report.h"
+#include "tests/support/floors.h"
 #include "tests/support/says.h"
 
 namespace tetwarp::bench {
 namespace {
+
+using test::find_floor;
 
 Summary ms(double median) { return {median, median, median, median, median, 3}; }
 PeerTimes peer(double median) { return {ms(median), 0.25}; }
@@ -23,23 +26,13 @@ CpuRun make_run(const std::string& field, const glm::i64vec3& size = {512, 512, 
   return run;
 }
 
-const Floor* find(const std::vector<Floor>& floors, const std::string& ratio, const std::string& where) {
-  for (const Floor& floor : floors) {
-    if (floor.ratio == ratio && floor.where == where) return &floor;
-  }
-  return nullptr;
-}
-
+/// With the aim as well.
 void expect_floor(const std::vector<Floor>& floors, const std::string& ratio, const std::string& where, double value,
                   std::optional<double> required, std::optional<double> aim, bool met) {
-  const Floor* floor = find(floors, ratio, where);
-  ASSERT_TRUE(floor) << ratio << ", " << where;
-  EXPECT_NEAR(floor->value, value, 1e-12) << ratio << ", " << where;
-  EXPECT_EQ(floor->required, required) << ratio << ", " << where;
+  test::expect_floor(floors, ratio, where, value, required, met);
+  const Floor* floor = find_floor(floors, ratio, where);
+  ASSERT_TRUE(floor);
   EXPECT_EQ(floor->aim, aim) << ratio << ", " << where;
-  if (required) {
-    EXPECT_EQ(floor->meets(*required), met) << ratio << ", " << where;
-  }
 }
 
 TEST(CpuFloors, ThePaperCountsSetFieldAndItksWarpDoesNot) {
@@ -100,7 +93,7 @@ TEST(CpuFloors, IdentityIsHeldAgainstTheBytesAndALocalFieldIsToldBesideThem) {
   expect_floor(floors, "new field / bytes", "identity", 2.5, 2, {}, false);
   expect_floor(floors, "resample / bytes", "identity", 1.875, 2, {}, true);
   expect_floor(floors, "new field / bytes", "local", 2.5, {}, {}, false);
-  EXPECT_FALSE(find(floors, "new field / bytes", "wave"));
+  EXPECT_FALSE(find_floor(floors, "new field / bytes", "wave"));
 }
 
 TEST(CpuFloors, AVoxelOfALargeVolumeCostsAQuarterMoreAtMost) {

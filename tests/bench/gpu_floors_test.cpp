@@ -6,10 +6,14 @@
 #include <nlohmann/json.hpp>
 
 #include "bench/gpu_report.h"
+#include "tests/support/floors.h"
 #include "tests/support/says.h"
 
 namespace tetwarp::bench {
 namespace {
+
+using test::expect_floor;
+using test::find_floor;
 
 Summary ms(double median) { return {median, median, median, median, median, 15}; }
 
@@ -34,23 +38,6 @@ GpuResults results_of(const std::vector<GpuRun>& runs) {
   results.copies = {ms(0.1), ms(0.4)};
   results.runs = runs;
   return results;
-}
-
-const Floor* find(const std::vector<Floor>& floors, const std::string& ratio, const std::string& where) {
-  for (const Floor& floor : floors) {
-    if (floor.ratio == ratio && floor.where == where) return &floor;
-  }
-  return nullptr;
-}
-
-void expect_floor(const std::vector<Floor>& floors, const std::string& ratio, const std::string& where, double value,
-                  std::optional<double> required, std::optional<bool> met) {
-  const Floor* floor = find(floors, ratio, where);
-  ASSERT_TRUE(floor) << ratio << ", " << where;
-  EXPECT_NEAR(floor->value, value, 1e-12) << ratio << ", " << where;
-  EXPECT_EQ(floor->required, required) << ratio << ", " << where;
-  if (!met) return;
-  EXPECT_EQ(floor->meets(*required), *met) << ratio << ", " << where;
 }
 
 TEST(GpuFloors, BytesAreTheVolumesCopyAndHalfTheFields) {
@@ -83,8 +70,8 @@ TEST(GpuFloors, AnAimThatIsNotReachedIsNoFailure) {
   GpuRun run = make_run("wave", 1.0, 1.0, 12);
   run.backward_ms = ms(0.5);
   const std::vector<Floor> floors = find_floors(results_of({run}));
-  EXPECT_FALSE(find(floors, "backward / resample", "wave")->meets(1));
-  EXPECT_FALSE(find(floors, "paper / resample", "wave")->meets(15));
+  EXPECT_FALSE(find_floor(floors, "backward / resample", "wave")->meets(1));
+  EXPECT_FALSE(find_floor(floors, "paper / resample", "wave")->meets(15));
   EXPECT_TRUE(all_met(floors));
 }
 
@@ -104,7 +91,7 @@ TEST(GpuFloors, LargerCellsAreHeldAgainstTheCopyAndTheLargestAgainstGascon) {
   expect_floor(floors, "new field / copy", "wave, cells of 4", 6, 6, true);
   expect_floor(floors, "new field / copy", "wave, cells of 16", 6.1, 6, false);
   expect_floor(floors, "gascon / new field", "wave, cells of 16", 0.5 / 0.61, 1, false);
-  EXPECT_FALSE(find(floors, "gascon / new field", "wave, cells of 4"));
+  EXPECT_FALSE(find_floor(floors, "gascon / new field", "wave, cells of 4"));
 }
 
 TEST(GpuFloors, TwiceTheSlicesMayCostFivePercentMoreThanTwice) {

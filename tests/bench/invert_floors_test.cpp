@@ -6,10 +6,13 @@
 #include <nlohmann/json.hpp>
 
 #include "bench/invert_report.h"
+#include "tests/support/floors.h"
 #include "tests/support/says.h"
 
 namespace tetwarp::bench {
 namespace {
+
+using test::find_floor;
 
 Summary ms(double median) { return {median, median, median, median, median, 3}; }
 
@@ -31,22 +34,9 @@ InvertResults results_of(const std::vector<InverseRun>& runs) {
   return results;
 }
 
-const Floor* find(const std::vector<Floor>& floors, const std::string& ratio, const std::string& where) {
-  for (const Floor& floor : floors) {
-    if (floor.ratio == ratio && floor.where == where) return &floor;
-  }
-  return nullptr;
-}
-
 void expect_floor(const std::vector<Floor>& floors, const std::string& ratio, const std::string& where, double value,
                   std::optional<double> required, bool met) {
-  const Floor* floor = find(floors, ratio, where);
-  ASSERT_TRUE(floor) << ratio << ", " << where;
-  EXPECT_NEAR(floor->value, value, 1e-9) << ratio << ", " << where;
-  EXPECT_EQ(floor->required, required) << ratio << ", " << where;
-  if (required) {
-    EXPECT_EQ(floor->meets(*required), met) << ratio << ", " << where;
-  }
+  test::expect_floor(floors, ratio, where, value, required, met, 1e-9);
 }
 
 TEST(InvertFloors, EachInverterIsHeldAgainstTetwarpOnItsOwnField) {
@@ -85,7 +75,7 @@ TEST(InvertFloors, AFieldThatFoldsHasNoErrorsAndItsTimeIsNotHeldAgainstAnything)
       find_floors(results_of({make_run("folds", "tetwarp", 100, NAN, NAN), make_run("folds", "ITK a", 300, NAN, NAN)}));
   expect_floor(floors, "time / tetwarp's", "folds, ITK a", 3, {}, false);
   expect_floor(floors, "written without a source", "folds", 0, 0, true);
-  EXPECT_FALSE(find(floors, "mean error / tetwarp's", "folds, ITK a"));
+  EXPECT_FALSE(find_floor(floors, "mean error / tetwarp's", "folds, ITK a"));
   EXPECT_TRUE(all_met(floors));
 }
 

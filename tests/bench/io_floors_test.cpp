@@ -6,30 +6,16 @@
 #include <nlohmann/json.hpp>
 
 #include "bench/io_report.h"
+#include "tests/support/floors.h"
 #include "tests/support/says.h"
 
 namespace tetwarp::bench {
 namespace {
 
+using test::expect_floor;
+using test::find_floor;
+
 Summary ms(double median) { return {median, median, median, median, median, 5}; }
-
-const Floor* find(const std::vector<Floor>& floors, const std::string& ratio, const std::string& where) {
-  for (const Floor& floor : floors) {
-    if (floor.ratio == ratio && floor.where == where) return &floor;
-  }
-  return nullptr;
-}
-
-void expect_floor(const std::vector<Floor>& floors, const std::string& ratio, const std::string& where, double value,
-                  std::optional<double> required, bool met) {
-  const Floor* floor = find(floors, ratio, where);
-  ASSERT_TRUE(floor) << ratio << ", " << where;
-  EXPECT_NEAR(floor->value, value, 1e-12) << ratio << ", " << where;
-  EXPECT_EQ(floor->required, required) << ratio << ", " << where;
-  if (required) {
-    EXPECT_EQ(floor->meets(*required), met) << ratio << ", " << where;
-  }
-}
 
 IoResults results_of(const std::vector<IoTime>& times) {
   IoResults results{.options = {}, .machine = {}, .size = {512, 512, 300}, .times = times};
@@ -71,7 +57,7 @@ TEST(IoFloors, WritersAreNoSlowerThanItkAndTwiceAsFastIsAnAim) {
   const std::vector<Floor> floors =
       find_floors(results_of({{"DICOM out", "tetwarp", ms(100)}, {"DICOM out", "ITK", ms(150)}}));
   expect_floor(floors, "ITK / tetwarp", "DICOM out", 1.5, 1, true);
-  EXPECT_EQ(find(floors, "ITK / tetwarp", "DICOM out")->aim, 2);
+  EXPECT_EQ(find_floor(floors, "ITK / tetwarp", "DICOM out")->aim, 2);
   EXPECT_TRUE(all_met(floors));
 }
 
