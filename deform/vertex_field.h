@@ -6,14 +6,25 @@
 
 namespace tetwarp {
 
-/// Forward deformation: a regular lattice of vertices and where each goes. A value; simulators, files and formulas
-/// return it.
+/// Explicit tetrahedra of any size, as finite element programs write them; inside each the map is affine.
+struct TetrahedralMesh {
+  std::vector<glm::dvec3> rest;          ///< LPS mm of each vertex
+  std::vector<glm::vec3> displacement;   ///< LPS mm, deformed minus rest, one a vertex; zero rests exactly
+  std::vector<glm::u32vec4> tetrahedra;  ///< vertex numbers; in either orientation
+
+  bool is_empty() const { return tetrahedra.empty(); }
+};
+
+/// Forward deformation: a regular lattice of vertices and where each goes, or a mesh. A value; simulators, files and
+/// formulas return it.
 ///
 /// Every cell of the lattice is split into five tetrahedra (core/five_tetrahedra.h); inside each the map is affine.
 struct VertexField {
-  Geometry lattice;                     ///< of the undeformed vertices; its last cells may overhang a volume
+  Geometry lattice;                     ///< of the undeformed vertices; its last cells may overhang a volume. Size 0:
+                                        ///< there is a mesh
   std::vector<glm::vec3> displacement;  ///< LPS mm, deformed minus rest, i fastest, 12 bytes each (1.9 GB at
                                         ///< 512x512x600); zero rests exactly
+  TetrahedralMesh mesh = {};            ///< in the place of a lattice
 };
 
 /// Deformation the other way round, as registration tools write it: what lies at output point p comes from p + d(p).
