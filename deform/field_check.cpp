@@ -35,7 +35,7 @@ LatticeFrame make_lattice_frame(const Geometry& output, const FieldView& field) 
   Box rest{glm::i32vec3(INT32_MAX), glm::i32vec3(INT32_MIN)};
   for (int corner = 0; corner < 8; ++corner) {
     const glm::dvec3 at = glm::dvec3(corner & 1, corner >> 1 & 1, corner >> 2);
-    require(LatticeFrame::is_usable(frame.output_from_lattice(at * glm::dvec3(frame.cells)), kLargestIndex),
+    require(is_within(frame.output_from_lattice(at * glm::dvec3(frame.cells)), kLargestIndex),
             "the field's lattice lies more than 262144 voxels from the output grid");
     rest.grow(snap(frame.output_from_lattice(at * glm::dvec3(frame.cells))));
     if (field.outside != Outside::refuse) continue;

@@ -13,6 +13,7 @@ void require_one_each(const Geometry& grid, std::size_t vectors) {
 }  // namespace
 
 FieldView view(const VertexField& field, Outside outside) {
+  if (!field.mesh.is_empty()) return {.outside = outside, .mesh = &field.mesh};
   require_one_each(field.lattice, field.displacement.size());
   return {&field.lattice, field.displacement.data(), outside, Memory::host};
 }

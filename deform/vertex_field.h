@@ -35,8 +35,8 @@ struct PullField {
                                         ///< point, as Maps::inverse_mm says it
 };
 
-/// What becomes of a voxel that lies outside the undeformed lattice (or the grid of a pull field), where no tetrahedron
-/// owns it.
+/// What becomes of a voxel that lies outside the undeformed lattice or mesh (or the grid of a pull field), where no
+/// tetrahedron owns it.
 enum class Outside : std::uint8_t {
   refuse,     ///< the field must reach over the whole output: `set_field` throws otherwise
   rest,       ///< the voxel stays where it is
@@ -48,7 +48,8 @@ struct FieldView {
   const Geometry* lattice = nullptr;
   const glm::vec3* displacement = nullptr;
   Outside outside = Outside::refuse;
-  Memory memory = Memory::host;  ///< of `displacement`; the lattice is always the host's
+  Memory memory = Memory::host;           ///< of `displacement`; the lattice is always the host's
+  const TetrahedralMesh* mesh = nullptr;  ///< in the place of lattice and displacement; in host memory
 };
 struct PullFieldView {
   const Geometry* grid = nullptr;
@@ -57,7 +58,7 @@ struct PullFieldView {
   Memory memory = Memory::host;
 };
 
-/// @throws InputError unless there is one displacement for each vertex
+/// @throws InputError unless there is one displacement for each vertex, of a lattice or of a mesh
 FieldView view(const VertexField& field, Outside outside = Outside::refuse);
 PullFieldView view(const PullField& field, Outside outside = Outside::refuse);
 /// The samples as a volume of three floats: for `Maps::inverse_mm`. @throws InputError as `view`

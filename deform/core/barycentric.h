@@ -157,23 +157,53 @@ TETWARP_HD inline glm::vec3 interpolate_u_exactly(const Tetrahedron& t, const gl
   return u;
 }
 
-/// u = undeformed minus deformed position at a voxel that the tetrahedron owns, in voxels of output index.
+/// What the voxels of a tetrahedron have in common: their u is interpolated without looking at the vertices again.
 ///
 /// Weights in float by `Cramer`, blended by `blend`: a tetrahedron that is only translated gives its translation
 /// exactly, whatever the weights' rounding.
+class TetrahedronMap {
+ public:
+  TETWARP_HD explicit TetrahedronMap(const Tetrahedron& t)
+      : TetrahedronMap(t, detail::to_voxels(t.a.deformed - t.d.deformed),
+                       detail::to_voxels(t.b.deformed - t.d.deformed), detail::to_voxels(t.c.deformed - t.d.deformed)) {
+  }
+
+  /// u = undeformed minus deformed position at a voxel that the tetrahedron owns, in voxels of output index.
+  ///
+  /// @param steps    the voxel, 2^-12 voxel
+  /// @param exactly  gives `interpolate_u_exactly`, where float has too few digits
+  template <class Exactly>
+  TETWARP_HD glm::vec3 u(const glm::i32vec3& steps, Exactly&& exactly) const {
+    if (is_thin_) return exactly();
+    const glm::vec3 r = detail::to_voxels(steps - d_);
+    const Weights w =
+        weights_of(cramer_, detail::dot(r, cramer_.bc), detail::dot(r, cramer_.ca), detail::dot(r, cramer_.ab));
+    if (!w.within_slack()) return exactly();
+    return blend(w, u_, u_a_, u_b_, u_c_);
+  }
+
+ private:
+  TETWARP_HD TetrahedronMap(const Tetrahedron& t, const glm::vec3& a, const glm::vec3& b, const glm::vec3& c)
+      : d_(t.d.deformed),
+        cramer_(a, b, c),
+        is_thin_(is_thin(cramer_, a, b, c)),
+        u_(detail::to_voxels(t.d.u)),
+        u_a_(detail::to_voxels(t.a.u - t.d.u)),
+        u_b_(detail::to_voxels(t.b.u - t.d.u)),
+        u_c_(detail::to_voxels(t.c.u - t.d.u)) {}
+
+  glm::i32vec3 d_;
+  Cramer cramer_;
+  bool is_thin_;
+  glm::vec3 u_, u_a_, u_b_, u_c_;  ///< at D, and the differences from it at A, B, C
+};
+
+/// u = undeformed minus deformed position at a voxel that the tetrahedron owns, in voxels of output index.
 ///
 /// @param steps  the voxel, 2^-12 voxel
 /// @param signs  which way it is nudged
 TETWARP_HD inline glm::vec3 interpolate_u(const Tetrahedron& t, const glm::i32vec3& steps, const glm::i32vec3& signs) {
-  const glm::vec3 a = detail::to_voxels(t.a.deformed - t.d.deformed),
-                  b = detail::to_voxels(t.b.deformed - t.d.deformed);
-  const glm::vec3 c = detail::to_voxels(t.c.deformed - t.d.deformed), r = detail::to_voxels(steps - t.d.deformed);
-  const Cramer m(a, b, c);
-  if (is_thin(m, a, b, c)) return interpolate_u_exactly(t, steps, signs);
-  const Weights w = weights_of(m, detail::dot(r, m.bc), detail::dot(r, m.ca), detail::dot(r, m.ab));
-  if (!w.within_slack()) return interpolate_u_exactly(t, steps, signs);
-  return blend(w, detail::to_voxels(t.d.u), detail::to_voxels(t.a.u - t.d.u), detail::to_voxels(t.b.u - t.d.u),
-               detail::to_voxels(t.c.u - t.d.u));
+  return TetrahedronMap(t).u(steps, [&] { return interpolate_u_exactly(t, steps, signs); });
 }
 
 }  // namespace tetwarp

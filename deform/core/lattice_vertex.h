@@ -5,10 +5,29 @@
 
 namespace tetwarp {
 
+constexpr double kFarthest = 1 << 17;  ///< voxels that a vertex may be displaced on an axis
+
+/// False for NaN.
+TETWARP_HD inline bool is_within(const glm::dvec3& index, double limit) {
+  return std::fabs(index.x) < limit && std::fabs(index.y) < limit && std::fabs(index.z) < limit;
+}
+
+/// Both ends of a vertex, snapped; u is zero exactly where the displacement is.
+/// @param rest  output index, within kLargestIndex  @return false where the displacement is not finite or too long
+TETWARP_HD inline bool snap_moved(const glm::dvec3& rest, const glm::dmat3& output_from_mm,
+                                  const glm::vec3& displacement, Vertex& vertex) {
+  const glm::i32vec3 snapped = snap(rest);
+  vertex = {snapped, glm::i32vec3(0)};
+  if (displacement.x == 0 && displacement.y == 0 && displacement.z == 0) return true;
+  const glm::dvec3 shift = output_from_mm * glm::dvec3(displacement);
+  if (!is_within(shift, kFarthest) || !is_within(rest + shift, kLargestIndex)) return false;
+  vertex.deformed = snap(rest + shift);
+  vertex.u = snapped - vertex.deformed;
+  return true;
+}
+
 /// How a lattice lies over an output grid: what turns its vertices into snapped ones.
 struct LatticeFrame {
-  static constexpr double kFarthest = 1 << 17;  ///< voxels that a vertex may be displaced on an axis
-
   AffineMap output_from_lattice, lattice_from_output;
   glm::dmat3 output_from_mm{1};
   glm::i64vec3 cells{0};
@@ -17,22 +36,11 @@ struct LatticeFrame {
   std::int64_t first_slice = 0;
   Nudge nudge;
 
-  TETWARP_HD static bool is_usable(const glm::dvec3& index, double limit) {  // false for NaN
-    return std::fabs(index.x) < limit && std::fabs(index.y) < limit && std::fabs(index.z) < limit;
-  }
-
   /// Both ends of a vertex in output index, in double, then snapped; u is zero exactly where the displacement is.
   /// @return false where the displacement is not finite or too long
   TETWARP_HD bool snap_vertex(const glm::i64vec3& at, const glm::vec3& displacement, Vertex& vertex) const {
     const glm::dvec3 rest = output_from_lattice(glm::dvec3(at.x, at.y, at.z + first_slice));
-    const glm::i32vec3 snapped = snap(rest);
-    vertex = {snapped, glm::i32vec3(0)};
-    if (displacement.x == 0 && displacement.y == 0 && displacement.z == 0) return true;
-    const glm::dvec3 shift = output_from_mm * glm::dvec3(displacement);
-    if (!is_usable(shift, kFarthest) || !is_usable(rest + shift, kLargestIndex)) return false;
-    vertex.deformed = snap(rest + shift);
-    vertex.u = snapped - vertex.deformed;
-    return true;
+    return snap_moved(rest, output_from_mm, displacement, vertex);
   }
 
   /// How far beyond the rest box of its cell an undeformed place may lie, for weights leave [0, 1] by the slack.

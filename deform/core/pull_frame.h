@@ -38,7 +38,7 @@ struct PullFrame {
 
   /// Whether a sample is missing or a vector that is finite and not too long.
   TETWARP_HD bool is_usable(const glm::vec3& mm) const {
-    if (!is_missing(mm)) return LatticeFrame::is_usable(in_voxels(mm), kLargestIndex);
+    if (!is_missing(mm)) return is_within(in_voxels(mm), kLargestIndex);
     return !std::isinf(mm.x) && !std::isinf(mm.y) && !std::isinf(mm.z);
   }
 

@@ -147,6 +147,37 @@ TETWARP_HD int make_row_faces(const glm::i32vec3& a, const glm::i32vec3& b, cons
   return lower;
 }
 
+/// How any tetrahedron crosses the rows of a tile. @param first  voxel of the tile
+/// @return false where it may have no volume: then `exact_row` must say
+///
+/// Where 64 bits are too few, faces are exact in Wide, and rounding them to double (2^-52 of each) disappears beside
+/// what `row_face` allows for rounding to float.
+TETWARP_HD inline bool make_row_faces(const Tetrahedron& t, const glm::ivec3& first, const glm::i32vec3& signs,
+                                      const glm::ivec3& size, RowFaces& rows) {
+  const auto put = [&rows](int n, const RowFace& face) { rows.faces[n] = face; };
+  const glm::i32vec3& d = t.d.deformed;
+  if (has_int64_rows(t)) {
+    rows.lower = make_row_faces(t.a.deformed - d, t.b.deformed - d, t.c.deformed - d, d - first * kStepsPerVoxel, signs,
+                                size, put);
+    return rows.lower != 0;
+  }
+  Face<Wide> faces[4];
+  if (!detail::make_faces<Wide>(t, first * kStepsPerVoxel, faces)) return false;
+  const glm::i32vec3 nudged = nudge_steps(signs);
+  rows.lower = 0;
+  int upper = 4;
+  for (const Face<Wide>& face : faces) {
+    const Wide value =
+        face.constant - face.normal[0] * nudged.x - face.normal[1] * nudged.y - face.normal[2] * nudged.z;
+    const auto in_float = [](Wide x) { return static_cast<float>(to_double(x)); };
+    const float constant = in_float(value) * (1.0f / kNudgeSteps), x = in_float(face.normal[0]);
+    put(x <= 0 ? rows.lower++ : --upper,
+        detail::row_face(x, in_float(face.normal[1]), in_float(face.normal[2]), constant,
+                         0x1p-50f * detail::magnitude(constant), glm::vec3(size)));
+  }
+  return true;
+}
+
 /// The rows of a tile with the same y.
 class RowsAlongZ {
  public:

@@ -7,8 +7,10 @@
 #include "deform/cpu/lattice_index.h"
 #include "deform/cpu/map_writer.h"
 #include "deform/cpu/march.h"
+#include "deform/cpu/mesh_resampler.h"
 #include "deform/cpu/sampler.h"
 #include "deform/cpu/tiles.h"
+#include "deform/lattice_or_mesh.h"
 #include "deform/target_check.h"
 
 namespace tetwarp {
@@ -38,9 +40,9 @@ struct Tile {
 
 /// Tile by tile: finds for each voxel where it comes from, then samples its rows. Voxels at rest are copied; lattices
 /// at whole steps take the march, others, and what the march leaves, are claimed.
-class ForwardResampler final : public Resampler {
+class LatticeResampler final : public Resampler {
  public:
-  ForwardResampler(Geometry output, const Limits& limits) : Resampler(output), arena_(make_arena(limits)) {}
+  LatticeResampler(Geometry output, const Limits& limits) : Resampler(output), arena_(make_arena(limits)) {}
 
   void set_field(const FieldView& field, const Control& control) override {
     ready_ = false;
@@ -315,7 +317,9 @@ class ForwardResampler final : public Resampler {
 }  // namespace cpu
 
 std::unique_ptr<Resampler> make_cpu_resampler(Geometry output, Limits limits) {
-  return std::make_unique<cpu::ForwardResampler>(output, limits);
+  return std::make_unique<LatticeOrMesh>(
+      output, [=] { return std::make_unique<cpu::LatticeResampler>(output, limits); },
+      [=] { return cpu::make_mesh_resampler(output, limits); });
 }
 
 }  // namespace tetwarp

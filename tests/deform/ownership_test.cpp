@@ -4,11 +4,9 @@
 #include <glm/common.hpp>
 #include <glm/matrix.hpp>
 
+#include "tests/support/against_oracle.h"
 #include "tests/support/backends.h"
 #include "tests/support/fields.h"
-#include "tests/support/oracle.h"
-#include "tests/support/reference_sample.h"
-#include "tests/support/run.h"
 
 namespace tetwarp {
 namespace {
@@ -16,66 +14,6 @@ namespace {
 using namespace test;
 
 TETWARP_BACKEND_SUITE(Ownership);
-
-/// A source whose linear interpolation is smooth: rounding of coordinates shows as a small error.
-Volume<float> smooth_source(const Geometry& geometry) {
-  Volume<float> source{geometry, {}};
-  for_each_voxel(geometry, [&](const glm::i64vec3& voxel, std::size_t) {
-    const glm::dvec3 x(voxel);
-    source.voxels.push_back(static_cast<float>(100 * std::sin(x.x) + 30 * x.y - 20 * x.z));
-  });
-  return source;
-}
-
-/// How far u, in voxels, may be from the exact one: float arithmetic with the owner's edges.
-double u_tolerance(const Undeformed& exact) { return 1e-7 * (exact.reach * exact.condition + 16); }
-
-double distance(const glm::dvec3& u, const glm::dvec3& v) {
-  const glm::dvec3 d = glm::abs(u - v);
-  return std::max({d.x, d.y, d.z});
-}
-
-/// Owners, inverse, Jacobian, coverage and value of every voxel against the oracle.
-void expect_like_oracle(const Outcome<float>& found, const Volume<float>& source, const Oracle& oracle) {
-  const Geometry& grid = found.output.geometry;
-  const glm::dmat3 index_from_mm = index_from_point(grid).linear;
-  std::uint64_t covered = 0;
-  int failures = 0;
-  for_each_voxel(grid, [&](const glm::i64vec3& voxel, std::size_t n) {
-    if (failures > 3) return;
-    SCOPED_TRACE("voxel " + to_string(voxel));
-    const Owners& owners = oracle.owners(voxel);
-    EXPECT_EQ(found.owners.voxels[n], owners.count);
-    covered += found.coverage.voxels[n];
-    if (owners.count == 0) {
-      EXPECT_TRUE(std::isnan(found.inverse_mm.voxels[n].x) && std::isnan(found.jacobian.voxels[n]));
-      EXPECT_EQ(found.coverage.voxels[n], 0);
-      EXPECT_EQ(found.output.voxels[n], -7);
-    } else if (found.owners.voxels[n] > 0) {
-      const Undeformed exact = oracle.undeformed(voxel);
-      const glm::dvec3 u = index_from_mm * glm::dvec3(found.inverse_mm.voxels[n]);
-      const double tolerance = u_tolerance(exact);
-      EXPECT_LE(std::min(distance(u, exact.u), distance(u, exact.alternative)), tolerance)
-          << "u " << u.x << " " << u.y << " " << u.z << ", exact " << exact.u.x << " " << exact.u.y << " " << exact.u.z
-          << ", condition " << exact.condition;
-      EXPECT_NEAR(found.jacobian.voxels[n], exact.jacobian, 1e-6 * std::abs(exact.jacobian));
-      const ReferenceSample sample = reference_sample(source, glm::dvec3(voxel) + u, Interpolation::linear);
-      if (sample.jump > 1e-3) {
-        EXPECT_EQ(found.coverage.voxels[n], sample.inside);
-        EXPECT_NEAR(found.output.voxels[n], sample.inside ? sample.value : -7, 1e-2);
-      }
-    }
-    failures += testing::Test::HasFailure();
-  });
-  EXPECT_EQ(found.report.covered, covered);
-  EXPECT_EQ(found.report.covered + found.report.uncovered, found.output.voxels.size());
-  EXPECT_EQ(found.report.inverted, oracle.inverted);
-  EXPECT_EQ(found.report.degenerate, oracle.degenerate);
-  EXPECT_EQ(found.report.multiply_owned, oracle.multiply_owned);
-  const double rounding = 1e-5 * (1 + std::max(std::abs(oracle.jacobian_min), std::abs(oracle.jacobian_max)));
-  EXPECT_NEAR(found.report.jacobian_min, oracle.jacobian_min, rounding);
-  EXPECT_NEAR(found.report.jacobian_max, oracle.jacobian_max, rounding);
-}
 
 /// Without the oracle: one owner inside the image of the lattice's box, none outside, at most one on its border.
 void expect_one_owner_inside(const Outcome<float>& found, const FieldCase& test) {

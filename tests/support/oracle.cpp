@@ -117,8 +117,14 @@ Oracle::Oracle(const Geometry& output, const VertexField& field, const Region& r
       jacobian_max(-std::numeric_limits<double>::infinity()),
       region_(region),
       owners_(static_cast<std::size_t>(voxel_count(region))) {
-  take_vertices(output, field);
-  const std::uint64_t tetrahedra = 5 * static_cast<std::uint64_t>(cells_.x * cells_.y * cells_.z);
+  const bool has_mesh = !field.mesh.is_empty();
+  if (has_mesh) {
+    take_mesh(output, field.mesh);
+  } else {
+    take_vertices(output, field);
+  }
+  const std::uint64_t tetrahedra =
+      has_mesh ? tetrahedra_.size() : 5 * static_cast<std::uint64_t>(cells_.x * cells_.y * cells_.z);
   for (std::uint64_t number = 0; number < tetrahedra; ++number) visit(number);
   for (const Owners& voxel : owners_) multiply_owned += voxel.count > 1;
 }
@@ -146,7 +152,28 @@ void Oracle::take_vertices(const Geometry& output, const VertexField& field) {
   middle_doubled_ = low + high;
 }
 
+void Oracle::take_mesh(const Geometry& output, const TetrahedralMesh& mesh) {
+  const AffineMap index = index_from_point(output);
+  for (std::size_t n = 0; n < mesh.rest.size(); ++n) {
+    const glm::dvec3 rest = index(mesh.rest[n]), moved = index.linear * glm::dvec3(mesh.displacement[n]);
+    vertex_.push_back({snapped(rest), snapped(rest + moved)});
+  }
+  tetrahedra_ = mesh.tetrahedra;
+  glm::i64vec3 low(INT64_MAX), high(INT64_MIN);
+  for (const glm::u32vec4& tetrahedron : tetrahedra_) {
+    for (int corner = 0; corner < 4; ++corner) {
+      low = glm::min(low, vertex_[tetrahedron[corner]].rest);
+      high = glm::max(high, vertex_[tetrahedron[corner]].rest);
+    }
+  }
+  middle_doubled_ = low + high;
+}
+
 void Oracle::corners(std::uint64_t tetrahedron, Vertex (&result)[4]) const {
+  if (!tetrahedra_.empty()) {
+    for (int corner = 0; corner < 4; ++corner) result[corner] = vertex_[tetrahedra_[tetrahedron][corner]];
+    return;
+  }
   const auto cell = static_cast<std::int64_t>(tetrahedron / 5);
   const int number = static_cast<int>(tetrahedron % 5);
   const glm::i64vec3 first(cell % cells_.x, cell / cells_.x % cells_.y, cell / (cells_.x * cells_.y));
@@ -187,8 +214,10 @@ void Oracle::visit(std::uint64_t tetrahedron) {
   degenerate += orientation == 0;
   const auto jacobian =
       static_cast<double>(static_cast<long double>(cramer.determinant) / static_cast<long double>(rest_determinant));
-  jacobian_min = std::min(jacobian_min, jacobian);
-  jacobian_max = std::max(jacobian_max, jacobian);
+  if (rest_determinant != 0) {
+    jacobian_min = std::min(jacobian_min, jacobian);
+    jacobian_max = std::max(jacobian_max, jacobian);
+  }
 
   glm::i64vec3 low = deformed[0], high = deformed[0];
   for (const glm::i64vec3& point : deformed) {

@@ -49,12 +49,14 @@ class Oracle {
   };
 
   void take_vertices(const Geometry& output, const VertexField& field);
+  void take_mesh(const Geometry& output, const TetrahedralMesh& mesh);
   void visit(std::uint64_t tetrahedron);
   void corners(std::uint64_t tetrahedron, Vertex (&result)[4]) const;
   glm::i64vec3 signs(const glm::i64vec3& voxel) const;
   std::size_t offset(const glm::i64vec3& voxel) const;
 
   glm::i64vec3 vertices_{0}, cells_{0};
+  std::vector<glm::u32vec4> tetrahedra_;  ///< of a mesh
   std::vector<Vertex> vertex_;
   glm::i64vec3 middle_doubled_{0};  ///< of the undeformed lattice's box, 2^-17 voxel
   Region region_;

@@ -1,0 +1,119 @@
+#include "deform/cpu/mesh_raster.h"
+
+#include <algorithm>
+#include <glm/common.hpp>
+
+#include "deform/core/row_interval.h"
+#include "deform/cpu/tiles.h"
+
+namespace tetwarp::cpu {
+
+namespace {
+
+constexpr std::int64_t kBin = kMostRowTile;  ///< voxels of a bin along an axis
+constexpr std::size_t kAtOnce = 1 << 16;     ///< tetrahedra between two looks at a request to stop
+
+/// Gives the voxels of a run to a tetrahedron that comes after all others.
+void give(std::uint32_t number, std::size_t first, int count, bool wants_count, MeshOwners& owners) {
+  std::uint32_t* owner = owners.owner.data() + first;
+  for (int n = 0; n < count; ++n) owner[n] = std::min(owner[n], number);
+  if (!wants_count) return;
+  std::uint16_t* several = owners.count.data() + first;
+  for (int n = 0; n < count; ++n) several[n] = static_cast<std::uint16_t>(several[n] + (several[n] < UINT16_MAX));
+}
+
+}  // namespace
+
+Region MeshRaster::bin(const glm::i64vec3& at) const {
+  const glm::i64vec3 begin = origin_ + at * kBin;
+  return {glm::max(begin, glm::i64vec3(0)), glm::min(begin + kBin, size_)};
+}
+
+/// Calls `visit(number)` for the bins that a tetrahedron may reach.
+template <class Visit>
+void MeshRaster::for_each_bin(const Box& box, const TetrahedronPlanes& planes, Visit&& visit) const {
+  const VoxelBox voxels = detail::candidates(mesh_->nudge, box, {glm::i64vec3(0), size_});
+  if (detail::is_empty(voxels)) return;
+  const glm::i64vec3 begin = (voxels.begin - origin_) / kBin, end = (voxels.end - std::int64_t{1} - origin_) / kBin;
+  for (std::int64_t z = begin.z; z <= end.z; ++z) {
+    for (std::int64_t y = begin.y; y <= end.y; ++y) {
+      for (std::int64_t x = begin.x; x <= end.x; ++x) {
+        const Region in = intersection(bin({x, y, z}), {voxels.begin, voxels.end});
+        if (begin == end || planes.may_reach({in.begin, in.end}))
+          visit(static_cast<std::size_t>((z * bins_.y + y) * bins_.x + x));
+      }
+    }
+  }
+}
+
+void MeshRaster::build(const SnappedMesh& mesh, const Geometry& output, const Control& control) {
+  mesh_ = &mesh;
+  size_ = output.size;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::int64_t turn = mesh.nudge.first_down(axis);
+    origin_[axis] = turn > 0 && turn < size_[axis] ? turn - (turn + kBin - 1) / kBin * kBin : 0;
+    bins_[axis] = (size_[axis] - origin_[axis] + kBin - 1) / kBin;
+  }
+  first_.assign(static_cast<std::size_t>(bins_.x * bins_.y * bins_.z) + 1, 0);
+  const auto for_each_pair = [&](auto&& visit) {
+    for (std::size_t n = 0; n < mesh.tetrahedra.size(); ++n) {
+      if (n % kAtOnce == 0 && control.stop.stop_requested()) throw Cancelled();
+      const Tetrahedron t = mesh.tetrahedron(n);
+      for_each_bin(box_of(t), TetrahedronPlanes(t), [&](std::size_t number) { visit(number, n); });
+    }
+  };
+  for_each_pair([&](std::size_t number, std::size_t) { ++first_[number + 1]; });
+  for (std::size_t number = 1; number < first_.size(); ++number) first_[number] += first_[number - 1];
+  numbers_.resize(first_.back());
+  std::vector<std::size_t> next(first_.begin(), first_.end() - 1);
+  for_each_pair([&](std::size_t number, std::size_t n) { numbers_[next[number]++] = static_cast<std::uint32_t>(n); });
+}
+
+void MeshRaster::find(const Region& box, bool wants_count, MeshOwners& owners) const {
+  const auto voxels = static_cast<std::size_t>(voxel_count(box));
+  owners.owner.assign(voxels, MeshOwners::kNobody);
+  if (wants_count) owners.count.assign(voxels, 0);
+  const glm::i64vec3 begin = (box.begin - origin_) / kBin, end = (box.end - std::int64_t{1} - origin_) / kBin;
+  for (std::int64_t z = begin.z; z <= end.z; ++z) {
+    for (std::int64_t y = begin.y; y <= end.y; ++y) {
+      for (std::int64_t x = begin.x; x <= end.x; ++x) {
+        const auto number = static_cast<std::size_t>((z * bins_.y + y) * bins_.x + x);
+        find_in_bin(number, intersection(bin({x, y, z}), box), box, wants_count, owners);
+      }
+    }
+  }
+}
+
+/// @param part  of the box, within the bin
+void MeshRaster::find_in_bin(std::size_t number, const Region& part, const Region& box, bool wants_count,
+                             MeshOwners& owners) const {
+  const glm::i32vec3 signs = mesh_->nudge.signs(part.begin);
+  const glm::ivec3 first(part.begin), size(part.end - part.begin);
+  const glm::i64vec3 box_size = box.end - box.begin;
+  const auto offset = [&](int y, int z) {
+    const glm::i64vec3 at = part.begin + glm::i64vec3(0, y, z) - box.begin;
+    return static_cast<std::size_t>((at.z * box_size.y + at.y) * box_size.x + at.x);
+  };
+  for (std::size_t place = first_[number]; place < first_[number + 1]; ++place) {
+    const Tetrahedron t = mesh_->tetrahedron(numbers_[place]);
+    const VoxelBox reached = detail::candidates(mesh_->nudge, box_of(t), {part.begin, part.end});
+    if (detail::is_empty(reached)) continue;
+    const glm::ivec3 begin = glm::ivec3(reached.begin) - first, end = glm::ivec3(reached.end) - first;
+    RowFaces faces{};
+    const bool has_faces = make_row_faces(t, first, signs, size, faces);
+    for (int y = begin.y; y < end.y; ++y) {
+      const RowsAlongZ rows(faces, y);
+      for (int z = begin.z; z < end.z; ++z) {
+        bool is_certain = false;
+        RowInterval in{0, 0};
+        if (has_faces) in = rows.interval(z, size.x, is_certain);
+        if (!is_certain) in = exact_row(t, first, signs, y, z, size.x);
+        if (in.is_empty()) continue;
+        give(numbers_[place], offset(y, z) + static_cast<std::size_t>(in.begin), in.end - in.begin, wants_count,
+             owners);
+      }
+    }
+  }
+}
+
+}  // namespace tetwarp::cpu

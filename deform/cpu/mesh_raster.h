@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "deform/snapped_mesh.h"
+
+namespace tetwarp::cpu {
+
+/// Who owns the voxels of a box.
+struct MeshOwners {
+  static constexpr std::uint32_t kNobody = UINT32_MAX;
+
+  std::vector<std::uint32_t> owner;  ///< number of the lowest tetrahedron that owns it, or kNobody; i fastest
+  std::vector<std::uint16_t> count;  ///< how many there are, where wanted; saturates
+};
+
+/// Rasterises a mesh: its tetrahedra are listed by bins of voxels, and in a bin each owns an interval of every row
+/// (deform/core/row_interval.h).
+class MeshRaster {
+ public:
+  /// Lists the tetrahedra. @param mesh  must stay as it is  @throws Cancelled
+  void build(const SnappedMesh& mesh, const Geometry& output, const Control& control);
+
+  /// Part of the output, up to 32 voxels an axis.
+  void find(const Region& box, bool wants_count, MeshOwners& owners) const;
+
+ private:
+  Region bin(const glm::i64vec3& at) const;
+  template <class Visit>
+  void for_each_bin(const Box& box, const TetrahedronPlanes& planes, Visit&& visit) const;
+  void find_in_bin(std::size_t number, const Region& part, const Region& box, bool wants_count,
+                   MeshOwners& owners) const;
+
+  const SnappedMesh* mesh_ = nullptr;
+  glm::i64vec3 size_{0};              ///< of the output
+  glm::i64vec3 origin_{0}, bins_{0};  ///< first voxel of the first bin, and how many bins; the nudge turns between bins
+  std::vector<std::size_t> first_;    ///< of each bin, i fastest, and of one more: where its tetrahedra are listed
+  std::vector<std::uint32_t> numbers_;  ///< of the tetrahedra of each bin, rising
+};
+
+}  // namespace tetwarp::cpu

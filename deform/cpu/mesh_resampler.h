@@ -1,0 +1,12 @@
+#pragma once
+
+#include <memory>
+
+#include "deform/resampler.h"
+
+namespace tetwarp::cpu {
+
+/// Takes forward fields that are meshes. @throws InputError as `make_cpu_resampler`
+std::unique_ptr<Resampler> make_mesh_resampler(const Geometry& output, const Limits& limits);
+
+}  // namespace tetwarp::cpu

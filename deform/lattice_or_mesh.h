@@ -1,0 +1,48 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "deform/resampler.h"
+
+namespace tetwarp {
+
+/// What a backend's factory gives: takes lattices and meshes, and has a resampler for each kind. Of these it keeps one
+/// at a time, so that their buffers do not add up.
+class LatticeOrMesh final : public Resampler {
+ public:
+  using Make = std::function<std::unique_ptr<Resampler>()>;
+
+  /// @param lattice, mesh  make the resampler of that kind; whatever the first throws, this throws
+  LatticeOrMesh(const Geometry& output, Make lattice, Make mesh)
+      : Resampler(output), make_lattice_(std::move(lattice)), make_mesh_(std::move(mesh)), current_(make_lattice_()) {}
+
+  using Resampler::set_field;
+  void set_field(const FieldView& field, const Control& control) override {
+    const bool is_mesh = field.mesh != nullptr;
+    if (is_mesh != holds_mesh_ || !current_) {
+      current_.reset();
+      current_ = is_mesh ? make_mesh_() : make_lattice_();
+      holds_mesh_ = is_mesh;
+    }
+    current_->set_field(field, control);
+  }
+  Region source_region(const Geometry& source, Region region) const override {
+    return held().source_region(source, region);
+  }
+  Report resample(Region region, std::span<const Target> targets, const Maps& maps, const Control& control) override {
+    return held().resample(region, targets, maps, control);
+  }
+
+ private:
+  Resampler& held() const {
+    require(current_ != nullptr, "a resampler needs a field: call set_field first");
+    return *current_;
+  }
+
+  Make make_lattice_, make_mesh_;
+  std::unique_ptr<Resampler> current_;
+  bool holds_mesh_ = false;
+};
+
+}  // namespace tetwarp

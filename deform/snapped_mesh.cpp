@@ -1,0 +1,144 @@
+#include "deform/snapped_mesh.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
+
+#include <algorithm>
+#include <glm/common.hpp>
+#include <string>
+
+#include "deform/core/lattice_vertex.h"
+
+namespace tetwarp {
+
+namespace {
+
+constexpr std::size_t kGrain = 4096;
+
+void check_arrays(const TetrahedralMesh& mesh) {
+  require(!mesh.tetrahedra.empty(), "the mesh has no tetrahedra");
+  require(mesh.rest.size() == mesh.displacement.size(),
+          "the mesh has " + std::to_string(mesh.rest.size()) + " vertices and " +
+              std::to_string(mesh.displacement.size()) + " displacements; expected one for each vertex");
+  require(mesh.tetrahedra.size() < UINT32_MAX,
+          "the mesh has " + std::to_string(mesh.tetrahedra.size()) + " tetrahedra; expected fewer than 4294967295");
+  for (std::size_t n = 0; n < mesh.tetrahedra.size(); ++n) {
+    const glm::u32vec4& t = mesh.tetrahedra[n];
+    const std::uint32_t largest = std::max({t.x, t.y, t.z, t.w});
+    require(largest < mesh.rest.size(), "tetrahedron " + std::to_string(n) + " of the mesh has vertex " +
+                                            std::to_string(largest) + " of " + std::to_string(mesh.rest.size()) +
+                                            ", counted from 0");
+  }
+}
+
+[[noreturn]] void refuse(const TetrahedralMesh& mesh, std::size_t vertex) {
+  const glm::dvec3& at = mesh.rest[vertex];
+  const glm::vec3& by = mesh.displacement[vertex];
+  const auto text = [](const auto& v) {
+    return "(" + std::to_string(v.x) + ", " + std::to_string(v.y) + ", " + std::to_string(v.z) + ")";
+  };
+  throw InputError("vertex " + std::to_string(vertex) + " of the mesh, counted from 0, at " + text(at) +
+                   " mm and displaced by " + text(by) +
+                   " mm, is not finite, lies more than 262144 voxels from the grid, or is moved by more than 131072; "
+                   "are its units and frame right?");
+}
+
+/// What some tetrahedra have in common.
+struct Findings {
+  std::uint64_t inverted = 0, degenerate = 0;
+  double least = std::numeric_limits<double>::infinity(), most = -least;
+  glm::i64vec3 low{INT64_MAX}, high{INT64_MIN};  ///< of undeformed corners
+
+  void look_at(const Tetrahedron& t) {
+    for (const Vertex* v : {&t.a, &t.b, &t.c, &t.d}) {
+      const glm::i64vec3 rest(v->deformed + v->u);
+      low = glm::min(low, rest);
+      high = glm::max(high, rest);
+    }
+    const double determinant = jacobian(t);
+    if (!std::isfinite(determinant) || determinant == 0) ++degenerate;
+    if (!std::isfinite(determinant)) return;  // undeformed, it has no volume
+    inverted += determinant < 0;
+    least = std::min(least, determinant);
+    most = std::max(most, determinant);
+  }
+  Findings operator+(const Findings& other) const {
+    return {inverted + other.inverted,  degenerate + other.degenerate, std::min(least, other.least),
+            std::max(most, other.most), glm::min(low, other.low),      glm::max(high, other.high)};
+  }
+};
+
+}  // namespace
+
+SnappedMesh snap_mesh(const Geometry& output, const TetrahedralMesh& mesh, const Control& control) {
+  check_arrays(mesh);
+  const AffineMap output_from_point = index_from_point(output);
+  SnappedMesh snapped;
+  snapped.vertices.resize(mesh.rest.size());
+  snapped.tetrahedra = mesh.tetrahedra;
+  const auto snap_one = [&](std::size_t n) {
+    const glm::dvec3 rest = output_from_point(mesh.rest[n]);
+    if (!is_within(rest, kLargestIndex)) return false;
+    return snap_moved(rest, output_from_point.linear, mesh.displacement[n], snapped.vertices[n]);
+  };
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.rest.size(), kGrain), [&](const auto& range) {
+    if (control.stop.stop_requested()) throw Cancelled();
+    for (std::size_t n = range.begin(); n < range.end(); ++n) {
+      if (!snap_one(n)) snapped.vertices[n].u.x = INT32_MIN;  // no u that is usable
+    }
+  });
+  for (std::size_t n = 0; n < mesh.rest.size(); ++n) {
+    if (snapped.vertices[n].u.x == INT32_MIN) refuse(mesh, n);
+  }
+  const Findings found = tbb::parallel_reduce(
+      tbb::blocked_range<std::size_t>(0, mesh.tetrahedra.size(), kGrain), Findings{},
+      [&](const auto& range, Findings findings) {
+        if (control.stop.stop_requested()) throw Cancelled();
+        for (std::size_t n = range.begin(); n < range.end(); ++n) findings.look_at(snapped.tetrahedron(n));
+        return findings;
+      },
+      [](const Findings& a, const Findings& b) { return a + b; });
+  snapped.nudge.low_plus_high = found.low + found.high;
+  snapped.inverted = found.inverted;
+  snapped.degenerate = found.degenerate;
+  snapped.jacobian_min = found.least;
+  snapped.jacobian_max = found.most;
+  return snapped;
+}
+
+SnappedMesh undeformed(const SnappedMesh& mesh) {
+  SnappedMesh rest = mesh;
+  for (Vertex& vertex : rest.vertices) vertex = {vertex.deformed + vertex.u, glm::i32vec3(0)};
+  return rest;
+}
+
+void refuse_mesh_reach(const Geometry& output, std::int64_t voxels, std::int64_t lowest) {
+  throw InputError("the mesh does not reach over the whole grid of the volume: " + std::to_string(voxels) + " of " +
+                   std::to_string(voxel_count(output)) + " voxels lie outside it, the first at (" +
+                   std::to_string(lowest % output.size.x) + ", " +
+                   std::to_string(lowest / output.size.x % output.size.y) + ", " +
+                   std::to_string(lowest / (output.size.x * output.size.y)) +
+                   "); choose rest or background for what lies outside it");
+}
+
+UndeformedBox undeformed_box(const SnappedMesh& mesh, const Region& region) {
+  constexpr double kVoxelsPerStepExactly = 1.0 / kStepsPerVoxel;
+  UndeformedBox box;
+  for (std::size_t n = 0; n < mesh.tetrahedra.size(); ++n) {
+    const Tetrahedron t = mesh.tetrahedron(n);
+    if (detail::is_empty(detail::candidates(mesh.nudge, box_of(t), {region.begin, region.end}))) continue;
+    glm::dvec3 low(std::numeric_limits<double>::infinity()), high(-low);
+    for (const Vertex* v : {&t.a, &t.b, &t.c, &t.d}) {
+      const glm::dvec3 rest = glm::dvec3(v->deformed + v->u) * kVoxelsPerStepExactly;
+      low = glm::min(low, rest);
+      high = glm::max(high, rest);
+    }
+    const glm::dvec3 beyond = 4 * kWeightSlack * (high - low);  // weights leave [0, 1] by the slack
+    box.low = glm::min(box.low, low - beyond);
+    box.high = glm::max(box.high, high + beyond);
+  }
+  return box;
+}
+
+}  // namespace tetwarp
