@@ -7,9 +7,11 @@
 
 #include "cuda/gather.h"
 #include "cuda/lattice_part.h"
+#include "cuda/mesh_resampler.h"
 #include "cuda/pointer_check.h"
 #include "deform/core/visit_cell.h"
 #include "deform/field_check.h"
+#include "deform/lattice_or_mesh.h"
 #include "deform/target_check.h"
 
 namespace tetwarp {
@@ -73,7 +75,7 @@ __global__ void reach_kernel(DeviceField field, unsigned blocks_per_slice, Slice
   atomicMax(&reach[slice].high, high);
 }
 
-class ForwardResampler final : public CudaResampler {
+class LatticeResampler final : public CudaResampler {
  public:
   using CudaResampler::CudaResampler;
   using Resampler::set_field;
@@ -332,7 +334,9 @@ class ForwardResampler final : public CudaResampler {
 }  // namespace cuda_detail
 
 std::unique_ptr<Resampler> make_cuda_resampler(Geometry output, int device, Limits limits) {
-  return std::make_unique<cuda_detail::ForwardResampler>(output, device, limits);
+  return std::make_unique<LatticeOrMesh>(
+      output, [=] { return std::make_unique<cuda_detail::LatticeResampler>(output, device, limits); },
+      [=] { return cuda_detail::make_mesh_resampler(output, device, limits); });
 }
 
 }  // namespace tetwarp

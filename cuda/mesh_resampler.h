@@ -1,0 +1,12 @@
+#pragma once
+
+#include <memory>
+
+#include "deform/resampler.h"
+
+namespace tetwarp::cuda_detail {
+
+/// Takes forward fields that are meshes. @throws InputError, DeviceError as `make_cuda_resampler`
+std::unique_ptr<Resampler> make_mesh_resampler(const Geometry& output, int device, const Limits& limits);
+
+}  // namespace tetwarp::cuda_detail
