@@ -7,6 +7,7 @@
 #include "io/dicom_dose.h"
 #include "io/field_file.h"
 #include "io/image_file.h"
+#include "io/mesh_file.h"
 #include "io/transform_file.h"
 
 namespace tetwarp::apps {
@@ -50,6 +51,32 @@ json describe_field(const FieldSource& source) {
   const glm::i64vec3& size = header.grid.size;
   document["lattice"] = header.has_own_grid ? to_json(header.grid) : json{{"size", {size.x, size.y, size.z}}};
   return document;
+}
+
+json describe_mesh(const FieldSource& source) {
+  const MeshFileHeader header = read_mesh_header(source);
+  json cells = json::object();
+  for (std::size_t n = 0; n < kCellShapes.size(); ++n) {
+    if (header.cells[n] > 0) cells[to_string(kCellShapes[n])] = header.cells[n];
+  }
+  const bool known = header.largest_mm.has_value();
+  return {{"path", source.path.string()},
+          {"kind", "mesh"},
+          {"format", header.format},
+          {"vertices", header.vertices},
+          {"tetrahedra", header.tetrahedra},
+          {"cells", cells},
+          {"arrays", header.arrays},
+          {"displacement", known ? json(header.displacement) : json()},
+          {"largest_displacement_mm", known ? json(*header.largest_mm) : json()},
+          {"direction", to_string(FieldDirection::forward)},
+          {"frame", header.frame},
+          {"units", header.units},
+          {"known",
+           {{"direction", to_string(FieldBasis::by_format)},
+            {"frame", to_string(header.frame_basis)},
+            {"units", to_string(header.units_basis)}}},
+          {"notes", header.notes}};
 }
 
 json describe_transform(const std::filesystem::path& path) {
@@ -133,9 +160,34 @@ void print_field(const json& document) {
   std::printf("  place        that of the volume\n");
 }
 
+void print_mesh(const json& document) {
+  const auto text = [](const json& value) { return value.get<std::string>(); };
+  const json& known = document["known"];
+  std::string cells, arrays;
+  for (const auto& [shape, count] : document["cells"].items())
+    cells += (cells.empty() ? "" : ", ") + shape + " " + count.dump();
+  for (const json& name : document["arrays"]) arrays += (arrays.empty() ? "" : ", ") + name.dump();
+  std::printf("  format       %s\n", text(document["format"]).c_str());
+  std::printf("  vertices     %s\n", document["vertices"].dump().c_str());
+  std::printf("  tetrahedra   %s, of cells: %s\n", document["tetrahedra"].dump().c_str(), cells.c_str());
+  std::printf("  direction    %s (%s)\n", text(document["direction"]).c_str(), text(known["direction"]).c_str());
+  std::printf("  positions    frame %s (%s), %s (%s)\n", text(document["frame"]).c_str(), text(known["frame"]).c_str(),
+              text(document["units"]).c_str(), text(known["units"]).c_str());
+  std::printf("  vectors      %s\n", arrays.empty() ? "none at the vertices" : arrays.c_str());
+  if (document["displacement"].is_null()) {
+    std::printf("  displacement undecided; give displacement=NAME, step=N or deformed=FILE behind the name\n");
+  } else {
+    std::printf("  displacement %s, at most %.6g mm\n", document["displacement"].dump().c_str(),
+                document["largest_displacement_mm"].get<double>());
+  }
+  print_lines("notes:", document["notes"]);
+}
+
 void print_file(const json& document) {
   std::printf("%s: %s\n", document["path"].get<std::string>().c_str(), document["kind"].get<std::string>().c_str());
-  if (document["kind"] == "transform") {
+  if (document["kind"] == "mesh") {
+    print_mesh(document);
+  } else if (document["kind"] == "transform") {
     std::printf("  written by   %s\n", document["tool"].get<std::string>().c_str());
     for (const json& name : document["classes"]) std::printf("  class        %s\n", name.get<std::string>().c_str());
     std::printf("  parameters   %s\n", document["parameters"].dump().c_str());
@@ -154,17 +206,28 @@ void print_file(const json& document) {
   }
 }
 
+/// @throws UsageError for options that a mesh has not
+void check_options(const FieldSource& mesh) {
+  try {
+    check_mesh_options(mesh);
+  } catch (const InputError& error) {
+    throw UsageError(error.what());
+  }
+}
+
 }  // namespace
 
 int run_info(const InfoOptions& options) {
   const FieldSource source = field_source(options.input.path.string());
-  const bool field = is_field_file(source.path);
+  const bool field = is_field_file(source.path), mesh = !field && is_mesh_file(source.path);
+  if (mesh) check_options(source);
   const std::filesystem::path& path = field ? source.path : options.input.path;
-  const bool transform = !field && has_transform_suffix(path) && !std::filesystem::is_directory(path);
-  const bool other = field || transform || has_image_suffix(path), dose = !other && is_dicom_dose(path),
+  const bool transform = !field && !mesh && has_transform_suffix(path) && !std::filesystem::is_directory(path);
+  const bool other = field || mesh || transform || has_image_suffix(path), dose = !other && is_dicom_dose(path),
              dicom = !other && !dose;
   const json document = [&] {
     Stage stage(options.common, "scan");
+    if (mesh) return describe_mesh(source);
     if (transform) return describe_transform(path);
     if (dose) return describe_dose(path);
     if (dicom) return describe_dicom(options.input, stage.control());

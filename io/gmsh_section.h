@@ -1,0 +1,73 @@
+#pragma once
+
+// Private to io/: the sections of a Gmsh file and the numbers in them.
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace tetwarp {
+
+/// How a Gmsh file writes numbers, by its $MeshFormat.
+struct GmshForm {
+  double version = 0;
+  bool binary = false, swapped = false;  ///< of the other byte order
+  std::size_t size_bytes = 8;            ///< of a size_t, in binary
+  bool tags_are_sizes = false;           ///< not ints: in MSH 4.1
+};
+
+/// $NAME to $EndNAME; the bytes between them.
+struct GmshSection {
+  std::string name;
+  std::size_t begin = 0, end = 0;
+};
+
+/// All sections of a file in order, the first is MeshFormat. @throws InputError where one does not end
+std::vector<GmshSection> gmsh_sections(std::string_view bytes, const std::string& file);
+
+/// Takes the numbers of a section one by one. Every function throws InputError naming file and byte where the section
+/// ends too early or has something else.
+class GmshNumbers {
+ public:
+  GmshNumbers(std::string_view bytes, const GmshSection& section, GmshForm form, std::string file)
+      : bytes_(bytes.substr(0, section.end)),
+        name_(section.name),
+        file_(std::move(file)),
+        form_(form),
+        at_(section.begin) {}
+
+  std::int64_t integer();               ///< an int: 4 bytes in binary
+  std::uint64_t size();                 ///< a size_t
+  double real();                        ///< a double; may be NaN or infinite
+  std::uint64_t tag();                  ///< of a node or an element: a size_t or an int
+  std::string line();                   ///< the rest of the line
+  std::int64_t text_integer();          ///< written as text in a binary file, too
+  void skip_tags(std::uint64_t count);  ///< of numbers as of `tag`
+
+  /// Checks, before anything is allocated for them, that so many items may follow.
+  /// @param tags, reals  of one item
+  void require_room(std::uint64_t items, std::uint64_t tags, std::uint64_t reals) const;
+  void require_end();
+  std::string here() const;
+  /// From where these are, in another form.
+  GmshNumbers in(const GmshForm& form) const;
+
+ private:
+  std::string_view word();
+  [[noreturn]] void refuse_end() const;
+  std::size_t tag_bytes() const;
+  template <class Number>
+  Number raw();
+  template <class Number>
+  Number parsed();
+
+  std::string_view bytes_;
+  std::string name_, file_;
+  GmshForm form_;
+  std::size_t at_;
+};
+
+/// Reads the section MeshFormat. @throws InputError for a version that is not read
+GmshForm gmsh_form(std::string_view bytes, const GmshSection& section, const std::string& file);
+
+}  // namespace tetwarp

@@ -1,0 +1,283 @@
+#include "io/mesh_file.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <set>
+#include <utility>
+
+#include "deform/errors.h"
+#include "io/image_reader.h"
+#include "io/mesh_format.h"
+
+namespace tetwarp {
+namespace {
+
+const MeshFormat* format_of(const std::filesystem::path& path) {
+  std::string first(64, '\0');
+  std::ifstream stream(path, std::ios::binary);
+  stream.read(first.data(), static_cast<std::streamsize>(first.size()));
+  first.resize(static_cast<std::size_t>(stream.gcount()));
+  return find_mesh_format(path, first);
+}
+
+std::unique_ptr<MeshReader> open_mesh(const std::filesystem::path& path) {
+  const std::string file = path.string();
+  require_readable_file(path);
+  const MeshFormat* format = format_of(path);
+  require(format != nullptr, "not a mesh file, " + file + "; expected " + mesh_suffixes());
+  auto reader = format->open(path);
+  if (reader->cells.tetrahedra().empty()) {
+    std::string notes;
+    for (const std::string& note : reader->notes) notes += " (" + note + ")";
+    throw InputError("no cells with a volume, " + file + notes +
+                     "; expected tetrahedra, hexahedra, wedges or pyramids");
+  }
+  return reader;
+}
+
+std::string option(const FieldSource& source, const std::string& key) {
+  const auto found = source.options.find(key);
+  return found == source.options.end() ? "" : found->second;
+}
+
+std::int64_t step_of(const FieldSource& source) {
+  const std::string text = option(source, "step");
+  std::int64_t step = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), step);
+  require(error == std::errc() && end == text.data() + text.size(),
+          "step=" + text + " for " + source.path.string() + "; expected a whole number");
+  return step;
+}
+
+/// "U", or "U, step 3" where there are several steps.
+std::string name_of(const MeshReader& reader, const MeshVectors& array) {
+  const auto steps = std::count_if(reader.arrays.begin(), reader.arrays.end(),
+                                   [&](const MeshVectors& other) { return other.name == array.name; });
+  return array.name + (array.step && steps > 1 ? ", step " + std::to_string(*array.step) : "");
+}
+
+/// "; it has "A", "B""
+std::string listed(const MeshReader& reader) {
+  std::string text;
+  for (const MeshVectors& array : reader.arrays)
+    text += (text.empty() ? "; it has \"" : ", \"") + name_of(reader, array) + "\"";
+  return text.empty() ? "; it has no vectors at its vertices" : text;
+}
+
+/// Which of the file's vectors are the displacement; empty: that cannot be decided. @throws InputError for an option
+/// that goes with none
+std::optional<std::size_t> chosen_vectors(const MeshReader& reader, const FieldSource& source) {
+  std::set<std::string> names;
+  for (const MeshVectors& array : reader.arrays) names.insert(array.name);
+  std::string name = option(source, "displacement");
+  require(name.empty() || names.contains(name),
+          "no vectors called \"" + name + "\" at the vertices of " + source.path.string() + listed(reader));
+  if (!source.options.contains("displacement") && names.size() > 1) {
+    std::set<std::string> usual;
+    for (const char* known : {"displacement", "Displacement", "U", "u"}) {
+      if (names.contains(known)) usual.insert(known);
+    }
+    names = usual;
+  }
+  if (!source.options.contains("displacement")) {
+    if (names.size() != 1) return {};
+    name = *names.begin();
+  }
+  std::vector<std::size_t> found;
+  for (std::size_t n = 0; n < reader.arrays.size(); ++n) {
+    const MeshVectors& array = reader.arrays[n];
+    if (array.name == name && (!source.options.contains("step") || array.step == step_of(source))) found.push_back(n);
+  }
+  require(!found.empty(),
+          "no step " + option(source, "step") + " of \"" + name + "\", " + source.path.string() + listed(reader));
+  return found.size() == 1 ? std::optional(found[0]) : std::nullopt;
+}
+
+/// The frame or units of a file: as it says itself, else by the option, else as assumed.
+FieldBasis take_stated(const std::optional<std::string>& stated, const std::string& by_option, const std::string& file,
+                       std::string& value) {
+  if (stated) {
+    require(
+        by_option.empty() || by_option == *stated,
+        file + " says that it is in " + *stated + ", an option that it is in " + by_option + "; leave the option out");
+    value = *stated;
+    return FieldBasis::stated;
+  }
+  if (by_option.empty()) return FieldBasis::assumed;
+  value = by_option;
+  return FieldBasis::by_option;
+}
+
+void take_frame_and_units(const MeshReader& reader, const FieldSource& source, MeshFileHeader& header) {
+  std::string frame = option(source, "frame");
+  std::transform(frame.begin(), frame.end(), frame.begin(), [](char c) { return static_cast<char>(c - 'a' + 'A'); });
+  header.frame_basis = take_stated(reader.frame, frame, source.path.string(), header.frame);
+  header.units_basis = take_stated(reader.units, option(source, "units"), source.path.string(), header.units);
+}
+
+std::uint64_t tag_of(const MeshReader& reader, std::size_t vertex) {
+  return reader.tags.empty() ? vertex : reader.tags[vertex];
+}
+
+/// The displacement as positions of a second file. @throws InputError unless vertices and cells are the same
+std::vector<glm::dvec3> from_deformed(const MeshReader& rest, const FieldSource& source, const MeshFileHeader& header) {
+  const std::string path = option(source, "deformed"), both = path + " and " + source.path.string();
+  const auto deformed = open_mesh(path);
+  const std::string what = "; the deformed mesh must have the vertices and cells of the mesh at rest";
+  require(deformed->points.size() == rest.points.size(), std::to_string(deformed->points.size()) + " and " +
+                                                             std::to_string(rest.points.size()) + " vertices, " + both +
+                                                             what);
+  for (std::size_t v = 0; v < rest.points.size(); ++v) {
+    if (tag_of(rest, v) != tag_of(*deformed, v)) {
+      throw InputError("the vertex " + std::to_string(tag_of(rest, v)) + " is in one file only, " + both + what);
+    }
+  }
+  require(deformed->cells.counts() == rest.cells.counts() && deformed->cells.tetrahedra() == rest.cells.tetrahedra(),
+          "other cells, " + both + what);
+  require(
+      deformed->frame.value_or(header.frame) == header.frame && deformed->units.value_or(header.units) == header.units,
+      "another frame or other units, " + both);
+  std::vector<glm::dvec3> displacement = std::move(deformed->points);
+  for (std::size_t v = 0; v < displacement.size(); ++v) displacement[v] -= rest.points[v];
+  return displacement;
+}
+
+/// In the file's frame and units, one a vertex; empty: it cannot be decided.
+std::vector<glm::dvec3> displacement_of(const MeshReader& reader, const FieldSource& source, MeshFileHeader& header) {
+  if (source.options.contains("deformed")) {
+    header.displacement = "positions of " + option(source, "deformed");
+    return from_deformed(reader, source, header);
+  }
+  const auto chosen = chosen_vectors(reader, source);
+  if (!chosen) return {};
+  header.displacement = name_of(reader, reader.arrays[*chosen]);
+  return reader.vectors(*chosen);
+}
+
+bool is_finite(const glm::dvec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+
+void require_finite(const glm::dvec3& value, const char* what, std::uint64_t vertex, const FieldSource& source) {
+  if (is_finite(value)) return;
+  throw InputError(std::string(what) + " not finite (" + std::to_string(value.x) + ", " + std::to_string(value.y) +
+                   ", " + std::to_string(value.z) + ") at vertex " + std::to_string(vertex) + ", " +
+                   source.path.string() + "; every vertex of a cell needs a number");
+}
+
+constexpr std::uint32_t kUnused = UINT32_MAX;
+
+/// New numbers of the vertices, those of no tetrahedron left out.
+std::vector<std::uint32_t> numbers_of_used(const MeshReader& reader) {
+  std::vector<std::uint32_t> numbers(reader.points.size(), kUnused);
+  for (const glm::u32vec4& tetrahedron : reader.cells.tetrahedra()) {
+    for (int n = 0; n < 4; ++n) numbers[tetrahedron[n]] = 0;
+  }
+  std::uint32_t next = 0;
+  for (std::uint32_t& number : numbers) {
+    if (number != kUnused) number = next++;
+  }
+  return numbers;
+}
+
+/// Leaves out all but the first of tetrahedra of the same vertices: MSH 2 has an element of two physical groups twice.
+/// @return how many were left out
+std::size_t drop_repeated(std::vector<glm::u32vec4>& tetrahedra) {
+  std::vector<std::pair<std::array<std::uint32_t, 4>, std::size_t>> sorted(tetrahedra.size());
+  for (std::size_t t = 0; t < tetrahedra.size(); ++t) {
+    const glm::u32vec4& v = tetrahedra[t];
+    sorted[t] = {{v[0], v[1], v[2], v[3]}, t};
+    std::sort(sorted[t].first.begin(), sorted[t].first.end());
+  }
+  std::sort(sorted.begin(), sorted.end());
+  std::vector<bool> repeated(tetrahedra.size());
+  for (std::size_t n = 1; n < sorted.size(); ++n) {
+    if (sorted[n].first == sorted[n - 1].first) repeated[sorted[n].second] = true;
+  }
+  std::size_t t = 0;
+  return std::erase_if(tetrahedra, [&](const glm::u32vec4&) { return repeated[t++]; });
+}
+
+/// @param displacement  as of `displacement_of`
+TetrahedralMesh mesh_of(MeshReader& reader, const std::vector<glm::dvec3>& displacement, const FieldSource& source,
+                        MeshFileHeader& header) {
+  const std::vector<std::uint32_t> numbers = numbers_of_used(reader);
+  const double unit = header.units == "m" ? 1000 : 1;
+  const glm::dvec3 to_lps_mm = header.frame == "RAS" ? glm::dvec3(-unit, -unit, unit) : glm::dvec3(unit);
+  TetrahedralMesh mesh;
+  const auto used =
+      static_cast<std::size_t>(std::count_if(numbers.begin(), numbers.end(), [](auto n) { return n != kUnused; }));
+  mesh.rest.reserve(used);
+  mesh.displacement.reserve(displacement.empty() ? 0 : used);
+  for (std::size_t v = 0; v < numbers.size(); ++v) {
+    if (numbers[v] == kUnused) continue;
+    mesh.rest.push_back(to_lps_mm * reader.points[v]);
+    require_finite(mesh.rest.back(), "a position that is", tag_of(reader, v), source);
+    if (displacement.empty()) continue;
+    const glm::dvec3 mm = to_lps_mm * displacement[v];
+    mesh.displacement.emplace_back(mm + 0.0);  // no -0
+    require_finite(glm::dvec3(mesh.displacement.back()), "a displacement that is missing or", tag_of(reader, v),
+                   source);
+    header.largest_mm = std::max(header.largest_mm.value_or(0), glm::length(mm));
+  }
+  mesh.tetrahedra = reader.cells.take();
+  for (glm::u32vec4& tetrahedron : mesh.tetrahedra) {
+    for (int n = 0; n < 4; ++n) tetrahedron[n] = numbers[tetrahedron[n]];
+  }
+  if (const std::size_t repeated = drop_repeated(mesh.tetrahedra); repeated > 0)
+    header.notes.push_back(std::to_string(repeated) + " tetrahedra are there twice and are left out once");
+  if (used < numbers.size())
+    header.notes.push_back(std::to_string(numbers.size() - used) + " vertices are corners of no cell and are left out");
+  return mesh;
+}
+
+MeshFile read(const FieldSource& source, bool must_be_decided) {
+  check_mesh_options(source);
+  const auto reader = open_mesh(source.path);
+  MeshFile result;
+  MeshFileHeader& header = result.header;
+  header.format = reader->format;
+  header.cells = reader->cells.counts();
+  for (const MeshVectors& array : reader->arrays) header.arrays.push_back(name_of(*reader, array));
+  header.notes = reader->notes;
+  take_frame_and_units(*reader, source, header);
+  const std::vector<glm::dvec3> displacement = displacement_of(*reader, source, header);
+  require(!displacement.empty() || !must_be_decided,
+          "which vectors are the displacement? " + source.path.string() + listed(*reader) +
+              "; give displacement=NAME, step=N where there are several, or deformed=FILE, as in " +
+              source.path.string() + ":displacement=NAME");
+  result.mesh = mesh_of(*reader, displacement, source, header);
+  header.vertices = result.mesh.rest.size();
+  header.tetrahedra = result.mesh.tetrahedra.size();
+  return result;
+}
+
+}  // namespace
+
+void check_mesh_options(const FieldSource& source) {
+  const std::string file = source.path.string();
+  for (const auto& [key, value] : source.options) {
+    const bool free = key == "displacement" || key == "step" || key == "deformed";
+    require(free || key == "frame" || key == "units",
+            "the option \"" + key + "\" for " + file + "; a mesh takes displacement, step, deformed, frame and units");
+    require(free || (key == "frame" ? value == "lps" || value == "ras" : value == "mm" || value == "m"),
+            key + "=" + value + " for " + file + "; expected " +
+                (key == "frame" ? "frame=lps or frame=ras" : "units=mm or units=m"));
+  }
+  if (source.options.contains("step")) step_of(source);
+  require(!source.options.contains("deformed") ||
+              (!source.options.contains("displacement") && !source.options.contains("step")),
+          "deformed= beside displacement= or step= for " + file + "; give one of them");
+}
+
+bool is_mesh_file(const std::filesystem::path& path) {
+  if (std::filesystem::is_directory(path)) return false;
+  const MeshFormat* format = format_of(path);
+  return format != nullptr && (format->holds_mesh == nullptr || format->holds_mesh(path));
+}
+
+MeshFile read_mesh_file(const FieldSource& source) { return read(source, true); }
+
+MeshFileHeader read_mesh_header(const FieldSource& source) { return read(source, false).header; }
+
+}  // namespace tetwarp
