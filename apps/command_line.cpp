@@ -39,7 +39,8 @@ void add_series(CLI::App& command, InputOptions& input) {
 constexpr const char* kInputHelp = "Folder of DICOM files, one DICOM file, or .nii .nii.gz .nrrd .mha";
 constexpr const char* kFieldHelp =
     "Forward field: a file (.mha .nrrd .nii .nii.gz, or .npy:order=zyx|xyz,units=mm|voxel), a transform of ITK, "
-    "elastix or plastimatch (.h5 .tfm .txt; each vertex x goes to T(x)), or identity, "
+    "elastix or plastimatch (.h5 .tfm .txt; each vertex x goes to T(x)), a mesh (.msh; .vtu .vtk where built with VTK; "
+    "first of several), or identity, "
     "wave:amplitude=,wavelength=[,phase=,axis=,along=], "
     "twist:angle=[,axis=], bubble:radius=,strength=[,center=X/Y/Z], bubble-paper:shift=[,center=], translate:by=X/Y/Z; "
     "mm, "
@@ -62,8 +63,8 @@ void add_phantom(CLI::App& app, PhantomOptions& options) {
 }
 
 void add_info(CLI::App& app, InfoOptions& options) {
-  CLI::App* command = app.add_subcommand("info", "Say what an input, a field or a transform file holds");
-  command->add_option("INPUT", options.input.path, std::string(kInputHelp) + ", or a field or transform file")
+  CLI::App* command = app.add_subcommand("info", "Say what an input, a field, a mesh or a transform file holds");
+  command->add_option("INPUT", options.input.path, std::string(kInputHelp) + ", or a field, mesh or transform file")
       ->required();
   command->add_flag("--single", options.input.single, "Look at the one DICOM file alone, not its series");
   command->add_flag("--json", options.json, "One JSON document on standard output");

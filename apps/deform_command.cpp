@@ -93,9 +93,7 @@ Backend Deformation::resample() {
   auto input_hash = std::async(std::launch::async, [&] {
     return record_.input.is_dicom() ? record_.input.dicom->sha256 : hash_file(options_.input.path);
   });
-  record_.field_sha256 =
-      hash_field(record_.field.lattice(), record_.field.displacement(),
-                 record_.field.direction == Direction::pull ? "pull" : "forward", options_.common.threads);
+  record_.field_sha256 = record_.field.hash(options_.common.threads);
   const Limits limits{.threads = options_.common.threads, .memory = options_.memory_bytes.value_or(0)};
   Backend backend = make_backend(options_.backend, record_.field.direction, record_.plan.grid, options_.device, limits);
   record_.backend = backend.name;

@@ -24,12 +24,12 @@ std::filesystem::path folder_of(const std::filesystem::path& file) {
 /// @param grid  of the output
 std::uint64_t plan_bytes(const DeformOptions& options, DeformOutputs& outputs, const InputHeader& input,
                          const Geometry& grid) {
-  const glm::i64vec3 lattice = options.pull_field.empty()
-                                   ? lattice_size(options.fields, input.geometry, options.cell_size)
-                                   : pull_grid_size(options.pull_field, grid);
+  const glm::i64vec3 pulled = options.pull_field.empty() ? glm::i64vec3(0) : pull_grid_size(options.pull_field, grid);
+  const std::uint64_t of_field = options.pull_field.empty()
+                                     ? field_bytes(options.fields, input.geometry, options.cell_size)
+                                     : static_cast<std::uint64_t>(pulled.x * pulled.y * pulled.z) * sizeof(glm::vec3);
   const auto voxels = static_cast<std::uint64_t>(voxel_count(input.geometry)),
              output_voxels = static_cast<std::uint64_t>(voxel_count(grid));
-  const auto vertices = static_cast<std::uint64_t>(lattice.x * lattice.y * lattice.z);
   const auto slices = static_cast<std::uint64_t>(grid.size.z);
   const std::uint64_t of_check = reports_quality(options) ? sizeof(glm::vec3) * output_voxels / slices *
                                                                 std::min(slices, std::uint64_t{RoundTrip::kMostSlices})
@@ -37,7 +37,7 @@ std::uint64_t plan_bytes(const DeformOptions& options, DeformOutputs& outputs, c
   const std::uint64_t of_mass = options.preserve_mass ? sizeof(float) * (voxels + 2 * output_voxels) : 0;
   return of_mass + of_check + voxels * size_bytes(input.type) +
          output_voxels * (size_bytes(input.type) + outputs.maps->bytes_a_voxel()) +
-         outputs.further->bytes(output_voxels) + vertices * sizeof(glm::vec3) + kOverheadBytes;
+         outputs.further->bytes(output_voxels) + of_field + kOverheadBytes;
 }
 
 }  // namespace

@@ -57,9 +57,9 @@ json sidecar(const DeformRecord& of) {
   }
   document["field"] = {{"sha256", of.field_sha256},
                        {"direction", of.field.direction == Direction::pull ? "pull" : "forward"},
-                       {"lattice", to_json(of.field.lattice())},
                        {"notes", of.field.notes},
                        {"files", to_json(of.field.files)}};
+  document["field"].update(of.field.place());
   document["output"] = {{"path", of.options.output.string()},
                         {"voxel_type", to_string(of.output.type())},
                         {"geometry", to_json(of.output.geometry())}};
@@ -101,7 +101,7 @@ json report_with_times(const DeformRecord& of) {
                         {"planned_bytes", of.plan.bytes},
                         {"source_bytes", of.input.volume.size_bytes()},
                         {"output_bytes", of.output.size_bytes()},
-                        {"field_bytes", of.field.displacement().size() * sizeof(glm::vec3)}};
+                        {"field_bytes", of.field.size_bytes()}};
   return document;
 }
 
@@ -118,7 +118,7 @@ std::string summary(const DeformRecord& of) {
   }
   if (of.report.clamped > 0) line += "; " + std::to_string(of.report.clamped) + " values clamped";
   if (of.report.conflicts > 0)
-    line += "; " + std::to_string(of.report.conflicts) + " voxels outside the lattice were moved into";
+    line += "; " + std::to_string(of.report.conflicts) + " voxels outside the field were moved into";
   return line;
 }
 

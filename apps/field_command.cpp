@@ -20,6 +20,9 @@ int run_field(const FieldOptions& options) {
   const InputHeader like = open_input(options.like, {.stop = interrupt_token()});
   const ForwardField source =
       read_forward_field(options.fields, like.geometry, options.cell_size, options.common, stage.control());
+  require(source.field.mesh.is_empty(),
+          "a mesh, " + options.fields.front() +
+              ", has no lattice that a field file could hold; give it to deform or invert");
   outputs.write([&] { write_field_file(output, source.field); });
   outputs.commit();
   for (const std::string& note : source.notes) say(options.common, "tetwarp: note: " + note);

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "apps/output.h"
 #include "deform/fields/formula.h"
 #include "io/field_file.h"
 #include "io/hash.h"
@@ -30,12 +31,37 @@ VertexField read_file(const std::string& text, const Geometry& volume, ForwardFi
   return tetwarp::read_forward_field(source);
 }
 
-/// Whether the text is a file whose vertices are where the file says.
-bool has_lattice(const std::string& text) { return !is_formula(text) && !has_transform_suffix(text); }
+enum class FieldKind { formula, transform, lattice, mesh };
+
+FieldKind kind_of(const std::string& text) {
+  if (is_formula(text)) return FieldKind::formula;
+  if (has_transform_suffix(text)) return FieldKind::transform;
+  return is_mesh_file(parse_field_source(text).path) ? FieldKind::mesh : FieldKind::lattice;
+}
+
+/// Whether the vertices are where the text says.
+bool has_vertices(FieldKind kind) { return kind == FieldKind::lattice || kind == FieldKind::mesh; }
+
+TetrahedralMesh read_mesh(const std::string& text, ForwardField& result) {
+  const FieldSource source = field_source(text);
+  MeshFile file = read_mesh_file(source);
+  const std::string path = source.path.string();
+  for (const std::string& note : file.header.notes) result.notes.push_back(path + ": " + note);
+  FieldFileHeader header;
+  header.format = file.header.format;
+  header.direction = FieldDirection::forward;
+  header.frame = file.header.frame;
+  header.units = file.header.units;
+  header.direction_basis = header.absolute_basis = FieldBasis::by_format;
+  header.frame_basis = file.header.frame_basis;
+  header.units_basis = file.header.units_basis;
+  result.files.push_back({path, header, file.header});
+  return std::move(file.mesh);
+}
 
 /// A bad transform is refused before volumes are read.
 void check_transform(const std::string& text) {
-  if (!is_formula(text) && has_transform_suffix(text)) read_transform_file(text);
+  if (kind_of(text) == FieldKind::transform) read_transform_file(text);
 }
 
 /// What to say of a transform once it was evaluated at every vertex or voxel.
@@ -49,6 +75,18 @@ void note_transform(const TransformFile& transform, const std::string& path, Dir
     notes.push_back(path + ": " + std::to_string(outside) + (direction == Direction::pull ? " voxels" : " vertices") +
                     " lie outside its domain, where ITK does not move them");
   }
+}
+
+std::string hash_samples(const Geometry& lattice, const std::vector<glm::vec3>& displacement,
+                         const std::string& direction, int threads) {
+  const auto bytes_of = [](const auto& value) { return std::as_bytes(std::span(&value, 1)); };
+  Sha256 hash;
+  hash.add("tetwarp field").add(direction);
+  hash.add(bytes_of(lattice.size))
+      .add(bytes_of(lattice.spacing))
+      .add(bytes_of(lattice.origin))
+      .add(bytes_of(lattice.direction));
+  return hash.add_blocks(std::as_bytes(std::span(displacement)), threads).hex();
 }
 
 /// The displacement of a formula or a transform, and what to say of it afterwards.
@@ -68,7 +106,11 @@ NamedMap map_of(const std::string& text, const Geometry& volume) {
 FieldSource field_source(const std::string& text, const std::optional<Geometry>& volume) {
   try {
     FieldSource source = parse_field_source(text);
-    check_field_options(source);
+    if (is_mesh_file(source.path)) {
+      check_mesh_options(source);
+    } else {
+      check_field_options(source);
+    }
     source.grid = volume;
     return source;
   } catch (const InputError& error) {
@@ -87,10 +129,16 @@ void check_fields(const std::vector<std::string>& fields, std::optional<std::int
       throw UsageError("\"" + text + "\" is neither a formula nor a file that exists; see tetwarp deform --help");
     }
   }
+  for (std::size_t n = 1; n < fields.size(); ++n) {
+    if (kind_of(fields[n]) == FieldKind::mesh) {
+      throw UsageError("the mesh " + fields[n] +
+                       " comes after another field, but moves its own vertices alone; let it be the first -f");
+    }
+  }
   if (!cell_size) return;
   if (*cell_size < 1) throw UsageError("--cell-size is " + std::to_string(*cell_size) + ", expected at least 1");
-  if (has_lattice(fields.front()))
-    throw UsageError("--cell-size is for formulas and transforms, " + fields.front() + " has its own lattice");
+  if (has_vertices(kind_of(fields.front())))
+    throw UsageError("--cell-size is for formulas and transforms, " + fields.front() + " has its own vertices");
 }
 
 std::vector<std::filesystem::path> field_files(const std::vector<std::string>& fields) {
@@ -101,11 +149,19 @@ std::vector<std::filesystem::path> field_files(const std::vector<std::string>& f
   return files;
 }
 
-glm::i64vec3 lattice_size(const std::vector<std::string>& fields, const Geometry& volume,
+std::uint64_t field_bytes(const std::vector<std::string>& fields, const Geometry& volume,
                           std::optional<std::int64_t> cell_size) {
   for (const std::string& text : fields) check_transform(text);
-  if (!has_lattice(fields.front())) return lattice_over(volume, cell_size.value_or(1)).size;
-  return read_field_header(field_source(fields.front())).grid.size;
+  const FieldKind kind = kind_of(fields.front());
+  if (kind == FieldKind::mesh) {
+    constexpr std::uint64_t kVertex = sizeof(glm::dvec3) + sizeof(glm::vec3) + 2 * 2 * sizeof(glm::ivec3),
+                            kTetrahedron = sizeof(glm::u32vec4) + 32;  // snapped twice; in lists
+    const MeshFileHeader header = read_mesh_header(field_source(fields.front()));
+    return header.vertices * kVertex + header.tetrahedra * kTetrahedron;
+  }
+  const glm::i64vec3 size = kind == FieldKind::lattice ? read_field_header(field_source(fields.front())).grid.size
+                                                       : lattice_over(volume, cell_size.value_or(1)).size;
+  return static_cast<std::uint64_t>(size.x * size.y * size.z) * sizeof(glm::vec3);
 }
 
 ForwardField read_forward_field(const std::vector<std::string>& fields, const Geometry& volume,
@@ -118,7 +174,12 @@ ForwardField read_forward_field(const std::vector<std::string>& fields, const Ge
   for (std::size_t n = 0; n < fields.size(); ++n) {
     const std::string& text = fields[n];
     result.identity = result.identity && text == "identity";
-    if (has_lattice(text)) {
+    const FieldKind kind = kind_of(text);
+    if (kind == FieldKind::mesh) {  // the first, as was checked
+      result.field.mesh = read_mesh(text, result);
+      continue;
+    }
+    if (kind == FieldKind::lattice) {
       VertexField next = read_file(text, volume, result);
       if (n == 0)
         result.field = std::move(next);
@@ -146,6 +207,7 @@ PullField read_pull_field(const std::string& text, const Geometry& volume, const
   }
   const FieldSource source = field_source(text, volume);
   const std::string path = source.path.string();
+  require(!is_mesh_file(source.path), "a mesh, " + path + ", says where its vertices go: give it with -f");
   found.files.push_back({path, read_field_header(source)});
   if (!found.files.back().header.direction)
     found.notes.push_back(path + " does not say its direction: taken as output to input");
@@ -177,20 +239,50 @@ nlohmann::json to_json(const std::vector<ReadField>& files) {
   for (const ReadField& file : files) {
     list.push_back(to_json(file.header));
     list.back()["path"] = file.path;
+    if (file.mesh) {
+      list.back()["vertices"] = file.mesh->vertices;
+      list.back()["tetrahedra"] = file.mesh->tetrahedra;
+      list.back()["displacement"] = file.mesh->displacement;
+    }
   }
   return list;
 }
 
-std::string hash_field(const Geometry& lattice, const std::vector<glm::vec3>& displacement,
-                       const std::string& direction, int threads) {
-  const auto bytes_of = [](const auto& value) { return std::as_bytes(std::span(&value, 1)); };
+nlohmann::json place_json(const VertexField& field) {
+  if (field.mesh.is_empty()) return {{"lattice", to_json(field.lattice)}};
+  return {{"mesh", {{"vertices", field.mesh.rest.size()}, {"tetrahedra", field.mesh.tetrahedra.size()}}}};
+}
+
+std::string hash_field(const VertexField& field, int threads) {
+  const TetrahedralMesh& mesh = field.mesh;
+  if (mesh.is_empty()) return hash_samples(field.lattice, field.displacement, "forward", threads);
   Sha256 hash;
-  hash.add("tetwarp field").add(direction);
-  hash.add(bytes_of(lattice.size))
-      .add(bytes_of(lattice.spacing))
-      .add(bytes_of(lattice.origin))
-      .add(bytes_of(lattice.direction));
-  return hash.add_blocks(std::as_bytes(std::span(displacement)), threads).hex();
+  hash.add("tetwarp mesh");
+  const std::uint64_t sizes[] = {mesh.rest.size(), mesh.tetrahedra.size()};
+  hash.add(std::as_bytes(std::span(sizes)));
+  hash.add(std::as_bytes(std::span(mesh.rest)));
+  hash.add(std::as_bytes(std::span(mesh.displacement)));
+  return hash.add_blocks(std::as_bytes(std::span(mesh.tetrahedra)), threads).hex();
+}
+
+std::string hash_field(const PullField& field, int threads) {
+  return hash_samples(field.grid, field.displacement, "pull", threads);
+}
+
+std::string AnyField::hash(int threads) const {
+  return direction == Direction::pull ? hash_field(pull, threads) : hash_field(forward.field, threads);
+}
+
+nlohmann::json AnyField::place() const {
+  if (direction == Direction::pull) return {{"lattice", to_json(pull.grid)}};
+  return place_json(forward.field);
+}
+
+std::uint64_t AnyField::size_bytes() const {
+  const auto bytes_of = [](const auto& values) { return std::as_bytes(std::span(values)).size(); };
+  const VertexField& field = forward.field;
+  return bytes_of(pull.displacement) + bytes_of(field.displacement) + bytes_of(field.mesh.rest) +
+         bytes_of(field.mesh.displacement) + bytes_of(field.mesh.tetrahedra);
 }
 
 }  // namespace tetwarp::apps

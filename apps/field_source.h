@@ -9,6 +9,7 @@
 #include "apps/console.h"
 #include "deform/vertex_field.h"
 #include "io/field_file.h"
+#include "io/mesh_file.h"
 
 namespace tetwarp::apps {
 
@@ -16,6 +17,7 @@ namespace tetwarp::apps {
 struct ReadField {
   std::string path;
   FieldFileHeader header;
+  std::optional<MeshFileHeader> mesh = {};  ///< of a mesh: then `header` has no grid
 };
 
 /// A forward field from the command line.
@@ -34,10 +36,9 @@ struct AnyField {
   std::vector<std::string> notes;
   std::vector<ReadField> files;
 
-  const Geometry& lattice() const { return direction == Direction::pull ? pull.grid : forward.field.lattice; }
-  const std::vector<glm::vec3>& displacement() const {
-    return direction == Direction::pull ? pull.displacement : forward.field.displacement;
-  }
+  std::string hash(int threads) const;
+  nlohmann::json place() const;
+  std::uint64_t size_bytes() const;
 };
 
 /// A file from the command line, `PATH` or `PATH:KEY=VALUE,...`, for a volume. It is not read yet and need not exist.
@@ -45,7 +46,8 @@ struct AnyField {
 FieldSource field_source(const std::string& text, const std::optional<Geometry>& volume = {});
 
 /// Formulas, transforms and fields, composed vertex by vertex, the first applied first. The lattice is that of the
-/// first if it is a field file, else one over `volume` with a vertex every `cell_size` voxels.
+/// first if it is a field file, else one over `volume` with a vertex every `cell_size` voxels. If the first is a mesh,
+/// the vertices are the mesh's; it cannot come later.
 /// @throws UsageError for a text that is no formula and no file, or a cell size with a field file; InputError for
 /// unusable files
 ForwardField read_forward_field(const std::vector<std::string>& fields, const Geometry& volume,
@@ -58,8 +60,9 @@ void check_fields(const std::vector<std::string>& fields, std::optional<std::int
 /// Those of the fields that are files.
 std::vector<std::filesystem::path> field_files(const std::vector<std::string>& fields);
 
-/// Size of the lattice that `read_forward_field` will make. Transforms are read, so that a bad one is known early.
-glm::i64vec3 lattice_size(const std::vector<std::string>& fields, const Geometry& volume,
+/// Memory of the field that `read_forward_field` will make, with what a mesh needs beside its own. Transforms and
+/// meshes are read, so that a bad one is known early.
+std::uint64_t field_bytes(const std::vector<std::string>& fields, const Geometry& volume,
                           std::optional<std::int64_t> cell_size);
 
 /// The pull field of a file for `volume`, or a transform sampled at every voxel centre of `output`.
@@ -74,9 +77,12 @@ glm::i64vec3 pull_grid_size(const std::string& text, const Geometry& output);
 nlohmann::json to_json(const FieldFileHeader& header);
 nlohmann::json to_json(const std::vector<ReadField>& files);
 
-/// SHA-256 over direction, lattice geometry and displacements (Sha256::add_blocks), hexadecimal: the same for a formula
-/// and the file it was written to.
-std::string hash_field(const Geometry& lattice, const std::vector<glm::vec3>& displacement,
-                       const std::string& direction, int threads);
+/// SHA-256 of what decides a field, its direction, place and numbers (Sha256::add_blocks), hexadecimal: the same for a
+/// formula and the file it was written to.
+std::string hash_field(const VertexField& field, int threads);
+std::string hash_field(const PullField& field, int threads);
+
+/// "lattice" and its geometry, or "mesh" and its size.
+nlohmann::json place_json(const VertexField& field);
 
 }  // namespace tetwarp::apps

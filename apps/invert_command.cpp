@@ -61,10 +61,10 @@ int run_invert(const InvertOptions& options) {
     json document = provenance("invert");
     document["backend"] = backend.name;
     document["field"] = {
-        {"sha256", hash_field(field.field.lattice, field.field.displacement, "forward", options.common.threads)},
-        {"lattice", to_json(field.field.lattice)},
+        {"sha256", hash_field(field.field, options.common.threads)},
         {"notes", field.notes},
         {"files", to_json(field.files)}};
+    document["field"].update(place_json(field.field));
     document["output"] = {{"path", options.output.string()}, {"geometry", to_json(like.geometry)}};
     document["covered"] = report.covered;
     document["uncovered"] = report.uncovered;

@@ -9,6 +9,7 @@
 
 #include "apps/input.h"
 #include "deform/field_check.h"
+#include "deform/resampler.h"
 #include "io/image_file.h"
 
 namespace tetwarp::apps {
@@ -26,6 +27,13 @@ struct Bounds {
 
 /// Where the deformed vertices lie in a volume's continuous index.
 Bounds bounds_of(const VertexField& field, const Geometry& volume) {
+  if (!field.mesh.is_empty()) {
+    Bounds bounds;
+    const AffineMap index = index_from_point(volume);
+    for (std::size_t n = 0; n < field.mesh.rest.size(); ++n)
+      bounds.grow(index(field.mesh.rest[n] + glm::dvec3(field.mesh.displacement[n])));
+    return bounds;
+  }
   const AffineMap index_from_lattice = index_from_point(volume) * point_from_index(field.lattice);
   const glm::dmat3 index_from_mm = index_from_point(volume).linear;
   const glm::i64vec3 size = field.lattice.size;
@@ -84,7 +92,12 @@ Geometry output_grid(const std::string& wanted, const Geometry& volume, const Ve
     like.path = wanted;
     return open_input(like, {.stop = interrupt_token()}).geometry;
   }
-  make_lattice_frame(volume, view(field, outside));  // refuses what does not reach over the volume
+  // What does not reach over the volume is refused.
+  if (field.mesh.is_empty()) {
+    make_lattice_frame(volume, view(field, outside));
+  } else {
+    make_cpu_resampler(volume)->set_field(view(field, outside));
+  }
   return grown(volume, bounds_of(field, volume));
 }
 

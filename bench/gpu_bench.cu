@@ -12,6 +12,7 @@ namespace tetwarp::bench {
 namespace {
 
 constexpr const char* kCoarseFields[] = {"wave", "twist", "bubble", "elastic"};
+constexpr std::int64_t kMeshCells[] = {16, 32};  ///< tetrahedra of a few dozen voxels a side
 constexpr const char* kLongField = "wave";
 
 bool contains(std::span<const std::string> names, const std::string& name) {
@@ -32,6 +33,13 @@ void run_methods(const Volume<std::int16_t>& volume, GpuResults& results,
       if (!contains(options.fields, field)) continue;
       say(field + ", cells of " + std::to_string(cell_size));
       results.runs.push_back(methods.measure(field, cell_size, {.paper = true, .gascon = true}));
+    }
+  }
+  for (const std::int64_t cell_size : kMeshCells) {
+    for (const std::string field : kCoarseFields) {
+      if (!contains(options.fields, field)) continue;
+      say(field + ", a mesh, cells of " + std::to_string(cell_size));
+      results.meshes.push_back(methods.measure_mesh(field, cell_size));
     }
   }
 }

@@ -47,6 +47,17 @@ void add_coarse(const GpuResults& results, std::vector<Floor>& floors) {
   }
 }
 
+void add_meshes(const GpuResults& results, std::vector<Floor>& floors) {
+  for (const MeshRun& run : results.meshes) {
+    floors.push_back({"gascon / mesh resample",
+                      run.field + ", cells of " + std::to_string(run.cell_size),
+                      run.gascon_ms.median / run.resample_ms.median,
+                      true,
+                      1,
+                      {}});
+  }
+}
+
 /// Twice the slices may cost 5 % more than twice the time; other lengths likewise.
 void add_long(const GpuResults& results, std::vector<Floor>& floors) {
   constexpr double kMore = 1.05;
@@ -106,7 +117,8 @@ void add_memory(const GpuResults& results, std::vector<Floor>& floors) {
 
 std::vector<Floor> find_floors(const GpuResults& results) {
   std::vector<Floor> floors;
-  for (const auto add : {add_dense, add_hard, add_local, add_coarse, add_long, add_memory}) add(results, floors);
+  for (const auto add : {add_dense, add_hard, add_local, add_coarse, add_meshes, add_long, add_memory})
+    add(results, floors);
   return floors;
 }
 

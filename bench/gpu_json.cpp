@@ -32,6 +32,15 @@ Json to_json(const GpuRun& run) {
           {"report", to_json(run.report)}};
 }
 
+Json to_json(const MeshRun& run) {
+  return {{"field", run.field},
+          {"cell_size", run.cell_size},
+          {"tetrahedra", run.tetrahedra},
+          {"set_field_ms", to_json(run.set_field_ms)},
+          {"resample_ms", to_json(run.resample_ms)},
+          {"gascon_ms", to_json(run.gascon_ms)}};
+}
+
 Json to_json(const CopyTimes& copies) {
   return {{"volume_ms", to_json(copies.volume_ms)},
           {"field_ms", to_json(copies.field_ms)},
@@ -82,6 +91,7 @@ nlohmann::json to_json(const GpuResults& results, const std::vector<Floor>& floo
           {"size", size_json(results.size)},
           {"copies", to_json(results.copies)},
           {"runs", list(results.runs)},
+          {"meshes", list(results.meshes)},
           {"frame_loops", list(results.loops)},
           {"memory", list(results.memory)},
           {"floors", to_json(floors)}};

@@ -6,6 +6,7 @@
 #include "bench/gpu_backward.h"
 #include "bench/gpu_parts.h"
 #include "bench/gpu_scene.h"
+#include "deform/fields/lattice_mesh.h"
 
 namespace tetwarp::bench {
 
@@ -66,20 +67,40 @@ class GpuMethods::State {
             .report = report_};
   }
 
+  MeshRun measure_mesh(const std::string& name, std::int64_t cell_size) {
+    field_.generate(make_test_field(name, volume_.geometry.size), volume_.geometry, cell_size, stream_);
+    VertexField lattice{field_.lattice(), std::vector<glm::vec3>(field_.vertices())};
+    TETWARP_CUDA_TRY(
+        cudaMemcpy(lattice.displacement.data(), field_.displacement(), field_.size_bytes(), cudaMemcpyDeviceToHost));
+    VertexField mesh;
+    mesh.mesh = mesh_of(lattice);
+    MeshRun run{.field = name, .cell_size = cell_size, .tetrahedra = mesh.mesh.tetrahedra.size()};
+    Times times, untimed;
+    for (int n = -options_.warmup; n < options_.frames; ++n) {
+      Times& to = n < 0 ? untimed : times;
+      run_tetwarp(tetwarp::view(mesh, Outside::background), to);
+      to.gascon.push_back(run_baseline(Method::gascon));
+    }
+    run.set_field_ms = summarize(times.set_field);
+    run.resample_ms = summarize(times.resample);
+    run.gascon_ms = summarize(times.gascon);
+    return run;
+  }
+
  private:
   /// Every method once; times from events on the stream.
   void run_frame(const Others& others, Times& times) {
-    run_tetwarp(times);
+    run_tetwarp(field_.view(), times);
     times.two.push_back(run_two());
     if (others.paper) times.paper.push_back(run_baseline(Method::paper));
     if (others.gascon) times.gascon.push_back(run_baseline(Method::gascon));
     if (others.backward) times.backward.push_back(run_backward());
   }
 
-  void run_tetwarp(Times& times) {
+  void run_tetwarp(const FieldView& field, Times& times) {
     const Target target = target_of(source_, output_);
     start_.record(stream_);
-    resampler_->set_field(field_.view(), on_stream(stream_));
+    resampler_->set_field(field, on_stream(stream_));
     middle_.record(stream_);
     report_ = resampler_->resample(whole(volume_.geometry), {&target, 1}, {}, on_stream(stream_));
     end_.record(stream_);
@@ -146,6 +167,10 @@ GpuMethods::~GpuMethods() = default;
 
 GpuRun GpuMethods::measure(const std::string& field, std::int64_t cell_size, const Others& others) {
   return state_->measure(field, cell_size, others);
+}
+
+MeshRun GpuMethods::measure_mesh(const std::string& field, std::int64_t cell_size) {
+  return state_->measure_mesh(field, cell_size);
 }
 
 CopyTimes measure_copies(const Geometry& volume, const GpuOptions& options) {

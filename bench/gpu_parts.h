@@ -26,6 +26,7 @@ class GpuMethods {
   ~GpuMethods();
 
   GpuRun measure(const std::string& field, std::int64_t cell_size, const Others& others);
+  MeshRun measure_mesh(const std::string& field, std::int64_t cell_size);
 
  private:
   class State;

@@ -20,6 +20,15 @@ struct GpuRun {
   Report report;                                    ///< of the last frame
 };
 
+/// The tetrahedra of a field with large cells given to Tetwarp as a mesh, and to `gascon`; ms a frame. The mesh is on
+/// the host: setting it uploads it.
+struct MeshRun {
+  std::string field;
+  std::int64_t cell_size = 0;
+  std::uint64_t tetrahedra = 0;
+  Summary set_field_ms, resample_ms, gascon_ms;
+};
+
 /// Copies on the device, ms: of a volume, and of a field with a vertex on every voxel.
 struct CopyTimes {
   Summary volume_ms, field_ms;
@@ -58,6 +67,7 @@ struct GpuResults {
   glm::i64vec3 size{0};  ///< of the first volume; all but the long runs are on it
   CopyTimes copies;
   std::vector<GpuRun> runs;
+  std::vector<MeshRun> meshes;
   std::vector<FrameLoop> loops;
   std::vector<MemoryUse> memory;
 };

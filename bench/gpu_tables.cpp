@@ -17,6 +17,13 @@ constexpr char kCoarseNote[] = R"(## Larger cells
 
 )";
 
+constexpr char kMeshNote[] = R"(## Meshes
+
+The tetrahedra of a field with large cells, given as a mesh on the host: set_field snaps and checks it there, uploads it
+and lists its tetrahedra, for what lies outside is background.
+
+)";
+
 constexpr char kLongNote[] = R"(## Other lengths
 
 )";
@@ -83,6 +90,18 @@ std::string coarse_table(const GpuResults& results) {
          rows + "\n";
 }
 
+std::string mesh_table(const GpuResults& results) {
+  if (results.meshes.empty()) return "";
+  std::string text =
+      kMeshNote + heading({"field", "cell", "tetrahedra", "set_field", "resample", "gascon", "gascon / resample"});
+  for (const MeshRun& run : results.meshes) {
+    text += row({run.field, std::to_string(run.cell_size), std::to_string(run.tetrahedra), cell(run.set_field_ms),
+                 cell(run.resample_ms), cell(run.gascon_ms),
+                 format("%.2f", run.gascon_ms.median / run.resample_ms.median)});
+  }
+  return text + "\n";
+}
+
 std::string long_table(const GpuResults& results) {
   std::string rows;
   for (const GpuRun& run : results.runs) {
@@ -115,8 +134,8 @@ std::string memory_table(const GpuResults& results) {
 }  // namespace
 
 std::string to_markdown(const GpuResults& results, const std::vector<Floor>& floors) {
-  return introduction(results) + dense_table(results) + coarse_table(results) + long_table(results) +
-         loop_table(results) + memory_table(results) + to_markdown(floors);
+  return introduction(results) + dense_table(results) + coarse_table(results) + mesh_table(results) +
+         long_table(results) + loop_table(results) + memory_table(results) + to_markdown(floors);
 }
 
 }  // namespace tetwarp::bench

@@ -5,6 +5,7 @@
 
 #include "cuda/gather.h"
 #include "cuda/voxel_sink.cuh"
+#include "cuda/weighing.cuh"
 #include "deform/core/row_interval.h"
 
 namespace tetwarp::cuda_detail {
@@ -134,17 +135,6 @@ __global__ void cells_kernel(TileTask task) {
   cells.source_end = ((voxels.end * kStepsPerVoxel - (moved.low - beyond)) >> kStepBits) + 1;
 }
 
-/// What a tetrahedron's voxels need, as it lies in shared memory: their weights by Cramer's rule, and how far its
-/// vertices are displaced.
-struct Weighing {
-  float from_d[3];   ///< from D to the first voxel of the tile, 2^-12 voxel
-  float reciprocal;  ///< of the determinant; no number: not in float
-  float bc[3], moved_x, ca[3], moved_y, ab[3], moved_z;
-  float moved_a[3], moved_b[3], moved_c[3];
-};
-constexpr int kQuads = 6;  ///< whole ones of it, of four floats
-static_assert(sizeof(Weighing) == (4 * kQuads + 1) * sizeof(float));
-
 /// A row of a tile.
 struct Row {
   unsigned short owner[kTileI];  ///< where an interval starts: place of its tetrahedron among `numbers`, or kNoOwner
@@ -189,7 +179,6 @@ struct Corners {
 };
 
 constexpr unsigned short kNoOwner = 0xFFFF;
-constexpr float kNoNumber = std::numeric_limits<float>::quiet_NaN();
 
 /// Rows of a tile that a tetrahedron may reach, in one word.
 struct Span {
@@ -202,35 +191,6 @@ struct Span {
   }
   __device__ unsigned word() const {
     return static_cast<unsigned>(y_begin | y_end << 4 | z_begin << 8 | z_end << 13 | (is_small ? 1 << 18 : 0));
-  }
-};
-
-/// The `Weighing` of the tetrahedron that a lane is in.
-struct HeldWeighing {
-  float values[4 * kQuads + 1];
-
-  /// Reads it, where it is not the one that is held.
-  __device__ void hold(const TileMemory& memory, unsigned place, unsigned& held) {
-    float(&v)[4 * kQuads + 1] = values;
-    const auto from = static_cast<unsigned>(__cvta_generic_to_shared(&memory.prepared[place][0])),
-               end = static_cast<unsigned>(__cvta_generic_to_shared(&memory.ends[place]));
-    asm volatile(
-        "{\n\t"
-        ".reg .pred p;\n\t"
-        "setp.ne.u32 p, %25, %26;\n\t"
-        "@p ld.shared.v4.f32 {%0, %1, %2, %3}, [%27];\n\t"
-        "@p ld.shared.v4.f32 {%4, %5, %6, %7}, [%27+16];\n\t"
-        "@p ld.shared.v4.f32 {%8, %9, %10, %11}, [%27+32];\n\t"
-        "@p ld.shared.v4.f32 {%12, %13, %14, %15}, [%27+48];\n\t"
-        "@p ld.shared.v4.f32 {%16, %17, %18, %19}, [%27+64];\n\t"
-        "@p ld.shared.v4.f32 {%20, %21, %22, %23}, [%27+80];\n\t"
-        "@p ld.shared.f32 %24, [%28];\n\t"
-        "}"
-        : "+f"(v[0]), "+f"(v[1]), "+f"(v[2]), "+f"(v[3]), "+f"(v[4]), "+f"(v[5]), "+f"(v[6]), "+f"(v[7]), "+f"(v[8]),
-          "+f"(v[9]), "+f"(v[10]), "+f"(v[11]), "+f"(v[12]), "+f"(v[13]), "+f"(v[14]), "+f"(v[15]), "+f"(v[16]),
-          "+f"(v[17]), "+f"(v[18]), "+f"(v[19]), "+f"(v[20]), "+f"(v[21]), "+f"(v[22]), "+f"(v[23]), "+f"(v[24])
-        : "r"(place), "r"(held), "r"(from), "r"(end));
-    held = place;
   }
 };
 
@@ -551,29 +511,8 @@ struct TileWorker {
     };
     glm::vec3 moved_a, moved_b, moved_c;
     const glm::vec3 a = vertex_at(at.a, 0, moved_a), b = vertex_at(at.b, 1, moved_b), c = vertex_at(at.c, 2, moved_c);
-    const Cramer m(a, b, c);
-    const float s = (detail::norm1(a) + detail::norm1(b)) + detail::norm1(c);
-    const bool usable = detail::magnitude(m.det) > s * s * detail::multiply_add(detail::kThinSum, s, detail::kSlackSum);
-    const auto cross = [](const detail::Cross& v, float w) { return make_float4(v.x, v.y, v.z, w); };
-    float4* to = memory.prepared[thread];
-    to[0] = make_float4(static_cast<float>(-d.x), static_cast<float>(-d.y), static_cast<float>(-d.z),
-                        usable ? detail::reciprocal(m.det) : kNoNumber);
-    to[1] = cross(m.bc, moved.x);
-    to[2] = cross(m.ca, moved.y);
-    to[3] = cross(m.ab, moved.z);
-    to[4] = make_float4(moved_a.x, moved_a.y, moved_a.z, moved_b.x);
-    to[5] = make_float4(moved_b.y, moved_b.z, moved_c.x, moved_c.y);
-    memory.ends[thread] = moved_c.z;
-  }
-
-  /// How far a voxel moved; no numbers where its weights are not for float, or it is nobody's.
-  /// @param from_first  from the first voxel of the tile, 2^-12 voxel
-  __device__ static glm::vec3 moved_by(const HeldWeighing& m, const glm::vec3& from_first) {
-    const float(&v)[4 * kQuads + 1] = m.values;
-    const float x = from_first.x + v[0], y = from_first.y + v[1], z = from_first.z + v[2];
-    const auto weight = [&](int n) { return ((x * v[n] + y * v[n + 1]) + z * v[n + 2]) * v[3]; };
-    return blend({weight(4), weight(8), weight(12)}, {v[7], v[11], v[15]}, {v[16], v[17], v[18]}, {v[19], v[20], v[21]},
-                 {v[22], v[23], v[24]});
+    prepare_weighing(a, b, c, glm::vec3(-d), {moved, moved_a, moved_b, moved_c}, memory.prepared[thread],
+                     memory.ends[thread]);
   }
 
   /// The voxels of one lane: a column along k. @tparam kInside  whether all come from well inside the source
@@ -593,7 +532,7 @@ struct TileWorker {
     const auto next_moved = [&] {
       const unsigned place = row->owner[31 - __clz(static_cast<int>(row->starts & up_to_lane))];
       row += kTileJ;
-      m.hold(memory, min(place, unsigned{kSlots}), held);
+      m.hold(memory.prepared, memory.ends, min(place, unsigned{kSlots}), held);
       const glm::vec3 moved = moved_by(m, from_first);
       from_first.z += float{kStepsPerVoxel};
       return moved;
@@ -637,7 +576,7 @@ struct TileWorker {
     }
     HeldWeighing m{};
     unsigned held = ~0u;
-    m.hold(memory, min(place, unsigned{kSlots}), held);
+    m.hold(memory.prepared, memory.ends, min(place, unsigned{kSlots}), held);
     const glm::vec3 moved = moved_by(m, glm::vec3(in_tile * kStepsPerVoxel));
     if (moved.x == moved.x) return write_out_of_line(sink, out, at, detail::to_offset(moved));
     return write_slowly(task, sink, tetrahedron(memory.numbers[place]), out, at, signs);

@@ -4,6 +4,7 @@
 
 #include "cuda/gather.h"
 #include "cuda/voxel_sink.cuh"
+#include "cuda/weighing.cuh"
 #include "deform/core/row_interval.h"
 
 namespace tetwarp::cuda_detail {
@@ -14,7 +15,7 @@ constexpr int kTileI = 32, kTileJ = 8, kTileK = 16;  ///< voxels of a tile
 constexpr int kTileRows = kTileJ * kTileK;
 constexpr int kTileThreads = 32 * kTileJ;  ///< a warp a column of rows
 constexpr int kTileBlocks = 4;             ///< a multiprocessor
-constexpr int kSlots = 64;                 ///< tetrahedra whose faces are prepared at a time
+constexpr int kSlots = 128;                ///< tetrahedra whose arithmetic is prepared at a time
 constexpr int kRowStride = kTileI + 1;     ///< so that a column of rows lies in different banks
 static_assert(kTileI <= kMostRowTile && kTileJ <= kMostRowTile && kTileK <= kMostRowTile);
 
@@ -65,13 +66,17 @@ __global__ void list_kernel(MeshTask task) {
 /// The shared memory of a tile.
 template <bool kCountsOwners>
 struct TileMemory {
-  RowFaces faces[kSlots];
+  /// A tetrahedron of the list, and the rows that it may reach.
   struct Slot {
     unsigned number;
     short y_begin, y_end, z_begin, z_end;
-    bool has_faces;
-  } slots[kSlots];
-  unsigned owner[kTileRows * kRowStride];
+    short lower;  ///< of `RowFaces`; 0: exact integers must say
+  };
+  float4 prepared[kSlots + 1][kQuads];  ///< faces, and then `Weighing`, the last nobody's
+  float ends[kSlots + 1];               ///< the last float of each `Weighing`
+  Slot slots[kSlots];
+  unsigned numbers[kSlots];                ///< before they are sorted
+  unsigned owner[kTileRows * kRowStride];  ///< slot where all have one, else number; or kNoTetrahedron
   unsigned several[kCountsOwners ? kTileRows * kRowStride : 1];
   unsigned covered;
 
@@ -88,12 +93,23 @@ __device__ __noinline__ glm::vec3 interpolate_exactly(MeshRaster::View mesh, uns
                                                       glm::i32vec3 signs) {
   return interpolate_u_exactly(mesh.tetrahedron(number), steps, signs);
 }
+template <class Sink>
+__device__ __noinline__ bool write_out_of_line(const Sink& sink, int out, glm::ivec3 at, glm::vec3 u) {
+  return sink.write(out, at, u);
+}
+template <class Sink>
+__device__ __noinline__ bool write_slowly(const MeshRaster::View& mesh, const Sink& sink, unsigned number, int out,
+                                          glm::ivec3 at, glm::i32vec3 signs) {
+  return sink.write(out, at, interpolate_u(mesh.tetrahedron(number), at * kStepsPerVoxel, signs));
+}
 
 /// A thread block at work on a tile, or the part of it that a box has.
 template <bool kCountsOwners>
 struct TileWorker {
+  using Memory = TileMemory<kCountsOwners>;
+
   const MeshTask& task;
-  TileMemory<kCountsOwners>& memory;
+  Memory& memory;
   IntBox voxels;
   glm::ivec3 size;
   glm::i32vec3 signs;
@@ -104,86 +120,227 @@ struct TileWorker {
       memory.owner[n] = kNoTetrahedron;
       if constexpr (kCountsOwners) memory.several[n] = 0;
     }
-    if (thread == 0) memory.covered = 0;
+    if (thread != 0) return;
+    memory.prepared[kSlots][0] = make_float4(0, 0, 0, kNoNumber);
+    memory.covered = 0;
   }
 
   __device__ void prepare(int slot, unsigned number) const {
     const Tetrahedron t = task.mesh.tetrahedron(number);
     const VoxelBox reached =
         detail::candidates(task.mesh.nudge, box_of(t), {glm::i64vec3(voxels.begin), glm::i64vec3(voxels.end)});
-    typename TileMemory<kCountsOwners>::Slot& to = memory.slots[slot];
-    to = {number, 0, 0, 0, 0, false};
+    typename Memory::Slot& to = memory.slots[slot];
+    to = {number, 0, 0, 0, 0, 0};
     if (detail::is_empty(reached)) return;
     to.y_begin = static_cast<short>(reached.begin.y - voxels.begin.y);
     to.y_end = static_cast<short>(reached.end.y - voxels.begin.y);
     to.z_begin = static_cast<short>(reached.begin.z - voxels.begin.z);
     to.z_end = static_cast<short>(reached.end.z - voxels.begin.z);
-    to.has_faces = make_row_faces(t, voxels.begin, signs, size, memory.faces[slot]);
+    RowFaces faces;
+    if (!make_row_faces(t, voxels.begin, signs, size, faces)) return;
+    to.lower = static_cast<short>(faces.lower);
+    for (int n = 0; n < 4; ++n) {
+      const RowFace& face = faces.faces[n];
+      memory.prepared[slot][n] = make_float4(face.at, face.along_y, face.along_z, face.error);
+    }
   }
 
-  __device__ void mark(int slot, int y, int z) const {
+  __device__ RowFaces faces_of(int slot) const {
+    RowFaces t;
+#pragma unroll
+    for (int n = 0; n < 4; ++n) {
+      const float4 face = memory.prepared[slot][n];
+      t.faces[n] = {face.x, face.y, face.z, face.w};
+    }
+    t.lower = memory.slots[slot].lower;
+    return t;
+  }
+
+  /// @param owner  to be the voxels' owner, where it is the lowest
+  __device__ void mark(int slot, int y, int z, unsigned owner) const {
     const auto& of = memory.slots[slot];
     if (y < of.y_begin || y >= of.y_end || z < of.z_begin || z >= of.z_end) return;
     bool is_certain = false;
     RowInterval in{0, 0};
-    if (of.has_faces) in = RowsAlongZ(memory.faces[slot], y).interval(z, size.x, is_certain);
+    if (of.lower != 0) in = RowsAlongZ(faces_of(slot), y).interval(z, size.x, is_certain);
     if (!is_certain) in = exactly(task.mesh, of.number, voxels.begin, signs, y, z, size.x);
     const int row = memory.row(y, z);
     for (int x = in.begin; x < in.end; ++x) {
-      atomicMin(&memory.owner[row + x], of.number);
+      atomicMin(&memory.owner[row + x], owner);
       if constexpr (kCountsOwners) atomicAdd(&memory.several[row + x], 1u);
     }
   }
 
-  /// All tetrahedra of the tile, as many at a time as there is room for.
-  __device__ void rasterise(unsigned long long first, unsigned long long last) const {
-    for (; first < last; first += kSlots) {
-      const int slots = static_cast<int>(min(last - first, static_cast<unsigned long long>(kSlots)));
+  __device__ void mark_all(int slots, bool by_slot) const {
+    for (int item = thread; item < slots * kTileRows; item += kTileThreads) {
+      const int slot = item / kTileRows;
+      mark(slot, item % kTileJ, item % kTileRows / kTileJ,
+           by_slot ? static_cast<unsigned>(slot) : memory.slots[slot].number);
+    }
+  }
+
+  /// A list for which there is room, in the order of the numbers. @param list  of the tile's tetrahedra, in any
+  __device__ void rasterise_few(const unsigned* list, int count) const {
+    static_assert(kSlots <= kTileThreads);
+    unsigned number = kNoTetrahedron;
+    if (thread < count) memory.numbers[thread] = number = list[thread];
+    __syncthreads();
+    if (thread < count) {
+      int slot = 0;
+      for (int n = 0; n < count; ++n) slot += memory.numbers[n] < number;
+      prepare(slot, number);
+    }
+    __syncthreads();
+    mark_all(count, true);
+    __syncthreads();
+    if (thread < count) weigh(thread);
+    __syncthreads();
+  }
+
+  /// Any list, as many at a time as there is room for.
+  __device__ void rasterise_many(const unsigned* list, unsigned long long count) const {
+    for (unsigned long long from = 0; from < count; from += kSlots) {
+      const int slots = static_cast<int>(min(count - from, static_cast<unsigned long long>(kSlots)));
       __syncthreads();
-      if (thread < slots) prepare(thread, task.numbers[first + static_cast<unsigned>(thread)]);
+      if (thread < slots) prepare(thread, list[from + static_cast<unsigned>(thread)]);
       __syncthreads();
-      for (int item = thread; item < slots * kTileRows; item += kTileThreads)
-        mark(item / kTileRows, item % kTileJ, item % kTileRows / kTileJ);
+      mark_all(slots, false);
     }
     __syncthreads();
   }
 
-  /// The voxels of one lane: a column along k. @return how many are covered
+  /// What the voxels of a tetrahedron need, in the place of its faces.
+  __device__ void weigh(int slot) const {
+    const Tetrahedron t = task.mesh.tetrahedron(memory.slots[slot].number);
+    const glm::i32vec3& d = t.d.deformed;
+    const auto further = [&](const Vertex& v) { return glm::vec3(t.d.u - v.u); };
+    prepare_weighing(glm::vec3(t.a.deformed - d), glm::vec3(t.b.deformed - d), glm::vec3(t.c.deformed - d),
+                     glm::vec3(voxels.begin * kStepsPerVoxel - d),
+                     {glm::vec3(-t.d.u), further(t.a), further(t.b), further(t.c)}, memory.prepared[slot],
+                     memory.ends[slot]);
+    if (is_long(t)) memory.prepared[slot][0].w = kNoNumber;
+  }
+
+  /// The voxels of one lane, a column along k, where slots own. @return how many are covered
   template <class Sink>
-  __device__ unsigned finish(const Sink& sink) const {
+  __device__ unsigned sample_few(const Sink& sink) const {
     const int lane = thread & 31, y = thread / 32;
     if (lane >= size.x || y >= size.y) return 0;
+    const unsigned* owner = &memory.owner[memory.row(y, 0) + lane];
+    glm::vec3 from_first(lane * kStepsPerVoxel, y * kStepsPerVoxel, 0);
     glm::ivec3 at = voxels.begin + glm::ivec3(lane, y, 0);
+    unsigned column = sink.column(at), held = ~0u, left = 0;
     int out = sink.place(at);
+    HeldWeighing m{};
+    typename Sink::Pending pending{};
+    const auto next_moved = [&] {
+      m.hold(memory.prepared, memory.ends, min(*owner, unsigned{kSlots}), held);
+      owner += kTileJ * kRowStride;
+      const glm::vec3 moved = moved_by(m, from_first);
+      from_first.z += float{kStepsPerVoxel};
+      return moved;
+    };
+    const auto begin = [&](const glm::vec3& moved) {
+      typename Sink::Origin origin;
+      const bool any = sink.template locate<false>(at, column, moved, origin);
+      sink.begin(origin, any, pending);
+      if (!any) left |= 1;
+      column += sink.per_source_slice();
+      ++at.z;
+    };
+    begin(next_moved());
+#pragma unroll 1
+    for (int z = 1; z < size.z; ++z) {
+      const glm::vec3 moved = next_moved();
+      left <<= 1;
+      if (moved.x == moved.x) {  // a branch, so that nothing of it is moved before what is read meanwhile
+        sink.end(out, pending);
+      } else {
+        left |= 2;
+      }
+      out += sink.per_slice();
+      begin(moved);
+    }
+    sink.end(out, pending);
+    unsigned covered = static_cast<unsigned>(size.z - __popc(left));
+#pragma unroll 1
+    for (; left != 0; left &= left - 1) covered += finish_voxel(sink, lane, y, size.z - __ffs(static_cast<int>(left)));
+    return covered;
+  }
+  /// A voxel that `sample_few` has not written. @return whether it is covered
+  template <class Sink>
+  __device__ bool finish_voxel(const Sink& sink, int x, int y, int z) const {
+    const glm::ivec3 in_tile(x, y, z), at = voxels.begin + in_tile;
+    const int out = sink.place(at);
+    const unsigned slot = memory.owner[memory.row(y, z) + x];
+    if (slot == kNoTetrahedron) {
+      sink.nothing(out);
+      return false;
+    }
+    HeldWeighing m{};
+    unsigned held = ~0u;
+    m.hold(memory.prepared, memory.ends, slot, held);
+    const glm::vec3 moved = moved_by(m, glm::vec3(in_tile * kStepsPerVoxel));
+    if (moved.x == moved.x) return write_out_of_line(sink, out, at, detail::to_offset(moved));
+    return write_slowly(task.mesh, sink, memory.slots[slot].number, out, at, signs);
+  }
+
+  /// The same where numbers own: a tetrahedron's map is made when a column enters it.
+  template <class Sink>
+  __device__ unsigned sample_many(const Sink& sink) const {
     unsigned covered = 0, held = kNoTetrahedron;
     TetrahedronMap map(Tetrahedron{});
-    for (int z = 0; z < size.z; ++z, ++at.z, out += sink.per_slice()) {
-      const int place = memory.row(y, z) + lane;
+    for_each_of_column(sink, [&](const glm::ivec3& at, int place, int out) {
       const unsigned number = memory.owner[place];
-      if constexpr (std::is_same_v<Sink, OwnerSink>) {
-        sink.owner[out] = number;
-        if constexpr (kCountsOwners) sink.several[out] = static_cast<std::uint16_t>(min(memory.several[place], 65535u));
-      } else if constexpr (std::is_same_v<Sink, HoleSink>) {
-        if (number == kNoTetrahedron) sink.nothing(out);
-      } else {
-        if (number == kNoTetrahedron) {
-          sink.nothing(out);
-          continue;
-        }
-        if (number != held) map = TetrahedronMap(task.mesh.tetrahedron(number));
-        held = number;
-        const glm::i32vec3 steps = at * kStepsPerVoxel;
-        const glm::vec3 u = map.u(steps, [&] { return interpolate_exactly(task.mesh, number, steps, signs); });
-        covered += sink.write(out, at, u);
-      }
-    }
+      if (number == kNoTetrahedron) return sink.nothing(out);
+      if (number != held) map = TetrahedronMap(task.mesh.tetrahedron(number));
+      held = number;
+      const glm::i32vec3 steps = at * kStepsPerVoxel;
+      covered +=
+          sink.write(out, at, map.u(steps, [&] { return interpolate_exactly(task.mesh, number, steps, signs); }));
+    });
     return covered;
+  }
+
+  /// Calls `work(voxel, its place in `owner`, its place in the output)` for the voxels of one lane.
+  template <class Sink, class Work>
+  __device__ void for_each_of_column(const Sink& sink, Work&& work) const {
+    const int lane = thread & 31, y = thread / 32;
+    if (lane >= size.x || y >= size.y) return;
+    glm::ivec3 at = voxels.begin + glm::ivec3(lane, y, 0);
+    int out = sink.place(at);
+    for (int z = 0; z < size.z; ++z, ++at.z, out += sink.per_slice()) work(at, memory.row(y, z) + lane, out);
+  }
+
+  __device__ unsigned finish(const OwnerSink& sink, bool is_few) const {
+    for_each_of_column(sink, [&](const glm::ivec3&, int place, int out) {
+      const unsigned owner = memory.owner[place];
+      sink.owner[out] = is_few && owner != kNoTetrahedron ? memory.slots[owner].number : owner;
+      if constexpr (kCountsOwners) sink.several[out] = static_cast<std::uint16_t>(min(memory.several[place], 65535u));
+    });
+    return 0;
+  }
+  __device__ unsigned finish(const HoleSink& sink, bool) const {
+    for_each_of_column(sink, [&](const glm::ivec3&, int place, int out) {
+      if (memory.owner[place] == kNoTetrahedron) sink.nothing(out);
+    });
+    return 0;
+  }
+  template <class Sink>
+  __device__ unsigned finish(const Sink& sink, bool is_few) const {
+    return is_few ? sample_few(sink) : sample_many(sink);
   }
 };
 
+template <class Sink>
+constexpr bool is_wide() {
+  if constexpr (requires { Sink::kIsWide; }) return Sink::kIsWide;
+  return false;
+}
+
 /// A block a tile that the box reaches.
 template <bool kCountsOwners, class Sink>
-__global__ void __launch_bounds__(kTileThreads, kTileBlocks)
+__global__ void __launch_bounds__(kTileThreads, is_wide<Sink>() ? kTileBlocks - 1 : kTileBlocks)
     mesh_tile_kernel(const __grid_constant__ MeshTask task, const __grid_constant__ IntBox box,
                      const __grid_constant__ glm::ivec3 first_tile, const __grid_constant__ Sink sink,
                      unsigned long long* covered) {
@@ -200,8 +357,14 @@ __global__ void __launch_bounds__(kTileThreads, kTileBlocks)
                                          static_cast<int>(threadIdx.x)};
   worker.clear();
   const int number = task.number_of(tile);
-  worker.rasterise(task.first[number], task.first[number + 1]);
-  const unsigned found = warp_sum(worker.finish(sink));
+  const unsigned long long first = task.first[number], count = task.first[number + 1] - first;
+  const bool is_few = count <= kSlots;
+  if (is_few) {
+    worker.rasterise_few(task.numbers + first, static_cast<int>(count));
+  } else {
+    worker.rasterise_many(task.numbers + first, count);
+  }
+  const unsigned found = warp_sum(worker.finish(sink, is_few));
   if ((worker.thread & 31) == 0) atomicAdd(&memory.covered, found);
   __syncthreads();
   if (worker.thread == 0 && memory.covered != 0) atomicAdd(covered, static_cast<unsigned long long>(memory.covered));

@@ -1,5 +1,6 @@
 #include "deform/field_quality.h"
 
+#include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
@@ -53,24 +54,26 @@ class Tally {
       : inverse_(glm::inverse(from_lattice)), over_rest_(1 / glm::determinant(from_lattice)) {}
 
   /// @param gradient  of the deformed place by vertex index
-  void add(const dmat3& gradient, std::uint64_t sixths) {
-    const double determinant = glm::determinant(gradient) * over_rest_;
+  void add(const dmat3& gradient, std::uint64_t part) {
+    add(gradient * inverse_, glm::determinant(gradient) * over_rest_, part);
+  }
+  /// @param f  gradient of the deformed by the undeformed place
+  void add(const dmat3& f, double determinant, std::uint64_t part) {
     const auto bin = std::upper_bound(FieldQuality::kEdges.begin(), FieldQuality::kEdges.end(), determinant) -
                      FieldQuality::kEdges.begin();
-    sixths_[static_cast<std::size_t>(bin)] += sixths;
-    const dmat3 f = gradient * inverse_;
+    parts_[static_cast<std::size_t>(bin)] += part;
     if (bound(f) * kAboveRounding <= largest_) return;
     const Characteristic of(glm::transpose(f) * f);
     if (!of.is_below(largest_)) largest_ = std::max(largest_, of.largest_root());
   }
-  void add_at_rest(std::uint64_t sixths) {
+  void add_at_rest(std::uint64_t part) {
     constexpr auto kOne =
         std::upper_bound(FieldQuality::kEdges.begin(), FieldQuality::kEdges.end(), 1.0) - FieldQuality::kEdges.begin();
-    sixths_[static_cast<std::size_t>(kOne)] += sixths;
+    parts_[static_cast<std::size_t>(kOne)] += part;
     largest_ = std::max(largest_, 1.0);
   }
   void add_to(FieldQuality& quality) const {
-    for (std::size_t bin = 0; bin < sixths_.size(); ++bin) quality.sixths[bin] += sixths_[bin];
+    for (std::size_t bin = 0; bin < parts_.size(); ++bin) quality.parts[bin] += parts_[bin];
     quality.largest_stretch = std::max(quality.largest_stretch, std::sqrt(largest_));
   }
 
@@ -87,7 +90,7 @@ class Tally {
 
   const dmat3 inverse_;
   const double over_rest_;
-  decltype(FieldQuality::sixths) sixths_{};
+  decltype(FieldQuality::parts) parts_{};
   double largest_ = 0;
 };
 
@@ -106,6 +109,40 @@ void add_cell(const dvec3 (&u)[8], bool odd, const dmat3& from_lattice, Tally& t
   tally.add(from_lattice + dmat3(b + c - a, a + c - b, a + b - c), 2);
 }
 
+dmat3 edges_of(const dvec3& a, const dvec3& b, const dvec3& c, const dvec3& d) { return {a - d, b - d, c - d}; }
+
+FieldQuality quality_of(const TetrahedralMesh& mesh, const Limits& limits, const Control& control) {
+  constexpr std::size_t kGrain = 4096;
+  constexpr double kParts = std::uint64_t{1} << 40;
+  const auto rest_edges = [&](const glm::u32vec4& t) {
+    return edges_of(mesh.rest[t.x], mesh.rest[t.y], mesh.rest[t.z], mesh.rest[t.w]);
+  };
+  double volume = 0;
+  for (const glm::u32vec4& t : mesh.tetrahedra) volume += std::abs(glm::determinant(rest_edges(t)));
+  tbb::enumerable_thread_specific<Tally> tallies(dmat3(1));
+  tbb::task_arena arena = cpu::make_arena(limits);
+  cpu::Progress progress(control, static_cast<std::int64_t>(mesh.tetrahedra.size()));
+  arena.execute([&] {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.tetrahedra.size(), kGrain), [&](const auto& range) {
+      Tally& tally = tallies.local();
+      for (std::size_t n = range.begin(); n < range.end(); ++n) {
+        const glm::u32vec4& t = mesh.tetrahedra[n];
+        const dmat3 rest = rest_edges(t);
+        const double determinant = glm::determinant(rest);
+        if (determinant == 0) continue;
+        const auto by = [&](std::uint32_t vertex) { return dvec3(mesh.displacement[vertex]); };
+        const dmat3 f = (rest + edges_of(by(t.x), by(t.y), by(t.z), by(t.w))) * glm::inverse(rest);
+        tally.add(f, glm::determinant(f),
+                  static_cast<std::uint64_t>(std::rint(std::abs(determinant) / volume * kParts)));
+      }
+      progress.done(static_cast<std::int64_t>(range.size()));
+    });
+  });
+  FieldQuality quality;
+  for (const Tally& tally : tallies) tally.add_to(quality);
+  return quality;
+}
+
 std::string format(const char* form, double value) {
   char text[96];
   std::snprintf(text, sizeof text, form, value);
@@ -116,14 +153,15 @@ std::string format(const char* form, double value) {
 
 std::array<double, FieldQuality::kEdges.size() + 1> FieldQuality::shares() const {
   std::uint64_t all = 0;
-  for (const std::uint64_t count : sixths) all += count;
+  for (const std::uint64_t count : parts) all += count;
   std::array<double, kEdges.size() + 1> shares{};
   for (std::size_t bin = 0; bin < shares.size() && all != 0; ++bin)
-    shares[bin] = static_cast<double>(sixths[bin]) / static_cast<double>(all);
+    shares[bin] = static_cast<double>(parts[bin]) / static_cast<double>(all);
   return shares;
 }
 
 FieldQuality measure_quality(const VertexField& field, const Limits& limits, const Control& control) {
+  if (!field.mesh.is_empty()) return quality_of(field.mesh, limits, control);
   const glm::i64vec3 size = field.lattice.size;
   require(std::min({size.x, size.y, size.z}) >= 2, "a field of " + to_string(size) + " vertices has no cell");
   const dmat3 from_lattice = point_from_index(field.lattice).linear;

@@ -14,15 +14,18 @@ struct FieldQuality {
   /// Between these, and below the first and from the last on, Jacobian determinants are counted.
   static constexpr std::array<double, 7> kEdges{0, 0.25, 0.5, 0.8, 1.25, 2, 4};
 
-  std::array<std::uint64_t, kEdges.size() + 1> sixths{};  ///< of cells: a centre tetrahedron has two, the others one
+  /// Undeformed volume in each bin: sixths of a lattice's cells, of which a centre tetrahedron has two and the others
+  /// one; of a mesh, parts that are rounded to 2^-40 of all.
+  std::array<std::uint64_t, kEdges.size() + 1> parts{};
   double largest_stretch = 0;  ///< largest singular value of the forward gradient: a length in any direction, over the
                                ///< same at rest
 
-  /// Part of the lattice's volume in each bin of determinants.
+  /// Share of the undeformed volume in each bin of determinants.
   std::array<double, kEdges.size() + 1> shares() const;
 };
 
 /// One pass over the field, in parallel; the same result for any number of threads.
+/// Tetrahedra of a mesh without undeformed volume are left out.
 /// @throws InputError for a field that has no cell, Cancelled
 FieldQuality measure_quality(const VertexField& field, const Limits& limits = {}, const Control& control = {});
 

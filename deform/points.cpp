@@ -13,6 +13,7 @@
 #include "deform/core/cell_weights.h"
 #include "deform/cpu/tiles.h"
 #include "deform/field_check.h"
+#include "deform/mesh_locator.h"
 
 namespace tetwarp {
 
@@ -30,9 +31,33 @@ struct Holder {
   double least = -INFINITY;  ///< of all four weights: negative outside the tetrahedron
 };
 
-class PointMover {
+/// How far the affine map of a tetrahedron moves what it holds; mm.
+glm::dvec3 moved_by(const Tetrahedron& t, const glm::dvec3& weights, const glm::dmat3& mm_from_output) {
+  const glm::dvec3 d(t.d.u), &w = weights;
+  const glm::dvec3 u =
+      d + w.x * (glm::dvec3(t.a.u) - d) + w.y * (glm::dvec3(t.b.u) - d) + w.z * (glm::dvec3(t.c.u) - d);
+  return u == glm::dvec3(0) ? u : mm_from_output * (u * (-1.0 / kStepsPerVoxel));
+}
+
+/// Adds it, so that a point that does not move keeps its bits.
+void add_move(const glm::dvec3& by, glm::dvec3& point) {
+  if (by != glm::dvec3(0)) point += by;
+}
+
+}  // namespace
+
+/// A field as points see it.
+class PointMover::Map {
  public:
-  PointMover(const Geometry& output, const FieldView& field)
+  virtual ~Map() = default;
+  virtual PointStatus move(glm::dvec3& point) const = 0;
+};
+
+namespace {
+
+class LatticeMap final : public PointMover::Map {
+ public:
+  LatticeMap(const Geometry& output, const FieldView& field)
       : field_(field),
         frame_(make_lattice_frame(output, field)),
         lattice_from_point_(index_from_point(*field.lattice)),
@@ -42,7 +67,7 @@ class PointMover {
       slack_[axis] = kOnBorder / glm::length(frame_.output_from_lattice.linear[axis]);
   }
 
-  PointStatus move(glm::dvec3& point) const;
+  PointStatus move(glm::dvec3& point) const override;
 
  private:
   static bool is_odd(const glm::i64vec3& cell) { return ((cell.x + cell.y + cell.z) & 1) != 0; }
@@ -57,7 +82,7 @@ class PointMover {
   glm::dvec3 slack_{0};  ///< kOnBorder in cells
 };
 
-Vertex PointMover::vertex(const glm::i64vec3& cell, int corner) const {
+Vertex LatticeMap::vertex(const glm::i64vec3& cell, int corner) const {
   const glm::i64vec3 at = cell + glm::i64vec3(corner & 1, corner >> 1 & 1, corner >> 2);
   const glm::i64vec3& size = field_.lattice->size;
   Vertex result;
@@ -66,7 +91,7 @@ Vertex PointMover::vertex(const glm::i64vec3& cell, int corner) const {
 }
 
 /// @param steps  a point of output index in 2^-12 voxel, not rounded
-Holder PointMover::hold(const glm::i64vec3& cell, const TetrahedronCorners& corners, const glm::dvec3& steps) const {
+Holder LatticeMap::hold(const glm::i64vec3& cell, const TetrahedronCorners& corners, const glm::dvec3& steps) const {
   Holder holder;
   Tetrahedron& t = holder.tetrahedron;
   t = {vertex(cell, corners.a), vertex(cell, corners.b), vertex(cell, corners.c), vertex(cell, corners.d)};
@@ -80,7 +105,7 @@ Holder PointMover::hold(const glm::i64vec3& cell, const TetrahedronCorners& corn
 
 /// The tetrahedron that holds a point best, of a cell and its neighbours: snapping moves the faces of undeformed
 /// tetrahedra by up to 2^-13 voxel, so the point may be beyond a face of the one that held it before.
-Holder PointMover::search_around(const glm::i64vec3& cell, const glm::dvec3& steps) const {
+Holder LatticeMap::search_around(const glm::i64vec3& cell, const glm::dvec3& steps) const {
   const glm::i64vec3 begin = glm::max(cell - std::int64_t{1}, glm::i64vec3(0));
   const glm::i64vec3 end = glm::min(cell + std::int64_t{2}, frame_.cells);
   Holder best;
@@ -98,7 +123,7 @@ Holder PointMover::search_around(const glm::i64vec3& cell, const glm::dvec3& ste
   return best;
 }
 
-PointStatus PointMover::move(glm::dvec3& point) const {
+PointStatus LatticeMap::move(glm::dvec3& point) const {
   const glm::dvec3 at = lattice_from_point_(point);
   glm::i64vec3 cell;
   for (int axis = 0; axis < 3; ++axis) {
@@ -110,30 +135,65 @@ PointStatus PointMover::move(glm::dvec3& point) const {
   const CellWeights guess = weights_in_cell(glm::clamp(at - glm::dvec3(cell), 0.0, 1.0), is_odd(cell));
   Holder holder = hold(cell, guess.corners, steps);
   if (!(holder.least >= -kRounding)) holder = search_around(cell, steps);
-  const Tetrahedron& t = holder.tetrahedron;
-  const glm::dvec3 d(t.d.u), &w = holder.weights;
-  const glm::dvec3 u =
-      d + w.x * (glm::dvec3(t.a.u) - d) + w.y * (glm::dvec3(t.b.u) - d) + w.z * (glm::dvec3(t.c.u) - d);
-  if (u != glm::dvec3(0)) point -= mm_from_output_ * (u * (1.0 / kStepsPerVoxel));
+  add_move(moved_by(holder.tetrahedron, holder.weights, mm_from_output_), point);
   return PointStatus::moved;
 }
 
+class MeshMap final : public PointMover::Map {
+ public:
+  MeshMap(const Geometry& output, const TetrahedralMesh& mesh, const Control& control)
+      : mesh_(snap_mesh(output, mesh, control)),
+        locator_(mesh_),
+        output_from_point_(index_from_point(output)),
+        mm_from_output_(point_from_index(output).linear) {}
+
+  PointStatus move(glm::dvec3& point) const override {
+    const auto found = locator_.find(output_from_point_(point) * double{kStepsPerVoxel});
+    if (!found) return PointStatus::outside;
+    add_move(moved_by(mesh_.tetrahedron(found->tetrahedron), found->weights, mm_from_output_), point);
+    return PointStatus::moved;
+  }
+
+ private:
+  const SnappedMesh mesh_;
+  const MeshLocator locator_;
+  const AffineMap output_from_point_;
+  const glm::dmat3 mm_from_output_;
+};
+
 }  // namespace
 
-std::vector<PointStatus> move_points(const Geometry& output, const FieldView& field, std::span<glm::dvec3> points,
-                                     Limits limits, const Control& control) {
+PointMover::PointMover(const Geometry& output, const FieldView& field, const Limits& limits, const Control& control)
+    : limits_(limits) {
   require(field.memory == Memory::host, "points are moved by fields in host memory");
-  const PointMover mover(output, field);
+  if (!field.mesh) {
+    map_ = std::make_unique<LatticeMap>(output, field);
+    return;
+  }
+  tbb::task_arena arena = cpu::make_arena(limits);
+  arena.execute([&] { map_ = std::make_unique<MeshMap>(output, *field.mesh, control); });
+}
+
+PointMover::~PointMover() = default;
+
+PointStatus PointMover::move(glm::dvec3& point) const { return map_->move(point); }
+
+std::vector<PointStatus> PointMover::move(std::span<glm::dvec3> points, const Control& control) const {
   std::vector<PointStatus> status(points.size());
   cpu::Progress progress(control, static_cast<std::int64_t>(points.size()));
-  tbb::task_arena arena = cpu::make_arena(limits);
+  tbb::task_arena arena = cpu::make_arena(limits_);
   arena.execute([&] {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size(), 4096), [&](const auto& range) {
-      for (std::size_t n = range.begin(); n < range.end(); ++n) status[n] = mover.move(points[n]);
+      for (std::size_t n = range.begin(); n < range.end(); ++n) status[n] = move(points[n]);
       progress.done(static_cast<std::int64_t>(range.size()));
     });
   });
   return status;
+}
+
+std::vector<PointStatus> move_points(const Geometry& output, const FieldView& field, std::span<glm::dvec3> points,
+                                     Limits limits, const Control& control) {
+  return PointMover(output, field, limits, control).move(points, control);
 }
 
 }  // namespace tetwarp

@@ -157,6 +157,19 @@ TETWARP_HD inline glm::vec3 interpolate_u_exactly(const Tetrahedron& t, const gl
   return u;
 }
 
+/// Whether an edge from D is so long that float may not hold where a voxel lies from D, in 2^-12 voxel.
+TETWARP_HD inline bool is_long(const Tetrahedron& t) {
+  constexpr int kLong = (1 << 24) - (1 << 18);  // room for the voxels of a tile around
+  for (const glm::i32vec3& edge :
+       {t.a.deformed - t.d.deformed, t.b.deformed - t.d.deformed, t.c.deformed - t.d.deformed}) {
+    if (edge.x <= -kLong || edge.x >= kLong || edge.y <= -kLong || edge.y >= kLong || edge.z <= -kLong ||
+        edge.z >= kLong) {
+      return true;
+    }
+  }
+  return false;
+}
+
 /// What the voxels of a tetrahedron have in common: their u is interpolated without looking at the vertices again.
 ///
 /// Weights in float by `Cramer`, blended by `blend`: a tetrahedron that is only translated gives its translation
@@ -174,10 +187,10 @@ class TetrahedronMap {
   /// @param exactly  gives `interpolate_u_exactly`, where float has too few digits
   template <class Exactly>
   TETWARP_HD glm::vec3 u(const glm::i32vec3& steps, Exactly&& exactly) const {
-    if (is_thin_) return exactly();
+    if (is_exact_) return exactly();
     const glm::vec3 r = detail::to_voxels(steps - d_);
-    const Weights w =
-        weights_of(cramer_, detail::dot(r, cramer_.bc), detail::dot(r, cramer_.ca), detail::dot(r, cramer_.ab));
+    const Weights w{detail::dot(r, cramer_.bc) * reciprocal_, detail::dot(r, cramer_.ca) * reciprocal_,
+                    detail::dot(r, cramer_.ab) * reciprocal_};
     if (!w.within_slack()) return exactly();
     return blend(w, u_, u_a_, u_b_, u_c_);
   }
@@ -186,7 +199,8 @@ class TetrahedronMap {
   TETWARP_HD TetrahedronMap(const Tetrahedron& t, const glm::vec3& a, const glm::vec3& b, const glm::vec3& c)
       : d_(t.d.deformed),
         cramer_(a, b, c),
-        is_thin_(is_thin(cramer_, a, b, c)),
+        is_exact_(is_thin(cramer_, a, b, c) || is_long(t)),
+        reciprocal_(1.0f / cramer_.det),
         u_(detail::to_voxels(t.d.u)),
         u_a_(detail::to_voxels(t.a.u - t.d.u)),
         u_b_(detail::to_voxels(t.b.u - t.d.u)),
@@ -194,7 +208,8 @@ class TetrahedronMap {
 
   glm::i32vec3 d_;
   Cramer cramer_;
-  bool is_thin_;
+  bool is_exact_;                  ///< float has too few digits for any voxel
+  float reciprocal_;               ///< of the determinant
   glm::vec3 u_, u_a_, u_b_, u_c_;  ///< at D, and the differences from it at A, B, C
 };
 

@@ -1,3 +1,4 @@
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
@@ -43,7 +44,27 @@ VertexField sample_on(const Geometry& lattice, const PointMap& map, Limits limit
   return field;
 }
 
+namespace {
+
+void compose(TetrahedralMesh& mesh, const PointMap& next, const Limits& limits, const Control& control) {
+  constexpr std::size_t kGrain = 4096;
+  cpu::Progress progress(control, static_cast<std::int64_t>(mesh.rest.size()));
+  tbb::task_arena arena = cpu::make_arena(limits);
+  arena.execute([&] {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.rest.size(), kGrain), [&](const auto& range) {
+      for (std::size_t n = range.begin(); n < range.end(); ++n) {
+        const glm::dvec3 displacement(mesh.displacement[n]);
+        mesh.displacement[n] = glm::vec3(displacement + next(mesh.rest[n] + displacement));
+      }
+      progress.done(static_cast<std::int64_t>(range.size()));
+    });
+  });
+}
+
+}  // namespace
+
 void compose(VertexField& field, const PointMap& next, Limits limits, const Control& control) {
+  if (!field.mesh.is_empty()) return compose(field.mesh, next, limits, control);
   for_each_vertex(field, limits, control, [&](const glm::dvec3& rest, const glm::vec3& moved) {
     const glm::dvec3 displacement(moved);
     return glm::vec3(displacement + next(rest + displacement));
@@ -51,6 +72,7 @@ void compose(VertexField& field, const PointMap& next, Limits limits, const Cont
 }
 
 PointMap piecewise_affine(const VertexField& field) {
+  require(field.mesh.is_empty(), "a mesh says where its own vertices go alone; let it be the first field");
   const AffineMap lattice_from_point = index_from_point(field.lattice);
   return [&field, lattice_from_point](const glm::dvec3& point) {
     constexpr double kSlack = 1e-6;  // of a cell

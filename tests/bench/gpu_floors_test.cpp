@@ -124,6 +124,25 @@ TEST(GpuFloors, MemoryMayBeATenthOr128MegabytesMoreThanTheData) {
   expect_floor(floors, "memory / allowed", "wave, device views", 1.2, 1, false);
 }
 
+TEST(GpuFloors, MeshesAreNoSlowerThanGascon) {
+  GpuResults results = results_of({});
+  results.meshes = {{.field = "wave",
+                     .cell_size = 16,
+                     .tetrahedra = 5,
+                     .set_field_ms = ms(1),
+                     .resample_ms = ms(1),
+                     .gascon_ms = ms(2.5)},
+                    {.field = "wave",
+                     .cell_size = 32,
+                     .tetrahedra = 5,
+                     .set_field_ms = ms(1),
+                     .resample_ms = ms(2),
+                     .gascon_ms = ms(1.9)}};
+  const std::vector<Floor> floors = find_floors(results);
+  expect_floor(floors, "gascon / mesh resample", "wave, cells of 16", 2.5, 1, true);
+  expect_floor(floors, "gascon / mesh resample", "wave, cells of 32", 0.95, 1, false);
+}
+
 TEST(GpuFloors, WhatWasNotRunHasNoFloor) {
   EXPECT_TRUE(find_floors(results_of({})).empty());
   EXPECT_TRUE(find_floors(results_of({make_run("wave", 1, 1, {}, 1, 600)})).empty());
@@ -135,6 +154,12 @@ GpuResults small_results() {
   GpuResults results = results_of({run, make_run("wave", 1, 3, 5, 4), make_run("wave", 2, 2, {}, 1, 600)});
   results.input_kind = "phantom";
   results.machine.gpu = "A GPU";
+  results.meshes = {{.field = "wave",
+                     .cell_size = 32,
+                     .tetrahedra = 77,
+                     .set_field_ms = ms(4),
+                     .resample_ms = ms(1.25),
+                     .gascon_ms = ms(2.5)}};
   results.loops = {{.cell_size = 1, .kernels = 500, .with_copies = 50, .copies_alone = 55, .host_views = 5}};
   results.memory = {{.field = "wave", .data = 1000, .host_views = 1100, .device_views = 50}};
   return results;
@@ -152,6 +177,8 @@ TEST(GpuReport, JsonHasEveryNumberAndEveryFloor) {
   EXPECT_EQ(document["runs"][0]["paper_ms"]["median"], 5.0);
   EXPECT_EQ(document["runs"][0]["report"]["covered"], 7);
   EXPECT_TRUE(document["runs"][0]["gascon_ms"].is_null());
+  EXPECT_EQ(document["meshes"][0]["tetrahedra"], 77);
+  EXPECT_EQ(document["meshes"][0]["gascon_ms"]["median"], 2.5);
   EXPECT_EQ(document["frame_loops"][0]["copies_alone_per_s"], 55.0);
   EXPECT_EQ(document["memory"][0]["allowed_bytes"], 128'001'000);
   ASSERT_EQ(document["floors"].size(), floors.size());
@@ -162,10 +189,11 @@ TEST(GpuReport, JsonHasEveryNumberAndEveryFloor) {
 TEST(GpuReport, MarkdownHasTheTablesAndWhatCameOfTheFloors) {
   const GpuResults results = small_results();
   const std::string text = to_markdown(results, find_floors(results));
-  EXPECT_TRUE(says(text, {"# tetwarp-bench gpu", "A GPU", "512 x 512 x 300", "## A vertex on every voxel",
-                          "## Larger cells", "## Other lengths", "512 x 512 x 600", "## Frames per second", "## Memory",
-                          "## Floors", "| paper / resample | wave | 5.000 | at least 6 | missed | at least 15 | not",
-                          "| memory / allowed | wave, host views | 0.000 | at most 1 | met |  |  |"}));
+  EXPECT_TRUE(says(
+      text, {"# tetwarp-bench gpu", "A GPU", "512 x 512 x 300", "## A vertex on every voxel", "## Larger cells",
+             "## Meshes", "| wave | 32 | 77 |", "## Other lengths", "512 x 512 x 600", "## Frames per second",
+             "## Memory", "## Floors", "| paper / resample | wave | 5.000 | at least 6 | missed | at least 15 | not",
+             "| memory / allowed | wave, host views | 0.000 | at most 1 | met |  |  |"}));
 }
 
 }  // namespace

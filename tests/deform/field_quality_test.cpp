@@ -37,10 +37,10 @@ TEST(FieldQuality, OfAnAffineMapIsItsDeterminantAndLargestSingularValue) {
     const Geometry lattice = oblique_grid({5, 4, 6});
     const FieldQuality quality = measure_quality(affine_field(lattice, to));
     const double determinant = stretches.x * stretches.y * stretches.z;
-    for (std::size_t bin = 0; bin < quality.sixths.size(); ++bin) {
+    for (std::size_t bin = 0; bin < quality.parts.size(); ++bin) {
       const bool above = bin == 0 || determinant >= FieldQuality::kEdges[bin - 1] - 1e-6,
                  below = bin == FieldQuality::kEdges.size() || determinant < FieldQuality::kEdges[bin];
-      EXPECT_EQ(quality.sixths[bin], above && below ? 6U * 4 * 3 * 5 : 0U) << determinant << " in bin " << bin;
+      EXPECT_EQ(quality.parts[bin], above && below ? 6U * 4 * 3 * 5 : 0U) << determinant << " in bin " << bin;
     }
     EXPECT_NEAR(quality.largest_stretch, std::max({stretches.x, stretches.y, std::abs(stretches.z)}), 1e-4);
   }
@@ -57,16 +57,16 @@ TEST(FieldQuality, CountsWhatTheResamplerCountsAndAddsUpToTheLattice) {
   resampler->set_field(view(field));
   const Report report = resampler->resample(whole(grid), {});
   const FieldQuality one = measure_quality(field, {.threads = 1}), quality = measure_quality(field);
-  EXPECT_EQ(one.sixths, quality.sixths);
+  EXPECT_EQ(one.parts, quality.parts);
   EXPECT_EQ(one.largest_stretch, quality.largest_stretch);
   const glm::i64vec3 cells = field.lattice.size - std::int64_t{1};
-  EXPECT_EQ(std::accumulate(quality.sixths.begin(), quality.sixths.end(), std::uint64_t{0}),
+  EXPECT_EQ(std::accumulate(quality.parts.begin(), quality.parts.end(), std::uint64_t{0}),
             static_cast<std::uint64_t>(6 * cells.x * cells.y * cells.z));
   // A tetrahedron has one sixth or two.
   EXPECT_GT(report.inverted, 0U);
-  EXPECT_GE(quality.sixths.front(), report.inverted);
-  EXPECT_LE(quality.sixths.front(), 2 * report.inverted);
-  EXPECT_GT(quality.sixths.back() + quality.sixths[6], 0U);
+  EXPECT_GE(quality.parts.front(), report.inverted);
+  EXPECT_LE(quality.parts.front(), 2 * report.inverted);
+  EXPECT_GT(quality.parts.back() + quality.parts[6], 0U);
   EXPECT_NE(verdict(report, quality, {}).find(std::to_string(report.inverted) + " tetrahedra are inverted"),
             std::string::npos);
 }

@@ -3,6 +3,10 @@
 #include <glm/common.hpp>
 #include <limits>
 
+#include "deform/field_quality.h"
+#include "deform/fields/lattice_mesh.h"
+#include "deform/fields/point_map.h"
+#include "deform/points.h"
 #include "tests/support/against_oracle.h"
 #include "tests/support/backends.h"
 #include "tests/support/fields.h"
@@ -21,6 +25,29 @@ Geometry any_grid(Random& random, const glm::i64vec3& size) {
 }
 
 glm::dvec3 last_of(const Geometry& grid) { return glm::dvec3(grid.size - std::int64_t{1}); }
+
+/// Without maps, one volume and two: a backend may have other ways then.
+void expect_same_volumes(Resampler& resampler, const Volume<std::int16_t>& source, const VertexField& lattice,
+                         const VertexField& mesh, Random& random) {
+  const Geometry& grid = source.geometry;
+  const auto labels = random_values<std::uint8_t>(grid, random, 0, 5);
+  for (const std::size_t targets : {1, 2}) {
+    auto expected = poisoned<std::int16_t>(grid), found = expected;
+    auto expected_labels = poisoned<std::uint8_t>(grid), found_labels = expected_labels;
+    const auto send = [&](const VertexField& field, Volume<std::int16_t>& volume, Volume<std::uint8_t>& of_labels) {
+      const Target both[] = {
+          {.source = view(source), .output = view(volume), .background = -7},
+          {.source = view(labels), .output = view(of_labels), .interpolation = Interpolation::vote, .background = 9}};
+      resampler.set_field(view(field, Outside::background));
+      return resampler.resample(whole(grid), std::span(both).first(targets));
+    };
+    const Report of_lattice = send(lattice, expected, expected_labels), of_mesh = send(mesh, found, found_labels);
+    EXPECT_TRUE(same_bits(expected.voxels, found.voxels)) << targets << " volumes";
+    EXPECT_TRUE(same_bits(expected_labels.voxels, found_labels.voxels)) << "labels";  // poisoned both, or written
+    EXPECT_EQ(of_lattice.covered, of_mesh.covered);
+    EXPECT_EQ(of_lattice.uncovered, of_mesh.uncovered);
+  }
+}
 
 TEST_P(Meshes, TheTetrahedraOfALatticeGiveWhatTheLatticeGives) {
   const std::uint64_t seed = test_seed();
@@ -49,6 +76,7 @@ TEST_P(Meshes, TheTetrahedraOfALatticeGiveWhatTheLatticeGives) {
     EXPECT_EQ(expected.report.inverted, found.report.inverted);
     EXPECT_EQ(expected.report.multiply_owned, found.report.multiply_owned);
     folded += found.report.multiply_owned.value_or(0);
+    expect_same_volumes(*resampler, source, lattice, mesh, random);
   }
   EXPECT_GT(folded, 1000u);
 }
@@ -295,6 +323,63 @@ TEST_P(Meshes, RefuseNamesTheFirstVoxelOutside) {
     EXPECT_NE(text.find("640 of 2240 voxels"), std::string::npos) << text;
     EXPECT_NE(text.find("(0, 0, 5)"), std::string::npos) << text;
   }
+}
+
+/// From a voxel to where it comes from, and forward again.
+TEST_P(Meshes, PointsGoWhereTheVolumeGoes) {
+  const std::uint64_t seed = test_seed();
+  std::uint64_t moved = 0;
+  for (std::uint64_t number = 0; number < test_cases(30) && !HasFailure(); ++number) {
+    SCOPED_TRACE(seed_text(seed) + ", mesh " + std::to_string(number));
+    Random random(seed, 12'000'000 + number);
+    const Geometry grid = any_grid(random, {33, 14, 12});
+    TetrahedralMesh mesh = random_mesh(grid, glm::dvec3(-2), last_of(grid) + 2.0, 4, random);
+    shake(mesh, grid, random.real(0, 0.5), 0, random);
+    const VertexField field = field_of(std::move(mesh));
+    const auto resampler = make(grid);
+    resampler->set_field(view(field, Outside::background));
+    const auto found = run(*resampler, smooth_source(grid));
+    const PointMover mover(grid, view(field, Outside::background));
+    const AffineMap point = point_from_index(grid), index = index_from_point(grid);
+    for_each_voxel(grid, [&](const glm::i64vec3& voxel, std::size_t n) {
+      if (found.owners.voxels[n] != 1 || found.jacobian.voxels[n] < 0.01f) return;
+      glm::dvec3 at = point(glm::dvec3(voxel)) + glm::dvec3(found.inverse_mm.voxels[n]);
+      ASSERT_EQ(mover.move(at), PointStatus::moved) << to_string(voxel);
+      ASSERT_LT(distance(index(at), glm::dvec3(voxel)), 0.02) << to_string(voxel);
+      ++moved;
+    });
+    glm::dvec3 far = point(glm::dvec3(-9, 3, 3));
+    const glm::dvec3 before = far;
+    EXPECT_EQ(mover.move(far), PointStatus::outside);
+    EXPECT_EQ(far, before);
+  }
+  EXPECT_GT(moved, 50000u);
+}
+
+/// What a lattice's points, quality and composition are, its tetrahedra have too.
+TEST_P(Meshes, EverythingElseSeesTheTetrahedraOfALatticeAsTheLattice) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE(seed_text(seed));
+  Random random(seed, 13'000'000);
+  const Geometry grid = unit_grid({20, 19, 18});
+  VertexField lattice = field_in_voxels(grid, lattice_over(grid, 3), [&](const glm::dvec3&) {
+    return glm::dvec3(random.real(-1, 1), random.real(-1, 1), random.real(-1, 1));
+  });
+  VertexField mesh = field_of(mesh_of(lattice));
+  const PointMap next = [](const glm::dvec3& at) { return glm::dvec3(0.1 * at.y, 0, -0.2 * at.x); };
+  compose(lattice, next);
+  compose(mesh, next);
+  EXPECT_TRUE(same_bits(lattice.displacement, mesh.mesh.displacement));
+  for (int n = 0; n < 1000; ++n) {
+    glm::dvec3 a(random.real(-0.5, 21), random.real(-0.5, 19), random.real(-0.5, 18)), b = a;
+    const PointStatus of_lattice = PointMover(grid, view(lattice)).move(a);
+    EXPECT_EQ(PointMover(grid, view(mesh, Outside::background)).move(b), of_lattice);
+    EXPECT_LT(distance(a, b), 1e-6);
+  }
+  const FieldQuality of_lattice = measure_quality(lattice), of_mesh = measure_quality(mesh);
+  EXPECT_NEAR(of_lattice.largest_stretch, of_mesh.largest_stretch, 1e-9);
+  for (std::size_t bin = 0; bin < of_lattice.parts.size(); ++bin)
+    EXPECT_NEAR(of_lattice.shares()[bin], of_mesh.shares()[bin], 1e-9);
 }
 
 }  // namespace

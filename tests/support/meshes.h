@@ -5,9 +5,6 @@
 
 namespace tetwarp::test {
 
-/// The tetrahedra of a lattice, with the lattice's numbers.
-TetrahedralMesh mesh_of(const VertexField& lattice);
-
 /// A mesh that fills the box between two corners of output index, with vertices where nobody would put them: planes at
 /// random distances (some edges shorter than a voxel, some much longer), inner vertices thrown about, tetrahedra in any
 /// order and orientation. Undeformed it has no gap and no overlap.

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <limits>
+
+#include "deform/core/gather.h"
+
+namespace tetwarp::cuda_detail {
+
+/// What a tetrahedron's voxels need, as it lies in shared memory: their weights by Cramer's rule, and how far its
+/// vertices are displaced.
+struct Weighing {
+  float from_d[3];   ///< from D to the first voxel of the tile, 2^-12 voxel
+  float reciprocal;  ///< of the determinant; no number: not in float
+  float bc[3], moved_x, ca[3], moved_y, ab[3], moved_z;
+  float moved_a[3], moved_b[3], moved_c[3];
+};
+constexpr int kQuads = 6;  ///< whole ones of it, of four floats
+static_assert(sizeof(Weighing) == (4 * kQuads + 1) * sizeof(float));
+
+constexpr float kNoNumber = std::numeric_limits<float>::quiet_NaN();
+
+/// How far the vertices of a tetrahedron are displaced, 2^-12 voxel: D, and how much further A, B, C are.
+struct Displaced {
+  glm::vec3 d, a, b, c;
+};
+
+/// Writes a `Weighing`. @param a, b, c  from D  @param from_d  from D to the first voxel of the tile; all exact
+__device__ inline void prepare_weighing(const glm::vec3& a, const glm::vec3& b, const glm::vec3& c,
+                                        const glm::vec3& from_d, const Displaced& moved, float4 (&to)[kQuads],
+                                        float& end) {
+  const Cramer m(a, b, c);
+  const float s = (detail::norm1(a) + detail::norm1(b)) + detail::norm1(c);
+  const bool usable = detail::magnitude(m.det) > s * s * detail::multiply_add(detail::kThinSum, s, detail::kSlackSum);
+  const auto cross = [](const detail::Cross& v, float w) { return make_float4(v.x, v.y, v.z, w); };
+  to[0] = make_float4(from_d.x, from_d.y, from_d.z, usable ? detail::reciprocal(m.det) : kNoNumber);
+  to[1] = cross(m.bc, moved.d.x);
+  to[2] = cross(m.ca, moved.d.y);
+  to[3] = cross(m.ab, moved.d.z);
+  to[4] = make_float4(moved.a.x, moved.a.y, moved.a.z, moved.b.x);
+  to[5] = make_float4(moved.b.y, moved.b.z, moved.c.x, moved.c.y);
+  end = moved.c.z;
+}
+
+/// The `Weighing` of the tetrahedron that a lane is in.
+struct HeldWeighing {
+  float values[4 * kQuads + 1];
+
+  /// Reads it, where it is not the one that is held.
+  __device__ void hold(const float4 (*prepared)[kQuads], const float* ends, unsigned place, unsigned& held) {
+    float(&v)[4 * kQuads + 1] = values;
+    const auto from = static_cast<unsigned>(__cvta_generic_to_shared(&prepared[place][0])),
+               end = static_cast<unsigned>(__cvta_generic_to_shared(&ends[place]));
+    asm volatile(
+        "{\n\t"
+        ".reg .pred p;\n\t"
+        "setp.ne.u32 p, %25, %26;\n\t"
+        "@p ld.shared.v4.f32 {%0, %1, %2, %3}, [%27];\n\t"
+        "@p ld.shared.v4.f32 {%4, %5, %6, %7}, [%27+16];\n\t"
+        "@p ld.shared.v4.f32 {%8, %9, %10, %11}, [%27+32];\n\t"
+        "@p ld.shared.v4.f32 {%12, %13, %14, %15}, [%27+48];\n\t"
+        "@p ld.shared.v4.f32 {%16, %17, %18, %19}, [%27+64];\n\t"
+        "@p ld.shared.v4.f32 {%20, %21, %22, %23}, [%27+80];\n\t"
+        "@p ld.shared.f32 %24, [%28];\n\t"
+        "}"
+        : "+f"(v[0]), "+f"(v[1]), "+f"(v[2]), "+f"(v[3]), "+f"(v[4]), "+f"(v[5]), "+f"(v[6]), "+f"(v[7]), "+f"(v[8]),
+          "+f"(v[9]), "+f"(v[10]), "+f"(v[11]), "+f"(v[12]), "+f"(v[13]), "+f"(v[14]), "+f"(v[15]), "+f"(v[16]),
+          "+f"(v[17]), "+f"(v[18]), "+f"(v[19]), "+f"(v[20]), "+f"(v[21]), "+f"(v[22]), "+f"(v[23]), "+f"(v[24])
+        : "r"(place), "r"(held), "r"(from), "r"(end));
+    held = place;
+  }
+};
+
+/// How far a voxel moved; no numbers where its weights are not for float, or it is nobody's.
+/// @param from_first  from the first voxel of the tile, 2^-12 voxel
+__device__ inline glm::vec3 moved_by(const HeldWeighing& m, const glm::vec3& from_first) {
+  const float(&v)[4 * kQuads + 1] = m.values;
+  const float x = from_first.x + v[0], y = from_first.y + v[1], z = from_first.z + v[2];
+  const auto weight = [&](int n) { return ((x * v[n] + y * v[n + 1]) + z * v[n + 2]) * v[3]; };
+  return blend({weight(4), weight(8), weight(12)}, {v[7], v[11], v[15]}, {v[16], v[17], v[18]}, {v[19], v[20], v[21]},
+               {v[22], v[23], v[24]});
+}
+
+}  // namespace tetwarp::cuda_detail

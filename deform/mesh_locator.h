@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "deform/snapped_mesh.h"
+
+namespace tetwarp {
+
+/// Finds the tetrahedron of an undeformed mesh that holds a point: they are listed by the cells of a grid over it.
+class MeshLocator {
+ public:
+  /// @param mesh  must stay as it is
+  explicit MeshLocator(const SnappedMesh& mesh);
+
+  /// A tetrahedron and the weights of its corners A, B, C at a point.
+  struct Found {
+    std::uint32_t tetrahedron;
+    glm::dvec3 weights;
+  };
+  /// The lowest that holds the point; where none does, the nearest that is no farther than one 2^-12 voxel.
+  /// @param steps  output index in 2^-12 voxel, not rounded
+  std::optional<Found> find(const glm::dvec3& steps) const;
+
+ private:
+  std::int64_t cell_on_axis(int axis, double at) const;
+
+  const SnappedMesh& mesh_;
+  glm::dvec3 low_{0}, cell_{1};         ///< 2^-12 voxel: least corner of the grid, and size of its cells
+  glm::i64vec3 cells_{0};               ///< on each axis
+  std::vector<std::size_t> first_;      ///< of each cell, i fastest, and of one more
+  std::vector<std::uint32_t> numbers_;  ///< of the tetrahedra that may reach a cell, rising
+};
+
+}  // namespace tetwarp
