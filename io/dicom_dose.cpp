@@ -52,14 +52,12 @@ class DoseFile {
     if (bits != 16 && bits != 32)
       refuse("has Bits Allocated (0028,0100) " + std::to_string(bits) + ", expected 16 or 32");
     const auto voxels = static_cast<std::size_t>(voxel_count(grid));
-    AnyVolume volume(grid, VoxelType::f32);
-    const std::span<float> doses = volume.as<float>();
-    const auto scale = [&](std::size_t n, double stored) { doses[n] = static_cast<float>(stored * scaling); };
     // Whole words of 16 bits, the low one of a value first, on this machine's order of bytes.
     const Uint16* words = nullptr;
     unsigned long count = 0;
     const E_TransferSyntax native = EXS_LittleEndianExplicit;
-    if (data().chooseRepresentation(native, nullptr).bad() ||
+    if (!is_at_most(data(), DCM_PixelData, std::filesystem::file_size(path_)) ||
+        data().chooseRepresentation(native, nullptr).bad() ||
         data().findAndGetUint16Array(DCM_PixelData, words, &count).bad() || words == nullptr) {
       refuse("has no Pixel Data (7FE0,0010) that can be read");
     }
@@ -68,6 +66,9 @@ class DoseFile {
       refuse("is cut short: Pixel Data hold " + std::to_string(count) + " words of 16 bits, expected " +
              std::to_string(expected));
     }
+    AnyVolume volume(grid, VoxelType::f32);
+    const std::span<float> doses = volume.as<float>();
+    const auto scale = [&](std::size_t n, double stored) { doses[n] = static_cast<float>(stored * scaling); };
     for (std::size_t n = 0; n < voxels; ++n) {
       const std::uint32_t value =
           bits == 16 ? words[n] : words[2 * n] | static_cast<std::uint32_t>(words[2 * n + 1]) << 16;
@@ -86,19 +87,22 @@ class DoseFile {
 
   double number(const DcmTagKey& tag, unsigned long n) {
     double value = 0;
-    if (data().findAndGetFloat64(tag, value, n).bad() || !std::isfinite(value)) {
+    if (!is_at_most(data(), tag, kLongestValue) || data().findAndGetFloat64(tag, value, n).bad() ||
+        !std::isfinite(value)) {
       refuse("has no value " + std::to_string(n + 1) + " of " + tag_name(tag));
     }
     return value;
   }
   std::int64_t word(const DcmTagKey& tag) {
     Uint16 value = 0;
-    if (data().findAndGetUint16(tag, value).bad()) refuse("has no " + tag_name(tag));
+    if (!is_at_most(data(), tag, kLongestValue) || data().findAndGetUint16(tag, value).bad())
+      refuse("has no " + tag_name(tag));
     return value;
   }
   std::int64_t whole_number(const DcmTagKey& tag) {
     Sint32 value = 0;
-    if (data().findAndGetSint32(tag, value).bad()) refuse("has no " + tag_name(tag));
+    if (!is_at_most(data(), tag, kLongestValue) || data().findAndGetSint32(tag, value).bad())
+      refuse("has no " + tag_name(tag));
     return value;
   }
 
@@ -134,7 +138,8 @@ class DoseFile {
 }  // namespace
 
 bool is_dicom_dose(const std::filesystem::path& path) {
-  if (!std::filesystem::is_regular_file(path)) return false;
+  std::error_code ignored;  // a name that no file can have
+  if (!std::filesystem::is_regular_file(path, ignored)) return false;
   prepare_dcmtk();
   DcmFileFormat format;
   if (format

@@ -83,7 +83,7 @@ std::optional<int> word_of(DcmItem& item, const DcmTagKey& tag) {
   DcmElement* element = nullptr;
   Uint16 word = 0;
   Sint16 signed_word = 0;
-  if (item.findAndGetElement(tag, element).bad()) return std::nullopt;
+  if (!is_at_most(item, tag, kLongestValue) || item.findAndGetElement(tag, element).bad()) return std::nullopt;
   if (element->getUint16(word).good()) return word;
   if (element->getSint16(signed_word).good()) return static_cast<Uint16>(signed_word);
   return std::nullopt;
@@ -182,9 +182,14 @@ void prepare_dcmtk() {
   }
 }
 
+bool is_at_most(DcmItem& item, const DcmTagKey& tag, std::uint64_t bytes) {
+  DcmElement* element = nullptr;
+  return item.findAndGetElement(tag, element).bad() || element->getLengthField() <= bytes;
+}
+
 std::string text_of(DcmItem& item, const DcmTagKey& tag) {
   OFString value;
-  if (item.findAndGetOFStringArray(tag, value).bad()) return {};
+  if (!is_at_most(item, tag, kLongestValue) || item.findAndGetOFStringArray(tag, value).bad()) return {};
   std::string text(value.c_str());  // stops at a padding zero
   const auto last = text.find_last_not_of(' ');
   return last == std::string::npos ? "" : text.substr(0, last + 1);

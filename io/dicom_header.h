@@ -62,6 +62,12 @@ DicomFileHeader header_of(DcmDataset& data);
 /// Reads a file up to Pixel Data. Never throws for what the file holds: see `skip` and `damage`.
 DicomFileHeader read_dicom_header(const std::filesystem::path& file);
 
+/// Whether the value of an attribute, if there is one, has at most so many bytes: DCMTK allocates what a damaged length
+/// asks for before it looks whether the file holds that.
+bool is_at_most(DcmItem& item, const DcmTagKey& tag, std::uint64_t bytes);
+/// Of every attribute but Pixel Data that is read here.
+constexpr std::uint64_t kLongestValue = 1 << 20;
+
 /// Text of an attribute without padding, values separated by backslashes; empty if missing.
 std::string text_of(DcmItem& item, const DcmTagKey& tag);
 

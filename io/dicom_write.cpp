@@ -49,7 +49,7 @@ DerivedSeriesWriter::DerivedSeriesWriter(std::filesystem::path folder, const Geo
           "the volume has " + std::to_string(geometry.size.z) + " slices and the source series " +
               std::to_string(source.slices.size()) + "; a derived series needs one header a slice");
   DerivedSeries series = derive_series(source, derivation);
-  state_ = std::make_unique<State>(std::move(folder), geometry, source, std::move(derivation), std::move(series));
+  state_.reset(new State{std::move(folder), geometry, source, std::move(derivation), std::move(series)});
 }
 DerivedSeriesWriter::~DerivedSeriesWriter() = default;
 

@@ -12,6 +12,12 @@
 namespace tetwarp {
 namespace {
 
+/// False also for a name that no file can have, which std::filesystem throws at.
+bool is_there(const std::filesystem::path& path) {
+  std::error_code ignored;
+  return std::filesystem::exists(path, ignored);
+}
+
 /// The format that takes the file; null: none.
 const FieldFormat* format_of(const std::filesystem::path& path) {
   std::string first(16, '\0');
@@ -23,7 +29,7 @@ const FieldFormat* format_of(const std::filesystem::path& path) {
 
 const FieldFormat& required_format(const std::filesystem::path& path) {
   const FieldFormat* format = format_of(path);
-  require(format != nullptr || std::filesystem::exists(path), "no such file, " + path.string());
+  require(format != nullptr || is_there(path), "no such file, " + path.string());
   require(format != nullptr, "not a field file, " + path.string() + "; expected .mha .nrrd .nii .nii.gz or .npy");
   return *format;
 }
@@ -93,8 +99,7 @@ std::string to_string(FieldBasis basis) {
 
 FieldSource parse_field_source(const std::string& text) {
   const std::size_t colon = text.rfind(':');
-  if (std::filesystem::exists(text) || colon == std::string::npos || text.find('=', colon) == std::string::npos)
-    return {text};
+  if (is_there(text) || colon == std::string::npos || text.find('=', colon) == std::string::npos) return {text};
   FieldSource source(text.substr(0, colon));
   std::istringstream options(text.substr(colon + 1));
   for (std::string option; std::getline(options, option, ',');) {

@@ -133,7 +133,8 @@ void check_options(const FieldSource& source) {
       {{"order", "zyx", "xyz"}, {"units", "mm", "voxel"}, {"components", "xyz", "zyx"}, {"frame", "lps", "ras"}}};
   const std::string file = source.path.string();
   for (const auto& [key, value] : source.options) {
-    const auto* known = std::find_if(kKnown.begin(), kKnown.end(), [&key](const Known& k) { return k.key == key; });
+    const auto* known =
+        std::find_if(kKnown.begin(), kKnown.end(), [&name = key](const Known& k) { return k.key == name; });
     require(known != kKnown.end(),
             "the option \"" + key + "\", " + file + "; expected order, units, components or frame");
     require(value == known->first || value == known->second,

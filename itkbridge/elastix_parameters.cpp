@@ -124,6 +124,12 @@ TransformRecord record_of(const Parameters& from) {
   return record;
 }
 
+/// False also for a name that no file can have, which std::filesystem throws at.
+bool is_file(const std::filesystem::path& path) {
+  std::error_code ignored;
+  return std::filesystem::is_regular_file(path, ignored);
+}
+
 /// The file of the initial transform, or an empty path.
 std::filesystem::path initial_of(const Parameters& from) {
   const std::string old_key = "InitialTransformParametersFileName", key = "InitialTransformParameterFileName";
@@ -132,11 +138,11 @@ std::filesystem::path initial_of(const Parameters& from) {
   from.require_word("HowToCombineTransforms", "Compose");
   const std::filesystem::path said(name), own(from.file());
   for (const std::filesystem::path& path : {own.parent_path() / said, said}) {
-    if (std::filesystem::is_regular_file(path)) return path;
+    if (is_file(path)) return path;
   }
   // Both were moved: the name alone, unless it is the same in another folder.
   const std::filesystem::path beside = own.parent_path() / said.filename();
-  if (said.filename() != own.filename() && std::filesystem::is_regular_file(beside)) return beside;
+  if (said.filename() != own.filename() && is_file(beside)) return beside;
   throw InputError("the initial transform " + name + " is not there, " + from.file());
 }
 

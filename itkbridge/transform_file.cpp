@@ -13,7 +13,9 @@ namespace {
 constexpr std::string_view kHdf5 = "\x89HDF\r\n\x1a\n", kText = "#Insight Transform File V1.0";
 
 std::string first_bytes(const std::filesystem::path& path) {
-  require(std::filesystem::is_regular_file(path), "not a file, " + path.string() + "; expected a transform file");
+  std::error_code ignored;  // a name that no file can have
+  require(std::filesystem::is_regular_file(path, ignored),
+          "not a file, " + path.string() + "; expected a transform file");
   std::ifstream file(path, std::ios::binary);
   std::string bytes(kText.size(), '\0');
   file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));

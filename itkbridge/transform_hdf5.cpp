@@ -1,5 +1,6 @@
 #include <itk_H5Cpp.h>
 
+#include <algorithm>
 #include <fstream>
 
 #include "deform/errors.h"
@@ -10,6 +11,7 @@ namespace {
 
 constexpr double kDeflateAtMost = 1040;  // deflate cannot do better than 1032 to 1
 constexpr hsize_t kMostTransforms = 1000;
+constexpr std::size_t kLongestText = 1000;
 
 /// The HDF5 library prints its stack of errors otherwise. After a failure it stays quiet, for what damaged files leave
 /// open makes it complain once more when the program ends.
@@ -57,6 +59,9 @@ class Hdf5Reader {
     require(set.getTypeClass() == H5T_STRING && set.getSpace().getSimpleExtentNpoints() == 1,
             name + " is not one string, " + file_);
     if (set.getStrType().isVariableStr()) return heap_text(set, name);
+    const std::size_t length = set.getStrType().getSize();
+    require(length <= kLongestText, name + " has " + std::to_string(length) + " characters, " + file_ +
+                                        "; expected at most " + std::to_string(kLongestText));
     std::string value;
     set.read(value, set.getStrType());
     return value.substr(0, value.find('\0'));
@@ -79,7 +84,7 @@ class Hdf5Reader {
     };
     const std::uint64_t place = set.getOffset(), length = number(place, 4), heap = number(place + 4, 8),
                         wanted = number(place + 12, 4);
-    require(length < 1000 && number(heap, 4) == 0x4c4f4347, damaged);  // "GCOL"
+    require(length <= kLongestText && number(heap, 4) == 0x4c4f4347, damaged);  // "GCOL"
     const std::uint64_t end = heap + number(heap + 8, 8);
     for (std::uint64_t at = heap + 16; at + 16 + length <= end;) {
       const std::uint64_t index = number(at, 2), size = number(at + 8, 8);
@@ -96,17 +101,32 @@ class Hdf5Reader {
     throw InputError(damaged);
   }
 
+  /// Of IEEE 754, as ITK writes them: HDF5 can hold floating-point numbers of any layout and length.
+  static bool is_float_or_double(const H5::DataType& type) {
+    using Type = H5::PredType;
+    return type == Type::IEEE_F64LE || type == Type::IEEE_F32LE || type == Type::IEEE_F64BE || type == Type::IEEE_F32BE;
+  }
+
+  /// Values in a chunk, for which HDF5 makes room however few it is asked for; 0: there are no chunks.
+  static hsize_t chunk_of(const H5::DataSet& set) {
+    const H5::DSetCreatPropList layout = set.getCreatePlist();
+    hsize_t chunk = 0;
+    if (layout.getLayout() == H5D_CHUNKED) layout.getChunk(1, &chunk);
+    return chunk;
+  }
+
   std::vector<double> values(const std::string& group, const std::string& what) const {
     std::string name = group + "/Transform" + what;
     if (!hdf5_.nameExists(name)) name = group + "/Tranform" + what;  // as ITK 4 and 5 write it
     const H5::DataSet set = hdf5_.openDataSet(name);
     const H5::DataSpace space = set.getSpace();
-    require(set.getTypeClass() == H5T_FLOAT && space.isSimple() && space.getSimpleExtentNdims() == 1,
-            name + " is not a list of floating-point numbers, " + file_);
+    require(is_float_or_double(set.getDataType()) && space.isSimple() && space.getSimpleExtentNdims() == 1,
+            name + " is not a list of floats or doubles, " + file_);
     hsize_t count = 0;
     space.getSimpleExtentDims(&count);
     const auto stored = static_cast<double>(set.getStorageSize());
-    const double needed = static_cast<double>(count) * static_cast<double>(set.getDataType().getSize());
+    const double needed =
+        static_cast<double>(std::max(count, chunk_of(set))) * static_cast<double>(set.getDataType().getSize());
     require(stored <= bytes_ && needed <= stored * kDeflateAtMost, "truncated, or a header that promises too much, " +
                                                                        file_ + ": " + name + " has " +
                                                                        std::to_string(count) + " values");

@@ -124,6 +124,7 @@ TEST(ElastixParameters, CirclesAndOtherBadFilesAreRefused) {
       {parameters("TranslationTransform", 3, "3 5 7", "", "second.txt"), "circle"},
       {parameters("TranslationTransform", 3, "3 5 7", "", "absent.txt"),
        "the initial transform absent.txt is not there"},
+      {parameters("TranslationTransform", 3, "3 5 7", "", std::string(300, 'x')), "is not there"},
       {parameters("TranslationTransform", 3, "3 5 7", "", "other.txt"), "not an elastix parameter file"},
       {parameters("TranslationTransform", 3, "3 5 7", "", "good.txt", "Add"), "HowToCombineTransforms Add"},
       {parameters("TranslationTransform", 4, "3 5 7"), "NumberOfParameters says 4"},

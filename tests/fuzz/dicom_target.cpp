@@ -1,0 +1,29 @@
+// One DICOM file: as a dose, as a series of one slice, and the series derived from it.
+#include "io/dicom_dose.h"
+#include "io/dicom_series.h"
+#include "tests/fuzz/input_file.h"
+
+namespace {
+
+void derive(const tetwarp::DicomVolume& ct) {
+  static const InputFile folder(".derived");
+  std::filesystem::remove_all(folder.written());
+  std::filesystem::create_directories(folder.written());
+  tetwarp::DicomDerivation derivation;
+  derivation.field_sha256 = std::string(64, '0');
+  derivation.parameters = "identity";
+  derivation.description = "Deformed by nothing";
+  accepted([&] { tetwarp::write_derived_series(folder.written(), view(ct.volume), *ct.headers, derivation, {}, 1); });
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const InputFile file(TETWARP_FUZZ_SUFFIX);
+  file.fill(data, size);
+  if (tetwarp::is_dicom_dose(file.path())) accepted([] { tetwarp::read_dose(file.path()); });
+  for (const auto& series : tetwarp::scan_dicom(file.path(), true).series)
+    accepted([&] { derive(tetwarp::load_dicom(series, 1)); });
+  tetwarp::is_tetwarp_dicom(file.path());
+  return 0;
+}

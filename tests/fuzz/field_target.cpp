@@ -1,0 +1,34 @@
+// Field files of one suffix, and volumes where the suffix is theirs. TETWARP_FUZZ_OPTIONS: what is said behind the name
+// of a field that does not say it itself, one reading per text.
+#include "io/field_file.h"
+#include "io/image_file.h"
+#include "tests/fuzz/input_file.h"
+
+/// NrrdIO of ITK 5.2.1 loses the words of its errors.
+extern "C" const char* __lsan_default_suppressions() { return "leak:libITKNrrdIO"; }
+
+namespace {
+
+/// A file without a grid of its own is taken for a volume of its size.
+void read_field(tetwarp::FieldSource source) {
+  const auto header = tetwarp::read_field_header(source);
+  if (!header.has_own_grid) {
+    source.grid.emplace();
+    source.grid->size = header.grid.size;
+  }
+  accepted([&] { tetwarp::read_forward_field(source); });
+  tetwarp::read_pull_field(source);
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const InputFile file(TETWARP_FUZZ_SUFFIX);
+  file.fill(data, size);
+  if (tetwarp::has_image_suffix(file.path())) accepted([] { tetwarp::read_image(file.path()); });
+  accepted([] { tetwarp::is_field_file(file.path()); });
+  for (const std::string options : {TETWARP_FUZZ_OPTIONS}) {
+    accepted([&] { read_field(tetwarp::parse_field_source(file.path().string() + options)); });
+  }
+  return 0;
+}

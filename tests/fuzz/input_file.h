@@ -1,0 +1,63 @@
+#pragma once
+
+#include <unistd.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "deform/errors.h"
+
+/// What a fuzzer calls, and the replay of a corpus too: hands the bytes to a reader. Returns 0.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
+
+/// How often a reader took what it was given, in this process.
+inline std::uint64_t& accepted_reads() {
+  static std::uint64_t count = 0;
+  return count;
+}
+
+/// Runs a reader. Whatever it throws that is not an error of Tetwarp goes on, and is a crash.
+/// @return  whether it took its input
+template <class Action>
+bool accepted(Action&& action) {
+  try {
+    action();
+  } catch (const tetwarp::Error&) {
+    return false;
+  }
+  ++accepted_reads();
+  return true;
+}
+
+/// A file for readers, which take paths: in a folder of this process's own below that of temporary files (TMPDIR).
+class InputFile {
+ public:
+  explicit InputFile(const std::string& suffix)
+      : folder_(std::filesystem::temp_directory_path() / ("tetwarp-fuzz-" + std::to_string(::getpid()))),
+        path_(folder_ / ("input" + suffix)),
+        written_(folder_ / ("written" + suffix)) {
+    std::filesystem::create_directories(folder_);
+  }
+  ~InputFile() {
+    std::error_code ignored;
+    std::filesystem::remove_all(folder_, ignored);
+  }
+  InputFile(const InputFile&) = delete;
+  InputFile& operator=(const InputFile&) = delete;
+
+  void fill(const std::uint8_t* data, std::size_t size) const {
+    std::ofstream stream(path_, std::ios::binary | std::ios::trunc);
+    stream.write(reinterpret_cast<const char*>(data), static_cast<std::streamsize>(size));
+    stream.close();
+    if (!stream) throw std::runtime_error("cannot write " + path_.string());
+  }
+  const std::filesystem::path& path() const { return path_; }
+  /// Where the same may be written again.
+  const std::filesystem::path& written() const { return written_; }
+
+ private:
+  std::filesystem::path folder_, path_, written_;
+};

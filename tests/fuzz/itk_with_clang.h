@@ -1,0 +1,14 @@
+#pragma once
+
+// Debian's ITK knows the one compiler that it was built with, and refuses clang. It knows g++ by these macros, and what
+// it wants to know of g++ 12 is true of clang 14 too. Included before everything else in the preset fuzz.
+#if __has_include(<itk_compiler_detection.h>)
+#pragma push_macro("__clang__")
+#pragma push_macro("__GNUC__")
+#undef __clang__
+#undef __GNUC__
+#define __GNUC__ 12
+#include <itk_compiler_detection.h>
+#pragma pop_macro("__GNUC__")
+#pragma pop_macro("__clang__")
+#endif
