@@ -39,8 +39,9 @@ void add_series(CLI::App& command, InputOptions& input) {
 constexpr const char* kInputHelp = "Folder of DICOM files, one DICOM file, or .nii .nii.gz .nrrd .mha";
 constexpr const char* kFieldHelp =
     "Forward field: a file (.mha .nrrd .nii .nii.gz, or .npy:order=zyx|xyz,units=mm|voxel), a transform of ITK, "
-    "elastix or plastimatch (.h5 .tfm .txt; each vertex x goes to T(x)), a mesh (.msh; .vtu .vtk where built with VTK; "
-    "first of several), or identity, "
+    "elastix, plastimatch (.h5 .tfm .txt) or NiftyReg (its B-spline; each vertex x goes to T(x)), a mesh (.msh; .vtu "
+    "and "
+    ".vtk; first of several), or identity, "
     "wave:amplitude=,wavelength=[,phase=,axis=,along=], "
     "twist:angle=[,axis=], bubble:radius=,strength=[,center=X/Y/Z], bubble-paper:shift=[,center=], translate:by=X/Y/Z; "
     "mm, "
@@ -97,13 +98,22 @@ void add_backend(CLI::App& command, std::string& backend, int& device) {
 }
 
 void add_invert(CLI::App& app, InvertOptions& options) {
-  CLI::App* command = app.add_subcommand("invert", "Write the inverse displacement field of a forward field");
-  command->add_option("FIELD", options.fields, kFieldHelp)->required();
-  command->add_option("--like", options.like.path, "The volume on whose grid the inverse is sampled")->required();
+  CLI::App* command = app.add_subcommand("invert", "Write the inverse of a field");
+  auto* field = command->add_option("FIELD", options.fields, kFieldHelp);
   command
       ->add_option(
-          "-o,--output", options.output,
-          ".mha .nrrd .nii .nii.gz: output to input, LPS mm, for ITK's and other warps; NaN where nothing maps")
+          "--pull-field", options.pull_field,
+          "Instead of FIELD: a field that maps output to input. Its inverse is a forward field, with a vertex at "
+          "every voxel of --like, the volume that the field takes values from; beyond its grid the field goes on "
+          "with its outermost samples")
+      ->type_name("FILE")
+      ->excludes(field);
+  command->add_option("--like", options.like.path, "The volume on whose grid the inverse is sampled")->required();
+  command
+      ->add_option("-o,--output", options.output,
+                   ".mha .nrrd .nii .nii.gz: output to input, LPS mm, for ITK's and other warps; NaN where nothing "
+                   "maps. Of a pull "
+                   "field: forward, for -f")
       ->required();
   command
       ->add_option("--cell-size", options.cell_size,
@@ -123,8 +133,10 @@ void add_deform(CLI::App& app, DeformOptions& options) {
       command->add_option("-f,--field", options.fields, kFieldHelp)->allow_extra_args(false)->type_name("FIELD");
   command
       ->add_option("--pull-field", options.pull_field,
-                   "A field that maps output to input, as registration tools write it (files as for -f); NaN in it: no "
-                   "source. Or a transform of ITK, elastix or plastimatch (.h5 .tfm .txt): output p comes from T(p)")
+                   "A field that maps output to input, as registration tools write it (files as for -f, and a "
+                   "DICOM Deformable Spatial Registration, FILE:item=N where it has several); NaN in it: no source. Or "
+                   "a transform of ITK, elastix, plastimatch (.h5 .tfm .txt) or NiftyReg (its B-spline): "
+                   "output p comes from T(p)")
       ->type_name("FILE")
       ->excludes(field);
   command

@@ -35,7 +35,7 @@ enum class FieldKind { formula, transform, lattice, mesh };
 
 FieldKind kind_of(const std::string& text) {
   if (is_formula(text)) return FieldKind::formula;
-  if (has_transform_suffix(text)) return FieldKind::transform;
+  if (is_transform_file(text)) return FieldKind::transform;
   return is_mesh_file(parse_field_source(text).path) ? FieldKind::mesh : FieldKind::lattice;
 }
 
@@ -73,7 +73,7 @@ void note_transform(const TransformFile& transform, const std::string& path, Dir
     notes.push_back(path + ": transforms of " + transform.tool + " map output to input; taken as " + taken);
   if (const std::uint64_t outside = *transform.outside; outside > 0) {
     notes.push_back(path + ": " + std::to_string(outside) + (direction == Direction::pull ? " voxels" : " vertices") +
-                    " lie outside its domain, where ITK does not move them");
+                    " lie outside its domain, " + transform.beyond);
   }
 }
 
@@ -199,7 +199,7 @@ ForwardField read_forward_field(const std::vector<std::string>& fields, const Ge
 
 PullField read_pull_field(const std::string& text, const Geometry& volume, const Geometry& output,
                           const CommonOptions& common, const Control& control, AnyField& found) {
-  if (has_transform_suffix(text)) {
+  if (is_transform_file(text)) {
     const TransformFile transform = read_transform_file(text);
     VertexField sampled = sample_on(output, transform.displacement, {.threads = common.threads}, control);
     note_transform(transform, text, Direction::pull, found.notes);
@@ -215,7 +215,7 @@ PullField read_pull_field(const std::string& text, const Geometry& volume, const
 }
 
 glm::i64vec3 pull_grid_size(const std::string& text, const Geometry& output) {
-  if (!has_transform_suffix(text)) return read_field_header(field_source(text)).grid.size;
+  if (!is_transform_file(text)) return read_field_header(field_source(text)).grid.size;
   check_transform(text);
   return output.size;
 }

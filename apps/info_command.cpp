@@ -222,7 +222,7 @@ int run_info(const InfoOptions& options) {
   const bool field = is_field_file(source.path), mesh = !field && is_mesh_file(source.path);
   if (mesh) check_options(source);
   const std::filesystem::path& path = field ? source.path : options.input.path;
-  const bool transform = !field && !mesh && has_transform_suffix(path) && !std::filesystem::is_directory(path);
+  const bool transform = !field && !mesh && is_transform_file(path) && !std::filesystem::is_directory(path);
   const bool other = field || mesh || transform || has_image_suffix(path), dose = !other && is_dicom_dose(path),
              dicom = !other && !dose;
   const json document = [&] {

@@ -1,10 +1,13 @@
+#include <algorithm>
 #include <cstdio>
+#include <glm/common.hpp>
 #include <nlohmann/json.hpp>
 
 #include "apps/backend.h"
 #include "apps/field_source.h"
 #include "apps/input.h"
 #include "apps/output.h"
+#include "deform/fields/continued.h"
 #include "io/field_file.h"
 #include "io/image_file.h"
 
@@ -21,15 +24,144 @@ std::string text_of(const Residuals& residuals) {
   return text;
 }
 
+/// The map to invert, from wherever the lattice is to places in the grid of --like.
+struct Invertible {
+  VertexField field;
+  std::vector<std::string> notes;
+  std::vector<ReadField> files;
+  Geometry pull_grid = {};  ///< of a pull field, before it was continued
+};
+
+Invertible read_invertible(const InvertOptions& options, const Geometry& like, const Control& control) {
+  if (options.pull_field.empty()) {
+    ForwardField read = read_forward_field(options.fields, like, options.cell_size, options.common, control);
+    return {std::move(read.field), std::move(read.notes), std::move(read.files)};
+  }
+  AnyField found;
+  const PullField pull = read_pull_field(options.pull_field, like, like, options.common, control, found);
+  try {
+    return {continued_over(pull, like), std::move(found.notes), std::move(found.files), pull.grid};
+  } catch (const InputError& error) {
+    throw InputError(std::string(error.what()) + ", " + options.pull_field);
+  }
+}
+
+/// Samples of the inverse whose place lies beyond the grid of the pull field.
+std::uint64_t count_beyond(const PullField& inverse, const Geometry& grid) {
+  constexpr double kRounding = 1e-3;  // of a sample
+  const AffineMap point = point_from_index(inverse.grid), index = index_from_point(grid);
+  const glm::dvec3 last(grid.size - std::int64_t{1});
+  const glm::i64vec3 size = inverse.grid.size;
+  std::uint64_t beyond = 0;
+  std::size_t n = 0;
+  for (std::int64_t k = 0; k < size.z; ++k) {
+    for (std::int64_t j = 0; j < size.y; ++j) {
+      for (std::int64_t i = 0; i < size.x; ++i, ++n) {
+        const glm::dvec3 at = index(point(glm::dvec3(i, j, k)) + glm::dvec3(inverse.displacement[n]));
+        beyond += glm::clamp(at, glm::dvec3(-kRounding), last + kRounding) != at;
+      }
+    }
+  }
+  return beyond;
+}
+
+/// What came out, and what is left after going there and back.
+struct Inversion {
+  std::string backend;
+  PullField inverse;
+  Report report;
+  Residuals there, back;
+  double field_seconds = 0, invert_seconds = 0, check_seconds = 0;
+};
+
+/// A forward field needs a place at every vertex. @throws InputError where there is none
+void check_forward(const InvertOptions& options, const Inversion& result, Invertible& field) {
+  require(result.report.uncovered == 0, std::to_string(result.report.uncovered) + " voxels of " +
+                                            options.like.path.string() + " have no place by the inverse of " +
+                                            options.pull_field + "; a forward field needs one at every vertex");
+  const std::uint64_t beyond = count_beyond(result.inverse, field.pull_grid);
+  if (beyond == 0) return;
+  field.notes.push_back(std::to_string(beyond) + " of " + std::to_string(result.inverse.displacement.size()) +
+                        " vertices go beyond the grid of " + options.pull_field +
+                        ", which goes on there with its outermost samples");
+}
+
+void write_inverse(const std::filesystem::path& path, PullField& inverse, bool forward) {
+  if (!forward) return write_field_file(path, inverse);
+  write_field_file(path, VertexField{inverse.grid, std::move(inverse.displacement)});
+}
+
+json document_of(const InvertOptions& options, const Invertible& field, const Inversion& result) {
+  json document = provenance("invert");
+  document["backend"] = result.backend;
+  document["field"] = {{"sha256", hash_field(field.field, options.common.threads)},
+                       {"notes", field.notes},
+                       {"files", to_json(field.files)}};
+  document["field"].update(place_json(field.field));
+  document["output"] = {{"path", options.output.string()},
+                        {"direction", options.pull_field.empty() ? "pull" : "forward"},
+                        {"geometry", to_json(result.inverse.grid)}};
+  document["covered"] = result.report.covered;
+  document["uncovered"] = result.report.uncovered;
+  document["inverted"] = result.report.inverted;
+  document["forward_after_inverse"] = to_json(result.there);
+  document["inverse_after_forward"] = to_json(result.back);
+  document["stages"] = {{"field", {{"seconds", result.field_seconds}}},
+                        {"invert", {{"seconds", result.invert_seconds}}},
+                        {"check", {{"seconds", result.check_seconds}}}};
+  return document;
+}
+
+void say_all(const InvertOptions& options, const Invertible& field, const Inversion& result) {
+  for (const std::string& note : field.notes) say(options.common, "tetwarp: note: " + note);
+  if (result.report.inverted > 0) {
+    say(options.common, "tetwarp: warning: the field folds, " + std::to_string(result.report.inverted) +
+                            " tetrahedra are inverted: where several places map to one, the inverse gives one of them");
+  }
+  const bool forward = !options.pull_field.empty();
+  say(options.common,
+      "wrote " + options.output.string() + (forward ? ": forward field, " : ": inverse displacement, ") +
+          to_string(result.inverse.grid.size) +
+          (forward ? " vertices" : " samples, " + std::to_string(result.report.uncovered) + " of them empty"));
+  say(options.common, "forward after inverse: " + text_of(result.there));
+  say(options.common, "inverse after forward: " + text_of(result.back));
+}
+
+Inversion invert(const InvertOptions& options, const Geometry& like, Invertible& field, const Control& stop) {
+  Stage invert_stage(options.common, "invert");
+  Inversion result{.backend = {},
+                   .inverse = {like, std::vector<glm::vec3>(static_cast<std::size_t>(voxel_count(like)))},
+                   .report = {},
+                   .there = {},
+                   .back = {}};
+  const Limits limits{.threads = options.common.threads};
+  const Backend backend = make_backend(options.backend, Direction::forward, like, options.device, limits);
+  result.backend = backend.name;
+  backend.resampler->set_field(view(field.field, Outside::background), {.stop = stop.stop, .jacobian_range = false});
+  result.report = backend.resampler->resample(
+      whole(like), {}, {.coverage = {}, .inverse_mm = samples_of(result.inverse)}, invert_stage.control());
+  result.invert_seconds = invert_stage.seconds();
+  if (!options.pull_field.empty()) check_forward(options, result, field);
+
+  Stage check_stage(options.common, "check");
+  result.there = forward_after_inverse(field.field, result.inverse, limits, stop);
+  result.back = inverse_after_forward(field.field, result.inverse, limits, stop);
+  result.check_seconds = check_stage.seconds();
+  return result;
+}
+
 }  // namespace
 
 int run_invert(const InvertOptions& options) {
+  const bool pulls = !options.pull_field.empty();
   if (!has_image_suffix(options.output)) {
     throw UsageError("unknown suffix of \"" + options.output.string() +
                      "\"; a displacement field is written as .mha .nrrd .nii .nii.gz");
   }
-  check_fields(options.fields, options.cell_size);
-  std::vector<std::filesystem::path> inputs = field_files(options.fields);
+  if (pulls && options.cell_size) throw UsageError("--cell-size does not go with --pull-field; leave it out");
+  if (!pulls) check_fields(options.fields, options.cell_size);
+  std::vector<std::filesystem::path> inputs =
+      field_files(pulls ? std::vector<std::string>{options.pull_field} : options.fields);
   inputs.push_back(options.like.path);
   OutputSet outputs(inputs, options.common.overwrite);
   const std::filesystem::path output = outputs.add(options.output), report_path = outputs.add(options.report);
@@ -37,55 +169,16 @@ int run_invert(const InvertOptions& options) {
   const InputHeader like = open_input(options.like, stop);
 
   Stage field_stage(options.common, "field");
-  const ForwardField field =
-      read_forward_field(options.fields, like.geometry, options.cell_size, options.common, field_stage.control());
+  Invertible field = read_invertible(options, like.geometry, field_stage.control());
   const double field_seconds = field_stage.seconds();
-
-  Stage invert_stage(options.common, "invert");
-  PullField inverse{like.geometry, std::vector<glm::vec3>(static_cast<std::size_t>(voxel_count(like.geometry)))};
-  const Limits limits{.threads = options.common.threads};
-  const Backend backend = make_backend(options.backend, Direction::forward, like.geometry, options.device, limits);
-  backend.resampler->set_field(view(field.field, Outside::background), {.stop = stop.stop, .jacobian_range = false});
-  const Report report = backend.resampler->resample(
-      whole(like.geometry), {}, {.coverage = {}, .inverse_mm = samples_of(inverse)}, invert_stage.control());
-  const double invert_seconds = invert_stage.seconds();
-
-  Stage check_stage(options.common, "check");
-  const Residuals there = forward_after_inverse(field.field, inverse, limits, stop),
-                  back = inverse_after_forward(field.field, inverse, limits, stop);
-  const double check_seconds = check_stage.seconds();
-
+  Inversion result = invert(options, like.geometry, field, stop);
+  result.field_seconds = field_seconds;
   outputs.write([&] {
-    write_field_file(output, inverse);
-    if (report_path.empty()) return;
-    json document = provenance("invert");
-    document["backend"] = backend.name;
-    document["field"] = {
-        {"sha256", hash_field(field.field, options.common.threads)},
-        {"notes", field.notes},
-        {"files", to_json(field.files)}};
-    document["field"].update(place_json(field.field));
-    document["output"] = {{"path", options.output.string()}, {"geometry", to_json(like.geometry)}};
-    document["covered"] = report.covered;
-    document["uncovered"] = report.uncovered;
-    document["inverted"] = report.inverted;
-    document["forward_after_inverse"] = to_json(there);
-    document["inverse_after_forward"] = to_json(back);
-    document["stages"] = {{"field", {{"seconds", field_seconds}}},
-                          {"invert", {{"seconds", invert_seconds}}},
-                          {"check", {{"seconds", check_seconds}}}};
-    write_json(report_path, document);
+    write_inverse(output, result.inverse, pulls);
+    if (!report_path.empty()) write_json(report_path, document_of(options, field, result));
   });
   outputs.commit();
-  for (const std::string& note : field.notes) say(options.common, "tetwarp: note: " + note);
-  if (report.inverted > 0) {
-    say(options.common, "tetwarp: warning: the field folds, " + std::to_string(report.inverted) +
-                            " tetrahedra are inverted: where several places map to one, the inverse gives one of them");
-  }
-  say(options.common, "wrote " + options.output.string() + ": inverse displacement, " + to_string(like.geometry.size) +
-                          " samples, " + std::to_string(report.uncovered) + " of them empty");
-  say(options.common, "forward after inverse: " + text_of(there));
-  say(options.common, "inverse after forward: " + text_of(back));
+  say_all(options, field, result);
   return 0;
 }
 

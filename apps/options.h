@@ -55,6 +55,7 @@ struct FieldOptions {
 struct InvertOptions {
   CommonOptions common;
   std::vector<std::string> fields;  ///< formulas and files, the first applied first
+  std::string pull_field;           ///< instead: a field that maps output to input
   InputOptions like;
   std::filesystem::path output, report;
   std::optional<std::int64_t> cell_size;

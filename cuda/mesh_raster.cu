@@ -15,7 +15,7 @@ constexpr int kTileI = 32, kTileJ = 8, kTileK = 16;  ///< voxels of a tile
 constexpr int kTileRows = kTileJ * kTileK;
 constexpr int kTileThreads = 32 * kTileJ;  ///< a warp a column of rows
 constexpr int kTileBlocks = 4;             ///< a multiprocessor
-constexpr int kSlots = 128;                ///< tetrahedra whose arithmetic is prepared at a time
+constexpr int kSlots = 112;                ///< tetrahedra whose arithmetic is prepared at a time
 constexpr int kRowStride = kTileI + 1;     ///< so that a column of rows lies in different banks
 static_assert(kTileI <= kMostRowTile && kTileJ <= kMostRowTile && kTileK <= kMostRowTile);
 

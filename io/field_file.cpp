@@ -20,7 +20,7 @@ bool is_there(const std::filesystem::path& path) {
 
 /// The format that takes the file; null: none.
 const FieldFormat* format_of(const std::filesystem::path& path) {
-  std::string first(16, '\0');
+  std::string first(kFirstBytes, '\0');
   std::ifstream stream(path, std::ios::binary);
   stream.read(first.data(), static_cast<std::streamsize>(first.size()));
   first.resize(static_cast<std::size_t>(stream.gcount()));
@@ -30,7 +30,9 @@ const FieldFormat* format_of(const std::filesystem::path& path) {
 const FieldFormat& required_format(const std::filesystem::path& path) {
   const FieldFormat* format = format_of(path);
   require(format != nullptr || is_there(path), "no such file, " + path.string());
-  require(format != nullptr, "not a field file, " + path.string() + "; expected .mha .nrrd .nii .nii.gz or .npy");
+  require(format != nullptr, "not a field file, " + path.string() +
+                                 "; expected .mha .nrrd .nii .nii.gz .npy, or a "
+                                 "DICOM Deformable Spatial Registration");
   return *format;
 }
 

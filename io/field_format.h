@@ -12,6 +12,9 @@
 
 namespace tetwarp {
 
+/// How much of a file is looked at to know its format: DICOM's mark is at 128.
+inline constexpr std::size_t kFirstBytes = 132;
+
 /// A field file whose header was read and found to fit the file's length.
 class FieldReader {
  public:
@@ -28,7 +31,8 @@ class FieldReader {
 };
 
 struct FieldFormat {
-  /// Whether the file is of this format, by its suffix or its first bytes (up to 16; fewer where it cannot be read).
+  /// Whether the file is of this format, by its suffix or its first bytes (up to `kFirstBytes`; fewer of a
+  /// shorter file, none where it cannot be read).
   bool (*claims)(const std::filesystem::path& path, std::string_view first_bytes);
   /// Whether a claimed file holds a field rather than a volume; null: always. @throws InputError as `open`
   bool (*holds_field)(const std::filesystem::path& path);

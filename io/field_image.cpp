@@ -1,5 +1,7 @@
 #include "io/field_image.h"
 
+#include <algorithm>
+
 #include "deform/errors.h"
 #include "io/text_header.h"
 
@@ -74,6 +76,19 @@ void read_stated_direction(const ImageHeader& image, const std::string& file, Fi
   header.frame_basis = header.units_basis = header.absolute_basis = FieldBasis::by_format;
 }
 
+std::vector<glm::dvec3> read_double_vectors(const ImageReader& reader) {
+  static_assert(sizeof(glm::dvec3) == 3 * sizeof(double));
+  std::vector<glm::dvec3> vectors(reader.value_count() / 3);
+  if (reader.header().type == VoxelType::f64) {
+    reader.read(std::as_writable_bytes(std::span(vectors)));
+    return vectors;
+  }
+  std::vector<glm::vec3> floats(vectors.size());
+  reader.read(std::as_writable_bytes(std::span(floats)));
+  std::copy(floats.begin(), floats.end(), vectors.begin());
+  return vectors;
+}
+
 void read_vectors(const ImageReader& reader, std::span<glm::vec3> vectors,
                   const std::function<glm::dvec3(const glm::dvec3&, std::size_t)>& to_mm) {
   static_assert(sizeof(glm::vec3) == 3 * sizeof(float));
@@ -83,12 +98,8 @@ void read_vectors(const ImageReader& reader, std::span<glm::vec3> vectors,
     for (std::size_t v = 0; v < vectors.size(); ++v) vectors[v] = glm::vec3(to_mm(glm::dvec3(vectors[v]), v));
     return;
   }
-  std::vector<double> values(reader.value_count());
-  reader.read(std::as_writable_bytes(std::span(values)));
-  for (std::size_t v = 0; v < vectors.size(); ++v) {
-    const glm::dvec3 vector(values[3 * v], values[3 * v + 1], values[3 * v + 2]);
-    vectors[v] = glm::vec3(to_mm ? to_mm(vector, v) : vector);
-  }
+  const std::vector<glm::dvec3> values = read_double_vectors(reader);
+  for (std::size_t v = 0; v < vectors.size(); ++v) vectors[v] = glm::vec3(to_mm ? to_mm(values[v], v) : values[v]);
 }
 
 }  // namespace tetwarp

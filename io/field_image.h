@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "io/field_format.h"
 #include "io/image_reader.h"
@@ -21,6 +22,9 @@ std::unique_ptr<ImageReader> open_vectors(const std::filesystem::path& path);
 /// The direction by `kDirectionKey` and what follows from it: Tetwarp writes the key only to LPS mm displacements.
 /// @throws InputError for a direction that is neither
 void read_stated_direction(const ImageHeader& image, const std::string& file, FieldFileHeader& header);
+
+/// One vector a voxel, as it is.
+std::vector<glm::dvec3> read_double_vectors(const ImageReader& reader);
 
 /// Fills one vector a voxel. @param to_mm  from the vector in the file and its vertex number; empty: as it is
 void read_vectors(const ImageReader& reader, std::span<glm::vec3> vectors,

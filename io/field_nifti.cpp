@@ -6,6 +6,7 @@
 #include "deform/errors.h"
 #include "io/field_image.h"
 #include "io/nifti_file.h"
+#include "io/niftyreg_spline.h"
 
 namespace tetwarp {
 namespace {
@@ -75,7 +76,9 @@ class NiftiFieldReader final : public FieldReader {
 
 bool claims(const std::filesystem::path& path, std::string_view) { return image_format(path) == ImageFormat::nifti; }
 
-bool holds_field(const std::filesystem::path& path) { return read_image_header(path).components == 3; }
+bool holds_field(const std::filesystem::path& path) {
+  return read_image_header(path).components == 3 && !is_niftyreg_spline(read_nifti_header(path));
+}
 
 std::unique_ptr<FieldReader> open(const FieldSource& source) {
   const std::string file = source.path.string();

@@ -7,6 +7,8 @@
 
 #include "deform/errors.h"
 #ifdef TETWARP_WITH_ITK
+#include "io/image_reader.h"
+#include "io/niftyreg_spline.h"
 #include "itkbridge/transform_file.h"
 #endif
 
@@ -29,13 +31,25 @@ const char* name_of(TransformTool tool) {
 
 }  // namespace
 
+bool is_transform_file(const std::filesystem::path& path) {
+  if (has_transform_suffix(path)) return true;
+  if (image_format(path) != ImageFormat::nifti || !std::filesystem::is_regular_file(path)) return false;
+  try {
+    return is_niftyreg_spline(read_nifti_header(path));
+  } catch (const InputError&) {
+    return false;  // whoever takes it for a volume or a field says why
+  }
+}
+
 TransformFile read_transform_file(const std::filesystem::path& path) {
+  if (image_format(path) == ImageFormat::nifti) return read_niftyreg_spline(path);
   const StoredTransform stored = read_transform(path);
   const std::string file = path.string();
   TransformFile result{.tool = name_of(stored.tool),
                        .classes = {},
                        .pulls = stored.tool != TransformTool::itk,
                        .displacement = {},
+                       .beyond = "where ITK does not move them",
                        .outside = std::make_shared<std::atomic<std::uint64_t>>(0)};
   for (const TransformRecord& part : stored.parts) {
     result.classes.push_back(part.type);
@@ -54,6 +68,8 @@ TransformFile read_transform_file(const std::filesystem::path& path) {
   return result;
 }
 #else
+bool is_transform_file(const std::filesystem::path& path) { return has_transform_suffix(path); }
+
 TransformFile read_transform_file(const std::filesystem::path& path) {
   throw NotCompiled("transform files need ITK, which this build does not have, " + path.string());
 }

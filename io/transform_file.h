@@ -13,21 +13,25 @@ namespace tetwarp {
 
 /// A transform that another tool wrote, as a map of points.
 struct TransformFile {
-  std::string tool;                  ///< "ITK", "elastix" or "plastimatch"
-  std::vector<std::string> classes;  ///< of ITK, the last applied first
+  std::string tool;                  ///< "ITK", "elastix", "plastimatch" or "NiftyReg"
+  std::vector<std::string> classes;  ///< of ITK, the last applied first; of others what it is
   std::uint64_t parameters = 0;      ///< of all classes
   bool pulls = false;                ///< the tool's transforms map output to input (not ITK's: its files do not say)
   PointMap displacement;             ///< T(x) - x, LPS mm. Throws InputError where that is not finite
-  /// How often `displacement` was asked for a point where a B-spline or displacement field has no value and leaves the
-  /// point where it is.
+  std::string beyond;                ///< what becomes of points outside its domain, for people
+  /// How often `displacement` was asked for a point outside the domain of a B-spline or displacement field.
   std::shared_ptr<std::atomic<std::uint64_t>> outside;
 };
 
 /// Whether the name ends as those of transform files do: .h5 .hdf5 .tfm .txt.
 bool has_transform_suffix(const std::filesystem::path& path);
 
+/// Whether a file is a transform: by its name, or, of a NIfTI file, by its header (a cubic B-spline of NiftyReg).
+bool is_transform_file(const std::filesystem::path& path);
+
 /// Reads an ITK transform file (.h5 .tfm .txt), an elastix parameter file or a plastimatch B-spline (.txt): affine
 /// transforms of all kinds, B-splines of order 3, displacement fields, and composites of these. ITK evaluates them.
+/// Reads a cubic B-spline control point grid of NiftyReg (.nii .nii.gz) as well.
 /// @throws InputError naming the file for what is not that; NotCompiled in a build without ITK
 TransformFile read_transform_file(const std::filesystem::path& path);
 

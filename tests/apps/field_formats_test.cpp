@@ -1,7 +1,9 @@
 // One field, stored as other tools store it: the same deformed volume, and what `info` and the report say of the file.
 #include <gtest/gtest.h>
 
+#include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
+#include <tuple>
 
 #include "io/field_file.h"
 #include "io/image_file.h"
@@ -70,6 +72,94 @@ TEST(FieldFormats, EveryFileOfOneFieldDeformsAlikeInBothDirections) {
       EXPECT_TRUE(deformed(scratch, "-f f.nii.gz") == pushed) << kind;
     }
   }
+}
+
+TEST(FieldFormats, ADeformableRegistrationOfDicomPullsAndOnlyPulls) {
+  const Scratch scratch;
+  make_phantom_file(scratch, "in.mha");
+  write_field_file(scratch / "pull.mha", PullField{turned_grid(), corner_displacement(turned_grid())});
+  const std::string pulled = deformed(scratch, "--pull-field pull.mha");
+  for (const std::string kind : {"dsr:explicit", "dsr:big", "dsr:explicit:matrices"}) {
+    if (!make_foreign_field(kind, scratch / "pull.mha", scratch / "f.dcm")) GTEST_SKIP() << "python3-pydicom";
+    const std::string found = deformed(scratch, "--pull-field f.dcm");
+    if (kind != "dsr:explicit:matrices") {
+      EXPECT_TRUE(found == pulled) << kind;
+    } else {
+      EXPECT_EQ(found.size(), pulled.size());  // displacements differ by 1e-5 mm
+    }
+    EXPECT_TRUE(deformed(scratch, "--pull-field f.dcm:item=1") == found) << kind;
+    const auto file = nlohmann::json::parse(read_text(scratch / "out.json"))["field"]["files"][0];
+    EXPECT_EQ(file["path"], "f.dcm");
+    EXPECT_EQ(file["direction"], "pull");
+    EXPECT_EQ(file["known"]["direction"], "by the format");
+  }
+  const std::string info = run_tetwarp(scratch.path(), "info f.dcm").out;
+  EXPECT_NE(info.find("f.dcm: field\n  format       DICOM Deformable Spatial Registration, with its matrices\n"),
+            std::string::npos)
+      << info;
+  EXPECT_NE(info.find("size         4 x 3 x 5"), std::string::npos) << info;
+  for (const auto& [option, status, why] : {std::tuple("-f f.dcm", 4, "a pull field where a forward field is expected"),
+                                            {"--pull-field f.dcm:item=2", 4, "no item 2 with a grid"},
+                                            {"--pull-field f.dcm:item=two", 2, "expected a whole number from 1"},
+                                            {"--pull-field f.dcm:part=1", 2, "expected item"}}) {
+    const Outcome run =
+        run_tetwarp(scratch.path(), std::string("deform in.mha ") + option + " --outside rest -o no.mha");
+    EXPECT_EQ(run.status, status) << run.err;
+    EXPECT_NE(run.err.find(why), std::string::npos) << run.err;
+    EXPECT_FALSE(std::filesystem::exists(scratch / "no.mha"));
+  }
+}
+
+/// The largest difference of the voxels of two volumes.
+int largest_difference(const std::filesystem::path& a, const std::filesystem::path& b) {
+  const AnyVolume one = read_image(a), other = read_image(b);
+  EXPECT_EQ(one.size_bytes(), other.size_bytes());
+  int largest = 0;
+  for (std::size_t n = 0; n < one.as<std::int16_t>().size(); ++n)
+    largest = std::max(largest, std::abs(one.as<std::int16_t>()[n] - other.as<std::int16_t>()[n]));
+  return largest;
+}
+
+TEST(FieldFormats, ASplineOfNiftyRegIsATransformOnItsImageAndOnOtherGrids) {
+  const Scratch scratch;
+  make_phantom_file(scratch, "in.mha");
+  const Geometry grid = read_image_header(scratch / "in.mha").geometry;
+  write_field_file(scratch / "pull.mha", PullField{grid, corner_displacement(grid)});
+  for (const std::string kind : {"spline:corner", "spline:random"}) {
+    if (!make_foreign_field(kind, scratch / "pull.mha", scratch / "cpp.nii")) GTEST_SKIP() << "python3-nibabel";
+    // Beside them dense fields of the same positions, in float64: the last bit of a voxel may differ.
+    const auto run = [&](const std::string& arguments, const std::string& output) {
+      const Outcome outcome = run_tetwarp(scratch.path(), "deform in.mha --overwrite " + arguments + " -o " + output);
+      EXPECT_EQ(outcome.status, 0) << outcome.err;
+      return outcome.err;
+    };
+    EXPECT_EQ(run("--pull-field cpp.nii", "spline.mha").find("outside"), std::string::npos);
+    run("--pull-field cpp-index.nii", "dense.mha");
+    EXPECT_LE(largest_difference(scratch / "spline.mha", scratch / "dense.mha"), 1) << kind;
+    run("-f identity", "rest.mha");
+    EXPECT_GT(largest_difference(scratch / "spline.mha", scratch / "rest.mha"), kind == "spline:random" ? 100 : 0)
+        << kind;
+
+    const Geometry other = read_field_header(scratch / "cpp-world.nii").grid;
+    write_image(scratch / "other.mha", AnyVolume(other, VoxelType::i16).view());
+    EXPECT_NE(run("--pull-field cpp.nii --grid other.mha", "spline.mha")
+                  .find("voxels lie outside its domain, where its outermost control points go on"),
+              std::string::npos);
+    run("--pull-field cpp-world.nii --grid other.mha", "dense.mha");
+    EXPECT_LE(largest_difference(scratch / "spline.mha", scratch / "dense.mha"), 1) << kind;
+  }
+  const Outcome forward = run_tetwarp(scratch.path(), "field cpp.nii --like in.mha -o f.mha");
+  ASSERT_EQ(forward.status, 0) << forward.err;
+  EXPECT_NE(forward.err.find("transforms of NiftyReg map output to input; taken as forward"), std::string::npos);
+  const std::vector<glm::vec3> vertices = read_forward_field(scratch / "f.mha").displacement,
+                               dense = read_pull_field(scratch / "cpp-index.nii").displacement;
+  ASSERT_EQ(vertices.size(), dense.size());
+  for (std::size_t v = 0; v < dense.size(); ++v) ASSERT_LT(glm::distance(vertices[v], dense[v]), 1e-4) << v;
+  const std::string info = run_tetwarp(scratch.path(), "info cpp.nii").out;
+  EXPECT_NE(info.find("cpp.nii: transform\n  written by   NiftyReg\n  class        cubic B-spline of "),
+            std::string::npos)
+      << info;
+  EXPECT_NE(info.find("direction    output to input (pull)"), std::string::npos) << info;
 }
 
 TEST(FieldFormats, AnArrayLiesOnTheVolumeOnceOrderAndUnitsAreGiven) {

@@ -14,34 +14,12 @@
 namespace tetwarp {
 namespace {
 
-/// Straight, with axes exchanged and turned, and at no right angle to anything.
-std::vector<Geometry> grids() {
-  Geometry flipped = oblique_grid();
-  flipped.direction[1] = -flipped.direction[1];
-  return {all_orientations()[0], all_orientations()[29], oblique_grid(), flipped};
-}
-
 /// A volume's grid that is none of `grids()`.
 Geometry volume_grid() {
   Geometry grid;
   grid.size = {6, 5, 7};
   grid.spacing = {1.5, 2, 2.5};
   return grid;
-}
-
-std::string error_of(const FieldSource& source) {
-  return refusal([&] { read_pull_field(source); });
-}
-
-/// @param tolerance_mm  0: the same numbers
-void expect_corner(const FieldFile& field, const Geometry& grid, double tolerance_mm, const std::string& what) {
-  const std::vector<glm::vec3> expected = corner_displacement(grid);
-  ASSERT_EQ(field.displacement.size(), expected.size()) << what;
-  EXPECT_TRUE(same_grid(field.grid, grid, 2e-5)) << what;
-  for (std::size_t v = 0; v < expected.size(); ++v) {
-    for (int c = 0; c < 3; ++c)
-      ASSERT_NEAR(field.displacement[v][c], expected[v][c], tolerance_mm) << what << " vertex " << v;
-  }
 }
 
 TEST(FieldFormats, OwnFilesHaveTheCornerInBothDirections) {
@@ -104,19 +82,6 @@ TEST(FieldFormats, TextsAreAPathAndOptions) {
   EXPECT_NE(refusal([] { parse_field_source("b.npy:order=,units=mm"); }).find("expected KEY=VALUE"), std::string::npos);
   EXPECT_NE(refusal([] { parse_field_source("b.npy:order=zyx,mm"); }).find("expected KEY=VALUE"), std::string::npos);
   EXPECT_NE(refusal([] { parse_field_source("b.npy:order=zyx,order=xyz"); }).find("is given twice"), std::string::npos);
-}
-
-/// Every byte of a header, one at a time, made another: the file is read or refused, and nothing else happens.
-void expect_read_or_refused(const std::string& good, std::size_t header_bytes, const FieldSource& source) {
-  for (std::size_t at = 0; at < header_bytes; ++at) {
-    for (const char byte : {'9', '\x7f', '\xff'}) {
-      std::string bytes = good;
-      bytes[at] = byte;
-      write_file(source.path, bytes);
-      const std::string text = error_of(source);
-      EXPECT_TRUE(text.empty() || text.starts_with("InputError: ")) << "byte " << at << ": " << text;
-    }
-  }
 }
 
 // --- NumPy arrays

@@ -7,7 +7,9 @@
 #include <filesystem>
 #include <string>
 
-#include "deform/vertex_field.h"
+#include "io/field_file.h"
+#include "tests/support/image_samples.h"
+#include "tests/support/write_file.h"
 
 /// Has Python write the field of an .mha file as another tool would (tests/support/make_field.py says which).
 /// @return  false: Python or a library of it is missing
@@ -26,4 +28,41 @@ inline std::vector<glm::vec3> corner_displacement(const tetwarp::Geometry& grid)
   std::vector<glm::vec3> mm(static_cast<std::size_t>(voxel_count(grid)), glm::vec3(0));
   mm[static_cast<std::size_t>(grid.size.x - 1 + grid.size.x * grid.size.y * (grid.size.z - 1))] = {3, 5, 7};
   return mm;
+}
+
+/// Straight, with axes exchanged and turned, and at no right angle to anything.
+inline std::vector<tetwarp::Geometry> grids() {
+  tetwarp::Geometry flipped = oblique_grid();
+  flipped.direction[1] = -flipped.direction[1];
+  return {all_orientations()[0], all_orientations()[29], oblique_grid(), flipped};
+}
+
+inline std::string error_of(const tetwarp::FieldSource& source) {
+  return refusal([&] { read_pull_field(source); });
+}
+
+/// @param tolerance_mm  0: the same numbers
+inline void expect_corner(const tetwarp::FieldFile& field, const tetwarp::Geometry& grid, double tolerance_mm,
+                          const std::string& what) {
+  const std::vector<glm::vec3> expected = corner_displacement(grid);
+  ASSERT_EQ(field.displacement.size(), expected.size()) << what;
+  EXPECT_TRUE(same_grid(field.grid, grid, 2e-5)) << what;
+  for (std::size_t v = 0; v < expected.size(); ++v) {
+    for (int c = 0; c < 3; ++c)
+      ASSERT_NEAR(field.displacement[v][c], expected[v][c], tolerance_mm) << what << " vertex " << v;
+  }
+}
+
+/// Every byte of a header, one at a time, made another: the file is read or refused, and nothing else happens.
+inline void expect_read_or_refused(const std::string& good, std::size_t header_bytes,
+                                   const tetwarp::FieldSource& source) {
+  for (std::size_t at = 0; at < header_bytes; ++at) {
+    for (const char byte : {'9', '\x7f', '\xff'}) {
+      std::string bytes = good;
+      bytes[at] = byte;
+      write_file(source.path, bytes);
+      const std::string text = error_of(source);
+      EXPECT_TRUE(text.empty() || text.starts_with("InputError: ")) << "byte " << at << ": " << text;
+    }
+  }
 }

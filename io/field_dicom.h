@@ -1,0 +1,13 @@
+#pragma once
+
+// Private to io/. Deformable Spatial Registration objects of DICOM (PS3.3 A.39.2, C.20.3): a grid of offsets, between
+// an affine map before it and one after it.
+#include "io/field_format.h"
+
+namespace tetwarp {
+
+/// Option: item=N, of the Deformable Registration Sequence from 1 up; needed where several items have a grid, each for
+/// a source frame of reference.
+extern const FieldFormat kFieldFormat_dicom;
+
+}  // namespace tetwarp

@@ -1,0 +1,107 @@
+#include "io/niftyreg_spline.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <memory>
+
+#include "deform/errors.h"
+#include "io/field_image.h"
+
+namespace tetwarp {
+namespace {
+
+constexpr glm::dvec3 kLpsFromRas(-1, -1, 1);
+constexpr double kFirstByte = 352;  // of a file without header extensions
+constexpr double kRounding = 1e-3;  // of a control point: the header's floats may put the border of the image outside
+
+struct ControlPoints {
+  Geometry grid;
+  std::vector<glm::dvec3> displacement;  // LPS mm, i fastest; the B-spline of points at rest is the identity
+};
+
+/// The four control points that reach a place on one axis, and their weights.
+struct Reach {
+  std::array<std::int64_t, 4> at{};
+  std::array<double, 4> weight{};
+  bool inside = true;
+};
+
+Reach reach(double index, std::int64_t size) {
+  const auto last = static_cast<double>(size - 1), base = std::floor(index), t = index - base, s = 1 - t;
+  Reach result;
+  for (std::size_t n = 0; n < 4; ++n)
+    result.at[n] = static_cast<std::int64_t>(std::clamp(base - 1 + static_cast<double>(n), 0.0, last));
+  result.weight = {s * s * s / 6, (3 * t * t * t - 6 * t * t + 4) / 6, (3 * s * s * s - 6 * s * s + 4) / 6,
+                   t * t * t / 6};
+  result.inside = index >= 1 - kRounding && index <= last - 1 + kRounding;
+  return result;
+}
+
+glm::dvec3 displacement_at(const ControlPoints& points, const glm::dvec3& index, bool& inside) {
+  const glm::i64vec3 size = points.grid.size;
+  const Reach x = reach(index.x, size.x), y = reach(index.y, size.y), z = reach(index.z, size.z);
+  inside = x.inside && y.inside && z.inside;
+  glm::dvec3 sum(0);
+  for (std::size_t c = 0; c < 4; ++c) {
+    for (std::size_t b = 0; b < 4; ++b) {
+      const std::int64_t row = size.x * (y.at[b] + size.y * z.at[c]);
+      for (std::size_t a = 0; a < 4; ++a)
+        sum += x.weight[a] * y.weight[b] * z.weight[c] * points.displacement[static_cast<std::size_t>(row + x.at[a])];
+    }
+  }
+  return sum;
+}
+
+ControlPoints read_control_points(const std::filesystem::path& path) {
+  const std::string file = path.string();
+  const auto image = open_vectors(path);  // the file holds what its header says
+  const NiftiHeader nifti = read_nifti_header(path);
+  ControlPoints points{nifti.sform_code > 0 ? nifti.sform : nifti.qform, {}};
+  const glm::i64vec3 size = points.grid.size;
+  require(size.x >= 4 && size.y >= 4 && size.z >= 4,
+          "a grid of " + to_string(size) + " control points, " + file + "; expected at least 4 on every axis");
+  require(nifti.vox_offset == kFirstByte, "a control point grid with header extensions (vox_offset " +
+                                              std::to_string(nifti.vox_offset) + "), " + file +
+                                              "; make a displacement field of it with reg_transform -disp");
+  points.displacement = read_double_vectors(*image);
+  const AffineMap rest = point_from_index(points.grid);
+  for (std::size_t v = 0; v < points.displacement.size(); ++v) {
+    glm::dvec3& d = points.displacement[v];
+    const auto n = static_cast<std::int64_t>(v);
+    const glm::i64vec3 at(n % size.x, n / size.x % size.y, n / (size.x * size.y));
+    require(glm::length(d) < 1e9,  // false for NaN
+            "control point (" + std::to_string(at.x) + ", " + std::to_string(at.y) + ", " + std::to_string(at.z) +
+                ") is not finite, or beyond 1e9 mm, " + file + "; every one needs a position");
+    d = kLpsFromRas * d - rest(glm::dvec3(at));
+  }
+  return points;
+}
+
+}  // namespace
+
+bool is_niftyreg_spline(const NiftiHeader& header) {
+  return header.intent_name == "NREG_TRANS" && header.intent_p1 == 2;
+}
+
+TransformFile read_niftyreg_spline(const std::filesystem::path& path) {
+  const auto points = std::make_shared<const ControlPoints>(read_control_points(path));
+  const AffineMap index = index_from_point(points->grid);
+  TransformFile result{.tool = "NiftyReg",
+                       .classes = {"cubic B-spline of " + to_string(points->grid.size) + " control points"},
+                       .parameters = 3 * points->displacement.size(),
+                       .pulls = true,
+                       .displacement = {},
+                       .beyond = "where its outermost control points go on",
+                       .outside = std::make_shared<std::atomic<std::uint64_t>>(0)};
+  result.displacement = [points, index, outside = result.outside](const glm::dvec3& point) {
+    bool inside = true;
+    const glm::dvec3 by = displacement_at(*points, index(point), inside);
+    if (!inside) outside->fetch_add(1, std::memory_order_relaxed);
+    return by;
+  };
+  return result;
+}
+
+}  // namespace tetwarp
