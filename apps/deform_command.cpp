@@ -45,7 +45,7 @@ class Deformation {
   std::vector<std::string> notes_;
   struct {
     AnyVolume source, resampled;
-    ConstVolumeView jacobian;
+    ConstVolumeView jacobian;  ///< of the slab that is resampled
     std::atomic<std::uint64_t> saturated = 0;
   } mass_;  ///< with --preserve mass: in float
   std::vector<SliceRange> sampled_slices_;
@@ -106,8 +106,8 @@ Backend Deformation::resample() {
                         {.stop = interrupt_token()});
   record_.output = AnyVolume(record_.plan.grid, record_.input.volume.type());
   sampled_slices_.resize(record_.outputs.series ? static_cast<std::size_t>(record_.plan.grid.size.z) : 0);
-  const Maps maps = record_.outputs.maps->make(record_.plan.grid, options_.preserve_mass);
-  mass_.jacobian = maps.jacobian;
+  MapStream maps(record_.plan.grid, record_.outputs.set);
+  record_.outputs.set.write([&] { record_.outputs.maps->add_to(maps, record_.plan.grid, options_.preserve_mass); });
   std::vector<Target> targets = record_.outputs.further->targets_on(record_.plan.grid, false, options_.interpolation);
   targets.insert(targets.begin(), main_target());
   Control control = stage.control();
@@ -118,7 +118,10 @@ Backend Deformation::resample() {
       if (record_.outputs.series) record_.outputs.set.write([&] { write_slices(slices); });
     };
   }
-  record_.report = backend.resampler->resample(whole(record_.plan.grid), targets, maps, control);
+  maps.run([&](const Region& slab, const Maps& of_slab) {
+    mass_.jacobian = of_slab.jacobian;
+    record_.report += resample_slab(*backend.resampler, slab, targets, of_slab, control);
+  });
   record_.report.clamped += mass_.saturated;
   resample_onto_own_grids();
   record_.input_sha256 = input_hash.get();
@@ -215,7 +218,6 @@ void Deformation::write() {
     write_image(record_.outputs.volume, std::as_const(record_.output).view(),
                 {.compression = options_.compression.value_or(-1), .metadata = {{"descrip", made_by}}});
   }
-  record_.outputs.maps->write();
   if (!record_.outputs.preview.empty()) write_preview_picture();
   record_.outputs.further->write(options_.compression, made_by);
   record_.points.write(record_.outputs.points);

@@ -34,10 +34,10 @@ std::uint64_t plan_bytes(const DeformOptions& options, DeformOutputs& outputs, c
   const std::uint64_t of_check = reports_quality(options) ? sizeof(glm::vec3) * output_voxels / slices *
                                                                 std::min(slices, std::uint64_t{RoundTrip::kMostSlices})
                                                           : 0;
-  const std::uint64_t of_mass = options.preserve_mass ? sizeof(float) * (voxels + 2 * output_voxels) : 0;
-  return of_mass + of_check + voxels * size_bytes(input.type) +
-         output_voxels * (size_bytes(input.type) + outputs.maps->bytes_a_voxel()) +
-         outputs.further->bytes(output_voxels) + of_field + kOverheadBytes;
+  const std::uint64_t of_mass = options.preserve_mass ? sizeof(float) * (voxels + output_voxels) : 0;
+  return of_mass + of_check + voxels * size_bytes(input.type) + output_voxels * size_bytes(input.type) +
+         outputs.maps->bytes(grid, options.preserve_mass) + outputs.further->bytes(output_voxels) + of_field +
+         kOverheadBytes;
 }
 
 }  // namespace

@@ -6,7 +6,7 @@
 #include "apps/backend.h"
 #include "apps/field_source.h"
 #include "apps/input.h"
-#include "apps/output.h"
+#include "apps/map_stream.h"
 #include "deform/fields/continued.h"
 #include "io/field_file.h"
 #include "io/image_file.h"
@@ -46,18 +46,28 @@ Invertible read_invertible(const InvertOptions& options, const Geometry& like, c
   }
 }
 
-/// Samples of the inverse whose place lies beyond the grid of the pull field.
-std::uint64_t count_beyond(const PullField& inverse, const Geometry& grid) {
+/// What came out, and what is left after going there and back.
+struct Inversion {
+  std::string backend;
+  Geometry grid;
+  Report report;
+  std::uint64_t beyond = 0;  ///< vertices whose place lies beyond the grid of the pull field
+  Residuals there, back;
+  double field_seconds = 0, invert_seconds = 0, check_seconds = 0;
+};
+
+/// Counts samples of an inverse whose place lies beyond the grid of the pull field. @param samples  some slices
+std::uint64_t count_beyond(const VolumeView& samples, const Geometry& grid) {
   constexpr double kRounding = 1e-3;  // of a sample
-  const AffineMap point = point_from_index(inverse.grid), index = index_from_point(grid);
+  const AffineMap point = point_from_index(*samples.geometry), index = index_from_point(grid);
   const glm::dvec3 last(grid.size - std::int64_t{1});
-  const glm::i64vec3 size = inverse.grid.size;
+  const Region& held = samples.buffered;
+  const auto* displacement = reinterpret_cast<const glm::vec3*>(samples.voxels);
   std::uint64_t beyond = 0;
-  std::size_t n = 0;
-  for (std::int64_t k = 0; k < size.z; ++k) {
-    for (std::int64_t j = 0; j < size.y; ++j) {
-      for (std::int64_t i = 0; i < size.x; ++i, ++n) {
-        const glm::dvec3 at = index(point(glm::dvec3(i, j, k)) + glm::dvec3(inverse.displacement[n]));
+  for (std::int64_t k = held.begin.z; k < held.end.z; ++k) {
+    for (std::int64_t j = held.begin.y; j < held.end.y; ++j) {
+      for (std::int64_t i = held.begin.x; i < held.end.x; ++i, ++displacement) {
+        const glm::dvec3 at = index(point(glm::dvec3(i, j, k)) + glm::dvec3(*displacement));
         beyond += glm::clamp(at, glm::dvec3(-kRounding), last + kRounding) != at;
       }
     }
@@ -65,30 +75,15 @@ std::uint64_t count_beyond(const PullField& inverse, const Geometry& grid) {
   return beyond;
 }
 
-/// What came out, and what is left after going there and back.
-struct Inversion {
-  std::string backend;
-  PullField inverse;
-  Report report;
-  Residuals there, back;
-  double field_seconds = 0, invert_seconds = 0, check_seconds = 0;
-};
-
 /// A forward field needs a place at every vertex. @throws InputError where there is none
 void check_forward(const InvertOptions& options, const Inversion& result, Invertible& field) {
   require(result.report.uncovered == 0, std::to_string(result.report.uncovered) + " voxels of " +
                                             options.like.path.string() + " have no place by the inverse of " +
                                             options.pull_field + "; a forward field needs one at every vertex");
-  const std::uint64_t beyond = count_beyond(result.inverse, field.pull_grid);
-  if (beyond == 0) return;
-  field.notes.push_back(std::to_string(beyond) + " of " + std::to_string(result.inverse.displacement.size()) +
+  if (result.beyond == 0) return;
+  field.notes.push_back(std::to_string(result.beyond) + " of " + std::to_string(voxel_count(result.grid)) +
                         " vertices go beyond the grid of " + options.pull_field +
                         ", which goes on there with its outermost samples");
-}
-
-void write_inverse(const std::filesystem::path& path, PullField& inverse, bool forward) {
-  if (!forward) return write_field_file(path, inverse);
-  write_field_file(path, VertexField{inverse.grid, std::move(inverse.displacement)});
 }
 
 json document_of(const InvertOptions& options, const Invertible& field, const Inversion& result) {
@@ -100,7 +95,7 @@ json document_of(const InvertOptions& options, const Invertible& field, const In
   document["field"].update(place_json(field.field));
   document["output"] = {{"path", options.output.string()},
                         {"direction", options.pull_field.empty() ? "pull" : "forward"},
-                        {"geometry", to_json(result.inverse.grid)}};
+                        {"geometry", to_json(result.grid)}};
   document["covered"] = result.report.covered;
   document["uncovered"] = result.report.uncovered;
   document["inverted"] = result.report.inverted;
@@ -109,6 +104,7 @@ json document_of(const InvertOptions& options, const Invertible& field, const In
   document["stages"] = {{"field", {{"seconds", result.field_seconds}}},
                         {"invert", {{"seconds", result.invert_seconds}}},
                         {"check", {{"seconds", result.check_seconds}}}};
+  document["memory"] = {{"peak_bytes", peak_memory_bytes()}};
   return document;
 }
 
@@ -121,32 +117,39 @@ void say_all(const InvertOptions& options, const Invertible& field, const Invers
   const bool forward = !options.pull_field.empty();
   say(options.common,
       "wrote " + options.output.string() + (forward ? ": forward field, " : ": inverse displacement, ") +
-          to_string(result.inverse.grid.size) +
+          to_string(result.grid.size) +
           (forward ? " vertices" : " samples, " + std::to_string(result.report.uncovered) + " of them empty"));
   say(options.common, "forward after inverse: " + text_of(result.there));
   say(options.common, "inverse after forward: " + text_of(result.back));
 }
 
-Inversion invert(const InvertOptions& options, const Geometry& like, Invertible& field, const Control& stop) {
-  Stage invert_stage(options.common, "invert");
-  Inversion result{.backend = {},
-                   .inverse = {like, std::vector<glm::vec3>(static_cast<std::size_t>(voxel_count(like)))},
-                   .report = {},
-                   .there = {},
-                   .back = {}};
+/// Slab by slab into the file.
+Inversion invert(const InvertOptions& options, const Geometry& like, Invertible& field,
+                 const std::filesystem::path& output, OutputSet& outputs) {
+  const Control stop{.stop = interrupt_token()};
+  const bool pulls = !options.pull_field.empty();
   const Limits limits{.threads = options.common.threads};
   const Backend backend = make_backend(options.backend, Direction::forward, like, options.device, limits);
-  result.backend = backend.name;
+  Inversion result{.backend = backend.name, .grid = like, .report = {}, .there = {}, .back = {}};
+  InverseCheck check(field.field, like, limits);
+  MapStream stream(like, outputs);
+  outputs.write([&] {
+    stream.add(&Maps::inverse_mm,
+               create_field_file(output, like, pulls ? FieldDirection::forward : FieldDirection::pull));
+  });
+  Stage stage(options.common, "invert");
   backend.resampler->set_field(view(field.field, Outside::background), {.stop = stop.stop, .jacobian_range = false});
-  result.report = backend.resampler->resample(
-      whole(like), {}, {.coverage = {}, .inverse_mm = samples_of(result.inverse)}, invert_stage.control());
-  result.invert_seconds = invert_stage.seconds();
-  if (!options.pull_field.empty()) check_forward(options, result, field);
-
-  Stage check_stage(options.common, "check");
-  result.there = forward_after_inverse(field.field, result.inverse, limits, stop);
-  result.back = inverse_after_forward(field.field, result.inverse, limits, stop);
-  result.check_seconds = check_stage.seconds();
+  stream.run([&](const Region& slab, const Maps& maps) {
+    result.report += resample_slab(*backend.resampler, slab, {}, maps, stage.control());
+    const double begun = stage.seconds();
+    check.add(maps.inverse_mm, stop);
+    if (pulls) result.beyond += count_beyond(maps.inverse_mm, field.pull_grid);
+    result.check_seconds += stage.seconds() - begun;
+  });
+  result.invert_seconds = stage.seconds() - result.check_seconds;
+  result.there = check.forward_after_inverse();
+  result.back = check.inverse_after_forward();
+  if (pulls) check_forward(options, result, field);
   return result;
 }
 
@@ -165,16 +168,14 @@ int run_invert(const InvertOptions& options) {
   inputs.push_back(options.like.path);
   OutputSet outputs(inputs, options.common.overwrite);
   const std::filesystem::path output = outputs.add(options.output), report_path = outputs.add(options.report);
-  const Control stop{.stop = interrupt_token()};
-  const InputHeader like = open_input(options.like, stop);
+  const InputHeader like = open_input(options.like, {.stop = interrupt_token()});
 
   Stage field_stage(options.common, "field");
   Invertible field = read_invertible(options, like.geometry, field_stage.control());
   const double field_seconds = field_stage.seconds();
-  Inversion result = invert(options, like.geometry, field, stop);
+  Inversion result = invert(options, like.geometry, field, output, outputs);
   result.field_seconds = field_seconds;
   outputs.write([&] {
-    write_inverse(output, result.inverse, pulls);
     if (!report_path.empty()) write_json(report_path, document_of(options, field, result));
   });
   outputs.commit();

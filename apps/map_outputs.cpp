@@ -7,14 +7,6 @@
 
 namespace tetwarp::apps {
 
-namespace {
-
-void write_if_wanted(const std::filesystem::path& path, const AnyVolume& map) {
-  if (!path.empty()) write_image(path, map.view());
-}
-
-}  // namespace
-
 void require_image_suffix(const std::filesystem::path& path, const char* option) {
   if (path.empty() || has_image_suffix(path)) return;
   throw UsageError(std::string("unknown suffix of ") + option + " \"" + path.string() +
@@ -35,28 +27,23 @@ MapOutputs::MapOutputs(const MapOptions& options, Direction direction, OutputSet
   staged_.folds = outputs.add(options.folds);
 }
 
-std::uint64_t MapOutputs::bytes_a_voxel() const {
-  return (staged_.coverage.empty() ? 0 : sizeof(std::uint8_t)) + (staged_.inverse.empty() ? 0 : sizeof(glm::vec3)) +
-         (staged_.jacobian.empty() ? 0 : sizeof(float)) + (staged_.folds.empty() ? 0 : sizeof(std::uint16_t));
+std::uint64_t MapOutputs::bytes(const Geometry& grid, bool jacobian) const {
+  const auto held = [&](VolumeView Maps::*map, const std::filesystem::path& path, bool needed = false) {
+    return path.empty() && !needed ? 0 : MapStream::bytes(grid, map, !path.empty());
+  };
+  return held(&Maps::coverage, staged_.coverage) + held(&Maps::jacobian, staged_.jacobian, jacobian) +
+         held(&Maps::owners, staged_.folds) + held(&Maps::inverse_mm, staged_.inverse);
 }
 
-Maps MapOutputs::make(const Geometry& grid, bool jacobian) {
-  Maps maps;
-  if (!staged_.coverage.empty()) maps.coverage = (coverage_ = AnyVolume(grid, VoxelType::u8)).view();
-  if (jacobian || !staged_.jacobian.empty()) maps.jacobian = (jacobian_ = AnyVolume(grid, VoxelType::f32)).view();
-  if (!staged_.folds.empty()) maps.owners = (owners_ = AnyVolume(grid, VoxelType::u16)).view();
-  if (!staged_.inverse.empty()) {
-    inverse_ = {grid, std::vector<glm::vec3>(static_cast<std::size_t>(voxel_count(grid)))};
-    maps.inverse_mm = samples_of(inverse_);
-  }
-  return maps;
-}
-
-void MapOutputs::write() const {
-  write_if_wanted(staged_.coverage, coverage_);
-  write_if_wanted(staged_.jacobian, jacobian_);
-  write_if_wanted(staged_.folds, owners_);
-  if (!staged_.inverse.empty()) write_field_file(staged_.inverse, inverse_);
+void MapOutputs::add_to(MapStream& stream, const Geometry& grid, bool jacobian) const {
+  const auto add = [&](VolumeView Maps::*map, const std::filesystem::path& path, VoxelType type, bool needed = false) {
+    if (!path.empty() || needed) stream.add(map, path.empty() ? nullptr : create_image(path, grid, type));
+  };
+  add(&Maps::coverage, staged_.coverage, VoxelType::u8);
+  add(&Maps::jacobian, staged_.jacobian, VoxelType::f32, jacobian);
+  add(&Maps::owners, staged_.folds, VoxelType::u16);
+  if (!staged_.inverse.empty())
+    stream.add(&Maps::inverse_mm, create_field_file(staged_.inverse, grid, FieldDirection::pull));
 }
 
 nlohmann::json MapOutputs::describe() const {

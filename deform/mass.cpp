@@ -29,17 +29,23 @@ std::uint64_t preserve_mass(const ConstVolumeView& hu, const ConstVolumeView& ja
   require(hu.type == VoxelType::f32 && jacobian.type == VoxelType::f32, "HU and determinants are expected as float32");
   const Geometry& grid = *output.geometry;
   require(*hu.geometry == grid && *jacobian.geometry == grid && hu.buffered == whole(grid) &&
-              jacobian.buffered == whole(grid) && output.buffered == whole(grid),
-          "HU, determinants and output are expected whole, on one grid");
+              output.buffered == whole(grid),
+          "HU and output are expected whole, and determinants on their grid");
+  Region held = whole(grid);
+  held.begin.z = jacobian.buffered.begin.z;
+  held.end.z = jacobian.buffered.end.z;
+  require(jacobian.buffered == held && contains(held, slices),
+          "determinants are expected in whole slices, of those that are scaled");
   const std::int64_t slice = grid.size.x * grid.size.y;
   const auto* from = reinterpret_cast<const float*>(hu.voxels);
   const auto* determinants = reinterpret_cast<const float*>(jacobian.voxels);
+  const std::int64_t before = held.begin.z * slice;  // the first determinant's voxel
   std::uint64_t saturated = 0;
   dispatch(output.type, [&](auto voxel) {
     using V = decltype(voxel);
     V* to = reinterpret_cast<V*>(output.voxels);
     for (std::int64_t n = slices.begin.z * slice; n < slices.end.z * slice; ++n) {
-      const double value = from[n], determinant = std::abs(determinants[n]);
+      const double value = from[n], determinant = std::abs(determinants[n - before]);
       to[n] = stored<V>(determinant > 0 ? (value - kAir) / determinant + kAir : value, saturated);
     }
   });

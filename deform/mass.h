@@ -12,9 +12,10 @@ namespace tetwarp {
 /// one of its owners.
 ///
 /// @param hu        float32, as resampled
-/// @param jacobian  float32, `Maps::jacobian` of the same call
-/// @param output    any type; only `slices` of the region are read and written. All three on one grid, whole, in host
-///                  memory
+/// @param jacobian  float32, `Maps::jacobian` of the same call; may buffer `slices` and no more
+/// @param output    any type; only `slices`, whole ones, are read and written. All three on one grid, in host memory,
+/// the
+///                  two volumes whole
 /// @return how many values were saturated
 std::uint64_t preserve_mass(const ConstVolumeView& hu, const ConstVolumeView& jacobian, const VolumeView& output,
                             const Region& slices);

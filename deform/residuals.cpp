@@ -51,40 +51,51 @@ struct Slice {
   double sum = 0, largest = 0;
 };
 
-/// Calls `distances(k, tell)` for each slice, in parallel; it calls `tell(distance)`.
-template <class Distances>
-Residuals gather_slices(std::int64_t count, const Limits& limits, const Control& control, Distances&& distances) {
-  std::vector<Slice> slices(static_cast<std::size_t>(count));
-  tbb::enumerable_thread_specific<Histogram> histograms;
-  tbb::task_arena arena = cpu::make_arena(limits);
-  cpu::Progress progress(control, count);
-  arena.execute([&] {
-    tbb::parallel_for(std::int64_t{0}, count, [&](std::int64_t k) {
-      Slice& slice = slices[static_cast<std::size_t>(k)];
-      Histogram& histogram = histograms.local();
-      distances(k, [&](double distance) {
-        ++slice.points;
-        slice.sum += distance;
-        slice.largest = std::max(slice.largest, distance);
-        histogram.add(distance);
+/// Distances found in the slices of a grid, in one call or several.
+class Distances {
+ public:
+  explicit Distances(std::int64_t slices) : slices_(static_cast<std::size_t>(slices)) {}
+
+  /// Calls `distances(k, tell)` for each slice of begin <= k < end, in parallel; it calls `tell(distance)`.
+  template <class Find>
+  void find(std::int64_t begin, std::int64_t end, const Limits& limits, const Control& control, Find&& distances) {
+    tbb::task_arena arena = cpu::make_arena(limits);
+    cpu::Progress progress(control, end - begin);
+    arena.execute([&] {
+      tbb::parallel_for(begin, end, [&](std::int64_t k) {
+        Slice& slice = slices_[static_cast<std::size_t>(k)];
+        Histogram& histogram = histograms_.local();
+        distances(k, [&](double distance) {
+          ++slice.points;
+          slice.sum += distance;
+          slice.largest = std::max(slice.largest, distance);
+          histogram.add(distance);
+        });
+        progress.done(1);
       });
-      progress.done(1);
     });
-  });
-  Residuals all;
-  double sum = 0;
-  for (const Slice& slice : slices) {
-    all.points += slice.points;
-    sum += slice.sum;
-    all.largest = std::max(all.largest, slice.largest);
   }
-  if (all.points == 0) return all;
-  Histogram histogram;
-  for (const Histogram& part : histograms) histogram.add(part);
-  all.mean = sum / static_cast<double>(all.points);
-  all.percentile_99 = std::min(histogram.percentile(0.99, all.points), all.largest);
-  return all;
-}
+
+  Residuals residuals() const {
+    Residuals all;
+    double sum = 0;
+    for (const Slice& slice : slices_) {
+      all.points += slice.points;
+      sum += slice.sum;
+      all.largest = std::max(all.largest, slice.largest);
+    }
+    if (all.points == 0) return all;
+    Histogram histogram;
+    for (const Histogram& part : histograms_) histogram.add(part);
+    all.mean = sum / static_cast<double>(all.points);
+    all.percentile_99 = std::min(histogram.percentile(0.99, all.points), all.largest);
+    return all;
+  }
+
+ private:
+  std::vector<Slice> slices_;
+  tbb::enumerable_thread_specific<Histogram> histograms_;
+};
 
 /// An inverse of which some slices are at hand.
 struct SlicedField {
@@ -101,13 +112,26 @@ struct SlicedField {
   const glm::vec3* slice(std::int64_t k) const { return slices[static_cast<std::size_t>(k)]; }
 };
 
+/// Cells of a grid along k, half open.
+struct Cells {
+  std::int64_t begin = INT64_MIN, end = INT64_MAX;
+
+  bool contains(std::int64_t k) const { return begin <= k && k < end; }
+};
+
+/// The cell along one axis that holds a place; none (-1) outside the grid.
+std::int64_t cell_of(double index, std::int64_t size) {
+  if (!(index >= 0 && index <= static_cast<double>(size - 1))) return -1;
+  return std::min(static_cast<std::int64_t>(index), std::max<std::int64_t>(size - 2, 0));
+}
+
 /// Trilinear between samples, NaN where one of them is or is not at hand.
 glm::dvec3 sample(const SlicedField& field, const glm::dvec3& index) {
   const glm::i64vec3 size = field.grid.size;
   glm::i64vec3 cell;
   for (int axis = 0; axis < 3; ++axis) {
-    if (!(index[axis] >= 0 && index[axis] <= static_cast<double>(size[axis] - 1))) return glm::dvec3(NAN);
-    cell[axis] = std::min(static_cast<std::int64_t>(index[axis]), std::max<std::int64_t>(size[axis] - 2, 0));
+    cell[axis] = cell_of(index[axis], size[axis]);
+    if (cell[axis] < 0) return glm::dvec3(NAN);
   }
   if (!field.slice(cell.z) && !field.slice(std::min(cell.z + 1, size.z - 1))) return glm::dvec3(NAN);
   const glm::dvec3 t = index - glm::dvec3(cell);
@@ -125,12 +149,13 @@ glm::dvec3 sample(const SlicedField& field, const glm::dvec3& index) {
   return sum;
 }
 
-Residuals forward_after(const SlicedField& inverse, const VertexField& field, const Limits& limits,
-                        const Control& control) {
+/// From the samples of the slices begin <= k < end, and forward.
+void find_forward_after(const SlicedField& inverse, const VertexField& field, std::int64_t begin, std::int64_t end,
+                        const Limits& limits, const Control& control, Distances& distances) {
   const Geometry& grid = inverse.grid;
   const AffineMap point = point_from_index(grid);
   const FieldView forward = view(field, Outside::background);
-  return gather_slices(grid.size.z, limits, control, [&](std::int64_t k, auto&& tell) {
+  distances.find(begin, end, limits, control, [&](std::int64_t k, auto&& tell) {
     const glm::vec3* slice = inverse.slice(k);
     if (!slice) return;
     std::vector<glm::dvec3> meant, points;
@@ -149,21 +174,48 @@ Residuals forward_after(const SlicedField& inverse, const VertexField& field, co
   });
 }
 
-Residuals inverse_after(const VertexField& field, const SlicedField& inverse, const Limits& limits,
-                        const Control& control) {
+/// From the vertices that come to lie in some cells of the inverse, and back.
+///
+/// @param reach  for each slice of the lattice the cells that its vertices come to lie in, or more; is made exact
+void find_inverse_after(const VertexField& field, const SlicedField& inverse, const Cells& cells,
+                        std::vector<Cells>& reach, const Limits& limits, const Control& control, Distances& distances) {
   const glm::i64vec3 size = field.lattice.size;
-  const AffineMap point = point_from_index(field.lattice), index = index_from_point(inverse.grid);
-  return gather_slices(size.z, limits, control, [&](std::int64_t k, auto&& tell) {
+  const AffineMap point = point_from_index(field.lattice), index_from = index_from_point(inverse.grid);
+  distances.find(0, size.z, limits, control, [&](std::int64_t k, auto&& tell) {
+    Cells& reached = reach[static_cast<std::size_t>(k)];
+    if (reached.end <= cells.begin || cells.end <= reached.begin) return;
+    Cells found{INT64_MAX, INT64_MIN};
     for (std::int64_t j = 0; j < size.y; ++j) {
       for (std::int64_t i = 0; i < size.x; ++i) {
         const glm::dvec3 rest = point(glm::dvec3(i, j, k));
         const glm::dvec3 moved =
             rest + glm::dvec3(field.displacement[static_cast<std::size_t>((k * size.y + j) * size.x + i)]);
-        const double distance = glm::distance(moved + sample(inverse, index(moved)), rest);
+        const glm::dvec3 index = index_from(moved);
+        const std::int64_t cell = cell_of(index.z, inverse.grid.size.z);
+        if (cell < 0) continue;
+        found = {std::min(found.begin, cell), std::max(found.end, cell + 1)};
+        if (!cells.contains(cell)) continue;
+        const double distance = glm::distance(moved + sample(inverse, index), rest);
         if (!std::isnan(distance)) tell(distance);
       }
     }
+    reached = found;
   });
+}
+
+Residuals forward_after(const SlicedField& inverse, const VertexField& field, const Limits& limits,
+                        const Control& control) {
+  Distances distances(inverse.grid.size.z);
+  find_forward_after(inverse, field, 0, inverse.grid.size.z, limits, control, distances);
+  return distances.residuals();
+}
+
+Residuals inverse_after(const VertexField& field, const SlicedField& inverse, const Limits& limits,
+                        const Control& control) {
+  Distances distances(field.lattice.size.z);
+  std::vector<Cells> anywhere(static_cast<std::size_t>(field.lattice.size.z));
+  find_inverse_after(field, inverse, {}, anywhere, limits, control, distances);
+  return distances.residuals();
 }
 
 /// Pairs of slices, evenly spread, none twice; of few slices, all as one part.
@@ -191,6 +243,51 @@ Residuals inverse_after_forward(const VertexField& field, const PullField& inver
                                 const Control& control) {
   return inverse_after(field, SlicedField(inverse), limits, control);
 }
+
+struct InverseCheck::State {
+  const VertexField& field;
+  Geometry grid;
+  Limits limits;
+  Distances forward, back;
+  std::vector<Cells> reach;     ///< of each slice of the lattice: most slabs are reached by few
+  std::vector<glm::vec3> last;  ///< the last slice that was added
+  std::int64_t next = 0;        ///< slice
+};
+
+InverseCheck::InverseCheck(const VertexField& field, const Geometry& grid, const Limits& limits)
+    : state_(new State{field,
+                       grid,
+                       limits,
+                       Distances(grid.size.z),
+                       Distances(field.lattice.size.z),
+                       std::vector<Cells>(static_cast<std::size_t>(field.lattice.size.z)),
+                       {},
+                       0}) {}
+
+InverseCheck::~InverseCheck() = default;
+
+void InverseCheck::add(const ConstVolumeView& slices, const Control& control) {
+  State& state = *state_;
+  const glm::i64vec3 size = state.grid.size;
+  const std::int64_t first = state.next, end = slices.buffered.end.z, area = size.x * size.y;
+  require(slices.voxels && slices.type == VoxelType::f32 && slices.components == 3 && slices.memory == Memory::host &&
+              slices.buffered == Region{{0, 0, first}, {size.x, size.y, end}} && end > first && end <= size.z,
+          "an inverse is expected in whole slices of 3 x float32, from slice " + std::to_string(first) + " on");
+  SlicedField inverse(state.grid);
+  const auto* samples = reinterpret_cast<const glm::vec3*>(slices.voxels);
+  if (first > 0) inverse.hold(first - 1, state.last.data());
+  for (std::int64_t k = first; k < end; ++k) inverse.hold(k, samples + (k - first) * area);
+  const Control quiet{.stop = control.stop};
+  find_forward_after(inverse, state.field, first, end, state.limits, quiet, state.forward);
+  const Cells cells{first == 0 ? INT64_MIN : first - 1, end == size.z ? INT64_MAX : end - 1};
+  find_inverse_after(state.field, inverse, cells, state.reach, state.limits, quiet, state.back);
+  state.last.assign(samples + (end - 1 - first) * area, samples + (end - first) * area);
+  state.next = end;
+}
+
+Residuals InverseCheck::forward_after_inverse() const { return state_->forward.residuals(); }
+
+Residuals InverseCheck::inverse_after_forward() const { return state_->back.residuals(); }
 
 RoundTrip measure_round_trip(Resampler& resampler, const VertexField& field, const Limits& limits,
                              const Control& control) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 
 #include "deform/resampler.h"
 
@@ -27,6 +28,29 @@ Residuals forward_after_inverse(const VertexField& field, const PullField& inver
 /// What is left is what a grid of samples cannot say of a piecewise affine map.
 Residuals inverse_after_forward(const VertexField& field, const PullField& inverse, const Limits& limits = {},
                                 const Control& control = {});
+
+/// Both residuals of all of an inverse that comes slab by slab, so that no more of it is held than a slab and the slice
+/// before. The numbers are those of the whole inverse; only `mean` of the way back may round otherwise, by the split.
+class InverseCheck {
+ public:
+  /// @param field  in host memory; must stay as it is
+  /// @param grid   of the inverse
+  InverseCheck(const VertexField& field, const Geometry& grid, const Limits& limits = {});
+  ~InverseCheck();
+
+  /// @param slices   `Maps::inverse_mm`, in host memory: whole slices, from the first on, each once
+  /// @param control  stop; progress is not told
+  /// @throws InputError for other slices than the next ones; Cancelled
+  void add(const ConstVolumeView& slices, const Control& control = {});
+
+  /// Of the slices that were added; of the vertices that come to lie in or between them.
+  Residuals forward_after_inverse() const;
+  Residuals inverse_after_forward() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
 
 /// Both residuals, of an inverse that is never whole: of slices of the output grid in pairs, spread evenly along k.
 struct RoundTrip {

@@ -77,12 +77,9 @@ void write_as(const std::filesystem::path& path, const Geometry& grid, const std
   require(displacement.size() == static_cast<std::size_t>(voxel_count(grid)),
           std::to_string(displacement.size()) + " displacements for " + to_string(grid.size) + " vertices, " +
               path.string());
-  ImageWriteOptions options;
-  if (image_format(path) == ImageFormat::nifti)
-    options.metadata["descrip"] = std::string(kDirectionKey) + "=" + to_string(direction);
-  else
-    options.metadata[kDirectionKey] = to_string(direction);
-  write_image(path, {&grid, whole(grid), VoxelType::f32, 3, std::as_bytes(std::span(displacement)).data()}, options);
+  const auto writer = create_field_file(path, grid, direction);
+  writer->write({&grid, whole(grid), VoxelType::f32, 3, std::as_bytes(std::span(displacement)).data()});
+  writer->finish();
 }
 
 }  // namespace
@@ -147,6 +144,16 @@ void write_field_file(const std::filesystem::path& path, const VertexField& fiel
 
 void write_field_file(const std::filesystem::path& path, const PullField& field) {
   write_as(path, field.grid, field.displacement, FieldDirection::pull);
+}
+
+std::unique_ptr<ImageWriter> create_field_file(const std::filesystem::path& path, const Geometry& grid,
+                                               FieldDirection direction) {
+  ImageWriteOptions options;
+  if (image_format(path) == ImageFormat::nifti)
+    options.metadata["descrip"] = std::string(kDirectionKey) + "=" + to_string(direction);
+  else
+    options.metadata[kDirectionKey] = to_string(direction);
+  return create_image(path, grid, VoxelType::f32, 3, options);
 }
 
 }  // namespace tetwarp

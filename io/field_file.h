@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "deform/vertex_field.h"
+#include "io/image_file.h"
 
 namespace tetwarp {
 
@@ -79,5 +80,9 @@ PullField read_pull_field(const FieldSource& source);
 /// Writes the field with its direction. The same bits come back from `read_forward_field`.
 void write_field_file(const std::filesystem::path& path, const VertexField& field);
 void write_field_file(const std::filesystem::path& path, const PullField& field);
+
+/// Begins the same file, for displacements that come slice by slice: 3 x float32, LPS mm.
+std::unique_ptr<ImageWriter> create_field_file(const std::filesystem::path& path, const Geometry& grid,
+                                               FieldDirection direction);
 
 }  // namespace tetwarp

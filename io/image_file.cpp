@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <fstream>
 #include <glm/geometric.hpp>
 #include <sstream>
 
 #include "deform/errors.h"
 #include "io/image_reader.h"
+#include "io/image_writer.h"
 #include "io/raw_image.h"
 #ifdef TETWARP_WITH_ITK
 #include "io/nifti_file.h"
@@ -76,43 +78,36 @@ std::unique_ptr<ImageReader> open_format(const std::filesystem::path& path, Imag
   return std::make_unique<ItkReader>(path, std::move(header), stored, itk_format(format));
 }
 
-/// MetaIO of ITK 5.2.1 reports success when the disk is full.
-bool is_whole_mha(const std::filesystem::path& path, const ConstVolumeView& volume) {
-  try {
-    const TextHeader header = read_text_header(path, ImageFormat::mha);
-    const std::uint64_t voxels = static_cast<std::uint64_t>(voxel_count(*volume.geometry)) *
-                                 static_cast<std::uint64_t>(volume.components) * size_bytes(volume.type);
-    const std::uint64_t stored = is_zlib(header, ImageFormat::mha) ? std::stoull(header["compresseddatasize"]) : voxels;
-    return std::filesystem::file_size(path) == header.data_offset + stored;
-  } catch (const std::exception&) {
-    return false;
-  }
+/// ITK makes the header, of one voxel in a file of its own beside the output: ITK knows its suffixes in lower case
+/// alone, holds what it compresses, and reports success for MHA when the disk is full. Sizes are filled in here.
+std::string text_header(const std::filesystem::path& path, ImageFormat format, const Geometry& grid, VoxelType type,
+                        int components, const ImageWriteOptions& options) {
+  Geometry one = grid;
+  one.size = glm::i64vec3(1);
+  const std::vector<std::byte> zeros(static_cast<std::size_t>(components) * size_bytes(type));
+  const bool mha = format == ImageFormat::mha;
+  const TemporaryFile made(path.string() + (mha ? ".header.mha" : ".header.nrrd"));
+  itk_write(made.path(), itk_format(format), {&one, whole(one), type, components, zeros.data()}, options.compression,
+            options.metadata);
+  std::string text(static_cast<std::size_t>(read_text_header(made.path(), format).data_offset), '\0');
+  std::ifstream(made.path(), std::ios::binary).read(text.data(), static_cast<std::streamsize>(text.size()));
+  const std::string size =
+      std::to_string(grid.size.x) + " " + std::to_string(grid.size.y) + " " + std::to_string(grid.size.z);
+  const bool vectors = components > 1;
+  set_text_field(text,
+                 mha ? "DimSize = " : "sizes: ", (mha || !vectors ? "" : std::to_string(components) + " ") + size);
+  return text;
 }
 
-/// NRRD and MHA. ITK knows its suffixes in lower case alone, and writes elsewhere when it does not find them.
-void write_with_itk(const std::filesystem::path& path, ImageFormat format, const ConstVolumeView& volume,
-                    const ImageWriteOptions& options) {
-  const std::string suffix = format == ImageFormat::mha ? ".mha" : ".nrrd";
-  if (path.extension() != suffix) {
-    const TemporaryFile named(path.string() + suffix);
-    write_with_itk(named.path(), format, volume, options);
-    return std::filesystem::rename(named.path(), path);
-  }
-  itk_write(path, itk_format(format), volume, options.compression, options.metadata);
-  if (format == ImageFormat::mha && !is_whole_mha(path, volume)) {
-    throw Error("cannot write the whole file, " + path.string() + "; check free space");
-  }
-}
-
-void write_format(const std::filesystem::path& path, ImageFormat format, const ConstVolumeView& volume,
-                  const ImageWriteOptions& options) {
+std::unique_ptr<ImageWriter> create_format(const std::filesystem::path& path, ImageFormat format, const Geometry& grid,
+                                           VoxelType type, int components, const ImageWriteOptions& options) {
   if (format == ImageFormat::nifti) {
     const auto descrip = options.metadata.find("descrip");
-    write_nifti(path, volume, descrip == options.metadata.end() ? "" : descrip->second,
-                options.compression < 0 ? 1 : options.compression);
-  } else {
-    write_with_itk(path, format, volume, options);
+    return create_nifti(path, grid, type, components, descrip == options.metadata.end() ? "" : descrip->second,
+                        options.compression < 0 ? 1 : options.compression);
   }
+  return create_text_image(path, format, grid, type, components,
+                           text_header(path, format, grid, type, components, options), options.compression);
 }
 #else
 [[noreturn]] void no_nifti(const std::filesystem::path& path) {
@@ -124,12 +119,13 @@ std::unique_ptr<ImageReader> open_format(const std::filesystem::path& path, Imag
   return open_raw_image(path, format);
 }
 
-void write_format(const std::filesystem::path& path, ImageFormat format, const ConstVolumeView& volume,
-                  const ImageWriteOptions& options) {
+std::unique_ptr<ImageWriter> create_format(const std::filesystem::path& path, ImageFormat format, const Geometry& grid,
+                                           VoxelType type, int components, const ImageWriteOptions& options) {
   if (format == ImageFormat::nifti) no_nifti(path);
   if (options.compression > 0)
     throw NotCompiled("compression needs ITK, which this build does not have, " + path.string());
-  write_raw_image(path, format, volume, options.metadata);
+  return create_text_image(path, format, grid, type, components,
+                           raw_image_header(format, grid, type, components, options.metadata), 0);
 }
 #endif
 
@@ -187,22 +183,53 @@ AnyVolume read_image(const std::filesystem::path& path) {
   return volume;
 }
 
-void write_image(const std::filesystem::path& path, const ConstVolumeView& volume, const ImageWriteOptions& options) {
+void ImageWriter::write(const ConstVolumeView& slices) {
+  const std::string file = path_.string();
+  require(slices.geometry && slices.voxels && slices.geometry->size == grid_.size && slices.type == type_ &&
+              slices.components == components_ && slices.memory == Memory::host,
+          "slices of another grid or type than the file's, " + file);
+  const glm::i64vec3 begin(0, 0, written_), end(grid_.size.x, grid_.size.y, slices.buffered.end.z);
+  require(slices.buffered == Region{begin, end} && end.z > begin.z && end.z <= grid_.size.z,
+          "slices " + std::to_string(slices.buffered.begin.z) + " to " + std::to_string(end.z) + ", " + file +
+              "; expected whole slices from " + std::to_string(written_) + " on");
+  append(slices);
+  written_ = end.z;
+}
+
+void ImageWriter::finish() {
+  require(written_ == grid_.size.z, std::to_string(written_) + " slices were written, " + path_.string() +
+                                        "; expected " + std::to_string(grid_.size.z));
+  close();
+}
+
+void ImageWriter::fail() const {
+  throw Error("cannot write, " + path_.string() + "; check folder, rights and free space");
+}
+
+std::unique_ptr<ImageWriter> create_image(const std::filesystem::path& path, const Geometry& grid, VoxelType type,
+                                          int components, const ImageWriteOptions& options) {
   const std::string file = path.string();
   const ImageFormat format = required_format(path);
-  require(volume.geometry && volume.voxels && volume.buffered == whole(*volume.geometry),
-          "only a whole volume can be written, " + file);
   require(options.compression >= -1 && options.compression <= 9,
           "compression level " + std::to_string(options.compression) + ", " + file + "; expected 0 to 9");
-  require_valid(*volume.geometry, file);
-  require_orthogonal(*volume.geometry, file);
+  require(components >= 1, std::to_string(components) + " components, " + file + "; expected 1 or more");
+  require_valid(grid, file);
+  require_orthogonal(grid, file);
   for (const auto& [key, value] : options.metadata) {
     const auto control = [](char c) { return static_cast<unsigned char>(c) < 32; };
     require(!key.empty() && std::ranges::none_of(key, [&](char c) { return control(c) || c == ':' || c == '='; }) &&
                 std::ranges::none_of(value, control),
             "the key \"" + key + "\", " + file + "; keys and values are one line, keys without ':' and '='");
   }
-  write_format(path, format, volume, options);
+  return create_format(path, format, grid, type, components, options);
+}
+
+void write_image(const std::filesystem::path& path, const ConstVolumeView& volume, const ImageWriteOptions& options) {
+  require(volume.geometry && volume.voxels && volume.buffered == whole(*volume.geometry),
+          "only a whole volume can be written, " + path.string());
+  const auto writer = create_image(path, *volume.geometry, volume.type, volume.components, options);
+  writer->write(volume);
+  writer->finish();
 }
 
 }  // namespace tetwarp

@@ -2,7 +2,9 @@
 
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <string>
+#include <utility>
 
 #include "deform/volume.h"
 
@@ -34,9 +36,49 @@ struct ImageWriteOptions {
 ImageHeader read_image_header(const std::filesystem::path& path);
 AnyVolume read_image(const std::filesystem::path& path);
 
-/// Writes the whole volume with its own voxel type; NIfTI with qform and sform both set (code 1), mm.
+/// A volume file that takes its slices one after the other: what was written need not stay in memory.
+///
+/// However the slices are split, the file has the same bytes. Two kinds of file cannot be written from front to back:
+/// several components in .nii.gz (one plane a component, one after the other) and compressed .mha (the header states
+/// the compressed size). What has to wait for its place lies on the disk, in files without names beside `path`.
+class ImageWriter {
+ public:
+  virtual ~ImageWriter() = default;
+  ImageWriter(const ImageWriter&) = delete;
+  ImageWriter& operator=(const ImageWriter&) = delete;
+
+  /// @param slices  whole slices, the next ones of the grid; of the file's type and components, in host memory
+  /// @throws InputError for other slices, Error when they cannot be written
+  void write(const ConstVolumeView& slices);
+  /// To be called after the last slice; the file is not whole before. @throws InputError when slices are missing, Error
+  /// when the file cannot be written whole
+  void finish();
+
+ protected:
+  ImageWriter(std::filesystem::path path, const Geometry& grid, VoxelType type, int components)
+      : path_(std::move(path)), grid_(grid), type_(type), components_(components) {}
+
+  virtual void append(const ConstVolumeView& slices) = 0;
+  virtual void close() = 0;  ///< all slices are there
+  [[noreturn]] void fail() const;
+
+  std::filesystem::path path_;
+  Geometry grid_;
+  VoxelType type_;
+  int components_;
+
+ private:
+  std::int64_t written_ = 0;  ///< slices
+};
+
+/// Begins a file of voxels of their own type; NIfTI with qform and sform both set (code 1), mm.
 /// Writes to `path` directly: io/staged_output.h is what makes an output appear only when complete.
-/// @throws InputError for an unknown suffix, Error when the file cannot be written whole
+/// @throws InputError for an unknown suffix, a grid or metadata that the format cannot hold, Error when the file cannot
+///         be written
+std::unique_ptr<ImageWriter> create_image(const std::filesystem::path& path, const Geometry& grid, VoxelType type,
+                                          int components = 1, const ImageWriteOptions& options = {});
+
+/// Writes a whole volume with `create_image`. @throws as that, and Error when the file cannot be written whole
 void write_image(const std::filesystem::path& path, const ConstVolumeView& volume,
                  const ImageWriteOptions& options = {});
 

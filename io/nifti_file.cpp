@@ -18,7 +18,6 @@
 namespace tetwarp {
 namespace {
 
-constexpr std::size_t kHeaderBytes = 352;  // 348, and four zeros: no extension follows
 constexpr std::pair<int, VoxelType> kDatatypes[] = {
     {2, VoxelType::u8},    {256, VoxelType::i8}, {512, VoxelType::u16}, {4, VoxelType::i16},
     {768, VoxelType::u32}, {8, VoxelType::i32},  {16, VoxelType::f32},  {64, VoxelType::f64},
@@ -183,37 +182,6 @@ class NiftiReader final : public ImageReader {
   VoxelType disk_;
 };
 
-/// ITK makes the header, of one voxel in a file of its own beside the output; size and description are filled in here.
-std::array<char, kHeaderBytes> make_header(const std::filesystem::path& path, const ConstVolumeView& volume,
-                                           const std::string& descrip) {
-  Geometry one = *volume.geometry;
-  one.size = glm::i64vec3(1);
-  constexpr std::array<std::byte, 64> kZeros{};
-  require(static_cast<std::size_t>(volume.components) * size_bytes(volume.type) <= kZeros.size(),
-          std::to_string(volume.components) + " values a voxel, " + path.string() + "; NIfTI is written with 1 or 3");
-  const TemporaryFile made(path.string() + ".header.nii");
-  itk_write(made.path(), ItkFormat::nifti, {&one, whole(one), volume.type, volume.components, kZeros.data()}, 0, {});
-  std::array<char, kHeaderBytes> header{};
-  std::ifstream(made.path(), std::ios::binary).read(header.data(), header.size());
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto size = static_cast<std::int16_t>(volume.geometry->size[axis]);
-    std::memcpy(header.data() + 42 + 2 * axis, &size, sizeof(size));
-  }
-  descrip.copy(header.data() + 148, 79);
-  return header;
-}
-
-/// One of `PlanePieces`.
-std::span<const std::byte> plane_piece(const ConstVolumeView& volume, std::size_t component, std::size_t begin,
-                                       std::size_t n, std::vector<std::byte>& scratch) {
-  const std::size_t width = size_bytes(volume.type), components = static_cast<std::size_t>(volume.components);
-  if (components == 1) return {volume.voxels + begin * width, n * width};
-  scratch.resize(n * width);
-  const std::byte* from = volume.voxels + (begin * components + component) * width;
-  for (std::size_t i = 0; i < n; ++i) std::memcpy(scratch.data() + i * width, from + i * components * width, width);
-  return scratch;
-}
-
 /// Where ITK places the volume, with the digits of the header. ITK 5.2.1 takes displacement vectors (intent 1006) for
 /// an image of five axes: these are placed here, by its rule.
 Geometry placed_geometry(const std::filesystem::path& path, const NiftiHeader& header) {
@@ -252,39 +220,6 @@ std::unique_ptr<ImageReader> open_nifti(const std::filesystem::path& path) {
           "vox_offset " + std::to_string(header.vox_offset) + ", " + file + "; expected 352");
   const Stored stored{static_cast<std::uint64_t>(header.vox_offset), size_bytes(disk), compressed};
   return std::make_unique<NiftiReader>(path, std::move(image), stored, std::move(header), disk);
-}
-
-void write_nifti(const std::filesystem::path& path, const ConstVolumeView& volume, const std::string& descrip,
-                 int level) {
-  const std::string file = path.string();
-  const Geometry& grid = *volume.geometry;
-  for (int axis = 0; axis < 3; ++axis) {
-    require(grid.size[axis] <= INT16_MAX,
-            "a size of " + to_string(grid.size) + ", " + file + "; NIfTI-1 holds up to 32767 an axis");
-  }
-  require(descrip.size() <= 79,
-          "a description of " + std::to_string(descrip.size()) + " characters, " + file + "; NIfTI holds 79");
-  std::ofstream out(path, std::ios::binary | std::ios::trunc);
-  if (!out) throw Error("cannot write, " + file + "; check folder and rights");
-  const auto header = make_header(path, volume, descrip);
-  const PlanePieces planes(grid, size_bytes(volume.type), volume.components);
-  const std::size_t pieces = 1 + planes.count();
-  const PieceSource piece = [&](std::size_t i, std::vector<std::byte>& scratch) -> std::span<const std::byte> {
-    if (i == 0) return std::as_bytes(std::span(header));
-    const auto [component, begin, count] = planes[i - 1];
-    return plane_piece(volume, component, begin, count, scratch);
-  };
-  if (path.extension() != ".nii" && path.extension() != ".NII") {
-    write_gzip(out, pieces, piece, level);
-  } else {
-    std::vector<std::byte> scratch;
-    for (std::size_t i = 0; i < pieces && out; ++i) {
-      const auto bytes = piece(i, scratch);
-      out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-    }
-  }
-  out.close();
-  if (!out) throw Error("cannot write, " + file + "; check folder, rights and free space");
 }
 
 }  // namespace tetwarp

@@ -33,9 +33,4 @@ bool sform_decides(const NiftiHeader& header);
 
 std::unique_ptr<ImageReader> open_nifti(const std::filesystem::path& path);
 
-/// @param descrip  up to 79 characters
-/// @param level    of libdeflate, 0 to 9, for a name in .gz
-void write_nifti(const std::filesystem::path& path, const ConstVolumeView& volume, const std::string& descrip,
-                 int level);
-
 }  // namespace tetwarp

@@ -207,8 +207,8 @@ std::string exact(const glm::dvec3& v, const char* separator) {
   return text.data();
 }
 
-std::string mha_header(const ConstVolumeView& volume, const std::map<std::string, std::string>& metadata) {
-  const Geometry& grid = *volume.geometry;
+std::string mha_header(const Geometry& grid, VoxelType type, int components,
+                       const std::map<std::string, std::string>& metadata) {
   const glm::dmat3& d = grid.direction;
   std::ostringstream out;
   out << "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData = False\n"
@@ -216,18 +216,18 @@ std::string mha_header(const ConstVolumeView& volume, const std::map<std::string
       << "Offset = " << exact(grid.origin, " ") << "\nElementSpacing = " << exact(grid.spacing, " ") << '\n';
   for (const auto& [key, value] : metadata) out << key << " = " << value << '\n';
   out << "DimSize = " << grid.size.x << ' ' << grid.size.y << ' ' << grid.size.z << '\n';
-  if (volume.components > 1) out << "ElementNumberOfChannels = " << volume.components << '\n';
-  out << "ElementType = " << kTypes[static_cast<std::size_t>(volume.type)].mha << "\nElementDataFile = LOCAL\n";
+  if (components > 1) out << "ElementNumberOfChannels = " << components << '\n';
+  out << "ElementType = " << kTypes[static_cast<std::size_t>(type)].mha << "\nElementDataFile = LOCAL\n";
   return out.str();
 }
 
-std::string nrrd_header(const ConstVolumeView& volume, const std::map<std::string, std::string>& metadata) {
-  const Geometry& grid = *volume.geometry;
-  const bool vectors = volume.components > 1;
+std::string nrrd_header(const Geometry& grid, VoxelType type, int components,
+                        const std::map<std::string, std::string>& metadata) {
+  const bool vectors = components > 1;
   std::ostringstream out;
-  out << "NRRD0004\ntype: " << kTypes[static_cast<std::size_t>(volume.type)].nrrd
-      << "\ndimension: " << (vectors ? 4 : 3) << "\nspace: left-posterior-superior\nsizes:";
-  if (vectors) out << ' ' << volume.components;
+  out << "NRRD0004\ntype: " << kTypes[static_cast<std::size_t>(type)].nrrd << "\ndimension: " << (vectors ? 4 : 3)
+      << "\nspace: left-posterior-superior\nsizes:";
+  if (vectors) out << ' ' << components;
   out << ' ' << grid.size.x << ' ' << grid.size.y << ' ' << grid.size.z
       << "\nspace directions:" << (vectors ? " none" : "");
   for (int axis = 0; axis < 3; ++axis) out << " (" << exact(grid.spacing[axis] * grid.direction[axis], ",") << ')';
@@ -258,16 +258,10 @@ std::unique_ptr<ImageReader> open_raw_image(const std::filesystem::path& path, I
   return make_raw_reader(path, std::move(header), stored);
 }
 
-void write_raw_image(const std::filesystem::path& path, ImageFormat format, const ConstVolumeView& volume,
-                     const std::map<std::string, std::string>& metadata) {
-  std::ofstream out(path, std::ios::binary | std::ios::trunc);
-  out << (format == ImageFormat::mha ? mha_header(volume, metadata) : nrrd_header(volume, metadata));
-  const auto voxels =
-      static_cast<std::size_t>(voxel_count(*volume.geometry)) * static_cast<std::size_t>(volume.components);
-  out.write(reinterpret_cast<const char*>(volume.voxels),
-            static_cast<std::streamsize>(voxels * size_bytes(volume.type)));
-  out.close();
-  if (!out) throw Error("cannot write, " + path.string() + "; check folder, rights and free space");
+std::string raw_image_header(ImageFormat format, const Geometry& grid, VoxelType type, int components,
+                             const std::map<std::string, std::string>& metadata) {
+  return format == ImageFormat::mha ? mha_header(grid, type, components, metadata)
+                                    : nrrd_header(grid, type, components, metadata);
 }
 
 }  // namespace tetwarp

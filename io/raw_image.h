@@ -20,8 +20,8 @@ std::unique_ptr<ImageReader> make_raw_reader(const std::filesystem::path& path, 
 /// compressed
 std::unique_ptr<ImageReader> open_raw_image(const std::filesystem::path& path, ImageFormat format);
 
-/// @throws Error when the file cannot be written whole
-void write_raw_image(const std::filesystem::path& path, ImageFormat format, const ConstVolumeView& volume,
-                     const std::map<std::string, std::string>& metadata);
+/// The header of MHA or NRRD, up to the voxels, which follow raw.
+std::string raw_image_header(ImageFormat format, const Geometry& grid, VoxelType type, int components,
+                             const std::map<std::string, std::string>& metadata);
 
 }  // namespace tetwarp

@@ -81,6 +81,70 @@ void expect_same(const Residuals& expected, const Residuals& found) {
   EXPECT_EQ(expected.largest, found.largest);
 }
 
+/// Slices of an inverse, in memory that ends with them.
+void add_slices(InverseCheck& check, const PullField& inverse, std::int64_t begin, std::int64_t end) {
+  const std::int64_t area = inverse.grid.size.x * inverse.grid.size.y;
+  const std::vector<glm::vec3> held(inverse.displacement.begin() + begin * area,
+                                    inverse.displacement.begin() + end * area);
+  Region region = whole(inverse.grid);
+  region.begin.z = begin;
+  region.end.z = end;
+  check.add({&inverse.grid, region, VoxelType::f32, 3, std::as_bytes(std::span(held)).data()});
+}
+
+TEST(InverseCheck, SlabsGiveTheNumbersOfTheWholeInverse) {
+  Geometry grid = unit_grid({30, 28, 33});
+  grid.spacing = {0.8, 0.9, 1.5};
+  // A lattice of its own: finer along k, beyond the grid, and turned, so that each of its slices reaches many slabs.
+  VertexField turned = uniform_field(unit_grid({30, 28, 40}), {0, 0, 0.25F});
+  turned.lattice.direction = glm::dmat3(1, 0, 0, 0, 0, 1, 0, -1, 0);
+  turned.lattice.origin = {-2, 34, 3};
+  for (const VertexField& field :
+       {twist(grid, 0.3, 1), uniform_field(grid, {0.5F, 0, 7.25F}), uniform_field(grid, {0, 0, 0}), turned}) {
+    const PullField inverse = inverse_of(field, grid);
+    const Residuals there = forward_after_inverse(field, inverse), back = inverse_after_forward(field, inverse);
+    EXPECT_GT(there.points, 5000U);
+    EXPECT_GT(back.points, 5000U);
+    for (const std::int64_t step : {1, 2, 7, 32, 33}) {
+      InverseCheck check(field, grid);
+      for (std::int64_t k = 0; k < 33; k += step) add_slices(check, inverse, k, std::min<std::int64_t>(k + step, 33));
+      expect_same(there, check.forward_after_inverse());
+      const Residuals found = check.inverse_after_forward();
+      EXPECT_EQ(back.points, found.points) << step;
+      EXPECT_EQ(back.percentile_99, found.percentile_99) << step;
+      EXPECT_EQ(back.largest, found.largest) << step;
+      EXPECT_NEAR(back.mean, found.mean, 1e-12 * back.mean) << step;
+    }
+  }
+}
+
+TEST(InverseCheck, FindsWhatIsWrongInAnySlice) {
+  const Geometry grid = unit_grid({12, 10, 9});
+  const VertexField field = uniform_field(grid, {0, 0, 0.5F});
+  for (std::int64_t wrong = 1; wrong < 9; ++wrong) {
+    PullField inverse = inverse_of(field, grid);
+    for (std::int64_t n = 0; n < 120; ++n) inverse.displacement[static_cast<std::size_t>(wrong * 120 + n)].y += 1;
+    InverseCheck check(field, grid);
+    for (std::int64_t k = 0; k < 9; k += 3) add_slices(check, inverse, k, k + 3);
+    EXPECT_EQ(check.forward_after_inverse().largest, 1) << wrong;
+    EXPECT_EQ(check.inverse_after_forward().largest, 0.5) << wrong;
+  }
+}
+
+TEST(InverseCheck, TakesEachSliceOnceAndInOrder) {
+  const Geometry grid = unit_grid({8, 7, 6});
+  const VertexField field = uniform_field(grid, {0, 0, 0});
+  const PullField inverse = inverse_of(field, grid);
+  InverseCheck check(field, grid);
+  add_slices(check, inverse, 0, 2);
+  EXPECT_THROW(add_slices(check, inverse, 0, 2), InputError);
+  EXPECT_THROW(add_slices(check, inverse, 3, 4), InputError);
+  EXPECT_EQ(check.forward_after_inverse().points, 8U * 7 * 2);
+  EXPECT_EQ(check.inverse_after_forward().points, 8U * 7);  // those on slice 1 belong to the cells between 1 and 2
+  add_slices(check, inverse, 2, 6);
+  EXPECT_EQ(check.inverse_after_forward().points, 8U * 7 * 6);
+}
+
 TEST(RoundTrip, OfFewSlicesIsThatOfTheWholeInverse) {
   Geometry grid = unit_grid({30, 28, 16});
   grid.spacing = {0.8, 0.9, 1.5};

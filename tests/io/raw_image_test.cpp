@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "io/image_writer.h"
 #include "tests/support/image_samples.h"
 #include "tests/support/scratch.h"
 #include "tests/support/write_file.h"
@@ -11,6 +12,15 @@ namespace {
 
 constexpr ImageFormat kFormats[] = {ImageFormat::mha, ImageFormat::nrrd};
 const char* name_of(ImageFormat format) { return format == ImageFormat::mha ? "x.mha" : "x.nrrd"; }
+
+void write_raw(const std::filesystem::path& path, ImageFormat format, const AnyVolume& volume,
+               const std::map<std::string, std::string>& metadata) {
+  const Geometry& grid = volume.geometry();
+  const auto header = raw_image_header(format, grid, volume.type(), volume.components(), metadata);
+  const auto writer = create_text_image(path, format, grid, volume.type(), volume.components(), header, 0);
+  writer->write(volume.view());
+  writer->finish();
+}
 
 AnyVolume read_raw(const std::filesystem::path& path, ImageFormat format) {
   const auto reader = open_raw_image(path, format);
@@ -27,7 +37,7 @@ TEST(RawImage, GeometryVoxelsAndMetadataComeBack) {
     for (const Geometry& grid : all_orientations()) {
       const AnyVolume volume = numbered(grid, static_cast<VoxelType>(type % 8), type % 5 == 0 ? 3 : 1);
       ++type;
-      write_raw_image(scratch / name_of(format), format, volume.view(), {{"tetwarp_direction", "pull"}});
+      write_raw(scratch / name_of(format), format, volume, {{"tetwarp_direction", "pull"}});
       const AnyVolume back = read_raw(scratch / name_of(format), format);
       EXPECT_TRUE(same_bytes(back, volume)) << name_of(format) << to_string(volume.type());
       EXPECT_EQ(back.geometry(), grid) << name_of(format) << " " << orientation_code(grid);
@@ -53,7 +63,7 @@ TEST(RawImage, AgreesWithTheOtherReaderAndWriter) {
         EXPECT_EQ(open_raw_image(scratch / name_of(format), format)->header().metadata.at("key"), "value");
       }
       const AnyVolume volume = numbered(grid, VoxelType::f64, 3);
-      write_raw_image(scratch / name_of(format), format, volume.view(), {});
+      write_raw(scratch / name_of(format), format, volume, {});
       const AnyVolume back = read_image(scratch / name_of(format));
       EXPECT_TRUE(same_bytes(back, volume));
       EXPECT_TRUE(same_grid(back.geometry(), grid, 1e-12));
@@ -77,7 +87,7 @@ TEST(RawImage, WhatIsNotPlainIsRefusedByName) {
   const Scratch scratch;
   const auto refused = [&](ImageFormat format, const std::string& from, const std::string& to, const char* why) {
     const auto path = scratch / name_of(format);
-    write_raw_image(path, format, numbered(all_orientations()[0], VoxelType::i16).view(), {});
+    write_raw(path, format, numbered(all_orientations()[0], VoxelType::i16), {});
     std::string bytes = read_bytes(path);
     const auto at = bytes.find(from);
     ASSERT_NE(at, std::string::npos) << from;
