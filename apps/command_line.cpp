@@ -38,10 +38,11 @@ void add_series(CLI::App& command, InputOptions& input) {
 
 constexpr const char* kInputHelp = "Folder of DICOM files, one DICOM file, or .nii .nii.gz .nrrd .mha";
 constexpr const char* kFieldHelp =
-    "Forward field: a file (.mha .nrrd .nii .nii.gz, or .npy:order=zyx|xyz,units=mm|voxel), a transform of ITK, "
-    "elastix, plastimatch (.h5 .tfm .txt) or NiftyReg (its B-spline; each vertex x goes to T(x)), a mesh (.msh; .vtu "
-    "and "
-    ".vtk; first of several), or identity, "
+    "Forward field: a file (.mha .nrrd .nii .nii.gz, .npy:order=zyx|xyz,units=mm|voxel, or .vts .vti .vtr .vtk "
+    "[:displacement=NAME,frame=lps|ras,units=mm|m]), a transform of ITK, "
+    "elastix, plastimatch (.h5 .tfm .txt) or NiftyReg (its B-spline; each vertex x goes to T(x)), a mesh (.msh .vtu "
+    ".vtk, "
+    "the first of several), or identity, "
     "wave:amplitude=,wavelength=[,phase=,axis=,along=], "
     "twist:angle=[,axis=], bubble:radius=,strength=[,center=X/Y/Z], bubble-paper:shift=[,center=], translate:by=X/Y/Z; "
     "mm, "

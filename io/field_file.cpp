@@ -31,7 +31,7 @@ const FieldFormat& required_format(const std::filesystem::path& path) {
   const FieldFormat* format = format_of(path);
   require(format != nullptr || is_there(path), "no such file, " + path.string());
   require(format != nullptr, "not a field file, " + path.string() +
-                                 "; expected .mha .nrrd .nii .nii.gz .npy, or a "
+                                 "; expected .mha .nrrd .nii .nii.gz .npy .vts .vti .vtr .vtk, or a "
                                  "DICOM Deformable Spatial Registration");
   return *format;
 }

@@ -5,22 +5,43 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <sstream>
 #include <string>
 
 #include "io/field_file.h"
 #include "tests/support/image_samples.h"
 #include "tests/support/write_file.h"
 
-/// Has Python write the field of an .mha file as another tool would (tests/support/make_field.py says which).
-/// @return  false: Python or a library of it is missing
-inline bool make_foreign_field(const std::string& kind, const std::filesystem::path& mha,
-                               const std::filesystem::path& output) {
-  const std::string command = "'" TETWARP_PYTHON "' '" TETWARP_MAKE_FIELD "' '" + kind + "' '" + mha.string() + "' '" +
-                              output.string() + "' > /dev/null";
+/// Runs a script of tests/support. @return  false: Python or a library of it is missing
+inline bool run_python(const std::string& script_and_arguments) {
+  const std::string command = "'" TETWARP_PYTHON "' " + script_and_arguments + " > /dev/null";
   const int status = std::system(command.c_str());
   if (WIFEXITED(status) && (WEXITSTATUS(status) == 77 || WEXITSTATUS(status) == 127)) return false;  // 127: no Python
   EXPECT_EQ(status, 0) << command;
   return true;
+}
+
+/// Has Python write the field of an .mha file as another tool would (tests/support/make_field.py says which).
+/// @return  as `run_python`
+inline bool make_foreign_field(const std::string& kind, const std::filesystem::path& mha,
+                               const std::filesystem::path& output) {
+  return run_python("'" TETWARP_MAKE_FIELD "' '" + kind + "' '" + mha.string() + "' '" + output.string() + "'");
+}
+
+/// Has VTK write a dataset (tests/support/make_vtk.py says which). @return  as `run_python`
+inline bool make_vtk(const std::string& kind, const std::string& encoding, const std::filesystem::path& output,
+                     const tetwarp::Geometry& grid) {
+  std::ostringstream numbers;
+  numbers.precision(17);
+  numbers << grid.size.x << ',' << grid.size.y << ',' << grid.size.z;
+  for (const glm::dvec3& triple : {grid.spacing, grid.origin}) {
+    numbers << ',' << triple.x << ',' << triple.y << ',' << triple.z;
+  }
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) numbers << ',' << grid.direction[column][row];
+  }
+  return run_python("'" TETWARP_MAKE_VTK "' '" + kind + "' '" + encoding + "' '" + output.string() + "' ' " +
+                    numbers.str() + "'");
 }
 
 /// At rest but for the corner at the end of i, the begin of j and the end of k: (3, 5, 7) mm.
