@@ -149,56 +149,80 @@ glm::dvec3 sample(const SlicedField& field, const glm::dvec3& index) {
   return sum;
 }
 
+/// The vertices of a field in parts: the slices of a lattice, or as many of a mesh as one thread takes at a time.
+class VertexParts {
+ public:
+  explicit VertexParts(const VertexField& field) : field_(field), point_(point_from_index(field.lattice)) {}
+
+  std::int64_t count() const {
+    if (field_.mesh.is_empty()) return field_.lattice.size.z;
+    return (static_cast<std::int64_t>(field_.mesh.rest.size()) + kOfMesh - 1) / kOfMesh;
+  }
+
+  /// Calls `visit(rest, displacement)`, mm, for the vertices of a part.
+  template <class Visit>
+  void for_each(std::int64_t part, Visit&& visit) const {
+    if (!field_.mesh.is_empty()) {
+      const std::size_t begin = static_cast<std::size_t>(part * kOfMesh),
+                        end = std::min(begin + kOfMesh, field_.mesh.rest.size());
+      for (std::size_t n = begin; n < end; ++n) visit(field_.mesh.rest[n], glm::dvec3(field_.mesh.displacement[n]));
+      return;
+    }
+    const glm::i64vec3 size = field_.lattice.size;
+    const glm::vec3* displacement = field_.displacement.data() + part * size.x * size.y;
+    for (std::int64_t j = 0; j < size.y; ++j) {
+      for (std::int64_t i = 0; i < size.x; ++i, ++displacement)
+        visit(point_(glm::dvec3(i, j, part)), glm::dvec3(*displacement));
+    }
+  }
+
+ private:
+  static constexpr std::int64_t kOfMesh = 4096;
+
+  const VertexField& field_;
+  AffineMap point_;
+};
+
 /// From the samples of the slices begin <= k < end, and forward.
-void find_forward_after(const SlicedField& inverse, const VertexField& field, std::int64_t begin, std::int64_t end,
+void find_forward_after(const SlicedField& inverse, const PointMover& forward, std::int64_t begin, std::int64_t end,
                         const Limits& limits, const Control& control, Distances& distances) {
   const Geometry& grid = inverse.grid;
   const AffineMap point = point_from_index(grid);
-  const FieldView forward = view(field, Outside::background);
   distances.find(begin, end, limits, control, [&](std::int64_t k, auto&& tell) {
     const glm::vec3* slice = inverse.slice(k);
     if (!slice) return;
-    std::vector<glm::dvec3> meant, points;
     for (std::int64_t j = 0; j < grid.size.y; ++j) {
       for (std::int64_t i = 0; i < grid.size.x; ++i) {
         const glm::vec3& by = slice[j * grid.size.x + i];
         if (std::isnan(by.x)) continue;
-        meant.push_back(point(glm::dvec3(i, j, k)));
-        points.push_back(meant.back() + glm::dvec3(by));
+        const glm::dvec3 meant = point(glm::dvec3(i, j, k));
+        glm::dvec3 found = meant + glm::dvec3(by);
+        if (forward.move(found) == PointStatus::moved) tell(glm::distance(found, meant));
       }
-    }
-    const std::vector<PointStatus> status = move_points(grid, forward, points, {.threads = 1});
-    for (std::size_t n = 0; n < points.size(); ++n) {
-      if (status[n] == PointStatus::moved) tell(glm::distance(points[n], meant[n]));
     }
   });
 }
 
 /// From the vertices that come to lie in some cells of the inverse, and back.
 ///
-/// @param reach  for each slice of the lattice the cells that its vertices come to lie in, or more; is made exact
+/// @param reach  for each part of the vertices the cells that they come to lie in, or more; is made exact
 void find_inverse_after(const VertexField& field, const SlicedField& inverse, const Cells& cells,
                         std::vector<Cells>& reach, const Limits& limits, const Control& control, Distances& distances) {
-  const glm::i64vec3 size = field.lattice.size;
-  const AffineMap point = point_from_index(field.lattice), index_from = index_from_point(inverse.grid);
-  distances.find(0, size.z, limits, control, [&](std::int64_t k, auto&& tell) {
-    Cells& reached = reach[static_cast<std::size_t>(k)];
+  const VertexParts parts(field);
+  const AffineMap index_from = index_from_point(inverse.grid);
+  distances.find(0, parts.count(), limits, control, [&](std::int64_t part, auto&& tell) {
+    Cells& reached = reach[static_cast<std::size_t>(part)];
     if (reached.end <= cells.begin || cells.end <= reached.begin) return;
     Cells found{INT64_MAX, INT64_MIN};
-    for (std::int64_t j = 0; j < size.y; ++j) {
-      for (std::int64_t i = 0; i < size.x; ++i) {
-        const glm::dvec3 rest = point(glm::dvec3(i, j, k));
-        const glm::dvec3 moved =
-            rest + glm::dvec3(field.displacement[static_cast<std::size_t>((k * size.y + j) * size.x + i)]);
-        const glm::dvec3 index = index_from(moved);
-        const std::int64_t cell = cell_of(index.z, inverse.grid.size.z);
-        if (cell < 0) continue;
-        found = {std::min(found.begin, cell), std::max(found.end, cell + 1)};
-        if (!cells.contains(cell)) continue;
-        const double distance = glm::distance(moved + sample(inverse, index), rest);
-        if (!std::isnan(distance)) tell(distance);
-      }
-    }
+    parts.for_each(part, [&](const glm::dvec3& rest, const glm::dvec3& displacement) {
+      const glm::dvec3 moved = rest + displacement, index = index_from(moved);
+      const std::int64_t cell = cell_of(index.z, inverse.grid.size.z);
+      if (cell < 0) return;
+      found = {std::min(found.begin, cell), std::max(found.end, cell + 1)};
+      if (!cells.contains(cell)) return;
+      const double distance = glm::distance(moved + sample(inverse, index), rest);
+      if (!std::isnan(distance)) tell(distance);
+    });
     reached = found;
   });
 }
@@ -206,14 +230,16 @@ void find_inverse_after(const VertexField& field, const SlicedField& inverse, co
 Residuals forward_after(const SlicedField& inverse, const VertexField& field, const Limits& limits,
                         const Control& control) {
   Distances distances(inverse.grid.size.z);
-  find_forward_after(inverse, field, 0, inverse.grid.size.z, limits, control, distances);
+  const PointMover forward(inverse.grid, view(field, Outside::background), limits, control);
+  find_forward_after(inverse, forward, 0, inverse.grid.size.z, limits, control, distances);
   return distances.residuals();
 }
 
 Residuals inverse_after(const VertexField& field, const SlicedField& inverse, const Limits& limits,
                         const Control& control) {
-  Distances distances(field.lattice.size.z);
-  std::vector<Cells> anywhere(static_cast<std::size_t>(field.lattice.size.z));
+  const std::int64_t parts = VertexParts(field).count();
+  Distances distances(parts);
+  std::vector<Cells> anywhere(static_cast<std::size_t>(parts));
   find_inverse_after(field, inverse, {}, anywhere, limits, control, distances);
   return distances.residuals();
 }
@@ -245,24 +271,27 @@ Residuals inverse_after_forward(const VertexField& field, const PullField& inver
 }
 
 struct InverseCheck::State {
+  State(const VertexField& of, const Geometry& inverse, const Limits& with)
+      : field(of),
+        grid(inverse),
+        limits(with),
+        mover(inverse, view(of, Outside::background), with),
+        forward(inverse.size.z),
+        back(VertexParts(of).count()),
+        reach(static_cast<std::size_t>(VertexParts(of).count())) {}
+
   const VertexField& field;
   Geometry grid;
   Limits limits;
+  PointMover mover;
   Distances forward, back;
-  std::vector<Cells> reach;     ///< of each slice of the lattice: most slabs are reached by few
+  std::vector<Cells> reach;     ///< of each part of the vertices: most slabs are reached by few
   std::vector<glm::vec3> last;  ///< the last slice that was added
   std::int64_t next = 0;        ///< slice
 };
 
 InverseCheck::InverseCheck(const VertexField& field, const Geometry& grid, const Limits& limits)
-    : state_(new State{field,
-                       grid,
-                       limits,
-                       Distances(grid.size.z),
-                       Distances(field.lattice.size.z),
-                       std::vector<Cells>(static_cast<std::size_t>(field.lattice.size.z)),
-                       {},
-                       0}) {}
+    : state_(std::make_unique<State>(field, grid, limits)) {}
 
 InverseCheck::~InverseCheck() = default;
 
@@ -278,7 +307,7 @@ void InverseCheck::add(const ConstVolumeView& slices, const Control& control) {
   if (first > 0) inverse.hold(first - 1, state.last.data());
   for (std::int64_t k = first; k < end; ++k) inverse.hold(k, samples + (k - first) * area);
   const Control quiet{.stop = control.stop};
-  find_forward_after(inverse, state.field, first, end, state.limits, quiet, state.forward);
+  find_forward_after(inverse, state.mover, first, end, state.limits, quiet, state.forward);
   const Cells cells{first == 0 ? INT64_MIN : first - 1, end == size.z ? INT64_MAX : end - 1};
   find_inverse_after(state.field, inverse, cells, state.reach, state.limits, quiet, state.back);
   state.last.assign(samples + (end - 1 - first) * area, samples + (end - first) * area);

@@ -7,6 +7,7 @@
 #include "deform/fields/lattice_mesh.h"
 #include "deform/fields/point_map.h"
 #include "deform/points.h"
+#include "deform/residuals.h"
 #include "tests/support/against_oracle.h"
 #include "tests/support/backends.h"
 #include "tests/support/fields.h"
@@ -376,6 +377,17 @@ TEST_P(Meshes, EverythingElseSeesTheTetrahedraOfALatticeAsTheLattice) {
     EXPECT_EQ(PointMover(grid, view(mesh, Outside::background)).move(b), of_lattice);
     EXPECT_LT(distance(a, b), 1e-6);
   }
+  const auto resampler = make(grid);
+  const auto trip = [&](const VertexField& field) {
+    resampler->set_field(view(field, Outside::background));
+    return measure_round_trip(*resampler, field);
+  };
+  const RoundTrip by_lattice = trip(lattice), by_mesh = trip(mesh);
+  EXPECT_EQ(by_lattice.forward_after_inverse.points, by_mesh.forward_after_inverse.points);
+  EXPECT_EQ(by_lattice.inverse_after_forward.points, by_mesh.inverse_after_forward.points);
+  EXPECT_GT(by_mesh.inverse_after_forward.points, 200u);
+  EXPECT_NEAR(by_lattice.forward_after_inverse.mean, by_mesh.forward_after_inverse.mean, 1e-9);
+  EXPECT_NEAR(by_lattice.inverse_after_forward.largest, by_mesh.inverse_after_forward.largest, 1e-9);
   const FieldQuality of_lattice = measure_quality(lattice), of_mesh = measure_quality(mesh);
   EXPECT_NEAR(of_lattice.largest_stretch, of_mesh.largest_stretch, 1e-9);
   for (std::size_t bin = 0; bin < of_lattice.parts.size(); ++bin)

@@ -5,10 +5,10 @@
 
 #include "deform/errors.h"
 #include "io/mesh_file.h"
-#include "tests/support/foreign_field.h"
 #include "tests/support/image_samples.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"
+#include "tests/support/vtk_maker.h"
 #include "tests/support/write_file.h"
 
 namespace tetwarp {

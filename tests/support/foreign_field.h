@@ -5,7 +5,6 @@
 
 #include <cstdlib>
 #include <filesystem>
-#include <sstream>
 #include <string>
 
 #include "io/field_file.h"
@@ -26,22 +25,6 @@ inline bool run_python(const std::string& script_and_arguments) {
 inline bool make_foreign_field(const std::string& kind, const std::filesystem::path& mha,
                                const std::filesystem::path& output) {
   return run_python("'" TETWARP_MAKE_FIELD "' '" + kind + "' '" + mha.string() + "' '" + output.string() + "'");
-}
-
-/// Has VTK write a dataset (tests/support/make_vtk.py says which). @return  as `run_python`
-inline bool make_vtk(const std::string& kind, const std::string& encoding, const std::filesystem::path& output,
-                     const tetwarp::Geometry& grid) {
-  std::ostringstream numbers;
-  numbers.precision(17);
-  numbers << grid.size.x << ',' << grid.size.y << ',' << grid.size.z;
-  for (const glm::dvec3& triple : {grid.spacing, grid.origin}) {
-    numbers << ',' << triple.x << ',' << triple.y << ',' << triple.z;
-  }
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) numbers << ',' << grid.direction[column][row];
-  }
-  return run_python("'" TETWARP_MAKE_VTK "' '" + kind + "' '" + encoding + "' '" + output.string() + "' ' " +
-                    numbers.str() + "'");
 }
 
 /// At rest but for the corner at the end of i, the begin of j and the end of k: (3, 5, 7) mm.
