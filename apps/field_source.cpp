@@ -197,6 +197,18 @@ ForwardField read_forward_field(const std::vector<std::string>& fields, const Ge
   return result;
 }
 
+namespace {
+
+/// Of a pull field. @throws InputError for a mesh, which is a forward one
+FieldSource pull_source(const std::string& text, const std::optional<Geometry>& volume = {}) {
+  FieldSource source = field_source(text, volume);
+  require(!is_mesh_file(source.path),
+          "a mesh, " + source.path.string() + ", says where its vertices go; give it with -f");
+  return source;
+}
+
+}  // namespace
+
 PullField read_pull_field(const std::string& text, const Geometry& volume, const Geometry& output,
                           const CommonOptions& common, const Control& control, AnyField& found) {
   if (is_transform_file(text)) {
@@ -205,9 +217,8 @@ PullField read_pull_field(const std::string& text, const Geometry& volume, const
     note_transform(transform, text, Direction::pull, found.notes);
     return {sampled.lattice, std::move(sampled.displacement)};
   }
-  const FieldSource source = field_source(text, volume);
+  const FieldSource source = pull_source(text, volume);
   const std::string path = source.path.string();
-  require(!is_mesh_file(source.path), "a mesh, " + path + ", says where its vertices go: give it with -f");
   found.files.push_back({path, read_field_header(source)});
   if (!found.files.back().header.direction)
     found.notes.push_back(path + " does not say its direction: taken as output to input");
@@ -215,7 +226,7 @@ PullField read_pull_field(const std::string& text, const Geometry& volume, const
 }
 
 glm::i64vec3 pull_grid_size(const std::string& text, const Geometry& output) {
-  if (!is_transform_file(text)) return read_field_header(field_source(text)).grid.size;
+  if (!is_transform_file(text)) return read_field_header(pull_source(text)).grid.size;
   check_transform(text);
   return output.size;
 }
