@@ -26,9 +26,9 @@ void check_arrays(const TetrahedralMesh& mesh) {
   for (std::size_t n = 0; n < mesh.tetrahedra.size(); ++n) {
     const glm::u32vec4& t = mesh.tetrahedra[n];
     const std::uint32_t largest = std::max({t.x, t.y, t.z, t.w});
-    require(largest < mesh.rest.size(), "tetrahedron " + std::to_string(n) + " of the mesh has vertex " +
-                                            std::to_string(largest) + " of " + std::to_string(mesh.rest.size()) +
-                                            ", counted from 0");
+    if (largest < mesh.rest.size()) continue;
+    throw InputError("tetrahedron " + std::to_string(n) + " of the mesh has vertex " + std::to_string(largest) +
+                     " of " + std::to_string(mesh.rest.size()) + ", counted from 0");
   }
 }
 

@@ -31,16 +31,20 @@ Region MeshRaster::bin(const glm::i64vec3& at) const {
 
 /// Calls `visit(number)` for the bins that a tetrahedron may reach.
 template <class Visit>
-void MeshRaster::for_each_bin(const Box& box, const TetrahedronPlanes& planes, Visit&& visit) const {
-  const VoxelBox voxels = detail::candidates(mesh_->nudge, box, {glm::i64vec3(0), size_});
+void MeshRaster::for_each_bin(const Tetrahedron& t, Visit&& visit) const {
+  const VoxelBox voxels = detail::candidates(mesh_->nudge, box_of(t), {glm::i64vec3(0), size_});
   if (detail::is_empty(voxels)) return;
   const glm::i64vec3 begin = (voxels.begin - origin_) / kBin, end = (voxels.end - std::int64_t{1} - origin_) / kBin;
+  const auto number = [&](const glm::i64vec3& at) {
+    return static_cast<std::size_t>((at.z * bins_.y + at.y) * bins_.x + at.x);
+  };
+  if (begin == end) return visit(number(begin));
+  const TetrahedronPlanes planes(t);
   for (std::int64_t z = begin.z; z <= end.z; ++z) {
     for (std::int64_t y = begin.y; y <= end.y; ++y) {
       for (std::int64_t x = begin.x; x <= end.x; ++x) {
         const Region in = intersection(bin({x, y, z}), {voxels.begin, voxels.end});
-        if (begin == end || planes.may_reach({in.begin, in.end}))
-          visit(static_cast<std::size_t>((z * bins_.y + y) * bins_.x + x));
+        if (planes.may_reach({in.begin, in.end})) visit(number({x, y, z}));
       }
     }
   }
@@ -58,8 +62,7 @@ void MeshRaster::build(const SnappedMesh& mesh, const Geometry& output, const Co
   const auto for_each_pair = [&](auto&& visit) {
     for (std::size_t n = 0; n < mesh.tetrahedra.size(); ++n) {
       if (n % kAtOnce == 0 && control.stop.stop_requested()) throw Cancelled();
-      const Tetrahedron t = mesh.tetrahedron(n);
-      for_each_bin(box_of(t), TetrahedronPlanes(t), [&](std::size_t number) { visit(number, n); });
+      for_each_bin(mesh.tetrahedron(n), [&](std::size_t number) { visit(number, n); });
     }
   };
   for_each_pair([&](std::size_t number, std::size_t) { ++first_[number + 1]; });

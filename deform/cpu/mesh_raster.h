@@ -28,7 +28,7 @@ class MeshRaster {
  private:
   Region bin(const glm::i64vec3& at) const;
   template <class Visit>
-  void for_each_bin(const Box& box, const TetrahedronPlanes& planes, Visit&& visit) const;
+  void for_each_bin(const Tetrahedron& t, Visit&& visit) const;
   void find_in_bin(std::size_t number, const Region& part, const Region& box, bool wants_count,
                    MeshOwners& owners) const;
 
