@@ -347,6 +347,7 @@ class XmlFile final : public VtkFile {
 
 }  // namespace
 
-std::unique_ptr<VtkFile> open_vtk_xml(const std::filesystem::path& path) { return std::make_unique<XmlFile>(path); }
+/// For vtk_xml_module.cpp, which owns what this returns.
+extern "C" VtkFile* tetwarp_open_vtk_xml(const char* path) { return new XmlFile(path); }
 
 }  // namespace tetwarp
