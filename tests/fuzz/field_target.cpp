@@ -26,7 +26,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static const InputFile file(TETWARP_FUZZ_SUFFIX);
   file.fill(data, size);
   if (tetwarp::has_image_suffix(file.path())) accepted([] { tetwarp::read_image(file.path()); });
-  accepted([] { tetwarp::is_field_file(file.path()); });
+  asked([] { tetwarp::is_field_file(file.path()); });
   for (const std::string options : {TETWARP_FUZZ_OPTIONS}) {
     accepted([&] { read_field(tetwarp::parse_field_source(file.path().string() + options)); });
   }

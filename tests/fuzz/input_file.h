@@ -32,6 +32,15 @@ bool accepted(Action&& action) {
   return true;
 }
 
+/// As `accepted`, for what is asked about a file, which does not count as having read it.
+template <class Action>
+void asked(Action&& action) {
+  try {
+    action();
+  } catch (const tetwarp::Error&) {
+  }
+}
+
 /// A file for readers, which take paths: in a folder of this process's own below that of temporary files (TMPDIR).
 class InputFile {
  public:

@@ -6,6 +6,7 @@
 #include <dcmtk/dcmjpls/djencode.h>
 #include <itk_H5Cpp.h>
 
+#include <algorithm>
 #include <iostream>
 
 #include "io/field_file.h"
@@ -13,6 +14,7 @@
 #include "tests/fuzz/input_file.h"
 #include "tests/itkbridge/itk_transforms.h"
 #include "tests/support/dicom_maker.h"
+#include "tests/support/gmsh_file.h"
 #include "tests/support/image_samples.h"
 #include "tests/support/point_files.h"
 #include "tests/support/write_file.h"
@@ -230,6 +232,25 @@ void make_points(const fs::path& root) {
   }
 }
 
+/// Whole ones, and counts that no file holds.
+void make_meshes(const fs::path& folder) {
+  for (const GmshStyle& style : gmsh_styles()) {
+    std::string name = style.name() + ".msh";
+    std::erase(name, ',');
+    std::ranges::replace(name, ' ', '-');
+    write_file(folder / name, GmshSample{}.write(style));
+  }
+  for (const std::string version : {"2.2", "4.1"}) {
+    for (const std::string part : {"$Nodes", "$Elements"}) {
+      std::string bytes = GmshSample{}.write({version});
+      const std::size_t begin = bytes.find(part + "\n") + part.size() + 1, end = bytes.find('\n', begin);
+      const std::string counts = version == "2.2" ? "4000000000000000000" : "2 4000000000000000000 1 4000000000";
+      bytes.replace(begin, end - begin, counts);
+      write_file(folder / ("refused-count-of-" + part.substr(1) + "-" + version + ".msh"), bytes);
+    }
+  }
+}
+
 void make_dose(const fs::path& folder) {
   MadeSlice dose;
   dose.rows = 2;
@@ -286,6 +307,7 @@ int main(int argc, char** argv) {
   make_hdf5(root / "transform-h5");
   make_other_transforms(root / "transform-text");
   make_points(root);
+  make_meshes(folder_of(root, "mesh-msh"));
   make_dicom(folder_of(root, "dicom"));
   return 0;
 }

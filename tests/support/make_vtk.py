@@ -7,8 +7,8 @@ of k; UnstructuredGrid: one cell of each kind that has a volume, 10 apart along 
 last point of the first cell moves by (3, 5, 7). GEOMETRY: size, spacing, origin and direction (row by row), 18 numbers with
 commas; a mesh does not look at it. ENCODING: ascii, binary, raw, base64; for XML also zlib, lz4 (appended, raw), inline-zlib,
 big (big endian, raw), wide (64 bit lengths); for legacy files ascii-4, binary-4 (version 4.2). Further words behind a colon: two
-(a second array of vectors), none (no vectors), off (one point elsewhere), extent (that begins at (-2, 3, 5)), double, polyhedron.
-Exit status 77: a library is missing.
+(a second array of vectors), none (no vectors), off (one point elsewhere), extent (that begins at (-2, 3, 5)), double, polyhedron,
+few (the first and the last two cells alone). Exit status 77: a library is missing.
 """
 
 import sys
@@ -118,7 +118,7 @@ CELLS = [(10, TETRAHEDRON, 4), (11, VOXEL, 8), (12, HEXAHEDRON, 8), (13, WEDGE, 
 def make_mesh():
     dataset = vtk.vtkUnstructuredGrid()
     points = new_points()
-    for number, (cell_type, corners, count) in enumerate(CELLS):
+    for number, (cell_type, corners, count) in enumerate(CELLS[:1] + CELLS[-2:] if "few" in words else CELLS):
         ids = vtk.vtkIdList()
         for n in range(count):
             x, y, z = corners[n] if n < len(corners) else (0.5, 0.5, 0.5)

@@ -1,0 +1,23 @@
+// Mesh files of one suffix: whether it is one, its header, and the whole of it, as it is and under each text of
+// TETWARP_FUZZ_OPTIONS.
+#include "io/mesh_file.h"
+#include "tests/fuzz/input_file.h"
+
+namespace {
+
+void read_mesh(const std::string& text) {
+  const auto source = tetwarp::parse_field_source(text);
+  asked([&] { tetwarp::read_mesh_header(source); });
+  accepted([&] { tetwarp::read_mesh_file(source); });
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const InputFile file(TETWARP_FUZZ_SUFFIX);
+  file.fill(data, size);
+  asked([] { tetwarp::is_mesh_file(file.path()); });
+  read_mesh(file.path().string());
+  for (const std::string options : {TETWARP_FUZZ_OPTIONS}) read_mesh(file.path().string() + options);
+  return 0;
+}
