@@ -1,5 +1,6 @@
 #include "io/text_header.h"
 
+#include <algorithm>
 #include <cctype>
 #include <fstream>
 #include <set>
@@ -66,6 +67,25 @@ std::string trimmed(const std::string& text) {
   return begin == std::string::npos ? "" : text.substr(begin, end - begin + 1);
 }
 
+/// Refuses what MetaIO cannot take: it copies names and values into buffers without asking for their length, and counts
+/// as many numbers as NDims says.
+void check_meta_line(const std::string& line, const std::string& file) {
+  constexpr std::size_t kLongestLine = 1000, kLongestName = 200, kMostDimensions = 10;
+  require(line.size() <= kLongestLine && std::min(line.find_first_of("=:"), line.size()) <= kLongestName,
+          "a line of " + std::to_string(line.size()) + " bytes in the header of " + file +
+              "; expected a name of at most 200, and 1000 in all");
+  for (const char c : line) {
+    require(static_cast<unsigned char>(c) >= ' ' || c == '\t' || c == '\r',
+            "a control character in the header of " + file + "; is it text?");
+  }
+  const auto equals = line.find_first_of("=:");
+  if (equals == std::string::npos || lower(trimmed(line.substr(0, equals))) != "ndims") return;
+  const std::string value = trimmed(line.substr(equals + 1));
+  const bool is_number =
+      !value.empty() && value.size() <= 2 && value.find_first_not_of("0123456789") == std::string::npos;
+  require(is_number && std::stoul(value) <= kMostDimensions, "NDims = " + value + ", " + file + "; expected 3");
+}
+
 /// Takes one line of a header; true after the last.
 bool take_line(const std::string& line, ImageFormat format, TextHeader& header) {
   if (format == ImageFormat::nrrd) {
@@ -106,6 +126,7 @@ TextHeader read_text_header(const std::filesystem::path& path, ImageFormat forma
     for (; stream.get(c) && c != '\n' && line.size() < kLongestHeader;) line += c;
     if (!stream) break;
     header.data_offset += line.size() + 1;
+    if (format == ImageFormat::mha) check_meta_line(line, file);
     if (first && format == ImageFormat::nrrd)
       require(line.starts_with("NRRD000"), "not an NRRD file (it does not begin with NRRD000), " + file);
     else

@@ -41,7 +41,7 @@ SinCos find_sin_cos(double angle) {
   const double r = high + lost, low = (high - r) + lost;
   const double near_sine = sine_near_zero(r), near_cosine = cosine_near_zero(r);
   const double s = near_sine + low * near_cosine, c = near_cosine - low * near_sine;
-  switch (static_cast<long long>(quarter) & 3) {
+  switch (static_cast<int>(quarter - 4 * std::floor(quarter / 4))) {  // exact, for any size
     case 0: return {s, c};
     case 1: return {c, -s};
     case 2: return {-s, -c};
