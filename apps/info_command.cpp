@@ -206,21 +206,11 @@ void print_file(const json& document) {
   }
 }
 
-/// @throws UsageError for options that a mesh has not
-void check_options(const FieldSource& mesh) {
-  try {
-    check_mesh_options(mesh);
-  } catch (const InputError& error) {
-    throw UsageError(error.what());
-  }
-}
-
 }  // namespace
 
 int run_info(const InfoOptions& options) {
   const FieldSource source = field_source(options.input.path.string());
   const bool field = is_field_file(source.path), mesh = !field && is_mesh_file(source.path);
-  if (mesh) check_options(source);
   const std::filesystem::path& path = field ? source.path : options.input.path;
   const bool transform = !field && !mesh && is_transform_file(path) && !std::filesystem::is_directory(path);
   const bool other = field || mesh || transform || has_image_suffix(path), dose = !other && is_dicom_dose(path),

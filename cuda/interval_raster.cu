@@ -200,11 +200,6 @@ __device__ __noinline__ RowInterval exactly(const TileTask& task, LatticeTetrahe
   return exact_row(vertices_of(task.lattice, t), first, signs, y, z, count);
 }
 
-template <class Sink>
-__device__ __noinline__ bool write_out_of_line(const Sink& sink, int out, glm::ivec3 at, glm::vec3 u) {
-  return sink.write(out, at, u);
-}
-
 /// A voxel whose weights are not for float; likewise.
 template <class Sink>
 __device__ __noinline__ bool write_slowly(const TileTask& task, const Sink& sink, LatticeTetrahedron t, int out,
@@ -523,63 +518,27 @@ struct TileWorker {
     if (lane >= size.x || y >= size.y) return 0;
     const Row* row = &memory.rows[y];
     const unsigned up_to_lane = ~0u >> (31 - lane);
-    glm::vec3 from_first(lane * kStepsPerVoxel, y * kStepsPerVoxel, 0);
-    glm::ivec3 at = voxels.begin + glm::ivec3(lane, y, 0);
-    unsigned column = sink.column(at), held = ~0u, left = 0;
-    int out = sink.place(at);
-    HeldWeighing m{};
-    typename Sink::Pending pending{};
-    const auto next_moved = [&] {
-      const unsigned place = row->owner[31 - __clz(static_cast<int>(row->starts & up_to_lane))];
+    const auto next_place = [&]() -> unsigned {
+      const Row& of = *row;
       row += kTileJ;
-      m.hold(memory.prepared, memory.ends, min(place, unsigned{kSlots}), held);
-      const glm::vec3 moved = moved_by(m, from_first);
-      from_first.z += float{kStepsPerVoxel};
-      return moved;
+      return of.owner[31 - __clz(static_cast<int>(of.starts & up_to_lane))];
     };
-    const auto begin = [&](const glm::vec3& moved) {
-      typename Sink::Origin origin;
-      const bool any = sink.template locate<kInside>(at, column, moved, origin);
-      sink.begin(origin, any, pending);
-      if (!any) left |= 1;
-      column += sink.per_source_slice();
-      ++at.z;
-    };
-    begin(next_moved());
-#pragma unroll(kInside && !Sink::kIsWide ? 3 : 1)  // fewer registers are copied
-    for (int z = 1; z < size.z; ++z) {
-      const glm::vec3 moved = next_moved();
-      left <<= 1;
-      if (moved.x == moved.x) {  // a branch, so that nothing of it is moved before what is read meanwhile
-        sink.end(out, pending);
-      } else {
-        left |= 2;
-      }
-      out += sink.per_slice();
-      begin(moved);
-    }
-    sink.end(out, pending);
-    unsigned covered = static_cast<unsigned>(size.z - __popc(left));
-#pragma unroll 1
-    for (; left != 0; left &= left - 1)  // not within the loop above: calls would cost it registers
-      covered += finish_voxel(lane, y, size.z - __ffs(static_cast<int>(left)));
-    return covered;
+    return sample_column<kInside>(sink, weighings(), voxels.begin + glm::ivec3(lane, y, 0),
+                                  glm::vec3(lane * kStepsPerVoxel, y * kStepsPerVoxel, 0), size.z, next_place,
+                                  [&](int z) { return finish(lane, y, z); });
   }
+  __device__ Weighings weighings() const { return {memory.prepared, memory.ends, kSlots}; }
   /// A voxel that `sample` has not written. @return whether it is covered
-  __device__ bool finish_voxel(int x, int y, int z) const {
+  __device__ bool finish(int x, int y, int z) const {
     const glm::ivec3 in_tile(x, y, z), at = voxels.begin + in_tile;
-    const int out = sink.place(at);
     const unsigned place = memory.rows[z * kTileJ + y].owner_of(x);
     if (place == kNoOwner) {
-      sink.nothing(out);
+      sink.nothing(sink.place(at));
       return false;
     }
-    HeldWeighing m{};
-    unsigned held = ~0u;
-    m.hold(memory.prepared, memory.ends, min(place, unsigned{kSlots}), held);
-    const glm::vec3 moved = moved_by(m, glm::vec3(in_tile * kStepsPerVoxel));
-    if (moved.x == moved.x) return write_out_of_line(sink, out, at, detail::to_offset(moved));
-    return write_slowly(task, sink, tetrahedron(memory.numbers[place]), out, at, signs);
+    return finish_voxel(sink, weighings(), place, at, glm::vec3(in_tile * kStepsPerVoxel), [&](int out) {
+      return write_slowly(task, sink, tetrahedron(memory.numbers[place]), out, at, signs);
+    });
   }
 };
 
@@ -647,11 +606,6 @@ __global__ void mark_left_kernel(TileTask task, std::uint32_t* several) {
     atomicOr(&several[row + word], bits_of_word(word, first.x, last));
 }
 
-/// Where tiles begin, so that none has voxels of both sides of the nudge's turn.
-int tile_origin(int begin, int end, int turn, int size) {
-  return turn > begin && turn < end ? turn - (turn - begin + size - 1) / size * size : begin;
-}
-
 TileTask make_task(const DeviceField& field, const SlabBox& box) {
   TileTask task{};
   task.lattice = field.steps;
@@ -660,7 +614,8 @@ TileTask make_task(const DeviceField& field, const SlabBox& box) {
   task.blocks = (field.steps.cells + kBlockCells - 1) / kBlockCells;
   const glm::ivec3 size(kTileI, kTileJ, kTileK);
   for (int axis = 0; axis < 3; ++axis) {
-    task.origin[axis] = tile_origin(task.box.begin[axis], task.box.end[axis], task.turns.first_down[axis], size[axis]);
+    task.origin[axis] = static_cast<int>(
+        tile_origin(task.box.begin[axis], task.box.end[axis], task.turns.first_down[axis], size[axis]));
     task.tiles[axis] = (task.box.end[axis] - task.origin[axis] + size[axis] - 1) / size[axis];
   }
   return task;

@@ -94,10 +94,6 @@ __device__ __noinline__ glm::vec3 interpolate_exactly(MeshRaster::View mesh, uns
   return interpolate_u_exactly(mesh.tetrahedron(number), steps, signs);
 }
 template <class Sink>
-__device__ __noinline__ bool write_out_of_line(const Sink& sink, int out, glm::ivec3 at, glm::vec3 u) {
-  return sink.write(out, at, u);
-}
-template <class Sink>
 __device__ __noinline__ bool write_slowly(const MeshRaster::View& mesh, const Sink& sink, unsigned number, int out,
                                           glm::ivec3 at, glm::i32vec3 signs) {
   return sink.write(out, at, interpolate_u(mesh.tetrahedron(number), at * kStepsPerVoxel, signs));
@@ -227,62 +223,28 @@ struct TileWorker {
     const int lane = thread & 31, y = thread / 32;
     if (lane >= size.x || y >= size.y) return 0;
     const unsigned* owner = &memory.owner[memory.row(y, 0) + lane];
-    glm::vec3 from_first(lane * kStepsPerVoxel, y * kStepsPerVoxel, 0);
-    glm::ivec3 at = voxels.begin + glm::ivec3(lane, y, 0);
-    unsigned column = sink.column(at), held = ~0u, left = 0;
-    int out = sink.place(at);
-    HeldWeighing m{};
-    typename Sink::Pending pending{};
-    const auto next_moved = [&] {
-      m.hold(memory.prepared, memory.ends, min(*owner, unsigned{kSlots}), held);
+    const auto next_place = [&] {
+      const unsigned place = *owner;
       owner += kTileJ * kRowStride;
-      const glm::vec3 moved = moved_by(m, from_first);
-      from_first.z += float{kStepsPerVoxel};
-      return moved;
+      return place;
     };
-    const auto begin = [&](const glm::vec3& moved) {
-      typename Sink::Origin origin;
-      const bool any = sink.template locate<false>(at, column, moved, origin);
-      sink.begin(origin, any, pending);
-      if (!any) left |= 1;
-      column += sink.per_source_slice();
-      ++at.z;
-    };
-    begin(next_moved());
-#pragma unroll 1
-    for (int z = 1; z < size.z; ++z) {
-      const glm::vec3 moved = next_moved();
-      left <<= 1;
-      if (moved.x == moved.x) {  // a branch, so that nothing of it is moved before what is read meanwhile
-        sink.end(out, pending);
-      } else {
-        left |= 2;
-      }
-      out += sink.per_slice();
-      begin(moved);
-    }
-    sink.end(out, pending);
-    unsigned covered = static_cast<unsigned>(size.z - __popc(left));
-#pragma unroll 1
-    for (; left != 0; left &= left - 1) covered += finish_voxel(sink, lane, y, size.z - __ffs(static_cast<int>(left)));
-    return covered;
+    return sample_column<false>(sink, weighings(), voxels.begin + glm::ivec3(lane, y, 0),
+                                glm::vec3(lane * kStepsPerVoxel, y * kStepsPerVoxel, 0), size.z, next_place,
+                                [&](int z) { return finish_few(sink, lane, y, z); });
   }
+  __device__ Weighings weighings() const { return {memory.prepared, memory.ends, kSlots}; }
   /// A voxel that `sample_few` has not written. @return whether it is covered
   template <class Sink>
-  __device__ bool finish_voxel(const Sink& sink, int x, int y, int z) const {
+  __device__ bool finish_few(const Sink& sink, int x, int y, int z) const {
     const glm::ivec3 in_tile(x, y, z), at = voxels.begin + in_tile;
-    const int out = sink.place(at);
     const unsigned slot = memory.owner[memory.row(y, z) + x];
     if (slot == kNoTetrahedron) {
-      sink.nothing(out);
+      sink.nothing(sink.place(at));
       return false;
     }
-    HeldWeighing m{};
-    unsigned held = ~0u;
-    m.hold(memory.prepared, memory.ends, slot, held);
-    const glm::vec3 moved = moved_by(m, glm::vec3(in_tile * kStepsPerVoxel));
-    if (moved.x == moved.x) return write_out_of_line(sink, out, at, detail::to_offset(moved));
-    return write_slowly(task.mesh, sink, memory.slots[slot].number, out, at, signs);
+    return finish_voxel(sink, weighings(), slot, at, glm::vec3(in_tile * kStepsPerVoxel), [&](int out) {
+      return write_slowly(task.mesh, sink, memory.slots[slot].number, out, at, signs);
+    });
   }
 
   /// The same where numbers own: a tetrahedron's map is made when a column enters it.
@@ -370,11 +332,6 @@ __global__ void __launch_bounds__(kTileThreads, is_wide<Sink>() ? kTileBlocks - 
   if (worker.thread == 0 && memory.covered != 0) atomicAdd(covered, static_cast<unsigned long long>(memory.covered));
 }
 
-/// Where tiles begin, so that none has voxels of both sides of the nudge's turn.
-int tile_origin(std::int64_t end, std::int64_t turn, int size) {
-  return turn > 0 && turn < end ? static_cast<int>(turn - (turn + size - 1) / size * size) : 0;
-}
-
 }  // namespace
 
 std::uint64_t MeshRaster::bytes_of(const SnappedMesh& mesh) {
@@ -394,7 +351,7 @@ void MeshRaster::set(const SnappedMesh& mesh, const Geometry& output, cudaStream
   size_ = glm::ivec3(output.size);
   const glm::ivec3 extent(kTileI, kTileJ, kTileK);
   for (int axis = 0; axis < 3; ++axis) {
-    origin_[axis] = tile_origin(output.size[axis], mesh.nudge.first_down(axis), extent[axis]);
+    origin_[axis] = static_cast<int>(tile_origin(0, output.size[axis], mesh.nudge.first_down(axis), extent[axis]));
     tiles_[axis] = (size_[axis] - origin_[axis] + extent[axis] - 1) / extent[axis];
   }
   const auto tiles =

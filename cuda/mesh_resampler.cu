@@ -83,12 +83,7 @@ class MeshResampler final : public CudaResampler {
   }
 
   Region source_extent(const Geometry& source, const Region& region) const override {
-    UndeformedBox box = undeformed_box(mesh_, region);
-    if (stays_outside_) {
-      box.low = glm::min(box.low, glm::dvec3(region.begin));
-      box.high = glm::max(box.high, glm::dvec3(region.end - std::int64_t{1}));
-    }
-    return source_box(source, output(), box.low, box.high);
+    return mesh_source_region(mesh_, stays_outside_, output(), source, region);
   }
   void prepare_slabs() override {}
   Region slab_source(const Geometry& source, const Region& slab) const override { return source_extent(source, slab); }
@@ -126,12 +121,7 @@ class MeshResampler final : public CudaResampler {
     TETWARP_CUDA_TRY(cudaGetLastError());
   }
 
-  void describe_field(Report& report) const override {
-    report.inverted = mesh_.inverted;
-    report.degenerate = mesh_.degenerate;
-    report.jacobian_min = mesh_.jacobian_min;
-    report.jacobian_max = mesh_.jacobian_max;
-  }
+  void describe_field(Report& report) const override { mesh_.describe(report); }
 
   SnappedMesh mesh_;
   MeshRaster raster_, rest_;  ///< deformed; and undeformed, where it matters what lies outside

@@ -41,7 +41,6 @@ MeshLocator::MeshLocator(const SnappedMesh& mesh) : mesh_(mesh) {
   const double side = std::cbrt(extent.x * extent.y * extent.z / std::min(static_cast<double>(count), kMostCells));
   cells_ = glm::i64vec3(glm::clamp(glm::ceil(extent / side), 1.0, 1024.0));
   cell_ = extent / glm::dvec3(cells_);
-  first_.assign(static_cast<std::size_t>(cells_.x * cells_.y * cells_.z) + 1, 0);
   const auto for_each_pair = [&](auto&& visit) {
     for (std::size_t n = 0; n < count; ++n) {
       const RestCorners at(mesh.tetrahedron(n));
@@ -58,11 +57,7 @@ MeshLocator::MeshLocator(const SnappedMesh& mesh) : mesh_(mesh) {
       }
     }
   };
-  for_each_pair([&](std::size_t cell, std::size_t) { ++first_[cell + 1]; });
-  for (std::size_t cell = 1; cell < first_.size(); ++cell) first_[cell] += first_[cell - 1];
-  numbers_.resize(first_.back());
-  std::vector<std::size_t> next(first_.begin(), first_.end() - 1);
-  for_each_pair([&](std::size_t cell, std::size_t n) { numbers_[next[cell]++] = static_cast<std::uint32_t>(n); });
+  lists_.build(static_cast<std::size_t>(cells_.x * cells_.y * cells_.z), for_each_pair);
 }
 
 std::int64_t MeshLocator::cell_on_axis(int axis, double at) const {
@@ -80,20 +75,20 @@ std::optional<MeshLocator::Found> MeshLocator::find(const glm::dvec3& steps) con
   const auto number = static_cast<std::size_t>((cell.z * cells_.y + cell.y) * cells_.x + cell.x);
   std::optional<Found> nearest;
   double least_outside = -kOutside;
-  for (std::size_t place = first_[number]; place < first_[number + 1]; ++place) {
-    const RestCorners at(mesh_.tetrahedron(numbers_[place]));
+  for (const std::uint32_t* t = lists_.begin(number); t != lists_.end(number); ++t) {
+    const RestCorners at(mesh_.tetrahedron(*t));
     const glm::dmat3 edges(at.a - at.d, at.b - at.d, at.c - at.d);
     if (glm::determinant(edges) == 0) continue;
     const glm::dmat3 weights_from_place = glm::inverse(edges);
     const glm::dvec3 w = weights_from_place * (steps - at.d);
     const double of_d = 1 - w.x - w.y - w.z;
-    if (std::min({w.x, w.y, w.z, of_d}) >= -kRounding) return Found{numbers_[place], w};
+    if (std::min({w.x, w.y, w.z, of_d}) >= -kRounding) return Found{*t, w};
     const glm::dmat3 rows = glm::transpose(weights_from_place);  // how fast each weight changes
     const double distance = std::min({w.x / glm::length(rows[0]), w.y / glm::length(rows[1]),
                                       w.z / glm::length(rows[2]), of_d / glm::length(rows[0] + rows[1] + rows[2])});
     if (distance <= least_outside) continue;
     least_outside = distance;
-    nearest = Found{numbers_[place], w};
+    nearest = Found{*t, w};
   }
   return nearest;
 }

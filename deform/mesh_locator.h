@@ -2,8 +2,8 @@
 
 #include <cstdint>
 #include <optional>
-#include <vector>
 
+#include "deform/cell_lists.h"
 #include "deform/snapped_mesh.h"
 
 namespace tetwarp {
@@ -27,10 +27,9 @@ class MeshLocator {
   std::int64_t cell_on_axis(int axis, double at) const;
 
   const SnappedMesh& mesh_;
-  glm::dvec3 low_{0}, cell_{1};         ///< 2^-12 voxel: least corner of the grid, and size of its cells
-  glm::i64vec3 cells_{0};               ///< on each axis
-  std::vector<std::size_t> first_;      ///< of each cell, i fastest, and of one more
-  std::vector<std::uint32_t> numbers_;  ///< of the tetrahedra that may reach a cell, rising
+  glm::dvec3 low_{0}, cell_{1};  ///< 2^-12 voxel: least corner of the grid, and size of its cells
+  glm::i64vec3 cells_{0};        ///< on each axis
+  CellLists lists_;              ///< of the tetrahedra that may reach each cell, i fastest; rising
 };
 
 }  // namespace tetwarp

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "deform/core/lattice_vertex.h"
+#include "deform/target_check.h"
 
 namespace tetwarp {
 
@@ -122,23 +123,29 @@ void refuse_mesh_reach(const Geometry& output, std::int64_t voxels, std::int64_t
                    "); choose rest or background for what lies outside it");
 }
 
-UndeformedBox undeformed_box(const SnappedMesh& mesh, const Region& region) {
+Region mesh_source_region(const SnappedMesh& mesh, bool stays_outside, const Geometry& output, const Geometry& source,
+                          const Region& region) {
   constexpr double kVoxelsPerStepExactly = 1.0 / kStepsPerVoxel;
-  UndeformedBox box;
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  glm::dvec3 all_low(kInfinity), all_high(-kInfinity);  // of undeformed places, output index
   for (std::size_t n = 0; n < mesh.tetrahedra.size(); ++n) {
     const Tetrahedron t = mesh.tetrahedron(n);
     if (detail::is_empty(detail::candidates(mesh.nudge, box_of(t), {region.begin, region.end}))) continue;
-    glm::dvec3 low(std::numeric_limits<double>::infinity()), high(-low);
+    glm::dvec3 low(kInfinity), high(-kInfinity);
     for (const Vertex* v : {&t.a, &t.b, &t.c, &t.d}) {
       const glm::dvec3 rest = glm::dvec3(v->deformed + v->u) * kVoxelsPerStepExactly;
       low = glm::min(low, rest);
       high = glm::max(high, rest);
     }
     const glm::dvec3 beyond = 4 * kWeightSlack * (high - low);  // weights leave [0, 1] by the slack
-    box.low = glm::min(box.low, low - beyond);
-    box.high = glm::max(box.high, high + beyond);
+    all_low = glm::min(all_low, low - beyond);
+    all_high = glm::max(all_high, high + beyond);
   }
-  return box;
+  if (stays_outside && !tetwarp::is_empty(region)) {
+    all_low = glm::min(all_low, glm::dvec3(region.begin));
+    all_high = glm::max(all_high, glm::dvec3(region.end - std::int64_t{1}));
+  }
+  return source_box(source, output, all_low, all_high);
 }
 
 }  // namespace tetwarp

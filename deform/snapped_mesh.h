@@ -29,6 +29,13 @@ struct SnappedMesh {
     const glm::u32vec4& at = tetrahedra[number];
     return {vertices[at.x], vertices[at.y], vertices[at.z], vertices[at.w]};
   }
+  /// What a report says of the whole field.
+  void describe(Report& report) const {
+    report.inverted = inverted;
+    report.degenerate = degenerate;
+    report.jacobian_min = jacobian_min;
+    report.jacobian_max = jacobian_max;
+  }
 };
 
 /// Checks a mesh, snaps its vertices and looks at its tetrahedra, in parallel in the calling task arena.
@@ -42,12 +49,10 @@ SnappedMesh undeformed(const SnappedMesh& mesh);
 /// @throws InputError for voxels of the output that lie outside the undeformed mesh. @param lowest  number of the first
 [[noreturn]] void refuse_mesh_reach(const Geometry& output, std::int64_t voxels, std::int64_t lowest);
 
-/// The box in continuous output index that holds every undeformed place that voxels of a region can come from; `low`
-/// above `high` for none.
-struct UndeformedBox {
-  glm::dvec3 low{std::numeric_limits<double>::infinity()}, high{-std::numeric_limits<double>::infinity()};
-};
-UndeformedBox undeformed_box(const SnappedMesh& mesh, const Region& region);
+/// The part of a source that voxels of a region of the output may be sampled from.
+/// @param stays_outside  whether voxels outside the undeformed mesh stay where they are
+Region mesh_source_region(const SnappedMesh& mesh, bool stays_outside, const Geometry& output, const Geometry& source,
+                          const Region& region);
 
 /// What keeps a tetrahedron away from boxes of voxels.
 class TetrahedronPlanes {

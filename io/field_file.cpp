@@ -96,6 +96,11 @@ std::string to_string(FieldBasis basis) {
   return "assumed";
 }
 
+std::string FieldSource::option(const std::string& key, const std::string& otherwise) const {
+  const auto found = options.find(key);
+  return found == options.end() ? otherwise : found->second;
+}
+
 FieldSource parse_field_source(const std::string& text) {
   const std::size_t colon = text.rfind(':');
   if (is_there(text) || colon == std::string::npos || text.find('=', colon) == std::string::npos) return {text};

@@ -52,6 +52,9 @@ struct FieldSource {
   std::filesystem::path path;
   std::map<std::string, std::string> options;  ///< docs/fields.md lists them by format: "order" is "zyx"
   std::optional<Geometry> grid;                ///< of the volume that the field is for
+
+  /// The value of an option, or another where it was not given.
+  std::string option(const std::string& key, const std::string& otherwise = "") const;
 };
 
 /// `PATH` or `PATH:KEY=VALUE[,KEY=VALUE]`; a file whose name is the whole text goes before.

@@ -120,11 +120,6 @@ Array read_array_header(const std::filesystem::path& path) {
   return array;
 }
 
-std::string option(const FieldSource& source, const std::string& key, const std::string& otherwise) {
-  const auto found = source.options.find(key);
-  return found == source.options.end() ? otherwise : found->second;
-}
-
 void check_options(const FieldSource& source) {
   struct Known {
     const char *key, *first, *second;
@@ -143,25 +138,25 @@ void check_options(const FieldSource& source) {
   require(source.options.contains("order") && source.options.contains("units"),
           "an array does not say the order of its axes and the units of its values, " + file + "; give both: " + file +
               ":order=zyx|xyz,units=mm|voxel[,components=xyz|zyx][,frame=lps|ras]");
-  require(option(source, "units", "") == "mm" || !source.options.contains("frame"),
+  require(source.option("units") == "mm" || !source.options.contains("frame"),
           "a frame for voxels, " + file + "; they are along the grid's i, j, k");
 }
 
 FieldFileHeader describe(const FieldSource& source, const Array& array) {
   FieldFileHeader header;
   const auto& shape = array.shape;
-  header.grid.size = option(source, "order", "") == "xyz" ? glm::i64vec3(shape[0], shape[1], shape[2])
-                                                          : glm::i64vec3(shape[2], shape[1], shape[0]);
+  header.grid.size = source.option("order") == "xyz" ? glm::i64vec3(shape[0], shape[1], shape[2])
+                                                     : glm::i64vec3(shape[2], shape[1], shape[0]);
   header.has_own_grid = false;
   header.format = "NumPy array";
-  header.units = option(source, "units", "");
-  header.frame = header.units == "voxel" ? "index" : option(source, "frame", "lps") == "ras" ? "RAS" : "LPS";
+  header.units = source.option("units");
+  header.frame = header.units == "voxel" ? "index" : source.option("frame", "lps") == "ras" ? "RAS" : "LPS";
   header.units_basis = FieldBasis::by_option;
   header.frame_basis =
       header.units == "voxel" || source.options.contains("frame") ? FieldBasis::by_option : FieldBasis::assumed;
   if (!source.grid) return header;
   const glm::i64vec3 size = header.grid.size, wanted = source.grid->size;
-  const std::string other = option(source, "order", "") == "xyz" ? "zyx" : "xyz";
+  const std::string other = source.option("order") == "xyz" ? "zyx" : "xyz";
   require(size == wanted,
           "a field of " + to_string(size) + " vertices for a volume of " + to_string(wanted) + " voxels, " +
               source.path.string() + "; an array has one vertex a voxel" +
@@ -177,8 +172,8 @@ class NpyReader final : public FieldReader {
         path_(source.path),
         array_(array),
         placed_(source.grid.has_value()),
-        order_xyz_(option(source, "order", "") == "xyz"),
-        components_xyz_(option(source, "components", "xyz") == "xyz") {}
+        order_xyz_(source.option("order") == "xyz"),
+        components_xyz_(source.option("components", "xyz") == "xyz") {}
 
   void read(std::span<glm::vec3> displacement) const override {
     require(placed_,

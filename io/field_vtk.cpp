@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
 
 #include "deform/errors.h"
+#include "io/vector_options.h"
 #include "io/vtk_file.h"
 
 namespace tetwarp {
@@ -12,12 +14,6 @@ namespace {
 
 constexpr double kOffLattice = 1e-3;  // of the smallest step: how far a vertex may lie from its place
 constexpr double kRightAngle = 1e-4;  // the largest cosine between two axes
-constexpr std::array<const char*, 4> kUsualNames = {"displacement", "Displacement", "U", "u"};
-
-std::string option(const FieldSource& source, const std::string& key, const std::string& otherwise) {
-  const auto found = source.options.find(key);
-  return found == source.options.end() ? otherwise : found->second;
-}
 
 void check_options(const FieldSource& source) {
   for (const auto& [key, value] : source.options) {
@@ -32,33 +28,27 @@ void check_options(const FieldSource& source) {
 /// @throws InputError that lists the vectors of the file
 VtkArray displacement_of(const VtkFile& file, const FieldSource& source) {
   std::vector<VtkArray> vectors;
-  std::string names;
+  std::set<std::string> names;
+  std::string listed;
   for (const VtkArray& array : file.point_data) {
     if (array.components != 3) continue;
     vectors.push_back(array);
-    names += (names.empty() ? "\"" : ", \"") + array.name + "\"";
+    names.insert(array.name);
+    listed += (listed.empty() ? "\"" : ", \"") + array.name + "\"";
   }
   require(!vectors.empty(), "no vectors at the points, " + file.name +
                                 "; expected point data with three components that says how far each point moves");
-  const std::string give = "; it has " + names + ": give " + file.name + ":displacement=NAME";
-  const auto called = [&vectors](const std::string& name) {
-    std::vector<VtkArray> found;
-    std::copy_if(vectors.begin(), vectors.end(), std::back_inserter(found),
-                 [&name](const VtkArray& array) { return array.name == name; });
-    return found;
-  };
-  std::vector<VtkArray> chosen = vectors;
+  const std::string give = "; it has " + listed + ": give " + file.name + ":displacement=NAME";
   if (source.options.contains("displacement")) {
-    chosen = called(option(source, "displacement", ""));
-    require(!chosen.empty(), "no vectors \"" + option(source, "displacement", "") + "\" at the points, " + file.name +
-                                 "; it has " + names);
+    const std::string name = source.option("displacement");
+    require(names.contains(name), "no vectors \"" + name + "\" at the points, " + file.name + "; it has " + listed);
+    names = {name};
   } else if (vectors.size() > 1) {
-    chosen.clear();
-    for (const char* name : kUsualNames) {
-      const std::vector<VtkArray> more = called(name);
-      chosen.insert(chosen.end(), more.begin(), more.end());
-    }
+    names = usual_displacements(names);
   }
+  std::vector<VtkArray> chosen;
+  std::copy_if(vectors.begin(), vectors.end(), std::back_inserter(chosen),
+               [&names](const VtkArray& array) { return names.contains(array.name); });
   require(chosen.size() == 1,
           std::to_string(vectors.size()) + " arrays of vectors, which is the displacement? " + file.name + give);
   return chosen[0];
@@ -199,15 +189,8 @@ Geometry grid_of(const VtkFile& file, const glm::dvec3& to_lps_mm) {
 }
 
 void take_frame_and_units(const VtkFile& file, const FieldSource& source, FieldFileHeader& header) {
-  header.units = option(source, "units", "mm");
-  header.units_basis = source.options.contains("units") ? FieldBasis::by_option : FieldBasis::assumed;
-  const std::string asked =
-      source.options.contains("frame") ? (option(source, "frame", "") == "ras" ? "RAS" : "LPS") : "";
-  require(!file.frame || asked.empty() || *file.frame == asked, "the file says " + file.frame.value_or("") +
-                                                                    ", the option " + asked + ", " + file.name +
-                                                                    "; leave the option out");
-  header.frame = file.frame.value_or(asked.empty() ? "LPS" : asked);
-  header.frame_basis = file.frame ? FieldBasis::stated : asked.empty() ? FieldBasis::assumed : FieldBasis::by_option;
+  header.frame_basis = take_stated(file.frame, frame_option(source), file.name, header.frame);
+  header.units_basis = take_stated({}, source.option("units"), file.name, header.units);
 }
 
 class VtkFieldReader final : public FieldReader {
@@ -242,12 +225,11 @@ std::unique_ptr<FieldReader> open(const FieldSource& source) {
   auto file = open_vtk_file(source.path);
   FieldFileHeader header;
   take_frame_and_units(*file, source, header);
-  const double unit = header.units == "m" ? 1000 : 1;
-  const glm::dvec3 to_lps_mm = header.frame == "RAS" ? glm::dvec3(-unit, -unit, unit) : glm::dvec3(unit);
+  const glm::dvec3 to_mm = to_lps_mm(header.frame, header.units);
   VtkArray vectors = displacement_of(*file, source);
   header.format = file->format + ", vectors \"" + vectors.name + "\"";
-  header.grid = grid_of(*file, to_lps_mm);
-  return std::make_unique<VtkFieldReader>(std::move(header), std::move(file), std::move(vectors), to_lps_mm);
+  header.grid = grid_of(*file, to_mm);
+  return std::make_unique<VtkFieldReader>(std::move(header), std::move(file), std::move(vectors), to_mm);
 }
 
 }  // namespace

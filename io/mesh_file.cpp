@@ -10,6 +10,7 @@
 #include "deform/errors.h"
 #include "io/image_reader.h"
 #include "io/mesh_format.h"
+#include "io/vector_options.h"
 
 namespace tetwarp {
 namespace {
@@ -37,13 +38,8 @@ std::unique_ptr<MeshReader> open_mesh(const std::filesystem::path& path) {
   return reader;
 }
 
-std::string option(const FieldSource& source, const std::string& key) {
-  const auto found = source.options.find(key);
-  return found == source.options.end() ? "" : found->second;
-}
-
 std::int64_t step_of(const FieldSource& source) {
-  const std::string text = option(source, "step");
+  const std::string text = source.option("step");
   std::int64_t step = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), step);
   require(error == std::errc() && end == text.data() + text.size(),
@@ -71,16 +67,10 @@ std::string listed(const MeshReader& reader) {
 std::optional<std::size_t> chosen_vectors(const MeshReader& reader, const FieldSource& source) {
   std::set<std::string> names;
   for (const MeshVectors& array : reader.arrays) names.insert(array.name);
-  std::string name = option(source, "displacement");
+  std::string name = source.option("displacement");
   require(name.empty() || names.contains(name),
           "no vectors called \"" + name + "\" at the vertices of " + source.path.string() + listed(reader));
-  if (!source.options.contains("displacement") && names.size() > 1) {
-    std::set<std::string> usual;
-    for (const char* known : {"displacement", "Displacement", "U", "u"}) {
-      if (names.contains(known)) usual.insert(known);
-    }
-    names = usual;
-  }
+  if (!source.options.contains("displacement") && names.size() > 1) names = usual_displacements(names);
   if (!source.options.contains("displacement")) {
     if (names.size() != 1) return {};
     name = *names.begin();
@@ -91,30 +81,14 @@ std::optional<std::size_t> chosen_vectors(const MeshReader& reader, const FieldS
     if (array.name == name && (!source.options.contains("step") || array.step == step_of(source))) found.push_back(n);
   }
   require(!found.empty(),
-          "no step " + option(source, "step") + " of \"" + name + "\", " + source.path.string() + listed(reader));
+          "no step " + source.option("step") + " of \"" + name + "\", " + source.path.string() + listed(reader));
   return found.size() == 1 ? std::optional(found[0]) : std::nullopt;
 }
 
-/// The frame or units of a file: as it says itself, else by the option, else as assumed.
-FieldBasis take_stated(const std::optional<std::string>& stated, const std::string& by_option, const std::string& file,
-                       std::string& value) {
-  if (stated) {
-    require(
-        by_option.empty() || by_option == *stated,
-        file + " says that it is in " + *stated + ", an option that it is in " + by_option + "; leave the option out");
-    value = *stated;
-    return FieldBasis::stated;
-  }
-  if (by_option.empty()) return FieldBasis::assumed;
-  value = by_option;
-  return FieldBasis::by_option;
-}
-
 void take_frame_and_units(const MeshReader& reader, const FieldSource& source, MeshFileHeader& header) {
-  std::string frame = option(source, "frame");
-  std::transform(frame.begin(), frame.end(), frame.begin(), [](char c) { return static_cast<char>(c - 'a' + 'A'); });
-  header.frame_basis = take_stated(reader.frame, frame, source.path.string(), header.frame);
-  header.units_basis = take_stated(reader.units, option(source, "units"), source.path.string(), header.units);
+  const std::string file = source.path.string();
+  header.frame_basis = take_stated(reader.frame, frame_option(source), file, header.frame);
+  header.units_basis = take_stated(reader.units, source.option("units"), file, header.units);
 }
 
 std::uint64_t tag_of(const MeshReader& reader, std::size_t vertex) {
@@ -123,7 +97,7 @@ std::uint64_t tag_of(const MeshReader& reader, std::size_t vertex) {
 
 /// The displacement as positions of a second file. @throws InputError unless vertices and cells are the same
 std::vector<glm::dvec3> from_deformed(const MeshReader& rest, const FieldSource& source, const MeshFileHeader& header) {
-  const std::string path = option(source, "deformed"), both = path + " and " + source.path.string();
+  const std::string path = source.option("deformed"), both = path + " and " + source.path.string();
   const auto deformed = open_mesh(path);
   const std::string what = "; the deformed mesh must have the vertices and cells of the mesh at rest";
   require(deformed->points.size() == rest.points.size(), std::to_string(deformed->points.size()) + " and " +
@@ -147,7 +121,7 @@ std::vector<glm::dvec3> from_deformed(const MeshReader& rest, const FieldSource&
 /// In the file's frame and units, one a vertex; empty: it cannot be decided.
 std::vector<glm::dvec3> displacement_of(const MeshReader& reader, const FieldSource& source, MeshFileHeader& header) {
   if (source.options.contains("deformed")) {
-    header.displacement = "positions of " + option(source, "deformed");
+    header.displacement = "positions of " + source.option("deformed");
     return from_deformed(reader, source, header);
   }
   const auto chosen = chosen_vectors(reader, source);
@@ -202,8 +176,7 @@ std::size_t drop_repeated(std::vector<glm::u32vec4>& tetrahedra) {
 TetrahedralMesh mesh_of(MeshReader& reader, const std::vector<glm::dvec3>& displacement, const FieldSource& source,
                         MeshFileHeader& header) {
   const std::vector<std::uint32_t> numbers = numbers_of_used(reader);
-  const double unit = header.units == "m" ? 1000 : 1;
-  const glm::dvec3 to_lps_mm = header.frame == "RAS" ? glm::dvec3(-unit, -unit, unit) : glm::dvec3(unit);
+  const glm::dvec3 to_mm = to_lps_mm(header.frame, header.units);
   TetrahedralMesh mesh;
   const auto used =
       static_cast<std::size_t>(std::count_if(numbers.begin(), numbers.end(), [](auto n) { return n != kUnused; }));
@@ -211,10 +184,10 @@ TetrahedralMesh mesh_of(MeshReader& reader, const std::vector<glm::dvec3>& displ
   mesh.displacement.reserve(displacement.empty() ? 0 : used);
   for (std::size_t v = 0; v < numbers.size(); ++v) {
     if (numbers[v] == kUnused) continue;
-    mesh.rest.push_back(to_lps_mm * reader.points[v]);
+    mesh.rest.push_back(to_mm * reader.points[v]);
     require_finite(mesh.rest.back(), "a position that is", tag_of(reader, v), source);
     if (displacement.empty()) continue;
-    const glm::dvec3 mm = to_lps_mm * displacement[v];
+    const glm::dvec3 mm = to_mm * displacement[v];
     mesh.displacement.emplace_back(mm + 0.0);  // no -0
     require_finite(glm::dvec3(mesh.displacement.back()), "a displacement that is missing or", tag_of(reader, v),
                    source);

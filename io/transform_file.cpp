@@ -14,12 +14,16 @@
 
 namespace tetwarp {
 
+namespace {
+
 bool has_transform_suffix(const std::filesystem::path& path) {
   std::string suffix = path.extension().string();
   std::ranges::transform(suffix, suffix.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   constexpr std::array<std::string_view, 4> kSuffixes = {".h5", ".hdf5", ".tfm", ".txt"};
   return std::ranges::find(kSuffixes, suffix) != kSuffixes.end();
 }
+
+}  // namespace
 
 #ifdef TETWARP_WITH_ITK
 namespace {

@@ -23,10 +23,8 @@ struct TransformFile {
   std::shared_ptr<std::atomic<std::uint64_t>> outside;
 };
 
-/// Whether the name ends as those of transform files do: .h5 .hdf5 .tfm .txt.
-bool has_transform_suffix(const std::filesystem::path& path);
-
-/// Whether a file is a transform: by its name, or, of a NIfTI file, by its header (a cubic B-spline of NiftyReg).
+/// Whether a file is a transform: by its name (.h5 .hdf5 .tfm .txt), or, of a NIfTI file, by its header (a cubic
+/// B-spline of NiftyReg).
 bool is_transform_file(const std::filesystem::path& path);
 
 /// Reads an ITK transform file (.h5 .tfm .txt), an elastix parameter file or a plastimatch B-spline (.txt): affine

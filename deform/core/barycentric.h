@@ -113,12 +113,6 @@ struct Weights {
   }
 };
 
-/// @param a, b, c  the numerators: dot of r and m.bc, m.ca, m.ab
-TETWARP_HD inline Weights weights_of(const Cramer& m, float a, float b, float c) {
-  const float reciprocal = 1.0f / m.det;
-  return {a * reciprocal, b * reciprocal, c * reciprocal};
-}
-
 /// u = u_D + b_A (u_A - u_D) + b_B (u_B - u_D) + b_C (u_C - u_D) (Eq. 7 rewritten).
 ///
 /// @param ud, a, b, c  u at D, and the differences from it at A, B, C

@@ -62,6 +62,12 @@ struct NudgeTurns {
   }
 };
 
+/// Where tiles of some voxels begin on an axis, so that none has voxels of both sides of the nudge's turn.
+/// @param begin, end  voxels, half open  @param turn  `first_down` of the axis
+inline std::int64_t tile_origin(std::int64_t begin, std::int64_t end, std::int64_t turn, std::int64_t size) {
+  return turn > begin && turn < end ? turn - (turn - begin + size - 1) / size * size : begin;
+}
+
 /// d in units of 2^-16 voxel.
 TETWARP_HD inline glm::i32vec3 nudge_steps(const glm::i32vec3& signs) {
   return {kNudgeX * signs.x, kNudgeY * signs.y, kNudgeZ * signs.z};

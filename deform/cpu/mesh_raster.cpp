@@ -54,22 +54,16 @@ void MeshRaster::build(const SnappedMesh& mesh, const Geometry& output, const Co
   mesh_ = &mesh;
   size_ = output.size;
   for (int axis = 0; axis < 3; ++axis) {
-    const std::int64_t turn = mesh.nudge.first_down(axis);
-    origin_[axis] = turn > 0 && turn < size_[axis] ? turn - (turn + kBin - 1) / kBin * kBin : 0;
+    origin_[axis] = tile_origin(0, size_[axis], mesh.nudge.first_down(axis), kBin);
     bins_[axis] = (size_[axis] - origin_[axis] + kBin - 1) / kBin;
   }
-  first_.assign(static_cast<std::size_t>(bins_.x * bins_.y * bins_.z) + 1, 0);
   const auto for_each_pair = [&](auto&& visit) {
     for (std::size_t n = 0; n < mesh.tetrahedra.size(); ++n) {
       if (n % kAtOnce == 0 && control.stop.stop_requested()) throw Cancelled();
       for_each_bin(mesh.tetrahedron(n), [&](std::size_t number) { visit(number, n); });
     }
   };
-  for_each_pair([&](std::size_t number, std::size_t) { ++first_[number + 1]; });
-  for (std::size_t number = 1; number < first_.size(); ++number) first_[number] += first_[number - 1];
-  numbers_.resize(first_.back());
-  std::vector<std::size_t> next(first_.begin(), first_.end() - 1);
-  for_each_pair([&](std::size_t number, std::size_t n) { numbers_[next[number]++] = static_cast<std::uint32_t>(n); });
+  lists_.build(static_cast<std::size_t>(bins_.x * bins_.y * bins_.z), for_each_pair);
 }
 
 void MeshRaster::find(const Region& box, bool wants_count, MeshOwners& owners) const {
@@ -97,8 +91,8 @@ void MeshRaster::find_in_bin(std::size_t number, const Region& part, const Regio
     const glm::i64vec3 at = part.begin + glm::i64vec3(0, y, z) - box.begin;
     return static_cast<std::size_t>((at.z * box_size.y + at.y) * box_size.x + at.x);
   };
-  for (std::size_t place = first_[number]; place < first_[number + 1]; ++place) {
-    const Tetrahedron t = mesh_->tetrahedron(numbers_[place]);
+  for (const std::uint32_t* listed = lists_.begin(number); listed != lists_.end(number); ++listed) {
+    const Tetrahedron t = mesh_->tetrahedron(*listed);
     const VoxelBox reached = detail::candidates(mesh_->nudge, box_of(t), {part.begin, part.end});
     if (detail::is_empty(reached)) continue;
     const glm::ivec3 begin = glm::ivec3(reached.begin) - first, end = glm::ivec3(reached.end) - first;
@@ -112,8 +106,7 @@ void MeshRaster::find_in_bin(std::size_t number, const Region& part, const Regio
         if (has_faces) in = rows.interval(z, size.x, is_certain);
         if (!is_certain) in = exact_row(t, first, signs, y, z, size.x);
         if (in.is_empty()) continue;
-        give(numbers_[place], offset(y, z) + static_cast<std::size_t>(in.begin), in.end - in.begin, wants_count,
-             owners);
+        give(*listed, offset(y, z) + static_cast<std::size_t>(in.begin), in.end - in.begin, wants_count, owners);
       }
     }
   }

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "deform/cell_lists.h"
 #include "deform/snapped_mesh.h"
 
 namespace tetwarp::cpu {
@@ -35,8 +36,7 @@ class MeshRaster {
   const SnappedMesh* mesh_ = nullptr;
   glm::i64vec3 size_{0};              ///< of the output
   glm::i64vec3 origin_{0}, bins_{0};  ///< first voxel of the first bin, and how many bins; the nudge turns between bins
-  std::vector<std::size_t> first_;    ///< of each bin, i fastest, and of one more: where its tetrahedra are listed
-  std::vector<std::uint32_t> numbers_;  ///< of the tetrahedra of each bin, rising
+  CellLists lists_;                   ///< of the tetrahedra of each bin, i fastest; rising
 };
 
 }  // namespace tetwarp::cpu

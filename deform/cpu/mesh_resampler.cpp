@@ -80,12 +80,7 @@ void MeshResampler::require_reach(const Control& control) {
 Region MeshResampler::source_region(const Geometry& source, Region region) const {
   require(ready_, "source_region needs a field: call set_field first");
   region = intersection(region, whole(output()));
-  UndeformedBox box = undeformed_box(mesh_, region);
-  if (stays_outside_ && !tetwarp::is_empty(region)) {
-    box.low = glm::min(box.low, glm::dvec3(region.begin));
-    box.high = glm::max(box.high, glm::dvec3(region.end - std::int64_t{1}));
-  }
-  return source_box(source, output(), box.low, box.high);
+  return mesh_source_region(mesh_, stays_outside_, output(), source, region);
 }
 
 Report MeshResampler::resample(Region region, std::span<const Target> targets, const Maps& maps,
@@ -116,10 +111,7 @@ Report MeshResampler::resample(Region region, std::span<const Target> targets, c
     }
     return of_tile;
   });
-  report.inverted = mesh_.inverted;
-  report.degenerate = mesh_.degenerate;
-  report.jacobian_min = mesh_.jacobian_min;
-  report.jacobian_max = mesh_.jacobian_max;
+  mesh_.describe(report);
   return report;
 }
 

@@ -76,4 +76,13 @@ inline void expect_like_oracle(const Outcome<float>& found, const Volume<float>&
   EXPECT_NEAR(found.report.jacobian_max, oracle.jacobian_max, rounding);
 }
 
+/// Sends a smooth source through a field and looks at every voxel. @return  what the oracle says
+inline Oracle expect_oracles_result(Resampler& resampler, const VertexField& field, Outside outside = Outside::refuse) {
+  const Volume<float> source = smooth_source(resampler.output());
+  resampler.set_field(view(field, outside));
+  Oracle oracle(resampler.output(), field);
+  expect_like_oracle(run(resampler, source), source, oracle);
+  return oracle;
+}
+
 }  // namespace tetwarp::test
