@@ -1,0 +1,168 @@
+#include "deform/simulate/model.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "deform/errors.h"
+
+namespace tetwarp::simulate {
+
+namespace {
+
+constexpr int kCorners = 8;
+
+std::int64_t cell_count(const Geometry& lattice) {
+  const glm::i64vec3 cells = lattice.size - std::int64_t{1};
+  return cells.x * cells.y * cells.z;
+}
+
+glm::ivec3 corner_steps(int corner) { return {corner & 1, corner >> 1 & 1, corner >> 2}; }
+
+/// In how many cells a link lies: 4 along an axis, 2 across a face, 1 across a cell.
+int cells_round(const glm::ivec3& steps) {
+  const int along = std::abs(steps.x) + std::abs(steps.y) + std::abs(steps.z);
+  return along == 1 ? 4 : along == 2 ? 2 : 1;
+}
+
+void require_tissue(const Tissue& tissue) {
+  const auto check = [&](const char* what, double value, double low, double high) {
+    require(std::isfinite(value) && value >= low && value <= high,
+            "the tissue \"" + tissue.name + "\" has " + what + " " + std::to_string(value) + "; expected " +
+                std::to_string(low) + " to " + std::to_string(high));
+  };
+  check("a Young's modulus of", tissue.youngs_modulus_kpa, 1e-6, 1e9);
+  check("a compression of", tissue.compression, 0, 1);
+  check("a stretch of", tissue.stretch, 0, 100);
+  check("a shear of", tissue.shear, 0, 100);
+}
+
+class Builder {
+ public:
+  Builder(Model& model, std::span<const Tissue> tissues)
+      : model_(model), tissues_(tissues), springs_(spring_constants(model.lattice.spacing)) {
+    const std::size_t nodes = model.nodes();
+    model.neighbour.assign(kDirections * nodes, -1);
+    model.stiffness.assign(kDirections * nodes, 0);
+    model.limits.assign(3 * nodes, {});
+  }
+
+  void add(const std::array<std::uint32_t, kCorners>& node, std::uint8_t tissue, double volume) {
+    for (int a = 0; a < kCorners; ++a) {
+      for (int b = 0; b < kCorners; ++b) {
+        if (a == b) continue;
+        const glm::ivec3 steps = corner_steps(b) - corner_steps(a);
+        const int direction = direction_of(steps.x, steps.y, steps.z);
+        const std::size_t at = model_.link(direction, node[static_cast<std::size_t>(a)]);
+        const bool is_new = model_.neighbour[at] < 0;
+        model_.neighbour[at] = static_cast<std::int32_t>(node[static_cast<std::size_t>(b)]);
+        const double newton_per_mm2 = tissues_[tissue].youngs_modulus_kpa * 1e-3;
+        model_.stiffness[at] += static_cast<float>(springs_.along[static_cast<std::size_t>(direction)] *
+                                                   newton_per_mm2 * volume / cells_round(steps));
+        if (steps.x + steps.y + steps.z == 1 && cells_round(steps) == 4) {
+          limit(steps, node[static_cast<std::size_t>(a)], tissues_[tissue], is_new);
+        }
+      }
+    }
+  }
+
+ private:
+  void limit(const glm::ivec3& steps, std::size_t node, const Tissue& tissue, bool is_new) {
+    const int axis = steps.x ? 0 : steps.y ? 1 : 2;
+    const double length = model_.lattice.spacing[axis];
+    LinkLimits& limits = model_.limits[static_cast<std::size_t>(axis) * model_.nodes() + node];
+    const LinkLimits own{static_cast<float>(-tissue.compression * length), static_cast<float>(tissue.stretch * length),
+                         static_cast<float>(tissue.shear * length)};
+    limits = is_new ? own
+                    : LinkLimits{std::max(limits.shortest, own.shortest), std::min(limits.longest, own.longest),
+                                 std::min(limits.shear, own.shear)};
+  }
+
+  Model& model_;
+  std::span<const Tissue> tissues_;
+  SpringConstants springs_;
+};
+
+}  // namespace
+
+SpringConstants spring_constants(const glm::dvec3& h) {
+  constexpr double kShear = 1 / 2.5;      // of Young's modulus, at Poisson's ratio 1/4
+  constexpr double kBodyShare = 4.0 / 7;  // of it, by the body diagonals
+  const glm::dvec3 square = h * h;
+  const double volume = h.x * h.y * h.z, across_cell = square.x + square.y + square.z;
+  const double largest_pair = std::max({square.x * square.y, square.y * square.z, square.x * square.z});
+  const double body = kBodyShare * kShear * volume * across_cell / (4 * largest_pair);
+  const auto face = [&](int a, int b) {
+    const double pair = square[a] * square[b];
+    return (kShear * volume - 4 * body * pair / across_cell) * (square[a] + square[b]) / (2 * pair);
+  };
+  const auto axial = [&](int a, int b, int c) {
+    const double fourth = square[a] * square[a];
+    const double by_diagonals = 2 * face(a, b) * fourth / (square[a] + square[b]) +
+                                2 * face(a, c) * fourth / (square[a] + square[c]) + 4 * body * fourth / across_cell;
+    return std::max(0.0, (3 * kShear * volume - by_diagonals) / square[a]);
+  };
+  SpringConstants result;
+  for (int d = 0; d < kDirections; ++d) {
+    const glm::ivec3 steps = link_steps(d);
+    double& k = result.along[static_cast<std::size_t>(d)];
+    if (cells_round(steps) == 1) {
+      k = body;
+    } else if (cells_round(steps) == 2) {
+      k = steps.x == 0 ? face(1, 2) : steps.y == 0 ? face(0, 2) : face(0, 1);
+    } else {
+      k = steps.x != 0 ? axial(0, 1, 2) : steps.y != 0 ? axial(1, 0, 2) : axial(2, 0, 1);
+    }
+  }
+  return result;
+}
+
+Model make_model(const Geometry& lattice, std::span<const std::uint8_t> tissue_of_cell, std::span<const Tissue> tissues,
+                 std::span<const std::uint32_t> copies_of, std::span<const CellPiece> pieces) {
+  require_valid(lattice, "the lattice");
+  const std::int64_t vertices = voxel_count(lattice), cells = cell_count(lattice);
+  require(cells > 0, "a lattice of " + to_string(lattice.size) + " vertices has no cell");
+  require(vertices + static_cast<std::int64_t>(copies_of.size()) < INT32_MAX,
+          "a lattice of " + to_string(lattice.size) + " vertices is too large to simulate; choose larger cells");
+  require(
+      tissue_of_cell.size() == static_cast<std::size_t>(cells),
+      "one tissue a cell is expected, " + std::to_string(cells) + "; found " + std::to_string(tissue_of_cell.size()));
+  for (const Tissue& tissue : tissues) require_tissue(tissue);
+
+  Model model{.lattice = lattice, .vertex = {}, .neighbour = {}, .stiffness = {}, .limits = {}};
+  for (std::int64_t v = 0; v < vertices; ++v) model.vertex.push_back(static_cast<std::uint32_t>(v));
+  model.vertex.insert(model.vertex.end(), copies_of.begin(), copies_of.end());
+  Builder builder(model, tissues);
+  auto piece = pieces.begin();
+  const glm::i64vec3 size = lattice.size;
+  std::uint64_t cell = 0;
+  for (std::int64_t k = 0; k + 1 < size.z; ++k) {
+    for (std::int64_t j = 0; j + 1 < size.y; ++j) {
+      for (std::int64_t i = 0; i + 1 < size.x; ++i, ++cell) {
+        const std::uint8_t tissue = tissue_of_cell[cell];
+        if (tissue >= tissues.size()) {
+          throw InputError("the cell " + std::to_string(cell) + " is of the tissue " + std::to_string(tissue) +
+                           "; there are " + std::to_string(tissues.size()));
+        }
+        if (piece != pieces.end() && piece->cell == cell) {
+          for (; piece != pieces.end() && piece->cell == cell; ++piece) builder.add(piece->node, tissue, piece->volume);
+          continue;
+        }
+        std::array<std::uint32_t, kCorners> node;
+        for (int c = 0; c < kCorners; ++c) {
+          const glm::ivec3 at = corner_steps(c);
+          node[static_cast<std::size_t>(c)] =
+              static_cast<std::uint32_t>(i + at.x + size.x * (j + at.y + size.y * (k + at.z)));
+        }
+        builder.add(node, tissue, 1);
+      }
+    }
+  }
+  require(piece == pieces.end(), "pieces of cells are expected by rising number of a cell of the lattice");
+  return model;
+}
+
+glm::dvec3 rest_link(const Geometry& lattice, int direction) {
+  return lattice.direction * (lattice.spacing * glm::dvec3(link_steps(direction)));
+}
+
+}  // namespace tetwarp::simulate
