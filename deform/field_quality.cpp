@@ -13,6 +13,7 @@
 
 #include "deform/core/five_tetrahedra.h"
 #include "deform/cpu/tiles.h"
+#include "deform/fields/lattice_mesh.h"
 
 namespace tetwarp {
 
@@ -161,6 +162,7 @@ std::array<double, FieldQuality::kEdges.size() + 1> FieldQuality::shares() const
 }
 
 FieldQuality measure_quality(const VertexField& field, const Limits& limits, const Control& control) {
+  if (!field.replaced.empty()) return quality_of(mesh_of(field), limits, control);
   if (!field.mesh.is_empty()) return quality_of(field.mesh, limits, control);
   const glm::i64vec3 size = field.lattice.size;
   require(std::min({size.x, size.y, size.z}) >= 2, "a field of " + to_string(size) + " vertices has no cell");

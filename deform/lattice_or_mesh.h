@@ -3,12 +3,13 @@
 #include <functional>
 #include <memory>
 
+#include "deform/fields/lattice_mesh.h"
 #include "deform/resampler.h"
 
 namespace tetwarp {
 
 /// What a backend's factory gives: takes lattices and meshes, and has a resampler for each kind. Of these it keeps one
-/// at a time, so that their buffers do not add up.
+/// at a time, so that their buffers do not add up. A lattice with replaced cells is taken as one mesh.
 class LatticeOrMesh final : public Resampler {
  public:
   using Make = std::function<std::unique_ptr<Resampler>()>;
@@ -25,7 +26,10 @@ class LatticeOrMesh final : public Resampler {
       current_ = is_mesh ? make_mesh_() : make_lattice_();
       holds_mesh_ = is_mesh;
     }
-    current_->set_field(field, control);
+    if (field.replaced.empty()) return current_->set_field(field, control);
+    require(is_mesh, "a field with replaced cells needs a mesh in their place");
+    whole_ = mesh_of(field);
+    current_->set_field({.outside = field.outside, .mesh = &whole_}, control);
   }
   Region source_region(const Geometry& source, Region region) const override {
     return held().source_region(source, region);
@@ -43,6 +47,7 @@ class LatticeOrMesh final : public Resampler {
   Make make_lattice_, make_mesh_;
   std::unique_ptr<Resampler> current_;
   bool holds_mesh_ = false;
+  TetrahedralMesh whole_;  ///< of a lattice with replaced cells
 };
 
 }  // namespace tetwarp

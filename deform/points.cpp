@@ -13,6 +13,7 @@
 #include "deform/core/cell_weights.h"
 #include "deform/cpu/tiles.h"
 #include "deform/field_check.h"
+#include "deform/fields/lattice_mesh.h"
 #include "deform/mesh_locator.h"
 
 namespace tetwarp {
@@ -171,7 +172,10 @@ PointMover::PointMover(const Geometry& output, const FieldView& field, const Lim
     return;
   }
   tbb::task_arena arena = cpu::make_arena(limits);
-  arena.execute([&] { map_ = std::make_unique<MeshMap>(output, *field.mesh, control); });
+  arena.execute([&] {
+    const TetrahedralMesh whole = field.replaced.empty() ? TetrahedralMesh{} : mesh_of(field);
+    map_ = std::make_unique<MeshMap>(output, field.replaced.empty() ? *field.mesh : whole, control);
+  });
 }
 
 PointMover::~PointMover() = default;

@@ -13,9 +13,14 @@ void require_one_each(const Geometry& grid, std::size_t vectors) {
 }  // namespace
 
 FieldView view(const VertexField& field, Outside outside) {
-  if (!field.mesh.is_empty()) return {.outside = outside, .mesh = &field.mesh};
+  if (!field.mesh.is_empty() && field.replaced.empty()) return {.outside = outside, .mesh = &field.mesh};
   require_one_each(field.lattice, field.displacement.size());
-  return {&field.lattice, field.displacement.data(), outside, Memory::host};
+  if (field.replaced.empty()) return {&field.lattice, field.displacement.data(), outside, Memory::host};
+  return {.lattice = &field.lattice,
+          .displacement = field.displacement.data(),
+          .outside = outside,
+          .mesh = &field.mesh,
+          .replaced = field.replaced};
 }
 
 VolumeView samples_of(PullField& field) {

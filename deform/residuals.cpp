@@ -155,15 +155,14 @@ class VertexParts {
   explicit VertexParts(const VertexField& field) : field_(field), point_(point_from_index(field.lattice)) {}
 
   std::int64_t count() const {
-    if (field_.mesh.is_empty()) return field_.lattice.size.z;
-    return (static_cast<std::int64_t>(field_.mesh.rest.size()) + kOfMesh - 1) / kOfMesh;
+    return slices() + (static_cast<std::int64_t>(field_.mesh.rest.size()) + kOfMesh - 1) / kOfMesh;
   }
 
   /// Calls `visit(rest, displacement)`, mm, for the vertices of a part.
   template <class Visit>
   void for_each(std::int64_t part, Visit&& visit) const {
-    if (!field_.mesh.is_empty()) {
-      const std::size_t begin = static_cast<std::size_t>(part * kOfMesh),
+    if (part >= slices()) {
+      const std::size_t begin = static_cast<std::size_t>((part - slices()) * kOfMesh),
                         end = std::min(begin + kOfMesh, field_.mesh.rest.size());
       for (std::size_t n = begin; n < end; ++n) visit(field_.mesh.rest[n], glm::dvec3(field_.mesh.displacement[n]));
       return;
@@ -178,6 +177,9 @@ class VertexParts {
 
  private:
   static constexpr std::int64_t kOfMesh = 4096;
+
+  /// Of a lattice, unless a mesh stands alone.
+  std::int64_t slices() const { return field_.mesh.is_empty() || !field_.replaced.empty() ? field_.lattice.size.z : 0; }
 
   const VertexField& field_;
   AffineMap point_;

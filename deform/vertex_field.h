@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "deform/volume.h"
@@ -15,8 +16,8 @@ struct TetrahedralMesh {
   bool is_empty() const { return tetrahedra.empty(); }
 };
 
-/// Forward deformation: a regular lattice of vertices and where each goes, or a mesh. A value; simulators, files and
-/// formulas return it.
+/// Forward deformation: a regular lattice of vertices and where each goes, a mesh, or a lattice of which a mesh takes
+/// the place of some cells (cuts). A value; simulators, files and formulas return it.
 ///
 /// Every cell of the lattice is split into five tetrahedra (core/five_tetrahedra.h); inside each the map is affine.
 struct VertexField {
@@ -24,7 +25,9 @@ struct VertexField {
                                         ///< there is a mesh
   std::vector<glm::vec3> displacement;  ///< LPS mm, deformed minus rest, i fastest, 12 bytes each (1.9 GB at
                                         ///< 512x512x600); zero rests exactly
-  TetrahedralMesh mesh = {};            ///< in the place of a lattice
+  TetrahedralMesh mesh = {};            ///< in the place of a lattice, or of some of its cells
+  std::vector<std::uint64_t> replaced = {};  ///< these cells, i fastest, rising; the mesh's tetrahedra follow the
+                                             ///< lattice's
 };
 
 /// Deformation the other way round, as registration tools write it: what lies at output point p comes from p + d(p).
@@ -48,8 +51,9 @@ struct FieldView {
   const Geometry* lattice = nullptr;
   const glm::vec3* displacement = nullptr;
   Outside outside = Outside::refuse;
-  Memory memory = Memory::host;           ///< of `displacement`; the lattice is always the host's
-  const TetrahedralMesh* mesh = nullptr;  ///< in the place of lattice and displacement; in host memory
+  Memory memory = Memory::host;                  ///< of `displacement`; the lattice is always the host's
+  const TetrahedralMesh* mesh = nullptr;         ///< in the place of lattice and displacement; in host memory
+  std::span<const std::uint64_t> replaced = {};  ///< not empty: the mesh takes the place of these cells alone
 };
 struct PullFieldView {
   const Geometry* grid = nullptr;

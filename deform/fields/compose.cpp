@@ -64,7 +64,8 @@ void compose(TetrahedralMesh& mesh, const PointMap& next, const Limits& limits, 
 }  // namespace
 
 void compose(VertexField& field, const PointMap& next, Limits limits, const Control& control) {
-  if (!field.mesh.is_empty()) return compose(field.mesh, next, limits, control);
+  if (!field.mesh.is_empty()) compose(field.mesh, next, limits, control);
+  if (!field.mesh.is_empty() && field.replaced.empty()) return;
   for_each_vertex(field, limits, control, [&](const glm::dvec3& rest, const glm::vec3& moved) {
     const glm::dvec3 displacement(moved);
     return glm::vec3(displacement + next(rest + displacement));

@@ -1,27 +1,62 @@
 #include "deform/fields/lattice_mesh.h"
 
+#include <glm/common.hpp>
+
 #include "deform/core/five_tetrahedra.h"
 #include "deform/errors.h"
 
 namespace tetwarp {
 
-TetrahedralMesh mesh_of(const VertexField& field) {
-  const Geometry& lattice = field.lattice;
-  view(field);  // checks the number of displacements
-  require(voxel_count(lattice) < UINT32_MAX,
+namespace {
+
+/// Adds a mesh to that of a lattice. Vertices that the lattice has too are not added again.
+void append(const TetrahedralMesh& added, const Geometry& lattice, TetrahedralMesh& mesh) {
+  const AffineMap point = point_from_index(lattice), index = index_from_point(lattice);
+  const glm::i64vec3 size = lattice.size;
+  std::vector<std::uint32_t> number;
+  for (std::size_t n = 0; n < added.rest.size(); ++n) {
+    const glm::i64vec3 near =
+        glm::clamp(glm::i64vec3(glm::round(index(added.rest[n]))), glm::i64vec3(0), size - std::int64_t{1});
+    const auto of_lattice = static_cast<std::size_t>((near.z * size.y + near.y) * size.x + near.x);
+    if (point(glm::dvec3(near)) == added.rest[n] && mesh.displacement[of_lattice] == added.displacement[n]) {
+      number.push_back(static_cast<std::uint32_t>(of_lattice));
+      continue;
+    }
+    number.push_back(static_cast<std::uint32_t>(mesh.rest.size()));
+    mesh.rest.push_back(added.rest[n]);
+    mesh.displacement.push_back(added.displacement[n]);
+  }
+  for (const glm::u32vec4& t : added.tetrahedra)
+    mesh.tetrahedra.emplace_back(number[t.x], number[t.y], number[t.z], number[t.w]);
+}
+
+}  // namespace
+
+TetrahedralMesh mesh_of(const FieldView& field) {
+  if (field.mesh && field.replaced.empty()) return *field.mesh;
+  require(field.memory == Memory::host, "a mesh is made of a field in host memory");
+  const Geometry& lattice = *field.lattice;
+  const auto vertices = static_cast<std::size_t>(voxel_count(lattice));
+  require(vertices + (field.mesh ? field.mesh->rest.size() : 0) < UINT32_MAX,
           "a lattice of " + to_string(lattice.size) + " vertices is too large for a mesh");
   const AffineMap point = point_from_index(lattice);
   const glm::i64vec3 size = lattice.size;
   TetrahedralMesh mesh;
-  mesh.displacement = field.displacement;
+  mesh.displacement.assign(field.displacement, field.displacement + vertices);
   for (std::int64_t k = 0; k < size.z; ++k) {
     for (std::int64_t j = 0; j < size.y; ++j) {
       for (std::int64_t i = 0; i < size.x; ++i) mesh.rest.push_back(point(glm::dvec3(i, j, k)));
     }
   }
+  std::uint64_t cell = 0;
+  auto replaced = field.replaced.begin();
   for (std::int64_t k = 0; k + 1 < size.z; ++k) {
     for (std::int64_t j = 0; j + 1 < size.y; ++j) {
-      for (std::int64_t i = 0; i + 1 < size.x; ++i) {
+      for (std::int64_t i = 0; i + 1 < size.x; ++i, ++cell) {
+        if (replaced != field.replaced.end() && *replaced == cell) {
+          ++replaced;
+          continue;
+        }
         for (int t = 0; t < kTetrahedraPerCell; ++t) {
           const TetrahedronCorners corners = tetrahedron_corners(t, (i + j + k) % 2 != 0);
           const auto vertex = [&](int c) {
@@ -32,7 +67,12 @@ TetrahedralMesh mesh_of(const VertexField& field) {
       }
     }
   }
+  require(replaced == field.replaced.end(),
+          "replaced cells are expected by rising number, below " + std::to_string(cell) + ", the cells of the lattice");
+  if (field.mesh) append(*field.mesh, lattice, mesh);
   return mesh;
 }
+
+TetrahedralMesh mesh_of(const VertexField& field) { return mesh_of(view(field)); }
 
 }  // namespace tetwarp

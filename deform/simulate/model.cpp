@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 
 #include "deform/errors.h"
 
@@ -9,14 +10,14 @@ namespace tetwarp::simulate {
 
 namespace {
 
-constexpr int kCorners = 8;
+constexpr std::size_t kCorners = 8;
 
 std::int64_t cell_count(const Geometry& lattice) {
   const glm::i64vec3 cells = lattice.size - std::int64_t{1};
   return cells.x * cells.y * cells.z;
 }
 
-glm::ivec3 corner_steps(int corner) { return {corner & 1, corner >> 1 & 1, corner >> 2}; }
+glm::ivec3 corner_steps(std::size_t corner) { return {corner & 1, corner >> 1 & 1, corner >> 2}; }
 
 /// In how many cells a link lies: 4 along an axis, 2 across a face, 1 across a cell.
 int cells_round(const glm::ivec3& steps) {
@@ -39,33 +40,47 @@ void require_tissue(const Tissue& tissue) {
 class Builder {
  public:
   Builder(Model& model, std::span<const Tissue> tissues)
-      : model_(model), tissues_(tissues), springs_(spring_constants(model.lattice.spacing)) {
+      : model_(model),
+        tissues_(tissues),
+        springs_(spring_constants(model.lattice.spacing)),
+        vertices_(static_cast<std::size_t>(voxel_count(model.lattice))) {
     const std::size_t nodes = model.nodes();
     model.neighbour.assign(kDirections * nodes, -1);
     model.stiffness.assign(kDirections * nodes, 0);
     model.limits.assign(3 * nodes, {});
   }
 
-  void add(const std::array<std::uint32_t, kCorners>& node, std::uint8_t tissue, double volume) {
-    for (int a = 0; a < kCorners; ++a) {
-      for (int b = 0; b < kCorners; ++b) {
-        if (a == b) continue;
-        const glm::ivec3 steps = corner_steps(b) - corner_steps(a);
-        const int direction = direction_of(steps.x, steps.y, steps.z);
-        const std::size_t at = model_.link(direction, node[static_cast<std::size_t>(a)]);
-        const bool is_new = model_.neighbour[at] < 0;
-        model_.neighbour[at] = static_cast<std::int32_t>(node[static_cast<std::size_t>(b)]);
-        const double newton_per_mm2 = tissues_[tissue].youngs_modulus_kpa * 1e-3;
-        model_.stiffness[at] += static_cast<float>(springs_.along[static_cast<std::size_t>(direction)] *
-                                                   newton_per_mm2 * volume / cells_round(steps));
-        if (steps.x + steps.y + steps.z == 1 && cells_round(steps) == 4) {
-          limit(steps, node[static_cast<std::size_t>(a)], tissues_[tissue], is_new);
-        }
+  /// Adds the links of a cell or of a piece of one: between vertices of the lattice, or those of copies.
+  void add(const std::array<std::uint32_t, kCorners>& node, std::uint8_t tissue, double volume, bool of_copies) {
+    for (std::size_t a = 0; a < kCorners; ++a) {
+      for (std::size_t b = a + 1; b < kCorners; ++b) {
+        const bool has_copy = node[a] >= vertices_ || node[b] >= vertices_;
+        if (has_copy == of_copies) add(node[a], node[b], corner_steps(b) - corner_steps(a), tissue, volume);
       }
     }
   }
 
  private:
+  void add(std::uint32_t a, std::uint32_t b, const glm::ivec3& steps, std::uint8_t tissue, double volume) {
+    const int direction = direction_of(steps.x, steps.y, steps.z);
+    const std::size_t there = model_.link(direction, a), back = model_.link(opposite(direction), b);
+    const auto is_free_or = [&](std::size_t link, std::uint32_t node) {
+      return model_.neighbour[link] < 0 || model_.neighbour[link] == static_cast<std::int32_t>(node);
+    };
+    if (!is_free_or(there, b) || !is_free_or(back, a)) return;  // at the rim of a cut
+    const bool is_new = model_.neighbour[there] < 0;
+    model_.neighbour[there] = static_cast<std::int32_t>(b);
+    model_.neighbour[back] = static_cast<std::int32_t>(a);
+    const double newton_per_mm2 = tissues_[tissue].youngs_modulus_kpa * 1e-3;
+    const auto stiffness = static_cast<float>(springs_.along[static_cast<std::size_t>(direction)] * newton_per_mm2 *
+                                              volume / cells_round(steps));
+    model_.stiffness[there] += stiffness;
+    model_.stiffness[back] += stiffness;
+    if (cells_round(steps) != 4) return;
+    const bool is_up = steps.x + steps.y + steps.z == 1;
+    limit(glm::abs(steps), is_up ? a : b, tissues_[tissue], is_new);
+  }
+
   void limit(const glm::ivec3& steps, std::size_t node, const Tissue& tissue, bool is_new) {
     const int axis = steps.x ? 0 : steps.y ? 1 : 2;
     const double length = model_.lattice.spacing[axis];
@@ -80,6 +95,7 @@ class Builder {
   Model& model_;
   std::span<const Tissue> tissues_;
   SpringConstants springs_;
+  std::size_t vertices_;
 };
 
 }  // namespace
@@ -144,20 +160,22 @@ Model make_model(const Geometry& lattice, std::span<const std::uint8_t> tissue_o
                            "; there are " + std::to_string(tissues.size()));
         }
         if (piece != pieces.end() && piece->cell == cell) {
-          for (; piece != pieces.end() && piece->cell == cell; ++piece) builder.add(piece->node, tissue, piece->volume);
+          for (; piece != pieces.end() && piece->cell == cell; ++piece)
+            builder.add(piece->node, tissue, piece->volume, false);
           continue;
         }
         std::array<std::uint32_t, kCorners> node;
-        for (int c = 0; c < kCorners; ++c) {
+        for (std::size_t c = 0; c < kCorners; ++c) {
           const glm::ivec3 at = corner_steps(c);
-          node[static_cast<std::size_t>(c)] =
-              static_cast<std::uint32_t>(i + at.x + size.x * (j + at.y + size.y * (k + at.z)));
+          node[c] = static_cast<std::uint32_t>(i + at.x + size.x * (j + at.y + size.y * (k + at.z)));
         }
-        builder.add(node, tissue, 1);
+        builder.add(node, tissue, 1, false);
       }
     }
   }
   require(piece == pieces.end(), "pieces of cells are expected by rising number of a cell of the lattice");
+  for (const CellPiece& of_copies : pieces)
+    builder.add(of_copies.node, tissue_of_cell[of_copies.cell], of_copies.volume, true);
   return model;
 }
 

@@ -83,7 +83,8 @@ SpringConstants spring_constants(const glm::dvec3& cell_mm);
 ///
 /// A spring's constant is the sum of what the cells round it give (a fourth of an axial spring each, half of a face's
 /// diagonal, a body diagonal whole); its chainmail limits are the tightest of those cells. Of a divided cell each piece
-/// links its own nodes, with springs of its part of the volume.
+/// links its own nodes, with springs of its part of the volume. A node has one neighbour in each direction: at the rim
+/// of a cut, where a vertex would have two, the lattice's own is taken before copies.
 ///
 /// @param tissue_of_cell  index into `tissues`, one a cell, i fastest
 /// @param copies_of       lattice vertex of each copy beyond the vertices themselves: node numbers follow the lattice's

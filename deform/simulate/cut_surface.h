@@ -1,0 +1,37 @@
+#pragma once
+
+#include "deform/simulate/cut.h"
+
+namespace tetwarp::simulate {
+
+/// Which side of a cut a place is on, and whether the cut reaches there.
+class CutSurface {
+ public:
+  /// @throws InputError naming the cut: numbers that are not finite, a normal or sweep of length 0, a radius that is
+  /// not above 0, a path of less than two points or that only goes along the sweep
+  explicit CutSurface(const Cut& cut);
+
+  /// LPS mm from the surface, or from the surface carried on beyond its rim; of either sign. Near the surface it is a
+  /// signed distance, elsewhere it may jump.
+  double side(const glm::dvec3& point) const;
+
+  /// Whether the cut goes through a place that `side` says is near it: not beyond its rim.
+  bool reaches(const glm::dvec3& point) const;
+
+ private:
+  /// The nearest place on the path, seen along the sweep.
+  struct Nearest {
+    double side;    ///< signed distance
+    bool is_on_it;  ///< not beyond an end
+    double height;  ///< of the path there, along the sweep
+  };
+  Nearest nearest_on_path(const glm::dvec3& point) const;
+
+  std::variant<PlaneCut, DiscCut, SweptCut> shape_;
+  glm::dvec3 up_{0};                ///< of length 1: the normal, or along the sweep
+  std::vector<glm::dvec3> flat_;    ///< the path's points seen along the sweep: their parts across it
+  std::vector<double> heights_;     ///< and along it
+  std::vector<glm::dvec3> across_;  ///< of each piece of the path: of length 1, across it and the sweep
+};
+
+}  // namespace tetwarp::simulate

@@ -1,0 +1,362 @@
+#include "deform/simulate/divided_lattice.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <map>
+#include <numeric>
+#include <unordered_map>
+
+#include "deform/errors.h"
+#include "deform/simulate/cut_surface.h"
+#include "deform/simulate/tetrahedron_splitter.h"
+
+namespace tetwarp::simulate {
+
+namespace {
+
+constexpr std::uint32_t kCorners = 8;
+constexpr std::uint32_t kNone = TetrahedronSplitter::kNone;
+
+glm::i64vec3 corner_steps(std::uint32_t c) { return {c & 1, c >> 1 & 1, c >> 2}; }
+
+/// Numbers on a lattice.
+class Grid {
+ public:
+  explicit Grid(const Geometry& lattice) : size_(lattice.size), cells_(lattice.size - std::int64_t{1}) {}
+
+  const glm::i64vec3& size() const { return size_; }
+  const glm::i64vec3& cells() const { return cells_; }
+  std::uint64_t cell(const glm::i64vec3& at) const {
+    return static_cast<std::uint64_t>(at.x + cells_.x * (at.y + cells_.y * at.z));
+  }
+  glm::i64vec3 place_of_cell(std::uint64_t cell) const { return place(cell, cells_); }
+  glm::i64vec3 place_of_vertex(std::uint32_t vertex) const { return place(vertex, size_); }
+  std::uint32_t vertex(const glm::i64vec3& at) const {
+    return static_cast<std::uint32_t>(at.x + size_.x * (at.y + size_.y * at.z));
+  }
+  /// Of a corner of a cell.
+  std::uint32_t vertex(std::uint64_t cell, std::uint32_t corner) const {
+    return vertex(place_of_cell(cell) + corner_steps(corner));
+  }
+
+ private:
+  static glm::i64vec3 place(std::uint64_t number, const glm::i64vec3& size) {
+    const auto n = static_cast<std::int64_t>(number);
+    return {n % size.x, n / size.x % size.y, n / (size.x * size.y)};
+  }
+
+  glm::i64vec3 size_, cells_;
+};
+
+/// Sets of things that are one; the least number stands for each.
+class Sets {
+ public:
+  explicit Sets(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0u); }
+  std::uint32_t of(std::uint32_t n) {
+    while (parent_[n] != n) n = parent_[n] = parent_[parent_[n]];
+    return n;
+  }
+  void unite(std::uint32_t a, std::uint32_t b) {
+    a = of(a);
+    b = of(b);
+    parent_[std::max(a, b)] = std::min(a, b);
+  }
+
+ private:
+  std::vector<std::uint32_t> parent_;
+};
+
+/// One cut over the lattice: its side of every vertex, and the cells that it goes through.
+struct Division {
+  std::vector<double> side;
+  std::vector<std::uint64_t> cells;  ///< rising
+  double nearest = 0;                ///< mm, that the cut may come to a vertex
+
+  bool is_through(std::uint64_t cell) const { return std::binary_search(cells.begin(), cells.end(), cell); }
+};
+
+Division divide_by(const Geometry& lattice, const Grid& grid, const Cut& cut) {
+  constexpr double kNearest = 1.0 / 256;  // of a cell
+  const CutSurface surface(cut);
+  const AffineMap point = point_from_index(lattice);
+  const glm::dvec3& h = lattice.spacing;
+  const double farthest = 0.5 * std::max({h.x, h.y, h.z});
+  Division division;
+  division.nearest = kNearest * std::min({h.x, h.y, h.z});
+  const auto vertices = static_cast<std::uint32_t>(voxel_count(lattice));
+  for (std::uint32_t v = 0; v < vertices; ++v) {
+    const double side = surface.side(point(glm::dvec3(grid.place_of_vertex(v))));
+    division.side.push_back(std::copysign(std::max(std::fabs(side), division.nearest), side));
+  }
+  const auto cells = static_cast<std::uint64_t>(grid.cells().x * grid.cells().y * grid.cells().z);
+  for (std::uint64_t cell = 0; cell < cells; ++cell) {
+    glm::dvec3 sum(0);  // of the places where the cut goes through edges, lattice index
+    int crossings = 0;
+    for (std::uint32_t a = 0; a < kCorners; ++a) {
+      for (const std::uint32_t axis : {1u, 2u, 4u}) {
+        if (a & axis) continue;
+        const std::uint32_t from = grid.vertex(cell, a), to = grid.vertex(cell, a | axis);
+        const double at = division.side[from], other = division.side[to];
+        if ((at < 0) == (other < 0)) continue;
+        sum +=
+            glm::mix(glm::dvec3(grid.place_of_vertex(from)), glm::dvec3(grid.place_of_vertex(to)), at / (at - other));
+        ++crossings;
+      }
+    }
+    if (crossings == 0) continue;
+    const glm::dvec3 middle = point(sum / static_cast<double>(crossings));
+    if (std::fabs(surface.side(middle)) <= farthest && surface.reaches(middle)) division.cells.push_back(cell);
+  }
+  return division;
+}
+
+/// The cells and those round them.
+std::vector<std::uint64_t> with_neighbours(const Grid& grid, const std::vector<Division>& divisions) {
+  std::vector<std::uint64_t> result;
+  for (const Division& division : divisions) {
+    for (const std::uint64_t cell : division.cells) {
+      const glm::i64vec3 at = grid.place_of_cell(cell);
+      const glm::i64vec3 low = glm::max(at - std::int64_t{1}, glm::i64vec3(0)),
+                         high = glm::min(at + std::int64_t{1}, grid.cells() - std::int64_t{1});
+      for (std::int64_t k = low.z; k <= high.z; ++k) {
+        for (std::int64_t j = low.y; j <= high.y; ++j) {
+          for (std::int64_t i = low.x; i <= high.x; ++i) result.push_back(grid.cell({i, j, k}));
+        }
+      }
+    }
+  }
+  std::sort(result.begin(), result.end());
+  result.erase(std::unique(result.begin(), result.end()), result.end());
+  return result;
+}
+
+/// Finds out what belongs together when all cuts are made, and gives nodes to it.
+class Joiner {
+ public:
+  Joiner(const Geometry& lattice, const Grid& grid, const TetrahedronSplitter& split)
+      : lattice_(lattice), grid_(grid), split_(split), pieces_(split.tetrahedra().size()) {
+    join_tetrahedra();
+    number_pieces();
+    nodes_ = Sets(cell_of_.size() * kCorners);
+    join_corners();
+    number_nodes();
+  }
+
+  DividedLattice result() {
+    DividedLattice divided;
+    divided.copies_of = copies_of_;
+    add_pieces(divided);
+    add_mesh(divided);
+    return divided;
+  }
+
+ private:
+  using Triangle = TetrahedronSplitter::Triangle;
+
+  /// Tetrahedra on both sides of every face that no cut severs.
+  template <class Visit>
+  void for_each_joint(Visit&& visit) const {
+    std::map<Triangle, std::uint32_t> open;
+    const auto& tetrahedra = split_.tetrahedra();
+    for (std::uint32_t n = 0; n < tetrahedra.size(); ++n) {
+      const auto& v = tetrahedra[n].vertex;
+      for (const auto& face :
+           {std::array{v[0], v[1], v[2]}, {v[0], v[1], v[3]}, {v[0], v[2], v[3]}, {v[1], v[2], v[3]}}) {
+        Triangle key = face;
+        std::sort(key.begin(), key.end());
+        if (split_.is_severed(key)) continue;
+        const auto [found, is_first] = open.try_emplace(key, n);
+        if (is_first) continue;
+        visit(found->second, n);
+        open.erase(found);
+      }
+    }
+  }
+
+  void join_tetrahedra() {
+    for_each_joint([&](std::uint32_t a, std::uint32_t b) {
+      if (split_.tetrahedra()[a].cell == split_.tetrahedra()[b].cell) pieces_.unite(a, b);
+    });
+  }
+
+  void number_pieces() {
+    const auto& tetrahedra = split_.tetrahedra();
+    piece_.assign(tetrahedra.size(), 0);
+    for (std::uint32_t n = 0; n < tetrahedra.size(); ++n) {
+      const std::uint32_t first = pieces_.of(n);
+      if (first == n) {
+        piece_[n] = static_cast<std::uint32_t>(cell_of_.size());
+        cell_of_.push_back(tetrahedra[n].cell);
+      } else {
+        piece_[n] = piece_[first];
+      }
+    }
+  }
+
+  std::uint32_t place(std::uint32_t piece, std::uint32_t corner) const { return piece * kCorners + corner; }
+
+  void join_corners() {
+    for_each_joint([&](std::uint32_t a, std::uint32_t b) {
+      const std::uint32_t of_a = piece_[a], of_b = piece_[b];
+      if (of_a == of_b) return;
+      const glm::i64vec3 steps = grid_.place_of_cell(cell_of_[of_b]) - grid_.place_of_cell(cell_of_[of_a]);
+      for (std::uint32_t c = 0; c < kCorners; ++c) {
+        const glm::i64vec3 in_b = corner_steps(c) - steps;
+        if (in_b.x < 0 || in_b.x > 1 || in_b.y < 0 || in_b.y > 1 || in_b.z < 0 || in_b.z > 1) continue;
+        nodes_.unite(place(of_a, c), place(of_b, static_cast<std::uint32_t>(in_b.x + 2 * in_b.y + 4 * in_b.z)));
+      }
+    });
+    const auto& tetrahedra = split_.tetrahedra();
+    for (std::uint32_t n = 0; n < tetrahedra.size(); ++n) {
+      for (const std::uint32_t v : tetrahedra[n].vertex) {
+        const TetrahedronSplitter::Vertex& vertex = split_.vertices()[v];
+        if (!vertex.is_corner()) continue;
+        const std::uint32_t at = place(piece_[n], corner_of(cell_of_[piece_[n]], vertex.corner[0]));
+        nodes_.unite(holder_.try_emplace(vertex.corner[0], at).first->second, at);
+      }
+    }
+  }
+
+  std::uint32_t corner_of(std::uint64_t cell, std::uint32_t vertex) const {
+    const glm::i64vec3 at = grid_.place_of_vertex(vertex) - grid_.place_of_cell(cell);
+    return static_cast<std::uint32_t>(at.x + 2 * at.y + 4 * at.z);
+  }
+
+  void number_nodes() {
+    node_.assign(cell_of_.size() * kCorners, kNone);
+    for (const auto& [vertex, at] : holder_) node_[nodes_.of(at)] = vertex;
+    auto next = static_cast<std::uint32_t>(voxel_count(lattice_));
+    for (std::uint32_t at = 0; at < node_.size(); ++at) {
+      std::uint32_t& node = node_[nodes_.of(at)];
+      if (node == kNone) {
+        node = next++;
+        copies_of_.push_back(grid_.vertex(cell_of_[at / kCorners], at % kCorners));
+      }
+      node_[at] = node;
+    }
+  }
+
+  double volume_of(const TetrahedronSplitter::Tetrahedron& t) const {
+    std::array<glm::dvec3, 4> at;
+    for (std::size_t n = 0; n < 4; ++n) {
+      for (int axis = 0; axis < 3; ++axis) {
+        at[n][axis] = split_.vertices()[t.vertex[n]].mean(
+            [&](std::uint32_t corner) { return static_cast<double>(grid_.place_of_vertex(corner)[axis]); });
+      }
+    }
+    return std::fabs(glm::determinant(glm::dmat3(at[0] - at[3], at[1] - at[3], at[2] - at[3]))) / 6;
+  }
+
+  void add_pieces(DividedLattice& divided) const {
+    std::vector<double> volume(cell_of_.size());
+    const auto& tetrahedra = split_.tetrahedra();
+    for (std::size_t n = 0; n < tetrahedra.size(); ++n) volume[piece_[n]] += volume_of(tetrahedra[n]);
+    for (std::uint32_t first = 0, end = 0; first < cell_of_.size(); first = end) {
+      while (end < cell_of_.size() && cell_of_[end] == cell_of_[first]) ++end;
+      bool is_whole = end - first == 1;
+      for (std::uint32_t c = 0; c < kCorners && is_whole; ++c) {
+        is_whole = node_[place(first, c)] == grid_.vertex(cell_of_[first], c);
+      }
+      for (std::uint32_t piece = first; piece < end && !is_whole; ++piece) {
+        CellPiece& added = divided.pieces.emplace_back();
+        added.cell = cell_of_[piece];
+        added.volume = volume[piece];
+        for (std::uint32_t c = 0; c < kCorners; ++c) added.node[c] = node_[place(piece, c)];
+      }
+    }
+  }
+
+  void add_mesh(DividedLattice& divided) const {
+    std::map<std::pair<std::uint32_t, std::array<std::uint32_t, 4>>, std::uint32_t> number_of;
+    const auto& tetrahedra = split_.tetrahedra();
+    for (std::size_t first = 0, end = 0; first < tetrahedra.size(); first = end) {
+      const std::uint64_t cell = tetrahedra[first].cell;
+      bool is_whole = true;
+      for (; end < tetrahedra.size() && tetrahedra[end].cell == cell; ++end) {
+        for (const std::uint32_t v : tetrahedra[end].vertex) is_whole &= split_.vertices()[v].is_corner();
+      }
+      if (is_whole) continue;
+      divided.replaced.push_back(cell);
+      for (std::size_t n = first; n < end; ++n) {
+        glm::u32vec4 corners;
+        for (int c = 0; c < 4; ++c) {
+          const std::uint32_t v = tetrahedra[n].vertex[static_cast<std::size_t>(c)];
+          const DividedLattice::Vertex vertex = vertex_in(piece_[n], split_.vertices()[v]);
+          const auto [found, is_new] =
+              number_of.try_emplace({v, vertex.node}, static_cast<std::uint32_t>(divided.vertices.size()));
+          if (is_new) divided.vertices.push_back(vertex);
+          corners[c] = found->second;
+        }
+        divided.tetrahedra.push_back(corners);
+      }
+    }
+  }
+
+  DividedLattice::Vertex vertex_in(std::uint32_t piece, const TetrahedronSplitter::Vertex& vertex) const {
+    DividedLattice::Vertex result;
+    result.weight = vertex.weight;
+    for (std::size_t n = 0; n < 4 && vertex.corner[n] != kNone; ++n) {
+      result.node[n] = node_[place(piece, corner_of(cell_of_[piece], vertex.corner[n]))];
+    }
+    return result;
+  }
+
+  const Geometry& lattice_;
+  const Grid& grid_;
+  const TetrahedronSplitter& split_;
+  Sets pieces_;                                              ///< of tetrahedra
+  std::vector<std::uint32_t> piece_;                         ///< of each tetrahedron
+  std::vector<std::uint64_t> cell_of_;                       ///< of each piece
+  Sets nodes_{0};                                            ///< of places: corners of pieces
+  std::unordered_map<std::uint32_t, std::uint32_t> holder_;  ///< a place of the piece that holds a lattice vertex
+  std::vector<std::uint32_t> node_;                          ///< of each place
+  std::vector<std::uint32_t> copies_of_;
+};
+
+}  // namespace
+
+DividedLattice divide(const Geometry& lattice, std::span<const Cut> cuts) {
+  require_valid(lattice, "the lattice");
+  require(voxel_count(lattice) < INT32_MAX,
+          "a lattice of " + to_string(lattice.size) + " vertices is too large to cut");
+  const Grid grid(lattice);
+  std::vector<Division> divisions;
+  for (const Cut& cut : cuts) divisions.push_back(divide_by(lattice, grid, cut));
+  TetrahedronSplitter split(lattice.size, with_neighbours(grid, divisions));
+  for (const Division& division : divisions) {
+    split.cut([&](std::uint32_t vertex) { return division.side[vertex]; }, division.nearest,
+              [&](std::uint64_t cell) { return division.is_through(cell); });
+  }
+  return Joiner(lattice, grid, split).result();
+}
+
+VertexField field_of(const Geometry& lattice, const DividedLattice& divided, std::span<const glm::vec3> displacement) {
+  const auto vertices = static_cast<std::size_t>(voxel_count(lattice));
+  const std::size_t nodes = vertices + divided.copies_of.size();
+  require(displacement.size() == nodes, "one displacement a node is expected, " + std::to_string(nodes) + "; found " +
+                                            std::to_string(displacement.size()));
+  const Grid grid(lattice);
+  const AffineMap point = point_from_index(lattice);
+  VertexField field{
+      .lattice = lattice,
+      .displacement = {displacement.begin(), displacement.begin() + static_cast<std::ptrdiff_t>(vertices)},
+      .mesh = {},
+      .replaced = divided.replaced};
+  for (const DividedLattice::Vertex& vertex : divided.vertices) {
+    glm::dvec3 rest(0), moved(0);
+    for (std::size_t n = 0; n < 4; ++n) {
+      if (vertex.weight[n] == 0) continue;
+      const std::uint32_t node = vertex.node[n];
+      const std::uint32_t at = node < vertices ? node : divided.copies_of[node - vertices];
+      rest += vertex.weight[n] * point(glm::dvec3(grid.place_of_vertex(at)));
+      moved += vertex.weight[n] * glm::dvec3(displacement[node]);
+    }
+    field.mesh.rest.push_back(rest);
+    field.mesh.displacement.emplace_back(moved);
+  }
+  field.mesh.tetrahedra = divided.tetrahedra;
+  return field;
+}
+
+}  // namespace tetwarp::simulate

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <unordered_map>
+#include <unordered_set>
+#include <vector>
+
+#include "deform/geometry.h"
+
+namespace tetwarp::simulate {
+
+/// Cells of a lattice as tetrahedra that fit together face by face, split along cuts, one cut after the other.
+///
+/// Where a cut goes through an edge a vertex is put; what shares the edge is split too, also where the cut ends there,
+/// so that nothing is left hanging: no gap opens where vertices are rounded later.
+class TetrahedronSplitter {
+ public:
+  /// A place as a mean of lattice vertices, all of one of the lattice's tetrahedra.
+  struct Vertex {
+    std::array<std::uint32_t, 4> corner{kNone, kNone, kNone, kNone};  ///< lattice vertices, rising
+    std::array<double, 4> weight{};                                   ///< they add up to 1
+
+    double mean(const std::function<double(std::uint32_t)>& of_corner) const;
+    bool is_corner() const { return corner[1] == kNone; }
+  };
+  struct Tetrahedron {
+    std::array<std::uint32_t, 4> vertex;
+    std::uint64_t cell;
+  };
+  using Triangle = std::array<std::uint32_t, 3>;  ///< vertices, rising
+  static constexpr std::uint32_t kNone = UINT32_MAX;
+
+  /// @param cells  numbers on the lattice, rising
+  TetrahedronSplitter(const glm::i64vec3& lattice, std::span<const std::uint64_t> cells);
+
+  /// @param side      of a lattice vertex: the cut lies where it changes its sign
+  /// @param nearest   vertices whose side is nearer to 0 are moved away to there, so that no sliver is cut off
+  /// @param is_through  whether the cut goes through a cell; elsewhere only what touches it is split
+  void cut(const std::function<double(std::uint32_t)>& side, double nearest,
+           const std::function<bool(std::uint64_t)>& is_through);
+
+  const std::vector<Vertex>& vertices() const { return vertices_; }
+  /// Those of a cell lie together, cells rising.
+  const std::vector<Tetrahedron>& tetrahedra() const { return tetrahedra_; }
+  /// Whether a cut separates the two tetrahedra at a face.
+  bool is_severed(const Triangle& face) const { return severed_.contains(face); }
+
+ private:
+  struct Hash {
+    std::size_t operator()(const Triangle& t) const {
+      return (t[0] * 0x9E3779B97F4A7C15u ^ t[1]) * 0xC2B2AE3D27D4EB4Fu ^ t[2] * 0x165667B19E3779F9u;
+    }
+  };
+  /// Triangles that bound a part of a tetrahedron.
+  using Skin = std::vector<Triangle>;
+
+  std::uint32_t on_edge(std::uint32_t a, std::uint32_t b) const;
+  std::uint32_t add_mean(std::span<const std::uint32_t> of, std::span<const double> weights);
+  void mark_edges(const std::function<bool(std::uint64_t)>& is_through);
+  void split(const Tetrahedron& whole, bool is_through, std::vector<Tetrahedron>& result);
+  void split_face(std::uint32_t a, std::uint32_t b, std::uint32_t c, Skin& above, Skin& below);
+  void sever(const Tetrahedron& whole, Skin& above, Skin& below);
+  void fill(const Skin& skin, std::uint64_t cell, std::vector<Tetrahedron>& result);
+
+  std::vector<Vertex> vertices_;
+  std::vector<Tetrahedron> tetrahedra_;
+  std::unordered_set<Triangle, Hash> severed_;
+  std::vector<double> side_;                                   ///< of each vertex, of the cut at hand
+  std::unordered_map<Triangle, std::uint32_t, Hash> on_edge_;  ///< of edges (a, b, 0): the vertex there, likewise
+};
+
+}  // namespace tetwarp::simulate
