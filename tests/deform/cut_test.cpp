@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -278,6 +279,43 @@ TEST(CutLattice, PiecesHaveTheVolumeOfTheirCellsAndNoLinkGoesThroughTheCut) {
     }
   }
   EXPECT_GT(copies, 500u);
+}
+
+TEST(CutLattice, ClosedTetrahedraMeetFaceToFaceOrAtTheBorder) {
+  const std::uint64_t seed = test_seed();
+  std::uint64_t inner = 0;
+  for (std::uint64_t number = 0; number < 30 && !testing::Test::HasFailure(); ++number) {
+    SCOPED_TRACE(seed_text(seed) + ", case " + std::to_string(number));
+    Random random(seed, 9'700'000 + number);
+    const Geometry lattice = unit_grid({random.integer(4, 8), random.integer(4, 8), random.integer(4, 8)});
+    std::vector<Cut> cuts;
+    for (std::int64_t n = random.integer(1, 3); n > 0; --n) cuts.push_back(random_cut(random, lattice));
+    const DividedLattice division = divide(lattice, cuts);
+    const std::vector<glm::vec3> rest(static_cast<std::size_t>(voxel_count(lattice)) + division.copies_of.size());
+    const TetrahedralMesh mesh = mesh_of(field_of(lattice, division, rest));
+    const auto key = [&](std::uint32_t n) { return std::array{mesh.rest[n].x, mesh.rest[n].y, mesh.rest[n].z}; };
+    std::map<std::array<std::array<double, 3>, 3>, int> faces;
+    for (const glm::u32vec4& t : mesh.tetrahedra) {
+      for (int left_out = 0; left_out < 4; ++left_out) {
+        std::array face{key(t[(left_out + 1) % 4]), key(t[(left_out + 2) % 4]), key(t[(left_out + 3) % 4])};
+        std::sort(face.begin(), face.end());
+        ++faces[face];
+      }
+    }
+    const glm::dvec3 last(lattice.size - std::int64_t{1});
+    for (const auto& [face, count] : faces) {
+      bool is_border = false;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        for (const double at : {0.0, last[static_cast<int>(axis)]})
+          is_border |= std::all_of(face.begin(), face.end(),
+                                   [&](const auto& corner) { return std::fabs(corner[axis] - at) < 1e-9; });
+      }
+      inner += !is_border;
+      EXPECT_EQ(count, is_border ? 1 : 2)
+          << face[0][0] << ' ' << face[0][1] << ' ' << face[0][2] << ", " << cuts.size() << " cuts";
+    }
+  }
+  EXPECT_GT(inner, 20000u);
 }
 
 TEST(CutLattice, APlaneBetweenTwoLayersHasCopiesOnBothSidesAndNoLinkBetweenTheVertices) {
