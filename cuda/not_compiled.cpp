@@ -1,5 +1,6 @@
 #include "cuda/devices.h"
 #include "deform/resampler.h"
+#include "deform/simulate/mass_spring.h"
 
 namespace tetwarp {
 
@@ -19,8 +20,18 @@ void wake_cuda_device(int) {}
 
 std::string describe_cuda_device(int) { not_compiled(); }
 
+void copy_from_cuda_device(void*, const void*, std::size_t) { not_compiled(); }
+
 std::unique_ptr<Resampler> make_cuda_resampler(Geometry, int, Limits) { not_compiled(); }
 
 std::unique_ptr<Resampler> make_cuda_pull_resampler(Geometry, int, Limits) { not_compiled(); }
+
+namespace simulate {
+
+std::unique_ptr<Simulation> make_cuda_mass_spring(const Model&, const MassSpringOptions&, int) {
+  throw NotCompiled("CUDA is not in this build; use --backend cpu, the methods agree to rounding");
+}
+
+}  // namespace simulate
 
 }  // namespace tetwarp

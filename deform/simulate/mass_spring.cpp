@@ -1,0 +1,181 @@
+#include "deform/simulate/mass_spring.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "deform/errors.h"
+#include "deform/simulate/spring_engine.h"
+
+namespace tetwarp::simulate {
+
+namespace {
+
+/// A local/global step is worth the next one while it takes this share off the energy.
+constexpr double kWorthwhile = 0.2;
+/// Newton's own matrix is tried below this residual: further off it is indefinite more often than not.
+constexpr double kNearResidual = 0.1;
+/// Of the descent that the slope promises, what a step must bring (Armijo).
+constexpr double kArmijo = 1e-4;
+/// Energies are compared down to this share of themselves; closer, slopes decide.
+constexpr double kEnergyRounding = 1e-11;
+constexpr double kShortest = 1e-6, kLongest = 4;
+
+/// Ordinary steps, and those after which a simulation may count as settled.
+constexpr Effort kUsual{.share = 0.1, .least = 3}, kThorough{.share = 0.05, .least = 50};
+constexpr Effort kFollow{.share = 0.02, .least = 10, .most = 500};
+
+/// Chooses what a step solves.
+class Schedule {
+ public:
+  Stiffness kind(double residual) const {
+    if (is_local_global_) return Stiffness::laplacian;
+    return residual < kNearResidual && wait_ == 0 ? Stiffness::full : Stiffness::projected;
+  }
+  /// The matrix was indefinite: leaves it alone for some steps, more each time.
+  void refuse_full() {
+    pause_ = std::min(2 * pause_ + 1, 7);
+    wait_ = pause_;
+  }
+  void took(Stiffness kind, double before, double after) {
+    if (kind == Stiffness::laplacian && !(before - after > kWorthwhile * std::abs(before))) is_local_global_ = false;
+    if (kind == Stiffness::projected && wait_ > 0) --wait_;
+    if (kind == Stiffness::full) pause_ = 0;
+  }
+
+ private:
+  bool is_local_global_ = true;
+  int wait_ = 0, pause_ = 0;
+};
+
+class MassSpring final : public Simulation {
+ public:
+  MassSpring(const Model& model, std::unique_ptr<SpringEngine> engine) : model_(model), engine_(std::move(engine)) {}
+
+  void set_loads(const Loads& loads) override {
+    const std::vector<Role> found = roles(model_, loads);
+    engine_->set_loads(loads, found);
+    least_force_ = rounding(found);
+    has_loads_ = true;
+  }
+
+  void set_displacement(std::span<const glm::vec3> displacement) override {
+    require_displacement(model_, displacement);
+    engine_->set_displacement(displacement);
+    engine_->show();
+  }
+
+  std::span<const glm::vec3> displacement() const override { return engine_->shown(); }
+  Memory memory() const override { return engine_->memory(); }
+
+  Settled advance(double part, const StoppingRule& rule, const Control& control) override {
+    require(part >= 0 && part <= 1, "a part of the way is " + std::to_string(part) + "; expected 0 to 1");
+    require(rule.steps > 0, "a rule allows " + std::to_string(rule.steps) + " steps; expected 1 or more");
+    if (!has_loads_) return {.reached = true};
+    const Settled settled = settle(part, rule, control);
+    engine_->show();
+    if (control.stop.stop_requested() && !settled.reached) throw Cancelled();
+    if (control.progress) control.progress(1);
+    return settled;
+  }
+
+ private:
+  /// Forces below are rounding, not loads.
+  double rounding(std::span<const Role> found) const {
+    constexpr double kSoftMm = 1e-4, kHardMm = 1e-9;
+    double least = 0, most = 0;
+    for (std::size_t n = 0; n < model_.nodes(); ++n) {
+      if (found[n] != Role::free) continue;
+      double sum = 0;
+      for (int d = 0; d < kDirections; ++d) sum += double{model_.stiffness[model_.link(d, n)]};
+      least = least > 0 ? std::min(least, sum) : sum;
+      most = std::max(most, sum);
+    }
+    return std::max(kSoftMm * least, kHardMm * most);
+  }
+
+  double residual(const Strain& strain) const {
+    const double scale = std::max(strain.placed_force, least_force_);
+    return scale > 0 ? strain.free_force / scale : 0;
+  }
+
+  Settled settle(double part, const StoppingRule& rule, const Control& control) {
+    if (engine_->aim(part) > 0) engine_->follow(kFollow, control.stop);
+    Strain now = engine_->try_step(0);
+    engine_->accept();
+    Settled settled{.residual = residual(now), .reached = now.free_force == 0};
+    Schedule schedule;
+    while (!settled.reached && settled.steps < rule.steps && !control.stop.stop_requested()) {
+      const bool is_near =
+          settled.steps > 0 && settled.motion_mm <= 10 * rule.motion_mm && settled.residual <= 10 * rule.residual;
+      const Effort& effort = is_near ? kThorough : kUsual;
+      Stiffness kind = schedule.kind(settled.residual);
+      Solved solved = engine_->solve(kind, effort, control.stop);
+      if (solved.is_indefinite) {
+        schedule.refuse_full();
+        kind = Stiffness::projected;
+        solved = engine_->solve(kind, effort, control.stop);
+      }
+      if (control.stop.stop_requested()) break;
+      const double before = now.energy, length = step(now, solved, kind);
+      schedule.took(kind, before, now.energy);
+      ++settled.steps;
+      settled.motion_mm = length * solved.longest_mm;
+      settled.residual = residual(now);
+      const bool is_trusted = is_near && kind != Stiffness::laplacian && length >= 1;
+      const bool is_still = now.free_force == 0 || (solved.longest_mm > 0 && length == 0);
+      settled.reached =
+          settled.motion_mm <= rule.motion_mm && settled.residual <= rule.residual && (is_trusted || is_still);
+      if (control.progress) control.progress(static_cast<double>(settled.steps) / rule.steps);
+    }
+    return settled;
+  }
+
+  static bool is_lower(const Strain& from, const Strain& to, double slope, double length) {
+    if (to.energy <= from.energy + kArmijo * length * slope) return true;
+    return -slope * length <= kEnergyRounding * std::abs(from.energy) && std::abs(to.slope) <= std::abs(slope);
+  }
+
+  /// Line search: halves until the energy falls enough; where the matrix is stiffer than the springs, doubles while it
+  /// falls further. @return the part of the direction that was gone, 0 where none lowers the energy
+  double step(Strain& now, const Solved& solved, Stiffness kind) {
+    double length = 1;
+    Strain there = engine_->try_step(length);
+    while (!is_lower(now, there, solved.slope, length)) {
+      length /= 2;
+      if (length < kShortest) return 0;
+      there = engine_->try_step(length);
+    }
+    if (length == 1 && kind == Stiffness::projected) {
+      while (length < kLongest && there.slope < 0) {
+        const Strain further = engine_->try_step(2 * length);
+        if (!(further.energy < there.energy)) {
+          engine_->try_step(length);
+          break;
+        }
+        length *= 2;
+        there = further;
+      }
+    }
+    engine_->accept();
+    now = there;
+    return length;
+  }
+
+  const Model& model_;
+  std::unique_ptr<SpringEngine> engine_;
+  double least_force_ = 0;
+  bool has_loads_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<Simulation> make_mass_spring(const Model& model, std::unique_ptr<SpringEngine> engine) {
+  return std::make_unique<MassSpring>(model, std::move(engine));
+}
+
+std::unique_ptr<Simulation> make_cpu_mass_spring(const Model& model, const MassSpringOptions& options, Limits limits) {
+  require_springs(model);
+  return make_mass_spring(model, make_cpu_springs(model, options, limits));
+}
+
+}  // namespace tetwarp::simulate

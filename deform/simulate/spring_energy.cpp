@@ -1,0 +1,45 @@
+#include "deform/simulate/mass_spring.h"
+#include "deform/simulate/spring_roles.h"
+#include "deform/simulate/spring_step.h"
+
+namespace tetwarp::simulate {
+
+namespace {
+
+/// Calls `work(node, spring, stiffness)` for each spring from each of its ends.
+template <class Work>
+void for_each_spring(const Model& model, std::span<const glm::vec3> displacement, Work&& work) {
+  require_springs(model);
+  require_displacement(model, displacement);
+  for (int d = 0; d < kDirections; ++d) {
+    const glm::dvec3 along = rest_link(model.lattice, d);
+    const RestLink<double> rest{along, std::sqrt(dot3(along, along))};
+    for (std::size_t n = 0; n < model.nodes(); ++n) {
+      const std::size_t link = model.link(d, n);
+      if (model.neighbour[link] < 0) continue;
+      const glm::vec3 &from = displacement[n], &to = displacement[static_cast<std::size_t>(model.neighbour[link])];
+      const glm::dvec3 apart(double{to.x} - from.x, double{to.y} - from.y, double{to.z} - from.z);
+      work(n, stretched(rest, apart), double{model.stiffness[link]});
+    }
+  }
+}
+
+}  // namespace
+
+double energy(const Model& model, std::span<const glm::vec3> displacement) {
+  double sum = 0;
+  for_each_spring(model, displacement, [&](std::size_t, const Stretched<double>& spring, double stiffness) {
+    sum += stiffness / 4 * spring.elongation * spring.elongation;
+  });
+  return sum;
+}
+
+std::vector<glm::dvec3> net_forces(const Model& model, std::span<const glm::vec3> displacement) {
+  std::vector<glm::dvec3> result(model.nodes(), glm::dvec3(0));
+  for_each_spring(model, displacement, [&](std::size_t n, const Stretched<double>& spring, double stiffness) {
+    result[n] += stiffness * spring.elongation * spring.unit;
+  });
+  return result;
+}
+
+}  // namespace tetwarp::simulate

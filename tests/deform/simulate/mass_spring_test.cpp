@@ -1,0 +1,529 @@
+#include "deform/simulate/mass_spring.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <glm/geometric.hpp>
+
+#include "cuda/devices.h"
+#include "tests/support/random.h"
+#include "tests/support/says.h"
+
+namespace tetwarp::simulate {
+namespace {
+
+using test::Random;
+using Solver = MassSpringOptions::Solver;
+
+constexpr StoppingRule kTight{.motion_mm = 1e-7, .residual = 1e-9, .steps = 500};
+
+struct Method {
+  std::string name, cannot_run;
+  std::function<std::unique_ptr<Simulation>(const Model&)> make;
+
+  friend void PrintTo(const Method& method, std::ostream* stream) { *stream << method.name; }
+};
+
+std::vector<Method> methods() {
+  const auto on_cpu = [](Solver solver) {
+    return [solver](const Model& model) { return make_cpu_mass_spring(model, {.solver = solver}, {.threads = 2}); };
+  };
+  const std::string no_cuda =
+      !has_cuda() ? "CUDA is not in this build" : (cuda_device_count() == 0 ? "no CUDA device on this machine" : "");
+  return {
+      {.name = "cholesky", .cannot_run = "", .make = on_cpu(Solver::cholesky)},
+      {.name = "pcg", .cannot_run = "", .make = on_cpu(Solver::pcg)},
+      {.name = "cuda", .cannot_run = no_cuda, .make = [](const Model& model) { return make_cuda_mass_spring(model); }}};
+}
+
+class MassSpring : public testing::TestWithParam<Method> {
+ protected:
+  void SetUp() override {
+    if (!GetParam().cannot_run.empty()) GTEST_SKIP() << GetParam().name << ": " << GetParam().cannot_run;
+  }
+  std::unique_ptr<Simulation> make(const Model& model) const { return GetParam().make(model); }
+};
+
+std::string method_name(const testing::TestParamInfo<Method>& method) { return method.param.name; }
+
+INSTANTIATE_TEST_SUITE_P(Methods, MassSpring, testing::ValuesIn(methods()), method_name);
+
+std::vector<glm::vec3> displacement(const Simulation& simulation) {
+  const std::span<const glm::vec3> shown = simulation.displacement();
+  std::vector<glm::vec3> result(shown.size());
+  if (simulation.memory() == Memory::host) {
+    std::copy(shown.begin(), shown.end(), result.begin());
+  } else {
+    copy_from_cuda_device(result.data(), shown.data(), shown.size_bytes());
+  }
+  return result;
+}
+
+Geometry lattice(const glm::i64vec3& size, const glm::dvec3& spacing = {6, 7, 8}) {
+  return {.size = size, .spacing = spacing, .origin = {3, -4, 5}};
+}
+
+const std::vector<Tissue>& tissues() {
+  static const std::vector<Tissue> all{{.name = "soft", .youngs_modulus_kpa = 10},
+                                       {.name = "bone", .youngs_modulus_kpa = 1e4},
+                                       {.name = "air", .youngs_modulus_kpa = 0.1}};
+  return all;
+}
+
+Model random_model(const Geometry& grid, Random& random, int kinds) {
+  const glm::i64vec3 cells = grid.size - std::int64_t{1};
+  std::vector<std::uint8_t> of_cell(static_cast<std::size_t>(cells.x * cells.y * cells.z));
+  for (std::uint8_t& tissue : of_cell) tissue = static_cast<std::uint8_t>(random.integer(0, kinds - 1));
+  return make_model(grid, of_cell, tissues());
+}
+
+glm::i64vec3 place_of(const Model& model, std::size_t node) {
+  const glm::i64vec3& size = model.lattice.size;
+  const auto v = static_cast<std::int64_t>(model.vertex[node]);
+  return {v % size.x, v / size.x % size.y, v / (size.x * size.y)};
+}
+
+glm::dvec3 rest_of(const Model& model, std::size_t node) {
+  return point_from_index(model.lattice)(glm::dvec3(place_of(model, node)));
+}
+
+/// All nodes free.
+Loads free_loads(const Model& model) {
+  return {.hold = std::vector<Hold>(model.nodes(), Hold::free),
+          .goal = std::vector<glm::vec3>(model.nodes(), glm::vec3(0)),
+          .force = {}};
+}
+
+void place(Loads& loads, std::size_t node, const glm::dvec3& goal) {
+  loads.hold[node] = Hold::placed;
+  loads.goal[node] = {static_cast<float>(goal.x), static_cast<float>(goal.y), static_cast<float>(goal.z)};
+}
+
+/// The bottom layer held, a part of the top layer moved.
+Loads pressed(const Model& model, const glm::dvec3& motion) {
+  Loads loads = free_loads(model);
+  const glm::i64vec3& size = model.lattice.size;
+  for (std::size_t n = 0; n < model.nodes(); ++n) {
+    const glm::i64vec3 at = place_of(model, n);
+    if (at.z == 0) place(loads, n, glm::dvec3(0));
+    if (at.z == size.z - 1 && at.x < (size.x + 1) / 2) place(loads, n, motion);
+  }
+  return loads;
+}
+
+double furthest(const std::vector<glm::vec3>& a, const std::function<glm::dvec3(std::size_t)>& b) {
+  double most = 0;
+  for (std::size_t n = 0; n < a.size(); ++n) {
+    const glm::dvec3 expected = b(n);
+    const double apart =
+        std::hypot(double{a[n].x} - expected.x, double{a[n].y} - expected.y, double{a[n].z} - expected.z);
+    if (!(apart <= most)) most = apart;  // NaN stays
+  }
+  return most;
+}
+
+double furthest(const std::vector<glm::vec3>& a, const std::vector<glm::vec3>& b) {
+  return furthest(a, [&](std::size_t n) { return glm::dvec3(double{b[n].x}, double{b[n].y}, double{b[n].z}); });
+}
+
+/// The equilibrium by Newton's method with a dense matrix, from the energy's definition: k/2 (|x_a - x_b| - r)^2.
+/// @param part  of the loads
+void improve(const Model& model, const Loads& loads, double part, std::vector<glm::dvec3>& u) {
+  const std::size_t nodes = model.nodes();
+  std::vector<glm::dvec3> rest(nodes);
+  for (std::size_t n = 0; n < nodes; ++n) rest[n] = rest_of(model, n);
+  for (std::size_t n = 0; n < nodes; ++n) {
+    if (loads.hold[n] == Hold::placed) u[n] = part * glm::dvec3(loads.goal[n].x, loads.goal[n].y, loads.goal[n].z);
+  }
+  for (int step = 0; step < 60; ++step) {
+    const auto rows = static_cast<Eigen::Index>(3 * nodes);
+    Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(rows, rows);
+    Eigen::VectorXd force = Eigen::VectorXd::Zero(rows);
+    for (int d = 0; d < kDirections; ++d) {
+      for (std::size_t a = 0; a < nodes; ++a) {
+        const std::size_t link = model.link(d, a);
+        if (model.neighbour[link] < 0) continue;
+        const auto b = static_cast<std::size_t>(model.neighbour[link]);
+        const glm::dvec3 apart = (rest[b] + u[b]) - (rest[a] + u[a]), at_rest = rest[b] - rest[a];
+        const Eigen::Vector3d x(apart.x, apart.y, apart.z);
+        const double r = std::sqrt(at_rest.x * at_rest.x + at_rest.y * at_rest.y + at_rest.z * at_rest.z);
+        const double k = model.stiffness[link], length = x.norm();
+        const Eigen::Matrix3d block =
+            k * (1 - r / length) * Eigen::Matrix3d::Identity() + k * r / (length * length * length) * x * x.transpose();
+        const auto ra = static_cast<Eigen::Index>(3 * a), rb = static_cast<Eigen::Index>(3 * b);
+        matrix.block<3, 3>(ra, ra) += block;
+        matrix.block<3, 3>(ra, rb) -= block;
+        force.segment<3>(ra) += k * (1 - r / length) * x;
+      }
+    }
+    for (std::size_t n = 0; n < nodes; ++n) {
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto row = static_cast<Eigen::Index>(3 * n) + axis;
+        if (!loads.force.empty()) force(row) += part * double{loads.force[n][axis]};
+        if (loads.hold[n] == Hold::free && matrix(row, row) != 0) continue;
+        matrix.row(row).setZero();
+        matrix.col(row).setZero();
+        matrix(row, row) = 1;
+        force(row) = 0;
+      }
+    }
+    const Eigen::VectorXd motion = matrix.fullPivLu().solve(force);
+    for (std::size_t n = 0; n < nodes; ++n) {
+      const auto row = static_cast<Eigen::Index>(3 * n);
+      u[n] += glm::dvec3(motion(row), motion(row + 1), motion(row + 2));
+    }
+    if (motion.norm() < 1e-11) return;
+  }
+  ADD_FAILURE() << "the dense solve did not converge";
+}
+
+/// From rest, in small steps of the loads.
+std::vector<glm::dvec3> dense_equilibrium(const Model& model, const Loads& loads) {
+  std::vector<glm::dvec3> u(model.nodes(), glm::dvec3(0));
+  for (const double part : {0.25, 0.5, 0.75, 1.0}) improve(model, loads, part, u);
+  return u;
+}
+
+TEST_P(MassSpring, WithoutLoadNothingMovesAtAll) {
+  Random random(test::test_seed());
+  SCOPED_TRACE(test::seed_text(test::test_seed()));
+  const Model model = random_model(lattice({6, 5, 7}), random, 3);
+  Loads loads = free_loads(model);
+  for (std::size_t n = 0; n < 30; ++n) place(loads, n, glm::dvec3(0));
+  const auto simulation = make(model);
+  simulation->set_loads(loads);
+  const Settled settled = simulation->advance(1, {});
+  EXPECT_TRUE(settled.reached);
+  EXPECT_EQ(settled.residual, 0);
+  for (const glm::vec3& u : displacement(*simulation)) EXPECT_EQ(u, glm::vec3(0));
+}
+
+TEST_P(MassSpring, RigidMotionOfHandlesIsRigidMotionOfAllNodes) {
+  const std::uint64_t seed = test::test_seed();
+  SCOPED_TRACE(test::seed_text(seed));
+  for (const bool turns : {false, true}) {
+    for (const int kinds : {1, 3}) {
+      Random random(seed, static_cast<std::uint64_t>(kinds));
+      const Model model = random_model(lattice({7, 8, 6}), random, kinds);
+      const double angle = turns ? std::acos(-1.0) / 6 : 0;
+      const glm::dvec3 about(10, 20, 30), shift(12.5, -3, 40);
+      const auto moved = [&](std::size_t n) {
+        const glm::dvec3 p = rest_of(model, n), d = p - about;
+        const glm::dvec3 turned(std::cos(angle) * d.x - std::sin(angle) * d.y,
+                                std::sin(angle) * d.x + std::cos(angle) * d.y, d.z);
+        return about + turned + shift - p;
+      };
+      Loads loads = free_loads(model);
+      for (std::size_t n = 0; n < model.nodes(); ++n) {
+        if (place_of(model, n).z == 0 || random.chance(0.1)) place(loads, n, moved(n));
+      }
+      const auto simulation = make(model);
+      simulation->set_loads(loads);
+      const Settled settled = simulation->advance(1, {});
+      EXPECT_TRUE(settled.reached) << settled.steps << " steps, " << settled.motion_mm << ", " << settled.residual;
+      EXPECT_LT(furthest(displacement(*simulation), moved), 1e-4) << kinds << " tissues, turns: " << turns;
+    }
+  }
+}
+
+TEST_P(MassSpring, EquilibriumIsThatOfADenseSolve) {
+  const std::uint64_t seed = test::test_seed();
+  for (std::uint64_t number = 0; number < test::test_cases(6); ++number) {
+    SCOPED_TRACE(test::seed_text(seed) + ", case " + std::to_string(number));
+    Random random(seed, 100 + number);
+    const int kinds = number % 2 == 0 ? 1 : 2;
+    const Model model =
+        random_model(lattice({random.integer(3, 5), random.integer(2, 4), random.integer(3, 5)}), random, kinds);
+    Loads loads = pressed(model, glm::dvec3(random.real(-1, 1), random.real(-1, 1), random.real(-1, 2)));
+    loads.force.assign(model.nodes(), glm::vec3(0));
+    loads.force.back() = {0.01f, 0.02f, -0.015f};
+    const auto simulation = make(model);
+    simulation->set_loads(loads);
+    const Settled settled = simulation->advance(1, kTight);
+    EXPECT_TRUE(settled.reached) << settled.steps << " steps, " << settled.motion_mm << ", " << settled.residual;
+    const std::vector<glm::vec3> found = displacement(*simulation);
+    const std::vector<glm::dvec3> expected = dense_equilibrium(model, loads);
+    EXPECT_LT(furthest(found, [&](std::size_t n) { return expected[n]; }), 2e-6);
+    double most = 0;
+    for (const glm::dvec3& u : expected) most = std::max(most, glm::length(u));
+    EXPECT_GT(most, 0.05);
+  }
+}
+
+TEST_P(MassSpring, TheUsualRuleEndsCloseToTheEquilibrium) {
+  Random random(test::test_seed(), 3);
+  SCOPED_TRACE(test::seed_text(test::test_seed()));
+  const Model model = random_model(lattice({6, 5, 6}), random, 2);
+  const Loads loads = pressed(model, {1, -0.5, -3});
+  const auto usual = make(model), tight = make(model);
+  usual->set_loads(loads);
+  tight->set_loads(loads);
+  EXPECT_TRUE(usual->advance(1, {}).reached);
+  EXPECT_TRUE(tight->advance(1, kTight).reached);
+  EXPECT_LT(furthest(displacement(*usual), displacement(*tight)), 0.01);
+}
+
+TEST_P(MassSpring, EnergyFallsInEveryStep) {
+  Random random(test::test_seed(), 4);
+  SCOPED_TRACE(test::seed_text(test::test_seed()));
+  const Model model = random_model(lattice({8, 7, 9}), random, 3);
+  const auto simulation = make(model);
+  simulation->set_loads(pressed(model, {6, 0, -15}));
+  double before = INFINITY;
+  int falls = 0;
+  for (int step = 0; step < 40; ++step) {
+    simulation->advance(1, {.motion_mm = 1e-6, .residual = 1e-8, .steps = 1});
+    const double now = energy(model, displacement(*simulation));
+    EXPECT_LE(now, before * (1 + 1e-6)) << "step " << step;  // displacements are shown in float
+    falls += now < before * (1 - 1e-6);
+    before = now;
+  }
+  EXPECT_GT(falls, 3);
+  EXPECT_GT(before, 0);
+}
+
+/// A bar whose ends are drawn apart while its sides are free to shrink. Nodes of its ends slide on rollers in effect:
+/// the bar is long, and the stress is taken in the middle.
+TEST_P(MassSpring, StretchedBarHasTheStressOfYoungsModulus) {
+  const Geometry grid = lattice({7, 7, 31}, glm::dvec3(4));
+  const std::vector<std::uint8_t> soft(6 * 6 * 30, 0);
+  const Model model = make_model(grid, soft, tissues());
+  Loads loads = free_loads(model);
+  for (std::size_t n = 0; n < model.nodes(); ++n) {
+    const std::int64_t z = place_of(model, n).z;
+    if (z == 0) place(loads, n, glm::dvec3(0));
+    if (z == 30) place(loads, n, {0, 0, 1.2});  // 1 %
+  }
+  const auto simulation = make(model);
+  simulation->set_loads(loads);
+  EXPECT_TRUE(simulation->advance(1, kTight).reached);
+  const std::vector<glm::vec3> u = displacement(*simulation);
+  double pull = 0;
+  const std::vector<glm::dvec3> force = net_forces(model, u);
+  for (std::size_t n = 0; n < model.nodes(); ++n) {
+    if (place_of(model, n).z == 30) pull -= force[n].z;
+  }
+  const auto node = [](int x, int y, int z) { return static_cast<std::size_t>(x + 7 * (y + 7 * z)); };
+  const double strain = (double{u[node(3, 3, 20)].z} - double{u[node(3, 3, 10)].z}) / 40;
+  const double shrink = (double{u[node(6, 3, 15)].x} - double{u[node(0, 3, 15)].x}) / 24;
+  EXPECT_NEAR(pull / (24 * 24) / strain, 0.01, 0.01 * 0.04);  // N/mm2, Young's modulus
+  EXPECT_NEAR(-shrink / strain, 0.25, 0.01);                  // Poisson's ratio
+}
+
+TEST_P(MassSpring, ReactionsOfALoadedLatticeBearTheLoad) {
+  Random random(test::test_seed(), 5);
+  SCOPED_TRACE(test::seed_text(test::test_seed()));
+  const Model model = random_model(lattice({5, 6, 5}), random, 2);
+  Loads loads = free_loads(model);
+  loads.force.assign(model.nodes(), glm::vec3(0));
+  glm::dvec3 load(0), reaction(0);
+  for (std::size_t n = 0; n < model.nodes(); ++n) {
+    const bool is_bottom = place_of(model, n).z == 0;
+    if (is_bottom) place(loads, n, glm::dvec3(0));
+    loads.force[n] = {1e-3f, -2e-3f, static_cast<float>(random.real(0, 3e-3))};
+    if (is_bottom) continue;  // forces on placed nodes do nothing
+    for (int axis = 0; axis < 3; ++axis) load[axis] += double{loads.force[n][axis]};
+  }
+  const auto simulation = make(model);
+  simulation->set_loads(loads);
+  for (const double part : {0.5, 1.0}) {
+    EXPECT_TRUE(simulation->advance(part, kTight).reached);
+    const std::vector<glm::dvec3> force = net_forces(model, displacement(*simulation));
+    reaction = glm::dvec3(0);
+    for (std::size_t n = 0; n < model.nodes(); ++n) {
+      if (loads.hold[n] == Hold::placed) reaction += force[n];
+    }
+    for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(reaction[axis], part * load[axis], 1e-3 * glm::length(load));
+  }
+}
+
+TEST_P(MassSpring, NodesThatNothingTiesStayWhereTheyAre) {
+  const Geometry grid = lattice({3, 3, 3});
+  std::vector<std::uint32_t> copies{13};  // a second node at the middle, without any link
+  const Model model = make_model(grid, std::vector<std::uint8_t>(8, 0), tissues(), copies);
+  ASSERT_EQ(model.nodes(), 28u);
+  const auto simulation = make(model);
+  simulation->set_loads(pressed(model, {2, 0, 1}));
+  const Settled settled = simulation->advance(1, {});
+  EXPECT_TRUE(settled.reached);
+  EXPECT_GT(settled.steps, 0);
+  EXPECT_EQ(displacement(*simulation)[27], glm::vec3(0));
+}
+
+/// The cells of a lattice of 3 x 3 x 3 vertices above the middle layer get a middle layer of their own.
+Model cut_model() {
+  std::vector<std::uint32_t> copies;
+  for (std::uint32_t v = 9; v < 18; ++v) copies.push_back(v);
+  std::vector<CellPiece> pieces;
+  for (std::uint64_t cell = 4; cell < 8; ++cell) {
+    CellPiece piece{.cell = cell, .node = {}, .volume = 1};
+    for (std::uint32_t c = 0; c < 8; ++c) {
+      const std::uint32_t x = (cell & 1) + (c & 1), y = (cell >> 1 & 1) + (c >> 1 & 1), z = 1 + (c >> 2);
+      piece.node[c] = z == 1 ? 27 + x + 3 * y : x + 3 * y + 9 * z;
+    }
+    pieces.push_back(piece);
+  }
+  return make_model(lattice({3, 3, 3}), std::vector<std::uint8_t>(8, 0), tissues(), copies, pieces);
+}
+
+TEST_P(MassSpring, NothingPullsAcrossACut) {
+  const Model model = cut_model();
+  Loads loads = free_loads(model);
+  for (std::size_t n = 0; n < 9; ++n) place(loads, n, glm::dvec3(0));
+  for (std::size_t n = 18; n < 27; ++n) place(loads, n, {0.5 * static_cast<double>(n % 3), 1, 9});
+  const auto simulation = make(model);
+  simulation->set_loads(loads);
+  EXPECT_TRUE(simulation->advance(1, kTight).reached);
+  const std::vector<glm::vec3> found = displacement(*simulation);
+  for (std::size_t n = 9; n < 18; ++n) EXPECT_EQ(found[n], glm::vec3(0));
+  for (std::size_t n = 27; n < 36; ++n) EXPECT_GT(found[n].z, 8);  // goes with its own side
+  const std::vector<glm::dvec3> expected = dense_equilibrium(model, loads);
+  EXPECT_LT(furthest(found, [&](std::size_t n) { return expected[n]; }), 2e-6);
+}
+
+TEST_P(MassSpring, PartsOfTheWayLeadToTheSameEnd) {
+  Random random(test::test_seed(), 7);
+  SCOPED_TRACE(test::seed_text(test::test_seed()));
+  const Model model = random_model(lattice({5, 6, 7}), random, 1);
+  const Loads loads = pressed(model, {2, 1, -4});
+  const auto at_once = make(model), bit_by_bit = make(model);
+  at_once->set_loads(loads);
+  bit_by_bit->set_loads(loads);
+  EXPECT_TRUE(at_once->advance(1, kTight).reached);
+  for (const double part : {0.25, 0.5, 1.0}) {
+    EXPECT_TRUE(bit_by_bit->advance(part, kTight).reached);
+    const std::size_t handle = model.nodes() - 5;  // x = 0, y and z last
+    EXPECT_EQ(displacement(*bit_by_bit)[handle], static_cast<float>(part) * glm::vec3(2, 1, -4));
+  }
+  EXPECT_LT(furthest(displacement(*at_once), displacement(*bit_by_bit)), 2e-6);
+}
+
+TEST_P(MassSpring, RunsAgainGiveTheSameBits) {
+  Random random(test::test_seed(), 8);
+  SCOPED_TRACE(test::seed_text(test::test_seed()));
+  const Model model = random_model(lattice({14, 13, 12}), random, 2);
+  const auto run = [&] {
+    const auto simulation = make(model);
+    simulation->set_loads(pressed(model, {3, 2, -6}));
+    simulation->advance(1, {.steps = 12});
+    return displacement(*simulation);
+  };
+  EXPECT_EQ(run(), run());
+}
+
+TEST_P(MassSpring, GivenDisplacementsAreTheStart) {
+  const Model model = make_model(lattice({3, 3, 4}), std::vector<std::uint8_t>(12, 0), tissues());
+  const auto simulation = make(model);
+  std::vector<glm::vec3> start(model.nodes(), glm::vec3(1, 2, 3));
+  simulation->set_displacement(start);
+  EXPECT_EQ(displacement(*simulation), start);
+  Loads loads = free_loads(model);
+  for (std::size_t n = 0; n < 9; ++n) place(loads, n, {1, 2, 3});
+  simulation->set_loads(loads);
+  EXPECT_TRUE(simulation->advance(1, {}).reached);
+  EXPECT_EQ(displacement(*simulation), start);
+  for (std::size_t n = 0; n < 9; ++n) place(loads, n, {0, 0, 0});
+  simulation->set_loads(loads);
+  EXPECT_TRUE(simulation->advance(0.5, {}).reached);
+  EXPECT_LT(furthest(displacement(*simulation), std::vector<glm::vec3>(model.nodes(), {0.5f, 1, 1.5f})), 1e-4);
+}
+
+TEST_P(MassSpring, AStopEndsIt) {
+  const Model model = make_model(lattice({9, 9, 9}), std::vector<std::uint8_t>(512, 0), tissues());
+  const auto simulation = make(model);
+  simulation->set_loads(pressed(model, {0, 0, -10}));
+  std::stop_source stop;
+  Control control{.progress = [&](double) { stop.request_stop(); }, .stop = stop.get_token()};
+  EXPECT_THROW(simulation->advance(1, kTight, control), Cancelled);
+  for (const glm::vec3& u : displacement(*simulation)) EXPECT_TRUE(std::isfinite(u.x + u.y + u.z));
+  EXPECT_TRUE(simulation->advance(1, {}).reached);
+}
+
+TEST_P(MassSpring, LoadsThatDoNotFitAreRefused) {
+  const Model model = make_model(lattice({3, 3, 3}), std::vector<std::uint8_t>(8, 0), tissues());
+  const auto simulation = make(model);
+  const auto refused = [&](const std::function<void(Loads&)>& change) {
+    Loads loads = pressed(model, {1, 0, 0});
+    change(loads);
+    try {
+      simulation->set_loads(loads);
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(refused([](Loads&) {}), "");
+  EXPECT_TRUE(says(refused([](Loads& loads) { loads.hold.pop_back(); }), {"one hold a node", "27", "found 26"}));
+  EXPECT_TRUE(says(refused([](Loads& loads) { loads.goal.pop_back(); }), {"one goal a node", "27", "found 26"}));
+  EXPECT_TRUE(says(refused([](Loads& loads) { loads.force.resize(3); }), {"one force a node", "27", "found 3"}));
+  EXPECT_TRUE(says(refused([](Loads& loads) { loads.goal[2].y = NAN; }), {"goal of node 2", "nan"}));
+  EXPECT_TRUE(says(refused([](Loads& loads) { loads.goal[2].y = 2e6f; }), {"goal of node 2", "2000000", "at most"}));
+  EXPECT_TRUE(says(refused([](Loads& loads) {
+                     loads.force.assign(27, glm::vec3(0));
+                     loads.force[13].z = INFINITY;
+                   }),
+                   {"force of node 13", "inf"}));
+  EXPECT_TRUE(says(refused([](Loads& loads) {
+                     loads.hold.assign(27, Hold::free);
+                     loads.force.assign(27, glm::vec3(0));
+                     loads.force[4].x = 1;
+                   }),
+                   {"force on node 4", "no placed node"}));
+  EXPECT_EQ(refused([](Loads& loads) { loads.hold.assign(27, Hold::free); }), "");
+  EXPECT_TRUE(simulation->advance(1, {}).reached);
+  EXPECT_EQ(displacement(*simulation), std::vector<glm::vec3>(27, glm::vec3(0)));
+  EXPECT_THROW(simulation->advance(1.5, {}), InputError);
+  EXPECT_THROW(simulation->advance(1, {.steps = 0}), InputError);
+  EXPECT_THROW(simulation->set_displacement(std::vector<glm::vec3>(26)), InputError);
+  Model broken = model;
+  broken.stiffness.pop_back();
+  EXPECT_THROW(make(broken), InputError);
+}
+
+TEST(MassSpringOnCpu, ResultIsIndependentOfThreadCount) {
+  Random random(test::test_seed(), 9);
+  SCOPED_TRACE(test::seed_text(test::test_seed()));
+  const Model model = random_model(lattice({17, 16, 15}), random, 3);  // several blocks
+  std::vector<glm::vec3> first;
+  for (const int threads : {1, 2, 5}) {
+    const auto simulation = make_cpu_mass_spring(model, {.solver = Solver::pcg}, {.threads = threads});
+    simulation->set_loads(pressed(model, {3, 2, -9}));
+    simulation->advance(1, {.steps = 8});
+    if (first.empty()) first = displacement(*simulation);
+    EXPECT_EQ(displacement(*simulation), first) << threads << " threads";
+  }
+}
+
+TEST(MassSpringOnCpu, CholeskyAndConjugateGradientsAgree) {
+  Random random(test::test_seed(), 10);
+  SCOPED_TRACE(test::seed_text(test::test_seed()));
+  const Model model = random_model(lattice({12, 11, 13}), random, 1);
+  std::vector<glm::vec3> of[2];
+  for (const int n : {0, 1}) {
+    const auto simulation = make_cpu_mass_spring(model, {.solver = n == 0 ? Solver::cholesky : Solver::pcg});
+    simulation->set_loads(pressed(model, {4, -3, -8}));
+    EXPECT_TRUE(simulation->advance(1, kTight).reached);
+    of[n] = displacement(*simulation);
+  }
+  EXPECT_LT(furthest(of[0], of[1]), 1e-5);
+}
+
+TEST(MassSpringEnergy, IsThatOfOneStretchedSpring) {
+  Model model = make_model(lattice({2, 2, 2}), std::vector<std::uint8_t>(1, 0), tissues());
+  std::fill(model.stiffness.begin(), model.stiffness.end(), 0.0f);
+  model.stiffness[model.link(direction_up(0), 0)] = model.stiffness[model.link(opposite(direction_up(0)), 1)] = 3;
+  std::vector<glm::vec3> u(8, glm::vec3(0));
+  u[1] = {2, 0, 0};
+  EXPECT_NEAR(energy(model, u), 6, 1e-12);
+  EXPECT_NEAR(net_forces(model, u)[0].x, 6, 1e-12);
+  EXPECT_NEAR(net_forces(model, u)[1].x, -6, 1e-12);
+  u[1] = {-6, 8, 0};  // upright, 8 mm long
+  EXPECT_NEAR(energy(model, u), 6, 1e-12);
+  EXPECT_NEAR(net_forces(model, u)[0].y, 6, 1e-12);
+}
+
+}  // namespace
+}  // namespace tetwarp::simulate
