@@ -1,0 +1,64 @@
+#pragma once
+
+// Private to io/: values of a JSON document that is checked while it is read.
+#include <initializer_list>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "deform/core/host_device.h"
+#include "io/json_tree.h"
+
+namespace tetwarp {
+
+/// Numbers that are taken: from `low` to `high`, `low` itself only where it is not `above`.
+struct NumberRange {
+  double low, high;
+  bool above = false;
+
+  bool contains(double value) const { return value <= high && (above ? value > low : value >= low); }
+  std::string text() const;  ///< "from 0 to 1", "above 0, to 1e+06"
+};
+
+/// A value, what it is called ("move[1].handle.radius_mm") and where it stands. Refers to tree and file name.
+///
+/// Every function throws InputError, "FILE:LINE: NAME is FOUND; EXPECTED is expected", for a value that is not of its
+/// kind.
+class JsonEntry {
+ public:
+  JsonEntry(const JsonTree& tree, std::string path, const std::string& file)
+      : tree_(&tree), file_(&file), path_(std::move(path)) {}
+
+  /// "FILE:LINE: NAME WHAT"
+  [[noreturn]] void refuse(const std::string& what) const;
+  const std::string& path() const { return path_; }
+  std::size_t line() const { return tree_->line; }
+  bool is(JsonTree::Kind kind) const { return tree_->kind == kind; }
+
+  double number(const NumberRange& range) const;
+  std::int64_t whole_number(std::int64_t low, std::int64_t high) const;
+  bool truth() const;
+  /// Not empty, and at most 200 bytes.
+  const std::string& text() const;
+  /// Three numbers.
+  glm::dvec3 vector(const NumberRange& range) const;
+  /// Three numbers, not all 0.
+  glm::dvec3 direction() const;
+  std::vector<JsonEntry> items(std::size_t fewest, std::size_t most) const;
+
+  /// Refuses keys that are not in the list. @param known  of an object
+  void only(std::span<const char* const> known) const;
+  bool has(const char* key) const;
+  JsonEntry at(const char* key) const;
+  /// The key of a list of which an object has one and no second. @return its number in the list
+  std::size_t one_of(std::span<const char* const> keys) const;
+
+ private:
+  void expect(JsonTree::Kind kind, const std::string& expected) const;
+
+  const JsonTree* tree_;
+  const std::string* file_;
+  std::string path_;
+};
+
+}  // namespace tetwarp

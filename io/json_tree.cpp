@@ -1,0 +1,157 @@
+#include "io/json_tree.h"
+
+#include <algorithm>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <tuple>
+
+#include "deform/errors.h"
+
+namespace tetwarp {
+
+namespace {
+
+constexpr std::size_t kDeepest = 64, kLongestQuote = 120;
+
+/// Lines up to the byte that was taken last, and up to the one before it.
+struct LineCount {
+  std::size_t line = 1, before = 1;
+};
+
+/// Bytes for nlohmann's lexer, which says nothing of lines: they are counted as it takes them.
+class CountingIterator {
+ public:
+  using iterator_category = std::input_iterator_tag;
+  using value_type = char;
+  using difference_type = std::ptrdiff_t;
+  using pointer = const char*;
+  using reference = const char&;
+
+  CountingIterator(const char* at, LineCount* count) : at_(at), count_(count) {}
+
+  reference operator*() const { return *at_; }
+  CountingIterator& operator++() {
+    count_->before = count_->line;
+    if (*at_++ == '\n') ++count_->line;
+    return *this;
+  }
+  CountingIterator operator++(int) {
+    CountingIterator old = *this;
+    ++*this;
+    return old;
+  }
+  bool operator==(const CountingIterator& other) const { return at_ == other.at_; }
+  bool operator!=(const CountingIterator& other) const { return at_ != other.at_; }
+
+ private:
+  const char* at_;
+  LineCount* count_;
+};
+
+/// Builds the tree of what nlohmann's parser finds.
+class Builder final : public nlohmann::json_sax<nlohmann::json> {
+ public:
+  Builder(const std::string& name, const LineCount& count) : name_(name), count_(count) {}
+
+  bool null() override { return add({.kind = JsonTree::Kind::null, .line = count_.line}); }
+  bool boolean(bool value) override {
+    return add({.kind = JsonTree::Kind::boolean, .line = count_.line, .truth = value});
+  }
+  bool number_integer(number_integer_t value) override { return add_number(static_cast<double>(value)); }
+  bool number_unsigned(number_unsigned_t value) override { return add_number(static_cast<double>(value)); }
+  bool number_float(number_float_t value, const string_t&) override { return add_number(value); }
+  bool string(string_t& value) override {
+    return add({.kind = JsonTree::Kind::text, .line = count_.line, .text = std::move(value)});
+  }
+  bool binary(binary_t&) override { return false; }  // not in text
+  bool start_object(std::size_t) override { return open(JsonTree::Kind::object); }
+  bool start_array(std::size_t) override { return open(JsonTree::Kind::list); }
+  bool end_object() override {
+    require_different_keys(open_.back().members);
+    return close();
+  }
+  bool end_array() override { return close(); }
+
+  bool key(string_t& value) override {
+    open_.back().members.push_back({std::move(value), count_.line, {}});
+    return true;
+  }
+
+  bool parse_error(std::size_t, const std::string& token, const nlohmann::detail::exception& error) override {
+    const std::string where = name_ + ":" + std::to_string(count_.before) + ": ";
+    if (error.id == 406) throw InputError(where + "the number " + printable(token) + " is too large");
+    std::string what = error.what();  // "[json...] parse error at line 3, column 5: syntax error while ..."
+    if (const auto begin = what.find(": "); begin != std::string::npos) what.erase(0, begin + 2);
+    throw InputError(where + "no JSON: " + printable(what));
+  }
+
+  JsonTree take() { return std::move(root_); }
+
+ private:
+  /// A number's end is known by the byte behind it, which has been taken.
+  bool add_number(double value) {
+    return add({.kind = JsonTree::Kind::number, .line = count_.before, .number = value});
+  }
+  bool add(JsonTree value) {
+    if (open_.empty()) {
+      root_ = std::move(value);
+    } else if (open_.back().kind == JsonTree::Kind::list) {
+      open_.back().items.push_back(std::move(value));
+    } else {
+      open_.back().members.back().value = std::move(value);
+    }
+    return true;
+  }
+  bool open(JsonTree::Kind kind) {
+    require(open_.size() < kDeepest, name_ + ":" + std::to_string(count_.line) + ": lists and objects lie more than " +
+                                         std::to_string(kDeepest) + " deep in each other");
+    open_.push_back({.kind = kind, .line = count_.line});
+    return true;
+  }
+  void require_different_keys(const std::vector<JsonTree::Member>& members) const {
+    std::vector<const JsonTree::Member*> sorted;
+    for (const JsonTree::Member& member : members) sorted.push_back(&member);
+    std::sort(sorted.begin(), sorted.end(),
+              [](const auto* a, const auto* b) { return std::tie(a->key, a->line) < std::tie(b->key, b->line); });
+    const auto twice =
+        std::adjacent_find(sorted.begin(), sorted.end(), [](const auto* a, const auto* b) { return a->key == b->key; });
+    if (twice == sorted.end()) return;
+    throw InputError(name_ + ":" + std::to_string(twice[1]->line) + ": the key \"" + printable(twice[1]->key) +
+                     "\" a second time; the first is in line " + std::to_string(twice[0]->line));
+  }
+  bool close() {
+    JsonTree value = std::move(open_.back());
+    open_.pop_back();
+    return add(std::move(value));
+  }
+
+  const std::string& name_;
+  const LineCount& count_;
+  std::vector<JsonTree> open_;
+  JsonTree root_;
+};
+
+}  // namespace
+
+const char* name_of(JsonTree::Kind kind) {
+  constexpr const char* kNames[] = {"null", "true or false", "a number", "a text", "a list", "an object"};
+  return kNames[static_cast<int>(kind)];
+}
+
+std::string printable(std::string_view text) {
+  std::string result(text.substr(0, kLongestQuote));
+  for (char& c : result) {
+    if (c < ' ' || c > '~') c = '?';
+  }
+  return text.size() > kLongestQuote ? result + "..." : result;
+}
+
+JsonTree parse_json(std::string_view bytes, const std::string& name) {
+  LineCount count;
+  Builder builder(name, count);
+  const char* const begin = bytes.data();
+  nlohmann::json::sax_parse(CountingIterator(begin, &count), CountingIterator(begin + bytes.size(), &count), &builder);
+  return builder.take();
+}
+
+}  // namespace tetwarp

@@ -1,0 +1,44 @@
+#pragma once
+
+// Private to io/: JSON that people write, with the line of each part.
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace tetwarp {
+
+/// A value of a JSON document and where it stands.
+struct JsonTree {
+  enum class Kind { null, boolean, number, text, list, object };
+  struct Member;
+
+  Kind kind = Kind::null;
+  std::size_t line = 0;  ///< where it begins, from 1
+  bool truth = false;
+  double number = 0;      ///< finite
+  std::string text = {};  ///< UTF-8
+  std::vector<JsonTree> items = {};
+  std::vector<Member> members = {};  ///< as they stand; no key twice
+};
+
+struct JsonTree::Member {
+  std::string key;
+  std::size_t line = 0;  ///< of the key
+  JsonTree value;
+};
+
+/// "a number", "a list" and so on.
+const char* name_of(JsonTree::Kind kind);
+
+/// What stands in quotes in messages: printable ASCII, other bytes as '?', cut short where it is long.
+std::string printable(std::string_view text);
+
+/// Parses a document.
+/// @param name  of the file: messages begin with "NAME:LINE: "
+/// @throws InputError for what is not JSON, a key that an object has twice, a number beyond doubles, or lists and
+/// objects that lie more than 64 deep in each other
+JsonTree parse_json(std::string_view bytes, const std::string& name);
+
+}  // namespace tetwarp

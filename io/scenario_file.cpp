@@ -1,0 +1,211 @@
+#include "io/scenario_file.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+
+#include "deform/errors.h"
+#include "io/scenario_parts.h"
+
+namespace tetwarp {
+
+namespace {
+
+using namespace simulate;
+
+constexpr std::size_t kLargestFile = std::size_t{1} << 20;
+constexpr std::size_t kMostEntries = 1000, kMostTissues = 255;
+constexpr std::int64_t kMostFrames = 10000, kLargestCell = 512, kMostSteps = 1000000;
+constexpr NumberRange kModulus{1e-6, 1e9}, kCompression{0, 1}, kLimit{0, 100};
+
+std::string read_bytes(const std::filesystem::path& path) {
+  require(!std::filesystem::is_directory(path), "a scenario is a file, " + path.string() + " is a folder");
+  std::ifstream file(path, std::ios::binary);
+  require(file.good(), "cannot be read, " + path.string());
+  std::string bytes(kLargestFile + 1, '\0');
+  file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  require(!file.bad(), "cannot be read to its end, " + path.string());
+  bytes.resize(static_cast<std::size_t>(file.gcount()));
+  require(bytes.size() <= kLargestFile,
+          "more than " + std::to_string(kLargestFile) + " bytes, " + path.string() + "; a scenario is a page of JSON");
+  return bytes;
+}
+
+/// `move[1] "left lip" (line 14)`: what messages call an entry when the file is read.
+std::string called(const JsonEntry& entry) {
+  const std::string name = entry.has("name") ? " \"" + printable(entry.at("name").text()) + "\"" : "";
+  return entry.path() + name + " (line " + std::to_string(entry.line()) + ")";
+}
+
+TissueClass read_tissue(const JsonEntry& entry) {
+  constexpr std::array<const char*, 7> kKeys = {"name",        "hu",      "label", "youngs_modulus_kpa",
+                                                "compression", "stretch", "shear"};
+  entry.only(kKeys);
+  TissueClass one;
+  one.tissue.name = entry.at("name").text();
+  if (entry.has("hu")) one.hu = read_hu(entry.at("hu"));
+  if (entry.has("label")) one.labels = read_labels(entry.at("label"));
+  const auto read = [&](const char* key, const NumberRange& range, double& value) {
+    if (entry.has(key)) value = entry.at(key).number(range);
+  };
+  read("youngs_modulus_kpa", kModulus, one.tissue.youngs_modulus_kpa);
+  read("compression", kCompression, one.tissue.compression);
+  read("stretch", kLimit, one.tissue.stretch);
+  read("shear", kLimit, one.tissue.shear);
+  return one;
+}
+
+std::vector<TissueClass> read_tissues(const JsonEntry& entry) {
+  std::vector<TissueClass> tissues;
+  const std::vector<JsonEntry> items = entry.items(1, kMostTissues);
+  for (const JsonEntry& item : items) {
+    tissues.push_back(read_tissue(item));
+    const bool is_last = &item == &items.back(), has_condition = item.has("hu") || item.has("label");
+    if (is_last && has_condition)
+      item.refuse("has a condition; the last tissue is the rest, whatever its HU and label: leave out hu and label");
+    if (!is_last && !has_condition) item.refuse("has no condition, hu or label, so that those after it are never met");
+  }
+  return tissues;
+}
+
+Rotation read_rotation(const JsonEntry& entry) {
+  constexpr std::array<const char*, 3> kKeys = {"about", "axis", "degrees"};
+  entry.only(kKeys);
+  return {read_place(entry.at("about")), entry.at("axis").direction(), entry.at("degrees").number({-180, 180})};
+}
+
+Move read_move(const JsonEntry& entry, Method method) {
+  constexpr std::array<const char*, 7> kKeys = {"region", "handle", "by_mm", "by_body", "rotate", "force_n", "name"};
+  entry.only(kKeys);
+  Move move{.what = {}, .how = {}, .entry = called(entry)};
+  if (entry.one_of(std::span(kKeys).first(2)) == 0) {
+    move.what = read_region(entry.at("region"));
+  } else {
+    constexpr std::array<const char*, 3> kHandleKeys = {"at", "radius_mm", "radius_body"};
+    const JsonEntry handle = entry.at("handle");
+    handle.only(kHandleKeys);
+    move.what = Handle{read_place(handle.at("at")), read_length(handle, "radius_mm", "radius_body")};
+  }
+  switch (entry.one_of(std::span(kKeys).subspan(2, 4))) {
+    case 0: move.how = Shift{entry.at("by_mm").vector({-1e4, 1e4}), Unit::mm}; break;
+    case 1: move.how = Shift{entry.at("by_body").vector({-10, 10}), Unit::body}; break;
+    case 2: move.how = read_rotation(entry.at("rotate")); break;
+    default:
+      if (method == Method::chainmail)
+        entry.at("force_n").refuse("is a force, which chainmail knows nothing of; mass-spring does");
+      move.how = Force{entry.at("force_n").vector({-1e6, 1e6})};
+  }
+  return move;
+}
+
+std::vector<Move> read_moves(const JsonEntry& entry, Method method, std::size_t fewest) {
+  std::vector<Move> moves;
+  for (const JsonEntry& item : entry.items(fewest, kMostEntries)) moves.push_back(read_move(item, method));
+  return moves;
+}
+
+std::vector<CutPlan> read_cuts(const JsonEntry& entry) {
+  std::vector<CutPlan> cuts;
+  for (const JsonEntry& item : entry.items(1, kMostEntries)) {
+    CutPlan cut = read_cut(item);
+    for (const CutPlan& other : cuts) {
+      if (other.name == cut.name)
+        item.at("name").refuse("is \"" + printable(cut.name) + "\", the name of another cut; give each its own");
+    }
+    cuts.push_back(std::move(cut));
+  }
+  return cuts;
+}
+
+int read_frames(const JsonEntry& entry) {
+  return entry.has("frames") ? static_cast<int>(entry.at("frames").whole_number(1, kMostFrames)) : 1;
+}
+
+Phase read_phase(const JsonEntry& entry, const Scenario& scenario) {
+  constexpr std::array<const char*, 4> kKeys = {"name", "move", "closed_cuts", "frames"};
+  entry.only(kKeys);
+  Phase phase;
+  phase.name = entry.has("name") ? entry.at("name").text() : entry.path();
+  if (entry.has("move")) phase.moves = read_moves(entry.at("move"), scenario.method, 0);
+  phase.frames = read_frames(entry);
+  if (!entry.has("closed_cuts")) return phase;
+  for (const JsonEntry& item : entry.at("closed_cuts").items(0, kMostEntries)) {
+    const std::string& name = item.text();
+    std::string known;
+    for (const CutPlan& cut : scenario.cuts) known += (known.empty() ? "" : ", ") + printable(cut.name);
+    if (std::none_of(scenario.cuts.begin(), scenario.cuts.end(), [&](const CutPlan& cut) { return cut.name == name; }))
+      item.refuse("is \"" + printable(name) + "\", which is no cut; " +
+                  (known.empty() ? "the scenario has no cuts" : "the cuts are " + known));
+    phase.closed_cuts.push_back(name);
+  }
+  return phase;
+}
+
+std::vector<Phase> read_phases(const JsonEntry& entry, const Scenario& scenario) {
+  if (!entry.has("phases")) {
+    Phase only;
+    if (!entry.has("move")) entry.refuse("has no \"move\" and no \"phases\"; one of them is expected");
+    only.moves = read_moves(entry.at("move"), scenario.method, 1);
+    only.frames = read_frames(entry);
+    return {only};
+  }
+  for (const char* key : {"move", "frames"}) {
+    if (entry.has(key)) entry.at(key).refuse("stands beside phases; put it into them");
+  }
+  std::vector<Phase> phases;
+  for (const JsonEntry& item : entry.at("phases").items(1, kMostEntries)) phases.push_back(read_phase(item, scenario));
+  return phases;
+}
+
+StoppingRule read_stop(const JsonEntry& entry) {
+  constexpr std::array<const char*, 3> kKeys = {"motion_mm", "residual", "steps"};
+  entry.only(kKeys);
+  StoppingRule stop;
+  if (entry.has("motion_mm")) stop.motion_mm = entry.at("motion_mm").number({0, 1e3, true});
+  if (entry.has("residual")) stop.residual = entry.at("residual").number({0, 1, true});
+  if (entry.has("steps")) stop.steps = static_cast<int>(entry.at("steps").whole_number(1, kMostSteps));
+  return stop;
+}
+
+Method read_method(const JsonEntry& entry) {
+  const std::string& name = entry.text();
+  if (name == "chainmail") return Method::chainmail;
+  if (name != "mass-spring") entry.refuse("is \"" + printable(name) + "\"; chainmail or mass-spring is expected");
+  return Method::mass_spring;
+}
+
+Scenario read_whole(const JsonEntry& entry) {
+  constexpr std::array<const char*, 13> kKeys = {"$schema",       "name",    "description", "method", "cell_size",
+                                                 "body_above_hu", "tissues", "hold",        "move",   "cuts",
+                                                 "phases",        "frames",  "stop"};
+  entry.only(kKeys);
+  for (const char* key : {"$schema", "description"}) {
+    if (entry.has(key) && !entry.at(key).is(JsonTree::Kind::text)) entry.at(key).refuse("is no text");
+  }
+  Scenario scenario;
+  if (entry.has("name")) scenario.name = entry.at("name").text();
+  scenario.method = read_method(entry.at("method"));
+  if (entry.has("cell_size")) scenario.cell_size = entry.at("cell_size").whole_number(1, kLargestCell);
+  if (entry.has("body_above_hu")) scenario.body_above_hu = entry.at("body_above_hu").number({-1e5, 1e5});
+  scenario.tissues = {{.tissue = {.name = "tissue"}, .hu = {}, .labels = {}}};
+  if (entry.has("tissues")) scenario.tissues = read_tissues(entry.at("tissues"));
+  if (entry.has("hold")) {
+    for (const JsonEntry& item : entry.at("hold").items(0, kMostEntries))
+      scenario.hold.push_back({read_region(item), item.path() + " (line " + std::to_string(item.line()) + ")"});
+  }
+  if (entry.has("cuts")) scenario.cuts = read_cuts(entry.at("cuts"));
+  scenario.phases = read_phases(entry, scenario);
+  if (entry.has("stop")) scenario.stop = read_stop(entry.at("stop"));
+  return scenario;
+}
+
+}  // namespace
+
+simulate::Scenario read_scenario(const std::filesystem::path& path) {
+  const std::string bytes = read_bytes(path), name = path.string();
+  const JsonTree tree = parse_json(bytes, name);
+  return read_whole(JsonEntry(tree, "", name));
+}
+
+}  // namespace tetwarp
