@@ -1,0 +1,91 @@
+#include "deform/simulate/scenario_run.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "deform/errors.h"
+
+namespace tetwarp::simulate {
+
+namespace {
+
+std::vector<std::string> sorted(std::vector<std::string> names) {
+  std::sort(names.begin(), names.end());
+  names.erase(std::unique(names.begin(), names.end()), names.end());
+  return names;
+}
+
+}  // namespace
+
+ScenarioRun::ScenarioRun(const Scenario& scenario, const Patient& patient, Workplace workplace)
+    : scenario_(scenario),
+      patient_(patient),
+      workplace_(std::move(workplace)),
+      tissue_of_cell_(tissue_of_cells(scenario, patient)) {
+  for (const Phase& phase : scenario.phases) {
+    loads_.emplace_back(scenario, phase, patient);
+    for (const Cut& cut : open_cuts(scenario, phase, patient))
+      throw InputError("the cut \"" + cut.name + "\" is open" + (phase.name.empty() ? "" : " in " + phase.name) +
+                       "; this version simulates cuts that are closed");
+  }
+  model_ = model_of(scenario.phases.front());
+}
+
+int ScenarioRun::frames() const {
+  return std::accumulate(scenario_.phases.begin(), scenario_.phases.end(), 0,
+                         [](int sum, const Phase& phase) { return sum + phase.frames; });
+}
+
+Model ScenarioRun::model_of(const Phase&) const {
+  std::vector<Tissue> tissues;
+  for (const TissueClass& one : scenario_.tissues) tissues.push_back(one.tissue);
+  return make_model(patient_.lattice, tissue_of_cell_, tissues);
+}
+
+std::vector<glm::vec3> ScenarioRun::displacement() const {
+  std::vector<glm::vec3> result(model_.nodes());
+  if (!simulation_) return result;
+  const std::span<const glm::vec3> held = simulation_->displacement();
+  if (simulation_->memory() == Memory::host) return {held.begin(), held.end()};
+  workplace_.fetch(result, held.data());
+  return result;
+}
+
+void ScenarioRun::begin_phase() {
+  const Phase& phase = scenario_.phases[phase_];
+  start_ = displacement();
+  const bool other_cuts = phase_ > 0 && sorted(phase.closed_cuts) != sorted(scenario_.phases[phase_ - 1].closed_cuts);
+  if (!simulation_ || other_cuts) {
+    simulation_.reset();
+    model_ = model_of(phase);
+    std::vector<glm::vec3> carried(model_.nodes());
+    for (std::size_t node = 0; node < carried.size(); ++node) carried[node] = start_[model_.vertex[node]];
+    start_ = std::move(carried);
+    simulation_ = workplace_.make(model_);
+    simulation_->set_displacement(start_);
+  }
+  if (!loads_[phase_].turns()) simulation_->set_loads(loads_[phase_].at(1, model_, start_));
+}
+
+Frame ScenarioRun::next(const Control& control) {
+  require(!is_done(), "the scenario has no further frame");
+  if (frame_in_phase_ == 0) begin_phase();
+  const Phase& phase = scenario_.phases[phase_];
+  const double part = static_cast<double>(frame_in_phase_ + 1) / phase.frames;
+  Frame frame{.number = done_ + 1, .phase = phase_, .settled = {}};
+  if (loads_[phase_].turns()) {
+    simulation_->set_loads(loads_[phase_].at(part, model_, start_));
+    frame.settled = simulation_->advance(1, scenario_.stop, control);
+  } else {
+    frame.settled = simulation_->advance(part, scenario_.stop, control);
+  }
+  ++done_;
+  frame.ends_phase = ++frame_in_phase_ == phase.frames;
+  if (frame.ends_phase) {
+    ++phase_;
+    frame_in_phase_ = 0;
+  }
+  return frame;
+}
+
+}  // namespace tetwarp::simulate

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "deform/simulate/scenario.h"
+
+namespace tetwarp::simulate {
+
+/// Where a scenario is simulated: one of the factories of a method, and the way back from its memory.
+struct Workplace {
+  std::function<std::unique_ptr<Simulation>(const Model&)> make;
+  /// Copies from the simulation's memory to the host; null: it is the host's.
+  std::function<void(std::span<glm::vec3> to, const glm::vec3* from)> fetch = {};
+};
+
+/// What became of a frame.
+struct Frame {
+  int number = 0;         ///< from 1, over all phases
+  std::size_t phase = 0;  ///< from 0
+  bool ends_phase = false;
+  Settled settled;
+};
+
+/// A scenario that is played on a patient, frame by frame.
+///
+/// Where other cuts are open than in the phase before, the model is made anew: vertices keep their places, and of
+/// copies that a cut needs each begins where its vertex is.
+class ScenarioRun {
+ public:
+  /// Refers to the scenario and the patient. @throws InputError for a scenario that cannot be played on this patient,
+  /// of any phase: before anything is simulated
+  ScenarioRun(const Scenario& scenario, const Patient& patient, Workplace workplace);
+
+  int frames() const;
+  bool is_done() const { return done_ == frames(); }
+  /// Simulates the next frame. @throws Cancelled, and what the simulation throws
+  Frame next(const Control& control = {});
+
+  const PhaseLoads& loads(std::size_t phase) const { return loads_[phase]; }
+  const std::vector<std::uint8_t>& tissues() const { return tissue_of_cell_; }  ///< of each cell
+  const Model& model() const { return model_; }                                 ///< of the last frame's phase
+  const Simulation& simulation() const { return *simulation_; }                 ///< after the last frame
+  /// LPS mm of each node of the model, in host memory; at rest before the first frame.
+  std::vector<glm::vec3> displacement() const;
+
+ private:
+  void begin_phase();
+  Model model_of(const Phase& phase) const;
+
+  const Scenario& scenario_;
+  const Patient& patient_;
+  Workplace workplace_;
+  std::vector<std::uint8_t> tissue_of_cell_;
+  std::vector<PhaseLoads> loads_;
+  Model model_;
+  std::unique_ptr<Simulation> simulation_;
+  std::vector<glm::vec3> start_;  ///< displacements when the phase began
+  std::size_t phase_ = 0;
+  int frame_in_phase_ = 0, done_ = 0;
+};
+
+}  // namespace tetwarp::simulate
