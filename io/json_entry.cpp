@@ -88,8 +88,10 @@ bool JsonEntry::truth() const {
 const std::string& JsonEntry::text() const {
   expect(JsonTree::Kind::text, "a text");
   if (tree_->text.empty()) refuse("is empty; a text is expected");
-  if (tree_->text.size() > kLongestText)
-    refuse("has " + std::to_string(tree_->text.size()) + " bytes; a text of at most " + std::to_string(kLongestText) +
+  const auto characters = static_cast<std::size_t>(
+      std::count_if(tree_->text.begin(), tree_->text.end(), [](char c) { return (c & 0xC0) != 0x80; }));  // of UTF-8
+  if (characters > kLongestText)
+    refuse("has " + std::to_string(characters) + " characters; a text of at most " + std::to_string(kLongestText) +
            " is expected");
   return tree_->text;
 }
@@ -104,8 +106,8 @@ glm::dvec3 JsonEntry::vector(const NumberRange& range) const {
 glm::dvec3 JsonEntry::direction() const {
   const glm::dvec3 result = vector({-1e6, 1e6});
   const double largest = std::max({std::abs(result.x), std::abs(result.y), std::abs(result.z)});
-  if (largest < 1e-6) refuse("has no length; a direction is expected");
-  return result;
+  if (largest == 0) refuse("has no length; a direction is expected");
+  return result / largest;
 }
 
 std::vector<JsonEntry> JsonEntry::items(std::size_t fewest, std::size_t most) const {

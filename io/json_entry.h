@@ -38,11 +38,11 @@ class JsonEntry {
   double number(const NumberRange& range) const;
   std::int64_t whole_number(std::int64_t low, std::int64_t high) const;
   bool truth() const;
-  /// Not empty, and at most 200 bytes.
+  /// Not empty, and at most 200 characters.
   const std::string& text() const;
   /// Three numbers.
   glm::dvec3 vector(const NumberRange& range) const;
-  /// Three numbers, not all 0.
+  /// Three numbers, not all 0. @return so scaled that the largest is 1
   glm::dvec3 direction() const;
   std::vector<JsonEntry> items(std::size_t fewest, std::size_t most) const;
 

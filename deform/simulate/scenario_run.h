@@ -33,6 +33,8 @@ class ScenarioRun {
   /// Refers to the scenario and the patient. @throws InputError for a scenario that cannot be played on this patient,
   /// of any phase: before anything is simulated
   ScenarioRun(const Scenario& scenario, const Patient& patient, Workplace workplace);
+  ScenarioRun(const ScenarioRun&) = delete;
+  ScenarioRun& operator=(const ScenarioRun&) = delete;
 
   int frames() const;
   bool is_done() const { return done_ == frames(); }
