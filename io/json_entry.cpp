@@ -43,10 +43,11 @@ std::string list_of(std::span<const char* const> words) {
   return list;
 }
 
-const JsonTree::Member* find(const JsonTree& object, const std::string& key) {
-  const auto found = std::find_if(object.members.begin(), object.members.end(),
-                                  [&](const JsonTree::Member& member) { return member.key == key; });
-  return found == object.members.end() ? nullptr : &*found;
+const JsonTree* find(const JsonTree& object, const std::string& key) {
+  if (object.kind != JsonTree::Kind::object) return nullptr;
+  const auto found =
+      std::find_if(object.items.begin(), object.items.end(), [&](const JsonTree& member) { return member.key == key; });
+  return found == object.items.end() ? nullptr : &*found;
 }
 
 }  // namespace
@@ -125,13 +126,13 @@ std::vector<JsonEntry> JsonEntry::items(std::size_t fewest, std::size_t most) co
 
 void JsonEntry::only(std::span<const char* const> known) const {
   expect(JsonTree::Kind::object, "an object");
-  for (const JsonTree::Member& member : tree_->members) {
+  for (const JsonTree& member : tree_->items) {
     if (std::find(known.begin(), known.end(), member.key) != known.end()) continue;
     const auto nearest = std::min_element(known.begin(), known.end(), [&](const char* a, const char* b) {
       return distance(printable(member.key), a) < distance(printable(member.key), b);
     });
     const bool is_near = distance(printable(member.key), *nearest) <= std::max<std::size_t>(1, member.key.size() / 3);
-    throw InputError(*file_ + ":" + std::to_string(member.line) + ": " + (path_.empty() ? "" : path_ + ": ") +
+    throw InputError(*file_ + ":" + std::to_string(member.key_line) + ": " + (path_.empty() ? "" : path_ + ": ") +
                      "the key \"" + printable(member.key) + "\" is not known; " +
                      (is_near ? std::string("did you mean \"") + *nearest + "\"?" : "known are " + list_of(known)));
   }
@@ -141,9 +142,9 @@ bool JsonEntry::has(const char* key) const { return find(*tree_, key) != nullptr
 
 JsonEntry JsonEntry::at(const char* key) const {
   expect(JsonTree::Kind::object, "an object");
-  const JsonTree::Member* member = find(*tree_, key);
+  const JsonTree* member = find(*tree_, key);
   if (member == nullptr) refuse(std::string("has no \"") + key + "\"");
-  return {member->value, path_.empty() ? key : path_ + "." + key, *file_};
+  return {*member, path_.empty() ? key : path_ + "." + key, *file_};
 }
 
 std::size_t JsonEntry::one_of(std::span<const char* const> keys) const {

@@ -67,13 +67,13 @@ class Builder final : public nlohmann::json_sax<nlohmann::json> {
   bool start_object(std::size_t) override { return open(JsonTree::Kind::object); }
   bool start_array(std::size_t) override { return open(JsonTree::Kind::list); }
   bool end_object() override {
-    require_different_keys(open_.back().members);
+    require_different_keys(open_.back().items);
     return close();
   }
   bool end_array() override { return close(); }
 
   bool key(string_t& value) override {
-    open_.back().members.push_back({std::move(value), count_.line, {}});
+    open_.back().items.push_back({.key = std::move(value), .key_line = count_.line});
     return true;
   }
 
@@ -98,7 +98,10 @@ class Builder final : public nlohmann::json_sax<nlohmann::json> {
     } else if (open_.back().kind == JsonTree::Kind::list) {
       open_.back().items.push_back(std::move(value));
     } else {
-      open_.back().members.back().value = std::move(value);
+      JsonTree& member = open_.back().items.back();
+      value.key = std::move(member.key);
+      value.key_line = member.key_line;
+      member = std::move(value);
     }
     return true;
   }
@@ -108,16 +111,17 @@ class Builder final : public nlohmann::json_sax<nlohmann::json> {
     open_.push_back({.kind = kind, .line = count_.line});
     return true;
   }
-  void require_different_keys(const std::vector<JsonTree::Member>& members) const {
-    std::vector<const JsonTree::Member*> sorted;
-    for (const JsonTree::Member& member : members) sorted.push_back(&member);
-    std::sort(sorted.begin(), sorted.end(),
-              [](const auto* a, const auto* b) { return std::tie(a->key, a->line) < std::tie(b->key, b->line); });
+  void require_different_keys(const std::vector<JsonTree>& members) const {
+    std::vector<const JsonTree*> sorted;
+    for (const JsonTree& member : members) sorted.push_back(&member);
+    std::sort(sorted.begin(), sorted.end(), [](const auto* a, const auto* b) {
+      return std::tie(a->key, a->key_line) < std::tie(b->key, b->key_line);
+    });
     const auto twice =
         std::adjacent_find(sorted.begin(), sorted.end(), [](const auto* a, const auto* b) { return a->key == b->key; });
     if (twice == sorted.end()) return;
-    throw InputError(name_ + ":" + std::to_string(twice[1]->line) + ": the key \"" + printable(twice[1]->key) +
-                     "\" a second time; the first is in line " + std::to_string(twice[0]->line));
+    throw InputError(name_ + ":" + std::to_string(twice[1]->key_line) + ": the key \"" + printable(twice[1]->key) +
+                     "\" a second time; the first is in line " + std::to_string(twice[0]->key_line));
   }
   bool close() {
     JsonTree value = std::move(open_.back());

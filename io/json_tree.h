@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 namespace tetwarp {
@@ -12,21 +11,15 @@ namespace tetwarp {
 /// A value of a JSON document and where it stands.
 struct JsonTree {
   enum class Kind { null, boolean, number, text, list, object };
-  struct Member;
 
   Kind kind = Kind::null;
   std::size_t line = 0;  ///< where it begins, from 1
   bool truth = false;
-  double number = 0;      ///< finite
-  std::string text = {};  ///< UTF-8
-  std::vector<JsonTree> items = {};
-  std::vector<Member> members = {};  ///< as they stand; no key twice
-};
-
-struct JsonTree::Member {
-  std::string key;
-  std::size_t line = 0;  ///< of the key
-  JsonTree value;
+  double number = 0;                 ///< finite
+  std::string text = {};             ///< UTF-8
+  std::vector<JsonTree> items = {};  ///< of a list, or of an object as they stand there; no key twice
+  std::string key = {};              ///< in an object
+  std::size_t key_line = 0;
 };
 
 /// "a number", "a list" and so on.

@@ -54,7 +54,7 @@ Boxes boxes_of_vertices(const glm::i64vec3& voxels, const Geometry& lattice, std
 template <class V, class MakeVisitor>
 void for_each_box(std::span<const V> values, const glm::i64vec3& size, const Boxes& boxes, const Control& control,
                   const MakeVisitor& make_visitor) {
-  const auto& [along_i, along_j, along_k] = boxes;
+  const std::vector<Extent>&along_i = boxes[0], &along_j = boxes[1], &along_k = boxes[2];
   tbb::parallel_for(std::size_t{0}, along_k.size(), [&](std::size_t k) {
     if (control.stop.stop_requested()) return;
     auto visitor = make_visitor();
