@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "deform/errors.h"
+#include "deform/simulate/cut_surface.h"
 
 namespace tetwarp::simulate {
 
@@ -24,11 +25,9 @@ ScenarioRun::ScenarioRun(const Scenario& scenario, const Patient& patient, Workp
       tissue_of_cell_(tissue_of_cells(scenario, patient)) {
   for (const Phase& phase : scenario.phases) {
     loads_.emplace_back(scenario, phase, patient);
-    for (const Cut& cut : open_cuts(scenario, phase, patient))
-      throw InputError("the cut \"" + cut.name + "\" is open" + (phase.name.empty() ? "" : " in " + phase.name) +
-                       "; this version simulates cuts that are closed");
+    for (const Cut& cut : open_cuts(scenario, phase, patient)) CutSurface{cut};  // throws for those that are none
   }
-  model_ = model_of(scenario.phases.front());
+  make_model_of(scenario.phases.front());
 }
 
 int ScenarioRun::frames() const {
@@ -36,11 +35,15 @@ int ScenarioRun::frames() const {
                          [](int sum, const Phase& phase) { return sum + phase.frames; });
 }
 
-Model ScenarioRun::model_of(const Phase&) const {
+void ScenarioRun::make_model_of(const Phase& phase) {
   std::vector<Tissue> tissues;
   for (const TissueClass& one : scenario_.tissues) tissues.push_back(one.tissue);
-  return make_model(patient_.lattice, tissue_of_cell_, tissues);
+  const std::vector<Cut> cuts = open_cuts(scenario_, phase, patient_);
+  division_ = cuts.empty() ? DividedLattice{} : divide(patient_.lattice, cuts);
+  model_ = make_model(patient_.lattice, tissue_of_cell_, tissues, division_.copies_of, division_.pieces);
 }
+
+VertexField ScenarioRun::field() const { return field_of(patient_.lattice, division_, displacement()); }
 
 std::vector<glm::vec3> ScenarioRun::displacement() const {
   std::vector<glm::vec3> result(model_.nodes());
@@ -57,7 +60,7 @@ void ScenarioRun::begin_phase() {
   const bool other_cuts = phase_ > 0 && sorted(phase.closed_cuts) != sorted(scenario_.phases[phase_ - 1].closed_cuts);
   if (!simulation_ || other_cuts) {
     simulation_.reset();
-    model_ = model_of(phase);
+    make_model_of(phase);
     std::vector<glm::vec3> carried(model_.nodes());
     for (std::size_t node = 0; node < carried.size(); ++node) carried[node] = start_[model_.vertex[node]];
     start_ = std::move(carried);

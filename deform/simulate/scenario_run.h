@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "deform/simulate/divided_lattice.h"
 #include "deform/simulate/scenario.h"
 
 namespace tetwarp::simulate {
@@ -47,16 +48,19 @@ class ScenarioRun {
   const Simulation& simulation() const { return *simulation_; }                 ///< after the last frame
   /// LPS mm of each node of the model, in host memory; at rest before the first frame.
   std::vector<glm::vec3> displacement() const;
+  /// As it is after the last frame: cells that open cuts divide are replaced by a mesh.
+  VertexField field() const;
 
  private:
   void begin_phase();
-  Model model_of(const Phase& phase) const;
+  void make_model_of(const Phase& phase);
 
   const Scenario& scenario_;
   const Patient& patient_;
   Workplace workplace_;
   std::vector<std::uint8_t> tissue_of_cell_;
   std::vector<PhaseLoads> loads_;
+  DividedLattice division_;  ///< by the cuts that are open
   Model model_;
   std::unique_ptr<Simulation> simulation_;
   std::vector<glm::vec3> start_;  ///< displacements when the phase began

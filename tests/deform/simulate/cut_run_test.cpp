@@ -1,0 +1,82 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "deform/simulate/mass_spring.h"
+#include "deform/simulate/scenario_run.h"
+#include "tests/deform/simulate/scenario_volumes.h"
+
+namespace tetwarp::simulate {
+namespace {
+
+using namespace test;
+
+/// 11 x 11 x 6 vertices; the lowest layer is held, the uppermost moved, a cut goes between the middle ones.
+Scenario parted(const CutPlan& cut, const glm::dvec3& by) {
+  const Zone bottom{HalfSpace{{{0, 0, 1}}, {0, 0, -1}}}, top{HalfSpace{{{0, 0, 39}}, {0, 0, 1}}};
+  Scenario scenario = scenario_of({{bottom, "hold[0]"}}, {move_of(top, Shift{by}, "move[0]")});
+  scenario.method = Method::mass_spring;
+  scenario.cuts = {cut};
+  scenario.phases[0].frames = 2;
+  scenario.phases.push_back({.name = "closed", .moves = {}, .closed_cuts = {cut.name}});
+  scenario.phases[1].frames = 1;
+  scenario.stop = {.motion_mm = 1e-5, .residual = 1e-5, .steps = 500};
+  return scenario;
+}
+
+Workplace cpu() {
+  return {[](const Model& model) { return make_cpu_mass_spring(model); }};
+}
+
+TEST(CutRun, BothSidesOfAPlaneGoTheirWaysAndComeBackWhenItIsClosed) {
+  const Patient patient = uniform_patient();
+  const glm::dvec3 by(3, -2, 9);
+  const Scenario scenario = parted({"across", PlaneCutPlan{{{0, 0, 19}}, {0.05, 0.03, 1}}}, by);
+  ScenarioRun run(scenario, patient, cpu());
+  run.next();
+  run.next();
+  const VertexField open = run.field();
+  EXPECT_GE(open.replaced.size(), 100u);
+  for (std::size_t n = 0; n < open.displacement.size(); ++n) {
+    const bool above = n >= 3 * 121;  // vertices of the fourth layer, at 24 mm, and further up
+    EXPECT_LT(glm::distance(open.displacement[n], above ? glm::vec3(by) : glm::vec3(0)), 1e-3f) << n;
+  }
+  for (const glm::vec3& d : open.mesh.displacement)
+    EXPECT_LT(std::min(glm::length(d), glm::distance(d, glm::vec3(by))), 1e-3f);
+  run.next();
+  const VertexField closed = run.field();
+  EXPECT_TRUE(closed.replaced.empty());
+  EXPECT_TRUE(closed.mesh.is_empty());
+  for (const glm::vec3& d : closed.displacement) EXPECT_LT(glm::length(d), 1e-3f);
+}
+
+TEST(CutRun, ADiscOpensWhereItIsAndTissueRoundItHolds) {
+  const Patient patient = uniform_patient();
+  const Scenario scenario = parted({"slit", DiscCutPlan{{{0, 0, 19}}, {0, 0, 1}, {13}}}, {0, 0, 6});
+  ScenarioRun run(scenario, patient, cpu());
+  run.next();
+  run.next();
+  const VertexField open = run.field();
+  double widest = 0;
+  std::size_t lips = 0;
+  for (std::size_t a = 0; a < open.mesh.rest.size(); ++a) {
+    const glm::dvec3& rest = open.mesh.rest[a];
+    if (std::abs(rest.z - 19) > 1e-9) continue;
+    for (std::size_t b = a + 1; b < open.mesh.rest.size(); ++b) {
+      if (open.mesh.rest[b] != rest) continue;
+      const glm::dvec3 gap(open.mesh.displacement[b] - open.mesh.displacement[a]);
+      ++lips;
+      widest = std::max(widest, std::abs(gap.z));
+      EXPECT_LE(glm::length(glm::dvec3(rest.x, rest.y, 0)), 13 + 4) << "a cell more than the radius";
+      EXPECT_LT(std::hypot(gap.x, gap.y), 0.5 * std::abs(gap.z) + 0.5);
+    }
+  }
+  EXPECT_GT(lips, 20u);
+  EXPECT_GT(widest, 2);  // mm, of the 6 by which the top was pulled away
+  EXPECT_LT(widest, 6);
+}
+
+}  // namespace
+}  // namespace tetwarp::simulate
