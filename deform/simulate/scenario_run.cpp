@@ -91,4 +91,18 @@ Frame ScenarioRun::next(const Control& control) {
   return frame;
 }
 
+DeformedFrame ScenarioRun::next(Resampler& resampler, std::span<const Target> targets, Outside outside,
+                                const Maps& maps, const Control& control) {
+  DeformedFrame result;
+  result.frame = next(control);
+  if (division_.replaced.empty()) {
+    resampler.set_field(simulate::view(*simulation_, model_, outside), control);
+  } else {
+    field_ = field();
+    resampler.set_field(tetwarp::view(field_, outside), control);
+  }
+  result.report = resampler.resample(whole(resampler.output()), targets, maps, control);
+  return result;
+}
+
 }  // namespace tetwarp::simulate

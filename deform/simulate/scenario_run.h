@@ -25,6 +25,12 @@ struct Frame {
   Settled settled;
 };
 
+/// And of the volumes that were sent through it.
+struct DeformedFrame {
+  Frame frame;
+  Report report;
+};
+
 /// A scenario that is played on a patient, frame by frame.
 ///
 /// Where other cuts are open than in the phase before, the model is made anew: vertices keep their places, and of
@@ -41,6 +47,12 @@ class ScenarioRun {
   bool is_done() const { return done_ == frames(); }
   /// Simulates the next frame. @throws Cancelled, and what the simulation throws
   Frame next(const Control& control = {});
+
+  /// Simulates the next frame and sends volumes through its field: the loop of an interactive program. Where the
+  /// simulation keeps displacements on a device they stay there, unless open cuts divide cells. Nothing is allocated a
+  /// frame once sizes repeat. @throws as `next` and Resampler do
+  DeformedFrame next(Resampler& resampler, std::span<const Target> targets, Outside outside = Outside::background,
+                     const Maps& maps = {}, const Control& control = {});
 
   const PhaseLoads& loads(std::size_t phase) const { return loads_[phase]; }
   const std::vector<std::uint8_t>& tissues() const { return tissue_of_cell_; }  ///< of each cell
@@ -64,6 +76,7 @@ class ScenarioRun {
   Model model_;
   std::unique_ptr<Simulation> simulation_;
   std::vector<glm::vec3> start_;  ///< displacements when the phase began
+  VertexField field_;             ///< that the resampler of the last frame looks at, with open cuts
   std::size_t phase_ = 0;
   int frame_in_phase_ = 0, done_ = 0;
 };

@@ -52,6 +52,31 @@ TEST(CutRun, BothSidesOfAPlaneGoTheirWaysAndComeBackWhenItIsClosed) {
   for (const glm::vec3& d : closed.displacement) EXPECT_LT(glm::length(d), 1e-3f);
 }
 
+TEST(CutRun, FramesAreResampledThroughTheirFields) {
+  const Patient patient = uniform_patient();
+  const Scenario scenario = parted({"across", PlaneCutPlan{{{0, 0, 19}}, {0, 0, 1}}}, {0, 0, 8});
+  const auto source = ct_of(small_grid(), [](auto i, auto j, auto k) { return 100 * k + 7 * i - j; });
+  Volume<std::int16_t> by_loop = source, by_hand = source;
+  const Target to_loop{.source = view(source), .output = view(by_loop), .background = -1000},
+      to_hand{.source = view(source), .output = view(by_hand), .background = -1000};
+  ScenarioRun loop(scenario, patient, cpu()), hand(scenario, patient, cpu());
+  const auto resampler = make_cpu_resampler(small_grid()), other = make_cpu_resampler(small_grid());
+  while (!loop.is_done()) {
+    const DeformedFrame frame = loop.next(*resampler, {&to_loop, 1});
+    hand.next();
+    const VertexField field = hand.field();
+    other->set_field(tetwarp::view(field, Outside::background));
+    const Report report = other->resample(whole(small_grid()), {&to_hand, 1});
+    EXPECT_EQ(by_loop.voxels, by_hand.voxels);
+    EXPECT_EQ(frame.report.uncovered, report.uncovered);
+    if (frame.frame.number == 2) {
+      EXPECT_EQ(by_loop.voxels[441 * 6], -1000) << "the gap is background";
+    }
+    EXPECT_EQ(frame.report.uncovered > 0, frame.frame.phase == 0);
+  }
+  EXPECT_EQ(by_loop.voxels, source.voxels) << "closed again";
+}
+
 TEST(CutRun, ADiscOpensWhereItIsAndTissueRoundItHolds) {
   const Patient patient = uniform_patient();
   const Scenario scenario = parted({"slit", DiscCutPlan{{{0, 0, 19}}, {0, 0, 1}, {13}}}, {0, 0, 6});
