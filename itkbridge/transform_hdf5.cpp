@@ -4,29 +4,24 @@
 #include <fstream>
 
 #include "deform/errors.h"
-#include "itkbridge/transform_record.h"
+#include "itkbridge/isolated_read.h"
 
 namespace tetwarp {
 namespace {
 
-constexpr double kDeflateAtMost = 1040;  // deflate cannot do better than 1032 to 1
+constexpr std::uint64_t kDeflateAtMost = 1040;  // deflate cannot do better than 1032 to 1
 constexpr hsize_t kMostTransforms = 1000;
 constexpr std::size_t kLongestText = 1000;
 
-/// The HDF5 library prints its stack of errors otherwise. After a failure it stays quiet, for what damaged files leave
-/// open makes it complain once more when the program ends.
-class QuietHdf5 {
- public:
-  QuietHdf5() {
-    H5::Exception::getAutoPrint(print_, &data_);
-    H5::Exception::dontPrint();
-  }
-  void restore() { H5::Exception::setAutoPrint(print_, data_); }
-
- private:
-  H5E_auto2_t print_ = nullptr;
-  void* data_ = nullptr;
-};
+/// HDF5 1.10.8 follows what a damaged file says out of its memory, round in circles and into allocations of any size.
+/// What a whole file takes: its values as double, stored as float perhaps, twice while a chunk is inflated.
+IsolatedLimits limits_for(std::uint64_t bytes) {
+  constexpr std::uint64_t kMemory = std::uint64_t{64} << 20, kMost = std::uint64_t{1} << 32;
+  bytes = std::min(bytes, kMost);
+  return {.memory_bytes = kMemory + 3 * kDeflateAtMost * bytes,
+          .cpu_seconds = static_cast<unsigned>(5 + bytes / 100'000),
+          .seconds = static_cast<unsigned>(60 + bytes / 100'000)};
+}
 
 class Hdf5Reader {
  public:
@@ -127,9 +122,9 @@ class Hdf5Reader {
     const auto stored = static_cast<double>(set.getStorageSize());
     const double needed =
         static_cast<double>(std::max(count, chunk_of(set))) * static_cast<double>(set.getDataType().getSize());
-    require(stored <= bytes_ && needed <= stored * kDeflateAtMost, "truncated, or a header that promises too much, " +
-                                                                       file_ + ": " + name + " has " +
-                                                                       std::to_string(count) + " values");
+    require(stored <= bytes_ && needed <= stored * static_cast<double>(kDeflateAtMost),
+            "truncated, or a header that promises too much, " + file_ + ": " + name + " has " + std::to_string(count) +
+                " values");
     std::vector<double> numbers(count);
     if (count > 0) set.read(numbers.data(), H5::PredType::NATIVE_DOUBLE);
     return numbers;
@@ -143,15 +138,17 @@ class Hdf5Reader {
 }  // namespace
 
 std::vector<TransformRecord> read_transform_hdf5(const std::filesystem::path& path) {
-  QuietHdf5 quiet;
-  try {
-    std::vector<TransformRecord> records = Hdf5Reader(path).read();
-    quiet.restore();
-    return records;
-  } catch (const H5::Exception& error) {
-    throw InputError("HDF5 cannot read " + path.string() + ": " + error.getDetailMsg() +
-                     "; the file may be truncated or damaged");
-  }
+  const std::string file = path.string();
+  const auto read = [&] {
+    try {
+      H5::Exception::dontPrint();
+      return Hdf5Reader(path).read();
+    } catch (const H5::Exception& error) {
+      throw InputError("HDF5 cannot read " + file + ": " + error.getDetailMsg() +
+                       "; the file may be truncated or damaged");
+    }
+  };
+  return read_isolated(read, limits_for(std::filesystem::file_size(path)), "HDF5", file);
 }
 
 }  // namespace tetwarp

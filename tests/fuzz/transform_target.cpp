@@ -2,9 +2,6 @@
 #include "io/transform_file.h"
 #include "tests/fuzz/input_file.h"
 
-/// HDF5 1.10.8 loses memory where a file is damaged.
-extern "C" const char* __lsan_default_suppressions() { return "leak:libhdf5"; }
-
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const InputFile file(TETWARP_FUZZ_SUFFIX);
   file.fill(data, size);

@@ -13,12 +13,6 @@
 #include "tests/support/scratch.h"
 #include "tests/support/write_file.h"
 
-#ifdef __SANITIZE_ADDRESS__
-/// HDF5 1.10.8 leaves memory behind when it meets a damaged file.
-extern "C" const char* __lsan_default_suppressions();
-extern "C" const char* __lsan_default_suppressions() { return "leak:libhdf5"; }
-#endif
-
 namespace tetwarp {
 namespace {
 
