@@ -1,6 +1,5 @@
 #include "io/dicom_bytes.h"
 
-#include <dcmtk/dcmdata/dcistrmb.h>
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -13,6 +12,7 @@
 #include <optional>
 
 #include "deform/errors.h"
+#include "io/dicom_stream.h"
 
 namespace tetwarp {
 namespace {
@@ -78,35 +78,14 @@ std::optional<std::size_t> native_length(std::span<const std::byte> bytes, std::
   return length % 2 == 0 ? std::optional<std::size_t>(length) : std::nullopt;
 }
 
-using Read = OFCondition(DcmFileFormat&, DcmInputStream&);
-
-/// @param at  receives the place where reading ended
-std::unique_ptr<DcmFileFormat> read_format(std::span<const std::byte> bytes, Read read, std::size_t& at,
-                                           OFCondition& result) {
-  DcmInputBufferStream stream;
-  stream.setBuffer(bytes.data(), std::ssize(bytes));
-  stream.setEos();
-  auto format = std::make_unique<DcmFileFormat>();
-  format->transferInit();
-  result = read(*format, stream);
-  format->transferEnd();
-  at = static_cast<std::size_t>(stream.tell());
-  return format;
-}
-
-OFCondition read_all(DcmFileFormat& format, DcmInputStream& stream) { return format.read(stream); }
-OFCondition read_attributes(DcmFileFormat& format, DcmInputStream& stream) {
-  return format.readUntilTag(stream, EXS_Unknown, EGL_noChange, DCM_MaxReadLength, DCM_PixelData);
-}
-
 /// The attributes before Pixel Data, if these are words that end the file, 16 bits each.
 std::optional<ParsedSlice> parse_native(std::span<const std::byte> bytes, const std::filesystem::path& file) {
   static_assert(std::endian::native == std::endian::little);
   ParsedSlice slice;
-  OFCondition result;
-  std::size_t at = 0;
-  slice.format = read_format(bytes, read_attributes, at, result);
-  if (result.bad() || at >= bytes.size()) return std::nullopt;
+  slice.format = std::make_unique<DcmFileFormat>();
+  const DicomRead read = parse_dicom(*slice.format, bytes, DCM_PixelData);
+  if (read.result.bad() || read.rest == 0 || read.rest >= bytes.size()) return std::nullopt;
+  const std::size_t at = bytes.size() - read.rest;
   slice.header = header_of(*slice.format, file);
   const E_TransferSyntax encoding = slice.header.encoding;
   if (!is_little_endian(encoding) || slice.format->getDataset()->getOriginalXfer() != encoding) return std::nullopt;
@@ -146,9 +125,8 @@ ParsedSlice parse_slice(std::span<const std::byte> bytes, const std::filesystem:
   if (native) {
     slice = std::move(*native);
   } else {
-    OFCondition result;
-    std::size_t at = 0;
-    slice.format = read_format(bytes, read_all, at, result);
+    slice.format = std::make_unique<DcmFileFormat>();
+    const OFCondition result = parse_dicom(*slice.format, bytes, DCM_UndefinedTagKey).result;
     require(result.good(),
             "truncated or damaged file, " + file.string() + ": " + result.text() + "; copy the file again");
     slice.header = header_of(*slice.format, file);

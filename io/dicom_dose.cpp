@@ -11,6 +11,7 @@
 
 #include "io/dicom_header.h"
 #include "io/dicom_put.h"
+#include "io/dicom_stream.h"
 
 namespace tetwarp {
 
@@ -21,7 +22,7 @@ class DoseFile {
  public:
   explicit DoseFile(const std::filesystem::path& path) : path_(path) {
     prepare_dcmtk();
-    const OFCondition read = format_.loadFile(OFFilename(path.c_str()));
+    const OFCondition read = parse_dicom(format_, path, DCM_UndefinedTagKey).result;
     if (read.bad()) refuse(std::string("cannot be read as DICOM: ") + read.text());
     if (text_of(data(), DCM_SOPClassUID) != UID_RTDoseStorage) refuse("is no RT Dose object");
   }
@@ -142,12 +143,7 @@ bool is_dicom_dose(const std::filesystem::path& path) {
   if (!std::filesystem::is_regular_file(path, ignored)) return false;
   prepare_dcmtk();
   DcmFileFormat format;
-  if (format
-          .loadFileUntilTag(OFFilename(path.c_str()), EXS_Unknown, EGL_noChange, DCM_MaxReadLength, ERM_autoDetect,
-                            DCM_StudyDate)
-          .bad()) {
-    return false;
-  }
+  if (parse_dicom(format, path, DCM_StudyDate).result.bad()) return false;
   return text_of(*format.getDataset(), DCM_SOPClassUID) == UID_RTDoseStorage;
 }
 

@@ -1,7 +1,6 @@
 #include "io/dicom_header.h"
 
 #include <dcmtk/dcmdata/dcdict.h>
-#include <dcmtk/dcmdata/dcistrmf.h>
 #include <dcmtk/dcmdata/dcrledrg.h>
 #include <dcmtk/dcmdata/dcuid.h>
 #include <dcmtk/dcmjpeg/djdecode.h>
@@ -15,6 +14,8 @@
 #include <cstring>
 #include <fstream>
 #include <mutex>
+
+#include "io/dicom_stream.h"
 
 namespace tetwarp {
 namespace {
@@ -241,17 +242,13 @@ DicomFileHeader read_dicom_header(const std::filesystem::path& file) {
   sniff(header);
   if (!header.skip.empty()) return header;
 
-  DcmInputFileStream stream(OFFilename(file.c_str()));
   DcmFileFormat format;
-  format.transferInit();
-  const OFCondition result = format.readUntilTag(stream, EXS_Unknown, EGL_noChange, DCM_MaxReadLength, DCM_PixelData);
-  format.transferEnd();
-  const bool at_end = stream.eos();
+  const DicomRead read = parse_dicom(format, file, DCM_PixelData);
   header = header_of(format, file);
-  if (result.bad()) header.damage = result.text();
+  if (read.result.bad()) header.damage = read.result.text();
   std::error_code no_size;
   header.file_bytes = std::filesystem::file_size(file, no_size);
-  if (result.good() && !at_end) header.pixel_bytes = header.file_bytes - static_cast<std::uint64_t>(stream.tell());
+  if (read.result.good() && read.rest > 0) header.pixel_bytes = read.rest;
   header.skip = no_image_reason(header);
   header.broken = !header.skip.empty() && !header.damage.empty() && header.sop_class_uid.empty();
   return header;

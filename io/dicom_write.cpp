@@ -9,6 +9,7 @@
 #include "io/dicom_file.h"
 #include "io/dicom_header.h"
 #include "io/dicom_put.h"
+#include "io/dicom_stream.h"
 #include "io/parallel.h"
 
 namespace tetwarp {
@@ -90,9 +91,7 @@ bool is_tetwarp_dicom(const std::filesystem::path& file) {
   prepare_dcmtk();
   DcmFileFormat format;
   // The attributes asked for are all before (0018,a002). Only files with a preamble: ours have one.
-  const OFCondition condition = format.loadFileUntilTag(OFFilename(file.c_str()), EXS_Unknown, EGL_noChange,
-                                                        DCM_MaxReadLength, ERM_fileOnly, DCM_ContributionDateTime);
-  if (condition.bad()) return false;
+  if (parse_dicom(format, file, DCM_ContributionDateTime, ERM_fileOnly).result.bad()) return false;
   DcmDataset& data = *format.getDataset();
   DcmItem* last = nullptr;
   if (data.findAndGetSequenceItem(DCM_ContributingEquipmentSequence, last, -1).bad()) last = &data;

@@ -11,6 +11,7 @@
 #include "deform/errors.h"
 #include "io/dicom_header.h"
 #include "io/dicom_put.h"
+#include "io/dicom_stream.h"
 #include "io/image_reader.h"
 
 namespace tetwarp {
@@ -109,7 +110,7 @@ class RegistrationFile {
  public:
   explicit RegistrationFile(const std::filesystem::path& path) : file_(path.string()) {
     prepare_dcmtk();
-    const OFCondition read = format_.loadFile(OFFilename(path.c_str()));
+    const OFCondition read = parse_dicom(format_, path, DCM_UndefinedTagKey).result;
     require(read.good(), std::string("cannot be read as DICOM (") + read.text() + "), " + file_ + "; is it whole?");
     const std::string kind = text_of(*format_.getDataset(), DCM_SOPClassUID);
     require(kind == UID_DeformableSpatialRegistrationStorage,
@@ -250,9 +251,8 @@ bool claims(const std::filesystem::path&, std::string_view first_bytes) {
 bool holds_field(const std::filesystem::path& path) {
   prepare_dcmtk();
   DcmFileFormat format;
-  const OFCondition read = format.loadFileUntilTag(OFFilename(path.c_str()), EXS_Unknown, EGL_noChange,
-                                                   DCM_MaxReadLength, ERM_autoDetect, DCM_StudyDate);
-  return read.good() && text_of(*format.getDataset(), DCM_SOPClassUID) == UID_DeformableSpatialRegistrationStorage;
+  return parse_dicom(format, path, DCM_StudyDate).result.good() &&
+         text_of(*format.getDataset(), DCM_SOPClassUID) == UID_DeformableSpatialRegistrationStorage;
 }
 
 std::unique_ptr<FieldReader> open(const FieldSource& source) {
