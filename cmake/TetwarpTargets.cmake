@@ -10,6 +10,16 @@ function(tetwarp_library name)
   set_target_properties(tetwarp_${name} PROPERTIES EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
 endfunction()
 
+# tetwarp_module(NAME SOURCES ...): libtetwarp_NAME.so, which io/module.h loads when it is needed. It is built with
+# tetwarp_io, and looked for in lib of the build and of the installation.
+function(tetwarp_module name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES")
+  add_library(tetwarp_${name} MODULE ${arg_SOURCES})
+  tetwarp_configure(tetwarp_${name})
+  set_target_properties(tetwarp_${name} PROPERTIES LIBRARY_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/lib")
+  install(TARGETS tetwarp_${name} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+endfunction()
+
 # What every target of the project is compiled with.
 function(tetwarp_configure target)
   target_compile_features(${target} PUBLIC cxx_std_20)

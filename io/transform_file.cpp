@@ -8,6 +8,7 @@
 #include "deform/errors.h"
 #ifdef TETWARP_WITH_ITK
 #include "io/image_reader.h"
+#include "io/module.h"
 #include "io/niftyreg_spline.h"
 #include "itkbridge/transform_file.h"
 #endif
@@ -33,6 +34,16 @@ const char* name_of(TransformTool tool) {
   return tool == TransformTool::plastimatch ? "plastimatch" : "ITK";
 }
 
+/// ITK's transforms and HDF5 come in a module of their own: their libraries would take 8 ms of every start.
+LoadedTransform load_transform(const std::filesystem::path& path) {
+  static auto* const load = reinterpret_cast<decltype(&tetwarp_load_transform)>(
+      find_in_module(TETWARP_TRANSFORM_MODULE, "tetwarp_load_transform"));
+  if (!load) refuse_without_module("transform files", TETWARP_TRANSFORM_MODULE, path.string(), "");
+  LoadedTransform loaded;
+  load(path, loaded);
+  return loaded;
+}
+
 }  // namespace
 
 bool is_transform_file(const std::filesystem::path& path) {
@@ -47,7 +58,8 @@ bool is_transform_file(const std::filesystem::path& path) {
 
 TransformFile read_transform_file(const std::filesystem::path& path) {
   if (image_format(path) == ImageFormat::nifti) return read_niftyreg_spline(path);
-  const StoredTransform stored = read_transform(path);
+  LoadedTransform loaded = load_transform(path);
+  const StoredTransform& stored = loaded.stored;
   const std::string file = path.string();
   TransformFile result{.tool = name_of(stored.tool),
                        .classes = {},
@@ -59,8 +71,7 @@ TransformFile read_transform_file(const std::filesystem::path& path) {
     result.classes.push_back(part.type);
     result.parameters += part.parameters.size();
   }
-  result.displacement = [transform = make_transform(stored, file), outside = result.outside,
-                         file](const glm::dvec3& point) {
+  result.displacement = [transform = std::move(loaded.map), outside = result.outside, file](const glm::dvec3& point) {
     bool is_outside = false;
     const glm::dvec3 by = transform(point, is_outside) - point;
     if (is_outside) outside->fetch_add(1, std::memory_order_relaxed);

@@ -122,4 +122,9 @@ StoredTransform read_transform(const std::filesystem::path& path) {
   return {TransformTool::elastix, read_elastix(path)};
 }
 
+void tetwarp_load_transform(const std::filesystem::path& path, LoadedTransform& loaded) {
+  loaded.stored = read_transform(path);
+  loaded.map = make_transform(loaded.stored, path.string());
+}
+
 }  // namespace tetwarp

@@ -37,4 +37,13 @@ using TransformFunction = std::function<glm::dvec3(const glm::dvec3& point, bool
 ///         finite, a grid that cannot be
 TransformFunction make_transform(const StoredTransform& stored, const std::string& file);
 
+/// A file read and made ready.
+struct LoadedTransform {
+  StoredTransform stored;
+  TransformFunction map;
+};
+
+/// What the module of these files is asked for (io/transform_file.cpp loads it): `read_transform` and `make_transform`.
+extern "C" void tetwarp_load_transform(const std::filesystem::path& path, LoadedTransform& loaded);
+
 }  // namespace tetwarp

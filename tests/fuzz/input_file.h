@@ -19,12 +19,15 @@ inline std::uint64_t& accepted_reads() {
   return count;
 }
 
-/// Runs a reader. Whatever it throws that is not an error of Tetwarp goes on, and is a crash.
+/// Runs a reader. Whatever it throws that is not an error of Tetwarp goes on, and is a crash; so is a reader that is
+/// not there, of which nothing would be tested.
 /// @return  whether it took its input
 template <class Action>
 bool accepted(Action&& action) {
   try {
     action();
+  } catch (const tetwarp::NotCompiled&) {
+    throw;
   } catch (const tetwarp::Error&) {
     return false;
   }
@@ -37,6 +40,8 @@ template <class Action>
 void asked(Action&& action) {
   try {
     action();
+  } catch (const tetwarp::NotCompiled&) {
+    throw;
   } catch (const tetwarp::Error&) {
   }
 }

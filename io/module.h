@@ -1,0 +1,23 @@
+#pragma once
+
+// Private to io/: what most runs of a program do not need lies in a library of its own, which is loaded when it is
+// first asked for: the libraries that it brings along would take their time of every start.
+#include <string>
+
+namespace tetwarp {
+
+/// A function of a module, which stays until the program ends. The module is looked for where the dynamic linker looks
+/// for the libraries of the program: `lib` of the build, or beside the program's folder.
+/// @param module    file name
+/// @param function  an extern "C" name
+/// @return  null if the module cannot be loaded, or has no such function
+void* find_in_module(const char* module, const char* function);
+
+/// @param what       needs the module: "XML files of VTK"
+/// @param path       of the file that was to be read
+/// @param otherwise  what to do without the module, ", or ..."; empty: nothing
+/// @throws NotCompiled, always
+[[noreturn]] void refuse_without_module(const std::string& what, const std::string& module, const std::string& path,
+                                        const std::string& otherwise);
+
+}  // namespace tetwarp
