@@ -1,6 +1,7 @@
 #include "cuda/devices.h"
 #include "cuda/fetch.h"
 #include "deform/resampler.h"
+#include "deform/simulate/chainmail.h"
 #include "deform/simulate/mass_spring.h"
 
 namespace tetwarp {
@@ -34,6 +35,8 @@ namespace simulate {
 std::unique_ptr<Simulation> make_cuda_mass_spring(const Model&, const MassSpringOptions&, int) {
   throw NotCompiled("CUDA is not in this build; use --backend cpu, the methods agree to rounding");
 }
+
+std::unique_ptr<Simulation> make_cuda_chainmail(const Model&, int) { not_compiled(); }
 
 }  // namespace simulate
 

@@ -59,6 +59,12 @@ class Simulation {
   virtual std::span<const glm::vec3> displacement() const = 0;
   virtual Memory memory() const { return Memory::host; }
 
+  /// The same, copied to the host whatever the memory.
+  virtual std::vector<glm::vec3> displacement_on_host() const {
+    const std::span<const glm::vec3> from = displacement();
+    return {from.begin(), from.end()};
+  }
+
   /// Starts from these displacements (host memory) instead. @throws InputError as set_loads
   virtual void set_displacement(std::span<const glm::vec3> displacement) = 0;
 };

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "deform/simulate/chain_step.h"
+#include "deform/simulate/simulation.h"
+
+namespace tetwarp::simulate {
+
+/// Nodes of a box of vertices, numbered one after the other.
+struct ChainBlock {
+  std::int32_t begin = 0, end = 0;
+  int colour = 0;                    ///< blocks of one colour share no link
+  std::vector<std::int32_t> beside;  ///< blocks that share links with it
+};
+
+/// A model made ready for chainmail on any backend.
+///
+/// Nodes are numbered block by block, in a block as in the model: a block is a few rows of vertices, on the chequered
+/// pattern of `colour`, with the copies of its vertices. The result does not depend on the numbers.
+class ChainPlan {
+ public:
+  /// @throws InputError for a lattice that is not orthonormal, or limits that do not include 0
+  explicit ChainPlan(const Model& model);
+
+  /// Of host arrays, which stay with the plan. @param moves  one a node
+  ChainView view(const std::uint8_t* moves) const {
+    return {nodes(), around.data(), links.data(), shares.data(), moves};
+  }
+  std::int32_t nodes() const { return static_cast<std::int32_t>(node_of.size()); }
+
+  /// @throws InputError where a vector is not finite or too long; `what` and the node's number in the model name it
+  Units to_units(const glm::vec3& lps, const char* what, std::size_t node) const;
+  std::vector<Units> to_units(std::span<const glm::vec3> displacement) const;
+
+  /// The placed nodes with their goals; the starts are left to the backend. @throws InputError as set_loads
+  std::vector<PlacedNode> read(const Loads& loads) const;
+  /// Whether links lead from a node to a placed one.
+  std::vector<std::uint8_t> moving(std::span<const PlacedNode> placed) const;
+
+  std::vector<std::int32_t> node_of;    ///< the model's number of each node
+  std::vector<std::int32_t> number_of;  ///< the other way
+  std::vector<ChainBlock> blocks;
+  std::vector<std::int32_t> around;  ///< see ChainView
+  std::vector<LinkUnits> links;      ///< likewise
+  /// At 3 * (n_i + 3 n_j + 9 n_k) + axis, for n_i, n_j, n_k links along the axes: the weight of a neighbour on an axis
+  /// in the mean, 2^-16. Weights are as one over the squared length of a link, so that what the mean leads to does not
+  /// depend on the shape of cells.
+  std::vector<std::int32_t> shares;
+  std::int32_t momentum = 0, patience = 1;  ///< see Pacer
+  glm::dmat3 direction{1};
+
+ private:
+  void number(const Model& model);
+  void connect(const Model& model);
+  void find_islands();
+  void weigh(const Geometry& lattice);
+
+  std::vector<std::int32_t> island_;  ///< of each node: of nodes with links between them
+  std::int32_t islands_ = 0;
+};
+
+/// @throws InputError unless the part is from 0 to 1 and the rule's numbers are not negative
+void require_valid(double part, const StoppingRule& rule);
+
+/// Of `square_of_motion`.
+double motion_mm(std::uint64_t square);
+
+}  // namespace tetwarp::simulate

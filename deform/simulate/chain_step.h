@@ -1,0 +1,214 @@
+#pragma once
+
+#include <cstdint>
+
+#include "deform/core/host_device.h"
+
+/// Chainmail in whole numbers: what one node does, the same on every backend. What is solved and why the order does not
+/// matter is in chainmail.h; here are its parts.
+namespace tetwarp::simulate {
+
+/// Displacements are counted in 2^-16 mm along the lattice's axes.
+inline constexpr double kUnitsPerMm = 65536;
+/// No node goes further than 4096 mm, so that two of these and a limit fit 32 bits.
+inline constexpr std::int32_t kFarthest = std::int32_t{1} << 28;
+/// A limit beyond this is none.
+inline constexpr std::int32_t kLongest = 2 * kFarthest;
+
+/// Displacement of a node.
+struct Units {
+  alignas(16) std::int32_t at[3];
+};
+
+/// LinkLimits in whole units.
+struct LinkUnits {
+  std::int32_t shortest, longest, shear;
+
+  /// The most by which the upper end's displacement along an axis may exceed the lower end's, and fall short of it.
+  TETWARP_HD std::int32_t above(bool own_axis) const { return own_axis ? longest : shear; }
+  TETWARP_HD std::int32_t below(bool own_axis) const { return own_axis ? -shortest : shear; }
+};
+
+/// Nodes and links as the backends see them, numbered as ChainPlan does.
+struct ChainView {
+  std::int32_t nodes;
+  const std::int32_t* around;  ///< at (2 * axis + is_up) * nodes + node: the neighbour; -1: no link
+  const LinkUnits* links;      ///< at axis * nodes + node: of the link up that axis
+  const std::int32_t* shares;  ///< see ChainPlan::shares
+  const std::uint8_t* moves;   ///< whether links lead from the node to a placed one
+};
+
+/// Steps of relaxation: how far towards the mean, and how much of the last motion is kept; 2^-12.
+struct Pace {
+  std::int32_t towards_mean, kept;
+};
+inline constexpr int kPaceBits = 12, kShareBits = 16;
+
+/// The pace of each step. The first is plain; the others keep momentum, of which half is given up whenever the motion
+/// has not fallen for some time: for where limits would keep it swinging.
+struct Pacer {
+  std::int32_t full, patience;  ///< momentum, and steps
+  Pace pace{std::int32_t{1} << kPaceBits, 0};
+  std::int32_t steps = 0;
+  std::uint64_t least = ~std::uint64_t{0}, least_before = ~std::uint64_t{0};
+
+  TETWARP_HD Pacer(std::int32_t kept, std::int32_t patient) : full(kept), patience(patient) {}
+
+  /// @param motion  square of the largest of the step that was made
+  TETWARP_HD void follow(std::uint64_t motion) {
+    least = motion < least ? motion : least;
+    if (++steps % patience == 0) {
+      if (least >= least_before) full /= 2;
+      least_before = least;
+      least = ~std::uint64_t{0};
+    }
+    pace = {(std::int32_t{1} << kPaceBits) + full, full};
+  }
+};
+
+TETWARP_HD inline std::int32_t smaller(std::int32_t a, std::int32_t b) { return a < b ? a : b; }
+TETWARP_HD inline std::int32_t larger(std::int32_t a, std::int32_t b) { return a > b ? a : b; }
+
+/// To the nearest whole number, halves away from 0: the same for a mirrored lattice.
+TETWARP_HD inline std::int64_t rounded_shift(std::int64_t value, int bits) {
+  const std::int64_t half = std::int64_t{1} << (bits - 1);
+  return value < 0 ? -((half - value) >> bits) : (value + half) >> bits;
+}
+
+/// Lowers `upper` and raises `lower` of a node to what its links to its neighbours' leave. @return whether it had to
+///
+/// Repeated for all nodes until nothing changes, in any order, this ends at the largest displacements that keep all
+/// limits and nowhere exceed the `upper` of the start, and at the smallest that nowhere fall below the `lower`.
+TETWARP_HD inline bool tighten(const ChainView& chain, Units* upper, Units* lower, std::int32_t node) {
+  Units high = upper[node], low = lower[node];
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::int32_t* around = chain.around + std::int64_t{2} * axis * chain.nodes + node;
+    const std::int32_t down = around[0], up = around[chain.nodes];
+    const LinkUnits* links = chain.links + std::int64_t{axis} * chain.nodes;
+    if (up >= 0) {
+      const LinkUnits link = links[node];
+      const Units most = upper[up], least = lower[up];
+      for (int c = 0; c < 3; ++c) {
+        high.at[c] = smaller(high.at[c], most.at[c] + link.below(c == axis));
+        low.at[c] = larger(low.at[c], least.at[c] - link.above(c == axis));
+      }
+    }
+    if (down >= 0) {
+      const LinkUnits link = links[down];
+      const Units most = upper[down], least = lower[down];
+      for (int c = 0; c < 3; ++c) {
+        high.at[c] = smaller(high.at[c], most.at[c] + link.above(c == axis));
+        low.at[c] = larger(low.at[c], least.at[c] - link.below(c == axis));
+      }
+    }
+  }
+  bool changed = false;
+  for (int c = 0; c < 3; ++c) changed = changed || high.at[c] != upper[node].at[c] || low.at[c] != lower[node].at[c];
+  if (changed) {
+    upper[node] = high;
+    lower[node] = low;
+  }
+  return changed;
+}
+
+/// What the placed nodes leave a node: displacements from `least` to `most`.
+struct Span {
+  Units least, most;
+};
+
+/// From the ends of `tighten`, begun at the placed nodes. Where these contradict each other the ends are crossed;
+/// both keep all limits, and so does what is larger or smaller of them.
+TETWARP_HD inline Span span_between(const Units& upper, const Units& lower) {
+  Span span{};
+  for (int c = 0; c < 3; ++c) {
+    span.least.at[c] = smaller(upper.at[c], lower.at[c]);
+    span.most.at[c] = larger(upper.at[c], lower.at[c]);
+  }
+  return span;
+}
+
+TETWARP_HD inline Units clamped(const Units& value, const Span& span) {
+  Units result{};
+  for (int c = 0; c < 3; ++c) {
+    result.at[c] = larger(span.least.at[c], smaller(value.at[c], span.most.at[c]));
+  }
+  return result;
+}
+
+/// A node's place after a step towards the mean of its neighbours, before limits are looked at.
+///
+/// The products are below 2^59. @param before  where the nodes were a step ago
+TETWARP_HD inline Units relaxed(const ChainView& chain, const Units* now, const Units* before, const Span& span,
+                                const Pace& pace, std::int32_t node) {
+  const Units own = now[node];
+  if (!chain.moves[node]) return own;
+  std::int64_t pull[3][3] = {};
+  int links[3] = {};
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::int32_t* around = chain.around + std::int64_t{2} * axis * chain.nodes + node;
+    for (int side = 0; side < 2; ++side) {
+      const std::int32_t other = around[side == 0 ? 0 : chain.nodes];
+      if (other < 0) continue;
+      ++links[axis];
+      for (int c = 0; c < 3; ++c) pull[axis][c] += now[other].at[c] - own.at[c];
+    }
+  }
+  const std::int32_t* share = chain.shares + 3 * (links[0] + 3 * links[1] + 9 * links[2]);
+  Units result{};
+  for (int c = 0; c < 3; ++c) {
+    const std::int64_t to_mean = pull[0][c] * share[0] + pull[1][c] * share[1] + pull[2][c] * share[2];
+    const std::int64_t last = std::int64_t{own.at[c] - before[node].at[c]} * (std::int64_t{1} << kShareBits);
+    const std::int64_t to =
+        own.at[c] + rounded_shift(to_mean * pace.towards_mean + last * pace.kept, kShareBits + kPaceBits);
+    const std::int64_t low = span.least.at[c], high = span.most.at[c];
+    result.at[c] = static_cast<std::int32_t>(to < low ? low : to > high ? high : to);
+  }
+  return result;
+}
+
+/// Halfway between two states that keep all limits, towards 0: it keeps them, too. (So do halves rounded down, D, and
+/// rounded up, U, and 0; this is max(D, min(U, 0)).)
+TETWARP_HD inline Units halfway(const Units& a, const Units& b) {
+  Units result{};
+  for (int c = 0; c < 3; ++c) result.at[c] = (a.at[c] + b.at[c]) / 2;
+  return result;
+}
+
+/// Squared length of a motion, units.
+TETWARP_HD inline std::uint64_t square_of_motion(const Units& from, const Units& to) {
+  std::int64_t sum = 0;
+  for (int c = 0; c < 3; ++c) sum += std::int64_t{to.at[c] - from.at[c]} * (to.at[c] - from.at[c]);
+  return static_cast<std::uint64_t>(sum);
+}
+
+/// To the nearest whole number, halves away from 0.
+TETWARP_HD inline std::int32_t rounded(double value) {
+  return value < 0 ? -static_cast<std::int32_t>(0.5 - value) : static_cast<std::int32_t>(value + 0.5);
+}
+
+/// A placed node and its way.
+struct PlacedNode {
+  std::int32_t node;
+  Units start, goal;
+
+  TETWARP_HD Units at(double part) const {
+    Units result{};
+    for (int c = 0; c < 3; ++c) {
+      const double way = static_cast<double>(goal.at[c]) - static_cast<double>(start.at[c]);
+      result.at[c] = rounded(static_cast<double>(start.at[c]) + part * way);
+    }
+    return result;
+  }
+};
+
+/// LPS mm. @param direction  of the lattice; where it is the identity, only the result is rounded
+TETWARP_HD inline glm::vec3 to_lps(const glm::dmat3& direction, const Units& units) {
+  constexpr double kMm = 1 / kUnitsPerMm;
+  const double i = units.at[0] * kMm, j = units.at[1] * kMm, k = units.at[2] * kMm;
+  const auto along = [&](int axis) {
+    return static_cast<float>(direction[0][axis] * i + direction[1][axis] * j + direction[2][axis] * k);
+  };
+  return {along(0), along(1), along(2)};
+}
+
+}  // namespace tetwarp::simulate

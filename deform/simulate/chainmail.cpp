@@ -1,0 +1,231 @@
+#include "deform/simulate/chainmail.h"
+
+#include <algorithm>
+#include <atomic>
+
+#include "deform/cpu/tiles.h"
+#include "deform/errors.h"
+#include "deform/simulate/chain_plan.h"
+
+namespace tetwarp::simulate {
+
+namespace {
+
+class CpuChainmail final : public Simulation {
+ public:
+  CpuChainmail(const Model& model, const Limits& limits)
+      : plan_(model), arena_(cpu::make_arena(limits)), active_(plan_.blocks.size()) {
+    const auto count = static_cast<std::size_t>(plan_.nodes());
+    for (std::vector<Units>* state : {&now_, &before_, &shown_, &upper_, &lower_}) state->resize(count);
+    spans_.resize(count);
+    moves_.resize(count);
+    displacement_.resize(count);
+    for (std::size_t n = 0; n < plan_.blocks.size(); ++n) of_colour_[plan_.blocks[n].colour].push_back(n);
+  }
+
+  void set_loads(const Loads& loads) override {
+    std::vector<PlacedNode> placed = plan_.read(loads);
+    for (PlacedNode& one : placed) one.start = shown_[at(one.node)];
+    moves_ = plan_.moving(placed);
+    placed_ = std::move(placed);
+    has_loads_ = true;
+  }
+
+  Settled advance(double part, const StoppingRule& rule, const Control& control) override {
+    require(has_loads_, "advance needs loads: call set_loads first");
+    require_valid(part, rule);
+    Settled settled;
+    arena_.execute([&] { settled = run(part, rule, control); });
+    return settled;
+  }
+
+  std::span<const glm::vec3> displacement() const override { return displacement_; }
+
+  void set_displacement(std::span<const glm::vec3> displacement) override {
+    upper_ = plan_.to_units(displacement);
+    lower_ = upper_;
+    arena_.execute([&] {
+      activate_all();
+      tighten_all({});
+      for_nodes([&](std::size_t n) { now_[n] = shown_[n] = halfway(upper_[n], lower_[n]); });
+      convert();
+    });
+  }
+
+ private:
+  static std::size_t at(std::int32_t n) { return static_cast<std::size_t>(n); }
+
+  /// Calls `work(block)` for all blocks, each by one thread.
+  template <class Work>
+  void for_blocks(Work&& work) {
+    tbb::parallel_for(std::size_t{0}, plan_.blocks.size(), work);
+  }
+  template <class Work>
+  void for_nodes(Work&& work) {
+    for_blocks([&](std::size_t block) {
+      for (std::int32_t n = plan_.blocks[block].begin; n < plan_.blocks[block].end; ++n) work(at(n));
+    });
+  }
+
+  Settled run(double part, const StoppingRule& rule, const Control& control) {
+    Settled settled;
+    std::uint64_t motion = follow(part, control);
+    Pacer pacer(plan_.momentum, plan_.patience);
+    try {
+      while (settled.steps < rule.steps && !settled.reached) {
+        motion = relax(pacer.pace, control);
+        ++settled.steps;
+        settled.reached = motion_mm(motion) <= rule.motion_mm;
+        pacer.follow(motion);
+        if (control.progress) control.progress(static_cast<double>(settled.steps) / rule.steps);
+      }
+    } catch (const Cancelled&) {
+      show(part);
+      throw;
+    }
+    settled.motion_mm = motion_mm(motion);
+    show(part);
+    return settled;
+  }
+
+  /// The chain stage: nodes move as far as placed ones force them to.
+  std::uint64_t follow(double part, const Control& control) {
+    const auto any = [](std::int32_t mm) { return Units{{mm, mm, mm}}; };
+    for_nodes([&](std::size_t n) {
+      upper_[n] = any(kFarthest);
+      lower_[n] = any(-kFarthest);
+    });
+    for (const PlacedNode& one : placed_) upper_[at(one.node)] = lower_[at(one.node)] = one.at(part);
+    activate_all();
+    tighten_all(control);
+    return finish([&](std::size_t n) {
+      spans_[n] = span_between(upper_[n], lower_[n]);
+      return clamped(now_[n], spans_[n]);
+    });
+  }
+
+  /// One step of relaxation.
+  std::uint64_t relax(const Pace& pace, const Control& control) {
+    const ChainView chain = plan_.view(moves_.data());
+    for_nodes([&](std::size_t n) {
+      upper_[n] = lower_[n] =
+          relaxed(chain, now_.data(), before_.data(), spans_[n], pace, static_cast<std::int32_t>(n));
+    });
+    activate_all();
+    tighten_all(control);
+    return finish([&](std::size_t n) { return halfway(upper_[n], lower_[n]); });
+  }
+
+  /// Puts each node where `place` says. @return square of the largest motion
+  template <class Place>
+  std::uint64_t finish(Place&& place) {
+    std::vector<std::uint64_t> motion(plan_.blocks.size());
+    for_blocks([&](std::size_t block) {
+      for (std::int32_t n = plan_.blocks[block].begin; n < plan_.blocks[block].end; ++n) {
+        before_[at(n)] = now_[at(n)];
+        now_[at(n)] = place(at(n));
+        motion[block] = std::max(motion[block], square_of_motion(before_[at(n)], now_[at(n)]));
+      }
+    });
+    return *std::max_element(motion.begin(), motion.end());
+  }
+
+  void activate_all() {
+    for (std::atomic<std::uint8_t>& active : active_) active.store(1, std::memory_order_relaxed);
+  }
+
+  /// Runs `tighten` in the active blocks and in those beside what changes, until nothing does.
+  ///
+  /// Blocks of one colour run at the same time: none reads what another one writes.
+  void tighten_all(const Control& control) {
+    for (bool any = true; any;) {
+      if (control.stop.stop_requested()) throw Cancelled();
+      any = false;
+      for (const std::vector<std::size_t>& blocks : of_colour_) {
+        std::atomic<bool> changed = false;
+        tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t n) {
+          if (!active_[blocks[n]].exchange(0, std::memory_order_relaxed)) return;
+          if (!tighten_block(plan_.blocks[blocks[n]])) return;
+          for (const std::int32_t beside : plan_.blocks[blocks[n]].beside) {
+            active_[at(beside)].store(1, std::memory_order_relaxed);
+          }
+          changed.store(true, std::memory_order_relaxed);
+        });
+        any = any || changed;
+      }
+    }
+  }
+
+  /// Up and down through the nodes until nothing changes. @return whether anything did
+  bool tighten_block(const ChainBlock& block) {
+    const ChainView chain = plan_.view(moves_.data());
+    bool any = false;
+    for (bool up = true;; up = !up) {
+      bool changed = false;
+      for (std::int32_t n = 0; n < block.end - block.begin; ++n) {
+        changed |= tighten(chain, upper_.data(), lower_.data(), up ? block.begin + n : block.end - 1 - n);
+      }
+      if (!changed) return any;
+      any = true;
+    }
+  }
+
+  void show(double part) {
+    shown_ = now_;
+    for (const PlacedNode& one : placed_) shown_[at(one.node)] = one.at(part);
+    convert();
+  }
+
+  void convert() {
+    for_nodes([&](std::size_t n) { displacement_[at(plan_.node_of[n])] = to_lps(plan_.direction, shown_[n]); });
+  }
+
+  ChainPlan plan_;
+  tbb::task_arena arena_;
+  std::vector<std::size_t> of_colour_[2];          ///< numbers of blocks
+  std::vector<std::atomic<std::uint8_t>> active_;  ///< blocks
+  std::vector<PlacedNode> placed_;
+  std::vector<std::uint8_t> moves_;
+  bool has_loads_ = false;
+  std::vector<Units> now_, before_;   ///< always within the limits
+  std::vector<Units> shown_;          ///< the same with placed nodes in their places
+  std::vector<Units> upper_, lower_;  ///< what `tighten` works on
+  std::vector<Span> spans_;           ///< what placed nodes leave
+  std::vector<glm::vec3> displacement_;
+};
+
+}  // namespace
+
+std::unique_ptr<Simulation> make_cpu_chainmail(const Model& model, Limits limits) {
+  return std::make_unique<CpuChainmail>(model, limits);
+}
+
+std::vector<BrokenLink> links_beyond_limits(const Model& model, std::span<const glm::vec3> displacement,
+                                            double tolerance_mm) {
+  require(displacement.size() == model.nodes(), "one displacement a node is expected, " +
+                                                    std::to_string(model.nodes()) + "; found " +
+                                                    std::to_string(displacement.size()));
+  const glm::dmat3& direction = model.lattice.direction;
+  std::vector<BrokenLink> broken;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (std::size_t n = 0; n < model.nodes(); ++n) {
+      const std::int32_t other = model.neighbour[model.link(direction_up(axis), n)];
+      if (other < 0) continue;
+      const glm::vec3 &upper = displacement[static_cast<std::size_t>(other)], &lower = displacement[n];
+      const glm::dvec3 apart(double{upper.x} - double{lower.x}, double{upper.y} - double{lower.y},
+                             double{upper.z} - double{lower.z});
+      const LinkLimits& limits = model.limits[static_cast<std::size_t>(axis) * model.nodes() + n];
+      double beyond = 0;
+      for (int c = 0; c < 3; ++c) {
+        const double along = direction[c].x * apart.x + direction[c].y * apart.y + direction[c].z * apart.z;
+        const double least = c == axis ? limits.shortest : -limits.shear,
+                     most = c == axis ? limits.longest : limits.shear;
+        beyond = std::max({beyond, least - along, along - most});
+      }
+      if (beyond > tolerance_mm) broken.push_back({static_cast<std::uint32_t>(n), axis, beyond});
+    }
+  }
+  return broken;
+}
+
+}  // namespace tetwarp::simulate
