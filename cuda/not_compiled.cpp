@@ -1,5 +1,4 @@
 #include "cuda/devices.h"
-#include "cuda/fetch.h"
 #include "deform/resampler.h"
 #include "deform/simulate/chainmail.h"
 #include "deform/simulate/mass_spring.h"
@@ -23,8 +22,6 @@ void wake_cuda_device(int) {}
 std::string describe_cuda_device(int) { not_compiled(); }
 
 void copy_from_cuda_device(void*, const void*, std::size_t) { not_compiled(); }
-
-void fetch_from_cuda(std::span<glm::vec3>, const glm::vec3*) { not_compiled(); }
 
 std::unique_ptr<Resampler> make_cuda_resampler(Geometry, int, Limits) { not_compiled(); }
 
