@@ -1,5 +1,6 @@
 #include "bench/backend.h"
 #include "bench/gpu_bench.h"
+#include "bench/simulate_bench.h"
 
 namespace tetwarp::bench {
 
@@ -14,5 +15,7 @@ std::unique_ptr<Backend> make_cuda_backend(int, InverseIn) { not_compiled(); }
 CudaFacts describe_cuda(int) { not_compiled(); }
 
 GpuResults measure_gpu(const GpuOptions&, const std::function<void(const std::string&)>&) { not_compiled(); }
+
+std::unique_ptr<FrameVolumes> make_device_volumes(const Volume<std::int16_t>&, double) { not_compiled(); }
 
 }  // namespace tetwarp::bench

@@ -1,4 +1,5 @@
-// tetwarp-bench: what the paper compares, what a deformation and its inverse cost on a GPU and on the CPU, and files.
+// tetwarp-bench: what the paper compares, what a deformation and its inverse cost on a GPU and on the CPU, simulations,
+// and files.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
@@ -210,6 +211,40 @@ void add_io(CLI::App& app, IoOptions& options) {
   command->footer("Example: tetwarp bench io --repeats 5 --json io.json");
 }
 
+void add_simulate(CLI::App& app, SimulateOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "simulate", "What chainmail and mass-spring cost on a phantom: until they have settled, and frame by frame");
+  command->add_option("SCENARIO", options.scenario, "JSON; its first phase is simulated, by every method")->required();
+  command->add_option("--methods", options.methods, "Methods")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(CLI::IsMember(options.methods))
+      ->capture_default_str();
+  command->add_option("--backends", options.backends, "Where: cpu, cuda")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(CLI::IsMember({"cpu", "cuda"}))
+      ->capture_default_str();
+  command->add_option("--slices", options.slices, "Slices of the phantom")
+      ->check(CLI::Range(2, 100000))
+      ->capture_default_str();
+  command->add_option("--width", options.width, "Columns and rows of the phantom")
+      ->check(CLI::Range(2, 100000))
+      ->capture_default_str();
+  add_frames(*command, options.frames, options.warmup);
+  command->add_option("--steps", options.steps, "Steps that a frame may take")
+      ->check(CLI::Range(0, 1000000))
+      ->capture_default_str();
+  command->add_option("--threads", options.threads, "Threads of the CPU; 0 is all")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_option("--device", options.device, "CUDA device")->check(CLI::NonNegativeNumber)->capture_default_str();
+  command->add_option("--json", options.json, "Every number, as JSON")->type_name("FILE");
+  command->add_flag("--check", options.check, "Exit with 1 where a floor is missed");
+  command->add_flag("--verbose", options.verbose, "A line on standard error for every step");
+  command->footer("Example: tetwarp bench simulate examples/scenarios/diaphragm_push.json --json simulate.json");
+}
+
 /// "4,8,16", "none" or nothing.
 std::vector<std::int64_t> parse_cell_sizes(const std::string& text) {
   std::vector<std::int64_t> sizes;
@@ -234,6 +269,7 @@ int run_command_line(int argc, char** argv) {
   CpuOptions cpu;
   InvertOptions invert;
   IoOptions io;
+  SimulateOptions simulate;
   Words words;
   std::string gpu_cell_sizes = words.cell_sizes, cpu_cell_sizes = words.cell_sizes;
   add_paper(app, paper, words);
@@ -241,6 +277,7 @@ int run_command_line(int argc, char** argv) {
   add_cpu(app, cpu, cpu_cell_sizes);
   add_invert(app, invert);
   add_io(app, io);
+  add_simulate(app, simulate);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& help) {
@@ -254,6 +291,7 @@ int run_command_line(int argc, char** argv) {
   }
   if (app.got_subcommand("invert")) return run_invert(invert);
   if (app.got_subcommand("io")) return run_io(io);
+  if (app.got_subcommand("simulate")) return run_simulate(simulate);
   if (app.got_subcommand("gpu")) {
     gpu.cell_sizes = parse_cell_sizes(gpu_cell_sizes);
     return run_gpu(gpu);

@@ -88,6 +88,19 @@ struct IoOptions {
   bool verbose = false;  ///< a line to standard error for every step
 };
 
+struct SimulateOptions {
+  std::filesystem::path scenario;  ///< JSON; its first phase is simulated, by every method
+  std::vector<std::string> methods{"chainmail", "mass-spring"};
+  std::vector<std::string> backends{"cpu"};
+  std::int64_t width = 512, slices = 300;  ///< of the phantom
+  int frames = 60, warmup = 3;             ///< timed, and before them
+  int steps = 2;                           ///< that a frame may take
+  int threads = 0;                         ///< 0: all
+  int device = 0;                          ///< of CUDA
+  std::filesystem::path json;
+  bool check = false, verbose = false;
+};
+
 /// The tables of the paper, to standard output. @return the exit status
 int run_paper(const PaperOptions& options);
 /// What a frame costs on a CUDA device, against other methods, copies and memory. @return the exit status
@@ -99,5 +112,7 @@ int run_cpu(const CpuOptions& options);
 /// The inverse displacement field on the CPU, against ITK's inverters: time, error and what has no source. @return the
 /// exit status
 int run_invert(const InvertOptions& options);
+/// What a scenario costs until it has settled, and frame by frame with resampling. @return the exit status
+int run_simulate(const SimulateOptions& options);
 
 }  // namespace tetwarp::bench

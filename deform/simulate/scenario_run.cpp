@@ -91,18 +91,16 @@ Frame ScenarioRun::next(const Control& control) {
   return frame;
 }
 
-DeformedFrame ScenarioRun::next(Resampler& resampler, std::span<const Target> targets, Outside outside,
-                                const Maps& maps, const Control& control) {
-  DeformedFrame result;
-  result.frame = next(control);
+Report ScenarioRun::resample(Resampler& resampler, std::span<const Target> targets, Outside outside, const Maps& maps,
+                             const Control& control) {
+  require(simulation_ != nullptr, "a scenario has a field after its first frame");
   if (division_.replaced.empty()) {
     resampler.set_field(simulate::view(*simulation_, model_, outside), control);
   } else {
     field_ = field();
     resampler.set_field(tetwarp::view(field_, outside), control);
   }
-  result.report = resampler.resample(whole(resampler.output()), targets, maps, control);
-  return result;
+  return resampler.resample(whole(resampler.output()), targets, maps, control);
 }
 
 }  // namespace tetwarp::simulate

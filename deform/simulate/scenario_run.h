@@ -25,12 +25,6 @@ struct Frame {
   Settled settled;
 };
 
-/// And of the volumes that were sent through it.
-struct DeformedFrame {
-  Frame frame;
-  Report report;
-};
-
 /// A scenario that is played on a patient, frame by frame.
 ///
 /// Where other cuts are open than in the phase before, the model is made anew: vertices keep their places, and of
@@ -48,11 +42,11 @@ class ScenarioRun {
   /// Simulates the next frame. @throws Cancelled, and what the simulation throws
   Frame next(const Control& control = {});
 
-  /// Simulates the next frame and sends volumes through its field: the loop of an interactive program. Where the
-  /// simulation keeps displacements on a device they stay there, unless open cuts divide cells. Nothing is allocated a
-  /// frame once sizes repeat. @throws as `next` and Resampler do
-  DeformedFrame next(Resampler& resampler, std::span<const Target> targets, Outside outside = Outside::background,
-                     const Maps& maps = {}, const Control& control = {});
+  /// Sends volumes through the field as it is after the last frame: with `next` in turn, the loop of an interactive
+  /// program. Where the simulation keeps displacements on a device they stay there, unless open cuts divide cells;
+  /// nothing is allocated a frame once sizes repeat. @throws as Resampler does
+  Report resample(Resampler& resampler, std::span<const Target> targets, Outside outside = Outside::background,
+                  const Maps& maps = {}, const Control& control = {});
 
   const PhaseLoads& loads(std::size_t phase) const { return loads_[phase]; }
   const std::vector<std::uint8_t>& tissues() const { return tissue_of_cell_; }  ///< of each cell

@@ -62,17 +62,18 @@ TEST(CutRun, FramesAreResampledThroughTheirFields) {
   ScenarioRun loop(scenario, patient, cpu()), hand(scenario, patient, cpu());
   const auto resampler = make_cpu_resampler(small_grid()), other = make_cpu_resampler(small_grid());
   while (!loop.is_done()) {
-    const DeformedFrame frame = loop.next(*resampler, {&to_loop, 1});
+    const Frame frame = loop.next();
+    const Report of_loop = loop.resample(*resampler, {&to_loop, 1});
     hand.next();
     const VertexField field = hand.field();
     other->set_field(tetwarp::view(field, Outside::background));
     const Report report = other->resample(whole(small_grid()), {&to_hand, 1});
     EXPECT_EQ(by_loop.voxels, by_hand.voxels);
-    EXPECT_EQ(frame.report.uncovered, report.uncovered);
-    if (frame.frame.number == 2) {
+    EXPECT_EQ(of_loop.uncovered, report.uncovered);
+    if (frame.number == 2) {
       EXPECT_EQ(by_loop.voxels[441 * 6], -1000) << "the gap is background";
     }
-    EXPECT_EQ(frame.report.uncovered > 0, frame.frame.phase == 0);
+    EXPECT_EQ(of_loop.uncovered > 0, frame.phase == 0);
   }
   EXPECT_EQ(by_loop.voxels, source.voxels) << "closed again";
 }

@@ -1,0 +1,17 @@
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "bench/conclude.h"
+#include "bench/simulate_bench.h"
+
+namespace tetwarp::bench {
+
+int run_simulate(const SimulateOptions& options) {
+  require_writable(options.json);
+  const SimulateResults results = measure_simulate(options, [&](const std::string& line) {
+    if (options.verbose) std::fprintf(stderr, "%s\n", line.c_str());
+  });
+  return conclude(results, options.json, options.check);
+}
+
+}  // namespace tetwarp::bench
