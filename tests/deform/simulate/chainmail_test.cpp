@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <glm/matrix.hpp>
 
 #include "cuda/devices.h"
 #include "tests/support/random.h"
@@ -194,6 +195,55 @@ TEST_P(Chainmail, HandlesThatContradictEachOtherBreakOnlyTheirOwnLinks) {
     }
   }
   EXPECT_EQ(broken, expected);
+}
+
+/// Smallest determinant of the tetrahedra of both five-fold splits of all cells, over that at rest.
+double smallest_volume(const Geometry& grid, const Field& found) {
+  double smallest = INFINITY;
+  const auto place = [&](const glm::ivec3& at) {
+    const glm::vec3 u = found[vertex_at(grid, at.x, at.y, at.z)];
+    return grid.spacing * glm::dvec3(at) + glm::dvec3(double{u.x}, double{u.y}, double{u.z});
+  };
+  const auto look = [&](const glm::ivec3& a, const glm::ivec3& b, const glm::ivec3& c, const glm::ivec3& d) {
+    const glm::dvec3 p = place(a);
+    const glm::dmat3 rest(glm::dvec3(b - a), glm::dvec3(c - a), glm::dvec3(d - a)),
+        deformed(place(b) - p, place(c) - p, place(d) - p);
+    smallest = std::min(smallest, glm::determinant(deformed) / glm::determinant(rest));
+  };
+  for (int k = 0; k + 1 < grid.size.z; ++k) {
+    for (int j = 0; j + 1 < grid.size.y; ++j) {
+      for (int i = 0; i + 1 < grid.size.x; ++i) {
+        const glm::ivec3 first(i, j, k);
+        const auto corner = [&](int c) { return first + glm::ivec3(c & 1, c >> 1 & 1, c >> 2); };
+        for (int c = 0; c < 8; ++c) look(corner(c), corner(c ^ 1), corner(c ^ 2), corner(c ^ 4));
+        look(corner(0), corner(3), corner(5), corner(6));
+        look(corner(7), corner(4), corner(2), corner(1));
+      }
+    }
+  }
+  return smallest;
+}
+
+TEST_P(Chainmail, LimitsWithDominantDiagonalsKeepTetrahedraFromTurningOver) {
+  const std::uint64_t seed = test::test_seed();
+  for (std::uint64_t number = 0; number < test::test_cases(20) && !HasFailure(); ++number) {
+    SCOPED_TRACE(test::seed_text(seed) + ", model " + std::to_string(number));
+    Random random(seed, 7'150'000 + number);
+    const Geometry grid = lattice({6, 6, 6}, {random.real(3, 9), random.real(3, 9), random.real(3, 9)});
+    const auto tissue = [&](double compression, double below_bound) {
+      double shear = INFINITY;
+      for (int a = 0; a < 3; ++a) {
+        const double others = grid.spacing.x + grid.spacing.y + grid.spacing.z - grid.spacing[a];
+        shear = std::min(shear, below_bound * (1 - compression) * grid.spacing[a] / others);
+      }
+      return Tissue{.name = "soft", .compression = compression, .stretch = random.real(0, 2), .shear = shear};
+    };
+    const std::vector<Tissue> tissues{tissue(random.real(0, 0.9), 0.99), tissue(random.real(0, 0.9), 0.99)};
+    const Model model = make_model(grid, random_cells(grid, random, 2), tissues);
+    const auto simulation = make(model);
+    simulation->set_displacement(random_field(model.nodes(), random, 80));
+    EXPECT_GT(smallest_volume(grid, simulation->displacement_on_host()), 0);
+  }
 }
 
 TEST_P(Chainmail, RestStaysRest) {
