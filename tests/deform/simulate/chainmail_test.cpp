@@ -50,9 +50,12 @@ std::size_t vertex_at(const Geometry& grid, std::int64_t i, std::int64_t j, std:
   return static_cast<std::size_t>(i + grid.size.x * (j + grid.size.y * k));
 }
 
+/// Few of the first tissue.
 std::vector<std::uint8_t> random_cells(const Geometry& grid, Random& random, std::int64_t tissues) {
   std::vector<std::uint8_t> cells(static_cast<std::size_t>((grid.size.x - 1) * (grid.size.y - 1) * (grid.size.z - 1)));
-  for (std::uint8_t& cell : cells) cell = static_cast<std::uint8_t>(random.integer(0, tissues - 1));
+  for (std::uint8_t& cell : cells) {
+    cell = static_cast<std::uint8_t>(random.chance(0.04) ? 0 : random.integer(1, tissues - 1));
+  }
   return cells;
 }
 
