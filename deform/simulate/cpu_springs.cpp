@@ -12,8 +12,6 @@ namespace tetwarp::simulate {
 
 namespace {
 
-/// Residuals of conjugate gradients in float, squared, that tell nothing more.
-constexpr double kFloatRounding = 1e-12;
 constexpr int kStopEvery = 16;  ///< iterations between questions whether to stop
 
 class CpuSprings final : public SpringEngine {
@@ -33,8 +31,8 @@ class CpuSprings final : public SpringEngine {
       *vectors = grid_.vectors<double>();
     }
     for (auto* vectors : {&x_, &r_, &z_, &p_, &q_}) *vectors = grid_.vectors<float>();
-    for (auto& of_direction : blocks_.up) of_direction.fill(Padded<float>(grid_.nodes, grid_.padding));
-    blocks_.odd.resize(grid_.odd.size());
+    for (auto& of_direction : matrices_.up) of_direction.fill(Padded<float>(grid_.nodes, grid_.padding));
+    matrices_.odd.resize(grid_.odd.size());
   }
 
   void set_loads(const Loads& loads, std::span<const Role> roles) override {
@@ -86,9 +84,9 @@ class CpuSprings final : public SpringEngine {
           }
         }
       });
-      make_blocks(Stiffness::laplacian);
+      make_matrices(Stiffness::laplacian);
       for_blocks([&](NodeRange range, std::size_t) {
-        sweep_product(grid_, range, blocks_, p_, q_);
+        sweep_product(grid_, range, matrices_, p_, q_);
         for_free(range, [&](std::size_t a, std::size_t n) { r_[a][n] = -q_[a][n]; });
       });
       seek(Stiffness::laplacian, effort, stop);
@@ -104,7 +102,7 @@ class CpuSprings final : public SpringEngine {
       for_blocks([&](NodeRange range, std::size_t) {
         for_free(range, [&](std::size_t a, std::size_t n) { r_[a][n] = static_cast<float>(force_[a][n]); });
       });
-      if (!(kind == Stiffness::laplacian && factor_)) make_blocks(kind);
+      if (!(kind == Stiffness::laplacian && factor_)) make_matrices(kind);
       Solved result = seek(kind, effort, stop);
       const Sums sums = sum_blocks([&](NodeRange range) {
         Sums block;
@@ -164,10 +162,12 @@ class CpuSprings final : public SpringEngine {
 
   template <class Work>
   void for_blocks(Work&& work) {
-    tbb::parallel_for(std::size_t{0}, grid_.blocks(), [&](std::size_t block) {
+    const auto run = [&](std::size_t block) {
       const std::size_t begin = block * SpringGrid::kBlock;
       work(NodeRange{begin, std::min(begin + SpringGrid::kBlock, grid_.nodes)}, block);
-    });
+    };
+    // a thread sweeps over neighbouring blocks: what one has read is in its cache for the next
+    tbb::parallel_for(std::size_t{0}, grid_.blocks(), run, tbb::static_partitioner());
   }
 
   /// In the order of the blocks, whoever swept over them.
@@ -214,27 +214,23 @@ class CpuSprings final : public SpringEngine {
     return sums;
   }
 
-  void make_blocks(Stiffness kind) {
-    for_blocks([&](NodeRange range, std::size_t) { sweep_blocks(grid_, range, u_, kind, blocks_); });
+  void make_matrices(Stiffness kind) {
+    for_blocks([&](NodeRange range, std::size_t) { sweep_matrices(grid_, range, u_, kind, matrices_); });
     for_blocks([&](NodeRange range, std::size_t block) {
       for (std::size_t n = range.begin; n < range.end; ++n) inverse_[n] = {};
       for (std::size_t at = grid_.first_odd[block]; at < grid_.first_odd[block + 1]; ++at) {
-        inverse_[grid_.odd[at].node].add(blocks_.odd[at]);
+        inverse_[grid_.odd[at].node].add(matrices_.odd[at].full());
       }
       for (std::size_t n = range.begin; n < range.end; ++n) {
         Symmetric<float> sum = inverse_[n];
-        float stiffness = 0;
         for (std::size_t up = 0; up < kUp; ++up) {
-          for (const std::ptrdiff_t at :
-               {static_cast<std::ptrdiff_t>(n), static_cast<std::ptrdiff_t>(n) - grid_.distance[up]}) {
-            const auto& of = blocks_.up[up];
-            const auto entry = [&](std::size_t i) { return of[i].data()[at]; };
-            sum.add({entry(0), entry(1), entry(2), entry(3), entry(4), entry(5)});
-            stiffness += grid_.stiffness[up].data()[at];
+          for (const std::ptrdiff_t back : {std::ptrdiff_t{0}, grid_.distance[up]}) {
+            const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(n) - back;
+            const auto entry = [&](std::size_t i) { return matrices_.up[up][i].data()[at]; };
+            sum.add(SpringMatrix<float>{{entry(0), entry(1), entry(2)}, entry(3)}.full());
           }
         }
-        inverse_[n] = roles_[n] == Role::free ? inverse_block(sum, std::max(stiffness, sum.xx + sum.yy + sum.zz))
-                                              : Symmetric<float>{};
+        inverse_[n] = roles_[n] == Role::free ? inverse_block(sum) : Symmetric<float>{};
       }
     });
   }
@@ -280,7 +276,7 @@ class CpuSprings final : public SpringEngine {
           sum_blocks([&](NodeRange range) { return descend(range, static_cast<float>(length), false); }).sum;
       gained += gain;
       const int done = result.iterations + 1;
-      if (done >= effort.least && done * gain <= effort.share * gained) {
+      if (effort.is_enough(done, gain, gained)) {
         ++result.iterations;
         break;
       }
@@ -292,7 +288,7 @@ class CpuSprings final : public SpringEngine {
 
   /// q = A p. @return p.q over free nodes
   Sums bend(NodeRange range) {
-    sweep_product(grid_, range, blocks_, p_, q_);
+    sweep_product(grid_, range, matrices_, p_, q_);
     Sums sums;
     for (std::size_t a = 0; a < 3; ++a) {
       const float *p = p_[a].data(), *q = q_[a].data();
@@ -341,7 +337,7 @@ class CpuSprings final : public SpringEngine {
   PaddedVectors<double> start_, goal_;                ///< of placed nodes
   PaddedVectors<double> load_, load_from_, load_to_;  ///< of free nodes
   PaddedVectors<double> force_, trial_force_;         ///< net, of free nodes, at u_ and trial_
-  SpringBlocks blocks_;
+  SpringMatrices matrices_;
   std::vector<Symmetric<float>> inverse_;   ///< of each free node's sum of blocks
   PaddedVectors<float> x_, r_, z_, p_, q_;  ///< direction, and what conjugate gradients need
   std::vector<Sums> partial_;

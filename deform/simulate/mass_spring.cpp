@@ -21,7 +21,7 @@ constexpr double kEnergyRounding = 1e-11;
 constexpr double kShortest = 1e-6, kLongest = 4;
 
 /// Ordinary steps, and those after which a simulation may count as settled.
-constexpr Effort kUsual{.share = 0.1, .least = 3}, kThorough{.share = 0.05, .least = 50};
+constexpr Effort kUsual{.share = 0.1, .least = 3}, kThorough{.share = 0.1, .least = 50};
 constexpr Effort kFollow{.share = 0.02, .least = 10, .most = 500};
 
 /// Chooses what a step solves.
@@ -71,6 +71,7 @@ class MassSpring final : public Simulation {
     require(part >= 0 && part <= 1, "a part of the way is " + std::to_string(part) + "; expected 0 to 1");
     require(rule.steps > 0, "a rule allows " + std::to_string(rule.steps) + " steps; expected 1 or more");
     if (!has_loads_) return {.reached = true};
+    engine_->set_stream(control.stream);
     const Settled settled = settle(part, rule, control);
     engine_->show();
     if (control.stop.stop_requested() && !settled.reached) throw Cancelled();

@@ -26,7 +26,14 @@ struct Strain {
 struct Effort {
   double share = 0.1;
   int least = 3, most = 3000;
+
+  TETWARP_HD bool is_enough(int iterations, double last_gain, double gained) const {
+    return iterations >= least && iterations * last_gain <= share * gained;
+  }
 };
+
+/// Squared residuals of conjugate gradients in float, over the first, that tell nothing more.
+inline constexpr double kFloatRounding = 1e-12;
 
 /// A direction that was found.
 struct Solved {
@@ -41,6 +48,9 @@ struct Solved {
 class SpringEngine {
  public:
   virtual ~SpringEngine() = default;
+
+  /// A cudaStream_t on which the next calls queue their work; null: the default stream.
+  virtual void set_stream(void*) {}
 
   /// From here on: placed nodes go from where they are to `loads.goal`, forces from what they are to `loads.force`.
   virtual void set_loads(const Loads& loads, std::span<const Role> roles) = 0;

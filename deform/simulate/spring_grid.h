@@ -29,8 +29,6 @@ class Padded {
 template <class T>
 using PaddedVectors = std::array<Padded<T>, 3>;
 
-inline constexpr int kUp = kDirections / 2;  ///< first of the directions that lead to higher vertices
-
 /// A link that does not lead to the next vertex on the lattice, because a cut gave one of its ends a copy.
 struct OddLink {
   std::uint32_t node, other;
@@ -66,20 +64,20 @@ struct NodeRange {
   std::size_t begin, end;
 };
 
-/// Spring blocks (spring_block) of regular links up, and of odd ones.
-struct SpringBlocks {
-  std::array<std::array<Padded<float>, 6>, kUp> up;  ///< xx xy xz yy yz zz
-  std::vector<Symmetric<float>> odd;
+/// Spring matrices of regular links up, and of odd ones.
+struct SpringMatrices {
+  std::array<std::array<Padded<float>, 4>, kUp> up;  ///< across.x, .y, .z and even
+  std::vector<SpringMatrix<float>> odd;
 };
 
 /// Forces of springs on the nodes of a block. @return half their energies
 double sweep_forces(const SpringGrid& grid, NodeRange range, const PaddedVectors<double>& displacement,
                     PaddedVectors<double>& force);
-/// Blocks of links from the nodes of a block.
-void sweep_blocks(const SpringGrid& grid, NodeRange range, const PaddedVectors<double>& displacement, Stiffness kind,
-                  SpringBlocks& blocks);
-/// Of each node the sum of blocks times the node's vector less its neighbour's.
-void sweep_product(const SpringGrid& grid, NodeRange range, const SpringBlocks& blocks,
+/// Matrices of links from the nodes of a block.
+void sweep_matrices(const SpringGrid& grid, NodeRange range, const PaddedVectors<double>& displacement, Stiffness kind,
+                    SpringMatrices& matrices);
+/// Of each node the sum of matrices times the node's vector less its neighbour's.
+void sweep_product(const SpringGrid& grid, NodeRange range, const SpringMatrices& matrices,
                    const PaddedVectors<float>& vector, PaddedVectors<float>& product);
 
 }  // namespace tetwarp::simulate

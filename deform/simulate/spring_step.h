@@ -1,10 +1,13 @@
 #pragma once
 
 #include <cmath>
+#include <cstdint>
 
 #include "deform/simulate/model.h"
 
 namespace tetwarp::simulate {
+
+inline constexpr int kUp = kDirections / 2;  ///< first of the directions that lead to higher vertices
 
 /// A link at rest: from a node to its neighbour, mm.
 template <class T>
@@ -63,24 +66,38 @@ struct Symmetric {
   TETWARP_HD void add(const Symmetric& o) { xx += o.xx, xy += o.xy, xz += o.xz, yy += o.yy, yz += o.yz, zz += o.zz; }
 };
 
-/// Second derivative of one spring's energy.
+/// k [(1 - t) n n^T + t I] of one spring as across across^T + even I: k and 1 - t are never negative.
 template <class T>
-TETWARP_HD Symmetric<T> spring_block(const Stretched<T>& spring, T stiffness, Stiffness kind) {
-  const T t = sideways(kind, spring.tension), along = stiffness * (1 - t), all = stiffness * t;
-  const glm::vec<3, T>& n = spring.unit;
-  return {along * n.x * n.x + all, along * n.x * n.y, along * n.x * n.z,
-          along * n.y * n.y + all, along * n.y * n.z, along * n.z * n.z + all};
+struct SpringMatrix {
+  glm::vec<3, T> across;
+  T even;
+
+  TETWARP_HD glm::vec<3, T> operator*(const glm::vec<3, T>& v) const { return across * dot3(across, v) + even * v; }
+  TETWARP_HD Symmetric<T> full() const {
+    return {across.x * across.x + even, across.x * across.y, across.x * across.z,
+            across.y * across.y + even, across.y * across.z, across.z * across.z + even};
+  }
+};
+
+/// Second derivative of one spring's energy, computed in double, in float.
+TETWARP_HD inline SpringMatrix<float> spring_matrix(const Stretched<double>& spring, double stiffness, Stiffness kind) {
+  const double t = sideways(kind, spring.tension), root = std::sqrt(stiffness * (1 - t));
+  const glm::dvec3 across = root * spring.unit;
+  return {{static_cast<float>(across.x), static_cast<float>(across.y), static_cast<float>(across.z)},
+          static_cast<float>(stiffness * t)};
 }
 
-/// Inverse of a node's sum of blocks, for the preconditioner. Where springs leave the node a way to give, or more than
-/// that (a full block), it is made definite: first a little of the trace is added, then only the diagonal is taken.
+/// Inverse of a node's sum of spring matrices, for the preconditioner. Where springs leave the node a way to give, or
+/// more than that, it is made definite: a little of the trace is added, and if that does not do, the trace is all that
+/// is taken.
 template <class T>
-TETWARP_HD Symmetric<T> inverse_block(Symmetric<T> s, T sum_of_stiffness) {
-  const T little = T(1e-4) * sum_of_stiffness;
+TETWARP_HD Symmetric<T> inverse_block(Symmetric<T> s) {
+  const T trace = s.xx + s.yy + s.zz, little = T(1e-4) * trace;
+  if (!(trace > 0)) return {};
   s.xx += little, s.yy += little, s.zz += little;
   const T a = s.yy * s.zz - s.yz * s.yz, b = s.xz * s.yz - s.xy * s.zz, c = s.xy * s.yz - s.xz * s.yy;
   const T determinant = s.xx * a + s.xy * b + s.xz * c, minor = s.xx * s.yy - s.xy * s.xy;
-  if (s.xx > 0 && minor > 0 && determinant > T(1e-12) * sum_of_stiffness * sum_of_stiffness * sum_of_stiffness) {
+  if (s.xx > 0 && minor > 0 && determinant > T(1e-12) * trace * trace * trace) {
     return {a / determinant,
             b / determinant,
             c / determinant,
@@ -88,8 +105,7 @@ TETWARP_HD Symmetric<T> inverse_block(Symmetric<T> s, T sum_of_stiffness) {
             (s.xy * s.xz - s.xx * s.yz) / determinant,
             minor / determinant};
   }
-  const T one = sum_of_stiffness > 0 ? 1 / sum_of_stiffness : T(0);
-  return {one, 0, 0, one, 0, one};
+  return {1 / trace, 0, 0, 1 / trace, 0, 1 / trace};
 }
 
 }  // namespace tetwarp::simulate

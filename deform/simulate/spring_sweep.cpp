@@ -87,8 +87,8 @@ double forces(const SpringGrid& grid, NodeRange range, const PaddedVectors<doubl
   return sum / 4;
 }
 
-void blocks(const SpringGrid& grid, NodeRange range, const PaddedVectors<double>& u, Stiffness kind,
-            SpringBlocks& result) {
+void matrices(const SpringGrid& grid, NodeRange range, const PaddedVectors<double>& u, Stiffness kind,
+              SpringMatrices& result) {
   const Doubles d;
   const Halves df;
   for (std::size_t up = 0; up < kUp; ++up) {
@@ -99,45 +99,42 @@ void blocks(const SpringGrid& grid, NodeRange range, const PaddedVectors<double>
       auto t = hn::Div(springs.elongation, springs.length);
       if (kind == Stiffness::laplacian) t = hn::Set(d, 1.0);
       if (kind == Stiffness::projected) t = hn::Max(t, hn::Zero(d));
-      const auto all = hn::Mul(k, t);
-      const auto along = hn::Div(hn::Sub(k, all), hn::Mul(springs.length, springs.length));
-      const auto x = hn::Mul(along, springs.x), y = hn::Mul(along, springs.y), z = hn::Mul(along, springs.z);
-      const auto store = [&](std::size_t i, hn::Vec<Doubles> value) {
-        hn::StoreU(hn::DemoteTo(df, value), df, result.up[up][i].data() + n);
-      };
-      store(0, hn::Add(hn::Mul(x, springs.x), all));
-      store(1, hn::Mul(x, springs.y));
-      store(2, hn::Mul(x, springs.z));
-      store(3, hn::Add(hn::Mul(y, springs.y), all));
-      store(4, hn::Mul(y, springs.z));
-      store(5, hn::Add(hn::Mul(z, springs.z), all));
+      const auto even = hn::Mul(k, t);
+      const auto root = hn::Div(hn::Sqrt(hn::Max(hn::Sub(k, even), hn::Zero(d))), springs.length);
+      const auto store = [&](std::size_t i, hn::Vec<Doubles> value)
+                             HWY_ATTR { hn::StoreU(hn::DemoteTo(df, value), df, result.up[up][i].data() + n); };
+      store(0, hn::Mul(root, springs.x));
+      store(1, hn::Mul(root, springs.y));
+      store(2, hn::Mul(root, springs.z));
+      store(3, even);
     }
   }
 }
 
-void product(const SpringGrid& grid, NodeRange range, const SpringBlocks& matrix, const PaddedVectors<float>& vector,
+void product(const SpringGrid& grid, NodeRange range, const SpringMatrices& matrix, const PaddedVectors<float>& vector,
              PaddedVectors<float>& result) {
   const Floats d;
   float* const out[3] = {result[0].data(), result[1].data(), result[2].data()};
   for (float* values : out) std::fill(values + range.begin, values + range.end, 0.0f);
   for (int direction = 0; direction < kDirections; ++direction) {
     const Way way(grid, direction);
-    const float* block[6];
-    for (std::size_t i = 0; i < 6; ++i) block[i] = matrix.up[way.up][i].data() + way.kept;
+    const float* entry[4];
+    for (std::size_t i = 0; i < 4; ++i) entry[i] = matrix.up[way.up][i].data() + way.kept;
     const float* const in[3] = {vector[0].data(), vector[1].data(), vector[2].data()};
     for (std::size_t n = range.begin; n < range.end; n += hn::Lanes(d)) {
       const auto less = [&](const float* v)
                             HWY_ATTR { return hn::Sub(hn::LoadU(d, v + n), hn::LoadU(d, v + n + way.distance)); };
-      const auto at = [&](int i) HWY_ATTR { return hn::LoadU(d, block[i] + n); };
       const auto x = less(in[0]), y = less(in[1]), z = less(in[2]);
-      const auto xy = at(1), xz = at(2), yz = at(4);
-      const auto add = [&](float* to, auto a, auto b, auto c) HWY_ATTR {
-        const auto sum = hn::Add(hn::Add(hn::Mul(a, x), hn::Mul(b, y)), hn::Mul(c, z));
+      const auto ax = hn::LoadU(d, entry[0] + n), ay = hn::LoadU(d, entry[1] + n), az = hn::LoadU(d, entry[2] + n);
+      const auto even = hn::LoadU(d, entry[3] + n);
+      const auto along = hn::Add(hn::Add(hn::Mul(ax, x), hn::Mul(ay, y)), hn::Mul(az, z));
+      const auto add = [&](float* to, auto across, auto apart) HWY_ATTR {
+        const auto sum = hn::Add(hn::Mul(across, along), hn::Mul(even, apart));
         hn::StoreU(hn::Add(hn::LoadU(d, to + n), sum), d, to + n);
       };
-      add(out[0], at(0), xy, xz);
-      add(out[1], xy, at(3), yz);
-      add(out[2], xz, yz, at(5));
+      add(out[0], ax, x);
+      add(out[1], ay, y);
+      add(out[2], az, z);
     }
   }
 }
@@ -151,7 +148,7 @@ HWY_AFTER_NAMESPACE();
 namespace tetwarp::simulate {
 
 HWY_EXPORT(forces);
-HWY_EXPORT(blocks);
+HWY_EXPORT(matrices);
 HWY_EXPORT(product);
 
 namespace {
@@ -180,18 +177,16 @@ double sweep_forces(const SpringGrid& grid, NodeRange range, const PaddedVectors
   return energy;
 }
 
-void sweep_blocks(const SpringGrid& grid, NodeRange range, const PaddedVectors<double>& displacement, Stiffness kind,
-                  SpringBlocks& result) {
-  HWY_DYNAMIC_DISPATCH(blocks)(grid, range, displacement, kind, result);
+void sweep_matrices(const SpringGrid& grid, NodeRange range, const PaddedVectors<double>& displacement, Stiffness kind,
+                    SpringMatrices& result) {
+  HWY_DYNAMIC_DISPATCH(matrices)(grid, range, displacement, kind, result);
   for (const OddLink& link : odd_links(grid, range)) {
-    const Symmetric<double> s = spring_block(odd_spring(grid, link, displacement), double{link.stiffness}, kind);
-    const auto f = [](double value) { return static_cast<float>(value); };
-    result.odd[static_cast<std::size_t>(&link - grid.odd.data())] = {f(s.xx), f(s.xy), f(s.xz),
-                                                                     f(s.yy), f(s.yz), f(s.zz)};
+    result.odd[static_cast<std::size_t>(&link - grid.odd.data())] =
+        spring_matrix(odd_spring(grid, link, displacement), double{link.stiffness}, kind);
   }
 }
 
-void sweep_product(const SpringGrid& grid, NodeRange range, const SpringBlocks& matrix,
+void sweep_product(const SpringGrid& grid, NodeRange range, const SpringMatrices& matrix,
                    const PaddedVectors<float>& vector, PaddedVectors<float>& result) {
   HWY_DYNAMIC_DISPATCH(product)(grid, range, matrix, vector, result);
   for (const OddLink& link : odd_links(grid, range)) {

@@ -9,6 +9,7 @@
 #include <glm/geometric.hpp>
 
 #include "cuda/devices.h"
+#include "tests/support/plain_machine.h"
 #include "tests/support/random.h"
 #include "tests/support/says.h"
 
@@ -36,6 +37,13 @@ std::vector<Method> methods() {
   return {
       {.name = "cholesky", .cannot_run = "", .make = on_cpu(Solver::cholesky)},
       {.name = "pcg", .cannot_run = "", .make = on_cpu(Solver::pcg)},
+      {.name = "device_code_on_cpu",
+       .cannot_run = "",
+       .make =
+           [](const Model& model) {
+             require_springs(model);
+             return make_mass_spring(model, std::make_unique<DeviceSprings<test::PlainMachine>>(model));
+           }},
       {.name = "cuda", .cannot_run = no_cuda, .make = [](const Model& model) { return make_cuda_mass_spring(model); }}};
 }
 

@@ -1,0 +1,185 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "deform/simulate/device_springs_nodes.h"
+
+namespace tetwarp::simulate {
+
+/// Threads that one device block has; sums are made block by block, as a tree over its threads, and then over blocks.
+inline constexpr int kDeviceBlock = 256;
+
+/// Mass-spring on a machine that runs sweeps over nodes. Nothing leaves the machine's memory but sums and, every
+/// kRepeats iterations, the state of conjugate gradients. A machine is
+///
+///     template <class T> class Buffer;           // reserve(size), data()
+///     scope();                                   // what it returns holds while the machine is used
+///     each(nodes, sweep);                        // sweep(n) for every node, unless sweep.is_idle()
+///     sum<T>(nodes, sweep, then);                // adds up what sweep(n) returns in an order of its own that never
+///                                                // changes, then calls then(total) where the sweep ran
+///     repeat(times, work);                       // the same times and work in every call: it may be recorded
+///     upload(place, host, size), download(host, place, size), wait();
+///     T fetch(const T* place);                   // waits for what is queued, and brings a value to the host
+///
+/// so that the same code runs on CUDA and, in tests, on the CPU.
+template <class Machine>
+class DeviceSprings final : public SpringEngine {
+ public:
+  static constexpr int kRepeats = 16;
+
+  template <class... Given>
+  explicit DeviceSprings(const Model& model, Given&&... given)
+      : machine_(std::forward<Given>(given)...), nodes_(model.nodes()) {
+    const auto scope = machine_.scope();
+    a_.neighbour = hold(neighbour_, model.neighbour);
+    a_.stiffness = hold(stiffness_, model.stiffness);
+    a_.role = hold(role_, std::vector<Role>(nodes_, Role::kept));
+    a_.nodes = nodes_;
+    for (int d = 0; d < kDirections; ++d) {
+      const glm::dvec3 along = rest_link(model.lattice, d);
+      a_.rest[d] = {along, std::sqrt(dot3(along, along))};
+    }
+    const std::vector<glm::dvec3> zeros(nodes_, glm::dvec3(0));
+    glm::dvec3** const doubles[] = {&a_.u,         &a_.trial,   &a_.start, &a_.goal,       &a_.load,
+                                    &a_.load_from, &a_.load_to, &a_.force, &a_.trial_force};
+    for (std::size_t i = 0; i < std::size(doubles); ++i) *doubles[i] = hold(doubles_[i], zeros);
+    const std::vector<glm::vec3> float_zeros(nodes_, glm::vec3(0));
+    glm::vec3** const floats[] = {&a_.x, &a_.r, &a_.z, &a_.p, &a_.q, &a_.shown};
+    for (std::size_t i = 0; i < std::size(floats); ++i) *floats[i] = hold(floats_[i], float_zeros);
+    a_.matrix = matrix_.reserve(kUp * nodes_);
+    a_.inverse = inverse_.reserve(nodes_);
+    a_.state = state_.reserve(1);
+    a_.result = result_.reserve(1);
+  }
+
+  void set_stream(void* stream) override { machine_.set_stream(stream); }
+
+  void set_loads(const Loads& loads, std::span<const Role> roles) override {
+    const auto scope = machine_.scope();
+    std::vector<glm::dvec3> now(nodes_), goal(nodes_), to(nodes_, glm::dvec3(0)), from(nodes_);
+    machine_.download(now.data(), a_.u, nodes_);
+    machine_.download(from.data(), a_.load, nodes_);
+    for (std::size_t n = 0; n < nodes_; ++n) {
+      goal[n] = sweeps::in_double(loads.goal[n]);
+      if (roles[n] != Role::free) {
+        from[n] = glm::dvec3(0);
+      } else if (!loads.force.empty()) {
+        to[n] = sweeps::in_double(loads.force[n]);
+      }
+    }
+    machine_.upload(role_.data(), roles.data(), nodes_);
+    machine_.upload(a_.start, now.data(), nodes_);
+    machine_.upload(a_.goal, goal.data(), nodes_);
+    machine_.upload(a_.load_from, from.data(), nodes_);
+    machine_.upload(a_.load_to, to.data(), nodes_);
+  }
+
+  void set_displacement(std::span<const glm::vec3> displacement) override {
+    const auto scope = machine_.scope();
+    std::vector<glm::dvec3> given(nodes_);
+    std::transform(displacement.begin(), displacement.end(), given.begin(), sweeps::in_double);
+    machine_.upload(a_.u, given.data(), nodes_);
+    machine_.upload(a_.start, given.data(), nodes_);
+  }
+
+  double aim(double part) override {
+    const auto scope = machine_.scope();
+    machine_.template sum<Sums>(nodes_, sweeps::Aim{{a_}, part}, sweeps::Keep{a_.result});
+    return std::sqrt(machine_.fetch(a_.result).most);
+  }
+
+  void follow(const Effort& effort, std::stop_token stop) override {
+    const auto scope = machine_.scope();
+    machine_.each(nodes_, sweeps::Way{{a_}});
+    make_matrices(Stiffness::laplacian);
+    machine_.each(nodes_, sweeps::Pull{{a_}});
+    conjugate_gradients(effort, stop);
+    machine_.each(nodes_, sweeps::Follow{{a_}});
+    std::swap(a_.u, a_.trial);
+  }
+
+  Solved solve(Stiffness kind, const Effort& effort, std::stop_token stop) override {
+    const auto scope = machine_.scope();
+    make_matrices(kind);
+    machine_.each(nodes_, sweeps::Forces{{a_}});
+    const GradientState state = conjugate_gradients(effort, stop);
+    machine_.template sum<Sums>(nodes_, sweeps::Direction{{a_}}, sweeps::Keep{a_.result});
+    const Sums sums = machine_.fetch(a_.result);
+    return {.iterations = state.iterations,
+            .is_indefinite = state.is_indefinite,
+            .slope = sums.slope,
+            .longest_mm = std::sqrt(sums.most)};
+  }
+
+  Strain try_step(double part) override {
+    const auto scope = machine_.scope();
+    machine_.each(nodes_, sweeps::Go{{a_}, part});
+    machine_.template sum<Sums>(nodes_, sweeps::StrainOf{{a_}}, sweeps::Keep{a_.result});
+    const Sums sums = machine_.fetch(a_.result);
+    return {.energy = sums.sum,
+            .free_force = std::sqrt(sums.most),
+            .placed_force = std::sqrt(std::max(sums.most_placed, sums.most_load)),
+            .slope = sums.slope};
+  }
+
+  void accept() override {
+    std::swap(a_.u, a_.trial);
+    std::swap(a_.force, a_.trial_force);
+  }
+
+  void show() override {
+    const auto scope = machine_.scope();
+    machine_.each(nodes_, sweeps::Show{{a_}});
+    machine_.wait();
+  }
+  std::span<const glm::vec3> shown() const override { return {a_.shown, nodes_}; }
+  Memory memory() const override { return Machine::kMemory; }
+
+ private:
+  template <class T>
+  using Buffer = typename Machine::template Buffer<T>;
+
+  template <class T>
+  T* hold(Buffer<T>& buffer, const std::vector<T>& values) {
+    T* place = buffer.reserve(values.size());
+    machine_.upload(place, values.data(), values.size());
+    return place;
+  }
+
+  void make_matrices(Stiffness kind) {
+    machine_.each(nodes_, sweeps::Matrices{{a_}, kind});
+    machine_.each(nodes_, sweeps::Inverses{{a_}});
+  }
+
+  GradientState conjugate_gradients(const Effort& effort, const std::stop_token& stop) {
+    machine_.template sum<Sum>(nodes_, sweeps::Begin{{a_}}, sweeps::AfterBegin{a_.state, effort});
+    GradientState state = machine_.fetch(a_.state);
+    while (!state.is_done && !stop.stop_requested()) {
+      machine_.repeat(kRepeats, [&] {
+        machine_.template sum<Sum>(nodes_, sweeps::Bend{{a_}}, sweeps::AfterBend{a_.state});
+        machine_.template sum<Sum>(nodes_, sweeps::Descend{{a_}}, sweeps::AfterDescend{a_.state});
+        machine_.each(nodes_, sweeps::Turn{{a_}});
+      });
+      state = machine_.fetch(a_.state);
+    }
+    return state;
+  }
+
+  Machine machine_;
+  std::size_t nodes_;
+  DeviceArrays a_{};
+  Buffer<std::int32_t> neighbour_;
+  Buffer<float> stiffness_;
+  Buffer<Role> role_;
+  Buffer<glm::dvec3> doubles_[9];
+  Buffer<glm::vec3> floats_[6];
+  Buffer<SpringMatrix<float>> matrix_;
+  Buffer<Symmetric<float>> inverse_;
+  Buffer<GradientState> state_;
+  Buffer<Sums> result_;
+};
+
+}  // namespace tetwarp::simulate

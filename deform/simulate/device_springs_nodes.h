@@ -1,0 +1,266 @@
+#pragma once
+
+#include <cstdint>
+
+#include "deform/simulate/spring_engine.h"
+#include "deform/simulate/spring_step.h"
+
+// What a device does for one node in each sweep of mass-spring. Every node gathers from its 26 links: no two write the
+// same place, so that no order matters but that of sums, which the machine keeps (device_springs.h).
+
+namespace tetwarp::simulate {
+
+/// Conjugate gradients, between their sweeps; in the device's memory.
+struct GradientState {
+  Effort effort;
+  double rz = 0, least = 0, gained = 0;
+  float length = 0, share = 0;
+  int iterations = 0;
+  bool is_indefinite = false, is_done = false;
+};
+
+/// What sweeps add up, and the largest of what they see.
+struct Sums {
+  double sum = 0, slope = 0, most = 0, most_placed = 0, most_load = 0;
+
+  TETWARP_HD void add(const Sums& other) {
+    sum += other.sum;
+    slope += other.slope;
+    keep(most, other.most);
+    keep(most_placed, other.most_placed);
+    keep(most_load, other.most_load);
+  }
+  TETWARP_HD static void keep(double& most, double value) {
+    if (value > most) most = value;
+  }
+};
+struct Sum {
+  double sum = 0;
+  TETWARP_HD void add(const Sum& other) { sum += other.sum; }
+};
+
+/// All that lies in a device's memory; vectors have one entry a node.
+struct DeviceArrays {
+  std::size_t nodes;
+  const std::int32_t* neighbour;  ///< as Model's
+  const float* stiffness;
+  const Role* role;
+  RestLink<double> rest[kDirections];
+  glm::dvec3 *u, *trial, *start, *goal;    ///< displacement; of placed nodes where they come from and go
+  glm::dvec3 *load, *load_from, *load_to;  ///< of free nodes
+  glm::dvec3 *force, *trial_force;         ///< net, of free nodes, at u and trial
+  glm::vec3 *x, *r, *z, *p, *q;            ///< direction, and what conjugate gradients need
+  SpringMatrix<float>* matrix;             ///< at up * nodes + node: of the link in direction kUp + up
+  Symmetric<float>* inverse;               ///< of each free node's sum of matrices; 0 of others
+  glm::vec3* shown;
+  GradientState* state;
+  Sums* result;
+
+  TETWARP_HD std::int32_t other(int direction, std::size_t n) const {
+    return neighbour[static_cast<std::size_t>(direction) * nodes + n];
+  }
+  /// Of the link to a neighbour; kept at its lower end.
+  TETWARP_HD const SpringMatrix<float>& of_link(int direction, std::size_t n, std::int32_t to) const {
+    return direction >= kUp
+               ? matrix[static_cast<std::size_t>(direction - kUp) * nodes + n]
+               : matrix[static_cast<std::size_t>(opposite(direction) - kUp) * nodes + static_cast<std::size_t>(to)];
+  }
+  TETWARP_HD bool is_free(std::size_t n) const { return role[n] == Role::free; }
+};
+
+namespace sweeps {
+
+TETWARP_HD inline glm::vec3 in_float(const glm::dvec3& v) {
+  return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
+}
+TETWARP_HD inline glm::dvec3 in_double(const glm::vec3& v) { return {double{v.x}, double{v.y}, double{v.z}}; }
+TETWARP_HD inline glm::dvec3 on_the_way(const glm::dvec3& from, const glm::dvec3& to, double part) {
+  return part == 1 ? to : from + part * (to - from);
+}
+
+/// A sweep that always runs; those of conjugate gradients have nothing left to do once these are done.
+struct Sweep {
+  DeviceArrays a;
+  TETWARP_HD bool is_idle() const { return false; }
+};
+struct GradientSweep {
+  DeviceArrays a;
+  TETWARP_HD bool is_idle() const { return a.state->is_done; }
+};
+
+/// See SpringEngine::aim. Sums::most is the largest way of a placed node, squared.
+struct Aim : Sweep {
+  double part;
+  TETWARP_HD Sums operator()(std::size_t n) const {
+    a.load[n] = on_the_way(a.load_from[n], a.load_to[n], part);
+    a.trial[n] = a.role[n] == Role::placed ? on_the_way(a.start[n], a.goal[n], part) : a.u[n];
+    const glm::dvec3 way = a.trial[n] - a.u[n];
+    return {.most = dot3(way, way)};
+  }
+};
+
+/// The way of placed nodes as p.
+struct Way : Sweep {
+  TETWARP_HD void operator()(std::size_t n) const { a.p[n] = in_float(a.trial[n] - a.u[n]); }
+};
+
+/// Springs up from a node, where they are now.
+struct Matrices : Sweep {
+  Stiffness kind;
+  TETWARP_HD void operator()(std::size_t n) const {
+    for (int d = kUp; d < kDirections; ++d) {
+      const std::int32_t to = a.other(d, n);
+      if (to < 0) continue;
+      const double k = double{a.stiffness[static_cast<std::size_t>(d) * a.nodes + n]};
+      const Stretched<double> spring = stretched(a.rest[d], a.u[to] - a.u[n]);
+      a.matrix[static_cast<std::size_t>(d - kUp) * a.nodes + n] = spring_matrix(spring, k, kind);
+    }
+  }
+};
+
+struct Inverses : Sweep {
+  TETWARP_HD void operator()(std::size_t n) const {
+    Symmetric<float> sum{};
+    for (int d = 0; d < kDirections && a.is_free(n); ++d) {
+      const std::int32_t to = a.other(d, n);
+      if (to >= 0) sum.add(a.of_link(d, n, to).full());
+    }
+    a.inverse[n] = a.is_free(n) ? inverse_block(sum) : Symmetric<float>{};
+  }
+};
+
+TETWARP_HD inline glm::vec3 product(const DeviceArrays& a, std::size_t n) {
+  const glm::vec3 own = a.p[n];
+  glm::vec3 sum(0);
+  for (int d = 0; d < kDirections; ++d) {
+    const std::int32_t to = a.other(d, n);
+    if (to >= 0) sum += a.of_link(d, n, to) * (own - a.p[to]);
+  }
+  return sum;
+}
+
+/// What the way of placed nodes asks of the others.
+struct Pull : Sweep {
+  TETWARP_HD void operator()(std::size_t n) const { a.r[n] = a.is_free(n) ? -product(a, n) : glm::vec3(0); }
+};
+struct Forces : Sweep {
+  TETWARP_HD void operator()(std::size_t n) const { a.r[n] = in_float(a.force[n]); }
+};
+
+/// x = 0, z = preconditioned r.
+struct Begin : Sweep {
+  TETWARP_HD Sum operator()(std::size_t n) const {
+    a.x[n] = glm::vec3(0);
+    a.p[n] = a.z[n] = a.inverse[n] * a.r[n];
+    return {dot3(in_double(a.r[n]), in_double(a.z[n]))};
+  }
+};
+struct AfterBegin {
+  GradientState* state;
+  Effort effort;
+  TETWARP_HD void operator()(const Sum& rz) const {
+    *state = {.effort = effort, .rz = rz.sum, .least = kFloatRounding * rz.sum, .is_done = !(rz.sum > 0)};
+  }
+};
+
+/// q = A p; the curvature p.q over free nodes.
+struct Bend : GradientSweep {
+  TETWARP_HD Sum operator()(std::size_t n) const {
+    if (!a.is_free(n)) return {};
+    a.q[n] = product(a, n);
+    return {dot3(in_double(a.p[n]), in_double(a.q[n]))};
+  }
+};
+struct AfterBend {
+  GradientState* state;
+  TETWARP_HD void operator()(const Sum& curvature) const {
+    if (curvature.sum > 0) {
+      state->length = static_cast<float>(state->rz / curvature.sum);
+    } else {
+      state->is_indefinite = state->is_done = true;
+    }
+  }
+};
+
+/// x += length p, r -= length q, z = preconditioned r; r.z.
+struct Descend : GradientSweep {
+  TETWARP_HD Sum operator()(std::size_t n) const {
+    if (!a.is_free(n)) return {};
+    const float length = a.state->length;
+    a.x[n] += length * a.p[n];
+    a.r[n] -= length * a.q[n];
+    a.z[n] = a.inverse[n] * a.r[n];
+    return {dot3(in_double(a.r[n]), in_double(a.z[n]))};
+  }
+};
+struct AfterDescend {
+  GradientState* state;
+  TETWARP_HD void operator()(const Sum& next) const {
+    GradientState& s = *state;
+    const double gain = double{s.length} * s.rz / 2;
+    s.gained += gain;
+    ++s.iterations;
+    s.share = static_cast<float>(next.sum / s.rz);
+    s.rz = next.sum;
+    s.is_done = !(s.rz > s.least) || s.iterations >= s.effort.most || s.effort.is_enough(s.iterations, gain, s.gained);
+  }
+};
+
+/// p = z + share p.
+struct Turn : GradientSweep {
+  TETWARP_HD void operator()(std::size_t n) const { a.p[n] = a.z[n] + a.state->share * a.p[n]; }
+};
+
+/// Minus the forces times the direction, and its longest entry, squared.
+struct Direction : Sweep {
+  TETWARP_HD Sums operator()(std::size_t n) const {
+    const glm::dvec3 x = in_double(a.x[n]);
+    return {.slope = -dot3(a.force[n], x), .most = dot3(x, x)};
+  }
+};
+
+/// Free nodes follow the placed ones.
+struct Follow : Sweep {
+  TETWARP_HD void operator()(std::size_t n) const { a.trial[n] += in_double(a.x[n]); }
+};
+struct Go : Sweep {
+  double part;
+  TETWARP_HD void operator()(std::size_t n) const {
+    a.trial[n] = part == 0 ? a.u[n] : a.u[n] + part * in_double(a.x[n]);
+  }
+};
+
+/// See SpringEngine::try_step, at trial; forces squared.
+struct StrainOf : Sweep {
+  TETWARP_HD Sums operator()(std::size_t n) const {
+    glm::dvec3 force = a.load[n];
+    Sums sums{.sum = -dot3(a.load[n], a.trial[n])};
+    for (int d = 0; d < kDirections; ++d) {
+      const std::int32_t to = a.other(d, n);
+      if (to < 0) continue;
+      const Stretched<double> spring = stretched(a.rest[d], a.trial[to] - a.trial[n]);
+      const double pull = double{a.stiffness[static_cast<std::size_t>(d) * a.nodes + n]} * spring.elongation;
+      sums.sum += pull * spring.elongation / 4;
+      force += pull * spring.unit;
+    }
+    (a.is_free(n) ? sums.most : sums.most_placed) = a.role[n] == Role::kept ? 0 : dot3(force, force);
+    sums.most_load = dot3(a.load[n], a.load[n]);
+    a.trial_force[n] = a.is_free(n) ? force : glm::dvec3(0);
+    sums.slope = -dot3(a.trial_force[n], in_double(a.x[n]));
+    return sums;
+  }
+};
+
+struct Show : Sweep {
+  TETWARP_HD void operator()(std::size_t n) const { a.shown[n] = in_float(a.u[n]); }
+};
+
+/// The result of a sum, where the host fetches it.
+struct Keep {
+  Sums* result;
+  TETWARP_HD void operator()(const Sums& sums) const { *result = sums; }
+};
+
+}  // namespace sweeps
+
+}  // namespace tetwarp::simulate

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "deform/simulate/device_springs.h"
+
+namespace tetwarp::test {
+
+/// What runs the sweeps of DeviceSprings without a device, with sums in the order of CUDA's: so is known how they
+/// converge wherever the tests run.
+class PlainMachine {
+ public:
+  static constexpr Memory kMemory = Memory::host;
+
+  template <class T>
+  class Buffer {
+   public:
+    T* reserve(std::size_t size) {
+      values_.resize(std::max(size, values_.size()));
+      return values_.data();
+    }
+    T* data() { return values_.data(); }
+
+   private:
+    std::vector<T> values_;
+  };
+
+  struct Scope {
+    ~Scope() {}  // so that holding one is a use
+  };
+  Scope scope() const { return {}; }
+  void set_stream(void*) {}
+  void wait() const {}
+  template <class T>
+  void upload(T* place, const T* host, std::size_t size) const {
+    std::copy_n(host, size, place);
+  }
+  template <class T>
+  void download(T* host, const T* place, std::size_t size) const {
+    std::copy_n(place, size, host);
+  }
+  template <class T>
+  T fetch(const T* place) const {
+    return *place;
+  }
+
+  template <class Sweep>
+  void each(std::size_t nodes, const Sweep& sweep) const {
+    if (sweep.is_idle()) return;
+    for (std::size_t n = 0; n < nodes; ++n) sweep(n);
+  }
+  template <class T, class Sweep, class Then>
+  void sum(std::size_t nodes, const Sweep& sweep, const Then& then) const {
+    if (sweep.is_idle()) return;
+    std::vector<T> of_block;
+    for (std::size_t begin = 0; begin < nodes; begin += kThreads) {
+      std::vector<T> of_thread(kThreads);
+      for (std::size_t t = 0; t < std::min(kThreads, nodes - begin); ++t) of_thread[t] = sweep(begin + t);
+      of_block.push_back(tree(of_thread));
+    }
+    std::vector<T> of_thread(kThreads);
+    for (std::size_t block = 0; block < of_block.size(); ++block) of_thread[block % kThreads].add(of_block[block]);
+    then(tree(of_thread));
+  }
+  template <class Work>
+  void repeat(int times, const Work& work) const {
+    for (int n = 0; n < times; ++n) work();
+  }
+
+ private:
+  static constexpr std::size_t kThreads = simulate::kDeviceBlock;
+
+  template <class T>
+  static T tree(std::vector<T>& of_thread) {
+    for (std::size_t half = kThreads / 2; half > 0; half /= 2) {
+      for (std::size_t t = 0; t < half; ++t) of_thread[t].add(of_thread[t + half]);
+    }
+    return of_thread[0];
+  }
+};
+
+}  // namespace tetwarp::test
