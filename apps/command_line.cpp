@@ -19,6 +19,7 @@ struct Commands {
   FieldOptions field;
   InvertOptions invert;
   DeformOptions deform;
+  SimulateOptions simulate;
 };
 
 void add_common(CLI::App& command, CommonOptions& common, bool writes) {
@@ -88,10 +89,9 @@ void add_field(CLI::App& app, FieldOptions& options) {
   command->footer("Example: tetwarp field twist:angle=30 --like ct.nii.gz -o twist.mha --cell-size 4");
 }
 
-void add_backend(CLI::App& command, std::string& backend, int& device) {
-  command.add_option("--backend", backend, "auto, cuda or cpu: the bits are the same")
-      ->check(CLI::IsMember({"auto", "cuda", "cpu"}))
-      ->capture_default_str();
+void add_backend(CLI::App& command, std::string& backend, int& device,
+                 const char* help = "auto, cuda or cpu: the bits are the same") {
+  command.add_option("--backend", backend, help)->check(CLI::IsMember({"auto", "cuda", "cpu"}))->capture_default_str();
   command.add_option("--device", device, "CUDA device, as `tetwarp --version` numbers them")
       ->check(CLI::NonNegativeNumber)
       ->type_name("N")
@@ -222,6 +222,30 @@ void add_deform(CLI::App& app, DeformOptions& options) {
       "Example: tetwarp deform ct_folder -f wave:amplitude=8,wavelength=64 -o deformed_dicom --preview look.png");
 }
 
+void add_simulate(CLI::App& app, SimulateOptions& options) {
+  CLI::App* command = app.add_subcommand("simulate", "Make a field: what happens to a volume in a scenario");
+  command->add_option("SCENARIO", options.scenario, "What is held, moved and cut, as JSON (docs/simulate.md)")
+      ->required();
+  command->add_option("INPUT", options.input.path, std::string(kInputHelp) + "; a CT in HU")->required();
+  command->add_option("-o,--output", options.output, ".mha .nrrd .nii .nii.gz: a forward field, for -f of deform")
+      ->required();
+  command->add_option("--labels", options.labels, "Label volume on the grid of INPUT, for tissues and regions by label")
+      ->type_name("FILE");
+  command
+      ->add_option("--every", options.every,
+                   "Write the field of every Nth frame too, with its number before the suffix of the output")
+      ->check(CLI::PositiveNumber)
+      ->type_name("N");
+  command->add_option("--report", options.report, "What happened, with times, as JSON")->type_name("FILE.json");
+  add_series(*command, options.input);
+  add_backend(*command, options.backend, options.device,
+              "auto, cuda or cpu: of chainmail the bits are the same, of mass-spring the equilibrium");
+  command->add_flag("--dry-run", options.dry_run, "Check everything and say what would be done");
+  add_common(*command, options.common, true);
+  command->footer(
+      "Example: tetwarp simulate examples/scenarios/diaphragm_push.json ct_folder -o push.mha --report push.json");
+}
+
 /// Only for `tetwarp --help`: what follows `bench` is never parsed here.
 void add_bench(CLI::App& app) {
   app.add_subcommand("bench", "Time the paper's methods and Tetwarp (runs tetwarp-bench, see `tetwarp bench --help`)");
@@ -257,6 +281,7 @@ int run_command_line(int argc, char** argv) {
   add_deform(app, commands.deform);
   add_field(app, commands.field);
   add_invert(app, commands.invert);
+  add_simulate(app, commands.simulate);
   add_bench(app);
   try {
     app.parse(argc, argv);
@@ -269,6 +294,7 @@ int run_command_line(int argc, char** argv) {
   if (app.got_subcommand("info")) return run(run_info, commands.info);
   if (app.got_subcommand("field")) return run(run_field, commands.field);
   if (app.got_subcommand("invert")) return run(run_invert, commands.invert);
+  if (app.got_subcommand("simulate")) return run(run_simulate, commands.simulate);
   return run(run_deform, commands.deform);
 }
 

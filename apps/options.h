@@ -96,6 +96,18 @@ struct DeformOptions {
   bool dry_run = false;
 };
 
+struct SimulateOptions {
+  CommonOptions common;
+  std::filesystem::path scenario;
+  InputOptions input;
+  std::filesystem::path labels;  ///< on the grid of INPUT
+  std::filesystem::path output, report;
+  std::string backend = "auto";
+  int device = 0;  ///< of CUDA
+  int every = 0;   ///< frames; 0: none on the way
+  bool dry_run = false;
+};
+
 /// Parses the command line and runs the subcommand. @return the exit status (README has the table)
 int run_command_line(int argc, char** argv);
 
@@ -104,6 +116,7 @@ int run_info(const InfoOptions& options);
 int run_field(const FieldOptions& options);
 int run_invert(const InvertOptions& options);
 int run_deform(const DeformOptions& options);
+int run_simulate(const SimulateOptions& options);
 
 /// Becomes the program tetwarp-bench that lies beside this one; returns only by an exception.
 /// @param arguments  given to it as they are

@@ -1,0 +1,177 @@
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "apps/input.h"
+#include "apps/output.h"
+#include "apps/simulate_report.h"
+#include "apps/simulation_backend.h"
+#include "io/field_file.h"
+#include "io/image_file.h"
+#include "io/scenario_file.h"
+
+namespace tetwarp::apps {
+
+namespace {
+
+using namespace simulate;
+namespace fs = std::filesystem;
+
+/// Where the frame's field goes: FIELD with the number before its suffix, `field.0020.nii.gz`.
+fs::path frame_path(const fs::path& output, int number, int frames) {
+  const std::string name = output.filename().string();
+  std::string suffix = output.extension().string();
+  if (suffix.size() == 3 && (suffix[1] == 'g' || suffix[1] == 'G'))
+    suffix = output.stem().extension().string() + suffix;  // .nii.gz
+  std::string digits = std::to_string(number);
+  digits.insert(0, std::max<std::size_t>(4, std::to_string(frames).size()) - digits.size(), '0');
+  return output.parent_path() / (name.substr(0, name.size() - suffix.size()) + "." + digits + suffix);
+}
+
+/// The outputs of the command, before they have their names.
+struct Outputs {
+  OutputSet set;
+  fs::path field, report;
+  std::vector<std::pair<int, fs::path>> frames;  ///< by rising number
+};
+
+int frames_of(const Scenario& scenario) {
+  int frames = 0;
+  for (const Phase& phase : scenario.phases) frames += phase.frames;
+  return frames;
+}
+
+Outputs begin_outputs(const SimulateOptions& options, const Scenario& scenario) {
+  std::vector<fs::path> inputs = {options.scenario, options.input.path};
+  if (!options.labels.empty()) inputs.push_back(options.labels);
+  Outputs outputs{OutputSet(inputs, options.common.overwrite), {}, {}, {}};
+  outputs.field = outputs.set.add(options.output);
+  const int frames = frames_of(scenario);
+  for (int number = options.every; options.every > 0 && number <= frames; number += options.every)
+    outputs.frames.emplace_back(number, outputs.set.add(frame_path(options.output, number, frames)));
+  outputs.report = outputs.set.add(options.report);
+  return outputs;
+}
+
+/// One run of the command.
+class Simulating {
+ public:
+  Simulating(const SimulateOptions& options, Scenario scenario, Outputs outputs)
+      : options_(options), scenario_(std::move(scenario)), outputs_(std::move(outputs)) {}
+
+  int run();
+
+ private:
+  void read();
+  std::unique_ptr<ScenarioRun> begin(const Workplace& workplace);
+  void simulate(ScenarioRun& run, SimulateRecord& record);
+  void write(const fs::path& path, const std::vector<glm::vec3>& displacement);
+
+  const SimulateOptions& options_;
+  Scenario scenario_;
+  Outputs outputs_;
+  Patient patient_;
+  std::vector<std::string> notes_;
+  double read_seconds_ = 0, prepare_seconds_ = 0, write_seconds_ = 0;
+};
+
+void Simulating::read() {
+  AnyVolume volume, labels;
+  {
+    Stage stage(options_.common, "read");
+    const InputHeader header = open_input(options_.input, {.stop = interrupt_token()});
+    if (header.series) notes_ = header.series->warnings;
+    volume = read_input(options_.input, header, options_.common, stage.control()).volume;
+    if (!options_.labels.empty()) {
+      const InputOptions from{.path = options_.labels, .series = {}};
+      labels = read_input(from, open_input(from, {.stop = interrupt_token()}), options_.common, stage.control()).volume;
+    }
+    read_seconds_ = stage.seconds();
+  }
+  Stage stage(options_.common, "prepare");
+  const ConstVolumeView ct = std::as_const(volume).view(), labelled = std::as_const(labels).view();
+  patient_ = examine(ct, options_.labels.empty() ? nullptr : &labelled, scenario_.cell_size, scenario_.body_above_hu,
+                     stage.control());
+  prepare_seconds_ = stage.seconds();
+}
+
+void Simulating::write(const fs::path& path, const std::vector<glm::vec3>& displacement) {
+  Stage stage(options_.common, "write");
+  const auto vertices = static_cast<std::ptrdiff_t>(voxel_count(patient_.lattice));
+  const VertexField field{patient_.lattice, {displacement.begin(), displacement.begin() + vertices}};
+  outputs_.set.write([&] { write_field_file(path, field); });
+  write_seconds_ += stage.seconds();
+}
+
+void Simulating::simulate(ScenarioRun& run, SimulateRecord& record) {
+  Stage stage(options_.common, "simulate");
+  const Control whole = stage.control();
+  auto staged = outputs_.frames.begin();
+  double written = 0;
+  for (int done = 0; !run.is_done(); ++done) {
+    const Control control{.progress = [&](double part) { whole.progress((done + part) / run.frames()); },
+                          .stop = whole.stop};
+    const Frame frame = run.next(control);
+    const bool is_wanted = staged != outputs_.frames.end() && staged->first == frame.number;
+    const std::vector<glm::vec3> displacement =
+        is_wanted || frame.ends_phase ? run.displacement() : std::vector<glm::vec3>();
+    add_frame(record, frame, displacement);
+    if (!is_wanted) continue;
+    const double begun = stage.seconds();
+    write(staged->second, displacement);
+    written += stage.seconds() - begun;
+    ++staged;
+  }
+  record.stages.emplace_back("simulate", stage.seconds() - written);
+}
+
+std::unique_ptr<ScenarioRun> Simulating::begin(const Workplace& workplace) {
+  try {
+    return std::make_unique<ScenarioRun>(scenario_, patient_, workplace);
+  } catch (const InputError& error) {
+    throw InputError(std::string(error.what()) + ", " + options_.scenario.string());
+  }
+}
+
+int Simulating::run() {
+  read();
+  const SimulationBackend backend = make_simulation_backend(scenario_.method, options_.backend, options_.device,
+                                                            {.threads = options_.common.threads});
+  const std::unique_ptr<ScenarioRun> begun = begin(backend.workplace);
+  ScenarioRun& run = *begun;
+  SimulateRecord record{options_, scenario_, patient_, run, backend.name};
+  for (const std::string& note : notes_) say(options_.common, "tetwarp: warning: " + note);
+  if (options_.dry_run) {
+    for (const std::string& warning : warnings_of(record)) say(options_.common, "tetwarp: warning: " + warning);
+    say(options_.common, "would simulate: " + describe(record));
+    return 0;
+  }
+  record.stages = {{"read", read_seconds_}, {"prepare", prepare_seconds_}};
+  simulate(run, record);
+  write(outputs_.field, run.displacement());
+  record.stages.emplace_back("write", write_seconds_);
+  outputs_.set.write([&] {
+    if (!outputs_.report.empty()) write_json(outputs_.report, document_of(record));
+  });
+  outputs_.set.commit();
+  for (const std::string& warning : warnings_of(record)) say(options_.common, "tetwarp: warning: " + warning);
+  say(options_.common, "simulated: " + describe(record));
+  say(options_.common,
+      "wrote " + options_.output.string() + ": forward field, " + to_string(patient_.lattice.size) + " vertices" +
+          (outputs_.frames.empty() ? std::string()
+                                   : ", and " + std::to_string(outputs_.frames.size()) + " frames on the way"));
+  return 0;
+}
+
+}  // namespace
+
+int run_simulate(const SimulateOptions& options) {
+  if (!has_image_suffix(options.output)) {
+    throw UsageError("unknown suffix of \"" + options.output.string() +
+                     "\"; a field is written as .mha .nrrd .nii .nii.gz");
+  }
+  Scenario scenario = read_scenario(options.scenario);
+  Outputs outputs = begin_outputs(options, scenario);
+  return Simulating(options, std::move(scenario), std::move(outputs)).run();
+}
+
+}  // namespace tetwarp::apps

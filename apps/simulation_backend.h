@@ -1,0 +1,19 @@
+#pragma once
+
+#include <string>
+
+#include "deform/simulate/scenario_run.h"
+
+namespace tetwarp::apps {
+
+struct SimulationBackend {
+  std::string name;  ///< the one that runs: never "auto"
+  simulate::Workplace workplace;
+};
+
+/// @param wanted  auto (CUDA where a device works, else the CPU), cpu or cuda
+/// Whether a wish can be met is known when the workplace makes a simulation: that throws NotCompiled or DeviceError.
+SimulationBackend make_simulation_backend(simulate::Method method, const std::string& wanted, int device,
+                                          const Limits& limits);
+
+}  // namespace tetwarp::apps

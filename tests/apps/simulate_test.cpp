@@ -1,0 +1,244 @@
+// `tetwarp simulate`: scenarios on a small phantom, end to end.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "io/field_file.h"
+#include "io/image_file.h"
+#include "tests/support/program.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch.h"
+#include "tests/support/write_file.h"
+
+namespace {
+
+using namespace tetwarp;
+using nlohmann::json;
+
+/// A phantom of 48 x 48 x 30 voxels of 8 x 8 x 10 mm, and scenarios beside it.
+class Simulate : public testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_EQ(run_tetwarp(scratch_.path(), "phantom --size 48,48,30 --spacing 8,8,10 --quiet -o ct.mha").status, 0);
+    write_file(scratch_ / "push.json", R"({
+  "method": "chainmail",
+  "cell_size": 2,
+  "name": "push",
+  "tissues": [
+    {"name": "bone", "hu": [300, null], "compression": 0, "stretch": 0, "shear": 0},
+    {"name": "rest", "compression": 0.2, "stretch": 0.2, "shear": 0.3}
+  ],
+  "hold": [{"border": true}],
+  "phases": [
+    {"name": "in", "frames": 4,
+     "move": [{"name": "hand", "handle": {"at": {"body": [0.5, 0.3, 0.5]}, "radius_mm": 20}, "by_mm": [0, 12, 0]}]},
+    {"name": "aside", "frames": 2,
+     "move": [{"name": "hand", "handle": {"at": {"body": [0.5, 0.3, 0.5]}, "radius_mm": 20}, "by_mm": [8, 12, 0]}]}
+  ]
+})");
+  }
+  Outcome run(const std::string& arguments) const { return run_tetwarp(scratch_.path(), arguments); }
+  json document(const std::string& name) const { return json::parse(read_text(scratch_ / name)); }
+  /// What lies in the folder beside the inputs and the program's own words.
+  std::vector<std::string> left() const {
+    std::vector<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(scratch_.path())) {
+      const std::string name = entry.path().filename().string();
+      if (name != "ct.mha" && name != "ct.mha.json" && !name.ends_with(".json") && name != ".stdout" &&
+          name != ".stderr" && name != "labels.mha")
+        names.push_back(name);
+    }
+    std::sort(names.begin(), names.end());
+    return names;
+  }
+
+  Scratch scratch_;
+};
+
+float largest(const VertexField& field) {
+  float result = 0;
+  for (const glm::vec3& by : field.displacement)
+    result = std::max(result, std::sqrt(by.x * by.x + by.y * by.y + by.z * by.z));
+  return result;
+}
+
+TEST_F(Simulate, WritesAForwardFieldThatDeformTakes) {
+  const Outcome made = run("simulate push.json ct.mha -o field.mha --report report.json --backend cpu");
+  ASSERT_EQ(made.status, 0) << made.err;
+  EXPECT_TRUE(says(made.err, {"simulated: chainmail on the cpu", "wrote field.mha"}));
+  EXPECT_EQ(made.out, "");
+  const VertexField field = read_forward_field(FieldSource(scratch_ / "field.mha"));
+  EXPECT_EQ(field.lattice.size, glm::i64vec3(25, 25, 16));
+  EXPECT_NEAR(largest(field), std::sqrt(208.0f), 1e-4f);
+  const Outcome deformed = run("deform ct.mha -f field.mha -o out.mha");
+  EXPECT_EQ(deformed.status, 0) << deformed.err;
+  EXPECT_EQ(left(), (std::vector<std::string>{"field.mha", "out.mha"}));
+}
+
+TEST_F(Simulate, ReportSaysWhatWasDone) {
+  ASSERT_EQ(run("simulate push.json ct.mha -o field.nii.gz --report report.json --backend cpu").status, 0);
+  const json report = document("report.json");
+  EXPECT_EQ(report["command"], "simulate");
+  EXPECT_EQ(report["method"], "chainmail");
+  EXPECT_EQ(report["backend"], "cpu");
+  EXPECT_EQ(report["scenario"]["name"], "push");
+  EXPECT_EQ(report["lattice"]["size"], json({25, 25, 16}));
+  EXPECT_EQ(report["body_box_lps_mm"].size(), 2u);
+  ASSERT_EQ(report["tissues"].size(), 2u);
+  EXPECT_EQ(report["tissues"][0]["cells"].get<int>() + report["tissues"][1]["cells"].get<int>(), 24 * 24 * 15);
+  EXPECT_GT(report["tissues"][0]["cells"], 10);
+  ASSERT_EQ(report["phases"].size(), 2u);
+  const json& in = report["phases"][0];
+  EXPECT_EQ(in["name"], "in");
+  EXPECT_EQ(in["held"], 25 * 25 * 16 - 23 * 23 * 14);
+  EXPECT_GT(in["moved"], 3);
+  EXPECT_GT(in["steps"], 3);
+  EXPECT_EQ(in["settled"], true);
+  EXPECT_NEAR(in["largest_displacement_mm"], 12, 1e-4);
+  EXPECT_TRUE(in["links_beyond_limits"]["count"].is_number_unsigned());
+  EXPECT_LE(in["links_beyond_limits"]["first"].size(), 10u);
+  for (const char* stage : {"read", "prepare", "simulate", "write"})
+    EXPECT_GE(report["stages"][stage]["seconds"], 0) << stage;
+}
+
+TEST_F(Simulate, FramesOnTheWayHaveTheirNumbers) {
+  ASSERT_EQ(run("simulate push.json ct.mha -o f.nii.gz --every 2 --backend cpu").status, 0);
+  EXPECT_EQ(left(), (std::vector<std::string>{"f.0002.nii.gz", "f.0004.nii.gz", "f.0006.nii.gz", "f.nii.gz"}));
+  const auto at = [&](const std::string& name) { return read_forward_field(FieldSource(scratch_ / name)); };
+  EXPECT_NEAR(largest(at("f.0002.nii.gz")), 6, 1e-4f);
+  EXPECT_NEAR(largest(at("f.0004.nii.gz")), 12, 1e-4f);
+  EXPECT_TRUE(at("f.0006.nii.gz").displacement == at("f.nii.gz").displacement);
+  const Outcome again = run("simulate push.json ct.mha -o f.nii.gz --every 3 --overwrite --quiet --backend cpu");
+  EXPECT_EQ(again.status, 0);
+  EXPECT_EQ(again.err, "");
+  std::filesystem::remove(scratch_ / "f.nii.gz");
+  EXPECT_EQ(run("simulate push.json ct.mha -o f.nii.gz --every 3").status, 1) << "f.0003.nii.gz is there";
+  EXPECT_FALSE(std::filesystem::exists(scratch_ / "f.nii.gz"));
+}
+
+TEST_F(Simulate, BytesDoNotDependOnThreads) {
+  ASSERT_EQ(run("simulate push.json ct.mha -o a.mha --threads 1 --backend cpu").status, 0);
+  ASSERT_EQ(run("simulate push.json ct.mha -o b.mha --threads 3 --backend cpu").status, 0);
+  EXPECT_EQ(read_text(scratch_ / "a.mha"), read_text(scratch_ / "b.mha"));
+}
+
+TEST_F(Simulate, DryRunSaysWhatWouldBeDoneAndLeavesNothing) {
+  const Outcome dry = run("simulate push.json ct.mha -o field.mha --every 1 --dry-run --backend cpu");
+  EXPECT_EQ(dry.status, 0);
+  EXPECT_TRUE(says(dry.err, {"would simulate: chainmail on the cpu, 25 x 25 x 16 vertices, 6 frames", "bone",
+                             "in phase \"in\" ", "vertices held"}));
+  EXPECT_TRUE(left().empty());
+}
+
+TEST_F(Simulate, RefusalsAreOneLineWithTheirStatusAndLeaveNothing) {
+  const auto refused = [&](const std::string& arguments, int status, const std::vector<std::string>& words) {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.status, status) << outcome.err;
+    EXPECT_TRUE(says(outcome.err, words));
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_TRUE(left().empty()) << left().front();
+  };
+  const std::string text = read_text(scratch_ / "push.json");
+  const auto changed = [&](const std::string& from, const std::string& to) {
+    std::string other = text;
+    other.replace(other.find(from), from.size(), to);
+    write_file(scratch_ / "bad.json", other);
+  };
+  changed("\"radius_mm\": 20", "\"radius_mm\": -3");
+  refused("simulate bad.json ct.mha -o f.mha", 4, {"bad.json:12: phases[0].move[0].handle.radius_mm is -3"});
+  changed("\"hu\": [300, null]", "\"label\": 3");
+  refused("simulate bad.json ct.mha -o f.mha", 4, {"\"bone\"", "--labels"});
+  changed("{\"border\": true}", "{\"half_space\": {\"at\": {\"mm\": [0, 0, 9000]}, \"normal\": [0, 0, -1]}}");
+  refused("simulate bad.json ct.mha -o f.mha", 4, {"bad.json", "phases[0].move[0] \"hand\" (line 12)", "are held"});
+  changed("\"phases\": [",
+          "\"cuts\": [{\"name\": \"slit\", \"plane\": {\"at\": {\"body\": [0.5, 0.5, 0.5]}, "
+          "\"normal\": [1, 0, 0]}}],\n\"phases\": [");
+  refused("simulate bad.json ct.mha -o f.mha", 4, {"\"slit\" is open"});
+  refused("simulate absent.json ct.mha -o f.mha", 4, {"cannot be read, absent.json"});
+  refused("simulate . ct.mha -o f.mha", 4, {"folder"});
+  refused("simulate ct.mha ct.mha -o f.mha", 4, {"ct.mha"});
+  refused("simulate push.json absent.mha -o f.mha", 4, {"absent.mha"});
+  refused("simulate push.json ct.mha -o f.txt", 2, {"f.txt", ".mha .nrrd .nii .nii.gz"});
+  refused("simulate push.json ct.mha -o folder", 2, {"folder"});
+  refused("simulate push.json ct.mha -o ct.mha --overwrite", 2, {"ct.mha"});
+  refused("simulate push.json ct.mha -o f.mha --every 0", 2, {"--every"});
+  refused("simulate push.json ct.mha", 2, {"output"});
+  refused("simulate push.json ct.mha -o f.mha --labels push.json", 4, {"push.json"});
+}
+
+TEST_F(Simulate, CutsThatAreClosedAreTissue) {
+  std::string text = read_text(scratch_ / "push.json");
+  write_file(scratch_ / "plain.json", text);
+  text.replace(
+      text.find("\"phases\": ["), 11,
+      R"("cuts": [{"name": "slit", "plane": {"at": {"body": [0.5, 0.5, 0.5]}, "normal": [1, 0, 0]}}], "phases": [)");
+  for (const std::string name : {"in", "aside"}) {
+    const std::string key = "\"name\": \"" + name + "\"";
+    text.replace(text.find(key), key.size(), key + ", \"closed_cuts\": [\"slit\"]");
+  }
+  write_file(scratch_ / "closed.json", text);
+  ASSERT_EQ(run("simulate plain.json ct.mha -o a.mha --backend cpu").status, 0);
+  const Outcome closed = run("simulate closed.json ct.mha -o b.mha --backend cpu");
+  ASSERT_EQ(closed.status, 0) << closed.err;
+  EXPECT_EQ(read_text(scratch_ / "a.mha"), read_text(scratch_ / "b.mha"));
+}
+
+TEST_F(Simulate, LabelsDecideWhatIsHeld) {
+  AnyVolume labels = read_image(scratch_ / "ct.mha");
+  for (std::int16_t& voxel : labels.as<std::int16_t>()) voxel = 7;
+  write_image(scratch_ / "labels.mha", std::as_const(labels).view());
+  std::string text = read_text(scratch_ / "push.json");
+  text.replace(text.find("{\"border\": true}"), 16, "{\"label\": 7}");
+  write_file(scratch_ / "all.json", text);
+  const Outcome all = run("simulate all.json ct.mha -o f.mha --labels labels.mha");
+  EXPECT_EQ(all.status, 4);
+  EXPECT_TRUE(says(all.err, {"are held"}));
+  text.replace(text.find("{\"label\": 7}"), 12, "{\"label\": [8, 9]}");
+  write_file(scratch_ / "none.json", text);
+  const Outcome none = run("simulate none.json ct.mha -o f.mha --labels labels.mha");
+  EXPECT_EQ(none.status, 0);
+  EXPECT_TRUE(says(none.err, {"tetwarp: warning: hold[0] (line 9) holds no vertex"}));
+}
+
+TEST_F(Simulate, StepsThatAreSpentAreAWarning) {
+  std::string text = read_text(scratch_ / "push.json");
+  text.replace(text.find("\"hold\""), 6, "\"stop\": {\"steps\": 1}, \"hold\"");
+  write_file(scratch_ / "short.json", text);
+  const Outcome shortened = run("simulate short.json ct.mha -o f.mha --report report.json --backend cpu");
+  EXPECT_EQ(shortened.status, 0);
+  EXPECT_TRUE(says(shortened.err, {"tetwarp: warning: in phase \"in\" ", "had not settled after 1 steps"}));
+  EXPECT_EQ(document("report.json")["phases"][0]["settled"], false);
+}
+
+TEST_F(Simulate, ShippedScenariosRunOnThePhantom) {
+  for (const auto& entry : std::filesystem::directory_iterator(TETWARP_SCENARIOS)) {
+    const std::string name = entry.path().stem().string();
+    json scenario = json::parse(read_text(entry.path()));
+    if (scenario.contains("cuts")) continue;
+    scenario["cell_size"] = 2;  // of a phantom with few voxels
+    write_file(scratch_ / (name + ".json"), scenario.dump());
+    const Outcome made =
+        run("simulate " + name + ".json ct.mha -o " + name + ".mha --report " + name + ".report.json --backend cpu");
+    ASSERT_EQ(made.status, 0) << name << ": " << made.err;
+    const json report = document(name + ".report.json");
+    for (const json& phase : report["phases"]) {
+      EXPECT_EQ(phase["settled"], true) << name;
+      EXPECT_GT(phase["held"], 0) << name;
+      EXPECT_GT(phase["moved"], 0) << name;
+      EXPECT_GT(phase["largest_displacement_mm"], 5) << name;
+      EXPECT_LT(phase["largest_displacement_mm"], 100) << name;
+    }
+    const Outcome deformed = run("deform ct.mha -f " + name + ".mha -o " + name + "_out.mha --outside background");
+    EXPECT_EQ(deformed.status, 0) << deformed.err;
+  }
+}
+
+TEST_F(Simulate, HelpHasAnExample) {
+  const Outcome help = run("simulate --help");
+  EXPECT_EQ(help.status, 0);
+  EXPECT_TRUE(says(help.out, {"Example: tetwarp simulate", "--every", "--labels", "--dry-run"}));
+}
+
+}  // namespace
