@@ -5,8 +5,10 @@
 #include "apps/output.h"
 #include "apps/simulate_report.h"
 #include "apps/simulation_backend.h"
+#include "deform/fields/lattice_mesh.h"
 #include "io/field_file.h"
 #include "io/image_file.h"
+#include "io/mesh_writer.h"
 #include "io/scenario_file.h"
 
 namespace tetwarp::apps {
@@ -52,6 +54,19 @@ Outputs begin_outputs(const SimulateOptions& options, const Scenario& scenario) 
   return outputs;
 }
 
+/// Only a mesh holds open cuts. @throws InputError for a phase whose field is written, and is divided
+void require_fitting_format(const SimulateOptions& options, const Scenario& scenario) {
+  if (has_mesh_suffix(options.output)) return;
+  for (const Phase& phase : scenario.phases) {
+    if (options.every == 0 && &phase != &scenario.phases.back()) continue;
+    for (const CutPlan& cut : scenario.cuts) {
+      if (std::find(phase.closed_cuts.begin(), phase.closed_cuts.end(), cut.name) != phase.closed_cuts.end()) continue;
+      throw InputError("the cut \"" + cut.name + "\" is open" + (phase.name.empty() ? "" : " in " + phase.name) +
+                       ", which " + options.output.string() + " cannot hold; write a mesh, .vtu or .vtk");
+    }
+  }
+}
+
 /// One run of the command.
 class Simulating {
  public:
@@ -64,7 +79,7 @@ class Simulating {
   void read();
   std::unique_ptr<ScenarioRun> begin(const Workplace& workplace);
   void simulate(ScenarioRun& run, SimulateRecord& record);
-  void write(const fs::path& path, const std::vector<glm::vec3>& displacement);
+  void write(const fs::path& path, const VertexField& field);
 
   const SimulateOptions& options_;
   Scenario scenario_;
@@ -94,11 +109,15 @@ void Simulating::read() {
   prepare_seconds_ = stage.seconds();
 }
 
-void Simulating::write(const fs::path& path, const std::vector<glm::vec3>& displacement) {
+void Simulating::write(const fs::path& path, const VertexField& field) {
   Stage stage(options_.common, "write");
-  const auto vertices = static_cast<std::ptrdiff_t>(voxel_count(patient_.lattice));
-  const VertexField field{patient_.lattice, {displacement.begin(), displacement.begin() + vertices}};
-  outputs_.set.write([&] { write_field_file(path, field); });
+  outputs_.set.write([&] {
+    if (has_mesh_suffix(path)) {
+      write_mesh_file(path, mesh_of(field));
+    } else {
+      write_field_file(path, field);
+    }
+  });
   write_seconds_ += stage.seconds();
 }
 
@@ -112,12 +131,11 @@ void Simulating::simulate(ScenarioRun& run, SimulateRecord& record) {
                           .stop = whole.stop};
     const Frame frame = run.next(control);
     const bool is_wanted = staged != outputs_.frames.end() && staged->first == frame.number;
-    const std::vector<glm::vec3> displacement =
-        is_wanted || frame.ends_phase ? run.displacement() : std::vector<glm::vec3>();
+    const std::vector<glm::vec3> displacement = frame.ends_phase ? run.displacement() : std::vector<glm::vec3>();
     add_frame(record, frame, displacement);
     if (!is_wanted) continue;
     const double begun = stage.seconds();
-    write(staged->second, displacement);
+    write(staged->second, run.field());
     written += stage.seconds() - begun;
     ++staged;
   }
@@ -147,7 +165,8 @@ int Simulating::run() {
   }
   record.stages = {{"read", read_seconds_}, {"prepare", prepare_seconds_}};
   simulate(run, record);
-  write(outputs_.field, run.displacement());
+  const VertexField field = run.field();
+  write(outputs_.field, field);
   record.stages.emplace_back("write", write_seconds_);
   outputs_.set.write([&] {
     if (!outputs_.report.empty()) write_json(outputs_.report, document_of(record));
@@ -157,6 +176,9 @@ int Simulating::run() {
   say(options_.common, "simulated: " + describe(record));
   say(options_.common,
       "wrote " + options_.output.string() + ": forward field, " + to_string(patient_.lattice.size) + " vertices" +
+          (field.replaced.empty() ? std::string()
+                                  : ", " + std::to_string(field.replaced.size()) + " cells along open cuts as " +
+                                        std::to_string(field.mesh.tetrahedra.size()) + " tetrahedra") +
           (outputs_.frames.empty() ? std::string()
                                    : ", and " + std::to_string(outputs_.frames.size()) + " frames on the way"));
   return 0;
@@ -165,11 +187,12 @@ int Simulating::run() {
 }  // namespace
 
 int run_simulate(const SimulateOptions& options) {
-  if (!has_image_suffix(options.output)) {
+  if (!has_image_suffix(options.output) && !has_mesh_suffix(options.output)) {
     throw UsageError("unknown suffix of \"" + options.output.string() +
-                     "\"; a field is written as .mha .nrrd .nii .nii.gz");
+                     "\"; a field is written as .mha .nrrd .nii .nii.gz, or as a mesh, .vtu .vtk");
   }
   Scenario scenario = read_scenario(options.scenario);
+  require_fitting_format(options, scenario);
   Outputs outputs = begin_outputs(options, scenario);
   return Simulating(options, std::move(scenario), std::move(outputs)).run();
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <utility>
 
 #include "bench/machine.h"
 #include "bench/statistics.h"
@@ -37,25 +38,26 @@ class HostVolumes final : public FrameVolumes {
   double background_;
 };
 
-Workplace workplace_of(Method method, bool on_cuda, const SimulateOptions& options) {
+Workplace workplace_of(simulate::Method method, bool on_cuda, const SimulateOptions& options) {
   const Limits limits{.threads = options.threads};
   const int device = options.device;
   if (!on_cuda) {
     return {[=](const Model& model) {
-      return method == Method::chainmail ? make_cpu_chainmail(model, limits) : make_cpu_mass_spring(model, {}, limits);
+      return method == simulate::Method::chainmail ? make_cpu_chainmail(model, limits)
+                                                   : make_cpu_mass_spring(model, {}, limits);
     }};
   }
   return {.make =
               [=](const Model& model) {
-                return method == Method::chainmail ? make_cuda_chainmail(model, device)
-                                                   : make_cuda_mass_spring(model, {}, device);
+                return method == simulate::Method::chainmail ? make_cuda_chainmail(model, device)
+                                                             : make_cuda_mass_spring(model, {}, device);
               },
           .fetch = [](std::span<glm::vec3> to,
                       const glm::vec3* from) { copy_from_cuda_device(to.data(), from, to.size_bytes()); }};
 }
 
 /// The first phase alone.
-Scenario first_phase(Scenario scenario, Method method, int frames) {
+Scenario first_phase(Scenario scenario, simulate::Method method, int frames) {
   scenario.method = method;
   scenario.phases.resize(1);
   scenario.phases[0].frames = frames;
@@ -82,7 +84,8 @@ class Measuring {
     for (const std::string& backend : options_.backends) {
       for (const std::string& method : options_.methods) {
         say_(backend + ", " + method);
-        const Method which = method == "chainmail" ? Method::chainmail : Method::mass_spring;
+        const simulate::Method which =
+            method == "chainmail" ? simulate::Method::chainmail : simulate::Method::mass_spring;
         settle(which, method, backend);
         frames(which, method, backend);
       }
@@ -91,7 +94,7 @@ class Measuring {
   }
 
  private:
-  void settle(Method method, const std::string& name, const std::string& backend) {
+  void settle(simulate::Method method, const std::string& name, const std::string& backend) {
     const Scenario scenario = first_phase(scenario_, method, 1);
     ScenarioRun run(scenario, patient_, workplace_of(method, backend == "cuda", options_));
     const auto start = Clock::now();
@@ -99,7 +102,7 @@ class Measuring {
     results_.settle.push_back({name, backend, ms_since(start) / 1000, frame.settled});
   }
 
-  void frames(Method method, const std::string& name, const std::string& backend) {
+  void frames(simulate::Method method, const std::string& name, const std::string& backend) {
     const bool on_cuda = backend == "cuda";
     Scenario scenario = first_phase(scenario_, method, options_.warmup + options_.frames);
     scenario.stop.steps = options_.steps;
