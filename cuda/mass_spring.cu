@@ -110,11 +110,6 @@ class CudaMachine {
     wait();
   }
   template <class T>
-  void download(T* host, const T* place, std::size_t size) const {
-    TETWARP_CUDA_TRY(cudaMemcpyAsync(host, place, size * sizeof(T), cudaMemcpyDeviceToHost, stream_));
-    wait();
-  }
-  template <class T>
   T fetch(const T* place) {
     static_assert(sizeof(T) <= sizeof(Fetched));
     void* const to = pinned_.reserve(1);

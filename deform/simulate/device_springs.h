@@ -21,7 +21,7 @@ inline constexpr int kDeviceBlock = 256;
 ///     sum<T>(nodes, sweep, then);                // adds up what sweep(n) returns in an order of its own that never
 ///                                                // changes, then calls then(total) where the sweep ran
 ///     repeat(times, work);                       // the same times and work in every call: it may be recorded
-///     upload(place, host, size), download(host, place, size), wait();
+///     upload(place, host, size), wait();
 ///     T fetch(const T* place);                   // waits for what is queued, and brings a value to the host
 ///
 /// so that the same code runs on CUDA and, in tests, on the CPU.
@@ -59,22 +59,11 @@ class DeviceSprings final : public SpringEngine {
 
   void set_loads(const Loads& loads, std::span<const Role> roles) override {
     const auto scope = machine_.scope();
-    std::vector<glm::dvec3> now(nodes_), goal(nodes_), to(nodes_, glm::dvec3(0)), from(nodes_);
-    machine_.download(now.data(), a_.u, nodes_);
-    machine_.download(from.data(), a_.load, nodes_);
-    for (std::size_t n = 0; n < nodes_; ++n) {
-      goal[n] = sweeps::in_double(loads.goal[n]);
-      if (roles[n] != Role::free) {
-        from[n] = glm::dvec3(0);
-      } else if (!loads.force.empty()) {
-        to[n] = sweeps::in_double(loads.force[n]);
-      }
-    }
     machine_.upload(role_.data(), roles.data(), nodes_);
-    machine_.upload(a_.start, now.data(), nodes_);
-    machine_.upload(a_.goal, goal.data(), nodes_);
-    machine_.upload(a_.load_from, from.data(), nodes_);
-    machine_.upload(a_.load_to, to.data(), nodes_);
+    const glm::vec3* goals = hold(given_goals_, loads.goal);
+    const glm::vec3* forces = loads.force.empty() ? nullptr : hold(given_forces_, loads.force);
+    machine_.each(nodes_, sweeps::TakeLoads{{a_}, goals, forces});
+    machine_.wait();
   }
 
   void set_displacement(std::span<const glm::vec3> displacement) override {
@@ -175,7 +164,7 @@ class DeviceSprings final : public SpringEngine {
   Buffer<float> stiffness_;
   Buffer<Role> role_;
   Buffer<glm::dvec3> doubles_[9];
-  Buffer<glm::vec3> floats_[6];
+  Buffer<glm::vec3> floats_[6], given_goals_, given_forces_;
   Buffer<SpringMatrix<float>> matrix_;
   Buffer<Symmetric<float>> inverse_;
   Buffer<GradientState> state_;

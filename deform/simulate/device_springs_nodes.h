@@ -88,6 +88,17 @@ struct GradientSweep {
   TETWARP_HD bool is_idle() const { return a.state->is_done; }
 };
 
+/// New loads: from what is now. @param force  null: none
+struct TakeLoads : Sweep {
+  const glm::vec3 *goals, *forces;
+  TETWARP_HD void operator()(std::size_t n) const {
+    a.start[n] = a.u[n];
+    a.goal[n] = in_double(goals[n]);
+    a.load_from[n] = a.is_free(n) ? a.load[n] : glm::dvec3(0);
+    a.load_to[n] = a.is_free(n) && forces ? in_double(forces[n]) : glm::dvec3(0);
+  }
+};
+
 /// See SpringEngine::aim. Sums::most is the largest way of a placed node, squared.
 struct Aim : Sweep {
   double part;

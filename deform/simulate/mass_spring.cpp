@@ -52,9 +52,13 @@ class MassSpring final : public Simulation {
   MassSpring(const Model& model, std::unique_ptr<SpringEngine> engine) : model_(model), engine_(std::move(engine)) {}
 
   void set_loads(const Loads& loads) override {
-    const std::vector<Role> found = roles(model_, loads);
-    engine_->set_loads(loads, found);
-    least_force_ = rounding(found);
+    require_loads(model_, loads);
+    if (!has_loads_ || loads.hold != hold_) {
+      hold_ = loads.hold;
+      roles_ = roles(model_, hold_);
+      least_force_ = rounding();
+    }
+    engine_->set_loads(loads, roles_);
     has_loads_ = true;
   }
 
@@ -81,11 +85,11 @@ class MassSpring final : public Simulation {
 
  private:
   /// Forces below are rounding, not loads.
-  double rounding(std::span<const Role> found) const {
+  double rounding() const {
     constexpr double kSoftMm = 1e-4, kHardMm = 1e-9;
     double least = 0, most = 0;
     for (std::size_t n = 0; n < model_.nodes(); ++n) {
-      if (found[n] != Role::free) continue;
+      if (roles_[n] != Role::free) continue;
       double sum = 0;
       for (int d = 0; d < kDirections; ++d) sum += double{model_.stiffness[model_.link(d, n)]};
       least = least > 0 ? std::min(least, sum) : sum;
@@ -164,6 +168,8 @@ class MassSpring final : public Simulation {
 
   const Model& model_;
   std::unique_ptr<SpringEngine> engine_;
+  std::vector<Hold> hold_;
+  std::vector<Role> roles_;
   double least_force_ = 0;
   bool has_loads_ = false;
 };

@@ -30,26 +30,13 @@ bool is_zero(const glm::vec3& v) { return v.x == 0 && v.y == 0 && v.z == 0; }
 
 }  // namespace
 
-std::vector<Role> roles(const Model& model, const Loads& loads) {
-  const std::size_t nodes = model.nodes();
-  require_size(loads.hold.size(), model, "hold");
-  require_size(loads.goal.size(), model, "goal");
-  if (!loads.force.empty()) require_size(loads.force.size(), model, "force");
-  std::vector<Role> result(nodes, Role::kept);
+std::vector<Role> roles(const Model& model, std::span<const Hold> hold) {
+  std::vector<Role> result(model.nodes(), Role::kept);
   std::vector<std::uint32_t> front;
-  for (std::size_t n = 0; n < nodes; ++n) {
-    if (!loads.force.empty()) require_within(loads.force[n], kMostNewton, n, "force", "N");
-    if (loads.hold[n] != Hold::placed) continue;
-    require_within(loads.goal[n], kMostMm, n, "goal", "mm");
+  for (std::size_t n = 0; n < model.nodes(); ++n) {
+    if (hold[n] != Hold::placed) continue;
     result[n] = Role::placed;
     front.push_back(static_cast<std::uint32_t>(n));
-  }
-  if (front.empty()) {
-    for (std::size_t n = 0; n < loads.force.size(); ++n) {
-      if (is_zero(loads.force[n])) continue;
-      throw InputError("there is a force on node " + std::to_string(n) +
-                       " and no placed node to hold against it; place at least one");
-    }
   }
   while (!front.empty()) {
     const std::size_t n = front.back();
@@ -64,6 +51,25 @@ std::vector<Role> roles(const Model& model, const Loads& loads) {
     }
   }
   return result;
+}
+
+void require_loads(const Model& model, const Loads& loads) {
+  require_size(loads.hold.size(), model, "hold");
+  require_size(loads.goal.size(), model, "goal");
+  if (!loads.force.empty()) require_size(loads.force.size(), model, "force");
+  bool any_placed = false;
+  for (std::size_t n = 0; n < model.nodes(); ++n) {
+    if (!loads.force.empty()) require_within(loads.force[n], kMostNewton, n, "force", "N");
+    if (loads.hold[n] != Hold::placed) continue;
+    require_within(loads.goal[n], kMostMm, n, "goal", "mm");
+    any_placed = true;
+  }
+  if (any_placed) return;
+  for (std::size_t n = 0; n < loads.force.size(); ++n) {
+    if (is_zero(loads.force[n])) continue;
+    throw InputError("there is a force on node " + std::to_string(n) +
+                     " and no placed node to hold against it; place at least one");
+  }
 }
 
 void require_displacement(const Model& model, std::span<const glm::vec3> displacement) {

@@ -11,11 +11,12 @@ enum class Role : std::uint8_t {
   placed,  ///< given
 };
 
-/// Checks loads against a model, and finds the nodes that springs tie to placed ones.
-///
+/// Finds the nodes that springs tie to placed ones. One hold a node.
+std::vector<Role> roles(const Model& model, std::span<const Hold> hold);
+
 /// @throws InputError for arrays of the wrong size, a goal or force that is not finite or too large (1e6 mm, 1e9 N), or
 /// forces where no node is placed
-std::vector<Role> roles(const Model& model, const Loads& loads);
+void require_loads(const Model& model, const Loads& loads);
 
 /// @throws InputError unless there is one finite displacement a node, of 1e6 mm at most
 void require_displacement(const Model& model, std::span<const glm::vec3> displacement);

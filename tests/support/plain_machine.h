@@ -37,10 +37,6 @@ class PlainMachine {
     std::copy_n(host, size, place);
   }
   template <class T>
-  void download(T* host, const T* place, std::size_t size) const {
-    std::copy_n(place, size, host);
-  }
-  template <class T>
   T fetch(const T* place) const {
     return *place;
   }

@@ -2,50 +2,17 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Dense>
-#include <algorithm>
-#include <cmath>
-#include <functional>
 #include <glm/geometric.hpp>
 
-#include "cuda/devices.h"
-#include "tests/support/plain_machine.h"
-#include "tests/support/random.h"
+#include "tests/support/dense_springs.h"
 #include "tests/support/says.h"
+#include "tests/support/springs.h"
 
 namespace tetwarp::simulate {
 namespace {
 
-using test::Random;
+using namespace test;
 using Solver = MassSpringOptions::Solver;
-
-constexpr StoppingRule kTight{.motion_mm = 1e-7, .residual = 1e-9, .steps = 500};
-
-struct Method {
-  std::string name, cannot_run;
-  std::function<std::unique_ptr<Simulation>(const Model&)> make;
-
-  friend void PrintTo(const Method& method, std::ostream* stream) { *stream << method.name; }
-};
-
-std::vector<Method> methods() {
-  const auto on_cpu = [](Solver solver) {
-    return [solver](const Model& model) { return make_cpu_mass_spring(model, {.solver = solver}, {.threads = 2}); };
-  };
-  const std::string no_cuda =
-      !has_cuda() ? "CUDA is not in this build" : (cuda_device_count() == 0 ? "no CUDA device on this machine" : "");
-  return {
-      {.name = "cholesky", .cannot_run = "", .make = on_cpu(Solver::cholesky)},
-      {.name = "pcg", .cannot_run = "", .make = on_cpu(Solver::pcg)},
-      {.name = "device_code_on_cpu",
-       .cannot_run = "",
-       .make =
-           [](const Model& model) {
-             require_springs(model);
-             return make_mass_spring(model, std::make_unique<DeviceSprings<test::PlainMachine>>(model));
-           }},
-      {.name = "cuda", .cannot_run = no_cuda, .make = [](const Model& model) { return make_cuda_mass_spring(model); }}};
-}
 
 class MassSpring : public testing::TestWithParam<Method> {
  protected:
@@ -59,145 +26,9 @@ std::string method_name(const testing::TestParamInfo<Method>& method) { return m
 
 INSTANTIATE_TEST_SUITE_P(Methods, MassSpring, testing::ValuesIn(methods()), method_name);
 
-std::vector<glm::vec3> displacement(const Simulation& simulation) {
-  const std::span<const glm::vec3> shown = simulation.displacement();
-  std::vector<glm::vec3> result(shown.size());
-  if (simulation.memory() == Memory::host) {
-    std::copy(shown.begin(), shown.end(), result.begin());
-  } else {
-    copy_from_cuda_device(result.data(), shown.data(), shown.size_bytes());
-  }
-  return result;
-}
-
-Geometry lattice(const glm::i64vec3& size, const glm::dvec3& spacing = {6, 7, 8}) {
-  return {.size = size, .spacing = spacing, .origin = {3, -4, 5}};
-}
-
-const std::vector<Tissue>& tissues() {
-  static const std::vector<Tissue> all{{.name = "soft", .youngs_modulus_kpa = 10},
-                                       {.name = "bone", .youngs_modulus_kpa = 1e4},
-                                       {.name = "air", .youngs_modulus_kpa = 0.1}};
-  return all;
-}
-
-Model random_model(const Geometry& grid, Random& random, int kinds) {
-  const glm::i64vec3 cells = grid.size - std::int64_t{1};
-  std::vector<std::uint8_t> of_cell(static_cast<std::size_t>(cells.x * cells.y * cells.z));
-  for (std::uint8_t& tissue : of_cell) tissue = static_cast<std::uint8_t>(random.integer(0, kinds - 1));
-  return make_model(grid, of_cell, tissues());
-}
-
-glm::i64vec3 place_of(const Model& model, std::size_t node) {
-  const glm::i64vec3& size = model.lattice.size;
-  const auto v = static_cast<std::int64_t>(model.vertex[node]);
-  return {v % size.x, v / size.x % size.y, v / (size.x * size.y)};
-}
-
-glm::dvec3 rest_of(const Model& model, std::size_t node) {
-  return point_from_index(model.lattice)(glm::dvec3(place_of(model, node)));
-}
-
-/// All nodes free.
-Loads free_loads(const Model& model) {
-  return {.hold = std::vector<Hold>(model.nodes(), Hold::free),
-          .goal = std::vector<glm::vec3>(model.nodes(), glm::vec3(0)),
-          .force = {}};
-}
-
-void place(Loads& loads, std::size_t node, const glm::dvec3& goal) {
-  loads.hold[node] = Hold::placed;
-  loads.goal[node] = {static_cast<float>(goal.x), static_cast<float>(goal.y), static_cast<float>(goal.z)};
-}
-
-/// The bottom layer held, a part of the top layer moved.
-Loads pressed(const Model& model, const glm::dvec3& motion) {
-  Loads loads = free_loads(model);
-  const glm::i64vec3& size = model.lattice.size;
-  for (std::size_t n = 0; n < model.nodes(); ++n) {
-    const glm::i64vec3 at = place_of(model, n);
-    if (at.z == 0) place(loads, n, glm::dvec3(0));
-    if (at.z == size.z - 1 && at.x < (size.x + 1) / 2) place(loads, n, motion);
-  }
-  return loads;
-}
-
-double furthest(const std::vector<glm::vec3>& a, const std::function<glm::dvec3(std::size_t)>& b) {
-  double most = 0;
-  for (std::size_t n = 0; n < a.size(); ++n) {
-    const glm::dvec3 expected = b(n);
-    const double apart =
-        std::hypot(double{a[n].x} - expected.x, double{a[n].y} - expected.y, double{a[n].z} - expected.z);
-    if (!(apart <= most)) most = apart;  // NaN stays
-  }
-  return most;
-}
-
-double furthest(const std::vector<glm::vec3>& a, const std::vector<glm::vec3>& b) {
-  return furthest(a, [&](std::size_t n) { return glm::dvec3(double{b[n].x}, double{b[n].y}, double{b[n].z}); });
-}
-
-/// The equilibrium by Newton's method with a dense matrix, from the energy's definition: k/2 (|x_a - x_b| - r)^2.
-/// @param part  of the loads
-void improve(const Model& model, const Loads& loads, double part, std::vector<glm::dvec3>& u) {
-  const std::size_t nodes = model.nodes();
-  std::vector<glm::dvec3> rest(nodes);
-  for (std::size_t n = 0; n < nodes; ++n) rest[n] = rest_of(model, n);
-  for (std::size_t n = 0; n < nodes; ++n) {
-    if (loads.hold[n] == Hold::placed) u[n] = part * glm::dvec3(loads.goal[n].x, loads.goal[n].y, loads.goal[n].z);
-  }
-  for (int step = 0; step < 60; ++step) {
-    const auto rows = static_cast<Eigen::Index>(3 * nodes);
-    Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(rows, rows);
-    Eigen::VectorXd force = Eigen::VectorXd::Zero(rows);
-    for (int d = 0; d < kDirections; ++d) {
-      for (std::size_t a = 0; a < nodes; ++a) {
-        const std::size_t link = model.link(d, a);
-        if (model.neighbour[link] < 0) continue;
-        const auto b = static_cast<std::size_t>(model.neighbour[link]);
-        const glm::dvec3 apart = (rest[b] + u[b]) - (rest[a] + u[a]), at_rest = rest[b] - rest[a];
-        const Eigen::Vector3d x(apart.x, apart.y, apart.z);
-        const double r = std::sqrt(at_rest.x * at_rest.x + at_rest.y * at_rest.y + at_rest.z * at_rest.z);
-        const double k = model.stiffness[link], length = x.norm();
-        const Eigen::Matrix3d block =
-            k * (1 - r / length) * Eigen::Matrix3d::Identity() + k * r / (length * length * length) * x * x.transpose();
-        const auto ra = static_cast<Eigen::Index>(3 * a), rb = static_cast<Eigen::Index>(3 * b);
-        matrix.block<3, 3>(ra, ra) += block;
-        matrix.block<3, 3>(ra, rb) -= block;
-        force.segment<3>(ra) += k * (1 - r / length) * x;
-      }
-    }
-    for (std::size_t n = 0; n < nodes; ++n) {
-      for (int axis = 0; axis < 3; ++axis) {
-        const auto row = static_cast<Eigen::Index>(3 * n) + axis;
-        if (!loads.force.empty()) force(row) += part * double{loads.force[n][axis]};
-        if (loads.hold[n] == Hold::free && matrix(row, row) != 0) continue;
-        matrix.row(row).setZero();
-        matrix.col(row).setZero();
-        matrix(row, row) = 1;
-        force(row) = 0;
-      }
-    }
-    const Eigen::VectorXd motion = matrix.fullPivLu().solve(force);
-    for (std::size_t n = 0; n < nodes; ++n) {
-      const auto row = static_cast<Eigen::Index>(3 * n);
-      u[n] += glm::dvec3(motion(row), motion(row + 1), motion(row + 2));
-    }
-    if (motion.norm() < 1e-11) return;
-  }
-  ADD_FAILURE() << "the dense solve did not converge";
-}
-
-/// From rest, in small steps of the loads.
-std::vector<glm::dvec3> dense_equilibrium(const Model& model, const Loads& loads) {
-  std::vector<glm::dvec3> u(model.nodes(), glm::dvec3(0));
-  for (const double part : {0.25, 0.5, 0.75, 1.0}) improve(model, loads, part, u);
-  return u;
-}
-
 TEST_P(MassSpring, WithoutLoadNothingMovesAtAll) {
-  Random random(test::test_seed());
-  SCOPED_TRACE(test::seed_text(test::test_seed()));
+  Random random(test_seed());
+  SCOPED_TRACE(seed_text(test_seed()));
   const Model model = random_model(lattice({6, 5, 7}), random, 3);
   Loads loads = free_loads(model);
   for (std::size_t n = 0; n < 30; ++n) place(loads, n, glm::dvec3(0));
@@ -210,8 +41,8 @@ TEST_P(MassSpring, WithoutLoadNothingMovesAtAll) {
 }
 
 TEST_P(MassSpring, RigidMotionOfHandlesIsRigidMotionOfAllNodes) {
-  const std::uint64_t seed = test::test_seed();
-  SCOPED_TRACE(test::seed_text(seed));
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE(seed_text(seed));
   for (const bool turns : {false, true}) {
     for (const int kinds : {1, 3}) {
       Random random(seed, static_cast<std::uint64_t>(kinds));
@@ -238,9 +69,9 @@ TEST_P(MassSpring, RigidMotionOfHandlesIsRigidMotionOfAllNodes) {
 }
 
 TEST_P(MassSpring, EquilibriumIsThatOfADenseSolve) {
-  const std::uint64_t seed = test::test_seed();
-  for (std::uint64_t number = 0; number < test::test_cases(6); ++number) {
-    SCOPED_TRACE(test::seed_text(seed) + ", case " + std::to_string(number));
+  const std::uint64_t seed = test_seed();
+  for (std::uint64_t number = 0; number < test_cases(6); ++number) {
+    SCOPED_TRACE(seed_text(seed) + ", case " + std::to_string(number));
     Random random(seed, 100 + number);
     const int kinds = number % 2 == 0 ? 1 : 2;
     const Model model =
@@ -252,6 +83,8 @@ TEST_P(MassSpring, EquilibriumIsThatOfADenseSolve) {
     simulation->set_loads(loads);
     const Settled settled = simulation->advance(1, kTight);
     EXPECT_TRUE(settled.reached) << settled.steps << " steps, " << settled.motion_mm << ", " << settled.residual;
+    EXPECT_LE(settled.motion_mm, kTight.motion_mm);
+    EXPECT_LE(settled.residual, kTight.residual);
     const std::vector<glm::vec3> found = displacement(*simulation);
     const std::vector<glm::dvec3> expected = dense_equilibrium(model, loads);
     EXPECT_LT(furthest(found, [&](std::size_t n) { return expected[n]; }), 2e-6);
@@ -262,8 +95,8 @@ TEST_P(MassSpring, EquilibriumIsThatOfADenseSolve) {
 }
 
 TEST_P(MassSpring, TheUsualRuleEndsCloseToTheEquilibrium) {
-  Random random(test::test_seed(), 3);
-  SCOPED_TRACE(test::seed_text(test::test_seed()));
+  Random random(test_seed(), 3);
+  SCOPED_TRACE(seed_text(test_seed()));
   const Model model = random_model(lattice({6, 5, 6}), random, 2);
   const Loads loads = pressed(model, {1, -0.5, -3});
   const auto usual = make(model), tight = make(model);
@@ -275,8 +108,8 @@ TEST_P(MassSpring, TheUsualRuleEndsCloseToTheEquilibrium) {
 }
 
 TEST_P(MassSpring, EnergyFallsInEveryStep) {
-  Random random(test::test_seed(), 4);
-  SCOPED_TRACE(test::seed_text(test::test_seed()));
+  Random random(test_seed(), 4);
+  SCOPED_TRACE(seed_text(test_seed()));
   const Model model = random_model(lattice({8, 7, 9}), random, 3);
   const auto simulation = make(model);
   simulation->set_loads(pressed(model, {6, 0, -15}));
@@ -322,8 +155,8 @@ TEST_P(MassSpring, StretchedBarHasTheStressOfYoungsModulus) {
 }
 
 TEST_P(MassSpring, ReactionsOfALoadedLatticeBearTheLoad) {
-  Random random(test::test_seed(), 5);
-  SCOPED_TRACE(test::seed_text(test::test_seed()));
+  Random random(test_seed(), 5);
+  SCOPED_TRACE(seed_text(test_seed()));
   const Model model = random_model(lattice({5, 6, 5}), random, 2);
   Loads loads = free_loads(model);
   loads.force.assign(model.nodes(), glm::vec3(0));
@@ -346,6 +179,26 @@ TEST_P(MassSpring, ReactionsOfALoadedLatticeBearTheLoad) {
     }
     for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(reaction[axis], part * load[axis], 1e-3 * glm::length(load));
   }
+}
+
+TEST_P(MassSpring, NewForcesBeginWhereTheOldOnesAre) {
+  const Model model = make_model(lattice({3, 3, 3}), std::vector<std::uint8_t>(8, 0), tissues());
+  Loads loads = free_loads(model);
+  for (std::size_t n = 0; n < 9; ++n) place(loads, n, glm::dvec3(0));
+  const auto simulation = make(model);
+  const auto reaction = [&](float force, double part) {
+    loads.force.assign(model.nodes(), glm::vec3(0));
+    loads.force[22].x = force;  // middle of the top
+    simulation->set_loads(loads);
+    EXPECT_TRUE(simulation->advance(part, kTight).reached);
+    const std::vector<glm::dvec3> forces = net_forces(model, displacement(*simulation));
+    double sum = 0;
+    for (std::size_t n = 0; n < 9; ++n) sum += forces[n].x;
+    return sum;
+  };
+  EXPECT_NEAR(reaction(0.04f, 1), 0.04, 1e-5);
+  EXPECT_NEAR(reaction(0.02f, 0.5), 0.03, 1e-5);
+  EXPECT_NEAR(reaction(0, 1), 0, 1e-5);
 }
 
 TEST_P(MassSpring, NodesThatNothingTiesStayWhereTheyAre) {
@@ -393,8 +246,8 @@ TEST_P(MassSpring, NothingPullsAcrossACut) {
 }
 
 TEST_P(MassSpring, PartsOfTheWayLeadToTheSameEnd) {
-  Random random(test::test_seed(), 7);
-  SCOPED_TRACE(test::seed_text(test::test_seed()));
+  Random random(test_seed(), 7);
+  SCOPED_TRACE(seed_text(test_seed()));
   const Model model = random_model(lattice({5, 6, 7}), random, 1);
   const Loads loads = pressed(model, {2, 1, -4});
   const auto at_once = make(model), bit_by_bit = make(model);
@@ -410,8 +263,8 @@ TEST_P(MassSpring, PartsOfTheWayLeadToTheSameEnd) {
 }
 
 TEST_P(MassSpring, RunsAgainGiveTheSameBits) {
-  Random random(test::test_seed(), 8);
-  SCOPED_TRACE(test::seed_text(test::test_seed()));
+  Random random(test_seed(), 8);
+  SCOPED_TRACE(seed_text(test_seed()));
   const Model model = random_model(lattice({14, 13, 12}), random, 2);
   const auto run = [&] {
     const auto simulation = make(model);
@@ -492,8 +345,8 @@ TEST_P(MassSpring, LoadsThatDoNotFitAreRefused) {
 }
 
 TEST(MassSpringOnCpu, ResultIsIndependentOfThreadCount) {
-  Random random(test::test_seed(), 9);
-  SCOPED_TRACE(test::seed_text(test::test_seed()));
+  Random random(test_seed(), 9);
+  SCOPED_TRACE(seed_text(test_seed()));
   const Model model = random_model(lattice({17, 16, 15}), random, 3);  // several blocks
   std::vector<glm::vec3> first;
   for (const int threads : {1, 2, 5}) {
@@ -506,8 +359,8 @@ TEST(MassSpringOnCpu, ResultIsIndependentOfThreadCount) {
 }
 
 TEST(MassSpringOnCpu, CholeskyAndConjugateGradientsAgree) {
-  Random random(test::test_seed(), 10);
-  SCOPED_TRACE(test::seed_text(test::test_seed()));
+  Random random(test_seed(), 10);
+  SCOPED_TRACE(seed_text(test_seed()));
   const Model model = random_model(lattice({12, 11, 13}), random, 1);
   std::vector<glm::vec3> of[2];
   for (const int n : {0, 1}) {
@@ -517,6 +370,20 @@ TEST(MassSpringOnCpu, CholeskyAndConjugateGradientsAgree) {
     of[n] = displacement(*simulation);
   }
   EXPECT_LT(furthest(of[0], of[1]), 1e-5);
+}
+
+/// Not only the same end: the same way there, to rounding, so that one's speed of convergence is the other's.
+TEST(MassSpringOnCpu, TheCodeOfDevicesTakesTheSameSteps) {
+  Random random(test_seed(), 11);
+  SCOPED_TRACE(seed_text(test_seed()));
+  const Model model = random_model(lattice({12, 11, 13}), random, 2);
+  const auto on_cpu = make_cpu_mass_spring(model, {.solver = Solver::pcg});
+  const auto of_device = make_mass_spring(model, std::make_unique<DeviceSprings<PlainMachine>>(model));
+  for (Simulation* simulation : {on_cpu.get(), of_device.get()}) {
+    simulation->set_loads(pressed(model, {1, -1, -3}));
+    EXPECT_EQ(simulation->advance(1, {.steps = 2}).steps, 2);
+  }
+  EXPECT_LT(furthest(displacement(*on_cpu), displacement(*of_device)), 1e-3);
 }
 
 TEST(MassSpringEnergy, IsThatOfOneStretchedSpring) {
