@@ -26,7 +26,7 @@ inline constexpr std::size_t kMostNodesForCholesky = 20'000;
 /// Where placed nodes moved, the others first follow by the harmonic extension. Then come local/global steps (Liu,
 /// Bargteil, O'Brien and Kavan 2013: springs choose their directions, then one linear system with a constant Laplacian)
 /// while they are worth it, and Newton's steps with conjugate gradients from there on. A line search keeps the energy
-/// falling in every step. A step is one linear system. See docs/simulate-mass-spring.
+/// falling in every step. A step is one linear system. See docs/simulation.md.
 ///
 /// Nodes that springs do not tie to a placed node stay where they are, whatever the force on them.
 ///
