@@ -4,6 +4,8 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "cuda/devices.h"
+#include "deform/simulate/chainmail.h"
 #include "deform/simulate/mass_spring.h"
 #include "deform/simulate/scenario_run.h"
 #include "tests/deform/simulate/scenario_volumes.h"
@@ -76,6 +78,36 @@ TEST(CutRun, FramesAreResampledThroughTheirFields) {
     EXPECT_EQ(of_loop.uncovered > 0, frame.phase == 0);
   }
   EXPECT_EQ(by_loop.voxels, source.voxels) << "closed again";
+}
+
+TEST(CutRun, FramesOnADeviceHaveTheCpusBits) {
+  if (cuda_device_count() == 0) GTEST_SKIP() << "no CUDA device on this machine";
+  const Patient patient = uniform_patient();
+  Scenario scenario = parted({"slit", DiscCutPlan{{{0, 0, 19}}, {0, 0, 1}, {13}}}, {2, 1, 6});
+  scenario.method = Method::chainmail;
+  scenario.phases.push_back(scenario.phases[1]);  // closed, open, closed: with and without copies in the field
+  scenario.phases[0].closed_cuts = scenario.phases[2].closed_cuts;
+  scenario.phases[1] = parted(scenario.cuts[0], {2, 1, 6}).phases[0];
+  const auto source = ct_of(small_grid(), [](auto i, auto j, auto k) { return 100 * k + 7 * i - j; });
+  Volume<std::int16_t> on_cpu = source, on_device = source;
+  const Target to_cpu{.source = view(source), .output = view(on_cpu), .background = -1000},
+      to_device{.source = view(source), .output = view(on_device), .background = -1000};
+  ScenarioRun cpu_run(scenario, patient, {[](const Model& model) { return make_cpu_chainmail(model); }});
+  ScenarioRun device_run(
+      scenario, patient,
+      {.make = [](const Model& model) { return make_cuda_chainmail(model); },
+       .fetch = [](std::span<glm::vec3> to,
+                   const glm::vec3* from) { copy_from_cuda_device(to.data(), from, to.size_bytes()); }});
+  const auto cpu_resampler = make_cpu_resampler(small_grid()), device_resampler = make_cuda_resampler(small_grid());
+  for (int frame = 0; !cpu_run.is_done(); ++frame) {
+    cpu_run.next();
+    device_run.next();
+    EXPECT_EQ(cpu_run.displacement(), device_run.displacement()) << frame;
+    cpu_run.resample(*cpu_resampler, {&to_cpu, 1});
+    device_run.resample(*device_resampler, {&to_device, 1});
+    EXPECT_EQ(on_cpu.voxels, on_device.voxels) << frame;
+    EXPECT_EQ(on_cpu.voxels != source.voxels, frame < 4) << frame;  // at last let go
+  }
 }
 
 TEST(CutRun, ADiscOpensWhereItIsAndTissueRoundItHolds) {
