@@ -3,6 +3,7 @@
 #include <itkTransformFactoryBase.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
@@ -118,12 +119,15 @@ Part make_part(const TransformRecord& record, const std::string& file) {
   return part;
 }
 
-/// One part at a point. ITK's methods are const and keep nothing between calls but a B-spline's working arrays, which
-/// each thread has for itself.
+/// One part at a point. ITK's methods are const and keep nothing between calls; a B-spline's working arrays are on the
+/// stack, for the leak sanitizer of GCC 12 stumbles over the thread-local ones of a library that was loaded.
 Transform::OutputPointType apply(const Part& part, const Transform::InputPointType& point, bool& outside) {
   if (part.spline) {
-    thread_local Spline::WeightsType weights(64);
-    thread_local Spline::ParameterIndexArrayType indices(64);
+    constexpr std::size_t kCoefficients = 64;  // that a point depends on
+    std::array<Spline::WeightsType::ValueType, kCoefficients> weight_values;
+    std::array<Spline::ParameterIndexArrayType::ValueType, kCoefficients> index_values;
+    Spline::WeightsType weights(weight_values.data(), kCoefficients, false);
+    Spline::ParameterIndexArrayType indices(index_values.data(), kCoefficients, false);
     Transform::OutputPointType moved;
     bool inside = true;
     part.spline->TransformPoint(point, moved, weights, indices, inside);
