@@ -125,7 +125,7 @@ class CudaMachine {
   }
   template <class T, class Sweep, class Then>
   void sum(std::size_t nodes, const Sweep& sweep, const Then& then) {
-    static_assert(sizeof(T) <= sizeof(Sums));
+    static_assert(sizeof(T) <= sizeof(Ways));
     T* const of_block = reinterpret_cast<T*>(of_block_.data());
     sum_kernel<T><<<blocks_for(nodes), kDeviceBlock, 0, stream_>>>(sweep, then, nodes, of_block, arrived_.data());
     TETWARP_CUDA_TRY(cudaGetLastError());
@@ -144,12 +144,12 @@ class CudaMachine {
 
  private:
   struct alignas(16) Fetched {
-    std::byte bytes[128];
+    std::byte bytes[256];
   };
 
   int device_;
   cudaStream_t stream_ = nullptr;
-  DeviceBuffer<Sums> of_block_;
+  DeviceBuffer<Ways> of_block_;  ///< room for the largest of sums
   DeviceBuffer<unsigned> arrived_;
   cuda_detail::PinnedBuffer<Fetched> pinned_;
   Graph repeated_;

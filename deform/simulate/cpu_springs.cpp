@@ -19,6 +19,7 @@ class CpuSprings final : public SpringEngine {
   CpuSprings(const Model& model, const MassSpringOptions& options, Limits limits)
       : model_(model),
         grid_(model),
+        rest_(model.lattice),
         is_factored_(
             options.solver == MassSpringOptions::Solver::cholesky ||
             (options.solver == MassSpringOptions::Solver::automatic && model.nodes() <= kMostNodesForCholesky)),
@@ -60,19 +61,33 @@ class CpuSprings final : public SpringEngine {
     start_ = u_;
   }
 
-  double aim(double part) override {
-    double furthest = 0;
+  Ways aim(double part) override {
+    Ways ways;
     for (std::size_t n = 0; n < grid_.nodes; ++n) {
-      double square = 0;
+      const bool is_placed = roles_[n] == Role::placed;
       for (std::size_t a = 0; a < 3; ++a) {
         load_[a][n] = on_the_way(load_from_[a][n], load_to_[a][n], part);
-        trial_[a][n] = roles_[n] == Role::placed ? on_the_way(start_[a][n], goal_[a][n], part) : u_[a][n];
-        const double way = trial_[a][n] - u_[a][n];
-        square += way * way;
+        trial_[a][n] = is_placed ? on_the_way(start_[a][n], goal_[a][n], part) : u_[a][n];
       }
-      furthest = std::max(furthest, square);
+      if (is_placed) ways.add(Ways::of(rest_(model_.vertex[n]) + at(u_, n), at(trial_, n) - at(u_, n)));
     }
-    return std::sqrt(furthest);
+    return ways;
+  }
+
+  void carry(const RigidMotion& motion) override {
+    arena_.execute([&] {
+      for_blocks([&](NodeRange range, std::size_t) {
+        for (std::size_t n = range.begin; n < range.end; ++n) {
+          if (roles_[n] == Role::kept) continue;
+          const glm::dvec3 way = motion.way_of(rest_(model_.vertex[n]) + at(u_, n));
+          for (int axis = 0; axis < 3; ++axis) {
+            const auto a = static_cast<std::size_t>(axis);
+            u_[a][n] += way[axis];
+            if (roles_[n] == Role::free) trial_[a][n] = u_[a][n];
+          }
+        }
+      });
+    });
   }
 
   void follow(const Effort& effort, std::stop_token stop) override {
@@ -158,6 +173,9 @@ class CpuSprings final : public SpringEngine {
     double sum = 0, slope = 0, most = 0, most_placed = 0, most_load = 0;
   };
 
+  static glm::dvec3 at(const PaddedVectors<double>& vectors, std::size_t n) {
+    return {vectors[0][n], vectors[1][n], vectors[2][n]};
+  }
   static double on_the_way(double from, double to, double part) { return part == 1 ? to : from + part * (to - from); }
 
   template <class Work>
@@ -329,6 +347,7 @@ class CpuSprings final : public SpringEngine {
 
   const Model& model_;
   SpringGrid grid_;
+  RestPlace rest_;
   bool is_factored_;
   tbb::task_arena arena_;
   std::vector<Role> roles_;

@@ -37,6 +37,8 @@ class DeviceSprings final : public SpringEngine {
     a_.neighbour = hold(neighbour_, model.neighbour);
     a_.stiffness = hold(stiffness_, model.stiffness);
     a_.role = hold(role_, std::vector<Role>(nodes_, Role::kept));
+    a_.vertex = hold(vertex_, model.vertex);
+    a_.rest_place = RestPlace(model.lattice);
     a_.nodes = nodes_;
     for (int d = 0; d < kDirections; ++d) {
       const glm::dvec3 along = rest_link(model.lattice, d);
@@ -53,6 +55,7 @@ class DeviceSprings final : public SpringEngine {
     a_.inverse = inverse_.reserve(nodes_);
     a_.state = state_.reserve(1);
     a_.result = result_.reserve(1);
+    a_.ways = ways_.reserve(1);
   }
 
   void set_stream(void* stream) override { machine_.set_stream(stream); }
@@ -74,10 +77,15 @@ class DeviceSprings final : public SpringEngine {
     machine_.upload(a_.start, given.data(), nodes_);
   }
 
-  double aim(double part) override {
+  Ways aim(double part) override {
     const auto scope = machine_.scope();
-    machine_.template sum<Sums>(nodes_, sweeps::Aim{{a_}, part}, sweeps::Keep{a_.result});
-    return std::sqrt(machine_.fetch(a_.result).most);
+    machine_.template sum<Ways>(nodes_, sweeps::Aim{{a_}, part}, sweeps::Keep{a_.ways});
+    return machine_.fetch(a_.ways);
+  }
+
+  void carry(const RigidMotion& motion) override {
+    const auto scope = machine_.scope();
+    machine_.each(nodes_, sweeps::Carry{{a_}, motion});
   }
 
   void follow(const Effort& effort, std::stop_token stop) override {
@@ -161,6 +169,7 @@ class DeviceSprings final : public SpringEngine {
   std::size_t nodes_;
   DeviceArrays a_{};
   Buffer<std::int32_t> neighbour_;
+  Buffer<std::uint32_t> vertex_;
   Buffer<float> stiffness_;
   Buffer<Role> role_;
   Buffer<glm::dvec3> doubles_[9];
@@ -169,6 +178,7 @@ class DeviceSprings final : public SpringEngine {
   Buffer<Symmetric<float>> inverse_;
   Buffer<GradientState> state_;
   Buffer<Sums> result_;
+  Buffer<Ways> ways_;
 };
 
 }  // namespace tetwarp::simulate

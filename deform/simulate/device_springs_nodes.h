@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include "deform/simulate/rigid_motion.h"
 #include "deform/simulate/spring_engine.h"
 #include "deform/simulate/spring_step.h"
 
@@ -44,8 +45,10 @@ struct DeviceArrays {
   std::size_t nodes;
   const std::int32_t* neighbour;  ///< as Model's
   const float* stiffness;
+  const std::uint32_t* vertex;
   const Role* role;
   RestLink<double> rest[kDirections];
+  RestPlace rest_place;
   glm::dvec3 *u, *trial, *start, *goal;    ///< displacement; of placed nodes where they come from and go
   glm::dvec3 *load, *load_from, *load_to;  ///< of free nodes
   glm::dvec3 *force, *trial_force;         ///< net, of free nodes, at u and trial
@@ -55,6 +58,7 @@ struct DeviceArrays {
   glm::vec3* shown;
   GradientState* state;
   Sums* result;
+  Ways* ways;
 
   TETWARP_HD std::int32_t other(int direction, std::size_t n) const {
     return neighbour[static_cast<std::size_t>(direction) * nodes + n];
@@ -99,14 +103,24 @@ struct TakeLoads : Sweep {
   }
 };
 
-/// See SpringEngine::aim. Sums::most is the largest way of a placed node, squared.
+/// See SpringEngine::aim.
 struct Aim : Sweep {
   double part;
-  TETWARP_HD Sums operator()(std::size_t n) const {
+  TETWARP_HD Ways operator()(std::size_t n) const {
     a.load[n] = on_the_way(a.load_from[n], a.load_to[n], part);
     a.trial[n] = a.role[n] == Role::placed ? on_the_way(a.start[n], a.goal[n], part) : a.u[n];
-    const glm::dvec3 way = a.trial[n] - a.u[n];
-    return {.most = dot3(way, way)};
+    if (a.role[n] != Role::placed) return {};
+    return Ways::of(a.rest_place(a.vertex[n]) + a.u[n], a.trial[n] - a.u[n]);
+  }
+};
+
+/// See SpringEngine::carry.
+struct Carry : Sweep {
+  RigidMotion motion;
+  TETWARP_HD void operator()(std::size_t n) const {
+    if (a.role[n] == Role::kept) return;
+    a.u[n] += motion.way_of(a.rest_place(a.vertex[n]) + a.u[n]);
+    if (a.is_free(n)) a.trial[n] = a.u[n];
   }
 };
 
@@ -267,9 +281,10 @@ struct Show : Sweep {
 };
 
 /// The result of a sum, where the host fetches it.
+template <class T>
 struct Keep {
-  Sums* result;
-  TETWARP_HD void operator()(const Sums& sums) const { *result = sums; }
+  T* result;
+  TETWARP_HD void operator()(const T& sums) const { *result = sums; }
 };
 
 }  // namespace sweeps

@@ -104,7 +104,9 @@ class MassSpring final : public Simulation {
   }
 
   Settled settle(double part, const StoppingRule& rule, const Control& control) {
-    if (engine_->aim(part) > 0) engine_->follow(kFollow, control.stop);
+    const Ways ways = engine_->aim(part);
+    if (const std::optional<RigidMotion> motion = rigid_motion(ways)) engine_->carry(*motion);
+    if (ways.squares > 0) engine_->follow(kFollow, control.stop);
     Strain now = engine_->try_step(0);
     engine_->accept();
     Settled settled{.residual = residual(now), .reached = now.free_force == 0};

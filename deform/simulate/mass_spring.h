@@ -23,10 +23,11 @@ inline constexpr std::size_t kMostNodesForCholesky = 20'000;
 /// Springs along all links of a model, at rest where nothing moved; quasi-static: every call of `advance` goes to a
 /// minimum of the energy, and mass and time play no part.
 ///
-/// Where placed nodes moved, the others first follow by the harmonic extension. Then come local/global steps (Liu,
-/// Bargteil, O'Brien and Kavan 2013: springs choose their directions, then one linear system with a constant Laplacian)
-/// while they are worth it, and Newton's steps with conjugate gradients from there on. A line search keeps the energy
-/// falling in every step. A step is one linear system. See docs/simulation.md.
+/// Where placed nodes moved, the others first follow: by the rigid motion closest to that of the placed ones, where it
+/// leaves less than a quarter of the squares of their ways (rigid_motion), and for the rest by the harmonic extension.
+/// Then come local/global steps (Liu, Bargteil, O'Brien and Kavan 2013: springs choose their directions, then one
+/// linear system with a constant Laplacian) while they are worth it, and Newton's steps with conjugate gradients from
+/// there on. A line search keeps the energy falling in every step. A step is one linear system. See docs/simulation.md.
 ///
 /// Nodes that springs do not tie to a placed node stay where they are, whatever the force on them.
 ///

@@ -5,6 +5,7 @@
 #include <stop_token>
 
 #include "deform/simulate/mass_spring.h"
+#include "deform/simulate/rigid_motion.h"
 #include "deform/simulate/spring_roles.h"
 #include "deform/simulate/spring_step.h"
 
@@ -56,8 +57,10 @@ class SpringEngine {
   virtual void set_loads(const Loads& loads, std::span<const Role> roles) = 0;
   virtual void set_displacement(std::span<const glm::vec3> displacement) = 0;
 
-  /// Takes forces to a part of their way. @return how far placed nodes have to go for theirs, mm
-  virtual double aim(double part) = 0;
+  /// Takes forces to a part of their way. @return how placed nodes have to go for theirs
+  virtual Ways aim(double part) = 0;
+  /// Moves free and placed nodes from where they are; the latter still have to go where `aim` wants them.
+  virtual void carry(const RigidMotion& motion) = 0;
   /// Takes placed nodes to where `aim` wants them, and free ones by the harmonic extension of that: the Laplacian of
   /// what they do is 0.
   virtual void follow(const Effort& effort, std::stop_token stop) = 0;

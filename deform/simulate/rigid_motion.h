@@ -1,0 +1,71 @@
+#pragma once
+
+#include <optional>
+
+#include "deform/simulate/model.h"
+#include "deform/simulate/spring_step.h"
+
+namespace tetwarp::simulate {
+
+/// Where the vertices of a lattice rest, LPS mm from its middle: squares of that lose nothing to an origin far away.
+struct RestPlace {
+  std::uint32_t width, height;  ///< vertices along i, j
+  glm::dvec3 middle;            ///< index
+  glm::dmat3 linear;
+
+  explicit RestPlace(const Geometry& lattice);
+  RestPlace() = default;
+  TETWARP_HD glm::dvec3 operator()(std::uint32_t vertex) const {
+    const std::uint32_t row = vertex / width;
+    return linear * (glm::dvec3{double(vertex % width), double(row % height), double(row / height)} - middle);
+  }
+};
+
+/// What placed nodes are to do, as sums over them of where one is (`at`, mm) and how it has to go from there (`way`,
+/// mm).
+struct Ways {
+  double count = 0, squares = 0;
+  glm::dvec3 at{0}, way{0};
+  Symmetric<double> at_at{0, 0, 0, 0, 0, 0};      ///< at at^T
+  glm::dvec3 at_by_x{0}, at_by_y{0}, at_by_z{0};  ///< each component of way times at
+
+  TETWARP_HD static Ways of(const glm::dvec3& at, const glm::dvec3& way) {
+    Ways one;
+    one.count = 1;
+    one.squares = dot3(way, way);
+    one.at = at;
+    one.way = way;
+    one.at_at = {at.x * at.x, at.x * at.y, at.x * at.z, at.y * at.y, at.y * at.z, at.z * at.z};
+    one.at_by_x = way.x * at, one.at_by_y = way.y * at, one.at_by_z = way.z * at;
+    return one;
+  }
+  TETWARP_HD void add(const Ways& other) {
+    count += other.count;
+    squares += other.squares;
+    at += other.at;
+    way += other.way;
+    at_at.add(other.at_at);
+    at_by_x += other.at_by_x, at_by_y += other.at_by_y, at_by_z += other.at_by_z;
+  }
+};
+
+/// x -> x + turned (x - about) + way, where I + turned is a rotation.
+struct RigidMotion {
+  glm::dmat3 turned{0};
+  glm::dvec3 about{0}, way{0};
+
+  /// How a point goes, mm.
+  TETWARP_HD glm::dvec3 way_of(const glm::dvec3& at) const { return turned * (at - about) + way; }
+};
+
+/// The rigid motion closest to given ways, in the sum of squares (W. Kabsch 1976, "A solution for the best rotation to
+/// relate two sets of vectors", by singular values): the rotation R with the largest trace of R^T H, where H is the sum
+/// of (at + way) at^T about the means.
+///
+/// Points on a line, or none but one, leave rotations open. The least of them is taken: 1e-8 of the spread of the
+/// points is added to H as if it lay in all directions and did not move.
+///
+/// @return nothing unless the squares that the motion leaves of the ways are less than a quarter of all
+std::optional<RigidMotion> rigid_motion(const Ways& ways);
+
+}  // namespace tetwarp::simulate
