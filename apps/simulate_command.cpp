@@ -77,7 +77,7 @@ class Simulating {
 
  private:
   void read();
-  std::unique_ptr<ScenarioRun> begin(const Workplace& workplace);
+  std::unique_ptr<ScenarioRun> begin(const MakeSimulation& make);
   void simulate(ScenarioRun& run, SimulateRecord& record);
   void write(const fs::path& path, const VertexField& field);
 
@@ -142,9 +142,9 @@ void Simulating::simulate(ScenarioRun& run, SimulateRecord& record) {
   record.stages.emplace_back("simulate", stage.seconds() - written);
 }
 
-std::unique_ptr<ScenarioRun> Simulating::begin(const Workplace& workplace) {
+std::unique_ptr<ScenarioRun> Simulating::begin(const MakeSimulation& make) {
   try {
-    return std::make_unique<ScenarioRun>(scenario_, patient_, workplace);
+    return std::make_unique<ScenarioRun>(scenario_, patient_, make);
   } catch (const InputError& error) {
     throw InputError(std::string(error.what()) + ", " + options_.scenario.string());
   }
@@ -154,7 +154,7 @@ int Simulating::run() {
   read();
   const SimulationBackend backend = make_simulation_backend(scenario_.method, options_.backend, options_.device,
                                                             {.threads = options_.common.threads});
-  const std::unique_ptr<ScenarioRun> begun = begin(backend.workplace);
+  const std::unique_ptr<ScenarioRun> begun = begin(backend.make);
   ScenarioRun& run = *begun;
   SimulateRecord record{options_, scenario_, patient_, run, backend.name};
   for (const std::string& note : notes_) say(options_.common, "tetwarp: warning: " + note);

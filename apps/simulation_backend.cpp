@@ -1,7 +1,6 @@
 #include "apps/simulation_backend.h"
 
 #include "apps/backend.h"
-#include "cuda/devices.h"
 #include "deform/simulate/chainmail.h"
 #include "deform/simulate/mass_spring.h"
 
@@ -12,19 +11,15 @@ SimulationBackend make_simulation_backend(simulate::Method method, const std::st
   using simulate::Method;
   using simulate::Model;
   if (means_cuda(wanted)) {
-    return {"cuda",
-            {.make =
-                 [method, device](const Model& model) {
-                   return method == Method::chainmail ? simulate::make_cuda_chainmail(model, device)
-                                                      : simulate::make_cuda_mass_spring(model, {}, device);
-                 },
-             .fetch = [](std::span<glm::vec3> to,
-                         const glm::vec3* from) { copy_from_cuda_device(to.data(), from, to.size_bytes()); }}};
+    return {"cuda", [method, device](const Model& model) {
+              return method == Method::chainmail ? simulate::make_cuda_chainmail(model, device)
+                                                 : simulate::make_cuda_mass_spring(model, {}, device);
+            }};
   }
-  return {"cpu", {.make = [method, limits](const Model& model) {
+  return {"cpu", [method, limits](const Model& model) {
             return method == Method::chainmail ? simulate::make_cpu_chainmail(model, limits)
                                                : simulate::make_cpu_mass_spring(model, {}, limits);
-          }}};
+          }};
 }
 
 }  // namespace tetwarp::apps

@@ -8,11 +8,11 @@ namespace tetwarp::apps {
 
 struct SimulationBackend {
   std::string name;  ///< the one that runs: never "auto"
-  simulate::Workplace workplace;
+  simulate::MakeSimulation make;
 };
 
 /// @param wanted  auto (CUDA where a device works, else the CPU), cpu or cuda
-/// Whether a wish can be met is known when the workplace makes a simulation: that throws NotCompiled or DeviceError.
+/// Whether a wish can be met is known when a simulation is made: that throws NotCompiled or DeviceError.
 SimulationBackend make_simulation_backend(simulate::Method method, const std::string& wanted, int device,
                                           const Limits& limits);
 

@@ -6,7 +6,6 @@
 
 #include "bench/machine.h"
 #include "bench/statistics.h"
-#include "cuda/devices.h"
 #include "deform/phantom.h"
 #include "deform/simulate/chainmail.h"
 #include "deform/simulate/mass_spring.h"
@@ -38,22 +37,19 @@ class HostVolumes final : public FrameVolumes {
   double background_;
 };
 
-Workplace workplace_of(simulate::Method method, bool on_cuda, const SimulateOptions& options) {
+MakeSimulation factory_of(simulate::Method method, bool on_cuda, const SimulateOptions& options) {
   const Limits limits{.threads = options.threads};
   const int device = options.device;
-  if (!on_cuda) {
-    return {[=](const Model& model) {
-      return method == simulate::Method::chainmail ? make_cpu_chainmail(model, limits)
-                                                   : make_cpu_mass_spring(model, {}, limits);
-    }};
+  if (on_cuda) {
+    return [=](const Model& model) {
+      return method == simulate::Method::chainmail ? make_cuda_chainmail(model, device)
+                                                   : make_cuda_mass_spring(model, {}, device);
+    };
   }
-  return {.make =
-              [=](const Model& model) {
-                return method == simulate::Method::chainmail ? make_cuda_chainmail(model, device)
-                                                             : make_cuda_mass_spring(model, {}, device);
-              },
-          .fetch = [](std::span<glm::vec3> to,
-                      const glm::vec3* from) { copy_from_cuda_device(to.data(), from, to.size_bytes()); }};
+  return [=](const Model& model) {
+    return method == simulate::Method::chainmail ? make_cpu_chainmail(model, limits)
+                                                 : make_cpu_mass_spring(model, {}, limits);
+  };
 }
 
 /// The first phase alone.
@@ -96,7 +92,7 @@ class Measuring {
  private:
   void settle(simulate::Method method, const std::string& name, const std::string& backend) {
     const Scenario scenario = first_phase(scenario_, method, 1);
-    ScenarioRun run(scenario, patient_, workplace_of(method, backend == "cuda", options_));
+    ScenarioRun run(scenario, patient_, factory_of(method, backend == "cuda", options_));
     const auto start = Clock::now();
     const Frame frame = run.next();
     results_.settle.push_back({name, backend, ms_since(start) / 1000, frame.settled});
@@ -106,7 +102,7 @@ class Measuring {
     const bool on_cuda = backend == "cuda";
     Scenario scenario = first_phase(scenario_, method, options_.warmup + options_.frames);
     scenario.stop.steps = options_.steps;
-    ScenarioRun run(scenario, patient_, workplace_of(method, on_cuda, options_));
+    ScenarioRun run(scenario, patient_, factory_of(method, on_cuda, options_));
     const double background = *std::min_element(volume_.voxels.begin(), volume_.voxels.end());
     const std::unique_ptr<FrameVolumes> volumes =
         on_cuda ? make_device_volumes(volume_, background) : std::make_unique<HostVolumes>(volume_, background);

@@ -23,8 +23,4 @@ std::string describe_cuda_device(int device) {
   return std::string(properties.name) + ", " + std::to_string(properties.totalGlobalMem / 1000000000) + " GB";
 }
 
-void copy_from_cuda_device(void* host, const void* device, std::size_t bytes) {
-  TETWARP_CUDA_TRY(cudaMemcpy(host, device, bytes, cudaMemcpyDeviceToHost));
-}
-
 }  // namespace tetwarp

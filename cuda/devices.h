@@ -11,8 +11,6 @@ int cuda_device_count();
 void wake_cuda_device(int device);
 /// Name and memory of a device, "NVIDIA H200, 150 GB". @throws DeviceError, NotCompiled
 std::string describe_cuda_device(int device);
-/// Copies bytes from device memory to the host. @throws DeviceError, NotCompiled
-void copy_from_cuda_device(void* host, const void* device, std::size_t bytes);
 /// Whether CUDA is in this build.
 bool has_cuda();
 

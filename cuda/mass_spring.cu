@@ -110,6 +110,11 @@ class CudaMachine {
     wait();
   }
   template <class T>
+  void download(T* to, const T* from, std::size_t count) {
+    TETWARP_CUDA_TRY(cudaMemcpyAsync(to, from, count * sizeof(T), cudaMemcpyDeviceToHost, stream_));
+    wait();
+  }
+  template <class T>
   T fetch(const T* place) {
     static_assert(sizeof(T) <= sizeof(Fetched));
     void* const to = pinned_.reserve(1);

@@ -21,8 +21,6 @@ void wake_cuda_device(int) {}
 
 std::string describe_cuda_device(int) { not_compiled(); }
 
-void copy_from_cuda_device(void*, const void*, std::size_t) { not_compiled(); }
-
 std::unique_ptr<Resampler> make_cuda_resampler(Geometry, int, Limits) { not_compiled(); }
 
 std::unique_ptr<Resampler> make_cuda_pull_resampler(Geometry, int, Limits) { not_compiled(); }

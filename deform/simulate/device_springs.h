@@ -133,6 +133,12 @@ class DeviceSprings final : public SpringEngine {
     machine_.wait();
   }
   std::span<const glm::vec3> shown() const override { return {a_.shown, nodes_}; }
+  std::vector<glm::vec3> shown_on_host() override {
+    const auto scope = machine_.scope();
+    std::vector<glm::vec3> result(nodes_);
+    machine_.download(result.data(), a_.shown, nodes_);
+    return result;
+  }
   Memory memory() const override { return Machine::kMemory; }
 
  private:

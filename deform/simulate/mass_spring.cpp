@@ -69,6 +69,7 @@ class MassSpring final : public Simulation {
   }
 
   std::span<const glm::vec3> displacement() const override { return engine_->shown(); }
+  std::vector<glm::vec3> displacement_on_host() const override { return engine_->shown_on_host(); }
   Memory memory() const override { return engine_->memory(); }
 
   Settled advance(double part, const StoppingRule& rule, const Control& control) override {

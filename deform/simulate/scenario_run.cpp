@@ -18,10 +18,10 @@ std::vector<std::string> sorted(std::vector<std::string> names) {
 
 }  // namespace
 
-ScenarioRun::ScenarioRun(const Scenario& scenario, const Patient& patient, Workplace workplace)
+ScenarioRun::ScenarioRun(const Scenario& scenario, const Patient& patient, MakeSimulation make)
     : scenario_(scenario),
       patient_(patient),
-      workplace_(std::move(workplace)),
+      make_(std::move(make)),
       tissue_of_cell_(tissue_of_cells(scenario, patient)) {
   for (const Phase& phase : scenario.phases) {
     loads_.emplace_back(scenario, phase, patient);
@@ -46,12 +46,7 @@ void ScenarioRun::make_model_of(const Phase& phase) {
 VertexField ScenarioRun::field() const { return field_of(patient_.lattice, division_, displacement()); }
 
 std::vector<glm::vec3> ScenarioRun::displacement() const {
-  std::vector<glm::vec3> result(model_.nodes());
-  if (!simulation_) return result;
-  const std::span<const glm::vec3> held = simulation_->displacement();
-  if (simulation_->memory() == Memory::host) return {held.begin(), held.end()};
-  workplace_.fetch(result, held.data());
-  return result;
+  return simulation_ ? simulation_->displacement_on_host() : std::vector<glm::vec3>(model_.nodes());
 }
 
 void ScenarioRun::begin_phase() {
@@ -64,7 +59,7 @@ void ScenarioRun::begin_phase() {
     std::vector<glm::vec3> carried(model_.nodes());
     for (std::size_t node = 0; node < carried.size(); ++node) carried[node] = start_[model_.vertex[node]];
     start_ = std::move(carried);
-    simulation_ = workplace_.make(model_);
+    simulation_ = make_(model_);
     simulation_->set_displacement(start_);
   }
   if (!loads_[phase_].turns()) simulation_->set_loads(loads_[phase_].at(1, model_, start_));

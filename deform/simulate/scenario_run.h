@@ -10,12 +10,8 @@
 
 namespace tetwarp::simulate {
 
-/// Where a scenario is simulated: one of the factories of a method, and the way back from its memory.
-struct Workplace {
-  std::function<std::unique_ptr<Simulation>(const Model&)> make;
-  /// Copies from the simulation's memory to the host; null: it is the host's.
-  std::function<void(std::span<glm::vec3> to, const glm::vec3* from)> fetch = {};
-};
+/// How a scenario is simulated, and where: one of the factories of a method.
+using MakeSimulation = std::function<std::unique_ptr<Simulation>(const Model&)>;
 
 /// What became of a frame.
 struct Frame {
@@ -33,7 +29,7 @@ class ScenarioRun {
  public:
   /// Refers to the scenario and the patient. @throws InputError for a scenario that cannot be played on this patient,
   /// of any phase: before anything is simulated
-  ScenarioRun(const Scenario& scenario, const Patient& patient, Workplace workplace);
+  ScenarioRun(const Scenario& scenario, const Patient& patient, MakeSimulation make);
   ScenarioRun(const ScenarioRun&) = delete;
   ScenarioRun& operator=(const ScenarioRun&) = delete;
 
@@ -63,7 +59,7 @@ class ScenarioRun {
 
   const Scenario& scenario_;
   const Patient& patient_;
-  Workplace workplace_;
+  MakeSimulation make_;
   std::vector<std::uint8_t> tissue_of_cell_;
   std::vector<PhaseLoads> loads_;
   DividedLattice division_;  ///< by the cuts that are open

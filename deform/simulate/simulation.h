@@ -59,7 +59,7 @@ class Simulation {
   virtual std::span<const glm::vec3> displacement() const = 0;
   virtual Memory memory() const { return Memory::host; }
 
-  /// The same, copied to the host whatever the memory.
+  /// The same, copied to the host whatever the memory: those on a device override it.
   virtual std::vector<glm::vec3> displacement_on_host() const {
     const std::span<const glm::vec3> from = displacement();
     return {from.begin(), from.end()};

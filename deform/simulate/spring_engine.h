@@ -76,6 +76,11 @@ class SpringEngine {
   /// Makes `shown` what the displacement is.
   virtual void show() = 0;
   virtual std::span<const glm::vec3> shown() const = 0;
+  /// The same, copied to the host.
+  virtual std::vector<glm::vec3> shown_on_host() {
+    const std::span<const glm::vec3> from = shown();
+    return {from.begin(), from.end()};
+  }
   virtual Memory memory() const { return Memory::host; }
 };
 

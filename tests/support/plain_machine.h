@@ -37,6 +37,10 @@ class PlainMachine {
     std::copy_n(host, size, place);
   }
   template <class T>
+  void download(T* to, const T* from, std::size_t count) const {
+    std::copy(from, from + count, to);
+  }
+  template <class T>
   T fetch(const T* place) const {
     return *place;
   }

@@ -48,17 +48,7 @@ inline std::vector<Method> methods() {
       {.name = "cuda", .cannot_run = no_cuda, .make = [](const Model& model) { return make_cuda_mass_spring(model); }}};
 }
 
-/// Wherever it is.
-inline std::vector<glm::vec3> displacement(const Simulation& simulation) {
-  const std::span<const glm::vec3> shown = simulation.displacement();
-  std::vector<glm::vec3> result(shown.size());
-  if (simulation.memory() == Memory::host) {
-    std::copy(shown.begin(), shown.end(), result.begin());
-  } else {
-    copy_from_cuda_device(result.data(), shown.data(), shown.size_bytes());
-  }
-  return result;
-}
+inline std::vector<glm::vec3> displacement(const Simulation& simulation) { return simulation.displacement_on_host(); }
 
 inline Geometry lattice(const glm::i64vec3& size, const glm::dvec3& spacing = {6, 7, 8}) {
   return {.size = size, .spacing = spacing, .origin = {3, -4, 5}};

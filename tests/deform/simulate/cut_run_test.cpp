@@ -28,8 +28,8 @@ Scenario parted(const CutPlan& cut, const glm::dvec3& by) {
   return scenario;
 }
 
-Workplace cpu() {
-  return {[](const Model& model) { return make_cpu_mass_spring(model); }};
+MakeSimulation cpu() {
+  return [](const Model& model) { return make_cpu_mass_spring(model); };
 }
 
 TEST(CutRun, BothSidesOfAPlaneGoTheirWaysAndComeBackWhenItIsClosed) {
@@ -92,12 +92,8 @@ TEST(CutRun, FramesOnADeviceHaveTheCpusBits) {
   Volume<std::int16_t> on_cpu = source, on_device = source;
   const Target to_cpu{.source = view(source), .output = view(on_cpu), .background = -1000},
       to_device{.source = view(source), .output = view(on_device), .background = -1000};
-  ScenarioRun cpu_run(scenario, patient, {[](const Model& model) { return make_cpu_chainmail(model); }});
-  ScenarioRun device_run(
-      scenario, patient,
-      {.make = [](const Model& model) { return make_cuda_chainmail(model); },
-       .fetch = [](std::span<glm::vec3> to,
-                   const glm::vec3* from) { copy_from_cuda_device(to.data(), from, to.size_bytes()); }});
+  ScenarioRun cpu_run(scenario, patient, [](const Model& model) { return make_cpu_chainmail(model); });
+  ScenarioRun device_run(scenario, patient, [](const Model& model) { return make_cuda_chainmail(model); });
   const auto cpu_resampler = make_cpu_resampler(small_grid()), device_resampler = make_cuda_resampler(small_grid());
   for (int frame = 0; !cpu_run.is_done(); ++frame) {
     cpu_run.next();
