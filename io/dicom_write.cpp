@@ -58,10 +58,11 @@ void DerivedSeriesWriter::write(const ConstVolumeView& volume, std::int64_t begi
                                 std::span<const SliceRange> sampled, int threads, const Control& control) {
   State& to = *state_;
   check_volume(volume, to.geometry, sampled);
+  for (std::int64_t k = begin; k < end && !sampled.empty(); ++k)  // all of them, before a thread writes a file
+    check_range(sampled[static_cast<std::size_t>(k)], to.source.slices.size());
   for_each_index(static_cast<std::size_t>(end - begin), threads, control, [&](std::size_t n) {
     const std::size_t k = static_cast<std::size_t>(begin) + n;
     const SliceRange range = sampled.empty() ? SliceRange{} : sampled[k];
-    check_range(range, to.source.slices.size());
     DcmDataset slice;
     const auto added = derive_slice(slice, *to.source.slices[k], to.series, to.derivation, range, to.geometry, k);
     put_hu_format(slice, to.geometry);
