@@ -36,18 +36,12 @@ struct Outputs {
   std::vector<std::pair<int, fs::path>> frames;  ///< by rising number
 };
 
-int frames_of(const Scenario& scenario) {
-  int frames = 0;
-  for (const Phase& phase : scenario.phases) frames += phase.frames;
-  return frames;
-}
-
 Outputs begin_outputs(const SimulateOptions& options, const Scenario& scenario) {
   std::vector<fs::path> inputs = {options.scenario, options.input.path};
   if (!options.labels.empty()) inputs.push_back(options.labels);
   Outputs outputs{OutputSet(inputs, options.common.overwrite), {}, {}, {}};
   outputs.field = outputs.set.add(options.output);
-  const int frames = frames_of(scenario);
+  const int frames = frame_count(scenario);
   for (int number = options.every; options.every > 0 && number <= frames; number += options.every)
     outputs.frames.emplace_back(number, outputs.set.add(frame_path(options.output, number, frames)));
   outputs.report = outputs.set.add(options.report);
@@ -60,7 +54,7 @@ void require_fitting_format(const SimulateOptions& options, const Scenario& scen
   for (const Phase& phase : scenario.phases) {
     if (options.every == 0 && &phase != &scenario.phases.back()) continue;
     for (const CutPlan& cut : scenario.cuts) {
-      if (std::find(phase.closed_cuts.begin(), phase.closed_cuts.end(), cut.name) != phase.closed_cuts.end()) continue;
+      if (!is_open(cut, phase)) continue;
       throw InputError("the cut \"" + cut.name + "\" is open" + (phase.name.empty() ? "" : " in " + phase.name) +
                        ", which " + options.output.string() + " cannot hold; write a mesh, .vtu or .vtk");
     }

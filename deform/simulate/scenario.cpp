@@ -43,6 +43,16 @@ struct CutOfPlan {
 
 }  // namespace
 
+int frame_count(const Scenario& scenario) {
+  int frames = 0;
+  for (const Phase& phase : scenario.phases) frames += phase.frames;
+  return frames;
+}
+
+bool is_open(const CutPlan& cut, const Phase& phase) {
+  return std::find(phase.closed_cuts.begin(), phase.closed_cuts.end(), cut.name) == phase.closed_cuts.end();
+}
+
 std::vector<std::uint8_t> tissue_of_cells(const Scenario& scenario, const Patient& patient) {
   for (const TissueClass& one : scenario.tissues) {
     require(one.labels.empty() || !patient.cell_label.empty(),
@@ -65,8 +75,7 @@ std::vector<std::uint8_t> tissue_of_cells(const Scenario& scenario, const Patien
 std::vector<Cut> open_cuts(const Scenario& scenario, const Phase& phase, const Patient& patient) {
   std::vector<Cut> cuts;
   for (const CutPlan& plan : scenario.cuts) {
-    const auto& closed = phase.closed_cuts;
-    if (std::find(closed.begin(), closed.end(), plan.name) != closed.end()) continue;
+    if (!is_open(plan, phase)) continue;
     cuts.push_back({plan.name, std::visit(CutOfPlan{patient}, plan.shape)});
   }
   return cuts;

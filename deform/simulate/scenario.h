@@ -91,6 +91,10 @@ struct Scenario {
   StoppingRule stop;
 };
 
+/// Of all phases.
+int frame_count(const Scenario& scenario);
+bool is_open(const CutPlan& cut, const Phase& phase);
+
 /// Tissue of each cell, as numbers of Scenario::tissues. @throws InputError for labels where there is no label volume
 std::vector<std::uint8_t> tissue_of_cells(const Scenario& scenario, const Patient& patient);
 

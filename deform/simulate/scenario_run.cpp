@@ -1,7 +1,6 @@
 #include "deform/simulate/scenario_run.h"
 
 #include <algorithm>
-#include <numeric>
 
 #include "deform/errors.h"
 #include "deform/simulate/cut_surface.h"
@@ -30,10 +29,7 @@ ScenarioRun::ScenarioRun(const Scenario& scenario, const Patient& patient, MakeS
   make_model_of(scenario.phases.front());
 }
 
-int ScenarioRun::frames() const {
-  return std::accumulate(scenario_.phases.begin(), scenario_.phases.end(), 0,
-                         [](int sum, const Phase& phase) { return sum + phase.frames; });
-}
+int ScenarioRun::frames() const { return frame_count(scenario_); }
 
 void ScenarioRun::make_model_of(const Phase& phase) {
   std::vector<Tissue> tissues;
@@ -55,7 +51,7 @@ void ScenarioRun::begin_phase() {
   const bool other_cuts = phase_ > 0 && sorted(phase.closed_cuts) != sorted(scenario_.phases[phase_ - 1].closed_cuts);
   if (!simulation_ || other_cuts) {
     simulation_.reset();
-    make_model_of(phase);
+    if (other_cuts) make_model_of(phase);  // that of the first phase is there
     std::vector<glm::vec3> carried(model_.nodes());
     for (std::size_t node = 0; node < carried.size(); ++node) carried[node] = start_[model_.vertex[node]];
     start_ = std::move(carried);
