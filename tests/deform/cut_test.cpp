@@ -58,6 +58,18 @@ Cut random_cut(Random& random, const Geometry& grid) {
   }
 }
 
+std::vector<Cut> random_cuts(Random& random, const Geometry& grid) {
+  std::vector<Cut> cuts;
+  for (std::int64_t n = random.integer(1, 3); n > 0; --n) cuts.push_back(random_cut(random, grid));
+  return cuts;
+}
+
+/// Where a vertex of a lattice is, i fastest.
+glm::dvec3 index_of(const Geometry& lattice, std::uint32_t vertex) {
+  const glm::i64vec3& size = lattice.size;
+  return glm::dvec3(vertex % size.x, vertex / size.x % size.y, vertex / (size.x * size.y));
+}
+
 /// A smooth displacement of a lattice, and the same of the nodes of its division: a copy goes where its vertex goes.
 struct Closed {
   VertexField whole, divided;
@@ -120,8 +132,7 @@ TEST_P(Cuts, ClosedOnesChangeNothingAwayFromThemAndOneUnitAlongThem) {
     Random random(seed, 9'000'000 + number);
     const glm::i64vec3 size(random.integer(20, 45), random.integer(20, 40), random.integer(15, 40));
     const Geometry grid = random.chance(0.6) ? unit_grid(size) : oblique_grid(size);
-    std::vector<Cut> cuts;
-    for (std::int64_t n = random.integer(1, 3); n > 0; --n) cuts.push_back(random_cut(random, grid));
+    const std::vector<Cut> cuts = random_cuts(random, grid);
     const Closed closed = closed_cuts(grid, random.integer(2, 9), cuts, random.chance(0.3) ? 0 : 1.5);
     const Volume<std::int16_t> source = hounsfield_like(grid);
     const auto resampler = make(grid);
@@ -168,9 +179,8 @@ TEST_P(Cuts, BothSidesOfAnOpenedPlaneAreWholeAndNothingIsBetween) {
   const auto vertices = static_cast<std::uint32_t>(voxel_count(lattice));
   for (std::uint32_t n = 0; n < vertices + division.copies_of.size(); ++n) {
     const std::uint32_t v = n < vertices ? n : division.copies_of[n - vertices];
-    const glm::i64vec3 at(v % lattice.size.x, v / lattice.size.x % lattice.size.y,
-                          v / (lattice.size.x * lattice.size.y));
-    const bool is_above = (surface.side(point(glm::dvec3(at))) > 0) == (n < vertices);  // a copy: of the other side
+    const double side = surface.side(point(index_of(lattice, v)));
+    const bool is_above = (side > 0) == (n < vertices);  // a copy: of the other side
     displacement.push_back(is_above ? opening : glm::vec3(0));
   }
   const VertexField field = field_of(lattice, division, displacement);
@@ -215,8 +225,7 @@ VertexField opened_disc(const Geometry& lattice, const Cut& cut, double opening,
   const auto vertices = static_cast<std::uint32_t>(voxel_count(lattice));
   for (std::uint32_t n = 0; n < vertices + division.copies_of.size(); ++n) {
     const std::uint32_t v = n < vertices ? n : division.copies_of[n - vertices];
-    const glm::dvec3 at = point(glm::dvec3(
-        glm::i64vec3(v % lattice.size.x, v / lattice.size.x % lattice.size.y, v / (lattice.size.x * lattice.size.y))));
+    const glm::dvec3 at = point(index_of(lattice, v));
     const double side = surface.side(at), across = glm::length(at - disc.centre - side * normal);
     const double part = std::max(0.0, 1 - across / disc.radius_mm) * std::max(0.0, 1 - std::fabs(side) / 12);
     displacement.emplace_back(((side > 0) == (n < vertices) ? 1.0 : -1.0) * part * opening * normal);
@@ -258,8 +267,7 @@ TEST(CutLattice, PiecesHaveTheVolumeOfTheirCellsAndNoLinkGoesThroughTheCut) {
     SCOPED_TRACE(seed_text(seed) + ", case " + std::to_string(number));
     Random random(seed, 9'500'000 + number);
     const Geometry lattice = unit_grid({random.integer(4, 9), random.integer(4, 9), random.integer(4, 9)});
-    std::vector<Cut> cuts;
-    for (std::int64_t n = random.integer(1, 3); n > 0; --n) cuts.push_back(random_cut(random, lattice));
+    const std::vector<Cut> cuts = random_cuts(random, lattice);
     const DividedLattice division = divide(lattice, cuts);
     copies += division.copies_of.size();
     std::map<std::uint64_t, double> volume;
@@ -288,8 +296,7 @@ TEST(CutLattice, ClosedTetrahedraMeetFaceToFaceOrAtTheBorder) {
     SCOPED_TRACE(seed_text(seed) + ", case " + std::to_string(number));
     Random random(seed, 9'700'000 + number);
     const Geometry lattice = unit_grid({random.integer(4, 8), random.integer(4, 8), random.integer(4, 8)});
-    std::vector<Cut> cuts;
-    for (std::int64_t n = random.integer(1, 3); n > 0; --n) cuts.push_back(random_cut(random, lattice));
+    const std::vector<Cut> cuts = random_cuts(random, lattice);
     const DividedLattice division = divide(lattice, cuts);
     const std::vector<glm::vec3> rest(static_cast<std::size_t>(voxel_count(lattice)) + division.copies_of.size());
     const TetrahedralMesh mesh = mesh_of(field_of(lattice, division, rest));

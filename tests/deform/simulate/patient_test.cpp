@@ -1,6 +1,5 @@
 #include <gtest/gtest.h>
 
-#include "deform/errors.h"
 #include "tests/deform/simulate/scenario_volumes.h"
 #include "tests/support/says.h"
 
@@ -8,16 +7,6 @@ namespace tetwarp::simulate {
 namespace {
 
 using namespace test;
-
-template <class Action>
-std::string refusal(const Action& action) {
-  try {
-    action();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
-}
 
 TEST(Patient, HuOfACellIsTheMeanOfItsVoxelsAndOfTheLastThoseThatAreLeft) {
   // 6 voxels along i, cells of 3: voxels 0 1 2 | 3 4 5; along j, 4 voxels: 0 1 2 and, in a cell that overhangs, 3.

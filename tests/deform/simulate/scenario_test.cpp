@@ -4,7 +4,6 @@
 
 #include <glm/geometric.hpp>
 
-#include "deform/errors.h"
 #include "deform/simulate/scenario_run.h"
 #include "tests/deform/simulate/scenario_volumes.h"
 #include "tests/support/says.h"
@@ -13,16 +12,6 @@ namespace tetwarp::simulate {
 namespace {
 
 using namespace test;
-
-template <class Action>
-std::string refusal(const Action& action) {
-  try {
-    action();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
-}
 
 const Zone kTop{HalfSpace{{{0, 0, 40}}, {0, 0, 1}}}, kBottom{HalfSpace{{{0, 0, 0}}, {0, 0, -1}}};
 constexpr std::size_t kLayer = 121, kVertices = 6 * kLayer;

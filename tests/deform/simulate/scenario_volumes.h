@@ -5,9 +5,21 @@
 #include <utility>
 #include <vector>
 
+#include "deform/errors.h"
 #include "deform/simulate/scenario.h"
 
 namespace tetwarp::simulate::test {
+
+/// What an action says that must be refused; empty where it is not.
+template <class Action>
+std::string refusal(const Action& action) {
+  try {
+    action();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
 
 /// A CT whose voxels are `hu(i, j, k)`.
 template <class Hu>
