@@ -4,8 +4,8 @@
 
 #include <tbb/global_control.h>
 
-#include "apps/backend.h"
 #include "apps/options.h"
+#include "cuda/backend.h"
 #include "deform/version.h"
 
 namespace tetwarp::apps {

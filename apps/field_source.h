@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "apps/backend.h"
 #include "apps/console.h"
+#include "cuda/backend.h"
 #include "deform/vertex_field.h"
 #include "io/field_file.h"
 #include "io/mesh_file.h"

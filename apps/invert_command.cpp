@@ -3,10 +3,10 @@
 #include <glm/common.hpp>
 #include <nlohmann/json.hpp>
 
-#include "apps/backend.h"
 #include "apps/field_source.h"
 #include "apps/input.h"
 #include "apps/map_stream.h"
+#include "cuda/backend.h"
 #include "deform/fields/continued.h"
 #include "io/field_file.h"
 #include "io/image_file.h"

@@ -2,9 +2,9 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "apps/backend.h"
 #include "apps/map_stream.h"
 #include "apps/options.h"
+#include "cuda/backend.h"
 
 namespace tetwarp::apps {
 

@@ -1,6 +1,6 @@
 #include "apps/simulation_backend.h"
 
-#include "apps/backend.h"
+#include "cuda/backend.h"
 #include "deform/simulate/chainmail.h"
 #include "deform/simulate/mass_spring.h"
 

@@ -6,7 +6,7 @@
 
 #include "deform/resampler.h"
 
-namespace tetwarp::apps {
+namespace tetwarp {
 
 enum class Direction { forward, pull };
 
@@ -26,4 +26,4 @@ Backend make_backend(const std::string& wanted, Direction direction, const Geome
 /// One line a backend: its name, and whether it can be used on this machine.
 std::vector<std::string> describe_backends();
 
-}  // namespace tetwarp::apps
+}  // namespace tetwarp

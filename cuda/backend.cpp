@@ -1,10 +1,10 @@
-#include "apps/backend.h"
+#include "cuda/backend.h"
 
 #include <thread>
 
 #include "cuda/devices.h"
 
-namespace tetwarp::apps {
+namespace tetwarp {
 
 bool means_cuda(const std::string& wanted) { return wanted == "cuda" || (wanted == "auto" && cuda_device_count() > 0); }
 
@@ -28,4 +28,4 @@ std::vector<std::string> describe_backends() {
   return lines;
 }
 
-}  // namespace tetwarp::apps
+}  // namespace tetwarp
