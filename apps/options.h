@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "deform/enum_names.h"
 #include "deform/errors.h"
 #include "deform/resampler.h"
 
@@ -67,11 +68,6 @@ struct InvertOptions {
 struct MapOptions {
   std::filesystem::path coverage, inverse, jacobian, folds;
 };
-
-/// Words of the command line and of sidecars.
-const char* name_of(Outside outside);
-const char* name_of(Interpolation interpolation);
-std::optional<Interpolation> interpolation_named(std::string_view name);
 
 struct DeformOptions {
   CommonOptions common;

@@ -1,9 +1,9 @@
+#include "deform/enum_names.h"
+
 #include <algorithm>
 #include <iterator>
 
-#include "apps/options.h"
-
-namespace tetwarp::apps {
+namespace tetwarp {
 
 namespace {
 
@@ -36,4 +36,4 @@ std::optional<Interpolation> interpolation_named(std::string_view name) {
   return {};
 }
 
-}  // namespace tetwarp::apps
+}  // namespace tetwarp

@@ -1,0 +1,62 @@
+#ifndef itkDisplacementFieldToVertexFieldFilter_h
+#define itkDisplacementFieldToVertexFieldFilter_h
+
+#include "itkbridge/displacement_image.h"
+#include "itkbridge/itkVertexFieldSource.h"
+#include "itkbridge/pipeline_run.h"
+
+namespace itk {
+/** \class DisplacementFieldToVertexFieldFilter
+ * \brief Takes a displacement image as a forward field: each pixel is a vertex and goes to its point plus its value.
+ *
+ * That is what simulations write. The displacement field of a registration says the opposite, where an output point
+ * comes from: give it to `PullFieldResampleImageFilter` as it is.
+ *
+ * An image of `Vector<float, 3>` is used in place (its pixel container is kept); other component types are converted.
+ *
+ * \code
+ * auto source = itk::DisplacementFieldToVertexFieldFilter<FieldType>::New();
+ * source->SetInput(reader->GetOutput());
+ * \endcode
+ *
+ * \sa VertexFieldToDisplacementFieldFilter
+ * \ingroup DisplacementField Tetwarp */
+template <typename TDisplacementField = Image<Vector<float, 3>, 3>>
+class ITK_TEMPLATE_EXPORT DisplacementFieldToVertexFieldFilter : public VertexFieldSource {
+ public:
+  ITK_DISALLOW_COPY_AND_MOVE(DisplacementFieldToVertexFieldFilter);
+
+  using Self = DisplacementFieldToVertexFieldFilter;
+  using Superclass = VertexFieldSource;
+  using Pointer = SmartPointer<Self>;
+  using ConstPointer = SmartPointer<const Self>;
+
+  itkNewMacro(Self);
+  itkTypeMacro(DisplacementFieldToVertexFieldFilter, VertexFieldSource);
+
+  using DisplacementFieldType = TDisplacementField;
+
+  /** Deformed minus undeformed point, LPS mm. Required. */
+  using Superclass::SetInput;
+  void SetInput(const DisplacementFieldType* image) {
+    this->ProcessObject::SetNthInput(0, const_cast<DisplacementFieldType*>(image));
+  }
+  const DisplacementFieldType* GetInput() const {
+    return static_cast<const DisplacementFieldType*>(this->GetPrimaryInput());
+  }
+
+ protected:
+  DisplacementFieldToVertexFieldFilter() { this->SetNumberOfRequiredInputs(1); }
+  ~DisplacementFieldToVertexFieldFilter() override = default;
+
+  void GenerateOutputInformation() override {}
+  void GenerateData() override {
+    tetwarp::translate_errors(*this, [this] {
+      const auto held = tetwarp::hold_displacements(*this->GetInput());
+      this->GetOutput()->SetView({.lattice = &held->grid, .displacement = held->displacement}, held);
+    });
+  }
+};
+}  // namespace itk
+
+#endif

@@ -1,0 +1,73 @@
+#ifndef itkExactInvertDisplacementFieldImageFilter_h
+#define itkExactInvertDisplacementFieldImageFilter_h
+
+#include <itkImageToImageFilter.h>
+#include <itkVector.h>
+
+#include "itkbridge/displacement_image.h"
+#include "itkbridge/itkOutputGridFilter.h"
+
+namespace itk {
+/** \class ExactInvertDisplacementFieldImageFilter
+ * \brief The exact inverse of a forward displacement field.
+ *
+ * The input says where each of its pixels goes (LPS mm); between pixels the map is affine in each of five tetrahedra a
+ * cell. The output says of each voxel where it comes from, undeformed minus deformed point: nothing is iterated,
+ * nothing is set to zero at the border. It is NaN where there is no inverse: nothing comes to lie there. Where the
+ * field folds, the tetrahedron of the lowest number is inverted.
+ *
+ * It takes the place of `InvertDisplacementFieldImageFilter`, whose input is forward and whose output is its inverse,
+ * too. The output's grid is the input's unless it is set.
+ *
+ * \code
+ * auto invert = itk::ExactInvertDisplacementFieldImageFilter<FieldType>::New();
+ * invert->SetInput(forward);
+ * invert->Update();
+ * transform->SetDisplacementField(invert->GetOutput());
+ * \endcode
+ *
+ * \sa VertexFieldToInverseDisplacementFieldFilter
+ * \ingroup DisplacementField Tetwarp */
+template <typename TInputImage, typename TOutputImage = Image<Vector<float, 3>, 3>>
+class ITK_TEMPLATE_EXPORT ExactInvertDisplacementFieldImageFilter
+    : public OutputGridFilter<ImageToImageFilter<TInputImage, TOutputImage>> {
+ public:
+  ITK_DISALLOW_COPY_AND_MOVE(ExactInvertDisplacementFieldImageFilter);
+
+  using Self = ExactInvertDisplacementFieldImageFilter;
+  using Superclass = OutputGridFilter<ImageToImageFilter<TInputImage, TOutputImage>>;
+  using Pointer = SmartPointer<Self>;
+  using ConstPointer = SmartPointer<const Self>;
+
+  itkNewMacro(Self);
+  itkTypeMacro(ExactInvertDisplacementFieldImageFilter, OutputGridFilter);
+
+  static_assert(TInputImage::ImageDimension == 3, "Tetwarp deforms 3-D images");
+  static_assert(sizeof(typename TOutputImage::PixelType) == 3 * sizeof(float) &&
+                    std::is_same<tetwarp::ComponentOf<TOutputImage>, float>::value,
+                "the output's pixels must be three floats, such as Vector<float, 3>");
+
+ protected:
+  ExactInvertDisplacementFieldImageFilter() = default;
+  ~ExactInvertDisplacementFieldImageFilter() override = default;
+
+  tetwarp::HeldField GetHeldField() override {
+    const auto held = m_Held.hold(*this->GetInput());
+    return {tetwarp::FieldView{&held->grid, held->displacement}, held};
+  }
+  void GenerateDefaultGrid() override { this->GetOutput()->CopyInformation(this->GetInput()); }
+  void GenerateInputRequestedRegion() override {
+    const_cast<TInputImage*>(this->GetInput())->SetRequestedRegionToLargestPossibleRegion();
+  }
+  void GenerateData() override {
+    this->AllocateOutputs();
+    this->ResampleRequestedRegion([](const tetwarp::VolumeView& output, std::vector<tetwarp::Target>&,
+                                     tetwarp::Maps& maps) { maps.inverse_mm = output; });
+  }
+
+ private:
+  tetwarp::DisplacementHolder<TInputImage> m_Held;
+};
+}  // namespace itk
+
+#endif

@@ -1,0 +1,58 @@
+#ifndef itkVertexFieldResampleImageFilter_h
+#define itkVertexFieldResampleImageFilter_h
+
+#include "itkbridge/itkFieldResampleImageFilter.h"
+#include "itkbridge/itkVertexField.h"
+
+namespace itk {
+/** \class VertexFieldResampleImageFilter
+ * \brief Deforms an image by a forward field: each voxel gets what the one tetrahedron that owns it carried there.
+ *
+ * No inverse is needed, and none is approximated: in exact arithmetic one deformed tetrahedron owns each voxel of the
+ * output, and the image is sampled once, where that voxel was in the undeformed volume (docs/algorithm.md). The program
+ * `tetwarp deform` gives the same bits.
+ *
+ * \code
+ * using ImageType = itk::Image<short, 3>;
+ * auto warp = itk::VertexFieldResampleImageFilter<ImageType>::New();
+ * warp->SetInput(reader->GetOutput());
+ * warp->SetVertexField(source->GetOutput());   // of a TransformToVertexFieldFilter, for example
+ * warp->SetDefaultPixelValue(-1024);
+ * warp->Update();
+ * \endcode
+ *
+ * \sa VertexField, PullFieldResampleImageFilter
+ * \ingroup GeometricTransforms Tetwarp */
+template <typename TInputImage, typename TOutputImage = TInputImage>
+class ITK_TEMPLATE_EXPORT VertexFieldResampleImageFilter : public FieldResampleImageFilter<TInputImage, TOutputImage> {
+ public:
+  ITK_DISALLOW_COPY_AND_MOVE(VertexFieldResampleImageFilter);
+
+  using Self = VertexFieldResampleImageFilter;
+  using Superclass = FieldResampleImageFilter<TInputImage, TOutputImage>;
+  using Pointer = SmartPointer<Self>;
+  using ConstPointer = SmartPointer<const Self>;
+
+  itkNewMacro(Self);
+  itkTypeMacro(VertexFieldResampleImageFilter, FieldResampleImageFilter);
+
+  /** Where the vertices go. Required. */
+  itkSetInputMacro(VertexField, VertexField);
+  itkGetInputMacro(VertexField, VertexField);
+
+ protected:
+  VertexFieldResampleImageFilter() { this->AddRequiredInputName("VertexField"); }
+  ~VertexFieldResampleImageFilter() override = default;
+
+  tetwarp::HeldField GetHeldField() override {
+    const VertexField* const field = this->GetVertexField();
+    return {field->GetView(), field->GetOwner()};
+  }
+  void UpdateFieldInput() override { const_cast<VertexField*>(this->GetVertexField())->Update(); }
+  void RequestFieldInput() override {
+    const_cast<VertexField*>(this->GetVertexField())->SetRequestedRegionToLargestPossibleRegion();
+  }
+};
+}  // namespace itk
+
+#endif

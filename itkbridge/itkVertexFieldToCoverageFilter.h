@@ -1,0 +1,44 @@
+#ifndef itkVertexFieldToCoverageFilter_h
+#define itkVertexFieldToCoverageFilter_h
+
+#include "itkbridge/itkVertexFieldToImageFilter.h"
+
+namespace itk {
+/** \class VertexFieldToCoverageFilter
+ * \brief 1 where a forward field brings something to a voxel, 0 where it does not.
+ *
+ * It does not ask whether an image has a value there. `SetOutside` counts: what rests is covered.
+ *
+ * \code
+ * auto coverage = itk::VertexFieldToCoverageFilter<>::New();
+ * coverage->SetVertexField(field);
+ * coverage->SetOutputParametersFromImage(image);
+ * coverage->Update();
+ * \endcode
+ *
+ * \ingroup DisplacementField Tetwarp */
+template <typename TOutputImage = Image<unsigned char, 3>>
+class ITK_TEMPLATE_EXPORT VertexFieldToCoverageFilter : public VertexFieldToImageFilter<TOutputImage> {
+ public:
+  ITK_DISALLOW_COPY_AND_MOVE(VertexFieldToCoverageFilter);
+
+  using Self = VertexFieldToCoverageFilter;
+  using Superclass = VertexFieldToImageFilter<TOutputImage>;
+  using Pointer = SmartPointer<Self>;
+  using ConstPointer = SmartPointer<const Self>;
+
+  itkNewMacro(Self);
+  itkTypeMacro(VertexFieldToCoverageFilter, VertexFieldToImageFilter);
+
+  static_assert(std::is_same<typename TOutputImage::PixelType, unsigned char>::value,
+                "the output's pixels must be unsigned char");
+
+ protected:
+  VertexFieldToCoverageFilter() = default;
+  ~VertexFieldToCoverageFilter() override = default;
+
+  tetwarp::Maps GetMaps(const tetwarp::VolumeView& output) const override { return {.coverage = output}; }
+};
+}  // namespace itk
+
+#endif

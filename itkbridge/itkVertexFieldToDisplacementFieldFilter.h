@@ -1,0 +1,77 @@
+#ifndef itkVertexFieldToDisplacementFieldFilter_h
+#define itkVertexFieldToDisplacementFieldFilter_h
+
+#include <itkImageSource.h>
+#include <itkVector.h>
+
+#include <algorithm>
+
+#include "itkbridge/image_view.h"
+#include "itkbridge/itkVertexField.h"
+#include "itkbridge/pipeline_run.h"
+
+namespace itk {
+/** \class VertexFieldToDisplacementFieldFilter
+ * \brief The displacements of a lattice's vertices as an image: a *forward* field, deformed minus undeformed point, LPS
+ * mm.
+ *
+ * What ITK's `WarpImageFilter` and `DisplacementFieldTransform` take is the inverse:
+ * `VertexFieldToInverseDisplacementField Filter` makes that. The image has a pixel for each vertex. The field is
+ * brought up to date when the pipeline asks for information, for its lattice is the image's grid. Throws for a field in
+ * device memory, and for one with a mesh.
+ *
+ * \code
+ * auto image = itk::VertexFieldToDisplacementFieldFilter<>::New();
+ * image->SetVertexField(field);
+ * \endcode
+ *
+ * \sa DisplacementFieldToVertexFieldFilter
+ * \ingroup DisplacementField Tetwarp */
+template <typename TOutputImage = Image<Vector<float, 3>, 3>>
+class ITK_TEMPLATE_EXPORT VertexFieldToDisplacementFieldFilter : public ImageSource<TOutputImage> {
+ public:
+  ITK_DISALLOW_COPY_AND_MOVE(VertexFieldToDisplacementFieldFilter);
+
+  using Self = VertexFieldToDisplacementFieldFilter;
+  using Superclass = ImageSource<TOutputImage>;
+  using Pointer = SmartPointer<Self>;
+  using ConstPointer = SmartPointer<const Self>;
+
+  itkNewMacro(Self);
+  itkTypeMacro(VertexFieldToDisplacementFieldFilter, ImageSource);
+
+  static_assert(TOutputImage::ImageDimension == 3, "Tetwarp deforms 3-D images");
+  static_assert(sizeof(typename TOutputImage::PixelType) == 3 * sizeof(tetwarp::ComponentOf<TOutputImage>),
+                "the output's pixels must be three numbers, such as Vector<float, 3>");
+
+  /** Required. */
+  itkSetInputMacro(VertexField, VertexField);
+  itkGetInputMacro(VertexField, VertexField);
+
+ protected:
+  VertexFieldToDisplacementFieldFilter() { this->AddRequiredInputName("VertexField"); }
+  ~VertexFieldToDisplacementFieldFilter() override = default;
+
+  void GenerateOutputInformation() override {
+    const_cast<VertexField*>(this->GetVertexField())->Update();
+    const tetwarp::FieldView view = this->GetVertexField()->GetView();
+    if (view.mesh) itkExceptionMacro(<< "a field with a mesh is no image; see VertexFieldToMeshFilter");
+    if (view.memory != tetwarp::Memory::host) itkExceptionMacro(<< "the field is in device memory");
+    tetwarp::set_geometry(*this->GetOutput(), *view.lattice);
+  }
+  void EnlargeOutputRequestedRegion(DataObject* output) override {
+    output->SetRequestedRegionToLargestPossibleRegion();
+  }
+  void GenerateData() override {
+    this->AllocateOutputs();
+    const tetwarp::FieldView view = this->GetVertexField()->GetView();
+    using Component = tetwarp::ComponentOf<TOutputImage>;
+    const auto* const from = reinterpret_cast<const float*>(view.displacement);
+    auto* const to = reinterpret_cast<Component*>(this->GetOutput()->GetBufferPointer());
+    const auto values = 3 * static_cast<std::size_t>(tetwarp::voxel_count(*view.lattice));
+    std::transform(from, from + values, to, [](float value) { return static_cast<Component>(value); });
+  }
+};
+}  // namespace itk
+
+#endif

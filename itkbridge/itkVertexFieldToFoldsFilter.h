@@ -1,0 +1,45 @@
+#ifndef itkVertexFieldToFoldsFilter_h
+#define itkVertexFieldToFoldsFilter_h
+
+#include "itkbridge/itkVertexFieldToImageFilter.h"
+
+namespace itk {
+/** \class VertexFieldToFoldsFilter
+ * \brief How many tetrahedra of a forward field own each voxel.
+ *
+ * 1 nearly everywhere; 0 where nothing comes to lie, so in opened cuts and outside the deformed lattice; more than 1
+ * where the field folds. It saturates at 65535.
+ *
+ * \code
+ * auto folds = itk::VertexFieldToFoldsFilter<>::New();
+ * folds->SetVertexField(field);
+ * folds->SetOutputParametersFromImage(image);
+ * folds->Update();
+ * \endcode
+ *
+ * \ingroup DisplacementField Tetwarp */
+template <typename TOutputImage = Image<unsigned short, 3>>
+class ITK_TEMPLATE_EXPORT VertexFieldToFoldsFilter : public VertexFieldToImageFilter<TOutputImage> {
+ public:
+  ITK_DISALLOW_COPY_AND_MOVE(VertexFieldToFoldsFilter);
+
+  using Self = VertexFieldToFoldsFilter;
+  using Superclass = VertexFieldToImageFilter<TOutputImage>;
+  using Pointer = SmartPointer<Self>;
+  using ConstPointer = SmartPointer<const Self>;
+
+  itkNewMacro(Self);
+  itkTypeMacro(VertexFieldToFoldsFilter, VertexFieldToImageFilter);
+
+  static_assert(std::is_same<typename TOutputImage::PixelType, unsigned short>::value,
+                "the output's pixels must be unsigned short");
+
+ protected:
+  VertexFieldToFoldsFilter() = default;
+  ~VertexFieldToFoldsFilter() override = default;
+
+  tetwarp::Maps GetMaps(const tetwarp::VolumeView& output) const override { return {.owners = output}; }
+};
+}  // namespace itk
+
+#endif

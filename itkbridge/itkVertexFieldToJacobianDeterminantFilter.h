@@ -1,0 +1,47 @@
+#ifndef itkVertexFieldToJacobianDeterminantFilter_h
+#define itkVertexFieldToJacobianDeterminantFilter_h
+
+#include "itkbridge/itkVertexFieldToImageFilter.h"
+
+namespace itk {
+/** \class VertexFieldToJacobianDeterminantFilter
+ * \brief How much a forward field enlarges what comes to lie at each voxel of the deformed volume.
+ *
+ * It is the determinant of the affine map, undeformed to deformed, of the tetrahedron that owns the voxel; negative
+ * where that is turned inside out, NaN where none owns it. `DisplacementFieldJacobianDeterminantFilter` takes central
+ * differences of a displacement field at that field's own pixels: of a forward field it is this at the undeformed
+ * place, of the inverse field its reciprocal here, both up to what differences of two voxels smooth over. For affine
+ * fields all agree.
+ *
+ * \code
+ * auto jacobian = itk::VertexFieldToJacobianDeterminantFilter<>::New();
+ * jacobian->SetVertexField(field);
+ * jacobian->SetOutputParametersFromImage(image);
+ * jacobian->Update();
+ * \endcode
+ *
+ * \ingroup DisplacementField Tetwarp */
+template <typename TOutputImage = Image<float, 3>>
+class ITK_TEMPLATE_EXPORT VertexFieldToJacobianDeterminantFilter : public VertexFieldToImageFilter<TOutputImage> {
+ public:
+  ITK_DISALLOW_COPY_AND_MOVE(VertexFieldToJacobianDeterminantFilter);
+
+  using Self = VertexFieldToJacobianDeterminantFilter;
+  using Superclass = VertexFieldToImageFilter<TOutputImage>;
+  using Pointer = SmartPointer<Self>;
+  using ConstPointer = SmartPointer<const Self>;
+
+  itkNewMacro(Self);
+  itkTypeMacro(VertexFieldToJacobianDeterminantFilter, VertexFieldToImageFilter);
+
+  static_assert(std::is_same<typename TOutputImage::PixelType, float>::value, "the output's pixels must be float");
+
+ protected:
+  VertexFieldToJacobianDeterminantFilter() = default;
+  ~VertexFieldToJacobianDeterminantFilter() override = default;
+
+  tetwarp::Maps GetMaps(const tetwarp::VolumeView& output) const override { return {.jacobian = output}; }
+};
+}  // namespace itk
+
+#endif

@@ -1,0 +1,68 @@
+#ifndef itkVertexFieldToMeshFilter_h
+#define itkVertexFieldToMeshFilter_h
+
+#include <itkMesh.h>
+#include <itkMeshSource.h>
+#include <itkVector.h>
+
+#include "itkbridge/itkVertexField.h"
+
+namespace itk {
+/** \class VertexFieldToMeshFilter
+ * \brief The tetrahedra of a forward field, five of each cell of its lattice, as a mesh of ITK.
+ *
+ * Points are at rest, LPS mm, or where they go with `DeformedOn`; the point data are the displacements, mm. A mesh of
+ * ITK takes some hundred bytes for each tetrahedron: this is for looking at a coarse field, not for one with a vertex
+ * on every voxel.
+ *
+ * \code
+ * auto mesh = itk::VertexFieldToMeshFilter<>::New();
+ * mesh->SetVertexField(field);
+ * mesh->Update();
+ * \endcode
+ *
+ * \sa MeshToVertexFieldFilter
+ * \ingroup MeshFilters Tetwarp */
+template <typename TOutputMesh = Mesh<Vector<float, 3>, 3>>
+class ITK_TEMPLATE_EXPORT VertexFieldToMeshFilter : public MeshSource<TOutputMesh> {
+ public:
+  ITK_DISALLOW_COPY_AND_MOVE(VertexFieldToMeshFilter);
+
+  using Self = VertexFieldToMeshFilter;
+  using Superclass = MeshSource<TOutputMesh>;
+  using Pointer = SmartPointer<Self>;
+  using ConstPointer = SmartPointer<const Self>;
+
+  itkNewMacro(Self);
+  itkTypeMacro(VertexFieldToMeshFilter, MeshSource);
+
+  using MeshType = TOutputMesh;
+  static_assert(TOutputMesh::PointDimension == 3, "Tetwarp deforms 3-D meshes");
+
+  /** Required. */
+  itkSetInputMacro(VertexField, VertexField);
+  itkGetInputMacro(VertexField, VertexField);
+
+  /** Whether points are where they go, not at rest. Off by default. */
+  itkSetMacro(Deformed, bool);
+  itkGetConstMacro(Deformed, bool);
+  itkBooleanMacro(Deformed);
+
+ protected:
+  VertexFieldToMeshFilter() { this->AddRequiredInputName("VertexField"); }
+  ~VertexFieldToMeshFilter() override = default;
+
+  void GenerateOutputInformation() override {}
+  void GenerateData() override;
+  void PrintSelf(std::ostream& os, Indent indent) const override;
+
+ private:
+  bool m_Deformed{false};
+};
+}  // namespace itk
+
+#ifndef ITK_MANUAL_INSTANTIATION
+#include "itkbridge/itkVertexFieldToMeshFilter.hxx"
+#endif
+
+#endif

@@ -1,0 +1,90 @@
+#include "itkbridge/pipeline_resampler.h"
+
+#include <atomic>
+
+#include "cuda/devices.h"
+
+namespace tetwarp {
+
+namespace {
+
+bool is_same(const HeldField& a, const HeldField& b) {
+  if (a.owner != b.owner || a.view.index() != b.view.index()) return false;
+  return std::visit([](const auto& left, const auto& right) { return left.outside == right.outside; }, a.view, b.view);
+}
+
+void warn_of_fallback(const itk::ProcessObject& filter, const std::string& reason) {
+  static std::atomic_flag warned = ATOMIC_FLAG_INIT;
+  if (!warned.test_and_set())
+    warn(filter,
+         "works on the CPU, the bits are the same: " + reason + "; SetBackend(\"cpu\") says so without a warning");
+}
+
+}  // namespace
+
+bool PipelineResampler::holds(const Geometry& output, const HeldField& field, const PipelineOptions& options) const {
+  return backend_.resampler && output_ == output && options_ == options && is_same(field_, field);
+}
+
+void PipelineResampler::make(const std::string& wanted, const Control& control) {
+  const Direction direction = std::holds_alternative<FieldView>(field_.view) ? Direction::forward : Direction::pull;
+  backend_.resampler.reset();  // before another takes memory
+  backend_ = make_backend(wanted, direction, output_, options_.device,
+                          {.threads = options_.threads, .memory = options_.device_memory});
+  std::visit([&](const auto& view) { backend_.resampler->set_field(view, control); }, field_.view);
+}
+
+void PipelineResampler::fall_back(const itk::ProcessObject& filter, const Control& control, const DeviceError& error) {
+  if (options_.backend != "auto") throw;
+  warn_of_fallback(filter, error.what());
+  make("cpu", control);
+}
+
+bool PipelineResampler::set_field(itk::ProcessObject& filter, const Geometry& output, const HeldField& field,
+                                  const PipelineOptions& options, ProgressShare share) {
+  if (holds(output, field, options)) return false;
+  backend_ = {};
+  output_ = output;
+  field_ = field;
+  options_ = options;
+  if (options.backend == "auto" && !means_cuda("auto"))
+    warn_of_fallback(filter, has_cuda() ? "no CUDA device works on this machine" : "CUDA is not in this build");
+  try {
+    run_for(filter, share, [&](const Control& control) {
+      try {
+        make(options.backend, control);
+      } catch (const DeviceError& error) {
+        fall_back(filter, control, error);
+      }
+    });
+  } catch (...) {
+    backend_ = {};
+    field_ = {};
+    throw;
+  }
+  return true;
+}
+
+Region PipelineResampler::source_region(const itk::ProcessObject& filter, const Geometry& source,
+                                        const Region& output) const {
+  Region region;
+  translate_errors(filter, [&] { region = backend_.resampler->source_region(source, output); });
+  return is_empty(region) ? Region{glm::i64vec3(0), glm::i64vec3(1)} : region;
+}
+
+Report PipelineResampler::resample(itk::ProcessObject& filter, const Region& region, std::span<const Target> targets,
+                                   const Maps& maps, ProgressShare share) {
+  Report report;
+  run_for(filter, share, [&](const Control& control) {
+    const auto work = [&] { report = backend_.resampler->resample(region, targets, maps, control); };
+    try {
+      work();
+    } catch (const DeviceError& error) {
+      fall_back(filter, control, error);
+      work();
+    }
+  });
+  return report;
+}
+
+}  // namespace tetwarp
