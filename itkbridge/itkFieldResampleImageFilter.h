@@ -70,7 +70,7 @@ class ITK_TEMPLATE_EXPORT FieldResampleImageFilter
   double GetBackground() const;
 
   InterpolationEnum m_Interpolation{InterpolationEnum::linear};
-  PixelType m_DefaultPixelValue;
+  PixelType m_DefaultPixelValue{};
   std::optional<tetwarp::PaddingRange> m_Padding;
 };
 }  // namespace itk

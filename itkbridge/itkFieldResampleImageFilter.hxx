@@ -8,8 +8,9 @@
 namespace itk {
 
 template <typename TInputImage, typename TOutputImage>
-FieldResampleImageFilter<TInputImage, TOutputImage>::FieldResampleImageFilter()
-    : m_DefaultPixelValue(NumericTraits<PixelType>::ZeroValue(m_DefaultPixelValue)) {}
+FieldResampleImageFilter<TInputImage, TOutputImage>::FieldResampleImageFilter() {
+  m_DefaultPixelValue = NumericTraits<PixelType>::ZeroValue(m_DefaultPixelValue);
+}
 
 template <typename TInputImage, typename TOutputImage>
 void FieldResampleImageFilter<TInputImage, TOutputImage>::SetPadding(double low, double high) {

@@ -80,7 +80,6 @@ void MeshToVertexFieldFilter<TMesh, TDeformedMesh>::CopyTetrahedra(const Numbers
 template <typename TMesh, typename TDeformedMesh>
 void MeshToVertexFieldFilter<TMesh, TDeformedMesh>::GenerateData() {
   tetwarp::VertexField field;
-  field.lattice.size = glm::i64vec3(0);
   this->CopyTetrahedra(this->CopyPoints(field.mesh), field.mesh);
   if (field.mesh.is_empty()) itkExceptionMacro(<< "the mesh has no tetrahedra");
   this->GetOutput()->SetField(std::move(field));

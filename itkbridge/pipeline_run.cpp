@@ -79,6 +79,7 @@ void run_for(itk::ProcessObject& filter, ProgressShare share, const std::functio
     told = std::min(progress, share.end);
     filter.UpdateProgress(told);
   };
+  if (share.end > share.begin) filter.UpdateProgress(told);
   translate_errors(filter, [&] {
     Worker worker(work);
     while (!worker.wait()) {
