@@ -169,6 +169,8 @@ std::unique_ptr<ImageReader> open_image(const std::filesystem::path& path) {
   auto reader = open_format(path, format);
   require_valid(reader->header().geometry, file);
   require_orthogonal(reader->header().geometry, file);
+  require(reader->header().components >= 1,
+          std::to_string(reader->header().components) + " components a voxel, " + file + "; expected 1 or more");
   require_file_holds(path, reader->header(), reader->stored());
   return reader;
 }

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <fstream>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <sstream>
 #include <utility>
 
@@ -51,6 +52,12 @@ std::int64_t whole_number(double value, const std::string& file) {
   require(value >= 1 && value < 9e15 && value == static_cast<double>(static_cast<std::int64_t>(value)),
           "a size of " + std::to_string(value) + ", " + file + "; expected a positive whole number");
   return static_cast<std::int64_t>(value);
+}
+
+int component_count(double value, const std::string& file) {
+  const std::int64_t count = whole_number(value, file);
+  require(count <= std::numeric_limits<int>::max(), std::to_string(count) + " components a voxel, " + file);
+  return static_cast<int>(count);
 }
 
 void expect(const TextHeader& header, const std::string& name, const std::string& value, bool may_be_absent,
@@ -116,7 +123,7 @@ ImageHeader parse_mha(const TextHeader& text, const std::string& file) {
   header.metadata = text.metadata;
   header.type = voxel_type(text["elementtype"], ImageFormat::mha, file);
   if (!text["elementnumberofchannels"].empty()) {
-    header.components = static_cast<int>(whole_number(numbers(text, "elementnumberofchannels", 1, file)[0], file));
+    header.components = component_count(numbers(text, "elementnumberofchannels", 1, file)[0], file);
   }
   const auto size = numbers(text, "dimsize", 3, file), spacing = numbers(text, "elementspacing", 3, file);
   const auto offset = numbers(text, "offset", 3, file), matrix = numbers(text, "transformmatrix", 9, file);
@@ -144,7 +151,7 @@ ImageHeader parse_nrrd(const TextHeader& text, const std::string& file) {
   require(size.size() == 3 || (size.size() == 4 && text["space directions"].starts_with("none")),
           std::to_string(size.size()) + " axes, " + file + "; expected 3, or 4 with the vectors' components first");
   if (size.size() == 4) {
-    header.components = static_cast<int>(whole_number(size[0], file));
+    header.components = component_count(size[0], file);
     size.erase(size.begin());
   }
   const auto steps = numbers(text, "space directions", 9, file), origin = numbers(text, "space origin", 3, file);
