@@ -127,7 +127,9 @@ void SlabWriter::begin(std::span<const Target> targets, const Maps& maps, cudaSt
     DeviceTarget& on_device = *targets_[n];
     const Target& target = on_device.target = targets[n];
     on_device.source = target.source;
-    on_device.relation = relate(*target.source.geometry, output_);
+    const std::vector<double> slices = uneven_slices(*target.source.geometry);
+    if (!slices.empty()) on_device.slices.upload(slices.data(), slices.size(), stream_);
+    on_device.relation = relate(*target.source.geometry, output_, slices.empty() ? nullptr : on_device.slices.data());
     require_memory(target.source.voxels, target.source.memory, "the source");
     require_memory(target.output.voxels, target.output.memory, "the output");
     std::vector<long long> first, last;

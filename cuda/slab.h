@@ -228,6 +228,7 @@ class SlabWriter {
     Target target;           ///< its source is what the device holds
     ConstVolumeView source;  ///< as it was given
     SourceRelation relation;
+    DeviceBuffer<double> slices;          ///< of an uneven source
     DeviceBuffer<long long> first, last;  ///< its sampled slices
   };
   /// Where the results of a box begin, bytes; kNone: not wanted.

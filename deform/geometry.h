@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "deform/core/host_device.h"
 
@@ -11,11 +12,16 @@ namespace tetwarp {
 ///
 /// A voxel is a point sample at its centre: continuous index (i, j, k) lies at
 /// `origin + direction * (spacing * index)`; column c of `direction` is the unit vector along which index c grows.
+///
+/// A source may also be sheared, as a gantry tilt leaves it: the columns of `direction` are not perpendicular then. And
+/// its slices may be unevenly far apart: `slices` says where they are, and `spacing.z` is their mean distance, so that
+/// the first and the last slice lie where an even stack has them.
 struct Geometry {
   glm::i64vec3 size{0};     ///< samples along i, j, k
   glm::dvec3 spacing{1};    ///< mm between neighbours along i, j, k, each > 0
   glm::dvec3 origin{0};     ///< LPS mm of the centre of sample (0, 0, 0)
   glm::dmat3 direction{1};  ///< columns: directions of i, j, k in LPS
+  std::vector<double> slices = {};  ///< empty: even; else mm along k of each slice, from 0, rising (sources only)
 
   friend bool operator==(const Geometry&, const Geometry&) = default;
 };
@@ -58,11 +64,19 @@ bool same_grid(const Geometry& a, const Geometry& b, double tolerance_mm);
 /// cell may overhang the volume. @throws InputError for a cell size below 1 or fewer than two voxels on an axis
 Geometry lattice_over(const Geometry& volume, std::int64_t cell_size);
 
+/// Whether rows, columns and stack are not perpendicular, by more than rounding: 1e-6 in a cosine.
+bool is_sheared(const Geometry& geometry);
+
+/// The grid that a sheared or uneven volume is resampled onto where it is to keep "its" grid: rows and columns as they
+/// are, the third axis row x column, its step the smallest distance of two slices along it, grown by whole voxels until
+/// all slices lie inside. Others are returned as they are.
+Geometry straightened(const Geometry& geometry);
+
 /// Three-letter anatomical code of the directions in which i, j, k grow, "LPS" for the identity direction.
 std::string orientation_code(const Geometry& geometry);
 
-/// @throws InputError unless sizes and spacings are positive, all numbers finite, and the direction can be inverted;
-/// `what` names the grid in the message
+/// @throws InputError unless sizes and spacings are positive, all numbers finite, and the direction can be inverted; or
+/// for `slices` that are not one a slice, rising from 0 to the last slice of the even stack; `what` names the grid
 void require_valid(const Geometry& geometry, const std::string& what);
 
 /// "512 x 512 x 300", the way messages show a size.

@@ -37,6 +37,7 @@ PullFieldView view(const PullField& field, Outside outside) {
 
 Resampler::Resampler(Geometry output) : output_(output) {
   require_valid(output_, "output grid");
+  require(output_.slices.empty(), "the output grid has uneven slices; only a source may");
   for (int axis = 0; axis < 3; ++axis) {
     require(output_.size[axis] >= 2,
             "output grid of " + to_string(output_.size) + " voxels: deforming needs at least 2 on every axis");

@@ -28,6 +28,8 @@ void check_target(const Target& target, const Geometry& output, const Region& re
   check_view(target.source, "the source");
   check_view(target.output, "the output");
   require_valid(*target.source.geometry, "source grid");
+  require(target.source.geometry->slices.empty() || target.interpolation != Interpolation::cubic,
+          "cubic interpolation needs even slices, those of the source are not; choose linear");
   require(*target.output.geometry == output, "the output of " + to_string(target.output.geometry->size) +
                                                  " voxels is not on the resampler's grid of " + to_string(output.size));
   require(target.output.type == target.source.type, "the output holds " + to_string(target.output.type) +
@@ -82,13 +84,20 @@ void require_host(Memory memory, const std::string& name) {
   require(memory == Memory::host, name + " is in device memory, which the CPU cannot read; use make_cuda_resampler");
 }
 
-SourceRelation relate(const Geometry& source, const Geometry& output) {
-  return {source == output, index_from_point(source) * point_from_index(output)};
+SourceRelation relate(const Geometry& source, const Geometry& output, const double* slices) {
+  return {source == output, index_from_point(source) * point_from_index(output), {slices, std::ssize(source.slices)}};
+}
+
+std::vector<double> uneven_slices(const Geometry& source) {
+  std::vector<double> slices = source.slices;
+  for (double& at : slices) at /= source.spacing.z;
+  return slices;
 }
 
 Region source_box(const Geometry& source, const Geometry& output, const glm::dvec3& low, const glm::dvec3& high) {
   if (!(low.x <= high.x)) return {};
-  const AffineMap source_from_output = index_from_point(source) * point_from_index(output);
+  const std::vector<double> slices = uneven_slices(source);
+  const SourceRelation source_from_output = relate(source, output, slices.empty() ? nullptr : slices.data());
   glm::dvec3 least(INFINITY), most(-INFINITY);
   for (int corner = 0; corner < 8; ++corner) {
     const glm::dvec3 at(corner & 1 ? high.x : low.x, corner >> 1 & 1 ? high.y : low.y, corner >> 2 ? high.z : low.z);

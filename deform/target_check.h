@@ -2,6 +2,7 @@
 
 #include <limits>
 #include <span>
+#include <vector>
 
 #include "deform/core/sample_voxel.h"
 #include "deform/resampler.h"
@@ -38,7 +39,11 @@ Padding<V> padding_of(const std::optional<PaddingRange>& range) {
   return {true, static_cast<V>(low), static_cast<V>(high)};
 }
 
-SourceRelation relate(const Geometry& source, const Geometry& output);
+/// @param slices  `uneven_slices(source)`, where the backend reads them; null for an even source
+SourceRelation relate(const Geometry& source, const Geometry& output, const double* slices);
+
+/// Places of the slices of an uneven source in units of their mean distance; empty for an even one.
+std::vector<double> uneven_slices(const Geometry& source);
 
 /// The plan of a checked target, for the first value of each voxel. `voxels` are the source's, wherever the backend
 /// keeps them.

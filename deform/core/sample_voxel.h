@@ -6,10 +6,38 @@
 
 namespace tetwarp {
 
+/// Where the slices of an uneven source lie, in units of their mean distance: from 0 to count - 1, rising.
+struct UnevenSlices {
+  const double* at = nullptr;  ///< null: even
+  std::int64_t count = 0;
+
+  /// Continuous slice index of a place along the stack: linear between neighbours, and beyond the outermost ones as
+  /// between them.
+  TETWARP_HD double index(double place) const {
+    std::int64_t low = 0, high = count - 1;  // at[low] <= place < at[high], or beyond an end
+    while (high - low > 1) {
+      const std::int64_t middle = (low + high) / 2;
+      if (place < at[middle])
+        high = middle;
+      else
+        low = middle;
+    }
+    return static_cast<double>(low) + (place - at[low]) / (at[high] - at[low]);
+  }
+};
+
 /// How a source grid lies to the output grid.
 struct SourceRelation {
   bool same_grid = false;        ///< source and output share their grid: places stay exact
-  AffineMap source_from_output;  ///< where they do not
+  AffineMap source_from_output;  ///< where they do not; of an uneven source as if its slices were even
+  UnevenSlices slices;
+
+  /// @param place  continuous output index  @return continuous source index
+  TETWARP_HD glm::dvec3 operator()(const glm::dvec3& place) const {
+    glm::dvec3 index = source_from_output(place);
+    if (slices.at) index.z = slices.index(index.z);
+    return index;
+  }
 };
 
 /// All that one output voxel needs to know of a target: plain data, the same for every backend.
@@ -40,7 +68,7 @@ template <class V>
 TETWARP_INLINE_HD bool source_place(const SamplePlan<V>& plan, const glm::i64vec3& voxel, const glm::vec3& offset,
                                     Place& place) {
   place = plan.relation.same_grid ? place_at(voxel, offset)
-                                  : place_at(plan.relation.source_from_output(glm::dvec3(voxel) + glm::dvec3(offset)));
+                                  : place_at(plan.relation(glm::dvec3(voxel) + glm::dvec3(offset)));
   return clamp_to_grid(place, plan.source.size);
 }
 

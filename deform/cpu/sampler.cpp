@@ -17,7 +17,8 @@ class TypedSampler final : public TargetSampler {
   /// @param target  checked (target_check.h)
   TypedSampler(const Target& target, const Geometry& output)
       : target_(target),
-        plan_(plan_target(target, relate(*target.source.geometry, output),
+        slices_(uneven_slices(*target.source.geometry)),
+        plan_(plan_target(target, relate(*target.source.geometry, output, slices_.empty() ? nullptr : slices_.data()),
                           reinterpret_cast<const V*>(target.source.voxels))) {
     if constexpr (kVectors) has_source_ = LinearSource::make(plan_, voxel_count(target.source.buffered), source_);
   }
@@ -123,6 +124,7 @@ class TypedSampler final : public TargetSampler {
   }
 
   Target target_;
+  std::vector<double> slices_;  ///< of an uneven source
   SamplePlan<V> plan_;
   LinearSource source_{};  ///< where vectors sample it
   bool has_source_ = false;
