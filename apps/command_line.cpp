@@ -35,6 +35,12 @@ void add_series(CLI::App& command, InputOptions& input) {
   command.add_option("--series", input.series, "Series Instance UID, or the number that `tetwarp info` prints")
       ->type_name("UID");
   command.add_flag("--single", input.single, "Read the one DICOM file alone, not its series");
+  command
+      .add_option_function<std::string>(
+          "--uneven", [&input](const std::string& wanted) { input.uneven = wanted == "exact"; },
+          "Slices at uneven distances: refuse them, or take each exactly where it is")
+      ->check(CLI::IsMember({"refuse", "exact"}))
+      ->default_str("refuse");
 }
 
 constexpr const char* kInputHelp = "Folder of DICOM files, one DICOM file, or .nii .nii.gz .nrrd .mha";

@@ -84,6 +84,12 @@ void Deformation::read_field() {
   }
   if (options_.grid == "fit")
     record_.plan.grid = output_grid("fit", grid, record_.field.forward.field, options_.outside);
+  if (is_same_grid(options_.grid) && record_.plan.grid != grid) {
+    record_.field.notes.push_back(std::string("INPUT's slices ") +
+                                  (is_sheared(grid) ? "lean" : "lie at uneven distances") +
+                                  ": the output has a straight, even grid of " + to_string(record_.plan.grid.size) +
+                                  " voxels, so that the identity resamples too");
+  }
   record_.stages.emplace_back("field", stage.seconds());
 }
 
@@ -194,7 +200,7 @@ void Deformation::begin_series() {
   const char* what =
       !deformed ? "Resampled by the identity" : (pull ? "Deformed by a pull field" : "Deformed by a field of vertices");
   series_.emplace(
-      record_.outputs.volume, record_.input.volume.geometry(), *record_.input.dicom->headers,
+      record_.outputs.volume, record_.plan.grid, *record_.input.dicom->headers,
       DicomDerivation{.field_sha256 = record_.field_sha256,
                       .parameters = parameters,
                       .description = std::string(what) + ", " + name_of(options_.interpolation) + " interpolation",
@@ -239,7 +245,10 @@ void Deformation::write_preview_picture() {
   const PullField none{corners, std::vector<glm::vec3>(8, glm::vec3(0))};
   const auto resampler = make_cpu_pull_resampler(record_.plan.grid, {.threads = options_.common.threads});
   resampler->set_field(view(none, Outside::background));
-  const Target target{.source = before, .output = on_grid.view(), .background = record_.background};
+  const Target target{.source = before,
+                      .output = on_grid.view(),
+                      .background = record_.background,
+                      .padding = record_.input.is_dicom() ? record_.input.dicom->padding : std::nullopt};
   resampler->resample(whole(record_.plan.grid), {&target, 1});
   write_preview(record_.outputs.preview, std::as_const(on_grid).view(), after, title());
 }

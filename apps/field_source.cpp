@@ -160,7 +160,7 @@ std::uint64_t field_bytes(const std::vector<std::string>& fields, const Geometry
     return header.vertices * kVertex + header.tetrahedra * kTetrahedron;
   }
   const glm::i64vec3 size = kind == FieldKind::lattice ? read_field_header(field_source(fields.front())).grid.size
-                                                       : lattice_over(volume, cell_size.value_or(1)).size;
+                                                       : lattice_over(straightened(volume), cell_size.value_or(1)).size;
   return static_cast<std::uint64_t>(size.x * size.y * size.z) * sizeof(glm::vec3);
 }
 
@@ -189,7 +189,7 @@ ForwardField read_forward_field(const std::vector<std::string>& fields, const Ge
     }
     const NamedMap next = map_of(text, volume);
     if (n == 0)
-      result.field = sample_on(lattice_over(volume, cell_size.value_or(1)), next.map, limits, control);
+      result.field = sample_on(lattice_over(straightened(volume), cell_size.value_or(1)), next.map, limits, control);
     else
       compose(result.field, next.map, limits, control);
     if (next.transform) note_transform(*next.transform, text, Direction::forward, result.notes);

@@ -107,7 +107,7 @@ void FurtherVolumes::read(const CommonOptions& common, const Control& control) {
 std::vector<Geometry> FurtherVolumes::own_grids() const {
   std::vector<Geometry> grids;
   for (const One& one : volumes_) {
-    const Geometry& grid = one.header.geometry;
+    const Geometry grid = straightened(one.header.geometry);
     if (one.options.own && std::find(grids.begin(), grids.end(), grid) == grids.end()) grids.push_back(grid);
   }
   return grids;
@@ -116,7 +116,7 @@ std::vector<Geometry> FurtherVolumes::own_grids() const {
 std::vector<Target> FurtherVolumes::targets_on(const Geometry& grid, bool own, Interpolation otherwise) {
   std::vector<Target> targets;
   for (One& one : volumes_) {
-    if (one.options.own != own || (own && one.header.geometry != grid)) continue;
+    if (one.options.own != own || (own && straightened(one.header.geometry) != grid)) continue;
     one.output = AnyVolume(grid, one.input.volume.type(), one.input.volume.components());
     targets.push_back({.source = std::as_const(one.input.volume).view(),
                        .output = one.output.view(),

@@ -31,6 +31,7 @@ json describe_series(const DicomSeries& series, std::size_t number) {
   } else {
     document["geometry"] = to_json(series.geometry);
   }
+  if (series.uneven) document["uneven"] = *series.uneven;
   return document;
 }
 
@@ -135,6 +136,8 @@ void print_dicom(const json& document) {
     std::printf("  UID          %s\n", uid.empty() ? "(none)" : uid.c_str());
     if (series["usable"].get<bool>()) {
       print_grid(series["geometry"]);
+      if (series.contains("uneven"))
+        std::printf("  uneven       %s; needs --uneven exact\n", series["uneven"].get<std::string>().c_str());
     } else {
       std::printf("  not usable   %s\n", series["refusal"].get<std::string>().c_str());
     }

@@ -104,6 +104,8 @@ InputHeader open_input(const InputOptions& options, const Control& control, bool
   const DicomScan scan = scan_dicom(options.path, options.single, control);
   const DicomSeries& series = choose_series(scan, options);
   require(!series.refusal, series.refusal.value_or(""));
+  require(!series.uneven || options.uneven,
+          series.uneven.value_or("") + "; add what is missing, or give --uneven exact, which takes each slice where it is");
   return {series.geometry, VoxelType::i16, series, false, 1};
 }
 

@@ -171,9 +171,10 @@ int run_invert(const InvertOptions& options) {
   const InputHeader like = open_input(options.like, {.stop = interrupt_token()});
 
   Stage field_stage(options.common, "field");
+  const Geometry grid = straightened(like.geometry);
   Invertible field = read_invertible(options, like.geometry, field_stage.control());
   const double field_seconds = field_stage.seconds();
-  Inversion result = invert(options, like.geometry, field, output, outputs);
+  Inversion result = invert(options, grid, field, output, outputs);
   result.field_seconds = field_seconds;
   outputs.write([&] {
     if (!report_path.empty()) write_json(report_path, document_of(options, field, result));

@@ -86,12 +86,14 @@ void write_json(const fs::path& path, const nlohmann::json& document) {
 
 nlohmann::json to_json(const Geometry& geometry) {
   const auto list = [](const auto& v) { return nlohmann::json::array({v.x, v.y, v.z}); };
-  return {
+  nlohmann::json document = {
       {"size", list(geometry.size)},
       {"spacing_mm", list(geometry.spacing)},
       {"origin_lps_mm", list(geometry.origin)},
       {"direction_columns", {list(geometry.direction[0]), list(geometry.direction[1]), list(geometry.direction[2])}},
       {"orientation", orientation_code(geometry)}};
+  if (!geometry.slices.empty()) document["slices_mm"] = geometry.slices;
+  return document;
 }
 
 nlohmann::json to_json(const Residuals& residuals) {

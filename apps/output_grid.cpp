@@ -84,13 +84,15 @@ void check_grid(const std::string& wanted, bool pull) {
   }
 }
 
-Geometry output_grid(const std::string& wanted, const Geometry& volume, const VertexField& field, Outside outside) {
+Geometry output_grid(const std::string& wanted, const Geometry& input, const VertexField& field, Outside outside) {
+  const Geometry volume = straightened(input);
   if (is_same_grid(wanted)) return volume;
   if (has_image_suffix(wanted)) return read_image_header(wanted).geometry;
   if (wanted != "fit") {
     InputOptions like;
     like.path = wanted;
-    return open_input(like, {.stop = interrupt_token()}).geometry;
+    like.uneven = true;
+    return straightened(open_input(like, {.stop = interrupt_token()}).geometry);
   }
   // What does not reach over the volume is refused.
   if (field.mesh.is_empty()) {

@@ -15,11 +15,11 @@ bool is_same_grid(const std::string& wanted);
 
 /// The output grid that --grid asks for.
 ///
-/// @param wanted  "same": the volume's; "fit": grown by whole voxels to hold every vertex where `field` moves it;
-///                else a volume file or DICOM folder, of which it is the grid
+/// @param wanted  "same": the input's; "fit": that grown by whole voxels to hold every vertex where `field` moves it;
+///                else a volume file or DICOM folder, of which it is the grid. Always `straightened`
 /// @param field   not used but for "fit"
 /// @throws InputError for a file that is no volume, or a lattice that does not reach over the volume where `outside`
 ///         refuses that
-Geometry output_grid(const std::string& wanted, const Geometry& volume, const VertexField& field, Outside outside);
+Geometry output_grid(const std::string& wanted, const Geometry& input, const VertexField& field, Outside outside);
 
 }  // namespace tetwarp::apps

@@ -19,6 +19,7 @@ LatticeFrame make_lattice_frame(const Geometry& output, const FieldView& field) 
   require(field.lattice && field.displacement, "the field is empty");
   const Geometry& lattice = *field.lattice;
   require_valid(lattice, "field lattice");
+  require(lattice.slices.empty(), "the field lattice has uneven slices; only a source may");
   LatticeFrame frame;
   frame.cells = lattice.size - std::int64_t{1};
   frame.output_from_lattice = index_from_point(output) * point_from_index(lattice);

@@ -1,5 +1,6 @@
 #include "deform/target_check.h"
 
+#include <cmath>
 #include <glm/common.hpp>
 
 namespace tetwarp {
@@ -60,6 +61,23 @@ void check_map(const VolumeView& map, const std::string& name, VoxelType type, i
   require(contains(map.buffered, region), "the " + name + " map does not buffer the region asked for");
 }
 
+/// Takes away what two changes of frame leave of rounding where grids lie alike along an axis: voxels there are copied,
+/// and what lies beside them, padding above all, has no weight.
+AffineMap without_rounding(AffineMap map) {
+  constexpr double kRounding = 1e-12, kNearly = 1e-9;  // of a step; voxels
+  for (int row = 0; row < 3; ++row) {
+    bool whole = true;
+    for (int column = 0; column < 3; ++column) {
+      double& step = map.linear[column][row];
+      whole = whole && std::abs(step - std::round(step)) <= kRounding;
+      if (std::abs(step - std::round(step)) <= kRounding) step = std::round(step);
+    }
+    const double place = std::round(map.offset[row] * kStepsPerVoxel) / kStepsPerVoxel;
+    if (whole && std::abs(map.offset[row] - place) <= kNearly) map.offset[row] = place;
+  }
+  return map;
+}
+
 }  // namespace
 
 void check_targets(const Resampler& resampler, std::span<const Target> targets, const Region& region) {
@@ -85,7 +103,8 @@ void require_host(Memory memory, const std::string& name) {
 }
 
 SourceRelation relate(const Geometry& source, const Geometry& output, const double* slices) {
-  return {source == output, index_from_point(source) * point_from_index(output), {slices, std::ssize(source.slices)}};
+  const AffineMap map = without_rounding(index_from_point(source) * point_from_index(output));
+  return {source == output, map, {slices, std::ssize(source.slices)}};
 }
 
 std::vector<double> uneven_slices(const Geometry& source) {

@@ -74,14 +74,33 @@ std::string series_description(DcmDataset& slice, bool deformed) {
 }
 
 /// The source's instance numbers where each is there once and is fit for a file name, else 1 to n.
-std::vector<int> instance_numbers(const std::vector<DicomFileHeader>& headers) {
+/// @param slices  of the output: others than the source's are numbered anew
+std::vector<int> instance_numbers(const std::vector<DicomFileHeader>& headers, std::size_t slices) {
   std::vector<int> numbers;
   for (const DicomFileHeader& header : headers) numbers.push_back(header.instance_number);
   std::vector<int> sorted = numbers;
   std::sort(sorted.begin(), sorted.end());
   const bool distinct = std::adjacent_find(sorted.begin(), sorted.end()) == sorted.end();
-  if (!distinct || sorted.front() < 0) std::iota(numbers.begin(), numbers.end(), 1);
+  if (distinct && sorted.front() >= 0 && numbers.size() == slices) return numbers;
+  numbers.resize(slices);
+  std::iota(numbers.begin(), numbers.end(), 1);
   return numbers;
+}
+
+/// Of each slice of the output, the source slice whose header it takes over: its own, or the nearest along the stack.
+std::vector<std::size_t> header_slices(const std::vector<DicomFileHeader>& headers, const Geometry& geometry) {
+  std::vector<std::size_t> nearest(static_cast<std::size_t>(geometry.size.z));
+  std::iota(nearest.begin(), nearest.end(), std::size_t{0});
+  if (headers.size() == nearest.size()) return nearest;
+  const AffineMap index = index_from_point(geometry);
+  std::vector<double> places;  // of the source's slices, in slices of the output
+  for (const DicomFileHeader& header : headers) places.push_back(index(header.position.value_or(glm::dvec3(0))).z);
+  for (std::size_t& slice : nearest) {
+    const auto at = static_cast<double>(slice);
+    const auto closer = [at](double a, double b) { return std::abs(a - at) < std::abs(b - at); };
+    slice = static_cast<std::size_t>(std::min_element(places.begin(), places.end(), closer) - places.begin());
+  }
+  return nearest;
 }
 
 std::optional<PaddingRange> common_padding(const std::vector<DicomFileHeader>& headers) {
@@ -155,7 +174,7 @@ void put_padding(DcmItem& target, const PaddingRange& padding) {
 
 }  // namespace
 
-DerivedSeries derive_series(const DicomHeaders& source, const DicomDerivation& derivation) {
+DerivedSeries derive_series(const DicomHeaders& source, const Geometry& geometry, const DicomDerivation& derivation) {
   require(!source.slices.empty(), "the source series has no slices; a derived series needs their headers");
   std::vector<DicomFileHeader> headers;
   std::vector<DcmDataset*> slices;
@@ -173,7 +192,8 @@ DerivedSeries derive_series(const DicomHeaders& source, const DicomDerivation& d
   series.frame_of_reference_uid = frame_uid(source, derivation);
   series.number = series_number(*slices.front());
   series.description = series_description(*slices.front(), derivation.deformed);
-  series.instance_number = instance_numbers(headers);
+  series.instance_number = instance_numbers(headers, static_cast<std::size_t>(geometry.size.z));
+  series.header = header_slices(headers, geometry);
   series.varying = varying_acquisition(slices);
   series.padding = common_padding(headers);
   return series;

@@ -20,12 +20,14 @@ struct DerivedSeries {
   std::string number, description;                   ///< Series Number and Description
   std::vector<std::string> sop_class, sop_instance;  ///< of the source's slices
   std::vector<int> instance_number;                  ///< of the output's slices, each once
+  std::vector<std::size_t> header;                   ///< of the output's slices, the source's whose header each takes over
   std::set<DcmTagKey> varying;                       ///< see varying_acquisition
   std::optional<PaddingRange> padding;               ///< HU: the source's, where all slices agree and int16 can hold it
 };
 
+/// @param geometry  of the output
 /// @throws InputError for headers without slices
-DerivedSeries derive_series(const DicomHeaders& source, const DicomDerivation& derivation);
+DerivedSeries derive_series(const DicomHeaders& source, const Geometry& geometry, const DicomDerivation& derivation);
 
 /// Puts everything of slice k but Pixel Data and SOP Instance UID into the empty item `target`.
 /// @param sampled  the source slices that it was interpolated from

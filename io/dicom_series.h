@@ -27,10 +27,12 @@ struct DicomSlice {
 struct DicomSeries {
   std::string series_uid, study_uid, frame_of_reference_uid, modality;
   std::vector<DicomSlice> slices;      ///< sorted by position along the normal, row x column
-  Geometry geometry;                   ///< from Image Position and Orientation (Patient) and Pixel Spacing alone; of a
-                                       ///< refused series: size 0, or as far as it is known
+  Geometry geometry;                   ///< from Image Position and Orientation (Patient) and Pixel Spacing alone, sheared
+                                       ///< and uneven as they say; of a refused series: size 0, or as far as it is known
   std::vector<std::string> set_aside;  ///< "FILE: reason", one a file
   std::optional<std::string> refusal;  ///< why the slices are not a volume: what, where, expected and found
+  std::optional<std::string> uneven;   ///< how the slice distances differ; `geometry.slices` has them exactly, for who
+                                       ///< takes such a volume
   std::vector<std::string> warnings;   ///< worth knowing, harmless to the volume
 };
 
@@ -82,8 +84,9 @@ struct DicomWriteReport {
 /// folder `folder`, which exists and is empty. Reads no clock: the same input gives the same bytes and the same UIDs.
 class DerivedSeriesWriter {
  public:
-  /// The source's headers must outlive the writer. @param geometry  of the derived volume, with as many slices as the
-  ///                                                                source
+  /// The source's headers must outlive the writer. Where the derived volume has as many slices as the source, each takes
+  /// over the header of its own; otherwise that of the source slice nearest to it along the stack.
+  /// @param geometry  of the derived volume, straight and even
   /// @throws InputError
   DerivedSeriesWriter(std::filesystem::path folder, const Geometry& geometry, const DicomHeaders& source,
                       DicomDerivation derivation);

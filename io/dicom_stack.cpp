@@ -76,27 +76,49 @@ std::optional<std::string> same_position(const Headers& files, const glm::dvec3&
          ", expected one: " + names + "; keep one phase or acquisition in the folder";
 }
 
-/// Whether slices lie beside the line through the first one along the normal.
-std::optional<std::string> tilt(const Headers& files, const glm::dvec3& normal) {
-  const DicomFileHeader& first = files.front();
-  const DicomFileHeader* worst = nullptr;
-  double worst_ratio = 1, worst_drift = 0, worst_distance = 0;
+/// How far a slice lies beside a line through the first one.
+struct Drift {
+  const DicomFileHeader* slice = nullptr;  ///< the worst one; null: all lie on the line, to rounding
+  double beside_mm = 0, distance_mm = 0;   ///< from the line, and along it from the first slice
+};
+
+/// Rounding of position and orientation explains 0.01 mm and 1e-4 of the distance.
+Drift drift_from(const Headers& files, const glm::dvec3& direction) {
+  Drift worst;
+  double worst_ratio = 1;
   for (const DicomFileHeader& header : files) {
-    const glm::dvec3 step = *header.position - *first.position;
-    const double distance = glm::dot(step, normal);
-    const double drift = glm::length(step - distance * normal);
-    const double ratio = drift / (0.01 + 1e-4 * distance);
+    const glm::dvec3 step = *header.position - *files.front().position;
+    const double distance = glm::dot(step, direction);
+    const double beside = glm::length(step - distance * direction);
+    const double ratio = beside / (0.01 + 1e-4 * distance);
     if (ratio <= worst_ratio) continue;
-    worst = &header;
     worst_ratio = ratio;
-    worst_drift = drift;
-    worst_distance = distance;
+    worst = {&header, beside, distance};
   }
-  if (!worst) return std::nullopt;
-  const double degrees = std::atan2(worst_drift, worst_distance) * 180 / M_PI;
-  return "gantry tilt or shear: slices are not stacked along their normal, " + worst->file.string() + " lies " +
-         number(worst_drift) + " mm beside the line through " + first.file.string() + " at a distance of " +
-         number(worst_distance) + " mm (" + number(degrees) + " degrees), expected 0";
+  return worst;
+}
+
+/// Lets the stack lean as the positions of its slices say: a gantry tilt. @return why they are no stack, if they are none
+std::optional<std::string> lean(const Headers& files, DicomSeries& series) {
+  Geometry& geometry = series.geometry;
+  const glm::dvec3 normal = geometry.direction[2];
+  if (!drift_from(files, normal).slice) return std::nullopt;
+  const glm::dvec3 along = glm::normalize(*files.back().position - *files.front().position);
+  if (const Drift drift = drift_from(files, along); drift.slice) {
+    return "slices are not stacked on one line, " + drift.slice->file.string() + " lies " + number(drift.beside_mm) +
+           " mm beside the line from " + files.front().file.string() + " to " + files.back().file.string() +
+           ", expected 0; choose the slices of one stack";
+  }
+  const double degrees = std::acos(std::min(glm::dot(along, normal), 1.0)) * 180 / M_PI;
+  constexpr double kMost = 60;
+  if (degrees > kMost) {
+    return "slices lie " + number(degrees) + " degrees beside their normal, expected a gantry tilt of less than " +
+           number(kMost) + "; choose the slices of one stack";
+  }
+  series.warnings.push_back("gantry tilt: the stack leans " + number(degrees) +
+                            " degrees from the normal of its slices, which are taken where they lie");
+  geometry.direction[2] = along;
+  return std::nullopt;
 }
 
 /// Last digit written of positions along the normal, mm, at most 0.01.
@@ -207,12 +229,13 @@ std::optional<std::string> stack_slices(Headers& files, DicomSeries& series) {
   if (files.size() == 1) {
     geometry.spacing.z = lone_spacing(first, series);
   } else {
-    geometry.spacing.z = (along(last, normal) - along(first, normal)) / static_cast<double>(files.size() - 1);
-    const auto tilted = tilt(files, normal), uneven = unevenness(files, normal);
-    const std::string straighten = "; resample the series to a straight stack first";
-    if (tilted && uneven) return *tilted + "; also " + *uneven + straighten;
-    if (tilted) return *tilted + straighten;
-    if (uneven) return *uneven + "; add what is missing, or resample the series to even slices first";
+    if (auto crooked = lean(files, series)) return crooked;
+    const double leaning = glm::dot(geometry.direction[2], normal);  // cosine: 1 for a straight stack
+    const double length = (along(last, normal) - along(first, normal)) / leaning;
+    geometry.spacing.z = length / static_cast<double>(files.size() - 1);
+    series.uneven = unevenness(files, normal);
+    for (std::size_t k = 0; series.uneven && k < files.size(); ++k)
+      geometry.slices.push_back((along(files[k], normal) - along(first, normal)) / leaning);
   }
   warn_of_rotation(files, geometry, series);
   return std::nullopt;

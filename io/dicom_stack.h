@@ -21,6 +21,8 @@ glm::dmat3 rotation_of(const std::array<double, 6>& orientation);
 ///   (what round-off of position and orientation makes; a tilt of 0.1 degrees over 20 mm is beyond it);
 /// - no gap differs from the median gap by more than 1e-3 s + q;
 /// - no slice is off its place in the even stack by more than 1e-2 s + q (gaps that drift).
+/// Where the first does not hold, the slices must lie on the line from the first to the last one, which is the third
+/// axis then; where the others do not, `geometry.slices` has the place of each.
 ///
 /// @return why the stack is no volume; none if it is
 std::optional<std::string> stack_slices(std::vector<DicomFileHeader>& files, DicomSeries& series);

@@ -46,10 +46,9 @@ struct DerivedSeriesWriter::State {
 DerivedSeriesWriter::DerivedSeriesWriter(std::filesystem::path folder, const Geometry& geometry,
                                          const DicomHeaders& source, DicomDerivation derivation) {
   prepare_dcmtk();
-  require(source.slices.size() == static_cast<std::size_t>(geometry.size.z),
-          "the volume has " + std::to_string(geometry.size.z) + " slices and the source series " +
-              std::to_string(source.slices.size()) + "; a derived series needs one header a slice");
-  DerivedSeries series = derive_series(source, derivation);
+  require(!is_sheared(geometry) && geometry.slices.empty(),
+          "a derived series is straight and even, the volume is not; resample it onto straightened()");
+  DerivedSeries series = derive_series(source, geometry, derivation);
   state_.reset(new State{std::move(folder), geometry, source, std::move(derivation), std::move(series)});
 }
 DerivedSeriesWriter::~DerivedSeriesWriter() = default;
@@ -64,7 +63,7 @@ void DerivedSeriesWriter::write(const ConstVolumeView& volume, std::int64_t begi
     const std::size_t k = static_cast<std::size_t>(begin) + n;
     const SliceRange range = sampled.empty() ? SliceRange{} : sampled[k];
     DcmDataset slice;
-    const auto added = derive_slice(slice, *to.source.slices[k], to.series, to.derivation, range, to.geometry, k);
+    const auto added = derive_slice(slice, *to.source.slices[to.series.header[k]], to.series, to.derivation, range, to.geometry, k);
     put_hu_format(slice, to.geometry);
     write_dicom_file(to.folder / dicom_file_name(to.series.instance_number[k]), slice, slice_of(volume, k));
     const std::lock_guard lock(to.mutex);

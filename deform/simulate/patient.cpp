@@ -209,6 +209,9 @@ Patient examine(const ConstVolumeView& ct, const ConstVolumeView* labels, std::i
                 const Control& control) {
   require(ct.components == 1, std::to_string(ct.components) + " components a voxel; expected a volume with one");
   const Geometry& volume = *ct.geometry;
+  require(!is_sheared(volume) && volume.slices.empty(),
+          "the volume's slices lean (gantry tilt) or lie at uneven distances; simulations need a straight one: make it "
+          "with `tetwarp deform INPUT -f identity`");
   Patient patient;
   patient.lattice = lattice_over(volume, cell_size);
   const Boxes cells = boxes_of_cells(volume.size, patient.lattice, cell_size),

@@ -88,21 +88,33 @@ TEST(DicomScan, OrientationThatIsNoRotationIsRefused) {
   EXPECT_TRUE(says(refusal_of(folder.path()), {"(0020,0037)", "no rotation", "s00.dcm", "0.1"}));
 }
 
-TEST(DicomScan, MissingSliceIsNamedWithItsNeighbours) {
+/// How the slice distances of a usable series differ; "even" where they do not.
+std::string uneven_of(const fs::path& folder) {
+  const DicomSeries series = only_series(folder);
+  EXPECT_EQ(series.refusal, std::nullopt);
+  EXPECT_EQ(series.uneven.has_value(), !series.geometry.slices.empty());
+  return series.uneven.value_or("even");
+}
+
+TEST(DicomScan, MissingSliceIsNamedWithItsNeighboursAndTheOthersArePlaced) {
   const Scratch folder;
   write_stack(folder.path(), 8);
   fs::remove(folder / "s04.dcm");
-  EXPECT_TRUE(says(refusal_of(folder.path()),
+  EXPECT_TRUE(says(uneven_of(folder.path()),
                    {"slice gap 5 mm between ", "s03.dcm and ", "s05.dcm, 2.5 mm elsewhere", "(1 slice missing)"}));
+  const Geometry geometry = only_series(folder.path()).geometry;
+  EXPECT_EQ(geometry.slices, (std::vector<double>{0, 2.5, 5, 7.5, 12.5, 15, 17.5}));
+  EXPECT_EQ(geometry.spacing.z, 17.5 / 6);
+  require_valid(geometry, "stack");
 }
 
-TEST(DicomScan, UnevenSlicesAreRefusedFromOneThousandthOfTheirDistance) {
+TEST(DicomScan, SlicesAreUnevenFromOneThousandthOfTheirDistance) {
   const Scratch folder;
   for (const auto& [z, is_even] : {std::pair{"35.002", true}, {"35.006", false}, {"35.1", false}}) {
     write_stack(folder.path(), 5, [&](int k, MadeSlice& slice) {
       if (k == 2) set_z(slice, z);
     });
-    EXPECT_EQ(refusal_of(folder.path()) == "accepted", is_even) << z << ": " << refusal_of(folder.path());
+    EXPECT_EQ(uneven_of(folder.path()) == "even", is_even) << z << ": " << uneven_of(folder.path());
   }
 }
 
@@ -110,25 +122,44 @@ TEST(DicomScan, PositionsWrittenWithTwoDecimalsAreEven) {
   const Scratch folder;
   const char* z[] = {"0.00", "0.63", "1.25", "1.88", "2.50", "3.13", "3.75"};
   write_stack(folder.path(), 7, [&](int k, MadeSlice& slice) { set_z(slice, z[k]); });
-  EXPECT_EQ(refusal_of(folder.path()), "accepted");
+  EXPECT_EQ(uneven_of(folder.path()), "even");
 }
 
-TEST(DicomScan, GapsThatDriftWithinToleranceAreRefused) {
+TEST(DicomScan, GapsThatDriftWithinToleranceAreUneven) {
   const Scratch folder;
   write_stack(folder.path(), 60, [&](int k, MadeSlice& slice) {
     set_z(slice, std::to_string(k < 30 ? k * 1.0 : 29 + (k - 29) * 1.0015));
   });
-  EXPECT_TRUE(says(refusal_of(folder.path()), {"slice gap"}));
+  EXPECT_TRUE(says(uneven_of(folder.path()), {"slice gap"}));
   write_stack(folder.path(), 60, [&](int k, MadeSlice& slice) {
     set_z(slice, std::to_string(k < 30 ? k * 1.0 : 29 + (k - 29) * 1.0009));
   });
-  EXPECT_TRUE(says(refusal_of(folder.path()), {"drift", "expected", "found"}));
+  EXPECT_TRUE(says(uneven_of(folder.path()), {"drift", "expected", "found"}));
 }
 
-TEST(DicomScan, GantryTiltIsRefusedWithItsAngle) {
+TEST(DicomScan, GantryTiltLeansTheStackAsPositionsSay) {
   const Scratch folder;
   write_stack(folder.path(), 5, [](int, MadeSlice& slice) { slice.orientation = "1\\0\\0\\0\\0.9483237\\-0.3173047"; });
-  EXPECT_TRUE(says(refusal_of(folder.path()), {"gantry tilt or shear", "18.5 degrees", "s04.dcm"}));
+  const DicomSeries series = only_series(folder.path());
+  EXPECT_EQ(series.refusal, std::nullopt);
+  EXPECT_EQ(series.uneven, std::nullopt);
+  EXPECT_EQ(series.geometry.direction[2], glm::dvec3(0, 0, 1));  // as the table moved, not the normal
+  EXPECT_NEAR(series.geometry.direction[1].y, 0.9483237, 1e-7);
+  EXPECT_NEAR(series.geometry.spacing.z, 2.5, 1e-12);
+  ASSERT_EQ(series.warnings.size(), 1u);
+  EXPECT_TRUE(says(series.warnings[0], {"gantry tilt", "18.5 degrees"}));
+}
+
+TEST(DicomScan, SlicesBesideOneLineAreRefusedByName) {
+  const Scratch folder;
+  write_stack(folder.path(), 5, [](int k, MadeSlice& slice) {
+    if (k == 2) slice.position = "-10\\-19\\35";
+  });
+  EXPECT_TRUE(says(refusal_of(folder.path()), {"not stacked on one line", "s02.dcm", "1 mm beside"}));
+  write_stack(folder.path(), 5, [](int k, MadeSlice& slice) {
+    slice.position = "-10\\" + std::to_string(-20 + 9 * k) + "\\" + std::to_string(30 + 2 * k);
+  });
+  EXPECT_TRUE(says(refusal_of(folder.path()), {"77.47", "degrees beside their normal", "less than 60"}));
 }
 
 TEST(DicomScan, SlicesAtOnePositionAreRefusedByName) {
@@ -265,7 +296,7 @@ TEST(DicomScan, HeaderCutShortIsRefusedNotSkipped) {
 
 TEST(DicomScan, RefusalsNeverHoldTheName) {
   const Scratch folder;
-  write_stack(folder.path(), 4, [](int k, MadeSlice& slice) { set_z(slice, std::to_string(k * k)); });
+  write_stack(folder.path(), 4, [](int, MadeSlice& slice) { set_z(slice, "61.5"); });
   const DicomSeries series = only_series(folder.path());
   ASSERT_TRUE(series.refusal);
   EXPECT_EQ(series.refusal->find("SECRET"), std::string::npos);

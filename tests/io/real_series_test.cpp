@@ -132,17 +132,35 @@ TEST(RealSeries, CtBesideDoseAndStructuresIsTheOneVolume) {
   EXPECT_TRUE(says(scan.skipped[1], {"rtss.dcm", "RTStructureSetStorage"}));
 }
 
-TEST(RealSeries, TiltedSeriesAreRefusedWithTheirAngle) {
+TEST(RealSeries, TiltedSeriesLeanAsTheirPositionsSayWhateverTheSignOfTheirTag) {
   TETWARP_REAL_DATA(philips, "tilt-uniform-philips");
-  EXPECT_TRUE(is_refused(scan_dicom(philips), {"gantry tilt or shear", "18.5 degrees"}));
   TETWARP_REAL_DATA(ge, "tilt-variable-spacing-ge");
-  EXPECT_TRUE(is_refused(scan_dicom(ge), {"gantry tilt or shear", "18.5 degrees", "slice gap", "14 gaps of 27"}));
+  const DicomScan even = scan_dicom(philips), uneven = scan_dicom(ge);
+  ASSERT_EQ(even.series.size(), 1u);
+  ASSERT_EQ(uneven.series.size(), 1u);
+  for (const DicomSeries& series : {even.series[0], uneven.series[0]}) {
+    EXPECT_EQ(series.refusal, std::nullopt);
+    expect_near(series.geometry.direction[2], {0, 0, 1});
+    EXPECT_NEAR(series.geometry.direction[1].z, -0.3173047, 1e-7);
+    ASSERT_EQ(series.warnings.size(), 1u);
+    EXPECT_TRUE(says(series.warnings[0], {"gantry tilt", "18.5 degrees"}));
+  }
+  EXPECT_EQ(even.series[0].uneven, std::nullopt);
+  EXPECT_NEAR(even.series[0].geometry.spacing.z, 2.5, 1e-9);
+  const std::vector<double>& slices = uneven.series[0].geometry.slices;
+  ASSERT_EQ(slices.size(), 28u);
+  EXPECT_NEAR(slices[13], 13 * 4.22, 1e-6);
+  EXPECT_NEAR(slices[14], 13 * 4.22 + 1.14, 1e-6);
+  EXPECT_NEAR(slices[27], 13 * 4.22 + 1.14 + 13 * 7.38, 1e-6);
+  EXPECT_TRUE(says(uneven.series[0].uneven.value_or(""), {"slice gap", "14 gaps of 27"}));
 }
 
-TEST(RealSeries, GapAndEqualPositionsAreRefusedByName) {
+TEST(RealSeries, GapAndEqualPositionsAreNamed) {
   TETWARP_REAL_DATA(folder, "slice-errors");
-  EXPECT_TRUE(is_refused(scan_dicom(folder / "gap"), {"slice gap 10 mm", "IM-0001-0009-0001.dcm",
-                                                      "IM-0001-0010-0001.dcm", "5 mm elsewhere", "1 slice missing"}));
+  const DicomScan gap = scan_dicom(folder / "gap");
+  ASSERT_EQ(gap.series.size(), 1u);
+  EXPECT_TRUE(says(gap.series[0].uneven.value_or(""), {"slice gap 10 mm", "IM-0001-0009-0001.dcm",
+                                                       "IM-0001-0010-0001.dcm", "5 mm elsewhere", "1 slice missing"}));
   EXPECT_TRUE(
       is_refused(scan_dicom(folder / "same-position"), {"4 slices at the same position", "001.dcm", "004.dcm"}));
 }
