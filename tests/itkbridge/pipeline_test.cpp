@@ -233,11 +233,8 @@ TEST(Pipeline, AbortMayComeFromAnotherThread) {
   const Geometry grid = turned_grid({256, 256, 200});
   const auto filter = warp_of(noise_image<ShortImage>(grid), twist_over(grid, 1));
   std::atomic<Clock::time_point> aborted;
-  std::atomic<bool> begun = false;
-  observe<itk::StartEvent>(*filter, [&] { begun = true; });
   std::thread other([&] {
-    while (!begun) std::this_thread::yield();
-    std::this_thread::sleep_for(std::chrono::milliseconds(60));
+    while (filter->GetProgress() == 0) std::this_thread::yield();
     aborted = Clock::now();
     filter->AbortGenerateDataOn();
   });
@@ -354,6 +351,21 @@ TEST(Pipeline, AutoFallsBackToTheCpuWithOneWarningAndCudaByNameThrows) {
   itk::OutputWindow::SetInstance(before);
   ASSERT_EQ(warnings->shown.size(), 1u);
   EXPECT_TRUE(says(warnings->shown[0], {"works on the CPU", "the bits are the same", "CUDA"}));
+}
+
+TEST(Pipeline, AutoFallsBackToTheCpuWhereTheDeviceFails) {
+  if (cuda_device_count() == 0) GTEST_SKIP() << "no CUDA device on this machine";
+  const Geometry grid = turned_grid({12, 11, 10});
+  const auto image = noise_image<ShortImage>(grid);
+  const auto field = twist_over(grid, 3);
+  const auto filter = warp_of(image, field);
+  filter->SetBackend("auto");
+  filter->SetDevice(cuda_device_count());  // is not there
+  filter->Update();
+  EXPECT_EQ(filter->GetUsedBackend(), "cpu");
+  EXPECT_TRUE(same_pixels(*filter->GetOutput(), *resampled_by_core(*image, grid, field->GetView())));
+  filter->SetBackend("cuda");
+  EXPECT_NE(itk_error_of([&] { filter->Update(); }), "");
 }
 
 TEST(Pipeline, CudaGivesTheBitsOfTheCpu) {
