@@ -1,5 +1,7 @@
 #include "deform/resampler.h"
 
+#include "deform/snapped_mesh.h"
+
 namespace tetwarp {
 
 namespace {
@@ -13,6 +15,7 @@ void require_one_each(const Geometry& grid, std::size_t vectors) {
 }  // namespace
 
 FieldView view(const VertexField& field, Outside outside) {
+  require_one_each(field.mesh);
   if (!field.mesh.is_empty() && field.replaced.empty()) return {.outside = outside, .mesh = &field.mesh};
   require_one_each(field.lattice, field.displacement.size());
   if (field.replaced.empty()) return {&field.lattice, field.displacement.data(), outside, Memory::host};

@@ -17,22 +17,6 @@ namespace {
 
 constexpr std::size_t kGrain = 4096;
 
-void check_arrays(const TetrahedralMesh& mesh) {
-  require(!mesh.tetrahedra.empty(), "the mesh has no tetrahedra");
-  require(mesh.rest.size() == mesh.displacement.size(),
-          "the mesh has " + std::to_string(mesh.rest.size()) + " vertices and " +
-              std::to_string(mesh.displacement.size()) + " displacements; expected one for each vertex");
-  require(mesh.tetrahedra.size() < UINT32_MAX,
-          "the mesh has " + std::to_string(mesh.tetrahedra.size()) + " tetrahedra; expected fewer than 4294967295");
-  for (std::size_t n = 0; n < mesh.tetrahedra.size(); ++n) {
-    const glm::u32vec4& t = mesh.tetrahedra[n];
-    const std::uint32_t largest = std::max({t.x, t.y, t.z, t.w});
-    if (largest < mesh.rest.size()) continue;
-    throw InputError("tetrahedron " + std::to_string(n) + " of the mesh has vertex " + std::to_string(largest) +
-                     " of " + std::to_string(mesh.rest.size()) + ", counted from 0");
-  }
-}
-
 [[noreturn]] void refuse(const TetrahedralMesh& mesh, std::size_t vertex) {
   const glm::dvec3& at = mesh.rest[vertex];
   const glm::vec3& by = mesh.displacement[vertex];
@@ -72,8 +56,28 @@ struct Findings {
 
 }  // namespace
 
+void require_one_each(const TetrahedralMesh& mesh) {
+  require(mesh.rest.size() == mesh.displacement.size(),
+          "the mesh has " + std::to_string(mesh.rest.size()) + " vertices and " +
+              std::to_string(mesh.displacement.size()) + " displacements; expected one for each vertex");
+}
+
+void require_fitting_arrays(const TetrahedralMesh& mesh) {
+  require_one_each(mesh);
+  require(mesh.tetrahedra.size() < UINT32_MAX,
+          "the mesh has " + std::to_string(mesh.tetrahedra.size()) + " tetrahedra; expected fewer than 4294967295");
+  for (std::size_t n = 0; n < mesh.tetrahedra.size(); ++n) {
+    const glm::u32vec4& t = mesh.tetrahedra[n];
+    const std::uint32_t largest = std::max({t.x, t.y, t.z, t.w});
+    if (largest < mesh.rest.size()) continue;
+    throw InputError("tetrahedron " + std::to_string(n) + " of the mesh has vertex " + std::to_string(largest) +
+                     " of " + std::to_string(mesh.rest.size()) + ", counted from 0");
+  }
+}
+
 SnappedMesh snap_mesh(const Geometry& output, const TetrahedralMesh& mesh, const Control& control) {
-  check_arrays(mesh);
+  require(!mesh.tetrahedra.empty(), "the mesh has no tetrahedra");
+  require_fitting_arrays(mesh);
   const AffineMap output_from_point = index_from_point(output);
   SnappedMesh snapped;
   snapped.vertices.resize(mesh.rest.size());

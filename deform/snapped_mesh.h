@@ -38,6 +38,11 @@ struct SnappedMesh {
   }
 };
 
+/// @throws InputError unless a mesh has one displacement for each vertex
+void require_one_each(const TetrahedralMesh& mesh);
+/// The same, and for a tetrahedron with a vertex that is not there.
+void require_fitting_arrays(const TetrahedralMesh& mesh);
+
 /// Checks a mesh, snaps its vertices and looks at its tetrahedra, in parallel in the calling task arena.
 /// @throws InputError for a mesh that is empty or whose arrays do not fit together, or the first vertex that is not
 /// finite or too far away; Cancelled

@@ -4,6 +4,7 @@
 
 #include "deform/core/five_tetrahedra.h"
 #include "deform/errors.h"
+#include "deform/snapped_mesh.h"
 
 namespace tetwarp {
 
@@ -33,6 +34,7 @@ void append(const TetrahedralMesh& added, const Geometry& lattice, TetrahedralMe
 }  // namespace
 
 TetrahedralMesh mesh_of(const FieldView& field) {
+  if (field.mesh) require_fitting_arrays(*field.mesh);
   if (field.mesh && field.replaced.empty()) return *field.mesh;
   require(field.memory == Memory::host, "a mesh is made of a field in host memory");
   const Geometry& lattice = *field.lattice;

@@ -2,6 +2,7 @@
 
 #include <limits>
 
+#include "deform/fields/lattice_mesh.h"
 #include "tests/support/backends.h"
 #include "tests/support/shifted.h"
 
@@ -77,6 +78,20 @@ TEST_P(Refusals, LatticesWithoutCellsOrWithoutTheirVertices) {
   far.origin = glm::dvec3(1e9, 0, 0);
   const VertexField away = uniform_field(far, glm::vec3(0));
   expect_refused("lattice", [&] { resampler->set_field(view(away, Outside::background)); });
+}
+
+TEST(MeshOfAField, ArraysThatDoNotFitAreRefusedBeforeTheyAreRead) {
+  VertexField field = uniform_field(unit_grid({4, 4, 4}), glm::vec3(0));
+  field.mesh = {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, std::vector<glm::vec3>(4), {{0, 1, 2, 3}}};
+  for (const bool takes_a_place : {false, true}) {
+    if (takes_a_place) field.replaced = {3};
+    VertexField few = field, beyond = field;
+    few.mesh.displacement.pop_back();
+    expect_refused("3 displacements", [&] { view(few); });
+    beyond.mesh.tetrahedra.back().z = 4;
+    expect_refused("vertex 4 of 4", [&] { mesh_of(beyond); });
+    EXPECT_NO_THROW(mesh_of(field));
+  }
 }
 
 TEST_P(Refusals, CallsWithoutAField) {
