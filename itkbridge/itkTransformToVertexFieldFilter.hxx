@@ -47,10 +47,11 @@ void TransformToVertexFieldFilter<TParametersValueType>::GenerateData() {
     const auto moved = transform->TransformPoint(point);
     return glm::dvec3(moved[0], moved[1], moved[2]) - rest;
   };
+  tetwarp::VertexField field;
   tetwarp::run_for(*this, {}, [&](const tetwarp::Control& control) {
-    this->GetOutput()->SetField(
-        tetwarp::sample_on(this->GetLattice(), map, {.threads = tetwarp::threads_of(*this)}, control));
+    field = tetwarp::sample_on(this->GetLattice(), map, {.threads = tetwarp::threads_of(*this)}, control);
   });
+  this->GetOutput()->SetField(std::move(field));
 }
 
 template <typename TParametersValueType>

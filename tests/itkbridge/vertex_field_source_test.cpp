@@ -7,7 +7,9 @@
 #include <itkVectorImage.h>
 
 #include <glm/geometric.hpp>
+#include <set>
 #include <sstream>
+#include <thread>
 
 #include "deform/fields/lattice_mesh.h"
 #include "io/field_file.h"
@@ -131,6 +133,15 @@ TEST(TransformToVertexField, SeesThatTheTransformWasChanged) {
   transform->Translate(itk_vector<double>({1, 0, 0}));
   source->Update();
   EXPECT_NEAR(source->GetOutput()->GetView().displacement[0].x - first.x, 1, 1e-5);
+}
+
+TEST(TransformToVertexField, ObserversOfTheFieldRunInTheThreadThatUpdates) {
+  const auto source = over_volume(*affine(), 4);
+  std::set<std::thread::id> threads;
+  source->GetOutput()->AddObserver(itk::ModifiedEvent(),
+                                   [&](const itk::EventObject&) { threads.insert(std::this_thread::get_id()); });
+  source->Update();
+  EXPECT_EQ(threads, std::set{std::this_thread::get_id()});
 }
 
 TEST(TransformToVertexField, WithoutALatticeItIsRefused) {
