@@ -52,6 +52,13 @@ void VertexFieldTransform::ComputeJacobianWithRespectToParameters(const InputPoi
   itkExceptionMacro(<< "a vertex field has no parameters to optimise");
 }
 
+LightObject::Pointer VertexFieldTransform::InternalClone() const {
+  const Pointer clone = New();
+  clone->m_Owner = m_Owner;
+  clone->m_Mover = m_Mover;
+  return clone.GetPointer();
+}
+
 void VertexFieldTransform::PrintSelf(std::ostream& os, Indent indent) const {
   Superclass::PrintSelf(os, indent);
   os << indent << "VertexField: " << (m_Mover ? "set" : "(none)") << std::endl;

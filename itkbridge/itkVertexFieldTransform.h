@@ -58,6 +58,8 @@ class VertexFieldTransform : public Transform<double, 3, 3> {
   VertexFieldTransform() : Superclass(0) {}
   ~VertexFieldTransform() override = default;
 
+  /** A clone shares the field. */
+  LightObject::Pointer InternalClone() const override;
   void PrintSelf(std::ostream& os, Indent indent) const override;
 
  private:

@@ -290,16 +290,20 @@ TEST(VertexFieldTransform, MovesPointsAsTheCoreDoesBitForBit) {
   }
 }
 
-TEST(VertexFieldTransform, WorksInACompositeTransform) {
+TEST(VertexFieldTransform, WorksInACompositeTransformAndItsClone) {
   const auto transform = transform_of(shaken(volume_grid(), 3));
   const auto shift = itk::TranslationTransform<double, 3>::New();
   shift->Translate(itk_vector<double>({30, -20, 10}));
   const auto both = itk::CompositeTransform<double, 3>::New();
   both->AddTransform(shift);
   both->AddTransform(transform);  // what is added last is applied first
+  const auto clone = both->Clone();
+  transform->SetVertexField(itk_field(uniform_field(volume_grid(), glm::vec3(0))), grid_image(volume_grid()));
+  const auto unchanged = transform_of(shaken(volume_grid(), 3));
   for (const glm::dvec3& point : points_around(volume_grid())) {
-    const glm::dvec3 shifted = glm_of(transform->TransformPoint(itk_point(point))) + glm::dvec3(30, -20, 10);
-    ASSERT_EQ(glm_of(both->TransformPoint(itk_point(point))), shifted);
+    const glm::dvec3 shifted = glm_of(unchanged->TransformPoint(itk_point(point))) + glm::dvec3(30, -20, 10);
+    ASSERT_EQ(glm_of(clone->TransformPoint(itk_point(point))), shifted);
+    ASSERT_LT(glm::distance(glm_of(both->TransformPoint(itk_point(point))), point + glm::dvec3(30, -20, 10)), 1e-12);
   }
 }
 
