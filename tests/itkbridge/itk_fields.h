@@ -11,6 +11,7 @@
 
 #include "itkbridge/image_geometry.h"
 #include "itkbridge/itkVertexField.h"
+#include "tests/support/fields.h"
 
 namespace tetwarp::test {
 
@@ -89,6 +90,16 @@ inline itk::VertexField::Pointer itk_field(VertexField field) {
   const auto result = itk::VertexField::New();
   result->SetField(std::move(field));
   return result;
+}
+
+/// A field over a volume whose vertices are thrown about by up to a third of a cell; at the border, too, so some voxels
+/// there get nothing.
+inline VertexField shaken(const Geometry& volume, std::int64_t cell_size, std::uint64_t seed = 1) {
+  Random random(seed);
+  const double most = 0.3 * static_cast<double>(cell_size);
+  return field_in_voxels(volume, lattice_over(volume, cell_size), [&](const glm::dvec3&) {
+    return glm::dvec3(random.real(-most, most), random.real(-most, most), random.real(-most, most));
+  });
 }
 
 /// What an `itk::ExceptionObject` says that `action` throws; otherwise a text that says so.

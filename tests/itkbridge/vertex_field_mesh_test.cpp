@@ -15,7 +15,6 @@
 #include "itkbridge/itkVertexFieldToMeshFilter.h"
 #include "itkbridge/itkVertexFieldTransform.h"
 #include "tests/itkbridge/itk_fields.h"
-#include "tests/support/fields.h"
 #include "tests/support/run.h"
 #include "tests/support/says.h"
 
@@ -32,15 +31,6 @@ using FromMesh = itk::MeshToVertexFieldFilter<Mesh>;
 using ToMesh = itk::VertexFieldToMeshFilter<Mesh>;
 
 Geometry volume_grid() { return oblique_grid({14, 12, 10}); }
-
-/// Vertices thrown about by up to a third of a cell.
-VertexField shaken(const Geometry& volume, std::int64_t cell_size, std::uint64_t seed = 1) {
-  Random random(seed);
-  const double most = 0.3 * static_cast<double>(cell_size);
-  return field_in_voxels(volume, lattice_over(volume, cell_size), [&](const glm::dvec3&) {
-    return glm::dvec3(random.real(-most, most), random.real(-most, most), random.real(-most, most));
-  });
-}
 
 itk::IdentifierType point_id(std::size_t n) { return 40 + 7 * n; }
 

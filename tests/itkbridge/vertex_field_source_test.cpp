@@ -18,7 +18,6 @@
 #include "itkbridge/itkTransformToVertexFieldFilter.h"
 #include "itkbridge/itkVertexFieldToDisplacementFieldFilter.h"
 #include "tests/itkbridge/itk_fields.h"
-#include "tests/support/fields.h"
 #include "tests/support/program.h"
 #include "tests/support/run.h"
 #include "tests/support/says.h"
