@@ -1,9 +1,6 @@
 // Exact inverses of forward fields, beside the core, the program, ITK's own inverter and ITK's resampler.
 #include <gtest/gtest.h>
-#include <itkCastImageFilter.h>
-#include <itkDisplacementFieldTransform.h>
 #include <itkInvertDisplacementFieldImageFilter.h>
-#include <itkResampleImageFilter.h>
 
 #include <cmath>
 #include <glm/common.hpp>
@@ -16,7 +13,7 @@
 #include "itkbridge/itkVertexFieldResampleImageFilter.h"
 #include "itkbridge/itkVertexFieldToInverseDisplacementFieldFilter.h"
 #include "itkbridge/itkVertexFieldTransform.h"
-#include "tests/itkbridge/itk_fields.h"
+#include "tests/itkbridge/itk_resampler.h"
 #include "tests/support/program.h"
 #include "tests/support/run.h"
 #include "tests/support/scratch.h"
@@ -248,23 +245,7 @@ TEST(InverseDisplacementField, OutsideTheLatticeItIsZeroWithRestAndNanWithBackgr
 
 constexpr float kNothing = -7777;  // of voxels that come from nowhere
 
-/// An image through ITK's own resampler by a displacement field, output to input.
-std::vector<float> resampled_by_itk(const FloatImage& image, const FieldImage& inverse) {
-  const auto doubles = itk::CastImageFilter<FieldImage, DoubleFieldImage>::New();
-  doubles->SetInput(&inverse);
-  doubles->Update();
-  const auto transform = itk::DisplacementFieldTransform<double, 3>::New();
-  transform->SetDisplacementField(doubles->GetOutput());
-  const auto resample = itk::ResampleImageFilter<FloatImage, FloatImage>::New();
-  resample->SetInput(&image);
-  resample->SetTransform(transform);
-  resample->SetOutputParametersFromImage(&image);
-  resample->SetDefaultPixelValue(kNothing);
-  resample->Update();
-  return pixels_of(*resample->GetOutput());
-}
-
-/// The same by the forward field that the inverse is of.
+/// An image by a forward field.
 std::vector<float> resampled_by_us(const FloatImage& image, const VertexField& field) {
   const auto resample = itk::VertexFieldResampleImageFilter<FloatImage>::New();
   resample->SetInput(&image);
@@ -294,7 +275,7 @@ TEST(InverseDisplacementField, InItksResamplerGivesWhatVertexFieldResampleGives)
   std::vector<glm::vec3> filled = by;
   std::ranges::replace_if(filled, is_nan, glm::vec3(1e5f));
   const std::vector<float> a = resampled_by_us(*image, field);
-  const std::vector<float> b = resampled_by_itk(*image, *field_image(grid, filled, kFarStart));
+  const std::vector<float> b = resampled_by_itk(*image, *field_image<double>(grid, filled, kFarStart), kNothing);
   const double tolerance = 3 * 2000 * std::ldexp(1, -20) + 1000 * std::ldexp(1, -21);
   const AffineMap place = point_from_index(grid), index = index_from_point(grid);
   std::size_t compared = 0, outside = 0;
@@ -324,7 +305,8 @@ TEST(InverseDisplacementField, ItkLosesVoxelsBesideNanAndNoOthers) {
   const auto image = noise(grid);
   const auto inverse = inverse_by_filter(*image, field);
   const std::vector<glm::vec3> by = pixels_of(*inverse);
-  const std::vector<float> a = resampled_by_us(*image, field), b = resampled_by_itk(*image, *inverse);
+  const std::vector<float> a = resampled_by_us(*image, field),
+                           b = resampled_by_itk(*image, *field_image<double>(grid, by, kFarStart), kNothing);
   std::size_t lost = 0;
   for_each_voxel(grid, [&](const glm::i64vec3& voxel, std::size_t n) {
     ASSERT_TRUE(b[n] == kNothing || !is_nan(by[n])) << "to ITK a NaN is a place outside";
