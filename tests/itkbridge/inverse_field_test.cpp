@@ -72,6 +72,19 @@ TEST(ExactInvert, IsTheCoresBitForBitOnItsOwnGridAndAnother) {
   EXPECT_TRUE(same_bits(expected, pixels_of(*of_doubles->GetOutput())));
 }
 
+TEST(ExactInvert, SeesThatItsInputWasChanged) {
+  const VertexField field = shaken(volume_grid(), 4, 1), other = shaken(volume_grid(), 4, 2);
+  const auto image = field_image(field.lattice, field.displacement);
+  const auto exact = ExactInvert::New();
+  exact->SetInput(image);
+  exact->Update();
+  for (std::size_t n = 0; n < other.displacement.size(); ++n)
+    image->GetBufferPointer()[n] = itk_vector<float>(other.displacement[n]);
+  image->Modified();
+  exact->Update();
+  EXPECT_TRUE(same_bits(inverse_by_core(other.lattice, other), pixels_of(*exact->GetOutput())));
+}
+
 TEST(ExactInvert, KeepsTheStartIndexOfItsInput) {
   const VertexField field = shaken(volume_grid(), 1);
   const auto image = field_image(field.lattice, field.displacement, kFarStart);

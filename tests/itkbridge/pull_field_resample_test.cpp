@@ -240,17 +240,18 @@ TEST(PullFieldResample, VectorsOfDoublesAreRoundedToFloat) {
   EXPECT_TRUE(same_bits(expected, resampled_by_us(*image, *doubles)));
 }
 
+/// Of doubles: a copy of them was made.
 TEST(PullFieldResample, SeesThatTheFieldWasChanged) {
   const auto image = volume(volume_grid());
   const std::vector<glm::vec3> vectors = smooth_vectors(field_grid(), 8), others = smooth_vectors(field_grid(), 9);
-  const auto field = field_image(field_grid(), vectors);
-  const auto filter = PullResample<>::New();
+  const auto field = field_image<double>(field_grid(), vectors);
+  const auto filter = PullResample<FloatImage, DoubleFieldImage>::New();
   filter->SetInput(image);
   filter->SetDisplacementField(field);
   filter->SetDefaultPixelValue(kNothing);
   filter->Update();
   EXPECT_TRUE(same_bits(resampled_by_us(*image, *field_image(field_grid(), vectors)), pixels_of(*filter->GetOutput())));
-  for (std::size_t n = 0; n < others.size(); ++n) field->GetBufferPointer()[n] = itk_vector<float>(others[n]);
+  for (std::size_t n = 0; n < others.size(); ++n) field->GetBufferPointer()[n] = itk_vector<double>(others[n]);
   field->Modified();
   filter->Update();
   EXPECT_TRUE(same_bits(resampled_by_us(*image, *field_image(field_grid(), others)), pixels_of(*filter->GetOutput())));

@@ -277,6 +277,26 @@ TEST(DisplacementFieldToVertexField, OutlivesAnImageThatReleasesItsData) {
   EXPECT_TRUE(same_bits(expected, {again.displacement, again.displacement + expected.size()}));
 }
 
+/// The image's own filter writes into the same buffer again, or lets go of it; not of an image that was disconnected.
+TEST(DisplacementFieldToVertexField, KeepsTheFieldOfADisconnectedImage) {
+  const auto transform = affine();
+  const auto sampled = over_volume(*transform, 4);
+  const auto made = ToImage::New();
+  made->SetVertexField(sampled->GetOutput());
+  made->Update();
+  const itk::SmartPointer<FieldImage> image = made->GetOutput();
+  image->DisconnectPipeline();
+  const auto source = FromImage::New();
+  source->SetInput(image);
+  source->Update();
+  const std::vector<glm::vec3> expected = pixels_of(*image);
+  transform->Translate(itk_vector<double>({1, 2, 3}));
+  made->Update();
+  EXPECT_NE(made->GetOutput()->GetBufferPointer()[0], image->GetBufferPointer()[0]);
+  const FieldView view = source->GetOutput()->GetView();
+  EXPECT_TRUE(same_bits(expected, {view.displacement, view.displacement + expected.size()}));
+}
+
 TEST(VertexFieldToDisplacementField, RoundTripKeepsEveryBit) {
   const VertexField field{volume_grid(), random_vectors(volume_grid(), 4)};
   const auto image = ToImage::New();
