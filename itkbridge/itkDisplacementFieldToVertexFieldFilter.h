@@ -12,7 +12,10 @@ namespace itk {
  * That is what simulations write. The displacement field of a registration says the opposite, where an output point
  * comes from: give it to `PullFieldResampleImageFilter` as it is.
  *
- * An image of `Vector<float, 3>` is used in place (its pixel container is kept); other component types are converted.
+ * An image of `Vector<float, 3>` is used in place (its pixel container is kept, also when the image releases it); other
+ * component types are converted. What makes the image may write into the same container when it runs again: the field
+ * changes then. Filters of a pipeline see that; who keeps the field longer (`VertexFieldTransform`, a graft)
+ * disconnects the image first (`DisconnectPipeline`).
  *
  * \code
  * auto source = itk::DisplacementFieldToVertexFieldFilter<FieldType>::New();

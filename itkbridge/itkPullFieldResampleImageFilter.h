@@ -8,10 +8,15 @@ namespace itk {
 /** \class PullFieldResampleImageFilter
  * \brief Deforms an image by a displacement field that maps output to input, as registration gives it.
  *
- * What lies at output point p comes from p + d(p), d linear between the pixels of the displacement field: inside the
- * field's box this is what `ResampleImageFilter` does with a `DisplacementFieldTransform`, to float rounding. Outside
- * that box ITK takes d to be zero; here `SetOutside` says what to do, and refusing is the default. A NaN in the field
- * says that there is no input point.
+ * What lies at output point p comes from p + d(p), d linear between the pixels of the displacement field: between the
+ * outermost of them this is what `ResampleImageFilter` does with a `DisplacementFieldTransform`. Tetwarp rounds each
+ * vector to 2^-12 voxel of the output, so its places are off by up to 2^-13 voxel an axis; of vectors that are whole
+ * multiples of that, the values agree to float rounding.
+ *
+ * ITK goes on for half a pixel of the field beyond the outermost ones, with their vectors; further out it takes d to be
+ * zero. Here nothing is assumed beyond them: `SetOutside` says what to do, and refusing is the default. With `rest`, d
+ * is zero there, from the outermost pixels on. A NaN in the field says that there is no input point, as it does to ITK;
+ * but a voxel within 2^-12 of the way from a pixel that has a vector does without a neighbour that has none.
  *
  * \code
  * auto warp = itk::PullFieldResampleImageFilter<ImageType, FieldType>::New();

@@ -15,10 +15,10 @@ namespace itk {
  * \brief The displacements of a lattice's vertices as an image: a *forward* field, deformed minus undeformed point, LPS
  * mm.
  *
- * What ITK's `WarpImageFilter` and `DisplacementFieldTransform` take is the inverse:
- * `VertexFieldToInverseDisplacementField Filter` makes that. The image has a pixel for each vertex. The field is
- * brought up to date when the pipeline asks for information, for its lattice is the image's grid. Throws for a field in
- * device memory, and for one with a mesh.
+ * What ITK's `WarpImageFilter` and `DisplacementFieldTransform` take is the inverse, which
+ * `VertexFieldToInverseDisplacementFieldFilter` makes. The image has a pixel for each vertex. The field is brought up
+ * to date when the pipeline asks for information, for its lattice is the image's grid. Throws for a field in device
+ * memory, and for one with a mesh.
  *
  * \code
  * auto image = itk::VertexFieldToDisplacementFieldFilter<>::New();

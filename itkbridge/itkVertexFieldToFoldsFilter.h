@@ -7,8 +7,8 @@ namespace itk {
 /** \class VertexFieldToFoldsFilter
  * \brief How many tetrahedra of a forward field own each voxel.
  *
- * 1 nearly everywhere; 0 where nothing comes to lie, so in opened cuts and outside the deformed lattice; more than 1
- * where the field folds. It saturates at 65535.
+ * 1 nearly everywhere; 0 where no tetrahedron comes to lie, so in opened cuts and outside the deformed lattice, also
+ * where `SetOutside` lets voxels rest; more than 1 where the field folds. It saturates at 65535.
  *
  * \code
  * auto folds = itk::VertexFieldToFoldsFilter<>::New();

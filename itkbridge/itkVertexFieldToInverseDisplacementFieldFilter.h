@@ -9,8 +9,15 @@ namespace itk {
 /** \class VertexFieldToInverseDisplacementFieldFilter
  * \brief The exact inverse of a forward field, as a displacement field of ITK: undeformed minus deformed point, LPS mm.
  *
- * Exact at each voxel centre: the owner's affine map is inverted, nothing is iterated. `DisplacementFieldTransform` and
- * `WarpImageFilter` take it. It is NaN where no tetrahedron owns the voxel, so where there is no inverse.
+ * Exact at each voxel centre, for vertices rounded to 2^-12 voxel: the owner's affine map is inverted, nothing is
+ * iterated. It is NaN where no tetrahedron owns the voxel, so where there is no inverse; with `Outside::rest` it is
+ * zero where a voxel beyond the lattice or mesh stays where it is. Where the field folds, the tetrahedron of the lowest
+ * number is inverted.
+ *
+ * `WarpImageFilter` and a `DisplacementFieldTransform` of floats take it; one of doubles, which `ResampleImageFilter`
+ * wants unless told otherwise, takes it through a `CastImageFilter`. To ITK a NaN is a place outside the image, but it
+ * also loses voxels beside one, where rounding gives that a weight of 1e-15: fill NaN with a place far away first.
+ * `PullFieldResampleImageFilter` takes it as it is.
  *
  * \code
  * auto inverse = itk::VertexFieldToInverseDisplacementFieldFilter<>::New();

@@ -15,6 +15,10 @@ namespace itk {
  * ITK takes some hundred bytes for each tetrahedron: this is for looking at a coarse field, not for one with a vertex
  * on every voxel.
  *
+ * A mesh whose coordinates are doubles (`DefaultDynamicMeshTraits<Vector<float, 3>, 3, 3, double>`) says the field
+ * again, bit for bit, through `MeshToVertexFieldFilter`. ITK's default are floats: of a grid whose numbers are not
+ * round, some vertices come to lie 2^-12 voxel aside then.
+ *
  * \code
  * auto mesh = itk::VertexFieldToMeshFilter<>::New();
  * mesh->SetVertexField(field);

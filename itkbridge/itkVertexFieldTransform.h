@@ -36,7 +36,7 @@ class VertexFieldTransform : public Transform<double, 3, 3> {
   itkNewMacro(Self);
   itkTypeMacro(VertexFieldTransform, Transform);
 
-  /** Takes the field as it is now, which must be up to date: it is not updated when points are moved.
+  /** Takes the field as it is now, which must be up to date: it is not updated when points are moved. Clones share it.
    * @param grid  image that volumes are resampled onto: vertices are snapped to 2^-12 of its voxels, as for them
    * Throws ExceptionObject for a field that a resampler refuses. */
   void SetVertexField(const VertexField* field, const ImageBase<3>* grid);
