@@ -58,7 +58,8 @@ TEST(BenchInput, ARawFileOfAnotherSizeIsRefusedWithBothSizes) {
 
 TEST(BenchInput, OnlyInt16IsTaken) {
   const Scratch scratch;
-  Volume<float> volume{{.size = {4, 3, 2}}, std::vector<float>(24)};
+  const Geometry grid{.size = {4, 3, 2}};
+  Volume<float> volume{grid, std::vector<float>(24)};
   volume.voxels[5] = 7;
   write_image(scratch / "float.mha", view(volume));
   InputOptions options;

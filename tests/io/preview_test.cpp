@@ -294,7 +294,8 @@ TEST(Preview, RefusesVolumesOnOtherGridsAndVectors) {
 
 TEST(Preview, FailureToWriteNamesThePath) {
   const Scratch scratch;
-  const Volume<std::uint8_t> volume{{.size = {4, 4, 4}}, std::vector<std::uint8_t>(64)};
+  const Geometry grid{.size = {4, 4, 4}};
+  const Volume<std::uint8_t> volume{grid, std::vector<std::uint8_t>(64)};
   const std::filesystem::path path = scratch / "no such folder" / "p.png";
   try {
     write_preview(path, view(volume), view(volume), "");

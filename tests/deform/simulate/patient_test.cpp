@@ -33,7 +33,9 @@ TEST(Patient, ALatticeThatOverhangsHasAMeanOfWhatThereIsAtEveryVertex) {
 }
 
 TEST(Patient, PaddingAndNoNumbersCountAsAir) {
-  Volume<float> ct{{.size = {2, 2, 2}}, {-3024, std::nanf(""), -1024, -1024, -1024, -1024, -1024, -1024}};
+  Geometry grid;
+  grid.size = {2, 2, 2};
+  Volume<float> ct{grid, {-3024, std::nanf(""), -1024, -1024, -1024, -1024, -1024, -1024}};
   EXPECT_EQ(examine(view(ct), nullptr, 1, -400).cell_hu[0], -1024);
 }
 
