@@ -69,8 +69,8 @@ TEST(BenchInput, OnlyInt16IsTaken) {
 
 TEST(BenchInput, AnImagesOwnSpacingIsTakenAsOne) {
   const Scratch scratch;
-  Volume<std::int16_t> volume{{.size = {4, 3, 2}, .spacing = {0.5, 0.7, 3}, .origin = {1, 2, 3}},
-                              std::vector<std::int16_t>(24, -5)};
+  const Geometry grid{.size = {4, 3, 2}, .spacing = {0.5, 0.7, 3}, .origin = {1, 2, 3}};
+  Volume<std::int16_t> volume{grid, std::vector<std::int16_t>(24)};
   volume.voxels[7] = 9;
   write_image(scratch / "image.mha", view(volume));
   InputOptions options;
