@@ -70,7 +70,7 @@ TEST(BenchInput, OnlyInt16IsTaken) {
 TEST(BenchInput, AnImagesOwnSpacingIsTakenAsOne) {
   const Scratch scratch;
   const Geometry grid{.size = {4, 3, 2}, .spacing = {0.5, 0.7, 3}, .origin = {1, 2, 3}};
-  Volume<std::int16_t> volume{grid, std::vector<std::int16_t>(24)};
+  Volume<std::int16_t> volume{grid, std::vector<std::int16_t>(24, -5)};
   volume.voxels[7] = 9;
   write_image(scratch / "image.mha", view(volume));
   InputOptions options;

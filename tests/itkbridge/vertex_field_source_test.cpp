@@ -135,8 +135,8 @@ TEST(TransformToVertexField, SeesThatTheTransformWasChanged) {
 }
 
 TEST(TransformToVertexField, ObserversOfTheFieldRunInTheThreadThatUpdates) {
+  std::set<std::thread::id> threads;  // outlives the source, whose end is an event too
   const auto source = over_volume(*affine(), 4);
-  std::set<std::thread::id> threads;
   source->GetOutput()->AddObserver(itk::ModifiedEvent(),
                                    [&](const itk::EventObject&) { threads.insert(std::this_thread::get_id()); });
   source->Update();
