@@ -1,13 +1,17 @@
-# tetwarp_library(NAME SOURCES ...): the library target tetwarp_NAME, alias tetwarp::NAME.
+# tetwarp_library(NAME SOURCES ... HEADERS ...): the library target tetwarp_NAME, alias tetwarp::NAME, and the component
+# NAME of the package (TetwarpPackage.cmake). HEADERS: what its users include, and what these headers include; they are
+# installed.
 #
 # The flags that bits depend on are the target's own, so that every build type and every user has them: no fused
 # multiply-add unless the source spells it.
 function(tetwarp_library name)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;HEADERS")
   add_library(tetwarp_${name} STATIC ${arg_SOURCES})
   add_library(tetwarp::${name} ALIAS tetwarp_${name})
+  target_sources(tetwarp_${name} PUBLIC FILE_SET HEADERS BASE_DIRS "${PROJECT_SOURCE_DIR}" FILES ${arg_HEADERS})
   tetwarp_configure(tetwarp_${name})
-  set_target_properties(tetwarp_${name} PROPERTIES EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
+  set_target_properties(tetwarp_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  tetwarp_install_library(${name})
 endfunction()
 
 # tetwarp_module(NAME SOURCES ...): libtetwarp_NAME.so, which io/module.h loads when it is needed. It is built with
