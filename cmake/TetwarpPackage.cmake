@@ -16,7 +16,7 @@ endfunction()
 # tetwarp_install_package(): what find_package() reads first; after all libraries.
 function(tetwarp_install_package)
   set(tetwarp_itk_package "")
-  if(TETWARP_WITH_ITK)
+  if(TETWARP_WITH_ITK AND NOT TETWARP_ITK_MODULE)  # a module is found by ITK, and does not find ITK itself
     include("${PROJECT_SOURCE_DIR}/itkbridge/itk_modules.cmake")
     list(JOIN tetwarp_itk_modules " " modules)
     set(tetwarp_itk_package "ITK ${tetwarp_itk_version} COMPONENTS ${modules}")

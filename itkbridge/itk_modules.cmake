@@ -1,2 +1,3 @@
-# The modules of ITK that tetwarp::itkbridge is built on. One list for itkbridge/CMakeLists.txt and for the package.
+# The modules of ITK that tetwarp::itkbridge is built on. One list for itkbridge/CMakeLists.txt, for the package, and for
+# itk-module.cmake.
 set(tetwarp_itk_modules ITKCommon ITKIOImageBase ITKIOMeta ITKIONIFTI ITKIONRRD ITKMesh ITKTransform)
