@@ -1,6 +1,7 @@
 #include "itkbridge/pipeline_resampler.h"
 
 #include <atomic>
+#include <utility>
 
 #include "cuda/devices.h"
 
@@ -26,11 +27,20 @@ bool PipelineResampler::holds(const Geometry& output, const HeldField& field, co
   return backend_.resampler && output_ == output && options_ == options && is_same(field_, field);
 }
 
+bool PipelineResampler::takes(const Geometry& output, const HeldField& field, const PipelineOptions& options) const {
+  return backend_.resampler && output_ == output && options_ == options && field_.view.index() == field.view.index() &&
+         backend_.name == (means_cuda(options.backend) ? "cuda" : "cpu");
+}
+
 void PipelineResampler::make(const std::string& wanted, const Control& control) {
   const Direction direction = std::holds_alternative<FieldView>(field_.view) ? Direction::forward : Direction::pull;
   backend_.resampler.reset();  // before another takes memory
   backend_ = make_backend(wanted, direction, output_, options_.device,
                           {.threads = options_.threads, .memory = options_.device_memory});
+  give_field(control);
+}
+
+void PipelineResampler::give_field(const Control& control) {
   std::visit([&](const auto& view) { backend_.resampler->set_field(view, control); }, field_.view);
 }
 
@@ -43,16 +53,19 @@ void PipelineResampler::fall_back(const itk::ProcessObject& filter, const Contro
 bool PipelineResampler::set_field(itk::ProcessObject& filter, const Geometry& output, const HeldField& field,
                                   const PipelineOptions& options, ProgressShare share) {
   if (holds(output, field, options)) return false;
-  backend_ = {};
+  if (!takes(output, field, options)) backend_ = {};
+  const HeldField before = std::exchange(field_, field);  // kept while the resampler still looks at it
   output_ = output;
-  field_ = field;
   options_ = options;
   if (options.backend == "auto" && !means_cuda("auto"))
     warn_of_fallback(filter, has_cuda() ? "no CUDA device works on this machine" : "CUDA is not in this build");
   try {
     run_for(filter, share, [&](const Control& control) {
       try {
-        make(options.backend, control);
+        if (backend_.resampler)
+          give_field(control);
+        else
+          make(options.backend, control);
       } catch (const DeviceError& error) {
         fall_back(filter, control, error);
       }

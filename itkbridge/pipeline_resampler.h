@@ -27,8 +27,9 @@ struct PipelineOptions {
 };
 
 /// The resampler of a filter. It keeps the field that it was given, so that regions and images that come later need not
-/// prepare it again. With `auto` the CPU takes over where CUDA is missing or fails, with the same bits; the process
-/// warns of that once.
+/// prepare it again; and the next field of the same direction, output and options goes into what memory the one before
+/// took. With `auto` the CPU takes over where CUDA is missing or fails, with the same bits; the process warns of that
+/// once.
 class PipelineResampler {
  public:
   /// Makes the resampler and gives it the field, unless it has it already.
@@ -49,7 +50,10 @@ class PipelineResampler {
 
  private:
   bool holds(const Geometry& output, const HeldField& field, const PipelineOptions& options) const;
+  /// Whether the resampler at hand can take the field, and is not the one that stands in for a device that failed.
+  bool takes(const Geometry& output, const HeldField& field, const PipelineOptions& options) const;
   void make(const std::string& wanted, const Control& control);
+  void give_field(const Control& control);
   /// In the handler of an error of the device: the CPU takes the field, or the error goes on if CUDA was asked for.
   void fall_back(const itk::ProcessObject& filter, const Control& control, const DeviceError& error);
 
