@@ -1,5 +1,7 @@
 #include "itkbridge/image_geometry.h"
 
+#include "deform/errors.h"
+
 namespace tetwarp {
 
 Geometry geometry_of(const itk::ImageBase<3>& image) {
@@ -19,6 +21,9 @@ Geometry geometry_of(const itk::ImageBase<3>& image) {
 }
 
 void set_geometry(itk::ImageBase<3>& image, const Geometry& geometry, const itk::Index<3>& start) {
+  require(
+      geometry.slices.empty(),
+      "an image of ITK cannot have slices that are unevenly far apart; resample the volume onto straightened() first");
   itk::ImageRegion<3> whole;
   whole.SetIndex(start);
   itk::ImageBase<3>::SpacingType spacing;

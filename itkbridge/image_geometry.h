@@ -10,6 +10,7 @@ namespace tetwarp {
 Geometry geometry_of(const itk::ImageBase<3>& image);
 
 /// Gives an image the grid, its largest possible region from index `start` on. Nothing is allocated.
+/// @throws InputError for slices that are unevenly far apart, which an image of ITK cannot have
 void set_geometry(itk::ImageBase<3>& image, const Geometry& geometry, const itk::Index<3>& start = {{0, 0, 0}});
 
 /// A region of an image as voxels of `geometry_of` the image, and back.

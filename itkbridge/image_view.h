@@ -79,7 +79,7 @@ class KeepingImageContainer : public itk::ImportImageContainer<itk::SizeValueTyp
 };
 
 /// A volume as an image, without a copy: the image owns the volume.
-/// @throws InputError unless the volume holds what TImage's pixels are made of
+/// @throws InputError unless the volume holds what TImage's pixels are made of, and for unevenly distant slices
 template <class TImage>
 typename TImage::Pointer image_of(AnyVolume&& volume) {
   const auto owner = std::make_shared<AnyVolume>(std::move(volume));
