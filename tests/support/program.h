@@ -21,11 +21,17 @@ inline std::string read_text(const std::filesystem::path& path) {
   return text.str();
 }
 
-/// Runs `tetwarp ARGUMENTS` in a folder, through the shell.
-inline Outcome run_tetwarp(const std::filesystem::path& folder, const std::string& arguments) {
+/// Runs `PROGRAM ARGUMENTS` in a folder, through the shell.
+inline Outcome run_program(const std::filesystem::path& folder, const std::string& program,
+                           const std::string& arguments) {
   const std::filesystem::path out = folder / ".stdout", err = folder / ".stderr";
   const std::string command =
-      "cd '" + folder.string() + "' && '" TETWARP_PROGRAM "' " + arguments + " > .stdout 2> .stderr";
+      "cd '" + folder.string() + "' && '" + program + "' " + arguments + " > .stdout 2> .stderr";
   const int status = std::system(command.c_str());
   return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), read_text(out), read_text(err)};
+}
+
+/// Runs `tetwarp ARGUMENTS` in a folder, through the shell.
+inline Outcome run_tetwarp(const std::filesystem::path& folder, const std::string& arguments) {
+  return run_program(folder, TETWARP_PROGRAM, arguments);
 }
