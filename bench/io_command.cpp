@@ -1,6 +1,5 @@
 #include <tbb/global_control.h>
 #include <tbb/info.h>
-#include <unistd.h>
 
 #include <cstdio>
 #include <optional>
@@ -10,40 +9,9 @@
 #include "bench/io_report.h"
 #include "bench/machine.h"
 #include "bench/output_file.h"
-#include "deform/errors.h"
+#include "bench/scratch_folder.h"
 
 namespace tetwarp::bench {
-
-namespace {
-
-namespace fs = std::filesystem;
-
-/// A folder of its own under another, removed with all that is in it.
-class ScratchFolder {
- public:
-  /// @throws Error naming the folder and the system's reason
-  explicit ScratchFolder(const fs::path& parent) {
-    std::string pattern = ((parent.empty() ? fs::temp_directory_path() : parent) / "tetwarp-bench-XXXXXX").string();
-    if (!::mkdtemp(pattern.data())) {
-      throw Error("no folder can be made, " + pattern + ": " + std::generic_category().message(errno) +
-                  "; choose another --folder");
-    }
-    path_ = pattern;
-  }
-  ~ScratchFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
-
-}  // namespace
 
 int run_io(const IoOptions& options) {
   require_writable(options.json);

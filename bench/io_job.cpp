@@ -1,17 +1,13 @@
 #include "bench/io_job.h"
 
-#include <spawn.h>
-#include <sys/wait.h>
-
 #include <memory>
 
+#include "bench/program.h"
 #include "bench/series.h"
 #include "cuda/devices.h"
 #include "deform/fields/formula.h"
 #include "io/hash.h"
 #include "io/staged_output.h"
-
-extern char** environ;
 
 namespace tetwarp::bench {
 
@@ -20,17 +16,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr char kField[] = "wave:amplitude=8,wavelength=64";
-
-/// Runs a program to its end. @throws Error when it cannot be run or fails
-void run_program(const std::vector<std::string>& arguments) {
-  std::vector<char*> argv;
-  for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
-  argv.push_back(nullptr);
-  pid_t child = 0;
-  int status = ::posix_spawn(&child, argv.front(), nullptr, nullptr, argv.data(), environ);
-  if (status == 0 && ::waitpid(child, &status, 0) != child) status = -1;
-  if (status != 0) throw Error(arguments.front() + " failed, status " + std::to_string(status));
-}
 
 /// What one stage leaves to the next.
 struct Job {

@@ -15,11 +15,22 @@ namespace {
 
 constexpr int kFailed = 1, kWrongCommandLine = 2, kInputRefused = 4;
 
-/// As they were typed; `run_command_line` makes Method and InverseIn of them.
+/// As they were typed; `run` makes Method and InverseIn of them.
 struct Words {
   std::vector<std::string> methods{"inverse4x4-double", "inverse3x3-double", "inverse3x3-float", "paper", "tetwarp"};
-  std::string cell_sizes = "4,8,16";
+  std::string cell_sizes = "4,8,16", gpu_cell_sizes = cell_sizes, cpu_cell_sizes = cell_sizes;
   bool per_voxel_inverse = false;
+};
+
+/// What every subcommand was given.
+struct Commands {
+  PaperOptions paper;
+  GpuOptions gpu;
+  CpuOptions cpu;
+  InvertOptions invert;
+  IoOptions io;
+  SimulateOptions simulate;
+  Words words;
 };
 
 void add_input(CLI::App& command, InputOptions& input) {
@@ -259,25 +270,44 @@ std::vector<std::int64_t> parse_cell_sizes(const std::string& text) {
   return sizes;
 }
 
+void add_subcommands(CLI::App& app, Commands& commands) {
+  add_paper(app, commands.paper, commands.words);
+  add_gpu(app, commands.gpu, commands.words.gpu_cell_sizes);
+  add_cpu(app, commands.cpu, commands.words.cpu_cell_sizes);
+  add_invert(app, commands.invert);
+  add_io(app, commands.io);
+  add_simulate(app, commands.simulate);
+}
+
+/// Runs the subcommand that was given.
+int run(const CLI::App& app, Commands& commands) {
+  const Words& words = commands.words;
+  if (app.got_subcommand("cpu")) {
+    commands.cpu.cell_sizes = parse_cell_sizes(words.cpu_cell_sizes);
+    return run_cpu(commands.cpu);
+  }
+  if (app.got_subcommand("invert")) return run_invert(commands.invert);
+  if (app.got_subcommand("io")) return run_io(commands.io);
+  if (app.got_subcommand("simulate")) return run_simulate(commands.simulate);
+  if (app.got_subcommand("gpu")) {
+    commands.gpu.cell_sizes = parse_cell_sizes(words.gpu_cell_sizes);
+    return run_gpu(commands.gpu);
+  }
+  PaperOptions& paper = commands.paper;
+  paper.methods.clear();
+  for (const std::string& name : words.methods) paper.methods.push_back(parse_method(name));
+  paper.cell_sizes = parse_cell_sizes(words.cell_sizes);
+  paper.inverse = words.per_voxel_inverse ? InverseIn::every_voxel : InverseIn::loop_as_compiled;
+  return run_paper(paper);
+}
+
 int run_command_line(int argc, char** argv) {
   CLI::App app("Time Tetwarp and what it is compared with, and say what each result is worth");
   app.name("tetwarp-bench");
   app.require_subcommand(1);
   app.set_version_flag("--version", std::string("tetwarp-bench ") + version() + " (" + commit() + ")");
-  PaperOptions paper;
-  GpuOptions gpu;
-  CpuOptions cpu;
-  InvertOptions invert;
-  IoOptions io;
-  SimulateOptions simulate;
-  Words words;
-  std::string gpu_cell_sizes = words.cell_sizes, cpu_cell_sizes = words.cell_sizes;
-  add_paper(app, paper, words);
-  add_gpu(app, gpu, gpu_cell_sizes);
-  add_cpu(app, cpu, cpu_cell_sizes);
-  add_invert(app, invert);
-  add_io(app, io);
-  add_simulate(app, simulate);
+  Commands commands;
+  add_subcommands(app, commands);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& help) {
@@ -285,22 +315,7 @@ int run_command_line(int argc, char** argv) {
   } catch (const CLI::Error& error) {
     throw UsageError(std::string(error.what()) + "; see tetwarp-bench --help");
   }
-  if (app.got_subcommand("cpu")) {
-    cpu.cell_sizes = parse_cell_sizes(cpu_cell_sizes);
-    return run_cpu(cpu);
-  }
-  if (app.got_subcommand("invert")) return run_invert(invert);
-  if (app.got_subcommand("io")) return run_io(io);
-  if (app.got_subcommand("simulate")) return run_simulate(simulate);
-  if (app.got_subcommand("gpu")) {
-    gpu.cell_sizes = parse_cell_sizes(gpu_cell_sizes);
-    return run_gpu(gpu);
-  }
-  paper.methods.clear();
-  for (const std::string& name : words.methods) paper.methods.push_back(parse_method(name));
-  paper.cell_sizes = parse_cell_sizes(words.cell_sizes);
-  paper.inverse = words.per_voxel_inverse ? InverseIn::every_voxel : InverseIn::loop_as_compiled;
-  return run_paper(paper);
+  return run(app, commands);
 }
 
 int fail(int status, const char* what) {
