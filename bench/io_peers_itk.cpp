@@ -1,4 +1,4 @@
-// ITK beside `tetwarp-bench io`. The only file of the benchmark that names itk::.
+// ITK beside `tetwarp-bench io`.
 #include <itkGDCMImageIO.h>
 #include <itkGDCMSeriesFileNames.h>
 #include <itkImage.h>

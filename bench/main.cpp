@@ -1,5 +1,5 @@
 // tetwarp-bench: what the paper compares, what a deformation and its inverse cost on a GPU and on the CPU, simulations,
-// and files.
+// files, and filters beside ITK's.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
@@ -29,9 +29,22 @@ struct Commands {
   CpuOptions cpu;
   InvertOptions invert;
   IoOptions io;
+  ItkOptions itk;
+  std::filesystem::path itk_alone;
   SimulateOptions simulate;
   Words words;
 };
+
+/// An option of several values, as in wave,twist.
+template <class Value>
+void add_list(CLI::App& command, const std::string& name, std::vector<Value>& values, const std::string& text,
+              const CLI::Validator& allowed) {
+  command.add_option(name, values, text)
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(allowed)
+      ->capture_default_str();
+}
 
 void add_input(CLI::App& command, InputOptions& input) {
   auto* path = command.add_option("INPUT", input.path,
@@ -48,11 +61,7 @@ void add_input(CLI::App& command, InputOptions& input) {
                    ->check(CLI::PositiveNumber)
                    ->needs(raw);
   raw->needs(size);
-  command.add_option("--slices", input.slices, "Slices of the phantoms")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->check(CLI::Range(2, 100000))
-      ->capture_default_str();
+  add_list(command, "--slices", input.slices, "Slices of the phantoms", CLI::Range(2, 100000));
   command.add_option("--width", input.width, "Columns and rows of the phantoms")
       ->check(CLI::Range(2, 100000))
       ->capture_default_str();
@@ -66,16 +75,9 @@ void add_frames(CLI::App& command, int& frames, int& warmup) {
 void add_paper(CLI::App& app, PaperOptions& options, Words& words) {
   CLI::App* command = app.add_subcommand("paper", "The tables of the paper, with Tetwarp beside its methods");
   add_input(*command, options.input);
-  command->add_option("--fields", options.fields, "Deformations")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->check(CLI::IsMember({"identity", "wave", "twist", "bubble"}))
-      ->capture_default_str();
-  command->add_option("--methods", words.methods, "Methods on cells of one voxel")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->check(CLI::IsMember(words.methods))
-      ->capture_default_str();
+  add_list(*command, "--fields", options.fields, "Deformations",
+           CLI::IsMember({"identity", "wave", "twist", "bubble"}));
+  add_list(*command, "--methods", words.methods, "Methods on cells of one voxel", CLI::IsMember(words.methods));
   command
       ->add_option("--cell-sizes", words.cell_sizes,
                    "Cells of the coarse table (paper, gascon, tetwarp); none: no such table")
@@ -99,16 +101,9 @@ void add_paper(CLI::App& app, PaperOptions& options, Words& words) {
 void add_cpu(CLI::App& app, CpuOptions& options, std::string& cell_sizes) {
   CLI::App* command =
       app.add_subcommand("cpu", "What a deformation costs on the CPU, and the floors that it should reach");
-  command->add_option("--fields", options.fields, "Deformations")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->check(CLI::IsMember(options.fields))
-      ->capture_default_str();
-  command->add_option("--peers", options.peers, "What is measured beside Tetwarp; none: nothing")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->check(CLI::IsMember({"paper", "itk-warp", "itk-invert", "vtk-probe", "none"}))
-      ->capture_default_str();
+  add_list(*command, "--fields", options.fields, "Deformations", CLI::IsMember(options.fields));
+  add_list(*command, "--peers", options.peers, "What is measured beside Tetwarp; none: nothing",
+           CLI::IsMember({"paper", "itk-warp", "itk-invert", "vtk-probe", "none"}));
   command->add_option("--cell-sizes", cell_sizes, "Larger cells, voxels; none: cells of one voxel only")
       ->capture_default_str();
   command->add_option("--slices", options.slices, "Slices of the phantom")
@@ -135,21 +130,13 @@ void add_cpu(CLI::App& app, CpuOptions& options, std::string& cell_sizes) {
 void add_invert(CLI::App& app, InvertOptions& options) {
   CLI::App* command = app.add_subcommand(
       "invert", "The inverse displacement field on the CPU against ITK's inverters, and the floors to reach");
-  command
-      ->add_option("--fields", options.fields,
-                   "Fields with a known inverse, and one that folds: what has no source there is known")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->check(CLI::IsMember(options.fields))
-      ->capture_default_str();
-  command
-      ->add_option("--peers", options.peers,
-                   "InvertDisplacementField with its defaults, without its boundary condition, "
-                   "IterativeInverseDisplacementField; none: nothing beside Tetwarp")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->check(CLI::IsMember({"itk-invert", "itk-invert-free", "itk-iterative", "none"}))
-      ->capture_default_str();
+  add_list(*command, "--fields", options.fields,
+           "Fields with a known inverse, and one that folds: what has no source there is known",
+           CLI::IsMember(options.fields));
+  add_list(*command, "--peers", options.peers,
+           "InvertDisplacementField with its defaults, without its boundary condition, "
+           "IterativeInverseDisplacementField; none: nothing beside Tetwarp",
+           CLI::IsMember({"itk-invert", "itk-invert-free", "itk-iterative", "none"}));
   command->add_option("--slices", options.slices, "Slices of the field, a vertex on every voxel")
       ->check(CLI::Range(2, 100000))
       ->capture_default_str();
@@ -171,11 +158,7 @@ void add_invert(CLI::App& app, InvertOptions& options) {
 void add_gpu(CLI::App& app, GpuOptions& options, std::string& cell_sizes) {
   CLI::App* command = app.add_subcommand("gpu", "What a frame costs on a GPU, and the floors that it should reach");
   add_input(*command, options.input);
-  command->add_option("--fields", options.fields, "Deformations")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->check(CLI::IsMember(options.fields))
-      ->capture_default_str();
+  add_list(*command, "--fields", options.fields, "Deformations", CLI::IsMember(options.fields));
   command->add_option("--cell-sizes", cell_sizes, "Larger cells, voxels; none: cells of one voxel only")
       ->capture_default_str();
   add_frames(*command, options.frames, options.warmup);
@@ -194,16 +177,10 @@ void add_io(CLI::App& app, IoOptions& options) {
   command->add_option("--width", options.width, "Columns and rows of the phantom")
       ->check(CLI::Range(2, 4096))
       ->capture_default_str();
-  command->add_option("--steps", options.steps, "DICOM series in and out, .nii.gz, the whole job")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->check(CLI::IsMember(options.steps))
-      ->capture_default_str();
-  command->add_option("--cell-sizes", options.cell_sizes, "Cells of the fields of the whole jobs, voxels")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
+  add_list(*command, "--steps", options.steps, "DICOM series in and out, .nii.gz, the whole job",
+           CLI::IsMember(options.steps));
+  add_list(*command, "--cell-sizes", options.cell_sizes, "Cells of the fields of the whole jobs, voxels",
+           CLI::Range(1, 1000));
   command->add_option("--threads", options.threads, "Threads; 0 is all")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
@@ -222,20 +199,50 @@ void add_io(CLI::App& app, IoOptions& options) {
   command->footer("Example: tetwarp bench io --repeats 5 --json io.json");
 }
 
+void add_itk(CLI::App& app, ItkOptions& options) {
+  CLI::App* command =
+      app.add_subcommand("itk", "Filters for ITK's pipelines beside ITK's own: time, memory and error, and in pieces");
+  add_list(*command, "--tasks", options.tasks, "Warps by pull and forward fields, inverses, and so on",
+           CLI::IsMember(options.tasks));
+  add_list(*command, "--fields", options.fields, "Fields whose inverse and determinant are known",
+           CLI::IsMember(options.fields));
+  add_list(*command, "--cell-sizes", options.cell_sizes, "Cells of the fields of pull, forward and invert, voxels",
+           CLI::Range(1, 1000));
+  command->add_option("--slices", options.slices, "Slices of the phantom")
+      ->check(CLI::Range(8, 100000))
+      ->capture_default_str();
+  command->add_option("--width", options.width, "Columns and rows of the phantom")
+      ->check(CLI::Range(8, 100000))
+      ->capture_default_str();
+  command->add_option("--threads", options.threads, "Threads of everything; 0 is all")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_option("--repeats", options.repeats, "Repeats; the median counts")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  command
+      ->add_option("--folder", options.folder,
+                   "Where a folder for the files is made, and removed at the end (2.1 GB by default; the system's "
+                   "folder for temporary files)")
+      ->type_name("DIR")
+      ->check(CLI::ExistingDirectory);
+  command->add_option("--json", options.json, "Every number, as JSON")->type_name("FILE");
+  command->add_flag("--check", options.check, "Exit with 1 where a floor is missed");
+  command->add_flag("--verbose", options.verbose, "A line on standard error for every run");
+  command->footer("Example: tetwarp bench itk --slices 60 --repeats 1 --json itk.json");
+}
+
+/// How `itk` runs this program again. In no help: it asks for what `itk` alone can write.
+void add_itk_alone(CLI::App& app, std::filesystem::path& folder) {
+  app.add_subcommand("itk-alone")->group("")->add_option("FOLDER", folder)->required();
+}
+
 void add_simulate(CLI::App& app, SimulateOptions& options) {
   CLI::App* command = app.add_subcommand(
       "simulate", "What chainmail and mass-spring cost on a phantom: until they have settled, and frame by frame");
   command->add_option("SCENARIO", options.scenario, "JSON; its first phase is simulated, by every method")->required();
-  command->add_option("--methods", options.methods, "Methods")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->check(CLI::IsMember(options.methods))
-      ->capture_default_str();
-  command->add_option("--backends", options.backends, "Where: cpu, cuda")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->check(CLI::IsMember({"cpu", "cuda"}))
-      ->capture_default_str();
+  add_list(*command, "--methods", options.methods, "Methods", CLI::IsMember(options.methods));
+  add_list(*command, "--backends", options.backends, "Where: cpu, cuda", CLI::IsMember({"cpu", "cuda"}));
   command->add_option("--slices", options.slices, "Slices of the phantom")
       ->check(CLI::Range(2, 100000))
       ->capture_default_str();
@@ -276,6 +283,8 @@ void add_subcommands(CLI::App& app, Commands& commands) {
   add_cpu(app, commands.cpu, commands.words.cpu_cell_sizes);
   add_invert(app, commands.invert);
   add_io(app, commands.io);
+  add_itk(app, commands.itk);
+  add_itk_alone(app, commands.itk_alone);
   add_simulate(app, commands.simulate);
 }
 
@@ -288,6 +297,8 @@ int run(const CLI::App& app, Commands& commands) {
   }
   if (app.got_subcommand("invert")) return run_invert(commands.invert);
   if (app.got_subcommand("io")) return run_io(commands.io);
+  if (app.got_subcommand("itk")) return run_itk(commands.itk);
+  if (app.got_subcommand("itk-alone")) return run_itk_alone(commands.itk_alone);
   if (app.got_subcommand("simulate")) return run_simulate(commands.simulate);
   if (app.got_subcommand("gpu")) {
     commands.gpu.cell_sizes = parse_cell_sizes(words.gpu_cell_sizes);

@@ -88,6 +88,18 @@ struct IoOptions {
   bool verbose = false;  ///< a line to standard error for every step
 };
 
+struct ItkOptions {
+  std::vector<std::string> tasks{"pull", "forward", "invert", "determinant", "transform", "stream"};
+  std::vector<std::string> fields{"bubble", "elastic"};
+  std::vector<std::int64_t> cell_sizes{1, 4};  ///< of pull, forward and invert; determinant has 1 alone
+  std::int64_t width = 512, slices = 300;      ///< of the phantom
+  int threads = 0, repeats = 3;
+  std::filesystem::path folder;  ///< where a folder for the files is made, and removed at the end; empty: the system's
+  std::filesystem::path json;
+  bool check = false;    ///< a missed floor is a failure
+  bool verbose = false;  ///< a line to standard error for every run
+};
+
 struct SimulateOptions {
   std::filesystem::path scenario;  ///< JSON; its first phase is simulated, by every method
   std::vector<std::string> methods{"chainmail", "mass-spring"};
@@ -112,6 +124,12 @@ int run_cpu(const CpuOptions& options);
 /// The inverse displacement field on the CPU, against ITK's inverters: time, error and what has no source. @return the
 /// exit status
 int run_invert(const InvertOptions& options);
+/// Filters for ITK's pipelines beside ITK's own: time, memory and error, each in a process of its own. @return the exit
+/// status
+int run_itk(const ItkOptions& options);
+/// One measurement of `run_itk`: what `folder` asks for is run in this process, and answered there. @return the exit
+/// status
+int run_itk_alone(const std::filesystem::path& folder);
 /// What a scenario costs until it has settled, and frame by frame with resampling. @return the exit status
 int run_simulate(const SimulateOptions& options);
 

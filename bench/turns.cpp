@@ -25,7 +25,8 @@ double milliseconds(const timeval& time) {
   return 1e3 * static_cast<double>(time.tv_sec) + 1e-3 * static_cast<double>(time.tv_usec);
 }
 
-/// CPU time of this process and of the programs that it has waited for.
+}  // namespace
+
 double cpu_ms() {
   double sum = 0;
   for (const int who : {RUSAGE_SELF, RUSAGE_CHILDREN}) {
@@ -35,8 +36,6 @@ double cpu_ms() {
   }
   return sum;
 }
-
-}  // namespace
 
 std::vector<IoTime> Turns::run(int repeats, const std::function<void(const std::string&)>& say) const {
   using Clock = std::chrono::steady_clock;

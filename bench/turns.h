@@ -12,6 +12,9 @@ namespace tetwarp::bench {
 /// A run for Turns that leaves its result in files.
 std::function<std::any()> nothing(std::function<void()> run);
 
+/// CPU time of this process and of the programs that it has waited for, all threads.
+double cpu_ms();
+
 /// Programs that are timed in turn, so that what else the machine does falls on all of them alike.
 class Turns {
  public:

@@ -1,6 +1,8 @@
 // tetwarp-bench on the command line: exit statuses, and files that appear whole.
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -57,6 +59,9 @@ TEST(BenchProgram, WrongCommandLinesExitWithTwo) {
   expect_error(run_bench(scratch, "io --slices 1"), 2, "--slices");
   expect_error(run_bench(scratch, "io --steps in,through"), 2, "through");
   expect_error(run_bench(scratch, "io --folder missing"), 2, "missing");
+  expect_error(run_bench(scratch, "itk --tasks pull,push"), 2, "push");
+  expect_error(run_bench(scratch, "itk --fields wave"), 2, "wave");
+  expect_error(run_bench(scratch, "itk --cell-sizes 0"), 2, "--cell-sizes");
 }
 
 constexpr const char* kTinyGpu = "gpu --width 64 --slices 20,40 --cell-sizes 4 --frames 2 --warmup 1 --json r.json ";
@@ -196,6 +201,79 @@ TEST(BenchProgram, AJobThatMissesItsFloorFailsOnlyWhereItIsAsked) {
 }
 #endif
 
+#ifdef TETWARP_BENCH_ITK
+constexpr const char* kTinyItk = "itk --repeats 1 --threads 2 --folder . --json r.json ";
+
+/// The number at a JSON pointer of the one run of a filter.
+double number_of(const nlohmann::json& document, const std::string& filters, std::int64_t cell_size,
+                 const std::string& pointer) {
+  double found = NAN;
+  int runs = 0;
+  for (const nlohmann::json& run : document["runs"]) {
+    if (run["filters"] != filters || run["cell_size"] != cell_size) continue;
+    found = run[nlohmann::json::json_pointer(pointer)].get<double>();
+    ++runs;
+  }
+  EXPECT_EQ(runs, 1) << filters;
+  return found;
+}
+
+TEST(BenchProgram, ItksFiltersAndOursAreAsNearToTheTruthAsIsSaid) {
+  const Scratch scratch;
+  const Outcome run = run_bench(scratch, std::string(kTinyItk) + "--width 64 --slices 40 --fields elastic");
+  ASSERT_EQ(run.status, 0) << run.err;
+  EXPECT_TRUE(says(run.out, {"# tetwarp-bench itk", "64 x 64 x 40", "| elastic, 4 |", "## In pieces", "## Floors"}));
+  const nlohmann::json document = nlohmann::json::parse(read_text(scratch / "r.json"));
+  EXPECT_EQ(document["runs"].size(), 2 * (3u + 2u + 3u) + 2u + 2u);
+  const auto rms = [&](const std::string& filters, std::int64_t cell_size = 1) {
+    EXPECT_GT(number_of(document, filters, cell_size, "/ms/median"), 0) << filters;
+    EXPECT_GT(number_of(document, filters, cell_size, "/error/compared"), 100) << filters;
+    EXPECT_EQ(number_of(document, filters, cell_size, "/error/missing"), 0) << filters;
+    return number_of(document, filters, cell_size, "/error/rms");
+  };
+  const std::string invert = "InvertDisplacementFieldImageFilter", border = ", EnforceBoundaryConditionOff";
+  EXPECT_NEAR(rms("PullFieldResampleImageFilter"), 1 / std::sqrt(12.0), 0.02) << "rounded to nearest, no other error";
+  for (const std::string itk : {"ResampleImageFilter, DisplacementFieldTransform", "WarpImageFilter"}) {
+    EXPECT_NEAR(rms(itk), 1 / std::sqrt(3.0), 0.05) << "truncated, no other error";
+    EXPECT_NEAR(rms(itk, 4) / rms("PullFieldResampleImageFilter", 4), 1, 0.02) << "the same vectors between samples";
+  }
+  EXPECT_LT(rms("VertexFieldResampleImageFilter"), 1);
+  EXPECT_GT(rms(invert + ", WarpImageFilter"), 5) << "the border is held still";
+  EXPECT_LT(rms("ExactInvertDisplacementFieldImageFilter"), 0.01);
+  EXPECT_GT(rms(invert), 0.5) << "the border is held still";
+  EXPECT_LT(rms(invert + border), 0.1);
+  EXPECT_LT(rms("VertexFieldToJacobianDeterminantFilter"), 0.02);
+  EXPECT_LT(rms("DisplacementFieldJacobianDeterminantFilter"), 0.002);
+  for (const std::string sampled : {"TransformToVertexFieldFilter", "TransformToDisplacementFieldFilter"}) {
+    EXPECT_LT(rms(sampled, 2), 1e-6);
+    EXPECT_GT(number_of(document, sampled, 2, "/output_bytes"), 12 * 32 * 32 * 20);
+  }
+  for (const auto& entry : std::filesystem::directory_iterator(scratch.path())) {
+    EXPECT_FALSE(entry.is_directory()) << entry.path();
+  }
+}
+
+TEST(BenchProgram, StreamsWriteTheSameBytesInLessMemory) {
+  const Scratch scratch;
+  const Outcome run = run_bench(scratch, std::string(kTinyItk) + "--width 192 --slices 128 --tasks stream");
+  ASSERT_EQ(run.status, 0) << run.err;
+  const nlohmann::json document = nlohmann::json::parse(read_text(scratch / "r.json"));
+  ASSERT_EQ(document["streams"].size(), 6u);
+  std::map<int, double> peak;
+  for (const nlohmann::json& stream : document["streams"]) {
+    EXPECT_EQ(stream["differing_bytes"], 0) << stream;
+    if (stream["own"] == true) peak[stream["pieces"]] = stream["peak_bytes_beyond_field"];
+  }
+#if defined(__SANITIZE_ADDRESS__)
+  GTEST_SKIP() << "sanitizers keep freed memory";
+#endif
+  constexpr double kVolumeBytes = 2.0 * 192 * 192 * 128;
+  EXPECT_GT(peak[1], 1.9 * kVolumeBytes) << "source and output";
+  EXPECT_LT(peak[4], peak[1]);
+  EXPECT_LT(peak[16], 0.5 * peak[1]);
+}
+#endif
+
 TEST(BenchProgram, AVolumeOfZerosExitsWithFourAndWritesNothing) {
   const Scratch scratch;
   write_file(scratch / "zeros.raw", std::string(2 * 5 * 4 * 3, '\0'));
@@ -210,7 +288,7 @@ TEST(BenchProgram, AnUnwritableResultIsKnownBeforeTheWork) {
 
 TEST(BenchProgram, HelpHasAnExample) {
   const Scratch scratch;
-  for (const std::string command : {"paper", "gpu", "cpu", "invert", "io"}) {
+  for (const std::string command : {"paper", "gpu", "cpu", "invert", "io", "itk"}) {
     const Outcome run = run_bench(scratch, command + " --help");
     EXPECT_EQ(run.status, 0);
     EXPECT_TRUE(says(run.out, {"Example: tetwarp bench " + command}));

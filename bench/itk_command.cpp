@@ -1,0 +1,19 @@
+#include <cstdio>
+
+#include "bench/conclude.h"
+#include "bench/itk_bench.h"
+#include "bench/itk_report.h"
+#include "bench/scratch_folder.h"
+
+namespace tetwarp::bench {
+
+int run_itk(const ItkOptions& options) {
+  require_writable(options.json);
+  const ScratchFolder folder(options.folder);
+  const ItkResults results = measure_itk(options, folder.path(), [&](const std::string& line) {
+    if (options.verbose) std::fprintf(stderr, "%s\n", line.c_str());
+  });
+  return conclude(results, options.json, options.check);
+}
+
+}  // namespace tetwarp::bench

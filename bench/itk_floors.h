@@ -1,0 +1,14 @@
+#pragma once
+
+#include "bench/floors.h"
+#include "bench/itk_results.h"
+
+namespace tetwarp::bench {
+
+/// Our run of the same task and field; null where there is none.
+const ItkRun* find_own(const ItkResults& results, const ItkRun& like);
+
+/// Times and errors of ITK's filters over ours, and what streams may not do: write other bytes, or need as much memory.
+std::vector<Floor> find_floors(const ItkResults& results);
+
+}  // namespace tetwarp::bench
