@@ -87,7 +87,9 @@ PullFrame make_pull_frame(const Geometry& output, const PullFieldView& field) {
   require(field.grid && field.displacement, "the pull field is empty");
   require_valid(*field.grid, "pull field grid");
   PullFrame frame;
-  frame.grid_from_output = index_from_point(*field.grid) * point_from_index(output);
+  frame.grid_from_output = *field.grid == output  // rounding tells no grid from itself
+                               ? AffineMap{glm::dmat3(1), glm::dvec3(0)}
+                               : index_from_point(*field.grid) * point_from_index(output);
   frame.output_from_mm = index_from_point(output).linear;
   frame.size = field.grid->size;
   frame.displacement = field.displacement;

@@ -57,9 +57,9 @@ struct PullFrame {
     return t <= kSlack ? a : b;
   }
 
-  /// @param index  on the samples. @return missing where a sample that is needed is
-  template <bool kGaps>
-  TETWARP_HD glm::dvec3 trilinear(const glm::dvec3& index) const {
+  /// @param index  on the samples. @param sample_at  gives `sample`. @return missing where a sample that is needed is
+  template <bool kGaps, class SampleAt>
+  TETWARP_HD glm::dvec3 trilinear(const glm::dvec3& index, const SampleAt& sample_at) const {
     const glm::i64vec3 low(index);  // index >= 0
     const glm::dvec3 t = index - glm::dvec3(low);
     glm::i64vec3 high;
@@ -69,7 +69,7 @@ struct PullFrame {
       glm::dvec3 along_y[2];
       for (int y = 0; y < 2; ++y) {
         const glm::i64vec3 a(low.x, y ? high.y : low.y, z ? high.z : low.z), b(high.x, a.y, a.z);
-        along_y[y] = between<kGaps>(sample(a), sample(b), t.x);
+        along_y[y] = between<kGaps>(sample_at(a), sample_at(b), t.x);
       }
       along_z[z] = between<kGaps>(along_y[0], along_y[1], t.y);
     }
@@ -88,11 +88,23 @@ struct PullFrame {
 
   /// Undeformed minus deformed place, voxels. @return whether the voxel comes from anywhere
   TETWARP_HD bool offset_at(const glm::i64vec3& voxel, glm::vec3& offset) const {
+    return offset_at(voxel, offset, [this](const glm::i64vec3& at) { return sample(at); });
+  }
+
+  /// The same with samples from `sample_at`, which gives `sample`.
+  template <class SampleAt>
+  TETWARP_HD bool offset_at(const glm::i64vec3& voxel, glm::vec3& offset, const SampleAt& sample_at) const {
     glm::dvec3 index = grid_from_output(glm::dvec3(voxel));
     offset = glm::vec3(0);
     if (!clamp_to_samples(index)) return rest_outside;
-    glm::dvec3 found = trilinear<false>(index);
-    if (is_missing(found)) found = trilinear<true>(index);
+    const glm::i64vec3 low(index);
+    glm::dvec3 found(0);
+    if (glm::dvec3(low) == index) {
+      found = sample_at(low);  // what both of these give there, without the seven others
+    } else {
+      found = trilinear<false>(index, sample_at);
+      if (is_missing(found)) found = trilinear<true>(index, sample_at);
+    }
     if (is_missing(found)) return false;
     offset = glm::vec3(found);
     return true;

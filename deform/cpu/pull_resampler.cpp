@@ -1,5 +1,8 @@
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
+#include <glm/common.hpp>
+#include <optional>
 #include <vector>
 
 #include "deform/cpu/map_writer.h"
@@ -13,9 +16,52 @@ namespace cpu {
 
 namespace {
 
+/// The sample of a row's first voxel, where each of its voxels lies on one and the samples run along the row.
+std::optional<glm::i64vec3> find_first_sample(const PullFrame& frame, const glm::i64vec3& first, int count) {
+  const glm::dmat3& map = frame.grid_from_output.linear;
+  if (map[0] != glm::dvec3(1, 0, 0) || map[1].x != 0 || map[2].x != 0) return {};
+  const glm::i64vec3 along(count - 1, 0, 0);
+  glm::dvec3 begin = frame.grid_from_output(glm::dvec3(first)), end = frame.grid_from_output(glm::dvec3(first + along));
+  if (!frame.clamp_to_samples(begin) || !frame.clamp_to_samples(end)) return {};
+  const glm::i64vec3 low(begin);
+  if (glm::dvec3(low) != begin || glm::dvec3(low + along) != end) return {};
+  return low;
+}
+
+/// The samples around a row of voxels that runs along the first axis of the samples, converted once for all of them.
+class RowSamples {
+ public:
+  /// @return false where the row runs otherwise, leaves the grid, or has its voxels as far apart as the samples are:
+  ///         then there is little to share
+  bool find(const PullFrame& frame, const glm::i64vec3& first, int count) {
+    const glm::dvec3& step = frame.grid_from_output.linear[0];
+    if (!(step.x > 0 && step.x < 1 && step.y == 0 && step.z == 0)) return false;
+    glm::dvec3 begin = frame.grid_from_output(glm::dvec3(first)),
+               end = frame.grid_from_output(glm::dvec3(first + glm::i64vec3(count - 1, 0, 0)));
+    if (!frame.clamp_to_samples(begin) || !frame.clamp_to_samples(end)) return false;
+    low_ = glm::i64vec3(begin);
+    const glm::i64vec3 last = frame.size - std::int64_t{1}, high = glm::min(low_ + std::int64_t{1}, last);
+    const std::int64_t width = std::min(static_cast<std::int64_t>(end.x) + 1, last.x) - low_.x + 1;
+    for (int row = 0; row < 4; ++row) {
+      const glm::i64vec3 from(low_.x, row & 1 ? high.y : low_.y, row & 2 ? high.z : low_.z);
+      for (std::int64_t x = 0; x < width; ++x) samples_[row][x] = frame.sample(from + glm::i64vec3(x, 0, 0));
+    }
+    return true;
+  }
+
+  const glm::dvec3& operator()(const glm::i64vec3& at) const {
+    return samples_[(at.y != low_.y) + 2 * (at.z != low_.z)][at.x - low_.x];
+  }
+
+ private:
+  glm::i64vec3 low_{0};
+  glm::dvec3 samples_[4][kTile + 2];
+};
+
 struct RowScratch {
   std::uint8_t mapped[kTile], coverage[kTile];
   glm::vec3 offset[kTile];
+  RowSamples samples;
 };
 
 /// Row by row: where each voxel comes from, then the samples there.
@@ -47,9 +93,7 @@ class PullResampler final : public Resampler {
       for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {
         for (std::int64_t y = box.begin.y; y < box.end.y; ++y) {
           const Row row{{box.begin.x, y, z}, static_cast<int>(box.end.x - box.begin.x), scratch.mapped, scratch.offset};
-          for (int i = 0; i < row.count; ++i) {
-            scratch.mapped[i] = frame_.offset_at(row.voxel + glm::i64vec3(i, 0, 0), scratch.offset[i]);
-          }
+          find_offsets(row, scratch);
           sample_targets(row, samplers, scratch.coverage, report);
           writer.write(row, scratch.coverage, nullptr, nullptr);
         }
@@ -59,6 +103,23 @@ class PullResampler final : public Resampler {
   }
 
  private:
+  void find_offsets(const Row& row, RowScratch& scratch) const {
+    if (const auto first = find_first_sample(frame_, row.voxel, row.count)) {
+      for (int i = 0; i < row.count; ++i) {
+        const glm::dvec3 found = frame_.sample(*first + glm::i64vec3(i, 0, 0));
+        scratch.mapped[i] = !PullFrame::is_missing(found);
+        scratch.offset[i] = scratch.mapped[i] ? glm::vec3(found) : glm::vec3(0);
+      }
+      return;
+    }
+    const bool shared = scratch.samples.find(frame_, row.voxel, row.count);
+    for (int i = 0; i < row.count; ++i) {
+      const glm::i64vec3 voxel = row.voxel + glm::i64vec3(i, 0, 0);
+      glm::vec3& offset = scratch.offset[i];
+      scratch.mapped[i] = shared ? frame_.offset_at(voxel, offset, scratch.samples) : frame_.offset_at(voxel, offset);
+    }
+  }
+
   void check_samples(const Control& control) {
     const glm::i64vec3 size = frame_.size;
     arena_.execute([&] {

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 
+#include "deform/field_check.h"
 #include "tests/support/backends.h"
 #include "tests/support/shifted.h"
 
@@ -105,6 +106,59 @@ TEST_P(Pull, DisplacementIsTrilinearBetweenSamples) {
       ASSERT_EQ(found.coverage.voxels[n], expected.inside);
       ASSERT_NEAR(found.output.voxels[n], expected.inside ? expected.value : -7, 2e-3) << to_string(voxel);
     });
+  }
+}
+
+/// A grid of samples over a unit grid, its vectors at random, one in fifty missing.
+PullField random_pull(Random& random, const glm::i64vec3& size, double spacing, double origin) {
+  PullField field{{.size = size, .spacing = glm::dvec3(spacing), .origin = glm::dvec3(origin)}, {}};
+  for (std::int64_t n = 0; n < voxel_count(field.grid); ++n) {
+    const bool missing = random.real(0, 1) < 0.02;
+    field.displacement.emplace_back(missing ? NAN : random.real(-2, 2), random.real(-2, 2), random.real(-2, 2));
+  }
+  return field;
+}
+
+/// Where a voxel comes from by the eight samples around it, none of them shared with another voxel.
+bool offset_of_voxel(const PullFrame& frame, const glm::i64vec3& voxel, glm::vec3& offset) {
+  const auto sample = [&](const glm::i64vec3& at) { return frame.sample(at); };
+  glm::dvec3 index = frame.grid_from_output(glm::dvec3(voxel));
+  if (!frame.clamp_to_samples(index)) return false;
+  glm::dvec3 found = frame.trilinear<false>(index, sample);
+  if (PullFrame::is_missing(found)) found = frame.trilinear<true>(index, sample);
+  offset = glm::vec3(found);
+  return !PullFrame::is_missing(found);
+}
+
+TEST_P(Pull, OnWhateverGridTheSamplesLieEachVoxelHasTheBitsOfItsOwnEight) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE(seed_text(seed));
+  Random random(seed);
+  const Geometry output = unit_grid({70, 11, 9});
+  constexpr double kInSlack = 1.0 / 8192;  // of a sample
+  struct Case {
+    double spacing, origin;
+  };
+  for (const Case& of : {Case{1, 0}, Case{1, 0.25}, Case{4, -1}, Case{4, kInSlack}, Case{2.5, -0.3}, Case{3, 2},
+                         Case{0.5, -1}, Case{1.5, 0}, Case{7, 0}}) {
+    const glm::i64vec3 size = glm::i64vec3(glm::ceil(glm::dvec3(66, 11, 8) / of.spacing)) + std::int64_t{1};
+    const PullField field = random_pull(random, size, of.spacing, of.origin);
+    const auto resampler = make_pull(output);
+    resampler->set_field(view(field, Outside::background));
+    const auto source = random_values<std::int16_t>(output, random, 0, 100);
+    const auto found = run(*resampler, source, {.pull = true});
+    const PullFrame frame = make_pull_frame(output, view(field, Outside::background));
+    std::uint64_t mapped = 0;
+    for_each_voxel(output, [&](const glm::i64vec3& voxel, std::size_t n) {
+      glm::vec3 expected(0);
+      const bool comes = offset_of_voxel(frame, voxel, expected);
+      const glm::vec3 vector(found.inverse_mm.voxels[n]);
+      ASSERT_EQ(!std::isnan(vector.x), comes) << of.spacing << ", " << of.origin << ": " << to_string(voxel);
+      mapped += comes;
+      ASSERT_TRUE(!comes || vector == expected) << of.spacing << ", " << of.origin << ": " << to_string(voxel);
+    });
+    EXPECT_GT(mapped, 3000u) << of.spacing << ", " << of.origin;
+    EXPECT_LT(mapped, found.inverse_mm.voxels.size()) << of.spacing << ", " << of.origin;
   }
 }
 
