@@ -85,7 +85,8 @@ class LatticeResampler final : public Resampler {
     };
     const auto is_copied = [&](const Region& box) { return can_copy(box) && rests(box); };
     Report report = for_each_tile<Tile>(arena_, region, control, is_copied, [&](const Region& box, Tile& tile) {
-      if (places_only && rests(box)) return can_copy(box) ? copy(box, samplers) : stay(box, tile, samplers, writer);
+      if (!writer.wants_owners() && rests(box))
+        return can_copy(box) ? copy(box, samplers) : stay(box, tile, samplers, writer);
       Report of_tile;
       if (may_march && !mostly_folds(box)) {
         gather(box, tile, writer, of_tile.paths);
@@ -141,12 +142,14 @@ class LatticeResampler final : public Resampler {
     report.paths.gathered = static_cast<std::uint64_t>(voxel_count(box));
     const auto width = static_cast<int>(box.end.x - box.begin.x);
     const glm::vec3 offset[kTile] = {};
+    float jacobian[kTile];
+    std::fill_n(jacobian, width, 1.0f);
     std::fill_n(tile.mapped, width, std::uint8_t{1});
     for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {
       for (std::int64_t y = box.begin.y; y < box.end.y; ++y) {
         const Row row{{box.begin.x, y, z}, width, tile.mapped, offset};
         sample_targets(row, samplers, tile.coverage, report);
-        maps.write(row, tile.coverage, nullptr, nullptr);
+        maps.write(row, tile.coverage, jacobian, nullptr);
       }
     }
     return report;

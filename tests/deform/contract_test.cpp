@@ -1,8 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
 
+#include "deform/fields/formula.h"
 #include "tests/support/backends.h"
 #include "tests/support/fields.h"
 #include "tests/support/shifted.h"
@@ -50,6 +52,23 @@ void expect_identity(Resampler& resampler, const Volume<V>& source, Interpolatio
     ASSERT_EQ(found.owners.voxels[n], 1);
     ASSERT_EQ(found.inverse_mm.voxels[n], glm::vec3(0));
     ASSERT_EQ(found.jacobian.voxels[n], 1.0f);
+  }
+}
+
+TEST_P(Copies, DeterminantsAreTheSameWhetherOwnersAreCountedOrNot) {
+  const Geometry grid = unit_grid({100, 70, 66});  // tiles at rest, and tiles that move
+  const Bubble bubble{.radius = 20, .strength = 0.4, .centre = {30, 35, 33}};
+  const Volume<std::int16_t> source{grid, std::vector<std::int16_t>(static_cast<std::size_t>(voxel_count(grid)), 3)};
+  const auto resampler = make(grid);
+  for (const std::int64_t cell : {1, 5}) {
+    const VertexField field = sample_on(lattice_over(grid, cell), bubble);
+    resampler->set_field(view(field));
+    const auto expected = run(*resampler, source);
+    auto found = poisoned<float>(grid);
+    resampler->resample(whole(grid), {}, {.jacobian = view(found)});
+    EXPECT_TRUE(same_bits(expected.jacobian.voxels, found.voxels)) << "cells of " << cell;
+    EXPECT_GT(std::count(found.voxels.begin(), found.voxels.end(), 1.0f), 300000);
+    EXPECT_LT(*std::min_element(found.voxels.begin(), found.voxels.end()), 0.95f);
   }
 }
 
