@@ -137,8 +137,9 @@ TEST_F(ItkExamples, SequenceGivesTheProgramsBitsInEveryPhaseAndMemoryDoesNotGrow
   }
   EXPECT_FALSE(std::filesystem::exists(scratch_ / "phases/phase_13.mha"));
   EXPECT_TRUE(says(run.out, {"output buffers that were allocated: 1\n"}));
-#ifndef __SANITIZE_ADDRESS__  // which keeps what was freed
-  EXPECT_LT(peak_mb.back(), peak_mb[1] + 3);  // an output is 1.1 MB
+#ifndef __SANITIZE_ADDRESS__
+  // The sanitizer keeps what was freed. An output is 1.1 MB.
+  EXPECT_LT(peak_mb.back(), peak_mb[1] + 3);
 #endif
 }
 
