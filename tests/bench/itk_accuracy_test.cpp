@@ -125,7 +125,8 @@ TEST(ItkAccuracy, HalfWayBetweenVoxelsATrueVolumeIsTheirMean) {
     source[n] = static_cast<std::int16_t>(i * i);
     halfway[n] = static_cast<std::int16_t>((i * i + (i + 1) * (i + 1)) / 2);  // less a half
   }
-  const PullField half{{.size = kSize}, std::vector<glm::vec3>(voxels(), glm::vec3(0.5f, 0, 0))};
+  const Geometry grid{.size = kSize};
+  const PullField half{grid, std::vector<glm::vec3>(voxels(), glm::vec3(0.5f, 0, 0))};
   const Deviation found = compare_volume(halfway, source, {&half.grid, half.displacement});
   EXPECT_EQ(found.mean, 0.5);
   EXPECT_EQ(found.largest, 0.5);
