@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "io/dicom_codecs.h"
 #include "io/dicom_header.h"
 #include "io/dicom_text.h"
 
@@ -14,26 +15,6 @@ namespace {
 // for.
 constexpr int kLargestAxis = 16384;
 constexpr std::uint64_t kLargestExpansion = 1000, kSmallFile = 1 << 20;
-
-/// The transfer syntaxes whose pixels DCMTK 3.6.7 decodes.
-bool can_decode(E_TransferSyntax encoding) {
-  switch (encoding) {
-    case EXS_LittleEndianImplicit:
-    case EXS_LittleEndianExplicit:
-    case EXS_BigEndianExplicit:
-    case EXS_DeflatedLittleEndianExplicit:
-    case EXS_RLELossless:
-    case EXS_JPEGProcess1:
-    case EXS_JPEGProcess2_4:
-    case EXS_JPEGProcess6_8:
-    case EXS_JPEGProcess10_12:
-    case EXS_JPEGProcess14:
-    case EXS_JPEGProcess14SV1:
-    case EXS_JPEGLSLossless:
-    case EXS_JPEGLSLossy: return true;
-    default: return false;
-  }
-}
 
 std::string where(const DicomFileHeader& header) { return ", " + header.file.string(); }
 
@@ -55,13 +36,15 @@ std::string encoding_problem(const DicomFileHeader& header) {
            "; expected Pixel Data (7FE0,0010), export the series again without it";
   }
   if (!header.pixel_bytes) return "Pixel Data (7FE0,0010) is missing" + where(header) + "; export the file again";
-  if (!can_decode(header.encoding)) {
-    return "transfer syntax " + uid_with_name(header.transfer_syntax_uid) + " cannot be decoded" + where(header) +
+  const auto coding = pixel_coding(header.transfer_syntax_uid);
+  const bool is_compiled = coding != PixelCoding::jpeg_2000 || decodes_jpeg_2000();
+  if (!coding || !is_compiled) {
+    return "transfer syntax " + uid_with_name(header.transfer_syntax_uid) + " cannot be decoded" +
+           (is_compiled ? "" : " by this build, which has no OpenJPEG") + where(header) +
            "; decompress the series first, for example with gdcmconv --raw";
   }
   const std::uint64_t needed = slice_bytes(pixels);
-  const bool compressed =
-      DcmXfer(header.encoding).isEncapsulated() || header.encoding == EXS_DeflatedLittleEndianExplicit;
+  const bool compressed = coding != PixelCoding::native || header.encoding == EXS_DeflatedLittleEndianExplicit;
   if (!compressed && *header.pixel_bytes < needed) {
     return "Pixel Data is truncated" + where(header) + ": expected " + std::to_string(needed) + " bytes, found " +
            std::to_string(*header.pixel_bytes) + "; copy the file again";
@@ -117,7 +100,8 @@ std::string uid_with_name(const std::string& uid) {
   const DcmXfer syntax(uid.c_str());
   const char* name = dcmFindNameOfUID(uid.c_str());
   if (syntax.getXfer() != EXS_Unknown) name = syntax.getXferName();
-  return name ? std::string(name) + " (" + uid + ")" : uid;
+  const std::string found = name ? name : name_of_newer_syntax(uid);
+  return found.empty() ? uid : found + " (" + uid + ")";
 }
 
 std::string other_kind(const DicomFileHeader& header) {

@@ -16,6 +16,11 @@ namespace tetwarp {
 /// @throws InputError naming the file for data that are truncated, damaged or of another size than the header says
 std::vector<std::uint16_t> decode_pixels(DcmDataset& data, const DicomFileHeader& header);
 
+/// The same of the fragments of one compressed frame, without the Basic Offset Table (PS3.5 A.4): that is often wrong,
+/// and says nothing where there is one frame.
+std::vector<std::uint16_t> decode_frame(std::span<const std::span<const std::byte>> fragments,
+                                        const DicomFileHeader& header);
+
 /// Words of Pixel Data to HU. Built once for slices of the same format.
 struct HuTable {
   enum Kind : std::uint8_t { exact = 0, rounded = 1, beyond = 2, saturated_padding = 4 };

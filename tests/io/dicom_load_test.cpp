@@ -456,10 +456,19 @@ std::vector<Uint8> rle_frame(const std::vector<Uint8>& first, const std::vector<
 
 class DicomRle : public DicomLossless {};
 
-TEST_F(DicomRle, RunsLiteralsNoOpsAndWhatIsLeftOver) {
-  // High bytes: a run of 8. Low bytes: nothing (128), 3 literals, a run of 127 where 5 are left, padding.
-  const DicomVolume loaded = load_rle(rle_frame({249, 1}, {128, 2, 10, 20, 30, 130, 40, 0}));
+TEST_F(DicomRle, RunsLiteralsNoOpsAndPadding) {
+  // High bytes: a run of 8. Low bytes: nothing (128), 3 literals, a run of 5, padding.
+  const DicomVolume loaded = load_rle(rle_frame({249, 1}, {128, 2, 10, 20, 30, 252, 40, 0, 0, 0}));
   EXPECT_EQ(loaded.volume.voxels, (Hu{266, 276, 286, 296, 296, 296, 296, 296}));
+}
+
+TEST_F(DicomRle, SegmentsWithMoreThanThePlaneAreRefused) {
+  const std::vector<Uint8> high{249, 1}, run_beyond{2, 10, 20, 30, 130, 40},
+      another_run{2, 10, 20, 30, 252, 40, 250, 7};
+  EXPECT_TRUE(says(error_of([&] { load_rle(rle_frame(high, run_beyond)); }),
+                   {"slice.dcm", "expected 8 bytes of RLE segment 2, found more"}));
+  EXPECT_TRUE(says(error_of([&] { load_rle(rle_frame(high, another_run)); }),
+                   {"expected 8 bytes of RLE segment 2, found more"}));
 }
 
 TEST_F(DicomRle, SegmentsThatLackBytesAreRefusedWithTheirCount) {

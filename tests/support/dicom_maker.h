@@ -24,6 +24,7 @@ struct MadeSlice {
   std::string modality = "CT", image_type = "ORIGINAL\\PRIMARY\\AXIAL";
   int instance_number = 1, series_number = 1;
   E_TransferSyntax encoding = EXS_LittleEndianExplicit;
+  const DcmRepresentationParameter* encoder_parameter = nullptr;
   std::function<void(DcmDataset&)> edit;  ///< last word before writing
 };
 
@@ -43,10 +44,8 @@ inline void put_pixels(DcmDataset& data, const MadeSlice& slice) {
   }
 }
 
-/// Writes the slice; its transfer syntax may be one that a registered DCMTK encoder makes.
-inline void write_slice(const std::filesystem::path& path, const MadeSlice& slice) {
-  DcmFileFormat format;
-  DcmDataset& data = *format.getDataset();
+/// All attributes but Pixel Data.
+inline void put_attributes(DcmDataset& data, const MadeSlice& slice) {
   const auto text = [&](const DcmTagKey& tag, const std::string& value) {
     data.putAndInsertString(tag, value.c_str());
   };
@@ -75,9 +74,16 @@ inline void write_slice(const std::filesystem::path& path, const MadeSlice& slic
   word(DCM_BitsStored, slice.bits_stored);
   word(DCM_HighBit, slice.high_bit);
   word(DCM_PixelRepresentation, slice.is_signed ? 1 : 0);
+}
+
+/// Writes the slice; its transfer syntax may be one that a registered DCMTK encoder makes.
+inline void write_slice(const std::filesystem::path& path, const MadeSlice& slice) {
+  DcmFileFormat format;
+  DcmDataset& data = *format.getDataset();
+  put_attributes(data, slice);
   put_pixels(data, slice);
   if (slice.edit) slice.edit(data);
-  if (data.chooseRepresentation(slice.encoding, nullptr).bad()) throw std::runtime_error("no encoder");
+  if (data.chooseRepresentation(slice.encoding, slice.encoder_parameter).bad()) throw std::runtime_error("no encoder");
   const OFCondition result = format.saveFile(path.c_str(), slice.encoding);
   if (result.bad()) throw std::runtime_error(result.text());
 }

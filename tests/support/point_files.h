@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "io/points_file.h"
+#include "tests/support/write_file.h"
 
 /// Small files of points, each of the corners (1, 2, 3), (11, 2.5, 3), (1, 22, 3.25) in a frame that the text names.
 /// The frame is written into `SPACE` (surfaces, empty: not said) or stands as given.
@@ -41,11 +42,6 @@ inline std::string sample_text_stl(const std::string& space) {
   return "solid part " + space +
          "\n  facet normal 0 0 1\n    outer loop\n      vertex 1 2 3\n      vertex 11 2.5 3\n      vertex 1 22 3.25\n"
          "    endloop\n  endfacet\nendsolid part\n";
-}
-
-template <class T>
-void append_value(std::string& bytes, T value) {
-  bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
 }
 
 inline std::string sample_binary_stl(const std::string& space) {

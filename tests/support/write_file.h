@@ -7,3 +7,9 @@
 inline void write_file(const std::filesystem::path& path, const std::string& content) {
   std::ofstream(path, std::ios::binary) << content;
 }
+
+/// Appends the bytes of a number, little endian as this machine is.
+template <class T>
+void append_value(std::string& bytes, T value) {
+  bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+}

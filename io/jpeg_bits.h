@@ -1,0 +1,121 @@
+#pragma once
+
+// Private to io/: Huffman codes in JPEG streams, to the bit.
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace tetwarp {
+
+/// Entropy-coded data of a JPEG stream (ITU-T T.81 F.1.2.3), bit by bit up to a marker. Behind it come ones, which are
+/// counted: no code consists of them alone.
+class JpegBits {
+ public:
+  explicit JpegBits(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
+
+  /// The next 16 bits, which stay.
+  std::uint32_t peek() {
+    if (count_ < 16) fill();
+    return static_cast<std::uint32_t>(bits_ >> 48);
+  }
+  /// @param count  at most 16, after `peek`
+  void drop(int count) {
+    bits_ <<= count;
+    count_ -= count;
+  }
+  /// @param count  0 to 16
+  std::uint32_t take(int count) {
+    const std::uint32_t value = peek() >> (16 - count);
+    drop(count);
+    return value;
+  }
+
+  /// Whether bits were taken that are not there.
+  bool is_short() const { return count_ < behind_; }
+  /// Whether all were taken but what fills up the last byte: ones, of which some encoders add a byte, or zeros.
+  bool is_used_up() {
+    fill();
+    const int rest = count_ - behind_;
+    if (rest < 0 || rest > 15) return false;
+    const std::uint64_t value = rest == 0 ? 0 : bits_ >> (64 - rest);
+    return value == (std::uint64_t{1} << rest) - 1;
+  }
+  /// Goes to the marker where the data end, and behind it. @return its low byte; 0: there is none
+  std::uint8_t next_marker() {
+    while (at_ + 1 < bytes_.size() && bytes_[at_] == 0xff && bytes_[at_ + 1] == 0xff) ++at_;  // fill bytes
+    bits_ = 0;
+    count_ = behind_ = 0;
+    if (at_ + 1 >= bytes_.size() || bytes_[at_] != 0xff) return 0;
+    at_ += 2;
+    return bytes_[at_ - 1];
+  }
+
+ private:
+  void fill() {
+    while (count_ <= 48) {
+      std::uint64_t byte = 0xff;
+      const bool is_last = at_ + 1 >= bytes_.size();
+      if (is_last || (bytes_[at_] == 0xff && bytes_[at_ + 1] != 0)) {
+        behind_ += 8;
+      } else {
+        byte = bytes_[at_];
+        at_ += byte == 0xff ? 2 : 1;
+      }
+      bits_ |= byte << (56 - count_);
+      count_ += 8;
+    }
+  }
+
+  std::span<const std::uint8_t> bytes_;
+  std::size_t at_ = 0;
+  std::uint64_t bits_ = 0;      ///< the next ones, the first on top
+  int count_ = 0, behind_ = 0;  ///< how many there are, and how many of them lie behind the end
+};
+
+/// A table of Huffman codes (T.81 Annex C, F.2.2.3).
+class JpegCodes {
+ public:
+  /// @param counts  codes of 1 to 16 bits
+  /// @param values  of the codes, as many as these are
+  JpegCodes(std::span<const std::uint8_t, 16> counts, std::span<const std::uint8_t> values) {
+    std::uint32_t code = 0;
+    std::size_t n = 0;
+    for (int length = 1; length <= 16; ++length, code <<= 1) {
+      first_[length] = n - code;
+      for (int k = 0; k < counts[length - 1]; ++k, ++n, ++code) {
+        values_[n] = values[n];
+        for (std::uint32_t rest = 0; length <= kQuick && rest < 1u << (kQuick - length); ++rest)
+          quick_[(code << (kQuick - length) | rest) & (kQuickSize - 1)] =
+              static_cast<std::uint16_t>(length << 8 | values[n]);
+      }
+      end_[length] = code << (16 - length);
+    }
+  }
+  JpegCodes() = default;
+
+  /// @return the value of the next code, -1: no code begins like this
+  int next(JpegBits& bits) const {
+    const std::uint32_t ahead = bits.peek();
+    if (const std::uint16_t quick = quick_[ahead >> (16 - kQuick)]) {
+      bits.drop(quick >> 8);
+      return quick & 0xff;
+    }
+    for (int length = kQuick + 1; length <= 16; ++length) {
+      if (ahead >= end_[length]) continue;
+      bits.drop(length);
+      return values_[(first_[length] + (ahead >> (16 - length))) & 0xff];
+    }
+    return -1;
+  }
+
+ private:
+  static constexpr int kQuick = 9;
+  static constexpr std::size_t kQuickSize = std::size_t{1} << kQuick;
+  std::array<std::uint16_t, kQuickSize> quick_{};  ///< by the next bits: length and value of a short code; 0: none
+  std::array<std::uint8_t, 256> values_{};
+  std::array<std::size_t, 17> first_{};  ///< by length: the place of the first value, less its code
+  std::array<std::uint32_t, 17> end_{};  ///< by length: behind the last code, in 16 bits
+};
+
+}  // namespace tetwarp

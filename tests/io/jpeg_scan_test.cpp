@@ -1,0 +1,236 @@
+// Lossless JPEG decoded here, against what was encoded; and damage that shows to the bit.
+#include "io/jpeg_scan.h"
+
+#include <gtest/gtest.h>
+
+#include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmjpeg/djrplol.h>
+
+#include <algorithm>
+
+#include "tests/support/coded_slices.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch.h"
+
+namespace tetwarp {
+namespace {
+
+using Words = std::vector<std::uint16_t>;
+
+std::span<const std::uint8_t> octets(const std::string& bytes) {
+  return {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()};
+}
+
+/// What decoding gives, or why there is nothing.
+struct Decoded {
+  Words words;
+  std::string problem;
+};
+
+Decoded decode(const std::string& stream, bool is_signed = false) {
+  Decoded decoded;
+  const JpegScan scan = read_jpeg_scan(octets(stream), decoded.problem);
+  decoded.words.resize(static_cast<std::size_t>(scan.frame.rows * scan.frame.columns));
+  if (decoded.problem.empty()) decoded.problem = decode_lossless(scan, is_signed, decoded.words);
+  return decoded;
+}
+
+/// Frames of one component, coded with one table in which every size has a code of 5 bits: its number.
+class Writer {
+ public:
+  Writer(std::uint8_t marker, int rows, int columns, int precision, int restart_interval = 0) {
+    bytes_ = std::string("\xff\xd8", 2);
+    segment(marker, {precision, rows >> 8, rows & 255, columns >> 8, columns & 255, 1, 1, 0x11, 0});
+    std::vector<int> table{0, 0, 0, 0, 0, 17};
+    table.resize(17);
+    for (int size = 0; size <= 16; ++size) table.push_back(size);
+    segment(0xc4, table);
+    table[0] = 0x10;
+    segment(0xc4, table);
+    if (marker != 0xc3) segment(0xdb, std::vector<int>(65, 1));
+    if (marker != 0xc3) bytes_[bytes_.size() - 65] = '\0';  // the number of the table
+    if (restart_interval > 0) segment(0xdd, {restart_interval >> 8, restart_interval & 255});
+  }
+  void scan(int predictor, int transform = 0) {
+    segment(0xda, {1, 1, 0, predictor, predictor > 0 ? 0 : 63, transform});
+  }
+
+  void bits(int value, int count) {
+    for (int n = count - 1; n >= 0; --n) {
+      byte_ = byte_ << 1 | (value >> n & 1);
+      if (++filled_ < 8) continue;
+      bytes_ += static_cast<char>(byte_);
+      if (byte_ == 0xff) bytes_ += '\0';
+      byte_ = filled_ = 0;
+    }
+  }
+  void difference(int value) {
+    int size = 0;
+    for (int rest = std::abs(value); rest > 0; rest >>= 1) ++size;
+    bits(size, 5);
+    if (size < 16) bits(value < 0 ? value + (1 << size) - 1 : value, size);
+  }
+  /// Fills the last byte and writes a marker.
+  void marker(int code, int fill = 1) {
+    while (filled_ != 0) bits(fill, 1);
+    bytes_ += '\xff';
+    bytes_ += static_cast<char>(code);
+  }
+  std::string bytes() const { return bytes_; }
+
+ private:
+  void segment(int code, const std::vector<int>& content) {
+    bytes_ += '\xff';
+    bytes_ += static_cast<char>(code);
+    bytes_ += '\0';
+    bytes_ += static_cast<char>(content.size() + 2);
+    bytes_.append(content.begin(), content.end());
+  }
+
+  std::string bytes_;
+  int byte_ = 0, filled_ = 0;
+};
+
+/// 3 rows of 4 samples, each 10 more than the one before; rows begin anew after a restart.
+std::string ramp(int restart_rows, int end_fill = 1, int first_restart = 0) {
+  Writer writer(0xc3, 3, 4, 12, restart_rows * 4);
+  writer.scan(1);
+  for (int j = 0; j < 3; ++j) {
+    const bool is_first = j == 0 || (restart_rows > 0 && j % restart_rows == 0);
+    if (is_first && j > 0) writer.marker(0xd0 + (first_restart + j / restart_rows - 1) % 8);
+    for (int i = 0; i < 4; ++i) writer.difference(i > 0 ? 10 : is_first ? 100 - 2048 : 0);
+  }
+  writer.marker(0xd9, end_fill);
+  return writer.bytes();
+}
+
+const Words kRamp = {100, 110, 120, 130, 100, 110, 120, 130, 100, 110, 120, 130};
+
+TEST(JpegLossless, RestartsBeginAnewFromTheMiddleValue) {
+  for (const int restart_rows : {0, 1, 2, 3, 7}) {
+    const Decoded decoded = decode(ramp(restart_rows));
+    EXPECT_EQ(decoded.problem, "") << restart_rows;
+    EXPECT_EQ(decoded.words, kRamp) << restart_rows;
+  }
+}
+
+TEST(JpegLossless, RestartsOutOfOrderOrWithinARowAreRefused) {
+  EXPECT_TRUE(says(decode(ramp(1, 1, 1)).problem, {"damaged", "in row 2"}));
+  Writer within(0xc3, 3, 4, 12, 6);
+  within.scan(1);
+  EXPECT_TRUE(says(decode(within.bytes()).problem, {"whole rows", "6 samples"}));
+}
+
+TEST(JpegLossless, LastByteIsFilledWithOnes) {
+  EXPECT_EQ(decode(ramp(0, 1)).problem, "");
+  EXPECT_TRUE(says(decode(ramp(0, 0)).problem, {"damaged", "left over"}));
+}
+
+TEST(JpegLossless, SamplesBeyondThePrecisionAreRefusedUnlessTheyAreSigns) {
+  const auto stream = [](int first) {
+    Writer writer(0xc3, 1, 1, 12);
+    writer.scan(1);
+    writer.difference(first - 2048);
+    writer.marker(0xd9);
+    return writer.bytes();
+  };
+  EXPECT_EQ(decode(stream(4095)).words, Words{4095});
+  EXPECT_EQ(decode(stream(0)).words, Words{0});
+  EXPECT_TRUE(says(decode(stream(4096)).problem, {"damaged", "in row 1"}));
+  EXPECT_TRUE(says(decode(stream(-5)).problem, {"damaged"}));
+  EXPECT_EQ(decode(stream(-5), true).words, Words{0xfffb});
+  EXPECT_EQ(decode(stream(-2048), true).words, Words{0xf800});
+  EXPECT_TRUE(says(decode(stream(-2049), true).problem, {"damaged"}));
+}
+
+TEST(JpegLossless, DifferenceOf32768HasNoFurtherBits) {
+  Writer writer(0xc3, 1, 3, 16);
+  writer.scan(1);
+  writer.difference(-32768 + 5);
+  writer.bits(16, 5);
+  writer.difference(1);
+  writer.marker(0xd9);
+  const Decoded decoded = decode(writer.bytes());
+  EXPECT_EQ(decoded.problem, "");
+  EXPECT_EQ(decoded.words, (Words{5, 32773, 32774}));
+}
+
+TEST(JpegLossless, EveryPredictorAndShiftGivesBackWhatDcmtkEncoded) {
+  register_encoders();
+  const Scratch folder;
+  for (int predictor = 1; predictor <= 7; ++predictor) {
+    for (const int shift : {0, 3}) {
+      for (const int bits : {8, 12, 16}) {
+        MadeSlice slice = busy_slice();
+        slice.rows = 20;
+        slice.columns = 31;
+        slice.words = busy_words(620);
+        slice.bits_allocated = bits == 8 ? 8 : 16;
+        slice.bits_stored = bits;
+        slice.high_bit = bits - 1;
+        for (std::uint16_t& word : slice.words) word = static_cast<std::uint16_t>(word * 16 >> (16 - bits));
+        const DJ_RPLossless parameter(predictor, shift);
+        slice.encoder_parameter = &parameter;
+        const Decoded decoded = decode(encoded_frame(folder.path(), slice, EXS_JPEGProcess14));
+        EXPECT_EQ(decoded.problem, "");
+        for (std::uint16_t& word : slice.words) word = static_cast<std::uint16_t>(word >> shift << shift);
+        EXPECT_EQ(decoded.words, slice.words) << "predictor " << predictor << ", " << shift << ", " << bits << " bits";
+      }
+    }
+  }
+}
+
+/// One row of blocks, of which each has `coefficients` after its first.
+std::string blocks(int count, int coefficients, int restart_interval, bool with_end = true) {
+  Writer writer(0xc1, 8, 8 * count, 8, restart_interval);
+  writer.scan(0);
+  for (int n = 0; n < count; ++n) {
+    if (restart_interval > 0 && n > 0 && n % restart_interval == 0)
+      writer.marker(0xd0 + (n / restart_interval - 1) % 8);
+    writer.difference(3);
+    for (int k = 0; k < coefficients; ++k) writer.difference(1);  // a run of 0 and a size of 1
+    if (coefficients < 63) writer.bits(0, 5);                     // the end of the block
+  }
+  if (with_end) writer.marker(0xd9);
+  return writer.bytes();
+}
+
+std::string problem_of(const std::string& stream) {
+  std::string problem;
+  const JpegScan scan = read_jpeg_scan(octets(stream), problem);
+  return problem.empty() ? sequential_problem(scan) : problem;
+}
+
+TEST(JpegSequential, BlocksAreFollowedToTheBit) {
+  for (const int coefficients : {0, 1, 62, 63}) {
+    for (const int restart_interval : {0, 1, 3}) {
+      EXPECT_EQ(problem_of(blocks(20, coefficients, restart_interval)), "");
+    }
+  }
+  EXPECT_TRUE(says(problem_of(blocks(20, 64, 0)), {"damaged"}));
+  EXPECT_TRUE(says(problem_of(blocks(20, 2, 0, false)), {"damaged"}));
+  std::string fewer = blocks(20, 2, 0), more = fewer;
+  const std::size_t columns_at = fewer.find("\xff\xc1") + 7;
+  fewer[columns_at + 1] = static_cast<char>(8 * 19);
+  EXPECT_TRUE(says(problem_of(fewer), {"damaged", "left over"}));
+  more[columns_at + 1] = static_cast<char>(8 * 21);
+  EXPECT_TRUE(says(problem_of(more), {"damaged", "in block 21"}));
+}
+
+TEST(JpegHeader, DamagedOrMissingPartsAreNamed) {
+  const std::string whole = ramp(0);
+  EXPECT_EQ(problem_of(""), "expected a scan of one component, found none");
+  for (std::size_t size = 0; size < whole.size(); ++size) EXPECT_NE(decode(whole.substr(0, size)).problem, "") << size;
+  std::string crowded = whole;  // more codes of one bit than there are
+  crowded[crowded.find("\xff\xc4") + 5] = 3;
+  EXPECT_TRUE(says(decode(crowded).problem, {"Huffman", "damaged"}));
+  std::string other = whole;
+  other[other.find("\xff\xda") + 7] = 9;
+  EXPECT_TRUE(says(decode(other).problem, {"predictor 1 to 7", "found 9"}));
+  std::string elsewhere = whole;
+  elsewhere[elsewhere.find("\xff\xda") + 6] = 0x30;
+  EXPECT_TRUE(says(decode(elsewhere).problem, {"Huffman", "found none"}));
+}
+
+}  // namespace
+}  // namespace tetwarp
