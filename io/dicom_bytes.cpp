@@ -102,7 +102,7 @@ std::optional<ParsedSlice> parse_native(std::span<const std::byte> bytes, const 
 std::optional<std::uint64_t> pixel_bytes_of(DcmDataset& data, std::uint64_t file_bytes) {
   DcmElement* element = nullptr;
   if (data.findAndGetElement(DCM_PixelData, element).bad()) return std::nullopt;
-  return DcmXfer(data.getOriginalXfer()).isEncapsulated() ? file_bytes : element->getLength();
+  return element->getLengthField() == DCM_UndefinedLength ? file_bytes : element->getLength();
 }
 
 }  // namespace

@@ -3,7 +3,6 @@
 #include <dcmtk/dcmdata/dcdeftag.h>
 #include <dcmtk/dcmdata/dcuid.h>
 #include <dcmtk/dcmdata/dcvrui.h>
-#include <dcmtk/dcmdata/dcxfer.h>
 
 #include <algorithm>
 #include <numeric>
@@ -215,8 +214,6 @@ std::vector<DcmTagKey> derive_slice(DcmItem& target, DcmDataset& source, const D
   put_image_plane(target, geometry, static_cast<std::int64_t>(k));
   put_slice_place(target, source, geometry, k);
   if (series.padding) put_padding(target, *series.padding);
-  // Pixels that were once compressed with loss stay so, also where their file says it by its transfer syntax alone.
-  if (DcmXfer(source.getOriginalXfer()).isLossy()) put(target, DCM_LossyImageCompression, "01");
   std::vector<DcmTagKey> added;
   for (const DcmTagKey& tag : type_2_attributes()) {
     if (target.tagExists(tag)) continue;

@@ -12,7 +12,8 @@
 namespace tetwarp {
 
 struct DicomHeaders {
-  std::vector<std::unique_ptr<DcmDataset>> slices;  ///< every attribute but Pixel Data, as read
+  /// Every attribute but Pixel Data, as read. Lossy Image Compression is 01 also where only the transfer syntax says so.
+  std::vector<std::unique_ptr<DcmDataset>> slices;
 };
 
 }  // namespace tetwarp

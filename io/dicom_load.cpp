@@ -4,9 +4,11 @@
 
 #include "deform/large_memory.h"
 #include "io/dicom_bytes.h"
+#include "io/dicom_codecs.h"
 #include "io/dicom_header.h"
 #include "io/dicom_headers.h"
 #include "io/dicom_pixels.h"
+#include "io/dicom_put.h"
 #include "io/dicom_series.h"
 #include "io/dicom_stack.h"
 #include "io/hash.h"
@@ -56,6 +58,7 @@ LoadedSlice load_slice(const DicomSlice& slice, const Geometry& geometry, HuTabl
   loaded.pixels = header.pixels;
   loaded.header.reset(parsed.format->getAndRemoveDataset());
   delete loaded.header->remove(DCM_PixelData);
+  if (is_lossy(header.transfer_syntax_uid)) put(*loaded.header, DCM_LossyImageCompression, "01");
   return loaded;
 }
 
