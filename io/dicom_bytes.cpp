@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "deform/errors.h"
+#include "io/dicom_codecs.h"
 #include "io/dicom_stream.h"
 
 namespace tetwarp {
@@ -59,27 +60,53 @@ bool is_little_endian(E_TransferSyntax encoding) {
   return encoding == EXS_LittleEndianExplicit || encoding == EXS_LittleEndianImplicit;
 }
 
+std::uint32_t word_at(std::span<const std::byte> bytes, std::size_t at) {
+  const auto byte = [&](std::size_t n) { return std::to_integer<std::uint32_t>(bytes[at + n]); };
+  return byte(0) | byte(1) << 8 | byte(2) << 16 | byte(3) << 24;
+}
+
+bool starts_with(std::span<const std::byte> bytes, std::size_t at, const std::array<unsigned, 4>& start) {
+  return at <= bytes.size() && bytes.size() - at >= start.size() &&
+         std::equal(start.begin(), start.end(), bytes.begin() + static_cast<std::ptrdiff_t>(at),
+                    [](unsigned expected, std::byte found) { return expected == std::to_integer<unsigned>(found); });
+}
+
+constexpr std::array<unsigned, 4> kPixelData{0xe0, 0x7f, 0x10, 0x00}, kWords{'O', 'W', 0, 0}, kOctets{'O', 'B', 0, 0},
+    kItem{0xfe, 0xff, 0x00, 0xe0}, kItemsEnd{0xfe, 0xff, 0xdd, 0xe0};
+
 /// Bytes that the value of Pixel Data has by its own length field, which ends at `at` (PS3.5 7.1); none for what DCMTK
 /// has to look at: other value representations, lengths that are undefined or odd.
 std::optional<std::size_t> native_length(std::span<const std::byte> bytes, std::size_t at, E_TransferSyntax encoding) {
-  const auto byte = [&](std::size_t back) { return std::to_integer<std::uint32_t>(bytes[at - back]); };
-  const auto starts_with = [&](std::size_t back, const std::array<std::uint32_t, 4>& tag) {
-    for (std::size_t n = 0; n < tag.size(); ++n) {
-      if (byte(back - n) != tag[n]) return false;
-    }
-    return true;
-  };
-  constexpr std::array<std::uint32_t, 4> pixel_data{0xe0, 0x7f, 0x10, 0x00}, words{'O', 'W', 0, 0};
   const bool known = encoding == EXS_LittleEndianExplicit
-                         ? at >= 12 && starts_with(12, pixel_data) && starts_with(8, words)
-                         : at >= 8 && starts_with(8, pixel_data);
+                         ? at >= 12 && starts_with(bytes, at - 12, kPixelData) && starts_with(bytes, at - 8, kWords)
+                         : at >= 8 && starts_with(bytes, at - 8, kPixelData);
   if (!known) return std::nullopt;
-  const std::uint32_t length = byte(4) | byte(3) << 8 | byte(2) << 16 | byte(1) << 24;
+  const std::uint32_t length = word_at(bytes, at - 4);
   return length % 2 == 0 ? std::optional<std::size_t>(length) : std::nullopt;
 }
 
-/// The attributes before Pixel Data, if these are words that end the file, 16 bits each.
-std::optional<ParsedSlice> parse_native(std::span<const std::byte> bytes, const std::filesystem::path& file) {
+/// The items of encapsulated Pixel Data but the first, the offset table (PS3.5 A.4), which begin at `at` and end the
+/// file; none if it is not like this.
+std::vector<std::span<const std::byte>> fragments_at(std::span<const std::byte> bytes, std::size_t at) {
+  const bool known = at >= 12 && starts_with(bytes, at - 12, kPixelData) &&
+                     word_at(bytes, at - 4) == DCM_UndefinedLength &&
+                     (starts_with(bytes, at - 8, kOctets) || starts_with(bytes, at - 8, kWords));
+  std::vector<std::span<const std::byte>> items;
+  while (known && bytes.size() - at >= 8) {
+    const std::size_t length = word_at(bytes, at + 4), room = bytes.size() - at - 8;
+    if (starts_with(bytes, at, kItemsEnd) && room == 0 && !items.empty()) {
+      items.erase(items.begin());
+      return items;
+    }
+    if (!starts_with(bytes, at, kItem) || length > room) break;
+    items.push_back(bytes.subspan(at + 8, length));
+    at += 8 + length;
+  }
+  return {};
+}
+
+/// The attributes before Pixel Data, if these end the file: words of 16 bits each, or fragments.
+std::optional<ParsedSlice> parse_up_to_pixels(std::span<const std::byte> bytes, const std::filesystem::path& file) {
   static_assert(std::endian::native == std::endian::little);
   ParsedSlice slice;
   slice.format = std::make_unique<DcmFileFormat>();
@@ -88,6 +115,11 @@ std::optional<ParsedSlice> parse_native(std::span<const std::byte> bytes, const 
   const std::size_t at = bytes.size() - read.rest;
   slice.header = header_of(*slice.format, file);
   const E_TransferSyntax encoding = slice.header.encoding;
+  if (pixel_coding(slice.header.transfer_syntax_uid).value_or(PixelCoding::native) != PixelCoding::native) {
+    slice.fragments = fragments_at(bytes, at);
+    slice.header.pixel_bytes = bytes.size();
+    return slice.fragments.empty() ? std::nullopt : std::optional(std::move(slice));
+  }
   if (!is_little_endian(encoding) || slice.format->getDataset()->getOriginalXfer() != encoding) return std::nullopt;
   const auto length = native_length(bytes, at, encoding);
   const std::uint64_t needed = slice_bytes(slice.header.pixels);
@@ -120,10 +152,10 @@ std::span<const std::byte> FileBuffer::read(const std::filesystem::path& file) {
 }
 
 ParsedSlice parse_slice(std::span<const std::byte> bytes, const std::filesystem::path& file) {
-  std::optional<ParsedSlice> native = parse_native(bytes, file);
+  std::optional<ParsedSlice> in_place = parse_up_to_pixels(bytes, file);
   ParsedSlice slice;
-  if (native) {
-    slice = std::move(*native);
+  if (in_place) {
+    slice = std::move(*in_place);
   } else {
     slice.format = std::make_unique<DcmFileFormat>();
     const OFCondition result = parse_dicom(*slice.format, bytes, DCM_UndefinedTagKey).result;

@@ -25,12 +25,15 @@ class FileBuffer {
 struct ParsedSlice {
   std::unique_ptr<DcmFileFormat> format;
   DicomFileHeader header;
-  /// Pixel Data where they lie in the file: 16-bit words, little endian, as many as the header says. `format` does not
-  /// hold them then. Empty: they are in `format`.
+  /// Pixel Data where they lie in the file: 16-bit words, little endian, as many as the header says, or the fragments
+  /// of compressed frames as long as they are, without the offset table. `format` does not hold them then. Both empty:
+  /// they are in `format`.
   std::span<const std::byte> native;
+  std::vector<std::span<const std::byte>> fragments;
 };
 
-/// Parses a whole file. Uncompressed words are left where they are, which spares a copy or two of the most of it.
+/// Parses a whole file. Pixel Data that end it are left where they are, which spares a copy or two of the most of it;
+/// DCMTK makes fragments of odd length longer by a byte.
 /// @throws InputError naming the file for one that is truncated or damaged
 ParsedSlice parse_slice(std::span<const std::byte> bytes, const std::filesystem::path& file);
 

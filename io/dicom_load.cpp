@@ -52,9 +52,14 @@ LoadedSlice load_slice(const DicomSlice& slice, const Geometry& geometry, HuTabl
   for (const auto& problem : {geometry_problem(header), pixel_problem(header)}) require(problem.empty(), problem);
   require_unchanged(header, slice, geometry);
   const std::shared_ptr<const HuTable> table = tables.table_for(header.pixels);
-  loaded.count = parsed.native.empty()
-                     ? convert_to_hu(decode_pixels(*parsed.format->getDataset(), header), *table, slice.file, hu)
-                     : convert_to_hu(parsed.native, *table, slice.file, hu);
+  if (!parsed.native.empty()) {
+    loaded.count = convert_to_hu(parsed.native, *table, slice.file, hu);
+  } else {
+    const std::vector<std::uint16_t> words = parsed.fragments.empty()
+                                                 ? decode_pixels(*parsed.format->getDataset(), header)
+                                                 : decode_frame(parsed.fragments, header);
+    loaded.count = convert_to_hu(words, *table, slice.file, hu);
+  }
   loaded.pixels = header.pixels;
   loaded.header.reset(parsed.format->getAndRemoveDataset());
   delete loaded.header->remove(DCM_PixelData);

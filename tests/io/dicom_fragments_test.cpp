@@ -44,6 +44,13 @@ TEST_P(DicomFragments, AnyNumberOfThemIsOneFrame) {
   EXPECT_EQ(load({"", frame.substr(0, 20), "", frame.substr(20), ""}), whole) << "fragments without a byte";
 }
 
+TEST_P(DicomFragments, OddLengthsAreReadAsTheyAre) {
+  const std::string frame = GetParam().frame(folder_.path());
+  const Hu whole = load({frame});
+  for (const std::size_t size : {std::size_t{7}, std::size_t{1}, frame.size() / 2 | 1})
+    EXPECT_EQ(load(split(frame, size)), whole) << "fragments of " << size << " bytes";
+}
+
 TEST_P(DicomFragments, OffsetTableDecidesNothingWhereThereIsOneFrame) {
   const std::string frame = GetParam().frame(folder_.path());
   const Hu whole = load({frame});
