@@ -105,15 +105,24 @@ std::vector<std::span<const std::byte>> fragments_at(std::span<const std::byte> 
   return {};
 }
 
+/// What a deflated data set with this header may inflate to.
+std::size_t inflated_limit(const PixelFormat& pixels) {
+  const std::uint64_t frames = static_cast<std::uint64_t>(std::max(pixels.frames, 1));
+  return std::min(kLargestInflatedHeader + slice_bytes(pixels) * frames, kLargestInflated);
+}
+
 /// The attributes before Pixel Data, if these end the file: words of 16 bits each, or fragments.
-std::optional<ParsedSlice> parse_up_to_pixels(std::span<const std::byte> bytes, const std::filesystem::path& file) {
+/// @param limit  what the data set may inflate to, as these attributes say
+std::optional<ParsedSlice> parse_up_to_pixels(std::span<const std::byte> bytes, const std::filesystem::path& file,
+                                              std::size_t& limit) {
   static_assert(std::endian::native == std::endian::little);
   ParsedSlice slice;
   slice.format = std::make_unique<DcmFileFormat>();
-  const DicomRead read = parse_dicom(*slice.format, bytes, DCM_PixelData);
+  const DicomRead read = parse_dicom(*slice.format, bytes, DCM_PixelData, kLargestInflatedHeader);
   if (read.result.bad() || read.rest == 0 || read.rest >= bytes.size()) return std::nullopt;
   const std::size_t at = bytes.size() - read.rest;
   slice.header = header_of(*slice.format, file);
+  limit = inflated_limit(slice.header.pixels);
   const E_TransferSyntax encoding = slice.header.encoding;
   if (pixel_coding(slice.header.transfer_syntax_uid).value_or(PixelCoding::native) != PixelCoding::native) {
     slice.fragments = fragments_at(bytes, at);
@@ -152,13 +161,14 @@ std::span<const std::byte> FileBuffer::read(const std::filesystem::path& file) {
 }
 
 ParsedSlice parse_slice(std::span<const std::byte> bytes, const std::filesystem::path& file) {
-  std::optional<ParsedSlice> in_place = parse_up_to_pixels(bytes, file);
+  std::size_t limit = kLargestInflatedHeader;
+  std::optional<ParsedSlice> in_place = parse_up_to_pixels(bytes, file, limit);
   ParsedSlice slice;
   if (in_place) {
     slice = std::move(*in_place);
   } else {
     slice.format = std::make_unique<DcmFileFormat>();
-    const OFCondition result = parse_dicom(*slice.format, bytes, DCM_UndefinedTagKey).result;
+    const OFCondition result = parse_dicom(*slice.format, bytes, DCM_UndefinedTagKey, limit).result;
     require(result.good(),
             "truncated or damaged file, " + file.string() + ": " + result.text() + "; copy the file again");
     slice.header = header_of(*slice.format, file);

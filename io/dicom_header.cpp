@@ -243,7 +243,7 @@ DicomFileHeader read_dicom_header(const std::filesystem::path& file) {
   if (!header.skip.empty()) return header;
 
   DcmFileFormat format;
-  const DicomRead read = parse_dicom(format, file, DCM_PixelData);
+  const DicomRead read = parse_dicom(format, file, DCM_PixelData, ERM_autoDetect, kLargestInflatedHeader);
   header = header_of(format, file);
   if (read.result.bad()) header.damage = read.result.text();
   std::error_code no_size;

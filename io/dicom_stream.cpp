@@ -5,81 +5,125 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <cstring>
 #include <memory>
+#include <string>
 #include <vector>
 
 namespace tetwarp {
 namespace {
 
-/// Bytes, and what keeps them alive if they need that.
-struct Memory {
-  std::shared_ptr<const std::vector<std::byte>> owner;
-  std::span<const std::byte> bytes;
+/// Bytes that are there: those of a file in memory.
+class Plain {
+ public:
+  explicit Plain(std::span<const std::byte> bytes) : bytes_(bytes) {}
+  virtual ~Plain() = default;
+  /// All up to `end`, or as many as there are.
+  virtual std::span<const std::byte> first(std::size_t end) { return bytes_.first(std::min(end, bytes_.size())); }
+  /// How many there are from a place on; of what is not inflated yet, some of them.
+  virtual std::size_t count_from(std::size_t at) { return bytes_.size() - at; }
+  virtual bool is_whole() const { return true; }
+  virtual bool is_too_large() const { return false; }
+
+ private:
+  std::span<const std::byte> bytes_;
+};
+
+/// What is left of a producer, inflated as far as it is asked for (PS3.5 A.5: no header of zlib).
+class Inflated final : public Plain {
+ public:
+  /// @param limit  no more bytes than these are made
+  Inflated(std::unique_ptr<DcmProducer> packed, std::size_t limit)
+      : Plain({}), producer_(std::move(packed)), limit_(limit), packed_(kPiece), piece_(kPiece) {
+    status_ = inflateInit2(&stream_, -MAX_WBITS);
+  }
+  ~Inflated() override { inflateEnd(&stream_); }
+  Inflated(const Inflated&) = delete;
+  Inflated& operator=(const Inflated&) = delete;
+
+  std::span<const std::byte> first(std::size_t end) override {
+    while (plain_.size() < end && status_ == Z_OK && !is_too_large_) add_piece();
+    return std::span(plain_).first(std::min(end, plain_.size()));
+  }
+  std::size_t count_from(std::size_t at) override { return first(at + kPiece).size() - at; }
+  /// Whether it came to its end.
+  bool is_whole() const override { return status_ == Z_STREAM_END; }
+  bool is_too_large() const override { return is_too_large_; }
+
+ private:
+  static constexpr std::size_t kPiece = 1 << 16;
+
+  void add_piece() {
+    if (stream_.avail_in == 0) {
+      stream_.next_in = packed_.data();
+      stream_.avail_in = static_cast<uInt>(producer_->read(packed_.data(), kPiece));
+    }
+    stream_.next_out = piece_.data();
+    stream_.avail_out = kPiece;
+    status_ = inflate(&stream_, Z_NO_FLUSH);
+    const std::span<const std::byte> got = std::as_bytes(std::span(piece_).first(kPiece - stream_.avail_out));
+    is_too_large_ = got.size() > limit_ - plain_.size();
+    if (!is_too_large_) plain_.insert(plain_.end(), got.begin(), got.end());
+  }
+
+  std::unique_ptr<DcmProducer> producer_;
+  std::size_t limit_;
+  std::vector<Bytef> packed_, piece_;
+  std::vector<std::byte> plain_;
+  z_stream stream_{};
+  int status_;
+  bool is_too_large_ = false;
 };
 
 class MemoryProducer final : public DcmProducer {
  public:
-  MemoryProducer(Memory memory, std::size_t at) : memory_(std::move(memory)), at_(at) {}
+  MemoryProducer(std::shared_ptr<Plain> plain, std::size_t at) : plain_(std::move(plain)), at_(at) {}
 
   OFBool good() const override { return OFTrue; }
   OFCondition status() const override { return EC_Normal; }
-  OFBool eos() override { return at_ == memory_.bytes.size(); }
-  offile_off_t avail() override { return static_cast<offile_off_t>(memory_.bytes.size() - at_); }
+  OFBool eos() override { return avail() == 0; }
+  offile_off_t avail() override { return static_cast<offile_off_t>(plain_->count_from(at_)); }
   offile_off_t read(void* buffer, offile_off_t length) override {
-    const offile_off_t count = std::min(length, avail());
-    if (count > 0) std::memcpy(buffer, memory_.bytes.data() + at_, static_cast<std::size_t>(count));
-    return skip(count);
+    const std::span<const std::byte> bytes = next(length);
+    if (!bytes.empty()) std::memcpy(buffer, bytes.data(), bytes.size());
+    at_ += bytes.size();
+    return static_cast<offile_off_t>(bytes.size());
   }
   offile_off_t skip(offile_off_t length) override {
-    const offile_off_t count = std::min(length, avail());
-    at_ += static_cast<std::size_t>(count);
-    return count;
+    const std::size_t count = next(length).size();
+    at_ += count;
+    return static_cast<offile_off_t>(count);
   }
   void putback(offile_off_t count) override { at_ -= static_cast<std::size_t>(count); }
 
-  const Memory& memory() const { return memory_; }
+  const std::shared_ptr<Plain>& plain() const { return plain_; }
   std::size_t at() const { return at_; }
 
  private:
-  Memory memory_;
+  std::span<const std::byte> next(offile_off_t length) {
+    return plain_->first(at_ + static_cast<std::size_t>(std::max<offile_off_t>(length, 0))).subspan(at_);
+  }
+
+  std::shared_ptr<Plain> plain_;
   std::size_t at_;
 };
 
-/// All that is left of a producer, inflated (PS3.5 A.5: no header of zlib). @param whole  whether it came to its end
-Memory inflated(DcmProducer& producer, bool& whole) {
-  constexpr std::size_t kPiece = 1 << 16;
-  const auto plain = std::make_shared<std::vector<std::byte>>();
-  std::vector<Bytef> packed(kPiece), piece(kPiece);
-  z_stream stream{};
-  int status = inflateInit2(&stream, -MAX_WBITS);
-  while (status == Z_OK) {
-    if (stream.avail_in == 0) {
-      stream.next_in = packed.data();
-      stream.avail_in = static_cast<uInt>(producer.read(packed.data(), kPiece));
-    }
-    stream.next_out = piece.data();
-    stream.avail_out = kPiece;
-    status = inflate(&stream, Z_NO_FLUSH);
-    const std::span<const std::byte> got = std::as_bytes(std::span(piece).first(kPiece - stream.avail_out));
-    plain->insert(plain->end(), got.begin(), got.end());
-  }
-  whole = status == Z_STREAM_END;
-  inflateEnd(&stream);
-  return {plain, *plain};
-}
-
-/// DCMTK's stream, except that a compressed part is inflated as soon as it begins: what is in memory can be gone back
-/// to.
+/// DCMTK's stream, except that what is compressed is kept as it is inflated: what is in memory can be gone back to.
+///
+/// DCMTK calls itself for every item within an item, as deep as the file says. Each of its calls asks for a mark where
+/// a tag begins; how many of them are under way shows in where their frames lie.
 class DicomStream final : public DcmInputStream {
  public:
   explicit DicomStream(const OFFilename& file)
       : DcmInputStream(nullptr), file_(file), producer_(std::make_unique<DcmFileProducer>(file)) {}
-  DicomStream(const Memory& memory, std::size_t at)
-      : DcmInputStream(nullptr), producer_(std::make_unique<MemoryProducer>(memory, at)) {}
+  DicomStream(const std::shared_ptr<Plain>& plain, std::size_t at)
+      : DcmInputStream(nullptr), producer_(std::make_unique<MemoryProducer>(plain, at)) {}
 
-  OFBool good() const override { return producer_->good(); }
-  OFCondition status() const override { return producer_->status(); }
+  void limit_inflated(std::size_t bytes) { inflated_limit_ = bytes; }
+
+  OFBool good() const override { return producer_->good() && !is_too_deep(); }
+  OFCondition status() const override { return is_too_deep() ? EC_InvalidStream : producer_->status(); }
   OFBool eos() override { return producer_->eos(); }
   offile_off_t avail() override { return producer_->avail(); }
   offile_off_t read(void* buffer, offile_off_t length) override {
@@ -87,20 +131,32 @@ class DicomStream final : public DcmInputStream {
   }
   offile_off_t skip(offile_off_t length) override { return advanced(producer_->skip(length)); }
   offile_off_t tell() const override { return tell_; }
-  void mark() override { mark_ = tell_; }
+  void mark() override {
+    mark_ = tell_;
+    const auto frame = reinterpret_cast<std::uintptr_t>(__builtin_frame_address(0));
+    while (!frames_.empty() && frames_.back() < frame) frames_.pop_back();  // stacks grow downwards
+    if (frames_.empty() || frames_.back() != frame) frames_.push_back(frame);
+    deepest_ = std::max(deepest_, frames_.size());
+  }
   void putback() override {
     producer_->putback(tell_ - mark_);
     tell_ = mark_;
   }
   OFCondition installCompressionFilter(E_StreamCompression filter) override {
     if (filter == ESC_none) return EC_Normal;
-    producer_ = std::make_unique<MemoryProducer>(inflated(*producer_, whole_), 0);
+    inflated_ = std::make_shared<Inflated>(std::move(producer_), inflated_limit_);
+    producer_ = std::make_unique<MemoryProducer>(inflated_, 0);
     return EC_Normal;
   }
   DcmInputStreamFactory* newFactory() const override;
 
-  /// Whether what was compressed, if anything, could be inflated to its end.
-  bool whole() const { return whole_; }
+  /// Whether sequences lie in sequences deeper than kDeepestSequence.
+  bool is_too_deep() const {
+    constexpr std::size_t kOutside = 4;                 // the data set, and what is read before it
+    return deepest_ > 2 * kDeepestSequence + kOutside;  // a call for each, and one for its items
+  }
+  /// What was compressed, if anything.
+  const Plain* inflated() const { return inflated_.get(); }
 
  private:
   offile_off_t advanced(offile_off_t count) {
@@ -110,21 +166,23 @@ class DicomStream final : public DcmInputStream {
 
   OFFilename file_;
   std::unique_ptr<DcmProducer> producer_;
+  std::shared_ptr<Plain> inflated_;
+  std::size_t inflated_limit_ = 0, deepest_ = 0;
+  std::vector<std::uintptr_t> frames_;
   offile_off_t tell_ = 0, mark_ = 0;
-  bool whole_ = true;
 };
 
 /// Goes back to a place in memory.
 class MemoryFactory final : public DcmInputStreamFactory {
  public:
-  explicit MemoryFactory(const MemoryProducer& producer) : memory_(producer.memory()), at_(producer.at()) {}
-  DcmInputStream* create() const override { return new DicomStream(memory_, at_); }
+  explicit MemoryFactory(const MemoryProducer& producer) : plain_(producer.plain()), at_(producer.at()) {}
+  DcmInputStream* create() const override { return new DicomStream(plain_, at_); }
   DcmInputStreamFactory* clone() const override { return new MemoryFactory(*this); }
   /// DCMTK asks it to know whether there is a file that it can keep open.
   DcmInputStreamFactoryType ident() const override { return DFT_DcmInputTempFileStreamFactory; }
 
  private:
-  Memory memory_;
+  std::shared_ptr<Plain> plain_;
   std::size_t at_;
 };
 
@@ -133,27 +191,41 @@ DcmInputStreamFactory* DicomStream::newFactory() const {
   return new DcmInputFileStreamFactory(file_, tell_);
 }
 
-DicomRead load(DcmFileFormat& format, DicomStream& stream, const DcmTagKey& until) {
+OFCondition refusal(const std::string& reason) {
+  return {OFM_dcmdata, EC_CorruptedData.theCode, OF_error, reason.c_str()};
+}
+
+DicomRead load(DcmFileFormat& format, DicomStream& stream, const DcmTagKey& until, std::size_t inflated_limit) {
   if (stream.status().bad()) return {stream.status()};
+  stream.limit_inflated(inflated_limit);
   format.transferInit();
-  const OFCondition result = format.readUntilTag(stream, EXS_Unknown, EGL_noChange, DCM_MaxReadLength, until);
+  OFCondition result = format.readUntilTag(stream, EXS_Unknown, EGL_noChange, DCM_MaxReadLength, until);
   format.transferEnd();
   const auto rest = static_cast<std::size_t>(stream.avail());
-  return {result.good() && rest == 0 && !stream.whole() ? EC_CorruptedData : result, rest};
+  const Plain* inflated = stream.inflated();
+  if (stream.is_too_deep()) {
+    result = refusal("sequences in sequences, more than " + std::to_string(kDeepestSequence) + " deep");
+  } else if (inflated && inflated->is_too_large()) {
+    result = refusal("the data set inflates to more than " + std::to_string(inflated_limit >> 20) + " MiB");
+  } else if (result.good() && rest == 0 && inflated && !inflated->is_whole()) {
+    result = EC_CorruptedData;
+  }
+  return {result, rest};
 }
 
 }  // namespace
 
 DicomRead parse_dicom(DcmFileFormat& format, const std::filesystem::path& file, const DcmTagKey& until,
-                      E_FileReadMode mode) {
+                      E_FileReadMode mode, std::size_t inflated_limit) {
   DicomStream stream(OFFilename(file.c_str()));
   format.setReadMode(mode);
-  return load(format, stream, until);
+  return load(format, stream, until, inflated_limit);
 }
 
-DicomRead parse_dicom(DcmFileFormat& format, std::span<const std::byte> bytes, const DcmTagKey& until) {
-  DicomStream stream(Memory{nullptr, bytes}, 0);
-  DicomRead read = load(format, stream, until);
+DicomRead parse_dicom(DcmFileFormat& format, std::span<const std::byte> bytes, const DcmTagKey& until,
+                      std::size_t inflated_limit) {
+  DicomStream stream(std::make_shared<Plain>(bytes), 0);
+  DicomRead read = load(format, stream, until, inflated_limit);
   if (read.result.good()) read.result = format.loadAllDataIntoMemory();  // all of them lie within the file
   return read;
 }

@@ -12,17 +12,27 @@ namespace tetwarp {
 
 struct DicomRead {
   OFCondition result;
-  std::size_t rest = 0;  ///< bytes behind the place where reading ended, inflated
+  std::size_t rest = 0;  ///< bytes behind the place where reading ended; of a deflated data set, some of them
 };
+
+/// What a deflated data set may inflate to: up to Pixel Data, and all of it. A byte can stand for a thousand.
+constexpr std::size_t kLargestInflatedHeader = std::size_t{64} << 20, kLargestInflated = std::size_t{1} << 30;
+
+/// How deep sequences may lie in sequences. DCMTK calls itself for each, until the stack is full. Structured reports go
+/// some tens deep.
+constexpr std::size_t kDeepestSequence = 100;
 
 /// Reads a file as DCMTK's own loadFileUntilTag does, but for deflated data sets, of which DCMTK reads every value at
 /// once and so allocates whatever length a damaged one says. Here long values wait where they are until they are asked
-/// for, deflated or not, and one that goes beyond the end is an error before that.
-/// @param until  where reading stops; DCM_UndefinedTagKey: at the end
+/// for, deflated or not, and one that goes beyond the end is an error before that. What is deflated is inflated only as
+/// far as reading goes. Sequences deeper than kDeepestSequence are an error.
+/// @param until           where reading stops; DCM_UndefinedTagKey: at the end
+/// @param inflated_limit  a deflated data set that takes more bytes is an error
 DicomRead parse_dicom(DcmFileFormat& format, const std::filesystem::path& file, const DcmTagKey& until,
-                      E_FileReadMode mode = ERM_autoDetect);
+                      E_FileReadMode mode = ERM_autoDetect, std::size_t inflated_limit = kLargestInflated);
 
 /// The same of a file in memory, to which nothing of `format` points after a good result.
-DicomRead parse_dicom(DcmFileFormat& format, std::span<const std::byte> bytes, const DcmTagKey& until);
+DicomRead parse_dicom(DcmFileFormat& format, std::span<const std::byte> bytes, const DcmTagKey& until,
+                      std::size_t inflated_limit = kLargestInflated);
 
 }  // namespace tetwarp
