@@ -79,7 +79,7 @@ std::optional<int> integer_of(DcmItem& item, const DcmTagKey& tag) {
   return static_cast<int>(*value);
 }
 
-/// The 16 bits of a US or SS attribute.
+/// The 16 bits of a US or SS attribute, also where the file gives it another VR of words or bytes.
 std::optional<int> word_of(DcmItem& item, const DcmTagKey& tag) {
   DcmElement* element = nullptr;
   Uint16 word = 0;
@@ -87,6 +87,8 @@ std::optional<int> word_of(DcmItem& item, const DcmTagKey& tag) {
   if (!is_at_most(item, tag, kLongestValue) || item.findAndGetElement(tag, element).bad()) return std::nullopt;
   if (element->getUint16(word).good()) return word;
   if (element->getSint16(signed_word).good()) return static_cast<Uint16>(signed_word);
+  Uint8* bytes = nullptr;
+  if (element->getUint8Array(bytes).good() && bytes && element->getLength() >= 2) return bytes[0] | bytes[1] << 8;
   return std::nullopt;
 }
 
