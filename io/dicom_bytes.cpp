@@ -1,60 +1,17 @@
 #include "io/dicom_bytes.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cerrno>
-#include <cstring>
 #include <optional>
 
 #include "deform/errors.h"
 #include "io/dicom_codecs.h"
 #include "io/dicom_stream.h"
+#include "io/opened_file.h"
 
 namespace tetwarp {
 namespace {
-
-/// A file that is open for reading.
-class OpenFile {
- public:
-  explicit OpenFile(const std::filesystem::path& path)
-      : path_(path), file_(::open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
-    require(file_ >= 0, refusal());
-  }
-  ~OpenFile() { ::close(file_); }
-  OpenFile(const OpenFile&) = delete;
-  OpenFile& operator=(const OpenFile&) = delete;
-
-  std::size_t size() const {
-    struct stat status {};
-    require(::fstat(file_, &status) == 0 && S_ISREG(status.st_mode), refusal());
-    return static_cast<std::size_t>(status.st_size);
-  }
-  /// Up to `bytes.size()` of the next bytes; less at the end of the file.
-  std::size_t read(std::span<std::byte> bytes) const {
-    std::size_t done = 0;
-    while (done < bytes.size()) {
-      const ssize_t count = ::read(file_, bytes.data() + done, bytes.size() - done);
-      if (count < 0 && errno == EINTR) continue;
-      require(count >= 0, refusal());
-      if (count == 0) break;
-      done += static_cast<std::size_t>(count);
-    }
-    return done;
-  }
-
- private:
-  std::string refusal() const {
-    return "cannot be read, " + path_.string() + ": " + std::strerror(errno) + "; check the file";
-  }
-
-  const std::filesystem::path& path_;
-  int file_;
-};
 
 bool is_little_endian(E_TransferSyntax encoding) {
   return encoding == EXS_LittleEndianExplicit || encoding == EXS_LittleEndianImplicit;
@@ -149,14 +106,21 @@ std::optional<std::uint64_t> pixel_bytes_of(DcmDataset& data, std::uint64_t file
 }  // namespace
 
 std::span<const std::byte> FileBuffer::read(const std::filesystem::path& file) {
-  const OpenFile open(file);
-  const std::size_t size = open.size();
+  OpenedFile opened(file);
+  const auto check = [&] {
+    require(opened.problem().empty(),
+            "cannot be read, " + file.string() + ": " + opened.problem() + "; check the file");
+  };
+  check();
+  const std::size_t size = opened.size();
   if (room_ < size) {
     room_ = std::max(size, 2 * room_);
     bytes_ = std::make_unique_for_overwrite<std::byte[]>(room_);
   }
   const std::span<std::byte> bytes(bytes_.get(), size);
-  require(open.read(bytes) == size, "cannot be read whole, " + file.string() + "; check the file");
+  const std::size_t count = opened.read(0, bytes);
+  check();
+  require(count == size, "cannot be read whole, " + file.string() + "; check the file");
   return bytes;
 }
 

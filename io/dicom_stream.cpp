@@ -1,6 +1,7 @@
 #include "io/dicom_stream.h"
 
 #include <dcmtk/dcmdata/dcdeftag.h>
+#include <dcmtk/dcmdata/dcerror.h>
 #include <dcmtk/dcmdata/dcistrmf.h>
 #include <zlib.h>
 
@@ -76,6 +77,39 @@ class Inflated final : public Plain {
   bool is_too_large_ = false;
 };
 
+/// The bytes of an open file.
+class FileProducer final : public DcmProducer {
+ public:
+  explicit FileProducer(std::shared_ptr<OpenedFile> file) : file_(std::move(file)) {}
+
+  OFBool good() const override { return file_->problem().empty() && !cut_short_; }
+  OFCondition status() const override {
+    if (!file_->problem().empty()) return makeOFCondition(OFM_dcmdata, 18, OF_error, file_->problem().c_str());
+    return cut_short_ ? EC_InvalidStream : EC_Normal;
+  }
+  OFBool eos() override { return at_ == file_->size(); }
+  offile_off_t avail() override { return static_cast<offile_off_t>(file_->size() - at_); }
+  offile_off_t read(void* buffer, offile_off_t length) override {
+    const offile_off_t wanted = std::min(length, avail());
+    if (wanted <= 0) return 0;
+    const std::size_t count = file_->read(at_, {static_cast<std::byte*>(buffer), static_cast<std::size_t>(wanted)});
+    cut_short_ = count < static_cast<std::size_t>(wanted);  // since it was opened
+    at_ += count;
+    return static_cast<offile_off_t>(count);
+  }
+  offile_off_t skip(offile_off_t length) override {
+    const offile_off_t count = std::min(length, avail());
+    at_ += static_cast<std::uint64_t>(count);
+    return count;
+  }
+  void putback(offile_off_t count) override { at_ -= static_cast<std::uint64_t>(count); }
+
+ private:
+  std::shared_ptr<OpenedFile> file_;
+  std::uint64_t at_ = 0;
+  bool cut_short_ = false;
+};
+
 class MemoryProducer final : public DcmProducer {
  public:
   MemoryProducer(std::shared_ptr<Plain> plain, std::size_t at) : plain_(std::move(plain)), at_(at) {}
@@ -115,8 +149,8 @@ class MemoryProducer final : public DcmProducer {
 /// a tag begins; how many of them are under way shows in where their frames lie.
 class DicomStream final : public DcmInputStream {
  public:
-  explicit DicomStream(const OFFilename& file)
-      : DcmInputStream(nullptr), file_(file), producer_(std::make_unique<DcmFileProducer>(file)) {}
+  explicit DicomStream(const std::shared_ptr<OpenedFile>& file)
+      : DcmInputStream(nullptr), file_(file->path().c_str()), producer_(std::make_unique<FileProducer>(file)) {}
   DicomStream(const std::shared_ptr<Plain>& plain, std::size_t at)
       : DcmInputStream(nullptr), producer_(std::make_unique<MemoryProducer>(plain, at)) {}
 
@@ -215,11 +249,16 @@ DicomRead load(DcmFileFormat& format, DicomStream& stream, const DcmTagKey& unti
 
 }  // namespace
 
-DicomRead parse_dicom(DcmFileFormat& format, const std::filesystem::path& file, const DcmTagKey& until,
+DicomRead parse_dicom(DcmFileFormat& format, const std::shared_ptr<OpenedFile>& file, const DcmTagKey& until,
                       E_FileReadMode mode, std::size_t inflated_limit) {
-  DicomStream stream(OFFilename(file.c_str()));
+  DicomStream stream(file);
   format.setReadMode(mode);
   return load(format, stream, until, inflated_limit);
+}
+
+DicomRead parse_dicom(DcmFileFormat& format, const std::filesystem::path& file, const DcmTagKey& until,
+                      E_FileReadMode mode, std::size_t inflated_limit) {
+  return parse_dicom(format, std::make_shared<OpenedFile>(file), until, mode, inflated_limit);
 }
 
 DicomRead parse_dicom(DcmFileFormat& format, std::span<const std::byte> bytes, const DcmTagKey& until,

@@ -6,7 +6,10 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <memory>
 #include <span>
+
+#include "io/opened_file.h"
 
 namespace tetwarp {
 
@@ -29,6 +32,9 @@ constexpr std::size_t kDeepestSequence = 100;
 /// @param until           where reading stops; DCM_UndefinedTagKey: at the end
 /// @param inflated_limit  a deflated data set that takes more bytes is an error
 DicomRead parse_dicom(DcmFileFormat& format, const std::filesystem::path& file, const DcmTagKey& until,
+                      E_FileReadMode mode = ERM_autoDetect, std::size_t inflated_limit = kLargestInflated);
+/// The same of a file that is open. `format` may hold on to it: a deflated data set is inflated on demand.
+DicomRead parse_dicom(DcmFileFormat& format, const std::shared_ptr<OpenedFile>& file, const DcmTagKey& until,
                       E_FileReadMode mode = ERM_autoDetect, std::size_t inflated_limit = kLargestInflated);
 
 /// The same of a file in memory, to which nothing of `format` points after a good result.

@@ -1,0 +1,62 @@
+#include "io/opened_file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <system_error>
+#include <utility>
+
+namespace tetwarp {
+
+namespace {
+
+constexpr std::size_t kPiece = 1 << 14;
+
+}  // namespace
+
+OpenedFile::OpenedFile(std::filesystem::path path)
+    : path_(std::move(path)), file_(::open(path_.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {
+  struct stat status {};
+  if (file_ < 0 || ::fstat(file_, &status) != 0)
+    problem_ = std::generic_category().message(errno);
+  else if (!S_ISREG(status.st_mode))
+    problem_ = "not a regular file";
+  else
+    size_ = static_cast<std::uint64_t>(status.st_size);
+}
+
+OpenedFile::~OpenedFile() {
+  if (file_ >= 0) ::close(file_);
+}
+
+std::size_t OpenedFile::read(std::uint64_t offset, std::span<std::byte> bytes) {
+  if (bytes.size() >= kPiece) return read_directly(offset, bytes);
+  const bool there = offset >= piece_offset_ && offset + bytes.size() <= piece_offset_ + piece_bytes_;
+  if (!there) {
+    if (!piece_) piece_ = std::make_unique_for_overwrite<std::byte[]>(kPiece);
+    piece_bytes_ = read_directly(offset, {piece_.get(), kPiece});
+    piece_offset_ = offset;
+  }
+  const std::size_t begin = offset - piece_offset_;
+  const std::size_t count = std::min(bytes.size(), piece_bytes_ - std::min(begin, piece_bytes_));
+  std::copy_n(piece_.get() + begin, count, bytes.begin());
+  return count;
+}
+
+std::size_t OpenedFile::read_directly(std::uint64_t offset, std::span<std::byte> bytes) {
+  bytes = bytes.first(std::min<std::uint64_t>(bytes.size(), size_ - std::min(offset, size_)));
+  std::size_t done = 0;
+  while (done < bytes.size() && problem_.empty()) {
+    const ssize_t count = ::pread(file_, bytes.data() + done, bytes.size() - done, static_cast<off_t>(offset + done));
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) problem_ = std::generic_category().message(errno);
+    if (count <= 0) break;
+    done += static_cast<std::size_t>(count);
+  }
+  return done;
+}
+
+}  // namespace tetwarp

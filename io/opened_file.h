@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+
+namespace tetwarp {
+
+/// A regular file, opened once. Small reads are served from one piece of 16 KiB, so that the header of a slice takes
+/// one or two calls of the system, and a file that is no DICOM no more than its first piece.
+class OpenedFile {
+ public:
+  /// Never throws for what is there: see `problem`. A pipe or a device is not waited for.
+  explicit OpenedFile(std::filesystem::path path);
+  ~OpenedFile();
+  OpenedFile(const OpenedFile&) = delete;
+  OpenedFile& operator=(const OpenedFile&) = delete;
+
+  /// Why it cannot be read, in the system's words, also of a read that failed; empty if it can.
+  const std::string& problem() const { return problem_; }
+  const std::filesystem::path& path() const { return path_; }
+  std::uint64_t size() const { return size_; }
+  /// Fills `bytes` from an offset of the file. @return how many; less than asked for at the end, or with a problem
+  std::size_t read(std::uint64_t offset, std::span<std::byte> bytes);
+
+ private:
+  std::size_t read_directly(std::uint64_t offset, std::span<std::byte> bytes);
+
+  std::filesystem::path path_;
+  int file_;
+  std::uint64_t size_ = 0;
+  std::string problem_;
+  std::unique_ptr<std::byte[]> piece_;
+  std::uint64_t piece_offset_ = 0;
+  std::size_t piece_bytes_ = 0;
+};
+
+}  // namespace tetwarp
