@@ -8,6 +8,8 @@
 #include <cstdio>
 #include <thread>
 
+#include "io/shown_text.h"
+
 namespace tetwarp::apps {
 
 namespace {
@@ -39,7 +41,7 @@ void watch_interrupts() {
 std::stop_token interrupt_token() { return interrupts().get_token(); }
 
 void say(const CommonOptions& common, const std::string& line) {
-  if (!common.quiet) std::fprintf(stderr, "%s\n", line.c_str());
+  if (!common.quiet) std::fprintf(stderr, "%s\n", shown_lines(line).c_str());
 }
 
 Stage::Stage(const CommonOptions& common, std::string name)

@@ -5,13 +5,14 @@
 
 #include "apps/console.h"
 #include "apps/options.h"
+#include "io/shown_text.h"
 
 namespace {
 
 constexpr int kFailed = 1, kWrongCommandLine = 2, kInputRefused = 4, kInterrupted = 130;
 
 int fail(int status, const char* what) {
-  std::fprintf(stderr, "tetwarp: error: %s\n", what);
+  std::fprintf(stderr, "tetwarp: error: %s\n", tetwarp::shown_lines(what).c_str());
   return status;
 }
 

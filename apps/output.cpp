@@ -79,7 +79,7 @@ fs::path sidecar_of(const fs::path& output) { return plain(output).string() + ".
 
 void write_json(const fs::path& path, const nlohmann::json& document) {
   std::ofstream file(path, std::ios::binary | std::ios::trunc);
-  file << document.dump(2) << "\n";
+  file << document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << "\n";
   file.close();
   if (!file) throw Error("cannot be written whole, " + path.string() + "; is the disk full?");
 }

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+namespace tetwarp {
+
+/// Text from a file, or a name, the way messages show it: control characters (also those of a terminal, and line ends),
+/// marks that turn the direction of writing, and bytes that are no UTF-8 become "\xNN", byte by byte.
+std::string shown(std::string_view text);
+std::string shown(const std::filesystem::path& path);
+inline std::string shown(const char* text) { return shown(std::string_view(text)); }
+inline std::string shown(const std::string& text) { return shown(std::string_view(text)); }
+
+/// The same of text of several lines: line feeds stay.
+std::string shown_lines(std::string_view text);
+
+}  // namespace tetwarp
