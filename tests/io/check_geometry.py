@@ -2,8 +2,8 @@
 
     check_geometry.py pydicom|dcm2niix FOLDER EXPECTED.json
 
-EXPECTED.json: size, spacing, origin, direction (columns, one after the other), LPS mm; HU sum of all voxels.
-Every corner voxel centre must agree within 1e-4 mm. Exit status 0: it does, 1: it does not, 77: the reader is missing.
+EXPECTED.json: size, spacing, origin, direction (columns, one after the other), LPS mm; HU sum of all voxels; where the
+brightest voxel is, if there is one. Every corner voxel centre and the brightest must agree within 1e-4 mm. Exit status 0: it does, 1: it does not, 77: the reader is missing.
 """
 
 import itertools
@@ -56,10 +56,8 @@ def read_pydicom(folder):
     affine[:3, 1] = column * float(slices[0].PixelSpacing[0])
     affine[:3, 2] = np.subtract(last, first) / max(len(slices) - 1, 1)
     affine[:3, 3] = first
-    total = 0
-    for s in slices:
-        total += int((s.pixel_array.astype(np.int64) * int(s.RescaleSlope) + int(s.RescaleIntercept)).sum())
-    return affine, (slices[0].Columns, slices[0].Rows, len(slices)), total
+    hu = [s.pixel_array.astype(np.int64) * int(s.RescaleSlope) + int(s.RescaleIntercept) for s in slices]
+    return affine, np.stack(hu).transpose(2, 1, 0)
 
 
 def read_dcm2niix(folder):
@@ -76,15 +74,15 @@ def read_dcm2niix(folder):
         if len(files) != 1:
             sys.exit(f"dcm2niix made {len(files)} volumes of {folder}:\n{log}")
         image = nibabel.load(files[0])
-        total = int(np.asarray(image.dataobj).astype(np.int64).sum())
-        return np.diag([-1, -1, 1, 1]) @ image.affine, image.shape, total
+        return np.diag([-1, -1, 1, 1]) @ image.affine, np.asarray(image.dataobj).astype(np.int64)
 
 
 def main():
     reader, folder, expected_file = sys.argv[1:]
     expected = json.loads(pathlib.Path(expected_file).read_text())
     read = {"pydicom": read_pydicom, "dcm2niix": read_dcm2niix}[reader]
-    affine, size, total = read(pathlib.Path(folder))
+    affine, voxels = read(pathlib.Path(folder))
+    size, total = voxels.shape, int(voxels.sum())
     if list(size) != expected["size"]:
         sys.exit(f"{reader}: size {list(size)}, expected {expected['size']}")
     found, wanted = corners(affine, size), corners(expected_affine(expected), expected["size"])
@@ -92,6 +90,10 @@ def main():
     print(f"{reader}: corners agree within {error:.2e} mm")
     if not error <= TOLERANCE_MM:
         sys.exit(f"{reader}: a corner is {error} mm away, more than {TOLERANCE_MM}\n{affine}\n{expected_affine(expected)}")
+    if "brightest" in expected:
+        place = (affine @ [*np.unravel_index(voxels.argmax(), size), 1])[:3]
+        if not np.linalg.norm(place - expected["brightest"]) <= TOLERANCE_MM:
+            sys.exit(f"{reader}: the brightest voxel is at {place}, expected {expected['brightest']}")
     if total != expected["hu_sum"]:
         sys.exit(f"{reader}: the voxels add up to {total} HU, expected {expected['hu_sum']}")
 

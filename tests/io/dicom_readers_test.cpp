@@ -1,14 +1,12 @@
 // Derived series and phantoms as other programs see them: dciodvfy and dcentvfy (dicom3tools), pydicom, dcm2niix.
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
-#include <cstdio>
-#include <fstream>
-#include <numeric>
 #include <set>
+#include <sstream>
 
 #include "io/dicom_series.h"
 #include "tests/support/dicom_maker.h"
+#include "tests/support/other_readers.h"
 #include "tests/support/real_data.h"
 #include "tests/support/scratch.h"
 
@@ -17,25 +15,7 @@ namespace fs = std::filesystem;
 namespace tetwarp::test {
 namespace {
 
-struct Run {
-  int status = -1;
-  std::string output;  ///< both streams
-};
-
-Run run_command(const std::string& command) {
-  Run run;
-  FILE* pipe = ::popen((command + " 2>&1").c_str(), "r");
-  if (!pipe) return run;
-  char buffer[4096];
-  for (std::size_t count; (count = std::fread(buffer, 1, sizeof buffer, pipe)) > 0;) run.output.append(buffer, count);
-  const int status = ::pclose(pipe);
-  if (WIFEXITED(status)) run.status = WEXITSTATUS(status);
-  return run;
-}
-
 bool is_installed(const std::string& program) { return run_command("command -v " + program).status == 0; }
-
-std::string quoted(const fs::path& path) { return std::string("'").append(path.string()).append("'"); }
 
 std::set<std::string> error_lines(const std::string& command) {
   std::set<std::string> lines;
@@ -70,33 +50,6 @@ std::vector<fs::path> files_of(const DicomSeries& series) {
   std::vector<fs::path> files;
   for (const DicomSlice& slice : series.slices) files.push_back(slice.file);
   return files;
-}
-
-/// Runs check_geometry.py; a reader that is not there skips the test.
-void check_with(const std::string& reader, const fs::path& folder, const Volume<std::int16_t>& volume,
-                const fs::path& expected_file) {
-  const Geometry& g = volume.geometry;
-  std::ofstream expected(expected_file);
-  expected.precision(17);
-  const auto list = [&](const char* name, const auto& values) {
-    expected << '"' << name << "\": [";
-    for (std::size_t n = 0; n < values.size(); ++n) expected << (n ? ", " : "") << values[n];
-    expected << "], ";
-  };
-  std::vector<double> direction;
-  for (int c = 0; c < 3; ++c) direction.insert(direction.end(), &g.direction[c].x, &g.direction[c].x + 3);
-  expected << '{';
-  list("size", std::vector{g.size.x, g.size.y, g.size.z});
-  list("spacing", std::vector{g.spacing.x, g.spacing.y, g.spacing.z});
-  list("origin", std::vector{g.origin.x, g.origin.y, g.origin.z});
-  list("direction", direction);
-  expected << "\"hu_sum\": " << std::accumulate(volume.voxels.begin(), volume.voxels.end(), std::int64_t{0}) << '}';
-  expected.close();
-  const Run run = run_command(TETWARP_PYTHON " " TETWARP_CHECK_GEOMETRY " " + reader + " " + quoted(folder) + " " +
-                              quoted(expected_file));
-  if (run.status == 77 || run.status == 127) GTEST_SKIP() << run.output;
-  EXPECT_EQ(run.status, 0) << run.output;
-  EXPECT_NE(run.output.find("corners agree"), std::string::npos) << run.output;
 }
 
 /// A real series, and one derived from it that has its voxels: what differs is what the writer did.
