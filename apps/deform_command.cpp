@@ -54,12 +54,14 @@ class Deformation {
 
 void Deformation::plan(const InputHeader& input) {
   record_.plan = plan_deformation(options_, record_.outputs, input);
-  if (input.series) record_.set_aside = input.series->set_aside;
+  if (!input.series) return;
+  record_.volume_label = input.series->label;
+  for (const LeftOutFile& one : input.series->set_aside) record_.set_aside.push_back(to_string(one));
 }
 
 void Deformation::read() {
   Stage stage(options_.common, "read");
-  const InputHeader header = open_input(options_.input, {.stop = interrupt_token()});
+  const InputHeader header = open_input(options_.input, options_.common);
   plan(header);
   record_.points.read();
   if (header.series) notes_ = header.series->warnings;
@@ -266,7 +268,7 @@ std::string Deformation::title() const {
 
 int Deformation::run() {
   if (options_.dry_run) {
-    const InputHeader header = open_input(options_.input, {.stop = interrupt_token()});
+    const InputHeader header = open_input(options_.input, options_.common);
     plan(header);
     record_.points.read();
     say(options_.common, describe(record_.plan, options_, record_.outputs));

@@ -50,6 +50,7 @@ json sidecar(const DeformRecord& of) {
   document["input"] = {{"path", of.options.input.path.string()}, {"sha256", of.input_sha256}};
   if (of.input.is_dicom()) {
     document["input"]["series_instance_uid"] = of.input.dicom->series_uid;
+    if (!of.volume_label.empty()) document["input"]["volume"] = of.volume_label;
     document["input"]["rounded_voxels"] = of.input.dicom->rounded;
     document["input"]["set_aside"] = of.set_aside;
     if (of.input.dicom->padding)

@@ -24,6 +24,7 @@ struct DeformRecord {
   DeformOutputs outputs;
   DeformPlan plan;
   InputVolume input;
+  std::string volume_label;            ///< which of several volumes of its series the input is
   std::vector<std::string> set_aside;  ///< files of the input's folder that are no slices of it
   AnyField field;
   std::string input_sha256, field_sha256, backend;

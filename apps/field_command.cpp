@@ -17,7 +17,7 @@ int run_field(const FieldOptions& options) {
   OutputSet outputs(inputs, options.common.overwrite);
   const std::filesystem::path output = outputs.add(options.output);
   Stage stage(options.common, "field");
-  const InputHeader like = open_input(options.like, {.stop = interrupt_token()});
+  const InputHeader like = open_input(options.like, options.common);
   const ForwardField source =
       read_forward_field(options.fields, like.geometry, options.cell_size, options.common, stage.control());
   require(source.field.mesh.is_empty(),

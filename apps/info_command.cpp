@@ -2,6 +2,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/field_source.h"
+#include "apps/info_dicom.h"
 #include "apps/input.h"
 #include "apps/output.h"
 #include "io/dicom_dose.h"
@@ -15,34 +16,6 @@ namespace tetwarp::apps {
 namespace {
 
 using nlohmann::json;
-
-json describe_series(const DicomSeries& series, std::size_t number) {
-  json document = {{"number", number},
-                   {"series_instance_uid", series.series_uid},
-                   {"study_instance_uid", series.study_uid},
-                   {"frame_of_reference_uid", series.frame_of_reference_uid},
-                   {"modality", series.modality},
-                   {"slices", series.slices.size()},
-                   {"usable", !series.refusal},
-                   {"set_aside", series.set_aside},
-                   {"warnings", series.warnings}};
-  if (series.refusal) {
-    document["refusal"] = *series.refusal;
-  } else {
-    document["geometry"] = to_json(series.geometry);
-  }
-  if (series.uneven) document["uneven"] = *series.uneven;
-  return document;
-}
-
-json describe_dicom(const InputOptions& input, const Control& control) {
-  const DicomScan scan = scan_dicom(input.path, input.single, control);
-  json document = {
-      {"path", input.path.string()}, {"kind", "dicom"}, {"series", json::array()}, {"skipped", scan.skipped}};
-  for (std::size_t n = 0; n < scan.series.size(); ++n)
-    document["series"].push_back(describe_series(scan.series[n], n + 1));
-  return document;
-}
 
 json describe_field(const FieldSource& source) {
   const FieldFileHeader header = read_field_header(source);
@@ -127,27 +100,6 @@ void print_lines(const char* title, const json& lines) {
   for (const json& line : lines) std::printf("    %s\n", line.get<std::string>().c_str());
 }
 
-void print_dicom(const json& document) {
-  std::printf("%s: %zu series\n", document["path"].get<std::string>().c_str(), document["series"].size());
-  for (const json& series : document["series"]) {
-    std::printf("\nseries %zu: %s, %zu slices\n", series["number"].get<std::size_t>(),
-                series["modality"].get<std::string>().c_str(), series["slices"].get<std::size_t>());
-    const auto uid = series["series_instance_uid"].get<std::string>();
-    std::printf("  UID          %s\n", uid.empty() ? "(none)" : uid.c_str());
-    if (series["usable"].get<bool>()) {
-      print_grid(series["geometry"]);
-      if (series.contains("uneven"))
-        std::printf("  uneven       %s; needs --uneven exact\n", series["uneven"].get<std::string>().c_str());
-    } else {
-      std::printf("  not usable   %s\n", series["refusal"].get<std::string>().c_str());
-    }
-    print_lines("set aside:", series["set_aside"]);
-    print_lines("warnings:", series["warnings"]);
-  }
-  if (!document["skipped"].empty()) std::printf("\n");
-  print_lines("skipped:", document["skipped"]);
-}
-
 void print_field(const json& document) {
   const auto text = [](const json& value) { return value.get<std::string>(); };
   const json& known = document["known"];
@@ -212,27 +164,37 @@ void print_file(const json& document) {
 }  // namespace
 
 int run_info(const InfoOptions& options) {
+  refuse_pipes(options.input.path);
   const FieldSource source = field_source(options.input.path.string());
   const bool field = is_field_file(source.path), mesh = !field && is_mesh_file(source.path);
   const std::filesystem::path& path = field ? source.path : options.input.path;
   const bool transform = !field && !mesh && is_transform_file(path) && !std::filesystem::is_directory(path);
   const bool other = field || mesh || transform || has_image_suffix(path), dose = !other && is_dicom_dose(path),
              dicom = !other && !dose;
+  const auto print_json = [](const json& document) {
+    std::printf("%s\n", document.dump(2, ' ', false, json::error_handler_t::replace).c_str());
+  };
+  if (dicom) {
+    const DicomScan scan = [&] {
+      Stage stage(options.common, "scan");
+      return scan_dicom(path, options.input.single, stage.control());
+    }();
+    if (options.json)
+      print_json(describe(scan, options.input));
+    else
+      print(scan, options.input);
+    return 0;
+  }
   const json document = [&] {
-    Stage stage(options.common, "scan");
     if (mesh) return describe_mesh(source);
     if (transform) return describe_transform(path);
     if (dose) return describe_dose(path);
-    if (dicom) return describe_dicom(options.input, stage.control());
     return field ? describe_field(source) : describe_image(path);
   }();
-  if (options.json) {
-    std::printf("%s\n", document.dump(2, ' ', false, json::error_handler_t::replace).c_str());
-  } else if (dicom) {
-    print_dicom(document);
-  } else {
+  if (options.json)
+    print_json(document);
+  else
     print_file(document);
-  }
   return 0;
 }
 

@@ -9,6 +9,7 @@
 #include "io/dicom_dose.h"
 #include "io/hash.h"
 #include "io/image_file.h"
+#include "io/shown_text.h"
 
 namespace tetwarp::apps {
 
@@ -16,48 +17,54 @@ namespace {
 
 constexpr double kAirHu = -1024;
 
-std::string number_text(double value) {
-  char text[32];
-  const auto end = std::to_chars(text, text + sizeof text, value, std::chars_format::general, 6).ptr;
-  return std::string(text, end);
+/// Those of a UID, or all.
+std::string list_series(const DicomScan& scan, const std::optional<std::string>& uid = {}) {
+  std::string list;
+  for (std::size_t n = 0; n < scan.series.size(); ++n) {
+    if (!uid || scan.series[n].series_uid == *uid) list += "\n" + describe(scan.series[n], n + 1);
+  }
+  return list;
 }
 
-std::string list_series(const DicomScan& scan) {
-  std::string list;
-  for (std::size_t n = 0; n < scan.series.size(); ++n) list += "\n" + describe(scan.series[n], n + 1);
-  return list;
+/// The series that --series names.
+const DicomSeries& named_series(const DicomScan& scan, const InputOptions& options) {
+  const std::string where = shown(options.path), name = shown(options.series);
+  std::size_t number = 0;
+  const char* const end = options.series.data() + options.series.size();
+  if (std::from_chars(options.series.data(), end, number).ptr == end && number >= 1 && number <= scan.series.size()) {
+    return scan.series[number - 1];
+  }
+  const auto is_named = [&](const DicomSeries& series) { return series.series_uid == options.series; };
+  const auto found = std::find_if(scan.series.begin(), scan.series.end(), is_named);
+  require(found != scan.series.end(), "no series \"" + name + "\", " + where + "; choose one of" + list_series(scan));
+  const auto count = std::count_if(scan.series.begin(), scan.series.end(), is_named);
+  require(count == 1, "the series " + name + " holds " + std::to_string(count) + " volumes, " + where +
+                          "; choose one by its number" + list_series(scan, options.series));
+  return *found;
 }
 
 /// The series that --series names, or the only one that holds CT slices, usable or not.
 const DicomSeries& choose_series(const DicomScan& scan, const InputOptions& options) {
-  const std::string where = options.path.string();
+  const std::string where = shown(options.path);
   require(!scan.series.empty(),
           "no DICOM image found, " + where + "; give a folder that holds a CT series" +
-              (scan.skipped.empty() ? std::string() : " (first file: " + scan.skipped.front() + ")"));
-  if (!options.series.empty()) {
-    std::size_t number = 0;
-    const char* const end = options.series.data() + options.series.size();
-    if (std::from_chars(options.series.data(), end, number).ptr == end && number >= 1 && number <= scan.series.size()) {
-      return scan.series[number - 1];
-    }
-    const auto found = std::find_if(scan.series.begin(), scan.series.end(),
-                                    [&](const DicomSeries& series) { return series.series_uid == options.series; });
-    require(found != scan.series.end(),
-            "no series \"" + options.series + "\", " + where + "; choose one of" + list_series(scan));
-    return *found;
-  }
-  const DicomSeries* only = &scan.series.front();
-  std::size_t holding_slices = 0;
-  for (const DicomSeries& series : scan.series) {
-    if (series.slices.empty()) continue;  // localizers, captures, doses: nothing to choose
-    only = &series;
-    ++holding_slices;
-  }
-  if (holding_slices == 1 || scan.series.size() == 1) return *only;
+              (scan.skipped.empty() ? std::string() : " (first file: " + to_string(scan.skipped.front()) + ")"));
+  if (!options.series.empty()) return named_series(scan, options);
+  if (const auto only = only_choice(scan)) return scan.series[*only];
   const bool usable =
       std::any_of(scan.series.begin(), scan.series.end(), [](const DicomSeries& series) { return !series.refusal; });
-  throw InputError(std::to_string(scan.series.size()) + " series found, " + where +
+  const bool several =
+      std::any_of(scan.series.begin(), scan.series.end(), [](const DicomSeries& series) { return series.volumes > 1; });
+  throw InputError(std::to_string(scan.series.size()) + (several ? " volumes" : " series") + " found, " + where +
                    (usable ? "; choose one with --series" : "; none of them is a usable volume") + list_series(scan));
+}
+
+/// What was set aside of the whole series of a volume: the first volume of its series has it.
+const std::vector<LeftOutFile>& set_aside_with(const DicomScan& scan, const DicomSeries& volume) {
+  const auto index = static_cast<std::size_t>(&volume - scan.series.data());
+  std::size_t first = 0;
+  while (first + scan.series[first].volumes <= index) first += scan.series[first].volumes;
+  return scan.series[first].set_aside;
 }
 
 double smallest_value(const AnyVolume& volume) {
@@ -77,17 +84,42 @@ double smallest_value(const AnyVolume& volume) {
 
 }  // namespace
 
+std::optional<std::size_t> only_choice(const DicomScan& scan) {
+  if (scan.series.size() == 1) return 0;
+  std::optional<std::size_t> only;
+  for (std::size_t n = 0; n < scan.series.size(); ++n) {
+    if (scan.series[n].slices.empty()) continue;  // localizers, captures, doses: nothing to choose
+    if (only) return std::nullopt;
+    only = n;
+  }
+  return only;
+}
+
+std::string number_text(double value) {
+  char text[32];
+  const auto end = std::to_chars(text, text + sizeof text, value, std::chars_format::general, 6).ptr;
+  return std::string(text, end);
+}
+
 std::string describe(const DicomSeries& series, std::size_t number) {
   std::string line =
-      "  " + std::to_string(number) + "  " + (series.series_uid.empty() ? "(no UID)" : series.series_uid) + "  " +
-      (series.modality.empty() ? "??" : series.modality) + "  " + std::to_string(series.slices.size()) + " slices";
+      "  " + std::to_string(number) + "  " + (series.series_uid.empty() ? "(no UID)" : shown(series.series_uid)) +
+      "  " + (series.modality.empty() ? "??" : shown(series.modality)) + "  " +
+      (series.label.empty() ? "" : series.label + "  ") + std::to_string(series.slices.size()) + " slices";
   if (series.refusal) return line + "  not usable: " + *series.refusal;
   const glm::dvec3& spacing = series.geometry.spacing;
   return line + "  " + to_string(series.geometry.size) + "  " + number_text(spacing.x) + " x " +
          number_text(spacing.y) + " x " + number_text(spacing.z) + " mm";
 }
 
+void refuse_pipes(const std::filesystem::path& path) {
+  std::error_code ignored;  // a name that no file can have, or a formula
+  const std::filesystem::file_status status = std::filesystem::status(path, ignored);
+  require(!std::filesystem::is_other(status), "neither a file nor a folder, " + shown(path) + "; name one of them");
+}
+
 InputHeader open_input(const InputOptions& options, const Control& control, bool components) {
+  refuse_pipes(options.path);
   if (has_image_suffix(options.path)) {
     if (!options.series.empty() || options.single) {
       throw UsageError("--series and --single are for DICOM, " + options.path.string() + "; leave them out");
@@ -102,11 +134,19 @@ InputHeader open_input(const InputOptions& options, const Control& control, bool
     throw UsageError("--single is for one DICOM file, " + options.path.string() + " is a folder; name a file in it");
   }
   const DicomScan scan = scan_dicom(options.path, options.single, control);
-  const DicomSeries& series = choose_series(scan, options);
-  require(!series.refusal, series.refusal.value_or(""));
-  require(!series.uneven || options.uneven,
-          series.uneven.value_or("") + "; add what is missing, or give --uneven exact, which takes each slice where it is");
+  const DicomSeries& chosen = choose_series(scan, options);
+  require(!chosen.refusal, chosen.refusal.value_or(""));
+  require(
+      !chosen.uneven || options.uneven,
+      chosen.uneven.value_or("") + "; add what is missing, or give --uneven exact, which takes each slice where it is");
+  DicomSeries series = chosen;
+  series.set_aside = set_aside_with(scan, chosen);
   return {series.geometry, VoxelType::i16, series, false, 1};
+}
+
+InputHeader open_input(const InputOptions& options, const CommonOptions& common, bool components) {
+  Stage stage(common, "scan");
+  return open_input(options, stage.control(), components);
 }
 
 InputVolume read_input(const InputOptions& options, const InputHeader& header, const CommonOptions& common,

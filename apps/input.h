@@ -28,16 +28,30 @@ struct InputVolume {
   bool is_dicom() const { return dicom.has_value(); }
 };
 
+/// @throws InputError for a pipe, a socket or a device: reading one may wait for ever
+void refuse_pipes(const std::filesystem::path& path);
+
 /// Reads headers alone. @param components  whether a voxel may have several values
 /// @throws InputError when there is not one usable volume (several series: lists them), UsageError
 /// for DICOM options with a file, or --single with a folder
 InputHeader open_input(const InputOptions& options, const Control& control, bool components = false);
 
+/// The same with a progress bar.
+InputHeader open_input(const InputOptions& options, const CommonOptions& common, bool components = false);
+
 /// Reads the voxels of what `open_input` found.
 InputVolume read_input(const InputOptions& options, const InputHeader& header, const CommonOptions& common,
                        const Control& control);
 
-/// One line a series: number, UID, modality, size, spacing, what is wrong.
+/// The index of the series that is taken without --series: the only one that holds CT slices, usable or not, or the
+/// only one at all.
+std::optional<std::size_t> only_choice(const DicomScan& scan);
+
+/// Six significant digits.
+std::string number_text(double value);
+
+/// One line a series: number, UID, modality, what tells it from other volumes of its series, size, spacing, what is
+/// wrong.
 std::string describe(const DicomSeries& series, std::size_t number);
 
 /// Whether a value can be stored as a voxel of this type, rounded.

@@ -168,7 +168,7 @@ int run_invert(const InvertOptions& options) {
   inputs.push_back(options.like.path);
   OutputSet outputs(inputs, options.common.overwrite);
   const std::filesystem::path output = outputs.add(options.output), report_path = outputs.add(options.report);
-  const InputHeader like = open_input(options.like, {.stop = interrupt_token()});
+  const InputHeader like = open_input(options.like, options.common);
 
   Stage field_stage(options.common, "field");
   const Geometry grid = straightened(like.geometry);

@@ -87,12 +87,12 @@ void Simulating::read() {
   AnyVolume volume, labels;
   {
     Stage stage(options_.common, "read");
-    const InputHeader header = open_input(options_.input, {.stop = interrupt_token()});
+    const InputHeader header = open_input(options_.input, options_.common);
     if (header.series) notes_ = header.series->warnings;
     volume = read_input(options_.input, header, options_.common, stage.control()).volume;
     if (!options_.labels.empty()) {
       const InputOptions from{.path = options_.labels, .series = {}};
-      labels = read_input(from, open_input(from, {.stop = interrupt_token()}), options_.common, stage.control()).volume;
+      labels = read_input(from, open_input(from, options_.common), options_.common, stage.control()).volume;
     }
     read_seconds_ = stage.seconds();
   }

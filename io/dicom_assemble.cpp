@@ -6,34 +6,24 @@
 #include <cmath>
 #include <set>
 
+#include "io/dicom_copies.h"
+#include "io/dicom_kind.h"
+#include "io/dicom_split.h"
 #include "io/dicom_stack.h"
 #include "io/dicom_text.h"
+#include "io/dicom_traits.h"
+#include "io/shown_text.h"
 
 namespace tetwarp {
 namespace {
 
 using Headers = std::vector<DicomFileHeader>;
 
-std::string orientation_text(const std::array<double, 6>& cosines) {
-  std::string text;
-  for (const double value : cosines) {
-    if (!text.empty()) text += '\\';
-    text += number(value);
-  }
-  return text;
-}
-
-/// Round-off of at least four digits: 1e-4 is 0.05 mm at the far end of a 500 mm slice.
-bool same_orientation(const DicomFileHeader& a, const DicomFileHeader& b) {
-  return std::equal(a.orientation->begin(), a.orientation->end(), b.orientation->begin(),
-                    [](double x, double y) { return std::abs(x - y) <= 1e-4; });
-}
-
 /// Moves out of `files` what is by its kind no slice, one line each into `series.set_aside`.
 void set_other_kinds_aside(Headers& files, DicomSeries& series) {
   std::erase_if(files, [&](const DicomFileHeader& header) {
     const std::string kind = other_kind(header);
-    if (!kind.empty()) series.set_aside.push_back(header.file.string() + ": " + kind);
+    if (!kind.empty()) series.set_aside.push_back({header.file, kind});
     return !kind.empty();
   });
 }
@@ -54,38 +44,51 @@ std::optional<std::string> first_problem(const Headers& files, std::string (*jud
   return first;
 }
 
-/// Keeps the orientation that at least three quarters of the slices share and sets the others aside (a scout in the
-/// series). @return a refusal where none does
-std::optional<std::string> keep_one_orientation(Headers& files, DicomSeries& series) {
-  const DicomFileHeader* usual = &files.front();
-  std::ptrdiff_t usual_count = 0;
-  std::vector<const DicomFileHeader*> seen;
+/// Slices of one orientation.
+struct Orientation {
+  DicomFileHeader example;
+  std::ptrdiff_t slices = 0;
+};
+
+/// In the order in which they come; no more than 64 of them: more are no series.
+std::vector<Orientation> orientations_of(const Headers& files) {
+  constexpr std::size_t kMost = 64;
+  std::vector<Orientation> orientations;
   for (const DicomFileHeader& header : files) {
-    const auto is_same = [&](const auto* other) { return same_orientation(header, *other); };
-    if (std::any_of(seen.begin(), seen.end(), is_same)) continue;
-    seen.push_back(&header);
-    const auto count =
-        std::count_if(files.begin(), files.end(), [&](const auto& f) { return same_orientation(header, f); });
-    if (count > usual_count) {
-      usual = &header;
-      usual_count = count;
-    }
+    const auto is_same = [&](const Orientation& one) { return same_orientation(header, one.example); };
+    auto found = std::find_if(orientations.begin(), orientations.end(), is_same);
+    if (found == orientations.end() && orientations.size() == kMost) continue;
+    if (found == orientations.end()) found = orientations.insert(found, {header});
+    ++found->slices;
   }
-  if (seen.size() == 1) return std::nullopt;
-  if (usual_count * 4 < std::ssize(files) * 3) {
-    return "mixed orientations: " + orientation_text(*seen[0]->orientation) + " in " + seen[0]->file.string() + ", " +
-           orientation_text(*seen[1]->orientation) + " in " + seen[1]->file.string() + " (" +
-           std::to_string(seen.size()) + " orientations in " + std::to_string(files.size()) +
-           " files); put the slices of one orientation in a folder of their own";
-  }
-  const DicomFileHeader reference = *usual;
+  return orientations;
+}
+
+/// Keeps the orientation that at least three quarters of the slices share, if there is one, and sets the others aside
+/// (a scout in the series).
+void set_scouts_aside(Headers& files, DicomSeries& series) {
+  const std::vector<Orientation> orientations = orientations_of(files);
+  const auto usual = std::max_element(orientations.begin(), orientations.end(),
+                                      [](const auto& a, const auto& b) { return a.slices < b.slices; });
+  if (orientations.size() == 1 || usual->slices * 4 < std::ssize(files) * 3) return;
+  const auto plane = [](const DicomFileHeader& header) { return plane_name(rotation_of(*header.orientation)[2]); };
   std::erase_if(files, [&](const DicomFileHeader& header) {
-    if (same_orientation(header, reference)) return false;
-    series.set_aside.push_back(header.file.string() + ": Image Orientation " + orientation_text(*header.orientation) +
-                               ", the other slices have " + orientation_text(*reference.orientation));
+    if (same_orientation(header, usual->example)) return false;
+    series.set_aside.push_back({header.file, plane(header) + " among " + plane(usual->example) +
+                                                 " slices: Image Orientation " + orientation_text(*header.orientation) +
+                                                 ", the others have " + orientation_text(*usual->example.orientation)});
     return true;
   });
-  return std::nullopt;
+}
+
+std::optional<std::string> mixed_orientations(const Headers& files) {
+  const std::vector<Orientation> orientations = orientations_of(files);
+  if (orientations.size() == 1) return std::nullopt;
+  const DicomFileHeader &first = orientations[0].example, &second = orientations[1].example;
+  return "mixed orientations: " + orientation_text(*first.orientation) + " in " + shown(first.file) + ", " +
+         orientation_text(*second.orientation) + " in " + shown(second.file) + " (" +
+         std::to_string(orientations.size()) + " orientations in " + std::to_string(files.size()) +
+         " files); put the slices of one orientation in a folder of their own";
 }
 
 /// What must be the same in all slices. @return a refusal that names the first two files that differ
@@ -93,21 +96,20 @@ std::optional<std::string> inconsistency(const Headers& files) {
   const DicomFileHeader& first = files.front();
   const auto differ = [&](const std::string& what, const DicomFileHeader& other, const std::string& expected,
                           const std::string& found) {
-    return "mixed " + what + ": " + expected + " in " + first.file.string() + ", " + found + " in " +
-           other.file.string() + "; put the slices that belong together in a folder of their own";
+    return "mixed " + what + ": " + expected + " in " + shown(first.file) + ", " + found + " in " + shown(other.file) +
+           "; put the slices that belong together in a folder of their own";
   };
   const auto spacing = [](const DicomFileHeader& h) { return number(h.spacing->y) + "\\" + number(h.spacing->x); };
   for (const DicomFileHeader& other : files) {
     const PixelFormat &a = first.pixels, &b = other.pixels;
     if (a.rows != b.rows || a.columns != b.columns) return differ("Rows x Columns", other, size_text(a), size_text(b));
-    // 1e-5 is 0.005 mm over 500 mm.
-    const glm::dvec2 change = glm::abs(*first.spacing - *other.spacing) / *first.spacing;
-    if (change.x > 1e-5 || change.y > 1e-5) return differ("Pixel Spacing", other, spacing(first), spacing(other));
+    if (!same_pixel_spacing(first, other)) return differ("Pixel Spacing", other, spacing(first), spacing(other));
     if (first.frame_of_reference_uid != other.frame_of_reference_uid) {
-      return differ("Frame of Reference UID", other, first.frame_of_reference_uid, other.frame_of_reference_uid);
+      return differ("Frame of Reference UID", other, shown(first.frame_of_reference_uid),
+                    shown(other.frame_of_reference_uid));
     }
     if (first.study_uid != other.study_uid)
-      return differ("Study Instance UID", other, first.study_uid, other.study_uid);
+      return differ("Study Instance UID", other, shown(first.study_uid), shown(other.study_uid));
   }
   return std::nullopt;
 }
@@ -129,7 +131,7 @@ void warn_of_values(const Headers& files, DicomSeries& series) {
     if (pixels.photometric == "MONOCHROME1")
       warnings.insert("MONOCHROME1: HU are read as they are, only display is inverted");
     if (!is_hounsfield(pixels.rescale_type)) {
-      warnings.insert("Rescale Type is " + pixels.rescale_type + ": the values may not be HU");
+      warnings.insert("Rescale Type is " + shown(pixels.rescale_type) + ": the values may not be HU");
     }
     const auto stored = stored_padding(pixels);
     if (pixels.padding_word && !stored) {
@@ -141,50 +143,45 @@ void warn_of_values(const Headers& files, DicomSeries& series) {
     }
     if (padding_text(header) != padding_text(files.front())) {
       warnings.insert("Pixel Padding Value differs from slice to slice, no padding is assumed: " +
-                      padding_text(files.front()) + " in " + files.front().file.string() + ", not in all others");
+                      padding_text(files.front()) + " in " + shown(files.front().file) + ", not in all others");
     }
   }
   series.warnings.insert(series.warnings.end(), warnings.begin(), warnings.end());
 }
 
+/// What slices of one volume may differ in, and should not.
+void warn_of_mixture(const Headers& files, DicomSeries& series) {
+  for (const Trait trait : {Trait::kernel, Trait::kvp}) {
+    const auto other = std::find_if(files.begin(), files.end(), [&](const DicomFileHeader& header) {
+      return trait_of(header, trait) != trait_of(files.front(), trait);
+    });
+    if (other == files.end()) continue;
+    const DicomFileHeader* both[] = {&files.front(), &*other};
+    const std::vector<std::string> labels = labels_of(trait, both);
+    series.warnings.push_back(name_of(trait) + " differs from slice to slice: " + labels[0] + " in " +
+                              shown(files.front().file) + ", " + labels[1] + " in " + shown(other->file));
+  }
+}
+
 /// A refusal about kinds: nothing is left that could be a slice.
 std::string nothing_left(const DicomSeries& series) {
   const std::size_t count = series.set_aside.size();
-  return "no CT slice in the series, " + series.set_aside.front() +
+  return "no CT slice in the series, " + to_string(series.set_aside.front()) +
          (count > 1 ? " (" + std::to_string(count) + " files)" : std::string()) + "; choose a CT series";
 }
 
 /// All steps in order; each may end in a refusal.
 std::optional<std::string> judge(Headers& files, DicomSeries& series) {
-  if (auto problem = first_problem(files, geometry_problem)) return problem;
-  if (auto problem = keep_one_orientation(files, series)) return problem;
+  if (auto problem = mixed_orientations(files)) return problem;
   const auto pixels = first_problem(files, pixel_problem);
   if (auto problem = inconsistency(files)) return pixels ? pixels : problem;
   const auto stack = stack_slices(files, series);  // the geometry is of use even where pixels are not
   if (!pixels) warn_of_values(files, series);
+  if (!pixels && !stack) warn_of_mixture(files, series);
   return pixels ? pixels : stack;
 }
 
-}  // namespace
-
-DicomSeries assemble_series(Headers files) {
-  DicomSeries series;
-  std::sort(files.begin(), files.end(), [](const DicomFileHeader& a, const DicomFileHeader& b) {
-    return std::tie(a.instance_number, a.file) < std::tie(b.instance_number, b.file);
-  });
-  series.series_uid = files.front().series_uid;
-  series.study_uid = files.front().study_uid;
-  series.frame_of_reference_uid = files.front().frame_of_reference_uid;
-  series.modality = files.front().modality;
-  set_other_kinds_aside(files, series);
-  if (files.empty()) {
-    series.refusal = nothing_left(series);
-    return series;
-  }
-  series.study_uid = files.front().study_uid;
-  series.frame_of_reference_uid = files.front().frame_of_reference_uid;
-  series.modality = files.front().modality;
-  series.refusal = judge(files, series);
+void list_slices(const Headers& files, DicomSeries& series) {
   for (const DicomFileHeader& header : files) {
     DicomSlice slice{header.file, header.sop_instance_uid, header.transfer_syntax_uid, header.instance_number, 0};
     if (header.position && header.orientation) {
@@ -192,7 +189,55 @@ DicomSeries assemble_series(Headers files) {
     }
     series.slices.push_back(std::move(slice));
   }
+}
+
+DicomSeries refused(DicomSeries series, const Headers& files, const std::string& reason) {
+  series.refusal = reason;
+  list_slices(files, series);
   return series;
+}
+
+DicomSeries judged(SplitVolume& volume, DicomSeries series) {
+  series.label = std::move(volume.label);
+  series.split_by = std::move(volume.split_by);
+  series.refusal = judge(volume.files, series);
+  if (series.refusal && !volume.tried.empty()) *series.refusal += " (" + volume.tried + ")";
+  list_slices(volume.files, series);
+  return series;
+}
+
+void describe(const DicomFileHeader& header, DicomSeries& series) {
+  series.series_uid = header.series_uid;
+  series.study_uid = header.study_uid;
+  series.frame_of_reference_uid = header.frame_of_reference_uid;
+  series.modality = header.modality;
+  series.series_number = header.series_number;
+  series.description = shown_description(header);
+}
+
+}  // namespace
+
+std::vector<DicomSeries> assemble_series(Headers files, const std::stop_token& stop) {
+  std::sort(files.begin(), files.end(), [](const DicomFileHeader& a, const DicomFileHeader& b) {
+    return std::tie(a.instance_number, a.file) < std::tie(b.instance_number, b.file);
+  });
+  DicomSeries series;
+  describe(files.front(), series);
+  set_other_kinds_aside(files, series);
+  if (files.empty()) return {refused(series, files, nothing_left(series))};
+  describe(files.front(), series);
+  if (const auto problem = drop_copies(files, series, stop)) return {refused(series, files, *problem)};
+  if (const auto problem = first_problem(files, geometry_problem)) return {refused(series, files, *problem)};
+  set_scouts_aside(files, series);
+  std::vector<SplitVolume> volumes = split_volumes(std::move(files));
+  series.volumes = volumes.size();
+  std::vector<DicomSeries> result;
+  for (SplitVolume& volume : volumes) {
+    describe(volume.files.front(), series);
+    result.push_back(judged(volume, series));
+    series.set_aside.clear();
+  }
+  return result;
 }
 
 }  // namespace tetwarp

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <stop_token>
 #include <vector>
 
 #include "io/dicom_header.h"
@@ -7,8 +8,9 @@
 
 namespace tetwarp {
 
-/// Makes a series of the files that share its UID: what is no CT slice is set aside, the rest is sorted along the
-/// normal and judged. Never throws for what the files hold: see DicomSeries::refusal.
-DicomSeries assemble_series(std::vector<DicomFileHeader> files);
+/// Makes a series of the files that share its UID, one volume or several: what is no CT slice is set aside, copies
+/// count once, volumes are told apart, and each is sorted along its normal and judged. Never throws for what the files
+/// hold: see DicomSeries::refusal. @throws Cancelled
+std::vector<DicomSeries> assemble_series(std::vector<DicomFileHeader> files, const std::stop_token& stop);
 
 }  // namespace tetwarp

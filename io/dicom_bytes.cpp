@@ -9,6 +9,7 @@
 #include "io/dicom_codecs.h"
 #include "io/dicom_stream.h"
 #include "io/opened_file.h"
+#include "io/shown_text.h"
 
 namespace tetwarp {
 namespace {
@@ -108,8 +109,7 @@ std::optional<std::uint64_t> pixel_bytes_of(DcmDataset& data, std::uint64_t file
 std::span<const std::byte> FileBuffer::read(const std::filesystem::path& file) {
   OpenedFile opened(file);
   const auto check = [&] {
-    require(opened.problem().empty(),
-            "cannot be read, " + file.string() + ": " + opened.problem() + "; check the file");
+    require(opened.problem().empty(), "cannot be read, " + shown(file) + ": " + opened.problem() + "; check the file");
   };
   check();
   const std::size_t size = opened.size();
@@ -120,7 +120,7 @@ std::span<const std::byte> FileBuffer::read(const std::filesystem::path& file) {
   const std::span<std::byte> bytes(bytes_.get(), size);
   const std::size_t count = opened.read(0, bytes);
   check();
-  require(count == size, "cannot be read whole, " + file.string() + "; check the file");
+  require(count == size, "cannot be read whole, " + shown(file) + "; check the file");
   return bytes;
 }
 
@@ -134,7 +134,7 @@ ParsedSlice parse_slice(std::span<const std::byte> bytes, const std::filesystem:
     slice.format = std::make_unique<DcmFileFormat>();
     const OFCondition result = parse_dicom(*slice.format, bytes, DCM_UndefinedTagKey, limit).result;
     require(result.good(),
-            "truncated or damaged file, " + file.string() + ": " + result.text() + "; copy the file again");
+            "truncated or damaged file, " + shown(file) + ": " + result.text() + "; copy the file again");
     slice.header = header_of(*slice.format, file);
     slice.header.pixel_bytes = pixel_bytes_of(*slice.format->getDataset(), bytes.size());
   }

@@ -41,6 +41,9 @@ std::string series_uid(const DicomHeaders& source, const DicomDerivation& deriva
   Sha256 hash;
   hash.add("tetwarp derived series").add(uid_or_made_up(source, DCM_SeriesInstanceUID));
   for (const std::string& uid : series.sop_instance) hash.add(uid);  // part of a series is another source
+  const bool named = std::none_of(series.sop_instance.begin(), series.sop_instance.end(),
+                                  [](const std::string& uid) { return uid.empty(); });
+  if (!named) hash.add(uid_from_headers(source, "instances"));
   hash.add(derivation.field_sha256).add(derivation.parameters).add(version()).add(commit());
   return uid_of(hash);
 }
@@ -66,9 +69,10 @@ std::string series_description(DcmDataset& slice, bool deformed) {
   if (source.empty()) return mine;
   const std::string text = mine + ": " + source;
   if (text.size() <= kLongest) return text;
-  const bool one_byte = std::all_of(source.begin(), source.end(), [](char c) { return c >= ' ' && c <= '~'; }) ||
-                        text_of(slice, DCM_SpecificCharacterSet).starts_with("ISO_IR 1");
-  if (!one_byte || text_of(slice, DCM_SpecificCharacterSet) == "ISO_IR 192") return mine;
+  const std::string set = text_of(slice, DCM_SpecificCharacterSet);
+  const bool ascii = std::all_of(source.begin(), source.end(), [](char c) { return c >= ' ' && c <= '~'; });
+  const bool one_byte = set.starts_with("ISO_IR 1") && set != "ISO_IR 192" && set.find('\\') == std::string::npos;
+  if (!ascii && !one_byte) return mine;
   return text.substr(0, kLongest);
 }
 

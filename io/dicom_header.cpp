@@ -8,14 +8,16 @@
 #include <dcmtk/oflog/oflog.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <mutex>
+#include <span>
 
 #include "io/dicom_stream.h"
+#include "io/dicom_text.h"
+#include "io/dicom_traits.h"
+#include "io/hash.h"
 
 namespace tetwarp {
 namespace {
@@ -34,15 +36,6 @@ std::vector<std::string> split(const std::string& text) {
     value = first == std::string::npos ? "" : value.substr(first, last - first + 1);
   }
   return values;
-}
-
-/// A Decimal String (PS3.5 6.2) whatever the locale; none unless all of it is one finite number.
-std::optional<double> decimal(std::string text) {
-  if (text.starts_with('+')) text.erase(0, 1);
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
-  return value;
 }
 
 /// Digits after the point: 3 for "1.250", -1 for "5E1" (tens).
@@ -141,30 +134,29 @@ bool looks_like_dicom(const std::array<char, 132>& start, std::size_t size) {
 /// Why the object is nothing that scanning has to tell apart; empty for images and for what might be one.
 std::string no_image_reason(const DicomFileHeader& header) {
   const bool is_ct = header.sop_class_uid == UID_CTImageStorage;
-  if (header.sop_class_uid == UID_MediaStorageDirectoryStorage) return "a DICOM directory, not an image";
+  if (header.sop_class_uid == UID_MediaStorageDirectoryStorage)
+    return "a DICOM directory (DICOMDIR): what lies in the folder counts, not what it names";
   if (is_ct || header.pixels.rows != 0) return {};
-  if (!header.sop_class_uid.empty()) return uid_with_name(header.sop_class_uid) + ", not an image";
+  if (!header.sop_class_uid.empty()) return kind_name(header.sop_class_uid) + ", not an image";
   if (header.damage.empty()) return "DICOM without an image";
   return header.series_uid.empty() ? "damaged, or not DICOM: " + header.damage : std::string();
 }
 
 /// The first bytes of the file decide whether DCMTK is asked at all: it would take much for a data set without prefix.
-void sniff(DicomFileHeader& header) {
-  std::ifstream stream(header.file, std::ios::binary);
+void sniff(OpenedFile& file, DicomFileHeader& header) {
   std::array<char, 132> start{};
-  stream.read(start.data(), start.size());
-  const auto size = static_cast<std::size_t>(stream.gcount());
+  const std::size_t size = file.read(0, std::as_writable_bytes(std::span(start)));
   const bool blank =
       std::all_of(start.begin(), start.begin() + std::min<std::size_t>(size, 128), [](char c) { return c == 0; });
-  if (!stream.is_open() || stream.bad()) {
-    header.skip = std::string("cannot be read: ") + std::strerror(errno);
+  if (!file.problem().empty()) {
+    header.skip = "cannot be read: " + file.problem();
   } else if (size == 0) {
     header.skip = "an empty file";
   } else if (!looks_like_dicom(start, size)) {
     header.skip = blank ? "cut short: nothing but zeros where DICOM begins"
                         : "not DICOM: no prefix DICM at byte 128, no data set at the start";
   }
-  header.broken = !header.skip.empty() && (blank || !stream.is_open() || stream.bad());
+  header.broken = !header.skip.empty() && (blank || !file.problem().empty());
 }
 
 }  // namespace
@@ -191,14 +183,27 @@ bool is_at_most(DcmItem& item, const DcmTagKey& tag, std::uint64_t bytes) {
 }
 
 std::string text_of(DcmItem& item, const DcmTagKey& tag) {
+  DcmElement* element = nullptr;
   OFString value;
-  if (!is_at_most(item, tag, kLongestValue) || item.findAndGetOFStringArray(tag, value).bad()) return {};
+  if (item.findAndGetElement(tag, element).bad() || element->getLengthField() > kLongestValue ||
+      element->getOFStringArray(value).bad()) {
+    return {};
+  }
   std::string text(value.c_str());  // stops at a padding zero
   const auto last = text.find_last_not_of(' ');
   return last == std::string::npos ? "" : text.substr(0, last + 1);
 }
 
 namespace {
+
+/// A UID. One that is far longer than the 64 characters of PS3.5 9.1 is told apart by a hash instead of kept.
+std::string uid_of(DcmItem& item, const DcmTagKey& tag) {
+  constexpr std::size_t kLongest = 128, kKept = 32;
+  const std::string uid = text_of(item, tag);
+  if (uid.size() <= kLongest) return uid;
+  return uid.substr(0, kKept) + "... (" + std::to_string(uid.size()) + " characters, SHA-256 " +
+         Sha256().add(uid).hex() + ")";
+}
 
 DicomFileHeader header_of(DcmDataset& data, DcmMetaInfo& meta, const std::filesystem::path& file) {
   DicomFileHeader header;
@@ -209,18 +214,21 @@ DicomFileHeader header_of(DcmDataset& data, DcmMetaInfo& meta, const std::filesy
     header.transfer_syntax_uid = DcmXfer(header.encoding).getXferID();
   else
     header.encoding = DcmXfer(header.transfer_syntax_uid.c_str()).getXfer();
-  header.sop_class_uid = text_of(data, DCM_SOPClassUID);
+  header.sop_class_uid = uid_of(data, DCM_SOPClassUID);
   if (header.sop_class_uid.empty()) header.sop_class_uid = text_of(meta, DCM_MediaStorageSOPClassUID);
   if (header.sop_class_uid == UID_PrivateGenericFileSOPClass) header.sop_class_uid.clear();  // DCMTK's word for unknown
-  header.sop_instance_uid = text_of(data, DCM_SOPInstanceUID);
-  header.series_uid = text_of(data, DCM_SeriesInstanceUID);
-  header.study_uid = text_of(data, DCM_StudyInstanceUID);
-  header.frame_of_reference_uid = text_of(data, DCM_FrameOfReferenceUID);
+  header.sop_instance_uid = uid_of(data, DCM_SOPInstanceUID);
+  header.series_uid = uid_of(data, DCM_SeriesInstanceUID);
+  header.study_uid = uid_of(data, DCM_StudyInstanceUID);
+  header.frame_of_reference_uid = uid_of(data, DCM_FrameOfReferenceUID);
   header.modality = text_of(data, DCM_Modality);
   header.image_type = split(text_of(data, DCM_ImageType));
   header.series_number = integer_of(data, DCM_SeriesNumber);
   header.instance_number = integer_of(data, DCM_InstanceNumber).value_or(0);
   header.private_compression = text_of(data, DcmTagKey(0x07a1, 0x1011));
+  header.character_set = text_of(data, DCM_SpecificCharacterSet);
+  header.traits = read_traits(data);
+  header.secret_traits = traits_naming_patient(data, header.traits);
   read_geometry(data, header);
   header.pixels = pixel_format_of(data);
   return header;
@@ -241,15 +249,15 @@ DicomFileHeader read_dicom_header(const std::filesystem::path& file) {
   prepare_dcmtk();
   DicomFileHeader header;
   header.file = file;
-  sniff(header);
+  const auto opened = std::make_shared<OpenedFile>(file);
+  sniff(*opened, header);
   if (!header.skip.empty()) return header;
 
   DcmFileFormat format;
-  const DicomRead read = parse_dicom(format, file, DCM_PixelData, ERM_autoDetect, kLargestInflatedHeader);
+  const DicomRead read = parse_dicom(format, opened, DCM_PixelData, ERM_autoDetect, kLargestInflatedHeader);
   header = header_of(format, file);
   if (read.result.bad()) header.damage = read.result.text();
-  std::error_code no_size;
-  header.file_bytes = std::filesystem::file_size(file, no_size);
+  header.file_bytes = opened->size();
   if (read.result.good() && read.rest > 0) header.pixel_bytes = read.rest;
   header.skip = no_image_reason(header);
   header.broken = !header.skip.empty() && !header.damage.empty() && header.sop_class_uid.empty();

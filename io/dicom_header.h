@@ -37,6 +37,9 @@ struct DicomFileHeader {
   std::string transfer_syntax_uid;  ///< as the file states it, or as found where it has no meta header
   std::string sop_class_uid, sop_instance_uid, series_uid, study_uid, frame_of_reference_uid, modality;
   std::vector<std::string> image_type;
+  std::string character_set;        ///< Specific Character Set, of the texts among `traits`
+  std::string traits;               ///< what may tell volumes of a series apart: see trait_of (dicom_traits.h)
+  std::uint32_t secret_traits = 0;  ///< those that hold the patient's name or ID and are not shown, one bit each
   std::optional<int> series_number;
   int instance_number = 0;
   std::optional<glm::dvec3> position;                ///< Image Position (Patient), LPS mm
@@ -73,6 +76,9 @@ std::string text_of(DcmItem& item, const DcmTagKey& tag);
 
 /// "JPEG 2000 (Lossless only) (1.2.840.10008.1.2.4.90)"; the UID alone where it has no name.
 std::string uid_with_name(const std::string& uid);
+
+/// The same of a SOP Class, in plain words first: "an MR image, MRImageStorage (1.2.840.10008.5.1.4.1.1.4)".
+std::string kind_name(const std::string& sop_class_uid);
 
 /// Why this object is no slice of a CT volume by its kind (localizer, dose, MR, ...); empty if it may be one.
 std::string other_kind(const DicomFileHeader& header);

@@ -7,6 +7,7 @@
 #include "io/dicom_codecs.h"
 #include "io/dicom_header.h"
 #include "io/dicom_text.h"
+#include "io/shown_text.h"
 
 namespace tetwarp {
 namespace {
@@ -16,7 +17,7 @@ namespace {
 constexpr int kLargestAxis = 16384;
 constexpr std::uint64_t kLargestExpansion = 1000, kSmallFile = 1 << 20;
 
-std::string where(const DicomFileHeader& header) { return ", " + header.file.string(); }
+std::string where(const DicomFileHeader& header) { return ", " + shown(header.file); }
 
 std::string missing_or_bad(const std::string& attribute, const DicomFileHeader& header, const std::string& expected) {
   return attribute + " is missing or malformed" + where(header) + "; expected " + expected +
@@ -31,7 +32,7 @@ bool is_localizer(const DicomFileHeader& header) {
 std::string encoding_problem(const DicomFileHeader& header) {
   const PixelFormat& pixels = header.pixels;
   if (!header.pixel_bytes && !header.private_compression.empty()) {
-    return "pixels in the private compression " + header.private_compression +
+    return "pixels in the private compression " + shown(header.private_compression) +
            " of the attribute (07A1,1011) cannot be decoded" + where(header) +
            "; expected Pixel Data (7FE0,0010), export the series again without it";
   }
@@ -66,7 +67,7 @@ std::string layout_problem(const DicomFileHeader& header) {
   }
   if (pixels.samples != 1) return found("Samples per Pixel (0028,0002)", "1", std::to_string(pixels.samples));
   if (!pixels.photometric.empty() && !pixels.photometric.starts_with("MONOCHROME")) {
-    return found("Photometric Interpretation (0028,0004)", "MONOCHROME2", pixels.photometric);
+    return found("Photometric Interpretation (0028,0004)", "MONOCHROME2", shown(pixels.photometric));
   }
   if (pixels.frames != 1 && pixels.frames != 0) {
     return found("Number of Frames (0028,0008)", "1", pixels.frames < 0 ? "no number" : std::to_string(pixels.frames));
@@ -101,7 +102,50 @@ std::string uid_with_name(const std::string& uid) {
   const char* name = dcmFindNameOfUID(uid.c_str());
   if (syntax.getXfer() != EXS_Unknown) name = syntax.getXferName();
   const std::string found = name ? name : name_of_newer_syntax(uid);
-  return found.empty() ? uid : found + " (" + uid + ")";
+  return found.empty() ? shown(uid) : found + " (" + shown(uid) + ")";
+}
+
+std::string kind_name(const std::string& sop_class_uid) {
+  struct Word {
+    const char *start, *word;  ///< of DCMTK's name of the class
+  };
+  static constexpr Word kWords[] = {
+      {"SecondaryCapture", "a picture, of a screen for example"},
+      {"Multiframe", "pictures, of a screen for example"},
+      {"MRImage", "an MR image"},
+      {"EnhancedMR", "MR images"},
+      {"PositronEmission", "a PET image"},
+      {"EnhancedPET", "PET images"},
+      {"NuclearMedicine", "a nuclear medicine image"},
+      {"Ultrasound", "an ultrasound image"},
+      {"ComputedRadiography", "an X-ray image"},
+      {"DigitalXRay", "an X-ray image"},
+      {"DigitalMammography", "an X-ray image"},
+      {"XRay", "an X-ray image"},
+      {"RTDose", "a radiotherapy dose"},
+      {"RTStructureSet", "contours of radiotherapy"},
+      {"RTPlan", "a radiotherapy plan"},
+      {"RTIonPlan", "a radiotherapy plan"},
+      {"RTImage", "an image of radiotherapy"},
+      {"Segmentation", "a segmentation"},
+      {"SpatialRegistration", "a registration"},
+      {"DeformableSpatialRegistration", "a deformation"},
+      {"GrayscaleSoftcopyPresentation", "display settings"},
+      {"ColorSoftcopyPresentation", "display settings"},
+      {"KeyObjectSelection", "a list of chosen images"},
+      {"BasicTextSR", "a report"},
+      {"EnhancedSR", "a report"},
+      {"ComprehensiveSR", "a report"},
+      {"XRayRadiationDoseSR", "a report of X-ray dose"},
+      {"EncapsulatedPDF", "a PDF document"},
+      {"RawData", "raw data of a scanner"},
+  };
+  const char* name = dcmFindNameOfUID(sop_class_uid.c_str());
+  const auto found = std::find_if(std::begin(kWords), std::end(kWords), [&](const Word& word) {
+    return name && std::string_view(name).starts_with(word.start);
+  });
+  const std::string exact = uid_with_name(sop_class_uid);
+  return found == std::end(kWords) ? exact : std::string(found->word) + ", " + exact;
 }
 
 std::string other_kind(const DicomFileHeader& header) {
@@ -109,8 +153,8 @@ std::string other_kind(const DicomFileHeader& header) {
   if (kind == UID_EnhancedCTImageStorage || kind == UID_LegacyConvertedEnhancedCTImageStorage) {
     return uid_with_name(kind) + ", multi-frame CT is not read: convert it to CT Image Storage first";
   }
-  if (!kind.empty() && kind != UID_CTImageStorage) return uid_with_name(kind) + ", expected CT Image Storage";
-  if (is_localizer(header)) return "a localizer (Image Type), not a slice";
+  if (!kind.empty() && kind != UID_CTImageStorage) return kind_name(kind) + ", expected CT Image Storage";
+  if (is_localizer(header)) return "a localizer (scout) by its Image Type, not a slice";
   const bool placed = header.position && header.orientation && header.spacing;
   if (kind.empty() && !(header.modality == "CT" && placed)) {
     return "no SOP Class UID (0008,0016), and not Modality CT with a position in space either";

@@ -13,6 +13,7 @@
 #include "io/dicom_stack.h"
 #include "io/hash.h"
 #include "io/parallel.h"
+#include "io/shown_text.h"
 
 namespace tetwarp {
 namespace {
@@ -20,8 +21,7 @@ namespace {
 /// A file that was listed may have been replaced since.
 void require_unchanged(const DicomFileHeader& header, const DicomSlice& slice, const Geometry& geometry) {
   const auto same = [&](bool is_same, const std::string& what) {
-    require(is_same,
-            what + " is not what it was when the series was listed, " + slice.file.string() + "; list it again");
+    require(is_same, what + " is not what it was when the series was listed, " + shown(slice.file) + "; list it again");
   };
   const glm::dmat3 direction = rotation_of(*header.orientation);
   const glm::dvec2 spacing{geometry.spacing.x, geometry.spacing.y};
@@ -79,7 +79,7 @@ std::optional<PaddingRange> common_padding(const DicomSeries& series, const std:
   if (agree) return first;
   for (std::size_t k = 0; k < slices.size(); ++k) {
     require(slices[k].count.saturated_padding == 0,
-            "padding beyond int16 in HU, " + series.slices[k].file.string() +
+            "padding beyond int16 in HU, " + shown(series.slices[k].file) +
                 ", and Pixel Padding Value (0028,0120) differs from slice to slice; make it the same in all slices");
   }
   return std::nullopt;

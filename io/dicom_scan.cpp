@@ -1,75 +1,38 @@
+#include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmdata/dcuid.h>
+
 #include <algorithm>
 #include <climits>
+#include <iterator>
 #include <map>
 #include <set>
 #include <tuple>
 
 #include "io/dicom_assemble.h"
+#include "io/dicom_directory.h"
 #include "io/dicom_header.h"
 #include "io/dicom_series.h"
+#include "io/folder_files.h"
 #include "io/parallel.h"
+#include "io/shown_text.h"
 
 namespace tetwarp {
 namespace {
 
 namespace fs = std::filesystem;
+using Headers = std::vector<DicomFileHeader>;
 
-/// Lists the regular files of a folder tree in a fixed order, each real file and folder once.
-class FileList {
- public:
-  explicit FileList(const fs::path& root) : root_(fs::canonical(root)) {}
-
-  void add_folder(const fs::path& folder, bool with_sub_folders) {
-    if (!seen_.insert(fs::canonical(folder)).second) return;
-    std::error_code error;
-    std::vector<fs::path> entries;
-    for (fs::directory_iterator i(folder, error), end; !error && i != end; i.increment(error))
-      entries.push_back(i->path());
-    if (error) skipped.push_back(folder.string() + ": cannot be read: " + error.message());
-    std::sort(entries.begin(), entries.end());
-    for (const fs::path& entry : entries) add_entry(entry, with_sub_folders);
-  }
-
-  std::vector<fs::path> files;
-  std::vector<std::string> skipped;
-
- private:
-  void add_entry(const fs::path& entry, bool with_sub_folders) {
-    std::error_code error;
-    const fs::file_status status = fs::status(entry, error);
-    if (fs::is_directory(status)) {
-      if (!with_sub_folders) return;
-      if (leads_outwards(entry))
-        skipped.push_back(entry.string() + ": a link to a folder that holds the input, not followed");
-      else
-        add_folder(entry, true);
-    } else if (fs::is_regular_file(status)) {
-      const fs::path real = fs::canonical(entry, error);
-      if (seen_.insert(error ? entry : real).second) files.push_back(entry);
-    } else if (status.type() == fs::file_type::none) {
-      skipped.push_back(entry.string() + ": cannot be read: " + error.message());
-    } else if (fs::is_symlink(fs::symlink_status(entry, error))) {
-      skipped.push_back(entry.string() + ": a link that leads nowhere");
-    } else {
-      skipped.push_back(entry.string() + ": not a regular file");
-    }
-  }
-
-  /// Whether a link leads to a folder around the input: a cycle that would draw in what lies beside the input.
-  bool leads_outwards(const fs::path& entry) const {
-    const fs::path real = fs::canonical(entry);
-    const auto [end, ignored] = std::mismatch(real.begin(), real.end(), root_.begin(), root_.end());
-    return end == real.end() && real != root_;
-  }
-
-  fs::path root_;
-  std::set<fs::path> seen_;
-};
-
-std::vector<DicomFileHeader> read_headers(const std::vector<fs::path>& files, const Control& control) {
-  std::vector<DicomFileHeader> headers(files.size());
-  for_each_index(files.size(), 0, control, [&](std::size_t i) { headers[i] = read_dicom_header(files[i]); });
+Headers read_headers(std::vector<fs::path> files, const Control& control) {
+  Headers headers(files.size());
+  for_each_index(files.size(), 0, control, [&](std::size_t i) {
+    headers[i] = read_dicom_header(files[i]);
+    fs::path().swap(files[i]);  // a path takes 400 bytes, and there may be 100 000
+  });
   return headers;
+}
+
+void append(Headers& headers, Headers more) {
+  headers.insert(headers.end(), std::move_iterator(more.begin()), std::move_iterator(more.end()));
 }
 
 /// Files of one series. Where the Series Instance UID was wiped, study, series number and folder stand in for it.
@@ -80,54 +43,144 @@ SeriesKey key_of(const DicomFileHeader& header) {
   return {"", header.study_uid, header.series_number, header.file.parent_path()};
 }
 
-/// Names a file that nobody can know: it bears the suffix of the slices beside it, and may be one of them.
-std::string lost_slice(const std::vector<DicomFileHeader>& broken, const std::set<fs::path>& suffixes) {
+/// Names a file that nobody can know: it lies beside slices of the series, bears their suffix, and may be one of them.
+std::string lost_slice(const std::vector<DicomFileHeader>& broken, const DicomSeries& series) {
+  if (broken.empty()) return {};
+  std::set<std::pair<fs::path, fs::path>> places;  // folder and suffix
+  for (const DicomSlice& slice : series.slices) places.emplace(slice.file.parent_path(), slice.file.extension());
   for (const DicomFileHeader& header : broken) {
-    const fs::path name = header.file.filename();
-    if (name.string().front() == '.' || !suffixes.contains(name.extension())) continue;
-    return header.skip + ", " + header.file.string() + "; it may be a slice of this series: mend it, or take it away";
+    const fs::path& file = header.file;
+    if (file.filename().native().front() == '.' || !places.contains({file.parent_path(), file.extension()})) continue;
+    return header.skip + ", " + shown(file) + "; it may be a slice of this series: mend it, or take it away";
   }
   return {};
 }
 
-struct NumberedSeries {
-  int number;
-  DicomSeries series;
+/// Which headers belong to which series, and which to none.
+struct Grouping {
+  std::map<SeriesKey, std::vector<std::size_t>> series;
+  std::vector<LeftOutFile> skipped;
+  Headers broken;
 };
 
-DicomScan group(std::vector<DicomFileHeader> headers, const std::optional<fs::path>& wanted) {
-  DicomScan scan;
-  std::map<SeriesKey, std::vector<DicomFileHeader>> groups;
-  std::optional<SeriesKey> wanted_key;
-  std::vector<DicomFileHeader> broken;
-  std::set<fs::path> suffixes;
-  for (DicomFileHeader& header : headers) {
-    const bool is_wanted = wanted && header.file == *wanted;
-    if (header.broken) broken.push_back(header);
-    if (header.skip.empty()) suffixes.insert(header.file.extension());
-    if (!header.skip.empty()) {
-      if (!wanted || is_wanted) scan.skipped.push_back(header.file.string() + ": " + header.skip);
-      continue;
+Grouping group(const Headers& headers) {
+  Grouping groups;
+  for (std::size_t n = 0; n < headers.size(); ++n) {
+    const DicomFileHeader& header = headers[n];
+    if (header.skip.empty()) {
+      groups.series[key_of(header)].push_back(n);
+    } else {
+      groups.skipped.push_back({header.file, header.skip});
+      if (header.broken) groups.broken.push_back(header);
     }
-    const SeriesKey key = key_of(header);
-    if (is_wanted) wanted_key = key;
-    groups[key].push_back(std::move(header));
   }
-  std::vector<NumberedSeries> numbered;
-  for (auto& [key, files] : groups) {
-    if (wanted && key != wanted_key) continue;
-    const int number = files.front().series_number.value_or(INT_MAX);
-    numbered.push_back({number, assemble_series(std::move(files))});
+  return groups;
+}
+
+/// Takes the headers of a series out of all of them, so that two sets of them are never there at once.
+std::vector<DicomSeries> assemble(Headers& headers, const std::vector<std::size_t>& members, const Headers& broken,
+                                  const Control& control) {
+  Headers files;
+  files.reserve(members.size());
+  for (const std::size_t n : members) files.push_back(std::move(headers[n]));
+  std::vector<DicomSeries> volumes = assemble_series(std::move(files), control.stop);
+  for (DicomSeries& volume : volumes) {
+    const std::string lost = lost_slice(broken, volume);
+    if (!lost.empty() && !volume.refusal) volume.refusal = lost;
   }
-  std::stable_sort(numbered.begin(), numbered.end(), [](const NumberedSeries& a, const NumberedSeries& b) {
-    return std::tie(a.number, a.series.series_uid) < std::tie(b.number, b.series.series_uid);
+  return volumes;
+}
+
+DicomScan scan_of(Headers headers, const Control& control) {
+  Grouping groups = group(headers);
+  DicomScan scan;
+  scan.files = headers.size();
+  scan.skipped = std::move(groups.skipped);
+  std::vector<std::vector<DicomSeries>> all;
+  for (const auto& [key, members] : groups.series) all.push_back(assemble(headers, members, groups.broken, control));
+  std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) {
+    const int of_a = a.front().series_number.value_or(INT_MAX), of_b = b.front().series_number.value_or(INT_MAX);
+    return std::tie(of_a, a.front().series_uid) < std::tie(of_b, b.front().series_uid);
   });
-  const std::string lost = lost_slice(broken, suffixes);
-  for (NumberedSeries& one : numbered) {
-    if (!lost.empty() && !one.series.slices.empty() && !one.series.refusal) one.series.refusal = lost;
-    scan.series.push_back(std::move(one.series));
-  }
+  for (std::vector<DicomSeries>& volumes : all)
+    std::move(volumes.begin(), volumes.end(), std::back_inserter(scan.series));
   return scan;
+}
+
+/// The series of the first header alone.
+DicomScan scan_of_first(Headers headers, const Control& control) {
+  Grouping groups = group(headers);
+  DicomScan scan;
+  scan.files = headers.size();
+  if (headers.front().skip.empty())
+    scan.series = assemble(headers, groups.series[key_of(headers.front())], groups.broken, control);
+  else
+    scan.skipped.push_back({headers.front().file, headers.front().skip});
+  return scan;
+}
+
+DicomScan scan_folder(const fs::path& folder, const Control& control) {
+  std::error_code error;
+  fs::directory_iterator readable(folder, error);
+  require(!error, "the folder cannot be read, " + shown(folder) + ": " + error.message() + "; check its permissions");
+  FolderFiles list = list_files(folder, true, control.stop);
+  DicomScan scan = scan_of(read_headers(std::move(list.files), control), control);
+  scan.skipped.insert(scan.skipped.end(), list.left_out.begin(), list.left_out.end());
+  return scan;
+}
+
+bool is_directory_file(const DicomFileHeader& header) {
+  return header.sop_class_uid == UID_MediaStorageDirectoryStorage;
+}
+
+/// The files that a DICOMDIR names. Of these, other DICOMDIRs stand for what they name in turn.
+DicomScan scan_directory(const fs::path& dicomdir, const Control& control) {
+  Headers headers;
+  std::set<fs::path> seen{dicomdir}, missing;
+  std::vector<LeftOutFile> refused;
+  for (std::vector<fs::path> directories{dicomdir}; !directories.empty();) {
+    std::vector<fs::path> files;
+    for (const fs::path& directory : directories) {
+      DirectoryFiles found = read_directory(directory);
+      std::copy_if(found.files.begin(), found.files.end(), std::back_inserter(files),
+                   [&](const fs::path& file) { return seen.insert(file).second; });
+      missing.insert(found.missing.begin(), found.missing.end());
+      std::move(found.refused.begin(), found.refused.end(), std::back_inserter(refused));
+    }
+    Headers found = read_headers(std::move(files), control);
+    directories.clear();
+    for (const DicomFileHeader& header : found) {
+      if (is_directory_file(header)) directories.push_back(header.file);
+    }
+    std::erase_if(found, is_directory_file);
+    append(headers, std::move(found));
+  }
+  for (const fs::path& file : missing) {
+    DicomFileHeader header;
+    header.file = file;
+    header.skip = "missing, although a DICOMDIR names it";
+    header.broken = true;
+    headers.push_back(std::move(header));
+  }
+  DicomScan scan = scan_of(std::move(headers), control);
+  scan.skipped.insert(scan.skipped.end(), refused.begin(), refused.end());
+  return scan;
+}
+
+/// The series of one file, from the files beside it.
+DicomScan scan_beside(DicomFileHeader header, const Control& control) {
+  const fs::path path = header.file, folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  std::error_code error;
+  const fs::path real = fs::canonical(path, error), real_folder = fs::canonical(folder, error);
+  FolderFiles list = list_files(folder, false, control.stop);
+  std::erase_if(list.files, [&](const fs::path& file) {
+    const fs::path name = file.filename();
+    return name == path.filename() || (real.parent_path() == real_folder && name == real.filename());
+  });
+  Headers headers;
+  headers.push_back(std::move(header));
+  append(headers, read_headers(std::move(list.files), control));
+  return scan_of_first(std::move(headers), control);
 }
 
 }  // namespace
@@ -135,26 +188,15 @@ DicomScan group(std::vector<DicomFileHeader> headers, const std::optional<fs::pa
 DicomScan scan_dicom(const fs::path& path, bool single, const Control& control) {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
-  require(fs::exists(status), "no such file or folder, " + path.string() + "; check the path");
-  if (fs::is_directory(status)) {
-    fs::directory_iterator readable(path, error);
-    require(!error, "the folder cannot be read, " + path.string() + ": " + error.message() + "; check its permissions");
-    FileList list(path);
-    list.add_folder(path, true);
-    DicomScan scan = group(read_headers(list.files, control), std::nullopt);
-    scan.skipped.insert(scan.skipped.end(), list.skipped.begin(), list.skipped.end());
-    return scan;
-  }
-  require(fs::is_regular_file(status), "neither a file nor a folder, " + path.string() + "; name one of them");
-  if (single) return group(read_headers({path}, control), path);
-  const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
-  FileList list(folder);
-  list.add_folder(folder, false);
-  std::vector<fs::path> files{path};
-  for (const fs::path& file : list.files) {
-    if (!fs::equivalent(file, path, error)) files.push_back(file);
-  }
-  return group(read_headers(files, control), path);
+  require(fs::exists(status), "no such file or folder, " + shown(path) + "; check the path");
+  if (fs::is_directory(status)) return scan_folder(path, control);
+  require(fs::is_regular_file(status), "neither a file nor a folder, " + shown(path) + "; name one of them");
+  DicomFileHeader header = read_dicom_header(path);
+  if (!single && is_directory_file(header)) return scan_directory(path, control);
+  if (!single) return scan_beside(std::move(header), control);
+  Headers headers;
+  headers.push_back(std::move(header));
+  return scan_of_first(std::move(headers), control);
 }
 
 }  // namespace tetwarp

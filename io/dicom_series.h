@@ -21,15 +21,32 @@ struct DicomSlice {
   double position_mm = 0;  ///< Image Position (Patient) along the slice normal
 };
 
-/// The files that share a Series Instance UID, and the one volume that they make, if they do.
+/// A file that was met and is no slice.
+struct LeftOutFile {
+  std::filesystem::path file;
+  std::string reason;  ///< without the name of the file: many have the same
+};
+/// "FILE: reason".
+std::string to_string(const LeftOutFile& left_out);
+
+/// "axial", "coronal" or "sagittal" where slices of this normal are that within a degree; "oblique, nearly axial" else.
+std::string plane_name(const glm::dvec3& normal);
+
+/// The files that share a Series Instance UID and make one volume, if they do. A series that holds several volumes
+/// (phases, acquisitions, reconstructions) is several of these, in the natural order of what tells them apart.
 /// Files of the series that cannot belong to a CT volume (localizers, secondary captures, dose, structures) are set
 /// aside.
 struct DicomSeries {
   std::string series_uid, study_uid, frame_of_reference_uid, modality;
-  std::vector<DicomSlice> slices;      ///< sorted by position along the normal, row x column
-  Geometry geometry;                   ///< from Image Position and Orientation (Patient) and Pixel Spacing alone, sheared
-                                       ///< and uneven as they say; of a refused series: size 0, or as far as it is known
-  std::vector<std::string> set_aside;  ///< "FILE: reason", one a file
+  std::optional<int> series_number;
+  std::string description;         ///< Series Description, as messages show it; empty if it names the patient
+  std::size_t volumes = 1;         ///< in the series; of several each has:
+  std::string label;               ///< what people call it: "phase 50 %", "acquisition 3"
+  std::string split_by;            ///< the attribute that tells it from the others: "Acquisition Number (0020,0012)"
+  std::vector<DicomSlice> slices;  ///< sorted by position along the normal, row x column
+  Geometry geometry;               ///< from Image Position and Orientation (Patient) and Pixel Spacing alone, sheared
+                                   ///< and uneven as they say; of a refused series: size 0, or as far as it is known
+  std::vector<LeftOutFile> set_aside;  ///< of the whole series; of several volumes the first has them
   std::optional<std::string> refusal;  ///< why the slices are not a volume: what, where, expected and found
   std::optional<std::string> uneven;   ///< how the slice distances differ; `geometry.slices` has them exactly, for who
                                        ///< takes such a volume
@@ -39,12 +56,14 @@ struct DicomSeries {
 struct DicomScan {
   std::vector<DicomSeries>
       series;  ///< in the order of Series Number, then UID: the numbers that `--series` takes, from 1
-  std::vector<std::string> skipped;  ///< "FILE: reason" for files that are not DICOM images at all
+  std::vector<LeftOutFile> skipped;  ///< files that are not DICOM images at all
+  std::size_t files = 0;             ///< that were looked at
 };
 
 /// Reads the headers of every file under a folder, once (sub-folders included, symbolic links followed, each real
-/// folder once); or of one file and the series beside it; or, with `single`, of that file alone.
-/// @throws InputError when the path does not exist or cannot be read
+/// folder once); or of one file and the series beside it; or, with `single`, of that file alone; or of the files that a
+/// DICOMDIR names. Pixels are read only of files that have the same SOP Instance UID.
+/// @throws InputError when the path does not exist or cannot be read, Cancelled
 DicomScan scan_dicom(const std::filesystem::path& path, bool single = false, const Control& control = {});
 
 /// The headers of a series' slices, k-th slice first to last: what a derived series carries over. Hides DCMTK.

@@ -4,53 +4,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 
 #include "io/dicom_text.h"
+#include "io/shown_text.h"
 
 namespace tetwarp {
 namespace {
 
 using Headers = std::vector<DicomFileHeader>;
 
-constexpr double kSamePosition = 1e-3;  // mm
-
 double along(const DicomFileHeader& header, const glm::dvec3& normal) { return glm::dot(*header.position, normal); }
 
 std::string point_text(const glm::dvec3& p) { return number(p.x) + "\\" + number(p.y) + "\\" + number(p.z); }
-
-bool same_bytes(const DicomFileHeader& a, const DicomFileHeader& b) {
-  if (a.file_bytes != b.file_bytes) return false;
-  std::ifstream first(a.file, std::ios::binary), second(b.file, std::ios::binary);
-  std::vector<char> left(1 << 16), right(1 << 16);
-  while (first && second) {
-    first.read(left.data(), std::ssize(left));
-    second.read(right.data(), std::ssize(right));
-    if (first.gcount() != second.gcount()) return false;
-    if (!std::equal(left.begin(), left.begin() + first.gcount(), right.begin())) return false;
-  }
-  return first.eof() && second.eof();
-}
-
-/// Removes slices whose file is a byte for byte copy of one before it at the same position.
-void drop_copies(Headers& files, const glm::dvec3& normal, DicomSeries& series) {
-  Headers kept;
-  std::size_t dropped = 0;
-  std::string example;
-  for (DicomFileHeader& header : files) {
-    bool is_copy = false;
-    for (auto other = kept.rbegin(); other != kept.rend() && !is_copy; ++other) {
-      if (along(header, normal) - along(*other, normal) > kSamePosition) break;
-      is_copy = same_bytes(*other, header);
-      if (is_copy && dropped++ == 0) example = header.file.string() + " of " + other->file.string();
-    }
-    if (!is_copy) kept.push_back(std::move(header));
-  }
-  files = std::move(kept);
-  if (dropped == 0) return;
-  series.warnings.push_back(std::to_string(dropped) + " identical copies of slices left out: " + example +
-                            (dropped > 1 ? " and others" : ""));
-}
 
 /// The largest set of slices at one position, if any position has several.
 std::optional<std::string> same_position(const Headers& files, const glm::dvec3& normal) {
@@ -68,7 +33,7 @@ std::optional<std::string> same_position(const Headers& files, const glm::dvec3&
   if (crowded == 0) return std::nullopt;
   std::string names;
   for (std::size_t i = worst; i < worst + std::min<std::size_t>(worst_count, 4); ++i) {
-    names += (names.empty() ? "" : ", ") + files[i].file.string();
+    names += (names.empty() ? "" : ", ") + shown(files[i].file);
   }
   if (worst_count > 4) names += " and " + std::to_string(worst_count - 4) + " more";
   if (crowded > 1) names += " (likewise at " + std::to_string(crowded - 1) + " other positions)";
@@ -105,8 +70,8 @@ std::optional<std::string> lean(const Headers& files, DicomSeries& series) {
   if (!drift_from(files, normal).slice) return std::nullopt;
   const glm::dvec3 along = glm::normalize(*files.back().position - *files.front().position);
   if (const Drift drift = drift_from(files, along); drift.slice) {
-    return "slices are not stacked on one line, " + drift.slice->file.string() + " lies " + number(drift.beside_mm) +
-           " mm beside the line from " + files.front().file.string() + " to " + files.back().file.string() +
+    return "slices are not stacked on one line, " + shown(drift.slice->file) + " lies " + number(drift.beside_mm) +
+           " mm beside the line from " + shown(files.front().file) + " to " + shown(files.back().file) +
            ", expected 0; choose the slices of one stack";
   }
   const double degrees = std::acos(std::min(glm::dot(along, normal), 1.0)) * 180 / M_PI;
@@ -141,8 +106,8 @@ double median_gap(const std::vector<double>& positions) {
 }
 
 std::string gap_text(double gap, double usual, const DicomFileHeader& before, const DicomFileHeader& after) {
-  std::string text = "slice gap " + number(gap) + " mm between " + before.file.string() + " and " +
-                     after.file.string() + ", " + number(usual) + " mm elsewhere";
+  std::string text = "slice gap " + number(gap) + " mm between " + shown(before.file) + " and " + shown(after.file) +
+                     ", " + number(usual) + " mm elsewhere";
   const double missing = std::round(gap / usual) - 1;
   if (missing >= 1 && std::abs(gap / usual - missing - 1) < 0.02) {
     text += " (" + number(missing) + (missing > 1 ? " slices missing)" : " slice missing)");
@@ -176,7 +141,7 @@ std::optional<std::string> unevenness(const Headers& files, const glm::dvec3& no
   }
   if (!off_place) return std::nullopt;
   const double place = step * static_cast<double>(*off_place);
-  return "slice gaps drift: " + files[*off_place].file.string() + " is expected " + number(place) +
+  return "slice gaps drift: " + shown(files[*off_place].file) + " is expected " + number(place) +
          " mm from the first slice, found " + number(positions[*off_place] - positions.front()) + " mm";
 }
 
@@ -220,7 +185,6 @@ std::optional<std::string> stack_slices(Headers& files, DicomSeries& series) {
   std::stable_sort(files.begin(), files.end(), [&](const DicomFileHeader& a, const DicomFileHeader& b) {
     return along(a, normal) < along(b, normal);
   });
-  drop_copies(files, normal, series);
   const DicomFileHeader &first = files.front(), &last = files.back();
   geometry.size = {first.pixels.columns, first.pixels.rows, std::ssize(files)};
   geometry.origin = *first.position;

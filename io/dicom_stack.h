@@ -13,8 +13,10 @@ namespace tetwarp {
 /// column.
 glm::dmat3 rotation_of(const std::array<double, 6>& orientation);
 
-/// Sorts slices of one orientation, size and spacing by position along the normal, drops byte-identical copies (with a
-/// warning) and sets the geometry of the series.
+/// Slices this close along the normal are at one position, mm.
+constexpr double kSamePosition = 1e-3;
+
+/// Sorts slices of one orientation, size and spacing by position along the normal and sets the geometry of the series.
 ///
 /// A stack is straight and even when (mm; s: slice distance, q: last digit written of Image Position, at most 0.01)
 /// - no slice lies off the line through the first one, along the normal, by more than 0.01 + 1e-4 of its distance

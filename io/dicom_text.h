@@ -2,7 +2,9 @@
 
 #include <charconv>
 #include <cmath>
+#include <optional>
 #include <string>
+#include <string_view>
 
 namespace tetwarp {
 
@@ -11,6 +13,15 @@ inline std::string number(double value) {
   char text[32];
   const auto end = std::to_chars(text, text + sizeof text, value == 0 ? 0.0 : value, std::chars_format::general, 6).ptr;
   return {text, end};
+}
+
+/// A Decimal String (PS3.5 6.2) whatever the locale; none unless all of it is one finite number.
+inline std::optional<double> decimal(std::string_view text) {
+  if (text.starts_with('+')) text.remove_prefix(1);
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
+  return value;
 }
 
 }  // namespace tetwarp

@@ -31,7 +31,7 @@ class DamagedSlice : public testing::TestWithParam<Damaged> {
   std::vector<std::int16_t> load(const std::string& bytes) {
     write_file(folder_ / "slice.dcm", bytes);
     const DicomScan scan = scan_dicom(folder_ / "slice.dcm", true);
-    if (scan.series.empty()) throw InputError(scan.skipped.at(0));
+    if (scan.series.empty()) throw InputError(to_string(scan.skipped.at(0)));
     return load_dicom(scan.series[0], 1).volume.voxels;
   }
 

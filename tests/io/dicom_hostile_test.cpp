@@ -17,7 +17,7 @@ namespace {
 
 std::string load_error(const std::filesystem::path& file) {
   const DicomScan scan = scan_dicom(file, true);
-  if (scan.series.empty()) return scan.skipped.at(0);
+  if (scan.series.empty()) return to_string(scan.skipped.at(0));
   try {
     load_dicom(scan.series.front(), 1);
   } catch (const InputError& error) {

@@ -179,12 +179,13 @@ TEST(DicomScan, IdenticalCopyIsCountedOnceAndTold) {
   EXPECT_TRUE(says(series.warnings[0], {"1 identical", "s02.dcm"}));
 }
 
-TEST(DicomScan, CopyWithOtherPixelsIsRefused) {
+TEST(DicomScan, RetakeOfASliceIsRefused) {
   const Scratch folder;
   write_stack(folder.path(), 5, [](int k, MadeSlice& slice) {
     if (k < 4) return;
     slice = MadeSlice();
     slice.words = {77};
+    slice.sop_instance = "1.2.3.99";
     set_z(slice, std::to_string(30.0));
   });
   EXPECT_TRUE(says(refusal_of(folder.path()), {"2 slices at the same position", "s00.dcm", "s04.dcm"}));
@@ -219,7 +220,8 @@ TEST(DicomScan, ScoutOfAnotherOrientationIsSetAside) {
   EXPECT_EQ(series.refusal, std::nullopt);
   EXPECT_EQ(series.geometry.size.z, 4);
   ASSERT_EQ(series.set_aside.size(), 1u);
-  EXPECT_TRUE(says(series.set_aside[0], {"s00.dcm: Image Orientation 1\\0\\0\\0\\0\\-1", "1\\0\\0\\0\\1\\0"}));
+  EXPECT_TRUE(says(to_string(series.set_aside[0]),
+                   {"s00.dcm: coronal among axial slices", "Image Orientation 1\\0\\0\\0\\0\\-1", "1\\0\\0\\0\\1\\0"}));
 }
 
 TEST(DicomScan, OrientationsWithoutClearMajorityAreRefused) {
@@ -239,7 +241,7 @@ TEST(DicomScan, LocalizerIsSetAsideByItsImageType) {
   const DicomSeries series = only_series(folder.path());
   EXPECT_EQ(series.refusal, std::nullopt);
   ASSERT_EQ(series.set_aside.size(), 1u);
-  EXPECT_TRUE(says(series.set_aside[0], {"s04.dcm", "localizer"}));
+  EXPECT_TRUE(says(to_string(series.set_aside[0]), {"s04.dcm", "localizer"}));
 }
 
 TEST(DicomScan, ObjectsThatAreNoCtAreRefusedByTheirKind) {

@@ -1,0 +1,77 @@
+#include "io/dicom_charset.h"
+
+#include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmdata/dcspchrs.h>
+#include <dcmtk/ofstd/ofchrenc.h>
+
+#include <algorithm>
+#include <array>
+#include <optional>
+
+#include "io/shown_text.h"
+
+namespace tetwarp {
+namespace {
+
+constexpr char kEscape = 0x1b;
+
+bool is_japanese(const std::string& character_set) {
+  return character_set.find("IR 87") != std::string::npos || character_set.find("IR 159") != std::string::npos;
+}
+
+/// Text of ISO 2022 IR 6, 13, 87 and 159 (PS3.5 6.1.2.5.3, table C.12-4 of PS3.3) in EUC-JP; none for other escape
+/// sequences. The C library does not know these sets one by one, as DCMTK asks for them, but it knows EUC-JP.
+std::optional<std::string> euc_jp(std::string_view bytes) {
+  struct Set {
+    const char* escape;
+    std::size_t width;   ///< bytes a character
+    const char* before;  ///< in EUC-JP, whose bytes have the high bit
+  };
+  constexpr std::array<Set, 5> kSets = {
+      {{"(B", 1, ""}, {"(J", 1, ""}, {")I", 1, ""}, {"$B", 2, ""}, {"$(D", 2, "\x8f"}}};
+  std::string text;
+  Set set = kSets[0];
+  while (!bytes.empty()) {
+    if (bytes.front() == kEscape) {
+      bytes.remove_prefix(1);
+      const auto next =
+          std::find_if(kSets.begin(), kSets.end(), [&](const Set& s) { return bytes.starts_with(s.escape); });
+      if (next == kSets.end()) return std::nullopt;
+      bytes.remove_prefix(std::string_view(next->escape).size());
+      set = *next;
+    } else if (set.width == 1 || bytes.size() < set.width) {
+      if (bytes.front() < 0) text += '\x8e';  // a half-width katakana
+      text += bytes.front();
+      bytes.remove_prefix(1);
+    } else {
+      text += set.before;
+      for (const char c : bytes.substr(0, set.width)) text += static_cast<char>(c | 0x80);
+      bytes.remove_prefix(set.width);
+    }
+  }
+  return text;
+}
+
+std::optional<std::string> utf8_of(std::string_view bytes, const std::string& character_set) {
+  OFString utf8;
+  if (const auto japanese = is_japanese(character_set) ? euc_jp(bytes) : std::nullopt) {
+    OFCharacterEncoding converter;
+    const bool done = converter.selectEncoding("EUC-JP", "UTF-8").good() &&
+                      converter.convertString(japanese->data(), japanese->size(), utf8).good();
+    if (done) return std::string(utf8.data(), utf8.size());
+  }
+  DcmSpecificCharacterSet converter;
+  const bool done = converter.selectCharacterSet(character_set.c_str()).good() &&
+                    converter.convertString(bytes.data(), bytes.size(), utf8).good();
+  return done ? std::optional(std::string(utf8.data(), utf8.size())) : std::nullopt;
+}
+
+}  // namespace
+
+std::string shown_text(std::string_view bytes, const std::string& character_set) {
+  const bool plain = std::all_of(bytes.begin(), bytes.end(), [](char c) { return c >= 0 && c != kEscape; });
+  const std::optional<std::string> utf8 = plain ? std::nullopt : utf8_of(bytes, character_set);
+  return utf8 ? shown(*utf8) : shown(bytes);
+}
+
+}  // namespace tetwarp

@@ -1,0 +1,13 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace tetwarp {
+
+/// Text in the character sets that Specific Character Set (0008,0005) names, with code extensions (PS3.5 6.1.2.5), as
+/// messages show it: UTF-8 without control characters. Text that is not what it says it is is taken for UTF-8; bytes
+/// that are not that become "\xNN".
+std::string shown_text(std::string_view bytes, const std::string& character_set);
+
+}  // namespace tetwarp

@@ -1,0 +1,111 @@
+#include "io/dicom_kind.h"
+
+#include <glm/common.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "io/dicom_series.h"
+#include "io/dicom_stack.h"
+#include "io/dicom_text.h"
+#include "io/shown_text.h"
+
+namespace tetwarp {
+namespace {
+
+using Headers = std::vector<DicomFileHeader>;
+
+constexpr std::size_t kMostKinds = 64;
+
+/// One of the things in which kinds may differ.
+struct Aspect {
+  const char* name;
+  bool (*same)(const DicomFileHeader&, const DicomFileHeader&);
+  std::string (*text)(const DicomFileHeader&);
+};
+
+const std::array<Aspect, 5>& aspects() {
+  static const std::array<Aspect, 5> all = {{
+      {"Image Orientation (0020,0037)", same_orientation,
+       [](const DicomFileHeader& h) { return plane_name(rotation_of(*h.orientation)[2]); }},
+      {"Rows x Columns",
+       [](const DicomFileHeader& a, const DicomFileHeader& b) {
+         return a.pixels.rows == b.pixels.rows && a.pixels.columns == b.pixels.columns;
+       },
+       [](const DicomFileHeader& h) { return size_text(h.pixels); }},
+      {"Pixel Spacing (0028,0030)", same_pixel_spacing,
+       [](const DicomFileHeader& h) {
+         return "pixels of " + number(h.spacing->y) + " x " + number(h.spacing->x) + " mm";
+       }},
+      {"Frame of Reference UID (0020,0052)",
+       [](const DicomFileHeader& a, const DicomFileHeader& b) {
+         return a.frame_of_reference_uid == b.frame_of_reference_uid;
+       },
+       [](const DicomFileHeader& h) { return "frame of reference " + shown(h.frame_of_reference_uid); }},
+      {"Study Instance UID (0020,000D)",
+       [](const DicomFileHeader& a, const DicomFileHeader& b) { return a.study_uid == b.study_uid; },
+       [](const DicomFileHeader& h) { return "study " + shown(h.study_uid); }},
+  }};
+  return all;
+}
+
+bool same_kind(const DicomFileHeader& a, const DicomFileHeader& b) {
+  return std::all_of(aspects().begin(), aspects().end(), [&](const Aspect& aspect) { return aspect.same(a, b); });
+}
+
+void name_differences(std::vector<SliceKind>& kinds, const Headers& files) {
+  const auto example = [&](const SliceKind& kind) -> const DicomFileHeader& { return files[kind.slices.front()]; };
+  for (const Aspect& aspect : aspects()) {
+    const auto is_usual = [&](const SliceKind& kind) { return aspect.same(example(kind), files.front()); };
+    if (std::all_of(kinds.begin(), kinds.end(), is_usual)) continue;
+    for (SliceKind& kind : kinds) {
+      kind.label += (kind.label.empty() ? "" : ", ") + aspect.text(example(kind));
+      kind.differ_by += (kind.differ_by.empty() ? "" : " and ") + std::string(aspect.name);
+    }
+  }
+  std::set<std::string> labels;
+  for (const SliceKind& kind : kinds) labels.insert(kind.label);
+  if (labels.size() == kinds.size()) return;
+  for (SliceKind& kind : kinds) kind.label += " (" + orientation_text(*example(kind).orientation) + ")";
+}
+
+}  // namespace
+
+bool same_orientation(const DicomFileHeader& a, const DicomFileHeader& b) {
+  return std::equal(a.orientation->begin(), a.orientation->end(), b.orientation->begin(),
+                    [](double x, double y) { return std::abs(x - y) <= 1e-4; });
+}
+
+bool same_pixel_spacing(const DicomFileHeader& a, const DicomFileHeader& b) {
+  const glm::dvec2 change = glm::abs(*a.spacing - *b.spacing) / *a.spacing;
+  return change.x <= 1e-5 && change.y <= 1e-5;
+}
+
+std::string orientation_text(const std::array<double, 6>& cosines) {
+  std::string text;
+  for (const double value : cosines) {
+    if (!text.empty()) text += '\\';
+    text += number(value);
+  }
+  return text;
+}
+
+std::vector<SliceKind> slice_kinds(const Headers& files) {
+  std::vector<SliceKind> kinds;
+  for (std::size_t n = 0; n < files.size(); ++n) {
+    const auto kind = std::find_if(kinds.begin(), kinds.end(), [&](const SliceKind& one) {
+      return same_kind(files[one.slices.front()], files[n]);
+    });
+    if (kind != kinds.end()) {
+      kind->slices.push_back(n);
+      continue;
+    }
+    if (kinds.size() == kMostKinds) return {};
+    kinds.push_back({{n}, {}, {}});
+  }
+  name_differences(kinds, files);
+  return kinds;
+}
+
+}  // namespace tetwarp
