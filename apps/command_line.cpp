@@ -43,6 +43,25 @@ void add_series(CLI::App& command, InputOptions& input) {
       ->default_str("refuse");
 }
 
+void add_dicom_form(CLI::App& command, DicomForm& form) {
+  const std::map<std::string, DicomEncoding> encodings = {{"explicit", DicomEncoding::uncompressed},
+                                                          {"deflated", DicomEncoding::deflated},
+                                                          {"rle", DicomEncoding::rle},
+                                                          {"jpeg-ls", DicomEncoding::jpeg_ls}};
+  command
+      .add_option("--transfer-syntax", form.encoding,
+                  "Of a DICOM series: explicit (default), deflated, rle or jpeg-ls; all without loss")
+      ->transform(CLI::Transformer(encodings).description(""))
+      ->type_name("NAME");
+  command.add_flag("--keep-frame-of-reference", form.keep_frame_of_reference,
+                   "A DICOM series keeps INPUT's Frame of Reference UID although it is deformed: viewers overlay the two");
+  command.add_option("--series-number", form.series_number, "Of a DICOM series (default: INPUT's + 1000)")
+      ->check(CLI::Range(0, 2147483647));
+  command.add_option("--series-description", form.series_description,
+                     "Of a DICOM series, at most 64 characters (default: \"deformed: \" and INPUT's)")
+      ->type_name("TEXT");
+}
+
 constexpr const char* kInputHelp = "Folder of DICOM files, one DICOM file, or .nii .nii.gz .nrrd .mha";
 constexpr const char* kFieldHelp =
     "Forward field: a file (.mha .nrrd .nii .nii.gz, .npy:order=zyx|xyz,units=mm|voxel, or .vts .vti .vtr .vtk "
@@ -200,6 +219,7 @@ void add_deform(CLI::App& app, DeformOptions& options) {
       ->type_name("SIZE");
   command->add_option("--compress", options.compression, "Level 0 to 9 for .nii.gz (default 1) .nrrd .mha (default 0)")
       ->check(CLI::Range(0, 9));
+  add_dicom_form(*command, options.dicom);
   command
       ->add_option("--points", options.points,
                    "Landmarks or a surface, moved as the voxels under them: .csv (header x,y,z; LPS mm), .mrk.json, "

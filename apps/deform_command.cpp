@@ -207,7 +207,8 @@ void Deformation::begin_series() {
                       .parameters = parameters,
                       .description = std::string(what) + ", " + name_of(options_.interpolation) + " interpolation",
                       .deformed = deformed,
-                      .background_hu = record_.background});
+                      .background_hu = record_.background,
+                      .form = options_.dicom});
 }
 
 /// While others are resampled.

@@ -74,6 +74,12 @@ DeformOutputs begin_outputs(const DeformOptions& options, const PointsOption& po
   if (options.compression && (series || options.output.extension() == ".nii")) {
     throw UsageError("--compress is for .nii.gz, .nrrd and .mha, not for " + options.output.string());
   }
+  if (!series && options.dicom != DicomForm()) {
+    throw UsageError(
+        "--transfer-syntax, --keep-frame-of-reference, --series-number and --series-description are for a DICOM "
+        "series, not for " +
+        options.output.string());
+  }
   if (!options.preview.empty() && options.preview.extension() != ".png") {
     throw UsageError("unknown suffix of --preview \"" + options.preview.string() + "\"; use .png");
   }

@@ -12,12 +12,22 @@ namespace {
 
 using nlohmann::json;
 
+/// What was chosen of the series.
+json form_json(const DicomForm& form) {
+  json document = {{"transfer_syntax", name_of(form.encoding)},
+                   {"keep_frame_of_reference", form.keep_frame_of_reference}};
+  if (form.series_number) document["series_number"] = *form.series_number;
+  if (form.series_description) document["series_description"] = *form.series_description;
+  return document;
+}
+
 json canonical_options(const DeformRecord& of) {
   json options = {{"interpolation", name_of(of.options.interpolation)},
                   {"outside", name_of(of.options.outside)},
                   {"background", of.background}};
   if (of.options.preserve_mass) options["preserve"] = "mass";
   if (!is_same_grid(of.options.grid)) options["grid"] = of.options.grid;
+  if (of.outputs.series && of.options.dicom != DicomForm()) options["dicom"] = form_json(of.options.dicom);
   if (of.field.direction == Direction::pull) {
     options["pull_field"] = of.options.pull_field;
   } else {

@@ -9,6 +9,7 @@
 #include "deform/enum_names.h"
 #include "deform/errors.h"
 #include "deform/resampler.h"
+#include "io/dicom_series.h"
 
 namespace tetwarp::apps {
 
@@ -83,6 +84,7 @@ struct DeformOptions {
   std::optional<double> background;
   std::optional<std::int64_t> cell_size;
   std::optional<int> compression;
+  DicomForm dicom;  ///< of OUTPUT, where it is a series
   std::optional<std::uint64_t> memory_bytes;
   std::string grid = "same";      ///< same, fit, or a file or folder
   std::vector<std::string> with;  ///< IN=OUT...

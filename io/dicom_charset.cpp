@@ -74,4 +74,18 @@ std::string shown_text(std::string_view bytes, const std::string& character_set)
   return utf8 ? shown(*utf8) : shown(bytes);
 }
 
+std::optional<std::string> coded_text(const std::string& utf8, const std::string& character_set) {
+  if (std::all_of(utf8.begin(), utf8.end(), [](char c) { return c >= 0; })) return utf8;
+  const std::string first = character_set.substr(0, character_set.find('\\'));
+  DcmSpecificCharacterSet converter;
+  OFString coded;
+  if (first.empty() || converter.selectCharacterSet("ISO_IR 192", first.c_str()).bad()) return std::nullopt;
+  if (converter.convertString(utf8.data(), utf8.size(), coded).bad()) return std::nullopt;
+  return std::string(coded.data(), coded.size());
+}
+
+std::size_t length_of(std::string_view utf8) {
+  return static_cast<std::size_t>(std::count_if(utf8.begin(), utf8.end(), [](char c) { return (c & 0xc0) != 0x80; }));
+}
+
 }  // namespace tetwarp

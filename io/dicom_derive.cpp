@@ -9,14 +9,19 @@
 
 #include "deform/version.h"
 #include "io/dicom_carry.h"
+#include "io/dicom_charset.h"
+#include "io/dicom_compress.h"
 #include "io/dicom_file.h"
 #include "io/dicom_header.h"
 #include "io/dicom_put.h"
 #include "io/hash.h"
+#include "io/shown_text.h"
 
 namespace tetwarp {
 
 namespace {
+
+constexpr std::size_t kLongestDescription = 64;  // characters
 
 std::string uid_of(const Sha256& hash) { return uid_from_digest(hash.digest()); }
 
@@ -37,6 +42,15 @@ std::string uid_or_made_up(const DicomHeaders& source, const DcmTagKey& tag) {
   return uid.empty() ? uid_from_headers(source, tag_name(tag)) : uid;
 }
 
+/// Everything that was chosen, in one line.
+std::string line_of(const DicomForm& form) {
+  std::string text = uid_of(form.encoding);
+  if (form.keep_frame_of_reference) text += " frame of reference kept";
+  if (form.series_number) text += " number " + std::to_string(*form.series_number);
+  if (form.series_description) text += " description " + *form.series_description;
+  return text;
+}
+
 std::string series_uid(const DicomHeaders& source, const DicomDerivation& derivation, const DerivedSeries& series) {
   Sha256 hash;
   hash.add("tetwarp derived series").add(uid_or_made_up(source, DCM_SeriesInstanceUID));
@@ -45,35 +59,51 @@ std::string series_uid(const DicomHeaders& source, const DicomDerivation& deriva
                                   [](const std::string& uid) { return uid.empty(); });
   if (!named) hash.add(uid_from_headers(source, "instances"));
   hash.add(derivation.field_sha256).add(derivation.parameters).add(version()).add(commit());
+  if (derivation.form != DicomForm()) hash.add(line_of(derivation.form));
   return uid_of(hash);
 }
 
 std::string frame_uid(const DicomHeaders& source, const DicomDerivation& derivation) {
   const std::string frame = uid_or_made_up(source, DCM_FrameOfReferenceUID);
-  if (!derivation.deformed) return frame;
+  if (!derivation.deformed || derivation.form.keep_frame_of_reference) return frame;
   return uid_of(Sha256().add("tetwarp deformed frame of reference").add(frame).add(derivation.field_sha256));
 }
 
-/// Series Number of the source plus 1000: beside it in a list, and seldom taken.
-std::string series_number(DcmDataset& slice) {
+/// The one that was chosen, or that of the source plus 1000: beside it in a list, and seldom taken.
+std::string series_number(DcmDataset& slice, const DicomForm& form) {
+  if (form.series_number) return std::to_string(*form.series_number);
   Sint32 number = 0;
   slice.findAndGetSint32(DCM_SeriesNumber, number);
   return std::to_string(number > INT32_MAX - 1000 ? number : number + 1000);
 }
 
+/// The one that was chosen, in the character set of the source.
+std::string chosen_description(const std::string& text, const std::string& character_set) {
+  const std::string cannot = "the series description \"" + shown(text) + "\" ";
+  require(length_of(text) <= kLongestDescription,
+          cannot + "has " + std::to_string(length_of(text)) + " characters; DICOM takes at most 64");
+  const bool plain = std::none_of(text.begin(), text.end(), [](unsigned char c) { return c < ' ' || c == '\\'; });
+  require(plain, cannot + "holds a backslash or a control character; leave them out");
+  const std::optional<std::string> coded = coded_text(text, character_set);
+  require(coded.has_value(), cannot + "cannot be written in the character set of the series, " +
+                                 (character_set.empty() ? "ASCII" : shown(character_set)) + "; use other characters");
+  return *coded;
+}
+
 /// "deformed: " and the source's own description, cut to the 64 characters of VR LO. A text of several bytes a
 /// character that is too long is left out, as cutting it could break a character.
-std::string series_description(DcmDataset& slice, bool deformed) {
-  constexpr std::size_t kLongest = 64;
+std::string series_description(DcmDataset& slice, const DicomDerivation& derivation) {
+  const std::string set = text_of(slice, DCM_SpecificCharacterSet);
+  if (derivation.form.series_description) return chosen_description(*derivation.form.series_description, set);
+  const bool deformed = derivation.deformed;
   const std::string mine = deformed ? "deformed" : "resampled", source = text_of(slice, DCM_SeriesDescription);
   if (source.empty()) return mine;
   const std::string text = mine + ": " + source;
-  if (text.size() <= kLongest) return text;
-  const std::string set = text_of(slice, DCM_SpecificCharacterSet);
+  if (text.size() <= kLongestDescription) return text;
   const bool ascii = std::all_of(source.begin(), source.end(), [](char c) { return c >= ' ' && c <= '~'; });
   const bool one_byte = set.starts_with("ISO_IR 1") && set != "ISO_IR 192" && set.find('\\') == std::string::npos;
   if (!ascii && !one_byte) return mine;
-  return text.substr(0, kLongest);
+  return text.substr(0, kLongestDescription);
 }
 
 /// The source's instance numbers where each is there once and is fit for a file name, else 1 to n.
@@ -193,8 +223,8 @@ DerivedSeries derive_series(const DicomHeaders& source, const Geometry& geometry
   series.study_uid = uid_or_made_up(source, DCM_StudyInstanceUID);
   series.series_uid = series_uid(source, derivation, series);
   series.frame_of_reference_uid = frame_uid(source, derivation);
-  series.number = series_number(*slices.front());
-  series.description = series_description(*slices.front(), derivation.deformed);
+  series.number = series_number(*slices.front(), derivation.form);
+  series.description = series_description(*slices.front(), derivation);
   series.instance_number = instance_numbers(headers, static_cast<std::size_t>(geometry.size.z));
   series.header = header_slices(headers, geometry);
   series.varying = varying_acquisition(slices);

@@ -8,7 +8,6 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include <array>
 #include <bit>
 #include <cerrno>
 #include <cstdio>
@@ -16,6 +15,7 @@
 
 #include "deform/errors.h"
 #include "deform/version.h"
+#include "io/dicom_compress.h"
 #include "io/dicom_header.h"
 #include "io/dicom_put.h"
 #include "io/hash.h"
@@ -48,29 +48,64 @@ std::vector<std::byte> written(Object& object, std::size_t size) {
 }
 
 /// Preamble, "DICM" and group 0002.
-std::vector<std::byte> encoded_meta(const std::string& sop_class, const std::string& sop_instance) {
+std::vector<std::byte> encoded_meta(const std::string& sop_class, const std::string& sop_instance,
+                                    DicomEncoding encoding) {
   DcmMetaInfo meta;
   const Uint8 header_version[2] = {0, 1};
   check(meta.putAndInsertUint32(DCM_FileMetaInformationGroupLength, 0));
   check(meta.putAndInsertUint8Array(DCM_FileMetaInformationVersion, header_version, 2));
   put(meta, DCM_MediaStorageSOPClassUID, sop_class);
   put(meta, DCM_MediaStorageSOPInstanceUID, sop_instance);
-  put(meta, DCM_TransferSyntaxUID, UID_LittleEndianExplicitTransferSyntax);
+  put(meta, DCM_TransferSyntaxUID, uid_of(encoding));
   put(meta, DCM_ImplementationClassUID, kImplementationUid);
   put(meta, DCM_ImplementationVersionName, ascii(std::string("TETWARP_") + version(), 16));
   check(meta.computeGroupLengthAndPadding(EGL_withGL, EPD_noChange, kSyntax, EET_ExplicitLength));
   return written(meta, meta.calcElementLength(kSyntax, EET_ExplicitLength));
 }
 
-/// Tag, value representation and length of Pixel Data (PS3.5 7.1.2), as `kSyntax` has them.
-std::array<std::byte, 12> pixel_data_start(std::size_t value_bytes) {
-  constexpr std::uint64_t kLargest = 0xfffffffe;
-  require(value_bytes <= kLargest, "a slice of " + std::to_string(value_bytes) +
-                                       " bytes; Pixel Data of DICOM hold at most " + std::to_string(kLargest));
-  std::array<std::byte, 12> bytes{std::byte{0xe0}, std::byte{0x7f}, std::byte{0x10},
-                                  std::byte{0},    std::byte{'O'},  std::byte{'W'}};
-  for (std::size_t n = 0; n < 4; ++n) bytes[8 + n] = static_cast<std::byte>(value_bytes >> (8 * n));
-  return bytes;
+void append_number(std::vector<std::byte>& bytes, std::uint64_t value, std::size_t count) {
+  for (std::size_t n = 0; n < count; ++n) bytes.push_back(static_cast<std::byte>(value >> (8 * n)));
+}
+
+/// Tag and length of an item or a delimiter (PS3.5 7.5).
+void append_item_start(std::vector<std::byte>& bytes, unsigned element, std::size_t length) {
+  append_number(bytes, 0xfffe, 2);
+  append_number(bytes, element, 2);
+  append_number(bytes, length, 4);
+}
+
+/// Pixel Data as they lie in a file.
+struct PixelData {
+  std::vector<std::byte> start;      ///< tag, value representation and length (PS3.5 7.1.2), as `kSyntax` has them
+  std::vector<std::byte> frame;      ///< the compressed voxels, if they are
+  std::span<const std::byte> value;  ///< `frame`, or the voxels where they lie
+  std::vector<std::byte> end;
+};
+
+PixelData pixel_data(DcmDataset& dataset, std::span<const std::int16_t> voxels, DicomEncoding encoding) {
+  constexpr std::uint64_t kLargest = 0xfffffffe, kUndefined = 0xffffffff;
+  constexpr unsigned kItem = 0xe000, kEnd = 0xe0dd;
+  const bool fragments = is_encapsulated(encoding);
+  PixelData data;
+  if (fragments) {
+    Uint16 rows = 0, columns = 0;
+    check(dataset.findAndGetUint16(DCM_Rows, rows));
+    check(dataset.findAndGetUint16(DCM_Columns, columns));
+    data.frame = compressed_frame(voxels, rows, columns, encoding);
+  }
+  data.value = fragments ? std::span<const std::byte>(data.frame) : std::as_bytes(voxels);
+  require(data.value.size() <= kLargest, "a slice of " + std::to_string(data.value.size()) +
+                                             " bytes; Pixel Data of DICOM hold at most " + std::to_string(kLargest));
+  append_number(data.start, 0x7fe0, 2);
+  append_number(data.start, 0x0010, 2);
+  for (const char c : {'O', fragments ? 'B' : 'W', '\0', '\0'}) data.start.push_back(static_cast<std::byte>(c));
+  append_number(data.start, fragments ? kUndefined : data.value.size(), 4);
+  if (fragments) {
+    append_item_start(data.start, kItem, 0);  // an empty Basic Offset Table
+    append_item_start(data.start, kItem, data.value.size());
+    append_item_start(data.end, kEnd, 0);
+  }
+  return data;
 }
 
 void write_bytes(int file, std::span<const std::byte> bytes, const std::filesystem::path& path) {
@@ -96,25 +131,32 @@ std::vector<std::byte> encoded(DcmDataset& dataset) {
   return written(dataset, dataset.calcElementLength(kSyntax, EET_ExplicitLength));
 }
 
-void write_dicom_file(const std::filesystem::path& path, DcmDataset& dataset, std::span<const std::int16_t> voxels) {
+void write_dicom_file(const std::filesystem::path& path, DcmDataset& dataset, std::span<const std::int16_t> voxels,
+                      DicomEncoding encoding) {
   static_assert(std::endian::native == std::endian::little);
-  const std::span<const std::byte> pixels = std::as_bytes(voxels);
-  const std::array<std::byte, 12> pixel_start = pixel_data_start(pixels.size());
+  PixelData pixels = pixel_data(dataset, voxels, encoding);
   drop(dataset, DCM_SOPInstanceUID);
-  const std::vector<std::byte> nameless = encoded(dataset);
-  const std::string uid =
-      uid_from_digest(Sha256().add("tetwarp instance").add(nameless).add(pixel_start).add(pixels).digest());
+  Sha256 hash;
+  hash.add("tetwarp instance").add(encoded(dataset)).add(pixels.start).add(pixels.value).add(pixels.end);
+  if (encoding == DicomEncoding::deflated) hash.add(uid_of(encoding));  // nothing that was added shows it
+  const std::string uid = uid_from_digest(hash.digest());
   put(dataset, DCM_SOPInstanceUID, uid);
-  std::vector<std::byte> start = encoded_meta(text_of(dataset, DCM_SOPClassUID), uid);
-  const std::vector<std::byte> data = encoded(dataset);
+  std::vector<std::byte> start = encoded_meta(text_of(dataset, DCM_SOPClassUID), uid, encoding);
+  std::vector<std::byte> data = encoded(dataset);
+  data.insert(data.end(), pixels.start.begin(), pixels.start.end());
+  if (encoding == DicomEncoding::deflated) {
+    data.insert(data.end(), pixels.value.begin(), pixels.value.end());
+    data = deflated(data);
+    pixels.value = {};
+  }
   start.insert(start.end(), data.begin(), data.end());
-  start.insert(start.end(), pixel_start.begin(), pixel_start.end());
 
   const int file = ::open(path.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666);
   if (file < 0) throw Error("cannot create " + path.string() + ": " + std::generic_category().message(errno));
   try {
     write_bytes(file, start, path);
-    write_bytes(file, pixels, path);
+    write_bytes(file, pixels.value, path);
+    write_bytes(file, pixels.end, path);
     begin_flush(file);
   } catch (...) {
     ::close(file);

@@ -19,4 +19,9 @@ std::string plane_name(const glm::dvec3& normal) {
   return along[axis] > cosine_of_one_degree ? names[axis] : std::string("oblique, nearly ") + names[axis];
 }
 
+const char* name_of(DicomEncoding encoding) {
+  constexpr const char* kNames[] = {"explicit", "deflated", "rle", "jpeg-ls"};
+  return kNames[static_cast<int>(encoding)];
+}
+
 }  // namespace tetwarp

@@ -84,6 +84,27 @@ struct DicomVolume {
 ///         decoded, HU beyond int16: naming the file, the tag, expected and found
 DicomVolume load_dicom(const DicomSeries& series, int threads = 0, const Control& control = {});
 
+/// How a derived series keeps its pixels, always without loss: a transfer syntax of PS3.5.
+enum class DicomEncoding : std::uint8_t {
+  uncompressed,  ///< Explicit VR Little Endian
+  deflated,      ///< Deflated Explicit VR Little Endian: the header too
+  rle,           ///< RLE Lossless
+  jpeg_ls,       ///< JPEG-LS Lossless
+};
+
+/// The word of the command line: explicit, deflated, rle, jpeg-ls.
+const char* name_of(DicomEncoding encoding);
+
+/// What may be chosen of a derived series.
+struct DicomForm {
+  DicomEncoding encoding = DicomEncoding::uncompressed;
+  bool keep_frame_of_reference = false;                ///< also of what was deformed
+  std::optional<int> series_number = {};               ///< instead of the source's + 1000
+  std::optional<std::string> series_description = {};  ///< UTF-8; instead of "deformed: " and the source's
+
+  friend bool operator==(const DicomForm&, const DicomForm&) = default;
+};
+
 /// What a derived series says of how it came to be.
 struct DicomDerivation {
   std::string field_sha256;  ///< hex: the frame of reference depends on it and on the source's frame alone
@@ -91,6 +112,7 @@ struct DicomDerivation {
   std::string description;   ///< Derivation Description: "Deformed by ..."; no paths, no names
   bool deformed = true;      ///< false for identity: the frame of reference is kept
   double background_hu = -1024;
+  DicomForm form = {};
 };
 
 /// What the writer had to add or could not carry over, for the report.
@@ -103,8 +125,8 @@ struct DicomWriteReport {
 /// folder `folder`, which exists and is empty. Reads no clock: the same input gives the same bytes and the same UIDs.
 class DerivedSeriesWriter {
  public:
-  /// The source's headers must outlive the writer. Where the derived volume has as many slices as the source, each takes
-  /// over the header of its own; otherwise that of the source slice nearest to it along the stack.
+  /// The source's headers must outlive the writer. Where the derived volume has as many slices as the source, each
+  /// takes over the header of its own; otherwise that of the source slice nearest to it along the stack.
   /// @param geometry  of the derived volume, straight and even
   /// @throws InputError
   DerivedSeriesWriter(std::filesystem::path folder, const Geometry& geometry, const DicomHeaders& source,

@@ -56,6 +56,10 @@ def read_pydicom(folder):
     affine[:3, 1] = column * float(slices[0].PixelSpacing[0])
     affine[:3, 2] = np.subtract(last, first) / max(len(slices) - 1, 1)
     affine[:3, 3] = first
+    try:
+        slices[0].pixel_array
+    except (NotImplementedError, RuntimeError) as error:  # compressed, and no decoder is there
+        skip(f"pydicom: {error}; install python3-gdcm")
     hu = [s.pixel_array.astype(np.int64) * int(s.RescaleSlope) + int(s.RescaleIntercept) for s in slices]
     return affine, np.stack(hu).transpose(2, 1, 0)
 
