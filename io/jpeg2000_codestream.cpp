@@ -163,8 +163,19 @@ Marker marker_at(Bytes bytes, std::size_t at) {
   return marker;
 }
 
+/// Coded data hold no 0xff before more than 0x8f, nor at their end: bits are stuffed so that no marker occurs in them.
+/// OpenJPEG 2.5.0 asserts this of the high-throughput coder (T.814) and so ends the program at damaged data. Markers of
+/// packets (T.800 A.8) are refused with them, for nothing tells them from damage; OpenJPH writes none.
+void check_stuffing(Bytes data) {
+  const auto bad = std::adjacent_find(data.begin(), data.end(),
+                                      [](std::uint8_t a, std::uint8_t b) { return a == 0xff && b > 0x8f; });
+  expect(bad == data.end() && (data.empty() || data.back() != 0xff),
+         "expected high-throughput data without markers, found " +
+             (bad == data.end() ? "ff at their end" : hex(0xff00u | *std::next(bad))));
+}
+
 /// Follows the tile-parts (T.800 A.4.2) to the end marker. @return where that ends
-std::size_t follow_tile_parts(Bytes bytes, std::size_t at, std::uint64_t tiles) {
+std::size_t follow_tile_parts(Bytes bytes, std::size_t at, std::uint64_t tiles, bool is_high_throughput) {
   std::vector<bool> seen(tiles);
   while (true) {
     const Marker part = marker_at(bytes, at);
@@ -181,15 +192,18 @@ std::size_t follow_tile_parts(Bytes bytes, std::size_t at, std::uint64_t tiles) 
              "expected data of tile " + std::to_string(tile + 1) + ", found marker " + hex(marker.code));
       in_header = marker.next;
     }
+    const std::size_t data = in_header + 2;
     if (length == 0) {  // it goes on to the end
       constexpr std::array<std::uint8_t, 2> end_marker{0xff, 0xd9};
       const auto end = std::find_end(bytes.begin() + static_cast<std::ptrdiff_t>(in_header), bytes.end(),
                                      end_marker.begin(), end_marker.end());
       at = static_cast<std::size_t>(end - bytes.begin());
     } else {
-      expect(at + length >= in_header + 2, "expected a tile-part of more than " + std::to_string(length) + " bytes");
+      expect(at + length >= data, "expected a tile-part of more than " + std::to_string(length) + " bytes");
       at += length;
     }
+    number_at(bytes, at, 2);  // whether an end is there
+    if (is_high_throughput) check_stuffing(bytes.subspan(data, std::max(at, data) - data));
   }
   const auto missing = std::find(seen.begin(), seen.end(), false);
   expect(missing == seen.end(), "expected " + std::to_string(tiles) + " tiles, found none with number " +
@@ -234,7 +248,8 @@ Jpeg2000Image read(Bytes bytes) {
     at = marker.next;
   }
   expect(has_style, "expected a coding style, found none");
-  image.codestream = bytes.first(follow_tile_parts(bytes, at, grid.tiles_across * grid.tiles_down));
+  const bool is_high_throughput = (bytes[image.block_style_at] & 0x40) != 0;
+  image.codestream = bytes.first(follow_tile_parts(bytes, at, grid.tiles_across * grid.tiles_down, is_high_throughput));
   return image;
 }
 

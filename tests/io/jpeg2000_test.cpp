@@ -232,5 +232,15 @@ TEST(Jpeg2000, HighThroughputGivesBackTheSamples) {
             std::vector<int>(words.begin(), words.end()));
 }
 
+TEST(Jpeg2000, HighThroughputDataThatEndOpenJpegAreRefusedBeforeIt) {
+  const std::string stream = high_throughput_frame();
+  const DicomFileHeader header = header_of(10, 12, 12, false);
+  const std::size_t data = stream.find("\xff\x93") + 2;
+  EXPECT_TRUE(says(refusal(with_bytes(stream, data + 14, "\xff\xf1"), header), {"without markers, found fff1"}));
+  EXPECT_TRUE(says(refusal(with_bytes(stream, stream.size() - 3, "\xff"), header), {"found ff at their end"}));
+  for (std::size_t at = data; at + 3 < stream.size(); ++at)
+    EXPECT_NE(refusal(with_bytes(stream, at, "\xff\x90"), header), "no error") << at;
+}
+
 }  // namespace
 }  // namespace tetwarp
