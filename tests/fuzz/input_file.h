@@ -7,11 +7,15 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <string_view>
 
 #include "deform/errors.h"
 
 /// What a fuzzer calls, and the replay of a corpus too: hands the bytes to a reader. Returns 0.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
+
+/// Between the files of an input that is several.
+constexpr std::string_view kNextFile = "\nNEXT\n";
 
 /// How often a reader took what it was given, in this process.
 inline std::uint64_t& accepted_reads() {

@@ -1,9 +1,5 @@
 // Writes small whole files of every form that a fuzz target reads: seeds FOLDER makes FOLDER/TARGET/FILE. Made in code,
 // with ITK, DCMTK and what the tests make their files with.
-#include <dcmtk/config/osconfig.h>
-#include <dcmtk/dcmdata/dcrleerg.h>
-#include <dcmtk/dcmjpeg/djencode.h>
-#include <dcmtk/dcmjpls/djencode.h>
 #include <itk_H5Cpp.h>
 
 #include <algorithm>
@@ -13,7 +9,7 @@
 #include "io/image_file.h"
 #include "tests/fuzz/input_file.h"
 #include "tests/itkbridge/itk_transforms.h"
-#include "tests/support/dicom_maker.h"
+#include "tests/support/coded_slices.h"
 #include "tests/support/gmsh_file.h"
 #include "tests/support/image_samples.h"
 #include "tests/support/point_files.h"
@@ -268,16 +264,18 @@ void make_dose(const fs::path& folder) {
   write_slice(folder / "dose.dcm", dose);
 }
 
-void make_dicom(const fs::path& folder) {
-  DcmRLEEncoderRegistration::registerCodecs();
-  DJEncoderRegistration::registerCodecs();
-  DJLSEncoderRegistration::registerCodecs();
+/// One slice in every transfer syntax.
+void make_slices(const fs::path& folder) {
   for (const E_TransferSyntax encoding :
-       {EXS_LittleEndianExplicit, EXS_LittleEndianImplicit, EXS_BigEndianExplicit, EXS_DeflatedLittleEndianExplicit,
-        EXS_RLELossless, EXS_JPEGProcess14SV1, EXS_JPEGLSLossless}) {
+       {EXS_LittleEndianExplicit, EXS_LittleEndianImplicit, EXS_BigEndianExplicit, EXS_DeflatedLittleEndianExplicit}) {
     MadeSlice slice;
     slice.encoding = encoding;
     write_slice(folder / ("encoding-" + std::to_string(encoding) + ".dcm"), slice);
+  }
+  for (const Coding& coding : codings()) {
+    const std::string frame = coding.frame(folder);
+    write_encapsulated(folder / (coding.name + ".dcm"), coding.slice(), coding.uid,
+                       {frame.substr(0, 40), frame.substr(40)}, {0});
   }
   MadeSlice bytes;
   bytes.bits_allocated = bytes.bits_stored = 8;
@@ -286,7 +284,93 @@ void make_dicom(const fs::path& folder) {
   bytes.slope = "2.5";
   bytes.edit = [](DcmDataset& data) { data.putAndInsertUint16(DCM_PixelPaddingValue, 3); };
   write_slice(folder / "bytes.dcm", bytes);
-  make_dose(folder);
+}
+
+/// Slices in one input.
+std::string joined(const fs::path& scratch, const std::vector<MadeSlice>& slices) {
+  std::string bytes;
+  for (const MadeSlice& slice : slices) {
+    write_slice(scratch / "slice", slice);
+    bytes += std::string(bytes.empty() ? "" : kNextFile) + read_bytes(scratch / "slice");
+  }
+  fs::remove(scratch / "slice");
+  return bytes;
+}
+
+/// A DICOMDIR that names "IM2" and so on.
+std::string directory_of(const fs::path& scratch, std::size_t count) {
+  MadeSlice directory;
+  directory.sop_class = UID_MediaStorageDirectoryStorage;
+  directory.edit = [&](DcmDataset& data) {
+    data.clear();
+    data.putAndInsertString(DCM_SOPClassUID, UID_MediaStorageDirectoryStorage);
+    data.putAndInsertString(DCM_SOPInstanceUID, "1.2.3.99");
+    for (std::size_t n = 2; n < 2 + count; ++n) {
+      DcmItem* record = nullptr;
+      data.findOrCreateSequenceItem(DCM_DirectoryRecordSequence, record, -2);
+      record->putAndInsertString(DCM_DirectoryRecordType, "IMAGE");
+      record->putAndInsertString(DCM_ReferencedFileID, ("IM" + std::to_string(n)).c_str());
+    }
+  };
+  return joined(scratch, {directory});
+}
+
+/// Series of several files, each an input: a stack, one that leans, an uneven one, phases, copies, a DICOMDIR.
+void make_folders(const fs::path& folder) {
+  std::vector<MadeSlice> stack;
+  for (int k = 0; k < 6; ++k) {
+    MadeSlice& slice = stack.emplace_back();
+    slice.position = position_text(-10, -20, 30 + 2.5 * k);
+    slice.instance_number = k + 1;
+    slice.sop_instance = std::string("1.2.3.").append(std::to_string(k + 1));
+    slice.words = {static_cast<std::uint16_t>(k)};
+  }
+  std::vector<MadeSlice> leaning = stack, uneven(stack.begin(), stack.begin() + 3), phases = stack, copies = uneven;
+  for (int k = 0; k < 6; ++k) leaning[k].position = position_text(-10, -20 + k, 30 + 2.5 * k);
+  uneven[2].position = stack[4].position;
+  for (int k = 0; k < 6; ++k) {
+    phases[k].position = stack[k % 3].position;
+    phases[k].edit = [phase = 50 * (k / 3)](DcmDataset& data) {
+      data.putAndInsertString(DCM_SpecificCharacterSet, "ISO_IR 100");
+      data.putAndInsertString(DCM_SeriesDescription, ("Gated, " + std::to_string(phase) + ".0%").c_str());
+    };
+  }
+  copies[1] = copies[2] = copies[0];
+  copies[1].encoding = EXS_RLELossless;
+  write_file(folder / "stack", joined(folder, stack));
+  write_file(folder / "leaning", joined(folder, leaning));
+  write_file(folder / "uneven", joined(folder, uneven));
+  write_file(folder / "phases", joined(folder, phases));
+  write_file(folder / "copies", joined(folder, copies));
+  write_file(folder / "directory", directory_of(folder, stack.size()) + std::string(kNextFile) + joined(folder, stack));
+}
+
+/// Frames behind the header that dicom_decode_target.cpp reads.
+void make_frames(const fs::path& folder) {
+  // As numbered there; its three syntaxes of high throughput are one.
+  const std::vector<std::string> order = {"Rle",         "Jpeg1",    "Jpeg2And4",     "Jpeg6And8",
+                                          "Jpeg10And12", "Jpeg14",   "Jpeg14Sv1",     "JpegLs",
+                                          "JpegLsLossy", "Jpeg2000", "Jpeg2000Lossy", "HighThroughput"};
+  for (const Coding& coding : codings()) {
+    const auto number = std::ranges::find(order, coding.name) - order.begin();
+    if (number == std::ssize(order)) continue;
+    const MadeSlice slice = coding.slice();
+    std::string bytes;
+    for (const long value : {long{number}, long{slice.bits_allocated}, long{slice.bits_stored}, 0L})
+      bytes += static_cast<char>(value);
+    append_value(bytes, static_cast<std::uint16_t>(slice.rows));
+    append_value(bytes, static_cast<std::uint16_t>(slice.columns));
+    write_file(folder / coding.name, bytes + coding.frame(folder));
+  }
+}
+
+void make_dicom(const fs::path& root) {
+  register_encoders();
+  make_slices(folder_of(root, "dicom"));
+  make_dose(root / "dicom");
+  make_slices(folder_of(root, "dicom-scan"));
+  make_folders(root / "dicom-scan");
+  make_frames(folder_of(root, "dicom-decode"));
   DJLSEncoderRegistration::cleanup();
   DJEncoderRegistration::cleanup();
   DcmRLEEncoderRegistration::cleanup();
@@ -308,6 +392,6 @@ int main(int argc, char** argv) {
   make_other_transforms(root / "transform-text");
   make_points(root);
   make_meshes(folder_of(root, "mesh-msh"));
-  make_dicom(folder_of(root, "dicom"));
+  make_dicom(root);
   return 0;
 }
