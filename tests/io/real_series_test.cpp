@@ -127,6 +127,7 @@ TEST(RealSeries, CtBesideDoseAndStructuresIsTheOneVolume) {
   expect_near(ct->geometry.origin, {-275, -524, 168.5593});
   const DicomVolume loaded = load_dicom(*ct);
   EXPECT_EQ(*std::min_element(loaded.volume.voxels.begin(), loaded.volume.voxels.end()), -1000);
+  EXPECT_EQ(sum_of(loaded), -210494566);
   ASSERT_EQ(scan.skipped.size(), 2u);
   EXPECT_TRUE(says(to_string(scan.skipped[0]), {"rtplan.dcm", "RTPlanStorage"}));
   EXPECT_TRUE(says(to_string(scan.skipped[1]), {"rtss.dcm", "RTStructureSetStorage"}));
@@ -168,6 +169,7 @@ TEST(RealSeries, FourAcquisitionsAtOnePositionAreFourImagesInTheirOrder) {
   const DicomScan scan = scan_dicom(folder / "same-position");
   ASSERT_EQ(scan.series.size(), 4u);
   const char* files[] = {"004.dcm", "003.dcm", "002.dcm", "001.dcm"};
+  const std::int64_t sums[] = {-235153598, -235129399, -235151441, -235207036};
   for (int n = 0; n < 4; ++n) {
     const DicomSeries& series = scan.series[n];
     EXPECT_EQ(series.label, "acquisition " + std::to_string(12 + n));
@@ -176,6 +178,7 @@ TEST(RealSeries, FourAcquisitionsAtOnePositionAreFourImagesInTheirOrder) {
     EXPECT_EQ(series.refusal, std::nullopt);
     ASSERT_EQ(series.slices.size(), 1u);
     EXPECT_EQ(series.slices[0].file.filename(), files[n]);
+    EXPECT_EQ(sum_of(load_dicom(series)), sums[n]);
   }
 }
 
@@ -313,7 +316,16 @@ TEST(RealSeries, OddFilesReadWithTheirStatedGeometryAndValues) {
   const DicomVolume undefined_length = load_single(folder / kOddFiles.back().name);
   ASSERT_TRUE(undefined_length.padding);
   EXPECT_EQ(undefined_length.padding->low, -3024);
+  // Of HU, from pydicom and GDCM.
+  EXPECT_EQ(sum_of(rotated), -385703173);
+  EXPECT_EQ(sum_of(bare), -197319300);
+  EXPECT_EQ(sum_of(undefined_length), -228407043);
   EXPECT_EQ(sum_of(load_single(folder / "headers/CT_small.dcm")), -1950906);
+  EXPECT_EQ(sum_of(load_single(folder / "compressed/bad_sequence.dcm")), -20086954);
+  if (!kReadsJpeg2000) return;
+  const DicomVolume flipped = load_single(folder / "orientation/explicit_VR-UN.dcm");
+  EXPECT_EQ(sum_of(flipped), -175887460);
+  EXPECT_EQ(flipped.volume.geometry.direction[1], glm::dvec3(0, -1, 0));
 }
 
 }  // namespace
