@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "deform/errors.h"
+#include "io/dicom_header.h"
 #include "io/dicom_series.h"
 #include "tests/support/dicom_maker.h"
 #include "tests/support/image_samples.h"
@@ -111,6 +112,33 @@ TEST_F(EditedSlice, MonochromeOneChangesTheDisplayNotTheHu) {
   const DicomSeries series = expect_reads_as_pydicom(edit);
   EXPECT_TRUE(std::any_of(series.warnings.begin(), series.warnings.end(),
                           [](const std::string& warning) { return warning.starts_with("MONOCHROME1"); }));
+}
+
+/// PS3.3 C.7.6.3.1.2: which end is white is said after the Modality and VOI LUTs, so HU and window stay.
+TEST_F(EditedSlice, DerivedFromMonochromeOneIsMonochromeTwoOfTheSameHuAndWindow) {
+  Edit edit{.words = real_words_};
+  edit.more = [](DcmDataset& data) {
+    data.putAndInsertString(DCM_PhotometricInterpretation, "MONOCHROME1");
+    data.putAndInsertString(DCM_PresentationLUTShape, "INVERSE");
+    data.putAndInsertString(DCM_WindowCenter, "40");
+    data.putAndInsertString(DCM_WindowWidth, "400");
+  };
+  for (const int k : {0, 1}) write(edit, k);
+  const DicomVolume source = load_dicom(scan_dicom(folder_.path()).series.at(0));
+  const Scratch derived;
+  DicomDerivation derivation;
+  derivation.field_sha256 = std::string(64, '0');
+  write_derived_series(derived.path(), view(source.volume), *source.headers, derivation);
+  const DicomScan scan = scan_dicom(derived.path());
+  ASSERT_EQ(scan.series.size(), 1u);
+  EXPECT_EQ(load_dicom(scan.series[0]).volume.voxels, source.volume.voxels);
+  EXPECT_TRUE(scan.series[0].warnings.empty());
+  DcmFileFormat file;
+  ASSERT_TRUE(file.loadFile(scan.series[0].slices.at(1).file.c_str()).good());
+  const auto text = [&](const DcmTagKey& tag) { return text_of(*file.getDataset(), tag); };
+  EXPECT_EQ(text(DCM_PhotometricInterpretation), "MONOCHROME2");
+  EXPECT_FALSE(file.getDataset()->tagExists(DCM_PresentationLUTShape));
+  EXPECT_EQ(text(DCM_WindowCenter) + " " + text(DCM_WindowWidth), "40 400");
 }
 
 TEST_F(EditedSlice, SlopeAndInterceptAreThoseOfEachSlice) {
