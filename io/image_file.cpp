@@ -41,15 +41,16 @@ void require_file_holds(const std::filesystem::path& path, const ImageHeader& he
   constexpr double kDeflateAtMost = 1040;  // deflate cannot do better than 1032 to 1
   double expected = static_cast<double>(header.components) * static_cast<double>(stored.value_bytes);
   for (int axis = 0; axis < 3; ++axis) expected *= static_cast<double>(header.geometry.size[axis]);
-  const double held =
-      static_cast<double>(std::filesystem::file_size(path)) - (stored.encoded ? 0 : static_cast<double>(stored.offset));
+  const auto offset = static_cast<double>(stored.offset);
+  const double needed = stored.encoded ? (offset + expected) / kDeflateAtMost : expected;
+  const double held = static_cast<double>(std::filesystem::file_size(path)) - (stored.encoded ? 0 : offset);
   std::ostringstream text;
   text.precision(17);
   text << "truncated, or a header that promises too much, " << path.string() << ": " << std::max(held, 0.0)
        << " bytes, but " << to_string(header.geometry.size) << " voxels of " << header.components << " x "
        << stored.value_bytes << " bytes" << (stored.encoded ? ", compressed," : "") << " need "
-       << std::ceil(stored.encoded ? expected / kDeflateAtMost : expected);
-  require(held >= (stored.encoded ? expected / kDeflateAtMost : expected), text.str());
+       << std::ceil(needed);
+  require(held >= needed, text.str());
 }
 
 #ifdef TETWARP_WITH_ITK

@@ -67,6 +67,7 @@ class BinaryStl : public PointsDocument {
 class TextStl : public PointsDocument {
  public:
   TextStl(std::string all, const std::string& name) : bytes_(std::move(all)) {
+    require(bytes_.find('\0') == std::string::npos, "a byte of zero in text, " + name + "; is it an STL file?");
     // What a line may begin with, by what stands before it; a solid may hold any number of facets.
     constexpr const char* kFacet[] = {"facet", "outer", "vertex", "vertex", "vertex", "endloop", "endfacet"};
     Lines lines(bytes_);

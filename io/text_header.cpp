@@ -67,8 +67,8 @@ std::string trimmed(const std::string& text) {
   return begin == std::string::npos ? "" : text.substr(begin, end - begin + 1);
 }
 
-/// Refuses what MetaIO cannot take: it copies names and values into buffers without asking for their length, and counts
-/// as many numbers as NDims says.
+/// Refuses what MetaIO cannot take: it copies names and values into buffers without asking for their length, counts
+/// as many numbers as NDims says, and loses memory where a header is not what it expects.
 void check_meta_line(const std::string& line, const std::string& file) {
   constexpr std::size_t kLongestLine = 1000, kLongestName = 200, kMostDimensions = 10;
   require(line.size() <= kLongestLine && std::min(line.find_first_of("=:"), line.size()) <= kLongestName,
@@ -79,6 +79,8 @@ void check_meta_line(const std::string& line, const std::string& file) {
             "a control character in the header of " + file + "; is it text?");
   }
   const auto equals = line.find_first_of("=:");
+  require(equals != std::string::npos || trimmed(line).empty(),
+          "a line without \"=\" in the header of " + file + ", \"" + line.substr(0, 60) + "\"; expected NAME = VALUE");
   if (equals == std::string::npos || lower(trimmed(line.substr(0, equals))) != "ndims") return;
   const std::string value = trimmed(line.substr(equals + 1));
   const bool is_number =
@@ -139,6 +141,10 @@ TextHeader read_text_header(const std::filesystem::path& path, ImageFormat forma
       format == ImageFormat::nrrd ? header["data file"] + header["datafile"] : header["elementdatafile"];
   require(format == ImageFormat::nrrd ? elsewhere.empty() : elsewhere == "LOCAL",
           "voxels in another file (\"" + elsewhere + "\"), " + file + "; expected them after the header");
+  if (format == ImageFormat::mha) {
+    for (const char* field : {"ndims", "dimsize", "elementtype"})
+      require(!header[field].empty(), std::string("no ") + field + " in the header of " + file + "; is it an MHA file?");
+  }
   const std::string units = format == ImageFormat::nrrd ? header["space units"] : header["distanceunits"];
   std::istringstream words(units);
   for (std::string word; words >> word;) {
