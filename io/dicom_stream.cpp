@@ -6,9 +6,11 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <cstring>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -156,8 +158,10 @@ class DicomStream final : public DcmInputStream {
 
   void limit_inflated(std::size_t bytes) { inflated_limit_ = bytes; }
 
-  OFBool good() const override { return producer_->good() && !is_too_deep(); }
-  OFCondition status() const override { return is_too_deep() ? EC_InvalidStream : producer_->status(); }
+  OFBool good() const override { return producer_->good() && !is_too_deep() && !has_long_type_; }
+  OFCondition status() const override {
+    return is_too_deep() || has_long_type_ ? EC_InvalidStream : producer_->status();
+  }
   OFBool eos() override { return producer_->eos(); }
   offile_off_t avail() override { return producer_->avail(); }
   offile_off_t read(void* buffer, offile_off_t length) override {
@@ -171,6 +175,7 @@ class DicomStream final : public DcmInputStream {
     while (!frames_.empty() && frames_.back() < frame) frames_.pop_back();  // stacks grow downwards
     if (frames_.empty() || frames_.back() != frame) frames_.push_back(frame);
     deepest_ = std::max(deepest_, frames_.size());
+    has_long_type_ = has_long_type_ || begins_long_type();
   }
   void putback() override {
     producer_->putback(tell_ - mark_);
@@ -189,10 +194,28 @@ class DicomStream final : public DcmInputStream {
     constexpr std::size_t kOutside = 4;                 // the data set, and what is read before it
     return deepest_ > 2 * kDeepestSequence + kOutside;  // a call for each, and one for its items
   }
+  /// Whether a Directory Record Type (0004,1430) is longer than a CS may be, or of another VR. DCMTK 3.6.7 cuts it to
+  /// its length, and throws std::out_of_range if it has more than twice that.
+  bool has_long_type() const { return has_long_type_; }
   /// What was compressed, if anything.
   const Plain* inflated() const { return inflated_.get(); }
 
  private:
+  /// Looks at the tag that comes next, in every way to encode it. An implicit length that spells "CS" is taken for
+  /// that.
+  bool begins_long_type() {
+    std::array<std::uint8_t, 8> b{};
+    const offile_off_t count = producer_->read(b.data(), b.size());
+    producer_->putback(count);
+    const bool is_little = b[0] == 4 && b[1] == 0 && b[2] == 0x30 && b[3] == 0x14;
+    const bool is_big = b[0] == 0 && b[1] == 4 && b[2] == 0x14 && b[3] == 0x30;
+    if (count < 8 || !(is_little || is_big)) return false;
+    const bool is_code = b[4] == 'C' && b[5] == 'S';
+    constexpr int kLongest = 16;
+    if (is_code) return (is_little ? b[6] | b[7] << 8 : b[7] | b[6] << 8) > kLongest;
+    const bool is_implicit = is_little && b[5] == 0 && b[6] == 0 && b[7] == 0;
+    return !is_implicit || b[4] > kLongest;
+  }
   offile_off_t advanced(offile_off_t count) {
     tell_ += count;
     return count;
@@ -202,6 +225,7 @@ class DicomStream final : public DcmInputStream {
   std::unique_ptr<DcmProducer> producer_;
   std::shared_ptr<Plain> inflated_;
   std::size_t inflated_limit_ = 0, deepest_ = 0;
+  bool has_long_type_ = false;
   std::vector<std::uintptr_t> frames_;
   offile_off_t tell_ = 0, mark_ = 0;
 };
@@ -229,16 +253,28 @@ OFCondition refusal(const std::string& reason) {
   return {OFM_dcmdata, EC_CorruptedData.theCode, OF_error, reason.c_str()};
 }
 
+/// DCMTK throws no exceptions of its own, but those of strings that it cuts wrongly go through it, and it loses memory.
+/// What is known to bring that about is refused before (DicomStream::has_long_type).
+OFCondition read_until(DcmFileFormat& format, DicomStream& stream, const DcmTagKey& until) {
+  try {
+    return format.readUntilTag(stream, EXS_Unknown, EGL_noChange, DCM_MaxReadLength, until);
+  } catch (const std::logic_error&) {
+    return refusal("a value that DCMTK cannot take");
+  }
+}
+
 DicomRead load(DcmFileFormat& format, DicomStream& stream, const DcmTagKey& until, std::size_t inflated_limit) {
   if (stream.status().bad()) return {stream.status()};
   stream.limit_inflated(inflated_limit);
   format.transferInit();
-  OFCondition result = format.readUntilTag(stream, EXS_Unknown, EGL_noChange, DCM_MaxReadLength, until);
+  OFCondition result = read_until(format, stream, until);
   format.transferEnd();
   const auto rest = static_cast<std::size_t>(stream.avail());
   const Plain* inflated = stream.inflated();
   if (stream.is_too_deep()) {
     result = refusal("sequences in sequences, more than " + std::to_string(kDeepestSequence) + " deep");
+  } else if (stream.has_long_type()) {
+    result = refusal("a Directory Record Type (0004,1430) of more than 16 bytes");
   } else if (inflated && inflated->is_too_large()) {
     result = refusal("the data set inflates to more than " + std::to_string(inflated_limit >> 20) + " MiB");
   } else if (result.good() && rest == 0 && inflated && !inflated->is_whole()) {

@@ -14,7 +14,8 @@ namespace {
 namespace fs = std::filesystem;
 
 /// A DICOMDIR whose IMAGE records name these files; a '!' before a name makes its record one that is not in use.
-void write_directory(const fs::path& path, const std::vector<std::string>& file_ids) {
+void write_directory(const fs::path& path, const std::vector<std::string>& file_ids,
+                     const std::string& type = "IMAGE") {
   DcmFileFormat format;
   DcmDataset& data = *format.getDataset();
   data.putAndInsertString(DCM_SOPClassUID, UID_MediaStorageDirectoryStorage);
@@ -25,7 +26,7 @@ void write_directory(const fs::path& path, const std::vector<std::string>& file_
     DcmItem* record = nullptr;
     data.findOrCreateSequenceItem(DCM_DirectoryRecordSequence, record, -2);
     record->putAndInsertUint16(DCM_RecordInUseFlag, in_use ? 0xffff : 0);
-    record->putAndInsertString(DCM_DirectoryRecordType, "IMAGE");
+    record->putAndInsertString(DCM_DirectoryRecordType, type.c_str());
     record->putAndInsertString(DCM_ReferencedFileID, id.substr(in_use ? 0 : 1).c_str());
   }
   if (format.saveFile(path.c_str(), EXS_LittleEndianExplicit).bad()) throw std::runtime_error("cannot write DICOMDIR");
@@ -116,6 +117,23 @@ TEST(DicomDirectory, ADamagedOneIsRefusedByNameAndAnEmptyOneHoldsNothing) {
     FAIL() << "accepted";
   } catch (const InputError& error) {
     EXPECT_TRUE(says(error.what(), {"damaged DICOMDIR", "DICOMDIR:", "give its folder"}));
+  }
+}
+
+TEST(DicomDirectory, ATypeOfRecordThatDcmtkThrowsAtIsDamage) {
+  const Scratch folder;
+  write_stack(folder.path(), 3);
+  write_directory(folder / "DICOMDIR", {"s00.dcm", "s01.dcm"}, "MORE THAN TWICE THE SIXTEEN BYTES OF A TYPE");
+  const DicomScan scan = scan_dicom(folder.path());
+  ASSERT_EQ(scan.series.size(), 1u);
+  EXPECT_EQ(scan.series[0].slices.size(), 3u);
+  EXPECT_EQ(scan.skipped.size(), 1u);
+  try {
+    scan_dicom(folder / "DICOMDIR");
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_TRUE(says(error.what(), {"damaged DICOMDIR", "Directory Record Type (0004,1430) of more than 16 bytes",
+                                    "give its folder"}));
   }
 }
 
