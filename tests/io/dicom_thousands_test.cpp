@@ -102,5 +102,24 @@ TEST(ManyFiles, OfASliceItsHeaderAloneIsRead) {
   EXPECT_LT(bytes_read() - before, std::uint64_t{1} << 17) << "4 slices of 2 MiB";
 }
 
+#ifndef __SANITIZE_ADDRESS__  // which holds on to memory that was given back
+TEST(ManyScans, TakeNoMoreMemoryThanTheFirstOnes) {
+  const Scratch folder;
+  write_stack(folder.path(), 4);
+  const auto resident_kib = [] {
+    long pages = 0;
+    std::ifstream("/proc/self/statm") >> pages >> pages;
+    return pages * (::sysconf(_SC_PAGESIZE) / 1024);
+  };
+  constexpr int kFirst = 50, kScans = 500;
+  long before = 0;
+  for (int n = 0; n < kFirst + kScans; ++n) {
+    if (n == kFirst) before = resident_kib();
+    ASSERT_EQ(scan_dicom(folder.path()).series.size(), 1u);
+  }
+  EXPECT_LT(resident_kib() - before, kScans) << "KiB; a scan may leave less than one";
+}
+#endif
+
 }  // namespace
 }  // namespace tetwarp
