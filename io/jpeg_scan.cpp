@@ -200,6 +200,10 @@ JpegScan read_jpeg_scan(Bytes stream, std::string& problem) {
     problem = "expected a scan of one component, found none";
     return scan;
   }
+  if (scan.frame.marker == 0) {
+    problem = "expected a frame header before the scan, found none";
+    return scan;
+  }
   const bool is_lossless = scan.frame.marker == kLossless;
   const auto dc = tables.find(header[2] >> 4), ac = tables.find(16 + (header[2] & 15));
   if (dc == tables.end() || (!is_lossless && ac == tables.end())) {

@@ -230,6 +230,9 @@ TEST(JpegHeader, DamagedOrMissingPartsAreNamed) {
   std::string elsewhere = whole;
   elsewhere[elsewhere.find("\xff\xda") + 6] = 0x30;
   EXPECT_TRUE(says(decode(elsewhere).problem, {"Huffman", "found none"}));
+  const std::size_t scan = whole.find("\xff\xda"), frame = whole.find("\xff\xc3");
+  const std::string early = whole.substr(0, frame) + whole.substr(scan, 10) + whole.substr(frame);
+  EXPECT_EQ(problem_of(early), "expected a frame header before the scan, found none");
 }
 
 }  // namespace
