@@ -23,7 +23,7 @@ using Headers = std::vector<DicomFileHeader>;
 void set_other_kinds_aside(Headers& files, DicomSeries& series) {
   std::erase_if(files, [&](const DicomFileHeader& header) {
     const std::string kind = other_kind(header);
-    if (!kind.empty()) series.set_aside.push_back({header.file, kind});
+    if (!kind.empty()) series.set_aside.push_back({header.file, kind, header.frame});
     return !kind.empty();
   });
 }
@@ -40,7 +40,10 @@ std::optional<std::string> first_problem(const Headers& files, std::string (*jud
     else
       first = std::move(problem);
   }
-  if (more > 0) *first += " (" + std::to_string(more) + " more of " + std::to_string(files.size()) + " files likewise)";
+  if (more > 0) {
+    *first += " (" + std::to_string(more) + " more of " + std::to_string(files.size()) +
+              (files.front().frame ? " frames likewise)" : " files likewise)");
+  }
   return first;
 }
 
@@ -74,9 +77,11 @@ void set_scouts_aside(Headers& files, DicomSeries& series) {
   const auto plane = [](const DicomFileHeader& header) { return plane_name(rotation_of(*header.orientation)[2]); };
   std::erase_if(files, [&](const DicomFileHeader& header) {
     if (same_orientation(header, usual->example)) return false;
-    series.set_aside.push_back({header.file, plane(header) + " among " + plane(usual->example) +
-                                                 " slices: Image Orientation " + orientation_text(*header.orientation) +
-                                                 ", the others have " + orientation_text(*usual->example.orientation)});
+    series.set_aside.push_back({header.file,
+                                plane(header) + " among " + plane(usual->example) + " slices: Image Orientation " +
+                                    orientation_text(*header.orientation) + ", the others have " +
+                                    orientation_text(*usual->example.orientation),
+                                header.frame});
     return true;
   });
 }
@@ -85,9 +90,9 @@ std::optional<std::string> mixed_orientations(const Headers& files) {
   const std::vector<Orientation> orientations = orientations_of(files);
   if (orientations.size() == 1) return std::nullopt;
   const DicomFileHeader &first = orientations[0].example, &second = orientations[1].example;
-  return "mixed orientations: " + orientation_text(*first.orientation) + " in " + shown(first.file) + ", " +
-         orientation_text(*second.orientation) + " in " + shown(second.file) + " (" +
-         std::to_string(orientations.size()) + " orientations in " + std::to_string(files.size()) +
+  return "mixed orientations: " + orientation_text(*first.orientation) + " in " + shown(first) + ", " +
+         orientation_text(*second.orientation) + " in " + shown(second) + " (" + std::to_string(orientations.size()) +
+         " orientations in " + std::to_string(files.size()) +
          " files); put the slices of one orientation in a folder of their own";
 }
 
@@ -96,7 +101,7 @@ std::optional<std::string> inconsistency(const Headers& files) {
   const DicomFileHeader& first = files.front();
   const auto differ = [&](const std::string& what, const DicomFileHeader& other, const std::string& expected,
                           const std::string& found) {
-    return "mixed " + what + ": " + expected + " in " + shown(first.file) + ", " + found + " in " + shown(other.file) +
+    return "mixed " + what + ": " + expected + " in " + shown(first) + ", " + found + " in " + shown(other) +
            "; put the slices that belong together in a folder of their own";
   };
   const auto spacing = [](const DicomFileHeader& h) { return number(h.spacing->y) + "\\" + number(h.spacing->x); };
@@ -143,7 +148,7 @@ void warn_of_values(const Headers& files, DicomSeries& series) {
     }
     if (padding_text(header) != padding_text(files.front())) {
       warnings.insert("Pixel Padding Value differs from slice to slice, no padding is assumed: " +
-                      padding_text(files.front()) + " in " + shown(files.front().file) + ", not in all others");
+                      padding_text(files.front()) + " in " + shown(files.front()) + ", not in all others");
     }
   }
   series.warnings.insert(series.warnings.end(), warnings.begin(), warnings.end());
@@ -159,7 +164,7 @@ void warn_of_mixture(const Headers& files, DicomSeries& series) {
     const DicomFileHeader* both[] = {&files.front(), &*other};
     const std::vector<std::string> labels = labels_of(trait, both);
     series.warnings.push_back(name_of(trait) + " differs from slice to slice: " + labels[0] + " in " +
-                              shown(files.front().file) + ", " + labels[1] + " in " + shown(other->file));
+                              shown(files.front()) + ", " + labels[1] + " in " + shown(*other));
   }
 }
 
@@ -183,7 +188,8 @@ std::optional<std::string> judge(Headers& files, DicomSeries& series) {
 
 void list_slices(const Headers& files, DicomSeries& series) {
   for (const DicomFileHeader& header : files) {
-    DicomSlice slice{header.file, header.sop_instance_uid, header.transfer_syntax_uid, header.instance_number, 0};
+    DicomSlice slice{header.file, header.sop_instance_uid, header.transfer_syntax_uid, header.instance_number, 0,
+                     header.frame};
     if (header.position && header.orientation) {
       slice.position_mm = glm::dot(*header.position, rotation_of(*header.orientation)[2]);
     }

@@ -66,7 +66,7 @@ std::string name_of_newer_syntax(const std::string& transfer_syntax_uid) {
 }
 
 void refuse_pixels(const DicomFileHeader& header, const std::string& reason) {
-  throw InputError("pixel data cannot be decoded, " + header.file.string() + ": " + reason +
+  throw InputError("pixel data cannot be decoded, " + shown(header) + ": " + reason +
                    "; copy or export the file again");
 }
 

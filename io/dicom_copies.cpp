@@ -68,6 +68,7 @@ bool same_encoded_pixels(const DicomFileHeader& a, const DicomFileHeader& b) {
 /// What speaks against two files of one SOP Instance UID holding the same image; empty: they do.
 std::string difference(const DicomFileHeader& a, const DicomFileHeader& b) {
   if (same_file(a, b)) return {};
+  if (a.frame || b.frame) return "hold several frames and are not the same byte for byte";
   if (a.position != b.position) return "differ in Image Position";
   if (a.orientation != b.orientation) return "differ in Image Orientation";
   if (a.spacing != b.spacing) return "differ in Pixel Spacing";
@@ -128,7 +129,8 @@ std::vector<Pair> pairs_of_same_bytes(const Headers& files, const std::stop_toke
   std::vector<std::optional<std::tuple<double, double, double, std::uint64_t>>> places(files.size());
   for (std::size_t n = 0; n < files.size(); ++n) {
     const glm::dvec3 p = files[n].position.value_or(glm::dvec3(0));
-    if (files[n].sop_instance_uid.empty()) places[n] = {p.x, p.y, p.z, files[n].file_bytes};
+    if (files[n].sop_instance_uid.empty() && files[n].frame.value_or(0) == 0)
+      places[n] = {p.x, p.y, p.z, files[n].file_bytes};
   }
   std::set<std::size_t> together;
   for (const Pair& pair : pairs_by(files, places)) together.insert({pair.original, pair.copy});

@@ -13,7 +13,8 @@ namespace tetwarp {
 
 /// Counts each image of a series once: of files with one SOP Instance UID, the same geometry and the same pixels
 /// (decoded, where they are encoded in different ways) the one with the shortest name is kept, whatever else their
-/// headers say, with a warning. Without the UID a copy is known by its bytes, all of them.
+/// headers say, with a warning. Without the UID a copy is known by its bytes, all of them; so are files of several
+/// frames.
 /// @return why the series cannot be used: files that have one SOP Instance UID and are not the same image
 /// @throws Cancelled
 std::optional<std::string> drop_copies(std::vector<DicomFileHeader>& files, DicomSeries& series,

@@ -14,6 +14,8 @@
 #include <mutex>
 #include <span>
 
+#include "io/dicom_codecs.h"
+#include "io/dicom_enhanced.h"
 #include "io/dicom_stream.h"
 #include "io/dicom_text.h"
 #include "io/dicom_traits.h"
@@ -133,7 +135,7 @@ bool looks_like_dicom(const std::array<char, 132>& start, std::size_t size) {
 
 /// Why the object is nothing that scanning has to tell apart; empty for images and for what might be one.
 std::string no_image_reason(const DicomFileHeader& header) {
-  const bool is_ct = header.sop_class_uid == UID_CTImageStorage;
+  const bool is_ct = header.sop_class_uid == UID_CTImageStorage || is_enhanced_ct(header.sop_class_uid);
   if (header.sop_class_uid == UID_MediaStorageDirectoryStorage)
     return "a DICOM directory (DICOMDIR): what lies in the folder counts, not what it names";
   if (is_ct || header.pixels.rows != 0) return {};
@@ -245,13 +247,44 @@ DicomFileHeader header_of(DcmDataset& data) {
   return header_of(data, none, {});
 }
 
-DicomFileHeader read_dicom_header(const std::filesystem::path& file) {
+DicomFileHeader frame_header(DcmDataset& slice, const DicomFileHeader& whole, int frame) {
+  DicomFileHeader header = header_of(slice);
+  header.file = whole.file;
+  header.frame = frame;
+  header.encoding = whole.encoding;
+  header.transfer_syntax_uid = whole.transfer_syntax_uid;
+  header.file_bytes = whole.file_bytes;
+  header.pixels.frames = whole.pixels.frames;
+  header.pixel_bytes = whole.pixel_bytes;
+  if (header.pixel_bytes && pixel_coding(header.transfer_syntax_uid) == PixelCoding::native) {
+    const std::uint64_t before = slice_bytes(header.pixels) * static_cast<std::uint64_t>(frame);
+    header.pixel_bytes = *header.pixel_bytes - std::min(*header.pixel_bytes, before);
+  }
+  return header;
+}
+
+namespace {
+
+/// Of each frame; of a file whose frames are not told apart, its own.
+std::vector<DicomFileHeader> headers_of_frames(DcmDataset& data, DicomFileHeader whole) {
+  const EnhancedFrames frames(data);
+  whole.no_frames = frames.problem();
+  if (!whole.no_frames.empty()) return {std::move(whole)};
+  std::vector<DicomFileHeader> headers;
+  for (int frame = 0; frame < frames.count(); ++frame)
+    headers.push_back(frame_header(*frames.slice(frame), whole, frame));
+  return headers;
+}
+
+}  // namespace
+
+std::vector<DicomFileHeader> read_dicom_headers(const std::filesystem::path& file) {
   prepare_dcmtk();
   DicomFileHeader header;
   header.file = file;
   const auto opened = std::make_shared<OpenedFile>(file);
   sniff(*opened, header);
-  if (!header.skip.empty()) return header;
+  if (!header.skip.empty()) return {std::move(header)};
 
   DcmFileFormat format;
   const DicomRead read = parse_dicom(format, opened, DCM_PixelData, ERM_autoDetect, kLargestInflatedHeader);
@@ -261,7 +294,9 @@ DicomFileHeader read_dicom_header(const std::filesystem::path& file) {
   if (read.result.good() && read.rest > 0) header.pixel_bytes = read.rest;
   header.skip = no_image_reason(header);
   header.broken = !header.skip.empty() && !header.damage.empty() && header.sop_class_uid.empty();
-  return header;
+  if (is_enhanced_ct(header.sop_class_uid) && header.damage.empty())
+    return headers_of_frames(*format.getDataset(), std::move(header));
+  return {std::move(header)};
 }
 
 }  // namespace tetwarp

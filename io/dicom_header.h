@@ -12,12 +12,14 @@
 
 #include "deform/geometry.h"
 #include "deform/resampler.h"
+#include "io/shown_text.h"
 
 namespace tetwarp {
 
 /// How stored values are laid out and what they mean (PS3.3 C.7.6.3.1, C.7.5.1.1.2, C.11.1).
 struct PixelFormat {
-  int rows = 0, columns = 0, samples = 1, frames = 1;  ///< 0: missing; frames -1: not a number
+  int rows = 0, columns = 0, samples = 1;  ///< 0: missing
+  int frames = 1;                          ///< in the file; -1: not a number
   int bits_allocated = 0, bits_stored = 0, high_bit = 0;
   bool is_signed = false;
   std::string photometric;
@@ -28,11 +30,14 @@ struct PixelFormat {
   friend bool operator==(const PixelFormat&, const PixelFormat&) = default;
 };
 
+/// Of a file, or of one frame of a file that holds several slices.
 struct DicomFileHeader {
   std::filesystem::path file;
-  std::string skip;     ///< why the file is no DICOM object at all; empty: it is one
-  bool broken = false;  ///< skipped although it may have been a slice: unreadable, empty, cut short or damaged
-  std::string damage;   ///< why the data set could not be read to its end; empty: it could
+  std::optional<int> frame;    ///< from 0; none: the file is one slice
+  std::string skip;            ///< why the file is no DICOM object at all; empty: it is one
+  bool broken = false;         ///< skipped although it may have been a slice: unreadable, empty, cut short or damaged
+  std::string damage;          ///< why the data set could not be read to its end; empty: it could
+  std::string no_frames = {};  ///< why its frames are not told apart, of a kind of file that holds several; else empty
   E_TransferSyntax encoding = EXS_Unknown;
   std::string transfer_syntax_uid;  ///< as the file states it, or as found where it has no meta header
   std::string sop_class_uid, sop_instance_uid, series_uid, study_uid, frame_of_reference_uid, modality;
@@ -49,7 +54,8 @@ struct DicomFileHeader {
   std::optional<double> thickness, slice_spacing;    ///< (0018,0050), (0018,0088): never geometry but for one slice
   std::string private_compression;                   ///< ELSCINT1 (07a1,xx11): vendor's own pixel coding
   PixelFormat pixels;
-  std::optional<std::uint64_t> pixel_bytes;  ///< from Pixel Data's value to the end of the file; none: no Pixel Data
+  std::optional<std::uint64_t> pixel_bytes;  ///< from Pixel Data's value, or its own frame if that is not compressed,
+                                             ///< to the end of the file; none: no Pixel Data
   std::uint64_t file_bytes = 0;
 };
 
@@ -62,8 +68,15 @@ DicomFileHeader header_of(DcmFileFormat& format, const std::filesystem::path& fi
 /// The same without a meta header and a name.
 DicomFileHeader header_of(DcmDataset& data);
 
-/// Reads a file up to Pixel Data. Never throws for what the file holds: see `skip` and `damage`.
-DicomFileHeader read_dicom_header(const std::filesystem::path& file);
+/// Reads a file up to Pixel Data: one header, or one of each frame of multi-frame CT. Never throws for what the file
+/// holds: see `skip`, `damage` and `no_frames`.
+std::vector<DicomFileHeader> read_dicom_headers(const std::filesystem::path& file);
+
+/// Of a frame. @param slice  its attributes, as a file of this slice alone would have them (EnhancedFrames)
+/// @param whole  the header of the file
+DicomFileHeader frame_header(DcmDataset& slice, const DicomFileHeader& whole, int frame);
+
+inline std::string shown(const DicomFileHeader& header) { return shown(header.file, header.frame); }
 
 /// Whether the value of an attribute, if there is one, has at most so many bytes: DCMTK allocates what a damaged length
 /// asks for before it looks whether the file holds that.

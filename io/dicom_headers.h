@@ -12,8 +12,10 @@
 namespace tetwarp {
 
 struct DicomHeaders {
-  /// Every attribute but Pixel Data, as read. Lossy Image Compression is 01 also where only the transfer syntax says so.
+  /// Every attribute but Pixel Data, as read; of a frame as EnhancedFrames makes them. Lossy Image Compression is 01
+  /// also where only the transfer syntax says so.
   std::vector<std::unique_ptr<DcmDataset>> slices;
+  std::vector<int> frames = {};  ///< of each slice, its number in its file, from 1; 0: no frame; empty: none is
 };
 
 }  // namespace tetwarp

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "io/dicom_codecs.h"
+#include "io/dicom_enhanced.h"
 #include "io/dicom_header.h"
 #include "io/dicom_text.h"
 #include "io/shown_text.h"
@@ -17,7 +18,7 @@ namespace {
 constexpr int kLargestAxis = 16384;
 constexpr std::uint64_t kLargestExpansion = 1000, kSmallFile = 1 << 20;
 
-std::string where(const DicomFileHeader& header) { return ", " + shown(header.file); }
+std::string where(const DicomFileHeader& header) { return ", " + shown(header); }
 
 std::string missing_or_bad(const std::string& attribute, const DicomFileHeader& header, const std::string& expected) {
   return attribute + " is missing or malformed" + where(header) + "; expected " + expected +
@@ -50,9 +51,11 @@ std::string encoding_problem(const DicomFileHeader& header) {
     return "Pixel Data is truncated" + where(header) + ": expected " + std::to_string(needed) + " bytes, found " +
            std::to_string(*header.pixel_bytes) + "; copy the file again";
   }
-  if (compressed && needed > kLargestExpansion * header.file_bytes + kSmallFile) {
-    return "Rows x Columns " + size_text(pixels) + " cannot come from a file of " + std::to_string(header.file_bytes) +
-           " bytes" + where(header) + "; copy the file again";
+  const std::uint64_t frames = header.frame ? static_cast<std::uint64_t>(pixels.frames) : 1;
+  if (compressed && frames * needed > kLargestExpansion * header.file_bytes + kSmallFile) {
+    return "Rows x Columns " + size_text(pixels) + (frames > 1 ? " of " + std::to_string(frames) + " frames" : "") +
+           " cannot come from a file of " + std::to_string(header.file_bytes) + " bytes" + where(header) +
+           "; copy the file again";
   }
   return {};
 }
@@ -69,7 +72,7 @@ std::string layout_problem(const DicomFileHeader& header) {
   if (!pixels.photometric.empty() && !pixels.photometric.starts_with("MONOCHROME")) {
     return found("Photometric Interpretation (0028,0004)", "MONOCHROME2", shown(pixels.photometric));
   }
-  if (pixels.frames != 1 && pixels.frames != 0) {
+  if (!header.frame && pixels.frames != 1 && pixels.frames != 0) {
     return found("Number of Frames (0028,0008)", "1", pixels.frames < 0 ? "no number" : std::to_string(pixels.frames));
   }
   if (pixels.bits_allocated != 8 && pixels.bits_allocated != 16) {
@@ -150,10 +153,8 @@ std::string kind_name(const std::string& sop_class_uid) {
 
 std::string other_kind(const DicomFileHeader& header) {
   const std::string& kind = header.sop_class_uid;
-  if (kind == UID_EnhancedCTImageStorage || kind == UID_LegacyConvertedEnhancedCTImageStorage) {
-    return uid_with_name(kind) + ", multi-frame CT is not read: convert it to CT Image Storage first";
-  }
-  if (!kind.empty() && kind != UID_CTImageStorage) return kind_name(kind) + ", expected CT Image Storage";
+  const bool is_ct = kind == UID_CTImageStorage || is_enhanced_ct(kind);
+  if (!kind.empty() && !is_ct) return kind_name(kind) + ", expected CT Image Storage";
   if (is_localizer(header)) return "a localizer (scout) by its Image Type, not a slice";
   const bool placed = header.position && header.orientation && header.spacing;
   if (kind.empty() && !(header.modality == "CT" && placed)) {
@@ -164,6 +165,7 @@ std::string other_kind(const DicomFileHeader& header) {
 
 std::string geometry_problem(const DicomFileHeader& header) {
   if (!header.damage.empty()) return "damaged file" + where(header) + ": " + header.damage + "; copy it again";
+  if (!header.no_frames.empty()) return header.no_frames + where(header) + "; export the file again";
   if (!header.position) return missing_or_bad("Image Position (0020,0032)", header, "three numbers");
   if (!header.orientation) return missing_or_bad("Image Orientation (0020,0037)", header, "six numbers");
   if (!header.spacing || header.spacing->x <= 0 || header.spacing->y <= 0) {

@@ -9,6 +9,7 @@
 #include "io/dicom_series.h"
 #include "io/dicom_stack.h"
 #include "io/dicom_text.h"
+#include "io/dicom_traits.h"
 #include "io/shown_text.h"
 
 namespace tetwarp {
@@ -25,8 +26,8 @@ struct Aspect {
   std::string (*text)(const DicomFileHeader&);
 };
 
-const std::array<Aspect, 5>& aspects() {
-  static const std::array<Aspect, 5> all = {{
+const std::array<Aspect, 6>& aspects() {
+  static const std::array<Aspect, 6> all = {{
       {"Image Orientation (0020,0037)", same_orientation,
        [](const DicomFileHeader& h) { return plane_name(rotation_of(*h.orientation)[2]); }},
       {"Rows x Columns",
@@ -46,6 +47,14 @@ const std::array<Aspect, 5>& aspects() {
       {"Study Instance UID (0020,000D)",
        [](const DicomFileHeader& a, const DicomFileHeader& b) { return a.study_uid == b.study_uid; },
        [](const DicomFileHeader& h) { return "study " + shown(h.study_uid); }},
+      {"Stack ID (0020,9056)",
+       [](const DicomFileHeader& a, const DicomFileHeader& b) {
+         return !a.frame || !b.frame || trait_of(a, Trait::stack) == trait_of(b, Trait::stack);
+       },
+       [](const DicomFileHeader& h) {
+         const DicomFileHeader* const one[] = {&h};
+         return labels_of(Trait::stack, one).front();
+       }},
   }};
   return all;
 }

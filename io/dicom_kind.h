@@ -19,7 +19,8 @@ bool same_pixel_spacing(const DicomFileHeader& a, const DicomFileHeader& b);
 /// "1\0\0\0\1\0".
 std::string orientation_text(const std::array<double, 6>& cosines);
 
-/// Slices that agree in orientation, Rows and Columns, Pixel Spacing, Frame of Reference and study.
+/// Slices that agree in orientation, Rows and Columns, Pixel Spacing, Frame of Reference, study and, of frames, Stack
+/// ID.
 struct SliceKind {
   std::vector<std::size_t> slices;  ///< indices, rising
   std::string label;                ///< in what they differ from the other kinds: "axial, 512 x 512"; of one kind empty

@@ -1,10 +1,15 @@
 #include <tbb/enumerable_thread_specific.h>
 
+#include <algorithm>
 #include <glm/geometric.hpp>
+#include <map>
+#include <mutex>
+#include <utility>
 
 #include "deform/large_memory.h"
 #include "io/dicom_bytes.h"
 #include "io/dicom_codecs.h"
+#include "io/dicom_frames.h"
 #include "io/dicom_header.h"
 #include "io/dicom_headers.h"
 #include "io/dicom_pixels.h"
@@ -12,6 +17,7 @@
 #include "io/dicom_series.h"
 #include "io/dicom_stack.h"
 #include "io/hash.h"
+#include "io/opened_file.h"
 #include "io/parallel.h"
 #include "io/shown_text.h"
 
@@ -21,7 +27,8 @@ namespace {
 /// A file that was listed may have been replaced since.
 void require_unchanged(const DicomFileHeader& header, const DicomSlice& slice, const Geometry& geometry) {
   const auto same = [&](bool is_same, const std::string& what) {
-    require(is_same, what + " is not what it was when the series was listed, " + shown(slice.file) + "; list it again");
+    require(is_same, what + " is not what it was when the series was listed, " + shown(slice.file, slice.frame) +
+                         "; list it again");
   };
   const glm::dmat3 direction = rotation_of(*header.orientation);
   const glm::dvec2 spacing{geometry.spacing.x, geometry.spacing.y};
@@ -38,33 +45,114 @@ void require_unchanged(const DicomFileHeader& header, const DicomSlice& slice, c
 struct LoadedSlice {
   std::unique_ptr<DcmDataset> header;  ///< without Pixel Data
   PixelFormat pixels;
-  Sha256::Digest digest{};
   HuCount count;
 };
 
-LoadedSlice load_slice(const DicomSlice& slice, const Geometry& geometry, HuTableCache& tables, FileBuffer& buffer,
-                       std::span<std::int16_t> hu) {
-  LoadedSlice loaded;
-  const std::span<const std::byte> bytes = buffer.read(slice.file);
-  loaded.digest = Sha256().add(bytes).digest();
-  ParsedSlice parsed = parse_slice(bytes, slice.file);
-  const DicomFileHeader& header = parsed.header;
+void check(const DicomFileHeader& header, const DicomSlice& slice, const Geometry& geometry) {
   for (const auto& problem : {geometry_problem(header), pixel_problem(header)}) require(problem.empty(), problem);
   require_unchanged(header, slice, geometry);
-  const std::shared_ptr<const HuTable> table = tables.table_for(header.pixels);
+}
+
+/// Keeps what is left of a slice when its voxels are read.
+void finish(LoadedSlice& loaded, std::unique_ptr<DcmDataset> data, const DicomFileHeader& header) {
+  loaded.pixels = header.pixels;
+  loaded.header = std::move(data);
+  delete loaded.header->remove(DCM_PixelData);
+  if (is_lossy(header.transfer_syntax_uid)) put(*loaded.header, DCM_LossyImageCompression, "01");
+}
+
+/// What threads that load slices share.
+struct Loading {
+  const DicomSeries& series;
+  std::span<std::int16_t> voxels;
+  HuTableCache tables = {};
+  tbb::enumerable_thread_specific<FileBuffer> buffers = {};  ///< one file a thread, however long the series
+
+  std::span<std::int16_t> slice(std::size_t k) const {
+    const std::size_t size = voxels.size() / series.slices.size();
+    return voxels.subspan(k * size, size);
+  }
+};
+
+/// A file that is slice k.
+LoadedSlice load_slice(Loading& loading, std::size_t k, Sha256::Digest& digest) {
+  const DicomSlice& slice = loading.series.slices[k];
+  LoadedSlice loaded;
+  const std::span<const std::byte> bytes = loading.buffers.local().read(slice.file);
+  digest = Sha256().add(bytes).digest();
+  ParsedSlice parsed = parse_slice(bytes, slice.file);
+  const DicomFileHeader& header = parsed.header;
+  check(header, slice, loading.series.geometry);
+  const std::shared_ptr<const HuTable> table = loading.tables.table_for(header.pixels);
   if (!parsed.native.empty()) {
-    loaded.count = convert_to_hu(parsed.native, *table, slice.file, hu);
+    loaded.count = convert_to_hu(parsed.native, *table, shown(header), loading.slice(k));
   } else {
     const std::vector<std::uint16_t> words = parsed.fragments.empty()
                                                  ? decode_pixels(*parsed.format->getDataset(), header)
                                                  : decode_frame(parsed.fragments, header);
-    loaded.count = convert_to_hu(words, *table, slice.file, hu);
+    loaded.count = convert_to_hu(words, *table, shown(header), loading.slice(k));
   }
-  loaded.pixels = header.pixels;
-  loaded.header.reset(parsed.format->getAndRemoveDataset());
-  delete loaded.header->remove(DCM_PixelData);
-  if (is_lossy(header.transfer_syntax_uid)) put(*loaded.header, DCM_LossyImageCompression, "01");
+  finish(loaded, std::unique_ptr<DcmDataset>(parsed.format->getAndRemoveDataset()), header);
   return loaded;
+}
+
+/// A frame that is slice k.
+LoadedSlice load_frame(Loading& loading, std::size_t k, const FrameFile& file) {
+  const DicomSlice& slice = loading.series.slices[k];
+  LoadedSlice loaded;
+  FrameFile::Frame frame = file.frame(*slice.frame);
+  check(frame.header, slice, loading.series.geometry);
+  const std::shared_ptr<const HuTable> table = loading.tables.table_for(frame.header.pixels);
+  const FrameFile::Pixels pixels = file.pixels(frame.header, loading.buffers.local());
+  loaded.count = pixels.native.empty() ? convert_to_hu(pixels.words, *table, shown(frame.header), loading.slice(k))
+                                       : convert_to_hu(pixels.native, *table, shown(frame.header), loading.slice(k));
+  finish(loaded, std::move(frame.data), frame.header);
+  return loaded;
+}
+
+/// The file of one slice, or of several that are its frames: parsed by the first that is loaded, and let go by the
+/// last.
+struct SourceFile {
+  std::filesystem::path path;
+  std::size_t slices = 0;  ///< that are not loaded yet
+  bool has_frames = false;
+  Sha256::Digest digest{};
+  std::unique_ptr<std::mutex> mutex = std::make_unique<std::mutex>();
+  std::shared_ptr<const FrameFile> frames = {};
+
+  std::shared_ptr<const FrameFile> for_one_frame() {
+    const std::lock_guard lock(*mutex);
+    if (!frames) frames = std::make_shared<FrameFile>(path);
+    --slices;
+    return slices > 0 ? frames : std::exchange(frames, nullptr);
+  }
+};
+
+/// Each once, in the order of their first slices.
+struct SourceFiles {
+  std::vector<SourceFile> files;
+  std::vector<std::size_t> of_slice;  ///< per slice
+
+  explicit SourceFiles(const DicomSeries& series) {
+    std::map<std::filesystem::path, std::size_t> numbers;  // of files of frames
+    for (const DicomSlice& slice : series.slices) {
+      const auto next = slice.frame ? numbers.try_emplace(slice.file, files.size()).first->second : files.size();
+      if (next == files.size()) files.push_back({.path = slice.file, .has_frames = slice.frame.has_value()});
+      ++files[next].slices;
+      of_slice.push_back(next);
+    }
+  }
+};
+
+Sha256::Digest digest_of(const std::filesystem::path& path, FileBuffer& buffer) {
+  constexpr std::uint64_t kPiece = 1 << 20;
+  Sha256 hash;
+  const std::uint64_t size = OpenedFile(path).size();
+  for (FileRange piece; piece.begin < size; piece.begin += piece.bytes) {
+    piece.bytes = std::min(kPiece, size - piece.begin);
+    hash.add(buffer.read(path, {&piece, 1}));
+  }
+  return hash.digest();
 }
 
 bool same_padding(const std::optional<PaddingRange>& a, const std::optional<PaddingRange>& b) {
@@ -79,7 +167,7 @@ std::optional<PaddingRange> common_padding(const DicomSeries& series, const std:
   if (agree) return first;
   for (std::size_t k = 0; k < slices.size(); ++k) {
     require(slices[k].count.saturated_padding == 0,
-            "padding beyond int16 in HU, " + shown(series.slices[k].file) +
+            "padding beyond int16 in HU, " + shown(series.slices[k].file, series.slices[k].frame) +
                 ", and Pixel Padding Value (0028,0120) differs from slice to slice; make it the same in all slices");
   }
   return std::nullopt;
@@ -95,23 +183,33 @@ DicomVolume load_dicom(const DicomSeries& series, int threads, const Control& co
   result.series_uid = series.series_uid;
   result.volume.geometry = series.geometry;
   resize_large(result.volume.voxels, static_cast<std::size_t>(voxel_count(series.geometry)), threads);
-  const std::size_t slice_size = result.volume.voxels.size() / series.slices.size();
 
   std::vector<LoadedSlice> slices(series.slices.size());
-  HuTableCache tables;
-  tbb::enumerable_thread_specific<FileBuffer> buffers;  // one file a thread, however long the series
-  for_each_index(slices.size(), threads, control, [&](std::size_t k) {
-    const std::span<std::int16_t> hu = std::span(result.volume.voxels).subspan(k * slice_size, slice_size);
-    slices[k] = load_slice(series.slices[k], series.geometry, tables, buffers.local(), hu);
+  SourceFiles sources(series);
+  Loading loading{series, result.volume.voxels};
+  std::vector<std::size_t> with_frames;  // these are hashed on their own, first, as that takes longest
+  for (std::size_t n = 0; n < sources.files.size(); ++n) {
+    if (sources.files[n].has_frames) with_frames.push_back(n);
+  }
+  for_each_index(with_frames.size() + slices.size(), threads, control, [&](std::size_t i) {
+    if (i < with_frames.size()) {
+      SourceFile& file = sources.files[with_frames[i]];
+      file.digest = digest_of(file.path, loading.buffers.local());
+      return;
+    }
+    const std::size_t k = i - with_frames.size();
+    SourceFile& file = sources.files[sources.of_slice[k]];
+    slices[k] = file.has_frames ? load_frame(loading, k, *file.for_one_frame()) : load_slice(loading, k, file.digest);
   });
 
   result.padding = common_padding(series, slices);
   auto headers = std::make_shared<DicomHeaders>();
   Sha256 hash;
-  for (LoadedSlice& slice : slices) {
-    hash.add(slice.digest);
-    result.rounded += slice.count.rounded;
-    headers->slices.push_back(std::move(slice.header));
+  for (const SourceFile& file : sources.files) hash.add(file.digest);
+  for (std::size_t k = 0; k < slices.size(); ++k) {
+    result.rounded += slices[k].count.rounded;
+    headers->slices.push_back(std::move(slices[k].header));
+    headers->frames.push_back(series.slices[k].frame ? *series.slices[k].frame + 1 : 0);
   }
   result.sha256 = hash.hex();
   result.headers = std::move(headers);

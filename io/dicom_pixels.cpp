@@ -53,9 +53,10 @@ std::vector<std::uint16_t> native_words(DcmPixelData& pixels, DcmDataset& data, 
   const std::uint64_t needed = slice_bytes(header.pixels);
   std::vector<std::uint16_t> words((needed + 1) / 2);
   Uint32 fragment = 0;
+  const auto frame = static_cast<Uint32>(header.frame.value_or(0));
   OFString color_model;
-  const OFCondition result =
-      pixels.getUncompressedFrame(&data, 0, fragment, words.data(), static_cast<Uint32>(2 * words.size()), color_model);
+  const OFCondition result = pixels.getUncompressedFrame(&data, frame, fragment, words.data(),
+                                                         static_cast<Uint32>(2 * words.size()), color_model);
   if (result.bad()) refuse_pixels(header, result.text());
   if (header.pixels.bits_allocated == 16) return words;
   const auto* bytes = reinterpret_cast<const Uint8*>(words.data());
@@ -85,7 +86,7 @@ bool add_offset(std::span<const std::uint16_t> words, const HuTable& table, std:
   return (misfits & 0x8000) == 0;
 }
 
-HuCount look_up(std::span<const std::uint16_t> words, const HuTable& table, const std::filesystem::path& file,
+HuCount look_up(std::span<const std::uint16_t> words, const HuTable& table, const std::string& slice,
                 std::span<std::int16_t> hu) {
   HuCount count;
   std::uint8_t kinds = 0;
@@ -100,7 +101,7 @@ HuCount look_up(std::span<const std::uint16_t> words, const HuTable& table, cons
   const auto first =
       std::find_if(words.begin(), words.end(), [&](std::uint16_t w) { return table.kind[w] & HuTable::beyond; });
   const int stored = stored_value(table.format, *first);
-  throw InputError("HU beyond int16, " + file.string() + ": stored value " + std::to_string(stored) + " gives " +
+  throw InputError("HU beyond int16, " + slice + ": stored value " + std::to_string(stored) + " gives " +
                    number(hu_of(table.format, stored)) +
                    " HU, expected -32768 to 32767; check Rescale Slope (0028,1053) " + number(*table.format.slope) +
                    " and Intercept (0028,1052) " + number(*table.format.intercept));
@@ -158,7 +159,7 @@ std::shared_ptr<const HuTable> HuTableCache::table_for(const PixelFormat& format
   return last_;
 }
 
-HuCount convert_to_hu(std::span<const std::byte> words, const HuTable& table, const std::filesystem::path& file,
+HuCount convert_to_hu(std::span<const std::byte> words, const HuTable& table, const std::string& slice,
                       std::span<std::int16_t> hu) {
   HuCount count;
   std::array<std::uint16_t, 4096> aligned;
@@ -168,16 +169,16 @@ HuCount convert_to_hu(std::span<const std::byte> words, const HuTable& table, co
     const std::span<std::int16_t> part = hu.subspan(begin, size);
     const std::span<const std::uint16_t> from(aligned.data(), size);
     if (add_offset(from, table, part)) continue;
-    const HuCount more = look_up(from, table, file, part);
+    const HuCount more = look_up(from, table, slice, part);
     count.rounded += more.rounded;
     count.saturated_padding += more.saturated_padding;
   }
   return count;
 }
 
-HuCount convert_to_hu(std::span<const std::uint16_t> words, const HuTable& table, const std::filesystem::path& file,
+HuCount convert_to_hu(std::span<const std::uint16_t> words, const HuTable& table, const std::string& slice,
                       std::span<std::int16_t> hu) {
-  return convert_to_hu(std::as_bytes(words), table, file, hu);
+  return convert_to_hu(std::as_bytes(words), table, slice, hu);
 }
 
 }  // namespace tetwarp

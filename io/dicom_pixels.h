@@ -11,7 +11,8 @@
 
 namespace tetwarp {
 
-/// Decodes Pixel Data of a single-frame object whose header passed `pixel_problem`.
+/// Decodes Pixel Data of an object whose header passed `pixel_problem`: of one frame, or, of several that are not
+/// compressed, that of the header.
 /// @return one word a pixel, rows top to bottom, every bit as stored
 /// @throws InputError naming the file for data that are truncated, damaged or of another size than the header says
 std::vector<std::uint16_t> decode_pixels(DcmDataset& data, const DicomFileHeader& header);
@@ -45,11 +46,12 @@ struct HuCount {
   std::uint64_t rounded = 0;            ///< pixels with a fractional HU
   std::uint64_t saturated_padding = 0;  ///< pixels of padding whose HU does not fit int16
 };
-/// @throws InputError naming `file` for a pixel whose HU does not fit int16
-HuCount convert_to_hu(std::span<const std::uint16_t> words, const HuTable& table, const std::filesystem::path& file,
+/// @param slice  its name
+/// @throws InputError naming the slice for a pixel whose HU does not fit int16
+HuCount convert_to_hu(std::span<const std::uint16_t> words, const HuTable& table, const std::string& slice,
                       std::span<std::int16_t> hu);
 /// The same of words as they lie in a file, little endian, at any address.
-HuCount convert_to_hu(std::span<const std::byte> words, const HuTable& table, const std::filesystem::path& file,
+HuCount convert_to_hu(std::span<const std::byte> words, const HuTable& table, const std::string& slice,
                       std::span<std::int16_t> hu);
 
 }  // namespace tetwarp

@@ -5,6 +5,7 @@
 #include <climits>
 #include <iterator>
 #include <map>
+#include <mutex>
 #include <set>
 #include <tuple>
 
@@ -22,17 +23,31 @@ namespace {
 namespace fs = std::filesystem;
 using Headers = std::vector<DicomFileHeader>;
 
+void append(Headers& headers, Headers more) {
+  headers.insert(headers.end(), std::move_iterator(more.begin()), std::move_iterator(more.end()));
+}
+
 Headers read_headers(std::vector<fs::path> files, const Control& control) {
   Headers headers(files.size());
+  std::map<std::size_t, Headers> further;  // frames of files that hold several
+  std::mutex mutex;
   for_each_index(files.size(), 0, control, [&](std::size_t i) {
-    headers[i] = read_dicom_header(files[i]);
+    Headers read = read_dicom_headers(files[i]);
     fs::path().swap(files[i]);  // a path takes 400 bytes, and there may be 100 000
+    headers[i] = std::move(read.front());
+    if (read.size() == 1) return;
+    read.erase(read.begin());
+    const std::lock_guard lock(mutex);
+    further[i] = std::move(read);
   });
+  for (auto& [file, frames] : further) append(headers, std::move(frames));
   return headers;
 }
 
-void append(Headers& headers, Headers more) {
-  headers.insert(headers.end(), std::move_iterator(more.begin()), std::move_iterator(more.end()));
+/// Frames of a file count once.
+std::size_t files_of(const Headers& headers) {
+  const auto is_file = [](const DicomFileHeader& header) { return header.frame.value_or(0) == 0; };
+  return static_cast<std::size_t>(std::count_if(headers.begin(), headers.end(), is_file));
 }
 
 /// Files of one series. Where the Series Instance UID was wiped, study, series number and folder stand in for it.
@@ -94,7 +109,7 @@ std::vector<DicomSeries> assemble(Headers& headers, const std::vector<std::size_
 DicomScan scan_of(Headers headers, const Control& control) {
   Grouping groups = group(headers);
   DicomScan scan;
-  scan.files = headers.size();
+  scan.files = files_of(headers);
   scan.skipped = std::move(groups.skipped);
   std::vector<std::vector<DicomSeries>> all;
   for (const auto& [key, members] : groups.series) all.push_back(assemble(headers, members, groups.broken, control));
@@ -111,7 +126,7 @@ DicomScan scan_of(Headers headers, const Control& control) {
 DicomScan scan_of_first(Headers headers, const Control& control) {
   Grouping groups = group(headers);
   DicomScan scan;
-  scan.files = headers.size();
+  scan.files = files_of(headers);
   if (headers.front().skip.empty())
     scan.series = assemble(headers, groups.series[key_of(headers.front())], groups.broken, control);
   else
@@ -168,8 +183,8 @@ DicomScan scan_directory(const fs::path& dicomdir, const Control& control) {
 }
 
 /// The series of one file, from the files beside it.
-DicomScan scan_beside(DicomFileHeader header, const Control& control) {
-  const fs::path path = header.file, folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+DicomScan scan_beside(Headers headers, const Control& control) {
+  const fs::path path = headers.front().file, folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
   std::error_code error;
   const fs::path real = fs::canonical(path, error), real_folder = fs::canonical(folder, error);
   FolderFiles list = list_files(folder, false, control.stop);
@@ -177,8 +192,6 @@ DicomScan scan_beside(DicomFileHeader header, const Control& control) {
     const fs::path name = file.filename();
     return name == path.filename() || (real.parent_path() == real_folder && name == real.filename());
   });
-  Headers headers;
-  headers.push_back(std::move(header));
   append(headers, read_headers(std::move(list.files), control));
   return scan_of_first(std::move(headers), control);
 }
@@ -191,12 +204,9 @@ DicomScan scan_dicom(const fs::path& path, bool single, const Control& control) 
   require(fs::exists(status), "no such file or folder, " + shown(path) + "; check the path");
   if (fs::is_directory(status)) return scan_folder(path, control);
   require(fs::is_regular_file(status), "neither a file nor a folder, " + shown(path) + "; name one of them");
-  DicomFileHeader header = read_dicom_header(path);
-  if (!single && is_directory_file(header)) return scan_directory(path, control);
-  if (!single) return scan_beside(std::move(header), control);
-  Headers headers;
-  headers.push_back(std::move(header));
-  return scan_of_first(std::move(headers), control);
+  Headers headers = read_dicom_headers(path);
+  if (!single && is_directory_file(headers.front())) return scan_directory(path, control);
+  return single ? scan_of_first(std::move(headers), control) : scan_beside(std::move(headers), control);
 }
 
 }  // namespace tetwarp

@@ -9,7 +9,9 @@
 
 namespace tetwarp {
 
-std::string to_string(const LeftOutFile& left_out) { return shown(left_out.file) + ": " + left_out.reason; }
+std::string to_string(const LeftOutFile& left_out) {
+  return shown(left_out.file, left_out.frame) + ": " + left_out.reason;
+}
 
 std::string plane_name(const glm::dvec3& normal) {
   const glm::dvec3 along = glm::abs(glm::normalize(normal));

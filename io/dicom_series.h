@@ -12,21 +12,23 @@
 
 namespace tetwarp {
 
-/// One file of a series, from its header alone.
+/// One slice of a series, a file or a frame of it, from its header alone.
 struct DicomSlice {
   std::filesystem::path file;
   std::string sop_instance_uid;
   std::string transfer_syntax_uid;
   int instance_number = 0;
   double position_mm = 0;  ///< Image Position (Patient) along the slice normal
+  std::optional<int> frame = {};  ///< of a multi-frame file, from 0
 };
 
-/// A file that was met and is no slice.
+/// A file, or a frame of it, that was met and is no slice.
 struct LeftOutFile {
   std::filesystem::path file;
-  std::string reason;  ///< without the name of the file: many have the same
+  std::string reason;             ///< without the name of the file: many have the same
+  std::optional<int> frame = {};  ///< as in DicomSlice
 };
-/// "FILE: reason".
+/// "FILE: reason", "FILE, frame 17: reason".
 std::string to_string(const LeftOutFile& left_out);
 
 /// "axial", "coronal" or "sagittal" where slices of this normal are that within a degree; "oblique, nearly axial" else.
@@ -74,11 +76,12 @@ struct DicomVolume {
   std::optional<PaddingRange> padding;  ///< Pixel Padding Value and Range Limit in HU, when all slices agree
   std::uint64_t rounded = 0;            ///< voxels whose HU was fractional and was rounded half to even
   std::string series_uid;
-  std::string sha256;  ///< of the SHA-256 digests of the files, in slice order
+  std::string sha256;  ///< of the SHA-256 digests of the files, each once, in the order of their first slices
   std::shared_ptr<const DicomHeaders> headers;
 };
 
-/// Reads and decodes the slices in parallel; each file is read and parsed once.
+/// Reads and decodes the slices in parallel; each file is parsed once. Of a file of several frames no more is in memory
+/// than the header and the frames that are being decoded, unless its data set is deflated.
 /// @throws InputError for a series with a refusal, a file that changed or is truncated, a transfer syntax that cannot
 /// be
 ///         decoded, HU beyond int16: naming the file, the tag, expected and found

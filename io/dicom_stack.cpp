@@ -33,7 +33,7 @@ std::optional<std::string> same_position(const Headers& files, const glm::dvec3&
   if (crowded == 0) return std::nullopt;
   std::string names;
   for (std::size_t i = worst; i < worst + std::min<std::size_t>(worst_count, 4); ++i) {
-    names += (names.empty() ? "" : ", ") + shown(files[i].file);
+    names += (names.empty() ? "" : ", ") + shown(files[i]);
   }
   if (worst_count > 4) names += " and " + std::to_string(worst_count - 4) + " more";
   if (crowded > 1) names += " (likewise at " + std::to_string(crowded - 1) + " other positions)";
@@ -70,8 +70,8 @@ std::optional<std::string> lean(const Headers& files, DicomSeries& series) {
   if (!drift_from(files, normal).slice) return std::nullopt;
   const glm::dvec3 along = glm::normalize(*files.back().position - *files.front().position);
   if (const Drift drift = drift_from(files, along); drift.slice) {
-    return "slices are not stacked on one line, " + shown(drift.slice->file) + " lies " + number(drift.beside_mm) +
-           " mm beside the line from " + shown(files.front().file) + " to " + shown(files.back().file) +
+    return "slices are not stacked on one line, " + shown(*drift.slice) + " lies " + number(drift.beside_mm) +
+           " mm beside the line from " + shown(files.front()) + " to " + shown(files.back()) +
            ", expected 0; choose the slices of one stack";
   }
   const double degrees = std::acos(std::min(glm::dot(along, normal), 1.0)) * 180 / M_PI;
@@ -106,8 +106,8 @@ double median_gap(const std::vector<double>& positions) {
 }
 
 std::string gap_text(double gap, double usual, const DicomFileHeader& before, const DicomFileHeader& after) {
-  std::string text = "slice gap " + number(gap) + " mm between " + shown(before.file) + " and " + shown(after.file) +
-                     ", " + number(usual) + " mm elsewhere";
+  std::string text = "slice gap " + number(gap) + " mm between " + shown(before) + " and " + shown(after) + ", " +
+                     number(usual) + " mm elsewhere";
   const double missing = std::round(gap / usual) - 1;
   if (missing >= 1 && std::abs(gap / usual - missing - 1) < 0.02) {
     text += " (" + number(missing) + (missing > 1 ? " slices missing)" : " slice missing)");
@@ -141,7 +141,7 @@ std::optional<std::string> unevenness(const Headers& files, const glm::dvec3& no
   }
   if (!off_place) return std::nullopt;
   const double place = step * static_cast<double>(*off_place);
-  return "slice gaps drift: " + shown(files[*off_place].file) + " is expected " + number(place) +
+  return "slice gaps drift: " + shown(files[*off_place]) + " is expected " + number(place) +
          " mm from the first slice, found " + number(positions[*off_place] - positions.front()) + " mm";
 }
 

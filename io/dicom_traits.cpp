@@ -27,6 +27,7 @@ const TraitTable& table_of(Trait trait) {
   static const std::array<TraitTable, kTraits> table = {{
       {"Temporal Position Identifier", Kind::number, DCM_TemporalPositionIdentifier, none, "time point ", ""},
       {"Temporal Position Index", Kind::number, DCM_TemporalPositionIndex, none, "time point ", ""},
+      {"Stack ID", Kind::text, DCM_StackID, none, "stack ", ""},
       {"Nominal Percentage of Cardiac Phase", Kind::number, DCM_NominalPercentageOfCardiacPhase, none, "heart phase ",
        " %"},
       {"Nominal Percentage of Respiratory Phase", Kind::number, DCM_NominalPercentageOfRespiratoryPhase, none,
@@ -40,6 +41,7 @@ const TraitTable& table_of(Trait trait) {
       {"Convolution Kernel", Kind::text, DCM_ConvolutionKernel, none, "kernel ", ""},
       {"Slice Thickness", Kind::number, DCM_SliceThickness, none, "slices ", " mm thick"},
       {"Image Type", Kind::text, DCM_ImageType, none, "image type ", ""},
+      {"Dimension Index Values", Kind::text, DCM_DimensionIndexValues, none, "dimension index ", ""},
       {"Contrast/Bolus Agent", Kind::text, DCM_ContrastBolusAgent, none, "contrast agent ", ""},
       {"Scan Options", Kind::text, DCM_ScanOptions, none, "scan options ", ""},
       {"Filter Type", Kind::text, DCM_FilterType, none, "filter ", ""},

@@ -17,6 +17,7 @@ namespace tetwarp {
 enum class Trait : std::uint8_t {
   temporal_position,
   temporal_index,
+  stack,  ///< of frames
   cardiac_phase,
   respiratory_phase,
   trigger_time,
@@ -27,6 +28,7 @@ enum class Trait : std::uint8_t {
   kernel,
   thickness,
   image_type,
+  dimensions,  ///< indices of frames in what is no place
   contrast,
   scan_options,
   filter,
@@ -38,7 +40,7 @@ enum class Trait : std::uint8_t {
   content_time,
   series_time,
 };
-constexpr std::size_t kTraits = 22;
+constexpr std::size_t kTraits = 24;
 
 /// "Acquisition Number (0020,0012)".
 std::string name_of(Trait trait);

@@ -59,6 +59,9 @@ std::string escaped(std::string_view text, bool lines) {
 
 std::string shown(std::string_view text) { return escaped(text, false); }
 std::string shown(const std::filesystem::path& path) { return escaped(path.native(), false); }
+std::string shown(const std::filesystem::path& file, std::optional<int> frame) {
+  return shown(file) + (frame ? ", frame " + std::to_string(*frame + 1) : std::string());
+}
 std::string shown_lines(std::string_view text) { return escaped(text, true); }
 
 }  // namespace tetwarp

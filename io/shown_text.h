@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -10,6 +11,8 @@ namespace tetwarp {
 /// marks that turn the direction of writing, and bytes that are no UTF-8 become "\xNN", byte by byte.
 std::string shown(std::string_view text);
 std::string shown(const std::filesystem::path& path);
+/// "FILE", or of a frame, from 0, "FILE, frame 17", counted from 1.
+std::string shown(const std::filesystem::path& file, std::optional<int> frame);
 inline std::string shown(const char* text) { return shown(std::string_view(text)); }
 inline std::string shown(const std::string& text) { return shown(std::string_view(text)); }
 

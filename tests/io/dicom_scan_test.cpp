@@ -246,7 +246,7 @@ TEST(DicomScan, LocalizerIsSetAsideByItsImageType) {
 
 TEST(DicomScan, ObjectsThatAreNoCtAreRefusedByTheirKind) {
   for (const auto& [uid, name] : {std::pair{UID_MRImageStorage, "MRImageStorage"},
-                                  {UID_EnhancedCTImageStorage, "multi-frame CT is not read"},
+                                  {UID_EnhancedMRImageStorage, "MR images"},
                                   {UID_SecondaryCaptureImageStorage, "SecondaryCapture"},
                                   {UID_RTDoseStorage, "RTDoseStorage"}}) {
     const Scratch folder;

@@ -263,7 +263,7 @@ struct OddFile {
 };
 
 const std::vector<OddFile> kOddFiles = {
-    {"enhanced/eCT_Supplemental.dcm", {"EnhancedCTImageStorage", "multi-frame"}},
+    {"enhanced/eCT_Supplemental.dcm", {}},
     {"orientation/OrthogonalDirectionsTest.dcm", {}},
     {"orientation/DicomDirectionsTest_1020_0075.dcm", {"localizer"}},
     {"orientation/explicit_VR-UN.dcm",
