@@ -160,15 +160,31 @@ bool is_uid(const std::string& text) {
   return !text.empty() && DcmUniqueIdentifier::checkStringValue(text.c_str(), "1").good();
 }
 
-/// Source Image Sequence; images without a usable UID cannot be named.
+/// Whether a slice is a frame of the same file as the one before it.
+bool continues_file(const DerivedSeries& series, std::size_t slice) {
+  return series.frame[slice] > 0 && series.frame[slice - 1] > 0 &&
+         series.sop_instance[slice] == series.sop_instance[slice - 1];
+}
+
+/// Source Image Sequence, an item a file; images without a usable UID cannot be named.
 void put_references(DcmItem& target, const DerivedSeries& series, const SliceRange& sampled, bool deformed) {
+  std::string frames;
   for (std::int64_t k = sampled.first; k <= sampled.last; ++k) {
     const std::size_t slice = static_cast<std::size_t>(k);
     if (!is_uid(series.sop_instance.at(slice))) continue;
+    if (k > sampled.first && continues_file(series, slice)) {
+      DcmItem* image = nullptr;
+      target.findAndGetSequenceItem(DCM_SourceImageSequence, image, -1);
+      frames += "\\" + std::to_string(series.frame[slice]);
+      put(*image, DCM_ReferencedFrameNumber, frames);
+      continue;
+    }
     DcmItem& image = append_item(target, DCM_SourceImageSequence);
     const std::string& sop_class = series.sop_class.at(slice);
     put(image, DCM_ReferencedSOPClassUID, is_uid(sop_class) ? sop_class : UID_CTImageStorage);
     put(image, DCM_ReferencedSOPInstanceUID, series.sop_instance[slice]);
+    frames = std::to_string(series.frame[slice]);
+    if (series.frame[slice] > 0) put(image, DCM_ReferencedFrameNumber, frames);
     append_code(image, DCM_PurposeOfReferenceCodeSequence, "121322", "Source image for image processing operation");
     put(image, DCM_SpatialLocationsPreserved, deformed ? "NO" : "YES");
   }
@@ -220,6 +236,8 @@ DerivedSeries derive_series(const DicomHeaders& source, const Geometry& geometry
     series.sop_class.push_back(header.sop_class_uid);
     series.sop_instance.push_back(header.sop_instance_uid);
   }
+  series.frame = source.frames;
+  series.frame.resize(headers.size());
   series.study_uid = uid_or_made_up(source, DCM_StudyInstanceUID);
   series.series_uid = series_uid(source, derivation, series);
   series.frame_of_reference_uid = frame_uid(source, derivation);

@@ -19,6 +19,7 @@ struct DerivedSeries {
   std::string study_uid, series_uid, frame_of_reference_uid;
   std::string number, description;                   ///< Series Number and Description
   std::vector<std::string> sop_class, sop_instance;  ///< of the source's slices
+  std::vector<int> frame;                            ///< likewise, from 1; 0: the slice is a file
   std::vector<int> instance_number;                  ///< of the output's slices, each once
   std::vector<std::size_t> header;                   ///< of the output's slices, the source's whose header each takes over
   std::set<DcmTagKey> varying;                       ///< see varying_acquisition
