@@ -6,6 +6,7 @@
 #include <cstring>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "apps/input.h"
 #include "apps/output.h"
@@ -22,7 +23,8 @@ constexpr std::size_t kNamesShown = 3;
 /// Files that were left out for one reason.
 struct ReasonGroup {
   std::string reason;
-  std::vector<std::string> files;
+  std::vector<std::string> files;  ///< or frames of files
+  std::string noun = "file";
 };
 
 /// In the order in which the reasons come first.
@@ -31,8 +33,9 @@ std::vector<ReasonGroup> by_reason(const std::vector<LeftOutFile>& left_out) {
   std::map<std::string, std::size_t> place_of;
   for (const LeftOutFile& one : left_out) {
     const auto [found, is_new] = place_of.try_emplace(one.reason, groups.size());
-    if (is_new) groups.push_back({one.reason, {}});
-    groups[found->second].files.push_back(shown(one.file));
+    if (is_new) groups.push_back({.reason = one.reason, .files = {}});
+    groups[found->second].files.push_back(shown(one.file, one.frame));
+    if (one.frame) groups[found->second].noun = "frame";
   }
   return groups;
 }
@@ -81,13 +84,28 @@ std::string lie_of(const Geometry& geometry) {
   return plane + "; " + ways + " " + number_text(length) + " mm";
 }
 
+/// Files that hold the slices.
+std::size_t files_of(const DicomSeries& series) {
+  std::set<std::filesystem::path> files;
+  for (const DicomSlice& slice : series.slices) files.insert(slice.file);
+  return files.size();
+}
+
+/// "140 slices"; where they are frames "140 slices in 1 file".
+std::string slices_of(const DicomSeries& series) {
+  const std::string slices = plural(series.slices.size(), "slice");
+  const bool has_frames =
+      std::any_of(series.slices.begin(), series.slices.end(), [](const DicomSlice& slice) { return slice.frame; });
+  return has_frames ? slices + " in " + plural(files_of(series), "file") : slices;
+}
+
 /// "CT, 512 x 512, 140 slices, 1 mm apart, axial; head to feet 139 mm".
 std::string summary(const DicomSeries& series) {
   std::string text = series.modality.empty() ? "unknown kind" : shown(series.modality);
   const Geometry& geometry = series.geometry;
   if (series.slices.empty()) return text + ", no slices";
   if (geometry.size.x > 0) text += ", " + std::to_string(geometry.size.x) + " x " + std::to_string(geometry.size.y);
-  text += ", " + plural(series.slices.size(), "slice");
+  text += ", " + slices_of(series);
   if (series.refusal) return text;
   if (series.slices.size() == 1) return text + ", " + plane_name(geometry.direction[2]);
   const std::string apart =
@@ -108,6 +126,7 @@ json series_json(const DicomSeries& series, std::size_t number) {
                    {"label", series.label},
                    {"split_by", series.split_by},
                    {"slices", series.slices.size()},
+                   {"files", files_of(series)},
                    {"usable", !series.refusal},
                    {"set_aside", left_out_json(series.set_aside)},
                    {"warnings", series.warnings}};
@@ -123,7 +142,7 @@ void print_line(const std::string& line) { std::printf("%s\n", line.c_str()); }
 
 void print_left_out(const std::vector<LeftOutFile>& left_out) {
   for (const ReasonGroup& group : by_reason(left_out)) {
-    print_line("     " + plural(group.files.size(), "file") + ": " + group.reason);
+    print_line("     " + plural(group.files.size(), group.noun) + ": " + group.reason);
     for (std::size_t n = 0; n < std::min(group.files.size(), kNamesShown); ++n) print_line("       " + group.files[n]);
     if (group.files.size() > kNamesShown)
       print_line("       and " + std::to_string(group.files.size() - kNamesShown) + " more");

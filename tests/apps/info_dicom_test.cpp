@@ -6,6 +6,7 @@
 
 #include "tests/support/dicom_edit.h"
 #include "tests/support/dicom_maker.h"
+#include "tests/support/enhanced_maker.h"
 #include "tests/support/program.h"
 #include "tests/support/real_data.h"
 #include "tests/support/says.h"
@@ -65,7 +66,7 @@ TEST(InfoOfDicom, JsonHasTheKeysThatTheDocumentsPromise) {
   ASSERT_EQ(said["series"].size(), 3u);
   const json& second = said["series"][1];
   for (const auto& [key, value] : second.items()) of_series.push_back(key);
-  EXPECT_EQ(of_series, (std::vector<std::string>{"description", "frame_of_reference_uid", "geometry", "label",
+  EXPECT_EQ(of_series, (std::vector<std::string>{"description", "files", "frame_of_reference_uid", "geometry", "label",
                                                  "modality", "number", "series_instance_uid", "series_number",
                                                  "set_aside", "slices", "split_by", "study_instance_uid", "summary",
                                                  "usable", "volumes_in_series", "warnings"}));
@@ -79,6 +80,24 @@ TEST(InfoOfDicom, JsonHasTheKeysThatTheDocumentsPromise) {
   EXPECT_EQ(second["set_aside"], json::array()) << "with the first volume of the series";
   EXPECT_EQ(second["geometry"]["size"], json::array({6, 4, 5}));
   EXPECT_EQ(said.dump().find("SECRET"), std::string::npos);
+}
+
+TEST(InfoOfDicom, FramesOfOneFileAreSlicesThatItHolds) {
+  const Scratch scratch;
+  MadeEnhanced made;
+  made.edit_groups = [](int k, DcmItem& groups) {
+    if (k == 0)
+      macro_of(groups, DCM_CTImageFrameTypeSequence)
+          .putAndInsertString(DCM_FrameType, "ORIGINAL\\PRIMARY\\LOCALIZER\\NONE");
+  };
+  made.write(scratch / "in/all.dcm", classic_stack(6));
+  EXPECT_TRUE(says(run_tetwarp(scratch.path(), "info in").out,
+                   {"in: 1 file, 1 of 1 entries", "5 slices in 1 file, 2.5 mm apart, axial",
+                    "1 frame: a localizer (scout)", "in/all.dcm, frame 1\n"}));
+  const json said = json::parse(run_tetwarp(scratch.path(), "info in --json").out)["series"][0];
+  EXPECT_EQ(said["slices"], 5);
+  EXPECT_EQ(said["files"], 1);
+  EXPECT_EQ(said["set_aside"][0]["files"], json::array({"in/all.dcm, frame 1"}));
 }
 
 TEST(InfoOfDicom, ARefusedSeriesSaysWhyAndThatNothingIsLeft) {
