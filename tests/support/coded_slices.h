@@ -67,11 +67,13 @@ struct Coding {
     }
     return slice;
   }
-  std::string frame(const std::filesystem::path& scratch) const {
-    if (encoding != EXS_Unknown) return encoded_frame(scratch, slice(), encoding);
+  std::string frame(const std::filesystem::path& scratch) const { return frame(scratch, slice()); }
+  /// The same of a slice with other words, but for high-throughput JPEG 2000.
+  std::string frame(const std::filesystem::path& scratch, const MadeSlice& of) const {
+    if (encoding != EXS_Unknown) return encoded_frame(scratch, of, encoding);
 #ifdef TETWARP_WITH_OPENJPEG
     if (name.starts_with("Jpeg2000")) {
-      const std::vector<std::uint16_t> words = slice().words;
+      const std::vector<std::uint16_t>& words = of.words;
       MadeCodestream stream{10, 12, 12, false, {words.begin(), words.end()}, {}};
       stream.change = [&](opj_cparameters_t& parameters) {
         parameters.numresolution = 3;

@@ -36,11 +36,8 @@ inline std::string file_start(std::string transfer_syntax_uid) {
   return bytes + meta;
 }
 
-/// All attributes of a slice but Pixel Data, Explicit VR Little Endian.
-inline std::string attributes_of(const MadeSlice& slice) {
-  DcmDataset data;
-  put_attributes(data, slice);
-  if (slice.edit) slice.edit(data);
+/// All attributes but Pixel Data, Explicit VR Little Endian.
+inline std::string attributes_of(DcmDataset& data) {
   delete data.remove(DCM_PixelData);
   std::string bytes(data.calcElementLength(EXS_LittleEndianExplicit, EET_ExplicitLength) + 1024, '\0');
   DcmOutputBufferStream stream(bytes.data(), static_cast<offile_off_t>(bytes.size()));
@@ -53,6 +50,14 @@ inline std::string attributes_of(const MadeSlice& slice) {
   stream.flushBuffer(buffer, length);
   bytes.resize(static_cast<std::size_t>(length));
   return bytes;
+}
+
+/// The same of a slice.
+inline std::string attributes_of(const MadeSlice& slice) {
+  DcmDataset data;
+  put_attributes(data, slice);
+  if (slice.edit) slice.edit(data);
+  return attributes_of(data);
 }
 
 /// Encapsulated Pixel Data (PS3.5 A.4). @param offsets  the Basic Offset Table, right or wrong
