@@ -187,8 +187,13 @@ bool is_at_most(DcmItem& item, const DcmTagKey& tag, std::uint64_t bytes) {
 std::string text_of(DcmItem& item, const DcmTagKey& tag) {
   DcmElement* element = nullptr;
   OFString value;
-  if (item.findAndGetElement(tag, element).bad() || element->getLengthField() > kLongestValue ||
-      element->getOFStringArray(value).bad()) {
+  if (item.findAndGetElement(tag, element).bad() || element->getLengthField() > kLongestValue) return {};
+  constexpr Uint32 kLong = 4096;  // DCMTK goes through all values of a date again for each of them
+  char* whole = nullptr;
+  if (element->getLengthField() > kLong && dynamic_cast<DcmByteString*>(element)) {
+    if (element->getString(whole).bad() || !whole) return {};
+    value = whole;
+  } else if (element->getOFStringArray(value).bad()) {
     return {};
   }
   std::string text(value.c_str());  // stops at a padding zero

@@ -3,6 +3,7 @@
 
 #include <malloc.h>
 
+#include <chrono>
 #include <fstream>
 
 #include "deform/errors.h"
@@ -227,6 +228,13 @@ TEST_F(HostileEnhancedCt, SharedAttributesWithoutEndAreNotCopiedForEachFrame) {
     }
   });
   EXPECT_EQ(refusal(), "accepted");
+}
+
+TEST_F(HostileEnhancedCt, AMillionValuesOfADateAreReadInOneGo) {
+  write([](DcmDataset& data) { data.putAndInsertString(DCM_SeriesDate, std::string((1 << 20) - 2, '\\').c_str()); });
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_EQ(refusal(), "accepted");
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(10));
 }
 
 TEST_F(HostileEnhancedCt, TenThousandFramesAreListedInLittleMemory) {
