@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "deform/errors.h"
+#include "io/shown_text.h"
 
 namespace tetwarp {
 namespace {
@@ -88,16 +89,74 @@ void check_meta_line(const std::string& line, const std::string& file) {
   require(is_number && std::stoul(value) <= kMostDimensions, "NDims = " + value + ", " + file + "; expected 3");
 }
 
+/// Fields of NRRD, definition of the format, sections 4 to 7, each as NrrdIO takes it.
+const std::set<std::string>& nrrd_fields() {
+  static const std::set<std::string> kFields = {"content",
+                                                "number",
+                                                "type",
+                                                "block size",
+                                                "blocksize",
+                                                "dimension",
+                                                "space",
+                                                "sizes",
+                                                "spacings",
+                                                "thicknesses",
+                                                "space dimension",
+                                                "axis mins",
+                                                "axismins",
+                                                "axis maxs",
+                                                "axismaxs",
+                                                "centers",
+                                                "centerings",
+                                                "labels",
+                                                "units",
+                                                "kinds",
+                                                "min",
+                                                "max",
+                                                "old min",
+                                                "oldmin",
+                                                "old max",
+                                                "oldmax",
+                                                "endian",
+                                                "encoding",
+                                                "line skip",
+                                                "lineskip",
+                                                "byte skip",
+                                                "byteskip",
+                                                "sample units",
+                                                "sampleunits",
+                                                "data file",
+                                                "datafile",
+                                                "space origin",
+                                                "space units",
+                                                "space directions",
+                                                "measurement frame"};
+  return kFields;
+}
+
+/// Refuses what NrrdIO cannot take: it writes lines that it does not know into a buffer without asking for their
+/// length.
+void check_nrrd_field(const std::string& line, const std::string& name, const std::string& file) {
+  constexpr std::size_t kLongestLine = 1000;
+  require(nrrd_fields().contains(name), "a line that is no field of NRRD in the header of " + file + ", \"" +
+                                            shown(line.substr(0, 60)) + "\"; expected FIELD: VALUE or KEY:=VALUE");
+  require(line.size() <= kLongestLine, "a field of " + std::to_string(line.size()) + " bytes in the header of " + file +
+                                           ", \"" + name + "\"; expected at most " + std::to_string(kLongestLine));
+}
+
 /// Takes one line of a header; true after the last.
-bool take_line(const std::string& line, ImageFormat format, TextHeader& header) {
+bool take_line(const std::string& line, ImageFormat format, const std::string& file, TextHeader& header) {
   if (format == ImageFormat::nrrd) {
     if (trimmed(line).empty()) return true;
     if (line[0] == '#') return false;
     const auto pair = line.find(":="), field = line.find(": ");
-    if (pair != std::string::npos && pair < field)
+    if (pair != std::string::npos && pair < field) {
       header.metadata[line.substr(0, pair)] = trimmed(line.substr(pair + 2));
-    else if (field != std::string::npos)
-      header.fields[lower(line.substr(0, field))] = trimmed(line.substr(field + 2));
+    } else {
+      const std::string name = lower(line.substr(0, std::min(field, line.size())));
+      check_nrrd_field(line, field == std::string::npos ? "" : name, file);
+      header.fields[name] = trimmed(line.substr(field + 2));
+    }
     return false;
   }
   const auto equals = line.find('=');
@@ -132,7 +191,7 @@ TextHeader read_text_header(const std::filesystem::path& path, ImageFormat forma
     if (first && format == ImageFormat::nrrd)
       require(line.starts_with("NRRD000"), "not an NRRD file (it does not begin with NRRD000), " + file);
     else
-      ended = take_line(line, format, header);
+      ended = take_line(line, format, file, header);
     first = false;
   }
   const char* name = format == ImageFormat::nrrd ? "NRRD" : "MHA";
@@ -143,7 +202,8 @@ TextHeader read_text_header(const std::filesystem::path& path, ImageFormat forma
           "voxels in another file (\"" + elsewhere + "\"), " + file + "; expected them after the header");
   if (format == ImageFormat::mha) {
     for (const char* field : {"ndims", "dimsize", "elementtype"})
-      require(!header[field].empty(), std::string("no ") + field + " in the header of " + file + "; is it an MHA file?");
+      require(!header[field].empty(),
+              std::string("no ") + field + " in the header of " + file + "; is it an MHA file?");
   }
   const std::string units = format == ImageFormat::nrrd ? header["space units"] : header["distanceunits"];
   std::istringstream words(units);

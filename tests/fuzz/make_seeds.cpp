@@ -10,6 +10,7 @@
 #include "tests/fuzz/input_file.h"
 #include "tests/itkbridge/itk_transforms.h"
 #include "tests/support/coded_slices.h"
+#include "tests/support/enhanced_maker.h"
 #include "tests/support/gmsh_file.h"
 #include "tests/support/image_samples.h"
 #include "tests/support/point_files.h"
@@ -364,11 +365,19 @@ void make_frames(const fs::path& folder) {
   }
 }
 
+/// Four frames in two transfer syntaxes.
+void make_enhanced(const fs::path& folder) {
+  for (const E_TransferSyntax encoding : {EXS_LittleEndianExplicit, EXS_RLELossless})
+    MadeEnhanced().write(folder / ("enhanced-" + std::to_string(encoding) + ".dcm"), classic_stack(4), encoding);
+}
+
 void make_dicom(const fs::path& root) {
   register_encoders();
   make_slices(folder_of(root, "dicom"));
   make_dose(root / "dicom");
+  make_enhanced(root / "dicom");
   make_slices(folder_of(root, "dicom-scan"));
+  make_enhanced(root / "dicom-scan");
   make_folders(root / "dicom-scan");
   make_frames(folder_of(root, "dicom-decode"));
   DJLSEncoderRegistration::cleanup();
