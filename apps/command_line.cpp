@@ -53,12 +53,14 @@ void add_dicom_form(CLI::App& command, DicomForm& form) {
                   "Of a DICOM series: explicit (default), deflated, rle or jpeg-ls; all without loss")
       ->transform(CLI::Transformer(encodings).description(""))
       ->type_name("NAME");
-  command.add_flag("--keep-frame-of-reference", form.keep_frame_of_reference,
-                   "A DICOM series keeps INPUT's Frame of Reference UID although it is deformed: viewers overlay the two");
+  command.add_flag(
+      "--keep-frame-of-reference", form.keep_frame_of_reference,
+      "A DICOM series keeps INPUT's Frame of Reference UID although it is deformed: viewers overlay the two");
   command.add_option("--series-number", form.series_number, "Of a DICOM series (default: INPUT's + 1000)")
       ->check(CLI::Range(0, 2147483647));
-  command.add_option("--series-description", form.series_description,
-                     "Of a DICOM series, at most 64 characters (default: \"deformed: \" and INPUT's)")
+  command
+      .add_option("--series-description", form.series_description,
+                  "Of a DICOM series, at most 64 characters (default: \"deformed: \" and INPUT's)")
       ->type_name("TEXT");
 }
 

@@ -289,8 +289,9 @@ int Deformation::run() {
   for (const std::string& note : record_.field.notes) say(options_.common, "tetwarp: note: " + note);
   for (const std::string& note : record_.points.notes()) say(options_.common, "tetwarp: note: " + note);
   if (!record_.set_aside.empty()) {
-    say(options_.common, "tetwarp: note: " + std::to_string(record_.set_aside.size()) +
-                             " files of the series are no slices of it; OUTPUT.json names them");
+    const bool one = record_.set_aside.size() == 1;
+    say(options_.common, "tetwarp: note: " + plural(record_.set_aside.size(), "file") + " of the series " +
+                             (one ? "is no slice" : "are no slices") + " of it; OUTPUT.json names them");
   }
   say(options_.common, summary(record_));
   return 0;

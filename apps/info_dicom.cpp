@@ -69,10 +69,6 @@ std::string hint(const DicomScan& scan, const InputOptions& input) {
          (found->uneven ? " --uneven exact" : "") + " -f FIELD -o OUTPUT";
 }
 
-std::string plural(std::size_t count, const std::string& noun) {
-  return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
-}
-
 /// "axial; head to feet 139 mm" of the line of slices.
 std::string lie_of(const Geometry& geometry) {
   const std::string plane = plane_name(geometry.direction[2]);

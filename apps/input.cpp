@@ -101,11 +101,15 @@ std::string number_text(double value) {
   return std::string(text, end);
 }
 
+std::string plural(std::size_t count, const std::string& noun) {
+  return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
+}
+
 std::string describe(const DicomSeries& series, std::size_t number) {
   std::string line =
       "  " + std::to_string(number) + "  " + (series.series_uid.empty() ? "(no UID)" : shown(series.series_uid)) +
       "  " + (series.modality.empty() ? "??" : shown(series.modality)) + "  " +
-      (series.label.empty() ? "" : series.label + "  ") + std::to_string(series.slices.size()) + " slices";
+      (series.label.empty() ? "" : series.label + "  ") + plural(series.slices.size(), "slice");
   if (series.refusal) return line + "  not usable: " + *series.refusal;
   const glm::dvec3& spacing = series.geometry.spacing;
   return line + "  " + to_string(series.geometry.size) + "  " + number_text(spacing.x) + " x " +
