@@ -111,7 +111,7 @@ TEST(DicomScan, MissingSliceIsNamedWithItsNeighboursAndTheOthersArePlaced) {
 TEST(DicomScan, SlicesAreUnevenFromOneThousandthOfTheirDistance) {
   const Scratch folder;
   for (const auto& [z, is_even] : {std::pair{"35.002", true}, {"35.006", false}, {"35.1", false}}) {
-    write_stack(folder.path(), 5, [&](int k, MadeSlice& slice) {
+    write_stack(folder.path(), 5, [&, z = z](int k, MadeSlice& slice) {
       if (k == 2) set_z(slice, z);
     });
     EXPECT_EQ(uneven_of(folder.path()) == "even", is_even) << z << ": " << uneven_of(folder.path());
