@@ -6,6 +6,7 @@
 #include "io/dicom_series.h"
 #include "tests/support/dicom_edit.h"
 #include "tests/support/dicom_maker.h"
+#include "tests/support/only_series.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"
 
@@ -13,12 +14,6 @@ namespace tetwarp {
 namespace {
 
 namespace fs = std::filesystem;
-
-DicomSeries only_series(const fs::path& folder) {
-  DicomScan scan = scan_dicom(folder);
-  if (scan.series.size() != 1) throw std::runtime_error("expected one series");
-  return scan.series.front();
-}
 
 testing::AssertionResult counts_five(const fs::path& folder, const std::vector<std::string>& words) {
   const DicomSeries series = only_series(folder);

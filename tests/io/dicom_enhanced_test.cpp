@@ -3,6 +3,7 @@
 
 #include "io/dicom_series.h"
 #include "tests/support/enhanced_maker.h"
+#include "tests/support/only_series.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"
 
@@ -10,12 +11,6 @@ namespace tetwarp {
 namespace {
 
 namespace fs = std::filesystem;
-
-DicomSeries only_series(const fs::path& path) {
-  DicomScan scan = scan_dicom(path);
-  if (scan.series.size() != 1) throw std::runtime_error(std::to_string(scan.series.size()) + " series or volumes");
-  return scan.series.front();
-}
 
 void expect_same_volume(const fs::path& enhanced, const fs::path& classic) {
   const DicomSeries frames = only_series(enhanced), files = only_series(classic);

@@ -4,6 +4,7 @@
 
 #include "io/dicom_series.h"
 #include "tests/support/dicom_maker.h"
+#include "tests/support/only_series.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"
 
@@ -11,13 +12,6 @@ namespace tetwarp {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// The one series of a folder.
-DicomSeries only_series(const fs::path& folder) {
-  DicomScan scan = scan_dicom(folder);
-  if (scan.series.size() != 1) throw std::runtime_error("expected one series");
-  return scan.series.front();
-}
 
 std::string refusal_of(const fs::path& folder) { return only_series(folder).refusal.value_or("accepted"); }
 

@@ -8,6 +8,7 @@
 
 #include "tests/io/derived_source.h"
 #include "tests/support/enhanced_maker.h"
+#include "tests/support/only_series.h"
 #include "tests/support/other_readers.h"
 #include "tests/support/real_data.h"
 #include "tests/support/scratch.h"
@@ -16,12 +17,6 @@ namespace fs = std::filesystem;
 
 namespace tetwarp::test {
 namespace {
-
-DicomSeries only_series(const fs::path& path) {
-  DicomScan scan = scan_dicom(path);
-  if (scan.series.size() != 1) throw std::runtime_error("expected one series");
-  return scan.series.front();
-}
 
 DicomDerivation derivation() {
   return {.field_sha256 = std::string(64, 'a'),
