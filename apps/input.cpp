@@ -106,10 +106,10 @@ std::string plural(std::size_t count, const std::string& noun) {
 }
 
 std::string describe(const DicomSeries& series, std::size_t number) {
-  std::string line =
-      "  " + std::to_string(number) + "  " + (series.series_uid.empty() ? "(no UID)" : shown(series.series_uid)) +
-      "  " + (series.modality.empty() ? "??" : shown(series.modality)) + "  " +
-      (series.label.empty() ? "" : series.label + "  ") + plural(series.slices.size(), "slice");
+  std::string line = "  " + std::to_string(number) + "  " +
+                     (series.series_uid.empty() ? "(no UID)" : shown(series.series_uid)) + "  " +
+                     (series.modality.empty() ? "??" : shown(series.modality)) + "  " +
+                     (series.label.empty() ? "" : series.label + "  ") + plural(series.slices.size(), "slice");
   if (series.refusal) return line + "  not usable: " + *series.refusal;
   const glm::dvec3& spacing = series.geometry.spacing;
   return line + "  " + to_string(series.geometry.size) + "  " + number_text(spacing.x) + " x " +

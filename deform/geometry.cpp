@@ -129,8 +129,8 @@ void require_valid_slices(const Geometry& geometry, const std::string& what) {
               std::to_string(geometry.size.z) + ", at least 2");
   for (std::size_t k = 1; k < slices.size(); ++k) {
     require(std::isfinite(slices[k]) && slices[k] > slices[k - 1],
-            what + ": slice " + std::to_string(k) + " lies at " + std::to_string(slices[k]) + " mm, the one before at " +
-                std::to_string(slices[k - 1]) + " mm, expected rising places");
+            what + ": slice " + std::to_string(k) + " lies at " + std::to_string(slices[k]) +
+                " mm, the one before at " + std::to_string(slices[k - 1]) + " mm, expected rising places");
   }
   const double last = geometry.spacing.z * static_cast<double>(geometry.size.z - 1);
   require(slices.front() == 0 && std::abs(slices.back() - last) <= 1e-9 * last,

@@ -17,10 +17,10 @@ namespace tetwarp {
 /// its slices may be unevenly far apart: `slices` says where they are, and `spacing.z` is their mean distance, so that
 /// the first and the last slice lie where an even stack has them.
 struct Geometry {
-  glm::i64vec3 size{0};     ///< samples along i, j, k
-  glm::dvec3 spacing{1};    ///< mm between neighbours along i, j, k, each > 0
-  glm::dvec3 origin{0};     ///< LPS mm of the centre of sample (0, 0, 0)
-  glm::dmat3 direction{1};  ///< columns: directions of i, j, k in LPS
+  glm::i64vec3 size{0};             ///< samples along i, j, k
+  glm::dvec3 spacing{1};            ///< mm between neighbours along i, j, k, each > 0
+  glm::dvec3 origin{0};             ///< LPS mm of the centre of sample (0, 0, 0)
+  glm::dmat3 direction{1};          ///< columns: directions of i, j, k in LPS
   std::vector<double> slices = {};  ///< empty: even; else mm along k of each slice, from 0, rising (sources only)
 
   friend bool operator==(const Geometry&, const Geometry&) = default;

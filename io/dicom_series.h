@@ -18,7 +18,7 @@ struct DicomSlice {
   std::string sop_instance_uid;
   std::string transfer_syntax_uid;
   int instance_number = 0;
-  double position_mm = 0;  ///< Image Position (Patient) along the slice normal
+  double position_mm = 0;         ///< Image Position (Patient) along the slice normal
   std::optional<int> frame = {};  ///< of a multi-frame file, from 0
 };
 

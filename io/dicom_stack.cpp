@@ -63,7 +63,8 @@ Drift drift_from(const Headers& files, const glm::dvec3& direction) {
   return worst;
 }
 
-/// Lets the stack lean as the positions of its slices say: a gantry tilt. @return why they are no stack, if they are none
+/// Lets the stack lean as the positions of its slices say: a gantry tilt. @return why they are no stack, if they are
+/// none
 std::optional<std::string> lean(const Headers& files, DicomSeries& series) {
   Geometry& geometry = series.geometry;
   const glm::dvec3 normal = geometry.direction[2];

@@ -63,9 +63,11 @@ void DerivedSeriesWriter::write(const ConstVolumeView& volume, std::int64_t begi
     const std::size_t k = static_cast<std::size_t>(begin) + n;
     const SliceRange range = sampled.empty() ? SliceRange{} : sampled[k];
     DcmDataset slice;
-    const auto added = derive_slice(slice, *to.source.slices[to.series.header[k]], to.series, to.derivation, range, to.geometry, k);
+    const auto added =
+        derive_slice(slice, *to.source.slices[to.series.header[k]], to.series, to.derivation, range, to.geometry, k);
     put_hu_format(slice, to.geometry);
-    write_dicom_file(to.folder / dicom_file_name(to.series.instance_number[k]), slice, slice_of(volume, k), to.derivation.form.encoding);
+    write_dicom_file(to.folder / dicom_file_name(to.series.instance_number[k]), slice, slice_of(volume, k),
+                     to.derivation.form.encoding);
     const std::lock_guard lock(to.mutex);
     to.added.insert(added.begin(), added.end());
   });

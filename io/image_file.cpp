@@ -48,8 +48,7 @@ void require_file_holds(const std::filesystem::path& path, const ImageHeader& he
   text.precision(17);
   text << "truncated, or a header that promises too much, " << path.string() << ": " << std::max(held, 0.0)
        << " bytes, but " << to_string(header.geometry.size) << " voxels of " << header.components << " x "
-       << stored.value_bytes << " bytes" << (stored.encoded ? ", compressed," : "") << " need "
-       << std::ceil(needed);
+       << stored.value_bytes << " bytes" << (stored.encoded ? ", compressed," : "") << " need " << std::ceil(needed);
   require(held >= needed, text.str());
 }
 

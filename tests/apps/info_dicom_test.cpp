@@ -119,8 +119,8 @@ TEST(InfoOfDicom, AMissingSliceIsNamedWithTheOptionThatTakesTheRest) {
   write_stack(scratch / "in", 6);
   fs::remove(scratch / "in/s03.dcm");
   const Outcome run = run_tetwarp(scratch.path(), "info in");
-  EXPECT_TRUE(says(run.out, {"in: 5 files, 1 of 1 entries", "5 slices, unevenly spaced",
-                             "uneven: slice gap 5 mm", "1 slice missing", "needs --uneven exact"}));
+  EXPECT_TRUE(says(run.out, {"in: 5 files, 1 of 1 entries", "5 slices, unevenly spaced", "uneven: slice gap 5 mm",
+                             "1 slice missing", "needs --uneven exact"}));
   const json said = json::parse(run_tetwarp(scratch.path(), "info in --json").out);
   EXPECT_EQ(said["series"][0]["usable"], true);
   EXPECT_TRUE(says(said["series"][0]["uneven"], {"slice gap 5 mm"}));

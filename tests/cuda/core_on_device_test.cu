@@ -16,7 +16,8 @@ using namespace tetwarp;
 constexpr int kSide = 8;  // voxels of the box that each random cell is looked up in
 constexpr int kVoxels = kSide * kSide * kSide;
 
-/// What one cell says of each voxel of its box: the lowest tetrahedron that owns it (or 5), u there, and a sample at it.
+/// What one cell says of each voxel of its box: the lowest tetrahedron that owns it (or 5), u there, and a sample at
+/// it.
 struct Answer {
   std::uint8_t owner[kVoxels];
   std::uint8_t owners[kVoxels];
@@ -34,7 +35,8 @@ TETWARP_HD inline void answer_cell(const Cell& cell, bool odd, const std::int16_
     answer.value[i] = 0;
   }
   const Nudge nudge{glm::i64vec3(6 * kStepsPerVoxel + 100, 8 * kStepsPerVoxel, 7 * kStepsPerVoxel)};
-  const SourceVoxels<std::int16_t> voxels{source, glm::i64vec3(kSide), glm::i64vec3(0), glm::i64vec3(1, kSide, kSide * kSide)};
+  const SourceVoxels<std::int16_t> voxels{source, glm::i64vec3(kSide), glm::i64vec3(0),
+                                          glm::i64vec3(1, kSide, kSide * kSide)};
   visit_cell(cell, odd, {glm::i64vec3(0), glm::i64vec3(kSide)}, nudge,
              [&](const glm::i64vec3& voxel, const glm::i32vec3& signs, int t, const Tetrahedron& tetrahedron) {
                const auto i = static_cast<int>((voxel.z * kSide + voxel.y) * kSide + voxel.x);
@@ -95,8 +97,8 @@ TEST(CoreOnDevice, GivesTheSameBitsAsOnTheHost) {
   EXPECT_CUDA(cudaMemset(device_answers, 0xAB, cells.size() * sizeof(Answer)));
   EXPECT_CUDA(cudaMemcpy(device_cells, cells.data(), cells.size() * sizeof(Cell), cudaMemcpyHostToDevice));
   EXPECT_CUDA(cudaMemcpy(device_source, source.data(), source.size() * sizeof(std::int16_t), cudaMemcpyHostToDevice));
-  answer_cells<<<static_cast<unsigned>((cells.size() + 63) / 64), 64>>>(device_cells, static_cast<int>(cells.size()), device_source,
-                                                                     device_answers);
+  answer_cells<<<static_cast<unsigned>((cells.size() + 63) / 64), 64>>>(device_cells, static_cast<int>(cells.size()),
+                                                                        device_source, device_answers);
   EXPECT_CUDA(cudaGetLastError());
   std::vector<Answer> answers(cells.size());
   EXPECT_CUDA(cudaMemcpy(answers.data(), device_answers, cells.size() * sizeof(Answer), cudaMemcpyDeviceToHost));

@@ -18,7 +18,8 @@ class DicomFragments : public testing::TestWithParam<Coding> {
   Hu load(const std::vector<std::string>& fragments, const std::vector<std::uint32_t>& offsets = {}) {
     write_encapsulated(file_, GetParam().slice(), GetParam().uid, fragments, offsets);
     const DicomScan scan = scan_dicom(file_, true);
-    if (scan.series.size() != 1) throw std::runtime_error(scan.skipped.empty() ? "no series" : to_string(scan.skipped.front()));
+    if (scan.series.size() != 1)
+      throw std::runtime_error(scan.skipped.empty() ? "no series" : to_string(scan.skipped.front()));
     return load_dicom(scan.series.front(), 1).volume.voxels;
   }
 

@@ -13,6 +13,6 @@ inline std::filesystem::path real_data(const std::string& set) {
 }
 
 /// Skips the test with a reason where the set is absent; defines `folder` where it is there.
-#define TETWARP_REAL_DATA(folder, set)                                                              \
-  const std::filesystem::path folder = real_data(set);                                              \
+#define TETWARP_REAL_DATA(folder, set)                 \
+  const std::filesystem::path folder = real_data(set); \
   if (folder.empty()) GTEST_SKIP() << "no real data: " << (set) << " is not in $TETWARP_TEST_DATA"
