@@ -8,6 +8,7 @@
 #include "cuda/devices.h"
 #include "deform/fields/formula.h"
 #include "deform/mass.h"
+#include "io/dicom_text.h"
 #include "io/image_file.h"
 #include "io/preview.h"
 

@@ -10,6 +10,7 @@
 
 #include "apps/input.h"
 #include "apps/output.h"
+#include "io/dicom_text.h"
 #include "io/shown_text.h"
 
 namespace tetwarp::apps {

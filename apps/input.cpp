@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "io/dicom_dose.h"
+#include "io/dicom_text.h"
 #include "io/hash.h"
 #include "io/image_file.h"
 #include "io/shown_text.h"
@@ -99,10 +100,6 @@ std::string number_text(double value) {
   char text[32];
   const auto end = std::to_chars(text, text + sizeof text, value, std::chars_format::general, 6).ptr;
   return std::string(text, end);
-}
-
-std::string plural(std::size_t count, const std::string& noun) {
-  return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
 }
 
 std::string describe(const DicomSeries& series, std::size_t number) {

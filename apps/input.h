@@ -50,9 +50,6 @@ std::optional<std::size_t> only_choice(const DicomScan& scan);
 /// Six significant digits.
 std::string number_text(double value);
 
-/// "1 slice", "2 slices".
-std::string plural(std::size_t count, const std::string& noun);
-
 /// One line a series: number, UID, modality, what tells it from other volumes of its series, size, spacing, what is
 /// wrong.
 std::string describe(const DicomSeries& series, std::size_t number);

@@ -161,6 +161,19 @@ std::span<const std::byte> FileBuffer::read(const std::filesystem::path& file, s
   return read_parts(opened, parts, room_for(size));
 }
 
+Sha256::Digest digest_of(const std::filesystem::path& file) {
+  constexpr std::uint64_t kPiece = 1 << 20;
+  OpenedFile opened(file);
+  require_readable(opened);
+  std::vector<std::byte> room(std::min(kPiece, opened.size()));
+  Sha256 hash;
+  for (FileRange piece; piece.begin < opened.size(); piece.begin += piece.bytes) {
+    piece.bytes = std::min(kPiece, opened.size() - piece.begin);
+    hash.add(read_parts(opened, {&piece, 1}, std::span(room).first(piece.bytes)));
+  }
+  return hash.digest();
+}
+
 ParsedSlice parse_slice(std::span<const std::byte> bytes, const std::filesystem::path& file) {
   std::size_t limit = kLargestInflatedHeader;
   std::optional<ParsedSlice> in_place = parse_up_to_pixels(bytes, file, limit);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "io/dicom_header.h"
+#include "io/hash.h"
 
 namespace tetwarp {
 
@@ -32,6 +33,9 @@ class FileBuffer {
   std::unique_ptr<std::byte[]> bytes_;
   std::size_t room_ = 0;
 };
+
+/// SHA-256 of a file, read piece by piece. @throws InputError naming the file
+Sha256::Digest digest_of(const std::filesystem::path& file);
 
 struct ParsedSlice {
   std::unique_ptr<DcmFileFormat> format;

@@ -46,10 +46,8 @@ std::optional<std::vector<int>> stored_values(const DicomFileHeader& header) {
     const ParsedSlice slice = parse_slice(buffer.read(header.file), header.file);
     if (!pixel_problem(slice.header).empty()) return std::nullopt;
     std::vector<std::uint16_t> words(slice.native.size() / 2);
-    if (!slice.fragments.empty())
-      words = decode_frame(slice.fragments, slice.header);
-    else if (slice.native.empty())
-      words = decode_pixels(*slice.format->getDataset(), slice.header);
+    if (slice.native.empty())
+      words = decode_slice(slice);
     else
       std::memcpy(words.data(), slice.native.data(), 2 * words.size());
     std::vector<int> values;
@@ -119,11 +117,6 @@ std::vector<Pair> pairs_of_one_uid(const Headers& files) {
   return pairs_by(files, uids);
 }
 
-Sha256::Digest digest_of(const DicomFileHeader& header) {
-  FileBuffer buffer;
-  return Sha256().add(buffer.read(header.file)).digest();
-}
-
 /// Files without a UID that are the same byte for byte. Only those of one place and size are read.
 std::vector<Pair> pairs_of_same_bytes(const Headers& files, const std::stop_token& stop) {
   std::vector<std::optional<std::tuple<double, double, double, std::uint64_t>>> places(files.size());
@@ -137,7 +130,7 @@ std::vector<Pair> pairs_of_same_bytes(const Headers& files, const std::stop_toke
   const std::vector<std::size_t> suspects(together.begin(), together.end());
   std::vector<std::optional<Sha256::Digest>> digests(files.size());
   for_each_index(suspects.size(), 0, {.stop = stop},
-                 [&](std::size_t i) { digests[suspects[i]] = digest_of(files[suspects[i]]); });
+                 [&](std::size_t i) { digests[suspects[i]] = digest_of(files[suspects[i]].file); });
   return pairs_by(files, digests);
 }
 

@@ -9,6 +9,7 @@
 #include "io/dicom_pixels.h"
 #include "io/dicom_put.h"
 #include "io/dicom_stream.h"
+#include "io/dicom_text.h"
 #include "io/shown_text.h"
 
 namespace tetwarp {
@@ -32,10 +33,6 @@ std::vector<std::uint64_t> extended_offsets(DcmDataset& data) {
     return {};
   }
   return {offsets, offsets + element->getLength() / sizeof *offsets};
-}
-
-std::string count_text(std::size_t count, const std::string& noun) {
-  return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
 }
 
 }  // namespace
@@ -102,7 +99,7 @@ void FrameFile::assign_fragments(const PixelItems& found) {
     first_fragment_.push_back(count);
     return;
   }
-  const std::string mismatch = count_text(count, "fragment") + " of " + count_text(frames, "frame");
+  const std::string mismatch = plural(count, "fragment") + " of " + plural(frames, "frame");
   if (count < frames) refuse_pixels(whole_, "expected a fragment of each frame, found " + mismatch);
   std::vector<std::size_t> starts;
   const std::vector<std::uint64_t> extended = extended_offsets(*format_->getDataset());

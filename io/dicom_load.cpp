@@ -1,6 +1,5 @@
 #include <tbb/enumerable_thread_specific.h>
 
-#include <algorithm>
 #include <glm/geometric.hpp>
 #include <map>
 #include <mutex>
@@ -17,7 +16,6 @@
 #include "io/dicom_series.h"
 #include "io/dicom_stack.h"
 #include "io/hash.h"
-#include "io/opened_file.h"
 #include "io/parallel.h"
 #include "io/shown_text.h"
 
@@ -87,10 +85,7 @@ LoadedSlice load_slice(Loading& loading, std::size_t k, Sha256::Digest& digest) 
   if (!parsed.native.empty()) {
     loaded.count = convert_to_hu(parsed.native, *table, shown(header), loading.slice(k));
   } else {
-    const std::vector<std::uint16_t> words = parsed.fragments.empty()
-                                                 ? decode_pixels(*parsed.format->getDataset(), header)
-                                                 : decode_frame(parsed.fragments, header);
-    loaded.count = convert_to_hu(words, *table, shown(header), loading.slice(k));
+    loaded.count = convert_to_hu(decode_slice(parsed), *table, shown(header), loading.slice(k));
   }
   finish(loaded, std::unique_ptr<DcmDataset>(parsed.format->getAndRemoveDataset()), header);
   return loaded;
@@ -144,17 +139,6 @@ struct SourceFiles {
   }
 };
 
-Sha256::Digest digest_of(const std::filesystem::path& path, FileBuffer& buffer) {
-  constexpr std::uint64_t kPiece = 1 << 20;
-  Sha256 hash;
-  const std::uint64_t size = OpenedFile(path).size();
-  for (FileRange piece; piece.begin < size; piece.begin += piece.bytes) {
-    piece.bytes = std::min(kPiece, size - piece.begin);
-    hash.add(buffer.read(path, {&piece, 1}));
-  }
-  return hash.digest();
-}
-
 bool same_padding(const std::optional<PaddingRange>& a, const std::optional<PaddingRange>& b) {
   return a.has_value() == b.has_value() && (!a || (a->low == b->low && a->high == b->high));
 }
@@ -194,7 +178,7 @@ DicomVolume load_dicom(const DicomSeries& series, int threads, const Control& co
   for_each_index(with_frames.size() + slices.size(), threads, control, [&](std::size_t i) {
     if (i < with_frames.size()) {
       SourceFile& file = sources.files[with_frames[i]];
-      file.digest = digest_of(file.path, loading.buffers.local());
+      file.digest = digest_of(file.path);
       return;
     }
     const std::size_t k = i - with_frames.size();

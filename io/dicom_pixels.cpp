@@ -129,6 +129,11 @@ std::vector<std::uint16_t> decode_pixels(DcmDataset& data, const DicomFileHeader
   return decode_frame(fragments_of(*pixels, header), header);
 }
 
+std::vector<std::uint16_t> decode_slice(const ParsedSlice& slice) {
+  if (slice.fragments.empty()) return decode_pixels(*slice.format->getDataset(), slice.header);
+  return decode_frame(slice.fragments, slice.header);
+}
+
 std::shared_ptr<const HuTable> make_hu_table(const PixelFormat& format) {
   auto table = std::make_shared<HuTable>();
   const std::size_t words = std::size_t{1} << format.bits_allocated;

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "io/dicom_bytes.h"
 #include "io/dicom_header.h"
 
 namespace tetwarp {
@@ -21,6 +22,9 @@ std::vector<std::uint16_t> decode_pixels(DcmDataset& data, const DicomFileHeader
 /// and says nothing where there is one frame.
 std::vector<std::uint16_t> decode_frame(std::span<const std::span<const std::byte>> fragments,
                                         const DicomFileHeader& header);
+
+/// The same of a slice that was parsed and whose pixels are not native: its fragments, or what its data set holds.
+std::vector<std::uint16_t> decode_slice(const ParsedSlice& slice);
 
 /// Words of Pixel Data to HU. Built once for slices of the same format.
 struct HuTable {

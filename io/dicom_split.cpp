@@ -43,14 +43,6 @@ bool is_crowded(const Positions& positions) {
                             [](double a, double b) { return b - a <= kSamePosition; }) != positions.end();
 }
 
-double median_gap(const Positions& positions) {
-  std::vector<double> gaps;
-  for (std::size_t k = 1; k < positions.size(); ++k) gaps.push_back(positions[k] - positions[k - 1]);
-  const auto middle = gaps.begin() + std::ssize(gaps) / 2;
-  std::nth_element(gaps.begin(), middle, gaps.end());
-  return *middle;
-}
-
 bool is_uneven(const Positions& positions) {
   const double usual = median_gap(positions);
   for (std::size_t k = 1; k < positions.size(); ++k) {

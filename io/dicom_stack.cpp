@@ -98,14 +98,6 @@ double written_digit(const Headers& files, const glm::dvec3& normal) {
   return std::min(digit, 0.01);
 }
 
-double median_gap(const std::vector<double>& positions) {
-  std::vector<double> gaps;
-  for (std::size_t k = 1; k < positions.size(); ++k) gaps.push_back(positions[k] - positions[k - 1]);
-  const auto middle = gaps.begin() + std::ssize(gaps) / 2;
-  std::nth_element(gaps.begin(), middle, gaps.end());
-  return *middle;
-}
-
 std::string gap_text(double gap, double usual, const DicomFileHeader& before, const DicomFileHeader& after) {
   std::string text = "slice gap " + number(gap) + " mm between " + shown(before) + " and " + shown(after) + ", " +
                      number(usual) + " mm elsewhere";
@@ -170,6 +162,14 @@ void warn_of_rotation(const Headers& files, const Geometry& geometry, DicomSerie
 }
 
 }  // namespace
+
+double median_gap(const std::vector<double>& positions) {
+  std::vector<double> gaps;
+  for (std::size_t k = 1; k < positions.size(); ++k) gaps.push_back(positions[k] - positions[k - 1]);
+  const auto middle = gaps.begin() + std::ssize(gaps) / 2;
+  std::nth_element(gaps.begin(), middle, gaps.end());
+  return *middle;
+}
 
 glm::dmat3 rotation_of(const std::array<double, 6>& orientation) {
   const std::array<double, 6>& c = orientation;

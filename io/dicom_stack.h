@@ -16,6 +16,9 @@ glm::dmat3 rotation_of(const std::array<double, 6>& orientation);
 /// Slices this close along the normal are at one position, mm.
 constexpr double kSamePosition = 1e-3;
 
+/// The upper median of the distances between neighbours. @param positions  rising, two or more
+double median_gap(const std::vector<double>& positions);
+
 /// Sorts slices of one orientation, size and spacing by position along the normal and sets the geometry of the series.
 ///
 /// A stack is straight and even when (mm; s: slice distance, q: last digit written of Image Position, at most 0.01)

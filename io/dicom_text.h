@@ -15,6 +15,11 @@ inline std::string number(double value) {
   return {text, end};
 }
 
+/// "1 slice", "2 slices".
+inline std::string plural(std::size_t count, const std::string& noun) {
+  return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
+}
+
 /// A Decimal String (PS3.5 6.2) whatever the locale; none unless all of it is one finite number.
 inline std::optional<double> decimal(std::string_view text) {
   if (text.starts_with('+')) text.remove_prefix(1);
