@@ -64,6 +64,38 @@ void add_dicom_form(CLI::App& command, DicomForm& form) {
       ->type_name("TEXT");
 }
 
+std::set<ConfidentialityOption> confidentiality_options_of(const std::string& text) {
+  try {
+    return confidentiality_options(text);
+  } catch (const InputError& error) {
+    throw UsageError(error.what());
+  }
+}
+
+void add_deidentify(CLI::App& command, DicomForm& form) {
+  const auto chosen = [&form]() -> Deidentification& {
+    if (!form.deidentification) form.deidentification.emplace();
+    return *form.deidentification;
+  };
+  auto* what = command
+                   .add_option_function<std::string>(
+                       "--deidentify",
+                       [chosen](const std::string& text) { chosen().options = confidentiality_options_of(text); },
+                       "A DICOM series by the Basic Profile of PS3.15: basic, or retain-dates, shift-dates, "
+                       "retain-device, retain-institution, retain-patient, retain-uids, separated by commas; looks "
+                       "neither at text in pixels nor at faces")
+                   ->type_name("OPTIONS");
+  auto* key =
+      command
+          .add_option_function<std::string>(
+              "--deidentify-key", [chosen](const std::string& file) { chosen().key = read_deidentification_key(file); },
+              "File with a secret of 16 bytes or more, of which new UIDs, patient IDs and dates are made: one "
+              "for all series that belong together")
+          ->type_name("FILE");
+  what->needs(key);
+  key->needs(what);
+}
+
 constexpr const char* kInputHelp = "Folder of DICOM files, one DICOM file, or .nii .nii.gz .nrrd .mha";
 constexpr const char* kFieldHelp =
     "Forward field: a file (.mha .nrrd .nii .nii.gz, .npy:order=zyx|xyz,units=mm|voxel, or .vts .vti .vtr .vtk "
@@ -222,6 +254,7 @@ void add_deform(CLI::App& app, DeformOptions& options) {
   command->add_option("--compress", options.compression, "Level 0 to 9 for .nii.gz (default 1) .nrrd .mha (default 0)")
       ->check(CLI::Range(0, 9));
   add_dicom_form(*command, options.dicom);
+  add_deidentify(*command, options.dicom);
   command
       ->add_option("--points", options.points,
                    "Landmarks or a surface, moved as the voxels under them: .csv (header x,y,z; LPS mm), .mrk.json, "

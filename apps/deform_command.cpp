@@ -40,6 +40,7 @@ class Deformation {
   Target main_target();
   void scale_mass(const Region& slices);
   std::string title() const;
+  void say_what_is_not_done() const;
 
   const DeformOptions& options_;
   DeformRecord record_;
@@ -294,8 +295,21 @@ int Deformation::run() {
     say(options_.common, "tetwarp: note: " + plural(record_.set_aside.size(), "file") + " of the series " +
                              (one ? "is no slice" : "are no slices") + " of it; OUTPUT.json names them");
   }
+  if (options_.dicom.deidentification) say_what_is_not_done();
   say(options_.common, summary(record_));
   return 0;
+}
+
+void Deformation::say_what_is_not_done() const {
+  say(options_.common, std::string("tetwarp: note: de-identified by ") + kConfidentialityEdition +
+                           ", Basic Profile; not looked at: text in the pixels, faces that a rendering shows, paths "
+                           "of fields and outputs in " +
+                           sidecar_of(options_.output).filename().string());
+  if (record_.dicom_report->says_who) {
+    say(options_.common,
+        "tetwarp: warning: the source says that its pixels hold text (Burned In Annotation) or a face that can be "
+        "recognised (Recognizable Visual Features); they are still there");
+  }
 }
 
 }  // namespace

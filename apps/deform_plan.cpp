@@ -76,8 +76,8 @@ DeformOutputs begin_outputs(const DeformOptions& options, const PointsOption& po
   }
   if (!series && options.dicom != DicomForm()) {
     throw UsageError(
-        "--transfer-syntax, --keep-frame-of-reference, --series-number and --series-description are for a DICOM "
-        "series, not for " +
+        "--transfer-syntax, --keep-frame-of-reference, --series-number, --series-description and --deidentify are for "
+        "a DICOM series, not for " +
         options.output.string());
   }
   if (!options.preview.empty() && options.preview.extension() != ".png") {

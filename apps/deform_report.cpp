@@ -18,6 +18,10 @@ json form_json(const DicomForm& form) {
                    {"keep_frame_of_reference", form.keep_frame_of_reference}};
   if (form.series_number) document["series_number"] = *form.series_number;
   if (form.series_description) document["series_description"] = *form.series_description;
+  if (form.deidentification) {
+    json& options = document["deidentified"][kConfidentialityEdition] = {"basic"};
+    for (const ConfidentialityOption option : form.deidentification->options) options.push_back(name_of(option));
+  }
   return document;
 }
 
@@ -35,6 +39,22 @@ json canonical_options(const DeformRecord& of) {
     if (of.options.cell_size) options["cell_size"] = *of.options.cell_size;
   }
   return options;
+}
+
+/// Of a de-identified series nothing that names its source or can be looked up.
+json input_json(const DeformRecord& of) {
+  json document = json::object();
+  const bool is_open = !of.options.dicom.deidentification;
+  if (is_open) document = {{"path", of.options.input.path.string()}, {"sha256", of.input_sha256}};
+  if (!of.input.is_dicom()) return document;
+  if (is_open) {
+    document["series_instance_uid"] = of.input.dicom->series_uid;
+    if (!of.volume_label.empty()) document["volume"] = of.volume_label;
+    document["set_aside"] = of.set_aside;
+  }
+  document["rounded_voxels"] = of.input.dicom->rounded;
+  if (of.input.dicom->padding) document["padding_hu"] = {of.input.dicom->padding->low, of.input.dicom->padding->high};
+  return document;
 }
 
 /// How far the map can be trusted.
@@ -57,15 +77,7 @@ json sidecar(const DeformRecord& of) {
   json document = provenance("deform");
   document["options"] = canonical_options(of);
   document["backend"] = of.backend;
-  document["input"] = {{"path", of.options.input.path.string()}, {"sha256", of.input_sha256}};
-  if (of.input.is_dicom()) {
-    document["input"]["series_instance_uid"] = of.input.dicom->series_uid;
-    if (!of.volume_label.empty()) document["input"]["volume"] = of.volume_label;
-    document["input"]["rounded_voxels"] = of.input.dicom->rounded;
-    document["input"]["set_aside"] = of.set_aside;
-    if (of.input.dicom->padding)
-      document["input"]["padding_hu"] = {of.input.dicom->padding->low, of.input.dicom->padding->high};
-  }
+  document["input"] = input_json(of);
   document["field"] = {{"sha256", of.field_sha256},
                        {"direction", of.field.direction == Direction::pull ? "pull" : "forward"},
                        {"notes", of.field.notes},

@@ -48,6 +48,10 @@ std::string line_of(const DicomForm& form) {
   if (form.keep_frame_of_reference) text += " frame of reference kept";
   if (form.series_number) text += " number " + std::to_string(*form.series_number);
   if (form.series_description) text += " description " + *form.series_description;
+  if (form.deidentification) {
+    text += " deidentified";
+    for (const ConfidentialityOption option : form.deidentification->options) text.append(" ").append(name_of(option));
+  }
   return text;
 }
 
@@ -97,7 +101,7 @@ std::string series_description(DcmDataset& slice, const DicomDerivation& derivat
   if (derivation.form.series_description) return chosen_description(*derivation.form.series_description, set);
   const bool deformed = derivation.deformed;
   const std::string mine = deformed ? "deformed" : "resampled", source = text_of(slice, DCM_SeriesDescription);
-  if (source.empty()) return mine;
+  if (source.empty() || derivation.form.deidentification) return mine;
   const std::string text = mine + ": " + source;
   if (text.size() <= kLongestDescription) return text;
   const bool ascii = std::all_of(source.begin(), source.end(), [](char c) { return c >= ' ' && c <= '~'; });
@@ -216,6 +220,16 @@ void put_slice_place(DcmItem& target, DcmDataset& source, const Geometry& geomet
   }
 }
 
+void deidentify(DerivedSeries& series, DcmDataset& source, const Deidentification& how) {
+  const Deidentifier deidentifier(how, text_of(source, DCM_PatientID), text_of(source, DCM_StudyInstanceUID));
+  for (std::string* uid : {&series.study_uid, &series.series_uid, &series.frame_of_reference_uid})
+    *uid = deidentifier.uid(*uid);
+  for (std::string& uid : series.sop_instance) {
+    if (is_uid(uid)) uid = deidentifier.uid(uid);
+  }
+  series.deidentifier = deidentifier;
+}
+
 void put_padding(DcmItem& target, const PaddingRange& padding) {
   put(target, DCM_PixelPaddingValue, static_cast<std::int16_t>(padding.low));
   if (padding.high != padding.low) put(target, DCM_PixelPaddingRangeLimit, static_cast<std::int16_t>(padding.high));
@@ -247,6 +261,7 @@ DerivedSeries derive_series(const DicomHeaders& source, const Geometry& geometry
   series.header = header_slices(headers, geometry);
   series.varying = varying_acquisition(slices);
   series.padding = common_padding(headers);
+  if (derivation.form.deidentification) deidentify(series, *slices.front(), *derivation.form.deidentification);
   return series;
 }
 
@@ -254,6 +269,7 @@ std::vector<DcmTagKey> derive_slice(DcmItem& target, DcmDataset& source, const D
                                     const DicomDerivation& derivation, const SliceRange& sampled,
                                     const Geometry& geometry, std::size_t k) {
   carry_over(target, source, series.varying);
+  if (series.deidentifier) series.deidentifier->apply(target, true);
   put(target, DCM_SOPClassUID, UID_CTImageStorage);
   put(target, DCM_Modality, "CT");
   put(target, DCM_StudyInstanceUID, series.study_uid);

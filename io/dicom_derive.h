@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "io/dicom_deidentify.h"
 #include "io/dicom_headers.h"
 
 namespace tetwarp {
@@ -21,9 +22,10 @@ struct DerivedSeries {
   std::vector<std::string> sop_class, sop_instance;  ///< of the source's slices
   std::vector<int> frame;                            ///< likewise, from 1; 0: the slice is a file
   std::vector<int> instance_number;                  ///< of the output's slices, each once
-  std::vector<std::size_t> header;      ///< of the output's slices, the source's whose header each takes over
-  std::set<DcmTagKey> varying;          ///< see varying_acquisition
-  std::optional<PaddingRange> padding;  ///< HU: the source's, where all slices agree and int16 can hold it
+  std::vector<std::size_t> header;           ///< of the output's slices, the source's whose header each takes over
+  std::set<DcmTagKey> varying;               ///< see varying_acquisition
+  std::optional<Deidentifier> deidentifier;  ///< what is above went through it
+  std::optional<PaddingRange> padding;       ///< HU: the source's, where all slices agree and int16 can hold it
 };
 
 /// @param geometry  of the output

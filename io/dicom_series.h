@@ -9,6 +9,7 @@
 
 #include "deform/resampler.h"
 #include "deform/volume.h"
+#include "io/deidentification.h"
 
 namespace tetwarp {
 
@@ -104,6 +105,7 @@ struct DicomForm {
   bool keep_frame_of_reference = false;                ///< also of what was deformed
   std::optional<int> series_number = {};               ///< instead of the source's + 1000
   std::optional<std::string> series_description = {};  ///< UTF-8; instead of "deformed: " and the source's
+  std::optional<Deidentification> deidentification = {};
 
   friend bool operator==(const DicomForm&, const DicomForm&) = default;
 };
@@ -122,6 +124,7 @@ struct DicomDerivation {
 struct DicomWriteReport {
   std::string series_uid, frame_of_reference_uid;
   std::vector<std::string> added_empty;  ///< missing type 2 attributes: "(0008,0090) ReferringPhysicianName"
+  bool says_who = false;                 ///< the source says that pixels show text or a face that can be recognised
 };
 
 /// Writes a derived CT series (PS3.3 A.3; docs/dicom.md has the table of attributes) of one file a slice into the

@@ -2,6 +2,7 @@
 #include <dcmtk/dcmdata/dcdeftag.h>
 #include <dcmtk/dcmdata/dcfilefo.h>
 
+#include <algorithm>
 #include <mutex>
 #include <set>
 
@@ -29,6 +30,12 @@ void check_range(const SliceRange& range, std::size_t slices) {
   require(range.first > range.last || (range.first >= 0 && range.last < static_cast<std::int64_t>(slices)),
           "sampled slices " + std::to_string(range.first) + " to " + std::to_string(range.last) +
               " are not all among the " + std::to_string(slices) + " of the source series; check the ranges");
+}
+
+bool says_who(const DicomHeaders& source) {
+  return std::any_of(source.slices.begin(), source.slices.end(), [](const auto& slice) {
+    return text_of(*slice, DCM_BurnedInAnnotation) == "YES" || text_of(*slice, DCM_RecognizableVisualFeatures) == "YES";
+  });
 }
 
 }  // namespace
@@ -74,7 +81,10 @@ void DerivedSeriesWriter::write(const ConstVolumeView& volume, std::int64_t begi
 }
 
 DicomWriteReport DerivedSeriesWriter::report() const {
-  DicomWriteReport report{state_->series.series_uid, state_->series.frame_of_reference_uid, {}};
+  DicomWriteReport report{.series_uid = state_->series.series_uid,
+                          .frame_of_reference_uid = state_->series.frame_of_reference_uid,
+                          .added_empty = {},
+                          .says_who = says_who(state_->source)};
   const std::lock_guard lock(state_->mutex);
   for (const DcmTagKey& tag : state_->added) report.added_empty.push_back(tag_name(tag));
   return report;

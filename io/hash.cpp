@@ -1,6 +1,7 @@
 #include "io/hash.h"
 
 #include <openssl/evp.h>
+#include <openssl/hmac.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -72,6 +73,15 @@ std::string Sha256::hex() const {
     text += kDigits[std::to_integer<int>(b & std::byte{15})];
   }
   return text;
+}
+
+Sha256::Digest keyed_digest(std::span<const std::byte> key, std::string_view message) {
+  Sha256::Digest digest;
+  const auto* result = HMAC(EVP_sha256(), key.data(), static_cast<int>(key.size()),
+                            reinterpret_cast<const unsigned char*>(message.data()), message.size(),
+                            reinterpret_cast<unsigned char*>(digest.data()), nullptr);
+  check(result ? 1 : 0);
+  return digest;
 }
 
 std::string uid_from_digest(const Sha256::Digest& digest) {

@@ -33,6 +33,9 @@ class Sha256 {
   std::unique_ptr<State> state_;
 };
 
+/// HMAC-SHA-256 (FIPS 198-1): nobody without the key can find it, or what it was made of by trying.
+Sha256::Digest keyed_digest(std::span<const std::byte> key, std::string_view message);
+
 /// DICOM UID of a digest: "2.25." and the decimal value of a version 8 UUID (RFC 9562) made of its first 128 bits
 /// (PS3.5 B.2). At most 44 characters.
 std::string uid_from_digest(const Sha256::Digest& digest);
