@@ -104,7 +104,8 @@ constexpr const char* kFieldHelp =
     ".vtk, "
     "the first of several), or identity, "
     "wave:amplitude=,wavelength=[,phase=,axis=,along=], "
-    "twist:angle=[,axis=], bubble:radius=,strength=[,center=X/Y/Z], bubble-paper:shift=[,center=], translate:by=X/Y/Z; "
+    "twist:angle=[,axis=], bubble:radius=,strength=[,center=X/Y/Z], bubble-paper:shift=[,center=], "
+    "elastic:amplitude=,spacing=,seed=, translate:by=X/Y/Z; "
     "mm, "
     "or voxels with the suffix vox; degrees. Several compose, the first is applied first";
 

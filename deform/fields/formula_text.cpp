@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "deform/fields/elastic.h"
 #include "deform/fields/formula.h"
 
 namespace tetwarp {
@@ -60,6 +61,15 @@ class Parameters {
   double number(const std::string& key, std::optional<double> otherwise = {}) {
     const std::string_view text = take(key, otherwise.has_value());
     return text.empty() ? *otherwise : parse(key, text);
+  }
+
+  std::uint64_t whole_number(const std::string& key) {
+    const std::string_view text = take(key, false);
+    std::uint64_t value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc() || end != text.data() + text.size())
+      fail(key + " is \"" + std::string(text) + "\", expected a whole number from 0 to 2^64 - 1");
+    return value;
   }
 
   /// mm; one `vox` is the spacing of the grid axis nearest to patient axis `along`, or the smallest where that is -1.
@@ -182,6 +192,15 @@ PointMap parse_translate(Parameters& given, const Geometry&) {
   return [by = given.shift("by")](const glm::dvec3&) { return by; };
 }
 
+PointMap parse_elastic(Parameters& given, const Geometry& volume) {
+  const double spacing = given.positive_length("spacing", -1);
+  constexpr double kMostControlPoints = 1e6;  // along an axis: smaller is a mistake, and would leave 64 bits some day
+  for (int axis = 0; axis < 3; ++axis) {
+    if (half_length(volume, axis) / spacing > kMostControlPoints) given.fail("spacing is too small for the volume");
+  }
+  return Elastic{given.length("amplitude", -1), spacing, given.whole_number("seed"), centre(volume)};
+}
+
 struct Formula {
   std::string_view name;
   PointMap (*parse)(Parameters&, const Geometry&);
@@ -191,6 +210,7 @@ constexpr Formula kFormulas[] = {{"identity", parse_identity},
                                  {"twist", parse_twist},
                                  {"bubble", parse_bubble},
                                  {"bubble-paper", parse_paper_bubble},
+                                 {"elastic", parse_elastic},
                                  {"translate", parse_translate}};
 
 const Formula* find_formula(std::string_view text) {
