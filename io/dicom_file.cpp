@@ -131,8 +131,8 @@ std::vector<std::byte> encoded(DcmDataset& dataset) {
   return written(dataset, dataset.calcElementLength(kSyntax, EET_ExplicitLength));
 }
 
-void write_dicom_file(const std::filesystem::path& path, DcmDataset& dataset, std::span<const std::int16_t> voxels,
-                      DicomEncoding encoding) {
+std::string write_dicom_file(const std::filesystem::path& path, DcmDataset& dataset,
+                             std::span<const std::int16_t> voxels, DicomEncoding encoding) {
   static_assert(std::endian::native == std::endian::little);
   PixelData pixels = pixel_data(dataset, voxels, encoding);
   drop(dataset, DCM_SOPInstanceUID);
@@ -163,6 +163,7 @@ void write_dicom_file(const std::filesystem::path& path, DcmDataset& dataset, st
     throw;
   }
   if (::close(file) != 0) throw Error("cannot write " + path.string() + ": " + std::generic_category().message(errno));
+  return uid;
 }
 
 std::string dicom_file_name(int instance_number) {

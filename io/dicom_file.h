@@ -25,9 +25,11 @@ std::vector<std::byte> encoded(DcmDataset& dataset);
 /// Uncompressed voxels are hashed and written from where they lie: DCMTK, which would copy them four times, encodes the
 /// rest.
 /// @param dataset  with Rows and Columns; without Pixel Data (7FE0,0010) and what would follow it
+/// @return the SOP Instance UID
 /// @throws Error naming the file and the system's reason (disk full and so on)
-void write_dicom_file(const std::filesystem::path& path, DcmDataset& dataset, std::span<const std::int16_t> voxels,
-                      DicomEncoding encoding = DicomEncoding::uncompressed);
+std::string write_dicom_file(const std::filesystem::path& path, DcmDataset& dataset,
+                             std::span<const std::int16_t> voxels,
+                             DicomEncoding encoding = DicomEncoding::uncompressed);
 
 /// "IM00042.dcm": names sort as their numbers do.
 std::string dicom_file_name(int instance_number);

@@ -47,6 +47,7 @@ struct DerivedSeriesWriter::State {
   DicomDerivation derivation;
   DerivedSeries series;
   std::set<DcmTagKey> added = {};
+  std::vector<std::string> instances = std::vector<std::string>(series.instance_number.size());
   std::mutex mutex = {};
 };
 
@@ -73,19 +74,21 @@ void DerivedSeriesWriter::write(const ConstVolumeView& volume, std::int64_t begi
     const auto added =
         derive_slice(slice, *to.source.slices[to.series.header[k]], to.series, to.derivation, range, to.geometry, k);
     put_hu_format(slice, to.geometry);
-    write_dicom_file(to.folder / dicom_file_name(to.series.instance_number[k]), slice, slice_of(volume, k),
-                     to.derivation.form.encoding);
+    std::string uid = write_dicom_file(to.folder / dicom_file_name(to.series.instance_number[k]), slice,
+                                       slice_of(volume, k), to.derivation.form.encoding);
     const std::lock_guard lock(to.mutex);
+    to.instances[k] = std::move(uid);
     to.added.insert(added.begin(), added.end());
   });
 }
 
 DicomWriteReport DerivedSeriesWriter::report() const {
+  const std::lock_guard lock(state_->mutex);
   DicomWriteReport report{.series_uid = state_->series.series_uid,
                           .frame_of_reference_uid = state_->series.frame_of_reference_uid,
                           .added_empty = {},
+                          .sop_instance_uids = state_->instances,
                           .says_who = says_who(state_->source)};
-  const std::lock_guard lock(state_->mutex);
   for (const DcmTagKey& tag : state_->added) report.added_empty.push_back(tag_name(tag));
   return report;
 }

@@ -247,6 +247,18 @@ TEST(DerivedSeries, KeepsInstanceNumbersUnlessTheyRepeat) {
   EXPECT_EQ(Written(scratch / "repeated" / "IM00003.dcm")[DCM_InstanceNumber], "3");
 }
 
+TEST(DerivedSeries, ReportsInstancesInTheOrderOfTheSlices) {
+  const Scratch scratch;
+  DerivedSource source;
+  for (std::size_t k = 0; k < 3; ++k) set(source[k], DCM_InstanceNumber, std::to_string(102 - k));
+  const DicomWriteReport report = source.write(scratch.path());
+  ASSERT_EQ(report.sop_instance_uids.size(), 3u);
+  for (std::size_t k = 0; k < 3; ++k) {
+    Written file(scratch / dicom_file_name(static_cast<int>(102 - k)));
+    EXPECT_EQ(file[DCM_SOPInstanceUID], report.sop_instance_uids[k]) << k;
+  }
+}
+
 TEST(DerivedSeries, CarriesPaddingInHu) {
   const Scratch scratch;
   DerivedSource source;
