@@ -84,6 +84,34 @@ bool is_carried(const DcmTagKey& tag, const std::set<DcmTagKey>& varying) {
   }
 }
 
+bool is_of_patient_or_study(const DcmTagKey& tag) {
+  static const std::set<DcmTagKey> of_study = {DCM_SpecificCharacterSet,
+                                               DCM_StudyDate,
+                                               DCM_StudyTime,
+                                               DCM_AccessionNumber,
+                                               DCM_IssuerOfAccessionNumberSequence,
+                                               DCM_ReferringPhysicianName,
+                                               DCM_ReferringPhysicianIdentificationSequence,
+                                               DCM_ConsultingPhysicianName,
+                                               DCM_ConsultingPhysicianIdentificationSequence,
+                                               DCM_TimezoneOffsetFromUTC,
+                                               DCM_StudyDescription,
+                                               DCM_ProcedureCodeSequence,
+                                               DCM_PhysiciansOfRecord,
+                                               DCM_PhysiciansOfRecordIdentificationSequence,
+                                               DCM_NameOfPhysiciansReadingStudy,
+                                               DCM_PhysiciansReadingStudyIdentificationSequence,
+                                               DCM_AdmittingDiagnosesDescription,
+                                               DCM_AdmittingDiagnosesCodeSequence,
+                                               DCM_ReferencedStudySequence,
+                                               DCM_StudyInstanceUID,
+                                               DCM_StudyID,
+                                               DCM_PositionReferenceIndicator};
+  const Uint16 group = tag.getGroup();
+  if (tag.getElement() == 0) return false;  // group lengths
+  return group == 0x0010 || group == 0x0012 || group == 0x0038 || of_study.contains(tag);
+}
+
 /// Removes private attributes and group lengths from the items of a sequence, at any depth.
 void clean(DcmSequenceOfItems& sequence) {
   for (unsigned long i = 0; i < sequence.card(); ++i) {
@@ -96,6 +124,18 @@ void clean(DcmSequenceOfItems& sequence) {
       else if (auto* nested = dynamic_cast<DcmSequenceOfItems*>(element))
         clean(*nested);
     }
+  }
+}
+
+/// Copies attributes, without what is private in their sequences.
+template <class Wanted>
+void copy_those(DcmItem& target, DcmDataset& source, const Wanted& is_wanted) {
+  for (unsigned long i = 0; i < source.card(); ++i) {
+    const DcmElement* element = source.getElement(i);
+    if (!is_wanted(element->getTag().getXTag())) continue;
+    std::unique_ptr<DcmElement> copy(dynamic_cast<DcmElement*>(element->clone()));
+    if (auto* sequence = dynamic_cast<DcmSequenceOfItems*>(copy.get())) clean(*sequence);
+    if (target.insert(copy.get(), OFTrue).good()) copy.release();
   }
 }
 
@@ -124,12 +164,15 @@ std::set<DcmTagKey> varying_acquisition(const std::vector<DcmDataset*>& slices) 
 }
 
 void carry_over(DcmItem& target, DcmDataset& source, const std::set<DcmTagKey>& varying) {
-  for (unsigned long i = 0; i < source.card(); ++i) {
-    const DcmElement* element = source.getElement(i);
-    if (!is_carried(element->getTag().getXTag(), varying)) continue;
-    std::unique_ptr<DcmElement> copy(dynamic_cast<DcmElement*>(element->clone()));
-    if (auto* sequence = dynamic_cast<DcmSequenceOfItems*>(copy.get())) clean(*sequence);
-    if (target.insert(copy.get(), OFTrue).good()) copy.release();
+  copy_those(target, source, [&](const DcmTagKey& tag) { return is_carried(tag, varying); });
+}
+
+void carry_patient_and_study(DcmItem& target, DcmDataset& source) {
+  copy_those(target, source, is_of_patient_or_study);
+  for (const DcmTagKey& tag :
+       {DCM_StudyDate, DCM_StudyTime, DCM_AccessionNumber, DCM_ReferringPhysicianName, DCM_PatientName, DCM_PatientID,
+        DCM_PatientBirthDate, DCM_PatientSex, DCM_StudyID, DCM_PositionReferenceIndicator}) {  // type 2
+    if (!target.tagExists(tag)) put(target, tag, "");
   }
 }
 

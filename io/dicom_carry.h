@@ -28,6 +28,10 @@ std::set<DcmTagKey> varying_acquisition(const std::vector<DcmDataset*>& slices);
 /// Private attributes within sequences go too. An attribute of VR UN is copied as it is: nobody can look into it.
 void carry_over(DcmItem& target, DcmDataset& source, const std::set<DcmTagKey>& varying);
 
+/// Copies what an object beside a derived series says of patient, study and frame of reference: groups 0010, 0012 and
+/// 0038, and the attributes of General Study (PS3.3 C.7.2.1). Private attributes go, as above.
+void carry_patient_and_study(DcmItem& target, DcmDataset& source);
+
 /// Type 2 attributes of the CT Image IOD (PS3.3 A.3), in ascending order: may be empty, may not be missing.
 std::vector<DcmTagKey> type_2_attributes();
 

@@ -67,8 +67,8 @@ std::string series_uid(const DicomHeaders& source, const DicomDerivation& deriva
   return uid_of(hash);
 }
 
-std::string frame_uid(const DicomHeaders& source, const DicomDerivation& derivation) {
-  const std::string frame = uid_or_made_up(source, DCM_FrameOfReferenceUID);
+/// @param frame  of the source
+std::string frame_uid(const std::string& frame, const DicomDerivation& derivation) {
   if (!derivation.deformed || derivation.form.keep_frame_of_reference) return frame;
   return uid_of(Sha256().add("tetwarp deformed frame of reference").add(frame).add(derivation.field_sha256));
 }
@@ -160,10 +160,6 @@ std::string image_type(DcmDataset& source) {
   return type;
 }
 
-bool is_uid(const std::string& text) {
-  return !text.empty() && DcmUniqueIdentifier::checkStringValue(text.c_str(), "1").good();
-}
-
 /// Whether a slice is a frame of the same file as the one before it.
 bool continues_file(const DerivedSeries& series, std::size_t slice) {
   return series.frame[slice] > 0 && series.frame[slice - 1] > 0 &&
@@ -201,11 +197,7 @@ void put_derivation(DcmItem& target, DcmDataset& source, const DerivedSeries& se
   put(target, DCM_DerivationDescription, ascii(derivation.description, 1024));
   append_code(target, DCM_DerivationCodeSequence, "113085", "Spatial resampling");
   put_references(target, series, sampled, derivation.deformed);
-  DcmItem& equipment = append_item(target, DCM_ContributingEquipmentSequence);
-  append_code(equipment, DCM_PurposeOfReferenceCodeSequence, "109103", "Modifying Equipment");
-  put_tetwarp(equipment, "tetwarp");
-  put(equipment, DCM_ContributionDescription,
-      ascii("field sha256 " + derivation.field_sha256 + "; " + derivation.parameters, 1024));
+  put_equipment(target, "109103", "Modifying Equipment", derivation);
 }
 
 /// Position along the normal, and the distance of slices: only where the source tells them.
@@ -237,6 +229,19 @@ void put_padding(DcmItem& target, const PaddingRange& padding) {
 
 }  // namespace
 
+bool is_uid(const std::string& text) {
+  return !text.empty() && DcmUniqueIdentifier::checkStringValue(text.c_str(), "1").good();
+}
+
+void put_equipment(DcmItem& target, const std::string& purpose, const std::string& meaning,
+                   const DicomDerivation& derivation) {
+  DcmItem& equipment = append_item(target, DCM_ContributingEquipmentSequence);
+  append_code(equipment, DCM_PurposeOfReferenceCodeSequence, purpose, meaning);
+  put_tetwarp(equipment, "tetwarp");
+  put(equipment, DCM_ContributionDescription,
+      ascii("field sha256 " + derivation.field_sha256 + "; " + derivation.parameters, 1024));
+}
+
 DerivedSeries derive_series(const DicomHeaders& source, const Geometry& geometry, const DicomDerivation& derivation) {
   require(!source.slices.empty(), "the source series has no slices; a derived series needs their headers");
   std::vector<DicomFileHeader> headers;
@@ -254,7 +259,8 @@ DerivedSeries derive_series(const DicomHeaders& source, const Geometry& geometry
   series.frame.resize(headers.size());
   series.study_uid = uid_or_made_up(source, DCM_StudyInstanceUID);
   series.series_uid = series_uid(source, derivation, series);
-  series.frame_of_reference_uid = frame_uid(source, derivation);
+  series.source_frame_of_reference_uid = uid_or_made_up(source, DCM_FrameOfReferenceUID);
+  series.frame_of_reference_uid = frame_uid(series.source_frame_of_reference_uid, derivation);
   series.number = series_number(*slices.front(), derivation.form);
   series.description = series_description(*slices.front(), derivation);
   series.instance_number = instance_numbers(headers, static_cast<std::size_t>(geometry.size.z));

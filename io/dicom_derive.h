@@ -18,6 +18,7 @@ namespace tetwarp {
 /// so that slices can then be made in parallel.
 struct DerivedSeries {
   std::string study_uid, series_uid, frame_of_reference_uid;
+  std::string source_frame_of_reference_uid;         ///< made up where the source has none
   std::string number, description;                   ///< Series Number and Description
   std::vector<std::string> sop_class, sop_instance;  ///< of the source's slices
   std::vector<int> frame;                            ///< likewise, from 1; 0: the slice is a file
@@ -27,6 +28,14 @@ struct DerivedSeries {
   std::optional<Deidentifier> deidentifier;  ///< what is above went through it
   std::optional<PaddingRange> padding;       ///< HU: the source's, where all slices agree and int16 can hold it
 };
+
+/// Whether images can be named by it (PS3.5 9.1).
+bool is_uid(const std::string& text);
+
+/// Appends an item to Contributing Equipment (PS3.3 C.12.1.1): this program, the field and what was chosen.
+/// @param purpose  code of context group 7005, and @param meaning  its meaning
+void put_equipment(DcmItem& target, const std::string& purpose, const std::string& meaning,
+                   const DicomDerivation& derivation);
 
 /// @param geometry  of the output
 /// @throws InputError for headers without slices

@@ -47,33 +47,6 @@ std::vector<std::byte> written(Object& object, std::size_t size) {
   return bytes;
 }
 
-/// Preamble, "DICM" and group 0002.
-std::vector<std::byte> encoded_meta(const std::string& sop_class, const std::string& sop_instance,
-                                    DicomEncoding encoding) {
-  DcmMetaInfo meta;
-  const Uint8 header_version[2] = {0, 1};
-  check(meta.putAndInsertUint32(DCM_FileMetaInformationGroupLength, 0));
-  check(meta.putAndInsertUint8Array(DCM_FileMetaInformationVersion, header_version, 2));
-  put(meta, DCM_MediaStorageSOPClassUID, sop_class);
-  put(meta, DCM_MediaStorageSOPInstanceUID, sop_instance);
-  put(meta, DCM_TransferSyntaxUID, uid_of(encoding));
-  put(meta, DCM_ImplementationClassUID, kImplementationUid);
-  put(meta, DCM_ImplementationVersionName, ascii(std::string("TETWARP_") + version(), 16));
-  check(meta.computeGroupLengthAndPadding(EGL_withGL, EPD_noChange, kSyntax, EET_ExplicitLength));
-  return written(meta, meta.calcElementLength(kSyntax, EET_ExplicitLength));
-}
-
-void append_number(std::vector<std::byte>& bytes, std::uint64_t value, std::size_t count) {
-  for (std::size_t n = 0; n < count; ++n) bytes.push_back(static_cast<std::byte>(value >> (8 * n)));
-}
-
-/// Tag and length of an item or a delimiter (PS3.5 7.5).
-void append_item_start(std::vector<std::byte>& bytes, unsigned element, std::size_t length) {
-  append_number(bytes, 0xfffe, 2);
-  append_number(bytes, element, 2);
-  append_number(bytes, length, 4);
-}
-
 /// Pixel Data as they lie in a file.
 struct PixelData {
   std::vector<std::byte> start;      ///< tag, value representation and length (PS3.5 7.1.2), as `kSyntax` has them
@@ -129,6 +102,31 @@ void begin_flush([[maybe_unused]] int file) {
 std::vector<std::byte> encoded(DcmDataset& dataset) {
   check(dataset.computeGroupLengthAndPadding(EGL_withoutGL, EPD_withoutPadding, kSyntax, EET_ExplicitLength));
   return written(dataset, dataset.calcElementLength(kSyntax, EET_ExplicitLength));
+}
+
+void append_number(std::vector<std::byte>& bytes, std::uint64_t value, std::size_t count) {
+  for (std::size_t n = 0; n < count; ++n) bytes.push_back(static_cast<std::byte>(value >> (8 * n)));
+}
+
+void append_item_start(std::vector<std::byte>& bytes, unsigned element, std::size_t length) {
+  append_number(bytes, 0xfffe, 2);
+  append_number(bytes, element, 2);
+  append_number(bytes, length, 4);
+}
+
+std::vector<std::byte> encoded_meta(const std::string& sop_class, const std::string& sop_instance,
+                                    DicomEncoding encoding) {
+  DcmMetaInfo meta;
+  const Uint8 header_version[2] = {0, 1};
+  check(meta.putAndInsertUint32(DCM_FileMetaInformationGroupLength, 0));
+  check(meta.putAndInsertUint8Array(DCM_FileMetaInformationVersion, header_version, 2));
+  put(meta, DCM_MediaStorageSOPClassUID, sop_class);
+  put(meta, DCM_MediaStorageSOPInstanceUID, sop_instance);
+  put(meta, DCM_TransferSyntaxUID, uid_of(encoding));
+  put(meta, DCM_ImplementationClassUID, kImplementationUid);
+  put(meta, DCM_ImplementationVersionName, ascii(std::string("TETWARP_") + version(), 16));
+  check(meta.computeGroupLengthAndPadding(EGL_withGL, EPD_noChange, kSyntax, EET_ExplicitLength));
+  return written(meta, meta.calcElementLength(kSyntax, EET_ExplicitLength));
 }
 
 std::string write_dicom_file(const std::filesystem::path& path, DcmDataset& dataset,

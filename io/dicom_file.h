@@ -19,6 +19,15 @@ namespace tetwarp {
 /// @throws Error when DCMTK cannot encode it
 std::vector<std::byte> encoded(DcmDataset& dataset);
 
+/// Preamble, "DICM" and group 0002 (PS3.10 7.1). @throws Error when DCMTK cannot encode them
+std::vector<std::byte> encoded_meta(const std::string& sop_class, const std::string& sop_instance,
+                                    DicomEncoding encoding = DicomEncoding::uncompressed);
+
+/// Appends the lowest `count` bytes of a number, the lowest first.
+void append_number(std::vector<std::byte>& bytes, std::uint64_t value, std::size_t count);
+/// Appends tag and length of an item or a delimiter (PS3.5 7.5). @param element  of group fffe
+void append_item_start(std::vector<std::byte>& bytes, unsigned element, std::size_t length);
+
 /// Gives the data set its SOP Instance UID, a hash of everything else in the file, and writes it as a DICOM file
 /// (PS3.10) with `voxels` as its Pixel Data. Every byte is a function of these and the encoding.
 ///

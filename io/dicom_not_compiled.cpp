@@ -1,5 +1,6 @@
 #include "io/dicom_dose.h"
 #include "io/dicom_series.h"
+#include "io/image_file.h"
 
 namespace tetwarp {
 namespace {
@@ -25,6 +26,8 @@ void DerivedSeriesWriter::write(const ConstVolumeView&, std::int64_t, std::int64
   refuse();
 }
 DicomWriteReport DerivedSeriesWriter::report() const { refuse(); }
+std::unique_ptr<ImageWriter> DerivedSeriesWriter::create_registration(const std::filesystem::path&) const { refuse(); }
+void require_registration_fits(const Geometry&) { refuse(); }
 
 DicomWriteReport write_derived_series(const std::filesystem::path&, const ConstVolumeView&, const DicomHeaders&,
                                       const DicomDerivation&, std::span<const SliceRange>, int, const Control&) {

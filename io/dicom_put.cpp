@@ -82,6 +82,10 @@ DcmItem& append_item(DcmItem& item, const DcmTagKey& sequence) {
   return *appended;
 }
 
+void put_empty_sequence(DcmItem& item, const DcmTagKey& sequence) {
+  check(item.insertEmptyElement(sequence), sequence);
+}
+
 void append_code(DcmItem& item, const DcmTagKey& sequence, const std::string& value, const std::string& meaning) {
   DcmItem& code = append_item(item, sequence);
   put(code, DCM_CodeValue, value);

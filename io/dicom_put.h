@@ -33,6 +33,9 @@ void drop(DcmItem& item, const DcmTagKey& tag);
 /// Appends an empty item to a sequence, which is made if there is none (or if what is there could not be parsed).
 DcmItem& append_item(DcmItem& item, const DcmTagKey& sequence);
 
+/// Sets a sequence without items.
+void put_empty_sequence(DcmItem& item, const DcmTagKey& sequence);
+
 /// Appends a code (PS3.3 8.8) of scheme DCM (PS3.16 annex D) to a code sequence.
 void append_code(DcmItem& item, const DcmTagKey& sequence, const std::string& value, const std::string& meaning);
 

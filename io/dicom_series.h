@@ -13,6 +13,8 @@
 
 namespace tetwarp {
 
+class ImageWriter;
+
 /// One slice of a series, a file or a frame of it, from its header alone.
 struct DicomSlice {
   std::filesystem::path file;
@@ -151,10 +153,20 @@ class DerivedSeriesWriter {
   /// Of what was written so far.
   DicomWriteReport report() const;
 
+  /// Begins a Deformable Spatial Registration object (PS3.3 A.39.2): from points p of the derived series' frame of
+  /// reference to those of the source's that they come from. It takes displacements x0 - p (3 x float32, LPS mm; NaN:
+  /// undefined) on the grid of the series, and names the slices that are written when it is finished; of a series of
+  /// which none is, the frame of reference alone. Must not outlive this writer.
+  /// @throws what `require_registration_fits` throws, and Error when the file cannot be written
+  std::unique_ptr<ImageWriter> create_registration(const std::filesystem::path& path) const;
+
  private:
   struct State;
   std::unique_ptr<State> state_;
 };
+
+/// @throws InputError where the vectors of a grid are more bytes than an attribute of DICOM holds, 2^32 - 2
+void require_registration_fits(const Geometry& grid);
 
 /// A whole series at once.
 DicomWriteReport write_derived_series(const std::filesystem::path& folder, const ConstVolumeView& volume,

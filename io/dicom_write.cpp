@@ -10,6 +10,7 @@
 #include "io/dicom_file.h"
 #include "io/dicom_header.h"
 #include "io/dicom_put.h"
+#include "io/dicom_registration.h"
 #include "io/dicom_stream.h"
 #include "io/parallel.h"
 
@@ -91,6 +92,12 @@ DicomWriteReport DerivedSeriesWriter::report() const {
                           .says_who = says_who(state_->source)};
   for (const DcmTagKey& tag : state_->added) report.added_empty.push_back(tag_name(tag));
   return report;
+}
+
+std::unique_ptr<ImageWriter> DerivedSeriesWriter::create_registration(const std::filesystem::path& path) const {
+  return tetwarp::create_registration(
+      path, state_->geometry,
+      {state_->source, state_->series, state_->derivation, [this] { return report().sop_instance_uids; }});
 }
 
 DicomWriteReport write_derived_series(const std::filesystem::path& folder, const ConstVolumeView& volume,
