@@ -173,7 +173,7 @@ void add_invert(CLI::App& app, InvertOptions& options) {
   command
       ->add_option("-o,--output", options.output,
                    ".mha .nrrd .nii .nii.gz: output to input, LPS mm, for ITK's and other warps; NaN where nothing "
-                   "maps. Of a pull "
+                   "maps; or .dcm, where --like is a DICOM series: a Deformable Spatial Registration. Of a pull "
                    "field: forward, for -f")
       ->required();
   command
@@ -267,7 +267,8 @@ void add_deform(CLI::App& app, DeformOptions& options) {
       ->type_name("FILE");
   command
       ->add_option("--inverse", options.maps.inverse,
-                   "Inverse displacement, LPS mm, for ITK's and other warps; NaN where nothing maps")
+                   "Inverse displacement, LPS mm, for ITK's and other warps; NaN where nothing maps. FILE.dcm, where "
+                   "OUTPUT is a DICOM series: a Deformable Spatial Registration from it to INPUT")
       ->type_name("FILE");
   command
       ->add_option("--jacobian", options.maps.jacobian,

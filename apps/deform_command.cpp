@@ -116,12 +116,14 @@ Backend Deformation::resample() {
                         {.stop = interrupt_token()});
   record_.output = AnyVolume(record_.plan.grid, record_.input.volume.type());
   sampled_slices_.resize(record_.outputs.series ? static_cast<std::size_t>(record_.plan.grid.size.z) : 0);
+  if (record_.outputs.series) begin_series();
   MapStream maps(record_.plan.grid, record_.outputs.set);
-  record_.outputs.set.write([&] { record_.outputs.maps->add_to(maps, record_.plan.grid, options_.preserve_mass); });
+  record_.outputs.set.write([&] {
+    record_.outputs.maps->add_to(maps, record_.plan.grid, options_.preserve_mass, series_ ? &*series_ : nullptr);
+  });
   std::vector<Target> targets = record_.outputs.further->targets_on(record_.plan.grid, false, options_.interpolation);
   targets.insert(targets.begin(), main_target());
   Control control = stage.control();
-  if (record_.outputs.series) begin_series();
   if (record_.outputs.series || options_.preserve_mass) {
     control.finished = [&](const Region& slices) {
       if (options_.preserve_mass) scale_mass(slices);

@@ -91,7 +91,8 @@ DeformOutputs begin_outputs(const DeformOptions& options, const PointsOption& po
   DeformOutputs outputs{series, OutputSet(inputs, options.common.overwrite), {}, {}, {}, {}, {}, {}, {}};
   outputs.volume = outputs.set.add(options.output, series ? StagedOutput::Kind::folder : StagedOutput::Kind::file);
   outputs.sidecar = outputs.set.add(sidecar_of(options.output));
-  outputs.maps.emplace(options.maps, options.pull_field.empty() ? Direction::forward : Direction::pull, outputs.set);
+  outputs.maps.emplace(options.maps, options.pull_field.empty() ? Direction::forward : Direction::pull, series,
+                       outputs.set);
   outputs.further.emplace(options.with, outputs.set);
   outputs.report = outputs.set.add(options.report);
   outputs.preview = outputs.set.add(options.preview);
@@ -114,6 +115,7 @@ DeformPlan plan_deformation(const DeformOptions& options, DeformOutputs& outputs
   }
   DeformPlan plan;
   if (options.grid != "fit") plan.grid = output_grid(options.grid, input.geometry, {}, options.outside);
+  if (outputs.series) outputs.maps->check(plan.grid);
   plan.bytes = plan_bytes(options, outputs, input, options.grid == "fit" ? input.geometry : plan.grid);
   if (options.memory_bytes && plan.bytes > *options.memory_bytes && !means_cuda(options.backend)) {
     throw Error("about " + format_bytes(plan.bytes) + " of memory are needed, --memory allows " +

@@ -5,7 +5,7 @@
 
 #include "apps/field_source.h"
 #include "apps/input.h"
-#include "apps/map_stream.h"
+#include "apps/map_outputs.h"
 #include "cuda/backend.h"
 #include "deform/fields/continued.h"
 #include "io/field_file.h"
@@ -29,18 +29,19 @@ struct Invertible {
   VertexField field;
   std::vector<std::string> notes;
   std::vector<ReadField> files;
+  bool identity = false;
   Geometry pull_grid = {};  ///< of a pull field, before it was continued
 };
 
 Invertible read_invertible(const InvertOptions& options, const Geometry& like, const Control& control) {
   if (options.pull_field.empty()) {
     ForwardField read = read_forward_field(options.fields, like, options.cell_size, options.common, control);
-    return {std::move(read.field), std::move(read.notes), std::move(read.files)};
+    return {std::move(read.field), std::move(read.notes), std::move(read.files), read.identity};
   }
   AnyField found;
   const PullField pull = read_pull_field(options.pull_field, like, like, options.common, control, found);
   try {
-    return {continued_over(pull, like), std::move(found.notes), std::move(found.files), pull.grid};
+    return {continued_over(pull, like), std::move(found.notes), std::move(found.files), false, pull.grid};
   } catch (const InputError& error) {
     throw InputError(std::string(error.what()) + ", " + options.pull_field);
   }
@@ -123,9 +124,28 @@ void say_all(const InvertOptions& options, const Invertible& field, const Invers
   say(options.common, "inverse after forward: " + text_of(result.back));
 }
 
-/// Slab by slab into the file.
+/// The series that `deform` would derive from --like, of which no slice is written: a registration object is beside it.
+class UnwrittenSeries {
+ public:
+  UnwrittenSeries(const InvertOptions& options, const InputHeader& like, const Invertible& field,
+                  const Control& control)
+      : headers_(read_input(options.like, like, options.common, control).dicom->headers),
+        writer_({}, straightened(like.geometry), *headers_,
+                {.field_sha256 = hash_field(field.field, options.common.threads),
+                 .parameters = "direction=forward",
+                 .description = field.identity ? "The identity, inverted" : "A field of vertices, inverted",
+                 .deformed = !field.identity}) {}
+
+  const DerivedSeriesWriter& writer() const { return writer_; }
+
+ private:
+  std::shared_ptr<const DicomHeaders> headers_;
+  DerivedSeriesWriter writer_;
+};
+
+/// Slab by slab into the file. @param series  what a registration object is beside, if the output is one
 Inversion invert(const InvertOptions& options, const Geometry& like, Invertible& field,
-                 const std::filesystem::path& output, OutputSet& outputs) {
+                 const std::filesystem::path& output, const UnwrittenSeries* series, OutputSet& outputs) {
   const Control stop{.stop = interrupt_token()};
   const bool pulls = !options.pull_field.empty();
   const Limits limits{.threads = options.common.threads};
@@ -135,7 +155,8 @@ Inversion invert(const InvertOptions& options, const Geometry& like, Invertible&
   MapStream stream(like, outputs);
   outputs.write([&] {
     stream.add(&Maps::inverse_mm,
-               create_field_file(output, like, pulls ? FieldDirection::forward : FieldDirection::pull));
+               series ? series->writer().create_registration(output)
+                      : create_field_file(output, like, pulls ? FieldDirection::forward : FieldDirection::pull));
   });
   Stage stage(options.common, "invert");
   backend.resampler->set_field(view(field.field, Outside::background), {.stop = stop.stop, .jacobian_range = false});
@@ -153,14 +174,29 @@ Inversion invert(const InvertOptions& options, const Geometry& like, Invertible&
   return result;
 }
 
+/// @throws UsageError for an output that is no file of a field, or not of this one
+void check_output(const InvertOptions& options) {
+  if (has_image_suffix(options.output)) return;
+  const std::string name = options.output.string();
+  if (!has_registration_suffix(options.output)) {
+    throw UsageError("unknown suffix of \"" + name +
+                     "\"; a displacement field is written as .mha .nrrd .nii .nii.gz, or .dcm");
+  }
+  if (!options.pull_field.empty()) {
+    throw UsageError("the inverse of a pull field is a forward field, which a DICOM registration, " + name +
+                     ", cannot hold; name it .mha .nrrd .nii .nii.gz");
+  }
+  if (has_image_suffix(options.like.path)) {
+    throw UsageError("a DICOM registration, " + name + ", needs the frame of reference of a DICOM series, --like is " +
+                     options.like.path.string() + "; name the output .mha .nrrd .nii .nii.gz");
+  }
+}
+
 }  // namespace
 
 int run_invert(const InvertOptions& options) {
   const bool pulls = !options.pull_field.empty();
-  if (!has_image_suffix(options.output)) {
-    throw UsageError("unknown suffix of \"" + options.output.string() +
-                     "\"; a displacement field is written as .mha .nrrd .nii .nii.gz");
-  }
+  check_output(options);
   if (pulls && options.cell_size) throw UsageError("--cell-size does not go with --pull-field; leave it out");
   if (!pulls) check_fields(options.fields, options.cell_size);
   std::vector<std::filesystem::path> inputs =
@@ -169,12 +205,20 @@ int run_invert(const InvertOptions& options) {
   OutputSet outputs(inputs, options.common.overwrite);
   const std::filesystem::path output = outputs.add(options.output), report_path = outputs.add(options.report);
   const InputHeader like = open_input(options.like, options.common);
+  const bool registers = has_registration_suffix(options.output);
+  if (registers) {
+    if (!like.series)
+      throw UsageError("a DICOM registration needs a CT series as --like, not " + options.like.path.string());
+    require_registration_fits(straightened(like.geometry));
+  }
 
   Stage field_stage(options.common, "field");
   const Geometry grid = straightened(like.geometry);
   Invertible field = read_invertible(options, like.geometry, field_stage.control());
   const double field_seconds = field_stage.seconds();
-  Inversion result = invert(options, grid, field, output, outputs);
+  std::optional<UnwrittenSeries> series;
+  if (registers) series.emplace(options, like, field, Control{.stop = interrupt_token()});
+  Inversion result = invert(options, grid, field, output, series ? &*series : nullptr, outputs);
   result.field_seconds = field_seconds;
   outputs.write([&] {
     if (!report_path.empty()) write_json(report_path, document_of(options, field, result));

@@ -1,5 +1,7 @@
 #include "apps/map_outputs.h"
 
+#include <algorithm>
+#include <cctype>
 #include <nlohmann/json.hpp>
 
 #include "io/field_file.h"
@@ -13,9 +15,22 @@ void require_image_suffix(const std::filesystem::path& path, const char* option)
                    "\"; use .nii .nii.gz .nrrd .mha");
 }
 
-MapOutputs::MapOutputs(const MapOptions& options, Direction direction, OutputSet& outputs) : options_(options) {
+bool has_registration_suffix(const std::filesystem::path& path) {
+  std::string suffix = path.extension().string();
+  std::transform(suffix.begin(), suffix.end(), suffix.begin(), [](unsigned char c) { return std::tolower(c); });
+  return suffix == ".dcm";
+}
+
+MapOutputs::MapOutputs(const MapOptions& options, Direction direction, bool series, OutputSet& outputs)
+    : options_(options) {
   require_image_suffix(options.coverage, "--coverage");
-  require_image_suffix(options.inverse, "--inverse");
+  if (!has_registration_suffix(options.inverse)) {
+    require_image_suffix(options.inverse, "--inverse");
+  } else if (!series) {
+    throw UsageError("--inverse " + options.inverse.string() +
+                     " is a DICOM registration between INPUT and a derived DICOM series; name OUTPUT as a folder, or "
+                     "the inverse .nii .nii.gz .nrrd .mha");
+  }
   require_image_suffix(options.jacobian, "--jacobian");
   require_image_suffix(options.folds, "--folds");
   if (direction == Direction::pull && (!options.jacobian.empty() || !options.folds.empty())) {
@@ -35,15 +50,22 @@ std::uint64_t MapOutputs::bytes(const Geometry& grid, bool jacobian) const {
          held(&Maps::owners, staged_.folds) + held(&Maps::inverse_mm, staged_.inverse);
 }
 
-void MapOutputs::add_to(MapStream& stream, const Geometry& grid, bool jacobian) const {
+void MapOutputs::check(const Geometry& grid) const {
+  if (has_registration_suffix(options_.inverse)) require_registration_fits(grid);
+}
+
+void MapOutputs::add_to(MapStream& stream, const Geometry& grid, bool jacobian,
+                        const DerivedSeriesWriter* series) const {
   const auto add = [&](VolumeView Maps::*map, const std::filesystem::path& path, VoxelType type, bool needed = false) {
     if (!path.empty() || needed) stream.add(map, path.empty() ? nullptr : create_image(path, grid, type));
   };
   add(&Maps::coverage, staged_.coverage, VoxelType::u8);
   add(&Maps::jacobian, staged_.jacobian, VoxelType::f32, jacobian);
   add(&Maps::owners, staged_.folds, VoxelType::u16);
-  if (!staged_.inverse.empty())
-    stream.add(&Maps::inverse_mm, create_field_file(staged_.inverse, grid, FieldDirection::pull));
+  if (staged_.inverse.empty()) return;
+  stream.add(&Maps::inverse_mm, has_registration_suffix(options_.inverse)
+                                    ? series->create_registration(staged_.inverse)
+                                    : create_field_file(staged_.inverse, grid, FieldDirection::pull));
 }
 
 nlohmann::json MapOutputs::describe() const {
