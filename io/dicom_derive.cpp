@@ -214,7 +214,8 @@ void put_slice_place(DcmItem& target, DcmDataset& source, const Geometry& geomet
 
 void deidentify(DerivedSeries& series, DcmDataset& source, const Deidentification& how) {
   const Deidentifier deidentifier(how, text_of(source, DCM_PatientID), text_of(source, DCM_StudyInstanceUID));
-  for (std::string* uid : {&series.study_uid, &series.series_uid, &series.frame_of_reference_uid})
+  for (std::string* uid : {&series.study_uid, &series.series_uid, &series.frame_of_reference_uid,
+                           &series.source_series_uid, &series.source_frame_of_reference_uid})
     *uid = deidentifier.uid(*uid);
   for (std::string& uid : series.sop_instance) {
     if (is_uid(uid)) uid = deidentifier.uid(uid);
@@ -259,6 +260,7 @@ DerivedSeries derive_series(const DicomHeaders& source, const Geometry& geometry
   series.frame.resize(headers.size());
   series.study_uid = uid_or_made_up(source, DCM_StudyInstanceUID);
   series.series_uid = series_uid(source, derivation, series);
+  series.source_series_uid = text_of(*slices.front(), DCM_SeriesInstanceUID);
   series.source_frame_of_reference_uid = uid_or_made_up(source, DCM_FrameOfReferenceUID);
   series.frame_of_reference_uid = frame_uid(series.source_frame_of_reference_uid, derivation);
   series.number = series_number(*slices.front(), derivation.form);

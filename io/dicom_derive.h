@@ -18,6 +18,7 @@ namespace tetwarp {
 /// so that slices can then be made in parallel.
 struct DerivedSeries {
   std::string study_uid, series_uid, frame_of_reference_uid;
+  std::string source_series_uid;                     ///< empty where the source has none
   std::string source_frame_of_reference_uid;         ///< made up where the source has none
   std::string number, description;                   ///< Series Number and Description
   std::vector<std::string> sop_class, sop_instance;  ///< of the source's slices

@@ -98,6 +98,8 @@ std::string registration_number(const std::string& derived) {
 DcmDataset head_of(const Registration& of, const std::vector<ReferencedImage>& derived) {
   DcmDataset head, &source = *of.source.slices.front();
   carry_patient_and_study(head, source);
+  put_content_date(head, source);
+  if (of.series.deidentifier) of.series.deidentifier->apply(head, false);
   put(head, DCM_SOPClassUID, UID_DeformableSpatialRegistrationStorage);
   put(head, DCM_StudyInstanceUID, of.series.study_uid);
   put(head, DCM_Modality, "REG");
@@ -109,10 +111,9 @@ DcmDataset head_of(const Registration& of, const std::vector<ReferencedImage>& d
   put(head, DCM_Laterality, "");  // type 2C: required unless a body part that is no pair is named
   put(head, DCM_FrameOfReferenceUID, of.series.frame_of_reference_uid);
   put(head, DCM_InstanceNumber, "1");
-  put_content_date(head, source);
   put_tetwarp(head, "tetwarp");
   put(head, DCM_DeviceSerialNumber, commit());  // type 1 (C.7.5.2)
-  put_series_reference(head, text_of(source, DCM_SeriesInstanceUID), source_images(of.series));
+  put_series_reference(head, of.series.source_series_uid, source_images(of.series));
   put_series_reference(head, of.series.series_uid, derived);
   put_equipment(head, "109102", "Processing Equipment", of.derivation);
   return head;

@@ -80,25 +80,27 @@ TEST_P(HostileReading, FindsNothingThatTheOptionsDoNotAllow) {
   const Scratch scratch;
   write_file(scratch / "key", std::string(32, 'k'));
   const std::string source = "'" + folder.string() + "'";
-  const Outcome run = run_tetwarp(scratch.path(), "deform " + source +
-                                                      " -f wave:amplitude=4,wavelength=90 --cell-size 8 --outside rest "
-                                                      "-o out --report report.json --deidentify-key key --deidentify " +
-                                                      options);
+  const Outcome run = run_tetwarp(
+      scratch.path(), "deform " + source +
+                          " -f wave:amplitude=4,wavelength=90 --cell-size 8 --outside rest "
+                          "-o out --inverse reg.dcm --report report.json --deidentify-key key --deidentify " +
+                          options);
   ASSERT_EQ(run.status, 0) << run.err;
   write_file(scratch / "messages.txt", run.out + run.err);
-  const Outcome search = run_program(
-      scratch.path(), TETWARP_PYTHON,
-      std::string(TETWARP_HOSTILE_SEARCH) + " " + source + " " + options + " out out.json report.json messages.txt");
+  const Outcome search = run_program(scratch.path(), TETWARP_PYTHON,
+                                     std::string(TETWARP_HOSTILE_SEARCH) + " " + source + " " + options +
+                                         " out reg.dcm out.json report.json messages.txt");
   if (search.err.find("No module named 'pydicom'") != std::string::npos) GTEST_SKIP() << "pydicom is not installed";
   EXPECT_EQ(search.status, 0) << search.out << search.err;
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Sets, HostileReading,
-    testing::Values(Case("overlap-kits-and-topogram/kits-00072", "basic"),
-                    Case("overlap-kits-and-topogram/kits-00072", "retain-dates,retain-device"), Case("abdomen-acrin-flt", "retain-patient,retain-uids"),
-                    Case("head-phantom-multiseries/S21570/S2020", "retain-institution,shift-dates"),
-                    Case("tilt-uniform-philips", "basic")));
+INSTANTIATE_TEST_SUITE_P(Sets, HostileReading,
+                         testing::Values(Case("overlap-kits-and-topogram/kits-00072", "basic"),
+                                         Case("overlap-kits-and-topogram/kits-00072", "retain-dates,retain-device"),
+                                         Case("abdomen-acrin-flt", "retain-patient,retain-uids"),
+                                         Case("head-phantom-multiseries/S21570/S2020",
+                                              "retain-institution,shift-dates"),
+                                         Case("tilt-uniform-philips", "basic")));
 
 }  // namespace
 }  // namespace tetwarp::test

@@ -63,15 +63,14 @@ def walk(dataset, inside=False):
 
 def strings(folder, wanted):
     found = set()
-    for path in pathlib.Path(folder).rglob("*"):
-        if path.is_file():
-            try:
-                dataset = pydicom.dcmread(path, stop_before_pixels=True)
-            except pydicom.errors.InvalidDicomError:
-                continue
-            for element, in_private in walk(dataset):
-                if in_private or wanted(element):
-                    found.update(text for text in texts(element) if len(text) > 3)
+    for path in files([folder]):
+        try:
+            dataset = pydicom.dcmread(path, stop_before_pixels=True)
+        except pydicom.errors.InvalidDicomError:
+            continue
+        for element, in_private in walk(dataset):
+            if in_private or wanted(element):
+                found.update(text for text in texts(element) if len(text) > 3)
     return found
 
 
@@ -86,15 +85,14 @@ def main():
     open_texts = strings(source, lambda e: not is_secret(e, options))
     secrets = {s for s in secrets - open_texts if not s.startswith("1.2.840.10008.") and s not in ("REMOVED", "NONE")}
     values = set()
-    for folder in outputs:
-        if pathlib.Path(folder).is_dir():
-            values |= strings(folder, lambda e: True)
+    for output in outputs:
+        values |= strings(output, lambda e: True)
     found = sorted(secrets & values)
     letters = [s for s in secrets if len(s) > 4 and re.search("[A-Za-z]", s)] + \
               [s for s in secrets if re.fullmatch(r"[0-9.]{12,}", s)]
     for path in files(outputs):
         content = path.read_bytes()
-        at = content.find(b"\xe0\x7f\x10\x00OW")  # pixels hold any bytes
+        at = max(content.find(b"\xe0\x7f\x10\x00OW"), content.find(b"\x64\x00\x09\x00OF"))  # numbers hold any bytes
         head = (content[:at] if at >= 0 else content).decode("latin-1")
         found += [f"{path.name}: {s}" for s in letters if s in head]
     for one in found:
