@@ -1,0 +1,77 @@
+#pragma once
+
+#include <cstdint>
+#include <glm/mat3x3.hpp>
+#include <span>
+#include <vector>
+
+#include "deform/contours/contour.h"
+#include "deform/contours/planar_region.h"
+
+namespace tetwarp {
+
+/// Points within this distance of a plane lie in it, mm: what is drawn on a slice is written with two decimals or more.
+constexpr double kInPlane = 0.05;
+
+/// What is between two planes of contours.
+enum class Between : std::uint8_t {
+  interpolated,  ///< signed distances change linearly (shape-based interpolation: Raya and Udupa, IEEE Trans. Med.
+                 ///< Imaging 9, 1990)
+  nearest        ///< what is in the nearer plane
+};
+
+/// A solid that is drawn as closed contours in parallel planes.
+///
+/// In a plane the solid is what an odd number of contours surround. Planes further apart than 1.5 times what is usual
+/// for them (the median) have nothing between them: there the solid ends. At an end it goes on unchanged for half the
+/// usual distance; a plane that lies exactly there is inside at the lower end alone, by a hundredth of the distance.
+class ContourStack {
+ public:
+  /// @param contours  others than closed ones are passed over, and so are those of fewer than three points
+  /// @param normal    of the planes to expect, of length 1; if the contours lie in others, these are found
+  /// @param distance  of two planes where there is only one, mm
+  /// @throws InputError unless the contours lie in planes, all parallel
+  ContourStack(std::span<const Contour> contours, const glm::dvec3& normal, double distance);
+
+  /// Positive inside, mm; near the surface the distance to it, or less. -infinity where there is nothing.
+  double signed_distance(const glm::dvec3& point, Between between) const;
+  /// Whether that is inside, for either kind: much faster than the distance.
+  struct Place {
+    bool interpolated = false, nearest = false;
+  };
+  Place place(const glm::dvec3& point) const;
+  /// Of what lies in the planes, each as thick as halves the way to its neighbours; mm3.
+  double volume() const;
+  /// How far the planes usually are apart, mm.
+  double distance() const { return distance_; }
+  /// Runs of planes with something between them.
+  std::size_t parts() const { return parts_.size(); }
+
+ private:
+  struct Plane {
+    double at;  ///< mm along the normal
+    PlanarRegion region;
+    double area;
+  };
+  struct Part {
+    std::size_t first, last;  ///< planes
+    double begin, end;        ///< mm along the normal
+  };
+
+  void choose_frame(std::span<const Contour> contours, const glm::dvec3& normal);
+  void add_planes(std::span<const Contour> contours);
+  void add_parts(double distance);
+  /// The planes around a height in a part, and how far it is from the lower to the upper one, 0 to 1.
+  struct Neighbours {
+    const PlanarRegion *below, *above;
+    double t;
+  };
+  Neighbours neighbours(const Part& part, double z) const;
+
+  glm::dmat3 frame_from_point_{1};  ///< two axes of the planes, and their normal
+  std::vector<Plane> planes_;       ///< rising
+  std::vector<Part> parts_;         ///< rising
+  double distance_ = 0;
+};
+
+}  // namespace tetwarp

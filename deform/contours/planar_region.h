@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "deform/contours/polygon.h"
+
+namespace tetwarp {
+
+/// The area inside an odd number of closed polygons of a plane, and how far a place is from its border.
+///
+/// Edges with the area on both sides are no border: the channel of a keyhole, and what two equal rings take away from
+/// each other. The edges lie in a tree of boxes over runs of neighbouring edges, for polygons are coherent already.
+class PlanarRegion {
+ public:
+  /// @param rings  mm, of three corners or more; they may touch and cross
+  explicit PlanarRegion(const std::vector<Ring>& rings);
+
+  static constexpr double kFar = 1e9;  ///< mm
+
+  bool contains(const glm::dvec2& point) const;
+  /// Exact; positive inside, mm; -kFar where there is no border.
+  double signed_distance(const glm::dvec2& point) const;
+
+ private:
+  struct Edge {
+    glm::dvec2 a, b;
+    bool border = true;
+  };
+  static constexpr std::size_t kLeaf = 4;
+  struct Node {
+    glm::dvec2 low, high;
+    std::size_t begin = 0, end = 0;  ///< edges
+    std::size_t next = 0;            ///< the node behind all that is below this one; its first child follows it
+
+    bool is_leaf() const { return end - begin <= kLeaf; }
+  };
+
+  void build(std::size_t begin, std::size_t end);
+
+  std::vector<Edge> edges_;
+  std::vector<Node> nodes_;
+};
+
+}  // namespace tetwarp
