@@ -127,15 +127,18 @@ void clean(DcmSequenceOfItems& sequence) {
   }
 }
 
-/// Copies attributes, without what is private in their sequences.
+/// Copies an attribute, without what is private in its items.
+void copy_element(DcmItem& target, const DcmElement& element) {
+  std::unique_ptr<DcmElement> copy(dynamic_cast<DcmElement*>(element.clone()));
+  if (auto* sequence = dynamic_cast<DcmSequenceOfItems*>(copy.get())) clean(*sequence);
+  if (target.insert(copy.get(), OFTrue).good()) copy.release();
+}
+
 template <class Wanted>
 void copy_those(DcmItem& target, DcmDataset& source, const Wanted& is_wanted) {
   for (unsigned long i = 0; i < source.card(); ++i) {
-    const DcmElement* element = source.getElement(i);
-    if (!is_wanted(element->getTag().getXTag())) continue;
-    std::unique_ptr<DcmElement> copy(dynamic_cast<DcmElement*>(element->clone()));
-    if (auto* sequence = dynamic_cast<DcmSequenceOfItems*>(copy.get())) clean(*sequence);
-    if (target.insert(copy.get(), OFTrue).good()) copy.release();
+    const DcmElement& element = *source.getElement(i);
+    if (is_wanted(element.getTag().getXTag())) copy_element(target, element);
   }
 }
 
@@ -173,6 +176,13 @@ void carry_patient_and_study(DcmItem& target, DcmDataset& source) {
        {DCM_StudyDate, DCM_StudyTime, DCM_AccessionNumber, DCM_ReferringPhysicianName, DCM_PatientName, DCM_PatientID,
         DCM_PatientBirthDate, DCM_PatientSex, DCM_StudyID, DCM_PositionReferenceIndicator}) {  // type 2
     if (!target.tagExists(tag)) put(target, tag, "");
+  }
+}
+
+void copy_over(DcmItem& target, DcmItem& source, std::span<const DcmTagKey> tags) {
+  for (const DcmTagKey& tag : tags) {
+    DcmElement* element = nullptr;
+    if (source.findAndGetElement(tag, element).good()) copy_element(target, *element);
   }
 }
 

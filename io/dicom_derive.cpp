@@ -73,14 +73,6 @@ std::string frame_uid(const std::string& frame, const DicomDerivation& derivatio
   return uid_of(Sha256().add("tetwarp deformed frame of reference").add(frame).add(derivation.field_sha256));
 }
 
-/// The one that was chosen, or that of the source plus 1000: beside it in a list, and seldom taken.
-std::string series_number(DcmDataset& slice, const DicomForm& form) {
-  if (form.series_number) return std::to_string(*form.series_number);
-  Sint32 number = 0;
-  slice.findAndGetSint32(DCM_SeriesNumber, number);
-  return std::to_string(number > INT32_MAX - 1000 ? number : number + 1000);
-}
-
 /// The one that was chosen, in the character set of the source.
 std::string chosen_description(const std::string& text, const std::string& character_set) {
   const std::string cannot = "the series description \"" + shown(text) + "\" ";
@@ -92,22 +84,6 @@ std::string chosen_description(const std::string& text, const std::string& chara
   require(coded.has_value(), cannot + "cannot be written in the character set of the series, " +
                                  (character_set.empty() ? "ASCII" : shown(character_set)) + "; use other characters");
   return *coded;
-}
-
-/// "deformed: " and the source's own description, cut to the 64 characters of VR LO. A text of several bytes a
-/// character that is too long is left out, as cutting it could break a character.
-std::string series_description(DcmDataset& slice, const DicomDerivation& derivation) {
-  const std::string set = text_of(slice, DCM_SpecificCharacterSet);
-  if (derivation.form.series_description) return chosen_description(*derivation.form.series_description, set);
-  const bool deformed = derivation.deformed;
-  const std::string mine = deformed ? "deformed" : "resampled", source = text_of(slice, DCM_SeriesDescription);
-  if (source.empty() || derivation.form.deidentification) return mine;
-  const std::string text = mine + ": " + source;
-  if (text.size() <= kLongestDescription) return text;
-  const bool ascii = std::all_of(source.begin(), source.end(), [](char c) { return c >= ' ' && c <= '~'; });
-  const bool one_byte = set.starts_with("ISO_IR 1") && set != "ISO_IR 192" && set.find('\\') == std::string::npos;
-  if (!ascii && !one_byte) return mine;
-  return text.substr(0, kLongestDescription);
 }
 
 /// The source's instance numbers where each is there once and is fit for a file name, else 1 to n.
@@ -190,7 +166,7 @@ void put_references(DcmItem& target, const DerivedSeries& series, const SliceRan
   }
 }
 
-/// General Image (PS3.3 C.7.6.1) and Contributing Equipment (C.12.1.1): what was done to which images, and by what.
+/// General Image (PS3.3 C.7.6.1) and Contributing Equipment: what was done to which images, and by what.
 void put_derivation(DcmItem& target, DcmDataset& source, const DerivedSeries& series, const DicomDerivation& derivation,
                     const SliceRange& sampled) {
   put(target, DCM_ImageType, image_type(source));
@@ -234,6 +210,24 @@ bool is_uid(const std::string& text) {
   return !text.empty() && DcmUniqueIdentifier::checkStringValue(text.c_str(), "1").good();
 }
 
+std::string derived_number(DcmItem& source) {
+  Sint32 number = 0;
+  source.findAndGetSint32(DCM_SeriesNumber, number);
+  return std::to_string(number > INT32_MAX - 1000 ? number : number + 1000);
+}
+
+std::string derived_description(DcmItem& source, const DicomDerivation& derivation) {
+  const std::string mine = derivation.deformed ? "deformed" : "resampled", own = text_of(source, DCM_SeriesDescription);
+  if (own.empty() || derivation.form.deidentification) return mine;
+  const std::string text = mine + ": " + own;
+  if (text.size() <= kLongestDescription) return text;
+  const std::string set = text_of(source, DCM_SpecificCharacterSet);
+  const bool ascii = std::all_of(own.begin(), own.end(), [](char c) { return c >= ' ' && c <= '~'; });
+  const bool one_byte = set.starts_with("ISO_IR 1") && set != "ISO_IR 192" && set.find('\\') == std::string::npos;
+  if (!ascii && !one_byte) return mine;
+  return text.substr(0, kLongestDescription);
+}
+
 void put_equipment(DcmItem& target, const std::string& purpose, const std::string& meaning,
                    const DicomDerivation& derivation) {
   DcmItem& equipment = append_item(target, DCM_ContributingEquipmentSequence);
@@ -263,8 +257,11 @@ DerivedSeries derive_series(const DicomHeaders& source, const Geometry& geometry
   series.source_series_uid = text_of(*slices.front(), DCM_SeriesInstanceUID);
   series.source_frame_of_reference_uid = uid_or_made_up(source, DCM_FrameOfReferenceUID);
   series.frame_of_reference_uid = frame_uid(series.source_frame_of_reference_uid, derivation);
-  series.number = series_number(*slices.front(), derivation.form);
-  series.description = series_description(*slices.front(), derivation);
+  const DicomForm& form = derivation.form;
+  series.number = form.series_number ? std::to_string(*form.series_number) : derived_number(*slices.front());
+  series.description = form.series_description ? chosen_description(*form.series_description,
+                                                                    text_of(*slices.front(), DCM_SpecificCharacterSet))
+                                               : derived_description(*slices.front(), derivation);
   series.instance_number = instance_numbers(headers, static_cast<std::size_t>(geometry.size.z));
   series.header = header_slices(headers, geometry);
   series.varying = varying_acquisition(slices);

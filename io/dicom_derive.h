@@ -37,6 +37,13 @@ bool is_uid(const std::string& text);
 /// @param purpose  code of context group 7005, and @param meaning  its meaning
 void put_equipment(DcmItem& target, const std::string& purpose, const std::string& meaning,
                    const DicomDerivation& derivation);
+/// Series Number: the one of the source plus 1000: beside it in a list, and seldom taken.
+std::string derived_number(DcmItem& source);
+
+/// Series Description: "deformed: " (or "resampled: ") and the source's own, cut to the 64 characters of VR LO. A text
+/// of several bytes a character that is too long is left out, as cutting it could break a character; so is all of a
+/// de-identified series.
+std::string derived_description(DcmItem& source, const DicomDerivation& derivation);
 
 /// @param geometry  of the output
 /// @throws InputError for headers without slices

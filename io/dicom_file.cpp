@@ -11,6 +11,7 @@
 #include <bit>
 #include <cerrno>
 #include <cstdio>
+#include <initializer_list>
 #include <system_error>
 
 #include "deform/errors.h"
@@ -33,11 +34,11 @@ void check(const OFCondition& condition) {
 
 /// What DcmObject::write makes of an object, in a buffer of `size` bytes or less.
 template <class Object>
-std::vector<std::byte> written(Object& object, std::size_t size) {
+std::vector<std::byte> written(Object& object, std::size_t size, E_TransferSyntax syntax = kSyntax) {
   std::vector<std::byte> bytes(size + size % 2);
   DcmOutputBufferStream stream(bytes.data(), static_cast<offile_off_t>(bytes.size()));
   object.transferInit();
-  const OFCondition condition = object.write(stream, kSyntax, EET_ExplicitLength, nullptr);
+  const OFCondition condition = object.write(stream, syntax, EET_ExplicitLength, nullptr);
   object.transferEnd();
   check(condition);
   void* buffer = nullptr;
@@ -97,11 +98,25 @@ void begin_flush([[maybe_unused]] int file) {
 #endif
 }
 
+/// @param mode  O_EXCL: the file must not be there; O_TRUNC: it may be
+void write_file(const std::filesystem::path& path, int mode, std::initializer_list<std::span<const std::byte>> parts) {
+  const int file = ::open(path.c_str(), O_CREAT | mode | O_WRONLY | O_CLOEXEC, 0666);
+  if (file < 0) throw Error("cannot create " + path.string() + ": " + std::generic_category().message(errno));
+  try {
+    for (const std::span<const std::byte> part : parts) write_bytes(file, part, path);
+    begin_flush(file);
+  } catch (...) {
+    ::close(file);
+    throw;
+  }
+  if (::close(file) != 0) throw Error("cannot write " + path.string() + ": " + std::generic_category().message(errno));
+}
+
 }  // namespace
 
-std::vector<std::byte> encoded(DcmDataset& dataset) {
-  check(dataset.computeGroupLengthAndPadding(EGL_withoutGL, EPD_withoutPadding, kSyntax, EET_ExplicitLength));
-  return written(dataset, dataset.calcElementLength(kSyntax, EET_ExplicitLength));
+std::vector<std::byte> encoded(DcmDataset& dataset, E_TransferSyntax syntax) {
+  check(dataset.computeGroupLengthAndPadding(EGL_withoutGL, EPD_withoutPadding, syntax, EET_ExplicitLength));
+  return written(dataset, dataset.calcElementLength(syntax, EET_ExplicitLength), syntax);
 }
 
 void append_number(std::vector<std::byte>& bytes, std::uint64_t value, std::size_t count) {
@@ -115,14 +130,14 @@ void append_item_start(std::vector<std::byte>& bytes, unsigned element, std::siz
 }
 
 std::vector<std::byte> encoded_meta(const std::string& sop_class, const std::string& sop_instance,
-                                    DicomEncoding encoding) {
+                                    const std::string& transfer_syntax) {
   DcmMetaInfo meta;
   const Uint8 header_version[2] = {0, 1};
   check(meta.putAndInsertUint32(DCM_FileMetaInformationGroupLength, 0));
   check(meta.putAndInsertUint8Array(DCM_FileMetaInformationVersion, header_version, 2));
   put(meta, DCM_MediaStorageSOPClassUID, sop_class);
   put(meta, DCM_MediaStorageSOPInstanceUID, sop_instance);
-  put(meta, DCM_TransferSyntaxUID, uid_of(encoding));
+  put(meta, DCM_TransferSyntaxUID, transfer_syntax);
   put(meta, DCM_ImplementationClassUID, kImplementationUid);
   put(meta, DCM_ImplementationVersionName, ascii(std::string("TETWARP_") + version(), 16));
   check(meta.computeGroupLengthAndPadding(EGL_withGL, EPD_noChange, kSyntax, EET_ExplicitLength));
@@ -139,7 +154,7 @@ std::string write_dicom_file(const std::filesystem::path& path, DcmDataset& data
   if (encoding == DicomEncoding::deflated) hash.add(uid_of(encoding));  // nothing that was added shows it
   const std::string uid = uid_from_digest(hash.digest());
   put(dataset, DCM_SOPInstanceUID, uid);
-  std::vector<std::byte> start = encoded_meta(text_of(dataset, DCM_SOPClassUID), uid, encoding);
+  std::vector<std::byte> start = encoded_meta(text_of(dataset, DCM_SOPClassUID), uid, uid_of(encoding));
   std::vector<std::byte> data = encoded(dataset);
   data.insert(data.end(), pixels.start.begin(), pixels.start.end());
   if (encoding == DicomEncoding::deflated) {
@@ -148,19 +163,18 @@ std::string write_dicom_file(const std::filesystem::path& path, DcmDataset& data
     pixels.value = {};
   }
   start.insert(start.end(), data.begin(), data.end());
+  write_file(path, O_EXCL, {start, pixels.value, pixels.end});
+  return uid;
+}
 
-  const int file = ::open(path.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666);
-  if (file < 0) throw Error("cannot create " + path.string() + ": " + std::generic_category().message(errno));
-  try {
-    write_bytes(file, start, path);
-    write_bytes(file, pixels.value, path);
-    write_bytes(file, pixels.end, path);
-    begin_flush(file);
-  } catch (...) {
-    ::close(file);
-    throw;
-  }
-  if (::close(file) != 0) throw Error("cannot write " + path.string() + ": " + std::generic_category().message(errno));
+std::string write_dicom_file(const std::filesystem::path& path, DcmDataset& dataset) {
+  constexpr E_TransferSyntax kImplicit = EXS_LittleEndianImplicit;
+  drop(dataset, DCM_SOPInstanceUID);
+  const std::string uid = uid_from_digest(Sha256().add("tetwarp instance").add(encoded(dataset, kImplicit)).digest());
+  put(dataset, DCM_SOPInstanceUID, uid);
+  const std::vector<std::byte> start =
+      encoded_meta(text_of(dataset, DCM_SOPClassUID), uid, UID_LittleEndianImplicitTransferSyntax);
+  write_file(path, O_TRUNC, {start, encoded(dataset, kImplicit)});
   return uid;
 }
 

@@ -15,13 +15,13 @@
 
 namespace tetwarp {
 
-/// The data set as a file holds it: Explicit VR Little Endian, sequences of explicit length, no group lengths.
+/// The data set as a file holds it: little endian, sequences of explicit length, no group lengths.
 /// @throws Error when DCMTK cannot encode it
-std::vector<std::byte> encoded(DcmDataset& dataset);
+std::vector<std::byte> encoded(DcmDataset& dataset, E_TransferSyntax syntax = EXS_LittleEndianExplicit);
 
 /// Preamble, "DICM" and group 0002 (PS3.10 7.1). @throws Error when DCMTK cannot encode them
 std::vector<std::byte> encoded_meta(const std::string& sop_class, const std::string& sop_instance,
-                                    DicomEncoding encoding = DicomEncoding::uncompressed);
+                                    const std::string& transfer_syntax);
 
 /// Appends the lowest `count` bytes of a number, the lowest first.
 void append_number(std::vector<std::byte>& bytes, std::uint64_t value, std::size_t count);
@@ -39,6 +39,10 @@ void append_item_start(std::vector<std::byte>& bytes, unsigned element, std::siz
 std::string write_dicom_file(const std::filesystem::path& path, DcmDataset& dataset,
                              std::span<const std::int16_t> voxels,
                              DicomEncoding encoding = DicomEncoding::uncompressed);
+
+/// The same of a data set without Pixel Data; a file that is there is replaced. Implicit VR Little Endian: in the
+/// explicit syntaxes a decimal string ends at 65534 bytes, which the points of a contour may need more of.
+std::string write_dicom_file(const std::filesystem::path& path, DcmDataset& dataset);
 
 /// "IM00042.dcm": names sort as their numbers do.
 std::string dicom_file_name(int instance_number);

@@ -1,5 +1,6 @@
 #include "io/dicom_dose.h"
 #include "io/dicom_series.h"
+#include "io/dicom_structures.h"
 #include "io/image_file.h"
 
 namespace tetwarp {
@@ -43,6 +44,16 @@ bool is_dicom_dose(const std::filesystem::path&) { return false; }
 DicomDose read_dose_header(const std::filesystem::path&) { refuse(); }
 
 AnyVolume read_dose(const std::filesystem::path&) { refuse(); }
+
+bool is_dicom_structure_set(const std::filesystem::path&) { return false; }
+
+StructureSet read_structure_set(const std::filesystem::path&) { refuse(); }
+
+StructureWriteReport write_structure_set(const std::filesystem::path&, const StructureSet&,
+                                         const std::vector<std::vector<Contour>>&, const DicomWriteReport&,
+                                         const DicomDerivation&) {
+  refuse();
+}
 
 bool is_tetwarp_dicom(const std::filesystem::path&) { refuse(); }
 

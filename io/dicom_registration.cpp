@@ -264,7 +264,7 @@ class RegistrationWriter final : public ImageWriter {
     DcmDataset head = head_of(registration_, derived);
     const std::string uid = uid_from_digest(hash_.add(encoded(head)).add(start).add(end).digest());
     put(head, DCM_SOPInstanceUID, uid);
-    write(encoded_meta(UID_DeformableSpatialRegistrationStorage, uid));
+    write(encoded_meta(UID_DeformableSpatialRegistrationStorage, uid, UID_LittleEndianExplicitTransferSyntax));
     write(encoded(head));
     write(start);
     vectors_.copy_to(out_);

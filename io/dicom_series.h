@@ -124,7 +124,7 @@ struct DicomDerivation {
 
 /// What the writer had to add or could not carry over, for the report.
 struct DicomWriteReport {
-  std::string series_uid, frame_of_reference_uid;
+  std::string study_uid, series_uid, frame_of_reference_uid;
   std::vector<std::string> added_empty;        ///< missing type 2 attributes: "(0008,0090) ReferringPhysicianName"
   std::vector<std::string> sop_instance_uids;  ///< of the output's slices, k-th first to last; empty: not yet written
   bool says_who = false;  ///< the source says that pixels show text or a face that can be recognised

@@ -85,7 +85,8 @@ void DerivedSeriesWriter::write(const ConstVolumeView& volume, std::int64_t begi
 
 DicomWriteReport DerivedSeriesWriter::report() const {
   const std::lock_guard lock(state_->mutex);
-  DicomWriteReport report{.series_uid = state_->series.series_uid,
+  DicomWriteReport report{.study_uid = state_->series.study_uid,
+                          .series_uid = state_->series.series_uid,
                           .frame_of_reference_uid = state_->series.frame_of_reference_uid,
                           .added_empty = {},
                           .sop_instance_uids = state_->instances,
