@@ -179,11 +179,13 @@ void carry_patient_and_study(DcmItem& target, DcmDataset& source) {
   }
 }
 
+void carry_attribute(DcmItem& target, DcmItem& source, const DcmTagKey& tag) {
+  DcmElement* element = nullptr;
+  if (source.findAndGetElement(tag, element).good()) copy_element(target, *element);
+}
+
 void copy_over(DcmItem& target, DcmItem& source, std::span<const DcmTagKey> tags) {
-  for (const DcmTagKey& tag : tags) {
-    DcmElement* element = nullptr;
-    if (source.findAndGetElement(tag, element).good()) copy_element(target, *element);
-  }
+  for (const DcmTagKey& tag : tags) carry_attribute(target, source, tag);
 }
 
 std::vector<DcmTagKey> type_2_attributes() {

@@ -32,7 +32,8 @@ void carry_over(DcmItem& target, DcmDataset& source, const std::set<DcmTagKey>& 
 /// Copies what an object beside a derived series says of patient, study and frame of reference: groups 0010, 0012 and
 /// 0038, and the attributes of General Study (PS3.3 C.7.2.1). Private attributes go, as above.
 void carry_patient_and_study(DcmItem& target, DcmDataset& source);
-/// Copies those of the attributes that are there, without private attributes in their sequences.
+/// Copies one attribute, or several, if they are there, as `carry_over` does: without private ones within their items.
+void carry_attribute(DcmItem& target, DcmItem& source, const DcmTagKey& tag);
 void copy_over(DcmItem& target, DcmItem& source, std::span<const DcmTagKey> tags);
 
 /// Type 2 attributes of the CT Image IOD (PS3.3 A.3), in ascending order: may be empty, may not be missing.

@@ -170,10 +170,8 @@ void put_references(DcmItem& target, const DerivedSeries& series, const SliceRan
 void put_derivation(DcmItem& target, DcmDataset& source, const DerivedSeries& series, const DicomDerivation& derivation,
                     const SliceRange& sampled) {
   put(target, DCM_ImageType, image_type(source));
-  put(target, DCM_DerivationDescription, ascii(derivation.description, 1024));
-  append_code(target, DCM_DerivationCodeSequence, "113085", "Spatial resampling");
+  put_how_derived(target, derivation);
   put_references(target, series, sampled, derivation.deformed);
-  put_equipment(target, "109103", "Modifying Equipment", derivation);
 }
 
 /// Position along the normal, and the distance of slices: only where the source tells them.
@@ -235,6 +233,12 @@ void put_equipment(DcmItem& target, const std::string& purpose, const std::strin
   put_tetwarp(equipment, "tetwarp");
   put(equipment, DCM_ContributionDescription,
       ascii("field sha256 " + derivation.field_sha256 + "; " + derivation.parameters, 1024));
+}
+
+void put_how_derived(DcmItem& target, const DicomDerivation& derivation) {
+  put(target, DCM_DerivationDescription, ascii(derivation.description, 1024));
+  append_code(target, DCM_DerivationCodeSequence, "113085", "Spatial resampling");
+  put_equipment(target, "109103", "Modifying Equipment", derivation);
 }
 
 DerivedSeries derive_series(const DicomHeaders& source, const Geometry& geometry, const DicomDerivation& derivation) {

@@ -14,6 +14,12 @@
 
 namespace tetwarp {
 
+/// Whether a text is a UID (PS3.5 9.1).
+bool is_uid(const std::string& text);
+
+/// Derivation Description and Code (PS3.3 C.7.6.1) and Contributing Equipment (C.12.1.1): what was done, and by what.
+void put_how_derived(DcmItem& target, const DicomDerivation& derivation);
+
 /// What the slices of a derived series share, and what a slice has to know of the others: taken from the source once,
 /// so that slices can then be made in parallel.
 struct DerivedSeries {
@@ -30,13 +36,11 @@ struct DerivedSeries {
   std::optional<PaddingRange> padding;       ///< HU: the source's, where all slices agree and int16 can hold it
 };
 
-/// Whether images can be named by it (PS3.5 9.1).
-bool is_uid(const std::string& text);
-
 /// Appends an item to Contributing Equipment (PS3.3 C.12.1.1): this program, the field and what was chosen.
 /// @param purpose  code of context group 7005, and @param meaning  its meaning
 void put_equipment(DcmItem& target, const std::string& purpose, const std::string& meaning,
                    const DicomDerivation& derivation);
+
 /// Series Number: the one of the source plus 1000: beside it in a list, and seldom taken.
 std::string derived_number(DcmItem& source);
 

@@ -56,29 +56,38 @@ struct PixelData {
   std::vector<std::byte> end;
 };
 
-PixelData pixel_data(DcmDataset& dataset, std::span<const std::int16_t> voxels, DicomEncoding encoding) {
-  constexpr std::uint64_t kLargest = 0xfffffffe, kUndefined = 0xffffffff;
-  constexpr unsigned kItem = 0xe000, kEnd = 0xe0dd;
-  const bool fragments = is_encapsulated(encoding);
+void append_pixel_data_start(std::vector<std::byte>& bytes, DicomWords words, std::uint64_t length) {
+  append_number(bytes, 0x7fe0, 2);
+  append_number(bytes, 0x0010, 2);
+  for (const char c : {'O', words == DicomWords::bytes ? 'B' : 'W', '\0', '\0'})
+    bytes.push_back(static_cast<std::byte>(c));
+  append_number(bytes, length, 4);
+}
+
+PixelData native_pixel_data(std::span<const std::byte> value, DicomWords words) {
+  constexpr std::uint64_t kLargest = 0xfffffffe;
+  require(value.size() <= kLargest, "pixels of " + std::to_string(value.size()) +
+                                        " bytes; Pixel Data of DICOM hold at most " + std::to_string(kLargest));
   PixelData data;
-  if (fragments) {
-    Uint16 rows = 0, columns = 0;
-    check(dataset.findAndGetUint16(DCM_Rows, rows));
-    check(dataset.findAndGetUint16(DCM_Columns, columns));
-    data.frame = compressed_frame(voxels, rows, columns, encoding);
-  }
-  data.value = fragments ? std::span<const std::byte>(data.frame) : std::as_bytes(voxels);
-  require(data.value.size() <= kLargest, "a slice of " + std::to_string(data.value.size()) +
-                                             " bytes; Pixel Data of DICOM hold at most " + std::to_string(kLargest));
-  append_number(data.start, 0x7fe0, 2);
-  append_number(data.start, 0x0010, 2);
-  for (const char c : {'O', fragments ? 'B' : 'W', '\0', '\0'}) data.start.push_back(static_cast<std::byte>(c));
-  append_number(data.start, fragments ? kUndefined : data.value.size(), 4);
-  if (fragments) {
-    append_item_start(data.start, kItem, 0);  // an empty Basic Offset Table
-    append_item_start(data.start, kItem, data.value.size());
-    append_item_start(data.end, kEnd, 0);
-  }
+  data.value = value;
+  if (value.size() % 2 != 0) append_number(data.end, 0, 1);
+  append_pixel_data_start(data.start, words, value.size() + data.end.size());
+  return data;
+}
+
+PixelData compressed_pixel_data(DcmDataset& dataset, std::span<const std::int16_t> voxels, DicomEncoding encoding) {
+  constexpr std::uint64_t kUndefined = 0xffffffff;
+  constexpr unsigned kItem = 0xe000, kEnd = 0xe0dd;
+  PixelData data;
+  Uint16 rows = 0, columns = 0;
+  check(dataset.findAndGetUint16(DCM_Rows, rows));
+  check(dataset.findAndGetUint16(DCM_Columns, columns));
+  data.frame = compressed_frame(voxels, rows, columns, encoding);
+  data.value = data.frame;
+  append_pixel_data_start(data.start, DicomWords::bytes, kUndefined);
+  append_item_start(data.start, kItem, 0);  // an empty Basic Offset Table
+  append_item_start(data.start, kItem, data.value.size());
+  append_item_start(data.end, kEnd, 0);
   return data;
 }
 
@@ -144,10 +153,13 @@ std::vector<std::byte> encoded_meta(const std::string& sop_class, const std::str
   return written(meta, meta.calcElementLength(kSyntax, EET_ExplicitLength));
 }
 
-std::string write_dicom_file(const std::filesystem::path& path, DcmDataset& dataset,
-                             std::span<const std::int16_t> voxels, DicomEncoding encoding) {
+namespace {
+
+/// Gives the data set its UID and writes it with its pixels.
+/// @param existing  what open(2) does where there is a file: O_EXCL, O_TRUNC
+std::string write_with_pixels(const std::filesystem::path& path, int existing, DcmDataset& dataset, PixelData pixels,
+                              DicomEncoding encoding) {
   static_assert(std::endian::native == std::endian::little);
-  PixelData pixels = pixel_data(dataset, voxels, encoding);
   drop(dataset, DCM_SOPInstanceUID);
   Sha256 hash;
   hash.add("tetwarp instance").add(encoded(dataset)).add(pixels.start).add(pixels.value).add(pixels.end);
@@ -163,8 +175,23 @@ std::string write_dicom_file(const std::filesystem::path& path, DcmDataset& data
     pixels.value = {};
   }
   start.insert(start.end(), data.begin(), data.end());
-  write_file(path, O_EXCL, {start, pixels.value, pixels.end});
+  write_file(path, existing, {start, pixels.value, pixels.end});
   return uid;
+}
+
+}  // namespace
+
+std::string write_dicom_file(const std::filesystem::path& path, DcmDataset& dataset,
+                             std::span<const std::int16_t> voxels, DicomEncoding encoding) {
+  return write_with_pixels(path, O_EXCL, dataset,
+                           is_encapsulated(encoding) ? compressed_pixel_data(dataset, voxels, encoding)
+                                                     : native_pixel_data(std::as_bytes(voxels), DicomWords::of_16_bits),
+                           encoding);
+}
+
+std::string write_dicom_file(const std::filesystem::path& path, DcmDataset& dataset, std::span<const std::byte> pixels,
+                             DicomWords words) {
+  return write_with_pixels(path, O_TRUNC, dataset, native_pixel_data(pixels, words), DicomEncoding::uncompressed);
 }
 
 std::string write_dicom_file(const std::filesystem::path& path, DcmDataset& dataset) {

@@ -43,6 +43,13 @@ std::string write_dicom_file(const std::filesystem::path& path, DcmDataset& data
 /// The same of a data set without Pixel Data; a file that is there is replaced. Implicit VR Little Endian: in the
 /// explicit syntaxes a decimal string ends at 65534 bytes, which the points of a contour may need more of.
 std::string write_dicom_file(const std::filesystem::path& path, DcmDataset& dataset);
+/// What Pixel Data are made of: VR OB or OW (PS3.5 A.2).
+enum class DicomWords : std::uint8_t { bytes, of_16_bits };
+
+/// The same, uncompressed, of pixels of any size as they lie in the file; an odd number of bytes is filled up.
+/// A file of that name is replaced.
+std::string write_dicom_file(const std::filesystem::path& path, DcmDataset& dataset, std::span<const std::byte> pixels,
+                             DicomWords words);
 
 /// "IM00042.dcm": names sort as their numbers do.
 std::string dicom_file_name(int instance_number);

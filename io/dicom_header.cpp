@@ -50,8 +50,9 @@ int decimals_of(const std::string& text) {
   return digits - static_cast<int>(decimal(text.substr(exponent_at + 1)).value_or(0));
 }
 
-/// Exactly `count` numbers, or none.
-std::optional<std::vector<double>> decimals(DcmItem& item, const DcmTagKey& tag, std::size_t count) {
+}  // namespace
+
+std::optional<std::vector<double>> numbers_of(DcmItem& item, const DcmTagKey& tag, std::size_t count) {
   const std::vector<std::string> texts = split(text_of(item, tag));
   if (texts.size() != count) return std::nullopt;
   std::vector<double> values;
@@ -63,8 +64,10 @@ std::optional<std::vector<double>> decimals(DcmItem& item, const DcmTagKey& tag,
   return values;
 }
 
+namespace {
+
 std::optional<double> decimal_of(DcmItem& item, const DcmTagKey& tag) {
-  const auto values = decimals(item, tag, 1);
+  const auto values = numbers_of(item, tag, 1);
   return values ? std::optional(values->front()) : std::nullopt;
 }
 
@@ -107,17 +110,17 @@ PixelFormat pixel_format_of(DcmItem& data) {
 }
 
 void read_geometry(DcmItem& data, DicomFileHeader& header) {
-  if (const auto position = decimals(data, DCM_ImagePositionPatient, 3)) {
+  if (const auto position = numbers_of(data, DCM_ImagePositionPatient, 3)) {
     header.position = glm::dvec3((*position)[0], (*position)[1], (*position)[2]);
     const std::vector<std::string> texts = split(text_of(data, DCM_ImagePositionPatient));
     std::transform(texts.begin(), texts.end(), header.position_decimals.begin(), decimals_of);
   }
-  if (const auto cosines = decimals(data, DCM_ImageOrientationPatient, 6)) {
+  if (const auto cosines = numbers_of(data, DCM_ImageOrientationPatient, 6)) {
     header.orientation.emplace();
     std::copy(cosines->begin(), cosines->end(), header.orientation->begin());
   }
   // Pixel Spacing is the distance of rows, then of columns (PS3.3 10.7.1.3).
-  if (const auto spacing = decimals(data, DCM_PixelSpacing, 2))
+  if (const auto spacing = numbers_of(data, DCM_PixelSpacing, 2))
     header.spacing = glm::dvec2((*spacing)[1], (*spacing)[0]);
   header.thickness = decimal_of(data, DCM_SliceThickness);
   header.slice_spacing = decimal_of(data, DCM_SpacingBetweenSlices);

@@ -87,6 +87,9 @@ constexpr std::uint64_t kLongestValue = 1 << 20;
 /// Text of an attribute without padding, values separated by backslashes; empty if missing.
 std::string text_of(DcmItem& item, const DcmTagKey& tag);
 
+/// Decimal strings of an attribute: exactly `count` numbers, or none.
+std::optional<std::vector<double>> numbers_of(DcmItem& item, const DcmTagKey& tag, std::size_t count);
+
 /// "JPEG 2000 (Lossless only) (1.2.840.10008.1.2.4.90)"; the UID alone where it has no name.
 std::string uid_with_name(const std::string& uid);
 

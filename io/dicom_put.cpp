@@ -83,7 +83,7 @@ DcmItem& append_item(DcmItem& item, const DcmTagKey& sequence) {
 }
 
 void put_empty_sequence(DcmItem& item, const DcmTagKey& sequence) {
-  check(item.insertEmptyElement(sequence), sequence);
+  check(item.insertEmptyElement(sequence, OFTrue), sequence);
 }
 
 void append_code(DcmItem& item, const DcmTagKey& sequence, const std::string& value, const std::string& meaning) {
@@ -93,12 +93,24 @@ void append_code(DcmItem& item, const DcmTagKey& sequence, const std::string& va
   put(code, DCM_CodeMeaning, meaning);
 }
 
-void put_image_plane(DcmItem& item, const Geometry& geometry, std::int64_t k) {
-  const glm::dvec3 row = geometry.direction[0], column = geometry.direction[1];
+void put_position(DcmItem& item, const Geometry& geometry, std::int64_t k) {
   const glm::dvec3 position = point_from_index(geometry)(glm::dvec3(0, 0, static_cast<double>(k)));
   put_decimals(item, DCM_ImagePositionPatient, std::vector{position.x, position.y, position.z}, 1e-6);
+}
+
+void put_orientation(DcmItem& item, const Geometry& geometry) {
+  const glm::dvec3 row = geometry.direction[0], column = geometry.direction[1];
   put_decimals(item, DCM_ImageOrientationPatient, std::vector{row.x, row.y, row.z, column.x, column.y, column.z}, 1e-7);
+}
+
+void put_pixel_spacing(DcmItem& item, const Geometry& geometry) {
   put_decimals(item, DCM_PixelSpacing, std::vector{geometry.spacing.y, geometry.spacing.x}, 1e-7);
+}
+
+void put_image_plane(DcmItem& item, const Geometry& geometry, std::int64_t k) {
+  put_position(item, geometry, k);
+  put_orientation(item, geometry);
+  put_pixel_spacing(item, geometry);
 }
 
 const Geometry& require_hu_volume(const ConstVolumeView& volume) {
@@ -118,15 +130,21 @@ std::span<const std::int16_t> slice_of(const ConstVolumeView& volume, std::size_
   return {reinterpret_cast<const std::int16_t*>(volume.voxels) + k * count, count};
 }
 
-void put_hu_format(DcmItem& item, const Geometry& geometry) {
+void put_pixel_format(DcmItem& item, const Geometry& geometry, int bits, bool is_signed) {
+  require(geometry.size.x <= UINT16_MAX && geometry.size.y <= UINT16_MAX,
+          "a DICOM image has at most 65535 rows and columns, the volume is " + to_string(geometry.size));
   put(item, DCM_SamplesPerPixel, std::uint16_t{1});
   put(item, DCM_PhotometricInterpretation, "MONOCHROME2");
   put(item, DCM_Rows, static_cast<std::uint16_t>(geometry.size.y));
   put(item, DCM_Columns, static_cast<std::uint16_t>(geometry.size.x));
-  put(item, DCM_BitsAllocated, std::uint16_t{16});
-  put(item, DCM_BitsStored, std::uint16_t{16});
-  put(item, DCM_HighBit, std::uint16_t{15});
-  put(item, DCM_PixelRepresentation, std::uint16_t{1});
+  put(item, DCM_BitsAllocated, static_cast<std::uint16_t>(bits));
+  put(item, DCM_BitsStored, static_cast<std::uint16_t>(bits));
+  put(item, DCM_HighBit, static_cast<std::uint16_t>(bits - 1));
+  put(item, DCM_PixelRepresentation, static_cast<std::uint16_t>(is_signed));
+}
+
+void put_hu_format(DcmItem& item, const Geometry& geometry) {
+  put_pixel_format(item, geometry, 16, true);
   put(item, DCM_RescaleIntercept, "0");
   put(item, DCM_RescaleSlope, "1");
   put(item, DCM_RescaleType, "HU");

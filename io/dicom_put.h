@@ -39,6 +39,14 @@ void put_empty_sequence(DcmItem& item, const DcmTagKey& sequence);
 /// Appends a code (PS3.3 8.8) of scheme DCM (PS3.16 annex D) to a code sequence.
 void append_code(DcmItem& item, const DcmTagKey& sequence, const std::string& value, const std::string& meaning);
 
+/// Sets a sequence without items.
+void put_empty_sequence(DcmItem& item, const DcmTagKey& sequence);
+
+/// Image Position (Patient) of slice k, Image Orientation (Patient), Pixel Spacing: as in put_image_plane.
+void put_position(DcmItem& item, const Geometry& geometry, std::int64_t k);
+void put_orientation(DcmItem& item, const Geometry& geometry);
+void put_pixel_spacing(DcmItem& item, const Geometry& geometry);
+
 /// Image Plane (PS3.3 C.7.6.2): spacing, orientation, and the position of slice k. Decimal strings that are there
 /// already and mean the same (1e-6 mm in position, 1e-7 in direction cosines and spacing) are left as they are: nothing
 /// drifts.
@@ -51,6 +59,10 @@ const Geometry& require_hu_volume(const ConstVolumeView& volume);
 
 /// Voxels of slice k.
 std::span<const std::int16_t> slice_of(const ConstVolumeView& volume, std::size_t k);
+
+/// Image Pixel (PS3.3 C.7.6.3) but Pixel Data: one sample of so many bits, all of them stored.
+/// @throws InputError for more than 65535 rows or columns
+void put_pixel_format(DcmItem& item, const Geometry& geometry, int bits, bool is_signed);
 
 /// Image Pixel (PS3.3 C.7.6.3) but Pixel Data, and the Modality LUT: signed 16-bit words that are HU.
 void put_hu_format(DcmItem& item, const Geometry& geometry);
