@@ -9,6 +9,7 @@
 #include <glm/geometric.hpp>
 #include <vector>
 
+#include "io/dicom_along_put.h"
 #include "io/dicom_header.h"
 #include "io/dicom_put.h"
 #include "io/dicom_stream.h"
@@ -30,6 +31,7 @@ class DoseFile {
   DicomDose header() {
     DicomDose dose;
     dose.units = text_of(data(), DCM_DoseUnits);
+    dose.frame_of_reference_uid = text_of(data(), DCM_FrameOfReferenceUID);
     Geometry& grid = dose.geometry;
     grid.size = {word(DCM_Columns), word(DCM_Rows), std::max<std::int64_t>(1, whole_number(DCM_NumberOfFrames))};
     const glm::dvec3 row(number(DCM_ImageOrientationPatient, 0), number(DCM_ImageOrientationPatient, 1),
@@ -138,14 +140,7 @@ class DoseFile {
 
 }  // namespace
 
-bool is_dicom_dose(const std::filesystem::path& path) {
-  std::error_code ignored;  // a name that no file can have
-  if (!std::filesystem::is_regular_file(path, ignored)) return false;
-  prepare_dcmtk();
-  DcmFileFormat format;
-  if (parse_dicom(format, path, DCM_StudyDate).result.bad()) return false;
-  return text_of(*format.getDataset(), DCM_SOPClassUID) == UID_RTDoseStorage;
-}
+bool is_dicom_dose(const std::filesystem::path& path) { return sop_class_of(path) == UID_RTDoseStorage; }
 
 DicomDose read_dose_header(const std::filesystem::path& path) { return DoseFile(path).header(); }
 

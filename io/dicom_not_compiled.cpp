@@ -1,4 +1,5 @@
 #include "io/dicom_dose.h"
+#include "io/dicom_segmentation.h"
 #include "io/dicom_series.h"
 #include "io/dicom_structures.h"
 #include "io/image_file.h"
@@ -52,6 +53,22 @@ StructureSet read_structure_set(const std::filesystem::path&) { refuse(); }
 StructureWriteReport write_structure_set(const std::filesystem::path&, const StructureSet&,
                                          const std::vector<std::vector<Contour>>&, const DicomWriteReport&,
                                          const DicomDerivation&) {
+  refuse();
+}
+
+DoseReport write_derived_dose(const std::filesystem::path&, const ConstVolumeView&, const DicomAlong&,
+                              const WrittenSeries&) {
+  refuse();
+}
+
+bool is_dicom_segmentation(const std::filesystem::path&) { return false; }
+
+DicomSegmentation read_segmentation_header(const std::filesystem::path&, double) { refuse(); }
+
+std::vector<AnyVolume> read_segments(const std::filesystem::path&, const DicomSegmentation&) { refuse(); }
+
+SegmentationReport write_derived_segmentation(const std::filesystem::path&, const std::vector<ConstVolumeView>&,
+                                              const DicomSegmentation&, const DicomAlong&, const WrittenSeries&) {
   refuse();
 }
 

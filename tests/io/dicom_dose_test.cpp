@@ -1,59 +1,14 @@
 #include "io/dicom_dose.h"
 
-#include <dcmtk/config/osconfig.h>
-#include <dcmtk/dcmdata/dctk.h>
 #include <gtest/gtest.h>
 
+#include "tests/support/dose_maker.h"
 #include "tests/support/real_data.h"
 #include "tests/support/scratch.h"
 #include "tests/support/write_file.h"
 
 namespace tetwarp {
 namespace {
-
-/// A small RT Dose file; value n is stored as 1000 n.
-struct MadeDose {
-  int bits = 32;
-  std::string frames = "3", offsets = "0\\2.5\\5", position = "-10\\20\\7", orientation = "1\\0\\0\\0\\1\\0";
-  std::string sop_class = UID_RTDoseStorage;
-  int missing_words = 0;
-
-  void write(const std::filesystem::path& path) const {
-    DcmFileFormat format;
-    DcmDataset& data = *format.getDataset();
-    for (const auto& [tag, text] :
-         std::initializer_list<std::pair<DcmTagKey, std::string>>{{DCM_SOPClassUID, sop_class},
-                                                                  {DCM_SOPInstanceUID, "1.2.3"},
-                                                                  {DCM_Modality, "RTDOSE"},
-                                                                  {DCM_DoseUnits, "GY"},
-                                                                  {DCM_NumberOfFrames, frames},
-                                                                  {DCM_GridFrameOffsetVector, offsets},
-                                                                  {DCM_ImagePositionPatient, position},
-                                                                  {DCM_ImageOrientationPatient, orientation},
-                                                                  {DCM_PixelSpacing, "2\\3"},
-                                                                  {DCM_DoseGridScaling, "0.0005"}}) {
-      data.putAndInsertString(tag, text.c_str());
-    }
-    for (const auto& [tag, value] : std::initializer_list<std::pair<DcmTagKey, int>>{{DCM_Rows, 2},
-                                                                                     {DCM_Columns, 4},
-                                                                                     {DCM_BitsAllocated, bits},
-                                                                                     {DCM_BitsStored, bits},
-                                                                                     {DCM_HighBit, bits - 1},
-                                                                                     {DCM_SamplesPerPixel, 1},
-                                                                                     {DCM_PixelRepresentation, 0}}) {
-      data.putAndInsertUint16(tag, static_cast<Uint16>(value));
-    }
-    std::vector<Uint16> words;
-    for (unsigned n = 0; n < 24; ++n) {
-      const unsigned value = 1000 * n * (bits == 32 ? 10 : 1);
-      words.push_back(static_cast<Uint16>(value));
-      if (bits == 32) words.push_back(static_cast<Uint16>(value >> 16));
-    }
-    words.resize(words.size() - static_cast<std::size_t>(missing_words));
-    data.putAndInsertUint16Array(DCM_PixelData, words.data(), words.size());
-    ASSERT_TRUE(format.saveFile(path.c_str(), EXS_LittleEndianExplicit).good());
-  }
-};
 
 TEST(Dose, IsStoredValuesTimesTheScalingOnTheGridThatTheHeaderGives) {
   const Scratch scratch;

@@ -1,0 +1,131 @@
+#include "io/dicom_segmentation.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/says.h"
+#include "tests/support/scratch.h"
+#include "tests/support/seg_maker.h"
+
+namespace tetwarp {
+namespace {
+
+/// Two that overlap: the first in slices 0 and 2, the second in 1 and 2.
+int two_organs(int segment, int i, int j, int k) {
+  if (segment == 0) return k != 1 && (i + j) % 3 == 0 ? 1 : 0;
+  return k > 0 && i >= 2 && j >= 1 ? 1 : 0;
+}
+
+TEST(Segmentation, EachSegmentIsAVolumeAndMissingFramesAreEmpty) {
+  const Scratch scratch;
+  for (const bool fractional : {false, true}) {
+    const int scale = fractional ? 100 : 1;
+    const MadeSeg made{.fractional = fractional, .segments = {7, 3}, .value = [&](int n, int i, int j, int k) {
+                         return two_organs(n, i, j, k) * (scale - (fractional ? i : 0));
+                       }};
+    made.write(scratch / "seg");
+    ASSERT_TRUE(is_dicom_segmentation(scratch / "seg"));
+    const DicomSegmentation seg = read_segmentation_header(scratch / "seg");
+    EXPECT_EQ(seg.geometry, (Geometry{{6, 4, 5}, {0.5, 0.75, 2.5}, {-10, -20, 27.5}, glm::dmat3(1)}));
+    EXPECT_EQ(seg.fractional, fractional);
+    EXPECT_EQ(seg.largest, fractional ? 255 : 1);
+    EXPECT_EQ(seg.frame_of_reference_uid, "1.2.4");
+    ASSERT_EQ(seg.segments.size(), 2U);
+    EXPECT_EQ(seg.segments[0].number, 7);
+    EXPECT_EQ(seg.segments[1].label, "Organ 3");
+    EXPECT_EQ(seg.frames.size(), 4U);
+    const std::vector<AnyVolume> volumes = read_segments(scratch / "seg", seg);
+    ASSERT_EQ(volumes.size(), 2U);
+    for (int n = 0; n < 2; ++n) {
+      const auto voxels = volumes[static_cast<std::size_t>(n)].as<std::uint8_t>();
+      for (int at = 0; at < 6 * 4 * 5; ++at) {
+        const int i = at % 6, j = at / 6 % 4, k = at / 24 - 1;
+        const int expected = k < 0 || k > 2 ? 0 : made.value(n, i, j, k);
+        ASSERT_EQ(int{voxels[static_cast<std::size_t>(at)]}, expected) << n << " " << i << " " << j << " " << k;
+      }
+    }
+  }
+}
+
+TEST(Segmentation, SlicesAreAsFarApartAsTheFileSaysElseAsTheSeriesElseAsTheClosestFrames) {
+  const Scratch scratch;
+  const auto outer = [](int, int, int, int k) { return k % 2 == 0 ? 1 : 0; };  // 5 mm apart
+  MadeSeg{.value = outer}.write(scratch / "stated");
+  EXPECT_EQ(read_segmentation_header(scratch / "stated").geometry.spacing.z, 2.5);
+  EXPECT_EQ(read_segmentation_header(scratch / "stated").geometry.size.z, 5);
+  MadeSeg{.value = outer, .spacing_between = ""}.write(scratch / "not");
+  EXPECT_EQ(read_segmentation_header(scratch / "not", 1.25).geometry.spacing.z, 1.25);
+  EXPECT_EQ(read_segmentation_header(scratch / "not", 1.3).geometry.spacing.z, 5);
+  EXPECT_EQ(read_segmentation_header(scratch / "not").geometry.size.z, 4);
+  MadeSeg{.slices = 1, .value = outer, .spacing_between = ""}.write(scratch / "one");
+  EXPECT_EQ(read_segmentation_header(scratch / "one").geometry.spacing.z, 3);  // Slice Thickness
+  EXPECT_EQ(read_segmentation_header(scratch / "one", 2).geometry.spacing.z, 2);
+}
+
+DcmItem& frame_of(DcmDataset& data, long n) {
+  DcmItem* item = nullptr;
+  if (data.findAndGetSequenceItem(DCM_PerFrameFunctionalGroupsSequence, item, n).bad())
+    throw std::runtime_error("none");
+  return *item;
+}
+
+void move_frame(DcmDataset& data, long n, const std::string& position) {
+  DcmItem* plane = nullptr;
+  frame_of(data, n).findAndGetSequenceItem(DCM_PlanePositionSequence, plane);
+  MadeSeg::text(*plane, DCM_ImagePositionPatient, position);
+}
+
+TEST(Segmentation, WhatIsNotOnOneEvenGridOrCutShortOrContradictsItselfIsRefused) {
+  const Scratch scratch;
+  const auto refused = [&](const char* names, const std::function<void(DcmDataset&)>& edit, bool fractional = false) {
+    MadeSeg{.fractional = fractional, .value = two_organs, .edit = edit}.write(scratch / "seg");
+    try {
+      read_segments(scratch / "seg", read_segmentation_header(scratch / "seg"));
+      FAIL() << names;
+    } catch (const InputError& error) {
+      EXPECT_TRUE(says(error.what(), {names, (scratch / "seg").string()}));
+    }
+  };
+  refused("(0028,0100) BitsAllocated 8", [](DcmDataset& data) { MadeSeg::word(data, DCM_BitsAllocated, 8); });
+  refused(
+      "(0028,0101) BitsStored 16", [](DcmDataset& data) { MadeSeg::word(data, DCM_BitsStored, 16); }, true);
+  refused("Segmentation Type", [](DcmDataset& data) { MadeSeg::text(data, DCM_SegmentationType, "LABELMAP"); });
+  refused(
+      "above (0062,000e)",
+      [](DcmDataset& data) {
+        MadeSeg::word(data, DCM_MaximumFractionalValue, 1);
+        Uint8 pixels[96] = {0, 0, 2};
+        data.putAndInsertUint8Array(DCM_PixelData, pixels, 96);
+      },
+      true);
+  refused("not on an even grid", [](DcmDataset& data) { move_frame(data, 1, "-10\\-20\\33.5"); });
+  refused("above one another", [](DcmDataset& data) { move_frame(data, 1, "-9\\-20\\32.5"); });
+  refused("twice", [](DcmDataset& data) { move_frame(data, 2, "-10\\-20\\30"); });
+  refused("ImagePositionPatient", [](DcmDataset& data) { move_frame(data, 2, "-10\\-20"); });
+  refused("at most 2500", [](DcmDataset& data) { move_frame(data, 3, "-10\\-20\\25030"); });
+  refused("Number of Frames", [](DcmDataset& data) { MadeSeg::text(data, DCM_NumberOfFrames, "5"); });
+  refused("cut short", [](DcmDataset& data) {
+    Uint8 pixels[10] = {};
+    data.putAndInsertUint8Array(DCM_PixelData, pixels, 10);
+  });
+  refused("Pixel Data", [](DcmDataset& data) { data.findAndDeleteElement(DCM_PixelData); });
+  refused("parallel", [](DcmDataset& data) {
+    MadeSeg::text(MadeSeg::append(frame_of(data, 2), DCM_PlaneOrientationSequence), DCM_ImageOrientationPatient,
+                  "0\\1\\0\\-1\\0\\0");
+  });
+  refused("does not describe", [](DcmDataset& data) {
+    DcmItem* segment = nullptr;
+    data.findAndGetSequenceItem(DCM_SegmentSequence, segment, 1);
+    MadeSeg::word(*segment, DCM_SegmentNumber, 9);
+  });
+  refused("two segments", [](DcmDataset& data) {
+    DcmItem* segment = nullptr;
+    data.findAndGetSequenceItem(DCM_SegmentSequence, segment, 1);
+    MadeSeg::word(*segment, DCM_SegmentNumber, 1);
+  });
+  refused("SharedFunctionalGroups",
+          [](DcmDataset& data) { data.findAndDeleteElement(DCM_SharedFunctionalGroupsSequence); });
+  refused("no DICOM segmentation", [](DcmDataset& data) { MadeSeg::text(data, DCM_SOPClassUID, UID_CTImageStorage); });
+}
+
+}  // namespace
+}  // namespace tetwarp

@@ -1,0 +1,176 @@
+#pragma once
+
+#include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmdata/dctk.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <glm/vec3.hpp>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "tests/support/dicom_maker.h"
+
+/// A small DICOM segmentation as an annotation program might write it: slice by slice, frames without a voxel left out.
+struct MadeSeg {
+  int columns = 6, rows = 4, slices = 3;
+  glm::dvec3 origin{-10, -20, 30}, spacing{0.5, 0.75, 2.5};
+  bool fractional = false;
+  int largest = 255;                                  ///< Maximum Fractional Value
+  std::vector<int> segments = {1, 2};                 ///< Segment Numbers
+  std::function<int(int, int, int, int)> value = {};  ///< of segment n at (i, j, k)
+  std::string spacing_between = "2.5", frame = "1.2.4", study = "1.2", patient = "SECRET-ID";
+  std::function<void(DcmDataset&)> edit = {};  ///< last word before writing
+
+  void write(const std::filesystem::path& path) const {
+    DcmFileFormat format;
+    DcmDataset& data = *format.getDataset();
+    put_header(data);
+    put_segments(data);
+    put_shared(data);
+    put_frames(data);
+    if (edit) edit(data);
+    const OFCondition result = format.saveFile(path.c_str(), EXS_LittleEndianExplicit);
+    if (result.bad()) throw std::runtime_error(result.text());
+  }
+
+  static void text(DcmItem& item, const DcmTagKey& tag, const std::string& written) {
+    item.putAndInsertString(tag, written.c_str());
+  }
+  static void word(DcmItem& item, const DcmTagKey& tag, int written) {
+    item.putAndInsertUint16(tag, static_cast<Uint16>(written));
+  }
+  static DcmItem& append(DcmItem& item, const DcmTagKey& sequence) {
+    DcmItem* appended = nullptr;
+    if (item.findOrCreateSequenceItem(sequence, appended, -2).bad()) throw std::runtime_error("no item");
+    return *appended;
+  }
+  static void code(DcmItem& item, const DcmTagKey& sequence, const char* coded, const char* scheme,
+                   const char* meaning) {
+    DcmItem& to = append(item, sequence);
+    text(to, DCM_CodeValue, coded);
+    text(to, DCM_CodingSchemeDesignator, scheme);
+    text(to, DCM_CodeMeaning, meaning);
+  }
+  static constexpr char kDimensions[] = "1.2.6.1";
+
+ private:
+  void put_header(DcmDataset& data) const {
+    for (const auto& [tag, given] : std::initializer_list<std::pair<DcmTagKey, std::string>>{
+             {DCM_SOPClassUID, UID_SegmentationStorage},
+             {DCM_SOPInstanceUID, "1.2.6.2"},
+             {DCM_SeriesInstanceUID, "1.2.6"},
+             {DCM_StudyInstanceUID, study},
+             {DCM_FrameOfReferenceUID, frame},
+             {DCM_PositionReferenceIndicator, ""},
+             {DCM_Modality, "SEG"},
+             {DCM_ImageType, "DERIVED\\PRIMARY"},
+             {DCM_PatientName, "SECRET^NAME"},
+             {DCM_PatientID, patient},
+             {DCM_PatientBirthDate, ""},
+             {DCM_PatientSex, ""},
+             {DCM_StudyDate, "20200102"},
+             {DCM_StudyTime, "030405"},
+             {DCM_StudyID, "1"},
+             {DCM_AccessionNumber, ""},
+             {DCM_ReferringPhysicianName, ""},
+             {DCM_SeriesNumber, "5"},
+             {DCM_SeriesDescription, "Organs"},
+             {DCM_InstanceNumber, "1"},
+             {DCM_ContentDate, "20200103"},
+             {DCM_ContentTime, "040506"},
+             {DCM_Manufacturer, "Maker"},
+             {DCM_ManufacturerModelName, "Model"},
+             {DCM_DeviceSerialNumber, "7"},
+             {DCM_SoftwareVersions, "1.0"},
+             {DCM_ContentLabel, "ORGANS"},
+             {DCM_ContentDescription, "Two organs"},
+             {DCM_ContentCreatorName, "SECRET^READER"},
+             {DCM_LossyImageCompression, "00"},
+             {DCM_PhotometricInterpretation, "MONOCHROME2"},
+             {DcmTagKey(0x0029, 0x0010), "PRIVATE MAKER"},
+             {DCM_SegmentationType, fractional ? "FRACTIONAL" : "BINARY"}}) {
+      text(data, tag, given);
+    }
+    const int bits = fractional ? 8 : 1;
+    for (const auto& [tag, given] : std::initializer_list<std::pair<DcmTagKey, int>>{{DCM_Rows, rows},
+                                                                                     {DCM_Columns, columns},
+                                                                                     {DCM_SamplesPerPixel, 1},
+                                                                                     {DCM_BitsAllocated, bits},
+                                                                                     {DCM_BitsStored, bits},
+                                                                                     {DCM_HighBit, bits - 1},
+                                                                                     {DCM_PixelRepresentation, 0}})
+      word(data, tag, given);
+    if (!fractional) return;
+    text(data, DCM_SegmentationFractionalType, "OCCUPANCY");
+    word(data, DCM_MaximumFractionalValue, largest);
+  }
+
+  void put_segments(DcmDataset& data) const {
+    for (const int number : segments) {
+      DcmItem& item = append(data, DCM_SegmentSequence);
+      word(item, DCM_SegmentNumber, number);
+      text(item, DCM_SegmentLabel, "Organ " + std::to_string(number));
+      text(item, DCM_SegmentAlgorithmType, "SEMIAUTOMATIC");
+      text(item, DCM_SegmentAlgorithmName, "Painter");
+      text(item, DCM_TrackingID, "organ-" + std::to_string(number));
+      text(item, DCM_TrackingUID, "1.2.6.9." + std::to_string(number));
+      code(item, DCM_SegmentedPropertyCategoryCodeSequence, "123037004", "SCT", "Anatomical Structure");
+      code(item, DCM_SegmentedPropertyTypeCodeSequence, "10200004", "SCT", "Liver");
+      text(item, DcmTagKey(0x0029, 0x0010), "PRIVATE MAKER");
+    }
+    text(append(data, DCM_DimensionOrganizationSequence), DCM_DimensionOrganizationUID, kDimensions);
+    const auto dimension = [&](const DcmTagKey& pointer, const DcmTagKey& group) {
+      DcmItem& item = append(data, DCM_DimensionIndexSequence);
+      text(item, DCM_DimensionOrganizationUID, kDimensions);
+      item.putAndInsertTagKey(DCM_DimensionIndexPointer, pointer);
+      item.putAndInsertTagKey(DCM_FunctionalGroupPointer, group);
+    };
+    dimension(DCM_ImagePositionPatient, DCM_PlanePositionSequence);
+    dimension(DCM_ReferencedSegmentNumber, DCM_SegmentIdentificationSequence);
+  }
+
+  void put_shared(DcmDataset& data) const {
+    DcmItem& shared = append(data, DCM_SharedFunctionalGroupsSequence);
+    text(append(shared, DCM_PlaneOrientationSequence), DCM_ImageOrientationPatient, "1\\0\\0\\0\\1\\0");
+    DcmItem& measures = append(shared, DCM_PixelMeasuresSequence);
+    text(measures, DCM_PixelSpacing, std::to_string(spacing.y) + "\\" + std::to_string(spacing.x));
+    text(measures, DCM_SliceThickness, "3");
+    if (!spacing_between.empty()) text(measures, DCM_SpacingBetweenSlices, spacing_between);
+  }
+
+  void put_frames(DcmDataset& data) const {
+    std::vector<Uint8> pixels;
+    std::size_t bit = 0;
+    int frames = 0;
+    for (int k = 0; k < slices; ++k) {
+      for (std::size_t n = 0; n < segments.size(); ++n) {
+        if (is_empty(static_cast<int>(n), k)) continue;
+        ++frames;
+        for (int pixel = 0; pixel < rows * columns; ++pixel, ++bit) {
+          const int here = value(static_cast<int>(n), pixel % columns, pixel / columns, k);
+          if (fractional || bit % 8 == 0) pixels.push_back(0);
+          pixels.back() = static_cast<Uint8>(fractional ? here : pixels.back() | here << bit % 8);
+        }
+        DcmItem& groups = append(data, DCM_PerFrameFunctionalGroupsSequence);
+        const Uint32 index[2] = {static_cast<Uint32>(k + 1), static_cast<Uint32>(n + 1)};
+        append(groups, DCM_FrameContentSequence).putAndInsertUint32Array(DCM_DimensionIndexValues, index, 2);
+        text(append(groups, DCM_PlanePositionSequence), DCM_ImagePositionPatient,
+             position_text(origin.x, origin.y, origin.z + k * spacing.z));
+        word(append(groups, DCM_SegmentIdentificationSequence), DCM_ReferencedSegmentNumber, segments[n]);
+      }
+    }
+    text(data, DCM_NumberOfFrames, std::to_string(frames));
+    if (pixels.size() % 2 != 0) pixels.push_back(0);
+    data.putAndInsertUint8Array(DCM_PixelData, pixels.data(), pixels.size());
+  }
+
+  bool is_empty(int segment, int k) const {
+    for (int pixel = 0; pixel < rows * columns; ++pixel) {
+      if (value(segment, pixel % columns, pixel / columns, k) != 0) return false;
+    }
+    return true;
+  }
+};
