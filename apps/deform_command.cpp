@@ -35,6 +35,7 @@ class Deformation {
   void resample_onto_own_grids();
   void write();
   void write_preview_picture();
+  DicomDerivation derivation() const;
   void begin_series();
   void write_slices(const Region& slices);
   Target main_target();
@@ -196,23 +197,28 @@ void Deformation::resample_onto_own_grids() {
   }
 }
 
-void Deformation::begin_series() {
-  const std::string parameters =
-      "interpolation=" + std::string(name_of(options_.interpolation)) + " outside=" + name_of(options_.outside) +
-      " background=" + json(record_.background).dump() +
-      (record_.field.direction == Direction::pull ? " direction=pull" : " direction=forward") +
-      (options_.preserve_mass ? " preserve=mass" : "");
+/// What is true of all that goes through the field; INPUT's voxels have parameters of their own.
+DicomDerivation Deformation::derivation() const {
   const bool pull = record_.field.direction == Direction::pull, deformed = pull || !record_.field.forward.identity;
   const char* what =
       !deformed ? "Resampled by the identity" : (pull ? "Deformed by a pull field" : "Deformed by a field of vertices");
-  series_.emplace(
-      record_.outputs.volume, record_.plan.grid, *record_.input.dicom->headers,
-      DicomDerivation{.field_sha256 = record_.field_sha256,
-                      .parameters = parameters,
-                      .description = std::string(what) + ", " + name_of(options_.interpolation) + " interpolation",
-                      .deformed = deformed,
-                      .background_hu = record_.background,
-                      .form = options_.dicom});
+  return {.field_sha256 = record_.field_sha256,
+          .parameters =
+              std::string("outside=") + name_of(options_.outside) + (pull ? " direction=pull" : " direction=forward"),
+          .description = what,
+          .deformed = deformed,
+          .background_hu = record_.background,
+          .form = options_.dicom};
+}
+
+void Deformation::begin_series() {
+  DicomDerivation of_input = derivation();
+  of_input.parameters = "interpolation=" + std::string(name_of(options_.interpolation)) +
+                        " outside=" + name_of(options_.outside) + " background=" + json(record_.background).dump() +
+                        (record_.field.direction == Direction::pull ? " direction=pull" : " direction=forward") +
+                        (options_.preserve_mass ? " preserve=mass" : "");
+  of_input.description += std::string(", ") + name_of(options_.interpolation) + " interpolation";
+  series_.emplace(record_.outputs.volume, record_.plan.grid, *record_.input.dicom->headers, std::move(of_input));
 }
 
 /// While others are resampled.
@@ -232,7 +238,11 @@ void Deformation::write() {
                 {.compression = options_.compression.value_or(-1), .metadata = {{"descrip", made_by}}});
   }
   if (!record_.outputs.preview.empty()) write_preview_picture();
-  record_.outputs.further->write(options_.compression, made_by);
+  std::optional<DerivedOutput> series;
+  if (record_.dicom_report)
+    series.emplace(WrittenSeries{*record_.input.dicom->headers, *record_.dicom_report, record_.plan.grid},
+                   derivation());
+  record_.outputs.further->write(options_.compression, made_by, series);
   record_.points.write(record_.outputs.points);
   write_json(record_.outputs.sidecar, sidecar(record_));
   record_.stages.emplace_back("write", std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
@@ -291,6 +301,7 @@ int Deformation::run() {
   record_.outputs.set.write([&] { write(); });
   for (const std::string& note : notes_) say(options_.common, "tetwarp: warning: " + note);
   for (const std::string& note : record_.field.notes) say(options_.common, "tetwarp: note: " + note);
+  for (const std::string& note : record_.outputs.further->notes()) say(options_.common, "tetwarp: note: " + note);
   for (const std::string& note : record_.points.notes()) say(options_.common, "tetwarp: note: " + note);
   if (!record_.set_aside.empty()) {
     const bool one = record_.set_aside.size() == 1;

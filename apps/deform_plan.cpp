@@ -93,7 +93,7 @@ DeformOutputs begin_outputs(const DeformOptions& options, const PointsOption& po
   outputs.sidecar = outputs.set.add(sidecar_of(options.output));
   outputs.maps.emplace(options.maps, options.pull_field.empty() ? Direction::forward : Direction::pull, series,
                        outputs.set);
-  outputs.further.emplace(options.with, outputs.set);
+  outputs.further.emplace(options.with, series, outputs.set);
   outputs.report = outputs.set.add(options.report);
   outputs.preview = outputs.set.add(options.preview);
   outputs.points = points.add_outputs(outputs.set);
@@ -113,6 +113,7 @@ DeformPlan plan_deformation(const DeformOptions& options, DeformOutputs& outputs
     throw UsageError("--background " + nlohmann::json(*options.background).dump() + " does not fit the voxels, " +
                      to_string(input.type) + "; choose a value in their range");
   }
+  outputs.further->open(input);
   DeformPlan plan;
   if (options.grid != "fit") plan.grid = output_grid(options.grid, input.geometry, {}, options.outside);
   if (outputs.series) outputs.maps->check(plan.grid);

@@ -5,20 +5,12 @@
 #include <string>
 #include <vector>
 
+#include "apps/further_dicom.h"
 #include "apps/input.h"
 #include "apps/options.h"
 #include "apps/output.h"
 
 namespace tetwarp::apps {
-
-/// One --with: IN=OUT, and what follows OUT.
-struct FurtherOptions {
-  InputOptions input;
-  std::filesystem::path output;
-  std::optional<Interpolation> interpolation;  ///< none: that of INPUT
-  std::optional<double> background;            ///< none: as for INPUT
-  bool own = false;                            ///< onto its own grid instead of the output's
-};
 
 /// @throws UsageError for a text that is not IN=OUT[:nearest|linear|cubic|vote][:background=V][:own]
 FurtherOptions parse_further(const std::string& text);
@@ -26,33 +18,47 @@ FurtherOptions parse_further(const std::string& text);
 /// Volumes that go through the same field as INPUT: labels, doses, other modalities.
 class FurtherVolumes {
  public:
-  /// Begins their outputs. @throws UsageError, and what OutputSet::add throws
-  FurtherVolumes(const std::vector<std::string>& texts, OutputSet& outputs);
+  /// Begins their outputs. @param series  whether OUTPUT is a DICOM series, to which DICOM objects can refer
+  /// @throws UsageError, and what OutputSet::add throws
+  FurtherVolumes(const std::vector<std::string>& texts, bool series, OutputSet& outputs);
 
   /// All inputs, for OutputSet.
   static std::vector<std::filesystem::path> inputs(const std::vector<std::string>& texts);
-  /// From their headers: with their outputs, where those have `output_voxels`.
-  std::uint64_t bytes(std::uint64_t output_voxels);
+  /// Reads their headers. @throws UsageError, InputError for what does not go with its output or with INPUT
+  void open(const InputHeader& input);
+  /// What they hold: with their outputs, where those have `output_voxels`.
+  std::uint64_t bytes(std::uint64_t output_voxels) const;
   void read(const CommonOptions& common, const Control& control);
 
   /// Grids of their own that volumes go back onto, each once.
   std::vector<Geometry> own_grids() const;
   /// What goes onto a grid: those that asked for their own, or the others. The targets refer to this object.
   std::vector<Target> targets_on(const Geometry& grid, bool own, Interpolation otherwise);
-  void write(const std::optional<int>& compression, const std::string& descrip) const;
+  /// @param series  as it was written, and how: where OUTPUT is one
+  void write(const std::optional<int>& compression, const std::string& descrip,
+             const std::optional<DerivedOutput>& series);
   nlohmann::json describe() const;
+  /// What people should know.
+  const std::vector<std::string>& notes() const { return notes_; }
 
  private:
   struct One {
     FurtherOptions options;
     std::filesystem::path staged;
     InputHeader header;
-    InputVolume input;
-    AnyVolume output;
+    std::optional<DicomSegmentation> segmentation;
+    Geometry own_grid;
+    InputVolume input;                        ///< its volume is the only source, or there is none
+    std::vector<AnyVolume> sources, outputs;  ///< of a segmentation one each segment, else one
     std::string sha256;
-    Target target;
+    Target target;  ///< of the first
+    std::optional<DoseReport> dose_report;
+    std::optional<SegmentationReport> segmentation_report;
   };
+  void write_object(One& one, const DerivedOutput& series);
+
   std::deque<One> volumes_;
+  std::vector<std::string> notes_;
 };
 
 }  // namespace tetwarp::apps

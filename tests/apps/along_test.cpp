@@ -1,0 +1,274 @@
+// `tetwarp deform --with IN=OUT.dcm`: doses and segmentations that go along with a derived series.
+#include "tests/apps/along_case.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "tests/support/real_data.h"
+#include "tests/support/says.h"
+
+namespace {
+
+using namespace tetwarp;
+
+constexpr char kTwist[] = " -f twist:angle=25 --outside background ";
+
+double largest_difference(std::span<const float> a, std::span<const float> b) {
+  double largest = a.size() == b.size() ? 0 : INFINITY;
+  for (std::size_t n = 0; n < a.size() && n < b.size(); ++n) largest = std::max(largest, std::abs(double{a[n]} - b[n]));
+  return largest;
+}
+
+double quantum(const AlongCase& kase, std::size_t n = 0) {
+  return kase.with("out.json")[n]["dicom"]["dose_grid_scaling"].get<double>();
+}
+
+TEST(DoseAlong, IdentityKeepsDosesWithinHalfAQuantum) {
+  const AlongCase kase;
+  AlongCase::dose().write(kase.scratch / "dose.dcm");
+  MadeDose small{.offsets = "0\\-3\\-6", .position = "-9\\-19.5\\41", .spacing = "1\\1"};  // frames downwards
+  small.write(kase.scratch / "small.dcm");
+  kase.run("deform ct -f identity -o out --with dose.dcm=moved.dcm --with small.dcm=own.dcm:own");
+  for (const auto& [before, after, n] :
+       {std::tuple("dose.dcm", "moved.dcm", std::size_t{0}), std::tuple("small.dcm", "own.dcm", std::size_t{1})}) {
+    const AnyVolume source = read_dose(kase.scratch / before), found = read_dose(kase.scratch / after);
+    EXPECT_TRUE(same_grid(found.geometry(), source.geometry(), 1e-6)) << after;
+    const auto doses = source.as<float>();
+    const float largest = *std::max_element(doses.begin(), doses.end());
+    EXPECT_NEAR(quantum(kase, n), largest / 2147483647.0, 1e-9 * quantum(kase, n));
+    // Half a quantum, and what float32 makes of it.
+    EXPECT_LE(largest_difference(doses, found.as<float>()), quantum(kase, n) / 2 + 1e-7 * largest) << after;
+  }
+  EXPECT_EQ(kase.with("out.json")[0]["dicom"]["units"], "GY");
+  TETWARP_CHECK_ALONG_WITH(kase, "moved.dcm", "dose.dcm", "dump");
+  TETWARP_CHECK_ALONG_WITH(kase, "own.dcm", "small.dcm", "-");
+}
+
+TEST(DoseAlong, ATranslationByWholeVoxelsMovesDosesExactlyAndLeavesNothingOutside) {
+  const AlongCase kase;
+  MadeDose made = AlongCase::dose();
+  made.stored = [](unsigned n) { return n * 7919 % 40009 + 10; };  // nowhere 0
+  made.write(kase.scratch / "dose.dcm");
+  kase.run("deform ct -f translate:by=1/2/1vox --outside background -o out --with dose.dcm=moved.dcm");
+  const AnyVolume source = read_dose(kase.scratch / "dose.dcm"), found = read_dose(kase.scratch / "moved.dcm");
+  const auto before = source.as<float>(), after = found.as<float>();
+  ASSERT_EQ(after.size(), before.size());
+  for (int k = 0; k < AlongCase::kSlices; ++k) {
+    for (int j = 0; j < AlongCase::kRows; ++j) {
+      for (int i = 0; i < AlongCase::kColumns; ++i) {
+        const auto at = [](int x, int y, int z) {
+          return static_cast<std::size_t>((z * AlongCase::kRows + y) * AlongCase::kColumns + x);
+        };
+        const float expected = i >= 1 && j >= 2 && k >= 1 ? before[at(i - 1, j - 2, k - 1)] : 0;
+        ASSERT_NEAR(after[at(i, j, k)], expected, quantum(kase) / 2 + 1e-6) << i << " " << j << " " << k;
+      }
+    }
+  }
+  TETWARP_CHECK_ALONG_WITH(kase, "moved.dcm", "dose.dcm", "dump");
+}
+
+TEST(DoseAlong, IsWhatAnImageOfItBecomesAndPydicomReadsTheSame) {
+  const AlongCase kase;
+  AlongCase::dose().write(kase.scratch / "dose.dcm");
+  kase.run("deform ct" + std::string(kTwist) +
+           "-o out --with dose.dcm=moved.dcm --with dose.dcm=moved.nii --with dose.dcm=cubic.dcm:cubic:background=0.5");
+  const AnyVolume image = kase.image("moved.nii"), dose = read_dose(kase.scratch / "moved.dcm");
+  EXPECT_LE(largest_difference(image.as<float>(), dose.as<float>()), quantum(kase) + 2e-6);
+  const auto cubic = read_dose(kase.scratch / "cubic.dcm");
+  const auto doses = cubic.as<float>();
+  EXPECT_GE(*std::min_element(doses.begin(), doses.end()), 0);  // cubic overshoots
+  EXPECT_GT(std::count_if(doses.begin(), doses.end(), [](float value) { return std::abs(value - 0.5F) < 1e-6F; }), 10);
+  TETWARP_CHECK_ALONG_WITH(kase, "moved.dcm", "dose.dcm", "dump");
+  const std::vector<double> read = kase.dumped<double>("dump");
+  ASSERT_EQ(read.size(), image.as<float>().size());
+  for (std::size_t n = 0; n < read.size(); ++n) ASSERT_NEAR(read[n], image.as<float>()[n], quantum(kase) + 2e-6) << n;
+}
+
+/// Of the real plan. Its one CT slice is no volume, so a made-up one stands around the dose.
+TEST(DoseAlong, OfARealPlanIsReadByPlastimatchAndPydicomAsTheImageOfIt) {
+  TETWARP_REAL_DATA(folder, "rt-breast");
+  const AlongCase kase;
+  std::filesystem::copy(folder / "rtdose.dcm", kase.scratch / "dose.dcm");
+  DcmFileFormat ct;
+  ASSERT_TRUE(ct.loadFile((folder / "ct.0.dcm").c_str()).good());
+  const auto text = [&](const DcmTagKey& tag) {
+    OFString value;
+    ct.getDataset()->findAndGetOFString(tag, value);
+    return std::string(value.c_str());
+  };
+  std::filesystem::remove_all(kase.scratch / "ct");
+  write_stack(kase.scratch / "ct", 40, [&](int k, MadeSlice& slice) {
+    slice.columns = 60;
+    slice.rows = 50;
+    slice.spacing = "5\\6";
+    slice.position = position_text(-180, -380, -100 + 6 * k);
+    slice.frame = text(DCM_FrameOfReferenceUID);
+    slice.study = text(DCM_StudyInstanceUID);
+    slice.edit = [&](DcmDataset& data) {
+      for (const DcmTagKey& tag : {DCM_PatientName, DCM_PatientID}) data.putAndInsertString(tag, text(tag).c_str());
+    };
+  });
+  kase.run("deform ct" + std::string(kTwist) +
+           "-o out --with dose.dcm=moved.dcm --with dose.dcm=moved.nii --with dose.dcm=own.dcm:own --with "
+           "dose.dcm=own.nii:own");
+  for (const std::string name : {"moved", "own"}) {
+    const AnyVolume image = kase.image(name + ".nii"), dose = read_dose(kase.scratch / (name + ".dcm"));
+    EXPECT_TRUE(same_grid(image.geometry(), dose.geometry(), 1e-3));
+    EXPECT_LE(largest_difference(image.as<float>(), dose.as<float>()), quantum(kase) + 2e-6) << name;
+    const auto doses = dose.as<float>();
+    EXPECT_GT(*std::max_element(doses.begin(), doses.end()), 10) << name;
+  }
+  if (std::system("command -v plastimatch > /dev/null") == 0) {
+    ASSERT_EQ(
+        run_program(kase.scratch.path(), "plastimatch", "convert --input moved.dcm --output-dose-img read.mha").status,
+        0);
+    const AnyVolume read = kase.image("read.mha"), image = kase.image("moved.nii");
+    EXPECT_TRUE(same_grid(read.geometry(), image.geometry(), 1e-3));
+    EXPECT_LE(largest_difference(read.as<float>(), image.as<float>()), quantum(kase) + 4e-6);
+  }
+  TETWARP_CHECK_ALONG_WITH(kase, "moved.dcm", "dose.dcm", "dump");
+  TETWARP_CHECK_ALONG_WITH(kase, "own.dcm", "dose.dcm", "-");
+}
+
+/// Voxel (i, j, k) of the series in a segmentation that we read.
+struct ReadSeg {
+  explicit ReadSeg(const std::filesystem::path& path)
+      : header(read_segmentation_header(path)), volumes(read_segments(path, header)) {}
+
+  int at(std::size_t segment, int i, int j, int k) const {
+    const glm::dvec3 index =
+        index_from_point(header.geometry)(point_from_index(AlongCase::grid())(glm::dvec3(i, j, k)));
+    const glm::i64vec3 voxel(std::llround(index.x), std::llround(index.y), std::llround(index.z)),
+        size = header.geometry.size;
+    if (voxel.z < 0 || voxel.z >= size.z) return 0;
+    return volumes[segment]
+        .as<std::uint8_t>()[static_cast<std::size_t>(voxel.x + size.x * (voxel.y + size.y * voxel.z))];
+  }
+
+  DicomSegmentation header;
+  std::vector<AnyVolume> volumes;
+};
+
+void expect_segments(const std::filesystem::path& path, const std::function<int(int, int, int, int)>& expected) {
+  const ReadSeg found(path);
+  ASSERT_EQ(found.volumes.size(), 2U);
+  for (int n = 0; n < 2; ++n) {
+    for (int k = 0; k < AlongCase::kSlices; ++k) {
+      for (int j = 0; j < AlongCase::kRows; ++j) {
+        for (int i = 0; i < AlongCase::kColumns; ++i)
+          ASSERT_EQ(found.at(static_cast<std::size_t>(n), i, j, k), expected(n, i, j, k))
+              << path << ": segment " << n << " at " << i << " " << j << " " << k;
+      }
+    }
+  }
+}
+
+TEST(SegAlong, IdentityKeepsEveryBit) {
+  const AlongCase kase;
+  AlongCase::seg().write(kase.scratch / "seg.dcm");
+  AlongCase::fractions().write(kase.scratch / "part.dcm");
+  MadeSeg fine = AlongCase::seg();  // two slices for one of the series
+  fine.slices = 11;
+  fine.spacing.z = 1.25;
+  fine.spacing_between = "1.25";
+  fine.value = [](int n, int i, int j, int k) { return AlongCase::organs(n, i, j, k / 2); };
+  fine.write(kase.scratch / "fine.dcm");
+  kase.run(
+      "deform ct -f identity -o out --with seg.dcm=seg_out.dcm --with part.dcm=part_out.dcm --with "
+      "seg.dcm=seg_own.dcm:own --with fine.dcm=fine_own.dcm:own");
+  expect_segments(kase.scratch / "seg_out.dcm", AlongCase::organs);
+  expect_segments(kase.scratch / "seg_own.dcm", AlongCase::organs);
+  expect_segments(kase.scratch / "part_out.dcm", AlongCase::fractions().value);
+  EXPECT_EQ(read_segmentation_header(kase.scratch / "seg_out.dcm").frames.size(), 8U);  // 5 and 3 slices
+  const nlohmann::json with = kase.with("out.json");
+  EXPECT_EQ(with[0]["dicom"]["segments"][0], (nlohmann::json{{"number", 1}, {"frames", 5}}));
+  EXPECT_EQ(with[0]["interpolation"], "vote");
+  EXPECT_EQ(with[1]["interpolation"], "linear");
+  TETWARP_CHECK_ALONG_WITH(kase, "seg_out.dcm", "seg.dcm", "dump");
+  TETWARP_CHECK_ALONG_WITH(kase, "part_out.dcm", "part.dcm", "dump");
+  TETWARP_CHECK_ALONG_WITH(kase, "seg_own.dcm", "seg.dcm", "dump");
+  const ReadSeg before(kase.scratch / "fine.dcm"), after(kase.scratch / "fine_own.dcm");
+  EXPECT_TRUE(same_grid(before.header.geometry, after.header.geometry, 1e-6));
+  for (std::size_t n = 0; n < 2; ++n)
+    EXPECT_TRUE(std::ranges::equal(before.volumes[n].as<std::uint8_t>(), after.volumes[n].as<std::uint8_t>())) << n;
+  TETWARP_CHECK_ALONG_WITH(kase, "fine_own.dcm", "fine.dcm", "-");
+}
+
+TEST(SegAlong, ATranslationByWholeVoxelsMovesSegmentsExactly) {
+  const AlongCase kase;
+  AlongCase::seg().write(kase.scratch / "seg.dcm");
+  AlongCase::fractions().write(kase.scratch / "part.dcm");
+  kase.run(
+      "deform ct -f translate:by=1/-2/1vox --outside background -o out --with seg.dcm=seg_out.dcm --with "
+      "part.dcm=part_out.dcm");
+  const auto moved = [](const MadeSeg& made) {
+    return [made](int n, int i, int j, int k) {
+      return i >= 1 && j + 2 < AlongCase::kRows && k >= 1 ? made.value(n, i - 1, j + 2, k - 1) : 0;
+    };
+  };
+  expect_segments(kase.scratch / "seg_out.dcm", moved(AlongCase::seg()));
+  expect_segments(kase.scratch / "part_out.dcm", moved(AlongCase::fractions()));
+  TETWARP_CHECK_ALONG_WITH(kase, "seg_out.dcm", "seg.dcm", "dump");
+}
+
+/// Frames in slices 0 to 4 alone: what moves into slice 5 is not lost.
+TEST(SegAlong, OnItsOwnGridItReachesAsFarAsTheSeries) {
+  const AlongCase kase;
+  MadeSeg made = AlongCase::seg();
+  made.value = [](int n, int i, int j, int k) { return i > 3 + n && j > 4 && k < 5 ? 1 : 0; };
+  made.write(kase.scratch / "seg.dcm");
+  kase.run("deform ct -f translate:by=0/0/1vox --outside background -o out --with seg.dcm=own.dcm:own");
+  expect_segments(kase.scratch / "own.dcm",
+                  [](int n, int i, int j, int k) { return i > 3 + n && j > 4 && k > 0 ? 1 : 0; });
+}
+
+TEST(SegAlong, EachSegmentIsWhatItsMaskBecomesVoxelByVoxelForPydicomToo) {
+  const AlongCase kase;
+  const MadeSeg binary = AlongCase::seg(), fractional = AlongCase::fractions();
+  binary.write(kase.scratch / "binary.dcm");
+  fractional.write(kase.scratch / "fractional.dcm");
+  std::string with;
+  for (const std::string segment : {"0", "1"}) {
+    kase.write_mask(binary, std::stoi(segment), "binary" + segment + ".mha");
+    kase.write_mask(fractional, std::stoi(segment), "fractional" + segment + ".mha");
+    with += " --with binary" + segment + ".mha=binary" + segment + ".nii:vote:background=0 --with fractional" +
+            segment + ".mha=fractional" + segment + ".nii:linear:background=0";
+  }
+  kase.run("deform ct" + std::string(kTwist) +
+           "-o out --with binary.dcm=binary_out.dcm --with "
+           "fractional.dcm=fractional_out.dcm" +
+           with);
+  for (const std::string kind : {"binary", "fractional"}) {
+    TETWARP_CHECK_ALONG_WITH(kase, kind + "_out.dcm", kind + ".dcm", "dump");
+    const std::vector<std::uint8_t> found = kase.dumped<std::uint8_t>("dump");
+    ASSERT_EQ(found.size(), 2U * AlongCase::kVoxels);
+    std::vector<int> overlap(AlongCase::kVoxels);
+    for (std::size_t n = 0; n < 2; ++n) {
+      const AnyVolume mask = kase.image(kind + std::to_string(n) + ".nii");
+      int shown = 0;
+      for (std::size_t at = 0; at < AlongCase::kVoxels; ++at) {
+        const int expected = mask.as<std::uint8_t>()[at], here = found[n * AlongCase::kVoxels + at];
+        ASSERT_EQ(here, expected) << kind << " segment " << n << " voxel " << at;
+        shown += here != 0;
+        overlap[at] += here != 0;
+      }
+      EXPECT_GT(shown, 30) << kind << n;
+    }
+    EXPECT_GT(std::count(overlap.begin(), overlap.end(), 2), 5) << kind;
+  }
+}
+
+TEST(SegAlong, WhereNothingIsLeftOneEmptyFrameIsWrittenAndSaidSo) {
+  const AlongCase kase;
+  MadeSeg made = AlongCase::seg();
+  made.value = [](int, int i, int, int k) { return i == 11 && k == 5 ? 1 : 0; };
+  made.write(kase.scratch / "seg.dcm");
+  const std::string said =
+      kase.said("deform ct -f translate:by=3/0/0vox --outside background -o out --with seg.dcm=seg_out.dcm", 0);
+  EXPECT_TRUE(says(said, {"tetwarp: note: nothing is left", "seg.dcm"}));
+  expect_segments(kase.scratch / "seg_out.dcm", [](int, int, int, int) { return 0; });
+  TETWARP_CHECK_ALONG_WITH(kase, "seg_out.dcm", "seg.dcm", "dump");
+}
+
+}  // namespace
