@@ -53,6 +53,7 @@ class SegmentationFile {
   void read_segment_list(DicomSegmentation& seg);
   void read_plane(DicomSegmentation& seg);
   void place_frames(DicomSegmentation& seg, double otherwise_mm);
+  void require_dense(const DicomSegmentation& seg);
   double slice_distance(const std::vector<double>& places, double otherwise_mm);
   std::span<const Uint8> pixels(std::size_t expected);
 
@@ -216,6 +217,16 @@ void SegmentationFile::place_frames(DicomSegmentation& seg, double otherwise_mm)
   }
 }
 
+/// A few frames far apart, and segments without any, can stand for far more memory than the file takes.
+void SegmentationFile::require_dense(const DicomSegmentation& seg) {
+  constexpr double kMost = 10'000;
+  const double stored = static_cast<double>(seg.frames.size()) / (seg.fractional ? 1 : 8),
+               held = static_cast<double>(seg.segments.size()) * static_cast<double>(seg.geometry.size.z);
+  if (held > kMost * stored)
+    refuse("has " + plural(seg.frames.size(), "frame") + " for " + plural(seg.segments.size(), "segment") + " of " +
+           std::to_string(seg.geometry.size.z) + " slices: read, it takes more than 10000 times its pixels");
+}
+
 DicomSegmentation SegmentationFile::header(double otherwise_mm) {
   DicomSegmentation seg;
   seg.frame_of_reference_uid = text_of(data(), DCM_FrameOfReferenceUID);
@@ -228,6 +239,7 @@ DicomSegmentation SegmentationFile::header(double otherwise_mm) {
            std::to_string(frames_.size()));
   read_plane(seg);
   place_frames(seg, otherwise_mm);
+  require_dense(seg);
   return seg;
 }
 

@@ -85,6 +85,22 @@ TEST(DoseAlong, IsWhatAnImageOfItBecomesAndPydicomReadsTheSame) {
   for (std::size_t n = 0; n < read.size(); ++n) ASSERT_NEAR(read[n], image.as<float>()[n], quantum(kase) + 2e-6) << n;
 }
 
+/// Dose Type ERROR has words with a sign (PS3.3 C.8.8.3.4.6).
+TEST(DoseAlong, OfErrorsKeepsTheirSign) {
+  const AlongCase kase;
+  MadeDose made = AlongCase::dose();
+  made.stored = [](unsigned n) { return n * 7919 % 40009 - 20000; };
+  made.edit = [](DcmDataset& data) {
+    data.putAndInsertString(DCM_DoseType, "ERROR");
+    data.putAndInsertUint16(DCM_PixelRepresentation, 1);
+  };
+  made.write(kase.scratch / "errors.dcm");
+  kase.run("deform ct -f identity -o out --with errors.dcm=moved.dcm");
+  const AnyVolume source = read_dose(kase.scratch / "errors.dcm"), found = read_dose(kase.scratch / "moved.dcm");
+  EXPECT_LT(*std::ranges::min_element(found.as<float>()), -9);
+  EXPECT_LE(largest_difference(source.as<float>(), found.as<float>()), quantum(kase) / 2 + 1e-6);
+}
+
 /// Of the real plan. Its one CT slice is no volume, so a made-up one stands around the dose.
 TEST(DoseAlong, OfARealPlanIsReadByPlastimatchAndPydicomAsTheImageOfIt) {
   TETWARP_REAL_DATA(folder, "rt-breast");

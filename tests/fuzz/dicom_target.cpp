@@ -1,5 +1,6 @@
-// One DICOM file: as a dose, as a series of one slice, and the series derived from it.
+// One DICOM file: as a dose, as a segmentation, as a series of one slice, and the series derived from it.
 #include "io/dicom_dose.h"
+#include "io/dicom_segmentation.h"
 #include "io/dicom_series.h"
 #include "tests/fuzz/input_file.h"
 
@@ -22,6 +23,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static const InputFile file(TETWARP_FUZZ_SUFFIX);
   file.fill(data, size);
   if (tetwarp::is_dicom_dose(file.path())) accepted([] { tetwarp::read_dose(file.path()); });
+  if (tetwarp::is_dicom_segmentation(file.path()))
+    accepted([] { tetwarp::read_segments(file.path(), tetwarp::read_segmentation_header(file.path())); });
   for (const auto& series : tetwarp::scan_dicom(file.path(), true).series)
     accepted([&] { derive(tetwarp::load_dicom(series, 1)); });
   tetwarp::is_tetwarp_dicom(file.path());

@@ -14,6 +14,7 @@
 #include "tests/support/gmsh_file.h"
 #include "tests/support/image_samples.h"
 #include "tests/support/point_files.h"
+#include "tests/support/seg_maker.h"
 #include "tests/support/write_file.h"
 
 namespace {
@@ -265,6 +266,13 @@ void make_dose(const fs::path& folder) {
   write_slice(folder / "dose.dcm", dose);
 }
 
+void make_segmentations(const fs::path& folder) {
+  for (const bool fractional : {false, true}) {
+    MadeSeg seg{.fractional = fractional, .value = [](int n, int i, int j, int k) { return (i + j + k + n) % 3 / 2; }};
+    seg.write(folder / (fractional ? "seg-fractional.dcm" : "seg-binary.dcm"));
+  }
+}
+
 /// One slice in every transfer syntax.
 void make_slices(const fs::path& folder) {
   for (const E_TransferSyntax encoding :
@@ -375,6 +383,7 @@ void make_dicom(const fs::path& root) {
   register_encoders();
   make_slices(folder_of(root, "dicom"));
   make_dose(root / "dicom");
+  make_segmentations(root / "dicom");
   make_enhanced(root / "dicom");
   make_slices(folder_of(root, "dicom-scan"));
   make_enhanced(root / "dicom-scan");

@@ -74,6 +74,16 @@ void move_frame(DcmDataset& data, long n, const std::string& position) {
   MadeSeg::text(*plane, DCM_ImagePositionPatient, position);
 }
 
+TEST(Segmentation, FarMoreVolumeThanPixelsIsRefused) {
+  const Scratch scratch;
+  MadeSeg made{.slices = 2000, .value = [](int n, int, int, int k) { return n == 0 && k % 1999 == 0 ? 1 : 0; }};
+  made.write(scratch / "two");
+  EXPECT_THROW(read_segmentation_header(scratch / "two"), InputError);  // 2 x 2002 slices for 2 frames of bits
+  made.segments = {1};
+  made.write(scratch / "one");
+  EXPECT_EQ(read_segmentation_header(scratch / "one").geometry.size.z, 2002);
+}
+
 TEST(Segmentation, WhatIsNotOnOneEvenGridOrCutShortOrContradictsItselfIsRefused) {
   const Scratch scratch;
   const auto refused = [&](const char* names, const std::function<void(DcmDataset&)>& edit, bool fractional = false) {
