@@ -243,8 +243,8 @@ void add_deform(CLI::App& app, DeformOptions& options) {
       ->add_option(
           "--with", options.with,
           "Another volume through the same field, from its own grid onto the output grid, or back onto its own. An "
-          "RTDOSE or SEG comes out as one where OUT is .dcm, and refers to the series that OUTPUT receives. May be "
-          "repeated")
+          "RTDOSE or SEG comes out as one where OUT is .dcm, an RT Structure Set always does; they refer to the series "
+          "that OUTPUT receives. May be repeated")
       ->allow_extra_args(false)
       ->type_name("IN=OUT[:nearest|linear|cubic|vote][:background=V][:own]");
   command

@@ -33,6 +33,7 @@ class Deformation {
   void check(Resampler& resampler);
   void set_field(Resampler& resampler, Outside outside) const;
   void resample_onto_own_grids();
+  void move_structures(Resampler& resampler, Outside outside);
   void write();
   void write_preview_picture();
   DicomDerivation derivation() const;
@@ -71,6 +72,7 @@ void Deformation::read() {
   record_.input = read_input(options_.input, header, options_.common, stage.control());
   record_.background = options_.background.value_or(record_.input.background);
   record_.outputs.further->read(options_.common, {.stop = interrupt_token()});
+  if (header.series) record_.outputs.structures.read(header.series->frame_of_reference_uid);
   record_.stages.emplace_back("read", stage.seconds());
 }
 
@@ -136,6 +138,7 @@ Backend Deformation::resample() {
     record_.report += resample_slab(*backend.resampler, slab, targets, of_slab, control);
   });
   record_.report.clamped += mass_.saturated;
+  move_structures(*backend.resampler, outside);
   resample_onto_own_grids();
   record_.input_sha256 = input_hash.get();
   record_.stages.emplace_back("resample", stage.seconds());
@@ -197,6 +200,26 @@ void Deformation::resample_onto_own_grids() {
   }
 }
 
+/// @param resampler  holds the field
+void Deformation::move_structures(Resampler& resampler, Outside outside) {
+  FurtherStructures& structures = record_.outputs.structures;
+  const Geometry& source = record_.input.volume.geometry();
+  const Limits limits{.threads = options_.common.threads};
+  const Control control{.stop = interrupt_token()};
+  std::optional<PointMover> mover;
+  if (!structures.empty() && record_.field.direction == Direction::forward)
+    mover.emplace(record_.plan.grid, view(record_.field.forward.field, outside), limits, control);
+  structures.move(mover ? &*mover : nullptr, source, record_.plan.grid, outside, options_.common.threads);
+  if (!structures.needs_inverse()) return;
+  MapStream inverse(record_.plan.grid, record_.outputs.set);
+  inverse.add(&Maps::inverse_mm, nullptr);
+  inverse.run([&](const Region& slab, const Maps& maps) {
+    resample_slab(resampler, slab, {}, maps, control);
+    structures.reslice(maps.inverse_mm, options_.common.threads);
+  });
+  structures.finish();
+}
+
 /// What is true of all that goes through the field; INPUT's voxels have parameters of their own.
 DicomDerivation Deformation::derivation() const {
   const bool pull = record_.field.direction == Direction::pull, deformed = pull || !record_.field.forward.identity;
@@ -232,6 +255,7 @@ void Deformation::write() {
   const std::string made_by = "tetwarp field " + record_.field_sha256.substr(0, 16);
   if (record_.outputs.series) {
     record_.dicom_report = series_->report();
+    record_.outputs.structures.write(*record_.dicom_report, derivation());
   } else {
     Stage stage(options_.common, "write");
     write_image(record_.outputs.volume, std::as_const(record_.output).view(),
@@ -286,6 +310,7 @@ int Deformation::run() {
     const InputHeader header = open_input(options_.input, options_.common);
     plan(header);
     record_.points.read();
+    if (header.series) record_.outputs.structures.read(header.series->frame_of_reference_uid);
     say(options_.common, describe(record_.plan, options_, record_.outputs));
     return 0;
   }
@@ -303,6 +328,7 @@ int Deformation::run() {
   for (const std::string& note : record_.field.notes) say(options_.common, "tetwarp: note: " + note);
   for (const std::string& note : record_.outputs.further->notes()) say(options_.common, "tetwarp: note: " + note);
   for (const std::string& note : record_.points.notes()) say(options_.common, "tetwarp: note: " + note);
+  for (const std::string& note : record_.outputs.structures.notes()) say(options_.common, "tetwarp: note: " + note);
   if (!record_.set_aside.empty()) {
     const bool one = record_.set_aside.size() == 1;
     say(options_.common, "tetwarp: note: " + plural(record_.set_aside.size(), "file") + " of the series " +

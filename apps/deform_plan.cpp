@@ -35,9 +35,10 @@ std::uint64_t plan_bytes(const DeformOptions& options, DeformOutputs& outputs, c
                                                                 std::min(slices, std::uint64_t{RoundTrip::kMostSlices})
                                                           : 0;
   const std::uint64_t of_mass = options.preserve_mass ? sizeof(float) * (voxels + output_voxels) : 0;
+  const std::uint64_t of_structures = outputs.structures.empty() ? 0 : MapStream::bytes(grid, &Maps::inverse_mm, false);
   return of_mass + of_check + voxels * size_bytes(input.type) + output_voxels * size_bytes(input.type) +
-         outputs.maps->bytes(grid, options.preserve_mass) + outputs.further->bytes(output_voxels) + of_field +
-         kOverheadBytes;
+         outputs.maps->bytes(grid, options.preserve_mass) + outputs.further->bytes(output_voxels) + of_structures +
+         of_field + kOverheadBytes;
 }
 
 }  // namespace
@@ -54,7 +55,10 @@ DeformOutputs begin_outputs(const DeformOptions& options, const PointsOption& po
   if (options.preserve_mass && !options.pull_field.empty()) {
     throw UsageError("--preserve mass needs the determinant of a forward map, which --pull-field has not");
   }
-  std::vector<std::filesystem::path> inputs = FurtherVolumes::inputs(options.with);
+  std::vector<std::string> structures, volumes;  // of --with
+  for (const std::string& text : options.with) (FurtherStructures::is_one(text) ? structures : volumes).push_back(text);
+  std::vector<std::filesystem::path> inputs = FurtherVolumes::inputs(volumes);
+  for (const std::string& text : structures) inputs.push_back(text.substr(0, text.find('=')));
   inputs.push_back(options.input.path);
   if (!is_same_grid(options.grid) && options.grid != "fit") inputs.emplace_back(options.grid);
   for (const std::filesystem::path& path : field_files(options.fields)) inputs.push_back(path);
@@ -88,12 +92,13 @@ DeformOutputs begin_outputs(const DeformOptions& options, const PointsOption& po
   // The series of a single file is read from its folder, so a derived series must not land there.
   if (series && !options.input.single && !std::filesystem::is_directory(options.input.path))
     inputs.push_back(folder_of(options.input.path));
-  DeformOutputs outputs{series, OutputSet(inputs, options.common.overwrite), {}, {}, {}, {}, {}, {}, {}};
+  DeformOutputs outputs{series, OutputSet(inputs, options.common.overwrite), {}, {}, {}, {}, {}, {}, {}, {}};
   outputs.volume = outputs.set.add(options.output, series ? StagedOutput::Kind::folder : StagedOutput::Kind::file);
   outputs.sidecar = outputs.set.add(sidecar_of(options.output));
   outputs.maps.emplace(options.maps, options.pull_field.empty() ? Direction::forward : Direction::pull, series,
                        outputs.set);
-  outputs.further.emplace(options.with, series, outputs.set);
+  outputs.further.emplace(volumes, series, outputs.set);
+  outputs.structures = FurtherStructures(structures, series, outputs.set);
   outputs.report = outputs.set.add(options.report);
   outputs.preview = outputs.set.add(options.preview);
   outputs.points = points.add_outputs(outputs.set);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "apps/further_structures.h"
 #include "apps/further_volumes.h"
 #include "apps/map_outputs.h"
 #include "apps/points_option.h"
@@ -12,6 +13,7 @@ struct DeformOutputs {
   OutputSet set;
   std::optional<MapOutputs> maps;
   std::optional<FurtherVolumes> further;
+  FurtherStructures structures;
   std::filesystem::path volume, sidecar, report, preview;
   std::vector<std::filesystem::path> points;
 };

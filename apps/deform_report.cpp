@@ -92,6 +92,7 @@ json sidecar(const DeformRecord& of) {
     document["output"]["added_empty_attributes"] = of.dicom_report->added_empty;
   }
   if (const json further = of.outputs.further->describe(); !further.empty()) document["with"] = further;
+  if (!of.outputs.structures.empty()) document["structures"] = of.outputs.structures.describe();
   if (const json maps = of.outputs.maps->describe(); !maps.empty()) document["maps"] = maps;
   if (!of.points.empty()) document["points"] = of.points.to_json();
   document["report"] = {{"covered", of.report.covered},      {"uncovered", of.report.uncovered},

@@ -66,6 +66,7 @@ MovedContour ContourMover::move(const Contour& contour) const {
     glm::dvec3 at = point;
     if (mover_.move(at) == PointStatus::outside) ++result.outside;
     const double along = glm::dot(normal, at - point);
+    result.rests = result.rests && at == point;
     result.lowest = std::min(result.lowest, along);
     result.highest = std::max(result.highest, along);
     return at;
@@ -94,17 +95,21 @@ MovedContour ContourMover::move(const Contour& contour) const {
 }
 
 std::optional<std::vector<MovedContour>> ContourMover::move_within_slices(std::span<const Contour> contours,
-                                                                          const Geometry& source) const {
+                                                                          const Geometry& source,
+                                                                          Outside outside) const {
   const glm::dvec3 normal = normal_of(output_);
   if (!source.slices.empty()) return {};
   std::vector<MovedContour> result;
   double lowest = INFINITY, highest = -INFINITY;
+  bool known = true, rests = true;
   for (const Contour& contour : contours) {
     if (!is_closed(contour.kind)) continue;
     const MovedContour& moved = result.emplace_back(move(contour));
     lowest = std::min(lowest, moved.lowest);
     highest = std::max(highest, moved.highest);
-    if (highest - lowest > kOnSlice) return {};
+    known = known && (moved.outside == 0 || outside == Outside::rest);
+    rests = rests && moved.rests;
+    if (highest - lowest > kOnSlice || (!known && !rests)) return {};
     for (const glm::dvec3& point : contour.points) {
       const double before = to_nearest(glm::dot(normal, point - source.origin), slice_step(source));
       const double after = to_nearest(glm::dot(normal, point - output_.origin) + lowest, slice_step(output_));

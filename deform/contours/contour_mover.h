@@ -17,6 +17,7 @@ struct MovedContour {
   Contour contour;          ///< the kind as it was, but for an open one that has left its plane
   double lowest, highest;   ///< by how much it moved along the normal of the slices, mm
   std::size_t outside = 0;  ///< points that the field does not reach: they stay
+  bool rests = true;        ///< none has moved
 };
 
 /// Moves contours of a structure as points: exact, but what was in a plane need not stay in one.
@@ -31,8 +32,10 @@ class ContourMover {
 
   /// All closed contours of a structure, if they are still what they were: all moved by the same distance along the
   /// normal of the slices, and as near to slices of the output as they were to those of the source. Else none.
-  std::optional<std::vector<MovedContour>> move_within_slices(std::span<const Contour> contours,
-                                                              const Geometry& source) const;
+  /// @param outside  what becomes of points that the field does not reach; unless they rest, they are known only where
+  ///                 nothing of the structure moves
+  std::optional<std::vector<MovedContour>> move_within_slices(std::span<const Contour> contours, const Geometry& source,
+                                                              Outside outside) const;
 
  private:
   const PointMover& mover_;

@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numbers>
+#include <tuple>
 
 #include "deform/contours/contour_mover.h"
 #include "deform/contours/reslicer.h"
@@ -246,7 +247,7 @@ SlicedContours drawn_anew(const Reslicer& reslicer, const Warp& warp, double& vo
 TEST(ContourMover, IdentityKeepsEveryPoint) {
   const Warp warp(slices_grid(), "identity");
   const std::vector<Contour> contours = ball(warp.grid, {0, 0, 0}, 20, 8);
-  const auto moved = ContourMover(warp.mover, warp.grid).move_within_slices(contours, warp.grid);
+  const auto moved = ContourMover(warp.mover, warp.grid).move_within_slices(contours, warp.grid, Outside::background);
   ASSERT_TRUE(moved.has_value());
   ASSERT_EQ(moved->size(), contours.size());
   for (std::size_t n = 0; n < contours.size(); ++n) {
@@ -281,10 +282,21 @@ TEST(ContourMover, SlicesThatAreNoLongerSlicesAreNotTaken) {
                                        {"wave:amplitude=3,wavelength=60,axis=z,along=z", false},
                                        {"twist:angle=20", true}}) {
     const Warp warp(slices_grid(), formula);
-    const auto moved = ContourMover(warp.mover, warp.grid).move_within_slices(contours, warp.grid);
+    const auto moved = ContourMover(warp.mover, warp.grid).move_within_slices(contours, warp.grid, Outside::background);
     EXPECT_EQ(moved.has_value(), taken) << formula;
     if (!moved) continue;
     for (const MovedContour& one : *moved) EXPECT_EQ(one.contour.slice, slice_of(one.contour.points, warp.grid));
+  }
+}
+
+TEST(ContourMover, PointsThatTheFieldDoesNotReachAreNotTaken) {
+  const std::vector<Contour> beyond{drawn({{0, 0}, {50, 0}, {50, 20}, {0, 20}}, 0)};
+  for (const auto& [formula, outside, taken] : {std::tuple("identity", Outside::background, true),
+                                                {"twist:angle=20", Outside::background, false},
+                                                {"twist:angle=20", Outside::rest, true}}) {
+    const Warp warp(slices_grid(), formula, outside);
+    EXPECT_EQ(ContourMover(warp.mover, warp.grid).move_within_slices(beyond, warp.grid, outside).has_value(), taken)
+        << formula;
   }
 }
 

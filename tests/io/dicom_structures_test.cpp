@@ -219,7 +219,7 @@ TEST(WrittenStructures, KeepWhatStaysTrueAndDropWhatDoesNot) {
   EXPECT_EQ(file[DCM_SeriesNumber], "1007");
   DcmItem& roi = item_of(file.data(), DCM_StructureSetROISequence, 1);
   EXPECT_EQ(get(roi, DCM_ROINumber), "2");
-  EXPECT_EQ(get(roi, DCM_ROIName), "organ 2");
+  EXPECT_EQ(get(roi, DCM_ROIName), "organ_2");
   EXPECT_EQ(get(roi, DCM_ROIGenerationAlgorithm), "SEMIAUTOMATIC");
   EXPECT_EQ(get(roi, DCM_ROIVolume), "<missing>");
   EXPECT_EQ(get(item_of(file.data(), DCM_ROIContourSequence, 1), DCM_ROIDisplayColor), "255\\20\\0");

@@ -49,7 +49,7 @@ inline void put_roi(DcmDataset& data, const MadeStructures& made, std::size_t n)
   DcmItem& roi = made_item(data, DCM_StructureSetROISequence);
   text(roi, DCM_ROINumber, number);
   text(roi, DCM_ReferencedFrameOfReferenceUID, made.frame);
-  text(roi, DCM_ROIName, "organ " + number);
+  text(roi, DCM_ROIName, "organ_" + number);
   text(roi, DCM_ROIGenerationAlgorithm, "MANUAL");
   text(roi, DCM_ROIVolume, "12.5");
   DcmItem& contours = made_item(data, DCM_ROIContourSequence);
