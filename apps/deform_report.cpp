@@ -57,6 +57,18 @@ json input_json(const DeformRecord& of) {
   return document;
 }
 
+/// Likewise of what went along.
+void close_sources(json& document) {
+  for (const char* key : {"with", "structures", "points"}) {
+    if (!document.contains(key)) continue;
+    for (json& along : document[key]) {
+      if (!along.is_object()) continue;
+      along.erase("input");
+      along.erase("sha256");
+    }
+  }
+}
+
 /// How far the map can be trusted.
 json quality_json(const DeformRecord& of) {
   const auto& [quality, trip] = *of.check;
@@ -95,6 +107,7 @@ json sidecar(const DeformRecord& of) {
   if (!of.outputs.structures.empty()) document["structures"] = of.outputs.structures.describe();
   if (const json maps = of.outputs.maps->describe(); !maps.empty()) document["maps"] = maps;
   if (!of.points.empty()) document["points"] = of.points.to_json();
+  if (of.options.dicom.deidentification) close_sources(document);
   document["report"] = {{"covered", of.report.covered},      {"uncovered", of.report.uncovered},
                         {"clamped", of.report.clamped},      {"padded", of.report.padded},
                         {"conflicts", of.report.conflicts},  {"inverted", of.report.inverted},

@@ -2,6 +2,7 @@
 
 #include "io/dicom_along_put.h"
 #include "io/dicom_carry.h"
+#include "io/dicom_deidentify.h"
 #include "io/dicom_derive.h"
 #include "io/dicom_header.h"
 #include "io/dicom_put.h"
@@ -41,13 +42,16 @@ std::string sop_class_of(const std::filesystem::path& path) {
 
 void put_along(DcmItem& target, DcmDataset& source, const DicomAlong& along, const WrittenSeries& series,
                std::span<const DcmTagKey> type_2) {
-  DicomDerivation derivation = along.derivation;
-  derivation.form = {};
+  const DicomDerivation& derivation = along.derivation;
+  const std::optional<Deidentification>& how = derivation.form.deidentification;
+  DcmDataset slice(*series.source.slices.front());
+  deidentify(slice, how, true);
   carry_over(target, source, {});
-  put_study(target, *series.source.slices.front(), along, series);
+  put_study(target, slice, along, series);
   Sha256 hash;
   hash.add("tetwarp along").add(series.report.series_uid).add(along.source_sha256).add(derivation.parameters);
-  put(target, DCM_SeriesInstanceUID, uid_from_digest(hash.digest()));
+  const std::string uid = uid_from_digest(hash.digest());
+  put(target, DCM_SeriesInstanceUID, how ? Deidentifier(*how, "", "").uid(uid) : uid);
   put(target, DCM_SeriesNumber, derived_number(source));
   put(target, DCM_SeriesDescription, derived_description(source, derivation));
   put(target, DCM_FrameOfReferenceUID, series.report.frame_of_reference_uid);

@@ -18,7 +18,7 @@ struct WrittenSeries {
 struct DicomAlong {
   std::filesystem::path source;  ///< the file that it was read from
   std::string source_sha256;
-  DicomDerivation derivation;  ///< its own parameters and description; of its form nothing is used
+  DicomDerivation derivation;  ///< its own parameters and description; of its form only the de-identification
 };
 
 /// What was written of it.

@@ -180,6 +180,12 @@ Deidentifier::Deidentifier(Deidentification how, const std::string& patient_id, 
   days_back_ = 1 + number_below(kMostDaysBack, keyed_digest(how_.key, "dates of " + whose));
 }
 
+void deidentify(DcmItem& dataset, const std::optional<Deidentification>& how, bool is_ct_image) {
+  if (!how) return;
+  const Deidentifier deidentifier(*how, text_of(dataset, DCM_PatientID), text_of(dataset, DCM_StudyInstanceUID));
+  deidentifier.apply(dataset, is_ct_image);
+}
+
 std::string Deidentifier::uid(const std::string& uid) const { return how_.has(retain_uids) ? uid : replacement(uid); }
 
 std::string Deidentifier::replacement(const std::string& uid) const {

@@ -4,6 +4,7 @@
 #include <dcmtk/config/osconfig.h>
 #include <dcmtk/dcmdata/dcdatset.h>
 
+#include <optional>
 #include <string>
 
 #include "io/deidentification.h"
@@ -34,7 +35,8 @@ class Deidentifier {
   /// @param is_ct_image  of a CT image the types of attributes are known; otherwise what is valid for every type stays
   void apply(DcmItem& dataset, bool is_ct_image) const;
 
-  const Deidentification& how() const { return how_; }
+  /// De-identifies an item of a data set of which nothing is known: without marks.
+  void apply(DcmItem& item) const { apply_to(item, false); }
 
  private:
   std::string replacement(const std::string& uid) const;
@@ -48,5 +50,8 @@ class Deidentifier {
   Deidentification how_;
   int days_back_;
 };
+
+/// De-identifies a data set, if that is asked for, by its own Patient ID and Study Instance UID.
+void deidentify(DcmItem& dataset, const std::optional<Deidentification>& how, bool is_ct_image);
 
 }  // namespace tetwarp

@@ -8,6 +8,7 @@
 
 #include "io/dicom_along_put.h"
 #include "io/dicom_carry.h"
+#include "io/dicom_deidentify.h"
 #include "io/dicom_derive.h"
 #include "io/dicom_dose.h"
 #include "io/dicom_file.h"
@@ -115,6 +116,7 @@ DoseReport write_derived_dose(const std::filesystem::path& path, const ConstVolu
   const OFCondition read = parse_dicom(format, along.source, DCM_PixelData).result;
   require(read.good(), shown(along.source) + " cannot be read as DICOM any more: " + read.text());
   DcmDataset& source = *format.getDataset();
+  deidentify(source, along.derivation.form.deidentification, false);
   const bool is_signed = text_of(source, DCM_PixelRepresentation) == "1";
   DcmDataset target;
   put_along(target, source, along, series, type_2_of_dose());

@@ -8,6 +8,7 @@
 
 #include "io/dicom_along_put.h"
 #include "io/dicom_carry.h"
+#include "io/dicom_deidentify.h"
 #include "io/dicom_file.h"
 #include "io/dicom_header.h"
 #include "io/dicom_put.h"
@@ -71,9 +72,9 @@ void put_tag(DcmItem& item, const DcmTagKey& tag, const DcmTagKey& value) {
 }
 
 /// Multi-frame Dimension (PS3.3 C.7.6.17): by segment, then by place.
-void put_dimensions(DcmItem& target, const DicomAlong& along) {
-  const std::string uid = uid_from_digest(
-      Sha256().add("tetwarp dimensions").add(text_of(target, DCM_SeriesInstanceUID)).add(along.source_sha256).digest());
+void put_dimensions(DcmItem& target) {
+  const std::string uid =
+      uid_from_digest(Sha256().add("tetwarp dimensions").add(text_of(target, DCM_SeriesInstanceUID)).digest());
   for (const DcmTagKey& tag : {DCM_DimensionOrganizationSequence, DCM_DimensionIndexSequence}) drop(target, tag);
   drop(target, DCM_DimensionOrganizationType);
   put(append_item(target, DCM_DimensionOrganizationSequence), DCM_DimensionOrganizationUID, uid);
@@ -180,6 +181,7 @@ SegmentationReport write_derived_segmentation(const std::filesystem::path& path,
   const OFCondition read = parse_dicom(format, along.source, DCM_PixelData).result;
   require(read.good(), shown(along.source) + " cannot be read as DICOM any more: " + read.text());
   DcmDataset& source = *format.getDataset();
+  deidentify(source, along.derivation.form.deidentification, false);
   const std::vector<DicomSegmentation::Frame> frames = frames_to_write(segments);
   const std::vector<std::byte> pixels = packed(segments, frames, header);
 
@@ -191,7 +193,7 @@ SegmentationReport write_derived_segmentation(const std::filesystem::path& path,
   put(target, DCM_ImageType, "DERIVED\\PRIMARY");
   if (!header.fractional) put(target, DCM_SegmentsOverlap, overlap(segments) ? "YES" : "NO");
   put_series_reference(target, grid, series);
-  put_dimensions(target, along);
+  put_dimensions(target);
   put_shared_groups(target, grid);
   put_frames(target, frames, header, grid, series);
   put_pixel_format(target, grid, header.fractional ? 8 : 1, false);

@@ -7,6 +7,7 @@
 
 #include "deform/version.h"
 #include "io/dicom_carry.h"
+#include "io/dicom_deidentify.h"
 #include "io/dicom_derive.h"
 #include "io/dicom_file.h"
 #include "io/dicom_header.h"
@@ -129,14 +130,35 @@ std::string series_uid(DcmDataset& source, const DicomWriteReport& series, const
   return uid_from_digest(hash.digest());
 }
 
+std::vector<std::unique_ptr<DcmItem>> copies(const std::vector<std::unique_ptr<DcmItem>>& items) {
+  std::vector<std::unique_ptr<DcmItem>> copied;
+  for (const auto& item : items) copied.push_back(item ? std::make_unique<DcmItem>(*item) : nullptr);
+  return copied;
+}
+
+/// A copy, de-identified if that is asked for.
+StructureSetHeader deidentified(const StructureSetHeader& header, const std::optional<Deidentification>& how) {
+  StructureSetHeader copy{std::make_unique<DcmDataset>(*header.data), copies(header.roi), copies(header.contour),
+                          copies(header.observations)};
+  if (!how) return copy;
+  const Deidentifier deidentifier(*how, text_of(*copy.data, DCM_PatientID), text_of(*copy.data, DCM_StudyInstanceUID));
+  deidentifier.apply(*copy.data, false);
+  for (const auto* items : {&copy.roi, &copy.contour, &copy.observations}) {
+    for (const auto& item : *items) {
+      if (item) deidentifier.apply(*item);
+    }
+  }
+  return copy;
+}
+
 }  // namespace
 
 StructureWriteReport write_structure_set(const std::filesystem::path& path, const StructureSet& source,
                                          const std::vector<std::vector<Contour>>& moved, const DicomWriteReport& series,
                                          const DicomDerivation& derivation) {
   prepare_dcmtk();
-  DcmDataset& from = *source.header->data;
-  const StructureSetHeader& header = *source.header;
+  const StructureSetHeader header = deidentified(*source.header, derivation.form.deidentification);
+  DcmDataset& from = *header.data;
   DcmDataset data;
   carry_over(data, from, {});
   put(data, DCM_SOPClassUID, UID_RTStructureSetStorage);
