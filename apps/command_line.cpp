@@ -257,6 +257,10 @@ void add_deform(CLI::App& app, DeformOptions& options) {
       ->check(CLI::Range(0, 9));
   add_dicom_form(*command, options.dicom);
   add_deidentify(*command, options.dicom);
+  command->add_flag(
+      "--bids", options.bids,
+      "Write STEM.json beside OUTPUT STEM.nii.gz or STEM.nii, of a CT series: scanner and protocol with the "
+      "names of BIDS, without patient, institution and dates");
   command
       ->add_option("--points", options.points,
                    "Landmarks or a surface, moved as the voxels under them: .csv (header x,y,z; LPS mm), .mrk.json, "

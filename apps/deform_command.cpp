@@ -8,6 +8,7 @@
 #include "cuda/devices.h"
 #include "deform/fields/formula.h"
 #include "deform/mass.h"
+#include "io/dicom_bids.h"
 #include "io/dicom_text.h"
 #include "io/image_file.h"
 #include "io/preview.h"
@@ -37,7 +38,7 @@ class Deformation {
   void write();
   void write_preview_picture();
   DicomDerivation derivation() const;
-  void begin_series();
+  DicomDerivation input_derivation() const;
   void write_slices(const Region& slices);
   Target main_target();
   void scale_mass(const Region& slices);
@@ -119,7 +120,8 @@ Backend Deformation::resample() {
                         {.stop = interrupt_token()});
   record_.output = AnyVolume(record_.plan.grid, record_.input.volume.type());
   sampled_slices_.resize(record_.outputs.series ? static_cast<std::size_t>(record_.plan.grid.size.z) : 0);
-  if (record_.outputs.series) begin_series();
+  if (record_.outputs.series)
+    series_.emplace(record_.outputs.volume, record_.plan.grid, *record_.input.dicom->headers, input_derivation());
   MapStream maps(record_.plan.grid, record_.outputs.set);
   record_.outputs.set.write([&] {
     record_.outputs.maps->add_to(maps, record_.plan.grid, options_.preserve_mass, series_ ? &*series_ : nullptr);
@@ -234,14 +236,14 @@ DicomDerivation Deformation::derivation() const {
           .form = options_.dicom};
 }
 
-void Deformation::begin_series() {
+DicomDerivation Deformation::input_derivation() const {
   DicomDerivation of_input = derivation();
   of_input.parameters = "interpolation=" + std::string(name_of(options_.interpolation)) +
                         " outside=" + name_of(options_.outside) + " background=" + json(record_.background).dump() +
                         (record_.field.direction == Direction::pull ? " direction=pull" : " direction=forward") +
                         (options_.preserve_mass ? " preserve=mass" : "");
   of_input.description += std::string(", ") + name_of(options_.interpolation) + " interpolation";
-  series_.emplace(record_.outputs.volume, record_.plan.grid, *record_.input.dicom->headers, std::move(of_input));
+  return of_input;
 }
 
 /// While others are resampled.
@@ -260,6 +262,10 @@ void Deformation::write() {
     Stage stage(options_.common, "write");
     write_image(record_.outputs.volume, std::as_const(record_.output).view(),
                 {.compression = options_.compression.value_or(-1), .metadata = {{"descrip", made_by}}});
+  }
+  if (options_.bids) {
+    write_json(record_.outputs.bids,
+               json::parse(bids_sidecar(*record_.input.dicom->headers, record_.plan.grid, input_derivation())));
   }
   if (!record_.outputs.preview.empty()) write_preview_picture();
   std::optional<DerivedOutput> series;

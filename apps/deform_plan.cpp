@@ -41,6 +41,11 @@ std::uint64_t plan_bytes(const DeformOptions& options, DeformOutputs& outputs, c
          of_field + kOverheadBytes;
 }
 
+[[noreturn]] void refuse_bids(const DeformOptions& options) {
+  throw UsageError("--bids says what the headers of a CT series say, " + options.input.path.string() +
+                   " has none; leave it out");
+}
+
 }  // namespace
 
 bool reports_quality(const DeformOptions& options) { return !options.report.empty() && options.pull_field.empty(); }
@@ -84,6 +89,10 @@ DeformOutputs begin_outputs(const DeformOptions& options, const PointsOption& po
         "a DICOM series, not for " +
         options.output.string());
   }
+  if (options.bids && bids_sidecar_of(options.output).empty()) {
+    throw UsageError("--bids is for .nii and .nii.gz, not for " + options.output.string());
+  }
+  if (options.bids && has_image_suffix(options.input.path)) refuse_bids(options);
   if (!options.preview.empty() && options.preview.extension() != ".png") {
     throw UsageError("unknown suffix of --preview \"" + options.preview.string() + "\"; use .png");
   }
@@ -92,9 +101,10 @@ DeformOutputs begin_outputs(const DeformOptions& options, const PointsOption& po
   // The series of a single file is read from its folder, so a derived series must not land there.
   if (series && !options.input.single && !std::filesystem::is_directory(options.input.path))
     inputs.push_back(folder_of(options.input.path));
-  DeformOutputs outputs{series, OutputSet(inputs, options.common.overwrite), {}, {}, {}, {}, {}, {}, {}, {}};
+  DeformOutputs outputs{series, OutputSet(inputs, options.common.overwrite), {}, {}, {}, {}, {}, {}, {}, {}, {}};
   outputs.volume = outputs.set.add(options.output, series ? StagedOutput::Kind::folder : StagedOutput::Kind::file);
   outputs.sidecar = outputs.set.add(sidecar_of(options.output));
+  if (options.bids) outputs.bids = outputs.set.add(bids_sidecar_of(options.output));
   outputs.maps.emplace(options.maps, options.pull_field.empty() ? Direction::forward : Direction::pull, series,
                        outputs.set);
   outputs.further.emplace(volumes, series, outputs.set);
@@ -110,6 +120,7 @@ DeformPlan plan_deformation(const DeformOptions& options, DeformOutputs& outputs
     throw UsageError("a DICOM series can only be derived from a CT series, not from " + options.input.path.string() +
                      "; name the output .nii.gz, .nii, .nrrd or .mha");
   }
+  if (options.bids && !input.series) refuse_bids(options);
   const glm::i64vec3& size = input.geometry.size;
   require(std::min({size.x, size.y, size.z}) >= 2, "a volume of " + to_string(size) +
                                                        " voxels has no cell to deform, " + options.input.path.string() +

@@ -14,7 +14,7 @@ struct DeformOutputs {
   std::optional<MapOutputs> maps;
   std::optional<FurtherVolumes> further;
   FurtherStructures structures;
-  std::filesystem::path volume, sidecar, report, preview;
+  std::filesystem::path volume, sidecar, bids, report, preview;
   std::vector<std::filesystem::path> points;
 };
 

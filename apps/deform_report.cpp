@@ -103,6 +103,7 @@ json sidecar(const DeformRecord& of) {
     document["output"]["frame_of_reference_uid"] = of.dicom_report->frame_of_reference_uid;
     document["output"]["added_empty_attributes"] = of.dicom_report->added_empty;
   }
+  if (of.options.bids) document["bids"] = bids_sidecar_of(of.options.output).string();
   if (const json further = of.outputs.further->describe(); !further.empty()) document["with"] = further;
   if (!of.outputs.structures.empty()) document["structures"] = of.outputs.structures.describe();
   if (const json maps = of.outputs.maps->describe(); !maps.empty()) document["maps"] = maps;

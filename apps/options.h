@@ -86,6 +86,7 @@ struct DeformOptions {
   std::optional<int> compression;
   DicomForm dicom;  ///< of OUTPUT, where it is a series
   std::optional<std::uint64_t> memory_bytes;
+  bool bids = false;              ///< a sidecar for BIDS beside OUTPUT
   std::string grid = "same";      ///< same, fit, or a file or folder
   std::vector<std::string> with;  ///< IN=OUT...
   bool preserve_mass = false;

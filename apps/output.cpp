@@ -1,6 +1,7 @@
 #include "apps/output.h"
 
 #include <algorithm>
+#include <cctype>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -76,6 +77,18 @@ void OutputSet::commit() {
 }
 
 fs::path sidecar_of(const fs::path& output) { return plain(output).string() + ".json"; }
+
+fs::path bids_sidecar_of(const fs::path& output) {
+  const auto has_suffix = [](const fs::path& path, const std::string& suffix) {
+    std::string found = path.extension().string();
+    std::transform(found.begin(), found.end(), found.begin(), [](unsigned char c) { return std::tolower(c); });
+    return found == suffix;
+  };
+  fs::path stem = output;
+  if (has_suffix(stem, ".gz")) stem.replace_extension();
+  if (!has_suffix(stem, ".nii")) return {};
+  return stem.replace_extension(".json");
+}
 
 void write_json(const fs::path& path, const nlohmann::json& document) {
   std::ofstream file(path, std::ios::binary | std::ios::trunc);

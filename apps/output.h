@@ -42,6 +42,9 @@ class OutputSet {
 /// OUTPUT.json beside OUTPUT.
 std::filesystem::path sidecar_of(const std::filesystem::path& output);
 
+/// STEM.json beside STEM.nii or STEM.nii.gz; empty beside anything else.
+std::filesystem::path bids_sidecar_of(const std::filesystem::path& output);
+
 /// @throws Error when it cannot be written whole
 void write_json(const std::filesystem::path& path, const nlohmann::json& document);
 

@@ -125,17 +125,6 @@ std::optional<PaddingRange> common_padding(const std::vector<DicomFileHeader>& h
   return first;
 }
 
-/// Values 1 to 3 of Image Type are those of a cross-section that was computed; vendors' own ones follow.
-std::string image_type(DcmDataset& source) {
-  std::string type = "DERIVED\\SECONDARY\\AXIAL";
-  OFString value;
-  for (unsigned long i = 3; source.findAndGetOFString(DCM_ImageType, value, i).good(); ++i) {
-    type += '\\';
-    type += value.c_str();
-  }
-  return type;
-}
-
 /// Whether a slice is a frame of the same file as the one before it.
 bool continues_file(const DerivedSeries& series, std::size_t slice) {
   return series.frame[slice] > 0 && series.frame[slice - 1] > 0 &&
@@ -169,7 +158,7 @@ void put_references(DcmItem& target, const DerivedSeries& series, const SliceRan
 /// General Image (PS3.3 C.7.6.1) and Contributing Equipment: what was done to which images, and by what.
 void put_derivation(DcmItem& target, DcmDataset& source, const DerivedSeries& series, const DicomDerivation& derivation,
                     const SliceRange& sampled) {
-  put(target, DCM_ImageType, image_type(source));
+  put(target, DCM_ImageType, derived_image_type(source));
   put_how_derived(target, derivation);
   put_references(target, series, sampled, derivation.deformed);
 }
@@ -203,6 +192,16 @@ void put_padding(DcmItem& target, const PaddingRange& padding) {
 }
 
 }  // namespace
+
+std::string derived_image_type(DcmDataset& source) {
+  std::string type = "DERIVED\\SECONDARY\\AXIAL";
+  OFString value;
+  for (unsigned long i = 3; source.findAndGetOFString(DCM_ImageType, value, i).good(); ++i) {
+    type += '\\';
+    type += value.c_str();
+  }
+  return type;
+}
 
 bool is_uid(const std::string& text) {
   return !text.empty() && DcmUniqueIdentifier::checkStringValue(text.c_str(), "1").good();

@@ -36,6 +36,10 @@ struct DerivedSeries {
   std::optional<PaddingRange> padding;       ///< HU: the source's, where all slices agree and int16 can hold it
 };
 
+/// Image Type of a slice derived from another: values 1 to 3 are those of a cross-section that was computed; vendors'
+/// own ones follow. Separated by backslashes.
+std::string derived_image_type(DcmDataset& source);
+
 /// Appends an item to Contributing Equipment (PS3.3 C.12.1.1): this program, the field and what was chosen.
 /// @param purpose  code of context group 7005, and @param meaning  its meaning
 void put_equipment(DcmItem& target, const std::string& purpose, const std::string& meaning,

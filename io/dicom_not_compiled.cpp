@@ -1,3 +1,4 @@
+#include "io/dicom_bids.h"
 #include "io/dicom_dose.h"
 #include "io/dicom_segmentation.h"
 #include "io/dicom_series.h"
@@ -39,6 +40,8 @@ DicomWriteReport write_derived_series(const std::filesystem::path&, const ConstV
 void write_phantom_series(const std::filesystem::path&, const ConstVolumeView&, std::uint64_t, const Control&) {
   refuse();
 }
+
+std::string bids_sidecar(const DicomHeaders&, const Geometry&, const DicomDerivation&) { refuse(); }
 
 bool is_dicom_dose(const std::filesystem::path&) { return false; }
 

@@ -252,10 +252,18 @@ std::vector<std::string> labels_of(Trait trait, std::span<const DicomFileHeader*
   return labels;
 }
 
-std::uint32_t traits_naming_patient(DcmItem& data, const std::string& traits) {
+PatientNames::PatientNames(DcmItem& data)
+    : words_(words_of(text_of(data, DCM_PatientName))), id_(text_of(data, DCM_PatientID)) {}
+
+bool PatientNames::are_in(std::string_view text) const {
   constexpr std::size_t kShortestId = 4;
-  const std::set<std::string> name = words_of(text_of(data, DCM_PatientName));
-  const std::string id = text_of(data, DCM_PatientID);
+  if (id_.size() >= kShortestId && text.find(id_) != std::string_view::npos) return true;
+  const std::set<std::string> words = words_of(text);
+  return std::any_of(words.begin(), words.end(), [&](const auto& word) { return words_.contains(word); });
+}
+
+std::uint32_t traits_naming_patient(DcmItem& data, const std::string& traits) {
+  const PatientNames patient(data);
   std::uint32_t found = 0;
   std::size_t begin = 0;
   for (std::size_t n = 0; n < kTraits; ++n) {
@@ -263,11 +271,7 @@ std::uint32_t traits_naming_patient(DcmItem& data, const std::string& traits) {
     const std::string_view value = std::string_view(traits).substr(begin, end - begin);
     begin = end + 1;
     if (value.empty() || table_of(static_cast<Trait>(n)).kind != Kind::text) continue;
-    const std::set<std::string> words = words_of(value);
-    const bool says_name =
-        std::any_of(words.begin(), words.end(), [&](const auto& word) { return name.contains(word); });
-    const bool says_id = id.size() >= kShortestId && value.find(id) != std::string_view::npos;
-    if (says_name || says_id) found |= 1u << n;
+    if (patient.are_in(value)) found |= 1u << n;
   }
   return found;
 }

@@ -3,6 +3,7 @@
 // Private to io/: the attributes that may tell several volumes of one series apart.
 #include <cstddef>
 #include <cstdint>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -51,6 +52,17 @@ std::string read_traits(DcmItem& data);
 
 /// One of them; empty where the file has none.
 std::string_view trait_of(const DicomFileHeader& header, Trait trait);
+
+/// Tells texts that name the patient: by a word of the name, of two characters or more, or by an ID of four or more.
+class PatientNames {
+ public:
+  explicit PatientNames(DcmItem& data);
+  bool are_in(std::string_view text) const;
+
+ private:
+  std::set<std::string> words_;  ///< in lower case
+  std::string id_;
+};
 
 /// Which texts among them hold a word of the patient's name, or the ID: one bit each, the first trait is the lowest.
 std::uint32_t traits_naming_patient(DcmItem& data, const std::string& traits);
