@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
-#include <glm/geometric.hpp>
 #include <iterator>
 #include <nlohmann/json.hpp>
 
@@ -39,8 +38,7 @@ std::size_t count_beyond(const std::vector<MovedContour>& contours, const Geomet
 
 /// mm3; 0 where the contours are no solid.
 double volume_of(std::span<const Contour> contours, const Geometry& grid) try {
-  return ContourStack(contours, glm::normalize(glm::cross(grid.direction[0], grid.direction[1])), grid.spacing.z)
-      .volume();
+  return ContourStack(contours, grid).volume();
 } catch (const InputError&) {
   return 0;
 }

@@ -38,6 +38,28 @@ bool all_lie_in_planes(std::span<const Contour> contours, const glm::dvec3& norm
                      [&](const Contour& contour) { return !is_area(contour) || lies_in_plane(contour, normal); });
 }
 
+glm::dvec3 normal_of(const Geometry& slices) {
+  return glm::normalize(glm::cross(slices.direction[0], slices.direction[1]));
+}
+
+/// Places of the slices along the third axis of a frame; none if they are not perpendicular to it.
+std::vector<double> slice_places(const Geometry& slices, const glm::dmat3& frame_from_point) {
+  const double first = (frame_from_point * slices.origin).z, step = (frame_from_point * slices.direction[2]).z;
+  std::vector<double> places;
+  if (std::abs((frame_from_point * normal_of(slices)).z) < 1 - 1e-6) return places;
+  for (std::int64_t k = 0; k < slices.size.z; ++k) {
+    const double along =
+        slices.slices.empty() ? slices.spacing.z * static_cast<double>(k) : slices.slices[static_cast<std::size_t>(k)];
+    places.push_back(first + step * along);
+  }
+  return places;
+}
+
+bool is_any_between(const std::vector<double>& places, double below, double above) {
+  return std::any_of(places.begin(), places.end(),
+                     [&](double at) { return at > below + 2 * kInPlane && at < above - 2 * kInPlane; });
+}
+
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
@@ -46,10 +68,10 @@ double median(std::vector<double> values) {
 
 }  // namespace
 
-ContourStack::ContourStack(std::span<const Contour> contours, const glm::dvec3& normal, double distance) {
-  choose_frame(contours, normal);
+ContourStack::ContourStack(std::span<const Contour> contours, const Geometry& slices) {
+  choose_frame(contours, normal_of(slices));
   add_planes(contours);
-  if (!planes_.empty()) add_parts(distance);
+  if (!planes_.empty()) add_parts(slices);
 }
 
 void ContourStack::choose_frame(std::span<const Contour> contours, const glm::dvec3& normal) {
@@ -94,14 +116,17 @@ void ContourStack::add_planes(std::span<const Contour> contours) {
   }
 }
 
-void ContourStack::add_parts(double distance) {
+void ContourStack::add_parts(const Geometry& slices) {
+  const std::vector<double> places = slice_places(slices, frame_from_point_);
   std::vector<double> gaps;
   for (std::size_t n = 1; n < planes_.size(); ++n) gaps.push_back(planes_[n].at - planes_[n - 1].at);
-  distance_ = gaps.empty() ? distance : median(gaps);
+  distance_ = gaps.empty() ? slices.spacing.z : median(gaps);
   const double below = (0.5 + kNudge) * distance_, above = (0.5 - kNudge) * distance_;
   for (std::size_t n = 0; n < planes_.size(); ++n) {
     const double at = planes_[n].at;
-    if (n == 0 || gaps[n - 1] > kUsual * distance_) parts_.push_back({n, n, at - below, at + above});
+    if (n == 0 ||
+        (gaps[n - 1] > kUsual * distance_ && (places.empty() || is_any_between(places, planes_[n - 1].at, at))))
+      parts_.push_back({n, n, at - below, at + above});
     parts_.back().last = n;
     parts_.back().end = at + above;
   }

@@ -7,6 +7,7 @@
 
 #include "deform/contours/contour.h"
 #include "deform/contours/planar_region.h"
+#include "deform/geometry.h"
 
 namespace tetwarp {
 
@@ -23,15 +24,15 @@ enum class Between : std::uint8_t {
 /// A solid that is drawn as closed contours in parallel planes.
 ///
 /// In a plane the solid is what an odd number of contours surround. Planes further apart than 1.5 times what is usual
-/// for them (the median) have nothing between them: there the solid ends. At an end it goes on unchanged for half the
-/// usual distance; a plane that lies exactly there is inside at the lower end alone, by a hundredth of the distance.
+/// for them (the median) have nothing between them if a slice without contours is there: there the solid ends. At an
+/// end it goes on unchanged for half the usual distance; a plane that lies exactly there is inside at the lower end
+/// alone, by a hundredth of the distance.
 class ContourStack {
  public:
   /// @param contours  others than closed ones are passed over, and so are those of fewer than three points
-  /// @param normal    of the planes to expect, of length 1; if the contours lie in others, these are found
-  /// @param distance  of two planes where there is only one, mm
+  /// @param slices    grid of the images that they were drawn on; contours in other planes than these are taken too
   /// @throws InputError unless the contours lie in planes, all parallel
-  ContourStack(std::span<const Contour> contours, const glm::dvec3& normal, double distance);
+  ContourStack(std::span<const Contour> contours, const Geometry& slices);
 
   /// Positive inside, mm; near the surface the distance to it, or less. -infinity where there is nothing.
   double signed_distance(const glm::dvec3& point, Between between) const;
@@ -60,7 +61,7 @@ class ContourStack {
 
   void choose_frame(std::span<const Contour> contours, const glm::dvec3& normal);
   void add_planes(std::span<const Contour> contours);
-  void add_parts(double distance);
+  void add_parts(const Geometry& slices);
   /// The planes around a height in a part, and how far it is from the lower to the upper one, 0 to 1.
   struct Neighbours {
     const PlanarRegion *below, *above;

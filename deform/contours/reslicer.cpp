@@ -33,7 +33,7 @@ struct Reslicer::Window {
 };
 
 Reslicer::Reslicer(std::span<const Contour> contours, const Geometry& source, const Geometry& output)
-    : solid_(contours, glm::normalize(glm::cross(source.direction[0], source.direction[1])), source.spacing.z),
+    : solid_(contours, source),
       output_(output),
       point_from_output_(point_from_index(output)),
       low_(INFINITY),

@@ -156,7 +156,7 @@ TEST(ZeroContours, WhatIsCutIsClosedAndSaid) {
 Geometry slices_grid() { return {{64, 60, 30}, {1, 1, 3}, {-32, -30, -45}, glm::dmat3(1)}; }
 
 TEST(ContourStack, VolumeOfABall) {
-  const ContourStack stack(ball(slices_grid(), {0, 0, 0}, 24, 10), {0, 0, 1}, 3);
+  const ContourStack stack(ball(slices_grid(), {0, 0, 0}, 24, 10), slices_grid());
   EXPECT_NEAR(stack.volume(), 4 * kPi / 3 * (24 * 24 * 24 - 10 * 10 * 10), 0.01 * stack.volume());
   EXPECT_EQ(stack.parts(), 1u);
   EXPECT_NEAR(stack.signed_distance({17, 0, 0}, Between::interpolated), 7, 0.02);
@@ -166,7 +166,7 @@ TEST(ContourStack, VolumeOfABall) {
 TEST(ContourStack, NothingIsBetweenPlanesThatAreFarApart) {
   std::vector<Contour> contours;
   for (const double z : {0.0, 3.0, 6.0, 30.0, 33.0}) contours.push_back(drawn(circle({0, 0}, 10, 60), z));
-  const ContourStack stack(contours, {0, 0, 1}, 3);
+  const ContourStack stack(contours, slices_grid());
   EXPECT_EQ(stack.parts(), 2u);
   for (const auto& [z, inside] : {std::pair(-1.6, false),
                                   {-1.4, true},
@@ -184,10 +184,24 @@ TEST(ContourStack, NothingIsBetweenPlanesThatAreFarApart) {
   }
 }
 
+TEST(ContourStack, NeighboursOnUnevenSlicesHaveSomethingBetweenThem) {
+  Geometry uneven = slices_grid();
+  uneven.size.z = 6;
+  uneven.origin.z = 0;
+  uneven.slices = {0, 3, 6, 15, 18, 21};
+  uneven.spacing.z = 21.0 / 5;
+  std::vector<Contour> contours;
+  for (const double z : uneven.slices) contours.push_back(drawn(circle({0, 0}, 10, 60), z));
+  EXPECT_EQ(ContourStack(contours, uneven).parts(), 1u);
+  EXPECT_TRUE(ContourStack(contours, uneven).place({1, 2, 10.4}).interpolated);
+  contours.erase(contours.begin() + 3);
+  EXPECT_EQ(ContourStack(contours, uneven).parts(), 2u);
+}
+
 TEST(ContourStack, AnEndHalfWayToASliceBelongsToOneOfTwoSlices) {
   std::vector<Contour> contours;
   for (const double z : {0.0, 3.0, 6.0}) contours.push_back(drawn(circle({0, 0}, 10, 60), z));
-  const ContourStack stack(contours, {0, 0, 1}, 3);
+  const ContourStack stack(contours, slices_grid());
   int inside = 0;
   for (double z = -10.5; z < 20; z += 3) inside += stack.place({0, 0, z}).interpolated;
   EXPECT_EQ(inside, 3);
@@ -201,11 +215,13 @@ TEST(ContourStack, TakesTheContoursOwnPlanesButNotSeveralKinds) {
   };
   std::vector<Contour> sagittal, mixed;
   for (const Contour& contour : ball(slices_grid(), {0, 0, 0}, 20)) sagittal.push_back(turned(contour));
-  const ContourStack stack(sagittal, {0, 0, 1}, 3);
+  const ContourStack stack(sagittal, slices_grid());
   EXPECT_NEAR(stack.volume(), 4 * kPi / 3 * 8000, 0.01 * stack.volume());
+  std::erase_if(sagittal, [](const Contour& contour) { return std::abs(contour.points[0].x) < 5; });
+  EXPECT_EQ(ContourStack(sagittal, slices_grid()).parts(), 2u);
   mixed = ball(slices_grid(), {0, 0, 0}, 20);
   mixed.push_back(sagittal[sagittal.size() / 2]);
-  EXPECT_THROW(ContourStack(mixed, {0, 0, 1}, 3), InputError);
+  EXPECT_THROW(ContourStack(mixed, slices_grid()), InputError);
 }
 
 /// A field of the formula on a lattice as fine as the grid, and its inverse at every voxel.
