@@ -103,7 +103,6 @@ bool is_of_patient_or_study(const DcmTagKey& tag) {
                                                DCM_PhysiciansReadingStudyIdentificationSequence,
                                                DCM_AdmittingDiagnosesDescription,
                                                DCM_AdmittingDiagnosesCodeSequence,
-                                               DCM_ReferencedStudySequence,
                                                DCM_StudyInstanceUID,
                                                DCM_StudyID,
                                                DCM_PositionReferenceIndicator};
