@@ -181,6 +181,27 @@ TEST(Registration, KeepsPatientAndStudyAndDropsTheScan) {
   EXPECT_TRUE(says(get(equipment, DCM_ContributionDescription), {std::string(64, 'a'), "interpolation=linear"}));
 }
 
+TEST(Registration, IsDeidentifiedWithItsSeries) {
+  const Scratch scratch;
+  DerivedSource source;
+  source.derivation.form.deidentification.emplace(Deidentification{.key = std::vector<std::byte>(32, std::byte{7})});
+  const DicomWriteReport series = write_both(source, scratch.path());
+  const std::string bytes = file_bytes(scratch / "reg.dcm");
+  for (const char* word : {"NAME", "GIVEN", "ID17", "1.2.3.", "20200102", "20200104", "19500101", "REFERRER"})
+    EXPECT_EQ(bytes.find(word), std::string::npos) << word;
+  Written file(scratch / "reg.dcm"), slice(scratch / "out" / "IM00001.dcm");
+  EXPECT_EQ(file[DCM_PatientIdentityRemoved], "YES");
+  for (const DcmTagKey& tag : {DCM_PatientName, DCM_PatientID, DCM_StudyInstanceUID, DCM_FrameOfReferenceUID}) {
+    EXPECT_FALSE(file[tag].empty()) << tag.toString();
+    EXPECT_EQ(file[tag], slice[tag]) << tag.toString();
+  }
+  EXPECT_EQ(images_of(derived_item(file)), series.sop_instance_uids);
+  EXPECT_EQ(images_of(source_item(file)).at(0),
+            get(item_of(slice.data(), DCM_SourceImageSequence), DCM_ReferencedSOPInstanceUID));
+  EXPECT_FALSE(file[DCM_ContentDate].empty());
+  EXPECT_EQ(items_of(file.data(), DCM_ReferencedSeriesSequence), 2U);
+}
+
 TEST(Registration, TakesItsDateFromTheSource) {
   const Scratch scratch;
   DerivedSource source;
