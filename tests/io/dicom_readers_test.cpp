@@ -1,11 +1,9 @@
 // Derived series and phantoms as other programs see them: dciodvfy and dcentvfy (dicom3tools), pydicom, dcm2niix.
 #include <gtest/gtest.h>
 
-#include <set>
-#include <sstream>
-
 #include "io/dicom_series.h"
 #include "tests/support/dicom_maker.h"
+#include "tests/support/dicom_validators.h"
 #include "tests/support/other_readers.h"
 #include "tests/support/real_data.h"
 #include "tests/support/scratch.h"
@@ -14,33 +12,6 @@ namespace fs = std::filesystem;
 
 namespace tetwarp::test {
 namespace {
-
-bool is_installed(const std::string& program) { return run_command("command -v " + program).status == 0; }
-
-std::set<std::string> error_lines(const std::string& command) {
-  std::set<std::string> lines;
-  std::istringstream output(run_command(command).output);
-  for (std::string line; std::getline(output, line);) {
-    if (line.find("Error") != std::string::npos) lines.insert(line);
-  }
-  return lines;
-}
-
-/// The different error lines over all slices.
-std::set<std::string> dciodvfy_errors(const std::vector<fs::path>& files) {
-  std::set<std::string> lines;
-  for (const fs::path& file : files) lines.merge(error_lines("dciodvfy " + quoted(file)));
-  return lines;
-}
-
-std::set<std::string> dcentvfy_errors(const std::vector<fs::path>& files) {
-  std::string command = "dcentvfy";
-  for (const fs::path& file : files) command.append(" ").append(quoted(file));
-  std::set<std::string> lines;
-  std::istringstream output(run_command(command).output);
-  for (std::string line; std::getline(output, line);) lines.insert(line);  // it prints differences only
-  return lines;
-}
 
 std::vector<fs::path> files_in(const fs::path& folder) {
   return {fs::directory_iterator(folder), fs::directory_iterator()};
