@@ -143,9 +143,9 @@ void copy_those(DcmItem& target, DcmDataset& source, const Wanted& is_wanted) {
 
 }  // namespace
 
-std::set<DcmTagKey> varying_acquisition(const std::vector<DcmDataset*>& slices) {
-  static const std::set<DcmTagKey> of_each_slice = {DCM_SliceThickness, DCM_KVP, DCM_SpacingBetweenSlices,
-                                                    DCM_ContributingEquipmentSequence};
+std::set<DcmTagKey> varying_acquisition(const std::vector<DcmDataset*>& slices, bool own) {
+  std::set<DcmTagKey> of_each_slice = {DCM_KVP, DCM_SpacingBetweenSlices, DCM_ContributingEquipmentSequence};
+  if (own) of_each_slice.insert(DCM_SliceThickness);
   std::set<DcmTagKey> tags, varying;
   for (DcmDataset* slice : slices) {
     for (unsigned long i = 0; i < slice->card(); ++i) {

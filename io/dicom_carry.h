@@ -12,7 +12,10 @@ namespace tetwarp {
 
 /// Attributes of acquisition (group 0018) that do not have one value for the whole series: tube current, exposure,
 /// table position. After a deformation a slice shows tissue of several source slices, so these would be false.
-std::set<DcmTagKey> varying_acquisition(const std::vector<DcmDataset*>& slices);
+/// @param own  whether each slice stands for its own of the source. KVP and Slice Thickness are then carried slice by
+///             slice; else Slice Thickness, where it varies, belongs to no slice, and would divide an even stack for
+///             readers that go by it (GDCM's series details)
+std::set<DcmTagKey> varying_acquisition(const std::vector<DcmDataset*>& slices, bool own);
 
 /// Copies into `target` what stays true of a derived slice.
 ///

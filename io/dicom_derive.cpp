@@ -267,7 +267,7 @@ DerivedSeries derive_series(const DicomHeaders& source, const Geometry& geometry
                                                : derived_description(*slices.front(), derivation);
   series.instance_number = instance_numbers(headers, static_cast<std::size_t>(geometry.size.z));
   series.header = header_slices(headers, geometry);
-  series.varying = varying_acquisition(slices);
+  series.varying = varying_acquisition(slices, std::ssize(slices) == geometry.size.z);
   series.padding = common_padding(headers);
   if (derivation.form.deidentification) deidentify(series, *slices.front(), *derivation.form.deidentification);
   return series;

@@ -191,6 +191,26 @@ TEST(DerivedSeries, DropsAcquisitionValuesThatDifferFromSliceToSlice) {
   EXPECT_EQ(file[DCM_TableHeight], "150");
 }
 
+TEST(DerivedSeries, SliceThicknessThatVariesIsLeftToSlicesOfTheSource) {
+  const Scratch scratch;
+  DerivedSource own;
+  set(own[2], DCM_SliceThickness, "5.0");
+  own.write(scratch / "own");
+  EXPECT_EQ(Written(scratch / "own" / kNames[0])[DCM_SliceThickness], "2.50");
+  EXPECT_EQ(Written(scratch / "own" / kNames[2])[DCM_SliceThickness], "5.0");
+
+  for (const std::string thickness : {"2.50", "5.0"}) {  // the same in all slices; that of one
+    DerivedSource more(5);
+    more.headers.slices.resize(3);
+    more.sampled.assign(5, {0, 2});
+    set(more[2], DCM_SliceThickness, thickness);
+    const DicomWriteReport report = more.write(scratch / thickness);
+    const std::string written = Written(scratch / thickness / kNames[0])[DCM_SliceThickness];
+    EXPECT_EQ(written, thickness == "2.50" ? "2.50" : "");
+    EXPECT_EQ(report.added_empty.empty(), thickness == "2.50");
+  }
+}
+
 TEST(DerivedSeries, AddsMissingType2AttributesEmptyAndNamesThem) {
   const Scratch scratch;
   DerivedSource source;
