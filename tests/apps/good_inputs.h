@@ -1,0 +1,31 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace tetwarp::test {
+
+/// A series or volume of the real data that can be deformed, or a slice that can as a stack of two.
+struct GoodInput {
+  std::string name;                ///< of the test
+  std::filesystem::path at;        ///< folder or file below $TETWARP_TEST_DATA
+  int number = 1;                  ///< what --series takes
+  const char* dcm2niix = nullptr;  ///< what is said where dcm2niix disagrees with the identity; null: it agrees
+  bool thinned = false;            ///< deformed are some slices of it, for the time that the whole takes
+  bool alike = false;              ///< to one before it, but for how its pixels are coded
+};
+
+inline void PrintTo(const GoodInput& input, std::ostream* out) { *out << input.at.string() << " " << input.number; }
+
+/// Series of several slices.
+std::vector<GoodInput> good_series();
+/// DICOM files of one slice that belongs to no such series.
+std::vector<GoodInput> good_slices();
+/// Volume files.
+std::vector<GoodInput> good_files();
+
+/// $TETWARP_TEST_DATA, or empty.
+std::filesystem::path test_data();
+
+}  // namespace tetwarp::test
