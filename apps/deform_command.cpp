@@ -37,13 +37,10 @@ class Deformation {
   void move_structures(Resampler& resampler, Outside outside);
   void write();
   void write_preview_picture();
-  DicomDerivation derivation() const;
-  DicomDerivation input_derivation() const;
   void write_slices(const Region& slices);
   Target main_target();
   void scale_mass(const Region& slices);
   std::string title() const;
-  void say_what_is_not_done() const;
 
   const DeformOptions& options_;
   DeformRecord record_;
@@ -121,7 +118,8 @@ Backend Deformation::resample() {
   record_.output = AnyVolume(record_.plan.grid, record_.input.volume.type());
   sampled_slices_.resize(record_.outputs.series ? static_cast<std::size_t>(record_.plan.grid.size.z) : 0);
   if (record_.outputs.series)
-    series_.emplace(record_.outputs.volume, record_.plan.grid, *record_.input.dicom->headers, input_derivation());
+    series_.emplace(record_.outputs.volume, record_.plan.grid, *record_.input.dicom->headers,
+                    input_derivation(record_));
   MapStream maps(record_.plan.grid, record_.outputs.set);
   record_.outputs.set.write([&] {
     record_.outputs.maps->add_to(maps, record_.plan.grid, options_.preserve_mass, series_ ? &*series_ : nullptr);
@@ -222,30 +220,6 @@ void Deformation::move_structures(Resampler& resampler, Outside outside) {
   structures.finish();
 }
 
-/// What is true of all that goes through the field; INPUT's voxels have parameters of their own.
-DicomDerivation Deformation::derivation() const {
-  const bool pull = record_.field.direction == Direction::pull, deformed = pull || !record_.field.forward.identity;
-  const char* what =
-      !deformed ? "Resampled by the identity" : (pull ? "Deformed by a pull field" : "Deformed by a field of vertices");
-  return {.field_sha256 = record_.field_sha256,
-          .parameters =
-              std::string("outside=") + name_of(options_.outside) + (pull ? " direction=pull" : " direction=forward"),
-          .description = what,
-          .deformed = deformed,
-          .background_hu = record_.background,
-          .form = options_.dicom};
-}
-
-DicomDerivation Deformation::input_derivation() const {
-  DicomDerivation of_input = derivation();
-  of_input.parameters = "interpolation=" + std::string(name_of(options_.interpolation)) +
-                        " outside=" + name_of(options_.outside) + " background=" + json(record_.background).dump() +
-                        (record_.field.direction == Direction::pull ? " direction=pull" : " direction=forward") +
-                        (options_.preserve_mass ? " preserve=mass" : "");
-  of_input.description += std::string(", ") + name_of(options_.interpolation) + " interpolation";
-  return of_input;
-}
-
 /// While others are resampled.
 void Deformation::write_slices(const Region& slices) {
   series_->write(std::as_const(record_.output).view(), slices.begin.z, slices.end.z, sampled_slices_,
@@ -257,7 +231,7 @@ void Deformation::write() {
   const std::string made_by = "tetwarp field " + record_.field_sha256.substr(0, 16);
   if (record_.outputs.series) {
     record_.dicom_report = series_->report();
-    record_.outputs.structures.write(*record_.dicom_report, derivation());
+    record_.outputs.structures.write(*record_.dicom_report, derivation(record_));
   } else {
     Stage stage(options_.common, "write");
     write_image(record_.outputs.volume, std::as_const(record_.output).view(),
@@ -265,13 +239,13 @@ void Deformation::write() {
   }
   if (options_.bids) {
     write_json(record_.outputs.bids,
-               json::parse(bids_sidecar(*record_.input.dicom->headers, record_.plan.grid, input_derivation())));
+               json::parse(bids_sidecar(*record_.input.dicom->headers, record_.plan.grid, input_derivation(record_))));
   }
   if (!record_.outputs.preview.empty()) write_preview_picture();
   std::optional<DerivedOutput> series;
   if (record_.dicom_report)
     series.emplace(WrittenSeries{*record_.input.dicom->headers, *record_.dicom_report, record_.plan.grid},
-                   derivation());
+                   derivation(record_));
   record_.outputs.further->write(options_.compression, made_by, series);
   record_.points.write(record_.outputs.points);
   write_json(record_.outputs.sidecar, sidecar(record_));
@@ -340,21 +314,9 @@ int Deformation::run() {
     say(options_.common, "tetwarp: note: " + plural(record_.set_aside.size(), "file") + " of the series " +
                              (one ? "is no slice" : "are no slices") + " of it; OUTPUT.json names them");
   }
-  if (options_.dicom.deidentification) say_what_is_not_done();
+  for (const std::string& note : deidentification_notes(record_)) say(options_.common, "tetwarp: " + note);
   say(options_.common, summary(record_));
   return 0;
-}
-
-void Deformation::say_what_is_not_done() const {
-  say(options_.common, std::string("tetwarp: note: de-identified by ") + kConfidentialityEdition +
-                           ", Basic Profile; not looked at: text in the pixels, faces that a rendering shows, paths "
-                           "of fields and outputs in " +
-                           sidecar_of(options_.output).filename().string());
-  if (record_.dicom_report->says_who) {
-    say(options_.common,
-        "tetwarp: warning: the source says that its pixels hold text (Burned In Annotation) or a face that can be "
-        "recognised (Recognizable Visual Features); they are still there");
-  }
 }
 
 }  // namespace

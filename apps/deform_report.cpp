@@ -85,6 +85,43 @@ json quality_json(const DeformRecord& of) {
 
 }  // namespace
 
+DicomDerivation derivation(const DeformRecord& of) {
+  const bool pull = of.field.direction == Direction::pull, deformed = pull || !of.field.forward.identity;
+  const char* what =
+      !deformed ? "Resampled by the identity" : (pull ? "Deformed by a pull field" : "Deformed by a field of vertices");
+  return {.field_sha256 = of.field_sha256,
+          .parameters =
+              std::string("outside=") + name_of(of.options.outside) + (pull ? " direction=pull" : " direction=forward"),
+          .description = what,
+          .deformed = deformed,
+          .background_hu = of.background,
+          .form = of.options.dicom};
+}
+
+DicomDerivation input_derivation(const DeformRecord& of) {
+  DicomDerivation of_input = derivation(of);
+  of_input.parameters = "interpolation=" + std::string(name_of(of.options.interpolation)) +
+                        " outside=" + name_of(of.options.outside) + " background=" + json(of.background).dump() +
+                        (of.field.direction == Direction::pull ? " direction=pull" : " direction=forward") +
+                        (of.options.preserve_mass ? " preserve=mass" : "");
+  of_input.description += std::string(", ") + name_of(of.options.interpolation) + " interpolation";
+  return of_input;
+}
+
+std::vector<std::string> deidentification_notes(const DeformRecord& of) {
+  if (!of.options.dicom.deidentification) return {};
+  std::vector<std::string> notes = {std::string("note: de-identified by ") + kConfidentialityEdition +
+                                    ", Basic Profile; not looked at: text in the pixels, faces that a rendering shows, "
+                                    "paths of fields and outputs in " +
+                                    sidecar_of(of.options.output).filename().string()};
+  if (of.dicom_report && of.dicom_report->says_who) {
+    notes.push_back(
+        "warning: the source says that its pixels hold text (Burned In Annotation) or a face that can be recognised "
+        "(Recognizable Visual Features); they are still there");
+  }
+  return notes;
+}
+
 json sidecar(const DeformRecord& of) {
   json document = provenance("deform");
   document["options"] = canonical_options(of);

@@ -36,6 +36,13 @@ struct DeformRecord {
   std::vector<std::pair<std::string, double>> stages;  ///< seconds
 };
 
+/// How all that goes through the field came to be; INPUT's voxels have parameters of their own.
+DicomDerivation derivation(const DeformRecord& of);
+DicomDerivation input_derivation(const DeformRecord& of);
+
+/// What a de-identification did not do, "note: ..." and "warning: ..."; none where there was no de-identification.
+std::vector<std::string> deidentification_notes(const DeformRecord& of);
+
 /// OUTPUT.json: without a clock.
 nlohmann::json sidecar(const DeformRecord& of);
 /// --report: the sidecar, times, memory, and what the field is like.

@@ -15,6 +15,7 @@
 #include "tests/support/image_samples.h"
 #include "tests/support/point_files.h"
 #include "tests/support/seg_maker.h"
+#include "tests/support/structure_maker.h"
 #include "tests/support/write_file.h"
 
 namespace {
@@ -273,6 +274,13 @@ void make_segmentations(const fs::path& folder) {
   }
 }
 
+void make_structure_set(const fs::path& folder) {
+  MadeStructures made;
+  made.rois = {{{"CLOSED_PLANAR", {{0, 0, 0}, {9, 0, 0}, {9, 9, 0}}}, {"POINT", {{1, 2, 3}}}},
+               {{"OPEN_NONPLANAR", {{0, 0, 0}, {8, 6, 7}}}}};
+  write_structures(folder / "structures.dcm", made);
+}
+
 /// One slice in every transfer syntax.
 void make_slices(const fs::path& folder) {
   for (const E_TransferSyntax encoding :
@@ -384,6 +392,7 @@ void make_dicom(const fs::path& root) {
   make_slices(folder_of(root, "dicom"));
   make_dose(root / "dicom");
   make_segmentations(root / "dicom");
+  make_structure_set(root / "dicom");
   make_enhanced(root / "dicom");
   make_slices(folder_of(root, "dicom-scan"));
   make_enhanced(root / "dicom-scan");
