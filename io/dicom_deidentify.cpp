@@ -35,13 +35,15 @@ AttributeType type_in(bool is_ct_image, const DcmTagKey& tag) {
   return type_2_of_ct_image().contains(tag) ? AttributeType::may_be_empty : AttributeType::optional;
 }
 
-bool is_about_patient_or_order(const DcmTagKey& tag) {
+/// Of groups in which people write what they like: patient, trial, order, visit, procedure, presentation.
+bool may_be_told_in_text(const DcmTagKey& tag) {
   switch (tag.getGroup()) {
     case 0x0010:
     case 0x0012:
     case 0x0032:
     case 0x0038:
-    case 0x0040: return true;
+    case 0x0040:
+    case 0x0070: return true;
     default: return false;
   }
 }
@@ -245,7 +247,7 @@ Confidentiality Deidentifier::action_on(DcmElement& element, AttributeType type)
     case EVR_UC:
     case EVR_UR: return is_code(tag) ? keep : taken;
     case EVR_LO:
-    case EVR_SH: return is_about_patient_or_order(tag) ? taken : keep;
+    case EVR_SH: return may_be_told_in_text(tag) ? taken : keep;
     case EVR_AS:
     case EVR_AT:
     case EVR_CS:

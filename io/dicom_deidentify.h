@@ -15,7 +15,7 @@ namespace tetwarp {
 /// Applies table E.1-1 of PS3.15 to whole data sets. Stricter than the table, since no list of names is complete:
 /// - What the dictionary of DCMTK does not know goes, and what lies in an element of VR UN.
 /// - Other free text (VR LT, ST, UT, UC, UR), persons' names (PN), application entities (AE) and bytes (OB, OW, ...)
-///   go, and all texts of the groups 0010, 0012, 0032, 0038 and 0040: of patient, trial and order.
+///   go, and all texts of the groups 0010, 0012, 0032, 0038, 0040 and 0070: of patient, trial, order, presentation.
 /// - Other dates and times (DA, DT, TM) are treated as those of the table, other UIDs are replaced unless the standard
 ///   gave them.
 /// What may not be missing in an item, or may not be empty, becomes empty or a dummy instead.
