@@ -40,6 +40,13 @@ std::string sop_class_of(const std::filesystem::path& path) {
   return text_of(*format.getDataset(), DCM_SOPClassUID);
 }
 
+DcmDataset& read_source(DcmFileFormat& format, const DicomAlong& along) {
+  const OFCondition read = parse_dicom(format, along.source, DCM_PixelData).result;
+  require(read.good(), shown(along.source) + " cannot be read as DICOM any more: " + read.text());
+  deidentify(*format.getDataset(), along.derivation.form.deidentification, false);
+  return *format.getDataset();
+}
+
 void put_along(DcmItem& target, DcmDataset& source, const DicomAlong& along, const WrittenSeries& series,
                std::span<const DcmTagKey> type_2) {
   const DicomDerivation& derivation = along.derivation;

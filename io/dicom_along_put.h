@@ -15,6 +15,10 @@ namespace tetwarp {
 /// SOP Class UID of a DICOM file; empty for what is none or cannot be read.
 std::string sop_class_of(const std::filesystem::path& path);
 
+/// Reads the object up to its Pixel Data, and de-identifies it if that is asked for.
+/// @throws InputError for a file that is no longer what it was
+DcmDataset& read_source(DcmFileFormat& format, const DicomAlong& along);
+
 /// Puts patient, study, series, frame of reference, equipment and derivation into the empty item `target`: of the
 /// source what `carry_over` takes, in the study and frame of reference of the derived series, as a series of its own.
 /// Where the source belongs to another study, Study Date, Time, ID and Accession Number are those of the derived

@@ -8,13 +8,11 @@
 
 #include "io/dicom_along_put.h"
 #include "io/dicom_carry.h"
-#include "io/dicom_deidentify.h"
 #include "io/dicom_derive.h"
 #include "io/dicom_dose.h"
 #include "io/dicom_file.h"
 #include "io/dicom_header.h"
 #include "io/dicom_put.h"
-#include "io/dicom_stream.h"
 #include "io/dicom_text.h"
 
 namespace tetwarp {
@@ -113,10 +111,7 @@ DoseReport write_derived_dose(const std::filesystem::path& path, const ConstVolu
   prepare_dcmtk();
   const Geometry& grid = *doses.geometry;
   DcmFileFormat format;
-  const OFCondition read = parse_dicom(format, along.source, DCM_PixelData).result;
-  require(read.good(), shown(along.source) + " cannot be read as DICOM any more: " + read.text());
-  DcmDataset& source = *format.getDataset();
-  deidentify(source, along.derivation.form.deidentification, false);
+  DcmDataset& source = read_source(format, along);
   const bool is_signed = text_of(source, DCM_PixelRepresentation) == "1";
   DcmDataset target;
   put_along(target, source, along, series, type_2_of_dose());

@@ -8,12 +8,10 @@
 
 #include "io/dicom_along_put.h"
 #include "io/dicom_carry.h"
-#include "io/dicom_deidentify.h"
 #include "io/dicom_file.h"
 #include "io/dicom_header.h"
 #include "io/dicom_put.h"
 #include "io/dicom_segmentation.h"
-#include "io/dicom_stream.h"
 #include "io/hash.h"
 
 namespace tetwarp {
@@ -178,10 +176,7 @@ SegmentationReport write_derived_segmentation(const std::filesystem::path& path,
   prepare_dcmtk();
   const Geometry& grid = *segments.front().geometry;
   DcmFileFormat format;
-  const OFCondition read = parse_dicom(format, along.source, DCM_PixelData).result;
-  require(read.good(), shown(along.source) + " cannot be read as DICOM any more: " + read.text());
-  DcmDataset& source = *format.getDataset();
-  deidentify(source, along.derivation.form.deidentification, false);
+  DcmDataset& source = read_source(format, along);
   const std::vector<DicomSegmentation::Frame> frames = frames_to_write(segments);
   const std::vector<std::byte> pixels = packed(segments, frames, header);
 
