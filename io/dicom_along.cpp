@@ -64,9 +64,7 @@ void put_along(DcmItem& target, DcmDataset& source, const DicomAlong& along, con
   put(target, DCM_FrameOfReferenceUID, series.report.frame_of_reference_uid);
   if (text_of(target, DCM_InstanceNumber).empty()) put(target, DCM_InstanceNumber, "1");
   put_how_derived(target, derivation);
-  for (const DcmTagKey& tag : type_2) {
-    if (!target.tagExists(tag)) put(target, tag, "");
-  }
+  put_missing(target, type_2);
 }
 
 DcmItem& append_slice_reference(DcmItem& target, const DcmTagKey& sequence, const WrittenSeries& series,

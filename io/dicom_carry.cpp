@@ -171,11 +171,12 @@ void carry_over(DcmItem& target, DcmDataset& source, const std::set<DcmTagKey>& 
 
 void carry_patient_and_study(DcmItem& target, DcmDataset& source) {
   copy_those(target, source, is_of_patient_or_study);
-  for (const DcmTagKey& tag :
-       {DCM_StudyDate, DCM_StudyTime, DCM_AccessionNumber, DCM_ReferringPhysicianName, DCM_PatientName, DCM_PatientID,
-        DCM_PatientBirthDate, DCM_PatientSex, DCM_StudyID, DCM_PositionReferenceIndicator}) {  // type 2
-    if (!target.tagExists(tag)) put(target, tag, "");
-  }
+  static const std::vector<DcmTagKey> kType2 = {DCM_StudyDate,        DCM_StudyTime,
+                                                DCM_AccessionNumber,  DCM_ReferringPhysicianName,
+                                                DCM_PatientName,      DCM_PatientID,
+                                                DCM_PatientBirthDate, DCM_PatientSex,
+                                                DCM_StudyID,          DCM_PositionReferenceIndicator};
+  put_missing(target, kType2);
 }
 
 void carry_attribute(DcmItem& target, DcmItem& source, const DcmTagKey& tag) {

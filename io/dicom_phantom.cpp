@@ -84,9 +84,7 @@ void write_phantom_series(const std::filesystem::path& folder, const ConstVolume
     put_patient_and_study(slice, uids);
     put_series_and_equipment(slice, uids, seed);
     put_image(slice, geometry, k);
-    for (const DcmTagKey& tag : type_2_attributes()) {
-      if (!slice.tagExists(tag)) put(slice, tag, "");
-    }
+    put_missing(slice, type_2_attributes());
     put_hu_format(slice, geometry);
     write_dicom_file(folder / dicom_file_name(static_cast<int>(k + 1)), slice, slice_of(volume, k));
   });

@@ -55,6 +55,12 @@ void put(DcmItem& item, const DcmTagKey& tag, const std::string& value) {
 }
 void put(DcmItem& item, const DcmTagKey& tag, std::uint16_t value) { check(item.putAndInsertUint16(tag, value), tag); }
 
+void put_missing(DcmItem& item, std::span<const DcmTagKey> tags) {
+  for (const DcmTagKey& tag : tags) {
+    if (!item.tagExists(tag)) put(item, tag, "");
+  }
+}
+
 void drop(DcmItem& item, const DcmTagKey& tag) { item.findAndDeleteElement(tag); }
 
 void put(DcmItem& item, const DcmTagKey& tag, std::int16_t value) {

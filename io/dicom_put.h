@@ -27,6 +27,9 @@ void put(DcmItem& item, const DcmTagKey& tag, std::int16_t value);  ///< for att
 /// Sets decimal strings, unless those that are there mean the same within `tolerance`: nothing drifts.
 void put_decimals(DcmItem& item, const DcmTagKey& tag, std::span<const double> values, double tolerance);
 
+/// Sets those of the attributes that are missing to empty: type 2 (PS3.5 7.4.3).
+void put_missing(DcmItem& item, std::span<const DcmTagKey> tags);
+
 /// Removes an attribute, if it is there.
 void drop(DcmItem& item, const DcmTagKey& tag);
 

@@ -22,15 +22,6 @@ namespace {
 constexpr double kPlaces = 1e4;                            // a coordinate is written to 1 / kPlaces mm
 constexpr char kStudyClass[] = "1.2.840.10008.3.1.2.3.1";  // Detached Study Management (retired): what names a study
 
-void put_type_2(DcmItem& target) {
-  for (const DcmTagKey& tag :
-       {DCM_StudyDate, DCM_StudyTime, DCM_AccessionNumber, DCM_Manufacturer, DCM_ReferringPhysicianName,
-        DCM_OperatorsName, DCM_PatientName, DCM_PatientID, DCM_PatientBirthDate, DCM_PatientSex, DCM_StudyID,
-        DCM_PositionReferenceIndicator, DCM_StructureSetDate, DCM_StructureSetTime}) {
-    if (!target.tagExists(tag)) put(target, tag, "");
-  }
-}
-
 void append_instance(DcmItem& target, const DcmTagKey& sequence, const char* sop_class, const std::string& instance) {
   DcmItem& item = append_item(target, sequence);
   put(item, DCM_ReferencedSOPClassUID, sop_class);
@@ -176,7 +167,21 @@ StructureWriteReport write_structure_set(const std::filesystem::path& path, cons
     append_contours(data, header.contour[n].get(), source.structures[n].number, moved.at(n), series);
   }
   for (const auto& observation : header.observations) append_observation(data, *observation);
-  put_type_2(data);
+  static const std::vector<DcmTagKey> kType2 = {DCM_StudyDate,
+                                                DCM_StudyTime,
+                                                DCM_AccessionNumber,
+                                                DCM_Manufacturer,
+                                                DCM_ReferringPhysicianName,
+                                                DCM_OperatorsName,
+                                                DCM_PatientName,
+                                                DCM_PatientID,
+                                                DCM_PatientBirthDate,
+                                                DCM_PatientSex,
+                                                DCM_StudyID,
+                                                DCM_PositionReferenceIndicator,
+                                                DCM_StructureSetDate,
+                                                DCM_StructureSetTime};
+  put_missing(data, kType2);
   const std::string instance = write_dicom_file(path, data);
   return {text_of(data, DCM_SeriesInstanceUID), instance};
 }
