@@ -201,6 +201,17 @@ void add_deform(CLI::App& app, DeformOptions& options) {
       ->type_name("FILE")
       ->excludes(field);
   command
+      ->add_option(
+          "--scenario", options.scenario,
+          "Simulate the field as `simulate` does, of a page of scenario (docs/simulate.md); INPUT is a CT in HU")
+      ->type_name("FILE.json");
+  command->add_option("--labels", options.labels, "Label volume on the grid of INPUT, for the tissues of --scenario")
+      ->type_name("FILE");
+  command
+      ->add_option("--write-field", options.write_field,
+                   "The forward field that was used: .mha .nrrd .nii .nii.gz, or a mesh, .vtu .vtk")
+      ->type_name("FILE");
+  command
       ->add_option("-o,--output", options.output,
                    "A folder (DICOM series; INPUT must be DICOM), or .nii .nii.gz .nrrd .mha")
       ->required();

@@ -9,6 +9,8 @@
 #include "deform/fields/formula.h"
 #include "deform/residuals.h"
 #include "io/image_file.h"
+#include "io/mesh_writer.h"
+#include "io/scenario_file.h"
 
 namespace tetwarp::apps {
 
@@ -21,13 +23,17 @@ std::filesystem::path folder_of(const std::filesystem::path& file) {
   return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
 }
 
+std::uint64_t bytes_of_field(const DeformOptions& options, const Geometry& volume, const Geometry& grid) {
+  if (!options.scenario.empty()) return simulation_bytes(options.scenario, volume, !options.labels.empty());
+  if (options.pull_field.empty()) return field_bytes(options.fields, volume, options.cell_size);
+  const glm::i64vec3 pulled = pull_grid_size(options.pull_field, grid);
+  return static_cast<std::uint64_t>(pulled.x * pulled.y * pulled.z) * sizeof(glm::vec3);
+}
+
 /// @param grid  of the output
 std::uint64_t plan_bytes(const DeformOptions& options, DeformOutputs& outputs, const InputHeader& input,
                          const Geometry& grid) {
-  const glm::i64vec3 pulled = options.pull_field.empty() ? glm::i64vec3(0) : pull_grid_size(options.pull_field, grid);
-  const std::uint64_t of_field = options.pull_field.empty()
-                                     ? field_bytes(options.fields, input.geometry, options.cell_size)
-                                     : static_cast<std::uint64_t>(pulled.x * pulled.y * pulled.z) * sizeof(glm::vec3);
+  const std::uint64_t of_field = bytes_of_field(options, input.geometry, grid);
   const auto voxels = static_cast<std::uint64_t>(voxel_count(input.geometry)),
              output_voxels = static_cast<std::uint64_t>(voxel_count(grid));
   const auto slices = static_cast<std::uint64_t>(grid.size.z);
@@ -46,12 +52,34 @@ std::uint64_t plan_bytes(const DeformOptions& options, DeformOutputs& outputs, c
                    " has none; leave it out");
 }
 
+/// One of -f, --pull-field and --scenario, and what goes with it.
+void check_choice_of_field(const DeformOptions& options) {
+  if (!options.scenario.empty() && (!options.fields.empty() || !options.pull_field.empty()))
+    throw UsageError("--scenario makes the field, so -f and --pull-field do not go with it; leave one out");
+  if (options.scenario.empty() && !options.labels.empty()) throw UsageError("--labels is for --scenario; leave it out");
+  if (!options.write_field.empty() && !options.pull_field.empty())
+    throw UsageError("--write-field writes a forward field, which --pull-field has not; leave it out");
+  if (!options.write_field.empty() && !has_image_suffix(options.write_field) && !has_mesh_suffix(options.write_field)) {
+    throw UsageError("unknown suffix of --write-field \"" + options.write_field.string() +
+                     "\"; a field is written as .mha .nrrd .nii .nii.gz, or as a mesh, .vtu .vtk");
+  }
+}
+
+void check_scenario(const DeformOptions& options) {
+  if (options.cell_size) throw UsageError("--cell-size is for formulas and transforms, a scenario says its own");
+  const simulate::Scenario scenario = read_scenario(options.scenario);
+  if (!options.write_field.empty()) require_fitting_format(scenario, options.write_field, false);
+}
+
 }  // namespace
 
 bool reports_quality(const DeformOptions& options) { return !options.report.empty() && options.pull_field.empty(); }
 
 DeformOutputs begin_outputs(const DeformOptions& options, const PointsOption& points) {
-  if (options.pull_field.empty()) {
+  check_choice_of_field(options);
+  if (!options.scenario.empty()) {
+    check_scenario(options);
+  } else if (options.pull_field.empty()) {
     check_fields(options.fields, options.cell_size);
   } else if (options.cell_size) {
     throw UsageError("--cell-size is for formulas and transforms with -f; --pull-field has its own grid");
@@ -65,6 +93,9 @@ DeformOutputs begin_outputs(const DeformOptions& options, const PointsOption& po
   std::vector<std::filesystem::path> inputs = FurtherVolumes::inputs(volumes);
   for (const std::string& text : structures) inputs.push_back(text.substr(0, text.find('=')));
   inputs.push_back(options.input.path);
+  for (const std::filesystem::path& file : {options.scenario, options.labels}) {
+    if (!file.empty()) inputs.push_back(file);
+  }
   if (!is_same_grid(options.grid) && options.grid != "fit") inputs.emplace_back(options.grid);
   for (const std::filesystem::path& path : field_files(options.fields)) inputs.push_back(path);
   if (!options.pull_field.empty()) inputs.push_back(field_source(options.pull_field).path);
@@ -101,7 +132,8 @@ DeformOutputs begin_outputs(const DeformOptions& options, const PointsOption& po
   // The series of a single file is read from its folder, so a derived series must not land there.
   if (series && !options.input.single && !std::filesystem::is_directory(options.input.path))
     inputs.push_back(folder_of(options.input.path));
-  DeformOutputs outputs{series, OutputSet(inputs, options.common.overwrite), {}, {}, {}, {}, {}, {}, {}, {}, {}};
+  DeformOutputs outputs{
+      series, OutputSet(inputs, options.common.overwrite, options.folder), {}, {}, {}, {}, {}, {}, {}, {}, {}, {}};
   outputs.volume = outputs.set.add(options.output, series ? StagedOutput::Kind::folder : StagedOutput::Kind::file);
   outputs.sidecar = outputs.set.add(sidecar_of(options.output));
   if (options.bids) outputs.bids = outputs.set.add(bids_sidecar_of(options.output));
@@ -109,6 +141,7 @@ DeformOutputs begin_outputs(const DeformOptions& options, const PointsOption& po
                        outputs.set);
   outputs.further.emplace(volumes, series, outputs.set);
   outputs.structures = FurtherStructures(structures, series, outputs.set);
+  outputs.field = outputs.set.add(options.write_field);
   outputs.report = outputs.set.add(options.report);
   outputs.preview = outputs.set.add(options.preview);
   outputs.points = points.add_outputs(outputs.set);

@@ -14,7 +14,7 @@ struct DeformOutputs {
   std::optional<MapOutputs> maps;
   std::optional<FurtherVolumes> further;
   FurtherStructures structures;
-  std::filesystem::path volume, sidecar, bids, report, preview;
+  std::filesystem::path volume, sidecar, bids, field, report, preview;
   std::vector<std::filesystem::path> points;
 };
 
@@ -24,8 +24,9 @@ DeformOutputs begin_outputs(const DeformOptions& options, const PointsOption& po
 
 /// What will be made, as far as headers tell.
 struct DeformPlan {
-  Geometry grid;            ///< of the output; with --grid fit known only once the field is
-  std::uint64_t bytes = 0;  ///< of memory; --grid fit is taken for the input's grid
+  Geometry grid;                   ///< of the output; with --grid fit known only once the field is
+  std::uint64_t bytes = 0;         ///< of memory; --grid fit is taken for the input's grid
+  std::uint64_t output_bytes = 0;  ///< on disk, were nothing compressed
 };
 
 /// Checks the header of the input. @throws UsageError for an output or background that it does not go with, InputError

@@ -34,6 +34,9 @@ json canonical_options(const DeformRecord& of) {
   if (of.outputs.series && of.options.dicom != DicomForm()) options["dicom"] = form_json(of.options.dicom);
   if (of.field.direction == Direction::pull) {
     options["pull_field"] = of.options.pull_field;
+  } else if (!of.options.scenario.empty()) {
+    options["scenario"] = of.options.scenario.string();
+    if (!of.options.labels.empty()) options["labels"] = of.options.labels.string();
   } else {
     options["field"] = of.options.fields;
     if (of.options.cell_size) options["cell_size"] = *of.options.cell_size;
@@ -67,6 +70,12 @@ void close_sources(json& document) {
       along.erase("sha256");
     }
   }
+}
+
+json simulation_json(const SimulationSource& source) {
+  json document = {{"scenario_sha256", source.scenario_sha256}, {"method", source.method}, {"backend", source.backend}};
+  if (!source.labels.empty()) document["labels_sha256"] = source.labels_sha256;
+  return document;
 }
 
 /// How far the map can be trusted.
@@ -132,6 +141,8 @@ json sidecar(const DeformRecord& of) {
                        {"notes", of.field.notes},
                        {"files", to_json(of.field.files)}};
   document["field"].update(of.field.place());
+  if (of.field.simulation) document["field"]["simulation"] = simulation_json(*of.field.simulation);
+  if (!of.options.write_field.empty()) document["field"]["written"] = of.options.write_field.string();
   document["output"] = {{"path", of.options.output.string()},
                         {"voxel_type", to_string(of.output.type())},
                         {"geometry", to_json(of.output.geometry())}};

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "apps/console.h"
+#include "apps/simulated_field.h"
 #include "cuda/backend.h"
 #include "deform/vertex_field.h"
 #include "io/field_file.h"
@@ -35,6 +36,7 @@ struct AnyField {
   PullField pull;
   std::vector<std::string> notes;
   std::vector<ReadField> files;
+  std::optional<SimulationSource> simulation;  ///< of a simulated one
 
   std::string hash(int threads) const;
   nlohmann::json place() const;

@@ -76,7 +76,10 @@ struct DeformOptions {
   InputOptions input;
   std::vector<std::string> fields;
   std::string pull_field;
+  std::filesystem::path scenario, labels;  ///< instead of fields: a simulation, and its labels on the grid of INPUT
+  std::filesystem::path write_field;       ///< where the forward field that was used goes
   std::filesystem::path output;
+  std::filesystem::path folder;  ///< that all outputs lie in and that appears as a whole; empty: each by itself
   std::string backend = "auto";
   int device = 0;  ///< of CUDA
   Interpolation interpolation = Interpolation::linear;

@@ -22,6 +22,21 @@ bool is_inside(const fs::path& inner, const fs::path& outer) {
   return std::mismatch(b.begin(), b.end(), a.begin(), a.end()).first == b.end();
 }
 
+/// Whether the record of the folder that a file lies in, or of the one around it, names it.
+bool is_recorded(const fs::path& file) {
+  for (fs::path folder = file.parent_path(), name = file.filename(); folder.has_filename();
+       name = folder.filename() / name, folder = folder.parent_path()) {
+    if (name == kFolderRecord) return true;
+    std::ifstream record(folder / kFolderRecord, std::ios::binary);
+    if (!record) continue;
+    const nlohmann::json document = nlohmann::json::parse(record, nullptr, false);
+    if (!document.is_object() || !document.contains("files")) return false;
+    const nlohmann::json& files = document["files"];
+    return files.is_object() && files.contains(name.generic_string());
+  }
+  return false;
+}
+
 }  // namespace
 
 bool is_series_output(const fs::path& output) {
@@ -33,14 +48,25 @@ bool is_series_output(const fs::path& output) {
   return true;
 }
 
-fs::path OutputSet::add(const fs::path& target, StagedOutput::Kind kind) {
-  if (target.empty()) return {};
+OutputSet::OutputSet(std::vector<fs::path> inputs, bool overwrite, const fs::path& folder)
+    : inputs_(std::move(inputs)), overwrite_(overwrite), together_(!folder.empty()) {
+  if (!together_) return;
+  refuse_inputs(folder);
+  staged_.push_back(std::make_unique<StagedOutput>(plain(folder), StagedOutput::Kind::folder, overwrite, is_recorded));
+}
+
+void OutputSet::refuse_inputs(const fs::path& target) const {
   for (const fs::path& input : inputs_) {
     if (is_inside(target, input) || is_inside(input, target)) {
       throw UsageError("the output " + target.string() + " is, is inside, or is around the input " + input.string() +
                        "; choose another place");
     }
   }
+}
+
+fs::path OutputSet::add(const fs::path& target, StagedOutput::Kind kind) {
+  if (target.empty()) return {};
+  refuse_inputs(target);
   for (const fs::path& other : targets_) {
     if (is_inside(target, other) || is_inside(other, target)) {
       throw UsageError("two outputs have the same place, " + other.string() + " and " + target.string() +
@@ -48,6 +74,14 @@ fs::path OutputSet::add(const fs::path& target, StagedOutput::Kind kind) {
     }
   }
   targets_.push_back(target);
+  if (together_) {
+    const fs::path path = folder() / plain(target).filename();
+    if (kind == StagedOutput::Kind::folder)
+      fs::create_directory(path);
+    else
+      std::ofstream(path).close();
+    return path;
+  }
   staged_.push_back(std::make_unique<StagedOutput>(plain(target), kind, overwrite_,
                                                    kind == StagedOutput::Kind::folder ? is_tetwarp_dicom : nullptr));
   return staged_.back()->path();

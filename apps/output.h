@@ -21,23 +21,33 @@ bool is_series_output(const std::filesystem::path& output);
 /// The outputs of one command: checked and begun before any work, given their names together at its end.
 class OutputSet {
  public:
-  OutputSet(std::vector<std::filesystem::path> inputs, bool overwrite)
-      : inputs_(std::move(inputs)), overwrite_(overwrite) {}
+  /// @param folder  that all outputs are to lie in, directly, and that appears as a whole; empty: each by itself
+  /// @throws Error where the folder cannot be begun
+  OutputSet(std::vector<std::filesystem::path> inputs, bool overwrite, const std::filesystem::path& folder = {});
 
   /// @return where to write it; empty for an empty target, which is not wanted.
   /// @throws UsageError where it is equal to, inside or around an input or another output; Error where it cannot be
   /// begun
   std::filesystem::path add(const std::filesystem::path& target, StagedOutput::Kind kind = StagedOutput::Kind::file);
   void commit();
+  /// Where the folder is staged. @pre there is one
+  const std::filesystem::path& folder() const { return staged_.front()->path(); }
+  /// What was added, by its final names.
+  const std::vector<std::filesystem::path>& targets() const { return targets_; }
 
   /// Runs `write`; an Error that names the place where an output is staged names the output itself instead.
   void write(const std::function<void()>& write);
 
  private:
+  void refuse_inputs(const std::filesystem::path& target) const;
+
   std::vector<std::filesystem::path> inputs_, targets_;
-  bool overwrite_;
+  bool overwrite_, together_;
   std::vector<std::unique_ptr<StagedOutput>> staged_;
 };
+
+/// What a folder of outputs says of itself, and by which it is known as Tetwarp's: `files`, names relative to it.
+inline constexpr const char* kFolderRecord = "case.json";
 
 /// OUTPUT.json beside OUTPUT.
 std::filesystem::path sidecar_of(const std::filesystem::path& output);

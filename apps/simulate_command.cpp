@@ -4,6 +4,7 @@
 #include "apps/input.h"
 #include "apps/output.h"
 #include "apps/simulate_report.h"
+#include "apps/simulated_field.h"
 #include "apps/simulation_backend.h"
 #include "deform/fields/lattice_mesh.h"
 #include "io/field_file.h"
@@ -46,19 +47,6 @@ Outputs begin_outputs(const SimulateOptions& options, const Scenario& scenario) 
     outputs.frames.emplace_back(number, outputs.set.add(frame_path(options.output, number, frames)));
   outputs.report = outputs.set.add(options.report);
   return outputs;
-}
-
-/// Only a mesh holds open cuts. @throws InputError for a phase whose field is written, and is divided
-void require_fitting_format(const SimulateOptions& options, const Scenario& scenario) {
-  if (has_mesh_suffix(options.output)) return;
-  for (const Phase& phase : scenario.phases) {
-    if (options.every == 0 && &phase != &scenario.phases.back()) continue;
-    for (const CutPlan& cut : scenario.cuts) {
-      if (!is_open(cut, phase)) continue;
-      throw InputError("the cut \"" + cut.name + "\" is open" + (phase.name.empty() ? "" : " in " + phase.name) +
-                       ", which " + options.output.string() + " cannot hold; write a mesh, .vtu or .vtk");
-    }
-  }
 }
 
 /// One run of the command.
@@ -186,7 +174,7 @@ int run_simulate(const SimulateOptions& options) {
                      "\"; a field is written as .mha .nrrd .nii .nii.gz, or as a mesh, .vtu .vtk");
   }
   Scenario scenario = read_scenario(options.scenario);
-  require_fitting_format(options, scenario);
+  require_fitting_format(scenario, options.output, options.every > 0);
   Outputs outputs = begin_outputs(options, scenario);
   return Simulating(options, std::move(scenario), std::move(outputs)).run();
 }

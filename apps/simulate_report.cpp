@@ -18,8 +18,6 @@ using nlohmann::json;
 constexpr double kLimitToleranceMm = 1e-3;
 constexpr std::size_t kMostLinksNamed = 10;
 
-const char* name_of(Method method) { return method == Method::chainmail ? "chainmail" : "mass-spring"; }
-
 json list_of(const glm::dvec3& v) { return json::array({v.x, v.y, v.z}); }
 
 std::size_t cells_of(const SimulateRecord& record, std::size_t tissue) {
@@ -81,6 +79,8 @@ std::string phase_name(const SimulateRecord& record, std::size_t n) {
 }
 
 }  // namespace
+
+const char* name_of(Method method) { return method == Method::chainmail ? "chainmail" : "mass-spring"; }
 
 void add_frame(SimulateRecord& record, const Frame& frame, std::span<const glm::vec3> displacement) {
   record.phases.resize(std::max(record.phases.size(), frame.phase + 1));

@@ -35,6 +35,9 @@ struct SimulateRecord {
 /// Adds a frame to its phase. @param displacement  of each node, when the frame ends its phase
 void add_frame(SimulateRecord& record, const simulate::Frame& frame, std::span<const glm::vec3> displacement);
 
+/// "chainmail", "mass-spring".
+const char* name_of(simulate::Method method);
+
 nlohmann::json document_of(const SimulateRecord& record);
 /// Lines for people: holds without vertices, phases that did not settle, links beyond their limits.
 std::vector<std::string> warnings_of(const SimulateRecord& record);

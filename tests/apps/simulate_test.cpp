@@ -77,6 +77,33 @@ TEST_F(Simulate, WritesAForwardFieldThatDeformTakes) {
   EXPECT_EQ(left(), (std::vector<std::string>{"field.mha", "out.mha"}));
 }
 
+TEST_F(Simulate, DeformMakesTheSameFieldByItself) {
+  ASSERT_EQ(run("simulate push.json ct.mha -o field.mha --backend cpu").status, 0);
+  ASSERT_EQ(run("deform ct.mha -f field.mha -o two_steps.mha").status, 0);
+  const Outcome once = run("deform ct.mha --scenario push.json -o one_step.mha --write-field used.mha --backend cpu");
+  ASSERT_EQ(once.status, 0) << once.err;
+  EXPECT_EQ(read_text(scratch_ / "field.mha"), read_text(scratch_ / "used.mha"));
+  EXPECT_EQ(read_text(scratch_ / "two_steps.mha"), read_text(scratch_ / "one_step.mha"));
+  const json told = document("one_step.mha.json");
+  EXPECT_EQ(told["field"]["sha256"], document("two_steps.mha.json")["field"]["sha256"]);
+  EXPECT_EQ(told["field"]["simulation"]["method"], "chainmail");
+  EXPECT_EQ(told["options"]["scenario"], "push.json");
+}
+
+TEST_F(Simulate, DeformTakesOneSourceOfTheFieldAndAFittingFile) {
+  const auto refused = [&](const std::string& options, int status, const std::string& words) {
+    const Outcome outcome = run("deform ct.mha " + options + " -o out.mha");
+    EXPECT_EQ(outcome.status, status) << options;
+    EXPECT_TRUE(says(outcome.err, {words}));
+  };
+  refused("--scenario push.json -f identity", 2, "--scenario makes the field");
+  refused("--labels ct.mha -f identity", 2, "--labels is for --scenario");
+  refused("--scenario push.json --cell-size 2", 2, "a scenario says its own");
+  refused("-f identity --write-field field.txt", 2, "unknown suffix of --write-field");
+  refused("--scenario ct.mha", 4, "ct.mha");
+  EXPECT_EQ(left(), std::vector<std::string>());
+}
+
 TEST_F(Simulate, ReportSaysWhatWasDone) {
   ASSERT_EQ(run("simulate push.json ct.mha -o field.nii.gz --report report.json --backend cpu").status, 0);
   const json report = document("report.json");
@@ -206,6 +233,15 @@ TEST_F(Simulate, AnOpenCutIsWrittenAsAMeshLeavesAGapAndClosesWithoutATrace) {
     const json report = document("r.json");
     EXPECT_GT(report["report"]["uncovered"], 30);
     EXPECT_LT(report["report"]["uncovered"], 1000);
+    const Outcome unfit = run("deform ct.mha --scenario open.json -o out.mha --write-field f.mha --backend cpu");
+    EXPECT_EQ(unfit.status, 4);
+    EXPECT_TRUE(says(unfit.err, {"\"midline\" is open in open", "f.mha cannot hold"}));
+    ASSERT_EQ(
+        run("deform ct.mha --scenario open.json -o one.mha --background -3000 --write-field one.vtk --backend cpu "
+            "--overwrite")
+            .status,
+        0);
+    EXPECT_EQ(read_text(scratch_ / "one.vtk"), read_text(scratch_ / "f.vtk"));
     const Outcome sutured = run("simulate closed.json ct.mha -o g.mha --backend cpu --overwrite");
     ASSERT_EQ(sutured.status, 0) << sutured.err;
     if (std::string(method) == "chainmail") continue;  // it knows no way back to rest

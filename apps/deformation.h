@@ -1,0 +1,65 @@
+#pragma once
+
+#include <atomic>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/deform_report.h"
+#include "apps/deform_worker.h"
+
+namespace tetwarp::apps {
+
+/// One run of `deform`, stage by stage: open, read, make_field, resample, write, commit, in this order and each once.
+/// Its outputs are begun when it is made, and removed with it unless it came to `commit`.
+class Deformation {
+ public:
+  /// Refers to the options. @throws what begin_outputs throws
+  explicit Deformation(const DeformOptions& options) : options_(options), record_(options) {}
+
+  /// Reads headers, and plans. @throws what plan_deformation throws
+  void open();
+  void read();
+  /// Reads, evaluates or simulates the field. @param worker  of a simulation
+  void make_field(const Worker& worker);
+  /// Resamples all that goes through the field; maps and the slices of a series are written meanwhile. Then looks at
+  /// what the field is like, where the report says so.
+  void resample(const Worker& worker);
+  /// Writes what is not written yet, under hidden names.
+  void write();
+  /// Gives the outputs their names.
+  void commit() { record_.outputs.set.commit(); }
+
+  const DeformRecord& record() const { return record_; }
+  /// What people should know, "warning: ..." and "note: ...".
+  std::vector<std::string> notes() const;
+
+ private:
+  void note_series(const DicomSeries& series);
+  void check(Resampler& resampler);
+  void set_field(Resampler& resampler, Outside outside) const;
+  void resample_onto_own_grids(const Worker& worker);
+  void move_structures(Resampler& resampler, Outside outside);
+  void write_files();
+  void write_field();
+  void write_preview_picture();
+  void write_slices(const Region& slices);
+  Target main_target();
+  void scale_mass(const Region& slices);
+  std::string title() const;
+
+  const DeformOptions& options_;
+  DeformRecord record_;
+  std::optional<InputHeader> header_;
+  double open_seconds_ = 0;
+  std::vector<std::string> warnings_;
+  struct {
+    AnyVolume source, resampled;
+    ConstVolumeView jacobian;  ///< of the slab that is resampled
+    std::atomic<std::uint64_t> saturated = 0;
+  } mass_;  ///< with --preserve mass: in float
+  std::vector<SliceRange> sampled_slices_;
+  std::optional<DerivedSeriesWriter> series_;
+};
+
+}  // namespace tetwarp::apps
