@@ -4,7 +4,7 @@
 
 #include <tbb/global_control.h>
 
-#include "apps/options.h"
+#include "apps/command_line.h"
 #include "cuda/backend.h"
 #include "deform/version.h"
 
@@ -20,6 +20,7 @@ struct Commands {
   InvertOptions invert;
   DeformOptions deform;
   SimulateOptions simulate;
+  BatchOptions batch;
 };
 
 void add_common(CLI::App& command, CommonOptions& common, bool writes) {
@@ -325,6 +326,46 @@ void add_simulate(CLI::App& app, SimulateOptions& options) {
       "Example: tetwarp simulate examples/scenarios/diaphragm_push.json ct_folder -o push.mha --report push.json");
 }
 
+void add_batch(CLI::App& app, BatchOptions& options) {
+  CLI::App* command = app.add_subcommand("batch", "Deform many volumes, unattended");
+  auto* manifest = command->add_option("MANIFEST", options.manifest,
+                                       "The cases: .csv or JSON Lines, .jsonl .ndjson (docs/batch.md)");
+  auto* init = command
+                   ->add_option("--init", options.init,
+                                "Write a manifest instead, to be edited: a row for every volume of a folder of DICOM")
+                   ->type_name("FOLDER")
+                   ->excludes(manifest);
+  command->add_option("-o,--output", options.output, "The folder of the results; with --init, the manifest, .csv")
+      ->required();
+  command->add_option("--field", options.field, "With --init: the field of every row")
+      ->type_name("FIELD")
+      ->needs(init)
+      ->capture_default_str();
+  command->add_flag("--resume", options.resume,
+                    "Continue a batch: cases that are finished and whole are kept, all others are made");
+  auto* shard = command->add_option("--shard", options.shard, "Make every Nth case alone, from the Ith on: 2/8")
+                    ->type_name("I/N");
+  command->add_flag("--merge", options.merge, "Join what all shards have recorded; nothing is deformed")
+      ->excludes(shard);
+  command
+      ->add_option("--memory", options.memory_bytes,
+                   "8G, 500M: what all cases in work may hold (default: four fifths of what is available)")
+      ->transform(CLI::AsSizeValue(true))
+      ->type_name("SIZE");
+  command->add_option("--jobs", options.jobs, "Cases in work at once; 0: two more than there are devices")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command
+      ->add_option("--backend", options.backend,
+                   "auto (all CUDA devices where one works, otherwise the CPU), cuda or cpu; the bits are the same")
+      ->check(CLI::IsMember({"auto", "cuda", "cpu"}))
+      ->capture_default_str();
+  command->add_flag("--log-json", options.log_json, "Say what happens as JSON Lines on standard error");
+  command->add_flag("--dry-run", options.dry_run, "Check the manifest and say what would be done");
+  add_common(*command, options.common, true);
+  command->footer("Example: tetwarp batch cohort.csv -o results --memory 8G");
+}
+
 /// Only for `tetwarp --help`: what follows `bench` is never parsed here.
 void add_bench(CLI::App& app) {
   app.add_subcommand("bench", "Time the paper's methods and Tetwarp (runs tetwarp-bench, see `tetwarp bench --help`)");
@@ -345,7 +386,44 @@ int run(int (*command)(const Options&), const Options& options) {
   return command(options);
 }
 
+/// CLI11's words for a command line that is wrong.
+void parse(CLI::App& app, const std::vector<std::string>& arguments) {
+  std::vector<const char*> texts;
+  for (const std::string& argument : arguments) texts.push_back(argument.c_str());
+  try {
+    app.parse(static_cast<int>(texts.size()), texts.data());
+  } catch (const CLI::Success&) {
+    throw;
+  } catch (const CLI::Error& error) {
+    throw UsageError(std::string(error.what()) + "; see tetwarp --help");
+  }
+}
+
 }  // namespace
+
+std::vector<OptionKind> deform_options() {
+  CLI::App app;
+  DeformOptions options;
+  add_deform(app, options);
+  std::vector<OptionKind> kinds;
+  for (const CLI::Option* option : app.get_subcommand("deform")->get_options()) {
+    for (const std::string& name : option->get_lnames()) {
+      if (name != "help")
+        kinds.push_back({name, option->get_expected_max() == 0, option->get_items_expected_max() > 1});
+    }
+  }
+  return kinds;
+}
+
+DeformOptions parse_deform(const std::vector<std::string>& arguments) {
+  CLI::App app;
+  DeformOptions options;
+  add_deform(app, options);
+  std::vector<std::string> all = {"tetwarp", "deform"};
+  all.insert(all.end(), arguments.begin(), arguments.end());
+  parse(app, all);
+  return options;
+}
 
 int run_command_line(int argc, char** argv) {
   // Ahead of CLI11, which takes words such as `--` and `--help` away even from a prefix command.
@@ -361,18 +439,18 @@ int run_command_line(int argc, char** argv) {
   add_field(app, commands.field);
   add_invert(app, commands.invert);
   add_simulate(app, commands.simulate);
+  add_batch(app, commands.batch);
   add_bench(app);
   try {
-    app.parse(argc, argv);
+    parse(app, {argv, argv + argc});
   } catch (const CLI::Success& help) {
     return app.exit(help);
-  } catch (const CLI::Error& error) {
-    throw UsageError(std::string(error.what()) + "; see tetwarp --help");
   }
   if (app.got_subcommand("phantom")) return run(run_phantom, commands.phantom);
   if (app.got_subcommand("info")) return run(run_info, commands.info);
   if (app.got_subcommand("field")) return run(run_field, commands.field);
   if (app.got_subcommand("invert")) return run(run_invert, commands.invert);
+  if (app.got_subcommand("batch")) return run(run_batch, commands.batch);
   if (app.got_subcommand("simulate")) return run(run_simulate, commands.simulate);
   return run(run_deform, commands.deform);
 }

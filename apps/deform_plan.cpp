@@ -47,6 +47,20 @@ std::uint64_t plan_bytes(const DeformOptions& options, DeformOutputs& outputs, c
          of_field + kOverheadBytes;
 }
 
+/// What the outputs take on disk, were nothing compressed.
+std::uint64_t output_bytes(const DeformOptions& options, const DeformOutputs& outputs, const InputHeader& input,
+                           const Geometry& grid) {
+  const auto voxels = static_cast<std::uint64_t>(voxel_count(grid));
+  std::uint64_t per_voxel = size_bytes(input.type);
+  const MapOptions& maps = options.maps;
+  if (!maps.coverage.empty()) per_voxel += sizeof(std::uint8_t);
+  if (!maps.folds.empty()) per_voxel += sizeof(std::uint16_t);
+  if (!maps.jacobian.empty()) per_voxel += sizeof(float);
+  if (!maps.inverse.empty()) per_voxel += sizeof(glm::vec3);
+  const std::uint64_t of_field = options.write_field.empty() ? 0 : bytes_of_field(options, input.geometry, grid);
+  return voxels * per_voxel + outputs.further->bytes(voxels) + of_field;
+}
+
 [[noreturn]] void refuse_bids(const DeformOptions& options) {
   throw UsageError("--bids says what the headers of a CT series say, " + options.input.path.string() +
                    " has none; leave it out");
@@ -71,7 +85,30 @@ void check_scenario(const DeformOptions& options) {
   if (!options.write_field.empty()) require_fitting_format(scenario, options.write_field, false);
 }
 
+/// The texts of --with by what they name.
+struct FurtherTexts {
+  std::vector<std::string> structures, volumes;
+
+  explicit FurtherTexts(const std::vector<std::string>& with) {
+    for (const std::string& text : with) (FurtherStructures::is_one(text) ? structures : volumes).push_back(text);
+  }
+};
+
 }  // namespace
+
+std::vector<std::filesystem::path> further_inputs(const DeformOptions& options) {
+  const FurtherTexts with(options.with);
+  std::vector<std::filesystem::path> inputs = FurtherVolumes::inputs(with.volumes);
+  for (const std::string& text : with.structures) inputs.push_back(text.substr(0, text.find('=')));
+  for (const std::filesystem::path& file : {options.scenario, options.labels}) {
+    if (!file.empty()) inputs.push_back(file);
+  }
+  if (!is_same_grid(options.grid) && options.grid != "fit") inputs.emplace_back(options.grid);
+  for (const std::filesystem::path& path : field_files(options.fields)) inputs.push_back(path);
+  if (!options.pull_field.empty()) inputs.push_back(field_source(options.pull_field).path);
+  for (const std::filesystem::path& path : PointsOption(options.points).inputs()) inputs.push_back(path);
+  return inputs;
+}
 
 bool reports_quality(const DeformOptions& options) { return !options.report.empty() && options.pull_field.empty(); }
 
@@ -88,20 +125,11 @@ DeformOutputs begin_outputs(const DeformOptions& options, const PointsOption& po
   if (options.preserve_mass && !options.pull_field.empty()) {
     throw UsageError("--preserve mass needs the determinant of a forward map, which --pull-field has not");
   }
-  std::vector<std::string> structures, volumes;  // of --with
-  for (const std::string& text : options.with) (FurtherStructures::is_one(text) ? structures : volumes).push_back(text);
-  std::vector<std::filesystem::path> inputs = FurtherVolumes::inputs(volumes);
-  for (const std::string& text : structures) inputs.push_back(text.substr(0, text.find('=')));
+  const FurtherTexts with(options.with);
+  std::vector<std::filesystem::path> inputs = further_inputs(options);
   inputs.push_back(options.input.path);
-  for (const std::filesystem::path& file : {options.scenario, options.labels}) {
-    if (!file.empty()) inputs.push_back(file);
-  }
-  if (!is_same_grid(options.grid) && options.grid != "fit") inputs.emplace_back(options.grid);
-  for (const std::filesystem::path& path : field_files(options.fields)) inputs.push_back(path);
-  if (!options.pull_field.empty()) inputs.push_back(field_source(options.pull_field).path);
   if (!options.pull_field.empty() && !points.empty())
     throw UsageError("--points needs a forward field, --pull-field has no forward map");
-  for (const std::filesystem::path& path : points.inputs()) inputs.push_back(path);
   const bool series = is_series_output(options.output);
   if (series && has_image_suffix(options.input.path)) {
     throw UsageError("a DICOM series can only be derived from DICOM, not from " + options.input.path.string() +
@@ -133,14 +161,19 @@ DeformOutputs begin_outputs(const DeformOptions& options, const PointsOption& po
   if (series && !options.input.single && !std::filesystem::is_directory(options.input.path))
     inputs.push_back(folder_of(options.input.path));
   DeformOutputs outputs{
-      series, OutputSet(inputs, options.common.overwrite, options.folder), {}, {}, {}, {}, {}, {}, {}, {}, {}, {}};
+      series, OutputSet(inputs, options.common.overwrite, options.folder, options.dry_run && !options.folder.empty()),
+      {},     {},
+      {},     {},
+      {},     {},
+      {},     {},
+      {},     {}};
   outputs.volume = outputs.set.add(options.output, series ? StagedOutput::Kind::folder : StagedOutput::Kind::file);
   outputs.sidecar = outputs.set.add(sidecar_of(options.output));
   if (options.bids) outputs.bids = outputs.set.add(bids_sidecar_of(options.output));
   outputs.maps.emplace(options.maps, options.pull_field.empty() ? Direction::forward : Direction::pull, series,
                        outputs.set);
-  outputs.further.emplace(volumes, series, outputs.set);
-  outputs.structures = FurtherStructures(structures, series, outputs.set);
+  outputs.further.emplace(with.volumes, series, outputs.set);
+  outputs.structures = FurtherStructures(with.structures, series, outputs.set);
   outputs.field = outputs.set.add(options.write_field);
   outputs.report = outputs.set.add(options.report);
   outputs.preview = outputs.set.add(options.preview);
@@ -166,7 +199,9 @@ DeformPlan plan_deformation(const DeformOptions& options, DeformOutputs& outputs
   DeformPlan plan;
   if (options.grid != "fit") plan.grid = output_grid(options.grid, input.geometry, {}, options.outside);
   if (outputs.series) outputs.maps->check(plan.grid);
-  plan.bytes = plan_bytes(options, outputs, input, options.grid == "fit" ? input.geometry : plan.grid);
+  const Geometry& grid = options.grid == "fit" ? input.geometry : plan.grid;
+  plan.bytes = plan_bytes(options, outputs, input, grid);
+  plan.output_bytes = output_bytes(options, outputs, input, grid);
   if (options.memory_bytes && plan.bytes > *options.memory_bytes && !means_cuda(options.backend)) {
     throw Error("about " + format_bytes(plan.bytes) + " of memory are needed, --memory allows " +
                 format_bytes(*options.memory_bytes) + "; a larger --cell-size needs less");

@@ -1,3 +1,4 @@
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <iostream>
@@ -22,6 +23,7 @@ int main(int argc, char** argv) {
   using namespace tetwarp;
   try {
     apps::watch_interrupts();
+    std::signal(SIGXFSZ, SIG_IGN);  // a file that would be larger than allowed is an error like a full disk
     const int status = apps::run_command_line(argc, argv);
     std::cout.flush();
     if (std::fflush(stdout) != 0 || std::ferror(stdout) || !std::cout)

@@ -111,6 +111,19 @@ struct SimulateOptions {
   bool dry_run = false;
 };
 
+struct BatchOptions {
+  CommonOptions common;
+  std::filesystem::path manifest;
+  std::filesystem::path init;    ///< a folder of DICOM of which a manifest is made; empty: a batch is run
+  std::filesystem::path output;  ///< folder of the results, or the manifest
+  std::string field = "identity";
+  bool resume = false, merge = false, log_json = false, dry_run = false;
+  std::string shard;  ///< "I/N"; empty: all
+  std::optional<std::uint64_t> memory_bytes;
+  int jobs = 0;
+  std::string backend = "auto";
+};
+
 /// Parses the command line and runs the subcommand. @return the exit status (README has the table)
 int run_command_line(int argc, char** argv);
 
@@ -120,6 +133,7 @@ int run_field(const FieldOptions& options);
 int run_invert(const InvertOptions& options);
 int run_deform(const DeformOptions& options);
 int run_simulate(const SimulateOptions& options);
+int run_batch(const BatchOptions& options);
 
 /// Becomes the program tetwarp-bench that lies beside this one; returns only by an exception.
 /// @param arguments  given to it as they are

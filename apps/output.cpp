@@ -48,10 +48,11 @@ bool is_series_output(const fs::path& output) {
   return true;
 }
 
-OutputSet::OutputSet(std::vector<fs::path> inputs, bool overwrite, const fs::path& folder)
-    : inputs_(std::move(inputs)), overwrite_(overwrite), together_(!folder.empty()) {
+OutputSet::OutputSet(std::vector<fs::path> inputs, bool overwrite, const fs::path& folder, bool only_look)
+    : inputs_(std::move(inputs)), overwrite_(overwrite), together_(!folder.empty()), only_look_(only_look) {
   if (!together_) return;
   refuse_inputs(folder);
+  if (only_look_) return;
   staged_.push_back(std::make_unique<StagedOutput>(plain(folder), StagedOutput::Kind::folder, overwrite, is_recorded));
 }
 
@@ -74,6 +75,7 @@ fs::path OutputSet::add(const fs::path& target, StagedOutput::Kind kind) {
     }
   }
   targets_.push_back(target);
+  if (only_look_) return target;
   if (together_) {
     const fs::path path = folder() / plain(target).filename();
     if (kind == StagedOutput::Kind::folder)

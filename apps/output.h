@@ -22,8 +22,10 @@ bool is_series_output(const std::filesystem::path& output);
 class OutputSet {
  public:
   /// @param folder  that all outputs are to lie in, directly, and that appears as a whole; empty: each by itself
+  /// @param only_look  names are checked, and nothing is begun: for a folder whose place does not exist yet
   /// @throws Error where the folder cannot be begun
-  OutputSet(std::vector<std::filesystem::path> inputs, bool overwrite, const std::filesystem::path& folder = {});
+  OutputSet(std::vector<std::filesystem::path> inputs, bool overwrite, const std::filesystem::path& folder = {},
+            bool only_look = false);
 
   /// @return where to write it; empty for an empty target, which is not wanted.
   /// @throws UsageError where it is equal to, inside or around an input or another output; Error where it cannot be
@@ -42,7 +44,7 @@ class OutputSet {
   void refuse_inputs(const std::filesystem::path& target) const;
 
   std::vector<std::filesystem::path> inputs_, targets_;
-  bool overwrite_, together_;
+  bool overwrite_, together_, only_look_;
   std::vector<std::unique_ptr<StagedOutput>> staged_;
 };
 

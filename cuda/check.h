@@ -4,18 +4,22 @@
 
 #include <string>
 
+#include "cuda/fault.h"
 #include "deform/errors.h"
 
-/// Throws DeviceError, naming the call, file and line, unless a CUDA call succeeded.
+/// Throws DeviceError, or DeviceMemoryError, naming the call, file and line, unless a CUDA call succeeded.
 #define TETWARP_CUDA_TRY(call) ::tetwarp::cuda_detail::check((call), #call, __FILE__, __LINE__)
 
 namespace tetwarp::cuda_detail {
 
 inline void check(cudaError_t status, const char* call, const char* file, int line) {
+  if (status == cudaSuccess && kFaultsAreInjected) status = injected_fault(call);
   if (status == cudaSuccess) return;
   cudaGetLastError();  // clears what is not sticky
-  throw DeviceError(std::string("CUDA: ") + cudaGetErrorString(status) + ", " + call + " at " + file + ":" +
-                    std::to_string(line) + "; use --backend cpu, the bits are the same");
+  const std::string what = std::string("CUDA: ") + cudaGetErrorString(status) + ", " + call + " at " + file + ":" +
+                           std::to_string(line) + "; use --backend cpu, the bits are the same";
+  if (status == cudaErrorMemoryAllocation) throw DeviceMemoryError(what);
+  throw DeviceError(what);
 }
 
 }  // namespace tetwarp::cuda_detail

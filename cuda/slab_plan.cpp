@@ -35,13 +35,13 @@ SlabPlan plan_slabs(std::int64_t begin, std::int64_t end, std::uint64_t allowed,
 }
 
 void refuse_slab(const SlabNeeds& needs, const std::string& held, std::uint64_t allowed) {
-  throw DeviceError("one slice of the output needs " + megabytes(needs.total()) + " of device memory (" + held + " " +
+  throw DeviceMemoryError("one slice of the output needs " + megabytes(needs.total()) + " of device memory (" + held + " " +
                     megabytes(needs.field) + ", sources " + megabytes(needs.source) + ", results " +
                     megabytes(needs.output) + "), " + megabytes(allowed) + " are allowed" + kWhatToDo);
 }
 
 void refuse_field(std::uint64_t bytes, std::uint64_t allowed) {
-  throw DeviceError("a pull field is held whole and needs " + megabytes(bytes) + " of device memory, " +
+  throw DeviceMemoryError("a pull field is held whole and needs " + megabytes(bytes) + " of device memory, " +
                     megabytes(allowed) + " are allowed" + kWhatToDo);
 }
 
@@ -49,7 +49,7 @@ std::int64_t cells_of_piece(std::int64_t cells, std::uint64_t slice_bytes, std::
   constexpr std::uint64_t kShare = 4;  // of what is allowed: sources and results will need some
   const std::uint64_t least = static_cast<std::uint64_t>(std::min<std::int64_t>(cells, 2) + 1) * slice_bytes;
   if (least > allowed) {
-    throw DeviceError("two slices of cells of the field need " + megabytes(least) + " of device memory, " +
+    throw DeviceMemoryError("two slices of cells of the field need " + megabytes(least) + " of device memory, " +
                       megabytes(allowed) + " are allowed" + kWhatToDo);
   }
   const std::uint64_t room = held >= least && held <= allowed ? held : std::max(least, allowed / kShare);

@@ -24,6 +24,12 @@ class DeviceError : public Error {
   using Error::Error;
 };
 
+/// The accelerator has not the memory that is needed: in smaller pieces, or on the processor, it may go.
+class DeviceMemoryError : public DeviceError {
+ public:
+  using DeviceError::DeviceError;
+};
+
 /// The part that was asked for is not in this build.
 class NotCompiled : public Error {
  public:

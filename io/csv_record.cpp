@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "deform/errors.h"
+#include "io/points_document.h"
 
 namespace tetwarp {
 

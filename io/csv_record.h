@@ -1,11 +1,11 @@
 #pragma once
 
-// Private to io/: records of comma-separated values (RFC 4180), with their bytes as they are.
+// Records of comma-separated values (RFC 4180), with their bytes as they are.
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "io/points_document.h"
+#include "io/text_span.h"
 
 namespace tetwarp {
 

@@ -137,6 +137,12 @@ struct SourceFiles {
       of_slice.push_back(next);
     }
   }
+
+  std::string hash() const {
+    Sha256 hash;
+    for (const SourceFile& file : files) hash.add(file.digest);
+    return hash.hex();
+  }
 };
 
 bool same_padding(const std::optional<PaddingRange>& a, const std::optional<PaddingRange>& b) {
@@ -158,6 +164,13 @@ std::optional<PaddingRange> common_padding(const DicomSeries& series, const std:
 }
 
 }  // namespace
+
+std::string hash_files(const DicomSeries& series, int threads, const Control& control) {
+  SourceFiles sources(series);
+  for_each_index(sources.files.size(), threads, control,
+                 [&](std::size_t n) { sources.files[n].digest = digest_of(sources.files[n].path); });
+  return sources.hash();
+}
 
 DicomVolume load_dicom(const DicomSeries& series, int threads, const Control& control) {
   require(!series.refusal, series.refusal.value_or(""));
@@ -188,14 +201,12 @@ DicomVolume load_dicom(const DicomSeries& series, int threads, const Control& co
 
   result.padding = common_padding(series, slices);
   auto headers = std::make_shared<DicomHeaders>();
-  Sha256 hash;
-  for (const SourceFile& file : sources.files) hash.add(file.digest);
   for (std::size_t k = 0; k < slices.size(); ++k) {
     result.rounded += slices[k].count.rounded;
     headers->slices.push_back(std::move(slices[k].header));
     headers->frames.push_back(series.slices[k].frame ? *series.slices[k].frame + 1 : 0);
   }
-  result.sha256 = hash.hex();
+  result.sha256 = sources.hash();
   result.headers = std::move(headers);
   return result;
 }

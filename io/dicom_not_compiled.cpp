@@ -18,6 +18,8 @@ DicomScan scan_dicom(const std::filesystem::path&, bool, const Control&) { refus
 
 DicomVolume load_dicom(const DicomSeries&, int, const Control&) { refuse(); }
 
+std::string hash_files(const DicomSeries&, int, const Control&) { refuse(); }
+
 struct DerivedSeriesWriter::State {};
 
 DerivedSeriesWriter::DerivedSeriesWriter(std::filesystem::path, const Geometry&, const DicomHeaders&, DicomDerivation) {

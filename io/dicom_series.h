@@ -90,6 +90,9 @@ struct DicomVolume {
 ///         decoded, HU beyond int16: naming the file, the tag, expected and found
 DicomVolume load_dicom(const DicomSeries& series, int threads = 0, const Control& control = {});
 
+/// `DicomVolume::sha256` without reading voxels. @throws InputError for a file that cannot be read, Cancelled
+std::string hash_files(const DicomSeries& series, int threads = 0, const Control& control = {});
+
 /// How a derived series keeps its pixels, always without loss: a transfer syntax of PS3.5.
 enum class DicomEncoding : std::uint8_t {
   uncompressed,  ///< Explicit VR Little Endian

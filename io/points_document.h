@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "io/points_file.h"
+#include "io/text_span.h"
 
 namespace tetwarp {
 
@@ -97,11 +98,6 @@ class Patch {
   std::string_view text_;
   std::size_t done_ = 0;
   std::string result_;
-};
-
-/// From `begin` up to `end`, bytes of a text.
-struct Span {
-  std::size_t begin = 0, end = 0;
 };
 
 /// Words between blanks, tabs and line ends.

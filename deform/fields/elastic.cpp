@@ -6,14 +6,14 @@
 
 namespace tetwarp {
 
-namespace {
-
-std::uint64_t mixed(std::uint64_t state) {
+std::uint64_t split_mix(std::uint64_t state) {
   std::uint64_t z = state + 0x9e3779b97f4a7c15;
   z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9;
   z = (z ^ z >> 27) * 0x94d049bb133111eb;
   return z ^ z >> 31;
 }
+
+namespace {
 
 /// Of the control points floor(t) - 1 to floor(t) + 2, f = t - floor(t).
 std::array<double, 4> spline_weights(double f) {
@@ -31,8 +31,8 @@ glm::dvec3 numbers_of(std::uint64_t hash) {
 }  // namespace
 
 glm::dvec3 random_control(std::uint64_t seed, const glm::i64vec3& index) {
-  std::uint64_t hash = mixed(seed);
-  for (int axis = 0; axis < 3; ++axis) hash = mixed(hash + static_cast<std::uint64_t>(index[axis]));
+  std::uint64_t hash = split_mix(seed);
+  for (int axis = 0; axis < 3; ++axis) hash = split_mix(hash + static_cast<std::uint64_t>(index[axis]));
   return numbers_of(hash);
 }
 
@@ -42,16 +42,16 @@ glm::dvec3 Elastic::operator()(const glm::dvec3& point) const {
   std::array<std::array<double, 4>, 3> weights;
   for (int axis = 0; axis < 3; ++axis) weights[axis] = spline_weights(t[axis] - below[axis]);
   // As random_control, but the hash of what control points share is found once.
-  const std::uint64_t start = mixed(seed);
+  const std::uint64_t start = split_mix(seed);
   glm::dvec3 sum(0);
   for (int i = 0; i < 4; ++i) {
-    const std::uint64_t plane_hash = mixed(start + static_cast<std::uint64_t>(first.x + i));
+    const std::uint64_t plane_hash = split_mix(start + static_cast<std::uint64_t>(first.x + i));
     glm::dvec3 plane(0);
     for (int j = 0; j < 4; ++j) {
-      const std::uint64_t row_hash = mixed(plane_hash + static_cast<std::uint64_t>(first.y + j));
+      const std::uint64_t row_hash = split_mix(plane_hash + static_cast<std::uint64_t>(first.y + j));
       glm::dvec3 row(0);
       for (int k = 0; k < 4; ++k)
-        row += weights[2][k] * numbers_of(mixed(row_hash + static_cast<std::uint64_t>(first.z + k)));
+        row += weights[2][k] * numbers_of(split_mix(row_hash + static_cast<std::uint64_t>(first.z + k)));
       plane += weights[1][j] * row;
     }
     sum += weights[0][i] * plane;

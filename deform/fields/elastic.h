@@ -19,8 +19,11 @@ struct Elastic {
   glm::dvec3 operator()(const glm::dvec3& point) const;
 };
 
+/// One step of SplitMix64 (Steele, Lea and Flood 2014) from a state: a hash of 64 bits.
+std::uint64_t split_mix(std::uint64_t state);
+
 /// Three numbers in (-1, 1) of a control point, multiples of 2^-21: bits 0-20, 21-41 and 42-62 of a hash, m(m(m(m(seed)
-/// + i) + j) + k), where m(x) is one step of SplitMix64 (Steele, Lea and Flood 2014) from the state x.
+/// + i) + j) + k), where m is `split_mix`.
 glm::dvec3 random_control(std::uint64_t seed, const glm::i64vec3& index);
 
 }  // namespace tetwarp

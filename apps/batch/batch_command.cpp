@@ -1,0 +1,166 @@
+#include <unistd.h>
+
+#include <iostream>
+
+#include "apps/batch/case_record.h"
+#include "apps/batch/check.h"
+#include "apps/batch/init.h"
+#include "apps/batch/runner.h"
+#include "apps/input.h"
+#include "cuda/devices.h"
+#include "io/parallel.h"
+
+namespace tetwarp::apps {
+
+namespace {
+
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+constexpr int kSomeFailed = 3, kInterrupted = 130;
+
+std::vector<std::string> ids_of(const std::vector<BatchCase>& cases) {
+  std::vector<std::string> ids;
+  for (const BatchCase& one : cases) ids.push_back(one.id);
+  return ids;
+}
+
+/// One run of `tetwarp batch`.
+class Batch {
+ public:
+  explicit Batch(const BatchOptions& options)
+      : options_(options),
+        shard_(options.shard.empty() ? Shard() : parse_shard(options.shard)),
+        cases_(read_manifest(options.manifest, options.output)) {}
+
+  int run();
+
+ private:
+  void choose();
+  void check(Progress& progress);
+  void find_finished(OutputFolder& folder, Results& results);
+  int conclude(const Results& results, Progress& progress, const Usage& usage, bool whole) const;
+  std::vector<std::string> ids() const;
+  Progress::Form form() const;
+  std::uint64_t memory_bytes() const { return options_.memory_bytes.value_or(available_memory_bytes() / 5 * 4); }
+
+  const BatchOptions& options_;
+  Shard shard_;
+  std::vector<BatchCase> cases_;
+  std::vector<const BatchCase*> mine_;  ///< of the shard
+  std::vector<const BatchCase*> open_;  ///< those that are not finished
+  BatchCheck found_;
+};
+
+Progress::Form Batch::form() const {
+  if (options_.log_json) return Progress::Form::machine;
+  return options_.common.quiet ? Progress::Form::none : Progress::Form::person;
+}
+
+void Batch::choose() {
+  for (std::size_t n = 0; n < cases_.size(); ++n) {
+    BatchCase& one = cases_[n];
+    one.options.common.quiet = true;
+    one.options.common.threads = options_.common.threads;
+    if (shard_.holds(n)) mine_.push_back(&one);
+  }
+}
+
+std::vector<std::string> Batch::ids() const {
+  std::vector<std::string> ids;
+  for (const BatchCase* one : mine_) ids.push_back(one->id);
+  return ids;
+}
+
+/// Cases whose folder is whole are kept; others are replaced when they are made again.
+void Batch::find_finished(OutputFolder& folder, Results& results) {
+  folder.remove_unfinished(ids());
+  std::vector<std::optional<json>> lines(mine_.size());
+  for_each_index(mine_.size(), options_.common.threads, {.stop = interrupt_token()}, [&](std::size_t n) {
+    std::string why;
+    lines[n] = finished_line(*mine_[n], folder.case_folder(mine_[n]->id), why);
+  });
+  for (std::size_t n = 0; n < mine_.size(); ++n) {
+    if (lines[n])
+      results.keep(*lines[n]);
+    else
+      open_.push_back(mine_[n]);
+  }
+  for (BatchCase& one : cases_) one.options.common.overwrite = fs::exists(folder.case_folder(one.id) / kFolderRecord);
+}
+
+void Batch::check(Progress& progress) {
+  Stage stage(options_.common, "check");
+  found_ = check_cases(options_.manifest, mine_, memory_bytes(), stage.control());
+  for (const std::string& forecast : found_.forecasts) progress.warn(forecast);
+}
+
+int Batch::conclude(const Results& results, Progress& progress, const Usage& usage, bool whole) const {
+  results.finish();
+  const Tally tally = results.tally();
+  progress.end({{"done", tally.done}, {"failed", tally.failed}, {"not_run", tally.missing}, {"usage", usage.report()}});
+  if (form() == Progress::Form::person) {
+    std::cout << results.table(mine_.size() <= 60);
+    say(options_.common, usage.sentence());
+    if (!whole) say(options_.common, "tetwarp: interrupted; --resume continues");
+  }
+  if (!whole) return kInterrupted;
+  return tally.failed > 0 ? kSomeFailed : 0;
+}
+
+int Batch::run() {
+  choose();
+  if (options_.dry_run) {
+    for (const BatchCase* one : mine_) {
+      std::cout << one->id << ": tetwarp";
+      for (const std::string& argument : command_of(*one)) std::cout << " '" << argument << "'";
+      std::cout << "\n";
+    }
+  }
+  Progress progress(form());
+  check(progress);
+  if (options_.dry_run) {
+    say(options_.common, "would run " + std::to_string(mine_.size()) + " cases; outputs of at most " +
+                             format_bytes(found_.plain_bytes + found_.packed_bytes) + " before compression");
+    return 0;
+  }
+  OutputFolder folder(options_.output, shard_, hash_file(options_.manifest), options_.resume);
+  Results results(folder, ids());
+  find_finished(folder, results);
+  const std::string scarce = check_space(found_, folder.path());
+  const int cuda = options_.backend == "cpu" ? 0 : cuda_device_count();
+  if (options_.backend == "cuda" && cuda == 0) make_backend("cuda", Direction::forward, Geometry(), 0, {});
+  MemoryBudget memory(memory_bytes());
+  Devices devices(options_.backend, cuda);
+  const std::size_t wanted = options_.jobs > 0 ? static_cast<std::size_t>(options_.jobs) : devices.count() + 2;
+  const std::size_t jobs = std::max<std::size_t>(1, std::min(wanted, open_.size()));
+  progress.begin(open_.size(), mine_.size() - open_.size());
+  if (!scarce.empty()) progress.warn(scarce);
+  Usage usage(devices.count(), cuda > 0, jobs);
+  Runner runner(open_, {memory, devices, results, progress, usage});
+  const bool whole = runner.run(jobs, [&] {
+    folder.remove_unfinished(ids());
+    const int status = conclude(results, progress, usage, false);
+    std::cout.flush();
+    ::_exit(status);
+  });
+  return conclude(results, progress, usage, whole);
+}
+
+int merge(const BatchOptions& options) {
+  std::string table;
+  const std::vector<BatchCase> cases = read_manifest(options.manifest, options.output);
+  const Tally tally = merge_shards(options.output, ids_of(cases), table);
+  if (!options.common.quiet) std::cout << table;
+  return tally.failed > 0 ? kSomeFailed : 0;
+}
+
+}  // namespace
+
+int run_batch(const BatchOptions& options) {
+  if (!options.init.empty()) return run_batch_init(options);
+  if (options.manifest.empty()) throw UsageError("no manifest; give one, or make one with --init FOLDER");
+  return options.merge ? merge(options) : Batch(options).run();
+}
+
+}  // namespace tetwarp::apps

@@ -1,0 +1,125 @@
+#include "apps/batch/case_run.h"
+
+#include <optional>
+
+#include "apps/batch/case_record.h"
+
+namespace tetwarp::apps {
+
+namespace {
+
+using nlohmann::json;
+
+/// Device memory that a case may take once there was not enough of it.
+constexpr std::uint64_t kScarceDeviceBytes = 512'000'000;
+
+class Clock {
+ public:
+  double lap() {
+    const auto now = std::chrono::steady_clock::now();
+    const double seconds = std::chrono::duration<double>(now - last_).count();
+    last_ = now;
+    return seconds;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+/// How often a case was begun anew, and what it may use from then on.
+struct Retry {
+  std::optional<std::uint64_t> device_bytes;
+  bool on_cpu = false;
+  json reasons = json::array();
+};
+
+bool is_simulated_on_device(const DeformOptions& options) { return !options.scenario.empty(); }
+
+json attempt(const BatchCase& of, const Retry& retry, MemoryBudget& memory, Devices& devices,
+             const std::stop_token& stop, std::optional<int>& device, json& timing) {
+  DeformOptions options = of.options;
+  options.memory_bytes = retry.device_bytes;
+  if (retry.on_cpu) options.backend = "cpu";
+  Clock clock;
+  Deformation deformation(options);
+  deformation.open();
+  timing["open"] = clock.lap();
+  const MemoryBudget::Grant grant = memory.wait_for(deformation.record().plan.bytes, stop);
+  timing["wait_memory"] = clock.lap();
+  deformation.read();
+  timing["read"] = clock.lap();
+  if (!is_simulated_on_device(options)) {
+    deformation.make_field({"cpu", 0});
+    timing["field"] = clock.lap();
+  }
+  {
+    const Devices::Lease lease = devices.wait_for(options.backend, stop);
+    timing["wait_device"] = clock.lap();
+    timing["worker"] = lease.worker().backend;
+    if (lease.worker().backend == "cuda") {
+      device = lease.worker().device;
+      timing["device"] = *device;
+    }
+    if (is_simulated_on_device(options)) {
+      deformation.make_field(lease.worker());
+      timing["field"] = clock.lap();
+    }
+    deformation.resample(lease.worker());
+    timing["resample"] = clock.lap();
+  }
+  deformation.write();
+  timing["write"] = clock.lap();
+  json line = record_case(of, deformation);
+  timing["hash"] = clock.lap();
+  deformation.commit();
+  timing["commit"] = clock.lap();
+  timing["planned_bytes"] = deformation.record().plan.bytes;
+  return line;
+}
+
+}  // namespace
+
+CaseOutcome run_case(const BatchCase& of, MemoryBudget& memory, Devices& devices, const std::stop_token& stop) {
+  Retry retry;
+  CaseOutcome outcome;
+  for (;;) {
+    std::optional<int> device;
+    outcome.timing = {{"case", of.id}};
+    try {
+      outcome.line = attempt(of, retry, memory, devices, stop, device, outcome.timing);
+      if (!retry.reasons.empty()) outcome.timing["made_again"] = retry.reasons;
+      return outcome;
+    } catch (const Cancelled&) {
+      throw;
+    } catch (const DeviceError& error) {
+      const bool is_memory = dynamic_cast<const DeviceMemoryError*>(&error) != nullptr;
+      retry.reasons.push_back(error.what());
+      if (device && is_memory && !retry.device_bytes) {
+        retry.device_bytes = kScarceDeviceBytes;
+        continue;
+      }
+      if (device && !is_memory && devices.lose(*device)) continue;
+      if (device && is_memory && of.options.backend == "auto") {
+        retry.on_cpu = true;
+        continue;
+      }
+      outcome.status = CaseStatus::failed;
+      outcome.line = failed_line(of, "failed", error.what());
+    } catch (const InputError& error) {
+      outcome.status = CaseStatus::refused;
+      outcome.line = failed_line(of, "refused", error.what());
+    } catch (const UsageError& error) {
+      outcome.status = CaseStatus::refused;
+      outcome.line = failed_line(of, "refused", error.what());
+    } catch (const std::bad_alloc&) {
+      outcome.status = CaseStatus::failed;
+      outcome.line = failed_line(of, "failed", "not enough memory; give the batch less with --memory, or fewer --jobs");
+    } catch (const std::exception& error) {
+      outcome.status = CaseStatus::failed;
+      outcome.line = failed_line(of, "failed", error.what());
+    }
+    return outcome;
+  }
+}
+
+}  // namespace tetwarp::apps

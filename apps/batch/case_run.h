@@ -1,0 +1,25 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "apps/batch/manifest.h"
+#include "apps/batch/resources.h"
+
+namespace tetwarp::apps {
+
+enum class CaseStatus { done, failed, refused };
+
+/// What became of a case.
+struct CaseOutcome {
+  CaseStatus status = CaseStatus::done;
+  nlohmann::json line;    ///< of results.jsonl: no clock
+  nlohmann::json timing;  ///< of timings.jsonl: seconds a stage, who resampled
+};
+
+/// Runs one case, from its headers to its folder's name. A device that fails is given up, and the case made again on
+/// another or on the processor; where its memory runs out, in slabs, then on the processor. The bits are the same.
+/// @throws Cancelled; whatever else goes wrong is the outcome
+CaseOutcome run_case(const BatchCase& of, MemoryBudget& memory, Devices& devices, const std::stop_token& stop);
+
+}  // namespace tetwarp::apps

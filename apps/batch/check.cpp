@@ -1,0 +1,85 @@
+#include "apps/batch/check.h"
+
+#include <mutex>
+
+#include "apps/batch/output_folder.h"
+#include "apps/deformation.h"
+#include "io/parallel.h"
+
+namespace tetwarp::apps {
+
+namespace {
+
+/// Whether all outputs of a case are written as they are.
+bool is_plain(const DeformOptions& options) {
+  const auto is_packed = [&](const std::filesystem::path& path) { return path.extension() == ".gz"; };
+  if (options.compression.value_or(0) > 0) return false;
+  if (is_series_output(options.output)) return options.dicom.encoding == DicomEncoding::uncompressed;
+  const MapOptions& maps = options.maps;
+  for (const auto& path :
+       {options.output, maps.coverage, maps.folds, maps.jacobian, maps.inverse, options.write_field}) {
+    if (is_packed(path)) return false;
+  }
+  return options.with.empty();
+}
+
+/// What one case comes to: one of the texts is empty or both are.
+struct Finding {
+  std::uint64_t output_bytes = 0;
+  std::string error, forecast;
+};
+
+Finding look_at(const BatchCase& of, std::uint64_t memory_bytes) {
+  Finding finding;
+  DeformOptions options = of.options;
+  options.dry_run = true;
+  try {
+    Deformation deformation(options);
+    deformation.open();
+    const DeformPlan& plan = deformation.record().plan;
+    finding.output_bytes = plan.output_bytes;
+    if (plan.bytes > memory_bytes) {
+      finding.forecast =
+          "about " + format_bytes(plan.bytes) + " of memory are needed, the batch has " + format_bytes(memory_bytes);
+    }
+  } catch (const UsageError& error) {
+    finding.error = error.what();
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const std::exception& error) {
+    finding.forecast = error.what();
+  }
+  return finding;
+}
+
+}  // namespace
+
+BatchCheck check_cases(const std::filesystem::path& manifest, const std::vector<const BatchCase*>& cases,
+                       std::uint64_t memory_bytes, const Control& control) {
+  std::vector<Finding> findings(cases.size());
+  for_each_index(cases.size(), 0, control, [&](std::size_t n) { findings[n] = look_at(*cases[n], memory_bytes); });
+  BatchCheck check;
+  std::string errors;
+  for (std::size_t n = 0; n < cases.size(); ++n) {
+    (is_plain(cases[n]->options) ? check.plain_bytes : check.packed_bytes) += findings[n].output_bytes;
+    if (!findings[n].forecast.empty()) check.forecasts.push_back(cases[n]->id + ": " + findings[n].forecast);
+    if (findings[n].error.empty()) continue;
+    errors += (errors.empty() ? "" : "\n") + manifest.string() + ":" + std::to_string(cases[n]->line) + ": " +
+              cases[n]->id + ": " + findings[n].error;
+  }
+  require(errors.empty(), errors);
+  return check;
+}
+
+std::string check_space(const BatchCheck& check, const std::filesystem::path& folder) {
+  const std::uint64_t free = free_bytes(folder);
+  if (check.plain_bytes > free) {
+    throw Error("the outputs take at least " + format_bytes(check.plain_bytes) + ", " + format_bytes(free) +
+                " are free, " + folder.string() + "; choose another disk, or a compressed form");
+  }
+  if (check.plain_bytes + check.packed_bytes <= free) return "";
+  return "the outputs take up to " + format_bytes(check.plain_bytes + check.packed_bytes) + " before compression, " +
+         format_bytes(free) + " are free, " + folder.string();
+}
+
+}  // namespace tetwarp::apps

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace tetwarp::apps {
+
+/// Whether a formula holds something that is drawn: a range, LOW..HIGH, or an `elastic` without a seed.
+bool is_random(const std::string& formula);
+
+/// The formula with what is random in it drawn: each LOW..HIGH (a suffix behind it, `2..8vox`, is that of the number)
+/// becomes a number of at most six significant digits, uniform between them, and an `elastic` without a seed gets one.
+///
+/// The number for component `c`, from 0 (of X/Y/Z; else 0), of a parameter is LOW + u (HIGH - LOW), u = floor(h / 2^11)
+/// / 2^53, where h = m(g + c) and g is the result of h = m(m(m(seed) + variant) + field) and then h = m(h + byte) for
+/// each byte of the parameter's name; m is `split_mix`, sums are modulo 2^64. A seed is floor(h / 2^12) of the name
+/// "seed", component 0. So a number depends on no other parameter.
+///
+/// @param variant  of the row, from 0. @param field  its place among the fields of the case, from 0
+/// @throws InputError for a range that is none: not numbers, LOW above HIGH
+std::string draw(const std::string& formula, std::uint64_t seed, std::uint64_t variant, std::uint64_t field);
+
+}  // namespace tetwarp::apps

@@ -1,0 +1,12 @@
+#pragma once
+
+#include "apps/options.h"
+
+namespace tetwarp::apps {
+
+/// Writes a manifest with a row for every volume of a folder that can be deformed, to be edited by a person. What
+/// cannot is named in comments. It holds paths and UIDs, and nothing else that tells who a patient is.
+/// @throws InputError for a folder without a usable volume, and what scan_dicom and StagedOutput throw
+int run_batch_init(const BatchOptions& options);
+
+}  // namespace tetwarp::apps

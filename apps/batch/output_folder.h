@@ -1,0 +1,62 @@
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace tetwarp::apps {
+
+/// A share of the cases: those whose number, from 0, leaves `number` - 1 when divided by `count`.
+struct Shard {
+  std::size_t number = 1, count = 1;
+
+  bool holds(std::size_t index) const { return index % count == number - 1; }
+  /// ".2-of-4", nothing of the whole: goes before the suffix of a file's name.
+  std::string mark() const { return count == 1 ? "" : "." + std::to_string(number) + "-of-" + std::to_string(count); }
+};
+
+/// @throws UsageError for a text that is not I/N, 1 <= I <= N
+Shard parse_shard(const std::string& text);
+
+/// OUTPUT_DIR of a batch, for one process and one shard at a time: other shards may write into the same folder, each to
+/// files of its own.
+class OutputFolder {
+ public:
+  /// Creates it where it does not exist, and locks the shard.
+  /// @param manifest_sha256  what a resumed batch has to have begun with
+  /// @throws Error where it exists, is not empty and `resume` is false, where it belongs to another manifest or
+  /// something else, or another process works in it
+  OutputFolder(std::filesystem::path path, const Shard& shard, const std::string& manifest_sha256, bool resume);
+  ~OutputFolder();
+  OutputFolder(const OutputFolder&) = delete;
+  OutputFolder& operator=(const OutputFolder&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+  std::filesystem::path results() const { return file("results", ".jsonl"); }
+  std::filesystem::path timings() const { return file("timings", ".jsonl"); }
+  std::filesystem::path summary() const { return file("summary", ".txt"); }
+  std::filesystem::path case_folder(const std::string& id) const { return path_ / id; }
+  /// Removes what killed runs left of these cases under hidden names, and what this run has not finished.
+  void remove_unfinished(const std::vector<std::string>& ids) const;
+
+ private:
+  std::filesystem::path file(const std::string& name, const std::string& suffix) const {
+    return path_ / (name + shard_.mark() + suffix);
+  }
+  void begin(bool resume, const std::string& manifest_sha256);
+
+  std::filesystem::path path_;
+  Shard shard_;
+  bool created_ = false;
+  int lock_ = -1;
+};
+
+/// Bytes that an ordinary user can still write on the file system of a folder.
+std::uint64_t free_bytes(const std::filesystem::path& folder);
+
+/// A text under a name, whole or not at all: through StagedOutput. @throws Error
+void write_whole(const std::filesystem::path& path, const std::string& text);
+
+}  // namespace tetwarp::apps

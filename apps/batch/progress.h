@@ -1,0 +1,46 @@
+#pragma once
+
+#include <chrono>
+#include <mutex>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "apps/batch/case_run.h"
+#include "apps/console.h"
+
+namespace tetwarp::apps {
+
+/// What a batch says while it runs, on standard error: to a person on a terminal a bar with cases a minute and the time
+/// left, and a line for each case that fails; to a machine JSON Lines. Cases by their ids, nothing of patients.
+class Progress {
+ public:
+  enum class Form { none, person, machine };
+
+  explicit Progress(Form form);
+  ~Progress();
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  /// @param cases  to run. @param finished  by earlier runs
+  void begin(std::size_t cases, std::size_t finished);
+  /// These may be called by several threads.
+  void started(const std::string& id);
+  void ended(const CaseOutcome& outcome);
+  void warn(const std::string& text);
+  void draw();
+  /// The last word. @param summary  numbers of cases, for a machine
+  void end(const nlohmann::json& summary);
+
+ private:
+  void print(const nlohmann::json& event);
+  void print(const std::string& line);
+  void clear();
+
+  Form form_;
+  std::size_t cases_ = 0, done_ = 0, failed_ = 0;
+  bool terminal_, visible_ = false;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  std::mutex mutex_;
+};
+
+}  // namespace tetwarp::apps

@@ -1,0 +1,88 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <mutex>
+#include <set>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "apps/deform_worker.h"
+
+namespace tetwarp::apps {
+
+/// Memory that cases hold together, granted in the order in which they ask: a large case is not passed over for ever.
+class MemoryBudget {
+ public:
+  explicit MemoryBudget(std::uint64_t bytes) : bytes_(bytes) {}
+
+  /// A part of the budget, until it dies.
+  class Grant {
+   public:
+    Grant(MemoryBudget& of, std::uint64_t bytes) : of_(&of), bytes_(bytes) {}
+    ~Grant();
+    Grant(const Grant&) = delete;
+    Grant& operator=(const Grant&) = delete;
+
+   private:
+    MemoryBudget* of_;
+    std::uint64_t bytes_;
+  };
+
+  /// Waits until so much is free. @throws Error for more than there ever is, Cancelled when it has to stop
+  Grant wait_for(std::uint64_t bytes, const std::stop_token& stop);
+  std::uint64_t bytes() const { return bytes_; }
+
+ private:
+  std::uint64_t bytes_, held_ = 0, next_ = 0, turn_ = 0;
+  std::set<std::uint64_t> given_up_;  ///< tickets of those who stopped waiting
+  std::mutex mutex_;
+  std::condition_variable_any changed_;
+};
+
+/// Who resamples: every CUDA device that works, or the processor, one case at a time each. Cases take whichever is
+/// free.
+class Devices {
+ public:
+  /// @param wanted  auto, cpu or cuda. @param cuda  how many devices there are
+  Devices(const std::string& wanted, int cuda);
+
+  /// A device, until it dies.
+  class Lease {
+   public:
+    Lease(Devices& of, Worker worker) : of_(&of), worker_(std::move(worker)) {}
+    ~Lease();
+    Lease(const Lease&) = delete;
+    Lease& operator=(const Lease&) = delete;
+    const Worker& worker() const { return worker_; }
+
+   private:
+    Devices* of_;
+    Worker worker_;
+  };
+
+  /// Waits for one. @param wanted  what a case asks for: auto takes what the batch was given
+  /// @throws DeviceError where CUDA is wanted and no device is left, Cancelled when it has to stop
+  Lease wait_for(const std::string& wanted, const std::stop_token& stop);
+  /// A device is used no more. @return false where it was known
+  bool lose(int device);
+  std::size_t count() const { return count_; }  ///< of those that there were at first, the processor as one
+
+ private:
+  bool is_cuda(const std::string& wanted) const;
+  void give_back(const Worker& worker);
+
+  std::string wanted_;
+  std::set<int> free_, lost_;
+  bool cpu_is_free_ = true;
+  int cuda_;
+  std::size_t count_;
+  std::mutex mutex_;
+  std::condition_variable_any changed_;
+};
+
+/// What the system and its control group can still give, bytes.
+std::uint64_t available_memory_bytes();
+
+}  // namespace tetwarp::apps

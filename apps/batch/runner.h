@@ -1,0 +1,48 @@
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "apps/batch/progress.h"
+#include "apps/batch/results.h"
+#include "apps/batch/usage.h"
+
+namespace tetwarp::apps {
+
+/// Cases that are in work side by side: while one is read, another is resampled and a third is written. Each takes what
+/// it needs of memory and devices, in the order of the manifest.
+class Runner {
+ public:
+  struct Parts {
+    MemoryBudget& memory;
+    Devices& devices;
+    Results& results;
+    Progress& progress;
+    Usage& usage;
+  };
+
+  Runner(std::vector<const BatchCase*> cases, const Parts& parts) : cases_(std::move(cases)), parts_(parts) {}
+
+  /// Runs all, at most `jobs` at once.
+  /// @return false where it was interrupted. Cases in work are then dropped, or finish at once; if one does neither for
+  /// some seconds, `abandon` is called, which has to end the process.
+  /// @throws Error where results cannot be written
+  bool run(std::size_t jobs, const std::function<void()>& abandon);
+
+ private:
+  void work();
+
+  std::vector<const BatchCase*> cases_;
+  Parts parts_;
+  std::atomic<std::size_t> next_ = 0;
+  std::atomic<bool> interrupted_ = false;
+  std::exception_ptr failure_;
+  std::size_t working_ = 0;
+  std::mutex mutex_;
+  std::condition_variable ended_;
+};
+
+}  // namespace tetwarp::apps

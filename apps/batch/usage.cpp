@@ -1,0 +1,83 @@
+#include "apps/batch/usage.h"
+
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <thread>
+
+namespace tetwarp::apps {
+
+namespace {
+
+using nlohmann::json;
+
+constexpr double kBusy = 0.8;      ///< who is busy for such a share of the time holds the others up
+constexpr double kWaiting = 0.25;  ///< of the time of all who work, spent waiting for memory
+
+double processor_seconds() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& time) {
+    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+std::string percent(double share) {
+  char text[16];
+  std::snprintf(text, sizeof text, "%.0f %%", 100 * share);
+  return text;
+}
+
+}  // namespace
+
+Usage::Usage(std::size_t devices, bool cuda, std::size_t jobs)
+    : devices_(devices), jobs_(jobs), cuda_(cuda), processor_before_(processor_seconds()) {}
+
+void Usage::add(const json& timing) {
+  const std::lock_guard lock(mutex_);
+  for (const auto& [stage, seconds] : timing.items()) {
+    if (seconds.is_number_float()) seconds_[stage] += seconds.get<double>();
+  }
+}
+
+double Usage::wall() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+double Usage::processor_share() const {
+  const double cores = std::max(1u, std::thread::hardware_concurrency());
+  return (processor_seconds() - processor_before_) / (cores * wall());
+}
+
+json Usage::report() const {
+  const std::lock_guard lock(mutex_);
+  json document = {{"wall_seconds", wall()}, {"jobs", jobs_}, {"processor", processor_share()}};
+  for (const auto& [stage, seconds] : seconds_)
+    document["stages"][stage] = seconds / (static_cast<double>(jobs_) * wall());
+  const auto resample = seconds_.find("resample");
+  if (cuda_ && resample != seconds_.end())
+    document["devices"] = resample->second / (static_cast<double>(devices_) * wall());
+  return document;
+}
+
+std::string Usage::sentence() const {
+  const json shares = report();
+  const double processor = shares["processor"], devices = shares.value("devices", 0.0);
+  const json stages = shares.value("stages", json::object());
+  const double memory = stages.value("wait_memory", 0.0);
+  const char* what = "files: reading them, and waiting until they are on the disk";
+  if (devices >= kBusy && devices >= processor)
+    what = devices_ > 1 ? "the CUDA devices" : "the CUDA device";
+  else if (processor >= kBusy)
+    what = "the processor";
+  else if (memory >= kWaiting)
+    what = "memory: more cases at once would need more of it (--memory)";
+  std::string text = std::string("bottleneck: ") + what + " (processor busy " + percent(processor);
+  if (cuda_) text += ", resampling on CUDA " + percent(devices);
+  for (const char* stage : {"read", "field", "resample", "write", "commit", "wait_memory", "wait_device"}) {
+    if (stages.value(stage, 0.0) >= 0.005) text += std::string(", ") + stage + " " + percent(stages[stage]);
+  }
+  return text + " of the cases' time)";
+}
+
+}  // namespace tetwarp::apps

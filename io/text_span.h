@@ -1,0 +1,12 @@
+#pragma once
+
+#include <cstddef>
+
+namespace tetwarp {
+
+/// From `begin` up to `end`, bytes of a text.
+struct Span {
+  std::size_t begin = 0, end = 0;
+};
+
+}  // namespace tetwarp
