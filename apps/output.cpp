@@ -52,6 +52,7 @@ OutputSet::OutputSet(std::vector<fs::path> inputs, bool overwrite, const fs::pat
     : inputs_(std::move(inputs)), overwrite_(overwrite), together_(!folder.empty()), only_look_(only_look) {
   if (!together_) return;
   refuse_inputs(folder);
+  targets_.push_back(folder / kFolderRecord);
   if (only_look_) return;
   staged_.push_back(std::make_unique<StagedOutput>(plain(folder), StagedOutput::Kind::folder, overwrite, is_recorded));
 }

@@ -34,8 +34,6 @@ class OutputSet {
   void commit();
   /// Where the folder is staged. @pre there is one
   const std::filesystem::path& folder() const { return staged_.front()->path(); }
-  /// What was added, by its final names.
-  const std::vector<std::filesystem::path>& targets() const { return targets_; }
 
   /// Runs `write`; an Error that names the place where an output is staged names the output itself instead.
   void write(const std::function<void()>& write);

@@ -101,7 +101,7 @@ int Batch::conclude(const Results& results, Progress& progress, const Usage& usa
   progress.end({{"done", tally.done}, {"failed", tally.failed}, {"not_run", tally.missing}, {"usage", usage.report()}});
   if (form() == Progress::Form::person) {
     std::cout << results.table(mine_.size() <= 60);
-    say(options_.common, usage.sentence());
+    if (const std::string sentence = usage.sentence(); !sentence.empty()) say(options_.common, sentence);
     if (!whole) say(options_.common, "tetwarp: interrupted; --resume continues");
   }
   if (!whole) return kInterrupted;

@@ -66,6 +66,14 @@ std::string one_line(std::string text) {
   return text;
 }
 
+/// Why a volume can be no case; empty where it can.
+std::string problem_of(const DicomSeries& series) {
+  if (series.refusal || series.slices.empty()) return series.refusal.value_or("no CT slices");
+  const glm::i64vec3& size = series.geometry.size;
+  return std::min({size.x, size.y, size.z}) < 2 ? "a volume of " + to_string(size) + " voxels has no cell to deform"
+                                                : "";
+}
+
 /// Writes the rows of a scan.
 class Rows {
  public:
@@ -111,12 +119,16 @@ std::string Rows::row(const DicomSeries& series) {
 std::string Rows::text() {
   std::string rows = "case,input,series,uneven,field,output,comment\n", others;
   for (const DicomSeries& series : scan_.series) {
-    if (!series.refusal && !series.slices.empty()) {
+    const std::string problem = problem_of(series);
+    if (problem.empty()) {
+      // Slices at uneven distances may mean that some are missing: a person has to say that they are meant.
+      if (series.uneven)
+        rows += "# " + one_line(*series.uneven) + "; to take each slice where it is, remove the # before:\n#";
       rows += row(series);
       continue;
     }
     others += "# not usable: " + (series.series_uid.empty() ? "no UID" : shown(series.series_uid)) + ": " +
-              one_line(series.refusal.value_or("no CT slices")) + "\n";
+              one_line(problem) + "\n";
   }
   return rows + others;
 }

@@ -69,12 +69,6 @@ void OutputFolder::begin(bool resume, const std::string& manifest_sha256) {
   if (::flock(lock_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
     throw Error("another process works on this batch, " + path_.string() + "; wait until it has ended");
   const json document = {{"manifest_sha256", manifest_sha256}, {"shard", shard_.number}, {"shards", shard_.count}};
-  std::ifstream before(mark, std::ios::binary);
-  const json found = json::parse(before, nullptr, false);
-  if (found.is_object() && found.value("manifest_sha256", "") != manifest_sha256)
-    throw Error("the batch in " + path_.string() +
-                " was begun with another manifest; give that one, or choose another folder");
-  if (found.is_object()) return;
   const std::string text = document.dump() + "\n";
   if (::ftruncate(lock_, 0) != 0 || ::pwrite(lock_, text.data(), text.size(), 0) != static_cast<ssize_t>(text.size()) ||
       ::fsync(lock_) != 0)

@@ -25,9 +25,9 @@ Shard parse_shard(const std::string& text);
 class OutputFolder {
  public:
   /// Creates it where it does not exist, and locks the shard.
-  /// @param manifest_sha256  what a resumed batch has to have begun with
-  /// @throws Error where it exists, is not empty and `resume` is false, where it belongs to another manifest or
-  /// something else, or another process works in it
+  /// @param manifest_sha256  for the record: a batch may go on with a manifest that was mended
+  /// @throws Error where it exists, is not empty and `resume` is false, where it holds something else, or another
+  /// process works in it
   OutputFolder(std::filesystem::path path, const Shard& shard, const std::string& manifest_sha256, bool resume);
   ~OutputFolder();
   OutputFolder(const OutputFolder&) = delete;

@@ -64,6 +64,7 @@ std::string Usage::sentence() const {
   const json shares = report();
   const double processor = shares["processor"], devices = shares.value("devices", 0.0);
   const json stages = shares.value("stages", json::object());
+  if (!stages.contains("resample")) return "";
   const double memory = stages.value("wait_memory", 0.0);
   const char* what = "files: reading them, and waiting until they are on the disk";
   if (devices >= kBusy && devices >= processor)

@@ -18,7 +18,7 @@ class Usage {
   void add(const nlohmann::json& timing);
   /// Shares of the time so far: of processor, devices and each stage.
   nlohmann::json report() const;
-  /// One line for people: "bottleneck: the processor (97 % busy; ...)".
+  /// One line for people: "bottleneck: the processor (busy 97 %, ...)"; nothing before a case was resampled.
   std::string sentence() const;
 
  private:

@@ -1,0 +1,227 @@
+// `tetwarp batch`: what a manifest says, and what is wrong with one.
+#include "tests/apps/batch_case.h"
+
+namespace {
+
+using namespace tetwarp::test;
+using nlohmann::json;
+
+class BatchManifest : public BatchCase {};
+
+TEST_F(BatchManifest, AllErrorsAreListedWithTheirLinesAndNothingIsRun) {
+  const Outcome refused = batch(
+      R"({"case": "a", "input": "ct.nii.gz", "field": "identity", "covrage": "x.nii.gz"}
+{"case": "b", "input": "nowhere.nii.gz", "field": "identity"}
+{"case": "B", "input": "ct.nii.gz", "field": "identity"}
+{"case": "../c", "input": "ct.nii.gz", "field": "identity"}
+{"case": "d", "input": "ct.nii.gz"}
+{"case": "e", "input": "ct.nii.gz", "field": "identity", "pull-field": "f.mha"}
+{"case": "f", "input": "ct.nii.gz", "field": "wave:amplitud=3,wavelength=5"}
+{"case": "g", "input": "ct.nii.gz", "field": "elastic:amplitude=2..8,spacing=40"}
+{"case": "h", "input": "ct.nii.gz", "field": "elastic:amplitude=8..2,spacing=40", "seed": 1}
+{"case": "i", "input": "ct.nii.gz", "field": "twist:angle=1..x", "seed": 1}
+{"case": "j", "input": "ct.nii.gz", "field": "identity", "output": "../out.nii.gz"}
+{"case": "k", "input": "ct.nii.gz", "field": "identity", "threads": 4}
+{"case": "l", "input": "ct.nii.gz", "field": "identity", "interpolation": "quick"}
+{"case": "m", "input": "ct.nii.gz", "field": "identity", "seed": -1, "variants": 2}
+{"case": "n", "input": "ct.nii.gz", "field": "nowhere.mha"}
+{"case": "o", "input": "ct.nii.gz", "field": "identity", "with": ["nowhere.nrrd=out.nrrd"]}
+{"case": "p", "input": "ct.nii.gz", "field": "identity", "bids": "perhaps"}
+{"case": "q", "input": "ct.nii.gz", "field": "identity", "case": "q"}
+{"case": "r", "input": "ct.nii.gz", "scenario": "springs.json"}
+{"case": "s", "input": {"path": "ct.nii.gz"}, "field": "identity"}
+no json
+{"input": "ct.nii.gz", "field": "identity"}
+{"case": "t", "input": "ct.nii.gz", "field": "identity", "variants": 0}
+)");
+  EXPECT_EQ(refused.status, 4);
+  for (const char* words : {"m.jsonl:1: unknown key \"covrage\"; is \"coverage\" meant?",
+                            "m.jsonl:2: no such file or folder, nowhere.nii.gz",
+                            "m.jsonl:3: the case id \"B\" is taken",
+                            "m.jsonl:4: the case id \"../c\"",
+                            "m.jsonl:5: one of field, pull-field and scenario",
+                            "m.jsonl:6: one of field, pull-field and scenario",
+                            "m.jsonl:7: ",
+                            "amplitud",
+                            "m.jsonl:8: \"elastic:amplitude=2..8,spacing=40\" is drawn at random",
+                            "m.jsonl:9: the range \"8..2\" ends below its begin",
+                            "m.jsonl:10: \"1..x\" is no range",
+                            "m.jsonl:11: output is \"../out.nii.gz\"",
+                            "m.jsonl:12: \"threads\" is for the whole batch",
+                            "m.jsonl:13: Could not convert: --interpolation",
+                            "m.jsonl:14: seed is \"-1\"",
+                            "m.jsonl:15: \"nowhere.mha\" is neither",
+                            "m.jsonl:16: no such file or folder, nowhere.nrrd",
+                            "m.jsonl:17: bids is \"perhaps\"",
+                            "m.jsonl:18: the key \"case\" stands there twice",
+                            "m.jsonl:19: no such file or folder, springs.json",
+                            "m.jsonl:20: \"input\" is an object",
+                            "m.jsonl:21: no JSON object",
+                            "m.jsonl:22: no case id",
+                            "m.jsonl:23: variants is \"0\""}) {
+    EXPECT_TRUE(says(refused.err, {words}));
+  }
+  EXPECT_FALSE(std::filesystem::exists(scratch_ / "out"));
+}
+
+TEST_F(BatchManifest, WhatHeadersShowToBeWrongIsListedToo) {
+  const Outcome refused = batch(
+      R"({"case": "a", "input": "ct.nii.gz", "field": "identity", "output": "dicom"}
+{"case": "b", "input": "ct.nii.gz", "field": "identity", "background": 1e9}
+{"case": "c", "input": "ct.nii.gz", "field": "identity", "output": "x.nii.gz", "coverage": "x.nii.gz"}
+{"case": "d", "input": "series", "field": "identity", "output": "case.nii.gz", "bids": true}
+{"case": "e", "input": "ct.nii.gz", "field": "identity"}
+)");
+  EXPECT_EQ(refused.status, 4);
+  EXPECT_TRUE(says(refused.err,
+                   {"m.jsonl:1: a: a DICOM series can only be derived from DICOM", "m.jsonl:2: b: --background",
+                    "m.jsonl:3: c: two outputs have the same place", "m.jsonl:4: d: two outputs have the same place"}));
+  EXPECT_EQ(refused.err.find("m.jsonl:5"), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(scratch_ / "out"));
+}
+
+TEST_F(BatchManifest, CsvAndJsonLinesSayTheSame) {
+  write_file(scratch_ / "m.csv",
+             "\xEF\xBB\xBF# to be edited\r\n"
+             "case,input,field,seed,variants,output,bids,comment\r\n"
+             "a,ct.nii.gz,\"elastic:amplitude=2..8,spacing=60..90 ; twist:angle=-5..5\",3,2,,no,\"a \"\"b\"\", c\"\r\n"
+             "\r\n#b,ct.nii.gz,identity,,,,,\r\n"
+             "c,series,identity,,,dicom,,\r\n");
+  const Outcome csv = run("batch m.csv -o out --dry-run");
+  const Outcome lines = batch(
+      R"({"comment": "x", "variants": 2, "case": "a", "input": "ct.nii.gz", "seed": 3, "field": ["elastic:amplitude=2..8,spacing=60..90", "twist:angle=-5..5"], "bids": false}
+
+{"case": "c", "input": "series", "field": "identity", "output": "dicom"}
+)",
+      "-o out --dry-run");
+  EXPECT_EQ(csv.status, 0) << csv.err;
+  EXPECT_EQ(lines.status, 0) << lines.err;
+  EXPECT_EQ(csv.out, lines.out);
+  EXPECT_TRUE(says(csv.out, {"a-1: tetwarp 'deform' 'ct.nii.gz'",
+                             "'--field=twist:angle=", "c: tetwarp 'deform' 'series'", "'--output=out/c/dicom'"}));
+  EXPECT_FALSE(std::filesystem::exists(scratch_ / "out"));
+}
+
+TEST_F(BatchManifest, CellsThatDoNotFitTheColumnsAreRefused) {
+  write_file(scratch_ / "m.csv", "case,input,field\na,ct.nii.gz,wave:amplitude=8,wavelength=64\n");
+  const Outcome refused = run("batch m.csv -o out");
+  EXPECT_EQ(refused.status, 4);
+  EXPECT_TRUE(says(refused.err, {"m.csv:2: 4 cells, the first line names 3 columns"}));
+}
+
+TEST_F(BatchManifest, PathsAreRelativeToTheManifest) {
+  std::filesystem::create_directories(scratch_ / "study");
+  write_file(scratch_ / "study/m.jsonl", R"({"case": "a", "input": "../ct.nii.gz", "field": "identity"})");
+  const Outcome made = run("batch study/m.jsonl -o out --quiet");
+  EXPECT_EQ(made.status, 0) << made.err;
+  EXPECT_TRUE(std::filesystem::exists(scratch_ / "out/a/deformed.nii.gz"));
+}
+
+/// By the rule of docs/batch.md, in another language.
+TEST_F(BatchManifest, NumbersAreDrawnByTheRuleOfTheDocuments) {
+  write_file(scratch_ / "draw.py", R"(
+M = (1 << 64) - 1
+def m(x):
+    z = (x + 0x9e3779b97f4a7c15) & M
+    z = ((z ^ (z >> 30)) * 0xbf58476d1ce4e5b9) & M
+    z = ((z ^ (z >> 27)) * 0x94d049bb133111eb) & M
+    return z ^ (z >> 31)
+def h(seed, variant, field, name, component=0):
+    g = m((m((m(seed) + variant) & M) + field) & M)
+    for byte in name.encode(): g = m((g + byte) & M)
+    return m((g + component) & M)
+def number(low, high, *of): return '%.6g' % (low + (h(*of) >> 11) / 2**53 * (high - low))
+for variant in range(3):
+    s = (18446744073709551615, variant)
+    print("elastic:amplitude=%svox,spacing=%s,seed=%d" % (number(2, 8, *s, 0, "amplitude"), number(30.5, 60, *s, 0, "spacing"), h(*s, 0, "seed") >> 12))
+    print("translate:by=%s/0/%s" % (number(-1, 1, *s, 1, "by"), number(5, 9, *s, 1, "by", 2)))
+)");
+  const Outcome drawn = batch(
+      R"({"case": "a", "input": "ct.nii.gz", "field": ["elastic:amplitude=2..8vox,spacing=30.5..60", "translate:by=-1..1/0/5..9"], "seed": 18446744073709551615, "variants": 3})",
+      "-o out --dry-run");
+  ASSERT_EQ(drawn.status, 0) << drawn.err;
+  std::string found;
+  for (std::size_t at = drawn.out.find("'--field="); at != std::string::npos; at = drawn.out.find("'--field=", at + 1))
+    found += drawn.out.substr(at + 9, drawn.out.find('\'', at + 1) - at - 9) + "\n";
+  EXPECT_EQ(found, run_program(scratch_.path(), TETWARP_PYTHON, "draw.py").out);
+}
+
+TEST_F(BatchManifest, MassSpringHasToNameItsBackend) {
+  write_file(scratch_ / "springs.json",
+             R"({"method": "mass-spring", "cell_size": 4, "tissues": [{"name": "all"}], "hold": [{"border": true}],
+                 "move": [{"name": "hand", "by_mm": [0, 5, 0], "handle": {"at": {"body": [0.5, 0.3, 0.5]}, "radius_mm": 20}}]})");
+  const Outcome refused = batch(R"({"case": "a", "input": "ct.nii.gz", "scenario": "springs.json"})");
+  EXPECT_EQ(refused.status, 4);
+  EXPECT_TRUE(says(refused.err, {"m.jsonl:1: a mass-spring scenario has other bits on each backend"}));
+  const Outcome made = batch(R"({"case": "a", "input": "ct.nii.gz", "scenario": "springs.json", "backend": "cpu"})");
+  EXPECT_EQ(made.status, 0) << made.err;
+}
+
+TEST_F(BatchManifest, SchemaTakesTheKeysThatTheReaderTakes) {
+  const json schema = json::parse(read_text(TETWARP_MANIFEST_SCHEMA));
+  std::set<std::string> keys;
+  for (const auto& [key, value] : schema["properties"].items()) keys.insert(key);
+  for (const std::string& key : keys) {
+    const Outcome outcome = batch(json{{"case", "a"}, {key, "1"}}.dump());
+    EXPECT_EQ(outcome.err.find("unknown key"), std::string::npos) << key;
+    EXPECT_EQ(outcome.err.find("is for the whole batch"), std::string::npos) << key;
+  }
+  std::istringstream help(run("deform --help").out);
+  std::size_t options = 0;
+  for (std::string line; std::getline(help, line);) {
+    const std::size_t at = line.substr(0, 12).find("--");
+    if (at == std::string::npos || line.find_first_not_of(" -abcdefghijklmnopqrstuvwxyz,") < at) continue;
+    const std::string name =
+        line.substr(at + 2, line.find_first_not_of("abcdefghijklmnopqrstuvwxyz-", at + 2) - at - 2);
+    if (keys.contains(name) || name == "help") continue;
+    const Outcome outcome = batch(json{{"case", "a"}, {name, "1"}}.dump());
+    EXPECT_TRUE(says(outcome.err, {"is for the whole batch"})) << name;
+    ++options;
+  }
+  EXPECT_GE(options, 5u);
+}
+
+TEST_F(BatchManifest, ExamplesOfTheDocumentsMeetTheSchemaAndBadRowsDoNot) {
+  if (std::system("'" TETWARP_PYTHON "' -c 'import jsonschema' 2> '/dev/null'") != 0)
+    GTEST_SKIP() << "python3-jsonschema is not installed";
+  const std::string document = read_text(TETWARP_BATCH_DOCUMENT);
+  const std::size_t begin = document.find("```jsonl\n") + 9;
+  std::istringstream lines(document.substr(begin, document.find("```", begin) - begin));
+  std::string good, bad;
+  std::size_t number = 0;
+  const auto put = [&](const std::string& line, std::string& list) {
+    const std::string name = std::to_string(number++) + ".json";
+    write_file(scratch_ / name, line);
+    list += " '" + (scratch_ / name).string() + "'";
+  };
+  for (std::string line; std::getline(lines, line);) put(line, good);
+  EXPECT_EQ(number, 3u);
+  for (const char* line : {R"({"case": "a", "input": "x", "field": "identity", "colour": 3})",
+                           R"({"case": "a/b", "input": "x", "field": "identity"})", R"({"case": "a", "input": "x"})",
+                           R"({"case": "a", "input": "x", "field": "f", "scenario": "s"})",
+                           R"({"case": "a", "input": "x", "field": "f", "output": "../y.nii"})",
+                           R"({"case": "a", "input": "x", "field": "f", "variants": 0})"})
+    put(line, bad);
+  const std::string check = "'" TETWARP_PYTHON "' '" TETWARP_CHECK_SCENARIO "' '" TETWARP_MANIFEST_SCHEMA "'";
+  EXPECT_EQ(std::system((check + " good" + good).c_str()), 0);
+  EXPECT_EQ(std::system((check + " bad" + bad).c_str()), 0);
+}
+
+TEST_F(BatchManifest, InitNamesEveryVolumeAndWhatItWritesIsTaken) {
+  std::filesystem::create_directories(scratch_ / "study/b");
+  std::filesystem::rename(scratch_ / "series", scratch_ / "study/a");
+  std::filesystem::copy(scratch_ / "study/a/IM00001.dcm", scratch_ / "study/b/one.dcm");
+  ASSERT_EQ(run("deform study/a -f wave:amplitude=3,wavelength=90 -o study/c --quiet").status, 0);
+  const Outcome made = run("batch --init study -o m.csv --field twist:angle=3");
+  ASSERT_EQ(made.status, 0) << made.err;
+  const std::string text = read_text(scratch_ / "m.csv");
+  EXPECT_TRUE(says(text, {"case-001,study", "case-002,study/c,,,twist:angle=3"}));
+  EXPECT_EQ(text.find("hantom"), std::string::npos) << "the patient's name: " << text;
+  EXPECT_EQ(run("batch --init study -o m.csv").status, 1) << "exists";
+  const Outcome all = run("batch m.csv -o out --quiet");
+  EXPECT_EQ(all.status, 0) << all.err;
+  EXPECT_EQ(run("batch --init ct.nii.gz -o n.csv").status, 4);
+  EXPECT_EQ(run("batch --init study -o n.txt").status, 2);
+}
+
+}  // namespace
