@@ -1,0 +1,86 @@
+"""What `tetwarp batch` makes of devices and processors: cases a minute, with one device and with several, beside what device and files take alone.
+
+    measure_batch.py TETWARP FOLDER [--cases 24] [--size 512,512,300] [--devices 1,2] [--jobs 0] [--rounds 3] [--backend cuda]
+
+FOLDER on a disk measures with files; on a memory file system (/dev/shm) with data in memory. Each source is another phantom. Rounds take turns.
+Prints a table of Markdown, of medians.
+"""
+import argparse
+import json
+import os
+import pathlib
+import shutil
+import statistics
+import subprocess
+import time
+
+
+def run(arguments, **more):
+    return subprocess.run(list(map(str, arguments)), check=True, **more)
+
+
+def copy_seconds(folder, sources, outputs):
+    """Reading all sources and writing as much, by copying, to the disk: what files take alone."""
+    target = folder / "copy"
+    target.mkdir()
+    begun = time.time()
+    for n, source in enumerate(sources[i % len(sources)] for i in range(outputs)):
+        shutil.copyfile(source, target / f"{n}.nii")
+        file = os.open(target / f"{n}.nii", os.O_RDONLY)
+        os.fsync(file)
+        os.close(file)
+    seconds = time.time() - begun
+    shutil.rmtree(target)
+    return seconds
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("tetwarp")
+    parser.add_argument("folder", type=pathlib.Path)
+    parser.add_argument("--cases", type=int, default=24)
+    parser.add_argument("--sources", type=int, default=4)
+    parser.add_argument("--size", default="512,512,300")
+    parser.add_argument("--devices", default="1")
+    parser.add_argument("--jobs", default="0")
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--backend", default="cuda")
+    parser.add_argument("--cell-size", type=int, default=8)
+    options = parser.parse_args()
+    options.folder.mkdir(parents=True, exist_ok=True)
+    sources = [options.folder / f"ct{n}.nii" for n in range(options.sources)]
+    for n, source in enumerate(sources):
+        if not source.exists():
+            run([options.tetwarp, "phantom", "-o", source, "--size", options.size, "--seed", n + 1, "--quiet"])
+    manifest = options.folder / "m.jsonl"
+    manifest.write_text("".join(json.dumps({
+        "case": f"c{n:03}", "input": sources[n % len(sources)].name, "field": "elastic:amplitude=4..12,spacing=60..90", "seed": n,
+        "cell-size": options.cell_size, "output": "out.nii"}) + "\n" for n in range(options.cases)))
+    found, copies = {}, []
+    for _ in range(options.rounds):
+        copies.append(copy_seconds(options.folder, sources, options.cases))
+        for devices in options.devices.split(","):
+            for jobs in options.jobs.split(","):
+                out = options.folder / "out"
+                shutil.rmtree(out, ignore_errors=True)
+                seen = dict(os.environ)
+                if options.backend == "cuda":
+                    seen["CUDA_VISIBLE_DEVICES"] = ",".join(map(str, range(int(devices))))
+                begun = time.time()
+                done = run([options.tetwarp, "batch", manifest, "-o", out, "--backend", options.backend, "--jobs", jobs], env=seen,
+                           capture_output=True, text=True)
+                wall = time.time() - begun
+                timings = [json.loads(line) for line in (out / "timings.jsonl").read_text().splitlines()]
+                resample = sum(t["resample"] for t in timings) / int(devices)
+                found.setdefault((devices, jobs), []).append((wall, resample, done.stderr.strip().splitlines()[-1]))
+    copy = statistics.median(copies)
+    print(f"{options.cases} cases of {options.size} voxels, int16; copying their files alone takes {copy:.2f} s\n")
+    print("| devices | jobs | s | cases a minute | resampling, s a device | slower of copying and resampling / s | bottleneck |")
+    print("| --- | --- | --- | --- | --- | --- | --- |")
+    for (devices, jobs), rounds in found.items():
+        wall, resample, words = sorted(rounds)[len(rounds) // 2]
+        print(f"| {devices} | {jobs} | {wall:.2f} | {60 * options.cases / wall:.1f} | {resample:.2f} | {max(copy, resample) / wall:.2f} | "
+              f"{words.removeprefix('bottleneck: ')} |")
+
+
+main()

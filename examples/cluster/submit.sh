@@ -1,0 +1,16 @@
+#!/usr/bin/env bash
+# Submits a batch to Slurm as an array job of N tasks, and a job after them that joins their results.
+#
+#   examples/cluster/submit.sh MANIFEST OUTPUT_DIR N [SBATCH OPTIONS]
+#
+# Environment: TETWARP, the program as the nodes find it (default: tetwarp in PATH). Prints the number of the last job.
+set -euo pipefail
+[ $# -ge 3 ] || { sed -n '2,6s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+manifest=$1 out=$2 tasks=$3
+shift 3
+"${TETWARP:-tetwarp}" batch "$manifest" -o "$out" --dry-run >/dev/null  # what is wrong with it is better known now
+array=$(sbatch --parsable --array="1-$tasks" "$@" "$here/slurm_array.sh" "$manifest" "$out")
+# afterany: cases that failed are results too, and end their task with status 3.
+sbatch --parsable --dependency="afterany:$array" --job-name=tetwarp-merge --output=tetwarp-merge-%j.log \
+  --wrap "'${TETWARP:-tetwarp}' batch '$manifest' -o '$out' --merge"

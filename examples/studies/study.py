@@ -1,0 +1,96 @@
+"""What the studies share: the program, a source, labels by thresholds, and batches that may be killed and continued.
+
+Needs python3-numpy and python3-nibabel. The program is that of TETWARP, or the one that was built in build/.
+"""
+import argparse
+import json
+import os
+import pathlib
+import subprocess
+import sys
+
+try:
+    import nibabel
+    import numpy
+except ImportError as missing:
+    sys.exit(f"{missing}; install python3-numpy and python3-nibabel")
+
+
+def program():
+    built = sorted(pathlib.Path(__file__).resolve().parents[2].glob("build/*/apps/tetwarp"))
+    path = os.environ.get("TETWARP") or (built[0] if built else None)
+    if not path:
+        sys.exit("build Tetwarp first, or name the program in TETWARP")
+    return str(pathlib.Path(path).resolve())
+
+
+def parser(description):
+    words = argparse.ArgumentParser(description=description.strip(), formatter_class=argparse.RawDescriptionHelpFormatter)
+    words.add_argument("ct", nargs="?", help="a folder of DICOM or a volume file (default: a phantom)")
+    words.add_argument("-o", "--output", type=pathlib.Path, required=True, help="folder of the study; continued where it exists")
+    words.add_argument("--series", help="of a folder that holds several")
+    words.add_argument("--size", default="160,160,80", help="voxels of the phantom (default: %(default)s)")
+    words.add_argument("--cell-size", type=int, default=4, help="voxels between vertices of the field (default: %(default)s)")
+    return words
+
+
+def tetwarp(*arguments, good=(0,)):
+    status = subprocess.run([program(), *map(str, arguments)]).returncode
+    if status not in good:
+        sys.exit(status)
+
+
+def source(options):
+    """The CT as OUTPUT/ct.nii.gz, in HU: of the series as it is, or a phantom of 400 x 400 x 320 mm."""
+    options.output.mkdir(parents=True, exist_ok=True)
+    path = options.output / "ct.nii.gz"
+    if path.exists():
+        return path
+    if options.ct:
+        tetwarp("deform", options.ct, "-f", "identity", "-o", path, "--quiet", *(["--series", options.series] if options.series else []))
+    else:
+        spacing = ",".join(f"{mm / float(n):.6g}" for mm, n in zip((400, 400, 320), options.size.split(",")))
+        tetwarp("phantom", "-o", path, "--size", options.size, "--spacing", spacing, "--quiet")
+    return path
+
+
+def read(path):
+    image = nibabel.load(path)
+    return numpy.squeeze(numpy.asarray(image.dataobj)), image
+
+
+def segment(hu):
+    """1 soft tissue, 2 lung, 3 bone: a segmentation network's place is taken by thresholds."""
+    labels = numpy.zeros(hu.shape, numpy.uint8)
+    labels[hu > -300] = 1
+    labels[(hu > -930) & (hu < -500)] = 2
+    labels[hu > 200] = 3
+    return labels
+
+
+def label_map(options, ct):
+    """OUTPUT/labels.nii.gz on the grid of the CT."""
+    path = options.output / "labels.nii.gz"
+    if not path.exists():
+        hu, image = read(ct)
+        nibabel.save(nibabel.Nifti1Image(segment(hu), image.affine), path)
+    return path
+
+
+def dice(a, b):
+    """Of each label that either has, by label."""
+    scores = {}
+    for label in sorted(set(numpy.unique(a)) | set(numpy.unique(b)) - {0}):
+        if label:
+            one, other = a == label, b == label
+            scores[int(label)] = float(2 * (one & other).sum() / (one.sum() + other.sum()))
+    return scores
+
+
+def batch(options, rows):
+    """Runs the cases, or those that are not finished. @return the lines of results.jsonl by case"""
+    manifest, out = options.output / "manifest.jsonl", options.output / "cases"
+    manifest.write_text("".join(json.dumps(row) + "\n" for row in rows))
+    tetwarp("batch", manifest, "-o", out, "--resume", *([] if sys.stderr.isatty() else ["--quiet"]))
+    lines = [json.loads(line) for line in (out / "results.jsonl").read_text().splitlines()]
+    return {line["case"]: line for line in lines}
