@@ -38,6 +38,8 @@ void Deformation::note_series(const DicomSeries& series) {
 
 void Deformation::read() {
   Stage stage(options_.common, "read");
+  if (!header_->series)  // of a series the reader finds it
+    input_hash_ = std::async(std::launch::async, [this] { return hash_file(options_.input.path); });
   record_.input = read_input(options_.input, *header_, options_.common, stage.control());
   record_.background = options_.background.value_or(record_.input.background);
   record_.outputs.further->read(options_.common, {.stop = interrupt_token()});
@@ -71,15 +73,13 @@ void Deformation::make_field(const Worker& worker) {
                                   ": the output has a straight, even grid of " + to_string(record_.plan.grid.size) +
                                   " voxels, so that the identity resamples too");
   }
+  record_.field_sha256 = record_.field.hash(options_.common.threads);
+  record_.output = AnyVolume(record_.plan.grid, record_.input.volume.type());
   record_.stages.emplace_back("field", stage.seconds());
 }
 
 void Deformation::resample(const Worker& worker) {
   Stage stage(options_.common, "resample");
-  auto input_hash = std::async(std::launch::async, [&] {
-    return record_.input.is_dicom() ? record_.input.dicom->sha256 : hash_file(options_.input.path);
-  });
-  record_.field_sha256 = record_.field.hash(options_.common.threads);
   const Limits limits{.threads = options_.common.threads, .memory = options_.memory_bytes.value_or(0)};
   Backend backend = make_backend(worker.backend, record_.field.direction, record_.plan.grid, worker.device, limits);
   record_.backend = backend.name;
@@ -90,7 +90,6 @@ void Deformation::resample(const Worker& worker) {
   if (!record_.points.empty())
     record_.points.move(record_.plan.grid, view(record_.field.forward.field, outside), limits,
                         {.stop = interrupt_token()});
-  record_.output = AnyVolume(record_.plan.grid, record_.input.volume.type());
   sampled_slices_.resize(record_.outputs.series ? static_cast<std::size_t>(record_.plan.grid.size.z) : 0);
   if (record_.outputs.series)
     series_.emplace(record_.outputs.volume, record_.plan.grid, *record_.input.dicom->headers,
@@ -115,7 +114,6 @@ void Deformation::resample(const Worker& worker) {
   record_.report.clamped += mass_.saturated;
   move_structures(*backend.resampler, outside);
   resample_onto_own_grids(worker);
-  record_.input_sha256 = input_hash.get();
   record_.stages.emplace_back("resample", stage.seconds());
   if (reports_quality(options_)) check(*backend.resampler);
 }
@@ -202,6 +200,7 @@ void Deformation::write_slices(const Region& slices) {
 }
 
 void Deformation::write() {
+  record_.input_sha256 = input_hash_.valid() ? input_hash_.get() : record_.input.dicom->sha256;
   record_.outputs.set.write([&] { write_files(); });
 }
 

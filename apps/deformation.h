@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <future>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,7 +21,8 @@ class Deformation {
   /// Reads headers, and plans. @throws what plan_deformation throws
   void open();
   void read();
-  /// Reads, evaluates or simulates the field. @param worker  of a simulation
+  /// Reads, evaluates or simulates the field, and makes room for what comes out: all that needs no device, unless one
+  /// simulates. @param worker  of a simulation
   void make_field(const Worker& worker);
   /// Resamples all that goes through the field; maps and the slices of a series are written meanwhile. Then looks at
   /// what the field is like, where the report says so.
@@ -60,6 +62,7 @@ class Deformation {
   } mass_;  ///< with --preserve mass: in float
   std::vector<SliceRange> sampled_slices_;
   std::optional<DerivedSeriesWriter> series_;
+  std::future<std::string> input_hash_;  ///< of a file; the last member: ends before what it refers to
 };
 
 }  // namespace tetwarp::apps

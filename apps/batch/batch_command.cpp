@@ -41,6 +41,7 @@ class Batch {
   void find_finished(OutputFolder& folder, Results& results);
   int conclude(const Results& results, Progress& progress, const Usage& usage, bool whole) const;
   std::vector<std::string> ids() const;
+  std::size_t jobs_of(const Devices& devices, bool cuda) const;
   Progress::Form form() const;
   std::uint64_t memory_bytes() const { return options_.memory_bytes.value_or(available_memory_bytes() / 5 * 4); }
 
@@ -108,6 +109,13 @@ int Batch::conclude(const Results& results, Progress& progress, const Usage& usa
   return tally.failed > 0 ? kSomeFailed : 0;
 }
 
+/// While one is resampled others are read and written, which takes longer than a CUDA device needs.
+std::size_t Batch::jobs_of(const Devices& devices, bool cuda) const {
+  const std::size_t usual = cuda ? 4 * devices.count() : 3;
+  const std::size_t wanted = options_.jobs > 0 ? static_cast<std::size_t>(options_.jobs) : usual;
+  return std::max<std::size_t>(1, std::min(wanted, open_.size()));
+}
+
 int Batch::run() {
   choose();
   if (options_.dry_run) {
@@ -132,8 +140,7 @@ int Batch::run() {
   if (options_.backend == "cuda" && cuda == 0) make_backend("cuda", Direction::forward, Geometry(), 0, {});
   MemoryBudget memory(memory_bytes());
   Devices devices(options_.backend, cuda);
-  const std::size_t wanted = options_.jobs > 0 ? static_cast<std::size_t>(options_.jobs) : devices.count() + 2;
-  const std::size_t jobs = std::max<std::size_t>(1, std::min(wanted, open_.size()));
+  const std::size_t jobs = jobs_of(devices, cuda > 0);
   progress.begin(open_.size(), mine_.size() - open_.size());
   if (!scarce.empty()) progress.warn(scarce);
   Usage usage(devices.count(), cuda > 0, jobs);

@@ -98,7 +98,10 @@ CaseOutcome run_case(const BatchCase& of, MemoryBudget& memory, Devices& devices
         retry.device_bytes = kScarceDeviceBytes;
         continue;
       }
-      if (device && !is_memory && devices.lose(*device)) continue;
+      if (device && !is_memory) {
+        devices.lose(*device);
+        continue;
+      }
       if (device && is_memory && of.options.backend == "auto") {
         retry.on_cpu = true;
         continue;

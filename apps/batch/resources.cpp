@@ -64,12 +64,11 @@ Devices::Lease Devices::wait_for(const std::string& wanted, const std::stop_toke
   return {*this, {"cuda", device}};
 }
 
-bool Devices::lose(int device) {
+void Devices::lose(int device) {
   const std::lock_guard lock(mutex_);
-  const bool is_new = lost_.insert(device).second;
+  lost_.insert(device);
   free_.erase(device);
   changed_.notify_all();
-  return is_new;
 }
 
 void Devices::give_back(const Worker& worker) {

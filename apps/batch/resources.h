@@ -65,8 +65,8 @@ class Devices {
   /// Waits for one. @param wanted  what a case asks for: auto takes what the batch was given
   /// @throws DeviceError where CUDA is wanted and no device is left, Cancelled when it has to stop
   Lease wait_for(const std::string& wanted, const std::stop_token& stop);
-  /// A device is used no more. @return false where it was known
-  bool lose(int device);
+  /// A device is given to nobody any more.
+  void lose(int device);
   std::size_t count() const { return count_; }  ///< of those that there were at first, the processor as one
 
  private:
