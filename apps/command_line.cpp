@@ -352,7 +352,7 @@ void add_batch(CLI::App& app, BatchOptions& options) {
                    "8G, 500M: what all cases in work may hold (default: four fifths of what is available)")
       ->transform(CLI::AsSizeValue(true))
       ->type_name("SIZE");
-  command->add_option("--jobs", options.jobs, "Cases in work at once; 0: four for each CUDA device, or three")
+  command->add_option("--jobs", options.jobs, "Cases in work at once; 0: eight for each CUDA device, or three")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command

@@ -1,6 +1,7 @@
 """What `tetwarp batch` makes of devices and processors: cases a minute, with one device and with several, beside what device and files take alone.
 
     measure_batch.py TETWARP FOLDER [--cases 24] [--size 512,512,300] [--devices 1,2] [--jobs 0] [--rounds 3] [--backend cuda]
+                     [--scenario FILE]
 
 FOLDER on a disk measures with files; on a memory file system (/dev/shm) with data in memory. Each source is another phantom. Rounds take turns.
 Prints a table of Markdown, of medians.
@@ -16,7 +17,10 @@ import time
 
 
 def run(arguments, **more):
-    return subprocess.run(list(map(str, arguments)), check=True, **more)
+    done = subprocess.run(list(map(str, arguments)), **more)
+    if done.returncode != 0:
+        raise SystemExit(f"{' '.join(map(str, arguments))}: status {done.returncode}\n{done.stderr or ''}")
+    return done
 
 
 def copy_seconds(folder, sources, outputs):
@@ -46,16 +50,18 @@ def main():
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--backend", default="cuda")
     parser.add_argument("--cell-size", type=int, default=8)
+    parser.add_argument("--scenario", type=pathlib.Path, help="simulate each field on the device, in the place of a formula")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
     sources = [options.folder / f"ct{n}.nii" for n in range(options.sources)]
     for n, source in enumerate(sources):
         if not source.exists():
             run([options.tetwarp, "phantom", "-o", source, "--size", options.size, "--seed", n + 1, "--quiet"])
+    field = {"scenario": str(options.scenario.resolve()), "backend": options.backend} if options.scenario else {
+        "field": "elastic:amplitude=4..12,spacing=60..90", "cell-size": options.cell_size}
     manifest = options.folder / "m.jsonl"
     manifest.write_text("".join(json.dumps({
-        "case": f"c{n:03}", "input": sources[n % len(sources)].name, "field": "elastic:amplitude=4..12,spacing=60..90", "seed": n,
-        "cell-size": options.cell_size, "output": "out.nii"}) + "\n" for n in range(options.cases)))
+        "case": f"c{n:03}", "input": sources[n % len(sources)].name, "seed": n, "output": "out.nii", **field}) + "\n" for n in range(options.cases)))
     found, copies = {}, []
     for _ in range(options.rounds):
         copies.append(copy_seconds(options.folder, sources, options.cases))
@@ -71,15 +77,15 @@ def main():
                            capture_output=True, text=True)
                 wall = time.time() - begun
                 timings = [json.loads(line) for line in (out / "timings.jsonl").read_text().splitlines()]
-                resample = sum(t["resample"] for t in timings) / int(devices)
-                found.setdefault((devices, jobs), []).append((wall, resample, done.stderr.strip().splitlines()[-1]))
+                on_device = sum(t["on_device"] for t in timings) / int(devices)
+                found.setdefault((devices, jobs), []).append((wall, on_device, done.stderr.strip().splitlines()[-1]))
     copy = statistics.median(copies)
     print(f"{options.cases} cases of {options.size} voxels, int16; copying their files alone takes {copy:.2f} s\n")
-    print("| devices | jobs | s | cases a minute | resampling, s a device | slower of copying and resampling / s | bottleneck |")
+    print("| devices | jobs | s | cases a minute | on a device, s | slower of copying and device / s | bottleneck |")
     print("| --- | --- | --- | --- | --- | --- | --- |")
     for (devices, jobs), rounds in found.items():
-        wall, resample, words = sorted(rounds)[len(rounds) // 2]
-        print(f"| {devices} | {jobs} | {wall:.2f} | {60 * options.cases / wall:.1f} | {resample:.2f} | {max(copy, resample) / wall:.2f} | "
+        wall, on_device, words = sorted(rounds)[len(rounds) // 2]
+        print(f"| {devices} | {jobs} | {wall:.2f} | {60 * options.cases / wall:.1f} | {on_device:.2f} | {max(copy, on_device) / wall:.2f} | "
               f"{words.removeprefix('bottleneck: ')} |")
 
 

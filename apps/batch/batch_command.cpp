@@ -111,7 +111,8 @@ int Batch::conclude(const Results& results, Progress& progress, const Usage& usa
 
 /// While one is resampled others are read and written, which takes longer than a CUDA device needs.
 std::size_t Batch::jobs_of(const Devices& devices, bool cuda) const {
-  const std::size_t usual = cuda ? 4 * devices.count() : 3;
+  constexpr std::size_t kPerDevice = 8, kOnCpu = 3;
+  const std::size_t usual = cuda ? kPerDevice * devices.count() : kOnCpu;
   const std::size_t wanted = options_.jobs > 0 ? static_cast<std::size_t>(options_.jobs) : usual;
   return std::max<std::size_t>(1, std::min(wanted, open_.size()));
 }

@@ -55,6 +55,7 @@ json attempt(const BatchCase& of, const Retry& retry, MemoryBudget& memory, Devi
   {
     const Devices::Lease lease = devices.wait_for(options.backend, stop);
     timing["wait_device"] = clock.lap();
+    Clock held;
     timing["worker"] = lease.worker().backend;
     if (lease.worker().backend == "cuda") {
       device = lease.worker().device;
@@ -66,6 +67,7 @@ json attempt(const BatchCase& of, const Retry& retry, MemoryBudget& memory, Devi
     }
     deformation.resample(lease.worker());
     timing["resample"] = clock.lap();
+    timing["on_device"] = held.lap();
   }
   deformation.write();
   timing["write"] = clock.lap();

@@ -29,10 +29,25 @@ void Runner::work() {
   ended_.notify_all();
 }
 
+/// Where the system gives fewer threads than there are jobs, those that it gives do the work.
+std::vector<std::jthread> Runner::start(std::size_t jobs) {
+  std::vector<std::jthread> threads;
+  threads.reserve(jobs);
+  while (threads.size() < jobs) {
+    const std::lock_guard lock(mutex_);
+    try {
+      threads.emplace_back([this] { work(); });
+    } catch (const std::system_error& error) {
+      if (threads.empty()) throw Error(std::string("the system gives the batch no thread: ") + error.what());
+      break;
+    }
+    ++working_;
+  }
+  return threads;
+}
+
 bool Runner::run(std::size_t jobs, const std::function<void()>& abandon) {
-  std::vector<std::thread> threads;
-  working_ = jobs;
-  for (std::size_t n = 0; n < jobs; ++n) threads.emplace_back([this] { work(); });
+  std::vector<std::jthread> threads = start(jobs);
   std::optional<std::chrono::steady_clock::time_point> asked;
   {
     std::unique_lock lock(mutex_);
@@ -43,7 +58,7 @@ bool Runner::run(std::size_t jobs, const std::function<void()>& abandon) {
       if (std::chrono::steady_clock::now() - *asked > kPatience) abandon();
     }
   }
-  for (std::thread& thread : threads) thread.join();
+  threads.clear();
   if (failure_) std::rethrow_exception(failure_);
   return !interrupt_token().stop_requested();
 }

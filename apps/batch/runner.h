@@ -33,12 +33,12 @@ class Runner {
   bool run(std::size_t jobs, const std::function<void()>& abandon);
 
  private:
+  std::vector<std::jthread> start(std::size_t jobs);
   void work();
 
   std::vector<const BatchCase*> cases_;
   Parts parts_;
   std::atomic<std::size_t> next_ = 0;
-  std::atomic<bool> interrupted_ = false;
   std::exception_ptr failure_;
   std::size_t working_ = 0;
   std::mutex mutex_;

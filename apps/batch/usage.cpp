@@ -13,6 +13,7 @@ namespace {
 using nlohmann::json;
 
 constexpr double kBusy = 0.8;      ///< who is busy for such a share of the time holds the others up
+constexpr const char* kOnDevice = "on_device";  ///< a timing: how long a case held its device, for one stage or several
 constexpr double kWaiting = 0.25;  ///< of the time of all who work, spent waiting for memory
 
 double processor_seconds() {
@@ -52,11 +53,12 @@ double Usage::processor_share() const {
 json Usage::report() const {
   const std::lock_guard lock(mutex_);
   json document = {{"wall_seconds", wall()}, {"jobs", jobs_}, {"processor", processor_share()}};
-  for (const auto& [stage, seconds] : seconds_)
-    document["stages"][stage] = seconds / (static_cast<double>(jobs_) * wall());
-  const auto resample = seconds_.find("resample");
-  if (cuda_ && resample != seconds_.end())
-    document["devices"] = resample->second / (static_cast<double>(devices_) * wall());
+  for (const auto& [stage, seconds] : seconds_) {
+    if (stage != kOnDevice) document["stages"][stage] = seconds / (static_cast<double>(jobs_) * wall());
+  }
+  const auto on_device = seconds_.find(kOnDevice);
+  if (cuda_ && on_device != seconds_.end())
+    document["devices"] = on_device->second / (static_cast<double>(devices_) * wall());
   return document;
 }
 
@@ -74,7 +76,7 @@ std::string Usage::sentence() const {
   else if (memory >= kWaiting)
     what = "memory: more cases at once would need more of it (--memory)";
   std::string text = std::string("bottleneck: ") + what + " (processor busy " + percent(processor);
-  if (cuda_) text += ", resampling on CUDA " + percent(devices);
+  if (cuda_) text += ", CUDA " + percent(devices);
   for (const char* stage : {"read", "field", "resample", "write", "commit", "wait_memory", "wait_device"}) {
     if (stages.value(stage, 0.0) >= 0.005) text += std::string(", ") + stage + " " + percent(stages[stage]);
   }
