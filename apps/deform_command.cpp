@@ -1,5 +1,4 @@
-#include <future>
-
+#include "apps/beside.h"
 #include "apps/deformation.h"
 #include "cuda/devices.h"
 
@@ -12,7 +11,7 @@ int run_deform(const DeformOptions& options) {
     say(options.common, describe(deformation.record().plan, options, deformation.record().outputs));
     return 0;
   }
-  const auto awake = std::async(std::launch::async, [&] {  // beside reading
+  const auto awake = beside([&] {  // beside reading
     if (means_cuda(options.backend)) wake_cuda_device(options.device);
   });
   const Worker worker{options.backend, options.device};

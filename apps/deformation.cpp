@@ -1,9 +1,9 @@
 #include "apps/deformation.h"
 
 #include <algorithm>
-#include <future>
 #include <nlohmann/json.hpp>
 
+#include "apps/beside.h"
 #include "apps/output_grid.h"
 #include "apps/simulated_field.h"
 #include "cuda/devices.h"
@@ -39,7 +39,7 @@ void Deformation::note_series(const DicomSeries& series) {
 void Deformation::read() {
   Stage stage(options_.common, "read");
   if (!header_->series)  // of a series the reader finds it
-    input_hash_ = std::async(std::launch::async, [this] { return hash_file(options_.input.path); });
+    input_hash_ = beside([this] { return hash_file(options_.input.path); });
   record_.input = read_input(options_.input, *header_, options_.common, stage.control());
   record_.background = options_.background.value_or(record_.input.background);
   record_.outputs.further->read(options_.common, {.stop = interrupt_token()});

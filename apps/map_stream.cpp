@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "apps/beside.h"
+
 namespace tetwarp::apps {
 
 namespace {
@@ -61,7 +63,7 @@ void MapStream::run(const std::function<void(const Region&, const Maps&)>& make)
     const Maps maps = maps_of(slab, number);
     make(slab, maps);
     if (writing_.valid()) writing_.get();
-    writing_ = std::async(std::launch::async, [this, maps] { write(maps); });
+    writing_ = beside([this, maps] { write(maps); });
   }
   writing_.get();
   outputs_.write([&] {

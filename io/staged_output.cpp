@@ -134,7 +134,10 @@ void flush_each(const std::vector<fs::path>& files, const fs::path& target) {
   };
   {
     std::vector<std::jthread> threads;
-    while (threads.size() + 1 < std::min(kMostThreads, files.size())) threads.emplace_back(work);
+    try {
+      while (threads.size() + 1 < std::min(kMostThreads, files.size())) threads.emplace_back(work);
+    } catch (const std::system_error&) {  // fewer threads then
+    }
     work();
   }
   for (const std::exception_ptr& failure : failures) {

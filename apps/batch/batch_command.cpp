@@ -6,6 +6,7 @@
 #include "apps/batch/check.h"
 #include "apps/batch/init.h"
 #include "apps/batch/runner.h"
+#include "apps/batch/threads.h"
 #include "apps/input.h"
 #include "cuda/devices.h"
 #include "io/parallel.h"
@@ -41,7 +42,7 @@ class Batch {
   void find_finished(OutputFolder& folder, Results& results);
   int conclude(const Results& results, Progress& progress, const Usage& usage, bool whole) const;
   std::vector<std::string> ids() const;
-  std::size_t jobs_of(const Devices& devices, bool cuda) const;
+  std::size_t wanted_jobs(const Devices& devices, bool cuda) const;
   Progress::Form form() const;
   std::uint64_t memory_bytes() const { return options_.memory_bytes.value_or(available_memory_bytes() / 5 * 4); }
 
@@ -110,11 +111,11 @@ int Batch::conclude(const Results& results, Progress& progress, const Usage& usa
 }
 
 /// While one is resampled others are read and written, which takes longer than a CUDA device needs.
-std::size_t Batch::jobs_of(const Devices& devices, bool cuda) const {
+std::size_t Batch::wanted_jobs(const Devices& devices, bool cuda) const {
   constexpr std::size_t kPerDevice = 8, kOnCpu = 3;
   const std::size_t usual = cuda ? kPerDevice * devices.count() : kOnCpu;
   const std::size_t wanted = options_.jobs > 0 ? static_cast<std::size_t>(options_.jobs) : usual;
-  return std::max<std::size_t>(1, std::min(wanted, open_.size()));
+  return std::clamp<std::size_t>(mine_.size(), 1, wanted);
 }
 
 int Batch::run() {
@@ -127,6 +128,9 @@ int Batch::run() {
     }
   }
   Progress progress(form());
+  const int cuda = options_.backend == "cpu" ? 0 : cuda_device_count();
+  Devices devices(options_.backend, cuda);
+  const Threads threads(wanted_jobs(devices, cuda > 0));  // before anything else needs threads
   check(progress);
   if (options_.dry_run) {
     say(options_.common, "would run " + std::to_string(mine_.size()) + " cases; outputs of at most " +
@@ -137,13 +141,15 @@ int Batch::run() {
   Results results(folder, ids());
   find_finished(folder, results);
   const std::string scarce = check_space(found_, folder.path());
-  const int cuda = options_.backend == "cpu" ? 0 : cuda_device_count();
   if (options_.backend == "cuda" && cuda == 0) make_backend("cuda", Direction::forward, Geometry(), 0, {});
   MemoryBudget memory(memory_bytes());
-  Devices devices(options_.backend, cuda);
-  const std::size_t jobs = jobs_of(devices, cuda > 0);
+  const std::size_t jobs = std::clamp<std::size_t>(open_.size(), 1, threads.jobs());
   progress.begin(open_.size(), mine_.size() - open_.size());
   if (!scarce.empty()) progress.warn(scarce);
+  if (threads.limit()) {
+    progress.warn("the system gives only " + std::to_string(*threads.limit()) + " threads: " + std::to_string(jobs) +
+                  " cases at once (ulimit -u, or pids.max of the control group)");
+  }
   Usage usage(devices.count(), cuda > 0, jobs);
   Runner runner(open_, {memory, devices, results, progress, usage});
   const bool whole = runner.run(jobs, [&] {

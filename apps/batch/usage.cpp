@@ -12,9 +12,9 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double kBusy = 0.8;      ///< who is busy for such a share of the time holds the others up
+constexpr double kBusy = 0.8;                   ///< who is busy for such a share of the time holds the others up
 constexpr const char* kOnDevice = "on_device";  ///< a timing: how long a case held its device, for one stage or several
-constexpr double kWaiting = 0.25;  ///< of the time of all who work, spent waiting for memory
+constexpr double kWaiting = 0.25;               ///< of the time of all who work, spent waiting for memory
 
 double processor_seconds() {
   rusage usage{};

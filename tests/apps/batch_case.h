@@ -1,9 +1,11 @@
 #pragma once
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
 #include "tests/support/program.h"
@@ -36,6 +38,16 @@ class BatchCase : public testing::Test {
       lines[parsed["case"].get<std::string>()] = parsed;
     }
     return lines;
+  }
+  /// What makes a command that of another user, who may write into the folder; the caller's own where that is not
+  /// root's, whom no permission stops. Nothing where the program lies beyond the other's reach.
+  std::optional<std::string> as_another_user(int id) const {
+    std::filesystem::permissions(scratch_.path(), std::filesystem::perms::all);
+    if (geteuid() != 0) return "";
+    const std::string as_other = "setpriv --reuid=" + std::to_string(id) + " --clear-groups ";
+    const std::string tried = "-c '" + as_other + TETWARP_PROGRAM + " --version'";
+    if (run_program(scratch_.path(), "/bin/sh", tried).status != 0) return std::nullopt;
+    return as_other;
   }
   /// All files below a folder with their bytes; those with times in them left out.
   std::map<std::string, std::string> files_of(const std::string& folder) const {

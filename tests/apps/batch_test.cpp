@@ -204,21 +204,31 @@ TEST_F(Batch, AFileThatCannotBeReadFailsItsCaseAlone) {
              std::string(R"({"case": "x", "input": "hidden.nrrd", "field": "identity"})") + "\n" + kSixCases);
   fs::copy(scratch_ / "ct.nrrd", scratch_ / "hidden.nrrd");
   fs::permissions(scratch_ / "hidden.nrrd", fs::perms::none);
-  fs::permissions(scratch_.path(), fs::perms::all);
-  std::string as_other;
-  if (geteuid() == 0) {  // whom no permission stops
-    if (std::system("setpriv --reuid=65534 true 2> '/dev/null'") != 0) GTEST_SKIP() << "no setpriv to be another user";
-    as_other = "setpriv --reuid=65534 --clear-groups ";
-    if (run_program(scratch_.path(), "/bin/sh", "-c '" + as_other + TETWARP_PROGRAM + " --version'").status != 0)
-      GTEST_SKIP() << "another user cannot run the program where it lies";
-  }
+  const std::optional<std::string> as_other = as_another_user(65534);
+  if (!as_other) GTEST_SKIP() << "another user cannot run the program where it lies";
   const Outcome made =
-      run_program(scratch_.path(), "/bin/sh", "-c '" + as_other + TETWARP_PROGRAM + " batch m.jsonl -o out --quiet'");
+      run_program(scratch_.path(), "/bin/sh", "-c '" + *as_other + TETWARP_PROGRAM + " batch m.jsonl -o out --quiet'");
   EXPECT_EQ(made.status, 3) << made.err;
   const auto lines = lines_of("out/results.jsonl");
   EXPECT_EQ(lines.size(), 7u);
   for (const auto& [id, line] : lines) EXPECT_EQ(line["status"] == "done", id != "x") << line;
   EXPECT_TRUE(says(lines.at("x")["reason"], {"hidden.nrrd"}));
+}
+
+TEST_F(Batch, FewerThreadsThanWantedCostNoCase) {
+  write_file(
+      scratch_ / "m.jsonl",
+      R"({"case": "a", "input": "ct.nrrd", "field": "elastic:amplitude=2,spacing=90", "seed": 1, "variants": 24})"
+      "\n");
+  if (geteuid() != 0) GTEST_SKIP() << "needs a user who has no other processes";
+  const std::optional<std::string> as_other = as_another_user(65533);
+  if (!as_other) GTEST_SKIP() << "another user cannot run the program where it lies";
+  const Outcome made =
+      run_program(scratch_.path(), "/bin/sh",
+                  "-c '" + *as_other + "prlimit --nproc=20 " TETWARP_PROGRAM " batch m.jsonl -o out --jobs 24'");
+  EXPECT_EQ(made.status, 0) << made.err;
+  EXPECT_TRUE(says(made.err, {"the system gives only", "cases at once", "ulimit -u"}));
+  EXPECT_EQ(lines_of("out/results.jsonl").size(), 24u);
 }
 
 TEST_F(Batch, ASignalEndsItWithinFiveSecondsAndResumeContinues) {

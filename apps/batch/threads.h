@@ -1,0 +1,28 @@
+#pragma once
+
+#include <tbb/global_control.h>
+
+#include <cstddef>
+#include <optional>
+
+namespace tetwarp::apps {
+
+/// The threads of a batch, as many as the system gives: a limit of user or control group (`ulimit -u`, pids.max) makes
+/// it work with fewer, and not fail. oneTBB ends the process where it cannot start a thread, so its threads are started
+/// here, while it is known that they are to be had.
+class Threads {
+ public:
+  /// @param jobs  cases at once that are wanted
+  explicit Threads(std::size_t jobs);
+
+  std::size_t jobs() const { return jobs_; }  ///< cases at once that there are threads for
+  /// How many threads the system gives, where that is fewer than wanted.
+  std::optional<std::size_t> limit() const { return limit_; }
+
+ private:
+  std::size_t jobs_;
+  std::optional<std::size_t> limit_;
+  std::optional<tbb::global_control> fewer_workers_;
+};
+
+}  // namespace tetwarp::apps

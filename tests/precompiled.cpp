@@ -1,0 +1,1 @@
+// Only there for what is compiled with it: precompiled.h.
