@@ -136,6 +136,7 @@ TEST_P(Pull, OnWhateverGridTheSamplesLieEachVoxelHasTheBitsOfItsOwnEight) {
   Random random(seed);
   const Geometry output = unit_grid({70, 11, 9});
   constexpr double kInSlack = 1.0 / 8192;  // of a sample
+  std::uint64_t unmapped = 0;  // a coarse field may have no hole
   struct Case {
     double spacing, origin;
   };
@@ -158,8 +159,9 @@ TEST_P(Pull, OnWhateverGridTheSamplesLieEachVoxelHasTheBitsOfItsOwnEight) {
       ASSERT_TRUE(!comes || vector == expected) << of.spacing << ", " << of.origin << ": " << to_string(voxel);
     });
     EXPECT_GT(mapped, 3000u) << of.spacing << ", " << of.origin;
-    EXPECT_LT(mapped, found.inverse_mm.voxels.size()) << of.spacing << ", " << of.origin;
+    unmapped += found.inverse_mm.voxels.size() - mapped;
   }
+  EXPECT_GT(unmapped, 0u);
 }
 
 TEST_P(Pull, OutsideItsGridVoxelsRestOrGetTheBackgroundOrAreRefused) {
