@@ -5,6 +5,7 @@
 #include <tbb/global_control.h>
 
 #include "apps/command_line.h"
+#include "apps/option_groups.h"
 #include "cuda/backend.h"
 #include "deform/version.h"
 
@@ -21,28 +22,8 @@ struct Commands {
   DeformOptions deform;
   SimulateOptions simulate;
   BatchOptions batch;
+  RenderOptions render;
 };
-
-void add_common(CLI::App& command, CommonOptions& common, bool writes) {
-  command.add_option("--threads", common.threads, "Threads; 0 is all")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
-  command.add_flag("--quiet", common.quiet, "Say nothing unless something is wrong");
-  command.add_flag("--verbose", common.verbose, "Say how long each stage takes");
-  if (writes) command.add_flag("--overwrite", common.overwrite, "Replace an output that exists");
-}
-
-void add_series(CLI::App& command, InputOptions& input) {
-  command.add_option("--series", input.series, "Series Instance UID, or the number that `tetwarp info` prints")
-      ->type_name("UID");
-  command.add_flag("--single", input.single, "Read the one DICOM file alone, not its series");
-  command
-      .add_option_function<std::string>(
-          "--uneven", [&input](const std::string& wanted) { input.uneven = wanted == "exact"; },
-          "Slices at uneven distances: refuse them, or take each exactly where it is")
-      ->check(CLI::IsMember({"refuse", "exact"}))
-      ->default_str("refuse");
-}
 
 void add_dicom_form(CLI::App& command, DicomForm& form) {
   const std::map<std::string, DicomEncoding> encodings = {{"explicit", DicomEncoding::uncompressed},
@@ -97,19 +78,6 @@ void add_deidentify(CLI::App& command, DicomForm& form) {
   key->needs(what);
 }
 
-constexpr const char* kInputHelp = "Folder of DICOM files, one DICOM file, or .nii .nii.gz .nrrd .mha";
-constexpr const char* kFieldHelp =
-    "Forward field: a file (.mha .nrrd .nii .nii.gz, .npy:order=zyx|xyz,units=mm|voxel, or .vts .vti .vtr .vtk "
-    "[:displacement=NAME,frame=lps|ras,units=mm|m]), a transform of ITK, "
-    "elastix, plastimatch (.h5 .tfm .txt) or NiftyReg (its B-spline; each vertex x goes to T(x)), a mesh (.msh .vtu "
-    ".vtk, "
-    "the first of several), or identity, "
-    "wave:amplitude=,wavelength=[,phase=,axis=,along=], "
-    "twist:angle=[,axis=], bubble:radius=,strength=[,center=X/Y/Z], bubble-paper:shift=[,center=], "
-    "elastic:amplitude=,spacing=,seed=, translate:by=X/Y/Z; "
-    "mm, "
-    "or voxels with the suffix vox; degrees. Several compose, the first is applied first";
-
 void add_phantom(CLI::App& app, PhantomOptions& options) {
   CLI::App* command = app.add_subcommand("phantom", "Make a CT of a trunk that never was");
   command->add_option("-o,--output", options.output, "A folder (DICOM series), or .nii .nii.gz .nrrd .mha")->required();
@@ -148,15 +116,6 @@ void add_field(CLI::App& app, FieldOptions& options) {
   add_series(*command, options.like);
   add_common(*command, options.common, true);
   command->footer("Example: tetwarp field twist:angle=30 --like ct.nii.gz -o twist.mha --cell-size 4");
-}
-
-void add_backend(CLI::App& command, std::string& backend, int& device,
-                 const char* help = "auto, cuda or cpu: the bits are the same") {
-  command.add_option("--backend", backend, help)->check(CLI::IsMember({"auto", "cuda", "cpu"}))->capture_default_str();
-  command.add_option("--device", device, "CUDA device, as `tetwarp --version` numbers them")
-      ->check(CLI::NonNegativeNumber)
-      ->type_name("N")
-      ->capture_default_str();
 }
 
 void add_invert(CLI::App& app, InvertOptions& options) {
@@ -226,13 +185,7 @@ void add_deform(CLI::App& app, DeformOptions& options) {
       ->add_option("--interpolation", options.interpolation, "linear (default), nearest or cubic; vote for label maps")
       ->transform(CLI::Transformer(interpolations).description(""))
       ->type_name("NAME");
-  const std::map<std::string, Outside> outsides = {
-      {"refuse", Outside::refuse}, {"rest", Outside::rest}, {"background", Outside::background}};
-  command
-      ->add_option("--outside", options.outside,
-                   "A field that does not cover the volume: refuse (default), rest or background")
-      ->transform(CLI::Transformer(outsides).description(""))
-      ->type_name("NAME");
+  add_outside(*command, options.outside);
   command->add_option(
       "--background", options.background,
       "Value where nothing maps (default: DICOM padding value or -1024 HU; else the smallest value present)");
@@ -439,6 +392,7 @@ int run_command_line(int argc, char** argv) {
   add_field(app, commands.field);
   add_invert(app, commands.invert);
   add_simulate(app, commands.simulate);
+  add_render(app, commands.render);
   add_batch(app, commands.batch);
   add_bench(app);
   try {
@@ -450,6 +404,7 @@ int run_command_line(int argc, char** argv) {
   if (app.got_subcommand("info")) return run(run_info, commands.info);
   if (app.got_subcommand("field")) return run(run_field, commands.field);
   if (app.got_subcommand("invert")) return run(run_invert, commands.invert);
+  if (app.got_subcommand("render")) return run(run_render, commands.render);
   if (app.got_subcommand("batch")) return run(run_batch, commands.batch);
   if (app.got_subcommand("simulate")) return run(run_simulate, commands.simulate);
   return run(run_deform, commands.deform);

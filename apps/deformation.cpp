@@ -7,7 +7,6 @@
 #include "apps/output_grid.h"
 #include "apps/simulated_field.h"
 #include "cuda/devices.h"
-#include "deform/fields/formula.h"
 #include "deform/fields/lattice_mesh.h"
 #include "deform/mass.h"
 #include "io/dicom_bids.h"
@@ -263,14 +262,8 @@ void Deformation::write_preview_picture() {
 
 /// What the preview says above the pictures: the fields by name, files without their folders.
 std::string Deformation::title() const {
-  if (!options_.pull_field.empty()) return "pull field " + field_source(options_.pull_field).path.filename().string();
   if (!options_.scenario.empty()) return "simulated " + options_.scenario.filename().string();
-  std::string text;
-  for (const std::string& field : options_.fields) {
-    text +=
-        (text.empty() ? "" : ", then ") + (is_formula(field) ? field : field_source(field).path.filename().string());
-  }
-  return text;
+  return title_of_fields(options_.fields, options_.pull_field);
 }
 
 std::vector<std::string> Deformation::notes() const {

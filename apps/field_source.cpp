@@ -141,6 +141,16 @@ void check_fields(const std::vector<std::string>& fields, std::optional<std::int
     throw UsageError("--cell-size is for formulas and transforms, " + fields.front() + " has its own vertices");
 }
 
+std::string title_of_fields(const std::vector<std::string>& fields, const std::string& pull_field) {
+  if (!pull_field.empty()) return "pull field " + field_source(pull_field).path.filename().string();
+  std::string text;
+  for (const std::string& field : fields) {
+    text +=
+        (text.empty() ? "" : ", then ") + (is_formula(field) ? field : field_source(field).path.filename().string());
+  }
+  return text;
+}
+
 std::vector<std::filesystem::path> field_files(const std::vector<std::string>& fields) {
   std::vector<std::filesystem::path> files;
   for (const std::string& text : fields) {

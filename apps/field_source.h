@@ -59,6 +59,9 @@ ForwardField read_forward_field(const std::vector<std::string>& fields, const Ge
 /// Checks texts and files' names without reading vectors: for a command that fails early. @throws as above
 void check_fields(const std::vector<std::string>& fields, std::optional<std::int64_t> cell_size);
 
+/// Fields by name, files without their folders: "wave:amplitude=8, then twist.mha".
+std::string title_of_fields(const std::vector<std::string>& fields, const std::string& pull_field);
+
 /// Those of the fields that are files.
 std::vector<std::filesystem::path> field_files(const std::vector<std::string>& fields);
 

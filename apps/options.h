@@ -124,6 +124,32 @@ struct BatchOptions {
   std::string backend = "auto";
 };
 
+struct RenderOptions {
+  CommonOptions common;
+  InputOptions input;
+  std::vector<std::string> fields;    ///< that deform the volume, the first applied first
+  std::string pull_field;             ///< instead: a field that maps output to input
+  std::vector<std::string> sequence;  ///< instead: field files, one a picture
+  std::optional<std::int64_t> cell_size;
+  Outside outside = Outside::refuse;
+  std::optional<double> fill;    ///< value where nothing maps
+  std::filesystem::path output;  ///< .png; of several pictures with numbers; or .mp4 .gif
+  std::string backend = "auto";
+  int device = 0;               ///< of CUDA
+  std::string view = "volume";  ///< volume, axial, coronal, sagittal or montage
+  std::string transfer;         ///< a name, or a JSON file; empty: ct-bone for values like HU, else mip
+  double angle = 0, elevation = 0, zoom = 1;
+  std::vector<int> size{768, 768};
+  std::optional<double> step;  ///< voxels
+  std::string background = "#000000";
+  std::optional<double> window, level;
+  std::vector<double> position;  ///< LPS mm that slices go through; empty: the middle
+  std::vector<std::string> overlays;
+  bool plain = false;
+  int turntable = 0, frames = 0;  ///< pictures
+  double rate = 12;               ///< of them a second, in .mp4 and .gif
+};
+
 /// Parses the command line and runs the subcommand. @return the exit status (README has the table)
 int run_command_line(int argc, char** argv);
 
@@ -134,6 +160,7 @@ int run_invert(const InvertOptions& options);
 int run_deform(const DeformOptions& options);
 int run_simulate(const SimulateOptions& options);
 int run_batch(const BatchOptions& options);
+int run_render(const RenderOptions& options);
 
 /// Becomes the program tetwarp-bench that lies beside this one; returns only by an exception.
 /// @param arguments  given to it as they are

@@ -127,6 +127,16 @@ fs::path bids_sidecar_of(const fs::path& output) {
   return stem.replace_extension(".json");
 }
 
+std::filesystem::path frame_path(const std::filesystem::path& output, int number, int most) {
+  const std::string name = output.filename().string();
+  std::string suffix = output.extension().string();
+  if (suffix.size() == 3 && (suffix[1] == 'g' || suffix[1] == 'G'))
+    suffix = output.stem().extension().string() + suffix;  // .nii.gz
+  std::string digits = std::to_string(number);
+  digits.insert(0, std::max<std::size_t>(4, std::to_string(most).size()) - digits.size(), '0');
+  return output.parent_path() / (name.substr(0, name.size() - suffix.size()) + "." + digits + suffix);
+}
+
 void write_json(const fs::path& path, const nlohmann::json& document) {
   std::ofstream file(path, std::ios::binary | std::ios::trunc);
   file << document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << "\n";

@@ -55,6 +55,10 @@ std::filesystem::path sidecar_of(const std::filesystem::path& output);
 /// STEM.json beside STEM.nii or STEM.nii.gz; empty beside anything else.
 std::filesystem::path bids_sidecar_of(const std::filesystem::path& output);
 
+/// Where the Nth of several outputs goes: OUTPUT with the number before its suffix, `field.0020.nii.gz`.
+/// @param most  the highest number, whose digits all of them have, at least four
+std::filesystem::path frame_path(const std::filesystem::path& output, int number, int most);
+
 /// @throws Error when it cannot be written whole
 void write_json(const std::filesystem::path& path, const nlohmann::json& document);
 

@@ -19,17 +19,6 @@ namespace {
 using namespace simulate;
 namespace fs = std::filesystem;
 
-/// Where the frame's field goes: FIELD with the number before its suffix, `field.0020.nii.gz`.
-fs::path frame_path(const fs::path& output, int number, int frames) {
-  const std::string name = output.filename().string();
-  std::string suffix = output.extension().string();
-  if (suffix.size() == 3 && (suffix[1] == 'g' || suffix[1] == 'G'))
-    suffix = output.stem().extension().string() + suffix;  // .nii.gz
-  std::string digits = std::to_string(number);
-  digits.insert(0, std::max<std::size_t>(4, std::to_string(frames).size()) - digits.size(), '0');
-  return output.parent_path() / (name.substr(0, name.size() - suffix.size()) + "." + digits + suffix);
-}
-
 /// The outputs of the command, before they have their names.
 struct Outputs {
   OutputSet set;

@@ -18,6 +18,11 @@ Backend make_backend(const std::string& wanted, Direction direction, const Geome
   return {"cpu", pull ? make_cpu_pull_resampler(output, limits) : make_cpu_resampler(output, limits)};
 }
 
+NamedRenderer make_renderer(const std::string& wanted, int device, const Limits& limits) {
+  if (means_cuda(wanted)) return {"cuda", make_cuda_renderer(device, limits)};
+  return {"cpu", make_cpu_renderer(limits)};
+}
+
 std::vector<std::string> describe_backends() {
   std::vector<std::string> lines = {"cpu: usable, " + std::to_string(std::thread::hardware_concurrency()) + " threads"};
   if (!has_cuda()) lines.emplace_back("cuda: not in this build");

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "deform/resampler.h"
+#include "deform/render/renderer.h"
 
 namespace tetwarp {
 
@@ -22,6 +22,13 @@ bool means_cuda(const std::string& wanted);
 /// @throws NotCompiled for a backend that this build does not have, DeviceError for one that does not work here
 Backend make_backend(const std::string& wanted, Direction direction, const Geometry& output, int device,
                      const Limits& limits);
+
+struct NamedRenderer {
+  std::string name;  ///< of the backend that runs: never "auto"
+  std::unique_ptr<Renderer> renderer;
+};
+/// @throws as `make_backend`
+NamedRenderer make_renderer(const std::string& wanted, int device, const Limits& limits);
 
 /// One line a backend: its name, and whether it can be used on this machine.
 std::vector<std::string> describe_backends();

@@ -1,4 +1,5 @@
 #include "cuda/devices.h"
+#include "deform/render/renderer.h"
 #include "deform/resampler.h"
 #include "deform/simulate/chainmail.h"
 #include "deform/simulate/mass_spring.h"
@@ -24,6 +25,8 @@ std::string describe_cuda_device(int) { not_compiled(); }
 std::unique_ptr<Resampler> make_cuda_resampler(Geometry, int, Limits) { not_compiled(); }
 
 std::unique_ptr<Resampler> make_cuda_pull_resampler(Geometry, int, Limits) { not_compiled(); }
+
+std::unique_ptr<Renderer> make_cuda_renderer(int, Limits) { not_compiled(); }
 
 namespace simulate {
 

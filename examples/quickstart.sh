@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installs what is missing (Debian 12), builds Tetwarp, and deforms the built-in phantom: DICOM in, DICOM and NIfTI out.
+# Installs what is missing (Debian 12), builds Tetwarp, and deforms the built-in phantom: DICOM in, DICOM, NIfTI and pictures out.
 # Safe to run again. CUDA is used where nvcc is found.
 #
 #   examples/quickstart.sh [OUTPUT_FOLDER]     default: ./first-light
@@ -45,12 +45,14 @@ mkdir -p "$out"
   -o "$out/deformed_dicom" --preview "$out/preview.png" --report "$out/report.json" --overwrite
 "$tetwarp" deform "$out/phantom_dicom" -f wave:amplitude=8,wavelength=96 -f bubble:radius=90,strength=0.6 \
   -o "$out/deformed.nii.gz" --overwrite
+"$tetwarp" render "$out/deformed_dicom" -o "$out/bones.png" --angle 25 --overwrite
 
 cat <<END
 
 The DICOM series:  $out/deformed_dicom
 The NIfTI file:    $out/deformed.nii.gz
 A picture of both: $out/preview.png
+Bones, deformed:   $out/bones.png
 What happened:     $out/report.json
 The program:       $tetwarp
 END

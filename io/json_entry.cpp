@@ -57,8 +57,7 @@ std::string NumberRange::text() const {
 }
 
 void JsonEntry::refuse(const std::string& what) const {
-  throw InputError(*file_ + ":" + std::to_string(line()) + ": " + (path_.empty() ? "the scenario" : path_) + " " +
-                   what);
+  throw InputError(*file_ + ":" + std::to_string(line()) + ": " + (path_.empty() ? whole_ : path_) + " " + what);
 }
 
 void JsonEntry::expect(JsonTree::Kind kind, const std::string& expected) const {
@@ -120,7 +119,7 @@ std::vector<JsonEntry> JsonEntry::items(std::size_t fewest, std::size_t most) co
   }
   std::vector<JsonEntry> result;
   for (std::size_t n = 0; n < tree_->items.size(); ++n)
-    result.emplace_back(tree_->items[n], path_ + "[" + std::to_string(n) + "]", *file_);
+    result.emplace_back(tree_->items[n], path_ + "[" + std::to_string(n) + "]", *file_, whole_);
   return result;
 }
 
@@ -144,7 +143,7 @@ JsonEntry JsonEntry::at(const char* key) const {
   expect(JsonTree::Kind::object, "an object");
   const JsonTree* member = find(*tree_, key);
   if (member == nullptr) refuse(std::string("has no \"") + key + "\"");
-  return {*member, path_.empty() ? key : path_ + "." + key, *file_};
+  return {*member, path_.empty() ? key : path_ + "." + key, *file_, whole_};
 }
 
 std::size_t JsonEntry::one_of(std::span<const char* const> keys) const {

@@ -26,8 +26,9 @@ struct NumberRange {
 /// kind.
 class JsonEntry {
  public:
-  JsonEntry(const JsonTree& tree, std::string path, const std::string& file)
-      : tree_(&tree), file_(&file), path_(std::move(path)) {}
+  /// @param whole  what the document is called: "the scenario"
+  JsonEntry(const JsonTree& tree, std::string path, const std::string& file, const char* whole)
+      : tree_(&tree), file_(&file), path_(std::move(path)), whole_(whole) {}
 
   /// "FILE:LINE: NAME WHAT"
   [[noreturn]] void refuse(const std::string& what) const;
@@ -59,6 +60,7 @@ class JsonEntry {
   const JsonTree* tree_;
   const std::string* file_;
   std::string path_;
+  const char* whole_;
 };
 
 }  // namespace tetwarp

@@ -1,6 +1,7 @@
 #include "io/json_tree.h"
 
 #include <algorithm>
+#include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <tuple>
@@ -11,7 +12,7 @@ namespace tetwarp {
 
 namespace {
 
-constexpr std::size_t kDeepest = 64, kLongestQuote = 120;
+constexpr std::size_t kDeepest = 64, kLongestQuote = 120, kLargestFile = std::size_t{1} << 20;
 
 /// Lines up to the byte that was taken last, and up to the one before it.
 struct LineCount {
@@ -156,6 +157,19 @@ JsonTree parse_json(std::string_view bytes, const std::string& name) {
   const char* const begin = bytes.data();
   nlohmann::json::sax_parse(CountingIterator(begin, &count), CountingIterator(begin + bytes.size(), &count), &builder);
   return builder.take();
+}
+
+JsonTree read_json(const std::filesystem::path& path, const std::string& kind) {
+  require(!std::filesystem::is_directory(path), kind + " is a file, " + path.string() + " is a folder");
+  std::ifstream file(path, std::ios::binary);
+  require(file.good(), "cannot be read, " + path.string());
+  std::string bytes(kLargestFile + 1, '\0');
+  file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  require(!file.bad(), "cannot be read to its end, " + path.string());
+  bytes.resize(static_cast<std::size_t>(file.gcount()));
+  require(bytes.size() <= kLargestFile, "more than " + std::to_string(kLargestFile) + " bytes, " + path.string() +
+                                            "; " + kind + " is a page of JSON");
+  return parse_json(bytes, path.string());
 }
 
 }  // namespace tetwarp

@@ -2,6 +2,7 @@
 
 // Private to io/: JSON that people write, with the line of each part.
 #include <cstddef>
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -33,5 +34,9 @@ std::string printable(std::string_view text);
 /// @throws InputError for what is not JSON, a key that an object has twice, a number beyond doubles, or lists and
 /// objects that lie more than 64 deep in each other
 JsonTree parse_json(std::string_view bytes, const std::string& name);
+
+/// Parses a file of at most 1 MiB. @param kind  what messages call it: "a scenario"
+/// @throws InputError as above, or for a file that cannot be read
+JsonTree read_json(const std::filesystem::path& path, const std::string& kind);
 
 }  // namespace tetwarp

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <vector>
 
 namespace tetwarp {
@@ -17,6 +18,8 @@ class Picture {
   int width() const { return width_; }
   int height() const { return height_; }
   const std::uint8_t* data() const { return bytes_.data(); }
+  /// Red, green and blue of each pixel, rows from the top.
+  std::span<std::uint8_t> bytes() { return bytes_; }
   Colour at(int x, int y) const;
   /// Pixels outside the picture are not drawn.
   void set(int x, int y, Colour colour);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
 
 #include "deform/errors.h"
 #include "io/scenario_parts.h"
@@ -14,23 +13,9 @@ namespace {
 
 using namespace simulate;
 
-constexpr std::size_t kLargestFile = std::size_t{1} << 20;
 constexpr std::size_t kMostEntries = 1000, kMostTissues = 255;
 constexpr std::int64_t kMostFrames = 10000, kLargestCell = 512, kMostSteps = 1000000;
 constexpr NumberRange kModulus{1e-6, 1e9}, kCompression{0, 1}, kLimit{0, 100};
-
-std::string read_bytes(const std::filesystem::path& path) {
-  require(!std::filesystem::is_directory(path), "a scenario is a file, " + path.string() + " is a folder");
-  std::ifstream file(path, std::ios::binary);
-  require(file.good(), "cannot be read, " + path.string());
-  std::string bytes(kLargestFile + 1, '\0');
-  file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  require(!file.bad(), "cannot be read to its end, " + path.string());
-  bytes.resize(static_cast<std::size_t>(file.gcount()));
-  require(bytes.size() <= kLargestFile,
-          "more than " + std::to_string(kLargestFile) + " bytes, " + path.string() + "; a scenario is a page of JSON");
-  return bytes;
-}
 
 /// `move[1] "left lip" (line 14)`: what messages call an entry when the file is read.
 std::string called(const JsonEntry& entry) {
@@ -203,9 +188,9 @@ Scenario read_whole(const JsonEntry& entry) {
 }  // namespace
 
 simulate::Scenario read_scenario(const std::filesystem::path& path) {
-  const std::string bytes = read_bytes(path), name = path.string();
-  const JsonTree tree = parse_json(bytes, name);
-  return read_whole(JsonEntry(tree, "", name));
+  const std::string name = path.string();
+  const JsonTree tree = read_json(path, "a scenario");
+  return read_whole(JsonEntry(tree, "", name, "the scenario"));
 }
 
 }  // namespace tetwarp

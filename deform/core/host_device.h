@@ -17,3 +17,4 @@
 #include <glm/ext/vector_uint4_sized.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
+#include <glm/vec4.hpp>

@@ -1,7 +1,6 @@
 #include "io/preview.h"
 
 #include <gtest/gtest.h>
-#include <png.h>
 
 #include <cmath>
 #include <fstream>
@@ -11,28 +10,13 @@
 #include "deform/phantom.h"
 #include "io/preview_layout.h"
 #include "io/preview_scale.h"
+#include "tests/support/png_picture.h"
 #include "tests/support/scratch.h"
 
 namespace tetwarp {
 namespace {
 
-/// A PNG as libpng reads it.
-Picture read_png(const std::filesystem::path& path) {
-  png_image image = {};
-  image.version = PNG_IMAGE_VERSION;
-  if (!png_image_begin_read_from_file(&image, path.c_str())) throw Error(image.message);
-  image.format = PNG_FORMAT_RGB;
-  std::vector<std::uint8_t> bytes(PNG_IMAGE_SIZE(image));
-  if (!png_image_finish_read(&image, nullptr, bytes.data(), 0, nullptr)) throw Error(image.message);
-  Picture picture(static_cast<int>(image.width), static_cast<int>(image.height));
-  for (int y = 0; y < picture.height(); ++y) {
-    for (int x = 0; x < picture.width(); ++x) {
-      const std::uint8_t* pixel = &bytes[3 * static_cast<std::size_t>(y * picture.width() + x)];
-      picture.set(x, y, {pixel[0], pixel[1], pixel[2]});
-    }
-  }
-  return picture;
-}
+using test::read_png;
 
 std::string bytes_of(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);

@@ -12,8 +12,16 @@ const std::vector<Backend>& backends() {
   const std::string no_cuda =
       !has_cuda() ? "CUDA is not in this build" : (cuda_device_count() == 0 ? "no CUDA device on this machine" : "");
   static const std::vector<Backend> all = {
-      {.name = "cpu", .cannot_run = "", .make = make_cpu_resampler, .make_pull = make_cpu_pull_resampler},
-      {.name = "cuda", .cannot_run = no_cuda, .make = on_cuda, .make_pull = pull_on_cuda},
+      {.name = "cpu",
+       .cannot_run = "",
+       .make = make_cpu_resampler,
+       .make_pull = make_cpu_pull_resampler,
+       .make_renderer = [] { return make_cpu_renderer(); }},
+      {.name = "cuda",
+       .cannot_run = no_cuda,
+       .make = on_cuda,
+       .make_pull = pull_on_cuda,
+       .make_renderer = [] { return make_cuda_renderer(); }},
   };
   return all;
 }

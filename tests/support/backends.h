@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "deform/render/renderer.h"
 #include "deform/resampler.h"
 
 namespace tetwarp::test {
@@ -20,6 +21,7 @@ struct Backend {
   std::string cannot_run;  ///< why it cannot run here; empty: it can
   Make make;               ///< forward fields
   Make make_pull;          ///< pull fields; null: this backend has none
+  std::function<std::unique_ptr<Renderer>()> make_renderer;
 
   friend void PrintTo(const Backend& backend, std::ostream* stream) { *stream << backend.name; }
 };

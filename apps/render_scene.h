@@ -1,0 +1,78 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/field_source.h"
+#include "apps/input.h"
+#include "apps/options.h"
+#include "io/overlay.h"
+#include "io/slice_picture.h"
+
+namespace tetwarp::apps {
+
+/// An overlay as it was asked for: "jacobian", "jacobian=FILE", "lattice=FIELD".
+struct OverlayWish {
+  OverlayKind kind = OverlayKind::coverage;
+  std::string source;  ///< empty: of the field that deforms the volume
+};
+/// @throws UsageError
+OverlayWish overlay_wish(const std::string& text);
+
+/// An overlay with the memory of its map.
+struct OwnedOverlay {
+  Overlay overlay;
+  std::shared_ptr<const AnyVolume> map;
+};
+
+/// The volume that `render` shows, frame by frame as it is deformed: by a field that grows, or by one field after the
+/// other.
+class RenderScene {
+ public:
+  /// Opens what is asked for. @throws as `open_input`
+  explicit RenderScene(const RenderOptions& options);
+  ~RenderScene();
+
+  void read();
+  std::size_t frames() const;
+  /// Deforms the volume as it is in a frame.
+  void show(std::size_t frame);
+
+  const Geometry& grid() const { return grid_; }
+  ConstVolumeView volume() const;  ///< of the frame that is shown
+  bool is_deformed() const { return deforms_; }
+  const VertexField* lattice_field()
+      const;  ///< that moves the volume in this frame; null: there is none with a lattice
+  /// What lies over a part of the volume, in the order of the wishes.
+  std::vector<OwnedOverlay> overlays(const Region& region);
+  /// "wave:amplitude=8, then twist.mha", without folders; empty: nothing deforms.
+  std::string field_title(std::size_t frame) const;
+  const std::string& backend() const { return backend_; }
+  const std::vector<std::string>& notes() const { return notes_; }
+
+ private:
+  void read_fields(const Control& control);
+  void set_frame_field(double amount, const Control& control);
+  OwnedOverlay computed(OverlayKind kind, const Region& region);
+  OwnedOverlay from_file(const OverlayWish& wish, const Region& region);
+
+  const RenderOptions& options_;
+  std::vector<OverlayWish> wishes_;
+  InputHeader header_;
+  InputVolume input_;
+  Geometry grid_;
+  bool deforms_ = false;
+  AnyField field_;           ///< whole
+  VertexField frame_field_;  ///< of the frame
+  PullField frame_pull_;
+  VertexField drawn_lattice_;  ///< of `lattice=FIELD`
+  AnyVolume output_;
+  std::unique_ptr<Resampler> resampler_, lattice_resampler_;
+  std::vector<std::shared_ptr<const AnyVolume>> files_;  ///< of the wishes; null where there is none
+  std::string backend_;
+  std::vector<std::string> notes_;
+};
+
+}  // namespace tetwarp::apps

@@ -1,0 +1,242 @@
+#include <memory>
+
+#include "cuda/device_buffer.h"
+#include "cuda/host_copies.h"
+#include "cuda/pointer_check.h"
+#include "deform/render/ray_blocks.h"
+#include "deform/render/ray_frame.h"
+
+namespace tetwarp {
+
+namespace cuda_detail {
+
+namespace {
+
+constexpr int kRangeThreads = 128, kDistanceThreads = 256;
+constexpr int kPatchWidth = 8, kPatchHeight = 4;  ///< pixels of a warp: near rays read the same voxels
+constexpr int kPatches = 4;                       ///< of a thread block
+
+__device__ float warp_least(float value) {
+  for (int step = 16; step > 0; step /= 2) value = fminf(value, __shfl_xor_sync(~0u, value, step));
+  return value;
+}
+
+__device__ float warp_most(float value) {
+  for (int step = 16; step > 0; step /= 2) value = fmaxf(value, __shfl_xor_sync(~0u, value, step));
+  return value;
+}
+
+/// A thread block looks at one block of voxels and those around it (`RayReach`).
+template <class V>
+__global__ void range_kernel(const V* voxels, glm::ivec3 size, glm::ivec3 blocks, BlockRange* ranges) {
+  const int number = static_cast<int>(blockIdx.x);
+  const glm::ivec3 block(number % blocks.x, number / blocks.x % blocks.y, number / (blocks.x * blocks.y));
+  const RayReach i(block.x, size.x), j(block.y, size.y), k(block.z, size.z);
+  const int width = i.end - i.begin, height = j.end - j.begin, count = width * height * (k.end - k.begin);
+  float least = INFINITY, most = -INFINITY;
+  for (int n = static_cast<int>(threadIdx.x); n < count; n += kRangeThreads) {
+    const std::int64_t x = i.begin + n % width, y = j.begin + n / width % height, z = k.begin + n / (width * height);
+    const float value = static_cast<float>(voxels[(z * size.y + y) * size.x + x]);
+    least = value < least ? value : least;
+    most = value > most ? value : most;
+  }
+  __shared__ float all_least[kRangeThreads / 32], all_most[kRangeThreads / 32];
+  least = warp_least(least);
+  most = warp_most(most);
+  if (threadIdx.x % 32 == 0) {
+    all_least[threadIdx.x / 32] = least;
+    all_most[threadIdx.x / 32] = most;
+  }
+  __syncthreads();
+  if (threadIdx.x != 0) return;
+  for (int n = 1; n < kRangeThreads / 32; ++n) {
+    least = fminf(least, all_least[n]);
+    most = fmaxf(most, all_most[n]);
+  }
+  ranges[number] = {least, most};
+}
+
+__global__ void empty_kernel(const BlockRange* ranges, int count, RayFrame frame, const int* opaque_before,
+                             std::uint8_t* distances) {
+  const int n = static_cast<int>(blockIdx.x) * kDistanceThreads + static_cast<int>(threadIdx.x);
+  if (n < count) distances[n] = is_empty(ranges[n], frame, opaque_before) ? kFarthestBlock : 0;
+}
+
+/// Each number becomes the least of max(|n - m|, number m) along one axis, as `block_distances` has it.
+__global__ void spread_kernel(const std::uint8_t* from, glm::ivec3 blocks, int axis, std::uint8_t* to) {
+  const int n = static_cast<int>(blockIdx.x) * kDistanceThreads + static_cast<int>(threadIdx.x);
+  if (n >= blocks.x * blocks.y * blocks.z) return;
+  const int stride = axis == 0 ? 1 : axis == 1 ? blocks.x : blocks.x * blocks.y;
+  const int at = n / stride % blocks[axis];
+  int nearest = from[n];
+  for (int apart = 1; apart < nearest; ++apart) {
+    if (at >= apart) nearest = min(nearest, max(apart, static_cast<int>(from[n - apart * stride])));
+    if (at + apart < blocks[axis]) nearest = min(nearest, max(apart, static_cast<int>(from[n + apart * stride])));
+  }
+  to[n] = static_cast<std::uint8_t>(nearest);
+}
+
+template <class V>
+__global__ void ray_kernel(RayScene<V> scene, int width, int height, std::uint8_t* rgb) {
+  const int lane = static_cast<int>(threadIdx.x) % 32, patch = static_cast<int>(threadIdx.x) / 32;
+  const int x = (static_cast<int>(blockIdx.x) * kPatches + patch) * kPatchWidth + lane % kPatchWidth,
+            y = static_cast<int>(blockIdx.y) * kPatchHeight + lane / kPatchWidth;
+  if (x >= width || y >= height) return;
+  const RayColour colour = cast_ray(scene, x, y);
+  std::uint8_t* const pixel = rgb + 3 * (static_cast<std::int64_t>(y) * width + x);
+  pixel[0] = colour.red;
+  pixel[1] = colour.green;
+  pixel[2] = colour.blue;
+}
+
+unsigned blocks_of(int count, int threads) { return static_cast<unsigned>((count + threads - 1) / threads); }
+
+class CudaRenderer final : public Renderer {
+ public:
+  explicit CudaRenderer(int device) : device_(device) {
+    const DeviceScope scope(device_);
+    uploads_ = std::make_unique<Uploads>();
+  }
+  ~CudaRenderer() override {
+    cudaSetDevice(device_);  // what it owns is given back there
+  }
+
+  void set_volume(const ConstVolumeView& volume, const Control& control) override;
+  void set_style(const RenderStyle& style) override {
+    require_valid(style);
+    style_ = style;
+    table_step_ = 0;
+    distances_are_stale_ = true;
+  }
+  void set_tints(const Tints& tints) override;
+  void render(const ViewPlane& plane, std::span<std::uint8_t> rgb, const Control& control) override;
+
+ private:
+  void prepare(const RayFrame& frame, double step, cudaStream_t stream);
+  void find_distances(const RayFrame& frame, const std::vector<TransferEntry>& table, cudaStream_t stream);
+  int block_count() const { return blocks_.x * blocks_.y * blocks_.z; }
+
+  int device_;
+  std::unique_ptr<Uploads> uploads_;
+  Geometry geometry_;
+  ConstVolumeView volume_;  ///< on the device
+  glm::ivec3 blocks_{0};
+  RenderStyle style_;
+  DeviceBuffer<std::byte> voxels_;  ///< of a volume on the host
+  DeviceBuffer<BlockRange> ranges_;
+  DeviceBuffer<std::uint8_t> distances_, other_distances_, tint_numbers_, picture_;
+  DeviceBuffer<TransferEntry> table_, tint_colours_;
+  DeviceBuffer<TransferIntegral> integrals_;
+  TransferIntegral lowest_, highest_;  ///< entries
+  DeviceBuffer<int> opaque_before_;
+  std::vector<TransferEntry> host_table_;
+  const std::uint8_t* tints_ = nullptr;
+  double table_step_ = 0;  ///< mm, that the tables are for
+  bool distances_are_stale_ = true;
+};
+
+void CudaRenderer::set_volume(const ConstVolumeView& volume, const Control& control) {
+  require_renderable(volume);
+  const DeviceScope scope(device_);
+  const auto stream = static_cast<cudaStream_t>(control.stream);
+  require_memory(volume.voxels, volume.memory, "the volume");
+  geometry_ = *volume.geometry;
+  volume_ = volume;
+  volume_.geometry = &geometry_;
+  if (volume.memory == Memory::host) {
+    const std::size_t bytes = static_cast<std::size_t>(voxel_count(geometry_)) * size_bytes(volume.type);
+    uploads_->copy(voxels_.reserve(bytes), volume.voxels, bytes, stream);
+    volume_.voxels = voxels_.data();
+  }
+  blocks_ = ray_blocks(geometry_);
+  ranges_.reserve(static_cast<std::size_t>(block_count()));
+  dispatch(volume.type, [&](auto voxel) {
+    using V = decltype(voxel);
+    range_kernel<<<static_cast<unsigned>(block_count()), kRangeThreads, 0, stream>>>(
+        reinterpret_cast<const V*>(volume_.voxels), glm::ivec3(geometry_.size), blocks_, ranges_.data());
+  });
+  TETWARP_CUDA_TRY(cudaGetLastError());
+  if (volume.memory == Memory::host) TETWARP_CUDA_TRY(cudaStreamSynchronize(stream));
+  volume_.memory = volume.memory;
+  distances_are_stale_ = true;
+  tints_ = nullptr;
+}
+
+void CudaRenderer::set_tints(const Tints& tints) {
+  require_valid(tints, volume_);
+  tints_ = nullptr;
+  if (!tints.numbers.voxels) return;
+  const DeviceScope scope(device_);
+  require_memory(tints.numbers.voxels, tints.numbers.memory, "the tints");
+  tints_ = reinterpret_cast<const std::uint8_t*>(tints.numbers.voxels);
+  if (tints.numbers.memory == Memory::host) {
+    const auto count = static_cast<std::size_t>(voxel_count(geometry_));
+    uploads_->copy(reinterpret_cast<std::byte*>(tint_numbers_.reserve(count)), tints.numbers.voxels, count, nullptr);
+    TETWARP_CUDA_TRY(cudaStreamSynchronize(nullptr));
+    tints_ = tint_numbers_.data();
+  }
+  const std::vector<TransferEntry> colours = tint_table(tints);
+  tint_colours_.upload(colours.data(), colours.size(), nullptr);
+}
+
+void CudaRenderer::find_distances(const RayFrame& frame, const std::vector<TransferEntry>& table, cudaStream_t stream) {
+  const std::vector<int> before = opaque_before(table);
+  opaque_before_.upload(before.data(), before.size(), stream);
+  const unsigned launches = blocks_of(block_count(), kDistanceThreads);
+  const auto count = static_cast<std::size_t>(block_count());
+  std::uint8_t *from = distances_.reserve(count), *to = other_distances_.reserve(count);
+  empty_kernel<<<launches, kDistanceThreads, 0, stream>>>(ranges_.data(), block_count(), frame, opaque_before_.data(),
+                                                          to);
+  spread_kernel<<<launches, kDistanceThreads, 0, stream>>>(to, blocks_, 0, from);
+  spread_kernel<<<launches, kDistanceThreads, 0, stream>>>(from, blocks_, 1, to);
+  spread_kernel<<<launches, kDistanceThreads, 0, stream>>>(to, blocks_, 2, from);
+  TETWARP_CUDA_TRY(cudaGetLastError());
+}
+
+void CudaRenderer::prepare(const RayFrame& frame, double step, cudaStream_t stream) {
+  if (step != table_step_) {
+    host_table_ = transfer_table(style_.transfer, step);
+    TransferIntegrals made = transfer_integrals(style_.transfer, step);
+    lowest_ = made.lowest;
+    highest_ = made.highest;
+    table_.upload(host_table_.data(), host_table_.size(), stream);
+    integrals_.upload(made.before.data(), made.before.size(), stream);
+    table_step_ = step;
+  }
+  if (distances_are_stale_) find_distances(frame, host_table_, stream);
+  distances_are_stale_ = false;
+}
+
+void CudaRenderer::render(const ViewPlane& plane, std::span<std::uint8_t> rgb, const Control& control) {
+  require_ready(volume_, style_, plane, rgb.size());
+  if (control.stop.stop_requested()) throw Cancelled();
+  const DeviceScope scope(device_);
+  const auto stream = static_cast<cudaStream_t>(control.stream);
+  const RayFrame frame = ray_frame(geometry_, style_, plane);
+  prepare(frame, step_mm(geometry_, style_, plane), stream);
+  cudaPointerAttributes found{};
+  TETWARP_CUDA_TRY(cudaPointerGetAttributes(&found, rgb.data()));
+  const bool on_device = found.type == cudaMemoryTypeDevice || found.type == cudaMemoryTypeManaged;
+  std::uint8_t* const pixels = on_device ? rgb.data() : picture_.reserve(rgb.size());
+  const RayTables tables{ranges_.data(), distances_.data(), blocks_, table_.data(),       integrals_.data(),
+                         lowest_,        highest_,          tints_,  tint_colours_.data()};
+  const dim3 grid(blocks_of(plane.width, kPatches * kPatchWidth), blocks_of(plane.height, kPatchHeight));
+  dispatch(volume_.type, [&](auto voxel) {
+    using V = decltype(voxel);
+    const RayScene<V> scene{frame, tables, reinterpret_cast<const V*>(volume_.voxels)};
+    ray_kernel<<<grid, kPatches * 32, 0, stream>>>(scene, plane.width, plane.height, pixels);
+  });
+  TETWARP_CUDA_TRY(cudaGetLastError());
+  if (!on_device) TETWARP_CUDA_TRY(cudaMemcpyAsync(rgb.data(), pixels, rgb.size(), cudaMemcpyDeviceToHost, stream));
+  TETWARP_CUDA_TRY(cudaStreamSynchronize(stream));
+}
+
+}  // namespace
+
+}  // namespace cuda_detail
+
+std::unique_ptr<Renderer> make_cuda_renderer(int device, Limits) {
+  return std::make_unique<cuda_detail::CudaRenderer>(device);
+}
+
+}  // namespace tetwarp

@@ -1,0 +1,392 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "deform/core/host_device.h"
+#include "deform/render/projection.h"
+
+namespace tetwarp {
+
+/// Of one value: its colour, and what one step through it adds to a sum.
+struct TransferEntry {
+  float red = 0, green = 0, blue = 0, opacity = 0;
+};
+/// Of all values below one: the optical depth of a step, added up, and the same times each colour.
+struct TransferIntegral {
+  float red = 0, green = 0, blue = 0, depth = 0;
+};
+constexpr int kTransferEntries = 4096;
+
+/// Blocks of 8 x 8 x 8 voxels, so that rays need not look at what is empty.
+constexpr int kRayBlock = 8;
+/// Least and largest value around a block: of its voxels, one before them and two behind, so that each sample in the
+/// block lies between them, a rounding error beside it too.
+struct BlockRange {
+  float least = 0, most = 0;
+};
+/// Blocks that a ray may leap over at most.
+constexpr int kFarthestBlock = 15;
+
+/// What the rays of a picture need to know, but for the voxels. Positions are continuous indices of the volume.
+struct RayFrame {
+  glm::ivec3 size{0};
+  Projection projection = Projection::composite;
+  float lowest = 0, per_value = 0;                ///< of the table: entry = (value - lowest) * per_value
+  glm::vec3 first{0}, per_column{0}, per_row{0};  ///< where the ray of a pixel begins
+  glm::vec3 step{0}, per_step{0};                 ///< to the next sample, and its inverse (0 where the step is)
+  glm::mat3 to_gradient{1};                       ///< differences along i, j, k to changes a mm in patient space
+  glm::vec3 light{0}, halfway{0};                 ///< unit vectors towards the light, and halfway to the viewer
+  float ambient = 0, diffuse = 0, specular = 0;
+  float full_gradient = 0;  ///< change a mm from which a place is lit as a surface; 0: no light
+  glm::vec3 background{0};
+};
+
+/// Where a backend keeps what rays look up.
+struct RayTables {
+  const BlockRange* ranges = nullptr;       ///< of each block, i fastest
+  const std::uint8_t* distances = nullptr;  ///< blocks to the nearest one that is not empty, the largest along an axis
+  glm::ivec3 blocks{0};
+  const TransferEntry* entries = nullptr;
+  const TransferIntegral* integrals = nullptr;   ///< kTransferEntries + 1
+  TransferIntegral lowest_entry, highest_entry;  ///< what holds for each entry beyond the table's ends
+  const std::uint8_t* tints = nullptr;           ///< of each voxel, i fastest: 0 none; null: nowhere one
+  const TransferEntry* tint_colours = nullptr;   ///< 256: `opacity` of the colour is mixed to what is seen
+};
+
+template <class V>
+struct RayScene : RayFrame, RayTables {
+  const V* voxels = nullptr;  ///< i fastest
+};
+
+/// The entry that a value would have in a table without ends.
+TETWARP_INLINE_HD int endless_entry(const RayFrame& frame, float value) {
+  constexpr float kFar = 4e6f;
+  const float entry = (value - frame.lowest) * frame.per_value + 0.5f;
+  return static_cast<int>(std::floor(entry > -kFar ? (entry < kFar ? entry : kFar) : -kFar));
+}
+
+/// The entry of a value in the table.
+TETWARP_INLINE_HD int transfer_entry(const RayFrame& frame, float value) {
+  const float entry = (value - frame.lowest) * frame.per_value + 0.5f;
+  return entry > 0 ? static_cast<int>(entry < kTransferEntries - 1 ? entry : kTransferEntries - 1) : 0;
+}
+
+namespace ray {
+
+constexpr float kOpaque = 0.998f;  ///< what lies behind is not looked for: half a grey level
+
+/// A ray within the volume, from `enter` to `leave`, in steps from its origin. Its samples lie at the ends and at all
+/// whole steps in between: `begin` to `end`, the last one left out; piece n lies before sample n.
+struct Span {
+  glm::vec3 origin;
+  float enter, leave;
+  int begin, end;
+};
+
+TETWARP_INLINE_HD float smaller(float a, float b) { return a < b ? a : b; }
+TETWARP_INLINE_HD float larger(float a, float b) { return a > b ? a : b; }
+TETWARP_INLINE_HD float clamped(float value, float low, float high) { return smaller(larger(value, low), high); }
+TETWARP_INLINE_HD int at_most(int value, int most) { return value < most ? value : most; }
+TETWARP_INLINE_HD float dot(const glm::vec3& a, const glm::vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+
+/// The part of a ray that lies in the volume, half a voxel around the outermost centres included.
+template <class V>
+TETWARP_INLINE_HD Span span_of(const RayScene<V>& scene, int column, int row) {
+  Span span;
+  span.origin = scene.first + scene.per_column * static_cast<float>(column) + scene.per_row * static_cast<float>(row);
+  float enter = 0, leave = 1e6f;
+  for (int axis = 0; axis < 3; ++axis) {
+    const float low = -0.5f - span.origin[axis], high = static_cast<float>(scene.size[axis]) - 0.5f - span.origin[axis];
+    if (scene.per_step[axis] == 0) {
+      if (low > 0 || high < 0) leave = -1;
+      continue;
+    }
+    const float a = low * scene.per_step[axis], b = high * scene.per_step[axis];
+    enter = larger(enter, smaller(a, b));
+    leave = smaller(leave, larger(a, b));
+  }
+  span.enter = enter;
+  span.leave = leave;
+  span.begin = static_cast<int>(std::ceil(enter));
+  span.end = leave < enter ? span.begin : static_cast<int>(std::ceil(leave)) + 1;
+  return span;
+}
+
+/// Steps from the origin to sample n.
+TETWARP_INLINE_HD float steps_to(const Span& span, int n) {
+  return clamped(static_cast<float>(n), span.enter, span.leave);
+}
+
+/// The eight voxels around a place and what lies between them; beyond the outermost centres theirs.
+template <class V>
+struct Cell {
+  const V* corner;  ///< of least indices
+  glm::vec3 fraction;
+  std::int64_t next[3];    ///< values to the neighbour along an axis; 0 at the end of the volume
+  std::int64_t before[3];  ///< values back to the one before; 0 at its beginning
+  std::int64_t beyond[3];  ///< values to the one after the neighbour, or to the last one
+};
+
+template <class V>
+TETWARP_INLINE_HD Cell<V> cell_at(const RayScene<V>& scene, const glm::vec3& index) {
+  Cell<V> cell;
+  cell.corner = scene.voxels;
+  std::int64_t stride = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int last = scene.size[axis] - 1;
+    const float place = clamped(index[axis], 0, static_cast<float>(last));
+    const int whole = static_cast<int>(place);
+    cell.fraction[axis] = place - static_cast<float>(whole);
+    cell.corner += whole * stride;
+    cell.before[axis] = whole > 0 ? stride : 0;
+    cell.next[axis] = whole < last ? stride : 0;
+    cell.beyond[axis] = whole + 1 < last ? 2 * stride : cell.next[axis];
+    stride *= scene.size[axis];
+  }
+  return cell;
+}
+
+template <class V>
+TETWARP_INLINE_HD float between(const V& a, const V& b, float share) {
+  const float from = static_cast<float>(a);
+  return from + (static_cast<float>(b) - from) * share;
+}
+
+/// Linear between the four corners of a side; `at` gives the value of one.
+template <class At>
+TETWARP_INLINE_HD float over_side(const At& at, std::int64_t right, std::int64_t up, float share_right,
+                                  float share_up) {
+  const float low = at(0) + (at(right) - at(0)) * share_right, high = at(up) + (at(up + right) - at(up)) * share_right;
+  return low + (high - low) * share_up;
+}
+
+/// The value, linear between voxels.
+template <class V>
+TETWARP_INLINE_HD float value_in(const Cell<V>& cell) {
+  const auto along_i = [&](std::int64_t offset) {
+    return between(cell.corner[offset], cell.corner[offset + cell.next[0]], cell.fraction.x);
+  };
+  return over_side(along_i, cell.next[1], cell.next[2], cell.fraction.y, cell.fraction.z);
+}
+
+/// Differences of the values a voxel further and a voxel before along each axis, halved: central differences, linear
+/// between voxels.
+template <class V>
+TETWARP_INLINE_HD glm::vec3 differences_in(const Cell<V>& cell) {
+  glm::vec3 difference;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int right = axis == 0 ? 1 : 0, up = axis == 2 ? 1 : 2;
+    const auto along = [&](std::int64_t offset) {
+      const V* const v = cell.corner + offset;
+      const float here = static_cast<float>(v[cell.next[axis]]) - static_cast<float>(v[-cell.before[axis]]),
+                  there = static_cast<float>(v[cell.beyond[axis]]) - static_cast<float>(v[0]);
+      return here + (there - here) * cell.fraction[axis];
+    };
+    difference[axis] =
+        0.5f * over_side(along, cell.next[right], cell.next[up], cell.fraction[right], cell.fraction[up]);
+  }
+  return difference;
+}
+
+/// The value at a continuous index.
+template <class V>
+TETWARP_INLINE_HD float sample(const RayScene<V>& scene, const glm::vec3& index) {
+  return value_in(cell_at(scene, index));
+}
+
+template <class V>
+TETWARP_INLINE_HD TransferEntry look_up(const RayScene<V>& scene, float value) {
+  return scene.entries[transfer_entry(scene, value)];
+}
+
+/// The block of a sample.
+template <class V>
+TETWARP_INLINE_HD glm::ivec3 block_of(const RayScene<V>& scene, const glm::vec3& index) {
+  glm::ivec3 block;
+  for (int axis = 0; axis < 3; ++axis)
+    block[axis] = at_most(static_cast<int>(larger(index[axis], 0)) / kRayBlock, scene.blocks[axis] - 1);
+  return block;
+}
+
+template <class V>
+TETWARP_INLINE_HD std::int64_t number_of(const RayScene<V>& scene, const glm::ivec3& block) {
+  return (static_cast<std::int64_t>(block.z) * scene.blocks.y + block.y) * scene.blocks.x + block.x;
+}
+
+/// The first sample behind a block and `around` blocks on every side of it.
+template <class V>
+TETWARP_INLINE_HD int behind(const RayScene<V>& scene, const Span& span, int n, const glm::ivec3& block, int around) {
+  float leave = static_cast<float>(span.end);
+  for (int axis = 0; axis < 3; ++axis) {
+    if (scene.per_step[axis] == 0) continue;
+    const int side = scene.per_step[axis] > 0 ? block[axis] + around + 1 : block[axis] - around;
+    leave = smaller(leave, (static_cast<float>(side * kRayBlock) - span.origin[axis]) * scene.per_step[axis]);
+  }
+  const int next = static_cast<int>(std::floor(leave)) + 1;
+  return next > n ? next : n + 1;
+}
+
+/// Blinn's and Phong's light on both sides of a surface; where the value hardly changes there is none, and the colour
+/// stays as it is.
+template <class V>
+TETWARP_INLINE_HD glm::vec3 lit(const RayScene<V>& scene, const glm::vec3& colour, const glm::vec3& index) {
+  const glm::vec3 slope = scene.to_gradient * differences_in(cell_at(scene, index));
+  const float steepness = std::sqrt(dot(slope, slope));
+  if (!(steepness > 0)) return colour;
+  const float towards = std::abs(dot(slope, scene.light)) / steepness;
+  float shine = std::abs(dot(slope, scene.halfway)) / steepness;
+  for (int doubled = 0; doubled < 5; ++doubled) shine *= shine;  // to the power of 32
+  const float surface = smaller(steepness / scene.full_gradient, 1);
+  const float factor = 1 + surface * (scene.ambient + scene.diffuse * towards - 1),
+              added = surface * scene.specular * shine;
+  return {colour.x * factor + added, colour.y * factor + added, colour.z * factor + added};
+}
+
+/// What entries `low` to `high`, both included, add up to; entries beyond the ends are as the first and the last one.
+TETWARP_INLINE_HD TransferIntegral sum_over(const RayTables& tables, int low, int high) {
+  const int end = high + 1, from = low < 0 ? 0 : at_most(low, kTransferEntries),
+            to = end < 0 ? 0 : at_most(end, kTransferEntries);
+  const TransferIntegral &a = tables.integrals[from], &b = tables.integrals[to];
+  TransferIntegral sum{b.red - a.red, b.green - a.green, b.blue - a.blue, b.depth - a.depth};
+  const auto add = [&](const TransferIntegral& entry, int count) {
+    if (count <= 0) return;
+    const float times = static_cast<float>(count);
+    sum.red += entry.red * times;
+    sum.green += entry.green * times;
+    sum.blue += entry.blue * times;
+    sum.depth += entry.depth * times;
+  };
+  add(tables.lowest_entry, at_most(end, 0) - low);
+  add(tables.highest_entry, end - (low > kTransferEntries ? low : kTransferEntries));
+  return sum;
+}
+
+/// exp(-depth) to 1e-4, of operations that round alike everywhere.
+TETWARP_INLINE_HD float transmitted(float depth) {
+  const float t = depth * 0.125f;
+  const float e = 1 + t * (1 + t * (0.5f + t * (1.0f / 6 + t * (1.0f / 24))));
+  const float squared = e * e, fourth = squared * squared;
+  return 1 / (fourth * fourth);
+}
+
+/// A colour with the tint of the nearest voxel mixed to it.
+template <class V>
+TETWARP_INLINE_HD glm::vec3 tinted(const RayScene<V>& scene, const glm::vec3& colour, const glm::vec3& index) {
+  std::int64_t voxel = 0;
+  for (int axis = 2; axis >= 0; --axis)
+    voxel = voxel * scene.size[axis] +
+            static_cast<int>(clamped(index[axis], 0, static_cast<float>(scene.size[axis] - 1)) + 0.5f);
+  const std::uint8_t tint = scene.tints[voxel];
+  if (tint == 0) return colour;
+  const TransferEntry& added = scene.tint_colours[tint];
+  return colour + (glm::vec3(added.red, added.green, added.blue) - colour) * added.opacity;
+}
+
+/// Pieces of the ray between two samples: all values between theirs count alike, so that thin layers are not stepped
+/// over (pre-integration without attenuation within a piece, Engel 2001; as differences of integrals, Lum 2004).
+template <class V>
+TETWARP_INLINE_HD glm::vec3 composite(const RayScene<V>& scene, const Span& span) {
+  glm::vec3 colour(0);
+  float through = 1;
+  constexpr int kUnknown = -(1 << 30);
+  int before = kUnknown;  // entry of the sample before
+  for (int n = span.begin; n < span.end;) {
+    const float steps = steps_to(span, n), length = steps - steps_to(span, n - 1);
+    const glm::vec3 index = span.origin + scene.step * steps;
+    const glm::ivec3 block = block_of(scene, index);
+    if (const int empty = scene.distances[number_of(scene, block)]; empty > 0) {
+      n = behind(scene, span, n, block, empty - 1);
+      before = kUnknown;
+      continue;
+    }
+    const glm::vec3 last = span.origin + scene.step * steps_to(span, n - 1);
+    if (before == kUnknown) {
+      const float value = sample(scene, last);
+      if (value == value) before = endless_entry(scene, value);
+    }
+    ++n;
+    const float value = sample(scene, index);
+    const int entry = value == value ? endless_entry(scene, value) : kUnknown;
+    const int low = before < entry ? before : entry, high = before < entry ? entry : before;
+    before = entry;
+    if (low == kUnknown) continue;
+    const TransferIntegral sum = sum_over(scene, low, high);
+    if (!(sum.depth > 0)) continue;
+    glm::vec3 seen = glm::vec3(sum.red, sum.green, sum.blue) * (1 / sum.depth);
+    const glm::vec3 middle = (last + index) * 0.5f;
+    if (scene.tints) seen = tinted(scene, seen, middle);
+    if (scene.full_gradient > 0) seen = lit(scene, seen, middle);
+    const float left = through * transmitted(sum.depth * length / static_cast<float>(high - low + 1));
+    colour = colour + seen * (through - left);
+    through = left;
+    if (through < 1 - kOpaque) break;
+  }
+  return colour + scene.background * through;
+}
+
+template <class V>
+TETWARP_INLINE_HD glm::vec3 maximum(const RayScene<V>& scene, const Span& span) {
+  float most = 0;
+  bool found = false;
+  for (int n = span.begin; n < span.end;) {
+    const glm::vec3 index = span.origin + scene.step * steps_to(span, n);
+    const glm::ivec3 block = block_of(scene, index);
+    if (found && scene.ranges[number_of(scene, block)].most <= most) {
+      n = behind(scene, span, n, block, 0);
+      continue;
+    }
+    ++n;
+    const float value = sample(scene, index);
+    if (value != value || (found && value <= most)) continue;
+    most = value;
+    found = true;
+  }
+  if (!found) return scene.background;
+  const TransferEntry entry = look_up(scene, most);
+  return {entry.red, entry.green, entry.blue};
+}
+
+template <class V>
+TETWARP_INLINE_HD glm::vec3 integral(const RayScene<V>& scene, const Span& span) {
+  float total = 0;
+  for (int n = span.begin; n < span.end;) {
+    const float from = steps_to(span, n - 1), to = steps_to(span, n);
+    const glm::vec3 index = span.origin + scene.step * (0.5f * (from + to));  // the middle of the piece
+    const glm::ivec3 block = block_of(scene, index);
+    if (const int empty = scene.distances[number_of(scene, block)]; empty > 0) {
+      n = behind(scene, span, n, block, empty - 1);
+      continue;
+    }
+    ++n;
+    const float value = sample(scene, index);
+    if (value == value) total += look_up(scene, value).opacity * (to - from);
+  }
+  return scene.background + (glm::vec3(1) - scene.background) * smaller(total, 1);
+}
+
+TETWARP_INLINE_HD std::uint8_t to_byte(float share) {
+  return static_cast<std::uint8_t>(255 * clamped(share, 0, 1) + 0.5f);
+}
+
+}  // namespace ray
+
+/// Colour of one pixel.
+struct RayColour {
+  std::uint8_t red, green, blue;
+};
+
+/// Casts the ray of a pixel. The same bits on every backend: which blocks are leapt over changes none.
+template <class V>
+TETWARP_INLINE_HD RayColour cast_ray(const RayScene<V>& scene, int column, int row) {
+  const ray::Span span = ray::span_of(scene, column, row);
+  glm::vec3 colour;
+  switch (scene.projection) {
+    case Projection::maximum: colour = ray::maximum(scene, span); break;
+    case Projection::sum: colour = ray::integral(scene, span); break;
+    default: colour = ray::composite(scene, span); break;
+  }
+  return {ray::to_byte(colour.x), ray::to_byte(colour.y), ray::to_byte(colour.z)};
+}
+
+}  // namespace tetwarp

@@ -1,0 +1,118 @@
+#include <tbb/parallel_for.h>
+
+#include <atomic>
+
+#include "deform/cpu/tiles.h"
+#include "deform/render/ray_blocks.h"
+#include "deform/render/ray_frame.h"
+
+namespace tetwarp {
+
+namespace {
+
+/// Pixels that one task casts: near rays read the same voxels.
+constexpr int kPatch = 16;
+
+class CpuRenderer final : public Renderer {
+ public:
+  explicit CpuRenderer(Limits limits) : limits_(limits) {}
+
+  void set_volume(const ConstVolumeView& volume, const Control&) override {
+    require_renderable(volume);
+    require(volume.memory == Memory::host, "the CPU cannot render a volume in device memory; use the CUDA renderer");
+    geometry_ = *volume.geometry;
+    volume_ = volume;
+    volume_.geometry = &geometry_;
+    ranges_ = block_ranges(volume_, limits_);
+    distances_.clear();
+    tint_numbers_ = nullptr;
+  }
+
+  void set_style(const RenderStyle& style) override {
+    require_valid(style);
+    style_ = style;
+    table_step_ = 0;
+    distances_.clear();
+  }
+
+  void set_tints(const Tints& tints) override {
+    require_valid(tints, volume_);
+    tint_numbers_ = reinterpret_cast<const std::uint8_t*>(tints.numbers.voxels);
+    tint_colours_ = tint_table(tints);
+  }
+
+  void render(const ViewPlane& plane, std::span<std::uint8_t> rgb, const Control& control) override;
+
+ private:
+  void prepare(const RayFrame& frame, double step);
+  template <class V>
+  void cast_all(const RayScene<V>& scene, const ViewPlane& plane, std::uint8_t* rgb, const Control& control) const;
+
+  Limits limits_;
+  Geometry geometry_;
+  ConstVolumeView volume_;
+  RenderStyle style_;
+  std::vector<BlockRange> ranges_;
+  std::vector<TransferEntry> table_;
+  TransferIntegrals integrals_;
+  std::vector<std::uint8_t> distances_;
+  const std::uint8_t* tint_numbers_ = nullptr;
+  std::vector<TransferEntry> tint_colours_;
+  double table_step_ = 0;  ///< mm, that the tables are for
+};
+
+void CpuRenderer::prepare(const RayFrame& frame, double step) {
+  if (step != table_step_) {
+    table_ = transfer_table(style_.transfer, step);
+    integrals_ = transfer_integrals(style_.transfer, step);
+    table_step_ = step;
+  }
+  if (distances_.empty()) distances_ = block_distances(ranges_, ray_blocks(geometry_), frame, table_);
+}
+
+template <class V>
+void CpuRenderer::cast_all(const RayScene<V>& scene, const ViewPlane& plane, std::uint8_t* rgb,
+                           const Control& control) const {
+  const int columns = (plane.width + kPatch - 1) / kPatch, rows = (plane.height + kPatch - 1) / kPatch;
+  std::atomic<bool> stopped = false;
+  tbb::parallel_for(0, columns * rows, [&](int patch) {
+    if (stopped || control.stop.stop_requested()) {
+      stopped = true;
+      return;
+    }
+    const int left = patch % columns * kPatch, top = patch / columns * kPatch;
+    for (int y = top; y < std::min(top + kPatch, plane.height); ++y) {
+      for (int x = left; x < std::min(left + kPatch, plane.width); ++x) {
+        const RayColour colour = cast_ray(scene, x, y);
+        std::uint8_t* const pixel = rgb + 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(plane.width) +
+                                               static_cast<std::size_t>(x));
+        pixel[0] = colour.red;
+        pixel[1] = colour.green;
+        pixel[2] = colour.blue;
+      }
+    }
+  });
+  if (stopped) throw Cancelled();
+}
+
+void CpuRenderer::render(const ViewPlane& plane, std::span<std::uint8_t> rgb, const Control& control) {
+  require_ready(volume_, style_, plane, rgb.size());
+  const RayFrame frame = ray_frame(geometry_, style_, plane);
+  tbb::task_arena arena = cpu::make_arena(limits_);
+  arena.execute([&] {
+    prepare(frame, step_mm(geometry_, style_, plane));
+    const RayTables tables{ranges_.data(),           distances_.data(), ray_blocks(geometry_), table_.data(),
+                           integrals_.before.data(), integrals_.lowest, integrals_.highest,    tint_numbers_,
+                           tint_colours_.data()};
+    dispatch(volume_.type, [&](auto voxel) {
+      using V = decltype(voxel);
+      cast_all(RayScene<V>{frame, tables, reinterpret_cast<const V*>(volume_.voxels)}, plane, rgb.data(), control);
+    });
+  });
+}
+
+}  // namespace
+
+std::unique_ptr<Renderer> make_cpu_renderer(Limits limits) { return std::make_unique<CpuRenderer>(limits); }
+
+}  // namespace tetwarp

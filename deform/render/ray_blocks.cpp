@@ -1,0 +1,108 @@
+#include "deform/render/ray_blocks.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "deform/cpu/tiles.h"
+
+namespace tetwarp {
+
+namespace {
+
+/// The blocks of one row along i: columns of voxels first, so that whole rows are compared at once.
+template <class V>
+void find_ranges(const V* voxels, const glm::ivec3& size, const glm::ivec3& block, BlockRange* row) {
+  const auto width = static_cast<std::size_t>(size.x);
+  constexpr float kHighest = std::numeric_limits<float>::infinity();
+  std::vector<float> least(width, kHighest), most(width, -kHighest);
+  const RayReach along_j(block.y, size.y), along_k(block.z, size.z);
+  for (int k = along_k.begin; k < along_k.end; ++k) {
+    for (int j = along_j.begin; j < along_j.end; ++j) {
+      const V* const from =
+          voxels +
+          (static_cast<std::size_t>(k) * static_cast<std::size_t>(size.y) + static_cast<std::size_t>(j)) * width;
+      for (std::size_t i = 0; i < width; ++i) {
+        const float value = static_cast<float>(from[i]);
+        least[i] = value < least[i] ? value : least[i];
+        most[i] = value > most[i] ? value : most[i];
+      }
+    }
+  }
+  const int blocks = (size.x + kRayBlock - 1) / kRayBlock;
+  for (int n = 0; n < blocks; ++n) {
+    const RayReach along_i(n, size.x);
+    row[n] = {*std::min_element(least.begin() + along_i.begin, least.begin() + along_i.end),
+              *std::max_element(most.begin() + along_i.begin, most.begin() + along_i.end)};
+  }
+}
+
+/// Each number becomes the least of max(|n - m|, number m), for all m near n along one axis.
+void spread(std::vector<std::uint8_t>& distances, const glm::ivec3& blocks, int axis) {
+  const int count = blocks[axis];
+  const std::size_t stride = axis == 0   ? 1
+                             : axis == 1 ? static_cast<std::size_t>(blocks.x)
+                                         : static_cast<std::size_t>(blocks.x) * static_cast<std::size_t>(blocks.y);
+  const int across = axis == 0 ? 1 : 0, beyond = axis == 2 ? 1 : 2;
+  const auto stride_of = [&](int other) {
+    return other == 0   ? std::size_t{1}
+           : other == 1 ? static_cast<std::size_t>(blocks.x)
+                        : static_cast<std::size_t>(blocks.x) * static_cast<std::size_t>(blocks.y);
+  };
+  tbb::parallel_for(0, blocks[beyond], [&](int b) {
+    std::vector<int> line(static_cast<std::size_t>(count));
+    for (int a = 0; a < blocks[across]; ++a) {
+      std::uint8_t* const first = distances.data() + static_cast<std::size_t>(a) * stride_of(across) +
+                                  static_cast<std::size_t>(b) * stride_of(beyond);
+      for (int n = 0; n < count; ++n) line[static_cast<std::size_t>(n)] = first[static_cast<std::size_t>(n) * stride];
+      for (int n = 0; n < count; ++n) {
+        int nearest = line[static_cast<std::size_t>(n)];
+        for (int apart = 1; apart < nearest; ++apart) {
+          if (n >= apart) nearest = std::min(nearest, std::max(apart, line[static_cast<std::size_t>(n - apart)]));
+          if (n + apart < count)
+            nearest = std::min(nearest, std::max(apart, line[static_cast<std::size_t>(n + apart)]));
+        }
+        first[static_cast<std::size_t>(n) * stride] = static_cast<std::uint8_t>(nearest);
+      }
+    }
+  });
+}
+
+}  // namespace
+
+glm::ivec3 ray_blocks(const Geometry& volume) { return (glm::ivec3(volume.size) + (kRayBlock - 1)) / kRayBlock; }
+
+std::vector<BlockRange> block_ranges(const ConstVolumeView& volume, Limits limits) {
+  const glm::ivec3 size = volume.geometry->size, blocks = ray_blocks(*volume.geometry);
+  const auto width = static_cast<std::size_t>(blocks.x);
+  std::vector<BlockRange> ranges(width * static_cast<std::size_t>(blocks.y) * static_cast<std::size_t>(blocks.z));
+  tbb::task_arena arena = cpu::make_arena(limits);
+  dispatch(volume.type, [&](auto voxel) {
+    const auto* const voxels = reinterpret_cast<const decltype(voxel)*>(volume.voxels);
+    arena.execute([&] {
+      tbb::parallel_for(0, blocks.y * blocks.z, [&](int n) {
+        find_ranges(voxels, size, {0, n % blocks.y, n / blocks.y}, ranges.data() + static_cast<std::size_t>(n) * width);
+      });
+    });
+  });
+  return ranges;
+}
+
+std::vector<int> opaque_before(const std::vector<TransferEntry>& table) {
+  std::vector<int> before(table.size() + 1, 0);
+  for (std::size_t n = 0; n < table.size(); ++n) before[n + 1] = before[n] + (table[n].opacity > 0 ? 1 : 0);
+  return before;
+}
+
+std::vector<std::uint8_t> block_distances(const std::vector<BlockRange>& ranges, const glm::ivec3& blocks,
+                                          const RayFrame& frame, const std::vector<TransferEntry>& table) {
+  const std::vector<int> before = opaque_before(table);
+  std::vector<std::uint8_t> distances(ranges.size());
+  for (std::size_t n = 0; n < ranges.size(); ++n)
+    distances[n] = is_empty(ranges[n], frame, before.data()) ? kFarthestBlock : 0;
+  for (int axis = 0; axis < 3; ++axis) spread(distances, blocks, axis);
+  return distances;
+}
+
+}  // namespace tetwarp

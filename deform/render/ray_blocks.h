@@ -1,0 +1,39 @@
+#pragma once
+
+#include <vector>
+
+#include "deform/core/ray_cast.h"
+#include "deform/resampler.h"
+
+namespace tetwarp {
+
+/// Voxels that block `n` of an axis of so many voxels knows: `BlockRange`.
+struct RayReach {
+  TETWARP_HD RayReach(int n, int size)
+      : begin(n * kRayBlock > 1 ? n * kRayBlock - 1 : 0),
+        end((n + 1) * kRayBlock + 2 < size ? (n + 1) * kRayBlock + 2 : size) {}
+  int begin, end;
+};
+
+/// How many blocks a volume has.
+glm::ivec3 ray_blocks(const Geometry& volume);
+
+/// Least and largest value around each block, i fastest; of values that are no number nothing.
+/// @param volume  `require_renderable`, in host memory
+std::vector<BlockRange> block_ranges(const ConstVolumeView& volume, Limits limits);
+
+/// How many entries below each have opacity: kTransferEntries + 1 numbers, so that two of them tell of all in between.
+std::vector<int> opaque_before(const std::vector<TransferEntry>& table);
+
+/// Whether no value of a block has opacity.
+TETWARP_INLINE_HD bool is_empty(const BlockRange& range, const RayFrame& frame, const int* opaque_before) {
+  if (!(range.least <= range.most)) return true;  // no value is a number
+  return opaque_before[transfer_entry(frame, range.most) + 1] == opaque_before[transfer_entry(frame, range.least)];
+}
+
+/// Of each block the distance to the nearest that is not empty, the largest along an axis, at most kFarthestBlock; 0
+/// for those (distance maps, Deakin and Knoll 2019).
+std::vector<std::uint8_t> block_distances(const std::vector<BlockRange>& ranges, const glm::ivec3& blocks,
+                                          const RayFrame& frame, const std::vector<TransferEntry>& table);
+
+}  // namespace tetwarp

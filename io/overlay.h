@@ -1,0 +1,39 @@
+#pragma once
+
+#include <string>
+
+#include "deform/volume.h"
+#include "io/png.h"
+
+namespace tetwarp {
+
+/// What may lie over a picture of a deformed volume.
+enum class OverlayKind : std::uint8_t {
+  coverage,  ///< where no value came through the field: `Maps::coverage`, u8
+  folds,     ///< where several places map to one: `Maps::owners`, u16
+  jacobian,  ///< how much the volume grew or shrank: `Maps::jacobian`, f32
+  lattice    ///< cells of the deformed lattice: `Maps::inverse_mm`, f32, 3 components
+};
+
+/// A colour, and how much of it is mixed to what lies below, 0 to 1.
+struct Tint {
+  Colour colour = {0, 0, 0};
+  double share = 0;
+};
+
+/// Of a voxel of a map. @param kind  not lattice
+Tint tint_of(OverlayKind kind, double value);
+
+/// What the colours mean, for a legend: "Jacobian: blue 1/2, red 2".
+std::string legend_of(OverlayKind kind);
+
+Colour mixed(const Colour& below, const Tint& tint);
+
+/// An overlay on the grid of a volume; the map holds at least what is shown of it.
+struct Overlay {
+  OverlayKind kind = OverlayKind::coverage;
+  ConstVolumeView map;
+  Geometry lattice = {};  ///< of lattice: its undeformed grid
+};
+
+}  // namespace tetwarp

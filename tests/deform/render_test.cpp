@@ -1,0 +1,515 @@
+#include <gtest/gtest.h>
+
+#include <array>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+#include "tests/support/backends.h"
+#include "tests/support/fields.h"
+
+namespace tetwarp {
+namespace {
+
+using test::oblique_grid;
+using test::Random;
+using test::seed_text;
+using test::test_seed;
+using test::unit_grid;
+
+TETWARP_BACKEND_SUITE(Rendered);
+
+/// Red, green, blue of a picture.
+struct Image {
+  int width = 0;
+  std::vector<std::uint8_t> rgb;
+
+  int grey(int x, int y) const {
+    return rgb[3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x))];
+  }
+  glm::ivec3 at(int x, int y) const {
+    const std::uint8_t* p =
+        rgb.data() + 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x));
+    return {p[0], p[1], p[2]};
+  }
+};
+
+Image render(Renderer& renderer, const ConstVolumeView& volume, const RenderStyle& style, const ViewPlane& plane) {
+  Image image{plane.width, std::vector<std::uint8_t>(3 * static_cast<std::size_t>(plane.width * plane.height))};
+  renderer.set_volume(volume);
+  renderer.set_style(style);
+  renderer.render(plane, image.rgb);
+  return image;
+}
+
+/// White of one opacity for a mm, from `from` on; nothing below. Without light.
+RenderStyle opaque_from(double from, double opacity) {
+  return {
+      .transfer = {
+          .name = "step",
+          .points = {{from - 1, glm::dvec3(1), 0}, {from, glm::dvec3(1), opacity}, {from + 1, glm::dvec3(1), opacity}},
+          .gradient = 0}};
+}
+
+/// The sum of the values for each mm; `white` of them are white.
+RenderStyle summed(double most, double white) {
+  return {.transfer = {.name = "sum",
+                       .projection = Projection::sum,
+                       .points = {{0, glm::dvec3(1), 0}, {most, glm::dvec3(1), most}},
+                       .white = white}};
+}
+
+RenderStyle brightest(double most) {
+  return {.transfer = {.name = "most",
+                       .projection = Projection::maximum,
+                       .points = {{0, glm::dvec3(0), 0}, {most, glm::dvec3(1), 0}}}};
+}
+
+template <class V, class F>
+Volume<V> volume_of(const Geometry& grid, F&& value) {
+  Volume<V> volume{grid, {}};
+  for (std::int64_t k = 0; k < grid.size.z; ++k)
+    for (std::int64_t j = 0; j < grid.size.y; ++j)
+      for (std::int64_t i = 0; i < grid.size.x; ++i)
+        volume.voxels.push_back(static_cast<V>(value(glm::i64vec3(i, j, k))));
+  return volume;
+}
+
+/// Smooth blobs here and there, and much nothing in between.
+Volume<float> blobs(const Geometry& grid, Random& random) {
+  std::vector<glm::dvec4> centres;
+  for (int n = 0; n < 6; ++n) {
+    const glm::dvec3 at = glm::dvec3(random.real(0, 1), random.real(0, 1), random.real(0, 1)) * glm::dvec3(grid.size);
+    centres.emplace_back(at, random.real(2, 7));
+  }
+  return volume_of<float>(grid, [&](const glm::i64vec3& voxel) {
+    double value = 0;
+    for (const glm::dvec4& blob : centres) {
+      const double r = glm::distance(glm::dvec3(voxel), glm::dvec3(blob)) / blob.w;
+      if (r < 1) value += 100 * (1 - r * r) * (1 - r * r);
+    }
+    return value;
+  });
+}
+
+TEST_P(Rendered, ASlabOfKnownOpacityLetsThroughWhatItsThicknessSays) {
+  const auto renderer = GetParam().make_renderer();
+  Geometry grid = unit_grid({24, 40, 24});
+  grid.spacing = {1, 0.7, 1.3};
+  const Volume<std::int16_t> slab =
+      volume_of<std::int16_t>(grid, [](const glm::i64vec3& v) { return v.y >= 10 && v.y < 30 ? 100 : 0; });
+  const ViewPlane plane = view_plane({.width = 48, .height = 48}, grid);
+  for (const double opacity : {0.02, 0.1, 0.4}) {
+    // Half of the step from 0 to 100 lies on either side of the slab's voxel boundaries.
+    const double thickness = 20 * 0.7;
+    for (const double step : {1.0, 0.5, 0.13}) {
+      RenderStyle style = opaque_from(50, opacity);
+      style.step_voxels = step;
+      const double through = std::pow(1 - opacity, thickness);
+      EXPECT_NEAR(render(*renderer, view(slab), style, plane).grey(24, 24), 255 * (1 - through), 1.5)
+          << opacity << ", " << step;
+      style.background = glm::dvec3(1);
+      style.transfer.points[1].colour = style.transfer.points[2].colour = glm::dvec3(0);
+      style.transfer.points[0].colour = glm::dvec3(0);
+      EXPECT_NEAR(render(*renderer, view(slab), style, plane).grey(24, 24), 255 * through, 1.5)
+          << opacity << ", " << step;
+    }
+  }
+}
+
+TEST_P(Rendered, ThroughABallASumIsTheLengthOfTheChord) {
+  const auto renderer = GetParam().make_renderer();
+  const Geometry grid = unit_grid({91, 91, 91});
+  constexpr double kRadius = 40;
+  // At the edge a voxel holds its share of the ball.
+  const Volume<float> ball = volume_of<float>(grid, [&](const glm::i64vec3& v) {
+    return std::clamp(kRadius - glm::distance(glm::dvec3(v), glm::dvec3(45)) + 0.5, 0.0, 1.0);
+  });
+  for (const auto& [angle, elevation] : {std::pair{0.0, 0.0}, {37.0, 0.0}, {-120.0, 55.0}}) {
+    const ViewPlane plane =
+        view_plane({.angle_deg = angle, .elevation_deg = elevation, .width = 101, .height = 101}, grid);
+    const Image image = render(*renderer, view(ball), summed(1, 100), plane);
+    for (int y = 0; y < 101; ++y) {
+      for (int x = 0; x < 101; ++x) {
+        const double r = plane.pixel_mm * glm::length(glm::dvec2(x - 50, y - 50));
+        const double chord = r < kRadius ? 2 * std::sqrt(kRadius * kRadius - r * r) : 0;
+        if (std::abs(r - kRadius) > 1.5) {
+          ASSERT_NEAR(image.grey(x, y), 2.55 * chord, 2.5) << x << ", " << y;
+        }
+      }
+    }
+  }
+}
+
+TEST_P(Rendered, TheSumOfARampIsExact) {
+  const auto renderer = GetParam().make_renderer();
+  const Geometry grid = unit_grid({32, 32, 32});
+  const Volume<float> ramp = volume_of<float>(grid, [](const glm::i64vec3& v) { return static_cast<double>(v.y); });
+  // Half a voxel at both ends has the outermost value: the mean is that of all voxels.
+  const ViewPlane plane = view_plane({.width = 32, .height = 32}, grid);
+  RenderStyle style = summed(31, 1000);
+  style.step_voxels = 0.25;
+  EXPECT_NEAR(render(*renderer, view(ramp), style, plane).grey(16, 16), 255 * (31.0 * 32 / 2) / 1000, 1.2);
+}
+
+TEST_P(Rendered, TheMaximumIsTheLargestVoxelOnTheWay) {
+  const auto renderer = GetParam().make_renderer();
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE(seed_text(seed));
+  Random random(seed);
+  const Geometry grid = unit_grid({16, 30, 16});
+  const Volume<std::uint8_t> noise =
+      volume_of<std::uint8_t>(grid, [&](const glm::i64vec3&) { return random.integer(0, 255); });
+  ViewPlane plane = view_plane({.width = 16, .height = 16}, grid);
+  plane.pixel_mm = 1;  // a ray through the centres of the voxels of a row, and a sample at each
+  RenderStyle style = brightest(255);
+  style.step_voxels = 0.5;
+  const Image image = render(*renderer, view(noise), style, plane);
+  for (int x = 0; x < 16; ++x) {
+    for (int z = 0; z < 16; ++z) {
+      int most = 0;
+      for (int y = 0; y < 30; ++y)
+        most = std::max<int>(most, noise.voxels[static_cast<std::size_t>((z * 30 + y) * 16 + x)]);
+      ASSERT_NEAR(image.grey(x, 15 - z), most, 1) << x << ", " << z;
+    }
+  }
+}
+
+/// The marker of a phantom: a bright block towards the patient's left, front and head.
+TEST_P(Rendered, LeftFrontAndHeadAreWhereTheyBelong) {
+  const auto renderer = GetParam().make_renderer();
+  // The same bodies on grids that run otherwise through them.
+  for (const glm::dmat3& direction :
+       {glm::dmat3(1), glm::dmat3({-1, 0, 0}, {0, -1, 0}, {0, 0, 1}), glm::dmat3({0, 0, 1}, {1, 0, 0}, {0, 1, 0}),
+        glm::dmat3({0, 1, 0}, {0, 0, -1}, {-1, 0, 0}), test::rotation({1, 2, 3}, 0.2)}) {
+    Geometry grid = unit_grid({40, 40, 40});
+    grid.direction = direction;
+    grid.origin = -(direction * glm::dvec3(19.5));
+    const AffineMap point = point_from_index(grid);
+    const Volume<std::int16_t> body = volume_of<std::int16_t>(grid, [&](const glm::i64vec3& v) {
+      return glm::distance(point(glm::dvec3(v)), glm::dvec3(10, -9, 8)) < 4 ? 100 : 0;
+    });
+    struct Expectation {
+      double angle, elevation;
+      glm::dvec2 at;  ///< mm to the right and down from the middle
+    };
+    for (const Expectation& of :
+         {Expectation{0, 0, {10, -8}}, Expectation{90, 0, {-9, -8}}, Expectation{180, 0, {-10, -8}},
+          Expectation{270, 0, {9, -8}}, Expectation{0, 90, {10, 9}}, Expectation{0, -90, {10, -9}}}) {
+      const ViewPlane plane =
+          view_plane({.angle_deg = of.angle, .elevation_deg = of.elevation, .width = 80, .height = 80}, grid);
+      const Image image = render(*renderer, view(body), opaque_from(50, 0.9), plane);
+      glm::dvec2 sum(0);
+      double weight = 0;
+      for (int y = 0; y < 80; ++y) {
+        for (int x = 0; x < 80; ++x) {
+          sum += glm::dvec2(x - 39.5, y - 39.5) * static_cast<double>(image.grey(x, y));
+          weight += image.grey(x, y);
+        }
+      }
+      ASSERT_GT(weight, 0);
+      EXPECT_LT(glm::distance(sum / weight * plane.pixel_mm, of.at), 0.3) << of.angle << ", " << of.elevation;
+    }
+  }
+}
+
+TEST_P(Rendered, WhatIsInTheMiddleOfThePictureIsWhatTheCameraLooksAt) {
+  const auto renderer = GetParam().make_renderer();
+  const Geometry grid = unit_grid({60, 60, 60});
+  const Volume<std::int16_t> body = volume_of<std::int16_t>(
+      grid, [&](const glm::i64vec3& v) { return glm::distance(glm::dvec3(v), glm::dvec3(50, 48, 9)) < 3 ? 100 : 0; });
+  for (const double angle : {0.0, 70.0, 200.0}) {
+    const ViewPlane plane = view_plane({.angle_deg = angle,
+                                        .elevation_deg = 30,
+                                        .zoom = 8,
+                                        .width = 40,
+                                        .height = 40,
+                                        .target = glm::dvec3(50, 48, 9)},
+                                       grid);
+    const Image image = render(*renderer, view(body), opaque_from(50, 0.9), plane);
+    EXPECT_GT(image.grey(20, 20), 250);
+    EXPECT_EQ(image.grey(2, 2), 0);
+  }
+}
+
+/// Emission and absorption by small steps in double, without blocks, tables or integrals.
+double marched(const Volume<float>& volume, const RenderStyle& style, const ViewPlane& plane, int x, int y) {
+  const Geometry& grid = volume.geometry;
+  const AffineMap index = index_from_point(grid);
+  const std::vector<TransferPoint>& points = style.transfer.points;
+  constexpr double kStep = 0.02, kFar = 200;
+  double light = 0, through = 1;
+  for (double along = -kFar; along < kFar; along += kStep) {
+    const glm::dvec3 at = index(plane.at(x + 0.5, y + 0.5) + plane.forward * along);
+    const glm::dvec3 last(grid.size - std::int64_t{1});
+    if (glm::any(glm::lessThan(at, glm::dvec3(-0.5))) || glm::any(glm::greaterThan(at, last + 0.5))) continue;
+    const glm::dvec3 inside = glm::clamp(at, glm::dvec3(0), last), low = glm::min(glm::floor(inside), last - 1.0),
+                     f = inside - low;
+    double value = 0;
+    for (int n = 0; n < 8; ++n) {
+      const glm::i64vec3 v = glm::i64vec3(low) + glm::i64vec3(n & 1, n >> 1 & 1, n >> 2 & 1);
+      value +=
+          static_cast<double>(volume.voxels[static_cast<std::size_t>((v.z * grid.size.y + v.y) * grid.size.x + v.x)]) *
+          (n & 1 ? f.x : 1 - f.x) * (n & 2 ? f.y : 1 - f.y) * (n & 4 ? f.z : 1 - f.z);
+    }
+    std::size_t p = 0;
+    while (p + 2 < points.size() && points[p + 1].value <= value) ++p;
+    const double share = std::clamp((value - points[p].value) / (points[p + 1].value - points[p].value), 0.0, 1.0),
+                 opacity = glm::mix(points[p].opacity, points[p + 1].opacity, share),
+                 stopped = 1 - std::pow(1 - opacity, kStep);
+    light += through * stopped * glm::mix(points[p].colour.x, points[p + 1].colour.x, share);
+    through *= 1 - stopped;
+  }
+  return 255 * (light + through * style.background.x);
+}
+
+TEST_P(Rendered, EqualsSmallStepsWithoutSkipping) {
+  const auto renderer = GetParam().make_renderer();
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE(seed_text(seed));
+  for (std::uint64_t number = 0; number < 4; ++number) {
+    Random random(seed, number);
+    const Geometry grid = number % 2 ? oblique_grid({60, 45, 37}) : unit_grid({50, 70, 41});
+    const Volume<float> volume = blobs(grid, random);
+    RenderStyle style{.transfer = {.name = "test",
+                                   .points = {{8, glm::dvec3(0.2), 0},
+                                              {30, glm::dvec3(0.4), 0.1},
+                                              {60, glm::dvec3(0.9), 0.02},
+                                              {90, glm::dvec3(1), 0.7}},
+                                   .gradient = 0},
+                      .step_voxels = 0.25,
+                      .background = glm::dvec3(0.3)};
+    const ViewPlane plane = view_plane(
+        {.angle_deg = random.real(0, 360), .elevation_deg = random.real(-90, 90), .width = 40, .height = 40}, grid);
+    const Image image = render(*renderer, view(volume), style, plane);
+    double sum = 0;
+    constexpr int kPixels = 120;
+    for (int n = 0; n < kPixels; ++n) {
+      const int x = static_cast<int>(random.integer(0, 39)), y = static_cast<int>(random.integer(0, 39));
+      const double difference = image.grey(x, y) - marched(volume, style, plane, x, y);
+      ASSERT_LT(std::abs(difference), 4) << number << ": " << x << ", " << y;
+      sum += std::abs(difference);
+    }
+    EXPECT_LT(sum / kPixels, 1) << number;
+  }
+}
+
+/// What is leapt over changes no bit: a second volume has something faint in every block.
+TEST_P(Rendered, PicturesDoNotDependOnWhichBlocksAreEmpty) {
+  const auto renderer = GetParam().make_renderer();
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE(seed_text(seed));
+  Random random(seed);
+  const Geometry grid = unit_grid({61, 50, 43});
+  const Volume<float> sparse = blobs(grid, random);
+  RenderStyle style = opaque_from(20, 0.3);
+  style.transfer.gradient = 30;
+  RenderStyle full = style;  // -5 is nowhere, but each block might hold it: none is empty
+  full.transfer.points.insert(full.transfer.points.begin(), {{-10, glm::dvec3(1), 0}, {-5, glm::dvec3(1), 0}});
+  const ViewPlane plane = view_plane({.angle_deg = 25, .elevation_deg = 15, .width = 90, .height = 90}, grid);
+  const Image image = render(*renderer, view(sparse), style, plane);
+  Volume<float> crowded = sparse;
+  // Below all that is seen, in every block, and of the opacity of nothing: the second function sees it, with none.
+  full.transfer.points[1].opacity = 1e-12;
+  for (std::int64_t k = 0; k < grid.size.z; k += 4)
+    for (std::int64_t j = 0; j < grid.size.y; j += 4)
+      for (std::int64_t i = 0; i < grid.size.x; i += 4) {
+        float& value = crowded.voxels[static_cast<std::size_t>((k * grid.size.y + j) * grid.size.x + i)];
+        if (value == 0) value = -5;
+      }
+  const Image other = render(*renderer, view(crowded), full, plane);
+  int different = 0;
+  for (std::size_t n = 0; n < image.rgb.size(); ++n) different += std::abs(image.rgb[n] - other.rgb[n]) > 3;
+  EXPECT_LT(different, static_cast<int>(image.rgb.size() / 100));
+  EXPECT_NE(std::count(image.rgb.begin(), image.rgb.end(), 0), static_cast<std::ptrdiff_t>(image.rgb.size()));
+}
+
+TEST_P(Rendered, HasTheSameBytesOnEveryBackendAndForAnyNumberOfThreads) {
+  const auto renderer = GetParam().make_renderer();
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE(seed_text(seed));
+  Random random(seed);
+  const Geometry grid = oblique_grid({70, 61, 33});
+  const Volume<float> volume = blobs(grid, random);
+  RenderStyle lit = opaque_from(20, 0.3);
+  lit.transfer.gradient = 20;
+  lit.transfer.points[0].colour = {0.9, 0.1, 0.2};
+  for (const RenderStyle& style : {lit, summed(100, 900), brightest(100)}) {
+    const ViewPlane plane = view_plane(
+        {.angle_deg = random.real(0, 360), .elevation_deg = random.real(-80, 80), .width = 130, .height = 97}, grid);
+    const Image image = render(*renderer, view(volume), style, plane);
+    for (const int threads : {1, 2}) {
+      const auto on_cpu = make_cpu_renderer({.threads = threads});
+      EXPECT_EQ(image.rgb, render(*on_cpu, view(volume), style, plane).rgb) << style.transfer.name << ", " << threads;
+    }
+  }
+}
+
+TEST_P(Rendered, VoxelsOfEveryTypeLookAlike) {
+  const auto renderer = GetParam().make_renderer();
+  Random random(5);
+  const Geometry grid = unit_grid({30, 30, 30});
+  Volume<float> smooth = blobs(grid, random);
+  for (float& value : smooth.voxels) value = std::round(value);
+  const ViewPlane plane = view_plane({.angle_deg = 40, .width = 60, .height = 60}, grid);
+  RenderStyle style = opaque_from(20, 0.3);
+  style.transfer.gradient = 20;
+  const Image image = render(*renderer, view(smooth), style, plane);
+  const auto as = [&](auto zero) {
+    using V = decltype(zero);
+    const Volume<V> volume{grid, std::vector<V>(smooth.voxels.begin(), smooth.voxels.end())};
+    EXPECT_EQ(render(*renderer, view(volume), style, plane).rgb, image.rgb) << to_string(voxel_type_of<V>());
+  };
+  as(std::uint8_t{});
+  as(std::int8_t{});
+  as(std::uint16_t{});
+  as(std::int16_t{});
+  as(std::uint32_t{});
+  as(std::int32_t{});
+  as(double{});
+}
+
+TEST_P(Rendered, LightFallsFromTheUpperLeftAndShadesWhatTurnsAway) {
+  const auto renderer = GetParam().make_renderer();
+  const Geometry grid = unit_grid({64, 64, 64});
+  const Volume<float> ball = volume_of<float>(grid, [&](const glm::i64vec3& v) {
+    return 100 * std::clamp(26 - glm::distance(glm::dvec3(v), glm::dvec3(31.5)), 0.0, 2.0) / 2;
+  });
+  RenderStyle style = opaque_from(50, 0.95);
+  style.transfer.points[0].colour = style.transfer.points[1].colour = style.transfer.points[2].colour = glm::dvec3(0.6);
+  style.transfer.gradient = 10;
+  for (const double angle : {0.0, 130.0}) {
+    const ViewPlane plane = view_plane({.angle_deg = angle, .width = 100, .height = 100}, grid);
+    const Image image = render(*renderer, view(ball), style, plane);
+    EXPECT_GT(image.grey(38, 32), image.grey(62, 68) + 20);
+    EXPECT_GT(image.grey(38, 32), image.grey(80, 50) + 40);
+    EXPECT_EQ(image.grey(2, 2), 0);
+  }
+}
+
+TEST_P(Rendered, MoreOpacityHidesMoreOfTheBackground) {
+  const auto renderer = GetParam().make_renderer();
+  Random random(11);
+  const Geometry grid = unit_grid({40, 40, 40});
+  const Volume<float> volume = blobs(grid, random);
+  const ViewPlane plane = view_plane({.width = 50, .height = 50}, grid);
+  std::vector<std::uint8_t> before(3 * 50 * 50, 0);
+  for (const double opacity : {0.01, 0.05, 0.2, 0.6, 0.99}) {
+    const Image image = render(*renderer, view(volume), opaque_from(15, opacity), plane);
+    for (std::size_t n = 0; n < before.size(); ++n) ASSERT_GE(image.rgb[n] + 1, before[n]) << opacity;
+    EXPECT_NE(image.rgb, before);
+    before = image.rgb;
+  }
+}
+
+TEST_P(Rendered, VoxelsThatAreNoNumberAreNotSeen) {
+  const auto renderer = GetParam().make_renderer();
+  const Geometry grid = unit_grid({40, 40, 40});
+  Volume<float> volume = volume_of<float>(grid, [](const glm::i64vec3& v) { return v.x < 20 ? NAN : 100.0; });
+  const ViewPlane plane = view_plane({.width = 40, .height = 40}, grid);
+  for (const RenderStyle& style : {opaque_from(50, 0.9), brightest(100), summed(100, 3000)}) {
+    const Image image = render(*renderer, view(volume), style, plane);
+    EXPECT_EQ(image.grey(8, 20), 0) << style.transfer.name;
+    EXPECT_GT(image.grey(32, 20), 200) << style.transfer.name;
+  }
+}
+
+TEST_P(Rendered, TintsColourTheVoxelsThatHaveThem) {
+  const auto renderer = GetParam().make_renderer();
+  const Geometry grid = unit_grid({40, 40, 40});
+  const Volume<std::int16_t> body =
+      volume_of<std::int16_t>(grid, [](const glm::i64vec3& v) { return v.y > 10 ? 100 : 0; });
+  const Volume<std::uint8_t> numbers =
+      volume_of<std::uint8_t>(grid, [](const glm::i64vec3& v) { return v.x < 20 ? 0 : 3; });
+  const ViewPlane plane = view_plane({.width = 40, .height = 40}, grid);
+  const Image plain = render(*renderer, view(body), opaque_from(50, 0.99), plane);
+  Tints tints{view(numbers), std::vector<glm::vec4>(4)};
+  tints.colours[3] = {1, 0, 0, 0.5};
+  renderer->set_tints(tints);
+  Image tinted = plain;
+  renderer->render(plane, tinted.rgb);
+  EXPECT_EQ(tinted.at(8, 20), plain.at(8, 20));
+  EXPECT_NEAR(tinted.at(32, 20).x, 255, 3);
+  EXPECT_NEAR(tinted.at(32, 20).y, 127, 3);
+  EXPECT_EQ(render(*renderer, view(body), opaque_from(50, 0.99), plane).rgb, plain.rgb);  // a new volume has none
+}
+
+TEST_P(Rendered, AShearedStackStandsAsItIs) {
+  const auto renderer = GetParam().make_renderer();
+  Geometry sheared = unit_grid({40, 40, 40});
+  sheared.direction[2] = glm::normalize(glm::dvec3(0, 0.4, 1));
+  const AffineMap point = point_from_index(sheared);
+  const glm::dvec3 middle = centre(sheared);
+  const Volume<std::int16_t> ball = volume_of<std::int16_t>(
+      sheared, [&](const glm::i64vec3& v) { return glm::distance(point(glm::dvec3(v)), middle) < 12 ? 100 : 0; });
+  for (const auto& [angle, elevation] : {std::pair{0.0, 0.0}, {90.0, 0.0}, {30.0, 60.0}}) {
+    const ViewPlane plane =
+        view_plane({.angle_deg = angle, .elevation_deg = elevation, .width = 80, .height = 80}, sheared);
+    const Image image = render(*renderer, view(ball), opaque_from(50, 0.9), plane);
+    for (int y = 0; y < 80; ++y) {
+      for (int x = 0; x < 80; ++x) {
+        const double r = plane.pixel_mm * glm::length(glm::dvec2(x - 39.5, y - 39.5));
+        if (r < 10.5) {
+          ASSERT_GT(image.grey(x, y), 200) << x << ", " << y;
+        }
+        if (r > 13.5) {
+          ASSERT_EQ(image.grey(x, y), 0) << x << ", " << y;
+        }
+      }
+    }
+  }
+}
+
+TEST_P(Rendered, AVolumeOfOneSliceIsAPicture) {
+  const auto renderer = GetParam().make_renderer();
+  const Volume<std::int16_t> slice =
+      volume_of<std::int16_t>(unit_grid({20, 20, 1}), [](const glm::i64vec3&) { return 100; });
+  const ViewPlane plane = view_plane({.elevation_deg = 90, .width = 20, .height = 20}, slice.geometry);
+  EXPECT_NEAR(render(*renderer, view(slice), opaque_from(50, 0.5), plane).grey(10, 10), 127.5, 1);
+}
+
+TEST_P(Rendered, RefusesWhatItCannotShow) {
+  const auto renderer = GetParam().make_renderer();
+  Volume<std::int16_t> body = volume_of<std::int16_t>(unit_grid({8, 8, 8}), [](const glm::i64vec3&) { return 1; });
+  const ViewPlane plane = view_plane({.width = 20, .height = 20}, body.geometry);
+  std::vector<std::uint8_t> rgb(3 * 20 * 20);
+  EXPECT_THROW(renderer->render(plane, rgb), InputError);  // no volume yet
+  renderer->set_volume(view(std::as_const(body)));
+  EXPECT_THROW(renderer->render(plane, rgb), InputError);  // no style yet
+  renderer->set_style(opaque_from(50, 0.5));
+  EXPECT_NO_THROW(renderer->render(plane, rgb));
+  EXPECT_THROW(renderer->render(plane, std::span(rgb).first(30)), InputError);
+  RenderStyle style = opaque_from(50, 0.5);
+  style.step_voxels = 2;
+  EXPECT_THROW(renderer->set_style(style), InputError);
+  style = opaque_from(50, 0.5);
+  style.background.x = 2;
+  EXPECT_THROW(renderer->set_style(style), InputError);
+  ConstVolumeView part = view(std::as_const(body));
+  part.buffered.end.z = 4;
+  EXPECT_THROW(renderer->set_volume(part), InputError);
+  ConstVolumeView vectors = view(std::as_const(body));
+  vectors.components = 3;
+  EXPECT_THROW(renderer->set_volume(vectors), InputError);
+  body.geometry.slices = {0, 1, 2, 3.5, 4, 5, 6, 7};
+  EXPECT_THROW(renderer->set_volume(view(std::as_const(body))), InputError);
+  const Volume<std::uint8_t> small =
+      volume_of<std::uint8_t>(unit_grid({4, 8, 8}), [](const glm::i64vec3&) { return 1; });
+  EXPECT_THROW(renderer->set_tints({view(small), {}}), InputError);
+}
+
+TEST_P(Rendered, StopsWhenItIsAskedTo) {
+  const auto renderer = GetParam().make_renderer();
+  const Volume<std::int16_t> body =
+      volume_of<std::int16_t>(unit_grid({8, 8, 8}), [](const glm::i64vec3&) { return 1; });
+  const ViewPlane plane = view_plane({.width = 20, .height = 20}, body.geometry);
+  std::vector<std::uint8_t> rgb(3 * 20 * 20);
+  renderer->set_volume(view(body));
+  renderer->set_style(opaque_from(50, 0.5));
+  std::stop_source source;
+  source.request_stop();
+  EXPECT_THROW(renderer->render(plane, rgb, {.stop = source.get_token()}), Cancelled);
+}
+
+}  // namespace
+}  // namespace tetwarp
