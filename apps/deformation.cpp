@@ -246,10 +246,7 @@ void Deformation::write_preview_picture() {
                         after = std::as_const(record_.output).view();
   if (*before.geometry == record_.plan.grid) return write_preview(record_.outputs.preview, before, after, title());
   AnyVolume on_grid(record_.plan.grid, record_.input.volume.type());
-  Geometry corners = record_.plan.grid;  // a pull field of zeros
-  corners.size = glm::i64vec3(2);
-  corners.spacing = record_.plan.grid.spacing * glm::dvec3(record_.plan.grid.size - std::int64_t{1});
-  const PullField none{corners, std::vector<glm::vec3>(8, glm::vec3(0))};
+  const PullField none = resting_pull_field(record_.plan.grid);
   const auto resampler = make_cpu_pull_resampler(record_.plan.grid, {.threads = options_.common.threads});
   resampler->set_field(view(none, Outside::background));
   const Target target{.source = before,

@@ -274,6 +274,13 @@ nlohmann::json place_json(const VertexField& field) {
   return {{"mesh", {{"vertices", field.mesh.rest.size()}, {"tetrahedra", field.mesh.tetrahedra.size()}}}};
 }
 
+PullField resting_pull_field(const Geometry& output) {
+  Geometry corners = output;
+  corners.size = glm::i64vec3(2);
+  corners.spacing = output.spacing * glm::dvec3(output.size - std::int64_t{1});
+  return {corners, std::vector<glm::vec3>(8, glm::vec3(0))};
+}
+
 std::string hash_field(const VertexField& field, int threads) {
   const TetrahedralMesh& mesh = field.mesh;
   if (mesh.is_empty()) return hash_samples(field.lattice, field.displacement, "forward", threads);

@@ -82,6 +82,9 @@ glm::i64vec3 pull_grid_size(const std::string& text, const Geometry& output);
 nlohmann::json to_json(const FieldFileHeader& header);
 nlohmann::json to_json(const std::vector<ReadField>& files);
 
+/// A pull field in which nothing moves: it takes a volume from its own grid onto `output`.
+PullField resting_pull_field(const Geometry& output);
+
 /// SHA-256 of what decides a field, its direction, place and numbers (Sha256::add_blocks), hexadecimal: the same for a
 /// formula and the file it was written to.
 std::string hash_field(const VertexField& field, int threads);

@@ -158,7 +158,7 @@ InputVolume read_input(const InputOptions& options, const InputHeader& header, c
     input.background = smallest_value(input.volume);
     return input;
   }
-  input.dicom = load_dicom(*header.series, common.threads, control);
+  input.dicom = load_dicom(*header.series, common.threads, control, options.hash);
   input.background = input.dicom->padding ? input.dicom->padding->low : kAirHu;
   input.volume = AnyVolume(std::move(input.dicom->volume));
   return input;

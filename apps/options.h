@@ -31,6 +31,7 @@ struct InputOptions {
   std::string series;   ///< UID, or the number that `info` prints; empty: the only one
   bool single = false;  ///< read the one DICOM file alone
   bool uneven = false;  ///< take slices at uneven distances, each where it is
+  FileHash hash = FileHash::made;  ///< of a DICOM series
 };
 
 struct PhantomOptions {

@@ -28,37 +28,6 @@ glm::dvec3 colour_of(const std::string& text) {
 
 std::string degrees(double angle) { return short_number(angle) + " deg"; }
 
-/// A number for each tint of an overlay: what `tint_of` says, in 255 steps of the map's values.
-class TintScale {
- public:
-  explicit TintScale(OverlayKind kind) : kind_(kind) {}
-
-  std::uint8_t number(double value) const {
-    if (tint_of(kind_, value).share <= 0) return 0;
-    if (kind_ != OverlayKind::jacobian) return 1;
-    if (value <= 0) return 255;
-    return static_cast<std::uint8_t>(std::lround(127 + 126 * std::clamp(std::log2(value), -1.0, 1.0)));
-  }
-  std::vector<glm::vec4> colours() const {
-    std::vector<glm::vec4> colours;
-    for (int n = 0; n < 256; ++n) {
-      const Tint tint = tint_of(kind_, value(n));
-      colours.emplace_back(glm::vec3(tint.colour[0], tint.colour[1], tint.colour[2]) / 255.0f,
-                           static_cast<float>(n == 0 ? 0 : tint.share));
-    }
-    return colours;
-  }
-
- private:
-  double value(int number) const {
-    if (kind_ == OverlayKind::coverage) return 0;
-    if (kind_ == OverlayKind::folds) return 2;
-    return number == 255 ? -1 : std::exp2((number - 127) / 126.0);
-  }
-
-  OverlayKind kind_;
-};
-
 /// One run of the command.
 class Rendering {
  public:
@@ -98,7 +67,11 @@ std::vector<fs::path> inputs_of(const RenderOptions& options) {
   for (const fs::path& file : field_files(options.sequence)) inputs.push_back(file);
   if (fs::path(options.transfer).extension() == ".json") inputs.emplace_back(options.transfer);
   for (const std::string& text : options.overlays) {
-    if (const std::string source = overlay_wish(text).source; !source.empty()) inputs.emplace_back(source);
+    const OverlayWish wish = overlay_wish(text);
+    if (wish.source.empty()) continue;
+    if (wish.kind != OverlayKind::lattice) inputs.emplace_back(wish.source);
+    if (wish.kind == OverlayKind::lattice)
+      for (const fs::path& file : field_files({wish.source})) inputs.push_back(file);
   }
   return inputs;
 }

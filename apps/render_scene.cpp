@@ -64,7 +64,8 @@ OverlayWish overlay_wish(const std::string& text) {
   return {found->second, split == std::string::npos ? "" : text.substr(split + 1)};
 }
 
-RenderScene::RenderScene(const RenderOptions& options) : options_(options) {
+RenderScene::RenderScene(const RenderOptions& options) : options_(options), input_options_(options.input) {
+  input_options_.hash = FileHash::left_out;
   deforms_ = !options.fields.empty() || !options.pull_field.empty() || !options.sequence.empty();
   for (const std::string& text : options.overlays) {
     const OverlayWish wish = overlay_wish(text);
@@ -76,7 +77,7 @@ RenderScene::RenderScene(const RenderOptions& options) : options_(options) {
   }
   if (!options.fields.empty()) check_fields(options.fields, options.cell_size);
   if (!options.sequence.empty()) check_fields(options.sequence, {});
-  header_ = open_input(options.input, options.common);
+  header_ = open_input(input_options_, options.common);
   grid_ = straightened(header_.geometry);
 }
 
@@ -90,11 +91,11 @@ std::size_t RenderScene::frames() const {
 void RenderScene::read() {
   {
     Stage stage(options_.common, "read");
-    input_ = read_input(options_.input, header_, options_.common, stage.control());
+    input_ = read_input(input_options_, header_, options_.common, stage.control());
   }
   if (!deforms_ && grid_ != header_.geometry) {  // onto a straight, even grid
-    field_.direction = Direction::forward;
-    field_.forward = read_forward_field({"identity"}, header_.geometry, {}, options_.common, {});
+    field_.direction = Direction::pull;
+    field_.pull = resting_pull_field(grid_);
     notes_.push_back("the slices of VOLUME lean or lie at uneven distances: it is shown resampled onto " +
                      to_string(grid_.size) + " voxels");
     deforms_ = true;

@@ -59,6 +59,7 @@ class RenderScene {
   OwnedOverlay from_file(const OverlayWish& wish, const Region& region);
 
   const RenderOptions& options_;
+  InputOptions input_options_;  ///< without the hash, which nobody asks for
   std::vector<OverlayWish> wishes_;
   InputHeader header_;
   InputVolume input_;

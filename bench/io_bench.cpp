@@ -59,7 +59,8 @@ void add_series_in(Turns& turns, const Scene& scene, int threads) {
     require_same(read_series(series, threads).volume.voxels, scene.volume.voxels, kTetwarp, series);
     require_same(itk_read_series(series)->voxels(), scene.volume.voxels, kItk, series);
     require_same(dcmtk_read_series(series, threads), scene.volume.voxels, kDcmtk, series);
-    turns.add(step, kTetwarp, [=] { return read_series(series, threads); });
+    turns.add(step, kTetwarp, [=] { return read_series(series, threads, FileHash::left_out); });
+    turns.add(step, kHashed, [=] { return read_series(series, threads); });
     turns.add(step, kItk, [=] { return itk_read_series(series); });
     turns.add(step, kDcmtk, [=] { return dcmtk_read_series(series, threads); });
     if (coding != Coding::none) turns.add(step, kDcmtk1, [=] { return dcmtk_read_series(series, 1); });

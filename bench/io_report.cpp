@@ -16,8 +16,8 @@ constexpr char kTimesNote[] = R"(## Times
 
 ms, median (q1-q3), each program in turn; CPU ms of all threads. All files were just written, so they are read from the page cache and written
 to it; only the whole job flushes to the disk, as `tetwarp deform` does. In: list the folder and read it; the loop with
-DCMTK knows the order of the files. tetwarp hashes every file that it reads and every slice that it writes. ITK reads
-and writes series, and NIfTI, in one thread. Whole job: `tetwarp deform` as a program, and its stages alone;
+DCMTK knows the order of the files. "tetwarp, hashed" makes the hash of the files as well, which `deform` records; it hashes every slice that it writes.
+ITK reads and writes series, and NIfTI, in one thread. Whole job: `tetwarp deform` as a program, and its stages alone;
 deform alone hashes the field, as the program does. The program writes slices while others are deformed.
 CUDA, awake: the whole job in this process, which has used the device before.
 

@@ -31,7 +31,7 @@ struct IoResults {
 };
 
 // Steps and programs as they are named in results.
-inline constexpr char kTetwarp[] = "tetwarp", kItk[] = "ITK", kDcmtk[] = "DCMTK", kDcmtk1[] = "DCMTK, 1 thread";
+inline constexpr char kTetwarp[] = "tetwarp", kHashed[] = "tetwarp, hashed", kItk[] = "ITK", kDcmtk[] = "DCMTK", kDcmtk1[] = "DCMTK, 1 thread";
 inline constexpr char kDicomIn[] = "DICOM in, ", kDicomOut[] = "DICOM out", kNiftiOut[] = ".nii.gz out",
                       kNiftiIn[] = ".nii.gz in, written by ", kJob[] = "whole job, ";
 inline constexpr char kJobIn[] = "in alone", kJobField[] = "field alone", kJobDeform[] = "deform alone",

@@ -7,6 +7,7 @@
 #include <new>
 
 #include "bench/options.h"
+#include "deform/render/transfer_function.h"
 #include "deform/version.h"
 
 namespace tetwarp::bench {
@@ -252,6 +253,14 @@ void add_simulate(CLI::App& app, SimulateOptions& options) {
   add_frames(*command, options.frames, options.warmup);
   command->add_option("--steps", options.steps, "Steps that a frame may take")
       ->check(CLI::Range(0, 1000000))
+      ->capture_default_str();
+  command->add_option("--render", options.render, "Make a picture of each frame, of W,H pixels")
+      ->expected(2)
+      ->delimiter(',')
+      ->check(CLI::Range(16, 8192))
+      ->type_name("W,H");
+  command->add_option("--transfer", options.transfer, "Transfer function of the pictures")
+      ->check(CLI::IsMember(transfer_function_names()))
       ->capture_default_str();
   command->add_option("--threads", options.threads, "Threads of the CPU; 0 is all")
       ->check(CLI::NonNegativeNumber)

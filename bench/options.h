@@ -102,6 +102,8 @@ struct ItkOptions {
 
 struct SimulateOptions {
   std::filesystem::path scenario;  ///< JSON; its first phase is simulated, by every method
+  std::vector<int> render;         ///< pixels of the picture of each frame, W and H; empty: none is rendered
+  std::string transfer = "ct-bone";
   std::vector<std::string> methods{"chainmail", "mass-spring"};
   std::vector<std::string> backends{"cpu"};
   std::int64_t width = 512, slices = 300;  ///< of the phantom

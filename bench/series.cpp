@@ -4,11 +4,11 @@
 
 namespace tetwarp::bench {
 
-DicomVolume read_series(const std::filesystem::path& folder, int threads) {
+DicomVolume read_series(const std::filesystem::path& folder, int threads, FileHash hash) {
   const DicomScan scan = scan_dicom(folder);
   require(scan.series.size() == 1,
           std::to_string(scan.series.size()) + " series in " + folder.string() + "; expected one");
-  return load_dicom(scan.series.front(), threads);
+  return load_dicom(scan.series.front(), threads, {}, hash);
 }
 
 DicomDerivation made_up_derivation() {

@@ -6,9 +6,9 @@
 
 namespace tetwarp::bench {
 
-/// Lists the folder and reads its one series, as `tetwarp deform` does.
+/// Lists the folder and reads its one series, as `tetwarp deform` does, or without hashing its files.
 /// @throws InputError
-DicomVolume read_series(const std::filesystem::path& folder, int threads);
+DicomVolume read_series(const std::filesystem::path& folder, int threads, FileHash hash = FileHash::made);
 
 /// What a derived series says of how it came to be.
 DicomDerivation made_up_derivation();

@@ -7,6 +7,7 @@
 #include "bench/machine.h"
 #include "bench/statistics.h"
 #include "deform/phantom.h"
+#include "deform/render/renderer.h"
 #include "deform/simulate/chainmail.h"
 #include "deform/simulate/mass_spring.h"
 #include "deform/simulate/scenario_run.h"
@@ -18,6 +19,8 @@ namespace {
 
 using namespace simulate;
 using Clock = std::chrono::steady_clock;
+
+constexpr int kPicturesAround = 72;
 
 double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
@@ -35,6 +38,40 @@ class HostVolumes final : public FrameVolumes {
   const Volume<std::int16_t>& source_;
   Volume<std::int16_t> output_;
   double background_;
+};
+
+/// A picture of each frame: nothing else leaves the backend.
+class FramePictures {
+ public:
+  FramePictures(const SimulateOptions& options, const Geometry& volume, bool on_cuda)
+      : camera_{.width = options.render[0], .height = options.render[1]},
+        volume_(volume),
+        renderer_(on_cuda ? make_cuda_renderer(options.device) : make_cpu_renderer({.threads = options.threads})),
+        rgb_(3 * static_cast<std::size_t>(camera_.width) * static_cast<std::size_t>(camera_.height)) {
+    renderer_->set_style({.transfer = transfer_function(options.transfer)});
+  }
+
+  void draw(const ConstVolumeView& volume) {
+    renderer_->set_volume(volume);
+    renderer_->render(view_plane(camera_, volume_), rgb_);
+  }
+  /// Milliseconds of pictures from all around.
+  std::vector<double> turn(int pictures) {
+    std::vector<double> ms;
+    for (int n = 0; n < pictures; ++n) {
+      camera_.angle_deg = 360.0 * n / pictures;
+      const auto start = Clock::now();
+      renderer_->render(view_plane(camera_, volume_), rgb_);
+      ms.push_back(ms_since(start));
+    }
+    return ms;
+  }
+
+ private:
+  Camera camera_;
+  const Geometry& volume_;
+  std::unique_ptr<Renderer> renderer_;
+  std::vector<std::uint8_t> rgb_;
 };
 
 MakeSimulation factory_of(simulate::Method method, bool on_cuda, const SimulateOptions& options) {
@@ -109,9 +146,17 @@ class Measuring {
     const auto resampler = on_cuda ? make_cuda_resampler(volume_.geometry, options_.device)
                                    : make_cpu_resampler(volume_.geometry, {.threads = options_.threads});
     const Target target = volumes->target();
-    std::vector<double> simulate_ms, resample_ms;
-    FrameRun result{
-        .method = name, .backend = backend, .steps = options_.steps, .simulate_ms = {}, .resample_ms = {}, .last = {}};
+    std::optional<FramePictures> pictures;
+    if (!options_.render.empty()) pictures.emplace(options_, volume_.geometry, on_cuda);
+    std::vector<double> simulate_ms, resample_ms, render_ms;
+    FrameRun result{.method = name,
+                    .backend = backend,
+                    .steps = options_.steps,
+                    .simulate_ms = {},
+                    .resample_ms = {},
+                    .render_ms = {},
+                    .turn_ms = {},
+                    .last = {}};
     Clock::time_point first{};
     for (int n = 0; !run.is_done(); ++n) {
       const auto start = Clock::now();
@@ -119,12 +164,19 @@ class Measuring {
       result.last = run.next().settled;
       const double simulated = ms_since(start);
       run.resample(*resampler, {&target, 1}, Outside::background, {}, {.jacobian_range = false});
+      const double resampled = ms_since(start);
+      if (pictures) pictures->draw(target.output);
       const double all = ms_since(start);
       if (n < options_.warmup) continue;
       simulate_ms.push_back(simulated);
-      resample_ms.push_back(all - simulated);
+      resample_ms.push_back(resampled - simulated);
+      render_ms.push_back(all - resampled);
     }
     result.frames_per_second = options_.frames / (ms_since(first) / 1000);
+    if (pictures) {
+      result.render_ms = summarize(render_ms);
+      result.turn_ms = summarize(pictures->turn(kPicturesAround));
+    }
     result.simulate_ms = summarize(simulate_ms);
     result.resample_ms = summarize(resample_ms);
     results_.frames.push_back(result);

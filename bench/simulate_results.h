@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,8 +19,9 @@ struct SettleRun {
 /// The same way in many frames, each resampled.
 struct FrameRun {
   std::string method, backend;
-  int steps = 0;                     ///< allowed a frame
-  Summary simulate_ms, resample_ms;  ///< of a frame; the second with set_field
+  int steps = 0;                              ///< allowed a frame
+  Summary simulate_ms, resample_ms;           ///< of a frame; the second with set_field
+  std::optional<Summary> render_ms, turn_ms;  ///< with what set_volume finds; of a volume that stands, from all around
   double frames_per_second = 0;
   simulate::Settled last;  ///< frame
 };

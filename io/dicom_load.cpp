@@ -72,12 +72,12 @@ struct Loading {
   }
 };
 
-/// A file that is slice k.
-LoadedSlice load_slice(Loading& loading, std::size_t k, Sha256::Digest& digest) {
+/// A file that is slice k. @param digest  receives its hash, where one is wanted
+LoadedSlice load_slice(Loading& loading, std::size_t k, Sha256::Digest* digest) {
   const DicomSlice& slice = loading.series.slices[k];
   LoadedSlice loaded;
   const std::span<const std::byte> bytes = loading.buffers.local().read(slice.file);
-  digest = Sha256().add(bytes).digest();
+  if (digest) *digest = Sha256().add(bytes).digest();
   ParsedSlice parsed = parse_slice(bytes, slice.file);
   const DicomFileHeader& header = parsed.header;
   check(header, slice, loading.series.geometry);
@@ -172,7 +172,7 @@ std::string hash_files(const DicomSeries& series, int threads, const Control& co
   return sources.hash();
 }
 
-DicomVolume load_dicom(const DicomSeries& series, int threads, const Control& control) {
+DicomVolume load_dicom(const DicomSeries& series, int threads, const Control& control, FileHash hash) {
   require(!series.refusal, series.refusal.value_or(""));
   require(!series.slices.empty(), "the series holds no slice, " + series.series_uid + "; choose another series");
   prepare_dcmtk();
@@ -186,7 +186,7 @@ DicomVolume load_dicom(const DicomSeries& series, int threads, const Control& co
   Loading loading{series, result.volume.voxels};
   std::vector<std::size_t> with_frames;  // these are hashed on their own, first, as that takes longest
   for (std::size_t n = 0; n < sources.files.size(); ++n) {
-    if (sources.files[n].has_frames) with_frames.push_back(n);
+    if (hash == FileHash::made && sources.files[n].has_frames) with_frames.push_back(n);
   }
   for_each_index(with_frames.size() + slices.size(), threads, control, [&](std::size_t i) {
     if (i < with_frames.size()) {
@@ -196,7 +196,8 @@ DicomVolume load_dicom(const DicomSeries& series, int threads, const Control& co
     }
     const std::size_t k = i - with_frames.size();
     SourceFile& file = sources.files[sources.of_slice[k]];
-    slices[k] = file.has_frames ? load_frame(loading, k, *file.for_one_frame()) : load_slice(loading, k, file.digest);
+    slices[k] = file.has_frames ? load_frame(loading, k, *file.for_one_frame())
+                                : load_slice(loading, k, hash == FileHash::made ? &file.digest : nullptr);
   });
 
   result.padding = common_padding(series, slices);
@@ -206,7 +207,7 @@ DicomVolume load_dicom(const DicomSeries& series, int threads, const Control& co
     headers->slices.push_back(std::move(slices[k].header));
     headers->frames.push_back(series.slices[k].frame ? *series.slices[k].frame + 1 : 0);
   }
-  result.sha256 = sources.hash();
+  if (hash == FileHash::made) result.sha256 = sources.hash();
   result.headers = std::move(headers);
   return result;
 }

@@ -16,7 +16,7 @@ namespace {
 
 DicomScan scan_dicom(const std::filesystem::path&, bool, const Control&) { refuse(); }
 
-DicomVolume load_dicom(const DicomSeries&, int, const Control&) { refuse(); }
+DicomVolume load_dicom(const DicomSeries&, int, const Control&, FileHash) { refuse(); }
 
 std::string hash_files(const DicomSeries&, int, const Control&) { refuse(); }
 

@@ -79,16 +79,21 @@ struct DicomVolume {
   std::optional<PaddingRange> padding;  ///< Pixel Padding Value and Range Limit in HU, when all slices agree
   std::uint64_t rounded = 0;            ///< voxels whose HU was fractional and was rounded half to even
   std::string series_uid;
-  std::string sha256;  ///< of the SHA-256 digests of the files, each once, in the order of their first slices
+  /// Of the SHA-256 digests of the files, each once, in the order of their first slices; empty where it was left out.
+  std::string sha256;
   std::shared_ptr<const DicomHeaders> headers;
 };
+
+/// Whether a reader hashes the files, which takes as long as reading them where they are not compressed.
+enum class FileHash : std::uint8_t { made, left_out };
 
 /// Reads and decodes the slices in parallel; each file is parsed once. Of a file of several frames no more is in memory
 /// than the header and the frames that are being decoded, unless its data set is deflated.
 /// @throws InputError for a series with a refusal, a file that changed or is truncated, a transfer syntax that cannot
 /// be
 ///         decoded, HU beyond int16: naming the file, the tag, expected and found
-DicomVolume load_dicom(const DicomSeries& series, int threads = 0, const Control& control = {});
+DicomVolume load_dicom(const DicomSeries& series, int threads = 0, const Control& control = {},
+                       FileHash hash = FileHash::made);
 
 /// `DicomVolume::sha256` without reading voxels. @throws InputError for a file that cannot be read, Cancelled
 std::string hash_files(const DicomSeries& series, int threads = 0, const Control& control = {});

@@ -10,6 +10,10 @@ namespace {
 constexpr Colour kEmpty = {0, 160, 160}, kFold = {255, 176, 0}, kInverted = {224, 0, 224}, kShrunk = {32, 96, 255},
                  kGrown = {255, 48, 32};
 
+/// Of a Jacobian: 1/2 is number 1, 1 is 127, 2 is 253.
+constexpr int kNumberOfOne = 127, kNumberInverted = 255;
+constexpr double kNumbersAnOctave = 126;
+
 }  // namespace
 
 Tint tint_of(OverlayKind kind, double value) {
@@ -32,6 +36,30 @@ std::string legend_of(OverlayKind kind) {
     case OverlayKind::jacobian: return "blue: shrunk (full at 1/2), red: grown (full at 2), violet: inside out";
     default: return "lines: cells of the deformed lattice";
   }
+}
+
+std::uint8_t TintScale::number(double value) const {
+  if (tint_of(kind_, value).share <= 0) return 0;
+  if (kind_ != OverlayKind::jacobian) return 1;
+  if (value <= 0) return kNumberInverted;
+  return static_cast<std::uint8_t>(
+      std::lround(kNumberOfOne + kNumbersAnOctave * std::clamp(std::log2(value), -1.0, 1.0)));
+}
+
+double TintScale::value_of(int number) const {
+  if (kind_ == OverlayKind::coverage) return 0;
+  if (kind_ == OverlayKind::folds) return 2;
+  return number == kNumberInverted ? -1 : std::exp2((number - kNumberOfOne) / kNumbersAnOctave);
+}
+
+std::vector<glm::vec4> TintScale::colours() const {
+  std::vector<glm::vec4> colours = {glm::vec4(0)};
+  for (int number = 1; number < 256; ++number) {
+    const Tint tint = tint_of(kind_, value_of(number));
+    colours.emplace_back(glm::vec3(tint.colour[0], tint.colour[1], tint.colour[2]) / 255.0f,
+                         static_cast<float>(tint.share));
+  }
+  return colours;
 }
 
 Colour mixed(const Colour& below, const Tint& tint) {

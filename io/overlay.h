@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "deform/volume.h"
 #include "io/png.h"
@@ -26,6 +27,23 @@ Tint tint_of(OverlayKind kind, double value);
 
 /// What the colours mean, for a legend: "Jacobian: blue 1/2, red 2".
 std::string legend_of(OverlayKind kind);
+
+/// The tints of an overlay as numbers of a byte, for volumes of them (Tints, deform/render/renderer.h).
+class TintScale {
+ public:
+  /// @param kind  not lattice
+  explicit TintScale(OverlayKind kind) : kind_(kind) {}
+
+  /// 0 where there is no tint.
+  std::uint8_t number(double value) const;
+  /// Red, green, blue and share of each number, 0 to 1.
+  std::vector<glm::vec4> colours() const;
+
+ private:
+  double value_of(int number) const;
+
+  OverlayKind kind_;
+};
 
 Colour mixed(const Colour& below, const Tint& tint);
 

@@ -157,6 +157,24 @@ TEST(BenchProgram, AnInverterThatIsMoreAccurateIsAFailureWhereItIsAskedFor) {
   EXPECT_TRUE(says(beside.out, {"| mean error / tetwarp's | wave, ITK iterative | 0.00", "at least 1 | missed"}));
 }
 
+TEST(BenchProgram, FramesAreSimulatedResampledAndRendered) {
+  const Scratch scratch;
+  write_file(scratch / "push.json",
+             R"({"method": "chainmail", "cell_size": 8, "tissues": [{"name": "all"}],
+                 "move": [{"handle": {"at": {"body": [0.5, 0.5, 0.5]}, "radius_mm": 40}, "by_mm": [0, 0, 20]}]})");
+  const std::string tiny =
+      "simulate push.json --methods chainmail --width 64 --slices 40 --frames 3 --warmup 1 --json r.json ";
+  const Outcome run = run_bench(scratch, tiny + "--render 48,32");
+  ASSERT_EQ(run.status, 0) << run.err;
+  const nlohmann::json frame = nlohmann::json::parse(read_text(scratch / "r.json"))["frames"][0];
+  for (const char* part : {"simulate_ms", "resample_ms", "render_ms", "turn_ms"})
+    EXPECT_GT(frame[part]["median"], 0) << part;
+  EXPECT_NE(run.out.find("| ms of a picture |"), std::string::npos) << run.out;
+  ASSERT_EQ(run_bench(scratch, tiny).status, 0);
+  EXPECT_FALSE(nlohmann::json::parse(read_text(scratch / "r.json"))["frames"][0].contains("turn_ms"));
+  expect_error(run_bench(scratch, tiny + "--render 4,4"), 2, "--render");
+}
+
 #ifdef TETWARP_BENCH_IO
 constexpr const char* kTinyIo = "io --width 32 --slices 6 --repeats 2 --cell-sizes 4 --folder . --json r.json ";
 

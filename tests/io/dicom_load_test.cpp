@@ -327,6 +327,16 @@ TEST(DicomLoad, TruncatedFileAndLostFileAreNamed) {
   EXPECT_TRUE(says(error_of([&] { load_dicom(series); }), {"cannot be read", "s01.dcm"}));
 }
 
+TEST(DicomLoad, WithoutItsHashASeriesIsReadTheSame) {
+  const Scratch folder;
+  write_stack(folder.path(), 4);
+  const DicomSeries series = scan_dicom(folder.path()).series.front();
+  const DicomVolume plain = load_dicom(series, 0, {}, FileHash::left_out), hashed = load_dicom(series);
+  EXPECT_EQ(plain.sha256, "");
+  EXPECT_EQ(hashed.sha256, hash_files(series));
+  EXPECT_EQ(plain.volume.voxels, hashed.volume.voxels);
+}
+
 TEST(DicomLoad, RefusedSeriesIsNotLoaded) {
   DicomSeries series;
   series.refusal = "slices lie crooked";

@@ -102,6 +102,24 @@ TEST(SliceView, OverlaysTintTheVoxelsThatTheyAreAbout) {
   EXPECT_EQ(changes.at(35, 5), grey);
 }
 
+TEST(TintScale, NumbersStandForTheTintsOfTheirValues) {
+  for (const OverlayKind kind : {OverlayKind::coverage, OverlayKind::folds, OverlayKind::jacobian}) {
+    const TintScale scale(kind);
+    const std::vector<glm::vec4> colours = scale.colours();
+    ASSERT_EQ(colours.size(), 256u);
+    EXPECT_EQ(colours[0], glm::vec4(0));
+    for (const double value : {-3.0, 0.0, 0.1, 0.5, 0.7, 0.99, 1.0, 1.4, 2.0, 3.0, 50.0}) {
+      const Tint tint = tint_of(kind, value);
+      const glm::vec4 found = colours[scale.number(value)];
+      EXPECT_NEAR(found.a, tint.share, 0.004) << value;
+      if (tint.share < 0.01) continue;
+      for (int channel = 0; channel < 3; ++channel)
+        EXPECT_NEAR(found[channel] * 255, tint.colour[static_cast<std::size_t>(channel)], 1e-3) << value;
+    }
+  }
+  EXPECT_EQ(TintScale(OverlayKind::jacobian).number(NAN), 0);
+}
+
 TEST(SliceView, LinesOfTheLatticeAreWhereCellsMeet) {
   const Geometry grid = unit_grid({160, 120, 5});
   const Volume<std::int16_t> volume = volume_of<std::int16_t>(grid, [](const glm::i64vec3&) { return 0; });
