@@ -203,6 +203,22 @@ void Deformation::write() {
   record_.outputs.set.write([&] { write_files(); });
 }
 
+/// The system takes 60 ms to get a gigabyte back: meanwhile the disk is waited for.
+void Deformation::commit() {
+  std::vector<glm::vec3> forward, pull;
+  forward.swap(record_.field.forward.field.displacement);
+  pull.swap(record_.field.pull.displacement);
+  const auto field = beside([&] {
+    std::vector<glm::vec3>().swap(forward);
+    std::vector<glm::vec3>().swap(pull);
+  });
+  const auto volumes = beside([&] {
+    record_.input.volume.release();
+    record_.output.release();
+  });
+  record_.outputs.set.commit();
+}
+
 void Deformation::write_files() {
   const auto start = std::chrono::steady_clock::now();
   const std::string made_by = "tetwarp field " + record_.field_sha256.substr(0, 16);

@@ -29,8 +29,8 @@ class Deformation {
   void resample(const Worker& worker);
   /// Writes what is not written yet, under hidden names.
   void write();
-  /// Gives the outputs their names.
-  void commit() { record_.outputs.set.commit(); }
+  /// Gives the outputs their names. Voxels and vertices are gone afterwards.
+  void commit();
 
   const DeformRecord& record() const { return record_; }
   /// What people should know, "warning: ..." and "note: ...".

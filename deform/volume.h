@@ -125,6 +125,8 @@ class AnyVolume {
   const std::byte* data() const { return voxels_.get(); }
   VolumeView view();
   ConstVolumeView view() const;
+  /// Gives the voxels back; what it was a volume of stays known.
+  void release() { voxels_.reset(); }
   /// The voxels as V. @throws InputError if V is not the type held
   template <class V>
   std::span<V> as() {
