@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 
 #include "apps/movie.h"
@@ -17,14 +16,6 @@ namespace tetwarp::apps {
 namespace {
 
 namespace fs = std::filesystem;
-
-glm::dvec3 colour_of(const std::string& text) {
-  unsigned bits = 0;
-  const char* const end = text.data() + text.size();
-  if (text.size() != 7 || text[0] != '#' || std::from_chars(text.data() + 1, end, bits, 16).ptr != end)
-    throw UsageError("--background is \"" + text + "\", expected #rrggbb, two hexadecimal digits each");
-  return glm::dvec3(bits >> 16 & 255u, bits >> 8 & 255u, bits & 255u) / 255.0;
-}
 
 std::string degrees(double angle) { return short_number(angle) + " deg"; }
 
@@ -91,7 +82,10 @@ Rendering::Rendering(const RenderOptions& options)
                      " fields, each a picture: leave out --frames, and give --turntable the same number");
   if (options.turntable > 0 && !is_volume()) throw UsageError("--turntable goes with --view volume only");
   if (!is_volume() && !options.transfer.empty()) throw UsageError("--transfer goes with --view volume only");
-  style_.background = colour_of(options.background);
+  const std::optional<glm::dvec3> background = parse_colour(options.background);
+  if (!background)
+    throw UsageError("--background is \"" + options.background + "\", expected #rrggbb, two hexadecimal digits each");
+  style_.background = *background;
   style_.step_voxels = options.step;
   if (fs::path(options.transfer).extension() == ".json")
     style_.transfer = read_transfer_file(options.transfer);
@@ -181,11 +175,11 @@ void Rendering::show(std::size_t number) {
 void Rendering::tint() {
   tint_numbers_.clear();
   std::optional<OverlayKind> kind;
-  for (const std::string& text : options_.overlays) {
-    const OverlayKind wanted = overlay_wish(text).kind;
-    if (wanted == OverlayKind::lattice) continue;
-    if (kind && *kind != wanted) throw UsageError("--view volume shows one of coverage, folds and jacobian at a time");
-    kind = wanted;
+  for (const OverlayWish& wish : scene_.wishes()) {
+    if (wish.kind == OverlayKind::lattice) continue;
+    if (kind && *kind != wish.kind)
+      throw UsageError("--view volume shows one of coverage, folds and jacobian at a time");
+    kind = wish.kind;
   }
   if (!kind) return;
   const TintScale scale(*kind);
@@ -240,7 +234,7 @@ Picture Rendering::volume_picture(std::size_t number) {
   if (options_.plain) return picture;
   ViewCaption said = caption(number);
   said.details = {"angle " + degrees(camera.angle_deg) + ", elevation " + degrees(camera.elevation_deg)};
-  for (const std::string& text : options_.overlays) said.details.push_back(legend_of(overlay_wish(text).kind));
+  for (const OverlayWish& wish : scene_.wishes()) said.details.push_back(legend_of(wish.kind));
   annotate(picture, plane, said);
   return picture;
 }

@@ -42,9 +42,9 @@ class RenderScene {
 
   const Geometry& grid() const { return grid_; }
   ConstVolumeView volume() const;  ///< of the frame that is shown
-  bool is_deformed() const { return deforms_; }
   const VertexField* lattice_field()
       const;  ///< that moves the volume in this frame; null: there is none with a lattice
+  const std::vector<OverlayWish>& wishes() const { return wishes_; }
   /// What lies over a part of the volume, in the order of the wishes.
   std::vector<OwnedOverlay> overlays(const Region& region);
   /// "wave:amplitude=8, then twist.mha", without folders; empty: nothing deforms.

@@ -14,14 +14,11 @@ constexpr std::size_t kFewestPoints = 2, kMostPoints = 1000;
 constexpr NumberRange kValue{-1e9, 1e9}, kOpacity{0, 1}, kDensity{0, 1e6}, kLight{0, 10}, kGradient{0, 1e9},
     kWhite{0, 1e12, true};
 
-/// "#f5e8cc".
 glm::dvec3 read_colour(const JsonEntry& entry) {
   const std::string& text = entry.text();
-  unsigned bits = 0;
-  const char* const end = text.data() + text.size();
-  if (text.size() != 7 || text[0] != '#' || std::from_chars(text.data() + 1, end, bits, 16).ptr != end)
-    entry.refuse("is \"" + printable(text) + "\"; a colour is #rrggbb, two hexadecimal digits each");
-  return glm::dvec3(bits >> 16 & 255u, bits >> 8 & 255u, bits & 255u) / 255.0;
+  const std::optional<glm::dvec3> colour = parse_colour(text);
+  if (!colour) entry.refuse("is \"" + printable(text) + "\"; a colour is #rrggbb, two hexadecimal digits each");
+  return *colour;
 }
 
 Projection read_projection(const JsonEntry& entry) {
@@ -66,6 +63,14 @@ void read_light(const JsonEntry& entry, TransferFunction& transfer) {
 }
 
 }  // namespace
+
+std::optional<glm::dvec3> parse_colour(const std::string& text) {
+  unsigned bits = 0;
+  const char* const end = text.data() + text.size();
+  if (text.size() != 7 || text[0] != '#' || std::from_chars(text.data() + 1, end, bits, 16).ptr != end)
+    return std::nullopt;
+  return glm::dvec3(bits >> 16 & 255u, bits >> 8 & 255u, bits & 255u) / 255.0;
+}
 
 TransferFunction read_transfer_file(const std::filesystem::path& path) {
   constexpr std::array<const char*, 5> kKeys = {"name", "projection", "points", "light", "white"};

@@ -1,10 +1,15 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
+#include <string>
 
 #include "deform/render/transfer_function.h"
 
 namespace tetwarp {
+
+/// Red, green and blue, 0 to 1, of "#f5e8cc"; nothing for a text that is no colour.
+std::optional<glm::dvec3> parse_colour(const std::string& text);
 
 /// A transfer function of a JSON file (docs/render.md has the keys).
 /// @throws InputError, "FILE:LINE: what; what is expected", for a file that cannot be read or used
