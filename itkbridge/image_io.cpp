@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iostream>
+#include <mutex>
 #include <sstream>
 #include <utility>
 
@@ -21,10 +22,11 @@ constexpr std::pair<VoxelType, Component> kComponents[] = {
     {VoxelType::f32, Component::FLOAT}, {VoxelType::f64, Component::DOUBLE},
 };
 
-/// ITK's warnings and MetaIO's complaints go to standard error; a library does not print.
+/// One thread at a time, as ITK 5.2 makes its singletons when they are first used, without a lock, and quiet: ITK's
+/// warnings and MetaIO's complaints go to standard error, which is the process's own; a library does not print.
 class QuietItk {
  public:
-  QuietItk() : before_(itk::Object::GetGlobalWarningDisplay()), cerr_(std::cerr.rdbuf(nullptr)) {
+  QuietItk() : turn_(turns()), before_(itk::Object::GetGlobalWarningDisplay()), cerr_(std::cerr.rdbuf(nullptr)) {
     itk::Object::SetGlobalWarningDisplay(false);
   }
   ~QuietItk() {
@@ -35,6 +37,12 @@ class QuietItk {
   QuietItk& operator=(const QuietItk&) = delete;
 
  private:
+  static std::mutex& turns() {
+    static std::mutex mutex;
+    return mutex;
+  }
+
+  std::lock_guard<std::mutex> turn_;
   bool before_;
   std::streambuf* cerr_;
 };

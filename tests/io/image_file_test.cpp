@@ -1,8 +1,11 @@
 #include "io/image_file.h"
 
 #include <gtest/gtest.h>
+
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
+#include <iostream>
+#include <thread>
 
 #include <algorithm>
 #include <bit>
@@ -338,6 +341,26 @@ TEST(ImageFile, RealMhaHasTheStatedSumAndSurvivesEveryFormat) {
   }
 }
 #endif
+
+TEST(ImageFile, ThreadsThatReadAtOnceLeaveStandardErrorAsItWas) {
+  const Scratch scratch;
+  Geometry grid;
+  grid.size = {4, 3, 2};
+  const AnyVolume volume(grid, VoxelType::i16);
+  write_image(scratch / "ct.nii", volume.view());
+  std::streambuf* const before = std::cerr.rdbuf();
+  {
+    std::vector<std::jthread> threads;
+    for (int n = 0; n < 8; ++n) {
+      threads.emplace_back([&] {
+        for (int again = 0; again < 50; ++again)
+          EXPECT_EQ(read_image_header(scratch / "ct.nii").geometry.size, grid.size);
+      });
+    }
+  }
+  std::streambuf* const after = std::cerr.rdbuf(before);
+  EXPECT_EQ(after, before);
+}
 
 }  // namespace
 }  // namespace tetwarp
