@@ -1,17 +1,16 @@
 #include "io/image_file.h"
 
 #include <gtest/gtest.h>
-
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
-#include <iostream>
-#include <thread>
 
 #include <algorithm>
 #include <bit>
 #include <glm/common.hpp>
 #include <glm/vector_relational.hpp>
+#include <iostream>
 #include <numeric>
+#include <thread>
 
 #include "tests/support/image_samples.h"
 #include "tests/support/real_data.h"
