@@ -8,6 +8,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 #include <memory>
+#include <mutex>
 
 #include "deform/errors.h"
 #include "itkbridge/transform_file.h"
@@ -141,6 +142,8 @@ Transform::OutputPointType apply(const Part& part, const Transform::InputPointTy
 }  // namespace
 
 TransformFunction make_transform(const StoredTransform& stored, const std::string& file) {
+  static std::mutex mutex;  // ITK 5.2 makes its factories and singletons without one
+  const std::lock_guard lock(mutex);
   itk::TransformFactoryBase::RegisterDefaultTransforms();
   const auto parts = std::make_shared<std::vector<Part>>();
   try {
