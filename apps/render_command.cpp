@@ -17,6 +17,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+bool is_transfer_file(const RenderOptions& options) { return fs::path(options.transfer).extension() == ".json"; }
+
 std::string degrees(double angle) { return short_number(angle) + " deg"; }
 
 /// One run of the command.
@@ -56,7 +58,7 @@ std::vector<fs::path> inputs_of(const RenderOptions& options) {
   inputs.push_back(options.input.path);
   if (!options.pull_field.empty()) inputs.push_back(field_source(options.pull_field).path);
   for (const fs::path& file : field_files(options.sequence)) inputs.push_back(file);
-  if (fs::path(options.transfer).extension() == ".json") inputs.emplace_back(options.transfer);
+  if (is_transfer_file(options)) inputs.emplace_back(options.transfer);
   for (const std::string& text : options.overlays) {
     const OverlayWish wish = overlay_wish(text);
     if (wish.source.empty()) continue;
@@ -87,7 +89,7 @@ Rendering::Rendering(const RenderOptions& options)
     throw UsageError("--background is \"" + options.background + "\", expected #rrggbb, two hexadecimal digits each");
   style_.background = *background;
   style_.step_voxels = options.step;
-  if (fs::path(options.transfer).extension() == ".json")
+  if (is_transfer_file(options))
     style_.transfer = read_transfer_file(options.transfer);
   else if (!options.transfer.empty()) {
     try {
@@ -143,8 +145,7 @@ void Rendering::choose_style() {
   const bool is_maximum = style_.transfer.projection == Projection::maximum, named = options_.window || options_.level;
   if (named && !is_maximum)
     throw UsageError("--window and --level go with slices and mip, not with " + style_.transfer.name);
-  const bool is_file = fs::path(options_.transfer).extension() == ".json";
-  if (is_maximum && (named || (!window_->hounsfield && !is_file))) {
+  if (is_maximum && (named || (!window_->hounsfield && !is_transfer_file(options_)))) {
     Window window = *window_;
     if (window_->hounsfield) {  // of the function, unless said otherwise
       const double low = style_.transfer.points.front().value, high = style_.transfer.points.back().value;
@@ -189,8 +190,9 @@ void Rendering::tint() {
     Region slab = whole(grid);
     slab.begin.z = k;
     slab.end.z = std::min(k + 16, grid.size.z);
-    for (const OwnedOverlay& owned : scene_.overlays(slab)) {
-      if (owned.overlay.kind != *kind) continue;
+    for (const OverlayWish& wish : scene_.wishes()) {
+      if (wish.kind != *kind) continue;
+      const OwnedOverlay owned = scene_.overlay(wish, slab);
       const ConstVolumeView& map = owned.overlay.map;
       const std::int64_t slice = grid.size.x * grid.size.y, offset = (k - map.buffered.begin.z) * slice;
       dispatch(map.type, [&](auto zero) {
@@ -245,7 +247,8 @@ Picture Rendering::slice_picture(std::size_t number) {
   std::vector<std::shared_ptr<const AnyVolume>> maps;
   for (const Slice& slice : slices) {
     SlicePart part{slice, {}};
-    for (const OwnedOverlay& owned : scene_.overlays(region_of(scene_.grid(), slice))) {
+    for (const OverlayWish& wish : scene_.wishes()) {
+      const OwnedOverlay owned = scene_.overlay(wish, region_of(scene_.grid(), slice));
       part.overlays.push_back(owned.overlay);
       maps.push_back(owned.map);
     }

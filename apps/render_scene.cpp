@@ -4,7 +4,6 @@
 #include <array>
 
 #include "cuda/backend.h"
-#include "deform/fields/formula.h"
 #include "io/image_file.h"
 
 namespace tetwarp::apps {
@@ -142,14 +141,22 @@ void RenderScene::set_frame_field(double amount, const Control& control) {
     resampler_ = std::move(backend.resampler);
   }
   if (field_.direction == Direction::pull) {
-    frame_pull_ = field_.pull;
-    scale(frame_pull_.displacement, amount);
-    return resampler_->set_field(view(frame_pull_, options_.outside), control);
+    const PullField* shown = &field_.pull;
+    if (amount != 1) {
+      frame_pull_ = field_.pull;
+      scale(frame_pull_.displacement, amount);
+      shown = &frame_pull_;
+    }
+    return resampler_->set_field(view(*shown, options_.outside), control);
   }
-  frame_field_ = field_.forward.field;
-  scale(frame_field_.displacement, amount);
-  scale(frame_field_.mesh.displacement, amount);
-  resampler_->set_field(view(frame_field_, options_.outside), control);
+  shown_field_ = &field_.forward.field;
+  if (amount != 1) {
+    frame_field_ = field_.forward.field;
+    scale(frame_field_.displacement, amount);
+    scale(frame_field_.mesh.displacement, amount);
+    shown_field_ = &frame_field_;
+  }
+  resampler_->set_field(view(*shown_field_, options_.outside), control);
 }
 
 void RenderScene::show(std::size_t frame) {
@@ -173,7 +180,7 @@ ConstVolumeView RenderScene::volume() const { return deforms_ ? output_.view() :
 const VertexField* RenderScene::lattice_field() const {
   for (const OverlayWish& wish : wishes_) {
     if (wish.kind != OverlayKind::lattice) continue;
-    const VertexField& field = wish.source.empty() ? frame_field_ : drawn_lattice_;
+    const VertexField& field = wish.source.empty() ? *shown_field_ : drawn_lattice_;
     return field.lattice.size.x > 0 ? &field : nullptr;
   }
   return nullptr;
@@ -192,7 +199,7 @@ OwnedOverlay RenderScene::computed(OverlayKind kind, const Region& region) {
   const Target target{.source = std::as_const(input_.volume).view(), .output = slab_view};
   OwnedOverlay made = make_map(*resampler_, grid_, kind, region,
                                kind == OverlayKind::coverage ? std::span(&target, 1) : std::span<const Target>());
-  made.overlay.lattice = frame_field_.lattice;
+  if (shown_field_) made.overlay.lattice = shown_field_->lattice;
   return made;
 }
 
@@ -206,11 +213,8 @@ OwnedOverlay RenderScene::from_file(const OverlayWish& wish, const Region& regio
   return {{wish.kind, files_[at]->view()}, files_[at]};
 }
 
-std::vector<OwnedOverlay> RenderScene::overlays(const Region& region) {
-  std::vector<OwnedOverlay> overlays;
-  for (const OverlayWish& wish : wishes_)
-    overlays.push_back(wish.source.empty() ? computed(wish.kind, region) : from_file(wish, region));
-  return overlays;
+OwnedOverlay RenderScene::overlay(const OverlayWish& wish, const Region& region) {
+  return wish.source.empty() ? computed(wish.kind, region) : from_file(wish, region);
 }
 
 std::string RenderScene::field_title(std::size_t frame) const {

@@ -45,8 +45,8 @@ class RenderScene {
   const VertexField* lattice_field()
       const;  ///< that moves the volume in this frame; null: there is none with a lattice
   const std::vector<OverlayWish>& wishes() const { return wishes_; }
-  /// What lies over a part of the volume, in the order of the wishes.
-  std::vector<OwnedOverlay> overlays(const Region& region);
+  /// What lies over a part of the volume. @param wish  one of `wishes()`
+  OwnedOverlay overlay(const OverlayWish& wish, const Region& region);
   /// "wave:amplitude=8, then twist.mha", without folders; empty: nothing deforms.
   std::string field_title(std::size_t frame) const;
   const std::string& backend() const { return backend_; }
@@ -66,9 +66,10 @@ class RenderScene {
   Geometry grid_;
   bool deforms_ = false;
   AnyField field_;           ///< whole
-  VertexField frame_field_;  ///< of the frame
+  VertexField frame_field_;  ///< of a frame in which it has not grown to its whole
   PullField frame_pull_;
-  VertexField drawn_lattice_;  ///< of `lattice=FIELD`
+  const VertexField* shown_field_ = nullptr;  ///< of the frame: that one, or the whole
+  VertexField drawn_lattice_;                 ///< of `lattice=FIELD`
   AnyVolume output_;
   std::unique_ptr<Resampler> resampler_, lattice_resampler_;
   std::vector<std::shared_ptr<const AnyVolume>> files_;  ///< of the wishes; null where there is none

@@ -38,11 +38,13 @@ __device__ inline unsigned warp_sum(unsigned value, int lanes = 32) {
 }
 
 /// The smallest, and the largest, over a whole warp, in every lane.
-__device__ inline int warp_min(int value) {
+template <class T>
+__device__ T warp_min(T value) {
   for (int step = 16; step > 0; step /= 2) value = min(value, __shfl_xor_sync(~0u, value, step));
   return value;
 }
-__device__ inline int warp_max(int value) {
+template <class T>
+__device__ T warp_max(T value) {
   for (int step = 16; step > 0; step /= 2) value = max(value, __shfl_xor_sync(~0u, value, step));
   return value;
 }

@@ -2,6 +2,7 @@
 
 #include "cuda/device_buffer.h"
 #include "cuda/host_copies.h"
+#include "cuda/lattice.h"
 #include "cuda/pointer_check.h"
 #include "deform/render/ray_blocks.h"
 #include "deform/render/ray_frame.h"
@@ -15,16 +16,6 @@ namespace {
 constexpr int kRangeThreads = 128, kDistanceThreads = 256;
 constexpr int kPatchWidth = 8, kPatchHeight = 4;  ///< pixels of a warp: near rays read the same voxels
 constexpr int kPatches = 4;                       ///< of a thread block
-
-__device__ float warp_least(float value) {
-  for (int step = 16; step > 0; step /= 2) value = fminf(value, __shfl_xor_sync(~0u, value, step));
-  return value;
-}
-
-__device__ float warp_most(float value) {
-  for (int step = 16; step > 0; step /= 2) value = fmaxf(value, __shfl_xor_sync(~0u, value, step));
-  return value;
-}
 
 /// A thread block looks at one block of voxels and those around it (`RayReach`).
 template <class V>
@@ -41,8 +32,8 @@ __global__ void range_kernel(const V* voxels, glm::ivec3 size, glm::ivec3 blocks
     most = value > most ? value : most;
   }
   __shared__ float all_least[kRangeThreads / 32], all_most[kRangeThreads / 32];
-  least = warp_least(least);
-  most = warp_most(most);
+  least = warp_min(least);
+  most = warp_max(most);
   if (threadIdx.x % 32 == 0) {
     all_least[threadIdx.x / 32] = least;
     all_most[threadIdx.x / 32] = most;
@@ -196,7 +187,7 @@ void CudaRenderer::find_distances(const RayFrame& frame, const std::vector<Trans
 void CudaRenderer::prepare(const RayFrame& frame, double step, cudaStream_t stream) {
   if (step != table_step_) {
     host_table_ = transfer_table(style_.transfer, step);
-    TransferIntegrals made = transfer_integrals(style_.transfer, step);
+    TransferIntegrals made = transfer_integrals(host_table_, step);
     lowest_ = made.lowest;
     highest_ = made.highest;
     table_.upload(host_table_.data(), host_table_.size(), stream);

@@ -12,10 +12,13 @@ namespace {
 
 constexpr Colour kShadow = {0, 0, 0};
 
+int scale_for(int width, int height) { return std::max(1, (std::min(width, height) + 160) / 320); }
+
 }  // namespace
 
-Lettering::Lettering(Picture& picture)
-    : picture_(picture), scale_(std::max(1, (std::min(picture.width(), picture.height()) + 160) / 320)) {}
+int lettering_line(int width, int height) { return kLineHeight * scale_for(width, height); }
+
+Lettering::Lettering(Picture& picture) : picture_(picture), scale_(scale_for(picture.width(), picture.height())) {}
 
 int Lettering::line() const { return kLineHeight * scale_; }
 

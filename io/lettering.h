@@ -9,6 +9,9 @@ namespace tetwarp {
 
 constexpr Colour kTextColour = {235, 235, 235}, kFaintColour = {160, 160, 168}, kLetterColour = {255, 214, 64};
 
+/// Pixels from one line to the next in a picture of a size.
+int lettering_line(int width, int height);
+
 /// Writes into a picture, in a size that goes with its own, with a dark edge, so that it is read on bone too.
 class Lettering {
  public:

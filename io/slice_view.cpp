@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "io/lettering.h"
+#include "io/preview_layout.h"
 
 namespace tetwarp {
 
@@ -15,10 +16,6 @@ constexpr const char* kNames[] = {"axial", "coronal", "sagittal"};
 constexpr int kLeastPixels = 16;   ///< of a slice along a side
 constexpr double kLineEvery = 12;  ///< pixels at least between two lines of the lattice
 constexpr Tint kLine = {{90, 220, 255}, 0.75};
-
-struct Panel {
-  int x = 0, y = 0, width = 0, height = 0;
-};
 
 /// The values of a voxel of a map, NaN where it has none.
 glm::dvec3 voxel_of(const ConstVolumeView& map, const glm::i64vec3& voxel) {
@@ -59,7 +56,7 @@ glm::dvec3 between_voxels(const ConstVolumeView& map, const Slice& slice, const 
 /// A picture of one slice in a part of a larger one.
 class SlicePanel {
  public:
-  SlicePanel(Picture& picture, const Panel& panel, const Geometry& grid, const Slice& slice)
+  SlicePanel(Picture& picture, const Rectangle& panel, const Geometry& grid, const Slice& slice)
       : picture_(picture), panel_(panel), grid_(grid), slice_(slice) {}
 
   void show(const ConstVolumeView& volume, const Window& window) {
@@ -90,7 +87,7 @@ class SlicePanel {
   void draw_lattice(const Overlay& overlay);
 
   Picture& picture_;
-  Panel panel_;
+  Rectangle panel_;
   const Geometry& grid_;
   const Slice& slice_;
 };
@@ -125,7 +122,7 @@ int pixels(double mm, double pixels_per_mm) { return static_cast<int>(std::lroun
 
 /// Panels beside each other, and the room around them.
 struct Layout {
-  std::vector<Panel> panels;
+  std::vector<Rectangle> panels;
   double pixels_per_mm = 1;
   int width = 0, height = 0, header = 0, gutter = 0;
 };
@@ -140,8 +137,7 @@ Layout lay_out(std::span<const SlicePart> parts, const SliceViewOptions& options
   const auto count = static_cast<int>(parts.size());
   int footer = 0;
   if (!options.plain) {
-    Picture size(options.width, options.height);
-    const int line = Lettering(size).line();
+    const int line = lettering_line(options.width, options.height);
     layout.gutter = 3 * line;
     layout.header = 4 * line;
     footer = (3 + static_cast<int>(parts.front().overlays.size())) * line;
@@ -151,8 +147,8 @@ Layout lay_out(std::span<const SlicePart> parts, const SliceViewOptions& options
   layout.width = layout.gutter;
   int tallest = 0;
   for (const auto& [slice, overlays] : parts) {
-    const Panel panel{layout.width, layout.header, pixels(slice.right.length_mm, layout.pixels_per_mm),
-                      pixels(slice.down.length_mm, layout.pixels_per_mm)};
+    const Rectangle panel{layout.width, layout.header, pixels(slice.right.length_mm, layout.pixels_per_mm),
+                          pixels(slice.down.length_mm, layout.pixels_per_mm)};
     require(std::min(panel.width, panel.height) >= kLeastPixels,
             "a picture of " + std::to_string(options.width) + " x " + std::to_string(options.height) +
                 " pixels is too small for " + std::to_string(count) + " slices; give it more with --size");
@@ -164,7 +160,7 @@ Layout lay_out(std::span<const SlicePart> parts, const SliceViewOptions& options
   return layout;
 }
 
-void draw_letters(const Lettering& lettering, const Panel& panel, const Slice& slice) {
+void draw_letters(const Lettering& lettering, const Rectangle& panel, const Slice& slice) {
   const int line = lettering.line(), middle_x = panel.x + panel.width / 2,
             middle_y = panel.y + (panel.height - line) / 2;
   const auto letter = [&](int x, int y, char direction) { lettering.write(x, y, {&direction, 1}, kLetterColour); };
@@ -201,7 +197,7 @@ Picture draw_slices(const ConstVolumeView& volume, std::span<const SlicePart> pa
   const Lettering lettering(picture);
   for (std::size_t n = 0; n < parts.size(); ++n) {
     const Slice& slice = parts[n].slice;
-    const Panel& place = layout.panels[n];
+    const Rectangle& place = layout.panels[n];
     SlicePanel panel(picture, place, *volume.geometry, slice);
     panel.show(volume, options.window);
     for (const Overlay& overlay : parts[n].overlays) panel.lay_over(overlay);

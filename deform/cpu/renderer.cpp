@@ -64,7 +64,7 @@ class CpuRenderer final : public Renderer {
 void CpuRenderer::prepare(const RayFrame& frame, double step) {
   if (step != table_step_) {
     table_ = transfer_table(style_.transfer, step);
-    integrals_ = transfer_integrals(style_.transfer, step);
+    integrals_ = transfer_integrals(table_, step);
     table_step_ = step;
   }
   if (distances_.empty()) distances_ = block_distances(ranges_, ray_blocks(geometry_), frame, table_);

@@ -41,15 +41,13 @@ void find_ranges(const V* voxels, const glm::ivec3& size, const glm::ivec3& bloc
 /// Each number becomes the least of max(|n - m|, number m), for all m near n along one axis.
 void spread(std::vector<std::uint8_t>& distances, const glm::ivec3& blocks, int axis) {
   const int count = blocks[axis];
-  const std::size_t stride = axis == 0   ? 1
-                             : axis == 1 ? static_cast<std::size_t>(blocks.x)
-                                         : static_cast<std::size_t>(blocks.x) * static_cast<std::size_t>(blocks.y);
   const int across = axis == 0 ? 1 : 0, beyond = axis == 2 ? 1 : 2;
   const auto stride_of = [&](int other) {
     return other == 0   ? std::size_t{1}
            : other == 1 ? static_cast<std::size_t>(blocks.x)
                         : static_cast<std::size_t>(blocks.x) * static_cast<std::size_t>(blocks.y);
   };
+  const std::size_t stride = stride_of(axis);
   tbb::parallel_for(0, blocks[beyond], [&](int b) {
     std::vector<int> line(static_cast<std::size_t>(count));
     for (int a = 0; a < blocks[across]; ++a) {

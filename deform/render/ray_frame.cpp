@@ -130,7 +130,7 @@ std::vector<TransferEntry> transfer_table(const TransferFunction& transfer, doub
   return table;
 }
 
-TransferIntegrals transfer_integrals(const TransferFunction& transfer, double step_mm) {
+TransferIntegrals transfer_integrals(const std::vector<TransferEntry>& table, double step_mm) {
   constexpr double kMostOpacity = 0.9999;  // of a mm: beyond, depth has no end
   TransferIntegrals integrals{{{}}, {}, {}};
   glm::dvec4 sum(0);
@@ -138,7 +138,7 @@ TransferIntegrals transfer_integrals(const TransferFunction& transfer, double st
     return TransferIntegral{static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z),
                             static_cast<float>(v.w)};
   };
-  for (const TransferEntry& entry : transfer_table(transfer, step_mm)) {
+  for (const TransferEntry& entry : table) {
     const double depth = -std::log1p(-std::min<double>(entry.opacity, kMostOpacity)) * step_mm;
     const glm::dvec4 of_entry = glm::dvec4(entry.red, entry.green, entry.blue, 1) * depth;
     if (integrals.before.size() == 1) integrals.lowest = rounded(of_entry);

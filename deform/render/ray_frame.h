@@ -38,6 +38,6 @@ struct TransferIntegrals {
 
 /// The optical depth of an entry is
 /// -ln(1 - opacity) * step / 1 mm, so that a picture does not depend on the step.
-TransferIntegrals transfer_integrals(const TransferFunction& transfer, double step_mm);
+TransferIntegrals transfer_integrals(const std::vector<TransferEntry>& table, double step_mm);
 
 }  // namespace tetwarp

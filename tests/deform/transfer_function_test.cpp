@@ -52,8 +52,8 @@ TEST(TransferFunctions, TableIsLinearBetweenPoints) {
 }
 
 TEST(TransferFunctions, IntegralsAddUpOpticalDepthInProportionToTheStep) {
-  const std::vector<TransferIntegral> one = transfer_integrals(ramp(), 1).before,
-                                      half = transfer_integrals(ramp(), 0.5).before;
+  const std::vector<TransferIntegral> one = transfer_integrals(transfer_table(ramp(), 1), 1).before,
+                                      half = transfer_integrals(transfer_table(ramp(), 0.5), 0.5).before;
   ASSERT_EQ(one.size(), static_cast<std::size_t>(kTransferEntries) + 1);
   EXPECT_EQ(one.front().depth, 0);
   // The integral of -ln(1 - a) for a from 0 to 1/2: (1 - ln 2) / 2.
