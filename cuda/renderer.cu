@@ -1,4 +1,6 @@
+#include <limits>
 #include <memory>
+#include <type_traits>
 
 #include "cuda/device_buffer.h"
 #include "cuda/host_copies.h"
@@ -14,37 +16,57 @@ namespace cuda_detail {
 namespace {
 
 constexpr int kRangeThreads = 128, kDistanceThreads = 256;
+constexpr int kRangeBlocks = (kRangeThreads - kMostRayReach) / kRayBlock + 1;  ///< of voxels, that a thread block takes
 constexpr int kPatchWidth = 8, kPatchHeight = 4;  ///< pixels of a warp: near rays read the same voxels
 constexpr int kPatches = 4;                       ///< of a thread block
 
-/// A thread block looks at one block of voxels and those around it (`RayReach`).
+/// What voxels are compared as: whole numbers as they are.
 template <class V>
-__global__ void range_kernel(const V* voxels, glm::ivec3 size, glm::ivec3 blocks, BlockRange* ranges) {
-  const int number = static_cast<int>(blockIdx.x);
-  const glm::ivec3 block(number % blocks.x, number / blocks.x % blocks.y, number / (blocks.x * blocks.y));
-  const RayReach i(block.x, size.x), j(block.y, size.y), k(block.z, size.z);
-  const int width = i.end - i.begin, height = j.end - j.begin, count = width * height * (k.end - k.begin);
-  float least = INFINITY, most = -INFINITY;
-  for (int n = static_cast<int>(threadIdx.x); n < count; n += kRangeThreads) {
-    const std::int64_t x = i.begin + n % width, y = j.begin + n / width % height, z = k.begin + n / (width * height);
-    const float value = static_cast<float>(voxels[(z * size.y + y) * size.x + x]);
-    least = value < least ? value : least;
-    most = value > most ? value : most;
+struct Extremes {
+  using Value = std::conditional_t<std::is_integral_v<V>, V, float>;
+  static constexpr Value kHighest =
+      std::is_integral_v<V> ? std::numeric_limits<Value>::max() : std::numeric_limits<Value>::infinity();
+  static constexpr Value kLowest = std::is_integral_v<V> ? std::numeric_limits<Value>::lowest() : -kHighest;
+
+  Value least = kHighest, most = kLowest;
+
+  __device__ void add(Value low, Value high) {
+    least = low < least ? low : least;
+    most = high > most ? high : most;
   }
-  __shared__ float all_least[kRangeThreads / 32], all_most[kRangeThreads / 32];
-  least = warp_min(least);
-  most = warp_max(most);
-  if (threadIdx.x % 32 == 0) {
-    all_least[threadIdx.x / 32] = least;
-    all_most[threadIdx.x / 32] = most;
+};
+
+/// A thread block looks at a row of blocks of voxels along i and what is around them (`RayReach`): a thread at a column
+/// of voxels, and then at a block.
+template <class V>
+__global__ void __launch_bounds__(kRangeThreads)
+    range_kernel(const V* voxels, glm::ivec3 size, glm::ivec3 blocks, int row, BlockRange* ranges) {
+  using Value = typename Extremes<V>::Value;
+  const glm::ivec3 first(static_cast<int>(blockIdx.x) * row, blockIdx.y, blockIdx.z);
+  const int count = min(row, blocks.x - first.x), thread = static_cast<int>(threadIdx.x);
+  const int begin = RayReach(first.x, size.x).begin, end = RayReach(first.x + count - 1, size.x).end;
+  const RayReach j(first.y, size.y), k(first.z, size.z);
+  __shared__ Value all_least[kRangeThreads], all_most[kRangeThreads];
+  if (begin + thread < end) {
+    Extremes<V> found;
+    for (int z = k.begin; z < k.end; ++z) {
+      const V* const slice = voxels + ray::number_in(size, {begin + thread, 0, z});
+#pragma unroll
+      for (int n = 0; n < kMostRayReach; ++n) {  // the last row again where there are less
+        const auto value = static_cast<Value>(slice[std::int64_t{min(j.begin + n, j.end - 1)} * size.x]);
+        found.add(value, value);
+      }
+    }
+    all_least[thread] = found.least;
+    all_most[thread] = found.most;
   }
   __syncthreads();
-  if (threadIdx.x != 0) return;
-  for (int n = 1; n < kRangeThreads / 32; ++n) {
-    least = fminf(least, all_least[n]);
-    most = fmaxf(most, all_most[n]);
-  }
-  ranges[number] = {least, most};
+  if (thread >= count) return;
+  const RayReach i(first.x + thread, size.x);
+  Extremes<V> found;
+  for (int n = i.begin; n < i.end; ++n) found.add(all_least[n - begin], all_most[n - begin]);
+  ranges[ray::number_in(blocks, {first.x + thread, first.y, first.z})] = {static_cast<float>(found.least),
+                                                                          static_cast<float>(found.most)};
 }
 
 __global__ void empty_kernel(const BlockRange* ranges, int count, RayFrame frame, const int* opaque_before,
@@ -141,10 +163,12 @@ void CudaRenderer::set_volume(const ConstVolumeView& volume, const Control& cont
   }
   blocks_ = ray_blocks(geometry_);
   ranges_.reserve(static_cast<std::size_t>(block_count()));
+  const int rows = (blocks_.x + kRangeBlocks - 1) / kRangeBlocks, row = (blocks_.x + rows - 1) / rows;
+  const dim3 grid(static_cast<unsigned>(rows), static_cast<unsigned>(blocks_.y), static_cast<unsigned>(blocks_.z));
   dispatch(volume.type, [&](auto voxel) {
     using V = decltype(voxel);
-    range_kernel<<<static_cast<unsigned>(block_count()), kRangeThreads, 0, stream>>>(
-        reinterpret_cast<const V*>(volume_.voxels), glm::ivec3(geometry_.size), blocks_, ranges_.data());
+    range_kernel<<<grid, kRangeThreads, 0, stream>>>(reinterpret_cast<const V*>(volume_.voxels),
+                                                     glm::ivec3(geometry_.size), blocks_, row, ranges_.data());
   });
   TETWARP_CUDA_TRY(cudaGetLastError());
   if (volume.memory == Memory::host) TETWARP_CUDA_TRY(cudaStreamSynchronize(stream));

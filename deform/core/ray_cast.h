@@ -19,7 +19,7 @@ struct TransferIntegral {
 constexpr int kTransferEntries = 4096;
 
 /// Blocks of 8 x 8 x 8 voxels, so that rays need not look at what is empty.
-constexpr int kRayBlock = 8;
+constexpr int kRayBlockBits = 3, kRayBlock = 1 << kRayBlockBits;
 /// Least and largest value around a block: of its voxels, one before them and two behind, so that each sample in the
 /// block lies between them, a rounding error beside it too.
 struct BlockRange {
@@ -112,10 +112,14 @@ TETWARP_INLINE_HD float steps_to(const Span& span, int n) {
   return clamped(static_cast<float>(n), span.enter, span.leave);
 }
 
-/// The value at a continuous index.
 template <class V>
-TETWARP_INLINE_HD float sample(const RayScene<V>& scene, const glm::vec3& index) {
-  return value_in(cell_at(scene.voxels, scene.size, index));
+TETWARP_INLINE_HD glm::vec3 index_of(const RayScene<V>& scene, const Span& span, float steps) {
+  return span.origin + scene.step * steps;
+}
+
+template <class V>
+TETWARP_INLINE_HD float sample(const RayScene<V>& scene, const RayPlace& place) {
+  return value_in(cell_at(scene.voxels, scene.size, place));
 }
 
 template <class V>
@@ -124,17 +128,8 @@ TETWARP_INLINE_HD TransferEntry look_up(const RayScene<V>& scene, float value) {
 }
 
 /// The block of a sample.
-template <class V>
-TETWARP_INLINE_HD glm::ivec3 block_of(const RayScene<V>& scene, const glm::vec3& index) {
-  glm::ivec3 block;
-  for (int axis = 0; axis < 3; ++axis)
-    block[axis] = at_most(static_cast<int>(larger(index[axis], 0)) / kRayBlock, scene.blocks[axis] - 1);
-  return block;
-}
-
-template <class V>
-TETWARP_INLINE_HD std::int64_t number_of(const RayScene<V>& scene, const glm::ivec3& block) {
-  return (static_cast<std::int64_t>(block.z) * scene.blocks.y + block.y) * scene.blocks.x + block.x;
+TETWARP_INLINE_HD glm::ivec3 block_of(const RayPlace& place) {
+  return {place.whole.x >> kRayBlockBits, place.whole.y >> kRayBlockBits, place.whole.z >> kRayBlockBits};
 }
 
 /// The first sample behind a block and `around` blocks on every side of it.
@@ -154,36 +149,36 @@ TETWARP_INLINE_HD int behind(const RayScene<V>& scene, const Span& span, int n, 
 /// stays as it is.
 template <class V>
 TETWARP_INLINE_HD glm::vec3 lit(const RayScene<V>& scene, const glm::vec3& colour, const glm::vec3& index) {
-  const glm::vec3 slope = scene.to_gradient * differences_in(cell_at(scene.voxels, scene.size, index));
+  const glm::vec3 slope =
+      scene.to_gradient * differences_in(cell_at(scene.voxels, scene.size, place_among(scene.size, index)));
   const float steepness = std::sqrt(dot(slope, slope));
   if (!(steepness > 0)) return colour;
   const float towards = std::abs(dot(slope, scene.light)) / steepness;
   float shine = std::abs(dot(slope, scene.halfway)) / steepness;
   for (int doubled = 0; doubled < 5; ++doubled) shine *= shine;  // to the power of 32
-  const float surface = smaller(steepness / scene.full_gradient, 1);
+  const float surface = smaller(steepness / scene.full_gradient, 1.0f);
   const float factor = 1 + surface * (scene.ambient + scene.diffuse * towards - 1),
               added = surface * scene.specular * shine;
   return {colour.x * factor + added, colour.y * factor + added, colour.z * factor + added};
 }
 
-/// What entries `low` to `high`, both included, add up to; entries beyond the ends are as the first and the last one.
-TETWARP_INLINE_HD TransferIntegral sum_over(const RayTables& tables, int low, int high) {
-  const int end = high + 1, from = low < 0 ? 0 : at_most(low, kTransferEntries),
-            to = end < 0 ? 0 : at_most(end, kTransferEntries);
-  const TransferIntegral &a = tables.integrals[from], &b = tables.integrals[to];
-  TransferIntegral sum{b.red - a.red, b.green - a.green, b.blue - a.blue, b.depth - a.depth};
-  const auto add = [&](const TransferIntegral& entry, int count) {
-    if (count <= 0) return;
-    const float times = static_cast<float>(count);
-    sum.red += entry.red * times;
-    sum.green += entry.green * times;
-    sum.blue += entry.blue * times;
-    sum.depth += entry.depth * times;
-  };
-  add(tables.lowest_entry, at_most(end, 0) - low);
-  add(tables.highest_entry, end - (low > kTransferEntries ? low : kTransferEntries));
-  return sum;
-}
+/// Entries `low` to `high` of the table, both included, and how many more there would be beyond its ends.
+struct EntryRange {
+  TETWARP_HD EntryRange(int low, int high)
+      : from(clamped(low, 0, kTransferEntries)),
+        to(clamped(high + 1, 0, kTransferEntries)),
+        below(static_cast<float>(larger(smaller(high + 1, 0) - low, 0))),
+        above(static_cast<float>(larger(high + 1 - larger(low, kTransferEntries), 0))) {}
+
+  /// What they add up to. @param part  of an integral
+  TETWARP_HD float sum(const RayTables& tables, float TransferIntegral::*part) const {
+    return tables.integrals[to].*part - tables.integrals[from].*part + tables.lowest_entry.*part * below +
+           tables.highest_entry.*part * above;
+  }
+
+  int from, to;        ///< in the integrals
+  float below, above;  ///< entries as the first and the last one
+};
 
 /// exp(-depth) to 1e-4, of operations that round alike everywhere.
 TETWARP_INLINE_HD float transmitted(float depth) {
@@ -199,7 +194,7 @@ TETWARP_INLINE_HD glm::vec3 tinted(const RayScene<V>& scene, const glm::vec3& co
   std::int64_t voxel = 0;
   for (int axis = 2; axis >= 0; --axis)
     voxel = voxel * scene.size[axis] +
-            static_cast<int>(clamped(index[axis], 0, static_cast<float>(scene.size[axis] - 1)) + 0.5f);
+            static_cast<int>(clamped(index[axis], 0.0f, static_cast<float>(scene.size[axis] - 1)) + 0.5f);
   const std::uint8_t tint = scene.tints[voxel];
   if (tint == 0) return colour;
   const TransferEntry& added = scene.tint_colours[tint];
@@ -213,34 +208,36 @@ TETWARP_INLINE_HD glm::vec3 composite(const RayScene<V>& scene, const Span& span
   glm::vec3 colour(0);
   float through = 1;
   constexpr int kUnknown = -(1 << 30);
+  const auto entry_at = [&](const RayPlace& place) {
+    const float value = sample(scene, place);
+    return value == value ? endless_entry(scene, value) : kUnknown;
+  };
   int before = kUnknown;  // entry of the sample before
   for (int n = span.begin; n < span.end;) {
-    const float steps = steps_to(span, n), length = steps - steps_to(span, n - 1);
-    const glm::vec3 index = span.origin + scene.step * steps;
-    const glm::ivec3 block = block_of(scene, index);
-    if (const int empty = scene.distances[number_of(scene, block)]; empty > 0) {
+    const glm::vec3 index = index_of(scene, span, steps_to(span, n));
+    const RayPlace place = place_among(scene.size, index);
+    const glm::ivec3 block = block_of(place);
+    if (const int empty = scene.distances[number_in(scene.blocks, block)]; empty > 0) {
       n = behind(scene, span, n, block, empty - 1);
       before = kUnknown;
       continue;
     }
-    const glm::vec3 last = span.origin + scene.step * steps_to(span, n - 1);
-    if (before == kUnknown) {
-      const float value = sample(scene, last);
-      if (value == value) before = endless_entry(scene, value);
-    }
+    if (before == kUnknown) before = entry_at(place_among(scene.size, index_of(scene, span, steps_to(span, n - 1))));
     ++n;
-    const float value = sample(scene, index);
-    const int entry = value == value ? endless_entry(scene, value) : kUnknown;
-    const int low = before < entry ? before : entry, high = before < entry ? entry : before;
+    const int entry = entry_at(place), low = smaller(before, entry), high = larger(before, entry);
     before = entry;
     if (low == kUnknown) continue;
-    const TransferIntegral sum = sum_over(scene, low, high);
-    if (!(sum.depth > 0)) continue;
-    glm::vec3 seen = glm::vec3(sum.red, sum.green, sum.blue) * (1 / sum.depth);
-    const glm::vec3 middle = (last + index) * 0.5f;
+    const EntryRange range(low, high);
+    const float depth = range.sum(scene, &TransferIntegral::depth);
+    if (!(depth > 0)) continue;
+    glm::vec3 seen = glm::vec3(range.sum(scene, &TransferIntegral::red), range.sum(scene, &TransferIntegral::green),
+                               range.sum(scene, &TransferIntegral::blue)) *
+                     (1 / depth);
+    const float to = steps_to(span, n - 1), from = steps_to(span, n - 2);
+    const glm::vec3 middle = (index_of(scene, span, from) + index) * 0.5f;
     if (scene.tints) seen = tinted(scene, seen, middle);
     if (scene.full_gradient > 0) seen = lit(scene, seen, middle);
-    const float left = through * transmitted(sum.depth * length / static_cast<float>(high - low + 1));
+    const float left = through * transmitted(depth * (to - from) / static_cast<float>(high - low + 1));
     colour = colour + seen * (through - left);
     through = left;
     if (through < 1 - kOpaque) break;
@@ -253,14 +250,14 @@ TETWARP_INLINE_HD glm::vec3 maximum(const RayScene<V>& scene, const Span& span) 
   float most = 0;
   bool found = false;
   for (int n = span.begin; n < span.end;) {
-    const glm::vec3 index = span.origin + scene.step * steps_to(span, n);
-    const glm::ivec3 block = block_of(scene, index);
-    if (found && scene.ranges[number_of(scene, block)].most <= most) {
+    const RayPlace place = place_among(scene.size, index_of(scene, span, steps_to(span, n)));
+    const glm::ivec3 block = block_of(place);
+    if (found && scene.ranges[number_in(scene.blocks, block)].most <= most) {
       n = behind(scene, span, n, block, 0);
       continue;
     }
     ++n;
-    const float value = sample(scene, index);
+    const float value = sample(scene, place);
     if (value != value || (found && value <= most)) continue;
     most = value;
     found = true;
@@ -275,21 +272,21 @@ TETWARP_INLINE_HD glm::vec3 integral(const RayScene<V>& scene, const Span& span)
   float total = 0;
   for (int n = span.begin; n < span.end;) {
     const float from = steps_to(span, n - 1), to = steps_to(span, n);
-    const glm::vec3 index = span.origin + scene.step * (0.5f * (from + to));  // the middle of the piece
-    const glm::ivec3 block = block_of(scene, index);
-    if (const int empty = scene.distances[number_of(scene, block)]; empty > 0) {
+    const RayPlace place = place_among(scene.size, index_of(scene, span, 0.5f * (from + to)));  // of the piece's middle
+    const glm::ivec3 block = block_of(place);
+    if (const int empty = scene.distances[number_in(scene.blocks, block)]; empty > 0) {
       n = behind(scene, span, n, block, empty - 1);
       continue;
     }
     ++n;
-    const float value = sample(scene, index);
+    const float value = sample(scene, place);
     if (value == value) total += look_up(scene, value).opacity * (to - from);
   }
-  return scene.background + (glm::vec3(1) - scene.background) * smaller(total, 1);
+  return scene.background + (glm::vec3(1) - scene.background) * smaller(total, 1.0f);
 }
 
 TETWARP_INLINE_HD std::uint8_t to_byte(float share) {
-  return static_cast<std::uint8_t>(255 * clamped(share, 0, 1) + 0.5f);
+  return static_cast<std::uint8_t>(255 * clamped(share, 0.0f, 1.0f) + 0.5f);
 }
 
 }  // namespace ray

@@ -10,31 +10,50 @@ namespace tetwarp::ray {
 TETWARP_INLINE_HD float smaller(float a, float b) { return a < b ? a : b; }
 TETWARP_INLINE_HD float larger(float a, float b) { return a > b ? a : b; }
 TETWARP_INLINE_HD float clamped(float value, float low, float high) { return smaller(larger(value, low), high); }
-TETWARP_INLINE_HD int at_most(int value, int most) { return value < most ? value : most; }
+TETWARP_INLINE_HD int smaller(int a, int b) { return a < b ? a : b; }
+TETWARP_INLINE_HD int larger(int a, int b) { return a > b ? a : b; }
+TETWARP_INLINE_HD int clamped(int value, int low, int high) { return smaller(larger(value, low), high); }
 TETWARP_INLINE_HD float dot(const glm::vec3& a, const glm::vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
-/// The eight voxels around a place and what lies between them; beyond the outermost centres theirs.
+/// A continuous index among the voxels; beyond the outermost centres it is theirs.
+struct RayPlace {
+  glm::ivec3 whole;
+  glm::vec3 fraction;
+};
+
+TETWARP_INLINE_HD RayPlace place_among(const glm::ivec3& size, const glm::vec3& index) {
+  RayPlace place;
+  for (int axis = 0; axis < 3; ++axis) {
+    const float at = clamped(index[axis], 0.0f, static_cast<float>(size[axis] - 1));
+    place.whole[axis] = static_cast<int>(at);
+    place.fraction[axis] = at - static_cast<float>(place.whole[axis]);
+  }
+  return place;
+}
+
+/// The number of an element of a grid, i fastest. @param size  so that a slice has less than 2^31 elements
+TETWARP_INLINE_HD std::int64_t number_in(const glm::ivec3& size, const glm::ivec3& element) {
+  return std::int64_t{element.z * size.y + element.y} * size.x + element.x;
+}
+
+/// The eight voxels around a place and what lies between them.
 template <class V>
 struct Cell {
   const V* corner;  ///< of least indices
   glm::vec3 fraction;
-  std::int64_t next[3];    ///< values to the neighbour along an axis; 0 at the end of the volume
-  std::int64_t before[3];  ///< values back to the one before; 0 at its beginning
-  std::int64_t beyond[3];  ///< values to the one after the neighbour, or to the last one
+  int next[3];    ///< values to the neighbour along an axis; 0 at the end of the volume
+  int before[3];  ///< values back to the one before; 0 at its beginning
+  int beyond[3];  ///< values to the one after the neighbour, or to the last one
 };
 
-/// @param index  continuous index; beyond the outermost centres it is theirs
 template <class V>
-TETWARP_INLINE_HD Cell<V> cell_at(const V* voxels, const glm::ivec3& size, const glm::vec3& index) {
+TETWARP_INLINE_HD Cell<V> cell_at(const V* voxels, const glm::ivec3& size, const RayPlace& place) {
   Cell<V> cell;
-  cell.corner = voxels;
-  std::int64_t stride = 1;
+  cell.corner = voxels + number_in(size, place.whole);
+  cell.fraction = place.fraction;
+  int stride = 1;
   for (int axis = 0; axis < 3; ++axis) {
-    const int last = size[axis] - 1;
-    const float place = clamped(index[axis], 0, static_cast<float>(last));
-    const int whole = static_cast<int>(place);
-    cell.fraction[axis] = place - static_cast<float>(whole);
-    cell.corner += whole * stride;
+    const int last = size[axis] - 1, whole = place.whole[axis];
     cell.before[axis] = whole > 0 ? stride : 0;
     cell.next[axis] = whole < last ? stride : 0;
     cell.beyond[axis] = whole + 1 < last ? 2 * stride : cell.next[axis];
@@ -51,8 +70,7 @@ TETWARP_INLINE_HD float between(const V& a, const V& b, float share) {
 
 /// Linear between the four corners of a side; `at` gives the value of one.
 template <class At>
-TETWARP_INLINE_HD float over_side(const At& at, std::int64_t right, std::int64_t up, float share_right,
-                                  float share_up) {
+TETWARP_INLINE_HD float over_side(const At& at, int right, int up, float share_right, float share_up) {
   const float low = at(0) + (at(right) - at(0)) * share_right, high = at(up) + (at(up + right) - at(up)) * share_right;
   return low + (high - low) * share_up;
 }
@@ -60,7 +78,7 @@ TETWARP_INLINE_HD float over_side(const At& at, std::int64_t right, std::int64_t
 /// The value, linear between voxels.
 template <class V>
 TETWARP_INLINE_HD float value_in(const Cell<V>& cell) {
-  const auto along_i = [&](std::int64_t offset) {
+  const auto along_i = [&](int offset) {
     return between(cell.corner[offset], cell.corner[offset + cell.next[0]], cell.fraction.x);
   };
   return over_side(along_i, cell.next[1], cell.next[2], cell.fraction.y, cell.fraction.z);
@@ -73,7 +91,7 @@ TETWARP_INLINE_HD glm::vec3 differences_in(const Cell<V>& cell) {
   glm::vec3 difference;
   for (int axis = 0; axis < 3; ++axis) {
     const int right = axis == 0 ? 1 : 0, up = axis == 2 ? 1 : 2;
-    const auto along = [&](std::int64_t offset) {
+    const auto along = [&](int offset) {
       const V* const v = cell.corner + offset;
       const float here = static_cast<float>(v[cell.next[axis]]) - static_cast<float>(v[-cell.before[axis]]),
                   there = static_cast<float>(v[cell.beyond[axis]]) - static_cast<float>(v[0]);

@@ -14,6 +14,7 @@ struct RayReach {
         end((n + 1) * kRayBlock + 2 < size ? (n + 1) * kRayBlock + 2 : size) {}
   int begin, end;
 };
+constexpr int kMostRayReach = kRayBlock + 3;
 
 /// How many blocks a volume has.
 glm::ivec3 ray_blocks(const Geometry& volume);

@@ -10,7 +10,7 @@ namespace tetwarp {
 namespace {
 
 constexpr std::size_t kTintColours = 256;
-constexpr std::int64_t kMostVoxels = 1 << 15;  ///< on an axis: places are floats
+constexpr std::int64_t kMostVoxels = (1 << 15) - 1;  ///< on an axis: places are floats, and strides ints
 
 /// From a plane back to where no ray has entered the volume's box yet, mm.
 double back_from(const Geometry& volume, const ViewPlane& plane) {
