@@ -47,6 +47,9 @@ struct DerivedSeriesWriter::State {
   const DicomHeaders& source;
   DicomDerivation derivation;
   DerivedSeries series;
+  /// Of each slice of the source: where derived slices take over the same header, one after the other reads it, for
+  /// DCMTK's data sets remember where they were read last.
+  std::vector<std::mutex> reading = std::vector<std::mutex>(source.slices.size());
   std::set<DcmTagKey> added = {};
   std::vector<std::string> instances = std::vector<std::string>(series.instance_number.size());
   std::mutex mutex = {};
@@ -72,8 +75,11 @@ void DerivedSeriesWriter::write(const ConstVolumeView& volume, std::int64_t begi
     const std::size_t k = static_cast<std::size_t>(begin) + n;
     const SliceRange range = sampled.empty() ? SliceRange{} : sampled[k];
     DcmDataset slice;
-    const auto added =
-        derive_slice(slice, *to.source.slices[to.series.header[k]], to.series, to.derivation, range, to.geometry, k);
+    const std::size_t header = to.series.header[k];
+    const auto added = [&] {
+      const std::lock_guard lock(to.reading[header]);
+      return derive_slice(slice, *to.source.slices[header], to.series, to.derivation, range, to.geometry, k);
+    }();
     put_hu_format(slice, to.geometry);
     std::string uid = write_dicom_file(to.folder / dicom_file_name(to.series.instance_number[k]), slice,
                                        slice_of(volume, k), to.derivation.form.encoding);

@@ -279,6 +279,26 @@ TEST(DerivedSeries, ReportsInstancesInTheOrderOfTheSlices) {
   }
 }
 
+/// DCMTK's data sets remember where they were read last.
+TEST(DerivedSeries, SlicesThatTakeOverOneHeaderHaveTheSameBytesForAnyNumberOfThreads) {
+  const Scratch scratch;
+  DerivedSource source(2), finer(400);
+  finer.volume.geometry.spacing.z = source.volume.geometry.spacing.z / 400;
+  const auto write = [&](const fs::path& folder, int threads) {
+    fs::create_directories(folder);
+    write_derived_series(folder, view(finer.volume), source.headers, source.derivation, {}, threads);
+  };
+  write(scratch / "alone", 1);
+  for (int round = 0; round < 4; ++round) {
+    const fs::path folder = scratch / std::to_string(round);
+    write(folder, 8);
+    for (int n = 1; n <= 400; ++n) {
+      const std::string name = dicom_file_name(n);
+      ASSERT_EQ(file_bytes(folder / name), file_bytes(scratch / "alone" / name)) << name;
+    }
+  }
+}
+
 TEST(DerivedSeries, CarriesPaddingInHu) {
   const Scratch scratch;
   DerivedSource source;
