@@ -49,14 +49,14 @@ json input_json(const DeformRecord& of) {
   json document = json::object();
   const bool is_open = !of.options.dicom.deidentification;
   if (is_open) document = {{"path", of.options.input.path.string()}, {"sha256", of.input_sha256}};
-  if (!of.input.is_dicom()) return document;
+  if (!of.input->is_dicom()) return document;
   if (is_open) {
-    document["series_instance_uid"] = of.input.dicom->series_uid;
+    document["series_instance_uid"] = of.input->dicom->series_uid;
     if (!of.volume_label.empty()) document["volume"] = of.volume_label;
     document["set_aside"] = of.set_aside;
   }
-  document["rounded_voxels"] = of.input.dicom->rounded;
-  if (of.input.dicom->padding) document["padding_hu"] = {of.input.dicom->padding->low, of.input.dicom->padding->high};
+  document["rounded_voxels"] = of.input->dicom->rounded;
+  if (of.input->dicom->padding) document["padding_hu"] = {of.input->dicom->padding->low, of.input->dicom->padding->high};
   return document;
 }
 
@@ -185,7 +185,7 @@ json report_with_times(const DeformRecord& of) {
       of.options.common.threads > 0 ? of.options.common.threads : static_cast<int>(std::thread::hardware_concurrency());
   document["memory"] = {{"peak_bytes", peak_memory_bytes()},
                         {"planned_bytes", of.plan.bytes},
-                        {"source_bytes", of.input.volume.size_bytes()},
+                        {"source_bytes", of.input->volume.size_bytes()},
                         {"output_bytes", of.output.size_bytes()},
                         {"field_bytes", of.field.size_bytes()}};
   return document;

@@ -23,7 +23,8 @@ struct DeformRecord {
   PointsOption points;
   DeformOutputs outputs;
   DeformPlan plan;
-  InputVolume input;
+  std::shared_ptr<const InputVolume> input;
+  std::shared_ptr<const DicomHeaders> headers;  ///< of a series: this run's own, for one thread at a time reads them
   std::string volume_label;            ///< which of several volumes of its series the input is
   std::vector<std::string> set_aside;  ///< files of the input's folder that are no slices of it
   AnyField field;

@@ -21,10 +21,10 @@ using nlohmann::json;
 
 void Deformation::open() {
   const Stage stage(options_.common, "open");
-  header_ = open_input(options_.input, options_.common);
-  record_.plan = plan_deformation(options_, record_.outputs, *header_);
+  const InputHeader& header = input_->open(options_.common);
+  record_.plan = plan_deformation(options_, record_.outputs, header);
   record_.points.read();
-  if (header_->series) note_series(*header_->series);
+  if (header.series) note_series(*header.series);
   open_seconds_ = stage.seconds();
 }
 
@@ -37,20 +37,18 @@ void Deformation::note_series(const DicomSeries& series) {
 
 void Deformation::read() {
   Stage stage(options_.common, "read");
-  if (!header_->series)  // of a series the reader finds it
-    input_hash_ = beside([this] { return hash_file(options_.input.path); });
-  record_.input = read_input(options_.input, *header_, options_.common, stage.control());
-  record_.background = options_.background.value_or(record_.input.background);
+  record_.input = {input_, &input_->read(options_.common, stage.control())};
+  record_.headers = input_->headers();
+  record_.background = options_.background.value_or(record_.input->background);
   record_.outputs.further->read(options_.common, {.stop = interrupt_token()});
   record_.stages.emplace_back("read", open_seconds_ + stage.seconds());
 }
 
 void Deformation::make_field(const Worker& worker) {
   Stage stage(options_.common, "field");
-  const Geometry& grid = record_.input.volume.geometry();
+  const Geometry& grid = record_.input->volume.geometry();
   if (!options_.scenario.empty()) {
-    SimulatedField simulated =
-        simulate_field(options_, std::as_const(record_.input.volume).view(), worker, stage.control());
+    SimulatedField simulated = simulate_field(options_, record_.input->volume.view(), worker, stage.control());
     record_.field.forward.field = std::move(simulated.field);
     record_.field.simulation = std::move(simulated.source);
     for (const std::string& warning : simulated.warnings) warnings_.push_back(warning);
@@ -73,7 +71,7 @@ void Deformation::make_field(const Worker& worker) {
                                   " voxels, so that the identity resamples too");
   }
   record_.field_sha256 = record_.field.hash(options_.common.threads);
-  record_.output = AnyVolume(record_.plan.grid, record_.input.volume.type());
+  record_.output = AnyVolume(record_.plan.grid, record_.input->volume.type());
   record_.stages.emplace_back("field", stage.seconds());
 }
 
@@ -91,8 +89,7 @@ void Deformation::resample(const Worker& worker) {
                         {.stop = interrupt_token()});
   sampled_slices_.resize(record_.outputs.series ? static_cast<std::size_t>(record_.plan.grid.size.z) : 0);
   if (record_.outputs.series)
-    series_.emplace(record_.outputs.volume, record_.plan.grid, *record_.input.dicom->headers,
-                    input_derivation(record_));
+    series_.emplace(record_.outputs.volume, record_.plan.grid, *record_.headers, input_derivation(record_));
   MapStream maps(record_.plan.grid, record_.outputs.set);
   record_.outputs.set.write([&] {
     record_.outputs.maps->add_to(maps, record_.plan.grid, options_.preserve_mass, series_ ? &*series_ : nullptr);
@@ -129,17 +126,17 @@ void Deformation::check(Resampler& resampler) {
 
 /// INPUT as it goes through the field: with --preserve mass in float, so that values are rounded once.
 Target Deformation::main_target() {
-  Target target{.source = std::as_const(record_.input.volume).view(),
+  Target target{.source = record_.input->volume.view(),
                 .output = record_.output.view(),
                 .interpolation = options_.interpolation,
                 .background = record_.background,
-                .padding = record_.input.is_dicom() ? record_.input.dicom->padding : std::nullopt,
+                .padding = record_.input->is_dicom() ? record_.input->dicom->padding : std::nullopt,
                 .sampled_slices = sampled_slices_};
   if (!options_.preserve_mass) return target;
-  mass_.source = AnyVolume(record_.input.volume.geometry(), VoxelType::f32);
+  mass_.source = AnyVolume(record_.input->volume.geometry(), VoxelType::f32);
   mass_.resampled = AnyVolume(record_.plan.grid, VoxelType::f32);
-  dispatch(record_.input.volume.type(), [&](auto voxel) {
-    const auto from = std::as_const(record_.input.volume).as<decltype(voxel)>();
+  dispatch(record_.input->volume.type(), [&](auto voxel) {
+    const auto from = record_.input->volume.as<decltype(voxel)>();
     std::transform(from.begin(), from.end(), mass_.source.as<float>().begin(),
                    [](auto value) { return static_cast<float>(value); });
   });
@@ -175,7 +172,7 @@ void Deformation::resample_onto_own_grids(const Worker& worker) {
 /// @param resampler  holds the field
 void Deformation::move_structures(Resampler& resampler, Outside outside) {
   FurtherStructures& structures = record_.outputs.structures;
-  const Geometry& source = record_.input.volume.geometry();
+  const Geometry& source = record_.input->volume.geometry();
   const Limits limits{.threads = options_.common.threads};
   const Control control{.stop = interrupt_token()};
   std::optional<PointMover> mover;
@@ -199,7 +196,7 @@ void Deformation::write_slices(const Region& slices) {
 }
 
 void Deformation::write() {
-  record_.input_sha256 = input_hash_.valid() ? input_hash_.get() : record_.input.dicom->sha256;
+  record_.input_sha256 = input_->sha256();
   record_.outputs.set.write([&] { write_files(); });
 }
 
@@ -213,7 +210,8 @@ void Deformation::commit() {
     std::vector<glm::vec3>().swap(pull);
   });
   const auto volumes = beside([&] {
-    record_.input.volume.release();
+    record_.input.reset();
+    input_.reset();
     record_.output.release();
   });
   record_.outputs.set.commit();
@@ -232,14 +230,13 @@ void Deformation::write_files() {
   }
   if (options_.bids) {
     write_json(record_.outputs.bids,
-               json::parse(bids_sidecar(*record_.input.dicom->headers, record_.plan.grid, input_derivation(record_))));
+               json::parse(bids_sidecar(*record_.headers, record_.plan.grid, input_derivation(record_))));
   }
   if (!record_.outputs.preview.empty()) write_preview_picture();
   if (!record_.outputs.field.empty()) write_field();
   std::optional<DerivedOutput> series;
   if (record_.dicom_report)
-    series.emplace(WrittenSeries{*record_.input.dicom->headers, *record_.dicom_report, record_.plan.grid},
-                   derivation(record_));
+    series.emplace(WrittenSeries{*record_.headers, *record_.dicom_report, record_.plan.grid}, derivation(record_));
   record_.outputs.further->write(options_.compression, made_by, series);
   record_.points.write(record_.outputs.points);
   write_json(record_.outputs.sidecar, sidecar(record_));
@@ -258,17 +255,16 @@ void Deformation::write_field() {
 
 /// Beside an output on another grid stands INPUT as it lies there.
 void Deformation::write_preview_picture() {
-  const ConstVolumeView before = std::as_const(record_.input.volume).view(),
-                        after = std::as_const(record_.output).view();
+  const ConstVolumeView before = record_.input->volume.view(), after = std::as_const(record_.output).view();
   if (*before.geometry == record_.plan.grid) return write_preview(record_.outputs.preview, before, after, title());
-  AnyVolume on_grid(record_.plan.grid, record_.input.volume.type());
+  AnyVolume on_grid(record_.plan.grid, record_.input->volume.type());
   const PullField none = resting_pull_field(record_.plan.grid);
   const auto resampler = make_cpu_pull_resampler(record_.plan.grid, {.threads = options_.common.threads});
   resampler->set_field(view(none, Outside::background));
   const Target target{.source = before,
                       .output = on_grid.view(),
                       .background = record_.background,
-                      .padding = record_.input.is_dicom() ? record_.input.dicom->padding : std::nullopt};
+                      .padding = record_.input->is_dicom() ? record_.input->dicom->padding : std::nullopt};
   resampler->resample(whole(record_.plan.grid), {&target, 1});
   write_preview(record_.outputs.preview, std::as_const(on_grid).view(), after, title());
 }

@@ -1,13 +1,14 @@
 #pragma once
 
 #include <atomic>
-#include <future>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "apps/deform_report.h"
 #include "apps/deform_worker.h"
+#include "apps/shared_input.h"
 
 namespace tetwarp::apps {
 
@@ -16,7 +17,11 @@ namespace tetwarp::apps {
 class Deformation {
  public:
   /// Refers to the options. @throws what begin_outputs throws
-  explicit Deformation(const DeformOptions& options) : options_(options), record_(options) {}
+  explicit Deformation(const DeformOptions& options)
+      : Deformation(options, std::make_shared<SharedInput>(options.input, SharedInput::Users::one)) {}
+  /// @param input  of the options, which other runs may read as well
+  Deformation(const DeformOptions& options, std::shared_ptr<SharedInput> input)
+      : options_(options), record_(options), input_(std::move(input)) {}
 
   /// Reads headers, and plans. @throws what plan_deformation throws
   void open();
@@ -52,7 +57,7 @@ class Deformation {
 
   const DeformOptions& options_;
   DeformRecord record_;
-  std::optional<InputHeader> header_;
+  std::shared_ptr<SharedInput> input_;
   double open_seconds_ = 0;
   std::vector<std::string> warnings_;
   struct {
@@ -62,7 +67,6 @@ class Deformation {
   } mass_;  ///< with --preserve mass: in float
   std::vector<SliceRange> sampled_slices_;
   std::optional<DerivedSeriesWriter> series_;
-  std::future<std::string> input_hash_;  ///< of a file; the last member: ends before what it refers to
 };
 
 }  // namespace tetwarp::apps

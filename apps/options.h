@@ -32,6 +32,8 @@ struct InputOptions {
   bool single = false;  ///< read the one DICOM file alone
   bool uneven = false;  ///< take slices at uneven distances, each where it is
   FileHash hash = FileHash::made;  ///< of a DICOM series
+
+  friend bool operator==(const InputOptions&, const InputOptions&) = default;
 };
 
 struct PhantomOptions {

@@ -172,6 +172,13 @@ std::string hash_files(const DicomSeries& series, int threads, const Control& co
   return sources.hash();
 }
 
+std::shared_ptr<const DicomHeaders> copy_headers(const DicomHeaders& headers) {
+  auto copy = std::make_shared<DicomHeaders>();
+  copy->frames = headers.frames;
+  for (const auto& slice : headers.slices) copy->slices.push_back(std::make_unique<DcmDataset>(*slice));
+  return copy;
+}
+
 DicomVolume load_dicom(const DicomSeries& series, int threads, const Control& control, FileHash hash) {
   require(!series.refusal, series.refusal.value_or(""));
   require(!series.slices.empty(), "the series holds no slice, " + series.series_uid + "; choose another series");

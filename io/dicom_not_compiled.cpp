@@ -18,6 +18,8 @@ DicomScan scan_dicom(const std::filesystem::path&, bool, const Control&) { refus
 
 DicomVolume load_dicom(const DicomSeries&, int, const Control&, FileHash) { refuse(); }
 
+std::shared_ptr<const DicomHeaders> copy_headers(const DicomHeaders&) { refuse(); }
+
 std::string hash_files(const DicomSeries&, int, const Control&) { refuse(); }
 
 struct DerivedSeriesWriter::State {};

@@ -73,6 +73,8 @@ DicomScan scan_dicom(const std::filesystem::path& path, bool single = false, con
 
 /// The headers of a series' slices, k-th slice first to last: what a derived series carries over. Hides DCMTK.
 struct DicomHeaders;
+/// DCMTK's data sets remember where they were read last: headers are for one thread at a time, each other needs its copy.
+std::shared_ptr<const DicomHeaders> copy_headers(const DicomHeaders& headers);
 
 struct DicomVolume {
   Volume<std::int16_t> volume;          ///< HU, each slice through its own Rescale Slope and Intercept

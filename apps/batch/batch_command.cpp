@@ -151,7 +151,8 @@ int Batch::run() {
                   " cases at once (ulimit -u, or pids.max of the control group)");
   }
   Usage usage(devices.count(), cuda > 0, jobs);
-  Runner runner(open_, {memory, devices, results, progress, usage});
+  SharedInputs inputs;
+  Runner runner(open_, {{memory, devices, inputs}, results, progress, usage});
   const bool whole = runner.run(jobs, [&] {
     folder.remove_unfinished(ids());
     const int status = conclude(results, progress, usage, false);

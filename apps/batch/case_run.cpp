@@ -35,16 +35,16 @@ struct Retry {
 
 bool is_simulated_on_device(const DeformOptions& options) { return !options.scenario.empty(); }
 
-json attempt(const BatchCase& of, const Retry& retry, MemoryBudget& memory, Devices& devices,
-             const std::stop_token& stop, std::optional<int>& device, json& timing) {
+json attempt(const BatchCase& of, const Retry& retry, const Resources& resources, const std::stop_token& stop,
+             std::optional<int>& device, json& timing) {
   DeformOptions options = of.options;
   options.memory_bytes = retry.device_bytes;
   if (retry.on_cpu) options.backend = "cpu";
   Clock clock;
-  Deformation deformation(options);
+  Deformation deformation(options, resources.inputs.get(options.input));
   deformation.open();
   timing["open"] = clock.lap();
-  const MemoryBudget::Grant grant = memory.wait_for(deformation.record().plan.bytes, stop);
+  const MemoryBudget::Grant grant = resources.memory.wait_for(deformation.record().plan.bytes, stop);
   timing["wait_memory"] = clock.lap();
   deformation.read();
   timing["read"] = clock.lap();
@@ -53,7 +53,7 @@ json attempt(const BatchCase& of, const Retry& retry, MemoryBudget& memory, Devi
     timing["field"] = clock.lap();
   }
   {
-    const Devices::Lease lease = devices.wait_for(options.backend, stop);
+    const Devices::Lease lease = resources.devices.wait_for(options.backend, stop);
     timing["wait_device"] = clock.lap();
     Clock held;
     timing["worker"] = lease.worker().backend;
@@ -81,14 +81,14 @@ json attempt(const BatchCase& of, const Retry& retry, MemoryBudget& memory, Devi
 
 }  // namespace
 
-CaseOutcome run_case(const BatchCase& of, MemoryBudget& memory, Devices& devices, const std::stop_token& stop) {
+CaseOutcome run_case(const BatchCase& of, const Resources& resources, const std::stop_token& stop) {
   Retry retry;
   CaseOutcome outcome;
   for (;;) {
     std::optional<int> device;
     outcome.timing = {{"case", of.id}};
     try {
-      outcome.line = attempt(of, retry, memory, devices, stop, device, outcome.timing);
+      outcome.line = attempt(of, retry, resources, stop, device, outcome.timing);
       if (!retry.reasons.empty()) outcome.timing["made_again"] = retry.reasons;
       return outcome;
     } catch (const Cancelled&) {
@@ -101,7 +101,7 @@ CaseOutcome run_case(const BatchCase& of, MemoryBudget& memory, Devices& devices
         continue;
       }
       if (device && !is_memory) {
-        devices.lose(*device);
+        resources.devices.lose(*device);
         continue;
       }
       if (device && is_memory && of.options.backend == "auto") {

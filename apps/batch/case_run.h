@@ -20,6 +20,6 @@ struct CaseOutcome {
 /// Runs one case, from its headers to its folder's name. A device that fails is given up, and the case made again on
 /// another or on the processor; where its memory runs out, in slabs, then on the processor. The bits are the same.
 /// @throws Cancelled; whatever else goes wrong is the outcome
-CaseOutcome run_case(const BatchCase& of, MemoryBudget& memory, Devices& devices, const std::stop_token& stop);
+CaseOutcome run_case(const BatchCase& of, const Resources& resources, const std::stop_token& stop);
 
 }  // namespace tetwarp::apps

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "apps/deform_worker.h"
+#include "apps/shared_input.h"
 
 namespace tetwarp::apps {
 
@@ -80,6 +81,13 @@ class Devices {
   std::size_t count_;
   std::mutex mutex_;
   std::condition_variable_any changed_;
+};
+
+/// What the cases in work share.
+struct Resources {
+  MemoryBudget& memory;
+  Devices& devices;
+  SharedInputs& inputs;
 };
 
 /// What the system and its control group can still give, bytes.

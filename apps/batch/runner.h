@@ -17,8 +17,7 @@ namespace tetwarp::apps {
 class Runner {
  public:
   struct Parts {
-    MemoryBudget& memory;
-    Devices& devices;
+    Resources resources;
     Results& results;
     Progress& progress;
     Usage& usage;
