@@ -75,8 +75,8 @@ void add_job(const IoResults& results, std::vector<Floor>& floors) {
       return sum;
     };
     if (time.by == kJobProgram) {
-      add(floors, "program / sum of its stages", step, time.ms.median, sum_of({kJobIn, kJobField, kJobDeform, kJobOut}),
-          {false, 1.05, {}});
+      add(floors, "program / sum of its stages", step, time.ms.median,
+          sum_of({kJobIn, kJobField, kJobDeform, kJobOut, kJobFree}), {false, 1.05, {}});
     } else if (time.by == kJobCuda) {
       add(floors, "program with CUDA / in and out", step, time.ms.median, sum_of({kJobIn, kJobOut}), {false, 1.3, {}});
     } else if (time.by == kJobAwake) {

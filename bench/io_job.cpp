@@ -96,10 +96,8 @@ void add_job(Turns& turns, const fs::path& series, const fs::path& scratch, std:
   turns.add(step, kJobDeform, nothing([=] {
               deform(*job, *make_cpu_resampler(job->input.volume.geometry, {.threads = threads}), threads);
             }));
-  turns.add(step, kJobOut, nothing([=] { write(*job, out, threads); }), [=] {
-    remove();
-    *job = {};  // the program has the memory to itself
-  });
+  turns.add(step, kJobOut, nothing([=] { write(*job, out, threads); }), remove);
+  turns.add(step, kJobFree, nothing([=] { *job = {}; }));
 }
 
 }  // namespace tetwarp::bench

@@ -18,7 +18,8 @@ ms, median (q1-q3), each program in turn; CPU ms of all threads. All files were 
 to it; only the whole job flushes to the disk, as `tetwarp deform` does. In: list the folder and read it; the loop with
 DCMTK knows the order of the files. "tetwarp, hashed" makes the hash of the files as well, which `deform` records; it hashes every slice that it writes.
 ITK reads and writes series, and NIfTI, in one thread. Whole job: `tetwarp deform` as a program, and its stages alone;
-deform alone hashes the field, as the program does. The program writes slices while others are deformed.
+deform alone hashes the field, as the program does. The program writes slices while others are deformed. A program's memory is
+given back when it ends, so that is a stage, too.
 CUDA, awake: the whole job in this process, which has used the device before.
 
 )";

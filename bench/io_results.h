@@ -31,11 +31,12 @@ struct IoResults {
 };
 
 // Steps and programs as they are named in results.
-inline constexpr char kTetwarp[] = "tetwarp", kHashed[] = "tetwarp, hashed", kItk[] = "ITK", kDcmtk[] = "DCMTK", kDcmtk1[] = "DCMTK, 1 thread";
+inline constexpr char kTetwarp[] = "tetwarp", kHashed[] = "tetwarp, hashed", kItk[] = "ITK", kDcmtk[] = "DCMTK",
+                      kDcmtk1[] = "DCMTK, 1 thread";
 inline constexpr char kDicomIn[] = "DICOM in, ", kDicomOut[] = "DICOM out", kNiftiOut[] = ".nii.gz out",
                       kNiftiIn[] = ".nii.gz in, written by ", kJob[] = "whole job, ";
 inline constexpr char kJobIn[] = "in alone", kJobField[] = "field alone", kJobDeform[] = "deform alone",
-                      kJobOut[] = "out alone", kJobProgram[] = "tetwarp deform", kJobCuda[] = "tetwarp deform, CUDA",
-                      kJobAwake[] = "CUDA, awake";
+                      kJobOut[] = "out alone", kJobFree[] = "memory given back", kJobProgram[] = "tetwarp deform",
+                      kJobCuda[] = "tetwarp deform, CUDA", kJobAwake[] = "CUDA, awake";
 
 }  // namespace tetwarp::bench

@@ -78,11 +78,9 @@ TEST(IoFloors, GzippedNiftiIsHeldToTimeAndSize) {
 
 TEST(IoFloors, TheWholeJobIsHeldAgainstTheSumOfAllItsStages) {
   const std::string step = "whole job, cells of 4";
-  std::vector<IoTime> times = {{step, "tetwarp deform", ms(106)},
-                               {step, "in alone", ms(30)},
-                               {step, "field alone", ms(5)},
-                               {step, "deform alone", ms(45)},
-                               {step, "out alone", ms(20)}};
+  std::vector<IoTime> times = {{step, "tetwarp deform", ms(106)}, {step, "in alone", ms(30)},
+                               {step, "field alone", ms(5)},      {step, "deform alone", ms(45)},
+                               {step, "out alone", ms(17)},       {step, "memory given back", ms(3)}};
   expect_floor(find_floors(results_of(times)), "program / sum of its stages", step, 1.06, 1.05, false);
   times.pop_back();
   EXPECT_TRUE(find_floors(results_of(times)).empty()) << "a sum without one of its stages";
