@@ -33,7 +33,8 @@ void add_looks(CLI::App& command, RenderOptions& options) {
       ->capture_default_str();
   command
       .add_option("--step", options.step,
-                  "Between samples of a ray, 0.01 to 1, in the smallest spacing (default: half a pixel, but 0.5 to 1)")
+                  "Between samples of a ray, 0.01 to 1, in the smallest spacing (default: half a pixel, but 0.5 to 1; "
+                  "1 for xray)")
       ->check(CLI::Range(0.01, 1.0))
       ->type_name("VOXELS");
   command.add_option("--background", options.background, "Colour behind the volume")

@@ -16,7 +16,7 @@ namespace tetwarp {
 struct RenderStyle {
   TransferFunction transfer;
   /// Between two samples of a ray, in the smallest spacing of the volume, 0.01 to 1; nothing: half a pixel, but 0.5
-  /// to 1.
+  /// to 1, and 1 for a sum.
   std::optional<double> step_voxels = {};
   glm::dvec3 background{0};  ///< red, green, blue, 0 to 1: behind what is seen
 };

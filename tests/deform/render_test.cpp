@@ -152,6 +152,23 @@ TEST_P(Rendered, TheSumOfARampIsExact) {
   EXPECT_NEAR(render(*renderer, view(ramp), style, plane).grey(16, 16), 255 * (31.0 * 32 / 2) / 1000, 1.2);
 }
 
+TEST_P(Rendered, ASumHardlyDependsOnTheStep) {
+  const auto renderer = GetParam().make_renderer();
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE(seed_text(seed));
+  Random random(seed);
+  const Geometry grid = oblique_grid({80, 70, 60});
+  Volume<float> volume = blobs(grid, random);
+  for (float& value : volume.voxels) value += static_cast<float>(random.real(0, 5));
+  const ViewPlane plane = view_plane({.angle_deg = 33, .elevation_deg = 21, .width = 200, .height = 200}, grid);
+  RenderStyle style = summed(100, 4000);
+  const Image usual = render(*renderer, view(volume), style, plane);
+  style.step_voxels = 0.05;
+  const Image fine = render(*renderer, view(volume), style, plane);
+  EXPECT_GT(*std::max_element(fine.rgb.begin(), fine.rgb.end()), 20);
+  for (std::size_t n = 0; n < fine.rgb.size(); ++n) ASSERT_NEAR(usual.rgb[n], fine.rgb[n], 1) << n;
+}
+
 TEST_P(Rendered, TheMaximumIsTheLargestVoxelOnTheWay) {
   const auto renderer = GetParam().make_renderer();
   const std::uint64_t seed = test_seed();
