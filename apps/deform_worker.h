@@ -8,6 +8,7 @@ namespace tetwarp::apps {
 struct Worker {
   std::string backend = "auto";
   int device = 0;
+  void* stream = nullptr;  ///< of the device, for all that is queued there; null: its default stream
 };
 
 }  // namespace tetwarp::apps

@@ -83,10 +83,10 @@ void Deformation::resample(const Worker& worker) {
   // What --grid fit adds lies beyond the lattice; that this reaches over INPUT is known.
   const bool grown = options_.grid == "fit" && options_.outside == Outside::refuse;
   const Outside outside = grown ? Outside::background : options_.outside;
-  set_field(*backend.resampler, outside);
+  const Control quiet{.stop = interrupt_token(), .stream = worker.stream};
+  set_field(*backend.resampler, outside, quiet);
   if (!record_.points.empty())
-    record_.points.move(record_.plan.grid, view(record_.field.forward.field, outside), limits,
-                        {.stop = interrupt_token()});
+    record_.points.move(record_.plan.grid, view(record_.field.forward.field, outside), limits, quiet);
   sampled_slices_.resize(record_.outputs.series ? static_cast<std::size_t>(record_.plan.grid.size.z) : 0);
   if (record_.outputs.series)
     series_.emplace(record_.outputs.volume, record_.plan.grid, *record_.headers, input_derivation(record_));
@@ -97,6 +97,7 @@ void Deformation::resample(const Worker& worker) {
   std::vector<Target> targets = record_.outputs.further->targets_on(record_.plan.grid, false, options_.interpolation);
   targets.insert(targets.begin(), main_target());
   Control control = stage.control();
+  control.stream = worker.stream;
   if (record_.outputs.series || options_.preserve_mass) {
     control.finished = [&](const Region& slices) {
       if (options_.preserve_mass) scale_mass(slices);
@@ -108,19 +109,19 @@ void Deformation::resample(const Worker& worker) {
     record_.report += resample_slab(*backend.resampler, slab, targets, of_slab, control);
   });
   record_.report.clamped += mass_.saturated;
-  move_structures(*backend.resampler, outside);
+  move_structures(*backend.resampler, outside, quiet);
   resample_onto_own_grids(worker);
   record_.stages.emplace_back("resample", stage.seconds());
-  if (reports_quality(options_)) check(*backend.resampler);
+  if (reports_quality(options_)) check(*backend.resampler, quiet);
 }
 
 /// Looks at the field, and where its inverse leads. @param resampler  holds the field
-void Deformation::check(Resampler& resampler) {
+void Deformation::check(Resampler& resampler, const Control& control) {
   Stage stage(options_.common, "check");
   const Limits limits{.threads = options_.common.threads};
   const VertexField& field = record_.field.forward.field;
   record_.check = {.quality = measure_quality(field, limits, stage.control()),
-                   .trip = measure_round_trip(resampler, field, limits, {.stop = interrupt_token()})};
+                   .trip = measure_round_trip(resampler, field, limits, control)};
   record_.stages.emplace_back("check", stage.seconds());
 }
 
@@ -150,8 +151,7 @@ void Deformation::scale_mass(const Region& slices) {
       preserve_mass(std::as_const(mass_.resampled).view(), mass_.jacobian, record_.output.view(), slices);
 }
 
-void Deformation::set_field(Resampler& resampler, Outside outside) const {
-  const Control control{.stop = interrupt_token()};
+void Deformation::set_field(Resampler& resampler, Outside outside, const Control& control) const {
   if (record_.field.direction == Direction::pull) {
     resampler.set_field(view(record_.field.pull, outside), control);
   } else {
@@ -161,20 +161,20 @@ void Deformation::set_field(Resampler& resampler, Outside outside) const {
 
 void Deformation::resample_onto_own_grids(const Worker& worker) {
   const Limits limits{.threads = options_.common.threads, .memory = options_.memory_bytes.value_or(0)};
+  const Control control{.stop = interrupt_token(), .stream = worker.stream};
   for (const Geometry& grid : record_.outputs.further->own_grids()) {
     const Backend backend = make_backend(worker.backend, record_.field.direction, grid, worker.device, limits);
-    set_field(*backend.resampler, options_.outside);
+    set_field(*backend.resampler, options_.outside, control);
     const std::vector<Target> targets = record_.outputs.further->targets_on(grid, true, options_.interpolation);
-    backend.resampler->resample(whole(grid), targets, {}, {.stop = interrupt_token()});
+    backend.resampler->resample(whole(grid), targets, {}, control);
   }
 }
 
 /// @param resampler  holds the field
-void Deformation::move_structures(Resampler& resampler, Outside outside) {
+void Deformation::move_structures(Resampler& resampler, Outside outside, const Control& control) {
   FurtherStructures& structures = record_.outputs.structures;
   const Geometry& source = record_.input->volume.geometry();
   const Limits limits{.threads = options_.common.threads};
-  const Control control{.stop = interrupt_token()};
   std::optional<PointMover> mover;
   if (!structures.empty() && record_.field.direction == Direction::forward)
     mover.emplace(record_.plan.grid, view(record_.field.forward.field, outside), limits, control);

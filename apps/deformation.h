@@ -43,10 +43,10 @@ class Deformation {
 
  private:
   void note_series(const DicomSeries& series);
-  void check(Resampler& resampler);
-  void set_field(Resampler& resampler, Outside outside) const;
+  void check(Resampler& resampler, const Control& control);
+  void set_field(Resampler& resampler, Outside outside, const Control& control) const;
   void resample_onto_own_grids(const Worker& worker);
-  void move_structures(Resampler& resampler, Outside outside);
+  void move_structures(Resampler& resampler, Outside outside, const Control& control);
   void write_files();
   void write_field();
   void write_preview_picture();

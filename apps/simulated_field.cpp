@@ -60,7 +60,8 @@ SimulatedField simulate_field(const DeformOptions& options, const ConstVolumeVie
                                        [&](double part) {
                                          if (control.progress) control.progress((done + part) / run->frames());
                                        },
-                                   .stop = control.stop});
+                                   .stop = control.stop,
+                                   .stream = worker.stream});
     add_frame(record, frame, frame.ends_phase ? run->displacement() : std::vector<glm::vec3>());
   }
   result.field = run->field();

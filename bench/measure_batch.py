@@ -1,4 +1,5 @@
 """What `tetwarp batch` makes of devices and processors: cases a minute, with one device and with several, beside what device and files take alone.
+What a device takes alone comes from a batch with one job: the time that its cases hold the device, one after the other.
 
     measure_batch.py TETWARP FOLDER [--cases 24] [--size 512,512,300] [--devices 1,2] [--jobs 0] [--rounds 3] [--backend cuda]
                      [--scenario FILE]
@@ -62,30 +63,30 @@ def main():
     manifest = options.folder / "m.jsonl"
     manifest.write_text("".join(json.dumps({
         "case": f"c{n:03}", "input": sources[n % len(sources)].name, "seed": n, "output": "out.nii", **field}) + "\n" for n in range(options.cases)))
-    found, copies = {}, []
+    found, copies, alone = {}, [], []
     for _ in range(options.rounds):
         copies.append(copy_seconds(options.folder, sources, options.cases))
-        for devices in options.devices.split(","):
-            for jobs in options.jobs.split(","):
-                out = options.folder / "out"
-                shutil.rmtree(out, ignore_errors=True)
-                seen = dict(os.environ)
-                if options.backend == "cuda":
-                    seen["CUDA_VISIBLE_DEVICES"] = ",".join(map(str, range(int(devices))))
-                begun = time.time()
-                done = run([options.tetwarp, "batch", manifest, "-o", out, "--backend", options.backend, "--jobs", jobs], env=seen,
-                           capture_output=True, text=True)
-                wall = time.time() - begun
-                timings = [json.loads(line) for line in (out / "timings.jsonl").read_text().splitlines()]
-                on_device = sum(t["on_device"] for t in timings) / int(devices)
-                found.setdefault((devices, jobs), []).append((wall, on_device, done.stderr.strip().splitlines()[-1]))
-    copy = statistics.median(copies)
-    print(f"{options.cases} cases of {options.size} voxels, int16; copying their files alone takes {copy:.2f} s\n")
-    print("| devices | jobs | s | cases a minute | on a device, s | slower of copying and device / s | bottleneck |")
-    print("| --- | --- | --- | --- | --- | --- | --- |")
+        for devices, jobs in [("1", "1")] + [(d, j) for d in options.devices.split(",") for j in options.jobs.split(",")]:
+            out = options.folder / "out"
+            shutil.rmtree(out, ignore_errors=True)
+            seen = dict(os.environ)
+            if options.backend == "cuda":
+                seen["CUDA_VISIBLE_DEVICES"] = ",".join(map(str, range(int(devices))))
+            begun = time.time()
+            done = run([options.tetwarp, "batch", manifest, "-o", out, "--backend", options.backend, "--jobs", jobs], env=seen,
+                       capture_output=True, text=True)
+            wall = time.time() - begun
+            timings = [json.loads(line) for line in (out / "timings.jsonl").read_text().splitlines()]
+            if jobs == "1":
+                alone.append(sum(t["on_device"] for t in timings))
+            found.setdefault((devices, jobs), []).append((wall, done.stderr.strip().splitlines()[-1]))
+    copy, device = statistics.median(copies), statistics.median(alone)
+    print(f"{options.cases} cases of {options.size} voxels, int16; copying their files alone takes {copy:.2f} s, a device alone {device:.2f} s\n")
+    print("| devices | jobs | s | cases a minute | slower of copying and devices / s | bottleneck |")
+    print("| --- | --- | --- | --- | --- | --- |")
     for (devices, jobs), rounds in found.items():
-        wall, on_device, words = sorted(rounds)[len(rounds) // 2]
-        print(f"| {devices} | {jobs} | {wall:.2f} | {60 * options.cases / wall:.1f} | {on_device:.2f} | {max(copy, on_device) / wall:.2f} | "
+        wall, words = sorted(rounds)[len(rounds) // 2]
+        print(f"| {devices} | {jobs} | {wall:.2f} | {60 * options.cases / wall:.1f} | {max(copy, device / int(devices)) / wall:.2f} | "
               f"{words.removeprefix('bottleneck: ')} |")
 
 

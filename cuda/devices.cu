@@ -1,6 +1,6 @@
 #include "cuda/devices.h"
 
-#include "cuda/check.h"
+#include "cuda/device_buffer.h"
 
 namespace tetwarp {
 
@@ -16,6 +16,15 @@ int cuda_device_count() {
 void wake_cuda_device(int device) {
   if (cudaSetDevice(device) != cudaSuccess || cudaFree(nullptr) != cudaSuccess) cudaGetLastError();  // told when used
 }
+
+DeviceStream::DeviceStream(int device) {
+  const cuda_detail::DeviceScope scope(device);
+  cudaStream_t stream = nullptr;
+  TETWARP_CUDA_TRY(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking));
+  stream_ = stream;
+}
+
+DeviceStream::~DeviceStream() { cudaStreamDestroy(static_cast<cudaStream_t>(stream_)); }
 
 std::string describe_cuda_device(int device) {
   cudaDeviceProp properties{};

@@ -20,6 +20,10 @@ int cuda_device_count() { return 0; }
 
 void wake_cuda_device(int) {}
 
+DeviceStream::DeviceStream(int) { not_compiled(); }
+
+DeviceStream::~DeviceStream() = default;
+
 std::string describe_cuda_device(int) { not_compiled(); }
 
 std::unique_ptr<Resampler> make_cuda_resampler(Geometry, int, Limits) { not_compiled(); }

@@ -150,7 +150,7 @@ int Batch::run() {
     progress.warn("the system gives only " + std::to_string(*threads.limit()) + " threads: " + std::to_string(jobs) +
                   " cases at once (ulimit -u, or pids.max of the control group)");
   }
-  Usage usage(devices.count(), cuda > 0, jobs);
+  Usage usage(devices.places(), devices.count(), cuda > 0, jobs);
   SharedInputs inputs;
   Runner runner(open_, {{memory, devices, inputs}, results, progress, usage});
   const bool whole = runner.run(jobs, [&] {

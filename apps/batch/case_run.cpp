@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "apps/batch/case_record.h"
+#include "cuda/devices.h"
 
 namespace tetwarp::apps {
 
@@ -28,6 +29,7 @@ class Clock {
 
 /// How often a case was begun anew, and what it may use from then on.
 struct Retry {
+  bool alone = false;  ///< on its device
   std::optional<std::uint64_t> device_bytes;
   bool on_cpu = false;
   json reasons = json::array();
@@ -53,19 +55,23 @@ json attempt(const BatchCase& of, const Retry& retry, const Resources& resources
     timing["field"] = clock.lap();
   }
   {
-    const Devices::Lease lease = resources.devices.wait_for(options.backend, stop);
+    const auto share = retry.alone ? Devices::Share::alone : Devices::Share::with_others;
+    const Devices::Lease lease = resources.devices.wait_for(options.backend, share, stop);
     timing["wait_device"] = clock.lap();
     Clock held;
-    timing["worker"] = lease.worker().backend;
-    if (lease.worker().backend == "cuda") {
-      device = lease.worker().device;
+    Worker worker = lease.worker();
+    timing["worker"] = worker.backend;
+    std::optional<DeviceStream> stream;  // cases on a device do not wait for each other
+    if (worker.backend == "cuda") {
+      device = worker.device;
       timing["device"] = *device;
+      worker.stream = stream.emplace(*device).get();
     }
     if (is_simulated_on_device(options)) {
-      deformation.make_field(lease.worker());
+      deformation.make_field(worker);
       timing["field"] = clock.lap();
     }
-    deformation.resample(lease.worker());
+    deformation.resample(worker);
     timing["resample"] = clock.lap();
     timing["on_device"] = held.lap();
   }
@@ -96,6 +102,10 @@ CaseOutcome run_case(const BatchCase& of, const Resources& resources, const std:
     } catch (const DeviceError& error) {
       const bool is_memory = dynamic_cast<const DeviceMemoryError*>(&error) != nullptr;
       retry.reasons.push_back(error.what());
+      if (device && is_memory && !retry.alone) {
+        retry.alone = true;  // others may have held what it needed
+        continue;
+      }
       if (device && is_memory && !retry.device_bytes) {
         retry.device_bytes = kScarceDeviceBytes;
         continue;
@@ -104,7 +114,7 @@ CaseOutcome run_case(const BatchCase& of, const Resources& resources, const std:
         resources.devices.lose(*device);
         continue;
       }
-      if (device && is_memory && of.options.backend == "auto") {
+      if (device && is_memory && resources.devices.may_fall_back(of.options.backend)) {
         retry.on_cpu = true;
         continue;
       }

@@ -37,50 +37,57 @@ MemoryBudget::Grant::~Grant() {
 }
 
 Devices::Devices(const std::string& wanted, int cuda) : wanted_(wanted), cuda_(wanted == "cpu" ? 0 : cuda) {
-  for (int device = 0; device < cuda_; ++device) free_.insert(device);
+  free_.assign(static_cast<std::size_t>(cuda_), kPlaces);
   count_ = std::max<std::size_t>(1, free_.size());
 }
 
 bool Devices::is_cuda(const std::string& wanted) const {
-  const std::string& of_case = wanted == "auto" ? wanted_ : wanted;
-  return of_case == "cuda" || (of_case == "auto" && cuda_ > static_cast<int>(lost_.size()));
+  const std::string& of_case = meant_by(wanted);
+  return of_case == "cuda" || (of_case == "auto" && is_any_left());
 }
 
-Devices::Lease Devices::wait_for(const std::string& wanted, const std::stop_token& stop) {
+Devices::Lease Devices::wait_for(const std::string& wanted, Share share, const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
+  const bool alone = share == Share::alone;
+  const int places = alone ? kPlaces : 1;
+  const auto freest = [&] { return std::max_element(free_.begin(), free_.end()); };
   const auto can_go_on = [&] {
     if (!is_cuda(wanted)) return cpu_is_free_;
-    return !free_.empty() || static_cast<int>(lost_.size()) >= cuda_;
+    return !is_any_left() || (*freest() >= places && (alone || waiting_alone_ == 0));
   };
-  if (!changed_.wait(lock, stop, can_go_on)) throw Cancelled();
+  waiting_alone_ += alone;
+  const bool goes_on = changed_.wait(lock, stop, can_go_on);
+  waiting_alone_ -= alone;
+  if (alone) changed_.notify_all();
+  if (!goes_on) throw Cancelled();
   if (!is_cuda(wanted)) {
     cpu_is_free_ = false;
-    return {*this, {"cpu", 0}};
+    return {*this, {"cpu", 0}, 0};
   }
-  if (free_.empty())
+  if (!is_any_left())
     throw DeviceError("no CUDA device is left for the case; use --backend auto, the bits are the same");
-  const int device = *free_.begin();
-  free_.erase(free_.begin());
-  return {*this, {"cuda", device}};
+  const auto device = freest();
+  *device -= places;
+  return {*this, {"cuda", static_cast<int>(device - free_.begin())}, places};
 }
 
 void Devices::lose(int device) {
   const std::lock_guard lock(mutex_);
   lost_.insert(device);
-  free_.erase(device);
+  free_[static_cast<std::size_t>(device)] = 0;
   changed_.notify_all();
 }
 
-void Devices::give_back(const Worker& worker) {
+void Devices::give_back(const Worker& worker, int places) {
   const std::lock_guard lock(mutex_);
   if (worker.backend == "cpu")
     cpu_is_free_ = true;
   else if (!lost_.contains(worker.device))
-    free_.insert(worker.device);
+    free_[static_cast<std::size_t>(worker.device)] += places;
   changed_.notify_all();
 }
 
-Devices::Lease::~Lease() { of_->give_back(worker_); }
+Devices::Lease::~Lease() { of_->give_back(worker_, places_); }
 
 namespace {
 

@@ -42,17 +42,21 @@ class MemoryBudget {
   std::condition_variable_any changed_;
 };
 
-/// Who resamples: every CUDA device that works, or the processor, one case at a time each. Cases take whichever is
-/// free.
+/// Who resamples: every CUDA device that works, a few cases at a time, or the processor, one case at a time. Cases take
+/// whichever is free.
 class Devices {
  public:
+  /// Cases that share a CUDA device: while one computes there, others copy, and a simulation leaves room for more.
+  static constexpr int kPlaces = 3;
+  enum class Share { with_others, alone };
+
   /// @param wanted  auto, cpu or cuda. @param cuda  how many devices there are
   Devices(const std::string& wanted, int cuda);
 
   /// A device, until it dies.
   class Lease {
    public:
-    Lease(Devices& of, Worker worker) : of_(&of), worker_(std::move(worker)) {}
+    Lease(Devices& of, Worker worker, int places) : of_(&of), worker_(std::move(worker)), places_(places) {}
     ~Lease();
     Lease(const Lease&) = delete;
     Lease& operator=(const Lease&) = delete;
@@ -61,21 +65,31 @@ class Devices {
    private:
     Devices* of_;
     Worker worker_;
+    int places_;
   };
 
   /// Waits for one. @param wanted  what a case asks for: auto takes what the batch was given
+  /// @param share  alone: a CUDA device without other cases; those that come later wait meanwhile
   /// @throws DeviceError where CUDA is wanted and no device is left, Cancelled when it has to stop
-  Lease wait_for(const std::string& wanted, const std::stop_token& stop);
+  Lease wait_for(const std::string& wanted, Share share, const std::stop_token& stop);
+  /// Whether the processor may take a case that no CUDA device can. @param wanted  what the case asks for
+  bool may_fall_back(const std::string& wanted) const { return meant_by(wanted) == "auto"; }
   /// A device is given to nobody any more.
   void lose(int device);
   std::size_t count() const { return count_; }  ///< of those that there were at first, the processor as one
+  /// Cases that resample at once at most, on those that there were at first.
+  std::size_t places() const { return cuda_ > 0 ? count_ * kPlaces : 1; }
 
  private:
+  const std::string& meant_by(const std::string& wanted) const { return wanted == "auto" ? wanted_ : wanted; }
   bool is_cuda(const std::string& wanted) const;
-  void give_back(const Worker& worker);
+  bool is_any_left() const { return static_cast<int>(lost_.size()) < cuda_; }
+  void give_back(const Worker& worker, int places);
 
   std::string wanted_;
-  std::set<int> free_, lost_;
+  std::vector<int> free_;  ///< places of each CUDA device
+  std::set<int> lost_;
+  int waiting_alone_ = 0;
   bool cpu_is_free_ = true;
   int cuda_;
   std::size_t count_;

@@ -33,8 +33,8 @@ std::string percent(double share) {
 
 }  // namespace
 
-Usage::Usage(std::size_t devices, bool cuda, std::size_t jobs)
-    : devices_(devices), jobs_(jobs), cuda_(cuda), processor_before_(processor_seconds()) {}
+Usage::Usage(std::size_t places, std::size_t devices, bool cuda, std::size_t jobs)
+    : places_(places), devices_(devices), jobs_(jobs), cuda_(cuda), processor_before_(processor_seconds()) {}
 
 void Usage::add(const json& timing) {
   const std::lock_guard lock(mutex_);
@@ -58,7 +58,7 @@ json Usage::report() const {
   }
   const auto on_device = seconds_.find(kOnDevice);
   if (cuda_ && on_device != seconds_.end())
-    document["devices"] = on_device->second / (static_cast<double>(devices_) * wall());
+    document["devices"] = on_device->second / (static_cast<double>(places_) * wall());
   return document;
 }
 

@@ -11,8 +11,8 @@ namespace tetwarp::apps {
 /// What a batch was busy with: for the sentence that says what held it up.
 class Usage {
  public:
-  /// @param devices  that resample at once. @param jobs  cases in work at once
-  Usage(std::size_t devices, bool cuda, std::size_t jobs);
+  /// @param places  of cases that resample at once, on so many `devices`. @param jobs  cases in work at once
+  Usage(std::size_t places, std::size_t devices, bool cuda, std::size_t jobs);
 
   /// Seconds of a case by stage, as in timings.jsonl. May be called by several threads.
   void add(const nlohmann::json& timing);
@@ -25,7 +25,7 @@ class Usage {
   double wall() const;
   double processor_share() const;
 
-  std::size_t devices_, jobs_;
+  std::size_t places_, devices_, jobs_;
   bool cuda_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   double processor_before_;
