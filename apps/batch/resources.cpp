@@ -48,7 +48,7 @@ bool Devices::is_cuda(const std::string& wanted) const {
 
 Devices::Lease Devices::wait_for(const std::string& wanted, Share share, const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
-  const bool alone = share == Share::alone;
+  const bool alone = share == Share::alone && is_cuda(wanted);
   const int places = alone ? kPlaces : 1;
   const auto freest = [&] { return std::max_element(free_.begin(), free_.end()); };
   const auto can_go_on = [&] {
