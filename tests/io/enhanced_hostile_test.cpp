@@ -244,7 +244,9 @@ TEST_F(HostileEnhancedCt, TenThousandFramesAreListedInLittleMemory) {
   const long growth = peak_growth([&] { scan = scan_dicom(file_); });
   ASSERT_EQ(scan.series.size(), 1u);
   EXPECT_EQ(scan.series.front().slices.size(), 10'000u);
+#ifndef __SANITIZE_ADDRESS__  // which keeps what was freed
   EXPECT_LT(growth, 150);
+#endif
   RecordProperty("mebibytes", std::to_string(growth));
 }
 
