@@ -20,6 +20,15 @@ constexpr int kRangeBlocks = (kRangeThreads - kMostRayReach) / kRayBlock + 1;  /
 constexpr int kPatchWidth = 8, kPatchHeight = 4;  ///< pixels of a warp: near rays read the same voxels
 constexpr int kPatches = 4;                       ///< of a thread block
 
+/// In the renderer's copy of a volume, rows and slices begin so many bytes further in a cache line than those before
+/// them. Rays that run along i read several rows and slices at once, and where all begin alike, as rows of 512 voxels
+/// do, they wait for the same bank.
+constexpr int kLine = 128, kRowShift = 16, kSliceRows = 5;  ///< a slice begins as far as so many rows
+constexpr int kMostStride = 1 << 30;                        ///< two of them are an int
+
+/// The least number from `least` on that is `rest` beyond a multiple of `unit`.
+int at_least(int least, int rest, int unit) { return least + ((rest - least) % unit + unit) % unit; }
+
 /// What voxels are compared as: whole numbers as they are.
 template <class V>
 struct Extremes {
@@ -90,7 +99,8 @@ __global__ void spread_kernel(const std::uint8_t* from, glm::ivec3 blocks, int a
 }
 
 template <class V>
-__global__ void ray_kernel(RayScene<V> scene, int width, int height, std::uint8_t* rgb) {
+__global__ void __launch_bounds__(kPatches * 32, 8)
+    ray_kernel(RayScene<V> scene, int width, int height, std::uint8_t* rgb) {
   const int lane = static_cast<int>(threadIdx.x) % 32, patch = static_cast<int>(threadIdx.x) / 32;
   const int x = (static_cast<int>(blockIdx.x) * kPatches + patch) * kPatchWidth + lane % kPatchWidth,
             y = static_cast<int>(blockIdx.y) * kPatchHeight + lane / kPatchWidth;
@@ -106,7 +116,7 @@ unsigned blocks_of(int count, int threads) { return static_cast<unsigned>((count
 
 class CudaRenderer final : public Renderer {
  public:
-  explicit CudaRenderer(int device) : device_(device) {
+  CudaRenderer(int device, Limits limits) : device_(device), limits_(limits) {
     const DeviceScope scope(device_);
     uploads_ = std::make_unique<Uploads>();
   }
@@ -125,17 +135,22 @@ class CudaRenderer final : public Renderer {
   void render(const ViewPlane& plane, std::span<std::uint8_t> rgb, const Control& control) override;
 
  private:
+  void copy_volume(cudaStream_t stream);
   void prepare(const RayFrame& frame, double step, cudaStream_t stream);
   void find_distances(const RayFrame& frame, const std::vector<TransferEntry>& table, cudaStream_t stream);
   int block_count() const { return blocks_.x * blocks_.y * blocks_.z; }
 
   int device_;
+  Limits limits_;
   std::unique_ptr<Uploads> uploads_;
   Geometry geometry_;
   ConstVolumeView volume_;  ///< on the device
   glm::ivec3 blocks_{0};
   RenderStyle style_;
   DeviceBuffer<std::byte> voxels_;  ///< of a volume on the host
+  DeviceBuffer<std::byte> copy_;
+  const std::byte* read_ = nullptr;  ///< by rays: the copy, or the volume where there is no room for one
+  glm::ivec3 strides_{0};            ///< of what is read
   DeviceBuffer<BlockRange> ranges_;
   DeviceBuffer<std::uint8_t> distances_, other_distances_, tint_numbers_, picture_;
   DeviceBuffer<TransferEntry> table_, tint_colours_;
@@ -147,6 +162,32 @@ class CudaRenderer final : public Renderer {
   double table_step_ = 0;  ///< mm, that the tables are for
   bool distances_are_stale_ = true;
 };
+
+void CudaRenderer::copy_volume(cudaStream_t stream) {
+  const glm::ivec3 size(geometry_.size);
+  const int bytes = static_cast<int>(size_bytes(volume_.type));
+  const int row = at_least(size.x, kRowShift / bytes, kLine / bytes),
+            rows = at_least(size.y, kSliceRows, kLine / kRowShift);
+  const std::int64_t slice = std::int64_t{row} * rows;
+  const auto pitch = static_cast<std::size_t>(row * bytes), width = static_cast<std::size_t>(size.x * bytes),
+             all = static_cast<std::size_t>(slice * size.z * bytes);
+  read_ = volume_.voxels;
+  strides_ = {1, size.x, size.x * size.y};
+  if (slice > kMostStride || (limits_.memory != 0 && all > limits_.memory)) return;
+  cudaMemcpy3DParms copy{};
+  try {
+    copy.dstPtr = make_cudaPitchedPtr(copy_.reserve(all), pitch, width, static_cast<std::size_t>(rows));
+  } catch (const DeviceMemoryError&) {
+    return;
+  }
+  void* const voxels = const_cast<std::byte*>(volume_.voxels);
+  copy.srcPtr = make_cudaPitchedPtr(voxels, width, width, static_cast<std::size_t>(size.y));
+  copy.extent = {width, static_cast<std::size_t>(size.y), static_cast<std::size_t>(size.z)};
+  copy.kind = cudaMemcpyDeviceToDevice;
+  TETWARP_CUDA_TRY(cudaMemcpy3DAsync(&copy, stream));
+  read_ = copy_.data();
+  strides_ = {1, row, static_cast<int>(slice)};
+}
 
 void CudaRenderer::set_volume(const ConstVolumeView& volume, const Control& control) {
   require_renderable(volume);
@@ -161,6 +202,7 @@ void CudaRenderer::set_volume(const ConstVolumeView& volume, const Control& cont
     uploads_->copy(voxels_.reserve(bytes), volume.voxels, bytes, stream);
     volume_.voxels = voxels_.data();
   }
+  copy_volume(stream);
   blocks_ = ray_blocks(geometry_);
   ranges_.reserve(static_cast<std::size_t>(block_count()));
   const int rows = (blocks_.x + kRangeBlocks - 1) / kRangeBlocks, row = (blocks_.x + rows - 1) / rows;
@@ -238,7 +280,7 @@ void CudaRenderer::render(const ViewPlane& plane, std::span<std::uint8_t> rgb, c
   const dim3 grid(blocks_of(plane.width, kPatches * kPatchWidth), blocks_of(plane.height, kPatchHeight));
   dispatch(volume_.type, [&](auto voxel) {
     using V = decltype(voxel);
-    const RayScene<V> scene{frame, tables, reinterpret_cast<const V*>(volume_.voxels)};
+    const RayScene<V> scene{frame, tables, {reinterpret_cast<const V*>(read_), glm::ivec3(geometry_.size), strides_}};
     ray_kernel<<<grid, kPatches * 32, 0, stream>>>(scene, plane.width, plane.height, pixels);
   });
   TETWARP_CUDA_TRY(cudaGetLastError());
@@ -250,8 +292,8 @@ void CudaRenderer::render(const ViewPlane& plane, std::span<std::uint8_t> rgb, c
 
 }  // namespace cuda_detail
 
-std::unique_ptr<Renderer> make_cuda_renderer(int device, Limits) {
-  return std::make_unique<cuda_detail::CudaRenderer>(device);
+std::unique_ptr<Renderer> make_cuda_renderer(int device, Limits limits) {
+  return std::make_unique<cuda_detail::CudaRenderer>(device, limits);
 }
 
 }  // namespace tetwarp

@@ -30,7 +30,6 @@ constexpr int kFarthestBlock = 15;
 
 /// What the rays of a picture need to know, but for the voxels. Positions are continuous indices of the volume.
 struct RayFrame {
-  glm::ivec3 size{0};
   Projection projection = Projection::composite;
   float lowest = 0, per_value = 0;                ///< of the table: entry = (value - lowest) * per_value
   glm::vec3 first{0}, per_column{0}, per_row{0};  ///< where the ray of a pixel begins
@@ -55,9 +54,7 @@ struct RayTables {
 };
 
 template <class V>
-struct RayScene : RayFrame, RayTables {
-  const V* voxels = nullptr;  ///< i fastest
-};
+struct RayScene : RayFrame, RayTables, ray::RayVolume<V> {};
 
 /// The entry that a value would have in a table without ends.
 TETWARP_INLINE_HD int endless_entry(const RayFrame& frame, float value) {
@@ -119,7 +116,7 @@ TETWARP_INLINE_HD glm::vec3 index_of(const RayScene<V>& scene, const Span& span,
 
 template <class V>
 TETWARP_INLINE_HD float sample(const RayScene<V>& scene, const RayPlace& place) {
-  return value_in(cell_at(scene.voxels, scene.size, place));
+  return value_at<V>(scene, place);
 }
 
 template <class V>
@@ -149,12 +146,12 @@ TETWARP_INLINE_HD int behind(const RayScene<V>& scene, const Span& span, int n, 
 /// stays as it is.
 template <class V>
 TETWARP_INLINE_HD glm::vec3 lit(const RayScene<V>& scene, const glm::vec3& colour, const glm::vec3& index) {
-  const glm::vec3 slope =
-      scene.to_gradient * differences_in(cell_at(scene.voxels, scene.size, place_among(scene.size, index)));
+  const glm::vec3 slope = scene.to_gradient * differences_at<V>(scene, place_among(scene.size, index));
   const float steepness = std::sqrt(dot(slope, slope));
   if (!(steepness > 0)) return colour;
-  const float towards = std::abs(dot(slope, scene.light)) / steepness;
-  float shine = std::abs(dot(slope, scene.halfway)) / steepness;
+  const float inverse = 1 / steepness;
+  const float towards = std::abs(dot(slope, scene.light)) * inverse;
+  float shine = std::abs(dot(slope, scene.halfway)) * inverse;
   for (int doubled = 0; doubled < 5; ++doubled) shine *= shine;  // to the power of 32
   const float surface = smaller(steepness / scene.full_gradient, 1.0f);
   const float factor = 1 + surface * (scene.ambient + scene.diffuse * towards - 1),
@@ -210,7 +207,7 @@ TETWARP_INLINE_HD glm::vec3 composite(const RayScene<V>& scene, const Span& span
   constexpr int kUnknown = -(1 << 30);
   const auto entry_at = [&](const RayPlace& place) {
     const float value = sample(scene, place);
-    return value == value ? endless_entry(scene, value) : kUnknown;
+    return is_number<V>(value) ? endless_entry(scene, value) : kUnknown;
   };
   int before = kUnknown;  // entry of the sample before
   for (int n = span.begin; n < span.end;) {
@@ -252,13 +249,14 @@ TETWARP_INLINE_HD glm::vec3 maximum(const RayScene<V>& scene, const Span& span) 
   for (int n = span.begin; n < span.end;) {
     const RayPlace place = place_among(scene.size, index_of(scene, span, steps_to(span, n)));
     const glm::ivec3 block = block_of(place);
-    if (found && scene.ranges[number_in(scene.blocks, block)].most <= most) {
-      n = behind(scene, span, n, block, 0);
+    const std::int64_t number = number_in(scene.blocks, block);
+    if (found && scene.ranges[number].most <= larger(most, scene.lowest)) {  // nothing that would be seen
+      n = behind(scene, span, n, block, larger(scene.distances[number] - 1, 0));
       continue;
     }
     ++n;
     const float value = sample(scene, place);
-    if (value != value || (found && value <= most)) continue;
+    if (!is_number<V>(value) || (found && value <= most)) continue;
     most = value;
     found = true;
   }
@@ -269,18 +267,20 @@ TETWARP_INLINE_HD glm::vec3 maximum(const RayScene<V>& scene, const Span& span) 
 
 template <class V>
 TETWARP_INLINE_HD glm::vec3 integral(const RayScene<V>& scene, const Span& span) {
-  float total = 0;
+  float total = 0, from = steps_to(span, span.begin - 1);
   for (int n = span.begin; n < span.end;) {
-    const float from = steps_to(span, n - 1), to = steps_to(span, n);
+    const float to = steps_to(span, n);
     const RayPlace place = place_among(scene.size, index_of(scene, span, 0.5f * (from + to)));  // of the piece's middle
     const glm::ivec3 block = block_of(place);
     if (const int empty = scene.distances[number_in(scene.blocks, block)]; empty > 0) {
       n = behind(scene, span, n, block, empty - 1);
+      from = steps_to(span, n - 1);
       continue;
     }
     ++n;
     const float value = sample(scene, place);
-    if (value == value) total += look_up(scene, value).opacity * (to - from);
+    if (is_number<V>(value)) total += look_up(scene, value).opacity * (to - from);
+    from = to;
   }
   return scene.background + (glm::vec3(1) - scene.background) * smaller(total, 1.0f);
 }

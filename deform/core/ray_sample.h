@@ -1,19 +1,32 @@
 #pragma once
 
 #include <cstdint>
+#include <type_traits>
 
 #include "deform/core/host_device.h"
 
 // Values of a volume between its voxels, in float, and how they change: what rays see.
 namespace tetwarp::ray {
 
+// On the device an instruction each; of equal zeros either may come out.
+#ifdef __CUDA_ARCH__
+TETWARP_INLINE_HD float smaller(float a, float b) { return fminf(a, b); }
+TETWARP_INLINE_HD float larger(float a, float b) { return fmaxf(a, b); }
+#else
 TETWARP_INLINE_HD float smaller(float a, float b) { return a < b ? a : b; }
 TETWARP_INLINE_HD float larger(float a, float b) { return a > b ? a : b; }
+#endif
 TETWARP_INLINE_HD float clamped(float value, float low, float high) { return smaller(larger(value, low), high); }
 TETWARP_INLINE_HD int smaller(int a, int b) { return a < b ? a : b; }
 TETWARP_INLINE_HD int larger(int a, int b) { return a > b ? a : b; }
 TETWARP_INLINE_HD int clamped(int value, int low, int high) { return smaller(larger(value, low), high); }
 TETWARP_INLINE_HD float dot(const glm::vec3& a, const glm::vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+
+/// Whether what was sampled among voxels of a type is a number: among whole numbers it always is.
+template <class V>
+TETWARP_INLINE_HD bool is_number(float value) {
+  return std::is_integral_v<V> || value == value;
+}
 
 /// A continuous index among the voxels; beyond the outermost centres it is theirs.
 struct RayPlace {
@@ -31,10 +44,33 @@ TETWARP_INLINE_HD RayPlace place_among(const glm::ivec3& size, const glm::vec3& 
   return place;
 }
 
+/// In one instruction on the device, where compilers move the conversion of one factor out of a loop and take five.
+TETWARP_INLINE_HD std::int64_t wide_product(int a, int b) {
+#ifdef __CUDA_ARCH__
+  std::int64_t product;
+  asm("mul.wide.s32 %0, %1, %2;" : "=l"(product) : "r"(a), "r"(b));
+  return product;
+#else
+  return std::int64_t{a} * b;
+#endif
+}
+
 /// The number of an element of a grid, i fastest. @param size  so that a slice has less than 2^31 elements
 TETWARP_INLINE_HD std::int64_t number_in(const glm::ivec3& size, const glm::ivec3& element) {
-  return std::int64_t{element.z * size.y + element.y} * size.x + element.x;
+  return wide_product(element.z * size.y + element.y, size.x) + element.x;
 }
+
+/// Voxels, i fastest.
+template <class V>
+struct RayVolume {
+  const V* voxels = nullptr;
+  glm::ivec3 size{0};
+  glm::ivec3 strides{0};  ///< values from a voxel to the next along each axis, less than 2^31; 1 along i
+
+  TETWARP_INLINE_HD const V* at(const glm::ivec3& voxel) const {
+    return voxels + wide_product(voxel.z, strides.z) + (voxel.y * strides.y + voxel.x);
+  }
+};
 
 /// The eight voxels around a place and what lies between them.
 template <class V>
@@ -47,19 +83,24 @@ struct Cell {
 };
 
 template <class V>
-TETWARP_INLINE_HD Cell<V> cell_at(const V* voxels, const glm::ivec3& size, const RayPlace& place) {
+TETWARP_INLINE_HD Cell<V> cell_at(const RayVolume<V>& volume, const RayPlace& place) {
   Cell<V> cell;
-  cell.corner = voxels + number_in(size, place.whole);
+  cell.corner = volume.at(place.whole);
   cell.fraction = place.fraction;
-  int stride = 1;
   for (int axis = 0; axis < 3; ++axis) {
-    const int last = size[axis] - 1, whole = place.whole[axis];
+    const int last = volume.size[axis] - 1, whole = place.whole[axis], stride = volume.strides[axis];
     cell.before[axis] = whole > 0 ? stride : 0;
     cell.next[axis] = whole < last ? stride : 0;
     cell.beyond[axis] = whole + 1 < last ? 2 * stride : cell.next[axis];
-    stride *= size[axis];
   }
   return cell;
+}
+
+/// The same where none of them is beyond an end of the volume: along i at distances that the compiler knows.
+template <class V>
+TETWARP_INLINE_HD Cell<V> inner_cell_at(const RayVolume<V>& volume, const RayPlace& place) {
+  const int row = volume.strides.y, slice = volume.strides.z;
+  return {volume.at(place.whole), place.fraction, {1, row, slice}, {1, row, slice}, {2, 2 * row, 2 * slice}};
 }
 
 template <class V>
@@ -84,6 +125,14 @@ TETWARP_INLINE_HD float value_in(const Cell<V>& cell) {
   return over_side(along_i, cell.next[1], cell.next[2], cell.fraction.y, cell.fraction.z);
 }
 
+/// `value_in` of the cell around a place.
+template <class V>
+TETWARP_INLINE_HD float value_at(const RayVolume<V>& volume, const RayPlace& place) {
+  bool inner = true;
+  for (int axis = 0; axis < 3; ++axis) inner = inner && place.whole[axis] < volume.size[axis] - 1;
+  return inner ? value_in(inner_cell_at(volume, place)) : value_in(cell_at(volume, place));
+}
+
 /// Differences of the values a voxel further and a voxel before along each axis, halved: central differences, linear
 /// between voxels.
 template <class V>
@@ -101,6 +150,15 @@ TETWARP_INLINE_HD glm::vec3 differences_in(const Cell<V>& cell) {
         0.5f * over_side(along, cell.next[right], cell.next[up], cell.fraction[right], cell.fraction[up]);
   }
   return difference;
+}
+
+/// `differences_in` of the cell around a place.
+template <class V>
+TETWARP_INLINE_HD glm::vec3 differences_at(const RayVolume<V>& volume, const RayPlace& place) {
+  bool inner = true;
+  for (int axis = 0; axis < 3; ++axis)
+    inner = inner && place.whole[axis] > 0 && place.whole[axis] < volume.size[axis] - 2;
+  return inner ? differences_in(inner_cell_at(volume, place)) : differences_in(cell_at(volume, place));
 }
 
 }  // namespace tetwarp::ray

@@ -106,7 +106,9 @@ void CpuRenderer::render(const ViewPlane& plane, std::span<std::uint8_t> rgb, co
                            tint_colours_.data()};
     dispatch(volume_.type, [&](auto voxel) {
       using V = decltype(voxel);
-      cast_all(RayScene<V>{frame, tables, reinterpret_cast<const V*>(volume_.voxels)}, plane, rgb.data(), control);
+      const auto* const voxels = reinterpret_cast<const V*>(volume_.voxels);
+      const glm::ivec3 size(geometry_.size);
+      cast_all(RayScene<V>{frame, tables, {voxels, size, {1, size.x, size.x * size.y}}}, plane, rgb.data(), control);
     });
   });
 }

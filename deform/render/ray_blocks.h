@@ -26,9 +26,10 @@ std::vector<BlockRange> block_ranges(const ConstVolumeView& volume, Limits limit
 /// How many entries below each have opacity: kTransferEntries + 1 numbers, so that two of them tell of all in between.
 std::vector<int> opaque_before(const std::vector<TransferEntry>& table);
 
-/// Whether no value of a block has opacity.
+/// Whether no value of a block has opacity; of a maximum, whether all look like the table's lowest.
 TETWARP_INLINE_HD bool is_empty(const BlockRange& range, const RayFrame& frame, const int* opaque_before) {
   if (!(range.least <= range.most)) return true;  // no value is a number
+  if (frame.projection == Projection::maximum) return range.most <= frame.lowest;
   return opaque_before[transfer_entry(frame, range.most) + 1] == opaque_before[transfer_entry(frame, range.least)];
 }
 

@@ -87,7 +87,6 @@ RayFrame ray_frame(const Geometry& volume, const RenderStyle& style, const ViewP
   const double low = transfer.points.front().value, high = transfer.points.back().value;
   const glm::dvec3 start = plane.at(0.5, 0.5) - plane.forward * back_from(volume, plane);
   RayFrame frame;
-  frame.size = volume.size;
   frame.projection = transfer.projection;
   frame.lowest = static_cast<float>(low);
   frame.per_value = static_cast<float>((kTransferEntries - 1) / (high - low));

@@ -54,6 +54,7 @@ class Renderer {
 };
 
 std::unique_ptr<Renderer> make_cpu_renderer(Limits limits = {});
+/// @param limits  `memory`: the most bytes of its copy of a volume, without which pictures take longer
 /// @throws DeviceError without a device, NotCompiled in a build without CUDA
 std::unique_ptr<Renderer> make_cuda_renderer(int device = 0, Limits limits = {});
 

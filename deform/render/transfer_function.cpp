@@ -56,10 +56,13 @@ TransferFunction mip() {
   return {.name = "mip", .projection = Projection::maximum, .points = {{-200, kBlack, 0}, {1200, kWhite, 0}}};
 }
 
-/// Density: attenuation as a multiple of water's, (HU + 1000) / 1000; 400 mm of water are white.
+/// Density: attenuation as a multiple of water's, (HU + 1000) / 1000; 400 mm of water are white. From -950 HU down
+/// there is none, so that the noise of the air around the patient does not add up.
 TransferFunction xray() {
-  return {
-      .name = "xray", .projection = Projection::sum, .points = {{-1000, kWhite, 0}, {3000, kWhite, 4}}, .white = 400};
+  return {.name = "xray",
+          .projection = Projection::sum,
+          .points = {{-950, kWhite, 0}, {-900, kWhite, 0.1}, {3000, kWhite, 4}},
+          .white = 400};
 }
 
 constexpr TransferFunction (*kFunctions[])() = {bone, skin, lung, vessel, mip, xray};

@@ -93,7 +93,7 @@ Volume<float> blobs(const Geometry& grid, Random& random) {
 }
 
 TEST_P(Rendered, ASlabOfKnownOpacityLetsThroughWhatItsThicknessSays) {
-  const auto renderer = GetParam().make_renderer();
+  const auto renderer = GetParam().make_renderer({});
   Geometry grid = unit_grid({24, 40, 24});
   grid.spacing = {1, 0.7, 1.3};
   const Volume<std::int16_t> slab =
@@ -118,7 +118,7 @@ TEST_P(Rendered, ASlabOfKnownOpacityLetsThroughWhatItsThicknessSays) {
 }
 
 TEST_P(Rendered, ThroughABallASumIsTheLengthOfTheChord) {
-  const auto renderer = GetParam().make_renderer();
+  const auto renderer = GetParam().make_renderer({});
   const Geometry grid = unit_grid({91, 91, 91});
   constexpr double kRadius = 40;
   // At the edge a voxel holds its share of the ball.
@@ -142,7 +142,7 @@ TEST_P(Rendered, ThroughABallASumIsTheLengthOfTheChord) {
 }
 
 TEST_P(Rendered, TheSumOfARampIsExact) {
-  const auto renderer = GetParam().make_renderer();
+  const auto renderer = GetParam().make_renderer({});
   const Geometry grid = unit_grid({32, 32, 32});
   const Volume<float> ramp = volume_of<float>(grid, [](const glm::i64vec3& v) { return static_cast<double>(v.y); });
   // Half a voxel at both ends has the outermost value: the mean is that of all voxels.
@@ -153,7 +153,7 @@ TEST_P(Rendered, TheSumOfARampIsExact) {
 }
 
 TEST_P(Rendered, ASumHardlyDependsOnTheStep) {
-  const auto renderer = GetParam().make_renderer();
+  const auto renderer = GetParam().make_renderer({});
   const std::uint64_t seed = test_seed();
   SCOPED_TRACE(seed_text(seed));
   Random random(seed);
@@ -170,7 +170,7 @@ TEST_P(Rendered, ASumHardlyDependsOnTheStep) {
 }
 
 TEST_P(Rendered, TheMaximumIsTheLargestVoxelOnTheWay) {
-  const auto renderer = GetParam().make_renderer();
+  const auto renderer = GetParam().make_renderer({});
   const std::uint64_t seed = test_seed();
   SCOPED_TRACE(seed_text(seed));
   Random random(seed);
@@ -192,9 +192,42 @@ TEST_P(Rendered, TheMaximumIsTheLargestVoxelOnTheWay) {
   }
 }
 
+/// What is leapt over because it lies below the window changes nothing.
+TEST_P(Rendered, AMaximumInAWindowIsTheMaximumThroughThatWindow) {
+  const auto renderer = GetParam().make_renderer({});
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE(seed_text(seed));
+  Random random(seed);
+  const Geometry grid = oblique_grid({50, 45, 37});
+  Volume<float> volume = blobs(grid, random);
+  for (std::size_t n = 0; n < volume.voxels.size(); ++n) {
+    const double below = static_cast<double>(n) / static_cast<double>(volume.voxels.size());
+    volume.voxels[n] = static_cast<float>(0.4 * volume.voxels[n] + 55 * below + random.real(0, 5));
+  }
+  const ViewPlane plane = view_plane({.angle_deg = 33, .elevation_deg = 21, .width = 150, .height = 150}, grid);
+  RenderStyle style = brightest(100);
+  style.background = {0, 0, 1};
+  const Image whole = render(*renderer, view(volume), style, plane);
+  style.transfer.points.front().value = 40;
+  const Image image = render(*renderer, view(volume), style, plane);
+  int dark = 0, bright = 0;
+  for (int y = 0; y < plane.height; ++y) {
+    for (int x = 0; x < plane.width; ++x) {
+      const bool beside = whole.at(x, y) == glm::ivec3(0, 0, 255);  // no ray through the volume
+      ASSERT_EQ(image.at(x, y) == glm::ivec3(0, 0, 255), beside) << x << ", " << y;
+      if (beside) continue;
+      ASSERT_NEAR(image.grey(x, y), std::clamp((whole.grey(x, y) - 0.4 * 255) / 0.6, 0.0, 255.0), 1.6)
+          << x << ", " << y;
+      ++(image.grey(x, y) > 0 ? bright : dark);
+    }
+  }
+  EXPECT_GT(dark, 1000);
+  EXPECT_GT(bright, 200);
+}
+
 /// The marker of a phantom: a bright block towards the patient's left, front and head.
 TEST_P(Rendered, LeftFrontAndHeadAreWhereTheyBelong) {
-  const auto renderer = GetParam().make_renderer();
+  const auto renderer = GetParam().make_renderer({});
   // The same bodies on grids that run otherwise through them.
   for (const glm::dmat3& direction :
        {glm::dmat3(1), glm::dmat3({-1, 0, 0}, {0, -1, 0}, {0, 0, 1}), glm::dmat3({0, 0, 1}, {1, 0, 0}, {0, 1, 0}),
@@ -231,7 +264,7 @@ TEST_P(Rendered, LeftFrontAndHeadAreWhereTheyBelong) {
 }
 
 TEST_P(Rendered, WhatIsInTheMiddleOfThePictureIsWhatTheCameraLooksAt) {
-  const auto renderer = GetParam().make_renderer();
+  const auto renderer = GetParam().make_renderer({});
   const Geometry grid = unit_grid({60, 60, 60});
   const Volume<std::int16_t> body = volume_of<std::int16_t>(
       grid, [&](const glm::i64vec3& v) { return glm::distance(glm::dvec3(v), glm::dvec3(50, 48, 9)) < 3 ? 100 : 0; });
@@ -281,7 +314,7 @@ double marched(const Volume<float>& volume, const RenderStyle& style, const View
 }
 
 TEST_P(Rendered, EqualsSmallStepsWithoutSkipping) {
-  const auto renderer = GetParam().make_renderer();
+  const auto renderer = GetParam().make_renderer({});
   const std::uint64_t seed = test_seed();
   SCOPED_TRACE(seed_text(seed));
   for (std::uint64_t number = 0; number < 4; ++number) {
@@ -313,7 +346,7 @@ TEST_P(Rendered, EqualsSmallStepsWithoutSkipping) {
 
 /// What is leapt over changes no bit: a second volume has something faint in every block.
 TEST_P(Rendered, PicturesDoNotDependOnWhichBlocksAreEmpty) {
-  const auto renderer = GetParam().make_renderer();
+  const auto renderer = GetParam().make_renderer({});
   const std::uint64_t seed = test_seed();
   SCOPED_TRACE(seed_text(seed));
   Random random(seed);
@@ -341,8 +374,7 @@ TEST_P(Rendered, PicturesDoNotDependOnWhichBlocksAreEmpty) {
   EXPECT_NE(std::count(image.rgb.begin(), image.rgb.end(), 0), static_cast<std::ptrdiff_t>(image.rgb.size()));
 }
 
-TEST_P(Rendered, HasTheSameBytesOnEveryBackendAndForAnyNumberOfThreads) {
-  const auto renderer = GetParam().make_renderer();
+TEST_P(Rendered, HasTheSameBytesOnEveryBackendAndUnderAnyLimits) {
   const std::uint64_t seed = test_seed();
   SCOPED_TRACE(seed_text(seed));
   Random random(seed);
@@ -354,16 +386,49 @@ TEST_P(Rendered, HasTheSameBytesOnEveryBackendAndForAnyNumberOfThreads) {
   for (const RenderStyle& style : {lit, summed(100, 900), brightest(100)}) {
     const ViewPlane plane = view_plane(
         {.angle_deg = random.real(0, 360), .elevation_deg = random.real(-80, 80), .width = 130, .height = 97}, grid);
-    const Image image = render(*renderer, view(volume), style, plane);
-    for (const int threads : {1, 2}) {
-      const auto on_cpu = make_cpu_renderer({.threads = threads});
-      EXPECT_EQ(image.rgb, render(*on_cpu, view(volume), style, plane).rgb) << style.transfer.name << ", " << threads;
+    const Image image = render(*make_cpu_renderer({.threads = 1}), view(volume), style, plane);
+    for (const Limits& limits : {Limits{}, Limits{.threads = 2}, Limits{.memory = 1}}) {
+      const auto renderer = GetParam().make_renderer(limits);
+      EXPECT_EQ(image.rgb, render(*renderer, view(volume), style, plane).rgb)
+          << style.transfer.name << ", " << limits.threads << " threads, memory " << limits.memory;
     }
   }
 }
 
+/// More of the outermost voxels beside the rays changes nothing: cells at the edges are as those within.
+TEST_P(Rendered, EdgesAreAsTheVolumeContinued) {
+  const auto renderer = GetParam().make_renderer({});
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE(seed_text(seed));
+  Random random(seed);
+  const Geometry grid = unit_grid({9, 14, 11});
+  const Volume<std::int16_t> noise =
+      volume_of<std::int16_t>(grid, [&](const glm::i64vec3&) { return random.integer(0, 200); });
+  constexpr std::int64_t kMore = 3;  // columns and slices on both sides
+  Geometry larger = grid;
+  larger.size += glm::i64vec3(2 * kMore, 0, 2 * kMore);
+  larger.origin -= glm::dvec3(kMore, 0, kMore);
+  const Volume<std::int16_t> continued = volume_of<std::int16_t>(larger, [&](const glm::i64vec3& voxel) {
+    const glm::i64vec3 at =
+        glm::clamp(voxel - glm::i64vec3(kMore, 0, kMore), glm::i64vec3(0), grid.size - std::int64_t{1});
+    return noise.voxels[static_cast<std::size_t>((at.z * grid.size.y + at.y) * grid.size.x + at.x)];
+  });
+  RenderStyle lit = opaque_from(90, 0.2);
+  lit.transfer.gradient = 30;
+  ViewPlane plane = view_plane({.width = 8 * 16, .height = 10 * 16}, grid);  // from centre to centre
+  plane.pixel_mm = 1.0 / 16;
+  for (RenderStyle style : {lit, summed(200, 3000), brightest(200)}) {
+    style.step_voxels = 0.5;
+    const Image image = render(*renderer, view(noise), style, plane),
+                same = render(*renderer, view(continued), style, plane);
+    for (std::size_t n = 0; n < image.rgb.size(); ++n)
+      ASSERT_NEAR(image.rgb[n], same.rgb[n], 1) << style.transfer.name << ", " << n;
+    EXPECT_GT(*std::max_element(image.rgb.begin(), image.rgb.end()), 60) << style.transfer.name;
+  }
+}
+
 TEST_P(Rendered, VoxelsOfEveryTypeLookAlike) {
-  const auto renderer = GetParam().make_renderer();
+  const auto renderer = GetParam().make_renderer({});
   Random random(5);
   const Geometry grid = unit_grid({30, 30, 30});
   Volume<float> smooth = blobs(grid, random);
@@ -387,7 +452,7 @@ TEST_P(Rendered, VoxelsOfEveryTypeLookAlike) {
 }
 
 TEST_P(Rendered, LightFallsFromTheUpperLeftAndShadesWhatTurnsAway) {
-  const auto renderer = GetParam().make_renderer();
+  const auto renderer = GetParam().make_renderer({});
   const Geometry grid = unit_grid({64, 64, 64});
   const Volume<float> ball = volume_of<float>(grid, [&](const glm::i64vec3& v) {
     return 100 * std::clamp(26 - glm::distance(glm::dvec3(v), glm::dvec3(31.5)), 0.0, 2.0) / 2;
@@ -405,7 +470,7 @@ TEST_P(Rendered, LightFallsFromTheUpperLeftAndShadesWhatTurnsAway) {
 }
 
 TEST_P(Rendered, MoreOpacityHidesMoreOfTheBackground) {
-  const auto renderer = GetParam().make_renderer();
+  const auto renderer = GetParam().make_renderer({});
   Random random(11);
   const Geometry grid = unit_grid({40, 40, 40});
   const Volume<float> volume = blobs(grid, random);
@@ -420,7 +485,7 @@ TEST_P(Rendered, MoreOpacityHidesMoreOfTheBackground) {
 }
 
 TEST_P(Rendered, VoxelsThatAreNoNumberAreNotSeen) {
-  const auto renderer = GetParam().make_renderer();
+  const auto renderer = GetParam().make_renderer({});
   const Geometry grid = unit_grid({40, 40, 40});
   Volume<float> volume = volume_of<float>(grid, [](const glm::i64vec3& v) { return v.x < 20 ? NAN : 100.0; });
   const ViewPlane plane = view_plane({.width = 40, .height = 40}, grid);
@@ -432,7 +497,7 @@ TEST_P(Rendered, VoxelsThatAreNoNumberAreNotSeen) {
 }
 
 TEST_P(Rendered, TintsColourTheVoxelsThatHaveThem) {
-  const auto renderer = GetParam().make_renderer();
+  const auto renderer = GetParam().make_renderer({});
   const Geometry grid = unit_grid({40, 40, 40});
   const Volume<std::int16_t> body =
       volume_of<std::int16_t>(grid, [](const glm::i64vec3& v) { return v.y > 10 ? 100 : 0; });
@@ -452,7 +517,7 @@ TEST_P(Rendered, TintsColourTheVoxelsThatHaveThem) {
 }
 
 TEST_P(Rendered, AShearedStackStandsAsItIs) {
-  const auto renderer = GetParam().make_renderer();
+  const auto renderer = GetParam().make_renderer({});
   Geometry sheared = unit_grid({40, 40, 40});
   sheared.direction[2] = glm::normalize(glm::dvec3(0, 0.4, 1));
   const AffineMap point = point_from_index(sheared);
@@ -478,7 +543,7 @@ TEST_P(Rendered, AShearedStackStandsAsItIs) {
 }
 
 TEST_P(Rendered, AVolumeOfOneSliceIsAPicture) {
-  const auto renderer = GetParam().make_renderer();
+  const auto renderer = GetParam().make_renderer({});
   const Volume<std::int16_t> slice =
       volume_of<std::int16_t>(unit_grid({20, 20, 1}), [](const glm::i64vec3&) { return 100; });
   const ViewPlane plane = view_plane({.elevation_deg = 90, .width = 20, .height = 20}, slice.geometry);
@@ -486,7 +551,7 @@ TEST_P(Rendered, AVolumeOfOneSliceIsAPicture) {
 }
 
 TEST_P(Rendered, RefusesWhatItCannotShow) {
-  const auto renderer = GetParam().make_renderer();
+  const auto renderer = GetParam().make_renderer({});
   Volume<std::int16_t> body = volume_of<std::int16_t>(unit_grid({8, 8, 8}), [](const glm::i64vec3&) { return 1; });
   const ViewPlane plane = view_plane({.width = 20, .height = 20}, body.geometry);
   std::vector<std::uint8_t> rgb(3 * 20 * 20);
@@ -516,7 +581,7 @@ TEST_P(Rendered, RefusesWhatItCannotShow) {
 }
 
 TEST_P(Rendered, StopsWhenItIsAskedTo) {
-  const auto renderer = GetParam().make_renderer();
+  const auto renderer = GetParam().make_renderer({});
   const Volume<std::int16_t> body =
       volume_of<std::int16_t>(unit_grid({8, 8, 8}), [](const glm::i64vec3&) { return 1; });
   const ViewPlane plane = view_plane({.width = 20, .height = 20}, body.geometry);

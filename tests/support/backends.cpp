@@ -16,12 +16,12 @@ const std::vector<Backend>& backends() {
        .cannot_run = "",
        .make = make_cpu_resampler,
        .make_pull = make_cpu_pull_resampler,
-       .make_renderer = [] { return make_cpu_renderer(); }},
+       .make_renderer = [](Limits limits) { return make_cpu_renderer(limits); }},
       {.name = "cuda",
        .cannot_run = no_cuda,
        .make = on_cuda,
        .make_pull = pull_on_cuda,
-       .make_renderer = [] { return make_cuda_renderer(); }},
+       .make_renderer = [](Limits limits) { return make_cuda_renderer(0, limits); }},
   };
   return all;
 }

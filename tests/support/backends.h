@@ -21,7 +21,7 @@ struct Backend {
   std::string cannot_run;  ///< why it cannot run here; empty: it can
   Make make;               ///< forward fields
   Make make_pull;          ///< pull fields; null: this backend has none
-  std::function<std::unique_ptr<Renderer>()> make_renderer;
+  std::function<std::unique_ptr<Renderer>(Limits limits)> make_renderer;
 
   friend void PrintTo(const Backend& backend, std::ostream* stream) { *stream << backend.name; }
 };
