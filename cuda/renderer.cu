@@ -19,6 +19,7 @@ constexpr int kRangeThreads = 128, kDistanceThreads = 256;
 constexpr int kRangeBlocks = (kRangeThreads - kMostRayReach) / kRayBlock + 1;  ///< of voxels, that a thread block takes
 constexpr int kPatchWidth = 8, kPatchHeight = 4;  ///< pixels of a warp: near rays read the same voxels
 constexpr int kPatches = 4;                       ///< of a thread block
+constexpr int kCopyWidth = 32, kCopyRows = 8;     ///< words and rows of a thread block
 
 /// In the renderer's copy of a volume, rows and slices begin so many bytes further in a cache line than those before
 /// them. Rays that run along i read several rows and slices at once, and where all begin alike, as rows of 512 voxels
@@ -28,6 +29,17 @@ constexpr int kMostStride = 1 << 30;                        ///< two of them are
 
 /// The least number from `least` on that is `rest` beyond a multiple of `unit`.
 int at_least(int least, int rest, int unit) { return least + ((rest - least) % unit + unit) % unit; }
+
+/// Rows of so many words, `rows` of them a slice, to where they are `pitch` words apart, `slots` of them a slice.
+template <class Word>
+__global__ void __launch_bounds__(kCopyWidth* kCopyRows)
+    copy_kernel(const Word* from, int words, int rows, int all_rows, Word* to, int pitch, int slots) {
+  const int row = static_cast<int>(blockIdx.x) * kCopyRows + static_cast<int>(threadIdx.y);
+  if (row >= all_rows) return;
+  const Word* const source = from + ray::wide_product(row, words);
+  Word* const copy = to + ray::wide_product(row / rows * slots + row % rows, pitch);
+  for (int n = static_cast<int>(threadIdx.x); n < words; n += kCopyWidth) copy[n] = source[n];
+}
 
 /// What voxels are compared as: whole numbers as they are.
 template <class V>
@@ -169,22 +181,31 @@ void CudaRenderer::copy_volume(cudaStream_t stream) {
   const int row = at_least(size.x, kRowShift / bytes, kLine / bytes),
             rows = at_least(size.y, kSliceRows, kLine / kRowShift);
   const std::int64_t slice = std::int64_t{row} * rows;
-  const auto pitch = static_cast<std::size_t>(row * bytes), width = static_cast<std::size_t>(size.x * bytes),
-             all = static_cast<std::size_t>(slice * size.z * bytes);
+  const auto all = static_cast<std::size_t>(slice * size.z * bytes);
   read_ = volume_.voxels;
   strides_ = {1, size.x, size.x * size.y};
   if (slice > kMostStride || (limits_.memory != 0 && all > limits_.memory)) return;
-  cudaMemcpy3DParms copy{};
   try {
-    copy.dstPtr = make_cudaPitchedPtr(copy_.reserve(all), pitch, width, static_cast<std::size_t>(rows));
+    copy_.reserve(all);
   } catch (const DeviceMemoryError&) {
     return;
   }
-  void* const voxels = const_cast<std::byte*>(volume_.voxels);
-  copy.srcPtr = make_cudaPitchedPtr(voxels, width, width, static_cast<std::size_t>(size.y));
-  copy.extent = {width, static_cast<std::size_t>(size.y), static_cast<std::size_t>(size.z)};
-  copy.kind = cudaMemcpyDeviceToDevice;
-  TETWARP_CUDA_TRY(cudaMemcpy3DAsync(&copy, stream));
+  const auto copy = [&](auto word) {
+    using Word = decltype(word);
+    const int words = size.x * bytes / static_cast<int>(sizeof(Word)),
+              pitch = row * bytes / static_cast<int>(sizeof(Word));
+    copy_kernel<<<blocks_of(size.y * size.z, kCopyRows), dim3(kCopyWidth, kCopyRows), 0, stream>>>(
+        reinterpret_cast<const Word*>(volume_.voxels), words, size.y, size.y * size.z,
+        reinterpret_cast<Word*>(copy_.data()), pitch, rows);
+  };
+  const bool in_quads = size.x * bytes % static_cast<int>(sizeof(uint4)) == 0 &&
+                        reinterpret_cast<std::uintptr_t>(volume_.voxels) % sizeof(uint4) == 0;
+  if (in_quads) {
+    copy(uint4{});
+  } else {
+    dispatch(volume_.type, copy);
+  }
+  TETWARP_CUDA_TRY(cudaGetLastError());
   read_ = copy_.data();
   strides_ = {1, row, static_cast<int>(slice)};
 }
