@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <limits>
 
 #include "io/dicom_dose.h"
 #include "io/dicom_text.h"
 #include "io/hash.h"
 #include "io/image_file.h"
+#include "io/opened_file.h"
 #include "io/shown_text.h"
 
 namespace tetwarp::apps {
@@ -173,8 +173,7 @@ bool fits(VoxelType type, double value) {
 }
 
 std::string hash_file(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  require(file.good(), "cannot be read, " + path.string());
+  std::ifstream file = opened(path);
   Sha256 hash;
   std::vector<char> buffer(std::size_t{1} << 20);
   while (file.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) || file.gcount() > 0) {

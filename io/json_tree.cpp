@@ -1,12 +1,12 @@
 #include "io/json_tree.h"
 
 #include <algorithm>
-#include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <tuple>
 
 #include "deform/errors.h"
+#include "io/opened_file.h"
 
 namespace tetwarp {
 
@@ -160,9 +160,9 @@ JsonTree parse_json(std::string_view bytes, const std::string& name) {
 }
 
 JsonTree read_json(const std::filesystem::path& path, const std::string& kind) {
-  require(!std::filesystem::is_directory(path), kind + " is a file, " + path.string() + " is a folder");
-  std::ifstream file(path, std::ios::binary);
-  require(file.good(), "cannot be read, " + path.string());
+  std::error_code error;
+  require(!std::filesystem::is_directory(path, error), kind + " is a file, " + path.string() + " is a folder");
+  std::ifstream file = opened(path);
   std::string bytes(kLargestFile + 1, '\0');
   file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   require(!file.bad(), "cannot be read to its end, " + path.string());

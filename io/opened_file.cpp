@@ -9,6 +9,9 @@
 #include <system_error>
 #include <utility>
 
+#include "deform/errors.h"
+#include "io/shown_text.h"
+
 namespace tetwarp {
 
 namespace {
@@ -16,6 +19,16 @@ namespace {
 constexpr std::size_t kPiece = 1 << 14;
 
 }  // namespace
+
+std::ifstream opened(const std::filesystem::path& path) {
+  std::error_code error;
+  const bool is_folder = std::filesystem::is_directory(path, error);
+  errno = 0;
+  std::ifstream file(path, std::ios::binary);
+  require(file.good() && !is_folder,
+          "cannot be read (" + std::generic_category().message(is_folder ? EISDIR : errno) + "), " + shown(path));
+  return file;
+}
 
 OpenedFile::OpenedFile(std::filesystem::path path)
     : path_(std::move(path)), file_(::open(path_.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {

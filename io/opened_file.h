@@ -3,11 +3,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <span>
 #include <string>
 
 namespace tetwarp {
+
+/// The bytes of a file, from the first on. @throws InputError that says in the system's words why it cannot be read
+std::ifstream opened(const std::filesystem::path& path);
 
 /// A regular file, opened once. Small reads are served from one piece of 16 KiB, so that the header of a slice takes
 /// one or two calls of the system, and a file that is no DICOM no more than its first piece.

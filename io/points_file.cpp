@@ -1,11 +1,10 @@
 #include "io/points_file.h"
 
-#include <cerrno>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <iterator>
 
+#include "io/opened_file.h"
 #include "io/points_document.h"
 
 namespace tetwarp {
@@ -29,10 +28,7 @@ const Form* form_of(const std::filesystem::path& path) {
 }
 
 std::string read_whole(const std::filesystem::path& path) {
-  errno = 0;
-  std::ifstream file(path, std::ios::binary);
-  require(file.good() && !std::filesystem::is_directory(path),
-          "cannot be opened (" + std::string(std::strerror(errno != 0 ? errno : EISDIR)) + "), " + path.string());
+  std::ifstream file = opened(path);
   std::string bytes(std::istreambuf_iterator<char>(file), {});
   require(!file.bad(), "cannot be read to its end, " + path.string());
   require(!bytes.empty(), "an empty file, " + path.string());

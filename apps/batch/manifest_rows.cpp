@@ -1,12 +1,12 @@
 #include "apps/batch/manifest_rows.h"
 
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
 
 #include "deform/errors.h"
 #include "io/csv_record.h"
+#include "io/opened_file.h"
 #include "io/shown_text.h"
 
 namespace tetwarp::apps {
@@ -22,8 +22,7 @@ constexpr std::size_t kMostShown = 100;
 std::string read_all(const fs::path& path) {
   std::error_code error;
   require(!fs::is_other(fs::status(path, error)), "neither a file nor a folder, " + shown(path) + "; name a manifest");
-  std::ifstream file(path, std::ios::binary);
-  require(file.good() && !fs::is_directory(path, error), "the manifest cannot be read, " + shown(path));
+  std::ifstream file = opened(path);
   const std::uintmax_t bytes = fs::file_size(path, error);
   require(!error && bytes <= kMostBytes, "the manifest is larger than 64 MiB, " + shown(path) + "; divide it");
   std::ostringstream text;

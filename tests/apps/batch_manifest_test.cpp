@@ -64,6 +64,16 @@ no json
   EXPECT_FALSE(std::filesystem::exists(scratch_ / "out"));
 }
 
+TEST_F(BatchManifest, OneThatCannotBeReadIsNamedWithTheReason) {
+  std::filesystem::create_directory(scratch_ / "folder.csv");
+  for (const auto& [manifest, reason] :
+       {std::pair("absent.csv", "(No such file or directory)"), std::pair("folder.csv", "(Is a directory)")}) {
+    const Outcome refused = run("batch " + std::string(manifest) + " -o out");
+    EXPECT_EQ(refused.status, 4);
+    EXPECT_TRUE(says(refused.err, {reason, manifest}));
+  }
+}
+
 TEST_F(BatchManifest, WhatHeadersShowToBeWrongIsListedToo) {
   const Outcome refused = batch(
       R"({"case": "a", "input": "ct.nii.gz", "field": "identity", "output": "dicom"}

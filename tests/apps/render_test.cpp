@@ -159,7 +159,7 @@ TEST_F(RenderProgram, FilmsAreMadeWhereTheEncoderIs) {
 TEST_F(RenderProgram, WhatDoesNotGoTogetherIsRefusedAndNothingIsWritten) {
   refused("ct.nii -o x.jpg", 2, {"x.jpg", ".png"});
   refused("ct.nii -o x.png --transfer bone", 2, {"bone", "ct-bone", ".json"});
-  refused("ct.nii -o x.png --transfer none.json", 4, {"none.json"});
+  refused("ct.nii -o x.png --transfer none.json", 4, {"No such file or directory", "none.json"});
   refused("ct.nii -o x.png --overlay folds", 2, {"--overlay folds", "-f", "folds=FILE"});
   refused("ct.nii -o x.png --overlay shape=x", 2, {"shape", "coverage, folds, jacobian and lattice"});
   refused("ct.nii -o x.png --overlay jacobian=none.nii", 4, {"none.nii"});

@@ -184,7 +184,7 @@ TEST_F(Simulate, RefusalsAreOneLineWithTheirStatusAndLeaveNothing) {
           "\"cuts\": [{\"name\": \"slit\", \"plane\": {\"at\": {\"body\": [0.5, 0.5, 0.5]}, "
           "\"normal\": [1, 0, 0]}}],\n\"phases\": [");
   refused("simulate bad.json ct.mha -o f.mha", 4, {"\"slit\" is open in aside", "write a mesh"});
-  refused("simulate absent.json ct.mha -o f.mha", 4, {"cannot be read, absent.json"});
+  refused("simulate absent.json ct.mha -o f.mha", 4, {"cannot be read (No such file or directory), absent.json"});
   refused("simulate . ct.mha -o f.mha", 4, {"folder"});
   refused("simulate ct.mha ct.mha -o f.mha", 4, {"ct.mha"});
   refused("simulate push.json absent.mha -o f.mha", 4, {"absent.mha"});
