@@ -105,7 +105,7 @@ void Deformation::resample(const Worker& worker) {
     };
   }
   maps.run([&](const Region& slab, const Maps& of_slab) {
-    mass_.jacobian = of_slab.jacobian;
+    mass_.maps = of_slab;
     record_.report += resample_slab(*backend.resampler, slab, targets, of_slab, control);
   });
   record_.report.clamped += mass_.saturated;
@@ -131,7 +131,7 @@ Target Deformation::main_target() {
                 .output = record_.output.view(),
                 .interpolation = options_.interpolation,
                 .background = record_.background,
-                .padding = record_.input->is_dicom() ? record_.input->dicom->padding : std::nullopt,
+                .padding = padding_of_input(),
                 .sampled_slices = sampled_slices_};
   if (!options_.preserve_mass) return target;
   mass_.source = AnyVolume(record_.input->volume.geometry(), VoxelType::f32);
@@ -146,9 +146,13 @@ Target Deformation::main_target() {
   return target;
 }
 
+std::optional<PaddingRange> Deformation::padding_of_input() const {
+  return record_.input->is_dicom() ? record_.input->dicom->padding : std::nullopt;
+}
+
 void Deformation::scale_mass(const Region& slices) {
-  mass_.saturated +=
-      preserve_mass(std::as_const(mass_.resampled).view(), mass_.jacobian, record_.output.view(), slices);
+  mass_.saturated += preserve_mass(std::as_const(mass_.resampled).view(), mass_.maps, padding_of_input(),
+                                   record_.output.view(), slices);
 }
 
 void Deformation::set_field(Resampler& resampler, Outside outside, const Control& control) const {

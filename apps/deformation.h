@@ -52,6 +52,7 @@ class Deformation {
   void write_preview_picture();
   void write_slices(const Region& slices);
   Target main_target();
+  std::optional<PaddingRange> padding_of_input() const;
   void scale_mass(const Region& slices);
   std::string title() const;
 
@@ -62,7 +63,7 @@ class Deformation {
   std::vector<std::string> warnings_;
   struct {
     AnyVolume source, resampled;
-    ConstVolumeView jacobian;  ///< of the slab that is resampled
+    Maps maps;  ///< of the slab that is resampled
     std::atomic<std::uint64_t> saturated = 0;
   } mass_;  ///< with --preserve mass: in float
   std::vector<SliceRange> sampled_slices_;

@@ -42,11 +42,11 @@ MapOutputs::MapOutputs(const MapOptions& options, Direction direction, bool seri
   staged_.folds = outputs.add(options.folds);
 }
 
-std::uint64_t MapOutputs::bytes(const Geometry& grid, bool jacobian) const {
+std::uint64_t MapOutputs::bytes(const Geometry& grid, bool mass) const {
   const auto held = [&](VolumeView Maps::*map, const std::filesystem::path& path, bool needed = false) {
     return path.empty() && !needed ? 0 : MapStream::bytes(grid, map, !path.empty());
   };
-  return held(&Maps::coverage, staged_.coverage) + held(&Maps::jacobian, staged_.jacobian, jacobian) +
+  return held(&Maps::coverage, staged_.coverage, mass) + held(&Maps::jacobian, staged_.jacobian, mass) +
          held(&Maps::owners, staged_.folds) + held(&Maps::inverse_mm, staged_.inverse);
 }
 
@@ -54,13 +54,12 @@ void MapOutputs::check(const Geometry& grid) const {
   if (has_registration_suffix(options_.inverse)) require_registration_fits(grid);
 }
 
-void MapOutputs::add_to(MapStream& stream, const Geometry& grid, bool jacobian,
-                        const DerivedSeriesWriter* series) const {
+void MapOutputs::add_to(MapStream& stream, const Geometry& grid, bool mass, const DerivedSeriesWriter* series) const {
   const auto add = [&](VolumeView Maps::*map, const std::filesystem::path& path, VoxelType type, bool needed = false) {
     if (!path.empty() || needed) stream.add(map, path.empty() ? nullptr : create_image(path, grid, type));
   };
-  add(&Maps::coverage, staged_.coverage, VoxelType::u8);
-  add(&Maps::jacobian, staged_.jacobian, VoxelType::f32, jacobian);
+  add(&Maps::coverage, staged_.coverage, VoxelType::u8, mass);
+  add(&Maps::jacobian, staged_.jacobian, VoxelType::f32, mass);
   add(&Maps::owners, staged_.folds, VoxelType::u16);
   if (staged_.inverse.empty()) return;
   stream.add(&Maps::inverse_mm, has_registration_suffix(options_.inverse)

@@ -25,10 +25,11 @@ class MapOutputs {
   /// @param grid  of the output. @throws InputError where a map cannot be written on it
   void check(const Geometry& grid) const;
 
-  /// What they hold while they are made. @param jacobian  whether that is needed, whatever is asked for
-  std::uint64_t bytes(const Geometry& grid, bool jacobian) const;
+  /// What they hold while they are made. @param mass  whether mass is preserved, which needs coverage and determinants
+  /// whatever is asked for
+  std::uint64_t bytes(const Geometry& grid, bool mass) const;
   /// Begins their files. @param series  OUTPUT, if it is a DICOM series. @throws Error where one cannot be written
-  void add_to(MapStream& stream, const Geometry& grid, bool jacobian, const DerivedSeriesWriter* series) const;
+  void add_to(MapStream& stream, const Geometry& grid, bool mass, const DerivedSeriesWriter* series) const;
   /// Names of the files, by option.
   nlohmann::json describe() const;
 

@@ -24,29 +24,35 @@ V stored(double value, std::uint64_t& saturated) {
 
 }  // namespace
 
-std::uint64_t preserve_mass(const ConstVolumeView& hu, const ConstVolumeView& jacobian, const VolumeView& output,
-                            const Region& slices) {
-  require(hu.type == VoxelType::f32 && jacobian.type == VoxelType::f32, "HU and determinants are expected as float32");
+std::uint64_t preserve_mass(const ConstVolumeView& hu, const Maps& maps, const std::optional<PaddingRange>& padding,
+                            const VolumeView& output, const Region& slices) {
+  const VolumeView &jacobian = maps.jacobian, &coverage = maps.coverage;
+  require(hu.type == VoxelType::f32 && jacobian.voxels && jacobian.type == VoxelType::f32,
+          "HU and determinants are expected as float32");
+  require(coverage.voxels && coverage.type == VoxelType::u8, "a coverage is expected as uint8");
   const Geometry& grid = *output.geometry;
-  require(*hu.geometry == grid && *jacobian.geometry == grid && hu.buffered == whole(grid) &&
-              output.buffered == whole(grid),
-          "HU and output are expected whole, and determinants on their grid");
+  require(*hu.geometry == grid && *jacobian.geometry == grid && *coverage.geometry == grid &&
+              hu.buffered == whole(grid) && output.buffered == whole(grid),
+          "HU and output are expected whole, and maps on their grid");
   Region held = whole(grid);
   held.begin.z = jacobian.buffered.begin.z;
   held.end.z = jacobian.buffered.end.z;
-  require(jacobian.buffered == held && contains(held, slices),
-          "determinants are expected in whole slices, of those that are scaled");
+  require(jacobian.buffered == held && coverage.buffered == held && contains(held, slices),
+          "maps are expected in whole slices, of those that are scaled");
   const std::int64_t slice = grid.size.x * grid.size.y;
   const auto* from = reinterpret_cast<const float*>(hu.voxels);
   const auto* determinants = reinterpret_cast<const float*>(jacobian.voxels);
-  const std::int64_t before = held.begin.z * slice;  // the first determinant's voxel
+  const auto* covered = reinterpret_cast<const std::uint8_t*>(coverage.voxels);
+  const std::int64_t before = held.begin.z * slice;  // the maps' first voxel
   std::uint64_t saturated = 0;
   dispatch(output.type, [&](auto voxel) {
     using V = decltype(voxel);
     V* to = reinterpret_cast<V*>(output.voxels);
     for (std::int64_t n = slices.begin.z * slice; n < slices.end.z * slice; ++n) {
       const double value = from[n], determinant = std::abs(determinants[n - before]);
-      to[n] = stored<V>(determinant > 0 ? (value - kAir) / determinant + kAir : value, saturated);
+      const bool is_padding = padding && value >= padding->low && value <= padding->high;
+      const bool is_density = covered[n - before] != 0 && !is_padding && determinant > 0;
+      to[n] = stored<V>(is_density ? (value - kAir) / determinant + kAir : value, saturated);
     }
   });
   return saturated;

@@ -1,6 +1,8 @@
 #pragma once
 
-#include "deform/volume.h"
+#include <optional>
+
+#include "deform/resampler.h"
 
 namespace tetwarp {
 
@@ -8,16 +10,18 @@ namespace tetwarp {
 ///
 /// Density is HU + 1000 (air 0, water 1000), so a voxel becomes (HU + 1000) / |J| - 1000 with the determinant J of its
 /// owner's forward map; computed in double, rounded to nearest, ties to even, and saturated where the type is an
-/// integer's. A voxel without a determinant (NaN) keeps its value. Where the map folds, mass is not kept: a voxel shows
-/// one of its owners.
+/// integer's. What is no density keeps its value: the background where the source gave none (coverage 0), though the
+/// voxel may have an owner and a determinant; padding; and a voxel without a determinant (NaN). Where the map folds,
+/// mass is not kept: a voxel shows one of its owners.
 ///
 /// @param hu        float32, as resampled
-/// @param jacobian  float32, `Maps::jacobian` of the same call; may buffer `slices` and no more
-/// @param output    any type; only `slices`, whole ones, are read and written. All three on one grid, in host memory,
-/// the
-///                  two volumes whole
+/// @param maps      `coverage` and `jacobian` of the same call, of which `hu` was the first target; they may buffer
+///                  `slices` and no more
+/// @param padding   of the source: values that are no data
+/// @param output    any type; only `slices`, whole ones, are read and written. All on one grid, in host memory, the two
+///                  volumes whole
 /// @return how many values were saturated
-std::uint64_t preserve_mass(const ConstVolumeView& hu, const ConstVolumeView& jacobian, const VolumeView& output,
-                            const Region& slices);
+std::uint64_t preserve_mass(const ConstVolumeView& hu, const Maps& maps, const std::optional<PaddingRange>& padding,
+                            const VolumeView& output, const Region& slices);
 
 }  // namespace tetwarp
