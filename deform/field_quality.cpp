@@ -1,6 +1,5 @@
 #include "deform/field_quality.h"
 
-#include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
@@ -48,7 +47,10 @@ struct Characteristic {
   }
 };
 
-/// Adds up gradients of one thread.
+/// Adds up the gradients of one part of a field, in order.
+///
+/// A gradient is passed over where it cannot stretch more than those before it, to within rounding. So the last bits of
+/// the largest stretch depend on which came before: parts are therefore fixed, whatever thread takes them.
 class Tally {
  public:
   explicit Tally(const dmat3& from_lattice)
@@ -112,21 +114,32 @@ void add_cell(const dvec3 (&u)[8], bool odd, const dmat3& from_lattice, Tally& t
 
 dmat3 edges_of(const dvec3& a, const dvec3& b, const dvec3& c, const dvec3& d) { return {a - d, b - d, c - d}; }
 
+FieldQuality sum_of(const tbb::enumerable_thread_specific<FieldQuality>& found) {
+  FieldQuality sum;
+  for (const FieldQuality& part : found) {
+    for (std::size_t bin = 0; bin < sum.parts.size(); ++bin) sum.parts[bin] += part.parts[bin];
+    sum.largest_stretch = std::max(sum.largest_stretch, part.largest_stretch);
+  }
+  return sum;
+}
+
 FieldQuality quality_of(const TetrahedralMesh& mesh, const Limits& limits, const Control& control) {
-  constexpr std::size_t kGrain = 4096;
+  constexpr std::size_t kAtOnce = 4096;
   constexpr double kParts = std::uint64_t{1} << 40;
   const auto rest_edges = [&](const glm::u32vec4& t) {
     return edges_of(mesh.rest[t.x], mesh.rest[t.y], mesh.rest[t.z], mesh.rest[t.w]);
   };
   double volume = 0;
   for (const glm::u32vec4& t : mesh.tetrahedra) volume += std::abs(glm::determinant(rest_edges(t)));
-  tbb::enumerable_thread_specific<Tally> tallies(dmat3(1));
+  tbb::enumerable_thread_specific<FieldQuality> found;
   tbb::task_arena arena = cpu::make_arena(limits);
-  cpu::Progress progress(control, static_cast<std::int64_t>(mesh.tetrahedra.size()));
+  const std::size_t count = mesh.tetrahedra.size();
+  cpu::Progress progress(control, static_cast<std::int64_t>(count));
   arena.execute([&] {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.tetrahedra.size(), kGrain), [&](const auto& range) {
-      Tally& tally = tallies.local();
-      for (std::size_t n = range.begin(); n < range.end(); ++n) {
+    tbb::parallel_for(std::size_t{0}, (count + kAtOnce - 1) / kAtOnce, [&](std::size_t part) {
+      Tally tally(dmat3(1));
+      const std::size_t begin = part * kAtOnce, end = std::min(begin + kAtOnce, count);
+      for (std::size_t n = begin; n < end; ++n) {
         const glm::u32vec4& t = mesh.tetrahedra[n];
         const dmat3 rest = rest_edges(t);
         const double determinant = glm::determinant(rest);
@@ -136,12 +149,11 @@ FieldQuality quality_of(const TetrahedralMesh& mesh, const Limits& limits, const
         tally.add(f, glm::determinant(f),
                   static_cast<std::uint64_t>(std::rint(std::abs(determinant) / volume * kParts)));
       }
-      progress.done(static_cast<std::int64_t>(range.size()));
+      tally.add_to(found.local());
+      progress.done(static_cast<std::int64_t>(end - begin));
     });
   });
-  FieldQuality quality;
-  for (const Tally& tally : tallies) tally.add_to(quality);
-  return quality;
+  return sum_of(found);
 }
 
 std::string format(const char* form, double value) {
@@ -167,12 +179,12 @@ FieldQuality measure_quality(const VertexField& field, const Limits& limits, con
   const glm::i64vec3 size = field.lattice.size;
   require(std::min({size.x, size.y, size.z}) >= 2, "a field of " + to_string(size) + " vertices has no cell");
   const dmat3 from_lattice = point_from_index(field.lattice).linear;
-  tbb::enumerable_thread_specific<Tally> tallies(from_lattice);
+  tbb::enumerable_thread_specific<FieldQuality> found;
   tbb::task_arena arena = cpu::make_arena(limits);
   cpu::Progress progress(control, size.z - 1);
   arena.execute([&] {
     tbb::parallel_for(std::int64_t{0}, size.z - 1, [&](std::int64_t z) {
-      Tally& tally = tallies.local();
+      Tally tally(from_lattice);
       for (std::int64_t y = 0; y < size.y - 1; ++y) {
         const glm::vec3* rows[4];
         for (int n = 0; n < 4; ++n)
@@ -192,12 +204,11 @@ FieldQuality measure_quality(const VertexField& field, const Limits& limits, con
           }
         }
       }
+      tally.add_to(found.local());
       progress.done(1);
     });
   });
-  FieldQuality quality;
-  for (const Tally& tally : tallies) tally.add_to(quality);
-  return quality;
+  return sum_of(found);
 }
 
 std::string verdict(const Report& report, const FieldQuality& quality, const RoundTrip& trip) {

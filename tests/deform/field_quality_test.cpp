@@ -6,6 +6,7 @@
 #include <glm/matrix.hpp>
 #include <numeric>
 
+#include "deform/fields/lattice_mesh.h"
 #include "tests/support/fields.h"
 #include "tests/support/run.h"
 
@@ -69,6 +70,22 @@ TEST(FieldQuality, CountsWhatTheResamplerCountsAndAddsUpToTheLattice) {
   EXPECT_GT(quality.parts.back() + quality.parts[6], 0U);
   EXPECT_NE(verdict(report, quality, {}).find(std::to_string(report.inverted) + " tetrahedra are inverted"),
             std::string::npos);
+}
+
+TEST(FieldQuality, TheLargestStretchIsTheSameWhateverThreadTookWhichPart) {
+  // Cells of one stretch to within rounding: which of them is the largest, to the last bit, is for rounding to say.
+  const Geometry grid = unit_grid({40, 40, 60});
+  const glm::dmat3 turn = rotation({1, 2, 3}, 0.7);
+  VertexField lattice = field_in_voxels(grid, grid, [&](const glm::dvec3& x) { return 1.25 * (turn * x) - x; });
+  VertexField mesh;
+  mesh.mesh = mesh_of(lattice);
+  mesh.mesh.lattice_vertex.clear();
+  for (const VertexField* field : {&lattice, &mesh}) {
+    const double one = measure_quality(*field, {.threads = 1}).largest_stretch;
+    EXPECT_NEAR(one, 1.25, 1e-5);
+    for (int run = 0; run < 20; ++run)
+      EXPECT_EQ(measure_quality(*field, {.threads = 2 + run % 7}).largest_stretch, one);
+  }
 }
 
 TEST(FieldQuality, StretchOfAShearIsNotItsLongestColumn) {
