@@ -39,9 +39,10 @@ Invertible read_invertible(const InvertOptions& options, const Geometry& like, c
     return {std::move(read.field), std::move(read.notes), std::move(read.files), read.identity};
   }
   AnyField found;
-  const PullField pull = read_pull_field(options.pull_field, like, like, options.common, control, found);
+  const Geometry grid = straightened(like);  // of the vertices of the inverse, on which a tilted stack is not held
+  const PullField pull = read_pull_field(options.pull_field, like, grid, options.common, control, found);
   try {
-    return {continued_over(pull, like), std::move(found.notes), std::move(found.files), false, pull.grid};
+    return {continued_over(pull, grid), std::move(found.notes), std::move(found.files), false, pull.grid};
   } catch (const InputError& error) {
     throw InputError(std::string(error.what()) + ", " + options.pull_field);
   }

@@ -60,6 +60,23 @@ TEST(StackProgram, SlicesThatLeanOrAreUnevenAreSampledWhereTheyLie) {
   }
 }
 
+TEST(StackProgram, AStackThatLeansIsTheGridOfEveryCommandThatTakesOne) {
+  const Scratch scratch;
+  write_noise(scratch / "tilted", kTilted, {0, 2.5, 5, 7.5, 10, 12.5});
+  const auto run = [&](const std::string& arguments) {
+    const Outcome outcome = run_tetwarp(scratch.path(), arguments);
+    EXPECT_EQ(outcome.status, 0) << arguments << ": " << outcome.err;
+  };
+  run("invert bubble:radius=20,strength=0.2 --like tilted -o pull.mha");
+  run("invert --pull-field pull.mha --like tilted -o forward.mha");
+  run("invert --pull-field pull.mha --like tilted -o forward.nii.gz --report r.json");
+  run("deform tilted --pull-field pull.mha -o a.mha --background -1500");
+  run("deform tilted -f forward.mha -o b.mha --background -1500 --outside background");
+  const auto report = nlohmann::json::parse(read_text(scratch / "r.json"));
+  EXPECT_LT(report["forward_after_inverse"]["largest_mm"], 0.01);
+  EXPECT_EQ(report["uncovered"], 0);
+}
+
 TEST(StackProgram, UnevenSlicesAreRefusedUnlessTheyAreAskedFor) {
   const Scratch scratch;
   write_noise(scratch / "uneven", kStraight, {0, 2.5, 5, 6.25, 9, 12.5});
