@@ -251,7 +251,8 @@ void Deformation::write_files() {
 /// What was used: of several the composed one.
 void Deformation::write_field() {
   const VertexField& field = record_.field.forward.field;
-  if (has_mesh_suffix(record_.outputs.field)) return write_mesh_file(record_.outputs.field, mesh_of(field));
+  if (has_mesh_suffix(record_.outputs.field))
+    return write_mesh_file(record_.outputs.field, mesh_of(field), field.lattice);
   require(field.mesh.is_empty(), "the field is a mesh, which " + options_.write_field.string() +
                                      " cannot hold; write it as a mesh, .vtu or .vtk");
   write_field_file(record_.outputs.field, field);

@@ -4,7 +4,9 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/output.h"
+#include "deform/core/barycentric.h"
 #include "deform/fields/formula.h"
+#include "deform/fields/lattice_mesh.h"
 #include "io/field_file.h"
 #include "io/hash.h"
 #include "io/transform_file.h"
@@ -42,7 +44,7 @@ FieldKind kind_of(const std::string& text) {
 /// Whether the vertices are where the text says.
 bool has_vertices(FieldKind kind) { return kind == FieldKind::lattice || kind == FieldKind::mesh; }
 
-TetrahedralMesh read_mesh(const std::string& text, ForwardField& result) {
+void read_mesh(const std::string& text, ForwardField& result) {
   const FieldSource source = field_source(text);
   MeshFile file = read_mesh_file(source);
   const std::string path = source.path.string();
@@ -56,7 +58,8 @@ TetrahedralMesh read_mesh(const std::string& text, ForwardField& result) {
   header.frame_basis = file.header.frame_basis;
   header.units_basis = file.header.units_basis;
   result.files.push_back({path, header, file.header});
-  return std::move(file.mesh);
+  result.field.mesh = std::move(file.mesh);
+  result.field.lattice = file.lattice;
 }
 
 /// A bad transform is refused before volumes are read.
@@ -77,15 +80,19 @@ void note_transform(const TransformFile& transform, const std::string& path, Dir
   }
 }
 
-std::string hash_samples(const Geometry& lattice, const std::vector<glm::vec3>& displacement,
-                         const std::string& direction, int threads) {
+void add_geometry(const Geometry& lattice, Sha256& hash) {
   const auto bytes_of = [](const auto& value) { return std::as_bytes(std::span(&value, 1)); };
-  Sha256 hash;
-  hash.add("tetwarp field").add(direction);
   hash.add(bytes_of(lattice.size))
       .add(bytes_of(lattice.spacing))
       .add(bytes_of(lattice.origin))
       .add(bytes_of(lattice.direction));
+}
+
+std::string hash_samples(const Geometry& lattice, const std::vector<glm::vec3>& displacement,
+                         const std::string& direction, int threads) {
+  Sha256 hash;
+  hash.add("tetwarp field").add(direction);
+  add_geometry(lattice, hash);
   return hash.add_blocks(std::as_bytes(std::span(displacement)), threads).hex();
 }
 
@@ -164,7 +171,8 @@ std::uint64_t field_bytes(const std::vector<std::string>& fields, const Geometry
   for (const std::string& text : fields) check_transform(text);
   const FieldKind kind = kind_of(fields.front());
   if (kind == FieldKind::mesh) {
-    constexpr std::uint64_t kVertex = sizeof(glm::dvec3) + sizeof(glm::vec3) + 2 * 2 * sizeof(glm::ivec3),
+    constexpr std::uint64_t kVertex =
+                                sizeof(glm::dvec3) + sizeof(glm::vec3) + sizeof(std::int64_t) + 2 * sizeof(Vertex),
                             kTetrahedron = sizeof(glm::u32vec4) + 32;  // snapped twice; in lists
     const MeshFileHeader header = read_mesh_header(field_source(fields.front()));
     return header.vertices * kVertex + header.tetrahedra * kTetrahedron;
@@ -186,7 +194,7 @@ ForwardField read_forward_field(const std::vector<std::string>& fields, const Ge
     result.identity = result.identity && text == "identity";
     const FieldKind kind = kind_of(text);
     if (kind == FieldKind::mesh) {  // the first, as was checked
-      result.field.mesh = read_mesh(text, result);
+      read_mesh(text, result);
       continue;
     }
     if (kind == FieldKind::lattice) {
@@ -269,9 +277,22 @@ nlohmann::json to_json(const std::vector<ReadField>& files) {
   return list;
 }
 
+namespace {
+
+/// Whether a field with a mesh is a lattice with replaced cells, or was made of a lattice.
+bool has_lattice(const VertexField& field) {
+  return !field.replaced.empty() || (!field.mesh.lattice_vertex.empty() && field.lattice.size.x != 0);
+}
+
+}  // namespace
+
 nlohmann::json place_json(const VertexField& field) {
   if (field.mesh.is_empty()) return {{"lattice", to_json(field.lattice)}};
-  return {{"mesh", {{"vertices", field.mesh.rest.size()}, {"tetrahedra", field.mesh.tetrahedra.size()}}}};
+  nlohmann::json place = {
+      {"mesh", {{"vertices", field.mesh.rest.size()}, {"tetrahedra", field.mesh.tetrahedra.size()}}}};
+  if (has_lattice(field)) place["lattice"] = to_json(field.lattice);
+  if (!field.replaced.empty()) place["replaced_cells"] = field.replaced.size();
+  return place;
 }
 
 PullField resting_pull_field(const Geometry& output) {
@@ -282,14 +303,19 @@ PullField resting_pull_field(const Geometry& output) {
 }
 
 std::string hash_field(const VertexField& field, int threads) {
-  const TetrahedralMesh& mesh = field.mesh;
-  if (mesh.is_empty()) return hash_samples(field.lattice, field.displacement, "forward", threads);
+  if (field.mesh.is_empty()) return hash_samples(field.lattice, field.displacement, "forward", threads);
+  const TetrahedralMesh whole = field.replaced.empty() ? TetrahedralMesh{} : mesh_of(field);
+  const TetrahedralMesh& mesh = field.replaced.empty() ? field.mesh : whole;
   Sha256 hash;
   hash.add("tetwarp mesh");
   const std::uint64_t sizes[] = {mesh.rest.size(), mesh.tetrahedra.size()};
   hash.add(std::as_bytes(std::span(sizes)));
   hash.add(std::as_bytes(std::span(mesh.rest)));
   hash.add(std::as_bytes(std::span(mesh.displacement)));
+  if (has_lattice(field)) {
+    add_geometry(field.lattice, hash);
+    hash.add(std::as_bytes(std::span(mesh.lattice_vertex)));
+  }
   return hash.add_blocks(std::as_bytes(std::span(mesh.tetrahedra)), threads).hex();
 }
 
@@ -310,7 +336,8 @@ std::uint64_t AnyField::size_bytes() const {
   const auto bytes_of = [](const auto& values) { return std::as_bytes(std::span(values)).size(); };
   const VertexField& field = forward.field;
   return bytes_of(pull.displacement) + bytes_of(field.displacement) + bytes_of(field.mesh.rest) +
-         bytes_of(field.mesh.displacement) + bytes_of(field.mesh.tetrahedra);
+         bytes_of(field.mesh.displacement) + bytes_of(field.mesh.tetrahedra) + bytes_of(field.mesh.lattice_vertex) +
+         bytes_of(field.replaced);
 }
 
 }  // namespace tetwarp::apps

@@ -86,11 +86,13 @@ nlohmann::json to_json(const std::vector<ReadField>& files);
 PullField resting_pull_field(const Geometry& output);
 
 /// SHA-256 of what decides a field, its direction, place and numbers (Sha256::add_blocks), hexadecimal: the same for a
-/// formula and the file it was written to.
+/// formula or a simulation and the file it was written to. A lattice with replaced cells counts as the mesh that it is
+/// made into (`mesh_of`).
 std::string hash_field(const VertexField& field, int threads);
 std::string hash_field(const PullField& field, int threads);
 
-/// "lattice" and its geometry, or "mesh" and its size.
+/// "lattice" and its geometry, or "mesh" and its size; both where a mesh takes the place of "replaced_cells", or was
+/// made of a lattice.
 nlohmann::json place_json(const VertexField& field);
 
 }  // namespace tetwarp::apps

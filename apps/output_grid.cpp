@@ -25,15 +25,15 @@ struct Bounds {
   }
 };
 
-/// Where the deformed vertices lie in a volume's continuous index.
-Bounds bounds_of(const VertexField& field, const Geometry& volume) {
-  if (!field.mesh.is_empty()) {
-    Bounds bounds;
-    const AffineMap index = index_from_point(volume);
-    for (std::size_t n = 0; n < field.mesh.rest.size(); ++n)
-      bounds.grow(index(field.mesh.rest[n] + glm::dvec3(field.mesh.displacement[n])));
-    return bounds;
-  }
+Bounds bounds_of_mesh(const TetrahedralMesh& mesh, const Geometry& volume) {
+  Bounds bounds;
+  const AffineMap index = index_from_point(volume);
+  for (std::size_t n = 0; n < mesh.rest.size(); ++n)
+    bounds.grow(index(mesh.rest[n] + glm::dvec3(mesh.displacement[n])));
+  return bounds;
+}
+
+Bounds bounds_of_lattice(const VertexField& field, const Geometry& volume) {
   const AffineMap index_from_lattice = index_from_point(volume) * point_from_index(field.lattice);
   const glm::dmat3 index_from_mm = index_from_point(volume).linear;
   const glm::i64vec3 size = field.lattice.size;
@@ -55,6 +55,17 @@ Bounds bounds_of(const VertexField& field, const Geometry& volume) {
         a.grow(b.high);
         return a;
       });
+}
+
+/// Where the deformed vertices lie in a volume's continuous index: those of the lattice, of the mesh that takes the
+/// place of some of its cells, or of a mesh that stands alone.
+Bounds bounds_of(const VertexField& field, const Geometry& volume) {
+  Bounds bounds = bounds_of_mesh(field.mesh, volume);
+  if (!field.mesh.is_empty() && field.replaced.empty()) return bounds;
+  const Bounds of_lattice = bounds_of_lattice(field, volume);
+  bounds.grow(of_lattice.low);
+  bounds.grow(of_lattice.high);
+  return bounds;
 }
 
 Geometry grown(const Geometry& volume, const Bounds& bounds) {

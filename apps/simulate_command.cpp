@@ -84,7 +84,7 @@ void Simulating::write(const fs::path& path, const VertexField& field) {
   Stage stage(options_.common, "write");
   outputs_.set.write([&] {
     if (has_mesh_suffix(path)) {
-      write_mesh_file(path, mesh_of(field));
+      write_mesh_file(path, mesh_of(field), field.lattice);
     } else {
       write_field_file(path, field);
     }

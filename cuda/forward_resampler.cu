@@ -46,7 +46,7 @@ __global__ void settle_kernel(DeviceField field, LatticeFrame whole, bool rest_o
   if (owned) {
     const Tetrahedron t = tetrahedron_numbered(field, owner[n]);
     out.offset[n] = interpolate_u(t, detail::to_steps(voxel), field.frame.nudge.signs(voxel));
-    if (out.jacobian) out.jacobian[n] = static_cast<float>(jacobian(t));
+    if (out.jacobian) out.jacobian[n] = forward_jacobian(t);
     if (outside) atomicAdd(&counts->conflicts, 1ULL);
   }
   if (out.owners) {

@@ -35,7 +35,7 @@ __global__ void settle_mesh_kernel(MeshRaster::View mesh, SlabBox box, Settling 
   if (owned) {
     const Tetrahedron t = mesh.tetrahedron(number);
     of.offset[n] = interpolate_u(t, detail::to_steps(voxel), mesh.nudge.signs(voxel));
-    if (of.jacobian) of.jacobian[n] = static_cast<float>(jacobian(t));
+    if (of.jacobian) of.jacobian[n] = forward_jacobian(t);
     if (outside) atomicAdd(&counts->conflicts, 1ULL);
   }
   if (of.several && of.several[n] > 1) atomicAdd(&counts->multiply_owned, 1ULL);
@@ -48,7 +48,7 @@ class MeshResampler final : public CudaResampler {
 
   void set_field(const FieldView& field, const Control& control) override {
     ready_ = false;
-    mesh_ = snap_mesh(output(), *field.mesh, control);
+    mesh_ = snap_mesh(output(), field, control);
     const DeviceScope scope(device_);
     stream_ = static_cast<cudaStream_t>(control.stream);
     stays_outside_ = field.outside == Outside::rest;

@@ -3,6 +3,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "deform/core/barycentric.h"
 #include "deform/errors.h"
 #include "deform/target_check.h"
 
@@ -11,13 +12,82 @@ namespace tetwarp {
 namespace {
 
 constexpr double kSmallestCell = 1.0 / 1024;  ///< voxels; snapping would leave smaller cells no shape
-constexpr double kReachTolerance = 1.0 / kStepsPerVoxel;
+/// Voxels that a lattice may end short of the outermost voxel centres and still be taken to end there: what rounding a
+/// header's spacing and origin to six digits costs on 512 voxels (2.6e-3), and a little more.
+constexpr double kBorderRounding = 1.0 / 256;
+
+/// Where the corners of an output lie in a lattice: the least and most vertex index of each axis.
+struct Reach {
+  glm::dvec3 low{INFINITY}, high{-INFINITY};
+
+  Reach(const AffineMap& lattice_from_output, const glm::i64vec3& size) {
+    for (int corner = 0; corner < 8; ++corner) {
+      const glm::dvec3 at(corner & 1, corner >> 1 & 1, corner >> 2);
+      const glm::dvec3 vertex = lattice_from_output(at * glm::dvec3(size - std::int64_t{1}));
+      low = glm::min(low, vertex);
+      high = glm::max(high, vertex);
+    }
+  }
+};
+
+/// Whether an axis of a lattice runs along an axis of the output, so that its border layers lie in planes of voxels.
+bool is_aligned(const glm::dvec3& step, std::int64_t cells) {
+  constexpr double kNegligible = 1e-6;  // voxels over the whole lattice
+  int along = 0;
+  for (int axis = 0; axis < 3; ++axis) along += std::fabs(step[axis]) * static_cast<double>(cells) > kNegligible;
+  return along == 1;
+}
+
+/// How far beyond the end of an axis a lattice is drawn out, so that its snapped border loses no voxel; vertex index.
+/// @param missing  voxels from the lattice's end to the outermost corner of the output; negative where it overhangs
+double drawn_out(double missing, double voxels_per_cell, bool aligned) {
+  constexpr double kStep = 1.0 / kStepsPerVoxel;
+  // A border in a plane of voxels snaps onto it from half a step away. An oblique one may lose a step and needs two.
+  const double from = aligned ? kStep / 4 : -kStep, further = aligned ? 0 : 2 * kStep;
+  return missing > from && missing <= kBorderRounding ? (missing + further) / voxels_per_cell : 0;
+}
+
+/// Draws a lattice out to the border of the output where it ends within rounding of it. A lattice that reaches over the
+/// border, or ends well inside it, stays as it is.
+void reach_border(const Reach& reach, LatticeFrame& frame) {
+  glm::dvec3 low(0), high(frame.cells);
+  for (int axis = 0; axis < 3; ++axis) {
+    const glm::dvec3 step = frame.output_from_lattice.linear[axis];
+    const double length = glm::length(step);
+    const bool aligned = is_aligned(step, frame.cells[axis]);
+    low[axis] -= drawn_out(-reach.low[axis] * length, length, aligned);
+    high[axis] += drawn_out((reach.high[axis] - static_cast<double>(frame.cells[axis])) * length, length, aligned);
+  }
+  if (low == glm::dvec3(0) && high == glm::dvec3(frame.cells)) return;
+  const glm::dvec3 scale = (high - low) / glm::dvec3(frame.cells);
+  const auto diagonal = [](const glm::dvec3& d) { return glm::dmat3(d.x, 0, 0, 0, d.y, 0, 0, 0, d.z); };
+  frame.output_from_lattice = frame.output_from_lattice * AffineMap{diagonal(scale), low};
+  frame.lattice_from_output = AffineMap{diagonal(1.0 / scale), -low / scale} * frame.lattice_from_output;
+}
+
+/// @throws InputError for a lattice that does not reach over the output
+void require_reach(const Reach& reach, const LatticeFrame& frame) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const double slack = kBorderRounding / glm::length(frame.output_from_lattice.linear[axis]),
+                 cells = static_cast<double>(frame.cells[axis]);
+    const bool below = !(reach.low[axis] >= -slack);
+    require(!below && reach.high[axis] <= cells + slack,
+            "the field's lattice of " + to_string(frame.cells + std::int64_t{1}) +
+                " vertices does not reach over the whole grid of the volume: a corner of it lies at vertex index " +
+                std::to_string(below ? reach.low[axis] : reach.high[axis]) + " of axis " + std::to_string(axis) +
+                ", expected 0 to " + std::to_string(frame.cells[axis]) +
+                "; choose rest or background for what lies outside it");
+  }
+}
 
 }  // namespace
 
 LatticeFrame make_lattice_frame(const Geometry& output, const FieldView& field) {
   require(field.lattice && field.displacement, "the field is empty");
-  const Geometry& lattice = *field.lattice;
+  return make_lattice_frame(output, *field.lattice, field.outside);
+}
+
+LatticeFrame make_lattice_frame(const Geometry& output, const Geometry& lattice, Outside outside) {
   require_valid(lattice, "field lattice");
   require(lattice.slices.empty(), "the field lattice has uneven slices; only a source may");
   LatticeFrame frame;
@@ -33,22 +103,15 @@ LatticeFrame make_lattice_frame(const Geometry& output, const FieldView& field) 
                                          " voxels of the output along axis " + std::to_string(axis) +
                                          ", expected at least 1/1024");
   }
+  const Reach reach(frame.lattice_from_output, output.size);
+  if (outside == Outside::refuse) require_reach(reach, frame);
+  reach_border(reach, frame);
   Box rest{glm::i32vec3(INT32_MAX), glm::i32vec3(INT32_MIN)};
   for (int corner = 0; corner < 8; ++corner) {
     const glm::dvec3 at = glm::dvec3(corner & 1, corner >> 1 & 1, corner >> 2);
     require(is_within(frame.output_from_lattice(at * glm::dvec3(frame.cells)), kLargestIndex),
             "the field's lattice lies more than 262144 voxels from the output grid");
     rest.grow(snap(frame.output_from_lattice(at * glm::dvec3(frame.cells))));
-    if (field.outside != Outside::refuse) continue;
-    const glm::dvec3 vertex = frame.lattice_from_output(at * glm::dvec3(output.size - std::int64_t{1}));
-    for (int axis = 0; axis < 3; ++axis) {
-      const double slack = kReachTolerance / glm::length(frame.output_from_lattice.linear[axis]);
-      require(vertex[axis] >= -slack && vertex[axis] <= static_cast<double>(frame.cells[axis]) + slack,
-              "the field's lattice of " + to_string(lattice.size) +
-                  " vertices does not reach over the whole grid of the volume: a corner of it lies at vertex index " +
-                  std::to_string(vertex[axis]) + " of axis " + std::to_string(axis) + ", expected 0 to " +
-                  std::to_string(frame.cells[axis]) + "; choose rest or background for what lies outside it");
-    }
   }
   frame.nudge.low_plus_high = glm::i64vec3(rest.low) + glm::i64vec3(rest.high);
   return frame;
@@ -76,6 +139,8 @@ StepLattice make_step_lattice(const LatticeFrame& frame, const Geometry& output)
   }
   const glm::i64vec3 size = frame.cells + std::int64_t{1};
   if (size.x * size.y * size.z > INT32_MAX) return {};
+  const glm::vec3 x(lattice.cell.x, 0, 0), y(0, lattice.cell.y, 0), z(0, 0, lattice.cell.z);
+  if (is_thin_at_rest(x, y, z) || is_thin_at_rest(y + z, x + z, x + y)) return {};
   lattice.cells = glm::ivec3(frame.cells);
   lattice.last = lattice.cells - 1;
   lattice.row = static_cast<int>(size.x);

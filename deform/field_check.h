@@ -10,13 +10,19 @@
 namespace tetwarp {
 
 /// Checks everything about a forward field but its displacements. Every backend begins `set_field` with it.
+///
+/// A lattice that ends up to 1/256 voxel short of the outermost voxel centres is drawn out to them, whatever becomes of
+/// voxels outside it: its maker meant to reach over the volume, and headers are rounded. Its vertices rest where they
+/// are drawn to.
 /// @throws InputError for a lattice that is empty, too far, too fine, or does not reach over the output
 /// (Outside::refuse)
 LatticeFrame make_lattice_frame(const Geometry& output, const FieldView& field);
+/// As above, of a lattice whose displacements are held elsewhere.
+LatticeFrame make_lattice_frame(const Geometry& output, const Geometry& lattice, Outside outside);
 
 /// The lattice of a frame as a gather reads it, without its vertices; cells are 0 where it is not along the grid's
-/// axes, its vertices are not at whole steps, or it or the grid is too large for that (4096 voxels an axis, 2^31
-/// vertices).
+/// axes, its vertices are not at whole steps, its cells are thin, or it or the grid is too large for that (4096 voxels
+/// an axis, 2^31 vertices).
 ///
 /// Rounding may still put a vertex a step beside its place: whoever snaps the vertices compares
 /// (`StepLattice::vertex`).

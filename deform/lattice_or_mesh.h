@@ -3,7 +3,6 @@
 #include <functional>
 #include <memory>
 
-#include "deform/fields/lattice_mesh.h"
 #include "deform/resampler.h"
 
 namespace tetwarp {
@@ -26,10 +25,8 @@ class LatticeOrMesh final : public Resampler {
       current_ = is_mesh ? make_mesh_() : make_lattice_();
       holds_mesh_ = is_mesh;
     }
-    if (field.replaced.empty()) return current_->set_field(field, control);
-    require(is_mesh, "a field with replaced cells needs a mesh in their place");
-    whole_ = mesh_of(field);
-    current_->set_field({.outside = field.outside, .mesh = &whole_}, control);
+    require(is_mesh || field.replaced.empty(), "a field with replaced cells needs a mesh in their place");
+    current_->set_field(field, control);
   }
   Region source_region(const Geometry& source, Region region) const override {
     return held().source_region(source, region);
@@ -47,7 +44,6 @@ class LatticeOrMesh final : public Resampler {
   Make make_lattice_, make_mesh_;
   std::unique_ptr<Resampler> current_;
   bool holds_mesh_ = false;
-  TetrahedralMesh whole_;  ///< of a lattice with replaced cells
 };
 
 }  // namespace tetwarp

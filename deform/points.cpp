@@ -13,7 +13,6 @@
 #include "deform/core/cell_weights.h"
 #include "deform/cpu/tiles.h"
 #include "deform/field_check.h"
-#include "deform/fields/lattice_mesh.h"
 #include "deform/mesh_locator.h"
 
 namespace tetwarp {
@@ -61,7 +60,6 @@ class LatticeMap final : public PointMover::Map {
   LatticeMap(const Geometry& output, const FieldView& field)
       : field_(field),
         frame_(make_lattice_frame(output, field)),
-        lattice_from_point_(index_from_point(*field.lattice)),
         output_from_point_(index_from_point(output)),
         mm_from_output_(point_from_index(output).linear) {
     for (int axis = 0; axis < 3; ++axis)
@@ -78,7 +76,7 @@ class LatticeMap final : public PointMover::Map {
 
   const FieldView field_;
   const LatticeFrame frame_;
-  const AffineMap lattice_from_point_, output_from_point_;
+  const AffineMap output_from_point_;
   const glm::dmat3 mm_from_output_;
   glm::dvec3 slack_{0};  ///< kOnBorder in cells
 };
@@ -125,14 +123,14 @@ Holder LatticeMap::search_around(const glm::i64vec3& cell, const glm::dvec3& ste
 }
 
 PointStatus LatticeMap::move(glm::dvec3& point) const {
-  const glm::dvec3 at = lattice_from_point_(point);
+  const glm::dvec3 in_output = output_from_point_(point), at = frame_.lattice_from_output(in_output);
   glm::i64vec3 cell;
   for (int axis = 0; axis < 3; ++axis) {
     const double last = static_cast<double>(frame_.cells[axis]);
     if (!(at[axis] >= -slack_[axis] && at[axis] <= last + slack_[axis])) return PointStatus::outside;
     cell[axis] = std::clamp<std::int64_t>(static_cast<std::int64_t>(std::floor(at[axis])), 0, frame_.cells[axis] - 1);
   }
-  const glm::dvec3 steps = output_from_point_(point) * double{kStepsPerVoxel};
+  const glm::dvec3 steps = in_output * double{kStepsPerVoxel};
   const CellWeights guess = weights_in_cell(glm::clamp(at - glm::dvec3(cell), 0.0, 1.0), is_odd(cell));
   Holder holder = hold(cell, guess.corners, steps);
   if (!(holder.least >= -kRounding)) holder = search_around(cell, steps);
@@ -142,8 +140,8 @@ PointStatus LatticeMap::move(glm::dvec3& point) const {
 
 class MeshMap final : public PointMover::Map {
  public:
-  MeshMap(const Geometry& output, const TetrahedralMesh& mesh, const Control& control)
-      : mesh_(snap_mesh(output, mesh, control)),
+  MeshMap(const Geometry& output, const FieldView& field, const Control& control)
+      : mesh_(snap_mesh(output, field, control)),
         locator_(mesh_),
         output_from_point_(index_from_point(output)),
         mm_from_output_(point_from_index(output).linear) {}
@@ -172,10 +170,7 @@ PointMover::PointMover(const Geometry& output, const FieldView& field, const Lim
     return;
   }
   tbb::task_arena arena = cpu::make_arena(limits);
-  arena.execute([&] {
-    const TetrahedralMesh whole = field.replaced.empty() ? TetrahedralMesh{} : mesh_of(field);
-    map_ = std::make_unique<MeshMap>(output, field.replaced.empty() ? *field.mesh : whole, control);
-  });
+  arena.execute([&] { map_ = std::make_unique<MeshMap>(output, field, control); });
 }
 
 PointMover::~PointMover() = default;

@@ -16,7 +16,10 @@ void require_one_each(const Geometry& grid, std::size_t vectors) {
 
 FieldView view(const VertexField& field, Outside outside) {
   require_one_each(field.mesh);
-  if (!field.mesh.is_empty() && field.replaced.empty()) return {.outside = outside, .mesh = &field.mesh};
+  if (!field.mesh.is_empty() && field.replaced.empty()) {
+    const bool of_lattice = !field.mesh.lattice_vertex.empty() && field.lattice.size.x != 0;
+    return {.lattice = of_lattice ? &field.lattice : nullptr, .outside = outside, .mesh = &field.mesh};
+  }
   require_one_each(field.lattice, field.displacement.size());
   if (field.replaced.empty()) return {&field.lattice, field.displacement.data(), outside, Memory::host};
   return {.lattice = &field.lattice,

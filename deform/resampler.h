@@ -72,7 +72,7 @@ struct Report {
   std::optional<std::uint64_t> multiply_owned =
       {};  ///< voxels with more than one owner, where Maps::owners was asked for
   double jacobian_min =
-      std::numeric_limits<double>::infinity();  ///< over all tetrahedra of the field; computed in float
+      std::numeric_limits<double>::infinity();  ///< over all tetrahedra of the field, as Maps::jacobian has it
   double jacobian_max = -std::numeric_limits<double>::infinity();
   Paths paths;  ///< the one part that backends, limits and splits change
 

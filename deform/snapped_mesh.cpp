@@ -6,9 +6,12 @@
 
 #include <algorithm>
 #include <glm/common.hpp>
+#include <optional>
 #include <string>
 
 #include "deform/core/lattice_vertex.h"
+#include "deform/field_check.h"
+#include "deform/fields/lattice_mesh.h"
 #include "deform/target_check.h"
 
 namespace tetwarp {
@@ -29,6 +32,40 @@ constexpr std::size_t kGrain = 4096;
                    "are its units and frame right?");
 }
 
+/// Turns the vertices of a mesh into snapped ones.
+class VertexSnapper {
+ public:
+  VertexSnapper(const Geometry& output, const TetrahedralMesh& mesh, const FieldView& field)
+      : mesh_(mesh), output_from_point_(index_from_point(output)) {
+    if (mesh.lattice_vertex.empty() || !field.lattice) return;
+    frame_ = make_lattice_frame(output, *field.lattice, field.outside);
+    lattice_from_point_ = index_from_point(*field.lattice);
+    size_ = field.lattice->size;
+  }
+
+  /// Of the lattice that the mesh is of; empty: of none.
+  const std::optional<LatticeFrame>& frame() const { return frame_; }
+
+  /// @return false where a vertex is not finite or too far away
+  bool snap(std::size_t n, Vertex& vertex) const {
+    const glm::dvec3 rest = frame_ ? frame_->output_from_lattice(lattice_index(n)) : output_from_point_(mesh_.rest[n]);
+    return is_within(rest, kLargestIndex) && snap_moved(rest, output_from_point_.linear, mesh_.displacement[n], vertex);
+  }
+
+ private:
+  glm::dvec3 lattice_index(std::size_t n) const {
+    const std::int64_t number = mesh_.lattice_vertex[n];
+    if (number < 0) return lattice_from_point_(mesh_.rest[n]);
+    return glm::dvec3(number % size_.x, number / size_.x % size_.y, number / (size_.x * size_.y));
+  }
+
+  const TetrahedralMesh& mesh_;
+  const AffineMap output_from_point_;
+  AffineMap lattice_from_point_;
+  glm::i64vec3 size_{0};
+  std::optional<LatticeFrame> frame_;
+};
+
 /// What some tetrahedra have in common.
 struct Findings {
   std::uint64_t inverted = 0, degenerate = 0;
@@ -41,7 +78,7 @@ struct Findings {
       low = glm::min(low, rest);
       high = glm::max(high, rest);
     }
-    const double determinant = jacobian(t);
+    const double determinant = forward_jacobian(t);
     if (!std::isfinite(determinant) || determinant == 0) ++degenerate;
     if (!std::isfinite(determinant)) return;  // undeformed, it has no volume
     inverted += determinant < 0;
@@ -62,8 +99,17 @@ void require_one_each(const TetrahedralMesh& mesh) {
               std::to_string(mesh.displacement.size()) + " displacements; expected one for each vertex");
 }
 
-void require_fitting_arrays(const TetrahedralMesh& mesh) {
+void require_fitting_arrays(const TetrahedralMesh& mesh, const Geometry* lattice) {
   require_one_each(mesh);
+  const std::int64_t vertices = lattice ? voxel_count(*lattice) : INT64_MAX;
+  require(mesh.lattice_vertex.empty() || mesh.lattice_vertex.size() == mesh.rest.size(),
+          "the mesh has " + std::to_string(mesh.rest.size()) + " vertices and " +
+              std::to_string(mesh.lattice_vertex.size()) +
+              " numbers of a lattice's vertices; expected one for each vertex");
+  for (const std::int64_t number : mesh.lattice_vertex) {
+    require(number >= -1 && number < vertices, "a vertex of the mesh rests at vertex " + std::to_string(number) +
+                                                   " of a lattice that has " + std::to_string(vertices));
+  }
   require(mesh.tetrahedra.size() < UINT32_MAX,
           "the mesh has " + std::to_string(mesh.tetrahedra.size()) + " tetrahedra; expected fewer than 4294967295");
   for (std::size_t n = 0; n < mesh.tetrahedra.size(); ++n) {
@@ -75,22 +121,22 @@ void require_fitting_arrays(const TetrahedralMesh& mesh) {
   }
 }
 
-SnappedMesh snap_mesh(const Geometry& output, const TetrahedralMesh& mesh, const Control& control) {
-  require(!mesh.tetrahedra.empty(), "the mesh has no tetrahedra");
-  require_fitting_arrays(mesh);
-  const AffineMap output_from_point = index_from_point(output);
+SnappedMesh snap_mesh(const Geometry& output, const FieldView& field, const Control& control) {
   SnappedMesh snapped;
+  const bool is_cut = !field.replaced.empty();
+  require(is_cut || field.mesh, "the field is empty");
+  TetrahedralMesh whole = is_cut ? mesh_of(field) : TetrahedralMesh{};
+  const TetrahedralMesh& mesh = is_cut ? whole : *field.mesh;
+  require(!mesh.tetrahedra.empty(), "the mesh has no tetrahedra");
+  require_fitting_arrays(mesh, field.lattice);
+  if (is_cut) snapped.made = std::make_shared<const std::vector<glm::u32vec4>>(std::move(whole.tetrahedra));
+  snapped.tetrahedra = is_cut ? *snapped.made : mesh.tetrahedra;
   snapped.vertices.resize(mesh.rest.size());
-  snapped.tetrahedra = mesh.tetrahedra;
-  const auto snap_one = [&](std::size_t n) {
-    const glm::dvec3 rest = output_from_point(mesh.rest[n]);
-    if (!is_within(rest, kLargestIndex)) return false;
-    return snap_moved(rest, output_from_point.linear, mesh.displacement[n], snapped.vertices[n]);
-  };
+  const VertexSnapper snapper(output, mesh, field);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.rest.size(), kGrain), [&](const auto& range) {
     if (control.stop.stop_requested()) throw Cancelled();
     for (std::size_t n = range.begin(); n < range.end(); ++n) {
-      if (!snap_one(n)) snapped.vertices[n].u.x = INT32_MIN;  // no u that is usable
+      if (!snapper.snap(n, snapped.vertices[n])) snapped.vertices[n].u.x = INT32_MIN;  // no u that is usable
     }
   });
   for (std::size_t n = 0; n < mesh.rest.size(); ++n) {
@@ -104,7 +150,7 @@ SnappedMesh snap_mesh(const Geometry& output, const TetrahedralMesh& mesh, const
         return findings;
       },
       [](const Findings& a, const Findings& b) { return a + b; });
-  snapped.nudge.low_plus_high = found.low + found.high;
+  snapped.nudge = snapper.frame() ? snapper.frame()->nudge : Nudge{found.low + found.high};
   snapped.inverted = found.inverted;
   snapped.degenerate = found.degenerate;
   snapped.jacobian_min = found.least;

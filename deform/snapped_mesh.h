@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -13,12 +14,14 @@ namespace tetwarp {
 
 /// A tetrahedral mesh over an output grid: what every backend works with.
 ///
-/// As a lattice's (`LatticeFrame::snap_vertex`), both ends of a vertex are taken in continuous output index in double
-/// and snapped; u is zero exactly where the displacement is.
+/// Both ends of a vertex are taken in continuous output index in double and snapped; u is zero exactly where the
+/// displacement is. Vertices that rest at a lattice's are snapped by its frame, from their vertex index, so that they
+/// have the bits that they have in the lattice; others from their place in mm.
 struct SnappedMesh {
   std::vector<Vertex> vertices;
-  std::span<const glm::u32vec4> tetrahedra;  ///< of the mesh that was given
-  Nudge nudge;                               ///< towards the middle of the undeformed mesh's box
+  std::span<const glm::u32vec4> tetrahedra;               ///< of the mesh that was given, or `made`
+  std::shared_ptr<const std::vector<glm::u32vec4>> made;  ///< of a lattice with replaced cells; else null
+  Nudge nudge;  ///< towards the middle of the undeformed box: the lattice's where there is one, else the mesh's
 
   std::uint64_t inverted = 0;    ///< tetrahedra turned inside out
   std::uint64_t degenerate = 0;  ///< tetrahedra without volume, deformed or undeformed; undeformed ones may own voxels
@@ -40,13 +43,16 @@ struct SnappedMesh {
 
 /// @throws InputError unless a mesh has one displacement for each vertex
 void require_one_each(const TetrahedralMesh& mesh);
-/// The same, and for a tetrahedron with a vertex that is not there.
-void require_fitting_arrays(const TetrahedralMesh& mesh);
+/// @throws InputError as `require_one_each`, for a tetrahedron with a vertex that is not there, and for numbers of
+/// lattice vertices that are not one a vertex, or of no vertex of the lattice. @param lattice  may be null
+void require_fitting_arrays(const TetrahedralMesh& mesh, const Geometry* lattice);
 
-/// Checks a mesh, snaps its vertices and looks at its tetrahedra, in parallel in the calling task arena.
-/// @throws InputError for a mesh that is empty or whose arrays do not fit together, or the first vertex that is not
-/// finite or too far away; Cancelled
-SnappedMesh snap_mesh(const Geometry& output, const TetrahedralMesh& mesh, const Control& control);
+/// Checks the mesh of a field, snaps its vertices and looks at its tetrahedra, in parallel in the calling task arena.
+/// @param field  a mesh, which must outlive the result, or a lattice with replaced cells, which need not; in host
+/// memory
+/// @throws InputError for a mesh that is empty or whose arrays do not fit together, the first vertex that is not finite
+/// or too far away, and what `make_lattice_frame` throws for the lattice, if there is one; Cancelled
+SnappedMesh snap_mesh(const Geometry& output, const FieldView& field, const Control& control);
 
 /// The same mesh where nothing moved: its tetrahedra own what lies in the undeformed mesh.
 SnappedMesh undeformed(const SnappedMesh& mesh);

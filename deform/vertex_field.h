@@ -12,6 +12,10 @@ struct TetrahedralMesh {
   std::vector<glm::dvec3> rest;          ///< LPS mm of each vertex
   std::vector<glm::vec3> displacement;   ///< LPS mm, deformed minus rest, one a vertex; zero rests exactly
   std::vector<glm::u32vec4> tetrahedra;  ///< vertex numbers; in either orientation
+  /// Of a mesh that takes the place of cells of a lattice, or that a lattice was made into: the number of the lattice's
+  /// vertex (i fastest) that each vertex rests at, -1 for none. Such vertices are snapped as the lattice's own are,
+  /// where the lattice is beside the mesh (`VertexField::lattice`). Empty: places tell, or there is no lattice.
+  std::vector<std::int64_t> lattice_vertex = {};
 
   bool is_empty() const { return tetrahedra.empty(); }
 };
@@ -22,7 +26,7 @@ struct TetrahedralMesh {
 /// Every cell of the lattice is split into five tetrahedra (core/five_tetrahedra.h); inside each the map is affine.
 struct VertexField {
   Geometry lattice;                     ///< of the undeformed vertices; its last cells may overhang a volume. Size 0:
-                                        ///< there is a mesh
+                                        ///< there is a mesh, of no lattice
   std::vector<glm::vec3> displacement;  ///< LPS mm, deformed minus rest, i fastest, 12 bytes each (1.9 GB at
                                         ///< 512x512x600); zero rests exactly
   TetrahedralMesh mesh = {};            ///< in the place of a lattice, or of some of its cells
@@ -48,7 +52,7 @@ enum class Outside : std::uint8_t {
 
 /// Not an owner: the field must outlive the view, and the Resampler that the view was given to.
 struct FieldView {
-  const Geometry* lattice = nullptr;
+  const Geometry* lattice = nullptr;  ///< of a mesh that stands alone: the one that `lattice_vertex` counts in, or null
   const glm::vec3* displacement = nullptr;
   Outside outside = Outside::refuse;
   Memory memory = Memory::host;                  ///< of `displacement`; the lattice is always the host's

@@ -172,6 +172,28 @@ std::size_t drop_repeated(std::vector<glm::u32vec4>& tetrahedra) {
   return std::erase_if(tetrahedra, [&](const glm::u32vec4&) { return repeated[t++]; });
 }
 
+/// Which of the lattice's vertices those of the mesh rest at, where the file says so and their places agree: a file of
+/// ours that another program moved or scaled is a mesh as any other. @param numbers  of `numbers_of_used`
+void take_lattice(const MeshReader& reader, const std::vector<std::uint32_t>& numbers, TetrahedralMesh& mesh,
+                  MeshFileHeader& header) {
+  if (!reader.lattice) return;
+  const Geometry& lattice = reader.lattice->geometry;
+  const AffineMap point = point_from_index(lattice);
+  std::vector<std::int64_t> of_lattice;
+  for (std::size_t v = 0; v < numbers.size(); ++v) {
+    if (numbers[v] == kUnused) continue;
+    const std::int64_t vertex = reader.lattice->vertex[v];
+    of_lattice.push_back(vertex);
+    const glm::i64vec3& size = lattice.size;
+    const glm::dvec3 index(vertex % size.x, vertex / size.x % size.y, vertex / (size.x * size.y));
+    if (vertex < 0 || mesh.rest[numbers[v]] == point(index)) continue;
+    header.notes.push_back("vertices are not where the lattice of the file has them, so it is taken as any mesh");
+    return;
+  }
+  mesh.lattice_vertex = std::move(of_lattice);
+  header.lattice = lattice;
+}
+
 /// @param displacement  as of `displacement_of`
 TetrahedralMesh mesh_of(MeshReader& reader, const std::vector<glm::dvec3>& displacement, const FieldSource& source,
                         MeshFileHeader& header) {
@@ -193,6 +215,7 @@ TetrahedralMesh mesh_of(MeshReader& reader, const std::vector<glm::dvec3>& displ
                    source);
     header.largest_mm = std::max(header.largest_mm.value_or(0), glm::length(mm));
   }
+  take_lattice(reader, numbers, mesh, header);
   mesh.tetrahedra = reader.cells.take();
   for (glm::u32vec4& tetrahedron : mesh.tetrahedra) {
     for (int n = 0; n < 4; ++n) tetrahedron[n] = numbers[tetrahedron[n]];
@@ -220,6 +243,7 @@ MeshFile read(const FieldSource& source, bool must_be_decided) {
               "; give displacement=NAME, step=N where there are several, or deformed=FILE, as in " +
               source.path.string() + ":displacement=NAME");
   result.mesh = mesh_of(*reader, displacement, source, header);
+  if (header.lattice) result.lattice = *header.lattice;
   header.vertices = result.mesh.rest.size();
   header.tetrahedra = result.mesh.tetrahedra.size();
   return result;

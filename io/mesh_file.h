@@ -24,11 +24,13 @@ struct MeshFileHeader {
   std::string frame = "LPS";                              ///< LPS or RAS, of the file
   std::string units = "mm";                               ///< mm or m, of the file
   FieldBasis frame_basis = FieldBasis::assumed, units_basis = FieldBasis::assumed;
-  std::vector<std::string> notes;  ///< for people: what was left out or made simpler
+  std::optional<Geometry> lattice;  ///< of which Tetwarp made the mesh; its vertices are snapped as the lattice's are
+  std::vector<std::string> notes;   ///< for people: what was left out or made simpler
 };
 
 struct MeshFile {
   MeshFileHeader header;
+  Geometry lattice;      ///< that the mesh was made of, where it has `lattice_vertex`
   TetrahedralMesh mesh;  ///< LPS mm; only vertices of tetrahedra, in the order of the file's vertex numbers
 };
 

@@ -22,6 +22,12 @@ struct MeshVectors {
   bool operator==(const MeshVectors&) const = default;
 };
 
+/// The lattice that a mesh was made of, as a file of ours states it.
+struct MeshLattice {
+  Geometry geometry;
+  std::vector<std::int64_t> vertex;  ///< TetrahedralMesh::lattice_vertex, one for each of the file's points
+};
+
 /// A mesh file that was read and checked: vertices and cells, as they are in the file. mesh_file.cpp drops vertices
 /// that no cell uses, applies frame and units, and looks for numbers that are not finite.
 class MeshReader {
@@ -40,6 +46,7 @@ class MeshReader {
   std::vector<MeshVectors> arrays;          ///< only those of three components
   std::optional<std::string> frame, units;  ///< LPS or RAS, mm or m, where this file states them
   std::vector<std::string> notes;           ///< without the file's name: "20 triangles are left out"
+  std::optional<MeshLattice> lattice;       ///< where this file states one, as `write_mesh_file` does
 };
 
 struct MeshFormat {

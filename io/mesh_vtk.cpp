@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <map>
 #include <set>
 
 #include "deform/errors.h"
+#include "io/mesh_lattice.h"
 #include "io/vtk_file.h"
 
 namespace tetwarp {
@@ -80,6 +82,7 @@ class VtkMeshReader final : public MeshReader {
       vectors_.push_back(array);
       arrays.push_back({array.name, {}});
     }
+    take_lattice();
   }
 
   std::vector<glm::dvec3> vectors(std::size_t n) const override { return triples(vectors_.at(n)); }
@@ -92,6 +95,30 @@ class VtkMeshReader final : public MeshReader {
         result[first + n] = {values[3 * n], values[3 * n + 1], values[3 * n + 2]};
     });
     return result;
+  }
+
+  /// What `write_mesh_file` says of the lattice that a mesh was made of.
+  void take_lattice() {
+    const auto called = [](const std::vector<VtkArray>& list, const char* title) -> const VtkArray* {
+      const auto found =
+          std::find_if(list.begin(), list.end(), [&](const VtkArray& array) { return array.name == title; });
+      return found == list.end() ? nullptr : &*found;
+    };
+    const VtkArray* place = called(file_->field_data, kMeshLatticeArray);
+    const VtkArray* numbers = called(file_->point_data, kMeshLatticeVertexArray);
+    if (!place || !numbers) return;
+    require(place->count() == kMeshLatticeNumbers && numbers->components == 1,
+            std::string("\"") + kMeshLatticeArray + "\" of " + std::to_string(place->count()) + " numbers, " +
+                file_->name + "; expected " + std::to_string(kMeshLatticeNumbers));
+    lattice.emplace();
+    lattice->geometry = mesh_lattice_of(file_->values_of(*place), file_->name);
+    const auto vertices = static_cast<double>(voxel_count(lattice->geometry));
+    for (const double number : file_->values_of(*numbers)) {
+      require(number >= -1 && number < vertices && number == std::floor(number),
+              "vertex " + std::to_string(number) + " of a lattice of " + to_string(lattice->geometry.size) + ", " +
+                  file_->name);
+      lattice->vertex.push_back(static_cast<std::int64_t>(number));
+    }
   }
 
   void take_cells() {

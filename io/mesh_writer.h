@@ -14,6 +14,9 @@ bool has_mesh_suffix(const std::filesystem::path& path);
 /// ones (float). Corners of tetrahedra keep their order, in either orientation, so that what is read again is the same.
 /// @throws InputError for another suffix, more than 2^31 vertices or arrays that do not fit together; Error where it
 /// cannot be written (disk full)
-void write_mesh_file(const std::filesystem::path& path, const TetrahedralMesh& mesh);
+///
+/// @param lattice  where the mesh has `lattice_vertex`, the one that it counts in: it is written too
+/// (io/mesh_lattice.h), so that the vertices are snapped as the lattice's own when the file is read again
+void write_mesh_file(const std::filesystem::path& path, const TetrahedralMesh& mesh, const Geometry& lattice = {});
 
 }  // namespace tetwarp

@@ -42,6 +42,15 @@ void VtkFile::read_all(const VtkArray& array,
   }
 }
 
+std::vector<double> VtkFile::values_of(const VtkArray& array) const {
+  require_holds(array);
+  std::vector<double> all;
+  all.reserve(array.count());
+  read_all(array,
+           [&](std::uint64_t, std::span<const double> values) { all.insert(all.end(), values.begin(), values.end()); });
+  return all;
+}
+
 template <class Number>
 std::vector<Number> VtkFile::whole_numbers(const VtkArray& array, double limit, const char* what) const {
   require_holds(array);

@@ -56,6 +56,7 @@ class VtkFile {
   std::array<VtkArray, 3> coordinates;  ///< of a rectilinear grid
   VtkArray points;                      ///< of a structured grid or a mesh
   std::vector<VtkArray> point_data;     ///< one tuple a point
+  std::vector<VtkArray> field_data;     ///< of the dataset as a whole; whoever reads one finds out whether it fits
 
   /// Some of an array's values as they lie in the file, from number `first` on; they need not be finite.
   /// @throws InputError for a file that is truncated or damaged
@@ -63,6 +64,8 @@ class VtkFile {
   /// All values, in parts of whole tuples. @param take  gets the number of the part's first tuple
   void read_all(const VtkArray& array,
                 const std::function<void(std::uint64_t tuple, std::span<const double> values)>& take) const;
+  /// All values of an array of which nothing was found out yet. @throws InputError where the file cannot hold it
+  std::vector<double> values_of(const VtkArray& array) const;
   /// Of a mesh. @throws InputError as `read`, for offsets that go back and for corners that are no point
   VtkCells cells() const;
 

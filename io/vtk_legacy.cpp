@@ -157,7 +157,12 @@ class LegacyFile final : public VtkFile {
 
   void take_arrays(const std::vector<VtkTextArray>& arrays, const std::string& where) {
     for (const VtkTextArray& array : arrays) {
-      if (at_ != At::points) continue;
+      if (at_ == At::cells) continue;
+      if (at_ == At::dataset) {
+        const bool is_text = array.values.type == "BIT" || array.values.type == "STRING";
+        field_data.push_back(added(decoded(array.name), is_text ? 0 : array.components, array.tuples, array.values));
+        continue;
+      }
       require(array.tuples == tuples_, std::to_string(array.tuples) + " tuples of \"" + decoded(array.name) +
                                            "\" for " + std::to_string(tuples_) + " points" + where);
       const bool is_bits = array.values.type == "BIT";

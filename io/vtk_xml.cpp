@@ -235,6 +235,11 @@ class XmlFile final : public VtkFile {
       points = arrays[0];
       require_holds(points);
     }
+    field_data = arrays_of(primary, "FieldData", 0);
+    for (VtkArray& array : field_data) {
+      vtkXMLDataElement* element = stored_[array.id].element;
+      if (element->GetAttribute("NumberOfTuples")) array.tuples = whole(element, "NumberOfTuples");
+    }
     point_data = arrays_of(piece, "PointData", count);
     for (const VtkArray& array : point_data) {
       if (array.components == 3) require_holds(array);

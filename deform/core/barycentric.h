@@ -66,17 +66,33 @@ TETWARP_HD inline float edge_determinant(const glm::i32vec3& a, const glm::i32ve
 
 }  // namespace detail
 
-/// Forward Jacobian determinants of the five tetrahedra of a cell, deformed over rest volume, in float; negative just
-/// where a tetrahedron is inverted, zero just where it has no volume.
+/// Whether a tetrahedron at rest has less volume than 1/64 of the product of its edges' sum norms: float has too few
+/// digits for its Jacobian determinant. A cube's corner tetrahedron has all of it, its centre a quarter.
+/// @param a, b, c  edges about D, in any unit
+TETWARP_HD inline bool is_thin_at_rest(const glm::vec3& a, const glm::vec3& b, const glm::vec3& c) {
+  constexpr float kThinnest = 1.0f / 64;
+  using detail::norm1;
+  return !(detail::magnitude(detail::dot(a, detail::cross(b, c))) >= kThinnest * ((norm1(a) * norm1(b)) * norm1(c)));
+}
+
+/// Forward Jacobian determinant of a tetrahedron, deformed over rest volume: the one that reports and maps of both
+/// backends state. Negative just where the tetrahedron is inverted, zero just where it has no volume when deformed, not
+/// finite where it has none at rest.
+///
+/// Both volumes in float (`edge_determinant`), so that vectors may take it: off by 5 units (2^-24) of the product of
+/// the edges' sum norms over the volume, deformed and at rest, some 1e-6 for a cell that is about as thick as wide.
+/// Where it is thin at rest that would be too much; both volumes are exact there before the division.
+TETWARP_HD inline float forward_jacobian(const Tetrahedron& t) {
+  const glm::i32vec3 a = t.a.deformed - t.d.deformed, b = t.b.deformed - t.d.deformed, c = t.c.deformed - t.d.deformed,
+                     rest_a = a + (t.a.u - t.d.u), rest_b = b + (t.b.u - t.d.u), rest_c = c + (t.c.u - t.d.u);
+  if (is_thin_at_rest(glm::vec3(rest_a), glm::vec3(rest_b), glm::vec3(rest_c))) return static_cast<float>(jacobian(t));
+  return detail::edge_determinant(a, b, c) / detail::edge_determinant(rest_a, rest_b, rest_c) + 0.0f;  // never -0
+}
+
+/// Those of the five tetrahedra of a cell.
 TETWARP_HD inline void cell_jacobians(const Cell& cell, bool odd, float (&jacobians)[kTetrahedraPerCell]) {
-  for (int number = 0; number < kTetrahedraPerCell; ++number) {
-    const Tetrahedron t = tetrahedron_of(cell, number, odd);
-    const glm::i32vec3 a = t.a.deformed - t.d.deformed, b = t.b.deformed - t.d.deformed,
-                       c = t.c.deformed - t.d.deformed;
-    const float after = detail::edge_determinant(a, b, c);
-    const float before = detail::edge_determinant(a + (t.a.u - t.d.u), b + (t.b.u - t.d.u), c + (t.c.u - t.d.u));
-    jacobians[number] = after / before + 0.0f;  // never -0
-  }
+  for (int number = 0; number < kTetrahedraPerCell; ++number)
+    jacobians[number] = forward_jacobian(tetrahedron_of(cell, number, odd));
 }
 
 /// How far a weight may leave [0, 1] at the voxel before u is taken at the nudged point, where it cannot.

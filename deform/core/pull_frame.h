@@ -18,6 +18,10 @@ namespace tetwarp {
 struct PullFrame {
   static constexpr double kSlack = 1.0 / kStepsPerVoxel;  ///< samples: a place so near to one is taken for it
 
+  /// Samples that a place may lie beyond the outermost ones: headers are rounded, and a grid that ends there was meant
+  /// to end at the voxel, as a lattice is (make_lattice_frame).
+  static constexpr double kBorderRounding = 1.0 / 256;
+
   AffineMap grid_from_output;
   glm::dmat3 output_from_mm{1};
   glm::i64vec3 size{0};
@@ -76,11 +80,11 @@ struct PullFrame {
     return between<kGaps>(along_z[0], along_z[1], t.z);
   }
 
-  /// Takes an index up to 2^-12 sample outside the grid onto it. @return false if it is further out
+  /// Takes an index up to 1/256 sample outside the grid onto it. @return false if it is further out
   TETWARP_HD bool clamp_to_samples(glm::dvec3& index) const {
     for (int axis = 0; axis < 3; ++axis) {
       const auto last = static_cast<double>(size[axis] - 1);
-      if (!(index[axis] >= -kSlack && index[axis] <= last + kSlack)) return false;
+      if (!(index[axis] >= -kBorderRounding && index[axis] <= last + kBorderRounding)) return false;
       index[axis] = index[axis] < 0 ? 0 : (index[axis] > last ? last : index[axis]);
     }
     return true;

@@ -24,7 +24,7 @@ void Claims::find(const LatticeIndex& lattice, const Region& box, bool wants_jac
                  if (number >= owner[place]) return;
                  owner[place] = number;
                  offset[place] = interpolate_u(tetrahedron, detail::to_steps(voxel), signs);
-                 if (wants_jacobian) jacobian[place] = static_cast<float>(tetwarp::jacobian(tetrahedron));
+                 if (wants_jacobian) jacobian[place] = forward_jacobian(tetrahedron);
                });
   };
   lattice.find_blocks(box, [&](std::size_t number) {

@@ -43,7 +43,7 @@ class MeshResampler final : public Resampler {
 
 void MeshResampler::set_field(const FieldView& field, const Control& control) {
   ready_ = false;
-  arena_.execute([&] { mesh_ = snap_mesh(output(), *field.mesh, control); });
+  arena_.execute([&] { mesh_ = snap_mesh(output(), field, control); });
   raster_.build(mesh_, output(), control);
   stays_outside_ = field.outside == Outside::rest;
   if (field.outside != Outside::background) {
@@ -133,7 +133,7 @@ void MeshResampler::settle(const Row& row, std::size_t first, const MapWriter& m
         const glm::i32vec3 steps = detail::to_steps(voxel);
         tile.offset[n] = map.u(steps, [&] { return interpolate_u_exactly(t, steps, mesh_.nudge.signs(voxel)); });
       }
-      if (maps.wants_jacobian()) std::fill(tile.jacobian + i, tile.jacobian + end, static_cast<float>(jacobian(t)));
+      if (maps.wants_jacobian()) std::fill(tile.jacobian + i, tile.jacobian + end, forward_jacobian(t));
     }
     i = end;
   }

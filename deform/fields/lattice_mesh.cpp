@@ -1,6 +1,7 @@
 #include "deform/fields/lattice_mesh.h"
 
 #include <glm/common.hpp>
+#include <numeric>
 
 #include "deform/core/five_tetrahedra.h"
 #include "deform/errors.h"
@@ -10,22 +11,35 @@ namespace tetwarp {
 
 namespace {
 
-/// Adds a mesh to that of a lattice. Vertices that the lattice has too are not added again.
-void append(const TetrahedralMesh& added, const Geometry& lattice, TetrahedralMesh& mesh) {
+/// The lattice's vertex that each vertex of a mesh rests at, -1: none. Where the mesh does not say, places tell.
+std::vector<std::int64_t> lattice_vertices_of(const TetrahedralMesh& mesh, const Geometry& lattice) {
+  if (!mesh.lattice_vertex.empty()) return mesh.lattice_vertex;
   const AffineMap point = point_from_index(lattice), index = index_from_point(lattice);
   const glm::i64vec3 size = lattice.size;
+  std::vector<std::int64_t> numbers;
+  for (const glm::dvec3& rest : mesh.rest) {
+    const glm::i64vec3 near =
+        glm::clamp(glm::i64vec3(glm::round(index(rest))), glm::i64vec3(0), size - std::int64_t{1});
+    numbers.push_back(point(glm::dvec3(near)) == rest ? (near.z * size.y + near.y) * size.x + near.x : -1);
+  }
+  return numbers;
+}
+
+/// Adds a mesh to that of a lattice. Vertices that the lattice has too, at the same place and displaced alike, are not
+/// added again.
+void append(const TetrahedralMesh& added, const Geometry& lattice, TetrahedralMesh& mesh) {
+  const std::vector<std::int64_t> of_lattice = lattice_vertices_of(added, lattice);
   std::vector<std::uint32_t> number;
   for (std::size_t n = 0; n < added.rest.size(); ++n) {
-    const glm::i64vec3 near =
-        glm::clamp(glm::i64vec3(glm::round(index(added.rest[n]))), glm::i64vec3(0), size - std::int64_t{1});
-    const auto of_lattice = static_cast<std::size_t>((near.z * size.y + near.y) * size.x + near.x);
-    if (point(glm::dvec3(near)) == added.rest[n] && mesh.displacement[of_lattice] == added.displacement[n]) {
-      number.push_back(static_cast<std::uint32_t>(of_lattice));
+    const std::int64_t vertex = of_lattice[n];
+    if (vertex >= 0 && mesh.displacement[static_cast<std::size_t>(vertex)] == added.displacement[n]) {
+      number.push_back(static_cast<std::uint32_t>(vertex));
       continue;
     }
     number.push_back(static_cast<std::uint32_t>(mesh.rest.size()));
     mesh.rest.push_back(added.rest[n]);
     mesh.displacement.push_back(added.displacement[n]);
+    mesh.lattice_vertex.push_back(vertex);
   }
   for (const glm::u32vec4& t : added.tetrahedra)
     mesh.tetrahedra.emplace_back(number[t.x], number[t.y], number[t.z], number[t.w]);
@@ -34,7 +48,7 @@ void append(const TetrahedralMesh& added, const Geometry& lattice, TetrahedralMe
 }  // namespace
 
 TetrahedralMesh mesh_of(const FieldView& field) {
-  if (field.mesh) require_fitting_arrays(*field.mesh);
+  if (field.mesh) require_fitting_arrays(*field.mesh, field.lattice);
   if (field.mesh && field.replaced.empty()) return *field.mesh;
   require(field.memory == Memory::host, "a mesh is made of a field in host memory");
   const Geometry& lattice = *field.lattice;
@@ -50,6 +64,8 @@ TetrahedralMesh mesh_of(const FieldView& field) {
       for (std::int64_t i = 0; i < size.x; ++i) mesh.rest.push_back(point(glm::dvec3(i, j, k)));
     }
   }
+  mesh.lattice_vertex.resize(vertices);
+  std::iota(mesh.lattice_vertex.begin(), mesh.lattice_vertex.end(), std::int64_t{0});
   std::uint64_t cell = 0;
   auto replaced = field.replaced.begin();
   for (std::int64_t k = 0; k + 1 < size.z; ++k) {

@@ -134,8 +134,9 @@ std::vector<std::uint64_t> with_neighbours(const Grid& grid, const std::vector<D
 /// Finds out what belongs together when all cuts are made, and gives nodes to it.
 class Joiner {
  public:
-  Joiner(const Geometry& lattice, const Grid& grid, const TetrahedronSplitter& split)
-      : lattice_(lattice), grid_(grid), split_(split), pieces_(split.tetrahedra().size()) {
+  Joiner(const Geometry& lattice, const Grid& grid, const TetrahedronSplitter& split,
+         std::span<const Division> divisions)
+      : lattice_(lattice), grid_(grid), split_(split), divisions_(divisions), pieces_(split.tetrahedra().size()) {
     join_tetrahedra();
     number_pieces();
     nodes_ = Sets(cell_of_.size() * kCorners);
@@ -248,10 +249,28 @@ class Joiner {
     return std::fabs(glm::determinant(glm::dmat3(at[0] - at[3], at[1] - at[3], at[2] - at[3]))) / 6;
   }
 
+  /// Of each piece, on which side of a cut it lies. Within a cell that the cut goes through no piece is on both.
+  std::vector<std::int8_t> sides_of(const Division& division) const {
+    std::vector<double> sum(cell_of_.size());
+    const auto& tetrahedra = split_.tetrahedra();
+    for (std::size_t n = 0; n < tetrahedra.size(); ++n) {
+      double side = 0;
+      for (const std::uint32_t v : tetrahedra[n].vertex)
+        side += split_.vertices()[v].mean([&](std::uint32_t corner) { return division.side[corner]; });
+      sum[piece_[n]] += side * volume_of(tetrahedra[n]);
+    }
+    std::vector<std::int8_t> sides;
+    for (std::size_t piece = 0; piece < sum.size(); ++piece)
+      sides.push_back(static_cast<std::int8_t>(!division.is_through(cell_of_[piece]) ? 0 : sum[piece] < 0 ? -1 : 1));
+    return sides;
+  }
+
   void add_pieces(DividedLattice& divided) const {
     std::vector<double> volume(cell_of_.size());
     const auto& tetrahedra = split_.tetrahedra();
     for (std::size_t n = 0; n < tetrahedra.size(); ++n) volume[piece_[n]] += volume_of(tetrahedra[n]);
+    std::vector<std::vector<std::int8_t>> sides;
+    for (const Division& division : divisions_) sides.push_back(sides_of(division));
     for (std::uint32_t first = 0, end = 0; first < cell_of_.size(); first = end) {
       while (end < cell_of_.size() && cell_of_[end] == cell_of_[first]) ++end;
       bool is_whole = end - first == 1;
@@ -263,6 +282,8 @@ class Joiner {
         added.cell = cell_of_[piece];
         added.volume = volume[piece];
         for (std::uint32_t c = 0; c < kCorners; ++c) added.node[c] = node_[place(piece, c)];
+        std::vector<std::int8_t>& of_piece = divided.sides.emplace_back();
+        for (const std::vector<std::int8_t>& of_cut : sides) of_piece.push_back(of_cut[piece]);
       }
     }
   }
@@ -305,6 +326,7 @@ class Joiner {
   const Geometry& lattice_;
   const Grid& grid_;
   const TetrahedronSplitter& split_;
+  const std::span<const Division> divisions_;
   Sets pieces_;                                              ///< of tetrahedra
   std::vector<std::uint32_t> piece_;                         ///< of each tetrahedron
   std::vector<std::uint64_t> cell_of_;                       ///< of each piece
@@ -328,7 +350,52 @@ DividedLattice divide(const Geometry& lattice, std::span<const Cut> cuts) {
     split.cut([&](std::uint32_t vertex) { return division.side[vertex]; }, division.nearest,
               [&](std::uint64_t cell) { return division.is_through(cell); });
   }
-  return Joiner(lattice, grid, split).result();
+  DividedLattice divided = Joiner(lattice, grid, split, divisions).result();
+  for (const Cut& cut : cuts) divided.cuts.push_back(cut.name);
+  return divided;
+}
+
+namespace {
+
+/// On how many of the cuts that two divided lattices both have two pieces lie on other sides.
+int other_sides(const DividedLattice& now, std::size_t piece, const DividedLattice& before, std::size_t earlier) {
+  int count = 0;
+  for (std::size_t cut = 0; cut < now.cuts.size(); ++cut) {
+    const auto found = std::find(before.cuts.begin(), before.cuts.end(), now.cuts[cut]);
+    if (found == before.cuts.end()) continue;
+    const auto at = static_cast<std::size_t>(found - before.cuts.begin());
+    count += now.sides[piece][cut] * before.sides[earlier][at] < 0;
+  }
+  return count;
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> nodes_before(const DividedLattice& now, const DividedLattice& before,
+                                        const Geometry& lattice) {
+  const auto vertices = static_cast<std::uint32_t>(voxel_count(lattice));
+  std::vector<std::uint32_t> nodes = now.copies_of;  // where the cell was whole
+  std::vector<bool> is_known(nodes.size());
+  const auto is_before = [](const CellPiece& piece, std::uint64_t cell) { return piece.cell < cell; };
+  for (std::size_t piece = 0; piece < now.pieces.size(); ++piece) {
+    const CellPiece& of_now = now.pieces[piece];
+    auto best = before.pieces.end();
+    int fewest = 0;
+    for (auto one = std::lower_bound(before.pieces.begin(), before.pieces.end(), of_now.cell, is_before);
+         one != before.pieces.end() && one->cell == of_now.cell; ++one) {
+      const int others = other_sides(now, piece, before, static_cast<std::size_t>(one - before.pieces.begin()));
+      if (best != before.pieces.end() && (others > fewest || (others == fewest && one->volume <= best->volume)))
+        continue;
+      best = one;
+      fewest = others;
+    }
+    for (std::size_t c = 0; c < kCorners; ++c) {
+      if (of_now.node[c] < vertices || is_known[of_now.node[c] - vertices]) continue;
+      is_known[of_now.node[c] - vertices] = true;
+      if (best != before.pieces.end()) nodes[of_now.node[c] - vertices] = best->node[c];
+    }
+  }
+  return nodes;
 }
 
 VertexField field_of(const Geometry& lattice, const DividedLattice& divided, std::span<const glm::vec3> displacement) {
@@ -345,15 +412,18 @@ VertexField field_of(const Geometry& lattice, const DividedLattice& divided, std
       .replaced = divided.replaced};
   for (const DividedLattice::Vertex& vertex : divided.vertices) {
     glm::dvec3 rest(0), moved(0);
+    std::int64_t of_lattice = -1;
     for (std::size_t n = 0; n < 4; ++n) {
       if (vertex.weight[n] == 0) continue;
       const std::uint32_t node = vertex.node[n];
       const std::uint32_t at = node < vertices ? node : divided.copies_of[node - vertices];
+      if (vertex.weight[n] == 1) of_lattice = at;
       rest += vertex.weight[n] * point(glm::dvec3(grid.place_of_vertex(at)));
       moved += vertex.weight[n] * glm::dvec3(displacement[node]);
     }
     field.mesh.rest.push_back(rest);
     field.mesh.displacement.emplace_back(moved);
+    field.mesh.lattice_vertex.push_back(of_lattice);
   }
   field.mesh.tetrahedra = divided.tetrahedra;
   return field;

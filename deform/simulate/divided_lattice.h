@@ -1,6 +1,7 @@
 #pragma once
 
 #include <span>
+#include <string>
 #include <vector>
 
 #include "deform/simulate/cut.h"
@@ -26,6 +27,9 @@ struct DividedLattice {
 
   std::vector<std::uint32_t> copies_of;  ///< lattice vertex of each node after the lattice's
   std::vector<CellPiece> pieces;         ///< of cells with several pieces or with copies, by rising cell
+  std::vector<std::string> cuts;         ///< names
+  /// Of each piece, on which side of each of `cuts` it lies: -1 or 1, 0 where that cut does not go through its cell.
+  std::vector<std::vector<std::int8_t>> sides;
   std::vector<std::uint64_t> replaced;   ///< cells that the mesh takes the place of, rising: those that a cut goes
                                          ///< through or touches
   std::vector<Vertex> vertices;          ///< of that mesh
@@ -36,6 +40,12 @@ struct DividedLattice {
 /// Cuts may cross. Without a cut in reach the result is empty.
 /// @throws InputError for cuts as CutSurface does
 DividedLattice divide(const Geometry& lattice, std::span<const Cut> cuts);
+
+/// Where other cuts are made: for each copy of a divided lattice, the node of the one before that held the same tissue.
+/// It is a node of the same corner and cell, of the piece on the same sides of the cuts that both have, of several the
+/// largest; where the cell was whole, the lattice's vertex. Of both lattices the vertices are the same.
+std::vector<std::uint32_t> nodes_before(const DividedLattice& now, const DividedLattice& before,
+                                        const Geometry& lattice);
 
 /// The field in which the nodes of a divided lattice are displaced: VertexField::replaced and mesh say what became of
 /// the divided cells. @param displacement  LPS mm of each node

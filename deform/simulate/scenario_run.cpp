@@ -45,16 +45,23 @@ std::vector<glm::vec3> ScenarioRun::displacement() const {
   return simulation_ ? simulation_->displacement_on_host() : std::vector<glm::vec3>(model_.nodes());
 }
 
+/// Makes the model anew. What begins where its vertex is or, of a copy, where the tissue was that it belongs to, is
+/// `start_`.
+void ScenarioRun::carry_over_to(const Phase& phase) {
+  const DividedLattice before = std::move(division_);
+  make_model_of(phase);
+  std::vector<glm::vec3> carried(start_.begin(), start_.begin() + voxel_count(patient_.lattice));
+  for (const std::uint32_t node : nodes_before(division_, before, patient_.lattice)) carried.push_back(start_[node]);
+  start_ = std::move(carried);
+}
+
 void ScenarioRun::begin_phase() {
   const Phase& phase = scenario_.phases[phase_];
   start_ = displacement();
   const bool other_cuts = phase_ > 0 && sorted(phase.closed_cuts) != sorted(scenario_.phases[phase_ - 1].closed_cuts);
   if (!simulation_ || other_cuts) {
     simulation_.reset();
-    if (other_cuts) make_model_of(phase);  // that of the first phase is there
-    std::vector<glm::vec3> carried(model_.nodes());
-    for (std::size_t node = 0; node < carried.size(); ++node) carried[node] = start_[model_.vertex[node]];
-    start_ = std::move(carried);
+    if (other_cuts) carry_over_to(phase);  // the model of the first phase is there
     simulation_ = make_(model_);
     simulation_->set_displacement(start_);
   }

@@ -23,8 +23,9 @@ struct Frame {
 
 /// A scenario that is played on a patient, frame by frame.
 ///
-/// Where other cuts are open than in the phase before, the model is made anew: vertices keep their places, and of
-/// copies that a cut needs each begins where its vertex is.
+/// Where other cuts are open than in the phase before, the model is made anew: vertices keep their places, and copies
+/// that a cut needs begin where the tissue was that they belong to (`nodes_before`). So a cut that stays open stays as
+/// wide as it is while another is made or closed.
 class ScenarioRun {
  public:
   /// Refers to the scenario and the patient. @throws InputError for a scenario that cannot be played on this patient,
@@ -55,6 +56,7 @@ class ScenarioRun {
 
  private:
   void begin_phase();
+  void carry_over_to(const Phase& phase);
   void make_model_of(const Phase& phase);
 
   const Scenario& scenario_;

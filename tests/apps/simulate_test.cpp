@@ -251,6 +251,38 @@ TEST_F(Simulate, AnOpenCutIsWrittenAsAMeshLeavesAGapAndClosesWithoutATrace) {
   }
 }
 
+TEST_F(Simulate, AnOpenCutIsOneFieldForReportHashGridAndFile) {
+  json scenario = json::parse(read_text(std::filesystem::path(TETWARP_SCENARIOS) / "incision.json"));
+  scenario["cell_size"] = 3;
+  scenario["phases"].erase(1);
+  write_file(scratch_ / "open.json", scenario.dump());
+  // The same cut and lips; what moves besides lies far from the cut.
+  scenario["phases"][0]["move"].push_back(
+      {{"name", "back"}, {"handle", {{"at", {{"body", {0.5, 0.55, 0.8}}}}, {"radius_mm", 12}}}, {"by_mm", {0, 0, 9}}});
+  write_file(scratch_ / "other.json", scenario.dump());
+  const std::string common = " --outside background --background -3000 --backend cpu --overwrite";
+  const Outcome made =
+      run("deform ct.mha --scenario open.json -o one.mha --report one-report.json --write-field one.vtk" + common);
+  ASSERT_EQ(made.status, 0) << made.err;
+  ASSERT_EQ(run("deform ct.mha --scenario other.json -o other.mha" + common).status, 0);
+  ASSERT_EQ(run("deform ct.mha -f one.vtk -o file.mha --report file-report.json" + common).status, 0);
+  const auto field_of = [&](const std::string& name) { return document(name)["field"]; };
+  EXPECT_GT(field_of("one.mha.json")["replaced_cells"], 20);
+  EXPECT_EQ(field_of("one.mha.json")["lattice"], field_of("file.mha.json")["lattice"]);
+  EXPECT_EQ(field_of("one.mha.json")["sha256"], field_of("file.mha.json")["sha256"]);
+  EXPECT_NE(field_of("one.mha.json")["sha256"], field_of("other.mha.json")["sha256"]);
+  EXPECT_EQ(read_text(scratch_ / "one.mha"), read_text(scratch_ / "file.mha"));
+  for (const char* name : {"one-report.json", "file-report.json"}) {
+    const json trip = document(name)["quality"]["round_trip"];
+    EXPECT_GT(trip["forward_after_inverse"]["points"], 10000) << name;
+    EXPECT_LT(trip["forward_after_inverse"]["largest_mm"], 0.1) << name;
+  }
+  // The grid holds the lattice beside the cut, not its clipped tetrahedra alone.
+  ASSERT_EQ(run("deform ct.mha --scenario open.json --grid fit -o fit.mha" + common).status, 0);
+  const glm::i64vec3 size = read_image_header(scratch_ / "fit.mha").geometry.size;
+  EXPECT_TRUE(size.x >= 48 && size.y >= 48 && size.z >= 30) << to_string(size);
+}
+
 TEST_F(Simulate, LabelsDecideWhatIsHeld) {
   AnyVolume labels = read_image(scratch_ / "ct.mha");
   for (std::int16_t& voxel : labels.as<std::int16_t>()) voxel = 7;

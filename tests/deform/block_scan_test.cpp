@@ -117,7 +117,7 @@ TEST_F(Blocks, GiveWhatTheirTetrahedraGiveOneByOneOnEveryInstructionSet) {
 TEST_F(Blocks, HaveBoxesThatAreExactBeyondWhatFloatHolds) {
   const Geometry output = unit_grid({20, 10, 9});
   Geometry lattice = unit_grid({4, 4, 5});
-  lattice.spacing.z = 1000;
+  lattice.spacing = glm::dvec3(1000);
   for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
     SCOPED_TRACE(hwy::TargetName(target));
     hwy::SetSupportedTargetsForTest(target);

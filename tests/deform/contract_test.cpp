@@ -72,6 +72,39 @@ TEST_P(Copies, DeterminantsAreTheSameWhetherOwnersAreCountedOrNot) {
   }
 }
 
+TEST_P(Copies, TheRangeOfDeterminantsIsThatOfTheMap) {
+  // One cell, whose five tetrahedra all own voxels: cubes, plates, and plates turned in the grid.
+  const std::uint64_t seed = test_seed();
+  const Geometry grid = unit_grid({60, 60, 60});
+  for (const glm::dvec3& edges : {glm::dvec3(20, 21, 19), {40, 40, 4}, {3, 44, 44}, {44, 44, 1.9}, {50, 2, 50}}) {
+    for (std::uint64_t number = 0; number < 20; ++number) {
+      SCOPED_TRACE(seed_text(seed) + ", case " + std::to_string(number));
+      Random random(seed, 50 + number);
+      Geometry lattice = unit_grid({2, 2, 2});
+      lattice.spacing = edges;
+      if (number > 9)
+        lattice.direction = rotation({random.real(-1, 1), random.real(-1, 1), random.real(-1, 1)}, random.real(0, 3));
+      lattice.origin = glm::dvec3(30.0) - lattice.direction * (0.5 * edges);
+      const VertexField field = field_in_voxels(grid, lattice, [&](const glm::dvec3&) {
+        return 0.2 * std::min({edges.x, edges.y, edges.z}) *
+               glm::dvec3(random.real(-1, 1), random.real(-1, 1), random.real(-1, 1));
+      });
+      const auto resampler = make(grid);
+      resampler->set_field(view(field, Outside::background));
+      Volume<float> jacobian{grid, std::vector<float>(static_cast<std::size_t>(voxel_count(grid)))};
+      const Report report = resampler->resample(whole(grid), {}, {.jacobian = view(jacobian)});
+      float least = INFINITY, most = -INFINITY;
+      for (const float value : jacobian.voxels) {
+        if (std::isnan(value)) continue;
+        least = std::min(least, value);
+        most = std::max(most, value);
+      }
+      EXPECT_EQ(report.jacobian_min, double{least}) << to_string(glm::i64vec3(edges));
+      EXPECT_EQ(report.jacobian_max, double{most}) << to_string(glm::i64vec3(edges));
+    }
+  }
+}
+
 TEST_P(Copies, IdentityReturnsTheSourceBitForBit) {
   const std::uint64_t seed = test_seed();
   SCOPED_TRACE(seed_text(seed));

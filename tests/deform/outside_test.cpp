@@ -82,6 +82,65 @@ TEST_P(OutsideTheLattice, RefuseThrowsWhereABorderLiesInside) {
   }
 }
 
+TEST_P(OutsideTheLattice, ABorderWithinRoundingOfTheOutermostVoxelsLosesNone) {
+  for (const Geometry& grid : {unit_grid({10, 11, 12}), oblique_grid({10, 11, 12})}) {
+    const glm::dvec3 last(grid.size - std::int64_t{1});
+    Random random(test_seed(), 77);
+    const auto source = random_values<float>(grid, random, -1000, 1000);
+    for (const double steps : {0.3, 0.5, 0.6, 0.9, 1.0, 1.1, 5.0, 15.9, 16.1, 30.0}) {  // of 2^-12 voxel
+      SCOPED_TRACE(steps);
+      for (int end = 0; end < 6; ++end) {
+        glm::dvec3 low(0), high(last);
+        (end < 3 ? low : high)[end % 3] += (end < 3 ? steps : -steps) / 4096;
+        const VertexField field = uniform_field(lattice_between(grid, low, high, 3), glm::vec3(0));
+        const auto resampler = make(grid);
+        const bool within = steps < 16;
+        if (!within) {
+          EXPECT_THROW(resampler->set_field(view(field)), InputError);
+          continue;
+        }
+        for (const Outside outside : {Outside::refuse, Outside::rest, Outside::background}) {
+          resampler->set_field(view(field, outside));
+          const auto found = run(*resampler, source);
+          EXPECT_EQ(found.report.covered, source.voxels.size());
+          EXPECT_EQ(found.output.voxels, source.voxels);
+          EXPECT_EQ(found.owners.voxels, std::vector<std::uint16_t>(source.voxels.size(), 1));
+        }
+      }
+    }
+  }
+}
+
+TEST_P(OutsideTheLattice, ALatticeTurnedInItsGridLosesNoVoxelOfItsBorder) {
+  // A layer of vertices along a tilted plane through the outermost voxels: each is snapped beside the plane.
+  const Geometry grid = unit_grid({24, 20, 12});
+  Random random(test_seed(), 78);
+  const auto source = random_values<float>(grid, random, -1000, 1000);
+  const glm::dvec3 last(grid.size - std::int64_t{1});
+  for (int number = 0; number < 20; ++number) {
+    SCOPED_TRACE(number);
+    const glm::dmat3 turn =
+        rotation({random.real(-1, 1), random.real(-1, 1), random.real(-1, 1)}, random.real(0.05, 1));
+    glm::dvec3 low(INFINITY), high(-INFINITY);
+    for (int corner = 0; corner < 8; ++corner) {
+      const glm::dvec3 at = glm::transpose(turn) * (glm::dvec3(corner & 1, corner >> 1 & 1, corner >> 2) * last);
+      low = glm::min(low, at);
+      high = glm::max(high, at);
+    }
+    Geometry lattice;
+    lattice.size = {6, 5, 4};
+    lattice.spacing = (high - low) / glm::dvec3(lattice.size - std::int64_t{1});
+    lattice.direction = turn;
+    lattice.origin = turn * low;
+    const VertexField field = uniform_field(lattice, glm::vec3(0));
+    const auto resampler = make(grid);
+    resampler->set_field(view(field));
+    const auto found = run(*resampler, source);
+    EXPECT_EQ(found.report.covered, source.voxels.size());
+    EXPECT_EQ(found.output.voxels, source.voxels);
+  }
+}
+
 TEST_P(OutsideTheLattice, RestKeepsTheSourceRoundAFieldWhoseBorderRests) {
   const std::uint64_t seed = test_seed();
   for (std::uint64_t number = 0; number < 30; ++number) {

@@ -25,6 +25,13 @@ inline Volume<float> smooth_source(const Geometry& geometry) {
 /// How far u, in voxels, may be from the exact one: float arithmetic with the owner's edges.
 inline double u_tolerance(const Undeformed& exact) { return 1e-7 * (exact.reach * exact.condition + 16); }
 
+/// How far a determinant may be from the exact one: volumes in float are off by 5 units of the product of their edges'
+/// sum norms, and the quotient is rounded once.
+inline double jacobian_tolerance(const Undeformed& exact) {
+  constexpr double kUnit = 1.0 / (1 << 24);
+  return kUnit * (5 * exact.condition + 5 * exact.rest_condition + 2) * std::abs(exact.jacobian);
+}
+
 inline double distance(const glm::dvec3& u, const glm::dvec3& v) {
   const glm::dvec3 d = glm::abs(u - v);
   return std::max({d.x, d.y, d.z});
@@ -54,7 +61,7 @@ inline void expect_like_oracle(const Outcome<float>& found, const Volume<float>&
           << "u " << u.x << " " << u.y << " " << u.z << ", exact " << exact.u.x << " " << exact.u.y << " " << exact.u.z
           << ", condition " << exact.condition;
       if (std::isfinite(exact.jacobian)) {
-        EXPECT_NEAR(found.jacobian.voxels[n], exact.jacobian, 1e-6 * std::abs(exact.jacobian));
+        EXPECT_NEAR(found.jacobian.voxels[n], exact.jacobian, jacobian_tolerance(exact));
       } else {
         EXPECT_EQ(found.jacobian.voxels[n], exact.jacobian);
       }

@@ -129,16 +129,50 @@ Oracle::Oracle(const Geometry& output, const VertexField& field, const Region& r
   for (const Owners& voxel : owners_) multiply_owned += voxel.count > 1;
 }
 
+namespace {
+
+/// Where the vertices of a lattice rest along one of its axes, as vertex index: their numbers, but for an end within
+/// rounding of the outermost voxels, which is drawn out to them.
+/// @param step   voxels from one vertex to the next  @param places  vertex index of the output's corners on the axis
+std::vector<double> places_on_axis(const glm::dvec3& step, std::int64_t vertices, const std::vector<double>& places) {
+  const double cells = static_cast<double>(vertices - 1), length = glm::length(step);
+  int along = 0;
+  for (int axis = 0; axis < 3; ++axis) along += std::abs(step[axis]) * cells > 1e-6;
+  const auto [lowest, highest] = std::minmax_element(places.begin(), places.end());
+  const auto end = [&](double voxels_short) {  // a quarter of a step lies within snapping, a turned border needs more
+    if (voxels_short > 1.0 / 256) return 0.0;
+    if (along == 1) return voxels_short > 0.25 / 4096 ? voxels_short / length : 0;
+    return voxels_short > -1.0 / 4096 ? (voxels_short + 2.0 / 4096) / length : 0;
+  };
+  const double low = -end(-*lowest * length), high = cells + end((*highest - cells) * length);
+  std::vector<double> at;
+  for (std::int64_t n = 0; n < vertices; ++n) at.push_back(low + static_cast<double>(n) * (high - low) / cells);
+  return at;
+}
+
+}  // namespace
+
 void Oracle::take_vertices(const Geometry& output, const VertexField& field) {
   vertices_ = field.lattice.size;
   cells_ = vertices_ - std::int64_t{1};
   const AffineMap index = index_from_point(output) * point_from_index(field.lattice);
+  const AffineMap back = index_from_point(field.lattice) * point_from_index(output);
+  std::vector<double> along[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> places;
+    for (int corner = 0; corner < 8; ++corner) {
+      const glm::dvec3 at(corner & 1, corner >> 1 & 1, corner >> 2);
+      places.push_back(back(at * glm::dvec3(output.size - std::int64_t{1}))[axis]);
+    }
+    along[axis] = places_on_axis(index.linear[axis], vertices_[axis], places);
+  }
   const glm::dmat3 linear = index_from_point(output).linear;
   vertex_.reserve(field.displacement.size());
   for (std::int64_t k = 0, n = 0; k < vertices_.z; ++k) {
     for (std::int64_t j = 0; j < vertices_.y; ++j) {
       for (std::int64_t i = 0; i < vertices_.x; ++i, ++n) {
-        const glm::dvec3 rest = index(glm::dvec3(i, j, k));
+        const auto place = [&](int axis, std::int64_t number) { return along[axis][static_cast<std::size_t>(number)]; };
+        const glm::dvec3 rest = index({place(0, i), place(1, j), place(2, k)});
         const glm::dvec3 moved = linear * glm::dvec3(field.displacement[static_cast<std::size_t>(n)]);
         vertex_.push_back({snapped(rest), snapped(rest + moved)});
       }
@@ -272,6 +306,7 @@ Undeformed Oracle::undeformed(const glm::i64vec3& voxel) const {
   result.alternative = std::abs(outside - kSlack) < 1e-3L ? u_at(outside > kSlack ? p : q) : result.u;
   result.jacobian = static_cast<double>(determinant / static_cast<long double>(Cramer(rest).determinant));
   result.condition = condition(deformed, determinant);
+  result.rest_condition = condition(rest, static_cast<long double>(Cramer(rest).determinant));
   for (int n = 0; n < 3; ++n) {
     const glm::i64vec3 difference = glm::abs((rest[n] - deformed[n]) - (rest[3] - deformed[3]));
     for (int axis = 0; axis < 3; ++axis) {

@@ -20,7 +20,8 @@ struct Undeformed {
       0};                ///< another u that is as right where rounding decides between the voxel and the nudged point
   double jacobian = 0;   ///< deformed over rest volume of the owner
   double condition = 1;  ///< how much a relative rounding error of float products may grow in the weights
-  double reach = 0;      ///< largest component of the difference of u between two corners, voxels
+  double rest_condition = 1;  ///< likewise in the owner's volume at rest
+  double reach = 0;           ///< largest component of the difference of u between two corners, voxels
 };
 
 /// Brute force, in other mathematics than the backends: the paper's 4x4 system (Eq. 6) solved by Cramer's rule in

@@ -6,6 +6,7 @@
 
 #include "cuda/devices.h"
 #include "deform/simulate/chainmail.h"
+#include "deform/simulate/cut_surface.h"
 #include "deform/simulate/mass_spring.h"
 #include "deform/simulate/scenario_run.h"
 #include "tests/deform/simulate/scenario_volumes.h"
@@ -104,6 +105,97 @@ TEST(CutRun, FramesOnADeviceHaveTheCpusBits) {
     EXPECT_EQ(on_cpu.voxels, on_device.voxels) << frame;
     EXPECT_EQ(on_cpu.voxels != source.voxels, frame < 4) << frame;  // at last let go
   }
+}
+
+/// Moves nodes as it is told: to the goals of placed nodes, others not at all. It remembers where it began.
+class Puppet final : public Simulation {
+ public:
+  Puppet(const Model& model, std::vector<std::vector<glm::vec3>>& begun) : at_(model.nodes()), begun_(begun) {}
+  void set_loads(const Loads& loads) override { loads_ = loads; }
+  Settled advance(double part, const StoppingRule&, const Control&) override {
+    for (std::size_t n = 0; n < at_.size(); ++n) {
+      if (loads_.hold[n] == Hold::placed) at_[n] = static_cast<float>(part) * loads_.goal[n];
+    }
+    return {.steps = 1, .reached = true};
+  }
+  std::span<const glm::vec3> displacement() const override { return at_; }
+  void set_displacement(std::span<const glm::vec3> displacement) override {
+    at_.assign(displacement.begin(), displacement.end());
+    begun_.push_back(at_);
+  }
+
+ private:
+  std::vector<glm::vec3> at_;
+  Loads loads_;
+  std::vector<std::vector<glm::vec3>>& begun_;
+};
+
+TEST(CutRun, ACutThatStaysOpenStaysAsWideAsItIsWhileAnotherIsMadeOrClosed) {
+  const Patient patient = uniform_patient();
+  Scenario scenario = parted({"across", PlaneCutPlan{{{0, 0, 19}}, {0.05, 0.03, 1}}}, {3, -2, 9});
+  scenario.cuts.push_back({"along", PlaneCutPlan{{{1, 0, 0}}, {1, 0.02, 0.1}}});
+  const Phase moved = scenario.phases[0];
+  scenario.phases = {moved, moved, moved};
+  scenario.phases[0].closed_cuts = scenario.phases[2].closed_cuts = {"along"};
+  ScenarioRun run(scenario, patient, cpu());
+  const auto vertices = static_cast<std::size_t>(voxel_count(patient.lattice));
+  std::size_t copies = 0, wide = 0;
+  run.next();
+  run.next();
+  std::vector<glm::vec3> before = run.displacement();
+  for (int phase = 1; phase < 3; ++phase) {
+    // As the phase begins: the same scenario, played by a puppet that starts where the true run is.
+    const std::vector<Cut> first = open_cuts(scenario, scenario.phases[phase - 1], patient),
+                           second = open_cuts(scenario, scenario.phases[phase], patient);
+    const DividedLattice earlier = divide(patient.lattice, first), now = divide(patient.lattice, second);
+    const std::vector<std::uint32_t> from = nodes_before(now, earlier, patient.lattice);
+    ASSERT_EQ(from.size(), now.copies_of.size());
+    const CutSurface across(first[0].name == "across" ? first[0] : first[1]);
+    const AffineMap point = point_from_index(patient.lattice);
+    const glm::i64vec3 size = patient.lattice.size;
+    for (std::size_t n = 0; n < from.size(); ++n) {
+      // A copy belongs to tissue on the other side of one cut or both. Where only "across" parts it from its vertex,
+      // it must begin with the other side, not with its vertex.
+      const std::int64_t v = now.copies_of[n];
+      const glm::dvec3 at = point(glm::dvec3(v % size.x, v / size.x % size.y, v / (size.x * size.y)));
+      const bool above = across.side(at) > 0;
+      const glm::vec3 begins = before[from[n]];
+      ++copies;
+      const bool with_other_side = glm::distance(begins, above ? glm::vec3(0) : glm::vec3(3, -2, 9)) < 1e-2f;
+      wide += with_other_side;
+      EXPECT_TRUE(with_other_side || glm::distance(begins, before[static_cast<std::size_t>(v)]) < 1e-2f);
+      EXPECT_TRUE(with_other_side || phase == 1) << "only one cut is left: node " << n;
+    }
+    run.next();
+    run.next();
+    before = run.displacement();
+    EXPECT_EQ(before.size(), vertices + now.copies_of.size());
+  }
+  EXPECT_GT(copies, 300u);
+  EXPECT_GT(wide, copies / 2);
+}
+
+TEST(CutRun, APhaseBeginsWhereTheTissueWasOnBothSidesOfACutThatStaysOpen) {
+  const Patient patient = uniform_patient();
+  Scenario scenario = parted({"across", PlaneCutPlan{{{0, 0, 19}}, {0.05, 0.03, 1}}}, {3, -2, 9});
+  scenario.method = Method::chainmail;
+  scenario.cuts.push_back({"along", PlaneCutPlan{{{1, 0, 0}}, {1, 0.02, 0.1}}});
+  const Phase moved = scenario.phases[0];
+  scenario.phases = {moved, moved};
+  scenario.phases[0].closed_cuts = {"along"};
+  std::vector<std::vector<glm::vec3>> begun;
+  ScenarioRun run(scenario, patient, [&](const Model& model) { return std::make_unique<Puppet>(model, begun); });
+  run.next();
+  run.next();
+  const std::vector<glm::vec3> before = run.displacement();
+  const DividedLattice earlier = divide(patient.lattice, open_cuts(scenario, scenario.phases[0], patient));
+  run.next();
+  ASSERT_EQ(begun.size(), 2u);
+  const DividedLattice now = divide(patient.lattice, open_cuts(scenario, scenario.phases[1], patient));
+  const std::vector<std::uint32_t> from = nodes_before(now, earlier, patient.lattice);
+  const auto vertices = static_cast<std::size_t>(voxel_count(patient.lattice));
+  for (std::size_t n = 0; n < begun[1].size(); ++n)
+    EXPECT_EQ(begun[1][n], before[n < vertices ? n : from[n - vertices]]) << n;
 }
 
 TEST(CutRun, ADiscOpensWhereItIsAndTissueRoundItHolds) {
