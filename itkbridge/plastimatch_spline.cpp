@@ -3,21 +3,25 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <functional>
 #include <map>
+#include <string_view>
 
 #include "deform/errors.h"
 
 namespace tetwarp {
 namespace {
 
-using Header = std::map<std::string, std::vector<double>>;
+using Header = std::map<std::string, std::vector<double>, std::less<>>;
 
-const std::vector<double>& field(const Header& header, const std::string& key, std::size_t count,
+/// The values of a key: a reference into `header`. The key comes by value, for a temporary one may be given, and with a
+/// reference to it GCC 14 would suspect that it is what is returned.
+const std::vector<double>& field(const Header& header, std::string_view key, std::size_t count,
                                  const std::string& file) {
   const auto found = header.find(key);
-  require(found != header.end(), "no " + key + " in " + file + "; the file may be truncated");
-  require(found->second.size() == count, std::to_string(found->second.size()) + " values of " + key + " in " + file +
-                                             "; expected " + std::to_string(count));
+  require(found != header.end(), "no " + std::string(key) + " in " + file + "; the file may be truncated");
+  require(found->second.size() == count, std::to_string(found->second.size()) + " values of " + std::string(key) +
+                                             " in " + file + "; expected " + std::to_string(count));
   return found->second;
 }
 

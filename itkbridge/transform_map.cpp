@@ -120,18 +120,30 @@ Part make_part(const TransformRecord& record, const std::string& file) {
   return part;
 }
 
+constexpr std::size_t kCoefficients = 64;  // of a B-spline, that one point depends on
+
+/// An array of `kCoefficients` values as ITK's B-splines take it, on the stack. ITK 5.4 has an itk::FixedArray, which
+/// holds its values; the itk::Array of ITK 5.2 would allocate them, so it is given their place.
+template <typename TArray>
+struct StackArray {
+  TArray array;
+};
+
+template <typename TValue>
+struct StackArray<itk::Array<TValue>> {
+  std::array<TValue, kCoefficients> values;
+  itk::Array<TValue> array{values.data(), kCoefficients, false};
+};
+
 /// One part at a point. ITK's methods are const and keep nothing between calls; a B-spline's working arrays are on the
 /// stack, for the leak sanitizer of GCC 12 stumbles over the thread-local ones of a library that was loaded.
 Transform::OutputPointType apply(const Part& part, const Transform::InputPointType& point, bool& outside) {
   if (part.spline) {
-    constexpr std::size_t kCoefficients = 64;  // that a point depends on
-    std::array<Spline::WeightsType::ValueType, kCoefficients> weight_values;
-    std::array<Spline::ParameterIndexArrayType::ValueType, kCoefficients> index_values;
-    Spline::WeightsType weights(weight_values.data(), kCoefficients, false);
-    Spline::ParameterIndexArrayType indices(index_values.data(), kCoefficients, false);
+    StackArray<Spline::WeightsType> weights;
+    StackArray<Spline::ParameterIndexArrayType> indices;
     Transform::OutputPointType moved;
     bool inside = true;
-    part.spline->TransformPoint(point, moved, weights, indices, inside);
+    part.spline->TransformPoint(point, moved, weights.array, indices.array, inside);
     outside = outside || !inside;
     return moved;
   }
