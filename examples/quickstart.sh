@@ -4,7 +4,8 @@
 #
 #   examples/quickstart.sh [OUTPUT_FOLDER]     default: ./first-light
 #
-# Environment: TETWARP_CUDA_ARCHITECTURES (default all-major), TETWARP_JOBS (default: all cores).
+# Environment: TETWARP_CUDA_ARCHITECTURES (default all-major), TETWARP_JOBS (default: all cores), TETWARP_PRESET (default: cuda
+# where nvcc is found, else cpu).
 set -euo pipefail
 source_dir=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 out=${1:-first-light}

@@ -65,7 +65,7 @@ done
 if [ -n "${TETWARP_PROGRAM:-}" ]; then
   tetwarp=$TETWARP_PROGRAM
 else
-  preset=$("$source_dir/cmake/preset.sh")
+  preset=$("$source_dir/cmake/preset.sh" --built)
   tetwarp=$source_dir/build/$preset/apps/tetwarp
   if [ -f "$source_dir/build/$preset/CMakeCache.txt" ]; then
     # A build that was made before is brought up to date, so that the numbers are those of the sources that lie here.

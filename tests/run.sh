@@ -1,13 +1,19 @@
 #!/usr/bin/env bash
-# Runs the tests of the build that examples/quickstart.sh made.
+# Runs the tests of the build that examples/quickstart.sh or .ci/run made, whichever was built last.
 #
 #   tests/run.sh [CTEST ARGUMENTS]
 #
+# TETWARP_PRESET names another build (CMakePresets.json): cpu on a machine with nvcc, or asan.
 # Real series: $TETWARP_TEST_DATA names a folder of unpacked sets; without it, sets packed in ../shared/data are unpacked
 # into the build folder. Tests that find no data skip and say so.
 set -euo pipefail
 source_dir=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
-preset=$("$source_dir/cmake/preset.sh")
+preset=$("$source_dir/cmake/preset.sh" --built)
+if [ ! -f "$source_dir/build/$preset/CTestTestfile.cmake" ]; then
+  echo "run.sh: error: no tests in build/$preset; run examples/quickstart.sh, or name another build in TETWARP_PRESET" >&2
+  exit 1
+fi
+echo "== testing build/$preset"
 packed="$source_dir/../shared/data"
 if [ -z "${TETWARP_TEST_DATA:-}" ] && [ -f "$packed/unpack.sh" ]; then
   export TETWARP_TEST_DATA="$source_dir/build/test-data"

@@ -38,7 +38,7 @@ done
 
 programs=${TETWARP_EXAMPLES:-}
 if [ -z "$programs" ]; then
-  preset=$("$source_dir/cmake/preset.sh")
+  preset=$("$source_dir/cmake/preset.sh" --built)
   programs=$source_dir/build/$preset/examples/itk
   if [ -f "$source_dir/build/$preset/CMakeCache.txt" ]; then
     echo "== building (preset $preset)"

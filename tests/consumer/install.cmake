@@ -1,4 +1,5 @@
-# Installs the build, moves the installation, and looks for absolute paths in what find_package() reads.
+# Installs the build, moves the installation, and looks in what find_package() reads for absolute paths, and for warnings
+# (with -Werror) that a user's build would take over.
 include("${SETTINGS}")
 file(REMOVE_RECURSE "${work}/installed" "${installation}" "${work}/without itkbridge")
 execute_process(COMMAND "${CMAKE_COMMAND}" --install "${build}" --prefix "${work}/installed"
@@ -13,6 +14,10 @@ foreach(file IN LISTS package)
   file(STRINGS "${file}" named REGEX "[\";:>, ]/[A-Za-z]")
   if(named)
     message(SEND_ERROR "${file} names a path:\n${named}")
+  endif()
+  file(STRINGS "${file}" warnings REGEX "[\";: ]-W[a-z]")
+  if(warnings)
+    message(SEND_ERROR "${file} passes warnings on to users:\n${warnings}")
   endif()
 endforeach()
 
