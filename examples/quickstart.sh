@@ -4,8 +4,8 @@
 #
 #   examples/quickstart.sh [OUTPUT_FOLDER]     default: ./first-light
 #
-# Environment: TETWARP_CUDA_ARCHITECTURES (default all-major), TETWARP_JOBS (default: all cores), TETWARP_PRESET (default: cuda
-# where nvcc is found, else cpu).
+# Environment: TETWARP_CUDA_ARCHITECTURES (default: those of this machine's devices; without one, a few that serve all
+# cards), TETWARP_JOBS (default: all cores), TETWARP_PRESET (default: cuda where nvcc is found, else cpu).
 set -euo pipefail
 source_dir=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 out=${1:-first-light}
@@ -35,6 +35,7 @@ configure=(--preset "$preset")
 echo "== building (preset $preset)"
 (cd "$source_dir" && cmake "${configure[@]}" >"/tmp/tetwarp-configure.$$.log" 2>&1) ||
   { cat "/tmp/tetwarp-configure.$$.log"; exit 1; }
+sed -n 's/^-- Tetwarp: //p' "/tmp/tetwarp-configure.$$.log"  # what CMake chose by itself
 rm -f "/tmp/tetwarp-configure.$$.log"
 (cd "$source_dir" && cmake --build --preset "$preset" --parallel "${TETWARP_JOBS:-$(nproc)}")
 tetwarp="$source_dir/build/$preset/apps/tetwarp"

@@ -128,7 +128,7 @@ describe_machine() {
   echo "distribution   $(sed -n 's/^PRETTY_NAME=//p' /etc/os-release | tr -d '"')"
   [ ! -x "$compiler" ] || echo "C++ compiler   $("$compiler" --version | head -n 1)"
   [ ! -x "$cuda" ] || echo "CUDA compiler  $("$cuda" --version | sed -n 's/^.*, \(release.*\)/\1/p')"
-  [ ! -x "$cuda" ] || echo "CUDA targets   $(cached CMAKE_CUDA_ARCHITECTURES)"
+  [ ! -x "$cuda" ] || echo "CUDA targets   $(cached TETWARP_CUDA_COMPILED_FOR)"
 }
 
 mkdir -p "$out"
