@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs what is missing (Debian 12), builds Tetwarp, and deforms the built-in phantom: DICOM in, DICOM, NIfTI and pictures out.
-# Safe to run again. CUDA is used where nvcc is found.
+# Installs what is missing (Debian 12 or 13), builds Tetwarp, and deforms the built-in phantom: DICOM in; DICOM, NIfTI and
+# pictures out. Safe to run again. CUDA is used where nvcc is found.
 #
 #   examples/quickstart.sh [OUTPUT_FOLDER]     default: ./first-light
 #
@@ -14,6 +14,7 @@ packages=(
   g++ cmake ninja-build git ca-certificates xz-utils          # to build, and to unpack test data
   libtbb-dev libhwy-dev libeigen3-dev libglm-dev libgtest-dev libcli11-dev nlohmann-json3-dev
   libinsighttoolkit5-dev libdcmtk-dev libopenjp2-7-dev        # NIfTI, NRRD, MHA; DICOM, in JPEG 2000 too
+  libfftw3-dev                                                # Debian 13's ITK asks for it when it is linked
   libdeflate-dev libpng-dev zlib1g-dev libssl-dev
   dicom3tools dcm2niix python3-pydicom python3-gdcm python3-numpy python3-nibabel  # independent readers that the tests ask
 )
