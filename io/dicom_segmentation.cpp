@@ -246,7 +246,7 @@ DicomSegmentation SegmentationFile::header(double otherwise_mm) {
 /// Pixel Data as they lie in the file, bytes whatever their value representation.
 std::span<const Uint8> SegmentationFile::pixels(std::size_t expected) {
   const std::string syntax = DcmXfer(data().getOriginalXfer()).getXferID();
-  if (DcmXfer(data().getOriginalXfer()).isEncapsulated())
+  if (pixel_coding(syntax) != PixelCoding::native)
     refuse("has compressed pixels, " + uid_with_name(syntax) + "; a segmentation must have plain ones");
   DcmElement* element = nullptr;
   if (data().findAndGetElement(DCM_PixelData, element).bad()) refuse("has no Pixel Data (7FE0,0010)");
