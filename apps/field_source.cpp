@@ -64,7 +64,7 @@ void read_mesh(const std::string& text, ForwardField& result) {
 
 /// A bad transform is refused before volumes are read.
 void check_transform(const std::string& text) {
-  if (kind_of(text) == FieldKind::transform) read_transform_file(text);
+  if (kind_of(text) == FieldKind::transform) read_transform_file(text, interrupt_token());
 }
 
 /// What to say of a transform once it was evaluated at every vertex or voxel.
@@ -104,7 +104,7 @@ struct NamedMap {
 
 NamedMap map_of(const std::string& text, const Geometry& volume) {
   if (is_formula(text)) return {formula_map(text, volume), {}};
-  TransformFile transform = read_transform_file(text);
+  TransformFile transform = read_transform_file(text, interrupt_token());
   return {transform.displacement, std::move(transform)};
 }
 
@@ -230,7 +230,7 @@ FieldSource pull_source(const std::string& text, const std::optional<Geometry>& 
 PullField read_pull_field(const std::string& text, const Geometry& volume, const Geometry& output,
                           const CommonOptions& common, const Control& control, AnyField& found) {
   if (is_transform_file(text)) {
-    const TransformFile transform = read_transform_file(text);
+    const TransformFile transform = read_transform_file(text, interrupt_token());
     VertexField sampled = sample_on(output, transform.displacement, {.threads = common.threads}, control);
     note_transform(transform, text, Direction::pull, found.notes);
     return {sampled.lattice, std::move(sampled.displacement)};

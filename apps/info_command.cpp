@@ -1,6 +1,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "apps/console.h"
 #include "apps/field_source.h"
 #include "apps/info_dicom.h"
 #include "apps/input.h"
@@ -54,7 +55,7 @@ json describe_mesh(const FieldSource& source) {
 }
 
 json describe_transform(const std::filesystem::path& path) {
-  const TransformFile transform = read_transform_file(path);
+  const TransformFile transform = read_transform_file(path, interrupt_token());
   return {{"path", path.string()},
           {"kind", "transform"},
           {"tool", transform.tool},

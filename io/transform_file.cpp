@@ -34,13 +34,13 @@ const char* name_of(TransformTool tool) {
   return tool == TransformTool::plastimatch ? "plastimatch" : "ITK";
 }
 
-/// ITK's transforms and HDF5 come in a module of their own: their libraries would take 8 ms of every start.
-LoadedTransform load_transform(const std::filesystem::path& path) {
+/// ITK's transforms come in a module of their own: their libraries would take their time of every start.
+LoadedTransform load_transform(const std::filesystem::path& path, const std::stop_token& stop) {
   static auto* const load = reinterpret_cast<decltype(&tetwarp_load_transform)>(
       find_in_module(TETWARP_TRANSFORM_MODULE, "tetwarp_load_transform"));
   if (!load) refuse_without_module("transform files", TETWARP_TRANSFORM_MODULE, path.string(), "");
   LoadedTransform loaded;
-  load(path, loaded);
+  load(path, stop, loaded);
   return loaded;
 }
 
@@ -56,9 +56,9 @@ bool is_transform_file(const std::filesystem::path& path) {
   }
 }
 
-TransformFile read_transform_file(const std::filesystem::path& path) {
+TransformFile read_transform_file(const std::filesystem::path& path, const std::stop_token& stop) {
   if (image_format(path) == ImageFormat::nifti) return read_niftyreg_spline(path);
-  LoadedTransform loaded = load_transform(path);
+  LoadedTransform loaded = load_transform(path, stop);
   const StoredTransform& stored = loaded.stored;
   const std::string file = path.string();
   TransformFile result{.tool = name_of(stored.tool),
@@ -85,7 +85,7 @@ TransformFile read_transform_file(const std::filesystem::path& path) {
 #else
 bool is_transform_file(const std::filesystem::path& path) { return has_transform_suffix(path); }
 
-TransformFile read_transform_file(const std::filesystem::path& path) {
+TransformFile read_transform_file(const std::filesystem::path& path, const std::stop_token&) {
   throw NotCompiled("transform files need ITK, which this build does not have, " + path.string());
 }
 #endif

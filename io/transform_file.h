@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -30,7 +31,12 @@ bool is_transform_file(const std::filesystem::path& path);
 /// Reads an ITK transform file (.h5 .tfm .txt), an elastix parameter file or a plastimatch B-spline (.txt): affine
 /// transforms of all kinds, B-splines of order 3, displacement fields, and composites of these. ITK evaluates them.
 /// Reads a cubic B-spline control point grid of NiftyReg (.nii .nii.gz) as well.
-/// @throws InputError naming the file for what is not that; NotCompiled in a build without ITK
-TransformFile read_transform_file(const std::filesystem::path& path);
+///
+/// HDF5 is read by the program tetwarp-read of the installation, so that a damaged file brings down that program alone.
+/// It lies in libexec/tetwarp; the environment variable TETWARP_READ_PROGRAM names another.
+/// @param stop  ends the reading of HDF5, which may take long
+/// @throws InputError naming the file for what is not that; NotCompiled in a build without ITK; Error where
+///         tetwarp-read is needed and missing; Cancelled
+TransformFile read_transform_file(const std::filesystem::path& path, const std::stop_token& stop = {});
 
 }  // namespace tetwarp

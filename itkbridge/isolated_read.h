@@ -2,7 +2,8 @@
 
 // Private to itkbridge/: reading with a library that damaged files bring down.
 #include <cstddef>
-#include <functional>
+#include <filesystem>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -12,22 +13,22 @@ namespace tetwarp {
 
 /// What a read in a process of its own may take. What goes beyond fails, or ends that process.
 struct IsolatedLimits {
-  std::size_t memory_bytes = 0;  ///< that can be written, beyond what this process has
+  std::size_t memory_bytes = 0;  ///< that can be written, beyond what the program that reads begins with
   unsigned cpu_seconds = 0;
   unsigned seconds = 0;  ///< by the clock: a read that waits for ever takes no CPU time
 };
 
-/// Runs `read` in a child process and returns what it returned, over a pipe. A crash, an endless loop or an allocation
-/// beyond the limits ends the child alone. What it prints is lost; its memory, leaks included, goes with it.
-///
-/// The child is a copy of the thread that calls: `read` may neither wait for other threads nor use a device, and no
-/// destructor of a static object nor handler of `exit` runs behind it.
+/// Lets the program tetwarp-read (read_program.h) read a file and returns what it read, which comes over a pipe. A
+/// crash, an endless loop or an allocation beyond the limits ends that program alone. What it prints is lost; its
+/// memory, leaks included, goes with it. It has no file of this process open, and is no copy of it: other threads may
+/// do what they like, use a device too.
+/// @param kind     what tetwarp-read shall read, one of its readers
 /// @param library  for errors: who reads
-/// @param file     for errors
-/// @throws InputError with the words of the one that `read` threw, or naming library and file where the child failed;
-///         Error if there can be no child
-std::vector<TransformRecord> read_isolated(const std::function<std::vector<TransformRecord>()>& read,
+/// @param stop     ends the read at once
+/// @throws InputError with the words of the one that the reader threw, or naming library and file where it failed;
+///         Error where there is no tetwarp-read, or none that starts; Cancelled
+std::vector<TransformRecord> read_isolated(const std::string& kind, const std::filesystem::path& path,
                                            const IsolatedLimits& limits, const std::string& library,
-                                           const std::string& file);
+                                           const std::stop_token& stop = {});
 
 }  // namespace tetwarp

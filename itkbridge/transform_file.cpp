@@ -111,9 +111,9 @@ std::vector<double> parse_numbers(std::string_view text, const std::string& wher
   return values;
 }
 
-StoredTransform read_transform(const std::filesystem::path& path) {
+StoredTransform read_transform(const std::filesystem::path& path, const std::stop_token& stop) {
   const std::string magic = first_bytes(path), file = path.string();
-  if (magic.starts_with(kHdf5)) return {TransformTool::itk, parts_of(read_transform_hdf5(path), file)};
+  if (magic.starts_with(kHdf5)) return {TransformTool::itk, parts_of(read_transform_hdf5(path, stop), file)};
   if (magic.starts_with(kText)) return {TransformTool::itk, parts_of(TextReader(path).read(), file)};
   if (magic.starts_with(kPlastimatchMagic)) return {TransformTool::plastimatch, {read_plastimatch_spline(path)}};
   require(is_elastix_file(path), "not a transform file, " + file +
@@ -122,8 +122,8 @@ StoredTransform read_transform(const std::filesystem::path& path) {
   return {TransformTool::elastix, read_elastix(path)};
 }
 
-void tetwarp_load_transform(const std::filesystem::path& path, LoadedTransform& loaded) {
-  loaded.stored = read_transform(path);
+void tetwarp_load_transform(const std::filesystem::path& path, const std::stop_token& stop, LoadedTransform& loaded) {
+  loaded.stored = read_transform(path, stop);
   loaded.map = make_transform(loaded.stored, path.string());
 }
 

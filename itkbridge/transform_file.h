@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <functional>
 #include <glm/vec3.hpp>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -24,8 +25,9 @@ struct StoredTransform {
 ///
 /// ITK's own reader is not used: it allocates what a B-spline's grid promises before it looks at the parameters, reads
 /// past the end of too few of them, and stops silently at what is not a number.
-/// @throws InputError naming the file
-StoredTransform read_transform(const std::filesystem::path& path);
+/// @param stop  ends the reading of HDF5, which may take long
+/// @throws InputError naming the file; Cancelled
+StoredTransform read_transform(const std::filesystem::path& path, const std::stop_token& stop = {});
 
 /// T(x), both LPS mm. Called from several threads. `outside` becomes true where a B-spline or displacement field on the
 /// way has no value at the point, which it then leaves where it is, as ITK does.
@@ -44,6 +46,7 @@ struct LoadedTransform {
 };
 
 /// What the module of these files is asked for (io/transform_file.cpp loads it): `read_transform` and `make_transform`.
-extern "C" void tetwarp_load_transform(const std::filesystem::path& path, LoadedTransform& loaded);
+extern "C" void tetwarp_load_transform(const std::filesystem::path& path, const std::stop_token& stop,
+                                       LoadedTransform& loaded);
 
 }  // namespace tetwarp

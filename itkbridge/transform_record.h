@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -24,8 +25,9 @@ std::string_view trimmed(std::string_view text);
 std::vector<double> parse_numbers(std::string_view text, const std::string& where);
 
 /// ITK's HDF5 layout: /TransformGroup/N/{TransformType, TransformFixedParameters, TransformParameters}. A composite is
-/// a record without numbers. Nothing is allocated for values that the file cannot hold.
-/// @throws InputError for what is not that, or damaged
-std::vector<TransformRecord> read_transform_hdf5(const std::filesystem::path& path);
+/// a record without numbers. Nothing is allocated for values that the file cannot hold. The program tetwarp-read reads
+/// it (isolated_read.h).
+/// @throws InputError for what is not that, or damaged; Error where that program is missing; Cancelled
+std::vector<TransformRecord> read_transform_hdf5(const std::filesystem::path& path, const std::stop_token& stop = {});
 
 }  // namespace tetwarp

@@ -1,19 +1,23 @@
 #include "itkbridge/isolated_read.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <pthread.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <chrono>
 #include <csignal>
-#include <cstdio>
+#include <cstdlib>
 #include <cstring>
-#include <numeric>
 #include <thread>
 
 #include "deform/errors.h"
 #include "tests/support/image_samples.h"
+#include "tests/support/program.h"
 #include "tests/support/says.h"
+#include "tests/support/scratch.h"
 
 namespace tetwarp {
 namespace {
@@ -22,95 +26,96 @@ using Records = std::vector<TransformRecord>;
 
 constexpr IsolatedLimits kLimits = {.memory_bytes = std::size_t{128} << 20, .cpu_seconds = 60, .seconds = 60};
 
-std::string why_not(const std::function<Records()>& read, const IsolatedLimits& limits = kLimits) {
-  return refusal([&] { read_isolated(read, limits, "Library", "FILE"); });
-}
+/// An environment variable while this object lives.
+class Variable {
+ public:
+  Variable(const char* name, const std::string& value) : name_(name) { ::setenv(name, value.c_str(), 1); }
+  ~Variable() { ::unsetenv(name_); }
+  Variable(const Variable&) = delete;
+  Variable& operator=(const Variable&) = delete;
+
+ private:
+  const char* name_;
+};
+
+/// Reads by the program of the tests (read_program_for_tests.cpp), whose readers misbehave.
+class IsolatedRead : public testing::Test {
+ protected:
+  static Records read(const std::string& kind, const std::string& file = "FILE", const IsolatedLimits& limits = kLimits,
+                      const std::stop_token& stop = {}) {
+    return read_isolated(kind, file, limits, "Library", stop);
+  }
+  static std::string why_not(const std::string& kind, const std::string& file = "FILE",
+                             const IsolatedLimits& limits = kLimits) {
+    return refusal([&] { read(kind, file, limits); });
+  }
+
+ private:
+  Variable program_{"TETWARP_READ_PROGRAM", TETWARP_TEST_READ_PROGRAM};
+};
 
 /// This process has no child, not even one that ended and was not asked for.
 bool has_no_child() { return ::waitpid(-1, nullptr, WNOHANG) == -1 && errno == ECHILD; }
 
-TEST(IsolatedRead, ReturnsWhatWasReadWhateverItsSize) {
-  TransformRecord large{"BSplineTransform_double_3_3", {1, -0.0, 3}, std::vector<double>(1'000'000)};
-  std::iota(large.parameters.begin(), large.parameters.end(), 0.5);
-  const Records expected = {{"CompositeTransform_double_3_3", {}, {}}, large};
-  const Records actual = read_isolated([&] { return expected; }, kLimits, "Library", "FILE");
-  ASSERT_EQ(actual.size(), 2U);
-  EXPECT_EQ(actual[0].type, "CompositeTransform_double_3_3");
-  EXPECT_TRUE(actual[0].fixed.empty() && actual[0].parameters.empty());
-  EXPECT_EQ(actual[1].type, large.type);
-  EXPECT_EQ(actual[1].fixed, large.fixed);
-  EXPECT_EQ(actual[1].parameters, large.parameters);
+TEST_F(IsolatedRead, ReturnsWhatWasReadWhateverItsSize) {
+  const Records records = read("ramp", "1000000");
+  ASSERT_EQ(records.size(), 2U);
+  EXPECT_EQ(records[0].type, "CompositeTransform_double_3_3");
+  EXPECT_TRUE(records[0].fixed.empty() && records[0].parameters.empty());
+  EXPECT_EQ(records[1].type, "BSplineTransform_double_3_3");
+  EXPECT_EQ(records[1].fixed, (std::vector<double>{1, 0, 3}));
+  EXPECT_TRUE(std::signbit(records[1].fixed[1]));
+  ASSERT_EQ(records[1].parameters.size(), 1'000'000U);
+  for (std::size_t n = 0; n < 1'000'000; n += 999) EXPECT_EQ(records[1].parameters[n], static_cast<double>(n) + 0.5);
   EXPECT_TRUE(has_no_child());
 }
 
-TEST(IsolatedRead, WordsOfARefusalArrive) {
-  EXPECT_TRUE(says(why_not([]() -> Records { throw InputError("7 values, FILE; expected 8"); }),
-                   {"InputError", "7 values, FILE; expected 8"}));
+TEST_F(IsolatedRead, WordsOfARefusalArrive) {
+  EXPECT_TRUE(says(why_not("refusal"), {"InputError", "7 values, FILE; expected 8"}));
   EXPECT_TRUE(has_no_child());
 }
 
-TEST(IsolatedRead, AnotherExceptionNamesLibraryAndFile) {
-  EXPECT_TRUE(
-      says(why_not([]() -> Records { throw 3; }), {"InputError", "Library cannot read FILE", "without a result"}));
+TEST_F(IsolatedRead, AnotherExceptionNamesLibraryAndFile) {
+  EXPECT_TRUE(says(why_not("other-exception"), {"InputError", "Library cannot read FILE", "without a result"}));
 }
 
-TEST(IsolatedRead, CrashIsAnError) {
-  for (const int signal : {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGILL}) {
-    const std::string why = why_not([&]() -> Records {
-      ::raise(signal);
-      return {};
-    });
-    EXPECT_TRUE(says(why, {"InputError", "Library cannot read FILE", ::strsignal(signal)}));
+TEST_F(IsolatedRead, CrashIsAnError) {
+  for (const int signal : {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGILL, SIGKILL}) {
+    const std::string file = std::to_string(signal);
+    EXPECT_TRUE(says(why_not("signalled", file),
+                     {"InputError", "Library cannot read " + file + ": it crashes", ::strsignal(signal)}));
   }
   EXPECT_TRUE(has_no_child());
 }
 
-TEST(IsolatedRead, ExitIsAnError) {
-  EXPECT_TRUE(
-      says(why_not([]() -> Records { ::_exit(0); }), {"InputError", "Library cannot read FILE", "without a result"}));
+TEST_F(IsolatedRead, ExitIsAnError) {
+  EXPECT_TRUE(says(why_not("leaves"), {"InputError", "Library cannot read FILE", "without a result"}));
 }
 
-TEST(IsolatedRead, EndlessLoopIsAnError) {
+TEST_F(IsolatedRead, EndlessLoopIsAnError) {
   IsolatedLimits limits = kLimits;
   limits.cpu_seconds = 1;
-  const std::string busy = why_not(
-      []() -> Records {
-        for (volatile bool forever = true; forever;) continue;
-        return {};
-      },
-      limits);
-  EXPECT_TRUE(says(busy, {"InputError", "Library cannot read FILE", "1 s of CPU time"}));
+  EXPECT_TRUE(says(why_not("busy", "FILE", limits), {"InputError", "Library cannot read FILE", "1 s of CPU time"}));
   limits.seconds = 1;
-  const std::string idle = why_not(
-      []() -> Records {
-        for (;;) ::pause();
-      },
-      limits);
-  EXPECT_TRUE(says(idle, {"InputError", "Library cannot read FILE", "more than 1 s"}));
+  EXPECT_TRUE(says(why_not("idle", "FILE", limits), {"InputError", "Library cannot read FILE", "more than 1 s"}));
   EXPECT_TRUE(has_no_child());
 }
 
-TEST(IsolatedRead, MemoryBeyondTheLimitIsAnError) {
-  const auto read = [](std::size_t values) {
-    return why_not([values] { return Records{{"", {}, std::vector<double>(values, 1.0)}}; });
-  };
-  EXPECT_EQ(read(kLimits.memory_bytes / 16), "");
-  const std::string why = read(kLimits.memory_bytes / 4);
-  EXPECT_TRUE(says(why, {"InputError", "Library cannot read FILE"}));
+TEST_F(IsolatedRead, MemoryBeyondTheLimitIsAnError) {
+  EXPECT_EQ(why_not("ramp", std::to_string(kLimits.memory_bytes / 32)), "");
+  const std::string why = why_not("ramp", std::to_string(kLimits.memory_bytes / 4));
+  EXPECT_TRUE(says(why, {"InputError", "Library cannot read"}));
 #ifndef __SANITIZE_ADDRESS__  // which ends the process
   EXPECT_TRUE(says(why, {"more than 128 MiB"}));
 #endif
 }
 
-TEST(IsolatedRead, WorksFromManyThreadsAtOnce) {
+TEST_F(IsolatedRead, WorksFromManyThreadsAtOnce) {
   std::vector<std::size_t> counts(8);
   std::vector<std::thread> threads;
   for (std::size_t n = 0; n < counts.size(); ++n) {
     threads.emplace_back([&counts, n] {
-      for (int turn = 0; turn < 4; ++turn) {
-        const auto read = [n] { return Records{{"", {}, std::vector<double>(n * 1000)}}; };
-        counts[n] += read_isolated(read, kLimits, "Library", "FILE")[0].parameters.size();
-      }
+      for (int turn = 0; turn < 4; ++turn) counts[n] += read("ramp", std::to_string(n * 1000))[1].parameters.size();
     });
   }
   for (std::thread& thread : threads) thread.join();
@@ -118,27 +123,138 @@ TEST(IsolatedRead, WorksFromManyThreadsAtOnce) {
   EXPECT_TRUE(has_no_child());
 }
 
-TEST(IsolatedRead, ProgramsThatLetTheirChildrenGoReadAsWell) {
+TEST_F(IsolatedRead, ProgramsThatLetTheirChildrenGoReadAsWell) {
   const auto before = ::signal(SIGCHLD, SIG_IGN);
-  const auto read = [] { return Records{{"a", {1}, {2}}}; };
-  EXPECT_EQ(read_isolated(read, kLimits, "Library", "FILE").size(), 1U);
-  EXPECT_TRUE(says(why_not([]() -> Records {
-                     ::raise(SIGSEGV);
-                     return {};
-                   }),
-                   {"Library cannot read FILE"}));
+  EXPECT_EQ(read("ramp", "3").size(), 2U);
+  EXPECT_TRUE(says(why_not("signalled", std::to_string(SIGSEGV)), {"Library cannot read"}));
   ::signal(SIGCHLD, before);
 }
 
-TEST(IsolatedRead, WhatIsPrintedIsLost) {
+TEST_F(IsolatedRead, WhatIsPrintedIsLost) {
+  ::testing::internal::CaptureStdout();
   ::testing::internal::CaptureStderr();
-  read_isolated(
-      [] {
-        std::fprintf(stderr, "noise\n");
-        return Records{};
-      },
-      kLimits, "Library", "FILE");
-  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+  EXPECT_TRUE(read("noise").empty());
+  EXPECT_EQ(::testing::internal::GetCapturedStderr() + ::testing::internal::GetCapturedStdout(), "");
+}
+
+int forks = 0;
+
+TEST_F(IsolatedRead, ThisProcessIsNotCopied) {
+  // What fork() calls first; a copy would hold locks of threads that it does not have.
+  ASSERT_EQ(::pthread_atfork([] { ++forks; }, nullptr, nullptr), 0);
+  const int before = forks;
+  read("nothing");
+  EXPECT_EQ(forks, before);
+}
+
+TEST_F(IsolatedRead, NoFileOfThisProcessIsInherited) {
+  const int open = ::open("/etc/hostname", O_RDONLY);  // closed by no exec
+  ASSERT_GE(open, 0);
+  const Records records = read("descriptors");
+  ::close(open);
+  ASSERT_EQ(records.size(), 4U);
+  for (int n = 0; n < 3; ++n) EXPECT_EQ(records[n].type, "/dev/null");
+  EXPECT_TRUE(says(records[3].type, {"pipe:"}));
+  EXPECT_EQ(records[3].fixed, std::vector<double>{3});
+}
+
+TEST_F(IsolatedRead, ReadsWhereDescriptorsOfTheStandardStreamsAreFree) {
+  const int in = ::fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 10), out = ::fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 10);
+  ::close(STDIN_FILENO);
+  ::close(STDOUT_FILENO);
+  const Records records = read("descriptors");
+  ::dup2(in, STDIN_FILENO);
+  ::dup2(out, STDOUT_FILENO);
+  ::close(in);
+  ::close(out);
+  ASSERT_EQ(records.size(), 4U);
+  EXPECT_TRUE(says(records[3].type, {"pipe:"}));
+}
+
+TEST_F(IsolatedRead, SignalsOfThisProcessAreNotInherited) {
+  sigset_t blocked, before;
+  sigfillset(&blocked);
+  ::pthread_sigmask(SIG_SETMASK, &blocked, &before);
+  const auto handler = ::signal(SIGXFSZ, SIG_IGN);
+  const Records records = read("signals");
+  ::signal(SIGXFSZ, handler);
+  ::pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  ASSERT_EQ(records.size(), 2U);
+  for (const TransformRecord& record : records) EXPECT_EQ(record.fixed, std::vector<double>{0}) << record.type;
+}
+
+TEST_F(IsolatedRead, AStopEndsItAtOnce) {
+  std::stop_source source;
+  const auto begin = std::chrono::steady_clock::now();
+  std::thread later([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    source.request_stop();
+  });
+  EXPECT_THROW(read("idle", "FILE", kLimits, source.get_token()), Cancelled);
+  later.join();
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(5));
+  EXPECT_THROW(read("ramp", "1000000", kLimits, source.get_token()), Cancelled) << "asked for before it began";
+  EXPECT_TRUE(has_no_child());
+}
+
+/// Lets `tetwarp info` read a file for which the reader waits for ever, and sends it a signal when it does.
+/// The status of tetwarp goes to the file `status`; the script fails if the reader then lives on.
+Outcome interrupt_info(const Scratch& scratch, const std::string& signal) {
+  std::ofstream(scratch / "x.h5") << "\x89HDF\r\n\x1a\n";
+  std::ofstream(scratch / "script") << R"("$2" info x.h5 &
+while [ ! -s process ]; do sleep 0.05; done
+kill -$1 $!
+wait $!
+echo $? > status
+for n in $(seq 50); do
+  [ -e /proc/$(cat process) ] || exit 0
+  grep -q '^State:.Z' /proc/$(cat process)/status && exit 0
+  sleep 0.1
+done
+exit 1
+)";
+  const Variable process("TETWARP_TEST_READ_PROCESS", (scratch / "process").string());
+  return run_program(scratch.path(), "/bin/sh", "script " + signal + " '" TETWARP_PROGRAM "'");
+}
+
+TEST_F(IsolatedRead, EndsWithTheProgramThatIsKilled) {
+  const Scratch scratch;
+  EXPECT_EQ(interrupt_info(scratch, "KILL").status, 0) << "the reader still runs";
+  EXPECT_EQ(read_text(scratch / "status"), "137\n");
+}
+
+TEST_F(IsolatedRead, EndsWithTheProgramThatIsInterrupted) {
+  for (const std::string signal : {"INT", "TERM"}) {
+    const Scratch scratch;
+    const Outcome run = interrupt_info(scratch, signal);
+    EXPECT_EQ(run.status, 0) << "the reader still runs";
+    EXPECT_EQ(read_text(scratch / "status"), "130\n") << run.err;
+    EXPECT_TRUE(says(run.err, {"interrupted"}));
+  }
+}
+
+TEST(IsolatedReadProgram, MissingIsAnErrorThatNamesIt) {
+  const Variable none("TETWARP_READ_PROGRAM", "/none/tetwarp-read");
+  const std::string why = refusal([] { read_isolated("nothing", "FILE", kLimits, "Library"); });
+  EXPECT_TRUE(says(why, {"tetwarp-read", "FILE", "TETWARP_READ_PROGRAM names /none/tetwarp-read"}));
+  EXPECT_EQ(why.find("InputError"), std::string::npos) << "the file is not to blame: " << why;
+}
+
+TEST(IsolatedReadProgram, OneThatCannotBeginIsNoFaultOfTheFile) {
+  for (const auto& [program, word] :
+       {std::pair<std::string, std::string>{"/bin/false", "status 1"}, {"/bin/true", "does not answer"}}) {
+    const Variable named("TETWARP_READ_PROGRAM", program);
+    const std::string why = refusal([] { read_isolated("nothing", "FILE", kLimits, "Library"); });
+    EXPECT_TRUE(says(why, {program, "FILE", word, "before it begins"}));
+    EXPECT_EQ(why.find("InputError"), std::string::npos) << why;
+  }
+  const Scratch scratch;
+  std::ofstream(scratch / "text") << "no program";
+  std::filesystem::permissions(scratch / "text", std::filesystem::perms::owner_all);
+  const Variable named("TETWARP_READ_PROGRAM", (scratch / "text").string());
+  EXPECT_TRUE(says(refusal([] { read_isolated("nothing", "FILE", kLimits, "Library"); }),
+                   {(scratch / "text").string(), "cannot be started"}));
+  EXPECT_TRUE(has_no_child());
 }
 
 }  // namespace

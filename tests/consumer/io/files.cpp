@@ -1,4 +1,5 @@
-// Writes a volume and reads it back; reads a transform, for which tetwarp::io loads a module.
+// Writes a volume and reads it back; reads a transform, for which tetwarp::io loads a module, and one of HDF5, for
+// which the module starts tetwarp-read.
 #include <algorithm>
 #include <cstdio>
 #include <fstream>
@@ -24,5 +25,7 @@ int main(int, char** arguments) {
                                          "Parameters: 1 2 3\nFixedParameters:\n";
   const glm::dvec3 shift = read_transform_file(folder / "shift.tfm").displacement({5, 5, 5});
   std::printf("a transform shifts by %g %g %g, expected 1 2 3\n", shift.x, shift.y, shift.z);
-  return wrong == 0 && shift == glm::dvec3{1, 2, 3} ? 0 : 1;
+  const TransformFile hdf5 = read_transform_file(arguments[2]);
+  std::printf("HDF5 has %zu transforms, expected 2\n", hdf5.classes.size());
+  return wrong == 0 && shift == glm::dvec3{1, 2, 3} && hdf5.classes.size() == 2 ? 0 : 1;
 }

@@ -1,0 +1,86 @@
+#pragma once
+
+// Private to Tetwarp: programs that run beside this one. Names nothing of ITK, and is compiled into whoever starts one.
+#include <sys/types.h>
+
+#include <filesystem>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace tetwarp {
+
+/// A file descriptor, closed at the end. Programs that are started do not inherit it.
+class Descriptor {
+ public:
+  Descriptor() = default;
+  explicit Descriptor(int number) : number_(number) {}
+  ~Descriptor() { close(); }
+  Descriptor(Descriptor&& other) noexcept : number_(other.release()) {}
+  Descriptor& operator=(Descriptor&& other) noexcept {
+    if (this != &other) {
+      close();
+      number_ = other.release();
+    }
+    return *this;
+  }
+
+  int number() const { return number_; }
+  void close();
+
+ private:
+  int release() {
+    const int number = number_;
+    number_ = -1;
+    return number;
+  }
+
+  int number_ = -1;
+};
+
+struct Pipe {
+  Descriptor read, write;
+};
+
+/// @throws Error where the system gives none
+Pipe make_pipe();
+
+/// What a program finds open when it starts: its descriptors 0 to 3 are copies of these, and it has no others.
+/// -1: /dev/null, but for `further`, which there is not then.
+struct ChildStreams {
+  int in = -1;
+  int out = -1;
+  int error = -1;
+  int further = -1;
+};
+
+/// A program that runs beside this one. It is started without a copy of this process, which may have other threads that
+/// hold locks or a device; it gets every signal, and does with each what it does by default.
+///
+/// It leads a process group of its own: Ctrl-C at the terminal reaches this program alone, which decides, and a script
+/// ends together with what it started.
+class ChildProcess {
+ public:
+  /// @throws Error naming the program and the system's reason where it cannot be started
+  ChildProcess(const std::filesystem::path& program, std::vector<std::string> arguments, const ChildStreams& streams);
+  /// Ends the program where it still runs.
+  ~ChildProcess();
+  ChildProcess(const ChildProcess&) = delete;
+  ChildProcess& operator=(const ChildProcess&) = delete;
+
+  /// Ends it and its process group at once. May be called by another thread, while one waits too; a program that has
+  /// been waited for is left alone.
+  void kill();
+
+  /// Waits for its end. @return the status by waitpid; nothing where this process lets its children go (SIGCHLD is
+  /// ignored), or somebody else asked for the status
+  std::optional<int> wait();
+
+ private:
+  std::mutex mutex_;  ///< of waited_: a process id that was waited for may be another's
+  pid_t id_ = -1;
+  bool waited_ = false;
+};
+
+}  // namespace tetwarp

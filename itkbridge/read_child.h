@@ -1,0 +1,24 @@
+#pragma once
+
+// Private to itkbridge/: what tetwarp-read does.
+#include <filesystem>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "itkbridge/transform_record.h"
+
+namespace tetwarp {
+
+/// One of the things that the program can read.
+struct ChildReader {
+  std::string_view kind;
+  std::vector<TransformRecord> (*read)(const std::filesystem::path& path);
+};
+
+/// The main function of the program: confines this process, reads one file by one of the readers, and answers
+/// (isolated_answer.h).
+/// @return the exit status
+int answer_read(int argc, char** argv, std::span<const ChildReader> readers);
+
+}  // namespace tetwarp

@@ -1,0 +1,9 @@
+// The program tetwarp-read: reads a file with a library that damaged files bring down, for the process that starts it
+// (itkbridge/isolated_read.h).
+#include "itkbridge/hdf5_reader.h"
+#include "itkbridge/read_child.h"
+
+int main(int argc, char** argv) {
+  constexpr tetwarp::ChildReader kReaders[] = {{"transform-hdf5", tetwarp::read_hdf5_unconfined}};
+  return tetwarp::answer_read(argc, argv, kReaders);
+}

@@ -1,0 +1,94 @@
+// A tetwarp-read whose readers do what a library may do that reads a damaged file. The file's name says how much, or
+// which signal.
+#include <unistd.h>
+
+#include <bit>
+#include <csignal>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <numeric>
+#include <string>
+
+#include "deform/errors.h"
+#include "itkbridge/read_child.h"
+
+namespace {
+
+using tetwarp::InputError;
+using Records = std::vector<tetwarp::TransformRecord>;
+using Path = std::filesystem::path;
+
+Records nothing(const Path&) { return {}; }
+
+Records ramp(const Path& count) {
+  tetwarp::TransformRecord record{"BSplineTransform_double_3_3", {1, -0.0, 3}, std::vector<double>(std::stoul(count))};
+  std::iota(record.parameters.begin(), record.parameters.end(), 0.5);
+  return {{"CompositeTransform_double_3_3", {}, {}}, record};
+}
+
+Records refusal(const Path& file) { throw InputError("7 values, " + file.string() + "; expected 8"); }
+Records other_exception(const Path&) { throw 3; }
+Records leaves(const Path&) { ::_exit(0); }
+
+Records signalled(const Path& signal) {
+  ::raise(std::stoi(signal));
+  return {};
+}
+
+Records busy(const Path&) {
+  for (volatile bool forever = true; forever;) continue;
+  return {};
+}
+
+/// Says which process it is, to whoever wants to know, and waits for ever.
+Records idle(const Path&) {
+  if (const char* file = std::getenv("TETWARP_TEST_READ_PROCESS")) std::ofstream(file) << ::getpid();
+  for (;;) ::pause();
+}
+
+Records noise(const Path&) {
+  std::fprintf(stderr, "noise\n");
+  std::printf("noise\n");
+  std::fflush(stdout);
+  return {};
+}
+
+/// The descriptors that are open, each with what it is.
+Records descriptors(const Path&) {
+  Records records;
+  for (int number = 0; number < 1024; ++number) {
+    std::error_code closed;
+    const Path link = "/proc/self/fd/" + std::to_string(number);
+    const std::string what = std::filesystem::read_symlink(link, closed).string();
+    if (!closed) records.push_back({what, {static_cast<double>(number)}, {}});
+  }
+  return records;
+}
+
+/// How many signals are blocked, and how many are ignored. 32 and 33 are the C library's own, which it ignores in every
+/// program that it starts.
+Records signals(const Path&) {
+  Records records;
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    if (!line.starts_with("SigBlk:") && !line.starts_with("SigIgn:")) continue;
+    const std::uint64_t own = std::uint64_t{3} << 31, found = std::stoull(line.substr(7), nullptr, 16) & ~own;
+    records.push_back({line, {static_cast<double>(std::popcount(found))}, {}});
+  }
+  return records;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  constexpr tetwarp::ChildReader kReaders[] = {{"nothing", nothing}, {"ramp", ramp},
+                                               {"refusal", refusal}, {"other-exception", other_exception},
+                                               {"leaves", leaves},   {"signalled", signalled},
+                                               {"busy", busy},       {"idle", idle},
+                                               {"noise", noise},     {"descriptors", descriptors},
+                                               {"signals", signals}, {"transform-hdf5", idle}};
+  return tetwarp::answer_read(argc, argv, kReaders);
+}
