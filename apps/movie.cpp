@@ -1,48 +1,31 @@
 #include "apps/movie.h"
 
-#include <fcntl.h>
-#include <spawn.h>
-#include <stdlib.h>
+#include <pthread.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
+#include <functional>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include "deform/errors.h"
+#include "itkbridge/child_process.h"
 
 namespace tetwarp::apps {
 
 namespace {
 
 namespace fs = std::filesystem;
-
-/// A folder of our own that is gone when this object is.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::error_code error;
-    const fs::path parent = fs::temp_directory_path(error);
-    std::string name = ((error ? fs::path("/tmp") : parent) / "tetwarp-film-XXXXXX").string();
-    if (!::mkdtemp(name.data())) throw Error("no temporary folder, " + name + ": " + std::strerror(errno));
-    path_ = name;
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 /// The program on PATH; empty: not there.
 fs::path find_program(const std::string& name) {
@@ -55,40 +38,15 @@ fs::path find_program(const std::string& name) {
   return {};
 }
 
-/// Runs a program, what it says into a file. @return its exit status; -1 where it could not be begun or was killed
-int run(const fs::path& program, std::vector<std::string> arguments, const fs::path& log) {
-  arguments.insert(arguments.begin(), program.string());
-  std::vector<char*> argv;
-  for (std::string& argument : arguments) argv.push_back(argument.data());
-  argv.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
-  posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
-  pid_t child = 0;
-  const int error = ::posix_spawn(&child, program.c_str(), &actions, nullptr, argv.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  int status = 0;
-  if (error != 0 || ::waitpid(child, &status, 0) != child || !WIFEXITED(status)) return -1;
-  return WEXITSTATUS(status);
-}
-
-std::string last_line(const fs::path& path) {
-  std::ifstream file(path);
-  std::string last;
-  for (std::string line; std::getline(file, line);) {
-    if (!line.empty()) last = line;
-  }
-  return last;
-}
-
-/// The same pictures give the same bytes: one thread, no times, no name of the encoder.
-std::vector<std::string> arguments_for(const fs::path& pictures, const fs::path& target, bool gif, double rate) {
+/// Raw pictures on the standard input, a film in `target`. The same pictures give the same bytes: one thread, no times,
+/// no name of the encoder.
+std::vector<std::string> arguments_for(const Picture& first, const fs::path& target, bool gif, double rate) {
+  const std::string size = std::to_string(first.width()) + "x" + std::to_string(first.height());
   char frames[32];
   std::snprintf(frames, sizeof frames, "%.6g", rate);
-  std::vector<std::string> arguments = {"-y",         "-nostdin", "-loglevel", "error",
-                                        "-framerate", frames,     "-i",        (pictures / "%06d.png").string()};
+  std::vector<std::string> arguments = {"-y",         "-nostdin",      "-loglevel", "error",       "-f",
+                                        "rawvideo",   "-pixel_format", "rgb24",     "-video_size", size,
+                                        "-framerate", frames,          "-i",        "pipe:0"};
   const std::vector<std::string> form =
       gif ? std::vector<std::string>{"-filter_complex", "split[a][b];[a]palettegen[p];[b][p]paletteuse", "-f", "gif"}
           : std::vector<std::string>{"-vf",       "pad=ceil(iw/2)*2:ceil(ih/2)*2",
@@ -100,9 +58,98 @@ std::vector<std::string> arguments_for(const fs::path& pictures, const fs::path&
   arguments.insert(arguments.end(), form.begin(), form.end());
   for (const char* argument : {"-threads", "1", "-fflags", "+bitexact", "-flags:v", "+bitexact", "-map_metadata", "-1"})
     arguments.emplace_back(argument);
-  arguments.push_back(target.string());
+  arguments.push_back("file:" + target.string());
   return arguments;
 }
+
+/// A file without a name, in memory.
+Descriptor make_log() {
+  Descriptor log(::memfd_create("tetwarp-film-log", MFD_CLOEXEC));
+  if (log.number() < 0) throw Error(std::string("no memory for what ffmpeg says: ") + std::strerror(errno));
+  return log;
+}
+
+/// The last line of the last kilobyte.
+std::string last_line(const Descriptor& log) {
+  struct stat state {};
+  ::fstat(log.number(), &state);
+  std::string text(1024, '\0');
+  const ssize_t read = ::pread(log.number(), text.data(), text.size(), std::max<off_t>(0, state.st_size - 1024));
+  text.resize(static_cast<std::size_t>(std::max<ssize_t>(0, read)));
+  text.erase(text.find_last_not_of(" \r\n") + 1);
+  return text.substr(text.find_last_of("\r\n") + 1);
+}
+
+/// Writes to a pipe. @return false where nobody reads it any more; the signal for that, which would end this program,
+/// does not arrive
+bool write_all(const Descriptor& pipe, const std::uint8_t* bytes, std::size_t size) {
+  sigset_t signal, before, pending;
+  sigemptyset(&signal);
+  sigaddset(&signal, SIGPIPE);
+  pthread_sigmask(SIG_BLOCK, &signal, &before);
+  sigpending(&pending);
+  bool broken = false;
+  while (size > 0) {
+    const ssize_t count = ::write(pipe.number(), bytes, size);
+    if (count < 0 && errno == EINTR) continue;
+    broken = count < 0;
+    if (broken) break;
+    bytes += count;
+    size -= static_cast<std::size_t>(count);
+  }
+  if (broken && !sigismember(&pending, SIGPIPE)) {
+    const timespec now{};
+    while (::sigtimedwait(&signal, nullptr, &now) < 0 && errno == EINTR) continue;
+  }
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  return !broken;
+}
+
+/// ffmpeg at work. It ends with this object, whatever it is doing; it ends by itself, too, where this program is
+/// killed: its pictures end then.
+class Encoder {
+ public:
+  Encoder(const Picture& first, const fs::path& target, const fs::path& name, double rate, const std::stop_token& stop)
+      : Encoder(make_pipe(), make_log(), first, target, name, rate, stop) {}
+
+  void add(const Picture& picture) {
+    const std::size_t bytes =
+        3 * static_cast<std::size_t>(picture.width()) * static_cast<std::size_t>(picture.height());
+    if (!write_all(pictures_, picture.data(), bytes)) finish(false);
+  }
+  void finish() { finish(true); }
+
+ private:
+  Encoder(Pipe pipe, Descriptor log, const Picture& first, const fs::path& target, const fs::path& name, double rate,
+          const std::stop_token& stop)
+      : name_(name),
+        log_(std::move(log)),
+        pictures_(std::move(pipe.write)),
+        stop_(stop),
+        program_(find_program("ffmpeg"), arguments_for(first, target, name.extension() == ".gif", rate),
+                 {.in = pipe.read.number(), .out = log_.number(), .error = log_.number()}),
+        at_once_(stop, [this] { program_.kill(); }) {}
+
+  /// Waits for the end. @param complete  whether it has all pictures
+  void finish(bool complete) {
+    pictures_.close();
+    const std::optional<int> status = program_.wait();
+    if (stop_.stop_requested()) throw Cancelled();
+    const bool good = status && WIFEXITED(*status) && WEXITSTATUS(*status) == 0;
+    if (good && complete) return;
+    std::string why = last_line(log_);
+    if (status && WIFSIGNALED(*status))
+      why = std::string("it was ended by a signal, ") + ::strsignal(WTERMSIG(*status));
+    if (why.empty()) why = good ? "it ends before it has all pictures" : "it says nothing";
+    throw Error("ffmpeg failed, " + name_.string() + ": " + why);
+  }
+
+  fs::path name_;
+  Descriptor log_, pictures_;
+  std::stop_token stop_;
+  ChildProcess program_;
+  std::stop_callback<std::function<void()>> at_once_;
+};
 
 }  // namespace
 
@@ -116,20 +163,15 @@ void require_movie_encoder(const fs::path& output) {
 }
 
 void write_movie(const fs::path& target, const fs::path& name, std::size_t pictures, double rate,
-                 const std::function<Picture(std::size_t)>& picture) {
-  const TemporaryFolder folder;
-  for (std::size_t n = 0; n < pictures; ++n) {
-    char number[32];
-    std::snprintf(number, sizeof number, "%06zu.png", n);
-    write_png(folder.path() / number, picture(n));
-  }
-  const fs::path log = folder.path() / "log", made = folder.path() / "film";
-  const int status =
-      run(find_program("ffmpeg"), arguments_for(folder.path(), made, name.extension() == ".gif", rate), log);
-  if (status != 0) throw Error("ffmpeg failed, " + name.string() + ": " + last_line(log));
+                 const std::function<Picture(std::size_t)>& picture, const std::stop_token& stop) {
+  const Picture first = picture(0);
+  Encoder encoder(first, target, name, rate, stop);
+  encoder.add(first);
+  for (std::size_t n = 1; n < pictures; ++n) encoder.add(picture(n));
+  encoder.finish();
   std::error_code error;
-  fs::copy_file(made, target, fs::copy_options::overwrite_existing, error);
-  if (error) throw Error("cannot be written, " + name.string() + ": " + error.message());
+  if (const auto bytes = fs::file_size(target, error); error || bytes == 0)
+    throw Error("ffmpeg failed, " + name.string() + ": it wrote no film");
 }
 
 }  // namespace tetwarp::apps

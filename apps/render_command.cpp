@@ -279,7 +279,8 @@ void Rendering::run() {
     return number == 0 ? first : picture(number);
   };
   outputs_.write([&] {
-    if (is_movie(options_.output)) return write_movie(staged_[0], options_.output, pictures(), options_.rate, next);
+    if (is_movie(options_.output))
+      return write_movie(staged_[0], options_.output, pictures(), options_.rate, next, control.stop);
     for (std::size_t n = 0; n < pictures(); ++n) write_png(staged_[n], next(n));
   });
   outputs_.commit();
