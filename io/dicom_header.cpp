@@ -98,7 +98,8 @@ PixelFormat pixel_format_of(DcmItem& data) {
   pixels.bits_allocated = word_of(data, DCM_BitsAllocated).value_or(0);
   pixels.bits_stored = word_of(data, DCM_BitsStored).value_or(pixels.bits_allocated);
   pixels.high_bit = word_of(data, DCM_HighBit).value_or(pixels.bits_stored - 1);
-  pixels.is_signed = word_of(data, DCM_PixelRepresentation).value_or(0) == 1;
+  pixels.sign_word = word_of(data, DCM_PixelRepresentation);
+  pixels.is_signed = pixels.sign_word == 1;
   pixels.photometric = text_of(data, DCM_PhotometricInterpretation);
   if (!text_of(data, DCM_NumberOfFrames).empty()) pixels.frames = integer_of(data, DCM_NumberOfFrames).value_or(-1);
   pixels.slope = decimal_of(data, DCM_RescaleSlope);

@@ -22,6 +22,7 @@ struct PixelFormat {
   int frames = 1;                          ///< in the file; -1: not a number
   int bits_allocated = 0, bits_stored = 0, high_bit = 0;
   bool is_signed = false;
+  std::optional<int> sign_word = 0;  ///< Pixel Representation as read, from which `is_signed` was made; none: missing
   std::string photometric;
   std::optional<double> slope, intercept;
   std::string rescale_type;
@@ -119,8 +120,7 @@ std::optional<StoredRange> stored_padding(const PixelFormat& pixels);
 /// slope * stored + intercept, not rounded.
 double hu_of(const PixelFormat& pixels, int stored);
 
-/// The stored value in a word of Pixel Data: the Bits Stored below High Bit, with the sign of Pixel Representation.
-/// What other bits hold (overlays, garbage) is no part of it.
+/// The stored value in a word of Pixel Data: see StoredBits.
 int stored_value(const PixelFormat& pixels, unsigned word);
 
 /// Bytes of one frame, uncompressed.

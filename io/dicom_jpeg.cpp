@@ -9,6 +9,7 @@
 #include <array>
 
 #include "io/dicom_codecs.h"
+#include "io/dicom_samples.h"
 #include "io/jpeg_scan.h"
 
 namespace tetwarp {
@@ -35,10 +36,8 @@ JpegFrame checked_frame(Bytes bytes, const DicomFileHeader& header) {
                               " x " + std::to_string(frame.columns));
   }
   if (frame.components != 1) refuse_pixels(header, "expected 1 component, found " + std::to_string(frame.components));
-  if (frame.precision < 1 || frame.precision > 16 || (frame.precision > 8 ? 16 : 8) != pixels.bits_allocated) {
-    refuse_pixels(header, "expected " + std::to_string(pixels.bits_allocated) + " bits a pixel, found " +
-                              std::to_string(frame.precision));
-  }
+  const std::string problem = sample_problem(pixels, {frame.precision});
+  if (!problem.empty()) refuse_pixels(header, problem);
   if (count_of_marker(bytes, kEnd) == 0) {
     refuse_pixels(header, "expected an end of image marker within " + std::to_string(bytes.size()) +
                               " bytes, found none: the data are truncated");
@@ -49,15 +48,31 @@ JpegFrame checked_frame(Bytes bytes, const DicomFileHeader& header) {
   return frame;
 }
 
-/// Bytes as they were decoded, one or two a pixel.
-std::vector<std::uint16_t> words_of(std::vector<std::uint16_t> packed, const PixelFormat& pixels) {
-  if (pixels.bits_allocated == 16) return packed;
-  const auto* bytes = reinterpret_cast<const std::uint8_t*>(packed.data());
-  return {bytes, bytes + slice_bytes(pixels)};
-}
+std::size_t count_of(const JpegFrame& frame) { return std::size_t(frame.rows) * std::size_t(frame.columns); }
 
-std::vector<std::uint16_t> packed_room(const PixelFormat& pixels) {
-  return std::vector<std::uint16_t>((slice_bytes(pixels) + 1) / 2);
+/// Samples as DCMTK decodes them: bytes up to a precision of 8, words above, whatever Bits Allocated says.
+class Packed {
+ public:
+  explicit Packed(const JpegFrame& frame)
+      : count_(count_of(frame)), are_bytes_(frame.precision <= 8), room_(are_bytes_ ? (count_ + 1) / 2 : count_) {}
+
+  Uint8* data() { return reinterpret_cast<Uint8*>(room_.data()); }
+  Uint32 bytes() const { return static_cast<Uint32>(2 * room_.size()); }
+  std::vector<std::uint16_t> samples() && {
+    if (!are_bytes_) return std::move(room_);
+    return {data(), data() + count_};
+  }
+
+ private:
+  std::size_t count_;
+  bool are_bytes_;
+  std::vector<std::uint16_t> room_;
+};
+
+std::vector<std::uint16_t> words_of(std::vector<std::uint16_t> samples, const JpegFrame& frame,
+                                    const PixelFormat& pixels) {
+  std::transform(samples.begin(), samples.end(), samples.begin(), SampleWords(pixels, {frame.precision}));
+  return samples;
 }
 
 const DJCodecParameter& parameter() {
@@ -79,13 +94,12 @@ class StrictDecoder final : public Decoder {
 };
 
 template <class Decoder>
-void decode_strictly(Bytes bytes, const DicomFileHeader& header, std::vector<std::uint16_t>& packed) {
+void decode_strictly(Bytes bytes, const DicomFileHeader& header, Packed& packed) {
   StrictDecoder<Decoder> decoder;
   OFCondition result = decoder.init();
   if (result.good()) {
-    result = decoder.decode(const_cast<Uint8*>(bytes.data()), static_cast<Uint32>(bytes.size()),
-                            reinterpret_cast<Uint8*>(packed.data()), static_cast<Uint32>(2 * packed.size()),
-                            header.pixels.is_signed);
+    result = decoder.decode(const_cast<Uint8*>(bytes.data()), static_cast<Uint32>(bytes.size()), packed.data(),
+                            packed.bytes(), header.pixels.is_signed);
   }
   if (result.bad()) refuse_pixels(header, result.text());
   if (decoder.damages() > 0) {
@@ -104,32 +118,32 @@ std::vector<std::uint16_t> decode_jpeg(Bytes bytes, const DicomFileHeader& heade
     std::string problem;
     const JpegScan scan = read_jpeg_scan(bytes, problem);
     const bool is_lossless = frame.marker == kLossless;
-    std::vector<std::uint16_t> words(is_lossless ? std::size_t(frame.rows) * std::size_t(frame.columns) : 0);
+    std::vector<std::uint16_t> samples(is_lossless ? count_of(frame) : 0);
     if (problem.empty())
-      problem = is_lossless ? decode_lossless(scan, header.pixels.is_signed, words) : sequential_problem(scan);
+      problem = is_lossless ? decode_lossless(scan, header.pixels.is_signed, samples) : sequential_problem(scan);
     if (!problem.empty()) refuse_pixels(header, problem);
-    if (is_lossless) return words;
+    if (is_lossless) return words_of(std::move(samples), frame, header.pixels);
   }
-  std::vector<std::uint16_t> packed = packed_room(header.pixels);
+  Packed packed(frame);
   if (frame.precision <= 8) {
     decode_strictly<DJDecompressIJG8Bit>(bytes, header, packed);
   } else {
     decode_strictly<DJDecompressIJG12Bit>(bytes, header, packed);
   }
-  return words_of(std::move(packed), header.pixels);
+  return words_of(std::move(packed).samples(), frame, header.pixels);
 }
 
 // DCMTK's decoder of JPEG-LS has no interface but that of its data sets.
 std::vector<std::uint16_t> decode_jpeg_ls(Bytes bytes, const DicomFileHeader& header) {
-  checked_frame(bytes, header);
-  const PixelFormat& pixels = header.pixels;
+  const JpegFrame frame = checked_frame(bytes, header);
+  Packed packed(frame);
   DcmDataset data;
   const auto put = [&](const DcmTagKey& tag, int value) { data.putAndInsertUint16(tag, static_cast<Uint16>(value)); };
   put(DCM_SamplesPerPixel, 1);
-  put(DCM_Rows, pixels.rows);
-  put(DCM_Columns, pixels.columns);
-  put(DCM_BitsAllocated, pixels.bits_allocated);
-  put(DCM_BitsStored, pixels.bits_stored);
+  put(DCM_Rows, frame.rows);
+  put(DCM_Columns, frame.columns);
+  put(DCM_BitsAllocated, frame.precision <= 8 ? 8 : 16);
+  put(DCM_BitsStored, frame.precision);
   data.putAndInsertString(DCM_PhotometricInterpretation, "MONOCHROME2");
   auto* sequence = new DcmPixelSequence(DCM_PixelSequenceTag);
   sequence->insert(new DcmPixelItem(DCM_PixelItemTag));  // no offset table
@@ -140,13 +154,12 @@ std::vector<std::uint16_t> decode_jpeg_ls(Bytes bytes, const DicomFileHeader& he
   element->putOriginalRepresentation(EXS_JPEGLSLossless, nullptr, sequence);
   data.insert(element);
 
-  std::vector<std::uint16_t> packed = packed_room(pixels);
   Uint32 fragment = 0;
   OFString color_model;
-  const OFCondition result = element->getUncompressedFrame(&data, 0, fragment, packed.data(),
-                                                           static_cast<Uint32>(2 * packed.size()), color_model);
+  const OFCondition result =
+      element->getUncompressedFrame(&data, 0, fragment, packed.data(), packed.bytes(), color_model);
   if (result.bad()) refuse_pixels(header, result.text());
-  return words_of(std::move(packed), pixels);
+  return words_of(std::move(packed).samples(), frame, header.pixels);
 }
 
 }  // namespace tetwarp

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "io/dicom_codecs.h"
+#include "io/dicom_samples.h"
 #include "io/jpeg2000_codestream.h"
 
 namespace tetwarp {
@@ -103,6 +104,10 @@ Image decode(Bytes codestream, std::string& complaint) {
   return image;
 }
 
+CodedSamples coded_samples(const Jpeg2000Image& image) {
+  return {image.precision, image.is_signed ? CodedSamples::Sign::extended : CodedSamples::Sign::none};
+}
+
 /// What the codestream says must be what the attributes say; bits that neither mean decide nothing.
 void check(const Jpeg2000Image& image, const DicomFileHeader& header) {
   const PixelFormat& pixels = header.pixels;
@@ -111,18 +116,8 @@ void check(const Jpeg2000Image& image, const DicomFileHeader& header) {
                               " x " + std::to_string(image.columns));
   }
   if (image.components != 1) refuse_pixels(header, "expected 1 component, found " + std::to_string(image.components));
-  if (image.precision > pixels.bits_allocated) {
-    refuse_pixels(header, "expected at most " + std::to_string(pixels.bits_allocated) + " bits a pixel, found " +
-                              std::to_string(image.precision));
-  }
-  // Where they differ, the bits as they are are the stored value if there are just as many: some encoders take
-  // two's complement for numbers without a sign.
-  if (image.is_signed != pixels.is_signed && image.precision != pixels.bits_stored) {
-    refuse_pixels(header, std::string("expected ") + (pixels.is_signed ? "signed" : "unsigned") + " samples, found " +
-                              (image.is_signed ? "signed" : "unsigned") + " ones of " +
-                              std::to_string(image.precision) + " bits for " + std::to_string(pixels.bits_stored) +
-                              " Bits Stored");
-  }
+  const std::string problem = sample_problem(pixels, coded_samples(image));
+  if (!problem.empty()) refuse_pixels(header, problem);
 }
 
 }  // namespace
@@ -143,7 +138,7 @@ std::vector<std::uint16_t> decode_jpeg_2000(Bytes frame, const DicomFileHeader& 
   const std::size_t count = std::size_t{expected.columns} * expected.rows;
   std::vector<std::uint16_t> words(count);
   std::transform(samples->data, samples->data + count, words.begin(),
-                 [](OPJ_INT32 sample) { return static_cast<std::uint16_t>(sample); });
+                 SampleWords(header.pixels, coded_samples(expected)));
   return words;
 }
 

@@ -7,6 +7,7 @@
 #include "io/dicom_codecs.h"
 #include "io/dicom_enhanced.h"
 #include "io/dicom_header.h"
+#include "io/dicom_samples.h"
 #include "io/dicom_text.h"
 #include "io/shown_text.h"
 
@@ -78,12 +79,11 @@ std::string layout_problem(const DicomFileHeader& header) {
   if (pixels.bits_allocated != 8 && pixels.bits_allocated != 16) {
     return found("Bits Allocated (0028,0100)", "8 or 16", std::to_string(pixels.bits_allocated));
   }
-  if (pixels.bits_stored < 1 || pixels.bits_stored > pixels.bits_allocated) {
-    return found("Bits Stored (0028,0101)", "1 to " + std::to_string(pixels.bits_allocated),
-                 std::to_string(pixels.bits_stored));
-  }
-  if (pixels.high_bit < pixels.bits_stored - 1 || pixels.high_bit >= pixels.bits_allocated) {
-    return found("High Bit (0028,0102)", std::to_string(pixels.bits_stored - 1), std::to_string(pixels.high_bit));
+  const std::string problem = stored_bits_problem(pixels.bits_allocated, pixels.bits_stored, pixels.high_bit);
+  if (!problem.empty()) return problem + where(header) + "; convert the file first";
+  if (pixels.sign_word != 0 && pixels.sign_word != 1) {
+    return found("Pixel Representation (0028,0103)", "0 or 1",
+                 pixels.sign_word ? std::to_string(*pixels.sign_word) : "none");
   }
   return {};
 }
@@ -199,10 +199,7 @@ std::uint64_t slice_bytes(const PixelFormat& pixels) {
 }
 
 int stored_value(const PixelFormat& pixels, unsigned word) {
-  const unsigned mask = (1u << pixels.bits_stored) - 1;
-  const unsigned value = (word >> (pixels.high_bit + 1 - pixels.bits_stored)) & mask;
-  const bool negative = pixels.is_signed && (value >> (pixels.bits_stored - 1)) != 0;
-  return static_cast<int>(value) - (negative ? 1 << pixels.bits_stored : 0);
+  return static_cast<int>(StoredBits(pixels.bits_stored, pixels.high_bit, pixels.is_signed).value(word));
 }
 
 double hu_of(const PixelFormat& pixels, int stored) { return *pixels.slope * stored + *pixels.intercept; }

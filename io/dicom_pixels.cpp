@@ -136,12 +136,9 @@ std::vector<std::uint16_t> decode_slice(const ParsedSlice& slice) {
 
 std::shared_ptr<const HuTable> make_hu_table(const PixelFormat& format) {
   auto table = std::make_shared<HuTable>();
-  const std::size_t words = std::size_t{1} << format.bits_allocated;
   table->format = format;
-  table->hu.resize(words);
-  table->kind.resize(words);
   const auto padding = stored_padding(format);
-  for (std::size_t word = 0; word < words; ++word) {
+  for (std::size_t word = 0; word < HuTable::kWords; ++word) {
     const int stored = stored_value(format, static_cast<unsigned>(word));
     const double exact_hu = hu_of(format, stored), whole_hu = std::nearbyint(exact_hu);
     const double fitting = std::clamp(whole_hu, -32768.0, 32767.0);
@@ -151,8 +148,7 @@ std::shared_ptr<const HuTable> make_hu_table(const PixelFormat& format) {
     if (fitting != whole_hu) table->kind[word] |= is_padding ? HuTable::saturated_padding : HuTable::beyond;
   }
   const double intercept = *format.intercept;
-  if (format.bits_allocated == 16 && *format.slope == 1 && intercept == std::nearbyint(intercept) &&
-      std::abs(intercept) <= 65536) {
+  if (*format.slope == 1 && intercept == std::nearbyint(intercept) && std::abs(intercept) <= 65536) {
     table->offset = static_cast<int>(intercept);
   }
   return table;
@@ -166,6 +162,9 @@ std::shared_ptr<const HuTable> HuTableCache::table_for(const PixelFormat& format
 
 HuCount convert_to_hu(std::span<const std::byte> words, const HuTable& table, const std::string& slice,
                       std::span<std::int16_t> hu) {
+  require(words.size() == 2 * hu.size(), "pixels and voxels differ in number, " + slice + ": expected " +
+                                             std::to_string(2 * hu.size()) + " bytes, found " +
+                                             std::to_string(words.size()) + "; copy or export the file again");
   HuCount count;
   std::array<std::uint16_t, 4096> aligned;
   for (std::size_t begin = 0; begin < hu.size(); begin += aligned.size()) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -26,13 +27,15 @@ std::vector<std::uint16_t> decode_frame(std::span<const std::span<const std::byt
 /// The same of a slice that was parsed and whose pixels are not native: its fragments, or what its data set holds.
 std::vector<std::uint16_t> decode_slice(const ParsedSlice& slice);
 
-/// Words of Pixel Data to HU. Built once for slices of the same format.
+/// Words of Pixel Data to HU. Built once for slices of the same format. Every word of 16 bits has an entry, whatever
+/// Bits Allocated says, so that nothing that a decoder gives lies outside.
 struct HuTable {
   enum Kind : std::uint8_t { exact = 0, rounded = 1, beyond = 2, saturated_padding = 4 };
+  static constexpr std::size_t kWords = std::size_t{UINT16_MAX} + 1;
   PixelFormat format;
-  std::vector<std::int16_t> hu;    ///< per word
-  std::vector<std::uint8_t> kind;  ///< per word; `beyond`: HU does not fit int16
-  std::optional<int> offset;       ///< HU less the stored value, where slope and intercept add a whole number only
+  std::array<std::int16_t, kWords> hu{};
+  std::array<std::uint8_t, kWords> kind{};  ///< `beyond`: HU does not fit int16
+  std::optional<int> offset;  ///< HU less the stored value, where slope and intercept add a whole number only
 };
 std::shared_ptr<const HuTable> make_hu_table(const PixelFormat& format);
 
@@ -50,6 +53,7 @@ struct HuCount {
   std::uint64_t rounded = 0;            ///< pixels with a fractional HU
   std::uint64_t saturated_padding = 0;  ///< pixels of padding whose HU does not fit int16
 };
+/// @param words  as many as there are `hu`
 /// @param slice  its name
 /// @throws InputError naming the slice for a pixel whose HU does not fit int16
 HuCount convert_to_hu(std::span<const std::uint16_t> words, const HuTable& table, const std::string& slice,

@@ -2,14 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include <numeric>
+
 #include "deform/errors.h"
 
 namespace tetwarp {
 namespace {
 
-PixelFormat format(int bits_stored, int high_bit, bool is_signed, double intercept) {
+PixelFormat format(int bits_stored, int high_bit, bool is_signed, double intercept, int bits_allocated = 16) {
   PixelFormat format;
-  format.bits_allocated = 16;
+  format.bits_allocated = bits_allocated;
   format.bits_stored = bits_stored;
   format.high_bit = high_bit;
   format.is_signed = is_signed;
@@ -54,6 +56,33 @@ TEST(Hu, IsTheStoredValueAndTheInterceptForEveryWord) {
       }
     }
   }
+}
+
+TEST(Hu, OfEightBitsIsKnownForEveryWordThatADecoderMayGive) {
+  for (const auto& [bits_stored, high_bit] : {std::pair{8, 7}, {7, 6}, {1, 0}, {4, 7}, {5, 5}}) {
+    for (const bool is_signed : {false, true}) {
+      for (const double slope : {1.0, 2.0}) {  // by an offset, and by the table
+        PixelFormat stored = format(bits_stored, high_bit, is_signed, 3, 8);
+        stored.slope = slope;
+        std::vector<std::uint16_t> words(UINT16_MAX + 1);
+        std::iota(words.begin(), words.end(), std::uint16_t{0});
+        std::vector<std::int16_t> found(words.size());
+        convert_to_hu(words, *make_hu_table(stored), "slice", found);
+        for (std::size_t n = 0; n < found.size(); ++n) {
+          ASSERT_EQ(found[n], slope * (expected_hu(stored, words[n]) - 3) + 3)
+              << bits_stored << " bits to " << high_bit << ", word " << words[n];
+        }
+      }
+    }
+  }
+}
+
+TEST(Hu, OfAnotherNumberOfPixelsThanVoxelsIsRefused) {
+  const auto table = make_hu_table(format(12, 11, false, -1024));
+  const std::vector<std::uint16_t> words(5);
+  std::vector<std::int16_t> hu(6);
+  EXPECT_THROW(convert_to_hu(words, *table, "slice", hu), InputError);
+  EXPECT_THROW(convert_to_hu(words, *table, "slice", std::span(hu).first(4)), InputError);
 }
 
 TEST(Hu, WordsMayLieAtAnyAddress) {
