@@ -77,7 +77,7 @@ std::optional<int> integer_of(DcmItem& item, const DcmTagKey& tag) {
   return static_cast<int>(*value);
 }
 
-/// The 16 bits of a US or SS attribute, also where the file gives it another VR of words or bytes.
+/// The 16 bits of a US or SS attribute, also where the file gives it another VR of numbers, words or bytes.
 std::optional<int> word_of(DcmItem& item, const DcmTagKey& tag) {
   DcmElement* element = nullptr;
   Uint16 word = 0;
@@ -87,6 +87,8 @@ std::optional<int> word_of(DcmItem& item, const DcmTagKey& tag) {
   if (element->getSint16(signed_word).good()) return static_cast<Uint16>(signed_word);
   Uint8* bytes = nullptr;
   if (element->getUint8Array(bytes).good() && bytes && element->getLength() >= 2) return bytes[0] | bytes[1] << 8;
+  const auto value = integer_of(item, tag);
+  if (value && *value >= INT16_MIN && *value <= UINT16_MAX) return static_cast<Uint16>(*value);
   return std::nullopt;
 }
 

@@ -207,18 +207,23 @@ TEST_F(EditedSlice, ThirtyTwoBitsAreRefusedByName) {
   EXPECT_TRUE(says(scan.series.at(0).refusal.value_or(""), {"Bits Allocated (0028,0100)", "found 32"}));
 }
 
-/// An attribute of two bytes with whatever VR.
+/// An attribute of two bytes, or of a number of four, with whatever VR.
 void put_word(DcmDataset& data, const DcmTagKey& tag, DcmEVR vr, int value) {
   const auto word = static_cast<Uint16>(value);
   DcmElement* element = nullptr;
   switch (vr) {
     case EVR_US: element = new DcmUnsignedShort(DcmTag(tag, vr)); break;
     case EVR_SS: element = new DcmSignedShort(DcmTag(tag, vr)); break;
+    case EVR_SL: element = new DcmSignedLong(DcmTag(tag, vr)); break;
+    case EVR_UL: element = new DcmUnsignedLong(DcmTag(tag, vr)); break;
+    case EVR_IS: element = new DcmIntegerString(DcmTag(tag, vr)); break;
     default: element = new DcmOtherByteOtherWord(DcmTag(tag, vr)); break;
   }
   if (vr == EVR_SS) {
     const auto number = static_cast<Sint16>(word);
     element->putSint16Array(&number, 1);
+  } else if (vr == EVR_SL || vr == EVR_UL || vr == EVR_IS) {
+    element->putString(std::to_string(vr == EVR_UL ? word : value).c_str());
   } else if (vr == EVR_UN || vr == EVR_OB) {
     const Uint8 bytes[] = {static_cast<Uint8>(word & 255), static_cast<Uint8>(word >> 8)};
     element->putUint8Array(bytes, 2);
@@ -240,7 +245,7 @@ TEST_F(EditedSlice, PaddingIsReadWhateverItsVr) {
                         {true, -1500, -2000, -3024, -2524},
                         {false, 10, 30, -1014, -994},
                         {false, 63000, 63536, 61976, 62512}}) {
-    for (const DcmEVR vr : {EVR_US, EVR_SS, EVR_UN, EVR_OW, EVR_OB}) {
+    for (const DcmEVR vr : {EVR_US, EVR_SS, EVR_UN, EVR_OW, EVR_OB, EVR_SL, EVR_UL, EVR_IS}) {
       SCOPED_TRACE(std::string(DcmVR(vr).getVRName()) + " " + std::to_string(c.value));
       Edit edit{.words = c.is_signed ? real_words_ : words(0, 2000), .is_signed = c.is_signed};
       edit.more = [&](DcmDataset& data) {
