@@ -12,6 +12,7 @@
 #include "io/dicom_along_put.h"
 #include "io/dicom_header.h"
 #include "io/dicom_put.h"
+#include "io/dicom_samples.h"
 #include "io/dicom_stream.h"
 
 namespace tetwarp {
@@ -51,9 +52,7 @@ class DoseFile {
   AnyVolume doses(const Geometry& grid) {
     const double scaling = number(DCM_DoseGridScaling, 0);
     const int bits = static_cast<int>(word(DCM_BitsAllocated));
-    const bool is_signed = word(DCM_PixelRepresentation) == 1;
-    if (bits != 16 && bits != 32)
-      refuse("has Bits Allocated (0028,0100) " + std::to_string(bits) + ", expected 16 or 32");
+    const StoredBits stored_bits = stored_bits_of(bits);
     const auto voxels = static_cast<std::size_t>(voxel_count(grid));
     // Whole words of 16 bits, the low one of a value first, on this machine's order of bytes.
     const Uint16* words = nullptr;
@@ -71,15 +70,10 @@ class DoseFile {
     }
     AnyVolume volume(grid, VoxelType::f32);
     const std::span<float> doses = volume.as<float>();
-    const auto scale = [&](std::size_t n, double stored) { doses[n] = static_cast<float>(stored * scaling); };
     for (std::size_t n = 0; n < voxels; ++n) {
       const std::uint32_t value =
           bits == 16 ? words[n] : words[2 * n] | static_cast<std::uint32_t>(words[2 * n + 1]) << 16;
-      if (!is_signed) {
-        scale(n, value);
-      } else {
-        scale(n, bits == 16 ? static_cast<std::int16_t>(value) : static_cast<std::int32_t>(value));
-      }
+      doses[n] = static_cast<float>(static_cast<double>(stored_bits.value(value)) * scaling);
     }
     return volume;
   }
@@ -87,6 +81,18 @@ class DoseFile {
  private:
   DcmDataset& data() { return *format_.getDataset(); }
   [[noreturn]] void refuse(const std::string& what) const { throw InputError(path_.string() + " " + what); }
+
+  StoredBits stored_bits_of(int allocated) {
+    if (allocated != 16 && allocated != 32)
+      refuse("has Bits Allocated (0028,0100) " + std::to_string(allocated) + ", expected 16 or 32");
+    const std::int64_t samples = word(DCM_SamplesPerPixel), sign = word(DCM_PixelRepresentation);
+    if (samples != 1) refuse("has Samples per Pixel (0028,0002) " + std::to_string(samples) + ", expected 1");
+    if (sign > 1) refuse("has Pixel Representation (0028,0103) " + std::to_string(sign) + ", expected 0 or 1");
+    const int stored = static_cast<int>(word(DCM_BitsStored)), high_bit = static_cast<int>(word(DCM_HighBit));
+    const std::string problem = stored_bits_problem(allocated, stored, high_bit);
+    if (!problem.empty()) refuse("has other bits than a dose can have: " + problem);
+    return {stored, high_bit, sign == 1};
+  }
 
   double number(const DcmTagKey& tag, unsigned long n) {
     double value = 0;

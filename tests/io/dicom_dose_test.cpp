@@ -24,6 +24,27 @@ TEST(Dose, IsStoredValuesTimesTheScalingOnTheGridThatTheHeaderGives) {
   }
 }
 
+TEST(Dose, OnlyTheStoredBitsCountWithTheirSign) {
+  const Scratch scratch;
+  for (const int bits : {16, 32}) {
+    for (const bool is_signed : {false, true}) {
+      MadeDose dose{.bits = bits};
+      dose.stored = [](unsigned n) { return (n * 91 & 0xfff) << 1 | 0xffffe001; };  // 12 bits to bit 12, others set
+      dose.edit = [=](DcmDataset& data) {
+        data.putAndInsertUint16(DCM_BitsStored, 12);
+        data.putAndInsertUint16(DCM_HighBit, 12);
+        data.putAndInsertUint16(DCM_PixelRepresentation, is_signed);
+      };
+      dose.write(scratch / "dose");
+      const AnyVolume read = read_dose(scratch / "dose");
+      for (int n = 0; n < 24; ++n) {
+        const int value = n * 91, stored = is_signed && value > 2047 ? value - 4096 : value;
+        EXPECT_FLOAT_EQ(read.as<float>()[static_cast<std::size_t>(n)], 0.0005F * static_cast<float>(stored)) << n;
+      }
+    }
+  }
+}
+
 TEST(Dose, FramesMayLieAtPatientCoordinatesOrAgainstTheNormal) {
   const Scratch scratch;
   MadeDose{.offsets = "7\\10\\13"}.write(scratch / "absolute");
@@ -56,6 +77,17 @@ TEST(Dose, WhatIsNoEvenGridOrCutShortIsRefused) {
   refused({.offsets = "8\\10\\12"}, "Image Position");
   refused({.position = "1\\2"}, "ImagePositionPatient");
   refused({.missing_words = 2}, "cut short");
+  const auto with = [](const DcmTagKey& tag, int value) {
+    MadeDose dose;
+    dose.edit = [=](DcmDataset& data) { data.putAndInsertUint16(tag, static_cast<Uint16>(value)); };
+    return dose;
+  };
+  refused(with(DCM_BitsAllocated, 8), "Bits Allocated (0028,0100) 8, expected 16 or 32");
+  refused(with(DCM_BitsStored, 33), "Bits Stored (0028,0101), expected 1 to 32, found 33");
+  refused(with(DCM_BitsStored, 0), "Bits Stored (0028,0101), expected 1 to 32, found 0");
+  refused(with(DCM_HighBit, 32), "High Bit (0028,0102), expected 31, found 32");
+  refused(with(DCM_PixelRepresentation, 2), "Pixel Representation (0028,0103) 2, expected 0 or 1");
+  refused(with(DCM_SamplesPerPixel, 3), "Samples per Pixel (0028,0002) 3, expected 1");
   refused({.sop_class = UID_CTImageStorage}, "no RT Dose");
   write_file(scratch / "text", "not DICOM");
   EXPECT_FALSE(is_dicom_dose(scratch / "text"));
