@@ -9,6 +9,7 @@
 #include <algorithm>
 
 #include "tests/support/coded_slices.h"
+#include "tests/support/jpeg_writer.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"
 
@@ -35,65 +36,9 @@ Decoded decode(const std::string& stream, bool is_signed = false) {
   return decoded;
 }
 
-/// Frames of one component, coded with one table in which every size has a code of 5 bits: its number.
-class Writer {
- public:
-  Writer(std::uint8_t marker, int rows, int columns, int precision, int restart_interval = 0) {
-    bytes_ = std::string("\xff\xd8", 2);
-    segment(marker, {precision, rows >> 8, rows & 255, columns >> 8, columns & 255, 1, 1, 0x11, 0});
-    std::vector<int> table{0, 0, 0, 0, 0, 17};
-    table.resize(17);
-    for (int size = 0; size <= 16; ++size) table.push_back(size);
-    segment(0xc4, table);
-    table[0] = 0x10;
-    segment(0xc4, table);
-    if (marker != 0xc3) segment(0xdb, std::vector<int>(65, 1));
-    if (marker != 0xc3) bytes_[bytes_.size() - 65] = '\0';  // the number of the table
-    if (restart_interval > 0) segment(0xdd, {restart_interval >> 8, restart_interval & 255});
-  }
-  void scan(int predictor, int transform = 0) {
-    segment(0xda, {1, 1, 0, predictor, predictor > 0 ? 0 : 63, transform});
-  }
-
-  void bits(int value, int count) {
-    for (int n = count - 1; n >= 0; --n) {
-      byte_ = byte_ << 1 | (value >> n & 1);
-      if (++filled_ < 8) continue;
-      bytes_ += static_cast<char>(byte_);
-      if (byte_ == 0xff) bytes_ += '\0';
-      byte_ = filled_ = 0;
-    }
-  }
-  void difference(int value) {
-    int size = 0;
-    for (int rest = std::abs(value); rest > 0; rest >>= 1) ++size;
-    bits(size, 5);
-    if (size < 16) bits(value < 0 ? value + (1 << size) - 1 : value, size);
-  }
-  /// Fills the last byte and writes a marker.
-  void marker(int code, int fill = 1) {
-    while (filled_ != 0) bits(fill, 1);
-    bytes_ += '\xff';
-    bytes_ += static_cast<char>(code);
-  }
-  std::string bytes() const { return bytes_; }
-
- private:
-  void segment(int code, const std::vector<int>& content) {
-    bytes_ += '\xff';
-    bytes_ += static_cast<char>(code);
-    bytes_ += '\0';
-    bytes_ += static_cast<char>(content.size() + 2);
-    bytes_.append(content.begin(), content.end());
-  }
-
-  std::string bytes_;
-  int byte_ = 0, filled_ = 0;
-};
-
 /// 3 rows of 4 samples, each 10 more than the one before; rows begin anew after a restart.
 std::string ramp(int restart_rows, int end_fill = 1, int first_restart = 0) {
-  Writer writer(0xc3, 3, 4, 12, restart_rows * 4);
+  JpegWriter writer(0xc3, 3, 4, 12, restart_rows * 4);
   writer.scan(1);
   for (int j = 0; j < 3; ++j) {
     const bool is_first = j == 0 || (restart_rows > 0 && j % restart_rows == 0);
@@ -116,7 +61,7 @@ TEST(JpegLossless, RestartsBeginAnewFromTheMiddleValue) {
 
 TEST(JpegLossless, RestartsOutOfOrderOrWithinARowAreRefused) {
   EXPECT_TRUE(says(decode(ramp(1, 1, 1)).problem, {"damaged", "in row 2"}));
-  Writer within(0xc3, 3, 4, 12, 6);
+  JpegWriter within(0xc3, 3, 4, 12, 6);
   within.scan(1);
   EXPECT_TRUE(says(decode(within.bytes()).problem, {"whole rows", "6 samples"}));
 }
@@ -128,7 +73,7 @@ TEST(JpegLossless, LastByteIsFilledWithOnes) {
 
 TEST(JpegLossless, SamplesBeyondThePrecisionAreRefusedUnlessTheyAreSigns) {
   const auto stream = [](int first) {
-    Writer writer(0xc3, 1, 1, 12);
+    JpegWriter writer(0xc3, 1, 1, 12);
     writer.scan(1);
     writer.difference(first - 2048);
     writer.marker(0xd9);
@@ -144,7 +89,7 @@ TEST(JpegLossless, SamplesBeyondThePrecisionAreRefusedUnlessTheyAreSigns) {
 }
 
 TEST(JpegLossless, DifferenceOf32768HasNoFurtherBits) {
-  Writer writer(0xc3, 1, 3, 16);
+  JpegWriter writer(0xc3, 1, 3, 16);
   writer.scan(1);
   writer.difference(-32768 + 5);
   writer.bits(16, 5);
@@ -182,7 +127,7 @@ TEST(JpegLossless, EveryPredictorAndShiftGivesBackWhatDcmtkEncoded) {
 
 /// One row of blocks, of which each has `coefficients` after its first.
 std::string blocks(int count, int coefficients, int restart_interval, bool with_end = true) {
-  Writer writer(0xc1, 8, 8 * count, 8, restart_interval);
+  JpegWriter writer(0xc1, 8, 8 * count, 8, restart_interval);
   writer.scan(0);
   for (int n = 0; n < count; ++n) {
     if (restart_interval > 0 && n > 0 && n % restart_interval == 0)
