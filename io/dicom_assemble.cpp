@@ -136,7 +136,9 @@ void warn_of_values(const Headers& files, DicomSeries& series) {
     if (pixels.photometric == "MONOCHROME1")
       warnings.insert("MONOCHROME1: HU are read as they are, only display is inverted");
     if (!is_hounsfield(pixels.rescale_type)) {
-      warnings.insert("Rescale Type is " + shown(pixels.rescale_type) + ": the values may not be HU");
+      warnings.insert("Rescale Type is " +
+                      known_code(pixels.rescale_type, {"OD", "US", "MGML", "Z_EFF", "ED", "EDW", "HU_MOD", "PCT"}) +
+                      ": the values may not be HU");
     }
     const auto stored = stored_padding(pixels);
     if (pixels.padding_word && !stored) {
@@ -212,13 +214,30 @@ DicomSeries judged(SplitVolume& volume, DicomSeries series) {
   return series;
 }
 
-void describe(const DicomFileHeader& header, DicomSeries& series) {
+/// Of the Modality of files that are kept apart, or set aside: one of PS3.3 C.7.3.1.1.1; empty for any other text.
+std::string shown_modality(const std::string& modality) {
+  static const std::set<std::string> kModalities = {
+      "ANN",    "AR",      "ASMT",       "AU",         "BDUS",  "BI",       "BMD",        "CD",       "CF",  "CP",
+      "CR",     "CS",      "CT",         "CTPROTOCOL", "DD",    "DF",       "DG",         "DM",       "DOC", "DS",
+      "DX",     "EC",      "ECG",        "EEG",        "EMG",   "EOG",      "EPS",        "ES",       "FA",  "FID",
+      "FS",     "GM",      "HC",         "HD",         "IO",    "IOL",      "IVOCT",      "IVUS",     "KER", "KO",
+      "LEN",    "LP",      "LS",         "M3D",        "MA",    "MG",       "MR",         "MS",       "NM",  "OAM",
+      "OCT",    "OP",      "OPM",        "OPR",        "OPT",   "OPTBSV",   "OPTENF",     "OPV",      "OSS", "OT",
+      "PA",     "PLAN",    "POS",        "PR",         "PT",    "PX",       "REG",        "RESP",     "RF",  "RG",
+      "RTDOSE", "RTIMAGE", "RTINTENT",   "RTPLAN",     "RTRAD", "RTRECORD", "RTSEGANN",   "RTSTRUCT", "RWV", "SEG",
+      "SM",     "SMR",     "SR",         "SRF",        "ST",    "STAIN",    "TEXTUREMAP", "TG",       "US",  "VA",
+      "VF",     "XA",      "XAPROTOCOL", "XC"};
+  return kModalities.contains(modality) ? modality : "";
+}
+
+void describe(const Headers& files, DicomSeries& series) {
+  const DicomFileHeader& header = files.front();
   series.series_uid = header.series_uid;
   series.study_uid = header.study_uid;
   series.frame_of_reference_uid = header.frame_of_reference_uid;
-  series.modality = header.modality;
+  series.modality = shown_modality(header.modality);
   series.series_number = header.series_number;
-  series.description = shown_description(header);
+  series.description = shown_description(files);
 }
 
 }  // namespace
@@ -228,10 +247,10 @@ std::vector<DicomSeries> assemble_series(Headers files, const std::stop_token& s
     return std::tie(a.instance_number, a.file) < std::tie(b.instance_number, b.file);
   });
   DicomSeries series;
-  describe(files.front(), series);
+  describe(files, series);
   set_other_kinds_aside(files, series);
   if (files.empty()) return {refused(series, files, nothing_left(series))};
-  describe(files.front(), series);
+  describe(files, series);
   if (const auto problem = drop_copies(files, series, stop)) return {refused(series, files, *problem)};
   if (const auto problem = first_problem(files, geometry_problem)) return {refused(series, files, *problem)};
   set_scouts_aside(files, series);
@@ -239,7 +258,7 @@ std::vector<DicomSeries> assemble_series(Headers files, const std::stop_token& s
   series.volumes = volumes.size();
   std::vector<DicomSeries> result;
   for (SplitVolume& volume : volumes) {
-    describe(volume.files.front(), series);
+    describe(volume.files, series);
     result.push_back(judged(volume, series));
     series.set_aside.clear();
   }

@@ -14,7 +14,7 @@
 #include "io/dicom_derive.h"
 #include "io/dicom_header.h"
 #include "io/dicom_text.h"
-#include "io/dicom_traits.h"
+#include "io/patient_names.h"
 
 namespace tetwarp {
 
@@ -72,17 +72,22 @@ std::string joined(const std::vector<std::string>& values) {
 std::string bids_sidecar(const DicomHeaders& source, const Geometry& output, const DicomDerivation& derivation) {
   require(!source.slices.empty(), "the source series has no slices; a sidecar needs their headers");
   DcmDataset& first = *source.slices.front();
-  const PatientNames patient(first);
+  const auto names_patient = [&](const std::string& text) {
+    return std::any_of(source.slices.begin(), source.slices.end(),
+                       [&](const auto& slice) { return PatientNames(*slice).are_in(text); });
+  };
+  std::vector<std::string> image_type = values_of(derived_image_type(first));
+  std::erase_if(image_type, [&](const std::string& value) { return value != "AXIAL" && names_patient(value); });
   const std::string set = text_of(first, DCM_SpecificCharacterSet);
   json document = {{"Modality", "CT"},
-                   {"ImageType", values_of(derived_image_type(first))},
+                   {"ImageType", std::move(image_type)},
                    {"RawImage", false},
                    {"Description", derivation.description},
                    {"ConversionSoftware", "tetwarp"},
                    {"ConversionSoftwareVersion", std::string(version()) + " (" + commit() + ")"}};
   for (const Name& name : kTexts) {
     const std::string text = common_value(source, name.tag);
-    if (!text.empty() && !patient.are_in(text)) document[name.key] = shown_text(joined(values_of(text)), set);
+    if (!text.empty() && !names_patient(text)) document[name.key] = shown_text(joined(values_of(text)), set);
   }
   for (const Name& name : kNumbers) {
     const std::optional<double> value = decimal(common_value(source, name.tag));

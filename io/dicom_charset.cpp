@@ -52,6 +52,10 @@ std::optional<std::string> euc_jp(std::string_view bytes) {
   return text;
 }
 
+bool is_plain(std::string_view bytes) {
+  return std::all_of(bytes.begin(), bytes.end(), [](char c) { return c >= 0 && c != kEscape; });
+}
+
 std::optional<std::string> utf8_of(std::string_view bytes, const std::string& character_set) {
   OFString utf8;
   if (const auto japanese = is_japanese(character_set) ? euc_jp(bytes) : std::nullopt) {
@@ -69,9 +73,12 @@ std::optional<std::string> utf8_of(std::string_view bytes, const std::string& ch
 }  // namespace
 
 std::string shown_text(std::string_view bytes, const std::string& character_set) {
-  const bool plain = std::all_of(bytes.begin(), bytes.end(), [](char c) { return c >= 0 && c != kEscape; });
-  const std::optional<std::string> utf8 = plain ? std::nullopt : utf8_of(bytes, character_set);
+  const std::optional<std::string> utf8 = decoded_text(bytes, character_set);
   return utf8 ? shown(*utf8) : shown(bytes);
+}
+
+std::optional<std::string> decoded_text(std::string_view bytes, const std::string& character_set) {
+  return is_plain(bytes) ? std::string(bytes) : utf8_of(bytes, character_set);
 }
 
 std::optional<std::string> coded_text(const std::string& utf8, const std::string& character_set) {

@@ -11,6 +11,9 @@ namespace tetwarp {
 /// that are not that become "\xNN".
 std::string shown_text(std::string_view bytes, const std::string& character_set);
 
+/// The same as it is, control characters included; none where it is not what its character sets say.
+std::optional<std::string> decoded_text(std::string_view bytes, const std::string& character_set);
+
 /// UTF-8 in the first of the character sets that Specific Character Set names; none where that has no such characters.
 std::optional<std::string> coded_text(const std::string& utf8, const std::string& character_set);
 

@@ -14,6 +14,7 @@
 #include "io/dicom_put.h"
 #include "io/dicom_samples.h"
 #include "io/dicom_stream.h"
+#include "io/dicom_text.h"
 
 namespace tetwarp {
 
@@ -32,6 +33,7 @@ class DoseFile {
   DicomDose header() {
     DicomDose dose;
     dose.units = text_of(data(), DCM_DoseUnits);
+    if (!dose.units.empty()) dose.units = known_code(dose.units, {"GY", "RELATIVE"});
     dose.frame_of_reference_uid = text_of(data(), DCM_FrameOfReferenceUID);
     Geometry& grid = dose.geometry;
     grid.size = {word(DCM_Columns), word(DCM_Rows), std::max<std::int64_t>(1, whole_number(DCM_NumberOfFrames))};

@@ -146,7 +146,7 @@ void EnhancedFrames::list_frames(DcmDataset& data) {
   const long expected = long_of(data, DCM_NumberOfFrames, 0);
   if (expected < 1 || expected > kMostFrames) {
     problem_ = "Number of Frames (0028,0008), expected 1 to " + std::to_string(kMostFrames) + ", found " +
-               (number.empty() ? "none" : shown(number));
+               (number.empty() ? "none" : stated_number(number));
     return;
   }
   frames_ = items_of(data, DCM_PerFrameFunctionalGroupsSequence);

@@ -34,7 +34,7 @@ bool is_localizer(const DicomFileHeader& header) {
 std::string encoding_problem(const DicomFileHeader& header) {
   const PixelFormat& pixels = header.pixels;
   if (!header.pixel_bytes && !header.private_compression.empty()) {
-    return "pixels in the private compression " + shown(header.private_compression) +
+    return "pixels in the private compression " + known_code(header.private_compression, {"PMSCT_RLE1", "PMSCT_RGB1"}) +
            " of the attribute (07A1,1011) cannot be decoded" + where(header) +
            "; expected Pixel Data (7FE0,0010), export the series again without it";
   }
@@ -71,7 +71,10 @@ std::string layout_problem(const DicomFileHeader& header) {
   }
   if (pixels.samples != 1) return found("Samples per Pixel (0028,0002)", "1", std::to_string(pixels.samples));
   if (!pixels.photometric.empty() && !pixels.photometric.starts_with("MONOCHROME")) {
-    return found("Photometric Interpretation (0028,0004)", "MONOCHROME2", shown(pixels.photometric));
+    return found(
+        "Photometric Interpretation (0028,0004)", "MONOCHROME2",
+        known_code(pixels.photometric, {"PALETTE COLOR", "RGB", "HSV", "ARGB", "CMYK", "YBR_FULL", "YBR_FULL_422",
+                                        "YBR_PARTIAL_422", "YBR_PARTIAL_420", "YBR_ICT", "YBR_RCT", "XYB"}));
   }
   if (!header.frame && pixels.frames != 1 && pixels.frames != 0) {
     return found("Number of Frames (0028,0008)", "1", pixels.frames < 0 ? "no number" : std::to_string(pixels.frames));

@@ -98,7 +98,7 @@ DcmItem* SegmentationFile::group(DcmItem& frame, const DcmTagKey& sequence) {
 void SegmentationFile::read_bits(DicomSegmentation& seg) {
   const std::string type = text_of(data(), DCM_SegmentationType);
   if (type != "BINARY" && type != "FRACTIONAL")
-    refuse("has Segmentation Type (0062,0001) \"" + shown(type) + "\", expected BINARY or FRACTIONAL");
+    refuse("has Segmentation Type (0062,0001) " + known_code(type, {"LABELMAP"}) + ", expected BINARY or FRACTIONAL");
   seg.fractional = type == "FRACTIONAL";
   const int bits = seg.fractional ? 8 : 1;
   for (const auto& [tag, expected] : std::initializer_list<std::pair<DcmTagKey, int>>{
@@ -235,7 +235,7 @@ DicomSegmentation SegmentationFile::header(double otherwise_mm) {
   shared_ = items(DCM_SharedFunctionalGroupsSequence, 1).front();
   frames_ = items(DCM_PerFrameFunctionalGroupsSequence, kMostFrames);
   if (const std::string stated = text_of(data(), DCM_NumberOfFrames); stated != std::to_string(frames_.size()))
-    refuse("has Number of Frames (0028,0008) " + shown(stated) + ", and functional groups of " +
+    refuse("has Number of Frames (0028,0008) " + stated_number(stated) + ", and functional groups of " +
            std::to_string(frames_.size()));
   read_plane(seg);
   place_frames(seg, otherwise_mm);

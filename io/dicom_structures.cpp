@@ -108,7 +108,7 @@ class StructureFile {
     const auto known = std::find_if(kContourKinds.begin(), kContourKinds.end(),
                                     [&](const auto& entry) { return kind == entry.second; });
     if (known == kContourKinds.end())
-      refuse("has " + tag_name(DCM_ContourGeometricType) + " \"" + shown(kind) + "\"" + where);
+      refuse("has " + tag_name(DCM_ContourGeometricType) + " that is " + known_code(kind, {}) + where);
     contour.kind = known->first;
     const std::vector<double> values = decimals(text(item, DCM_ContourData), where);
     if (values.size() % 3 != 0)
@@ -118,7 +118,7 @@ class StructureFile {
       contour.points.emplace_back(values[n], values[n + 1], values[n + 2]);
     const std::string count = text(item, DCM_NumberOfContourPoints);
     if (!count.empty() && decimal(count) != static_cast<double>(contour.points.size())) {
-      refuse("says " + shown(count) + " in " + tag_name(DCM_NumberOfContourPoints) + " and has " +
+      refuse("says " + stated_number(count) + " in " + tag_name(DCM_NumberOfContourPoints) + " and has " +
              plural(contour.points.size(), "point") + where);
     }
     const std::string offset = text(item, DCM_RETIRED_ContourOffsetVector);
@@ -135,8 +135,7 @@ class StructureFile {
       while (word.starts_with(' ')) word.remove_prefix(1);
       while (word.ends_with(' ')) word.remove_suffix(1);
       const std::optional<double> value = decimal(word);
-      if (!value || std::abs(*value) > kFarthest)
-        refuse("has \"" + shown(std::string(word.substr(0, 20))) + "\" for a place in mm" + where);
+      if (!value || std::abs(*value) > kFarthest) refuse("has " + stated_number(word) + " for a place in mm" + where);
       values.push_back(*value);
       begin = end + 1;
     }

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <initializer_list>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -18,6 +20,18 @@ inline std::string number(double value) {
 /// "1 slice", "2 slices".
 inline std::string plural(std::size_t count, const std::string& noun) {
   return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
+}
+
+/// A coded value as messages show it: one of those that the standard defines, and of any other text only that it is
+/// none, for scanners and people write names into such attributes too.
+inline std::string known_code(std::string_view value, std::initializer_list<std::string_view> defined) {
+  return std::string(std::find(defined.begin(), defined.end(), value) != defined.end() ? value : "no known value");
+}
+
+/// A number as the file spells it; of any other text only that it is none.
+inline std::string stated_number(std::string_view text) {
+  return text.size() <= 16 && text.find_first_not_of("+-.0123456789eE") == std::string_view::npos ? std::string(text)
+                                                                                                  : "no number";
 }
 
 /// A Decimal String (PS3.5 6.2) whatever the locale; none unless all of it is one finite number.

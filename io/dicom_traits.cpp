@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cstdio>
 #include <optional>
 #include <set>
 
 #include "io/dicom_charset.h"
 #include "io/dicom_text.h"
+#include "io/patient_names.h"
 
 namespace tetwarp {
 namespace {
@@ -170,23 +170,9 @@ bool is_secret(const DicomFileHeader& header, Trait trait) {
   return (header.secret_traits >> static_cast<unsigned>(trait) & 1) != 0;
 }
 
-/// Words of two characters or more, in lower case, but for numbers.
-std::set<std::string> words_of(std::string_view text) {
-  std::set<std::string> words;
-  std::string word;
-  const auto finish = [&] {
-    if (word.size() > 1 && !std::all_of(word.begin(), word.end(), is_digit)) words.insert(word);
-    word.clear();
-  };
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (byte >= 0x80 || std::isalnum(byte))
-      word += static_cast<char>(std::tolower(byte));
-    else
-      finish();
-  }
-  finish();
-  return words;
+/// A number, a time, a UID, or several of them.
+bool is_numeric(std::string_view value) {
+  return value.find_first_not_of("0123456789.+- \\") == std::string_view::npos;
 }
 
 }  // namespace
@@ -252,16 +238,6 @@ std::vector<std::string> labels_of(Trait trait, std::span<const DicomFileHeader*
   return labels;
 }
 
-PatientNames::PatientNames(DcmItem& data)
-    : words_(words_of(text_of(data, DCM_PatientName))), id_(text_of(data, DCM_PatientID)) {}
-
-bool PatientNames::are_in(std::string_view text) const {
-  constexpr std::size_t kShortestId = 4;
-  if (id_.size() >= kShortestId && text.find(id_) != std::string_view::npos) return true;
-  const std::set<std::string> words = words_of(text);
-  return std::any_of(words.begin(), words.end(), [&](const auto& word) { return words_.contains(word); });
-}
-
 std::uint32_t traits_naming_patient(DcmItem& data, const std::string& traits) {
   const PatientNames patient(data);
   std::uint32_t found = 0;
@@ -270,14 +246,20 @@ std::uint32_t traits_naming_patient(DcmItem& data, const std::string& traits) {
     const std::size_t end = traits.find('\0', begin);
     const std::string_view value = std::string_view(traits).substr(begin, end - begin);
     begin = end + 1;
-    if (value.empty() || table_of(static_cast<Trait>(n)).kind != Kind::text) continue;
+    const auto trait = static_cast<Trait>(n);
+    const Kind kind = table_of(trait).kind;
+    if (value.empty() || kind == Kind::percentage) continue;
+    const bool may_be_text = kind == Kind::text && trait != Trait::irradiation_event && trait != Trait::dimensions;
+    if (!may_be_text && is_numeric(value)) continue;
     if (patient.are_in(value)) found |= 1u << n;
   }
   return found;
 }
 
-std::string shown_description(const DicomFileHeader& header) {
-  if (is_secret(header, Trait::series_description)) return {};
+std::string shown_description(std::span<const DicomFileHeader> files) {
+  const auto names_patient = [](const DicomFileHeader& one) { return is_secret(one, Trait::series_description); };
+  if (std::any_of(files.begin(), files.end(), names_patient)) return {};
+  const DicomFileHeader& header = files.front();
   return shown_text(trait_of(header, Trait::series_description), header.character_set);
 }
 

@@ -3,7 +3,6 @@
 // Private to io/: the attributes that may tell several volumes of one series apart.
 #include <cstddef>
 #include <cstdint>
-#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -53,18 +52,8 @@ std::string read_traits(DcmItem& data);
 /// One of them; empty where the file has none.
 std::string_view trait_of(const DicomFileHeader& header, Trait trait);
 
-/// Tells texts that name the patient: by a word of the name, of two characters or more, or by an ID of four or more.
-class PatientNames {
- public:
-  explicit PatientNames(DcmItem& data);
-  bool are_in(std::string_view text) const;
-
- private:
-  std::set<std::string> words_;  ///< in lower case
-  std::string id_;
-};
-
-/// Which texts among them hold a word of the patient's name, or the ID: one bit each, the first trait is the lowest.
+/// Which of them name the patient (patient_names.h): one bit each, the first trait is the lowest. Numbers, times and
+/// UIDs that are such do not.
 std::uint32_t traits_naming_patient(DcmItem& data, const std::string& traits);
 
 /// Whether `a` comes before `b`: numbers by value, times by the clock, "P10" after "P9"; nothing comes first.
@@ -74,7 +63,8 @@ bool is_before(Trait trait, std::string_view a, std::string_view b);
 /// name the patient are numbered instead of shown.
 std::vector<std::string> labels_of(Trait trait, std::span<const DicomFileHeader* const> headers);
 
-/// Series Description in UTF-8, as messages show it; empty where it names the patient.
-std::string shown_description(const DicomFileHeader& header);
+/// Series Description of the first of the files of a series in UTF-8, as messages show it; empty where that of any of
+/// them names the patient.
+std::string shown_description(std::span<const DicomFileHeader> files);
 
 }  // namespace tetwarp

@@ -1,0 +1,35 @@
+#pragma once
+
+// Private to io/: which texts of a header name the patient.
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+class DcmItem;
+
+namespace tetwarp {
+
+/// Tells texts that name the patient, so that they can be left out of what is shown. Where in doubt, a text does.
+///
+/// A text names the patient when it holds, in any spelling (comparable_text.h), a word of Patient's Name, of Other
+/// Patient Names or of the birth names, in any of the groups of a name (alphabetic, ideographic, phonetic); or Patient
+/// ID or one of Other Patient IDs, with or without the zeros that it begins with; or the birth date. Case, marks, and
+/// what stands between letters do not matter, nor what a word is glued to:
+/// - three letters or more, four characters or more with digits, any word of another script: anywhere in the text;
+/// - fewer characters with digits: unless a digit beside them makes another number of them;
+/// - two letters: where a word begins or ends;
+/// - one letter: of an ID alone, as a word.
+class PatientNames {
+ public:
+  explicit PatientNames(DcmItem& data);
+  /// @param text  as the data set has it, in its Specific Character Set
+  bool are_in(std::string_view text) const;
+
+ private:
+  struct Secrets;
+  std::shared_ptr<const Secrets> secrets_;
+  std::string character_set_;
+};
+
+}  // namespace tetwarp
