@@ -92,6 +92,10 @@ bool starts_like_member(std::span<const std::byte> bytes) {
   return bytes.size() >= 2 && bytes[0] == kMemberStart[0] && bytes[1] == kMemberStart[1];
 }
 
+bool is_zero(std::span<const std::byte> bytes) {
+  return std::ranges::all_of(bytes, [](std::byte byte) { return byte == std::byte{0}; });
+}
+
 std::uint32_t u32(std::span<const std::byte> bytes) {
   std::uint32_t value = 0;
   for (std::size_t i = 0; i < 4; ++i) value |= std::to_integer<std::uint32_t>(bytes[i]) << 8 * i;
@@ -116,19 +120,29 @@ std::optional<Member> stated_member(const InputFile& file, std::uint64_t begin, 
   return Member{begin, plain_begin, bytes, u32(plain_bytes)};
 }
 
-/// The file's members, if all state their size, are as small as ours and hold `size` plain bytes or more.
-std::vector<Member> stated_members(const InputFile& file, std::uint64_t size) {
+/// Whether the file has nothing but zeros from `begin` on.
+bool ends_at(const InputFile& file, std::uint64_t begin) {
+  std::array<std::byte, 4096> part;
+  while (begin < file.size()) {
+    const std::span rest = std::span(part).first(std::min<std::uint64_t>(part.size(), file.size() - begin));
+    if (!file.read(begin, rest) || !is_zero(rest)) return false;
+    begin += rest.size();
+  }
+  return true;
+}
+
+/// The file's members from `begin` on, if all state their size, are as small as ours, hold `size` plain bytes and end
+/// the file.
+std::vector<Member> stated_members(const InputFile& file, std::uint64_t size, std::uint64_t begin) {
   std::vector<Member> members;
-  std::uint64_t begin = 0, plain = 0;
+  std::uint64_t plain = 0;
   while (const auto member = stated_member(file, begin, plain)) {
     if (member->plain_bytes > kGzipPieceBytes) return {};
     members.push_back(*member);
     begin += member->bytes;
     plain += member->plain_bytes;
   }
-  std::array<std::byte, 2> rest{};
-  const bool more = file.size() - begin >= rest.size() && (!file.read(begin, rest) || starts_like_member(rest));
-  if (more || plain < size) return {};
+  if (plain != size || !ends_at(file, begin)) return {};
   return members;
 }
 
@@ -171,36 +185,39 @@ class StatedMembers {
   std::vector<Member> members_;
 };
 
-bool read_whole(const InputFile& file, std::span<std::byte> bytes) {
+bool read_whole(const InputFile& file, std::uint64_t begin, std::span<std::byte> bytes) {
   constexpr std::size_t kPart = std::size_t{4} << 20;
   std::atomic<bool> good = true;
   tbb::parallel_for(std::size_t{0}, (bytes.size() + kPart - 1) / kPart, [&](std::size_t i) {
-    if (!file.read(i * kPart, bytes.subspan(i * kPart, std::min(kPart, bytes.size() - i * kPart)))) good = false;
+    if (!file.read(begin + i * kPart, bytes.subspan(i * kPart, std::min(kPart, bytes.size() - i * kPart))))
+      good = false;
   });
   return good;
 }
 
-/// One member after the other, until `plain` is full and no member is left.
-bool inflate_in_order(const InputFile& file, std::span<std::byte> plain) {
-  const Buffer buffer(static_cast<std::size_t>(file.size()));
-  if (!read_whole(file, buffer.bytes())) return false;
+/// One member after the other from `begin` on, until `plain` is full and no member is left.
+bool inflate_in_order(const InputFile& file, std::uint64_t begin, std::span<std::byte> plain) {
+  if (begin > file.size()) return false;
+  const Buffer buffer(static_cast<std::size_t>(file.size() - begin));
+  if (!read_whole(file, begin, buffer.bytes())) return false;
   std::span<const std::byte> packed = buffer.bytes();
   const Inflater inflater;
   while (starts_like_member(packed)) {
     if (!inflater.inflate(packed, plain)) return false;
   }
-  return plain.empty();
+  return plain.empty() && is_zero(packed);
 }
 
 }  // namespace
 
-PlainBytes inflate_at_once(const std::filesystem::path& path, std::uint64_t size) {
+PlainBytes inflate_at_once(const std::filesystem::path& path, std::uint64_t size, std::uint64_t begin) {
   const auto file = std::make_shared<const InputFile>(path);
-  if (auto members = stated_members(*file, size); !members.empty()) return StatedMembers(file, std::move(members));
+  if (auto members = stated_members(*file, size, begin); !members.empty())
+    return StatedMembers(file, std::move(members));
   if (size > kInflateAtMost) return {};
   const auto held = std::make_shared<const Buffer>(static_cast<std::size_t>(size));
   prepare_memory(held->bytes(), 0);  // one thread inflates
-  if (!inflate_in_order(*file, held->bytes())) return {};
+  if (!inflate_in_order(*file, begin, held->bytes())) return {};
   return [held](std::uint64_t offset, std::span<std::byte> bytes) {
     const std::span<const std::byte> all = held->bytes();
     if (offset > all.size() || bytes.size() > all.size() - offset) return false;

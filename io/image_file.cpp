@@ -15,7 +15,9 @@
 #include "io/raw_image.h"
 #ifdef TETWARP_WITH_ITK
 #include "io/nifti_file.h"
+#include "io/nrrd_layout.h"
 #include "io/text_header.h"
+#include "io/value_reader.h"
 #include "itkbridge/image_io.h"
 #endif
 
@@ -36,7 +38,8 @@ void require_orthogonal(const Geometry& geometry, const std::string& file) {
   }
 }
 
-/// A header that promises more voxels than the file can hold is not believed: nothing is allocated for it.
+/// A header that promises more voxels than the file can hold is not believed: nothing is allocated for it. Nor is one
+/// that leaves bytes over, where the voxels are stored as they are: it is about another volume, or the file is damaged.
 void require_file_holds(const std::filesystem::path& path, const ImageHeader& header, const Stored& stored) {
   constexpr double kDeflateAtMost = 1040;  // deflate cannot do better than 1032 to 1
   double expected = static_cast<double>(header.components) * static_cast<double>(stored.value_bytes);
@@ -44,38 +47,52 @@ void require_file_holds(const std::filesystem::path& path, const ImageHeader& he
   const auto offset = static_cast<double>(stored.offset);
   const double needed = stored.encoded ? (offset + expected) / kDeflateAtMost : expected;
   const double held = static_cast<double>(std::filesystem::file_size(path)) - (stored.encoded ? 0 : offset);
+  if (held >= needed && (stored.encoded || held == needed)) return;
   std::ostringstream text;
   text.precision(17);
-  text << "truncated, or a header that promises too much, " << path.string() << ": " << std::max(held, 0.0)
-       << " bytes, but " << to_string(header.geometry.size) << " voxels of " << header.components << " x "
-       << stored.value_bytes << " bytes" << (stored.encoded ? ", compressed," : "") << " need " << std::ceil(needed);
-  require(held >= needed, text.str());
+  text << (held < needed ? "truncated, or a header that promises too much, " : "more bytes than the header says, ")
+       << path.string() << ": " << std::max(held, 0.0) << " bytes, but " << to_string(header.geometry.size)
+       << " voxels of " << header.components << " x " << stored.value_bytes << " bytes"
+       << (stored.encoded ? ", compressed," : "") << " need " << std::ceil(needed)
+       << "; is it the header of this file?";
+  throw InputError(text.str());
 }
 
 #ifdef TETWARP_WITH_ITK
 ItkFormat itk_format(ImageFormat format) { return format == ImageFormat::nrrd ? ItkFormat::nrrd : ItkFormat::meta; }
 
-class ItkReader final : public ImageReader {
+/// NRRD of text or hexadecimal digits, which have no check sum.
+class TextValueReader final : public ImageReader {
  public:
-  ItkReader(const std::filesystem::path& path, ImageHeader header, Stored stored, ItkFormat format)
-      : ImageReader(path, std::move(header), stored), format_(format) {}
-  void read(std::span<std::byte> voxels) const override { itk_read_voxels(path_, format_, voxels); }
-
- private:
-  ItkFormat format_;
+  using ImageReader::ImageReader;
+  void read(std::span<std::byte> voxels) const override { itk_read_voxels(path_, ItkFormat::nrrd, voxels); }
 };
+
+std::unique_ptr<ImageReader> open_nrrd(const std::filesystem::path& path, const TextHeader& text, ImageHeader header,
+                                       Stored stored) {
+  const auto layout = nrrd_layout(path, text, header, stored.offset);
+  if (!layout) return std::make_unique<TextValueReader>(path, std::move(header), stored);
+  stored.encoded = layout->encoding != Encoding::raw;
+  return make_value_reader(path, std::move(header), stored, *layout);
+}
+
+std::unique_ptr<ImageReader> open_mha(const std::filesystem::path& path, const TextHeader& text, ImageHeader header,
+                                      const Stored& stored) {
+  require_stated_sizes(path, text);
+  const bool zlib = is_zlib(text, ImageFormat::mha);
+  require(zlib || !stored.encoded, "voxels that are text, or compressed big-endian, " + path.string() +
+                                       "; expected binary, compressed only in little endian");
+  return make_value_reader(path, std::move(header), stored,
+                           {.encoding = zlib ? Encoding::zlib : Encoding::raw, .big_endian = is_big_endian(text)});
+}
 
 std::unique_ptr<ImageReader> open_format(const std::filesystem::path& path, ImageFormat format) {
   if (format == ImageFormat::nifti) return open_nifti(path);
   const TextHeader text = read_text_header(path, format);
   const ItkImageInfo info = itk_read_info(path, itk_format(format));
   const Stored stored{text.data_offset, size_bytes(info.type), is_encoded(text, format)};
-  ImageHeader header{info.geometry, info.type, info.components, text.metadata};
-  if (is_zlib(text, format)) return make_raw_reader(path, std::move(header), stored);
-  require(format == ImageFormat::nrrd || !stored.encoded, "voxels that are text, or compressed big-endian, " +
-                                                              path.string() +
-                                                              "; expected binary, compressed only in little endian");
-  return std::make_unique<ItkReader>(path, std::move(header), stored, itk_format(format));
+  const ImageHeader header{info.geometry, info.type, info.components, text.metadata};
+  return format == ImageFormat::nrrd ? open_nrrd(path, text, header, stored) : open_mha(path, text, header, stored);
 }
 
 /// ITK makes the header, of one voxel in a file of its own beside the output: ITK knows its suffixes in lower case

@@ -1,13 +1,13 @@
 #include "io/nifti_file.h"
 
 #include <tbb/parallel_for.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <functional>
 #include <utility>
 
 #include "deform/errors.h"
@@ -114,31 +114,28 @@ class NiftiReader final : public ImageReader {
     return true;
   }
 
-  /// With zlib, whatever the file. @throws InputError for a damaged file
+  /// Of a file that is not compressed, or by zlib. @throws InputError for a damaged file
   void read_in_order(std::span<std::byte> voxels) const {
-    const std::unique_ptr<gzFile_s, int (*)(gzFile)> file(gzopen(path_.c_str(), "rb"), gzclose);
-    require(file != nullptr, "cannot open, " + path_.string());
-    gzbuffer(file.get(), 1 << 18);
-    if (gzseek(file.get(), static_cast<z_off_t>(stored_.offset), SEEK_SET) < 0) fail(file.get());
+    if (stored_.encoded) {
+      GzipStream stream(path_);
+      stream.skip(stored_.offset);
+      read_pieces(voxels, [&](std::span<std::byte> bytes) { stream.read(bytes); });
+      return stream.finish();
+    }
+    std::ifstream stream(path_, std::ios::binary);
+    stream.seekg(static_cast<std::streamoff>(stored_.offset));
+    read_pieces(voxels, [&](std::span<std::byte> bytes) {
+      stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+      require(stream.good(), "truncated voxels, " + path_.string() + "; is the file whole?");
+    });
+  }
+
+  void read_pieces(std::span<std::byte> voxels, const std::function<void(std::span<std::byte>)>& read) const {
     const PlainBytes next = [&](std::uint64_t, std::span<std::byte> bytes) {
-      const int read = gzread(file.get(), bytes.data(), static_cast<unsigned>(bytes.size()));
-      if (read != static_cast<int>(bytes.size())) fail(file.get());
+      read(bytes);
       return true;
     };
     for (std::size_t i = 0; i < pieces().count(); ++i) read_piece(i, next, voxels);
-    std::vector<std::byte> rest(std::size_t{1} << 18);
-    int read = 1;
-    while (read > 0) read = gzread(file.get(), rest.data(), static_cast<unsigned>(rest.size()));
-    int code = Z_OK;
-    gzerror(file.get(), &code);
-    if (read < 0 || code != Z_OK) fail(file.get());  // the CRC stands at the end; an early end is no failure of gzread
-  }
-
-  [[noreturn]] void fail(gzFile file) const {
-    int code = 0;
-    const std::string text = gzerror(file, &code);
-    throw InputError("truncated or damaged voxels (" + (code == Z_OK || text.empty() ? "the file ends early" : text) +
-                     "), " + path_.string() + "; is the file whole?");
   }
 
   PlanePieces pieces() const { return {header_.geometry, stored_.value_bytes, header_.components}; }

@@ -1,7 +1,5 @@
 #include "io/raw_image.h"
 
-#include <zlib.h>
-
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -15,6 +13,7 @@
 
 #include "deform/errors.h"
 #include "io/text_header.h"
+#include "io/value_reader.h"
 
 namespace tetwarp {
 namespace {
@@ -167,46 +166,6 @@ ImageHeader parse_nrrd(const TextHeader& text, const std::string& file) {
   return header;
 }
 
-class RawReader final : public ImageReader {
- public:
-  using ImageReader::ImageReader;
-
-  void read(std::span<std::byte> voxels) const override {
-    std::ifstream stream(path_, std::ios::binary);
-    stream.seekg(static_cast<std::streamoff>(stored_.offset));
-    if (stored_.encoded) return inflate_into(stream, voxels);
-    stream.read(reinterpret_cast<char*>(voxels.data()), static_cast<std::streamsize>(voxels.size()));
-    require(stream.good(), "truncated voxels, " + path_.string() + "; is the file whole?");
-  }
-
- private:
-  void inflate_into(std::istream& stream, std::span<std::byte> voxels) const {
-    z_stream inflater{};
-    if (inflateInit(&inflater) != Z_OK) throw Error("zlib: inflateInit failed");
-    const std::unique_ptr<z_stream, int (*)(z_stream*)> end(&inflater, inflateEnd);
-    std::vector<char> input(std::size_t{1} << 18);
-    int status = Z_OK;
-    for (std::size_t done = 0; status == Z_OK;) {
-      if (inflater.avail_in == 0) {
-        stream.read(input.data(), static_cast<std::streamsize>(input.size()));
-        inflater.next_in = reinterpret_cast<Bytef*>(input.data());
-        inflater.avail_in = static_cast<uInt>(stream.gcount());
-      }
-      const std::size_t room = std::min(voxels.size() - done, std::size_t{1} << 30);
-      inflater.next_out = reinterpret_cast<Bytef*>(voxels.data() + done);
-      inflater.avail_out = static_cast<uInt>(room);
-      status = inflate(&inflater, Z_NO_FLUSH);
-      done += room - inflater.avail_out;
-    }
-    const std::string file = path_.string();
-    require(status == Z_STREAM_END, std::string("truncated or damaged voxels (") +
-                                        (inflater.msg ? inflater.msg : "the stream does not end with them") + "), " +
-                                        file + "; is the file whole?");
-    require(inflater.total_out == voxels.size(), std::to_string(inflater.total_out) + " bytes of voxels, " + file +
-                                                     "; the header says " + std::to_string(voxels.size()));
-  }
-};
-
 /// As many digits as bring the same double back.
 std::string exact(const glm::dvec3& v, const char* separator) {
   std::array<char, 96> text;
@@ -247,22 +206,18 @@ std::string nrrd_header(const Geometry& grid, VoxelType type, int components,
 
 }  // namespace
 
-std::unique_ptr<ImageReader> make_raw_reader(const std::filesystem::path& path, ImageHeader header,
-                                             const Stored& stored) {
-  return std::make_unique<RawReader>(path, std::move(header), stored);
-}
-
 std::unique_ptr<ImageReader> open_raw_image(const std::filesystem::path& path, ImageFormat format) {
   const TextHeader text = read_text_header(path, format);
   const std::string file = path.string();
   const bool zlib = is_zlib(text, format);
+  if (format == ImageFormat::mha) require_stated_sizes(path, text);
   require(zlib || !is_encoded(text, format),
           "voxels that are compressed or text, " + file + "; without ITK only raw voxels can be read");
   require(text["byte skip"].empty() && text["line skip"].empty(),
           "a field \"byte skip\" or \"line skip\", " + file + "; without ITK neither can be read");
   ImageHeader header = format == ImageFormat::mha ? parse_mha(text, file) : parse_nrrd(text, file);
   const Stored stored{text.data_offset, size_bytes(header.type), zlib};
-  return make_raw_reader(path, std::move(header), stored);
+  return make_value_reader(path, std::move(header), stored, {.encoding = zlib ? Encoding::zlib : Encoding::raw});
 }
 
 std::string raw_image_header(ImageFormat format, const Geometry& grid, VoxelType type, int components,

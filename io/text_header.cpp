@@ -219,10 +219,25 @@ bool is_encoded(const TextHeader& header, ImageFormat format) {
   return lower(header["compresseddata"]) == "true" || lower(header["binarydata"]) == "false";
 }
 
+bool is_big_endian(const TextHeader& header) {
+  return lower(header["binarydatabyteordermsb"]) == "true" || lower(header["elementbyteordermsb"]) == "true";
+}
+
+void require_stated_sizes(const std::filesystem::path& path, const TextHeader& header) {
+  const auto require_size = [&](const char* name, std::initializer_list<std::string> expected) {
+    const std::string stated = header[name];
+    require(stated.empty() || std::ranges::find(expected, stated) != expected.end(),
+            std::string(name) + " is " + stated.substr(0, 60) + ", " + path.string() + "; the file has " +
+                *expected.begin() + ", is it whole?");
+  };
+  require_size("headersize", {std::to_string(header.data_offset), "0", "-1"});
+  if (!is_zlib(header, ImageFormat::mha)) return;
+  require_size("compresseddatasize", {std::to_string(std::filesystem::file_size(path) - header.data_offset)});
+}
+
 bool is_zlib(const TextHeader& header, ImageFormat format) {
   return format == ImageFormat::mha && lower(header["compresseddata"]) == "true" &&
-         lower(header["binarydata"]) != "false" && lower(header["binarydatabyteordermsb"]) != "true" &&
-         lower(header["elementbyteordermsb"]) != "true";
+         lower(header["binarydata"]) != "false" && !is_big_endian(header);
 }
 
 }  // namespace tetwarp

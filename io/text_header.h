@@ -28,6 +28,10 @@ TextHeader read_text_header(const std::filesystem::path& path, ImageFormat forma
 
 /// Whether the voxels are stored as something else than the plain bytes.
 bool is_encoded(const TextHeader& header, ImageFormat format);
+/// Whether binary MHA has its values in big endian.
+bool is_big_endian(const TextHeader& header);
+/// Of an MHA file. @throws InputError where HeaderSize or CompressedDataSize is not what the file has
+void require_stated_sizes(const std::filesystem::path& path, const TextHeader& header);
 /// Whether they are one zlib stream: compressed MHA, little endian.
 bool is_zlib(const TextHeader& header, ImageFormat format);
 

@@ -331,6 +331,34 @@ TEST(VtkField, DamagedBlocksAndLengthsAreRefused) {
     EXPECT_GT(refused, 30U) << encoding;
   }
 }
+
+TEST(VtkField, AnyFlippedBitOfZlibValuesIsRefusedOrHarmless) {
+  const Scratch scratch;
+  const auto file = scratch / "f.vts";
+  for (const std::string encoding : {"zlib", "inline-zlib"}) {
+    if (!make_vtk("StructuredGrid", encoding, file, small_grid())) GTEST_SKIP() << "python3-vtk9";
+    const std::string good = read_bytes(file);
+    const FieldFile expected = read_field_file(file);
+    const bool inside = encoding == "inline-zlib";
+    const std::size_t first = inside ? good.find("<PointData") : good.find('_', good.find("<AppendedData")) + 1,
+                      last = good.find(inside ? "</Piece>" : "\n  </AppendedData>");
+    std::size_t refused = 0;
+    for (std::size_t bit = 8 * first; bit < 8 * last; bit += inside ? 3 : 1) {
+      std::string bytes = good;
+      bytes[bit / 8] = static_cast<char>(bytes[bit / 8] ^ 1 << bit % 8);
+      write_file(file, bytes);
+      try {
+        const FieldFile field = read_field_file(file);
+        ASSERT_TRUE(field.displacement == expected.displacement && field.grid == expected.grid)
+            << encoding << ", bit " << bit % 8 << " of byte " << bit / 8 - first;
+      } catch (const InputError& error) {
+        ASSERT_TRUE(says(error.what(), {file.string()}));
+        ++refused;
+      }
+    }
+    EXPECT_GT(refused, last - first) << encoding;
+  }
+}
 #else
 TEST(VtkField, XmlFilesAreRefusedWithoutVtk) {
   const Scratch scratch;

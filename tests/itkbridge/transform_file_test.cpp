@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <zlib.h>
+
 #include <algorithm>
 #include <glm/geometric.hpp>
 #include <random>
@@ -223,6 +225,36 @@ TEST(TransformFile, EveryTruncationOfAnHdf5FileIsRefused) {
   for (std::size_t size = 0; size < bytes.size(); size += 1 + bytes.size() / 97) {
     write_file(scratch / "t.h5", bytes.substr(0, size));
     EXPECT_TRUE(says(refusal([&] { read_transform_file(scratch / "t.h5"); }), {"InputError", "t.h5"})) << size;
+  }
+}
+
+TEST(TransformFile, AnyDamagedByteOfCompressedParametersIsRefused) {
+  const Scratch scratch;
+  one_bump().write(scratch / "whole.h5");
+  const std::string bytes = read_bytes(scratch / "whole.h5");
+  std::vector<std::pair<std::size_t, std::size_t>> streams;  // of zlib, and where they end
+  for (std::size_t at = 0; at + 2 < bytes.size(); ++at) {
+    if (bytes[at] != '\x78' || bytes[at + 1] != '\x5e') continue;
+    std::string plain(1 << 20, '\0');
+    z_stream stream{};
+    ASSERT_EQ(inflateInit(&stream), Z_OK);
+    stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data() + at));
+    stream.avail_in = static_cast<uInt>(bytes.size() - at);
+    stream.next_out = reinterpret_cast<Bytef*>(plain.data());
+    stream.avail_out = static_cast<uInt>(plain.size());
+    if (inflate(&stream, Z_FINISH) == Z_STREAM_END) streams.emplace_back(at, at + stream.total_in);
+    inflateEnd(&stream);
+  }
+  ASSERT_FALSE(streams.empty());
+  for (const auto& [begin, end] : streams) {
+    const std::size_t step = std::max<std::size_t>(1, (end - begin) / 40);
+    for (std::size_t at = begin; at < end; at += step) {
+      std::string damaged = bytes;
+      damaged[at] = static_cast<char>(damaged[at] ^ 1 << at % 8);
+      write_file(scratch / "t.h5", damaged);
+      EXPECT_TRUE(says(refusal([&] { read_transform_file(scratch / "t.h5"); }), {"InputError", "t.h5"}))
+          << at - begin << " of " << end - begin;
+    }
   }
 }
 

@@ -1,0 +1,28 @@
+#pragma once
+
+// Private to io/: the voxels of MHA and NRRD, checked as far as the file lets them be.
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+
+#include "io/image_reader.h"
+
+namespace tetwarp {
+
+enum class Encoding : std::uint8_t { raw, zlib, gzip };
+
+/// How the values lie in the file, from `Stored::offset` on.
+struct ValueLayout {
+  Encoding encoding = Encoding::raw;
+  bool big_endian = false;
+  std::uint64_t skip = 0;         ///< plain bytes before the values, of gzip
+  std::uint64_t plane_count = 1;  ///< voxels of which all first components come first, then all second ones, and so on
+};
+
+/// A zlib stream and gzip data must have right check sums, hold exactly the values, and end the file: MetaIO and NrrdIO
+/// of ITK 5.2.1 take a truncated stream for whole, leave the rest of the buffer as it was, and look at no check sum of
+/// gzip.
+std::unique_ptr<ImageReader> make_value_reader(const std::filesystem::path& path, ImageHeader header,
+                                               const Stored& stored, const ValueLayout& layout);
+
+}  // namespace tetwarp
