@@ -99,6 +99,7 @@ void add_info(CLI::App& app, InfoOptions& options) {
   command->add_option("INPUT", options.input.path, std::string(kInputHelp) + ", or a field, mesh or transform file")
       ->required();
   command->add_flag("--single", options.input.single, "Look at the one DICOM file alone, not its series");
+  add_nifti_frame(*command, options.common, options.input);
   command->add_flag("--json", options.json, "One JSON document on standard output");
   add_common(*command, options.common, false);
   command->footer("Example: tetwarp info study_folder");
@@ -114,6 +115,7 @@ void add_field(CLI::App& app, FieldOptions& options) {
                    "Vertices every B voxels, for formulas and transforms only (default 1)")
       ->type_name("B");
   add_series(*command, options.like);
+  add_nifti_frame(*command, options.common, options.like);
   add_common(*command, options.common, true);
   command->footer("Example: tetwarp field twist:angle=30 --like ct.nii.gz -o twist.mha --cell-size 4");
 }
@@ -143,6 +145,7 @@ void add_invert(CLI::App& app, InvertOptions& options) {
   add_backend(*command, options.backend, options.device);
   command->add_option("--report", options.report, "Residuals both ways, with times, as JSON")->type_name("FILE.json");
   add_series(*command, options.like);
+  add_nifti_frame(*command, options.common, options.like);
   add_common(*command, options.common, true);
   command->footer("Example: tetwarp invert twist:angle=30 --like ct.nii.gz -o inverse.mha");
 }
@@ -176,6 +179,7 @@ void add_deform(CLI::App& app, DeformOptions& options) {
                    "A folder (DICOM series; INPUT must be DICOM), or .nii .nii.gz .nrrd .mha")
       ->required();
   add_series(*command, options.input);
+  add_nifti_frame(*command, options.common, options.input);
   add_backend(*command, options.backend, options.device);
   const std::map<std::string, Interpolation> interpolations = {{"nearest", Interpolation::nearest},
                                                                {"linear", Interpolation::linear},
@@ -271,6 +275,7 @@ void add_simulate(CLI::App& app, SimulateOptions& options) {
       ->type_name("N");
   command->add_option("--report", options.report, "What happened, with times, as JSON")->type_name("FILE.json");
   add_series(*command, options.input);
+  add_nifti_frame(*command, options.common, options.input);
   add_backend(*command, options.backend, options.device,
               "auto, cuda or cpu: of chainmail the bits are the same, of mass-spring the equilibrium");
   command->add_flag("--dry-run", options.dry_run, "Check everything and say what would be done");

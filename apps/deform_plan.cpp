@@ -25,8 +25,9 @@ std::filesystem::path folder_of(const std::filesystem::path& file) {
 
 std::uint64_t bytes_of_field(const DeformOptions& options, const Geometry& volume, const Geometry& grid) {
   if (!options.scenario.empty()) return simulation_bytes(options.scenario, volume, !options.labels.empty());
-  if (options.pull_field.empty()) return field_bytes(options.fields, volume, options.cell_size);
-  const glm::i64vec3 pulled = pull_grid_size(options.pull_field, grid);
+  if (options.pull_field.empty())
+    return field_bytes(options.fields, volume, options.cell_size, options.common.nifti_frame);
+  const glm::i64vec3 pulled = pull_grid_size(options.pull_field, grid, options.common.nifti_frame);
   return static_cast<std::uint64_t>(pulled.x * pulled.y * pulled.z) * sizeof(glm::vec3);
 }
 
@@ -172,7 +173,7 @@ DeformOutputs begin_outputs(const DeformOptions& options, const PointsOption& po
   if (options.bids) outputs.bids = outputs.set.add(bids_sidecar_of(options.output));
   outputs.maps.emplace(options.maps, options.pull_field.empty() ? Direction::forward : Direction::pull, series,
                        outputs.set);
-  outputs.further.emplace(with.volumes, series, outputs.set);
+  outputs.further.emplace(with.volumes, series, options.common.nifti_frame, outputs.set);
   outputs.structures = FurtherStructures(with.structures, series, outputs.set);
   outputs.field = outputs.set.add(options.write_field);
   outputs.report = outputs.set.add(options.report);
@@ -197,7 +198,8 @@ DeformPlan plan_deformation(const DeformOptions& options, DeformOutputs& outputs
   }
   outputs.further->open(input);
   DeformPlan plan;
-  if (options.grid != "fit") plan.grid = output_grid(options.grid, input.geometry, {}, options.outside);
+  if (options.grid != "fit")
+    plan.grid = output_grid(options.grid, input.geometry, {}, options.outside, options.common.nifti_frame);
   if (outputs.series) outputs.maps->check(plan.grid);
   const Geometry& grid = options.grid == "fit" ? input.geometry : plan.grid;
   plan.bytes = plan_bytes(options, outputs, input, grid);

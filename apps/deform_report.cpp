@@ -49,6 +49,7 @@ json input_json(const DeformRecord& of) {
   json document = json::object();
   const bool is_open = !of.options.dicom.deidentification;
   if (is_open) document = {{"path", of.options.input.path.string()}, {"sha256", of.input_sha256}};
+  if (of.options.common.nifti_frame == NiftiFrame::qform) document["nifti_frame"] = "qform";
   if (!of.input->is_dicom()) return document;
   if (is_open) {
     document["series_instance_uid"] = of.input->dicom->series_uid;
@@ -56,7 +57,8 @@ json input_json(const DeformRecord& of) {
     document["set_aside"] = of.set_aside;
   }
   document["rounded_voxels"] = of.input->dicom->rounded;
-  if (of.input->dicom->padding) document["padding_hu"] = {of.input->dicom->padding->low, of.input->dicom->padding->high};
+  if (of.input->dicom->padding)
+    document["padding_hu"] = {of.input->dicom->padding->low, of.input->dicom->padding->high};
   return document;
 }
 

@@ -23,6 +23,10 @@ void Deformation::open() {
   const Stage stage(options_.common, "open");
   const InputHeader& header = input_->open(options_.common);
   record_.plan = plan_deformation(options_, record_.outputs, header);
+  file_notes_ = header.notes;
+  for (const std::filesystem::path& file : {std::filesystem::path(options_.grid), options_.labels}) {
+    for (std::string& note : notes_of_file(file, options_.common.nifti_frame)) file_notes_.push_back(std::move(note));
+  }
   record_.points.read();
   if (header.series) note_series(*header.series);
   open_seconds_ = stage.seconds();
@@ -63,7 +67,8 @@ void Deformation::make_field(const Worker& worker) {
         read_pull_field(options_.pull_field, grid, record_.plan.grid, options_.common, stage.control(), record_.field);
   }
   if (options_.grid == "fit")
-    record_.plan.grid = output_grid("fit", grid, record_.field.forward.field, options_.outside);
+    record_.plan.grid =
+        output_grid("fit", grid, record_.field.forward.field, options_.outside, options_.common.nifti_frame);
   if (is_same_grid(options_.grid) && record_.plan.grid != grid) {
     record_.field.notes.push_back(std::string("INPUT's slices ") +
                                   (is_sheared(grid) ? "lean" : "lie at uneven distances") +
@@ -286,6 +291,7 @@ std::vector<std::string> Deformation::notes() const {
     for (const std::string& line : lines) notes.push_back(kind + line);
   };
   add("warning: ", warnings_);
+  add("note: ", file_notes_);
   add("note: ", record_.field.notes);
   add("note: ", record_.outputs.further->notes());
   add("note: ", record_.points.notes());

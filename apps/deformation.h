@@ -60,7 +60,7 @@ class Deformation {
   DeformRecord record_;
   std::shared_ptr<SharedInput> input_;
   double open_seconds_ = 0;
-  std::vector<std::string> warnings_;
+  std::vector<std::string> warnings_, file_notes_;
   struct {
     AnyVolume source, resampled;
     Maps maps;  ///< of the slab that is resampled

@@ -25,6 +25,7 @@ int run_field(const FieldOptions& options) {
               ", has no lattice that a field file could hold; give it to deform or invert");
   outputs.write([&] { write_field_file(output, source.field); });
   outputs.commit();
+  for (const std::string& note : like.notes) say(options.common, "tetwarp: note: " + note);
   for (const std::string& note : source.notes) say(options.common, "tetwarp: note: " + note);
   say(options.common,
       "wrote " + options.output.string() + ": forward field, " + to_string(source.field.lattice.size) + " vertices");

@@ -24,11 +24,17 @@ PointMap formula_map(const std::string& text, const Geometry& volume) {
   }
 }
 
-VertexField read_file(const std::string& text, const Geometry& volume, ForwardField& result) {
-  const FieldSource source = field_source(text, volume);
+/// What the header of a field file has to say.
+void note_header(const FieldFileHeader& header, const std::string& path, std::vector<std::string>& notes) {
+  for (const std::string& note : header.notes) notes.push_back(path + ": " + note);
+}
+
+VertexField read_file(const std::string& text, const Geometry& volume, NiftiFrame frame, ForwardField& result) {
+  const FieldSource source = field_source(text, volume, frame);
   const FieldFileHeader header = read_field_header(source);
   const std::string path = source.path.string();
   if (!header.direction) result.notes.push_back(path + " does not say its direction: taken as forward");
+  note_header(header, path, result.notes);
   result.files.push_back({path, header});
   return tetwarp::read_forward_field(source);
 }
@@ -110,9 +116,10 @@ NamedMap map_of(const std::string& text, const Geometry& volume) {
 
 }  // namespace
 
-FieldSource field_source(const std::string& text, const std::optional<Geometry>& volume) {
+FieldSource field_source(const std::string& text, const std::optional<Geometry>& volume, NiftiFrame frame) {
   try {
     FieldSource source = parse_field_source(text);
+    source.nifti_frame = frame;
     if (is_mesh_file(source.path)) {
       check_mesh_options(source);
     } else {
@@ -167,7 +174,7 @@ std::vector<std::filesystem::path> field_files(const std::vector<std::string>& f
 }
 
 std::uint64_t field_bytes(const std::vector<std::string>& fields, const Geometry& volume,
-                          std::optional<std::int64_t> cell_size) {
+                          std::optional<std::int64_t> cell_size, NiftiFrame frame) {
   for (const std::string& text : fields) check_transform(text);
   const FieldKind kind = kind_of(fields.front());
   if (kind == FieldKind::mesh) {
@@ -177,8 +184,9 @@ std::uint64_t field_bytes(const std::vector<std::string>& fields, const Geometry
     const MeshFileHeader header = read_mesh_header(field_source(fields.front()));
     return header.vertices * kVertex + header.tetrahedra * kTetrahedron;
   }
-  const glm::i64vec3 size = kind == FieldKind::lattice ? read_field_header(field_source(fields.front())).grid.size
-                                                       : lattice_over(straightened(volume), cell_size.value_or(1)).size;
+  const glm::i64vec3 size = kind == FieldKind::lattice
+                                ? read_field_header(field_source(fields.front(), {}, frame)).grid.size
+                                : lattice_over(straightened(volume), cell_size.value_or(1)).size;
   return static_cast<std::uint64_t>(size.x * size.y * size.z) * sizeof(glm::vec3);
 }
 
@@ -198,7 +206,7 @@ ForwardField read_forward_field(const std::vector<std::string>& fields, const Ge
       continue;
     }
     if (kind == FieldKind::lattice) {
-      VertexField next = read_file(text, volume, result);
+      VertexField next = read_file(text, volume, common.nifti_frame, result);
       if (n == 0)
         result.field = std::move(next);
       else
@@ -218,8 +226,8 @@ ForwardField read_forward_field(const std::vector<std::string>& fields, const Ge
 namespace {
 
 /// Of a pull field. @throws InputError for a mesh, which is a forward one
-FieldSource pull_source(const std::string& text, const std::optional<Geometry>& volume = {}) {
-  FieldSource source = field_source(text, volume);
+FieldSource pull_source(const std::string& text, const std::optional<Geometry>& volume, NiftiFrame frame) {
+  FieldSource source = field_source(text, volume, frame);
   require(!is_mesh_file(source.path),
           "a mesh, " + source.path.string() + ", says where its vertices go; give it with -f");
   return source;
@@ -235,16 +243,17 @@ PullField read_pull_field(const std::string& text, const Geometry& volume, const
     note_transform(transform, text, Direction::pull, found.notes);
     return {sampled.lattice, std::move(sampled.displacement)};
   }
-  const FieldSource source = pull_source(text, volume);
+  const FieldSource source = pull_source(text, volume, common.nifti_frame);
   const std::string path = source.path.string();
   found.files.push_back({path, read_field_header(source)});
   if (!found.files.back().header.direction)
     found.notes.push_back(path + " does not say its direction: taken as output to input");
+  note_header(found.files.back().header, path, found.notes);
   return tetwarp::read_pull_field(source);
 }
 
-glm::i64vec3 pull_grid_size(const std::string& text, const Geometry& output) {
-  if (!is_transform_file(text)) return read_field_header(pull_source(text)).grid.size;
+glm::i64vec3 pull_grid_size(const std::string& text, const Geometry& output, NiftiFrame frame) {
+  if (!is_transform_file(text)) return read_field_header(pull_source(text, {}, frame)).grid.size;
   check_transform(text);
   return output.size;
 }

@@ -45,7 +45,8 @@ struct AnyField {
 
 /// A file from the command line, `PATH` or `PATH:KEY=VALUE,...`, for a volume. It is not read yet and need not exist.
 /// @throws UsageError for options that do not go with it
-FieldSource field_source(const std::string& text, const std::optional<Geometry>& volume = {});
+FieldSource field_source(const std::string& text, const std::optional<Geometry>& volume = {},
+                         NiftiFrame frame = NiftiFrame::sform);
 
 /// Formulas, transforms and fields, composed vertex by vertex, the first applied first. The lattice is that of the
 /// first if it is a field file, else one over `volume` with a vertex every `cell_size` voxels. If the first is a mesh,
@@ -68,7 +69,7 @@ std::vector<std::filesystem::path> field_files(const std::vector<std::string>& f
 /// Memory of the field that `read_forward_field` will make, with what a mesh needs beside its own. Transforms and
 /// meshes are read, so that a bad one is known early.
 std::uint64_t field_bytes(const std::vector<std::string>& fields, const Geometry& volume,
-                          std::optional<std::int64_t> cell_size);
+                          std::optional<std::int64_t> cell_size, NiftiFrame frame);
 
 /// The pull field of a file for `volume`, or a transform sampled at every voxel centre of `output`.
 /// @param found  receives what was read and what was assumed
@@ -76,7 +77,7 @@ PullField read_pull_field(const std::string& text, const Geometry& volume, const
                           const CommonOptions& common, const Control& control, AnyField& found);
 
 /// Size of the grid that `read_pull_field` will give. A transform is read.
-glm::i64vec3 pull_grid_size(const std::string& text, const Geometry& output);
+glm::i64vec3 pull_grid_size(const std::string& text, const Geometry& output, NiftiFrame frame);
 
 /// What a header says and how that is known, without the grid.
 nlohmann::json to_json(const FieldFileHeader& header);

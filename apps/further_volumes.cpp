@@ -73,10 +73,12 @@ std::vector<std::filesystem::path> FurtherVolumes::inputs(const std::vector<std:
   return paths;
 }
 
-FurtherVolumes::FurtherVolumes(const std::vector<std::string>& texts, bool series, OutputSet& outputs) {
+FurtherVolumes::FurtherVolumes(const std::vector<std::string>& texts, bool series, NiftiFrame frame,
+                               OutputSet& outputs) {
   for (const std::string& text : texts) {
     One& one = volumes_.emplace_back();
     one.options = parse_further(text);
+    one.options.input.nifti_frame = frame;
     if (!series && is_object_output(one.options.output)) {
       throw UsageError("a DICOM object refers to a DICOM series, " + one.options.output.string() +
                        "; name a folder as OUTPUT, or .nii.gz, .nii, .nrrd or .mha here");
@@ -94,6 +96,7 @@ void FurtherVolumes::open(const InputHeader& input) {
       one.header = {one.segmentation->geometry, VoxelType::u8, {}, false, 1};
     } else {
       one.header = open_input(one.options.input, {.stop = interrupt_token()}, true);
+      notes_.insert(notes_.end(), one.header.notes.begin(), one.header.notes.end());
     }
     one.own_grid = one.segmentation ? own_grid(*one.segmentation, input.geometry) : straightened(one.header.geometry);
     if (one.options.background && !fits(one.header.type, *one.options.background)) {

@@ -20,7 +20,7 @@ class FurtherVolumes {
  public:
   /// Begins their outputs. @param series  whether OUTPUT is a DICOM series, to which DICOM objects can refer
   /// @throws UsageError, and what OutputSet::add throws
-  FurtherVolumes(const std::vector<std::string>& texts, bool series, OutputSet& outputs);
+  FurtherVolumes(const std::vector<std::string>& texts, bool series, NiftiFrame frame, OutputSet& outputs);
 
   /// All inputs, for OutputSet.
   static std::vector<std::filesystem::path> inputs(const std::vector<std::string>& texts);

@@ -23,6 +23,7 @@ json describe_field(const FieldSource& source) {
   json document = to_json(header);
   document["path"] = source.path.string();
   document["kind"] = "field";
+  document["notes"] = header.notes;
   const glm::i64vec3& size = header.grid.size;
   document["lattice"] = header.has_own_grid ? to_json(header.grid) : json{{"size", {size.x, size.y, size.z}}};
   return document;
@@ -67,13 +68,14 @@ json describe_transform(const std::filesystem::path& path) {
           {"absolute", true}};
 }
 
-json describe_image(const std::filesystem::path& path) {
-  const ImageHeader header = read_image_header(path);
+json describe_image(const std::filesystem::path& path, NiftiFrame frame) {
+  const ImageHeader header = read_image_header(path, frame);
   return {{"path", path.string()},
           {"kind", "volume"},
           {"voxel_type", to_string(header.type)},
           {"components", header.components},
-          {"geometry", to_json(header.geometry)}};
+          {"geometry", to_json(header.geometry)},
+          {"notes", header.notes}};
 }
 
 json describe_dose(const std::filesystem::path& path) {
@@ -111,9 +113,13 @@ void print_field(const json& document) {
               document["absolute"].get<bool>() ? "positions" : "displacements", text(known["absolute"]).c_str(),
               text(document["frame"]).c_str(), text(known["frame"]).c_str(), text(document["units"]).c_str(),
               text(known["units"]).c_str());
-  if (document["lattice"].contains("origin_lps_mm")) return print_grid(document["lattice"]);
-  std::printf("  size         %s\n", triple(document["lattice"]["size"]).c_str());
-  std::printf("  place        that of the volume\n");
+  if (document["lattice"].contains("origin_lps_mm")) {
+    print_grid(document["lattice"]);
+  } else {
+    std::printf("  size         %s\n", triple(document["lattice"]["size"]).c_str());
+    std::printf("  place        that of the volume\n");
+  }
+  print_lines("notes:", document["notes"]);
 }
 
 void print_mesh(const json& document) {
@@ -159,6 +165,7 @@ void print_file(const json& document) {
       std::printf("  dose         %s\n", document["dose_units"].get<std::string>().c_str());
     }
     print_grid(document["geometry"]);
+    if (document.contains("notes")) print_lines("notes:", document["notes"]);
   }
 }
 
@@ -166,8 +173,8 @@ void print_file(const json& document) {
 
 int run_info(const InfoOptions& options) {
   refuse_pipes(options.input.path);
-  const FieldSource source = field_source(options.input.path.string());
-  const bool field = is_field_file(source.path), mesh = !field && is_mesh_file(source.path);
+  const FieldSource source = field_source(options.input.path.string(), {}, options.common.nifti_frame);
+  const bool field = is_field_file(source), mesh = !field && is_mesh_file(source.path);
   const std::filesystem::path& path = field ? source.path : options.input.path;
   const bool transform = !field && !mesh && is_transform_file(path) && !std::filesystem::is_directory(path);
   const bool other = field || mesh || transform || has_image_suffix(path), dose = !other && is_dicom_dose(path),
@@ -190,7 +197,7 @@ int run_info(const InfoOptions& options) {
     if (mesh) return describe_mesh(source);
     if (transform) return describe_transform(path);
     if (dose) return describe_dose(path);
-    return field ? describe_field(source) : describe_image(path);
+    return field ? describe_field(source) : describe_image(path, options.common.nifti_frame);
   }();
   if (options.json)
     print_json(document);

@@ -68,6 +68,11 @@ const std::vector<LeftOutFile>& set_aside_with(const DicomScan& scan, const Dico
   return scan.series[first].set_aside;
 }
 
+std::vector<std::string> named(std::vector<std::string> notes, const std::filesystem::path& file) {
+  for (std::string& note : notes) note.insert(0, file.string() + ": ");
+  return notes;
+}
+
 double smallest_value(const AnyVolume& volume) {
   return dispatch(volume.type(), [&](auto voxel) {
     using V = decltype(voxel);
@@ -125,10 +130,10 @@ InputHeader open_input(const InputOptions& options, const Control& control, bool
     if (!options.series.empty() || options.single) {
       throw UsageError("--series and --single are for DICOM, " + options.path.string() + "; leave them out");
     }
-    const ImageHeader header = read_image_header(options.path);
+    const ImageHeader header = read_image_header(options.path, options.nifti_frame);
     require(components || header.components == 1, std::to_string(header.components) + " components a voxel, " +
                                                       options.path.string() + "; expected a volume with one");
-    return {header.geometry, header.type, {}, false, header.components};
+    return {header.geometry, header.type, {}, false, header.components, named(header.notes, options.path)};
   }
   if (is_dicom_dose(options.path)) return {read_dose_header(options.path).geometry, VoxelType::f32, {}, true, 1};
   if (options.single && std::filesystem::is_directory(options.path)) {
@@ -154,7 +159,7 @@ InputVolume read_input(const InputOptions& options, const InputHeader& header, c
                        const Control& control) {
   InputVolume input;
   if (!header.series) {
-    input.volume = header.dose ? read_dose(options.path) : read_image(options.path);
+    input.volume = header.dose ? read_dose(options.path) : read_image(options.path, options.nifti_frame);
     input.background = smallest_value(input.volume);
     return input;
   }
@@ -162,6 +167,11 @@ InputVolume read_input(const InputOptions& options, const InputHeader& header, c
   input.background = input.dicom->padding ? input.dicom->padding->low : kAirHu;
   input.volume = AnyVolume(std::move(input.dicom->volume));
   return input;
+}
+
+std::vector<std::string> notes_of_file(const std::filesystem::path& path, NiftiFrame frame) {
+  if (!has_image_suffix(path)) return {};
+  return named(read_image_header(path, frame).notes, path);
 }
 
 bool fits(VoxelType type, double value) {

@@ -14,9 +14,10 @@ namespace tetwarp::apps {
 struct InputHeader {
   Geometry geometry;
   VoxelType type = VoxelType::i16;
-  std::optional<DicomSeries> series;  ///< of a DICOM series; its warnings are for people
-  bool dose = false;                  ///< a DICOM RT Dose file
-  int components = 1;                 ///< values a voxel
+  std::optional<DicomSeries> series;    ///< of a DICOM series; its warnings are for people
+  bool dose = false;                    ///< a DICOM RT Dose file
+  int components = 1;                   ///< values a voxel
+  std::vector<std::string> notes = {};  ///< for people, of a file: "FILE: ..."
 };
 
 /// A volume as read, from a DICOM series or a file.
@@ -42,6 +43,9 @@ InputHeader open_input(const InputOptions& options, const CommonOptions& common,
 /// Reads the voxels of what `open_input` found.
 InputVolume read_input(const InputOptions& options, const InputHeader& header, const CommonOptions& common,
                        const Control& control);
+
+/// What is to be said of a volume file that is read for its grid or values: "FILE: ..."; nothing of what is none.
+std::vector<std::string> notes_of_file(const std::filesystem::path& path, NiftiFrame frame);
 
 /// The index of the series that is taken without --series: the only one that holds CT slices, usable or not, or the
 /// only one at all.

@@ -216,6 +216,7 @@ int run_invert(const InvertOptions& options) {
   Stage field_stage(options.common, "field");
   const Geometry grid = straightened(like.geometry);
   Invertible field = read_invertible(options, like.geometry, field_stage.control());
+  field.notes.insert(field.notes.begin(), like.notes.begin(), like.notes.end());
   const double field_seconds = field_stage.seconds();
   std::optional<UnwrittenSeries> series;
   if (registers) series.emplace(options, like, field, Control{.stop = interrupt_token()});

@@ -38,6 +38,21 @@ void add_series(CLI::App& command, InputOptions& input) {
       ->default_str("refuse");
 }
 
+void add_nifti_frame(CLI::App& command, CommonOptions& common, InputOptions& input) {
+  command
+      .add_option_function<std::string>(
+          "--nifti-frame",
+          [&common, &input](const std::string& name) {
+            common.nifti_frame = input.nifti_frame = name == "qform" ? NiftiFrame::qform : NiftiFrame::sform;
+          },
+          "What places a NIfTI file that has both: its sform, as nibabel and FSL have it, or its qform, which ITK "
+          "takes "
+          "unless the sform's code is 1. For every file that is read")
+      ->check(CLI::IsMember({"sform", "qform"}))
+      ->type_name("sform|qform")
+      ->default_str("sform");
+}
+
 void add_backend(CLI::App& command, std::string& backend, int& device, const char* help) {
   command.add_option("--backend", backend, help)->check(CLI::IsMember({"auto", "cuda", "cpu"}))->capture_default_str();
   command.add_option("--device", device, "CUDA device, as `tetwarp --version` numbers them")

@@ -15,6 +15,8 @@ extern const char* const kFieldHelp;
 void add_common(CLI::App& command, CommonOptions& common, bool writes);
 /// --series, --single, --uneven.
 void add_series(CLI::App& command, InputOptions& input);
+/// --nifti-frame, for `input` and all else that the command reads.
+void add_nifti_frame(CLI::App& command, CommonOptions& common, InputOptions& input);
 /// --backend, --device.
 void add_backend(CLI::App& command, std::string& backend, int& device,
                  const char* help = "auto, cuda or cpu: the bits are the same");

@@ -10,6 +10,7 @@
 #include "deform/errors.h"
 #include "deform/resampler.h"
 #include "io/dicom_series.h"
+#include "io/image_file.h"
 
 namespace tetwarp::apps {
 
@@ -23,15 +24,17 @@ class UsageError : public Error {
 struct CommonOptions {
   bool quiet = false, verbose = false, overwrite = false;
   int threads = 0;
+  NiftiFrame nifti_frame = NiftiFrame::sform;  ///< of every file that is read
 };
 
 /// A volume to read: a file, or a DICOM series of a folder.
 struct InputOptions {
   std::filesystem::path path;
-  std::string series;   ///< UID, or the number that `info` prints; empty: the only one
-  bool single = false;  ///< read the one DICOM file alone
-  bool uneven = false;  ///< take slices at uneven distances, each where it is
+  std::string series;              ///< UID, or the number that `info` prints; empty: the only one
+  bool single = false;             ///< read the one DICOM file alone
+  bool uneven = false;             ///< take slices at uneven distances, each where it is
   FileHash hash = FileHash::made;  ///< of a DICOM series
+  NiftiFrame nifti_frame = NiftiFrame::sform;
 
   friend bool operator==(const InputOptions&, const InputOptions&) = default;
 };

@@ -95,10 +95,11 @@ void check_grid(const std::string& wanted, bool pull) {
   }
 }
 
-Geometry output_grid(const std::string& wanted, const Geometry& input, const VertexField& field, Outside outside) {
+Geometry output_grid(const std::string& wanted, const Geometry& input, const VertexField& field, Outside outside,
+                     NiftiFrame frame) {
   const Geometry volume = straightened(input);
   if (is_same_grid(wanted)) return volume;
-  if (has_image_suffix(wanted)) return read_image_header(wanted).geometry;
+  if (has_image_suffix(wanted)) return read_image_header(wanted, frame).geometry;
   if (wanted != "fit") {
     InputOptions like;
     like.path = wanted;

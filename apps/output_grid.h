@@ -20,6 +20,7 @@ bool is_same_grid(const std::string& wanted);
 /// @param field   not used but for "fit"
 /// @throws InputError for a file that is no volume, or a lattice that does not reach over the volume where `outside`
 ///         refuses that
-Geometry output_grid(const std::string& wanted, const Geometry& input, const VertexField& field, Outside outside);
+Geometry output_grid(const std::string& wanted, const Geometry& input, const VertexField& field, Outside outside,
+                     NiftiFrame frame);
 
 }  // namespace tetwarp::apps

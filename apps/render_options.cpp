@@ -109,6 +109,7 @@ void add_render(CLI::App& app, RenderOptions& options) {
       ->check(CLI::Range(0.1, 120.0))
       ->capture_default_str();
   add_series(*command, options.input);
+  add_nifti_frame(*command, options.common, options.input);
   add_backend(*command, options.backend, options.device);
   add_common(*command, options.common, true);
   command->footer("Example: tetwarp render ct_folder -o bones.png --transfer ct-bone --angle 30 -f twist:angle=20");

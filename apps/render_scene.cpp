@@ -78,6 +78,7 @@ RenderScene::RenderScene(const RenderOptions& options) : options_(options), inpu
   if (!options.sequence.empty()) check_fields(options.sequence, {});
   header_ = open_input(input_options_, options.common);
   grid_ = straightened(header_.geometry);
+  notes_ = header_.notes;
 }
 
 RenderScene::~RenderScene() = default;
@@ -112,7 +113,8 @@ void RenderScene::read() {
       lattice_resampler_->set_field(view(drawn_lattice_, Outside::background), {.stop = interrupt_token()});
       continue;
     }
-    auto map = std::make_shared<AnyVolume>(read_image(wish.source));
+    for (std::string& note : notes_of_file(wish.source, options_.common.nifti_frame)) notes_.push_back(std::move(note));
+    auto map = std::make_shared<AnyVolume>(read_image(wish.source, options_.common.nifti_frame));
     require(same_grid(map->geometry(), grid_, 0.01 * std::min({grid_.spacing.x, grid_.spacing.y, grid_.spacing.z})) &&
                 map->components() == 1,
             "an overlay has one value at each voxel of VOLUME, " + to_string(grid_.size) + ", found " +
@@ -129,7 +131,7 @@ void RenderScene::read_fields(const Control& control) {
     for (const std::string& note : field_.notes) notes_.push_back(note);
   } else if (options_.sequence.empty()) {
     field_.forward = read_forward_field(options_.fields, source, options_.cell_size, options_.common, control);
-    notes_ = field_.forward.notes;
+    notes_.insert(notes_.end(), field_.forward.notes.begin(), field_.forward.notes.end());
   }
 }
 

@@ -56,7 +56,7 @@ class Simulating {
   Scenario scenario_;
   Outputs outputs_;
   Patient patient_;
-  std::vector<std::string> notes_;
+  std::vector<std::string> warnings_, notes_;
   double read_seconds_ = 0, prepare_seconds_ = 0, write_seconds_ = 0;
 };
 
@@ -65,11 +65,14 @@ void Simulating::read() {
   {
     Stage stage(options_.common, "read");
     const InputHeader header = open_input(options_.input, options_.common);
-    if (header.series) notes_ = header.series->warnings;
+    if (header.series) warnings_ = header.series->warnings;
+    notes_ = header.notes;
     volume = read_input(options_.input, header, options_.common, stage.control()).volume;
     if (!options_.labels.empty()) {
-      const InputOptions from{.path = options_.labels, .series = {}};
-      labels = read_input(from, open_input(from, options_.common), options_.common, stage.control()).volume;
+      const InputOptions from{.path = options_.labels, .series = {}, .nifti_frame = options_.common.nifti_frame};
+      const InputHeader labels_header = open_input(from, options_.common);
+      notes_.insert(notes_.end(), labels_header.notes.begin(), labels_header.notes.end());
+      labels = read_input(from, labels_header, options_.common, stage.control()).volume;
     }
     read_seconds_ = stage.seconds();
   }
@@ -128,7 +131,8 @@ int Simulating::run() {
   const std::unique_ptr<ScenarioRun> begun = begin(backend.make);
   ScenarioRun& run = *begun;
   SimulateRecord record{options_, scenario_, patient_, run, backend.name};
-  for (const std::string& note : notes_) say(options_.common, "tetwarp: warning: " + note);
+  for (const std::string& warning : warnings_) say(options_.common, "tetwarp: warning: " + warning);
+  for (const std::string& note : notes_) say(options_.common, "tetwarp: note: " + note);
   if (options_.dry_run) {
     for (const std::string& warning : warnings_of(record)) say(options_.common, "tetwarp: warning: " + warning);
     say(options_.common, "would simulate: " + describe(record));

@@ -248,10 +248,10 @@ bool claims(const std::filesystem::path&, std::string_view first_bytes) {
   return first_bytes.substr(std::min(kMagicOffset, first_bytes.size())).starts_with(kMagic);
 }
 
-bool holds_field(const std::filesystem::path& path) {
+bool holds_field(const FieldSource& source) {
   prepare_dcmtk();
   DcmFileFormat format;
-  return parse_dicom(format, path, DCM_StudyDate).result.good() &&
+  return parse_dicom(format, source.path, DCM_StudyDate).result.good() &&
          text_of(*format.getDataset(), DCM_SOPClassUID) == UID_DeformableSpatialRegistrationStorage;
 }
 

@@ -124,9 +124,9 @@ void check_field_options(const FieldSource& source) {
                                       "\" for " + source.path.string() + "; files of its format take none");
 }
 
-bool is_field_file(const std::filesystem::path& path) {
-  const FieldFormat* format = format_of(path);
-  return format && (!format->holds_field || format->holds_field(path));
+bool is_field_file(const FieldSource& source) {
+  const FieldFormat* format = format_of(source.path);
+  return format && (!format->holds_field || format->holds_field(source));
 }
 
 FieldFileHeader read_field_header(const FieldSource& source) { return open_field(source)->header(); }

@@ -41,6 +41,7 @@ struct FieldFileHeader {
   std::string frame = "LPS";                ///< LPS, RAS, or index: along the grid's i, j, k
   std::string units = "mm";                 ///< mm or voxel
   bool absolute = false;                    ///< displacements, not positions
+  std::vector<std::string> notes = {};      ///< for people, without the file's name
   FieldBasis direction_basis = FieldBasis::assumed, frame_basis = FieldBasis::assumed,
              units_basis = FieldBasis::assumed, absolute_basis = FieldBasis::assumed;
 };
@@ -52,6 +53,7 @@ struct FieldSource {
   std::filesystem::path path;
   std::map<std::string, std::string> options;  ///< docs/fields.md lists them by format: "order" is "zyx"
   std::optional<Geometry> grid;                ///< of the volume that the field is for
+  NiftiFrame nifti_frame = NiftiFrame::sform;
 
   /// The value of an option, or another where it was not given.
   std::string option(const std::string& key, const std::string& otherwise = "") const;
@@ -65,7 +67,7 @@ FieldSource parse_field_source(const std::string& text);
 void check_field_options(const FieldSource& source);
 
 /// Whether a format of io/field_format.h takes the file, and it holds vectors (not a volume).
-bool is_field_file(const std::filesystem::path& path);
+bool is_field_file(const FieldSource& source);
 
 /// Reads a file of any format of io/field_format.h (docs/fields.md lists them); doubles are rounded to float.
 /// Direction: NRRD and MHA key `tetwarp_direction`, NIfTI descrip `tetwarp_direction=forward`, or the format's own.

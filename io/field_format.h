@@ -35,7 +35,7 @@ struct FieldFormat {
   /// shorter file, none where it cannot be read).
   bool (*claims)(const std::filesystem::path& path, std::string_view first_bytes);
   /// Whether a claimed file holds a field rather than a volume; null: always. @throws InputError as `open`
-  bool (*holds_field)(const std::filesystem::path& path);
+  bool (*holds_field)(const FieldSource& source);
   /// @throws InputError naming the file and what to give; null: the format takes no options
   void (*check_options)(const FieldSource& source);
   /// Reads and checks the header; allocates nothing that the file's length does not warrant. @throws InputError

@@ -34,7 +34,7 @@ class ImageFieldReader final : public FieldReader {
 
 bool claims(const std::filesystem::path& path, std::string_view) { return has_image_suffix(path); }
 
-bool holds_field(const std::filesystem::path& path) { return read_image_header(path).components == 3; }
+bool holds_field(const FieldSource& source) { return read_image_header(source.path).components == 3; }
 
 std::unique_ptr<FieldReader> open(const FieldSource& source) {
   auto image = open_vectors(source.path);
@@ -51,8 +51,8 @@ std::unique_ptr<FieldReader> open(const FieldSource& source) {
 
 const FieldFormat kFieldFormat_image = {claims, holds_field, nullptr, open};
 
-std::unique_ptr<ImageReader> open_vectors(const std::filesystem::path& path) {
-  auto reader = open_image(path);
+std::unique_ptr<ImageReader> open_vectors(const std::filesystem::path& path, NiftiFrame frame) {
+  auto reader = open_image(path, frame);
   const ImageHeader& header = reader->header();
   require(header.components == 3 && (header.type == VoxelType::f32 || header.type == VoxelType::f64),
           "not a displacement field, " + path.string() + ": " + std::to_string(header.components) + " x " +

@@ -17,7 +17,7 @@ inline constexpr const char* kDirectionKey = "tetwarp_direction";
 extern const FieldFormat kFieldFormat_image;
 
 /// @throws InputError unless it has three floats or doubles a voxel
-std::unique_ptr<ImageReader> open_vectors(const std::filesystem::path& path);
+std::unique_ptr<ImageReader> open_vectors(const std::filesystem::path& path, NiftiFrame frame = NiftiFrame::sform);
 
 /// The direction by `kDirectionKey` and what follows from it: Tetwarp writes the key only to LPS mm displacements.
 /// @throws InputError for a direction that is neither

@@ -33,9 +33,6 @@ void describe_niftyreg(const NiftiHeader& nifti, const std::string& file, FieldF
   const char* refused = kNiftyRegRefused[static_cast<std::size_t>(nifti.intent_p1)];
   require(refused == nullptr, std::string(refused ? refused : "") + " of NiftyReg (intent_p1 " + type + "), " + file +
                                   "; make a displacement field of it with reg_transform -disp");
-  // NiftyReg goes by the sform where there is one, whatever its code.
-  require(nifti.sform_code <= 0 || same_grid(header.grid, nifti.sform, 0.01),
-          "a NiftyReg field whose qform and sform differ, " + file + "; correct the header");
   header.absolute = nifti.intent_p1 == 0;
   header.format = std::string("NIfTI, NiftyReg ") + (header.absolute ? "deformation field" : "displacement field");
   header.direction = FieldDirection::pull;
@@ -76,15 +73,22 @@ class NiftiFieldReader final : public FieldReader {
 
 bool claims(const std::filesystem::path& path, std::string_view) { return image_format(path) == ImageFormat::nifti; }
 
-bool holds_field(const std::filesystem::path& path) {
-  return read_image_header(path).components == 3 && !is_niftyreg_spline(read_nifti_header(path));
+/// NiftyReg goes by the sform where there is one, whatever its code and whoever asks.
+NiftiFrame frame_of(const FieldSource& source, const NiftiHeader& nifti) {
+  return nifti.intent_name.starts_with("NREG_") ? NiftiFrame::sform : source.nifti_frame;
+}
+
+bool holds_field(const FieldSource& source) {
+  const NiftiHeader nifti = read_nifti_header(source.path);
+  return read_image_header(source.path, frame_of(source, nifti)).components == 3 && !is_niftyreg_spline(nifti);
 }
 
 std::unique_ptr<FieldReader> open(const FieldSource& source) {
   const std::string file = source.path.string();
-  auto image = open_vectors(source.path);
   const NiftiHeader nifti = read_nifti_header(source.path);
+  auto image = open_vectors(source.path, frame_of(source, nifti));
   FieldFileHeader header;
+  header.notes = image->header().notes;
   header.grid = image->header().geometry;
   header.format = "NIfTI, intent 1007 (VECTOR)";
   if (nifti.intent_name.starts_with("NREG_")) {

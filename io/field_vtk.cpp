@@ -218,7 +218,7 @@ bool claims(const std::filesystem::path& path, std::string_view first_bytes) {
          vtk_dataset(path) != VtkDataset::unstructured_grid;
 }
 
-bool holds_field(const std::filesystem::path& path) { return vtk_dataset(path) != VtkDataset::other; }
+bool holds_field(const FieldSource& source) { return vtk_dataset(source.path) != VtkDataset::other; }
 
 std::unique_ptr<FieldReader> open(const FieldSource& source) {
   check_options(source);

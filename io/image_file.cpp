@@ -86,8 +86,8 @@ std::unique_ptr<ImageReader> open_mha(const std::filesystem::path& path, const T
                            {.encoding = zlib ? Encoding::zlib : Encoding::raw, .big_endian = is_big_endian(text)});
 }
 
-std::unique_ptr<ImageReader> open_format(const std::filesystem::path& path, ImageFormat format) {
-  if (format == ImageFormat::nifti) return open_nifti(path);
+std::unique_ptr<ImageReader> open_format(const std::filesystem::path& path, ImageFormat format, NiftiFrame frame) {
+  if (format == ImageFormat::nifti) return open_nifti(path, frame);
   const TextHeader text = read_text_header(path, format);
   const ItkImageInfo info = itk_read_info(path, itk_format(format));
   const Stored stored{text.data_offset, size_bytes(info.type), is_encoded(text, format)};
@@ -131,7 +131,7 @@ std::unique_ptr<ImageWriter> create_format(const std::filesystem::path& path, Im
   throw NotCompiled("NIfTI needs ITK, which this build does not have, " + path.string() + "; use .nrrd or .mha");
 }
 
-std::unique_ptr<ImageReader> open_format(const std::filesystem::path& path, ImageFormat format) {
+std::unique_ptr<ImageReader> open_format(const std::filesystem::path& path, ImageFormat format, NiftiFrame) {
   if (format == ImageFormat::nifti) no_nifti(path);
   return open_raw_image(path, format);
 }
@@ -179,11 +179,11 @@ void require_readable_file(const std::filesystem::path& path) {
   require(::access(path.c_str(), R_OK) == 0, "a file that may not be read, " + file + "; check its rights");
 }
 
-std::unique_ptr<ImageReader> open_image(const std::filesystem::path& path) {
+std::unique_ptr<ImageReader> open_image(const std::filesystem::path& path, NiftiFrame frame) {
   const std::string file = path.string();
   const ImageFormat format = required_format(path);
   require_readable_file(path);
-  auto reader = open_format(path, format);
+  auto reader = open_format(path, format, frame);
   require_valid(reader->header().geometry, file);
   require_orthogonal(reader->header().geometry, file);
   require(reader->header().components >= 1,
@@ -192,10 +192,12 @@ std::unique_ptr<ImageReader> open_image(const std::filesystem::path& path) {
   return reader;
 }
 
-ImageHeader read_image_header(const std::filesystem::path& path) { return open_image(path)->header(); }
+ImageHeader read_image_header(const std::filesystem::path& path, NiftiFrame frame) {
+  return open_image(path, frame)->header();
+}
 
-AnyVolume read_image(const std::filesystem::path& path) {
-  const auto reader = open_image(path);
+AnyVolume read_image(const std::filesystem::path& path, NiftiFrame frame) {
+  const auto reader = open_image(path, frame);
   const ImageHeader& header = reader->header();
   AnyVolume volume(header.geometry, header.type, header.components);
   reader->read({volume.data(), volume.size_bytes()});

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "deform/volume.h"
 
@@ -12,6 +14,10 @@ namespace tetwarp {
 
 /// Whether the name ends in a suffix of a volume file: .nii .nii.gz .nrrd .mha (upper or lower case).
 bool has_image_suffix(const std::filesystem::path& path);
+
+/// Which of the two places of a NIfTI file counts where it states both: the sform, as nibabel, FSL, SPM, FreeSurfer and
+/// NiftyReg have it, or the qform, as ITK has it unless the sform's code is 1. Without meaning for other files.
+enum class NiftiFrame : std::uint8_t { sform, qform };
 
 /// What a volume file says before its voxels are read.
 struct ImageHeader {
@@ -21,6 +27,7 @@ struct ImageHeader {
   /// Keys and values as the file has them. NIfTI: "descrip"; and "scaled" where scl_slope and scl_inter made float of
   /// it.
   std::map<std::string, std::string> metadata;
+  std::vector<std::string> notes = {};  ///< for people, without the file's name
 };
 
 struct ImageWriteOptions {
@@ -33,8 +40,8 @@ struct ImageWriteOptions {
 
 /// @throws InputError naming the file: missing, unreadable, truncated, an unknown suffix, not 3-D, a voxel type that
 ///         VoxelType does not have, a size that the file cannot hold, a geometry that is not finite or sheared
-ImageHeader read_image_header(const std::filesystem::path& path);
-AnyVolume read_image(const std::filesystem::path& path);
+ImageHeader read_image_header(const std::filesystem::path& path, NiftiFrame frame = NiftiFrame::sform);
+AnyVolume read_image(const std::filesystem::path& path, NiftiFrame frame = NiftiFrame::sform);
 
 /// A volume file that takes its slices one after the other: what was written need not stay in memory.
 ///

@@ -65,6 +65,6 @@ void require_readable_file(const std::filesystem::path& path);
 
 /// Reads and checks the header; a header that promises more than the file can hold is refused here, before anything is
 /// allocated. @throws InputError as `read_image_header`
-std::unique_ptr<ImageReader> open_image(const std::filesystem::path& path);
+std::unique_ptr<ImageReader> open_image(const std::filesystem::path& path, NiftiFrame frame = NiftiFrame::sform);
 
 }  // namespace tetwarp

@@ -11,9 +11,9 @@
 #include <utility>
 
 #include "deform/errors.h"
+#include "io/dicom_text.h"
 #include "io/gzip_inflate.h"
 #include "io/gzip_pieces.h"
-#include "itkbridge/image_io.h"
 
 namespace tetwarp {
 namespace {
@@ -179,32 +179,25 @@ class NiftiReader final : public ImageReader {
   VoxelType disk_;
 };
 
-/// Where ITK places the volume, with the digits of the header. ITK 5.2.1 takes displacement vectors (intent 1006) for
-/// an image of five axes: these are placed here, by its rule.
-Geometry placed_geometry(const std::filesystem::path& path, const NiftiHeader& header) {
-  const Geometry found = header.intent_code != 1006 ? itk_read_info(path, ItkFormat::nifti).geometry
-                         : sform_decides(header)    ? header.sform
-                                                    : header.qform;
-  const glm::i64vec3& size = found.size;
-  const double tolerance_mm =
-      0.01 + 1e-3 * static_cast<double>(std::max({size.x, size.y, size.z}));  // pixdim may be rounded
-  const bool as_sform = header.sform_code > 0 && same_grid(found, header.sform, tolerance_mm);
-  const bool as_qform = header.qform_code > 0 && same_grid(found, header.qform, tolerance_mm);
-  require(as_sform || (as_qform && !sform_decides(header)),
-          "a header that ITK places elsewhere than its sform or qform, " + path.string() + "; correct the header");
-  return as_sform ? header.sform : found;
+/// What people have to know of the place of a file whose forms differ.
+std::string note_of_forms(const NiftiHeader& header, NiftiFrame frame) {
+  const bool by_sform = frame == NiftiFrame::sform;
+  return "the sform (code " + std::to_string(header.sform_code) + ") and the qform (code " +
+         std::to_string(header.qform_code) + ") lie up to " + number(*header.apart_mm) + " mm apart: placed by the " +
+         (by_sform ? "sform, --nifti-frame qform takes the other" : "qform, as --nifti-frame says");
 }
 
 }  // namespace
 
-std::unique_ptr<ImageReader> open_nifti(const std::filesystem::path& path) {
+std::unique_ptr<ImageReader> open_nifti(const std::filesystem::path& path, NiftiFrame frame) {
   const std::string file = path.string();
   NiftiHeader header = read_nifti_header(path);
   const VoxelType disk = disk_type(header, file);
   const bool compressed = starts_like_gzip(path);
   require(!compressed || path.extension() != ".nii", "gzip data under a name in .nii, " + file + "; name it .nii.gz");
   ImageHeader image;
-  image.geometry = placed_geometry(path, header);
+  image.geometry = place_of(header, frame, path);
+  if (header.apart_mm) image.notes.push_back(note_of_forms(header, frame));
   image.components = header.dim[0] >= 5 ? static_cast<int>(header.dim[5]) : 1;
   image.type = disk;
   image.metadata["descrip"] = header.descrip;

@@ -1,12 +1,14 @@
 #pragma once
 
-// Private to io/. NIfTI-1 in one file (https://nifti.nimh.nih.gov, nifti1.h). ITK decides geometry on reading and makes
-// the header on writing; the voxels pass through here, for what ITK 5.2.1 does to them: NaN and infinity read as 0, the
-// voxels of x.nii taken for those of x.nii.gz, two copies in memory, one thread and one level of gzip.
+// Private to io/. NIfTI-1 in one file (https://nifti.nimh.nih.gov, nifti1.h). ITK makes the header on writing. Reading
+// is done here, for what ITK 5.2.1 does: NaN and infinity read as 0, the voxels of x.nii taken for those of x.nii.gz,
+// two copies in memory, one thread and one level of gzip; and a sform of code 2 or more, or one that it takes for
+// sheared, is passed over in silence.
 #include <array>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "io/image_reader.h"
@@ -20,17 +22,22 @@ struct NiftiHeader {
   int intent_code = 0, datatype = 0, units = 0, qform_code = 0, sform_code = 0;
   double vox_offset = 0, scl_slope = 0, scl_inter = 0, intent_p1 = 0;
   std::string descrip, intent_name;
-  Geometry qform, sform;  ///< LPS; valid where the code is not 0
+  Geometry qform, sform;           ///< LPS; valid where the code is not 0
+  glm::dvec3 pixdim{};             ///< mm
+  double qform_rounding = 0;       ///< radians by which float32 may turn the qform
+  std::optional<double> apart_mm;  ///< the farthest two places of a voxel by both, where that is more than rounding
 };
 
 /// @throws InputError naming the file: no NIfTI-1 in one file, more than one time point, a vector that is neither of
-///         intent 1006 nor 1007, a datatype that VoxelType does not have, units other than mm, no orientation, a
-///         sheared sform
+///         intent 1006 nor 1007, a datatype that VoxelType does not have, units other than mm, no orientation, a form
+///         that is not finite
 NiftiHeader read_nifti_header(const std::filesystem::path& path);
 
-/// Whether the sform, not the qform, places the volume, as ITK has it: it is the scanner's, or the only one.
-bool sform_decides(const NiftiHeader& header);
+/// The place of the volume: by the form that `frame` names where the header has both, else by the one that it has.
+/// @throws InputError naming the file: neither is there, or the one that decides is sheared, singular, or of another
+///         voxel size than pixdim
+const Geometry& place_of(const NiftiHeader& header, NiftiFrame frame, const std::filesystem::path& path);
 
-std::unique_ptr<ImageReader> open_nifti(const std::filesystem::path& path);
+std::unique_ptr<ImageReader> open_nifti(const std::filesystem::path& path, NiftiFrame frame);
 
 }  // namespace tetwarp

@@ -50,10 +50,31 @@ Geometry from_ras(const std::array<glm::dvec3, 4>& columns, const glm::i64vec3& 
   return grid;
 }
 
-/// Method 2 of nifti1.h: unit quaternion (a, b, c, d), pixdim, qfac = pixdim[0].
-Geometry qform(const Bytes& bytes, bool swapped, const glm::i64vec3& size) {
+/// Unit quaternion (a, b, c, d) of nifti1.h, of which a file has b, c, d.
+struct Quaternion {
+  double a = 0, b = 0, c = 0, d = 0;
+  double rounding = 0;  ///< radians by which the float32 of b, c and d may turn it: most where a is near 0
+};
+
+Quaternion quaternion(const Bytes& bytes, bool swapped) {
   const auto f = [&](std::size_t offset) { return static_cast<double>(number<float>(bytes, offset, swapped)); };
-  const double b = f(256), c = f(260), d = f(264), a = std::sqrt(std::max(0.0, 1 - (b * b + c * c + d * d)));
+  constexpr double kRounding = 4.0 / (1 << 24);  // of b^2 + c^2 + d^2
+  Quaternion q{0, f(256), f(260), f(264), 0};
+  const double squares = q.b * q.b + q.c * q.c + q.d * q.d;
+  if (squares > 1 - 1e-7) {  // a half turn: as niftilib and nibabel have it
+    const double length = std::sqrt(squares);
+    q = {0, q.b / length, q.c / length, q.d / length, 2 * std::sqrt(kRounding + 1e-7)};
+  } else {
+    q.a = std::sqrt(1 - squares);
+    q.rounding = 2 * std::min(std::sqrt(kRounding), kRounding / (2 * q.a)) + kRounding;
+  }
+  return q;
+}
+
+/// Method 2 of nifti1.h: quaternion, pixdim, qfac = pixdim[0].
+Geometry qform(const Bytes& bytes, bool swapped, const Quaternion& q, const glm::i64vec3& size) {
+  const auto f = [&](std::size_t offset) { return static_cast<double>(number<float>(bytes, offset, swapped)); };
+  const auto [a, b, c, d, rounding] = q;
   const double flip = f(76) < 0 ? -1 : 1;
   return from_ras({glm::dvec3(a * a + b * b - c * c - d * d, 2 * (b * c + a * d), 2 * (b * d - a * c)) * f(80),
                    glm::dvec3(2 * (b * c - a * d), a * a + c * c - b * b - d * d, 2 * (c * d + a * b)) * f(84),
@@ -104,10 +125,8 @@ void require_one_volume(const NiftiHeader& header, const std::string& file) {
   require(beyond(6) == 1 && beyond(7) == 1, "a size of " + dims + ", " + file + "; expected 3 axes and no more");
 }
 
-/// The transforms must be there, in mm, and the sform orthogonal and as large as pixdim says: ITK ignores a sform that
-/// is not, and would place the volume elsewhere without a word; numbers that are not finite, or huge, end
-/// the program in ITK 5.2.1, or keep it for ever.
-void require_known_place(const NiftiHeader& header, const glm::dvec3& pixdim, const std::string& file) {
+/// What both forms need. Numbers that are huge, or none, are damage: no scanner is a thousand kilometres long.
+void require_known_place(const NiftiHeader& header, const std::string& file) {
   constexpr int kMillimetres = 2;
   require(header.units == 0 || header.units == kMillimetres, "lengths in " +
                                                                  std::string(header.units == 1   ? "metres"
@@ -121,24 +140,51 @@ void require_known_place(const NiftiHeader& header, const glm::dvec3& pixdim, co
     require(code <= 0 || near,
             "a qform or sform that is not finite, or beyond 1e9 mm, " + file + "; correct the header");
   }
-  require(sform_decides(header) || (pixdim.x > 0 && pixdim.y > 0 && pixdim.z > 0),
-          "a voxel size of " + text(pixdim) + " mm by pixdim, " + file + "; expected more than 0");
-  if (header.sform_code <= 0) return;
-  const glm::dmat3& d = header.sform.direction;
-  const glm::dvec3 cosines(glm::dot(d[0], d[1]), glm::dot(d[0], d[2]), glm::dot(d[1], d[2]));
-  const bool orthogonal = std::abs(cosines.x) <= 1e-4 && std::abs(cosines.y) <= 1e-4 && std::abs(cosines.z) <= 1e-4;
-  require(orthogonal, "a sheared or singular sform (cosines between its axes " + text(cosines) + ", expected 0), " +
-                          file + "; resample it onto an orthogonal grid");
-  const glm::dvec3 difference = glm::abs(header.sform.spacing - pixdim);
-  require(!sform_decides(header) || (difference.x <= 1e-3 && difference.y <= 1e-3 && difference.z <= 1e-3),
-          "a voxel size of " + text(header.sform.spacing) + " mm by the sform and " + text(pixdim) + " mm by pixdim, " +
-              file + "; correct the header");
+}
+
+/// How far a voxel's places by the two forms lie apart at most, where rounding does not explain it: of float32 in
+/// either, and of writers that computed one form from the other in float32.
+std::optional<double> apart_mm(const NiftiHeader& header) {
+  if (header.qform_code <= 0 || header.sform_code <= 0) return {};
+  const AffineMap by_sform = point_from_index(header.sform), by_qform = point_from_index(header.qform);
+  double apart = 0, reach = 0, size = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const glm::dvec3 index =
+        glm::dvec3(corner & 1, corner >> 1 & 1, corner >> 2) * glm::dvec3(header.qform.size - std::int64_t{1});
+    apart = std::max(apart, glm::distance(by_sform(index), by_qform(index)));
+    reach = std::max(reach, glm::length(by_sform(index)));
+    size = std::max(size, glm::distance(by_sform(index), by_sform(glm::dvec3(0))));
+  }
+  const double rounding = 1e-3 + 1e-5 * (reach + size) + header.qform_rounding * size;
+  if (apart <= rounding) return {};
+  return apart;
+}
+
+std::string other_way(const NiftiHeader& header) {
+  return header.qform_code > 0 ? ", or give --nifti-frame qform" : "";
 }
 
 }  // namespace
 
-bool sform_decides(const NiftiHeader& header) {
-  return header.sform_code == 1 || (header.sform_code > 0 && header.qform_code <= 0);
+const Geometry& place_of(const NiftiHeader& header, NiftiFrame frame, const std::filesystem::path& path) {
+  const std::string file = path.string();
+  const bool by_sform = frame == NiftiFrame::sform ? header.sform_code > 0 : header.qform_code <= 0;
+  const glm::dvec3& pixdim = header.pixdim;
+  if (!by_sform) {
+    require(pixdim.x > 0 && pixdim.y > 0 && pixdim.z > 0,
+            "a voxel size of " + text(pixdim) + " mm by pixdim, " + file + "; expected more than 0");
+    return header.qform;
+  }
+  const glm::dmat3& d = header.sform.direction;
+  const glm::dvec3 cosines(glm::dot(d[0], d[1]), glm::dot(d[0], d[2]), glm::dot(d[1], d[2]));
+  const bool orthogonal = std::abs(cosines.x) <= 1e-4 && std::abs(cosines.y) <= 1e-4 && std::abs(cosines.z) <= 1e-4;
+  require(orthogonal, "a sheared or singular sform (cosines between its axes " + text(cosines) + ", expected 0), " +
+                          file + "; resample it onto an orthogonal grid" + other_way(header));
+  const glm::dvec3 difference = glm::abs(header.sform.spacing - pixdim);
+  require(difference.x <= 1e-3 && difference.y <= 1e-3 && difference.z <= 1e-3,
+          "a voxel size of " + text(header.sform.spacing) + " mm by the sform and " + text(pixdim) + " mm by pixdim, " +
+              file + "; correct the header" + other_way(header));
+  return header.sform;
 }
 
 NiftiHeader read_nifti_header(const std::filesystem::path& path) {
@@ -171,9 +217,13 @@ NiftiHeader read_nifti_header(const std::filesystem::path& path) {
   header.sform_code = i16(254);
   require_one_volume(header, file);
   const glm::i64vec3 voxels(header.dim[1], header.dim[2], header.dim[3]);
-  header.qform = qform(bytes, header.swapped, voxels);
+  const Quaternion turn = quaternion(bytes, header.swapped);
+  header.qform_rounding = turn.rounding;
+  header.qform = qform(bytes, header.swapped, turn, voxels);
   header.sform = sform(bytes, header.swapped, voxels);
-  require_known_place(header, {f32(80), f32(84), f32(88)}, file);
+  header.pixdim = {f32(80), f32(84), f32(88)};
+  require_known_place(header, file);
+  header.apart_mm = apart_mm(header);
   return header;
 }
 

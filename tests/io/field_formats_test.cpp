@@ -316,15 +316,28 @@ TEST(NiftiField, OtherFilesOfNiftyRegAreRefusedByName) {
   }
   ASSERT_TRUE(make_foreign_field("nreg-0", scratch / "f.mha", scratch / "f.nii"));
   const std::string good = read_bytes(scratch / "f.nii");
-  std::string elsewhere = good;
-  put(elsewhere, 254, std::int16_t{2});                     // the sform is not the scanner's: ITK takes the qform
-  put(elsewhere, 292, get<float>(elsewhere, 292) + 10.0F);  // srow_x[3]
-  write_file(scratch / "f.nii", elsewhere);
-  refused("a NiftyReg field whose qform and sform differ");
   std::string name = good;
   name.replace(328, 10, "NREG_WHAT\0", 10);
   write_file(scratch / "f.nii", name);
   refused("(intent_name \"NREG_WHAT\"");
+}
+
+TEST(NiftiField, NiftyRegsGoesByTheSformWhateverIsAskedFor) {
+  const Scratch scratch;
+  const Geometry grid = oblique_grid();
+  write_field_file(scratch / "f.mha", PullField{grid, corner_displacement(grid)});
+  if (!make_foreign_field("nreg-1", scratch / "f.mha", scratch / "f.nii")) GTEST_SKIP() << "python3-nibabel";
+  std::string bytes = read_bytes(scratch / "f.nii");
+  put(bytes, 252, std::int16_t{1});
+  put(bytes, 254, std::int16_t{2});                 // the sform is not the scanner's: ITK takes the qform
+  put(bytes, 292, get<float>(bytes, 292) + 10.0F);  // srow_x[3]: to the right
+  write_file(scratch / "f.nii", bytes);
+  for (const NiftiFrame frame : {NiftiFrame::sform, NiftiFrame::qform}) {
+    FieldSource source(scratch / "f.nii");
+    source.nifti_frame = frame;
+    EXPECT_NEAR(read_field_header(source).grid.origin.x, grid.origin.x - 10, 1e-4);
+    EXPECT_EQ(read_field_header(source).notes.size(), 1u);
+  }
 }
 
 TEST(NiftiField, DamagedFilesAreRefusedByName) {
