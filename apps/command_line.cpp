@@ -54,8 +54,8 @@ std::set<ConfidentialityOption> confidentiality_options_of(const std::string& te
   }
 }
 
-void add_deidentify(CLI::App& command, DicomForm& form) {
-  const auto chosen = [&form]() -> Deidentification& {
+void add_deidentify(CLI::App& command, DeformOptions& options) {
+  const auto chosen = [&form = options.dicom]() -> Deidentification& {
     if (!form.deidentification) form.deidentification.emplace();
     return *form.deidentification;
   };
@@ -67,13 +67,16 @@ void add_deidentify(CLI::App& command, DicomForm& form) {
                        "retain-device, retain-institution, retain-patient, retain-uids, separated by commas; looks "
                        "neither at text in pixels nor at faces")
                    ->type_name("OPTIONS");
-  auto* key =
-      command
-          .add_option_function<std::string>(
-              "--deidentify-key", [chosen](const std::string& file) { chosen().key = read_deidentification_key(file); },
-              "File with a secret of 16 bytes or more, of which new UIDs, patient IDs and dates are made: one "
-              "for all series that belong together")
-          ->type_name("FILE");
+  auto* key = command
+                  .add_option_function<std::string>(
+                      "--deidentify-key",
+                      [chosen, &options](const std::string& file) {
+                        options.deidentify_key = file;
+                        chosen().key = read_deidentification_key(file);
+                      },
+                      "File with a secret of 16 bytes or more, of which new UIDs, patient IDs and dates are made: one "
+                      "for all series that belong together")
+                  ->type_name("FILE");
   what->needs(key);
   key->needs(what);
 }
@@ -225,7 +228,7 @@ void add_deform(CLI::App& app, DeformOptions& options) {
   command->add_option("--compress", options.compression, "Level 0 to 9 for .nii.gz (default 1) .nrrd .mha (default 0)")
       ->check(CLI::Range(0, 9));
   add_dicom_form(*command, options.dicom);
-  add_deidentify(*command, options.dicom);
+  add_deidentify(*command, options);
   command->add_flag(
       "--bids", options.bids,
       "Write STEM.json beside OUTPUT STEM.nii.gz or STEM.nii, of a CT series: scanner and protocol with the "

@@ -6,6 +6,7 @@
 
 #include "apps/field_source.h"
 #include "apps/output_grid.h"
+#include "apps/reads.h"
 #include "deform/fields/formula.h"
 #include "deform/residuals.h"
 #include "io/image_file.h"
@@ -97,20 +98,6 @@ struct FurtherTexts {
 
 }  // namespace
 
-std::vector<std::filesystem::path> further_inputs(const DeformOptions& options) {
-  const FurtherTexts with(options.with);
-  std::vector<std::filesystem::path> inputs = FurtherVolumes::inputs(with.volumes);
-  for (const std::string& text : with.structures) inputs.push_back(text.substr(0, text.find('=')));
-  for (const std::filesystem::path& file : {options.scenario, options.labels}) {
-    if (!file.empty()) inputs.push_back(file);
-  }
-  if (!is_same_grid(options.grid) && options.grid != "fit") inputs.emplace_back(options.grid);
-  for (const std::filesystem::path& path : field_files(options.fields)) inputs.push_back(path);
-  if (!options.pull_field.empty()) inputs.push_back(field_source(options.pull_field).path);
-  for (const std::filesystem::path& path : PointsOption(options.points).inputs()) inputs.push_back(path);
-  return inputs;
-}
-
 bool reports_quality(const DeformOptions& options) { return !options.report.empty() && options.pull_field.empty(); }
 
 DeformOutputs begin_outputs(const DeformOptions& options, const PointsOption& points) {
@@ -127,8 +114,7 @@ DeformOutputs begin_outputs(const DeformOptions& options, const PointsOption& po
     throw UsageError("--preserve mass needs the determinant of a forward map, which --pull-field has not");
   }
   const FurtherTexts with(options.with);
-  std::vector<std::filesystem::path> inputs = further_inputs(options);
-  inputs.push_back(options.input.path);
+  const Reads reads = reads_of(options);
   if (!options.pull_field.empty() && !points.empty())
     throw UsageError("--points needs a forward field, --pull-field has no forward map");
   const bool series = is_series_output(options.output);
@@ -158,16 +144,16 @@ DeformOutputs begin_outputs(const DeformOptions& options, const PointsOption& po
   }
   if (options.background && !std::isfinite(*options.background))
     throw UsageError("--background is not a finite number");
-  // The series of a single file is read from its folder, so a derived series must not land there.
-  if (series && !options.input.single && !std::filesystem::is_directory(options.input.path))
-    inputs.push_back(folder_of(options.input.path));
   DeformOutputs outputs{
-      series, OutputSet(inputs, options.common.overwrite, options.folder, options.dry_run && !options.folder.empty()),
+      series, OutputSet(reads, options.common.overwrite, options.folder, options.dry_run && !options.folder.empty()),
       {},     {},
       {},     {},
       {},     {},
       {},     {},
       {},     {}};
+  // The series of a single file is read from its folder, so a derived series must not land there.
+  if (series && !options.input.single && !std::filesystem::is_directory(options.input.path))
+    outputs.set.add_reads({folder_of(options.input.path)});
   outputs.volume = outputs.set.add(options.output, series ? StagedOutput::Kind::folder : StagedOutput::Kind::file);
   outputs.sidecar = outputs.set.add(sidecar_of(options.output));
   if (options.bids) outputs.bids = outputs.set.add(bids_sidecar_of(options.output));
@@ -197,6 +183,7 @@ DeformPlan plan_deformation(const DeformOptions& options, DeformOutputs& outputs
                      to_string(input.type) + "; choose a value in their range");
   }
   outputs.further->open(input);
+  outputs.set.add_reads(reads_of(options).slices(options.input, input));
   DeformPlan plan;
   if (options.grid != "fit")
     plan.grid = output_grid(options.grid, input.geometry, {}, options.outside, options.common.nifti_frame);

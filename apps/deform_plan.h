@@ -18,9 +18,6 @@ struct DeformOutputs {
   std::vector<std::filesystem::path> points;
 };
 
-/// Files and folders that a deformation reads beside INPUT. Looks into the files of --with.
-std::vector<std::filesystem::path> further_inputs(const DeformOptions& options);
-
 /// Checks the options as far as that is possible before anything is read, and begins the outputs.
 /// @throws UsageError, and what OutputSet::add throws
 DeformOutputs begin_outputs(const DeformOptions& options, const PointsOption& points);

@@ -1,6 +1,7 @@
 #include "apps/field_source.h"
 #include "apps/input.h"
 #include "apps/output.h"
+#include "apps/reads.h"
 #include "io/field_file.h"
 #include "io/image_file.h"
 
@@ -12,12 +13,12 @@ int run_field(const FieldOptions& options) {
                      "\"; a field is written as .mha .nrrd .nii .nii.gz");
   }
   check_fields(options.fields, options.cell_size);
-  std::vector<std::filesystem::path> inputs = field_files(options.fields);
-  inputs.push_back(options.like.path);
-  OutputSet outputs(inputs, options.common.overwrite);
+  const Reads reads = reads_of(options);
+  OutputSet outputs(reads, options.common.overwrite);
   const std::filesystem::path output = outputs.add(options.output);
   Stage stage(options.common, "field");
   const InputHeader like = open_input(options.like, options.common);
+  outputs.add_reads(reads.slices(options.like, like));
   const ForwardField source =
       read_forward_field(options.fields, like.geometry, options.cell_size, options.common, stage.control());
   require(source.field.mesh.is_empty(),

@@ -165,14 +165,6 @@ std::string title_of_fields(const std::vector<std::string>& fields, const std::s
   return text;
 }
 
-std::vector<std::filesystem::path> field_files(const std::vector<std::string>& fields) {
-  std::vector<std::filesystem::path> files;
-  for (const std::string& text : fields) {
-    if (!is_formula(text)) files.push_back(field_source(text).path);
-  }
-  return files;
-}
-
 std::uint64_t field_bytes(const std::vector<std::string>& fields, const Geometry& volume,
                           std::optional<std::int64_t> cell_size, NiftiFrame frame) {
   for (const std::string& text : fields) check_transform(text);

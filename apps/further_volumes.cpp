@@ -67,12 +67,6 @@ FurtherOptions parse_further(const std::string& text) {
   return options;
 }
 
-std::vector<std::filesystem::path> FurtherVolumes::inputs(const std::vector<std::string>& texts) {
-  std::vector<std::filesystem::path> paths;
-  for (const std::string& text : texts) paths.push_back(parse_further(text).input.path);
-  return paths;
-}
-
 FurtherVolumes::FurtherVolumes(const std::vector<std::string>& texts, bool series, NiftiFrame frame,
                                OutputSet& outputs) {
   for (const std::string& text : texts) {

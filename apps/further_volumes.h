@@ -22,8 +22,6 @@ class FurtherVolumes {
   /// @throws UsageError, and what OutputSet::add throws
   FurtherVolumes(const std::vector<std::string>& texts, bool series, NiftiFrame frame, OutputSet& outputs);
 
-  /// All inputs, for OutputSet.
-  static std::vector<std::filesystem::path> inputs(const std::vector<std::string>& texts);
   /// Reads their headers. @throws UsageError, InputError for what does not go with its output or with INPUT
   void open(const InputHeader& input);
   /// What they hold: with their outputs, where those have `output_voxels`.

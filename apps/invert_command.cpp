@@ -6,6 +6,7 @@
 #include "apps/field_source.h"
 #include "apps/input.h"
 #include "apps/map_outputs.h"
+#include "apps/reads.h"
 #include "cuda/backend.h"
 #include "deform/fields/continued.h"
 #include "io/field_file.h"
@@ -200,12 +201,11 @@ int run_invert(const InvertOptions& options) {
   check_output(options);
   if (pulls && options.cell_size) throw UsageError("--cell-size does not go with --pull-field; leave it out");
   if (!pulls) check_fields(options.fields, options.cell_size);
-  std::vector<std::filesystem::path> inputs =
-      field_files(pulls ? std::vector<std::string>{options.pull_field} : options.fields);
-  inputs.push_back(options.like.path);
-  OutputSet outputs(inputs, options.common.overwrite);
+  const Reads reads = reads_of(options);
+  OutputSet outputs(reads, options.common.overwrite);
   const std::filesystem::path output = outputs.add(options.output), report_path = outputs.add(options.report);
   const InputHeader like = open_input(options.like, options.common);
+  outputs.add_reads(reads.slices(options.like, like));
   const bool registers = has_registration_suffix(options.output);
   if (registers) {
     if (!like.series)

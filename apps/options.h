@@ -93,7 +93,8 @@ struct DeformOptions {
   std::optional<double> background;
   std::optional<std::int64_t> cell_size;
   std::optional<int> compression;
-  DicomForm dicom;  ///< of OUTPUT, where it is a series
+  DicomForm dicom;                       ///< of OUTPUT, where it is a series
+  std::filesystem::path deidentify_key;  ///< the file that its key was read from
   std::optional<std::uint64_t> memory_bytes;
   bool bids = false;              ///< a sidecar for BIDS beside OUTPUT
   std::string grid = "same";      ///< same, fit, or a file or folder

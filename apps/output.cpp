@@ -5,6 +5,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "apps/reads.h"
 #include "deform/version.h"
 #include "io/image_file.h"
 
@@ -14,11 +15,14 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// Without a trailing slash.
-fs::path plain(const fs::path& path) { return path.has_filename() ? path : path.parent_path(); }
+/// Without slashes and "." at its end, as StagedOutput takes it.
+fs::path plain(fs::path path) {
+  while (path.has_relative_path() && (!path.has_filename() || path.filename() == ".")) path = path.parent_path();
+  return path;
+}
 
 bool is_inside(const fs::path& inner, const fs::path& outer) {
-  const fs::path a = plain(fs::weakly_canonical(inner)), b = plain(fs::weakly_canonical(outer));
+  const fs::path a = real_path(inner), b = real_path(outer);
   return std::mismatch(b.begin(), b.end(), a.begin(), a.end()).first == b.end();
 }
 
@@ -48,27 +52,33 @@ bool is_series_output(const fs::path& output) {
   return true;
 }
 
-OutputSet::OutputSet(std::vector<fs::path> inputs, bool overwrite, const fs::path& folder, bool only_look)
-    : inputs_(std::move(inputs)), overwrite_(overwrite), together_(!folder.empty()), only_look_(only_look) {
+void refuse_reads(const ReadPlaces& reads, const fs::path& output) {
+  const std::optional<fs::path> input = reads.touched_by(output);
+  if (!input) return;
+  throw UsageError("the output " + output.string() + " is, is inside, or is around the input " + input->string() +
+                   "; choose another place");
+}
+
+OutputSet::OutputSet(const Reads& reads, bool overwrite, const fs::path& folder, bool only_look)
+    : overwrite_(overwrite), together_(!folder.empty()), only_look_(only_look) {
+  for (const fs::path& path : reads.paths()) reads_.add(path);
   if (!together_) return;
-  refuse_inputs(folder);
+  refuse_reads(folder);
   targets_.push_back(folder / kFolderRecord);
   if (only_look_) return;
   staged_.push_back(std::make_unique<StagedOutput>(plain(folder), StagedOutput::Kind::folder, overwrite, is_recorded));
 }
 
-void OutputSet::refuse_inputs(const fs::path& target) const {
-  for (const fs::path& input : inputs_) {
-    if (is_inside(target, input) || is_inside(input, target)) {
-      throw UsageError("the output " + target.string() + " is, is inside, or is around the input " + input.string() +
-                       "; choose another place");
-    }
-  }
+void OutputSet::add_reads(const std::vector<fs::path>& files) {
+  for (const fs::path& file : files) reads_.add(file);
+  for (const fs::path& target : targets_) refuse_reads(target);
 }
+
+void OutputSet::refuse_reads(const fs::path& target) const { apps::refuse_reads(reads_, target); }
 
 fs::path OutputSet::add(const fs::path& target, StagedOutput::Kind kind) {
   if (target.empty()) return {};
-  refuse_inputs(target);
+  refuse_reads(target);
   for (const fs::path& other : targets_) {
     if (is_inside(target, other) || is_inside(other, target)) {
       throw UsageError("two outputs have the same place, " + other.string() + " and " + target.string() +

@@ -10,9 +10,12 @@
 #include "apps/console.h"
 #include "deform/residuals.h"
 #include "io/dicom_series.h"
+#include "io/read_places.h"
 #include "io/staged_output.h"
 
 namespace tetwarp::apps {
+
+class Reads;
 
 /// Whether an output's name means a folder that receives a DICOM series: no suffix, or a trailing slash.
 /// @throws UsageError for a suffix that is not one of a volume file
@@ -24,8 +27,12 @@ class OutputSet {
   /// @param folder  that all outputs are to lie in, directly, and that appears as a whole; empty: each by itself
   /// @param only_look  names are checked, and nothing is begun: for a folder whose place does not exist yet
   /// @throws Error where the folder cannot be begun
-  OutputSet(std::vector<std::filesystem::path> inputs, bool overwrite, const std::filesystem::path& folder = {},
-            bool only_look = false);
+  OutputSet(const Reads& reads, bool overwrite, const std::filesystem::path& folder = {}, bool only_look = false);
+
+  /// More that is read, as it becomes known. @throws UsageError where an output touches it
+  void add_reads(const std::vector<std::filesystem::path>& files);
+  /// @throws UsageError for a place that is, is inside or is around what is read
+  void refuse_reads(const std::filesystem::path& target) const;
 
   /// @return where to write it; empty for an empty target, which is not wanted.
   /// @throws UsageError where it is equal to, inside or around an input or another output; Error where it cannot be
@@ -39,12 +46,14 @@ class OutputSet {
   void write(const std::function<void()>& write);
 
  private:
-  void refuse_inputs(const std::filesystem::path& target) const;
-
-  std::vector<std::filesystem::path> inputs_, targets_;
+  ReadPlaces reads_;
+  std::vector<std::filesystem::path> targets_;
   bool overwrite_, together_, only_look_;
   std::vector<std::unique_ptr<StagedOutput>> staged_;
 };
+
+/// @throws UsageError for an output that is, is inside or is around what is read
+void refuse_reads(const ReadPlaces& reads, const std::filesystem::path& output);
 
 /// What a folder of outputs says of itself, and by which it is known as Tetwarp's: `files`, names relative to it.
 inline constexpr const char* kFolderRecord = "case.json";

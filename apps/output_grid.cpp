@@ -86,11 +86,20 @@ Geometry grown(const Geometry& volume, const Bounds& bounds) {
 
 bool is_same_grid(const std::string& wanted) { return wanted == "same"; }
 
+bool names_volume(const std::string& wanted) { return !is_same_grid(wanted) && wanted != "fit"; }
+
+InputOptions grid_volume(const std::string& wanted) {
+  InputOptions volume;
+  volume.path = wanted;
+  volume.uneven = true;
+  return volume;
+}
+
 void check_grid(const std::string& wanted, bool pull) {
   if (wanted == "fit" && pull) {
     throw UsageError("--grid fit needs to know where vertices go, which --pull-field does not say; give --grid FILE");
   }
-  if (!is_same_grid(wanted) && wanted != "fit" && !std::filesystem::exists(wanted)) {
+  if (names_volume(wanted) && !std::filesystem::exists(wanted)) {
     throw UsageError("--grid is \"" + wanted + "\", expected same, fit, or a volume that exists");
   }
 }
@@ -100,12 +109,7 @@ Geometry output_grid(const std::string& wanted, const Geometry& input, const Ver
   const Geometry volume = straightened(input);
   if (is_same_grid(wanted)) return volume;
   if (has_image_suffix(wanted)) return read_image_header(wanted, frame).geometry;
-  if (wanted != "fit") {
-    InputOptions like;
-    like.path = wanted;
-    like.uneven = true;
-    return straightened(open_input(like, {.stop = interrupt_token()}).geometry);
-  }
+  if (names_volume(wanted)) return straightened(open_input(grid_volume(wanted), {.stop = interrupt_token()}).geometry);
   // What does not reach over the volume is refused.
   if (field.mesh.is_empty()) {
     make_lattice_frame(volume, view(field, outside));

@@ -13,6 +13,10 @@ void check_grid(const std::string& wanted, bool pull);
 /// Whether the output has the input's grid.
 bool is_same_grid(const std::string& wanted);
 
+/// Whether a --grid is the name of a volume, and what is read of it.
+bool names_volume(const std::string& wanted);
+InputOptions grid_volume(const std::string& wanted);
+
 /// The output grid that --grid asks for.
 ///
 /// @param wanted  "same": the input's; "fit": that grown by whole voxels to hold every vertex where `field` moves it;

@@ -1,6 +1,7 @@
 #include <cmath>
 
 #include "apps/output.h"
+#include "apps/reads.h"
 #include "deform/phantom.h"
 #include "io/image_file.h"
 
@@ -27,7 +28,7 @@ void check(const PhantomOptions& options) {
 int run_phantom(const PhantomOptions& options) {
   check(options);
   const bool series = is_series_output(options.output);
-  OutputSet outputs({}, options.common.overwrite);
+  OutputSet outputs(Reads(), options.common.overwrite);
   const std::filesystem::path output =
       outputs.add(options.output, series ? StagedOutput::Kind::folder : StagedOutput::Kind::file);
   const glm::i64vec3 size(options.size[0], options.size[1], options.size[2]);

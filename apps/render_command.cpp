@@ -3,6 +3,7 @@
 
 #include "apps/movie.h"
 #include "apps/output.h"
+#include "apps/reads.h"
 #include "apps/render_scene.h"
 #include "cuda/backend.h"
 #include "io/lattice_lines.h"
@@ -16,8 +17,6 @@ namespace tetwarp::apps {
 namespace {
 
 namespace fs = std::filesystem;
-
-bool is_transfer_file(const RenderOptions& options) { return fs::path(options.transfer).extension() == ".json"; }
 
 std::string degrees(double angle) { return short_number(angle) + " deg"; }
 
@@ -53,24 +52,8 @@ class Rendering {
   std::optional<std::size_t> shown_;  ///< number of the picture that the volume is deformed for
 };
 
-std::vector<fs::path> inputs_of(const RenderOptions& options) {
-  std::vector<fs::path> inputs = field_files(options.fields);
-  inputs.push_back(options.input.path);
-  if (!options.pull_field.empty()) inputs.push_back(field_source(options.pull_field).path);
-  for (const fs::path& file : field_files(options.sequence)) inputs.push_back(file);
-  if (is_transfer_file(options)) inputs.emplace_back(options.transfer);
-  for (const std::string& text : options.overlays) {
-    const OverlayWish wish = overlay_wish(text);
-    if (wish.source.empty()) continue;
-    if (wish.kind != OverlayKind::lattice) inputs.emplace_back(wish.source);
-    if (wish.kind == OverlayKind::lattice)
-      for (const fs::path& file : field_files({wish.source})) inputs.push_back(file);
-  }
-  return inputs;
-}
-
 Rendering::Rendering(const RenderOptions& options)
-    : options_(options), outputs_(inputs_of(options), options.common.overwrite), scene_(options) {
+    : options_(options), outputs_(reads_of(options), options.common.overwrite), scene_(options) {
   const bool film = is_movie(options.output);
   if (!film && options.output.extension() != ".png")
     throw UsageError("unknown suffix of \"" + options.output.string() + "\"; pictures are .png, films .mp4 or .gif");
@@ -105,6 +88,7 @@ Rendering::Rendering(const RenderOptions& options)
   } else {
     for (int n = 1; n <= count; ++n) staged_.push_back(outputs_.add(frame_path(options.output, n, count)));
   }
+  outputs_.add_reads(reads_of(options).slices(options.input, scene_.header()));
 }
 
 std::optional<glm::dvec3> Rendering::position() const {

@@ -63,6 +63,10 @@ OverlayWish overlay_wish(const std::string& text) {
   return {found->second, split == std::string::npos ? "" : text.substr(split + 1)};
 }
 
+bool is_transfer_file(const RenderOptions& options) {
+  return std::filesystem::path(options.transfer).extension() == ".json";
+}
+
 RenderScene::RenderScene(const RenderOptions& options) : options_(options), input_options_(options.input) {
   input_options_.hash = FileHash::left_out;
   deforms_ = !options.fields.empty() || !options.pull_field.empty() || !options.sequence.empty();

@@ -21,6 +21,9 @@ struct OverlayWish {
 /// @throws UsageError
 OverlayWish overlay_wish(const std::string& text);
 
+/// Whether --transfer is the name of a file.
+bool is_transfer_file(const RenderOptions& options);
+
 /// An overlay with the memory of its map.
 struct OwnedOverlay {
   Overlay overlay;
@@ -40,6 +43,7 @@ class RenderScene {
   /// Deforms the volume as it is in a frame.
   void show(std::size_t frame);
 
+  const InputHeader& header() const { return header_; }
   const Geometry& grid() const { return grid_; }
   ConstVolumeView volume() const;  ///< of the frame that is shown
   const VertexField* lattice_field()

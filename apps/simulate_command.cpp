@@ -3,6 +3,7 @@
 
 #include "apps/input.h"
 #include "apps/output.h"
+#include "apps/reads.h"
 #include "apps/simulate_report.h"
 #include "apps/simulated_field.h"
 #include "apps/simulation_backend.h"
@@ -27,9 +28,7 @@ struct Outputs {
 };
 
 Outputs begin_outputs(const SimulateOptions& options, const Scenario& scenario) {
-  std::vector<fs::path> inputs = {options.scenario, options.input.path};
-  if (!options.labels.empty()) inputs.push_back(options.labels);
-  Outputs outputs{OutputSet(inputs, options.common.overwrite), {}, {}, {}};
+  Outputs outputs{OutputSet(reads_of(options), options.common.overwrite), {}, {}, {}};
   outputs.field = outputs.set.add(options.output);
   const int frames = frame_count(scenario);
   for (int number = options.every; options.every > 0 && number <= frames; number += options.every)
@@ -65,6 +64,7 @@ void Simulating::read() {
   {
     Stage stage(options_.common, "read");
     const InputHeader header = open_input(options_.input, options_.common);
+    outputs_.set.add_reads(reads_of(options_).slices(options_.input, header));
     if (header.series) warnings_ = header.series->warnings;
     notes_ = header.notes;
     volume = read_input(options_.input, header, options_.common, stage.control()).volume;

@@ -1,6 +1,6 @@
 #include "apps/simulated_field.h"
 
-#include "apps/input.h"
+#include "apps/reads.h"
 #include "apps/simulate_report.h"
 #include "apps/simulation_backend.h"
 #include "io/mesh_writer.h"
@@ -69,7 +69,9 @@ SimulatedField simulate_field(const DeformOptions& options, const ConstVolumeVie
   result.source = {.scenario = options.scenario.string(),
                    .scenario_sha256 = hash_file(options.scenario),
                    .labels = options.labels.string(),
-                   .labels_sha256 = options.labels.empty() ? "" : hash_file(options.labels),
+                   .labels_sha256 = options.labels.empty()
+                                        ? ""
+                                        : hash_volume({.path = options.labels, .series = {}}, options.common.threads),
                    .method = name_of(scenario.method),
                    .backend = backend.name};
   return result;

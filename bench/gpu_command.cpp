@@ -25,7 +25,7 @@ void require_device(int device) {
 }  // namespace
 
 int run_gpu(const GpuOptions& options) {
-  require_writable(options.json);
+  require_writable(options.json, {options.input.path, options.input.raw});
   require_device(options.device);
   GpuResults results = measure_gpu(options, [&](const std::string& line) {
     if (options.verbose) std::fprintf(stderr, "%s\n", line.c_str());

@@ -26,8 +26,8 @@ bool use_cuda(const PaperOptions& options) {
 }  // namespace
 
 int run_paper(const PaperOptions& options) {
-  require_writable(options.json);
-  require_writable(options.csv);
+  for (const auto& output : {options.json, options.csv})
+    require_writable(output, {options.input.path, options.input.raw});
   std::optional<tbb::global_control> limit;
   if (options.threads > 0) {
     limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(options.threads));

@@ -7,7 +7,7 @@
 namespace tetwarp::bench {
 
 int run_simulate(const SimulateOptions& options) {
-  require_writable(options.json);
+  require_writable(options.json, {options.scenario});
   const SimulateResults results = measure_simulate(options, [&](const std::string& line) {
     if (options.verbose) std::fprintf(stderr, "%s\n", line.c_str());
   });

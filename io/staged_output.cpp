@@ -25,10 +25,11 @@ namespace {
 std::string reason(int error) { return std::generic_category().message(error); }
 std::string reason(const std::error_code& error) { return error.message(); }
 
-/// The path with "..", "." and a trailing slash resolved in the text; always with a last component.
+/// The path without slashes and "." at its end; always with a last component. A ".." within it is left to the system,
+/// which follows links first: resolved in the text it may name another folder.
 fs::path named(const fs::path& target) {
-  fs::path path = target.lexically_normal();
-  if (!path.has_filename()) path = path.parent_path();
+  fs::path path = target;
+  while (path.has_relative_path() && (!path.has_filename() || path.filename() == ".")) path = path.parent_path();
   if (!path.has_filename() || path.filename() == "." || path.filename() == "..") {
     throw Error("'" + target.string() + "' names no file or folder to create; give the output a name");
   }

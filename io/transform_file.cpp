@@ -35,12 +35,17 @@ const char* name_of(TransformTool tool) {
 }
 
 /// ITK's transforms come in a module of their own: their libraries would take their time of every start.
+/// @param path  of the file that needs it
+template <class Function>
+Function* in_module(const char* name, const std::filesystem::path& path) {
+  auto* const function = reinterpret_cast<Function*>(find_in_module(TETWARP_TRANSFORM_MODULE, name));
+  if (!function) refuse_without_module("transform files", TETWARP_TRANSFORM_MODULE, path.string(), "");
+  return function;
+}
+
 LoadedTransform load_transform(const std::filesystem::path& path, const std::stop_token& stop) {
-  static auto* const load = reinterpret_cast<decltype(&tetwarp_load_transform)>(
-      find_in_module(TETWARP_TRANSFORM_MODULE, "tetwarp_load_transform"));
-  if (!load) refuse_without_module("transform files", TETWARP_TRANSFORM_MODULE, path.string(), "");
   LoadedTransform loaded;
-  load(path, stop, loaded);
+  in_module<decltype(tetwarp_load_transform)>("tetwarp_load_transform", path)(path, stop, loaded);
   return loaded;
 }
 
@@ -54,6 +59,13 @@ bool is_transform_file(const std::filesystem::path& path) {
   } catch (const InputError&) {
     return false;  // whoever takes it for a volume or a field says why
   }
+}
+
+std::vector<std::filesystem::path> files_of_transform(const std::filesystem::path& path) {
+  std::vector<std::filesystem::path> files = {path};
+  if (image_format(path) != ImageFormat::nifti)
+    in_module<decltype(tetwarp_transform_files)>("tetwarp_transform_files", path)(path, files);
+  return files;
 }
 
 TransformFile read_transform_file(const std::filesystem::path& path, const std::stop_token& stop) {
@@ -84,6 +96,8 @@ TransformFile read_transform_file(const std::filesystem::path& path, const std::
 }
 #else
 bool is_transform_file(const std::filesystem::path& path) { return has_transform_suffix(path); }
+
+std::vector<std::filesystem::path> files_of_transform(const std::filesystem::path& path) { return {path}; }
 
 TransformFile read_transform_file(const std::filesystem::path& path, const std::stop_token&) {
   throw NotCompiled("transform files need ITK, which this build does not have, " + path.string());

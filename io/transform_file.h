@@ -39,4 +39,9 @@ bool is_transform_file(const std::filesystem::path& path);
 ///         tetwarp-read is needed and missing; Cancelled
 TransformFile read_transform_file(const std::filesystem::path& path, const std::stop_token& stop = {});
 
+/// The files that `read_transform_file` reads: the one that is named, and those that it names, as a parameter file of
+/// elastix its initial transforms. Nothing is said of what they hold.
+/// @throws InputError for one that is missing; NotCompiled as above, but for a module alone
+std::vector<std::filesystem::path> files_of_transform(const std::filesystem::path& path);
+
 }  // namespace tetwarp

@@ -146,6 +146,22 @@ std::filesystem::path initial_of(const Parameters& from) {
   throw InputError("the initial transform " + name + " is not there, " + from.file());
 }
 
+/// Visits a file and the initial transforms behind it, each of which the one before names.
+template <class Visit>
+void follow(const std::filesystem::path& path, Visit&& visit) {
+  std::vector<std::filesystem::path> seen;
+  for (std::filesystem::path file = path; !file.empty();) {
+    require(std::ranges::find(seen, std::filesystem::canonical(file)) == seen.end() && seen.size() < kMostFiles,
+            "the initial transforms of " + path.string() +
+                " lead in a circle, or there are too many: " + file.string() + " again");
+    seen.push_back(std::filesystem::canonical(file));
+    require(is_elastix_file(file), "not an elastix parameter file, " + file.string() + ", named by " + path.string());
+    const Parameters parameters(file);
+    visit(parameters);
+    file = initial_of(parameters);
+  }
+}
+
 }  // namespace
 
 bool is_elastix_file(const std::filesystem::path& path) {
@@ -158,18 +174,14 @@ bool is_elastix_file(const std::filesystem::path& path) {
 
 std::vector<TransformRecord> read_elastix(const std::filesystem::path& path) {
   std::vector<TransformRecord> records;
-  std::vector<std::filesystem::path> seen;
-  for (std::filesystem::path file = path; !file.empty();) {
-    require(std::ranges::find(seen, std::filesystem::canonical(file)) == seen.end() && seen.size() < kMostFiles,
-            "the initial transforms of " + path.string() +
-                " lead in a circle, or there are too many: " + file.string() + " again");
-    seen.push_back(std::filesystem::canonical(file));
-    require(is_elastix_file(file), "not an elastix parameter file, " + file.string() + ", named by " + path.string());
-    const Parameters parameters(file);
-    records.push_back(record_of(parameters));
-    file = initial_of(parameters);
-  }
+  follow(path, [&](const Parameters& parameters) { records.push_back(record_of(parameters)); });
   return records;
+}
+
+std::vector<std::filesystem::path> elastix_files(const std::filesystem::path& path) {
+  std::vector<std::filesystem::path> files;
+  follow(path, [&](const Parameters& parameters) { files.emplace_back(parameters.file()); });
+  return files;
 }
 
 }  // namespace tetwarp

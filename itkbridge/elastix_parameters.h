@@ -21,4 +21,8 @@ bool is_elastix_file(const std::filesystem::path& path);
 ///         not 3-D, initial transforms that lead in a circle
 std::vector<TransformRecord> read_elastix(const std::filesystem::path& path);
 
+/// The files that `read_elastix` reads, the one that is named first. @throws InputError as that, for the same files,
+/// but not for what their transforms are
+std::vector<std::filesystem::path> elastix_files(const std::filesystem::path& path);
+
 }  // namespace tetwarp

@@ -127,4 +127,10 @@ void tetwarp_load_transform(const std::filesystem::path& path, const std::stop_t
   loaded.map = make_transform(loaded.stored, path.string());
 }
 
+void tetwarp_transform_files(const std::filesystem::path& path, std::vector<std::filesystem::path>& files) {
+  const std::string magic = first_bytes(path);
+  const bool alone = magic.starts_with(kHdf5) || magic.starts_with(kText) || magic.starts_with(kPlastimatchMagic);
+  files = alone || !is_elastix_file(path) ? std::vector<std::filesystem::path>{path} : elastix_files(path);
+}
+
 }  // namespace tetwarp

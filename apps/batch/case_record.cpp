@@ -2,7 +2,7 @@
 
 #include <fstream>
 
-#include "apps/input.h"
+#include "apps/reads.h"
 #include "deform/version.h"
 #include "io/hash.h"
 
@@ -75,7 +75,8 @@ std::string case_identity(const BatchCase& of, const std::string& input_sha256) 
   hash.add("tetwarp case").add(version());
   for (const std::string& argument : of.arguments) hash.add(argument);
   hash.add(input_sha256);
-  for (const fs::path& file : further_inputs(of.options)) {
+  const Reads further = further_reads_of(of.options);
+  for (const fs::path& file : further.paths()) {
     hash.add(file.string());
     if (fs::is_regular_file(file)) hash.add(hash_file(file));
   }

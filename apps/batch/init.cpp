@@ -141,6 +141,9 @@ int run_batch_init(const BatchOptions& options) {
   std::error_code error;
   if (fs::exists(options.output, error) && !options.common.overwrite)
     throw Error(options.output.string() + " exists; choose another name or add --overwrite");
+  ReadPlaces study;
+  study.add(options.init);
+  refuse_reads(study, options.output);
   Stage stage(options.common, "scan");
   const DicomScan scan = scan_dicom(options.init, false, stage.control());
   Rows rows(options, scan);

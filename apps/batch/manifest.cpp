@@ -9,8 +9,8 @@
 #include "apps/batch/draw.h"
 #include "apps/batch/manifest_rows.h"
 #include "apps/command_line.h"
-#include "apps/deform_plan.h"
 #include "apps/field_source.h"
+#include "apps/reads.h"
 #include "deform/fields/formula.h"
 #include "io/scenario_file.h"
 #include "io/shown_text.h"
@@ -187,7 +187,8 @@ void Reader::check_files(const DeformOptions& options) {
   exists(options.input.path);
   if (!options.scenario.empty()) exists(options.scenario);
   if (!options.fields.empty()) check_fields(options.fields, options.cell_size);
-  for (const fs::path& path : further_inputs(options)) exists(path);
+  const Reads further = further_reads_of(options);
+  for (const fs::path& path : further.paths()) exists(path);
 }
 
 /// Mass-spring has other bits on each backend: which one is the case's to say, not the machine's.

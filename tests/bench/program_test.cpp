@@ -304,6 +304,18 @@ TEST(BenchProgram, AnUnwritableResultIsKnownBeforeTheWork) {
   expect_error(run_bench(scratch, kTiny + std::string("--json missing/r.json")), 1, "missing");
 }
 
+TEST(BenchProgram, NumbersAreNotWrittenOverWhatIsRead) {
+  const Scratch scratch;
+  write_file(scratch / "s.json", "a scenario");
+  std::filesystem::create_hard_link(scratch / "s.json", scratch / "hard.json");
+  for (const std::string json : {"s.json", "hard.json"}) {
+    expect_error(run_bench(scratch, "simulate s.json --json " + json), 2, "around the input s.json");
+    expect_error(run_bench(scratch, kTiny + ("--raw s.json --size 12,12,9 --csv " + json)), 2,
+                 "around the input s.json");
+  }
+  EXPECT_EQ(read_text(scratch / "s.json"), "a scenario");
+}
+
 TEST(BenchProgram, HelpHasAnExample) {
   const Scratch scratch;
   for (const std::string command : {"paper", "gpu", "cpu", "invert", "io", "itk"}) {

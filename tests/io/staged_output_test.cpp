@@ -127,6 +127,19 @@ TEST(StagedFile, WritesThroughASymbolicLink) {
   EXPECT_EQ(content(scratch / "disk" / "real.nii"), "new");
 }
 
+TEST(StagedFile, FollowsLinksBeforeDotsInItsName) {
+  const Scratch scratch;
+  fs::create_directories(scratch / "far/deep");
+  fs::create_directory(scratch / "near");
+  fs::create_directory_symlink(scratch / "far/deep", scratch / "near/link");
+  write_file(scratch / "near/out.nii", "another's");
+  StagedOutput output(scratch / "near/link/../out.nii", Kind::file, true);
+  write_file(output.path(), "new");
+  output.commit();
+  EXPECT_EQ(content(scratch / "near/out.nii"), "another's");
+  EXPECT_EQ(content(scratch / "far/out.nii"), "new");
+}
+
 TEST(StagedFile, RefusesALinkThatGoesInCircles) {
   const Scratch scratch;
   fs::create_symlink(scratch / "b.nii", scratch / "a.nii");
@@ -150,6 +163,8 @@ TEST(StagedOutputPlace, MustHaveAParentFolder) {
 TEST(StagedOutputPlace, MustHaveAName) {
   EXPECT_NE(refusal("", Kind::folder).find("names no file or folder"), std::string::npos);
   EXPECT_NE(refusal("..", Kind::folder).find("names no file or folder"), std::string::npos);
+  EXPECT_NE(refusal("missing/..", Kind::folder).find("names no file or folder"), std::string::npos);
+  EXPECT_NE(refusal("./", Kind::folder).find("names no file or folder"), std::string::npos);
   EXPECT_NE(refusal("/", Kind::folder).find("names no file or folder"), std::string::npos);
 }
 
