@@ -137,7 +137,7 @@ int Batch::run() {
                              format_bytes(found_.plain_bytes + found_.packed_bytes) + " before compression");
     return 0;
   }
-  OutputFolder folder(options_.output, shard_, hash_file(options_.manifest), options_.resume);
+  OutputFolder folder(options_.output, shard_, ids_of(cases_), hash_file(options_.manifest), options_.resume);
   Results results(folder, ids());
   find_finished(folder, results);
   const std::string scarce = check_space(found_, folder.path());

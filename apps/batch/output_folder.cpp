@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -21,6 +22,14 @@ using nlohmann::json;
 namespace {
 
 std::string reason() { return std::generic_category().message(errno); }
+
+/// Whether a batch was begun in shards.
+bool holds_shards(const fs::path& folder) {
+  std::error_code error;
+  const fs::directory_iterator entries(folder, error);
+  return std::any_of(begin(entries), end(entries),
+                     [](const auto& entry) { return shard_of(entry.path(), "batch", ".json").has_value(); });
+}
 
 /// Whether a hidden name of StagedOutput, `.tetwarp-partial-PID-NAME`, or one that was dropped, stands for one of
 /// these.
@@ -47,23 +56,36 @@ Shard parse_shard(const std::string& text) {
   throw UsageError("--shard is \"" + text + "\", expected I/N with I from 1 to N, 2/8");
 }
 
-OutputFolder::OutputFolder(fs::path path, const Shard& shard, const std::string& manifest_sha256, bool resume)
+std::optional<Shard> shard_of(const fs::path& file, const std::string& name, const std::string& suffix) {
+  Shard shard;
+  int end = 0;
+  const std::string found = file.filename().string();
+  const std::string form = name + ".%zu-of-%zu" + suffix + "%n";
+  if (std::sscanf(found.c_str(), form.c_str(), &shard.number, &shard.count, &end) != 2 ||
+      end != static_cast<int>(found.size()))
+    return std::nullopt;
+  return shard;
+}
+
+OutputFolder::OutputFolder(fs::path path, const Shard& shard, const std::vector<std::string>& ids,
+                           const std::string& manifest_sha256, bool resume)
     : path_(path.has_filename() ? std::move(path) : path.parent_path()), shard_(shard) {
   std::error_code error;
   if (fs::exists(path_, error) && !fs::is_directory(path_, error))
     throw Error(path_.string() + " is no folder; choose another name");
   created_ = fs::create_directory(path_, error);
   if (error) throw Error("cannot make the folder " + path_.string() + ": " + error.message());
-  begin(resume, manifest_sha256);
+  begin(ids, resume, manifest_sha256);
 }
 
-void OutputFolder::begin(bool resume, const std::string& manifest_sha256) {
+void OutputFolder::begin(const std::vector<std::string>& ids, bool resume, const std::string& manifest_sha256) {
   const fs::path mark = file("batch", ".json");
-  const bool begun = fs::exists(mark);
+  const bool begun = fs::exists(mark) || (shard_.count == 1 && holds_shards(path_));
   if (begun && !resume)
     throw Error("a batch was begun in " + path_.string() + "; continue it with --resume, or choose another folder");
   if (!begun && shard_.count == 1 && !created_ && !fs::is_empty(path_))
     throw Error(path_.string() + " is not empty, and no batch was begun in it; choose another folder");
+  division_.emplace(path_, division_of(shard_.count, ids));
   lock_ = ::open(mark.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
   if (lock_ < 0) throw Error("cannot write " + mark.string() + ": " + reason());
   if (::flock(lock_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)

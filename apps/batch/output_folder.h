@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "apps/batch/division_lock.h"
+
 namespace tetwarp::apps {
 
 /// A share of the cases: those whose number, from 0, leaves `number` - 1 when divided by `count`.
@@ -24,11 +26,13 @@ Shard parse_shard(const std::string& text);
 /// files of its own.
 class OutputFolder {
  public:
-  /// Creates it where it does not exist, and locks the shard.
+  /// Creates it where it does not exist, and locks the shard, and the division: no other process makes these cases.
+  /// @param ids  of all cases, those of other shards too
   /// @param manifest_sha256  for the record: a batch may go on with a manifest that was mended
   /// @throws Error where it exists, is not empty and `resume` is false, where it holds something else, or another
-  /// process works in it
-  OutputFolder(std::filesystem::path path, const Shard& shard, const std::string& manifest_sha256, bool resume);
+  /// process works in it that may make the same cases
+  OutputFolder(std::filesystem::path path, const Shard& shard, const std::vector<std::string>& ids,
+               const std::string& manifest_sha256, bool resume);
   ~OutputFolder();
   OutputFolder(const OutputFolder&) = delete;
   OutputFolder& operator=(const OutputFolder&) = delete;
@@ -45,13 +49,17 @@ class OutputFolder {
   std::filesystem::path file(const std::string& name, const std::string& suffix) const {
     return path_ / (name + shard_.mark() + suffix);
   }
-  void begin(bool resume, const std::string& manifest_sha256);
+  void begin(const std::vector<std::string>& ids, bool resume, const std::string& manifest_sha256);
 
   std::filesystem::path path_;
   Shard shard_;
   bool created_ = false;
+  std::optional<DivisionLock> division_;
   int lock_ = -1;
 };
+
+/// I and N of a file of a shard, `NAME.I-of-N.SUFFIX`; nothing of any other.
+std::optional<Shard> shard_of(const std::filesystem::path& file, const std::string& name, const std::string& suffix);
 
 /// Bytes that an ordinary user can still write on the file system of a folder.
 std::uint64_t free_bytes(const std::filesystem::path& folder);

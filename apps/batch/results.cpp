@@ -143,17 +143,13 @@ std::size_t shard_count(const fs::path& folder) {
   std::size_t count = 0;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
-    unsigned long number = 0, of = 0;
-    int end = 0;
-    const std::string name = entry.path().filename().string();
-    if (std::sscanf(name.c_str(), "results.%lu-of-%lu.jsonl%n", &number, &of, &end) != 2 ||
-        end != static_cast<int>(name.size()))
-      continue;
-    if (count != 0 && count != of) {
-      throw Error("the folder has results of " + std::to_string(count) + " shards and of " + std::to_string(of) + ", " +
-                  folder.string() + "; remove those that are not meant");
+    const std::optional<Shard> shard = shard_of(entry.path(), "results", ".jsonl");
+    if (!shard) continue;
+    if (count != 0 && count != shard->count) {
+      throw Error("the folder has results of " + std::to_string(count) + " shards and of " +
+                  std::to_string(shard->count) + ", " + folder.string() + "; remove those that are not meant");
     }
-    count = of;
+    count = shard->count;
   }
   if (error) throw Error("cannot list " + folder.string() + ": " + error.message());
   if (count == 0) throw Error("no results of shards, " + folder.string() + "; run them with --shard I/N first");
@@ -164,6 +160,7 @@ std::size_t shard_count(const fs::path& folder) {
 
 Tally merge_shards(const fs::path& folder, const std::vector<std::string>& ids, std::string& table) {
   const std::size_t count = shard_count(folder);
+  const DivisionLock lock(folder, division_of(count, ids));
   std::map<std::string, json> lines, timings;
   for (std::size_t number = 1; number <= count; ++number) {
     const std::string mark = Shard{number, count}.mark();
