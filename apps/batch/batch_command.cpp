@@ -8,6 +8,7 @@
 #include "apps/batch/runner.h"
 #include "apps/batch/threads.h"
 #include "apps/input.h"
+#include "apps/output.h"
 #include "cuda/devices.h"
 #include "io/parallel.h"
 
@@ -24,6 +25,13 @@ std::vector<std::string> ids_of(const std::vector<BatchCase>& cases) {
   std::vector<std::string> ids;
   for (const BatchCase& one : cases) ids.push_back(one.id);
   return ids;
+}
+
+/// What is written must not touch the manifest. @throws UsageError
+void refuse_manifest_inside(const BatchOptions& options) {
+  ReadPlaces manifest;
+  manifest.add(options.manifest);
+  refuse_reads(manifest, options.output);
 }
 
 /// One run of `tetwarp batch`.
@@ -93,7 +101,8 @@ void Batch::find_finished(OutputFolder& folder, Results& results) {
 
 void Batch::check(Progress& progress) {
   Stage stage(options_.common, "check");
-  found_ = check_cases(options_.manifest, mine_, memory_bytes(), stage.control());
+  refuse_manifest_inside(options_);
+  found_ = check_cases(options_.manifest, options_.output, mine_, memory_bytes(), stage.control());
   for (const std::string& forecast : found_.forecasts) progress.warn(forecast);
 }
 
@@ -164,6 +173,7 @@ int Batch::run() {
 
 int merge(const BatchOptions& options) {
   std::string table;
+  refuse_manifest_inside(options);
   const std::vector<BatchCase> cases = read_manifest(options.manifest, options.output);
   const Tally tally = merge_shards(options.output, ids_of(cases), table);
   if (!options.common.quiet) std::cout << table;

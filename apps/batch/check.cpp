@@ -5,6 +5,7 @@
 #include "apps/batch/output_folder.h"
 #include "apps/deformation.h"
 #include "io/parallel.h"
+#include "io/shown_text.h"
 
 namespace tetwarp::apps {
 
@@ -26,18 +27,23 @@ bool is_plain(const DeformOptions& options) {
 /// What one case comes to: one of the texts is empty or both are.
 struct Finding {
   std::uint64_t output_bytes = 0;
+  bool plain = false;
   std::string error, forecast;
 };
 
-Finding look_at(const BatchCase& of, std::uint64_t memory_bytes) {
+Finding look_at(const BatchCase& of, const std::filesystem::path& folder, std::uint64_t memory_bytes) {
   Finding finding;
   DeformOptions options = of.options;
   options.dry_run = true;
   try {
     Deformation deformation(options);
+    const OutputSet& outputs = deformation.record().outputs.set;
+    outputs.refuse_reads(folder);
     deformation.open();
+    outputs.refuse_reads(folder);  // now that slices are known
     const DeformPlan& plan = deformation.record().plan;
     finding.output_bytes = plan.output_bytes;
+    finding.plain = is_plain(options);
     if (plan.bytes > memory_bytes) {
       finding.forecast =
           "about " + format_bytes(plan.bytes) + " of memory are needed, the batch has " + format_bytes(memory_bytes);
@@ -54,17 +60,18 @@ Finding look_at(const BatchCase& of, std::uint64_t memory_bytes) {
 
 }  // namespace
 
-BatchCheck check_cases(const std::filesystem::path& manifest, const std::vector<const BatchCase*>& cases,
-                       std::uint64_t memory_bytes, const Control& control) {
+BatchCheck check_cases(const std::filesystem::path& manifest, const std::filesystem::path& folder,
+                       const std::vector<const BatchCase*>& cases, std::uint64_t memory_bytes, const Control& control) {
   std::vector<Finding> findings(cases.size());
-  for_each_index(cases.size(), 0, control, [&](std::size_t n) { findings[n] = look_at(*cases[n], memory_bytes); });
+  for_each_index(cases.size(), 0, control,
+                 [&](std::size_t n) { findings[n] = look_at(*cases[n], folder, memory_bytes); });
   BatchCheck check;
   std::string errors;
   for (std::size_t n = 0; n < cases.size(); ++n) {
-    (is_plain(cases[n]->options) ? check.plain_bytes : check.packed_bytes) += findings[n].output_bytes;
+    (findings[n].plain ? check.plain_bytes : check.packed_bytes) += findings[n].output_bytes;
     if (!findings[n].forecast.empty()) check.forecasts.push_back(cases[n]->id + ": " + findings[n].forecast);
     if (findings[n].error.empty()) continue;
-    errors += (errors.empty() ? "" : "\n") + manifest.string() + ":" + std::to_string(cases[n]->line) + ": " +
+    errors += (errors.empty() ? "" : "\n") + shown(manifest) + ":" + std::to_string(cases[n]->line) + ": " +
               cases[n]->id + ": " + findings[n].error;
   }
   require(errors.empty(), errors);

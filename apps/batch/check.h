@@ -16,9 +16,10 @@ struct BatchCheck {
 };
 
 /// Opens the headers of every case and plans it, in parallel: nothing is written.
+/// @param folder  OUTPUT_DIR, which must be clear of all that is read
 /// @throws InputError for rows that `deform` would refuse, all of them, one a line; Cancelled
-BatchCheck check_cases(const std::filesystem::path& manifest, const std::vector<const BatchCase*>& cases,
-                       std::uint64_t memory_bytes, const Control& control);
+BatchCheck check_cases(const std::filesystem::path& manifest, const std::filesystem::path& folder,
+                       const std::vector<const BatchCase*>& cases, std::uint64_t memory_bytes, const Control& control);
 
 /// @throws Error where the outputs that are not compressed do not fit
 /// @return what to say where all might not fit; else empty

@@ -100,6 +100,53 @@ Number whole_number(const ManifestRow& row, const std::string& key, Number least
   return number;
 }
 
+/// Where the paths of a row count from.
+struct Places {
+  fs::path inputs;   ///< the folder of the manifest
+  fs::path outputs;  ///< the folder of the case
+};
+
+/// Relative to the manifest's folder. A ".." is left to the system, which follows links first.
+std::string input(const std::string& text, const Places& places) {
+  fs::path plain;
+  for (const fs::path& part : places.inputs / text) {
+    if (part != ".") plain /= part;
+  }
+  const std::string path = plain.empty() ? "." : plain.string();
+  return path.starts_with('-') ? "./" + path : path;
+}
+
+/// A field file with its options, of which one may name a second file.
+std::string field_input(const std::string& text, const Places& places) {
+  const std::string moved = input(text, places);
+  FieldSource source = parse_field_source(moved);
+  if (!source.options.contains("deformed")) return moved;
+  source.options["deformed"] = input(source.options["deformed"], places);
+  std::string all = source.path.string();
+  for (const auto& [key, value] : source.options)
+    all.append(all.size() == source.path.string().size() ? ":" : ",").append(key).append("=").append(value);
+  return all;
+}
+
+/// A name in the case's folder. @param text  of `with` and `points` with options behind it
+std::string output(const std::string& key, const std::string& text, const Places& places) {
+  const std::string name = text.substr(0, text.find(':'));
+  require(!name.empty() && fs::path(name).filename() == name && !name.starts_with('.'),
+          key + " is \"" + shown(name) + "\"; a name in the folder of the case is expected, no path");
+  return (places.outputs / text).string();
+}
+
+std::string value_of(const std::string& key, const std::string& text, const Places& places) {
+  if (key == "field") return is_formula(text) ? text : field_input(text, places);
+  if (key == "grid") return text == "same" || text == "fit" ? text : input(text, places);
+  if (kInputs.contains(key)) return input(text, places);
+  if (kOutputs.contains(key)) return output(key, text, places);
+  if (key != "with" && key != "points") return text;
+  const std::size_t equals = text.find('=');
+  require(equals != std::string::npos, key + " is \"" + shown(text) + "\"; IN=OUT is expected");
+  return input(text.substr(0, equals), places) + "=" + output(key, text.substr(equals + 1), places);
+}
+
 /// One manifest while it is read.
 class Reader {
  public:
@@ -111,10 +158,7 @@ class Reader {
  private:
   void take(const ManifestRow& row);
   void take_variant(const ManifestRow& row, const std::string& id, std::uint64_t variant);
-  std::vector<std::string> arguments_of(const ManifestRow& row, const fs::path& folder, std::uint64_t variant) const;
-  std::string value_of(const std::string& key, const std::string& text, const fs::path& folder) const;
-  std::string input(const std::string& text) const;
-  static std::string output(const std::string& key, const std::string& text, const fs::path& folder);
+  static std::vector<std::string> arguments_of(const ManifestRow& row, const Places& places, std::uint64_t variant);
   bool check_keys(const ManifestRow& row);
   static void check_files(const DeformOptions& options);
   static void check_backend(const DeformOptions& options);
@@ -125,35 +169,8 @@ class Reader {
   std::vector<BatchCase> cases_;
 };
 
-/// Relative to the manifest's folder.
-std::string Reader::input(const std::string& text) const {
-  const fs::path path = base_.empty() || fs::path(text).is_absolute() ? fs::path(text) : base_ / text;
-  const std::string plain = path.lexically_normal().string();
-  return plain.starts_with('-') ? "./" + plain : plain;
-}
-
-/// A name in the case's folder. @param text  of `with` and `points` with options behind it
-std::string Reader::output(const std::string& key, const std::string& text, const fs::path& folder) {
-  const std::string name = text.substr(0, text.find(':'));
-  require(!name.empty() && fs::path(name).filename() == name && !name.starts_with('.'),
-          key + " is \"" + shown(name) + "\"; a name in the folder of the case is expected, no path");
-  return (folder / text).string();
-}
-
-std::string Reader::value_of(const std::string& key, const std::string& text, const fs::path& folder) const {
-  if (key == "field") return is_formula(text) ? text : input(text);
-  if (key == "grid") return text == "same" || text == "fit" ? text : input(text);
-  if (kInputs.contains(key)) return input(text);
-  if (kOutputs.contains(key)) return output(key, text, folder);
-  if (key != "with" && key != "points") return text;
-  const std::size_t equals = text.find('=');
-  require(equals != std::string::npos, key + " is \"" + shown(text) + "\"; IN=OUT is expected");
-  return input(text.substr(0, equals)) + "=" + output(key, text.substr(equals + 1), folder);
-}
-
-std::vector<std::string> Reader::arguments_of(const ManifestRow& row, const fs::path& folder,
-                                              std::uint64_t variant) const {
-  std::vector<std::string> arguments = {input(row.text("input"))};
+std::vector<std::string> Reader::arguments_of(const ManifestRow& row, const Places& places, std::uint64_t variant) {
+  std::vector<std::string> arguments = {input(row.text("input"), places)};
   const std::uint64_t seed = row.has("seed") ? whole_number<std::uint64_t>(row, "seed", 0, UINT64_MAX) : 0;
   for (const OptionKind& option : known_options()) {  // in one order, whatever that of the columns
     std::vector<std::string> values = row.has(option.name) ? row.values.at(option.name) : std::vector<std::string>();
@@ -173,7 +190,7 @@ std::vector<std::string> Reader::arguments_of(const ManifestRow& row, const fs::
         require(row.has("seed"), "\"" + shown(value) + "\" is drawn at random; give the row a seed");
         value = draw(value, seed, variant, n);
       }
-      arguments.push_back("--" + option.name + "=" + value_of(option.name, value, folder));
+      arguments.push_back("--" + option.name + "=" + value_of(option.name, value, places));
     }
   }
   return arguments;
@@ -209,7 +226,7 @@ void Reader::take_variant(const ManifestRow& row, const std::string& id, std::ui
     BatchCase of;
     of.id = id;
     of.line = row.line;
-    of.arguments = arguments_of(row, folder, variant);
+    of.arguments = arguments_of(row, {base_, folder}, variant);
     of.options = parse_deform(of.arguments);
     of.options.folder = folder;
     if (variant == 0) {
@@ -219,6 +236,8 @@ void Reader::take_variant(const ManifestRow& row, const std::string& id, std::ui
     cases_.push_back(std::move(of));
   } catch (const Error& error) {
     errors_.add(row.line, error.what());
+  } catch (const fs::filesystem_error& error) {  // a name that is too long, a folder that may not be looked into
+    errors_.add(row.line, "cannot be looked at (" + error.code().message() + "), " + shown(error.path1()));
   }
 }
 

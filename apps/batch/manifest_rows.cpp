@@ -47,7 +47,16 @@ std::vector<ManifestRow> csv_rows(const std::string& text, const std::string& na
                                   ManifestErrors& errors) {
   std::vector<ManifestRow> rows;
   std::vector<std::string> keys;
-  for (CsvRecords records(text, 0, name); records.next();) {
+  CsvRecords records(text, 0, name);
+  const auto next = [&] {
+    try {
+      return records.next();
+    } catch (const InputError& error) {  // nobody knows where the next record begins
+      errors.add(records.line, error.what());
+      return false;
+    }
+  };
+  while (next()) {
     if (records.is_blank() || records.raw(0).starts_with('#')) continue;
     std::vector<std::string> cells;
     for (std::size_t n = 0; n < records.fields.size(); ++n) cells.push_back(unquoted(records.raw(n)));

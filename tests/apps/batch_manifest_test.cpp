@@ -90,6 +90,48 @@ TEST_F(BatchManifest, WhatHeadersShowToBeWrongIsListedToo) {
   EXPECT_FALSE(std::filesystem::exists(scratch_ / "out"));
 }
 
+TEST_F(BatchManifest, EveryRefusalNamesItsLine) {
+  const std::string good = R"({"case": "good", "input": "ct.nii.gz", "field": "identity"})", long_name(300, 'x');
+  const auto row = [](const std::string& rest) { return R"({"case": "bad", "input": "ct.nii.gz", )" + rest + "}"; };
+  for (const std::string& bad :
+       {row(R"("field": "identity", "output": "x.foo")"), row(R"("field": "identity", "coverage": "x.foo")"),
+        row(R"("field": "identity", "with": ["ct.nrrd=x.foo"])"),
+        row(R"("field": "identity", "with": [")" + long_name + R"(=x.mha"])"),
+        row(R"("field": "identity", "points": ["ct.nrrd=x.csv"])"),
+        row(R"("field": "identity", "grid": "fit", "output": "dicom")"),
+        row(R"("field": "identity", "labels": "ct.nrrd")"), row(R"("field": ")" + long_name + '"'),
+        row(R"("pull-field": ")" + long_name + '"'), row(R"("scenario": ")" + long_name + '"')}) {
+    SCOPED_TRACE(bad);
+    const Outcome refused = batch(good + "\n" + bad + "\n");
+    EXPECT_EQ(refused.status, 4);
+    EXPECT_TRUE(refused.err.starts_with("tetwarp: error: m.jsonl:2: ")) << refused.err;
+    EXPECT_FALSE(std::filesystem::exists(scratch_ / "out"));
+  }
+  for (const char* bad : {"b,\"ct.nii.gz,identity\n", "b,\"ct.nii.gz\"x,identity\n"}) {
+    write_file(scratch_ / "m.csv", std::string("case,input,field\na,ct.nii.gz,identity\n") + bad);
+    const Outcome refused = run("batch m.csv -o out");
+    EXPECT_EQ(refused.status, 4);
+    EXPECT_TRUE(refused.err.starts_with("tetwarp: error: m.csv:3: ")) << refused.err;
+  }
+}
+
+TEST_F(BatchManifest, ASecondMeshAndDotsBehindALinkCountFromTheManifest) {
+  std::filesystem::create_directories(scratch_ / "study/near");
+  std::filesystem::create_directories(scratch_ / "far/deep");
+  std::filesystem::create_directory_symlink(scratch_ / "far/deep", scratch_ / "study/near/link");
+  std::filesystem::rename(scratch_ / "ct.nii.gz", scratch_ / "far/ct.nii.gz");
+  write_file(
+      scratch_ / "study/m.jsonl",
+      R"({"case": "a", "input": "near/link/../ct.nii.gz", "field": "rest.msh:deformed=./deformed.msh,units=m"})");
+  for (const char* name : {"study/rest.msh", "study/deformed.msh"}) write_file(scratch_ / name, "no mesh");
+  const Outcome listed = run("batch study/m.jsonl -o out --dry-run");
+  EXPECT_TRUE(says(listed.out,
+                   {"'study/near/link/../ct.nii.gz'", "'--field=study/rest.msh:deformed=study/deformed.msh,units=m'"}))
+      << listed.err;
+  std::filesystem::remove(scratch_ / "study/deformed.msh");
+  EXPECT_TRUE(says(run("batch study/m.jsonl -o out").err, {"m.jsonl:1: no such file", "study/deformed.msh"}));
+}
+
 TEST_F(BatchManifest, CsvAndJsonLinesSayTheSame) {
   write_file(scratch_ / "m.csv",
              "\xEF\xBB\xBF# to be edited\r\n"

@@ -152,4 +152,27 @@ TEST_F(WhatIsRead, StaysWhereItIsWhenAnOutputIsNamedThroughALinkAndDots) {
   is_refused("deform far/ct.nii.gz -f identity -o data/out/../ct.nii.gz", "far/ct.nii.gz");
 }
 
+TEST_F(WhatIsRead, IsNotWrittenOverByBatch) {
+  const auto refused = [&](const std::string& arguments, int status, const std::vector<std::string>& words) {
+    SCOPED_TRACE(arguments);
+    const auto before = files();
+    const Outcome made = run(arguments);
+    EXPECT_EQ(made.status, status) << made.err;
+    EXPECT_TRUE(says(made.err, words));
+    EXPECT_EQ(files(), before);
+  };
+  fs::create_directory(scratch_ / "study");
+  write_file(scratch_ / "study/results.jsonl", R"({"case": "a", "input": "../ct.nii.gz", "field": "identity"})");
+  refused("batch study/results.jsonl -o study --shard 1/2", 2, {"the input study/results.jsonl"});
+  refused("batch study/results.jsonl -o study --merge", 2, {"the input study/results.jsonl"});
+  fs::copy(scratch_ / "ct.nii.gz", scratch_ / "study/ct.nii.gz");
+  write_file(scratch_ / "m.jsonl",
+             "\n"
+             R"({"case": "a", "input": "study/ct.nii.gz", "field": "identity"})");
+  refused("batch m.jsonl -o study --shard 1/1 --resume", 4, {"m.jsonl:2: a: the output study", "study/ct.nii.gz"});
+  write_file(scratch_ / "m.jsonl", R"({"case": "a", "input": "series", "field": "identity"})");
+  refused("batch m.jsonl -o far --shard 1/1 --resume", 4, {"m.jsonl:1: a: the output far", "series/IM00005.dcm"});
+  refused("batch --init series -o series/m.csv", 2, {"the output series/m.csv", "the input series"});
+}
+
 }  // namespace
