@@ -1,6 +1,7 @@
 #include <unistd.h>
 
 #include <iostream>
+#include <map>
 
 #include "apps/batch/case_record.h"
 #include "apps/batch/check.h"
@@ -47,7 +48,7 @@ class Batch {
  private:
   void choose();
   void check(Progress& progress);
-  void find_finished(OutputFolder& folder, Results& results);
+  void find_finished(const OutputFolder& folder, Results& results);
   int conclude(const Results& results, Progress& progress, const Usage& usage, bool whole) const;
   std::vector<std::string> ids() const;
   std::size_t wanted_jobs(const Devices& devices, bool cuda) const;
@@ -57,8 +58,9 @@ class Batch {
   const BatchOptions& options_;
   Shard shard_;
   std::vector<BatchCase> cases_;
-  std::vector<const BatchCase*> mine_;  ///< of the shard
-  std::vector<const BatchCase*> open_;  ///< those that are not finished
+  std::vector<const BatchCase*> mine_;                     ///< of the shard
+  std::vector<const BatchCase*> open_;                     ///< those that are not finished
+  std::map<std::string, std::vector<std::string>> again_;  ///< of these, by the reason, those that were made before
   BatchCheck found_;
 };
 
@@ -83,18 +85,23 @@ std::vector<std::string> Batch::ids() const {
 }
 
 /// Cases whose folder is whole are kept; others are replaced when they are made again.
-void Batch::find_finished(OutputFolder& folder, Results& results) {
+void Batch::find_finished(const OutputFolder& folder, Results& results) {
   folder.remove_unfinished(ids());
+  const std::map<std::string, json> earlier = read_lines(folder.results());
   std::vector<std::optional<json>> lines(mine_.size());
-  for_each_index(mine_.size(), options_.common.threads, {.stop = interrupt_token()}, [&](std::size_t n) {
-    std::string why;
-    lines[n] = finished_line(*mine_[n], folder.case_folder(mine_[n]->id), why);
-  });
+  std::vector<std::string> why(mine_.size());
+  for_each_index(mine_.size(), options_.common.threads, {.stop = interrupt_token()},
+                 [&](std::size_t n) { lines[n] = finished_line(*mine_[n], folder.case_folder(mine_[n]->id), why[n]); });
   for (std::size_t n = 0; n < mine_.size(); ++n) {
-    if (lines[n])
+    if (lines[n]) {
       results.keep(*lines[n]);
-    else
-      open_.push_back(mine_[n]);
+      continue;
+    }
+    open_.push_back(mine_[n]);
+    const auto line = earlier.find(mine_[n]->id);
+    if (why[n].empty() && line != earlier.end())
+      why[n] = line->second.value("status", "") == "done" ? "the folder is gone" : "nothing came of them before";
+    if (!why[n].empty()) again_[why[n]].push_back(mine_[n]->id);
   }
   for (BatchCase& one : cases_) one.options.common.overwrite = fs::exists(folder.case_folder(one.id) / kFolderRecord);
 }
@@ -154,6 +161,7 @@ int Batch::run() {
   MemoryBudget memory(memory_bytes());
   const std::size_t jobs = std::clamp<std::size_t>(open_.size(), 1, threads.jobs());
   progress.begin(open_.size(), mine_.size() - open_.size());
+  for (const auto& [reason, cases] : again_) progress.again(reason, cases);
   if (!scarce.empty()) progress.warn(scarce);
   if (threads.limit()) {
     progress.warn("the system gives only " + std::to_string(*threads.limit()) + " threads: " + std::to_string(jobs) +

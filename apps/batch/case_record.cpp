@@ -63,28 +63,44 @@ json line_of(const BatchCase& of, const std::string& status) {
 
 }  // namespace
 
-std::string hash_input(const DeformOptions& options) {
-  if (has_image_suffix(options.input.path)) return hash_file(options.input.path);
-  const InputHeader header = open_input(options.input, Control{.stop = interrupt_token()});
-  return header.series ? hash_files(*header.series, options.common.threads, {.stop = interrupt_token()})
-                       : hash_file(options.input.path);
+json case_identity(const BatchCase& of, const std::string& input_sha256, const std::vector<std::string>& further) {
+  json identity = {{"program", version()}};
+  const auto add = [&](const char* name, const std::vector<std::string>& values) {
+    Sha256 hash;
+    hash.add("tetwarp case").add(name);
+    for (const std::string& value : values) hash.add(value);
+    const auto& hidden = of.options.dicom.deidentification;
+    identity[name] = hidden ? Sha256().add(keyed_digest(hidden->key, hash.hex())).hex() : hash.hex();
+  };
+  add("row", of.row);
+  add("input", {input_sha256});
+  add("further", further);
+  return identity;
 }
 
-std::string case_identity(const BatchCase& of, const std::string& input_sha256) {
-  Sha256 hash;
-  hash.add("tetwarp case").add(version());
-  for (const std::string& argument : of.arguments) hash.add(argument);
-  hash.add(input_sha256);
-  const Reads further = further_reads_of(of.options);
-  for (const fs::path& file : further.paths()) {
-    hash.add(file.string());
-    if (fs::is_regular_file(file)) hash.add(hash_file(file));
+namespace {
+
+/// What tells a case from the one that was recorded; empty: nothing.
+std::string difference(const json& now, const json& recorded) {
+  if (!recorded.is_object() || recorded.value("program", json()) != now["program"]) return "another version made them";
+  for (const auto& [name, what] : {std::pair("row", "the row has changed"),
+                                   {"input", "the input has changed"},
+                                   {"further", "another file that is read has changed"}}) {
+    if (recorded.value(name, json()) != now[name]) return what;
   }
-  if (of.options.dicom.deidentification) hash.add(std::as_bytes(std::span(of.options.dicom.deidentification->key)));
-  return hash.hex();
+  return "";
 }
 
-json record_case(const BatchCase& of, const Deformation& made) {
+/// A line as it would be written now: OUTPUT_DIR and the manifest may have moved.
+json with_current_paths(json line, const BatchCase& of) {
+  if (line.contains("command")) line["command"] = command_of(of);
+  if (line.contains("input") && line["input"].contains("path")) line["input"]["path"] = of.options.input.path.string();
+  return line;
+}
+
+}  // namespace
+
+json record_case(const BatchCase& of, const Deformation& made, const std::vector<std::string>& further) {
   const DeformRecord& record = made.record();
   const fs::path& folder = record.outputs.set.folder();
   const json files = files_of(folder), told = sidecar(record);
@@ -94,9 +110,10 @@ json record_case(const BatchCase& of, const Deformation& made) {
   line["report"] = told["report"];
   line["outputs"] = outputs_of(files, of.id);
   line["notes"] = made.notes();
-  write_json(
-      folder / kFolderRecord,
-      {{"case", of.id}, {"identity", case_identity(of, record.input_sha256)}, {"result", line}, {"files", files}});
+  write_json(folder / kFolderRecord, {{"case", of.id},
+                                      {"identity", case_identity(of, record.input_sha256, further)},
+                                      {"result", line},
+                                      {"files", files}});
   return line;
 }
 
@@ -115,21 +132,18 @@ std::optional<json> finished_line(const BatchCase& of, const fs::path& folder, s
     return std::nullopt;
   }
   try {
-    if (record.value("identity", "") != case_identity(of, hash_input(of.options))) {
-      why = "its row, its input or the program has changed";
-      return std::nullopt;
-    }
-    if (files_of(folder) != record["files"]) {
-      why = "its files are not as they were written";
-      return std::nullopt;
-    }
+    const int threads = of.options.common.threads;
+    const json identity =
+        case_identity(of, hash_volume(of.options.input, threads), further_reads_of(of.options).digests(threads));
+    why = difference(identity, record.value("identity", json()));
+    if (why.empty() && files_of(folder) != record["files"]) why = "the outputs are not as they were written";
   } catch (const Cancelled&) {
     throw;
-  } catch (const std::exception& error) {
-    why = error.what();
-    return std::nullopt;
+  } catch (const std::exception&) {  // making it says what is wrong
+    why = "what is read cannot be read now";
   }
-  return record["result"];
+  if (!why.empty()) return std::nullopt;
+  return with_current_paths(record["result"], of);
 }
 
 }  // namespace tetwarp::apps

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "apps/batch/case_record.h"
+#include "apps/reads.h"
 #include "cuda/devices.h"
 
 namespace tetwarp::apps {
@@ -44,6 +45,8 @@ json attempt(const BatchCase& of, const Retry& retry, const Resources& resources
   if (retry.on_cpu) options.backend = "cpu";
   Clock clock;
   Deformation deformation(options, resources.inputs.get(options.input));
+  const std::vector<std::string> further = further_reads_of(options).digests(options.common.threads);
+  const double hashed = clock.lap();
   deformation.open();
   timing["open"] = clock.lap();
   const MemoryBudget::Grant grant = resources.memory.wait_for(deformation.record().plan.bytes, stop);
@@ -77,8 +80,8 @@ json attempt(const BatchCase& of, const Retry& retry, const Resources& resources
   }
   deformation.write();
   timing["write"] = clock.lap();
-  json line = record_case(of, deformation);
-  timing["hash"] = clock.lap();
+  json line = record_case(of, deformation, further);
+  timing["hash"] = hashed + clock.lap();
   deformation.commit();
   timing["commit"] = clock.lap();
   timing["planned_bytes"] = deformation.record().plan.bytes;

@@ -227,6 +227,7 @@ void Reader::take_variant(const ManifestRow& row, const std::string& id, std::ui
     of.id = id;
     of.line = row.line;
     of.arguments = arguments_of(row, {base_, folder}, variant);
+    of.row = arguments_of(row, {}, variant);
     of.options = parse_deform(of.arguments);
     of.options.folder = folder;
     if (variant == 0) {

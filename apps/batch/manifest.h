@@ -13,7 +13,9 @@ struct BatchCase {
   std::string id;
   std::size_t line = 0;                ///< of the manifest
   std::vector<std::string> arguments;  ///< of the `tetwarp deform` that repeats it, INPUT first
-  DeformOptions options;               ///< as parsed from them; all outputs lie in OUTPUT_DIR/ID
+  /// The same with inputs as the manifest names them, and outputs by their names alone: wherever both lie now.
+  std::vector<std::string> row;
+  DeformOptions options;  ///< as parsed from them; all outputs lie in OUTPUT_DIR/ID
 };
 
 /// What follows `tetwarp` on the command line that repeats a case.

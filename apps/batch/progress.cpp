@@ -6,6 +6,7 @@
 #include <ctime>
 #include <nlohmann/json.hpp>
 
+#include "io/dicom_text.h"
 #include "io/shown_text.h"
 
 namespace tetwarp::apps {
@@ -98,6 +99,16 @@ void Progress::warn(const std::string& text) {
   const std::lock_guard lock(mutex_);
   print("tetwarp: warning: " + text);
   print({{"event", "warning"}, {"text", text}});
+}
+
+void Progress::again(const std::string& reason, const std::vector<std::string>& ids) {
+  constexpr std::size_t kMostShown = 10;
+  const std::lock_guard lock(mutex_);
+  std::string listed;
+  for (std::size_t n = 0; n < std::min(ids.size(), kMostShown); ++n) listed += (n == 0 ? "" : ", ") + ids[n];
+  if (ids.size() > kMostShown) listed += " and " + std::to_string(ids.size() - kMostShown) + " more";
+  print("tetwarp: made again: " + plural(ids.size(), "case") + ", " + reason + ": " + listed);
+  print({{"event", "again"}, {"cases", ids.size()}, {"reason", reason}, {"ids", ids}});
 }
 
 void Progress::draw() {

@@ -4,6 +4,7 @@
 #include <mutex>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <vector>
 
 #include "apps/batch/case_run.h"
 #include "apps/console.h"
@@ -27,6 +28,8 @@ class Progress {
   void started(const std::string& id);
   void ended(const CaseOutcome& outcome);
   void warn(const std::string& text);
+  /// Finished cases that are made again. @param reason  "the row has changed"
+  void again(const std::string& reason, const std::vector<std::string>& ids);
   void draw();
   /// The last word. @param summary  numbers of cases, for a machine
   void end(const nlohmann::json& summary);
