@@ -20,8 +20,9 @@ struct Barycentric {
   Real a, b, c, d;
 };
 
-/// det [A B C D; 1 1 1 1] (Eq. 6), as it is printed: expanded by cofactors of the first row, which multiplies
-/// coordinates as large as the volume and takes the products off each other. In float that leaves noise.
+/// det [A B C D; 1 1 1 1] (Eq. 6), expanded along the first row by minors of differences: it multiplies coordinates as
+/// large as the volume and takes the products off each other, which in float leaves noise. The order in which the paper
+/// writes it multiplies three coordinates and leaves more (bench/appendix.h).
 template <class Real>
 TETWARP_HD Real determinant_4x4(const Corners<Real>& t) {
   const auto minor = [](const Point<Real>& p, const Point<Real>& q, const Point<Real>& r) {  // of rows y, z, 1

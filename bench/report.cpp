@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "bench/published.h"
 #include "deform/version.h"
 
 namespace tetwarp::bench {
@@ -35,15 +36,22 @@ Json to_json(const Run& run) {
 }
 
 Json to_json(const Appendix& appendix) {
-  const auto point = [](const Point<float>& p) { return Json{p.x, p.y, p.z}; };
-  const Corners<float>& t = appendix.corners;
-  Json document = {{"note", "the corners are ours; those of the paper's Eq. 8 are not known"},
-                   {"corners", {{"A", point(t.a)}, {"B", point(t.b)}, {"C", point(t.c)}, {"D", point(t.d)}}},
-                   {"determinant",
-                    {{"double_4x4", appendix.example.double_4x4},
-                     {"float_4x4", appendix.example.float_4x4},
-                     {"double_3x3", appendix.example.double_3x3},
-                     {"float_3x3", appendix.example.float_3x3}}},
+  const auto point = [](const Point<double>& p) { return Json{p.x, p.y, p.z}; };
+  const PublishedAppendix& paper = published_appendix();
+  const Corners<double>& t = paper.corners;
+  Json forms = Json::array();
+  for (const DeterminantForm& form : appendix.forms) {
+    forms.push_back({{"form", form.name},
+                     {"determinant", form.value},
+                     {"printed", form.printed ? Json(*form.printed) : Json(nullptr)}});
+  }
+  Json document = {{"corners", {{"A", point(t.a)}, {"B", point(t.b)}, {"C", point(t.c)}, {"D", point(t.d)}}},
+                   {"determinants", forms},
+                   {"inverse_first_column",
+                    {{"double", appendix.in_double.inverse},
+                     {"float", appendix.in_float.inverse},
+                     {"printed_double", paper.inverse_in_double},
+                     {"printed_float", paper.inverse_in_float}}},
                    {"relative_errors", Json::array()}};
   for (const DeterminantErrors& errors : appendix.errors) {
     document["relative_errors"].push_back(

@@ -3,6 +3,7 @@
 #include <span>
 
 #include "bench/markdown.h"
+#include "bench/published.h"
 #include "bench/report.h"
 #include "deform/version.h"
 
@@ -46,9 +47,8 @@ Differences in stored units, over voxels both covered and written.
 
 constexpr char kAppendixNote[] = R"(## Appendix A: the determinant far from the origin
 
-The corners are ours: those of the paper's Eq. 8 are not known.
-
-)";
+The corners of the paper's Eq. 8, its order of operations, and others that a compiler or a reader may take, since the paper
+names neither its compiler nor its flags. )";
 
 std::string size_text(const Run& run) { return to_string(run.size); }
 
@@ -170,19 +170,32 @@ std::string quality_table(const Results& results) {
   return text + "\n";
 }
 
+std::string inverse_text(const AppendixResult<double>& in_double, const AppendixResult<float>& in_float) {
+  const PublishedAppendix& paper = published_appendix();
+  std::string text = heading({"the inverse begins", "the paper, double", "ours", "the paper, float", "ours"});
+  constexpr const char* kOf[] = {"A", "B", "C", "D"};
+  for (std::size_t n = 0; n < 4; ++n) {
+    text += row({std::string("x of ") + kOf[n], format("%.6f", paper.inverse_in_double[n]),
+                 format("%.6f", in_double.inverse[n]), format("%.6f", paper.inverse_in_float[n]),
+                 format("%.6f", static_cast<double>(in_float.inverse[n]))});
+  }
+  return text + "\n";
+}
+
 std::string appendix_text(const Appendix& appendix) {
-  const auto point = [](const char* name, const Point<float>& p) {
-    return format("%s (%.9g, %.9g, %.9g)", name, p.x, p.y, p.z);
+  const auto point = [](const char* name, const Point<double>& p) {
+    return format("%s (%g, %g, %g)", name, p.x, p.y, p.z);
   };
-  const Corners<float>& t = appendix.corners;
-  std::string text =
-      kAppendixNote + point("A", t.a) + ", " + point("B", t.b) + ", " + point("C", t.c) + ", " + point("D", t.d) +
-      "\n\n" + heading({"form", "determinant"}) +
-      row({"4 x 4, Eq. 6, double", format("%.9g", appendix.example.double_4x4)}) +
-      row({"4 x 4, Eq. 6, float", format("%.9g", static_cast<double>(appendix.example.float_4x4))}) +
-      row({"3 x 3 about D, Eq. 13, double", format("%.9g", appendix.example.double_3x3)}) +
-      row({"3 x 3 about D, Eq. 13, float", format("%.9g", static_cast<double>(appendix.example.float_3x3))}) +
-      "\nRelative errors of the float forms, random tetrahedra of about one cell.\n\n" +
+  const Corners<double>& t = published_appendix().corners;
+  std::string text = kAppendixNote + point("A", t.a) + ", " + point("B", t.b) + ", " + point("C", t.c) + ", " +
+                     point("D", t.d) + ".\n\n" + heading({"form", "the paper", "ours", "difference"});
+  for (const DeterminantForm& form : appendix.forms) {
+    text += row({form.name, form.printed ? format("%.7g", *form.printed) : "-", format("%.9g", form.value),
+                 form.printed ? format("%.1e", form.value - *form.printed) : "-"});
+  }
+  text +=
+      "\n" + inverse_text(appendix.in_double, appendix.in_float) +
+      "Relative errors of the float forms (4 x 4 by minors of differences), random tetrahedra of about one cell.\n\n" +
       heading(
           {"coordinates up to", "tetrahedra", "4 x 4, largest", "4 x 4, median", "3 x 3, largest", "3 x 3, median"});
   for (const DeterminantErrors& errors : appendix.errors) {

@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
+#include "bench/published.h"
+
 namespace tetwarp::bench {
 namespace {
 
@@ -21,20 +25,75 @@ TEST(BenchAppendix, SwappingTwoCornersTurnsTheSign) {
   EXPECT_EQ(found.float_3x3, -1);
 }
 
-TEST(BenchAppendix, TheExampleIsAboutOneCellFarFromTheOrigin) {
-  const Appendix appendix = measure_appendix(10);
-  const Corners<float>& t = appendix.corners;
-  for (const Point<float>& corner : {t.a, t.b, t.c, t.d}) {
-    for (const float x : {corner.x, corner.y, corner.z}) {
-      EXPECT_GT(x, 400);
-      EXPECT_LT(x, 512);
-      EXPECT_NE(x, std::floor(x));
+Corners<float> equation_8_in_float() {
+  const Corners<double>& t = published_appendix().corners;
+  const auto narrow = [](const Point<double>& p) {
+    return Point<float>{static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
+  };
+  return {narrow(t.a), narrow(t.b), narrow(t.c), narrow(t.d)};
+}
+
+TEST(BenchAppendix, ThePapersOrderGivesItsDeterminantsOfEquation8) {
+  const AppendixResult<double> exact = expand_by_cofactors(published_appendix().corners, Order::as_printed);
+  EXPECT_NEAR(exact.determinant, 1.216, 1e-8);
+  const AppendixResult<float> found = expand_by_cofactors(equation_8_in_float(), Order::as_printed);
+  EXPECT_NEAR(found.determinant, 2.010187, 1e-4);
+}
+
+TEST(BenchAppendix, ThePapersOrderGivesTheInverseThatItPrints) {
+  const PublishedAppendix& paper = published_appendix();
+  const AppendixResult<double> exact = expand_by_cofactors(paper.corners, Order::as_printed);
+  const AppendixResult<float> found = expand_by_cofactors(equation_8_in_float(), Order::as_printed);
+  for (std::size_t n = 0; n < 4; ++n) {
+    EXPECT_NEAR(exact.inverse[n], paper.inverse_in_double[n], 5.1e-7) << n;
+    EXPECT_NEAR(found.inverse[n], paper.inverse_in_float[n], 5e-6) << n;
+  }
+}
+
+TEST(BenchAppendix, OrdersDifferOnlyInFloat) {
+  float least = 10, largest = 0;
+  for (const Order order :
+       {Order::as_printed, Order::right_to_left, Order::ends_first, Order::fused_last, Order::fused}) {
+    EXPECT_NEAR(expand_by_cofactors(published_appendix().corners, order).determinant, 1.216, 1e-8);
+    const float found = expand_by_cofactors(equation_8_in_float(), order).determinant;
+    least = std::min(least, found);
+    largest = std::max(largest, found);
+  }
+  EXPECT_LT(least, 1.8f);
+  EXPECT_GT(largest, 4.0f);
+}
+
+TEST(BenchAppendix, CofactorsAndTheFormAboutDAgreeOnGeneralCorners) {
+  const Corners<double> t{{3.5, -1.25, 2}, {0.5, 4.75, -1}, {-2.5, 1, 5.25}, {1.5, 0.25, -0.75}};
+  const AppendixResult<double> found = expand_by_cofactors(t, Order::as_printed);
+  EXPECT_NEAR(found.determinant, determinant_about_d(t), 1e-12);
+  const Barycentric<double> here = barycentric_about_d(t, {0, 0, 0}), there = barycentric_about_d(t, {1, 0, 0});
+  EXPECT_NEAR(found.inverse[0], there.a - here.a, 1e-12);
+  EXPECT_NEAR(found.inverse[1], there.b - here.b, 1e-12);
+  EXPECT_NEAR(found.inverse[2], there.c - here.c, 1e-12);
+  EXPECT_NEAR(found.inverse[3], there.d - here.d, 1e-12);
+}
+
+TEST(BenchAppendix, FloatAboutDKeepsTheDeterminantOfEquation8) {
+  EXPECT_NEAR(determinant_about_d(equation_8_in_float()), 1.216, 1e-4);
+}
+
+TEST(BenchAppendix, EveryFormOfEquation8IsListedBesideWhatThePaperPrints) {
+  int beside_double = 0, beside_float = 0, alone = 0;
+  for (const DeterminantForm& form : measure_appendix(10).forms) {
+    if (!form.printed) {
+      ++alone;
+    } else if (form.name.find("double") != std::string::npos) {
+      ++beside_double;
+      EXPECT_EQ(form.printed, 1.216);
+    } else {
+      ++beside_float;
+      EXPECT_EQ(form.printed, 2.010187);
     }
   }
-  EXPECT_NEAR(appendix.example.double_3x3, 1.2, 0.05);
-  EXPECT_NEAR(appendix.example.double_4x4, appendix.example.double_3x3, 1e-9);
-  EXPECT_NEAR(appendix.example.float_3x3, appendix.example.double_3x3, 1e-6);
-  EXPECT_GT(std::abs(appendix.example.float_4x4 - appendix.example.double_3x3), 1e-3);
+  EXPECT_EQ(beside_double, 1);
+  EXPECT_EQ(beside_float, 5);
+  EXPECT_EQ(alone, 3);
 }
 
 TEST(BenchAppendix, FloatAboutDStaysAccurateWhereFloatByEquation6DoesNot) {
