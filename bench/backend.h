@@ -59,7 +59,7 @@ class Backend {
   const VertexField& field() const { return field_; }
 
  protected:
-  Backend(int threads, InverseIn inverse) : threads_(threads), inverse_(inverse) {}
+  explicit Backend(int threads) : threads_(threads) {}
 
   virtual std::unique_ptr<Resampler> make_resampler(const Geometry& geometry) const = 0;
   virtual void volume_changed() {}
@@ -68,7 +68,6 @@ class Backend {
   virtual std::vector<std::uint32_t> count_baseline_writes(Method method, FieldSource source) = 0;
 
   const int threads_;
-  const InverseIn inverse_;
   const Volume<std::int16_t>* volume_ = nullptr;
   std::int16_t background_ = 0;
   Formula formula_;
@@ -81,9 +80,9 @@ class Backend {
 };
 
 /// Plain loops on the host, sampling in software, float. @param threads  0: all
-std::unique_ptr<Backend> make_cpu_backend(int threads, InverseIn inverse = InverseIn::loop_as_compiled);
+std::unique_ptr<Backend> make_cpu_backend(int threads);
 /// @throws DeviceError without a device, NotCompiled in a build without CUDA
-std::unique_ptr<Backend> make_cuda_backend(int device, InverseIn inverse = InverseIn::loop_as_compiled);
+std::unique_ptr<Backend> make_cuda_backend(int device);
 
 /// Facts of a device and the software that drives it.
 struct CudaFacts {

@@ -55,7 +55,7 @@ __global__ void __launch_bounds__(kThreads)
 constexpr unsigned kThreadsOfTetrahedron = 128;
 
 /// One block a tetrahedron.
-template <InverseIn kWhen, class Field>
+template <class Field>
 __global__ void __launch_bounds__(kThreadsOfTetrahedron)
     gascon_kernel(Grid grid, Field field, HardwareTexture texture, SetValue write) {
   __shared__ CellVertex corners[4];
@@ -67,7 +67,7 @@ __global__ void __launch_bounds__(kThreadsOfTetrahedron)
                                                    cell / (cells_x * cells_y), t, static_cast<int>(threadIdx.x));
   }
   __syncthreads();
-  walk_tetrahedron<kWhen>(grid, corners, threadIdx.x, blockDim.x, texture, write);
+  walk_tetrahedron<InverseIn::loop_as_compiled>(grid, corners, threadIdx.x, blockDim.x, texture, write);
 }
 
 inline __global__ void fill_kernel(std::int16_t* output, std::int64_t voxels, std::int16_t value) {
@@ -89,30 +89,46 @@ inline unsigned blocks_for(std::int64_t count, unsigned threads = kThreads) {
   return static_cast<unsigned>((count + threads - 1) / threads);
 }
 
-/// Queues one run of a method, on the field and the texture.
-template <InverseIn kWhen, class Field>
-void launch(Method method, const Grid& grid, const Field& field, const HardwareTexture& texture, const SetValue& write,
-            cudaStream_t stream) {
+/// Queues one run of a method of one thread a cell.
+template <class M, InverseIn kWhen, class Field>
+void launch_cells(const Grid& grid, const Field& field, const HardwareTexture& texture, const SetValue& write,
+                  cudaStream_t stream) {
   const dim3 threads(32, 4, 2);
   const dim3 blocks(blocks_for(grid.vertices_x - 1, threads.x), blocks_for(grid.vertices_y - 1, threads.y),
                     blocks_for(grid.vertices_z - 1, threads.z));
+  cell_kernel<M, kWhen><<<blocks, threads, 0, stream>>>(grid, field, texture, write);
+}
+
+/// Queues one run of a method, on the field and the texture.
+template <class Field>
+void launch(Method method, const Grid& grid, const Field& field, const HardwareTexture& texture, const SetValue& write,
+            cudaStream_t stream) {
   const std::int64_t tetrahedra =
       std::int64_t{grid.vertices_x - 1} * (grid.vertices_y - 1) * (grid.vertices_z - 1) * kTetrahedraPerCell;
+  constexpr InverseIn kCompiled = InverseIn::loop_as_compiled, kEvery = InverseIn::every_voxel;
   switch (method) {
     case Method::inverse4x4_double:
-      cell_kernel<Inverse4x4Double, kWhen><<<blocks, threads, 0, stream>>>(grid, field, texture, write);
+      launch_cells<Inverse4x4Double, kCompiled>(grid, field, texture, write, stream);
       break;
     case Method::inverse3x3_double:
-      cell_kernel<Inverse3x3Double, kWhen><<<blocks, threads, 0, stream>>>(grid, field, texture, write);
+      launch_cells<Inverse3x3Double, kCompiled>(grid, field, texture, write, stream);
       break;
-    case Method::inverse3x3_float:
-      cell_kernel<Inverse3x3Float, kWhen><<<blocks, threads, 0, stream>>>(grid, field, texture, write);
+    case Method::inverse3x3_float: launch_cells<Inverse3x3Float, kCompiled>(grid, field, texture, write, stream); break;
+    case Method::paper: launch_cells<Paper, kCompiled>(grid, field, texture, write, stream); break;
+    case Method::inverse4x4_double_per_voxel:
+      launch_cells<Inverse4x4Double, kEvery>(grid, field, texture, write, stream);
       break;
-    case Method::paper: cell_kernel<Paper, kWhen><<<blocks, threads, 0, stream>>>(grid, field, texture, write); break;
+    case Method::inverse3x3_double_per_voxel:
+      launch_cells<Inverse3x3Double, kEvery>(grid, field, texture, write, stream);
+      break;
+    case Method::inverse3x3_float_per_voxel:
+      launch_cells<Inverse3x3Float, kEvery>(grid, field, texture, write, stream);
+      break;
+    case Method::paper_per_voxel: launch_cells<Paper, kEvery>(grid, field, texture, write, stream); break;
     case Method::gascon:
       require(tetrahedra <= INT32_MAX, "more tetrahedra than a grid of blocks holds; use larger cells");
-      gascon_kernel<kWhen>
-          <<<static_cast<unsigned>(tetrahedra), kThreadsOfTetrahedron, 0, stream>>>(grid, field, texture, write);
+      gascon_kernel<<<static_cast<unsigned>(tetrahedra), kThreadsOfTetrahedron, 0, stream>>>(grid, field, texture,
+                                                                                             write);
       break;
     case Method::tetwarp: throw InputError("tetwarp is not a baseline");
   }

@@ -10,7 +10,7 @@ namespace {
 
 }  // namespace
 
-std::unique_ptr<Backend> make_cuda_backend(int, InverseIn) { not_compiled(); }
+std::unique_ptr<Backend> make_cuda_backend(int) { not_compiled(); }
 
 CudaFacts describe_cuda(int) { not_compiled(); }
 

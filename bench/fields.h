@@ -2,25 +2,54 @@
 
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "deform/core/host_device.h"
 
 namespace tetwarp::bench {
 
-/// A test deformation in float, as a thread of the paper's kernels evaluates it (Eqs. 14-16; amplitudes and origin as
-/// the program's own formulas have them). Everything in voxels and radians, about the middle of the volume.
+/// A test deformation in float, as a thread of the paper's kernels evaluates it. Everything in voxels and radians,
+/// about the middle of the volume.
 struct Formula {
-  enum class Kind : std::uint8_t { identity, wave, twist, bubble };
+  enum class Kind : std::uint8_t { identity, wave, twist, bubble, shift };
 
   Kind kind = Kind::identity;
   glm::vec3 centre{0};
-  float amplitude = 0, radians_per_voxel = 0;  ///< wave: along z; twist: the second alone
+  float amplitude = 0, radians_per_voxel = 0;  ///< wave, along z: both; twist: the second alone; shift: the first alone
   float radius = 0, strength = 0;              ///< bubble
 };
 
-/// The formula `name` (identity, wave, twist, bubble) for a volume: amplitude 1/32, wavelength and radius 1/4 of the
-/// columns, 0.5 rad from the centre to either end, strength 0.3. @throws InputError for another name
+/// One of the paper's Eqs. 14 to 16 as it is printed, at t = pi / 2, p in voxels, times an amplitude that is ours: the
+/// paper gives none.
+struct FieldAsWritten {
+  const char* name;       ///< of the field here
+  const char* transform;  ///< wave, twist or bubble: the paper's word for it
+  double amplitude;       ///< the longest way that a vertex goes (Twist: in the middle of a side), voxels
+};
+/// wave-paper-1 and -16, twist-paper-1 and -16, bubble-paper-1 and -16.
+const std::vector<FieldAsWritten>& fields_as_written();
+/// None for a field of another kind.
+std::optional<FieldAsWritten> as_written(const std::string& name);
+
+/// The formula `name` for a volume:
+///
+/// | name | what it is |
+/// | --- | --- |
+/// | identity | |
+/// | wave | amplitude 1/32, wavelength 1/4 of the columns |
+/// | twist | 0.5 rad from the centre to either end |
+/// | bubble | radius 1/4 of the columns, strength 0.3 |
+/// | wave-paper-A | Eq. 14: p' = p + A sin(p.z + t) x, so one radian a voxel |
+/// | twist-paper-A | Eq. 15: p - c turned about z by theta = s A sin t (p - c).z |
+/// | bubble-paper-A | Eq. 16: p' = (1 + A sin t / abs(p - c)) (p - c) + c, and c stays |
+///
+/// The paper's Eq. 15 has no s. In voxels that is one radian a slice, which puts the corners of a cell hundreds of
+/// voxels apart, so it cannot be what was timed. Here s is such that a vertex in the middle of a side of the first and
+/// the last slice goes A voxels along its arc.
+///
+/// @throws InputError for another name
 Formula make_formula(const std::string& name, const glm::i64vec3& size);
 
 /// The same in the words of the command line, for a volume with a spacing of 1 mm.
@@ -72,6 +101,12 @@ TETWARP_HD inline glm::vec3 displacement_at(const Formula& formula, const glm::v
       if (r >= formula.radius) break;
       const float inwards = plus(1.0f, -(r / formula.radius));
       const float scale = times(formula.strength, times(inwards, inwards));
+      return {times(scale, x), times(scale, y), times(scale, z)};
+    }
+    case Formula::Kind::shift: {
+      const float r = std::sqrt(plus(plus(times(x, x), times(y, y)), times(z, z)));
+      if (r == 0) break;
+      const float scale = formula.amplitude / r;
       return {times(scale, x), times(scale, y), times(scale, z)};
     }
   }

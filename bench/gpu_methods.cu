@@ -130,9 +130,8 @@ class GpuMethods::State {
     fill_kernel<<<blocks_for(voxels), kThreads, 0, stream_.get()>>>(output_.data(), voxels, background_);
     TETWARP_CUDA_TRY(cudaGetLastError());
     start_.record(stream_);
-    launch<InverseIn::loop_as_compiled>(method, field_.grid(), field_.memory_field(),
-                                        HardwareTexture{texture_.object()},
-                                        SetValue{output_.data(), nullptr, field_.grid()}, stream_.get());
+    launch(method, field_.grid(), field_.memory_field(), HardwareTexture{texture_.object()},
+           SetValue{output_.data(), nullptr, field_.grid()}, stream_.get());
     end_.record(stream_);
     return end_.ms_since(start_);
   }

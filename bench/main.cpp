@@ -14,13 +14,18 @@ namespace tetwarp::bench {
 
 namespace {
 
+std::vector<std::string> names_of(const std::vector<Method>& methods) {
+  std::vector<std::string> names;
+  for (const Method method : methods) names.push_back(name_of(method));
+  return names;
+}
+
 constexpr int kFailed = 1, kWrongCommandLine = 2, kInputRefused = 4;
 
-/// As they were typed; `run` makes Method and InverseIn of them.
+/// As they were typed; `run` makes methods and numbers of them.
 struct Words {
-  std::vector<std::string> methods{"inverse4x4-double", "inverse3x3-double", "inverse3x3-float", "paper", "tetwarp"};
+  std::vector<std::string> methods = names_of(PaperOptions{}.methods);
   std::string cell_sizes = "4,8,16", gpu_cell_sizes = cell_sizes, cpu_cell_sizes = cell_sizes;
-  bool per_voxel_inverse = false;
 };
 
 /// What every subcommand was given.
@@ -76,16 +81,18 @@ void add_frames(CLI::App& command, int& frames, int& warmup) {
 void add_paper(CLI::App& app, PaperOptions& options, Words& words) {
   CLI::App* command = app.add_subcommand("paper", "The tables of the paper, with Tetwarp beside its methods");
   add_input(*command, options.input);
-  add_list(*command, "--fields", options.fields, "Deformations",
-           CLI::IsMember({"identity", "wave", "twist", "bubble"}));
-  add_list(*command, "--methods", words.methods, "Methods on cells of one voxel", CLI::IsMember(words.methods));
+  add_list(*command, "--fields", options.fields,
+           "Deformations. The paper's as written (-paper-) run on one volume, their waves on all, in the kernel",
+           CLI::IsMember(options.fields));
+  add_list(
+      *command, "--methods", words.methods,
+      "Methods on cells of one voxel; -per-voxel: the compiler may not move the inverse out of the loop over voxels",
+      CLI::IsMember(words.methods));
   command
       ->add_option("--cell-sizes", words.cell_sizes,
                    "Cells of the coarse table (paper, gascon, tetwarp); none: no such table")
       ->capture_default_str();
   add_frames(*command, options.frames, options.warmup);
-  command->add_flag("--per-voxel-inverse", words.per_voxel_inverse,
-                    "Keep the compiler from moving the inverse out of the loop over voxels");
   command->add_option("--backend", options.backend, "cpu: the same loops in plain C++, sampling in software")
       ->check(CLI::IsMember({"auto", "cuda", "cpu"}))
       ->capture_default_str();
@@ -317,7 +324,6 @@ int run(const CLI::App& app, Commands& commands) {
   paper.methods.clear();
   for (const std::string& name : words.methods) paper.methods.push_back(parse_method(name));
   paper.cell_sizes = parse_cell_sizes(words.cell_sizes);
-  paper.inverse = words.per_voxel_inverse ? InverseIn::every_voxel : InverseIn::loop_as_compiled;
   return run_paper(paper);
 }
 

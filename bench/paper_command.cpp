@@ -33,8 +33,7 @@ int run_paper(const PaperOptions& options) {
     limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(options.threads));
   }
   const bool cuda = use_cuda(options);
-  const std::unique_ptr<Backend> backend =
-      cuda ? make_cuda_backend(options.device, options.inverse) : make_cpu_backend(options.threads, options.inverse);
+  const std::unique_ptr<Backend> backend = cuda ? make_cuda_backend(options.device) : make_cpu_backend(options.threads);
   Results results{.options = options,
                   .backend = cuda ? "cuda" : "cpu",
                   .input_kind = input_kind(options.input),

@@ -72,29 +72,34 @@ void for_each_cell(const Grid& grid, const F& f) {
   });
 }
 
-template <InverseIn kWhen, class Field>
+template <class Field>
 void run_gascon(const Grid& grid, const Field& field, const SoftwareTexture& texture, const SetValue& write) {
   for_each_cell(grid, [&](int i, int j, int k) {
     for (int t = 0; t < kTetrahedraPerCell; ++t) {
       CellVertex corners[4];
       for (int n = 0; n < 4; ++n) corners[n] = make_tetrahedron_vertex(grid, field, i, j, k, t, n);
-      walk_tetrahedron<kWhen>(grid, corners, 0, 1, texture, write);
+      walk_tetrahedron<InverseIn::loop_as_compiled>(grid, corners, 0, 1, texture, write);
     }
   });
 }
 
-template <InverseIn kWhen, class Field>
+template <class Field>
 void run_method(Method method, const Grid& grid, const Field& field, const SoftwareTexture& texture,
                 const SetValue& write) {
-  const auto each_cell = [&]<class M>(M) {
+  const auto each_cell = [&]<class M, InverseIn kWhen>() {
     for_each_cell(grid, [&](int i, int j, int k) { deform_cell<M, kWhen>(grid, i, j, k, field, texture, write); });
   };
+  constexpr InverseIn kCompiled = InverseIn::loop_as_compiled, kEvery = InverseIn::every_voxel;
   switch (method) {
-    case Method::inverse4x4_double: return each_cell(Inverse4x4Double{});
-    case Method::inverse3x3_double: return each_cell(Inverse3x3Double{});
-    case Method::inverse3x3_float: return each_cell(Inverse3x3Float{});
-    case Method::paper: return each_cell(Paper{});
-    case Method::gascon: return run_gascon<kWhen>(grid, field, texture, write);
+    case Method::inverse4x4_double: return each_cell.template operator()<Inverse4x4Double, kCompiled>();
+    case Method::inverse3x3_double: return each_cell.template operator()<Inverse3x3Double, kCompiled>();
+    case Method::inverse3x3_float: return each_cell.template operator()<Inverse3x3Float, kCompiled>();
+    case Method::paper: return each_cell.template operator()<Paper, kCompiled>();
+    case Method::inverse4x4_double_per_voxel: return each_cell.template operator()<Inverse4x4Double, kEvery>();
+    case Method::inverse3x3_double_per_voxel: return each_cell.template operator()<Inverse3x3Double, kEvery>();
+    case Method::inverse3x3_float_per_voxel: return each_cell.template operator()<Inverse3x3Float, kEvery>();
+    case Method::paper_per_voxel: return each_cell.template operator()<Paper, kEvery>();
+    case Method::gascon: return run_gascon(grid, field, texture, write);
     case Method::tetwarp: break;
   }
   throw InputError("tetwarp is not a baseline");
@@ -102,7 +107,7 @@ void run_method(Method method, const Grid& grid, const Field& field, const Softw
 
 class CpuBackend final : public Backend {
  public:
-  CpuBackend(int threads, InverseIn inverse) : Backend(threads, inverse) {}
+  explicit CpuBackend(int threads) : Backend(threads) {}
 
   FrameTimes time(Method method, FieldSource source, const FrameCount& frames) override {
     FrameTimes times, untimed;
@@ -150,11 +155,7 @@ class CpuBackend final : public Backend {
   template <class Field>
   void run_on(const Field& field, Method method, const Grid& grid, const SetValue& write) const {
     const SoftwareTexture texture{volume_->voxels.data(), grid};
-    if (inverse_ == InverseIn::every_voxel) {
-      run_method<InverseIn::every_voxel>(method, grid, field, texture, write);
-    } else {
-      run_method<InverseIn::loop_as_compiled>(method, grid, field, texture, write);
-    }
+    run_method(method, grid, field, texture, write);
   }
 
   void run_baseline(Method method, FieldSource source, FrameTimes& times) {
@@ -196,13 +197,10 @@ class CpuBackend final : public Backend {
 void run_paper_loop(const Volume<std::int16_t>& volume, const VertexField& field, std::int64_t cell_size,
                     std::int16_t* output) {
   const Grid grid = make_grid(volume.geometry, field.lattice, cell_size);
-  run_method<InverseIn::loop_as_compiled>(Method::paper, grid,
-                                          MemoryField{field.displacement.data(), grid.vertices_x, grid.vertices_y},
-                                          SoftwareTexture{volume.voxels.data(), grid}, SetValue{output, nullptr, grid});
+  run_method(Method::paper, grid, MemoryField{field.displacement.data(), grid.vertices_x, grid.vertices_y},
+             SoftwareTexture{volume.voxels.data(), grid}, SetValue{output, nullptr, grid});
 }
 
-std::unique_ptr<Backend> make_cpu_backend(int threads, InverseIn inverse) {
-  return std::make_unique<CpuBackend>(threads, inverse);
-}
+std::unique_ptr<Backend> make_cpu_backend(int threads) { return std::make_unique<CpuBackend>(threads); }
 
 }  // namespace tetwarp::bench

@@ -21,7 +21,7 @@ double ms_since(Clock::time_point start) {
 
 class CudaBackend final : public Backend {
  public:
-  CudaBackend(int device, InverseIn inverse) : Backend(0, inverse), device_(select(device)) {}
+  explicit CudaBackend(int device) : Backend(0), device_(select(device)) {}
 
   FrameTimes time(Method method, FieldSource source, const FrameCount& frames) override {
     FrameTimes times, untimed;
@@ -95,11 +95,7 @@ class CudaBackend final : public Backend {
   void run_baseline_on(const Field& field, Method method, std::uint32_t* writes) {
     const HardwareTexture texture{texture_->object()};
     const SetValue write{device_output_.data(), writes, grid()};
-    if (inverse_ == InverseIn::every_voxel) {
-      launch<InverseIn::every_voxel>(method, grid(), field, texture, write, stream_.get());
-    } else {
-      launch<InverseIn::loop_as_compiled>(method, grid(), field, texture, write, stream_.get());
-    }
+    launch(method, grid(), field, texture, write, stream_.get());
   }
 
   void set_tetwarp_field(FieldSource source) {
@@ -188,8 +184,6 @@ class CudaBackend final : public Backend {
 
 }  // namespace
 
-std::unique_ptr<Backend> make_cuda_backend(int device, InverseIn inverse) {
-  return std::make_unique<CudaBackend>(device, inverse);
-}
+std::unique_ptr<Backend> make_cuda_backend(int device) { return std::make_unique<CudaBackend>(device); }
 
 }  // namespace tetwarp::bench

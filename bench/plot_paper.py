@@ -3,10 +3,12 @@
 
     bench/plot_paper.py paper.json paper.svg
 
-Upper row: time of every method by field, at 512 x 512 x 300 (or the largest size measured), once with the field evaluated in
-the kernel and once with the field read from memory. Lower row, where it was measured: time against the number of slices, and
-against the edge of the cells, for one field. Bars and points are medians, whiskers quartiles. Tetwarp's time includes what
-it does to the field before it resamples (hatched). The suffix of the second name decides the format.
+Upper row: time of every method by field, at 512 x 512 x 300 (or the largest size measured), once with the field
+evaluated in the kernel and once with the field read from memory. Lower row, where it was measured: time against the
+number of slices, and against the edge of the cells, for one field. Bars and points are medians, whiskers quartiles.
+Tetwarp's time includes what it does to the field before it resamples (hatched). Last row, where ours has the paper's
+sizes and settings: the paper's own times of its Tables 2 and 3 and ours beside them, for its fields as it writes them.
+The suffix of the second name decides the format.
 """
 import json
 import math
@@ -29,6 +31,9 @@ COLOURS = {
     "tetwarp": "#D55E00",
 }
 SOURCES = {"kernel": ("field evaluated in the kernel", "-", "o"), "memory": ("field read from memory", "--", "s")}
+TWIN = "-per-voxel"  # of a method's name: the inverse for every candidate voxel
+PAPER_GPUS = {"GeForce RTX 2080": "^", "GeForce GTX 1650 Mobile": "v"}
+PAPER_COLUMNS = ["inverse4x4-double", "inverse3x3-double", "inverse3x3-float", "paper"]
 PAPER_SIZE = (512, 512, 300)
 LINE_FIELD = "wave"  # the one of the lower row, where it was measured
 LOG_FROM = 30.0  # from about this ratio on, a linear axis hides the short bars
@@ -152,17 +157,61 @@ def draw_legend(figure, runs, with_lines):
     figure.legend(handles=handles, loc="lower center", bbox_to_anchor=(0.5, 0.0), ncol=5, frameon=False)
 
 
+def cells_beside(document):
+    """The paper's times of Tables 2 and 3 that have ours beside them, each once."""
+    cells = {}
+    for cell in document.get("published", {}).get("times", []):
+        if cell["table"] < 4 and any(ours["ms"] for ours in cell["ours"]):
+            cells.setdefault((cell["transform"], cell["method"], cell["gpu"]), cell)
+    return cells
+
+
+def draw_beside(axes, cells):
+    """A column a transform and method; the paper's GPUs as grey triangles, ours as circles in the method's colour."""
+    transforms = list(dict.fromkeys(transform for transform, _, _ in cells))
+    columns = [(transform, method) for transform in transforms for method in PAPER_COLUMNS]
+    for (transform, method, gpu), cell in cells.items():
+        x = columns.index((transform, method))
+        axes.plot(x, cell["ms"], PAPER_GPUS[gpu], color="#555555", markersize=8)
+        for ours in cell["ours"]:
+            if not ours["ms"]:
+                continue
+            twin, large = ours["method"].endswith(TWIN), ours["amplitude"] > 1
+            axes.plot(x + (0.12 if twin else -0.12), ours["ms"], "o", color=COLOURS[method],
+                      markerfacecolor="white" if twin else COLOURS[method], markersize=9 if large else 5.5)
+    axes.set_yscale("log")
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.grid(axis="y", color="#DDDDDD")
+    axes.set_ylabel("ms a frame")
+    labels = [transform + "\n" + method.replace("-", "\n") for transform, method in columns]
+    axes.set_xticks(range(len(columns)), labels, fontsize=9)
+    axes.set_title("the paper's Tables 2 and 3, and ours with its fields as written, field evaluated in the kernel",
+                   fontsize=11)
+    black = {"color": "black", "linestyle": "none", "marker": "o"}
+    handles = [Line2D([], [], color="#555555", linestyle="none", marker=marker, label=gpu)
+               for gpu, marker in PAPER_GPUS.items()]
+    handles += [Line2D([], [], markersize=5.5, label="ours, amplitude 1", **black),
+                Line2D([], [], markersize=9, label="ours, amplitude 16", **black),
+                Line2D([], [], markerfacecolor="white", label="open: inverse for every voxel", **black)]
+    axes.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.19), ncol=5, frameon=False)
+
+
 def title_of(document):
     machine, options = document["machine"], document["options"]
     on_gpu = machine.get("gpu") and options["backend"] != "cpu"
     device = machine["gpu"] if on_gpu else f"{machine['cpu']}, {machine['threads']} threads (CPU)"
-    inverse = "" if options["inverse"] == "as compiled" else f", inverse at {options['inverse']}"
     return (f"tetwarp bench paper on {device}, commit {document['commit']}\n"
-            f"{document['input']['kind']}, median of {options['frames']} frames with quartiles{inverse}")
+            f"{document['input']['kind']}, median of {options['frames']} frames with quartiles")
+
+
+def drawn_as_bars(runs):
+    """Without what only stands beside the paper's numbers, unless nothing else was run."""
+    return [run for run in runs if TWIN not in run["method"] and "-paper-" not in run["field"]] or runs
 
 
 def draw(document):
-    runs = document["runs"]
+    beside = cells_beside(document)
+    runs = drawn_as_bars(document["runs"])
     fine = select(runs, cell_size=min(run["cell_size"] for run in runs))  # cells of one voxel, but for --methods gascon
     coarse = [run for run in runs if run["cell_size"] > 1]
     bars, size = of_one_size(fine)
@@ -171,21 +220,26 @@ def draw(document):
     lower = [(draw_slices, slices)] if len({run["size"][2] for run in slices}) > 1 else []
     lower += [(draw_cells, coarse)] if len({run["cell_size"] for run in coarse}) > 1 else []
 
-    figure = plt.figure(figsize=(13, 9.5 if lower else 5.5))
-    rows = figure.add_gridspec(2 if lower else 1, 1, left=0.07, right=0.985, top=0.89 if lower else 0.82,
-                               bottom=0.15 if lower else 0.2, hspace=0.3)
+    count = 1 + bool(lower) + bool(beside)
+    margin = 1.7 if beside else 1.4  # inches, of the legends
+    height = 0.1 + margin + 4 * count
+    figure = plt.figure(figsize=(13, height))
+    grid = figure.add_gridspec(count, 1, left=0.07, right=0.985, top=1 - 1 / height, bottom=margin / height,
+                               hspace=0.35)
     methods = in_order((run["method"] for run in bars), list(COLOURS))
     fields = list(dict.fromkeys(run["field"] for run in bars))
-    for source, cell in zip(sources, rows[0].subgridspec(1, len(sources), wspace=0.16)):
+    for source, cell in zip(sources, grid[0].subgridspec(1, len(sources), wspace=0.16)):
         axes = figure.add_subplot(cell)
         draw_bars(axes, select(bars, field_source=source), methods, fields)
         axes.set_title(f"{SOURCES[source][0]}: {size}, {cells_of(bars)}", fontsize=11)
         scale(axes, bars)
     if lower:
-        for (draw_panel, measured), cell in zip(lower, rows[1].subgridspec(1, 2, wspace=0.16)):
+        for (draw_panel, measured), cell in zip(lower, grid[1].subgridspec(1, 2, wspace=0.16)):
             draw_panel(figure.add_subplot(cell), measured)
+    if beside:
+        draw_beside(figure.add_subplot(grid[count - 1]), beside)
     draw_legend(figure, bars + [run for _, measured in lower for run in measured], bool(lower))
-    figure.suptitle(title_of(document), fontsize=13, y=0.975)
+    figure.suptitle(title_of(document), fontsize=13, y=1 - 0.25 / height)
     return figure
 
 

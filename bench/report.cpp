@@ -13,12 +13,19 @@ using Json = nlohmann::json;
 
 Json json_or_null(const std::optional<std::string>& text) { return text ? Json(*text) : Json(nullptr); }
 
+/// When a method computes the inverse; null for one that has none of the paper's.
+Json inverse_json(Method method) {
+  if (method == Method::tetwarp) return nullptr;
+  return inverse_of(method) == InverseIn::every_voxel ? "every voxel" : "as compiled";
+}
+
 Json to_json(const Run& run) {
   return {{"size", size_json(run.size)},
           {"field", run.field},
           {"formula", run.formula},
           {"cell_size", run.cell_size},
           {"method", name_of(run.method)},
+          {"inverse", inverse_json(run.method)},
           {"field_source", name_of(run.source)},
           {"kernel_ms", to_json(run.kernel_ms)},
           {"field_ms", to_json(run.field_ms)},
@@ -67,13 +74,8 @@ Json options_json(const Results& results) {
   const PaperOptions& options = results.options;
   Json methods = Json::array();
   for (const Method method : options.methods) methods.push_back(name_of(method));
-  return {{"frames", options.frames},
-          {"warmup", options.warmup},
-          {"backend", results.backend},
-          {"methods", methods},
-          {"fields", options.fields},
-          {"cell_sizes", options.cell_sizes},
-          {"inverse", options.inverse == InverseIn::every_voxel ? "every voxel" : "as compiled"}};
+  return {{"frames", options.frames}, {"warmup", options.warmup}, {"backend", results.backend},
+          {"methods", methods},       {"fields", options.fields}, {"cell_sizes", options.cell_sizes}};
 }
 
 double whole_ms(const Run& run) { return run.total_ms ? run.total_ms->median : run.kernel_ms.median; }

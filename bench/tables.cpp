@@ -79,7 +79,7 @@ std::string method_rows(const Results& results, const Run& like, std::span<const
   for (const Method method : methods) {
     const Run* sources[] = {find_run(results, like, method, FieldSource::kernel),
                             find_run(results, like, method, FieldSource::memory)};
-    if (!sources[0] || !sources[1]) continue;
+    if (!sources[0] && !sources[1]) continue;
     for (const bool with_field : {false, true}) {
       if (with_field && method != Method::tetwarp) continue;
       const bool whole = with_field || method != Method::tetwarp;
@@ -87,7 +87,7 @@ std::string method_rows(const Results& results, const Run& like, std::span<const
       cells.push_back(name_of(method) + (whole ? "" : ", resample alone"));
       for (const Run* run : sources) {
         cells.push_back(cell(time_of(run, with_field)));
-        if (than) cells.push_back(whole ? cell(speed_up(results, *run, *than)) : "");
+        if (than) cells.push_back(whole && run ? cell(speed_up(results, *run, *than)) : "");
       }
       text += row(cells);
     }
@@ -218,19 +218,23 @@ std::string introduction(const Results& results) {
   text += "- host: " + machine.cpu + ", " + std::to_string(machine.threads) +
           " threads\n- input: " + results.input_kind + ", int16, linear interpolation\n";
   text += format("- %d timed frames after %d\n", options.frames, options.warmup);
-  text += options.inverse == InverseIn::every_voxel
-              ? "- inverse: computed for every candidate voxel (the compiler is kept from moving it)\n"
-              : "- inverse: as compiled; the source says every candidate voxel, the compiler may move it out of that "
-                "loop (--per-voxel-inverse keeps it there)\n";
+  text += "- inverse: as compiled. The source says every candidate voxel; a compiler may move it out of that loop, ";
+  text += "to once a tetrahedron. In the methods -per-voxel it is kept there\n";
   return text + "\n";
 }
 
 }  // namespace
 
 std::string to_markdown(const Results& results) {
-  constexpr Method kTable2[] = {Method::inverse4x4_double, Method::inverse3x3_double, Method::inverse3x3_float,
+  constexpr Method kTable2[] = {Method::inverse4x4_double,
+                                Method::inverse3x3_double,
+                                Method::inverse3x3_float,
+                                Method::inverse4x4_double_per_voxel,
+                                Method::inverse3x3_double_per_voxel,
+                                Method::inverse3x3_float_per_voxel,
                                 Method::tetwarp};
-  constexpr Method kTable3[] = {Method::inverse3x3_float, Method::paper, Method::tetwarp};
+  constexpr Method kTable3[] = {Method::inverse3x3_float, Method::paper, Method::inverse3x3_float_per_voxel,
+                                Method::paper_per_voxel, Method::tetwarp};
   return introduction(results) + speed_table(results, "Table 2: the inverse", kTable2) +
          speed_table(results, "Table 3: what is interpolated", kTable3) + size_table(results) + coarse_table(results) +
          end_to_end_table(results) + quality_table(results) + appendix_text(results.appendix);

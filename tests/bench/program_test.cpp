@@ -32,7 +32,7 @@ TEST(BenchProgram, PrintsTablesAndWritesTheNumbers) {
   const Outcome run = run_bench(scratch, kTiny + std::string("--cell-sizes none --json r.json --csv r.csv"));
   ASSERT_EQ(run.status, 0) << run.err;
   EXPECT_TRUE(says(run.out, {"# tetwarp-bench paper", "## Table 2", "12 x 12 x 9", "plain C++"}));
-  EXPECT_EQ(nlohmann::json::parse(read_text(scratch / "r.json"))["runs"].size(), 10u);
+  EXPECT_EQ(nlohmann::json::parse(read_text(scratch / "r.json"))["runs"].size(), 14u) << "4 of them per voxel";
   EXPECT_TRUE(
       says(read_text(scratch / "r.csv"), {"12,12,9,wave,\"wave:amplitude=0.375,wavelength=3\",1,paper,memory"}));
 }
@@ -42,6 +42,7 @@ TEST(BenchProgram, WrongCommandLinesExitWithTwo) {
   expect_error(run_bench(scratch, ""), 2, "subcommand");
   expect_error(run_bench(scratch, "paper --methods fastest"), 2, "fastest");
   expect_error(run_bench(scratch, "paper --fields swirl"), 2, "swirl");
+  expect_error(run_bench(scratch, "paper --fields wave-paper-2"), 2, "wave-paper-2");
   expect_error(run_bench(scratch, "paper --cell-sizes 1"), 2, "--cell-sizes");
   expect_error(run_bench(scratch, "paper --cell-sizes 4,x"), 2, "--cell-sizes");
   expect_error(run_bench(scratch, "paper --raw some.raw"), 2, "--size");
