@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bench/published.h"
+#include "bench/published_tables.h"
 #include "deform/version.h"
 
 namespace tetwarp::bench {
@@ -127,6 +128,7 @@ nlohmann::json to_json(const Results& results) {
                    {"machine", to_json(results.machine)},
                    {"input", input_json(results.input_kind)},
                    {"appendix_a", to_json(results.appendix)},
+                   {"published", published_json(results)},
                    {"runs", Json::array()}};
   for (const Run& run : results.runs) document["runs"].push_back(to_json(run));
   return document;
@@ -153,7 +155,8 @@ std::string to_csv(const Results& results) {
                     columns("field_ms") + columns("total_ms") + columns("copy_in_ms") + columns("copy_out_ms") +
                     columns("end_to_end_ms") +
                     ",writes,voxels_lost,voxels_multiple,voxels_spilled,largest_difference,mean_difference,"
-                    "exact_covered,speed_up_over_inverse4x4_double,speed_up_over_inverse3x3_float\n";
+                    "exact_covered,speed_up_over_inverse4x4_double,speed_up_over_inverse3x3_float" +
+                    published_csv_columns() + "\n";
   for (const Run& run : results.runs) {
     csv += std::to_string(run.size.x) + "," + std::to_string(run.size.y) + "," + std::to_string(run.size.z) + "," +
            run.field + ",\"" + run.formula + "\"," + std::to_string(run.cell_size) + "," + name_of(run.method) + "," +
@@ -172,7 +175,7 @@ std::string to_csv(const Results& results) {
       const std::optional<double> ratio = speed_up(results, run, than);
       csv += "," + (ratio ? number(*ratio) : std::string());
     }
-    csv += "\n";
+    csv += published_csv_cells(results, run) + "\n";
   }
   return csv;
 }

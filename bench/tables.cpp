@@ -4,6 +4,7 @@
 
 #include "bench/markdown.h"
 #include "bench/published.h"
+#include "bench/published_tables.h"
 #include "bench/report.h"
 #include "deform/version.h"
 
@@ -235,7 +236,7 @@ std::string to_markdown(const Results& results) {
                                 Method::tetwarp};
   constexpr Method kTable3[] = {Method::inverse3x3_float, Method::paper, Method::inverse3x3_float_per_voxel,
                                 Method::paper_per_voxel, Method::tetwarp};
-  return introduction(results) + speed_table(results, "Table 2: the inverse", kTable2) +
+  return introduction(results) + published_tables(results) + speed_table(results, "Table 2: the inverse", kTable2) +
          speed_table(results, "Table 3: what is interpolated", kTable3) + size_table(results) + coarse_table(results) +
          end_to_end_table(results) + quality_table(results) + appendix_text(results.appendix);
 }

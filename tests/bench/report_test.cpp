@@ -54,7 +54,7 @@ TEST(BenchReport, EveryMethodRunsOnEveryFieldAndTheCoarseCellsOnOneVolume) {
 TEST(BenchReport, JsonHasEveryKey) {
   const nlohmann::json document = to_json(tiny());
   EXPECT_EQ(keys(document), (std::vector<std::string>{"appendix_a", "commit", "input", "machine", "options", "program",
-                                                      "runs", "version"}));
+                                                      "published", "runs", "version"}));
   EXPECT_EQ(document["program"], "tetwarp-bench paper");
   EXPECT_EQ(keys(document["machine"]),
             (std::vector<std::string>{"compute_capability", "cpu", "cuda_runtime", "driver", "gpu", "threads"}));
