@@ -134,7 +134,7 @@ std::string ours(const Results& results, const PublishedClaim& claim) {
       return std::to_string(std::int64_t{kTetrahedraPerCell} * (kPublishedColumns - 1) * (kPublishedRows - 1) *
                             (published_data("leg").slices - 1));
     case PublishedClaim::About::bytes_a_thread: return std::to_string(8 * sizeof(CellVertex));
-    case PublishedClaim::About::differences: return "see \"What the results are worth\"";
+    case PublishedClaim::About::differences: return "each against the exact result: below";
     case PublishedClaim::About::picture:
     case PublishedClaim::About::others: break;
   }
