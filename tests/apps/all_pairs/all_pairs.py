@@ -32,6 +32,12 @@ from judge import Truth, Wrong, check, check_alike, check_files, check_refusal, 
 from outputs import Outputs, check_privacy
 
 
+# Choices of a run that is made for comparison.
+PLAIN = {"output": ".nrrd", "with": "none", "points": "none", "coverage": "none", "inverse": "none", "jacobian": "none",
+         "folds": "none", "write-field": "none", "mass": "none", "deidentify": "none", "bids": "none",
+         "keep-frame": "none", "compress": "none", "preview": "none", "report": "none", "memory": "none"}
+
+
 class Result:
     def __init__(self, done):
         self.status = done.returncode
@@ -109,6 +115,8 @@ class Cases:
                 attempt(judge)
         if case["field"] in SCENARIOS:
             attempt(self.from_written, case, truth)
+        if case["grid"] == "same" and truth.kind not in ("pull", "short"):
+            attempt(self.by_inverse, case, truth)
         return problems
 
     def alone(self, case):
@@ -183,23 +191,27 @@ class Cases:
 
     def truth(self, case):
         """The same with all maps, as files that are easy to read."""
-        is_pull = table.FIELDS[case["field"]] == "pull"
-        plain = {"output": ".nrrd", "with": "none", "points": "none", "coverage": ".mha", "inverse": ".mha",
-                 "jacobian": "none" if is_pull else ".nrrd", "folds": "none" if is_pull else ".nii",
-                 "write-field": "none" if is_pull else ".vtk" if case["field"] in table.MESHES else ".mha",
-                 "mass": "none", "deidentify": "none", "bids": "none", "preview": "none", "memory": "none"}
+        maps = {"report": case["report"], "coverage": ".mha", "inverse": ".mha"}
+        if table.FIELDS[case["field"]] != "pull":
+            maps |= {"jacobian": ".nrrd", "folds": ".nii",
+                     "write-field": ".vtk" if case["field"] in table.MESHES else ".mha"}
         place = self.place("truth")
-        self.program.must(self.world.arguments({**case, **plain}), place)
+        self.program.must(self.world.arguments({**case, **PLAIN, **maps}), place)
         return Truth(self.world, case, place)
+
+    def by_inverse(self, case, truth):
+        """The inverse as a pull field: what comes from where, to within the rounding of its samples."""
+        place = self.place("by inverse")
+        options = {**case, **PLAIN, "field": "pull", "coverage": ".mha"}
+        field = ["--pull-field", str(truth.folder / "out/i.mha")]
+        self.program.must(self.world.arguments(options, field=field), place)
+        truth.check_by_inverse(place / "out")
 
     def from_written(self, case, truth):
         """The field that a scenario made, written and read again, deforms to the same bits."""
         written = next((truth.folder / "out").glob("w.*"))
         place = self.place("written")
-        plain = {"output": ".nrrd", "with": "none", "points": "none", "coverage": "none", "inverse": ".mha",
-                 "jacobian": "none", "folds": "none", "write-field": "none", "mass": "none", "deidentify": "none",
-                 "bids": "none", "preview": "none", "report": "none", "memory": "none"}
-        self.program.must(self.world.arguments({**case, **plain}, field=["-f", str(written)]), place)
+        self.program.must(self.world.arguments({**case, **PLAIN, "inverse": ".mha"}, field=["-f", str(written)]), place)
         for name in ("v.nrrd", "i.mha"):
             one, other = ((run / "out" / name).read_bytes() for run in (truth.folder, place))
             strip = lambda data: b"\n".join(line for line in data.split(b"\n", 16) if not line.startswith(b"descrip"))
@@ -220,7 +232,7 @@ def main():
     parser.add_argument("program")
     parser.add_argument("--part", default="1/1")
     parser.add_argument("--seed", type=int)
-    parser.add_argument("--case", type=int)
+    parser.add_argument("--case", type=int, nargs="*")
     parser.add_argument("--keep")
     parser.add_argument("--list", action="store_true")
     options = parser.parse_args()
@@ -240,7 +252,7 @@ def main():
             cases = Covering(factors, cases_of.rules, seed=seed).cases()
             print(f"seed {seed}: {len(cases)} cases")
             for number, case in choose(cases, options.part):
-                if options.case is not None and number != options.case:
+                if options.case is not None and number not in options.case:
                     continue
                 if options.list:
                     print(number, describe(case))

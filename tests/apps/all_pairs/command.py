@@ -154,8 +154,11 @@ class World:
         if case["deidentify"] != "none":
             add("deidentify", case["deidentify"])
             add("deidentify-key", self.path("key"))
-        if case["bids"] != "none":
-            add("bids")
+        if case["compress"] != "none":
+            add("compress", int(case["compress"]))
+        for flag in (case["keep-frame"], case["bids"]):
+            if flag != "none":
+                add(flag)
         if case["report"] != "none":
             add("report", prefix + "r.json")
         if case["preview"] != "none":

@@ -29,23 +29,19 @@ class Covering:
     def __init__(self, factors, rules, strength=2, seed=1):
         self.factors, self.rules, self.strength = factors, rules, strength
         self.random = random.Random(seed)
+        self.rules_of = {name: [rule for rule in rules if name in rule.when] for name in factors}
         self.missing = dict.fromkeys(
             frozenset(zip(names, choices))
             for names in itertools.combinations(factors, strength)
             for choices in itertools.product(*(factors[name] for name in names)))
-        self.by_item = {}
-        for group in self.missing:
-            for item in group:
-                self.by_item.setdefault(item, set()).add(group)
-
     def refusals(self, case):
         return [rule for rule in self.rules if rule.holds(case)]
 
     def gain(self, case, factor, choice):
         """How many missing combinations the choice completes."""
-        known = set(case.items())
-        known.add((factor, choice))
-        return sum(group <= known for group in self.by_item[factor, choice])
+        added = (factor, choice)
+        return sum(frozenset((*others, added)) in self.missing
+                   for others in itertools.combinations(case.items(), self.strength - 1))
 
     def grow(self, start, allowed):
         """A whole case around some choices that at most `allowed` rules refuse; None if every way ends at a rule."""
@@ -54,7 +50,7 @@ class Covering:
             rest = [factor for factor in self.factors if factor not in case]
             self.random.shuffle(rest)
             for factor in rest:
-                free = [c for c in self.factors[factor] if len(self.refusals({**case, factor: c})) <= allowed]
+                free = self.free(case, factor, allowed)
                 if not free:
                     break
                 self.random.shuffle(free)
@@ -63,17 +59,19 @@ class Covering:
                 return case
         return None
 
+    def free(self, case, factor, allowed):
+        """The choices that leave the number of refusals within what is allowed."""
+        some = [rule for rule in self.rules_of[factor] if all(
+            case.get(other) in choices for other, choices in rule.when.items() if other != factor)]
+        left = allowed - len(self.refusals(case)) if some else 0
+        return [c for c in self.factors[factor] if sum(c in rule.when[factor] for rule in some) <= left]
+
     def cross_off(self, case):
         """A case that is refused shows nothing but the refusal: of it those combinations count that are refused."""
         is_refused = bool(self.refusals(case))
         for group in itertools.combinations(case.items(), self.strength):
             if not is_refused or self.refusals(dict(group)):
-                self.forget(frozenset(group))
-
-    def forget(self, group):
-        if self.missing.pop(group, 0) is None:
-            for item in group:
-                self.by_item[item].discard(group)
+                self.missing.pop(frozenset(group), None)
 
     def cases(self):
         """All cases: dictionaries from factor to choice. Some of them are refused."""
@@ -87,5 +85,5 @@ class Covering:
                 raise ValueError(f"no case can hold {dict(group)}")
             cases.append(case)
             self.cross_off(case)
-            self.forget(group)
+            self.missing.pop(group, None)
         return cases

@@ -53,6 +53,11 @@ class Expected:
         steps = list(itertools.product(range(*reach), repeat=3))
         corners = np.stack([values[tuple(np.clip(base[..., a] + s[a], 0, last[a]) for a in range(3))] for s in steps])
         weights = self.weights(steps, t, interpolation)
+        little = 1e-5 + 3 * self.slack_of_place
+        is_none = np.isnan(corners)
+        corners = np.where(is_none, 0, corners)
+        becomes_none = (is_none & (np.abs(weights) > little)).any(0)
+        self.doubtful |= (is_none & (weights != 0) & (np.abs(weights) <= little)).any(0)
         nearest = np.floor(place + 0.5).astype(int)
         is_half = (np.abs(place + 0.5 - np.rint(place + 0.5)) < self.slack_of_place[..., None] + 1e-7).any(-1)
         at_nearest = values[tuple(np.minimum(nearest[..., a], last[a]) for a in range(3))]
@@ -60,19 +65,19 @@ class Expected:
         unit = 1e-13 if self.kind in EXACT_TYPES else 5e-7
         slack = 8 * spread * self.slack_of_place + unit * np.abs(corners).max(0) * (3 if interpolation == "cubic" else 1)
         if interpolation == "nearest":
-            self.doubtful |= is_half & (spread > 0)
+            self.doubtful |= is_half & ((spread > 0) | is_none.any(0))
             value, slack = at_nearest, np.zeros_like(slack)
         elif interpolation == "vote":
-            value, close = self.vote(corners, weights)
-            self.doubtful |= close
+            value, close = self.vote(corners, weights, 1e-4 + 8 * self.slack_of_place)
+            self.doubtful |= close | becomes_none
             slack = np.zeros_like(slack)
         else:
-            value = (weights * corners).sum(0)
+            value = np.where(becomes_none, np.nan, (weights * corners).sum(0))
         if padding is None:
             return value, slack
         is_padding = corners == padding
-        with_weight = (is_padding & (np.abs(weights) > 1e-5)).any(0)
-        self.doubtful |= (is_padding & (weights != 0) & (np.abs(weights) <= 1e-5)).any(0) | (with_weight & is_half)
+        with_weight = (is_padding & (np.abs(weights) > little)).any(0)
+        self.doubtful |= (is_padding & (weights != 0) & (np.abs(weights) <= little)).any(0) | (with_weight & is_half)
         if interpolation == "nearest":
             with_weight = at_nearest == padding
         self.padded |= with_weight & (at_nearest == padding)
@@ -88,11 +93,11 @@ class Expected:
         return np.stack([along(s[0], t[..., 0]) * along(s[1], t[..., 1]) * along(s[2], t[..., 2]) for s in steps])
 
     @staticmethod
-    def vote(corners, weights):
+    def vote(corners, weights, rounding):
         totals = np.stack([(weights * (corners == one)).sum(0) for one in corners])
         most = totals.max(0)
         value = np.where(totals >= most - 1e-12, corners, np.inf).min(0)
-        close = ((totals > most - 1e-4) & (corners != value)).any(0)
+        close = ((totals > most - rounding) & (corners != value)).any(0)
         return value, close
 
     def preserve_mass(self, jacobian):
@@ -119,6 +124,7 @@ class Expected:
         else:
             slack = slack + (1e-6 if self.kind == np.dtype("<f4") else 1e-12) * np.abs(value) * (slack > 0)
         with np.errstate(invalid="ignore"):
-            wrong = (np.abs(found - value) > slack).any(-1) & self.covered
+            same = (np.abs(found - value) <= slack) | (np.isnan(found) & np.isnan(value))
+            wrong = ~same.all(-1) & self.covered
             wrong |= ((found != self.background).any(-1)) & ~self.covered
         return wrong & ~self.doubtful

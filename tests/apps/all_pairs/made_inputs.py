@@ -20,9 +20,9 @@ FILES = {"nii-i8": ("i8", "a.nii", SPACING, False), "nii-u8": ("u8", "b.nii.gz",
          "nii-i32": ("i32", "e.nii", SPACING, False), "nii-u32": ("u32", "f.nii", SPACING, False),
          "nii-f32": ("f32", "g.nii.gz", SPACING, False), "nii-f64": ("f64", "h.nii", SPACING, False),
          "nii-oblique": ("i16", "i.nii", SPACING, True), "nrrd-i16": ("i16", "j.nrrd", SPACING, False),
-         "nrrd-f32": ("f32", "k.nrrd", (2.0, 2.0, 2.0), True), "mha-u16": ("u16", "l.mha", SPACING, False),
+         "nii-nan": ("f32", "n.nii", SPACING, False), "nrrd-f32": ("f32", "k.nrrd", (2.0, 2.0, 2.0), True), "mha-u16": ("u16", "l.mha", SPACING, False),
          "mha-f64": ("f64", "m.mha", (2.6, 2.2, 2.9), False)}
-DICOM = ["dicom", "dicom-oblique", "enhanced", "tilted", "uneven", "padded"]
+DICOM = ["dicom", "dicom-file", "dicom-oblique", "enhanced", "tilted", "uneven", "padded"]
 
 
 def noise(kind, size, seed):
@@ -55,6 +55,8 @@ class Inputs:
             path = self.folder / file
             direction = rotation(25, -35, 15) if turned else None
             volume = Volume(noise(kind, SIZE, len(self.made)), grid_affine(SIZE, spacing, direction))
+        if name == "nii-nan":
+            volume.values[np.indices(SIZE).sum(0) % 9 == 4] = np.nan
         if path.suffix == ".nrrd":
             write_nrrd(path, volume, compressed=name == "nrrd-f32")
         elif path.suffix == ".mha":
@@ -86,7 +88,7 @@ class Inputs:
             made_dicom.write_enhanced(folder / "e.dcm", slices)
         else:
             made_dicom.write_series(folder, slices)
-        return str(folder), volume
+        return str(folder / "s005.dcm" if name == "dicom-file" else folder), volume
 
 
 def write_along(folder):

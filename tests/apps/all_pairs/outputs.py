@@ -178,6 +178,9 @@ class Outputs:
         check(of_series == {sidecar["output"]["series_instance_uid"]}, "the sidecar names another series")
         check(len({file.SOPInstanceUID for file in files}) == len(files), "two slices with one SOP Instance UID")
         check(not any(uid.startswith(made_dicom.SERIES) for uid in of_series), "the series has the source's UID")
+        is_kept = self.case["keep-frame"] != "none" or self.case["field"] == "identity"
+        if self.case["deidentify"] == "none":
+            check((files[0].FrameOfReferenceUID == made_dicom.FRAME) == is_kept, "the Frame of Reference UID")
         name = str(files[0].PatientName)
         check((name == made_dicom.PATIENT["PatientName"]) == (self.case["deidentify"] == "none"),
               f"the patient is called {name!r}")
