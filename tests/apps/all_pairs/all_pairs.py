@@ -60,9 +60,12 @@ class Program:
         check(result.status == 0, f"status {result.status}: {result.error.strip()!r} of {command}")
         for line in result.error.splitlines():
             check(line.startswith(("tetwarp: ", "wrote ", "simulated: ")), f"it said {line!r}")
+        self.check_temporary()
+        return result
+
+    def check_temporary(self):
         left = sorted(path.name for path in self.temporary.iterdir())
         check(not left, f"temporary files are left: {left}")
-        return result
 
     def has_device(self):
         line = next(line for line in self.run(["--version"]).output.splitlines() if "cuda:" in line)
@@ -123,7 +126,8 @@ class Cases:
         place = self.place("plain")
         result = self.program.must(self.world.arguments(case), place)
         files = contents(place / "out")
-        check(set(contents(place)) == {"out/" + name for name in files}, f"beside OUTPUT lies {sorted(contents(place))}")
+        everything = contents(place)
+        check(set(everything) == {"out/" + name for name in files}, f"beside OUTPUT lies {sorted(everything)}")
         check_files(place / "out", self.world.files(case))
         check_privacy(files, result.output + result.error, case["deidentify"] != "none")
         return files
@@ -136,7 +140,10 @@ class Cases:
 
     def refused(self, case, refusals):
         place = self.place("refused")
-        check_refusal(self.program.run(self.world.arguments(case), place), refusals, place / "out")
+        result = self.program.run(self.world.arguments(case), place)
+        check_refusal(result, refusals, place)
+        check_privacy({}, result.error, False)
+        self.program.check_temporary()
         if case["run"] == "batch" and case["backend"] == "auto" and case["memory"] == "none":
             (place / "m.jsonl").write_text(self.row(case) + "\n")
             result = self.program.run(["batch", "m.jsonl", "-o", "results", "--quiet"], place)
@@ -172,8 +179,8 @@ class Cases:
         result = self.program.run(["batch", "m.jsonl", "-o", "results", "--quiet"], place)
         check(result.status == 0, f"status {result.status} of a batch: {result.error!r}")
         made = contents(place / "results")
-        check({name.split("/")[0] for name in made} == {"one", "batch.json", "results.jsonl", "summary.txt", "timings.jsonl"},
-              f"a batch left {sorted(made)}")
+        expected = {"one", "batch.json", "results.jsonl", "summary.txt", "timings.jsonl"}
+        check({name.split("/")[0] for name in made} == expected, f"a batch left {sorted(made)}")
         check_privacy(made, result.output + result.error, case["deidentify"] != "none")
         of_case = {name.removeprefix("one/"): data for name, data in made.items() if name.startswith("one/")}
         of_case.pop("case.json")

@@ -19,8 +19,8 @@ PAGES = {"cut-open": "open", "cut-springs": "open-springs", "cut-closed": "close
 OUTPUTS = {"dicom": "v", "dicom-rle": "v", "dicom-deflated": "v"}
 WITH = {"labels": "labels.nii.gz=along.nii:vote", "nearest-own": "other.mha=along.nrrd:nearest:own",
         "cubic": "other.mha=along.mha:cubic:background=-5", "vectors": "arrows.nrrd=along.nrrd:linear",
-        "dose": "dose.dcm=along.nii.gz:linear", "dose-object": "dose.dcm=along.dcm:linear", "segmentation": "seg.dcm=along.dcm",
-        "structures": "structures.dcm=along.dcm"}
+        "dose": "dose.dcm=along.nii.gz:linear", "dose-object": "dose.dcm=along.dcm:linear",
+        "segmentation": "seg.dcm=along.dcm", "structures": "structures.dcm=along.dcm"}
 POINTS = {"csv": "points.csv=p.csv", "markups": "points.mrk.json=p.mrk.json", "stl": "points.stl=p.stl"}
 SCENARIOS = ("cut-open", "cut-springs", "cut-closed", "chain", "springs", "labelled")
 

@@ -10,8 +10,8 @@ EXACT_TYPES = [np.dtype(NUMPY[kind]) for kind in ("i32", "u32", "f64")]  # compu
 
 
 class Expected:
-    """By voxel: `covered`, `value` within `slack` (before rounding to the type), `padded`, and `doubtful`: either may be
-    right."""
+    """By voxel: `covered`, `value` within `slack` (before rounding to the type), `padded`, and `doubtful`, where either
+    may be right."""
 
     def __init__(self, deformed, source, interpolation, background, padding=None):
         grid, self.kind, self.background = deformed.grid, source.values.dtype, background
@@ -63,7 +63,8 @@ class Expected:
         at_nearest = values[tuple(np.minimum(nearest[..., a], last[a]) for a in range(3))]
         spread = corners.max(0) - corners.min(0)
         unit = 1e-13 if self.kind in EXACT_TYPES else 5e-7
-        slack = 8 * spread * self.slack_of_place + unit * np.abs(corners).max(0) * (3 if interpolation == "cubic" else 1)
+        unit *= 3 if interpolation == "cubic" else 1
+        slack = 8 * spread * self.slack_of_place + unit * np.abs(corners).max(0)
         if interpolation == "nearest":
             self.doubtful |= is_half & ((spread > 0) | is_none.any(0))
             value, slack = at_nearest, np.zeros_like(slack)

@@ -95,14 +95,16 @@ class Hashes:
                 def flip(data):
                     value = struct.unpack_from("<f", data, place)[0]
                     return data[:place] + struct.pack("<f", value + 0.03125) + data[place + word:]
-                self.expect(f"number {at} of {name}", [option, path(name)], [option, self.changed(name, flip)], OF_FIELD)
+                self.expect(f"number {at} of {name}", [option, path(name)], [option, self.changed(name, flip)],
+                            OF_FIELD)
             self.expect(f"{name} under another name", [option, path(name)], [option, self.changed(name, same)], set())
             for key in (b"space origin: (", b"space directions: none ("):
                 def shift(data):
                     begin = data.index(key) + len(key)
                     end = data.index(b",", begin)
                     return data[:begin] + repr(float(data[begin:end]) + 0.001).encode() + data[end:]
-                self.expect(f"{key.decode()} of {name}", [option, path(name)], [option, self.changed(name, shift)], OF_FIELD)
+                self.expect(f"{key.decode()} of {name}", [option, path(name)], [option, self.changed(name, shift)],
+                            OF_FIELD)
         pull, second = volumes.read(path("pull.nrrd")), volumes.read(path("second.mha"))
         volumes.write_nrrd(self.folder / "second.nrrd", second)
         self.expect("pull.nrrd taken as forward", ["--pull-field", path("pull.nrrd")], ["-f", path("pull.nrrd")],
@@ -188,8 +190,8 @@ class Hashes:
         affine = ["-f", path("affine.tfm")]
         self.expect("a number of a transform", affine,
                     ["-f", self.changed("affine.tfm", lambda data: data.replace(b" 0.4 ", b" 0.41 "))], OF_FIELD)
-        self.expect("a comment in a transform", affine,
-                    ["-f", self.changed("affine.tfm", lambda data: data.replace(b"#Transform 0", b"#Transform 0\n#x"))], set())
+        remarked = self.changed("affine.tfm", lambda data: data.replace(b"#Transform 0", b"#Transform 0\n#x"))
+        self.expect("a comment in a transform", affine, ["-f", remarked], set())
 
     def options(self):
         wave = ["-f", "wave:amplitude=2,wavelength=24"]

@@ -127,6 +127,7 @@ def write(folder):
     pages = {"open": scenario("chainmail", True), "closed": scenario("chainmail", True, True),
              "chain": scenario("chainmail", False), "springs": scenario("mass-spring", False),
              "open-springs": scenario("mass-spring", True), "labelled": scenario("chainmail", False)}
-    pages["labelled"]["tissues"].insert(0, {"name": "one", "label": 1, "compression": 0.3, "stretch": 0.3, "shear": 0.3})
+    one = {"name": "one", "label": 1, "compression": 0.3, "stretch": 0.3, "shear": 0.3}
+    pages["labelled"]["tissues"].insert(0, one)
     for name, page in pages.items():
         (folder / f"{name}.json").write_text(json.dumps(page, indent=1))

@@ -20,7 +20,8 @@ FILES = {"nii-i8": ("i8", "a.nii", SPACING, False), "nii-u8": ("u8", "b.nii.gz",
          "nii-i32": ("i32", "e.nii", SPACING, False), "nii-u32": ("u32", "f.nii", SPACING, False),
          "nii-f32": ("f32", "g.nii.gz", SPACING, False), "nii-f64": ("f64", "h.nii", SPACING, False),
          "nii-oblique": ("i16", "i.nii", SPACING, True), "nrrd-i16": ("i16", "j.nrrd", SPACING, False),
-         "nii-nan": ("f32", "n.nii", SPACING, False), "nrrd-f32": ("f32", "k.nrrd", (2.0, 2.0, 2.0), True), "mha-u16": ("u16", "l.mha", SPACING, False),
+         "nii-nan": ("f32", "n.nii", SPACING, False), "nrrd-f32": ("f32", "k.nrrd", (2.0, 2.0, 2.0), True),
+         "mha-u16": ("u16", "l.mha", SPACING, False),
          "mha-f64": ("f64", "m.mha", (2.6, 2.2, 2.9), False)}
 DICOM = ["dicom", "dicom-file", "dicom-oblique", "enhanced", "tilted", "uneven", "padded"]
 

@@ -11,6 +11,7 @@ import pydicom
 import made_dicom
 import volumes
 from expected import Expected
+from made_inputs import PADDING
 from judge import check, grid_of, near
 from oracle import determinant, snap
 from table import SERIES
@@ -104,7 +105,7 @@ class Outputs:
             "nearest-own": lambda: (along["other"], "nearest", None, None),
             "cubic": lambda: (along["other"], "cubic", -5, None),
             "vectors": lambda: (along["vectors"], "linear", None, None),
-            "series": lambda: (self.world.inputs.get("padded")[1], "nearest", made_dicom_padding(), made_dicom_padding()),
+            "series": lambda: (self.world.inputs.get("padded")[1], "nearest", PADDING, PADDING),
             "dose": lambda: (along["dose"], "linear", None, None)}[wanted]()
         if wanted == "dose":
             source = volumes.Volume((source.values * 0.001).astype(found.values.dtype), source.affine)
@@ -140,7 +141,7 @@ class Outputs:
         return np.array(points), None
 
     def check_points(self):
-        """Each point lies where the field takes it: found among the tetrahedra at rest, and moved by one that holds it."""
+        """Each point lies where the field takes it: moved by one of the tetrahedra that hold it at rest."""
         if self.case["points"] == "none" or self.truth.kind == "short":
             return
         points = self.world.points[:21] if self.case["points"] == "stl" else self.world.points
@@ -184,8 +185,3 @@ class Outputs:
         name = str(files[0].PatientName)
         check((name == made_dicom.PATIENT["PatientName"]) == (self.case["deidentify"] == "none"),
               f"the patient is called {name!r}")
-
-
-def made_dicom_padding():
-    from made_inputs import PADDING
-    return PADDING

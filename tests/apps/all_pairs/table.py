@@ -11,7 +11,8 @@ FIELDS = {  # name: what it is for the checks
     "elastic": "formula", "lattice": "lattice", "folded": "lattice", "short": "short", "mesh": "mesh",
     "two-meshes": "mesh", "island": "mesh", "composed": "composed", "composed-mesh": "composed", "affine": "transform",
     "cut-open": "scenario", "cut-springs": "scenario", "cut-closed": "scenario", "chain": "scenario",
-    "springs": "scenario", "labelled": "scenario", "cut-file": "file of a scenario", "chain-file": "file of a scenario", "pull": "pull",
+    "springs": "scenario", "labelled": "scenario", "cut-file": "file of a scenario",
+    "chain-file": "file of a scenario", "pull": "pull",
     "gaps": "pull", "pull-affine": "pull"}
 SERIES = ["dicom", "dicom-rle", "dicom-deflated"]
 FACTORS = {
