@@ -183,7 +183,8 @@ class Truth:
     def make_model(self):
         self.model = self.deformed(self.grid)
         self.sure = ~self.model.doubtful
-        check(self.sure.mean() > 0.8, f"only {self.sure.mean():.0%} of the voxels can be judged")
+        least = 0.3 if "scenario" in self.kind else 0.8  # simulations move by whole 2^-16 mm, often half a step
+        check(self.sure.mean() > least, f"only {self.sure.mean():.0%} of the voxels can be judged")
 
     def check_values(self):
         padding = getattr(self.source, "padding", None)
@@ -208,7 +209,7 @@ class Truth:
         model, sure = self.model, self.sure
         with np.errstate(invalid="ignore"):
             wrong = ~(np.abs(self.jacobian - model.jacobian) <= 2e-6 * np.abs(model.jacobian))
-        wrong &= sure & model.mapped & np.isfinite(model.jacobian)
+        wrong &= sure & model.sure_jacobian & np.isfinite(model.jacobian)
         self.none(wrong, "--jacobian", self.jacobian, model.jacobian)
         self.none(sure & ~model.mapped & ~model.rests & ~np.isnan(self.jacobian), "--jacobian where nothing maps")
         self.none(sure & model.rests & (self.jacobian != 1), "--jacobian of what rests outside the field")

@@ -101,11 +101,24 @@ class Owners:
         voxel, signs, q, number = voxel[near], signs[near], q[near], number[near]
         owned = self.contains(number, q, signs)
         doubt = self.is_doubtful[number]
+        doubt[doubt] = self.is_near_face(number[doubt], q[doubt])
         np.logical_or.at(self.doubtful, tuple(voxel[doubt].T), True)
         voxel, number = voxel[owned], number[owned]
         np.add.at(self.count, tuple(voxel.T), 1)
         order = np.argsort(-number, kind="stable")  # the lowest is written last
         self.lowest[tuple(voxel[order].T)] = number[order]
+
+    def is_near_face(self, number, q):
+        """Whether a step of a vertex may take a point into a tetrahedron or out of it."""
+        corner = self.corner_at[number]
+        w = weights(corner, q)
+        local = (corner - corner[:, [3]]) / ONE
+        volume = np.abs(determinant(local[:, 0], local[:, 1], local[:, 2]))
+        longest = np.linalg.norm(corner[:, :, None] - corner[:, None], axis=-1).max((1, 2)) / ONE
+        with np.errstate(divide="ignore", invalid="ignore"):
+            margin = np.minimum(4 / 4096 * longest**2 / volume, 1)  # a step over the least height
+            clear = (w.min(1) > margin) | (w.min(1) < -margin * (1 + np.abs(w).max(1)))
+        return ~clear
 
     def contains(self, number, q, signs):
         """Whether a tetrahedron contains a point, or what lies beside it, exactly."""
@@ -187,8 +200,12 @@ class Deformed:
         reach = np.abs(vertex_u[:, :3] - vertex_u[:, [3]]).max((1, 2))
         with np.errstate(divide="ignore", invalid="ignore"):
             self.jacobian[self.mapped] = volume / rest_volume
-        # in float, 2^-20 voxel; beside that what one bit of a vertex can do to a tetrahedron without much volume
-        self.tolerance[self.mapped] = 1e-7 * (reach * condition(corner, volume) + 16)
+        # In float; and a step or two where the last bits of a vertex decide.
+        is_doubtful = owners.is_doubtful[number]
+        self.tolerance[self.mapped] = 1e-7 * (reach * condition(corner, volume) + 16) + is_doubtful * (
+            4 / 4096 * (1 + reach * condition(corner, volume)))
+        self.sure_jacobian = np.zeros(shape, bool)
+        self.sure_jacobian[self.mapped] = ~is_doubtful
         self.doubtful[self.mapped] |= np.abs(least + 1 / 64) < 1e-3
         self.rests = np.zeros(shape, bool)
         if outside == "rest":
