@@ -120,6 +120,8 @@ class Cases:
             attempt(self.from_written, case, truth)
         if case["grid"] == "same" and truth.kind not in ("pull", "short"):
             attempt(self.by_inverse, case, truth)
+        if case["grid"] == "same" and case["outside"] == "refuse" and case["field"] not in SCENARIOS:
+            attempt(self.by_commands, case, truth)
         return problems
 
     def alone(self, case):
@@ -223,6 +225,26 @@ class Cases:
             one, other = ((run / "out" / name).read_bytes() for run in (truth.folder, place))
             strip = lambda data: b"\n".join(line for line in data.split(b"\n", 16) if not line.startswith(b"descrip"))
             check(strip(one) == strip(other), f"other bytes of {name} from the field that the scenario wrote")
+
+
+    def by_commands(self, case, truth):
+        """`invert` gives what --inverse does, `field` what --write-field does, and pull fields have an inverse too."""
+        place, written = self.place("commands"), truth.folder / "out"
+        field = self.world.field(case)
+        like = ["--like", self.world.input(case)[0], "--quiet"]
+        for name, value in self.world.options(case, ""):
+            like += ["--" + name, str(value)] if name in ("cell-size", "uneven") else []
+        if truth.kind == "pull":
+            result = self.program.run(["invert", *field, *like, "-o", "out/f.mha"], place)
+            wanted = 4 if case["field"] == "gaps" else 0  # a gap has no inverse
+            check(result.status == wanted, f"status {result.status} of invert --pull-field: {result.error!r}")
+            return
+        self.program.must(["invert", *field[1::2], *like, "-o", "out/i.mha"], place)
+        check((place / "out/i.mha").read_bytes() == (written / "i.mha").read_bytes(), "invert differs from --inverse")
+        if case["field"] not in table.MESHES:
+            self.program.must(["field", *field[1::2], *like, "-o", "out/w.mha"], place)
+            check((place / "out/w.mha").read_bytes() == (written / "w.mha").read_bytes(),
+                  "field differs from --write-field")
 
 
 def choose(cases, part):
