@@ -120,7 +120,8 @@ class Cases:
             attempt(self.from_written, case, truth)
         if case["grid"] == "same" and truth.kind not in ("pull", "short"):
             attempt(self.by_inverse, case, truth)
-        if case["grid"] == "same" and case["outside"] == "refuse" and case["field"] not in SCENARIOS:
+        is_plain = case["grid"] == "same" and case["outside"] == "refuse" and case["field"] not in SCENARIOS
+        if is_plain or truth.kind == "pull":
             attempt(self.by_commands, case, truth)
         return problems
 
