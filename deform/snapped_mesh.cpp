@@ -143,7 +143,7 @@ SnappedMesh snap_mesh(const Geometry& output, const FieldView& field, const Cont
     if (snapped.vertices[n].u.x == INT32_MIN) refuse(mesh, n);
   }
   const Findings found = tbb::parallel_reduce(
-      tbb::blocked_range<std::size_t>(0, mesh.tetrahedra.size(), kGrain), Findings{},
+      tbb::blocked_range<std::size_t>(0, snapped.tetrahedra.size(), kGrain), Findings{},
       [&](const auto& range, Findings findings) {
         if (control.stop.stop_requested()) throw Cancelled();
         for (std::size_t n = range.begin(); n < range.end(); ++n) findings.look_at(snapped.tetrahedron(n));
