@@ -208,7 +208,7 @@ class Truth:
     def check_jacobian(self):
         model, sure = self.model, self.sure
         with np.errstate(invalid="ignore"):
-            wrong = ~(np.abs(self.jacobian - model.jacobian) <= 2e-6 * np.abs(model.jacobian))
+            wrong = ~(np.abs(self.jacobian - model.jacobian) <= model.slack_of_jacobian * np.abs(model.jacobian))
         wrong &= sure & model.sure_jacobian & np.isfinite(model.jacobian)
         self.none(wrong, "--jacobian", self.jacobian, model.jacobian)
         self.none(sure & ~model.mapped & ~model.rests & ~np.isnan(self.jacobian), "--jacobian where nothing maps")
@@ -216,6 +216,7 @@ class Truth:
 
     def check_range(self):
         low, high = self.sidecar["report"]["jacobian"]
+        check(low is not None and high is not None, f"the report has no range of the Jacobian, {[low, high]}")
         found = self.jacobian[np.isfinite(self.jacobian) & self.model.mapped]
         check(found.size == 0 or (low <= found.min() and found.max() <= high),
               f"the report's Jacobian is {low} to {high}, that of the map {found.min()} to {found.max()}")
