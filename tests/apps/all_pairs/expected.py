@@ -21,7 +21,7 @@ class Expected:
         if np.allclose(matrix, np.eye(4), atol=1e-9):
             matrix = np.eye(4)
         place = (voxel + deformed.u) @ matrix[:3, :3].T + matrix[:3, 3]
-        self.slack_of_place = deformed.tolerance * np.abs(matrix[:3, :3]).sum(1).max() + 1e-9
+        self.slack_of_place = deformed.tolerance * np.abs(matrix[:3, :3]).sum(1).max() + 1e-7  # kept in float
         if source.slices is not None:
             place[..., 2] = self.uneven(place[..., 2], source.slices)
             self.slack_of_place = self.slack_of_place * 2

@@ -204,7 +204,7 @@ class Deformed:
         is_doubtful = owners.is_doubtful[number]
         self.tolerance[self.mapped] = 1e-7 * (reach * condition(corner, volume) + 16) + is_doubtful * (
             4 / 4096 * (1 + reach * condition(corner, volume)))
-        self.slack_of_jacobian = np.full(shape, 1.0)  # relative: a determinant is taken in float where its sign is clear
+        self.slack_of_jacobian = np.full(shape, 1.0)  # relative: determinants are taken in float
         self.slack_of_jacobian[self.mapped] = 2e-6 + 3e-7 * condition(corner, volume)
         self.sure_jacobian = np.zeros(shape, bool)
         self.sure_jacobian[self.mapped] = ~is_doubtful
