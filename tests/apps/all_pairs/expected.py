@@ -18,7 +18,8 @@ class Expected:
         shape = tuple(grid.size)
         voxel = np.stack(np.meshgrid(*[np.arange(n) for n in shape], indexing="ij"), -1)
         matrix = np.linalg.inv(source.affine) @ grid.affine
-        if np.allclose(matrix, np.eye(4), atol=1e-9):
+        self.is_same_grid = np.allclose(matrix, np.eye(4), atol=1e-9)
+        if self.is_same_grid:
             matrix = np.eye(4)
         place = (voxel + deformed.u) @ matrix[:3, :3].T + matrix[:3, 3]
         self.slack_of_place = deformed.tolerance * np.abs(matrix[:3, :3]).sum(1).max() + 1e-7  # kept in float
@@ -57,7 +58,7 @@ class Expected:
         is_none = np.isnan(corners)
         corners = np.where(is_none, 0, corners)
         becomes_none = (is_none & (np.abs(weights) > little)).any(0)
-        self.doubtful |= (is_none & (weights != 0) & (np.abs(weights) <= little)).any(0)
+        self.doubtful |= (is_none & self.may_weigh(weights) & (np.abs(weights) <= little)).any(0)
         nearest = np.floor(place + 0.5).astype(int)
         is_half = (np.abs(place + 0.5 - np.rint(place + 0.5)) < self.slack_of_place[..., None] + 1e-7).any(-1)
         at_nearest = values[tuple(np.minimum(nearest[..., a], last[a]) for a in range(3))]
@@ -78,11 +79,15 @@ class Expected:
             return value, slack
         is_padding = corners == padding
         with_weight = (is_padding & (np.abs(weights) > little)).any(0)
-        self.doubtful |= (is_padding & (weights != 0) & (np.abs(weights) <= little)).any(0) | (with_weight & is_half)
+        self.doubtful |= (is_padding & self.may_weigh(weights) & (np.abs(weights) <= little)).any(0) | (with_weight & is_half)
         if interpolation == "nearest":
             with_weight = at_nearest == padding
         self.padded |= with_weight & (at_nearest == padding)
         return np.where(with_weight, at_nearest, value), np.where(with_weight, 0, slack)
+
+    def may_weigh(self, weights):
+        """On one grid a weight of zero is zero; between grids it may be rounding."""
+        return weights != 0 if self.is_same_grid else np.ones(weights.shape, bool)
 
     @staticmethod
     def weights(steps, t, interpolation):

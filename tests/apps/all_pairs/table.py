@@ -82,6 +82,8 @@ def rules(has_device):
              field=[name for name, kind in FIELDS.items() if kind == "scenario"]),
         Rule(4, "does not reach over", field=["island"], outside=["refuse"]),
         Rule(4, "does not reach over", field=OVER_INPUT, input=SMALLER, grid=["series"], outside=["refuse"]),
+        Rule(4, "does not reach over", field=["pull-affine"], grid=["file"], outside=["refuse"],
+             **{"with": ["nearest-own"]}),  # a transform is sampled on the output grid alone
         Rule(4, "cannot hold|written as a mesh", field=MESHES, **{"write-field": [".mha"]}),
     ]
     if has_device:
