@@ -79,7 +79,8 @@ class Expected:
             return value, slack
         is_padding = corners == padding
         with_weight = (is_padding & (np.abs(weights) > little)).any(0)
-        self.doubtful |= (is_padding & self.may_weigh(weights) & (np.abs(weights) <= little)).any(0) | (with_weight & is_half)
+        self.doubtful |= (is_padding & self.may_weigh(weights) & (np.abs(weights) <= little)).any(0)
+        self.doubtful |= with_weight & is_half
         if interpolation == "nearest":
             with_weight = at_nearest == padding
         self.padded |= with_weight & (at_nearest == padding)
