@@ -8,6 +8,7 @@
 #include "apps/output_grid.h"
 #include "apps/reads.h"
 #include "deform/fields/formula.h"
+#include "deform/mass.h"
 #include "deform/residuals.h"
 #include "io/image_file.h"
 #include "io/mesh_writer.h"
@@ -42,7 +43,8 @@ std::uint64_t plan_bytes(const DeformOptions& options, DeformOutputs& outputs, c
   const std::uint64_t of_check = reports_quality(options) ? sizeof(glm::vec3) * output_voxels / slices *
                                                                 std::min(slices, std::uint64_t{RoundTrip::kMostSlices})
                                                           : 0;
-  const std::uint64_t of_mass = options.preserve_mass ? sizeof(float) * (voxels + output_voxels) : 0;
+  const std::uint64_t of_mass =
+      options.preserve_mass ? size_bytes(type_of_mass(input.type)) * (voxels + output_voxels) : 0;
   const std::uint64_t of_structures = outputs.structures.empty() ? 0 : MapStream::bytes(grid, &Maps::inverse_mm, false);
   return of_mass + of_check + voxels * size_bytes(input.type) + output_voxels * size_bytes(input.type) +
          outputs.maps->bytes(grid, options.preserve_mass) + outputs.further->bytes(output_voxels) + of_structures +

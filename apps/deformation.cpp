@@ -130,7 +130,8 @@ void Deformation::check(Resampler& resampler, const Control& control) {
   record_.stages.emplace_back("check", stage.seconds());
 }
 
-/// INPUT as it goes through the field: with --preserve mass in float, so that values are rounded once.
+/// INPUT as it goes through the field: with --preserve mass in a real type that holds its values, so that they are
+/// rounded once.
 Target Deformation::main_target() {
   Target target{.source = record_.input->volume.view(),
                 .output = record_.output.view(),
@@ -139,12 +140,16 @@ Target Deformation::main_target() {
                 .padding = padding_of_input(),
                 .sampled_slices = sampled_slices_};
   if (!options_.preserve_mass) return target;
-  mass_.source = AnyVolume(record_.input->volume.geometry(), VoxelType::f32);
-  mass_.resampled = AnyVolume(record_.plan.grid, VoxelType::f32);
+  const VoxelType type = type_of_mass(record_.input->volume.type());
+  mass_.source = AnyVolume(record_.input->volume.geometry(), type);
+  mass_.resampled = AnyVolume(record_.plan.grid, type);
   dispatch(record_.input->volume.type(), [&](auto voxel) {
     const auto from = record_.input->volume.as<decltype(voxel)>();
-    std::transform(from.begin(), from.end(), mass_.source.as<float>().begin(),
-                   [](auto value) { return static_cast<float>(value); });
+    const auto convert = [&](auto to) {
+      using Real = typename decltype(to)::value_type;
+      std::transform(from.begin(), from.end(), to.begin(), [](auto value) { return static_cast<Real>(value); });
+    };
+    type == VoxelType::f64 ? convert(mass_.source.as<double>()) : convert(mass_.source.as<float>());
   });
   target.source = std::as_const(mass_.source).view();
   target.output = mass_.resampled.view();

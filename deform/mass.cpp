@@ -24,11 +24,16 @@ V stored(double value, std::uint64_t& saturated) {
 
 }  // namespace
 
+VoxelType type_of_mass(VoxelType type) {
+  const bool fits = type != VoxelType::i32 && type != VoxelType::u32 && type != VoxelType::f64;
+  return fits ? VoxelType::f32 : VoxelType::f64;
+}
+
 std::uint64_t preserve_mass(const ConstVolumeView& hu, const Maps& maps, const std::optional<PaddingRange>& padding,
                             const VolumeView& output, const Region& slices) {
   const VolumeView &jacobian = maps.jacobian, &coverage = maps.coverage;
-  require(hu.type == VoxelType::f32 && jacobian.voxels && jacobian.type == VoxelType::f32,
-          "HU and determinants are expected as float32");
+  require(hu.type == VoxelType::f32 || hu.type == VoxelType::f64, "HU are expected as float32 or float64");
+  require(jacobian.voxels && jacobian.type == VoxelType::f32, "determinants are expected as float32");
   require(coverage.voxels && coverage.type == VoxelType::u8, "a coverage is expected as uint8");
   const Geometry& grid = *output.geometry;
   require(*hu.geometry == grid && *jacobian.geometry == grid && *coverage.geometry == grid &&
@@ -40,7 +45,10 @@ std::uint64_t preserve_mass(const ConstVolumeView& hu, const Maps& maps, const s
   require(jacobian.buffered == held && coverage.buffered == held && contains(held, slices),
           "maps are expected in whole slices, of those that are scaled");
   const std::int64_t slice = grid.size.x * grid.size.y;
-  const auto* from = reinterpret_cast<const float*>(hu.voxels);
+  const auto value_of = [&](std::int64_t n) {
+    return hu.type == VoxelType::f64 ? reinterpret_cast<const double*>(hu.voxels)[n]
+                                     : double{reinterpret_cast<const float*>(hu.voxels)[n]};
+  };
   const auto* determinants = reinterpret_cast<const float*>(jacobian.voxels);
   const auto* covered = reinterpret_cast<const std::uint8_t*>(coverage.voxels);
   const std::int64_t before = held.begin.z * slice;  // the maps' first voxel
@@ -49,7 +57,7 @@ std::uint64_t preserve_mass(const ConstVolumeView& hu, const Maps& maps, const s
     using V = decltype(voxel);
     V* to = reinterpret_cast<V*>(output.voxels);
     for (std::int64_t n = slices.begin.z * slice; n < slices.end.z * slice; ++n) {
-      const double value = from[n], determinant = std::abs(determinants[n - before]);
+      const double value = value_of(n), determinant = std::abs(determinants[n - before]);
       const bool is_padding = padding && value >= padding->low && value <= padding->high;
       const bool is_density = covered[n - before] != 0 && !is_padding && determinant > 0;
       to[n] = stored<V>(is_density ? (value - kAir) / determinant + kAir : value, saturated);

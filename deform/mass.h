@@ -6,6 +6,10 @@
 
 namespace tetwarp {
 
+/// In what values of a type are resampled before mass is preserved: float32, or float64 where float32 does not hold
+/// them all.
+VoxelType type_of_mass(VoxelType type);
+
 /// Values of a CT after a deformation that keeps mass: tissue that is squeezed into half the volume is twice as dense.
 ///
 /// Density is HU + 1000 (air 0, water 1000), so a voxel becomes (HU + 1000) / |J| - 1000 with the determinant J of its
@@ -14,7 +18,7 @@ namespace tetwarp {
 /// voxel may have an owner and a determinant; padding; and a voxel without a determinant (NaN). Where the map folds,
 /// mass is not kept: a voxel shows one of its owners.
 ///
-/// @param hu        float32, as resampled
+/// @param hu        float32 or float64, as resampled
 /// @param maps      `coverage` and `jacobian` of the same call, of which `hu` was the first target; they may buffer
 ///                  `slices` and no more
 /// @param padding   of the source: values that are no data

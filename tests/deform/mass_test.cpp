@@ -42,6 +42,21 @@ TEST(Mass, WhatIsNoDensityKeepsItsValue) {
   EXPECT_EQ(output.voxels, (std::vector<std::int16_t>{0, -2000, -1500, -3002, -1998, 1000, 1000, 1000, 1000, 1000}));
 }
 
+TEST(Mass, ValuesThatFloatDoesNotHoldAreHeldInDouble) {
+  for (const VoxelType type : {VoxelType::i32, VoxelType::u32, VoxelType::f64})
+    EXPECT_EQ(type_of_mass(type), VoxelType::f64);
+  for (const VoxelType type : {VoxelType::u8, VoxelType::i16, VoxelType::u16, VoxelType::f32})
+    EXPECT_EQ(type_of_mass(type), VoxelType::f32);
+  const Geometry grid = unit_grid({2, 1, 2});
+  const Volume<double> hu{grid, {123456789, 987654321, 0.1, -5}};
+  Volume<float> jacobian{grid, {1, 1, 1, 1}};
+  Volume<std::uint8_t> coverage{grid, {1, 0, 1, 1}};
+  Volume<std::int32_t> output{grid, std::vector<std::int32_t>(4)};
+  const Maps maps{.coverage = view(coverage), .jacobian = view(jacobian)};
+  preserve_mass(view(hu), maps, {}, view(output), whole(grid));
+  EXPECT_EQ(output.voxels, (std::vector<std::int32_t>{123456789, 987654321, 0, -5}));
+}
+
 TEST(Mass, NeedsFloatsOnOneGrid) {
   const Geometry grid = unit_grid({2, 2, 2});
   const Geometry grid3 = unit_grid({2, 2, 3});

@@ -125,8 +125,8 @@ TEST_P(DamagedVolume, AnyFlippedBitOfCompressedVoxelsIsRefusedOrHarmless) {
 
 TEST_P(DamagedVolume, SizesThatAreNotThoseOfTheVoxelsAreRefused) {
   if (path_.extension() == ".nii") {
-    for (const std::int16_t slices : {4, 6}) {
-      put(bytes_, 46, slices);
+    for (const int slices : {4, 6}) {
+      put(bytes_, 46, static_cast<std::int16_t>(slices));
       write_file(path_, bytes_);
       EXPECT_EQ(not_refused(path_), "") << slices;
     }
@@ -140,8 +140,8 @@ TEST_P(DamagedVolume, SizesThatAreNotThoseOfTheVoxelsAreRefused) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Formats, DamagedVolume, testing::ValuesIn(kKinds), [](const auto& info) {
-  std::string name = info.param.name;
+INSTANTIATE_TEST_SUITE_P(Formats, DamagedVolume, testing::ValuesIn(kKinds), [](const auto& kind) {
+  std::string name = kind.param.name;
   std::erase_if(name, [](char c) { return !std::isalnum(static_cast<unsigned char>(c)); });
   return name;
 });
