@@ -31,6 +31,7 @@ Bytes read_bytes(const std::filesystem::path& path) {
   require(file != nullptr, "cannot open, " + path.string());
   Bytes bytes{};
   const int read = gzread(file.get(), bytes.data(), bytes.size());
+  require(read != 0, "an empty file, " + path.string());
   require(read == static_cast<int>(bytes.size()), "a header of " + std::to_string(std::max(read, 0)) + " bytes, " +
                                                       path.string() + "; a NIfTI-1 header has 348");
   return bytes;
@@ -61,8 +62,8 @@ Quaternion quaternion(const Bytes& bytes, bool swapped) {
   constexpr double kRounding = 4.0 / (1 << 24);  // of b^2 + c^2 + d^2
   Quaternion q{0, f(256), f(260), f(264), 0};
   const double squares = q.b * q.b + q.c * q.c + q.d * q.d;
-  if (squares > 1 - 1e-7) {  // a half turn: as niftilib and nibabel have it
-    const double length = std::sqrt(squares);
+  if (squares > 1 - 1e-7) {                                           // a half turn: as niftilib and nibabel have it
+    const double length = squares < 1.01 ? std::sqrt(squares) : NAN;  // what is longer by more than rounding is damage
     q = {0, q.b / length, q.c / length, q.d / length, 2 * std::sqrt(kRounding + 1e-7)};
   } else {
     q.a = std::sqrt(1 - squares);
@@ -138,7 +139,7 @@ void require_known_place(const NiftiHeader& header, const std::string& file) {
   for (const auto& [code, grid] : {std::pair(header.qform_code, &header.qform), {header.sform_code, &header.sform}}) {
     const bool near = glm::length(grid->origin) + glm::length(grid->spacing) < 1e9;  // false for NaN
     require(code <= 0 || near,
-            "a qform or sform that is not finite, or beyond 1e9 mm, " + file + "; correct the header");
+            "a qform or sform that is not finite, no rotation, or beyond 1e9 mm, " + file + "; correct the header");
   }
 }
 

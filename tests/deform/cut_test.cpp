@@ -177,9 +177,9 @@ TEST_P(Cuts, ClosedOnesChangeNothingAwayFromThemAndOneUnitAlongThem) {
         EXPECT_EQ(whole_result.jacobian.voxels[n], cut_result.jacobian.voxels[n]);
       }
     });
-    // Splitting a tetrahedron keeps its determinant, to within rounding of short edges to steps.
-    EXPECT_NEAR(cut_result.report.jacobian_min, whole_result.report.jacobian_min, 1);
-    EXPECT_NEAR(cut_result.report.jacobian_max, whole_result.report.jacobian_max, 1);
+    // All tetrahedra are counted. Splitting one keeps its determinant, but for rounding, which slivers show.
+    EXPECT_LT(cut_result.report.jacobian_min, whole_result.report.jacobian_min + 0.1);
+    EXPECT_GT(cut_result.report.jacobian_max, whole_result.report.jacobian_max - 0.1);
     const bool is_alone = cuts.size() == 1;  // slivers where cuts cross may be thinner than a step
     EXPECT_LE(cut_result.report.inverted, is_alone ? 0u : 50u);
   }

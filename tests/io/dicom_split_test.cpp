@@ -346,9 +346,12 @@ TEST(DicomSplit, APatientsNameInTheDescriptionIsNeverShown) {
   Folder by_id;
   by_id.write(0, 4, {put(DCM_SeriesDescription, "scan of SECRET-ID.")});
   EXPECT_EQ(by_id.series()[0].description, "");
+  Folder in_doubt;  // a word that begins as the name does may be the name, with what was put behind it
+  in_doubt.write(0, 4, {put(DCM_SeriesDescription, "SECRETION 5 mm")});
+  EXPECT_EQ(in_doubt.series()[0].description, "");
   Folder harmless;
-  harmless.write(0, 4, {put(DCM_SeriesDescription, "SECRETION 5 mm")});
-  EXPECT_EQ(harmless.series()[0].description, "SECRETION 5 mm");
+  harmless.write(0, 4, {put(DCM_SeriesDescription, "Lung 5 mm")});
+  EXPECT_EQ(harmless.series()[0].description, "Lung 5 mm");
 }
 
 TEST(DicomSplit, KernelsThatAlternateInAnEvenStackAreToldAsWarning) {

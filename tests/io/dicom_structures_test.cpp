@@ -67,12 +67,12 @@ TEST(Structures, WhatContradictsItselfIsRefusedByName) {
     std::vector<std::string> words;
   } kCases[] = {
       {text(DCM_ContourData, "1\\2\\3\\4"), {"4 numbers", "contour 1 of ROI 1"}},
-      {text(DCM_ContourData, "1\\2\\three"), {"\"three\"", "contour 1 of ROI 1"}},
+      {text(DCM_ContourData, "1\\2\\three"), {"no number", "contour 1 of ROI 1"}},
       {text(DCM_ContourData, "1\\2\\3\\", 0, 1), {"empty number", "contour 2 of ROI 1"}},
       {text(DCM_ContourData, "1\\2\\1e300", 1, 0), {"1e300", "contour 1 of ROI 2"}},
       {text(DCM_NumberOfContourPoints, "7"), {"says 7", "has 3 points"}},
       {text(DCM_NumberOfContourPoints, "99999999999"), {"99999999999", "has 3 points"}},
-      {text(DCM_ContourGeometricType, "ROUND"), {"\"ROUND\""}},
+      {text(DCM_ContourGeometricType, "ROUND"), {"(3006,0042)", "no known value"}},
       {text(DCM_RETIRED_ContourOffsetVector, "0\\0\\1.5"), {"(3006,0045)"}},
       {[](DcmDataset& data) { data.findAndDeleteElement(DCM_StructureSetROISequence); }, {"(3006,0020)"}},
       {[](DcmDataset& data) { item_of(data, DCM_StructureSetROISequence, 1).putAndInsertString(DCM_ROINumber, "1"); },

@@ -109,6 +109,7 @@ TEST(Nifti, WhatCannotBeReadExactlyIsRefusedByName) {
   refused(with(good, F32(280, 0.0f)), "a sheared or singular sform");
   for (const std::size_t at : {256, 272, 280, 292}) {  // quatern_b, qoffset_y, srow_x[0], srow_x[3]
     for (const float bad : {NAN, INFINITY, -INFINITY, 2.9e38F}) refused(with(good, F32(at, bad)), "that is not finite");
+    if (at == 256) refused(with(good, F32(at, 1.2F)), "no rotation");
   }
   refused(with(good, F32(80, 0.9f)), "by pixdim");
   refused(with(good, std::pair<std::size_t, char>(123, 1)), "lengths in metres");

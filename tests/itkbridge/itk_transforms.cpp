@@ -52,7 +52,7 @@ glm::dvec3 ItkTransform::operator()(const glm::dvec3& point) const {
   return {moved[0], moved[1], moved[2]};
 }
 
-void ItkTransform::write(const std::filesystem::path& path) const {
+void ItkTransform::write(const std::filesystem::path& path, bool compressed) const {
   const auto writer = itk::TransformFileWriterTemplate<double>::New();
   if (path.extension() == ".h5") {
     writer->SetTransformIO(itk::HDF5TransformIO::New());
@@ -61,6 +61,7 @@ void ItkTransform::write(const std::filesystem::path& path) const {
   }
   writer->SetFileName(path.string());
   writer->SetInput(held_->transform);
+  writer->SetUseCompression(compressed);
   writer->Update();
 }
 

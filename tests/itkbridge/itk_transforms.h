@@ -19,7 +19,7 @@ class ItkTransform {
 
   glm::dvec3 operator()(const glm::dvec3& point) const;
   /// Written by ITK's TransformFileWriter: .h5 .tfm .txt.
-  void write(const std::filesystem::path& path) const;
+  void write(const std::filesystem::path& path, bool compressed = false) const;
 
  private:
   struct Held;

@@ -79,7 +79,7 @@ TEST(ReadProgram, MissingIsAnErrorThatNamesItAndEveryPlace) {
 TEST(ReadProgram, DoesNothingByHand) {
   const Scratch scratch;
   for (const std::string arguments :
-       {"", "transform-hdf5 t.h5", "other t.h5 1 1 1 1 3> out", "transform-hdf5 t.h5 1 1 1 1"}) {
+       {"", "transform-hdf5 t.h5", "other t.h5 1 1 1 1 3> out", "transform-hdf5 t.h5 1 1 1 1 3>&-"}) {
     const Outcome run = run_program(scratch.path(), TETWARP_READ_BUILT, arguments);
     EXPECT_EQ(run.status, 2) << arguments;
     EXPECT_TRUE(says(run.err, {"tetwarp-read", "by hand"}));
