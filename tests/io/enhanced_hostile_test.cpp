@@ -53,7 +53,7 @@ TEST_F(HostileEnhancedCt, NumberOfFramesThatNoFileHoldsIsRefused) {
        {"1000000000", "2147483647", "0", "-3", "many", "99999999999999999999", "", "1e9", "100001"}) {
     write([&](DcmDataset& data) { data.putAndInsertString(DCM_NumberOfFrames, number); });
     const std::string text = number;  // text that is no number is not shown: it could be anything
-    const bool is_text = text == "many" || text == "1e9" || text.size() > 12;
+    const bool is_text = text == "many" || text.size() > 12;
     const std::string why = refusal();
     EXPECT_TRUE(says(why, {"Number of Frames (0028,0008), expected 1 to 100000, found", "all.dcm"})) << text;
     EXPECT_TRUE(says(why, {is_text ? std::string("no number") : text})) << text;

@@ -83,7 +83,8 @@ inline void write_slice(const std::filesystem::path& path, const MadeSlice& slic
   put_attributes(data, slice);
   put_pixels(data, slice);
   if (slice.edit) slice.edit(data);
-  if (data.chooseRepresentation(slice.encoding, slice.encoder_parameter).bad()) throw std::runtime_error("no encoder");
+  const OFCondition coded = data.chooseRepresentation(slice.encoding, slice.encoder_parameter);
+  if (coded.bad()) throw std::runtime_error(std::string(DcmXfer(slice.encoding).getXferName()) + ": " + coded.text());
   const OFCondition result = format.saveFile(path.c_str(), slice.encoding);
   if (result.bad()) throw std::runtime_error(result.text());
 }

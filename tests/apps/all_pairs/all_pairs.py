@@ -182,7 +182,7 @@ class Cases:
         result = self.program.run(["batch", "m.jsonl", "-o", "results", "--quiet"], place)
         check(result.status == 0, f"status {result.status} of a batch: {result.error!r}")
         made = contents(place / "results")
-        expected = {"one", "batch.json", "results.jsonl", "summary.txt", "timings.jsonl"}
+        expected = {"one", "batch.json", "batch.lock", "results.jsonl", "summary.txt", "timings.jsonl"}
         check({name.split("/")[0] for name in made} == expected, f"a batch left {sorted(made)}")
         check_privacy(made, result.output + result.error, case["deidentify"] != "none")
         of_case = {name.removeprefix("one/"): data for name, data in made.items() if name.startswith("one/")}
