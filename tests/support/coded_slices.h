@@ -32,7 +32,8 @@ inline MadeSlice busy_slice() {
 inline void register_encoders() {
   DcmRLEEncoderRegistration::registerCodecs();
   DJEncoderRegistration::registerCodecs();
-  DJLSEncoderRegistration::registerCodecs();
+  DJLSEncoderRegistration::registerCodecs(0, 0, 0, 0,
+                                          OFFalse);  // words as they are: the other way reads beyond odd images
 }
 
 /// `busy_slice` in high-throughput JPEG 2000, which no library of Debian 12 but OpenJPH's own encodes: made by
