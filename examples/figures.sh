@@ -12,7 +12,10 @@ set -euo pipefail
 case ${1:-} in -h | --help) sed -n '2,/^set /{/^set /d;s/^# \{0,1\}//;p}' "$0"; exit 0 ;; esac
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 out=${1:-figures} data=${2:-${TETWARP_TEST_DATA:-}}
-tetwarp=${TETWARP:-$(ls "$here"/../build/*/apps/tetwarp 2>/dev/null | head -n 1)}
+[[ $out != -* ]] || out=./$out  # a name that begins with a dash is no option
+[[ $data != -* ]] || data=./$data
+built=("$here"/../build/*/apps/tetwarp)
+tetwarp=${TETWARP:-${built[0]}}
 [ -x "$tetwarp" ] || { echo "figures.sh: build Tetwarp first, or name the program in TETWARP" >&2; exit 1; }
 mkdir -p "$out"
 

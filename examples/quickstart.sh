@@ -9,6 +9,7 @@
 set -euo pipefail
 source_dir=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 out=${1:-first-light}
+[[ $out != -* ]] || out=./$out  # a name that begins with a dash is no option
 
 packages=(
   g++ cmake ninja-build git ca-certificates xz-utils          # to build, and to unpack test data
@@ -34,10 +35,10 @@ preset=$("$source_dir/cmake/preset.sh")
 configure=(--preset "$preset")
 [ -z "${TETWARP_CUDA_ARCHITECTURES:-}" ] || configure+=("-DCMAKE_CUDA_ARCHITECTURES=$TETWARP_CUDA_ARCHITECTURES")
 echo "== building (preset $preset)"
-(cd "$source_dir" && cmake "${configure[@]}" >"/tmp/tetwarp-configure.$$.log" 2>&1) ||
-  { cat "/tmp/tetwarp-configure.$$.log"; exit 1; }
-sed -n 's/^-- Tetwarp: //p' "/tmp/tetwarp-configure.$$.log"  # what CMake chose by itself
-rm -f "/tmp/tetwarp-configure.$$.log"
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+(cd "$source_dir" && cmake "${configure[@]}" >"$log" 2>&1) || { cat "$log"; exit 1; }
+sed -n 's/^-- Tetwarp: //p' "$log"  # what CMake chose by itself
 (cd "$source_dir" && cmake --build --preset "$preset" --parallel "${TETWARP_JOBS:-$(nproc)}")
 tetwarp="$source_dir/build/$preset/apps/tetwarp"
 

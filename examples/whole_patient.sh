@@ -9,7 +9,13 @@ set -euo pipefail
 [ $# -ge 2 ] || { sed -n '2,8s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 ct=$1 dose=$2 out=${3:-whole-patient}
-tetwarp=${TETWARP:-$(ls "$here"/../build/*/apps/tetwarp 2>/dev/null | head -n 1)}
+built=("$here"/../build/*/apps/tetwarp)
+tetwarp=${TETWARP:-${built[0]}}
+# Names from the root: they are used in OUTPUT_FOLDER, and a name that begins with a dash is no option.
+[[ $ct == /* ]] || ct=$PWD/$ct
+[[ $dose == /* ]] || dose=$PWD/$dose
+[[ $out == /* ]] || out=$PWD/$out
+[[ $tetwarp != */* || $tetwarp == /* ]] || tetwarp=$PWD/$tetwarp
 [ -x "$tetwarp" ] || { echo "build Tetwarp first, or name the program in TETWARP" >&2; exit 1; }
 mkdir -p "$out"
 
@@ -18,11 +24,15 @@ echo "== the volume as NIfTI, thresholds and landmarks from it"
 /usr/bin/python3 "$here/whole_patient.py" labels "$out"
 
 echo "== one field for all"
-"$tetwarp" deform "$ct" -f bubble:radius=120,strength=0.5 -f twist:angle=8 -o "$out/deformed.nii.gz" \
-  --with "$out/labels.nii.gz=$out/labels_deformed.nii.gz" --with "$dose=$out/dose_deformed.nii.gz" \
-  --points "$out/landmarks.csv=$out/landmarks_deformed.csv" \
-  --coverage "$out/coverage.nii.gz" --inverse "$out/inverse.nii.gz" --jacobian "$out/jacobian.nii.gz" --folds "$out/folds.nii.gz" \
-  --report "$out/report.json" --overwrite
+# IN=OUT:OPTIONS leaves no room for = and : in names, so the dose gets a plain one, and the others are named from within their folder.
+plain=$(mktemp -d)
+trap 'rm -rf "$plain"' EXIT
+ln -s "$dose" "$plain/dose.dcm"
+(cd "$out" && "$tetwarp" deform "$ct" -f bubble:radius=120,strength=0.5 -f twist:angle=8 -o deformed.nii.gz \
+  --with labels.nii.gz=labels_deformed.nii.gz --with "$plain/dose.dcm=dose_deformed.nii.gz" \
+  --points landmarks.csv=landmarks_deformed.csv \
+  --coverage coverage.nii.gz --inverse inverse.nii.gz --jacobian jacobian.nii.gz --folds folds.nii.gz \
+  --report report.json --overwrite)
 
 /usr/bin/python3 "$here/whole_patient.py" picture "$out" ${SLICE:+"$SLICE"}
 echo "A picture of it: $out/picture.png"

@@ -17,7 +17,10 @@
 # look at their hashes. TERM comes a minute before the time is up; the batch then ends within seconds and leaves nothing half made.
 set -euo pipefail
 [ $# -eq 2 ] || { sed -n '2,5s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+manifest=$1 out=$2
+[[ $manifest != -* ]] || manifest=./$manifest  # a name that begins with a dash is no option
+[[ $out != -* ]] || out=./$out
 memory=()
 [ -z "${SLURM_MEM_PER_NODE:-}" ] || memory=(--memory "$((SLURM_MEM_PER_NODE * 9 / 10))M")
-exec "${TETWARP:-tetwarp}" batch "$1" -o "$2" --shard "$SLURM_ARRAY_TASK_ID/$SLURM_ARRAY_TASK_COUNT" --resume \
+exec "${TETWARP:-tetwarp}" batch "$manifest" -o "$out" --shard "$SLURM_ARRAY_TASK_ID/$SLURM_ARRAY_TASK_COUNT" --resume \
   --threads "${SLURM_CPUS_PER_TASK:-0}" "${memory[@]}" --log-json

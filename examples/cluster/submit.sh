@@ -9,8 +9,10 @@ set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 manifest=$1 out=$2 tasks=$3
 shift 3
+[[ $tasks =~ ^[1-9][0-9]*$ ]] || { echo "submit.sh: error: N is \"$tasks\"; expected a number of tasks" >&2; exit 2; }
+[[ $manifest != -* ]] || manifest=./$manifest  # a name that begins with a dash is no option
+[[ $out != -* ]] || out=./$out
 "${TETWARP:-tetwarp}" batch "$manifest" -o "$out" --dry-run >/dev/null  # what is wrong with it is better known now
 array=$(sbatch --parsable --array="1-$tasks" "$@" "$here/slurm_array.sh" "$manifest" "$out")
-# afterany: cases that failed are results too, and end their task with status 3.
-sbatch --parsable --dependency="afterany:$array" --job-name=tetwarp-merge --output=tetwarp-merge-%j.log \
-  --wrap "'${TETWARP:-tetwarp}' batch '$manifest' -o '$out' --merge"
+# afterany: cases that failed are results too, and end their task with status 3. Names go as arguments, never as text of a shell.
+sbatch --parsable --dependency="afterany:$array" "$here/slurm_merge.sh" "$manifest" "$out"

@@ -28,6 +28,7 @@ esac
 [ $# -le 2 ] || refuse 2 "more than a data folder and an output folder; see --help"
 data=${1:-${TETWARP_TEST_DATA:-}}
 out=${2:-itk-examples}
+[[ $out != -* ]] || out=./$out  # a name that begins with a dash is no option
 dicom=${DICOM:-${data:+$data/chest-cmb-crc}}
 fixed=${FIXED:-${data:+$data/lung-4dct-t0-t5/t5.mha}}
 moving=${MOVING:-${data:+$data/lung-4dct-t0-t5/t0.mha}}

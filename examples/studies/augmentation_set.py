@@ -22,7 +22,7 @@ def main():
     results = study.batch(options, [{
         "case": "aug", "input": str(ct.resolve()), "variants": options.variants, "seed": options.seed,
         "field": ["elastic:amplitude=2..10,spacing=40..80", "twist:angle=-5..5"], "cell-size": options.cell_size,
-        "output": "image.nii.gz", "with": [f"{study.pathlib.Path(labels).resolve()}=label.nii.gz:vote"]}])
+        "output": "image.nii.gz", "with": [study.along(labels, "label.nii.gz:vote")]}])
     with open(options.output / "set.csv", "w", newline="") as file:
         out = csv.writer(file)
         out.writerow(["image", "label", "field", "jacobian_min", "jacobian_max", "folded"])

@@ -64,7 +64,7 @@ def main():
     results = study.batch(options, [{
         "case": name, "input": str(ct.resolve()), "variants": options.repeats, "seed": 1, "cell-size": options.cell_size,
         "field": f"elastic:amplitude={amplitude},spacing=72", "output": "image.nii.gz", "coverage": "covered.nii.gz",
-        "with": [f"{labels_path.resolve()}=truth.nii.gz:vote"]} for name, amplitude in amplitudes.items()])
+        "with": [study.along(labels_path, "truth.nii.gz:vote")]} for name, amplitude in amplitudes.items()])
     (hu, _), (labels, _) = study.read(ct), study.read(labels_path)
     rows = [{"case": case, "amplitude_mm": amplitudes[case.split("-")[0]], **measure(options.output / "cases", case, line, hu, labels)}
             for case, line in results.items()]

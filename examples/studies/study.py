@@ -47,7 +47,7 @@ def source(options):
     if path.exists():
         return path
     if options.ct:
-        tetwarp("deform", options.ct, "-f", "identity", "-o", path, "--quiet", *(["--series", options.series] if options.series else []))
+        tetwarp("deform", pathlib.Path(options.ct).resolve(), "-f", "identity", "-o", path, "--quiet", *(["--series", options.series] if options.series else []))
     else:
         spacing = ",".join(f"{mm / float(n):.6g}" for mm, n in zip((400, 400, 320), options.size.split(",")))
         tetwarp("phantom", "-o", path, "--size", options.size, "--spacing", spacing, "--quiet")
@@ -85,6 +85,14 @@ def dice(a, b):
             one, other = a == label, b == label
             scores[int(label)] = float(2 * (one & other).sum() / (one.sum() + other.sum()))
     return scores
+
+
+def along(path, output):
+    """An entry of `with`, IN=OUT, which leaves no room for another = in IN."""
+    path = str(pathlib.Path(path).resolve())
+    if "=" in path:
+        sys.exit(f"a path with = cannot go along, {path}; rename it")
+    return f"{path}={output}"
 
 
 def batch(options, rows):
