@@ -1,7 +1,6 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <csignal>
 #include <cstring>
 #include <filesystem>
 
@@ -9,21 +8,6 @@
 #include "apps/options.h"
 
 namespace tetwarp::apps {
-
-namespace {
-
-/// Undoes watch_interrupts() for the program that follows: a signal mask outlives exec, the thread that waits does not.
-/// @throws Cancelled if an interrupt has been taken already
-void release_interrupts() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGINT);
-  sigaddset(&signals, SIGTERM);
-  pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
-  if (interrupt_token().stop_requested()) throw Cancelled();
-}
-
-}  // namespace
 
 int run_bench(const std::vector<std::string>& arguments) {
   // The kernel has followed the symbolic links of this path.
@@ -37,6 +21,7 @@ int run_bench(const std::vector<std::string>& arguments) {
   for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
   argv.push_back(nullptr);
   release_interrupts();
+  if (interrupt_token().stop_requested()) throw Cancelled();
   execv(program.c_str(), argv.data());
   throw Error(program + " cannot be run: " + std::strerror(errno) + "; build or install it again");
 }

@@ -21,13 +21,32 @@ std::stop_source& interrupts() {
 
 constexpr int kBarWidth = 30;
 
+/// What people, terminals, shells and queues of clusters end a program with. Without a handler each of them would end
+/// it where it stands, and unfinished outputs would stay.
+constexpr int kInterrupts[] = {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGXCPU, SIGUSR1, SIGUSR2, SIGALRM};
+
+volatile std::sig_atomic_t reader_is_gone = 0;
+
+bool is_ignored(int signal) {
+  struct sigaction action {};
+  return sigaction(signal, nullptr, &action) == 0 && action.sa_handler == SIG_IGN;
+}
+
+/// A hangup under nohup, and what else the caller has had ignored, stays ignored. Ctrl-C and TERM always count, for
+/// they are ignored in every job that a shell has put into the background.
+sigset_t watched_signals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  for (const int signal : kInterrupts) {
+    if (signal == SIGINT || signal == SIGTERM || !is_ignored(signal)) sigaddset(&signals, signal);
+  }
+  return signals;
+}
+
 }  // namespace
 
 void watch_interrupts() {
-  static sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGINT);
-  sigaddset(&signals, SIGTERM);
+  static const sigset_t signals = watched_signals();
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);  // every later thread inherits the mask; one thread waits
   std::thread([] {
     int received = 0;
@@ -36,6 +55,21 @@ void watch_interrupts() {
     sigwait(&signals, &received);
     _exit(128 + received);
   }).detach();
+  struct sigaction broken_pipe {};  // a handler, for to ignore a signal would pass on to programs that are run
+  broken_pipe.sa_handler = [](int) { reader_is_gone = 1; };
+  broken_pipe.sa_flags = SA_RESTART;
+  if (!is_ignored(SIGPIPE)) sigaction(SIGPIPE, &broken_pipe, nullptr);
+}
+
+void release_interrupts() {
+  const sigset_t signals = watched_signals();
+  pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
+}
+
+void end_with_reader() {
+  if (!reader_is_gone) return;
+  std::signal(SIGPIPE, SIG_DFL);
+  std::raise(SIGPIPE);
 }
 
 std::stop_token interrupt_token() { return interrupts().get_token(); }

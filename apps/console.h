@@ -8,9 +8,14 @@
 
 namespace tetwarp::apps {
 
-/// Turns SIGINT and SIGTERM into a stop request, so that partial outputs are removed; a second one ends the process at
-/// once.
+/// Turns what ends a program from outside (Ctrl-C, TERM, a hangup, Ctrl-\, a limit of time, USR1 and the like) into a
+/// stop request, so that partial outputs are removed; a second one ends the process at once. A reader of standard
+/// output or standard error that goes away stops nothing.
 void watch_interrupts();
+/// Lets all of them through again, for a program that follows this one: a signal mask outlives exec.
+void release_interrupts();
+/// Ends the process by SIGPIPE, as other programs are, where the reader of what it printed has gone; else returns.
+void end_with_reader();
 std::stop_token interrupt_token();
 
 /// One line to standard error, unless quiet.

@@ -26,8 +26,10 @@ int main(int argc, char** argv) {
     std::signal(SIGXFSZ, SIG_IGN);  // a file that would be larger than allowed is an error like a full disk
     const int status = apps::run_command_line(argc, argv);
     std::cout.flush();
-    if (std::fflush(stdout) != 0 || std::ferror(stdout) || !std::cout)
+    if (std::fflush(stdout) != 0 || std::ferror(stdout) || !std::cout) {
+      apps::end_with_reader();
       throw Error("standard output cannot be written; is the disk full?");
+    }
     return status;
   } catch (const apps::UsageError& error) {
     return fail(kWrongCommandLine, error.what());

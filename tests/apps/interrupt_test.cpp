@@ -1,0 +1,79 @@
+// What ends a run from outside, and what does not: signals, and readers that go away.
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <thread>
+
+#include "tests/apps/batch_case.h"
+
+namespace {
+
+using namespace tetwarp::test;
+namespace fs = std::filesystem;
+
+class Interrupt : public BatchCase {
+ protected:
+  std::vector<std::string> hidden() const {
+    std::vector<std::string> names;
+    for (const auto& entry : fs::recursive_directory_iterator(scratch_.path())) {
+      const std::string name = entry.path().filename().string();
+      if (name.starts_with(".tetwarp")) names.push_back(name);
+    }
+    return names;
+  }
+};
+
+TEST_F(Interrupt, WhateverEndsARunFromOutsideLeavesNoPartOfIt) {
+  ASSERT_EQ(run("phantom --size 200,200,200 --spacing 2,2,2 --quiet -o large.nrrd").status, 0);
+  for (const int signal : {SIGHUP, SIGQUIT, SIGTERM, SIGINT, SIGXCPU, SIGUSR1, SIGUSR2, SIGALRM}) {
+    const pid_t child = fork();
+    if (child == 0) {
+      if (chdir(scratch_.path().c_str()) != 0) _exit(99);
+      for (const int one : {SIGHUP, SIGQUIT, SIGINT}) ::signal(one, SIG_DFL);
+      freopen("log", "w", stderr);
+      execl(TETWARP_PROGRAM, TETWARP_PROGRAM, "render", "large.nrrd", "-o", "turn.png", "--turntable", "400", "--quiet",
+            nullptr);
+      _exit(98);
+    }
+    const auto begun = std::chrono::steady_clock::now();
+    while (hidden().empty() && std::chrono::steady_clock::now() - begun < std::chrono::seconds(20))
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    EXPECT_FALSE(hidden().empty()) << "it was ended before it began";
+    kill(child, signal);
+    int status = 0;
+    waitpid(child, &status, 0);
+    EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 130) << strsignal(signal) << read_text(scratch_ / "log");
+    EXPECT_EQ(hidden(), std::vector<std::string>()) << strsignal(signal);
+    for (const auto& entry : fs::directory_iterator(scratch_.path()))
+      EXPECT_FALSE(entry.path().filename().string().starts_with("turn")) << entry.path();
+  }
+}
+
+TEST_F(Interrupt, AHangupThatNohupKeepsOffStopsNothing) {
+  const Outcome made = run_program(
+      scratch_.path(), "/bin/sh",
+      "-c 'nohup " TETWARP_PROGRAM
+      " render ct.nrrd -o turn.png --turntable 40 --size 64,64 --quiet & sleep 0.1; kill -HUP $!; wait $!'");
+  EXPECT_EQ(made.status, 0) << made.err;
+  EXPECT_TRUE(fs::exists(scratch_ / "turn.0040.png"));
+}
+
+TEST_F(Interrupt, AReaderThatGoesAwayEndsAListAsOfOtherProgramsAndNoWork) {
+  const Outcome listed = run_program(scratch_.path(), "/bin/bash",
+                                     "-c 'set -o pipefail; " TETWARP_PROGRAM
+                                     " info series --json | true; "
+                                     "echo ${PIPESTATUS[0]}'");
+  EXPECT_TRUE(listed.out == "141\n" || listed.out == "0\n") << listed.out;  // 0: all of it fitted into the pipe before
+  EXPECT_EQ(listed.err, "");
+  const Outcome worked = run_program(scratch_.path(), "/bin/bash",
+                                     "-c '" TETWARP_PROGRAM
+                                     " deform series -f identity -o out.nii --verbose "
+                                     "2> >(exec 0<&-) >&2; echo $?'");
+  EXPECT_EQ(worked.out, "0\n");
+  EXPECT_TRUE(fs::exists(scratch_ / "out.nii.json"));
+  EXPECT_EQ(hidden(), std::vector<std::string>());
+}
+
+}  // namespace
