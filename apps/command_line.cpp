@@ -8,10 +8,14 @@
 #include "apps/option_groups.h"
 #include "cuda/backend.h"
 #include "deform/version.h"
+#include "io/shown_text.h"
 
 namespace tetwarp::apps {
 
 namespace {
+
+/// A lattice with larger cells has one cell an axis, of whatever volume.
+constexpr std::int64_t kMostCellSize = 65536;
 
 /// The options of every subcommand; one of them was given.
 struct Commands {
@@ -39,7 +43,7 @@ void add_dicom_form(CLI::App& command, DicomForm& form) {
       "--keep-frame-of-reference", form.keep_frame_of_reference,
       "A DICOM series keeps INPUT's Frame of Reference UID although it is deformed: viewers overlay the two");
   command.add_option("--series-number", form.series_number, "Of a DICOM series (default: INPUT's + 1000)")
-      ->check(CLI::Range(0, 2147483647));
+      ->check(whole_number(0, 2147483647));
   command
       .add_option("--series-description", form.series_description,
                   "Of a DICOM series, at most 64 characters (default: \"deformed: \" and INPUT's)")
@@ -87,12 +91,16 @@ void add_phantom(CLI::App& app, PhantomOptions& options) {
   command->add_option("--size", options.size, "Voxels along i, j, k")
       ->expected(3)
       ->delimiter(',')
+      ->check(whole_number(2, 4096))
       ->capture_default_str();
   command->add_option("--spacing", options.spacing, "Millimetres along i, j, k")
       ->expected(3)
       ->delimiter(',')
+      ->check(positive_number())
       ->capture_default_str();
-  command->add_option("--seed", options.seed, "Noise and small variations of the anatomy")->capture_default_str();
+  command->add_option("--seed", options.seed, "Noise and small variations of the anatomy")
+      ->check(whole_number(0, INT64_MAX))
+      ->capture_default_str();
   add_common(*command, options.common, true);
   command->footer("Example: tetwarp phantom -o phantom_dicom --size 512,512,100 --spacing 0.8,0.8,3");
 }
@@ -116,6 +124,7 @@ void add_field(CLI::App& app, FieldOptions& options) {
   command
       ->add_option("--cell-size", options.cell_size,
                    "Vertices every B voxels, for formulas and transforms only (default 1)")
+      ->check(whole_number(1, kMostCellSize))
       ->type_name("B");
   add_series(*command, options.like);
   add_nifti_frame(*command, options.common, options.like);
@@ -144,6 +153,7 @@ void add_invert(CLI::App& app, InvertOptions& options) {
   command
       ->add_option("--cell-size", options.cell_size,
                    "Vertices every B voxels, for formulas and transforms only (default 1)")
+      ->check(whole_number(1, kMostCellSize))
       ->type_name("B");
   add_backend(*command, options.backend, options.device);
   command->add_option("--report", options.report, "Residuals both ways, with times, as JSON")->type_name("FILE.json");
@@ -193,12 +203,15 @@ void add_deform(CLI::App& app, DeformOptions& options) {
       ->transform(CLI::Transformer(interpolations).description(""))
       ->type_name("NAME");
   add_outside(*command, options.outside);
-  command->add_option(
-      "--background", options.background,
-      "Value where nothing maps (default: DICOM padding value or -1024 HU; else the smallest value present)");
+  command
+      ->add_option(
+          "--background", options.background,
+          "Value where nothing maps (default: DICOM padding value or -1024 HU; else the smallest value present)")
+      ->check(finite_number());
   command
       ->add_option("--cell-size", options.cell_size,
                    "Vertices every B voxels, for formulas and transforms only (default 1)")
+      ->check(whole_number(1, kMostCellSize))
       ->type_name("B");
   command
       ->add_option("--grid", options.grid,
@@ -220,13 +233,14 @@ void add_deform(CLI::App& app, DeformOptions& options) {
       ->allow_extra_args(false)
       ->type_name("IN=OUT[:nearest|linear|cubic|vote][:background=V][:own]");
   command
-      ->add_option("--memory", options.memory_bytes,
-                   "8G, 500M. On the CPU: refuse to start if more is needed. On a CUDA device: volumes and field there "
-                   "take no more, what does not fit is streamed in slabs; 10 % or 128 MB of working space come on top")
-      ->transform(CLI::AsSizeValue(true))
+      ->add_option(
+          "--memory", options.memory_bytes,
+          "8G, 2.5G, 500M. On the CPU: refuse to start if more is needed. On a CUDA device: volumes and field there "
+          "take no more, what does not fit is streamed in slabs; 10 % or 128 MB of working space come on top")
+      ->transform(size_in_bytes())
       ->type_name("SIZE");
   command->add_option("--compress", options.compression, "Level 0 to 9 for .nii.gz (default 1) .nrrd .mha (default 0)")
-      ->check(CLI::Range(0, 9));
+      ->check(whole_number(0, 9));
   add_dicom_form(*command, options.dicom);
   add_deidentify(*command, options);
   command->add_flag(
@@ -274,7 +288,7 @@ void add_simulate(CLI::App& app, SimulateOptions& options) {
   command
       ->add_option("--every", options.every,
                    "Write the field of every Nth frame too, with its number before the suffix of the output")
-      ->check(CLI::PositiveNumber)
+      ->check(whole_number(1, INT32_MAX))
       ->type_name("N");
   command->add_option("--report", options.report, "What happened, with times, as JSON")->type_name("FILE.json");
   add_series(*command, options.input);
@@ -310,11 +324,11 @@ void add_batch(CLI::App& app, BatchOptions& options) {
       ->excludes(shard);
   command
       ->add_option("--memory", options.memory_bytes,
-                   "8G, 500M: what all cases in work may hold (default: four fifths of what is available)")
-      ->transform(CLI::AsSizeValue(true))
+                   "8G, 2.5G, 500M: what all cases in work may hold (default: four fifths of what is available)")
+      ->transform(size_in_bytes())
       ->type_name("SIZE");
   command->add_option("--jobs", options.jobs, "Cases in work at once; 0: eight for each CUDA device, or three")
-      ->check(CLI::NonNegativeNumber)
+      ->check(whole_number(0, 65536))
       ->capture_default_str();
   command
       ->add_option("--backend", options.backend,
@@ -347,6 +361,13 @@ int run(int (*command)(const Options&), const Options& options) {
   return command(options);
 }
 
+/// Words before the command, or in its place, that are none. CLI11 looks at --help, and at whether there is a command,
+/// before it looks at them. @throws UsageError for the first
+void refuse_unknown_words(const CLI::App& app) {
+  const std::vector<std::string> unknown = app.remaining();
+  if (!unknown.empty()) throw UsageError("no command or option \"" + shown(unknown.front()) + "\"; see tetwarp --help");
+}
+
 /// CLI11's words for a command line that is wrong.
 void parse(CLI::App& app, const std::vector<std::string>& arguments) {
   std::vector<const char*> texts;
@@ -354,8 +375,10 @@ void parse(CLI::App& app, const std::vector<std::string>& arguments) {
   try {
     app.parse(static_cast<int>(texts.size()), texts.data());
   } catch (const CLI::Success&) {
+    refuse_unknown_words(app);
     throw;
   } catch (const CLI::Error& error) {
+    refuse_unknown_words(app);
     throw UsageError(std::string(error.what()) + "; see tetwarp --help");
   }
 }

@@ -11,6 +11,19 @@ namespace tetwarp::apps {
 extern const char* const kInputHelp;
 extern const char* const kFieldHelp;
 
+// Checks of numbers; a value that is none, not finite, or outside its range is refused, and the refusal names both.
+
+/// A whole number from `least` to `most`.
+CLI::Validator whole_number(std::int64_t least, std::int64_t most);
+/// A finite number from `least` to `most`.
+CLI::Validator real_number(double least, double most);
+/// A finite number, of any size that a float has.
+CLI::Validator finite_number();
+/// A finite number greater than 0.
+CLI::Validator positive_number();
+/// Turns a size in memory, such as 8G, 2.5G, 500M or 512MiB, into bytes.
+CLI::Validator size_in_bytes();
+
 /// --threads, --quiet, --verbose, and --overwrite of a command that writes.
 void add_common(CLI::App& command, CommonOptions& common, bool writes);
 /// --series, --single, --uneven.

@@ -20,22 +20,24 @@ void add_looks(CLI::App& command, RenderOptions& options) {
   command
       .add_option("--angle", options.angle,
                   "Degrees around the patient's long axis: 0 from the front, 90 from the patient's left")
+      ->check(finite_number())
       ->capture_default_str();
   command.add_option("--elevation", options.elevation, "Degrees: 90 from above the head, -90 from below the feet")
+      ->check(finite_number())
       ->capture_default_str();
   command.add_option("--zoom", options.zoom, "1: the whole volume is in the picture")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
   command.add_option("--size", options.size, "Pixels of the picture, W,H; of slices: at most")
       ->expected(2)
       ->delimiter(',')
-      ->check(CLI::Range(16, kMostPixels))
+      ->check(whole_number(16, kMostPixels))
       ->capture_default_str();
   command
       .add_option("--step", options.step,
                   "Between samples of a ray, 0.01 to 1, in the smallest spacing (default: half a pixel, but 0.5 to 1; "
                   "1 for xray)")
-      ->check(CLI::Range(0.01, 1.0))
+      ->check(real_number(0.01, 1))
       ->type_name("VOXELS");
   command.add_option("--background", options.background, "Colour behind the volume")
       ->type_name("#RRGGBB")
@@ -44,15 +46,17 @@ void add_looks(CLI::App& command, RenderOptions& options) {
       .add_option(
           "--window", options.window,
           "Of slices and mip: width of the values from black to white (default: 1500 for a CT, else 1 % to 99 %)")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->type_name("WIDTH");
-  command.add_option("--level", options.level, "Of slices and mip: value of middle grey (default: -200 for a CT)");
+  command.add_option("--level", options.level, "Of slices and mip: value of middle grey (default: -200 for a CT)")
+      ->check(finite_number());
   command
       .add_option("--position", options.position,
                   "LPS mm of a point that the slices go through, or that is in the middle of the picture (default: the "
                   "volume's middle)")
       ->expected(3)
       ->delimiter('/')
+      ->check(finite_number())
       ->type_name("X/Y/Z");
   command
       .add_option("--overlay", options.overlays,
@@ -83,9 +87,11 @@ void add_deformation(CLI::App& command, RenderOptions& options) {
   command
       .add_option("--cell-size", options.cell_size,
                   "Vertices every B voxels, for formulas and transforms only (default 1)")
+      ->check(whole_number(1, 65536))
       ->type_name("B");
   add_outside(command, options.outside);
-  command.add_option("--fill", options.fill, "Value where nothing maps (default: as --background of `deform`)");
+  command.add_option("--fill", options.fill, "Value where nothing maps (default: as --background of `deform`)")
+      ->check(finite_number());
 }
 
 }  // namespace
@@ -100,13 +106,13 @@ void add_render(CLI::App& app, RenderOptions& options) {
   add_looks(*command, options);
   add_deformation(*command, options);
   command->add_option("--turntable", options.turntable, "Once around the patient in N pictures")
-      ->check(CLI::Range(2, kMostPictures))
+      ->check(whole_number(2, kMostPictures))
       ->type_name("N");
   command->add_option("--frames", options.frames, "N pictures in which the field grows from nothing to its whole")
-      ->check(CLI::Range(2, kMostPictures))
+      ->check(whole_number(2, kMostPictures))
       ->type_name("N");
   command->add_option("--rate", options.rate, "Pictures a second of a film")
-      ->check(CLI::Range(0.1, 120.0))
+      ->check(real_number(0.1, 120))
       ->capture_default_str();
   add_series(*command, options.input);
   add_nifti_frame(*command, options.common, options.input);

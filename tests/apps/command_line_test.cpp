@@ -1,0 +1,68 @@
+// Words of the command line: numbers that are none, commands that there are not, sizes of memory.
+#include "tests/apps/batch_case.h"
+
+namespace {
+
+using namespace tetwarp::test;
+
+class CommandLine : public BatchCase {
+ protected:
+  void expect_wrong(const std::string& arguments, const std::vector<std::string>& words) const {
+    const Outcome made = run(arguments);
+    EXPECT_EQ(made.status, 2) << arguments << "\n" << made.err;
+    EXPECT_TRUE(says(made.err, words)) << arguments;
+    EXPECT_LT(made.err.size(), 250u) << made.err;
+    EXPECT_EQ(std::count(made.err.begin(), made.err.end(), '\n'), 1) << made.err;
+    EXPECT_EQ(made.out, "") << arguments;
+  }
+};
+
+TEST_F(CommandLine, AWordThatIsNoCommandIsRefusedBesideHelpToo) {
+  for (const char* words : {"NOSUCH", "NOSUCH --help", "--help NOSUCH", "NOSUCH --version", "NOSUCH deform --help"})
+    expect_wrong(words, {"NOSUCH", "tetwarp --help"});
+  for (const char* words : {"--help", "deform --help", "--version"}) EXPECT_EQ(run(words).status, 0) << words;
+}
+
+TEST_F(CommandLine, EveryNumberThatIsNoneIsRefusedInAShortLine) {
+  const std::string deform = "deform ct.nrrd -f identity -o o.nii ", render = "render ct.nrrd -o o.png ",
+                    simulate = "simulate s.json ct.nrrd -o o.mha ", batch = "batch m.csv -o out ",
+                    phantom = "phantom -o o.nii ";
+  const std::string options[] = {
+      deform + "--threads",   deform + "--device",    deform + "--cell-size",     deform + "--background",
+      deform + "--compress",  deform + "--memory",    deform + "--series-number", render + "--angle",
+      render + "--elevation", render + "--zoom",      render + "--step",          render + "--window",
+      render + "--level",     render + "--fill",      render + "--turntable",     render + "--frames",
+      render + "--rate",      render + "--cell-size", simulate + "--every",       batch + "--jobs",
+      batch + "--memory",     batch + "--threads",    phantom + "--seed"};
+  for (const std::string& option : options) {
+    const std::string name = option.substr(option.rfind("--"));
+    for (const char* value : {"nan", "inf", "-inf", "''", "1e999", "four", "0x", "' '", "1,5"})
+      expect_wrong(option + "=" + value, {name});
+  }
+  for (const std::string& option : options) {
+    const std::string name = option.substr(option.rfind("--"));
+    if (name == "--background" || name == "--fill" || name == "--level" || name == "--angle" || name == "--elevation")
+      continue;
+    expect_wrong(option + "=-1", {name});
+    if (name != "--zoom" && name != "--window" && name != "--seed" && name != "--memory")
+      expect_wrong(option + "=99999999999999999999", {name});
+  }
+  for (const char* values : {"--size 1,2,3", "--size nan,4,4", "--size 4,4,99999", "--size 4,4,-4", "--spacing 1,1,nan",
+                             "--spacing 0,1,1", "--spacing 1,1,inf", "--spacing 1,1,1e999"})
+    expect_wrong(phantom + values, {std::string(values).substr(0, 6)});
+  for (const char* values : {"--size 15,99", "--size nan,99", "--position nan/0/0", "--position 0/inf/0"})
+    expect_wrong(render + values, {std::string(values).substr(0, 6)});
+}
+
+TEST_F(CommandLine, ASizeMayHaveAFraction) {
+  for (const char* size : {"2.5G", "2G", "0.5GB", "900M", "900MiB", "2.5 GiB", "1t", "2500000000"})
+    EXPECT_EQ(run("deform ct.nrrd -f identity -o o.nii --dry-run --memory '" + std::string(size) + "'").status, 0)
+        << size;
+  for (const char* size : {"0", "-1G", "G", "2.5.1G", "2,5G", "1X", "1GG", "1Gib8", "0.0001K", "1e9G", "99999999T"})
+    expect_wrong("deform ct.nrrd -f identity -o o.nii --dry-run --memory '" + std::string(size) + "'", {"--memory"});
+  const Outcome little = run("deform ct.nrrd -f identity -o o.nii --memory 0.1G");
+  EXPECT_EQ(little.status, 1);
+  EXPECT_TRUE(says(little.err, {"--memory allows 100 MB"}));
+}
+
+}  // namespace
