@@ -14,6 +14,12 @@ bool CsvRecords::next() {
   line = lines_done_ + 1;
   begin = next_;
   fields.clear();
+  if (comments_ && text_[begin] == '#') {
+    end = std::min(text_.find('\n', begin), text_.size());
+    next_ = std::min(end + 1, text_.size());
+    fields.push_back({begin, end});
+    return true;
+  }
   do {
     take_field();
   } while (next_ < text_.size() && text_[next_++] == ',');
@@ -62,7 +68,9 @@ std::string unquoted(std::string_view field) {
 }
 
 std::string quoted(const std::string& value) {
-  if (value.find_first_of(",\"\r\n") == std::string::npos) return value;
+  const auto is_blank = [](char c) { return c == ' ' || c == '\t'; };
+  const bool blanks = !value.empty() && (is_blank(value.front()) || is_blank(value.back()));
+  if (!blanks && value.find_first_of(",\"\r\n") == std::string::npos) return value;
   std::string text = "\"";
   for (const char c : value) {
     if (c == '"') text += '"';

@@ -12,8 +12,9 @@ namespace tetwarp {
 /// Records of a text, one after the other. A quoted field may hold commas, line ends and doubled quotes.
 class CsvRecords {
  public:
-  CsvRecords(std::string_view text, std::size_t from, const std::string& name)
-      : text_(text), name_(name), next_(from) {}
+  /// @param comments  a line that begins with # is a record of one field, whatever commas and quotes it has
+  CsvRecords(std::string_view text, std::size_t from, const std::string& name, bool comments = false)
+      : text_(text), name_(name), next_(from), comments_(comments) {}
 
   /// @return false at the end of the text
   /// @throws InputError for a quote that does not end, or with something else behind it
@@ -34,6 +35,7 @@ class CsvRecords {
   std::string_view text_;
   const std::string& name_;
   std::size_t next_;
+  bool comments_;
   std::size_t lines_done_ = 0;
 };
 

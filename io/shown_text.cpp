@@ -62,6 +62,24 @@ std::string shown(const std::filesystem::path& path) { return escaped(path.nativ
 std::string shown(const std::filesystem::path& file, std::optional<int> frame) {
   return shown(file) + (frame ? ", frame " + std::to_string(*frame + 1) : std::string());
 }
+std::string shell_quoted(const std::string& text) {
+  if (escaped(text, false) != text) {
+    constexpr char kDigits[] = "0123456789abcdef";
+    std::string word = "$'";
+    for (const char c : text) {
+      const auto byte = static_cast<unsigned char>(c);
+      if (byte < 0x20 || byte >= 0x7f)
+        word += {'\\', 'x', kDigits[byte >> 4], kDigits[byte & 15]};
+      else
+        word += c == '\'' || c == '\\' ? std::string{'\\', c} : std::string(1, c);
+    }
+    return word + "'";
+  }
+  std::string word = "'";
+  for (const char c : text) word += c == '\'' ? "'\\''" : std::string(1, c);
+  return word + "'";
+}
+
 std::string shown_lines(std::string_view text) { return escaped(text, true); }
 
 }  // namespace tetwarp

@@ -19,4 +19,8 @@ inline std::string shown(const std::string& text) { return shown(std::string_vie
 /// The same of text of several lines: line feeds stay.
 std::string shown_lines(std::string_view text);
 
+/// The text as one word of a command line, to be pasted into a shell: in single quotes, or where it holds what messages
+/// would not show as it is (see `shown`), in those of bash, ksh and zsh, $'a\nb'. Always one line.
+std::string shell_quoted(const std::string& text);
+
 }  // namespace tetwarp

@@ -12,6 +12,7 @@
 #include "apps/output.h"
 #include "cuda/devices.h"
 #include "io/parallel.h"
+#include "io/shown_text.h"
 
 namespace tetwarp::apps {
 
@@ -139,7 +140,7 @@ int Batch::run() {
   if (options_.dry_run) {
     for (const BatchCase* one : mine_) {
       std::cout << one->id << ": tetwarp";
-      for (const std::string& argument : command_of(*one)) std::cout << " '" << argument << "'";
+      for (const std::string& argument : command_of(*one)) std::cout << " " << shell_quoted(argument);
       std::cout << "\n";
     }
   }

@@ -47,7 +47,7 @@ std::vector<ManifestRow> csv_rows(const std::string& text, const std::string& na
                                   ManifestErrors& errors) {
   std::vector<ManifestRow> rows;
   std::vector<std::string> keys;
-  CsvRecords records(text, 0, name);
+  CsvRecords records(text, 0, name, true);
   const auto next = [&] {
     try {
       return records.next();

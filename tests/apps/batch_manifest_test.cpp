@@ -276,4 +276,41 @@ TEST_F(BatchManifest, InitNamesEveryVolumeAndWhatItWritesIsTaken) {
   EXPECT_EQ(run("batch --init study -o n.txt").status, 2);
 }
 
+TEST_F(BatchManifest, WhatInitWritesIsReadBackWhateverTheFoldersAreCalled) {
+  const std::vector<std::string> names = {"blank ", " blank",  "tab\t",      "comma, and \"quotes\"", "-dash",
+                                          "#hash",  "semi;co", "two\nlines", "$(touch hurt) `x` 'y'", "caf\xe9"};
+  for (std::size_t n = 0; n < names.size(); ++n) {
+    const std::string seed = " --seed " + std::to_string(n + 1);
+    ASSERT_EQ(run("phantom --size 8,8,4 --spacing 40,40,50 --quiet -o s" + seed).status, 0);
+    std::filesystem::create_directories(scratch_ / "all");
+    std::filesystem::rename(scratch_ / "s", scratch_ / "all" / names[n]);
+  }
+  ASSERT_EQ(run("batch --init all -o m.csv --quiet").status, 0);
+  const Outcome made = run("batch m.csv -o out --quiet");
+  EXPECT_EQ(made.status, 0) << made.err;
+  EXPECT_EQ(lines_of("out/results.jsonl").size(), names.size());
+  const Outcome listed = run("batch m.csv -o again --dry-run");
+  std::istringstream text(listed.out);
+  std::size_t lines = 0;
+  for (std::string line; std::getline(text, line); ++lines) {
+    const std::string id = line.substr(0, line.find(": "));
+    write_file(scratch_ / "pasted.sh", "mkdir -p again/" + id + "; tetwarp() { " TETWARP_PROGRAM " \"$@\"; }\n" +
+                                           line.substr(id.size() + 2) + " --quiet\n");
+    const Outcome pasted = run_program(scratch_.path(), "/bin/bash", "pasted.sh");
+    EXPECT_EQ(pasted.status, 0) << line << pasted.err;
+    EXPECT_EQ(read_text(scratch_ / "again" / id / "deformed.nii.gz"),
+              read_text(scratch_ / "out" / id / "deformed.nii.gz"));
+  }
+  EXPECT_EQ(lines, names.size()) << "a line a case, whatever is in it";
+  EXPECT_FALSE(std::filesystem::exists(scratch_ / "hurt"));
+}
+
+TEST_F(BatchManifest, ACommentMayHaveCommasAndQuotes) {
+  write_file(scratch_ / "m.csv",
+             "# \"a, b\" c\ncase,input,field\n# x, \"y\" z, \"\na,ct.nrrd,identity\n#,\"\nb,ct.nrrd,bogus:\n");
+  const Outcome made = run("batch m.csv -o out --quiet");
+  EXPECT_EQ(made.status, 4);
+  EXPECT_TRUE(says(made.err, {"m.csv:6: "})) << "lines are counted through comments";
+}
+
 }  // namespace
