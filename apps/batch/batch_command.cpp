@@ -154,11 +154,14 @@ int Batch::run() {
                              format_bytes(found_.plain_bytes + found_.packed_bytes) + " before compression");
     return 0;
   }
+  std::error_code unknown;
+  const bool made_before = options_.resume && fs::exists(options_.output, unknown);
+  if (!made_before) check_space(found_, options_.output);  // before a folder is begun that another run would refuse
+  if (options_.backend == "cuda" && cuda == 0) make_backend("cuda", Direction::forward, Geometry(), 0, {});
   OutputFolder folder(options_.output, shard_, ids_of(cases_), hash_file(options_.manifest), options_.resume);
   Results results(folder, ids());
   find_finished(folder, results);
   const std::string scarce = check_space(found_, folder.path());
-  if (options_.backend == "cuda" && cuda == 0) make_backend("cuda", Direction::forward, Geometry(), 0, {});
   MemoryBudget memory(memory_bytes());
   const std::size_t jobs = std::clamp<std::size_t>(open_.size(), 1, threads.jobs());
   progress.begin(open_.size(), mine_.size() - open_.size());

@@ -119,9 +119,10 @@ void OutputFolder::remove_unfinished(const std::vector<std::string>& ids) const 
   }
 }
 
-std::uint64_t free_bytes(const fs::path& folder) {
+std::uint64_t free_bytes(fs::path folder) {
   std::error_code error;
-  const fs::space_info space = fs::space(folder, error);
+  while (!folder.empty() && !fs::exists(folder, error) && folder.has_relative_path()) folder = folder.parent_path();
+  const fs::space_info space = fs::space(folder.empty() ? fs::path(".") : folder, error);
   return error ? UINT64_MAX : space.available;
 }
 

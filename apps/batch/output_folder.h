@@ -62,7 +62,7 @@ class OutputFolder {
 std::optional<Shard> shard_of(const std::filesystem::path& file, const std::string& name, const std::string& suffix);
 
 /// Bytes that an ordinary user can still write on the file system of a folder.
-std::uint64_t free_bytes(const std::filesystem::path& folder);
+std::uint64_t free_bytes(std::filesystem::path folder);
 
 /// A text under a name, whole or not at all: through StagedOutput. @throws Error
 void write_whole(const std::filesystem::path& path, const std::string& text);

@@ -313,4 +313,20 @@ TEST_F(BatchManifest, ACommentMayHaveCommasAndQuotes) {
   EXPECT_TRUE(says(made.err, {"m.csv:6: "})) << "lines are counted through comments";
 }
 
+TEST_F(BatchManifest, ABatchThatTheDiskCannotHoldLeavesNoFolder) {
+  write_file(
+      scratch_ / "huge.mha",
+      "ObjectType = Image\nNDims = 3\nDimSize = 4000 4000 4000\nElementType = MET_FLOAT\nElementSpacing = 1 1 1\n"
+      "Offset = 0 0 0\nTransformMatrix = 1 0 0 0 1 0 0 0 1\nElementDataFile = LOCAL\n");
+  std::filesystem::resize_file(scratch_ / "huge.mha", std::filesystem::file_size(scratch_ / "huge.mha") +
+                                                          std::uintmax_t{4} * 4000 * 4000 * 4000);
+  const std::string row =
+      R"({"case": "v", "input": "huge.mha", "field": "identity", "cell-size": 64, "output": "o.nii", "variants": 400})";
+  const Outcome refused = batch(row);
+  EXPECT_EQ(refused.status, 1) << refused.err;
+  EXPECT_TRUE(says(refused.err, {"the outputs take at least", "are free"}));
+  EXPECT_FALSE(std::filesystem::exists(scratch_ / "out"));
+  EXPECT_EQ(batch(R"({"case": "v", "input": "ct.nrrd", "field": "identity"})").status, 0) << "the folder is free";
+}
+
 }  // namespace
