@@ -119,9 +119,7 @@ void OutputSet::write(const std::function<void()>& write) {
   }
 }
 
-void OutputSet::commit() {
-  for (const auto& output : staged_) output->commit();
-}
+void OutputSet::commit() { commit_together(staged_); }
 
 fs::path sidecar_of(const fs::path& output) { return plain(output).string() + ".json"; }
 

@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <exception>
+#include <set>
 #include <system_error>
 #include <thread>
 #include <vector>
@@ -32,6 +33,24 @@ fs::path named(const fs::path& target) {
   while (path.has_relative_path() && (!path.has_filename() || path.filename() == ".")) path = path.parent_path();
   if (!path.has_filename() || path.filename() == "." || path.filename() == "..") {
     throw Error("'" + target.string() + "' names no file or folder to create; give the output a name");
+  }
+  return path;
+}
+
+fs::path folder_of(const fs::path& path);
+
+/// The path itself, or what a link of this name leads to, over any number of links. Nothing need be there yet: the
+/// links stay, and what they name is written.
+fs::path followed(const fs::path& target) {
+  constexpr int kMostLinks = 40;  // as Linux has it
+  fs::path path = target;
+  std::error_code error;
+  for (int links = 0; fs::is_symlink(fs::symlink_status(path, error)); ++links) {
+    const fs::path next = fs::read_symlink(path, error);
+    if (!error && links == kMostLinks) error = std::make_error_code(std::errc::too_many_symbolic_link_levels);
+    if (error)
+      throw Error("cannot follow the link " + target.string() + ": " + reason(error) + "; choose another name");
+    path = folder_of(path) / next;  // the same as `next` where that is absolute
   }
   return path;
 }
@@ -182,17 +201,17 @@ int replace_folder(const fs::path& staged, const fs::path& target) {
 
 StagedOutput::StagedOutput(fs::path target, Kind kind, bool overwrite, bool (*is_ours)(const fs::path&))
     : target_(named(target)), kind_(kind), overwrite_(overwrite), is_ours_(is_ours) {
+  if (const fs::path named_by_link = followed(target_); named_by_link != target_) target_ = named(named_by_link);
   std::error_code error;
-  if (fs::is_symlink(target_, error)) {
-    target_ = fs::weakly_canonical(target_, error);  // the link stays: what it names is written
-    if (error) throw Error("cannot follow the link " + target.string() + ": " + reason(error));
-  }
   const fs::path parent = folder_of(target_);
-  if (!fs::exists(parent, error)) {
+  const fs::file_status of_parent = fs::status(parent, error);
+  if (of_parent.type() == fs::file_type::none)
+    throw Error("cannot look at the folder " + parent.string() + ": " + reason(error) + "; choose another place");
+  if (!fs::exists(of_parent)) {
     throw Error("folder " + parent.string() + " does not exist, so " + target_.filename().string() +
                 " cannot be written into it; create it first");
   }
-  if (!fs::is_directory(parent, error)) {
+  if (!fs::is_directory(of_parent)) {
     throw Error(parent.string() + " is not a folder, so " + target_.filename().string() +
                 " cannot be written into it; choose another name");
   }
@@ -214,7 +233,14 @@ bool StagedOutput::check_target() const {
 }
 
 void StagedOutput::commit() {
-  flush_all(staged_, kind_, target_);
+  flush_content();
+  give_name();
+  flush(folder_of(target_), target_);
+}
+
+void StagedOutput::flush_content() const { flush_all(staged_, kind_, target_); }
+
+void StagedOutput::give_name() {
   const bool replaces = check_target();  // again: hours may have passed
   int error = 0;
   if (!replaces)
@@ -226,7 +252,28 @@ void StagedOutput::commit() {
   if (error != 0)
     throw Error("cannot give " + target_.string() + " its name: " + reason(error) + "; nothing was replaced");
   done_ = true;
-  flush(folder_of(target_), target_);
+  replaced_ = replaces;
+}
+
+void StagedOutput::take_name_back() {
+  if (!done_ || replaced_) return;
+  std::error_code ignored;
+  fs::remove_all(target_, ignored);
+}
+
+void commit_together(std::span<const std::unique_ptr<StagedOutput>> outputs) {
+  for (const auto& output : outputs) output->flush_content();
+  std::size_t count = 0;
+  try {
+    for (; count < outputs.size(); ++count) outputs[count]->give_name();
+  } catch (...) {
+    for (const auto& output : outputs.first(count)) output->take_name_back();
+    throw;
+  }
+  std::set<fs::path> folders;
+  for (const auto& output : outputs) {
+    if (folders.insert(folder_of(output->target())).second) flush(folder_of(output->target()), output->target());
+  }
 }
 
 }  // namespace tetwarp

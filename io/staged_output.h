@@ -1,6 +1,8 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
+#include <span>
 
 namespace tetwarp {
 
@@ -30,13 +32,27 @@ class StagedOutput {
   /// @throws Error naming the path and the system's reason (disk full and so on); nothing is lost then
   void commit();
 
+  // What `commit` does, in steps, so that of several outputs all can be written before the first gets its name.
+
+  /// Flushes what was written to disk. @throws Error
+  void flush_content() const;
+  /// Gives it its name; the folder's entry is not flushed yet. @throws Error
+  void give_name();
+  /// Removes what `give_name` gave a name that was free before; what it replaced something by stays.
+  void take_name_back();
+
  private:
   bool check_target() const;  ///< whether something will be replaced; throws where that is not allowed
 
   std::filesystem::path target_, staged_;
   Kind kind_;
-  bool overwrite_, done_ = false;
+  bool overwrite_, done_ = false, replaced_ = false;
   bool (*is_ours_)(const std::filesystem::path&);
 };
+
+/// Gives several outputs their names, one right after the other once all of them are on the disk, so that a process
+/// that is killed leaves all or none of them but for the instant of the renames. @throws Error, and no output has its
+/// name that had been free
+void commit_together(std::span<const std::unique_ptr<StagedOutput>> outputs);
 
 }  // namespace tetwarp

@@ -4,7 +4,9 @@
 #include <unistd.h>
 
 #include <fstream>
+#include <memory>
 #include <sstream>
+#include <vector>
 
 #include "deform/errors.h"
 #include "tests/support/scratch.h"
@@ -288,6 +290,39 @@ TEST(StagedFolder, OneFileOfManyThatCannotBeFlushedStopsAll) {
     output.commit();
   }
   EXPECT_EQ(entries(scratch / "series"), 61U);
+}
+
+TEST(StagedOutputs, OfSeveralAllGetTheirNamesOrNoneThatWasFree) {
+  const Scratch scratch;
+  write_file(scratch / "old", "old");
+  std::vector<std::unique_ptr<StagedOutput>> outputs;
+  for (const char* name : {"old", "a", "b", "c"}) {
+    outputs.push_back(std::make_unique<StagedOutput>(scratch / name, Kind::file, std::string(name) == "old"));
+    write_file(outputs.back()->path(), "new");
+  }
+  write_file(scratch / "c", "somebody else's");
+  EXPECT_NE(error_of([&] { tetwarp::commit_together(outputs); }).find("c exists"), std::string::npos);
+  EXPECT_FALSE(fs::exists(scratch / "a"));
+  EXPECT_FALSE(fs::exists(scratch / "b"));
+  EXPECT_EQ(content(scratch / "c"), "somebody else's");
+  outputs.clear();
+  EXPECT_EQ(entries(scratch.path()), 2U) << "no hidden file";
+}
+
+TEST(StagedOutput, FollowsLinksThatLeadNowhereYetAndNoCircle) {
+  const Scratch scratch;
+  fs::create_directory(scratch / "deep");
+  fs::create_symlink("deep/second", scratch / "first");
+  fs::create_symlink(scratch / "deep/third", scratch / "deep/second");
+  {
+    StagedOutput output(scratch / "first", Kind::file, false);
+    write_file(output.path(), "new");
+    output.commit();
+  }
+  EXPECT_EQ(content(scratch / "deep/third"), "new");
+  EXPECT_TRUE(fs::is_symlink(scratch / "first") && fs::is_symlink(scratch / "deep/second"));
+  fs::create_symlink("circle", scratch / "circle");
+  EXPECT_NE(refusal(scratch / "circle", Kind::file, true).find("Too many levels"), std::string::npos);
 }
 
 }  // namespace
