@@ -9,6 +9,7 @@
 #include "deform/fields/lattice_mesh.h"
 #include "io/field_file.h"
 #include "io/hash.h"
+#include "io/opened_file.h"
 #include "io/transform_file.h"
 
 namespace tetwarp::apps {
@@ -114,22 +115,31 @@ NamedMap map_of(const std::string& text, const Geometry& volume) {
   return {transform.displacement, std::move(transform)};
 }
 
+FieldSource parsed_source(const std::string& text) {
+  try {
+    return parse_field_source(text);
+  } catch (const InputError& error) {
+    throw UsageError(error.what());
+  }
+}
+
 }  // namespace
 
 FieldSource field_source(const std::string& text, const std::optional<Geometry>& volume, NiftiFrame frame) {
+  FieldSource source = parsed_source(text);
+  source.nifti_frame = frame;
+  const bool mesh = is_mesh_file(source.path);  // a file that cannot be read is no mistake of the command line
   try {
-    FieldSource source = parse_field_source(text);
-    source.nifti_frame = frame;
-    if (is_mesh_file(source.path)) {
+    if (mesh) {
       check_mesh_options(source);
     } else {
       check_field_options(source);
     }
-    source.grid = volume;
-    return source;
   } catch (const InputError& error) {
     throw UsageError(error.what());
   }
+  source.grid = volume;
+  return source;
 }
 
 void check_fields(const std::vector<std::string>& fields, std::optional<std::int64_t> cell_size) {
@@ -139,7 +149,7 @@ void check_fields(const std::vector<std::string>& fields, std::optional<std::int
   for (const std::string& text : fields) {
     if (is_formula(text)) {
       formula_map(text, any);  // a misspelled one is known before anything is read
-    } else if (!std::filesystem::exists(field_source(text).path)) {
+    } else if (found_at(field_source(text).path) == Found::nothing) {
       throw UsageError("\"" + text + "\" is neither a formula nor a file that exists; see tetwarp deform --help");
     }
   }

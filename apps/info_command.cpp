@@ -10,6 +10,7 @@
 #include "io/field_file.h"
 #include "io/image_file.h"
 #include "io/mesh_file.h"
+#include "io/opened_file.h"
 #include "io/transform_file.h"
 
 namespace tetwarp::apps {
@@ -176,7 +177,7 @@ int run_info(const InfoOptions& options) {
   const FieldSource source = field_source(options.input.path.string(), {}, options.common.nifti_frame);
   const bool field = is_field_file(source), mesh = !field && is_mesh_file(source.path);
   const std::filesystem::path& path = field ? source.path : options.input.path;
-  const bool transform = !field && !mesh && is_transform_file(path) && !std::filesystem::is_directory(path);
+  const bool transform = !field && !mesh && is_transform_file(path) && !is_folder(path);
   const bool other = field || mesh || transform || has_image_suffix(path), dose = !other && is_dicom_dose(path),
              dicom = !other && !dose;
   const auto print_json = [](const json& document) {

@@ -118,11 +118,7 @@ std::string describe(const DicomSeries& series, std::size_t number) {
          number_text(spacing.y) + " x " + number_text(spacing.z) + " mm";
 }
 
-void refuse_pipes(const std::filesystem::path& path) {
-  std::error_code ignored;  // a name that no file can have, or a formula
-  const std::filesystem::file_status status = std::filesystem::status(path, ignored);
-  require(!std::filesystem::is_other(status), "neither a file nor a folder, " + shown(path) + "; name one of them");
-}
+void refuse_pipes(const std::filesystem::path& path) { found_at(path); }
 
 InputHeader open_input(const InputOptions& options, const Control& control, bool components) {
   refuse_pipes(options.path);
@@ -136,7 +132,7 @@ InputHeader open_input(const InputOptions& options, const Control& control, bool
     return {header.geometry, header.type, {}, false, header.components, named(header.notes, options.path)};
   }
   if (is_dicom_dose(options.path)) return {read_dose_header(options.path).geometry, VoxelType::f32, {}, true, 1};
-  if (options.single && std::filesystem::is_directory(options.path)) {
+  if (options.single && is_folder(options.path)) {
     throw UsageError("--single is for one DICOM file, " + options.path.string() + " is a folder; name a file in it");
   }
   const DicomScan scan = scan_dicom(options.path, options.single, control);

@@ -1,11 +1,13 @@
 #include <csignal>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <iostream>
 #include <new>
 
 #include "apps/console.h"
 #include "apps/options.h"
+#include "io/opened_file.h"
 #include "io/shown_text.h"
 
 namespace {
@@ -37,6 +39,8 @@ int main(int argc, char** argv) {
     return fail(kInputRefused, error.what());
   } catch (const Cancelled&) {
     return fail(kInterrupted, "interrupted; nothing was written");
+  } catch (const std::filesystem::filesystem_error& error) {
+    return fail(kInputRefused, message_of(error).c_str());
   } catch (const std::bad_alloc&) {
     return fail(kFailed, "not enough memory; try a larger --cell-size, or see --dry-run for what is needed");
   } catch (const std::exception& error) {

@@ -6,6 +6,7 @@
 #include <iterator>
 
 #include "deform/errors.h"
+#include "io/opened_file.h"
 #include "io/shown_text.h"
 
 namespace tetwarp {
@@ -54,7 +55,9 @@ std::set<ConfidentialityOption> confidentiality_options(std::string_view text) {
 
 std::vector<std::byte> read_deidentification_key(const std::filesystem::path& path) {
   constexpr std::size_t kShortest = 16, kLongest = 4096;
-  std::ifstream file(path, std::ios::binary);
+  require(is_file(path), "no file with a key of de-identification, " + shown(path.string()) +
+                             "; make one with `openssl rand -hex 32`");
+  std::ifstream file = opened(path);
   std::string text(kLongest + 2, '\0');
   file.read(text.data(), static_cast<std::streamsize>(text.size()));
   require(file.eof() && !file.bad(), "the key of de-identification cannot be read, or has more than " +

@@ -70,7 +70,9 @@ DirectoryFiles read_directory(const fs::path& dicomdir) {
   DcmSequenceOfItems* records = nullptr;
   if (format.getDataset()->findAndGetSequence(DCM_DirectoryRecordSequence, records).bad()) return found;
   const fs::path folder = dicomdir.has_parent_path() ? dicomdir.parent_path() : fs::path(".");
-  const fs::path real_folder = fs::canonical(folder);
+  std::error_code error;
+  const fs::path real_folder = fs::canonical(folder, error);
+  require(!error, "the folder cannot be read, " + shown(folder) + ": " + error.message() + "; check its permissions");
   std::set<fs::path> files, missing;
   for (DcmObject* record = records->nextInContainer(nullptr); record; record = records->nextInContainer(record)) {
     auto* item = dynamic_cast<DcmItem*>(record);

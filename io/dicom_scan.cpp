@@ -14,6 +14,7 @@
 #include "io/dicom_header.h"
 #include "io/dicom_series.h"
 #include "io/folder_files.h"
+#include "io/opened_file.h"
 #include "io/parallel.h"
 #include "io/shown_text.h"
 
@@ -199,11 +200,9 @@ DicomScan scan_beside(Headers headers, const Control& control) {
 }  // namespace
 
 DicomScan scan_dicom(const fs::path& path, bool single, const Control& control) {
-  std::error_code error;
-  const fs::file_status status = fs::status(path, error);
-  require(fs::exists(status), "no such file or folder, " + shown(path) + "; check the path");
-  if (fs::is_directory(status)) return scan_folder(path, control);
-  require(fs::is_regular_file(status), "neither a file nor a folder, " + shown(path) + "; name one of them");
+  const Found found = found_at(path);
+  require(found != Found::nothing, "no such file or folder, " + shown(path) + "; check the path");
+  if (found == Found::folder) return scan_folder(path, control);
   Headers headers = read_dicom_headers(path);
   if (!single && is_directory_file(headers.front())) return scan_directory(path, control);
   return single ? scan_of_first(std::move(headers), control) : scan_beside(std::move(headers), control);

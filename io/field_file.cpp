@@ -8,6 +8,7 @@
 #include "deform/errors.h"
 #include "io/field_format.h"
 #include "io/field_image.h"
+#include "io/opened_file.h"
 
 namespace tetwarp {
 namespace {
@@ -20,8 +21,9 @@ bool is_there(const std::filesystem::path& path) {
 
 /// The format that takes the file; null: none.
 const FieldFormat* format_of(const std::filesystem::path& path) {
+  if (!is_file(path)) return find_field_format(path, "");
   std::string first(kFirstBytes, '\0');
-  std::ifstream stream(path, std::ios::binary);
+  std::ifstream stream = opened(path);
   stream.read(first.data(), static_cast<std::streamsize>(first.size()));
   first.resize(static_cast<std::size_t>(stream.gcount()));
   return find_field_format(path, first);

@@ -4,17 +4,27 @@
 #include <set>
 #include <system_error>
 
+#include "deform/errors.h"
 #include "deform/resampler.h"
+#include "io/shown_text.h"
 
 namespace tetwarp {
 namespace {
 
 namespace fs = std::filesystem;
 
+/// @throws InputError in the system's words
+fs::path real(const fs::path& folder) {
+  std::error_code error;
+  const fs::path path = fs::canonical(folder, error);
+  require(!error, "the folder cannot be read, " + shown(folder) + ": " + error.message() + "; check its permissions");
+  return path;
+}
+
 class Listing {
  public:
   Listing(const fs::path& root, bool with_sub_folders, const std::stop_token& stop)
-      : root_(fs::canonical(root)), with_sub_folders_(with_sub_folders), stop_(stop) {}
+      : root_(real(root)), with_sub_folders_(with_sub_folders), stop_(stop) {}
 
   void add_folder(const fs::path& folder) {
     if (stop_.stop_requested()) throw Cancelled();

@@ -16,6 +16,7 @@
 #ifdef TETWARP_WITH_ITK
 #include "io/nifti_file.h"
 #include "io/nrrd_layout.h"
+#include "io/opened_file.h"
 #include "io/text_header.h"
 #include "io/value_reader.h"
 #include "itkbridge/image_io.h"
@@ -172,10 +173,10 @@ std::size_t ImageReader::value_count() const {
 void require_readable_file(const std::filesystem::path& path) {
   const std::string file = path.string();
   std::error_code error;
-  const auto status = std::filesystem::status(path, error);
-  require(std::filesystem::exists(status), "no such file, " + file);
-  require(std::filesystem::is_regular_file(status), "not a file, " + file);
-  require(std::filesystem::file_size(path) > 0, "an empty file, " + file);
+  const Found found = found_at(path);
+  require(found != Found::nothing, "no such file, " + file);
+  require(found == Found::file, "not a file, " + file);
+  require(std::filesystem::file_size(path, error) > 0, "an empty file, " + file);
   require(::access(path.c_str(), R_OK) == 0, "a file that may not be read, " + file + "; check its rights");
 }
 

@@ -10,14 +10,16 @@
 #include "deform/errors.h"
 #include "io/image_reader.h"
 #include "io/mesh_format.h"
+#include "io/opened_file.h"
 #include "io/vector_options.h"
 
 namespace tetwarp {
 namespace {
 
 const MeshFormat* format_of(const std::filesystem::path& path) {
+  if (!is_file(path)) return find_mesh_format(path, "");
   std::string first(64, '\0');
-  std::ifstream stream(path, std::ios::binary);
+  std::ifstream stream = opened(path);
   stream.read(first.data(), static_cast<std::streamsize>(first.size()));
   first.resize(static_cast<std::size_t>(stream.gcount()));
   return find_mesh_format(path, first);
@@ -268,7 +270,7 @@ void check_mesh_options(const FieldSource& source) {
 }
 
 bool is_mesh_file(const std::filesystem::path& path) {
-  if (std::filesystem::is_directory(path)) return false;
+  if (is_folder(path)) return false;
   const MeshFormat* format = format_of(path);
   return format != nullptr && (format->holds_mesh == nullptr || format->holds_mesh(path));
 }

@@ -20,13 +20,29 @@ constexpr std::size_t kPiece = 1 << 14;
 
 }  // namespace
 
-std::ifstream opened(const std::filesystem::path& path) {
+Found found_at(const std::filesystem::path& path) {
+  using std::filesystem::file_type;
   std::error_code error;
-  const bool is_folder = std::filesystem::is_directory(path, error);
+  const file_type type = std::filesystem::status(path, error).type();
+  if (type == file_type::not_found) return Found::nothing;
+  if (type == file_type::regular) return Found::file;
+  if (type == file_type::directory) return Found::folder;
+  require(type != file_type::none,
+          "cannot be read (" + error.message() + "), " + shown(path) + "; check the name and your rights to it");
+  throw InputError("neither a file nor a folder, " + shown(path) + "; name one of them");
+}
+
+std::string message_of(const std::filesystem::filesystem_error& error) {
+  return "cannot be read (" + error.code().message() + "), " + shown(error.path1()) +
+         "; check the name and your rights to it";
+}
+
+std::ifstream opened(const std::filesystem::path& path) {
+  const bool folder = is_folder(path);
   errno = 0;
   std::ifstream file(path, std::ios::binary);
-  require(file.good() && !is_folder,
-          "cannot be read (" + std::generic_category().message(is_folder ? EISDIR : errno) + "), " + shown(path));
+  require(file.good() && !folder,
+          "cannot be read (" + std::generic_category().message(folder ? EISDIR : errno) + "), " + shown(path));
   return file;
 }
 

@@ -10,6 +10,7 @@
 #include "io/image_reader.h"
 #include "io/module.h"
 #include "io/niftyreg_spline.h"
+#include "io/opened_file.h"
 #include "itkbridge/transform_file.h"
 #endif
 
@@ -53,7 +54,7 @@ LoadedTransform load_transform(const std::filesystem::path& path, const std::sto
 
 bool is_transform_file(const std::filesystem::path& path) {
   if (has_transform_suffix(path)) return true;
-  if (image_format(path) != ImageFormat::nifti || !std::filesystem::is_regular_file(path)) return false;
+  if (image_format(path) != ImageFormat::nifti || !is_file(path)) return false;
   try {
     return is_niftyreg_spline(read_nifti_header(path));
   } catch (const InputError&) {

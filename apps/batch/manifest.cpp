@@ -12,6 +12,7 @@
 #include "apps/field_source.h"
 #include "apps/reads.h"
 #include "deform/fields/formula.h"
+#include "io/opened_file.h"
 #include "io/scenario_file.h"
 #include "io/shown_text.h"
 
@@ -198,8 +199,8 @@ std::vector<std::string> Reader::arguments_of(const ManifestRow& row, const Plac
 
 void Reader::check_files(const DeformOptions& options) {
   const auto exists = [](const fs::path& path) {
-    std::error_code error;
-    require(fs::exists(path, error), "no such file or folder, " + shown(path) + "; paths are relative to the manifest");
+    require(found_at(path) != Found::nothing,
+            "no such file or folder, " + shown(path) + "; paths are relative to the manifest");
   };
   exists(options.input.path);
   if (!options.scenario.empty()) exists(options.scenario);
