@@ -3,20 +3,23 @@
 #include <cuda_runtime.h>
 
 #include <string>
+#include <string_view>
 
 #include "cuda/fault.h"
 #include "deform/errors.h"
 
-/// Throws DeviceError, or DeviceMemoryError, naming the call, file and line, unless a CUDA call succeeded.
+/// Throws DeviceError, or DeviceMemoryError, unless a CUDA call succeeded. It names the call, the line and the file,
+/// but not the folder of whoever built the program.
 #define TETWARP_CUDA_TRY(call) ::tetwarp::cuda_detail::check((call), #call, __FILE__, __LINE__)
 
 namespace tetwarp::cuda_detail {
 
-inline void check(cudaError_t status, const char* call, const char* file, int line) {
+inline void check(cudaError_t status, const char* call, std::string_view file, int line) {
   if (status == cudaSuccess && kFaultsAreInjected) status = injected_fault(call);
   if (status == cudaSuccess) return;
   cudaGetLastError();  // clears what is not sticky
-  const std::string what = std::string("CUDA: ") + cudaGetErrorString(status) + ", " + call + " at " + file + ":" +
+  const std::string name(file.substr(file.find_last_of('/') + 1));
+  const std::string what = std::string("CUDA: ") + cudaGetErrorString(status) + ", " + call + " at " + name + ":" +
                            std::to_string(line) + "; use --backend cpu, the bits are the same";
   if (status == cudaErrorMemoryAllocation) throw DeviceMemoryError(what);
   throw DeviceError(what);
