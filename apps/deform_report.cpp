@@ -62,18 +62,6 @@ json input_json(const DeformRecord& of) {
   return document;
 }
 
-/// Likewise of what went along.
-void close_sources(json& document) {
-  for (const char* key : {"with", "structures", "points"}) {
-    if (!document.contains(key)) continue;
-    for (json& along : document[key]) {
-      if (!along.is_object()) continue;
-      along.erase("input");
-      along.erase("sha256");
-    }
-  }
-}
-
 json simulation_json(const SimulationSource& source) {
   json document = {{"scenario_sha256", source.scenario_sha256}, {"method", source.method}, {"backend", source.backend}};
   if (!source.labels.empty()) document["labels_sha256"] = source.labels_sha256;
@@ -123,8 +111,7 @@ std::vector<std::string> deidentification_notes(const DeformRecord& of) {
   if (!of.options.dicom.deidentification) return {};
   std::vector<std::string> notes = {std::string("note: de-identified by ") + kConfidentialityEdition +
                                     ", Basic Profile; not looked at: text in the pixels, faces that a rendering shows, "
-                                    "paths of fields and outputs in " +
-                                    sidecar_of(of.options.output).filename().string()};
+                                    "names and comments in files of --points"};
   if (of.dicom_report && of.dicom_report->says_who) {
     notes.push_back(
         "warning: the source says that its pixels hold text (Burned In Annotation) or a face that can be recognised "
@@ -158,7 +145,6 @@ json sidecar(const DeformRecord& of) {
   if (!of.outputs.structures.empty()) document["structures"] = of.outputs.structures.describe();
   if (const json maps = of.outputs.maps->describe(); !maps.empty()) document["maps"] = maps;
   if (!of.points.empty()) document["points"] = of.points.to_json();
-  if (of.options.dicom.deidentification) close_sources(document);
   document["report"] = {{"covered", of.report.covered},      {"uncovered", of.report.uncovered},
                         {"clamped", of.report.clamped},      {"padded", of.report.padded},
                         {"conflicts", of.report.conflicts},  {"inverted", of.report.inverted},

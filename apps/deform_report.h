@@ -25,8 +25,8 @@ struct DeformRecord {
   DeformPlan plan;
   std::shared_ptr<const InputVolume> input;
   std::shared_ptr<const DicomHeaders> headers;  ///< of a series: this run's own, for one thread at a time reads them
-  std::string volume_label;            ///< which of several volumes of its series the input is
-  std::vector<std::string> set_aside;  ///< files of the input's folder that are no slices of it
+  std::string volume_label;                     ///< which of several volumes of its series the input is
+  std::vector<std::string> set_aside;           ///< files of the input's folder that are no slices of it
   AnyField field;
   std::string input_sha256, field_sha256, backend;
   double background = 0;
@@ -44,7 +44,7 @@ DicomDerivation input_derivation(const DeformRecord& of);
 /// What a de-identification did not do, "note: ..." and "warning: ..."; none where there was no de-identification.
 std::vector<std::string> deidentification_notes(const DeformRecord& of);
 
-/// OUTPUT.json: without a clock.
+/// OUTPUT.json: without a clock. It names all that was read; Record closes that of a de-identified run.
 nlohmann::json sidecar(const DeformRecord& of);
 /// --report: the sidecar, times, memory, and what the field is like.
 nlohmann::json report_with_times(const DeformRecord& of);

@@ -244,7 +244,7 @@ void Deformation::write_files() {
   }
   if (options_.bids) {
     write_json(record_.outputs.bids,
-               json::parse(bids_sidecar(*record_.headers, record_.plan.grid, input_derivation(record_))));
+               Record::open(json::parse(bids_sidecar(*record_.headers, record_.plan.grid, input_derivation(record_)))));
   }
   if (!record_.outputs.preview.empty()) write_preview_picture();
   if (!record_.outputs.field.empty()) write_field();
@@ -253,9 +253,11 @@ void Deformation::write_files() {
     series.emplace(WrittenSeries{*record_.headers, *record_.dicom_report, record_.plan.grid}, derivation(record_));
   record_.outputs.further->write(options_.compression, made_by, series);
   record_.points.write(record_.outputs.points);
-  write_json(record_.outputs.sidecar, sidecar(record_));
+  const bool hides = options_.dicom.deidentification.has_value();
+  write_json(record_.outputs.sidecar, Record::of(hides, sidecar(record_)));
   record_.stages.emplace_back("write", std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
-  if (!record_.outputs.report.empty()) write_json(record_.outputs.report, report_with_times(record_));
+  if (!record_.outputs.report.empty())
+    write_json(record_.outputs.report, Record::of(hides, report_with_times(record_)));
 }
 
 /// What was used: of several the composed one.
@@ -284,8 +286,10 @@ void Deformation::write_preview_picture() {
   write_preview(record_.outputs.preview, std::as_const(on_grid).view(), after, title());
 }
 
-/// What the preview says above the pictures: the fields by name, files without their folders.
+/// What the preview says above the pictures: the fields by name, files without their folders, or
+/// where they would tell the patient not at all.
 std::string Deformation::title() const {
+  if (options_.dicom.deidentification) return title_without_names(options_.fields);
   if (!options_.scenario.empty()) return "simulated " + options_.scenario.filename().string();
   return title_of_fields(options_.fields, options_.pull_field);
 }

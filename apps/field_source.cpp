@@ -165,6 +165,13 @@ void check_fields(const std::vector<std::string>& fields, std::optional<std::int
     throw UsageError("--cell-size is for formulas and transforms, " + fields.front() + " has its own vertices");
 }
 
+std::string title_without_names(const std::vector<std::string>& fields) {
+  std::string title;
+  for (const std::string& text : fields)
+    title += (title.empty() ? "" : ", then ") + (is_formula(text) ? text : std::string("a field of a file"));
+  return title.empty() ? "deformed" : title;
+}
+
 std::string title_of_fields(const std::vector<std::string>& fields, const std::string& pull_field) {
   if (!pull_field.empty()) return "pull field " + field_source(pull_field).path.filename().string();
   std::string text;

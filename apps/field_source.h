@@ -63,6 +63,9 @@ void check_fields(const std::vector<std::string>& fields, std::optional<std::int
 /// Fields by name, files without their folders: "wave:amplitude=8, then twist.mha".
 std::string title_of_fields(const std::vector<std::string>& fields, const std::string& pull_field);
 
+/// The same of a de-identified volume: formulas, and that there was a file.
+std::string title_without_names(const std::vector<std::string>& fields);
+
 /// Memory of the field that `read_forward_field` will make, with what a mesh needs beside its own. Transforms and
 /// meshes are read, so that a bad one is known early.
 std::uint64_t field_bytes(const std::vector<std::string>& fields, const Geometry& volume,

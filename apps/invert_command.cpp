@@ -223,7 +223,7 @@ int run_invert(const InvertOptions& options) {
   Inversion result = invert(options, grid, field, output, series ? &*series : nullptr, outputs);
   result.field_seconds = field_seconds;
   outputs.write([&] {
-    if (!report_path.empty()) write_json(report_path, document_of(options, field, result));
+    if (!report_path.empty()) write_json(report_path, Record::open(document_of(options, field, result)));
   });
   outputs.commit();
   say_all(options, field, result);

@@ -145,13 +145,6 @@ std::filesystem::path frame_path(const std::filesystem::path& output, int number
   return output.parent_path() / (name.substr(0, name.size() - suffix.size()) + "." + digits + suffix);
 }
 
-void write_json(const fs::path& path, const nlohmann::json& document) {
-  std::ofstream file(path, std::ios::binary | std::ios::trunc);
-  file << document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << "\n";
-  file.close();
-  if (!file) throw Error("cannot be written whole, " + path.string() + "; is the disk full?");
-}
-
 nlohmann::json to_json(const Geometry& geometry) {
   const auto list = [](const auto& v) { return nlohmann::json::array({v.x, v.y, v.z}); };
   nlohmann::json document = {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "apps/console.h"
+#include "apps/record.h"
 #include "deform/residuals.h"
 #include "io/dicom_series.h"
 #include "io/read_places.h"
@@ -67,9 +68,6 @@ std::filesystem::path bids_sidecar_of(const std::filesystem::path& output);
 /// Where the Nth of several outputs goes: OUTPUT with the number before its suffix, `field.0020.nii.gz`.
 /// @param most  the highest number, whose digits all of them have, at least four
 std::filesystem::path frame_path(const std::filesystem::path& output, int number, int most);
-
-/// @throws Error when it cannot be written whole
-void write_json(const std::filesystem::path& path, const nlohmann::json& document);
 
 nlohmann::json to_json(const Geometry& geometry);
 nlohmann::json to_json(const Residuals& residuals);

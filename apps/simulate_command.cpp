@@ -144,7 +144,7 @@ int Simulating::run() {
   write(outputs_.field, field);
   record.stages.emplace_back("write", write_seconds_);
   outputs_.set.write([&] {
-    if (!outputs_.report.empty()) write_json(outputs_.report, document_of(record));
+    if (!outputs_.report.empty()) write_json(outputs_.report, Record::open(document_of(record)));
   });
   outputs_.set.commit();
   for (const std::string& warning : warnings_of(record)) say(options_.common, "tetwarp: warning: " + warning);

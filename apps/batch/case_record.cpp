@@ -11,6 +11,8 @@ namespace tetwarp::apps {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
+bool hides(const BatchCase& of) { return of.options.dicom.deidentification.has_value(); }
+
 namespace {
 
 /// Files below a folder by their names in it, its record left out.
@@ -57,7 +59,7 @@ json outputs_of(const json& files, const std::string& id) {
 
 json line_of(const BatchCase& of, const std::string& status) {
   json line = {{"case", of.id}, {"status", status}, {"version", version()}, {"commit", commit()}};
-  if (!of.options.dicom.deidentification) line["command"] = command_of(of);
+  if (!hides(of)) line["command"] = command_of(of);
   return line;
 }
 
@@ -100,27 +102,28 @@ json with_current_paths(json line, const BatchCase& of) {
 
 }  // namespace
 
-json record_case(const BatchCase& of, const Deformation& made, const std::vector<std::string>& further) {
+Record record_case(const BatchCase& of, const Deformation& made, const std::vector<std::string>& further) {
   const DeformRecord& record = made.record();
   const fs::path& folder = record.outputs.set.folder();
   const json files = files_of(folder), told = sidecar(record);
   json line = line_of(of, "done");
-  if (!of.options.dicom.deidentification) line["input"] = told["input"];
+  if (!hides(of)) line["input"] = told["input"];
   line["field"] = {{"sha256", record.field_sha256}, {"direction", told["field"]["direction"]}};
   line["report"] = told["report"];
   line["outputs"] = outputs_of(files, of.id);
   line["notes"] = made.notes();
-  write_json(folder / kFolderRecord, {{"case", of.id},
-                                      {"identity", case_identity(of, record.input_sha256, further)},
-                                      {"result", line},
-                                      {"files", files}});
-  return line;
+  write_json(folder / kFolderRecord,
+             Record::of(hides(of), {{"case", of.id},
+                                    {"identity", case_identity(of, record.input_sha256, further)},
+                                    {"result", line},
+                                    {"files", files}}));
+  return Record::of(hides(of), line);
 }
 
-json failed_line(const BatchCase& of, const std::string& status, const std::string& reason) {
+Record failed_line(const BatchCase& of, const std::string& status, FixedReason kind, const std::string& reason) {
   json line = line_of(of, status);
-  line["reason"] = reason;
-  return line;
+  line["reason"] = hides(of) ? fixed_text(kind) : reason;
+  return Record::of(hides(of), line);
 }
 
 std::optional<json> finished_line(const BatchCase& of, const fs::path& folder, std::string& why) {

@@ -21,10 +21,14 @@ nlohmann::json case_identity(const BatchCase& of, const std::string& input_sha25
 /// A line of results.jsonl for a case that is written but has no name yet: what it was made of, and what came out. The
 /// folder's record, kFolderRecord, is written beside the outputs. No clock.
 /// @param further  as of case_identity, found before anything was read: what changes meanwhile makes another case
-nlohmann::json record_case(const BatchCase& of, const Deformation& made, const std::vector<std::string>& further);
+Record record_case(const BatchCase& of, const Deformation& made, const std::vector<std::string>& further);
 
 /// A line for a case that came to nothing. @param status  failed or refused
-nlohmann::json failed_line(const BatchCase& of, const std::string& status, const std::string& reason);
+/// @param kind  what a de-identified case says instead of the reason
+Record failed_line(const BatchCase& of, const std::string& status, FixedReason kind, const std::string& reason);
+
+/// Whether the records of a case may not name what it reads.
+bool hides(const BatchCase& of);
 
 /// The line of a case that was finished earlier, with paths as they are now: its record is of this case, and every file
 /// of it has the bytes that the record says. Otherwise none, and `why` says so, "the row has changed": in words that

@@ -5,6 +5,7 @@
 #include "apps/batch/case_record.h"
 #include "apps/reads.h"
 #include "cuda/devices.h"
+#include "io/opened_file.h"
 
 namespace tetwarp::apps {
 
@@ -33,13 +34,13 @@ struct Retry {
   bool alone = false;  ///< on its device
   std::optional<std::uint64_t> device_bytes;
   bool on_cpu = false;
-  json reasons = json::array();
+  std::vector<std::string> reasons;
 };
 
 bool is_simulated_on_device(const DeformOptions& options) { return !options.scenario.empty(); }
 
-json attempt(const BatchCase& of, const Retry& retry, const Resources& resources, const std::stop_token& stop,
-             std::optional<int>& device, json& timing) {
+Record attempt(const BatchCase& of, const Retry& retry, const Resources& resources, const std::stop_token& stop,
+               std::optional<int>& device, json& timing) {
   DeformOptions options = of.options;
   options.memory_bytes = retry.device_bytes;
   if (retry.on_cpu) options.backend = "cpu";
@@ -80,7 +81,7 @@ json attempt(const BatchCase& of, const Retry& retry, const Resources& resources
   }
   deformation.write();
   timing["write"] = clock.lap();
-  json line = record_case(of, deformation, further);
+  Record line = record_case(of, deformation, further);
   timing["hash"] = hashed + clock.lap();
   deformation.commit();
   timing["commit"] = clock.lap();
@@ -90,54 +91,68 @@ json attempt(const BatchCase& of, const Retry& retry, const Resources& resources
 
 }  // namespace
 
+namespace {
+
+/// A case that came to nothing, and why.
+void end(CaseOutcome& outcome, const BatchCase& of, CaseStatus status, FixedReason kind, const std::string& reason) {
+  outcome.status = status;
+  outcome.reason = reason;
+  outcome.line = failed_line(of, status == CaseStatus::refused ? "refused" : "failed", kind, reason);
+}
+
+/// Takes the next thing that may help where a device failed. @return whether there is one
+bool try_again(const BatchCase& of, const DeviceError& error, std::optional<int> device, const Resources& resources,
+               Retry& retry) {
+  const bool is_memory = dynamic_cast<const DeviceMemoryError*>(&error) != nullptr;
+  retry.reasons.emplace_back(error.what());
+  if (!device) return false;
+  if (!is_memory) {
+    resources.devices.lose(*device);
+  } else if (!retry.alone) {
+    retry.alone = true;  // others may have held what it needed
+  } else if (!retry.device_bytes) {
+    retry.device_bytes = kScarceDeviceBytes;
+  } else if (resources.devices.may_fall_back(of.options.backend)) {
+    retry.on_cpu = true;
+  } else {
+    return false;
+  }
+  return true;
+}
+
+}  // namespace
+
 CaseOutcome run_case(const BatchCase& of, const Resources& resources, const std::stop_token& stop) {
   Retry retry;
   CaseOutcome outcome;
-  for (;;) {
+  json timing;
+  for (bool again = true; again;) {
+    again = false;
     std::optional<int> device;
-    outcome.timing = {{"case", of.id}};
+    timing = {{"case", of.id}};
     try {
-      outcome.line = attempt(of, retry, resources, stop, device, outcome.timing);
-      if (!retry.reasons.empty()) outcome.timing["made_again"] = retry.reasons;
-      return outcome;
+      outcome.line = attempt(of, retry, resources, stop, device, timing);
+      if (!retry.reasons.empty()) timing["made_again"] = outcome.made_again = retry.reasons;
     } catch (const Cancelled&) {
       throw;
     } catch (const DeviceError& error) {
-      const bool is_memory = dynamic_cast<const DeviceMemoryError*>(&error) != nullptr;
-      retry.reasons.push_back(error.what());
-      if (device && is_memory && !retry.alone) {
-        retry.alone = true;  // others may have held what it needed
-        continue;
-      }
-      if (device && is_memory && !retry.device_bytes) {
-        retry.device_bytes = kScarceDeviceBytes;
-        continue;
-      }
-      if (device && !is_memory) {
-        resources.devices.lose(*device);
-        continue;
-      }
-      if (device && is_memory && resources.devices.may_fall_back(of.options.backend)) {
-        retry.on_cpu = true;
-        continue;
-      }
-      outcome.status = CaseStatus::failed;
-      outcome.line = failed_line(of, "failed", error.what());
+      again = try_again(of, error, device, resources, retry);
+      if (!again) end(outcome, of, CaseStatus::failed, FixedReason::device, error.what());
     } catch (const InputError& error) {
-      outcome.status = CaseStatus::refused;
-      outcome.line = failed_line(of, "refused", error.what());
+      end(outcome, of, CaseStatus::refused, FixedReason::input, error.what());
     } catch (const UsageError& error) {
-      outcome.status = CaseStatus::refused;
-      outcome.line = failed_line(of, "refused", error.what());
+      end(outcome, of, CaseStatus::refused, FixedReason::options, error.what());
+    } catch (const std::filesystem::filesystem_error& error) {
+      end(outcome, of, CaseStatus::refused, FixedReason::input, message_of(error));
     } catch (const std::bad_alloc&) {
-      outcome.status = CaseStatus::failed;
-      outcome.line = failed_line(of, "failed", "not enough memory; give the batch less with --memory, or fewer --jobs");
+      end(outcome, of, CaseStatus::failed, FixedReason::memory,
+          "not enough memory; give the batch less with --memory, or fewer --jobs");
     } catch (const std::exception& error) {
-      outcome.status = CaseStatus::failed;
-      outcome.line = failed_line(of, "failed", error.what());
+      end(outcome, of, CaseStatus::failed, FixedReason::other, error.what());
     }
-    return outcome;
   }
+  outcome.timing = Record::of(hides(of), timing);
+  return outcome;
 }
 
 }  // namespace tetwarp::apps

@@ -2,9 +2,11 @@
 
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "apps/batch/manifest.h"
 #include "apps/batch/resources.h"
+#include "apps/record.h"
 
 namespace tetwarp::apps {
 
@@ -13,8 +15,11 @@ enum class CaseStatus { done, failed, refused };
 /// What became of a case.
 struct CaseOutcome {
   CaseStatus status = CaseStatus::done;
-  nlohmann::json line;    ///< of results.jsonl: no clock
-  nlohmann::json timing;  ///< of timings.jsonl: seconds a stage, who resampled
+  Record line;    ///< of results.jsonl: no clock
+  Record timing;  ///< of timings.jsonl: seconds a stage, who resampled
+  // For standard error alone, since they may name paths.
+  std::string reason;                   ///< why it came to nothing
+  std::vector<std::string> made_again;  ///< why it was begun anew
 };
 
 /// Runs one case, from its headers to its folder's name. A device that fails is given up, and the case made again on

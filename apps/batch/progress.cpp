@@ -80,17 +80,20 @@ void Progress::started(const std::string& id) {
 
 void Progress::ended(const CaseOutcome& outcome) {
   const std::lock_guard lock(mutex_);
-  const std::string id = outcome.line["case"];
+  const std::string id = outcome.line.document()["case"];
   ++(outcome.status == CaseStatus::done ? done_ : failed_);
   json event = {{"event", name_of(outcome.status)}, {"case", id}, {"done", done_}, {"failed", failed_}};
   if (outcome.status != CaseStatus::done) {
-    event["reason"] = outcome.line["reason"];
-    print("tetwarp: case " + id + " " + name_of(outcome.status) + ": " + outcome.line["reason"].get<std::string>());
+    event["reason"] = outcome.reason;
+    const std::string said = "tetwarp: case " + id + " " + name_of(outcome.status) + ": " + outcome.reason;
+    print(said);
+    const bool only_here = outcome.line.document()["reason"] != outcome.reason;  // the case is de-identified
+    if (only_here && form_ == Form::none) std::fprintf(stderr, "%s\n", shown_lines(said).c_str());
   }
-  if (outcome.timing.contains("made_again")) {
-    event["made_again"] = outcome.timing["made_again"];
-    for (const json& reason : outcome.timing["made_again"])
-      print("tetwarp: warning: case " + id + " was made again: " + reason.get<std::string>());
+  if (!outcome.made_again.empty()) {
+    event["made_again"] = outcome.made_again;
+    for (const std::string& reason : outcome.made_again)
+      print("tetwarp: warning: case " + id + " was made again: " + reason);
   }
   print(event);
 }

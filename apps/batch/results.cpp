@@ -112,11 +112,12 @@ void Results::add(const CaseOutcome& outcome) {
     growing_results_.open(folder_.results(), std::ios::binary | std::ios::app);
     growing_timings_.open(folder_.timings(), std::ios::binary | std::ios::app);
   }
-  const std::string id = outcome.line["case"];
-  lines_[id] = outcome.line;
-  timings_[id] = outcome.timing;
-  growing_results_ << dumped(outcome.line) << std::flush;
-  growing_timings_ << dumped(outcome.timing) << std::flush;
+  const json &line = outcome.line.document(), &timing = outcome.timing.document();
+  const std::string id = line["case"];
+  lines_[id] = line;
+  timings_[id] = timing;
+  growing_results_ << dumped(line) << std::flush;
+  growing_timings_ << dumped(timing) << std::flush;
 }
 
 void Results::finish() const {

@@ -14,7 +14,7 @@ void Runner::work() {
     for (std::size_t n = next_++; n < cases_.size() && !interrupt_token().stop_requested(); n = next_++) {
       parts_.progress.started(cases_[n]->id);
       const CaseOutcome outcome = run_case(*cases_[n], parts_.resources, interrupt_token());
-      parts_.usage.add(outcome.timing);
+      parts_.usage.add(outcome.timing.document());
       parts_.results.add(outcome);
       parts_.progress.ended(outcome);
     }

@@ -34,7 +34,7 @@ TEST_F(DeidentifyOption, SaysWhatItDoesNotDo) {
   const Outcome run = deform("-o out --deidentify retain-device,shift-dates --deidentify-key key");
   ASSERT_EQ(run.status, 0) << run.err;
   EXPECT_TRUE(
-      says(run.err, {"de-identified by PS3.15 2026d, Basic Profile", "text in the pixels", "faces", "out.json"}));
+      says(run.err, {"de-identified by PS3.15 2026d, Basic Profile", "text in the pixels", "faces", "--points"}));
   std::ifstream file(scratch_ / "out.json");
   const nlohmann::json said = nlohmann::json::parse(file);
   EXPECT_EQ(said["options"]["dicom"]["deidentified"]["PS3.15 2026d"],
