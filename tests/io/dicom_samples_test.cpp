@@ -197,7 +197,8 @@ TEST_F(PixelCodings, AreReadAsPydicomAndGdcmReadThem) {
     command += " '" + all.back().file.string() + "' '" + all.back().out.string() + "'";
   };
   for (const Layout& layout : layouts()) {
-    if (layout.shift() != 0 || layout.stored < 8) continue;  // GDCM is at a loss with fewer bits
+    // GDCM is at a loss with fewer than 8 bits, and with 8 in words of 16.
+    if (layout.shift() != 0 || layout.stored < 8 || (layout.stored == 8 && layout.allocated == 16)) continue;
     const Values values = values_of(layout);
     MadeSlice slice = slice_of(layout, values);
     for (const E_TransferSyntax encoding : {EXS_RLELossless, EXS_JPEGLSLossless, EXS_JPEGProcess14SV1}) {
