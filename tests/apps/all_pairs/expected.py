@@ -59,6 +59,8 @@ class Expected:
         corners = np.where(is_none, 0, corners)
         becomes_none = (is_none & (np.abs(weights) > little)).any(0)
         self.doubtful |= (is_none & self.may_weigh(weights) & (np.abs(weights) <= little)).any(0)
+        if interpolation == "cubic":  # of its 64 weights some are zero but for rounding, and NaN times that is NaN
+            self.doubtful |= is_none.any(0)
         nearest = np.floor(place + 0.5).astype(int)
         is_half = (np.abs(place + 0.5 - np.rint(place + 0.5)) < self.slack_of_place[..., None] + 1e-7).any(-1)
         at_nearest = values[tuple(np.minimum(nearest[..., a], last[a]) for a in range(3))]
