@@ -1,4 +1,4 @@
-// The figures of docs/paper.md are those of the run that lies in bench/results/paper-h200.
+// The figures of docs/paper.md are those of the run that lies in bench/results/paper-h100.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -11,7 +11,7 @@
 namespace {
 
 const std::filesystem::path kSources = TETWARP_SOURCES;
-const std::filesystem::path kRun = kSources / "bench/results/paper-h200/paper.json";
+const std::filesystem::path kRun = kSources / "bench/results/paper-h100/paper.json";
 const std::filesystem::path kDocument = kSources / "docs/paper.md";
 
 class PaperDocument : public testing::Test {
