@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "io/shown_text.h"
+#include "io/staged_output.h"
 
 namespace tetwarp::apps {
 
@@ -53,6 +54,7 @@ void watch_interrupts() {
     sigwait(&signals, &received);
     interrupts().request_stop();
     sigwait(&signals, &received);
+    remove_unfinished_outputs();
     _exit(128 + received);
   }).detach();
   struct sigaction broken_pipe {};  // a handler, for to ignore a signal would pass on to programs that are run

@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <exception>
+#include <mutex>
 #include <set>
 #include <system_error>
 #include <thread>
@@ -197,7 +198,40 @@ int replace_folder(const fs::path& staged, const fs::path& target) {
   return 0;
 }
 
+/// The hidden siblings of this process that have no name yet.
+class Unfinished {
+ public:
+  static Unfinished& all() {
+    static Unfinished one;
+    return one;
+  }
+
+  fs::path create(const fs::path& target, StagedOutput::Kind kind) {
+    const std::lock_guard lock(mutex_);
+    return *paths_.insert(create_sibling(target, kind, "partial")).first;
+  }
+  void forget(const fs::path& path) {
+    const std::lock_guard lock(mutex_);
+    paths_.erase(path);
+  }
+  /// Other threads may still write into a folder while it goes, so more than once.
+  void remove() noexcept {
+    mutex_.lock();  // for good: nothing is created any more
+    constexpr int kRounds = 3;
+    std::error_code ignored;
+    for (int round = 0; round < kRounds; ++round) {
+      for (const fs::path& path : paths_) fs::remove_all(path, ignored);
+    }
+  }
+
+ private:
+  std::mutex mutex_;
+  std::set<fs::path> paths_;
+};
+
 }  // namespace
+
+void remove_unfinished_outputs() noexcept { Unfinished::all().remove(); }
 
 StagedOutput::StagedOutput(fs::path target, Kind kind, bool overwrite, bool (*is_ours)(const fs::path&))
     : target_(named(target)), kind_(kind), overwrite_(overwrite), is_ours_(is_ours) {
@@ -216,13 +250,13 @@ StagedOutput::StagedOutput(fs::path target, Kind kind, bool overwrite, bool (*is
                 " cannot be written into it; choose another name");
   }
   check_target();
-  staged_ = create_sibling(target_, kind_, "partial");
+  staged_ = Unfinished::all().create(target_, kind_);
 }
 
 StagedOutput::~StagedOutput() {
-  if (done_) return;
   std::error_code ignored;
-  fs::remove_all(staged_, ignored);
+  if (!done_) fs::remove_all(staged_, ignored);
+  Unfinished::all().forget(staged_);
 }
 
 bool StagedOutput::check_target() const {

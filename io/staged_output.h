@@ -50,6 +50,10 @@ class StagedOutput {
   bool (*is_ours_)(const std::filesystem::path&);
 };
 
+/// Removes what the StagedOutputs of this process have not given a name yet, for one that ends without destructors.
+/// No other can be created or destroyed behind it: end the process.
+void remove_unfinished_outputs() noexcept;
+
 /// Gives several outputs their names, one right after the other once all of them are on the disk, so that a process
 /// that is killed leaves all or none of them but for the instant of the renames. @throws Error, and no output has its
 /// name that had been free
