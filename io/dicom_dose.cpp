@@ -11,6 +11,7 @@
 
 #include "io/dicom_along_put.h"
 #include "io/dicom_header.h"
+#include "io/dicom_plain_pixels.h"
 #include "io/dicom_put.h"
 #include "io/dicom_samples.h"
 #include "io/dicom_stream.h"
@@ -53,23 +54,16 @@ class DoseFile {
 
   AnyVolume doses(const Geometry& grid) {
     const double scaling = number(DCM_DoseGridScaling, 0);
+    if (!(scaling > 0))
+      refuse("has " + tag_name(DCM_DoseGridScaling) + " " + tetwarp::number(scaling) + ", expected more than 0");
     const int bits = static_cast<int>(word(DCM_BitsAllocated));
     const StoredBits stored_bits = stored_bits_of(bits);
     const auto voxels = static_cast<std::size_t>(voxel_count(grid));
     // Whole words of 16 bits, the low one of a value first, on this machine's order of bytes.
-    const Uint16* words = nullptr;
-    unsigned long count = 0;
-    const E_TransferSyntax native = EXS_LittleEndianExplicit;
-    if (!is_at_most(data(), DCM_PixelData, std::filesystem::file_size(path_)) ||
-        data().chooseRepresentation(native, nullptr).bad() ||
-        data().findAndGetUint16Array(DCM_PixelData, words, &count).bad() || words == nullptr) {
-      refuse("has no Pixel Data (7FE0,0010) that can be read");
-    }
-    const std::size_t expected = voxels * static_cast<std::size_t>(bits / 16);
-    if (count < expected) {
-      refuse("is cut short: Pixel Data hold " + std::to_string(count) + " words of 16 bits, expected " +
-             std::to_string(expected));
-    }
+    Uint16* words = nullptr;
+    DcmElement& pixels = plain_pixels(data(), path_, voxels * static_cast<std::size_t>(bits / 8), "a dose");
+    if (pixels.getUint16Array(words).bad() || words == nullptr)
+      refuse("has no Pixel Data (7FE0,0010) that can be read as words of 16 bits");
     AnyVolume volume(grid, VoxelType::f32);
     const std::span<float> doses = volume.as<float>();
     for (std::size_t n = 0; n < voxels; ++n) {

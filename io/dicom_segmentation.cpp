@@ -11,8 +11,8 @@
 #include <set>
 
 #include "io/dicom_along_put.h"
-#include "io/dicom_codecs.h"
 #include "io/dicom_header.h"
+#include "io/dicom_plain_pixels.h"
 #include "io/dicom_put.h"
 #include "io/dicom_stream.h"
 #include "io/dicom_text.h"
@@ -101,8 +101,11 @@ void SegmentationFile::read_bits(DicomSegmentation& seg) {
     refuse("has Segmentation Type (0062,0001) " + known_code(type, {"LABELMAP"}) + ", expected BINARY or FRACTIONAL");
   seg.fractional = type == "FRACTIONAL";
   const int bits = seg.fractional ? 8 : 1;
-  for (const auto& [tag, expected] : std::initializer_list<std::pair<DcmTagKey, int>>{
-           {DCM_BitsAllocated, bits}, {DCM_BitsStored, bits}, {DCM_HighBit, bits - 1}, {DCM_SamplesPerPixel, 1}}) {
+  for (const auto& [tag, expected] : std::initializer_list<std::pair<DcmTagKey, int>>{{DCM_BitsAllocated, bits},
+                                                                                      {DCM_BitsStored, bits},
+                                                                                      {DCM_HighBit, bits - 1},
+                                                                                      {DCM_SamplesPerPixel, 1},
+                                                                                      {DCM_PixelRepresentation, 0}}) {
     if (const int found = word(tag); found != expected)
       refuse("has " + tag_name(tag) + " " + std::to_string(found) + ", expected " + std::to_string(expected) +
              " of type " + type);
@@ -245,19 +248,11 @@ DicomSegmentation SegmentationFile::header(double otherwise_mm) {
 
 /// Pixel Data as they lie in the file, bytes whatever their value representation.
 std::span<const Uint8> SegmentationFile::pixels(std::size_t expected) {
-  const std::string syntax = DcmXfer(data().getOriginalXfer()).getXferID();
-  if (pixel_coding(syntax) != PixelCoding::native)
-    refuse("has compressed pixels, " + uid_with_name(syntax) + "; a segmentation must have plain ones");
-  DcmElement* element = nullptr;
-  if (data().findAndGetElement(DCM_PixelData, element).bad()) refuse("has no Pixel Data (7FE0,0010)");
-  const std::size_t found = element->getLengthField();
-  if (found != expected + expected % 2)
-    refuse("has " + std::to_string(found) + " bytes of Pixel Data (7FE0,0010), expected " +
-           std::to_string(expected + expected % 2) + (found < expected ? ": it is cut short" : ""));
+  DcmElement& element = plain_pixels(data(), path_, expected, "a segmentation");
   Uint8* bytes = nullptr;
-  if (element->getUint8Array(bytes).good() && bytes) return {bytes, expected};
+  if (element.getUint8Array(bytes).good() && bytes) return {bytes, expected};
   Uint16* words = nullptr;
-  if (element->getUint16Array(words).good() && words) return {reinterpret_cast<const Uint8*>(words), expected};
+  if (element.getUint16Array(words).good() && words) return {reinterpret_cast<const Uint8*>(words), expected};
   refuse("has no Pixel Data (7FE0,0010) that can be read");
 }
 

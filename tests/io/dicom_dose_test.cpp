@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/dose_maker.h"
+#include "tests/support/encapsulated.h"
 #include "tests/support/real_data.h"
+#include "tests/support/says.h"
 #include "tests/support/scratch.h"
 #include "tests/support/write_file.h"
 
@@ -20,6 +22,36 @@ TEST(Dose, IsStoredValuesTimesTheScalingOnTheGridThatTheHeaderGives) {
     EXPECT_EQ(dose.geometry(), (Geometry{{4, 2, 3}, {3, 2, 2.5}, {-10, 20, 7}, glm::dmat3(1)}));
     for (std::size_t n = 0; n < 24; ++n) {
       EXPECT_FLOAT_EQ(dose.as<float>()[n], (bits == 32 ? 5.0F : 0.5F) * static_cast<float>(n));
+    }
+  }
+}
+
+TEST(Dose, EveryCodingThatCompressesNoPixelsGivesTheSameValues) {
+  const Scratch scratch;
+  for (const E_TransferSyntax encoding :
+       {EXS_LittleEndianImplicit, EXS_BigEndianExplicit, EXS_DeflatedLittleEndianExplicit}) {
+    for (const int bits : {16, 32}) {
+      MadeDose{.bits = bits, .encoding = encoding}.write(scratch / "dose");
+      const AnyVolume dose = read_dose(scratch / "dose");
+      for (std::size_t n = 0; n < 24; ++n) {
+        EXPECT_FLOAT_EQ(dose.as<float>()[n], (bits == 32 ? 5.0F : 0.5F) * static_cast<float>(n)) << encoding;
+      }
+    }
+  }
+}
+
+TEST(Dose, CompressedPixelsAreRefusedByTheirName) {
+  const Scratch scratch;
+  for (const auto& [uid, name] : {std::pair{UID_RLELosslessTransferSyntax, "RLE Lossless"},
+                                  std::pair{UID_JPEGLSLosslessTransferSyntax, "JPEG-LS"}}) {
+    std::string attributes;
+    MadeDose{.edit = [&](DcmDataset& data) { attributes = attributes_of(data); }}.write(scratch / "dose");
+    write_file(scratch / "dose", file_start(uid) + attributes + encapsulated({std::string(64, '\0')}));
+    try {
+      read_dose(scratch / "dose");
+      FAIL() << name;
+    } catch (const InputError& error) {
+      EXPECT_TRUE(says(error.what(), {"has compressed pixels", name, "a dose must have plain ones", "decompress"}));
     }
   }
 }
@@ -77,6 +109,12 @@ TEST(Dose, WhatIsNoEvenGridOrCutShortIsRefused) {
   refused({.offsets = "8\\10\\12"}, "Image Position");
   refused({.position = "1\\2"}, "ImagePositionPatient");
   refused({.missing_words = 2}, "cut short");
+  refused({.frames = "2", .offsets = "0\\2.5"}, "96 bytes of Pixel Data (7FE0,0010), expected 64");
+  for (const char* scaling : {"0", "-0.0005"}) {
+    MadeDose dose;
+    dose.edit = [=](DcmDataset& data) { data.putAndInsertString(DCM_DoseGridScaling, scaling); };
+    refused(dose, "expected more than 0");
+  }
   const auto with = [](const DcmTagKey& tag, int value) {
     MadeDose dose;
     dose.edit = [=](DcmDataset& data) { data.putAndInsertUint16(tag, static_cast<Uint16>(value)); };

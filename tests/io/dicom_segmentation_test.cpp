@@ -98,6 +98,9 @@ TEST(Segmentation, WhatIsNotOnOneEvenGridOrCutShortOrContradictsItselfIsRefused)
   refused("(0028,0100) BitsAllocated 8", [](DcmDataset& data) { MadeSeg::word(data, DCM_BitsAllocated, 8); });
   refused(
       "(0028,0101) BitsStored 16", [](DcmDataset& data) { MadeSeg::word(data, DCM_BitsStored, 16); }, true);
+  refused(
+      "PixelRepresentation 1, expected 0", [](DcmDataset& data) { MadeSeg::word(data, DCM_PixelRepresentation, 1); },
+      true);
   refused("Segmentation Type", [](DcmDataset& data) { MadeSeg::text(data, DCM_SegmentationType, "LABELMAP"); });
   refused(
       "above (0062,000e)",

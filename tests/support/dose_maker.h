@@ -20,6 +20,7 @@ struct MadeDose {
   std::string spacing = "2\\3", frame = "1.2.4", study = "1.2", patient = "SECRET-ID";
   std::function<unsigned(unsigned)> stored = {};
   std::function<void(DcmDataset&)> edit = {};  ///< last word before writing
+  E_TransferSyntax encoding = EXS_LittleEndianExplicit;
 
   void write(const std::filesystem::path& path) const {
     DcmFileFormat format;
@@ -44,7 +45,7 @@ struct MadeDose {
     words.resize(words.size() - static_cast<std::size_t>(missing_words));
     data.putAndInsertUint16Array(DCM_PixelData, words.data(), words.size());
     if (edit) edit(data);
-    const OFCondition result = format.saveFile(path.c_str(), EXS_LittleEndianExplicit);
+    const OFCondition result = format.saveFile(path.c_str(), encoding);
     if (result.bad()) throw std::runtime_error(result.text());
   }
 

@@ -1,0 +1,17 @@
+#pragma once
+
+// Private to io/: Pixel Data of objects that are read only where nothing compressed them (doses, segmentations).
+#include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmdata/dcdatset.h>
+
+#include <cstddef>
+#include <filesystem>
+
+namespace tetwarp {
+
+/// Pixel Data (7FE0,0010) as they lie in the file, which hold `expected` bytes and, where that is odd, one more.
+/// @param kind  of object, for the message: "a dose"
+/// @throws InputError where they are compressed, missing, or of another length; names `path`
+DcmElement& plain_pixels(DcmDataset& data, const std::filesystem::path& path, std::size_t expected, const char* kind);
+
+}  // namespace tetwarp
