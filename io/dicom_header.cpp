@@ -107,6 +107,7 @@ PixelFormat pixel_format_of(DcmItem& data) {
   pixels.slope = decimal_of(data, DCM_RescaleSlope);
   pixels.intercept = decimal_of(data, DCM_RescaleIntercept);
   pixels.rescale_type = text_of(data, DCM_RescaleType);
+  pixels.has_modality_lut = data.tagExists(DCM_ModalityLUTSequence);
   pixels.padding_word = word_of(data, DCM_PixelPaddingValue);
   pixels.padding_limit_word = word_of(data, DCM_PixelPaddingRangeLimit);
   return pixels;

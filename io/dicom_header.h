@@ -26,6 +26,7 @@ struct PixelFormat {
   std::string photometric;
   std::optional<double> slope, intercept;
   std::string rescale_type;
+  bool has_modality_lut = false;  ///< Modality LUT Sequence (0028,3000), another way from stored values to HU
   std::optional<int> padding_word, padding_limit_word;  ///< the 16 bits as read, whatever VR the file gave them
 
   friend bool operator==(const PixelFormat&, const PixelFormat&) = default;

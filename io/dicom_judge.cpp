@@ -91,9 +91,14 @@ std::string layout_problem(const DicomFileHeader& header) {
   return {};
 }
 
-/// Without slope and intercept HU cannot be known: 0 and -1024 are both common intercepts, so neither is assumed.
+/// Without slope and intercept HU cannot be known: 0 and -1024 are both common intercepts, so neither is assumed. Nor
+/// is it known which to take where a table stands beside them, which PS3.3 C.11.1 forbids.
 std::string rescale_problem(const DicomFileHeader& header) {
   const PixelFormat& pixels = header.pixels;
+  if (pixels.has_modality_lut) {
+    return "a Modality LUT Sequence (0028,3000)" + where(header) +
+           "; expected Rescale Slope and Intercept alone, export the series again without it";
+  }
   if (!pixels.slope || *pixels.slope == 0) {
     return missing_or_bad("Rescale Slope (0028,1053)", header, "a number other than 0");
   }

@@ -264,6 +264,8 @@ TEST(DicomScan, AttributesThatMakeAVolumeWrongAreRefusedByTag) {
       {put(DCM_PixelSpacing, "0.5\\0"), {"Pixel Spacing (0028,0030)", "positive"}},
       {remove(DCM_RescaleIntercept), {"Rescale Intercept (0028,1052)"}},
       {put(DCM_RescaleSlope, "0"), {"Rescale Slope (0028,1053)", "other than 0"}},
+      {[](DcmDataset& data) { data.insertEmptyElement(DCM_ModalityLUTSequence); },
+       {"Modality LUT Sequence (0028,3000)", "Rescale Slope and Intercept alone"}},
       {put(DCM_NumberOfFrames, "3"), {"Number of Frames (0028,0008)", "expected 1, found 3"}},
       {put_word(DCM_SamplesPerPixel, 3), {"Samples per Pixel (0028,0002)", "expected 1, found 3"}},
       {put_word(DCM_BitsAllocated, 32), {"Bits Allocated (0028,0100)", "found 32"}},
