@@ -90,10 +90,26 @@ std::unique_ptr<ImageReader> open_mha(const std::filesystem::path& path, const T
 std::unique_ptr<ImageReader> open_format(const std::filesystem::path& path, ImageFormat format, NiftiFrame frame) {
   if (format == ImageFormat::nifti) return open_nifti(path, frame);
   const TextHeader text = read_text_header(path, format);
-  const ItkImageInfo info = itk_read_info(path, itk_format(format));
+  if (format == ImageFormat::nrrd) require_known_steps(text, path.string());
+  ItkImageInfo info = itk_read_info(path, itk_format(format));
+  // NrrdImageIO of ITK 5.2 turns left-anterior-superior about the wrong axis.
+  if (format == ImageFormat::nrrd && is_las(text)) place_nrrd(info.geometry, text, path.string());
   const Stored stored{text.data_offset, size_bytes(info.type), is_encoded(text, format)};
   const ImageHeader header{info.geometry, info.type, info.components, text.metadata};
   return format == ImageFormat::nrrd ? open_nrrd(path, text, header, stored) : open_mha(path, text, header, stored);
+}
+
+/// The header that ITK wrote into a file of its own, up to the voxels. @throws Error, about the output, where it is not
+/// whole: a full disk
+std::string written_header(const std::filesystem::path& made, const std::filesystem::path& output, ImageFormat format) {
+  try {
+    std::string text(static_cast<std::size_t>(read_text_header(made, format).data_offset), '\0');
+    std::ifstream stream(made, std::ios::binary);
+    if (stream.read(text.data(), static_cast<std::streamsize>(text.size()))) return text;
+  } catch (const InputError&) {
+    // What ITK left is no input of anybody's.
+  }
+  throw Error("cannot write, " + output.string() + "; check folder, rights and free space");
 }
 
 /// ITK makes the header, of one voxel in a file of its own beside the output: ITK knows its suffixes in lower case
@@ -107,8 +123,7 @@ std::string text_header(const std::filesystem::path& path, ImageFormat format, c
   const TemporaryFile made(path.string() + (mha ? ".header.mha" : ".header.nrrd"));
   itk_write(made.path(), itk_format(format), {&one, whole(one), type, components, zeros.data()}, options.compression,
             options.metadata);
-  std::string text(static_cast<std::size_t>(read_text_header(made.path(), format).data_offset), '\0');
-  std::ifstream(made.path(), std::ios::binary).read(text.data(), static_cast<std::streamsize>(text.size()));
+  std::string text = written_header(made.path(), path, format);
   const std::string size =
       std::to_string(grid.size.x) + " " + std::to_string(grid.size.y) + " " + std::to_string(grid.size.z);
   const bool vectors = components > 1;

@@ -39,9 +39,10 @@ VoxelType disk_type(const NiftiHeader& header, const std::string& file) {
 }
 
 /// nifti1.h, "DATA SCALING": slope 0 (and, as niftilib has it, a slope that is not finite) means none.
+bool has_slope(const NiftiHeader& header) { return std::isfinite(header.scl_slope) && header.scl_slope != 0; }
+
 bool is_scaled(const NiftiHeader& header) {
-  return std::isfinite(header.scl_slope) && header.scl_slope != 0 &&
-         (header.scl_slope != 1 || (std::isfinite(header.scl_inter) && header.scl_inter != 0));
+  return has_slope(header) && (header.scl_slope != 1 || header.scl_inter != 0);
 }
 
 bool starts_like_gzip(const std::filesystem::path& path) {
@@ -169,9 +170,8 @@ class NiftiReader final : public ImageReader {
 
   template <class Disk, class Scaled>
   void scale(const Disk* values, std::size_t n, Scaled* to, std::size_t stride) const {
-    const double inter = std::isfinite(nifti_.scl_inter) ? nifti_.scl_inter : 0;
     for (std::size_t i = 0; i < n; ++i) {
-      to[i * stride] = static_cast<Scaled>(static_cast<double>(values[i]) * nifti_.scl_slope + inter);
+      to[i * stride] = static_cast<Scaled>(static_cast<double>(values[i]) * nifti_.scl_slope + nifti_.scl_inter);
     }
   }
 
@@ -193,6 +193,9 @@ std::unique_ptr<ImageReader> open_nifti(const std::filesystem::path& path, Nifti
   const std::string file = path.string();
   NiftiHeader header = read_nifti_header(path);
   const VoxelType disk = disk_type(header, file);
+  require(!has_slope(header) || std::isfinite(header.scl_inter), "scl_slope " + std::to_string(header.scl_slope) +
+                                                                     " beside a scl_inter that is no number, " + file +
+                                                                     "; correct the header");
   const bool compressed = starts_like_gzip(path);
   require(!compressed || path.extension() != ".nii", "gzip data under a name in .nii, " + file + "; name it .nii.gz");
   ImageHeader image;

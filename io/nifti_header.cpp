@@ -31,9 +31,10 @@ Bytes read_bytes(const std::filesystem::path& path) {
   require(file != nullptr, "cannot open, " + path.string());
   Bytes bytes{};
   const int read = gzread(file.get(), bytes.data(), bytes.size());
+  require(read >= 0, "damaged gzip data, " + path.string() + "; copy the file again");
   require(read != 0, "an empty file, " + path.string());
-  require(read == static_cast<int>(bytes.size()), "a header of " + std::to_string(std::max(read, 0)) + " bytes, " +
-                                                      path.string() + "; a NIfTI-1 header has 348");
+  require(read == static_cast<int>(bytes.size()),
+          "a header of " + std::to_string(read) + " bytes, " + path.string() + "; a NIfTI-1 header has 348");
   return bytes;
 }
 

@@ -62,6 +62,20 @@ std::uint64_t plane_count(const TextHeader& text, const ImageHeader& header) {
 
 }  // namespace
 
+void require_known_steps(const TextHeader& text, const std::string& file) {
+  std::string steps = lower(text["space directions"]);
+  if (steps.empty()) return;
+  std::ranges::replace(steps, ')', ' ');
+  std::istringstream vectors(steps);
+  int known = 0;
+  for (std::string vector; std::getline(vectors, vector, '(');) {
+    const bool is_vector = vector.find(',') != std::string::npos;
+    known += is_vector && vector.find("nan") == std::string::npos && vector.find("inf") == std::string::npos;
+  }
+  require(known >= 3, "\"space directions\" with steps of " + std::to_string(known) + " axes, " + file +
+                          "; expected those of 3, correct the header");
+}
+
 std::optional<ValueLayout> nrrd_layout(const std::filesystem::path& path, const TextHeader& text,
                                        const ImageHeader& header, std::uint64_t& offset) {
   const std::string file = path.string(), encoding = lower(text["encoding"]), endian = lower(text["endian"]);

@@ -15,4 +15,8 @@ namespace tetwarp {
 std::optional<ValueLayout> nrrd_layout(const std::filesystem::path& path, const TextHeader& text,
                                        const ImageHeader& header, std::uint64_t& offset);
 
+/// ITK makes up a direction for an axis whose step is NaN, which files of old have for axes that lie in no space.
+/// @throws InputError where "space directions" are there and fewer than three of them are numbers
+void require_known_steps(const TextHeader& text, const std::string& file);
+
 }  // namespace tetwarp

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
@@ -34,7 +35,8 @@ std::vector<double> numbers(const TextHeader& header, const std::string& name, c
     if (word == "none") continue;
     char* end = nullptr;
     values.push_back(std::strtod(word.c_str(), &end));
-    require(*end == '\0', "\"" + word + "\" in the field \"" + name + "\", " + file + "; expected a number");
+    require(*end == '\0' && std::isfinite(values.back()),
+            "\"" + word + "\" in the field \"" + name + "\", " + file + "; expected a number");
   }
   return values;
 }
@@ -137,11 +139,6 @@ ImageHeader parse_mha(const TextHeader& text, const std::string& file) {
 }
 
 ImageHeader parse_nrrd(const TextHeader& text, const std::string& file) {
-  const std::string space = lower(text["space"]);
-  const bool ras = space == "right-anterior-superior" || space == "ras";
-  require(ras || space == "left-posterior-superior" || space == "lps",
-          "the space \"" + space + "\", " + file +
-              "; without ITK only left-posterior-superior and right-anterior-superior can be read");
   ImageHeader header;
   header.metadata = text.metadata;
   header.type = voxel_type(nrrd_type(lower(text["type"])), ImageFormat::nrrd, file);
@@ -153,16 +150,9 @@ ImageHeader parse_nrrd(const TextHeader& text, const std::string& file) {
     header.components = component_count(size[0], file);
     size.erase(size.begin());
   }
-  const auto steps = numbers(text, "space directions", 9, file), origin = numbers(text, "space origin", 3, file);
-  const glm::dvec3 lps = ras ? glm::dvec3(-1, -1, 1) : glm::dvec3(1);
-  header.geometry.origin = lps * glm::dvec3(origin[0], origin[1], origin[2]) + 0.0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto a = static_cast<std::size_t>(axis);
-    const glm::dvec3 step = lps * glm::dvec3(steps[3 * a], steps[3 * a + 1], steps[3 * a + 2]) + 0.0;
-    header.geometry.size[axis] = whole_number(size[a], file);
-    header.geometry.spacing[axis] = glm::length(step);
-    header.geometry.direction[axis] = step / header.geometry.spacing[axis];
-  }
+  place_nrrd(header.geometry, text, file);
+  for (int axis = 0; axis < 3; ++axis)
+    header.geometry.size[axis] = whole_number(size[static_cast<std::size_t>(axis)], file);
   return header;
 }
 
@@ -205,6 +195,29 @@ std::string nrrd_header(const Geometry& grid, VoxelType type, int components,
 }
 
 }  // namespace
+
+bool is_las(const TextHeader& text) {
+  const std::string space = lower(text["space"]);
+  return space == "left-anterior-superior" || space == "las";
+}
+
+void place_nrrd(Geometry& grid, const TextHeader& text, const std::string& file) {
+  const std::string space = lower(text["space"]);
+  const bool ras = space == "right-anterior-superior" || space == "ras";
+  require(
+      ras || is_las(text) || space == "left-posterior-superior" || space == "lps",
+      "the space \"" + space + "\", " + file +
+          "; without ITK only left-posterior-superior, right-anterior-superior and left-anterior-superior can be read");
+  const auto steps = numbers(text, "space directions", 9, file), origin = numbers(text, "space origin", 3, file);
+  const glm::dvec3 lps(ras ? -1 : 1, ras || is_las(text) ? -1 : 1, 1);
+  grid.origin = lps * glm::dvec3(origin[0], origin[1], origin[2]) + 0.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<std::size_t>(axis);
+    const glm::dvec3 step = lps * glm::dvec3(steps[3 * a], steps[3 * a + 1], steps[3 * a + 2]) + 0.0;
+    grid.spacing[axis] = glm::length(step);
+    grid.direction[axis] = step / grid.spacing[axis];
+  }
+}
 
 std::unique_ptr<ImageReader> open_raw_image(const std::filesystem::path& path, ImageFormat format) {
   const TextHeader text = read_text_header(path, format);

@@ -14,6 +14,7 @@
 
 #include "tests/support/image_samples.h"
 #include "tests/support/real_data.h"
+#include "tests/support/says.h"
 #include "tests/support/scratch.h"
 #include "tests/support/write_file.h"
 
@@ -239,6 +240,27 @@ TEST(ImageFile, NrrdInRasIsReadAsLps) {
   EXPECT_EQ(volume.geometry().spacing, glm::dvec3(2, 3, 4));
   EXPECT_EQ(volume.geometry().direction, glm::dmat3(-1, 0, 0, 0, 0, 1, 0, 1, 0));
   EXPECT_EQ(volume.as<std::int8_t>()[4], 'e');
+}
+
+TEST(ImageFile, NrrdInLasIsReadAsLps) {
+  const Scratch scratch;
+  for (const char* space : {"left-anterior-superior", "LAS"}) {
+    write_file(scratch / "x.nrrd", std::string("NRRD0004\ntype: int8\ndimension: 3\nspace: ") + space +
+                                       "\nsizes: 2 1 3\nspace directions: (2,0,0) (0,0,3) (0,4,0)\nencoding: raw\n"
+                                       "space origin: (10,20,30)\n\nabcdef");
+    const Geometry grid = read_image_header(scratch / "x.nrrd").geometry;
+    EXPECT_EQ(grid.origin, glm::dvec3(10, -20, 30));
+    EXPECT_EQ(grid.spacing, glm::dvec3(2, 3, 4));
+    EXPECT_EQ(grid.direction, glm::dmat3(1, 0, 0, 0, 0, 1, 0, -1, 0));
+  }
+}
+
+TEST(ImageFile, AnNrrdAxisWithoutAStepIsNotGivenOne) {
+  const Scratch scratch;
+  write_file(scratch / "x.nrrd",
+             "NRRD0004\ntype: int8\ndimension: 3\nspace: left-posterior-superior\nsizes: 2 1 3\n"
+             "space directions: (2,0,0) (nan,nan,nan) (0,4,0)\nencoding: raw\nspace origin: (1,2,3)\n\nabcdef");
+  EXPECT_TRUE(says(refusal([&] { read_image(scratch / "x.nrrd"); }), {"space directions", "x.nrrd"}));
 }
 
 #ifdef TETWARP_WITH_ITK

@@ -206,10 +206,11 @@ TEST(ImageWriter, AFullDiskIsSaidWithTheNameOfTheFile) {
     const AnyVolume volume =
         noisy(is_nifti(name) ? glm::i64vec3(151, 113, 40) : glm::i64vec3(61, 43, 31), VoxelType::f32, 3);
     for (const int level : {-1, kLevels.back()}) {
-      // Within the first slices, and at the end: where planes are put together, or a header goes before.
+      // Within the header, within the first slices, and at the end: where planes are put together, or a header goes
+      // before.
       write_image(scratch / name, volume.view(), {level, {}});
       const auto size = static_cast<rlim_t>(std::filesystem::file_size(scratch / name));
-      for (const rlim_t bytes : {rlim_t{100'000}, size - 10}) {
+      for (const rlim_t bytes : {rlim_t{64}, rlim_t{100'000}, size - 10}) {
         const FullDisk full(bytes);
         const std::string text = refusal([&] { written(scratch / name, volume, 3, {level, {}}); });
         EXPECT_TRUE(text.starts_with("Error: cannot write, " + (scratch / name).string() + ";"))

@@ -116,6 +116,7 @@ TEST(Nifti, WhatCannotBeReadExactlyIsRefusedByName) {
   refused(with(good, std::pair<std::size_t, char>(345, 'i')), "NIfTI-1 in one file");
   refused(with(good, std::pair<std::size_t, std::int32_t>(0, 540)), "a NIfTI-2 file");
   refused(with(good, F32(108, 0.0f)), "vox_offset");
+  for (const float slope : {1.0F, 2.0F}) refused(with(good, F32(112, slope), F32(116, NAN)), "scl_inter");
   refused(good.substr(0, 300), "a NIfTI-1 header has 348");
   write_gzipped(scratch / "x.nii", good);
   EXPECT_NE(refusal([&] { read_image(scratch / "x.nii"); }).find("name it .nii.gz"), std::string::npos);
