@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "deform/errors.h"
+#include "io/slicer_space.h"
 
 namespace tetwarp {
 
@@ -30,11 +31,9 @@ std::string with_outside_text(const std::string& description) {
 }
 
 void PointsDocument::take_space(std::string_view text, const std::string& name) {
-  for (const PointFrame said : {PointFrame::lps, PointFrame::ras}) {
-    if (text.find("SPACE=" + to_string(said)) == std::string_view::npos) continue;
-    require(!frame || *frame == said, "both SPACE=LPS and SPACE=RAS, " + name);
-    frame = said;
-  }
+  const std::optional<PointFrame> said = slicer_space(text, name);
+  require(!said || !frame || *frame == *said, "both SPACE=LPS and SPACE=RAS, " + name);
+  if (said) frame = said;
 }
 
 PointFrame frame_of(const std::string& text, const std::string& name) {

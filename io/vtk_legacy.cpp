@@ -7,6 +7,8 @@
 
 #include "deform/errors.h"
 #include "deform/geometry.h"
+#include "io/points_document.h"
+#include "io/slicer_space.h"
 #include "io/vtk_file.h"
 #include "io/vtk_text.h"
 
@@ -85,10 +87,7 @@ class LegacyFile final : public VtkFile {
 
  private:
   void take_frame() {
-    const bool ras = text_.title.find("SPACE=RAS") != std::string_view::npos;
-    const bool lps = text_.title.find("SPACE=LPS") != std::string_view::npos;
-    require(!ras || !lps, "both SPACE=LPS and SPACE=RAS, " + name);
-    if (ras || lps) frame = ras ? "RAS" : "LPS";
+    if (const auto said = slicer_space(text_.title, name)) frame = to_string(*said);
   }
 
   void take_part() {

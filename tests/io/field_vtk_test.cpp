@@ -184,6 +184,8 @@ TEST(VtkField, FrameAndUnitsAreTakenFromOptionsOrTheTitle) {
   expect_corner(file, turned, kFloat, {-3, -5, 7});
   EXPECT_EQ(read_field_header(file).frame_basis, FieldBasis::stated);
   EXPECT_TRUE(says(error_of(with(file, "frame=lps")), {"the file says RAS, the option LPS"}));
+  write_file(file, replaced(read_bytes(file), "SPACE=RAS", "SPACE=IJK"));
+  EXPECT_TRUE(says(error_of(file), {"SPACE=IJK", "expected LPS or RAS"}));
 }
 
 TEST(VtkField, IrregularGridsAreRefusedByTheirFirstVertex) {

@@ -313,6 +313,8 @@ TEST(PointsFile, BrokenFilesAreRefusedWithTheirPlace) {
       {"a.stl", with(stl, "endsolid part\n", ""), {"no endsolid"}},
       {"a.stl", "solid nothing\nendsolid nothing\n", {"no points"}},
       {"a.stl", with(stl, "part", "SPACE=LPS SPACE=RAS"), {"both"}},
+      {"a.stl", with(stl, "part", "SPACE=IJK"), {"SPACE=IJK", "expected LPS or RAS"}},
+      {"a.obj", "# SPACE=LPI\n" + obj, {"SPACE=LPI", "expected LPS or RAS"}},
       {"a.obj", with(obj, "v 1 22 3.25", "v 1 22"), {"2 coordinates", "line 6"}},
       {"a.obj", with(obj, "v 1 22 3.25", "v 1 22 NaN"), {"not a finite number", "line 6"}},
       {"a.obj", with(obj, "v 1 22 3.25\n", ""), {"vertex 3 of 2"}},

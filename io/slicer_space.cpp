@@ -1,0 +1,26 @@
+#include "io/slicer_space.h"
+
+#include <cctype>
+
+#include "deform/errors.h"
+#include "io/points_document.h"
+
+namespace tetwarp {
+
+std::optional<PointFrame> slicer_space(std::string_view text, const std::string& name) {
+  constexpr std::string_view kKey = "SPACE=";
+  std::optional<PointFrame> frame;
+  for (auto at = text.find(kKey); at != std::string_view::npos; at = text.find(kKey, at)) {
+    at += kKey.size();
+    auto end = at;
+    while (end < text.size() && std::isalnum(static_cast<unsigned char>(text[end]))) ++end;
+    const std::string word(text.substr(at, end - at));
+    require(word == "LPS" || word == "RAS", "the frame \"SPACE=" + word + "\", " + name + "; expected LPS or RAS");
+    const PointFrame said = frame_of(word, name);
+    require(!frame || *frame == said, "both SPACE=LPS and SPACE=RAS, " + name);
+    frame = said;
+  }
+  return frame;
+}
+
+}  // namespace tetwarp
