@@ -8,6 +8,7 @@
 
 #include "apps/batch/draw.h"
 #include "apps/batch/manifest_rows.h"
+#include "apps/batch/output_folder.h"
 #include "apps/command_line.h"
 #include "apps/field_source.h"
 #include "apps/reads.h"
@@ -82,6 +83,8 @@ std::string problem_of_id(const std::string& id) {
            "\" cannot be a folder's name everywhere; letters, digits, '.', '_' and '-' are allowed, at most 100, "
            "a letter or digit first";
   }
+  if (is_file_of_a_batch(id))
+    return "the case id \"" + id + "\" is the name of a file of the batch's own; choose another";
   return "";
 }
 
@@ -250,6 +253,8 @@ bool Reader::check_keys(const ManifestRow& row) {
     good = false;
   };
   for (const auto& [key, values] : row.values) {
+    const auto is_cut = [](const std::string& value) { return value.find('\0') != std::string::npos; };
+    if (std::ranges::any_of(values, is_cut)) refuse("\"" + shown(key) + "\" holds a NUL character; take it out");
     if (kOfTheBatch.contains(key))
       refuse("\"" + key + "\" is for the whole batch, not for a case; take it out");
     else if (!kOwnKeys.contains(key) && !option_named(key))

@@ -67,6 +67,16 @@ std::optional<Shard> shard_of(const fs::path& file, const std::string& name, con
   return shard;
 }
 
+bool is_file_of_a_batch(std::string name) {
+  std::ranges::transform(name, name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string start = name.substr(0, name.find('.'));
+  const auto is_of = [&](std::initializer_list<const char*> starts, const char* suffix) {
+    return name.ends_with(suffix) && std::ranges::find(starts, start) != starts.end();
+  };
+  return is_of({"results", "timings"}, ".jsonl") || is_of({"summary"}, ".txt") || is_of({"batch"}, ".json") ||
+         is_of({"batch"}, ".lock");
+}
+
 OutputFolder::OutputFolder(fs::path path, const Shard& shard, const std::vector<std::string>& ids,
                            const std::string& manifest_sha256, bool resume)
     : path_(path.has_filename() ? std::move(path) : path.parent_path()), shard_(shard) {

@@ -61,6 +61,10 @@ class OutputFolder {
 /// I and N of a file of a shard, `NAME.I-of-N.SUFFIX`; nothing of any other.
 std::optional<Shard> shard_of(const std::filesystem::path& file, const std::string& name, const std::string& suffix);
 
+/// Whether a batch, or a shard of one, has a file of its own of this name, whatever the case of its letters: some file
+/// systems tell them not apart.
+bool is_file_of_a_batch(std::string name);
+
 /// Bytes that an ordinary user can still write on the file system of a folder.
 std::uint64_t free_bytes(std::filesystem::path folder);
 

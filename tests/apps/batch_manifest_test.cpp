@@ -99,12 +99,21 @@ TEST_F(BatchManifest, EveryRefusalNamesItsLine) {
         row(R"("field": "identity", "with": [")" + long_name + R"(=x.mha"])"),
         row(R"("field": "identity", "points": ["ct.nrrd=x.csv"])"),
         row(R"("field": "identity", "grid": "fit", "output": "dicom")"),
-        row(R"("field": "identity", "labels": "ct.nrrd")"), row(R"("field": ")" + long_name + '"'),
-        row(R"("pull-field": ")" + long_name + '"'), row(R"("scenario": ")" + long_name + '"')}) {
+        row(R"("field": "identity", "labels": "ct.nrrd")"), row(R"("field": "identity", "coverage": "c.nii.gz\u0000")"),
+        row(R"("field": ")" + long_name + '"'), row(R"("pull-field": ")" + long_name + '"'),
+        row(R"("scenario": ")" + long_name + '"')}) {
     SCOPED_TRACE(bad);
     const Outcome refused = batch(good + "\n" + bad + "\n");
     EXPECT_EQ(refused.status, 4);
     EXPECT_TRUE(refused.err.starts_with("tetwarp: error: m.jsonl:2: ")) << refused.err;
+    EXPECT_FALSE(std::filesystem::exists(scratch_ / "out"));
+  }
+  for (const char* own : {"summary.txt", "Results.jsonl", "timings.2-of-3.jsonl", "batch.json", "batch.lock"}) {
+    write_file(scratch_ / "m.csv",
+               "case,input,field\na,ct.nii.gz,identity\n" + std::string(own) + ",ct.nii.gz,identity\n");
+    const Outcome refused = run("batch m.csv -o out");
+    EXPECT_EQ(refused.status, 4);
+    EXPECT_TRUE(refused.err.starts_with("tetwarp: error: m.csv:3: the case id \"" + std::string(own))) << refused.err;
     EXPECT_FALSE(std::filesystem::exists(scratch_ / "out"));
   }
   for (const char* bad : {"b,\"ct.nii.gz,identity\n", "b,\"ct.nii.gz\"x,identity\n"}) {
