@@ -109,9 +109,11 @@ Part make_part(const TransformRecord& record, const std::string& file) {
     require(transform->IsLinear(),
             "the transform \"" + type + "\", " + file + "; expected an affine one, a B-spline or a displacement field");
     const std::size_t fixed = transform->GetFixedParameters().Size();
-    // Files older than ITK 4.13 do not say in which order Euler3DTransform turns.
-    if (name != "Euler3DTransform" || record.fixed.size() != 3)
-      require_count(record.fixed.size(), fixed, "fixed parameters of " + name, file);
+    // Files older than ITK 4.13 do not say in which order Euler3DTransform turns. Its inverse still says it, as a
+    // matrix, which has no order of turns.
+    const bool has_other_count = (name == "Euler3DTransform" && record.fixed.size() == 3) ||
+                                 (name == "MatrixOffsetTransformBase" && record.fixed.size() == 4);
+    if (!has_other_count) require_count(record.fixed.size(), fixed, "fixed parameters of " + name, file);
     require_count(record.parameters.size(), transform->GetNumberOfParameters(), "parameters of " + name, file);
   }
   transform->SetFixedParameters(itk_array<Transform::FixedParametersType>(record.fixed));

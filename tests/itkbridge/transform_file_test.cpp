@@ -85,13 +85,18 @@ TEST(TransformFile, EveryAffineLikeClassIsItksOwn) {
   }
 }
 
-TEST(TransformFile, BaseClassThatAntsWritesIsAnAffineTransform) {
+TEST(TransformFile, TheBaseClassOfAntsAndOfInversesIsAnAffineTransform) {
   const Scratch scratch;
-  write_file(scratch / "t.txt",
-             "#Insight Transform File V1.0\n#Transform 0\nTransform: MatrixOffsetTransformBase_double_3_3\n"
-             "Parameters: 1.1 0.2 -0.1 0.05 0.9 0.15 -0.2 0.1 1.05 3 5 7\nFixedParameters: 10 -20 30\n");
-  EXPECT_LT(largest_difference(read_transform_file(scratch / "t.txt"), sheared_about(), points_around(oblique_grid())),
-            1e-12);
+  for (const char* order : {"", " 0", " 1"}) {  // of the turns, which the inverse of an Euler3DTransform still states
+    write_file(
+        scratch / "t.txt",
+        std::string("#Insight Transform File V1.0\n#Transform 0\nTransform: MatrixOffsetTransformBase_double_3_3\n"
+                    "Parameters: 1.1 0.2 -0.1 0.05 0.9 0.15 -0.2 0.1 1.05 3 5 7\nFixedParameters: 10 -20 30") +
+            order + "\n");
+    EXPECT_LT(
+        largest_difference(read_transform_file(scratch / "t.txt"), sheared_about(), points_around(oblique_grid())),
+        1e-12);
+  }
 }
 
 TEST(TransformFile, SplineWithOneMovedCoefficientIsItksOwnInsideAndOutside) {
