@@ -30,14 +30,13 @@ struct Commands {
 };
 
 void add_dicom_form(CLI::App& command, DicomForm& form) {
-  const std::map<std::string, DicomEncoding> encodings = {{"explicit", DicomEncoding::uncompressed},
-                                                          {"deflated", DicomEncoding::deflated},
-                                                          {"rle", DicomEncoding::rle},
-                                                          {"jpeg-ls", DicomEncoding::jpeg_ls}};
   command
       .add_option("--transfer-syntax", form.encoding,
                   "Of a DICOM series: explicit (default), deflated, rle or jpeg-ls; all without loss")
-      ->transform(CLI::Transformer(encodings).description(""))
+      ->transform(one_of<DicomEncoding>({{"explicit", DicomEncoding::uncompressed},
+                                         {"deflated", DicomEncoding::deflated},
+                                         {"rle", DicomEncoding::rle},
+                                         {"jpeg-ls", DicomEncoding::jpeg_ls}}))
       ->type_name("NAME");
   command.add_flag(
       "--keep-frame-of-reference", form.keep_frame_of_reference,
@@ -194,13 +193,12 @@ void add_deform(CLI::App& app, DeformOptions& options) {
   add_series(*command, options.input);
   add_nifti_frame(*command, options.common, options.input);
   add_backend(*command, options.backend, options.device);
-  const std::map<std::string, Interpolation> interpolations = {{"nearest", Interpolation::nearest},
-                                                               {"linear", Interpolation::linear},
-                                                               {"cubic", Interpolation::cubic},
-                                                               {"vote", Interpolation::vote}};
   command
       ->add_option("--interpolation", options.interpolation, "linear (default), nearest or cubic; vote for label maps")
-      ->transform(CLI::Transformer(interpolations).description(""))
+      ->transform(one_of<Interpolation>({{"nearest", Interpolation::nearest},
+                                         {"linear", Interpolation::linear},
+                                         {"cubic", Interpolation::cubic},
+                                         {"vote", Interpolation::vote}}))
       ->type_name("NAME");
   add_outside(*command, options.outside);
   command
@@ -368,6 +366,18 @@ void refuse_unknown_words(const CLI::App& app) {
   if (!unknown.empty()) throw UsageError("no command or option \"" + shown(unknown.front()) + "\"; see tetwarp --help");
 }
 
+/// No option takes an empty text: it is what an unset variable of a script leaves, and would count as no option at all.
+void refuse_empty_values(const CLI::App& app) {
+  for (const CLI::App* command : app.get_subcommands()) {
+    for (const CLI::Option* option : command->get_options()) {
+      for (const std::string& value : option->results()) {
+        if (value.empty() && option->get_expected_max() > 0)
+          throw UsageError(option->get_name() + " is empty; give a value, or leave it out");
+      }
+    }
+  }
+}
+
 /// CLI11's words for a command line that is wrong.
 void parse(CLI::App& app, const std::vector<std::string>& arguments) {
   std::vector<const char*> texts;
@@ -381,6 +391,7 @@ void parse(CLI::App& app, const std::vector<std::string>& arguments) {
     refuse_unknown_words(app);
     throw UsageError(std::string(error.what()) + "; see tetwarp --help");
   }
+  refuse_empty_values(app);
 }
 
 }  // namespace

@@ -36,12 +36,17 @@ std::optional<double> number(std::string_view text) {
 /// Reads one option that follows OUT. @return whether it is one
 bool read_option(std::string_view text, FurtherOptions& options) {
   constexpr std::string_view kBackground = "background=";
+  const auto is_first = [](bool given, const char* what) {
+    if (given) throw UsageError(std::string("--with has two of ") + what + "; " + kForm);
+  };
   if (text == "own") {
     options.own = true;
   } else if (text.starts_with(kBackground)) {
+    is_first(options.background.has_value(), "background=");
     options.background = number(text.substr(kBackground.size()));
     return options.background.has_value();
   } else {
+    is_first(options.interpolation.has_value(), "nearest, linear, cubic and vote");
     options.interpolation = interpolation_named(text);
     return options.interpolation.has_value();
   }

@@ -156,11 +156,10 @@ void add_backend(CLI::App& command, std::string& backend, int& device, const cha
 }
 
 void add_outside(CLI::App& command, Outside& outside) {
-  const std::map<std::string, Outside> outsides = {
-      {"refuse", Outside::refuse}, {"rest", Outside::rest}, {"background", Outside::background}};
   command
       .add_option("--outside", outside, "A field that does not cover the volume: refuse (default), rest or background")
-      ->transform(CLI::Transformer(outsides).description(""))
+      ->transform(
+          one_of<Outside>({{"refuse", Outside::refuse}, {"rest", Outside::rest}, {"background", Outside::background}}))
       ->type_name("NAME");
 }
 

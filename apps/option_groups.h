@@ -1,6 +1,10 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <initializer_list>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "apps/options.h"
 
@@ -21,6 +25,24 @@ CLI::Validator real_number(double least, double most);
 CLI::Validator finite_number();
 /// A finite number greater than 0.
 CLI::Validator positive_number();
+/// Turns a name into the value of an enumeration that it stands for, as CLI11 reads it. Any other word is refused,
+/// numbers too, which CLI11's own transformers let through.
+template <class Choice>
+CLI::Validator one_of(std::initializer_list<std::pair<const char*, Choice>> choices) {
+  return CLI::Validator(
+      [choices = std::vector(choices)](std::string& text) {
+        std::string names;
+        for (const auto& [name, value] : choices) {
+          if (text == name) {
+            text = std::to_string(static_cast<int>(value));
+            return std::string();
+          }
+          names += (names.empty() ? "" : ",") + std::string(name);
+        }
+        return text + " not in {" + names + "}";
+      },
+      "");
+}
 /// Turns a size in memory, such as 8G, 2.5G, 500M or 512MiB, into bytes.
 CLI::Validator size_in_bytes();
 

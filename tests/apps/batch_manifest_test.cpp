@@ -48,7 +48,7 @@ no json
                             "m.jsonl:10: \"1..x\" is no range",
                             "m.jsonl:11: output is \"../out.nii.gz\"",
                             "m.jsonl:12: \"threads\" is for the whole batch",
-                            "m.jsonl:13: Could not convert: --interpolation",
+                            "m.jsonl:13: --interpolation: ",
                             "m.jsonl:14: seed is \"-1\"",
                             "m.jsonl:15: \"nowhere.mha\" is neither",
                             "m.jsonl:16: no such file or folder, nowhere.nrrd",

@@ -54,6 +54,28 @@ TEST_F(CommandLine, EveryNumberThatIsNoneIsRefusedInAShortLine) {
     expect_wrong(render + values, {std::string(values).substr(0, 6)});
 }
 
+TEST_F(CommandLine, AChoiceIsANameNoNumberAndTheRefusalListsTheNames) {
+  const std::string deform = "deform ct.nrrd -f identity -o o.nii ";
+  for (const char* word : {"LINEAR", "1", "0", "7", "-1", "lin"}) {
+    expect_wrong(deform + "--interpolation=" + word, {"--interpolation", word, "nearest,linear,cubic,vote"});
+    expect_wrong(deform + "--outside=" + word, {"--outside", word, "refuse,rest,background"});
+    expect_wrong(deform + "--transfer-syntax=" + word, {"--transfer-syntax", word, "explicit,deflated,rle,jpeg-ls"});
+  }
+}
+
+TEST_F(CommandLine, AnEmptyTextIsNoValue) {
+  for (const char* option : {"--report", "--preview", "--inverse", "--grid", "--with", "--series", "--labels"})
+    expect_wrong("deform ct.nrrd -f identity -o o.nii " + std::string(option) + " ''", {option});
+  expect_wrong("deform ct.nrrd -f identity -o ''", {"--output"});
+  expect_wrong("deform '' -f identity -o o.nii", {"empty"});
+}
+
+TEST_F(CommandLine, AnOptionOfAFurtherVolumeIsGivenOnce) {
+  for (const char* options : {":linear:nearest", ":background=1:background=2", ":cubic:cubic"})
+    expect_wrong("deform ct.nrrd -f identity -o o.nii --with ct.nrrd=p.nii" + std::string(options),
+                 {"--with has two of"});
+}
+
 TEST_F(CommandLine, ASizeMayHaveAFraction) {
   for (const char* size : {"2.5G", "2G", "0.5GB", "900M", "900MiB", "2.5 GiB", "1t", "2500000000"})
     EXPECT_EQ(run("deform ct.nrrd -f identity -o o.nii --dry-run --memory '" + std::string(size) + "'").status, 0)
