@@ -63,6 +63,7 @@ std::string series_uid(const DicomHeaders& source, const DicomDerivation& deriva
                                   [](const std::string& uid) { return uid.empty(); });
   if (!named) hash.add(uid_from_headers(source, "instances"));
   hash.add(derivation.field_sha256).add(derivation.parameters).add(version()).add(commit());
+  if (!derivation.deformed) hash.add("resampled");  // a field of zeros has the same digest, and another frame
   if (derivation.form != DicomForm()) hash.add(line_of(derivation.form));
   return uid_of(hash);
 }

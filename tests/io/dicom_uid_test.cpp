@@ -109,6 +109,7 @@ TEST(DerivedUids, FrameOfReferenceIsKeptWhereNothingMoved) {
   const Scratch scratch;
   const Identity written = changed(scratch / "a", [](DerivedSource& source) { source.derivation.deformed = false; });
   EXPECT_EQ(written.frame, "1.2.3.3");
+  EXPECT_NE(written.series, identity_of(DerivedSource(), scratch / "b").series) << "one series in two frames";
   Written file(scratch / "a" / "IM00001.dcm");
   EXPECT_EQ(file[DCM_SeriesDescription], "resampled: Abdomen 2.5");
   EXPECT_EQ(get(item_of(file.data(), DCM_SourceImageSequence), DCM_SpatialLocationsPreserved), "YES");
