@@ -96,12 +96,28 @@ struct PatientNames::Secrets {
       }
     }
   }
-  /// Year, month and day in the orders that people write them in.
+  /// Year, month and day in the orders that people write them in, with and without century and zeros, the month as a
+  /// number or an English name.
   void add_date(std::string date) {
     std::erase_if(date, [](char c) { return !is_digit(c); });
     if (date.size() != 8) return;
-    const std::string year = date.substr(0, 4), month = date.substr(4, 2), day = date.substr(6);
-    words.insert({date, day + month + year, month + day + year});
+    static constexpr const char* kMonths[] = {"january", "february", "march",     "april",   "may",      "june",
+                                              "july",    "august",   "september", "october", "november", "december"};
+    const auto shorter = [](const std::string& number) { return number.front() == '0' ? number.substr(1) : number; };
+    const std::string month = date.substr(4, 2), day = date.substr(6);
+    std::set<std::string> months = {month, shorter(month)};
+    if (month >= "01" && month <= "12") {
+      const std::string name = kMonths[std::stoi(month) - 1];
+      months.insert({name, name.substr(0, 3)});
+    }
+    for (const std::string& year : {date.substr(0, 4), date.substr(2, 2)}) {
+      for (const std::string& m : months) {
+        for (const std::string& d : {day, shorter(day)}) {
+          if (year.size() + m.size() + d.size() < 6) continue;  // 1150 may be anything
+          words.insert({year + m + d, d + m + year, m + d + year});
+        }
+      }
+    }
   }
 
  private:
@@ -112,7 +128,8 @@ struct PatientNames::Secrets {
 };
 
 PatientNames::PatientNames(DcmItem& data) : character_set_(text_of(data, DCM_SpecificCharacterSet)) {
-  const DcmTagKey names[] = {DCM_PatientName, DCM_OtherPatientNames, DCM_PatientBirthName, DCM_PatientMotherBirthName};
+  const DcmTagKey names[] = {DCM_PatientName, DCM_OtherPatientNames, DCM_PatientBirthName, DCM_PatientMotherBirthName,
+                             DCM_ResponsiblePerson};
   const DcmTagKey ids[] = {DCM_PatientID, DcmTagKey(0x0010, 0x1000)};
   std::string source = character_set_;
   for (const DcmTagKey& tag : names) source += '\0' + text_of(data, tag);

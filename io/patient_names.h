@@ -13,9 +13,10 @@ namespace tetwarp {
 /// Tells texts that name the patient, so that they can be left out of what is shown. Where in doubt, a text does.
 ///
 /// A text names the patient when it holds, in any spelling (comparable_text.h), a word of Patient's Name, of Other
-/// Patient Names or of the birth names, in any of the groups of a name (alphabetic, ideographic, phonetic); or Patient
-/// ID or one of Other Patient IDs, with or without the zeros that it begins with; or the birth date. Case, marks, and
-/// what stands between letters do not matter, nor what a word is glued to:
+/// Patient Names, of the birth names or of the Responsible Person, in any of the groups of a name (alphabetic,
+/// ideographic, phonetic); or Patient ID or one of Other Patient IDs, with or without the zeros that it begins with; or
+/// the birth date, in numbers or with an English name of the month. Case, marks, and what stands between letters do not
+/// matter, nor what a word is glued to:
 /// - three letters or more, four characters or more with digits, any word of another script: anywhere in the text;
 /// - fewer characters with digits: unless a digit beside them makes another number of them;
 /// - two letters: where a word begins or ends;

@@ -113,14 +113,15 @@ TEST(PatientNames, OtherNamesOtherIdsAndBirthDateAreFound) {
   set(data, DCM_PatientBirthName, "MAIDEN");
   set(data, DcmTagKey(0x0010, 0x1000), "OLDID\\7788");
   set(data, DCM_PatientBirthDate, "19500214");
+  set(data, DCM_ResponsiblePerson, "PARENT");
   DcmItem* other = nullptr;
   ASSERT_TRUE(data.findOrCreateSequenceItem(DCM_OtherPatientIDsSequence, other, 0).good());
   set(*other, DCM_PatientID, "LISTED9");
   const PatientNames patient(data);
-  for (const char* text :
-       {"Former", "second", "maidenCT", "oldid", "x7788", "listed9", "born 14.02.1950", "1950-02-14"})
+  for (const char* text : {"Former", "second", "maidenCT", "oldid", "x7788", "listed9", "born 14.02.1950", "1950-02-14",
+                           "14 Feb 1950", "february 14, 1950", "14.2.1950", "500214", "14FEB50", "parent"})
     EXPECT_TRUE(patient.are_in(text)) << text;
-  EXPECT_FALSE(patient.are_in("Abdomen 1950"));
+  for (const char* text : {"Abdomen 1950", "Feb 1950", "50214"}) EXPECT_FALSE(patient.are_in(text)) << text;
 }
 
 TEST(PatientNames, SidecarAndListOfSeriesLeaveSuchTextsOut) {
