@@ -150,7 +150,8 @@ void require_whole_numbers(const ConstVolumeView& labels) {
       for (const V value : voxels_of<V>(labels)) {
         const auto label = static_cast<double>(value);
         if (!(std::abs(label) <= kLargest && std::floor(label) == label))
-          throw InputError("a label is " + std::to_string(label) + "; labels are whole numbers");
+          throw InputError("a label is " + std::to_string(label) +
+                           "; labels are whole numbers, resample them by nearest neighbour or vote");
       }
     }
   });
@@ -219,9 +220,12 @@ Patient examine(const ConstVolumeView& ct, const ConstVolumeView* labels, std::i
   patient.cell_hu = means(ct, cells, control);
   patient.vertex_hu = means(ct, vertices, control);
   if (labels != nullptr) {
-    require(labels->components == 1 && same_grid(*labels->geometry, volume, kSameGridMm),
+    require(labels->components == 1, "labels of " + std::to_string(labels->components) + " values a voxel; expected 1");
+    const bool same_size = labels->geometry->size == volume.size;
+    require(same_grid(*labels->geometry, volume, kSameGridMm),
             "the labels have a grid of " + to_string(labels->geometry->size) + " voxels, the volume one of " +
-                to_string(volume.size) + "; labels are expected on the grid of the volume, voxel by voxel");
+                (same_size ? "as many at another place" : to_string(volume.size)) +
+                "; labels are expected on the grid of the volume, voxel by voxel");
     require_whole_numbers(*labels);
     patient.cell_label = most_frequent(*labels, cells, control);
     patient.vertex_label = most_frequent(*labels, vertices, control);
