@@ -107,6 +107,10 @@ std::string geometry_problem(const DicomFileHeader& header);
 /// Why its pixels cannot be turned into HU; empty if they can, as far as the header tells.
 std::string pixel_problem(const DicomFileHeader& header);
 
+/// Why Pixel Data of a file that was read to their end are about an image of other rows, or more frames: a row or more
+/// is left over. Less counts as filling, which some writers add. Empty: nothing is, or they are compressed.
+std::string excess_problem(const DicomFileHeader& header);
+
 /// Padding in HU, rounded half to even and saturated to int16; none if the slice has no usable Pixel Padding Value.
 std::optional<PaddingRange> padding_hu(const PixelFormat& pixels);
 

@@ -198,6 +198,17 @@ std::string pixel_problem(const DicomFileHeader& header) {
   return {};
 }
 
+std::string excess_problem(const DicomFileHeader& header) {
+  const PixelFormat& pixels = header.pixels;
+  if (pixel_coding(header.transfer_syntax_uid) != PixelCoding::native || !header.pixel_bytes) return {};
+  const auto frames = static_cast<std::uint64_t>(header.frame ? pixels.frames - *header.frame : 1);
+  const std::uint64_t expected = frames * slice_bytes(pixels), row = expected / frames / std::uint64_t(pixels.rows);
+  if (*header.pixel_bytes < expected + row) return {};
+  return "more Pixel Data than Rows x Columns " + size_text(pixels) + (frames > 1 ? " of each frame" : "") +
+         where(header) + ": expected " + std::to_string(expected) + " bytes, found " +
+         std::to_string(*header.pixel_bytes) + "; correct the file or leave it out";
+}
+
 std::string size_text(const PixelFormat& pixels) {
   return std::to_string(pixels.rows) + " x " + std::to_string(pixels.columns);
 }

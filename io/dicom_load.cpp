@@ -47,7 +47,10 @@ struct LoadedSlice {
 };
 
 void check(const DicomFileHeader& header, const DicomSlice& slice, const Geometry& geometry) {
-  for (const auto& problem : {geometry_problem(header), pixel_problem(header)}) require(problem.empty(), problem);
+  for (const auto problem_of : {geometry_problem, pixel_problem, excess_problem}) {
+    const std::string problem = problem_of(header);
+    require(problem.empty(), problem);
+  }
   require_unchanged(header, slice, geometry);
 }
 

@@ -236,6 +236,20 @@ TEST(DicomLoad, PixelsAreTheSameFromTheFileAndThroughDcmtk) {
   }
 }
 
+TEST(DicomLoad, PixelsOfMoreRowsThanTheHeaderSaysAreNotCutToThem) {
+  for (const E_TransferSyntax encoding :
+       {EXS_LittleEndianExplicit, EXS_BigEndianExplicit, EXS_DeflatedLittleEndianExplicit}) {
+    const Scratch folder;
+    write_large_stack(folder.path(), [&](MadeSlice& slice) {
+      slice.encoding = encoding;
+      slice.edit = [](DcmDataset& data) { data.putAndInsertUint16(DCM_Rows, 95); };
+    });
+    EXPECT_TRUE(says(error_of([&] { load_folder(folder.path()); }),
+                     {"more Pixel Data than Rows x Columns 95 x 100", "expected 19000 bytes, found 19200"}))
+        << encoding;
+  }
+}
+
 TEST(DicomLoad, PixelsAreFoundWherePixelDataAlsoOccurWithinASequence) {
   const Scratch folder;
   write_large_stack(folder.path(), [](MadeSlice& slice) {
