@@ -87,15 +87,24 @@ std::unique_ptr<ImageReader> open_mha(const std::filesystem::path& path, const T
                            {.encoding = zlib ? Encoding::zlib : Encoding::raw, .big_endian = is_big_endian(text)});
 }
 
+/// An NRRD that names none of the patient's spaces is taken as LPS, as ITK takes it.
+void note_assumed_space(const TextHeader& text, ImageHeader& header) {
+  const std::string space = nrrd_space(text);
+  if (space == "lps" || space == "ras" || space == "las") return;
+  header.notes.push_back(space.empty() ? "the file does not say its space: taken as LPS"
+                                       : "the space \"" + space + "\" is none of a patient: taken as LPS");
+}
+
 std::unique_ptr<ImageReader> open_format(const std::filesystem::path& path, ImageFormat format, NiftiFrame frame) {
   if (format == ImageFormat::nifti) return open_nifti(path, frame);
   const TextHeader text = read_text_header(path, format);
   if (format == ImageFormat::nrrd) require_known_steps(text, path.string());
   ItkImageInfo info = itk_read_info(path, itk_format(format));
   // NrrdImageIO of ITK 5.2 turns left-anterior-superior about the wrong axis.
-  if (format == ImageFormat::nrrd && is_las(text)) place_nrrd(info.geometry, text, path.string());
+  if (format == ImageFormat::nrrd && nrrd_space(text) == "las") place_nrrd(info.geometry, text, path.string());
   const Stored stored{text.data_offset, size_bytes(info.type), is_encoded(text, format)};
-  const ImageHeader header{info.geometry, info.type, info.components, text.metadata};
+  ImageHeader header{info.geometry, info.type, info.components, text.metadata};
+  if (format == ImageFormat::nrrd) note_assumed_space(text, header);
   return format == ImageFormat::nrrd ? open_nrrd(path, text, header, stored) : open_mha(path, text, header, stored);
 }
 

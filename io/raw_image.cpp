@@ -196,20 +196,23 @@ std::string nrrd_header(const Geometry& grid, VoxelType type, int components,
 
 }  // namespace
 
-bool is_las(const TextHeader& text) {
+std::string nrrd_space(const TextHeader& text) {
   const std::string space = lower(text["space"]);
-  return space == "left-anterior-superior" || space == "las";
+  if (space == "left-posterior-superior") return "lps";
+  if (space == "right-anterior-superior") return "ras";
+  if (space == "left-anterior-superior") return "las";
+  return space;
 }
 
 void place_nrrd(Geometry& grid, const TextHeader& text, const std::string& file) {
-  const std::string space = lower(text["space"]);
-  const bool ras = space == "right-anterior-superior" || space == "ras";
-  require(
-      ras || is_las(text) || space == "left-posterior-superior" || space == "lps",
-      "the space \"" + space + "\", " + file +
-          "; without ITK only left-posterior-superior, right-anterior-superior and left-anterior-superior can be read");
+  const std::string space = nrrd_space(text);
+  const bool ras = space == "ras", las = space == "las";
+  require(ras || las || space == "lps",
+          "the space \"" + space + "\", " + file +
+              "; without ITK only left-posterior-superior, right-anterior-superior and left-anterior-superior can be "
+              "read");
   const auto steps = numbers(text, "space directions", 9, file), origin = numbers(text, "space origin", 3, file);
-  const glm::dvec3 lps(ras ? -1 : 1, ras || is_las(text) ? -1 : 1, 1);
+  const glm::dvec3 lps(ras ? -1 : 1, ras || las ? -1 : 1, 1);
   grid.origin = lps * glm::dvec3(origin[0], origin[1], origin[2]) + 0.0;
   for (int axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<std::size_t>(axis);

@@ -16,8 +16,8 @@ namespace tetwarp {
 /// compressed
 std::unique_ptr<ImageReader> open_raw_image(const std::filesystem::path& path, ImageFormat format);
 
-/// Whether the space of an NRRD is left-anterior-superior.
-bool is_las(const TextHeader& text);
+/// The field "space" of an NRRD, in lower case; of the three that a patient has, each in its short form: lps, ras, las.
+std::string nrrd_space(const TextHeader& text);
 
 /// Origin, spacing and direction, LPS, by the fields "space", "space origin" and "space directions" of an NRRD.
 /// @throws InputError for spaces other than LPS, RAS and LAS, and for anything but nine and three finite numbers

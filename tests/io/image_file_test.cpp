@@ -255,6 +255,22 @@ TEST(ImageFile, NrrdInLasIsReadAsLps) {
   }
 }
 
+#ifdef TETWARP_WITH_ITK
+TEST(ImageFile, AnNrrdWithoutASpaceOfThePatientIsTakenAsLpsWithANote) {
+  const Scratch scratch;
+  const auto notes_of = [&](const std::string& place) {
+    write_file(scratch / "x.nrrd",
+               "NRRD0004\ntype: int8\ndimension: 3\nsizes: 2 1 3\nencoding: raw\n" + place + "\n\nabcdef");
+    return read_image_header(scratch / "x.nrrd").notes;
+  };
+  const std::string directions = "\nspace directions: (2,0,0) (0,3,0) (0,0,4)\nspace origin: (1,2,3)";
+  EXPECT_EQ(notes_of("space: left-posterior-superior" + directions), std::vector<std::string>());
+  EXPECT_EQ(notes_of("space: RAS" + directions), std::vector<std::string>());
+  EXPECT_TRUE(says(notes_of("space: scanner-xyz" + directions).at(0), {"scanner-xyz", "taken as LPS"}));
+  EXPECT_TRUE(says(notes_of("spacings: 2 3 4").at(0), {"does not say its space", "taken as LPS"}));
+}
+#endif
+
 TEST(ImageFile, AnNrrdAxisWithoutAStepIsNotGivenOne) {
   const Scratch scratch;
   write_file(scratch / "x.nrrd",
