@@ -5,6 +5,7 @@
 #include <dcmtk/dcmdata/dcfilefo.h>
 #include <dcmtk/dcmdata/dcuid.h>
 
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <vector>
@@ -38,10 +39,11 @@ class DoseFile {
     dose.frame_of_reference_uid = text_of(data(), DCM_FrameOfReferenceUID);
     Geometry& grid = dose.geometry;
     grid.size = {word(DCM_Columns), word(DCM_Rows), std::max<std::int64_t>(1, whole_number(DCM_NumberOfFrames))};
-    const glm::dvec3 row(number(DCM_ImageOrientationPatient, 0), number(DCM_ImageOrientationPatient, 1),
-                         number(DCM_ImageOrientationPatient, 2));
-    const glm::dvec3 column(number(DCM_ImageOrientationPatient, 3), number(DCM_ImageOrientationPatient, 4),
-                            number(DCM_ImageOrientationPatient, 5));
+    std::array<double, 6> cosines;
+    for (unsigned long n = 0; n < 6; ++n) cosines[n] = number(DCM_ImageOrientationPatient, n);
+    if (const std::string problem = rotation_problem(cosines); !problem.empty())
+      refuse("has an Image Orientation (0020,0037) that is no rotation: " + problem);
+    const glm::dvec3 row(cosines[0], cosines[1], cosines[2]), column(cosines[3], cosines[4], cosines[5]);
     const glm::dvec3 normal = glm::cross(row, column);
     grid.direction = glm::dmat3(row, column, normal);
     grid.origin = {number(DCM_ImagePositionPatient, 0), number(DCM_ImagePositionPatient, 1),
@@ -115,7 +117,7 @@ class DoseFile {
   /// the patient's z of every frame.
   void place_frames(Geometry& grid) {
     constexpr double kTolerance = 1e-3;  // mm
-    if (grid.size.z == 1) return;
+    if (grid.size.z < 2) refuse("has one frame, which says no distance between frames; expected 2 or more");
     const double first = number(DCM_GridFrameOffsetVector, 0), step = number(DCM_GridFrameOffsetVector, 1) - first;
     for (std::int64_t k = 1; k < grid.size.z; ++k) {
       const double offset = number(DCM_GridFrameOffsetVector, static_cast<unsigned long>(k));

@@ -7,6 +7,7 @@
 #include <array>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -100,6 +101,10 @@ std::string kind_name(const std::string& sop_class_uid);
 
 /// Why this object is no slice of a CT volume by its kind (localizer, dose, MR, ...); empty if it may be one.
 std::string other_kind(const DicomFileHeader& header);
+
+/// Why the cosines of a row and a column (Image Orientation) are no rotation, "expected X, found Y"; empty: they are
+/// one.
+std::string rotation_problem(std::span<const double, 6> cosines);
 
 /// Why Image Plane attributes of this slice cannot be used, "WHAT, FILE; WHAT TO DO"; empty if they can.
 std::string geometry_problem(const DicomFileHeader& header);

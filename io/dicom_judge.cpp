@@ -179,16 +179,19 @@ std::string geometry_problem(const DicomFileHeader& header) {
   if (!header.spacing || header.spacing->x <= 0 || header.spacing->y <= 0) {
     return missing_or_bad("Pixel Spacing (0028,0030)", header, "two positive numbers");
   }
-  const std::array<double, 6>& c = *header.orientation;
+  if (const std::string problem = rotation_problem(*header.orientation); !problem.empty()) {
+    return "Image Orientation (0020,0037) is no rotation" + where(header) + ": " + problem +
+           "; correct the file or leave it out";
+  }
+  return {};
+}
+
+std::string rotation_problem(std::span<const double, 6> c) {
   const double row = std::hypot(c[0], c[1], c[2]), column = std::hypot(c[3], c[4], c[5]);
   const double across = c[0] * c[3] + c[1] * c[4] + c[2] * c[5];
   // Three digits (.707) are round-off; more is no rotation.
-  if (std::abs(row - 1) > 1e-3 || std::abs(column - 1) > 1e-3 || std::abs(across) > 1e-3) {
-    return "Image Orientation (0020,0037) is no rotation" + where(header) +
-           ": expected lengths 1, 1 and product 0, found " + number(row) + ", " + number(column) + " and " +
-           number(across) + "; correct the file or leave it out";
-  }
-  return {};
+  if (std::abs(row - 1) <= 1e-3 && std::abs(column - 1) <= 1e-3 && std::abs(across) <= 1e-3) return {};
+  return "expected lengths 1, 1 and product 0, found " + number(row) + ", " + number(column) + " and " + number(across);
 }
 
 std::string pixel_problem(const DicomFileHeader& header) {

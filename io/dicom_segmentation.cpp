@@ -142,6 +142,8 @@ void SegmentationFile::read_plane(DicomSegmentation& seg) {
       refuse("has frames that are not parallel or of different Pixel Spacing: frame " + std::to_string(n + 1) +
              " differs from the first");
   }
+  if (const std::string problem = rotation_problem(std::span<const double, 6>(cosines)); !problem.empty())
+    refuse("has an Image Orientation (0020,0037) that is no rotation: " + problem);
   const glm::dvec3 row(cosines[0], cosines[1], cosines[2]), column(cosines[3], cosines[4], cosines[5]);
   seg.geometry.direction = glm::dmat3(row, column, glm::cross(row, column));
   seg.geometry.spacing = {spacing[1], spacing[0], 1};
@@ -237,9 +239,10 @@ DicomSegmentation SegmentationFile::header(double otherwise_mm) {
   read_segment_list(seg);
   shared_ = items(DCM_SharedFunctionalGroupsSequence, 1).front();
   frames_ = items(DCM_PerFrameFunctionalGroupsSequence, kMostFrames);
-  if (const std::string stated = text_of(data(), DCM_NumberOfFrames); stated != std::to_string(frames_.size()))
-    refuse("has Number of Frames (0028,0008) " + stated_number(stated) + ", and functional groups of " +
-           std::to_string(frames_.size()));
+  Sint32 stated = 0;
+  if (data().findAndGetSint32(DCM_NumberOfFrames, stated).bad() || stated != std::ssize(frames_))
+    refuse("has Number of Frames (0028,0008) " + stated_number(text_of(data(), DCM_NumberOfFrames)) +
+           ", and functional groups of " + std::to_string(frames_.size()));
   read_plane(seg);
   place_frames(seg, otherwise_mm);
   require_dense(seg);

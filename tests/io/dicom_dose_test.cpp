@@ -108,6 +108,9 @@ TEST(Dose, WhatIsNoEvenGridOrCutShortIsRefused) {
   refused({.offsets = "0\\2.5"}, "GridFrameOffsetVector");
   refused({.offsets = "8\\10\\12"}, "Image Position");
   refused({.position = "1\\2"}, "ImagePositionPatient");
+  refused({.orientation = "1\\0\\0\\0\\0.9\\0"},
+          "no rotation: expected lengths 1, 1 and product 0, found 1, 0.9 and 0");
+  refused({.frames = "1", .offsets = "0", .count = 8}, "one frame");
   refused({.missing_words = 2}, "cut short");
   refused({.frames = "2", .offsets = "0\\2.5"}, "96 bytes of Pixel Data (7FE0,0010), expected 64");
   for (const char* scaling : {"0", "-0.0005"}) {

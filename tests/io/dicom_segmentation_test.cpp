@@ -74,6 +74,15 @@ void move_frame(DcmDataset& data, long n, const std::string& position) {
   MadeSeg::text(*plane, DCM_ImagePositionPatient, position);
 }
 
+TEST(Segmentation, NumberOfFramesIsANumberHoweverItIsWritten) {
+  const Scratch scratch;
+  for (const char* stated : {"4", "04", "+4 "}) {
+    MadeSeg{.value = two_organs, .edit = [=](DcmDataset& data) { MadeSeg::text(data, DCM_NumberOfFrames, stated); }}
+        .write(scratch / "seg");
+    EXPECT_EQ(read_segmentation_header(scratch / "seg").frames.size(), 4U) << stated;
+  }
+}
+
 TEST(Segmentation, FarMoreVolumeThanPixelsIsRefused) {
   const Scratch scratch;
   MadeSeg made{.slices = 2000, .value = [](int n, int, int, int k) { return n == 0 && k % 1999 == 0 ? 1 : 0; }};
@@ -101,6 +110,11 @@ TEST(Segmentation, WhatIsNotOnOneEvenGridOrCutShortOrContradictsItselfIsRefused)
   refused(
       "PixelRepresentation 1, expected 0", [](DcmDataset& data) { MadeSeg::word(data, DCM_PixelRepresentation, 1); },
       true);
+  refused("no rotation: expected lengths 1, 1 and product 0, found 1, 0.9 and 0", [](DcmDataset& data) {
+    for (long n = 0; n < 4; ++n)
+      MadeSeg::text(MadeSeg::append(frame_of(data, n), DCM_PlaneOrientationSequence), DCM_ImageOrientationPatient,
+                    "1\\0\\0\\0\\0.9\\0");
+  });
   refused("Segmentation Type", [](DcmDataset& data) { MadeSeg::text(data, DCM_SegmentationType, "LABELMAP"); });
   refused(
       "above (0062,000e)",
