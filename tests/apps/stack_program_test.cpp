@@ -9,6 +9,7 @@
 #include "tests/support/real_data.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"
+#include "tests/support/write_file.h"
 
 namespace tetwarp::test {
 namespace {
@@ -70,6 +71,11 @@ TEST(StackProgram, AStackThatLeansIsTheGridOfEveryCommandThatTakesOne) {
   run("invert bubble:radius=20,strength=0.2 --like tilted -o pull.mha");
   run("invert --pull-field pull.mha --like tilted -o forward.mha");
   run("invert --pull-field pull.mha --like tilted -o forward.nii.gz --report r.json");
+  // A transform has no grid of its own: its inverse has that of --like, straightened.
+  write_file(scratch / "t.tfm",
+             "#Insight Transform File V1.0\n#Transform 0\nTransform: TranslationTransform_double_3_3\n"
+             "Parameters: 1 0 0\nFixedParameters:\n");
+  run("invert --pull-field t.tfm --like tilted -o shift.mha");
   run("deform tilted --pull-field pull.mha -o a.mha --background -1500");
   run("deform tilted -f forward.mha -o b.mha --background -1500 --outside background");
   const auto report = nlohmann::json::parse(read_text(scratch / "r.json"));
