@@ -119,6 +119,7 @@ TEST_F(WhatIsRead, IsNotWrittenOverByOtherCommands) {
   is_refused("render series/IM00001.dcm --view axial -o slice.png", "series/IM00004.dcm");
   fs::create_hard_link(scratch_ / "first.txt", scratch_ / "first.png");
   is_refused("render ct.nii.gz --view axial --overlay lattice=second.txt -o first.png", "first.txt");
+  is_refused("render ct.nii.gz --view axial --outside background --sequence second.txt -o first.png", "first.txt");
 }
 
 TEST_F(WhatIsRead, IsHashedWithEverySliceOfASeriesOfLabels) {
