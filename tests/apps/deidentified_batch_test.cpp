@@ -137,6 +137,19 @@ TEST_F(DeidentifiedBatch, KeepsWhatTheCaseCannotBeReadWithout) {
   EXPECT_EQ(lines_of("out/results.jsonl").at("a")["outputs"][0]["path"], "a/dicom.json");
 }
 
+TEST_F(DeidentifiedBatch, ThePreviewOfAFieldIsTheSameWhateverItsFileIsCalled) {
+  fs::copy_file(scratch_ / "Mustermann_field.mha", scratch_ / "other.mha");
+  const auto preview = [&](const std::string& field, const std::string& more) {
+    const Outcome made = run("deform Mustermann_Erika -f " + field +
+                             " --outside rest -o out --overwrite --backend cpu --preview p.png" + more);
+    EXPECT_EQ(made.status, 0) << made.err;
+    return read_text(scratch_ / "p.png");
+  };
+  const std::string hidden = " --deidentify basic --deidentify-key Mustermann_key";
+  EXPECT_EQ(preview("Mustermann_field.mha", hidden), preview("other.mha", hidden));
+  EXPECT_NE(preview("Mustermann_field.mha", ""), preview("other.mha", "")) << "its title has the name else";
+}
+
 TEST_F(DeidentifiedBatch, OfOneRunTheSidecarAndTheReportNameNothingEither) {
   const Outcome made =
       run("deform Mustermann_Erika -f Mustermann_field.mha --outside rest -o Mustermann_out --deidentify basic "
