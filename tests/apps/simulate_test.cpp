@@ -277,6 +277,14 @@ TEST_F(Simulate, AnOpenCutIsOneFieldForReportHashGridAndFile) {
     EXPECT_GT(trip["forward_after_inverse"]["points"], 10000) << name;
     EXPECT_LT(trip["forward_after_inverse"]["largest_mm"], 0.1) << name;
   }
+  // What is of a lattice is snapped as the lattice's, so the same mesh of none is another field.
+  std::string plain = read_text(scratch_ / "one.vtk");
+  for (auto at = plain.find("tetwarp_lattice"); at != std::string::npos; at = plain.find("tetwarp_lattice", at))
+    plain.replace(at, 7, "unknown");
+  write_file(scratch_ / "plain.vtk", plain);
+  ASSERT_EQ(run("deform ct.mha -f plain.vtk -o plain.mha" + common).status, 0);
+  EXPECT_FALSE(field_of("plain.mha.json").contains("lattice"));
+  EXPECT_NE(field_of("one.mha.json")["sha256"], field_of("plain.mha.json")["sha256"]);
 }
 
 TEST_F(Simulate, AGridThatFitsAnOpenCutHoldsTheLatticeBesideItToo) {
