@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/encapsulated.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"
 #include "tests/support/seg_maker.h"
@@ -152,6 +153,23 @@ TEST(Segmentation, WhatIsNotOnOneEvenGridOrCutShortOrContradictsItselfIsRefused)
   refused("SharedFunctionalGroups",
           [](DcmDataset& data) { data.findAndDeleteElement(DCM_SharedFunctionalGroupsSequence); });
   refused("no DICOM segmentation", [](DcmDataset& data) { MadeSeg::text(data, DCM_SOPClassUID, UID_CTImageStorage); });
+}
+
+TEST(Segmentation, CompressedPixelsAreRefusedByTheirName) {
+  const Scratch scratch;
+  for (const auto& [uid, name] : {std::pair{UID_RLELosslessTransferSyntax, "RLE Lossless"},
+                                  std::pair{UID_JPEG2000LosslessOnlyTransferSyntax, "JPEG 2000"}}) {
+    std::string attributes;
+    MadeSeg{.value = two_organs, .edit = [&](DcmDataset& data) { attributes = attributes_of(data); }}.write(scratch /
+                                                                                                            "seg");
+    write_file(scratch / "seg", file_start(uid) + attributes + encapsulated({std::string(64, '\0')}));
+    try {
+      read_segments(scratch / "seg", read_segmentation_header(scratch / "seg"));
+      FAIL() << name;
+    } catch (const InputError& error) {
+      EXPECT_TRUE(says(error.what(), {"has compressed pixels", name, "plain ones", (scratch / "seg").string()}));
+    }
+  }
 }
 
 }  // namespace
