@@ -77,6 +77,12 @@ TEST(Dose, OnlyTheStoredBitsCountWithTheirSign) {
   }
 }
 
+TEST(Dose, UnitsThatTheStandardDoesNotDefineAreNotShown) {
+  const Scratch scratch;
+  MadeDose{.edit = [](DcmDataset& data) { data.putAndInsertString(DCM_DoseUnits, "SECRET"); }}.write(scratch / "dose");
+  EXPECT_EQ(read_dose_header(scratch / "dose").units, "no known value");
+}
+
 TEST(Dose, FramesMayLieAtPatientCoordinatesOrAgainstTheNormal) {
   const Scratch scratch;
   MadeDose{.offsets = "7\\10\\13"}.write(scratch / "absolute");

@@ -117,6 +117,7 @@ TEST(Segmentation, WhatIsNotOnOneEvenGridOrCutShortOrContradictsItselfIsRefused)
                     "1\\0\\0\\0\\0.9\\0");
   });
   refused("Segmentation Type", [](DcmDataset& data) { MadeSeg::text(data, DCM_SegmentationType, "LABELMAP"); });
+  refused("(0062,0001) no known value,", [](DcmDataset& data) { MadeSeg::text(data, DCM_SegmentationType, "SECRET"); });
   refused(
       "above (0062,000e)",
       [](DcmDataset& data) {
@@ -131,6 +132,7 @@ TEST(Segmentation, WhatIsNotOnOneEvenGridOrCutShortOrContradictsItselfIsRefused)
   refused("ImagePositionPatient", [](DcmDataset& data) { move_frame(data, 2, "-10\\-20"); });
   refused("at most 2500", [](DcmDataset& data) { move_frame(data, 3, "-10\\-20\\25030"); });
   refused("Number of Frames", [](DcmDataset& data) { MadeSeg::text(data, DCM_NumberOfFrames, "5"); });
+  refused("(0028,0008) no number,", [](DcmDataset& data) { MadeSeg::text(data, DCM_NumberOfFrames, "SECRET"); });
   refused("cut short", [](DcmDataset& data) {
     Uint8 pixels[10] = {};
     data.putAndInsertUint8Array(DCM_PixelData, pixels, 10);

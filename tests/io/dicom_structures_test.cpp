@@ -72,6 +72,7 @@ TEST(Structures, WhatContradictsItselfIsRefusedByName) {
       {text(DCM_ContourData, "1\\2\\1e300", 1, 0), {"1e300", "contour 1 of ROI 2"}},
       {text(DCM_NumberOfContourPoints, "7"), {"says 7", "has 3 points"}},
       {text(DCM_NumberOfContourPoints, "99999999999"), {"99999999999", "has 3 points"}},
+      {text(DCM_NumberOfContourPoints, "SECRET"), {"says no number", "has 3 points"}},
       {text(DCM_ContourGeometricType, "ROUND"), {"(3006,0042)", "no known value"}},
       {text(DCM_RETIRED_ContourOffsetVector, "0\\0\\1.5"), {"(3006,0045)"}},
       {[](DcmDataset& data) { data.findAndDeleteElement(DCM_StructureSetROISequence); }, {"(3006,0020)"}},

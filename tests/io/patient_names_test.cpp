@@ -138,6 +138,9 @@ TEST(PatientNames, SidecarAndListOfSeriesLeaveSuchTextsOut) {
   EXPECT_FALSE(found.contains("SeriesDescription"));
   EXPECT_EQ(found["ImageType"], nlohmann::json({"DERIVED", "SECONDARY", "AXIAL"}));
   EXPECT_EQ(found["BodyPartExamined"], "ABDOMEN");
+  set(*source.headers.slices.back(), DCM_OtherPatientNames, "ABDOMEN");  // a name that no other slice has
+  EXPECT_FALSE(nlohmann::json::parse(bids_sidecar(source.headers, source.volume.geometry, source.derivation))
+                   .contains("BodyPartExamined"));
 
   const Scratch folder;
   for (int n = 0; n < 3; ++n) {
@@ -164,6 +167,28 @@ TEST(PatientNames, SidecarAndListOfSeriesLeaveSuchTextsOut) {
   EXPECT_NE(texts.find("KVP"), std::string::npos) << texts;
   EXPECT_NE(texts.find("Rescale Type is no known value"), std::string::npos) << texts;
   for (const char* word : {"M\xc3\x9cLLER", "MUELLER"}) EXPECT_EQ(texts.find(word), std::string::npos) << texts;
+}
+
+TEST(PatientNames, ARefusalShowsNoCodeThatTheStandardDoesNotDefine) {
+  const auto refusal = [](const std::function<void(DcmDataset&)>& edit) {
+    const Scratch folder;
+    MadeSlice slice;
+    slice.edit = edit;
+    write_slice(folder / "slice", slice);
+    const DicomScan scan = scan_dicom(folder.path());
+    return scan.series.empty() ? std::string() : scan.series.front().refusal.value_or("");
+  };
+  const std::string colour =
+      refusal([](DcmDataset& data) { data.putAndInsertString(DCM_PhotometricInterpretation, "MUELLER"); });
+  EXPECT_NE(colour.find("found no known value"), std::string::npos) << colour;
+  EXPECT_EQ(colour.find("MUELLER"), std::string::npos) << colour;
+  const std::string packed = refusal([](DcmDataset& data) {
+    delete data.remove(DCM_PixelData);
+    data.putAndInsertString(DcmTag(0x07a1, 0x0010, EVR_LO), "ELSCINT1");
+    data.putAndInsertString(DcmTag(0x07a1, 0x1011, EVR_CS), "MUELLER");
+  });
+  EXPECT_NE(packed.find("private compression no known value"), std::string::npos) << packed;
+  EXPECT_EQ(packed.find("MUELLER"), std::string::npos) << packed;
 }
 
 }  // namespace
