@@ -148,10 +148,12 @@ TEST_F(IsolatedRead, ThisProcessIsNotCopied) {
 }
 
 TEST_F(IsolatedRead, NoFileOfThisProcessIsInherited) {
-  const int open = ::open("/etc/hostname", O_RDONLY);  // closed by no exec
-  ASSERT_GE(open, 0);
+  // Closed by no exec, and above the numbers that the reader is given: what lies there is replaced, not inherited.
+  const int first = ::open("/etc/hostname", O_RDONLY), open = ::fcntl(first, F_DUPFD, 20);
+  ASSERT_GE(open, 20);
   const Records records = read("descriptors");
   ::close(open);
+  ::close(first);
   ASSERT_EQ(records.size(), 4U);
   for (int n = 0; n < 3; ++n) EXPECT_EQ(records[n].type, "/dev/null");
   EXPECT_TRUE(says(records[3].type, {"pipe:"}));
@@ -159,14 +161,16 @@ TEST_F(IsolatedRead, NoFileOfThisProcessIsInherited) {
 }
 
 TEST_F(IsolatedRead, ReadsWhereDescriptorsOfTheStandardStreamsAreFree) {
-  const int in = ::fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 10), out = ::fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 10);
-  ::close(STDIN_FILENO);
-  ::close(STDOUT_FILENO);
+  int kept[3];
+  for (int n = 0; n < 3; ++n) {
+    kept[n] = ::fcntl(n, F_DUPFD_CLOEXEC, 10);
+    ::close(n);
+  }
   const Records records = read("descriptors");
-  ::dup2(in, STDIN_FILENO);
-  ::dup2(out, STDOUT_FILENO);
-  ::close(in);
-  ::close(out);
+  for (int n = 0; n < 3; ++n) {
+    ::dup2(kept[n], n);
+    ::close(kept[n]);
+  }
   ASSERT_EQ(records.size(), 4U);
   EXPECT_TRUE(says(records[3].type, {"pipe:"}));
 }
@@ -255,6 +259,22 @@ TEST(IsolatedReadProgram, OneThatCannotBeginIsNoFaultOfTheFile) {
   EXPECT_TRUE(says(refusal([] { read_isolated("nothing", "FILE", kLimits, "Library"); }),
                    {(scratch / "text").string(), "cannot be started"}));
   EXPECT_TRUE(has_no_child());
+}
+
+TEST(IsolatedReadProgram, OneThatSaysSomethingElseIsNotBelieved) {
+  const auto why_of = [](const std::string& said) {
+    const Scratch scratch;
+    std::ofstream(scratch / "says") << "#!/bin/sh\nprintf '" + said + "' >&3\n";
+    std::filesystem::permissions(scratch / "says", std::filesystem::perms::owner_all);
+    const Variable named("TETWARP_READ_PROGRAM", (scratch / "says").string());
+    return refusal([] { read_isolated("nothing", "FILE", kLimits, "Library"); });
+  };
+  const std::string older = why_of("tetwarp-read 0\\n\\002\\000\\000\\000");
+  EXPECT_TRUE(says(older, {"FILE", "does not answer as this version expects"}));
+  EXPECT_EQ(older.find("InputError"), std::string::npos) << older;
+  // A refusal of so many letters that no memory holds them.
+  EXPECT_TRUE(says(why_of("tetwarp-read 1\\n\\001\\377\\377\\377\\377\\377\\377\\377\\177"),
+                   {"InputError", "Library cannot read FILE", "without a result"}));
 }
 
 }  // namespace
