@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 #include "bench/cpu_report.h"
 #include "bench/markdown.h"
 #include "deform/version.h"

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Frames per second: one resampler, field after field.
 #include <algorithm>
 #include <array>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Tetwarp, the paper's methods and a backward warp, side by side. Compiled as anyone would compile it
 // (bench/CMakeLists.txt).
 #include <algorithm>

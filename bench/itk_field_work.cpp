@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Fields alone: inverses, determinants and transforms, by ITK's filters and by ours.
 #include <itkBSplineTransform.h>
 #include <itkDisplacementFieldJacobianDeterminantFilter.h>

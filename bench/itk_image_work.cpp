@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Volumes through fields, by ITK's filters and by ours.
 #include <itkDisplacementFieldTransform.h>
 #include <itkImageFileWriter.h>

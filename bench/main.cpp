@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // tetwarp-bench: what the paper compares, what a deformation and its inverse cost on a GPU and on the CPU, simulations,
 // files, and filters beside ITK's.
 #include <CLI/CLI.hpp>

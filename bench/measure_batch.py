@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """What `tetwarp batch` makes of devices and processors: cases a minute, with one device and with several, beside what device and files take alone.
 What a device takes alone comes from a batch with one job: the time that its cases hold the device, one after the other.
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // The baselines on a CUDA device, and Tetwarp beside them. Compiled as anyone would compile it: multiplications and
 // additions are fused (bench/CMakeLists.txt), unlike in the project's own kernels.
 #include <chrono>

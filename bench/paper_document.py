@@ -1,4 +1,7 @@
 #!/usr/bin/env python3
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Puts what `tetwarp bench paper --json` measured into a document, so that its figures are those of one run.
 
     bench/paper_document.py bench/results/paper-h100/paper.json docs/paper.md

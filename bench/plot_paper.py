@@ -1,4 +1,7 @@
 #!/usr/bin/env python3
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Draws what `tetwarp bench paper --json` measured.
 
     bench/plot_paper.py paper.json paper.svg

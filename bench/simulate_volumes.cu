@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Source and output of a frame loop on a CUDA device.
 #include "bench/gpu_scene.h"
 #include "bench/simulate_bench.h"

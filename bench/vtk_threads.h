@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 #pragma once
 
 // Apart from peers_vtk.cpp, for vtkSMPTools.h of VTK 9.1 is not C++20.

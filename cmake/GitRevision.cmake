@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 # tetwarp_version_source(TARGET): adds version.cpp, made from deform/version.cpp.in, to a target.
 #
 # This same file is run as a script at each build, so that the commit is that of the build and not that of the last time

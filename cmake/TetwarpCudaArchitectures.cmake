@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 # tetwarp_enable_cuda(): enables CUDA and settles which architectures device code is compiled for: that is most of what
 # CUDA adds to the time of a build. CMAKE_CUDA_ARCHITECTURES (in the environment: CUDAARCHS) decides where it is given,
 # next TETWARP_CUDA_ARCHITECTURES, otherwise this machine. One line says what it came to.

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 # tetwarp_find_itk(MODULES ...): ITK_LIBRARIES and ITK_INCLUDE_DIRS of these modules and what they depend on.
 macro(tetwarp_find_itk)
   if(TETWARP_ITK_MODULE AND ITK_SOURCE_DIR)

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 # The package `tetwarp`: one component a library, each with an export file of its own. find_package() takes it from an
 # installation, or from the build (tetwarp_DIR is then the build folder).
 include(CMakePackageConfigHelpers)

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 # tetwarp_library(NAME SOURCES ... HEADERS ...): the library target tetwarp_NAME, alias tetwarp::NAME, and the component
 # NAME of the package (TetwarpPackage.cmake). HEADERS: what its users include, and what these headers include; they are
 # installed.

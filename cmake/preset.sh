@@ -1,4 +1,7 @@
 #!/usr/bin/env bash
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 # Prints the preset for this machine: cuda where nvcc is found, else cpu.
 #
 #   cmake/preset.sh            the preset that users build

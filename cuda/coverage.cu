@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 #include "cuda/coverage.h"
 #include "deform/core/border.h"
 #include "deform/core/gather.h"

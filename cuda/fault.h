@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 #pragma once
 
 // For tests of what becomes of work when a device fails; no device fails on demand.

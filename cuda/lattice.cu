@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 #include "cuda/findings.cuh"
 #include "cuda/step_pass.h"
 #include "deform/core/visit_cell.h"

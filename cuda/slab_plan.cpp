@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 #include "cuda/slab_plan.h"
 
 #include <algorithm>
@@ -35,14 +38,14 @@ SlabPlan plan_slabs(std::int64_t begin, std::int64_t end, std::uint64_t allowed,
 }
 
 void refuse_slab(const SlabNeeds& needs, const std::string& held, std::uint64_t allowed) {
-  throw DeviceMemoryError("one slice of the output needs " + megabytes(needs.total()) + " of device memory (" + held + " " +
-                    megabytes(needs.field) + ", sources " + megabytes(needs.source) + ", results " +
-                    megabytes(needs.output) + "), " + megabytes(allowed) + " are allowed" + kWhatToDo);
+  throw DeviceMemoryError("one slice of the output needs " + megabytes(needs.total()) + " of device memory (" + held +
+                          " " + megabytes(needs.field) + ", sources " + megabytes(needs.source) + ", results " +
+                          megabytes(needs.output) + "), " + megabytes(allowed) + " are allowed" + kWhatToDo);
 }
 
 void refuse_field(std::uint64_t bytes, std::uint64_t allowed) {
   throw DeviceMemoryError("a pull field is held whole and needs " + megabytes(bytes) + " of device memory, " +
-                    megabytes(allowed) + " are allowed" + kWhatToDo);
+                          megabytes(allowed) + " are allowed" + kWhatToDo);
 }
 
 std::int64_t cells_of_piece(std::int64_t cells, std::uint64_t slice_bytes, std::uint64_t held, std::uint64_t allowed) {
@@ -50,7 +53,7 @@ std::int64_t cells_of_piece(std::int64_t cells, std::uint64_t slice_bytes, std::
   const std::uint64_t least = static_cast<std::uint64_t>(std::min<std::int64_t>(cells, 2) + 1) * slice_bytes;
   if (least > allowed) {
     throw DeviceMemoryError("two slices of cells of the field need " + megabytes(least) + " of device memory, " +
-                      megabytes(allowed) + " are allowed" + kWhatToDo);
+                            megabytes(allowed) + " are allowed" + kWhatToDo);
   }
   const std::uint64_t room = held >= least && held <= allowed ? held : std::max(least, allowed / kShare);
   const std::int64_t fit = static_cast<std::int64_t>(room / slice_bytes) - 1;

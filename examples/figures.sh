@@ -1,4 +1,7 @@
 #!/usr/bin/env bash
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 # Redraws the paper's figures 7 and 8: a lung, a colon and an upper leg, undeformed and through Wave, Twist and Bubble.
 #
 #   examples/figures.sh [OUTPUT_FOLDER [DATA_FOLDER]]      default: ./figures
@@ -9,7 +12,7 @@
 #
 # Environment: TETWARP, the program (default: found in build/), SIZE, pixels of a picture (default 512,512), BACKEND (auto, cuda or cpu).
 set -euo pipefail
-case ${1:-} in -h | --help) sed -n '2,/^set /{/^set /d;s/^# \{0,1\}//;p}' "$0"; exit 0 ;; esac
+case ${1:-} in -h | --help) sed -n '5,/^set /{/^set /d;s/^# \{0,1\}//;p}' "$0"; exit 0 ;; esac
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 out=${1:-figures} data=${2:-${TETWARP_TEST_DATA:-}}
 [[ $out != -* ]] || out=./$out  # a name that begins with a dash is no option

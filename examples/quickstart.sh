@@ -1,4 +1,7 @@
 #!/usr/bin/env bash
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 # Installs what is missing (Debian 12 or 13), builds Tetwarp, and deforms the built-in phantom: DICOM in; DICOM, NIfTI and
 # pictures out. Safe to run again. CUDA is used where nvcc is found.
 #

@@ -1,4 +1,7 @@
 #!/usr/bin/env bash
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 # Makes the tables of the paper on this machine, with Tetwarp's numbers beside them. Builds what is not built.
 #
 #   examples/reproduce_paper.sh [OUTPUT_FOLDER [INPUT]] [-- BENCH OPTIONS...]
@@ -36,7 +39,7 @@ refuse() {  # STATUS, TEXT
 folders=() extra=()
 while [ $# -gt 0 ]; do
   case $1 in
-    -h | --help) sed -n '2,/^set /{/^set /d;s/^# \{0,1\}//;p}' "${BASH_SOURCE[0]}"; exit 0 ;;
+    -h | --help) sed -n '5,/^set /{/^set /d;s/^# \{0,1\}//;p}' "${BASH_SOURCE[0]}"; exit 0 ;;
     --) shift; extra=("$@"); break ;;
     -*) refuse 2 "unknown option $1; options of the bench follow --, see --help" ;;
     *) folders+=("$1"); shift ;;

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // The library in one page: a volume, a field, a resampler. Needs neither ITK nor DCMTK.
 #include <cstdio>
 

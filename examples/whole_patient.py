@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Labels and landmarks for whole_patient.sh, and its picture.
 
 whole_patient.py labels FOLDER           ct.nii.gz -> labels.nii.gz, landmarks.csv

@@ -1,4 +1,7 @@
 #!/usr/bin/env bash
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 # A CT with all that belongs to it through one field: labels (made by thresholds), an RT Dose on a grid of its own, landmarks, and every map;
 # then a picture of it (python3-nibabel, python3-matplotlib).
 #
@@ -6,7 +9,7 @@
 #
 # Environment: TETWARP, the program (default: found in build/), SLICE, the one to draw (default: the middle).
 set -euo pipefail
-[ $# -ge 2 ] || { sed -n '2,8s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+[ $# -ge 2 ] || { sed -n '5,11s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 ct=$1 dose=$2 out=${3:-whole-patient}
 built=("$here"/../build/*/apps/tetwarp)

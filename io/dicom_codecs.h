@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 #pragma once
 
 // Private to io/: how transfer syntaxes keep pixels, and the decoders of one compressed frame of one sample a pixel.

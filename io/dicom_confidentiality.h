@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 #pragma once
 
 // Private to io/: table E.1-1 of PS3.15, which says what becomes of an attribute when a data set is de-identified.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 #pragma once
 
 #include <filesystem>
@@ -73,7 +76,8 @@ DicomScan scan_dicom(const std::filesystem::path& path, bool single = false, con
 
 /// The headers of a series' slices, k-th slice first to last: what a derived series carries over. Hides DCMTK.
 struct DicomHeaders;
-/// DCMTK's data sets remember where they were read last: headers are for one thread at a time, each other needs its copy.
+/// DCMTK's data sets remember where they were read last: headers are for one thread at a time, each other needs its
+/// copy.
 std::shared_ptr<const DicomHeaders> copy_headers(const DicomHeaders& headers);
 
 struct DicomVolume {

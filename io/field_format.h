@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 #pragma once
 
 // Private to io/: the seam between field_file.cpp and the formats that it reads. docs/fields.md, "A new format", shows

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 #pragma once
 
 // Private to io/. Fields in volume files with three components a voxel (image_file.h): MHA and NRRD, as ITK,

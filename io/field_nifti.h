@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 #pragma once
 
 // Private to io/. Fields in NIfTI-1 files: vectors (intent 1007) as ITK and ANTs write them, displacement vectors

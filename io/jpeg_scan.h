@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 #pragma once
 
 // Private to io/: JPEG streams (ITU-T T.81) of one component in one scan, the way to the coded data and these to the

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 #pragma once
 
 // Private to io/: the seam between mesh_file.cpp and the formats that it reads. A format is a pair of files, a word of

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 #pragma once
 
 // Private to io/. Unstructured grids of VTK, XML (.vtu) and legacy (.vtk), whose displacement is point data.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 #pragma once
 
 // Private to io/. NIfTI-1 in one file (https://nifti.nimh.nih.gov, nifti1.h). ITK makes the header on writing. Reading

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // 3D Slicer's .mrk.json: markups-schema-v1.0.3.json of Slicer, Modules/Loadable/Markups/Resources/Schema.
 #include <cmath>
 #include <nlohmann/json.hpp>

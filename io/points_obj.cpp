@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Wavefront OBJ surfaces. Vertex normals do not hold after a deformation: `vn` lines and the references to them are
 // left out.
 #include <charconv>

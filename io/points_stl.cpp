@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Surfaces of facets: 80 bytes, a count and 50 bytes a facet (little endian), or text.
 #include <bit>
 #include <cmath>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Landmarks in lines: CSV, and the .fcsv of 3D Slicer (https://www.slicer.org/wiki/Modules:Fiducials-Documentation-3.6,
 // vtkMRMLMarkupsFiducialStorageNode).
 #include <algorithm>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Legacy VTK polydata, text or big-endian binary (https://docs.vtk.org/en/latest/design_documents/VTKFileFormats.html).
 // NORMALS do not hold after a deformation and are left out; everything else is kept byte for byte.
 #include <bit>

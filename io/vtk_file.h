@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 #pragma once
 
 // Private to io/. Datasets in VTK files, for fields and meshes: legacy files (.vtk), which are read here, and XML files

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Legacy VTK files, text or big-endian binary, versions 1 to 5.
 #include <algorithm>
 #include <charconv>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // XML files of VTK: .vts .vti .vtr .vtu. VTK's parser reads the XML, and decodes text, base64, raw and compressed
 // values into buffers whose size was compared with what the file holds.
 #include <vtkCallbackCommand.h>

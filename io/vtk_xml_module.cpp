@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // XML files of VTK are read in a module of its own: VTK's libraries would take 30 ms of every start.
 #include "io/module.h"
 #include "io/vtk_file.h"

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 #pragma once
 
 // Private to Tetwarp: programs that run beside this one. Names nothing of ITK, and is compiled into whoever starts one.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 #include "itkbridge/hdf5_reader.h"
 
 #include <itk_H5Cpp.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // The program tetwarp-read: reads a file with a library that damaged files bring down, for the process that starts it
 // (itkbridge/isolated_read.h).
 #include "itkbridge/hdf5_reader.h"

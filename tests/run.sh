@@ -1,4 +1,7 @@
 #!/usr/bin/env bash
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 # Runs the tests of the build that examples/quickstart.sh or .ci/run made, whichever was built last.
 #
 #   tests/run.sh [CTEST ARGUMENTS]

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 #pragma once
 
 // The one place that includes GLM: GLM 0.9.9.8 wants <cuda.h> first under nvcc, and GLM_FORCE_CUDA (a definition of the

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Snapping of vertices with vectors; included once for each instruction set (Highway's -inl.h files).
 #if defined(TETWARP_VECTOR_SNAP_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TETWARP_VECTOR_SNAP_INL_H_

@@ -1,4 +1,7 @@
 #!/usr/bin/env bash
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 # One share of a batch: a task of a Slurm array job. submit.sh submits it; edit what a task gets.
 #
 #   sbatch --array=1-8 slurm_array.sh MANIFEST OUTPUT_DIR
@@ -16,7 +19,7 @@
 # A task that is preempted, killed or out of time goes on where it was when it is queued again: --resume keeps finished cases after a
 # look at their hashes. TERM comes a minute before the time is up; the batch then ends within seconds and leaves nothing half made.
 set -euo pipefail
-[ $# -eq 2 ] || { sed -n '2,5s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+[ $# -eq 2 ] || { sed -n '5,8s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 manifest=$1 out=$2
 [[ $manifest != -* ]] || manifest=./$manifest  # a name that begins with a dash is no option
 [[ $out != -* ]] || out=./$out

@@ -1,11 +1,14 @@
 #!/usr/bin/env bash
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 # Submits a batch to Slurm as an array job of N tasks, and a job after them that joins their results.
 #
 #   examples/cluster/submit.sh MANIFEST OUTPUT_DIR N [SBATCH OPTIONS]
 #
 # Environment: TETWARP, the program as the nodes find it (default: tetwarp in PATH). Prints the number of the last job.
 set -euo pipefail
-[ $# -ge 3 ] || { sed -n '2,6s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+[ $# -ge 3 ] || { sed -n '5,9s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 manifest=$1 out=$2 tasks=$3
 shift 3

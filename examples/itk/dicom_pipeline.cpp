@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // A CT from DICOM to NIfTI in one ITK pipeline: read, deform by a simulation, filter, write.
 //
 //   tetwarp-example-dicom-pipeline DICOM_FOLDER SCENARIO.json OUTPUT.nii.gz

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Registration by ITK, the warp by Tetwarp, and the same warp by ITK from the exact inverse.
 //
 //   tetwarp-example-register-and-warp FIXED MOVING OUTPUT_FOLDER

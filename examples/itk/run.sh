@@ -1,4 +1,7 @@
 #!/usr/bin/env bash
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 # Runs the examples of ITK pipelines on real data. Builds what is not built.
 #
 #   examples/itk/run.sh [DATA_FOLDER [OUTPUT_FOLDER]]
@@ -22,7 +25,7 @@ refuse() {  # STATUS, TEXT
 }
 
 case ${1:-} in
-  -h | --help) sed -n '2,/^set /{/^set /d;s/^# \{0,1\}//;p}' "${BASH_SOURCE[0]}"; exit 0 ;;
+  -h | --help) sed -n '5,/^set /{/^set /d;s/^# \{0,1\}//;p}' "${BASH_SOURCE[0]}"; exit 0 ;;
   -*) refuse 2 "unknown option $1; see --help" ;;
 esac
 [ $# -le 2 ] || refuse 2 "more than a data folder and an output folder; see --help"

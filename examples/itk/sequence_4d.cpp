@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // One CT in motion: a filter, and a new field for each phase.
 //
 //   tetwarp-example-sequence-4d IMAGE SCENARIO.json OUTPUT_FOLDER

@@ -1,4 +1,7 @@
 #!/usr/bin/python3
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """An augmentation set for a segmentation network: a CT and its labels in many random smooth deformations.
 
     augmentation_set.py [CT] -o FOLDER [--labels LABELS] [--variants 100] [--seed 1]

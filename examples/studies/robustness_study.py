@@ -1,4 +1,7 @@
 #!/usr/bin/python3
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """How a segmentation stands growing deformations: a table and a plot.
 
     robustness_study.py [CT] -o FOLDER [--steps 8] [--largest 24] [--repeats 3]

@@ -1,4 +1,7 @@
 #!/usr/bin/python3
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """A 4D sequence: one CT that breathes, as one NIfTI file of a cycle.
 
     sequence_4d.py [CT] -o FOLDER [--phases 10] [--amplitude 15] [--period 4]

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """What the studies share: the program, a source, labels by thresholds, and batches that may be killed and continued.
 
 Needs python3-numpy and python3-nibabel. The program is that of TETWARP, or the one that was built in build/.

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // What goes along with a de-identified series tells no more than the series does.
 #include "tests/apps/along_case.h"
 #include "tests/support/structure_maker.h"

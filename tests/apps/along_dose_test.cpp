@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // `tetwarp deform --with DOSE=OUT.dcm`: doses that go along with a derived series.
 #include "tests/apps/along_case.h"
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // `--with IN=OUT.dcm`: what is refused, and what the objects say of themselves.
 #include <algorithm>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // `tetwarp deform --with SEG=OUT.dcm`: segmentations that go along with a derived series.
 #include <algorithm>
 #include <cmath>

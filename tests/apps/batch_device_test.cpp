@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // `tetwarp batch`: what becomes of cases whose CUDA device fails, or has too little memory. Faults are injected at
 // calls of CUDA (cuda/fault.h).
 #include <cstdlib>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // `tetwarp batch`: processes that share a folder.
 #include <signal.h>
 #include <sys/wait.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // `tetwarp batch`: what a manifest says, and what is wrong with one.
 #include "tests/apps/batch_case.h"
 

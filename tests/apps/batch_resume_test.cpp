@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // `tetwarp batch --resume`: which cases are kept, and what is said of the others.
 #include "tests/apps/batch_case.h"
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // `tetwarp batch`: what becomes of cases.
 #include <fcntl.h>
 #include <signal.h>

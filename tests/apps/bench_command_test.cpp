@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // `tetwarp bench` becomes the program tetwarp-bench beside it: found, arguments, exit status, signals.
 #include <gtest/gtest.h>
 

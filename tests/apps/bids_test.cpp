@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // `--bids`: a sidecar with the names of BIDS, beside dcm2niix's own of the same series.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Opens a dose or segmentation that went along with a derived CT series, with pydicom, and checks what it refers to.
 
 check_along.py SERIES OBJECT SOURCE DUMP    SERIES: folder of the derived series; SOURCE: what the object was made of

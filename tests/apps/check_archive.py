@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Sends derived series to an archive and fetches them back: storescu and getscu of DCMTK, Orthanc on loopback.
 
     check_archive.py TETWARP SERIES

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """A batch that is killed at random moments and resumed comes to the bytes of one that nobody disturbed.
 
     check_batch_kill.py TETWARP [--data FOLDER] [--full] [--kills N] [--seed N] [--record FILE.md]

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Checks a Deformable Spatial Registration object of ours as pydicom reads it.
 
     check_registration.py OBJECT SOURCE_FOLDER DERIVED_FOLDER|- INVERSE.mha

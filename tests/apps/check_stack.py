@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Checks that OUT.nii shows a DICOM series where its slices lie, by pydicom and NumPy alone: linear within each slice,
 and linear between neighbouring slices, which need not be even nor stacked along their normal.
 

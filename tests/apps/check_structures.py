@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Checks an RT Structure Set that was moved with a derived series, by other programs.
 
     check_structures.py references SERIES OUT.dcm SOURCE.dcm   every UID by pydicom; every contour lies in its slice

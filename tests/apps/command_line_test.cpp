@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Words of the command line: numbers that are none, commands that there are not, sizes of memory.
 #include "tests/apps/batch_case.h"
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // `tetwarp deform` on files: what comes out, and that it is the same whichever way the field goes in.
 #include <gtest/gtest.h>
 

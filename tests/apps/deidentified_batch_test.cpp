@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Nothing that a de-identified run writes holds a word of the paths, the rows and the files that it reads: every byte
 // of every file is searched, also within gzip, whatever succeeds, is left out, refused or fails.
 #include <algorithm>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // De-identification on the command line, and a hostile reading of all that it leaves.
 #include <gtest/gtest.h>
 

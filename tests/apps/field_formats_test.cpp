@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // One field, stored as other tools store it: the same deformed volume, and what `info` and the report say of the file.
 #include <gtest/gtest.h>
 

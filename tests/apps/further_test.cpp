@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // `tetwarp deform --with` and `--grid`: other volumes, and other grids of the output.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 #include "tests/apps/good_inputs.h"
 
 namespace tetwarp::test {

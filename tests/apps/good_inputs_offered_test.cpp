@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Whether good_inputs.cpp lists all of the real data that can be deformed, and nothing else.
 #include "tests/apps/good_inputs.h"
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Every real series and volume that can be deformed, through the program: what it writes as other programs read it, and
 // as was computed; and the identity as NIfTI beside what dcm2niix makes of the source.
 #include "tests/apps/good_inputs.h"

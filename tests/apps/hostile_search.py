@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Reads de-identified output as somebody would who wants to know whom it shows.
 
 hostile_search.py SOURCE OPTIONS OUTPUT...: every string of patient, study, institution, device and private data of the

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // What `tetwarp info FOLDER` says, and how --series takes what it offers.
 #include <gtest/gtest.h>
 #include <sys/stat.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // What ends a run from outside, and what does not: signals, and readers that go away.
 #include <signal.h>
 #include <sys/wait.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // `tetwarp invert`: the inverse of a forward field, as other programs want it.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Maps of `tetwarp deform` and `tetwarp invert` go to their files slab by slab: what is held does not grow with the
 // slices, and the files are those of the whole maps.
 #include <gtest/gtest.h>

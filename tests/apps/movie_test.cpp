@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Films of `render`: what goes to ffmpeg, and what is left when either of the two ends early.
 #include <gtest/gtest.h>
 

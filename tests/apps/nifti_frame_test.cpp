@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // `--nifti-frame`: one rule for everything that a command reads, and a note wherever it matters.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // `tetwarp deform --points`: landmarks and surfaces go where the voxels under them go.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // What the command line promises: exit statuses, messages, outputs that appear whole or not at all.
 #include <gtest/gtest.h>
 

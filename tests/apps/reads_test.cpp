@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Nothing that a command reads is written over, whatever it is called.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Two phases of a real 4D-CT and the field between them (lung-4dct-t0-t5): one phase warped onto the other by the pull
 // field, and by its inverse as a forward field.
 #include <gtest/gtest.h>

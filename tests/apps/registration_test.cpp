@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // `--inverse FILE.dcm` of `deform`, and `invert -o FILE.dcm`: a Deformable Spatial Registration beside a series.
 #include <gtest/gtest.h>
 

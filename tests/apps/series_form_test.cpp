@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // What the command line chooses of a derived series.
 #include <gtest/gtest.h>
 

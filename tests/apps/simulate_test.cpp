@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // `tetwarp simulate`: scenarios on a small phantom, end to end.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Series whose slices lean or lie at uneven distances, through the whole program, against pydicom and NumPy.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // `tetwarp deform --with STRUCTURES.dcm=OUT.dcm`: what was drawn on a series goes with it.
 #include <gtest/gtest.h>
 

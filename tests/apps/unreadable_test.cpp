@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // What cannot be read: pipes, sockets and devices, which may never end, names that lead nowhere in ways of their own,
 // and folders without rights. Each is refused at once, in one line that says why.
 #include <sys/socket.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // What every backend of the benchmark must do; the list runs on the CPU, and on a device where there is one.
 #include "bench/backend.h"
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // The bodies that every backend runs, here on the host and with fields of the tests' own.
 #include "bench/baselines.h"
 

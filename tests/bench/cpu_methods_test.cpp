@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // What `cpu` measures beside Tetwarp does the same work: only then are times to be compared.
 #include "bench/cpu_methods.h"
 

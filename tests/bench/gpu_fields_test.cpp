@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // The fields of `gpu` and its backward warp, which a device and the CPU compute by the same functions.
 #include "bench/gpu_fields.h"
 

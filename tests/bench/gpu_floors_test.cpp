@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // The floors of `gpu`, from given medians, and what is written of them.
 #include "bench/gpu_floors.h"
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // The floors of `invert`, from given times and errors, and what is written of them.
 #include "bench/invert_floors.h"
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // What `invert` knows of its fields, and what it says of an inverse that is wrong.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // What `itk` takes for the truth, and what it says of a result that is wrong.
 #include <gtest/gtest.h>
 

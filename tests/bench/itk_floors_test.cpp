@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // The floors of `itk`, from given times, errors and memory, and what is written of them.
 #include "bench/itk_floors.h"
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // The figures of docs/paper.md are those of the run that lies in bench/results/paper-h100.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // tetwarp-bench on the command line: exit statuses, and files that appear whole.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // The paper's own numbers, and which of ours may stand beside them.
 #include "bench/published.h"
 

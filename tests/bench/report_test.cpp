@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // A tiny run from end to end, and what is written of it.
 #include "bench/report.h"
 

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 # The choice of architectures for devices that this machine need not have.
 cmake_minimum_required(VERSION 3.25)
 include("${SOURCE}/cmake/TetwarpCudaArchitectures.cmake")

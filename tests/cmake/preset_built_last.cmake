@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 # cmake/preset.sh in a source folder of its own, on a machine without nvcc and on one with it.
 file(REMOVE_RECURSE "${WORK}")
 file(MAKE_DIRECTORY "${WORK}/source" "${WORK}/nvcc" "${WORK}/tools")

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 # Asks CMake what each preset sets, without configuring anything.
 function(expect_werror preset expected)
   execute_process(COMMAND "${CMAKE_COMMAND}" --preset ${preset} -N WORKING_DIRECTORY "${SOURCE}" OUTPUT_VARIABLE set

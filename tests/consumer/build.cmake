@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 # Configures, builds and runs the project PROJECT of this folder against the moved installation.
 include("${SETTINGS}")
 execute_process(COMMAND "${CMAKE_COMMAND}" --fresh -S "${source}/tests/consumer/${PROJECT}" -B "${work}/${PROJECT}"

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 # Installs the build, moves the installation, and looks in what find_package() reads for absolute paths, and for warnings
 # (with -Werror) that a user's build would take over.
 include("${SETTINGS}")

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // The arithmetic of deform/core, run on the device and on the host: the same bits.
 #include <cuda_runtime.h>
 #include <gtest/gtest.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Fields, volumes and maps in device memory: the bits of host memory, and refusals instead of a lost context.
 #include <cuda_runtime.h>
 #include <gtest/gtest.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Every way that the CUDA backend may take, against the CPU, bit for bit.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // A part of a lattice says of the voxels that it is held for what the whole says. Needs no device.
 #include "cuda/lattice_part.h"
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Volumes and fields larger than the device may hold: the same bits and the same report, whatever the limit.
 #include <cuda_runtime.h>
 #include <gtest/gtest.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // How an output and a field are split where not everything fits, and how boxes go to the host. Needs no device.
 #include "cuda/slab_plan.h"
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Blocks of cells looked at with vectors, for every instruction set that the processor has, against one tetrahedron
 // after the other.
 #include "deform/cpu/block_scan.h"

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Volumes with several values a voxel, against each value as a volume of its own.
 #include <gtest/gtest.h>
 

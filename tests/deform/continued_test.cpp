@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // A pull field as a forward one, continued until its image holds a volume.
 #include "deform/fields/continued.h"
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Contours of structures: distances, zero contours, and solids that are moved and drawn anew.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Outputs on other grids than the source's: larger, smaller, rotated, anisotropic, mirrored; several sources, each on a
 // grid of its own.
 #include <gtest/gtest.h>

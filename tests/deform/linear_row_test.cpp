@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Rows sampled with vectors, for every instruction set that the processor has, against one voxel after the other.
 #include "deform/cpu/linear_row.h"
 

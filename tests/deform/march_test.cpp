@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // The march of the CPU, for every instruction set that the processor has, against claims: bit for bit.
 #include "deform/cpu/march.h"
 

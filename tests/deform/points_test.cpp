@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Points moved by the forward map, against the resampler, against the definition, and against images.
 #include "deform/points.h"
 

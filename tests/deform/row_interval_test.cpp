@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // The intervals of rows against the definition of ownership, voxel by voxel.
 #include "deform/core/row_interval.h"
 

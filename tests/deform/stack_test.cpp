@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Sources whose slices do not stand straight or evenly: gantry tilt, uneven slice distances.
 #include <gtest/gtest.h>
 

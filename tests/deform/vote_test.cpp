@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Interpolation::vote, against volumes that have 1 where a label is and 0 elsewhere.
 #include <gtest/gtest.h>
 

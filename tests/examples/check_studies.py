@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The studies of examples/studies at a small size: what they make is what their texts say.
 
     check_studies.py TETWARP STUDIES_FOLDER        status 77: numpy or nibabel is missing

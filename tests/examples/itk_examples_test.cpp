@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // The examples of ITK pipelines: on a small phantom against the program `tetwarp`, and on real data.
 #include <dcmtk/dcmdata/dctk.h>
 #include <gtest/gtest.h>

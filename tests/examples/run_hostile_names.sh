@@ -1,4 +1,7 @@
 #!/usr/bin/env bash
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 # The scripts of examples/ with names that a shell would take for more than names: quotes, commands, line ends, dashes, blanks.
 # Slurm is played by a small sbatch, which runs what is submitted at once as the real one does: a script with its arguments, or
 # the text of --wrap by sh.

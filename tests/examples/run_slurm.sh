@@ -1,4 +1,7 @@
 #!/usr/bin/env bash
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 # A batch on a real Slurm: controller and daemon on loopback, the array job of examples/cluster, one task requeued in the middle of
 # its work; then the bytes are those of a batch that nobody disturbed.
 #

@@ -1,4 +1,7 @@
 #!/usr/bin/env bash
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 # The Snakemake workflow of examples/cluster: a small batch, one of its cases broken, then once more with nothing to do.
 #
 #   tests/examples/run_snakemake.sh TETWARP

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // One compressed frame, behind what a header says of it: number of the transfer syntax, Bits Allocated, Bits Stored,
 // Pixel Representation, a byte each, then Rows and Columns, two bytes each, little endian.
 #include <array>

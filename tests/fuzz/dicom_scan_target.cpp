@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // DICOM files as a folder is listed, by their headers: "IM1", "IM2" and so on, whose bytes are separated by kNextFile.
 // The first also alone, and as what may be a DICOMDIR that names the others.
 #include <algorithm>

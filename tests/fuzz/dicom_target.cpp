@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // One DICOM file: as a dose, a segmentation, a structure set, as a series of one slice, and the series derived from it,
 // with the patient and without.
 #include "io/dicom_dose.h"

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Field files of one suffix, and volumes where the suffix is theirs. TETWARP_FUZZ_OPTIONS: what is said behind the name
 // of a field that does not say it itself, one reading per text.
 #include "io/field_file.h"

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Changes what is inside a gzip file, whose check sum keeps random changes of its bytes out of everything behind it.
 #include <zlib.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 #pragma once
 
 // Debian's ITK knows the one compiler that it was built with, and refuses clang. It knows g++ by these macros, and what

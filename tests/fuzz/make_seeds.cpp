@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Writes small whole files of every form that a fuzz target reads: seeds FOLDER makes FOLDER/TARGET/FILE. Made in code,
 // with ITK, DCMTK and what the tests make their files with.
 #include <itk_H5Cpp.h>

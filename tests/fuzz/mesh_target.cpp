@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Mesh files of one suffix: whether it is one, its header, and the whole of it, as it is and under each text of
 // TETWARP_FUZZ_OPTIONS.
 #include "io/mesh_file.h"

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Files of points of one suffix: read, written again as they are, and read back.
 #include <stdexcept>
 

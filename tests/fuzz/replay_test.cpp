@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // The kept corpus of one fuzz target, file by file and cut short, in a plain test program: what once crashed stays
 // mended. A crash ends the program; the last file that it named is the one.
 #include <gtest/gtest.h>

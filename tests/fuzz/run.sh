@@ -1,4 +1,7 @@
 #!/usr/bin/env bash
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 # Fuzzes the readers, each target for a time, one after the other, on one thread.
 #
 #   tests/fuzz/run.sh [SECONDS] [TARGET ...]      # default: 1800, all targets

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Scenarios: read, and made into what they are for a small patient.
 #include <cmath>
 #include <stdexcept>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // What a command line says of a field: a formula, or a file with options.
 #include <string_view>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Transfer functions: read, and looked through at a few voxels.
 #include <utility>
 

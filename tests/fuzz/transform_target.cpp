@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Transform files: ITK's text and HDF5, elastix's parameters, plastimatch's B-spline. The content decides which.
 #include "io/transform_file.h"
 #include "tests/fuzz/input_file.h"

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Checks that other readers see the voxels of a volume where and as they are.
 
     check_geometry.py READER[,READER...] PATH EXPECTED

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Whether JSON files meet a schema: check_scenario.py SCHEMA good|bad FILE... Exit status 0: all of them do, or none does."""
 import json
 import sys

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Every row of table E.1-1 of PS3.15, under every option, by itself and within a sequence. The table is read anew here,
 // and what its letters mean is said anew.
 #include <fstream>

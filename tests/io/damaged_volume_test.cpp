@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Volume files whose bytes are damaged, missing or too many.
 #include <gtest/gtest.h>
 

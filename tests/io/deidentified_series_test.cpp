@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // A whole derived series, de-identified: what its files hold, read as bytes.
 #include <functional>
 #include <map>

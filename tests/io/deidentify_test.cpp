@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // What de-identification does beyond the table of the standard, and its options and key.
 #include "io/dicom_deidentify.h"
 

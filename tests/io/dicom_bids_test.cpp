@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // What a BIDS sidecar says of the headers of a series.
 #include "io/dicom_bids.h"
 

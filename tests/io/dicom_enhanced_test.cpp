@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Enhanced multi-frame CT: the same volumes as of the classic slices that it was made of.
 #include <gtest/gtest.h>
 

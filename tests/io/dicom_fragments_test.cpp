@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Compressed frames in all the ways in which their bytes may lie in a file.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Where pydicom and dcm2niix see the voxels of a stack, Tetwarp does, however it lies and its slices are numbered.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Files that ask for more than there is: depth, memory, sizes.
 #include <gtest/gtest.h>
 #include <sys/resource.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Folders and headers as an enemy would make them.
 #include <gtest/gtest.h>
 #include <sys/socket.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Geometry through a DICOM series, for every way in which a stack of slices can lie along the patient's axes.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Derived series and phantoms as other programs see them: dciodvfy and dcentvfy (dicom3tools), pydicom, dcm2niix.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Deformable Spatial Registration objects beside a derived series, value by value.
 #include <cmath>
 #include <cstring>

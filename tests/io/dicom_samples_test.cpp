@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Every depth, place and sign of a stored value in every coding, against the values that were put in.
 #include "io/dicom_samples.h"
 

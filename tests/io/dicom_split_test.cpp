@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Series that hold several volumes, made up: which attribute tells them apart, and when none may.
 #include <gtest/gtest.h>
 

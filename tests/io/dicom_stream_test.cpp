@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Where DCMTK finds the values of a file: in it, in memory, in what was deflated.
 #include <gtest/gtest.h>
 

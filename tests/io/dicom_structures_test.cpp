@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // RT Structure Sets: read, refused, and written beside a derived series.
 #include "io/dicom_structures.h"
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Folders of many files: each is opened once, of no image more than its beginning is read.
 #include <gtest/gtest.h>
 #include <sys/inotify.h>

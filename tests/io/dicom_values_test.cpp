@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Values that no real CT at hand has: copies of a real slice, edited, and what pydicom makes of them.
 #include <gtest/gtest.h>
 

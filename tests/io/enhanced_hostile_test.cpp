@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Enhanced CT that is damaged, or made to do harm.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Enhanced CT made of a real series, as other programs see it; and the derived series of both.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Fields as other tools write them: a corner moved by (3, 5, 7) mm, all else at rest, whichever way it is stored.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Grids that VTK writes, as fields: a corner moved by (3, 5, 7), all else at rest.
 #include <gtest/gtest.h>
 

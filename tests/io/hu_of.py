@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Writes what pydicom and numpy make of the pixels of DICOM files, doubles, rows top to bottom.
 
     hu_of.py FILE OUT [FILE OUT ...]

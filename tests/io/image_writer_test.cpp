@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Volume files written slice by slice: the bytes do not depend on the split, and are those that ITK writes at once.
 #include <gtest/gtest.h>
 #include <sys/resource.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // JPEG 2000 through OpenJPEG, whose encoder makes the streams.
 #include <gtest/gtest.h>
 

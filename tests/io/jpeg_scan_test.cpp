@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Lossless JPEG decoded here, against what was encoded; and damage that shows to the bit.
 #include "io/jpeg_scan.h"
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // What is the same for every mesh format: options, and how vertices and cells become a TetrahedralMesh.
 #include "io/mesh_file.h"
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Gmsh's MSH: files that Gmsh wrote, and files made number by number, whole and damaged.
 #include <gtest/gtest.h>
 #include <sys/wait.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Meshes that VTK writes: one cell of each kind, 10 mm apart along x; the last vertex of the first moves.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Meshes that Tetwarp writes, read again by its own readers (of .vtu: by VTK).
 #include "io/mesh_writer.h"
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // NIfTI files that state their place twice: which of the two counts, and what is said of it.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Cubic B-spline control point grids of NiftyReg: by closed form, and beside the formula in NumPy.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Which texts of a header name the patient, whatever their case, marks, alphabet and what they are glued to.
 #include "io/patient_names.h"
 

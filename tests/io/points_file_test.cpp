@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Landmarks and surfaces in files: places and frames in every form, and all that must stay as it is.
 #include "io/points_file.h"
 

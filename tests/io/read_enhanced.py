@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Writes what pydicom and numpy make of an Enhanced CT file: an independent reader.
 
     read_enhanced.py FILE OUT

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Real CT through Wave, Twist and Bubble, against sampling the source at the true inverse position.
 #include <gtest/gtest.h>
 

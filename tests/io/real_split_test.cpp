@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Several volumes in one series, made by editing copies of a real one.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // elastix parameter files: beside what they mean on paper, and beside transformix where it is installed.
 #include <gtest/gtest.h>
 

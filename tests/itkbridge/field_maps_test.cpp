@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Jacobian determinants, coverage and folds, beside ITK's DisplacementFieldJacobianDeterminantFilter.
 #include <gtest/gtest.h>
 #include <itkDisplacementFieldJacobianDeterminantFilter.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Exact inverses of forward fields, beside the core, the program, ITK's own inverter and ITK's resampler.
 #include <gtest/gtest.h>
 #include <itkInvertDisplacementFieldImageFilter.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // B-splines of plastimatch: by closed form, and a real registration beside its own dense field.
 #include <gtest/gtest.h>
 

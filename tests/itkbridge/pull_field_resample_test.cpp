@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Images deformed by displacement fields of registrations, beside ITK's ResampleImageFilter with a
 // DisplacementFieldTransform.
 #include <gtest/gtest.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // A tetwarp-read whose readers do what a library may do that reads a damaged file. The file's name says how much, or
 // which signal.
 #include <unistd.h>

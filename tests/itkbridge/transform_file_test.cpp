@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Transform files that ITK wrote, read by the library, beside ITK's own TransformPoint.
 #include "io/transform_file.h"
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Transforms through the program: -f, --pull-field, field, info; and what it refuses.
 #include <gtest/gtest.h>
 

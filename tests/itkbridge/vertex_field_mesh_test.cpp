@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Fields of tetrahedra as meshes of ITK, and points and surfaces that a field moves.
 #include <gtest/gtest.h>
 #include <itkCompositeTransform.h>

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // A field that comes out of a transform or a displacement image, and goes back into one.
 #include <gtest/gtest.h>
 #include <itkAffineTransform.h>

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Writes a displacement field as other tools do, with their libraries (nibabel, NumPy, pydicom) and not with ours.
 
     make_field.py KIND FIELD.mha OUTPUT

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Has Gmsh write a mesh of the box from (0, 0, 0) to (10, 20, 30) whose vertex (10, 0, 30) is moved by (3, 5, 7).
 
     python3 make_mesh.py KIND BINARY VERSION FILE

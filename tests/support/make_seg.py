@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Writes a DICOM segmentation of a CT series with pydicom: a segment for each threshold, of all voxels above it.
 
 make_seg.py SERIES SEG.dcm DUMP HU [HU ...]    DUMP receives the masks: uint8, segment by segment, slices by rising

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Writes datasets with VTK, as finite element programs and ParaView do.
 
     make_vtk.py KIND ENCODING OUTPUT GEOMETRY

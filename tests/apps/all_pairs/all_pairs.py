@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Features together: cases in which every pair of choices occurs (table.py), each run and judged.
 
     all_pairs.py PROGRAM [--part I/N] [--seed S] [--case N] [--keep FOLDER] [--list]

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """From a case to a command line, and to the row of a manifest."""
 import json
 import pathlib

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Covering arrays: few cases in which every pair (or triple) of choices occurs together.
 
 A case gives each factor one of its choices. A rule is a refusal: a combination of choices that the program must turn

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """UIDs and hashes of a derived series differ when anything that is read differs, and only then.
 
     hashes.py PROGRAM

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """What must hold of a case: an oracle for what it computes, and what is so for every case."""
 import copy
 import json

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """DICOM files of a made-up patient, by pydicom: CT series of all forms that are read, and what goes along with them."""
 import pathlib
 

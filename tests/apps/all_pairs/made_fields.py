@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Fields of all kinds round the middle of the made-up volumes, written here as other programs write them."""
 import json
 import pathlib

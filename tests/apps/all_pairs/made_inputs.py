@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The volumes that go through the fields, and what goes along: each as a file of its form and as a `Volume`."""
 import json
 import pathlib

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """What a case wrote, compared with what its truth says: the volume in any form, maps, what went along, points."""
 import csv
 import io

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The features that meet: each factor with its choices, and what is refused. A new feature joins by one line.
 
 The first choice of each factor is the plain one. What a choice means on the command line is in command.py, what must

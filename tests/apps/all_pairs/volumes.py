@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Volumes as the checks see them, and files of them: written here byte by byte or by nibabel, read by nibabel, by
 pydicom, or from raw NRRD and MHA. Nothing of Tetwarp is asked.
 

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Deforms a phantom on the device and on the CPU; where there is no device, expects the error that says so.
 #include <cstdio>
 

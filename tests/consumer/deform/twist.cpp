@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Twists a ramp by a quarter turn and compares the slice that turned most with the ramp turned by hand.
 #include <cstdio>
 #include <cstdlib>

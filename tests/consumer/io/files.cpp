@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Writes a volume and reads it back; reads a transform, for which tetwarp::io loads a module, and one of HDF5, for
 // which the module starts tetwarp-read.
 #include <algorithm>

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
 set(tetwarp "${installation}/bin/tetwarp")
 foreach(arguments
     "phantom -o ct.nii.gz --size 64,64,40 --spacing 5,5,8"

@@ -1,3 +1,6 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
 // Reads an image and a forward field, warps, writes, and compares with what the program `tetwarp deform` wrote.
 #include <itkImageFileReader.h>
 #include <itkImageFileWriter.h>
