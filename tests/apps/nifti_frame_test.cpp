@@ -78,6 +78,8 @@ TEST_F(NiftiFrameProgram, InputFieldsWithAndGridGoTogetherAndEachHasItsNote) {
   EXPECT_TRUE(same_grid(place_of("o.mha"), moved_grid(), 1e-4));
   EXPECT_TRUE(same_grid(place_of("w.mha"), moved_grid(), 1e-4));
   EXPECT_TRUE(same_bytes(read_image(scratch_ / "o.mha"), by_sform)) << "all moved together";
+  EXPECT_TRUE(same_bytes(read_image(scratch_ / "w.mha"), by_sform)) << "what goes along too";
+  EXPECT_NE(read_bytes(scratch_ / "o.mha.json").find("\"nifti_frame\": \"qform\""), std::string::npos);
   EXPECT_NE(read_bytes(scratch_ / "o.mha.json").find("mm apart"), std::string::npos);
 }
 
@@ -97,6 +99,21 @@ TEST_F(NiftiFrameProgram, LikeIsPlacedByItInFieldAndInvert) {
   EXPECT_EQ(notes_in(run("invert f.nii --like v.nii -o i.mha --nifti-frame qform")), 2u);
   EXPECT_TRUE(same_grid(place_of("i.mha"), moved_grid(), 1e-4));
   EXPECT_EQ(notes_in(run("field identity --like plain.mha -o c.mha")), 0u);
+}
+
+TEST_F(NiftiFrameProgram, LabelsAndOverlaysArePlacedByItToo) {
+  write_image(scratch_ / "j.nii", numbered(grid(), VoxelType::f32).view());
+  part(scratch_ / "j.nii");
+  write_file(scratch_ / "push.json",
+             R"({"method": "chainmail", "cell_size": 2, "tissues": [{"name": "all"}], "hold": [{"border": true}],
+  "move": [{"name": "hand", "by_mm": [0, 1, 0], "handle": {"at": {"mm": [-5, 19, 12]}, "radius_mm": 3}}]})");
+  for (const char* frame : {"sform", "qform"}) {
+    const std::string option = std::string(" --backend cpu --nifti-frame ") + frame;
+    run("simulate push.json v.nii --labels v.nii -o s-" + std::string(frame) + ".mha" + option);
+    run("deform v.nii --scenario push.json --labels v.nii -o d-" + std::string(frame) + ".mha" + option);
+    run("render v.nii --view axial --overlay jacobian=j.nii -o r-" + std::string(frame) + ".png" + option);
+  }
+  EXPECT_EQ(read_bytes(scratch_ / "r-sform.png"), read_bytes(scratch_ / "r-qform.png"));
 }
 
 TEST_F(NiftiFrameProgram, InfoHasTheNoteAndThePlace) {
