@@ -54,6 +54,13 @@ TEST_F(BatchResume, SeesAChangeOfEveryFileThatIsRead) {
   write_file(scratch_ / "study/rest.msh", tetrahedron(0));
   write_file(scratch_ / "study/deformed.msh", tetrahedron(3));
   write_file(scratch_ / "study/p.csv", "x,y,z\n1,2,3\n");
+  const auto push_by = [&](int mm) {
+    write_file(scratch_ / "study/push.json",
+               R"({"method": "chainmail", "cell_size": 4, "tissues": [{"name": "all"}], "hold": [{"border": true}],
+  "move": [{"name": "hand", "by_mm": [0, )" +
+                   std::to_string(mm) + R"(, 0], "handle": {"at": {"body": [0.5, 0.3, 0.5]}, "radius_mm": 30}}]})");
+  };
+  push_by(5);
   write_file(scratch_ / "study/m.jsonl",
              R"({"case": "elastix", "input": "ct.nii.gz", "pull-field": "second.txt"}
 {"case": "mesh", "input": "ct.nii.gz", "field": "rest.msh:deformed=deformed.msh", "outside": "background"}
@@ -61,6 +68,7 @@ TEST_F(BatchResume, SeesAChangeOfEveryFileThatIsRead) {
 {"case": "grid", "input": "ct.nii.gz", "field": "identity", "grid": "series", "outside": "background"}
 {"case": "single", "input": "ct.nii.gz", "field": "identity", "with": ["series/IM00001.dcm=with.nii.gz"]}
 {"case": "points", "input": "ct.nii.gz", "field": "identity", "points": ["p.csv=q.csv"]}
+{"case": "scenario", "input": "ct.nii.gz", "scenario": "push.json"}
 )");
   const Outcome made = run("batch study/m.jsonl -o out --quiet");
   ASSERT_EQ(made.status, 0) << made.err;
@@ -74,6 +82,8 @@ TEST_F(BatchResume, SeesAChangeOfEveryFileThatIsRead) {
   EXPECT_EQ(made_by(batch + " --jobs 1"), why + "with grid single; with grid single ");
   write_file(scratch_ / "study/p.csv", "x,y,z\n1,2,4\n");
   EXPECT_EQ(made_by(batch), why + "points; points ");
+  push_by(6);
+  EXPECT_EQ(made_by(batch), why + "scenario; scenario ");
   EXPECT_EQ(made_by(batch), "");
 }
 
