@@ -160,7 +160,7 @@ struct RenderOptions {
   double rate = 12;               ///< of them a second, in .mp4 and .gif
 };
 
-/// Parses the command line and runs the subcommand. @return the exit status (README has the table)
+/// Parses the command line and runs the subcommand. @return the exit status (docs/reference/exit-status.md)
 int run_command_line(int argc, char** argv);
 
 int run_phantom(const PhantomOptions& options);
