@@ -9,7 +9,7 @@
 
 namespace tetwarp {
 
-/// The test deformations (paper Eqs. 14-16, which leave units and origin open; semantics section 7 settles them).
+/// The test deformations. The paper's Eqs. 14-16 leave units and origin open; here c is `centre`,
 /// d = p - c, all lengths mm, angles radians; axes 0, 1, 2 are L, P, S.
 
 /// p' = p + A sin(2 pi d.along / L + phase) axis. Inverse: the same with -A.
@@ -43,7 +43,7 @@ struct PaperBubble {
   glm::dvec3 operator()(const glm::dvec3& point) const;
 };
 
-/// The smallest half length along a patient axis that holds all corners: semantics' h.
+/// The smallest half length along a patient axis that holds all corners: h of the twist.
 double half_length(const Geometry& volume, int axis);
 
 /// Twist of a volume about S through its centre, on a lattice with a vertex every `cell_size` voxels.
@@ -52,7 +52,7 @@ VertexField twist(const Geometry& volume, double angle, std::int64_t cell_size);
 /// Whether the text names a formula (`wave`, `wave:...`), known or misspelled parameters aside.
 bool is_formula(std::string_view text);
 
-/// A formula of the command line (cli.md, FIELD), for example `wave:amplitude=8,wavelength=64vox`.
+/// A formula of the command line (docs/guide/deform.md, "Fields"), for example `wave:amplitude=8,wavelength=64vox`.
 /// Lengths are mm, or with the suffix `vox` the spacing of the grid axis nearest to the direction meant; angles
 /// degrees.
 /// @throws InputError naming the formula and the key: unknown, missing, given twice, not a number, out of range
