@@ -17,17 +17,14 @@
 namespace tetwarp {
 
 DcmElement& plain_pixels(DcmDataset& data, const std::filesystem::path& path, std::size_t expected, const char* kind) {
-  const auto require_that = [&](bool holds, const std::string& otherwise) {
-    if (!holds) throw InputError(shown(path) + " " + otherwise);
-  };
-  const std::string syntax = DcmXfer(data.getOriginalXfer()).getXferID();
-  require_that(pixel_coding(syntax) == PixelCoding::native, "has compressed pixels, " + uid_with_name(syntax) + "; " +
-                                                                kind + " must have plain ones: decompress it");
+  const std::string file = shown(path), syntax = DcmXfer(data.getOriginalXfer()).getXferID();
+  require(pixel_coding(syntax) == PixelCoding::native, file + " has compressed pixels, " + uid_with_name(syntax) +
+                                                           "; " + kind + " must have plain ones: decompress it");
   DcmElement* element = nullptr;
-  require_that(data.findAndGetElement(DCM_PixelData, element).good() && element, "has no Pixel Data (7FE0,0010)");
+  require(data.findAndGetElement(DCM_PixelData, element).good() && element, file + " has no Pixel Data (7FE0,0010)");
   const std::size_t found = element->getLengthField(), even = expected + expected % 2;
-  require_that(found == even, "has " + std::to_string(found) + " bytes of Pixel Data (7FE0,0010), expected " +
-                                  std::to_string(even) + (found < even ? ": it is cut short" : ""));
+  require(found == even, file + " has " + std::to_string(found) + " bytes of Pixel Data (7FE0,0010), expected " +
+                             std::to_string(even) + (found < even ? ": it is cut short" : ""));
   return *element;
 }
 

@@ -92,10 +92,6 @@ Record attempt(const BatchCase& of, const Retry& retry, const Resources& resourc
   return line;
 }
 
-}  // namespace
-
-namespace {
-
 /// A case that came to nothing, and why.
 void end(CaseOutcome& outcome, const BatchCase& of, CaseStatus status, FixedReason kind, const std::string& reason) {
   outcome.status = status;
