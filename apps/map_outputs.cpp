@@ -9,6 +9,7 @@
 
 #include "io/field_file.h"
 #include "io/image_file.h"
+#include "io/lower_case.h"
 
 namespace tetwarp::apps {
 
@@ -18,11 +19,7 @@ void require_image_suffix(const std::filesystem::path& path, const char* option)
                    "\"; use .nii .nii.gz .nrrd .mha");
 }
 
-bool has_registration_suffix(const std::filesystem::path& path) {
-  std::string suffix = path.extension().string();
-  std::transform(suffix.begin(), suffix.end(), suffix.begin(), [](unsigned char c) { return std::tolower(c); });
-  return suffix == ".dcm";
-}
+bool has_registration_suffix(const std::filesystem::path& path) { return lower(path.extension().string()) == ".dcm"; }
 
 MapOutputs::MapOutputs(const MapOptions& options, Direction direction, bool series, OutputSet& outputs)
     : options_(options) {

@@ -11,6 +11,7 @@
 #include "apps/reads.h"
 #include "deform/version.h"
 #include "io/image_file.h"
+#include "io/lower_case.h"
 
 namespace tetwarp::apps {
 
@@ -128,9 +129,7 @@ fs::path sidecar_of(const fs::path& output) { return plain(output).string() + ".
 
 fs::path bids_sidecar_of(const fs::path& output) {
   const auto has_suffix = [](const fs::path& path, const std::string& suffix) {
-    std::string found = path.extension().string();
-    std::transform(found.begin(), found.end(), found.begin(), [](unsigned char c) { return std::tolower(c); });
-    return found == suffix;
+    return lower(path.extension().string()) == suffix;
   };
   fs::path stem = output;
   if (has_suffix(stem, ".gz")) stem.replace_extension();

@@ -13,6 +13,7 @@
 
 #include "io/dicom_header.h"
 #include "io/dicom_stream.h"
+#include "io/lower_case.h"
 #include "io/shown_text.h"
 
 namespace tetwarp {
@@ -36,11 +37,6 @@ std::optional<fs::path> relative_path(const std::string& file_id) {
   return path;
 }
 
-std::string in_lower_case(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
-  return text;
-}
-
 /// Without the first parts that are also the last folders of `folder`: "S1/S20/I10" is "I10" in ".../S1/S20".
 fs::path below(const fs::path& folder, const fs::path& path) {
   const std::vector<fs::path> above(folder.begin(), folder.end()), parts(path.begin(), path.end());
@@ -54,7 +50,7 @@ fs::path below(const fs::path& folder, const fs::path& path) {
 /// Where a file of this name is, below a folder.
 std::optional<fs::path> find(const fs::path& folder, const fs::path& real_folder, const fs::path& name) {
   const fs::path shorter = below(real_folder, name);
-  for (const fs::path& one : {name, shorter, fs::path(in_lower_case(name)), fs::path(in_lower_case(shorter))}) {
+  for (const fs::path& one : {name, shorter, fs::path(lower(name)), fs::path(lower(shorter))}) {
     std::error_code error;
     if (fs::is_regular_file(folder / one, error)) return folder / one;
   }

@@ -15,6 +15,7 @@
 #include "deform/errors.h"
 #include "io/image_reader.h"
 #include "io/image_writer.h"
+#include "io/lower_case.h"
 #include "io/raw_image.h"
 #ifdef TETWARP_WITH_ITK
 #include "io/nifti_file.h"
@@ -183,8 +184,7 @@ ImageFormat required_format(const std::filesystem::path& path) {
 }  // namespace
 
 std::optional<ImageFormat> image_format(const std::filesystem::path& path) {
-  std::string name = path.filename().string();
-  for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const std::string name = lower(path.filename().string());
   if (name.ends_with(".nii") || name.ends_with(".nii.gz")) return ImageFormat::nifti;
   if (name.ends_with(".nrrd")) return ImageFormat::nrrd;
   if (name.ends_with(".mha")) return ImageFormat::mha;

@@ -12,14 +12,10 @@
 #include <vector>
 
 #include "deform/errors.h"
+#include "io/lower_case.h"
 
 namespace tetwarp {
 namespace {
-
-std::string lower(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
 
 std::vector<std::string> words(const std::string& text) {
   std::istringstream stream(text);

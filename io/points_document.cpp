@@ -79,12 +79,6 @@ std::string text_of(const glm::dvec3& point) {
   return text_of(point.x) + " " + text_of(point.y) + " " + text_of(point.z);
 }
 
-std::string lower(std::string_view text) {
-  std::string result(text);
-  for (char& c : result) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return result;
-}
-
 bool Lines::next() {
   if (next_ >= text_.size()) return false;
   begin = next_;

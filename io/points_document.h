@@ -69,9 +69,6 @@ std::string text_of(float value);
 /// `x y z` so.
 std::string text_of(const glm::dvec3& point);
 
-/// Its ASCII letters small.
-std::string lower(std::string_view text);
-
 /// Lines of a text, one after the other, with where they begin.
 class Lines {
  public:

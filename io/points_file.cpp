@@ -7,6 +7,7 @@
 #include <cstring>
 #include <iterator>
 
+#include "io/lower_case.h"
 #include "io/opened_file.h"
 #include "io/points_document.h"
 

@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 
 #include "deform/errors.h"
+#include "io/lower_case.h"
 #include "io/points_document.h"
 
 namespace tetwarp {
@@ -78,7 +79,7 @@ class TextStl : public PointsDocument {
     for (std::size_t step = 0; lines.next();) {
       const auto words = words_of(lines.line);
       if (words.empty()) continue;
-      const std::string word = lower(words[0]), where = at_line(lines.number, name);
+      const std::string word = lower(std::string(words[0])), where = at_line(lines.number, name);
       if (step == 0 && word == (in_solid ? "endsolid" : "solid")) {
         in_solid = !in_solid;
         take_space(lines.line, name);

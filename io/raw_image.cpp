@@ -16,16 +16,12 @@
 #include <utility>
 
 #include "deform/errors.h"
+#include "io/lower_case.h"
 #include "io/text_header.h"
 #include "io/value_reader.h"
 
 namespace tetwarp {
 namespace {
-
-std::string lower(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
 
 /// The whole text as numbers; parentheses and commas (NRRD vectors) count as spaces. @throws InputError
 std::vector<double> numbers(const TextHeader& header, const std::string& name, const std::string& file) {

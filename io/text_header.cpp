@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "deform/errors.h"
+#include "io/lower_case.h"
 #include "io/shown_text.h"
 
 namespace tetwarp {
@@ -59,11 +60,6 @@ const std::set<std::string>& meta_fields() {
                                                 "elementtointensityfunctionoffset",
                                                 "elementdatafile"};
   return kFields;
-}
-
-std::string lower(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
 }
 
 std::string trimmed(const std::string& text) {

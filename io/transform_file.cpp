@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "deform/errors.h"
+#include "io/lower_case.h"
 #ifdef TETWARP_WITH_ITK
 #include "io/image_reader.h"
 #include "io/module.h"
@@ -22,8 +23,7 @@ namespace tetwarp {
 namespace {
 
 bool has_transform_suffix(const std::filesystem::path& path) {
-  std::string suffix = path.extension().string();
-  std::ranges::transform(suffix, suffix.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string suffix = lower(path.extension().string());
   constexpr std::array<std::string_view, 4> kSuffixes = {".h5", ".hdf5", ".tfm", ".txt"};
   return std::ranges::find(kSuffixes, suffix) != kSuffixes.end();
 }

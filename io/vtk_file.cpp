@@ -11,6 +11,7 @@
 
 #include "deform/errors.h"
 #include "io/image_reader.h"
+#include "io/lower_case.h"
 #include "io/vtk_text.h"
 
 namespace tetwarp {

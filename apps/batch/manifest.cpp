@@ -16,6 +16,7 @@
 #include "apps/field_source.h"
 #include "apps/reads.h"
 #include "deform/fields/formula.h"
+#include "io/lower_case.h"
 #include "io/opened_file.h"
 #include "io/scenario_file.h"
 #include "io/shown_text.h"
@@ -89,11 +90,6 @@ std::string problem_of_id(const std::string& id) {
   if (is_file_of_a_batch(id))
     return "the case id \"" + id + "\" is the name of a file of the batch's own; choose another";
   return "";
-}
-
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
-  return text;
 }
 
 template <class Number>

@@ -15,6 +15,7 @@
 
 #include "apps/options.h"
 #include "deform/errors.h"
+#include "io/lower_case.h"
 #include "io/staged_output.h"
 
 namespace tetwarp::apps {
@@ -70,9 +71,8 @@ std::optional<Shard> shard_of(const fs::path& file, const std::string& name, con
   return shard;
 }
 
-bool is_file_of_a_batch(std::string name) {
-  std::ranges::transform(name, name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  const std::string start = name.substr(0, name.find('.'));
+bool is_file_of_a_batch(const std::string& any_case) {
+  const std::string name = lower(any_case), start = name.substr(0, name.find('.'));
   const auto is_of = [&](std::initializer_list<const char*> starts, const char* suffix) {
     return name.ends_with(suffix) && std::ranges::find(starts, start) != starts.end();
   };

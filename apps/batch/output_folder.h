@@ -66,7 +66,7 @@ std::optional<Shard> shard_of(const std::filesystem::path& file, const std::stri
 
 /// Whether a batch, or a shard of one, has a file of its own of this name, whatever the case of its letters: some file
 /// systems tell them not apart.
-bool is_file_of_a_batch(std::string name);
+bool is_file_of_a_batch(const std::string& name);
 
 /// Bytes that an ordinary user can still write on the file system of a folder.
 std::uint64_t free_bytes(std::filesystem::path folder);
