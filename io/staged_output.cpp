@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <climits>
 #include <cstdio>
 #include <exception>
 #include <mutex>
@@ -43,12 +44,18 @@ fs::path named(const fs::path& target) {
 
 fs::path folder_of(const fs::path& path);
 
+[[noreturn]] void refuse_irregular(const fs::path& path) {
+  throw Error(path.string() + " is no regular file; choose another name");
+}
+
 /// The path itself, or what a link of this name leads to, over any number of links. Nothing need be there yet: the
 /// links stay, and what they name is written.
 fs::path followed(const fs::path& target) {
   constexpr int kMostLinks = 40;  // as Linux has it
-  fs::path path = target;
   std::error_code error;
+  // A pipe or terminal that a link of /proc leads to has no path of its own that could be named.
+  if (const fs::file_status status = fs::status(target, error); fs::is_other(status)) refuse_irregular(target);
+  fs::path path = target;
   for (int links = 0; fs::is_symlink(fs::symlink_status(path, error)); ++links) {
     const fs::path next = fs::read_symlink(path, error);
     if (!error && links == kMostLinks) error = std::make_error_code(std::errc::too_many_symbolic_link_levels);
@@ -70,7 +77,7 @@ bool occupied(const fs::path& path, StagedOutput::Kind kind) {
   if (kind == StagedOutput::Kind::file) {
     if (fs::is_directory(status))
       throw Error(path.string() + " is a folder, a file is to be written; choose another name");
-    if (!fs::is_regular_file(status)) throw Error(path.string() + " is no regular file; choose another name");
+    if (!fs::is_regular_file(status)) refuse_irregular(path);
     return true;
   }
   if (!fs::is_directory(status)) {
@@ -109,14 +116,16 @@ void require_ours(const fs::path& folder, bool (*is_ours)(const fs::path&)) {
 }
 
 /// Creates an empty file or folder beside `target` under a hidden name that nobody has. A leftover of a killed run with
-/// the same process id (or of another machine on a shared disk) is left alone.
+/// the same process id (or of another machine on a shared disk) is left alone. Of a name that would be too long the
+/// front is left out.
 fs::path create_sibling(const fs::path& target, StagedOutput::Kind kind, const std::string& word) {
   const std::string process = ".tetwarp-" + word + "-" + std::to_string(::getpid());
   for (int attempt = 0;; ++attempt) {
     std::string name = process;
     if (attempt > 0) name += '-' + std::to_string(attempt);
     name += '-';
-    name += target.filename().string();
+    const std::string own = target.filename().string();
+    name += own.substr(own.size() - std::min(own.size(), NAME_MAX - name.size()));
     const fs::path path = folder_of(target) / name;
     int result;
     if (kind == StagedOutput::Kind::folder) {
@@ -185,8 +194,9 @@ int move_to_free(const fs::path& from, const fs::path& to, StagedOutput::Kind ki
   return fs::exists(to, ignored) ? EEXIST : move(from, to);
 }
 
-/// Moves the old folder aside, the new one in, and removes the old one last. 0 or errno.
-int replace_folder(const fs::path& staged, const fs::path& target) {
+/// Moves the old folder aside, the new one in, and removes the old one last: for file systems that cannot exchange two
+/// names at once. 0 or errno.
+int replace_in_steps(const fs::path& staged, const fs::path& target) {
   const fs::path aside = create_sibling(target, StagedOutput::Kind::folder, "replaced");
   std::error_code ignored;
   if (const int error = move(target, aside)) {
@@ -198,6 +208,16 @@ int replace_folder(const fs::path& staged, const fs::path& target) {
     throw Error("cannot replace " + target.string() + ": " + reason(error) + "; what it held is now " + aside.string());
   }
   fs::remove_all(aside, ignored);
+  return 0;
+}
+
+/// Exchanges the old folder and the new one, so that the name is never free and runs that replace one folder at once
+/// replace each other's whole; removes the old one last. 0 or errno.
+int replace_folder(const fs::path& staged, const fs::path& target) {
+  if (::renameat2(AT_FDCWD, staged.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE) != 0)
+    return errno == EINVAL || errno == ENOSYS ? replace_in_steps(staged, target) : errno;
+  std::error_code ignored;
+  fs::remove_all(staged, ignored);
   return 0;
 }
 

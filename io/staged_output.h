@@ -31,7 +31,7 @@ class StagedOutput {
   const std::filesystem::path& path() const { return staged_; }
   const std::filesystem::path& target() const { return target_; }
 
-  /// Flushes to disk and gives it its name. A folder that is replaced is moved aside first and removed last.
+  /// Flushes to disk and gives it its name. A folder that is replaced changes places with this one and is removed last.
   /// @throws Error naming the path and the system's reason (disk full and so on); nothing is lost then
   void commit();
 

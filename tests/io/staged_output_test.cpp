@@ -6,9 +6,12 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <climits>
+#include <exception>
 #include <fstream>
 #include <memory>
 #include <sstream>
+#include <thread>
 #include <vector>
 
 #include "deform/errors.h"
@@ -54,6 +57,8 @@ void make_folder(const fs::path& folder, const std::string& name, const std::str
   fs::create_directories(folder);
   write_file(folder / name, text);
 }
+
+std::string numbered(int n) { return "IM000" + std::to_string(10 + n) + ".dcm"; }
 
 TEST(StagedFile, AppearsOnlyWhenCommitted) {
   const Scratch scratch;
@@ -117,6 +122,28 @@ TEST(StagedFile, RefusesAFolderAndADevice) {
   fs::create_directory(scratch / "out.nii");
   EXPECT_NE(refusal(scratch / "out.nii", Kind::file, true).find("is a folder"), std::string::npos);
   EXPECT_NE(refusal("/dev/null", Kind::file, true).find("is no regular file"), std::string::npos);
+}
+
+TEST(StagedFile, APipeBehindALinkIsNamedAsTheLinkIs) {
+  const Scratch scratch;
+  int ends[2];
+  ASSERT_EQ(::pipe(ends), 0);
+  fs::create_symlink("/proc/self/fd/" + std::to_string(ends[1]), scratch / "out.nii");
+  const std::string why = refusal(scratch / "out.nii", Kind::file, true);
+  ::close(ends[0]);
+  ::close(ends[1]);
+  EXPECT_NE(why.find((scratch / "out.nii").string() + " is no regular file"), std::string::npos) << why;
+}
+
+TEST(StagedFile, ANameOfAsManyLettersAsAFileSystemAllowsIsGood) {
+  const Scratch scratch;
+  const std::string name = std::string(NAME_MAX - 4, 'x') + ".nii";
+  StagedOutput output(scratch / name, Kind::file, false);
+  EXPECT_EQ(output.path().extension(), ".nii");
+  write_file(output.path(), "new");
+  output.commit();
+  EXPECT_EQ(content(scratch / name), "new");
+  EXPECT_EQ(entries(scratch.path()), 1U);
 }
 
 TEST(StagedFile, WritesThroughASymbolicLink) {
@@ -235,6 +262,36 @@ TEST(StagedFolder, ReplacesAFolderOfOursWhole) {
   EXPECT_EQ(entries(scratch.path()), 1U);
 }
 
+TEST(StagedFolder, OneThatSeveralReplaceAtOnceIsTheWholeOfOneOfThem) {
+  const Scratch scratch;
+  make_folder(scratch / "series", numbered(0), "ours, old");
+  const auto replace = [&](const std::string& writer) {
+    for (int turn = 0; turn < 50; ++turn) {
+      StagedOutput output(scratch / "series", Kind::folder, true, [](const fs::path&) { return true; });
+      for (int n = 0; n < 20; ++n) write_file(output.path() / numbered(n), "ours, of " + writer);
+      output.give_name();
+    }
+  };
+  std::exception_ptr failures[2];
+  {
+    std::vector<std::jthread> threads;
+    for (int n = 0; n < 2; ++n) {
+      threads.emplace_back([&, n] {
+        try {
+          replace(std::to_string(n));
+        } catch (...) {
+          failures[n] = std::current_exception();
+        }
+      });
+    }
+  }
+  for (const std::exception_ptr& failure : failures) EXPECT_NO_THROW(if (failure) std::rethrow_exception(failure));
+  EXPECT_EQ(entries(scratch.path()), 1U) << "something is left behind";
+  ASSERT_EQ(entries(scratch / "series"), 20U);
+  for (int n = 1; n < 20; ++n)
+    EXPECT_EQ(content(scratch / "series" / numbered(n)), content(scratch / "series" / numbered(0)));
+}
+
 TEST(StagedFolder, RefusesToReplaceWhatIsNotOurs) {
   const Scratch scratch;
   make_folder(scratch / "series", "IM00009.dcm", "ours");
@@ -268,8 +325,6 @@ TEST(StagedFolder, DoesNotReplaceOneThatWasFilledMeanwhile) {
   EXPECT_THROW(output.commit(), Error);
   EXPECT_EQ(content(scratch / "series" / "notes.txt"), "mine");
 }
-
-std::string numbered(int n) { return "IM000" + std::to_string(10 + n) + ".dcm"; }
 
 TEST(StagedFolder, OfManyForeignFilesTheFirstIsNamed) {
   const Scratch scratch;
