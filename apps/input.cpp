@@ -60,7 +60,10 @@ const DicomSeries& choose_series(const DicomScan& scan, const InputOptions& opti
   const bool several =
       std::any_of(scan.series.begin(), scan.series.end(), [](const DicomSeries& series) { return series.volumes > 1; });
   throw InputError(std::to_string(scan.series.size()) + (several ? " volumes" : " series") + " found, " + where +
-                   (usable ? "; choose one with --series" : "; none of them is a usable volume") + list_series(scan));
+                   (!usable           ? "; none of them is a usable volume"
+                    : options.is_main ? "; choose one with --series"
+                                      : "; name a folder that holds one of them alone") +
+                   list_series(scan));
 }
 
 /// What was set aside of the whole series of a volume: the first volume of its series has it.
@@ -141,9 +144,9 @@ InputHeader open_input(const InputOptions& options, const Control& control, bool
   const DicomScan scan = scan_dicom(options.path, options.single, control);
   const DicomSeries& chosen = choose_series(scan, options);
   require(!chosen.refusal, chosen.refusal.value_or(""));
-  require(
-      !chosen.uneven || options.uneven,
-      chosen.uneven.value_or("") + "; add what is missing, or give --uneven exact, which takes each slice where it is");
+  require(!chosen.uneven || options.uneven,
+          chosen.uneven.value_or("") + "; add what is missing" +
+              (options.is_main ? ", or give --uneven exact, which takes each slice where it is" : ""));
   DicomSeries series = chosen;
   series.set_aside = set_aside_with(scan, chosen);
   return {series.geometry, VoxelType::i16, series, false, 1};

@@ -38,6 +38,7 @@ struct InputOptions {
   bool uneven = false;             ///< take slices at uneven distances, each where it is
   FileHash hash = FileHash::made;  ///< of a DICOM series
   NiftiFrame nifti_frame = NiftiFrame::sform;
+  bool is_main = true;  ///< the volume that --series and --uneven speak of; of another one no message names them
 
   friend bool operator==(const InputOptions&, const InputOptions&) = default;
 };

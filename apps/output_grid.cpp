@@ -95,6 +95,7 @@ InputOptions grid_volume(const std::string& wanted) {
   InputOptions volume;
   volume.path = wanted;
   volume.uneven = true;
+  volume.is_main = false;
   return volume;
 }
 

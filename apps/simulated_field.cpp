@@ -30,7 +30,8 @@ SimulateOptions as_simulation(const DeformOptions& options, const Worker& worker
 }
 
 AnyVolume read_labels(const DeformOptions& options, const Control& control) {
-  const InputOptions from{.path = options.labels, .series = {}, .nifti_frame = options.common.nifti_frame};
+  const InputOptions from{
+      .path = options.labels, .series = {}, .nifti_frame = options.common.nifti_frame, .is_main = false};
   return read_input(from, open_input(from, control), options.common, control).volume;
 }
 

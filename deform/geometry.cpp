@@ -9,6 +9,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <sstream>
 
 #include "deform/errors.h"
 
@@ -147,9 +148,11 @@ void require_valid(const Geometry& geometry, const std::string& what) {
   for (int axis = 0; axis < 3; ++axis) {
     require(geometry.size[axis] >= 1,
             what + ": size " + to_string(geometry.size) + ", expected at least 1 on every axis");
-    require(std::isfinite(geometry.spacing[axis]) && geometry.spacing[axis] > 0,
-            what + ": spacing " + std::to_string(geometry.spacing[axis]) + " mm on axis " + std::to_string(axis) +
-                ", expected a positive number");
+    std::ostringstream spacing;
+    spacing << geometry.spacing[axis];
+    require(geometry.spacing[axis] >= kSmallestSpacing && geometry.spacing[axis] <= kLargestSpacing,
+            what + ": spacing " + spacing.str() + " mm on axis " + std::to_string(axis) +
+                ", expected a number from 1e-6 to 1e6");
     require(std::isfinite(geometry.origin[axis]), what + ": the origin is not finite");
   }
   const double determinant = glm::determinant(geometry.direction);

@@ -78,8 +78,13 @@ Geometry straightened(const Geometry& geometry);
 /// Three-letter anatomical code of the directions in which i, j, k grow, "LPS" for the identity direction.
 std::string orientation_code(const Geometry& geometry);
 
-/// @throws InputError unless sizes and spacings are positive, all numbers finite, and the direction can be inverted; or
-/// for `slices` that are not one a slice, rising from 0 to the last slice of the even stack; `what` names the grid
+/// What the spacing of a grid may be, in mm: no scanner and no microscope is near either end, and a number beyond them
+/// is a mistaken unit or a damaged file.
+constexpr double kSmallestSpacing = 1e-6, kLargestSpacing = 1e6;
+
+/// @throws InputError unless sizes are positive, spacings within the bounds above, all numbers finite, and the
+/// direction can be inverted; or for `slices` that are not one a slice, rising from 0 to the last slice of the even
+/// stack; `what` names the grid
 void require_valid(const Geometry& geometry, const std::string& what);
 
 /// "512 x 512 x 300", the way messages show a size.

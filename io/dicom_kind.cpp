@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <tuple>
 
 #include "io/dicom_series.h"
 #include "io/dicom_stack.h"
@@ -66,6 +67,20 @@ bool same_kind(const DicomFileHeader& a, const DicomFileHeader& b) {
   return std::all_of(aspects().begin(), aspects().end(), [&](const Aspect& aspect) { return aspect.same(a, b); });
 }
 
+/// The order of volumes that lie in one series, whatever that of the files: what is compared exactly comes first, then
+/// axial before coronal before sagittal, small pixels before large ones.
+bool comes_before(const DicomFileHeader& a, const DicomFileHeader& b) {
+  const std::string_view stack_a = a.frame ? trait_of(a, Trait::stack) : "",
+                         stack_b = b.frame ? trait_of(b, Trait::stack) : "";
+  if (stack_a != stack_b) return is_before(Trait::stack, stack_a, stack_b);
+  const auto exact = [](const DicomFileHeader& h) {
+    return std::tie(h.study_uid, h.frame_of_reference_uid, h.pixels.rows, h.pixels.columns);
+  };
+  if (exact(a) != exact(b)) return exact(a) < exact(b);
+  if (!same_orientation(a, b)) return *a.orientation > *b.orientation;
+  return std::tie(a.spacing->x, a.spacing->y) < std::tie(b.spacing->x, b.spacing->y);
+}
+
 void name_differences(std::vector<SliceKind>& kinds, const Headers& files) {
   const auto example = [&](const SliceKind& kind) -> const DicomFileHeader& { return files[kind.slices.front()]; };
   for (const Aspect& aspect : aspects()) {
@@ -116,6 +131,9 @@ std::vector<SliceKind> slice_kinds(const Headers& files) {
     if (kinds.size() == kMostKinds) return {};
     kinds.push_back({{n}, {}, {}});
   }
+  std::stable_sort(kinds.begin(), kinds.end(), [&](const SliceKind& a, const SliceKind& b) {
+    return comes_before(files[a.slices.front()], files[b.slices.front()]);
+  });
   name_differences(kinds, files);
   return kinds;
 }

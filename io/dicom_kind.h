@@ -30,8 +30,8 @@ struct SliceKind {
   std::string differ_by;            ///< the attributes: "Image Orientation (0020,0037) and Rows x Columns"
 };
 
-/// All slices must have position, orientation and spacing. @return in the order in which they come; nothing for more
-/// than 64 kinds, which are no series
+/// All slices must have position, orientation and spacing. @return by their values, whatever the order of the files;
+/// nothing for more than 64 kinds, which are no series
 std::vector<SliceKind> slice_kinds(const std::vector<DicomFileHeader>& files);
 
 }  // namespace tetwarp

@@ -35,8 +35,8 @@ std::string with_outside_text(const std::string& description) {
 
 void PointsDocument::take_space(std::string_view text, const std::string& name) {
   const std::optional<PointFrame> said = slicer_space(text, name);
-  require(!said || !frame || *frame == *said, "both SPACE=LPS and SPACE=RAS, " + name);
-  if (said) frame = said;
+  if (said) require_same_space(frame, *said, name);
+  frame = said ? said : frame;
 }
 
 PointFrame frame_of(const std::string& text, const std::string& name) {

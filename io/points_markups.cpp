@@ -4,8 +4,10 @@
 // 3D Slicer's .mrk.json: markups-schema-v1.0.3.json of Slicer, Modules/Loadable/Markups/Resources/Schema.
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "deform/errors.h"
+#include "io/json_tree.h"
 #include "io/points_document.h"
 
 namespace tetwarp {
@@ -13,6 +15,21 @@ namespace tetwarp {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+/// Parses, and refuses an object that has a key twice: of two positions or coordinate systems none is the right one.
+/// @throws InputError or what nlohmann throws
+Json parse_with_different_keys(const std::string& bytes, const std::string& name) {
+  std::vector<std::set<std::string>> keys;  // of the objects that are open
+  return Json::parse(bytes, [&](int, Json::parse_event_t event, const Json& parsed) {
+    if (event == Json::parse_event_t::object_start) keys.emplace_back();
+    if (event == Json::parse_event_t::object_end) keys.pop_back();
+    if (event == Json::parse_event_t::key) {
+      const auto key = parsed.get<std::string>();
+      require(keys.back().insert(key).second, "the key \"" + printable(key) + "\" twice in one object, " + name);
+    }
+    return true;
+  });
+}
 
 /// "/markups/0/controlPoints/2, FILE".
 std::string place_of(const Json::json_pointer& at, const std::string& name) { return at.to_string() + ", " + name; }
@@ -50,7 +67,7 @@ class MarkupsDocument : public PointsDocument {
  public:
   MarkupsDocument(const std::string& bytes, const std::string& name) {
     try {
-      document_ = Json::parse(bytes);
+      document_ = parse_with_different_keys(bytes, name);
     } catch (const nlohmann::json::parse_error& error) {
       throw InputError("not a JSON document" + at_byte(error.byte, name) + "; is the file whole?");
     } catch (const nlohmann::json::exception&) {

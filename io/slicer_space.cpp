@@ -10,6 +10,10 @@
 
 namespace tetwarp {
 
+void require_same_space(std::optional<PointFrame> before, PointFrame said, const std::string& name) {
+  require(!before || *before == said, "both SPACE=LPS and SPACE=RAS, " + name);
+}
+
 std::optional<PointFrame> slicer_space(std::string_view text, const std::string& name) {
   constexpr std::string_view kKey = "SPACE=";
   std::optional<PointFrame> frame;
@@ -20,7 +24,7 @@ std::optional<PointFrame> slicer_space(std::string_view text, const std::string&
     const std::string word(text.substr(at, end - at));
     require(word == "LPS" || word == "RAS", "the frame \"SPACE=" + word + "\", " + name + "; expected LPS or RAS");
     const PointFrame said = frame_of(word, name);
-    require(!frame || *frame == said, "both SPACE=LPS and SPACE=RAS, " + name);
+    require_same_space(frame, said, name);
     frame = said;
   }
   return frame;

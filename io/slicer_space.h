@@ -12,6 +12,9 @@
 
 namespace tetwarp {
 
+/// @throws InputError where a file has said another frame before
+void require_same_space(std::optional<PointFrame> before, PointFrame said, const std::string& name);
+
 /// What follows "SPACE=" in a text, "RAS" or "LPS"; none where that is not in it.
 /// @param name  of the file, for messages
 /// @throws InputError for another word than these two, or where both stand

@@ -93,6 +93,12 @@ TEST(StackProgram, UnevenSlicesAreRefusedUnlessTheyAreAskedFor) {
   EXPECT_EQ(refused.status, 4);
   EXPECT_TRUE(says(refused.err, {"slice gap", "--uneven exact"}));
   EXPECT_FALSE(fs::exists(scratch / "out.nii"));
+  // What speaks of the main volume alone is not named where another one is to blame.
+  write_noise(scratch / "even", kStraight, {0, 2.5, 5, 7.5});
+  const Outcome other = run_tetwarp(scratch.path(), "deform even -f identity -o out.nii --with uneven=other.nii");
+  EXPECT_EQ(other.status, 3);
+  EXPECT_TRUE(says(other.err, {"slice gap", "add what is missing"}));
+  EXPECT_EQ(other.err.find("--uneven"), std::string::npos) << other.err;
   EXPECT_EQ(run_tetwarp(scratch.path(), "deform uneven --uneven maybe -f identity -o out.nii").status, 2);
   const Outcome cubic =
       run_tetwarp(scratch.path(), "deform uneven --uneven exact --interpolation cubic -f identity -o out.nii");

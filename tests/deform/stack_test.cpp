@@ -7,6 +7,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <random>
 
 #include "tests/support/backends.h"
@@ -197,6 +198,14 @@ TEST(StraightenedGrid, HoldsAllSlicesWithRowsAndColumnsAsTheyAre) {
 TEST(StraightenedGrid, OfAStraightVolumeIsItsOwn) {
   const Geometry grid = oblique_grid({5, 6, 7});
   EXPECT_EQ(straightened(grid), grid);
+}
+
+TEST(Geometry, SpacingsBeyondAllMeasureAreRefused) {
+  for (const double spacing : {1e-6, 0.7, 1e6}) require_valid(Geometry{{4, 4, 4}, {1, spacing, 1}}, "grid");
+  for (const double spacing : {0.0, -1.0, 1e-9, 1e9, std::numeric_limits<double>::quiet_NaN()}) {
+    const Geometry bad{{4, 4, 4}, {1, spacing, 1}};
+    EXPECT_TRUE(says(error_of([&] { require_valid(bad, "grid"); }), {"grid: spacing", "axis 1", "from 1e-6 to 1e6"}));
+  }
 }
 
 TEST(StraightenedGrid, PlacesOfSlicesAreChecked) {

@@ -170,6 +170,13 @@ TEST(PointsFile, MarkupsOfTwoFramesInOneFileKeepTheirs) {
   EXPECT_EQ(found["markups"][1]["controlPoints"][1]["position"], (std::vector<double>{0.5, 23.25, 103.25}));
 }
 
+TEST(PointsFile, MarkupsWithAKeyTwiceInOneObjectAreRefused) {
+  const Scratch scratch;
+  const std::string good = sample_markups("\"LPS\"");
+  const std::string twice = with(good, "\"Curve\", ", "\"Curve\", \"coordinateSystem\": \"RAS\", ");
+  EXPECT_TRUE(says(refusal(scratch, "a.mrk.json", twice), {"the key \"coordinateSystem\" twice", "a.mrk.json"}));
+}
+
 TEST(PointsFile, StlNormalsAreThoseOfTheMovedFacets) {
   const Scratch scratch;
   write_file(scratch / "a.stl", sample_binary_stl(""));
