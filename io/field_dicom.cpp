@@ -12,9 +12,9 @@
 #include <limits>
 
 #include "deform/errors.h"
-#include "io/dicom_header.h"
-#include "io/dicom_put.h"
-#include "io/dicom_stream.h"
+#include "io/dicom/derive/dicom_put.h"
+#include "io/dicom/scan/dicom_header.h"
+#include "io/dicom/scan/dicom_stream.h"
 #include "io/image_reader.h"
 
 namespace tetwarp {

@@ -6,7 +6,7 @@
 #include <array>
 #include <span>
 
-#include "io/dicom_pixels.h"
+#include "io/dicom/pixels/dicom_pixels.h"
 #include "tests/fuzz/input_file.h"
 
 namespace {

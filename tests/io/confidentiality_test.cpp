@@ -6,8 +6,8 @@
 #include <fstream>
 #include <sstream>
 
-#include "io/dicom_deidentify.h"
-#include "io/dicom_file.h"
+#include "io/dicom/derive/dicom_file.h"
+#include "io/dicom/privacy/dicom_deidentify.h"
 #include "tests/io/derived_source.h"
 
 namespace tetwarp::test {

@@ -2,12 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // What de-identification does beyond the table of the standard, and its options and key.
-#include "io/dicom_deidentify.h"
+#include "io/dicom/privacy/dicom_deidentify.h"
 
 #include <chrono>
 
 #include "deform/errors.h"
-#include "io/dicom_file.h"
+#include "io/dicom/derive/dicom_file.h"
 #include "io/hash.h"
 #include "tests/io/derived_source.h"
 #include "tests/support/says.h"

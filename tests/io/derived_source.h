@@ -13,7 +13,7 @@
 #include <memory>
 #include <string>
 
-#include "io/dicom_headers.h"
+#include "io/dicom/scan/dicom_headers.h"
 
 namespace tetwarp::test {
 

@@ -9,7 +9,7 @@
 #include <set>
 
 #include "deform/errors.h"
-#include "io/dicom_compress.h"
+#include "io/dicom/codecs/dicom_compress.h"
 #include "tests/io/derived_source.h"
 #include "tests/support/other_readers.h"
 #include "tests/support/real_data.h"

@@ -7,9 +7,9 @@
 #include <zlib.h>
 
 #include "deform/errors.h"
-#include "io/dicom_header.h"
+#include "io/dicom/scan/dicom_header.h"
+#include "io/dicom/scan/dicom_stream.h"
 #include "io/dicom_series.h"
-#include "io/dicom_stream.h"
 #include "tests/support/coded_slices.h"
 #include "tests/support/image_samples.h"
 #include "tests/support/says.h"

@@ -15,7 +15,7 @@
 #include <array>
 #include <fstream>
 
-#include "io/dicom_headers.h"
+#include "io/dicom/scan/dicom_headers.h"
 #include "io/hash.h"
 #include "tests/support/dicom_maker.h"
 #include "tests/support/says.h"

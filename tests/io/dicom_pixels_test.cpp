@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/dicom_pixels.h"
+#include "io/dicom/pixels/dicom_pixels.h"
 
 #include <gtest/gtest.h>
 

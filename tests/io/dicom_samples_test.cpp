@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Every depth, place and sign of a stored value in every coding, against the values that were put in.
-#include "io/dicom_samples.h"
+#include "io/dicom/pixels/dicom_samples.h"
 
 #include <gtest/gtest.h>
 
@@ -14,7 +14,7 @@
 #include <set>
 
 #include "deform/errors.h"
-#include "io/dicom_header.h"
+#include "io/dicom/scan/dicom_header.h"
 #include "io/dicom_series.h"
 #include "tests/support/coded_slices.h"
 #include "tests/support/image_samples.h"

@@ -7,7 +7,7 @@
 #include <dcmtk/config/osconfig.h>
 #include <dcmtk/dcmdata/dcxfer.h>
 
-#include "io/dicom_headers.h"
+#include "io/dicom/scan/dicom_headers.h"
 #include "tests/support/dicom_maker.h"
 #include "tests/support/image_samples.h"
 #include "tests/support/scratch.h"

@@ -4,7 +4,7 @@
 // Text from files, as messages show it.
 #include <gtest/gtest.h>
 
-#include "io/dicom_charset.h"
+#include "io/dicom/scan/dicom_charset.h"
 #include "io/dicom_series.h"
 #include "io/shown_text.h"
 #include "tests/support/dicom_edit.h"

@@ -9,7 +9,7 @@
 #include <cstring>
 
 #include "deform/errors.h"
-#include "io/dicom_header.h"
+#include "io/dicom/scan/dicom_header.h"
 #include "io/dicom_series.h"
 #include "tests/support/dicom_maker.h"
 #include "tests/support/image_samples.h"

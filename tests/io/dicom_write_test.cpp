@@ -10,7 +10,7 @@
 
 #include "deform/errors.h"
 #include "deform/version.h"
-#include "io/dicom_file.h"
+#include "io/dicom/derive/dicom_file.h"
 #include "io/hash.h"
 #include "tests/io/derived_source.h"
 #include "tests/support/dicom_maker.h"

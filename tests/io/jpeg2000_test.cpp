@@ -8,7 +8,7 @@
 #include <random>
 
 #include "deform/errors.h"
-#include "io/dicom_codecs.h"
+#include "io/dicom/codecs/dicom_codecs.h"
 #include "tests/support/coded_slices.h"
 #include "tests/support/says.h"
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Lossless JPEG decoded here, against what was encoded; and damage that shows to the bit.
-#include "io/jpeg_scan.h"
+#include "io/dicom/codecs/jpeg_scan.h"
 
 #include <gtest/gtest.h>
 

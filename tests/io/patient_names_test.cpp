@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Which texts of a header name the patient, whatever their case, marks, alphabet and what they are glued to.
-#include "io/patient_names.h"
+#include "io/dicom/privacy/patient_names.h"
 
 #include <nlohmann/json.hpp>
 
-#include "io/comparable_text.h"
+#include "io/dicom/privacy/comparable_text.h"
 #include "io/dicom_bids.h"
 #include "io/dicom_series.h"
 #include "tests/io/derived_source.h"

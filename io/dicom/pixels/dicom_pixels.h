@@ -1,0 +1,68 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "io/dicom/scan/dicom_bytes.h"
+#include "io/dicom/scan/dicom_header.h"
+
+namespace tetwarp {
+
+/// Decodes Pixel Data of an object whose header passed `pixel_problem`: of one frame, or, of several that are not
+/// compressed, that of the header.
+/// @return one word a pixel, rows top to bottom, every bit as stored
+/// @throws InputError naming the file for data that are truncated, damaged or of another size than the header says
+std::vector<std::uint16_t> decode_pixels(DcmDataset& data, const DicomFileHeader& header);
+
+/// The same of the fragments of one compressed frame, without the Basic Offset Table (PS3.5 A.4): that is often wrong,
+/// and says nothing where there is one frame.
+std::vector<std::uint16_t> decode_frame(std::span<const std::span<const std::byte>> fragments,
+                                        const DicomFileHeader& header);
+
+/// The same of a slice that was parsed and whose pixels are not native: its fragments, or what its data set holds.
+std::vector<std::uint16_t> decode_slice(const ParsedSlice& slice);
+
+/// Words of Pixel Data to HU. Built once for slices of the same format. Every word of 16 bits has an entry, whatever
+/// Bits Allocated says, so that nothing that a decoder gives lies outside.
+struct HuTable {
+  enum Kind : std::uint8_t { exact = 0, rounded = 1, beyond = 2, saturated_padding = 4 };
+  static constexpr std::size_t kWords = std::size_t{UINT16_MAX} + 1;
+  PixelFormat format;
+  std::array<std::int16_t, kWords> hu{};
+  std::array<std::uint8_t, kWords> kind{};  ///< `beyond`: HU does not fit int16
+  std::optional<int> offset;  ///< HU less the stored value, where slope and intercept add a whole number only
+};
+std::shared_ptr<const HuTable> make_hu_table(const PixelFormat& format);
+
+/// Keeps the last table for whoever needs the same next.
+class HuTableCache {
+ public:
+  std::shared_ptr<const HuTable> table_for(const PixelFormat& format);
+
+ private:
+  std::mutex mutex_;
+  std::shared_ptr<const HuTable> last_;
+};
+
+struct HuCount {
+  std::uint64_t rounded = 0;            ///< pixels with a fractional HU
+  std::uint64_t saturated_padding = 0;  ///< pixels of padding whose HU does not fit int16
+};
+/// @param words  as many as there are `hu`
+/// @param slice  its name
+/// @throws InputError naming the slice for a pixel whose HU does not fit int16
+HuCount convert_to_hu(std::span<const std::uint16_t> words, const HuTable& table, const std::string& slice,
+                      std::span<std::int16_t> hu);
+/// The same of words as they lie in a file, little endian, at any address.
+HuCount convert_to_hu(std::span<const std::byte> words, const HuTable& table, const std::string& slice,
+                      std::span<std::int16_t> hu);
+
+}  // namespace tetwarp

@@ -1,0 +1,60 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#pragma once
+
+// Private to io/: takes from a data set what tells whom it shows.
+#include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmdata/dcdatset.h>
+
+#include <optional>
+#include <string>
+
+#include "io/deidentification.h"
+#include "io/dicom/privacy/dicom_confidentiality.h"
+
+namespace tetwarp {
+
+/// Applies table E.1-1 of PS3.15 to whole data sets. Stricter than the table, since no list of names is complete:
+/// - What the dictionary of DCMTK does not know goes, and what lies in an element of VR UN.
+/// - Other free text (VR LT, ST, UT, UC, UR), persons' names (PN), application entities (AE) and bytes (OB, OW, ...)
+///   go, and all texts of the groups 0010, 0012, 0032, 0038, 0040 and 0070: of patient, trial, order, presentation.
+/// - Other dates and times (DA, DT, TM) are treated as those of the table, other UIDs are replaced unless the standard
+///   gave them.
+/// What may not be missing in an item, or may not be empty, becomes empty or a dummy instead.
+class Deidentifier {
+ public:
+  /// @param patient_id, study_uid  of the source: the days that dates go back by belong to the patient; to the study
+  ///     where no patient is named
+  Deidentifier(Deidentification how, const std::string& patient_id, const std::string& study_uid);
+
+  /// What stands for a UID: itself if it is empty, registered in PS3.6, or UIDs are retained.
+  std::string uid(const std::string& uid) const;
+  /// What stands for a patient ID.
+  std::string patient(const std::string& id) const;
+
+  /// De-identifies what is there and says so in Patient Identity Removed and what belongs to it (PS3.3 C.7.1.1 and
+  /// C.12.1).
+  /// @param is_ct_image  of a CT image the types of attributes are known; otherwise what is valid for every type stays
+  void apply(DcmItem& dataset, bool is_ct_image) const;
+
+  /// De-identifies an item of a data set of which nothing is known: without marks.
+  void apply(DcmItem& item) const { apply_to(item, false); }
+
+ private:
+  std::string replacement(const std::string& uid) const;
+  void apply_to(DcmItem& item, bool is_ct_image) const;
+  Confidentiality action_on(DcmElement& element, AttributeType type) const;
+  void carry_out(Confidentiality action, DcmItem& item, unsigned long n, AttributeType type) const;
+  void put_dummies(DcmItem& item, unsigned long n) const;
+  void replace_uids(DcmElement& element) const;
+  bool shift(DcmElement& element) const;
+
+  Deidentification how_;
+  int days_back_;
+};
+
+/// De-identifies a data set, if that is asked for, by its own Patient ID and Study Instance UID.
+void deidentify(DcmItem& dataset, const std::optional<Deidentification>& how, bool is_ct_image);
+
+}  // namespace tetwarp

@@ -1,0 +1,80 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#pragma once
+
+// Private to io/: one DICOM file in memory, and what is parsed of it.
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "io/dicom/scan/dicom_header.h"
+#include "io/hash.h"
+
+namespace tetwarp {
+
+/// Some bytes of a file.
+struct FileRange {
+  std::uint64_t begin = 0, bytes = 0;
+};
+
+/// Memory for one file after the other.
+class FileBuffer {
+ public:
+  /// All bytes of a file; good until the next call. @throws InputError naming the file
+  std::span<const std::byte> read(const std::filesystem::path& file);
+  /// Parts of it, one after the other; likewise.
+  std::span<const std::byte> read(const std::filesystem::path& file, std::span<const FileRange> parts);
+
+ private:
+  std::span<std::byte> room_for(std::size_t bytes);
+
+  std::unique_ptr<std::byte[]> bytes_;
+  std::size_t room_ = 0;
+};
+
+/// SHA-256 of a file, read piece by piece. @throws InputError naming the file
+Sha256::Digest digest_of(const std::filesystem::path& file);
+
+struct ParsedSlice {
+  std::unique_ptr<DcmFileFormat> format;
+  DicomFileHeader header;
+  /// Pixel Data where they lie in the file: 16-bit words, little endian, as many as the header says, or the fragments
+  /// of compressed frames as long as they are, without the offset table. `format` does not hold them then. Both empty:
+  /// they are in `format`.
+  std::span<const std::byte> native;
+  std::vector<std::span<const std::byte>> fragments;
+};
+
+/// Bytes that uncompressed Pixel Data have by their own length field.
+/// @param start  the 12 bytes before the value (PS3.5 7.1)
+/// @return none for what DCMTK has to look at: other value representations, lengths that are undefined or odd, big
+/// endian
+std::optional<std::size_t> native_length(std::span<const std::byte> start, E_TransferSyntax encoding);
+
+/// The items of encapsulated Pixel Data (PS3.5 A.4).
+struct PixelItems {
+  std::vector<FileRange> items;      ///< their values; the first is the Basic Offset Table
+  std::optional<std::uint64_t> end;  ///< behind the delimiter; none: there are no such items, or they are cut short
+};
+/// @param read  the bytes of a file from an offset on, as many as there are up to those asked for
+/// @param at    where the value of Pixel Data begins
+PixelItems pixel_items(const std::function<std::size_t(std::uint64_t, std::span<std::byte>)>& read,
+                       std::uint64_t file_bytes, std::uint64_t at);
+
+/// What a deflated data set with this header may inflate to.
+std::size_t inflated_limit(const PixelFormat& pixels);
+
+/// Bytes of Pixel Data that are there; compressed: of the file.
+std::optional<std::uint64_t> pixel_bytes_of(DcmDataset& data, std::uint64_t file_bytes);
+
+/// Parses a whole file. Pixel Data that end it are left where they are, which spares a copy or two of the most of it;
+/// DCMTK makes fragments of odd length longer by a byte.
+/// @throws InputError naming the file for one that is truncated or damaged
+ParsedSlice parse_slice(std::span<const std::byte> bytes, const std::filesystem::path& file);
+
+}  // namespace tetwarp
