@@ -15,7 +15,7 @@
 #include "io/dicom/derive/dicom_put.h"
 #include "io/dicom/scan/dicom_header.h"
 #include "io/dicom/scan/dicom_stream.h"
-#include "io/image_reader.h"
+#include "io/images/image_reader.h"
 
 namespace tetwarp {
 namespace {

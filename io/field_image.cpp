@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "deform/errors.h"
-#include "io/text_header.h"
+#include "io/images/text_header.h"
 
 namespace tetwarp {
 namespace {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "io/field_format.h"
-#include "io/image_reader.h"
+#include "io/images/image_reader.h"
 
 namespace tetwarp {
 

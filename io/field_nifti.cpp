@@ -8,7 +8,7 @@
 
 #include "deform/errors.h"
 #include "io/field_image.h"
-#include "io/nifti_file.h"
+#include "io/images/nifti_file.h"
 #include "io/niftyreg_spline.h"
 
 namespace tetwarp {

@@ -12,7 +12,7 @@
 #include <fstream>
 
 #include "deform/errors.h"
-#include "io/image_reader.h"
+#include "io/images/image_reader.h"
 
 namespace tetwarp {
 namespace {

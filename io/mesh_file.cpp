@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "deform/errors.h"
-#include "io/image_reader.h"
+#include "io/images/image_reader.h"
 #include "io/mesh_format.h"
 #include "io/opened_file.h"
 #include "io/vector_options.h"

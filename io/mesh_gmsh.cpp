@@ -14,7 +14,7 @@
 
 #include "deform/errors.h"
 #include "io/gmsh_section.h"
-#include "io/image_reader.h"
+#include "io/images/image_reader.h"
 
 namespace tetwarp {
 namespace {

@@ -4,7 +4,7 @@
 #pragma once
 
 // Private to io/.
-#include "io/nifti_file.h"
+#include "io/images/nifti_file.h"
 #include "io/transform_file.h"
 
 namespace tetwarp {

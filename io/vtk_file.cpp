@@ -10,7 +10,7 @@
 #include <map>
 
 #include "deform/errors.h"
-#include "io/image_reader.h"
+#include "io/images/image_reader.h"
 #include "io/lower_case.h"
 #include "io/vtk_text.h"
 

@@ -10,7 +10,7 @@
 
 #include "deform/errors.h"
 #include "io/image_file.h"
-#include "io/text_header.h"
+#include "io/images/text_header.h"
 #include "itkbridge/image_io.h"
 #include "tests/support/image_samples.h"
 #include "tests/support/scratch.h"

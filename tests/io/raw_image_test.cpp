@@ -1,11 +1,11 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/raw_image.h"
+#include "io/images/raw_image.h"
 
 #include <gtest/gtest.h>
 
-#include "io/image_writer.h"
+#include "io/images/image_writer.h"
 #include "tests/support/image_samples.h"
 #include "tests/support/scratch.h"
 #include "tests/support/write_file.h"

@@ -19,7 +19,7 @@
 #include "io/dicom/derive/dicom_put.h"
 #include "io/dicom/scan/dicom_header.h"
 #include "io/hash.h"
-#include "io/image_writer.h"
+#include "io/images/image_writer.h"
 
 namespace tetwarp {
 

@@ -12,7 +12,7 @@
 
 #include "deform/errors.h"
 #include "io/gzip_pieces.h"
-#include "io/image_writer.h"
+#include "io/images/image_writer.h"
 #include "itkbridge/image_io.h"
 
 namespace tetwarp {

@@ -11,7 +11,7 @@
 #include <string>
 
 #include "io/image_file.h"
-#include "io/image_reader.h"
+#include "io/images/image_reader.h"
 
 namespace tetwarp {
 

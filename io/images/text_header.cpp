@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/text_header.h"
+#include "io/images/text_header.h"
 
 #include <algorithm>
 #include <cctype>

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/nrrd_layout.h"
+#include "io/images/nrrd_layout.h"
 
 #include <algorithm>
 #include <cctype>

@@ -13,16 +13,16 @@
 #include <sstream>
 
 #include "deform/errors.h"
-#include "io/image_reader.h"
-#include "io/image_writer.h"
+#include "io/images/image_reader.h"
+#include "io/images/image_writer.h"
+#include "io/images/raw_image.h"
 #include "io/lower_case.h"
-#include "io/raw_image.h"
 #ifdef TETWARP_WITH_ITK
-#include "io/nifti_file.h"
-#include "io/nrrd_layout.h"
+#include "io/images/nifti_file.h"
+#include "io/images/nrrd_layout.h"
+#include "io/images/text_header.h"
+#include "io/images/value_reader.h"
 #include "io/opened_file.h"
-#include "io/text_header.h"
-#include "io/value_reader.h"
 #include "itkbridge/image_io.h"
 #endif
 

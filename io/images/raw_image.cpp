@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/raw_image.h"
+#include "io/images/raw_image.h"
 
 #include <algorithm>
 #include <array>
@@ -16,9 +16,9 @@
 #include <utility>
 
 #include "deform/errors.h"
+#include "io/images/text_header.h"
+#include "io/images/value_reader.h"
 #include "io/lower_case.h"
-#include "io/text_header.h"
-#include "io/value_reader.h"
 
 namespace tetwarp {
 namespace {

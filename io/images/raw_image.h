@@ -10,8 +10,8 @@
 #include <memory>
 #include <string>
 
-#include "io/image_reader.h"
-#include "io/text_header.h"
+#include "io/images/image_reader.h"
+#include "io/images/text_header.h"
 
 namespace tetwarp {
 

@@ -10,7 +10,7 @@
 #include <map>
 #include <string>
 
-#include "io/image_reader.h"
+#include "io/images/image_reader.h"
 
 namespace tetwarp {
 

@@ -14,7 +14,7 @@
 #include <optional>
 #include <string>
 
-#include "io/image_reader.h"
+#include "io/images/image_reader.h"
 
 namespace tetwarp {
 

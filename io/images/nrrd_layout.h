@@ -7,8 +7,8 @@
 #include <filesystem>
 #include <optional>
 
-#include "io/text_header.h"
-#include "io/value_reader.h"
+#include "io/images/text_header.h"
+#include "io/images/value_reader.h"
 
 namespace tetwarp {
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/value_reader.h"
+#include "io/images/value_reader.h"
 
 #include <tbb/parallel_for.h>
 #include <zlib.h>

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "deform/errors.h"
-#include "io/nifti_file.h"
+#include "io/images/nifti_file.h"
 
 namespace tetwarp {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/nifti_file.h"
+#include "io/images/nifti_file.h"
 
 #include <tbb/parallel_for.h>
 

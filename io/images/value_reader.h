@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <memory>
 
-#include "io/image_reader.h"
+#include "io/images/image_reader.h"
 
 namespace tetwarp {
 

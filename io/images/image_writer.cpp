@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/image_writer.h"
+#include "io/images/image_writer.h"
 
 #include <zlib.h>
 
