@@ -69,10 +69,10 @@ FieldSource parse_field_source(const std::string& text);
 /// @throws InputError for options that the file's format has not, needs and does not have, or with an unknown value
 void check_field_options(const FieldSource& source);
 
-/// Whether a format of io/field_format.h takes the file, and it holds vectors (not a volume).
+/// Whether a format of io/fields/field_format.h takes the file, and it holds vectors (not a volume).
 bool is_field_file(const FieldSource& source);
 
-/// Reads a file of any format of io/field_format.h (docs/fields.md lists them); doubles are rounded to float.
+/// Reads a file of any format of io/fields/field_format.h (docs/fields.md lists them); doubles are rounded to float.
 /// Direction: NRRD and MHA key `tetwarp_direction`, NIfTI descrip `tetwarp_direction=forward`, or the format's own.
 /// A pull field may have NaN where there is no source, which a file that does not say its direction has only for
 /// `read_pull_field`.

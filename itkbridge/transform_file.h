@@ -48,7 +48,7 @@ struct LoadedTransform {
   TransformFunction map;
 };
 
-// What the module of these files is asked for (io/transform_file.cpp loads it).
+// What the module of these files is asked for (io/fields/transform_file.cpp loads it).
 /// `read_transform` and `make_transform`.
 extern "C" void tetwarp_load_transform(const std::filesystem::path& path, const std::stop_token& stop,
                                        LoadedTransform& loaded);

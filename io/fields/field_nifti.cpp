@@ -1,15 +1,15 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/field_nifti.h"
+#include "io/fields/field_nifti.h"
 
 #include <array>
 #include <cmath>
 
 #include "deform/errors.h"
-#include "io/field_image.h"
+#include "io/fields/field_image.h"
+#include "io/fields/niftyreg_spline.h"
 #include "io/images/nifti_file.h"
-#include "io/niftyreg_spline.h"
 
 namespace tetwarp {
 namespace {

@@ -5,7 +5,7 @@
 
 // Private to io/. Displacements at the points of a VTK grid: StructuredGrid whose points form a regular lattice,
 // ImageData, and RectilinearGrid of even steps; XML (.vts .vti .vtr) and legacy (.vtk) files.
-#include "io/field_format.h"
+#include "io/fields/field_format.h"
 
 namespace tetwarp {
 

@@ -5,7 +5,7 @@
 
 // Private to io/. Fields in NIfTI-1 files: vectors (intent 1007) as ITK and ANTs write them, displacement vectors
 // (1006, DISPVECT), and NiftyReg's deformation and displacement fields.
-#include "io/field_format.h"
+#include "io/fields/field_format.h"
 
 namespace tetwarp {
 

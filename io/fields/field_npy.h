@@ -7,7 +7,7 @@
 // (https://numpy.org/doc/stable/reference/generated/numpy.lib.format), versions 1.0 to 3.0: an array of four axes, the
 // last of which has the three components. The file says neither which axis is which, nor the units, nor where it lies:
 // the first two are given, the place is the volume's.
-#include "io/field_format.h"
+#include "io/fields/field_format.h"
 
 namespace tetwarp {
 

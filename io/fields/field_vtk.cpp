@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/field_vtk.h"
+#include "io/fields/field_vtk.h"
 
 #include <algorithm>
 #include <array>

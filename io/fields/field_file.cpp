@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "deform/errors.h"
-#include "io/field_format.h"
-#include "io/field_image.h"
+#include "io/fields/field_format.h"
+#include "io/fields/field_image.h"
 #include "io/opened_file.h"
 
 namespace tetwarp {

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/field_image.h"
+#include "io/fields/field_image.h"
 
 #include <algorithm>
 

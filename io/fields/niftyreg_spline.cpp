@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/niftyreg_spline.h"
+#include "io/fields/niftyreg_spline.h"
 
 #include <algorithm>
 #include <array>
@@ -10,7 +10,7 @@
 #include <memory>
 
 #include "deform/errors.h"
-#include "io/field_image.h"
+#include "io/fields/field_image.h"
 
 namespace tetwarp {
 namespace {

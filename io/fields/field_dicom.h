@@ -5,7 +5,7 @@
 
 // Private to io/. Deformable Spatial Registration objects of DICOM (PS3.3 A.39.2, C.20.3): a grid of offsets, between
 // an affine map before it and one after it.
-#include "io/field_format.h"
+#include "io/fields/field_format.h"
 
 namespace tetwarp {
 

@@ -10,7 +10,7 @@
 #include <span>
 #include <vector>
 
-#include "io/field_format.h"
+#include "io/fields/field_format.h"
 #include "io/images/image_reader.h"
 
 namespace tetwarp {
