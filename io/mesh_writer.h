@@ -19,7 +19,7 @@ bool has_mesh_suffix(const std::filesystem::path& path);
 /// cannot be written (disk full)
 ///
 /// @param lattice  where the mesh has `lattice_vertex`, the one that it counts in: it is written too
-/// (io/mesh_lattice.h), so that the vertices are snapped as the lattice's own when the file is read again
+/// (io/meshes/mesh_lattice.h), so that the vertices are snapped as the lattice's own when the file is read again
 void write_mesh_file(const std::filesystem::path& path, const TetrahedralMesh& mesh, const Geometry& lattice = {});
 
 }  // namespace tetwarp

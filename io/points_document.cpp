@@ -9,7 +9,7 @@
 #include <cmath>
 
 #include "deform/errors.h"
-#include "io/slicer_space.h"
+#include "io/meshes/slicer_space.h"
 
 namespace tetwarp {
 

@@ -7,8 +7,8 @@
 #include <cmath>
 
 #include "deform/errors.h"
+#include "io/meshes/vtk_text.h"
 #include "io/points_document.h"
-#include "io/vtk_text.h"
 
 namespace tetwarp {
 

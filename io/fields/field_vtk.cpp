@@ -9,8 +9,8 @@
 #include <set>
 
 #include "deform/errors.h"
-#include "io/vector_options.h"
-#include "io/vtk_file.h"
+#include "io/meshes/vector_options.h"
+#include "io/meshes/vtk_file.h"
 
 namespace tetwarp {
 namespace {

@@ -20,9 +20,9 @@
 
 #include "deform/errors.h"
 #include "deform/geometry.h"
+#include "io/meshes/vtk_file.h"
+#include "io/meshes/vtk_xml_parser.h"
 #include "io/points_document.h"
-#include "io/vtk_file.h"
-#include "io/vtk_xml_parser.h"
 
 namespace tetwarp {
 namespace {

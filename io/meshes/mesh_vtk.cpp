@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/mesh_vtk.h"
+#include "io/meshes/mesh_vtk.h"
 
 #include <algorithm>
 #include <array>
@@ -10,8 +10,8 @@
 #include <set>
 
 #include "deform/errors.h"
-#include "io/mesh_lattice.h"
-#include "io/vtk_file.h"
+#include "io/meshes/mesh_lattice.h"
+#include "io/meshes/vtk_file.h"
 
 namespace tetwarp {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/vtk_file.h"
+#include "io/meshes/vtk_file.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,7 +12,7 @@
 #include "deform/errors.h"
 #include "io/images/image_reader.h"
 #include "io/lower_case.h"
-#include "io/vtk_text.h"
+#include "io/meshes/vtk_text.h"
 
 namespace tetwarp {
 namespace {

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include "deform/errors.h"
-#include "io/vtk_file.h"
+#include "io/meshes/vtk_file.h"
 
 namespace tetwarp {
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/mesh_gmsh.h"
+#include "io/meshes/mesh_gmsh.h"
 
 #include <algorithm>
 #include <array>
@@ -13,8 +13,8 @@
 #include <utility>
 
 #include "deform/errors.h"
-#include "io/gmsh_section.h"
 #include "io/images/image_reader.h"
+#include "io/meshes/gmsh_section.h"
 
 namespace tetwarp {
 namespace {

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "deform/errors.h"
-#include "io/mesh_lattice.h"
+#include "io/meshes/mesh_lattice.h"
 
 namespace tetwarp {
 

@@ -3,7 +3,7 @@
 
 #pragma once
 
-#include "io/mesh_format.h"
+#include "io/meshes/mesh_format.h"
 
 namespace tetwarp {
 

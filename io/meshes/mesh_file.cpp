@@ -12,9 +12,9 @@
 
 #include "deform/errors.h"
 #include "io/images/image_reader.h"
-#include "io/mesh_format.h"
+#include "io/meshes/mesh_format.h"
+#include "io/meshes/vector_options.h"
 #include "io/opened_file.h"
-#include "io/vector_options.h"
 
 namespace tetwarp {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/slicer_space.h"
+#include "io/meshes/slicer_space.h"
 
 #include <cctype>
 

@@ -4,7 +4,7 @@
 #pragma once
 
 // Private to io/. Unstructured grids of VTK, XML (.vtu) and legacy (.vtk), whose displacement is point data.
-#include "io/mesh_format.h"
+#include "io/meshes/mesh_format.h"
 
 namespace tetwarp {
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/gmsh_section.h"
+#include "io/meshes/gmsh_section.h"
 
 #include <algorithm>
 #include <bit>

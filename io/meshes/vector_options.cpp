@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/vector_options.h"
+#include "io/meshes/vector_options.h"
 
 #include "deform/errors.h"
 

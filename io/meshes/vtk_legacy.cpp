@@ -10,10 +10,10 @@
 
 #include "deform/errors.h"
 #include "deform/geometry.h"
+#include "io/meshes/slicer_space.h"
+#include "io/meshes/vtk_file.h"
+#include "io/meshes/vtk_text.h"
 #include "io/points_document.h"
-#include "io/slicer_space.h"
-#include "io/vtk_file.h"
-#include "io/vtk_text.h"
 
 namespace tetwarp {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/vtk_text.h"
+#include "io/meshes/vtk_text.h"
 
 #include <algorithm>
 #include <bit>

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/mesh_lattice.h"
+#include "io/meshes/mesh_lattice.h"
 
 #include <cmath>
 
