@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "deform/errors.h"
-#include "io/points_document.h"
+#include "io/points/points_document.h"
 
 namespace tetwarp {
 namespace {

@@ -6,7 +6,7 @@
 #include <cctype>
 
 #include "deform/errors.h"
-#include "io/points_document.h"
+#include "io/points/points_document.h"
 
 namespace tetwarp {
 

@@ -13,7 +13,7 @@
 #include "io/meshes/slicer_space.h"
 #include "io/meshes/vtk_file.h"
 #include "io/meshes/vtk_text.h"
-#include "io/points_document.h"
+#include "io/points/points_document.h"
 
 namespace tetwarp {
 namespace {

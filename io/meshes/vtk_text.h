@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "io/points_document.h"
+#include "io/points/points_document.h"
 
 namespace tetwarp {
 

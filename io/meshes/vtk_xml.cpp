@@ -22,7 +22,7 @@
 #include "deform/geometry.h"
 #include "io/meshes/vtk_file.h"
 #include "io/meshes/vtk_xml_parser.h"
-#include "io/points_document.h"
+#include "io/points/points_document.h"
 
 namespace tetwarp {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "deform/errors.h"
 #include "io/meshes/vtk_text.h"
-#include "io/points_document.h"
+#include "io/points/points_document.h"
 
 namespace tetwarp {
 

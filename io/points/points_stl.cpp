@@ -9,7 +9,7 @@
 
 #include "deform/errors.h"
 #include "io/lower_case.h"
-#include "io/points_document.h"
+#include "io/points/points_document.h"
 
 namespace tetwarp {
 

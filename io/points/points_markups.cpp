@@ -8,7 +8,7 @@
 
 #include "deform/errors.h"
 #include "io/json_tree.h"
-#include "io/points_document.h"
+#include "io/points/points_document.h"
 
 namespace tetwarp {
 

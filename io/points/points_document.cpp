@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/points_document.h"
+#include "io/points/points_document.h"
 
 #include <algorithm>
 #include <cctype>

@@ -9,7 +9,7 @@
 
 #include "io/lower_case.h"
 #include "io/opened_file.h"
-#include "io/points_document.h"
+#include "io/points/points_document.h"
 
 namespace tetwarp {
 
