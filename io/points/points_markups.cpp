@@ -7,7 +7,7 @@
 #include <set>
 
 #include "deform/errors.h"
-#include "io/json_tree.h"
+#include "io/documents/json_tree.h"
 #include "io/points/points_document.h"
 
 namespace tetwarp {

@@ -7,7 +7,7 @@
 #include <charconv>
 
 #include "deform/errors.h"
-#include "io/json_entry.h"
+#include "io/documents/json_entry.h"
 
 namespace tetwarp {
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/scenario_parts.h"
+#include "io/documents/scenario_parts.h"
 
 #include <array>
 #include <cmath>

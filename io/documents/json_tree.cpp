@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/json_tree.h"
+#include "io/documents/json_tree.h"
 
 #include <algorithm>
 #include <iterator>

@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "deform/errors.h"
-#include "io/scenario_parts.h"
+#include "io/documents/scenario_parts.h"
 
 namespace tetwarp {
 

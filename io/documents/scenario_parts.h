@@ -5,7 +5,7 @@
 
 // Private to io/: places, regions and cuts of a scenario.
 #include "deform/simulate/scenario.h"
-#include "io/json_entry.h"
+#include "io/documents/json_entry.h"
 
 namespace tetwarp {
 

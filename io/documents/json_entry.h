@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "deform/core/host_device.h"
-#include "io/json_tree.h"
+#include "io/documents/json_tree.h"
 
 namespace tetwarp {
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/json_entry.h"
+#include "io/documents/json_entry.h"
 
 #include <algorithm>
 #include <cmath>
