@@ -17,8 +17,8 @@ function(tetwarp_library name)
   tetwarp_install_library(${name})
 endfunction()
 
-# tetwarp_module(NAME SOURCES ...): libtetwarp_NAME.so, which io/module.h loads when it is needed. It is built with
-# tetwarp_io, and looked for in lib of the build and of the installation.
+# tetwarp_module(NAME SOURCES ...): libtetwarp_NAME.so, which io/files/module.h loads when it is needed. It is built
+# with tetwarp_io, and looked for in lib of the build and of the installation.
 function(tetwarp_module name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES")
   add_library(tetwarp_${name} MODULE ${arg_SOURCES})

@@ -12,8 +12,8 @@
 #include "io/lower_case.h"
 #ifdef TETWARP_WITH_ITK
 #include "io/fields/niftyreg_spline.h"
+#include "io/files/module.h"
 #include "io/images/image_reader.h"
-#include "io/module.h"
 #include "io/opened_file.h"
 #include "itkbridge/transform_file.h"
 #endif

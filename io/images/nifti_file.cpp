@@ -15,8 +15,8 @@
 
 #include "deform/errors.h"
 #include "io/dicom_text.h"
-#include "io/gzip_inflate.h"
-#include "io/gzip_pieces.h"
+#include "io/files/gzip_inflate.h"
+#include "io/files/gzip_pieces.h"
 
 namespace tetwarp {
 namespace {

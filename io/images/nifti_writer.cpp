@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "deform/errors.h"
-#include "io/gzip_pieces.h"
+#include "io/files/gzip_pieces.h"
 #include "io/images/image_writer.h"
 #include "itkbridge/image_io.h"
 

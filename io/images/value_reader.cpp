@@ -13,8 +13,8 @@
 
 #include "deform/errors.h"
 #ifdef TETWARP_WITH_ITK
-#include "io/gzip_inflate.h"
-#include "io/gzip_pieces.h"
+#include "io/files/gzip_inflate.h"
+#include "io/files/gzip_pieces.h"
 #endif
 
 namespace tetwarp {

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // XML files of VTK are read in a module of its own: VTK's libraries would take 30 ms of every start.
+#include "io/files/module.h"
 #include "io/meshes/vtk_file.h"
-#include "io/module.h"
 
 namespace tetwarp {
 

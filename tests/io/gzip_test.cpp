@@ -14,8 +14,8 @@
 #include <utility>
 
 #include "deform/errors.h"
-#include "io/gzip_inflate.h"
-#include "io/gzip_pieces.h"
+#include "io/files/gzip_inflate.h"
+#include "io/files/gzip_pieces.h"
 #include "io/image_file.h"
 #include "tests/support/image_samples.h"
 #include "tests/support/scratch.h"

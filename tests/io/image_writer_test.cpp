@@ -15,7 +15,7 @@
 #ifdef TETWARP_WITH_ITK
 #include <sstream>
 
-#include "io/gzip_pieces.h"
+#include "io/files/gzip_pieces.h"
 #include "itkbridge/image_io.h"
 #endif
 

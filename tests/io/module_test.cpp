@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/module.h"
+#include "io/files/module.h"
 
 #include <gtest/gtest.h>
 

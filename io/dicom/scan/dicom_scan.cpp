@@ -16,7 +16,7 @@
 #include "io/dicom/scan/dicom_directory.h"
 #include "io/dicom/scan/dicom_header.h"
 #include "io/dicom_series.h"
-#include "io/folder_files.h"
+#include "io/files/folder_files.h"
 #include "io/opened_file.h"
 #include "io/parallel.h"
 #include "io/shown_text.h"

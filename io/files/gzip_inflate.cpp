@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/gzip_inflate.h"
+#include "io/files/gzip_inflate.h"
 
 #include <fcntl.h>
 #include <libdeflate.h>
@@ -20,8 +20,8 @@
 
 #include "deform/errors.h"
 #include "deform/large_memory.h"
-#include "io/gzip_member.h"
-#include "io/gzip_pieces.h"
+#include "io/files/gzip_member.h"
+#include "io/files/gzip_pieces.h"
 
 namespace tetwarp {
 namespace {

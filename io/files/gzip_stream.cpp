@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "deform/errors.h"
-#include "io/gzip_inflate.h"
+#include "io/files/gzip_inflate.h"
 
 namespace tetwarp {
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/folder_files.h"
+#include "io/files/folder_files.h"
 
 #include <algorithm>
 #include <set>

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/gzip_pieces.h"
+#include "io/files/gzip_pieces.h"
 
 #include <libdeflate.h>
 #include <tbb/parallel_pipeline.h>
@@ -15,7 +15,7 @@
 #include <string>
 
 #include "deform/errors.h"
-#include "io/gzip_member.h"
+#include "io/files/gzip_member.h"
 
 namespace tetwarp {
 namespace {
