@@ -11,7 +11,7 @@
 #include <iterator>
 
 #include "deform/phantom.h"
-#include "io/preview_layout.h"
+#include "io/pictures/preview_layout.h"
 #include "io/preview_scale.h"
 #include "tests/support/png_picture.h"
 #include "tests/support/scratch.h"

@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/preview_layout.h"
+#include "io/pictures/preview_layout.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "io/text_raster.h"
+#include "io/pictures/text_raster.h"
 
 namespace tetwarp {
 

@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <string>
 
+#include "io/pictures/preview_layout.h"
+#include "io/pictures/text_raster.h"
 #include "io/png.h"
-#include "io/preview_layout.h"
 #include "io/preview_scale.h"
-#include "io/text_raster.h"
 
 namespace tetwarp {
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/text_raster.h"
+#include "io/pictures/text_raster.h"
 
 #include <array>
 

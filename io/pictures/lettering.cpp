@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/lettering.h"
+#include "io/pictures/lettering.h"
 
 #include <algorithm>
 #include <cmath>
 
+#include "io/pictures/text_raster.h"
 #include "io/preview_scale.h"
-#include "io/text_raster.h"
 
 namespace tetwarp {
 

@@ -7,7 +7,7 @@
 #include <array>
 #include <cmath>
 
-#include "io/lettering.h"
+#include "io/pictures/lettering.h"
 
 namespace tetwarp {
 

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <cstring>
 
-#include "io/lettering.h"
-#include "io/preview_layout.h"
+#include "io/pictures/lettering.h"
+#include "io/pictures/preview_layout.h"
 
 namespace tetwarp {
 
