@@ -8,8 +8,8 @@
 #include <iostream>
 #include <new>
 
-#include "apps/console.h"
-#include "apps/options.h"
+#include "apps/cli/console.h"
+#include "apps/cli/options.h"
 #include "io/opened_file.h"
 #include "io/shown_text.h"
 

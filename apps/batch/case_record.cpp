@@ -5,7 +5,7 @@
 
 #include <fstream>
 
-#include "apps/reads.h"
+#include "apps/cli/reads.h"
 #include "deform/version.h"
 #include "io/hash.h"
 

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "apps/batch/manifest.h"
-#include "apps/deformation.h"
+#include "apps/deform/deformation.h"
 
 namespace tetwarp::apps {
 

@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "apps/batch/case_record.h"
-#include "apps/reads.h"
+#include "apps/cli/reads.h"
 #include "cuda/devices.h"
 #include "io/opened_file.h"
 

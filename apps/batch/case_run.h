@@ -9,7 +9,7 @@
 
 #include "apps/batch/manifest.h"
 #include "apps/batch/resources.h"
-#include "apps/record.h"
+#include "apps/cli/record.h"
 
 namespace tetwarp::apps {
 

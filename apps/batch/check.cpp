@@ -6,7 +6,7 @@
 #include <mutex>
 
 #include "apps/batch/output_folder.h"
-#include "apps/deformation.h"
+#include "apps/deform/deformation.h"
 #include "io/parallel.h"
 #include "io/shown_text.h"
 

@@ -15,7 +15,7 @@
 #include <system_error>
 #include <thread>
 
-#include "apps/console.h"
+#include "apps/cli/console.h"
 #include "deform/errors.h"
 #include "deform/resampler.h"
 #include "io/hash.h"

@@ -7,7 +7,7 @@
 #include <sstream>
 #include <vector>
 
-#include "apps/input.h"
+#include "apps/cli/input.h"
 #include "deform/fields/elastic.h"
 #include "deform/fields/formula.h"
 

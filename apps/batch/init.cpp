@@ -8,8 +8,8 @@
 #include <map>
 
 #include "apps/batch/output_folder.h"
-#include "apps/input.h"
-#include "apps/output.h"
+#include "apps/cli/input.h"
+#include "apps/cli/output.h"
 #include "io/csv_record.h"
 #include "io/dicom_text.h"
 #include "io/shown_text.h"

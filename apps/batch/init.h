@@ -3,7 +3,7 @@
 
 #pragma once
 
-#include "apps/options.h"
+#include "apps/cli/options.h"
 
 namespace tetwarp::apps {
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/options.h"
+#include "apps/cli/options.h"
 
 namespace tetwarp::apps {
 

@@ -13,7 +13,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "apps/options.h"
+#include "apps/cli/options.h"
 #include "deform/errors.h"
 #include "io/lower_case.h"
 #include "io/staged_output.h"

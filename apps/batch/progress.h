@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "apps/batch/case_run.h"
-#include "apps/console.h"
+#include "apps/cli/console.h"
 
 namespace tetwarp::apps {
 

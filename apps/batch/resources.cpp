@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <fstream>
 
-#include "apps/console.h"
+#include "apps/cli/console.h"
 #include "deform/errors.h"
 
 namespace tetwarp::apps {

@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "apps/deform_worker.h"
-#include "apps/shared_input.h"
+#include "apps/cli/shared_input.h"
+#include "apps/deform/deform_worker.h"
 
 namespace tetwarp::apps {
 

@@ -1,0 +1,169 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include "apps/cli/option_groups.h"
+
+#include <cfloat>
+#include <charconv>
+#include <cmath>
+#include <map>
+#include <optional>
+
+#include "io/shown_text.h"
+
+namespace tetwarp::apps {
+
+namespace {
+
+/// Threads, jobs, devices, pictures: more than any machine has, and few enough to be counted in 32 bits.
+constexpr std::int64_t kMostThreads = 65536, kMostDevices = 65535;
+
+template <class Number>
+std::optional<Number> number_of(std::string_view text) {
+  if (text.starts_with('+')) text.remove_prefix(1);
+  Number number{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return number;
+}
+
+std::string short_text(double number) {
+  char text[32];
+  return {text, std::to_chars(text, text + sizeof text, number).ptr};
+}
+
+CLI::Validator check(const std::string& expected, std::function<bool(const std::string&)> is_good) {
+  return {[expected, is_good](std::string& text) {
+            return is_good(text) ? std::string() : "\"" + shown(text) + "\", expected " + expected;
+          },
+          ""};
+}
+
+/// Of K, M, G, T, with B or not (a thousand each), and of Ki, Mi, Gi, Ti (1024 each); no letters: 1.
+std::optional<double> factor_of(std::string unit) {
+  for (char& c : unit) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  if (unit.ends_with('B')) unit.pop_back();
+  if (unit.empty()) return 1;
+  const std::size_t power = std::string_view("KMGT").find(unit[0]);
+  if (power == std::string_view::npos || (unit.size() > 1 && unit.substr(1) != "I")) return std::nullopt;
+  return std::pow(unit.size() > 1 ? 1024.0 : 1000.0, static_cast<double>(power + 1));
+}
+
+/// @return nothing for what is no size, is none of a machine's, or less than a byte
+std::optional<std::uint64_t> bytes_of(const std::string& text) {
+  constexpr double kMost = 0x1p62;
+  const std::size_t end = std::min(text.find_first_not_of("0123456789."), text.size()),
+                    unit = std::min(text.find_first_not_of(' ', end), text.size());
+  const std::optional<double> number = number_of<double>(text.substr(0, end)), factor = factor_of(text.substr(unit));
+  if (end == 0 || !number || !factor) return std::nullopt;
+  const double bytes = std::floor(*number * *factor);
+  if (!(bytes >= 1 && bytes <= kMost)) return std::nullopt;
+  return static_cast<std::uint64_t>(bytes);
+}
+
+}  // namespace
+
+CLI::Validator whole_number(std::int64_t least, std::int64_t most) {
+  return check("a whole number from " + std::to_string(least) + " to " + std::to_string(most), [=](const auto& text) {
+    const auto number = number_of<std::int64_t>(text);
+    return number && *number >= least && *number <= most;
+  });
+}
+
+CLI::Validator real_number(double least, double most) {
+  return check("a number from " + short_text(least) + " to " + short_text(most), [=](const auto& text) {
+    const auto number = number_of<double>(text);
+    return number && *number >= least && *number <= most;
+  });
+}
+
+CLI::Validator finite_number() {
+  return check("a finite number", [](const auto& text) {
+    const auto number = number_of<double>(text);
+    return number && std::abs(*number) <= FLT_MAX;
+  });
+}
+
+CLI::Validator positive_number() {
+  return check("a number greater than 0", [](const auto& text) {
+    const auto number = number_of<double>(text);
+    return number && *number > 0 && *number <= FLT_MAX;
+  });
+}
+
+CLI::Validator size_in_bytes() {
+  return {[](std::string& text) {
+            const auto bytes = bytes_of(text);
+            if (!bytes) return "\"" + shown(text) + "\", expected a size such as 8G, 2.5G, 500M or 512MiB";
+            text = std::to_string(*bytes);
+            return std::string();
+          },
+          ""};
+}
+
+const char* const kInputHelp = "Folder of DICOM files, one DICOM file, or .nii .nii.gz .nrrd .mha";
+const char* const kFieldHelp =
+    "Forward field: a file (.mha .nrrd .nii .nii.gz, .npy:order=zyx|xyz,units=mm|voxel, or .vts .vti .vtr .vtk "
+    "[:displacement=NAME,frame=lps|ras,units=mm|m]), a transform of ITK, "
+    "elastix, plastimatch (.h5 .tfm .txt) or NiftyReg (its B-spline; each vertex x goes to T(x)), a mesh (.msh .vtu "
+    ".vtk, "
+    "the first of several), or identity, "
+    "wave:amplitude=,wavelength=[,phase=,axis=,along=], "
+    "twist:angle=[,axis=], bubble:radius=,strength=[,center=X/Y/Z], bubble-paper:shift=[,center=], "
+    "elastic:amplitude=,spacing=,seed=, translate:by=X/Y/Z; "
+    "mm, "
+    "or voxels with the suffix vox; degrees. Several compose, the first is applied first";
+
+void add_common(CLI::App& command, CommonOptions& common, bool writes) {
+  command.add_option("--threads", common.threads, "Threads; 0 is all")
+      ->check(whole_number(0, kMostThreads))
+      ->capture_default_str();
+  command.add_flag("--quiet", common.quiet, "Say nothing unless something is wrong");
+  command.add_flag("--verbose", common.verbose, "Say how long each stage takes");
+  if (writes) command.add_flag("--overwrite", common.overwrite, "Replace an output that exists");
+}
+
+void add_series(CLI::App& command, InputOptions& input) {
+  command.add_option("--series", input.series, "Series Instance UID, or the number that `tetwarp info` prints")
+      ->type_name("UID");
+  command.add_flag("--single", input.single, "Read the one DICOM file alone, not its series");
+  command
+      .add_option_function<std::string>(
+          "--uneven", [&input](const std::string& wanted) { input.uneven = wanted == "exact"; },
+          "Slices at uneven distances: refuse them, or take each exactly where it is")
+      ->check(CLI::IsMember({"refuse", "exact"}))
+      ->default_str("refuse");
+}
+
+void add_nifti_frame(CLI::App& command, CommonOptions& common, InputOptions& input) {
+  command
+      .add_option_function<std::string>(
+          "--nifti-frame",
+          [&common, &input](const std::string& name) {
+            common.nifti_frame = input.nifti_frame = name == "qform" ? NiftiFrame::qform : NiftiFrame::sform;
+          },
+          "What places a NIfTI file that has both: its sform, as nibabel and FSL have it, or its qform, which ITK "
+          "takes "
+          "unless the sform's code is 1. For every file that is read")
+      ->check(CLI::IsMember({"sform", "qform"}))
+      ->type_name("sform|qform")
+      ->default_str("sform");
+}
+
+void add_backend(CLI::App& command, std::string& backend, int& device, const char* help) {
+  command.add_option("--backend", backend, help)->check(CLI::IsMember({"auto", "cuda", "cpu"}))->capture_default_str();
+  command.add_option("--device", device, "CUDA device, as `tetwarp --version` numbers them")
+      ->check(whole_number(0, kMostDevices))
+      ->type_name("N")
+      ->capture_default_str();
+}
+
+void add_outside(CLI::App& command, Outside& outside) {
+  command
+      .add_option("--outside", outside, "A field that does not cover the volume: refuse (default), rest or background")
+      ->transform(
+          one_of<Outside>({{"refuse", Outside::refuse}, {"rest", Outside::rest}, {"background", Outside::background}}))
+      ->type_name("NAME");
+}
+
+}  // namespace tetwarp::apps

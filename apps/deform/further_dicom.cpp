@@ -1,0 +1,88 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include "apps/deform/further_dicom.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <nlohmann/json.hpp>
+
+#include "io/shown_text.h"
+
+namespace tetwarp::apps {
+
+bool is_object_output(const std::filesystem::path& output) { return output.extension() == ".dcm"; }
+
+DicomSegmentation open_segmentation(const FurtherOptions& options, const InputHeader& input) {
+  const std::string name = options.input.path.string();
+  if (!is_object_output(options.output))
+    throw UsageError("a SEG comes out as a SEG, " + name + "; name the output of --with .dcm");
+  if (options.background)
+    throw UsageError("background= is not for a SEG, which is empty where nothing maps, " + name + "; leave it out");
+  return read_segmentation_header(options.input.path, input.geometry.spacing.z);
+}
+
+Geometry own_grid(const DicomSegmentation& segmentation, const Geometry& input) {
+  constexpr double kParallel = 1e-4, kSlice = 1e-3;
+  Geometry grid = segmentation.geometry;
+  std::int64_t first = 1, last = grid.size.z - 2;  // without the empty ones
+  const AffineMap index = index_from_point(grid), point = point_from_index(input);
+  const double a = index(point(glm::dvec3(0))).z, b = index(point(glm::dvec3(0, 0, input.size.z - 1))).z;
+  if (std::abs(glm::dot(grid.direction[2], glm::cross(input.direction[0], input.direction[1]))) > 1 - kParallel) {
+    first = std::min<std::int64_t>(first, std::llround(std::ceil(std::min(a, b) - kSlice)));
+    last = std::max<std::int64_t>(last, std::llround(std::floor(std::max(a, b) + kSlice)));
+  }
+  grid.origin = point_from_index(grid)(glm::dvec3(0, 0, static_cast<double>(first)));
+  grid.size.z = last - first + 1;
+  return grid;
+}
+
+Interpolation usual_interpolation(const DicomSegmentation& segmentation) {
+  return segmentation.fractional ? Interpolation::linear : Interpolation::vote;
+}
+
+std::optional<std::string> compare_frames(const std::filesystem::path& path, const std::string& frame,
+                                          const InputHeader& input) {
+  const std::string expected = input.series ? input.series->frame_of_reference_uid : std::string();
+  if (expected.empty()) {
+    return "INPUT has no Frame of Reference UID (0020,0052): whether " + path.string() +
+           " lies in the same space is not known";
+  }
+  require(frame == expected, path.string() + " has the Frame of Reference UID (0020,0052) " +
+                                 (frame.empty() ? "(none)" : shown(frame)) + ", INPUT has " + shown(expected) +
+                                 "; give one that lies in the space of INPUT");
+  return std::nullopt;
+}
+
+DicomAlong along_with(const FurtherOptions& options, const std::string& sha256, const Target& target,
+                      const DerivedOutput& series) {
+  DicomAlong along{options.input.path, sha256, series.derivation};
+  const std::string interpolation = name_of(target.interpolation);
+  along.derivation.parameters = "interpolation=" + interpolation +
+                                " background=" + nlohmann::json(target.background).dump() +
+                                (options.own ? " grid=own " : " grid=output ") + series.derivation.parameters;
+  along.derivation.description += ", " + interpolation + " interpolation";
+  return along;
+}
+
+nlohmann::json to_json(const DoseReport& report) {
+  return {{"kind", "RTDOSE"},
+          {"series_instance_uid", report.series_uid},
+          {"sop_instance_uid", report.sop_instance_uid},
+          {"dose_grid_scaling", report.scaling},
+          {"units", report.units}};
+}
+
+nlohmann::json to_json(const SegmentationReport& report, const DicomSegmentation& segmentation) {
+  nlohmann::json segments = nlohmann::json::array();
+  for (std::size_t n = 0; n < segmentation.segments.size(); ++n)
+    segments.push_back({{"number", segmentation.segments[n].number}, {"frames", report.frames[n]}});
+  return {{"kind", "SEG"},
+          {"series_instance_uid", report.series_uid},
+          {"sop_instance_uid", report.sop_instance_uid},
+          {"type", segmentation.fractional ? "FRACTIONAL" : "BINARY"},
+          {"segments", segments}};
+}
+
+}  // namespace tetwarp::apps

@@ -1,0 +1,236 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include <algorithm>
+#include <cstdio>
+#include <glm/common.hpp>
+#include <nlohmann/json.hpp>
+
+#include "apps/cli/input.h"
+#include "apps/cli/reads.h"
+#include "apps/deform/field_source.h"
+#include "apps/deform/map_outputs.h"
+#include "cuda/backend.h"
+#include "deform/fields/continued.h"
+#include "io/field_file.h"
+#include "io/image_file.h"
+
+namespace tetwarp::apps {
+
+namespace {
+
+using nlohmann::json;
+
+std::string text_of(const Residuals& residuals) {
+  char text[96];
+  std::snprintf(text, sizeof text, "mean %.3g, 99 %% below %.3g, largest %.3g mm", residuals.mean,
+                residuals.percentile_99, residuals.largest);
+  return text;
+}
+
+/// The map to invert, from wherever the lattice is to places in the grid of --like.
+struct Invertible {
+  VertexField field;
+  std::vector<std::string> notes;
+  std::vector<ReadField> files;
+  bool identity = false;
+  Geometry pull_grid = {};  ///< of a pull field, before it was continued
+};
+
+Invertible read_invertible(const InvertOptions& options, const Geometry& like, const Control& control) {
+  if (options.pull_field.empty()) {
+    ForwardField read = read_forward_field(options.fields, like, options.cell_size, options.common, control);
+    return {std::move(read.field), std::move(read.notes), std::move(read.files), read.identity};
+  }
+  AnyField found;
+  const Geometry grid = straightened(like);  // of the vertices of the inverse, on which a tilted stack is not held
+  const PullField pull = read_pull_field(options.pull_field, like, grid, options.common, control, found);
+  try {
+    return {continued_over(pull, grid), std::move(found.notes), std::move(found.files), false, pull.grid};
+  } catch (const InputError& error) {
+    throw InputError(std::string(error.what()) + ", " + options.pull_field);
+  }
+}
+
+/// What came out, and what is left after going there and back.
+struct Inversion {
+  std::string backend;
+  Geometry grid;
+  Report report;
+  std::uint64_t beyond = 0;  ///< vertices whose place lies beyond the grid of the pull field
+  Residuals there, back;
+  double field_seconds = 0, invert_seconds = 0, check_seconds = 0;
+};
+
+/// Counts samples of an inverse whose place lies beyond the grid of the pull field. @param samples  some slices
+std::uint64_t count_beyond(const VolumeView& samples, const Geometry& grid) {
+  constexpr double kRounding = 1e-3;  // of a sample
+  const AffineMap point = point_from_index(*samples.geometry), index = index_from_point(grid);
+  const glm::dvec3 last(grid.size - std::int64_t{1});
+  const Region& held = samples.buffered;
+  const auto* displacement = reinterpret_cast<const glm::vec3*>(samples.voxels);
+  std::uint64_t beyond = 0;
+  for (std::int64_t k = held.begin.z; k < held.end.z; ++k) {
+    for (std::int64_t j = held.begin.y; j < held.end.y; ++j) {
+      for (std::int64_t i = held.begin.x; i < held.end.x; ++i, ++displacement) {
+        const glm::dvec3 at = index(point(glm::dvec3(i, j, k)) + glm::dvec3(*displacement));
+        beyond += glm::clamp(at, glm::dvec3(-kRounding), last + kRounding) != at;
+      }
+    }
+  }
+  return beyond;
+}
+
+/// A forward field needs a place at every vertex. @throws InputError where there is none
+void check_forward(const InvertOptions& options, const Inversion& result, Invertible& field) {
+  require(result.report.uncovered == 0, std::to_string(result.report.uncovered) + " voxels of " +
+                                            options.like.path.string() + " have no place by the inverse of " +
+                                            options.pull_field + "; a forward field needs one at every vertex");
+  if (result.beyond == 0) return;
+  field.notes.push_back(std::to_string(result.beyond) + " of " + std::to_string(voxel_count(result.grid)) +
+                        " vertices go beyond the grid of " + options.pull_field +
+                        ", which goes on there with its outermost samples");
+}
+
+json document_of(const InvertOptions& options, const Invertible& field, const Inversion& result) {
+  json document = provenance("invert");
+  document["backend"] = result.backend;
+  document["field"] = {{"sha256", hash_field(field.field, options.common.threads)},
+                       {"notes", field.notes},
+                       {"files", to_json(field.files)}};
+  document["field"].update(place_json(field.field));
+  document["output"] = {{"path", options.output.string()},
+                        {"direction", options.pull_field.empty() ? "pull" : "forward"},
+                        {"geometry", to_json(result.grid)}};
+  document["covered"] = result.report.covered;
+  document["uncovered"] = result.report.uncovered;
+  document["inverted"] = result.report.inverted;
+  document["forward_after_inverse"] = to_json(result.there);
+  document["inverse_after_forward"] = to_json(result.back);
+  document["stages"] = {{"field", {{"seconds", result.field_seconds}}},
+                        {"invert", {{"seconds", result.invert_seconds}}},
+                        {"check", {{"seconds", result.check_seconds}}}};
+  document["memory"] = {{"peak_bytes", peak_memory_bytes()}};
+  return document;
+}
+
+void say_all(const InvertOptions& options, const Invertible& field, const Inversion& result) {
+  for (const std::string& note : field.notes) say(options.common, "tetwarp: note: " + note);
+  if (result.report.inverted > 0) {
+    say(options.common, "tetwarp: warning: the field folds, " + std::to_string(result.report.inverted) +
+                            " tetrahedra are inverted: where several places map to one, the inverse gives one of them");
+  }
+  const bool forward = !options.pull_field.empty();
+  say(options.common,
+      "wrote " + options.output.string() + (forward ? ": forward field, " : ": inverse displacement, ") +
+          to_string(result.grid.size) +
+          (forward ? " vertices" : " samples, " + std::to_string(result.report.uncovered) + " of them empty"));
+  say(options.common, "forward after inverse: " + text_of(result.there));
+  say(options.common, "inverse after forward: " + text_of(result.back));
+}
+
+/// The series that `deform` would derive from --like, of which no slice is written: a registration object is beside it.
+class UnwrittenSeries {
+ public:
+  UnwrittenSeries(const InvertOptions& options, const InputHeader& like, const Invertible& field,
+                  const Control& control)
+      : headers_(read_input(options.like, like, options.common, control).dicom->headers),
+        writer_({}, straightened(like.geometry), *headers_,
+                {.field_sha256 = hash_field(field.field, options.common.threads),
+                 .parameters = "direction=forward",
+                 .description = field.identity ? "The identity, inverted" : "A field of vertices, inverted",
+                 .deformed = !field.identity}) {}
+
+  const DerivedSeriesWriter& writer() const { return writer_; }
+
+ private:
+  std::shared_ptr<const DicomHeaders> headers_;
+  DerivedSeriesWriter writer_;
+};
+
+/// Slab by slab into the file. @param series  what a registration object is beside, if the output is one
+Inversion invert(const InvertOptions& options, const Geometry& like, Invertible& field,
+                 const std::filesystem::path& output, const UnwrittenSeries* series, OutputSet& outputs) {
+  const Control stop{.stop = interrupt_token()};
+  const bool pulls = !options.pull_field.empty();
+  const Limits limits{.threads = options.common.threads};
+  const Backend backend = make_backend(options.backend, Direction::forward, like, options.device, limits);
+  Inversion result{.backend = backend.name, .grid = like, .report = {}, .there = {}, .back = {}};
+  InverseCheck check(field.field, like, limits);
+  MapStream stream(like, outputs);
+  outputs.write([&] {
+    stream.add(&Maps::inverse_mm,
+               series ? series->writer().create_registration(output)
+                      : create_field_file(output, like, pulls ? FieldDirection::forward : FieldDirection::pull));
+  });
+  Stage stage(options.common, "invert");
+  backend.resampler->set_field(view(field.field, Outside::background), {.stop = stop.stop, .jacobian_range = false});
+  stream.run([&](const Region& slab, const Maps& maps) {
+    result.report += resample_slab(*backend.resampler, slab, {}, maps, stage.control());
+    const double begun = stage.seconds();
+    check.add(maps.inverse_mm, stop);
+    if (pulls) result.beyond += count_beyond(maps.inverse_mm, field.pull_grid);
+    result.check_seconds += stage.seconds() - begun;
+  });
+  result.invert_seconds = stage.seconds() - result.check_seconds;
+  result.there = check.forward_after_inverse();
+  result.back = check.inverse_after_forward();
+  if (pulls) check_forward(options, result, field);
+  return result;
+}
+
+/// @throws UsageError for an output that is no file of a field, or not of this one
+void check_output(const InvertOptions& options) {
+  if (has_image_suffix(options.output)) return;
+  const std::string name = options.output.string();
+  if (!has_registration_suffix(options.output)) {
+    throw UsageError("unknown suffix of \"" + name +
+                     "\"; a displacement field is written as .mha .nrrd .nii .nii.gz, or .dcm");
+  }
+  if (!options.pull_field.empty()) {
+    throw UsageError("the inverse of a pull field is a forward field, which a DICOM registration, " + name +
+                     ", cannot hold; name it .mha .nrrd .nii .nii.gz");
+  }
+  if (has_image_suffix(options.like.path)) {
+    throw UsageError("a DICOM registration, " + name + ", needs the frame of reference of a DICOM series, --like is " +
+                     options.like.path.string() + "; name the output .mha .nrrd .nii .nii.gz");
+  }
+}
+
+}  // namespace
+
+int run_invert(const InvertOptions& options) {
+  const bool pulls = !options.pull_field.empty();
+  check_output(options);
+  if (pulls && options.cell_size) throw UsageError("--cell-size does not go with --pull-field; leave it out");
+  if (!pulls) check_fields(options.fields, options.cell_size);
+  const Reads reads = reads_of(options);
+  OutputSet outputs(reads, options.common.overwrite);
+  const std::filesystem::path output = outputs.add(options.output), report_path = outputs.add(options.report);
+  const InputHeader like = open_input(options.like, options.common);
+  outputs.add_reads(reads.slices(options.like, like));
+  const bool registers = has_registration_suffix(options.output);
+  if (registers) {
+    if (!like.series)
+      throw UsageError("a DICOM registration needs a CT series as --like, not " + options.like.path.string());
+    require_registration_fits(straightened(like.geometry));
+  }
+
+  Stage field_stage(options.common, "field");
+  const Geometry grid = straightened(like.geometry);
+  Invertible field = read_invertible(options, like.geometry, field_stage.control());
+  field.notes.insert(field.notes.begin(), like.notes.begin(), like.notes.end());
+  const double field_seconds = field_stage.seconds();
+  std::optional<UnwrittenSeries> series;
+  if (registers) series.emplace(options, like, field, Control{.stop = interrupt_token()});
+  Inversion result = invert(options, grid, field, output, series ? &*series : nullptr, outputs);
+  result.field_seconds = field_seconds;
+  outputs.write([&] {
+    if (!report_path.empty()) write_json(report_path, Record::open(document_of(options, field, result)));
+  });
+  outputs.commit();
+  say_all(options, field, result);
+  return 0;
+}
+
+}  // namespace tetwarp::apps

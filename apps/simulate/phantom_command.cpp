@@ -1,0 +1,55 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include <cmath>
+
+#include "apps/cli/output.h"
+#include "apps/cli/reads.h"
+#include "deform/phantom.h"
+#include "io/image_file.h"
+
+namespace tetwarp::apps {
+
+namespace {
+
+constexpr std::int64_t kMostVoxels = 4096;
+
+void check(const PhantomOptions& options) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (options.size[axis] < 2 || options.size[axis] > kMostVoxels) {
+      throw UsageError("--size has " + std::to_string(options.size[axis]) + ", expected 2 to 4096 on every axis");
+    }
+    if (!(options.spacing[axis] > 0) || !std::isfinite(options.spacing[axis])) {
+      throw UsageError("--spacing has " + std::to_string(options.spacing[axis]) +
+                       ", expected millimetres greater than 0");
+    }
+  }
+}
+
+}  // namespace
+
+int run_phantom(const PhantomOptions& options) {
+  check(options);
+  const bool series = is_series_output(options.output);
+  OutputSet outputs(Reads(), options.common.overwrite);
+  const std::filesystem::path output =
+      outputs.add(options.output, series ? StagedOutput::Kind::folder : StagedOutput::Kind::file);
+  const glm::i64vec3 size(options.size[0], options.size[1], options.size[2]);
+  const Volume<std::int16_t> phantom = [&] {
+    Stage stage(options.common, "phantom");
+    return make_phantom(size, {options.spacing[0], options.spacing[1], options.spacing[2]}, options.seed);
+  }();
+  Stage stage(options.common, "write");
+  outputs.write([&] {
+    if (series) {
+      write_phantom_series(output, view(phantom), options.seed, stage.control());
+    } else {
+      write_image(output, view(phantom));
+    }
+  });
+  outputs.commit();
+  say(options.common, "wrote " + options.output.string() + ": " + to_string(size) + " voxels");
+  return 0;
+}
+
+}  // namespace tetwarp::apps
