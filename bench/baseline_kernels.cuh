@@ -8,7 +8,7 @@
 
 #include "bench/backend.h"
 #include "bench/baselines.h"
-#include "cuda/check.h"
+#include "cuda/runtime/check.h"
 
 namespace tetwarp::bench {
 

@@ -5,7 +5,7 @@
 #include <sstream>
 
 #include "bench/backend.h"
-#include "cuda/check.h"
+#include "cuda/runtime/check.h"
 
 namespace tetwarp::bench {
 

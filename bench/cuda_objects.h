@@ -7,7 +7,7 @@
 
 #include <cstdint>
 
-#include "cuda/check.h"
+#include "cuda/runtime/check.h"
 #include "deform/core/host_device.h"
 
 namespace tetwarp::bench {

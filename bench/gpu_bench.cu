@@ -8,7 +8,7 @@
 
 #include "bench/gpu_parts.h"
 #include "bench/input.h"
-#include "cuda/check.h"
+#include "cuda/runtime/check.h"
 
 namespace tetwarp::bench {
 

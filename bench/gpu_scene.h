@@ -7,7 +7,7 @@
 #include "bench/baselines.h"
 #include "bench/cuda_objects.h"
 #include "bench/gpu_fields.h"
-#include "cuda/device_buffer.h"
+#include "cuda/runtime/device_buffer.h"
 #include "deform/resampler.h"
 
 namespace tetwarp::bench {

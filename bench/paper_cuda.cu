@@ -8,8 +8,8 @@
 #include "bench/backend.h"
 #include "bench/baseline_kernels.cuh"
 #include "bench/cuda_objects.h"
-#include "cuda/device_buffer.h"
 #include "cuda/devices.h"
+#include "cuda/runtime/device_buffer.h"
 
 namespace tetwarp::bench {
 

@@ -50,8 +50,8 @@ struct MarchTile {
 
 /// Finds the owners of the voxels of a tile that have one, by the widest vectors that the processor has (Highway).
 ///
-/// As the march of cuda/march.cuh: along k, each owner predicted from the affine map of the one before, and accepted
-/// where float arithmetic proves it (`try_tetrahedron`) or, at a second look, double. Offsets are made by the
+/// As the march of cuda/owners/march.cuh: along k, each owner predicted from the affine map of the one before, and
+/// accepted where float arithmetic proves it (`try_tetrahedron`) or, at a second look, double. Offsets are made by the
 /// operations of `interpolate_u`, so they have its bits. What is not found so comes out in `scratch.unsettled`; other
 /// offsets are left as anything.
 void march(const VectorField& field, const NudgeTurns& nudge, const MarchTile& tile, MarchScratch& scratch);

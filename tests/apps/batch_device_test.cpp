@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // `tetwarp batch`: what becomes of cases whose CUDA device fails, or has too little memory. Faults are injected at
-// calls of CUDA (cuda/fault.h).
+// calls of CUDA (cuda/runtime/fault.h).
 #include <cstdlib>
 
 #include "cuda/devices.h"

@@ -5,8 +5,8 @@
 #include <cuda_runtime.h>
 #include <gtest/gtest.h>
 
-#include "cuda/device_buffer.h"
 #include "cuda/devices.h"
+#include "cuda/runtime/device_buffer.h"
 #include "tests/support/fields.h"
 #include "tests/support/shifted.h"
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // A part of a lattice says of the voxels that it is held for what the whole says. Needs no device.
-#include "cuda/lattice_part.h"
+#include "cuda/lattice/lattice_part.h"
 
 #include <gtest/gtest.h>
 

@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // How an output and a field are split where not everything fits, and how boxes go to the host. Needs no device.
-#include "cuda/slab_plan.h"
+#include "cuda/output/slab_plan.h"
 
 #include <gtest/gtest.h>
 
-#include "cuda/host_rows.h"
+#include "cuda/runtime/host_rows.h"
 #include "deform/errors.h"
 #include "tests/support/random.h"
 #include "tests/support/run.h"

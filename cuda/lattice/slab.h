@@ -1,0 +1,288 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <variant>
+#include <vector>
+
+#include "cuda/lattice/lattice.h"
+#include "cuda/lattice/lattice_part.h"
+#include "cuda/runtime/host_copies.h"
+#include "deform/core/sample_voxel.h"
+
+namespace tetwarp::cuda_detail {
+
+/// A box of fewer than 2^32 voxels, as a kernel sees it.
+struct SlabBox {
+  glm::i64vec3 begin, size;
+
+  __host__ __device__ std::int64_t count() const { return size.x * size.y * size.z; }
+  __device__ glm::i64vec3 voxel(std::int64_t n) const {  // long divisions are slow
+    const auto number = static_cast<unsigned>(n), row = static_cast<unsigned>(size.x),
+               rows = static_cast<unsigned>(size.y);
+    return begin + glm::i64vec3(number % row, number / row % rows, number / row / rows);
+  }
+  __device__ std::int64_t offset(const glm::i64vec3& voxel) const {
+    const glm::i64vec3 at = voxel - begin;
+    return (at.z * size.y + at.y) * size.x + at.x;
+  }
+};
+
+/// Where a kernel writes the voxels of a slab: a part of a larger volume, or a buffer of the slab's own.
+template <class V>
+struct Destination {
+  V* voxels;  ///< of `begin`
+  glm::i64vec3 begin;
+  std::int64_t row, slice;  ///< in voxels
+
+  /// In voxels, from `voxels` on.
+  __device__ std::int64_t index(const glm::i64vec3& voxel) const {
+    return (voxel.z - begin.z) * slice + (voxel.y - begin.y) * row + (voxel.x - begin.x);
+  }
+};
+
+/// Counts of a report, on the device.
+struct Counts {
+  unsigned long long covered, uncovered, clamped, padded, conflicts, multiply_owned;
+};
+
+/// Where each voxel of a box comes from, one after the other.
+struct Mapped {
+  static constexpr std::int64_t kBytes = sizeof(std::uint8_t) + sizeof(glm::vec3);  ///< of a voxel
+
+  DeviceBuffer<std::uint8_t> mapped;  ///< whether it comes from anywhere
+  DeviceBuffer<glm::vec3> offset;     ///< undeformed minus deformed place, voxels
+};
+
+/// How the voxels lie of sources and outputs on one grid, and where a voxel comes from: what all sinks that sample have
+/// in common (`OffsetSink` says what a sink is).
+struct SinkLayout {
+  glm::ivec3 last;  ///< of the whole source grid
+  int row, slice;   ///< of what is buffered
+  int output_row, output_slice;
+
+  __device__ int place(const glm::ivec3& voxel) const {
+    return voxel.z * output_slice + voxel.y * output_row + voxel.x;
+  }
+  __device__ int per_slice() const { return output_slice; }
+  /// Whether voxels of a box of the source, half open, are all well inside.
+  __device__ bool surrounds(const glm::ivec3& begin, const glm::ivec3& end) const {
+    return (begin.x >= 0) & (begin.y >= 0) & (begin.z >= 0) & (end.x <= last.x) & (end.y <= last.y) & (end.z <= last.z);
+  }
+  /// Where a voxel is, for `locate`; changes by `per_source_slice` along k.
+  __device__ unsigned column(const glm::ivec3& voxel) const;
+  __device__ unsigned per_source_slice() const { return static_cast<unsigned>(slice); }
+  /// A place in the source: the offset of its whole voxel, and the rest.
+  struct Origin {
+    int base;
+    glm::vec3 fraction;
+  };
+  /// Where a voxel comes from. @tparam kInside  whether that is known to be well inside the source
+  /// @param moved  may be no numbers  @return whether it is well inside, and `moved` are numbers
+  template <bool kInside>
+  __device__ bool locate(const glm::ivec3& voxel, unsigned column, const glm::vec3& moved, Origin& origin) const;
+  /// The same for one voxel. @param moved  deformed minus undeformed place, 2^-12 voxel
+  __device__ bool locate(const glm::ivec3& voxel, const glm::vec3& moved, Origin& origin) const;
+  /// The same wherever it is inside the source, by its exact offset. @return whether it is inside
+  __device__ bool locate_exactly(const glm::ivec3& voxel, const glm::vec3& u, Origin& origin) const;
+  __device__ int source_index(const glm::ivec3& voxel) const { return voxel.z * slice + voxel.y * row + voxel.x; }
+};
+
+/// Samples voxels one by one: linear, integers that float holds, no padding, source and output on one grid. The bits of
+/// `sample_voxel`.
+template <class V>
+struct VoxelSink : SinkLayout {
+  static constexpr bool kIsWide = false;  ///< whether it takes many registers
+
+  const V* source;  ///< of voxel (0, 0, 0), were it held; likewise `output`
+  V background;
+  V* output;
+
+  /// What a voxel well inside the source is made from, on its way.
+  struct Pending {
+    bool any = false;
+    glm::vec3 fraction;
+    int corners[8];
+  };
+
+  /// Begins to write a voxel that a tetrahedron owns, where that is `wanted` and it comes from well inside the source;
+  /// else nothing is pending. What is on the border is for `write`.
+  /// @param moved  deformed minus undeformed place, 2^-12 voxel
+  __device__ void start(int place, const glm::ivec3& voxel, const glm::vec3& moved, bool wanted,
+                        Pending& pending) const;
+  /// Writes what is pending. @param place  that it was started with
+  __device__ void finish(int place, const Pending& pending) const;
+  /// Begins to read what a voxel is made from, where that is `wanted`.
+  __device__ void begin(const Origin& origin, bool wanted, Pending& pending) const;
+  /// Writes what was begun last; any value where nothing was.
+  __device__ void end(int place, const Pending& pending) const;
+  /// A voxel that a tetrahedron owns. @return whether it comes from inside the source
+  __device__ bool write(int place, const glm::ivec3& voxel, const glm::vec3& u) const;
+  /// Voxels of a column along k that stay where they are: those whose bits are set, of kCount from one on.
+  template <int kCount>
+  __device__ void copy(const glm::ivec3& voxel, std::uint32_t wanted) const;
+  __device__ void nothing(int place) const { output[place] = background; }
+};
+
+constexpr int kMostSinkVolumes = 8;
+
+/// One of several volumes.
+struct SinkVolume {
+  const void* source;  ///< as in VoxelSink
+  void* output;
+  VoxelType type;  ///< u8, i16 or u16
+  bool votes;      ///< linear otherwise
+  int background;
+};
+
+/// The same for several volumes on one grid: where a voxel comes from is found once.
+///
+/// @tparam V  of all volumes, which are linear; void: any
+template <class V>
+struct VolumesSink : SinkLayout {
+  static constexpr bool kIsWide = true;
+
+  SinkVolume volumes[kMostSinkVolumes];
+  int count;
+
+  /// Of the first volumes, all that a voxel is made from is on its way.
+  static constexpr int kOnTheWay = 2;
+  struct Pending {
+    bool any = false;
+    Origin origin;
+    int corners[kOnTheWay][8];
+  };
+  __device__ void start(int place, const glm::ivec3& voxel, const glm::vec3& moved, bool wanted,
+                        Pending& pending) const;
+  __device__ void finish(int place, const Pending& pending) const;
+  __device__ void begin(const Origin& origin, bool wanted, Pending& pending) const;
+  __device__ void end(int place, const Pending& pending) const { finish(place, pending); }
+  __device__ bool write(int place, const glm::ivec3& voxel, const glm::vec3& u) const;
+  template <int kCount>
+  __device__ void copy(const glm::ivec3& voxel, std::uint32_t wanted) const;
+  __device__ void nothing(int place) const;
+
+ private:
+  /// Calls with null of a pointer to the volume's type.
+  template <class Work>
+  __device__ void with_type(const SinkVolume& volume, Work&& work) const;
+  __device__ void read(const SinkVolume& volume, const Origin& origin, const glm::ivec3& step, int (&corners)[8]) const;
+  __device__ void put(const SinkVolume& volume, int place, int value) const;
+  __device__ void put(const SinkVolume& volume, int place, const int (&corners)[8], const glm::vec3& t) const;
+};
+
+using AnyVoxelSink = std::variant<VoxelSink<std::uint8_t>, VoxelSink<std::int16_t>, VoxelSink<std::uint16_t>,
+                                  VolumesSink<std::int16_t>, VolumesSink<void>>;
+
+/// Samples targets and writes maps, box after box, and copies to the host beside the next box. Knows nothing of fields.
+///
+/// Everything on the device is kept from call to call.
+class SlabWriter {
+ public:
+  SlabWriter(const Geometry& output, int device, Uploads& uploads)
+      : output_(output), uploads_(uploads), downloads_(device) {}
+
+  /// Takes the targets and maps of a call, which are checked. @throws InputError for memory that is not where a view
+  /// says
+  void begin(std::span<const Target> targets, const Maps& maps, cudaStream_t stream);
+
+  bool wants_jacobian() const { return maps_.jacobian.voxels != nullptr; }
+  bool wants_owners() const { return maps_.owners.voxels != nullptr; }
+  /// Whether all that is wanted are volumes that a VoxelSink or VolumesSink can sample, and no maps.
+  bool is_plain() const;
+
+  /// Voxels that may be worked on at a time. @param work_bytes  memory of each while that lasts; 0: `plain_sink`
+  std::int64_t box_voxels(std::int64_t work_bytes) const;
+  /// Device memory for the results of boxes, of which `boxes` are held at a time.
+  std::uint64_t result_bytes(std::int64_t voxels, int boxes) const { return boxes * layout(voxels).bytes; }
+  /// Device memory for slices of the sources on the host. @param slices_of  of a source, the slices to hold
+  std::uint64_t source_bytes(const std::function<Slices(const ConstVolumeView& source)>& slices_of) const;
+
+  std::uint64_t held_source_bytes() const { return sources_.capacity(); }
+  std::uint64_t held_result_bytes() const { return results_.capacity(); }
+  void release();
+
+  void reserve(std::uint64_t source_bytes, std::int64_t box_voxels, int boxes);
+  /// Uploads slices of the sources that are on the host.
+  void hold_sources(const std::function<Slices(const ConstVolumeView& source)>& slices_of);
+
+  /// Before the voxels of a box are found.
+  void begin_box(const SlabBox& box);
+  float* jacobian() const { return place<float>(layout_.jacobian); }              ///< of the box; null: not wanted
+  std::uint16_t* owners() const { return place<std::uint16_t>(layout_.owners); }  ///< likewise
+  void write(const SlabBox& box, const Mapped& mapped, Counts* counts);
+  /// What writes the voxels of the box, where `is_plain`, in place of `write`.
+  AnyVoxelSink plain_sink(const SlabBox& box);
+  /// Gives the results of the box to the views.
+  void end_box(const SlabBox& box);
+  /// Waits until the host has everything.
+  void finish();
+  /// Waits until nothing is under way, whatever became of it.
+  void settle() noexcept;
+
+ private:
+  /// One target, and what of it is on the device.
+  struct DeviceTarget {
+    Target target;           ///< its source is what the device holds
+    ConstVolumeView source;  ///< as it was given
+    SourceRelation relation;
+    DeviceBuffer<double> slices;          ///< of an uneven source
+    DeviceBuffer<long long> first, last;  ///< its sampled slices
+  };
+  /// Where the results of a box begin, bytes; kNone: not wanted.
+  struct Layout {
+    static constexpr std::size_t kNone = SIZE_MAX;
+
+    std::vector<std::size_t> voxels;  ///< of each target
+    std::size_t coverage = kNone, inverse_mm = kNone, jacobian = kNone, owners = kNone;
+    std::size_t bytes = 0;
+  };
+
+  Layout layout(std::int64_t voxels) const;
+  template <class T>
+  T* place(std::size_t offset) const {
+    if (offset == Layout::kNone) return nullptr;
+    return reinterpret_cast<T*>(results_.data() + static_cast<std::size_t>(current_) * box_bytes_ + offset);
+  }
+  template <class V>
+  Destination<V> destination(std::size_t number, const SlabBox& box);
+  bool is_plain(const DeviceTarget& target) const;
+  /// Of a plain target, what a sink knows of it.
+  template <class V>
+  struct PlainVolume {
+    const V* source;
+    V background;
+    V* output;
+  };
+  template <class V>
+  PlainVolume<V> plain_volume(std::size_t number, const SlabBox& box);
+  /// @tparam V  of the first target
+  template <class V>
+  SinkLayout sink_layout(const SlabBox& box);
+  template <class V>
+  VolumesSink<V> volumes_sink(const SlabBox& box);
+  void write_target(std::size_t number, const SlabBox& box, const Mapped& mapped, std::uint8_t* coverage,
+                    Counts* counts);
+  void give(const VolumeView& view, const SlabBox& box, std::size_t offset);
+  bool has_results_on_host() const;
+
+  const Geometry& output_;
+  Uploads& uploads_;
+  Downloads downloads_;
+  Maps maps_;
+  cudaStream_t stream_ = nullptr;
+  std::vector<std::unique_ptr<DeviceTarget>> kept_;
+  std::span<std::unique_ptr<DeviceTarget>> targets_;  ///< of this call, the first of `kept_`
+  DeviceBuffer<std::byte> sources_, results_;
+  Layout layout_;  ///< of the box
+  std::size_t box_bytes_ = 0;
+  int boxes_ = 1, current_ = 0;
+  Event computed_, copied_[2];
+};
+
+}  // namespace tetwarp::cuda_detail

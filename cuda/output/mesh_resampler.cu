@@ -1,0 +1,142 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include "cuda/output/mesh_resampler.h"
+
+#include <algorithm>
+#include <glm/common.hpp>
+
+#include "cuda/output/resampler.h"
+#include "cuda/owners/gather.h"
+#include "cuda/owners/mesh_raster.h"
+#include "deform/target_check.h"
+
+namespace tetwarp::cuda_detail {
+
+namespace {
+
+/// What is known of the voxels of a box, and where it goes.
+struct Settling {
+  const unsigned* owner;
+  const unsigned* at_rest;       ///< owner in the undeformed mesh; null: nothing stays outside
+  const std::uint16_t* several;  ///< null: not wanted
+  std::uint8_t* mapped;
+  glm::vec3* offset;
+  float* jacobian;  ///< null: not wanted
+};
+
+/// From the owner of each voxel to where it comes from; voxels outside the undeformed mesh may stay where they are.
+__global__ void settle_mesh_kernel(MeshRaster::View mesh, SlabBox box, Settling of, Counts* counts) {
+  const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
+  if (n >= box.count()) return;
+  const glm::i64vec3 voxel = box.voxel(n);
+  const unsigned number = of.owner[n];
+  const bool owned = number != kNoTetrahedron, outside = of.at_rest && of.at_rest[n] == kNoTetrahedron;
+  of.mapped[n] = owned || outside;
+  of.offset[n] = glm::vec3(0);
+  if (of.jacobian) of.jacobian[n] = owned || !outside ? __int_as_float(0x7fc00000) : 1.0f;
+  if (owned) {
+    const Tetrahedron t = mesh.tetrahedron(number);
+    of.offset[n] = interpolate_u(t, detail::to_steps(voxel), mesh.nudge.signs(voxel));
+    if (of.jacobian) of.jacobian[n] = forward_jacobian(t);
+    if (outside) atomicAdd(&counts->conflicts, 1ULL);
+  }
+  if (of.several && of.several[n] > 1) atomicAdd(&counts->multiply_owned, 1ULL);
+}
+
+class MeshResampler final : public CudaResampler {
+ public:
+  using CudaResampler::CudaResampler;
+  using Resampler::set_field;
+
+  void set_field(const FieldView& field, const Control& control) override {
+    ready_ = false;
+    mesh_ = snap_mesh(output(), field, control);
+    const DeviceScope scope(device_);
+    stream_ = static_cast<cudaStream_t>(control.stream);
+    stays_outside_ = field.outside == Outside::rest;
+    const bool wants_rest = field.outside != Outside::background;
+    const std::uint64_t bytes = (wants_rest ? 2 : 1) * MeshRaster::bytes_of(mesh_);
+    if (!may_hold(bytes)) refuse_field(bytes, allowed_bytes());
+    make_room_for_field(bytes);
+    raster_.set(mesh_, output(), stream_);
+    if (wants_rest) rest_.set(undeformed(mesh_), output(), stream_);
+    if (field.outside == Outside::refuse) require_reach(control);
+    ready_ = true;
+  }
+
+ private:
+  /// @throws InputError unless the undeformed mesh reaches over the whole output
+  void require_reach(const Control& control) {
+    const glm::i64vec3& size = output().size;
+    const std::int64_t slices = std::clamp<std::int64_t>((std::int64_t{1} << 30) / (size.x * size.y), 1, size.z);
+    std::int64_t voxels = 0, lowest = INT64_MAX;
+    for (std::int64_t z = 0; z < size.z; z += slices) {
+      if (control.stop.stop_requested()) throw Cancelled();
+      const SlabBox box{{0, 0, z}, {size.x, size.y, std::min(slices, size.z - z)}};
+      unsigned long long found[2] = {0, ~0ULL};
+      holes_.upload(found, 2, stream_);
+      rest_.run(box, HoleSink{box, holes_.data()}, stream_);
+      holes_.download(found, 2, stream_);
+      if (found[0] == 0) continue;
+      voxels += static_cast<std::int64_t>(found[0]);
+      lowest = std::min(lowest, z * size.x * size.y + static_cast<std::int64_t>(found[1]));
+    }
+    if (voxels != 0) refuse_mesh_reach(output(), voxels, lowest);
+  }
+
+  Region source_extent(const Geometry& source, const Region& region) const override {
+    return mesh_source_region(mesh_, stays_outside_, output(), source, region);
+  }
+  void prepare_slabs() override {}
+  Region slab_source(const Geometry& source, const Region& slab) const override { return source_extent(source, slab); }
+
+  std::uint64_t field_bytes(const Slices&) const override { return held_field_bytes(); }
+  std::uint64_t held_field_bytes() const override { return raster_.held_bytes() + rest_.held_bytes(); }
+  const char* held_of_field() const override { return "whole mesh"; }
+
+  bool can_write_plainly() const override { return !stays_outside_; }
+  std::int64_t work_bytes(const SlabWriter&) const override {
+    return Mapped::kBytes + std::int64_t{2 * sizeof(unsigned)};
+  }
+
+  void write_plainly(const SlabBox& box, SlabWriter& writer) override {
+    std::visit([&](const auto& sink) { raster_.run(box, sink, stream_); }, writer.plain_sink(box));
+    const std::uint64_t covered = raster_.covered(stream_);
+    plainly_covered_ += covered;
+    plainly_uncovered_ += static_cast<std::uint64_t>(box.count()) - covered;
+    paths_.claimed += static_cast<std::uint64_t>(box.count());
+  }
+
+  void map_box(const SlabBox& box, SlabWriter& writer) override {
+    const auto voxels = static_cast<std::size_t>(box.count());
+    paths_.claimed += static_cast<std::uint64_t>(voxels);
+    std::uint8_t* mapped = mapped_.mapped.reserve(voxels);
+    glm::vec3* offset = mapped_.offset.reserve(voxels);
+    if (!stays_outside_ && !writer.wants_jacobian() && !writer.wants_owners())
+      return raster_.run(box, OffsetSink{box, mapped, offset}, stream_);
+    raster_.run(box, OwnerSink{box, owner_.reserve(voxels), writer.owners()}, stream_);
+    if (stays_outside_) rest_.run(box, OwnerSink{box, at_rest_.reserve(voxels), nullptr}, stream_);
+    const Settling settling{
+        owner_.data(), stays_outside_ ? at_rest_.data() : nullptr, writer.owners(), mapped, offset, writer.jacobian()};
+    settle_mesh_kernel<<<blocks_for(box.count()), kThreads, 0, stream_>>>(raster_.view(), box, settling,
+                                                                          counts_.data());
+    TETWARP_CUDA_TRY(cudaGetLastError());
+  }
+
+  void describe_field(Report& report) const override { mesh_.describe(report); }
+
+  SnappedMesh mesh_;
+  MeshRaster raster_, rest_;  ///< deformed; and undeformed, where it matters what lies outside
+  DeviceBuffer<unsigned> owner_, at_rest_;
+  DeviceBuffer<unsigned long long> holes_;
+  bool stays_outside_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<Resampler> make_mesh_resampler(const Geometry& output, int device, const Limits& limits) {
+  return std::make_unique<MeshResampler>(output, device, limits);
+}
+
+}  // namespace tetwarp::cuda_detail

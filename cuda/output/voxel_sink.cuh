@@ -1,0 +1,285 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#pragma once
+
+#include "cuda/lattice/slab.h"
+
+namespace tetwarp::cuda_detail {
+
+/// One axis of a place that was rounded up to the next voxel, like `place_at`.
+__device__ inline void carry_on_axis(int& base, float& rest) {
+  if (rest < 1.0f) return;
+  ++base;
+  rest = 0;
+}
+
+/// Moves it onto the grid like `clamp_to_grid`. @return false further out
+__device__ inline bool clamp_on_axis(int last, int& base, float& fraction) {
+  if (static_cast<unsigned>(base) < static_cast<unsigned>(last)) return true;
+  const bool low = base == -1 && fraction >= 0.5f, high = base == last && fraction <= 0.5f;
+  base = low ? 0 : base;
+  fraction = 0;
+  return low || high;
+}
+
+/// Along x, then y, then z.
+__device__ inline float interpolate(const float (&v)[8], const glm::vec3& t) {
+  const auto along_x = [&](int from) { return v[from] + t.x * (v[from + 1] - v[from]); };
+  const auto along_y = [&](int from) {
+    const float a = along_x(from);
+    return a + t.y * (along_x(from + 2) - a);
+  };
+  const float a = along_y(0);
+  return a + t.z * (along_y(4) - a);
+}
+
+/// The eight voxels from one on. As words: their conversion to float is a faster one.
+template <class V>
+__device__ void read_corners(const V* v, int dx, int dy, int dz, int (&corners)[8]) {
+#pragma unroll
+  for (int n = 0; n < 8; ++n)
+    corners[n] = v[((n & 1) != 0 ? dx : 0) + ((n & 2) != 0 ? dy : 0) + ((n & 4) != 0 ? dz : 0)];
+}
+
+/// Adding it rounds to a whole number, to be read from the lowest bits.
+constexpr float kToWhole = 3.0f * (1 << 22);
+
+template <class V>
+__device__ V interpolated(const int (&corners)[8], const glm::vec3& t) {
+  float v[8];
+#pragma unroll
+  for (int n = 0; n < 8; ++n) v[n] = static_cast<float>(corners[n]);
+  return static_cast<V>(__float_as_int(interpolate(v, t) + kToWhole));  // between the corners: never saturates
+}
+
+/// The whole voxels of minus `moved`, rounded down, as bits of a float `kToWhole` above; and what is left.
+__device__ inline int whole_bits(float moved, float& fraction) {
+  const float whole = __fmaf_rd(moved, -kVoxelsPerStep, kToWhole);
+  fraction = fmaf(moved, -kVoxelsPerStep, kToWhole - whole);
+  return __float_as_int(whole);
+}
+
+__device__ inline unsigned SinkLayout::column(const glm::ivec3& voxel) const {
+  const auto by_row = static_cast<unsigned>(row), by_slice = static_cast<unsigned>(slice);
+  const glm::uvec3 at = glm::uvec3(voxel) - static_cast<unsigned>(__float_as_int(kToWhole));
+  return at.z * by_slice + at.y * by_row + at.x;
+}
+
+template <bool kInside>
+__device__ bool SinkLayout::locate(const glm::ivec3& voxel, unsigned column, const glm::vec3& moved,
+                                   Origin& origin) const {
+  const auto x = static_cast<unsigned>(whole_bits(moved.x, origin.fraction.x)),
+             y = static_cast<unsigned>(whole_bits(moved.y, origin.fraction.y)),
+             z = static_cast<unsigned>(whole_bits(moved.z, origin.fraction.z));
+  origin.base = static_cast<int>(z * static_cast<unsigned>(slice) + (y * static_cast<unsigned>(row) + (x + column)));
+  // A negative u that is small gives a fraction that is rounded to 1. Along x, between whole numbers, a + 1 (b - a) is
+  // b; along y and z it need not be, so that the place must be carried to the next voxel.
+  const bool is_whole = fmaxf(origin.fraction.y, origin.fraction.z) < 1.0f;
+  if constexpr (kInside) return is_whole;
+  const auto is_below = [](int voxel, unsigned bits, int end) {
+    return static_cast<unsigned>(voxel) + (bits - static_cast<unsigned>(__float_as_int(kToWhole))) <
+           static_cast<unsigned>(end);
+  };
+  return is_whole & is_below(voxel.x, x, last.x) & is_below(voxel.y, y, last.y) & is_below(voxel.z, z, last.z);
+}
+
+__device__ inline bool SinkLayout::locate(const glm::ivec3& voxel, const glm::vec3& moved, Origin& origin) const {
+  const auto on_axis = [](int voxel, float moved, int& base, float& fraction) {
+    base = voxel + (whole_bits(moved, fraction) - __float_as_int(kToWhole));
+  };
+  glm::ivec3 base;
+  on_axis(voxel.x, moved.x, base.x, origin.fraction.x);
+  on_axis(voxel.y, moved.y, base.y, origin.fraction.y);
+  on_axis(voxel.z, moved.z, base.z, origin.fraction.z);
+  const auto is_below = [](int index, int end) { return static_cast<unsigned>(index) < static_cast<unsigned>(end); };
+  origin.base = source_index(base);
+  return is_below(base.x, last.x) & is_below(base.y, last.y) & is_below(base.z, last.z) &
+         (fmaxf(origin.fraction.y, origin.fraction.z) < 1.0f);  // as above
+}
+
+__device__ inline bool SinkLayout::locate_exactly(const glm::ivec3& voxel, const glm::vec3& u, Origin& origin) const {
+  const glm::ivec3 whole(__float2int_rd(u.x), __float2int_rd(u.y), __float2int_rd(u.z));
+  glm::ivec3 base = voxel + whole;
+  glm::vec3& t = origin.fraction = u - glm::vec3(whole);
+  for (int axis = 0; axis < 3; ++axis) carry_on_axis(base[axis], t[axis]);
+  const bool in_x = clamp_on_axis(last.x, base.x, t.x), in_y = clamp_on_axis(last.y, base.y, t.y),
+             in_z = clamp_on_axis(last.z, base.z, t.z);
+  origin.base = source_index(base);
+  return in_x && in_y && in_z;
+}
+
+template <class V>
+__device__ void VoxelSink<V>::begin(const Origin& origin, bool wanted, Pending& pending) const {
+  pending.fraction = origin.fraction;
+  if (wanted) read_corners(source + origin.base, 1, row, slice, pending.corners);
+}
+
+template <class V>
+__device__ void VoxelSink<V>::end(int place, const Pending& pending) const {
+  output[place] = interpolated<V>(pending.corners, pending.fraction);
+}
+
+template <class V>
+__device__ void VoxelSink<V>::start(int, const glm::ivec3& voxel, const glm::vec3& moved, bool wanted,
+                                    Pending& pending) const {
+  Origin origin;
+  pending.any = wanted & locate(voxel, moved, origin);
+  begin(origin, pending.any, pending);
+}
+
+template <class V>
+__device__ void VoxelSink<V>::finish(int place, const Pending& pending) const {
+  // A branch, so that nothing of it is moved before what is read meanwhile.
+  if (pending.any) end(place, pending);
+}
+
+template <class V>
+__device__ bool VoxelSink<V>::write(int place, const glm::ivec3& voxel, const glm::vec3& u) const {
+  Origin origin;
+  if (!locate_exactly(voxel, u, origin)) {
+    nothing(place);
+    return false;
+  }
+  const glm::vec3& t = origin.fraction;
+  int corners[8];  // neighbours without weight may be any voxels: their finite values do not count
+  read_corners(source + origin.base, t.x != 0 ? 1 : 0, t.y != 0 ? row : 0, t.z != 0 ? slice : 0, corners);
+  output[place] = interpolated<V>(corners, t);
+  return true;
+}
+
+/// Where labels meet; out of line, for few voxels, and by value, so that registers hold them where they do not.
+__device__ __noinline__ inline int vote_among(int4 low, int4 high, glm::vec3 t) {
+  const int labels[8] = {low.x, low.y, low.z, low.w, high.x, high.y, high.z, high.w};
+  const SourceVoxels<int> source{labels, glm::i64vec3(2), glm::i64vec3(0), {1, 2, 4}};
+  return sample_vote(source, {glm::i64vec3(0), t}, Padding<int>{}).value;
+}
+
+__device__ inline int voted(const int (&l)[8], const glm::vec3& t) {
+  bool uniform = true;
+#pragma unroll
+  for (int n = 1; n < 8; ++n) uniform = uniform & (l[n] == l[0]);
+  return uniform ? l[0] : vote_among({l[0], l[1], l[2], l[3]}, {l[4], l[5], l[6], l[7]}, t);
+}
+
+template <class V>
+template <class Work>
+__device__ void VolumesSink<V>::with_type(const SinkVolume& volume, Work&& work) const {
+  if constexpr (!std::is_void_v<V>) {
+    work(static_cast<V*>(nullptr));
+  } else if (volume.type == VoxelType::i16) {
+    work(static_cast<std::int16_t*>(nullptr));
+  } else if (volume.type == VoxelType::u8) {
+    work(static_cast<std::uint8_t*>(nullptr));
+  } else {
+    work(static_cast<std::uint16_t*>(nullptr));
+  }
+}
+
+template <class V>
+__device__ void VolumesSink<V>::read(const SinkVolume& volume, const Origin& origin, const glm::ivec3& step,
+                                     int (&corners)[8]) const {
+  with_type(volume, [&](auto* type) {
+    using T = std::remove_pointer_t<decltype(type)>;
+    read_corners(static_cast<const T*>(volume.source) + origin.base, step.x, step.y, step.z, corners);
+  });
+}
+
+template <class V>
+__device__ void VolumesSink<V>::put(const SinkVolume& volume, int place, int value) const {
+  with_type(volume, [&](auto* type) {
+    using T = std::remove_pointer_t<decltype(type)>;
+    static_cast<T*>(volume.output)[place] = static_cast<T>(value);
+  });
+}
+
+template <class V>
+__device__ void VolumesSink<V>::put(const SinkVolume& volume, int place, const int (&corners)[8],
+                                    const glm::vec3& t) const {
+  put(volume, place, std::is_void_v<V> && volume.votes ? voted(corners, t) : interpolated<int>(corners, t));
+}
+
+template <class V>
+__device__ void VolumesSink<V>::begin(const Origin& origin, bool wanted, Pending& pending) const {
+  pending.any = wanted;
+  pending.origin = origin;
+  if (!wanted) return;
+#pragma unroll
+  for (int n = 0; n < kOnTheWay; ++n)
+    if (n == 0 || n < count) read(volumes[n], origin, {1, row, slice}, pending.corners[n]);
+}
+
+template <class V>
+__device__ void VolumesSink<V>::start(int, const glm::ivec3& voxel, const glm::vec3& moved, bool wanted,
+                                      Pending& pending) const {
+  Origin origin;
+  const bool inside = locate(voxel, moved, origin);
+  begin(origin, wanted & inside, pending);
+}
+
+template <class V>
+__device__ void VolumesSink<V>::finish(int place, const Pending& pending) const {
+  if (!pending.any) return;
+#pragma unroll
+  for (int n = 0; n < kOnTheWay; ++n)
+    if (n == 0 || n < count) put(volumes[n], place, pending.corners[n], pending.origin.fraction);
+  for (int n = kOnTheWay; n < count; ++n) {
+    int corners[8];
+    read(volumes[n], pending.origin, {1, row, slice}, corners);
+    put(volumes[n], place, corners, pending.origin.fraction);
+  }
+}
+
+template <class V>
+__device__ bool VolumesSink<V>::write(int place, const glm::ivec3& voxel, const glm::vec3& u) const {
+  Origin origin;
+  if (!locate_exactly(voxel, u, origin)) {
+    nothing(place);
+    return false;
+  }
+  const glm::vec3& t = origin.fraction;
+  const glm::ivec3 step(t.x != 0 ? 1 : 0, t.y != 0 ? row : 0, t.z != 0 ? slice : 0);
+  for (int n = 0; n < count; ++n) {
+    int corners[8];
+    read(volumes[n], origin, step, corners);
+    put(volumes[n], place, corners, t);
+  }
+  return true;
+}
+
+/// Reads first, then writes.
+template <int kCount, class V>
+__device__ void copy_column(const V* from, int from_step, V* to, int to_step, std::uint32_t wanted) {
+  V copied[kCount];
+#pragma unroll
+  for (int n = 0; n < kCount; ++n)
+    if ((wanted >> n & 1) != 0) copied[n] = from[n * from_step];
+#pragma unroll
+  for (int n = 0; n < kCount; ++n)
+    if ((wanted >> n & 1) != 0) to[n * to_step] = copied[n];
+}
+
+template <class V>
+template <int kCount>
+__device__ void VoxelSink<V>::copy(const glm::ivec3& voxel, std::uint32_t wanted) const {
+  copy_column<kCount>(source + source_index(voxel), slice, output + place(voxel), output_slice, wanted);
+}
+
+template <class V>
+template <int kCount>
+__device__ void VolumesSink<V>::copy(const glm::ivec3& voxel, std::uint32_t wanted) const {
+  for (int n = 0; n < count; ++n) {
+    with_type(volumes[n], [&](auto* type) {
+      using T = std::remove_pointer_t<decltype(type)>;
+      copy_column<kCount>(static_cast<const T*>(volumes[n].source) + source_index(voxel), slice,
+                          static_cast<T*>(volumes[n].output) + place(voxel), output_slice, wanted);
+    });
+  }
+}
+
+template <class V>
+__device__ void VolumesSink<V>::nothing(int place) const {
+  for (int n = 0; n < count; ++n) put(volumes[n], place, volumes[n].background);
+}
+
+}  // namespace tetwarp::cuda_detail

@@ -1,0 +1,217 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include "cuda/owners/gather.h"
+
+#include <algorithm>
+
+#include "cuda/owners/march.cuh"
+#include "deform/core/visit_cell.h"
+
+namespace tetwarp::cuda_detail {
+
+namespace {
+
+constexpr int kQueueTries = 6;                 ///< in float, before the exact walk
+constexpr int kWalk = 24;                      ///< tetrahedra that the exact walk may pass
+constexpr unsigned kClaimedAtOnce = 1u << 22;  ///< voxels, or those of a slice
+
+/// The voxels that no prediction settled: a few more in float, then a walk with exact integers.
+template <class Sink>
+__global__ void queue_kernel(Task task, int walk, Sink sink) {
+  const unsigned count = min(task.counters->queued, kQueueSize);
+  const glm::ivec3 size = task.size();
+  unsigned covered = 0;
+  for (unsigned n = blockIdx.x * kThreads + threadIdx.x; n < count; n += gridDim.x * kThreads) {
+    const Gather::Entry entry = task.queue[n];
+    const glm::ivec3 in(entry.voxel % size.x, entry.voxel / size.x % size.y, entry.voxel / (size.x * size.y));
+    const glm::ivec3 voxel = in + task.begin();
+    const GatherPoint point = task.point(voxel);
+    glm::vec3 place(entry.x, entry.y, entry.z);
+    bool settled = false;
+    for (int n_try = 0; n_try < kQueueTries && !settled; ++n_try) {
+      if (!is_finite(place)) place = task.lattice.place(glm::vec3(voxel));
+      const Trial trial = try_tetrahedron(task.lattice, tetrahedron_at(task.lattice, place), point);
+      settled = trial.owns;
+      if (settled) covered += sink.write(sink.place(voxel), voxel, trial.u());
+      place =
+          n_try == 0 ? trial.place() : (place + trial.place()) * 0.5f;  // full steps may go round in circles in folds
+    }
+    if (settled) continue;
+    if (!is_finite(place)) place = task.lattice.place(glm::vec3(voxel));
+    const glm::i32vec3 steps = detail::to_steps(glm::i64vec3(voxel)), signs = task.nudge.signs(voxel);
+    LatticeTetrahedron owner;
+    if (walk_to_owner(task.lattice, as_lattice(tetrahedron_at(task.lattice, place)), steps, signs, walk, owner)) {
+      covered += sink.write(sink.place(voxel), voxel, interpolate_u(vertices_of(task.lattice, owner), steps, signs));
+    } else {
+      task.leave_to_claims(in);
+    }
+  }
+  if (covered != 0) atomicAdd(&task.counters->covered, static_cast<unsigned long long>(covered));
+}
+
+/// Numbers the voxels that are to be claimed, and lists them: one thread a word.
+__global__ void number_kernel(const std::uint32_t* several, std::int64_t words, unsigned* rank, unsigned* numbered,
+                              unsigned* voxels) {
+  const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
+  const std::uint32_t bits = n < words ? several[n] : 0;
+  const auto mine = static_cast<unsigned>(__popc(bits));
+  const auto before = static_cast<unsigned>(warp_scan(__popc(bits)));  // of the warp, this one too
+  const int lane = static_cast<int>(threadIdx.x & 31);
+  unsigned first = 0;
+  if (lane == 31 && before != 0) first = atomicAdd(numbered, before);
+  first = __shfl_sync(~0u, first, 31) + before - mine;
+  if (bits == 0) return;
+  rank[n] = first;
+  for (std::uint32_t left = bits; left != 0; left &= left - 1)
+    voxels[first++] = static_cast<unsigned>(n * 32 + __ffs(static_cast<int>(left)) - 1);
+}
+
+/// From the owners of claimed voxels to their values.
+template <class Sink>
+__global__ void settle_kernel(Task task, glm::ivec3 begin, const unsigned* voxels, unsigned count,
+                              const unsigned long long* owner, Sink sink) {
+  const unsigned n = blockIdx.x * kThreads + threadIdx.x;
+  if (n >= count) return;
+  const int words = task.single.words_per_row, rows = task.size().y;
+  const unsigned word = voxels[n] / 32;
+  const glm::ivec3 voxel =
+      begin + glm::ivec3(word % words * 32 + voxels[n] % 32, word / words % rows, word / words / rows);
+  const int place = sink.place(voxel);
+  if (owner[n] == kNobody) return sink.nothing(place);
+  const glm::ivec3& cells = task.lattice.cells;
+  const unsigned long long cell = owner[n] / kTetrahedraPerCell, row = cell / cells.x;
+  const LatticeTetrahedron t = LatticeTetrahedron::of_cell(
+      {static_cast<int>(cell % cells.x), static_cast<int>(row % cells.y), static_cast<int>(row / cells.y)},
+      static_cast<int>(owner[n] % kTetrahedraPerCell));
+  warp_count(&task.counters->covered,
+             sink.write(place, voxel, offset_in(task.lattice, t, voxel, task.nudge.signs(voxel))));
+}
+
+}  // namespace
+
+template <class Sink>
+Gather::Counters Gather::run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink,
+                             cudaStream_t stream) {
+  const DeviceField& field = lattice.field();
+  if (IntervalRaster::suits(field.steps, is_mostly_folded(lattice))) return run_intervals(lattice, box, sink, stream);
+  coverage_.begin(box, stream);
+  const glm::ivec3 size(box.size), tile(kSeedTile, kSeedTile, kMarch);
+  const glm::ivec3 marches = marches_of(size);
+  Task task{field.steps,
+            NudgeTurns(field.frame.nudge),
+            box,
+            {},
+            nullptr,
+            lattice.moving_blocks(),
+            resting_.reserve(std::size_t(marches.x) * std::size_t(marches.y) * std::size_t(marches.z)),
+            (size + tile - 1) / tile,
+            queue_.reserve(kQueueSize),
+            coverage_.counters()};
+  const std::int64_t seeds = std::int64_t{task.seeds.x} * task.seeds.y * task.seeds.z;
+  glm::vec3* seeded = seeds_.reserve(static_cast<std::size_t>(seeds));
+  if (!beside_) beside_.emplace();
+  beside_->begun.record(stream);
+  coverage_.find(lattice, box, stream);
+  beside_->begun.hold_back(beside_->stream.get());  // seeds and what rests do not wait for the coverage
+  seed_kernel<<<blocks_for(seeds), kThreads, 0, beside_->stream.get()>>>(task, seeded);
+  const std::int64_t march_count = std::int64_t{marches.x} * marches.y * marches.z;
+  rest_kernel<<<blocks_for(march_count * 32), kThreads, 0, beside_->stream.get()>>>(task, march_count);
+  beside_->seeded.record(beside_->stream.get());
+  beside_->seeded.hold_back(stream);
+  task.single = coverage_.single();
+  task.several = coverage_.several();
+  constexpr int kBlockI = kAcross * kAlongI, kBlockJ = kWarps / kAcross * kAlongJ;  // voxels of a block
+  const dim3 blocks(static_cast<unsigned>((size.x + kBlockI - 1) / kBlockI),
+                    static_cast<unsigned>((size.y + kBlockJ - 1) / kBlockJ), static_cast<unsigned>(marches.z));
+  const glm::vec3& cell = field.steps.cell;
+  const bool coarse = std::max({cell.x, cell.y, cell.z}) > 2 * kStepsPerVoxel;
+  const auto march = coarse ? march_kernel<Sink, true> : march_kernel<Sink, false>;
+  march<<<blocks, dim3(32, kWarps), 0, stream>>>(task, seeded, sink);
+  queue_kernel<<<1024, kThreads, 0, stream>>>(task, is_mostly_folded(lattice) ? 0 : kWalk, sink);
+  TETWARP_CUDA_TRY(cudaGetLastError());
+  Counters found = counters(stream);
+  if (found.left != 0) {
+    coverage_.count_several(box, stream);
+    found = counters(stream);
+  }
+  if (found.claimed == 0) return found;
+  claim_several(task, field, sink, stream);
+  return counters(stream);
+}
+
+/// Tiles that too many tetrahedra reach are claimed.
+template <class Sink>
+Gather::Counters Gather::run_intervals(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink,
+                                       cudaStream_t stream) {
+  intervals_.run(lattice, box, sink, stream);
+  const IntervalRaster::Counters settled = intervals_.counters(stream);
+  if (settled.left == 0) return {settled.covered, 0, 0, 0};
+  coverage_.forget(box, stream);
+  intervals_.mark_left(lattice, box, coverage_.several(), stream);
+  coverage_.count_several(box, stream);
+  Task task{lattice.field().steps, NudgeTurns(lattice.field().frame.nudge), box};
+  task.single = coverage_.single();
+  task.counters = coverage_.counters();
+  claim_several(task, lattice.field(), sink, stream);
+  Counters found = counters(stream);
+  found.covered += settled.covered;
+  return found;
+}
+
+bool Gather::is_mostly_folded(const LatticeOnDevice& lattice) {
+  constexpr std::int64_t kFew = 256;  // one inverted tetrahedron in so many
+  const std::int64_t tetrahedra = kTetrahedraPerCell * lattice.field().cell_count();
+  return static_cast<std::int64_t>(lattice.statistics().inverted) > tetrahedra / kFew;
+}
+
+Gather::Counters Gather::counters(cudaStream_t stream) {
+  Counters* found = found_.reserve(1);
+  TETWARP_CUDA_TRY(cudaMemcpyAsync(found, coverage_.counters(), sizeof *found, cudaMemcpyDeviceToHost, stream));
+  TETWARP_CUDA_TRY(cudaStreamSynchronize(stream));
+  return *found;
+}
+
+/// So many slices at a time that memory for their claimed voxels is bounded.
+template <class Task, class Sink>
+void Gather::claim_several(const Task& task, const DeviceField& field, const Sink& sink, cudaStream_t stream) {
+  const glm::i64vec3& size = task.box.size;
+  const auto slices = static_cast<std::size_t>(size.z);
+  unsigned* in_slice = several_in_slice_.reserve(slices);
+  TETWARP_CUDA_TRY(cudaMemcpyAsync(in_slice, coverage_.several_in_slice(), slices * sizeof(unsigned),
+                                   cudaMemcpyDeviceToHost, stream));
+  TETWARP_CUDA_TRY(cudaStreamSynchronize(stream));
+  const std::int64_t words_per_slice = coverage_.words_per_row() * size.y;
+  for (std::int64_t z = 0, end; z < size.z; z = end) {
+    std::size_t count = in_slice[z];
+    for (end = z + 1; end < size.z; ++end) {
+      const std::size_t next = in_slice[end];
+      if (count + next > kClaimedAtOnce) break;
+      count += next;
+    }
+    if (count == 0) continue;
+    const SlabBox slab{task.box.begin + glm::i64vec3(0, 0, z), {size.x, size.y, end - z}};
+    const std::int64_t words = words_per_slice * slab.size.z;
+    unsigned *rank = coverage_.scratch(), *voxels = claimed_.reserve(count);
+    const Wanted wanted{coverage_.several() + z * words_per_slice, rank};
+    numbered_.fill(0, 1, stream);
+    number_kernel<<<blocks_for(words), kThreads, 0, stream>>>(wanted.bits, words, rank, numbered_.data(), voxels);
+    claims_.claim(field, slab, wanted, count, stream);
+    settle_kernel<<<blocks_for(static_cast<std::int64_t>(count)), kThreads, 0, stream>>>(
+        task, glm::ivec3(slab.begin), voxels, static_cast<unsigned>(count), claims_.owner(), sink);
+    TETWARP_CUDA_TRY(cudaGetLastError());
+  }
+}
+
+template Gather::Counters Gather::run(const LatticeOnDevice&, const SlabBox&, const OffsetSink&, cudaStream_t);
+template Gather::Counters Gather::run(const LatticeOnDevice&, const SlabBox&, const VolumesSink<void>&, cudaStream_t);
+template Gather::Counters Gather::run(const LatticeOnDevice&, const SlabBox&, const VolumesSink<std::int16_t>&,
+                                      cudaStream_t);
+template Gather::Counters Gather::run(const LatticeOnDevice&, const SlabBox&, const VoxelSink<std::uint8_t>&,
+                                      cudaStream_t);
+template Gather::Counters Gather::run(const LatticeOnDevice&, const SlabBox&, const VoxelSink<std::int16_t>&,
+                                      cudaStream_t);
+template Gather::Counters Gather::run(const LatticeOnDevice&, const SlabBox&, const VoxelSink<std::uint16_t>&,
+                                      cudaStream_t);
+
+}  // namespace tetwarp::cuda_detail

@@ -1,0 +1,120 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#pragma once
+
+#include <optional>
+
+#include "cuda/owners/claim.h"
+#include "cuda/owners/coverage.h"
+#include "cuda/owners/interval_raster.h"
+#include "cuda/runtime/stream.h"
+#include "deform/core/gather.h"
+
+namespace tetwarp::cuda_detail {
+
+/// Where a gather puts what it finds: for each voxel of a box, whether a tetrahedron owns it and where it comes from.
+///
+/// Like every sink of a gather it has a place for each voxel, which moves by `per_slice` along k.
+struct OffsetSink {
+  static constexpr bool kIsWide = false;
+
+  SlabBox box;
+  std::uint8_t* mapped;
+  glm::vec3* offset;
+
+  __device__ int place(const glm::ivec3& voxel) const { return static_cast<int>(box.offset(glm::i64vec3(voxel))); }
+  __device__ int per_slice() const { return static_cast<int>(box.size.x * box.size.y); }
+  /// Nothing is read here.
+  struct Pending {
+    bool any;
+    glm::vec3 u;
+  };
+  __device__ void start(int place, const glm::ivec3& voxel, const glm::vec3& moved, bool wanted,
+                        Pending& pending) const {
+    pending.any = wanted && write(place, voxel, detail::to_offset(moved));
+  }
+  __device__ void finish(int, const Pending&) const {}
+  struct Origin {
+    glm::vec3 u;
+  };
+  __device__ bool surrounds(const glm::ivec3&, const glm::ivec3&) const { return false; }
+  __device__ unsigned column(const glm::ivec3&) const { return 0; }
+  __device__ unsigned per_source_slice() const { return 0; }
+  template <bool kInside>
+  __device__ bool locate(const glm::ivec3&, unsigned, const glm::vec3& moved, Origin& origin) const {
+    origin.u = detail::to_offset(moved);
+    return moved.x == moved.x;
+  }
+  __device__ void begin(const Origin& origin, bool, Pending& pending) const { pending.u = origin.u; }
+  __device__ void end(int place, const Pending& pending) const { write(place, {}, pending.u); }
+  /// @return whether the voxel counts as covered
+  __device__ bool write(int place, const glm::ivec3&, const glm::vec3& u) const {
+    mapped[place] = 1;
+    offset[place] = u;
+    return true;
+  }
+  /// Voxels of a column along k that stay where they are.
+  template <int kCount>
+  __device__ void copy(const glm::ivec3& voxel, std::uint32_t wanted) const {
+    for (int n = 0, to = place(voxel); n < kCount; ++n, to += per_slice())
+      if ((wanted >> n & 1) != 0) write(to, {}, glm::vec3(0));
+  }
+  __device__ void nothing(int place) const {
+    mapped[place] = 0;
+    offset[place] = glm::vec3(0);
+  }
+};
+
+/// From voxels to their owners: marches along k, and predicts each owner from the last one.
+///
+/// Voxels that the march cannot settle in float go to a queue, and there to a walk with exact integers; voxels that may
+/// have several owners, and what is left, are claimed. So every field with whole steps may take this way.
+class Gather {
+ public:
+  using Counters = GatherCounters;
+
+  /// Finds the voxels of `box`; waits for the stream.
+  template <class Sink>
+  Counters run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream);
+
+  /// To be called when the field is another one.
+  void forget_field() {
+    claims_.forget_field();
+    intervals_.forget_field();
+  }
+
+  struct Entry {
+    int voxel;  ///< offset in the box
+    float x, y, z;
+  };
+
+ private:
+  /// Whether so much is inverted that walks mostly fail: then what is not predicted is claimed.
+  static bool is_mostly_folded(const LatticeOnDevice& lattice);
+  /// The way for large cells.
+  template <class Sink>
+  Counters run_intervals(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream);
+  /// Claims the voxels that the coverage calls `several`.
+  template <class Task, class Sink>
+  void claim_several(const Task& task, const DeviceField& field, const Sink& sink, cudaStream_t stream);
+  Counters counters(cudaStream_t stream);
+
+  Coverage coverage_;
+  Claims claims_;
+  IntervalRaster intervals_;
+  DeviceBuffer<glm::vec3> seeds_;
+  DeviceBuffer<std::uint8_t> resting_;
+  DeviceBuffer<Entry> queue_;
+  DeviceBuffer<unsigned> numbered_, claimed_;
+  PinnedBuffer<unsigned> several_in_slice_;
+  PinnedBuffer<Counters> found_;
+  /// Of the device of the first run.
+  struct Beside {
+    Stream stream;
+    Event begun, seeded;
+  };
+  std::optional<Beside> beside_;
+};
+
+}  // namespace tetwarp::cuda_detail

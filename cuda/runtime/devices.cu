@@ -1,0 +1,38 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include "cuda/devices.h"
+
+#include "cuda/runtime/device_buffer.h"
+
+namespace tetwarp {
+
+bool has_cuda() { return true; }
+
+int cuda_device_count() {
+  int count = 0;
+  if (cudaGetDeviceCount(&count) == cudaSuccess) return count;
+  cudaGetLastError();
+  return 0;
+}
+
+void wake_cuda_device(int device) {
+  if (cudaSetDevice(device) != cudaSuccess || cudaFree(nullptr) != cudaSuccess) cudaGetLastError();  // told when used
+}
+
+DeviceStream::DeviceStream(int device) {
+  const cuda_detail::DeviceScope scope(device);
+  cudaStream_t stream = nullptr;
+  TETWARP_CUDA_TRY(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking));
+  stream_ = stream;
+}
+
+DeviceStream::~DeviceStream() { cudaStreamDestroy(static_cast<cudaStream_t>(stream_)); }
+
+std::string describe_cuda_device(int device) {
+  cudaDeviceProp properties{};
+  TETWARP_CUDA_TRY(cudaGetDeviceProperties(&properties, device));
+  return std::string(properties.name) + ", " + std::to_string(properties.totalGlobalMem / 1000000000) + " GB";
+}
+
+}  // namespace tetwarp
