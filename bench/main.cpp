@@ -9,7 +9,7 @@
 #include <iostream>
 #include <new>
 
-#include "bench/options.h"
+#include "bench/harness/options.h"
 #include "deform/render/transfer_function.h"
 #include "deform/version.h"
 

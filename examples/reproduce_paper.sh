@@ -147,7 +147,7 @@ mv -f "$unfinished"/{machine.txt,paper.json,paper.csv,paper.md} "$out"
 drawing="not made: no python3-matplotlib"
 for python in python3 /usr/bin/python3; do
   if "$python" -c 'import matplotlib' 2>/dev/null; then
-    "$python" "$source_dir/bench/plot_paper.py" "$out/paper.json" "$unfinished/paper.svg"
+    "$python" "$source_dir/bench/paper/plot_paper.py" "$out/paper.json" "$unfinished/paper.svg"
     mv -f "$unfinished/paper.svg" "$out"
     drawing=$out/paper.svg
     break

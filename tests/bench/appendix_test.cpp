@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "bench/appendix.h"
+#include "bench/paper/appendix.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "bench/published.h"
+#include "bench/paper/published.h"
 
 namespace tetwarp::bench {
 namespace {

@@ -2,14 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // What every backend of the benchmark must do; the list runs on the CPU, and on a device where there is one.
-#include "bench/backend.h"
+#include "bench/paper/backend.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
 #include <algorithm>
 
-#include "bench/compare.h"
+#include "bench/paper/compare.h"
 #include "cuda/devices.h"
 #include "deform/fields/formula.h"
 #include "deform/phantom.h"

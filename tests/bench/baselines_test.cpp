@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The bodies that every backend runs, here on the host and with fields of the tests' own.
-#include "bench/baselines.h"
+#include "bench/paper/baselines.h"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "bench/compare.h"
+#include "bench/paper/compare.h"
 
 #include <gtest/gtest.h>
 

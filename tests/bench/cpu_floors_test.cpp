@@ -2,13 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The floors of `cpu`, from given medians, and what is written of them.
-#include "bench/cpu_floors.h"
+#include "bench/cpu/cpu_floors.h"
 
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
 
-#include "bench/cpu_report.h"
+#include "bench/cpu/cpu_report.h"
 #include "tests/support/floors.h"
 #include "tests/support/says.h"
 

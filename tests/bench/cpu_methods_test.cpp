@@ -2,12 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // What `cpu` measures beside Tetwarp does the same work: only then are times to be compared.
-#include "bench/cpu_methods.h"
+#include "bench/cpu/cpu_methods.h"
 
 #include <gtest/gtest.h>
 
-#include "bench/paper_cpu.h"
-#include "bench/peers.h"
+#include "bench/paper/paper_cpu.h"
+#include "bench/peers/peers.h"
 #include "deform/phantom.h"
 
 namespace tetwarp::bench {

@@ -2,13 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The fields of `gpu` and its backward warp, which a device and the CPU compute by the same functions.
-#include "bench/gpu_fields.h"
+#include "bench/gpu/gpu_fields.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "bench/gpu_backward.h"
+#include "bench/gpu/gpu_backward.h"
 #include "deform/phantom.h"
 #include "deform/resampler.h"
 

@@ -2,13 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The floors of `gpu`, from given medians, and what is written of them.
-#include "bench/gpu_floors.h"
+#include "bench/gpu/gpu_floors.h"
 
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
 
-#include "bench/gpu_report.h"
+#include "bench/gpu/gpu_report.h"
 #include "tests/support/floors.h"
 #include "tests/support/says.h"
 

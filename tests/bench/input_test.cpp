@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "bench/input.h"
+#include "bench/harness/input.h"
 
 #include <gtest/gtest.h>
 

@@ -2,13 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The floors of `invert`, from given times and errors, and what is written of them.
-#include "bench/invert_floors.h"
+#include "bench/invert/invert_floors.h"
 
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
 
-#include "bench/invert_report.h"
+#include "bench/invert/invert_report.h"
 #include "tests/support/floors.h"
 #include "tests/support/says.h"
 

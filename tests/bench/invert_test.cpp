@@ -9,8 +9,8 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
-#include "bench/invert_bench.h"
-#include "bench/peers.h"
+#include "bench/invert/invert_bench.h"
+#include "bench/peers/peers.h"
 
 namespace tetwarp::bench {
 namespace {

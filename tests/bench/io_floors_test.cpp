@@ -2,13 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The floors of `io`, from given medians, and what is written of them.
-#include "bench/io_floors.h"
+#include "bench/io/io_floors.h"
 
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
 
-#include "bench/io_report.h"
+#include "bench/io/io_report.h"
 #include "tests/support/floors.h"
 #include "tests/support/says.h"
 

@@ -8,8 +8,8 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "bench/invert_fields.h"
-#include "bench/itk_accuracy.h"
+#include "bench/invert/invert_fields.h"
+#include "bench/itk/itk_accuracy.h"
 #include "deform/phantom.h"
 
 namespace tetwarp::bench {

@@ -2,13 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The floors of `itk`, from given times, errors and memory, and what is written of them.
-#include "bench/itk_floors.h"
+#include "bench/itk/itk_floors.h"
 
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
 
-#include "bench/itk_report.h"
+#include "bench/itk/itk_report.h"
 #include "tests/support/floors.h"
 #include "tests/support/says.h"
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "bench/machine.h"
+#include "bench/harness/machine.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -24,7 +24,7 @@ class PaperDocument : public testing::Test {
   }
   Outcome fill(const std::string& arguments) const {
     return run_program(scratch_.path(), TETWARP_PYTHON,
-                       "'" + (kSources / "bench/paper_document.py").string() + "' " + arguments);
+                       "'" + (kSources / "bench/paper/paper_document.py").string() + "' " + arguments);
   }
 
   const Scratch scratch_;

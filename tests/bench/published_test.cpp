@@ -2,16 +2,16 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The paper's own numbers, and which of ours may stand beside them.
-#include "bench/published.h"
+#include "bench/paper/published.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "bench/baselines.h"
-#include "bench/beside.h"
-#include "bench/published_tables.h"
+#include "bench/paper/baselines.h"
+#include "bench/paper/beside.h"
+#include "bench/paper/published_tables.h"
 #include "tests/support/says.h"
 
 namespace tetwarp::bench {

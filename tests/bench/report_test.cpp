@@ -2,16 +2,16 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // A tiny run from end to end, and what is written of it.
-#include "bench/report.h"
+#include "bench/harness/report.h"
 
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "bench/machine.h"
-#include "bench/paper_bench.h"
-#include "bench/tables.h"
+#include "bench/harness/machine.h"
+#include "bench/paper/paper_bench.h"
+#include "bench/paper/tables.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"
 #include "tests/support/write_file.h"

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "bench/statistics.h"
+#include "bench/harness/statistics.h"
 
 #include <gtest/gtest.h>
 

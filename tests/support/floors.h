@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "bench/floors.h"
+#include "bench/harness/floors.h"
 
 namespace tetwarp::test {
 

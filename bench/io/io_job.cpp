@@ -1,0 +1,106 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include "bench/io/io_job.h"
+
+#include <memory>
+
+#include "bench/harness/program.h"
+#include "bench/io/series.h"
+#include "cuda/devices.h"
+#include "deform/fields/formula.h"
+#include "io/hash.h"
+#include "io/staged_output.h"
+
+namespace tetwarp::bench {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kField[] = "wave:amplitude=8,wavelength=64";
+
+/// What one stage leaves to the next.
+struct Job {
+  DicomVolume input;
+  VertexField field;
+  AnyVolume output;
+  std::vector<SliceRange> sampled;
+};
+
+VertexField make_field(const Geometry& grid, std::int64_t cell_size, int threads) {
+  return sample_on(lattice_over(grid, cell_size), parse_formula(kField, grid), {.threads = threads});
+}
+
+/// As the program has it: the field is hashed, too. @param finished  told of slices that are done
+void deform(Job& job, Resampler& resampler, int threads, const std::function<void(const Region&)>& finished = {}) {
+  const Geometry& grid = job.input.volume.geometry;
+  Sha256().add_blocks(std::as_bytes(std::span(job.field.displacement)), threads);
+  resampler.set_field(view(job.field));
+  job.output = AnyVolume(grid, VoxelType::i16);
+  job.sampled.assign(static_cast<std::size_t>(grid.size.z), {});
+  const Target target{.source = view(job.input.volume),
+                      .output = job.output.view(),
+                      .background = -1024,
+                      .padding = job.input.padding,
+                      .sampled_slices = job.sampled};
+  resampler.resample(whole(grid), {&target, 1}, {}, {.finished = finished});
+}
+
+void write(const Job& job, const fs::path& folder, int threads) {
+  StagedOutput staged(folder, StagedOutput::Kind::folder, false);
+  write_series(staged.path(), job.input, job.output.view(), job.sampled, threads);
+  staged.commit();
+}
+
+/// From series to series, slices being written while others are deformed.
+void run_with_cuda(const fs::path& series, const fs::path& folder, std::int64_t cell_size, int threads) {
+  Job job;
+  job.input = read_series(series, threads);
+  const Geometry& grid = job.input.volume.geometry;
+  job.field = make_field(grid, cell_size, threads);
+  StagedOutput staged(folder, StagedOutput::Kind::folder, false);
+  DerivedSeriesWriter writer(staged.path(), grid, *job.input.headers, made_up_derivation());
+  deform(job, *make_cuda_resampler(grid), threads, [&](const Region& slices) {
+    writer.write(job.output.view(), slices.begin.z, slices.end.z, job.sampled, threads);
+  });
+  staged.commit();
+}
+
+}  // namespace
+
+fs::path tetwarp_program() {
+  const fs::path program = fs::read_symlink("/proc/self/exe").parent_path() / "tetwarp";
+  return fs::exists(program) ? program : fs::path();
+}
+
+void add_job(Turns& turns, const fs::path& series, const fs::path& scratch, std::int64_t cell_size, int threads) {
+  const std::string step = kJob + ("cells of " + std::to_string(cell_size));
+  const fs::path out = scratch / "derived", sidecar = scratch / "derived.json";
+  const auto remove = [=] {
+    fs::remove_all(out);
+    fs::remove(sidecar);
+  };
+  const fs::path program = tetwarp_program();
+  if (!program.empty()) {
+    const auto run_on = [=](const char* backend) {
+      run_program({program, "deform", series, "-f", kField, "--cell-size", std::to_string(cell_size), "-o", out,
+                   "--backend", backend, "--threads", std::to_string(threads), "--quiet"});
+    };
+    turns.add(step, kJobProgram, nothing([=] { run_on("cpu"); }), remove);
+    if (cuda_device_count() != 0) turns.add(step, kJobCuda, nothing([=] { run_on("cuda"); }), remove);
+  }
+  if (cuda_device_count() != 0) {
+    turns.add(step, kJobAwake, nothing([=] { run_with_cuda(series, out, cell_size, threads); }), remove);
+  }
+  const auto job = std::make_shared<Job>();
+  turns.add(step, kJobIn, nothing([=] { job->input = read_series(series, threads); }));
+  turns.add(step, kJobField, nothing([=] { job->field = make_field(job->input.volume.geometry, cell_size, threads); }));
+  turns.add(step, kJobDeform, nothing([=] {
+              deform(*job, *make_cpu_resampler(job->input.volume.geometry, {.threads = threads}), threads);
+            }));
+  turns.add(step, kJobOut, nothing([=] { write(*job, out, threads); }), remove);
+  turns.add(step, kJobFree, nothing([=] { *job = {}; }));
+}
+
+}  // namespace tetwarp::bench
