@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "itkbridge/transform_record.h"
+#include "itkbridge/transforms/transform_record.h"
 
 namespace tetwarp {
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "itkbridge/plastimatch_spline.h"
+#include "itkbridge/transforms/plastimatch_spline.h"
 
 #include <algorithm>
 #include <cmath>

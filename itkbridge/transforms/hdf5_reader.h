@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "itkbridge/transform_record.h"
+#include "itkbridge/transforms/transform_record.h"
 
 namespace tetwarp {
 

@@ -7,8 +7,8 @@
 #include <fstream>
 
 #include "deform/errors.h"
-#include "itkbridge/elastix_parameters.h"
-#include "itkbridge/plastimatch_spline.h"
+#include "itkbridge/transforms/elastix_parameters.h"
+#include "itkbridge/transforms/plastimatch_spline.h"
 
 namespace tetwarp {
 namespace {

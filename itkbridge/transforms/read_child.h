@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "itkbridge/transform_record.h"
+#include "itkbridge/transforms/transform_record.h"
 
 namespace tetwarp {
 

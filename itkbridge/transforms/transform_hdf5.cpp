@@ -4,8 +4,8 @@
 #include <algorithm>
 
 #include "deform/errors.h"
-#include "itkbridge/hdf5_reader.h"
-#include "itkbridge/isolated_read.h"
+#include "itkbridge/transforms/hdf5_reader.h"
+#include "itkbridge/transforms/isolated_read.h"
 
 namespace tetwarp {
 namespace {

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The program tetwarp-read: reads a file with a library that damaged files bring down, for the process that starts it
-// (itkbridge/isolated_read.h).
-#include "itkbridge/hdf5_reader.h"
-#include "itkbridge/read_child.h"
+// (itkbridge/transforms/isolated_read.h).
+#include "itkbridge/transforms/hdf5_reader.h"
+#include "itkbridge/transforms/read_child.h"
 
 int main(int argc, char** argv) {
   constexpr tetwarp::ChildReader kReaders[] = {{"transform-hdf5", tetwarp::read_hdf5_unconfined}};

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "itkbridge/transform_record.h"
+#include "itkbridge/transforms/transform_record.h"
 
 namespace tetwarp {
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "itkbridge/elastix_parameters.h"
+#include "itkbridge/transforms/elastix_parameters.h"
 
 #include <algorithm>
 #include <fstream>

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "itkbridge/hdf5_reader.h"
+#include "itkbridge/transforms/hdf5_reader.h"
 
 #include <itk_H5Cpp.h>
 
