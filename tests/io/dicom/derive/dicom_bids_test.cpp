@@ -6,7 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "tests/io/derived_source.h"
+#include "tests/io/dicom/derive/derived_source.h"
 
 namespace tetwarp::test {
 namespace {

@@ -8,7 +8,7 @@
 #include "io/dicom/derive/dicom_put.h"
 #include "io/dicom/privacy/dicom_deidentify.h"
 #include "io/dicom/scan/dicom_header.h"
-#include "tests/io/derived_source.h"
+#include "tests/io/dicom/derive/derived_source.h"
 #include "tests/support/real_data.h"
 #include "tests/support/scratch.h"
 

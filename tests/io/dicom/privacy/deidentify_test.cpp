@@ -9,7 +9,7 @@
 #include "deform/errors.h"
 #include "io/dicom/derive/dicom_file.h"
 #include "io/hash.h"
-#include "tests/io/derived_source.h"
+#include "tests/io/dicom/derive/derived_source.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"
 #include "tests/support/write_file.h"

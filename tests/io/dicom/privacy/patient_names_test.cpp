@@ -9,7 +9,7 @@
 #include "io/dicom/privacy/comparable_text.h"
 #include "io/dicom_bids.h"
 #include "io/dicom_series.h"
-#include "tests/io/derived_source.h"
+#include "tests/io/dicom/derive/derived_source.h"
 #include "tests/support/dicom_maker.h"
 #include "tests/support/scratch.h"
 

@@ -9,7 +9,7 @@
 #include <set>
 #include <sstream>
 
-#include "tests/io/derived_source.h"
+#include "tests/io/dicom/derive/derived_source.h"
 #include "tests/support/enhanced_maker.h"
 #include "tests/support/only_series.h"
 #include "tests/support/other_readers.h"

@@ -10,7 +10,7 @@
 #include <map>
 
 #include "deform/errors.h"
-#include "tests/io/derived_source.h"
+#include "tests/io/dicom/derive/derived_source.h"
 #include "tests/support/real_data.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"

@@ -6,7 +6,7 @@
 #include <functional>
 #include <set>
 
-#include "tests/io/derived_source.h"
+#include "tests/io/dicom/derive/derived_source.h"
 #include "tests/support/scratch.h"
 
 namespace tetwarp::test {

@@ -8,7 +8,7 @@
 
 #include "io/dicom/derive/dicom_file.h"
 #include "io/dicom/privacy/dicom_deidentify.h"
-#include "tests/io/derived_source.h"
+#include "tests/io/dicom/derive/derived_source.h"
 
 namespace tetwarp::test {
 namespace {

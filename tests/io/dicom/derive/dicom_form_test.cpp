@@ -10,7 +10,7 @@
 
 #include "deform/errors.h"
 #include "io/dicom/codecs/dicom_compress.h"
-#include "tests/io/derived_source.h"
+#include "tests/io/dicom/derive/derived_source.h"
 #include "tests/support/other_readers.h"
 #include "tests/support/real_data.h"
 #include "tests/support/says.h"

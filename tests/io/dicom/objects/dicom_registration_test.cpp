@@ -9,7 +9,7 @@
 #include "deform/errors.h"
 #include "io/field_file.h"
 #include "io/image_file.h"
-#include "tests/io/derived_source.h"
+#include "tests/io/dicom/derive/derived_source.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"
 
