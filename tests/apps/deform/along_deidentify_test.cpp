@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // What goes along with a de-identified series tells no more than the series does.
-#include "tests/apps/along_case.h"
+#include "tests/apps/deform/along_case.h"
 #include "tests/support/structure_maker.h"
 #include "tests/support/write_file.h"
 

@@ -9,7 +9,7 @@
 
 #include <cstring>
 
-#include "tests/apps/batch_case.h"
+#include "tests/apps/batch/batch_case.h"
 
 namespace {
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // `tetwarp batch --resume`: which cases are kept, and what is said of the others.
-#include "tests/apps/batch_case.h"
+#include "tests/apps/batch/batch_case.h"
 
 namespace {
 

@@ -9,7 +9,7 @@
 #include <glm/geometric.hpp>
 #include <stdexcept>
 
-#include "tests/apps/foreign_volumes.h"
+#include "tests/apps/deform/foreign_volumes.h"
 
 namespace tetwarp::test {
 namespace {

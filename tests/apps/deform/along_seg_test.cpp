@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tests/apps/along_case.h"
+#include "tests/apps/deform/along_case.h"
 #include "tests/support/real_data.h"
 #include "tests/support/says.h"
 

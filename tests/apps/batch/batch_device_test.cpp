@@ -6,7 +6,7 @@
 #include <cstdlib>
 
 #include "cuda/devices.h"
-#include "tests/apps/batch_case.h"
+#include "tests/apps/batch/batch_case.h"
 
 namespace {
 

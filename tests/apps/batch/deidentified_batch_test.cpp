@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cctype>
 
-#include "tests/apps/batch_case.h"
+#include "tests/apps/batch/batch_case.h"
 
 namespace {
 

@@ -9,7 +9,7 @@
 
 #include <thread>
 
-#include "tests/apps/batch_case.h"
+#include "tests/apps/batch/batch_case.h"
 
 namespace {
 

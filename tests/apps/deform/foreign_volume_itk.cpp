@@ -5,7 +5,7 @@
 #include <itkGDCMSeriesFileNames.h>
 #include <itkImageSeriesReader.h>
 
-#include "tests/apps/foreign_volumes.h"
+#include "tests/apps/deform/foreign_volumes.h"
 
 namespace tetwarp::test {
 

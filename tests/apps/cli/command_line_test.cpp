@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Words of the command line: numbers that are none, commands that there are not, sizes of memory.
-#include "tests/apps/batch_case.h"
+#include "tests/apps/batch/batch_case.h"
 
 namespace {
 

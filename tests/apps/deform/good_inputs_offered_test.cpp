@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Whether good_inputs.cpp lists all of the real data that can be deformed, and nothing else.
-#include "tests/apps/good_inputs.h"
+#include "tests/apps/deform/good_inputs.h"
 
 #include <gtest/gtest.h>
 

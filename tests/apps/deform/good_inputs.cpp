@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "tests/apps/good_inputs.h"
+#include "tests/apps/deform/good_inputs.h"
 
 namespace tetwarp::test {
 

@@ -3,7 +3,7 @@
 
 // Every real series and volume that can be deformed, through the program: what it writes as other programs read it, and
 // as was computed; and the identity as NIfTI beside what dcm2niix makes of the source.
-#include "tests/apps/good_inputs.h"
+#include "tests/apps/deform/good_inputs.h"
 
 #include <gtest/gtest.h>
 
@@ -14,7 +14,7 @@
 #include "deform/resampler.h"
 #include "io/dicom_series.h"
 #include "io/image_file.h"
-#include "tests/apps/foreign_volumes.h"
+#include "tests/apps/deform/foreign_volumes.h"
 #include "tests/support/dicom_edit.h"
 #include "tests/support/dicom_validators.h"
 #include "tests/support/only_series.h"

@@ -4,7 +4,7 @@
 // `--with IN=OUT.dcm`: what is refused, and what the objects say of themselves.
 #include <algorithm>
 
-#include "tests/apps/along_case.h"
+#include "tests/apps/deform/along_case.h"
 #include "tests/support/says.h"
 
 namespace {

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // `tetwarp deform --with DOSE=OUT.dcm`: doses that go along with a derived series.
-#include "tests/apps/along_case.h"
+#include "tests/apps/deform/along_case.h"
 
 #include <algorithm>
 #include <cmath>

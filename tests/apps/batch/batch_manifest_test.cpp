@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // `tetwarp batch`: what a manifest says, and what is wrong with one.
-#include "tests/apps/batch_case.h"
+#include "tests/apps/batch/batch_case.h"
 
 namespace {
 
