@@ -12,13 +12,13 @@
 #include "io/image_file.h"
 #include "tests/fuzz/input_file.h"
 #include "tests/itkbridge/itk_transforms.h"
-#include "tests/support/coded_slices.h"
-#include "tests/support/enhanced_maker.h"
+#include "tests/support/dicom/coded_slices.h"
+#include "tests/support/dicom/enhanced_maker.h"
+#include "tests/support/dicom/seg_maker.h"
+#include "tests/support/dicom/structure_maker.h"
 #include "tests/support/gmsh_file.h"
 #include "tests/support/image_samples.h"
 #include "tests/support/point_files.h"
-#include "tests/support/seg_maker.h"
-#include "tests/support/structure_maker.h"
 #include "tests/support/write_file.h"
 
 namespace {

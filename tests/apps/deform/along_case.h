@@ -11,10 +11,10 @@
 #include "io/dicom_dose.h"
 #include "io/dicom_segmentation.h"
 #include "io/image_file.h"
-#include "tests/support/dose_maker.h"
+#include "tests/support/dicom/dose_maker.h"
+#include "tests/support/dicom/seg_maker.h"
 #include "tests/support/program.h"
 #include "tests/support/scratch.h"
-#include "tests/support/seg_maker.h"
 
 /// A made-up CT series of 12 x 10 x 6 voxels, and what may go along with it.
 struct AlongCase {

@@ -3,7 +3,7 @@
 
 // What goes along with a de-identified series tells no more than the series does.
 #include "tests/apps/deform/along_case.h"
-#include "tests/support/structure_maker.h"
+#include "tests/support/dicom/structure_maker.h"
 #include "tests/support/write_file.h"
 
 namespace {

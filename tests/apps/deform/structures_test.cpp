@@ -12,12 +12,12 @@
 
 #include "io/dicom_structures.h"
 #include "io/image_file.h"
-#include "tests/support/dicom_maker.h"
+#include "tests/support/dicom/dicom_maker.h"
+#include "tests/support/dicom/structure_maker.h"
 #include "tests/support/program.h"
 #include "tests/support/real_data.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"
-#include "tests/support/structure_maker.h"
 
 namespace tetwarp::test {
 namespace {

@@ -7,9 +7,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "tests/support/dicom_edit.h"
-#include "tests/support/dicom_maker.h"
-#include "tests/support/enhanced_maker.h"
+#include "tests/support/dicom/dicom_edit.h"
+#include "tests/support/dicom/dicom_maker.h"
+#include "tests/support/dicom/enhanced_maker.h"
 #include "tests/support/program.h"
 #include "tests/support/real_data.h"
 #include "tests/support/says.h"

@@ -12,7 +12,7 @@
 
 #include "io/field_file.h"
 #include "io/image_file.h"
-#include "tests/support/dicom_maker.h"
+#include "tests/support/dicom/dicom_maker.h"
 #include "tests/support/foreign_field.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"

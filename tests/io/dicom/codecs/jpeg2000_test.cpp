@@ -9,7 +9,7 @@
 
 #include "deform/errors.h"
 #include "io/dicom/codecs/dicom_codecs.h"
-#include "tests/support/coded_slices.h"
+#include "tests/support/dicom/coded_slices.h"
 #include "tests/support/says.h"
 
 namespace tetwarp {

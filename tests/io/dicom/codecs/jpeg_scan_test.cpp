@@ -11,8 +11,8 @@
 
 #include <algorithm>
 
-#include "tests/support/coded_slices.h"
-#include "tests/support/jpeg_writer.h"
+#include "tests/support/dicom/coded_slices.h"
+#include "tests/support/dicom/jpeg_writer.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"
 

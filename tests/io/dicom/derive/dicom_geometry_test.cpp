@@ -9,7 +9,7 @@
 #include <glm/geometric.hpp>
 
 #include "io/dicom_series.h"
-#include "tests/support/dicom_maker.h"
+#include "tests/support/dicom/dicom_maker.h"
 #include "tests/support/other_readers.h"
 #include "tests/support/real_data.h"
 #include "tests/support/scratch.h"

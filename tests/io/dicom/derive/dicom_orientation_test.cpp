@@ -9,7 +9,7 @@
 #include <glm/matrix.hpp>
 
 #include "io/dicom_series.h"
-#include "tests/support/dicom_maker.h"
+#include "tests/support/dicom/dicom_maker.h"
 #include "tests/support/image_samples.h"
 #include "tests/support/scratch.h"
 

@@ -5,8 +5,8 @@
 #include <gtest/gtest.h>
 
 #include "io/dicom_series.h"
-#include "tests/support/dicom_maker.h"
-#include "tests/support/dicom_validators.h"
+#include "tests/support/dicom/dicom_maker.h"
+#include "tests/support/dicom/dicom_validators.h"
 #include "tests/support/other_readers.h"
 #include "tests/support/real_data.h"
 #include "tests/support/scratch.h"

@@ -13,7 +13,7 @@
 #include "io/dicom/derive/dicom_file.h"
 #include "io/hash.h"
 #include "tests/io/dicom/derive/derived_source.h"
-#include "tests/support/dicom_maker.h"
+#include "tests/support/dicom/dicom_maker.h"
 #include "tests/support/scratch.h"
 #include "tests/support/write_file.h"
 

@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/support/dose_maker.h"
-#include "tests/support/encapsulated.h"
+#include "tests/support/dicom/dose_maker.h"
+#include "tests/support/dicom/encapsulated.h"
 #include "tests/support/real_data.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"

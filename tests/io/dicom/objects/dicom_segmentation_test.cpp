@@ -5,10 +5,10 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/support/encapsulated.h"
+#include "tests/support/dicom/encapsulated.h"
+#include "tests/support/dicom/seg_maker.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"
-#include "tests/support/seg_maker.h"
 
 namespace tetwarp {
 namespace {

@@ -11,10 +11,10 @@
 
 #include "deform/errors.h"
 #include "tests/io/dicom/derive/derived_source.h"
+#include "tests/support/dicom/structure_maker.h"
 #include "tests/support/real_data.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"
-#include "tests/support/structure_maker.h"
 #include "tests/support/write_file.h"
 
 namespace tetwarp {

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "io/dicom_series.h"
-#include "tests/support/coded_slices.h"
+#include "tests/support/dicom/coded_slices.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"
 

@@ -10,7 +10,7 @@
 #include "io/dicom/scan/dicom_header.h"
 #include "io/dicom/scan/dicom_stream.h"
 #include "io/dicom_series.h"
-#include "tests/support/coded_slices.h"
+#include "tests/support/dicom/coded_slices.h"
 #include "tests/support/image_samples.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"

@@ -16,9 +16,9 @@
 #include "deform/errors.h"
 #include "io/dicom/scan/dicom_header.h"
 #include "io/dicom_series.h"
-#include "tests/support/coded_slices.h"
+#include "tests/support/dicom/coded_slices.h"
+#include "tests/support/dicom/jpeg_writer.h"
 #include "tests/support/image_samples.h"
-#include "tests/support/jpeg_writer.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"
 

@@ -11,7 +11,7 @@
 #include "deform/errors.h"
 #include "io/dicom/scan/dicom_header.h"
 #include "io/dicom_series.h"
-#include "tests/support/dicom_maker.h"
+#include "tests/support/dicom/dicom_maker.h"
 #include "tests/support/image_samples.h"
 #include "tests/support/real_data.h"
 #include "tests/support/says.h"

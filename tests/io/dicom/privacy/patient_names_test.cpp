@@ -10,7 +10,7 @@
 #include "io/dicom_bids.h"
 #include "io/dicom_series.h"
 #include "tests/io/dicom/derive/derived_source.h"
-#include "tests/support/dicom_maker.h"
+#include "tests/support/dicom/dicom_maker.h"
 #include "tests/support/scratch.h"
 
 namespace tetwarp::test {

@@ -7,9 +7,9 @@
 #include <gtest/gtest.h>
 
 #include "io/dicom_series.h"
-#include "tests/support/dicom_edit.h"
-#include "tests/support/dicom_maker.h"
-#include "tests/support/only_series.h"
+#include "tests/support/dicom/dicom_edit.h"
+#include "tests/support/dicom/dicom_maker.h"
+#include "tests/support/dicom/only_series.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"
 

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "io/dicom_series.h"
-#include "tests/support/dicom_maker.h"
+#include "tests/support/dicom/dicom_maker.h"
 #include "tests/support/real_data.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"

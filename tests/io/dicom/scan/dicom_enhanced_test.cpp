@@ -5,8 +5,8 @@
 #include <gtest/gtest.h>
 
 #include "io/dicom_series.h"
-#include "tests/support/enhanced_maker.h"
-#include "tests/support/only_series.h"
+#include "tests/support/dicom/enhanced_maker.h"
+#include "tests/support/dicom/only_series.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"
 

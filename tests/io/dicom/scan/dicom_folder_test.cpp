@@ -5,7 +5,7 @@
 #include <sys/stat.h>
 
 #include "io/dicom_series.h"
-#include "tests/support/dicom_maker.h"
+#include "tests/support/dicom/dicom_maker.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"
 #include "tests/support/write_file.h"

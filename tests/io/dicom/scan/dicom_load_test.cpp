@@ -17,7 +17,7 @@
 
 #include "io/dicom/scan/dicom_headers.h"
 #include "io/hash.h"
-#include "tests/support/dicom_maker.h"
+#include "tests/support/dicom/dicom_maker.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"
 

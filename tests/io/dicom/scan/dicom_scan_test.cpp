@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "io/dicom_series.h"
-#include "tests/support/dicom_maker.h"
-#include "tests/support/only_series.h"
+#include "tests/support/dicom/dicom_maker.h"
+#include "tests/support/dicom/only_series.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"
 

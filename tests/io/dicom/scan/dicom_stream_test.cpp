@@ -8,7 +8,7 @@
 #include <dcmtk/dcmdata/dcxfer.h>
 
 #include "io/dicom/scan/dicom_headers.h"
-#include "tests/support/dicom_maker.h"
+#include "tests/support/dicom/dicom_maker.h"
 #include "tests/support/image_samples.h"
 #include "tests/support/scratch.h"
 #include "tests/support/write_file.h"

@@ -7,8 +7,8 @@
 #include "io/dicom/scan/dicom_charset.h"
 #include "io/dicom_series.h"
 #include "io/shown_text.h"
-#include "tests/support/dicom_edit.h"
-#include "tests/support/dicom_maker.h"
+#include "tests/support/dicom/dicom_edit.h"
+#include "tests/support/dicom/dicom_maker.h"
 #include "tests/support/real_data.h"
 #include "tests/support/scratch.h"
 

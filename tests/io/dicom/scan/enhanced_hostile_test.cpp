@@ -11,8 +11,8 @@
 
 #include "deform/errors.h"
 #include "io/dicom_series.h"
-#include "tests/support/encapsulated.h"
-#include "tests/support/enhanced_maker.h"
+#include "tests/support/dicom/encapsulated.h"
+#include "tests/support/dicom/enhanced_maker.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"
 

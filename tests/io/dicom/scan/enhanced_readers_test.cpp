@@ -10,8 +10,8 @@
 #include <sstream>
 
 #include "tests/io/dicom/derive/derived_source.h"
-#include "tests/support/enhanced_maker.h"
-#include "tests/support/only_series.h"
+#include "tests/support/dicom/enhanced_maker.h"
+#include "tests/support/dicom/only_series.h"
 #include "tests/support/other_readers.h"
 #include "tests/support/real_data.h"
 #include "tests/support/scratch.h"

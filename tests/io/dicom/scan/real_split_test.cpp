@@ -7,7 +7,7 @@
 #include <algorithm>
 
 #include "io/dicom_series.h"
-#include "tests/support/dicom_edit.h"
+#include "tests/support/dicom/dicom_edit.h"
 #include "tests/support/real_data.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"

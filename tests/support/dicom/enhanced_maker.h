@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <memory>
 
-#include "tests/support/dicom_maker.h"
+#include "tests/support/dicom/dicom_maker.h"
 
 // Enhanced CT objects (PS3.3 A.38) made of classic slices, as a converter might make them.
 

@@ -7,9 +7,9 @@
 #include <dcmtk/dcmjpeg/djencode.h>
 #include <dcmtk/dcmjpls/djencode.h>
 
-#include "tests/support/encapsulated.h"
+#include "tests/support/dicom/encapsulated.h"
 #ifdef TETWARP_WITH_OPENJPEG
-#include "tests/support/jpeg2000_maker.h"
+#include "tests/support/dicom/jpeg2000_maker.h"
 #endif
 
 /// Numbers from 0 to 4095 that no predictor guesses.

@@ -7,7 +7,7 @@
 #include <dcmtk/dcmdata/dcpixseq.h>
 #include <dcmtk/dcmdata/dcpxitem.h>
 
-#include "tests/support/dicom_maker.h"
+#include "tests/support/dicom/dicom_maker.h"
 #include "tests/support/write_file.h"
 
 // DICOM files whose Pixel Data are written byte by byte: what no encoder of DCMTK makes.

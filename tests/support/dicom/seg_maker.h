@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/support/dicom_maker.h"
+#include "tests/support/dicom/dicom_maker.h"
 
 /// A small DICOM segmentation as an annotation program might write it: slice by slice, frames without a voxel left out.
 struct MadeSeg {
