@@ -6,7 +6,7 @@
 
 #include "itkbridge/displacement_image.h"
 #include "itkbridge/itkVertexFieldSource.h"
-#include "itkbridge/pipeline_run.h"
+#include "itkbridge/pipeline/pipeline_run.h"
 
 namespace itk {
 /** \class DisplacementFieldToVertexFieldFilter

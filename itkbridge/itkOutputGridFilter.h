@@ -8,7 +8,7 @@
 
 #include "itkbridge/enum_text.h"
 #include "itkbridge/image_view.h"
-#include "itkbridge/pipeline_resampler.h"
+#include "itkbridge/pipeline/pipeline_resampler.h"
 
 namespace itk {
 /** \class OutputGridFilter

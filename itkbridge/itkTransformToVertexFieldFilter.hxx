@@ -7,7 +7,7 @@
 #include "deform/fields/point_map.h"
 #include "itkbridge/image_geometry.h"
 #include "itkbridge/itkTransformToVertexFieldFilter.h"
-#include "itkbridge/pipeline_run.h"
+#include "itkbridge/pipeline/pipeline_run.h"
 
 namespace itk {
 

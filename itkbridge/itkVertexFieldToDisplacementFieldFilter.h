@@ -11,7 +11,7 @@
 
 #include "itkbridge/image_view.h"
 #include "itkbridge/itkVertexField.h"
-#include "itkbridge/pipeline_run.h"
+#include "itkbridge/pipeline/pipeline_run.h"
 
 namespace itk {
 /** \class VertexFieldToDisplacementFieldFilter

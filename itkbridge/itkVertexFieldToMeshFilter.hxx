@@ -8,7 +8,7 @@
 
 #include "deform/fields/lattice_mesh.h"
 #include "itkbridge/itkVertexFieldToMeshFilter.h"
-#include "itkbridge/pipeline_run.h"
+#include "itkbridge/pipeline/pipeline_run.h"
 
 namespace itk {
 

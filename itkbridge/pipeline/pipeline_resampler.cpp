@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "itkbridge/pipeline_resampler.h"
+#include "itkbridge/pipeline/pipeline_resampler.h"
 
 #include <atomic>
 #include <utility>

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "itkbridge/pipeline_run.h"
+#include "itkbridge/pipeline/pipeline_run.h"
 
 #include <itkMultiThreaderBase.h>
 

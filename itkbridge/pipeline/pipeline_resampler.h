@@ -9,7 +9,7 @@
 
 #include "cuda/backend.h"
 #include "deform/resampler.h"
-#include "itkbridge/pipeline_run.h"
+#include "itkbridge/pipeline/pipeline_run.h"
 
 namespace tetwarp {
 
