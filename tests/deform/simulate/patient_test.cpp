@@ -87,7 +87,8 @@ TEST(Patient, LabelOfACellIsTheMostFrequentAndOfSeveralTheSmallest) {
   Volume<std::uint8_t> elsewhere = labels;
   elsewhere.geometry.origin.x = 1;
   const ConstVolumeView moved = view(std::as_const(elsewhere));
-  EXPECT_TRUE(says(refusal([&] { examine(view(ct), &moved, 1, -400); }), {"labels", "grid", "as many at another place"}));
+  EXPECT_TRUE(
+      says(refusal([&] { examine(view(ct), &moved, 1, -400); }), {"labels", "grid", "as many at another place"}));
   const Volume<float> half{grid, std::vector<float>(12, 0.5f)};
   const ConstVolumeView halves = view(half);
   EXPECT_TRUE(says(refusal([&] { examine(view(ct), &halves, 1, -400); }), {"0.5", "whole"}));
