@@ -171,6 +171,23 @@ void sniff(OpenedFile& file, DicomFileHeader& header) {
   header.broken = !header.skip.empty() && (blank || !file.problem().empty());
 }
 
+/// DCMTK's decoders, registered until the process ends: DCMTK frees none of them by itself.
+class Decoders {
+ public:
+  Decoders() {
+    DcmRLEDecoderRegistration::registerCodecs();
+    DJDecoderRegistration::registerCodecs();
+    DJLSDecoderRegistration::registerCodecs();
+  }
+  ~Decoders() {
+    DJLSDecoderRegistration::cleanup();
+    DJDecoderRegistration::cleanup();
+    DcmRLEDecoderRegistration::cleanup();
+  }
+  Decoders(const Decoders&) = delete;
+  Decoders& operator=(const Decoders&) = delete;
+};
+
 }  // namespace
 
 void prepare_dcmtk() {
@@ -178,9 +195,7 @@ void prepare_dcmtk() {
   std::call_once(once, [] {
     OFLog::configure(OFLogger::OFF_LOG_LEVEL);
     dcmEnableUnknownVRConversion.set(OFTrue);  // standard attributes written as UN are read as what they are
-    DcmRLEDecoderRegistration::registerCodecs();
-    DJDecoderRegistration::registerCodecs();
-    DJLSDecoderRegistration::registerCodecs();
+    static const Decoders decoders;
   });
   if (!dcmDataDict.isDictionaryLoaded()) {
     throw Error(
