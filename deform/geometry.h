@@ -33,8 +33,8 @@ struct Geometry {
 
 /// Half-open box of voxels: a voxel is inside where begin <= voxel < end on every axis.
 struct Region {
-  /// Voxel indices (i, j, k).
-  glm::i64vec3 begin{0}, end{0};
+  glm::i64vec3 begin{0},  ///< first voxel (i, j, k)
+      end{0};             ///< one after the last voxel on each axis
 
   /// Whether both corners are equal.
   friend bool operator==(const Region&, const Region&) = default;
@@ -95,12 +95,12 @@ Geometry straightened(const Geometry& geometry);
 /// Three-letter anatomical code of the directions in which i, j, k grow: "LPS" for the identity direction.
 std::string orientation_code(const Geometry& geometry);
 
-/// Smallest and largest spacing of a grid, in mm. No scanner or microscope comes near either, so a number beyond them
-/// is a mistaken unit or a damaged file.
-constexpr double kSmallestSpacing = 1e-6, kLargestSpacing = 1e6;
+constexpr double kSmallestSpacing = 1e-6,  ///< smallest spacing of a grid, mm; less is a mistaken unit or damage
+    kLargestSpacing = 1e6;                 ///< largest spacing of a grid, mm
 
 /// Checks a grid.
-/// @param what  names the grid in the message
+/// @param geometry  the grid
+/// @param what      its name in the message
 /// @throws InputError unless sizes are positive, spacings lie between kSmallestSpacing and kLargestSpacing, all numbers
 ///         are finite, the direction has an inverse, and `slices` is empty or has one number a slice that rise from 0
 ///         to the last slice of the even stack

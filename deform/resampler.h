@@ -29,15 +29,15 @@ enum class Interpolation : std::uint8_t {
 /// Stored values from `low` to `high`, both included, are no data (DICOM Pixel Padding Value and Pixel Padding Range
 /// Limit, PS3.3 C.7.5.1.1.2).
 struct PaddingRange {
-  /// First and last value of the range.
-  double low = 0, high = 0;
+  double low = 0,  ///< first value of the range
+      high = 0;    ///< last value of the range
 };
 
 /// First and last slice (index k) of a source from which some voxel of one output slice was interpolated. The range is
 /// empty while `first` exceeds `last`.
 struct SliceRange {
-  /// Indices along k of the source.
-  std::int64_t first = INT64_MAX, last = INT64_MIN;
+  std::int64_t first = INT64_MAX,  ///< index k in the source
+      last = INT64_MIN;            ///< index k in the source
 };
 
 /// One volume to deform. All targets of a call share the owner and the undeformed place of each voxel.
@@ -161,6 +161,9 @@ class Resampler {
                           const Control& control = {}) = 0;
 
  protected:
+  /// For implementations.
+  /// @throws InputError for an output that is not valid or has uneven slices, fewer than two voxels, or more than 2^18,
+  ///         on an axis
   explicit Resampler(Geometry output);
 
  private:

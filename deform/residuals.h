@@ -66,8 +66,8 @@ struct RoundTrip {
   /// Most slices that are looked at, 12 bytes a voxel (50 MB at 512 x 512). Of an output with fewer slices all are.
   static constexpr std::int64_t kMostSlices = 16;
 
-  /// Slices and voxels of the output that were looked at.
-  std::uint64_t slices = 0, voxels = 0;
+  std::uint64_t slices = 0,         ///< slices of the output that were looked at
+      voxels = 0;                   ///< voxels in these slices
   double step_mm = 0;               ///< step to which vertices are rounded, mm: 2^-12 of the longest edge of a voxel
   Residuals forward_after_inverse;  ///< of the samples in these slices
   /// Of the vertices that come to lie in one of these slices, or between the two of a pair.

@@ -15,10 +15,11 @@ namespace tetwarp {
 /// A plane wave of shear: p' = p + A sin(2 pi d.along / L + phase) axis (the paper's Eq. 14). d is p minus the centre;
 /// axes 0, 1, 2 are L, P, S. The inverse is the wave with -A.
 struct Wave {
-  /// Amplitude A and wavelength L in mm, phase in radians.
-  double amplitude, wavelength, phase = 0;
-  /// Axis of the displacement, and axis along which the wave runs.
-  int axis = 0, along = 2;
+  double amplitude,      ///< A, mm
+      wavelength,        ///< L, mm
+      phase = 0;         ///< radians
+  int axis = 0,          ///< axis of the displacement
+      along = 2;         ///< axis along which the wave runs
   glm::dvec3 centre{0};  ///< LPS mm
   /// Displacement p' - p, LPS mm, of a point p, LPS mm.
   glm::dvec3 operator()(const glm::dvec3& point) const;
@@ -27,8 +28,8 @@ struct Wave {
 /// A rotation by angle * d.axis / half_length about an axis through the centre (the paper's Eq. 15), where d is p minus
 /// the centre. With a positive angle it turns about S from L towards P. The inverse is the twist with -angle.
 struct Twist {
-  /// Angle in radians at `half_length` mm from the centre.
-  double angle, half_length;
+  double angle,          ///< radians at the distance `half_length`
+      half_length;       ///< mm
   int axis = 2;          ///< axis of rotation: 0, 1, 2 are L, P, S
   glm::dvec3 centre{0};  ///< LPS mm
   /// Displacement p' - p, LPS mm, of a point p, LPS mm.
@@ -38,8 +39,8 @@ struct Twist {
 /// A local inflation around the centre c: p' = c + (1 + a (1 - r/R)^2) d for r = |d| < R, where d = p - c. Outside that
 /// ball nothing moves. The map is injective for -1 < a < 3.
 struct Bubble {
-  /// Radius R in mm and strength a.
-  double radius, strength;
+  double radius,         ///< R, mm
+      strength;          ///< a
   glm::dvec3 centre{0};  ///< c, LPS mm
   /// Displacement p' - p, LPS mm, of a point p, LPS mm.
   glm::dvec3 operator()(const glm::dvec3& point) const;

@@ -17,20 +17,20 @@ struct Camera {
   double elevation_deg = 0;  ///< degrees: 90 from above the head, -90 from below the feet
   double zoom = 1;           ///< magnification; at 1 the whole volume is in the picture
   bool every_angle = false;  ///< whether zoom 1 shows the whole volume at every `angle_deg`, not only at this one
-  /// Size of the picture in pixels.
-  int width = 512, height = 512;
+  int width = 512,           ///< columns of the picture, pixels
+      height = 512;          ///< rows of the picture, pixels
   std::optional<glm::dvec3> target = {};  ///< LPS mm of the middle of the picture; empty: the middle of the volume
 };
 
 /// The pixels of a picture in patient space, and the direction of its rays.
 struct ViewPlane {
-  glm::dvec3 middle{0};  ///< middle of the picture, LPS mm
-  /// Unit vectors, in LPS, along which pixels go to the right and downwards.
-  glm::dvec3 right{1, 0, 0}, down{0, 0, -1};
+  glm::dvec3 middle{0};         ///< middle of the picture, LPS mm
+  glm::dvec3 right{1, 0, 0},    ///< unit vector in LPS along which columns follow each other
+      down{0, 0, -1};           ///< unit vector in LPS along which rows follow each other
   glm::dvec3 forward{0, 1, 0};  ///< unit vector of the rays in LPS, away from the viewer
   double pixel_mm = 1;          ///< side of a pixel, mm
-  /// Size of the picture in pixels.
-  int width = 1, height = 1;
+  int width = 1,                ///< columns of the picture, pixels
+      height = 1;               ///< rows of the picture, pixels
 
   /// LPS mm of a place in the picture, given in pixels from its left and upper edge; (0.5, 0.5) is the middle of the
   /// first pixel.

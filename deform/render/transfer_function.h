@@ -26,9 +26,9 @@ struct TransferFunction {
   std::string name;                               ///< name that messages show
   Projection projection = Projection::composite;  ///< how the samples of a ray become a pixel
   std::vector<TransferPoint> points;              ///< at least two, with rising values
-  /// For Projection::composite: parts of the light, which comes from the viewer's upper left and falls on both sides of
-  /// surfaces (Phong 1975, Blinn 1977).
-  double ambient = 0.3, diffuse = 0.65, specular = 0.15;
+  double ambient = 0.3,  ///< for Projection::composite: part of the light that comes from everywhere
+      diffuse = 0.65,    ///< part from the viewer's upper left, on both sides of surfaces
+      specular = 0.15;   ///< part that surfaces mirror (Phong 1975, Blinn 1977)
   /// For Projection::composite: change of the value in a mm from which a place is lit as a surface.
   double gradient = 50;
   double white = 1;  ///< for Projection::sum: the integral that is shown white

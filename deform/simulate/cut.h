@@ -13,14 +13,14 @@ namespace tetwarp::simulate {
 
 /// A cut along a plane, through the whole lattice.
 struct PlaneCut {
-  /// A point of the plane, LPS mm, and a normal of any length, LPS.
-  glm::dvec3 point, normal;
+  glm::dvec3 point,  ///< a point of the plane, LPS mm
+      normal;        ///< LPS, of any length
 };
 /// A cut along a flat disc.
 struct DiscCut {
-  /// Centre of the disc, LPS mm, and a normal of any length, LPS.
-  glm::dvec3 centre, normal;
-  double radius_mm;  ///< radius, mm
+  glm::dvec3 centre,  ///< LPS mm
+      normal;         ///< LPS, of any length
+  double radius_mm;   ///< radius, mm
 };
 /// The cut of a blade that follows a line of points: the surface between that line and the line moved by `sweep`.
 struct SweptCut {

@@ -43,9 +43,9 @@ struct Tissue {
 /// What a ChainMail link allows: how far the displacement of its upper end may differ from that of its lower end, mm
 /// along the lattice's axes.
 struct LinkLimits {
-  /// Along the link's axis the difference lies from `shortest` (at most 0) to `longest` (at least 0); across it from
-  /// -shear to shear.
-  float shortest = 0, longest = 0, shear = 0;
+  float shortest = 0,  ///< least difference along the link's axis, at most 0
+      longest = 0,     ///< largest difference along the link's axis, at least 0
+      shear = 0;       ///< largest difference across the link, either way, at least 0
 };
 
 /// A piece of a cell that cuts divide.

@@ -13,8 +13,8 @@ namespace tetwarp::simulate {
 
 /// The box of a patient's body, with sides along L, P, S.
 struct BodyBox {
-  /// Opposite corners, LPS mm.
-  glm::dvec3 low{0}, high{0};
+  glm::dvec3 low{0},  ///< right, front and lower corner, LPS mm
+      high{0};        ///< left, back and upper corner, LPS mm
 };
 
 /// A volume as scenarios see it: cell by cell and vertex by vertex.
@@ -24,11 +24,12 @@ struct BodyBox {
 /// before it up to, but not including, B/2 after it, as far as there are any, and of at least one voxel. Values below
 /// -1024 and values that are not numbers are padding, and count as -1024.
 struct Patient {
-  Geometry lattice;  ///< grid of the undeformed vertices
-  /// Mean HU of each cell and vertex, i fastest.
-  std::vector<float> cell_hu, vertex_hu;
-  /// Most frequent label of each cell and vertex, the smallest of several; empty without a label volume.
-  std::vector<std::int64_t> cell_label, vertex_label;
+  Geometry lattice;            ///< grid of the undeformed vertices
+  std::vector<float> cell_hu,  ///< mean HU of each cell, i fastest
+      vertex_hu;               ///< mean HU of each vertex, i fastest
+  std::vector<std::int64_t>
+      cell_label,    ///< most frequent label of each cell, the smallest of several; empty without a label volume
+      vertex_label;  ///< the same of each vertex
   std::vector<std::uint8_t> body;  ///< for each cell: 1 if it belongs to the body, else 0
   std::optional<BodyBox> box;      ///< box of the body's cells; empty if no cell belongs to a body
 };

@@ -53,8 +53,8 @@ struct Sphere {
 };
 /// A box with sides along L, P, S.
 struct Box {
-  /// Opposite corners, in either order.
-  Place from, to;
+  Place from,  ///< a corner
+      to;      ///< the opposite corner; either may be the lower one
 };
 /// A plane, and the side to which its normal points.
 struct HalfSpace {
@@ -63,8 +63,8 @@ struct HalfSpace {
 };
 /// HU from `low` up to, but not including, `high`.
 struct HuRange {
-  /// Limits in HU.
-  double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
+  double low = -std::numeric_limits<double>::infinity(),  ///< in HU; included
+      high = std::numeric_limits<double>::infinity();     ///< in HU; not included
 
   /// Whether a value lies in the range.
   bool contains(double hu) const { return hu >= low && hu < high; }
