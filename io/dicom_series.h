@@ -140,9 +140,10 @@ struct DicomForm {
   /// Whether a deformed series, too, keeps the Frame of Reference UID of its source.
   bool keep_frame_of_reference = false;
   std::optional<int> series_number = {};  ///< Series Number (0020,0011); empty: that of the source plus 1000
-  std::optional<std::string> series_description = {};  ///< UTF-8; instead of "deformed: " and the source's
-  std::optional<Deidentification> deidentification = {};
+  std::optional<std::string> series_description = {};     ///< UTF-8; instead of "deformed: " and the source's
+  std::optional<Deidentification> deidentification = {};  ///< how the files are de-identified; empty: not at all
 
+  /// Whether all choices are equal.
   friend bool operator==(const DicomForm&, const DicomForm&) = default;
 };
 
