@@ -41,7 +41,7 @@ class ContourStack {
   /// Signed distance from the surface, mm: positive inside; near the surface exact or smaller in size; -infinity where
   /// there is nothing.
   double signed_distance(const glm::dvec3& point, Between between) const;
-  /// Whether that is inside, for either kind: much faster than the distance.
+  /// Whether a place is inside, for each kind of Between. `place` is much faster than `signed_distance`.
   struct Place {
     bool interpolated = false, nearest = false;
   };
