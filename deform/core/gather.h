@@ -177,16 +177,17 @@ TETWARP_HD inline glm::vec3 Trial::next_place() const {
                    multiply_add(slope.z, slope_factor, weights.z)});
 }
 
-/// Asks one tetrahedron for one voxel, in float.
+/// Tests one tetrahedron against one voxel, in float.
 ///
-/// The numerators of the weights at p + d and what they leave of the determinant are six times the volumes that decide
-/// ownership; here they are divided by the determinant. A quotient is off by 3 units of itself, and what all leave of 1
-/// by 7 units where all are positive; so it owns where all four are larger than the volumes' error, divided likewise,
-/// and 8 units. The determinant must have the sign of the undeformed one: an inverted tetrahedron is never accepted.
+/// The numerators of the weights at p + d, and the determinant minus their sum, are six times the volumes that decide
+/// ownership; here they are divided by the determinant. A quotient has an error of 3 units of itself, and 1 minus their
+/// sum one of 7 units where all are positive. So the tetrahedron owns the voxel where all four exceed the error of the
+/// volumes, divided by the determinant, plus 8 units. The determinant must have the sign of the undeformed one: an
+/// inverted tetrahedron is never accepted.
 ///
-/// From p + d to p a weight changes by at most 15/16 step times the sum norms of two columns over the determinant;
-/// where that is clearly below the slack, and the weights at p + d are positive, no weight at p can leave it. With full
-/// effort the weights themselves are looked at.
+/// From p + d to p a weight changes by at most 15/16 step times the sum norms of two columns over the determinant.
+/// Where that is clearly below the slack, and the weights at p + d are positive, no weight at p can leave it. With
+/// Effort::full the weights themselves are looked at.
 template <Effort kEffort>
 TETWARP_HD Trial try_tetrahedron(const FloatTetrahedron& t, const LocalTetrahedron& local, const GatherPoint& point) {
   using detail::multiply_add;

@@ -29,7 +29,7 @@ struct Patient {
       vertex_hu;               ///< mean HU of each vertex, i fastest
   std::vector<std::int64_t>
       cell_label,    ///< most frequent label of each cell, the smallest of several; empty without a label volume
-      vertex_label;  ///< the same of each vertex
+      vertex_label;  ///< most frequent label of each vertex
   std::vector<std::uint8_t> body;  ///< for each cell: 1 if it belongs to the body, else 0
   std::optional<BodyBox> box;      ///< box of the body's cells; empty if no cell belongs to a body
 };
