@@ -38,7 +38,7 @@ class Sha256 {
   Sha256& add_blocks(std::span<const std::byte> bytes, int threads = 0);
   /// The hash of everything added so far; more may be added later.
   Digest digest() const;
-  /// The same as 64 lower-case hexadecimal digits.
+  /// The hash of everything added so far as 64 lower-case hexadecimal digits.
   std::string hex() const;
 
  private:
