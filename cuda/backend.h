@@ -11,29 +11,47 @@
 
 namespace tetwarp {
 
-enum class Direction { forward, pull };
-
-struct Backend {
-  std::string name;  ///< the one that runs: never "auto"
-  std::unique_ptr<Resampler> resampler;
+/// Which way the fields of a resampler map.
+enum class Direction {
+  forward,  ///< undeformed to deformed points (VertexField)
+  pull      ///< output to input points (PullField)
 };
 
-/// Whether a wish (auto, cpu, cuda) means CUDA on this machine.
+/// A resampler, and where it runs.
+struct Backend {
+  std::string name;                      ///< "cpu" or "cuda", never "auto"
+  std::unique_ptr<Resampler> resampler;  ///< the resampler
+};
+
+/// Whether a choice of backend means CUDA on this machine: "cuda" always, "auto" where there is a device, any other
+/// word never.
 bool means_cuda(const std::string& wanted);
 
-/// @param wanted  auto (CUDA where a device works, else the CPU), cpu or cuda
-/// @throws NotCompiled for a backend that this build does not have, DeviceError for one that does not work here
+/// Makes a resampler on a chosen backend.
+/// @param wanted     "auto" (CUDA where a device works, else the CPU), "cpu" or "cuda"
+/// @param direction  of the fields that it will take
+/// @param output     output grid
+/// @param device     number of the CUDA device
+/// @param limits     threads and device memory
+/// @throws NotCompiled for a backend that this build does not contain
+/// @throws DeviceError for a backend that does not work on this machine
 Backend make_backend(const std::string& wanted, Direction direction, const Geometry& output, int device,
                      const Limits& limits);
 
+/// A renderer, and where it runs.
 struct NamedRenderer {
-  std::string name;  ///< of the backend that runs: never "auto"
-  std::unique_ptr<Renderer> renderer;
+  std::string name;                    ///< "cpu" or "cuda", never "auto"
+  std::unique_ptr<Renderer> renderer;  ///< the renderer
 };
-/// @throws as `make_backend`
+/// Makes a renderer on a chosen backend.
+/// @param wanted  "auto" (CUDA where a device works, else the CPU), "cpu" or "cuda"
+/// @param device  number of the CUDA device
+/// @param limits  threads and device memory
+/// @throws NotCompiled for a backend that this build does not contain
+/// @throws DeviceError for a backend that does not work on this machine
 NamedRenderer make_renderer(const std::string& wanted, int device, const Limits& limits);
 
-/// One line a backend: its name, and whether it can be used on this machine.
+/// For each backend one line: its name, and whether this machine can use it.
 std::vector<std::string> describe_backends();
 
 }  // namespace tetwarp

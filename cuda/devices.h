@@ -8,26 +8,33 @@
 
 namespace tetwarp {
 
-/// Devices that this process can use; 0 without a driver, and in a build without CUDA.
+/// Number of CUDA devices that this process can use; 0 without a driver, and in a build without CUDA.
 int cuda_device_count();
-/// Lets the driver do what the first use of a device costs, a fraction of a second; nothing where there is none.
+/// Makes the driver do now what the first use of a device costs, a fraction of a second. Without such a device nothing
+/// happens.
 void wake_cuda_device(int device);
-/// Name and memory of a device, "NVIDIA H200, 150 GB". @throws DeviceError, NotCompiled
+/// Name and memory of a device: "NVIDIA H200, 150 GB".
+/// @throws DeviceError without such a device
+/// @throws NotCompiled in a build without CUDA
 std::string describe_cuda_device(int device);
-/// A stream of a device, for `Control::stream`: what is queued on it waits for no other work there.
+/// A stream of a CUDA device, for `Control::stream`. Work queued on it waits for no other work on the device.
 class DeviceStream {
  public:
-  /// @throws DeviceError, NotCompiled
+  /// Makes a stream of the device with this number.
+  /// @throws DeviceError without such a device
+  /// @throws NotCompiled in a build without CUDA
   explicit DeviceStream(int device);
+  /// Destroys the stream.
   ~DeviceStream();
   DeviceStream(const DeviceStream&) = delete;
   DeviceStream& operator=(const DeviceStream&) = delete;
+  /// The stream, a cudaStream_t.
   void* get() const { return stream_; }
 
  private:
   void* stream_ = nullptr;
 };
-/// Whether CUDA is in this build.
+/// Whether this build contains CUDA.
 bool has_cuda();
 
 }  // namespace tetwarp

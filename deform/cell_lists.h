@@ -9,7 +9,8 @@
 
 namespace tetwarp {
 
-/// For each of many cells the numbers of what may reach it, one list after the other.
+/// For each of many cells the numbers of the items (such as tetrahedra) that may reach it. The lists lie one after
+/// another in one array.
 class CellLists {
  public:
   /// @param for_each_pair  called twice: `for_each_pair(visit)` calls `visit(cell, number)` in the same order each

@@ -8,40 +8,42 @@
 
 namespace tetwarp {
 
-/// Root of everything that Tetwarp throws. The text is one line: WHAT, WHERE; WHAT TO DO, with expected and found
-/// values.
+/// Root of everything that Tetwarp throws. The text is one line, "WHAT, WHERE; WHAT TO DO", and states the values that
+/// were expected and found.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// The input (a file, a series, a field, a shape) cannot be used as asked. Nothing was changed.
+/// An input (a file, a series, a field, the shape of an array) cannot be used. Nothing was changed.
 class InputError : public Error {
  public:
   using Error::Error;
 };
 
-/// The accelerator failed: no device, out of memory, a failed call. Names the call, file and line.
+/// A CUDA device failed: there is none, its memory is full, or a call returned an error. The text names the call, the
+/// file and the line.
 class DeviceError : public Error {
  public:
   using Error::Error;
 };
 
-/// The accelerator has not the memory that is needed: in smaller pieces, or on the processor, it may go.
+/// A CUDA device has too little free memory for the work. Smaller regions, or the CPU, may still do it.
 class DeviceMemoryError : public DeviceError {
  public:
   using DeviceError::DeviceError;
 };
 
-/// The part that was asked for is not in this build.
+/// This build does not contain the part of Tetwarp that was called, such as CUDA, ITK or DCMTK.
 class NotCompiled : public Error {
  public:
   using Error::Error;
 };
 
-/// `Control::stop` was requested; outputs hold no usable result.
+/// A stop was requested through `Control::stop`. The outputs hold no usable result.
 class Cancelled : public Error {
  public:
+  /// The text is always "cancelled".
   Cancelled() : Error("cancelled") {}
 };
 

@@ -20,7 +20,8 @@ namespace tetwarp {
 /// @throws InputError for a lattice that is empty, too far, too fine, or does not reach over the output
 /// (Outside::refuse)
 LatticeFrame make_lattice_frame(const Geometry& output, const FieldView& field);
-/// As above, of a lattice whose displacements are held elsewhere.
+/// Checks a lattice whose displacements lie elsewhere, as the other overload does.
+/// @throws InputError as that
 LatticeFrame make_lattice_frame(const Geometry& output, const Geometry& lattice, Outside outside);
 
 /// The lattice of a frame as a gather reads it, without its vertices; cells are 0 where it is not along the grid's
@@ -31,7 +32,8 @@ LatticeFrame make_lattice_frame(const Geometry& output, const Geometry& lattice,
 /// (`StepLattice::vertex`).
 StepLattice make_step_lattice(const LatticeFrame& frame, const Geometry& output);
 
-/// The same for a pull field.
+/// Checks everything about a pull field but its displacements.
+/// @throws InputError for a grid that is empty, too far away, or does not reach over the output (Outside::refuse)
 PullFrame make_pull_frame(const Geometry& output, const PullFieldView& field);
 
 /// The part of a source that a pull field's voxels of a region may be sampled from. The frame's samples are on the

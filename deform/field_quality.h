@@ -11,30 +11,35 @@
 
 namespace tetwarp {
 
-/// How a forward field stretches and folds what it moves: all its tetrahedra, in double, in mm, from the displacements
-/// as they are given (a resampler snaps them to 2^-12 voxel).
+/// How a forward field stretches and folds what it moves.
+/// All its tetrahedra are measured in double and in mm, from the displacements as given. (A resampler rounds vertices
+/// to 2^-12 voxel first.)
 struct FieldQuality {
-  /// Between these, and below the first and from the last on, Jacobian determinants are counted.
+  /// Limits of the bins in which Jacobian determinants are counted: the first bin lies below kEdges[0], bin n from
+  /// kEdges[n - 1] up to but not including kEdges[n], the last from the last limit upwards.
   static constexpr std::array<double, 7> kEdges{0, 0.25, 0.5, 0.8, 1.25, 2, 4};
 
-  /// Undeformed volume in each bin: sixths of a lattice's cells, of which a centre tetrahedron has two and the others
-  /// one; of a mesh, parts that are rounded to 2^-40 of all.
+  /// Undeformed volume in each bin. For a lattice the unit is a sixth of a cell: a centre tetrahedron has two, each
+  /// other tetrahedron has one. For a mesh the unit is 2^-40 of the whole volume.
   std::array<std::uint64_t, kEdges.size() + 1> parts{};
-  double largest_stretch = 0;  ///< largest singular value of the forward gradient: a length in any direction, over the
-                               ///< same at rest
+  /// Largest singular value of the gradient of the forward map: the largest ratio of a deformed to an undeformed
+  /// length, over all tetrahedra and directions.
+  double largest_stretch = 0;
 
-  /// Share of the undeformed volume in each bin of determinants.
+  /// Share of the undeformed volume in each bin; all shares sum to 1.
   std::array<double, kEdges.size() + 1> shares() const;
 };
 
-/// One pass over the field, in parallel; the same result for any number of threads.
-/// Tetrahedra of a mesh without undeformed volume are left out.
-/// @throws InputError for a field that has no cell, Cancelled
+/// Measures a field in one parallel pass. The result is the same for any number of threads. Tetrahedra of a mesh whose
+/// undeformed volume is zero are left out.
+/// @throws InputError for a field that has no cell
+/// @throws Cancelled
 FieldQuality measure_quality(const VertexField& field, const Limits& limits = {}, const Control& control = {});
 
-/// One sentence for a person: whether the map that a call reported on can be trusted, and what stands against it:
-/// folds; or an inverse that leads further beside a voxel than (1 + largest stretch) 2^-12 of the longest edge of a
-/// voxel, which is what rounding places before and after takes.
+/// One sentence for a person that says whether the map can be trusted, and what stands against it.
+/// Two things do: folds, and an inverse whose places, taken forward again, miss their voxel by more than (1 + largest
+/// stretch) 2^-12 of the longest edge of a voxel. That much is what rounding of places before and after the deformation
+/// explains.
 std::string verdict(const Report& report, const FieldQuality& quality, const RoundTrip& trip);
 
 }  // namespace tetwarp

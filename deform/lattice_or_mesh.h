@@ -10,8 +10,8 @@
 
 namespace tetwarp {
 
-/// What a backend's factory gives: takes lattices and meshes, and has a resampler for each kind. Of these it keeps one
-/// at a time, so that their buffers do not add up. A lattice with replaced cells is taken as one mesh.
+/// A resampler of all forward fields: it has one resampler for lattices and one for meshes. It keeps one of them at a
+/// time, so that their buffers do not add up. A lattice with replaced cells is taken as one mesh.
 class LatticeOrMesh final : public Resampler {
  public:
   using Make = std::function<std::unique_ptr<Resampler>()>;

@@ -11,7 +11,8 @@
 
 namespace tetwarp {
 
-/// Finds the tetrahedron of an undeformed mesh that holds a point: they are listed by the cells of a grid over it.
+/// Finds the tetrahedron of an undeformed mesh that holds a point. The tetrahedra are listed by the cells of a grid
+/// over the mesh.
 class MeshLocator {
  public:
   /// @param mesh  must stay as it is
@@ -22,7 +23,8 @@ class MeshLocator {
     std::uint32_t tetrahedron;
     glm::dvec3 weights;
   };
-  /// The lowest that holds the point; where none does, the nearest that is no farther than one 2^-12 voxel.
+  /// The tetrahedron with the lowest number that holds the point; if there is none, the nearest that is at most 2^-12
+  /// voxel away.
   /// @param steps  output index in 2^-12 voxel, not rounded
   std::optional<Found> find(const glm::dvec3& steps) const;
 

@@ -15,144 +15,196 @@
 #include "deform/vertex_field.h"
 #include "deform/volume.h"
 
+/// Tetwarp: deforms medical volumes by fields of displacements.
 namespace tetwarp {
 
-/// What is made of the voxels around a place (docs/algorithm.md). `vote` is for label maps: the linear weights are
-/// summed for each label, the largest sum wins, and of equal sums the one of the smaller label. No label is made up.
-enum class Interpolation : std::uint8_t { nearest, linear, cubic, vote };
+/// How a value is made from the voxels around a place between them (docs/algorithm.md).
+enum class Interpolation : std::uint8_t {
+  nearest,  ///< the voxel at floor(x + 0.5)
+  linear,   ///< trilinear: along x, then y, then z
+  cubic,    ///< Catmull-Rom, indices clamped to the grid
+  vote      ///< for label maps: the label whose linear weights sum to most; the smaller label of equal sums
+};
 
-/// Stored values from `low` to `high` are no data (DICOM Pixel Padding Value and Range Limit, PS3.3 C.7.5.1.1.2).
+/// Stored values from `low` to `high`, both included, are no data (DICOM Pixel Padding Value and Pixel Padding Range
+/// Limit, PS3.3 C.7.5.1.1.2).
 struct PaddingRange {
-  double low = 0, high = 0;
+  double low = 0,  ///< first value of the range
+      high = 0;    ///< last value of the range
 };
 
-/// First and last slice (k) of the source that some voxel of an output slice was interpolated from; empty while first >
-/// last.
+/// First and last slice (index k) of a source from which some voxel of one output slice was interpolated. The range is
+/// empty while `first` exceeds `last`.
 struct SliceRange {
-  std::int64_t first = INT64_MAX, last = INT64_MIN;
+  std::int64_t first = INT64_MAX,  ///< index k in the source
+      last = INT64_MIN;            ///< index k in the source
 };
 
-/// One volume through the field. Any number of them share owner and undeformed coordinate.
+/// One volume to deform. All targets of a call share the owner and the undeformed place of each voxel.
 ///
-/// A voxel may have several values (`components` of both views): each is interpolated alone, as if it were a volume of
-/// its own. Vectors are not turned.
+/// A voxel may have several values (`components` of both views). Each is interpolated as if it were a volume of its
+/// own; vectors are not rotated.
 struct Target {
-  ConstVolumeView source;  ///< must buffer `Resampler::source_region`
-  VolumeView output;       ///< on the resampler's geometry, of the source's type and components; must buffer the region
-  Interpolation interpolation = Interpolation::linear;
-  double background = 0;  ///< of every component, where nothing maps; rounded and saturated to the voxel type
-  std::optional<PaddingRange> padding = {};   ///< never mixed into tissue: see core/sample.h; for one component only
-  std::span<SliceRange> sampled_slices = {};  ///< one per slice of the output geometry, or none: grown by each call
+  ConstVolumeView source;  ///< must buffer at least `Resampler::source_region`
+  /// Lies on the output grid of the resampler, has the type and components of the source, and must buffer the region
+  /// that is resampled.
+  VolumeView output;
+  Interpolation interpolation = Interpolation::linear;  ///< how values are made between voxels of the source
+  /// Value of every component where nothing maps; rounded and saturated to the voxel type.
+  double background = 0;
+  /// Values that are no data. A sample that touches one takes the value of its nearest voxel, so that padding is never
+  /// mixed into tissue. For volumes of one component.
+  std::optional<PaddingRange> padding = {};
+  /// One range for each slice of the output grid, which every call widens; or empty.
+  std::span<SliceRange> sampled_slices = {};
 };
 
-/// Further results on the output geometry. A view without voxels is not wanted.
+/// Further results on the output grid. A view without voxels is not filled.
 struct Maps {
-  VolumeView coverage =
-      {};  ///< u8: 1 where the voxel got a value through the field (from the first target's source), else 0
-  VolumeView inverse_mm = {};  ///< f32, 3 components: undeformed minus deformed point, LPS mm; NaN where nothing maps
-  VolumeView jacobian =
-      {};  ///< f32: determinant of the owner's forward map, negative where inverted; NaN where nothing maps
-  VolumeView owners = {};  ///< u16: tetrahedra that own the voxel; more than 1 is a fold; saturates
+  /// Type u8: 1 where the voxel got a value from the first target's source through the field, else 0. Without targets:
+  /// 1 where the field maps something there.
+  VolumeView coverage = {};
+  /// Type f32, 3 components, LPS mm: undeformed minus deformed point; NaN where nothing maps.
+  VolumeView inverse_mm = {};
+  /// Type f32: determinant of the owner's forward map, negative where it is turned inside out; NaN where nothing maps.
+  VolumeView jacobian = {};
+  /// Type u16: number of tetrahedra that own the voxel, saturated. More than 1 is a fold.
+  VolumeView owners = {};
 };
 
-/// How a backend found the owners of the voxels asked for. The result does not depend on it; pull fields have none.
+/// By which way a backend found the owners of the voxels of the region. The way does not change the result. All counts
+/// are 0 for pull fields.
 struct Paths {
-  std::uint64_t gathered = 0;  ///< predicted and proved in float, rasterised tile by tile, or known to have no owner
-  std::uint64_t walked = 0;    ///< no prediction held: sought with exact integers
-  std::uint64_t claimed = 0;   ///< by every tetrahedron that may own them
+  /// Voxels whose owner was predicted and proved in float, found by rasterising tiles, or known not to exist.
+  std::uint64_t gathered = 0;
+  /// Voxels for which no prediction was proved, so that the owner was sought with exact integers.
+  std::uint64_t walked = 0;
+  std::uint64_t claimed = 0;  ///< voxels that were tested against every tetrahedron which may own them
 };
 
-/// What happened. Voxel counts are of the region asked for and the first target; the rest describes the whole field.
+/// What happened. Counts of voxels are of the resampled region and the first target; all else describes the whole
+/// field.
 struct Report {
   std::uint64_t covered = 0;    ///< voxels that got a value through the field
   std::uint64_t uncovered = 0;  ///< voxels that got the background
   std::uint64_t clamped = 0;    ///< voxels of which a value did not fit the voxel type and was saturated
-  std::uint64_t padded = 0;     ///< voxels with padding among the samples that count: value of the nearest sample
-  std::uint64_t conflicts =
-      0;  ///< Outside::rest only: voxels outside the undeformed lattice that a tetrahedron moved into
-  std::uint64_t inverted = 0;    ///< tetrahedra of the field turned inside out
-  std::uint64_t degenerate = 0;  ///< tetrahedra of the field without volume: they own nothing
-  std::optional<std::uint64_t> multiply_owned =
-      {};  ///< voxels with more than one owner, where Maps::owners was asked for
-  double jacobian_min =
-      std::numeric_limits<double>::infinity();  ///< over all tetrahedra of the field, as Maps::jacobian has it
+  /// Voxels that took the value of the nearest source voxel, because padding was among those with weight.
+  std::uint64_t padded = 0;
+  /// With Outside::rest: voxels outside the undeformed lattice or mesh onto which a tetrahedron was moved. 0 otherwise.
+  std::uint64_t conflicts = 0;
+  std::uint64_t inverted = 0;    ///< tetrahedra of the field that are turned inside out
+  std::uint64_t degenerate = 0;  ///< tetrahedra of the field without volume; they own nothing
+  /// Voxels with more than one owner; empty unless `Maps::owners` was filled.
+  std::optional<std::uint64_t> multiply_owned = {};
+  /// Smallest Jacobian determinant of the tetrahedra of the field, as `Maps::jacobian` has it; infinity if it was not
+  /// computed.
+  double jacobian_min = std::numeric_limits<double>::infinity();
+  /// Largest Jacobian determinant of the tetrahedra of the field; minus infinity if it was not computed.
   double jacobian_max = -std::numeric_limits<double>::infinity();
-  Paths paths;  ///< the one part that backends, limits and splits change
+  Paths paths;  ///< the only part that depends on the backend, the limits and the split into regions
 
-  /// Regions of one field add up to the same report, whatever the split.
+  /// Adds the report of another region of the same field. The sum is the same for every split into regions.
   Report& operator+=(const Report& other);
 };
 
-/// Progress and cancellation. Never changes a bit of the result.
+/// Progress and cancellation of one call.
 struct Control {
-  std::function<void(double)> progress = {};  ///< 0 to 1, monotone, one call at a time, from any thread
-  std::stop_token stop = {};                  ///< asked between tiles: the call throws Cancelled
-  /// For resample: told of each part of the region that is done, so that it can be used while the rest is made. Parts
-  /// are whole slices of the region, none twice, together all of it; what is in host memory has its last value then,
-  /// and so have the `sampled_slices`. Called from any thread, perhaps several at a time; what it throws ends the call.
+  /// Gets the share that is done, 0 to 1, rising; one call at a time, from any thread.
+  std::function<void(double)> progress = {};
+  std::stop_token stop = {};  ///< looked at between tiles; when it is set the call throws Cancelled
+  /// For `Resampler::resample`: called for each part of the region that is done, so that it can be used while the rest
+  /// is made. Parts are whole slices, none twice, together the whole region. Outputs in host memory, and
+  /// `Target::sampled_slices`, have their last values there. Calls come from any thread, perhaps several at a time;
+  /// what one throws ends the call.
   std::function<void(const Region&)> finished = {};
-  /// A cudaStream_t (deform/ knows no CUDA): the work is queued there, after what is queued already, and the call
-  /// returns when it is done. Null: the default stream. Ignored by the CPU.
+  /// A cudaStream_t, or null for the default stream. Work is queued there after what is queued already, and the call
+  /// returns when it is done. The CPU ignores it.
   void* stream = nullptr;
-  /// For set_field: whether reports state jacobian_min and jacobian_max. Inverted tetrahedra are always counted.
+  /// For `Resampler::set_field`: whether reports state `jacobian_min` and `jacobian_max`. Inverted tetrahedra are
+  /// always counted.
   bool jacobian_range = true;
 };
 
-/// Sends volumes through a field onto one output geometry; takes field after field.
+/// Sends volumes through a field onto one output grid; takes one field after another.
 ///
-/// A CUDA resampler takes fields, sources, outputs and maps in host or device memory, any mixture; device memory must
-/// be of its own device, and is used where it is. The CPU refuses device memory. One object is for one thread at a
-/// time.
+/// A CUDA resampler takes fields, sources, outputs and maps in host or device memory, in any mixture. Device memory
+/// must belong to its own device, and is used in place. The CPU refuses device memory. One object serves one thread at
+/// a time.
 ///
-/// The result is a function of source, field and output alone (docs/algorithm.md): the same bits for any number of
-/// threads, any split into regions and any backend.
+/// The result depends on source, field and output grid alone (docs/algorithm.md): it has the same bits for any number
+/// of threads, any split into regions and any backend.
 class Resampler {
  public:
+  /// Frees what the resampler holds; fields and volumes are not owned.
   virtual ~Resampler() = default;
+  /// The output grid.
   const Geometry& output() const { return output_; }
 
-  /// Checks the field and takes its bounds. The view is kept: its vertices must stay as they are until the next call.
-  /// @throws InputError for a field that is not finite (a pull field may have NaN: no source), too far away, too fine,
-  ///         or that does not reach over the output
-  ///         (Outside::refuse); or of the other direction than this resampler's
+  /// Checks a forward field and makes it ready. The view is kept: its vertices must not change until the next call.
+  /// @throws InputError for a field that is not finite, lies too far away, is too fine, or does not reach over the
+  ///         output with Outside::refuse; and always if this resampler is for pull fields
   virtual void set_field(const FieldView& field, const Control& control = {});
+  /// Checks a pull field and makes it ready. The view is kept: its samples must not change until the next call. A NaN
+  /// among them says that there is no source.
+  /// @throws InputError for a field that is infinite somewhere, lies too far away, or does not reach over the output
+  ///         with Outside::refuse; and always if this resampler is for forward fields
   virtual void set_field(const PullFieldView& field, const Control& control = {});
 
-  /// The part of a source grid that `resample(output)` may read: what a streaming reader must hold.
+  /// The voxels of a source grid that `resample` may read for the output region `output`. A reader that streams must
+  /// hold them.
   virtual Region source_region(const Geometry& source, Region output) const = 0;
 
-  /// Writes `region` of every target and map. @throws InputError for views that do not fit; Cancelled
+  /// Computes `region` of every target and map.
+  /// @throws InputError for views that do not fit
+  /// @throws Cancelled
   virtual Report resample(Region region, std::span<const Target> targets, const Maps& maps = {},
                           const Control& control = {}) = 0;
 
  protected:
+  /// For implementations.
+  /// @throws InputError for an output that is not valid or has uneven slices, fewer than two voxels, or more than 2^18,
+  ///         on an axis
   explicit Resampler(Geometry output);
 
  private:
   Geometry output_;
 };
 
+/// How much of the machine may be used.
 struct Limits {
-  int threads = 0;  ///< 0: all that this process may use
-  /// Bytes on the device for fields, sources and results that are on the host; 0: what is free there, less a reserve.
-  /// What does not fit is streamed in slabs. Working space comes on top: 10 % or 128 MB, whichever is more. Views of
-  /// device memory do not count. The CPU keeps nothing there.
+  int threads = 0;  ///< number of CPU threads; 0: all that this process may use
+  /// Bytes of device memory for copies of fields, sources and results that lie in host memory; 0: what is free there,
+  /// less a reserve. What does not fit is streamed in slabs. Working space of 10 % or 128 MB, whichever is more, comes
+  /// on top. Views of device memory do not count, and the CPU ignores it.
   std::uint64_t memory = 0;
 };
 
-/// Forward fields on the CPU. @throws InputError for an output with fewer than two voxels or more than 2^18 on an axis
+/// A resampler of forward fields on the CPU.
+/// @throws InputError for an output with fewer than two voxels, or more than 2^18, on an axis
 std::unique_ptr<Resampler> make_cpu_resampler(Geometry output, Limits limits = {});
-/// Pull fields on the CPU: the same Resampler, fed with PullFieldView.
+/// A resampler of pull fields on the CPU.
+/// @throws InputError for an output with fewer than two voxels, or more than 2^18, on an axis
 std::unique_ptr<Resampler> make_cpu_pull_resampler(Geometry output, Limits limits = {});
 
-/// The same on a CUDA device: the same bits. @throws DeviceError without a device, NotCompiled in a build without CUDA
+/// A resampler of forward fields on a CUDA device, with the same bits as on the CPU.
 ///
-/// Fields, sources and results on the host pass through pinned memory, downloads beside the kernels; repeated sizes
+/// Fields, sources and results in host memory pass through pinned memory, while kernels run. Calls of repeated sizes
 /// allocate nothing. `set_field` and `resample` throw DeviceError where not even one slice fits the memory allowed.
+/// @throws DeviceError without a device
+/// @throws NotCompiled in a build without CUDA
 std::unique_ptr<Resampler> make_cuda_resampler(Geometry output, int device = 0, Limits limits = {});
+/// A resampler of pull fields on a CUDA device, with the same bits as on the CPU.
+/// @throws DeviceError without a device
+/// @throws NotCompiled in a build without CUDA
 std::unique_ptr<Resampler> make_cuda_pull_resampler(Geometry output, int device = 0, Limits limits = {});
 
-/// One whole volume through one field, onto the resampler's geometry; the background is the smallest value present.
+/// Deforms one whole volume by one field onto the grid of a resampler. The background is the smallest value of the
+/// source.
+/// @param resampler  one for forward fields
+/// @param source     volume in host memory
+/// @param field      field that must reach over the output grid
+/// @param report     gets what happened, unless null
+/// @throws InputError for an empty source, or a field that does not fit
 template <class V>
 Volume<V> resample(Resampler& resampler, const Volume<V>& source, const VertexField& field, Report* report = nullptr) {
   require(!source.voxels.empty(), "the source volume is empty");

@@ -10,44 +10,49 @@
 
 namespace tetwarp {
 
-/// Distances, mm, between where points should be and where they are. The same for any number of threads.
+/// Distances in mm between where points should be and where they are. They are the same for any number of threads.
 struct Residuals {
-  std::uint64_t points = 0;  ///< that were compared
-  double mean = 0;
-  double percentile_99 = 0;  ///< that at least 99 % do not exceed, to within 1 %
-  double largest = 0;
+  std::uint64_t points = 0;  ///< number of points that were compared
+  double mean = 0;           ///< mean distance, mm
+  /// A distance, mm, that at least 99 % of the points do not exceed; rounded up by at most 1 %.
+  double percentile_99 = 0;
+  double largest = 0;  ///< largest distance, mm
 };
 
-/// From each sample of an inverse (LPS mm; NaN where nothing maps) to its undeformed place, and forward again by the
-/// piecewise affine map that a resampler onto the inverse's grid sees.
-///
-/// What is left is what rounding the inverse to float and to 2^-12 voxel takes.
+/// Takes each sample of an inverse (LPS mm; NaN where nothing maps) to its undeformed place, and forward again by the
+/// piecewise affine map that a resampler onto the grid of the inverse uses. What remains is due to rounding the inverse
+/// to float and vertices to 2^-12 voxel.
 Residuals forward_after_inverse(const VertexField& field, const PullField& inverse, const Limits& limits = {},
                                 const Control& control = {});
 
-/// From each vertex of a field to where it goes, and back by the inverse, interpolated between its samples as other
-/// programs do (trilinear). Vertices that come to lie where one of eight samples is missing are left out.
-///
-/// What is left is what a grid of samples cannot say of a piecewise affine map.
+/// Takes each vertex of a field to where it goes, and back by the inverse, interpolated trilinearly between its samples
+/// as other programs do. Vertices that come to lie where one of the eight samples is missing are left out. What remains
+/// is what a grid of samples cannot represent of a piecewise affine map.
 Residuals inverse_after_forward(const VertexField& field, const PullField& inverse, const Limits& limits = {},
                                 const Control& control = {});
 
-/// Both residuals of all of an inverse that comes slab by slab, so that no more of it is held than a slab and the slice
-/// before. The numbers are those of the whole inverse; only `mean` of the way back may round otherwise, by the split.
+/// Both residuals of an inverse that arrives slab by slab: only one slab and the slice before it are held. The results
+/// are those of `forward_after_inverse` and `inverse_after_forward` on the whole inverse; only the mean of the latter
+/// may round differently, depending on the split.
 class InverseCheck {
  public:
-  /// @param field  in host memory; must stay as it is
-  /// @param grid   of the inverse
+  /// @param field   field in host memory, which must outlive this object unchanged
+  /// @param grid    grid of the inverse
+  /// @param limits  number of threads
   InverseCheck(const VertexField& field, const Geometry& grid, const Limits& limits = {});
+  /// Frees the search structure and the slice that is held.
   ~InverseCheck();
 
-  /// @param slices   `Maps::inverse_mm`, in host memory: whole slices, from the first on, each once
-  /// @param control  stop; progress is not told
-  /// @throws InputError for other slices than the next ones; Cancelled
+  /// Adds the next slices.
+  /// @param slices   `Maps::inverse_mm` in host memory: whole slices in rising order, each once
+  /// @param control  only its stop is used
+  /// @throws InputError for other slices than the next ones
+  /// @throws Cancelled
   void add(const ConstVolumeView& slices, const Control& control = {});
 
-  /// Of the slices that were added; of the vertices that come to lie in or between them.
+  /// The residuals of all samples of the slices added so far.
   Residuals forward_after_inverse() const;
+  /// The residuals of all vertices that come to lie in or between the slices added so far.
   Residuals inverse_after_forward() const;
 
  private:
@@ -55,22 +60,28 @@ class InverseCheck {
   std::unique_ptr<State> state_;
 };
 
-/// Both residuals, of an inverse that is never whole: of slices of the output grid in pairs, spread evenly along k.
+/// Both residuals of an inverse that never exists as a whole: measured on pairs of slices of the output grid, spread
+/// evenly along k.
 struct RoundTrip {
-  static constexpr std::int64_t kMostSlices = 16;  ///< 12 bytes a voxel: 50 MB at 512 x 512; few slices: all
+  /// Most slices that are looked at, 12 bytes a voxel (50 MB at 512 x 512). Of an output with fewer slices all are.
+  static constexpr std::int64_t kMostSlices = 16;
 
-  std::uint64_t slices = 0, voxels = 0;  ///< of the output, that were looked at
-  double step_mm = 0;                    ///< to what vertices are rounded: 2^-12 of the longest edge of a voxel
-  Residuals forward_after_inverse;       ///< of the samples in these slices
-  Residuals inverse_after_forward;       ///< of the vertices that come to lie in a slice or between the two of a pair
+  std::uint64_t slices = 0,         ///< slices of the output that were looked at
+      voxels = 0;                   ///< voxels in these slices
+  double step_mm = 0;               ///< step to which vertices are rounded, mm: 2^-12 of the longest edge of a voxel
+  Residuals forward_after_inverse;  ///< of the samples in these slices
+  /// Of the vertices that come to lie in one of these slices, or between the two of a pair.
+  Residuals inverse_after_forward;
 };
 
-/// Looks at the same voxels and vertices, and gives the same, for every backend and any number of threads.
+/// Measures both residuals of a field that a resampler holds. Every backend, with any number of threads, looks at the
+/// same voxels and vertices and gives the same result.
 ///
-/// @param resampler  holds `field`; what it was given stays
-/// @param field      in host memory
-/// @param control    stop and stream; progress is not told
-/// @throws what `Resampler::resample` throws
+/// @param resampler  its field must be `field`, and stays set
+/// @param field      the same field in host memory
+/// @param limits     number of threads
+/// @param control    only its stop and stream are used
+/// @throws InputError and others, as `Resampler::resample`
 RoundTrip measure_round_trip(Resampler& resampler, const VertexField& field, const Limits& limits = {},
                              const Control& control = {});
 

@@ -12,12 +12,13 @@
 
 namespace tetwarp {
 
-/// Checks the views of a call against the resampler's grid, the region asked for, and each other.
-/// @throws InputError naming the view, expected and found
+/// Checks the views of a call against the resampler's grid, the region to resample, and each other.
+/// @throws InputError naming the view, and what was expected and found
 void check_targets(const Resampler& resampler, std::span<const Target> targets, const Region& region);
 void check_maps(const Maps& maps, const Geometry& output, const Region& region);
 
-/// What a backend without device memory begins with. @throws InputError naming the view that is on a device
+/// Refuses device memory, for a backend that has none.
+/// @throws InputError naming the view that is on a device
 void require_host(Memory memory, const std::string& name);
 
 /// The part of the source grid that any interpolation may read for places in a box of continuous output index, clipped.

@@ -5,11 +5,11 @@
 
 namespace tetwarp {
 
-/// Version of the project, "0.1.0".
+/// Version of the project, such as "0.1.0".
 const char* version();
 
-/// Commit that this was built from: twelve hexadecimal digits, "-dirty" after them where the sources differ from it;
-/// "unknown" when built outside its own git repository.
+/// Commit from which this was built: twelve hexadecimal digits, followed by "-dirty" where the sources differed from
+/// it. It is "unknown" for a build outside its own git repository.
 const char* commit();
 
 }  // namespace tetwarp

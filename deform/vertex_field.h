@@ -10,69 +10,87 @@
 
 namespace tetwarp {
 
-/// Explicit tetrahedra of any size, as finite element programs write them; inside each the map is affine.
+/// Tetrahedra of any size, as finite element programs write them. Inside each the map is affine.
 struct TetrahedralMesh {
-  std::vector<glm::dvec3> rest;          ///< LPS mm of each vertex
+  std::vector<glm::dvec3> rest;          ///< undeformed place of each vertex, LPS mm
   std::vector<glm::vec3> displacement;   ///< LPS mm, deformed minus rest, one a vertex; zero rests exactly
-  std::vector<glm::u32vec4> tetrahedra;  ///< vertex numbers; in either orientation
-  /// Of a mesh that takes the place of cells of a lattice, or that a lattice was made into: the number of the lattice's
-  /// vertex (i fastest) that each vertex rests at, -1 for none. Such vertices are snapped as the lattice's own are,
-  /// where the lattice is beside the mesh (`VertexField::lattice`). Empty: places tell, or there is no lattice.
+  std::vector<glm::u32vec4> tetrahedra;  ///< four vertex numbers each, in either orientation
+  /// For a mesh that was made from a lattice or takes the place of some of its cells: the number of the lattice vertex
+  /// (i fastest) that each vertex coincides with undeformed, or -1. Such vertices are rounded exactly as those of the
+  /// lattice, if the lattice is given with the mesh (`VertexField::lattice`). Empty where there is no lattice, or where
+  /// the places alone decide.
   std::vector<std::int64_t> lattice_vertex = {};
 
+  /// Whether there is no tetrahedron.
   bool is_empty() const { return tetrahedra.empty(); }
 };
 
-/// Forward deformation: a regular lattice of vertices and where each goes, a mesh, or a lattice of which a mesh takes
-/// the place of some cells (cuts). A value; simulators, files and formulas return it.
+/// Forward deformation: where each vertex of a regular lattice goes. A mesh may take the place of the lattice, or of
+/// some of its cells (cuts). It is a plain value; simulators, files and formulas return it.
 ///
-/// Every cell of the lattice is split into five tetrahedra (core/five_tetrahedra.h); inside each the map is affine.
+/// Every cell of the lattice is split into five tetrahedra (deform/core/five_tetrahedra.h). Inside each the map is
+/// affine.
 struct VertexField {
-  Geometry lattice;                     ///< of the undeformed vertices; its last cells may overhang a volume. Size 0:
-                                        ///< there is a mesh, of no lattice
-  std::vector<glm::vec3> displacement;  ///< LPS mm, deformed minus rest, i fastest, 12 bytes each (1.9 GB at
-                                        ///< 512x512x600); zero rests exactly
-  TetrahedralMesh mesh = {};            ///< in the place of a lattice, or of some of its cells
-  std::vector<std::uint64_t> replaced = {};  ///< these cells, i fastest, rising; the mesh's tetrahedra follow the
-                                             ///< lattice's
+  /// Grid of the undeformed vertices; its last cells may extend beyond a volume. Its size is 0 for a mesh without a
+  /// lattice.
+  Geometry lattice;
+  /// Deformed minus undeformed place of each vertex, LPS mm, i fastest. 12 bytes each: 1.9 GB for 512 x 512 x 600.
+  /// Vertices of zero displacement do not move at all.
+  std::vector<glm::vec3> displacement;
+  /// Stands in the place of the lattice, or of the cells in `replaced`.
+  TetrahedralMesh mesh = {};
+  /// Numbers of the cells (i fastest, rising) whose place the mesh takes. Numbers of the mesh's tetrahedra follow those
+  /// of the lattice.
+  std::vector<std::uint64_t> replaced = {};
 };
 
-/// Deformation the other way round, as registration tools write it: what lies at output point p comes from p + d(p).
-/// Another type, for the two never convert silently.
+/// Deformation in the other direction, as registration tools write it: what lies at output point p comes from p + d(p).
+/// It is a type of its own, because the two directions never convert silently.
 struct PullField {
-  Geometry grid;                        ///< samples of d; trilinear between them
-  std::vector<glm::vec3> displacement;  ///< LPS mm, input point minus output point, i fastest; NaN: there is no input
-                                        ///< point, as Maps::inverse_mm says it
+  Geometry grid;  ///< grid of the samples of d; between them d is trilinear
+  /// Input point minus output point at each sample, LPS mm, i fastest. NaN says that there is no input point, as in
+  /// `Maps::inverse_mm`.
+  std::vector<glm::vec3> displacement;
 };
 
-/// What becomes of a voxel that lies outside the undeformed lattice or mesh (or the grid of a pull field), where no
-/// tetrahedron owns it.
+/// What becomes of a voxel that lies outside the undeformed lattice or mesh (or the grid of a pull field) and that no
+/// tetrahedron owns.
 enum class Outside : std::uint8_t {
-  refuse,     ///< the field must reach over the whole output: `set_field` throws otherwise
+  refuse,     ///< the field must reach over the whole output; otherwise `Resampler::set_field` throws
   rest,       ///< the voxel stays where it is
-  background  ///< the voxel gets the background, its coverage is 0
+  background  ///< the voxel gets the background, and coverage 0
 };
 
-/// Not an owner: the field must outlive the view, and the Resampler that the view was given to.
+/// A forward field that something else owns. The field must outlive the view, and the Resampler that took it.
 struct FieldView {
-  const Geometry* lattice = nullptr;  ///< of a mesh that stands alone: the one that `lattice_vertex` counts in, or null
+  /// Grid of the undeformed vertices. For a mesh that stands alone: the lattice to which
+  /// `TetrahedralMesh::lattice_vertex` refers, or null.
+  const Geometry* lattice = nullptr;
+  /// Of each lattice vertex, LPS mm, i fastest; null for a mesh that stands alone.
   const glm::vec3* displacement = nullptr;
-  Outside outside = Outside::refuse;
-  Memory memory = Memory::host;                  ///< of `displacement`; the lattice is always the host's
-  const TetrahedralMesh* mesh = nullptr;         ///< in the place of lattice and displacement; in host memory
-  std::span<const std::uint64_t> replaced = {};  ///< not empty: the mesh takes the place of these cells alone
+  Outside outside = Outside::refuse;  ///< what becomes of voxels outside the undeformed lattice or mesh
+  Memory memory = Memory::host;       ///< where `displacement` lies; the lattice lies in host memory
+  /// In the place of the lattice, or of the cells in `replaced`; in host memory.
+  const TetrahedralMesh* mesh = nullptr;
+  /// Numbers of the cells whose place the mesh takes; empty: the mesh, if any, stands alone.
+  std::span<const std::uint64_t> replaced = {};
 };
+/// A pull field that something else owns. The field must outlive the view, and the Resampler that took it.
 struct PullFieldView {
-  const Geometry* grid = nullptr;
-  const glm::vec3* displacement = nullptr;
-  Outside outside = Outside::refuse;
-  Memory memory = Memory::host;
+  const Geometry* grid = nullptr;           ///< grid of the samples
+  const glm::vec3* displacement = nullptr;  ///< of each sample, LPS mm, i fastest
+  Outside outside = Outside::refuse;        ///< what becomes of voxels outside the grid
+  Memory memory = Memory::host;             ///< where `displacement` lies; the grid lies in host memory
 };
 
-/// @throws InputError unless there is one displacement for each vertex, of a lattice or of a mesh
+/// A view of a forward field in host memory.
+/// @throws InputError unless there is one displacement for each vertex of the lattice and of the mesh
 FieldView view(const VertexField& field, Outside outside = Outside::refuse);
+/// A view of a pull field in host memory.
+/// @throws InputError unless there is one displacement for each sample
 PullFieldView view(const PullField& field, Outside outside = Outside::refuse);
-/// The samples as a volume of three floats: for `Maps::inverse_mm`. @throws InputError as `view`
+/// The samples as a volume of type f32 with 3 components, as `Maps::inverse_mm` wants it.
+/// @throws InputError unless there is one displacement for each sample
 VolumeView samples_of(PullField& field);
 
 }  // namespace tetwarp

@@ -10,23 +10,24 @@
 
 namespace tetwarp {
 
-/// A derived series that was written whole: what objects that go through the same field refer to.
+/// A derived series that was written completely. Objects that go through the same field refer to it.
 struct WrittenSeries {
-  const DicomHeaders& source;  ///< of the series that was deformed
-  const DicomWriteReport& report;
-  const Geometry& geometry;
+  const DicomHeaders& source;      ///< headers of the series that was deformed
+  const DicomWriteReport& report;  ///< what was written, with the new UIDs
+  const Geometry& geometry;        ///< grid of the derived series
 };
 
-/// A dose or segmentation that goes along with a series.
+/// A dose or segmentation that goes through the same field as a series.
 struct DicomAlong {
-  std::filesystem::path source;  ///< the file that it was read from
-  std::string source_sha256;
-  DicomDerivation derivation;  ///< its own parameters and description; of its form only the de-identification
+  std::filesystem::path source;  ///< file from which it was read
+  std::string source_sha256;     ///< SHA-256 of that file, hexadecimal
+  DicomDerivation derivation;    ///< its own parameters and description; of the form only the de-identification counts
 };
 
-/// What was written of it.
+/// What was written of such an object.
 struct AlongReport {
-  std::string series_uid, sop_instance_uid;
+  std::string series_uid,  ///< new Series Instance UID
+      sop_instance_uid;    ///< new SOP Instance UID
 };
 
 }  // namespace tetwarp

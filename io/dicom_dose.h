@@ -10,34 +10,41 @@
 
 namespace tetwarp {
 
-/// An RT Dose object (PS3.3 A.18): a grid of doses, one file.
+/// Header of an RT Dose object (DICOM PS3.3 A.18): a grid of doses in one file.
 struct DicomDose {
   Geometry geometry;  ///< from Image Position and Orientation (Patient), Pixel Spacing and Grid Frame Offset Vector
   std::string units;  ///< Dose Units (3004,0002): "GY" or "RELATIVE"
-  std::string frame_of_reference_uid;
+  std::string frame_of_reference_uid;  ///< Frame of Reference UID (0020,0052)
 };
 
-/// Whether a file is a DICOM RT Dose object; false for what cannot be read.
+/// Whether a file is a DICOM RT Dose object; false for a file that cannot be read.
 bool is_dicom_dose(const std::filesystem::path& path);
 
-/// Reads all but the doses. @throws InputError for frames that are not evenly spaced, or a grid that is not one
+/// Reads all but the doses.
+/// @throws InputError for a file that is no RT Dose object, whose frames are not evenly spaced, or whose numbers
+///         describe no grid
 DicomDose read_dose_header(const std::filesystem::path& path);
 
-/// Doses as float32: stored values times Dose Grid Scaling (3004,000E).
-/// @throws InputError as `read_dose_header`, and for Pixel Data that are truncated or of another size than the header
-/// says
+/// Reads the doses as float32: stored values times Dose Grid Scaling (3004,000E).
+/// @throws InputError as `read_dose_header`, and for Pixel Data of another size than the header states
 AnyVolume read_dose(const std::filesystem::path& path);
 
 /// What was written of a dose.
 struct DoseReport : AlongReport {
-  double scaling = 0;  ///< Dose Grid Scaling: the quantum
-  std::string units;   ///< Dose Units
+  double scaling = 0;  ///< Dose Grid Scaling (3004,000E), the dose of one stored unit
+  std::string units;   ///< Dose Units (3004,0002)
 };
 
-/// Writes doses that went through a field as an RT Dose object (PS3.3 A.18; docs/dicom.md says what it takes over):
-/// frames of 32-bit words, the largest dose as 2^31 - 1. Negative doses become 0, unless the source's words are signed.
-/// @param doses  float32, in the units of the source, on a straight grid
-/// @throws InputError for another patient's dose, Error when the file cannot be written
+/// Writes doses that went through a field as an RT Dose object (PS3.3 A.18). docs/dicom.md lists what it takes over
+/// from the source.
+/// Frames have 32-bit words, the largest dose is 2^31 - 1. Negative doses become 0, unless the words of the source are
+/// signed.
+/// @param path    file to write
+/// @param doses   float32, in the units of the source, on a straight and even grid
+/// @param along   the source of the doses, and what was done
+/// @param series  the derived series to which the object refers
+/// @throws InputError for the dose of another patient
+/// @throws Error when the file cannot be written
 DoseReport write_derived_dose(const std::filesystem::path& path, const ConstVolumeView& doses, const DicomAlong& along,
                               const WrittenSeries& series);
 

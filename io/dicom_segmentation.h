@@ -12,49 +12,64 @@
 
 namespace tetwarp {
 
-/// A Segmentation object (PS3.3 A.51): masks on one grid, one file.
+/// Header of a Segmentation object (DICOM PS3.3 A.51): masks on one grid in one file.
 struct DicomSegmentation {
+  /// One mask.
   struct Segment {
-    int number = 0;  ///< Segment Number (0062,0004)
-    std::string label;
+    int number = 0;     ///< Segment Number (0062,0004)
+    std::string label;  ///< Segment Label (0062,0005)
   };
+  /// One slice of one mask.
   struct Frame {
     std::size_t segment = 0;  ///< index into `segments`
-    std::int64_t slice = 0;   ///< of `geometry`
+    std::int64_t slice = 0;   ///< index k in `geometry`
   };
-  Geometry geometry;  ///< of all frames, with an empty slice before and behind them: a frame that is missing is empty
-  bool fractional = false;
-  int largest = 1;  ///< what stands for "all of it": Maximum Fractional Value (0062,000E); of a binary one 1
-  std::vector<Segment> segments;
-  std::vector<Frame> frames;  ///< as they lie in Pixel Data
-  std::string frame_of_reference_uid;
+  /// Grid of all frames, with one empty slice before and one after them. A frame that is missing is empty.
+  Geometry geometry;
+  bool fractional = false;  ///< whether Segmentation Type (0062,0001) is FRACTIONAL, not BINARY
+  /// Value of a voxel that belongs wholly to a segment: Maximum Fractional Value (0062,000E), or 1 for BINARY.
+  int largest = 1;
+  std::vector<Segment> segments;       ///< in the order of the file
+  std::vector<Frame> frames;           ///< in the order of Pixel Data
+  std::string frame_of_reference_uid;  ///< Frame of Reference UID (0020,0052)
 };
 
-/// Whether a file is a DICOM Segmentation object; false for what cannot be read.
+/// Whether a file is a DICOM Segmentation object; false for a file that cannot be read.
 bool is_dicom_segmentation(const std::filesystem::path& path);
 
-/// Reads all but the pixels. Slices are as far apart as Spacing Between Slices (0018,0088) says; where it is missing,
-/// `otherwise_mm` apart, if the frames lie on such a grid, else as the closest frames are.
-/// @throws InputError for bits that do not go with the Segmentation Type, frames that are not on one even grid or are
-/// there twice, or segments that are not described
+/// Reads all but the pixels.
+/// Slices are as far apart as Spacing Between Slices (0018,0088) says. If it is missing, they are `otherwise_mm` apart
+/// where the frames lie on such a grid, else as far as the two closest frames.
+/// @param path          file to read
+/// @param otherwise_mm  mm; 0: unknown
+/// @throws InputError for a number of bits that does not fit Segmentation Type, frames that lie on no even grid or
+///         occur twice, or segments that are not described
 DicomSegmentation read_segmentation_header(const std::filesystem::path& path, double otherwise_mm = 0);
 
-/// One uint8 volume a segment: 0 and 1, or 0 to `largest`. Segments may overlap.
-/// @throws InputError as `read_segmentation_header`, and for compressed Pixel Data, or ones of another size than the
-/// header says
+/// Reads the pixels: one uint8 volume for each segment, with values 0 to `DicomSegmentation::largest`. Segments may
+/// overlap.
+/// @param path    file to read
+/// @param header  from `read_segmentation_header` of this file
+/// @throws InputError as `read_segmentation_header`, and for Pixel Data that are compressed or of another size than the
+///         header states
 std::vector<AnyVolume> read_segments(const std::filesystem::path& path, const DicomSegmentation& header);
 
 /// What was written of a segmentation.
 struct SegmentationReport : AlongReport {
-  std::vector<std::uint64_t> frames;  ///< of each segment
-  bool empty = false;                 ///< nothing is left: the one frame shows nothing of the first segment
+  std::vector<std::uint64_t> frames;  ///< number of frames of each segment
+  bool empty = false;  ///< whether no voxel is left, so that one empty frame of the first segment was written
 };
 
-/// Writes segments that went through a field as a Segmentation object of the source's type and segments
-/// (docs/dicom.md says what it takes over). Frames without a voxel are left out. On the grid of the series, each frame
-/// names the slice on which it lies.
-/// @param segments  uint8, in the order of the source's segments, all on one straight grid
-/// @throws InputError for another patient's segmentation, Error when the file cannot be written
+/// Writes segments that went through a field as a Segmentation object of the type and segments of the source.
+/// docs/dicom.md lists what it takes over.
+/// Frames without a voxel are left out. On the grid of the series each frame names the slice on which it lies.
+/// @param path      file to write
+/// @param segments  uint8, in the order of the source's segments, all on one straight and even grid
+/// @param header    header of the source
+/// @param along     the source, and what was done
+/// @param series    the derived series to which the object refers
+/// @throws InputError for the segmentation of another patient
+/// @throws Error when the file cannot be written
 SegmentationReport write_derived_segmentation(const std::filesystem::path& path,
                                               const std::vector<ConstVolumeView>& segments,
                                               const DicomSegmentation& header, const DicomAlong& along,

@@ -14,82 +14,106 @@
 
 namespace tetwarp {
 
-enum class FieldDirection : std::uint8_t { forward, pull };
-std::string to_string(FieldDirection direction);  // "forward", "pull"
+/// Which way a field maps.
+enum class FieldDirection : std::uint8_t {
+  forward,  ///< undeformed to deformed points
+  pull      ///< output to input points
+};
+/// The word "forward" or "pull".
+std::string to_string(FieldDirection direction);
 
-/// A displacement field, whatever its file has: three float components a sample, LPS mm, relative.
+/// A displacement field, whatever conventions its file has: displacements, not positions, in LPS mm.
 struct FieldFile {
-  Geometry grid;
-  std::vector<glm::vec3> displacement;      ///< i fastest
-  std::optional<FieldDirection> direction;  ///< as the file states it; files of other tools do not say
+  Geometry grid;                            ///< grid of the samples
+  std::vector<glm::vec3> displacement;      ///< one for each sample, LPS mm, i fastest
+  std::optional<FieldDirection> direction;  ///< as the file states it; empty for most files of other tools
 };
 
 /// How a property of a field is known.
 enum class FieldBasis : std::uint8_t {
-  stated,     ///< this file says so
-  by_format,  ///< every file of its kind has it so
-  by_option,  ///< whoever gave the file said so
-  assumed     ///< nobody said so
+  stated,     ///< this file states it
+  by_format,  ///< it is the same in every file of this format
+  by_option,  ///< an option of the `FieldSource` states it
+  assumed     ///< nothing states it
 };
-std::string to_string(FieldBasis basis);  // "stated", "by the format", "by an option", "assumed"
+/// The words "stated", "by the format", "by an option" or "assumed".
+std::string to_string(FieldBasis basis);
 
-/// What `tetwarp info` tells of a field file without reading its vectors: how they are in the file, not in FieldFile.
+/// What `tetwarp info` shows of a field file without reading its vectors. It describes the file, not the `FieldFile`
+/// that is read from it.
 struct FieldFileHeader {
-  Geometry grid;
-  /// False: the file has no grid but only a size, and takes the place of `FieldSource::grid`; without that, `grid` has
-  /// a size and nothing else.
+  Geometry grid;  ///< grid of the samples
+  /// Whether the file has a grid. A file that states only a size is taken to lie on `FieldSource::grid`; without that,
+  /// only the size of `grid` is known.
   bool has_own_grid = true;
-  std::string format;                       ///< "NIfTI, intent 1006 (DISPVECT)"
-  std::optional<FieldDirection> direction;  ///< empty: nobody says
-  std::string frame = "LPS";                ///< LPS, RAS, or index: along the grid's i, j, k
-  std::string units = "mm";                 ///< mm or voxel
-  bool absolute = false;                    ///< displacements, not positions
-  std::vector<std::string> notes = {};      ///< for people, without the file's name
-  FieldBasis direction_basis = FieldBasis::assumed, frame_basis = FieldBasis::assumed,
-             units_basis = FieldBasis::assumed, absolute_basis = FieldBasis::assumed;
+  std::string format;                                ///< such as "NIfTI, intent 1006 (DISPVECT)"
+  std::optional<FieldDirection> direction;           ///< empty: not known
+  std::string frame = "LPS";                         ///< axes of the vectors: LPS, RAS, or index for the grid's i, j, k
+  std::string units = "mm";                          ///< unit of the vectors: mm or voxel
+  bool absolute = false;                             ///< whether the vectors are positions, not displacements
+  std::vector<std::string> notes = {};               ///< remarks for people, without the name of the file
+  FieldBasis direction_basis = FieldBasis::assumed,  ///< how `direction` is known
+      frame_basis = FieldBasis::assumed,             ///< how `frame` is known
+      units_basis = FieldBasis::assumed,             ///< how `units` is known
+      absolute_basis = FieldBasis::assumed;          ///< how `absolute` is known
 };
 
-/// A field file, and what has to be said of files that do not say it themselves.
+/// A field file, with everything that has to be said of it because the file does not.
 struct FieldSource {
-  FieldSource(std::filesystem::path file) : path(std::move(file)) {}  // NOLINT: most files need nothing else
+  /// A file that needs no options; not explicit, because most files need none.
+  FieldSource(std::filesystem::path file) : path(std::move(file)) {}  // NOLINT
 
-  std::filesystem::path path;
-  std::map<std::string, std::string> options;  ///< docs/fields.md lists them by format: "order" is "zyx"
-  std::optional<Geometry> grid;                ///< of the volume that the field is for
-  NiftiFrame nifti_frame = NiftiFrame::sform;
+  std::filesystem::path path;  ///< the file
+  /// Key and value, such as "order" and "zyx"; docs/fields.md lists them by format.
+  std::map<std::string, std::string> options;
+  std::optional<Geometry> grid;                ///< grid of the volume for which the field is meant
+  NiftiFrame nifti_frame = NiftiFrame::sform;  ///< which place of a NIfTI file counts
 
-  /// The value of an option, or another where it was not given.
+  /// The value of an option, or `otherwise` if it was not given.
   std::string option(const std::string& key, const std::string& otherwise = "") const;
 };
 
-/// `PATH` or `PATH:KEY=VALUE[,KEY=VALUE]`; a file whose name is the whole text goes before.
+/// Parses `PATH` or `PATH:KEY=VALUE[,KEY=VALUE]`. If a file has the whole text as its name, that file is meant.
 /// @throws InputError for an option without a value, or given twice
 FieldSource parse_field_source(const std::string& text);
 
-/// @throws InputError for options that the file's format has not, needs and does not have, or with an unknown value
+/// Checks the options of a source against the format of its file.
+/// @throws InputError for options that the format does not have, needs and lacks, or with an unknown value
 void check_field_options(const FieldSource& source);
 
-/// Whether a format of io/fields/field_format.h takes the file, and it holds vectors (not a volume).
+/// Whether some field format reads the file, and it contains vectors, not a volume.
 bool is_field_file(const FieldSource& source);
 
-/// Reads a file of any format of io/fields/field_format.h (docs/fields.md lists them); doubles are rounded to float.
-/// Direction: NRRD and MHA key `tetwarp_direction`, NIfTI descrip `tetwarp_direction=forward`, or the format's own.
-/// A pull field may have NaN where there is no source, which a file that does not say its direction has only for
-/// `read_pull_field`.
-/// @throws InputError for a file that is no field, or with a value that is not finite (the first such vertex is named)
+/// Reads what a field file states before its vectors.
+/// @throws InputError for a file that is no field
 FieldFileHeader read_field_header(const FieldSource& source);
+/// Reads a field file of any format; docs/fields.md lists them. Doubles are rounded to float.
+/// The direction is stated by the key `tetwarp_direction` of NRRD and MHA, by the NIfTI header field descrip, as in
+/// `tetwarp_direction=forward`, or as the format has it. Pull fields may have NaN where there is no source; if the file
+/// does not state its direction only `read_pull_field` reads such a file.
+/// @throws InputError for a file that is no field, or with a value that is not finite (the first such sample is named)
 FieldFile read_field_file(const FieldSource& source);
 
-/// As `read_field_file`, and the direction must not be stated otherwise.
-/// @throws InputError naming the file and both directions
+/// Reads a field file as a forward field, as `read_field_file` does.
+/// @throws InputError, which names the file, also where the file states that it is a pull field
 VertexField read_forward_field(const FieldSource& source);
+/// Reads a field file as a pull field, as `read_field_file` does.
+/// @throws InputError, which names the file, also where the file states that it is a forward field
 PullField read_pull_field(const FieldSource& source);
 
-/// Writes the field with its direction. The same bits come back from `read_forward_field`.
+/// Writes the lattice of a forward field, with its direction. `read_forward_field` gives the same bits again. A mesh is
+/// not written.
+/// @throws InputError for a suffix that no volume file has, or displacements that do not fit the lattice
+/// @throws Error when the file cannot be written
 void write_field_file(const std::filesystem::path& path, const VertexField& field);
+/// Writes a pull field with its direction. `read_pull_field` gives the same bits again.
+/// @throws InputError for a suffix that no volume file has, or displacements that do not fit the grid
+/// @throws Error when the file cannot be written
 void write_field_file(const std::filesystem::path& path, const PullField& field);
 
-/// Begins the same file, for displacements that come slice by slice: 3 x float32, LPS mm.
+/// Begins a file as `write_field_file` writes it, for displacements that come slice by slice (3 x float32, LPS mm).
+/// @throws InputError for a suffix that no volume file has
+/// @throws Error when the file cannot be written
 std::unique_ptr<ImageWriter> create_field_file(const std::filesystem::path& path, const Geometry& grid,
                                                FieldDirection direction);
 

@@ -15,80 +15,103 @@
 
 namespace tetwarp {
 
-/// Whether the name ends in a suffix of a volume file: .nii .nii.gz .nrrd .mha (upper or lower case).
+/// Whether a name ends in a suffix of a volume file, in upper or lower case: .nii, .nii.gz, .nrrd or .mha.
 bool has_image_suffix(const std::filesystem::path& path);
 
-/// Which of the two places of a NIfTI file counts where it states both: the sform, as nibabel, FSL, SPM, FreeSurfer and
-/// NiftyReg have it, or the qform, as ITK has it unless the sform's code is 1. Without meaning for other files.
-enum class NiftiFrame : std::uint8_t { sform, qform };
+/// Which place of a NIfTI file counts if it states two. It has no meaning for other files.
+enum class NiftiFrame : std::uint8_t {
+  sform,  ///< srow_x, srow_y, srow_z, as nibabel, FSL, SPM, FreeSurfer and NiftyReg choose
+  qform   ///< quatern and qoffset, as ITK chooses unless sform_code is 1
+};
 
-/// What a volume file says before its voxels are read.
+/// What a volume file states before its voxels.
 struct ImageHeader {
-  Geometry geometry;  ///< LPS, whatever the file's own frame
-  VoxelType type = VoxelType::i16;
-  int components = 1;  ///< 3 for a displacement field
-  /// Keys and values as the file has them. NIfTI: "descrip"; and "scaled" where scl_slope and scl_inter made float of
-  /// it.
+  Geometry geometry;                ///< LPS mm, whatever coordinates the file has
+  VoxelType type = VoxelType::i16;  ///< type of one value
+  int components = 1;               ///< values of a voxel; 3 for a displacement field
+  /// Keys and values of the file. NIfTI has "descrip", and "scaled" where scl_slope and scl_inter turned integers into
+  /// float.
   std::map<std::string, std::string> metadata;
-  std::vector<std::string> notes = {};  ///< for people, without the file's name
+  std::vector<std::string> notes = {};  ///< remarks for people, without the name of the file
 };
 
+/// Choices for a volume file.
 struct ImageWriteOptions {
-  /// 0 none, 1 to 9; -1: 1 for .nii.gz, none else; .nii never is. The levels of .nii.gz are libdeflate's: its 1 makes
-  /// files about as small as zlib's 6 does, its 6 smaller ones in two to four times the time.
+  /// Compression level 1 to 9, or 0 for none; -1: 1 for .nii.gz, none for others. A .nii file is never compressed.
+  /// Levels of .nii.gz are those of libdeflate: its 1 gives files about as small as 6 of zlib, its 6 gives smaller ones
+  /// in two to four times the time.
   int compression = -1;
-  std::map<std::string, std::string>
-      metadata;  ///< NRRD and MHA: key and value; NIfTI keeps only "descrip" (79 characters)
+  /// Keys and values for NRRD and MHA. NIfTI keeps only "descrip" (79 characters).
+  std::map<std::string, std::string> metadata;
 };
 
-/// @throws InputError naming the file: missing, unreadable, truncated, an unknown suffix, not 3-D, a voxel type that
-///         VoxelType does not have, a size that the file cannot hold, a geometry that is not finite or sheared
+/// Reads what a volume file states before its voxels.
+/// @throws InputError, which names the file: missing, unreadable, truncated, an unknown suffix, not 3-D, a voxel type
+///         that VoxelType does not have, a size that the file cannot contain, or a geometry that is sheared or not
+///         finite
 ImageHeader read_image_header(const std::filesystem::path& path, NiftiFrame frame = NiftiFrame::sform);
+/// Reads a volume file.
+/// @throws InputError as `read_image_header`, and for voxels that cannot be read
 AnyVolume read_image(const std::filesystem::path& path, NiftiFrame frame = NiftiFrame::sform);
 
-/// A volume file that takes its slices one after the other: what was written need not stay in memory.
+/// A volume file that takes its slices one after another, so that what was written need not stay in memory.
 ///
-/// However the slices are split, the file has the same bytes. Two kinds of file cannot be written from front to back:
-/// several components in .nii.gz (one plane a component, one after the other) and compressed .mha (the header states
-/// the compressed size). What has to wait for its place lies on the disk, in files without names beside `path`.
+/// The file has the same bytes however slices are grouped. Two kinds of file cannot be written from front to back:
+/// .nii.gz with several components (which stores one plane for each component) and compressed .mha (whose header states
+/// the compressed size). For these, what must wait lies on the disk in nameless files beside `path`.
 class ImageWriter {
  public:
+  /// Closes the file. It is incomplete unless `finish` was called.
   virtual ~ImageWriter() = default;
   ImageWriter(const ImageWriter&) = delete;
   ImageWriter& operator=(const ImageWriter&) = delete;
 
-  /// @param slices  whole slices, the next ones of the grid; of the file's type and components, in host memory
-  /// @throws InputError for other slices, Error when they cannot be written
+  /// Writes the next slices.
+  /// @param slices  whole slices that follow those written before; of the file's type and components, in host memory
+  /// @throws InputError for other slices
+  /// @throws Error when they cannot be written
   void write(const ConstVolumeView& slices);
-  /// To be called after the last slice; the file is not whole before. @throws InputError when slices are missing, Error
-  /// when the file cannot be written whole
+  /// Completes the file after the last slice.
+  /// @throws InputError when slices are missing
+  /// @throws Error when the file cannot be completed
   void finish();
 
  protected:
+  /// For implementations: a writer of a file of this grid, type and number of components.
   ImageWriter(std::filesystem::path path, const Geometry& grid, VoxelType type, int components)
       : path_(std::move(path)), grid_(grid), type_(type), components_(components) {}
 
+  /// Writes slices that were checked.
   virtual void append(const ConstVolumeView& slices) = 0;
-  virtual void close() = 0;  ///< all slices are there
+  /// Completes the file; all slices were written.
+  virtual void close() = 0;
+  /// Throws Error with the path and the reason that the system gives.
   [[noreturn]] void fail() const;
 
-  std::filesystem::path path_;
-  Geometry grid_;
-  VoxelType type_;
-  int components_;
+  std::filesystem::path path_;  ///< the file
+  Geometry grid_;               ///< grid of the volume
+  VoxelType type_;              ///< type of one value
+  int components_;              ///< values of a voxel
 
  private:
-  std::int64_t written_ = 0;  ///< slices
+  std::int64_t written_ = 0;  ///< number of slices
 };
 
-/// Begins a file of voxels of their own type; NIfTI with qform and sform both set (code 1), mm.
-/// Writes to `path` directly: io/staged_output.h is what makes an output appear only when complete.
-/// @throws InputError for an unknown suffix, a grid or metadata that the format cannot hold, Error when the file cannot
-///         be written
+/// Begins a volume file. NIfTI gets qform and sform, both of code 1, and mm.
+/// It is written to `path` directly; `StagedOutput` makes an output appear only when it is complete.
+/// @param path        file to write; its suffix decides the format
+/// @param grid        grid of the volume
+/// @param type        type of one value
+/// @param components  values of a voxel
+/// @param options     compression and metadata
+/// @throws InputError for an unknown suffix, or a grid or metadata that the format cannot hold
+/// @throws Error when the file cannot be written
 std::unique_ptr<ImageWriter> create_image(const std::filesystem::path& path, const Geometry& grid, VoxelType type,
                                           int components = 1, const ImageWriteOptions& options = {});
 
-/// Writes a whole volume with `create_image`. @throws as that, and Error when the file cannot be written whole
+/// Writes a whole volume by `create_image`.
+/// @throws InputError for an unknown suffix, or a grid or metadata that the format cannot hold
+/// @throws Error when the file cannot be written
 void write_image(const std::filesystem::path& path, const ConstVolumeView& volume,
                  const ImageWriteOptions& options = {});
 

@@ -14,35 +14,47 @@
 
 namespace tetwarp {
 
-enum class CellShape : std::uint8_t { tetrahedron, pyramid, wedge, hexahedron };
+/// Shape of a volume cell of a mesh file.
+enum class CellShape : std::uint8_t {
+  tetrahedron,  ///< 4 corners
+  pyramid,      ///< 5 corners
+  wedge,        ///< 6 corners
+  hexahedron    ///< 8 corners
+};
+/// All shapes.
 inline constexpr std::array kCellShapes = {CellShape::tetrahedron, CellShape::pyramid, CellShape::wedge,
                                            CellShape::hexahedron};
-std::string to_string(CellShape shape);     // "tetrahedron"
-std::size_t corner_count(CellShape shape);  // 4, 5, 6, 8
+/// The name of a shape: "tetrahedron".
+std::string to_string(CellShape shape);
+/// Number of corners of a shape.
+std::size_t corner_count(CellShape shape);
 
-/// Collects the tetrahedra of cells of all shapes; each is made of vertices of its cell.
+/// Splits cells of all shapes into tetrahedra, whose vertices are those of their cell.
 ///
 /// A quadrilateral face is split by the diagonal at its lowest vertex number, so that the two cells at a face agree
-/// without knowing of each other (Dompierre, Labbe, Vallet, Camarero, "How to subdivide pyramids, prisms and hexahedra
-/// into tetrahedra", 1999). Inside, a cell is the cone from its lowest vertex over the triangles of the faces that do
-/// not hold it: a pyramid becomes 2 tetrahedra, a wedge 3, a hexahedron 6. (The paper has 5 for some hexahedra.)
+/// without knowing of each other (Dompierre, Labbe, Vallet and Camarero, "How to subdivide pyramids, prisms and
+/// hexahedra into tetrahedra", 1999). A cell becomes the cones from its lowest vertex over the triangles of the faces
+/// that do not contain it: a pyramid becomes 2 tetrahedra, a wedge 3, a hexahedron 6. (The paper gives some hexahedra
+/// 5.)
 class MeshCells {
  public:
-  /// @param file  named in errors
+  /// @param file  name that messages show
   explicit MeshCells(std::string file) : file_(std::move(file)) {}
 
-  /// @param corners  vertex numbers in VTK's order, 4, 5, 6 or 8 of them; a cell that is convex and positively oriented
-  ///                 there gives positively oriented tetrahedra. Vertices may be repeated where faces collapse to
-  ///                 triangles or edges, as where a wedge is written as a hexahedron; and a hexahedron (a, b, c, d, d,
-  ///                 d, d, d) is a tetrahedron
-  /// @param cell  number of the cell in the file, for errors
-  /// @throws InputError naming file and cell: another number of corners, or repeated ones that leave no solid
+  /// Adds a cell.
+  /// @param shape    its shape
+  /// @param corners  vertex numbers in VTK's order. A convex cell that is positively oriented there gives positively
+  ///         oriented tetrahedra. Vertices may be repeated where faces collapse to triangles or edges, as where a wedge
+  ///         is written as a hexahedron; a hexahedron (a, b, c, d, d, d, d, d) is a tetrahedron.
+  /// @param cell     number of the cell in the file, for messages
+  /// @throws InputError, which names file and cell, for another number of corners, or repeated ones that leave no solid
   void add(CellShape shape, std::span<const std::uint32_t> corners, std::uint64_t cell);
 
-  /// How many cells were added; sizes in order of kCellShapes.
+  /// Number of cells of each shape that were added, in the order of kCellShapes.
   const std::array<std::uint64_t, kCellShapes.size()>& counts() const { return counts_; }
+  /// Tetrahedra in the order of their cells.
   const std::vector<glm::u32vec4>& tetrahedra() const { return tetrahedra_; }
-  /// In the order of the cells. Nothing is left here.
+  /// Moves the tetrahedra out; none are left.
   std::vector<glm::u32vec4> take() { return std::move(tetrahedra_); }
 
  private:

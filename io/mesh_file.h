@@ -16,47 +16,54 @@
 
 namespace tetwarp {
 
-/// What `tetwarp info` tells of a mesh file. Its direction is forward, by the format.
+/// What `tetwarp info` shows of a mesh file. Mesh files are forward fields.
 struct MeshFileHeader {
-  std::string format;                                     ///< "Gmsh MSH 4.1, binary"
-  std::uint64_t vertices = 0, tetrahedra = 0;             ///< of the TetrahedralMesh
-  std::array<std::uint64_t, kCellShapes.size()> cells{};  ///< in the file, in order of kCellShapes
-  std::vector<std::string> arrays;                        ///< vectors at the vertices: "U", or "U, step 3"
-  std::string displacement;                               ///< one of these, or "positions of FILE"; empty: undecided
-  std::optional<double> largest_mm;                       ///< longest displacement; empty: undecided
-  std::string frame = "LPS";                              ///< LPS or RAS, of the file
-  std::string units = "mm";                               ///< mm or m, of the file
-  FieldBasis frame_basis = FieldBasis::assumed, units_basis = FieldBasis::assumed;
-  std::optional<Geometry> lattice;  ///< of which Tetwarp made the mesh; its vertices are snapped as the lattice's are
-  std::vector<std::string> notes;   ///< for people: what was left out or made simpler
+  std::string format;          ///< such as "Gmsh MSH 4.1, binary"
+  std::uint64_t vertices = 0,  ///< number of vertices of the TetrahedralMesh
+      tetrahedra = 0;          ///< number of its tetrahedra
+  /// Number of cells of each shape in the file, in the order of kCellShapes.
+  std::array<std::uint64_t, kCellShapes.size()> cells{};
+  std::vector<std::string> arrays;   ///< vectors at the vertices: "U", or "U, step 3"
+  std::string displacement;          ///< which of these is the displacement, or "positions of FILE"; empty: undecided
+  std::optional<double> largest_mm;  ///< length of the longest displacement, mm; empty: undecided
+  std::string frame = "LPS";         ///< coordinates of the file: LPS or RAS
+  std::string units = "mm";          ///< unit of the file: mm or m
+  FieldBasis frame_basis = FieldBasis::assumed,  ///< how `frame` is known
+      units_basis = FieldBasis::assumed;         ///< how `units` is known
+  /// Lattice from which Tetwarp made the mesh; vertices are rounded as those of the lattice.
+  std::optional<Geometry> lattice;
+  std::vector<std::string> notes;  ///< remarks for people: what was left out or simplified
 };
 
+/// A mesh file that was read.
 struct MeshFile {
-  MeshFileHeader header;
-  Geometry lattice;      ///< that the mesh was made of, where it has `lattice_vertex`
-  TetrahedralMesh mesh;  ///< LPS mm; only vertices of tetrahedra, in the order of the file's vertex numbers
+  MeshFileHeader header;  ///< what the file states
+  Geometry lattice;       ///< lattice from which the mesh was made, if it has `TetrahedralMesh::lattice_vertex`
+  TetrahedralMesh mesh;   ///< LPS mm; only vertices of tetrahedra, in the order of the file's vertex numbers
 };
 
-/// @throws InputError for options that mesh files have not, or with an unknown value
+/// Checks the options of a mesh file.
+/// @throws InputError for options that mesh files do not have, or with an unknown value
 void check_mesh_options(const FieldSource& source);
 
-/// Whether a format of io/meshes/mesh_format.h takes the file, and it holds volume cells (not a surface).
+/// Whether some mesh format reads the file, and it contains volume cells, not a surface.
 bool is_mesh_file(const std::filesystem::path& path);
 
-/// Reads a whole mesh of any format of io/meshes/mesh_format.h (docs/fields.md lists them), cells of all shapes split
-/// into tetrahedra (MeshCells), quadratic ones by their corners. Displacements are computed in double and rounded to
-/// float once.
+/// Reads a mesh of any format; docs/fields.md lists them. Cells of all shapes are split into tetrahedra by `MeshCells`,
+/// quadratic cells by their corners alone. Displacements are computed in double and rounded once to float.
 ///
-/// Options of the source, all optional:
-/// - displacement=NAME: the vectors to take; else the only ones, or those called displacement, Displacement, U or u
-/// - step=N: of vectors with several time steps
+/// Options of the source, all of them optional:
+/// - displacement=NAME: the vectors that are displacements; otherwise the only vectors, or those called displacement,
+///   Displacement, U or u
+/// - step=N: which of several time steps
 /// - deformed=FILE: a second mesh with the same vertices and cells, whose positions are the deformed ones
-/// - frame=lps|ras, units=mm|m: of both files; LPS mm unless given or stated
+/// - frame=lps|ras and units=mm|m: of both files; LPS and mm if neither option nor file states them
 ///
-/// @throws InputError for a file that is damaged or no mesh, a displacement that cannot be decided (all are listed),
-/// or a number that is not finite (the first such vertex is named)
+/// @throws InputError for a file that is damaged or no mesh, a displacement that cannot be decided (the message lists
+///         all), or a number that is not finite (the message names the first such vertex)
 MeshFile read_mesh_file(const FieldSource& source);
-/// As `read_mesh_file`, the whole file is read; but where no displacement can be decided it is left empty.
+/// Reads a whole mesh as `read_mesh_file` does and returns its header. If the displacement cannot be decided it is left
+/// empty.
 MeshFileHeader read_mesh_header(const FieldSource& source);
 
 }  // namespace tetwarp

@@ -44,7 +44,8 @@ class OpenedFile {
   const std::string& problem() const { return problem_; }
   const std::filesystem::path& path() const { return path_; }
   std::uint64_t size() const { return size_; }
-  /// Fills `bytes` from an offset of the file. @return how many; less than asked for at the end, or with a problem
+  /// Fills `bytes` from an offset of the file.
+  /// @return number of bytes that were read; fewer than there is room for at the end of the file, or after an error
   std::size_t read(std::uint64_t offset, std::span<std::byte> bytes);
 
  private:

@@ -14,37 +14,51 @@
 
 namespace tetwarp {
 
-/// Which way x and y of a file's points grow: LPS to the left and back, RAS to the right and front.
-enum class PointFrame : std::uint8_t { lps, ras };
-std::string to_string(PointFrame frame);  // "LPS", "RAS"
+/// Coordinates of the points of a file.
+enum class PointFrame : std::uint8_t {
+  lps,  ///< x grows to the left, y to the back, z upwards
+  ras   ///< x grows to the right, y to the front, z upwards
+};
+/// The word "LPS" or "RAS".
+std::string to_string(PointFrame frame);
 
-/// Private to io/: a file of points of one form, as parsed.
+/// Private to io/: a file of points in one format, as it was parsed.
 class PointsDocument;
 
-/// Landmarks or the vertices of a surface, with all else that their file holds (docs/coordinates.md, "Points").
+/// Landmarks or the vertices of a surface, with everything else that their file contains (docs/coordinates.md,
+/// "Points").
 ///
-/// Forms, by suffix: `.csv` (header with x, y, z), `.mrk.json` and `.fcsv` (3D Slicer), `.stl` and legacy `.vtk`
-/// polydata (ASCII or binary), `.obj`.
+/// Formats, by suffix: `.csv` (whose header has x, y, z), `.mrk.json` and `.fcsv` (3D Slicer), `.stl`, legacy `.vtk`
+/// polydata (ASCII or binary), and `.obj`.
 class PointsFile {
  public:
-  /// Reads the file whole.
-  /// @param told  the frame of a file that does not say
-  /// @throws InputError naming the file and its line or byte: not of its form, cut off, a number that is none or not
-  /// finite, no points, lengths that are not mm; a frame that contradicts `told`; a `.fcsv` without a frame
+  /// Reads a whole file.
+  /// @param path  the file
+  /// @param told  coordinates of a file that does not state them
+  /// @throws InputError, which names the file and its line or byte: damaged or of another format, a number that is not
+  ///         finite, no points, lengths that are not mm, coordinates that contradict `told`, or a `.fcsv` that does not
+  ///         state its coordinates
   explicit PointsFile(const std::filesystem::path& path, std::optional<PointFrame> told = {});
+  /// Frees the document.
   ~PointsFile();
+  /// Takes over another document.
   PointsFile(PointsFile&&) noexcept;
+  /// Takes over another document.
   PointsFile& operator=(PointsFile&&) noexcept;
 
-  /// LPS mm, in the file's order; each corner of each facet of a `.stl` is one.
+  /// All points, LPS mm, in the order of the file. Each corner of each facet of a `.stl` is one.
   const std::vector<glm::dvec3>& points() const { return points_; }
+  /// Coordinates of the file.
   PointFrame frame() const { return frame_; }
-  /// For people: what was assumed, or what the written file does not keep. Empty where there is nothing to say.
+  /// Remarks for people: what was assumed, or what `write` does not keep.
   const std::vector<std::string>& notes() const { return notes_; }
 
-  /// Writes the same form in the same frame with the points moved, and says which stay outside where the form has a
-  /// place for it. Numbers come back as the same float, or double where the form has doubles or text.
-  /// @param points  LPS mm, and their status, as many as were read  @throws Error when it cannot be written whole
+  /// Writes a file of the same format and coordinates with other points. It states which points are outside, if the
+  /// format has a place for that. Numbers keep their precision: float, or double where the format has doubles or text.
+  /// @param path    file to write
+  /// @param points  LPS mm, as many as were read
+  /// @param status  one for each point
+  /// @throws Error when the file cannot be completed
   void write(const std::filesystem::path& path, std::span<const glm::dvec3> points,
              std::span<const PointStatus> status) const;
 
@@ -55,7 +69,7 @@ class PointsFile {
   PointFrame frame_ = PointFrame::lps;
 };
 
-/// The suffix of a form that is known, in small letters (".mrk.json" for one); empty for any other name.
+/// The suffix of a known format in lower case, such as ".mrk.json"; empty for any other name.
 std::string points_suffix(const std::filesystem::path& path);
 
 }  // namespace tetwarp

@@ -9,12 +9,10 @@
 
 namespace tetwarp {
 
-/// Reads a scenario (docs/simulate.md, docs/scenario.schema.json).
+/// Reads a scenario from a JSON file; docs/simulate.md and docs/scenario.schema.json describe the keys.
 ///
-/// What is refused, and why, is said with line and key: "FILE:14: move[1].handle.radius_mm is -3; a number above 0, to
-/// 100000 is expected".
-///
-/// @throws InputError for what is no file of at most 1 MiB, no JSON, or no scenario
+/// @throws InputError for a file that is larger than 1 MiB, no JSON, or no scenario. The message names line and key:
+///         "FILE:14: move[1].handle.radius_mm is -3; a number above 0, to 100000 is expected".
 simulate::Scenario read_scenario(const std::filesystem::path& path);
 
 }  // namespace tetwarp

@@ -19,7 +19,7 @@ std::string shown(const std::filesystem::path& file, std::optional<int> frame);
 inline std::string shown(const char* text) { return shown(std::string_view(text)); }
 inline std::string shown(const std::string& text) { return shown(std::string_view(text)); }
 
-/// The same of text of several lines: line feeds stay.
+/// Text of several lines the way messages show it: as `shown`, but line feeds stay.
 std::string shown_lines(std::string_view text);
 
 /// The text as one word of a command line, to be pasted into a shell: in single quotes, or where it holds what messages

@@ -11,41 +11,55 @@ namespace tetwarp {
 
 /// A file or folder that appears under its name only when it is complete.
 ///
-/// Work goes to `path()`, a hidden sibling of the same suffix (`.tetwarp-partial-PID-NAME`), which exists, empty, from
-/// the start (so a place that cannot be written to is known before the work) and which `commit` renames. If the object
-/// dies before that, the sibling is removed and whatever had the name is untouched. A target that is a symbolic link
-/// stays one: what it names is written.
+/// Work goes to `path()`, a hidden file or folder beside the target with the same suffix (`.tetwarp-partial-PID-NAME`).
+/// It exists, empty, from the start, so that a place which cannot be written is known before the work begins; `commit`
+/// renames it. If the object is destroyed before that it is removed, and whatever has the target's name is untouched. A
+/// target that is a symbolic link stays one: the file to which it leads is written.
 class StagedOutput {
  public:
-  enum class Kind { file, folder };
+  /// Whether the output is a file or a folder.
+  enum class Kind {
+    file,   ///< a regular file
+    folder  ///< a folder with files
+  };
 
-  /// @throws Error when `target` exists and `overwrite` is false (an empty folder counts as absent), when its parent is
-  ///         missing or not writable; for a folder to be replaced: when a file in it is not Tetwarp's
-  ///         (`is_ours` decides for each regular file; sidecars are outside the folder)
+  /// @param target     name of the output
+  /// @param kind       file or folder
+  /// @param overwrite  whether an existing target may be replaced; an empty folder counts as absent
+  /// @param is_ours    tells whether Tetwarp wrote a regular file. A folder is replaced only if this holds for all of
+  ///         its files.
+  /// @throws Error when the target exists and may not be replaced, or its parent is missing or cannot be written
   StagedOutput(std::filesystem::path target, Kind kind, bool overwrite,
                bool (*is_ours)(const std::filesystem::path&) = nullptr);
+  /// Removes the output unless it has its name.
   ~StagedOutput();
   StagedOutput(const StagedOutput&) = delete;
   StagedOutput& operator=(const StagedOutput&) = delete;
 
+  /// Where to write.
   const std::filesystem::path& path() const { return staged_; }
+  /// Name of the complete output.
   const std::filesystem::path& target() const { return target_; }
 
-  /// Flushes to disk and gives it its name. A folder that is replaced changes places with this one and is removed last.
-  /// @throws Error naming the path and the system's reason (disk full and so on); nothing is lost then
+  /// Flushes the output to disk and gives it its name. A folder that is replaced changes places with the new one and is
+  /// removed last.
+  /// @throws Error with the path and the reason that the system gives, such as a full disk; then nothing is lost
   void commit();
 
   // What `commit` does, in steps, so that of several outputs all can be written before the first gets its name.
 
-  /// Flushes what was written to disk. @throws Error
+  /// First step of `commit`: flushes what was written to disk.
+  /// @throws Error
   void flush_content() const;
-  /// Gives it its name; the folder's entry is not flushed yet. @throws Error
+  /// Second step of `commit`: gives the output its name. The entry of its folder is not yet flushed.
+  /// @throws Error
   void give_name();
-  /// Removes what `give_name` gave a name that was free before; what it replaced something by stays.
+  /// Undoes `give_name` where the name was free before. An output that replaced something stays.
   void take_name_back();
 
  private:
-  bool check_target() const;  ///< whether something will be replaced; throws where that is not allowed
+  /// Whether something will be replaced. Throws where that is not allowed.
+  bool check_target() const;
 
   std::filesystem::path target_, staged_;
   Kind kind_;
@@ -53,13 +67,13 @@ class StagedOutput {
   bool (*is_ours_)(const std::filesystem::path&);
 };
 
-/// Removes what the StagedOutputs of this process have not given a name yet, for one that ends without destructors.
-/// No other can be created or destroyed behind it: end the process.
+/// Removes all outputs of this process that have no name yet, for a process that ends without running destructors.
+/// After this call no StagedOutput can be made or destroyed; end the process.
 void remove_unfinished_outputs() noexcept;
 
-/// Gives several outputs their names, one right after the other once all of them are on the disk, so that a process
-/// that is killed leaves all or none of them but for the instant of the renames. @throws Error, and no output has its
-/// name that had been free
+/// Commits several outputs: all are flushed to disk, then renamed one right after another. A process that is killed
+/// leaves all or none of them, except at the moment of renaming.
+/// @throws Error, after which no output has its name unless it replaced something
 void commit_together(std::span<const std::unique_ptr<StagedOutput>> outputs);
 
 }  // namespace tetwarp

@@ -11,10 +11,10 @@
 
 namespace tetwarp {
 
-/// Red, green and blue, 0 to 1, of "#f5e8cc"; nothing for a text that is no colour.
+/// Red, green and blue, 0 to 1, of a text such as "#f5e8cc"; nothing for any other text.
 std::optional<glm::dvec3> parse_colour(const std::string& text);
 
-/// A transfer function of a JSON file (docs/render.md has the keys).
+/// Reads a transfer function from a JSON file; docs/render.md has the keys.
 /// @throws InputError, "FILE:LINE: what; what is expected", for a file that cannot be read or used
 TransferFunction read_transfer_file(const std::filesystem::path& path);
 

@@ -76,8 +76,9 @@ class ChildProcess {
   /// been waited for is left alone.
   void kill();
 
-  /// Waits for its end. @return the status by waitpid; nothing where this process lets its children go (SIGCHLD is
-  /// ignored), or somebody else asked for the status
+  /// Waits for the end of the process.
+  /// @return the status that waitpid gives; nothing where this process ignores SIGCHLD, or another caller took the
+  ///         status
   std::optional<int> wait();
 
  private:

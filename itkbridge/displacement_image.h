@@ -14,16 +14,16 @@
 
 namespace tetwarp {
 
-/// Vectors on a grid, and what keeps them.
+/// Vectors on a grid, and what keeps them alive.
 struct HeldDisplacements {
-  Geometry grid;
-  const glm::vec3* displacement = nullptr;  ///< LPS mm, i fastest
-  std::shared_ptr<const void> keeper = {};
+  Geometry grid;                            ///< grid of the samples
+  const glm::vec3* displacement = nullptr;  ///< one for each sample, LPS mm, i fastest
+  std::shared_ptr<const void> keeper = {};  ///< owner of the vectors
 };
 
-/// The vectors of a displacement image, LPS mm, forward or pull as the caller says. Images of `Vector<float, 3>` (or
-/// another array of three floats) are used where they are: their pixel container is kept, not the image. Others are
-/// converted to float.
+/// The vectors of a displacement image, LPS mm; the caller knows whether they are forward or pull. An image of
+/// `Vector<float, 3>`, or of another array of three floats, is used in place: its pixel container is kept, not the
+/// image. Other components are converted to float.
 /// @throws InputError unless the whole image is buffered and has three components
 template <class TImage>
 std::shared_ptr<const HeldDisplacements> hold_displacements(const TImage& image) {
@@ -54,10 +54,11 @@ std::shared_ptr<const HeldDisplacements> hold_displacements(const TImage& image)
   return std::make_shared<const HeldDisplacements>(std::move(held));
 }
 
-/// Holds the vectors of the image that a filter was given last: the same object until the image changes.
+/// Holds the vectors of the last image that a filter got. It returns the same object until the image changes.
 template <class TImage>
 class DisplacementHolder {
  public:
+  /// The vectors of an image, LPS mm.
   /// @throws InputError as `hold_displacements`
   std::shared_ptr<const HeldDisplacements> hold(const TImage& image) {
     const std::array<itk::ModifiedTimeType, 2> times{image.GetMTime(), image.GetUpdateMTime()};

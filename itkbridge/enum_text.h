@@ -9,10 +9,11 @@
 
 namespace tetwarp {
 
-/// What `Print` of a filter shows.
+/// Writes the word that `name_of` gives, for `Print` of a filter.
 inline std::ostream& operator<<(std::ostream& stream, Interpolation interpolation) {
   return stream << name_of(interpolation);
 }
+/// Writes the word that `name_of` gives, for `Print` of a filter.
 inline std::ostream& operator<<(std::ostream& stream, Outside outside) { return stream << name_of(outside); }
 
 }  // namespace tetwarp

@@ -26,8 +26,8 @@ struct ItkImageInfo {
 ItkImageInfo itk_read_info(const std::filesystem::path& path, ItkFormat format);
 
 /// Lets ITK read the voxels straight into `voxels`, whose size must be that of the whole image.
-/// Not for NIfTI: NiftiImageIO of ITK 5.2 turns NaN and infinity into 0, takes the voxels of x.nii when x.nii.gz is
-/// asked for and x.nii lies beside it, and holds everything twice (io/images/nifti_file.h).
+/// Not for NIfTI: NiftiImageIO of ITK 5.2 turns NaN and infinity into 0, reads the voxels of x.nii instead
+/// of x.nii.gz if both exist, and holds everything twice (io/images/nifti_file.h).
 /// @throws InputError for a truncated or damaged file
 void itk_read_voxels(const std::filesystem::path& path, ItkFormat format, std::span<std::byte> voxels);
 

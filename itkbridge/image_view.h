@@ -15,12 +15,12 @@
 
 namespace tetwarp {
 
-/// Type of one component of an image's pixels: short for Image<short, 3>, for Image<Vector<short, 2>, 3>, and for
+/// Type of one component of an image's pixels: short for Image<short, 3>, Image<Vector<short, 2>, 3> and
 /// VectorImage<short, 3>.
 template <class TImage>
 using ComponentOf = typename itk::DefaultConvertPixelTraits<typename TImage::PixelType>::ComponentType;
 
-/// The VoxelType of a component, by its kind, size and sign: `char` has one too.
+/// The VoxelType of a component, by its kind, size and sign, so that `char` has one too.
 template <class Component>
 constexpr VoxelType component_type_of() {
   static_assert(std::is_arithmetic_v<Component>, "Tetwarp samples pixels of numbers");
@@ -38,8 +38,9 @@ constexpr VoxelType component_type_of() {
     return kSigned ? VoxelType::i32 : VoxelType::u32;
 }
 
-/// What an image buffers, where it is: no copy. The image must be an itk::Image of numbers or of arrays of them
+/// A view of what an image buffers, without a copy. The image must be an itk::Image of numbers or of arrays of numbers
 /// (RGBPixel, Vector, FixedArray, SymmetricSecondRankTensor and so on), or an itk::VectorImage.
+/// @param image     the image, which must outlive the view
 /// @param geometry  `geometry_of(image)`, which must outlive the view
 template <class TImage>
 auto view_of(TImage& image, const Geometry& geometry) {
@@ -56,18 +57,23 @@ auto view_of(TImage& image, const Geometry& geometry) {
                          Memory::host};
 }
 
-/// Pixels that something else owns: it is kept as long as the container.
+/// A pixel container for memory that something else owns. It keeps the owner alive.
 template <class Pixel>
 class KeepingImageContainer : public itk::ImportImageContainer<itk::SizeValueType, Pixel> {
  public:
   ITK_DISALLOW_COPY_AND_MOVE(KeepingImageContainer);
+  /** This class. */
   using Self = KeepingImageContainer;
+  /** The class from which this one is derived. */
   using Superclass = itk::ImportImageContainer<itk::SizeValueType, Pixel>;
+  /** Pointer that shares ownership. */
   using Pointer = itk::SmartPointer<Self>;
+  /** Pointer that shares ownership, for reading only. */
   using ConstPointer = itk::SmartPointer<const Self>;
   itkNewMacro(Self);
   itkTypeMacro(KeepingImageContainer, ImportImageContainer);
 
+  /// Refers to `count` pixels and keeps their owner alive.
   void Keep(Pixel* pixels, itk::SizeValueType count, std::shared_ptr<void> owner) {
     this->SetImportPointer(pixels, count, false);
     owner_ = std::move(owner);
@@ -81,8 +87,9 @@ class KeepingImageContainer : public itk::ImportImageContainer<itk::SizeValueTyp
   std::shared_ptr<void> owner_;
 };
 
-/// A volume as an image, without a copy: the image owns the volume.
-/// @throws InputError unless the volume holds what TImage's pixels are made of, and for unevenly distant slices
+/// A volume as an image that owns it, without a copy.
+/// @throws InputError unless the volume has the type and components of TImage's pixels, and for slices at unequal
+///         distances
 template <class TImage>
 typename TImage::Pointer image_of(AnyVolume&& volume) {
   const auto owner = std::make_shared<AnyVolume>(std::move(volume));

@@ -32,21 +32,28 @@ class ITK_TEMPLATE_EXPORT DisplacementFieldToVertexFieldFilter : public VertexFi
  public:
   ITK_DISALLOW_COPY_AND_MOVE(DisplacementFieldToVertexFieldFilter);
 
+  /** This class. */
   using Self = DisplacementFieldToVertexFieldFilter;
+  /** The class from which this one is derived. */
   using Superclass = VertexFieldSource;
+  /** Pointer that shares ownership. */
   using Pointer = SmartPointer<Self>;
+  /** Pointer that shares ownership, for reading only. */
   using ConstPointer = SmartPointer<const Self>;
 
   itkNewMacro(Self);
   itkTypeMacro(DisplacementFieldToVertexFieldFilter, VertexFieldSource);
 
+  /** Image of displacements. */
   using DisplacementFieldType = TDisplacementField;
 
-  /** Deformed minus undeformed point, LPS mm. Required. */
+  /** Inputs of ITK's process objects. */
   using Superclass::SetInput;
+  /** The displacement image: deformed minus undeformed point, LPS mm. Required. */
   void SetInput(const DisplacementFieldType* image) {
     this->ProcessObject::SetNthInput(0, const_cast<DisplacementFieldType*>(image));
   }
+  /** The displacement image. */
   const DisplacementFieldType* GetInput() const {
     return static_cast<const DisplacementFieldType*>(this->GetPrimaryInput());
   }
@@ -55,7 +62,9 @@ class ITK_TEMPLATE_EXPORT DisplacementFieldToVertexFieldFilter : public VertexFi
   DisplacementFieldToVertexFieldFilter() { this->SetNumberOfRequiredInputs(1); }
   ~DisplacementFieldToVertexFieldFilter() override = default;
 
+  /** A VertexField has no information to make before its data. */
   void GenerateOutputInformation() override {}
+  /** Makes the output. */
   void GenerateData() override {
     tetwarp::translate_errors(*this, [this] {
       const auto held = tetwarp::hold_displacements(*this->GetInput());

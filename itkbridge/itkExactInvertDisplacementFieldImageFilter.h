@@ -40,9 +40,13 @@ class ITK_TEMPLATE_EXPORT ExactInvertDisplacementFieldImageFilter
  public:
   ITK_DISALLOW_COPY_AND_MOVE(ExactInvertDisplacementFieldImageFilter);
 
+  /** This class. */
   using Self = ExactInvertDisplacementFieldImageFilter;
+  /** The class from which this one is derived. */
   using Superclass = OutputGridFilter<ImageToImageFilter<TInputImage, TOutputImage>>;
+  /** Pointer that shares ownership. */
   using Pointer = SmartPointer<Self>;
+  /** Pointer that shares ownership, for reading only. */
   using ConstPointer = SmartPointer<const Self>;
 
   itkNewMacro(Self);
@@ -57,14 +61,18 @@ class ITK_TEMPLATE_EXPORT ExactInvertDisplacementFieldImageFilter
   ExactInvertDisplacementFieldImageFilter() = default;
   ~ExactInvertDisplacementFieldImageFilter() override = default;
 
+  /** The field, up to date. */
   tetwarp::HeldField GetHeldField() override {
     const auto held = m_Held.hold(*this->GetInput());
     return {tetwarp::FieldView{&held->grid, held->displacement}, held};
   }
+  /** The grid of the input. */
   void GenerateDefaultGrid() override { this->GetOutput()->CopyInformation(this->GetInput()); }
+  /** Requests the whole input, for any part of it may come to lie in a region of the output. */
   void GenerateInputRequestedRegion() override {
     const_cast<TInputImage*>(this->GetInput())->SetRequestedRegionToLargestPossibleRegion();
   }
+  /** Makes the output. */
   void GenerateData() override {
     this->AllocateOutputs();
     this->ResampleRequestedRegion([](const tetwarp::VolumeView& output, std::vector<tetwarp::Target>&,

@@ -12,21 +12,21 @@
 
 namespace itk {
 /** \class OutputGridFilter
- * \brief What filters share that make an image on an output grid by a field.
+ * \brief Base of filters that make an image on an output grid from a field.
  *
  * It stands between such a filter and its ITK base class `TSuperclass`, whose output is one 3-D image.
  *
  * The grid is set as in `ResampleImageFilter`: by a reference image (`SetReferenceImage`, `UseReferenceImageOn`), by
  * `SetSize`, `SetOutputSpacing`, `SetOutputOrigin`, `SetOutputDirection` and `SetOutputStartIndex`, or by
- * `SetOutputParametersFromImage`. A filter that takes an image has that image's grid when neither is done. Only the
- * information of the reference image is used; `SetOutputParametersFromImage` spares the pipeline that reads it.
+ * `SetOutputParametersFromImage`. If nothing is set, a filter whose input is an image uses the grid of that image. Only
+ * the information of a reference image is used, never its pixels.
  *
  * `SetBackend` says where the work is done: `"auto"` (CUDA where a device works, otherwise the CPU: the same bits, and
  * one warning in a process), `"cpu"`, or `"cuda"`, which throws without a device. On the CPU there are as many threads
  * as there are work units, up to the maximum of the multi-threader.
  *
- * Any region may be requested, any number of stream divisions gives the same bits. A field that was prepared is kept
- * for the next region. `ProgressEvent`s come from the thread that called Update, from 0 to 1; `AbortGenerateData` ends
+ * Any region may be requested, and any number of stream divisions gives the same bits. The prepared field is kept for
+ * the next region. `ProgressEvent`s come from the thread that called Update, from 0 to 1; `AbortGenerateData` ends
  * the work within 100 ms by `ProcessAborted`. Errors are `ExceptionObject`s.
  *
  * \ingroup Tetwarp */
@@ -35,78 +35,106 @@ class ITK_TEMPLATE_EXPORT OutputGridFilter : public TSuperclass {
  public:
   ITK_DISALLOW_COPY_AND_MOVE(OutputGridFilter);
 
+  /** This class. */
   using Self = OutputGridFilter;
+  /** The class from which this one is derived. */
   using Superclass = TSuperclass;
+  /** Pointer that shares ownership. */
   using Pointer = SmartPointer<Self>;
+  /** Pointer that shares ownership, for reading only. */
   using ConstPointer = SmartPointer<const Self>;
 
   itkTypeMacro(OutputGridFilter, TSuperclass);
 
+  /** Type of the output. */
   using OutputImageType = typename Superclass::OutputImageType;
+  /** Number of axes, 3. */
   static constexpr unsigned int OutputImageDimension = OutputImageType::ImageDimension;
   static_assert(OutputImageDimension == 3, "Tetwarp deforms 3-D images");
 
+  /** Number of samples along each axis. */
   using SizeType = typename OutputImageType::SizeType;
+  /** Index of a voxel. */
   using IndexType = typename OutputImageType::IndexType;
+  /** mm between samples along each axis. */
   using SpacingType = typename OutputImageType::SpacingType;
+  /** Point, LPS mm. */
   using OriginPointType = typename OutputImageType::PointType;
+  /** Matrix whose columns are the directions of the axes. */
   using DirectionType = typename OutputImageType::DirectionType;
+  /** Type of an image that gives a grid. */
   using ReferenceImageBaseType = ImageBase<OutputImageDimension>;
+  /** Choices of `SetOutside`. */
   using OutsideEnum = tetwarp::Outside;
 
-  /** Voxels along each axis of the output; zero (the default): see the class. */
+  /** Number of voxels along each axis of the output; zero (the default): a reference image or the filter's own default
+   * decides. */
   itkSetMacro(Size, SizeType);
+  /** The value that `SetSize` set. */
   itkGetConstReferenceMacro(Size, SizeType);
 
   /** Index of the first voxel of the output. */
   itkSetMacro(OutputStartIndex, IndexType);
+  /** The value that `SetOutputStartIndex` set. */
   itkGetConstReferenceMacro(OutputStartIndex, IndexType);
 
-  /** Millimetres between voxels; 1 by default. */
+  /** Distance of voxels along each axis, mm; 1 by default. */
   itkSetMacro(OutputSpacing, SpacingType);
+  /** The value that `SetOutputSpacing` set. */
   itkGetConstReferenceMacro(OutputSpacing, SpacingType);
 
-  /** LPS mm of index (0, 0, 0). */
+  /** Place of index (0, 0, 0), LPS mm; 0 by default. */
   itkSetMacro(OutputOrigin, OriginPointType);
+  /** The value that `SetOutputOrigin` set. */
   itkGetConstReferenceMacro(OutputOrigin, OriginPointType);
 
+  /** Directions of the axes, columns in LPS; the identity by default. */
   itkSetMacro(OutputDirection, DirectionType);
+  /** The value that `SetOutputDirection` set. */
   itkGetConstReferenceMacro(OutputDirection, DirectionType);
 
-  /** Takes size, start index, spacing, origin and direction over, now. */
+  /** Copies size, start index, spacing, origin and direction of an image now. */
   void SetOutputParametersFromImage(const ReferenceImageBaseType* image);
 
-  /** An image that has the grid wanted; used after UseReferenceImageOn. */
+  /** An image with the output's grid, which counts after `UseReferenceImageOn`. */
   itkSetInputMacro(ReferenceImage, ReferenceImageBaseType);
+  /** The value that `SetReferenceImage` set. */
   itkGetInputMacro(ReferenceImage, ReferenceImageBaseType);
+  /** Whether the reference image gives the grid. Off by default. */
   itkSetMacro(UseReferenceImage, bool);
+  /** The value that `SetUseReferenceImage` set. */
   itkGetConstMacro(UseReferenceImage, bool);
+  /** Calls `SetUseReferenceImage(true)`; UseReferenceImageOff calls `SetUseReferenceImage(false)`. */
   itkBooleanMacro(UseReferenceImage);
 
-  /** What becomes of voxels that the undeformed lattice or mesh (or the grid of a pull field) does not hold:
+  /** What becomes of voxels outside the undeformed lattice or mesh (or the grid of a pull field):
    * `tetwarp::Outside::refuse` throws (the default), `rest` leaves them where they are, `background` gives them the
    * default pixel value. */
   itkSetMacro(Outside, OutsideEnum);
+  /** The value that `SetOutside` set. */
   itkGetConstMacro(Outside, OutsideEnum);
 
-  /** `auto` (the default), `cpu` or `cuda`. */
+  /** Where the work is done: "auto" (the default), "cpu" or "cuda". */
   void SetBackend(const std::string& backend);
+  /** The value that `SetBackend` set. */
   const std::string& GetBackend() const { return m_Options.backend; }
 
-  /** Number of the CUDA device. */
+  /** Number of the CUDA device; 0 by default. */
   void SetDevice(int device);
+  /** The value that `SetDevice` set. */
   int GetDevice() const { return m_Options.device; }
 
-  /** Bytes on the device for fields, sources and results; what does not fit is streamed through it with the same bits.
-   * 0 (the default): what is free there. */
+  /** Bytes of device memory for fields, sources and results; 0 (the default): what is free. What does not fit is
+   * streamed through the device with the same bits. */
   void SetDeviceMemory(std::uint64_t bytes);
+  /** The value that `SetDeviceMemory` set. */
   std::uint64_t GetDeviceMemory() const { return m_Options.device_memory; }
 
-  /** Where the last work was done, `cpu` or `cuda`; empty before. */
+  /** Where the last work was done, "cpu" or "cuda"; empty before. */
   const std::string& GetUsedBackend() const { return m_Resampler.backend(); }
 
-  /** What happened in the last call of GenerateData: voxels covered, tetrahedra inverted and so on. Reports of regions
-   * add up (`+=`). */
+  /** What happened when the output was last made: voxels covered, tetrahedra inverted and so on. Reports of regions add
+   * up (`+=`). */
   const tetwarp::Report& GetReport() const { return m_Report; }
 
  protected:
@@ -115,24 +143,27 @@ class ITK_TEMPLATE_EXPORT OutputGridFilter : public TSuperclass {
 
   /** The field, up to date. */
   virtual tetwarp::HeldField GetHeldField() = 0;
-  /** Gives the output the grid that it has when none is set. Throws where there is no such grid. */
+  /** Gives the output its grid when none is set. Throws where there is no such grid. */
   virtual void GenerateDefaultGrid() = 0;
 
+  /** Gives the output its grid. */
   void GenerateOutputInformation() override;
-  /** Inputs need not lie on one grid. */
+  /** Does nothing: inputs need not lie on one grid. */
   void VerifyInputInformation() ITKv5_CONST override {}
 
-  /** Gives the resampler the field unless it has it. Whether there was something to do. */
+  /** Gives the resampler the field unless it has it. Returns whether anything had to be done. */
   bool PrepareField(tetwarp::ProgressShare share);
-  /** Makes the requested region of the output, which is allocated. `make` turns a view of it into what is asked for:
+  /** Fills the requested region of the allocated output. `make` turns a view of the output into targets and maps:
    * \code
    * void make(const tetwarp::VolumeView & output, std::vector<tetwarp::Target> & targets, tetwarp::Maps & maps);
    * \endcode */
   template <typename TMake>
   void ResampleRequestedRegion(TMake&& make);
 
+  /** The resampler with the present field. */
   const tetwarp::PipelineResampler& GetResampler() const { return m_Resampler; }
 
+  /** Prints settings and state, as every class of ITK does. */
   void PrintSelf(std::ostream& os, Indent indent) const override;
 
  private:

@@ -39,32 +39,41 @@ class ITK_TEMPLATE_EXPORT PullFieldResampleImageFilter : public FieldResampleIma
  public:
   ITK_DISALLOW_COPY_AND_MOVE(PullFieldResampleImageFilter);
 
+  /** This class. */
   using Self = PullFieldResampleImageFilter;
+  /** The class from which this one is derived. */
   using Superclass = FieldResampleImageFilter<TInputImage, TOutputImage>;
+  /** Pointer that shares ownership. */
   using Pointer = SmartPointer<Self>;
+  /** Pointer that shares ownership, for reading only. */
   using ConstPointer = SmartPointer<const Self>;
 
   itkNewMacro(Self);
   itkTypeMacro(PullFieldResampleImageFilter, FieldResampleImageFilter);
 
+  /** Image of displacements. */
   using DisplacementFieldType = TDisplacementField;
 
-  /** Input point minus output point, LPS mm. Required. */
+  /** The pull field: input point minus output point, LPS mm. Required. */
   itkSetInputMacro(DisplacementField, DisplacementFieldType);
+  /** The value that `SetDisplacementField` set. */
   itkGetInputMacro(DisplacementField, DisplacementFieldType);
 
  protected:
   PullFieldResampleImageFilter() { this->AddRequiredInputName("DisplacementField"); }
   ~PullFieldResampleImageFilter() override = default;
 
+  /** The field, up to date. */
   tetwarp::HeldField GetHeldField() override {
     const auto held = m_Held.hold(*this->GetDisplacementField());
     return {tetwarp::PullFieldView{&held->grid, held->displacement}, held};
   }
+  /** Lets the pipeline make the whole field. */
   void UpdateFieldInput() override {
     this->RequestFieldInput();
     this->Field().Update();
   }
+  /** Requests the whole field. */
   void RequestFieldInput() override { this->Field().SetRequestedRegionToLargestPossibleRegion(); }
 
  private:

@@ -37,50 +37,72 @@ class ITK_TEMPLATE_EXPORT TransformToVertexFieldFilter : public VertexFieldSourc
  public:
   ITK_DISALLOW_COPY_AND_MOVE(TransformToVertexFieldFilter);
 
+  /** This class. */
   using Self = TransformToVertexFieldFilter;
+  /** The class from which this one is derived. */
   using Superclass = VertexFieldSource;
+  /** Pointer that shares ownership. */
   using Pointer = SmartPointer<Self>;
+  /** Pointer that shares ownership, for reading only. */
   using ConstPointer = SmartPointer<const Self>;
 
   itkNewMacro(Self);
   itkTypeMacro(TransformToVertexFieldFilter, VertexFieldSource);
 
+  /** Type of the transform. */
   using TransformType = Transform<TParametersValueType, 3, 3>;
+  /** Type of an image that gives a grid. */
   using ReferenceImageBaseType = ImageBase<3>;
+  /** Number of samples along each axis. */
   using SizeType = ReferenceImageBaseType::SizeType;
+  /** mm between samples along each axis. */
   using SpacingType = ReferenceImageBaseType::SpacingType;
+  /** Point, LPS mm. */
   using OriginPointType = ReferenceImageBaseType::PointType;
+  /** Matrix whose columns are the directions of the axes. */
   using DirectionType = ReferenceImageBaseType::DirectionType;
 
-  /** Maps undeformed to deformed points, LPS mm. Required. */
+  /** The transform, which maps undeformed to deformed points, LPS mm. Required. */
   itkSetGetDecoratedObjectInputMacro(Transform, TransformType);
 
-  /** An image whose grid the lattice lies over; its pixels are not used. */
+  /** An image over whose grid the lattice lies. Its pixels are not used. */
   itkSetInputMacro(ReferenceImage, ReferenceImageBaseType);
+  /** The value that `SetReferenceImage` set. */
   itkGetInputMacro(ReferenceImage, ReferenceImageBaseType);
 
-  /** Voxels of the reference image between vertices, 2 by default. The last cells may overhang it. */
+  /** Voxels of the reference image between two vertices; 2 by default. The last cells may extend beyond it. */
   itkSetMacro(CellSize, SizeValueType);
+  /** The value that `SetCellSize` set. */
   itkGetConstMacro(CellSize, SizeValueType);
 
-  /** Vertices along each axis of a lattice of its own; zero (the default): the reference image decides. */
+  /** Vertices along each axis of a lattice of its own; zero (the default): the reference image gives the lattice. */
   itkSetMacro(Size, SizeType);
+  /** The value that `SetSize` set. */
   itkGetConstReferenceMacro(Size, SizeType);
+  /** Distance of vertices of a lattice of its own, mm; 1 by default. */
   itkSetMacro(OutputSpacing, SpacingType);
+  /** The value that `SetOutputSpacing` set. */
   itkGetConstReferenceMacro(OutputSpacing, SpacingType);
+  /** Place of the first vertex of a lattice of its own, LPS mm; 0 by default. */
   itkSetMacro(OutputOrigin, OriginPointType);
+  /** The value that `SetOutputOrigin` set. */
   itkGetConstReferenceMacro(OutputOrigin, OriginPointType);
+  /** Directions of the axes of a lattice of its own, columns in LPS; the identity by default. */
   itkSetMacro(OutputDirection, DirectionType);
+  /** The value that `SetOutputDirection` set. */
   itkGetConstReferenceMacro(OutputDirection, DirectionType);
 
  protected:
   TransformToVertexFieldFilter();
   ~TransformToVertexFieldFilter() override = default;
 
+  /** A VertexField has no information to make before its data. */
   void GenerateOutputInformation() override {}
-  /** The reference image's pixels are not asked for. */
+  /** Requests nothing: pixels of the reference image are not used. */
   void GenerateInputRequestedRegion() override {}
+  /** Makes the output. */
   void GenerateData() override;
+  /** Prints settings and state, as every class of ITK does. */
   void PrintSelf(std::ostream& os, Indent indent) const override;
 
  private:

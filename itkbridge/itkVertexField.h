@@ -35,40 +35,45 @@ class VertexField : public DataObject {
  public:
   ITK_DISALLOW_COPY_AND_MOVE(VertexField);
 
+  /** This class. */
   using Self = VertexField;
+  /** The class from which this one is derived. */
   using Superclass = DataObject;
+  /** Pointer that shares ownership. */
   using Pointer = SmartPointer<Self>;
+  /** Pointer that shares ownership, for reading only. */
   using ConstPointer = SmartPointer<const Self>;
 
   itkNewMacro(Self);
   itkTypeMacro(VertexField, DataObject);
 
-  /** Takes a field over. Throws ExceptionObject unless there is one displacement for each vertex. */
+  /** Takes over a field. Throws ExceptionObject unless there is one displacement for each vertex. */
   void SetField(tetwarp::VertexField field);
 
-  /** Uses a field where it is, in host or device memory. All that the view points to must stay as it is while `owner`
-   * is kept. The view's `outside` is not used: filters have their own. */
+  /** Uses a field in place, in host or device memory. What the view points to must not change while `owner` is kept.
+   * The view's `outside` is ignored, for filters have their own. */
   void SetView(const tetwarp::FieldView& view, std::shared_ptr<const void> owner);
 
-  /** The field as a resampler takes it. Throws ExceptionObject when there is none. */
+  /** The field for a resampler. Throws ExceptionObject when there is none. */
   tetwarp::FieldView GetView(tetwarp::Outside outside = tetwarp::Outside::refuse) const;
 
-  /** Whoever holds a copy of this keeps what the view points to; equal pointers are the same field. */
+  /** A copy of this pointer keeps alive what the view points to. Equal pointers are the same field. */
   const std::shared_ptr<const void>& GetOwner() const { return m_Owner; }
 
-  /** Grid of the undeformed vertices. Throws ExceptionObject for a mesh that stands alone. */
+  /** The grid of the undeformed vertices. Throws ExceptionObject for a mesh that stands alone. */
   const tetwarp::Geometry& GetLattice() const;
 
   /** Forgets the field. */
   void Initialize() override;
 
-  /** Shares the field of another VertexField: no copy. Throws ExceptionObject for anything else. */
+  /** Shares the field of another VertexField without a copy. Throws ExceptionObject for any other object. */
   void Graft(const DataObject* data) override;
 
  protected:
   VertexField() = default;
   ~VertexField() override = default;
 
+  /** Prints settings and state, as every class of ITK does. */
   void PrintSelf(std::ostream& os, Indent indent) const override;
 
  private:

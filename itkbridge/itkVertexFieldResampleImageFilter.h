@@ -9,7 +9,7 @@
 
 namespace itk {
 /** \class VertexFieldResampleImageFilter
- * \brief Deforms an image by a forward field: each voxel gets what the one tetrahedron that owns it carried there.
+ * \brief Deforms an image by a forward field: each voxel gets what its one owning tetrahedron carried there.
  *
  * No inverse is needed, and none is approximated: in exact arithmetic one deformed tetrahedron owns each voxel of the
  * output, and the image is sampled once, where that voxel was in the undeformed volume (docs/algorithm.md). The program
@@ -31,27 +31,35 @@ class ITK_TEMPLATE_EXPORT VertexFieldResampleImageFilter : public FieldResampleI
  public:
   ITK_DISALLOW_COPY_AND_MOVE(VertexFieldResampleImageFilter);
 
+  /** This class. */
   using Self = VertexFieldResampleImageFilter;
+  /** The class from which this one is derived. */
   using Superclass = FieldResampleImageFilter<TInputImage, TOutputImage>;
+  /** Pointer that shares ownership. */
   using Pointer = SmartPointer<Self>;
+  /** Pointer that shares ownership, for reading only. */
   using ConstPointer = SmartPointer<const Self>;
 
   itkNewMacro(Self);
   itkTypeMacro(VertexFieldResampleImageFilter, FieldResampleImageFilter);
 
-  /** Where the vertices go. Required. */
+  /** The forward field. Required. */
   itkSetInputMacro(VertexField, VertexField);
+  /** The value that `SetVertexField` set. */
   itkGetInputMacro(VertexField, VertexField);
 
  protected:
   VertexFieldResampleImageFilter() { this->AddRequiredInputName("VertexField"); }
   ~VertexFieldResampleImageFilter() override = default;
 
+  /** The field, up to date. */
   tetwarp::HeldField GetHeldField() override {
     const VertexField* const field = this->GetVertexField();
     return {field->GetView(), field->GetOwner()};
   }
+  /** Lets the pipeline make the whole field. */
   void UpdateFieldInput() override { const_cast<VertexField*>(this->GetVertexField())->Update(); }
+  /** Requests the whole field. */
   void RequestFieldInput() override {
     const_cast<VertexField*>(this->GetVertexField())->SetRequestedRegionToLargestPossibleRegion();
   }

@@ -10,7 +10,7 @@ namespace itk {
 /** \class VertexFieldToCoverageFilter
  * \brief 1 where a forward field brings something to a voxel, 0 where it does not.
  *
- * It does not ask whether an image has a value there. `SetOutside` counts: what rests is covered.
+ * It does not matter whether an image has a value there. Voxels that rest, by `SetOutside`, are covered.
  *
  * \code
  * auto coverage = itk::VertexFieldToCoverageFilter<>::New();
@@ -25,9 +25,13 @@ class ITK_TEMPLATE_EXPORT VertexFieldToCoverageFilter : public VertexFieldToImag
  public:
   ITK_DISALLOW_COPY_AND_MOVE(VertexFieldToCoverageFilter);
 
+  /** This class. */
   using Self = VertexFieldToCoverageFilter;
+  /** The class from which this one is derived. */
   using Superclass = VertexFieldToImageFilter<TOutputImage>;
+  /** Pointer that shares ownership. */
   using Pointer = SmartPointer<Self>;
+  /** Pointer that shares ownership, for reading only. */
   using ConstPointer = SmartPointer<const Self>;
 
   itkNewMacro(Self);
@@ -40,6 +44,7 @@ class ITK_TEMPLATE_EXPORT VertexFieldToCoverageFilter : public VertexFieldToImag
   VertexFieldToCoverageFilter() = default;
   ~VertexFieldToCoverageFilter() override = default;
 
+  /** The map that fills the output. */
   tetwarp::Maps GetMaps(const tetwarp::VolumeView& output) const override { return {.coverage = output}; }
 };
 }  // namespace itk

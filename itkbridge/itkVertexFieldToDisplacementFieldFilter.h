@@ -35,9 +35,13 @@ class ITK_TEMPLATE_EXPORT VertexFieldToDisplacementFieldFilter : public ImageSou
  public:
   ITK_DISALLOW_COPY_AND_MOVE(VertexFieldToDisplacementFieldFilter);
 
+  /** This class. */
   using Self = VertexFieldToDisplacementFieldFilter;
+  /** The class from which this one is derived. */
   using Superclass = ImageSource<TOutputImage>;
+  /** Pointer that shares ownership. */
   using Pointer = SmartPointer<Self>;
+  /** Pointer that shares ownership, for reading only. */
   using ConstPointer = SmartPointer<const Self>;
 
   itkNewMacro(Self);
@@ -47,14 +51,16 @@ class ITK_TEMPLATE_EXPORT VertexFieldToDisplacementFieldFilter : public ImageSou
   static_assert(sizeof(typename TOutputImage::PixelType) == 3 * sizeof(tetwarp::ComponentOf<TOutputImage>),
                 "the output's pixels must be three numbers, such as Vector<float, 3>");
 
-  /** Required. */
+  /** The forward field. Required. */
   itkSetInputMacro(VertexField, VertexField);
+  /** The value that `SetVertexField` set. */
   itkGetInputMacro(VertexField, VertexField);
 
  protected:
   VertexFieldToDisplacementFieldFilter() { this->AddRequiredInputName("VertexField"); }
   ~VertexFieldToDisplacementFieldFilter() override = default;
 
+  /** Gives the output the grid of the lattice, for which the field must be up to date. */
   void GenerateOutputInformation() override {
     const_cast<VertexField*>(this->GetVertexField())->Update();
     const tetwarp::FieldView view = this->GetVertexField()->GetView();
@@ -62,9 +68,11 @@ class ITK_TEMPLATE_EXPORT VertexFieldToDisplacementFieldFilter : public ImageSou
     if (view.memory != tetwarp::Memory::host) itkExceptionMacro(<< "the field is in device memory");
     tetwarp::set_geometry(*this->GetOutput(), *view.lattice);
   }
+  /** Makes the whole output, whatever region is requested. */
   void EnlargeOutputRequestedRegion(DataObject* output) override {
     output->SetRequestedRegionToLargestPossibleRegion();
   }
+  /** Makes the output. */
   void GenerateData() override {
     this->AllocateOutputs();
     const tetwarp::FieldView view = this->GetVertexField()->GetView();

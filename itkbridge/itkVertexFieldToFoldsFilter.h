@@ -26,9 +26,13 @@ class ITK_TEMPLATE_EXPORT VertexFieldToFoldsFilter : public VertexFieldToImageFi
  public:
   ITK_DISALLOW_COPY_AND_MOVE(VertexFieldToFoldsFilter);
 
+  /** This class. */
   using Self = VertexFieldToFoldsFilter;
+  /** The class from which this one is derived. */
   using Superclass = VertexFieldToImageFilter<TOutputImage>;
+  /** Pointer that shares ownership. */
   using Pointer = SmartPointer<Self>;
+  /** Pointer that shares ownership, for reading only. */
   using ConstPointer = SmartPointer<const Self>;
 
   itkNewMacro(Self);
@@ -41,6 +45,7 @@ class ITK_TEMPLATE_EXPORT VertexFieldToFoldsFilter : public VertexFieldToImageFi
   VertexFieldToFoldsFilter() = default;
   ~VertexFieldToFoldsFilter() override = default;
 
+  /** The map that fills the output. */
   tetwarp::Maps GetMaps(const tetwarp::VolumeView& output) const override { return {.owners = output}; }
 };
 }  // namespace itk

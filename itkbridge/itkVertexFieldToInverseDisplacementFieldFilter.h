@@ -37,9 +37,13 @@ class ITK_TEMPLATE_EXPORT VertexFieldToInverseDisplacementFieldFilter : public V
  public:
   ITK_DISALLOW_COPY_AND_MOVE(VertexFieldToInverseDisplacementFieldFilter);
 
+  /** This class. */
   using Self = VertexFieldToInverseDisplacementFieldFilter;
+  /** The class from which this one is derived. */
   using Superclass = VertexFieldToImageFilter<TOutputImage>;
+  /** Pointer that shares ownership. */
   using Pointer = SmartPointer<Self>;
+  /** Pointer that shares ownership, for reading only. */
   using ConstPointer = SmartPointer<const Self>;
 
   itkNewMacro(Self);
@@ -53,6 +57,7 @@ class ITK_TEMPLATE_EXPORT VertexFieldToInverseDisplacementFieldFilter : public V
   VertexFieldToInverseDisplacementFieldFilter() = default;
   ~VertexFieldToInverseDisplacementFieldFilter() override = default;
 
+  /** The map that fills the output. */
   tetwarp::Maps GetMaps(const tetwarp::VolumeView& output) const override { return {.inverse_mm = output}; }
 };
 }  // namespace itk

@@ -35,9 +35,13 @@ class ITK_TEMPLATE_EXPORT VertexFieldToJacobianDeterminantFilter : public Vertex
  public:
   ITK_DISALLOW_COPY_AND_MOVE(VertexFieldToJacobianDeterminantFilter);
 
+  /** This class. */
   using Self = VertexFieldToJacobianDeterminantFilter;
+  /** The class from which this one is derived. */
   using Superclass = VertexFieldToImageFilter<TOutputImage>;
+  /** Pointer that shares ownership. */
   using Pointer = SmartPointer<Self>;
+  /** Pointer that shares ownership, for reading only. */
   using ConstPointer = SmartPointer<const Self>;
 
   itkNewMacro(Self);
@@ -49,6 +53,7 @@ class ITK_TEMPLATE_EXPORT VertexFieldToJacobianDeterminantFilter : public Vertex
   VertexFieldToJacobianDeterminantFilter() = default;
   ~VertexFieldToJacobianDeterminantFilter() override = default;
 
+  /** The map that fills the output. */
   tetwarp::Maps GetMaps(const tetwarp::VolumeView& output) const override { return {.jacobian = output}; }
 };
 }  // namespace itk

@@ -35,32 +35,43 @@ class ITK_TEMPLATE_EXPORT VertexFieldToMeshFilter : public MeshSource<TOutputMes
  public:
   ITK_DISALLOW_COPY_AND_MOVE(VertexFieldToMeshFilter);
 
+  /** This class. */
   using Self = VertexFieldToMeshFilter;
+  /** The class from which this one is derived. */
   using Superclass = MeshSource<TOutputMesh>;
+  /** Pointer that shares ownership. */
   using Pointer = SmartPointer<Self>;
+  /** Pointer that shares ownership, for reading only. */
   using ConstPointer = SmartPointer<const Self>;
 
   itkNewMacro(Self);
   itkTypeMacro(VertexFieldToMeshFilter, MeshSource);
 
+  /** Type of the mesh. */
   using MeshType = TOutputMesh;
   static_assert(TOutputMesh::PointDimension == 3, "Tetwarp deforms 3-D meshes");
 
-  /** Required. */
+  /** The forward field. Required. */
   itkSetInputMacro(VertexField, VertexField);
+  /** The value that `SetVertexField` set. */
   itkGetInputMacro(VertexField, VertexField);
 
-  /** Whether points are where they go, not at rest. Off by default. */
+  /** Whether points are deformed, not undeformed. Off by default. */
   itkSetMacro(Deformed, bool);
+  /** The value that `SetDeformed` set. */
   itkGetConstMacro(Deformed, bool);
+  /** Calls `SetDeformed(true)`; DeformedOff calls `SetDeformed(false)`. */
   itkBooleanMacro(Deformed);
 
  protected:
   VertexFieldToMeshFilter() { this->AddRequiredInputName("VertexField"); }
   ~VertexFieldToMeshFilter() override = default;
 
+  /** A VertexField has no information to make before its data. */
   void GenerateOutputInformation() override {}
+  /** Makes the output. */
   void GenerateData() override;
+  /** Prints settings and state, as every class of ITK does. */
   void PrintSelf(std::ostream& os, Indent indent) const override;
 
  private:

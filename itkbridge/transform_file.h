@@ -48,12 +48,12 @@ struct LoadedTransform {
   TransformFunction map;
 };
 
-// What the module of these files is asked for (io/fields/transform_file.cpp loads it).
-/// `read_transform` and `make_transform`.
+/// Entry point of the module, which io/fields/transform_file.cpp loads: `read_transform`, then `make_transform`.
 extern "C" void tetwarp_load_transform(const std::filesystem::path& path, const std::stop_token& stop,
                                        LoadedTransform& loaded);
-/// The files that `read_transform` reads: the one that is named, and of elastix its initial transforms. Parameters are
-/// not looked at. @throws InputError for a file that is missing, or initial transforms that lead in a circle
+/// Entry point of the module: the files that `read_transform` reads, which are the file itself and the initial
+/// transforms of elastix. Parameters are not checked.
+/// @throws InputError for a file that is missing, or initial transforms that form a circle
 extern "C" void tetwarp_transform_files(const std::filesystem::path& path, std::vector<std::filesystem::path>& files);
 
 }  // namespace tetwarp

@@ -16,7 +16,8 @@ struct BatchCase {
   std::string id;
   std::size_t line = 0;                ///< of the manifest
   std::vector<std::string> arguments;  ///< of the `tetwarp deform` that repeats it, INPUT first
-  /// The same with inputs as the manifest names them, and outputs by their names alone: wherever both lie now.
+  /// The arguments with inputs as the manifest names them, and outputs without their folder, so that they are equal
+  /// wherever both lie.
   std::vector<std::string> row;
   DeformOptions options;  ///< as parsed from them; all outputs lie in OUTPUT_DIR/ID
 };

@@ -16,7 +16,8 @@
 
 namespace tetwarp::apps {
 
-/// Memory that cases hold together, granted in the order in which they ask: a large case is not passed over for ever.
+/// Memory that all running cases share, granted in the order of requests, so that a large case is not overtaken for
+/// ever.
 class MemoryBudget {
  public:
   explicit MemoryBudget(std::uint64_t bytes) : bytes_(bytes) {}
@@ -34,7 +35,9 @@ class MemoryBudget {
     std::uint64_t bytes_;
   };
 
-  /// Waits until so much is free. @throws Error for more than there ever is, Cancelled when it has to stop
+  /// Waits until so many bytes are free.
+  /// @throws Error for more than the whole budget
+  /// @throws Cancelled when a stop is requested
   Grant wait_for(std::uint64_t bytes, const std::stop_token& stop);
   std::uint64_t bytes() const { return bytes_; }
 
@@ -45,18 +48,19 @@ class MemoryBudget {
   std::condition_variable_any changed_;
 };
 
-/// Who resamples: every CUDA device that works, a few cases at a time, or the processor, one case at a time. Cases take
-/// whichever is free.
+/// Places at which a case can resample: on every CUDA device that works, several cases at a time, or on the CPU, one
+/// case at a time. Cases take any free place.
 class Devices {
  public:
   /// Cases that share a CUDA device: while one computes there, others copy, and a simulation leaves room for more.
   static constexpr int kPlaces = 3;
   enum class Share { with_others, alone };
 
-  /// @param wanted  auto, cpu or cuda. @param cuda  how many devices there are
+  /// @param wanted  "auto", "cpu" or "cuda"
+  /// @param cuda    number of CUDA devices
   Devices(const std::string& wanted, int cuda);
 
-  /// A device, until it dies.
+  /// A place that a case holds until this object dies.
   class Lease {
    public:
     Lease(Devices& of, Worker worker, int places) : of_(&of), worker_(std::move(worker)), places_(places) {}
@@ -71,13 +75,16 @@ class Devices {
     int places_;
   };
 
-  /// Waits for one. @param wanted  what a case asks for: auto takes what the batch was given
-  /// @param share  alone: a CUDA device without other cases; those that come later wait meanwhile
-  /// @throws DeviceError where CUDA is wanted and no device is left, Cancelled when it has to stop
+  /// Waits for a free place.
+  /// @param wanted  backend of the case; "auto" is the backend of the batch
+  /// @param share   alone: a CUDA device without other cases; cases that come later wait meanwhile
+  /// @throws DeviceError where CUDA is chosen and no device is left
+  /// @throws Cancelled when a stop is requested
   Lease wait_for(const std::string& wanted, Share share, const std::stop_token& stop);
-  /// Whether the processor may take a case that no CUDA device can. @param wanted  what the case asks for
+  /// Whether the CPU may take a case that no CUDA device can.
+  /// @param wanted  backend of the case
   bool may_fall_back(const std::string& wanted) const { return meant_by(wanted) == "auto"; }
-  /// A device is given to nobody any more.
+  /// Withdraws a device that failed: no case gets it any more.
   void lose(int device);
   std::size_t count() const { return count_; }  ///< of those that there were at first, the processor as one
   /// Cases that resample at once at most, on those that there were at first.

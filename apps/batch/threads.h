@@ -15,11 +15,12 @@ namespace tetwarp::apps {
 /// here, while it is known that they are to be had.
 class Threads {
  public:
-  /// @param jobs  cases at once that are wanted
+  /// @param jobs  number of cases to run at once, if the system gives enough threads
   explicit Threads(std::size_t jobs);
 
-  std::size_t jobs() const { return jobs_; }  ///< cases at once that there are threads for
-  /// How many threads the system gives, where that is fewer than wanted.
+  /// Number of cases for which there are threads.
+  std::size_t jobs() const { return jobs_; }
+  /// Number of threads that the system gives, if it is fewer than needed.
   std::optional<std::size_t> limit() const { return limit_; }
 
  private:

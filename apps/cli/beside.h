@@ -8,8 +8,9 @@
 
 namespace tetwarp::apps {
 
-/// Calls it in a thread of its own; where the system gives none, as soon as the result is asked for.
-/// @return its result, whose destructor waits
+/// Calls a function in a thread of its own. If the system gives no thread, the call is made when the result is first
+/// used.
+/// @return the future result; its destructor waits
 template <class Call>
 auto beside(Call&& call) {
   return std::async(std::launch::async | std::launch::deferred, std::forward<Call>(call));

@@ -40,7 +40,7 @@ void refuse_pipes(const std::filesystem::path& path);
 /// for DICOM options with a file, or --single with a folder
 InputHeader open_input(const InputOptions& options, const Control& control, bool components = false);
 
-/// The same with a progress bar.
+/// Reads headers as the other overload does, and shows a progress bar.
 InputHeader open_input(const InputOptions& options, const CommonOptions& common, bool components = false);
 
 /// Reads the voxels of what `open_input` found.

@@ -76,7 +76,7 @@ struct InvertOptions {
   int device = 0;  ///< of CUDA
 };
 
-/// Where maps of the output go; an empty path: not wanted.
+/// Files for maps of the output. A map with an empty path is not written.
 struct MapOptions {
   std::filesystem::path coverage, inverse, jacobian, folds;
 };

@@ -38,9 +38,10 @@ class OutputSet {
   /// @throws UsageError for a place that is, is inside or is around what is read
   void refuse_reads(const std::filesystem::path& target) const;
 
-  /// @return where to write it; empty for an empty target, which is not wanted.
-  /// @throws UsageError where it is equal to, inside or around an input or another output; Error where it cannot be
-  /// begun
+  /// Begins an output.
+  /// @return where to write it; empty for an empty target, which stands for no output
+  /// @throws UsageError where it is equal to, inside or around an input or another output
+  /// @throws Error where it cannot be begun
   std::filesystem::path add(const std::filesystem::path& target, StagedOutput::Kind kind = StagedOutput::Kind::file);
   void commit();
   /// Where the folder is staged. @pre there is one

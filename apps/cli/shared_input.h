@@ -15,17 +15,19 @@
 
 namespace tetwarp::apps {
 
-/// An input that several may ask for at the same time: whoever is first reads it, the others wait.
+/// An input that several cases may need at the same time. The first case that needs it reads it, and the others wait.
 class SharedInput {
  public:
   enum class Users { one, several };
   SharedInput(InputOptions options, Users users) : options_(std::move(options)), users_(users) {}
 
-  /// @throws what open_input throws; then the next who asks tries again
+  /// The header.
+  /// @throws whatever open_input throws; then the next caller tries again
   const InputHeader& open(const CommonOptions& common);
-  /// Once it is open. @throws what read_input throws; likewise
+  /// The voxels, after `open`.
+  /// @throws whatever read_input throws; then the next caller tries again
   const InputVolume& read(const CommonOptions& common, const Control& control);
-  /// Of a series that was read, for one run: of several each has its copy. Null of a file.
+  /// Headers of a DICOM series that was read, for one run: each of several runs has its own copy. Null for a file.
   std::shared_ptr<const DicomHeaders> headers();
   /// SHA-256 of its bytes as they were when it was read, hexadecimal. @throws InputError
   std::string sha256() const { return hash_.valid() ? hash_.get() : volume_->dicom->sha256; }

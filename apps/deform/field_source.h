@@ -60,13 +60,14 @@ ForwardField read_forward_field(const std::vector<std::string>& fields, const Ge
                                 std::optional<std::int64_t> cell_size, const CommonOptions& common,
                                 const Control& control);
 
-/// Checks texts and files' names without reading vectors: for a command that fails early. @throws as above
+/// Checks texts and names of files without reading vectors, for a command that should fail early.
+/// @throws UsageError and InputError as `read_forward_field`
 void check_fields(const std::vector<std::string>& fields, std::optional<std::int64_t> cell_size);
 
 /// Fields by name, files without their folders: "wave:amplitude=8, then twist.mha".
 std::string title_of_fields(const std::vector<std::string>& fields, const std::string& pull_field);
 
-/// The same of a de-identified volume: formulas, and that there was a file.
+/// Title of the fields of a de-identified volume: formulas, and that there was a file, but not its name.
 std::string title_without_names(const std::vector<std::string>& fields);
 
 /// Memory of the field that `read_forward_field` will make, with what a mesh needs beside its own. Transforms and

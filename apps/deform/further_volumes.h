@@ -27,13 +27,14 @@ class FurtherVolumes {
 
   /// Reads their headers. @throws UsageError, InputError for what does not go with its output or with INPUT
   void open(const InputHeader& input);
-  /// What they hold: with their outputs, where those have `output_voxels`.
+  /// Memory of the volumes and of their outputs, the latter with `output_voxels` voxels each.
   std::uint64_t bytes(std::uint64_t output_voxels) const;
   void read(const CommonOptions& common, const Control& control);
 
   /// Grids of their own that volumes go back onto, each once.
   std::vector<Geometry> own_grids() const;
-  /// What goes onto a grid: those that asked for their own, or the others. The targets refer to this object.
+  /// Targets of the volumes that go onto a grid: with `own`, those that keep their own grid, otherwise the others. The
+  /// targets refer to this object.
   std::vector<Target> targets_on(const Geometry& grid, bool own, Interpolation otherwise);
   /// @param series  as it was written, and how: where OUTPUT is one
   void write(const std::optional<int>& compression, const std::string& descrip,

@@ -28,8 +28,8 @@ class MapOutputs {
   /// @param grid  of the output. @throws InputError where a map cannot be written on it
   void check(const Geometry& grid) const;
 
-  /// What they hold while they are made. @param mass  whether mass is preserved, which needs coverage and determinants
-  /// whatever is asked for
+  /// Memory of the maps while they are made.
+  /// @param mass  whether mass is preserved, which needs coverage and determinants in any case
   std::uint64_t bytes(const Geometry& grid, bool mass) const;
   /// Begins their files. @param series  OUTPUT, if it is a DICOM series. @throws Error where one cannot be written
   void add_to(MapStream& stream, const Geometry& grid, bool mass, const DerivedSeriesWriter* series) const;

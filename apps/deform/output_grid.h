@@ -20,11 +20,11 @@ bool is_same_grid(const std::string& wanted);
 bool names_volume(const std::string& wanted);
 InputOptions grid_volume(const std::string& wanted);
 
-/// The output grid that --grid asks for.
+/// The output grid that option --grid names.
 ///
-/// @param wanted  "same": the input's; "fit": that grown by whole voxels to hold every vertex where `field` moves it;
-///                else a volume file or DICOM folder, of which it is the grid. Always `straightened`
-/// @param field   not used but for "fit"
+/// @param wanted  "same": the grid of the input; "fit": that grid, grown by whole voxels to hold every vertex where
+///         `field` moves it; else a volume file or DICOM folder, whose grid it is. The result is always `straightened`.
+/// @param field   used for "fit" only
 /// @throws InputError for a file that is no volume, or a lattice that does not reach over the volume where `outside`
 ///         refuses that
 Geometry output_grid(const std::string& wanted, const Geometry& input, const VertexField& field, Outside outside,

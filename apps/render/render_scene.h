@@ -16,7 +16,7 @@
 
 namespace tetwarp::apps {
 
-/// An overlay as it was asked for: "jacobian", "jacobian=FILE", "lattice=FIELD".
+/// An overlay from the command line: "jacobian", "jacobian=FILE" or "lattice=FIELD".
 struct OverlayWish {
   OverlayKind kind = OverlayKind::coverage;
   std::string source;  ///< empty: of the field that deforms the volume
@@ -37,7 +37,8 @@ struct OwnedOverlay {
 /// other.
 class RenderScene {
  public:
-  /// Opens what is asked for. @throws as `open_input`
+  /// Opens all inputs that the options name.
+  /// @throws InputError and others, as `open_input`
   explicit RenderScene(const RenderOptions& options);
   ~RenderScene();
 
@@ -66,7 +67,7 @@ class RenderScene {
   OwnedOverlay from_file(const OverlayWish& wish, const Region& region);
 
   const RenderOptions& options_;
-  InputOptions input_options_;  ///< without the hash, which nobody asks for
+  InputOptions input_options_;  ///< without the hash, which is not used
   std::vector<OverlayWish> wishes_;
   InputHeader header_;
   InputVolume input_;

@@ -10,16 +10,19 @@
 
 namespace tetwarp::cuda_detail {
 
-/// What the passes over vertices and cells find. All zero: nothing yet.
+/// What the passes over vertices and cells of a field find. All zero means: nothing yet.
 struct LatticeFindings {
   unsigned long long inverted, degenerate;
-  unsigned long long not_least, most;  ///< Jacobian determinants as `ordered` keys; of the smallest, the complement
-  unsigned long long not_bad_vertex;   ///< complement of the number of the first vertex that cannot be used
-  unsigned long long beside;  ///< not 0: some vertex does not rest at a whole step, or moved too far for floats
-  unsigned long long wide;    ///< not 0: some vertex moved further than the lattice's packing holds
+  /// Smallest and largest Jacobian determinant as `ordered` keys; of the smallest the bitwise complement, so that
+  /// atomicMax finds both.
+  unsigned long long not_least, most;
+  unsigned long long not_bad_vertex;  ///< complement of the number of the first vertex that cannot be used
+  /// Not 0 if some undeformed vertex lies at no whole step, or a vertex moved too far for floats.
+  unsigned long long beside;
+  unsigned long long wide;  ///< not 0 if some vertex moved further than the packing of the lattice holds
 };
 
-/// Doubles as integers of the same order, so that integer atomics find the smallest and largest.
+/// Maps a double to an integer so that order is kept. Integer atomics then find the smallest and largest double.
 __host__ __device__ inline unsigned long long ordered(double value) {
   unsigned long long bits;
   memcpy(&bits, &value, sizeof bits);
@@ -32,7 +35,7 @@ inline double from_ordered(unsigned long long key) {
   return value;
 }
 
-/// Smallest and largest of a warp go to the findings; only where they are news.
+/// Adds the smallest and largest value of a warp to the findings, if they change them.
 __device__ inline void note_range(float least, float most, LatticeFindings* found) {
   for (int step = 16; step > 0; step /= 2) {
     least = fminf(least, __shfl_xor_sync(~0u, least, step));
@@ -51,7 +54,7 @@ __device__ inline void note_counts(unsigned inverted, unsigned degenerate, Latti
   if (degenerate != 0) atomicAdd(&found->degenerate, static_cast<unsigned long long>(degenerate));
 }
 
-/// The snapped vertex; one that cannot be used is noted.
+/// A snapped vertex. A vertex that cannot be used is added to the findings.
 __device__ inline Vertex snapped(const LatticeFrame& frame, const glm::vec3& displacement, const glm::i64vec3& at,
                                  std::int64_t number, LatticeFindings* found) {
   Vertex vertex;

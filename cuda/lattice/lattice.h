@@ -15,13 +15,14 @@ namespace tetwarp::cuda_detail {
 constexpr int kThreads = 128;
 inline unsigned blocks_for(std::int64_t count) { return static_cast<unsigned>((count + kThreads - 1) / kThreads); }
 
-/// One bit an element of a box; rows begin at a word.
+/// A box of bits, one for each element. Each row begins at a word.
 struct BitRows {
   const std::uint32_t* words;
   int words_per_row;
 };
 
-/// Of a word of a row of bits, those from `first` to `last` of the row, both included; the word must reach into these.
+/// Mask of those bits of a word of a row that lie from `first` to `last` of the row, both included; the word must
+/// contain some of them.
 __device__ inline std::uint32_t bits_of_word(int word, int first, int last) {
   std::uint32_t mask = ~0u;
   if (word == first / 32) mask &= ~0u << (first & 31);
@@ -29,12 +30,12 @@ __device__ inline std::uint32_t bits_of_word(int word, int first, int last) {
   return mask;
 }
 
-/// The place of an element that is number n in a box of this size, i fastest.
+/// Position of element number n in a box of this size, i fastest.
 __host__ __device__ inline glm::i64vec3 unravel(std::int64_t n, const glm::i64vec3& size) {
   return {n % size.x, n / size.x % size.y, n / (size.x * size.y)};
 }
 
-/// Sum over a whole warp, or over groups of so many lanes (a power of two), in every lane.
+/// Sum over a warp, or over groups of `lanes` lanes (a power of two), returned in every lane.
 __device__ inline unsigned warp_sum(unsigned value, int lanes = 32) {
   for (int step = lanes / 2; step > 0; step /= 2) value += __shfl_xor_sync(~0u, value, step);
   return value;
@@ -52,7 +53,7 @@ __device__ T warp_max(T value) {
   return value;
 }
 
-/// Sum over the lanes of such a group up to this one.
+/// Sum over the lanes of a group of `lanes` lanes (a power of two) up to and including this one.
 __device__ inline int warp_scan(int value, int lanes = 32) {
   const int lane = static_cast<int>(threadIdx.x) & (lanes - 1);
   for (int step = 1; step < lanes; step *= 2) {
@@ -71,11 +72,11 @@ __device__ inline void warp_count(unsigned long long* counter, bool condition) {
   }
 }
 
-/// A field as kernels see it: its vertices, snapped, in one of two forms.
+/// A field as kernels see it: snapped vertices, in one of two forms.
 struct DeviceField {
   LatticeFrame frame;
-  StepLattice steps;                 ///< where `packed` is not null
-  const Vertex* vertices = nullptr;  ///< otherwise
+  StepLattice steps;                 ///< the form that is used where `packed` is not null
+  const Vertex* vertices = nullptr;  ///< the form that is used otherwise
 
   bool has_steps() const { return steps.packed != nullptr; }
   __device__ glm::i64vec3 cell_at(std::int64_t number) const { return unravel(number, frame.cells); }
@@ -93,12 +94,12 @@ struct DeviceField {
   __host__ __device__ std::int64_t cell_count() const { return frame.cells.x * frame.cells.y * frame.cells.z; }
 };
 
-/// Blocks of 8 x 8 x 8 vertices: whether any is displaced.
+/// For each block of 8 x 8 x 8 vertices, whether any is displaced.
 struct MovingBlocks {
   static constexpr int kSide = 8;
 
   glm::ivec3 count{0};
-  std::uint8_t* moving = nullptr;  ///< a byte a block, i fastest; null: not known
+  std::uint8_t* moving = nullptr;  ///< one byte for each block, i fastest; null: not known
 
   __device__ std::uint8_t& at(const glm::ivec3& vertex) const {
     return moving[((vertex.z / kSide) * count.y + vertex.y / kSide) * count.x + vertex.x / kSide];
@@ -125,7 +126,7 @@ struct InvertedPairs {
   __device__ static int column(int row, int word, int bit) { return word * kColumns - 2 + 2 * bit + (row & 1); }
 };
 
-/// What one pass over the cells finds.
+/// What one pass over the cells of a field finds.
 struct FieldStatistics {
   std::uint64_t inverted = 0, degenerate = 0;
   double jacobian_min = INFINITY, jacobian_max = -INFINITY;
@@ -133,7 +134,7 @@ struct FieldStatistics {
 
 struct LatticeFindings;  // findings.cuh
 
-/// Owner of a field on the device: snaps its vertices and describes its cells.
+/// Owner of a field on the device. It snaps the vertices and describes the cells.
 class LatticeOnDevice {
  public:
   /// @param displacement  on the device
@@ -151,8 +152,8 @@ class LatticeOnDevice {
   /// Where the vertices rest at whole steps.
   const MovingBlocks& moving_blocks() const { return blocks_; }
 
-  /// Box of the rest places of all cells that may reach a region: low and high, 2^-12 voxel; low > high where none
-  /// does.
+  /// Box around the undeformed places of all cells that may reach a region: low and high corner, 2^-12 voxel; low
+  /// exceeds high where there is no such cell.
   void reach(const glm::i64vec3& begin, const glm::i64vec3& end, int (&low_high)[6], cudaStream_t stream) const;
 
  private:
@@ -167,7 +168,7 @@ class LatticeOnDevice {
   FieldStatistics statistics_;
   DeviceBuffer<Vertex> vertices_;
   DeviceBuffer<std::uint64_t> packed_;
-  StepPacking packing_;  ///< of the last field that was packed
+  StepPacking packing_;  ///< packing of the last field that was packed
   DeviceBuffer<int> range_;
   DeviceBuffer<std::byte> notes_;  ///< LatticeFindings; then the words of `inverted_`, and the bytes of `blocks_`
   PinnedBuffer<LatticeFindings> found_;

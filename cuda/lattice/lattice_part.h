@@ -9,7 +9,7 @@
 
 namespace tetwarp::cuda_detail {
 
-/// Slices along k, half open: of cells, or of voxels.
+/// A half-open range of slices along k, of cells or of voxels.
 struct Slices {
   std::int64_t begin = 0, end = 0;
 
@@ -17,18 +17,20 @@ struct Slices {
   friend bool operator==(const Slices&, const Slices&) = default;
 };
 
-/// How far the deformed vertices of one slice reach along k of the output: 2^-12 voxel, both ends included.
+/// Range along k of the output that the deformed vertices of one slice of vertices cover: 2^-12 voxel, both ends
+/// included.
 struct SliceReach {
   std::int32_t low = INT32_MAX, high = INT32_MIN;
 };
 
-/// The frame of a part of a lattice: its vertices, its owners and their order are those of the whole.
-/// @param cells  from an even slice on
+/// The frame of a part of a lattice. Snapped vertices, owners and the order of tetrahedra are those of the whole
+/// lattice.
+/// @param cells  begins at an even slice
 LatticeFrame part_of(const LatticeFrame& whole, const Slices& cells);
 
-/// The cells that may own voxels of the output slices begin <= k < end: one stretch, from an even slice on, that holds
-/// all of them. Empty where none does.
-/// @param vertices  of each slice of vertices
+/// The cells that may own voxels of the output slices begin <= k < end: the smallest range that begins at an even slice
+/// and contains all of them. It is empty where there are none.
+/// @param vertices  reach of each slice of vertices
 Slices cells_reaching(std::span<const SliceReach> vertices, std::int64_t begin, std::int64_t end);
 
 /// Box of output index that voxels owned by these cells may come from.

@@ -51,79 +51,89 @@ struct Counts {
   unsigned long long covered, uncovered, clamped, padded, conflicts, multiply_owned;
 };
 
-/// Where each voxel of a box comes from, one after the other.
+/// Where each voxel of a box comes from, in the order of the voxels.
 struct Mapped {
-  static constexpr std::int64_t kBytes = sizeof(std::uint8_t) + sizeof(glm::vec3);  ///< of a voxel
+  static constexpr std::int64_t kBytes = sizeof(std::uint8_t) + sizeof(glm::vec3);  ///< bytes for each voxel
 
-  DeviceBuffer<std::uint8_t> mapped;  ///< whether it comes from anywhere
+  DeviceBuffer<std::uint8_t> mapped;  ///< 1 where the voxel comes from anywhere, else 0
   DeviceBuffer<glm::vec3> offset;     ///< undeformed minus deformed place, voxels
 };
 
-/// How the voxels lie of sources and outputs on one grid, and where a voxel comes from: what all sinks that sample have
-/// in common (`OffsetSink` says what a sink is).
+/// How the voxels of sources and outputs on one grid lie, and where a voxel comes from. All sinks that sample share it;
+/// `OffsetSink` (cuda/owners/gather.h) describes what a sink is.
 struct SinkLayout {
-  glm::ivec3 last;  ///< of the whole source grid
-  int row, slice;   ///< of what is buffered
+  glm::ivec3 last;  ///< last voxel of the whole source grid
+  /// Values from one row, and one slice, to the next, in what is buffered of the source.
+  int row, slice;
   int output_row, output_slice;
 
   __device__ int place(const glm::ivec3& voxel) const {
     return voxel.z * output_slice + voxel.y * output_row + voxel.x;
   }
   __device__ int per_slice() const { return output_slice; }
-  /// Whether voxels of a box of the source, half open, are all well inside.
+  /// Whether all voxels of a half-open box of the source are well inside the source.
   __device__ bool surrounds(const glm::ivec3& begin, const glm::ivec3& end) const {
     return (begin.x >= 0) & (begin.y >= 0) & (begin.z >= 0) & (end.x <= last.x) & (end.y <= last.y) & (end.z <= last.z);
   }
-  /// Where a voxel is, for `locate`; changes by `per_source_slice` along k.
+  /// Number that names a voxel for `locate`; it grows by `per_source_slice` along k.
   __device__ unsigned column(const glm::ivec3& voxel) const;
   __device__ unsigned per_source_slice() const { return static_cast<unsigned>(slice); }
-  /// A place in the source: the offset of its whole voxel, and the rest.
+  /// A place in the source: offset of its whole voxel, and the fraction.
   struct Origin {
     int base;
     glm::vec3 fraction;
   };
-  /// Where a voxel comes from. @tparam kInside  whether that is known to be well inside the source
-  /// @param moved  may be no numbers  @return whether it is well inside, and `moved` are numbers
+  /// Computes where a voxel comes from, for the walk of a column.
+  /// @tparam kInside  whether that is known to be well inside the source
+  /// @param column  what `column` gave for the voxel
+  /// @param moved   deformed minus undeformed place, 2^-12 voxel; may be NaN
+  /// @return whether it is well inside the source, and `moved` is not NaN
   template <bool kInside>
   __device__ bool locate(const glm::ivec3& voxel, unsigned column, const glm::vec3& moved, Origin& origin) const;
-  /// The same for one voxel. @param moved  deformed minus undeformed place, 2^-12 voxel
+  /// Computes where a single voxel comes from.
+  /// @param moved  deformed minus undeformed place, 2^-12 voxel; may be NaN
+  /// @return whether it is well inside the source, and `moved` is not NaN
   __device__ bool locate(const glm::ivec3& voxel, const glm::vec3& moved, Origin& origin) const;
-  /// The same wherever it is inside the source, by its exact offset. @return whether it is inside
+  /// Computes where a voxel comes from, by its exact offset.
+  /// @return whether that is inside the source
   __device__ bool locate_exactly(const glm::ivec3& voxel, const glm::vec3& u, Origin& origin) const;
   __device__ int source_index(const glm::ivec3& voxel) const { return voxel.z * slice + voxel.y * row + voxel.x; }
 };
 
-/// Samples voxels one by one: linear, integers that float holds, no padding, source and output on one grid. The bits of
-/// `sample_voxel`.
+/// Samples the voxels of one volume: linear interpolation of integers that float holds, without padding, source and
+/// output on one grid. The result has the bits of `sample_voxel`.
 template <class V>
 struct VoxelSink : SinkLayout {
   static constexpr bool kIsWide = false;  ///< whether it takes many registers
 
-  const V* source;  ///< of voxel (0, 0, 0), were it held; likewise `output`
+  const V* source;  ///< address of voxel (0, 0, 0), which need not be buffered; so is `output`
   V background;
   V* output;
 
-  /// What a voxel well inside the source is made from, on its way.
+  /// A voxel well inside the source for which reading has begun.
   struct Pending {
     bool any = false;
     glm::vec3 fraction;
     int corners[8];
   };
 
-  /// Begins to write a voxel that a tetrahedron owns, where that is `wanted` and it comes from well inside the source;
-  /// else nothing is pending. What is on the border is for `write`.
+  /// Begins to write a voxel that a tetrahedron owns, if it is `wanted` and comes from well inside the source;
+  /// otherwise nothing is pending. Voxels from the border of the source are for `write`.
   /// @param moved  deformed minus undeformed place, 2^-12 voxel
   __device__ void start(int place, const glm::ivec3& voxel, const glm::vec3& moved, bool wanted,
                         Pending& pending) const;
-  /// Writes what is pending. @param place  that it was started with
+  /// Writes the pending voxel, if there is one.
+  /// @param place  the place with which `start` was called
   __device__ void finish(int place, const Pending& pending) const;
-  /// Begins to read what a voxel is made from, where that is `wanted`.
+  /// Begins to read the source for a voxel, if it is `wanted`.
   __device__ void begin(const Origin& origin, bool wanted, Pending& pending) const;
-  /// Writes what was begun last; any value where nothing was.
+  /// Writes the voxel for which reading began last; an undefined value if there is none.
   __device__ void end(int place, const Pending& pending) const;
-  /// A voxel that a tetrahedron owns. @return whether it comes from inside the source
+  /// Writes a voxel that a tetrahedron owns.
+  /// @return whether it comes from inside the source
   __device__ bool write(int place, const glm::ivec3& voxel, const glm::vec3& u) const;
-  /// Voxels of a column along k that stay where they are: those whose bits are set, of kCount from one on.
+  /// Copies voxels of a column along k that stay where they are: those of the kCount voxels from `voxel` on whose bits
+  /// are set.
   template <int kCount>
   __device__ void copy(const glm::ivec3& voxel, std::uint32_t wanted) const;
   __device__ void nothing(int place) const { output[place] = background; }
@@ -136,13 +146,14 @@ struct SinkVolume {
   const void* source;  ///< as in VoxelSink
   void* output;
   VoxelType type;  ///< u8, i16 or u16
-  bool votes;      ///< linear otherwise
+  bool votes;      ///< whether it is sampled by vote; otherwise linearly
   int background;
 };
 
-/// The same for several volumes on one grid: where a voxel comes from is found once.
+/// Samples the voxels of several volumes on one grid. Where a voxel comes from is computed once. Its members do what
+/// those of VoxelSink do.
 ///
-/// @tparam V  of all volumes, which are linear; void: any
+/// @tparam V  type of all volumes, which are then linear; void: any types
 template <class V>
 struct VolumesSink : SinkLayout {
   static constexpr bool kIsWide = true;
@@ -150,7 +161,7 @@ struct VolumesSink : SinkLayout {
   SinkVolume volumes[kMostSinkVolumes];
   int count;
 
-  /// Of the first volumes, all that a voxel is made from is on its way.
+  /// Number of volumes whose source voxels are read ahead, in `begin`; those of other volumes are read in `finish`.
   static constexpr int kOnTheWay = 2;
   struct Pending {
     bool any = false;
@@ -168,7 +179,7 @@ struct VolumesSink : SinkLayout {
   __device__ void nothing(int place) const;
 
  private:
-  /// Calls with null of a pointer to the volume's type.
+  /// Calls `work` with a null pointer to the volume's type.
   template <class Work>
   __device__ void with_type(const SinkVolume& volume, Work&& work) const;
   __device__ void read(const SinkVolume& volume, const Origin& origin, const glm::ivec3& step, int (&corners)[8]) const;
@@ -179,7 +190,8 @@ struct VolumesSink : SinkLayout {
 using AnyVoxelSink = std::variant<VoxelSink<std::uint8_t>, VoxelSink<std::int16_t>, VoxelSink<std::uint16_t>,
                                   VolumesSink<std::int16_t>, VolumesSink<void>>;
 
-/// Samples targets and writes maps, box after box, and copies to the host beside the next box. Knows nothing of fields.
+/// Samples targets and writes maps, box after box, and copies results to the host while the next box is computed. It
+/// knows nothing of fields.
 ///
 /// Everything on the device is kept from call to call.
 class SlabWriter {
@@ -187,20 +199,22 @@ class SlabWriter {
   SlabWriter(const Geometry& output, int device, Uploads& uploads)
       : output_(output), uploads_(uploads), downloads_(device) {}
 
-  /// Takes the targets and maps of a call, which are checked. @throws InputError for memory that is not where a view
-  /// says
+  /// Takes the targets and maps of a call, which were checked.
+  /// @throws InputError for memory that is not where a view says
   void begin(std::span<const Target> targets, const Maps& maps, cudaStream_t stream);
 
   bool wants_jacobian() const { return maps_.jacobian.voxels != nullptr; }
   bool wants_owners() const { return maps_.owners.voxels != nullptr; }
-  /// Whether all that is wanted are volumes that a VoxelSink or VolumesSink can sample, and no maps.
+  /// Whether the call fills volumes that a VoxelSink or VolumesSink can sample, and no maps.
   bool is_plain() const;
 
-  /// Voxels that may be worked on at a time. @param work_bytes  memory of each while that lasts; 0: `plain_sink`
+  /// Number of voxels that may be worked on at a time.
+  /// @param work_bytes  working memory for each voxel; 0: `plain_sink` is used
   std::int64_t box_voxels(std::int64_t work_bytes) const;
-  /// Device memory for the results of boxes, of which `boxes` are held at a time.
+  /// Device memory for the results of `boxes` boxes.
   std::uint64_t result_bytes(std::int64_t voxels, int boxes) const { return boxes * layout(voxels).bytes; }
-  /// Device memory for slices of the sources on the host. @param slices_of  of a source, the slices to hold
+  /// Device memory for slices of those sources that lie in host memory.
+  /// @param slices_of  the slices that are needed of a source
   std::uint64_t source_bytes(const std::function<Slices(const ConstVolumeView& source)>& slices_of) const;
 
   std::uint64_t held_source_bytes() const { return sources_.capacity(); }
@@ -208,25 +222,27 @@ class SlabWriter {
   void release();
 
   void reserve(std::uint64_t source_bytes, std::int64_t box_voxels, int boxes);
-  /// Uploads slices of the sources that are on the host.
+  /// Uploads slices of those sources that lie in host memory.
   void hold_sources(const std::function<Slices(const ConstVolumeView& source)>& slices_of);
 
-  /// Before the voxels of a box are found.
+  /// Prepares for a box, before its voxels are found.
   void begin_box(const SlabBox& box);
-  float* jacobian() const { return place<float>(layout_.jacobian); }              ///< of the box; null: not wanted
-  std::uint16_t* owners() const { return place<std::uint16_t>(layout_.owners); }  ///< likewise
+  /// The map of Jacobian determinants of the box; null if it is not filled.
+  float* jacobian() const { return place<float>(layout_.jacobian); }
+  /// The map of numbers of owners of the box; null if it is not filled.
+  std::uint16_t* owners() const { return place<std::uint16_t>(layout_.owners); }
   void write(const SlabBox& box, const Mapped& mapped, Counts* counts);
-  /// What writes the voxels of the box, where `is_plain`, in place of `write`.
+  /// The sink that writes the voxels of the box, instead of `write`, if the call `is_plain`.
   AnyVoxelSink plain_sink(const SlabBox& box);
   /// Gives the results of the box to the views.
   void end_box(const SlabBox& box);
   /// Waits until the host has everything.
   void finish();
-  /// Waits until nothing is under way, whatever became of it.
+  /// Waits until nothing runs any more, whether or not it failed.
   void settle() noexcept;
 
  private:
-  /// One target, and what of it is on the device.
+  /// A target, and what of it lies on the device.
   struct DeviceTarget {
     Target target;           ///< its source is what the device holds
     ConstVolumeView source;  ///< as it was given
@@ -234,7 +250,7 @@ class SlabWriter {
     DeviceBuffer<double> slices;          ///< of an uneven source
     DeviceBuffer<long long> first, last;  ///< its sampled slices
   };
-  /// Where the results of a box begin, bytes; kNone: not wanted.
+  /// Offsets in bytes at which the results of a box begin; kNone: not filled.
   struct Layout {
     static constexpr std::size_t kNone = SIZE_MAX;
 

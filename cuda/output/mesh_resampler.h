@@ -9,7 +9,8 @@
 
 namespace tetwarp::cuda_detail {
 
-/// Takes forward fields that are meshes. @throws InputError, DeviceError as `make_cuda_resampler`
+/// A resampler of forward fields that are meshes, on a CUDA device.
+/// @throws InputError, DeviceError as `make_cuda_resampler`
 std::unique_ptr<Resampler> make_mesh_resampler(const Geometry& output, int device, const Limits& limits);
 
 }  // namespace tetwarp::cuda_detail

@@ -11,10 +11,10 @@
 
 namespace tetwarp::cuda_detail {
 
-/// What forward and pull have in common. The output is made slab by slab, where not everything fits the device, and a
-/// slab box by box, of which `map_box` says where voxels come from.
+/// Base of the resamplers of forward and pull fields. The output is made slab by slab where not everything fits the
+/// device, and each slab box by box; `map_box` computes where the voxels of a box come from.
 ///
-/// A slab is what parts of the field and of the sources are held for; a box bounds working space, and is copied to the
+/// Parts of the field and of the sources are held for one slab. A box bounds the working space, and is copied to the
 /// host while the next one is computed.
 class CudaResampler : public Resampler {
  public:
@@ -28,45 +28,47 @@ class CudaResampler : public Resampler {
   virtual void check_wanted(const Maps&) const {}
   virtual void map_box(const SlabBox& box, SlabWriter& writer) = 0;
   virtual void describe_field(Report&) const {}
-  /// Device memory of a voxel that `map_box` works with.
+  /// Device memory for each voxel on which `map_box` works.
   virtual std::int64_t work_bytes(const SlabWriter&) const { return Mapped::kBytes; }
-  /// Whether voxels can be found and sampled in one go, and how.
+  /// Whether `write_plainly` can find and sample voxels in one pass.
   virtual bool can_write_plainly() const { return false; }
   virtual void write_plainly(const SlabBox&, SlabWriter&) {}
 
-  /// Device memory for what must be held of a field on the host, for some slices of the output.
+  /// Device memory for what must be held of a field in host memory, for some slices of the output.
   virtual std::uint64_t field_bytes(const Slices& output) const = 0;
   virtual std::uint64_t held_field_bytes() const = 0;
   virtual const char* held_of_field() const = 0;  ///< "whole field", "part of the field"
-  /// Whether only parts of the field are held, of which `hold_field` brings those for some slices of the output.
+  /// Whether only parts of the field are held, which `hold_field` uploads for some slices of the output.
   virtual bool is_field_streamed() const { return false; }
   virtual void hold_field(const Slices&) {}
-  /// Changes over to that. @return whether it can and did
+  /// Changes to holding parts of the field only.
+  /// @return whether that was possible
   virtual bool stream_field(const Control&) { return false; }
   virtual void release_field() {}
-  /// Before `slab_source` is asked for slabs of this field.
+  /// Called before `slab_source` is called for slabs of this field.
   virtual void prepare_slabs() = 0;
-  /// Like `source_extent`, soon found: it may be larger.
+  /// A region that contains `source_region` and is found quickly.
   virtual Region slab_source(const Geometry& source, const Region& slab) const = 0;
 
   /// Device memory that fields, sources and results on the host may take together.
   std::uint64_t allowed_bytes() const;
-  /// Whether a field may be held whole.
+  /// Whether so many bytes of a field may be held at once.
   bool may_hold(std::uint64_t bytes) const;
-  /// Gives back what does not fit beside a field.
+  /// Frees what does not fit beside a field of so many bytes.
   void make_room_for_field(std::uint64_t bytes);
 
   int device_;
   bool ready_ = false;
-  cudaStream_t stream_ = nullptr;  ///< of the latest call
+  cudaStream_t stream_ = nullptr;  ///< stream of the latest call
   std::unique_ptr<Uploads> uploads_;
   Mapped mapped_;
-  DeviceBuffer<Counts> counts_;                                ///< of the latest call
-  std::uint64_t plainly_covered_ = 0, plainly_uncovered_ = 0;  ///< likewise, by `write_plainly`
-  Paths paths_;                                                ///< likewise
+  DeviceBuffer<Counts> counts_;  ///< counts of the latest call
+  /// Voxels that `write_plainly` covered and did not cover in the latest call.
+  std::uint64_t plainly_covered_ = 0, plainly_uncovered_ = 0;
+  Paths paths_;  ///< of the latest call
 
  private:
-  /// Of a source, the slices that a slab is sampled from.
+  /// The slices of a source from which a slab is sampled.
   using SlicesOf = std::function<Slices(const ConstVolumeView& source)>;
 
   Counts write_region(const Region& region, const Control& control);
@@ -75,7 +77,7 @@ class CudaResampler : public Resampler {
   /// Decides on slabs, and makes room for them.
   std::int64_t plan(const Region& region, const Control& control);
   std::int64_t plan_parts(const Region& region, const Control& control);
-  /// Gives back what would be too much, were all buffers as large as `needs`.
+  /// Frees buffers that would be too much if all were as large as `needs`.
   void make_room(const SlabNeeds& needs, std::uint64_t allowed);
   SlabNeeds needs_of(const Region& slab) const;
   SlicesOf source_slices(const Region& slab) const;
@@ -88,7 +90,7 @@ class CudaResampler : public Resampler {
   Limits limits_;
   std::unique_ptr<SlabWriter> writer_;
   bool counted_ = false;         ///< whether some box of the call was counted in `counts_`
-  bool in_parts_ = false;        ///< of the sources, only what a slab needs is held
+  bool in_parts_ = false;        ///< whether only those parts of the sources are held that a slab needs
   std::int64_t box_voxels_ = 0;  ///< as planned
 };
 

@@ -11,39 +11,39 @@ namespace tetwarp::cuda_detail {
 
 /// Device memory that one slab of the output needs, bytes.
 struct SlabNeeds {
-  std::uint64_t field = 0;   ///< the part of the lattice that reaches it
-  std::uint64_t source = 0;  ///< the slices of all sources that it may be sampled from
-  std::uint64_t output = 0;  ///< what waits to be copied to the host
+  std::uint64_t field = 0;   ///< for the part of the lattice that reaches the slab
+  std::uint64_t source = 0;  ///< for the slices of all sources from which the slab may be sampled
+  std::uint64_t output = 0;  ///< for results that wait to be copied to the host
 
   std::uint64_t total() const { return field + source + output; }
 };
 
-/// The larger of each.
+/// The larger number of each pair.
 SlabNeeds larger(const SlabNeeds& a, const SlabNeeds& b);
 
-/// An output in slabs along k.
+/// A division of the output into slabs along k.
 struct SlabPlan {
-  std::int64_t slices = 0;  ///< of each slab, the last one may have fewer; 0: not even single slices fit
-  SlabNeeds needs;          ///< largest of any slab, each for itself: what buffers hold
+  std::int64_t slices = 0;  ///< slices of a slab, the last of which may have fewer; 0: not even single slices fit
+  SlabNeeds needs;          ///< the largest of each need over all slabs, which is the size of buffers
 };
 
-/// The highest slabs of which each fits: all slices, or half of them, or a quarter, and so on.
+/// The highest slabs that fit one by one: all slices, or half of them, or a quarter, and so on.
 /// @param needs_of  what the slab begin <= k < end needs
 SlabPlan plan_slabs(std::int64_t begin, std::int64_t end, std::uint64_t allowed,
                     const std::function<SlabNeeds(std::int64_t begin, std::int64_t end)>& needs_of);
 
 /// @param held  what is held of the field: "part of the field", "whole field"
-/// @throws DeviceError naming what a slice of the output needs and what is allowed
+/// @throws DeviceError, always; it names what one slice of the output needs and what is allowed
 [[noreturn]] void refuse_slab(const SlabNeeds& needs, const std::string& held, std::uint64_t allowed);
 
-/// @throws DeviceError for a field that cannot be held in parts
+/// @throws DeviceError, always, for a field that cannot be held in parts
 [[noreturn]] void refuse_field(std::uint64_t bytes, std::uint64_t allowed);
 
-/// How many slices of cells a piece of a lattice may have that is looked at on its own: an even number, or all.
+/// Number of slices of cells in a piece of a lattice that is looked at on its own: an even number, or all.
 ///
-/// @param slice_bytes  of a slice of vertices on the device
-/// @param held         bytes that are held for the field already: used as they are, so that repeated fields allocate
-///                     nothing
+/// @param slice_bytes  bytes of a slice of vertices on the device
+/// @param held         bytes that are held for the field already. They are reused, so that repeated fields allocate
+///         nothing.
 /// @throws DeviceError where the smallest piece does not fit
 std::int64_t cells_of_piece(std::int64_t cells, std::uint64_t slice_bytes, std::uint64_t held, std::uint64_t allowed);
 

@@ -7,14 +7,15 @@
 
 namespace tetwarp::cuda_detail {
 
-/// One axis of a place that was rounded up to the next voxel, like `place_at`.
+/// One axis of `place_at`: carries to the next voxel where the fraction was rounded up to 1.
 __device__ inline void carry_on_axis(int& base, float& rest) {
   if (rest < 1.0f) return;
   ++base;
   rest = 0;
 }
 
-/// Moves it onto the grid like `clamp_to_grid`. @return false further out
+/// One axis of `clamp_to_grid`.
+/// @return false if the place lies further out
 __device__ inline bool clamp_on_axis(int last, int& base, float& fraction) {
   if (static_cast<unsigned>(base) < static_cast<unsigned>(last)) return true;
   const bool low = base == -1 && fraction >= 0.5f, high = base == last && fraction <= 0.5f;
@@ -23,7 +24,7 @@ __device__ inline bool clamp_on_axis(int last, int& base, float& fraction) {
   return low || high;
 }
 
-/// Along x, then y, then z.
+/// Linear interpolation along x, then y, then z.
 __device__ inline float interpolate(const float (&v)[8], const glm::vec3& t) {
   const auto along_x = [&](int from) { return v[from] + t.x * (v[from + 1] - v[from]); };
   const auto along_y = [&](int from) {
@@ -42,7 +43,7 @@ __device__ void read_corners(const V* v, int dx, int dy, int dz, int (&corners)[
     corners[n] = v[((n & 1) != 0 ? dx : 0) + ((n & 2) != 0 ? dy : 0) + ((n & 4) != 0 ? dz : 0)];
 }
 
-/// Adding it rounds to a whole number, to be read from the lowest bits.
+/// A number to add to a float: it rounds the float to a whole number, which the lowest bits of the sum contain.
 constexpr float kToWhole = 3.0f * (1 << 22);
 
 template <class V>
@@ -53,7 +54,7 @@ __device__ V interpolated(const int (&corners)[8], const glm::vec3& t) {
   return static_cast<V>(__float_as_int(interpolate(v, t) + kToWhole));  // between the corners: never saturates
 }
 
-/// The whole voxels of minus `moved`, rounded down, as bits of a float `kToWhole` above; and what is left.
+/// The whole voxels of minus `moved`, rounded down, as bits of a float that is raised by `kToWhole`; and the fraction.
 __device__ inline int whole_bits(float moved, float& fraction) {
   const float whole = __fmaf_rd(moved, -kVoxelsPerStep, kToWhole);
   fraction = fmaf(moved, -kVoxelsPerStep, kToWhole - whole);

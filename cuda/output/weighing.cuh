@@ -9,25 +9,27 @@
 
 namespace tetwarp::cuda_detail {
 
-/// What a tetrahedron's voxels need, as it lies in shared memory: their weights by Cramer's rule, and how far its
-/// vertices are displaced.
+/// What the voxels of a tetrahedron need, in the layout of shared memory: factors of their weights by Cramer's rule,
+/// and the displacement of the vertices.
 struct Weighing {
   float from_d[3];   ///< from D to the first voxel of the tile, 2^-12 voxel
-  float reciprocal;  ///< of the determinant; no number: not in float
+  float reciprocal;  ///< of the determinant; NaN where float cannot compute the weights
   float bc[3], moved_x, ca[3], moved_y, ab[3], moved_z;
   float moved_a[3], moved_b[3], moved_c[3];
 };
-constexpr int kQuads = 6;  ///< whole ones of it, of four floats
+constexpr int kQuads = 6;  ///< number of groups of four floats that Weighing fills
 static_assert(sizeof(Weighing) == (4 * kQuads + 1) * sizeof(float));
 
 constexpr float kNoNumber = std::numeric_limits<float>::quiet_NaN();
 
-/// How far the vertices of a tetrahedron are displaced, 2^-12 voxel: D, and how much further A, B, C are.
+/// Displacement of the vertices of a tetrahedron, 2^-12 voxel: of D, and by how much those of A, B, C exceed it.
 struct Displaced {
   glm::vec3 d, a, b, c;
 };
 
-/// Writes a `Weighing`. @param a, b, c  from D  @param from_d  from D to the first voxel of the tile; all exact
+/// Computes a `Weighing`. All arguments are exact.
+/// @param a, b, c  edges from D, 2^-12 voxel
+/// @param from_d   from D to the first voxel of the tile, 2^-12 voxel
 __device__ inline void prepare_weighing(const glm::vec3& a, const glm::vec3& b, const glm::vec3& c,
                                         const glm::vec3& from_d, const Displaced& moved, float4 (&to)[kQuads],
                                         float& end) {
@@ -44,11 +46,11 @@ __device__ inline void prepare_weighing(const glm::vec3& a, const glm::vec3& b, 
   end = moved.c.z;
 }
 
-/// The `Weighing` of the tetrahedron that a lane is in.
+/// The `Weighing` of the tetrahedron in which the lane's voxel lies, in registers.
 struct HeldWeighing {
   float values[4 * kQuads + 1];
 
-  /// Reads it, where it is not the one that is held.
+  /// Reads the weighing at `place`, unless it is the one that is held.
   __device__ void hold(const float4 (*prepared)[kQuads], const float* ends, unsigned place, unsigned& held) {
     float(&v)[4 * kQuads + 1] = values;
     const auto from = static_cast<unsigned>(__cvta_generic_to_shared(&prepared[place][0])),
@@ -73,7 +75,8 @@ struct HeldWeighing {
   }
 };
 
-/// How far a voxel moved; no numbers where its weights are not for float, or it is nobody's.
+/// Deformed minus undeformed place of a voxel, 2^-12 voxel; NaN where float cannot compute its weights, or the voxel
+/// has no owner.
 /// @param from_first  from the first voxel of the tile, 2^-12 voxel
 __device__ inline glm::vec3 moved_by(const HeldWeighing& m, const glm::vec3& from_first) {
   const float(&v)[4 * kQuads + 1] = m.values;
@@ -83,11 +86,11 @@ __device__ inline glm::vec3 moved_by(const HeldWeighing& m, const glm::vec3& fro
                {v[22], v[23], v[24]});
 }
 
-/// The weighings of a tile's tetrahedra, in shared memory; the last is nobody's.
+/// The weighings of the tetrahedra of a tile, in shared memory. The last one is for voxels without an owner.
 struct Weighings {
   const float4 (*prepared)[kQuads];
   const float* ends;
-  unsigned nobody;  ///< its number; larger ones mean it too
+  unsigned nobody;  ///< number that stands for no owner, as do all larger numbers
 
   __device__ void hold(unsigned place, HeldWeighing& m, unsigned& held) const {
     m.hold(prepared, ends, min(place, nobody), held);

@@ -12,10 +12,10 @@ struct VoxelBounds {
   glm::ivec3 low, high;
 };
 
-/// Some voxels of a box, numbered as they came.
+/// A subset of the voxels of a box, numbered in order.
 struct Wanted {
-  const std::uint32_t* bits;  ///< one a voxel, rows from a word on
-  const unsigned* rank;       ///< number of the first voxel of a word, where that has any
+  const std::uint32_t* bits;  ///< one bit for each voxel; each row begins at a word
+  const unsigned* rank;       ///< number of the first voxel of each word that contains any
 
   __device__ bool has(std::int64_t word, int bit) const { return (bits[word] >> bit & 1) != 0; }
   __device__ unsigned number(std::int64_t word, int bit) const {
@@ -23,32 +23,36 @@ struct Wanted {
   }
 };
 
-/// The plain way, for any field: every cell claims its voxels, and the lowest number wins, whatever the order.
+/// Finds owners by scatter, for any field: every cell claims its voxels, and the lowest number wins, whatever the
+/// order.
 class Claims {
  public:
-  static constexpr std::int64_t kBytes = sizeof(unsigned long long) + sizeof(unsigned);  ///< of a voxel of a slab
+  /// Bytes for each voxel of a slab.
+  static constexpr std::int64_t kBytes = sizeof(unsigned long long) + sizeof(unsigned);
 
-  /// To be called when the field is another one.
+  /// To be called when the field changes.
   void forget_field() { has_bounds_ = false; }
 
-  /// Who owns the voxels of a slab.
+  /// Finds the owners of all voxels of a slab.
   void claim(const DeviceField& field, const SlabBox& slab, bool count_owners, cudaStream_t stream);
-  /// Who owns some of them, for a field with whole steps. @param count  how many these are
+  /// Finds the owners of some voxels of a slab, for a field with whole steps.
+  /// @param count  number of these voxels
   void claim(const DeviceField& field, const SlabBox& slab, const Wanted& wanted, std::size_t count,
              cudaStream_t stream);
 
-  /// Lowest number of a tetrahedron that owns the voxel, or kNobody: of each voxel of the slab, or by its
-  /// `Wanted::rank`.
+  /// Lowest number of a tetrahedron that owns the voxel, or kNobody: one for each voxel of the slab, or at the index
+  /// that `Wanted::rank` gives.
   const unsigned long long* owner() const { return owner_.data(); }
-  /// How many do; where asked for.
+  /// Number of owners, if they were counted.
   const unsigned* owners() const { return owners_.data(); }
 
  private:
   void choose(const DeviceField& field, const SlabBox& slab, const std::uint32_t* only, cudaStream_t stream);
 
   bool has_bounds_ = false;
-  DeviceBuffer<VoxelBounds> bounds_;       ///< of blocks of cells
-  DeviceBuffer<unsigned> chosen_, count_;  ///< blocks that may reach the slab, and how many
+  DeviceBuffer<VoxelBounds> bounds_;  ///< of each block of cells
+  /// Blocks that may reach the slab, and their number.
+  DeviceBuffer<unsigned> chosen_, count_;
   DeviceBuffer<unsigned long long> owner_;
   DeviceBuffer<unsigned> owners_;
 };

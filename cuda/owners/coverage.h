@@ -7,7 +7,7 @@
 
 namespace tetwarp::cuda_detail {
 
-/// A crossing where there is one of its kind before the same voxel already: a row has a chain of them.
+/// A crossing of a row before a voxel before which the row has such a crossing already. A row has a chain of them.
 struct ExtraCrossing {
   int next;  ///< numbered from 1; 0: none, -1: some are missing
   int voxel, sign;
@@ -21,33 +21,34 @@ struct GatherCounters {
   unsigned left;               ///< voxels with one owner that these left to the claims
 };
 
-/// Which voxels of a box have exactly one owner, so that any owner found is the one; and which need the slow path.
+/// Which voxels of a box have exactly one owner, so that any owner found is the one; and which must be claimed.
 ///
 /// The winding number of the deformed border is the number of owners, inverted ones counted as -1. Where no inverted
-/// tetrahedron can own a voxel and the number is 1, it has one owner; where it is 0, none (docs/algorithm.md,
-/// "Gather").
+/// tetrahedron can own a voxel, a voxel of winding number 1 has one owner and one of winding number 0 has none
+/// (docs/algorithm.md, "Gather").
 class Coverage {
  public:
-  /// Room for a box, before `find`, with counters that are zero. Queued on the stream.
+  /// Makes room for a box and sets all counters to zero, before `find`. The work is queued on the stream.
   void begin(const SlabBox& box, cudaStream_t stream);
-  /// For a field with whole steps; `claimed` is then the number of voxels that are `several`. Queued on the stream.
+  /// Finds the coverage of a field with whole steps. `GatherCounters::claimed` is then the number of voxels that are
+  /// `several`. The work is queued on the stream.
   void find(const LatticeOnDevice& lattice, const SlabBox& box, cudaStream_t stream);
 
-  /// In place of both: none has an owner as yet, no voxel is `single`, and none `several`. Queued on the stream.
+  /// Instead of `begin` and `find`: no voxel is `single`, and none `several`. The work is queued on the stream.
   void forget(const SlabBox& box, cudaStream_t stream);
 
-  /// Voxels with one owner.
+  /// Voxels with exactly one owner.
   BitRows single() const { return {single_.data(), words_}; }
-  /// Voxels that may have several, or none: not in `single`. Others may be added.
+  /// Voxels that may have several owners, or none; none of them is in `single`. Others may be added.
   std::uint32_t* several() const { return several_.data(); }
-  /// Counts them again, where some were added.
+  /// Counts `several` again, after some were added.
   void count_several(const SlabBox& box, cudaStream_t stream);
-  /// On the device.
+  /// The counters, in device memory.
   GatherCounters* counters() const { return reinterpret_cast<GatherCounters*>(crossings_.data()); }
-  /// How many of these each slice of the box has.
+  /// For each slice of the box, the number of its voxels in `several`.
   unsigned* several_in_slice() const { return in_slice_; }
   int words_per_row() const { return words_; }
-  /// As many words as `several` has, which nobody needs any more.
+  /// As many words as `several` has, which are free by then.
   unsigned* scratch() const { return ins(); }
 
  private:

@@ -13,9 +13,10 @@
 
 namespace tetwarp::cuda_detail {
 
-/// Where a gather puts what it finds: for each voxel of a box, whether a tetrahedron owns it and where it comes from.
+/// Receives what a gather finds, for later sampling: for each voxel of a box, whether a tetrahedron owns it and where
+/// it comes from.
 ///
-/// Like every sink of a gather it has a place for each voxel, which moves by `per_slice` along k.
+/// Every sink of a gather has a place for each voxel, which grows by `per_slice` along k.
 struct OffsetSink {
   static constexpr bool kIsWide = false;
 
@@ -25,7 +26,7 @@ struct OffsetSink {
 
   __device__ int place(const glm::ivec3& voxel) const { return static_cast<int>(box.offset(glm::i64vec3(voxel))); }
   __device__ int per_slice() const { return static_cast<int>(box.size.x * box.size.y); }
-  /// Nothing is read here.
+  /// This sink reads nothing, so nothing is pending.
   struct Pending {
     bool any;
     glm::vec3 u;
@@ -66,10 +67,11 @@ struct OffsetSink {
   }
 };
 
-/// From voxels to their owners: marches along k, and predicts each owner from the last one.
+/// Finds the owners of voxels by marching along k and predicting each owner from the one before.
 ///
-/// Voxels that the march cannot settle in float go to a queue, and there to a walk with exact integers; voxels that may
-/// have several owners, and what is left, are claimed. So every field with whole steps may take this way.
+/// Voxels that the march cannot settle in float go into a queue, and from there to a walk with exact integers. Voxels
+/// that may have several owners, and those that the walk leaves, are claimed. So this way is right for every field with
+/// whole steps.
 class Gather {
  public:
   using Counters = GatherCounters;
@@ -78,7 +80,7 @@ class Gather {
   template <class Sink>
   Counters run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream);
 
-  /// To be called when the field is another one.
+  /// To be called when the field changes.
   void forget_field() {
     claims_.forget_field();
     intervals_.forget_field();
@@ -90,7 +92,8 @@ class Gather {
   };
 
  private:
-  /// Whether so much is inverted that walks mostly fail: then what is not predicted is claimed.
+  /// Whether so many tetrahedra are inverted that walks mostly fail. Then voxels whose owner is not predicted are
+  /// claimed.
   static bool is_mostly_folded(const LatticeOnDevice& lattice);
   /// The way for large cells.
   template <class Sink>

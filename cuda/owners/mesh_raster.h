@@ -10,20 +10,20 @@ namespace tetwarp::cuda_detail {
 
 constexpr unsigned kNoTetrahedron = ~0u;
 
-/// Who owns the voxels of a box; likewise `OffsetSink`.
+/// Receives the owners of the voxels of a box, as `OffsetSink` (cuda/owners/gather.h) receives places.
 struct OwnerSink {
   SlabBox box;
-  unsigned* owner;         ///< number of the lowest, or kNoTetrahedron
-  std::uint16_t* several;  ///< how many there are; null: not wanted
+  unsigned* owner;         ///< lowest number of an owner of each voxel, or kNoTetrahedron
+  std::uint16_t* several;  ///< number of owners of each voxel; null: not counted
 
   __device__ int place(const glm::ivec3& voxel) const { return static_cast<int>(box.offset(glm::i64vec3(voxel))); }
   __device__ int per_slice() const { return static_cast<int>(box.size.x * box.size.y); }
 };
 
-/// Voxels that nobody owns.
+/// Counts the voxels that nobody owns.
 struct HoleSink {
   SlabBox box;
-  unsigned long long* found;  ///< how many, and the first of the box
+  unsigned long long* found;  ///< two numbers: how many there are, and the index of the first in the box
 
   __device__ int place(const glm::ivec3& voxel) const { return static_cast<int>(box.offset(glm::i64vec3(voxel))); }
   __device__ int per_slice() const { return static_cast<int>(box.size.x * box.size.y); }

@@ -10,21 +10,24 @@
 
 namespace tetwarp {
 
-/// What the points of a contour are (PS3.3 C.8.8.6.1).
+/// What the points of a contour are (Contour Geometric Type, DICOM PS3.3 C.8.8.6.1).
 enum class ContourKind : std::uint8_t {
   point,           ///< one place
   open,            ///< a line in a plane
   open_nonplanar,  ///< a line in space
   closed,          ///< the border of an area in a plane; the last point is joined to the first
-  closed_xor       ///< the same, said to be combined with the others of its plane by exclusive or
+  closed_xor       ///< like `closed`, in a file which says that areas of one plane are combined by exclusive or
 };
 
+/// Whether the last point is joined to the first.
 inline bool is_closed(ContourKind kind) { return kind == ContourKind::closed || kind == ContourKind::closed_xor; }
 
+/// Points that describe a place, a line, or the border of an area.
 struct Contour {
-  ContourKind kind = ContourKind::closed;
+  ContourKind kind = ContourKind::closed;  ///< what the points are
   std::vector<glm::dvec3> points;          ///< LPS mm
-  std::optional<std::int64_t> slice = {};  ///< of the image that it was drawn on, if it lies in the plane of one
+  /// Index k of the image slice in whose plane it lies, if it was drawn on one.
+  std::optional<std::int64_t> slice = {};
 };
 
 }  // namespace tetwarp

@@ -14,10 +14,11 @@
 
 namespace tetwarp {
 
-/// Points within this distance of a plane lie in it, mm: what is drawn on a slice is written with two decimals or more.
+/// Largest distance, mm, of points that lie in one plane. Coordinates of drawn contours are written with two decimals
+/// or more.
 constexpr double kInPlane = 0.05;
 
-/// What is between two planes of contours.
+/// How the solid between two planes of contours is found.
 enum class Between : std::uint8_t {
   interpolated,  ///< signed distances change linearly (shape-based interpolation: Raya and Udupa, IEEE Trans. Med.
                  ///< Imaging 9, 1990)
@@ -37,18 +38,19 @@ class ContourStack {
   /// @throws InputError unless the contours lie in planes, all parallel
   ContourStack(std::span<const Contour> contours, const Geometry& slices);
 
-  /// Positive inside, mm; near the surface the distance to it, or less. -infinity where there is nothing.
+  /// Signed distance from the surface, mm: positive inside; near the surface exact or smaller in size; -infinity where
+  /// there is nothing.
   double signed_distance(const glm::dvec3& point, Between between) const;
-  /// Whether that is inside, for either kind: much faster than the distance.
+  /// Whether a place is inside, for each kind of Between. `place` is much faster than `signed_distance`.
   struct Place {
     bool interpolated = false, nearest = false;
   };
   Place place(const glm::dvec3& point) const;
-  /// Of what lies in the planes, each as thick as halves the way to its neighbours; mm3.
+  /// Volume in mm3: the area in each plane times half the distance between its two neighbours.
   double volume() const;
-  /// How far the planes usually are apart, mm.
+  /// Usual (median) distance of neighbouring planes, mm.
   double distance() const { return distance_; }
-  /// Runs of planes with something between them.
+  /// Number of runs of planes that have something between them.
   std::size_t parts() const { return parts_.size(); }
 
  private:
@@ -65,7 +67,7 @@ class ContourStack {
   void choose_frame(std::span<const Contour> contours, const glm::dvec3& normal);
   void add_planes(std::span<const Contour> contours);
   void add_parts(const Geometry& slices);
-  /// The planes around a height in a part, and how far it is from the lower to the upper one, 0 to 1.
+  /// The planes of a part below and above a height, and how far the height is from the lower to the upper one, 0 to 1.
   struct Neighbours {
     const PlanarRegion *below, *above;
     double t;

@@ -22,7 +22,7 @@ class PlanarRegion {
   static constexpr double kFar = 1e9;  ///< mm
 
   bool contains(const glm::dvec2& point) const;
-  /// Exact; positive inside, mm; -kFar where there is no border.
+  /// Exact signed distance from the border, mm, positive inside; -kFar where there is no border.
   double signed_distance(const glm::dvec2& point) const;
 
  private:

@@ -12,11 +12,11 @@
 
 namespace tetwarp {
 
-/// What a deformed solid is on one slice of the output.
+/// A deformed solid on one slice of the output.
 struct SlicedContours {
   std::vector<Contour> contours;  ///< in the slice's plane; holes by keyholes
   double area = 0;                ///< mm2
-  bool cut = false;               ///< the solid goes on beyond the output, or to where the field maps nothing
+  bool cut = false;               ///< whether the solid continues beyond the output, or to where the field maps nothing
 };
 
 /// Draws a deformed solid anew on the slices of an output grid, through the inverse of the field: a place of the output
@@ -30,8 +30,10 @@ class Reslicer {
   /// @throws InputError as ContourStack
   Reslicer(std::span<const Contour> contours, const Geometry& source, const Geometry& output);
 
-  /// From any thread. @param inverse_mm  Maps::inverse_mm, with slice k of the output
-  /// @return  for each kind of Between, in their order
+  /// Draws the solid on a slice; may be called from any thread.
+  /// @param inverse_mm  `Maps::inverse_mm`, which buffers slice k of the output
+  /// @param k           the slice
+  /// @return one result for each kind of Between, in their order
   std::array<SlicedContours, 2> slice(const ConstVolumeView& inverse_mm, std::int64_t k) const;
 
   const ContourStack& solid() const { return solid_; }

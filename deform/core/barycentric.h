@@ -29,7 +29,7 @@ TETWARP_HD inline float magnitude(float x) { return std::fabs(x); }
 /// Length of a vector in the sum norm; the product of three bounds what a determinant's rounding error grows with.
 TETWARP_HD inline float norm1(const glm::vec3& v) { return (magnitude(v.x) + magnitude(v.y)) + magnitude(v.z); }
 
-/// det of three differences about D, exact; `r` in nudge units or steps.
+/// Determinant of three differences about D, exact, in the unit of the arguments.
 TETWARP_HD inline Wide determinant(const glm::i64vec3& a, const glm::i64vec3& b, const glm::i64vec3& c) {
   return Wide(a.x) * (Wide(b.y) * c.z - Wide(b.z) * c.y) + Wide(a.y) * (Wide(b.z) * c.x - Wide(b.x) * c.z) +
          Wide(a.z) * (Wide(b.x) * c.y - Wide(b.y) * c.x);
@@ -39,15 +39,16 @@ TETWARP_HD inline Wide determinant(const glm::i64vec3& a, const glm::i64vec3& b,
 
 namespace detail {
 
-/// Determinant of three edges, exact before it is rounded. Rarely called, so kept out of loops.
+/// Determinant of three edges, exact before it is rounded to float. It is rarely called, and so is kept out of loops.
 TETWARP_NOINLINE_HD inline float exact_determinant(glm::i64vec3 a, glm::i64vec3 b, glm::i64vec3 c) {
   return static_cast<float>(to_double(determinant(a, b, c)));
 }
 
-/// Determinant of three edges, whole numbers of steps below 2^24: in float where that is certain to have the right
-/// sign, else exact. So its sign and its zero are always right.
+/// Determinant of three edges whose components are whole numbers of steps below 2^24. It is computed in float where
+/// that certainly has the right sign, and exactly otherwise; so its sign and its zero are always right.
 ///
-/// A component of a cross product is off by at most 2 units (2^-24) of its two products, the dot product by 3 more.
+/// A component of a cross product has an error of at most 2 units (2^-24) of its two products; the dot product adds at
+/// most 3.
 TETWARP_HD inline float edge_determinant(const glm::vec3& a, const glm::vec3& b, const glm::vec3& c) {
   constexpr float kError = 8.0f / (1 << 24);
   const float det = dot(a, cross(b, c));
@@ -55,7 +56,7 @@ TETWARP_HD inline float edge_determinant(const glm::vec3& a, const glm::vec3& b,
   return exact_determinant(glm::i64vec3(a), glm::i64vec3(b), glm::i64vec3(c));
 }
 
-/// The same of any edges.
+/// Determinant of three edges of any length in steps, with the right sign and the right zero.
 TETWARP_HD inline float edge_determinant(const glm::i32vec3& a, const glm::i32vec3& b, const glm::i32vec3& c) {
   constexpr int kExact = 1 << 24;  // in float
   for (const glm::i32vec3& edge : {a, b, c}) {
@@ -69,8 +70,8 @@ TETWARP_HD inline float edge_determinant(const glm::i32vec3& a, const glm::i32ve
 
 }  // namespace detail
 
-/// Whether a tetrahedron at rest has less volume than 1/64 of the product of its edges' sum norms: float has too few
-/// digits for its Jacobian determinant. A cube's corner tetrahedron has all of it, its centre a quarter.
+/// Whether an undeformed tetrahedron has less volume than 1/64 of the product of its edges' sum norms; then float has
+/// too few digits for its Jacobian determinant. For a corner tetrahedron of a cube the share is 1, for its centre 1/4.
 /// @param a, b, c  edges about D, in any unit
 TETWARP_HD inline bool is_thin_at_rest(const glm::vec3& a, const glm::vec3& b, const glm::vec3& c) {
   constexpr float kThinnest = 1.0f / 64;
@@ -78,13 +79,14 @@ TETWARP_HD inline bool is_thin_at_rest(const glm::vec3& a, const glm::vec3& b, c
   return !(detail::magnitude(detail::dot(a, detail::cross(b, c))) >= kThinnest * ((norm1(a) * norm1(b)) * norm1(c)));
 }
 
-/// Forward Jacobian determinant of a tetrahedron, deformed over rest volume: the one that reports and maps of both
-/// backends state. Negative just where the tetrahedron is inverted, zero just where it has no volume when deformed, not
-/// finite where it has none at rest.
+/// Jacobian determinant of the forward map of a tetrahedron, deformed over undeformed volume, as reports and maps of
+/// all backends state it. It is negative exactly where the tetrahedron is inverted, zero exactly where it has no volume
+/// when deformed, and not finite where it has no undeformed volume.
 ///
-/// Both volumes in float (`edge_determinant`), so that vectors may take it: off by 5 units (2^-24) of the product of
-/// the edges' sum norms over the volume, deformed and at rest, some 1e-6 for a cell that is about as thick as wide.
-/// Where it is thin at rest that would be too much; both volumes are exact there before the division.
+/// Both volumes are computed in float (`edge_determinant`), so that vector units can do it. The error is 5 units
+/// (2^-24) of the product of the edges' sum norms over the volume, for each of both: about 1e-6 for a cell that is
+/// about as thick as wide. Where the undeformed tetrahedron is thin that would be too much; there both volumes are
+/// exact before the division.
 TETWARP_HD inline float forward_jacobian(const Tetrahedron& t) {
   const glm::i32vec3 a = t.a.deformed - t.d.deformed, b = t.b.deformed - t.d.deformed, c = t.c.deformed - t.d.deformed,
                      rest_a = a + (t.a.u - t.d.u), rest_b = b + (t.b.u - t.d.u), rest_c = c + (t.c.u - t.d.u);
@@ -92,7 +94,7 @@ TETWARP_HD inline float forward_jacobian(const Tetrahedron& t) {
   return detail::edge_determinant(a, b, c) / detail::edge_determinant(rest_a, rest_b, rest_c) + 0.0f;  // never -0
 }
 
-/// Those of the five tetrahedra of a cell.
+/// Jacobian determinants of the five tetrahedra of a cell.
 TETWARP_HD inline void cell_jacobians(const Cell& cell, bool odd, float (&jacobians)[kTetrahedraPerCell]) {
   for (int number = 0; number < kTetrahedraPerCell; ++number)
     jacobians[number] = forward_jacobian(tetrahedron_of(cell, number, odd));
@@ -115,12 +117,12 @@ struct Cramer {
       : bc(detail::cross(b, c)), ca(detail::cross(c, a)), ab(detail::cross(a, b)), det(detail::dot(a, bc)) {}
 };
 
-/// Whether float has too few right digits for the weights.
+/// Whether float has too few digits for the weights of a tetrahedron with these edges about D.
 TETWARP_HD inline bool is_thin(const Cramer& m, const glm::vec3& a, const glm::vec3& b, const glm::vec3& c) {
   return !(detail::magnitude(m.det) > kThin * ((detail::norm1(a) * detail::norm1(b)) * detail::norm1(c)));
 }
 
-/// Weights of A, B and C; that of D is what is left of 1.
+/// Barycentric weights of A, B and C; the weight of D is 1 minus their sum.
 struct Weights {
   float a, b, c;
 
@@ -141,10 +143,11 @@ TETWARP_HD inline glm::vec3 blend(const Weights& w, const glm::vec3& ud, const g
           ((ud.z + w.a * a.z) + w.b * b.z) + w.c * c.z};
 }
 
-/// u at a voxel of a thin or very small tetrahedron: weights exact before their division, about D.
+/// u at a voxel of a thin or very small tetrahedron, in voxels, from weights about D that are exact before their
+/// division.
 ///
-/// The owner holds the nudged point q, not p: where the tetrahedron is so small that a weight at p leaves [0, 1] by
-/// more than the slack, the affine map would be extrapolated far beyond the tetrahedron, so it is evaluated at q.
+/// The owner holds the nudged point q, not p. Where the tetrahedron is so small that a weight at p leaves [0, 1] by
+/// more than kWeightSlack, the affine map would be extrapolated far beyond the tetrahedron, so it is evaluated at q.
 TETWARP_HD inline glm::vec3 interpolate_u_exactly(const Tetrahedron& t, const glm::i32vec3& steps,
                                                   const glm::i32vec3& signs) {
   const glm::i64vec3 origin(t.d.deformed);
@@ -170,7 +173,7 @@ TETWARP_HD inline glm::vec3 interpolate_u_exactly(const Tetrahedron& t, const gl
   return u;
 }
 
-/// Whether an edge from D is so long that float may not hold where a voxel lies from D, in 2^-12 voxel.
+/// Whether an edge from D is so long that float may not hold the place of a voxel relative to D, in 2^-12 voxel.
 TETWARP_HD inline bool is_long(const Tetrahedron& t) {
   constexpr int kLong = (1 << 24) - (1 << 18);  // room for the voxels of a tile around
   for (const glm::i32vec3& edge :
@@ -183,10 +186,11 @@ TETWARP_HD inline bool is_long(const Tetrahedron& t) {
   return false;
 }
 
-/// What the voxels of a tetrahedron have in common: their u is interpolated without looking at the vertices again.
+/// The affine map of a tetrahedron, made once, so that u of its voxels is interpolated without reading the vertices
+/// again.
 ///
-/// Weights in float by `Cramer`, blended by `blend`: a tetrahedron that is only translated gives its translation
-/// exactly, whatever the weights' rounding.
+/// Weights are computed in float by `Cramer` and blended by `blend`: a tetrahedron that is only translated gives its
+/// translation exactly, however the weights are rounded.
 class TetrahedronMap {
  public:
   TETWARP_HD explicit TetrahedronMap(const Tetrahedron& t)
@@ -221,15 +225,15 @@ class TetrahedronMap {
 
   glm::i32vec3 d_;
   Cramer cramer_;
-  bool is_exact_;                  ///< float has too few digits for any voxel
+  bool is_exact_;                  ///< whether float has too few digits for all voxels
   float reciprocal_;               ///< of the determinant
   glm::vec3 u_, u_a_, u_b_, u_c_;  ///< at D, and the differences from it at A, B, C
 };
 
-/// u = undeformed minus deformed position at a voxel that the tetrahedron owns, in voxels of output index.
+/// u = undeformed minus deformed place at a voxel that the tetrahedron owns, in voxels of output index.
 ///
 /// @param steps  the voxel, 2^-12 voxel
-/// @param signs  which way it is nudged
+/// @param signs  directions in which it is nudged
 TETWARP_HD inline glm::vec3 interpolate_u(const Tetrahedron& t, const glm::i32vec3& steps, const glm::i32vec3& signs) {
   return TetrahedronMap(t).u(steps, [&] { return interpolate_u_exactly(t, steps, signs); });
 }

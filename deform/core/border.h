@@ -7,23 +7,25 @@
 
 namespace tetwarp {
 
-/// Where the deformed border of a lattice lies, row by row: the winding number of the border around a voxel is the
-/// number of tetrahedra that own it, inverted ones counted as -1 (docs/algorithm.md, "Gather").
-
-/// A triangle of the deformed border, corners in 2^-12 voxel; outside is on the side of (b - a) x (c - a) while the
-/// lattice is undeformed.
+/// A triangle of the deformed border of a lattice, corners in 2^-12 voxel. Its outer side is that of (b - a) x (c - a)
+/// while the lattice is undeformed.
+///
+/// The winding number of the border around a voxel is the number of tetrahedra that own the voxel, inverted ones
+/// counted as -1 (docs/algorithm.md, "Gather"). It is found row by row, from where the row passes through these
+/// triangles.
 struct BorderTriangle {
   glm::i32vec3 a, b, c;
 };
 
-/// One of the two triangles of a border face. Faces lie on one side of the lattice: axis 0 to 2, at its low or high
-/// end.
+/// One of the two triangles of a border face.
 ///
-/// Of the four corners of a face the two even ones are corners D of tetrahedra; each gives the triangle of D and its
+/// Of the four corners of a face, the two even ones are corners D of tetrahedra. Each gives the triangle of D and its
 /// two neighbours in the face.
-/// @param lattice  as of `vertices_of`  @param face  position in the side, in cells along the two axes that follow
-/// `axis`
-/// @param which  0 or 1
+/// @param lattice  what `vertices_of` takes
+/// @param axis     axis (0 to 2) across which the side of the lattice lies
+/// @param high     whether the side is the one at the high end of the axis
+/// @param face     position in the side, in cells along the two axes that follow `axis`
+/// @param which    0 or 1
 template <class Lattice>
 TETWARP_HD BorderTriangle border_triangle(const Lattice& lattice, int axis, bool high, const glm::ivec2& face,
                                           int which) {
@@ -48,7 +50,7 @@ TETWARP_HD BorderTriangle border_triangle(const Lattice& lattice, int axis, bool
 namespace detail {
 
 /// Side of the edge from a to b, seen along x, on which the nudged row lies: the sign of the determinant of (b - a) and
-/// (q - a) in y and z; on a tie q moves on by (sy e^2, sz e^3).
+/// (q - a) in y and z. On an exact tie q moves on by (sy e^2, sz e^3) for an infinitesimal e > 0.
 template <class Int>
 TETWARP_HD int side_of_edge(const glm::i32vec3& a, const glm::i32vec3& b, const glm::i32vec2& row,
                             const glm::i32vec3& signs) {
@@ -63,11 +65,12 @@ TETWARP_HD int side_of_edge(const glm::i32vec3& a, const glm::i32vec3& b, const 
 
 }  // namespace detail
 
-/// Where the row of voxels (y, z) passes through a triangle.
+/// Finds where the row of voxels (y, z) passes through a triangle.
 ///
-/// @param nudge  of the lattice  @param begin, end  voxels of the row that matter
-/// @param first  the first voxel of the row beyond the triangle, from begin (also where it is further back) to end
-/// @return 1 where the row goes in there, -1 where it comes out, 0 where it passes by
+/// @param nudge       nudge of the lattice
+/// @param begin, end  half-open range of the voxels of the row that matter
+/// @param first       set to the first voxel of the row beyond the triangle, clamped to `begin` and `end`
+/// @return 1 where the row enters the lattice, -1 where it leaves it, 0 where it misses the triangle
 template <class Int>
 TETWARP_HD int cross_border(const BorderTriangle& t, const Nudge& nudge, int y, int z, int begin, int end, int& first) {
   const glm::i32vec3 signs(1, nudge.sign(1, y), nudge.sign(2, z));

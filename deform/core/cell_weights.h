@@ -9,13 +9,16 @@
 
 namespace tetwarp {
 
-/// Weights of corners A, B, C of the tetrahedron of an undeformed cell that holds a place in it; D has the rest.
+/// The undeformed tetrahedron of a cell that holds a place, and the weights of its corners A, B, C there. The weight of
+/// D is 1 - a - b - c.
 struct CellWeights {
   TetrahedronCorners corners;
   double a, b, c;
 };
 
-/// @param at  place in the cell, 0 to 1 on each axis
+/// Finds the tetrahedron of an undeformed cell that holds a place.
+/// @param at   place in the cell, 0 to 1 on each axis
+/// @param odd  parity of the cell
 inline CellWeights weights_in_cell(const glm::dvec3& at, bool odd) {
   for (int t = 1; t < kTetrahedraPerCell; ++t) {
     const TetrahedronCorners corners = tetrahedron_corners(t, odd);

@@ -7,18 +7,18 @@
 
 namespace tetwarp {
 
-/// A lattice vertex: where it is in the deformed volume and u = rest minus deformed, both in 2^-12 voxel of output
+/// A snapped lattice vertex: its deformed place, and u = undeformed minus deformed place, both in 2^-12 voxel of output
 /// index.
 struct Vertex {
   glm::i32vec3 deformed, u;
 };
 
-/// The eight corners of a cell; corner c is at (c & 1, c >> 1 & 1, c >> 2) of it.
+/// The eight corners of a cell; corner c lies at (c & 1, c >> 1 & 1, c >> 2) of it.
 struct Cell {
   Vertex corner[8];
 };
 
-/// Corners A, B, C and the reference corner D (the paper's names).
+/// The corners A, B, C and the reference corner D of a tetrahedron (names of the paper).
 struct Tetrahedron {
   Vertex a, b, c, d;
 };
@@ -48,9 +48,8 @@ TETWARP_HD inline Tetrahedron tetrahedron_of(const Cell& cell, int t, bool odd) 
   return {cell.corner[corners.a], cell.corner[corners.b], cell.corner[corners.c], cell.corner[corners.d]};
 }
 
-/// A point relative to a voxel or vertex nearby, 2^-12 voxel. Int is any type that holds the determinants of such
-/// points exactly: double
-/// (`fits_double`), 64 bits (`fits_int64`) or Wide.
+/// A point relative to a voxel or vertex nearby, 2^-12 voxel. Int is any type that holds determinants of such points
+/// exactly: double (`fits_double`), 64 bits (`fits_int64`) or Wide.
 template <class Int>
 struct Relative {
   Int x, y, z;
@@ -70,7 +69,8 @@ TETWARP_HD Int signed_volume(const Relative<Int>& a, const Relative<Int>& b, con
   return ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx);
 }
 
-/// Forward Jacobian determinant of a tetrahedron: deformed over rest volume, both exact before the division.
+/// Jacobian determinant of the forward map of a tetrahedron: deformed over undeformed volume, both exact before the
+/// division.
 TETWARP_HD inline double jacobian(const Tetrahedron& t) {
   const auto volume = [](const glm::i32vec3& a, const glm::i32vec3& b, const glm::i32vec3& c, const glm::i32vec3& d) {
     return to_double(signed_volume(Relative<Wide>(a), Relative<Wide>(b), Relative<Wide>(c), Relative<Wide>(d)));
@@ -79,7 +79,7 @@ TETWARP_HD inline double jacobian(const Tetrahedron& t) {
          volume(t.a.deformed + t.a.u, t.b.deformed + t.b.u, t.c.deformed + t.c.u, t.d.deformed + t.d.u);
 }
 
-/// Box of a tetrahedron or cell in 2^-12 voxel, closed.
+/// Closed box around points, corners in 2^-12 voxel.
 struct Box {
   glm::i32vec3 low, high;
 
@@ -105,7 +105,7 @@ TETWARP_HD inline Box box_of(const Cell& cell) {
   return box;
 }
 
-/// Longest side of a box, in 2^-12 voxel, with one voxel more.
+/// Longest side of a box plus one voxel, in 2^-12 voxel.
 TETWARP_HD inline std::int64_t reach_of(const Box& box) {
   std::int64_t longest = 0;
   for (int axis = 0; axis < 3; ++axis) {

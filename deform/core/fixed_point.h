@@ -10,13 +10,14 @@
 
 namespace tetwarp {
 
-/// Vertices are held as integers in units of 2^-12 voxel of the output grid (docs/algorithm.md, "Input"): 2^18 voxels
-/// an axis fit with room for differences. All that decides ownership is integer arithmetic on them.
+/// Vertices are integers in steps of 2^-12 voxel of the output grid (docs/algorithm.md, "Input"). 2^18 voxels on an
+/// axis fit, with room for differences. Everything that decides ownership is integer arithmetic on them.
 constexpr int kStepsPerVoxel = 1 << 12;
 constexpr double kLargestIndex = 1 << 18;
 constexpr float kVoxelsPerStep = 1.0f / kStepsPerVoxel;
 
-/// Nearest multiple of 2^-12 voxel, ties to even. @param index  finite, |index| < kLargestIndex
+/// The nearest multiple of 2^-12 voxel, ties to even, in steps.
+/// @param index  finite, |index| < kLargestIndex
 TETWARP_HD inline std::int32_t snap(double index) {
   return static_cast<std::int32_t>(std::rint(index * kStepsPerVoxel));
 }
@@ -34,7 +35,7 @@ TETWARP_HD inline glm::i32vec3 snap(const glm::dvec3& index) { return {snap(inde
 constexpr int kNudgeSteps = 16;  ///< nudge units (2^-16 voxel) in a step of 2^-12
 constexpr int kNudgeX = 15, kNudgeY = 7, kNudgeZ = 4;
 
-/// Which way a voxel is nudged, on each axis: +1 below the middle, else -1.
+/// In which direction each voxel is nudged on each axis: +1 below the middle of the undeformed lattice, else -1.
 struct Nudge {
   glm::i64vec3 low_plus_high{0};  ///< twice the middle of the undeformed lattice's box of snapped vertices, 2^-12 voxel
 
@@ -44,14 +45,14 @@ struct Nudge {
   TETWARP_HD glm::i32vec3 signs(const glm::i64vec3& voxel) const {
     return {sign(0, voxel.x), sign(1, voxel.y), sign(2, voxel.z)};
   }
-  /// The first voxel of an axis that is nudged down.
+  /// The first voxel on an axis that is nudged downwards.
   TETWARP_HD std::int64_t first_down(int axis) const {
     const std::int64_t voxel = low_plus_high[axis] >> 13;  // floor of the middle
     return sign(axis, voxel) < 0 ? voxel : voxel + 1;
   }
 };
 
-/// The same in 32 bits, for grids that fit them: voxels from `first_down` on are nudged down.
+/// The directions of `Nudge` in 32 bits, for grids that fit them: voxels from `first_down` on are nudged downwards.
 struct NudgeTurns {
   glm::ivec3 first_down{0};
 
@@ -65,21 +66,23 @@ struct NudgeTurns {
   }
 };
 
-/// Where tiles of some voxels begin on an axis, so that none has voxels of both sides of the nudge's turn.
-/// @param begin, end  voxels, half open  @param turn  `first_down` of the axis
+/// Where tiles begin on an axis, so that all voxels of a tile are nudged in the same direction.
+/// @param begin, end  half-open range of voxels
+/// @param turn        `Nudge::first_down` of the axis
+/// @param size        voxels of a tile
 inline std::int64_t tile_origin(std::int64_t begin, std::int64_t end, std::int64_t turn, std::int64_t size) {
   return turn > begin && turn < end ? turn - (turn - begin + size - 1) / size * size : begin;
 }
 
-/// d in units of 2^-16 voxel.
+/// The nudge d in units of 2^-16 voxel, from its signs.
 TETWARP_HD inline glm::i32vec3 nudge_steps(const glm::i32vec3& signs) {
   return {kNudgeX * signs.x, kNudgeY * signs.y, kNudgeZ * signs.z};
 }
 
-/// Wide exact integer: products of three coordinates of any tetrahedron that fits the grid (below 2^100).
+/// Wide exact integer. It holds products of three coordinates of any tetrahedron that fits the grid (below 2^100).
 __extension__ typedef __int128 Wide;
 
-/// Rounded to double in two steps, the same on host and device.
+/// The value as double, rounded in two steps, with the same bits on host and device.
 TETWARP_HD inline double to_double(Wide value) {
   const bool negative = value < 0;
   const Wide size = negative ? -value : value;

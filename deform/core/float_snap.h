@@ -8,13 +8,14 @@
 
 namespace tetwarp {
 
-/// Snaps displacements in float where that certainly gives what `LatticeFrame::snap_vertex` gives.
+/// Snaps displacements in float where the result is certainly that of `LatticeFrame::snap_vertex`.
 ///
-/// With an axis of the lattice along each axis of the grid, a displacement in steps is d m, m = high + low to 48 bits.
-/// Adding what raises it to where floats are whole numbers (StepPacking), fused, rounds d high to whole steps; the
-/// rest, known to 2^-20 step, decides wherever it is not that close to a half. Where m is a power of two and vertices
-/// rest at even steps, all of that is exact, and ties go to even here as there. Other ties, and far and unusable
-/// vertices, need double arithmetic.
+/// It needs an axis of the lattice along each axis of the grid. Then a displacement in steps of 2^-12 voxel is d m,
+/// where m = high + low to 48 bits. One fused multiply-add of d high and a number that raises it to where floats are
+/// whole numbers (StepPacking) rounds d high to whole steps. The remainder, known to 2^-20 step, proves the rounding
+/// unless it is close to a half. Where m is a power of two and undeformed vertices lie at even steps all of this is
+/// exact, and ties go to even as in `snap_vertex`. All other ties, and vertices that are far away or not finite, need
+/// double arithmetic.
 class FloatSnap {
  public:
   FloatSnap() = default;
@@ -42,22 +43,23 @@ class FloatSnap {
     clear_ = static_cast<float>(0.5 - 1.0 / (1 << 16) - beside);
   }
 
-  /// Whether anything is ever certain.
+  /// Whether the rounding of any vertex can be proved.
   bool is_usable() const { return clear_ > 0; }
-  /// Whether ties go to even steps here as there.
+  /// Whether ties go to even steps as in `LatticeFrame::snap_vertex`.
   bool is_exact() const { return exact_; }
-  /// What is left decides where it is smaller than `clear`.
+  /// The rounding is proved where the remainder is smaller than this, in steps.
   float clear() const { return clear_; }
   const glm::vec3& high() const { return high_; }
   const glm::vec3& low() const { return low_; }
   const glm::vec3& lift() const { return lift_; }
 
-  /// The displacement in whole steps, raised; right where it can be packed and it `is_certain`.
+  /// The displacement (LPS mm) in whole steps, raised; valid where it can be packed and `is_certain`.
   TETWARP_HD glm::vec3 raised(const glm::vec3& displacement) const {
     return {fmaf(displacement.x, high_.x, lift_.x), fmaf(displacement.y, high_.y, lift_.y),
             fmaf(displacement.z, high_.z, lift_.z)};
   }
-  /// Where ties are not exact: whether there is none. No `&&`: branches would cost more than they save.
+  /// For a field where `is_exact` is false: whether no component is near a tie. It has no `&&`, because branches would
+  /// cost more than they save.
   TETWARP_HD bool is_certain(const glm::vec3& displacement, const glm::vec3& raised) const {
     bool certain = true;
 #ifdef __CUDA_ARCH__
@@ -72,7 +74,7 @@ class FloatSnap {
 
  private:
   glm::vec3 high_{0}, low_{0}, lift_{0};
-  float clear_ = -1;  ///< negative: never
+  float clear_ = -1;  ///< negative: no rounding can be proved
   bool exact_ = false;
 };
 

@@ -10,13 +10,14 @@
 
 namespace tetwarp {
 
-/// The other way round from `visit_cell`: from a voxel to the tetrahedron that owns it.
-///
-/// Nothing here decides ownership by itself. A tetrahedron is accepted where float arithmetic proves what
-/// `side_of_face` would say, or exact integers say it; whatever cannot be settled is left to `visit_cell`. That the
-/// owner found is the only one, and so the lowest, must be known before (docs/algorithm.md, "Gather").
+// From a voxel to the tetrahedron that owns it: the opposite way of `visit_cell`, which goes from a cell to its voxels.
+//
+// Nothing here decides ownership by itself. A tetrahedron is accepted where float arithmetic proves the result of
+// `side_of_face`, or exact integers compute it; whatever cannot be settled is left to `visit_cell`. That the owner
+// found is the only one, and so has the lowest number, must be known before (docs/algorithm.md, "Gather").
 
-/// A voxel centre, from the first vertex at rest, and its nudge; 2^-12 voxel, whole numbers and quarters in float.
+/// A voxel centre relative to the first undeformed vertex, and its nudge; 2^-12 voxel, in float, which holds both
+/// exactly.
 struct GatherPoint {
   glm::vec3 steps, nudge;
 
@@ -25,21 +26,21 @@ struct GatherPoint {
         nudge(glm::vec3(nudge_steps(signs)) * (1.0f / kNudgeSteps)) {}
 };
 
-/// What one tetrahedron says of a voxel.
+/// What the test of one tetrahedron against one voxel found.
 struct Trial {
-  bool owns;        ///< certainly, and its weights need no exact arithmetic
-  bool unsure;      ///< it may own, and with full effort its weights need no exact arithmetic
+  bool owns;    ///< whether it certainly owns the voxel and its weights need no exact arithmetic
+  bool unsure;  ///< whether it may own the voxel and, tested with Effort::full, its weights need no exact arithmetic
   glm::vec3 moved;  ///< where it owns: deformed minus undeformed place, 2^-12 voxel
   FloatTetrahedron t;
   glm::vec3 weights;   ///< of A, B and C at the nudged voxel
-  glm::vec3 slope;     ///< how they change along k, times the determinant
-  float slope_factor;  ///< by this, so that it is from one voxel to the next
+  glm::vec3 slope;     ///< change of the weights along k, times the determinant
+  float slope_factor;  ///< `slope` times this is the change of the weights from one voxel to the next along k
 
-  /// Where it owns: undeformed minus deformed place, voxels; the bits of `interpolate_u`.
+  /// If it owns the voxel: undeformed minus deformed place, voxels, with the bits of `interpolate_u`.
   TETWARP_HD glm::vec3 u() const;
-  /// Where its affine map takes the nudged voxel from, cells.
+  /// Undeformed place, in cells, that its affine map gives the nudged voxel.
   TETWARP_HD glm::vec3 place() const { return place_of(weights); }
-  /// Likewise the next voxel along k.
+  /// Undeformed place, in cells, that its affine map gives the next voxel along k.
   TETWARP_HD glm::vec3 next_place() const;
 
  private:
@@ -48,7 +49,7 @@ struct Trial {
 
 namespace detail {
 
-/// a b + c; fused on the device. For what need not be the same bits everywhere.
+/// a b + c, fused on the device only; for numbers that need not have the same bits everywhere.
 TETWARP_HD inline float multiply_add(float a, float b, float c) {
 #ifdef __CUDA_ARCH__
   return fmaf(a, b, c);
@@ -99,15 +100,15 @@ TETWARP_HD inline float error_bound(float product, float faces, float r) {
 /// |d|: (15 + 7 + 4) / 16 steps.
 constexpr float kNudgeNorm = 1.625f;
 
-/// The same over s^2, from the sum s of the three norms and |r|: P is at most s^3 / 27, and the sum of products of two
-/// norms at most s^2 / 3.
+/// `error_bound` over s^2, from the sum s of the three norms and from |r|. P is at most s^3 / 27, and the sum of
+/// products of two norms at most s^2 / 3.
 TETWARP_HD inline float error_factor(float s, float r) {
   return multiply_add(s, kUnit / 3, multiply_add(r, 5 * kUnit, 5 * kNudgeNorm * kUnit));
 }
 
-/// Likewise for any r, where the voxel is found to lie inside and the determinant is above kThinSum s^3 and
-/// kSlackSum s^2. Then its weights are wrong by less than 0.3 %, and |r| is at most the longest norm by the weights, so
-/// less than 1.01 s; 6 is more than 1/3 + 5 * 1.01.
+/// `error_bound` over s^2 for any r, valid where the voxel is found to lie inside and the determinant exceeds both
+/// kThinSum s^3 and kSlackSum s^2. Then weights have an error below 0.3 %, and |r| is at most the longest norm by the
+/// weights, so less than 1.01 s; 6 is more than 1/3 + 5 * 1.01.
 TETWARP_HD inline float error_factor(float s) { return multiply_add(s, 6 * kUnit, 5 * kNudgeNorm * kUnit); }
 
 /// A determinant above kThinSum s^3 is not thin: P is at most s^3 / 27, here 26. Above kSlackSum s^2, no weight moves
@@ -157,8 +158,8 @@ struct LocalTetrahedron {
   }
 };
 
-/// How much of what float allows is tried. Closer bounds of the errors are for large cells, where voxels are often near
-/// a face; with full effort the weights are looked at too.
+/// How much is tried before a trial is left unsure. Closer error bounds are for large cells, where voxels are often
+/// near a face; Effort::full looks at the weights too.
 enum class Effort { quick, close, full };
 
 TETWARP_HD inline glm::vec3 Trial::u() const { return detail::to_offset(moved); }
@@ -176,16 +177,17 @@ TETWARP_HD inline glm::vec3 Trial::next_place() const {
                    multiply_add(slope.z, slope_factor, weights.z)});
 }
 
-/// Asks one tetrahedron for one voxel, in float.
+/// Tests one tetrahedron against one voxel, in float.
 ///
-/// The numerators of the weights at p + d and what they leave of the determinant are six times the volumes that decide
-/// ownership; here they are divided by the determinant. A quotient is off by 3 units of itself, and what all leave of 1
-/// by 7 units where all are positive; so it owns where all four are larger than the volumes' error, divided likewise,
-/// and 8 units. The determinant must have the sign of the undeformed one: an inverted tetrahedron is never accepted.
+/// The numerators of the weights at p + d, and the determinant minus their sum, are six times the volumes that decide
+/// ownership; here they are divided by the determinant. A quotient has an error of 3 units of itself, and 1 minus their
+/// sum one of 7 units where all are positive. So the tetrahedron owns the voxel where all four exceed the error of the
+/// volumes, divided by the determinant, plus 8 units. The determinant must have the sign of the undeformed one: an
+/// inverted tetrahedron is never accepted.
 ///
-/// From p + d to p a weight changes by at most 15/16 step times the sum norms of two columns over the determinant;
-/// where that is clearly below the slack, and the weights at p + d are positive, no weight at p can leave it. With full
-/// effort the weights themselves are looked at.
+/// From p + d to p a weight changes by at most 15/16 step times the sum norms of two columns over the determinant.
+/// Where that is clearly below the slack, and the weights at p + d are positive, no weight at p can leave it. With
+/// Effort::full the weights themselves are looked at.
 template <Effort kEffort>
 TETWARP_HD Trial try_tetrahedron(const FloatTetrahedron& t, const LocalTetrahedron& local, const GatherPoint& point) {
   using detail::multiply_add;
@@ -242,8 +244,8 @@ TETWARP_HD inline glm::vec3 offset_in(const StepLattice& lattice, const LatticeT
   return interpolate_u_exactly(vertices_of(lattice, t), voxel * kStepsPerVoxel, signs);
 }
 
-/// Whether a tetrahedron owns a voxel, exactly. @param sides  the four sides that decide it, of the faces opposite A,
-/// B, C, D
+/// Whether a tetrahedron owns a voxel, by exact integers.
+/// @param sides  set to the sides of the faces opposite A, B, C, D on which the voxel lies
 template <class Int>
 TETWARP_HD bool owns_exactly(const Tetrahedron& t, const glm::i32vec3& steps, const glm::i32vec3& signs,
                              int (&sides)[4]) {
@@ -266,15 +268,15 @@ TETWARP_HD inline bool owns_exactly(const Tetrahedron& t, const glm::i32vec3& st
   return owns_exactly<Wide>(t, steps, signs, sides);
 }
 
-/// Box of voxels in 32 bits, half open.
+/// Half-open box of voxels in 32 bits.
 struct IntBox {
   glm::ivec3 begin, end;
 
   TETWARP_HD bool is_empty() const { return end.x <= begin.x || end.y <= begin.y || end.z <= begin.z; }
 };
 
-/// Cuts a range of voxels of one axis, half open, to those that something between `low` and `high` (2^-12 voxel) may
-/// own; as `detail::candidates`.
+/// Narrows a half-open range of voxels on one axis to those that a tetrahedron or cell between `low` and `high` (2^-12
+/// voxel) may own, as `detail::candidates` does.
 TETWARP_HD inline void cut_to_candidates(const NudgeTurns& turns, int axis, std::int32_t low, std::int32_t high,
                                          int& begin, int& end) {
   int first = low >> 12, last = high >> 12;
@@ -284,7 +286,7 @@ TETWARP_HD inline void cut_to_candidates(const NudgeTurns& turns, int axis, std:
   end = end < last + 1 ? end : last + 1;
 }
 
-/// Likewise a box.
+/// The part of a box that a tetrahedron or cell between `low` and `high` (2^-12 voxel) may own.
 TETWARP_HD inline IntBox candidates(const NudgeTurns& turns, const glm::i32vec3& low, const glm::i32vec3& high,
                                     IntBox box) {
   for (int axis = 0; axis < 3; ++axis)
@@ -292,11 +294,12 @@ TETWARP_HD inline IntBox candidates(const NudgeTurns& turns, const glm::i32vec3&
   return box;
 }
 
-/// Calls `visit(voxel)` for the voxels of `region` that a tetrahedron of the lattice owns and that are `wanted(voxel)`:
-/// what `visit_cell` reports of it, with a float test in front of the exact one.
+/// Calls `visit(voxel)` for each voxel of `region` that a tetrahedron of the lattice owns and for which `wanted(voxel)`
+/// holds. It reports what `visit_cell` reports of that tetrahedron, but tests in float first.
 ///
-/// With the faces' values at q as in `try_tetrahedron`: inside where all are clear of their error on the inner side,
-/// outside where one is clear of it on the other, exact integers in between. Inverted tetrahedra own like any other.
+/// With values of the faces at q as in `try_tetrahedron`: a voxel is inside where all values clear their error on the
+/// inner side, outside where one clears it on the outer side; in between exact integers decide. Inverted tetrahedra own
+/// like any other.
 template <class Wanted, class Visit>
 TETWARP_HD void visit_tetrahedron(const StepLattice& lattice, const LatticeTetrahedron& t, const IntBox& region,
                                   const NudgeTurns& turns, Wanted&& wanted, Visit&& visit) {
@@ -335,10 +338,13 @@ TETWARP_HD void visit_tetrahedron(const StepLattice& lattice, const LatticeTetra
   }
 }
 
-/// Walks from tetrahedron to tetrahedron, across a face that the voxel lies beyond, until one owns it, exactly.
+/// Walks from tetrahedron to tetrahedron, each time across a face beyond which the voxel lies, until one owns it by
+/// exact integers.
 ///
-/// @param lattice  as of `vertices_of`  @param start  where to begin  @param owner  the owner, where found
-/// @return whether one was found within `most` steps
+/// @param lattice  what `vertices_of` takes
+/// @param start    where the walk begins
+/// @param owner    set to the owner, if it is found
+/// @return whether it was found within `most` moves
 template <class Lattice>
 TETWARP_HD bool walk_to_owner(const Lattice& lattice, LatticeTetrahedron start, const glm::i32vec3& steps,
                               const glm::i32vec3& signs, int most, LatticeTetrahedron& owner) {

@@ -7,8 +7,11 @@
 // target, the same for every file) makes its functions callable on the device.
 #if defined(__CUDACC__)
 #include <cuda.h>
+// Marks a function that runs on the host and on the device.
 #define TETWARP_HD __host__ __device__
+// Marks such a function that is always inlined.
 #define TETWARP_INLINE_HD __forceinline__ __host__ __device__
+// Marks such a function that is never inlined.
 #define TETWARP_NOINLINE_HD __noinline__ __host__ __device__
 #else
 #define TETWARP_HD

@@ -8,15 +8,20 @@
 
 namespace tetwarp {
 
-constexpr double kFarthest = 1 << 17;  ///< voxels that a vertex may be displaced on an axis
+/// Largest displacement of a vertex on an axis, voxels of the output grid.
+constexpr double kFarthest = 1 << 17;
 
-/// False for NaN.
+/// Whether every component is smaller than `limit` in size; false for NaN.
 TETWARP_HD inline bool is_within(const glm::dvec3& index, double limit) {
   return std::fabs(index.x) < limit && std::fabs(index.y) < limit && std::fabs(index.z) < limit;
 }
 
-/// Both ends of a vertex, snapped; u is zero exactly where the displacement is.
-/// @param rest  output index, within kLargestIndex  @return false where the displacement is not finite or too long
+/// Snaps the undeformed and the deformed place of a vertex. u is zero exactly where the displacement is.
+/// @param rest            undeformed place, continuous output index, within kLargestIndex
+/// @param output_from_mm  linear map from LPS mm to output index
+/// @param displacement    LPS mm
+/// @param vertex          the result
+/// @return false where the displacement is not finite or too long
 TETWARP_HD inline bool snap_moved(const glm::dvec3& rest, const glm::dmat3& output_from_mm,
                                   const glm::vec3& displacement, Vertex& vertex) {
   const glm::i32vec3 snapped = snap(rest);
@@ -29,24 +34,26 @@ TETWARP_HD inline bool snap_moved(const glm::dvec3& rest, const glm::dmat3& outp
   return true;
 }
 
-/// How a lattice lies over an output grid: what turns its vertices into snapped ones.
+/// How a lattice lies over an output grid: the maps that turn its vertices into snapped ones.
 struct LatticeFrame {
   AffineMap output_from_lattice, lattice_from_output;
   glm::dmat3 output_from_mm{1};
   glm::i64vec3 cells{0};
-  /// Of a part of a lattice, slices along k that are held elsewhere: its vertices count from here, the maps and the
-  /// nudge stay those of the whole lattice. Even, so that cells keep their parity.
+  /// For a part of a lattice: number of slices along k that come before it in the whole lattice. Its vertices count
+  /// from there; maps and nudge are those of the whole lattice. It is even, so that cells keep their parity.
   std::int64_t first_slice = 0;
   Nudge nudge;
 
-  /// Both ends of a vertex in output index, in double, then snapped; u is zero exactly where the displacement is.
+  /// Computes both places of a vertex in double, in output index, and snaps them. u is zero exactly where the
+  /// displacement is.
   /// @return false where the displacement is not finite or too long
   TETWARP_HD bool snap_vertex(const glm::i64vec3& at, const glm::vec3& displacement, Vertex& vertex) const {
     const glm::dvec3 rest = output_from_lattice(glm::dvec3(at.x, at.y, at.z + first_slice));
     return snap_moved(rest, output_from_mm, displacement, vertex);
   }
 
-  /// How far beyond the rest box of its cell an undeformed place may lie, for weights leave [0, 1] by the slack.
+  /// How far, in output index, an undeformed place may lie outside the undeformed box of its cell, because weights may
+  /// leave [0, 1] by kWeightSlack.
   glm::dvec3 beyond_rest() const {
     const glm::dmat3& m = output_from_lattice.linear;
     glm::dvec3 reach(0);
@@ -56,7 +63,7 @@ struct LatticeFrame {
     return reach;
   }
 
-  /// Whether a voxel, nudged, lies inside the undeformed lattice, which must be a whole one.
+  /// Whether the nudged voxel lies inside the undeformed lattice, which must be a whole one.
   TETWARP_HD bool holds(const glm::i64vec3& voxel) const {
     const glm::dvec3 step = glm::dvec3(nudge_steps(nudge.signs(voxel))) * (1.0 / (kStepsPerVoxel * kNudgeSteps));
     const glm::dvec3 at = lattice_from_output(glm::dvec3(voxel) + step);

@@ -7,7 +7,7 @@
 
 namespace tetwarp {
 
-/// The nudge of one voxel: its signs, and d in units of 2^-16 voxel.
+/// The nudge of one voxel: its signs (+1 or -1 on each axis), and the shift d in units of 2^-16 voxel.
 template <class Int>
 struct VoxelNudge {
   glm::i32vec3 signs;
@@ -39,16 +39,19 @@ TETWARP_HD inline int side_of_face(const Relative<Int>& a, const Relative<Int>& 
   return 0;
 }
 
-/// A face of a tetrahedron as a function of the voxel: twice-area normal and value, for walking many voxels.
+/// A face of a tetrahedron as a function of the voxel, for walking many voxels: its normal, twice as long as its area,
+/// and a constant.
 ///
-/// value(p) = constant - 2^16 (p - first) . normal - d . normal, in units of 2^-40, positive inside.
+/// value(p) = constant - 2^16 (p - first) . normal - d . normal, in units of 2^-40 voxel^3, is positive on the inner
+/// side.
 template <class Int>
 struct Face {
   Int normal[3], constant;
 };
 
+/// Makes the face (a, b, c).
 /// @param a, b, c      corners relative to the first voxel, 2^-12 voxel
-/// @param orientation  +1 or -1, so that inside is positive
+/// @param orientation  +1 or -1, so that the value is positive inside
 template <class Int>
 TETWARP_HD Face<Int> make_face(const glm::i32vec3& a, const glm::i32vec3& b, const glm::i32vec3& c, int orientation) {
   const Int ux = b.x - a.x, uy = b.y - a.y, uz = b.z - a.z;  // in 32 bits, so that products are cheap

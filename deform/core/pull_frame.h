@@ -10,25 +10,26 @@
 
 namespace tetwarp {
 
-/// A pull field over an output grid: x0 = p + d(p), d trilinear between samples.
+/// A pull field over an output grid: x0 = p + d(p), where d is trilinear between samples.
 ///
-/// A sample that holds a NaN is missing: nothing comes to its place, nor to a voxel that would be interpolated from it.
-/// A voxel within 2^-12 of the way from one sample to the next, on an axis, does without the next where that is
-/// missing: rounding of a grid that is meant to be the output's takes no voxel away.
+/// A sample with a NaN is missing: neither its place nor a voxel that would be interpolated from it has a source. A
+/// voxel within 2^-12 of the way from one sample to the next, on some axis, does without the next one if that is
+/// missing, so that rounding of a grid that was meant to be the output grid takes no voxel away.
 ///
-/// Samples are snapped to 2^-12 voxel of output index like the vertices of a forward field, so that whole shifts copy
+/// Samples are snapped to 2^-12 voxel of output index like the vertices of a forward field, so whole shifts copy
 /// exactly whatever the spacing.
 struct PullFrame {
-  static constexpr double kSlack = 1.0 / kStepsPerVoxel;  ///< samples: a place so near to one is taken for it
+  /// In units of a sample: a place this near to a sample counts as on it.
+  static constexpr double kSlack = 1.0 / kStepsPerVoxel;
 
-  /// Samples that a place may lie beyond the outermost ones: headers are rounded, and a grid that ends there was meant
-  /// to end at the voxel, as a lattice is (make_lattice_frame).
+  /// In units of a sample: a place may lie this far beyond the outermost samples and counts as on them. Headers are
+  /// rounded, and a grid that ends there was meant to end at the voxel, as is a lattice (make_lattice_frame).
   static constexpr double kBorderRounding = 1.0 / 256;
 
   AffineMap grid_from_output;
   glm::dmat3 output_from_mm{1};
   glm::i64vec3 size{0};
-  const glm::vec3* displacement = nullptr;  ///< LPS mm, i fastest, in the memory of who asks
+  const glm::vec3* displacement = nullptr;  ///< LPS mm, i fastest, in the memory of the backend
   bool rest_outside = false;                ///< voxels outside the grid stay where they are
 
   TETWARP_HD glm::dvec3 in_voxels(const glm::vec3& mm) const { return output_from_mm * glm::dvec3(mm); }
@@ -37,26 +38,28 @@ struct PullFrame {
     return displacement[(at.z * size.y + at.y) * size.x + at.x];
   }
 
-  /// Whether a sample, or what was interpolated, says that nothing comes to its place. @param v  not infinite
+  /// Whether a sample, or a vector interpolated from samples, says that its place has no source.
+  /// @param v  has no infinite component
   template <class Vector>
   TETWARP_HD static bool is_missing(const Vector& v) {
     return v.x != v.x || v.y != v.y || v.z != v.z;
   }
 
-  /// Whether a sample is missing or a vector that is finite and not too long.
+  /// Whether a sample is missing, or finite and not too long.
   TETWARP_HD bool is_usable(const glm::vec3& mm) const {
     if (!is_missing(mm)) return is_within(in_voxels(mm), kLargestIndex);
     return !std::isinf(mm.x) && !std::isinf(mm.y) && !std::isinf(mm.z);
   }
 
-  /// A sample in voxels of output index; with a NaN where it is missing. Rounded as by `snap`, whose integers have no
-  /// NaN and no -0.
+  /// A sample in voxels of output index, with a NaN where it is missing. It is rounded as by `snap`, whose integers
+  /// have no NaN and no -0.
   TETWARP_HD glm::dvec3 sample(const glm::i64vec3& at) const {
     const glm::dvec3 steps = in_voxels(vector(at)) * double{kStepsPerVoxel};
     return glm::dvec3(std::rint(steps.x) + 0, std::rint(steps.y) + 0, std::rint(steps.z) + 0) * (1.0 / kStepsPerVoxel);
   }
 
-  /// From a to b. @tparam kGaps  whether one may be missing at the other, to within the slack
+  /// The value at share t of the way from a to b.
+  /// @tparam kGaps  whether a missing end may be ignored within kSlack of the other end
   template <bool kGaps>
   TETWARP_HD static glm::dvec3 between(const glm::dvec3& a, const glm::dvec3& b, double t) {
     const glm::dvec3 mixed = a + t * (b - a);
@@ -64,7 +67,11 @@ struct PullFrame {
     return t <= kSlack ? a : b;
   }
 
-  /// @param index  on the samples. @param sample_at  gives `sample`. @return missing where a sample that is needed is
+  /// Interpolates trilinearly.
+  /// @tparam kGaps      as of `between`
+  /// @param index      continuous index on the samples
+  /// @param sample_at  `sample_at(at)` gives what `sample(at)` gives
+  /// @return a missing vector where a sample that is needed is missing
   template <bool kGaps, class SampleAt>
   TETWARP_HD glm::dvec3 trilinear(const glm::dvec3& index, const SampleAt& sample_at) const {
     const glm::i64vec3 low(index);  // index >= 0
@@ -83,7 +90,8 @@ struct PullFrame {
     return between<kGaps>(along_z[0], along_z[1], t.z);
   }
 
-  /// Takes an index up to 1/256 sample outside the grid onto it. @return false if it is further out
+  /// Moves an index that lies up to 1/256 sample outside the grid onto it.
+  /// @return false if it lies further out
   TETWARP_HD bool clamp_to_samples(glm::dvec3& index) const {
     for (int axis = 0; axis < 3; ++axis) {
       const auto last = static_cast<double>(size[axis] - 1);
@@ -93,12 +101,14 @@ struct PullFrame {
     return true;
   }
 
-  /// Undeformed minus deformed place, voxels. @return whether the voxel comes from anywhere
+  /// Computes the undeformed minus deformed place of a voxel, in voxels.
+  /// @return whether the voxel has a source
   TETWARP_HD bool offset_at(const glm::i64vec3& voxel, glm::vec3& offset) const {
     return offset_at(voxel, offset, [this](const glm::i64vec3& at) { return sample(at); });
   }
 
-  /// The same with samples from `sample_at`, which gives `sample`.
+  /// Computes the undeformed minus deformed place of a voxel, in voxels, from samples that `sample_at` gives.
+  /// @return whether the voxel has a source
   template <class SampleAt>
   TETWARP_HD bool offset_at(const glm::i64vec3& voxel, glm::vec3& offset, const SampleAt& sample_at) const {
     glm::dvec3 index = grid_from_output(glm::dvec3(voxel));

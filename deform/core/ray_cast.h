@@ -11,27 +11,27 @@
 
 namespace tetwarp {
 
-/// Of one value: its colour, and what one step through it adds to a sum.
+/// An entry of the table of a transfer function: the colour of a value, and what one step through it adds to a sum.
 struct TransferEntry {
   float red = 0, green = 0, blue = 0, opacity = 0;
 };
-/// Of all values below one: the optical depth of a step, added up, and the same times each colour.
+/// Sums over all entries below one: the optical depth of a step, and that depth times each colour.
 struct TransferIntegral {
   float red = 0, green = 0, blue = 0, depth = 0;
 };
 constexpr int kTransferEntries = 4096;
 
-/// Blocks of 8 x 8 x 8 voxels, so that rays need not look at what is empty.
+/// Volumes are divided into blocks of 8 x 8 x 8 voxels, so that rays can leap over empty ones.
 constexpr int kRayBlockBits = 3, kRayBlock = 1 << kRayBlockBits;
-/// Least and largest value around a block: of its voxels, one before them and two behind, so that each sample in the
-/// block lies between them, a rounding error beside it too.
+/// Least and largest value around a block: of its voxels, of one layer before and of two layers behind them. Each
+/// sample in the block lies between the two, even with rounding errors in its place.
 struct BlockRange {
   float least = 0, most = 0;
 };
-/// Blocks that a ray may leap over at most.
+/// Largest number of blocks over which a ray leaps at once.
 constexpr int kFarthestBlock = 15;
 
-/// What the rays of a picture need to know, but for the voxels. Positions are continuous indices of the volume.
+/// What the rays of a picture need to know besides the voxels. Positions are continuous indices of the volume.
 struct RayFrame {
   Projection projection = Projection::composite;
   float lowest = 0, per_value = 0;                ///< of the table: entry = (value - lowest) * per_value
@@ -44,7 +44,7 @@ struct RayFrame {
   glm::vec3 background{0};
 };
 
-/// Where a backend keeps what rays look up.
+/// The tables that rays look up, where a backend keeps them.
 struct RayTables {
   const BlockRange* ranges = nullptr;       ///< of each block, i fastest
   const std::uint8_t* distances = nullptr;  ///< blocks to the nearest one that is not empty, the largest along an axis
@@ -59,7 +59,7 @@ struct RayTables {
 template <class V>
 struct RayScene : RayFrame, RayTables, ray::RayVolume<V> {};
 
-/// The entry that a value would have in a table without ends.
+/// The entry that a value would have if the table had no ends.
 TETWARP_INLINE_HD int endless_entry(const RayFrame& frame, float value) {
   constexpr float kFar = 4e6f;
   const float entry = (value - frame.lowest) * frame.per_value + 0.5f;
@@ -74,10 +74,10 @@ TETWARP_INLINE_HD int transfer_entry(const RayFrame& frame, float value) {
 
 namespace ray {
 
-constexpr float kOpaque = 0.998f;  ///< what lies behind is not looked for: half a grey level
+constexpr float kOpaque = 0.998f;  ///< opacity behind which nothing is looked for: the rest is half a grey level
 
-/// A ray within the volume, from `enter` to `leave`, in steps from its origin. Its samples lie at the ends and at all
-/// whole steps in between: `begin` to `end`, the last one left out; piece n lies before sample n.
+/// A ray within the volume, from `enter` to `leave`, in steps from its origin. Its samples lie at both ends and at all
+/// whole steps between: numbers `begin` up to, not including, `end`. Piece n lies before sample n.
 struct Span {
   glm::vec3 origin;
   float enter, leave;
@@ -132,7 +132,7 @@ TETWARP_INLINE_HD glm::ivec3 block_of(const RayPlace& place) {
   return {place.whole.x >> kRayBlockBits, place.whole.y >> kRayBlockBits, place.whole.z >> kRayBlockBits};
 }
 
-/// The first sample behind a block and `around` blocks on every side of it.
+/// The first sample behind a block and behind `around` more blocks on every side of it.
 template <class V>
 TETWARP_INLINE_HD int behind(const RayScene<V>& scene, const Span& span, int n, const glm::ivec3& block, int around) {
   float leave = static_cast<float>(span.end);
@@ -145,8 +145,8 @@ TETWARP_INLINE_HD int behind(const RayScene<V>& scene, const Span& span, int n, 
   return next > n ? next : n + 1;
 }
 
-/// Blinn's and Phong's light on both sides of a surface; where the value hardly changes there is none, and the colour
-/// stays as it is.
+/// A colour with the light of Blinn and Phong on both sides of a surface. Where the value hardly changes there is no
+/// surface, and the colour stays as it is.
 template <class V>
 TETWARP_INLINE_HD glm::vec3 lit(const RayScene<V>& scene, const glm::vec3& colour, const glm::vec3& index) {
   const glm::vec3 slope = scene.to_gradient * differences_at<V>(scene, place_among(scene.size, index));
@@ -162,7 +162,7 @@ TETWARP_INLINE_HD glm::vec3 lit(const RayScene<V>& scene, const glm::vec3& colou
   return {colour.x * factor + added, colour.y * factor + added, colour.z * factor + added};
 }
 
-/// Entries `low` to `high` of the table, both included, and how many more there would be beyond its ends.
+/// Entries `low` to `high` of the table, both included, with the number of those that lie beyond its ends.
 struct EntryRange {
   TETWARP_HD EntryRange(int low, int high)
       : from(clamped(low, 0, kTransferEntries)),
@@ -170,17 +170,19 @@ struct EntryRange {
         below(static_cast<float>(larger(smaller(high + 1, 0) - low, 0))),
         above(static_cast<float>(larger(high + 1 - larger(low, kTransferEntries), 0))) {}
 
-  /// What they add up to. @param part  of an integral
+  /// The sum over these entries.
+  /// @param part  which member of the integrals
   TETWARP_HD float sum(const RayTables& tables, float TransferIntegral::*part) const {
     return tables.integrals[to].*part - tables.integrals[from].*part + tables.lowest_entry.*part * below +
            tables.highest_entry.*part * above;
   }
 
-  int from, to;        ///< in the integrals
-  float below, above;  ///< entries as the first and the last one
+  int from, to;  ///< in the integrals
+  /// Number of entries beyond the first and beyond the last entry of the table.
+  float below, above;
 };
 
-/// exp(-depth) to 1e-4, of operations that round alike everywhere.
+/// exp(-depth) to 1e-4, by operations that round alike on every backend.
 TETWARP_INLINE_HD float transmitted(float depth) {
   const float t = depth * 0.125f;
   const float e = 1 + t * (1 + t * (0.5f + t * (1.0f / 6 + t * (1.0f / 24))));
@@ -188,7 +190,7 @@ TETWARP_INLINE_HD float transmitted(float depth) {
   return 1 / (fourth * fourth);
 }
 
-/// A colour with the tint of the nearest voxel mixed to it.
+/// A colour with the tint of the nearest voxel mixed into it.
 template <class V>
 TETWARP_INLINE_HD glm::vec3 tinted(const RayScene<V>& scene, const glm::vec3& colour, const glm::vec3& index) {
   std::int64_t voxel = 0;
@@ -201,8 +203,9 @@ TETWARP_INLINE_HD glm::vec3 tinted(const RayScene<V>& scene, const glm::vec3& co
   return colour + (glm::vec3(added.red, added.green, added.blue) - colour) * added.opacity;
 }
 
-/// Pieces of the ray between two samples: all values between theirs count alike, so that thin layers are not stepped
-/// over (pre-integration without attenuation within a piece, Engel 2001; as differences of integrals, Lum 2004).
+/// Adds up the pieces of a ray. In a piece all values between those of its two samples count alike, so that thin layers
+/// are not stepped over (pre-integration without attenuation within a piece, Engel 2001; as differences of integrals,
+/// Lum 2004).
 template <class V>
 TETWARP_INLINE_HD glm::vec3 composite(const RayScene<V>& scene, const Span& span) {
   glm::vec3 colour(0);
@@ -299,7 +302,7 @@ struct RayColour {
   std::uint8_t red, green, blue;
 };
 
-/// Casts the ray of a pixel. The same bits on every backend: which blocks are leapt over changes none.
+/// Casts the ray of a pixel, with the same bits on every backend: which blocks are leapt over changes none.
 template <class V>
 TETWARP_INLINE_HD RayColour cast_ray(const RayScene<V>& scene, int column, int row) {
   const ray::Span span = ray::span_of(scene, column, row);

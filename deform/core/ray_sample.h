@@ -31,7 +31,8 @@ TETWARP_INLINE_HD bool is_number(float value) {
   return std::is_integral_v<V> || value == value;
 }
 
-/// A continuous index among the voxels; beyond the outermost centres it is theirs.
+/// A continuous index among the voxels, as whole voxel and fraction. Places beyond the outermost centres are moved onto
+/// them.
 struct RayPlace {
   glm::ivec3 whole;
   glm::vec3 fraction;
@@ -47,7 +48,8 @@ TETWARP_INLINE_HD RayPlace place_among(const glm::ivec3& size, const glm::vec3& 
   return place;
 }
 
-/// In one instruction on the device, where compilers move the conversion of one factor out of a loop and take five.
+/// 64-bit product. On the device it is one instruction; compilers would move the conversion of one factor out of a loop
+/// and take five.
 TETWARP_INLINE_HD std::int64_t wide_product(int a, int b) {
 #ifdef __CUDA_ARCH__
   std::int64_t product;
@@ -58,27 +60,28 @@ TETWARP_INLINE_HD std::int64_t wide_product(int a, int b) {
 #endif
 }
 
-/// The number of an element of a grid, i fastest. @param size  so that a slice has less than 2^31 elements
+/// Number of an element of a grid, i fastest.
+/// @param size  elements on each axis; a slice has fewer than 2^31
 TETWARP_INLINE_HD std::int64_t number_in(const glm::ivec3& size, const glm::ivec3& element) {
   return wide_product(element.z * size.y + element.y, size.x) + element.x;
 }
 
-/// Voxels, i fastest.
+/// The voxels of a volume, i fastest.
 template <class V>
 struct RayVolume {
   const V* voxels = nullptr;
   glm::ivec3 size{0};
-  glm::ivec3 strides{0};  ///< values from a voxel to the next along each axis, less than 2^31; 1 along i
+  glm::ivec3 strides{0};  ///< values from one voxel to the next along each axis, fewer than 2^31; 1 along i
 
   TETWARP_INLINE_HD const V* at(const glm::ivec3& voxel) const {
     return voxels + wide_product(voxel.z, strides.z) + (voxel.y * strides.y + voxel.x);
   }
 };
 
-/// The eight voxels around a place and what lies between them.
+/// The eight voxels around a place, and the place between them.
 template <class V>
 struct Cell {
-  const V* corner;  ///< of least indices
+  const V* corner;  ///< the voxel of least indices
   glm::vec3 fraction;
   int next[3];    ///< values to the neighbour along an axis; 0 at the end of the volume
   int before[3];  ///< values back to the one before; 0 at its beginning
@@ -99,7 +102,8 @@ TETWARP_INLINE_HD Cell<V> cell_at(const RayVolume<V>& volume, const RayPlace& pl
   return cell;
 }
 
-/// The same where none of them is beyond an end of the volume: along i at distances that the compiler knows.
+/// The cell around a place none of whose voxels lies beyond an end of the volume. Distances along i are then constants
+/// that the compiler knows.
 template <class V>
 TETWARP_INLINE_HD Cell<V> inner_cell_at(const RayVolume<V>& volume, const RayPlace& place) {
   const int row = volume.strides.y, slice = volume.strides.z;
@@ -119,7 +123,7 @@ TETWARP_INLINE_HD float over_side(const At& at, int right, int up, float share_r
   return low + (high - low) * share_up;
 }
 
-/// The value, linear between voxels.
+/// The value at the place, linear between voxels.
 template <class V>
 TETWARP_INLINE_HD float value_in(const Cell<V>& cell) {
   const auto along_i = [&](int offset) {
@@ -136,8 +140,8 @@ TETWARP_INLINE_HD float value_at(const RayVolume<V>& volume, const RayPlace& pla
   return inner ? value_in(inner_cell_at(volume, place)) : value_in(cell_at(volume, place));
 }
 
-/// Differences of the values a voxel further and a voxel before along each axis, halved: central differences, linear
-/// between voxels.
+/// Central differences at the place: half the difference of the values one voxel further and one voxel before, along
+/// each axis, linear between voxels.
 template <class V>
 TETWARP_INLINE_HD glm::vec3 differences_in(const Cell<V>& cell) {
   glm::vec3 difference;

@@ -7,22 +7,25 @@
 
 namespace tetwarp {
 
-/// Which voxels of a row a tetrahedron owns: an interval, for the tetrahedron is convex.
+/// Half-open range of voxels of a row, counted from the first voxel of its tile. The voxels of a row that a tetrahedron
+/// owns are such an interval, for the tetrahedron is convex.
 ///
-/// For tiles of voxels that are all nudged alike. Where a face crosses a row is found in float, with a bound of its
-/// error; where a voxel lies within that bound exact integers decide, so the intervals are always exact.
-
-/// Voxels of a row, half open, from the first of its tile.
+/// The functions here work on tiles whose voxels are all nudged in the same direction. Float arithmetic with a bound of
+/// its error finds where a face crosses a row. Where a voxel lies within that bound exact integers decide, so intervals
+/// are always exact.
 struct RowInterval {
   int begin, end;
 
   TETWARP_HD bool is_empty() const { return begin >= end; }
 };
 
-/// The longest tile that the bounds below hold for, voxels.
+/// Longest side of a tile, in voxels, for which the error bounds here hold.
 constexpr int kMostRowTile = 32;
 
-/// Exactly. @param first  voxel of the tile  @param y, z  the row, from there  @param count  voxels of a row
+/// The interval of one row by exact integers.
+/// @param first  first voxel of the tile
+/// @param y, z   the row, counted from `first`
+/// @param count  voxels of a row
 template <class Int>
 TETWARP_HD RowInterval exact_row(const Tetrahedron& t, const glm::ivec3& first, const glm::i32vec3& signs, int y, int z,
                                  int count) {
@@ -43,22 +46,24 @@ TETWARP_HD inline RowInterval exact_row(const Tetrahedron& t, const glm::ivec3& 
   return exact_row<Wide>(t, first, signs, y, z, count);
 }
 
-/// Where a face crosses the rows of a tile: at `at` + y `along_y` + z `along_z` voxels, wrong by less than `error`.
+/// Where a face crosses the rows of a tile: at `at` + y `along_y` + z `along_z` voxels, with an error below `error`.
 struct RowFace {
   float at, along_y, along_z, error;
 };
 
 namespace detail {
 
-/// From a face whose normal, out of the tetrahedron, is (x, y, z), 2^-24 voxel^2, and whose value at the first voxel of
-/// the tile, nudged, is `constant`, 2^-36 voxel^3: all rounded from doubles.
+/// Computes where a face crosses rows. The outward normal of the face is (x, y, z), 2^-24 voxel^2; its value at the
+/// nudged first voxel of the tile is `constant`, 2^-36 voxel^3. All four are rounded from doubles.
 ///
 /// The value C - 4096 (x Nx + y Ny + z Nz) of a face is zero at x = (C / 4096 - y Ny - z Nz) / Nx. The normal is exact
-/// before it is rounded to float, so with u = 2^-24 each of the three terms is wrong by 4 u of itself (two roundings,
-/// the reciprocal and the product), and the first by the error of C; adding them, and the bound, costs 3 u of their
-/// sum. Where Nx is zero, a row lies on one side as a whole: the crossing is put far away on that side.
+/// before it is rounded to float, so with u = 2^-24 each of the three terms has an error of 4 u of itself (two
+/// roundings, the reciprocal and the product), and the first also the error of C. Adding them, and computing the bound,
+/// costs 3 u of their sum. Where Nx is zero a row lies on one side as a whole: the crossing is put far away on that
+/// side.
 ///
-/// @param wrong  bound of the error of `constant`  @param size  of the tile
+/// @param wrong  bound of the error of `constant`
+/// @param size   voxels of the tile
 TETWARP_HD inline RowFace row_face(float x, float y, float z, float constant, float wrong, const glm::vec3& size) {
   constexpr float kFar = 0x1p40f, kVoxel = kStepsPerVoxel;
   const float along_x = x * kVoxel, along_y = y * kVoxel, along_z = z * kVoxel;
@@ -75,7 +80,7 @@ TETWARP_HD inline RowFace row_face(float x, float y, float z, float constant, fl
 struct DoubleVector {
   double x, y, z;
 };
-/// Exact for whole numbers up to 2^26.
+/// Cross product, exact for whole numbers up to 2^26.
 TETWARP_HD inline DoubleVector exact_cross(const DoubleVector& a, const DoubleVector& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
@@ -86,7 +91,7 @@ TETWARP_HD inline float norm1(const DoubleVector& v) {
   return norm1(glm::vec3(static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)));
 }
 
-/// The smallest whole number not below x; too large or small ones are any large or small ones.
+/// The smallest whole number that is not below x. For x beyond the range of int it is some number as far out.
 TETWARP_HD inline int ceil_to_int(float x) {
 #ifdef __CUDA_ARCH__
   return __float2int_ru(x);
@@ -97,20 +102,25 @@ TETWARP_HD inline int ceil_to_int(float x) {
 
 }  // namespace detail
 
-/// How a tetrahedron crosses the rows of a tile: `lower` faces, which rows enter through, then the others.
+/// How a tetrahedron crosses the rows of a tile: first `lower` faces through which rows enter, then those through which
+/// they leave.
 struct RowFaces {
   RowFace faces[4];
   int lower;  ///< 1 to 3
 };
 
-/// How a tetrahedron with `has_int64_rows` crosses the rows of a tile.
+/// Computes how a tetrahedron with `has_int64_rows` crosses the rows of a tile.
 ///
-/// In double: edges are whole numbers of at most 2^18, so normals are exact. Values at the first voxel are sums of at
-/// most 12 terms, so wrong by less than 16 units (2^-53) of the sum of the normals' sizes, times the largest distance.
+/// It works in double. Edges are whole numbers of at most 2^18, so normals are exact. Values at the first voxel are
+/// sums of at most 12 terms, so their error is below 16 units (2^-53) of the sum of the normals' sizes, times the
+/// largest distance.
 ///
-/// @param a, b, c  from D  @param d  from the first voxel of the tile; 2^-12 voxel  @param signs, size  of the tile
-/// @param put      called four times, as put(n, face): where in `RowFaces` a face belongs
-/// @return `lower` of `RowFaces`; 0 where it may have no volume, and nothing is put
+/// @param a, b, c  edges from D, 2^-12 voxel
+/// @param d        D relative to the first voxel of the tile, 2^-12 voxel
+/// @param signs    nudge of the tile
+/// @param size     voxels of the tile
+/// @param put      called four times as put(n, face), where n is the index of the face in `RowFaces`
+/// @return `RowFaces::lower`; 0 where the tetrahedron may have no volume, and nothing is put
 template <class Put>
 TETWARP_HD int make_row_faces(const glm::i32vec3& a, const glm::i32vec3& b, const glm::i32vec3& c,
                               const glm::i32vec3& d, const glm::i32vec3& signs, const glm::ivec3& size, Put&& put) {
@@ -150,11 +160,12 @@ TETWARP_HD int make_row_faces(const glm::i32vec3& a, const glm::i32vec3& b, cons
   return lower;
 }
 
-/// How any tetrahedron crosses the rows of a tile. @param first  voxel of the tile
-/// @return false where it may have no volume: then `exact_row` must say
+/// Computes how any tetrahedron crosses the rows of a tile.
 ///
-/// Where 64 bits are too few, faces are exact in Wide, and rounding them to double (2^-52 of each) disappears beside
-/// what `row_face` allows for rounding to float.
+/// Where 64 bits are too few, faces are exact in Wide. Rounding them to double (2^-52 of each) is negligible beside the
+/// error that `row_face` allows for rounding to float.
+/// @param first  first voxel of the tile
+/// @return false where the tetrahedron may have no volume; then `exact_row` must decide
 TETWARP_HD inline bool make_row_faces(const Tetrahedron& t, const glm::ivec3& first, const glm::i32vec3& signs,
                                       const glm::ivec3& size, RowFaces& rows) {
   const auto put = [&rows](int n, const RowFace& face) { rows.faces[n] = face; };
@@ -181,7 +192,7 @@ TETWARP_HD inline bool make_row_faces(const Tetrahedron& t, const glm::ivec3& fi
   return true;
 }
 
-/// The rows of a tile with the same y.
+/// The rows of a tile that have the same y.
 class RowsAlongZ {
  public:
   TETWARP_HD RowsAlongZ(const RowFaces& t, int y) {
@@ -199,7 +210,8 @@ class RowsAlongZ {
     upper_[2] = third_is_lower ? last : third;
   }
 
-  /// The interval of row z among `count` voxels. @param is_certain  whether it is right, else exact integers must say
+  /// The interval of row z among `count` voxels.
+  /// @param is_certain  set to whether the interval is proved; otherwise exact integers must decide
   TETWARP_HD RowInterval interval(int z, int count, bool& is_certain) const {
     const auto row = static_cast<float>(z);
     const auto low = [&](const Line& line) { return detail::multiply_add(line.along_z, row, line.low); };
@@ -214,7 +226,7 @@ class RowsAlongZ {
   }
 
  private:
-  /// Least and largest crossing of row 0, and how both change from row to row.
+  /// Least and largest crossing of row 0, and by how much both change from row to row.
   struct Line {
     float low, high, along_z;
   };

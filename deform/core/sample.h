@@ -10,14 +10,15 @@
 
 namespace tetwarp {
 
-/// A place in a source volume: whole voxel and the rest, 0 <= fraction < 1. Kept apart, so that no precision is lost
-/// far from the origin and a whole shift copies exactly.
+/// A place in a source volume: a whole voxel and a fraction, 0 <= fraction < 1. They are kept apart, so that no
+/// precision is lost far from the origin and whole shifts copy exactly.
 struct Place {
   glm::i64vec3 base;
   glm::vec3 fraction;
 };
 
-/// @param offset  from `voxel`, in voxels
+/// The place at an offset from a voxel.
+/// @param offset  voxels
 TETWARP_INLINE_HD Place place_at(const glm::i64vec3& voxel, const glm::vec3& offset) {
   Place place;
   for (int axis = 0; axis < 3; ++axis) {
@@ -30,7 +31,8 @@ TETWARP_INLINE_HD Place place_at(const glm::i64vec3& voxel, const glm::vec3& off
   return place;
 }
 
-/// @param index  continuous source index, finite and within +-2^62
+/// The place at a continuous source index.
+/// @param index  finite and within +-2^62
 TETWARP_INLINE_HD Place place_at(const glm::dvec3& index) {
   Place place;
   for (int axis = 0; axis < 3; ++axis) {
@@ -43,7 +45,8 @@ TETWARP_INLINE_HD Place place_at(const glm::dvec3& index) {
   return place;
 }
 
-/// Moves a place up to half a voxel outside the outermost centres onto them. @return false if it is further out
+/// Moves a place that lies up to half a voxel outside the outermost centres onto them.
+/// @return false if it lies further out
 TETWARP_INLINE_HD bool clamp_to_grid(Place& place, const glm::i64vec3& size) {
   for (int axis = 0; axis < 3; ++axis) {
     const std::int64_t last = size[axis] - 1;
@@ -59,7 +62,7 @@ TETWARP_INLINE_HD bool clamp_to_grid(Place& place, const glm::i64vec3& size) {
   return true;
 }
 
-/// What voxels of type V are computed in: float where it holds them exactly, else double.
+/// The type in which values of type V are computed: float where it holds them all exactly, else double.
 template <class V>
 using Working = std::conditional_t<(sizeof(V) < 4 || std::is_same_v<V, float>), float, double>;
 
@@ -91,7 +94,7 @@ struct Sample {
   bool padded;
 };
 
-/// floor(x + 0.5) on every axis.
+/// The voxel at floor(x + 0.5) on every axis.
 template <class V>
 TETWARP_HD V nearest_voxel(const SourceVoxels<V>& source, const Place& place) {
   return source.at(place.base.x + (place.fraction.x >= 0.5f), place.base.y + (place.fraction.y >= 0.5f),
@@ -104,20 +107,20 @@ TETWARP_HD Sample<V> sample_nearest(const SourceVoxels<V>& source, const Place& 
   return {static_cast<Working<V>>(value), padding.present && padding.holds(value)};
 }
 
-/// The corner of largest weight, ties to the lowest index.
+/// The corner with the largest linear weight; of equal weights the one of lowest index.
 template <class V>
 TETWARP_HD V heaviest_corner(const SourceVoxels<V>& source, const Place& place) {
   return source.at(place.base.x + (place.fraction.x > 0.5f), place.base.y + (place.fraction.y > 0.5f),
                    place.base.z + (place.fraction.z > 0.5f));
 }
 
-/// What a sample that would mix padding into tissue takes.
+/// The sample where linear interpolation would mix padding into tissue: the voxel of largest weight.
 template <class V>
 TETWARP_HD Sample<V> heaviest_voxel(const SourceVoxels<V>& source, const Place& place) {
   return {static_cast<Working<V>>(heaviest_corner(source, place)), true};
 }
 
-/// Along x, then y, then z: each a + t (b - a). Voxels of weight zero are not looked at.
+/// Linear interpolation along x, then y, then z, each a + t (b - a). Voxels of weight zero are not read.
 template <class V>
 TETWARP_HD Sample<V> sample_linear(const SourceVoxels<V>& source, const Place& place, const Padding<V>& padding) {
   using W = Working<V>;
@@ -140,11 +143,13 @@ TETWARP_HD Sample<V> sample_linear(const SourceVoxels<V>& source, const Place& p
   return {nz ? along_z[0] + static_cast<W>(place.fraction.z) * (along_z[1] - along_z[0]) : along_z[0], false};
 }
 
-/// Catmull-Rom weights of the voxels -1, 0, 1, 2 (Keys 1981 with a = -1/2); at t = 0 only voxel 0 counts.
+/// Catmull-Rom weights of the voxels -1, 0, 1, 2 around a place (Keys 1981 with a = -1/2). At t = 0 only voxel 0 has
+/// weight.
 template <class W>
 struct CubicTaps {
-  int first, last;  ///< taps with weight, of -1 .. 2
-  W weight[4];      ///< of taps -1 .. 2
+  /// First and last tap with weight, from -1 to 2.
+  int first, last;
+  W weight[4];  ///< of taps -1 .. 2
 };
 
 template <class W>
@@ -161,7 +166,8 @@ TETWARP_HD inline std::int64_t clamp_index(std::int64_t index, std::int64_t size
   return index < 0 ? 0 : (index >= size ? size - 1 : index);
 }
 
-/// Catmull-Rom along x, then y, then z, indices clamped to the grid; each sum from the lowest tap up.
+/// Catmull-Rom interpolation along x, then y, then z, with indices clamped to the grid. Each sum runs from the lowest
+/// tap up.
 template <class V>
 TETWARP_HD Sample<V> sample_cubic(const SourceVoxels<V>& source, const Place& place, const Padding<V>& padding) {
   using W = Working<V>;
@@ -189,34 +195,34 @@ TETWARP_HD Sample<V> sample_cubic(const SourceVoxels<V>& source, const Place& pl
   return {sum_z, false};
 }
 
-/// Whether voxels have one label. NaN is a label too, as in `is_smaller_label`.
+/// Whether voxels have the same label. NaN is one label.
 template <class V>
 TETWARP_HD bool is_same_label(V a, V b) {
   if constexpr (std::is_floating_point_v<V>) return a == b || (a != a && b != b);
   return a == b;
 }
 
-/// NaN is larger than all others.
+/// Order of labels; NaN is larger than all others.
 template <class V>
 TETWARP_HD bool is_smaller_label(V a, V b) {
   if constexpr (std::is_floating_point_v<V>) return a < b || (a == a && b != b);
   return a < b;
 }
 
-/// A voxel of the source, copied.
+/// A copy of a voxel of the source.
 template <class V>
 struct Label {
   V value;
   bool padded;
 };
 
-/// The label that most of the weight is for. The weights are those of linear interpolation, of corner c = x + 2y + 4z
-/// the product of its factors along x, y and z, in this order, in float. Those of one label are summed from corner 0
-/// up, the largest sum wins, and among equal sums the smallest label. What is returned are the bits of the first corner
-/// with that label.
+/// The label with the largest sum of weights. Weights are those of linear interpolation: the weight of corner c = x +
+/// 2y + 4z is the product of its factors along x, y and z, in this order, in float. Weights of one label are summed
+/// from corner 0 up, the largest sum wins, and among equal sums the smallest label. The result has the bits of the
+/// first corner with that label.
 ///
-/// This is the largest of the volumes that have 1 where a label is and 0 elsewhere, each interpolated linearly, without
-/// making them. Voxels of weight zero are not looked at.
+/// Interpolating one 0/1 volume for each label linearly and taking the largest gives the same label. Voxels of weight
+/// zero do not count.
 template <class V>
 TETWARP_HD Label<V> sample_vote(const SourceVoxels<V>& source, const Place& place, const Padding<V>& padding) {
   const glm::vec3& t = place.fraction;
@@ -248,7 +254,7 @@ TETWARP_HD Label<V> sample_vote(const SourceVoxels<V>& source, const Place& plac
   return {winner, false};
 }
 
-/// The voxel value of a working value: integers are rounded to nearest, ties to even, and saturate.
+/// Turns a working value into a voxel value: integers round to nearest, ties to even, and saturate.
 template <class V>
 TETWARP_HD V to_voxel(Working<V> value, bool* saturated) {
   using W = Working<V>;

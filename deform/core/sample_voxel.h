@@ -14,8 +14,8 @@ struct UnevenSlices {
   const double* at = nullptr;  ///< null: even
   std::int64_t count = 0;
 
-  /// Continuous slice index of a place along the stack: linear between neighbours, and beyond the outermost ones as
-  /// between them.
+  /// Continuous slice index of a place along the stack, which is in units of the mean distance. It is linear between
+  /// neighbouring slices; beyond the outermost slices it continues the outermost intervals.
   TETWARP_HD double index(double place) const {
     std::int64_t low = 0, high = count - 1;  // at[low] <= place < at[high], or beyond an end
     while (high - low > 1) {
@@ -29,13 +29,14 @@ struct UnevenSlices {
   }
 };
 
-/// How a source grid lies to the output grid.
+/// How a source grid lies relative to the output grid.
 struct SourceRelation {
-  bool same_grid = false;        ///< source and output share their grid: places stay exact
-  AffineMap source_from_output;  ///< where they do not; of an uneven source as if its slices were even
+  bool same_grid = false;  ///< whether source and output have the same grid, so that places stay exact
+  /// Output index to source index, where grids differ; for an uneven source as if its slices were even.
+  AffineMap source_from_output;
   UnevenSlices slices;
 
-  /// @param place  continuous output index  @return continuous source index
+  /// Continuous source index of a continuous output index.
   TETWARP_HD glm::dvec3 operator()(const glm::dvec3& place) const {
     glm::dvec3 index = source_from_output(place);
     if (slices.at) index.z = slices.index(index.z);
@@ -43,7 +44,7 @@ struct SourceRelation {
   }
 };
 
-/// All that one output voxel needs to know of a target: plain data, the same for every backend.
+/// Everything that the sampling of one output voxel of a target needs: plain data, the same for every backend.
 template <class V>
 struct SamplePlan {
   SourceVoxels<V> source;
@@ -53,20 +54,24 @@ struct SamplePlan {
   SourceRelation relation;
 };
 
+/// A value, and whether it was saturated, or taken from one voxel because of padding.
 template <class V>
 struct VoxelValue {
   V value;
   bool saturated, padded;
 };
 
+/// The value of one output voxel, and how it came about.
 template <class V>
 struct SampledVoxel {
   V value;
   bool inside, saturated, padded;
-  std::int64_t first_slice, last_slice;  ///< of the source, with weight; where inside
+  /// Slices of the source that had weight; set where `inside`.
+  std::int64_t first_slice, last_slice;
 };
 
-/// Where an output voxel comes from, on the grid of the source. @return false if that is outside
+/// Computes where an output voxel comes from, on the grid of the source.
+/// @return false if that is outside the source
 template <class V>
 TETWARP_INLINE_HD bool source_place(const SamplePlan<V>& plan, const glm::i64vec3& voxel, const glm::vec3& offset,
                                     Place& place) {
@@ -116,9 +121,10 @@ TETWARP_INLINE_HD void slices_at(const Place& place, std::int64_t slices, std::i
   }
 }
 
-/// The value of one output voxel (docs/algorithm.md).
+/// Computes the value of one output voxel (docs/algorithm.md, "What the voxel gets").
 ///
-/// @param mapped  whether the field says where it comes from; @param offset  undeformed minus deformed place, voxels
+/// @param mapped  whether the field says where the voxel comes from
+/// @param offset  undeformed minus deformed place, voxels
 template <class V, Interpolation kInterpolation>
 TETWARP_HD SampledVoxel<V> sample_voxel(const SamplePlan<V>& plan, const glm::i64vec3& voxel, bool mapped,
                                         const glm::vec3& offset) {
@@ -131,10 +137,11 @@ TETWARP_HD SampledVoxel<V> sample_voxel(const SamplePlan<V>& plan, const glm::i6
   return sampled;
 }
 
-/// The same for several values a voxel, each interpolated alone at one place.
+/// Computes several values of one output voxel, each interpolated alone at the same place.
 ///
-/// @param plan  of the first value of each voxel, without padding; @param output  where the values go, side by side
-/// @return  the last value; saturated if any was
+/// @param plan    plan of the first value of each voxel, without padding
+/// @param output  gets the values, side by side
+/// @return the last value; saturated if any value was
 template <class V, Interpolation kInterpolation>
 TETWARP_HD SampledVoxel<V> sample_components(const SamplePlan<V>& plan, int components, const glm::i64vec3& voxel,
                                              bool mapped, const glm::vec3& offset, V* output) {

@@ -11,25 +11,25 @@
 
 namespace tetwarp {
 
-/// How far a vertex moved, three whole numbers of steps, in 8 bytes: each above the least of its axis, in as many of
-/// the 64 bits as its axis needs.
+/// Packs the displacement of a vertex, three whole numbers of steps, into 64 bits. Each number is stored as its
+/// distance from the least number of its axis, in as many bits as its axis needs.
 ///
-/// A number below 2^23 behind the exponent bits of 2^23 is the float 2^23 + that number. So vectors are unpacked
-/// without conversions as floats with something added ("raised"), and differences of raised ones are exact.
+/// A number below 2^23 behind the exponent bits of 2^23 is the float 2^23 + that number. So vectors unpack without
+/// conversions to floats with something added ("raised"), and differences of raised numbers are exact.
 class StepPacking {
  public:
   static constexpr int kMostBits = 23;  ///< of one axis
 
-  /// From -256 to below 256 voxels along x and y, twice that along z.
+  /// Holds displacements from -256 to below 256 voxels along x and y, and twice that along z.
   StepPacking()
       : StepPacking({-(1 << (kDefaultBits[0] - 1)), -(1 << (kDefaultBits[1] - 1)), -(1 << (kDefaultBits[2] - 1))},
                     {kDefaultBits[0], kDefaultBits[1]}) {}
 
-  /// What holds all from `low` to `high`, 2^-12 voxel; none where that takes more than 23 bits on an axis, or 64 in
-  /// all.
+  /// A packing that holds all numbers from `low` to `high`, 2^-12 voxel; nothing where that takes more than 23 bits on
+  /// an axis, or 64 in all.
   ///
-  /// Room is left below and above: for the next field of a sequence, and because before it is rounded a number may be
-  /// half a step lower, and floats below 2^23 have halves.
+  /// Room is left below and above, for the next field of a sequence, and because before rounding a number may be half a
+  /// step lower, and floats below 2^23 have halves.
   static std::optional<StepPacking> holding(const glm::ivec3& low, const glm::ivec3& high) {
     glm::ivec3 bits(0);
     bool by_default = true;
@@ -53,9 +53,10 @@ class StepPacking {
     return StepPacking(least, {bits.x, bits.y});
   }
 
-  /// What to add to a vector to have it raised.
+  /// Number to add to a vector to raise it.
   TETWARP_HD const glm::vec3& lift() const { return lift_; }
-  /// Nothing but zero bits where it can be packed. @param raised  whole numbers, or what may be no numbers at all
+  /// Zero if and only if a raised vector can be packed.
+  /// @param raised  raised whole numbers, or NaN or infinity
   TETWARP_HD std::uint32_t excess(const glm::vec3& raised) const {
     return ((bits_of(raised.x) ^ kTwoTo23) & ~x_mask_) | ((bits_of(raised.y) ^ kTwoTo23) & ~y_mask_) |
            ((bits_of(raised.z) ^ kTwoTo23) & ~z_mask_);
@@ -109,9 +110,10 @@ class StepPacking {
   glm::vec3 lift_;
 };
 
-/// A lattice along the axes of the output grid, whose undeformed vertices lie at whole steps: what a gather reads.
+/// A lattice along the axes of the output grid whose undeformed vertices lie at whole steps; a gather reads it.
 ///
-/// Lattices over a volume with cells of B voxels are such. All that is held of a vertex is how far it moved.
+/// Lattices over a volume with a whole number of voxels a cell are of this kind. Of a vertex only its displacement is
+/// stored.
 struct StepLattice {
   glm::ivec3 cells{0};          ///< on each axis
   glm::vec3 first{0}, cell{0};  ///< rest place of vertex (0, 0, 0), and from one vertex to the next; 2^-12 voxel
@@ -141,13 +143,12 @@ struct StepLattice {
   }
 };
 
-/// One tetrahedron of the lattice, by its corner D.
+/// One tetrahedron of the lattice, named by its corner D, three directions and one flag.
 ///
-/// With alternating parity the corner tetrahedra are octahedra around the even vertices (i + j + k even): D is an even
-/// vertex, and A, B, C are its neighbours along i, j, k, up or down. What is left in each cell is its centre, with odd
-/// vertices only: D is the cell's corner 7 (even cells; all directions down) or 0 (odd cells; up), and A, B, C are
-/// across the faces i, j, k from it. So vertex, three directions and one flag name a tetrahedron, and a step across a
-/// face that D lies on turns one direction round.
+/// With alternating parity the corner tetrahedra make up octahedra around the even vertices (i + j + k even): D is an
+/// even vertex, and A, B, C are its neighbours along i, j, k, up or down. What is left of each cell is its centre, with
+/// odd vertices only: D is the cell's corner 7 (even cells; all directions down) or 0 (odd cells; all up), and A, B, C
+/// lie across the faces i, j, k from it. A move across a face on which D lies turns one direction round.
 struct LatticeTetrahedron {
   glm::ivec3 d;     ///< vertex
   glm::ivec3 down;  ///< 1 where A, B, C lie down from D on that axis, else 0
@@ -214,7 +215,7 @@ struct LatticeTetrahedron {
   }
 };
 
-/// A tetrahedron of the lattice as float arithmetic wants it.
+/// A tetrahedron of the lattice in the form that float arithmetic uses.
 struct FloatTetrahedron {
   glm::vec3 d;   ///< vertex D
   glm::vec3 to;  ///< +1 or -1: where A, B, C lie from D
@@ -232,7 +233,8 @@ TETWARP_HD inline LatticeTetrahedron as_lattice(const FloatTetrahedron& t) {
 
 namespace detail {
 
-/// The largest whole number not above x; NaN: 0, and too large or small ones are any large or small ones.
+/// The largest whole number that is not above x. NaN gives 0; for x beyond the range of int it is some number as far
+/// out.
 TETWARP_HD inline int floor_to_int(float x) {
 #ifdef __CUDA_ARCH__
   return __float2int_rd(x);
@@ -242,7 +244,7 @@ TETWARP_HD inline int floor_to_int(float x) {
 #endif
 }
 
-/// x moved into [0, 1]; NaN: 0.
+/// x clamped to [0, 1]; NaN gives 0.
 TETWARP_HD inline float saturate(float x) {
 #ifdef __CUDA_ARCH__
   return __saturatef(x);
@@ -251,7 +253,7 @@ TETWARP_HD inline float saturate(float x) {
 #endif
 }
 
-/// x moved into [0, last].
+/// x clamped to [0, last].
 TETWARP_HD inline int clamp_to(int x, int last) {
 #ifdef __CUDA_ARCH__
   return __vimin_s32_relu(x, last);
@@ -263,7 +265,7 @@ TETWARP_HD inline int clamp_to(int x, int last) {
 
 }  // namespace detail
 
-/// The tetrahedron of the undeformed lattice that holds a place, in cells; places outside are moved inside.
+/// The tetrahedron of the undeformed lattice that holds a place, given in cells. Places outside are moved inside.
 TETWARP_HD inline FloatTetrahedron tetrahedron_at(const StepLattice& lattice, const glm::vec3& place) {
   const int x = detail::clamp_to(detail::floor_to_int(place.x), lattice.last.x),
             y = detail::clamp_to(detail::floor_to_int(place.y), lattice.last.y),
@@ -289,9 +291,9 @@ TETWARP_HD inline FloatTetrahedron tetrahedron_at(const StepLattice& lattice, co
   return t;
 }
 
-/// With its snapped vertices, for exact arithmetic.
+/// A tetrahedron with its snapped vertices, for exact arithmetic.
 ///
-/// @param lattice  a StepLattice, or whatever else knows the snapped vertices of one
+/// @param lattice  a StepLattice, or any type that gives the snapped vertices of a lattice
 template <class Lattice>
 TETWARP_HD Tetrahedron vertices_of(const Lattice& lattice, const LatticeTetrahedron& t) {
   return {lattice.vertex(t.a()), lattice.vertex(t.b()), lattice.vertex(t.c()), lattice.vertex(t.d)};

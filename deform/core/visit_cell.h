@@ -8,7 +8,7 @@
 
 namespace tetwarp {
 
-/// Box of voxels, half open.
+/// Half-open box of voxels.
 struct VoxelBox {
   glm::i64vec3 begin, end;
 };
@@ -51,7 +51,7 @@ TETWARP_HD Int floor_divide(Int a, Int b) {  // b > 0
 }
 
 /// Narrows [begin, end) of a row, in which the nudge is constant, to the voxels on the inner side of a face.
-/// `value` is the face's value at offset 0 of the row with the nudge taken off.
+/// @param value  value of the face at offset 0 of the row, without the nudge
 template <class Int>
 TETWARP_HD void clip_row(const Face<Int>& face, Int value, const glm::i32vec3& signs, std::int64_t* begin,
                          std::int64_t* end) {
@@ -72,7 +72,8 @@ TETWARP_HD void clip_row(const Face<Int>& face, Int value, const glm::i32vec3& s
   }
 }
 
-/// The faces of a tetrahedron, opposite A, B, C and D. @param first  the voxel that they count from, 2^-12 voxel
+/// Makes the faces of a tetrahedron opposite A, B, C and D.
+/// @param first  voxel from which the faces count, 2^-12 voxel
 /// @return false for a tetrahedron without volume, which owns nothing
 template <class Int>
 TETWARP_HD bool make_faces(const Tetrahedron& t, const glm::i32vec3& first, Face<Int> (&faces)[4]) {
@@ -88,8 +89,8 @@ TETWARP_HD bool make_faces(const Tetrahedron& t, const glm::i32vec3& first, Face
   return true;
 }
 
-/// Narrows [begin, end) of a row, in which the nudge is constant, to what a tetrahedron owns.
-/// @param y, z  the row, in voxels from the one that the faces count from
+/// Narrows [begin, end) of a row, in which the nudge is constant, to the voxels that a tetrahedron owns.
+/// @param y, z  the row, in voxels from the voxel from which the faces count
 template <class Int>
 TETWARP_HD void clip_row(const Face<Int> (&faces)[4], std::int64_t y, std::int64_t z, const glm::i32vec3& signs,
                          std::int64_t* begin, std::int64_t* end) {
@@ -126,8 +127,8 @@ TETWARP_HD void walk_rows(const Tetrahedron& t, int number, const VoxelBox& box,
   }
 }
 
-/// Whether corner tetrahedron kNumber owns a voxel. Its face opposite D is the centre's too, with the corners in the
-/// same cyclic order, so `shared` holds the side already.
+/// Whether corner tetrahedron kNumber owns a voxel. Its face opposite D is also a face of the centre tetrahedron, with
+/// corners in the same cyclic order, so `shared` has the side of that face.
 template <class Int, bool kOdd, int kNumber>
 TETWARP_HD bool corner_owns(const Relative<Int> (&at)[8], const int (&shared)[4], const VoxelNudge<Int>& nudge) {
   constexpr TetrahedronCorners kOf = tetrahedron_corners(kNumber, kOdd);
@@ -137,7 +138,7 @@ TETWARP_HD bool corner_owns(const Relative<Int> (&at)[8], const int (&shared)[4]
          side_of_face(a, b, d, nudge) == side;
 }
 
-/// Asks all five tetrahedra of a cell for one voxel.
+/// Tests all five tetrahedra of a cell against one voxel.
 template <class Int, bool kOdd, class Visit>
 TETWARP_HD void visit_voxel(const Cell& cell, const glm::i64vec3& voxel, const glm::i32vec3& signs, Visit& visit) {
   const glm::i32vec3 steps = to_steps(voxel);
@@ -179,8 +180,8 @@ TETWARP_HD void walk_voxels(const Cell& cell, bool odd, const VoxelBox& box, con
 
 /// Calls `visit(voxel, signs, t, tetrahedron)` for every voxel of `region` that tetrahedron t of the cell owns.
 ///
-/// The body that every backend runs for one cell: which voxels it reports is the definition of ownership
-/// (docs/algorithm.md, "Who owns a voxel"), what becomes of them is the backend's. A voxel in a fold is reported by
+/// Every backend runs this body for one cell. Which voxels it reports is the definition of ownership
+/// (docs/algorithm.md, "Who owns a voxel"); what becomes of them is up to the backend. A voxel in a fold is reported by
 /// several tetrahedra, of this cell or of others: the one with the lowest number 5 * cell + t is its owner.
 template <class Visit>
 TETWARP_HD void visit_cell(const Cell& cell, bool odd, const VoxelBox& region, const Nudge& nudge, Visit&& visit) {

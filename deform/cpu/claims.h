@@ -10,16 +10,16 @@
 
 namespace tetwarp::cpu {
 
-/// Scatter: every cell that may reach a box of voxels claims those that its tetrahedra own, and the lowest number wins,
-/// whatever the order. Right for every field, and slow.
+/// Finds owners by scatter: every cell that may reach a box of voxels claims the voxels that its tetrahedra own, and
+/// the lowest number wins, whatever the order. It is right for every field, and slow.
 struct Claims {
   static constexpr std::uint64_t kNobody = UINT64_MAX;
 
   // Of each voxel of the box, i fastest.
   std::vector<std::uint64_t> owner;   ///< number of the lowest tetrahedron that owns it, or kNobody
-  std::vector<glm::vec3> offset;      ///< undeformed minus deformed place, voxels; where owned
-  std::vector<float> jacobian;        ///< of the owner, where wanted
-  std::vector<std::uint16_t> owners;  ///< how many there are, where wanted; saturates
+  std::vector<glm::vec3> offset;      ///< undeformed minus deformed place, voxels, of voxels with an owner
+  std::vector<float> jacobian;        ///< Jacobian determinant of the owner; empty unless requested
+  std::vector<std::uint16_t> owners;  ///< number of owners, saturated; empty unless requested
 
   /// @param block  scratch
   void find(const LatticeIndex& lattice, const Region& box, bool wants_jacobian, bool wants_owners,

@@ -10,18 +10,23 @@
 
 namespace tetwarp::cpu {
 
-/// How many tetrahedra own each voxel: the winding number of the deformed border (docs/algorithm.md, "Gather"), held as
-/// the places where rows of voxels pass through it; and, tile by tile, what inverted tetrahedra may reach.
+/// How many tetrahedra own each voxel: the winding number of the deformed border (docs/algorithm.md, "Gather"). It is
+/// stored as the places where rows of voxels pass through the border, and, tile by tile, what inverted tetrahedra may
+/// reach.
 class Coverage {
  public:
-  /// Looks at the whole border, in parallel in the calling task arena. @param index  with `steps`; must stay as it is
+  /// Looks at the whole border, in parallel in the calling task arena.
+  /// @param index  must have `steps`, and must outlive this object unchanged
   void find(const LatticeIndex& index, const Geometry& output);
 
-  /// @param owners  of each voxel of the box, i fastest, written  @param block  scratch  @return how many are `several`
+  /// Writes how many owners each voxel of a box has.
+  /// @param owners  one for each voxel of the box, i fastest
+  /// @param block   scratch memory
+  /// @return number of voxels that are Owners::several
   std::int64_t owners_of(const Region& box, Owners* owners, LatticeBlock& block) const;
 
  private:
-  /// From this voxel of its row on, the winding number is another one.
+  /// From this voxel of its row on, the winding number is larger by `change`.
   struct Crossing {
     std::int32_t voxel, change;
   };
@@ -36,8 +41,8 @@ class Coverage {
 
   const LatticeIndex* index_ = nullptr;
   glm::i64vec3 size_{0};
-  std::vector<std::int64_t> first_;  ///< crossing of each row, and of the row after the last
-  std::vector<Crossing> crossings_;  ///< in each row by voxel
+  std::vector<std::int64_t> first_;  ///< first crossing of each row, and one after the last crossing
+  std::vector<Crossing> crossings_;  ///< row by row, ordered by voxel
 };
 
 }  // namespace tetwarp::cpu

@@ -9,8 +9,8 @@
 
 namespace tetwarp::cpu {
 
-/// Writes a row of the inverse displacement by vectors (Highway): `mm_from_index` times the offsets, in double, rounded
-/// to float; NaN where nothing maps.
+/// Writes a row of `Maps::inverse_mm` with vector instructions (Highway): `mm_from_index` times the offsets, in double,
+/// rounded to float; NaN where nothing maps.
 void write_inverse_row(const glm::dmat3& mm_from_index, const Row& row, glm::vec3* inverse_mm);
 
 }  // namespace tetwarp::cpu

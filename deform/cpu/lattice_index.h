@@ -14,14 +14,14 @@
 
 namespace tetwarp::cpu {
 
-/// Vertices of a block of cells, i fastest, snapped.
+/// The snapped vertices of a block of cells, i fastest.
 struct LatticeBlock {
   static constexpr glm::ivec3 kMostCells = kMostScanned;
   static constexpr int kMostVertices = (kMostCells.x + 1) * (kMostCells.y + 1) * (kMostCells.z + 1);
 
   glm::i64vec3 first_cell;
   glm::i32vec3 cells;  ///< cells on each axis
-  bool at_rest;        ///< every u is zero
+  bool at_rest;        ///< whether u of every vertex is zero
   Vertex vertices[kMostVertices];
 
   Cell cell(const glm::i32vec3& at) const;
@@ -30,7 +30,7 @@ struct LatticeBlock {
   }
 };
 
-/// Calls `visit(tetrahedron)` for what is inverted in a block.
+/// Calls `visit(tetrahedron)` for each inverted tetrahedron of a block.
 template <class Visit>
 void for_each_inverted(const LatticeBlock& block, Visit&& visit) {
   for (int z = 0; z < block.cells.z; ++z) {
@@ -51,27 +51,30 @@ void for_each_inverted(const LatticeBlock& block, Visit&& visit) {
 /// What a pass over all tetrahedra of a field found.
 struct FieldStatistics {
   std::uint64_t inverted = 0, degenerate = 0;
-  std::int32_t most_moved = 0;  ///< steps that a vertex is displaced on an axis
+  std::int32_t most_moved = 0;  ///< largest displacement of a vertex on an axis, 2^-12 voxel
   double jacobian_min = std::numeric_limits<double>::infinity();
   double jacobian_max = -std::numeric_limits<double>::infinity();
 
   void add(const FieldStatistics& other);
-  /// Counts the tetrahedra of a block.
+  /// Adds the tetrahedra of a block.
   void add_cells(const LatticeBlock& block);
-  /// Counts the tetrahedra of a block that was scanned. @param steps  the lattice that it is of
+  /// Adds the tetrahedra of a block that was scanned.
+  /// @param steps  lattice of the block
   void add_scanned(const BlockScan& block, const StepLattice& steps);
 };
 
 /// The vertices of a field, snapped on demand, and boxes by which to find the cells that may reach a part of the
 /// output.
 ///
-/// Cells are held in blocks of up to 16 x 8 x 8, blocks in groups of 8 x 8 x 8; each has the box of its deformed
-/// vertices. Nothing of the field is copied: a block's vertices are snapped each time that it is visited.
+/// Cells are grouped into blocks of up to 16 x 8 x 8, and blocks into groups of 8 x 8 x 8. Each has the box of its
+/// deformed vertices. Nothing of the field is copied: the vertices of a block are snapped each time that it is visited.
 class LatticeIndex {
  public:
   using Block = LatticeBlock;
 
-  /// Checks the field and builds the boxes, in parallel in the calling task arena. @throws InputError, Cancelled
+  /// Checks the field and builds the boxes, in parallel in the calling task arena.
+  /// @throws InputError for a field that cannot be used
+  /// @throws Cancelled
   void build(const Geometry& output, const FieldView& field, const Control& control);
 
   const FieldView& field() const { return field_; }
@@ -98,20 +101,21 @@ class LatticeIndex {
   }
 
   void load(std::size_t block, Block& into) const;
+  /// A snapped vertex.
   /// @throws InputError for a vertex that is not finite or too far away
   Vertex vertex(const glm::i64vec3& at) const {
     const glm::i64vec3& size = field_.lattice->size;
     return snapped(at, field_.displacement[(at.z * size.y + at.y) * size.x + at.x]);
   }
   bool has_inverted(std::size_t block) const { return inverted_[block] != 0; }
-  /// Whether every vertex of a block rests, and at the whole step where `steps` has it.
+  /// Whether no vertex of a block is displaced, and every one lies at the whole step where `steps` has it.
   bool rests(std::size_t block) const { return resting_[block] != 0; }
-  /// The lattice, where its undeformed vertices lie at whole steps; else no cells.
+  /// The lattice if its undeformed vertices lie at whole steps; otherwise a lattice without cells.
   const StepLattice& steps() const { return steps_; }
-  /// The field for vectors, where `steps` has cells.
+  /// The field in the form that vector code reads; valid if `steps` has cells.
   const VectorField& vectors() const { return vectors_; }
-  /// Grows a box in continuous output index to hold every undeformed place that a block's tetrahedra can give, weights
-  /// that leave [0, 1] by the slack included.
+  /// Grows a box in continuous output index until it holds every undeformed place that tetrahedra of a block can give,
+  /// with weights that leave [0, 1] by kWeightSlack.
   void rest_box(std::size_t block, glm::dvec3* low, glm::dvec3* high) const;
 
  private:
@@ -146,8 +150,7 @@ class LatticeIndex {
   FieldStatistics statistics_;
 };
 
-/// The vertices of a lattice at whole steps, snapped when they are asked for: for what takes any lattice
-/// (`vertices_of`).
+/// The vertices of a lattice at whole steps, snapped on demand, in the form that `vertices_of` takes.
 struct SnappedLattice {
   const LatticeIndex& index;
   glm::ivec3 cells;

@@ -11,25 +11,29 @@
 
 namespace tetwarp::cpu {
 
-/// Voxel types of which `sample_linear_row` knows what two that lie side by side are made of.
+/// Voxel types that `sample_linear_row` can sample: integers of 8 and 16 bits.
 template <class V>
 constexpr bool kHasLinearRow = std::is_integral_v<V> && sizeof(V) <= 2;
 
-/// How the voxels lie of a source on the grid of the output.
+/// How the voxels of a source lie that is on the grid of the output.
 struct LinearLayout {
-  glm::ivec3 begin, last;   ///< first voxel that is buffered, and last voxel of the whole grid
-  std::int32_t row, slice;  ///< steps from a voxel to the next
+  glm::ivec3 begin,  ///< first voxel that is buffered
+      last;          ///< last voxel of the whole grid
+  std::int32_t row,  ///< voxels from one row to the next
+      slice;         ///< voxels from one slice to the next
 
   bool operator==(const LinearLayout&) const = default;
 };
 
-/// A source on the grid of the output, of one component and without padding, that 32-bit offsets reach.
+/// A source on the grid of the output, with one component, without padding, and small enough for 32-bit offsets.
 struct LinearSource {
   VoxelType type;
   const void* voxels;
   LinearLayout layout;
 
-  /// @param buffered  voxels that are buffered  @return whether there is such a source
+  /// Describes the source of a plan.
+  /// @param buffered  number of voxels that are buffered
+  /// @return whether the source can be described
   template <class V>
   static bool make(const SamplePlan<V>& plan, std::int64_t buffered, LinearSource& source) {
     constexpr std::int64_t kMost = INT32_MAX / static_cast<std::int64_t>(sizeof(V));
@@ -43,25 +47,26 @@ struct LinearSource {
   }
 };
 
-constexpr int kMostInRow = 64;  ///< voxels that are sampled together; tiles have fewer
+constexpr int kMostInRow = 64;  ///< largest number of voxels that are sampled together; tiles have shorter rows
 
-/// What becomes of a voxel of a row.
+/// What was done with a voxel of a row.
 enum class RowState : std::uint8_t {
-  sampled = 1,  ///< written
-  left = 2      ///< for `sample_voxel`
+  sampled = 1,  ///< its value is written
+  left = 2      ///< `sample_voxel` has to compute it
 };
 
-/// Where the voxels of a row come from in all sources of one layout: those from well inside; others are left.
+/// Where the voxels of a row come from, for all sources with one layout. Only places well inside the source are
+/// computed; other voxels are left.
 struct LinearPlaces {
   alignas(64) float x[kMostInRow], y[kMostInRow], z[kMostInRow];  ///< fractions
   alignas(64) std::int32_t at[kMostInRow];                        ///< voxel of the buffer; 0 where it is left
   RowState state[kMostInRow];
-  int count = 0;      ///< voxels, whole vectors of them; those behind are left
-  int sampled = 0;    ///< voxels that are not left
-  SliceRange slices;  ///< of the sources
+  int count = 0;      ///< number of voxels in whole vectors; the voxels after them are left
+  int sampled = 0;    ///< number of voxels that are not left
+  SliceRange slices;  ///< slices of the sources that have weight
 
-  /// Finds them once for a row.
-  /// @param row  of up to kMostInRow voxels, the same in all calls
+  /// Computes the places, once for a row.
+  /// @param row  up to kMostInRow voxels, the same in all calls
   void find(const LinearLayout& layout, const Row& row);
 
  private:
@@ -69,16 +74,17 @@ struct LinearPlaces {
   bool found_ = false;
 };
 
-/// Samples what is not left: the bits of `sample_voxel` with linear interpolation, by the widest vectors that the
-/// processor has (Highway).
+/// Samples the voxels of a row that are not left, with the widest vectors that the processor has (Highway). The result
+/// has the bits of `sample_voxel` with linear interpolation.
 ///
-/// @param places  for the layout of the source  @param output  of the source's type
+/// @param places  computed for the layout of the source
+/// @param output  gets values of the source's type
 void sample_linear_row(const LinearSource& source, const LinearPlaces& places, void* output);
 
-/// The same for a vote, where all voxels around have one label.
+/// Samples by vote those voxels of a row that are not left and around which all voxels have one label.
 ///
-/// @param state  of each voxel, as `places` has it; where there are several labels, it is left
-/// @return voxels that are not left
+/// @param state  state of each voxel, as `places` has it; set to `left` where there are several labels
+/// @return number of voxels that are not left
 int sample_uniform_row(const LinearSource& source, const LinearPlaces& places, void* output, RowState* state);
 
 }  // namespace tetwarp::cpu

@@ -10,7 +10,7 @@
 
 namespace tetwarp::cpu {
 
-/// Writes rows of the maps that are wanted.
+/// Writes rows of those maps that a call asked to fill.
 class MapWriter {
  public:
   /// @throws InputError for a map that is not on the output grid, does not buffer the region, or has the wrong type
@@ -22,8 +22,10 @@ class MapWriter {
   bool wants_jacobian() const { return maps_.jacobian.voxels != nullptr; }
   bool wants_owners() const { return maps_.owners.voxels != nullptr; }
 
+  /// Writes one row.
   /// @param coverage  1 or 0 for each voxel of the row
-  /// @param jacobian  one a voxel where wanted, else null; likewise owners
+  /// @param jacobian  one for each voxel, or null if that map is not filled
+  /// @param owners    one for each voxel, or null if that map is not filled
   void write(const Row& row, const std::uint8_t* coverage, const float* jacobian, const std::uint16_t* owners) const;
 
  private:

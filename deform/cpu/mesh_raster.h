@@ -11,22 +11,24 @@
 
 namespace tetwarp::cpu {
 
-/// Who owns the voxels of a box.
+/// Owners of the voxels of a box.
 struct MeshOwners {
   static constexpr std::uint32_t kNobody = UINT32_MAX;
 
   std::vector<std::uint32_t> owner;  ///< number of the lowest tetrahedron that owns it, or kNobody; i fastest
-  std::vector<std::uint16_t> count;  ///< how many there are, where wanted; saturates
+  std::vector<std::uint16_t> count;  ///< number of owners of each voxel, saturated; empty unless requested
 };
 
 /// Rasterises a mesh: its tetrahedra are listed by bins of voxels, and in a bin each owns an interval of every row
 /// (deform/core/row_interval.h).
 class MeshRaster {
  public:
-  /// Lists the tetrahedra. @param mesh  must stay as it is  @throws Cancelled
+  /// Makes the lists of tetrahedra.
+  /// @param mesh  must outlive this object unchanged
+  /// @throws Cancelled
   void build(const SnappedMesh& mesh, const Geometry& output, const Control& control);
 
-  /// Part of the output, up to 32 voxels an axis.
+  /// Finds the owners in a part of the output of up to 32 voxels on an axis.
   void find(const Region& box, bool wants_count, MeshOwners& owners) const;
 
  private:
@@ -37,9 +39,11 @@ class MeshRaster {
                    MeshOwners& owners) const;
 
   const SnappedMesh* mesh_ = nullptr;
-  glm::i64vec3 size_{0};              ///< of the output
-  glm::i64vec3 origin_{0}, bins_{0};  ///< first voxel of the first bin, and how many bins; the nudge turns between bins
-  CellLists lists_;                   ///< of the tetrahedra of each bin, i fastest; rising
+  glm::i64vec3 size_{0};  ///< of the output grid
+  /// First voxel of the first bin, and number of bins on each axis. The direction of the nudge changes between bins
+  /// only.
+  glm::i64vec3 origin_{0}, bins_{0};
+  CellLists lists_;  ///< tetrahedra of each bin (bins with i fastest), with rising numbers
 };
 
 }  // namespace tetwarp::cpu

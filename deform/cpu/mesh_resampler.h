@@ -9,7 +9,8 @@
 
 namespace tetwarp::cpu {
 
-/// Takes forward fields that are meshes. @throws InputError as `make_cpu_resampler`
+/// A resampler of forward fields that are meshes, on the CPU.
+/// @throws InputError as `make_cpu_resampler`
 std::unique_ptr<Resampler> make_mesh_resampler(const Geometry& output, const Limits& limits);
 
 }  // namespace tetwarp::cpu

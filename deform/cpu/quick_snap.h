@@ -10,12 +10,13 @@
 
 namespace tetwarp::cpu {
 
-/// Snaps vertices of a lattice along the grid's axes that rest at whole steps, in few operations: the sums and products
-/// of `LatticeFrame::snap_vertex` that are not with zero, in steps. Scaling by a power of two changes no rounding.
+/// Snaps vertices of a lattice that lies along the axes of the grid, with undeformed vertices at whole steps, in few
+/// operations. It makes the sums and products of `LatticeFrame::snap_vertex` that are not with zero, in steps of 2^-12
+/// voxel. Scaling by a power of two changes no rounding.
 class QuickSnap {
  public:
   QuickSnap() = default;
-  /// @param steps  without cells: never usable
+  /// @param steps  a lattice without cells is never usable
   QuickSnap(const LatticeFrame& frame, const StepLattice& steps) {
     constexpr double kApart = 0.02;  // steps: more than rest places differ from whole multiples of cells, by all axes
     rests_at_steps_ = steps.cells.x != 0 && frame.first_slice == 0;
@@ -37,9 +38,10 @@ class QuickSnap {
   }
 
   bool is_usable() const { return usable_; }
-  /// Whether every vertex at rest is snapped to where the StepLattice has it, for all grids.
+  /// Whether every undeformed vertex is snapped to where the StepLattice has it, on every output grid.
   bool rests_at_steps() const { return rests_at_steps_; }
-  /// @return false for a vertex that is far away, or not finite: `snap_vertex` must be asked
+  /// Snaps one vertex.
+  /// @return false for a vertex that is far away or not finite; then `LatticeFrame::snap_vertex` must decide
   bool snap(const glm::ivec3& at, const glm::vec3& displacement, Vertex& vertex) const {
     glm::dvec3 rounded(0);
     bool near = true;

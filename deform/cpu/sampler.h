@@ -13,36 +13,38 @@
 
 namespace tetwarp::cpu {
 
-/// A run of output voxels along i and what the field says of each.
+/// A run of output voxels along i, and what the field says of each.
 struct Row {
-  glm::i64vec3 voxel;  ///< the first
+  glm::i64vec3 voxel;  ///< the first voxel
   int count;
   const std::uint8_t* mapped;  ///< 1: comes from `voxel + offset`; 0: nothing maps there
-  const glm::vec3* offset;     ///< undeformed minus deformed, voxels of output index
+  const glm::vec3* offset;     ///< undeformed minus deformed place of each, voxels of output index
 };
 
 struct LinearPlaces;  // linear_row.h
 
-/// Samples one source at the undeformed places of rows. Its source may be on any grid.
+/// Samples one source, on any grid, at the undeformed places of rows.
 class TargetSampler {
  public:
   virtual ~TargetSampler() = default;
-  /// Writes a row of the output; adds to the counts. `coverage`, where not null, receives 1 or 0 a voxel.
-  /// @param places  what samplers of the same row may share
+  /// Writes a row of the output and adds to the counts.
+  /// @param places    what samplers of the same row share
+  /// @param coverage  gets 1 or 0 for each voxel, unless null
   virtual void sample(const Row& row, LinearPlaces& places, std::uint8_t* coverage, Report& counts) const = 0;
   /// Whether voxels of a box that stay where they are can be copied.
   virtual bool can_copy(const Region& box) const = 0;
-  /// Copies them; adds to the counts.
+  /// Copies the voxels of a box and adds to the counts.
   virtual void copy(const Region& box, Report& counts) const = 0;
 };
 
 using TargetSamplers = std::vector<std::unique_ptr<const TargetSampler>>;
 
-/// The samplers of all targets of one call, checked. The targets' views must outlive them.
+/// Checks all targets of a call and makes their samplers. The targets' views must outlive them.
 TargetSamplers make_samplers(const Resampler& resampler, std::span<const Target> targets, const Region& region);
 
-/// Sends a row through all targets; the report counts the voxels of the first. `coverage` receives 1 or 0 a voxel: of
-/// the first target, or of the field where there is none.
+/// Sends a row through all targets. The report counts the voxels of the first.
+/// @param coverage  gets 1 or 0 for each voxel: whether the first target has a value there, or, without targets,
+///         whether the field maps something there
 void sample_targets(const Row& row, const TargetSamplers& samplers, std::uint8_t* coverage, Report& report);
 
 }  // namespace tetwarp::cpu

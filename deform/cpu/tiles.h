@@ -18,11 +18,11 @@
 
 namespace tetwarp::cpu {
 
-/// Output voxels that one task works on at a time: what it keeps of each (owner, offset) fits a core's second-level
-/// cache.
+/// Side, in voxels, of the tile on which one task works at a time. What a task keeps of each voxel (owner, offset) fits
+/// the second-level cache of a core.
 constexpr std::int64_t kTile = 32;
 
-/// Calls back with the share of work that is done, one call at a time and rising.
+/// Reports the share of work that is done, one call at a time and rising.
 class Progress {
  public:
   Progress(const Control& control, std::int64_t total) : control_(control), total_(total) {}
@@ -42,7 +42,7 @@ class Progress {
   std::mutex mutex_;
 };
 
-/// Tells of layers of tiles whose last row is done.
+/// Reports layers of tiles (all tiles with the same range of k) whose last row of tiles is done.
 class Layers {
  public:
   Layers(const Control& control, const Region& region, const glm::i64vec3& tiles)

@@ -9,9 +9,11 @@
 
 namespace tetwarp::cpu {
 
-/// A field as vector code sees it: displacements of a lattice at whole steps, in host memory, and how they are snapped.
+/// A field in the form that vector code reads: displacements, in host memory, of a lattice whose undeformed vertices
+/// lie at whole steps, and how they are snapped.
 struct VectorField {
-  /// What raises steps to where floats are whole numbers, for vertices that move less than 2^22 steps (1024 voxels).
+  /// Number that raises steps to where floats are whole numbers, for vertices that move less than 2^22 steps (1024
+  /// voxels).
   static constexpr float kLift = 3.0f * (1 << 22);
   static constexpr float kMostMoved = (1 << 22) - 1;
 
@@ -30,7 +32,7 @@ struct VectorField {
         output_from_lattice(frame.output_from_lattice),
         output_from_mm(frame.output_from_mm) {}
 
-  /// Its number.
+  /// Number of the last vertex.
   int last_vertex() const { return lattice.slice * (lattice.cells.z + 1) - 1; }
 };
 

@@ -7,14 +7,15 @@
 
 namespace tetwarp {
 
-/// The five tetrahedra of every cell of a lattice as a mesh, with the lattice's numbers; of replaced cells, those of
-/// the mesh that takes their place instead, after all others. It knows which vertices are the lattice's
-/// (`lattice_vertex`), so that with the lattice at its side it gives the same volumes. A mesh alone is returned as it
-/// is.
-/// @throws InputError unless there is one displacement for each vertex, for a mesh with a vertex number that is too
-/// large, for 2^32 vertices and more, for replaced cells that are not rising or not of the lattice, or for a field in
-/// device memory
+/// The five tetrahedra of every cell of a lattice, as a mesh with the same numbers. Tetrahedra that replace cells
+/// follow after all others. A mesh that stands alone is returned as it is.
+/// The mesh states which vertices are those of the lattice (`TetrahedralMesh::lattice_vertex`), so together with the
+/// lattice it gives the same deformed volumes.
+/// @throws InputError unless there is one displacement for each vertex; for a mesh with a vertex number that is too
+///         large; for 2^32 or more vertices; for replaced cells that do not rise or are not of the lattice; or for a
+///         field in device memory
 TetrahedralMesh mesh_of(const FieldView& field);
+/// The tetrahedra of a field as a mesh: `mesh_of` of its view.
 TetrahedralMesh mesh_of(const VertexField& field);
 
 }  // namespace tetwarp

@@ -10,19 +10,21 @@
 
 namespace tetwarp {
 
-/// Displacement (LPS mm, deformed minus rest) of a point (LPS mm) of the undeformed volume. Called from several
-/// threads.
+/// Displacement (LPS mm, deformed minus undeformed) of a point (LPS mm) of the undeformed volume. It may be called from
+/// several threads at a time.
 using PointMap = std::function<glm::dvec3(const glm::dvec3& point)>;
 
-/// Values of a map at the vertices of a lattice, in parallel.
+/// The values of a map at the vertices of a lattice, computed in parallel.
+/// @throws Cancelled
 VertexField sample_on(const Geometry& lattice, const PointMap& map, Limits limits = {}, const Control& control = {});
 
-/// The piecewise affine map of a field at any point of its lattice: the same five tetrahedra that the resampler uses.
-/// The field must outlive the map. @throws InputError (when called) for a point outside the lattice
+/// The map of a field between its vertices: affine in the same five tetrahedra of each cell that the resampler uses.
+/// The field must outlive the map. A call of the map throws InputError for a point outside the lattice.
 PointMap piecewise_affine(const VertexField& field);
 
-/// Moves every vertex on: where the field brought it, `next` displaces it further. The result holds for `field`'s
-/// lattice.
+/// Appends a second deformation to a field: each vertex is moved on by the displacement that `next` has at the place to
+/// which `field` moved it. The lattice stays.
+/// @throws Cancelled
 void compose(VertexField& field, const PointMap& next, Limits limits = {}, const Control& control = {});
 
 }  // namespace tetwarp

@@ -15,50 +15,64 @@
 
 namespace tetwarp {
 
-/// How a picture is made of a volume.
+/// How a picture is made from a volume.
 struct RenderStyle {
-  TransferFunction transfer;
-  /// Between two samples of a ray, in the smallest spacing of the volume, 0.01 to 1; nothing: half a pixel, but 0.5
-  /// to 1, and 1 for a sum.
+  TransferFunction transfer;  ///< colour and opacity of each value
+  /// Distance of two samples of a ray, 0.01 to 1, in units of the smallest spacing of the volume. Empty: 1 for a sum;
+  /// else half a pixel, but at least 0.5 and at most 1.
   std::optional<double> step_voxels = {};
-  glm::dvec3 background{0};  ///< red, green, blue, 0 to 1: behind what is seen
+  glm::dvec3 background{0};  ///< red, green and blue, 0 to 1, of what lies behind the volume
 };
 
-/// Colours that are mixed to what is seen of a volume, as an overlay: one of 255 at each voxel, or none.
+/// Colours mixed into what is seen of a volume, as an overlay: one of up to 256 colours at each voxel, or none.
 struct Tints {
-  ConstVolumeView numbers;              ///< u8 on the grid of the volume, 0: none; without voxels: nowhere one
-  std::vector<glm::vec4> colours = {};  ///< of number 0, 1, ...: red, green, blue, and the share of each, 0 to 1
+  /// Type u8 on the grid of the volume: number of the colour, 0 for none; without voxels there is no tint.
+  ConstVolumeView numbers;
+  /// For each number: red, green and blue, and the share of this colour in the mixture, all 0 to 1.
+  std::vector<glm::vec4> colours = {};
 };
 
-/// Casts parallel rays through a volume: one picture after the other, of one volume after the other.
+/// Casts parallel rays through a volume. It makes one picture after another, of one volume after another.
 ///
-/// A picture is a function of volume, style and plane alone: the same bytes on every backend, for any number of
-/// threads. One object is for one thread at a time.
+/// A picture depends on volume, style and plane alone: it has the same bytes on every backend, for any number of
+/// threads. One object serves one thread at a time.
 class Renderer {
  public:
+  /// Frees what the renderer holds; volumes are not owned.
   virtual ~Renderer() = default;
 
-  /// Takes a volume, in host memory or (CUDA) in that of the device, and looks which blocks of it are empty. The view
-  /// is kept: the voxels must stay as they are until the next call, which has to follow whenever they change.
-  /// @throws InputError unless the view has one component and holds its whole, evenly spaced grid (see `straightened`)
+  /// Takes a volume in host memory or, on CUDA, in memory of the device, and finds out which blocks of it are empty.
+  /// The view is kept: the voxels must not change until the next call, and call it again whenever they have changed.
+  /// @throws InputError unless the view has one component and buffers its whole, straight and even grid (see
+  ///         `straightened`)
   virtual void set_volume(const ConstVolumeView& volume, const Control& control = {}) = 0;
 
-  /// @throws InputError for a style that are not valid
+  /// Sets the style of the next pictures.
+  /// @throws InputError for a style with a number out of its range
   virtual void set_style(const RenderStyle& style) = 0;
 
-  /// Takes colours for the volume that was set last; the voxels are looked at in `render`. Composite alone shows them.
-  /// @throws InputError for another grid, type or memory, or more than 256 colours
+  /// Takes colours for the volume that was set last. `render` reads their voxels. Only Projection::composite shows
+  /// them.
+  /// @throws InputError for another grid, type or memory than that of the volume, or more than 256 colours
   virtual void set_tints(const Tints& tints) = 0;
 
-  /// The picture, red, green and blue of each pixel, rows from the top.
-  /// @param rgb  plane.width * plane.height * 3 bytes, in host memory or (CUDA) in that of the device
-  /// @throws InputError without a volume and a style, or for another size; Cancelled
+  /// Makes a picture.
+  /// @param plane    pixels and rays
+  /// @param rgb      gets red, green and blue of each pixel, rows from the top: plane.width * plane.height * 3 bytes,
+  ///         in host memory or, on CUDA, in memory of the device
+  /// @param control  stop and stream
+  /// @throws InputError before a volume and a style are set, or for an array of another size
+  /// @throws Cancelled
   virtual void render(const ViewPlane& plane, std::span<std::uint8_t> rgb, const Control& control = {}) = 0;
 };
 
+/// A renderer on the CPU.
 std::unique_ptr<Renderer> make_cpu_renderer(Limits limits = {});
-/// @param limits  `memory`: the most bytes of its copy of a volume, without which pictures take longer
-/// @throws DeviceError without a device, NotCompiled in a build without CUDA
+/// A renderer on a CUDA device.
+/// @param device  number of the device
+/// @param limits  `memory` limits the bytes of its own copy of a volume; without the copy pictures take longer
+/// @throws DeviceError without a device
+/// @throws NotCompiled in a build without CUDA
 std::unique_ptr<Renderer> make_cuda_renderer(int device = 0, Limits limits = {});
 
 }  // namespace tetwarp

@@ -12,23 +12,24 @@
 
 namespace tetwarp::simulate {
 
-/// Nodes of a box of vertices, numbered one after the other.
+/// The nodes of a box of vertices, with consecutive numbers.
 struct ChainBlock {
   std::int32_t begin = 0, end = 0;
   int colour = 0;                    ///< blocks of one colour share no link
-  std::vector<std::int32_t> beside;  ///< blocks that share links with it
+  std::vector<std::int32_t> beside;  ///< blocks that share links with this one
 };
 
-/// A model made ready for chainmail on any backend.
+/// A model made ready for ChainMail on any backend.
 ///
-/// Nodes are numbered block by block, in a block as in the model: a block is a few rows of vertices, on the chequered
-/// pattern of `colour`, with the copies of its vertices. The result does not depend on the numbers.
+/// Nodes are numbered block by block, and within a block as in the model. A block is a few rows of vertices, on the
+/// chequered pattern of `colour`, with the copies of its vertices. The result does not depend on the numbers.
 class ChainPlan {
  public:
   /// @throws InputError for a lattice that is not orthonormal, or limits that do not include 0
   explicit ChainPlan(const Model& model);
 
-  /// Of host arrays, which stay with the plan. @param moves  one a node
+  /// A view of the plan in host memory.
+  /// @param moves  one for each node, see ChainView::moves
   ChainView view(const std::uint8_t* moves) const {
     return {nodes(), around.data(), links.data(), shares.data(), moves};
   }
@@ -43,16 +44,17 @@ class ChainPlan {
   /// Whether links lead from a node to a placed one.
   std::vector<std::uint8_t> moving(std::span<const PlacedNode> placed) const;
 
-  std::vector<std::int32_t> node_of;    ///< the model's number of each node
-  std::vector<std::int32_t> number_of;  ///< the other way
+  std::vector<std::int32_t> node_of;    ///< number in the model of each node
+  std::vector<std::int32_t> number_of;  ///< number here of each node of the model
   std::vector<ChainBlock> blocks;
-  std::vector<std::int32_t> around;  ///< see ChainView
-  std::vector<LinkUnits> links;      ///< likewise
+  std::vector<std::int32_t> around;  ///< neighbours, see ChainView::around
+  std::vector<LinkUnits> links;      ///< limits, see ChainView::links
   /// At 3 * (n_i + 3 n_j + 9 n_k) + axis, for n_i, n_j, n_k links along the axes: the weight of a neighbour on an axis
   /// in the mean, 2^-16. Weights are as one over the squared length of a link, so that what the mean leads to does not
   /// depend on the shape of cells.
   std::vector<std::int32_t> shares;
-  std::int32_t momentum = 0, patience = 1;  ///< see Pacer
+  /// Parameters of the Pacer.
+  std::int32_t momentum = 0, patience = 1;
   glm::dmat3 direction{1};
 
  private:
@@ -68,7 +70,7 @@ class ChainPlan {
 /// @throws InputError unless the part is from 0 to 1 and the rule's numbers are not negative
 void require_valid(double part, const StoppingRule& rule);
 
-/// Of `square_of_motion`.
+/// The length in mm of a motion whose `square_of_motion` this is.
 double motion_mm(std::uint64_t square);
 
 }  // namespace tetwarp::simulate

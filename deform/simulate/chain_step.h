@@ -11,11 +11,11 @@
 /// matter is in chainmail.h; here are its parts.
 namespace tetwarp::simulate {
 
-/// Displacements are counted in 2^-16 mm along the lattice's axes.
+/// Displacements are whole numbers of 2^-16 mm along the lattice's axes.
 inline constexpr double kUnitsPerMm = 65536;
-/// No node goes further than 4096 mm, so that two of these and a limit fit 32 bits.
+/// Largest displacement on an axis, 4096 mm in units, so that the sum of two displacements and a limit fits 32 bits.
 inline constexpr std::int32_t kFarthest = std::int32_t{1} << 28;
-/// A limit beyond this is none.
+/// A limit of this size never takes effect.
 inline constexpr std::int32_t kLongest = 2 * kFarthest;
 
 /// Displacement of a node.
@@ -27,7 +27,8 @@ struct Units {
 struct LinkUnits {
   std::int32_t shortest, longest, shear;
 
-  /// The most by which the upper end's displacement along an axis may exceed the lower end's, and fall short of it.
+  /// The largest amount, units, by which the displacement of the upper end along an axis may exceed that of the lower
+  /// end.
   TETWARP_HD std::int32_t above(bool own_axis) const { return own_axis ? longest : shear; }
   TETWARP_HD std::int32_t below(bool own_axis) const { return own_axis ? -shortest : shear; }
 };
@@ -72,16 +73,17 @@ struct Pacer {
 TETWARP_HD inline std::int32_t smaller(std::int32_t a, std::int32_t b) { return a < b ? a : b; }
 TETWARP_HD inline std::int32_t larger(std::int32_t a, std::int32_t b) { return a > b ? a : b; }
 
-/// To the nearest whole number, halves away from 0: the same for a mirrored lattice.
+/// value / 2^bits, rounded to nearest, halves away from 0, so that a mirrored lattice gives the mirrored result.
 TETWARP_HD inline std::int64_t rounded_shift(std::int64_t value, int bits) {
   const std::int64_t half = std::int64_t{1} << (bits - 1);
   return value < 0 ? -((half - value) >> bits) : (value + half) >> bits;
 }
 
-/// Lowers `upper` and raises `lower` of a node to what its links to its neighbours' leave. @return whether it had to
+/// Lowers `upper` and raises `lower` of a node as far as the limits of its links to its neighbours demand.
 ///
-/// Repeated for all nodes until nothing changes, in any order, this ends at the largest displacements that keep all
-/// limits and nowhere exceed the `upper` of the start, and at the smallest that nowhere fall below the `lower`.
+/// Repeated for all nodes until nothing changes, in any order, this ends at the largest displacements within all limits
+/// that nowhere exceed the `upper` of the start, and at the smallest that nowhere fall below the `lower`.
+/// @return whether anything changed
 TETWARP_HD inline bool tighten(const ChainView& chain, Units* upper, Units* lower, std::int32_t node) {
   Units high = upper[node], low = lower[node];
   for (int axis = 0; axis < 3; ++axis) {
@@ -114,7 +116,7 @@ TETWARP_HD inline bool tighten(const ChainView& chain, Units* upper, Units* lowe
   return changed;
 }
 
-/// What the placed nodes leave a node: displacements from `least` to `most`.
+/// The displacements that placed nodes leave a node: from `least` to `most`.
 struct Span {
   Units least, most;
 };
@@ -184,7 +186,7 @@ TETWARP_HD inline std::uint64_t square_of_motion(const Units& from, const Units&
   return static_cast<std::uint64_t>(sum);
 }
 
-/// To the nearest whole number, halves away from 0.
+/// value rounded to nearest, halves away from 0.
 TETWARP_HD inline std::int32_t rounded(double value) {
   return value < 0 ? -static_cast<std::int32_t>(0.5 - value) : static_cast<std::int32_t>(value + 0.5);
 }
@@ -204,7 +206,8 @@ struct PlacedNode {
   }
 };
 
-/// LPS mm. @param direction  of the lattice; where it is the identity, only the result is rounded
+/// A displacement in LPS mm.
+/// @param direction  directions of the lattice; if it is the identity, only the result is rounded
 TETWARP_HD inline glm::vec3 to_lps(const glm::dmat3& direction, const Units& units) {
   constexpr double kMm = 1 / kUnitsPerMm;
   const double i = units.at[0] * kMm, j = units.at[1] * kMm, k = units.at[2] * kMm;

@@ -11,52 +11,61 @@
 
 namespace tetwarp::simulate {
 
-/// ChainMail (S. F. Gibson, "3D ChainMail: a fast algorithm for deforming volumetric objects", 1997), with limits of
-/// each link its own, by an algorithm that knows no order.
+/// ChainMail (S. F. Gibson, "3D ChainMail: a fast algorithm for deforming volumetric objects", 1997), in which each
+/// link has limits of its own, by an algorithm whose result depends on no order.
 ///
-/// For each link along an axis and each component c along the lattice's axes, the displacements u of its ends must keep
-/// lo_c <= u_upper - u_lower <= hi_c, lo_c <= 0 <= hi_c: difference constraints, each component by itself.
-/// Displacements and limits are whole numbers of 2^-16 mm, limits rounded towards 0, so that no sum is ever rounded.
+/// For each link along an axis and each component c along the lattice's axes, the displacements u of its two ends must
+/// keep lo_c <= u_upper - u_lower <= hi_c, where lo_c <= 0 <= hi_c. These are difference constraints, and components
+/// are independent. Displacements and limits are whole numbers of 2^-16 mm, and limits are rounded towards 0, so that
+/// no sum is ever rounded. Two steps are made:
 ///
-/// 1. The chain. Let d(f, v) be the length of the shortest path from f to v, where a link costs hi upwards and -lo
-///    downwards. Placed nodes f leave a node v the displacements from L = max_f (u_f - d(v, f)) to U = min_f (u_f +
-///    d(f, v)). No cost is negative, so lowering U (raising L) link by link until nothing changes ends, and ends at the
-///    same numbers whatever the order: U is the largest of all that keep the limits below its start (Bellman-Ford). A
-///    free node then goes to max(L, min(u, U)): as far as it is forced to. The largest and the smallest of two states
-///    within the limits, node by node, are within them, and so is this one. This is where Gibson's queue ends for one
-///    pulled element and equal limits, and where Schill's (2001) tries to for unequal ones. Where placed nodes
-///    contradict each other, L > U: then it is max(U, min(u, L)), also within the limits, of the placed nodes too;
-///    these are shown at their goals, so that only links at them are broken: see links_beyond_limits.
-/// 2. Relaxation. Each node goes towards the mean of its neighbours, weighed by one over the squared length of the link
-///    (whatever the tissue: limits tell tissues apart, and moduli a million times apart would not settle in any number
-///    of steps), plus a part of its last motion (second-order Richardson, Golub & Varga 1961: of the order of N steps
-///    instead of N^2 for N nodes in a row), kept between L and U. This y is brought back within the limits: with V the
-///    largest state within them and nowhere above y, and W the smallest nowhere below, found as U and L are, to
-///    (V + W) / 2 rounded towards 0. It is within the limits, and at the goals, exactly; a y within them stays.
+/// 1. The chain. Let d(f, v) be the length of the shortest path from node f to node v, where a link costs hi upwards
+///    and -lo downwards. Placed nodes f leave a node v the displacements from L = max_f (u_f - d(v, f)) to U = min_f
+///    (u_f + d(f, v)). No cost is negative, so lowering U (and raising L) link by link until nothing changes comes to
+///    an end, and gives the same numbers in every order: U is the largest state within the limits that does not exceed
+///    its start (Bellman-Ford). A free node then goes to max(L, min(u, U)): only as far as it is forced to. The
+///    node-wise largest and smallest of two states within the limits are within the limits, and so is this state.
+///    Gibson's queue ends here for one pulled element and equal limits, and Schill's (2001) aims here for unequal ones.
+///    Where placed nodes contradict each other, L exceeds U. Then the state is max(U, min(u, L)), which is within the
+///    limits for placed nodes too; these are shown at their goals, so only links at them are broken
+///    (`links_beyond_limits` lists them).
+/// 2. Relaxation. Each node moves towards the mean of its neighbours, weighted by one over the squared length of the
+///    link, plus a part of its last motion (second-order Richardson iteration, Golub and Varga 1961: about N steps
+///    instead of N^2 for N nodes in a row), and is kept between L and U. Weights ignore the tissue: limits tell tissues
+///    apart, and moduli that differ by a factor of a million would never settle. The outcome y is brought back within
+///    the limits. Let V be the largest state within them that does not exceed y, and W the smallest that is not below
+///    y, found as U and L are. Nodes go to (V + W) / 2, rounded towards 0. This is within the limits and exactly at the
+///    goals, and equals y where y is within the limits.
 ///
-/// Every number is a function of the numbers of the step before: any order, any number of threads and any backend give
-/// the same bits; a mirrored lattice gives the mirrored ones. With rule.steps = 0 there is only the chain, and
-/// `reached` is false. Nodes without links to a placed one stay. Displacements go to 4096 mm along each axis. Forces
-/// are refused.
+/// Every number depends on numbers of the step before alone, so any number of threads and any backend give the same
+/// bits, and a mirrored lattice gives the mirrored bits. With `StoppingRule::steps` = 0 there is only the chain, and
+/// `Settled::reached` is false. Nodes that no links tie to a placed node stay. Displacements reach up to 4096 mm along
+/// each axis. Forces are refused.
 ///
-/// The model must outlive the simulation. @throws InputError for a lattice whose axes are not at right angles, or
-/// limits without 0
+/// @param model   must outlive the simulation
+/// @param limits  number of threads
+/// @throws InputError for a lattice whose axes are not perpendicular, or limits that do not contain 0
 std::unique_ptr<Simulation> make_cpu_chainmail(const Model& model, Limits limits = {});
 
-/// The same on a CUDA device: the same bits. @throws DeviceError without a device, NotCompiled in a build without CUDA
+/// ChainMail on a CUDA device, with the same bits as on the CPU.
+/// @throws DeviceError without a device
+/// @throws NotCompiled in a build without CUDA
 std::unique_ptr<Simulation> make_cuda_chainmail(const Model& model, int device = 0);
 
 /// A link along an axis whose ends are further apart, nearer or more sheared than its limits allow.
 struct BrokenLink {
-  std::uint32_t node = 0;  ///< lower end
-  int axis = 0;
-  double beyond_mm = 0;  ///< by how much, in the component where that is most
+  std::uint32_t node = 0;  ///< node at the lower end
+  int axis = 0;            ///< 0, 1, 2: along i, j, k
+  double beyond_mm = 0;    ///< by how much the limit is exceeded, mm, in the component where that is most
 
+  /// Whether all numbers are equal.
   friend bool operator==(const BrokenLink&, const BrokenLink&) = default;
 };
 
-/// Walks all links along axes. @param displacement  LPS mm, one a node, host memory @return those beyond their limits
-/// by more than `tolerance_mm`, by rising axis, then node
+/// The links along axes that exceed their limits by more than `tolerance_mm`, ordered by axis, then node.
+/// @param model         model whose links are looked at
+/// @param displacement  LPS mm of each node, in host memory
+/// @param tolerance_mm  mm
 std::vector<BrokenLink> links_beyond_limits(const Model& model, std::span<const glm::vec3> displacement,
                                             double tolerance_mm);
 

@@ -7,18 +7,19 @@
 
 namespace tetwarp::simulate {
 
-/// Which side of a cut a place is on, and whether the cut reaches there.
+/// Tells on which side of a cut a place lies, and whether the cut reaches that place.
 class CutSurface {
  public:
   /// @throws InputError naming the cut: numbers that are not finite, a normal or sweep of length 0, a radius that is
   /// not above 0, a path of less than two points or that only goes along the sweep
   explicit CutSurface(const Cut& cut);
 
-  /// LPS mm from the surface, or from the surface carried on beyond its rim; of either sign. Near the surface it is a
-  /// signed distance, elsewhere it may jump.
+  /// Signed distance, mm, of a place (LPS mm) from the surface, or from the surface continued beyond its rim. It is a
+  /// distance near the surface only; elsewhere it may jump.
   double side(const glm::dvec3& point) const;
 
-  /// Whether the cut goes through a place that `side` says is near it: not beyond its rim.
+  /// Whether the cut itself, not its continuation beyond the rim, passes near a place that `side` says is near the
+  /// surface.
   bool reaches(const glm::dvec3& point) const;
 
  private:

@@ -12,42 +12,51 @@
 
 namespace tetwarp::simulate {
 
-/// How the global step of the CPU solves with the Laplacian of the springs.
+/// How mass-spring simulations solve their linear systems.
 struct MassSpringOptions {
+  /// How the global step on the CPU solves with the Laplacian of the springs.
   enum class Solver : std::uint8_t {
-    automatic,  ///< Cholesky up to kMostNodesForCholesky nodes, conjugate gradients above
-    cholesky,   ///< factored once for each set of placed nodes: its fill grows as nodes^(4/3)
-    pcg,        ///< conjugate gradients, matrix-free
+    automatic,  ///< `cholesky` up to kMostNodesForCholesky nodes, `pcg` above
+    cholesky,   ///< factored once for each set of placed nodes; memory grows as nodes^(4/3)
+    pcg,        ///< preconditioned conjugate gradients, without a matrix
   };
-  Solver solver = Solver::automatic;
+  Solver solver = Solver::automatic;  ///< choice of the solver
 };
+/// Largest number of nodes for which Solver::automatic factors the matrix.
 inline constexpr std::size_t kMostNodesForCholesky = 20'000;
 
-/// Springs along all links of a model, at rest where nothing moved; quasi-static: every call of `advance` goes to a
-/// minimum of the energy, and mass and time play no part.
+/// Springs along all links of a model, without force where nothing has moved. The simulation is quasi-static: every
+/// call of `advance` goes to a minimum of the energy; mass and time play no part.
 ///
-/// Where placed nodes moved, the others first follow: by the rigid motion closest to that of the placed ones, where it
-/// leaves less than a quarter of the squares of their ways (rigid_motion), and for the rest by the harmonic extension.
-/// Then come local/global steps (Liu, Bargteil, O'Brien and Kavan 2013: springs choose their directions, then one
-/// linear system with a constant Laplacian) while they are worth it, and Newton's steps with conjugate gradients from
-/// there on. A line search keeps the energy falling in every step. A step is one linear system. See docs/simulation.md.
+/// When placed nodes have moved, the others first follow: by the rigid motion closest to that of the placed nodes, if
+/// it leaves less than a quarter of their squared motion, and for the remainder by harmonic extension. Then come
+/// local/global steps (Liu, Bargteil, O'Brien and Kavan 2013: springs choose their directions, then one linear system
+/// with a constant Laplacian is solved) as long as they make good progress, and Newton steps with conjugate gradients
+/// after that. A line search makes the energy fall in every step. docs/simulation.md describes the method.
 ///
-/// Nodes that springs do not tie to a placed node stay where they are, whatever the force on them.
+/// Nodes that no springs tie to a placed node stay where they are, whatever force acts on them.
 ///
-/// @param model  must outlive the simulation and stay as it is
-/// @throws InputError for a model whose arrays do not fit each other. The simulation's set_loads refuses forces where
-/// no node is placed
+/// @param model    must outlive the simulation unchanged
+/// @param options  choice of the solver
+/// @param limits   number of threads
+/// @throws InputError for a model whose arrays do not fit each other. The simulation's `set_loads` refuses forces where
+///         no node is placed.
 std::unique_ptr<Simulation> make_cpu_mass_spring(const Model& model, const MassSpringOptions& options = {},
                                                  Limits limits = {});
 
-/// The same on a CUDA device, always with conjugate gradients; displacements stay in device memory.
-/// @throws DeviceError without a device, NotCompiled in a build without CUDA
+/// Mass-spring simulation on a CUDA device, always by conjugate gradients. Displacements stay in device memory.
+/// @throws DeviceError without a device
+/// @throws NotCompiled in a build without CUDA
 std::unique_ptr<Simulation> make_cuda_mass_spring(const Model& model, const MassSpringOptions& options = {},
                                                   int device = 0);
 
-/// Energy of the springs of displaced nodes (LPS mm), N mm: the sum of k/2 (length - rest length)^2.
+/// Energy of the springs, N mm: the sum of k/2 (length - rest length)^2 over all springs.
+/// @param model         model whose springs are summed
+/// @param displacement  LPS mm of each node
 double energy(const Model& model, std::span<const glm::vec3> displacement);
 /// Force of the springs on each node, N, LPS.
+/// @param model         model with the springs
+/// @param displacement  LPS mm of each node
 std::vector<glm::dvec3> net_forces(const Model& model, std::span<const glm::vec3> displacement);
 
 }  // namespace tetwarp::simulate

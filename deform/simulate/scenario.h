@@ -15,115 +15,134 @@
 
 namespace tetwarp::simulate {
 
-enum class Method : std::uint8_t { chainmail, mass_spring };
+/// How a scenario is simulated.
+enum class Method : std::uint8_t {
+  chainmail,   ///< links within limits (`make_cpu_chainmail`)
+  mass_spring  ///< springs in equilibrium (`make_cpu_mass_spring`)
+};
 
-/// Cells that a tissue fills: those that meet every condition which it has.
+/// A tissue and the cells that it fills: those that meet all of its conditions.
 struct TissueClass {
-  Tissue tissue;
-  std::optional<HuRange> hu;
-  std::vector<std::int64_t> labels;  ///< empty: whatever the label
+  Tissue tissue;                     ///< its properties
+  std::optional<HuRange> hu;         ///< mean HU of a cell; empty: any
+  std::vector<std::int64_t> labels;  ///< labels of a cell; empty: any
 };
 
-/// Vertices of a zone stay at rest, in every phase.
+/// Vertices that do not move in any phase.
 struct Held {
-  Zone zone;
-  std::string entry;  ///< what messages call it: `hold[1] "spine"`
+  Zone zone;          ///< which vertices
+  std::string entry;  ///< name of the entry in messages: `hold[1] "spine"`
 };
 
-/// A hold on some tissue, as of forceps.
+/// A grip on some tissue, as of forceps.
 struct Handle {
-  Place at;
-  Length radius;  ///< no vertex within it: the nearest vertex is taken
+  Place at;       ///< middle of the grip
+  Length radius;  ///< vertices up to this far away are gripped; if there are none, the nearest vertex
 };
+/// A rotation about an axis through a place.
 struct Rotation {
-  Place about;
-  glm::dvec3 axis;  ///< LPS, any length
-  double degrees;   ///< by the right hand
+  Place about;      ///< a place on the axis
+  glm::dvec3 axis;  ///< direction of the axis in LPS, of any length
+  double degrees;   ///< angle in degrees, by the right-hand rule
 };
-/// N, LPS, over all that is moved; each vertex takes the same share.
+/// A force that all moved vertices share equally.
 struct Force {
-  glm::dvec3 newton;
+  glm::dvec3 newton;  ///< total force, N, in LPS
 };
 
+/// One motion or force in a phase.
 struct Move {
-  std::variant<Zone, Handle> what;
-  std::variant<Shift, Rotation, Force> how;
-  std::string entry;  ///< what messages call it: `phases[0].move[1] "left lip"`
+  std::variant<Zone, Handle> what;           ///< the vertices that are moved
+  std::variant<Shift, Rotation, Force> how;  ///< what moves them
+  std::string entry;                         ///< name of the entry in messages: `phases[0].move[1] "left lip"`
 };
 
+/// A plane cut before the patient is known.
 struct PlaneCutPlan {
-  Place at;
-  glm::dvec3 normal;
+  Place at;           ///< a place on the plane
+  glm::dvec3 normal;  ///< in LPS, of any length
 };
+/// A disc cut before the patient is known.
 struct DiscCutPlan {
-  Place at;
-  glm::dvec3 normal;
-  Length radius;
+  Place at;           ///< centre of the disc
+  glm::dvec3 normal;  ///< in LPS, of any length
+  Length radius;      ///< radius of the disc
 };
+/// A swept cut before the patient is known.
 struct SweptCutPlan {
-  std::vector<Place> path;
-  glm::dvec3 along;
-  Length depth;
-  bool is_closed = false;
+  std::vector<Place> path;  ///< at least two places that the blade follows
+  glm::dvec3 along;         ///< direction in which the blade cuts, in LPS, of any length
+  Length depth;             ///< how deep it cuts
+  bool is_closed = false;   ///< whether the last place is joined to the first
 };
 /// A cut before the patient is known.
 struct CutPlan {
-  std::string name;
+  std::string name;  ///< name that phases and messages use
+  /// The surface.
   std::variant<PlaneCutPlan, DiscCutPlan, SweptCutPlan> shape;
 };
 
-/// A part of a scenario: from wherever the one before led to, moves go to their goals in `frames` steps of one size.
-/// What was moved before and is not moved now is let go.
+/// A part of a scenario. From the state in which the phase before ended, moves go to their goals in `frames` equal
+/// steps. Vertices that an earlier phase moved and this one does not are free again.
 struct Phase {
-  std::string name;
-  std::vector<Move> moves;
-  std::vector<std::string> closed_cuts;  ///< names; all others are open
-  int frames = 1;
+  std::string name;                      ///< name that messages use
+  std::vector<Move> moves;               ///< what is moved
+  std::vector<std::string> closed_cuts;  ///< names of the cuts that are closed in this phase; all others are open
+  int frames = 1;                        ///< number of steps
 };
 
-/// What is done to a patient, whoever it is.
+/// What is done to a patient, described so that it fits any patient.
 struct Scenario {
-  std::string name;
-  Method method = Method::chainmail;
-  std::int64_t cell_size = 8;  ///< voxels
-  double body_above_hu = -400;
-  std::vector<TissueClass> tissues;  ///< the first that fits a cell is the cell's; the last has no condition
-  std::vector<Held> hold;
-  std::vector<CutPlan> cuts;
-  std::vector<Phase> phases;
-  StoppingRule stop;
+  std::string name;                   ///< name that messages use
+  Method method = Method::chainmail;  ///< how it is simulated
+  std::int64_t cell_size = 8;         ///< distance of lattice vertices, voxels
+  double body_above_hu = -400;        ///< cells of higher mean HU can belong to the body
+  std::vector<TissueClass> tissues;   ///< a cell gets the first whose conditions it meets; the last has no condition
+  std::vector<Held> hold;             ///< what does not move
+  std::vector<CutPlan> cuts;          ///< all cuts of the scenario
+  std::vector<Phase> phases;          ///< what is done, in this order
+  StoppingRule stop;                  ///< when a frame has settled
 };
 
-/// Of all phases.
+/// Number of frames of all phases.
 int frame_count(const Scenario& scenario);
+/// Whether a cut is open in a phase.
 bool is_open(const CutPlan& cut, const Phase& phase);
 
-/// Tissue of each cell, as numbers of Scenario::tissues. @throws InputError for labels where there is no label volume
+/// For each cell, i fastest, the index of its tissue in `Scenario::tissues`.
+/// @throws InputError for conditions on labels where the patient has no label volume
 std::vector<std::uint8_t> tissue_of_cells(const Scenario& scenario, const Patient& patient);
 
-/// The cuts that are open in a phase. @throws InputError for parts of a body where there is none
+/// The cuts that are open in a phase, in mm.
+/// @throws InputError for lengths in parts of the body where the patient has no body
 std::vector<Cut> open_cuts(const Scenario& scenario, const Phase& phase, const Patient& patient);
 
 /// What a phase does to which vertices.
 ///
-/// Hold wins: a held vertex is not moved. A vertex in several moves needs the same goal from each of them; forces on it
+/// A held vertex is never moved. A vertex in several moves needs the same goal from each of them. Forces on a vertex
 /// add up, and a move with a goal excludes them.
 class PhaseLoads {
  public:
-  /// @throws InputError naming the entries: moves that disagree or take no vertex that is free, forces in chainmail,
-  /// nothing held or moved in mass-spring
+  /// @throws InputError, which names the entries, for moves that disagree or move no free vertex; for forces in
+  ///         ChainMail; for a mass-spring phase in which nothing is held or moved
   PhaseLoads(const Scenario& scenario, const Phase& phase, const Patient& patient);
 
-  /// Loads of the nodes of a model when `part` (0 to 1) of the way is gone. Turns follow their arc.
-  /// @param start  displacements of the model's nodes when the phase began
+  /// Loads of the nodes of a model when `part` (0 to 1) of the way is done. Rotations follow their arc.
+  /// @param part   0 to 1
+  /// @param model  model of the phase
+  /// @param start  displacement of each node when the phase began, LPS mm
   Loads at(double part, const Model& model, std::span<const glm::vec3> start) const;
 
-  /// Whether a vertex goes along an arc: else its way is straight.
+  /// Whether some vertex moves along an arc; otherwise all move along straight lines.
   bool turns() const;
-  std::size_t held() const { return held_; }                        ///< vertices
-  std::size_t moved() const { return moved_; }                      ///< vertices with a goal
-  std::size_t pulled() const;                                       ///< vertices with a force and no goal
-  const std::vector<std::string>& notes() const { return notes_; }  ///< for people: holds without a vertex
+  /// Number of held vertices.
+  std::size_t held() const { return held_; }
+  /// Number of vertices with a goal.
+  std::size_t moved() const { return moved_; }
+  /// Number of vertices with a force and no goal.
+  std::size_t pulled() const;
+  /// Remarks for people, such as a hold that holds no vertex.
+  const std::vector<std::string>& notes() const { return notes_; }
 
  private:
   void hold(const Scenario& scenario, const Patient& patient);
@@ -132,19 +151,20 @@ class PhaseLoads {
   std::vector<std::size_t> free_vertices(const Move& move, const Patient& patient) const;
   glm::dvec3 displacement(std::size_t move, const glm::dvec3& point, double part) const;
 
-  /// A move in mm.
+  /// A move of vertices, in mm.
   struct Way {
-    glm::dvec3 by{0};
-    glm::dvec3 about{0}, axis{0};  ///< axis: unit length; null: no turn
-    double radians = 0;
+    glm::dvec3 by{0};  ///< shift, LPS mm
+    /// A point on the axis of rotation, LPS mm, and the unit vector of the axis; 0: no rotation.
+    glm::dvec3 about{0}, axis{0};
+    double radians = 0;  ///< angle of the rotation
   };
   static constexpr std::int32_t kFree = -1, kHeld = -2;
 
   AffineMap vertex_point_;
   glm::i64vec3 size_;
-  std::vector<Way> ways_;             ///< of the phase's moves
-  std::vector<std::int32_t> way_of_;  ///< of each vertex, or kFree or kHeld
-  std::vector<glm::vec3> force_;      ///< of each vertex; empty: none
+  std::vector<Way> ways_;             ///< of the moves of the phase
+  std::vector<std::int32_t> way_of_;  ///< for each vertex an index into `ways_`, or kFree or kHeld
+  std::vector<glm::vec3> force_;      ///< on each vertex, N; empty: none
   std::size_t held_ = 0, moved_ = 0;
   std::vector<std::string> notes_;
 };

@@ -13,48 +13,56 @@
 
 namespace tetwarp::simulate {
 
-/// How a scenario is simulated, and where: one of the factories of a method.
+/// Makes the simulation of a model: one of the factories of a method and backend.
 using MakeSimulation = std::function<std::unique_ptr<Simulation>(const Model&)>;
 
 /// What became of a frame.
 struct Frame {
-  int number = 0;         ///< from 1, over all phases
-  std::size_t phase = 0;  ///< from 0
-  bool ends_phase = false;
-  Settled settled;
+  int number = 0;           ///< from 1, counted over all phases
+  std::size_t phase = 0;    ///< index of its phase
+  bool ends_phase = false;  ///< whether it is the last frame of its phase
+  Settled settled;          ///< how the simulation settled
 };
 
 /// A scenario that is played on a patient, frame by frame.
 ///
-/// Where other cuts are open than in the phase before, the model is made anew: vertices keep their places, and copies
-/// that a cut needs begin where the tissue was that they belong to (`nodes_before`). So a cut that stays open stays as
-/// wide as it is while another is made or closed.
+/// Where the open cuts are not those of the phase before, the model is made anew. Vertices keep their places, and
+/// copies that a cut needs begin where their tissue was (`nodes_before`). So a cut that stays open keeps its width
+/// while another is made or closed.
 class ScenarioRun {
  public:
-  /// Refers to the scenario and the patient. @throws InputError for a scenario that cannot be played on this patient,
-  /// of any phase: before anything is simulated
+  /// Checks all phases before anything is simulated. Scenario and patient must outlive this object.
+  /// @throws InputError for a scenario that cannot be played on this patient
   ScenarioRun(const Scenario& scenario, const Patient& patient, MakeSimulation make);
   ScenarioRun(const ScenarioRun&) = delete;
   ScenarioRun& operator=(const ScenarioRun&) = delete;
 
+  /// Number of frames of all phases.
   int frames() const;
+  /// Whether the last frame was simulated.
   bool is_done() const { return done_ == frames(); }
-  /// Simulates the next frame. @throws Cancelled, and what the simulation throws
+  /// Simulates the next frame.
+  /// @throws Cancelled and whatever the simulation throws
   Frame next(const Control& control = {});
 
-  /// Sends volumes through the field as it is after the last frame: with `next` in turn, the loop of an interactive
-  /// program. Where the simulation keeps displacements on a device they stay there, unless open cuts divide cells;
-  /// nothing is allocated a frame once sizes repeat. @throws as Resampler does
+  /// Sends volumes through the field after the last frame. Calling this and `next` in turn is the loop of an
+  /// interactive program. Displacements that the simulation keeps on a device stay there, unless open cuts divide
+  /// cells. Frames of the same sizes allocate nothing.
+  /// @throws InputError and others, as `Resampler::set_field` and `Resampler::resample`
   Report resample(Resampler& resampler, std::span<const Target> targets, Outside outside = Outside::background,
                   const Maps& maps = {}, const Control& control = {});
 
+  /// The loads of a phase, by index.
   const PhaseLoads& loads(std::size_t phase) const { return loads_[phase]; }
-  const std::vector<std::uint8_t>& tissues() const { return tissue_of_cell_; }  ///< of each cell
-  const Model& model() const { return model_; }                                 ///< of the last frame's phase
-  const Simulation& simulation() const { return *simulation_; }                 ///< after the last frame
-  /// LPS mm of each node of the model, in host memory; at rest before the first frame.
+  /// For each cell, i fastest, the index of its tissue in `Scenario::tissues`.
+  const std::vector<std::uint8_t>& tissues() const { return tissue_of_cell_; }
+  /// The model of the phase of the last frame.
+  const Model& model() const { return model_; }
+  /// The simulation after the last frame.
+  const Simulation& simulation() const { return *simulation_; }
+  /// Displacement of each node of the model, LPS mm, in host memory; 0 before the first frame.
   std::vector<glm::vec3> displacement() const;
-  /// As it is after the last frame: cells that open cuts divide are replaced by a mesh.
+  /// The field after the last frame. A mesh takes the place of cells that open cuts divide.
   VertexField field() const;
 
  private:
@@ -67,11 +75,11 @@ class ScenarioRun {
   MakeSimulation make_;
   std::vector<std::uint8_t> tissue_of_cell_;
   std::vector<PhaseLoads> loads_;
-  DividedLattice division_;  ///< by the cuts that are open
+  DividedLattice division_;  ///< of the lattice by the open cuts
   Model model_;
   std::unique_ptr<Simulation> simulation_;
-  std::vector<glm::vec3> start_;  ///< displacements when the phase began
-  VertexField field_;             ///< that the resampler of the last frame looks at, with open cuts
+  std::vector<glm::vec3> start_;  ///< displacement of each node when the phase began, LPS mm
+  VertexField field_;             ///< field that the resampler of the last frame refers to, where cuts are open
   std::size_t phase_ = 0;
   int frame_in_phase_ = 0, done_ = 0;
 };

@@ -71,8 +71,9 @@ class TetrahedronSplitter {
   std::vector<Vertex> vertices_;
   std::vector<Tetrahedron> tetrahedra_;
   std::unordered_set<Triangle, Hash> severed_;
-  std::vector<double> side_;                                   ///< of each vertex, of the cut at hand
-  std::unordered_map<Triangle, std::uint32_t, Hash> on_edge_;  ///< of edges (a, b, 0): the vertex there, likewise
+  std::vector<double> side_;  ///< of each vertex: on which side of the present cut it lies
+  /// Of an edge, as (a, b, 0): the vertex where the present cut goes through it.
+  std::unordered_map<Triangle, std::uint32_t, Hash> on_edge_;
 };
 
 }  // namespace tetwarp::simulate

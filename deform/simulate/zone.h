@@ -14,80 +14,98 @@
 
 namespace tetwarp::simulate {
 
-/// What numbers of a scenario are measured by: mm, or the box of the patient's body, so that they carry over to others.
-enum class Unit : std::uint8_t { mm, body };
+/// Unit of a length or place in a scenario.
+enum class Unit : std::uint8_t {
+  mm,   ///< millimetres
+  body  ///< parts of the box of the patient's body, so that a scenario fits other patients
+};
 
-/// A point: LPS mm, or parts of the body's box along L, P, S (0 is its right, front and lower side).
+/// A point: LPS mm, or parts of the body's box along L, P, S, where 0 is the right, front and lower side.
 struct Place {
-  glm::dvec3 at{0};
-  Unit unit = Unit::mm;
+  glm::dvec3 at{0};      ///< coordinates
+  Unit unit = Unit::mm;  ///< their unit
 };
 /// A radius or depth: mm, or parts of the longest side of the body's box.
 struct Length {
-  double value = 0;
-  Unit unit = Unit::mm;
+  double value = 0;      ///< the number
+  Unit unit = Unit::mm;  ///< its unit
 };
 /// A displacement: LPS mm, or parts of the sides of the body's box along L, P, S.
 struct Shift {
-  glm::dvec3 by{0};
-  Unit unit = Unit::mm;
+  glm::dvec3 by{0};      ///< components
+  Unit unit = Unit::mm;  ///< their unit
 };
 
-/// @throws InputError for parts of a body where the patient has none
+/// A place in LPS mm.
+/// @throws InputError for parts of the body where the patient has no body
 glm::dvec3 point_of(const Place& place, const Patient& patient);
+/// A length in mm.
+/// @throws InputError for parts of the body where the patient has no body
 double mm_of(const Length& length, const Patient& patient);
+/// A displacement in LPS mm.
+/// @throws InputError for parts of the body where the patient has no body
 glm::dvec3 mm_of(const Shift& shift, const Patient& patient);
 
+/// A ball.
 struct Sphere {
-  Place at;
-  Length radius;
+  Place at;       ///< its centre
+  Length radius;  ///< its radius
 };
-/// Sides along L, P, S; in whichever order the corners are.
+/// A box with sides along L, P, S.
 struct Box {
-  Place from, to;
+  Place from,  ///< a corner
+      to;      ///< the opposite corner; either may be the lower one
 };
-/// The side of a plane that its normal points to, and the plane.
+/// A plane, and the side to which its normal points.
 struct HalfSpace {
-  Place at;
-  glm::dvec3 normal;  ///< LPS, any length
+  Place at;           ///< a place on the plane
+  glm::dvec3 normal;  ///< in LPS, of any length
 };
-/// From `low` up to but not `high`.
+/// HU from `low` up to, but not including, `high`.
 struct HuRange {
-  double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
+  double low = -std::numeric_limits<double>::infinity(),  ///< in HU; included
+      high = std::numeric_limits<double>::infinity();     ///< in HU; not included
 
+  /// Whether a value lies in the range.
   bool contains(double hu) const { return hu >= low && hu < high; }
 };
+/// Vertices with one of these labels.
 struct Labels {
-  std::vector<std::int64_t> values;
+  std::vector<std::int64_t> values;  ///< the labels
 };
-/// Vertices without neighbours on some side.
+/// Vertices that lack a neighbour on some side of the lattice.
 struct Border {};
-/// Vertices of the body's cells.
+/// Vertices of the cells of the body.
 struct Body {};
 
 struct Zone;
+/// Vertices that lie in all parts.
 struct AllOf {
-  std::vector<Zone> parts;
+  std::vector<Zone> parts;  ///< the zones
 };
+/// Vertices that lie in at least one part.
 struct AnyOf {
-  std::vector<Zone> parts;
+  std::vector<Zone> parts;  ///< the zones
 };
+/// Vertices that do not lie in the part.
 struct Not {
-  std::vector<Zone> part;  ///< one
+  std::vector<Zone> part;  ///< one zone
 };
 
-/// Some vertices of a lattice: what a scenario calls a region.
+/// A set of vertices of a lattice. Scenario files call it a region.
 struct Zone {
+  /// How the set is described.
   std::variant<Sphere, Box, HalfSpace, HuRange, Labels, Border, Body, AllOf, AnyOf, Not> shape;
 };
 
-/// For each vertex of the patient's lattice, i fastest, whether it is in the zone.
-/// @throws InputError for a label without label volume, or parts of a body where there is none
+/// For each vertex of the patient's lattice, i fastest: 1 if it lies in the zone, else 0.
+/// @throws InputError for labels where the patient has no label volume, or parts of the body where it has no body
 std::vector<std::uint8_t> select(const Zone& zone, const Patient& patient);
 
-/// Vertices not further than `radius_mm` from a point; where there is none, the nearest vertex (of several, the first).
-/// @throws InputError where that is further away than a cell is wide from corner to corner: the place is not in the
-/// lattice
+/// Numbers of the vertices up to `radius_mm` from a point (LPS mm). If there are none, the nearest vertex; of several,
+/// the first.
+/// @throws InputError if the nearest vertex is further away than the diagonal of a cell, because the point lies outside
+///         the lattice
 std::vector<std::size_t> grasp(const glm::dvec3& point, double radius_mm, const Patient& patient);
 
 }  // namespace tetwarp::simulate

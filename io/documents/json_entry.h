@@ -14,7 +14,7 @@
 
 namespace tetwarp {
 
-/// Numbers that are taken: from `low` to `high`, `low` itself only where it is not `above`.
+/// The numbers that are accepted: from `low` to `high`; `low` itself unless `above` is set.
 struct NumberRange {
   double low, high;
   bool above = false;
@@ -42,19 +42,21 @@ class JsonEntry {
   double number(const NumberRange& range) const;
   std::int64_t whole_number(std::int64_t low, std::int64_t high) const;
   bool truth() const;
-  /// Not empty, and at most 200 characters.
+  /// The value as a text, which is not empty and has at most 200 characters.
   const std::string& text() const;
-  /// Three numbers.
+  /// The value as three numbers in a range.
   glm::dvec3 vector(const NumberRange& range) const;
-  /// Three numbers, not all 0. @return so scaled that the largest is 1
+  /// The value as three numbers that are not all 0.
+  /// @return the direction, scaled so that its largest component is 1 in size
   glm::dvec3 direction() const;
   std::vector<JsonEntry> items(std::size_t fewest, std::size_t most) const;
 
-  /// Refuses keys that are not in the list. @param known  of an object
+  /// Refuses keys of an object that are not in the list.
   void only(std::span<const char* const> known) const;
   bool has(const char* key) const;
   JsonEntry at(const char* key) const;
-  /// The key of a list of which an object has one and no second. @return its number in the list
+  /// The only key of a list that an object has; none or two are refused.
+  /// @return its number in the list
   std::size_t one_of(std::span<const char* const> keys) const;
 
  private:

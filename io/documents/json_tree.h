@@ -38,8 +38,9 @@ std::string printable(std::string_view text);
 /// objects that lie more than 64 deep in each other
 JsonTree parse_json(std::string_view bytes, const std::string& name);
 
-/// Parses a file of at most 1 MiB. @param kind  what messages call it: "a scenario"
-/// @throws InputError as above, or for a file that cannot be read
+/// Parses a file of at most 1 MiB.
+/// @param kind  what messages call it: "a scenario"
+/// @throws InputError as `parse_json`, or for a file that cannot be read
 JsonTree read_json(const std::filesystem::path& path, const std::string& kind);
 
 }  // namespace tetwarp

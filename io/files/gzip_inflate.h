@@ -20,20 +20,20 @@ using PlainBytes = std::function<bool(std::uint64_t offset, std::span<std::byte>
 /// The most plain bytes that are held beside the caller's.
 constexpr std::uint64_t kInflateAtMost = std::uint64_t{1} << 30;
 
-/// The `size` plain bytes of the gzip data (RFC 1952) that a file has from `begin` on, inflated by libdeflate: twice as
-/// fast as zlib, but it wants a member, and room for what is in it, whole in memory.
+/// The `size` plain bytes of the gzip data (RFC 1952) that begin at byte `begin` of a file, inflated by libdeflate. It
+/// is twice as fast as zlib, but needs a whole member and its content in memory.
 ///
-/// Members that all state their size (`write_gzip`) are read and inflated when a part of them is asked for. Any other
-/// file is inflated here and held: `size` bytes, and while that lasts the compressed file. Every CRC of what is
-/// inflated is checked. Nothing but zeros may follow the last member (tapes and archives fill up with them; gzip takes
-/// them likewise).
-/// @return  empty where zlib has to read the file, or to say what is wrong with it (GzipStream): damage, more or fewer
-///          than `size` plain bytes, something else behind them; or `size` above `kInflateAtMost` in members that do
-///          not state theirs
+/// If all members state their size (as `write_gzip` writes them) each is read and inflated when a part of it is first
+/// read. Any other file is inflated here and held: `size` bytes, and meanwhile the compressed file. Every CRC of what
+/// is inflated is checked. Only zeros may follow the last member, as tapes and archives append them; gzip accepts these
+/// too.
+/// @return  empty where zlib has to read the file, or to say what is wrong with it (GzipStream): damage, another number
+///         than `size` of plain bytes, other data behind them, or `size` above `kInflateAtMost` in members that do not
+///         state theirs
 /// @throws InputError when the file cannot be opened
 PlainBytes inflate_at_once(const std::filesystem::path& path, std::uint64_t size, std::uint64_t begin = 0);
 
-/// The same bytes one after the other, inflated by zlib, whatever their number.
+/// Plain bytes of a gzip file in order, inflated by zlib, whatever their number.
 class GzipStream {
  public:
   /// @throws InputError when the file cannot be opened
@@ -45,8 +45,8 @@ class GzipStream {
   /// Fills `bytes`. @throws InputError for damage, or too few bytes
   void read(std::span<std::byte> bytes);
   void skip(std::uint64_t count);
-  /// To be called behind the last byte that is wanted. @throws InputError for more bytes, damage in what ends a member,
-  /// or anything but zeros behind the last member
+  /// To be called after the last byte was read.
+  /// @throws InputError for more bytes, a damaged end of a member, or anything but zeros behind the last member
   void finish();
 
  private:

@@ -3,8 +3,8 @@
 
 #pragma once
 
-// Private to io/: what most runs of a program do not need lies in a library of its own, which is loaded when it is
-// first asked for: the libraries that it brings along would take their time of every start.
+// Private to io/: functions in libraries ("modules") that are loaded when they are first called. Most runs need none of
+// them, and loading what they link would slow the start of each run.
 #include <string>
 
 namespace tetwarp {

@@ -12,8 +12,8 @@
 
 namespace tetwarp {
 
-/// Of an attached NRRD whose data are raw or gzip; none for text, hexadecimal digits and bzip2.
-/// @param offset  receives where the data begin, "line skip" and "byte skip" counted
+/// The layout of an attached NRRD whose data are raw or gzip; nothing for text, hexadecimal digits and bzip2.
+/// @param offset  receives where the data begin, with "line skip" and "byte skip" counted
 /// @throws InputError for fields that contradict each other or the file
 std::optional<ValueLayout> nrrd_layout(const std::filesystem::path& path, const TextHeader& text,
                                        const ImageHeader& header, std::uint64_t& offset);

@@ -29,13 +29,14 @@ struct TextHeader {
 ///         whose lengths are not mm
 TextHeader read_text_header(const std::filesystem::path& path, ImageFormat format);
 
-/// Whether the voxels are stored as something else than the plain bytes.
+/// Whether the voxels are stored otherwise than as plain bytes.
 bool is_encoded(const TextHeader& header, ImageFormat format);
 /// Whether binary MHA has its values in big endian.
 bool is_big_endian(const TextHeader& header);
-/// Of an MHA file. @throws InputError where HeaderSize or CompressedDataSize is not what the file has
+/// Checks the sizes that the header of an MHA file states.
+/// @throws InputError where HeaderSize or CompressedDataSize is not what the file has
 void require_stated_sizes(const std::filesystem::path& path, const TextHeader& header);
-/// Whether they are one zlib stream: compressed MHA, little endian.
+/// Whether the voxels are one zlib stream: compressed MHA, little endian.
 bool is_zlib(const TextHeader& header, ImageFormat format);
 
 }  // namespace tetwarp

@@ -19,7 +19,7 @@ struct GmshForm {
   bool tags_are_sizes = false;           ///< not ints: in MSH 4.1
 };
 
-/// $NAME to $EndNAME; the bytes between them.
+/// A section of a Gmsh file: the bytes between $NAME and $EndNAME.
 struct GmshSection {
   std::string name;
   std::size_t begin = 0, end = 0;
@@ -47,12 +47,14 @@ class GmshNumbers {
   std::int64_t text_integer();          ///< written as text in a binary file, too
   void skip_tags(std::uint64_t count);  ///< of numbers as of `tag`
 
-  /// Checks, before anything is allocated for them, that so many items may follow.
-  /// @param tags, reals  of one item
+  /// Checks that the section has room for so many items, before memory for them is allocated.
+  /// @param items  number of items
+  /// @param tags   tags of one item
+  /// @param reals  real numbers of one item
   void require_room(std::uint64_t items, std::uint64_t tags, std::uint64_t reals) const;
   void require_end();
   std::string here() const;
-  /// From where these are, in another form.
+  /// The numbers from here on, read in another form.
   GmshNumbers in(const GmshForm& form) const;
 
  private:

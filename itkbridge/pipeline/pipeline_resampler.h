@@ -13,51 +13,58 @@
 
 namespace tetwarp {
 
-/// A field that a filter was given, forward or pull. Equal owners are the same field, unchanged.
+/// A field that a filter was given, forward or pull. Two objects with the same owner are the same field, unchanged.
 struct HeldField {
-  std::variant<FieldView, PullFieldView> view;
-  std::shared_ptr<const void> owner;  ///< keeps what the view points to
+  std::variant<FieldView, PullFieldView> view;  ///< the field
+  std::shared_ptr<const void> owner;            ///< keeps alive what the view points to
 };
 
-/// Where a filter's work is done.
+/// Where a filter works.
 struct PipelineOptions {
-  std::string backend = "auto";  ///< auto, cpu or cuda
-  int device = 0;
-  int threads = 0;
-  std::uint64_t device_memory = 0;  ///< bytes, `Limits::memory`
+  std::string backend = "auto";     ///< "auto", "cpu" or "cuda"
+  int device = 0;                   ///< number of the CUDA device
+  int threads = 0;                  ///< number of CPU threads; 0: all that this process may use
+  std::uint64_t device_memory = 0;  ///< bytes, see `Limits::memory`
 
+  /// Whether all options are equal.
   friend bool operator==(const PipelineOptions&, const PipelineOptions&) = default;
 };
 
-/// The resampler of a filter. It keeps the field that it was given, so that regions and images that come later need not
-/// prepare it again; and the next field of the same direction, output and options goes into what memory the one before
-/// took. With `auto` the CPU takes over where CUDA is missing or fails, with the same bits; the process warns of that
-/// once.
+/// The resampler of a filter. It keeps its field, so that later regions and images need not prepare it again. The next
+/// field with the same direction, output and options reuses the memory of the one before. With backend "auto" the CPU
+/// takes over where CUDA is missing or fails, with the same bits, and the process warns once.
 class PipelineResampler {
  public:
   /// Makes the resampler and gives it the field, unless it has it already.
-  /// @return whether there was something to do
-  /// @throws itk::ExceptionObject
+  /// @param filter   filter that warnings and exceptions name
+  /// @param output   output grid
+  /// @param field    forward or pull field
+  /// @param options  where to work
+  /// @param share    part of the filter's progress
+  /// @return whether anything had to be done
+  /// @throws itk::ExceptionObject for a field or an output that a resampler refuses, or a backend that cannot be used
   bool set_field(itk::ProcessObject& filter, const Geometry& output, const HeldField& field,
                  const PipelineOptions& options, ProgressShare share);
 
-  /// What of a source a region of the output needs; whole voxels of it, at least one. `set_field` comes first.
+  /// The voxels of a source grid that an output region needs, at least one. `set_field` must have been called.
   Region source_region(const itk::ProcessObject& filter, const Geometry& source, const Region& output) const;
 
-  /// `Resampler::resample`. @throws itk::ExceptionObject
+  /// `Resampler::resample`, as a part of the filter's progress.
+  /// @throws itk::ExceptionObject
   Report resample(itk::ProcessObject& filter, const Region& region, std::span<const Target> targets, const Maps& maps,
                   ProgressShare share);
 
-  /// "cpu" or "cuda", of the last field; empty before.
+  /// Where the last field went, "cpu" or "cuda"; empty before the first.
   const std::string& backend() const { return backend_.name; }
 
  private:
+  /// Whether the resampler has this field, for this output and these options.
   bool holds(const Geometry& output, const HeldField& field, const PipelineOptions& options) const;
-  /// Whether the resampler at hand can take the field, and is not the one that stands in for a device that failed.
+  /// Whether the present resampler can take the field. One that stands in for a device that failed cannot.
   bool takes(const Geometry& output, const HeldField& field, const PipelineOptions& options) const;
   void make(const std::string& wanted, const Control& control);
   void give_field(const Control& control);
-  /// In the handler of an error of the device: the CPU takes the field, or the error goes on if CUDA was asked for.
+  /// Handles an error of the device: the CPU takes the field, or, with backend "cuda", the error is thrown again.
   void fall_back(const itk::ProcessObject& filter, const Control& control, const DeviceError& error);
 
   Backend backend_;

@@ -36,8 +36,8 @@ std::set<DcmTagKey> varying_acquisition(const std::vector<DcmDataset*>& slices, 
 void carry_over(DcmItem& target, DcmDataset& source, const std::set<DcmTagKey>& varying);
 
 /// Copies what an object beside a derived series says of patient, study and frame of reference: groups 0010, 0012 and
-/// 0038, and the attributes of General Study (PS3.3 C.7.2.1) but Referenced Study Sequence, of a retired class.
-/// Private attributes go, as above.
+/// 0038, and the attributes of General Study (PS3.3 C.7.2.1), except Referenced Study Sequence, of a retired class.
+/// Private attributes are left out, within sequences too.
 void carry_patient_and_study(DcmItem& target, DcmDataset& source);
 /// Copies one attribute, or several, if they are there, as `carry_over` does: without private ones within their items.
 void carry_attribute(DcmItem& target, DcmItem& source, const DcmTagKey& tag);

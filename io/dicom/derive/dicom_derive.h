@@ -31,11 +31,11 @@ struct DerivedSeries {
   std::string source_frame_of_reference_uid;         ///< made up where the source has none
   std::string number, description;                   ///< Series Number and Description
   std::vector<std::string> sop_class, sop_instance;  ///< of the source's slices
-  std::vector<int> frame;                            ///< likewise, from 1; 0: the slice is a file
-  std::vector<int> instance_number;                  ///< of the output's slices, each once
+  std::vector<int> frame;                    ///< frame of each slice of the source, from 1; 0: the slice is a file
+  std::vector<int> instance_number;          ///< of the output's slices, each once
   std::vector<std::size_t> header;           ///< of the output's slices, the source's whose header each takes over
   std::set<DcmTagKey> varying;               ///< see varying_acquisition
-  std::optional<Deidentifier> deidentifier;  ///< what is above went through it
+  std::optional<Deidentifier> deidentifier;  ///< de-identified the members before this one
   std::optional<PaddingRange> padding;       ///< HU: the source's, where all slices agree and int16 can hold it
 };
 

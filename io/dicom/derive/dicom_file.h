@@ -43,8 +43,11 @@ std::string write_dicom_file(const std::filesystem::path& path, DcmDataset& data
                              std::span<const std::int16_t> voxels,
                              DicomEncoding encoding = DicomEncoding::uncompressed);
 
-/// The same of a data set without Pixel Data; a file that is there is replaced. Implicit VR Little Endian: in the
-/// explicit syntaxes a decimal string ends at 65534 bytes, which the points of a contour may need more of.
+/// Writes a data set without Pixel Data as a DICOM file (PS3.10), with a hash of everything else in it as SOP Instance
+/// UID. An existing file is replaced. The transfer syntax is Implicit VR Little Endian: explicit ones limit a decimal
+/// string to 65534 bytes, and the points of a contour may need more.
+/// @return the SOP Instance UID
+/// @throws Error naming the file and the system's reason
 std::string write_dicom_file(const std::filesystem::path& path, DcmDataset& dataset);
 /// What Pixel Data are made of: VR OB or OW (PS3.5 A.2).
 enum class DicomWords : std::uint8_t { bytes, of_16_bits };

@@ -18,8 +18,8 @@ namespace tetwarp {
 /// SOP Class UID of a DICOM file; empty for what is none or cannot be read.
 std::string sop_class_of(const std::filesystem::path& path);
 
-/// Reads the object up to its Pixel Data, and de-identifies it if that is asked for.
-/// @throws InputError for a file that is no longer what it was
+/// Reads the object up to its Pixel Data, and de-identifies it if the derivation says so.
+/// @throws InputError for a file that changed since its header was read
 DcmDataset& read_source(DcmFileFormat& format, const DicomAlong& along);
 
 /// Puts patient, study, series, frame of reference, equipment and derivation into the empty item `target`: of the

@@ -17,7 +17,8 @@ struct Registration {
   const DicomHeaders& source;
   const DerivedSeries& series;
   const DicomDerivation& derivation;
-  /// SOP Instance UIDs of the derived slices, asked for when the last vector is there; those not written are empty.
+  /// Gives SOP Instance UIDs of the derived slices, empty for those that are not written. It is called after the last
+  /// vector.
   std::function<std::vector<std::string>()> instances;
 };
 

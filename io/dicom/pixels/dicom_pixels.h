@@ -22,12 +22,16 @@ namespace tetwarp {
 /// @throws InputError naming the file for data that are truncated, damaged or of another size than the header says
 std::vector<std::uint16_t> decode_pixels(DcmDataset& data, const DicomFileHeader& header);
 
-/// The same of the fragments of one compressed frame, without the Basic Offset Table (PS3.5 A.4): that is often wrong,
-/// and says nothing where there is one frame.
+/// Decodes the fragments of one compressed frame. It does not use the Basic Offset Table (PS3.5 A.4), which is often
+/// wrong and superfluous for one frame.
+/// @return one word a pixel, rows top to bottom, every bit as stored
+/// @throws InputError naming the file for data that are truncated, damaged or of another size than the header states
 std::vector<std::uint16_t> decode_frame(std::span<const std::span<const std::byte>> fragments,
                                         const DicomFileHeader& header);
 
-/// The same of a slice that was parsed and whose pixels are not native: its fragments, or what its data set holds.
+/// Decodes a slice that was parsed and whose pixels are not native: its fragments, or what its data set holds.
+/// @return one word a pixel, rows top to bottom, every bit as stored
+/// @throws InputError naming the file for data that are truncated, damaged or of another size than the header states
 std::vector<std::uint16_t> decode_slice(const ParsedSlice& slice);
 
 /// Words of Pixel Data to HU. Built once for slices of the same format. Every word of 16 bits has an entry, whatever
@@ -56,12 +60,14 @@ struct HuCount {
   std::uint64_t rounded = 0;            ///< pixels with a fractional HU
   std::uint64_t saturated_padding = 0;  ///< pixels of padding whose HU does not fit int16
 };
+/// Converts words of Pixel Data to HU.
 /// @param words  as many as there are `hu`
-/// @param slice  its name
+/// @param slice  name of the slice
 /// @throws InputError naming the slice for a pixel whose HU does not fit int16
 HuCount convert_to_hu(std::span<const std::uint16_t> words, const HuTable& table, const std::string& slice,
                       std::span<std::int16_t> hu);
-/// The same of words as they lie in a file, little endian, at any address.
+/// Converts words of Pixel Data as they lie in a file, little endian, at any address, to HU.
+/// @throws InputError naming the slice for a pixel whose HU does not fit int16
 HuCount convert_to_hu(std::span<const std::byte> words, const HuTable& table, const std::string& slice,
                       std::span<std::int16_t> hu);
 

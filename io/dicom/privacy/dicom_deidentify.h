@@ -54,7 +54,7 @@ class Deidentifier {
   int days_back_;
 };
 
-/// De-identifies a data set, if that is asked for, by its own Patient ID and Study Instance UID.
+/// De-identifies a data set by its own Patient ID and Study Instance UID, if `how` is set.
 void deidentify(DcmItem& dataset, const std::optional<Deidentification>& how, bool is_ct_image);
 
 }  // namespace tetwarp

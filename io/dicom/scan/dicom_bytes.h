@@ -27,7 +27,8 @@ class FileBuffer {
  public:
   /// All bytes of a file; good until the next call. @throws InputError naming the file
   std::span<const std::byte> read(const std::filesystem::path& file);
-  /// Parts of it, one after the other; likewise.
+  /// Reads parts of a file, one after the other; good until the next call.
+  /// @throws InputError naming the file
   std::span<const std::byte> read(const std::filesystem::path& file, std::span<const FileRange> parts);
 
  private:
@@ -61,8 +62,9 @@ struct PixelItems {
   std::vector<FileRange> items;      ///< their values; the first is the Basic Offset Table
   std::optional<std::uint64_t> end;  ///< behind the delimiter; none: there are no such items, or they are cut short
 };
-/// @param read  the bytes of a file from an offset on, as many as there are up to those asked for
-/// @param at    where the value of Pixel Data begins
+/// @param read        fills a span with bytes of the file from an offset on, and returns how many there were
+/// @param file_bytes  length of the file
+/// @param at          where the value of Pixel Data begins
 PixelItems pixel_items(const std::function<std::size_t(std::uint64_t, std::span<std::byte>)>& read,
                        std::uint64_t file_bytes, std::uint64_t at);
 

@@ -14,7 +14,8 @@ namespace tetwarp {
 /// that are not that become "\xNN".
 std::string shown_text(std::string_view bytes, const std::string& character_set);
 
-/// The same as it is, control characters included; none where it is not what its character sets say.
+/// Text in the character sets that Specific Character Set (0008,0005) names as UTF-8, control characters included;
+/// nothing where the bytes do not fit these sets.
 std::optional<std::string> decoded_text(std::string_view bytes, const std::string& character_set);
 
 /// UTF-8 in the first of the character sets that Specific Character Set names; none where that has no such characters.

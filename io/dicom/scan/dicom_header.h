@@ -96,10 +96,11 @@ std::string text_of(DcmItem& item, const DcmTagKey& tag);
 /// Decimal strings of an attribute: exactly `count` numbers, or none.
 std::optional<std::vector<double>> numbers_of(DcmItem& item, const DcmTagKey& tag, std::size_t count);
 
-/// "JPEG 2000 (Lossless only) (1.2.840.10008.1.2.4.90)"; the UID alone where it has no name.
+/// The name of a UID, with the UID: "JPEG 2000 (Lossless only) (1.2.840.10008.1.2.4.90)". The UID alone if it has no
+/// name.
 std::string uid_with_name(const std::string& uid);
 
-/// The same of a SOP Class, in plain words first: "an MR image, MRImageStorage (1.2.840.10008.5.1.4.1.1.4)".
+/// A SOP Class in plain words, with its name and UID: "an MR image, MRImageStorage (1.2.840.10008.5.1.4.1.1.4)".
 std::string kind_name(const std::string& sop_class_uid);
 
 /// Why this object is no slice of a CT volume by its kind (localizer, dose, MR, ...); empty if it may be one.

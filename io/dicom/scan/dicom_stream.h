@@ -28,19 +28,21 @@ constexpr std::size_t kLargestInflatedHeader = std::size_t{64} << 20, kLargestIn
 /// some tens deep.
 constexpr std::size_t kDeepestSequence = 100;
 
-/// Reads a file as DCMTK's own loadFileUntilTag does, but for deflated data sets, of which DCMTK reads every value at
-/// once and so allocates whatever length a damaged one says. Here long values wait where they are until they are asked
-/// for, deflated or not, and one that goes beyond the end is an error before that. What is deflated is inflated only as
-/// far as reading goes. Sequences deeper than kDeepestSequence are an error.
+/// Reads a file as DCMTK's own loadFileUntilTag does, except for deflated data sets, of which DCMTK reads every value
+/// at once, and so allocates any length that a damaged file states. Here long values stay in the file until they are
+/// used, deflated or not, and one that extends beyond the end is an error. Deflated data are inflated only as far as
+/// reading goes. Sequences deeper than kDeepestSequence are an error.
 /// @param until           where reading stops; DCM_UndefinedTagKey: at the end
 /// @param inflated_limit  a deflated data set that takes more bytes is an error
 DicomRead parse_dicom(DcmFileFormat& format, const std::filesystem::path& file, const DcmTagKey& until,
                       E_FileReadMode mode = ERM_autoDetect, std::size_t inflated_limit = kLargestInflated);
-/// The same of a file that is open. `format` may hold on to it: a deflated data set is inflated on demand.
+/// Reads an open file as the overload for paths does. `format` may keep the file: a deflated data set is inflated on
+/// demand.
 DicomRead parse_dicom(DcmFileFormat& format, const std::shared_ptr<OpenedFile>& file, const DcmTagKey& until,
                       E_FileReadMode mode = ERM_autoDetect, std::size_t inflated_limit = kLargestInflated);
 
-/// The same of a file in memory, to which nothing of `format` points after a good result.
+/// Reads a file in memory as the overload for paths does. After a good result nothing of `format` points to that
+/// memory.
 DicomRead parse_dicom(DcmFileFormat& format, std::span<const std::byte> bytes, const DcmTagKey& until,
                       std::size_t inflated_limit = kLargestInflated);
 
