@@ -17,8 +17,9 @@
 
 namespace tetwarp {
 
-/// What is made of the voxels around a place (docs/algorithm.md). `vote` is for label maps: the linear weights are
-/// summed for each label, the largest sum wins, and of equal sums the one of the smaller label. No label is made up.
+/// What is made of the voxels around a place (docs/design/definition.md). `vote` is for label maps: the linear weights
+/// are summed for each label, the largest sum wins, and of equal sums the one of the smaller label. No label is made
+/// up.
 enum class Interpolation : std::uint8_t { nearest, linear, cubic, vote };
 
 /// Stored values from `low` to `high` are no data (DICOM Pixel Padding Value and Range Limit, PS3.3 C.7.5.1.1.2).
@@ -104,8 +105,8 @@ struct Control {
 /// be of its own device, and is used where it is. The CPU refuses device memory. One object is for one thread at a
 /// time.
 ///
-/// The result is a function of source, field and output alone (docs/algorithm.md): the same bits for any number of
-/// threads, any split into regions and any backend.
+/// The result is a function of source, field and output alone (docs/design/definition.md): the same bits for any number
+/// of threads, any split into regions and any backend.
 class Resampler {
  public:
   virtual ~Resampler() = default;

@@ -34,8 +34,9 @@ struct DoseReport : AlongReport {
   std::string units;   ///< Dose Units
 };
 
-/// Writes doses that went through a field as an RT Dose object (PS3.3 A.18; docs/dicom.md says what it takes over):
-/// frames of 32-bit words, the largest dose as 2^31 - 1. Negative doses become 0, unless the source's words are signed.
+/// Writes doses that went through a field as an RT Dose object (PS3.3 A.18; docs/reference/dicom.md says what it takes
+/// over): frames of 32-bit words, the largest dose as 2^31 - 1. Negative doses become 0, unless the source's words are
+/// signed.
 /// @param doses  float32, in the units of the source, on a straight grid
 /// @throws InputError for another patient's dose, Error when the file cannot be written
 DoseReport write_derived_dose(const std::filesystem::path& path, const ConstVolumeView& doses, const DicomAlong& along,

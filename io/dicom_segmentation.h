@@ -51,8 +51,8 @@ struct SegmentationReport : AlongReport {
 };
 
 /// Writes segments that went through a field as a Segmentation object of the source's type and segments
-/// (docs/dicom.md says what it takes over). Frames without a voxel are left out. On the grid of the series, each frame
-/// names the slice on which it lies.
+/// (docs/reference/dicom.md says what it takes over). Frames without a voxel are left out. On the grid of the series,
+/// each frame names the slice on which it lies.
 /// @param segments  uint8, in the order of the source's segments, all on one straight grid
 /// @throws InputError for another patient's segmentation, Error when the file cannot be written
 SegmentationReport write_derived_segmentation(const std::filesystem::path& path,

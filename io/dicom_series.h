@@ -144,8 +144,9 @@ struct DicomWriteReport {
   bool says_who = false;  ///< the source says that pixels show text or a face that can be recognised
 };
 
-/// Writes a derived CT series (PS3.3 A.3; docs/dicom.md has the table of attributes) of one file a slice into the
-/// folder `folder`, which exists and is empty. Reads no clock: the same input gives the same bytes and the same UIDs.
+/// Writes a derived CT series (PS3.3 A.3; docs/reference/dicom.md has the table of attributes) of one file a slice into
+/// the folder `folder`, which exists and is empty. Reads no clock: the same input gives the same bytes and the same
+/// UIDs.
 class DerivedSeriesWriter {
  public:
   /// The source's headers must outlive the writer. Where the derived volume has as many slices as the source, each

@@ -41,8 +41,8 @@ struct StructureWriteReport {
   std::string series_uid, sop_instance_uid;
 };
 
-/// Writes a structure set that was moved with a derived series (docs/dicom.md has the table of attributes). Reads no
-/// clock: the same input gives the same bytes and the same UIDs.
+/// Writes a structure set that was moved with a derived series (docs/reference/dicom.md has the table of attributes).
+/// Reads no clock: the same input gives the same bytes and the same UIDs.
 /// @param moved   contours of each structure of `source`, on slices of the derived series
 /// @param series  what they refer to, wholly written
 /// @throws Error when the file cannot be written

@@ -54,7 +54,7 @@ struct FieldSource {
   FieldSource(std::filesystem::path file) : path(std::move(file)) {}  // NOLINT: most files need nothing else
 
   std::filesystem::path path;
-  std::map<std::string, std::string> options;  ///< docs/fields.md lists them by format: "order" is "zyx"
+  std::map<std::string, std::string> options;  ///< docs/reference/fields.md lists them by format: "order" is "zyx"
   std::optional<Geometry> grid;                ///< of the volume that the field is for
   NiftiFrame nifti_frame = NiftiFrame::sform;
 
@@ -72,9 +72,9 @@ void check_field_options(const FieldSource& source);
 /// Whether a format of io/fields/field_format.h takes the file, and it holds vectors (not a volume).
 bool is_field_file(const FieldSource& source);
 
-/// Reads a file of any format of io/fields/field_format.h (docs/fields.md lists them); doubles are rounded to float.
-/// Direction: NRRD and MHA key `tetwarp_direction`, NIfTI descrip `tetwarp_direction=forward`, or the format's own.
-/// A pull field may have NaN where there is no source, which a file that does not say its direction has only for
+/// Reads a file of any format of io/fields/field_format.h (docs/reference/fields.md lists them); doubles are rounded to
+/// float. Direction: NRRD and MHA key `tetwarp_direction`, NIfTI descrip `tetwarp_direction=forward`, or the format's
+/// own. A pull field may have NaN where there is no source, which a file that does not say its direction has only for
 /// `read_pull_field`.
 /// @throws InputError for a file that is no field, or with a value that is not finite (the first such vertex is named)
 FieldFileHeader read_field_header(const FieldSource& source);

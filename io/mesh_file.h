@@ -43,9 +43,9 @@ void check_mesh_options(const FieldSource& source);
 /// Whether a format of io/meshes/mesh_format.h takes the file, and it holds volume cells (not a surface).
 bool is_mesh_file(const std::filesystem::path& path);
 
-/// Reads a whole mesh of any format of io/meshes/mesh_format.h (docs/fields.md lists them), cells of all shapes split
-/// into tetrahedra (MeshCells), quadratic ones by their corners. Displacements are computed in double and rounded to
-/// float once.
+/// Reads a whole mesh of any format of io/meshes/mesh_format.h (docs/reference/fields.md lists them), cells of all
+/// shapes split into tetrahedra (MeshCells), quadratic ones by their corners. Displacements are computed in double and
+/// rounded to float once.
 ///
 /// Options of the source, all optional:
 /// - displacement=NAME: the vectors to take; else the only ones, or those called displacement, Displacement, U or u

@@ -21,7 +21,8 @@ std::string to_string(PointFrame frame);  // "LPS", "RAS"
 /// Private to io/: a file of points of one form, as parsed.
 class PointsDocument;
 
-/// Landmarks or the vertices of a surface, with all else that their file holds (docs/coordinates.md, "Points").
+/// Landmarks or the vertices of a surface, with all else that their file holds (docs/reference/coordinates.md,
+/// "Points").
 ///
 /// Forms, by suffix: `.csv` (header with x, y, z), `.mrk.json` and `.fcsv` (3D Slicer), `.stl` and legacy `.vtk`
 /// polydata (ASCII or binary), `.obj`.

@@ -9,7 +9,7 @@
 
 namespace tetwarp {
 
-/// Reads a scenario (docs/simulate.md, docs/scenario.schema.json).
+/// Reads a scenario (docs/reference/scenario.md, docs/scenario.schema.json).
 ///
 /// What is refused, and why, is said with line and key: "FILE:14: move[1].handle.radius_mm is -3; a number above 0, to
 /// 100000 is expected".

@@ -24,7 +24,7 @@ struct GatherCounters {
 /// Which voxels of a box have exactly one owner, so that any owner found is the one; and which need the slow path.
 ///
 /// The winding number of the deformed border is the number of owners, inverted ones counted as -1. Where no inverted
-/// tetrahedron can own a voxel and the number is 1, it has one owner; where it is 0, none (docs/algorithm.md,
+/// tetrahedron can own a voxel and the number is 1, it has one owner; where it is 0, none (docs/design/cuda.md,
 /// "Gather").
 class Coverage {
  public:

@@ -8,7 +8,7 @@
 namespace tetwarp {
 
 /// Where the deformed border of a lattice lies, row by row: the winding number of the border around a voxel is the
-/// number of tetrahedra that own it, inverted ones counted as -1 (docs/algorithm.md, "Gather").
+/// number of tetrahedra that own it, inverted ones counted as -1 (docs/design/cuda.md, "Gather").
 
 /// A triangle of the deformed border, corners in 2^-12 voxel; outside is on the side of (b - a) x (c - a) while the
 /// lattice is undeformed.

@@ -14,7 +14,7 @@ namespace tetwarp {
 ///
 /// Nothing here decides ownership by itself. A tetrahedron is accepted where float arithmetic proves what
 /// `side_of_face` would say, or exact integers say it; whatever cannot be settled is left to `visit_cell`. That the
-/// owner found is the only one, and so the lowest, must be known before (docs/algorithm.md, "Gather").
+/// owner found is the only one, and so the lowest, must be known before (docs/design/cuda.md, "Gather").
 
 /// A voxel centre, from the first vertex at rest, and its nudge; 2^-12 voxel, whole numbers and quarters in float.
 struct GatherPoint {

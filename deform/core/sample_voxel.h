@@ -116,7 +116,7 @@ TETWARP_INLINE_HD void slices_at(const Place& place, std::int64_t slices, std::i
   }
 }
 
-/// The value of one output voxel (docs/algorithm.md).
+/// The value of one output voxel (docs/design/definition.md).
 ///
 /// @param mapped  whether the field says where it comes from; @param offset  undeformed minus deformed place, voxels
 template <class V, Interpolation kInterpolation>

@@ -10,8 +10,8 @@
 
 namespace tetwarp::cpu {
 
-/// How many tetrahedra own each voxel: the winding number of the deformed border (docs/algorithm.md, "Gather"), held as
-/// the places where rows of voxels pass through it; and, tile by tile, what inverted tetrahedra may reach.
+/// How many tetrahedra own each voxel: the winding number of the deformed border (docs/design/cuda.md, "Gather"), held
+/// as the places where rows of voxels pass through it; and, tile by tile, what inverted tetrahedra may reach.
 class Coverage {
  public:
   /// Looks at the whole border, in parallel in the calling task arena. @param index  with `steps`; must stay as it is

@@ -30,7 +30,8 @@ inline constexpr std::size_t kMostNodesForCholesky = 20'000;
 /// leaves less than a quarter of the squares of their ways (rigid_motion), and for the rest by the harmonic extension.
 /// Then come local/global steps (Liu, Bargteil, O'Brien and Kavan 2013: springs choose their directions, then one
 /// linear system with a constant Laplacian) while they are worth it, and Newton's steps with conjugate gradients from
-/// there on. A line search keeps the energy falling in every step. A step is one linear system. See docs/simulation.md.
+/// there on. A line search keeps the energy falling in every step. A step is one linear system. See
+/// docs/design/simulation.md.
 ///
 /// Nodes that springs do not tie to a placed node stay where they are, whatever the force on them.
 ///
