@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: The Tetwarp authors
 # SPDX-License-Identifier: Apache-2.0
 
-# What ITK reads to know this repository as its module Tetwarp (docs/itk.md): placed under Modules/Remote of ITK's
+# What ITK reads to know this repository as its module Tetwarp (docs/guide/itk.md): placed under Modules/Remote of ITK's
 # sources, or built beside a build of ITK.
 include("${CMAKE_CURRENT_LIST_DIR}/itkbridge/itk_modules.cmake")
 itk_module(Tetwarp

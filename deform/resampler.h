@@ -18,7 +18,7 @@
 /// Tetwarp: deforms medical volumes by fields of displacements.
 namespace tetwarp {
 
-/// How a value is made from the voxels around a place between them (docs/algorithm.md).
+/// How a value is made from the voxels around a place between them (docs/design/definition.md).
 enum class Interpolation : std::uint8_t {
   nearest,  ///< the voxel at floor(x + 0.5)
   linear,   ///< trilinear: along x, then y, then z
@@ -131,8 +131,8 @@ struct Control {
 /// must belong to its own device, and is used in place. The CPU refuses device memory. One object serves one thread at
 /// a time.
 ///
-/// The result depends on source, field and output grid alone (docs/algorithm.md): it has the same bits for any number
-/// of threads, any split into regions and any backend.
+/// The result depends on source, field and output grid alone (docs/design/definition.md): it has the same bits for any
+/// number of threads, any split into regions and any backend.
 class Resampler {
  public:
   /// Frees what the resampler holds; fields and volumes are not owned.

@@ -35,10 +35,9 @@ struct DoseReport : AlongReport {
   std::string units;   ///< Dose Units (3004,0002)
 };
 
-/// Writes doses that went through a field as an RT Dose object (PS3.3 A.18). docs/dicom.md lists what it takes over
-/// from the source.
-/// Frames have 32-bit words, the largest dose is 2^31 - 1. Negative doses become 0, unless the words of the source are
-/// signed.
+/// Writes doses that went through a field as an RT Dose object (PS3.3 A.18). docs/reference/dicom.md lists what it
+/// takes over from the source. Frames have 32-bit words, the largest dose is 2^31 - 1. Negative doses become 0, unless
+/// the words of the source are signed.
 /// @param path    file to write
 /// @param doses   float32, in the units of the source, on a straight and even grid
 /// @param along   the source of the doses, and what was done

@@ -61,7 +61,7 @@ struct SegmentationReport : AlongReport {
 };
 
 /// Writes segments that went through a field as a Segmentation object of the type and segments of the source.
-/// docs/dicom.md lists what it takes over.
+/// docs/reference/dicom.md lists what it takes over.
 /// Frames without a voxel are left out. On the grid of the series each frame names the slice on which it lies.
 /// @param path      file to write
 /// @param segments  uint8, in the order of the source's segments, all on one straight and even grid

@@ -170,8 +170,8 @@ struct DicomWriteReport {
   bool says_who = false;
 };
 
-/// Writes a derived CT series (DICOM PS3.3 A.3), one file a slice, into an existing empty folder. docs/dicom.md has the
-/// table of attributes. It reads no clock: equal input gives equal bytes and UIDs.
+/// Writes a derived CT series (DICOM PS3.3 A.3), one file a slice, into an existing empty folder.
+/// docs/reference/dicom.md has the table of attributes. It reads no clock: equal input gives equal bytes and UIDs.
 class DerivedSeriesWriter {
  public:
   /// Where the derived volume has as many slices as the source, each slice takes over the header of the slice with its

@@ -43,8 +43,8 @@ struct StructureWriteReport {
       sop_instance_uid;    ///< new SOP Instance UID
 };
 
-/// Writes a structure set that was moved with a derived series. docs/dicom.md has the table of attributes. It reads no
-/// clock: equal input gives equal bytes and UIDs.
+/// Writes a structure set that was moved with a derived series. docs/reference/dicom.md has the table of attributes. It
+/// reads no clock: equal input gives equal bytes and UIDs.
 /// @param path        file to write
 /// @param source      the structure set before it was moved
 /// @param moved       contours of each structure of `source`, on slices of the derived series

@@ -64,7 +64,7 @@ struct FieldSource {
   FieldSource(std::filesystem::path file) : path(std::move(file)) {}  // NOLINT
 
   std::filesystem::path path;  ///< the file
-  /// Key and value, such as "order" and "zyx"; docs/fields.md lists them by format.
+  /// Key and value, such as "order" and "zyx"; docs/reference/fields.md lists them by format.
   std::map<std::string, std::string> options;
   std::optional<Geometry> grid;                ///< grid of the volume for which the field is meant
   NiftiFrame nifti_frame = NiftiFrame::sform;  ///< which place of a NIfTI file counts
@@ -87,7 +87,7 @@ bool is_field_file(const FieldSource& source);
 /// Reads what a field file states before its vectors.
 /// @throws InputError for a file that is no field
 FieldFileHeader read_field_header(const FieldSource& source);
-/// Reads a field file of any format; docs/fields.md lists them. Doubles are rounded to float.
+/// Reads a field file of any format; docs/reference/fields.md lists them. Doubles are rounded to float.
 /// The direction is stated by the key `tetwarp_direction` of NRRD and MHA, by the NIfTI header field descrip, as in
 /// `tetwarp_direction=forward`, or as the format has it. Pull fields may have NaN where there is no source; if the file
 /// does not state its direction only `read_pull_field` reads such a file.

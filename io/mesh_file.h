@@ -49,8 +49,8 @@ void check_mesh_options(const FieldSource& source);
 /// Whether some mesh format reads the file, and it contains volume cells, not a surface.
 bool is_mesh_file(const std::filesystem::path& path);
 
-/// Reads a mesh of any format; docs/fields.md lists them. Cells of all shapes are split into tetrahedra by `MeshCells`,
-/// quadratic cells by their corners alone. Displacements are computed in double and rounded once to float.
+/// Reads a mesh of any format; docs/reference/fields.md lists them. Cells of all shapes are split into tetrahedra by
+/// `MeshCells`, quadratic cells by their corners alone. Displacements are computed in double and rounded once to float.
 ///
 /// Options of the source, all of them optional:
 /// - displacement=NAME: the vectors that are displacements; otherwise the only vectors, or those called displacement,

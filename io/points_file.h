@@ -25,8 +25,8 @@ std::string to_string(PointFrame frame);
 /// Private to io/: a file of points in one format, as it was parsed.
 class PointsDocument;
 
-/// Landmarks or the vertices of a surface, with everything else that their file contains (docs/coordinates.md,
-/// "Points").
+/// Landmarks or the vertices of a surface, with everything else that their file contains
+/// (docs/reference/coordinates.md, "Points").
 ///
 /// Formats, by suffix: `.csv` (whose header has x, y, z), `.mrk.json` and `.fcsv` (3D Slicer), `.stl`, legacy `.vtk`
 /// polydata (ASCII or binary), and `.obj`.

@@ -9,7 +9,7 @@
 
 namespace tetwarp {
 
-/// Reads a scenario from a JSON file; docs/simulate.md and docs/scenario.schema.json describe the keys.
+/// Reads a scenario from a JSON file; docs/reference/scenario.md and docs/scenario.schema.json describe the keys.
 ///
 /// @throws InputError for a file that is larger than 1 MiB, no JSON, or no scenario. The message names line and key:
 ///         "FILE:14: move[1].handle.radius_mm is -3; a number above 0, to 100000 is expected".

@@ -22,8 +22,8 @@ namespace itk {
  *
  * It takes the place of `InvertDisplacementFieldImageFilter`, whose input is forward and whose output is its inverse,
  * too. That one inverts a trilinear field, and comes closer than 2^-13 voxel where its iteration converges; by default
- * it stops before, holds the border at zero, and has a vector where there is no inverse (docs/itk.md). The output's
- * grid is the input's unless it is set.
+ * it stops before, holds the border at zero, and has a vector where there is no inverse (docs/reference/itk.md). The
+ * output's grid is the input's unless it is set.
  *
  * \code
  * auto invert = itk::ExactInvertDisplacementFieldImageFilter<FieldType>::New();

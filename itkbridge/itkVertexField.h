@@ -18,7 +18,7 @@ namespace itk {
  * It says of a point of the undeformed anatomy where that comes to lie, in LPS mm. A displacement field of ITK says the
  * opposite, where an output point comes from (`WarpImageFilter`, `DisplacementFieldTransform`), so this is a type of
  * its own and the two do not convert silently. Between vertices the map is affine in each tetrahedron, five of which
- * make a cell (docs/algorithm.md).
+ * make a cell (docs/design/definition.md).
  *
  * It is made by `TransformToVertexFieldFilter`, `DisplacementFieldToVertexFieldFilter`, `MeshToVertexFieldFilter`, or
  * from a `tetwarp::VertexField`, which the simulations and files of the toolkit give:

@@ -12,8 +12,8 @@ namespace itk {
  * \brief Deforms an image by a forward field: each voxel gets what its one owning tetrahedron carried there.
  *
  * No inverse is needed, and none is approximated: in exact arithmetic one deformed tetrahedron owns each voxel of the
- * output, and the image is sampled once, where that voxel was in the undeformed volume (docs/algorithm.md). The program
- * `tetwarp deform` gives the same bits.
+ * output, and the image is sampled once, where that voxel was in the undeformed volume (docs/design/definition.md). The
+ * program `tetwarp deform` gives the same bits.
  *
  * \code
  * using ImageType = itk::Image<short, 3>;

@@ -72,7 +72,7 @@ std::string nearest_key(const std::string& key) {
     return distance(a, key) < distance(b, key);
   });
   return distance(*nearest, key) <= std::max<std::size_t>(2, key.size() / 3) ? "; is \"" + *nearest + "\" meant?"
-                                                                             : "; see docs/batch.md";
+                                                                             : "; see docs/reference/batch.md";
 }
 
 /// "" for an id that can be the name of a folder everywhere, else what is wrong.

@@ -25,9 +25,9 @@ struct BatchCase {
 /// What follows `tetwarp` on the command line that repeats a case.
 std::vector<std::string> command_of(const BatchCase& of);
 
-/// Reads a manifest (docs/batch.md): `.csv`, or JSON Lines, `.jsonl` or `.ndjson`. Rows with variants become as many
-/// cases; what is random is drawn. Every file that is named has to exist; none is read but scenarios and what `--with`
-/// may hold.
+/// Reads a manifest (docs/reference/batch.md): `.csv`, or JSON Lines, `.jsonl` or `.ndjson`. Rows with variants become
+/// as many cases; what is random is drawn. Every file that is named has to exist; none is read but scenarios and what
+/// `--with` may hold.
 ///
 /// @throws InputError with every error of it, "MANIFEST:LINE: ..." each on a line of its own
 std::vector<BatchCase> read_manifest(const std::filesystem::path& manifest, const std::filesystem::path& output_dir);

@@ -181,7 +181,7 @@ void add_deform(CLI::App& app, DeformOptions& options) {
   command
       ->add_option(
           "--scenario", options.scenario,
-          "Simulate the field as `simulate` does, of a page of scenario (docs/simulate.md); INPUT is a CT in HU")
+          "Simulate the field as `simulate` does, of a page of scenario (docs/guide/simulate.md); INPUT is a CT in HU")
       ->type_name("FILE.json");
   command->add_option("--labels", options.labels, "Label volume on the grid of INPUT, for the tissues of --scenario")
       ->type_name("FILE");
@@ -279,7 +279,7 @@ void add_deform(CLI::App& app, DeformOptions& options) {
 
 void add_simulate(CLI::App& app, SimulateOptions& options) {
   CLI::App* command = app.add_subcommand("simulate", "Make a field: what happens to a volume in a scenario");
-  command->add_option("SCENARIO", options.scenario, "What is held, moved and cut, as JSON (docs/simulate.md)")
+  command->add_option("SCENARIO", options.scenario, "What is held, moved and cut, as JSON (docs/reference/scenario.md)")
       ->required();
   command->add_option("INPUT", options.input.path, std::string(kInputHelp) + "; a CT in HU")->required();
   command->add_option("-o,--output", options.output, ".mha .nrrd .nii .nii.gz: a forward field, for -f of deform")
@@ -305,7 +305,7 @@ void add_simulate(CLI::App& app, SimulateOptions& options) {
 void add_batch(CLI::App& app, BatchOptions& options) {
   CLI::App* command = app.add_subcommand("batch", "Deform many volumes, unattended");
   auto* manifest = command->add_option("MANIFEST", options.manifest,
-                                       "The cases: .csv or JSON Lines, .jsonl .ndjson (docs/batch.md)");
+                                       "The cases: .csv or JSON Lines, .jsonl .ndjson (docs/reference/batch.md)");
   auto* init = command
                    ->add_option("--init", options.init,
                                 "Write a manifest instead, to be edited: a row for every volume of a folder of DICOM")

@@ -10,7 +10,7 @@
 
 namespace tetwarp::apps {
 
-/// What a folder of DICOM files holds, for scripts; the keys stand in docs/dicom.md.
+/// What a folder of DICOM files holds, for scripts; the keys stand in docs/reference/dicom.md.
 nlohmann::json describe(const DicomScan& scan, const InputOptions& input);
 
 /// The same to standard output, in words for people.

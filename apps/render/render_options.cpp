@@ -18,7 +18,7 @@ void add_looks(CLI::App& command, RenderOptions& options) {
   command
       .add_option("--transfer", options.transfer,
                   "What values look like: ct-bone (default for a CT), ct-skin, ct-lung, ct-vessel, mip (default for "
-                  "others) or xray, or a JSON file (docs/render.md)")
+                  "others) or xray, or a JSON file (docs/reference/transfer-functions.md)")
       ->type_name("NAME|FILE.json");
   command
       .add_option("--angle", options.angle,

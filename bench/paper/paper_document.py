@@ -4,8 +4,8 @@
 
 """Puts what `tetwarp bench paper --json` measured into a document, so that its figures are those of one run.
 
-    bench/paper/paper_document.py bench/results/paper-h100/paper.json docs/paper.md
-    bench/paper/paper_document.py --check bench/results/paper-h100/paper.json docs/paper.md
+    bench/paper/paper_document.py bench/results/paper-h100/paper.json docs/reference/paper.md
+    bench/paper/paper_document.py --check bench/results/paper-h100/paper.json docs/reference/paper.md
 
 A part of the document that a program writes stands between two lines, of which the first one names it:
 

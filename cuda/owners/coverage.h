@@ -25,7 +25,7 @@ struct GatherCounters {
 ///
 /// The winding number of the deformed border is the number of owners, inverted ones counted as -1. Where no inverted
 /// tetrahedron can own a voxel, a voxel of winding number 1 has one owner and one of winding number 0 has none
-/// (docs/algorithm.md, "Gather").
+/// (docs/design/cuda.md, "Gather").
 class Coverage {
  public:
   /// Makes room for a box and sets all counters to zero, before `find`. The work is queued on the stream.

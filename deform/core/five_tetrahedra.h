@@ -25,7 +25,7 @@ struct Tetrahedron {
 
 constexpr int kTetrahedraPerCell = 5;
 
-/// Which corners of a cell its tetrahedron t has (docs/algorithm.md, "Five tetrahedra a cell").
+/// Which corners of a cell its tetrahedron t has (docs/design/definition.md, "Five tetrahedra a cell").
 ///
 /// Number 0 is the centre, {1, 2, 4, 7} in even cells (i + j + k even) and {0, 3, 5, 6} in odd ones; 1 to 4 are those
 /// at the remaining corners in rising order. The parity must alternate: only then do the face diagonals of neighbouring

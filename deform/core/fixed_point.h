@@ -10,8 +10,8 @@
 
 namespace tetwarp {
 
-/// Vertices are integers in steps of 2^-12 voxel of the output grid (docs/algorithm.md, "Input"). 2^18 voxels on an
-/// axis fit, with room for differences. Everything that decides ownership is integer arithmetic on them.
+/// Vertices are integers in steps of 2^-12 voxel of the output grid (docs/design/definition.md, "Input"). 2^18 voxels
+/// on an axis fit, with room for differences. Everything that decides ownership is integer arithmetic on them.
 constexpr int kStepsPerVoxel = 1 << 12;
 constexpr double kLargestIndex = 1 << 18;
 constexpr float kVoxelsPerStep = 1.0f / kStepsPerVoxel;

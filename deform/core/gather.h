@@ -14,7 +14,7 @@ namespace tetwarp {
 //
 // Nothing here decides ownership by itself. A tetrahedron is accepted where float arithmetic proves the result of
 // `side_of_face`, or exact integers compute it; whatever cannot be settled is left to `visit_cell`. That the owner
-// found is the only one, and so has the lowest number, must be known before (docs/algorithm.md, "Gather").
+// found is the only one, and so has the lowest number, must be known before (docs/design/cuda.md, "Gather").
 
 /// A voxel centre relative to the first undeformed vertex, and its nudge; 2^-12 voxel, in float, which holds both
 /// exactly.

@@ -121,7 +121,7 @@ TETWARP_INLINE_HD void slices_at(const Place& place, std::int64_t slices, std::i
   }
 }
 
-/// Computes the value of one output voxel (docs/algorithm.md, "What the voxel gets").
+/// Computes the value of one output voxel (docs/design/definition.md, "What the voxel gets").
 ///
 /// @param mapped  whether the field says where the voxel comes from
 /// @param offset  undeformed minus deformed place, voxels

@@ -181,8 +181,8 @@ TETWARP_HD void walk_voxels(const Cell& cell, bool odd, const VoxelBox& box, con
 /// Calls `visit(voxel, signs, t, tetrahedron)` for every voxel of `region` that tetrahedron t of the cell owns.
 ///
 /// Every backend runs this body for one cell. Which voxels it reports is the definition of ownership
-/// (docs/algorithm.md, "Who owns a voxel"); what becomes of them is up to the backend. A voxel in a fold is reported by
-/// several tetrahedra, of this cell or of others: the one with the lowest number 5 * cell + t is its owner.
+/// (docs/design/definition.md, "Who owns a voxel"); what becomes of them is up to the backend. A voxel in a fold is
+/// reported by several tetrahedra, of this cell or of others: the one with the lowest number 5 * cell + t is its owner.
 template <class Visit>
 TETWARP_HD void visit_cell(const Cell& cell, bool odd, const VoxelBox& region, const Nudge& nudge, Visit&& visit) {
   constexpr std::int64_t kFewVoxels = 8;  // up to here, looking at each voxel beats setting up rows

@@ -32,7 +32,7 @@ inline constexpr std::size_t kMostNodesForCholesky = 20'000;
 /// it leaves less than a quarter of their squared motion, and for the remainder by harmonic extension. Then come
 /// local/global steps (Liu, Bargteil, O'Brien and Kavan 2013: springs choose their directions, then one linear system
 /// with a constant Laplacian is solved) as long as they make good progress, and Newton steps with conjugate gradients
-/// after that. A line search makes the energy fall in every step. docs/simulation.md describes the method.
+/// after that. A line search makes the energy fall in every step. docs/design/simulation.md describes the method.
 ///
 /// Nodes that no springs tie to a placed node stay where they are, whatever force acts on them.
 ///

@@ -7,8 +7,8 @@
 //
 // The series is read twice, by ITK's reader (GDCM) and by Tetwarp's (DCMTK), and both must give the same voxels at the
 // same places; otherwise the program says what differs, and ends with status 1. The volume that Tetwarp read becomes an
-// itk::Image without a copy. A scenario (examples/scenarios, docs/simulate.md) then says what is held and moved; where
-// the simulation takes the vertices of its lattice is an itk::VertexField, the second input of
+// itk::Image without a copy. A scenario (examples/scenarios, docs/guide/simulate.md) then says what is held and moved;
+// where the simulation takes the vertices of its lattice is an itk::VertexField, the second input of
 // itk::VertexFieldResampleImageFilter. Whatever filter of ITK comes next is connected as always: here a median.
 #include <itkGDCMImageIO.h>
 #include <itkGDCMSeriesFileNames.h>

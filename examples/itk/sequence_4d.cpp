@@ -5,11 +5,11 @@
 //
 //   tetwarp-example-sequence-4d IMAGE SCENARIO.json OUTPUT_FOLDER
 //
-// A scenario (examples/scenarios, docs/simulate.md) is played on the CT frame by frame, breathing in for example, and
-// each frame becomes OUTPUT_FOLDER/phase_01.mha and so on. The pipeline is made once: image -> warp -> file. For each
-// phase its itk::VertexField gets the next field, and Update does the rest: the filter sees that the field changed, and
-// gives it to the resampler that it has. Nothing is composed or accumulated: every phase is sampled once, from the CT
-// that was read. IMAGE is whatever ITK reads as a volume of HU; a DICOM series: see dicom_pipeline.cpp.
+// A scenario (examples/scenarios, docs/guide/simulate.md) is played on the CT frame by frame, breathing in for example,
+// and each frame becomes OUTPUT_FOLDER/phase_01.mha and so on. The pipeline is made once: image -> warp -> file. For
+// each phase its itk::VertexField gets the next field, and Update does the rest: the filter sees that the field
+// changed, and gives it to the resampler that it has. Nothing is composed or accumulated: every phase is sampled once,
+// from the CT that was read. IMAGE is whatever ITK reads as a volume of HU; a DICOM series: see dicom_pipeline.cpp.
 #include <itkImageFileReader.h>
 #include <itkImageFileWriter.h>
 #include <sys/resource.h>

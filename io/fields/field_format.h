@@ -3,7 +3,7 @@
 
 #pragma once
 
-// Private to io/: the seam between field_file.cpp and the formats that it reads. docs/fields.md, "A new format", shows
+// Private to io/: the seam between field_file.cpp and the formats that it reads. docs/guide/new-format.md shows
 // what one more takes: a pair of files, a line of CMake, a test.
 #include <filesystem>
 #include <memory>

@@ -34,8 +34,8 @@ bool decodes_jpeg_2000();
 
 // Each decoder gives one word a pixel, rows top to bottom, every bit as stored, and throws InputError, which names the
 // file, for a frame that is truncated, of another size or layout than the header says, or damaged as far as that shows:
-// no coding has a checksum (docs/dicom.md has the numbers). Nothing larger than the frame that the header asks for is
-// allocated before the frame's own header is known to agree.
+// no coding has a checksum (docs/reference/dicom.md has the numbers). Nothing larger than the frame that the header
+// asks for is allocated before the frame's own header is known to agree.
 
 /// RLE (PS3.5 Annex G).
 std::vector<std::uint16_t> decode_rle(std::span<const std::uint8_t> frame, const DicomFileHeader& header);

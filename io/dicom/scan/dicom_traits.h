@@ -16,7 +16,7 @@
 namespace tetwarp {
 
 /// In the order in which they are tried: first what says outright which of several volumes it is, then how the volume
-/// was made, last when. docs/dicom.md has the table.
+/// was made, last when. docs/reference/dicom.md has the table.
 enum class Trait : std::uint8_t {
   temporal_position,
   temporal_index,

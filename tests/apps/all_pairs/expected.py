@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """What a volume's voxels must be, given where each comes from: an own sampler, in double, with bounds of what rounding
-to float may change (docs/algorithm.md, "What the voxel gets")."""
+to float may change (docs/design/definition.md, "What the voxel gets")."""
 import itertools
 
 import numpy as np

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: The Tetwarp authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The definition of a deformed volume (docs/algorithm.md), tetrahedron by tetrahedron and in exact integers.
+"""The definition of a deformed volume (docs/design/definition.md), tetrahedron by tetrahedron and in exact integers.
 
 Coordinates are whole numbers: vertices of 2^-12 voxel, points and everything else here of 2^-16. A voxel is `doubtful`
 where what is right hangs on the last bits of coordinates before they are rounded to 2^-12 voxel.

@@ -7,7 +7,7 @@ namespace tetwarp::test {
 
 namespace {
 
-// What dcm2niix 1.0.20220720 of Debian does (docs/dicom.md, "Difficult cases"):
+// What dcm2niix 1.0.20220720 of Debian does (docs/reference/dicom-cases.md, "Difficult cases"):
 constexpr const char* kNone = "dcm2niix made 0 volumes";  ///< deflated, JPEG-LS, JPEG of 12 bits: not supported
 constexpr const char* kTwo = "dcm2niix made 2 volumes";   ///< tilt, uneven: the slices as they come, and resampled
 constexpr const char* kOther = "voxels differ";           ///< JPEG of 8 bits: other values than other decoders

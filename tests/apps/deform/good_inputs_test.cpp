@@ -216,7 +216,7 @@ TEST_P(GoodDicom, IdentityIsWhatDcm2niixMakesOfTheSource) {
              is_missing(run)) {
     missing_ += run.output;
   } else {
-    EXPECT_NE(run.status, 0) << "it agrees: docs/dicom.md says that it does not";
+    EXPECT_NE(run.status, 0) << "it agrees: docs/reference/dicom-cases.md says that it does not";
     EXPECT_NE(run.output.find(known), std::string::npos) << run.output;
   }
   skip_where_readers_were_missing();

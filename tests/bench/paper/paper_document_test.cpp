@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-// The figures of docs/paper.md are those of the run that lies in bench/results/paper-h100.
+// The figures of docs/reference/paper.md are those of the run that lies in bench/results/paper-h100.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -15,7 +15,7 @@ namespace {
 
 const std::filesystem::path kSources = TETWARP_SOURCES;
 const std::filesystem::path kRun = kSources / "bench/results/paper-h100/paper.json";
-const std::filesystem::path kDocument = kSources / "docs/paper.md";
+const std::filesystem::path kDocument = kSources / "docs/reference/paper.md";
 
 class PaperDocument : public testing::Test {
  protected:

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Real compressed slices with a bit turned, or with a sector of a disk lost: how often that shows. No coding of DICOM
-// has a checksum, so that some damage never does; docs/dicom.md has the numbers.
+// has a checksum, so that some damage never does; docs/reference/dicom.md has the numbers.
 #include <gtest/gtest.h>
 
 #include <algorithm>
