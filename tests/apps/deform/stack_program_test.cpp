@@ -96,7 +96,7 @@ TEST(StackProgram, UnevenSlicesAreRefusedUnlessTheyAreAskedFor) {
   // What speaks of the main volume alone is not named where another one is to blame.
   write_noise(scratch / "even", kStraight, {0, 2.5, 5, 7.5});
   const Outcome other = run_tetwarp(scratch.path(), "deform even -f identity -o out.nii --with uneven=other.nii");
-  EXPECT_EQ(other.status, 3);
+  EXPECT_EQ(other.status, 4);
   EXPECT_TRUE(says(other.err, {"slice gap", "add what is missing"}));
   EXPECT_EQ(other.err.find("--uneven"), std::string::npos) << other.err;
   EXPECT_EQ(run_tetwarp(scratch.path(), "deform uneven --uneven maybe -f identity -o out.nii").status, 2);
