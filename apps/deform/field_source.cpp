@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/cli/output.h"
+#include "deform/core/five_tetrahedra.h"
 #include "deform/fields/formula.h"
 #include "deform/fields/lattice_mesh.h"
 #include "io/field_file.h"

@@ -39,6 +39,7 @@ OPEN_ROOMS = ("deform/contours/", "deform/fields/", "deform/phantom/", "deform/r
 
 # Private headers that another folder includes all the same: (who, prefix of the header) and why.
 FRIENDS = {
+    ("apps", "deform/core/five_tetrahedra.h"): "an estimate of memory counts the bytes of a snapped vertex",
     ("cuda", "deform/"): "a backend runs the arithmetic of deform/core and checks what the CPU checks",
     ("bench", "deform/core/"): "the paper's algorithms are measured on the same arithmetic",
     ("bench", "cuda/runtime/"): "the paper's kernels own memory and check errors as ours do",
