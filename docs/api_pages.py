@@ -6,31 +6,21 @@
 
     api_pages.py FOLDER
 
-The headers are those behind HEADERS in the CMakeLists.txt of the libraries. Their paths are printed, a line each.
+Their paths are printed, a line each. What a .hxx declares stands in its .h.
 """
 import pathlib
-import re
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "cmake"))
+from installed_headers import installed_headers  # noqa: E402
+
 LIBRARIES = {
     "deform": "the algorithm",
     "cuda": "devices",
     "itkbridge": "filters for ITK",
     "io": "files",
 }
-
-
-def installed_headers(library):
-    """Paths of the headers of a library, from the root."""
-    text = re.sub(r"#.*", "", (ROOT / library / "CMakeLists.txt").read_text())
-    found = set()
-    for words in re.findall(r"\bHEADERS\b([^)]*)", text):
-        for word in words.split():
-            if not word.endswith((".h", ".hxx")):
-                break  # the next keyword
-            found.add(f"{library}/{word}")
-    return sorted(header for header in found if header.endswith(".h"))
 
 
 def page(library, headers):
@@ -46,7 +36,7 @@ def main():
     folder = pathlib.Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)
     for library in LIBRARIES:
-        headers = installed_headers(library)
+        headers = [header for header in installed_headers(ROOT, library) if header.endswith(".h")]
         if not headers:
             sys.exit(f"api_pages.py: error: no HEADERS in {library}/CMakeLists.txt")
         (folder / f"{library}.md").write_text(page(library, headers))
