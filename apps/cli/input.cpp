@@ -60,9 +60,9 @@ const DicomSeries& choose_series(const DicomScan& scan, const InputOptions& opti
   const bool several =
       std::any_of(scan.series.begin(), scan.series.end(), [](const DicomSeries& series) { return series.volumes > 1; });
   throw InputError(std::to_string(scan.series.size()) + (several ? " volumes" : " series") + " found, " + where +
-                   (!usable           ? "; none of them is a usable volume"
-                    : options.is_main ? "; choose one with --series"
-                                      : "; name a folder that holds one of them alone") +
+                   (!usable               ? "; none of them is a usable volume"
+                    : options.has_options ? "; choose one with --series"
+                                          : "; name a folder that holds one of them alone") +
                    list_series(scan));
 }
 
@@ -146,7 +146,7 @@ InputHeader open_input(const InputOptions& options, const Control& control, bool
   require(!chosen.refusal, chosen.refusal.value_or(""));
   require(!chosen.uneven || options.uneven,
           chosen.uneven.value_or("") + "; add what is missing" +
-              (options.is_main ? ", or give --uneven exact, which takes each slice where it is" : ""));
+              (options.has_options ? ", or give --uneven exact, which takes each slice where it is" : ""));
   DicomSeries series = chosen;
   series.set_aside = set_aside_with(scan, chosen);
   return {series.geometry, VoxelType::i16, series, false, 1};

@@ -124,6 +124,7 @@ void add_common(CLI::App& command, CommonOptions& common, bool writes) {
 }
 
 void add_series(CLI::App& command, InputOptions& input) {
+  input.has_options = true;
   command.add_option("--series", input.series, "Series Instance UID, or the number that `tetwarp info` prints")
       ->type_name("UID");
   command.add_flag("--single", input.single, "Read the one DICOM file alone, not its series");

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "deform/enum_names.h"
@@ -38,9 +39,15 @@ struct InputOptions {
   bool uneven = false;             ///< take slices at uneven distances, each where it is
   FileHash hash = FileHash::made;  ///< of a DICOM series
   NiftiFrame nifti_frame = NiftiFrame::sform;
-  bool is_main = true;  ///< the volume that --series and --uneven speak of; of another one no message names them
+  bool has_options = false;  ///< a command has --series and --uneven for it (add_series), so messages may name them
 
-  friend bool operator==(const InputOptions&, const InputOptions&) = default;
+  /// Whether both read the same. What messages may name does not matter for that.
+  friend bool operator==(const InputOptions& a, const InputOptions& b) {
+    const auto read = [](const InputOptions& one) {
+      return std::tie(one.path, one.series, one.single, one.uneven, one.hash, one.nifti_frame);
+    };
+    return read(a) == read(b);
+  }
 };
 
 struct PhantomOptions {

@@ -81,7 +81,6 @@ FurtherVolumes::FurtherVolumes(const std::vector<std::string>& texts, bool serie
     One& one = volumes_.emplace_back();
     one.options = parse_further(text);
     one.options.input.nifti_frame = frame;
-    one.options.input.is_main = false;
     if (!series && is_object_output(one.options.output)) {
       throw UsageError("a DICOM object refers to a DICOM series, " + one.options.output.string() +
                        "; name a folder as OUTPUT, or .nii.gz, .nii, .nrrd or .mha here");

@@ -95,7 +95,6 @@ InputOptions grid_volume(const std::string& wanted) {
   InputOptions volume;
   volume.path = wanted;
   volume.uneven = true;
-  volume.is_main = false;
   return volume;
 }
 

@@ -72,8 +72,7 @@ void Simulating::read() {
     notes_ = header.notes;
     volume = read_input(options_.input, header, options_.common, stage.control()).volume;
     if (!options_.labels.empty()) {
-      const InputOptions from{
-          .path = options_.labels, .series = {}, .nifti_frame = options_.common.nifti_frame, .is_main = false};
+      const InputOptions from{.path = options_.labels, .series = {}, .nifti_frame = options_.common.nifti_frame};
       const InputHeader labels_header = open_input(from, options_.common);
       notes_.insert(notes_.end(), labels_header.notes.begin(), labels_header.notes.end());
       labels = read_input(from, labels_header, options_.common, stage.control()).volume;

@@ -30,8 +30,7 @@ SimulateOptions as_simulation(const DeformOptions& options, const Worker& worker
 }
 
 AnyVolume read_labels(const DeformOptions& options, const Control& control) {
-  const InputOptions from{
-      .path = options.labels, .series = {}, .nifti_frame = options.common.nifti_frame, .is_main = false};
+  const InputOptions from{.path = options.labels, .series = {}, .nifti_frame = options.common.nifti_frame};
   return read_input(from, open_input(from, control), options.common, control).volume;
 }
 

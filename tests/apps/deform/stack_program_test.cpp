@@ -99,6 +99,12 @@ TEST(StackProgram, UnevenSlicesAreRefusedUnlessTheyAreAskedFor) {
   EXPECT_EQ(other.status, 4);
   EXPECT_TRUE(says(other.err, {"slice gap", "add what is missing"}));
   EXPECT_EQ(other.err.find("--uneven"), std::string::npos) << other.err;
+  // Nor where what a command reads is listed before it is read.
+  const Outcome labels = run_tetwarp(
+      scratch.path(), "deform even --scenario '" TETWARP_SCENARIOS "/incision.json' --labels uneven -o out.nii");
+  EXPECT_EQ(labels.status, 4);
+  EXPECT_TRUE(says(labels.err, {"slice gap", "add what is missing"}));
+  EXPECT_EQ(labels.err.find("--uneven"), std::string::npos) << labels.err;
   EXPECT_EQ(run_tetwarp(scratch.path(), "deform uneven --uneven maybe -f identity -o out.nii").status, 2);
   const Outcome cubic =
       run_tetwarp(scratch.path(), "deform uneven --uneven exact --interpolation cubic -f identity -o out.nii");
