@@ -152,7 +152,7 @@ void require_valid(const Geometry& geometry, const std::string& what) {
     spacing << geometry.spacing[axis];
     require(geometry.spacing[axis] >= kSmallestSpacing && geometry.spacing[axis] <= kLargestSpacing,
             what + ": spacing " + spacing.str() + " mm on axis " + std::to_string(axis) +
-                ", expected a number from 1e-6 to 1e6");
+                ", expected a positive number from 1e-6 to 1e6");
     require(std::isfinite(geometry.origin[axis]), what + ": the origin is not finite");
   }
   const double determinant = glm::determinant(geometry.direction);
