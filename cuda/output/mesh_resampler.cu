@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <glm/common.hpp>
 
-#include "cuda/output/resampler.h"
+#include "cuda/output/cuda_resampler.h"
 #include "cuda/owners/gather.h"
 #include "cuda/owners/mesh_raster.h"
 #include "deform/target_check.h"

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "cuda/output/resampler.h"
+#include "cuda/output/cuda_resampler.h"
 
 #include <algorithm>
 
