@@ -3,38 +3,24 @@
 
 #pragma once
 
-#include <cstddef>
 #include <string>
 
+// What backend/devices.h is made of. A build without CUDA defines it in backend/not_compiled.cpp.
 namespace tetwarp {
 
-/// Number of CUDA devices that this process can use; 0 without a driver, and in a build without CUDA.
+/// Whether kernels are in this build.
+bool is_cuda_compiled();
+/// Number of devices that this process can use; 0 without a driver.
 int cuda_device_count();
-/// Makes the driver do now what the first use of a device costs, a fraction of a second. Without such a device nothing
-/// happens.
+/// Makes the driver do now what the first use of a device costs. Without such a device nothing happens.
 void wake_cuda_device(int device);
 /// Name and memory of a device: "NVIDIA H200, 150 GB".
 /// @throws DeviceError without such a device
-/// @throws NotCompiled in a build without CUDA
 std::string describe_cuda_device(int device);
-/// A stream of a CUDA device, for `Control::stream`. Work queued on it waits for no other work on the device.
-class DeviceStream {
- public:
-  /// Makes a stream of the device with this number.
-  /// @throws DeviceError without such a device
-  /// @throws NotCompiled in a build without CUDA
-  explicit DeviceStream(int device);
-  /// Destroys the stream.
-  ~DeviceStream();
-  DeviceStream(const DeviceStream&) = delete;
-  DeviceStream& operator=(const DeviceStream&) = delete;
-  /// The stream, a cudaStream_t.
-  void* get() const { return stream_; }
-
- private:
-  void* stream_ = nullptr;
-};
-/// Whether this build contains CUDA.
-bool has_cuda();
+/// A cudaStream_t of a device that waits for no other work there.
+/// @throws DeviceError without such a device
+void* create_cuda_stream(int device);
+/// Destroys what `create_cuda_stream` made.
+void destroy_cuda_stream(void* stream);
 
 }  // namespace tetwarp

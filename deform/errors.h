@@ -21,20 +21,20 @@ class InputError : public Error {
   using Error::Error;
 };
 
-/// A CUDA device failed: there is none, its memory is full, or a call returned an error. The text names the call, the
+/// A device failed: there is none, its memory is full, or a call returned an error. The text names the call, the
 /// file and the line.
 class DeviceError : public Error {
  public:
   using Error::Error;
 };
 
-/// A CUDA device has too little free memory for the work. Smaller regions, or the CPU, may still do it.
+/// A device has too little free memory for the work. Smaller regions, or the CPU, may still do it.
 class DeviceMemoryError : public DeviceError {
  public:
   using DeviceError::DeviceError;
 };
 
-/// This build does not contain the part of Tetwarp that was called, such as CUDA, ITK or DCMTK.
+/// This build does not contain the part of Tetwarp that was called, such as a backend, ITK or DCMTK.
 class NotCompiled : public Error {
  public:
   using Error::Error;

@@ -39,10 +39,6 @@ std::int64_t voxel_count(const Region& region) {
 
 Region whole(const Geometry& geometry) { return {glm::i64vec3(0), geometry.size}; }
 
-bool is_empty(const Region& region) {
-  return region.end.x <= region.begin.x || region.end.y <= region.begin.y || region.end.z <= region.begin.z;
-}
-
 bool contains(const Region& outer, const Region& inner) {
   return is_empty(inner) || intersection(outer, inner) == inner;
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "deform/core/host_device.h"
+#include "deform/core/region.h"
 
 namespace tetwarp {
 
@@ -29,15 +30,6 @@ struct Geometry {
 
   /// Whether all numbers are equal.
   friend bool operator==(const Geometry&, const Geometry&) = default;
-};
-
-/// Half-open box of voxels: a voxel is inside where begin <= voxel < end on every axis.
-struct Region {
-  glm::i64vec3 begin{0},  ///< first voxel (i, j, k)
-      end{0};             ///< one after the last voxel on each axis
-
-  /// Whether both corners are equal.
-  friend bool operator==(const Region&, const Region&) = default;
 };
 
 /// The map x -> linear * x + offset. Maps read from right to left, and so compose: `a_from_b * b_from_c`.
@@ -63,8 +55,6 @@ std::int64_t voxel_count(const Geometry& geometry);
 std::int64_t voxel_count(const Region& region);
 /// All voxels of a grid.
 Region whole(const Geometry& geometry);
-/// Whether a box holds no voxel.
-bool is_empty(const Region& region);
 /// Whether `outer` holds every voxel of `inner`.
 bool contains(const Region& outer, const Region& inner);
 /// The voxels that lie in both boxes.

@@ -55,14 +55,6 @@ Resampler::Resampler(Geometry output) : output_(output) {
   }
 }
 
-void Resampler::set_field(const FieldView&, const Control&) {
-  throw InputError("a forward field was given to a resampler of pull fields");
-}
-
-void Resampler::set_field(const PullFieldView&, const Control&) {
-  throw InputError("a pull field was given to a resampler of forward fields");
-}
-
 Report& Report::operator+=(const Report& other) {
   covered += other.covered;
   uncovered += other.uncovered;

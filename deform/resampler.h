@@ -11,6 +11,7 @@
 #include <optional>
 #include <span>
 #include <stop_token>
+#include <utility>
 
 #include "deform/vertex_field.h"
 #include "deform/volume.h"
@@ -107,29 +108,35 @@ struct Report {
   Report& operator+=(const Report& other);
 };
 
-/// Progress and cancellation of one call.
+/// Progress, stop and stream of one call. No part of it changes a result.
 struct Control {
   /// Gets the share that is done, 0 to 1, rising; one call at a time, from any thread.
   std::function<void(double)> progress = {};
   std::stop_token stop = {};  ///< looked at between tiles; when it is set the call throws Cancelled
-  /// For `Resampler::resample`: called for each part of the region that is done, so that it can be used while the rest
-  /// is made. Parts are whole slices, none twice, together the whole region. Outputs in host memory, and
-  /// `Target::sampled_slices`, have their last values there. Calls come from any thread, perhaps several at a time;
-  /// what one throws ends the call.
-  std::function<void(const Region&)> finished = {};
-  /// A cudaStream_t, or null for the default stream. Work is queued there after what is queued already, and the call
-  /// returns when it is done. The CPU ignores it.
+  /// A stream of the device, of the kind that its backend has (`DeviceStream`, backend/devices.h), or null for the
+  /// device's default one. Work is queued there after what is queued already, and the call returns when it is done. The
+  /// CPU ignores it.
   void* stream = nullptr;
-  /// For `Resampler::set_field`: whether reports state `jacobian_min` and `jacobian_max`. Inverted tetrahedra are
-  /// always counted.
+};
+
+/// What is found out of a forward field beside what deforming needs.
+struct FieldOptions {
+  /// Whether reports state `jacobian_min` and `jacobian_max`. Inverted tetrahedra are always counted.
   bool jacobian_range = true;
 };
 
-/// Sends volumes through a field onto one output grid; takes one field after another.
+/// Takes each part of a region when `Resampler::resample` is done with it, so that it can be used while the rest is
+/// made. Parts are whole slices of the region, none twice, together the whole region. Outputs in host memory, and
+/// `Target::sampled_slices`, have their last values there. Calls come from any thread, perhaps several at a time; what
+/// one throws ends `resample`.
+using PartSink = std::function<void(const Region&)>;
+
+/// Sends volumes through a field onto one output grid. Its two children take the field, one after another:
+/// ForwardResampler forward fields, PullResampler pull fields.
 ///
-/// A CUDA resampler takes fields, sources, outputs and maps in host or device memory, in any mixture. Device memory
-/// must belong to its own device, and is used in place. The CPU refuses device memory. One object serves one thread at
-/// a time.
+/// A resampler on a device takes fields, sources, outputs and maps in host or device memory, in any mixture. Device
+/// memory must belong to its own device, and is used in place. The CPU refuses device memory. One object serves one
+/// thread at a time.
 ///
 /// The result depends on source, field and output grid alone (docs/design/definition.md): it has the same bits for any
 /// number of threads, any split into regions and any backend.
@@ -140,25 +147,20 @@ class Resampler {
   /// The output grid.
   const Geometry& output() const { return output_; }
 
-  /// Checks a forward field and makes it ready. The view is kept: its vertices must not change until the next call.
-  /// @throws InputError for a field that is not finite, lies too far away, is too fine, or does not reach over the
-  ///         output with Outside::refuse; and always if this resampler is for pull fields
-  virtual void set_field(const FieldView& field, const Control& control = {});
-  /// Checks a pull field and makes it ready. The view is kept: its samples must not change until the next call. A NaN
-  /// among them says that there is no source.
-  /// @throws InputError for a field that is infinite somewhere, lies too far away, or does not reach over the output
-  ///         with Outside::refuse; and always if this resampler is for forward fields
-  virtual void set_field(const PullFieldView& field, const Control& control = {});
-
   /// The voxels of a source grid that `resample` may read for the output region `output`. A reader that streams must
   /// hold them.
   virtual Region source_region(const Geometry& source, Region output) const = 0;
 
   /// Computes `region` of every target and map.
+  /// @param region    part of the output grid
+  /// @param targets   volumes that go through the field, if any
+  /// @param maps      further results
+  /// @param control   progress, stop and stream
+  /// @param finished  gets the parts of the region that are done, unless empty
   /// @throws InputError for views that do not fit
   /// @throws Cancelled
   virtual Report resample(Region region, std::span<const Target> targets, const Maps& maps = {},
-                          const Control& control = {}) = 0;
+                          const Control& control = {}, const PartSink& finished = {}) = 0;
 
  protected:
   /// For implementations.
@@ -168,6 +170,38 @@ class Resampler {
 
  private:
   Geometry output_;
+};
+
+/// A resampler of forward fields.
+class ForwardResampler : public Resampler {
+ public:
+  /// Checks a forward field and makes it ready. The view is kept: its vertices must not change until the next call.
+  /// @param field    forward field
+  /// @param options  what reports state of it
+  /// @param control  stop and stream
+  /// @throws InputError for a field that is not finite, lies too far away, is too fine, or does not reach over the
+  ///         output with Outside::refuse
+  virtual void set_field(const FieldView& field, const FieldOptions& options = {}, const Control& control = {}) = 0;
+
+ protected:
+  /// For implementations. @throws InputError as the base
+  explicit ForwardResampler(Geometry output) : Resampler(std::move(output)) {}
+};
+
+/// A resampler of pull fields.
+class PullResampler : public Resampler {
+ public:
+  /// Checks a pull field and makes it ready. The view is kept: its samples must not change until the next call. A NaN
+  /// among them says that there is no source.
+  /// @param field    pull field
+  /// @param control  stop and stream
+  /// @throws InputError for a field that is infinite somewhere, lies too far away, or does not reach over the output
+  ///         with Outside::refuse
+  virtual void set_field(const PullFieldView& field, const Control& control = {}) = 0;
+
+ protected:
+  /// For implementations. @throws InputError as the base
+  explicit PullResampler(Geometry output) : Resampler(std::move(output)) {}
 };
 
 /// How much of the machine may be used.
@@ -181,32 +215,21 @@ struct Limits {
 
 /// A resampler of forward fields on the CPU.
 /// @throws InputError for an output with fewer than two voxels, or more than 2^18, on an axis
-std::unique_ptr<Resampler> make_cpu_resampler(Geometry output, Limits limits = {});
+std::unique_ptr<ForwardResampler> make_cpu_resampler(Geometry output, Limits limits = {});
 /// A resampler of pull fields on the CPU.
 /// @throws InputError for an output with fewer than two voxels, or more than 2^18, on an axis
-std::unique_ptr<Resampler> make_cpu_pull_resampler(Geometry output, Limits limits = {});
-
-/// A resampler of forward fields on a CUDA device, with the same bits as on the CPU.
-///
-/// Fields, sources and results in host memory pass through pinned memory, while kernels run. Calls of repeated sizes
-/// allocate nothing. `set_field` and `resample` throw DeviceError where not even one slice fits the memory allowed.
-/// @throws DeviceError without a device
-/// @throws NotCompiled in a build without CUDA
-std::unique_ptr<Resampler> make_cuda_resampler(Geometry output, int device = 0, Limits limits = {});
-/// A resampler of pull fields on a CUDA device, with the same bits as on the CPU.
-/// @throws DeviceError without a device
-/// @throws NotCompiled in a build without CUDA
-std::unique_ptr<Resampler> make_cuda_pull_resampler(Geometry output, int device = 0, Limits limits = {});
+std::unique_ptr<PullResampler> make_cpu_pull_resampler(Geometry output, Limits limits = {});
 
 /// Deforms one whole volume by one field onto the grid of a resampler. The background is the smallest value of the
 /// source.
-/// @param resampler  one for forward fields
+/// @param resampler  its output grid is that of the result
 /// @param source     volume in host memory
 /// @param field      field that must reach over the output grid
 /// @param report     gets what happened, unless null
 /// @throws InputError for an empty source, or a field that does not fit
 template <class V>
-Volume<V> resample(Resampler& resampler, const Volume<V>& source, const VertexField& field, Report* report = nullptr) {
+Volume<V> resample(ForwardResampler& resampler, const Volume<V>& source, const VertexField& field,
+                   Report* report = nullptr) {
   require(!source.voxels.empty(), "the source volume is empty");
   Volume<V> output{resampler.output(), std::vector<V>(static_cast<std::size_t>(voxel_count(resampler.output())))};
   resampler.set_field(view(field));

@@ -323,7 +323,7 @@ Residuals InverseCheck::forward_after_inverse() const { return state_->forward.r
 
 Residuals InverseCheck::inverse_after_forward() const { return state_->back.residuals(); }
 
-RoundTrip measure_round_trip(Resampler& resampler, const VertexField& field, const Limits& limits,
+RoundTrip measure_round_trip(ForwardResampler& resampler, const VertexField& field, const Limits& limits,
                              const Control& control) {
   const Geometry& grid = resampler.output();
   SlicedField inverse(grid);

@@ -82,7 +82,7 @@ struct RoundTrip {
 /// @param limits     number of threads
 /// @param control    only its stop and stream are used
 /// @throws InputError and others, as `Resampler::resample`
-RoundTrip measure_round_trip(Resampler& resampler, const VertexField& field, const Limits& limits = {},
+RoundTrip measure_round_trip(ForwardResampler& resampler, const VertexField& field, const Limits& limits = {},
                              const Control& control = {});
 
 }  // namespace tetwarp

@@ -183,7 +183,7 @@ Region mesh_source_region(const SnappedMesh& mesh, bool stays_outside, const Geo
   glm::dvec3 all_low(kInfinity), all_high(-kInfinity);  // of undeformed places, output index
   for (std::size_t n = 0; n < mesh.tetrahedra.size(); ++n) {
     const Tetrahedron t = mesh.tetrahedron(n);
-    if (detail::is_empty(detail::candidates(mesh.nudge, box_of(t), {region.begin, region.end}))) continue;
+    if (is_empty(detail::candidates(mesh.nudge, box_of(t), region))) continue;
     glm::dvec3 low(kInfinity), high(-kInfinity);
     for (const Vertex* v : {&t.a, &t.b, &t.c, &t.d}) {
       const glm::dvec3 rest = glm::dvec3(v->deformed + v->u) * kVoxelsPerStepExactly;

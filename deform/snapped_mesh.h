@@ -80,7 +80,7 @@ class TetrahedronPlanes {
   }
 
   /// False only where a face is certain to lie between the tetrahedron and all voxels of a box, nudged.
-  TETWARP_HD bool may_reach(const VoxelBox& box) const {
+  TETWARP_HD bool may_reach(const Region& box) const {
     const glm::dvec3 low(glm::dvec3(box.begin) * double{kStepsPerVoxel} - 1.0),  // a nudge is shorter than a step
         high(glm::dvec3(box.end - std::int64_t{1}) * double{kStepsPerVoxel} + 1.0);
     for (const Plane& plane : planes_) {

@@ -102,7 +102,8 @@ void check_maps(const Maps& maps, const Geometry& output, const Region& region) 
 }
 
 void require_host(Memory memory, const std::string& name) {
-  require(memory == Memory::host, name + " is in device memory, which the CPU cannot read; use make_cuda_resampler");
+  require(memory == Memory::host,
+          name + " is in device memory, which the CPU cannot read; use a resampler on that device");
 }
 
 SourceRelation relate(const Geometry& source, const Geometry& output, const double* slices) {

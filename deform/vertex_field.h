@@ -10,6 +10,13 @@
 
 namespace tetwarp {
 
+/// Which way a field maps. In the code the two are types of their own; this names one of them where a file or an option
+/// decides.
+enum class Direction : std::uint8_t {
+  forward,  ///< undeformed to deformed points (VertexField)
+  pull      ///< output to input points (PullField)
+};
+
 /// Tetrahedra of any size, as finite element programs write them. Inside each the map is affine.
 struct TetrahedralMesh {
   std::vector<glm::dvec3> rest;          ///< undeformed place of each vertex, LPS mm
@@ -56,7 +63,7 @@ struct PullField {
 /// What becomes of a voxel that lies outside the undeformed lattice or mesh (or the grid of a pull field) and that no
 /// tetrahedron owns.
 enum class Outside : std::uint8_t {
-  refuse,     ///< the field must reach over the whole output; otherwise `Resampler::set_field` throws
+  refuse,     ///< the field must reach over the whole output; otherwise `set_field` of the resampler throws
   rest,       ///< the voxel stays where it is
   background  ///< the voxel gets the background, and coverage 0
 };

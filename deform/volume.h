@@ -30,7 +30,7 @@ enum class VoxelType : std::uint8_t {
 /// Where the values of a view lie.
 enum class Memory : std::uint8_t {
   host,   ///< memory of the CPU
-  device  ///< memory of the CUDA device for which the resampler was made
+  device  ///< memory of the device for which the resampler was made
 };
 
 /// Bytes of one value of a type.

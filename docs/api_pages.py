@@ -17,7 +17,7 @@ from installed_headers import installed_headers  # noqa: E402
 
 LIBRARIES = {
     "deform": "the algorithm",
-    "cuda": "devices",
+    "backend": "where work is done",
     "itkbridge": "filters for ITK",
     "io": "files",
 }

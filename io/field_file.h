@@ -14,19 +14,14 @@
 
 namespace tetwarp {
 
-/// Which way a field maps.
-enum class FieldDirection : std::uint8_t {
-  forward,  ///< undeformed to deformed points
-  pull      ///< output to input points
-};
 /// The word "forward" or "pull".
-std::string to_string(FieldDirection direction);
+std::string to_string(Direction direction);
 
 /// A displacement field, whatever conventions its file has: displacements, not positions, in LPS mm.
 struct FieldFile {
-  Geometry grid;                            ///< grid of the samples
-  std::vector<glm::vec3> displacement;      ///< one for each sample, LPS mm, i fastest
-  std::optional<FieldDirection> direction;  ///< as the file states it; empty for most files of other tools
+  Geometry grid;                        ///< grid of the samples
+  std::vector<glm::vec3> displacement;  ///< one for each sample, LPS mm, i fastest
+  std::optional<Direction> direction;   ///< as the file states it; empty for most files of other tools
 };
 
 /// How a property of a field is known.
@@ -47,7 +42,7 @@ struct FieldFileHeader {
   /// only the size of `grid` is known.
   bool has_own_grid = true;
   std::string format;                                ///< such as "NIfTI, intent 1006 (DISPVECT)"
-  std::optional<FieldDirection> direction;           ///< empty: not known
+  std::optional<Direction> direction;                ///< empty: not known
   std::string frame = "LPS";                         ///< axes of the vectors: LPS, RAS, or index for the grid's i, j, k
   std::string units = "mm";                          ///< unit of the vectors: mm or voxel
   bool absolute = false;                             ///< whether the vectors are positions, not displacements
@@ -115,6 +110,6 @@ void write_field_file(const std::filesystem::path& path, const PullField& field)
 /// @throws InputError for a suffix that no volume file has
 /// @throws Error when the file cannot be written
 std::unique_ptr<ImageWriter> create_field_file(const std::filesystem::path& path, const Geometry& grid,
-                                               FieldDirection direction);
+                                               Direction direction);
 
 }  // namespace tetwarp

@@ -117,7 +117,7 @@ class ITK_TEMPLATE_EXPORT OutputGridFilter : public TSuperclass {
   /** Where the work is done: "auto" (the default), "cpu" or "cuda". */
   void SetBackend(const std::string& backend);
   /** The value that `SetBackend` set. */
-  const std::string& GetBackend() const { return m_Options.backend; }
+  std::string GetBackend() const { return tetwarp::name_of(m_Options.backend); }
 
   /** Number of the CUDA device; 0 by default. */
   void SetDevice(int device);
@@ -131,7 +131,7 @@ class ITK_TEMPLATE_EXPORT OutputGridFilter : public TSuperclass {
   std::uint64_t GetDeviceMemory() const { return m_Options.device_memory; }
 
   /** Where the last work was done, "cpu" or "cuda"; empty before. */
-  const std::string& GetUsedBackend() const { return m_Resampler.backend(); }
+  std::string GetUsedBackend() const { return m_Resampler.backend(); }
 
   /** What happened when the output was last made: voxels covered, tetrahedra inverted and so on. Reports of regions add
    * up (`+=`). */

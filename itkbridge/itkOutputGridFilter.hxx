@@ -29,10 +29,10 @@ void OutputGridFilter<TSuperclass>::SetOutputParametersFromImage(const Reference
 
 template <typename TSuperclass>
 void OutputGridFilter<TSuperclass>::SetBackend(const std::string& backend) {
-  if (backend != "auto" && backend != "cpu" && backend != "cuda")
-    itkExceptionMacro(<< "unknown backend \"" << backend << "\"; expected auto, cpu or cuda");
-  if (backend == m_Options.backend) return;
-  m_Options.backend = backend;
+  tetwarp::BackendChoice choice{};
+  tetwarp::translate_errors(*this, [&] { choice = tetwarp::backend_choice(backend); });
+  if (choice == m_Options.backend) return;
+  m_Options.backend = choice;
   this->Modified();
 }
 
@@ -102,7 +102,7 @@ void OutputGridFilter<TSuperclass>::PrintSelf(std::ostream& os, Indent indent) c
   os << indent << "OutputDirection: " << m_OutputDirection << std::endl;
   os << indent << "UseReferenceImage: " << (m_UseReferenceImage ? "On" : "Off") << std::endl;
   os << indent << "Outside: " << m_Outside << std::endl;
-  os << indent << "Backend: " << m_Options.backend << std::endl;
+  os << indent << "Backend: " << this->GetBackend() << std::endl;
   os << indent << "UsedBackend: " << (m_Resampler.backend().empty() ? "(none yet)" : m_Resampler.backend())
      << std::endl;
   os << indent << "Device: " << m_Options.device << std::endl;

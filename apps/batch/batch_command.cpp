@@ -13,7 +13,8 @@
 #include "apps/batch/threads.h"
 #include "apps/cli/input.h"
 #include "apps/cli/output.h"
-#include "cuda/devices.h"
+#include "backend/devices.h"
+#include "backend/factories.h"
 #include "io/parallel.h"
 #include "io/shown_text.h"
 
@@ -148,7 +149,7 @@ int Batch::run() {
     }
   }
   Progress progress(form());
-  const int cuda = options_.backend == "cpu" ? 0 : cuda_device_count();
+  const int cuda = may_use_device(options_.backend) ? device_count() : 0;
   Devices devices(options_.backend, cuda);
   const Threads threads(wanted_jobs(devices, cuda > 0));  // before anything else needs threads
   check(progress);
@@ -160,7 +161,7 @@ int Batch::run() {
   std::error_code unknown;
   const bool made_before = options_.resume && fs::exists(options_.output, unknown);
   if (!made_before) check_space(found_, options_.output);  // before a folder is begun that another run would refuse
-  if (options_.backend == "cuda" && cuda == 0) make_backend("cuda", Direction::forward, Geometry(), 0, {});
+  if (demands_device(options_.backend) && cuda == 0) make_forward_resampler(chosen(options_.backend), Geometry());
   OutputFolder folder(options_.output, shard_, ids_of(cases_), hash_file(options_.manifest), options_.resume);
   Results results(folder, ids());
   find_finished(folder, results);

@@ -7,7 +7,7 @@
 
 #include "apps/batch/case_record.h"
 #include "apps/cli/reads.h"
-#include "cuda/devices.h"
+#include "backend/devices.h"
 #include "io/opened_file.h"
 
 namespace tetwarp::apps {
@@ -46,7 +46,7 @@ Record attempt(const BatchCase& of, const Retry& retry, const Resources& resourc
                std::optional<int>& device, json& timing) {
   DeformOptions options = of.options;
   options.memory_bytes = retry.device_bytes;
-  if (retry.on_cpu) options.backend = "cpu";
+  if (retry.on_cpu) options.backend = BackendChoice::cpu;
   Clock clock;
   Deformation deformation(options, resources.inputs.get(options.input));
   const std::vector<std::string> further = further_reads_of(options).digests(options.common.threads);
@@ -58,7 +58,7 @@ Record attempt(const BatchCase& of, const Retry& retry, const Resources& resourc
   deformation.read();
   timing["read"] = clock.lap();
   if (!is_simulated_on_device(options)) {
-    deformation.make_field({"cpu", 0});
+    deformation.make_field({BackendChoice::cpu, 0});
     timing["field"] = clock.lap();
   }
   {
@@ -67,9 +67,9 @@ Record attempt(const BatchCase& of, const Retry& retry, const Resources& resourc
     timing["wait_device"] = clock.lap();
     Clock held;
     Worker worker = lease.worker();
-    timing["worker"] = worker.backend;
+    timing["worker"] = name_of(worker.backend);
     std::optional<DeviceStream> stream;  // cases on a device do not wait for each other
-    if (worker.backend == "cuda") {
+    if (demands_device(worker.backend)) {
       device = worker.device;
       timing["device"] = *device;
       worker.stream = stream.emplace(*device).get();

@@ -213,7 +213,7 @@ void Reader::check_files(const DeformOptions& options) {
 
 /// Mass-spring has other bits on each backend: which one is the case's to say, not the machine's.
 void Reader::check_backend(const DeformOptions& options) {
-  if (options.scenario.empty() || options.backend != "auto") return;
+  if (options.scenario.empty() || !leaves_open(options.backend)) return;
   require(read_scenario(options.scenario).method != simulate::Method::mass_spring,
           "a mass-spring scenario has other bits on each backend, " + shown(options.scenario) +
               "; give the row backend cpu or cuda");

@@ -39,17 +39,17 @@ MemoryBudget::Grant::~Grant() {
   of_->changed_.notify_all();
 }
 
-Devices::Devices(const std::string& wanted, int cuda) : wanted_(wanted), cuda_(wanted == "cpu" ? 0 : cuda) {
+Devices::Devices(BackendChoice wanted, int cuda) : wanted_(wanted), cuda_(may_use_device(wanted) ? cuda : 0) {
   free_.assign(static_cast<std::size_t>(cuda_), kPlaces);
   count_ = std::max<std::size_t>(1, free_.size());
 }
 
-bool Devices::is_cuda(const std::string& wanted) const {
-  const std::string& of_case = meant_by(wanted);
-  return of_case == "cuda" || (of_case == "auto" && is_any_left());
+bool Devices::is_cuda(BackendChoice wanted) const {
+  const BackendChoice of_case = meant_by(wanted);
+  return demands_device(of_case) || (leaves_open(of_case) && is_any_left());
 }
 
-Devices::Lease Devices::wait_for(const std::string& wanted, Share share, const std::stop_token& stop) {
+Devices::Lease Devices::wait_for(BackendChoice wanted, Share share, const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   const bool alone = share == Share::alone && is_cuda(wanted);
   const int places = alone ? kPlaces : 1;
@@ -65,13 +65,13 @@ Devices::Lease Devices::wait_for(const std::string& wanted, Share share, const s
   if (!goes_on) throw Cancelled();
   if (!is_cuda(wanted)) {
     cpu_is_free_ = false;
-    return {*this, {"cpu", 0}, 0};
+    return {*this, {BackendChoice::cpu, 0}, 0};
   }
   if (!is_any_left())
     throw DeviceError("no CUDA device is left for the case; use --backend auto, the bits are the same");
   const auto device = freest();
   *device -= places;
-  return {*this, {"cuda", static_cast<int>(device - free_.begin())}, places};
+  return {*this, {BackendChoice::cuda, static_cast<int>(device - free_.begin())}, places};
 }
 
 void Devices::lose(int device) {
@@ -83,7 +83,7 @@ void Devices::lose(int device) {
 
 void Devices::give_back(const Worker& worker, int places) {
   const std::lock_guard lock(mutex_);
-  if (worker.backend == "cpu")
+  if (!may_use_device(worker.backend))
     cpu_is_free_ = true;
   else if (!lost_.contains(worker.device))
     free_[static_cast<std::size_t>(worker.device)] += places;

@@ -56,9 +56,9 @@ class Devices {
   static constexpr int kPlaces = 3;
   enum class Share { with_others, alone };
 
-  /// @param wanted  "auto", "cpu" or "cuda"
+  /// @param wanted  of the batch
   /// @param cuda    number of CUDA devices
-  Devices(const std::string& wanted, int cuda);
+  Devices(BackendChoice wanted, int cuda);
 
   /// A place that a case holds until this object dies.
   class Lease {
@@ -76,14 +76,14 @@ class Devices {
   };
 
   /// Waits for a free place.
-  /// @param wanted  backend of the case; "auto" is the backend of the batch
+  /// @param wanted  of the case; where it leaves open, that of the batch counts
   /// @param share   alone: a CUDA device without other cases; cases that come later wait meanwhile
   /// @throws DeviceError where CUDA is chosen and no device is left
   /// @throws Cancelled when a stop is requested
-  Lease wait_for(const std::string& wanted, Share share, const std::stop_token& stop);
+  Lease wait_for(BackendChoice wanted, Share share, const std::stop_token& stop);
   /// Whether the CPU may take a case that no CUDA device can.
-  /// @param wanted  backend of the case
-  bool may_fall_back(const std::string& wanted) const { return meant_by(wanted) == "auto"; }
+  /// @param wanted  of the case
+  bool may_fall_back(BackendChoice wanted) const { return leaves_open(meant_by(wanted)); }
   /// Withdraws a device that failed: no case gets it any more.
   void lose(int device);
   std::size_t count() const { return count_; }  ///< of those that there were at first, the processor as one
@@ -91,12 +91,12 @@ class Devices {
   std::size_t places() const { return cuda_ > 0 ? count_ * kPlaces : 1; }
 
  private:
-  const std::string& meant_by(const std::string& wanted) const { return wanted == "auto" ? wanted_ : wanted; }
-  bool is_cuda(const std::string& wanted) const;
+  BackendChoice meant_by(BackendChoice wanted) const { return leaves_open(wanted) ? wanted_ : wanted; }
+  bool is_cuda(BackendChoice wanted) const;
   bool is_any_left() const { return static_cast<int>(lost_.size()) < cuda_; }
   void give_back(const Worker& worker, int places);
 
-  std::string wanted_;
+  BackendChoice wanted_;
   std::vector<int> free_;  ///< places of each CUDA device
   std::set<int> lost_;
   int waiting_alone_ = 0;

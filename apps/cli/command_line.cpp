@@ -9,7 +9,7 @@
 
 #include "apps/cli/command_line.h"
 #include "apps/cli/option_groups.h"
-#include "cuda/backend.h"
+#include "backend/backend.h"
 #include "deform/version.h"
 #include "io/shown_text.h"
 
@@ -331,11 +331,8 @@ void add_batch(CLI::App& app, BatchOptions& options) {
   command->add_option("--jobs", options.jobs, "Cases in work at once; 0: eight for each CUDA device, or three")
       ->check(whole_number(0, 65536))
       ->capture_default_str();
-  command
-      ->add_option("--backend", options.backend,
-                   "auto (all CUDA devices where one works, otherwise the CPU), cuda or cpu; the bits are the same")
-      ->check(CLI::IsMember({"auto", "cuda", "cpu"}))
-      ->capture_default_str();
+  add_backend_choice(*command, options.backend,
+                     "auto (all CUDA devices where one works, otherwise the CPU), cuda or cpu; the bits are the same");
   command->add_flag("--log-json", options.log_json, "Say what happens as JSON Lines on standard error");
   command->add_flag("--dry-run", options.dry_run, "Check the manifest and say what would be done");
   add_common(*command, options.common, true);

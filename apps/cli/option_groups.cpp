@@ -151,8 +151,16 @@ void add_nifti_frame(CLI::App& command, CommonOptions& common, InputOptions& inp
       ->default_str("sform");
 }
 
-void add_backend(CLI::App& command, std::string& backend, int& device, const char* help) {
-  command.add_option("--backend", backend, help)->check(CLI::IsMember({"auto", "cuda", "cpu"}))->capture_default_str();
+void add_backend_choice(CLI::App& command, BackendChoice& backend, const char* help) {
+  command
+      .add_option_function<std::string>(
+          "--backend", [&backend](const std::string& word) { backend = backend_choice(word); }, help)
+      ->check(CLI::IsMember(backend_words()))
+      ->default_str(name_of(backend));
+}
+
+void add_backend(CLI::App& command, BackendChoice& backend, int& device, const char* help) {
+  add_backend_choice(command, backend, help);
   command.add_option("--device", device, "CUDA device, as `tetwarp --version` numbers them")
       ->check(whole_number(0, kMostDevices))
       ->type_name("N")

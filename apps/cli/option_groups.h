@@ -55,8 +55,10 @@ void add_common(CLI::App& command, CommonOptions& common, bool writes);
 void add_series(CLI::App& command, InputOptions& input);
 /// --nifti-frame, for `input` and all else that the command reads.
 void add_nifti_frame(CLI::App& command, CommonOptions& common, InputOptions& input);
+/// --backend.
+void add_backend_choice(CLI::App& command, BackendChoice& backend, const char* help);
 /// --backend, --device.
-void add_backend(CLI::App& command, std::string& backend, int& device,
+void add_backend(CLI::App& command, BackendChoice& backend, int& device,
                  const char* help = "auto, cuda or cpu: the bits are the same");
 /// --outside.
 void add_outside(CLI::App& command, Outside& outside);

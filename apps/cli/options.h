@@ -10,6 +10,7 @@
 #include <tuple>
 #include <vector>
 
+#include "backend/backend.h"
 #include "deform/enum_names.h"
 #include "deform/errors.h"
 #include "deform/resampler.h"
@@ -79,7 +80,7 @@ struct InvertOptions {
   InputOptions like;
   std::filesystem::path output, report;
   std::optional<std::int64_t> cell_size;
-  std::string backend = "auto";
+  BackendChoice backend = BackendChoice::automatic;
   int device = 0;  ///< of CUDA
 };
 
@@ -97,7 +98,7 @@ struct DeformOptions {
   std::filesystem::path write_field;       ///< where the forward field that was used goes
   std::filesystem::path output;
   std::filesystem::path folder;  ///< that all outputs lie in and that appears as a whole; empty: each by itself
-  std::string backend = "auto";
+  BackendChoice backend = BackendChoice::automatic;
   int device = 0;  ///< of CUDA
   Interpolation interpolation = Interpolation::linear;
   Outside outside = Outside::refuse;
@@ -123,7 +124,7 @@ struct SimulateOptions {
   InputOptions input;
   std::filesystem::path labels;  ///< on the grid of INPUT
   std::filesystem::path output, report;
-  std::string backend = "auto";
+  BackendChoice backend = BackendChoice::automatic;
   int device = 0;  ///< of CUDA
   int every = 0;   ///< frames; 0: none on the way
   bool dry_run = false;
@@ -139,7 +140,7 @@ struct BatchOptions {
   std::string shard;  ///< "I/N"; empty: all
   std::optional<std::uint64_t> memory_bytes;
   int jobs = 0;
-  std::string backend = "auto";
+  BackendChoice backend = BackendChoice::automatic;
 };
 
 struct RenderOptions {
@@ -152,7 +153,7 @@ struct RenderOptions {
   Outside outside = Outside::refuse;
   std::optional<double> fill;    ///< value where nothing maps
   std::filesystem::path output;  ///< .png; of several pictures with numbers; or .mp4 .gif
-  std::string backend = "auto";
+  BackendChoice backend = BackendChoice::automatic;
   int device = 0;               ///< of CUDA
   std::string view = "volume";  ///< volume, axial, coronal, sagittal or montage
   std::string transfer;         ///< a name, or a JSON file; empty: ct-bone for values like HU, else mip

@@ -3,7 +3,7 @@
 
 #include "apps/cli/beside.h"
 #include "apps/deform/deformation.h"
-#include "cuda/devices.h"
+#include "backend/devices.h"
 
 namespace tetwarp::apps {
 
@@ -15,7 +15,7 @@ int run_deform(const DeformOptions& options) {
     return 0;
   }
   const auto awake = beside([&] {  // beside reading
-    if (means_cuda(options.backend)) wake_cuda_device(options.device);
+    if (runs_on_device(chosen(options.backend))) wake_device(options.device);
   });
   const Worker worker{options.backend, options.device};
   deformation.open();

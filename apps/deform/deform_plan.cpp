@@ -196,7 +196,7 @@ DeformPlan plan_deformation(const DeformOptions& options, DeformOutputs& outputs
   const Geometry& grid = options.grid == "fit" ? input.geometry : plan.grid;
   plan.bytes = plan_bytes(options, outputs, input, grid);
   plan.output_bytes = output_bytes(options, outputs, input, grid);
-  if (options.memory_bytes && plan.bytes > *options.memory_bytes && !means_cuda(options.backend)) {
+  if (options.memory_bytes && plan.bytes > *options.memory_bytes && !runs_on_device(chosen(options.backend))) {
     throw Error("about " + format_bytes(plan.bytes) + " of memory are needed, --memory allows " +
                 format_bytes(*options.memory_bytes) + "; a larger --cell-size needs less");
   }

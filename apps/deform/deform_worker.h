@@ -3,13 +3,13 @@
 
 #pragma once
 
-#include <string>
+#include "backend/backend.h"
 
 namespace tetwarp::apps {
 
-/// What computes: a backend by its wish (auto, cpu, cuda), and the device of CUDA.
+/// What computes: a backend by its choice, and the number of a device.
 struct Worker {
-  std::string backend = "auto";
+  BackendChoice backend = BackendChoice::automatic;
   int device = 0;
   void* stream = nullptr;  ///< of the device, for all that is queued there; null: its default stream
 };

@@ -9,7 +9,6 @@
 #include "apps/cli/beside.h"
 #include "apps/deform/output_grid.h"
 #include "apps/simulate/simulated_field.h"
-#include "cuda/devices.h"
 #include "deform/fields/lattice_mesh.h"
 #include "deform/mass.h"
 #include "io/dicom_bids.h"
@@ -86,13 +85,14 @@ void Deformation::make_field(const Worker& worker) {
 void Deformation::resample(const Worker& worker) {
   Stage stage(options_.common, "resample");
   const Limits limits{.threads = options_.common.threads, .memory = options_.memory_bytes.value_or(0)};
-  Backend backend = make_backend(worker.backend, record_.field.direction, record_.plan.grid, worker.device, limits);
-  record_.backend = backend.name;
+  const AnyResampler resampler(chosen(worker.backend), record_.field.direction, record_.plan.grid, worker.device,
+                               limits);
+  record_.backend = name_of(resampler.backend());
   // What --grid fit adds lies beyond the lattice; that this reaches over INPUT is known.
   const bool grown = options_.grid == "fit" && options_.outside == Outside::refuse;
   const Outside outside = grown ? Outside::background : options_.outside;
   const Control quiet{.stop = interrupt_token(), .stream = worker.stream};
-  set_field(*backend.resampler, outside, quiet);
+  set_field(resampler, outside, quiet);
   if (!record_.points.empty())
     record_.points.move(record_.plan.grid, view(record_.field.forward.field, outside), limits, quiet);
   sampled_slices_.resize(record_.outputs.series ? static_cast<std::size_t>(record_.plan.grid.size.z) : 0);
@@ -106,25 +106,26 @@ void Deformation::resample(const Worker& worker) {
   targets.insert(targets.begin(), main_target());
   Control control = stage.control();
   control.stream = worker.stream;
+  PartSink finished;
   if (record_.outputs.series || options_.preserve_mass) {
-    control.finished = [&](const Region& slices) {
+    finished = [&](const Region& slices) {
       if (options_.preserve_mass) scale_mass(slices);
       if (record_.outputs.series) record_.outputs.set.write([&] { write_slices(slices); });
     };
   }
   maps.run([&](const Region& slab, const Maps& of_slab) {
     mass_.maps = of_slab;
-    record_.report += resample_slab(*backend.resampler, slab, targets, of_slab, control);
+    record_.report += resample_slab(*resampler, slab, targets, of_slab, control, finished);
   });
   record_.report.clamped += mass_.saturated;
-  move_structures(*backend.resampler, outside, quiet);
+  move_structures(*resampler, outside, quiet);
   resample_onto_own_grids(worker);
   record_.stages.emplace_back("resample", stage.seconds());
-  if (reports_quality(options_)) check(*backend.resampler, quiet);
+  if (reports_quality(options_)) check(resampler.forward(), quiet);
 }
 
 /// Looks at the field, and where its inverse leads. @param resampler  holds the field
-void Deformation::check(Resampler& resampler, const Control& control) {
+void Deformation::check(ForwardResampler& resampler, const Control& control) {
   Stage stage(options_.common, "check");
   const Limits limits{.threads = options_.common.threads};
   const VertexField& field = record_.field.forward.field;
@@ -168,11 +169,11 @@ void Deformation::scale_mass(const Region& slices) {
                                    record_.output.view(), slices);
 }
 
-void Deformation::set_field(Resampler& resampler, Outside outside, const Control& control) const {
+void Deformation::set_field(const AnyResampler& resampler, Outside outside, const Control& control) const {
   if (record_.field.direction == Direction::pull) {
-    resampler.set_field(view(record_.field.pull, outside), control);
+    resampler.pull().set_field(view(record_.field.pull, outside), control);
   } else {
-    resampler.set_field(view(record_.field.forward.field, outside), control);
+    resampler.forward().set_field(view(record_.field.forward.field, outside), {}, control);
   }
 }
 
@@ -180,10 +181,10 @@ void Deformation::resample_onto_own_grids(const Worker& worker) {
   const Limits limits{.threads = options_.common.threads, .memory = options_.memory_bytes.value_or(0)};
   const Control control{.stop = interrupt_token(), .stream = worker.stream};
   for (const Geometry& grid : record_.outputs.further->own_grids()) {
-    const Backend backend = make_backend(worker.backend, record_.field.direction, grid, worker.device, limits);
-    set_field(*backend.resampler, options_.outside, control);
+    const AnyResampler resampler(chosen(worker.backend), record_.field.direction, grid, worker.device, limits);
+    set_field(resampler, options_.outside, control);
     const std::vector<Target> targets = record_.outputs.further->targets_on(grid, true, options_.interpolation);
-    backend.resampler->resample(whole(grid), targets, {}, control);
+    resampler->resample(whole(grid), targets, {}, control);
   }
 }
 

@@ -12,6 +12,7 @@
 #include "apps/cli/shared_input.h"
 #include "apps/deform/deform_report.h"
 #include "apps/deform/deform_worker.h"
+#include "backend/factories.h"
 
 namespace tetwarp::apps {
 
@@ -46,8 +47,8 @@ class Deformation {
 
  private:
   void note_series(const DicomSeries& series);
-  void check(Resampler& resampler, const Control& control);
-  void set_field(Resampler& resampler, Outside outside, const Control& control) const;
+  void check(ForwardResampler& resampler, const Control& control);
+  void set_field(const AnyResampler& resampler, Outside outside, const Control& control) const;
   void resample_onto_own_grids(const Worker& worker);
   void move_structures(Resampler& resampler, Outside outside, const Control& control);
   void write_files();

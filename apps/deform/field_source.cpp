@@ -61,7 +61,7 @@ void read_mesh(const std::string& text, ForwardField& result) {
   for (const std::string& note : file.header.notes) result.notes.push_back(path + ": " + note);
   FieldFileHeader header;
   header.format = file.header.format;
-  header.direction = FieldDirection::forward;
+  header.direction = Direction::forward;
   header.frame = file.header.frame;
   header.units = file.header.units;
   header.direction_basis = header.absolute_basis = FieldBasis::by_format;

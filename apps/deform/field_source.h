@@ -10,7 +10,6 @@
 
 #include "apps/cli/console.h"
 #include "apps/simulate/simulated_field.h"
-#include "cuda/backend.h"
 #include "deform/vertex_field.h"
 #include "io/field_file.h"
 #include "io/mesh_file.h"

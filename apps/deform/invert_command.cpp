@@ -10,7 +10,7 @@
 #include "apps/cli/reads.h"
 #include "apps/deform/field_source.h"
 #include "apps/deform/map_outputs.h"
-#include "cuda/backend.h"
+#include "backend/factories.h"
 #include "deform/fields/continued.h"
 #include "io/field_file.h"
 #include "io/image_file.h"
@@ -154,19 +154,20 @@ Inversion invert(const InvertOptions& options, const Geometry& like, Invertible&
   const Control stop{.stop = interrupt_token()};
   const bool pulls = !options.pull_field.empty();
   const Limits limits{.threads = options.common.threads};
-  const Backend backend = make_backend(options.backend, Direction::forward, like, options.device, limits);
-  Inversion result{.backend = backend.name, .grid = like, .report = {}, .there = {}, .back = {}};
+  const BackendKind backend = chosen(options.backend);
+  const auto resampler = make_forward_resampler(backend, like, options.device, limits);
+  Inversion result{.backend = name_of(backend), .grid = like, .report = {}, .there = {}, .back = {}};
   InverseCheck check(field.field, like, limits);
   MapStream stream(like, outputs);
   outputs.write([&] {
-    stream.add(&Maps::inverse_mm,
-               series ? series->writer().create_registration(output)
-                      : create_field_file(output, like, pulls ? FieldDirection::forward : FieldDirection::pull));
+    stream.add(&Maps::inverse_mm, series
+                                      ? series->writer().create_registration(output)
+                                      : create_field_file(output, like, pulls ? Direction::forward : Direction::pull));
   });
   Stage stage(options.common, "invert");
-  backend.resampler->set_field(view(field.field, Outside::background), {.stop = stop.stop, .jacobian_range = false});
+  resampler->set_field(view(field.field, Outside::background), {.jacobian_range = false}, stop);
   stream.run([&](const Region& slab, const Maps& maps) {
-    result.report += resample_slab(*backend.resampler, slab, {}, maps, stage.control());
+    result.report += resample_slab(*resampler, slab, {}, maps, stage.control());
     const double begun = stage.seconds();
     check.add(maps.inverse_mm, stop);
     if (pulls) result.beyond += count_beyond(maps.inverse_mm, field.pull_grid);

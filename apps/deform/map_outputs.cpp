@@ -64,7 +64,7 @@ void MapOutputs::add_to(MapStream& stream, const Geometry& grid, bool mass, cons
   if (staged_.inverse.empty()) return;
   stream.add(&Maps::inverse_mm, has_registration_suffix(options_.inverse)
                                     ? series->create_registration(staged_.inverse)
-                                    : create_field_file(staged_.inverse, grid, FieldDirection::pull));
+                                    : create_field_file(staged_.inverse, grid, Direction::pull));
 }
 
 nlohmann::json MapOutputs::describe() const {

@@ -7,7 +7,6 @@
 
 #include "apps/cli/options.h"
 #include "apps/deform/map_stream.h"
-#include "cuda/backend.h"
 
 namespace tetwarp::apps {
 

@@ -97,9 +97,9 @@ void MapStream::write(const Maps& maps) {
 }
 
 Report resample_slab(Resampler& resampler, const Region& slab, std::vector<Target> targets, const Maps& maps,
-                     const Control& control) {
+                     const Control& control, const PartSink& finished) {
   const Region all = whole(resampler.output());
-  if (slab == all) return resampler.resample(slab, targets, maps, control);
+  if (slab == all) return resampler.resample(slab, targets, maps, control, finished);
   for (Target& target : targets)
     target.source = cut(target.source, resampler.source_region(*target.source.geometry, slab));
   Control of_slab = control;
@@ -109,7 +109,7 @@ Report resample_slab(Resampler& resampler, const Region& slab, std::vector<Targe
       control.progress(slices / static_cast<double>(all.end.z));
     };
   }
-  return resampler.resample(slab, targets, maps, of_slab);
+  return resampler.resample(slab, targets, maps, of_slab, finished);
 }
 
 }  // namespace tetwarp::apps

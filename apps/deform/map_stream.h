@@ -51,8 +51,8 @@ class MapStream {
 };
 
 /// One slab for `MapStream::run`: sources are cut to the slices that it needs, so that a device is sent no more, and
-/// the progress told is that of the whole grid.
+/// the progress told is that of the whole grid. @param finished  of the slab, as `Resampler::resample` has it
 Report resample_slab(Resampler& resampler, const Region& slab, std::vector<Target> targets, const Maps& maps,
-                     const Control& control);
+                     const Control& control, const PartSink& finished = {});
 
 }  // namespace tetwarp::apps

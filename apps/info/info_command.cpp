@@ -49,7 +49,7 @@ json describe_mesh(const FieldSource& source) {
           {"arrays", header.arrays},
           {"displacement", known ? json(header.displacement) : json()},
           {"largest_displacement_mm", known ? json(*header.largest_mm) : json()},
-          {"direction", to_string(FieldDirection::forward)},
+          {"direction", to_string(Direction::forward)},
           {"frame", header.frame},
           {"units", header.units},
           {"known",

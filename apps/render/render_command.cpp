@@ -8,7 +8,7 @@
 #include "apps/cli/reads.h"
 #include "apps/render/movie.h"
 #include "apps/render/render_scene.h"
-#include "cuda/backend.h"
+#include "backend/factories.h"
 #include "io/lattice_lines.h"
 #include "io/preview_scale.h"
 #include "io/slice_view.h"
@@ -142,9 +142,9 @@ void Rendering::choose_style() {
     style_.transfer.points = {{window.level - 0.5 * window.width, glm::dvec3(0), 0},
                               {window.level + 0.5 * window.width, glm::dvec3(1), 0}};
   }
-  NamedRenderer made = make_renderer(options_.backend, options_.device, {.threads = options_.common.threads});
-  backend_ = made.name;
-  renderer_ = std::move(made.renderer);
+  const BackendKind backend = chosen(options_.backend);
+  backend_ = name_of(backend);
+  renderer_ = make_renderer(backend, options_.device, {.threads = options_.common.threads});
   renderer_->set_style(style_);
 }
 
@@ -283,10 +283,10 @@ int run_render(const RenderOptions& options) {
   try {
     Rendering(options).run();
   } catch (const DeviceError& error) {
-    if (options.backend != "auto") throw;
+    if (!leaves_open(options.backend)) throw;
     say(options.common, std::string("tetwarp: warning: ") + error.what() + "; the CPU is used");
     RenderOptions on_cpu = options;
-    on_cpu.backend = "cpu";
+    on_cpu.backend = BackendChoice::cpu;
     Rendering(on_cpu).run();
   }
   return 0;

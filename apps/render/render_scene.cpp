@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 
-#include "cuda/backend.h"
 #include "io/image_file.h"
 
 namespace tetwarp::apps {
@@ -117,7 +116,7 @@ void RenderScene::read() {
       drawn_lattice_ =
           read_forward_field({wish.source}, header_.geometry, options_.cell_size, options_.common, {}).field;
       lattice_resampler_ = make_cpu_resampler(grid_, {.threads = options_.common.threads});
-      lattice_resampler_->set_field(view(drawn_lattice_, Outside::background), {.stop = interrupt_token()});
+      lattice_resampler_->set_field(view(drawn_lattice_, Outside::background), {}, {.stop = interrupt_token()});
       continue;
     }
     for (std::string& note : notes_of_file(wish.source, options_.common.nifti_frame)) notes_.push_back(std::move(note));
@@ -145,9 +144,8 @@ void RenderScene::read_fields(const Control& control) {
 void RenderScene::set_frame_field(double amount, const Control& control) {
   const Limits limits{.threads = options_.common.threads};
   if (!resampler_) {
-    Backend backend = make_backend(options_.backend, field_.direction, grid_, options_.device, limits);
-    backend_ = backend.name;
-    resampler_ = std::move(backend.resampler);
+    resampler_ = AnyResampler(chosen(options_.backend), field_.direction, grid_, options_.device, limits);
+    backend_ = name_of(resampler_.backend());
   }
   if (field_.direction == Direction::pull) {
     const PullField* shown = &field_.pull;
@@ -156,7 +154,7 @@ void RenderScene::set_frame_field(double amount, const Control& control) {
       scale(frame_pull_.displacement, amount);
       shown = &frame_pull_;
     }
-    return resampler_->set_field(view(*shown, options_.outside), control);
+    return resampler_.pull().set_field(view(*shown, options_.outside), control);
   }
   shown_field_ = &field_.forward.field;
   if (amount != 1) {
@@ -165,7 +163,7 @@ void RenderScene::set_frame_field(double amount, const Control& control) {
     scale(frame_field_.mesh.displacement, amount);
     shown_field_ = &frame_field_;
   }
-  resampler_->set_field(view(*shown_field_, options_.outside), control);
+  resampler_.forward().set_field(view(*shown_field_, options_.outside), {}, control);
 }
 
 void RenderScene::show(std::size_t frame) {

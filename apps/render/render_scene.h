@@ -11,6 +11,7 @@
 #include "apps/cli/input.h"
 #include "apps/cli/options.h"
 #include "apps/deform/field_source.h"
+#include "backend/factories.h"
 #include "io/overlay.h"
 #include "io/slice_picture.h"
 
@@ -79,7 +80,8 @@ class RenderScene {
   const VertexField* shown_field_ = nullptr;  ///< of the frame: that one, or the whole
   VertexField drawn_lattice_;                 ///< of `lattice=FIELD`
   AnyVolume output_;
-  std::unique_ptr<Resampler> resampler_, lattice_resampler_;
+  AnyResampler resampler_;
+  std::unique_ptr<ForwardResampler> lattice_resampler_;
   std::vector<std::shared_ptr<const AnyVolume>> files_;  ///< of the wishes; null where there is none
   std::string backend_;
   std::vector<std::string> notes_;

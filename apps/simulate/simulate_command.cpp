@@ -9,7 +9,7 @@
 #include "apps/cli/reads.h"
 #include "apps/simulate/simulate_report.h"
 #include "apps/simulate/simulated_field.h"
-#include "apps/simulate/simulation_backend.h"
+#include "backend/factories.h"
 #include "deform/fields/lattice_mesh.h"
 #include "io/field_file.h"
 #include "io/image_file.h"
@@ -129,11 +129,12 @@ std::unique_ptr<ScenarioRun> Simulating::begin(const MakeSimulation& make) {
 
 int Simulating::run() {
   read();
-  const SimulationBackend backend = make_simulation_backend(scenario_.method, options_.backend, options_.device,
-                                                            {.threads = options_.common.threads});
-  const std::unique_ptr<ScenarioRun> begun = begin(backend.make);
+  const BackendKind backend = chosen(options_.backend);
+  const std::unique_ptr<ScenarioRun> begun = begin([&](const Model& model) {
+    return make_simulation(backend, scenario_.method, model, options_.device, {.threads = options_.common.threads});
+  });
   ScenarioRun& run = *begun;
-  SimulateRecord record{options_, scenario_, patient_, run, backend.name};
+  SimulateRecord record{options_, scenario_, patient_, run, name_of(backend)};
   for (const std::string& warning : warnings_) say(options_.common, "tetwarp: warning: " + warning);
   for (const std::string& note : notes_) say(options_.common, "tetwarp: note: " + note);
   if (options_.dry_run) {

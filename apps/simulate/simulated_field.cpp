@@ -5,7 +5,7 @@
 
 #include "apps/cli/reads.h"
 #include "apps/simulate/simulate_report.h"
-#include "apps/simulate/simulation_backend.h"
+#include "backend/factories.h"
 #include "io/mesh_writer.h"
 #include "io/scenario_file.h"
 
@@ -49,15 +49,17 @@ SimulatedField simulate_field(const DeformOptions& options, const ConstVolumeVie
         examine(ct, options.labels.empty() ? nullptr : &labelled, scenario.cell_size, scenario.body_above_hu, quiet);
   }
   const SimulateOptions of = as_simulation(options, worker);
-  const SimulationBackend backend =
-      make_simulation_backend(scenario.method, of.backend, of.device, {.threads = options.common.threads});
+  const BackendKind backend = chosen(of.backend);
+  const auto make = [&](const Model& model) {
+    return make_simulation(backend, scenario.method, model, of.device, {.threads = options.common.threads});
+  };
   std::optional<ScenarioRun> run;
   try {
-    run.emplace(scenario, patient, backend.make);
+    run.emplace(scenario, patient, make);
   } catch (const InputError& error) {
     throw InputError(std::string(error.what()) + ", " + options.scenario.string());
   }
-  SimulateRecord record{of, scenario, patient, *run, backend.name};
+  SimulateRecord record{of, scenario, patient, *run, name_of(backend)};
   for (int done = 0; !run->is_done(); ++done) {
     const Frame frame = run->next({.progress =
                                        [&](double part) {
@@ -76,7 +78,7 @@ SimulatedField simulate_field(const DeformOptions& options, const ConstVolumeVie
                                         ? ""
                                         : hash_volume({.path = options.labels, .series = {}}, options.common.threads),
                    .method = name_of(scenario.method),
-                   .backend = backend.name};
+                   .backend = name_of(backend)};
   return result;
 }
 

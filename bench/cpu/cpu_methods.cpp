@@ -100,7 +100,7 @@ class Own {
   void run(const Scene& scene, OwnSamples& samples) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads_));
     const auto start = Clock::now();
-    resampler_->set_field(view(scene.field), Control{.jacobian_range = true});
+    resampler_->set_field(view(scene.field), FieldOptions{.jacobian_range = true});
     const auto set = Clock::now();
     report_ = resample(whole(volume_.geometry));
     const auto done = Clock::now();
@@ -156,7 +156,7 @@ class Own {
     const glm::vec3* vertices = field.displacement.data() + slices.begin.z * grid.size.x * grid.size.y;
     const auto start = Clock::now();
     resample(slices);
-    alone->set_field(FieldView{&grid, vertices}, Control{.jacobian_range = true});
+    alone->set_field(FieldView{&grid, vertices}, FieldOptions{.jacobian_range = true});
     return ms_between(start, Clock::now());
   }
 
@@ -172,7 +172,7 @@ class Own {
   const Volume<std::int16_t>& volume_;
   const int threads_;
   const std::int16_t background_;
-  std::unique_ptr<Resampler> resampler_;
+  std::unique_ptr<ForwardResampler> resampler_;
   Volume<std::int16_t> output_, second_, second_output_;
   Report report_;
 };

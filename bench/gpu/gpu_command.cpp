@@ -3,13 +3,13 @@
 
 #include <cstdio>
 
+#include "backend/devices.h"
 #include "bench/gpu/gpu_bench.h"
 #include "bench/gpu/gpu_report.h"
 #include "bench/harness/conclude.h"
 #include "bench/harness/input.h"
 #include "bench/harness/machine.h"
 #include "bench/harness/output_file.h"
-#include "cuda/devices.h"
 
 namespace tetwarp::bench {
 
@@ -19,7 +19,7 @@ namespace {
 void require_device(int device) {
   if (!has_cuda())
     throw NotCompiled("CUDA is not in this build; `tetwarp bench cpu` and `paper --backend cpu` need none");
-  const int count = cuda_device_count();
+  const int count = device_count();
   if (device < count) return;
   throw DeviceError("no CUDA device " + std::to_string(device) + ", " + std::to_string(count) +
                     " found; see tetwarp --version, or use tetwarp bench paper --backend cpu");

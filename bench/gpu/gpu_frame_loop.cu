@@ -6,6 +6,7 @@
 #include <array>
 #include <chrono>
 
+#include "backend/factories.h"
 #include "bench/gpu/gpu_parts.h"
 #include "bench/gpu/gpu_scene.h"
 
@@ -43,7 +44,7 @@ class Loop {
       : volume_(volume),
         options_(options),
         background_(*std::min_element(volume.voxels.begin(), volume.voxels.end())),
-        resampler_(make_cuda_resampler(volume.geometry, options.device)) {
+        resampler_(make_forward_resampler(BackendKind::cuda, volume.geometry, options.device)) {
     source_.upload(volume.voxels.data(), volume.voxels.size(), compute_.get());
     for (DeviceBuffer<std::int16_t>& output : outputs_) output.reserve(volume.voxels.size());
     for (std::size_t n = 0; n < kAmplitudes.size(); ++n) {
@@ -108,7 +109,7 @@ class Loop {
     const Target target{.source = device_view(volume_.geometry, source_.data()),
                         .output = device_view(volume_.geometry, output.data()),
                         .background = static_cast<double>(background_)};
-    resampler_->set_field(field.view(), on_stream(compute_));
+    resampler_->set_field(field.view(), kWithoutRange, on_stream(compute_));
     resampler_->resample(whole(volume_.geometry), {&target, 1}, {}, on_stream(compute_));
   }
 
@@ -158,7 +159,7 @@ class Loop {
   std::array<FieldOnDevice, kAmplitudes.size()> fields_;
   std::vector<std::unique_ptr<PinnedBuffer<glm::vec3>>> host_fields_;
   std::vector<std::unique_ptr<PinnedBuffer<std::int16_t>>> host_outputs_;
-  std::unique_ptr<Resampler> resampler_;
+  std::unique_ptr<ForwardResampler> resampler_;
   Volume<std::int16_t> output_;
 };
 

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <thread>
 
+#include "backend/factories.h"
 #include "bench/gpu/gpu_parts.h"
 #include "bench/gpu/gpu_scene.h"
 
@@ -54,7 +55,7 @@ class MemoryWatch {
 std::uint64_t watch_frames(const FieldView& field, const Target& target, int device) {
   const Geometry& volume = *target.output.geometry;
   MemoryWatch watch(device);
-  const std::unique_ptr<Resampler> resampler = make_cuda_resampler(volume, device);
+  const std::unique_ptr<ForwardResampler> resampler = make_forward_resampler(BackendKind::cuda, volume, device);
   const Control looking{.progress = [&](double) { watch.look(); }};
   for (int n = 0; n < kFrames; ++n) {
     resampler->set_field(field);

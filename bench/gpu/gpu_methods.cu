@@ -5,6 +5,7 @@
 // (bench/CMakeLists.txt).
 #include <algorithm>
 
+#include "backend/factories.h"
 #include "bench/gpu/gpu_backward.h"
 #include "bench/gpu/gpu_parts.h"
 #include "bench/gpu/gpu_scene.h"
@@ -40,7 +41,7 @@ class GpuMethods::State {
         options_(options),
         background_(*std::min_element(volume.voxels.begin(), volume.voxels.end())),
         texture_(glm::ivec3(volume.geometry.size)),
-        resampler_(make_cuda_resampler(volume.geometry, options.device)) {
+        resampler_(make_forward_resampler(BackendKind::cuda, volume.geometry, options.device)) {
     texture_.upload(volume.voxels.data(), stream_.get());
     source_.upload(volume.voxels.data(), volume.voxels.size(), stream_.get());
     output_.reserve(volume.voxels.size());
@@ -103,7 +104,7 @@ class GpuMethods::State {
   void run_tetwarp(const FieldView& field, Times& times) {
     const Target target = target_of(source_, output_);
     start_.record(stream_);
-    resampler_->set_field(field, on_stream(stream_));
+    resampler_->set_field(field, kWithoutRange, on_stream(stream_));
     middle_.record(stream_);
     report_ = resampler_->resample(whole(volume_.geometry), {&target, 1}, {}, on_stream(stream_));
     end_.record(stream_);
@@ -158,7 +159,7 @@ class GpuMethods::State {
   DeviceBuffer<std::int16_t> source_, output_, second_, second_output_;
   FieldOnDevice field_;
   DeviceBuffer<glm::vec3> places_;
-  std::unique_ptr<Resampler> resampler_;
+  std::unique_ptr<ForwardResampler> resampler_;
   Report report_;
 };
 

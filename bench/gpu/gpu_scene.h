@@ -50,6 +50,7 @@ inline VolumeView device_view(const Geometry& volume, std::int16_t* voxels) {
 }
 
 /// Reports leave out the range of Jacobian determinants, as a frame loop would have it.
-inline Control on_stream(const Stream& stream) { return {.stream = stream.get(), .jacobian_range = false}; }
+inline constexpr FieldOptions kWithoutRange{.jacobian_range = false};
+inline Control on_stream(const Stream& stream) { return {.stream = stream.get()}; }
 
 }  // namespace tetwarp::bench

@@ -38,7 +38,7 @@ class OwnInverse final : public InversePeer {
 
  private:
   const VertexField& field_;
-  std::unique_ptr<Resampler> resampler_;
+  std::unique_ptr<ForwardResampler> resampler_;
   PullField inverse_;
 };
 

@@ -5,9 +5,10 @@
 
 #include <memory>
 
+#include "backend/devices.h"
+#include "backend/factories.h"
 #include "bench/harness/program.h"
 #include "bench/io/series.h"
-#include "cuda/devices.h"
 #include "deform/fields/formula.h"
 #include "io/hash.h"
 #include "io/staged_output.h"
@@ -33,7 +34,7 @@ VertexField make_field(const Geometry& grid, std::int64_t cell_size, int threads
 }
 
 /// As the program has it: the field is hashed, too. @param finished  told of slices that are done
-void deform(Job& job, Resampler& resampler, int threads, const std::function<void(const Region&)>& finished = {}) {
+void deform(Job& job, ForwardResampler& resampler, int threads, const PartSink& finished = {}) {
   const Geometry& grid = job.input.volume.geometry;
   Sha256().add_blocks(std::as_bytes(std::span(job.field.displacement)), threads);
   resampler.set_field(view(job.field));
@@ -44,7 +45,7 @@ void deform(Job& job, Resampler& resampler, int threads, const std::function<voi
                       .background = -1024,
                       .padding = job.input.padding,
                       .sampled_slices = job.sampled};
-  resampler.resample(whole(grid), {&target, 1}, {}, {.finished = finished});
+  resampler.resample(whole(grid), {&target, 1}, {}, {}, finished);
 }
 
 void write(const Job& job, const fs::path& folder, int threads) {
@@ -61,7 +62,7 @@ void run_with_cuda(const fs::path& series, const fs::path& folder, std::int64_t 
   job.field = make_field(grid, cell_size, threads);
   StagedOutput staged(folder, StagedOutput::Kind::folder, false);
   DerivedSeriesWriter writer(staged.path(), grid, *job.input.headers, made_up_derivation());
-  deform(job, *make_cuda_resampler(grid), threads, [&](const Region& slices) {
+  deform(job, *make_forward_resampler(BackendKind::cuda, grid), threads, [&](const Region& slices) {
     writer.write(job.output.view(), slices.begin.z, slices.end.z, job.sampled, threads);
   });
   staged.commit();
@@ -88,9 +89,9 @@ void add_job(Turns& turns, const fs::path& series, const fs::path& scratch, std:
                    "--backend", backend, "--threads", std::to_string(threads), "--quiet"});
     };
     turns.add(step, kJobProgram, nothing([=] { run_on("cpu"); }), remove);
-    if (cuda_device_count() != 0) turns.add(step, kJobCuda, nothing([=] { run_on("cuda"); }), remove);
+    if (device_count() != 0) turns.add(step, kJobCuda, nothing([=] { run_on("cuda"); }), remove);
   }
-  if (cuda_device_count() != 0) {
+  if (device_count() != 0) {
     turns.add(step, kJobAwake, nothing([=] { run_with_cuda(series, out, cell_size, threads); }), remove);
   }
   const auto job = std::make_shared<Job>();

@@ -64,7 +64,7 @@ class Backend {
  protected:
   explicit Backend(int threads) : threads_(threads) {}
 
-  virtual std::unique_ptr<Resampler> make_resampler(const Geometry& geometry) const = 0;
+  virtual std::unique_ptr<ForwardResampler> make_resampler(const Geometry& geometry) const = 0;
   virtual void volume_changed() {}
   /// Fills `field_.displacement`, sized and ready, with the formula.
   virtual void fill_field() = 0;
@@ -76,7 +76,7 @@ class Backend {
   Formula formula_;
   std::int64_t cell_size_ = 1;
   VertexField field_;
-  std::unique_ptr<Resampler> resampler_;
+  std::unique_ptr<ForwardResampler> resampler_;
 
  private:
   std::optional<Exact> exact_;

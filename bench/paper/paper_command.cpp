@@ -7,13 +7,13 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
+#include "backend/devices.h"
 #include "bench/harness/input.h"
 #include "bench/harness/machine.h"
 #include "bench/harness/output_file.h"
 #include "bench/harness/report.h"
 #include "bench/paper/paper_bench.h"
 #include "bench/paper/tables.h"
-#include "cuda/devices.h"
 
 namespace tetwarp::bench {
 
@@ -21,7 +21,7 @@ namespace {
 
 bool use_cuda(const PaperOptions& options) {
   if (options.backend != "auto") return options.backend == "cuda";
-  if (cuda_device_count() > 0) return true;
+  if (device_count() > 0) return true;
   std::fprintf(stderr, "no CUDA device: the CPU does it, for minutes to hours unless --width and --slices are small\n");
   return false;
 }

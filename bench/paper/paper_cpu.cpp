@@ -128,7 +128,7 @@ class CpuBackend final : public Backend {
   const std::vector<std::int16_t>& output() override { return output_.voxels; }
 
  private:
-  std::unique_ptr<Resampler> make_resampler(const Geometry& geometry) const override {
+  std::unique_ptr<ForwardResampler> make_resampler(const Geometry& geometry) const override {
     return make_cpu_resampler(geometry, Limits{.threads = threads_});
   }
 

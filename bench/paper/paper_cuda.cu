@@ -5,10 +5,11 @@
 // additions are fused (bench/CMakeLists.txt), unlike in the project's own kernels.
 #include <chrono>
 
+#include "backend/devices.h"
+#include "backend/factories.h"
 #include "bench/harness/cuda_objects.h"
 #include "bench/paper/backend.h"
 #include "bench/paper/baseline_kernels.cuh"
-#include "cuda/devices.h"
 #include "cuda/runtime/device_buffer.h"
 
 namespace tetwarp::bench {
@@ -40,7 +41,7 @@ class CudaBackend final : public Backend {
  private:
   /// Before any object of CUDA is made. @throws DeviceError
   static int select(int device) {
-    const int count = cuda_device_count();
+    const int count = device_count();
     if (device >= count) {
       throw DeviceError("no CUDA device " + std::to_string(device) + ", " + std::to_string(count) +
                         " found; see tetwarp --version, or use --backend cpu");
@@ -52,8 +53,8 @@ class CudaBackend final : public Backend {
   Grid grid() const { return make_grid(volume_->geometry, field_.lattice, cell_size_); }
   std::size_t voxels() const { return volume_->voxels.size(); }
 
-  std::unique_ptr<Resampler> make_resampler(const Geometry& geometry) const override {
-    return make_cuda_resampler(geometry, device_);
+  std::unique_ptr<ForwardResampler> make_resampler(const Geometry& geometry) const override {
+    return make_forward_resampler(BackendKind::cuda, geometry, device_);
   }
 
   void volume_changed() override {
@@ -106,7 +107,7 @@ class CudaBackend final : public Backend {
     FieldView on_device = view(field_);
     on_device.displacement = device_field_.data();
     on_device.memory = Memory::device;
-    resampler_->set_field(on_device, Control{.stream = stream_.get()});
+    resampler_->set_field(on_device, {}, Control{.stream = stream_.get()});
   }
 
   void run_tetwarp() {

@@ -7,12 +7,11 @@
 #include <chrono>
 #include <utility>
 
+#include "backend/factories.h"
 #include "bench/harness/machine.h"
 #include "bench/harness/statistics.h"
 #include "deform/phantom.h"
 #include "deform/render/renderer.h"
-#include "deform/simulate/chainmail.h"
-#include "deform/simulate/mass_spring.h"
 #include "deform/simulate/scenario_run.h"
 #include "io/scenario_file.h"
 
@@ -49,7 +48,8 @@ class FramePictures {
   FramePictures(const SimulateOptions& options, const Geometry& volume, bool on_cuda)
       : camera_{.width = options.render[0], .height = options.render[1]},
         volume_(volume),
-        renderer_(on_cuda ? make_cuda_renderer(options.device) : make_cpu_renderer({.threads = options.threads})),
+        renderer_(on_cuda ? make_renderer(BackendKind::cuda, options.device)
+                          : make_cpu_renderer({.threads = options.threads})),
         rgb_(3 * static_cast<std::size_t>(camera_.width) * static_cast<std::size_t>(camera_.height)) {
     renderer_->set_style({.transfer = transfer_function(options.transfer)});
   }
@@ -79,17 +79,9 @@ class FramePictures {
 
 MakeSimulation factory_of(simulate::Method method, bool on_cuda, const SimulateOptions& options) {
   const Limits limits{.threads = options.threads};
+  const BackendKind backend = on_cuda ? BackendKind::cuda : BackendKind::cpu;
   const int device = options.device;
-  if (on_cuda) {
-    return [=](const Model& model) {
-      return method == simulate::Method::chainmail ? make_cuda_chainmail(model, device)
-                                                   : make_cuda_mass_spring(model, {}, device);
-    };
-  }
-  return [=](const Model& model) {
-    return method == simulate::Method::chainmail ? make_cpu_chainmail(model, limits)
-                                                 : make_cpu_mass_spring(model, {}, limits);
-  };
+  return [=](const Model& model) { return make_simulation(backend, method, model, device, limits); };
 }
 
 /// The first phase alone.
@@ -146,7 +138,7 @@ class Measuring {
     const double background = *std::min_element(volume_.voxels.begin(), volume_.voxels.end());
     const std::unique_ptr<FrameVolumes> volumes =
         on_cuda ? make_device_volumes(volume_, background) : std::make_unique<HostVolumes>(volume_, background);
-    const auto resampler = on_cuda ? make_cuda_resampler(volume_.geometry, options_.device)
+    const auto resampler = on_cuda ? make_forward_resampler(BackendKind::cuda, volume_.geometry, options_.device)
                                    : make_cpu_resampler(volume_.geometry, {.threads = options_.threads});
     const Target target = volumes->target();
     std::optional<FramePictures> pictures;

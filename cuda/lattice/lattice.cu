@@ -36,11 +36,11 @@ __global__ void describe_kernel(DeviceField field, LatticeFindings* found) {
   note_counts(inverted, degenerate, found);
 }
 
-__global__ void reach_kernel(DeviceField field, VoxelBox region, int* low_high) {
+__global__ void reach_kernel(DeviceField field, Region region, int* low_high) {
   const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
   if (n >= field.cell_count()) return;
   const Cell cell = field.cell(field.cell_at(n));
-  if (detail::is_empty(detail::candidates(field.frame.nudge, box_of(cell), region))) return;
+  if (is_empty(detail::candidates(field.frame.nudge, box_of(cell), region))) return;
   for (const Vertex& vertex : cell.corner) {
     const glm::i32vec3 rest = vertex.deformed + vertex.u;
     for (int axis = 0; axis < 3; ++axis) {

@@ -1,13 +1,14 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "cuda/output/resampler.h"
+#include "cuda/output/cuda_resampler.h"
 
 #include <algorithm>
 #include <glm/common.hpp>
 #include <optional>
 #include <vector>
 
+#include "cuda/factories.h"
 #include "cuda/lattice/lattice_part.h"
 #include "cuda/output/mesh_resampler.h"
 #include "cuda/owners/gather.h"
@@ -78,17 +79,16 @@ __global__ void reach_kernel(DeviceField field, unsigned blocks_per_slice, Slice
   atomicMax(&reach[slice].high, high);
 }
 
-class LatticeResampler final : public CudaResampler {
+class LatticeResampler final : public CudaResampler<ForwardResampler> {
  public:
   using CudaResampler::CudaResampler;
-  using Resampler::set_field;
 
-  void set_field(const FieldView& field, const Control& control) override {
+  void set_field(const FieldView& field, const FieldOptions& options, const Control& control) override {
     ready_ = streamed_ = false;
     frame_ = make_lattice_frame(output(), field);
     field_ = field;
     rest_outside_ = field.outside == Outside::rest;
-    wants_range_ = control.jacobian_range;
+    wants_range_ = options.jacobian_range;
     if (control.stop.stop_requested()) throw Cancelled();
     const DeviceScope scope(device_);
     stream_ = static_cast<cudaStream_t>(control.stream);
@@ -336,7 +336,7 @@ class LatticeResampler final : public CudaResampler {
 
 }  // namespace cuda_detail
 
-std::unique_ptr<Resampler> make_cuda_resampler(Geometry output, int device, Limits limits) {
+std::unique_ptr<ForwardResampler> make_cuda_resampler(const Geometry& output, int device, const Limits& limits) {
   return std::make_unique<LatticeOrMesh>(
       output, [=] { return std::make_unique<cuda_detail::LatticeResampler>(output, device, limits); },
       [=] { return cuda_detail::make_mesh_resampler(output, device, limits); });

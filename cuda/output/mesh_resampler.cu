@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <glm/common.hpp>
 
-#include "cuda/output/resampler.h"
+#include "cuda/output/cuda_resampler.h"
 #include "cuda/owners/gather.h"
 #include "cuda/owners/mesh_raster.h"
 #include "deform/target_check.h"
@@ -44,12 +44,11 @@ __global__ void settle_mesh_kernel(MeshRaster::View mesh, SlabBox box, Settling 
   if (of.several && of.several[n] > 1) atomicAdd(&counts->multiply_owned, 1ULL);
 }
 
-class MeshResampler final : public CudaResampler {
+class MeshResampler final : public CudaResampler<ForwardResampler> {
  public:
   using CudaResampler::CudaResampler;
-  using Resampler::set_field;
 
-  void set_field(const FieldView& field, const Control& control) override {
+  void set_field(const FieldView& field, const FieldOptions&, const Control& control) override {
     ready_ = false;
     mesh_ = snap_mesh(output(), field, control);
     const DeviceScope scope(device_);
@@ -135,7 +134,7 @@ class MeshResampler final : public CudaResampler {
 
 }  // namespace
 
-std::unique_ptr<Resampler> make_mesh_resampler(const Geometry& output, int device, const Limits& limits) {
+std::unique_ptr<ForwardResampler> make_mesh_resampler(const Geometry& output, int device, const Limits& limits) {
   return std::make_unique<MeshResampler>(output, device, limits);
 }
 

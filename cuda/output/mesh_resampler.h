@@ -10,7 +10,8 @@
 namespace tetwarp::cuda_detail {
 
 /// A resampler of forward fields that are meshes, on a CUDA device.
-/// @throws InputError, DeviceError as `make_cuda_resampler`
-std::unique_ptr<Resampler> make_mesh_resampler(const Geometry& output, int device, const Limits& limits);
+/// @throws InputError for an output that no resampler takes
+/// @throws DeviceError without the device
+std::unique_ptr<ForwardResampler> make_mesh_resampler(const Geometry& output, int device, const Limits& limits);
 
 }  // namespace tetwarp::cuda_detail

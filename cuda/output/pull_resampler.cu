@@ -1,11 +1,12 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "cuda/output/resampler.h"
+#include "cuda/output/cuda_resampler.h"
 
 #include <glm/common.hpp>
 #include <vector>
 
+#include "cuda/factories.h"
 #include "cuda/runtime/pointer_check.h"
 #include "deform/field_check.h"
 #include "deform/target_check.h"
@@ -33,10 +34,9 @@ struct ShiftBounds {
   glm::dvec3 least{0}, most{0};
 };
 
-class PullResampler final : public CudaResampler {
+class SampledPullResampler final : public CudaResampler<PullResampler> {
  public:
   using CudaResampler::CudaResampler;
-  using Resampler::set_field;
 
   void set_field(const PullFieldView& field, const Control& control) override {
     ready_ = false;
@@ -151,8 +151,8 @@ class PullResampler final : public CudaResampler {
 
 }  // namespace cuda_detail
 
-std::unique_ptr<Resampler> make_cuda_pull_resampler(Geometry output, int device, Limits limits) {
-  return std::make_unique<cuda_detail::PullResampler>(output, device, limits);
+std::unique_ptr<PullResampler> make_cuda_pull_resampler(const Geometry& output, int device, const Limits& limits) {
+  return std::make_unique<cuda_detail::SampledPullResampler>(output, device, limits);
 }
 
 }  // namespace tetwarp

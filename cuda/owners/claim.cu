@@ -80,7 +80,7 @@ struct Slate {
   unsigned long long* owner;
   unsigned* owners;
 
-  __device__ VoxelBox region() const { return {slab.begin, slab.begin + slab.size}; }
+  __device__ Region region() const { return {slab.begin, slab.begin + slab.size}; }
   __device__ void claim(const glm::i64vec3& voxel, unsigned long long number) const {
     const std::int64_t n = slab.offset(voxel);
     atomicMin(&owner[n], number);

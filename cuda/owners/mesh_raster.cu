@@ -46,8 +46,8 @@ __global__ void list_kernel(MeshTask task) {
   const std::int64_t number = (std::int64_t{blockIdx.x} * kThreads + threadIdx.x) / 32;
   if (number >= task.count) return;
   const Tetrahedron t = task.mesh.tetrahedron(static_cast<unsigned>(number));
-  const VoxelBox reached = detail::candidates(task.mesh.nudge, box_of(t), {glm::i64vec3(0), glm::i64vec3(task.size)});
-  if (detail::is_empty(reached)) return;
+  const Region reached = detail::candidates(task.mesh.nudge, box_of(t), {glm::i64vec3(0), glm::i64vec3(task.size)});
+  if (is_empty(reached)) return;
   const glm::ivec3 extent(kTileI, kTileJ, kTileK),
       begin = (glm::ivec3(reached.begin) - task.origin) / extent,
       size = (glm::ivec3(reached.end) - 1 - task.origin) / extent - begin + 1;
@@ -126,11 +126,11 @@ struct TileWorker {
 
   __device__ void prepare(int slot, unsigned number) const {
     const Tetrahedron t = task.mesh.tetrahedron(number);
-    const VoxelBox reached =
+    const Region reached =
         detail::candidates(task.mesh.nudge, box_of(t), {glm::i64vec3(voxels.begin), glm::i64vec3(voxels.end)});
     typename Memory::Slot& to = memory.slots[slot];
     to = {number, 0, 0, 0, 0, 0};
-    if (detail::is_empty(reached)) return;
+    if (is_empty(reached)) return;
     to.y_begin = static_cast<short>(reached.begin.y - voxels.begin.y);
     to.y_end = static_cast<short>(reached.end.y - voxels.begin.y);
     to.z_begin = static_cast<short>(reached.begin.z - voxels.begin.z);

@@ -5,6 +5,7 @@
 #include <memory>
 #include <type_traits>
 
+#include "cuda/factories.h"
 #include "cuda/lattice/lattice.h"
 #include "cuda/runtime/device_buffer.h"
 #include "cuda/runtime/host_copies.h"
@@ -316,7 +317,7 @@ void CudaRenderer::render(const ViewPlane& plane, std::span<std::uint8_t> rgb, c
 
 }  // namespace cuda_detail
 
-std::unique_ptr<Renderer> make_cuda_renderer(int device, Limits limits) {
+std::unique_ptr<Renderer> make_cuda_renderer(int device, const Limits& limits) {
   return std::make_unique<cuda_detail::CudaRenderer>(device, limits);
 }
 

@@ -7,7 +7,7 @@
 
 namespace tetwarp {
 
-bool has_cuda() { return true; }
+bool is_cuda_compiled() { return true; }
 
 int cuda_device_count() {
   int count = 0;
@@ -20,14 +20,14 @@ void wake_cuda_device(int device) {
   if (cudaSetDevice(device) != cudaSuccess || cudaFree(nullptr) != cudaSuccess) cudaGetLastError();  // told when used
 }
 
-DeviceStream::DeviceStream(int device) {
+void* create_cuda_stream(int device) {
   const cuda_detail::DeviceScope scope(device);
   cudaStream_t stream = nullptr;
   TETWARP_CUDA_TRY(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking));
-  stream_ = stream;
+  return stream;
 }
 
-DeviceStream::~DeviceStream() { cudaStreamDestroy(static_cast<cudaStream_t>(stream_)); }
+void destroy_cuda_stream(void* stream) { cudaStreamDestroy(static_cast<cudaStream_t>(stream)); }
 
 std::string describe_cuda_device(int device) {
   cudaDeviceProp properties{};

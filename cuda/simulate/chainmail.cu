@@ -1,14 +1,14 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "deform/simulate/chainmail.h"
-
 #include <cooperative_groups.h>
 
 #include <algorithm>
 
+#include "cuda/factories.h"
 #include "cuda/runtime/device_buffer.h"
 #include "deform/simulate/chain_plan.h"
+#include "deform/simulate/chainmail.h"
 
 namespace tetwarp::simulate {
 

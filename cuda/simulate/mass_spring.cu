@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "cuda/factories.h"
 #include "cuda/runtime/device_buffer.h"
 #include "cuda/runtime/stream.h"
 #include "deform/simulate/device_springs.h"
@@ -165,7 +166,7 @@ class CudaMachine {
 
 }  // namespace
 
-std::unique_ptr<Simulation> make_cuda_mass_spring(const Model& model, const MassSpringOptions&, int device) {
+std::unique_ptr<Simulation> make_cuda_mass_spring(const Model& model, int device) {
   require_springs(model);
   return make_mass_spring(model, std::make_unique<DeviceSprings<CudaMachine>>(model, device, model.nodes()));
 }

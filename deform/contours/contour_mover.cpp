@@ -7,6 +7,8 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "deform/contours/edge_distance.h"
+
 namespace tetwarp {
 
 namespace {
@@ -21,20 +23,13 @@ double pixel_mm(const Geometry& grid) { return std::min(grid.spacing.x, grid.spa
 /// Distances of the planes of slices, along the normal.
 double slice_step(const Geometry& grid) { return grid.spacing.z * glm::dot(normal_of(grid), grid.direction[2]); }
 
-double distance_to(const glm::dvec3& point, const glm::dvec3& a, const glm::dvec3& b) {
-  const glm::dvec3 along = b - a;
-  const double length = glm::dot(along, along);
-  const double t = length == 0 ? 0.0 : std::clamp(glm::dot(point - a, along) / length, 0.0, 1.0);
-  return glm::distance(point, a + t * along);
-}
-
 /// Of moved samples between two corners, those that the straight line misses, in order.
 void add_missed(std::span<const glm::dvec3> samples, double tolerance, std::vector<glm::dvec3>& points) {
   if (samples.size() < 3) return;
   std::size_t farthest = 0;
   double distance = tolerance;
   for (std::size_t n = 1; n + 1 < samples.size(); ++n) {
-    const double missed = distance_to(samples[n], samples.front(), samples.back());
+    const double missed = distance_to_edge(samples[n], samples.front(), samples.back());
     if (missed <= distance) continue;
     distance = missed;
     farthest = n;

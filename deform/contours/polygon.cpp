@@ -8,18 +8,13 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "deform/contours/edge_distance.h"
+
 namespace tetwarp {
 
 namespace {
 
 double cross(const glm::dvec2& a, const glm::dvec2& b) { return a.x * b.y - a.y * b.x; }
-
-double distance_to(const glm::dvec2& point, const glm::dvec2& a, const glm::dvec2& b) {
-  const glm::dvec2 along = b - a;
-  const double length = glm::dot(along, along);
-  const double t = length == 0 ? 0.0 : std::clamp(glm::dot(point - a, along) / length, 0.0, 1.0);
-  return glm::distance(point, a + t * along);
-}
 
 /// Where the horizontal line through `point` crosses the edge from a to b, if it does; half open, as `contains`.
 bool crosses(const glm::dvec2& point, const glm::dvec2& a, const glm::dvec2& b, double& x) {
@@ -38,7 +33,7 @@ void keep_far_corners(const Ring& ring, std::size_t first, std::size_t last, dou
     double farthest = tolerance;
     std::size_t corner = to;
     for (std::size_t n = from + 1; n < to; ++n) {
-      const double distance = distance_to(ring[n], ring[from], ring[to % ring.size()]);
+      const double distance = distance_to_edge(ring[n], ring[from], ring[to % ring.size()]);
       if (distance > farthest) {
         farthest = distance;
         corner = n;

@@ -11,7 +11,7 @@ namespace tetwarp {
 /// while the lattice is undeformed.
 ///
 /// The winding number of the border around a voxel is the number of tetrahedra that own the voxel, inverted ones
-/// counted as -1 (docs/design/cuda.md, "Gather"). It is found row by row, from where the row passes through these
+/// counted as -1 (docs/design, "Gather"). It is found row by row, from where the row passes through these
 /// triangles.
 struct BorderTriangle {
   glm::i32vec3 a, b, c;

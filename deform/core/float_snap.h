@@ -62,7 +62,7 @@ class FloatSnap {
   /// cost more than they save.
   TETWARP_HD bool is_certain(const glm::vec3& displacement, const glm::vec3& raised) const {
     bool certain = true;
-#ifdef __CUDA_ARCH__
+#ifdef TETWARP_ON_DEVICE
 #pragma unroll
 #endif
     for (int axis = 0; axis < 3; ++axis) {

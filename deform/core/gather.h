@@ -14,7 +14,7 @@ namespace tetwarp {
 //
 // Nothing here decides ownership by itself. A tetrahedron is accepted where float arithmetic proves the result of
 // `side_of_face`, or exact integers compute it; whatever cannot be settled is left to `visit_cell`. That the owner
-// found is the only one, and so has the lowest number, must be known before (docs/design/cuda.md, "Gather").
+// found is the only one, and so has the lowest number, must be known before (docs/design, "Gather").
 
 /// A voxel centre relative to the first undeformed vertex, and its nudge; 2^-12 voxel, in float, which holds both
 /// exactly.
@@ -51,7 +51,7 @@ namespace detail {
 
 /// a b + c, fused on the device only; for numbers that need not have the same bits everywhere.
 TETWARP_HD inline float multiply_add(float a, float b, float c) {
-#ifdef __CUDA_ARCH__
+#ifdef TETWARP_ON_DEVICE
   return fmaf(a, b, c);
 #else
   return a * b + c;
@@ -60,7 +60,7 @@ TETWARP_HD inline float multiply_add(float a, float b, float c) {
 
 /// 1 / x, rounded to nearest, for x of at least 2^-100 and at most 2^100 in size.
 TETWARP_HD inline float reciprocal(float x) {
-#ifdef __CUDA_ARCH__
+#ifdef TETWARP_ON_DEVICE
   float guess;
   asm("rcp.approx.ftz.f32 %0, %1;" : "=f"(guess) : "f"(x));
   return fmaf(guess, fmaf(-x, guess, 1.0f), guess);  // what the division does once it knows the range
@@ -75,7 +75,7 @@ TETWARP_HD inline float nudged(float value, const glm::vec3& nudge, const Cross&
 
 /// u in voxels from how far a place has moved in steps: scaling by a power of two is exact; never -0.
 TETWARP_HD inline glm::vec3 to_offset(const glm::vec3& moved) {
-#ifdef __CUDA_ARCH__
+#ifdef TETWARP_ON_DEVICE
   return {fmaf(moved.x, -kVoxelsPerStep, 0.0f), fmaf(moved.y, -kVoxelsPerStep, 0.0f),
           fmaf(moved.z, -kVoxelsPerStep, 0.0f)};
 #else
@@ -117,7 +117,7 @@ constexpr float kThinSum = kThin / 26, kSlackSum = 22;
 
 /// x, negated where an odd number of the signs `to` (+1 or -1) are negative.
 TETWARP_HD inline float with_sign_of(float x, const glm::vec3& to) {
-#ifdef __CUDA_ARCH__
+#ifdef TETWARP_ON_DEVICE
   const unsigned signs = __float_as_uint(to.x) ^ __float_as_uint(to.y) ^ __float_as_uint(to.z);
   return __uint_as_float(__float_as_uint(x) ^ (signs & 0x80000000u));
 #else

@@ -12,7 +12,7 @@
 namespace tetwarp::ray {
 
 // On the device an instruction each; of equal zeros either may come out.
-#ifdef __CUDA_ARCH__
+#ifdef TETWARP_ON_DEVICE
 TETWARP_INLINE_HD float smaller(float a, float b) { return fminf(a, b); }
 TETWARP_INLINE_HD float larger(float a, float b) { return fmaxf(a, b); }
 #else
@@ -51,7 +51,7 @@ TETWARP_INLINE_HD RayPlace place_among(const glm::ivec3& size, const glm::vec3& 
 /// 64-bit product. On the device it is one instruction; compilers would move the conversion of one factor out of a loop
 /// and take five.
 TETWARP_INLINE_HD std::int64_t wide_product(int a, int b) {
-#ifdef __CUDA_ARCH__
+#ifdef TETWARP_ON_DEVICE
   std::int64_t product;
   asm("mul.wide.s32 %0, %1, %2;" : "=l"(product) : "r"(a), "r"(b));
   return product;

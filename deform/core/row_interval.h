@@ -93,7 +93,7 @@ TETWARP_HD inline float norm1(const DoubleVector& v) {
 
 /// The smallest whole number that is not below x. For x beyond the range of int it is some number as far out.
 TETWARP_HD inline int ceil_to_int(float x) {
-#ifdef __CUDA_ARCH__
+#ifdef TETWARP_ON_DEVICE
   return __float2int_ru(x);
 #else
   return -floor_to_int(-x);

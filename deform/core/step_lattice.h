@@ -88,7 +88,7 @@ class StepPacking {
         above_z_(kTwoTo23 >> (64 - z_at_)),
         lift_(float{1 << kMostBits} - glm::vec3(least)) {}
 
-#ifdef __CUDA_ARCH__
+#ifdef TETWARP_ON_DEVICE
   __device__ static float float_of(std::uint32_t bits) { return __uint_as_float(bits); }
   __device__ static std::uint32_t bits_of(float value) { return __float_as_uint(value); }
   __device__ std::uint32_t middle(std::uint32_t low, std::uint32_t high) const {
@@ -236,7 +236,7 @@ namespace detail {
 /// The largest whole number that is not above x. NaN gives 0; for x beyond the range of int it is some number as far
 /// out.
 TETWARP_HD inline int floor_to_int(float x) {
-#ifdef __CUDA_ARCH__
+#ifdef TETWARP_ON_DEVICE
   return __float2int_rd(x);
 #else
   constexpr float kFar = 1 << 30;
@@ -246,7 +246,7 @@ TETWARP_HD inline int floor_to_int(float x) {
 
 /// x clamped to [0, 1]; NaN gives 0.
 TETWARP_HD inline float saturate(float x) {
-#ifdef __CUDA_ARCH__
+#ifdef TETWARP_ON_DEVICE
   return __saturatef(x);
 #else
   return x > 0 ? (x < 1 ? x : 1.0f) : 0.0f;
@@ -255,7 +255,7 @@ TETWARP_HD inline float saturate(float x) {
 
 /// x clamped to [0, last].
 TETWARP_HD inline int clamp_to(int x, int last) {
-#ifdef __CUDA_ARCH__
+#ifdef TETWARP_ON_DEVICE
   return __vimin_s32_relu(x, last);
 #else
   const int inside = x > 0 ? x : 0;

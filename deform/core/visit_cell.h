@@ -5,13 +5,9 @@
 
 #include "deform/core/barycentric.h"
 #include "deform/core/ownership.h"
+#include "deform/core/region.h"
 
 namespace tetwarp {
-
-/// Half-open box of voxels.
-struct VoxelBox {
-  glm::i64vec3 begin, end;
-};
 
 namespace detail {
 
@@ -29,15 +25,11 @@ TETWARP_HD inline void candidates(const Nudge& nudge, int axis, std::int32_t low
 }
 
 /// The part of `region` that a tetrahedron or cell with this box may own.
-TETWARP_HD inline VoxelBox candidates(const Nudge& nudge, const Box& box, VoxelBox region) {
+TETWARP_HD inline Region candidates(const Nudge& nudge, const Box& box, Region region) {
   for (int axis = 0; axis < 3; ++axis) {
     candidates(nudge, axis, box.low[axis], box.high[axis], &region.begin[axis], &region.end[axis]);
   }
   return region;
-}
-
-TETWARP_HD inline bool is_empty(const VoxelBox& box) {
-  return box.end.x <= box.begin.x || box.end.y <= box.begin.y || box.end.z <= box.begin.z;
 }
 
 TETWARP_HD inline glm::i32vec3 to_steps(const glm::i64vec3& voxel) {
@@ -105,7 +97,7 @@ TETWARP_HD void clip_row(const Face<Int> (&faces)[4], std::int64_t y, std::int64
 
 /// Walks the rows of `box`: in each, the voxels of the tetrahedron are an interval between its faces.
 template <class Int, class Visit>
-TETWARP_HD void walk_rows(const Tetrahedron& t, int number, const VoxelBox& box, const Nudge& nudge, Visit& visit) {
+TETWARP_HD void walk_rows(const Tetrahedron& t, int number, const Region& box, const Nudge& nudge, Visit& visit) {
   Face<Int> faces[4];
   if (!make_faces<Int>(t, to_steps(box.begin), faces)) return;
   for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {
@@ -160,7 +152,7 @@ TETWARP_HD void visit_voxel(const Cell& cell, const glm::i64vec3& voxel, const g
 
 /// Walks the voxels of a small box one by one.
 template <class Int, class Visit>
-TETWARP_HD void walk_voxels(const Cell& cell, bool odd, const VoxelBox& box, const Nudge& nudge, Visit& visit) {
+TETWARP_HD void walk_voxels(const Cell& cell, bool odd, const Region& box, const Nudge& nudge, Visit& visit) {
   for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {
     for (std::int64_t y = box.begin.y; y < box.end.y; ++y) {
       for (std::int64_t x = box.begin.x; x < box.end.x; ++x) {
@@ -184,11 +176,11 @@ TETWARP_HD void walk_voxels(const Cell& cell, bool odd, const VoxelBox& box, con
 /// (docs/design/definition.md, "Who owns a voxel"); what becomes of them is up to the backend. A voxel in a fold is
 /// reported by several tetrahedra, of this cell or of others: the one with the lowest number 5 * cell + t is its owner.
 template <class Visit>
-TETWARP_HD void visit_cell(const Cell& cell, bool odd, const VoxelBox& region, const Nudge& nudge, Visit&& visit) {
+TETWARP_HD void visit_cell(const Cell& cell, bool odd, const Region& region, const Nudge& nudge, Visit&& visit) {
   constexpr std::int64_t kFewVoxels = 8;  // up to here, looking at each voxel beats setting up rows
   const Box cell_box = box_of(cell);
-  const VoxelBox all = detail::candidates(nudge, cell_box, region);
-  if (detail::is_empty(all)) return;
+  const Region all = detail::candidates(nudge, cell_box, region);
+  if (is_empty(all)) return;
   const glm::i64vec3 extent = all.end - all.begin;
   if (extent.x * extent.y * extent.z <= kFewVoxels) {
     if (fits_double(cell_box)) return detail::walk_voxels<double>(cell, odd, all, nudge, visit);
@@ -198,8 +190,8 @@ TETWARP_HD void visit_cell(const Cell& cell, bool odd, const VoxelBox& region, c
   for (int number = 0; number < kTetrahedraPerCell; ++number) {
     const Tetrahedron t = tetrahedron_of(cell, number, odd);
     const Box box = box_of(t);
-    const VoxelBox voxels = detail::candidates(nudge, box, all);
-    if (detail::is_empty(voxels)) continue;
+    const Region voxels = detail::candidates(nudge, box, all);
+    if (is_empty(voxels)) continue;
     if (fits_int64(box)) {
       detail::walk_rows<std::int64_t>(t, number, voxels, nudge, visit);
     } else {

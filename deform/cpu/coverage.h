@@ -10,7 +10,7 @@
 
 namespace tetwarp::cpu {
 
-/// How many tetrahedra own each voxel: the winding number of the deformed border (docs/design/cuda.md, "Gather"). It is
+/// How many tetrahedra own each voxel: the winding number of the deformed border (docs/design, "Gather"). It is
 /// stored as the places where rows of voxels pass through the border, and, tile by tile, what inverted tetrahedra may
 /// reach.
 class Coverage {

@@ -43,15 +43,15 @@ struct Tile {
 
 /// Tile by tile: finds for each voxel where it comes from, then samples its rows. Voxels at rest are copied; lattices
 /// at whole steps take the march, others, and what the march leaves, are claimed.
-class LatticeResampler final : public Resampler {
+class LatticeResampler final : public ForwardResampler {
  public:
-  LatticeResampler(Geometry output, const Limits& limits) : Resampler(output), arena_(make_arena(limits)) {}
+  LatticeResampler(Geometry output, const Limits& limits) : ForwardResampler(output), arena_(make_arena(limits)) {}
 
-  void set_field(const FieldView& field, const Control& control) override {
+  void set_field(const FieldView& field, const FieldOptions& options, const Control& control) override {
     ready_ = false;
     require_host(field.memory, "the field");
     arena_.execute([&] { lattice_.build(output(), field, control); });
-    wants_range_ = control.jacobian_range;
+    wants_range_ = options.jacobian_range;
     const FieldStatistics& statistics = lattice_.statistics();
     has_coverage_ = false;
     const glm::i64vec3& cells = lattice_.cells();
@@ -72,7 +72,8 @@ class LatticeResampler final : public Resampler {
     return source_box(source, output(), low, high);
   }
 
-  Report resample(Region region, std::span<const Target> targets, const Maps& maps, const Control& control) override {
+  Report resample(Region region, std::span<const Target> targets, const Maps& maps, const Control& control,
+                  const PartSink& finished) override {
     require(ready_, "resample needs a field: call set_field first");
     const TargetSamplers samplers = make_samplers(*this, targets, region);
     const MapWriter writer(maps, output(), region);
@@ -87,18 +88,19 @@ class LatticeResampler final : public Resampler {
              std::all_of(samplers.begin(), samplers.end(), [&](const auto& of) { return of->can_copy(box); });
     };
     const auto is_copied = [&](const Region& box) { return can_copy(box) && rests(box); };
-    Report report = for_each_tile<Tile>(arena_, region, control, is_copied, [&](const Region& box, Tile& tile) {
-      if (!writer.wants_owners() && rests(box))
-        return can_copy(box) ? copy(box, samplers) : stay(box, tile, samplers, writer);
-      Report of_tile;
-      if (may_march && !mostly_folds(box)) {
-        gather(box, tile, writer, of_tile.paths);
-      } else {
-        claim_all(box, tile, writer, of_tile.paths);
-      }
-      write(box, tile, samplers, writer, of_tile);
-      return of_tile;
-    });
+    Report report =
+        for_each_tile<Tile>(arena_, region, control, finished, is_copied, [&](const Region& box, Tile& tile) {
+          if (!writer.wants_owners() && rests(box))
+            return can_copy(box) ? copy(box, samplers) : stay(box, tile, samplers, writer);
+          Report of_tile;
+          if (may_march && !mostly_folds(box)) {
+            gather(box, tile, writer, of_tile.paths);
+          } else {
+            claim_all(box, tile, writer, of_tile.paths);
+          }
+          write(box, tile, samplers, writer, of_tile);
+          return of_tile;
+        });
     const FieldStatistics& statistics = lattice_.statistics();
     report.inverted = statistics.inverted;
     report.degenerate = statistics.degenerate;
@@ -322,7 +324,7 @@ class LatticeResampler final : public Resampler {
 
 }  // namespace cpu
 
-std::unique_ptr<Resampler> make_cpu_resampler(Geometry output, Limits limits) {
+std::unique_ptr<ForwardResampler> make_cpu_resampler(Geometry output, Limits limits) {
   return std::make_unique<LatticeOrMesh>(
       output, [=] { return std::make_unique<cpu::LatticeResampler>(output, limits); },
       [=] { return cpu::make_mesh_resampler(output, limits); });

@@ -51,7 +51,7 @@ struct MarchTile {
 /// Finds the owners of those voxels of a tile that have exactly one, with the widest vectors that the processor has
 /// (Highway).
 ///
-/// It goes along k, as the march of cuda/owners/march.cuh does. Each owner is predicted from the affine map of the one
+/// It goes along k, as the march on a device does. Each owner is predicted from the affine map of the one
 /// before, and accepted where float arithmetic proves it (`try_tetrahedron`) or, at a second look, double arithmetic.
 /// Offsets have the bits of `interpolate_u`, for they are computed by the same operations. Voxels whose owner is not
 /// found are listed in `scratch.unsettled`. Offsets of all other voxels are undefined.

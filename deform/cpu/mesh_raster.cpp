@@ -35,8 +35,8 @@ Region MeshRaster::bin(const glm::i64vec3& at) const {
 /// Calls `visit(number)` for the bins that a tetrahedron may reach.
 template <class Visit>
 void MeshRaster::for_each_bin(const Tetrahedron& t, Visit&& visit) const {
-  const VoxelBox voxels = detail::candidates(mesh_->nudge, box_of(t), {glm::i64vec3(0), size_});
-  if (detail::is_empty(voxels)) return;
+  const Region voxels = detail::candidates(mesh_->nudge, box_of(t), {glm::i64vec3(0), size_});
+  if (is_empty(voxels)) return;
   const glm::i64vec3 begin = (voxels.begin - origin_) / kBin, end = (voxels.end - std::int64_t{1} - origin_) / kBin;
   const auto number = [&](const glm::i64vec3& at) {
     return static_cast<std::size_t>((at.z * bins_.y + at.y) * bins_.x + at.x);
@@ -96,8 +96,8 @@ void MeshRaster::find_in_bin(std::size_t number, const Region& part, const Regio
   };
   for (const std::uint32_t* listed = lists_.begin(number); listed != lists_.end(number); ++listed) {
     const Tetrahedron t = mesh_->tetrahedron(*listed);
-    const VoxelBox reached = detail::candidates(mesh_->nudge, box_of(t), {part.begin, part.end});
-    if (detail::is_empty(reached)) continue;
+    const Region reached = detail::candidates(mesh_->nudge, box_of(t), part);
+    if (is_empty(reached)) continue;
     const glm::ivec3 begin = glm::ivec3(reached.begin) - first, end = glm::ivec3(reached.end) - first;
     RowFaces faces{};
     const bool has_faces = make_row_faces(t, first, signs, size, faces);

@@ -26,13 +26,14 @@ struct Tile {
 };
 
 /// Tile by tile: rasterises the tetrahedra, then samples the rows.
-class MeshResampler final : public Resampler {
+class MeshResampler final : public ForwardResampler {
  public:
-  MeshResampler(const Geometry& output, const Limits& limits) : Resampler(output), arena_(make_arena(limits)) {}
+  MeshResampler(const Geometry& output, const Limits& limits) : ForwardResampler(output), arena_(make_arena(limits)) {}
 
-  void set_field(const FieldView& field, const Control& control) override;
+  void set_field(const FieldView& field, const FieldOptions& options, const Control& control) override;
   Region source_region(const Geometry& source, Region region) const override;
-  Report resample(Region region, std::span<const Target> targets, const Maps& maps, const Control& control) override;
+  Report resample(Region region, std::span<const Target> targets, const Maps& maps, const Control& control,
+                  const PartSink& finished) override;
 
  private:
   void require_reach(const Control& control);
@@ -44,7 +45,7 @@ class MeshResampler final : public Resampler {
   bool ready_ = false, stays_outside_ = false;
 };
 
-void MeshResampler::set_field(const FieldView& field, const Control& control) {
+void MeshResampler::set_field(const FieldView& field, const FieldOptions&, const Control& control) {
   ready_ = false;
   arena_.execute([&] { mesh_ = snap_mesh(output(), field, control); });
   raster_.build(mesh_, output(), control);
@@ -61,7 +62,7 @@ void MeshResampler::set_field(const FieldView& field, const Control& control) {
 void MeshResampler::require_reach(const Control& control) {
   std::atomic<std::int64_t> voxels = 0, lowest = INT64_MAX;
   for_each_tile<MeshOwners>(
-      arena_, whole(output()), {.stop = control.stop}, [&](const Region& box, MeshOwners& owners) {
+      arena_, whole(output()), {.stop = control.stop}, {}, [&](const Region& box, MeshOwners& owners) {
         rest_raster_.find(box, false, owners);
         std::size_t n = 0;
         for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {
@@ -86,12 +87,12 @@ Region MeshResampler::source_region(const Geometry& source, Region region) const
   return mesh_source_region(mesh_, stays_outside_, output(), source, region);
 }
 
-Report MeshResampler::resample(Region region, std::span<const Target> targets, const Maps& maps,
-                               const Control& control) {
+Report MeshResampler::resample(Region region, std::span<const Target> targets, const Maps& maps, const Control& control,
+                               const PartSink& finished) {
   require(ready_, "resample needs a field: call set_field first");
   const TargetSamplers samplers = make_samplers(*this, targets, region);
   const MapWriter writer(maps, output(), region);
-  Report report = for_each_tile<Tile>(arena_, region, control, [&](const Region& box, Tile& tile) {
+  Report report = for_each_tile<Tile>(arena_, region, control, finished, [&](const Region& box, Tile& tile) {
     Report of_tile;
     of_tile.paths.claimed = static_cast<std::uint64_t>(voxel_count(box));
     raster_.find(box, writer.wants_owners(), tile.owners);
@@ -152,7 +153,7 @@ void MeshResampler::settle(const Row& row, std::size_t first, const MapWriter& m
 
 }  // namespace
 
-std::unique_ptr<Resampler> make_mesh_resampler(const Geometry& output, const Limits& limits) {
+std::unique_ptr<ForwardResampler> make_mesh_resampler(const Geometry& output, const Limits& limits) {
   return std::make_unique<MeshResampler>(output, limits);
 }
 

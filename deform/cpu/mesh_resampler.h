@@ -11,6 +11,6 @@ namespace tetwarp::cpu {
 
 /// A resampler of forward fields that are meshes, on the CPU.
 /// @throws InputError as `make_cpu_resampler`
-std::unique_ptr<Resampler> make_mesh_resampler(const Geometry& output, const Limits& limits);
+std::unique_ptr<ForwardResampler> make_mesh_resampler(const Geometry& output, const Limits& limits);
 
 }  // namespace tetwarp::cpu

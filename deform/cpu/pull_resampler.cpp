@@ -68,9 +68,9 @@ struct RowScratch {
 };
 
 /// Row by row: where each voxel comes from, then the samples there.
-class PullResampler final : public Resampler {
+class RowPullResampler final : public PullResampler {
  public:
-  PullResampler(Geometry output, const Limits& limits) : Resampler(output), arena_(make_arena(limits)) {}
+  RowPullResampler(Geometry output, const Limits& limits) : PullResampler(output), arena_(make_arena(limits)) {}
 
   void set_field(const PullFieldView& field, const Control& control) override {
     ready_ = false;
@@ -86,12 +86,13 @@ class PullResampler final : public Resampler {
     return pull_source_region(frame_, grid_, output(), source, region);
   }
 
-  Report resample(Region region, std::span<const Target> targets, const Maps& maps, const Control& control) override {
+  Report resample(Region region, std::span<const Target> targets, const Maps& maps, const Control& control,
+                  const PartSink& finished) override {
     require(ready_, "resample needs a field: call set_field first");
     require(!maps.jacobian.voxels && !maps.owners.voxels, "a pull field has no tetrahedra: no Jacobian or owners map");
     const TargetSamplers samplers = make_samplers(*this, targets, region);
     const MapWriter writer(maps, output(), region);
-    return for_each_tile<RowScratch>(arena_, region, control, [&](const Region& box, RowScratch& scratch) {
+    return for_each_tile<RowScratch>(arena_, region, control, finished, [&](const Region& box, RowScratch& scratch) {
       Report report;
       for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {
         for (std::int64_t y = box.begin.y; y < box.end.y; ++y) {
@@ -146,8 +147,8 @@ class PullResampler final : public Resampler {
 
 }  // namespace cpu
 
-std::unique_ptr<Resampler> make_cpu_pull_resampler(Geometry output, Limits limits) {
-  return std::make_unique<cpu::PullResampler>(output, limits);
+std::unique_ptr<PullResampler> make_cpu_pull_resampler(Geometry output, Limits limits) {
+  return std::make_unique<cpu::RowPullResampler>(output, limits);
 }
 
 }  // namespace tetwarp

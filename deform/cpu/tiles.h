@@ -45,21 +45,21 @@ class Progress {
 /// Reports layers of tiles (all tiles with the same range of k) whose last row of tiles is done.
 class Layers {
  public:
-  Layers(const Control& control, const Region& region, const glm::i64vec3& tiles)
-      : control_(control), region_(region), rows_left_(static_cast<std::size_t>(tiles.z)) {
+  Layers(const PartSink& finished, const Region& region, const glm::i64vec3& tiles)
+      : finished_(finished), region_(region), rows_left_(static_cast<std::size_t>(tiles.z)) {
     for (std::atomic<std::int64_t>& rows : rows_left_) rows = tiles.y;
   }
 
   void row_done(std::int64_t layer) {
-    if (!control_.finished || --rows_left_[static_cast<std::size_t>(layer)] != 0) return;
+    if (!finished_ || --rows_left_[static_cast<std::size_t>(layer)] != 0) return;
     Region slices = region_;
     slices.begin.z += layer * kTile;
     slices.end.z = std::min(slices.begin.z + kTile, region_.end.z);
-    control_.finished(slices);
+    finished_(slices);
   }
 
  private:
-  const Control& control_;
+  const PartSink& finished_;
   Region region_;
   std::vector<std::atomic<std::int64_t>> rows_left_;
 };
@@ -73,15 +73,16 @@ inline tbb::task_arena make_arena(const Limits& limits) {
 /// Runs `work(box, scratch)` for all tiles of the region, each thread with a Scratch of its own, and adds up the
 /// reports. Rows of tiles are begun in rising order of k, so that slices are finished early.
 ///
-/// @param at_once  whether a row of tiles along i is one piece of work: then the box is the row
+/// @param finished  gets layers of tiles that are done
+/// @param at_once   whether a row of tiles along i is one piece of work: then the box is the row
 template <class Scratch, class AtOnce, class Work>
-Report for_each_tile(tbb::task_arena& arena, const Region& region, const Control& control, AtOnce&& at_once,
-                     Work&& work) {
+Report for_each_tile(tbb::task_arena& arena, const Region& region, const Control& control, const PartSink& finished,
+                     AtOnce&& at_once, Work&& work) {
   Report total;
   if (is_empty(region)) return total;
   const glm::i64vec3 tiles = (region.end - region.begin + (kTile - 1)) / kTile;
   Progress progress(control, voxel_count(region));
-  Layers layers(control, region, tiles);
+  Layers layers(finished, region, tiles);
   tbb::enumerable_thread_specific<Scratch> scratch;
   tbb::enumerable_thread_specific<Report> reports;
   const auto run = [&](const Region& box) {
@@ -108,11 +109,12 @@ Report for_each_tile(tbb::task_arena& arena, const Region& region, const Control
   return total;
 }
 
-/// The same without such rows.
+/// Does the same tile by tile: no row is one piece of work.
 template <class Scratch, class Work>
-Report for_each_tile(tbb::task_arena& arena, const Region& region, const Control& control, Work&& work) {
+Report for_each_tile(tbb::task_arena& arena, const Region& region, const Control& control, const PartSink& finished,
+                     Work&& work) {
   const auto never = [](const Region&) { return false; };
-  return for_each_tile<Scratch>(arena, region, control, never, std::forward<Work>(work));
+  return for_each_tile<Scratch>(arena, region, control, finished, never, std::forward<Work>(work));
 }
 
 }  // namespace tetwarp::cpu

@@ -41,7 +41,7 @@ class Renderer {
   /// Frees what the renderer holds; volumes are not owned.
   virtual ~Renderer() = default;
 
-  /// Takes a volume in host memory or, on CUDA, in memory of the device, and finds out which blocks of it are empty.
+  /// Takes a volume in host memory or in memory of its device, and finds out which blocks of it are empty.
   /// The view is kept: the voxels must not change until the next call, and call it again whenever they have changed.
   /// @throws InputError unless the view has one component and buffers its whole, straight and even grid (see
   ///         `straightened`)
@@ -59,20 +59,14 @@ class Renderer {
   /// Makes a picture.
   /// @param plane    pixels and rays
   /// @param rgb      gets red, green and blue of each pixel, rows from the top: plane.width * plane.height * 3 bytes,
-  ///         in host memory or, on CUDA, in memory of the device
+  ///         in host memory or in memory of its device
   /// @param control  stop and stream
   /// @throws InputError before a volume and a style are set, or for an array of another size
   /// @throws Cancelled
   virtual void render(const ViewPlane& plane, std::span<std::uint8_t> rgb, const Control& control = {}) = 0;
 };
 
-/// A renderer on the CPU.
+/// A renderer on the CPU. It refuses volumes in device memory.
 std::unique_ptr<Renderer> make_cpu_renderer(Limits limits = {});
-/// A renderer on a CUDA device.
-/// @param device  number of the device
-/// @param limits  `memory` limits the bytes of its own copy of a volume; without the copy pictures take longer
-/// @throws DeviceError without a device
-/// @throws NotCompiled in a build without CUDA
-std::unique_ptr<Renderer> make_cuda_renderer(int device = 0, Limits limits = {});
 
 }  // namespace tetwarp

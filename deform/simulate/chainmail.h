@@ -47,11 +47,6 @@ namespace tetwarp::simulate {
 /// @throws InputError for a lattice whose axes are not perpendicular, or limits that do not contain 0
 std::unique_ptr<Simulation> make_cpu_chainmail(const Model& model, Limits limits = {});
 
-/// ChainMail on a CUDA device, with the same bits as on the CPU.
-/// @throws DeviceError without a device
-/// @throws NotCompiled in a build without CUDA
-std::unique_ptr<Simulation> make_cuda_chainmail(const Model& model, int device = 0);
-
 /// A link along an axis whose ends are further apart, nearer or more sheared than its limits allow.
 struct BrokenLink {
   std::uint32_t node = 0;  ///< node at the lower end

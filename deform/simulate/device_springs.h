@@ -27,7 +27,7 @@ inline constexpr int kDeviceBlock = 256;
 ///     upload(place, host, size), wait();
 ///     T fetch(const T* place);                   // waits for what is queued, and brings a value to the host
 ///
-/// so that the same code runs on CUDA and, in tests, on the CPU.
+/// so that the same code runs on a device and, in tests, on the CPU.
 template <class Machine>
 class DeviceSprings final : public SpringEngine {
  public:
@@ -106,7 +106,7 @@ class DeviceSprings final : public SpringEngine {
     make_matrices(kind);
     machine_.each(nodes_, sweeps::Forces{{a_}});
     const GradientState state = conjugate_gradients(effort, stop);
-    machine_.template sum<Sums>(nodes_, sweeps::Direction{{a_}}, sweeps::Keep{a_.result});
+    machine_.template sum<Sums>(nodes_, sweeps::SearchDirection{{a_}}, sweeps::Keep{a_.result});
     const Sums sums = machine_.fetch(a_.result);
     return {.iterations = state.iterations,
             .is_indefinite = state.is_indefinite,

@@ -240,7 +240,7 @@ struct Turn : GradientSweep {
 };
 
 /// Minus the forces times the direction, and its longest entry, squared.
-struct Direction : Sweep {
+struct SearchDirection : Sweep {
   TETWARP_HD Sums operator()(std::size_t n) const {
     const glm::dvec3 x = in_double(a.x[n]);
     return {.slope = -dot3(a.force[n], x), .most = dot3(x, x)};

@@ -44,12 +44,6 @@ inline constexpr std::size_t kMostNodesForCholesky = 20'000;
 std::unique_ptr<Simulation> make_cpu_mass_spring(const Model& model, const MassSpringOptions& options = {},
                                                  Limits limits = {});
 
-/// Mass-spring simulation on a CUDA device, always by conjugate gradients. Displacements stay in device memory.
-/// @throws DeviceError without a device
-/// @throws NotCompiled in a build without CUDA
-std::unique_ptr<Simulation> make_cuda_mass_spring(const Model& model, const MassSpringOptions& options = {},
-                                                  int device = 0);
-
 /// Energy of the springs, N mm: the sum of k/2 (length - rest length)^2 over all springs.
 /// @param model         model whose springs are summed
 /// @param displacement  LPS mm of each node

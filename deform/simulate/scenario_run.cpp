@@ -92,14 +92,14 @@ Frame ScenarioRun::next(const Control& control) {
   return frame;
 }
 
-Report ScenarioRun::resample(Resampler& resampler, std::span<const Target> targets, Outside outside, const Maps& maps,
-                             const Control& control) {
+Report ScenarioRun::resample(ForwardResampler& resampler, std::span<const Target> targets, Outside outside,
+                             const Maps& maps, const FieldOptions& options, const Control& control) {
   require(simulation_ != nullptr, "a scenario has a field after its first frame");
   if (division_.replaced.empty()) {
-    resampler.set_field(simulate::view(*simulation_, model_, outside), control);
+    resampler.set_field(simulate::view(*simulation_, model_, outside), options, control);
   } else {
     field_ = field();
-    resampler.set_field(tetwarp::view(field_, outside), control);
+    resampler.set_field(tetwarp::view(field_, outside), options, control);
   }
   return resampler.resample(whole(resampler.output()), targets, maps, control);
 }

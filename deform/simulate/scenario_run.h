@@ -48,9 +48,9 @@ class ScenarioRun {
   /// Sends volumes through the field after the last frame. Calling this and `next` in turn is the loop of an
   /// interactive program. Displacements that the simulation keeps on a device stay there, unless open cuts divide
   /// cells. Frames of the same sizes allocate nothing.
-  /// @throws InputError and others, as `Resampler::set_field` and `Resampler::resample`
-  Report resample(Resampler& resampler, std::span<const Target> targets, Outside outside = Outside::background,
-                  const Maps& maps = {}, const Control& control = {});
+  /// @throws InputError and others, as `ForwardResampler::set_field` and `Resampler::resample`
+  Report resample(ForwardResampler& resampler, std::span<const Target> targets, Outside outside = Outside::background,
+                  const Maps& maps = {}, const FieldOptions& options = {}, const Control& control = {});
 
   /// The loads of a phase, by index.
   const PhaseLoads& loads(std::size_t phase) const { return loads_[phase]; }

@@ -80,7 +80,7 @@ class Simulation {
   virtual void set_displacement(std::span<const glm::vec3> displacement) = 0;
 };
 
-/// The displaced lattice of a simulation without cuts, in place, for `Resampler::set_field`.
+/// The displaced lattice of a simulation without cuts, in place, for `ForwardResampler::set_field`.
 inline FieldView view(const Simulation& simulation, const Model& model, Outside outside = Outside::refuse) {
   return {.lattice = &model.lattice,
           .displacement = simulation.displacement().data(),

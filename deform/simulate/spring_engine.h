@@ -53,7 +53,7 @@ class SpringEngine {
  public:
   virtual ~SpringEngine() = default;
 
-  /// A cudaStream_t on which the next calls queue their work; null: the default stream.
+  /// A stream of the device (`Control::stream`) on which the next calls queue their work; null: the default stream.
   virtual void set_stream(void*) {}
 
   /// From here on: placed nodes go from where they are to `loads.goal`, forces from what they are to `loads.force`.

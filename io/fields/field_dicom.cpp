@@ -272,7 +272,7 @@ std::unique_ptr<FieldReader> open(const FieldSource& source) {
   header.format = "DICOM Deformable Spatial Registration";
   if (file->count() > 1) header.format += ", item " + std::to_string(number) + " of " + std::to_string(file->count());
   if (!is_identity(pre) || !is_identity(post)) header.format += ", with its matrices";
-  header.direction = FieldDirection::pull;
+  header.direction = Direction::pull;
   header.direction_basis = header.frame_basis = header.units_basis = header.absolute_basis = FieldBasis::by_format;
   DcmElement& vectors = vectors_of(grid, header.grid, name);
   return std::make_unique<RegistrationReader>(std::move(header), name, std::move(file), vectors, pre, post);

@@ -61,24 +61,24 @@ void require_finite(const std::vector<glm::vec3>& displacement, const Geometry& 
   }
 }
 
-FieldFile read_as(const FieldSource& source, std::optional<FieldDirection> wanted) {
+FieldFile read_as(const FieldSource& source, std::optional<Direction> wanted) {
   const std::string file = source.path.string();
   const auto reader = open_field(source);
   const FieldFileHeader& header = reader->header();
   require(!wanted || !header.direction || *wanted == *header.direction,
           "a " + (header.direction ? to_string(*header.direction) : "") + " field where a " +
               (wanted ? to_string(*wanted) : "") + " field is expected, " + file + "; " +
-              (wanted == FieldDirection::forward ? "give it with --pull-field, or invert it" : "give it with -f"));
+              (wanted == Direction::forward ? "give it with --pull-field, or invert it" : "give it with -f"));
   FieldFile field{header.grid, {}, header.direction};
   field.displacement.resize(static_cast<std::size_t>(voxel_count(field.grid)));
   reader->read(field.displacement);
   require_finite(field.displacement, field.grid,
-                 wanted.value_or(field.direction.value_or(FieldDirection::forward)) == FieldDirection::pull, file);
+                 wanted.value_or(field.direction.value_or(Direction::forward)) == Direction::pull, file);
   return field;
 }
 
 void write_as(const std::filesystem::path& path, const Geometry& grid, const std::vector<glm::vec3>& displacement,
-              FieldDirection direction) {
+              Direction direction) {
   require(displacement.size() == static_cast<std::size_t>(voxel_count(grid)),
           std::to_string(displacement.size()) + " displacements for " + to_string(grid.size) + " vertices, " +
               path.string());
@@ -89,7 +89,7 @@ void write_as(const std::filesystem::path& path, const Geometry& grid, const std
 
 }  // namespace
 
-std::string to_string(FieldDirection direction) { return direction == FieldDirection::forward ? "forward" : "pull"; }
+std::string to_string(Direction direction) { return direction == Direction::forward ? "forward" : "pull"; }
 
 std::string to_string(FieldBasis basis) {
   switch (basis) {
@@ -139,25 +139,25 @@ FieldFileHeader read_field_header(const FieldSource& source) { return open_field
 FieldFile read_field_file(const FieldSource& source) { return read_as(source, std::nullopt); }
 
 VertexField read_forward_field(const FieldSource& source) {
-  FieldFile field = read_as(source, FieldDirection::forward);
+  FieldFile field = read_as(source, Direction::forward);
   return {field.grid, std::move(field.displacement)};
 }
 
 PullField read_pull_field(const FieldSource& source) {
-  FieldFile field = read_as(source, FieldDirection::pull);
+  FieldFile field = read_as(source, Direction::pull);
   return {field.grid, std::move(field.displacement)};
 }
 
 void write_field_file(const std::filesystem::path& path, const VertexField& field) {
-  write_as(path, field.lattice, field.displacement, FieldDirection::forward);
+  write_as(path, field.lattice, field.displacement, Direction::forward);
 }
 
 void write_field_file(const std::filesystem::path& path, const PullField& field) {
-  write_as(path, field.grid, field.displacement, FieldDirection::pull);
+  write_as(path, field.grid, field.displacement, Direction::pull);
 }
 
 std::unique_ptr<ImageWriter> create_field_file(const std::filesystem::path& path, const Geometry& grid,
-                                               FieldDirection direction) {
+                                               Direction direction) {
   ImageWriteOptions options;
   if (image_format(path) == ImageFormat::nifti)
     options.metadata["descrip"] = std::string(kDirectionKey) + "=" + to_string(direction);

@@ -74,7 +74,7 @@ void read_stated_direction(const ImageHeader& image, const std::string& file, Fi
   if (text.empty()) return;
   require(text == "forward" || text == "pull",
           "the direction \"" + text + "\" (" + kDirectionKey + "), " + file + "; expected forward or pull");
-  header.direction = text == "forward" ? FieldDirection::forward : FieldDirection::pull;
+  header.direction = text == "forward" ? Direction::forward : Direction::pull;
   header.direction_basis = FieldBasis::stated;
   header.frame_basis = header.units_basis = header.absolute_basis = FieldBasis::by_format;
 }

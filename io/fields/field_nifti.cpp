@@ -38,7 +38,7 @@ void describe_niftyreg(const NiftiHeader& nifti, const std::string& file, FieldF
                                   "; make a displacement field of it with reg_transform -disp");
   header.absolute = nifti.intent_p1 == 0;
   header.format = std::string("NIfTI, NiftyReg ") + (header.absolute ? "deformation field" : "displacement field");
-  header.direction = FieldDirection::pull;
+  header.direction = Direction::pull;
   header.frame = "RAS";
   header.direction_basis = header.frame_basis = header.units_basis = FieldBasis::by_format;
   header.absolute_basis = FieldBasis::stated;

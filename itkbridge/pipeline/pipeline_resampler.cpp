@@ -6,7 +6,7 @@
 #include <atomic>
 #include <utility>
 
-#include "cuda/devices.h"
+#include "backend/devices.h"
 
 namespace tetwarp {
 
@@ -27,54 +27,58 @@ void warn_of_fallback(const itk::ProcessObject& filter, const std::string& reaso
 }  // namespace
 
 bool PipelineResampler::holds(const Geometry& output, const HeldField& field, const PipelineOptions& options) const {
-  return backend_.resampler && output_ == output && options_ == options && is_same(field_, field);
+  return resampler_ && output_ == output && options_ == options && is_same(field_, field);
 }
 
 bool PipelineResampler::takes(const Geometry& output, const HeldField& field, const PipelineOptions& options) const {
-  return backend_.resampler && output_ == output && options_ == options && field_.view.index() == field.view.index() &&
-         backend_.name == (means_cuda(options.backend) ? "cuda" : "cpu");
+  return resampler_ && output_ == output && options_ == options && field_.view.index() == field.view.index() &&
+         resampler_.backend() == chosen(options.backend);
 }
 
-void PipelineResampler::make(const std::string& wanted, const Control& control) {
+void PipelineResampler::make(BackendKind backend, const Control& control) {
   const Direction direction = std::holds_alternative<FieldView>(field_.view) ? Direction::forward : Direction::pull;
-  backend_.resampler.reset();  // before another takes memory
-  backend_ = make_backend(wanted, direction, output_, options_.device,
-                          {.threads = options_.threads, .memory = options_.device_memory});
+  resampler_.reset();  // before another takes memory
+  resampler_ = AnyResampler(backend, direction, output_, options_.device,
+                            {.threads = options_.threads, .memory = options_.device_memory});
   give_field(control);
 }
 
 void PipelineResampler::give_field(const Control& control) {
-  std::visit([&](const auto& view) { backend_.resampler->set_field(view, control); }, field_.view);
+  if (const auto* forward = std::get_if<FieldView>(&field_.view)) {
+    resampler_.forward().set_field(*forward, {}, control);
+  } else {
+    resampler_.pull().set_field(std::get<PullFieldView>(field_.view), control);
+  }
 }
 
 void PipelineResampler::fall_back(const itk::ProcessObject& filter, const Control& control, const DeviceError& error) {
-  if (options_.backend != "auto") throw;
+  if (!leaves_open(options_.backend)) throw;
   warn_of_fallback(filter, error.what());
-  make("cpu", control);
+  make(BackendKind::cpu, control);
 }
 
 bool PipelineResampler::set_field(itk::ProcessObject& filter, const Geometry& output, const HeldField& field,
                                   const PipelineOptions& options, ProgressShare share) {
   if (holds(output, field, options)) return false;
-  if (!takes(output, field, options)) backend_ = {};
+  if (!takes(output, field, options)) resampler_.reset();
   const HeldField before = std::exchange(field_, field);  // kept while the resampler still looks at it
   output_ = output;
   options_ = options;
-  if (options.backend == "auto" && !means_cuda("auto"))
+  if (leaves_open(options.backend) && !runs_on_device(chosen(options.backend)))
     warn_of_fallback(filter, has_cuda() ? "no CUDA device works on this machine" : "CUDA is not in this build");
   try {
     run_for(filter, share, [&](const Control& control) {
       try {
-        if (backend_.resampler)
+        if (resampler_)
           give_field(control);
         else
-          make(options.backend, control);
+          make(chosen(options.backend), control);
       } catch (const DeviceError& error) {
         fall_back(filter, control, error);
       }
     });
   } catch (...) {
-    backend_ = {};
+    resampler_.reset();
     field_ = {};
     throw;
   }
@@ -84,7 +88,7 @@ bool PipelineResampler::set_field(itk::ProcessObject& filter, const Geometry& ou
 Region PipelineResampler::source_region(const itk::ProcessObject& filter, const Geometry& source,
                                         const Region& output) const {
   Region region;
-  translate_errors(filter, [&] { region = backend_.resampler->source_region(source, output); });
+  translate_errors(filter, [&] { region = resampler_->source_region(source, output); });
   return is_empty(region) ? Region{glm::i64vec3(0), glm::i64vec3(1)} : region;
 }
 
@@ -92,7 +96,7 @@ Report PipelineResampler::resample(itk::ProcessObject& filter, const Region& reg
                                    const Maps& maps, ProgressShare share) {
   Report report;
   run_for(filter, share, [&](const Control& control) {
-    const auto work = [&] { report = backend_.resampler->resample(region, targets, maps, control); };
+    const auto work = [&] { report = resampler_->resample(region, targets, maps, control); };
     try {
       work();
     } catch (const DeviceError& error) {

@@ -7,7 +7,7 @@
 #include <string>
 #include <variant>
 
-#include "cuda/backend.h"
+#include "backend/factories.h"
 #include "deform/resampler.h"
 #include "itkbridge/pipeline/pipeline_run.h"
 
@@ -21,18 +21,18 @@ struct HeldField {
 
 /// Where a filter works.
 struct PipelineOptions {
-  std::string backend = "auto";     ///< "auto", "cpu" or "cuda"
-  int device = 0;                   ///< number of the CUDA device
-  int threads = 0;                  ///< number of CPU threads; 0: all that this process may use
-  std::uint64_t device_memory = 0;  ///< bytes, see `Limits::memory`
+  BackendChoice backend = BackendChoice::automatic;  ///< what is wished
+  int device = 0;                                    ///< number of the CUDA device
+  int threads = 0;                                   ///< number of CPU threads; 0: all that this process may use
+  std::uint64_t device_memory = 0;                   ///< bytes, see `Limits::memory`
 
   /// Whether all options are equal.
   friend bool operator==(const PipelineOptions&, const PipelineOptions&) = default;
 };
 
 /// The resampler of a filter. It keeps its field, so that later regions and images need not prepare it again. The next
-/// field with the same direction, output and options reuses the memory of the one before. With backend "auto" the CPU
-/// takes over where CUDA is missing or fails, with the same bits, and the process warns once.
+/// field with the same direction, output and options reuses the memory of the one before. Where the backend is left
+/// open, the CPU takes over where CUDA is missing or fails, with the same bits, and the process warns once.
 class PipelineResampler {
  public:
   /// Makes the resampler and gives it the field, unless it has it already.
@@ -55,19 +55,20 @@ class PipelineResampler {
                   ProgressShare share);
 
   /// Where the last field went, "cpu" or "cuda"; empty before the first.
-  const std::string& backend() const { return backend_.name; }
+  std::string backend() const { return resampler_ ? name_of(resampler_.backend()) : ""; }
 
  private:
   /// Whether the resampler has this field, for this output and these options.
   bool holds(const Geometry& output, const HeldField& field, const PipelineOptions& options) const;
   /// Whether the present resampler can take the field. One that stands in for a device that failed cannot.
   bool takes(const Geometry& output, const HeldField& field, const PipelineOptions& options) const;
-  void make(const std::string& wanted, const Control& control);
+  void make(BackendKind backend, const Control& control);
   void give_field(const Control& control);
-  /// Handles an error of the device: the CPU takes the field, or, with backend "cuda", the error is thrown again.
+  /// Handles an error of the device: the CPU takes the field, or, where a device is demanded, the error is thrown
+  /// again.
   void fall_back(const itk::ProcessObject& filter, const Control& control, const DeviceError& error);
 
-  Backend backend_;
+  AnyResampler resampler_;
   Geometry output_;
   HeldField field_;
   PipelineOptions options_;

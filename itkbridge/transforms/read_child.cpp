@@ -95,7 +95,7 @@ std::uint64_t writable_memory() {
 }
 
 /// Lowers a limit of this process, or does nothing where it is lower.
-void lower(__rlimit_resource resource, std::uint64_t to) {
+void limit_to(__rlimit_resource resource, std::uint64_t to) {
   rlimit limit{};
   if (::getrlimit(resource, &limit) != 0) return;
   limit.rlim_cur = std::min<rlim_t>(limit.rlim_cur, to);
@@ -106,9 +106,9 @@ void lower(__rlimit_resource resource, std::uint64_t to) {
 void confine(const Request& request) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != request.parent) end(1);  // it ended before
-  lower(RLIMIT_CORE, 0);
-  lower(RLIMIT_DATA, writable_memory() + request.memory_bytes);
-  lower(RLIMIT_CPU, request.cpu_seconds);
+  limit_to(RLIMIT_CORE, 0);
+  limit_to(RLIMIT_DATA, writable_memory() + request.memory_bytes);
+  limit_to(RLIMIT_CPU, request.cpu_seconds);
   ::alarm(request.seconds);
 }
 

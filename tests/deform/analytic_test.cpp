@@ -25,7 +25,7 @@ constexpr double kRounding = 4e-4;
 /// Every voxel of a map that is affine within each slice, with cells of one voxel, against its inverse: x0 to rounding,
 /// one owner where x0 is inside the lattice, none where it is not.
 template <class Forward, class Inverse>
-void expect_exact_inverse(Resampler& resampler, Forward&& forward, Inverse&& inverse) {
+void expect_exact_inverse(ForwardResampler& resampler, Forward&& forward, Inverse&& inverse) {
   const Geometry& grid = resampler.output();
   const VertexField field =
       field_in_voxels(grid, lattice_over(grid, 1), [&](const glm::dvec3& x) { return forward(x) - x; });
@@ -108,7 +108,7 @@ double inverse_bubble_radius(double r, double radius, double strength) {
   return 0.5 * (low + high);
 }
 
-double bubble_error(Resampler& resampler, std::int64_t cell, double strength) {
+double bubble_error(ForwardResampler& resampler, std::int64_t cell, double strength) {
   const Geometry& grid = resampler.output();
   const glm::dvec3 middle = centre(grid);
   constexpr double kRadius = 20;

@@ -219,7 +219,7 @@ TEST_P(Components, ScarceMemoryGivesTheBitsOfTheCpu) {
   Vectors<double> expected(grid, 3), found(grid, 3);
   const auto cpu = make_cpu_resampler(grid), scarce = GetParam().make(grid, {.memory = bytes});
   for (const Interpolation interpolation : kInterpolations) {
-    const auto resample = [&](Resampler& resampler, Vectors<double>& output) {
+    const auto resample = [&](ForwardResampler& resampler, Vectors<double>& output) {
       resampler.set_field(view(field));
       const Target target{.source = source.view(), .output = output.view(), .interpolation = interpolation};
       return resampler.resample(whole(grid), {&target, 1});

@@ -181,7 +181,7 @@ TEST_F(March, FieldsAtRestInsideTheVolume) {
   EXPECT_EQ(paths.claimed, 0u);
 
   const Volume<std::int16_t> source = random_values<std::int16_t>(output, random, -2000, 2000);
-  const auto resample = [&](Resampler& resampler, const VertexField& field) {  // one field after the other
+  const auto resample = [&](ForwardResampler& resampler, const VertexField& field) {  // one field after the other
     resampler.set_field(view(field, Outside::background));
     Volume<std::int16_t> found = poisoned<std::int16_t>(output);
     const Target of{.source = view(source), .output = view(found), .background = 7};

@@ -31,7 +31,7 @@ Geometry any_grid(Random& random, const glm::i64vec3& size) {
 glm::dvec3 last_of(const Geometry& grid) { return glm::dvec3(grid.size - std::int64_t{1}); }
 
 /// Without maps, one volume and two: a backend may have other ways then.
-void expect_same_volumes(Resampler& resampler, const Volume<std::int16_t>& source, const VertexField& lattice,
+void expect_same_volumes(ForwardResampler& resampler, const Volume<std::int16_t>& source, const VertexField& lattice,
                          const VertexField& mesh, Random& random) {
   const Geometry& grid = source.geometry;
   const auto labels = random_values<std::uint8_t>(grid, random, 0, 5);
@@ -261,7 +261,7 @@ TEST_P(Meshes, WhatWasFlatOwnsButHasNoJacobian) {
     ASSERT_EQ(found.output.voxels[n], found.coverage.voxels[n] ? 400 : -7);
 }
 
-void expect_refused(Resampler& resampler, const TetrahedralMesh& mesh, const std::string& part) {
+void expect_refused(ForwardResampler& resampler, const TetrahedralMesh& mesh, const std::string& part) {
   VertexField field;
   field.mesh = mesh;
   const FieldView given{.outside = Outside::background, .mesh = &field.mesh};

@@ -21,7 +21,7 @@ class Pull : public BackendTest {
     BackendTest::SetUp();
     if (!IsSkipped() && !GetParam().make_pull) GTEST_SKIP() << GetParam().name << " has no pull fields";
   }
-  std::unique_ptr<Resampler> make_pull(const Geometry& output, int threads = 0) const {
+  std::unique_ptr<PullResampler> make_pull(const Geometry& output, int threads = 0) const {
     return GetParam().make_pull(output, Limits{.threads = threads});
   }
 };
@@ -371,13 +371,27 @@ TEST_P(Pull, ThreadsAndRegionsChangeNothing) {
   });
 }
 
-TEST_P(Pull, DirectionsAreNeverMistaken) {
-  const Geometry grid = unit_grid({5, 5, 5});
-  const VertexField forward = uniform_field(lattice_over(grid, 1), glm::vec3(0));
-  const PullField pull = uniform_pull(grid, glm::dvec3(0));
-  EXPECT_THROW(make_pull(grid)->set_field(view(forward)), InputError);
-  EXPECT_THROW(make(grid)->set_field(view(pull)), InputError);
-}
+/// Whether a resampler can be given a field.
+template <class OneResampler, class Field>
+concept Takes = requires(OneResampler& resampler, const Field& field) {
+  resampler.set_field(field);
+};
+/// Whether `resample` sends volumes through a field by a resampler.
+template <class OneResampler, class Field>
+concept Sends = requires(OneResampler& resampler, const Volume<float>& source, const Field& field) {
+  resample(resampler, source, field);
+};
+
+// Directions are never mistaken: the wrong one does not compile.
+static_assert(Takes<ForwardResampler, FieldView>);
+static_assert(!Takes<ForwardResampler, PullFieldView>);
+static_assert(Takes<PullResampler, PullFieldView>);
+static_assert(!Takes<PullResampler, FieldView>);
+static_assert(!Takes<Resampler, FieldView> && !Takes<Resampler, PullFieldView>);
+static_assert(Sends<ForwardResampler, VertexField>);
+static_assert(!Sends<ForwardResampler, PullField> && !Sends<PullResampler, VertexField>);
+static_assert(!std::is_convertible_v<PullFieldView, FieldView> && !std::is_convertible_v<FieldView, PullFieldView>);
+static_assert(!std::is_convertible_v<PullField, VertexField> && !std::is_convertible_v<VertexField, PullField>);
 
 TEST_P(Pull, FieldsThatAreNotFiniteAreRefused) {
   const Geometry grid = unit_grid({5, 5, 5});

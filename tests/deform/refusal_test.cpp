@@ -117,9 +117,11 @@ struct Call {
   Target target{.source = view(source), .output = view(output)};
   Maps maps;
   Region region = whole(grid);
-  std::unique_ptr<Resampler> resampler;
+  std::unique_ptr<ForwardResampler> resampler;
 
-  explicit Call(std::unique_ptr<Resampler> made) : resampler(std::move(made)) { resampler->set_field(view(field)); }
+  explicit Call(std::unique_ptr<ForwardResampler> made) : resampler(std::move(made)) {
+    resampler->set_field(view(field));
+  }
   void operator()() { resampler->resample(region, {&target, 1}, maps); }
 };
 

@@ -147,7 +147,7 @@ TEST_P(Regions, PartsAreToldWhenTheyAreDone) {
         EXPECT_EQ(slices[n].last, expected_slices[n].last) << "slice " << k;
       }
     };
-    resampler->resample(region, {&target, 1}, maps_of(found), {.finished = finished});
+    resampler->resample(region, {&target, 1}, maps_of(found), {}, finished);
     for (std::int64_t k = 0; k < 37; ++k) {
       EXPECT_EQ(told[static_cast<std::size_t>(k)], k >= region.begin.z && k < region.end.z) << "slice " << k;
     }
@@ -162,7 +162,7 @@ TEST_P(Regions, WhatTheListenerThrowsEndsTheCall) {
   Outcome<std::int16_t> outcome = poisoned_outcome<std::int16_t>(scene.grid);
   const Target target{.source = view(scene.source), .output = view(outcome.output)};
   const auto fail = [](const Region&) { throw Error("the disk is full"); };
-  EXPECT_THROW(resampler->resample(whole(scene.grid), {&target, 1}, {}, {.finished = fail}), Error);
+  EXPECT_THROW(resampler->resample(whole(scene.grid), {&target, 1}, {}, {}, fail), Error);
   expect_same_outcome(expected, run(*resampler, scene.source, kOptions));
 }
 
@@ -293,7 +293,7 @@ TEST_P(Regions, AStopRequestCancels) {
   const Target target{.source = view(scene.source), .output = view(output)};
   std::stop_source stopped;
   stopped.request_stop();
-  EXPECT_THROW(resampler->set_field(view(scene.field), {.stop = stopped.get_token()}), Cancelled);
+  EXPECT_THROW(resampler->set_field(view(scene.field), {}, {.stop = stopped.get_token()}), Cancelled);
   resampler->set_field(view(scene.field));
   EXPECT_THROW(resampler->resample(whole(scene.grid), {&target, 1}, {}, {.stop = stopped.get_token()}), Cancelled);
   std::stop_source later;

@@ -184,15 +184,19 @@ TEST(RoundTrip, OfManySlicesIsOfEightPairsAllAlong) {
 }
 
 /// Hands on what another makes, its inverse half a millimetre off along x in one slice.
-class Astray final : public Resampler {
+class Astray final : public ForwardResampler {
  public:
-  Astray(std::unique_ptr<Resampler> right, std::int64_t slice)
-      : Resampler(right->output()), right_(std::move(right)), slice_(slice) {}
+  Astray(std::unique_ptr<ForwardResampler> right, std::int64_t slice)
+      : ForwardResampler(right->output()), right_(std::move(right)), slice_(slice) {}
+  void set_field(const FieldView& field, const FieldOptions& options, const Control& control) override {
+    right_->set_field(field, options, control);
+  }
   Region source_region(const Geometry& source, Region region) const override {
     return right_->source_region(source, region);
   }
-  Report resample(Region region, std::span<const Target> targets, const Maps& maps, const Control& control) override {
-    const Report report = right_->resample(region, targets, maps, control);
+  Report resample(Region region, std::span<const Target> targets, const Maps& maps, const Control& control,
+                  const PartSink& finished) override {
+    const Report report = right_->resample(region, targets, maps, control, finished);
     if (slice_ < region.begin.z || slice_ >= region.end.z) return report;
     const std::int64_t area = output().size.x * output().size.y;
     auto* by =
@@ -202,7 +206,7 @@ class Astray final : public Resampler {
   }
 
  private:
-  std::unique_ptr<Resampler> right_;
+  std::unique_ptr<ForwardResampler> right_;
   std::int64_t slice_;
 };
 

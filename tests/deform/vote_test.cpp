@@ -183,7 +183,7 @@ TEST_P(Vote, SumsAreOfTheLinearWeights) {
 
 /// What a vote between eight corners gives, labels in the order x + 2y + 4z, at one place between them.
 template <class V>
-V vote_of(Resampler& resampler, const std::vector<V>& corners, const glm::dvec3& fraction) {
+V vote_of(ForwardResampler& resampler, const std::vector<V>& corners, const glm::dvec3& fraction) {
   const Volume<V> source{unit_grid({2, 2, 2}), corners};
   return run_shifted(resampler, source, -fraction, {.interpolation = Interpolation::vote, .background = 99})
       .output.voxels[0];

@@ -12,7 +12,7 @@
 #include <chrono>
 #include <thread>
 
-#include "cuda/devices.h"
+#include "backend/devices.h"
 #include "itkbridge/itkDisplacementFieldToVertexFieldFilter.h"
 #include "itkbridge/itkExactInvertDisplacementFieldImageFilter.h"
 #include "itkbridge/itkPullFieldResampleImageFilter.h"
@@ -350,7 +350,7 @@ class Warnings : public itk::OutputWindow {
 };
 
 TEST(Pipeline, AutoFallsBackToTheCpuWithOneWarningAndCudaByNameThrows) {
-  if (cuda_device_count() > 0) GTEST_SKIP() << "a CUDA device works here";
+  if (device_count() > 0) GTEST_SKIP() << "a CUDA device works here";
   const Geometry grid = turned_grid({12, 11, 10});
   const auto image = noise_image<ShortImage>(grid);
   const auto field = twist_over(grid, 3);
@@ -373,13 +373,13 @@ TEST(Pipeline, AutoFallsBackToTheCpuWithOneWarningAndCudaByNameThrows) {
 }
 
 TEST(Pipeline, AutoFallsBackToTheCpuWhereTheDeviceFails) {
-  if (cuda_device_count() == 0) GTEST_SKIP() << "no CUDA device on this machine";
+  if (device_count() == 0) GTEST_SKIP() << "no CUDA device on this machine";
   const Geometry grid = turned_grid({12, 11, 10});
   const auto image = noise_image<ShortImage>(grid);
   const auto field = twist_over(grid, 3);
   const auto filter = warp_of(image, field);
   filter->SetBackend("auto");
-  filter->SetDevice(cuda_device_count());  // is not there
+  filter->SetDevice(device_count());  // is not there
   filter->Update();
   EXPECT_EQ(filter->GetUsedBackend(), "cpu");
   EXPECT_TRUE(same_pixels(*filter->GetOutput(), *resampled_by_core(*image, grid, field->GetView())));
@@ -388,7 +388,7 @@ TEST(Pipeline, AutoFallsBackToTheCpuWhereTheDeviceFails) {
 }
 
 TEST(Pipeline, CudaGivesTheBitsOfTheCpu) {
-  if (cuda_device_count() == 0) GTEST_SKIP() << "no CUDA device on this machine";
+  if (device_count() == 0) GTEST_SKIP() << "no CUDA device on this machine";
   const Geometry grid = turned_grid({60, 58, 56});
   const auto image = noise_image<ShortImage>(grid);
   const auto field = twist_over(grid, 3);

@@ -87,7 +87,8 @@ inline void expect_like_oracle(const Outcome<float>& found, const Volume<float>&
 }
 
 /// Sends a smooth source through a field and looks at every voxel. @return  what the oracle says
-inline Oracle expect_oracles_result(Resampler& resampler, const VertexField& field, Outside outside = Outside::refuse) {
+inline Oracle expect_oracles_result(ForwardResampler& resampler, const VertexField& field,
+                                    Outside outside = Outside::refuse) {
   const Volume<float> source = smooth_source(resampler.output());
   resampler.set_field(view(field, outside));
   Oracle oracle(resampler.output(), field);

@@ -3,17 +3,20 @@
 
 #include "tests/support/backends.h"
 
-#include "cuda/devices.h"
+#include "backend/devices.h"
+#include "backend/factories.h"
 
 namespace tetwarp::test {
 
 const std::vector<Backend>& backends() {
-  const auto on_cuda = [](const Geometry& output, Limits limits) { return make_cuda_resampler(output, 0, limits); };
+  const auto on_cuda = [](const Geometry& output, Limits limits) {
+    return make_forward_resampler(BackendKind::cuda, output, 0, limits);
+  };
   const auto pull_on_cuda = [](const Geometry& output, Limits limits) {
-    return make_cuda_pull_resampler(output, 0, limits);
+    return make_pull_resampler(BackendKind::cuda, output, 0, limits);
   };
   const std::string no_cuda =
-      !has_cuda() ? "CUDA is not in this build" : (cuda_device_count() == 0 ? "no CUDA device on this machine" : "");
+      !has_cuda() ? "CUDA is not in this build" : (device_count() == 0 ? "no CUDA device on this machine" : "");
   static const std::vector<Backend> all = {
       {.name = "cpu",
        .cannot_run = "",
@@ -24,7 +27,7 @@ const std::vector<Backend>& backends() {
        .cannot_run = no_cuda,
        .make = on_cuda,
        .make_pull = pull_on_cuda,
-       .make_renderer = [](Limits limits) { return make_cuda_renderer(0, limits); }},
+       .make_renderer = [](Limits limits) { return make_renderer(BackendKind::cuda, 0, limits); }},
   };
   return all;
 }

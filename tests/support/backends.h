@@ -18,12 +18,13 @@ namespace tetwarp::test {
 
 /// One way to run a Resampler. The contract tests are one source that runs over all of them.
 struct Backend {
-  using Make = std::function<std::unique_ptr<Resampler>(const Geometry& output, Limits limits)>;
+  template <class OneResampler>
+  using Make = std::function<std::unique_ptr<OneResampler>(const Geometry& output, Limits limits)>;
 
   std::string name;
   std::string cannot_run;  ///< why it cannot run here; empty: it can
-  Make make;               ///< forward fields
-  Make make_pull;          ///< pull fields; null: this backend has none
+  Make<ForwardResampler> make;
+  Make<PullResampler> make_pull;  ///< null: this backend has none
   std::function<std::unique_ptr<Renderer>(Limits limits)> make_renderer;
 
   friend void PrintTo(const Backend& backend, std::ostream* stream) { *stream << backend.name; }
@@ -38,7 +39,7 @@ class BackendTest : public testing::TestWithParam<Backend> {
   void SetUp() override {
     if (!GetParam().cannot_run.empty()) GTEST_SKIP() << GetParam().name << ": " << GetParam().cannot_run;
   }
-  std::unique_ptr<Resampler> make(const Geometry& output, int threads = 0) const {
+  std::unique_ptr<ForwardResampler> make(const Geometry& output, int threads = 0) const {
     return GetParam().make(output, Limits{.threads = threads});
   }
 };

@@ -37,7 +37,8 @@ Volume<V> random_values(const Geometry& grid, Random& random, double low, double
 /// One run through a lattice that moves as a whole, by a multiple of 2^-12 voxel: every place is voxel - shift,
 /// exactly.
 template <class V>
-Outcome<V> run_shifted(Resampler& resampler, const Volume<V>& source, const glm::dvec3& shift, const Options& options) {
+Outcome<V> run_shifted(ForwardResampler& resampler, const Volume<V>& source, const glm::dvec3& shift,
+                       const Options& options) {
   const VertexField field = uniform_field(wide_lattice(resampler.output()), glm::vec3(shift));
   resampler.set_field(view(field));
   return run(resampler, source, options);

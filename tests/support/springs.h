@@ -13,7 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "cuda/devices.h"
+#include "backend/devices.h"
+#include "backend/factories.h"
 #include "deform/simulate/mass_spring.h"
 #include "tests/support/plain_machine.h"
 #include "tests/support/random.h"
@@ -37,18 +38,19 @@ inline std::vector<Method> methods() {
     return [solver](const Model& model) { return make_cpu_mass_spring(model, {.solver = solver}, {.threads = 2}); };
   };
   const std::string no_cuda =
-      !has_cuda() ? "CUDA is not in this build" : (cuda_device_count() == 0 ? "no CUDA device on this machine" : "");
-  return {
-      {.name = "cholesky", .cannot_run = "", .make = on_cpu(MassSpringOptions::Solver::cholesky)},
-      {.name = "pcg", .cannot_run = "", .make = on_cpu(MassSpringOptions::Solver::pcg)},
-      {.name = "device_code_on_cpu",
-       .cannot_run = "",
-       .make =
-           [](const Model& model) {
-             require_springs(model);
-             return make_mass_spring(model, std::make_unique<DeviceSprings<PlainMachine>>(model));
-           }},
-      {.name = "cuda", .cannot_run = no_cuda, .make = [](const Model& model) { return make_cuda_mass_spring(model); }}};
+      !has_cuda() ? "CUDA is not in this build" : (device_count() == 0 ? "no CUDA device on this machine" : "");
+  return {{.name = "cholesky", .cannot_run = "", .make = on_cpu(MassSpringOptions::Solver::cholesky)},
+          {.name = "pcg", .cannot_run = "", .make = on_cpu(MassSpringOptions::Solver::pcg)},
+          {.name = "device_code_on_cpu",
+           .cannot_run = "",
+           .make =
+               [](const Model& model) {
+                 require_springs(model);
+                 return make_mass_spring(model, std::make_unique<DeviceSprings<PlainMachine>>(model));
+               }},
+          {.name = "cuda", .cannot_run = no_cuda, .make = [](const Model& model) {
+             return make_simulation(BackendKind::cuda, simulate::Method::mass_spring, model);
+           }}};
 }
 
 inline std::vector<glm::vec3> displacement(const Simulation& simulation) { return simulation.displacement_on_host(); }

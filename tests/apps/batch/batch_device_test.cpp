@@ -5,7 +5,7 @@
 // calls of CUDA (cuda/runtime/fault.h).
 #include <cstdlib>
 
-#include "cuda/devices.h"
+#include "backend/devices.h"
 #include "tests/apps/batch/batch_case.h"
 
 namespace {
@@ -16,7 +16,7 @@ using nlohmann::json;
 class BatchOnDevice : public BatchCase {
  protected:
   void SetUp() override {
-    if (tetwarp::cuda_device_count() == 0) GTEST_SKIP() << "cuda: no device";
+    if (tetwarp::device_count() == 0) GTEST_SKIP() << "cuda: no device";
     BatchCase::SetUp();
   }
   void TearDown() override { unsetenv("TETWARP_CUDA_FAULT"); }
@@ -87,7 +87,7 @@ TEST_F(BatchOnDevice, ALostDeviceIsGivenUp) {
     EXPECT_EQ(made.volumes, whole.volumes);
     EXPECT_FALSE(made.reasons.empty());
   }
-  if (tetwarp::cuda_device_count() > 1) GTEST_SKIP() << "another device takes over";
+  if (tetwarp::device_count() > 1) GTEST_SKIP() << "another device takes over";
   const Made refused = make("refused", "lost@2", "--backend cuda");
   EXPECT_EQ(refused.status, 3);
   EXPECT_TRUE(refused.volumes.empty());

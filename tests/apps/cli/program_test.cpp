@@ -6,7 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "cuda/devices.h"
+#include "backend/devices.h"
 #include "tests/support/program.h"
 #include "tests/support/scratch.h"
 #include "tests/support/write_file.h"
@@ -135,7 +135,7 @@ TEST(Program, FailuresExitWithOneAndLoseNothing) {
 }
 
 TEST(Program, CudaByNameFailsWhereNoDeviceIsAndAutoUsesTheCpu) {
-  if (tetwarp::cuda_device_count() > 0) GTEST_SKIP() << "this machine has a CUDA device";
+  if (tetwarp::device_count() > 0) GTEST_SKIP() << "this machine has a CUDA device";
   const Scratch scratch;
   ASSERT_EQ(run_tetwarp(scratch.path(), kPhantom + std::string("in.nii")).status, 0);
   expect_error(run_tetwarp(scratch.path(), "deform in.nii -f identity -o out.nii --backend cuda"), 1, "CUDA");

@@ -103,7 +103,7 @@ TEST(Deform, MapsSayWhereEachVoxelComesFromAndHowTheMapIsThere) {
     EXPECT_EQ(glm::vec3(by[0], by[1], by[2]), glm::vec3(-6, 3, -8));
   }
   EXPECT_EQ(covered, 38U * 35U * 22U);
-  EXPECT_TRUE(read_field_header(scratch / "i.nii.gz").direction == FieldDirection::pull);
+  EXPECT_TRUE(read_field_header(scratch / "i.nii.gz").direction == Direction::pull);
 
   expect_run(
       scratch,

@@ -25,7 +25,7 @@ TEST(Invert, WritesTheKnownInverseOfATwist) {
       run_tetwarp(scratch.path(), "invert twist:angle=30 --like in.mha -o inverse.mha --report report.json");
   ASSERT_EQ(run.status, 0) << run.err;
   EXPECT_NE(run.err.find("forward after inverse"), std::string::npos) << run.err;
-  EXPECT_TRUE(read_field_header(scratch / "inverse.mha").direction == FieldDirection::pull);
+  EXPECT_TRUE(read_field_header(scratch / "inverse.mha").direction == Direction::pull);
   const AnyVolume inverse = read_image(scratch / "inverse.mha");
   const Geometry& grid = inverse.geometry();
   const PointMap known = parse_formula("twist:angle=-30", grid);
@@ -105,7 +105,7 @@ TEST(Invert, InverseOfAPullFieldIsTheForwardFieldThatDoesTheSame) {
   ASSERT_EQ(run.status, 0) << run.err;
   EXPECT_NE(run.err.find("wrote f.mha: forward field, 40 x 36 x 24 vertices"), std::string::npos) << run.err;
   EXPECT_EQ(run.err.find("beyond"), std::string::npos) << run.err;
-  EXPECT_TRUE(read_field_header(scratch / "f.mha").direction == FieldDirection::forward);
+  EXPECT_TRUE(read_field_header(scratch / "f.mha").direction == Direction::forward);
   const nlohmann::json report = nlohmann::json::parse(read_text(scratch / "r.json"));
   EXPECT_EQ(report["uncovered"], 0);
   EXPECT_EQ(report["output"]["direction"], "forward");

@@ -69,7 +69,7 @@ TEST(RealPair, OnePhaseIsWarpedOntoTheOtherByThePullFieldAndByItsInverse) {
   const Outcome inverted = run_tetwarp(
       scratch.path(), "invert --pull-field " + field + " --like '" + (folder / "t0.mha").string() + "' -o f.mha");
   ASSERT_EQ(inverted.status, 0) << inverted.err;
-  EXPECT_EQ(read_field_header(scratch / "f.mha").direction, FieldDirection::forward);
+  EXPECT_EQ(read_field_header(scratch / "f.mha").direction, Direction::forward);
   const Warped pushed = warped(scratch, folder, "-f f.mha");
   const Mean by_push = mean(pushed.volume, t5, {&pushed.covered}),
              pull_there = mean(pulled.volume, t5, {&pulled.covered, &pushed.covered}),

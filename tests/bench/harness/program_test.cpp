@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "cuda/devices.h"
+#include "backend/devices.h"
 #include "tests/support/program.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"
@@ -71,14 +71,14 @@ TEST(BenchProgram, WrongCommandLinesExitWithTwo) {
 constexpr const char* kTinyGpu = "gpu --width 64 --slices 20,40 --cell-sizes 4 --frames 2 --warmup 1 --json r.json ";
 
 TEST(BenchProgram, TheGpusMeasureNeedsAGpu) {
-  if (tetwarp::cuda_device_count() > 0) GTEST_SKIP() << "there is a CUDA device on this machine";
+  if (tetwarp::device_count() > 0) GTEST_SKIP() << "there is a CUDA device on this machine";
   const Scratch scratch;
   expect_error(run_bench(scratch, kTinyGpu), 1, "CUDA");
   EXPECT_FALSE(std::filesystem::exists(scratch / "r.json"));
 }
 
 TEST(BenchProgram, MeasuresEveryFieldOnAGpu) {
-  if (tetwarp::cuda_device_count() == 0) GTEST_SKIP() << "no CUDA device on this machine, or CUDA is not in this build";
+  if (tetwarp::device_count() == 0) GTEST_SKIP() << "no CUDA device on this machine, or CUDA is not in this build";
   const Scratch scratch;
   const Outcome run = run_bench(scratch, kTinyGpu);
   ASSERT_EQ(run.status, 0) << run.err;

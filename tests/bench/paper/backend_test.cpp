@@ -9,8 +9,8 @@
 
 #include <algorithm>
 
+#include "backend/devices.h"
 #include "bench/paper/compare.h"
-#include "cuda/devices.h"
 #include "deform/fields/formula.h"
 #include "deform/phantom.h"
 #include "tests/support/run.h"
@@ -42,7 +42,7 @@ class BenchBackend : public testing::TestWithParam<std::string> {
   void SetUp() override {
     const bool on_cuda = GetParam() == "cuda";
     if (on_cuda && !has_cuda()) GTEST_SKIP() << "CUDA is not in this build";
-    if (on_cuda && cuda_device_count() == 0) GTEST_SKIP() << "no CUDA device on this machine";
+    if (on_cuda && device_count() == 0) GTEST_SKIP() << "no CUDA device on this machine";
     backend_ = on_cuda ? make_cuda_backend(0) : make_cpu_backend(0);
     volume_ = make_phantom({36, 32, 28}, {1, 1, 1}, 1);
     volume_.geometry = {.size = volume_.geometry.size};

@@ -6,7 +6,8 @@
 
 #include <functional>
 
-#include "cuda/devices.h"
+#include "backend/devices.h"
+#include "backend/factories.h"
 #include "deform/fields/formula.h"
 #include "tests/support/fields.h"
 #include "tests/support/shifted.h"
@@ -19,7 +20,7 @@ using namespace test;
 class GatherPaths : public testing::Test {
  protected:
   void SetUp() override {
-    if (cuda_device_count() == 0) GTEST_SKIP() << "no CUDA device";
+    if (device_count() == 0) GTEST_SKIP() << "no CUDA device";
   }
 };
 
@@ -28,7 +29,7 @@ class GatherPaths : public testing::Test {
 enum class Wanted { volume, places, everything };
 
 template <class V>
-Outcome<V> run_on(Resampler& resampler, const FieldCase& test, const Volume<V>& source, const Region& region,
+Outcome<V> run_on(ForwardResampler& resampler, const FieldCase& test, const Volume<V>& source, const Region& region,
                   Wanted what) {
   resampler.set_field(view(test.field, Outside::background), {.jacobian_range = what != Wanted::volume});
   Outcome<V> outcome = poisoned_outcome<V>(test.output);
@@ -72,7 +73,7 @@ void expect_same(const FieldCase& test, Random& random) {
   const Volume<V> source =
       random_values<V>(test.output, random, std::numeric_limits<V>::lowest(), std::numeric_limits<V>::max());
   const auto cpu = make_cpu_resampler(test.output);
-  const auto cuda = make_cuda_resampler(test.output);
+  const auto cuda = make_forward_resampler(BackendKind::cuda, test.output);
   const glm::i64vec3 size = test.output.size;
   const Region part{{random.integer(0, size.x / 3), random.integer(0, size.y / 3), random.integer(0, size.z / 3)},
                     {size.x - random.integer(0, size.x / 3), size.y - random.integer(0, size.y / 3), size.z}};
@@ -169,7 +170,7 @@ void expect_same_before_voxels() {
     source.voxels.push_back(
         static_cast<V>(n / 40 % 2 == 0 ? random.integer(low, low + 1) : random.integer(high - high / 12, high)));
   }
-  const auto cpu = make_cpu_resampler(grid), cuda = make_cuda_resampler(grid);
+  const auto cpu = make_cpu_resampler(grid), cuda = make_forward_resampler(BackendKind::cuda, grid);
   const auto expected = run_on<V>(*cpu, test, source, whole(grid), Wanted::volume);
   const auto found = run_on<V>(*cuda, test, source, whole(grid), Wanted::volume);
   EXPECT_GT(found.report.paths.gathered, 60000u);
@@ -232,7 +233,7 @@ TEST_F(GatherPaths, LargeCellsPressedTogether) {
   Random random(test_seed(), 1300);
   const auto press = [&](const glm::dvec3& x) { return (middle - x) * 0.8; };
   const FieldCase test{grid, field_in_voxels(grid, lattice_over(grid, 8), press), "pressed", {}};
-  const auto cuda = make_cuda_resampler(grid);
+  const auto cuda = make_forward_resampler(BackendKind::cuda, grid);
   const auto source = random_values<std::int16_t>(grid, random, -1000, 1000);
   const Paths paths = run_on<std::int16_t>(*cuda, test, source, whole(grid), Wanted::volume).report.paths;
   EXPECT_GT(paths.claimed, 0u) << "there was room for all";

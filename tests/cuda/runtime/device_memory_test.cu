@@ -5,7 +5,8 @@
 #include <cuda_runtime.h>
 #include <gtest/gtest.h>
 
-#include "cuda/devices.h"
+#include "backend/devices.h"
+#include "backend/factories.h"
 #include "cuda/runtime/device_buffer.h"
 #include "tests/support/fields.h"
 #include "tests/support/shifted.h"
@@ -18,7 +19,7 @@ using namespace test;
 class DeviceMemory : public testing::Test {
  protected:
   void SetUp() override {
-    if (cuda_device_count() == 0) GTEST_SKIP() << "no CUDA device";
+    if (device_count() == 0) GTEST_SKIP() << "no CUDA device";
   }
 };
 
@@ -85,11 +86,11 @@ TEST_F(DeviceMemory, GivesTheBitsOfHostMemoryOnAnyStream) {
     cudaStream_t stream = nullptr;
     ASSERT_EQ(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), cudaSuccess);
     const Control control{.stream = n % 2 == 0 ? stream : nullptr};
-    const auto cuda = make_cuda_resampler(scene.grid);
+    const auto cuda = make_forward_resampler(BackendKind::cuda, scene.grid);
     FieldView field = view(scene.field);
     field.displacement = displacement.data();
     field.memory = Memory::device;
-    cuda->set_field(field, control);
+    cuda->set_field(field, {}, control);
     const Target target{.source = on_device(host_target.source, source.data()),
                         .output = on_device(host_target.output, output.data()),
                         .background = -7};
@@ -123,7 +124,7 @@ TEST_F(DeviceMemory, PullFieldsToo) {
   PullFieldView device_field = view(field);
   device_field.displacement = displacement.data();
   device_field.memory = Memory::device;
-  const auto cuda = make_cuda_pull_resampler(scene.grid);
+  const auto cuda = make_pull_resampler(BackendKind::cuda, scene.grid);
   cuda->set_field(device_field);
   auto found = poisoned<std::int16_t>(scene.grid);
   const Target target{.source = view(scene.source), .output = view(found)};
@@ -137,7 +138,7 @@ TEST_F(DeviceMemory, VotesAndSeveralComponentsToo) {
   SCOPED_TRACE(seed_text(test_seed()));
   Scene scene(23);
   const Region region{{1, 2, 3}, {40, 29, 22}};
-  const auto cpu = make_cpu_resampler(scene.grid), cuda = make_cuda_resampler(scene.grid);
+  const auto cpu = make_cpu_resampler(scene.grid), cuda = make_forward_resampler(BackendKind::cuda, scene.grid);
   cpu->set_field(view(scene.field));
   cuda->set_field(view(scene.field));
   for (const int components : {1, 2, 3}) {
@@ -167,7 +168,7 @@ TEST_F(DeviceMemory, VotesAndSeveralComponentsToo) {
 
 TEST_F(DeviceMemory, PointersThatAreNotWhereTheViewSaysAreRefused) {
   Scene scene(3);
-  const auto cuda = make_cuda_resampler(scene.grid);
+  const auto cuda = make_forward_resampler(BackendKind::cuda, scene.grid);
   FieldView lying = view(scene.field);
   lying.memory = Memory::device;
   EXPECT_THROW(cuda->set_field(lying), InputError);

@@ -7,7 +7,8 @@
 
 #include <cmath>
 
-#include "cuda/devices.h"
+#include "backend/devices.h"
+#include "backend/factories.h"
 #include "deform/fields/formula.h"
 #include "tests/support/fields.h"
 #include "tests/support/shifted.h"
@@ -20,7 +21,7 @@ using namespace test;
 class MemoryLimit : public testing::Test {
  protected:
   void SetUp() override {
-    if (cuda_device_count() == 0) GTEST_SKIP() << "no CUDA device";
+    if (device_count() == 0) GTEST_SKIP() << "no CUDA device";
   }
 };
 
@@ -87,7 +88,7 @@ int expect_same_under_limits(const Geometry& grid, const VertexField& field, con
   for (double share = 4; share > 0.001; share *= 0.6) {
     const auto limit = static_cast<std::uint64_t>(share * static_cast<double>(all));
     SCOPED_TRACE("limit " + std::to_string(limit) + " of " + std::to_string(all));
-    const auto cuda = make_cuda_resampler(grid, 0, {.memory = limit});
+    const auto cuda = make_forward_resampler(BackendKind::cuda, grid, 0, {.memory = limit});
     try {
       cuda->set_field(view(field, wanted.outside));
       expect_same(expected, run_limited(*cuda, source, region, wanted));
@@ -204,7 +205,8 @@ TEST_F(MemoryLimit, ChangesNoBitOfPullFieldsAndOtherSources) {
   const std::uint64_t all = field.displacement.size() * sizeof(glm::vec3) + 2 * source.voxels.size() * sizeof(float);
   int in_slabs = 0;
   for (const double share : {2.0, 0.8, 0.6, 0.4, 0.3, 0.2}) {
-    const auto cuda = make_cuda_pull_resampler(grid, 0, {.memory = static_cast<std::uint64_t>(share * double(all))});
+    const auto cuda =
+        make_pull_resampler(BackendKind::cuda, grid, 0, {.memory = static_cast<std::uint64_t>(share * double(all))});
     cuda->set_field(view(field));
     try {
       expect_same(expected, run_limited(*cuda, source, whole(grid), wanted));
@@ -214,7 +216,7 @@ TEST_F(MemoryLimit, ChangesNoBitOfPullFieldsAndOtherSources) {
     }
   }
   EXPECT_GT(in_slabs, 0);
-  const auto too_small = make_cuda_pull_resampler(grid, 0, {.memory = 1000});
+  const auto too_small = make_pull_resampler(BackendKind::cuda, grid, 0, {.memory = 1000});
   EXPECT_THROW(too_small->set_field(view(field)), DeviceError);
 }
 
@@ -226,7 +228,7 @@ TEST_F(MemoryLimit, TooSmallALimitIsRefusedAndTheResamplerLivesOn) {
   Random random(1);
   const auto source = random_values<std::int16_t>(grid, random, -100, 100);
   const VertexField fine = uniform_field(lattice, {0, 0, 2}), coarse = uniform_field(lattice_over(grid, 16), {0, 0, 2});
-  const auto cuda = make_cuda_resampler(grid, 0, {.memory = 400'000});
+  const auto cuda = make_forward_resampler(BackendKind::cuda, grid, 0, {.memory = 400'000});
   const auto cpu = make_cpu_resampler(grid);
   cpu->set_field(view(coarse));
   const auto expected = run_limited(*cpu, source, whole(grid), {});
@@ -242,7 +244,7 @@ TEST_F(MemoryLimit, ABadVertexIsNamedAsInTheWholeField) {
   const Geometry grid = unit_grid({20, 20, 60});
   VertexField field = uniform_field(lattice_over(grid, 1), glm::vec3(0));
   field.displacement[offset_of(grid, {3, 4, 47})].y = NAN;
-  const auto cuda = make_cuda_resampler(grid, 0, {.memory = field_bytes(field) / 3});
+  const auto cuda = make_forward_resampler(BackendKind::cuda, grid, 0, {.memory = field_bytes(field) / 3});
   try {
     cuda->set_field(view(field));
     FAIL() << "not refused";
@@ -266,7 +268,7 @@ struct Frames {
     fields[1] = sample_on(lattice, parse_formula("bubble-paper:shift=-6", grid));  // folds
   }
   std::uint64_t bytes() const { return field_bytes(fields[0]) + 2 * source.voxels.size() * sizeof(std::int16_t); }
-  void run(Resampler& resampler, int frame, bool maps) {
+  void run(ForwardResampler& resampler, int frame, bool maps) {
     resampler.set_field(view(fields[frame % 2]));
     Outcome<std::int16_t> outcome;
     if (maps) outcome = poisoned_outcome<std::int16_t>(grid);
@@ -283,7 +285,7 @@ TEST_F(MemoryLimit, RepeatedFramesAllocateNothing) {
         SCOPED_TRACE("cells of " + std::to_string(cell_size) + ", " + std::to_string(share) +
                      " of what is needed, maps " + std::to_string(maps));
         const auto limit = static_cast<std::uint64_t>(share * double(frames.bytes()));
-        const auto cuda = make_cuda_resampler(frames.grid, 0, {.memory = limit});
+        const auto cuda = make_forward_resampler(BackendKind::cuda, frames.grid, 0, {.memory = limit});
         for (int frame = 0; frame < 4; ++frame) frames.run(*cuda, frame, maps);
         const std::uint64_t before = free_bytes();
         for (int frame = 0; frame < 4; ++frame) frames.run(*cuda, frame, maps);
@@ -296,7 +298,8 @@ TEST_F(MemoryLimit, RepeatedFramesAllocateNothing) {
 TEST_F(MemoryLimit, IsKeptButForWorkingSpace) {
   Frames frames(1);
   {
-    const auto first = make_cuda_resampler(frames.grid);  // what the context and kernels need comes with first use
+    const auto first = make_forward_resampler(BackendKind::cuda,
+                                              frames.grid);  // what the context and kernels need comes with first use
     frames.run(*first, 0, true);
     frames.run(*first, 1, false);
   }
@@ -304,7 +307,7 @@ TEST_F(MemoryLimit, IsKeptButForWorkingSpace) {
     const auto limit = static_cast<std::uint64_t>(share * double(frames.bytes()));
     SCOPED_TRACE("limit " + std::to_string(limit));
     const std::uint64_t before = free_bytes();
-    const auto cuda = make_cuda_resampler(frames.grid, 0, {.memory = limit});
+    const auto cuda = make_forward_resampler(BackendKind::cuda, frames.grid, 0, {.memory = limit});
     for (int frame = 0; frame < 2; ++frame) {
       frames.run(*cuda, frame, false);  // buffers are kept: what is held afterwards is the most
       EXPECT_LE(before - free_bytes(), std::min(limit, frames.bytes()) + kWorkingSpace);
@@ -314,7 +317,7 @@ TEST_F(MemoryLimit, IsKeptButForWorkingSpace) {
 
 TEST_F(MemoryLimit, PathsAddUpToTheRegion) {
   Frames frames(1);
-  const auto cuda = make_cuda_resampler(frames.grid);
+  const auto cuda = make_forward_resampler(BackendKind::cuda, frames.grid);
   const Region region{{0, 0, 3}, frames.grid.size};
   for (int n = 0; n < 2; ++n) {
     cuda->set_field(view(frames.fields[n]));
@@ -331,7 +334,7 @@ TEST_F(MemoryLimit, PathsAddUpToTheRegion) {
 /// Memory that the host has given to the device's reach, and memory that it has not.
 TEST_F(MemoryLimit, PinnedHostMemoryIsUsedAsItIs) {
   Frames frames(1);
-  const auto cuda = make_cuda_resampler(frames.grid);
+  const auto cuda = make_forward_resampler(BackendKind::cuda, frames.grid);
   frames.run(*cuda, 0, false);
   const auto expected = frames.output;
   for (auto* voxels : {&frames.source.voxels, &frames.output.voxels})

@@ -10,7 +10,8 @@
 #include <functional>
 #include <glm/matrix.hpp>
 
-#include "cuda/devices.h"
+#include "backend/devices.h"
+#include "backend/factories.h"
 #include "tests/support/random.h"
 #include "tests/support/says.h"
 
@@ -26,11 +27,13 @@ struct Backend {
 };
 
 std::vector<Backend> backends() {
-  const std::string no_cuda = !has_cuda()                ? "CUDA is not in this build"
-                              : cuda_device_count() == 0 ? "no CUDA device on this machine"
-                                                         : "";
+  const std::string no_cuda = !has_cuda()           ? "CUDA is not in this build"
+                              : device_count() == 0 ? "no CUDA device on this machine"
+                                                    : "";
   return {{"cpu", "", [](const Model& model, int threads) { return make_cpu_chainmail(model, {.threads = threads}); }},
-          {"cuda", no_cuda, [](const Model& model, int) { return make_cuda_chainmail(model); }}};
+          {"cuda", no_cuda, [](const Model& model, int) {
+             return make_simulation(BackendKind::cuda, simulate::Method::chainmail, model);
+           }}};
 }
 
 class Chainmail : public testing::TestWithParam<Backend> {

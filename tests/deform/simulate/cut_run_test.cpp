@@ -7,7 +7,8 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "cuda/devices.h"
+#include "backend/devices.h"
+#include "backend/factories.h"
 #include "deform/simulate/chainmail.h"
 #include "deform/simulate/cut_surface.h"
 #include "deform/simulate/mass_spring.h"
@@ -85,7 +86,7 @@ TEST(CutRun, FramesAreResampledThroughTheirFields) {
 }
 
 TEST(CutRun, FramesOnADeviceHaveTheCpusBits) {
-  if (cuda_device_count() == 0) GTEST_SKIP() << "no CUDA device on this machine";
+  if (device_count() == 0) GTEST_SKIP() << "no CUDA device on this machine";
   const Patient patient = uniform_patient();
   Scenario scenario = parted({"slit", DiscCutPlan{{{0, 0, 19}}, {0, 0, 1}, {13}}}, {2, 1, 6});
   scenario.method = Method::chainmail;
@@ -97,8 +98,11 @@ TEST(CutRun, FramesOnADeviceHaveTheCpusBits) {
   const Target to_cpu{.source = view(source), .output = view(on_cpu), .background = -1000},
       to_device{.source = view(source), .output = view(on_device), .background = -1000};
   ScenarioRun cpu_run(scenario, patient, [](const Model& model) { return make_cpu_chainmail(model); });
-  ScenarioRun device_run(scenario, patient, [](const Model& model) { return make_cuda_chainmail(model); });
-  const auto cpu_resampler = make_cpu_resampler(small_grid()), device_resampler = make_cuda_resampler(small_grid());
+  ScenarioRun device_run(scenario, patient, [](const Model& model) {
+    return make_simulation(BackendKind::cuda, simulate::Method::chainmail, model);
+  });
+  const auto cpu_resampler = make_cpu_resampler(small_grid()),
+             device_resampler = make_forward_resampler(BackendKind::cuda, small_grid());
   for (int frame = 0; !cpu_run.is_done(); ++frame) {
     cpu_run.next();
     device_run.next();

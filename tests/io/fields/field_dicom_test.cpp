@@ -95,7 +95,7 @@ TEST(DicomField, CornerOnEveryGridInEveryEncoding) {
       const FieldFileHeader header = read_field_header(scratch / "f.dcm");
       EXPECT_EQ(header.format,
                 std::string("DICOM Deformable Spatial Registration") + (matrices ? ", with its matrices" : ""));
-      EXPECT_EQ(header.direction, FieldDirection::pull);
+      EXPECT_EQ(header.direction, Direction::pull);
       EXPECT_EQ(header.direction_basis, FieldBasis::by_format);
       EXPECT_EQ(header.frame, "LPS");
       EXPECT_EQ(header.frame_basis, FieldBasis::by_format);

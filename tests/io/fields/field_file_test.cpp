@@ -54,14 +54,14 @@ TEST(FieldFile, DirectionIsStatedAndTheOtherOneIsRefused) {
   const PullField pull{forward.lattice, forward.displacement};
   for (const std::string& name : kNames) {
     write_field_file(scratch / name, forward);
-    EXPECT_EQ(read_field_file(scratch / name).direction, FieldDirection::forward) << name;
-    EXPECT_EQ(read_field_header(scratch / name).direction, FieldDirection::forward) << name;
+    EXPECT_EQ(read_field_file(scratch / name).direction, Direction::forward) << name;
+    EXPECT_EQ(read_field_header(scratch / name).direction, Direction::forward) << name;
     const std::string text = refusal([&] { read_pull_field(scratch / name); });
     EXPECT_NE(text.find("InputError: a forward field where a pull field is expected, " + (scratch / name).string()),
               std::string::npos)
         << text;
     write_field_file(scratch / name, pull);
-    EXPECT_EQ(read_field_file(scratch / name).direction, FieldDirection::pull) << name;
+    EXPECT_EQ(read_field_file(scratch / name).direction, Direction::pull) << name;
     EXPECT_TRUE(same_bits(read_pull_field(scratch / name).displacement, pull.displacement)) << name;
     EXPECT_NE(
         refusal([&] { read_forward_field(scratch / name); }).find("a pull field where a forward field is expected"),

@@ -266,9 +266,9 @@ TEST(NiftiField, EveryKindGivesTheSameCornerOnEveryGrid) {
   struct Kind {
     const char *name, *format, *frame;
     bool absolute;
-    std::optional<FieldDirection> direction;
+    std::optional<Direction> direction;
   };
-  constexpr auto kPull = FieldDirection::pull;
+  constexpr auto kPull = Direction::pull;
   const std::vector<Kind> kinds = {{"1006", "NIfTI, intent 1006 (DISPVECT)", "RAS", false, {}},
                                    {"1007", "NIfTI, intent 1007 (VECTOR)", "LPS", false, {}},
                                    {"nreg-0", "NIfTI, NiftyReg deformation field", "RAS", true, kPull},

@@ -71,7 +71,7 @@ TEST(Registration, VectorsAndGridComeBackAsTheyWere) {
   const Scratch scratch;
   const DerivedSource source;
   write_both(source, scratch.path());
-  EXPECT_EQ(read_field_header(scratch / "reg.dcm").direction, FieldDirection::pull);
+  EXPECT_EQ(read_field_header(scratch / "reg.dcm").direction, Direction::pull);
   const PullField field = read_pull_field(scratch / "reg.dcm");
   EXPECT_EQ(field.grid, source.volume.geometry);
   const std::vector<glm::vec3> expected = vectors_for(source);

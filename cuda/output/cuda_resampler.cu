@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "cuda/output/resampler.h"
+#include "cuda/output/cuda_resampler.h"
 
 #include <algorithm>
 
@@ -29,8 +29,9 @@ void for_each_box(const Region& slab, std::int64_t voxels, Work&& work) {
 
 }  // namespace
 
-CudaResampler::CudaResampler(Geometry output, int device, const Limits& limits)
-    : Resampler(output), device_(device), limits_(limits) {
+template <class Base>
+CudaResampler<Base>::CudaResampler(const Geometry& output, int device, const Limits& limits)
+    : Base(output), device_(device), limits_(limits) {
   int count = 0;
   TETWARP_CUDA_TRY(cudaGetDeviceCount(&count));
   if (device < 0 || device >= count) {
@@ -39,20 +40,22 @@ CudaResampler::CudaResampler(Geometry output, int device, const Limits& limits)
   }
   const DeviceScope scope(device);
   uploads_ = std::make_unique<Uploads>();
-  writer_ = std::make_unique<SlabWriter>(this->output(), device, *uploads_);
+  writer_ = std::make_unique<SlabWriter>(output, device, *uploads_);
 }
 
-Region CudaResampler::source_region(const Geometry& source, Region region) const {
+template <class Base>
+Region CudaResampler<Base>::source_region(const Geometry& source, Region region) const {
   require(ready_, "source_region needs a field: call set_field first");
-  region = intersection(region, whole(output()));
+  region = intersection(region, whole(this->output()));
   return tetwarp::is_empty(region) ? Region{} : source_extent(source, region);
 }
 
-Report CudaResampler::resample(Region region, std::span<const Target> targets, const Maps& maps,
-                               const Control& control) {
+template <class Base>
+Report CudaResampler<Base>::resample(Region region, std::span<const Target> targets, const Maps& maps,
+                                     const Control& control, const PartSink& finished) {
   require(ready_, "resample needs a field: call set_field first");
   check_targets(*this, targets, region);
-  check_maps(maps, output(), region);
+  check_maps(maps, this->output(), region);
   check_wanted(maps);
   plainly_covered_ = plainly_uncovered_ = 0;
   paths_ = {};
@@ -62,14 +65,15 @@ Report CudaResampler::resample(Region region, std::span<const Target> targets, c
   if (control.stop.stop_requested()) throw Cancelled();
   writer_->begin(targets, maps, stream_);
   try {
-    return report_of(write_region(region, control), maps);
+    return report_of(write_region(region, control, finished), maps);
   } catch (...) {
     writer_->settle();
     throw;
   }
 }
 
-Counts CudaResampler::write_region(const Region& region, const Control& control) {
+template <class Base>
+Counts CudaResampler<Base>::write_region(const Region& region, const Control& control, const PartSink& finished) {
   counted_ = false;
   const std::int64_t slices = plan(region, control);
   std::int64_t done = 0;
@@ -79,9 +83,9 @@ Counts CudaResampler::write_region(const Region& region, const Control& control)
     slab.end.z = std::min(z + slices, region.end.z);
     write_slab(slab, [&](const SlabBox& box) {
       const glm::i64vec3 end = box.begin + box.size;
-      if (control.finished && end.y == slab.end.y) {
+      if (finished && end.y == slab.end.y) {
         writer_->finish();
-        control.finished({{slab.begin.x, slab.begin.y, box.begin.z}, end});
+        finished({{slab.begin.x, slab.begin.y, box.begin.z}, end});
       }
       done += box.count();
       if (control.progress) control.progress(static_cast<double>(done) / static_cast<double>(voxel_count(region)));
@@ -95,7 +99,8 @@ Counts CudaResampler::write_region(const Region& region, const Control& control)
 }
 
 /// @return slices of a slab
-std::int64_t CudaResampler::plan(const Region& region, const Control& control) {
+template <class Base>
+std::int64_t CudaResampler<Base>::plan(const Region& region, const Control& control) {
   const glm::i64vec3 size = region.end - region.begin;
   box_voxels_ = std::max(most_in_box(), size.x);
   in_parts_ = is_field_streamed();
@@ -113,7 +118,8 @@ std::int64_t CudaResampler::plan(const Region& region, const Control& control) {
   return size.z;
 }
 
-std::int64_t CudaResampler::plan_parts(const Region& region, const Control& control) {
+template <class Base>
+std::int64_t CudaResampler<Base>::plan_parts(const Region& region, const Control& control) {
   const auto plan_now = [&](std::uint64_t allowed) {
     prepare_slabs();
     return plan_slabs(region.begin.z, region.end.z, allowed, [&](std::int64_t begin, std::int64_t end) {
@@ -133,14 +139,16 @@ std::int64_t CudaResampler::plan_parts(const Region& region, const Control& cont
   return slabs.slices;
 }
 
-SlabNeeds CudaResampler::needs_of(const Region& slab) const {
+template <class Base>
+SlabNeeds CudaResampler<Base>::needs_of(const Region& slab) const {
   const std::int64_t voxels = voxel_count(slab);
   const int boxes = !in_parts_ && voxels <= box_voxels_ ? 1 : 2;
   return {field_bytes({slab.begin.z, slab.end.z}), writer_->source_bytes(source_slices(slab)),
           writer_->result_bytes(std::min(box_voxels_, voxels), boxes)};
 }
 
-CudaResampler::SlicesOf CudaResampler::source_slices(const Region& slab) const {
+template <class Base>
+typename CudaResampler<Base>::SlicesOf CudaResampler<Base>::source_slices(const Region& slab) const {
   return [this, slab](const ConstVolumeView& source) -> Slices {
     const std::int64_t begin = source.buffered.begin.z, end = source.buffered.end.z;
     if (!in_parts_) return {begin, end};
@@ -150,8 +158,9 @@ CudaResampler::SlicesOf CudaResampler::source_slices(const Region& slab) const {
   };
 }
 
+template <class Base>
 template <class Done>
-void CudaResampler::write_slab(const Region& slab, Done&& done) {
+void CudaResampler<Base>::write_slab(const Region& slab, Done&& done) {
   hold_field({slab.begin.z, slab.end.z});
   writer_->hold_sources(source_slices(slab));
   const bool plain = writes_plainly();
@@ -162,7 +171,8 @@ void CudaResampler::write_slab(const Region& slab, Done&& done) {
   });
 }
 
-void CudaResampler::write_box(const SlabBox& box, bool plain) {
+template <class Base>
+void CudaResampler<Base>::write_box(const SlabBox& box, bool plain) {
   writer_->begin_box(box);
   if (plain) {
     write_plainly(box, *writer_);
@@ -175,7 +185,8 @@ void CudaResampler::write_box(const SlabBox& box, bool plain) {
   writer_->end_box(box);
 }
 
-std::uint64_t CudaResampler::allowed_bytes() const {
+template <class Base>
+std::uint64_t CudaResampler<Base>::allowed_bytes() const {
   if (limits_.memory != 0) return limits_.memory;
   std::size_t free = 0, total = 0;
   TETWARP_CUDA_TRY(cudaMemGetInfo(&free, &total));
@@ -183,26 +194,31 @@ std::uint64_t CudaResampler::allowed_bytes() const {
   return ours > reserve ? ours - reserve : 0;
 }
 
-bool CudaResampler::may_hold(std::uint64_t bytes) const {
+template <class Base>
+bool CudaResampler<Base>::may_hold(std::uint64_t bytes) const {
   const bool held_already = limits_.memory == 0 && bytes <= held_field_bytes();
   return held_already || bytes <= allowed_bytes();
 }
 
-void CudaResampler::make_room_for_field(std::uint64_t bytes) {
+template <class Base>
+void CudaResampler<Base>::make_room_for_field(std::uint64_t bytes) {
   if (bytes > held_field_bytes()) make_room({bytes, 0, 0}, allowed_bytes());
 }
 
-void CudaResampler::make_room(const SlabNeeds& needs, std::uint64_t allowed) {
+template <class Base>
+void CudaResampler<Base>::make_room(const SlabNeeds& needs, std::uint64_t allowed) {
   if (larger(held(), needs).total() <= allowed) return;
   writer_->release();
   if (larger(held(), needs).total() > allowed) release_field();
 }
 
-SlabNeeds CudaResampler::held() const {
+template <class Base>
+SlabNeeds CudaResampler<Base>::held() const {
   return {held_field_bytes(), writer_->held_source_bytes(), writer_->held_result_bytes()};
 }
 
-Report CudaResampler::report_of(const Counts& counts, const Maps& maps) const {
+template <class Base>
+Report CudaResampler<Base>::report_of(const Counts& counts, const Maps& maps) const {
   Report report;
   report.covered = counts.covered + plainly_covered_;
   report.uncovered = counts.uncovered + plainly_uncovered_;
@@ -214,5 +230,8 @@ Report CudaResampler::report_of(const Counts& counts, const Maps& maps) const {
   describe_field(report);
   return report;
 }
+
+template class CudaResampler<ForwardResampler>;
+template class CudaResampler<PullResampler>;
 
 }  // namespace tetwarp::cuda_detail

@@ -1,4 +1,4 @@
 # SPDX-FileCopyrightText: The Tetwarp authors
 # SPDX-License-Identifier: Apache-2.0
 
-execute_process(COMMAND "${work}/cuda/device" COMMAND_ERROR_IS_FATAL ANY)
+execute_process(COMMAND "${work}/backend/device" COMMAND_ERROR_IS_FATAL ANY)

@@ -16,12 +16,16 @@ namespace tetwarp::cuda_detail {
 ///
 /// Parts of the field and of the sources are held for one slab. A box bounds the working space, and is copied to the
 /// host while the next one is computed.
-class CudaResampler : public Resampler {
+///
+/// @tparam Base  ForwardResampler or PullResampler
+template <class Base>
+class CudaResampler : public Base {
  public:
-  CudaResampler(Geometry output, int device, const Limits& limits);
+  CudaResampler(const Geometry& output, int device, const Limits& limits);
 
   Region source_region(const Geometry& source, Region region) const override;
-  Report resample(Region region, std::span<const Target> targets, const Maps& maps, const Control& control) override;
+  Report resample(Region region, std::span<const Target> targets, const Maps& maps, const Control& control,
+                  const PartSink& finished) override;
 
  protected:
   virtual Region source_extent(const Geometry& source, const Region& region) const = 0;
@@ -71,7 +75,7 @@ class CudaResampler : public Resampler {
   /// The slices of a source from which a slab is sampled.
   using SlicesOf = std::function<Slices(const ConstVolumeView& source)>;
 
-  Counts write_region(const Region& region, const Control& control);
+  Counts write_region(const Region& region, const Control& control, const PartSink& finished);
   bool writes_plainly() const { return can_write_plainly() && writer_->is_plain(); }
   std::int64_t most_in_box() const { return writer_->box_voxels(writes_plainly() ? 0 : work_bytes(*writer_)); }
   /// Decides on slabs, and makes room for them.

@@ -1,0 +1,40 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#pragma once
+
+#include <string>
+
+namespace tetwarp {
+
+/// Whether this build contains CUDA.
+bool has_cuda();
+/// Number of CUDA devices that this process can use; 0 without a driver, and in a build without CUDA.
+int device_count();
+/// Makes the driver do now what the first use of a device costs, a fraction of a second. Without such a device nothing
+/// happens.
+void wake_device(int device);
+/// Name and memory of a device: "NVIDIA H200, 150 GB".
+/// @throws DeviceError without such a device
+/// @throws NotCompiled in a build without CUDA
+std::string describe_device(int device);
+
+/// A stream of a device, for `Control::stream`. Work queued on it waits for no other work on the device.
+class DeviceStream {
+ public:
+  /// Makes a stream of the device with this number.
+  /// @throws DeviceError without such a device
+  /// @throws NotCompiled in a build without CUDA
+  explicit DeviceStream(int device);
+  /// Destroys the stream.
+  ~DeviceStream();
+  DeviceStream(const DeviceStream&) = delete;
+  DeviceStream& operator=(const DeviceStream&) = delete;
+  /// The stream, a cudaStream_t.
+  void* get() const { return stream_; }
+
+ private:
+  void* stream_;
+};
+
+}  // namespace tetwarp
