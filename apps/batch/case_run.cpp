@@ -49,7 +49,7 @@ Record attempt(const BatchCase& of, const Retry& retry, const Resources& resourc
   if (retry.on_cpu) options.backend = "cpu";
   Clock clock;
   Deformation deformation(options, resources.inputs.get(options.input));
-  const std::vector<std::string> further = further_reads_of(options).digests(options.common.threads);
+  const std::vector<std::string> others = other_reads_of(options).digests(options.common.threads);
   const double hashed = clock.lap();
   deformation.open();
   timing["open"] = clock.lap();
@@ -84,7 +84,7 @@ Record attempt(const BatchCase& of, const Retry& retry, const Resources& resourc
   }
   deformation.write();
   timing["write"] = clock.lap();
-  Record line = record_case(of, deformation, further);
+  Record line = record_case(of, deformation, others);
   timing["hash"] = hashed + clock.lap();
   deformation.commit();
   timing["commit"] = clock.lap();

@@ -207,8 +207,8 @@ void Reader::check_files(const DeformOptions& options) {
   exists(options.input.path);
   if (!options.scenario.empty()) exists(options.scenario);
   if (!options.fields.empty()) check_fields(options.fields, options.cell_size);
-  const Reads further = further_reads_of(options);
-  for (const fs::path& path : further.paths()) exists(path);
+  const Reads others = other_reads_of(options);
+  for (const fs::path& path : others.paths()) exists(path);
 }
 
 /// Mass-spring has other bits on each backend: which one is the case's to say, not the machine's.

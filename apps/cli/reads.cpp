@@ -3,9 +3,9 @@
 
 #include "apps/cli/reads.h"
 
+#include "apps/deform/along_structures.h"
+#include "apps/deform/along_volumes.h"
 #include "apps/deform/field_source.h"
-#include "apps/deform/further_structures.h"
-#include "apps/deform/further_volumes.h"
 #include "apps/deform/output_grid.h"
 #include "apps/deform/points_option.h"
 #include "apps/render/render_scene.h"
@@ -23,10 +23,10 @@ namespace {
 /// Of a DICOM object, which is one file, or of a volume.
 void add_along(Reads& reads, const std::string& text) {
   const fs::path path = text.substr(0, text.find('='));
-  if (FurtherStructures::is_one(text) || is_dicom_segmentation(path))
+  if (AlongStructures::is_one(text) || is_dicom_segmentation(path))
     reads.add_file(path);
   else
-    reads.add_volume(parse_further(text).input);
+    reads.add_volume(parse_along(text).input);
 }
 
 void add_fields(Reads& reads, const std::vector<std::string>& fields, const std::string& pull_field) {
@@ -93,7 +93,7 @@ std::vector<std::string> Reads::digests(int threads) const {
   return digests;
 }
 
-Reads further_reads_of(const DeformOptions& options) {
+Reads other_reads_of(const DeformOptions& options) {
   Reads reads;
   add_fields(reads, options.fields, options.pull_field);
   if (!options.scenario.empty()) reads.add_file(options.scenario);
@@ -106,7 +106,7 @@ Reads further_reads_of(const DeformOptions& options) {
 }
 
 Reads reads_of(const DeformOptions& options) {
-  Reads reads = further_reads_of(options);
+  Reads reads = other_reads_of(options);
   reads.add_volume(options.input);
   return reads;
 }

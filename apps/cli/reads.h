@@ -50,7 +50,7 @@ Reads reads_of(const InvertOptions& options);
 Reads reads_of(const SimulateOptions& options);
 Reads reads_of(const RenderOptions& options);
 /// What `deform` reads beside INPUT.
-Reads further_reads_of(const DeformOptions& options);
+Reads other_reads_of(const DeformOptions& options);
 
 /// SHA-256 of a volume as sidecars give it, without reading voxels. @throws InputError
 std::string hash_volume(const InputOptions& volume, int threads);

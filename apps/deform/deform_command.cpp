@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "apps/cli/beside.h"
+#include "apps/cli/in_background.h"
 #include "apps/deform/deformation.h"
 #include "cuda/devices.h"
 
@@ -14,7 +14,7 @@ int run_deform(const DeformOptions& options) {
     say(options.common, describe(deformation.record().plan, options, deformation.record().outputs));
     return 0;
   }
-  const auto awake = beside([&] {  // beside reading
+  const auto awake = in_background([&] {  // beside reading
     if (means_cuda(options.backend)) wake_cuda_device(options.device);
   });
   const Worker worker{options.backend, options.device};

@@ -50,7 +50,7 @@ std::uint64_t plan_bytes(const DeformOptions& options, DeformOutputs& outputs, c
       options.preserve_mass ? size_bytes(type_of_mass(input.type)) * (voxels + output_voxels) : 0;
   const std::uint64_t of_structures = outputs.structures.empty() ? 0 : MapStream::bytes(grid, &Maps::inverse_mm, false);
   return of_mass + of_check + voxels * size_bytes(input.type) + output_voxels * size_bytes(input.type) +
-         outputs.maps->bytes(grid, options.preserve_mass) + outputs.further->bytes(output_voxels) + of_structures +
+         outputs.maps->bytes(grid, options.preserve_mass) + outputs.along->bytes(output_voxels) + of_structures +
          of_field + kOverheadBytes;
 }
 
@@ -65,7 +65,7 @@ std::uint64_t output_bytes(const DeformOptions& options, const DeformOutputs& ou
   if (!maps.jacobian.empty()) per_voxel += sizeof(float);
   if (!maps.inverse.empty()) per_voxel += sizeof(glm::vec3);
   const std::uint64_t of_field = options.write_field.empty() ? 0 : bytes_of_field(options, input.geometry, grid);
-  return voxels * per_voxel + outputs.further->bytes(voxels) + of_field;
+  return voxels * per_voxel + outputs.along->bytes(voxels) + of_field;
 }
 
 [[noreturn]] void refuse_bids(const DeformOptions& options) {
@@ -93,11 +93,11 @@ void check_scenario(const DeformOptions& options) {
 }
 
 /// The texts of --with by what they name.
-struct FurtherTexts {
+struct AlongTexts {
   std::vector<std::string> structures, volumes;
 
-  explicit FurtherTexts(const std::vector<std::string>& with) {
-    for (const std::string& text : with) (FurtherStructures::is_one(text) ? structures : volumes).push_back(text);
+  explicit AlongTexts(const std::vector<std::string>& with) {
+    for (const std::string& text : with) (AlongStructures::is_one(text) ? structures : volumes).push_back(text);
   }
 };
 
@@ -118,7 +118,7 @@ DeformOutputs begin_outputs(const DeformOptions& options, const PointsOption& po
   if (options.preserve_mass && !options.pull_field.empty()) {
     throw UsageError("--preserve mass needs the determinant of a forward map, which --pull-field has not");
   }
-  const FurtherTexts with(options.with);
+  const AlongTexts with(options.with);
   const Reads reads = reads_of(options);
   if (!options.pull_field.empty() && !points.empty())
     throw UsageError("--points needs a forward field, --pull-field has no forward map");
@@ -164,8 +164,8 @@ DeformOutputs begin_outputs(const DeformOptions& options, const PointsOption& po
   if (options.bids) outputs.bids = outputs.set.add(bids_sidecar_of(options.output));
   outputs.maps.emplace(options.maps, options.pull_field.empty() ? Direction::forward : Direction::pull, series,
                        outputs.set);
-  outputs.further.emplace(with.volumes, series, options.common.nifti_frame, outputs.set);
-  outputs.structures = FurtherStructures(with.structures, series, outputs.set);
+  outputs.along.emplace(with.volumes, series, options.common.nifti_frame, outputs.set);
+  outputs.structures = AlongStructures(with.structures, series, outputs.set);
   outputs.field = outputs.set.add(options.write_field);
   outputs.report = outputs.set.add(options.report);
   outputs.preview = outputs.set.add(options.preview);
@@ -187,7 +187,7 @@ DeformPlan plan_deformation(const DeformOptions& options, DeformOutputs& outputs
     throw UsageError("--background " + nlohmann::json(*options.background).dump() + " does not fit the voxels, " +
                      to_string(input.type) + "; choose a value in their range");
   }
-  outputs.further->open(input);
+  outputs.along->open(input);
   outputs.set.add_reads(reads_of(options).slices(options.input, input));
   DeformPlan plan;
   if (options.grid != "fit")

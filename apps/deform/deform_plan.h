@@ -3,8 +3,8 @@
 
 #pragma once
 
-#include "apps/deform/further_structures.h"
-#include "apps/deform/further_volumes.h"
+#include "apps/deform/along_structures.h"
+#include "apps/deform/along_volumes.h"
 #include "apps/deform/map_outputs.h"
 #include "apps/deform/points_option.h"
 
@@ -15,8 +15,8 @@ struct DeformOutputs {
   bool series = false;
   OutputSet set;
   std::optional<MapOutputs> maps;
-  std::optional<FurtherVolumes> further;
-  FurtherStructures structures;
+  std::optional<AlongVolumes> along;
+  AlongStructures structures;
   std::filesystem::path volume, sidecar, bids, field, report, preview;
   std::vector<std::filesystem::path> points;
 };

@@ -144,7 +144,7 @@ json sidecar(const DeformRecord& of) {
     document["output"]["added_empty_attributes"] = of.dicom_report->added_empty;
   }
   if (of.options.bids) document["bids"] = bids_sidecar_of(of.options.output).string();
-  if (const json further = of.outputs.further->describe(); !further.empty()) document["with"] = further;
+  if (const json along = of.outputs.along->describe(); !along.empty()) document["with"] = along;
   if (!of.outputs.structures.empty()) document["structures"] = of.outputs.structures.describe();
   if (const json maps = of.outputs.maps->describe(); !maps.empty()) document["maps"] = maps;
   if (!of.points.empty()) document["points"] = of.points.to_json();

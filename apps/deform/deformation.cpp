@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "apps/cli/beside.h"
+#include "apps/cli/in_background.h"
 #include "apps/deform/output_grid.h"
 #include "apps/simulate/simulated_field.h"
 #include "cuda/devices.h"
@@ -47,7 +47,7 @@ void Deformation::read() {
   record_.input = {input_, &input_->read(options_.common, stage.control())};
   record_.headers = input_->headers();
   record_.background = options_.background.value_or(record_.input->background);
-  record_.outputs.further->read(options_.common, {.stop = interrupt_token()});
+  record_.outputs.along->read(options_.common, {.stop = interrupt_token()});
   record_.stages.emplace_back("read", open_seconds_ + stage.seconds());
 }
 
@@ -102,7 +102,7 @@ void Deformation::resample(const Worker& worker) {
   record_.outputs.set.write([&] {
     record_.outputs.maps->add_to(maps, record_.plan.grid, options_.preserve_mass, series_ ? &*series_ : nullptr);
   });
-  std::vector<Target> targets = record_.outputs.further->targets_on(record_.plan.grid, false, options_.interpolation);
+  std::vector<Target> targets = record_.outputs.along->targets_on(record_.plan.grid, false, options_.interpolation);
   targets.insert(targets.begin(), main_target());
   Control control = stage.control();
   control.stream = worker.stream;
@@ -179,17 +179,17 @@ void Deformation::set_field(Resampler& resampler, Outside outside, const Control
 void Deformation::resample_onto_own_grids(const Worker& worker) {
   const Limits limits{.threads = options_.common.threads, .memory = options_.memory_bytes.value_or(0)};
   const Control control{.stop = interrupt_token(), .stream = worker.stream};
-  for (const Geometry& grid : record_.outputs.further->own_grids()) {
+  for (const Geometry& grid : record_.outputs.along->own_grids()) {
     const Backend backend = make_backend(worker.backend, record_.field.direction, grid, worker.device, limits);
     set_field(*backend.resampler, options_.outside, control);
-    const std::vector<Target> targets = record_.outputs.further->targets_on(grid, true, options_.interpolation);
+    const std::vector<Target> targets = record_.outputs.along->targets_on(grid, true, options_.interpolation);
     backend.resampler->resample(whole(grid), targets, {}, control);
   }
 }
 
 /// @param resampler  holds the field
 void Deformation::move_structures(Resampler& resampler, Outside outside, const Control& control) {
-  FurtherStructures& structures = record_.outputs.structures;
+  AlongStructures& structures = record_.outputs.structures;
   const Geometry& source = record_.input->volume.geometry();
   const Limits limits{.threads = options_.common.threads};
   std::optional<PointMover> mover;
@@ -222,11 +222,11 @@ void Deformation::commit() {
   std::vector<glm::vec3> forward, pull;
   forward.swap(record_.field.forward.field.displacement);
   pull.swap(record_.field.pull.displacement);
-  const auto field = beside([&] {
+  const auto field = in_background([&] {
     std::vector<glm::vec3>().swap(forward);
     std::vector<glm::vec3>().swap(pull);
   });
-  const auto volumes = beside([&] {
+  const auto volumes = in_background([&] {
     record_.input.reset();
     input_.reset();
     record_.output.release();
@@ -254,7 +254,7 @@ void Deformation::write_files() {
   std::optional<DerivedOutput> series;
   if (record_.dicom_report)
     series.emplace(WrittenSeries{*record_.headers, *record_.dicom_report, record_.plan.grid}, derivation(record_));
-  record_.outputs.further->write(options_.compression, made_by, series);
+  record_.outputs.along->write(options_.compression, made_by, series);
   record_.points.write(record_.outputs.points);
   const bool hides = options_.dicom.deidentification.has_value();
   write_json(record_.outputs.sidecar, Record::of(hides, sidecar(record_)));
@@ -305,7 +305,7 @@ std::vector<std::string> Deformation::notes() const {
   add("warning: ", warnings_);
   add("note: ", file_notes_);
   add("note: ", record_.field.notes);
-  add("note: ", record_.outputs.further->notes());
+  add("note: ", record_.outputs.along->notes());
   add("note: ", record_.points.notes());
   add("note: ", record_.outputs.structures.notes());
   if (!record_.set_aside.empty()) {

@@ -18,15 +18,15 @@
 namespace tetwarp::apps {
 
 /// The `--with STRUCTURES.dcm=OUT.dcm` of one command: RT Structure Sets that were drawn on INPUT, and go with it.
-class FurtherStructures {
+class AlongStructures {
  public:
   /// Whether the text of a `--with` names a structure set. Looks into the file.
   static bool is_one(const std::string& text);
 
-  FurtherStructures() = default;
+  AlongStructures() = default;
   /// Begins their outputs. @param series  whether OUTPUT is one
   /// @throws UsageError for a text that is not IN.dcm=OUT.dcm, or without a series; and what OutputSet::add throws
-  FurtherStructures(const std::vector<std::string>& texts, bool series, OutputSet& outputs);
+  AlongStructures(const std::vector<std::string>& texts, bool series, OutputSet& outputs);
 
   bool empty() const { return sets_.empty(); }
   /// Reads all files. @throws InputError for one that was not drawn in the frame of reference of the series

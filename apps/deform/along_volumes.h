@@ -11,19 +11,19 @@
 #include "apps/cli/input.h"
 #include "apps/cli/options.h"
 #include "apps/cli/output.h"
-#include "apps/deform/further_dicom.h"
+#include "apps/deform/along_dicom.h"
 
 namespace tetwarp::apps {
 
 /// @throws UsageError for a text that is not IN=OUT[:nearest|linear|cubic|vote][:background=V][:own]
-FurtherOptions parse_further(const std::string& text);
+AlongOptions parse_along(const std::string& text);
 
 /// Volumes that go through the same field as INPUT: labels, doses, other modalities.
-class FurtherVolumes {
+class AlongVolumes {
  public:
   /// Begins their outputs. @param series  whether OUTPUT is a DICOM series, to which DICOM objects can refer
   /// @throws UsageError, and what OutputSet::add throws
-  FurtherVolumes(const std::vector<std::string>& texts, bool series, NiftiFrame frame, OutputSet& outputs);
+  AlongVolumes(const std::vector<std::string>& texts, bool series, NiftiFrame frame, OutputSet& outputs);
 
   /// Reads their headers. @throws UsageError, InputError for what does not go with its output or with INPUT
   void open(const InputHeader& input);
@@ -45,7 +45,7 @@ class FurtherVolumes {
 
  private:
   struct One {
-    FurtherOptions options;
+    AlongOptions options;
     std::filesystem::path staged;
     InputHeader header;
     std::optional<DicomSegmentation> segmentation;

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "apps/deform/further_volumes.h"
+#include "apps/deform/along_volumes.h"
 
 #include <algorithm>
 #include <charconv>
@@ -37,7 +37,7 @@ std::optional<double> number(std::string_view text) {
 }
 
 /// Reads one option that follows OUT. @return whether it is one
-bool read_option(std::string_view text, FurtherOptions& options) {
+bool read_option(std::string_view text, AlongOptions& options) {
   constexpr std::string_view kBackground = "background=";
   const auto is_first = [](bool given, const char* what) {
     if (given) throw UsageError(std::string("--with has two of ") + what + "; " + kForm);
@@ -58,10 +58,10 @@ bool read_option(std::string_view text, FurtherOptions& options) {
 
 }  // namespace
 
-FurtherOptions parse_further(const std::string& text) {
+AlongOptions parse_along(const std::string& text) {
   const std::size_t equals = text.find('=');
   if (equals == 0 || equals == std::string::npos) throw UsageError("--with \"" + text + "\" names no output; " + kForm);
-  FurtherOptions options;
+  AlongOptions options;
   options.input.path = text.substr(0, equals);
   const std::vector<std::string> parts = split(text.substr(equals + 1), ':');
   options.output = parts.front();
@@ -75,11 +75,10 @@ FurtherOptions parse_further(const std::string& text) {
   return options;
 }
 
-FurtherVolumes::FurtherVolumes(const std::vector<std::string>& texts, bool series, NiftiFrame frame,
-                               OutputSet& outputs) {
+AlongVolumes::AlongVolumes(const std::vector<std::string>& texts, bool series, NiftiFrame frame, OutputSet& outputs) {
   for (const std::string& text : texts) {
     One& one = volumes_.emplace_back();
-    one.options = parse_further(text);
+    one.options = parse_along(text);
     one.options.input.nifti_frame = frame;
     if (!series && is_object_output(one.options.output)) {
       throw UsageError("a DICOM object refers to a DICOM series, " + one.options.output.string() +
@@ -89,7 +88,7 @@ FurtherVolumes::FurtherVolumes(const std::vector<std::string>& texts, bool serie
   }
 }
 
-void FurtherVolumes::open(const InputHeader& input) {
+void AlongVolumes::open(const InputHeader& input) {
   for (One& one : volumes_) {
     const std::filesystem::path& path = one.options.input.path;
     refuse_pipes(path);
@@ -116,7 +115,7 @@ void FurtherVolumes::open(const InputHeader& input) {
   }
 }
 
-std::uint64_t FurtherVolumes::bytes(std::uint64_t output_voxels) const {
+std::uint64_t AlongVolumes::bytes(std::uint64_t output_voxels) const {
   std::uint64_t bytes = 0;
   for (const One& one : volumes_) {
     const auto voxels = static_cast<std::uint64_t>(voxel_count(one.header.geometry)),
@@ -129,7 +128,7 @@ std::uint64_t FurtherVolumes::bytes(std::uint64_t output_voxels) const {
   return bytes;
 }
 
-void FurtherVolumes::read(const CommonOptions& common, const Control& control) {
+void AlongVolumes::read(const CommonOptions& common, const Control& control) {
   for (One& one : volumes_) {
     if (one.segmentation) {
       one.sources = read_segments(one.options.input.path, *one.segmentation);
@@ -142,7 +141,7 @@ void FurtherVolumes::read(const CommonOptions& common, const Control& control) {
   }
 }
 
-std::vector<Geometry> FurtherVolumes::own_grids() const {
+std::vector<Geometry> AlongVolumes::own_grids() const {
   std::vector<Geometry> grids;
   for (const One& one : volumes_) {
     if (one.options.own && std::find(grids.begin(), grids.end(), one.own_grid) == grids.end())
@@ -151,7 +150,7 @@ std::vector<Geometry> FurtherVolumes::own_grids() const {
   return grids;
 }
 
-std::vector<Target> FurtherVolumes::targets_on(const Geometry& grid, bool own, Interpolation otherwise) {
+std::vector<Target> AlongVolumes::targets_on(const Geometry& grid, bool own, Interpolation otherwise) {
   std::vector<Target> targets;
   for (One& one : volumes_) {
     if (one.options.own != own || (own && one.own_grid != grid)) continue;
@@ -170,7 +169,7 @@ std::vector<Target> FurtherVolumes::targets_on(const Geometry& grid, bool own, I
   return targets;
 }
 
-void FurtherVolumes::write_object(One& one, const DerivedOutput& series) {
+void AlongVolumes::write_object(One& one, const DerivedOutput& series) {
   const DicomAlong along = along_with(one.options, one.sha256, one.target, series);
   if (!one.segmentation) {
     one.dose_report = write_derived_dose(one.staged, std::as_const(one.outputs.front()).view(), along, series.written);
@@ -185,8 +184,8 @@ void FurtherVolumes::write_object(One& one, const DerivedOutput& series) {
   }
 }
 
-void FurtherVolumes::write(const std::optional<int>& compression, const std::string& descrip,
-                           const std::optional<DerivedOutput>& series) {
+void AlongVolumes::write(const std::optional<int>& compression, const std::string& descrip,
+                         const std::optional<DerivedOutput>& series) {
   for (One& one : volumes_) {
     if (is_object_output(one.options.output)) {
       write_object(one, series.value());
@@ -197,7 +196,7 @@ void FurtherVolumes::write(const std::optional<int>& compression, const std::str
   }
 }
 
-nlohmann::json FurtherVolumes::describe() const {
+nlohmann::json AlongVolumes::describe() const {
   nlohmann::json list = nlohmann::json::array();
   for (const One& one : volumes_) {
     list.push_back({{"input", one.options.input.path.string()},

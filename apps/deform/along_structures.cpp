@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "apps/deform/further_structures.h"
+#include "apps/deform/along_structures.h"
 
 #include <algorithm>
 #include <cmath>
@@ -48,9 +48,9 @@ double volume_of(std::span<const Contour> contours, const Geometry& grid) try {
 
 }  // namespace
 
-bool FurtherStructures::is_one(const std::string& text) { return is_dicom_structure_set(input_of(text)); }
+bool AlongStructures::is_one(const std::string& text) { return is_dicom_structure_set(input_of(text)); }
 
-FurtherStructures::FurtherStructures(const std::vector<std::string>& texts, bool series, OutputSet& outputs) {
+AlongStructures::AlongStructures(const std::vector<std::string>& texts, bool series, OutputSet& outputs) {
   for (const std::string& text : texts) {
     Set& set = sets_.emplace_back();
     set.input = input_of(text);
@@ -68,7 +68,7 @@ FurtherStructures::FurtherStructures(const std::vector<std::string>& texts, bool
   }
 }
 
-void FurtherStructures::read(const std::string& frame_of_reference_uid) {
+void AlongStructures::read(const std::string& frame_of_reference_uid) {
   for (Set& set : sets_) {
     set.structures = read_structure_set(set.input);
     set.sha256 = hash_file(set.input);
@@ -84,8 +84,8 @@ void FurtherStructures::read(const std::string& frame_of_reference_uid) {
   }
 }
 
-void FurtherStructures::move(Roi& roi, const Structure& structure, const PointMover* mover, const Geometry& source,
-                             const Geometry& output, Outside outside) {
+void AlongStructures::move(Roi& roi, const Structure& structure, const PointMover* mover, const Geometry& source,
+                           const Geometry& output, Outside outside) {
   const std::vector<Contour>& contours = structure.contours;
   std::vector<MovedContour> moved;
   for (const Contour& contour : contours) {
@@ -116,8 +116,8 @@ void FurtherStructures::move(Roi& roi, const Structure& structure, const PointMo
   roi.beyond += count_beyond(closed, output);
 }
 
-bool FurtherStructures::take_moved(Roi& roi, const ContourMover& mover, std::span<const Contour> contours,
-                                   const Geometry& source, const Geometry& output, Outside outside) {
+bool AlongStructures::take_moved(Roi& roi, const ContourMover& mover, std::span<const Contour> contours,
+                                 const Geometry& source, const Geometry& output, Outside outside) {
   auto moved = mover.move_within_slices(contours, source, outside);
   if (!moved) return false;
   roi.how = How::points;
@@ -129,8 +129,8 @@ bool FurtherStructures::take_moved(Roi& roi, const ContourMover& mover, std::spa
   return true;
 }
 
-void FurtherStructures::move(const PointMover* mover, const Geometry& source, const Geometry& output, Outside outside,
-                             int threads) {
+void AlongStructures::move(const PointMover* mover, const Geometry& source, const Geometry& output, Outside outside,
+                           int threads) {
   forward_ = mover != nullptr;
   last_slice_ = output.size.z - 1;
   for (Set& set : sets_) {
@@ -140,13 +140,13 @@ void FurtherStructures::move(const PointMover* mover, const Geometry& source, co
   }
 }
 
-bool FurtherStructures::needs_inverse() const {
+bool AlongStructures::needs_inverse() const {
   return std::any_of(sets_.begin(), sets_.end(), [](const Set& set) {
     return std::any_of(set.rois.begin(), set.rois.end(), [](const Roi& roi) { return roi.reslicer.has_value(); });
   });
 }
 
-void FurtherStructures::reslice(const ConstVolumeView& inverse_mm, int threads) {
+void AlongStructures::reslice(const ConstVolumeView& inverse_mm, int threads) {
   std::vector<Roi*> rois;
   for (Set& set : sets_)
     for (Roi& roi : set.rois)
@@ -168,7 +168,7 @@ void FurtherStructures::reslice(const ConstVolumeView& inverse_mm, int threads) 
   }
 }
 
-void FurtherStructures::finish() {
+void AlongStructures::finish() {
   for (Set& set : sets_) {
     for (Roi& roi : set.rois) {
       if (!roi.reslicer) continue;
@@ -188,7 +188,7 @@ void FurtherStructures::finish() {
   }
 }
 
-void FurtherStructures::write(const DicomWriteReport& series, const DicomDerivation& derivation) {
+void AlongStructures::write(const DicomWriteReport& series, const DicomDerivation& derivation) {
   for (Set& set : sets_) {
     std::vector<std::vector<Contour>> moved;
     for (Roi& roi : set.rois) moved.push_back(roi.moved);
@@ -196,7 +196,7 @@ void FurtherStructures::write(const DicomWriteReport& series, const DicomDerivat
   }
 }
 
-nlohmann::json FurtherStructures::describe() const {
+nlohmann::json AlongStructures::describe() const {
   constexpr double kMillilitre = 1000;  // mm3
   nlohmann::json list = nlohmann::json::array();
   for (const Set& set : sets_) {
@@ -229,7 +229,7 @@ nlohmann::json FurtherStructures::describe() const {
   return list;
 }
 
-std::vector<std::string> FurtherStructures::notes() const {
+std::vector<std::string> AlongStructures::notes() const {
   std::vector<std::string> notes;
   for (const Set& set : sets_) {
     for (std::size_t n = 0; n < set.rois.size(); ++n) {

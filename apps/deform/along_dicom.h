@@ -13,7 +13,7 @@
 namespace tetwarp::apps {
 
 /// One --with: IN=OUT, and what follows OUT.
-struct FurtherOptions {
+struct AlongOptions {
   InputOptions input;
   std::filesystem::path output;
   std::optional<Interpolation> interpolation;  ///< none: that of INPUT; of a segmentation see usual_interpolation
@@ -32,7 +32,7 @@ bool is_object_output(const std::filesystem::path& output);
 
 /// The header of a SEG. @throws UsageError for an output that is none, or a background; what read_segmentation_header
 /// throws
-DicomSegmentation open_segmentation(const FurtherOptions& options, const InputHeader& input);
+DicomSegmentation open_segmentation(const AlongOptions& options, const InputHeader& input);
 
 /// The grid that a segmentation goes back onto: that of its frames, with as many slices more as lie between those of
 /// INPUT if they are parallel, so that what is moved beyond the outermost frames is not lost.
@@ -47,7 +47,7 @@ std::optional<std::string> compare_frames(const std::filesystem::path& path, con
                                           const InputHeader& input);
 
 /// How an object came to be. @param target  what it went through the field as
-DicomAlong along_with(const FurtherOptions& options, const std::string& sha256, const Target& target,
+DicomAlong along_with(const AlongOptions& options, const std::string& sha256, const Target& target,
                       const DerivedOutput& series);
 
 nlohmann::json to_json(const DoseReport& report);
