@@ -13,6 +13,7 @@
 #include "apps/batch/threads.h"
 #include "apps/cli/input.h"
 #include "apps/cli/output.h"
+#include "cuda/backend.h"
 #include "cuda/devices.h"
 #include "io/parallel.h"
 #include "io/shown_text.h"

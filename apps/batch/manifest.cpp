@@ -14,7 +14,7 @@
 #include "apps/batch/output_folder.h"
 #include "apps/cli/command_line.h"
 #include "apps/cli/reads.h"
-#include "apps/deform/field_source.h"
+#include "apps/deform/deform_request.h"
 #include "deform/fields/formula.h"
 #include "io/lower_case.h"
 #include "io/opened_file.h"
@@ -206,8 +206,7 @@ void Reader::check_files(const DeformOptions& options) {
   };
   exists(options.input.path);
   if (!options.scenario.empty()) exists(options.scenario);
-  if (!options.fields.empty()) check_fields(options.fields, options.cell_size);
-  const Reads others = other_reads_of(options);
+  const Reads others = other_reads_of(options, parse_sources(options));
   for (const fs::path& path : others.paths()) exists(path);
 }
 

@@ -1,91 +1,91 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "apps/deform/points_option.h"
+#include "apps/deform/along_points.h"
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
 namespace tetwarp::apps {
 
-PointsOption::PointsOption(const std::vector<std::string>& texts) {
-  for (const std::string& text : texts) {
-    const auto equals = text.find('=');
-    if (equals == std::string::npos || equals == 0)
-      throw UsageError("--points \"" + text + "\"; expected IN=OUT, IN=OUT:lps or IN=OUT:ras");
-    Pair pair;
-    std::string output = text.substr(equals + 1);
-    for (const auto& [suffix, frame] : {std::pair{":lps", PointFrame::lps}, std::pair{":ras", PointFrame::ras}}) {
-      if (!output.ends_with(suffix)) continue;
-      pair.told = frame;
-      output.resize(output.size() - 4);
-      break;
-    }
-    pair.input = text.substr(0, equals);
-    pair.output = output;
-    const std::string form = points_suffix(pair.input);
-    if (form.empty()) {
-      throw UsageError("unknown suffix of --points \"" + pair.input.string() +
-                       "\"; use .csv .mrk.json .fcsv .stl .obj .vtk");
-    }
-    if (points_suffix(pair.output) != form) {
-      throw UsageError("--points writes the form that it reads, " + form + ", not \"" + output +
-                       "\"; give the output the suffix " + form);
-    }
-    pairs_.push_back(std::move(pair));
+namespace {
+
+std::size_t count_outside(const MovedPoints& moved) {
+  return static_cast<std::size_t>(std::count(moved.status.begin(), moved.status.end(), PointStatus::outside));
+}
+
+}  // namespace
+
+PointsText parse_points(const std::string& text) {
+  const auto equals = text.find('=');
+  if (equals == std::string::npos || equals == 0)
+    throw UsageError("--points \"" + text + "\"; expected IN=OUT, IN=OUT:lps or IN=OUT:ras");
+  PointsText parsed;
+  std::string output = text.substr(equals + 1);
+  for (const auto& [suffix, frame] : {std::pair{":lps", PointFrame::lps}, std::pair{":ras", PointFrame::ras}}) {
+    if (!output.ends_with(suffix)) continue;
+    parsed.told = frame;
+    output.resize(output.size() - 4);
+    break;
   }
-}
-
-std::vector<std::filesystem::path> PointsOption::inputs() const {
-  std::vector<std::filesystem::path> paths;
-  for (const Pair& pair : pairs_) paths.push_back(pair.input);
-  return paths;
-}
-
-std::vector<std::filesystem::path> PointsOption::add_outputs(OutputSet& outputs) const {
-  std::vector<std::filesystem::path> staged;
-  for (const Pair& pair : pairs_) staged.push_back(outputs.add(pair.output));
-  return staged;
-}
-
-void PointsOption::read() {
-  for (Pair& pair : pairs_) pair.file.emplace(pair.input, pair.told);
-}
-
-void PointsOption::move(const Geometry& output, const FieldView& field, const Limits& limits, const Control& control) {
-  for (Pair& pair : pairs_) {
-    pair.moved = pair.file->points();
-    pair.status = move_points(output, field, pair.moved, limits, control);
+  parsed.input = text.substr(0, equals);
+  parsed.output = output;
+  const std::string form = points_suffix(parsed.input);
+  if (form.empty()) {
+    throw UsageError("unknown suffix of --points \"" + parsed.input.string() +
+                     "\"; use .csv .mrk.json .fcsv .stl .obj .vtk");
   }
+  if (points_suffix(parsed.output) != form) {
+    throw UsageError("--points writes the form that it reads, " + form + ", not \"" + output +
+                     "\"; give the output the suffix " + form);
+  }
+  return parsed;
 }
 
-void PointsOption::write(const std::vector<std::filesystem::path>& staged) const {
-  for (std::size_t n = 0; n < pairs_.size(); ++n) pairs_[n].file->write(staged[n], pairs_[n].moved, pairs_[n].status);
+std::vector<PointsFile> read_points(const std::vector<PointsText>& texts) {
+  std::vector<PointsFile> files;
+  for (const PointsText& text : texts) files.emplace_back(text.input, text.told);
+  return files;
 }
 
-std::size_t PointsOption::Pair::outside() const {
-  return static_cast<std::size_t>(std::count(status.begin(), status.end(), PointStatus::outside));
+std::vector<MovedPoints> move_all_points(const std::vector<PointsFile>& files, const Geometry& output,
+                                         const FieldView& field, const Limits& limits, const Control& control) {
+  std::vector<MovedPoints> moved;
+  for (const PointsFile& file : files) {
+    MovedPoints& one = moved.emplace_back();
+    one.points = file.points();
+    one.status = move_points(output, field, one.points, limits, control);
+  }
+  return moved;
 }
 
-nlohmann::json PointsOption::to_json() const {
+void write_points(const std::vector<std::filesystem::path>& staged, const std::vector<PointsFile>& files,
+                  const std::vector<MovedPoints>& moved) {
+  for (std::size_t n = 0; n < files.size(); ++n) files[n].write(staged[n], moved[n].points, moved[n].status);
+}
+
+nlohmann::json points_json(const std::vector<PointsText>& texts, const std::vector<PointsFile>& files,
+                           const std::vector<MovedPoints>& moved) {
   nlohmann::json list = nlohmann::json::array();
-  for (const Pair& pair : pairs_) {
-    list.push_back({{"input", pair.input.string()},
-                    {"output", pair.output.string()},
-                    {"points", pair.moved.size()},
-                    {"outside", pair.outside()},
-                    {"frame", to_string(pair.file->frame())}});
+  for (std::size_t n = 0; n < texts.size(); ++n) {
+    list.push_back({{"input", texts[n].input.string()},
+                    {"output", texts[n].output.string()},
+                    {"points", moved[n].points.size()},
+                    {"outside", count_outside(moved[n])},
+                    {"frame", to_string(files[n].frame())}});
   }
   return list;
 }
 
-std::vector<std::string> PointsOption::notes() const {
+std::vector<std::string> notes_of(const std::vector<PointsText>& texts, const std::vector<PointsFile>& files,
+                                  const std::vector<MovedPoints>& moved) {
   std::vector<std::string> notes;
-  for (const Pair& pair : pairs_) {
-    notes.insert(notes.end(), pair.file->notes().begin(), pair.file->notes().end());
-    if (pair.outside() == 0) continue;
-    notes.push_back(std::to_string(pair.outside()) + " of " + std::to_string(pair.moved.size()) + " points of " +
-                    pair.input.string() + " lie outside the field's lattice and stay where they are");
+  for (std::size_t n = 0; n < texts.size(); ++n) {
+    notes.insert(notes.end(), files[n].notes().begin(), files[n].notes().end());
+    const std::size_t outside = count_outside(moved[n]);
+    if (outside == 0) continue;
+    notes.push_back(std::to_string(outside) + " of " + std::to_string(moved[n].points.size()) + " points of " +
+                    texts[n].input.string() + " lie outside the field's lattice and stay where they are");
   }
   return notes;
 }

@@ -22,8 +22,6 @@ namespace {
 /// more than this part of the volume away, the nearest contours are taken instead.
 constexpr double kThin = 0.1;
 
-std::filesystem::path input_of(const std::string& text) { return text.substr(0, text.find('=')); }
-
 /// Whether a place is in one of the voxels of a grid, or on the border of one.
 bool is_in_voxel(const AffineMap& index, const glm::i64vec3& size, const glm::dvec3& point) {
   const glm::dvec3 at = index(point), last(size - std::int64_t{1});
@@ -46,47 +44,23 @@ double volume_of(std::span<const Contour> contours, const Geometry& grid) try {
   return 0;
 }
 
-}  // namespace
-
-bool AlongStructures::is_one(const std::string& text) { return is_dicom_structure_set(input_of(text)); }
-
-AlongStructures::AlongStructures(const std::vector<std::string>& texts, bool series, OutputSet& outputs) {
-  for (const std::string& text : texts) {
-    Set& set = sets_.emplace_back();
-    set.input = input_of(text);
-    set.output = text.substr(std::min(text.find('='), text.size() - 1) + 1);
-    if (set.output.extension() != ".dcm") {
-      throw UsageError("--with \"" + text +
-                       "\" is an RT Structure Set, which is written as one; expected IN.dcm=OUT.dcm");
-    }
-    if (!series) {
-      throw UsageError(
-          "--with \"" + text +
-          "\" is an RT Structure Set, whose contours lie on slices of a DICOM series; name a folder as OUTPUT");
-    }
-    set.staged = outputs.add(set.output);
-  }
+/// Takes closed contours that stay in slices. @return whether they do
+bool take_moved(MovedRoi& roi, const ContourMover& mover, std::span<const Contour> contours, const Geometry& source,
+                const Geometry& output, Outside outside) {
+  auto moved = mover.move_within_slices(contours, source, outside);
+  if (!moved) return false;
+  roi.how = MovedRoi::How::points;
+  roi.beyond += count_beyond(*moved, output);
+  std::vector<Contour> closed;
+  for (MovedContour& one : *moved) closed.push_back(std::move(one.contour));
+  roi.volume_after = volume_of(closed, output);
+  std::move(closed.begin(), closed.end(), std::back_inserter(roi.contours));
+  return true;
 }
 
-void AlongStructures::read(const std::string& frame_of_reference_uid) {
-  for (Set& set : sets_) {
-    set.structures = read_structure_set(set.input);
-    set.sha256 = hash_file(set.input);
-    set.rois.resize(set.structures.structures.size());
-    for (const Structure& structure : set.structures.structures) {
-      const std::string& frame = structure.frame_of_reference_uid;
-      require(!frame.empty() && frame == frame_of_reference_uid,
-              "ROI " + std::to_string(structure.number) + " lies in the frame of reference " +
-                  (frame.empty() ? "(no UID)" : shown(frame)) + ", the series in " +
-                  (frame_of_reference_uid.empty() ? "(no UID)" : shown(frame_of_reference_uid)) + ", " +
-                  shown(set.input) + "; give a structure set that was drawn on the series");
-    }
-  }
-}
-
-void AlongStructures::move(Roi& roi, const Structure& structure, const PointMover* mover, const Geometry& source,
-                           const Geometry& output, Outside outside) {
-  const std::vector<Contour>& contours = structure.contours;
+/// Takes contours that are no closed ones, where it is known where they go.
+void take_open(MovedRoi& roi, std::span<const Contour> contours, const PointMover* mover, const Geometry& output,
+               Outside outside) {
   std::vector<MovedContour> moved;
   for (const Contour& contour : contours) {
     if (is_closed(contour.kind)) continue;
@@ -95,66 +69,78 @@ void AlongStructures::move(Roi& roi, const Structure& structure, const PointMove
     ++roi.left_out;
     if (mover) moved.pop_back();
   }
-  if (!moved.empty()) roi.how = How::points;
+  if (!moved.empty()) roi.how = MovedRoi::How::points;
   roi.beyond = count_beyond(moved, output);
-  for (MovedContour& one : moved) roi.moved.push_back(std::move(one.contour));
+  for (MovedContour& one : moved) roi.contours.push_back(std::move(one.contour));
+}
+
+}  // namespace
+
+std::vector<StructuresInput> read_structures(const std::vector<AlongStructuresText>& texts,
+                                             const std::string& frame_of_reference_uid) {
+  std::vector<StructuresInput> sets;
+  for (const AlongStructuresText& text : texts) {
+    const StructuresInput& set = sets.emplace_back(StructuresInput{text, {}, read_structure_set(text.input)});
+    sets.back().sha256 = hash_file(text.input);
+    for (const Structure& structure : set.structures.structures) {
+      const std::string& frame = structure.frame_of_reference_uid;
+      require(!frame.empty() && frame == frame_of_reference_uid,
+              "ROI " + std::to_string(structure.number) + " lies in the frame of reference " +
+                  (frame.empty() ? "(no UID)" : shown(frame)) + ", the series in " +
+                  (frame_of_reference_uid.empty() ? "(no UID)" : shown(frame_of_reference_uid)) + ", " +
+                  shown(text.input) + "; give a structure set that was drawn on the series");
+    }
+  }
+  return sets;
+}
+
+StructureMover::StructureMover(const std::vector<StructuresInput>& sets, const PointMover* mover,
+                               const Geometry& source, const Geometry& output, Outside outside, int threads)
+    : sets_(sets.size()), forward_(mover != nullptr), output_(output), outside_(outside), threads_(threads) {
+  for (std::size_t n = 0; n < sets.size(); ++n) {
+    const std::vector<Structure>& structures = sets[n].structures.structures;
+    sets_[n].resize(structures.size());
+    for_each_index(structures.size(), threads, {.stop = interrupt_token()},
+                   [&](std::size_t roi) { move(sets_[n][roi], structures[roi], mover, source); });
+  }
+}
+
+void StructureMover::move(Roi& roi, const Structure& structure, const PointMover* mover, const Geometry& source) const {
+  const std::vector<Contour>& contours = structure.contours;
+  take_open(roi.moved, contours, mover, output_, outside_);
   if (std::none_of(contours.begin(), contours.end(), [](const Contour& c) { return is_closed(c.kind); })) return;
-  roi.volume_before = volume_of(contours, source);
-  if (mover && take_moved(roi, ContourMover(*mover, output), contours, source, output, outside)) return;
+  roi.moved.volume_before = volume_of(contours, source);
+  if (mover && take_moved(roi.moved, ContourMover(*mover, output_), contours, source, output_, outside_)) return;
   try {
-    roi.reslicer.emplace(contours, source, output);
+    roi.reslicer.emplace(contours, source, output_);
   } catch (const InputError& error) {
-    roi.problem = error.what();
+    roi.moved.problem = error.what();
     return;
   }
-  roi.how = How::resliced;
-  roi.parts = roi.reslicer->solid().parts();
+  roi.moved.how = MovedRoi::How::resliced;
+  roi.moved.parts = roi.reslicer->solid().parts();
   if (!mover) return;
   std::vector<MovedContour> closed;
   for (const Contour& contour : contours)
-    if (is_closed(contour.kind)) closed.push_back(ContourMover(*mover, output).move(contour));
-  roi.beyond += count_beyond(closed, output);
+    if (is_closed(contour.kind)) closed.push_back(ContourMover(*mover, output_).move(contour));
+  roi.moved.beyond += count_beyond(closed, output_);
 }
 
-bool AlongStructures::take_moved(Roi& roi, const ContourMover& mover, std::span<const Contour> contours,
-                                 const Geometry& source, const Geometry& output, Outside outside) {
-  auto moved = mover.move_within_slices(contours, source, outside);
-  if (!moved) return false;
-  roi.how = How::points;
-  roi.beyond += count_beyond(*moved, output);
-  std::vector<Contour> closed;
-  for (MovedContour& one : *moved) closed.push_back(std::move(one.contour));
-  roi.volume_after = volume_of(closed, output);
-  std::move(closed.begin(), closed.end(), std::back_inserter(roi.moved));
-  return true;
-}
-
-void AlongStructures::move(const PointMover* mover, const Geometry& source, const Geometry& output, Outside outside,
-                           int threads) {
-  forward_ = mover != nullptr;
-  last_slice_ = output.size.z - 1;
-  for (Set& set : sets_) {
-    for_each_index(set.rois.size(), threads, {.stop = interrupt_token()}, [&](std::size_t n) {
-      move(set.rois[n], set.structures.structures[n], mover, source, output, outside);
-    });
-  }
-}
-
-bool AlongStructures::needs_inverse() const {
-  return std::any_of(sets_.begin(), sets_.end(), [](const Set& set) {
-    return std::any_of(set.rois.begin(), set.rois.end(), [](const Roi& roi) { return roi.reslicer.has_value(); });
+bool StructureMover::needs_inverse() const {
+  return std::any_of(sets_.begin(), sets_.end(), [](const std::vector<Roi>& set) {
+    return std::any_of(set.begin(), set.end(), [](const Roi& roi) { return roi.reslicer.has_value(); });
   });
 }
 
-void AlongStructures::reslice(const ConstVolumeView& inverse_mm, int threads) {
+void StructureMover::reslice(const ConstVolumeView& inverse_mm) {
   std::vector<Roi*> rois;
-  for (Set& set : sets_)
-    for (Roi& roi : set.rois)
+  for (std::vector<Roi>& set : sets_)
+    for (Roi& roi : set)
       if (roi.reslicer) rois.push_back(&roi);
   const auto [begin, end] = std::pair(inverse_mm.buffered.begin.z, inverse_mm.buffered.end.z);
   const auto slices = static_cast<std::size_t>(end - begin);
   std::vector<std::array<SlicedContours, 2>> sliced(rois.size() * slices);
-  for_each_index(sliced.size(), threads, {.stop = interrupt_token()}, [&, begin = begin](std::size_t n) {
+  for_each_index(sliced.size(), threads_, {.stop = interrupt_token()}, [&, begin = begin](std::size_t n) {
     sliced[n] = rois[n / slices]->reslicer->slice(inverse_mm, begin + static_cast<std::int64_t>(n % slices));
   });
   for (std::size_t n = 0; n < sliced.size(); ++n) {
@@ -168,85 +154,110 @@ void AlongStructures::reslice(const ConstVolumeView& inverse_mm, int threads) {
   }
 }
 
-void AlongStructures::finish() {
-  for (Set& set : sets_) {
-    for (Roi& roi : set.rois) {
-      if (!roi.reslicer) continue;
-      const double nearest = roi.drawn[static_cast<std::size_t>(Between::nearest)].volume;
-      const double interpolated = roi.drawn[static_cast<std::size_t>(Between::interpolated)].volume;
-      if (interpolated < (1 - kThin) * nearest) roi.between = Between::nearest;
-      Drawn& drawn = roi.drawn[static_cast<std::size_t>(roi.between)];
-      roi.volume_after = drawn.volume;
-      roi.cut = drawn.cut;
-      roi.at_end = !forward_ && std::any_of(drawn.contours.begin(), drawn.contours.end(), [&](const Contour& contour) {
-        return contour.slice == 0 || contour.slice == last_slice_;
-      });
-      std::move(drawn.contours.begin(), drawn.contours.end(), std::back_inserter(roi.moved));
-      roi.drawn = {};
-      roi.reslicer.reset();
+void StructureMover::finish(Roi& roi) const {
+  if (!roi.reslicer) return;
+  MovedRoi& moved = roi.moved;
+  const double nearest = roi.drawn[static_cast<std::size_t>(Between::nearest)].volume;
+  const double interpolated = roi.drawn[static_cast<std::size_t>(Between::interpolated)].volume;
+  if (interpolated < (1 - kThin) * nearest) moved.between = Between::nearest;
+  Drawn& drawn = roi.drawn[static_cast<std::size_t>(moved.between)];
+  moved.volume_after = drawn.volume;
+  moved.cut = drawn.cut;
+  const std::int64_t last_slice = output_.size.z - 1;
+  moved.at_end = !forward_ && std::any_of(drawn.contours.begin(), drawn.contours.end(), [&](const Contour& contour) {
+    return contour.slice == 0 || contour.slice == last_slice;
+  });
+  std::move(drawn.contours.begin(), drawn.contours.end(), std::back_inserter(moved.contours));
+}
+
+std::vector<MovedStructures> StructureMover::finish() && {
+  std::vector<MovedStructures> results;
+  for (std::vector<Roi>& set : sets_) {
+    MovedStructures& result = results.emplace_back();
+    for (Roi& roi : set) {
+      finish(roi);
+      result.push_back(std::move(roi.moved));
     }
   }
+  return results;
 }
 
-void AlongStructures::write(const DicomWriteReport& series, const DicomDerivation& derivation) {
-  for (Set& set : sets_) {
-    std::vector<std::vector<Contour>> moved;
-    for (Roi& roi : set.rois) moved.push_back(roi.moved);
-    set.written = write_structure_set(set.staged, set.structures, moved, series, derivation);
+std::vector<StructureWriteReport> write_structures(const std::vector<std::filesystem::path>& staged,
+                                                   const std::vector<StructuresInput>& sets,
+                                                   const std::vector<MovedStructures>& moved,
+                                                   const DicomWriteReport& series, const DicomDerivation& derivation) {
+  std::vector<StructureWriteReport> written;
+  for (std::size_t n = 0; n < sets.size(); ++n) {
+    std::vector<std::vector<Contour>> contours;
+    for (const MovedRoi& roi : moved[n]) contours.push_back(roi.contours);
+    written.push_back(write_structure_set(staged[n], sets[n].structures, contours, series, derivation));
   }
+  return written;
 }
 
-nlohmann::json AlongStructures::describe() const {
+namespace {
+
+const char* name_of(MovedRoi::How how) {
+  if (how == MovedRoi::How::points) return "points";
+  return how == MovedRoi::How::resliced ? "resliced" : "nothing";
+}
+
+nlohmann::json to_json(const MovedRoi& roi, const Structure& structure) {
   constexpr double kMillilitre = 1000;  // mm3
+  nlohmann::json one = {{"number", structure.number},
+                        {"moved", name_of(roi.how)},
+                        {"contours", {structure.contours.size(), roi.contours.size()}},
+                        {"volume_ml", {roi.volume_before / kMillilitre, roi.volume_after / kMillilitre}}};
+  if (roi.how == MovedRoi::How::resliced)
+    one["between_contours"] = roi.between == Between::interpolated ? "interpolated" : "nearest";
+  if (roi.parts > 1) one["parts"] = roi.parts;
+  if (roi.left_out > 0) one["contours_left_out"] = roi.left_out;
+  if (roi.beyond > 0) one["contours_beyond_output"] = roi.beyond;
+  if (roi.cut) one["cut"] = true;
+  if (roi.at_end) one["at_end"] = true;
+  if (!roi.problem.empty()) one["problem"] = roi.problem;
+  return one;
+}
+
+void add_notes(const MovedRoi& roi, const Structure& structure, const std::filesystem::path& input,
+               std::vector<std::string>& notes) {
+  const std::string name = "ROI " + std::to_string(structure.number) + " of " + shown(input);
+  const std::string of = " of " + std::to_string(structure.contours.size()) + " contours of " + name;
+  if (!roi.problem.empty()) notes.push_back(name + " is left empty: " + roi.problem);
+  if (roi.left_out > 0)
+    notes.push_back(std::to_string(roi.left_out) + of + " are left out: the field does not say where they go");
+  if (roi.beyond > 0) notes.push_back(std::to_string(roi.beyond) + of + " come to lie beyond the output");
+  if (roi.cut) notes.push_back(name + " is cut off where the output ends or the field maps nothing");
+  if (roi.at_end)
+    notes.push_back(name + " reaches the first or the last slice; a pull field does not say what is beyond");
+  if (roi.how == MovedRoi::How::resliced && roi.contours.empty())
+    notes.push_back(name + " has no contour in the output");
+}
+
+}  // namespace
+
+nlohmann::json structures_json(const std::vector<StructuresInput>& sets, const std::vector<MovedStructures>& moved,
+                               const std::vector<StructureWriteReport>& written) {
   nlohmann::json list = nlohmann::json::array();
-  for (const Set& set : sets_) {
+  for (std::size_t n = 0; n < sets.size(); ++n) {
     nlohmann::json rois = nlohmann::json::array();
-    for (std::size_t n = 0; n < set.rois.size(); ++n) {
-      const Roi& roi = set.rois[n];
-      const Structure& structure = set.structures.structures[n];
-      nlohmann::json one = {
-          {"number", structure.number},
-          {"moved", roi.how == How::points ? "points" : (roi.how == How::resliced ? "resliced" : "nothing")},
-          {"contours", {structure.contours.size(), roi.moved.size()}},
-          {"volume_ml", {roi.volume_before / kMillilitre, roi.volume_after / kMillilitre}}};
-      if (roi.how == How::resliced)
-        one["between_contours"] = roi.between == Between::interpolated ? "interpolated" : "nearest";
-      if (roi.parts > 1) one["parts"] = roi.parts;
-      if (roi.left_out > 0) one["contours_left_out"] = roi.left_out;
-      if (roi.beyond > 0) one["contours_beyond_output"] = roi.beyond;
-      if (roi.cut) one["cut"] = true;
-      if (roi.at_end) one["at_end"] = true;
-      if (!roi.problem.empty()) one["problem"] = roi.problem;
-      rois.push_back(std::move(one));
-    }
-    list.push_back({{"input", set.input.string()},
-                    {"sha256", set.sha256},
-                    {"output", set.output.string()},
-                    {"series_instance_uid", set.written.series_uid},
-                    {"sop_instance_uid", set.written.sop_instance_uid},
+    for (std::size_t roi = 0; roi < moved[n].size(); ++roi)
+      rois.push_back(to_json(moved[n][roi], sets[n].structures.structures[roi]));
+    list.push_back({{"input", sets[n].text.input.string()},
+                    {"sha256", sets[n].sha256},
+                    {"output", sets[n].text.output.string()},
+                    {"series_instance_uid", written[n].series_uid},
+                    {"sop_instance_uid", written[n].sop_instance_uid},
                     {"rois", std::move(rois)}});
   }
   return list;
 }
 
-std::vector<std::string> AlongStructures::notes() const {
+std::vector<std::string> notes_of(const std::vector<StructuresInput>& sets, const std::vector<MovedStructures>& moved) {
   std::vector<std::string> notes;
-  for (const Set& set : sets_) {
-    for (std::size_t n = 0; n < set.rois.size(); ++n) {
-      const Roi& roi = set.rois[n];
-      const Structure& structure = set.structures.structures[n];
-      const std::string name = "ROI " + std::to_string(structure.number) + " of " + shown(set.input);
-      const std::string of = " of " + std::to_string(structure.contours.size()) + " contours of " + name;
-      if (!roi.problem.empty()) notes.push_back(name + " is left empty: " + roi.problem);
-      if (roi.left_out > 0)
-        notes.push_back(std::to_string(roi.left_out) + of + " are left out: the field does not say where they go");
-      if (roi.beyond > 0) notes.push_back(std::to_string(roi.beyond) + of + " come to lie beyond the output");
-      if (roi.cut) notes.push_back(name + " is cut off where the output ends or the field maps nothing");
-      if (roi.at_end) {
-        notes.push_back(name + " reaches the first or the last slice; a pull field does not say what is beyond");
-      }
-      if (roi.how == How::resliced && roi.moved.empty()) notes.push_back(name + " has no contour in the output");
-    }
+  for (std::size_t n = 0; n < sets.size(); ++n) {
+    for (std::size_t roi = 0; roi < moved[n].size(); ++roi)
+      add_notes(moved[n][roi], sets[n].structures.structures[roi], sets[n].text.input, notes);
   }
   return notes;
 }

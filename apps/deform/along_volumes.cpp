@@ -4,212 +4,186 @@
 #include "apps/deform/along_volumes.h"
 
 #include <algorithm>
-#include <charconv>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "apps/deform/map_outputs.h"
 #include "io/image_file.h"
 
 namespace tetwarp::apps {
 
 namespace {
 
-constexpr char kForm[] = "expected IN=OUT[:nearest|linear|cubic|vote][:background=V][:own]";
-
-std::vector<std::string> split(const std::string& text, char at) {
-  std::vector<std::string> parts(1);
-  for (const char c : text) {
-    if (c == at) {
-      parts.emplace_back();
-    } else {
-      parts.back() += c;
-    }
+/// @throws UsageError, InputError for a DICOM object that cannot be written, or lies in another space than INPUT
+/// @return a note, where INPUT does not say in which it lies
+std::optional<std::string> check_object(const AlongHeader& one, const InputHeader& input) {
+  if (!is_object_output(one.text.output)) return std::nullopt;
+  const std::filesystem::path& path = one.text.input.path;
+  if (!one.segmentation && !one.header.dose) {
+    throw UsageError("only an RTDOSE or a SEG can be written as a DICOM object, not " + path.string() +
+                     "; name the output .nii.gz, .nii, .nrrd or .mha");
   }
-  return parts;
+  const std::string frame =
+      one.segmentation ? one.segmentation->frame_of_reference_uid : read_dose_header(path).frame_of_reference_uid;
+  return compare_frames(path, frame, input);
 }
 
-std::optional<double> number(std::string_view text) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return {};
-  return value;
-}
-
-/// Reads one option that follows OUT. @return whether it is one
-bool read_option(std::string_view text, AlongOptions& options) {
-  constexpr std::string_view kBackground = "background=";
-  const auto is_first = [](bool given, const char* what) {
-    if (given) throw UsageError(std::string("--with has two of ") + what + "; " + kForm);
-  };
-  if (text == "own") {
-    options.own = true;
-  } else if (text.starts_with(kBackground)) {
-    is_first(options.background.has_value(), "background=");
-    options.background = number(text.substr(kBackground.size()));
-    return options.background.has_value();
+AlongHeader open_one(const AlongVolumeText& text, const InputHeader& input) {
+  AlongHeader one{text, {}, {}, {}};
+  refuse_pipes(text.input.path);
+  if (text.segmentation) {
+    one.segmentation = open_segmentation(text, input);
+    one.header = {one.segmentation->geometry, VoxelType::u8, {}, false, 1};
   } else {
-    is_first(options.interpolation.has_value(), "nearest, linear, cubic and vote");
-    options.interpolation = interpolation_named(text);
-    return options.interpolation.has_value();
+    one.header = open_input(text.input, {.stop = interrupt_token()}, true);
   }
-  return true;
+  one.own_grid = one.segmentation ? own_grid(*one.segmentation, input.geometry) : straightened(one.header.geometry);
+  if (text.background && !fits(one.header.type, *text.background)) {
+    throw UsageError("background=" + nlohmann::json(*text.background).dump() + " does not fit the voxels, " +
+                     to_string(one.header.type) + ", " + text.input.path.string() + "; choose a value in their range");
+  }
+  return one;
 }
 
 }  // namespace
 
-AlongOptions parse_along(const std::string& text) {
-  const std::size_t equals = text.find('=');
-  if (equals == 0 || equals == std::string::npos) throw UsageError("--with \"" + text + "\" names no output; " + kForm);
-  AlongOptions options;
-  options.input.path = text.substr(0, equals);
-  const std::vector<std::string> parts = split(text.substr(equals + 1), ':');
-  options.output = parts.front();
-  for (auto part = parts.begin() + 1; part != parts.end(); ++part) {
-    if (!read_option(*part, options)) {
-      throw UsageError("unknown option \"" + *part + "\" of --with \"" + text + "\"; " + kForm);
-    }
+AlongHeaders open_along(const std::vector<AlongVolumeText>& texts, const InputHeader& input) {
+  AlongHeaders opened;
+  for (const AlongVolumeText& text : texts) {
+    const AlongHeader& one = opened.volumes.emplace_back(open_one(text, input));
+    opened.notes.insert(opened.notes.end(), one.header.notes.begin(), one.header.notes.end());
+    if (const auto note = check_object(one, input)) opened.notes.push_back(*note);
   }
-  if (options.output.empty()) throw UsageError("--with \"" + text + "\" names no output; " + kForm);
-  if (!is_object_output(options.output)) require_image_suffix(options.output, "an output of --with");
-  return options;
+  return opened;
 }
 
-AlongVolumes::AlongVolumes(const std::vector<std::string>& texts, bool series, NiftiFrame frame, OutputSet& outputs) {
-  for (const std::string& text : texts) {
-    One& one = volumes_.emplace_back();
-    one.options = parse_along(text);
-    one.options.input.nifti_frame = frame;
-    if (!series && is_object_output(one.options.output)) {
-      throw UsageError("a DICOM object refers to a DICOM series, " + one.options.output.string() +
-                       "; name a folder as OUTPUT, or .nii.gz, .nii, .nrrd or .mha here");
-    }
-    one.staged = outputs.add(one.options.output);
-  }
-}
-
-void AlongVolumes::open(const InputHeader& input) {
-  for (One& one : volumes_) {
-    const std::filesystem::path& path = one.options.input.path;
-    refuse_pipes(path);
-    if (is_dicom_segmentation(path)) {
-      one.segmentation = open_segmentation(one.options, input);
-      one.header = {one.segmentation->geometry, VoxelType::u8, {}, false, 1};
-    } else {
-      one.header = open_input(one.options.input, {.stop = interrupt_token()}, true);
-      notes_.insert(notes_.end(), one.header.notes.begin(), one.header.notes.end());
-    }
-    one.own_grid = one.segmentation ? own_grid(*one.segmentation, input.geometry) : straightened(one.header.geometry);
-    if (one.options.background && !fits(one.header.type, *one.options.background)) {
-      throw UsageError("background=" + nlohmann::json(*one.options.background).dump() + " does not fit the voxels, " +
-                       to_string(one.header.type) + ", " + path.string() + "; choose a value in their range");
-    }
-    if (!is_object_output(one.options.output)) continue;
-    if (!one.segmentation && !one.header.dose) {
-      throw UsageError("only an RTDOSE or a SEG can be written as a DICOM object, not " + path.string() +
-                       "; name the output .nii.gz, .nii, .nrrd or .mha");
-    }
-    const std::string frame =
-        one.segmentation ? one.segmentation->frame_of_reference_uid : read_dose_header(path).frame_of_reference_uid;
-    if (const auto note = compare_frames(path, frame, input)) notes_.push_back(*note);
-  }
-}
-
-std::uint64_t AlongVolumes::bytes(std::uint64_t output_voxels) const {
+std::uint64_t along_bytes(const std::vector<AlongHeader>& headers, std::uint64_t output_voxels) {
   std::uint64_t bytes = 0;
-  for (const One& one : volumes_) {
+  for (const AlongHeader& one : headers) {
     const auto voxels = static_cast<std::uint64_t>(voxel_count(one.header.geometry)),
-               results = one.options.own ? static_cast<std::uint64_t>(voxel_count(one.own_grid)) : output_voxels;
+               results = one.text.own ? static_cast<std::uint64_t>(voxel_count(one.own_grid)) : output_voxels;
     const std::uint64_t volumes = one.segmentation ? one.segmentation->segments.size() : 1;
     bytes +=
         size_bytes(one.header.type) * static_cast<std::uint64_t>(one.header.components) * volumes * (voxels + results);
-    if (is_object_output(one.options.output) && one.header.dose) bytes += sizeof(std::int32_t) * results;
+    if (is_object_output(one.text.output) && one.header.dose) bytes += sizeof(std::int32_t) * results;
   }
   return bytes;
 }
 
-void AlongVolumes::read(const CommonOptions& common, const Control& control) {
-  for (One& one : volumes_) {
+std::vector<AlongInput> read_along(const std::vector<AlongHeader>& headers, const CommonOptions& common,
+                                   const Control& control) {
+  std::vector<AlongInput> inputs;
+  for (const AlongHeader& one : headers) {
+    AlongInput& input = inputs.emplace_back();
+    const std::filesystem::path& path = one.text.input.path;
+    std::optional<DicomVolume> dicom;
     if (one.segmentation) {
-      one.sources = read_segments(one.options.input.path, *one.segmentation);
+      input.sources = read_segments(path, *one.segmentation);
     } else {
-      one.input = read_input(one.options.input, one.header, common, control);
-      one.sources.push_back(std::move(one.input.volume));
+      InputVolume read = read_input(one.text.input, one.header, common, control);
+      input.sources.push_back(std::move(read.volume));
+      input.background = read.background;
+      dicom = std::move(read.dicom);
     }
-    if (is_object_output(one.options.output)) one.input.background = 0;
-    one.sha256 = one.input.is_dicom() ? one.input.dicom->sha256 : hash_file(one.options.input.path);
+    if (is_object_output(one.text.output)) input.background = 0;
+    if (dicom) input.padding = dicom->padding;
+    input.sha256 = dicom ? dicom->sha256 : hash_file(path);
   }
+  return inputs;
 }
 
-std::vector<Geometry> AlongVolumes::own_grids() const {
+std::vector<Geometry> own_grids_of(const std::vector<AlongHeader>& headers) {
   std::vector<Geometry> grids;
-  for (const One& one : volumes_) {
-    if (one.options.own && std::find(grids.begin(), grids.end(), one.own_grid) == grids.end())
+  for (const AlongHeader& one : headers) {
+    if (one.text.own && std::find(grids.begin(), grids.end(), one.own_grid) == grids.end())
       grids.push_back(one.own_grid);
   }
   return grids;
 }
 
-std::vector<Target> AlongVolumes::targets_on(const Geometry& grid, bool own, Interpolation otherwise) {
-  std::vector<Target> targets;
-  for (One& one : volumes_) {
-    if (one.options.own != own || (own && one.own_grid != grid)) continue;
+std::vector<AlongResult> make_along_results(const std::vector<AlongHeader>& headers,
+                                            const std::vector<AlongInput>& inputs, const Geometry& output,
+                                            Interpolation otherwise) {
+  std::vector<AlongResult> results;
+  for (std::size_t n = 0; n < headers.size(); ++n) {
+    const AlongHeader& one = headers[n];
     const Interpolation usual = one.segmentation ? usual_interpolation(*one.segmentation) : otherwise;
-    const std::size_t first = targets.size();
-    for (const AnyVolume& source : one.sources) one.outputs.emplace_back(grid, source.type(), source.components());
-    for (std::size_t n = 0; n < one.sources.size(); ++n) {
-      targets.push_back({.source = std::as_const(one.sources[n]).view(),
-                         .output = one.outputs[n].view(),
-                         .interpolation = one.options.interpolation.value_or(usual),
-                         .background = one.options.background.value_or(one.input.background),
-                         .padding = one.input.is_dicom() ? one.input.dicom->padding : std::nullopt});
+    AlongResult& result = results.emplace_back();
+    result.interpolation = one.text.interpolation.value_or(usual);
+    result.background = one.text.background.value_or(inputs[n].background);
+    for (const AnyVolume& source : inputs[n].sources)
+      result.outputs.emplace_back(one.text.own ? one.own_grid : output, source.type(), source.components());
+  }
+  return results;
+}
+
+std::vector<Target> along_targets(const std::vector<AlongHeader>& headers, const std::vector<AlongInput>& inputs,
+                                  std::vector<AlongResult>& results, const Geometry& grid, bool own) {
+  std::vector<Target> targets;
+  for (std::size_t n = 0; n < headers.size(); ++n) {
+    if (headers[n].text.own != own || (own && headers[n].own_grid != grid)) continue;
+    for (std::size_t part = 0; part < inputs[n].sources.size(); ++part) {
+      targets.push_back({.source = inputs[n].sources[part].view(),
+                         .output = results[n].outputs[part].view(),
+                         .interpolation = results[n].interpolation,
+                         .background = results[n].background,
+                         .padding = inputs[n].padding});
     }
-    one.target = targets[first];
   }
   return targets;
 }
 
-void AlongVolumes::write_object(One& one, const DerivedOutput& series) {
-  const DicomAlong along = along_with(one.options, one.sha256, one.target, series);
-  if (!one.segmentation) {
-    one.dose_report = write_derived_dose(one.staged, std::as_const(one.outputs.front()).view(), along, series.written);
-    return;
-  }
+namespace {
+
+AlongWritten write_object(const std::filesystem::path& staged, const AlongHeader& one, const AlongInput& input,
+                          const AlongResult& result, const DerivedOutput& series) {
+  const DicomAlong along = along_with(one.text, input.sha256, result.interpolation, result.background, series);
+  if (!one.segmentation) return {write_derived_dose(staged, result.outputs.front().view(), along, series.written), {}};
   std::vector<ConstVolumeView> segments;
-  for (const AnyVolume& output : one.outputs) segments.push_back(output.view());
-  one.segmentation_report = write_derived_segmentation(one.staged, segments, *one.segmentation, along, series.written);
-  if (one.segmentation_report->empty) {
-    notes_.push_back("nothing is left of the segments of " + one.options.input.path.string() + ", " +
-                     one.options.output.string() + " has one empty frame");
-  }
+  for (const AnyVolume& output : result.outputs) segments.push_back(output.view());
+  return {{}, write_derived_segmentation(staged, segments, *one.segmentation, along, series.written)};
 }
 
-void AlongVolumes::write(const std::optional<int>& compression, const std::string& descrip,
-                         const std::optional<DerivedOutput>& series) {
-  for (One& one : volumes_) {
-    if (is_object_output(one.options.output)) {
-      write_object(one, series.value());
-      continue;
-    }
-    write_image(one.staged, std::as_const(one.outputs.front()).view(),
-                {.compression = compression.value_or(-1), .metadata = {{"descrip", descrip}}});
+}  // namespace
+
+std::vector<AlongWritten> write_along(const std::vector<std::filesystem::path>& staged,
+                                      const std::vector<AlongHeader>& headers, const std::vector<AlongInput>& inputs,
+                                      const std::vector<AlongResult>& results, const ImageWriteOptions& how,
+                                      const std::optional<DerivedOutput>& series) {
+  std::vector<AlongWritten> written(headers.size());
+  for (std::size_t n = 0; n < headers.size(); ++n) {
+    if (is_object_output(headers[n].text.output))
+      written[n] = write_object(staged[n], headers[n], inputs[n], results[n], series.value());
+    else
+      write_image(staged[n], results[n].outputs.front().view(), how);
   }
+  return written;
 }
 
-nlohmann::json AlongVolumes::describe() const {
+nlohmann::json along_json(const std::vector<AlongHeader>& headers, const std::vector<AlongInput>& inputs,
+                          const std::vector<AlongResult>& results, const std::vector<AlongWritten>& written) {
   nlohmann::json list = nlohmann::json::array();
-  for (const One& one : volumes_) {
-    list.push_back({{"input", one.options.input.path.string()},
-                    {"sha256", one.sha256},
-                    {"output", one.options.output.string()},
-                    {"grid", one.options.own ? "own" : "output"},
+  for (std::size_t n = 0; n < headers.size(); ++n) {
+    const AlongHeader& one = headers[n];
+    list.push_back({{"input", one.text.input.path.string()},
+                    {"sha256", inputs[n].sha256},
+                    {"output", one.text.output.string()},
+                    {"grid", one.text.own ? "own" : "output"},
                     {"voxel_type", to_string(one.header.type)},
-                    {"interpolation", name_of(one.target.interpolation)},
-                    {"background", one.target.background}});
-    if (one.dose_report) list.back()["dicom"] = to_json(*one.dose_report);
-    if (one.segmentation_report) list.back()["dicom"] = to_json(*one.segmentation_report, *one.segmentation);
+                    {"interpolation", name_of(results[n].interpolation)},
+                    {"background", results[n].background}});
+    if (written[n].dose) list.back()["dicom"] = to_json(*written[n].dose);
+    if (written[n].segmentation) list.back()["dicom"] = to_json(*written[n].segmentation, *one.segmentation);
   }
   return list;
+}
+
+std::vector<std::string> notes_of(const std::vector<AlongHeader>& headers, const std::vector<AlongWritten>& written) {
+  std::vector<std::string> notes;
+  for (std::size_t n = 0; n < headers.size(); ++n) {
+    if (!written[n].segmentation || !written[n].segmentation->empty) continue;
+    notes.push_back("nothing is left of the segments of " + headers[n].text.input.path.string() + ", " +
+                    headers[n].text.output.string() + " has one empty frame");
+  }
+  return notes;
 }
 
 }  // namespace tetwarp::apps

@@ -3,64 +3,85 @@
 
 #pragma once
 
-#include <deque>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
 #include "apps/cli/input.h"
-#include "apps/cli/options.h"
-#include "apps/cli/output.h"
 #include "apps/deform/along_dicom.h"
 
 namespace tetwarp::apps {
 
-/// @throws UsageError for a text that is not IN=OUT[:nearest|linear|cubic|vote][:background=V][:own]
-AlongOptions parse_along(const std::string& text);
+// Volumes that go along with INPUT through the field: labels, doses, other modalities. Each stage of a run has a value
+// for each of them, in the order of their texts.
 
-/// Volumes that go through the same field as INPUT: labels, doses, other modalities.
-class AlongVolumes {
- public:
-  /// Begins their outputs. @param series  whether OUTPUT is a DICOM series, to which DICOM objects can refer
-  /// @throws UsageError, and what OutputSet::add throws
-  AlongVolumes(const std::vector<std::string>& texts, bool series, NiftiFrame frame, OutputSet& outputs);
-
-  /// Reads their headers. @throws UsageError, InputError for what does not go with its output or with INPUT
-  void open(const InputHeader& input);
-  /// Memory of the volumes and of their outputs, the latter with `output_voxels` voxels each.
-  std::uint64_t bytes(std::uint64_t output_voxels) const;
-  void read(const CommonOptions& common, const Control& control);
-
-  /// Grids of their own that volumes go back onto, each once.
-  std::vector<Geometry> own_grids() const;
-  /// Targets of the volumes that go onto a grid: with `own`, those that keep their own grid, otherwise the others. The
-  /// targets refer to this object.
-  std::vector<Target> targets_on(const Geometry& grid, bool own, Interpolation otherwise);
-  /// @param series  as it was written, and how: where OUTPUT is one
-  void write(const std::optional<int>& compression, const std::string& descrip,
-             const std::optional<DerivedOutput>& series);
-  nlohmann::json describe() const;
-  /// What people should know.
-  const std::vector<std::string>& notes() const { return notes_; }
-
- private:
-  struct One {
-    AlongOptions options;
-    std::filesystem::path staged;
-    InputHeader header;
-    std::optional<DicomSegmentation> segmentation;
-    Geometry own_grid;
-    InputVolume input;                        ///< its volume is the only source, or there is none
-    std::vector<AnyVolume> sources, outputs;  ///< of a segmentation one each segment, else one
-    std::string sha256;
-    Target target;  ///< of the first
-    std::optional<DoseReport> dose_report;
-    std::optional<SegmentationReport> segmentation_report;
-  };
-  void write_object(One& one, const DerivedOutput& series);
-
-  std::deque<One> volumes_;
-  std::vector<std::string> notes_;
+/// What is known of one from its header.
+struct AlongHeader {
+  AlongVolumeText text;
+  InputHeader header;
+  std::optional<DicomSegmentation> segmentation;
+  Geometry own_grid;
 };
+/// Those of a run, with what people should know.
+struct AlongHeaders {
+  std::vector<AlongHeader> volumes;
+  std::vector<std::string> notes;
+};
+
+/// The voxels of one.
+struct AlongInput {
+  std::vector<AnyVolume> sources;       ///< of a segmentation one each segment, else one
+  std::optional<PaddingRange> padding;  ///< of a DICOM series
+  double background = 0;
+  std::string sha256;
+};
+
+/// One as it came out of the field.
+struct AlongResult {
+  std::vector<AnyVolume> outputs;  ///< one each source
+  Interpolation interpolation = Interpolation::linear;
+  double background = 0;
+};
+
+/// What was written of one, if it is a DICOM object.
+struct AlongWritten {
+  std::optional<DoseReport> dose;
+  std::optional<SegmentationReport> segmentation;
+};
+
+/// Reads headers. @throws UsageError, InputError for what does not go with its output or with INPUT
+AlongHeaders open_along(const std::vector<AlongVolumeText>& texts, const InputHeader& input);
+
+/// Memory of volumes and of their outputs, the latter with `output_voxels` voxels each.
+std::uint64_t along_bytes(const std::vector<AlongHeader>& headers, std::uint64_t output_voxels);
+
+std::vector<AlongInput> read_along(const std::vector<AlongHeader>& headers, const CommonOptions& common,
+                                   const Control& control);
+
+/// Grids of their own that volumes go back onto, each once.
+std::vector<Geometry> own_grids_of(const std::vector<AlongHeader>& headers);
+
+/// Room for what comes out. @param output  grid of OUTPUT
+/// @param otherwise  interpolation of a volume that has none of its own
+std::vector<AlongResult> make_along_results(const std::vector<AlongHeader>& headers,
+                                            const std::vector<AlongInput>& inputs, const Geometry& output,
+                                            Interpolation otherwise);
+
+/// Targets of the volumes that go onto a grid: OUTPUT's, or one of `own_grids_of`. They refer to inputs and results.
+std::vector<Target> along_targets(const std::vector<AlongHeader>& headers, const std::vector<AlongInput>& inputs,
+                                  std::vector<AlongResult>& results, const Geometry& grid, bool own);
+
+/// @param staged  where each is written
+/// @param series  OUTPUT as it was written, and how: where it is a series
+std::vector<AlongWritten> write_along(const std::vector<std::filesystem::path>& staged,
+                                      const std::vector<AlongHeader>& headers, const std::vector<AlongInput>& inputs,
+                                      const std::vector<AlongResult>& results, const ImageWriteOptions& how,
+                                      const std::optional<DerivedOutput>& series);
+
+/// "with" of sidecar and report.
+nlohmann::json along_json(const std::vector<AlongHeader>& headers, const std::vector<AlongInput>& inputs,
+                          const std::vector<AlongResult>& results, const std::vector<AlongWritten>& written);
+/// What people should know of what was written.
+std::vector<std::string> notes_of(const std::vector<AlongHeader>& headers, const std::vector<AlongWritten>& written);
 
 }  // namespace tetwarp::apps
