@@ -3,6 +3,7 @@
 
 #include "deform/resampler.h"
 
+#include "deform/fields/lattice_mesh.h"
 #include "deform/snapped_mesh.h"
 
 namespace tetwarp {
@@ -20,8 +21,7 @@ void require_one_each(const Geometry& grid, std::size_t vectors) {
 FieldView view(const VertexField& field, Outside outside) {
   require_one_each(field.mesh);
   if (!field.mesh.is_empty() && field.replaced.empty()) {
-    const bool of_lattice = !field.mesh.lattice_vertex.empty() && field.lattice.size.x != 0;
-    return {.lattice = of_lattice ? &field.lattice : nullptr, .outside = outside, .mesh = &field.mesh};
+    return {.lattice = has_lattice_vertices(field) ? &field.lattice : nullptr, .outside = outside, .mesh = &field.mesh};
   }
   require_one_each(field.lattice, field.displacement.size());
   if (field.replaced.empty()) return {&field.lattice, field.displacement.data(), outside, Memory::host};

@@ -126,14 +126,13 @@ void require_fitting_arrays(const TetrahedralMesh& mesh, const Geometry* lattice
 
 SnappedMesh snap_mesh(const Geometry& output, const FieldView& field, const Control& control) {
   SnappedMesh snapped;
-  const bool is_cut = !field.replaced.empty();
-  require(is_cut || field.mesh, "the field is empty");
-  TetrahedralMesh whole = is_cut ? mesh_of(field) : TetrahedralMesh{};
-  const TetrahedralMesh& mesh = is_cut ? whole : *field.mesh;
+  std::optional<TetrahedralMesh> cut = mesh_of_cut(field);
+  require(cut || field.mesh, "the field is empty");
+  const TetrahedralMesh& mesh = cut ? *cut : *field.mesh;
   require(!mesh.tetrahedra.empty(), "the mesh has no tetrahedra");
   require_fitting_arrays(mesh, field.lattice);
-  if (is_cut) snapped.made = std::make_shared<const std::vector<glm::u32vec4>>(std::move(whole.tetrahedra));
-  snapped.tetrahedra = is_cut ? *snapped.made : mesh.tetrahedra;
+  if (cut) snapped.made = std::make_shared<const std::vector<glm::u32vec4>>(std::move(cut->tetrahedra));
+  snapped.tetrahedra = cut ? *snapped.made : mesh.tetrahedra;
   snapped.vertices.resize(mesh.rest.size());
   const VertexSnapper snapper(output, mesh, field);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.rest.size(), kGrain), [&](const auto& range) {

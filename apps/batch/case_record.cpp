@@ -68,7 +68,7 @@ json line_of(const BatchCase& of, const std::string& status) {
 
 }  // namespace
 
-json case_identity(const BatchCase& of, const std::string& input_sha256, const std::vector<std::string>& further) {
+json case_identity(const BatchCase& of, const std::string& input_sha256, const std::vector<std::string>& others) {
   json identity = {{"program", version()}};
   const auto add = [&](const char* name, const std::vector<std::string>& values) {
     Sha256 hash;
@@ -79,7 +79,7 @@ json case_identity(const BatchCase& of, const std::string& input_sha256, const s
   };
   add("row", of.row);
   add("input", {input_sha256});
-  add("further", further);
+  add("further", others);
   return identity;
 }
 
@@ -105,19 +105,19 @@ json with_current_paths(json line, const BatchCase& of) {
 
 }  // namespace
 
-Record record_case(const BatchCase& of, const Deformation& made, const std::vector<std::string>& further) {
-  const DeformRecord& record = made.record();
-  const fs::path& folder = record.outputs.set.folder();
-  const json files = files_of(folder), told = sidecar(record);
+Record record_case(const BatchCase& of, const DeformOutputs& outputs, const DeformRun& run,
+                   const DeformWritten& written, const std::vector<std::string>& others) {
+  const fs::path& folder = outputs.set.folder();
+  const json files = files_of(folder), told = sidecar(run, written);
   json line = line_of(of, "done");
   if (!hides(of)) line["input"] = told["input"];
-  line["field"] = {{"sha256", record.field_sha256}, {"direction", told["field"]["direction"]}};
+  line["field"] = {{"sha256", run.field.sha256}, {"direction", told["field"]["direction"]}};
   line["report"] = told["report"];
   line["outputs"] = outputs_of(files, of.id);
-  line["notes"] = made.notes();
+  line["notes"] = notes_of(run, written);
   write_json(folder / kFolderRecord,
              Record::of(hides(of), {{"case", of.id},
-                                    {"identity", case_identity(of, record.input_sha256, further)},
+                                    {"identity", case_identity(of, written.input_sha256, others)},
                                     {"result", line},
                                     {"files", files}}));
   return Record::of(hides(of), line);
@@ -139,8 +139,8 @@ std::optional<json> finished_line(const BatchCase& of, const fs::path& folder, s
   }
   try {
     const int threads = of.options.common.threads;
-    const json identity =
-        case_identity(of, hash_volume(of.options.input, threads), further_reads_of(of.options).digests(threads));
+    const Reads others = other_reads_of(of.options, parse_sources(of.options));
+    const json identity = case_identity(of, hash_volume(of.options.input, threads), others.digests(threads));
     why = difference(identity, record.value("identity", json()));
     if (why.empty() && files_of(folder) != record["files"]) why = "the outputs are not as they were written";
   } catch (const Cancelled&) {

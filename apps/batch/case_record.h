@@ -9,22 +9,24 @@
 #include <string>
 
 #include "apps/batch/manifest.h"
-#include "apps/deform/deformation.h"
+#include "apps/deform/deform_outputs.h"
+#include "apps/deform/deform_report.h"
 
 namespace tetwarp::apps {
 
 /// What decides a case, a digest each: "program", its "row" wherever manifest and OUTPUT_DIR lie, the bytes of its
-/// "input" and of all that it reads "further". Of a de-identified case the key goes in too, so that nobody without it
-/// can find the source by trying.
+/// "input" and of all the others that it reads, "further". Of a de-identified case the key goes in too, so that nobody
+/// without it can find the source by trying.
 /// @param input_sha256  of INPUT, as sidecars give it
-/// @param further  Reads::digests of further_reads_of
+/// @param others  Reads::digests of what is read other than INPUT
 nlohmann::json case_identity(const BatchCase& of, const std::string& input_sha256,
-                             const std::vector<std::string>& further);
+                             const std::vector<std::string>& others);
 
 /// A line of results.jsonl for a case that is written but has no name yet: what it was made of, and what came out. The
 /// folder's record, kFolderRecord, is written beside the outputs. No clock.
-/// @param further  as of case_identity, found before anything was read: what changes meanwhile makes another case
-Record record_case(const BatchCase& of, const Deformation& made, const std::vector<std::string>& further);
+/// @param others  as of case_identity, found before anything was read: what changes meanwhile makes another case
+Record record_case(const BatchCase& of, const DeformOutputs& outputs, const DeformRun& run,
+                   const DeformWritten& written, const std::vector<std::string>& others);
 
 /// A line for a case that came to nothing. @param status  failed or refused
 /// @param kind  what a de-identified case says instead of the reason

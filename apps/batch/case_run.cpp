@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "apps/batch/case_record.h"
-#include "apps/cli/reads.h"
+#include "apps/deform/deform_write.h"
 #include "backend/devices.h"
 #include "io/opened_file.h"
 
@@ -40,7 +40,43 @@ struct Retry {
   std::vector<std::string> reasons;
 };
 
-bool is_simulated_on_device(const DeformOptions& options) { return !options.scenario.empty(); }
+/// What a case needs to be resampled, as far as it needs no device.
+struct Prepared {
+  const DeformRequest& request;
+  const DeformPlan& plan;
+  const DeformHeaders& headers;
+  const DeformInputs& inputs;
+  std::optional<DeformField>& field;  ///< none yet where it is simulated
+};
+
+/// Waits for a device, and resamples there. @param device  gets its number, where it is one of CUDA
+std::pair<DeformSinks, DeformResult> resample_on_device(const Prepared& of, DeformOutputs& outputs,
+                                                        Devices::Share share, const Resources& resources,
+                                                        const std::stop_token& stop, std::optional<int>& device,
+                                                        json& timing) {
+  Clock clock;
+  const Devices::Lease lease = resources.devices.wait_for(of.request.options.backend, share, stop);
+  timing["wait_device"] = clock.lap();
+  Clock held;
+  Worker worker = lease.worker();
+  timing["worker"] = name_of(worker.backend);
+  std::optional<DeviceStream> stream;  // cases on a device do not wait for each other
+  if (demands_device(worker.backend)) {
+    device = worker.device;
+    timing["device"] = *device;
+    worker.stream = stream.emplace(*device).get();
+  }
+  if (!of.field) {
+    of.field = make_field(of.request, of.plan, of.inputs, worker);
+    timing["field"] = clock.lap();
+  }
+  DeformSinks sinks = open_sinks(of.request, of.inputs, *of.field, outputs);
+  DeformResult result =
+      resample(of.request, of.headers, of.inputs, *of.field, std::move(of.field->room), sinks, worker);
+  timing["resample"] = clock.lap();
+  timing["on_device"] = held.lap();
+  return {std::move(sinks), std::move(result)};
+}
 
 Record attempt(const BatchCase& of, const Retry& retry, const Resources& resources, const std::stop_token& stop,
                std::optional<int>& device, json& timing) {
@@ -48,47 +84,36 @@ Record attempt(const BatchCase& of, const Retry& retry, const Resources& resourc
   options.memory_bytes = retry.device_bytes;
   if (retry.on_cpu) options.backend = BackendChoice::cpu;
   Clock clock;
-  Deformation deformation(options, resources.inputs.get(options.input));
-  const std::vector<std::string> further = further_reads_of(options).digests(options.common.threads);
+  const DeformRequest request = request_of(options);
+  DeformOutputs outputs = begin_outputs(request);
+  std::shared_ptr<SharedInput> input = resources.inputs.get(options.input);
+  const std::vector<std::string> others = request.others.digests(options.common.threads);
   const double hashed = clock.lap();
-  deformation.open();
+  const DeformHeaders headers = open_headers(request, *input, outputs.set);
+  const DeformPlan plan = plan_deformation(request, headers);
   timing["open"] = clock.lap();
-  const MemoryBudget::Grant grant = resources.memory.wait_for(deformation.record().plan.bytes, stop);
+  const MemoryBudget::Grant grant = resources.memory.wait_for(plan.bytes, stop);
   timing["wait_memory"] = clock.lap();
-  deformation.read();
+  DeformInputs inputs = read_inputs(request, headers, input);
   timing["read"] = clock.lap();
-  if (!is_simulated_on_device(options)) {
-    deformation.make_field({BackendChoice::cpu, 0});
+  std::optional<DeformField> field;
+  if (!is_simulated(request)) {
+    field = make_field(request, plan, inputs, {BackendChoice::cpu, 0});
     timing["field"] = clock.lap();
   }
-  {
-    const auto share = retry.alone ? Devices::Share::alone : Devices::Share::with_others;
-    const Devices::Lease lease = resources.devices.wait_for(options.backend, share, stop);
-    timing["wait_device"] = clock.lap();
-    Clock held;
-    Worker worker = lease.worker();
-    timing["worker"] = name_of(worker.backend);
-    std::optional<DeviceStream> stream;  // cases on a device do not wait for each other
-    if (demands_device(worker.backend)) {
-      device = worker.device;
-      timing["device"] = *device;
-      worker.stream = stream.emplace(*device).get();
-    }
-    if (is_simulated_on_device(options)) {
-      deformation.make_field(worker);
-      timing["field"] = clock.lap();
-    }
-    deformation.resample(worker);
-    timing["resample"] = clock.lap();
-    timing["on_device"] = held.lap();
-  }
-  deformation.write();
+  const auto share = retry.alone ? Devices::Share::alone : Devices::Share::with_others;
+  auto [sinks, result] =
+      resample_on_device({request, plan, headers, inputs, field}, outputs, share, resources, stop, device, timing);
+  clock.lap();
+  const DeformRun run{request, plan, headers, inputs, *field, result};
+  const DeformWritten written = write_outputs(run, std::move(sinks), outputs, input->sha256());
   timing["write"] = clock.lap();
-  Record line = record_case(of, deformation, further);
+  Record line = record_case(of, outputs, run, written, others);
   timing["hash"] = hashed + clock.lap();
-  deformation.commit();
+  input.reset();
+  commit_outputs(outputs, std::move(inputs), *std::move(field), std::move(result));
   timing["commit"] = clock.lap();
-  timing["planned_bytes"] = deformation.record().plan.bytes;
+  timing["planned_bytes"] = plan.bytes;
   return line;
 }
 

@@ -6,7 +6,8 @@
 #include <mutex>
 
 #include "apps/batch/output_folder.h"
-#include "apps/deform/deformation.h"
+#include "apps/deform/deform_outputs.h"
+#include "apps/deform/deform_plan.h"
 #include "io/parallel.h"
 #include "io/shown_text.h"
 
@@ -39,12 +40,13 @@ Finding look_at(const BatchCase& of, const std::filesystem::path& folder, std::u
   DeformOptions options = of.options;
   options.dry_run = true;
   try {
-    Deformation deformation(options);
-    const OutputSet& outputs = deformation.record().outputs.set;
+    const DeformRequest request = request_of(options);
+    OutputSet outputs = begin_outputs(request).set;
     outputs.refuse_reads(folder);
-    deformation.open();
+    SharedInput input(options.input, SharedInput::Users::one);
+    const DeformHeaders headers = open_headers(request, input, outputs);
     outputs.refuse_reads(folder);  // now that slices are known
-    const DeformPlan& plan = deformation.record().plan;
+    const DeformPlan plan = plan_deformation(request, headers);
     finding.output_bytes = plan.output_bytes;
     finding.plain = is_plain(options);
     if (plan.bytes > memory_bytes) {

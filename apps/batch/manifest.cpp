@@ -14,7 +14,7 @@
 #include "apps/batch/output_folder.h"
 #include "apps/cli/command_line.h"
 #include "apps/cli/reads.h"
-#include "apps/deform/field_source.h"
+#include "apps/deform/deform_request.h"
 #include "deform/fields/formula.h"
 #include "io/lower_case.h"
 #include "io/opened_file.h"
@@ -206,9 +206,8 @@ void Reader::check_files(const DeformOptions& options) {
   };
   exists(options.input.path);
   if (!options.scenario.empty()) exists(options.scenario);
-  if (!options.fields.empty()) check_fields(options.fields, options.cell_size);
-  const Reads further = further_reads_of(options);
-  for (const fs::path& path : further.paths()) exists(path);
+  const Reads others = other_reads_of(options, parse_sources(options));
+  for (const fs::path& path : others.paths()) exists(path);
 }
 
 /// Mass-spring has other bits on each backend: which one is the case's to say, not the machine's.

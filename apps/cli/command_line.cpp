@@ -120,11 +120,11 @@ void add_info(CLI::App& app, InfoOptions& options) {
 
 void add_field(CLI::App& app, FieldOptions& options) {
   CLI::App* command = app.add_subcommand("field", "Write a field as a file");
-  command->add_option("FIELD", options.fields, kFieldHelp)->required();
+  command->add_option("FIELD", options.field.forward, kFieldHelp)->required();
   command->add_option("--like", options.like.path, "The volume that the field is for")->required();
   command->add_option("-o,--output", options.output, ".mha .nrrd .nii .nii.gz, three components, LPS mm")->required();
   command
-      ->add_option("--cell-size", options.cell_size,
+      ->add_option("--cell-size", options.field.cell_size,
                    "Vertices every B voxels, for formulas and transforms only (default 1)")
       ->check(whole_number(1, kMostCellSize))
       ->type_name("B");
@@ -136,10 +136,10 @@ void add_field(CLI::App& app, FieldOptions& options) {
 
 void add_invert(CLI::App& app, InvertOptions& options) {
   CLI::App* command = app.add_subcommand("invert", "Write the inverse of a field");
-  auto* field = command->add_option("FIELD", options.fields, kFieldHelp);
+  auto* field = command->add_option("FIELD", options.field.forward, kFieldHelp);
   command
       ->add_option(
-          "--pull-field", options.pull_field,
+          "--pull-field", options.field.pull,
           "Instead of FIELD: a field that maps output to input. Its inverse is a forward field, with a vertex at "
           "every voxel of --like, the volume that the field takes values from; beyond its grid the field goes on "
           "with its outermost samples")
@@ -153,7 +153,7 @@ void add_invert(CLI::App& app, InvertOptions& options) {
                    "field: forward, for -f")
       ->required();
   command
-      ->add_option("--cell-size", options.cell_size,
+      ->add_option("--cell-size", options.field.cell_size,
                    "Vertices every B voxels, for formulas and transforms only (default 1)")
       ->check(whole_number(1, kMostCellSize))
       ->type_name("B");
@@ -169,9 +169,9 @@ void add_deform(CLI::App& app, DeformOptions& options) {
   CLI::App* command = app.add_subcommand("deform", "Deform a volume");
   command->add_option("INPUT", options.input.path, kInputHelp)->required();
   auto* field =
-      command->add_option("-f,--field", options.fields, kFieldHelp)->allow_extra_args(false)->type_name("FIELD");
+      command->add_option("-f,--field", options.field.forward, kFieldHelp)->allow_extra_args(false)->type_name("FIELD");
   command
-      ->add_option("--pull-field", options.pull_field,
+      ->add_option("--pull-field", options.field.pull,
                    "A field that maps output to input, as registration tools write it (files as for -f, and a "
                    "DICOM Deformable Spatial Registration, FILE:item=N where it has several); NaN in it: no source. Or "
                    "a transform of ITK, elastix, plastimatch (.h5 .tfm .txt) or NiftyReg (its B-spline): "
@@ -210,7 +210,7 @@ void add_deform(CLI::App& app, DeformOptions& options) {
           "Value where nothing maps (default: DICOM padding value or -1024 HU; else the smallest value present)")
       ->check(finite_number());
   command
-      ->add_option("--cell-size", options.cell_size,
+      ->add_option("--cell-size", options.field.cell_size,
                    "Vertices every B voxels, for formulas and transforms only (default 1)")
       ->check(whole_number(1, kMostCellSize))
       ->type_name("B");

@@ -51,6 +51,16 @@ struct InputOptions {
   }
 };
 
+/// Fields as a command line names them. They are parsed once, by parse_field (apps/fields/field_text.h); nothing else
+/// looks into the texts.
+struct FieldArguments {
+  std::vector<std::string> forward;       ///< formulas and files, the first applied first
+  std::string pull;                       ///< instead: a field that maps output to input
+  std::optional<std::int64_t> cell_size;  ///< of forward ones
+
+  bool is_given() const { return !forward.empty() || !pull.empty(); }
+};
+
 struct PhantomOptions {
   CommonOptions common;
   std::filesystem::path output;
@@ -58,6 +68,14 @@ struct PhantomOptions {
   std::vector<double> spacing{0.8, 0.8, 1.0};
   std::uint64_t seed = 1;
 };
+
+/// A volume that is named by its path alone, such as labels.
+inline InputOptions volume_named(const std::filesystem::path& path, NiftiFrame frame = NiftiFrame::sform) {
+  InputOptions volume;
+  volume.path = path;
+  volume.nifti_frame = frame;
+  return volume;
+}
 
 struct InfoOptions {
   CommonOptions common;
@@ -67,19 +85,16 @@ struct InfoOptions {
 
 struct FieldOptions {
   CommonOptions common;
-  std::vector<std::string> fields;  ///< formulas and files, the first applied first
+  FieldArguments field;  ///< forward
   InputOptions like;
   std::filesystem::path output;
-  std::optional<std::int64_t> cell_size;
 };
 
 struct InvertOptions {
   CommonOptions common;
-  std::vector<std::string> fields;  ///< formulas and files, the first applied first
-  std::string pull_field;           ///< instead: a field that maps output to input
+  FieldArguments field;
   InputOptions like;
   std::filesystem::path output, report;
-  std::optional<std::int64_t> cell_size;
   BackendChoice backend = BackendChoice::automatic;
   int device = 0;  ///< of CUDA
 };
@@ -92,9 +107,8 @@ struct MapOptions {
 struct DeformOptions {
   CommonOptions common;
   InputOptions input;
-  std::vector<std::string> fields;
-  std::string pull_field;
-  std::filesystem::path scenario, labels;  ///< instead of fields: a simulation, and its labels on the grid of INPUT
+  FieldArguments field;
+  std::filesystem::path scenario, labels;  ///< instead of a field: a simulation, and its labels on the grid of INPUT
   std::filesystem::path write_field;       ///< where the forward field that was used goes
   std::filesystem::path output;
   std::filesystem::path folder;  ///< that all outputs lie in and that appears as a whole; empty: each by itself
@@ -103,7 +117,6 @@ struct DeformOptions {
   Interpolation interpolation = Interpolation::linear;
   Outside outside = Outside::refuse;
   std::optional<double> background;
-  std::optional<std::int64_t> cell_size;
   std::optional<int> compression;
   DicomForm dicom;                       ///< of OUTPUT, where it is a series
   std::filesystem::path deidentify_key;  ///< the file that its key was read from
@@ -146,10 +159,8 @@ struct BatchOptions {
 struct RenderOptions {
   CommonOptions common;
   InputOptions input;
-  std::vector<std::string> fields;    ///< that deform the volume, the first applied first
-  std::string pull_field;             ///< instead: a field that maps output to input
+  FieldArguments field;               ///< that deforms the volume
   std::vector<std::string> sequence;  ///< instead: field files, one a picture
-  std::optional<std::int64_t> cell_size;
   Outside outside = Outside::refuse;
   std::optional<double> fill;    ///< value where nothing maps
   std::filesystem::path output;  ///< .png; of several pictures with numbers; or .mp4 .gif

@@ -9,6 +9,7 @@
 
 #include "apps/cli/input.h"
 #include "apps/cli/options.h"
+#include "apps/fields/field_text.h"
 
 namespace tetwarp::apps {
 
@@ -19,9 +20,8 @@ class Reads {
   void add_file(const std::filesystem::path& path);
   /// A volume file, or a DICOM series with all of its slices.
   void add_volume(const InputOptions& volume);
-  /// A field as -f and --pull-field take it: nothing of a formula, of a file also the second one of a mesh and the
-  /// initial transforms of elastix. @throws UsageError for options that do not go with the file
-  void add_field(const std::string& text);
+  /// The files of a field, as `files_of` has them.
+  void add_field(const FieldText& field);
 
   /// All paths, those first that options name. DICOM is not looked at: see `slices`.
   const std::vector<std::filesystem::path>& paths() const& { return paths_; }
@@ -43,14 +43,9 @@ class Reads {
   std::vector<std::filesystem::path> paths_;
 };
 
-/// @throws UsageError for a text of an option that cannot be taken apart
-Reads reads_of(const DeformOptions& options);
-Reads reads_of(const FieldOptions& options);
-Reads reads_of(const InvertOptions& options);
+/// Of a command that reads a field and a volume.
+Reads reads_of(const FieldText& field, const InputOptions& volume);
 Reads reads_of(const SimulateOptions& options);
-Reads reads_of(const RenderOptions& options);
-/// What `deform` reads beside INPUT.
-Reads further_reads_of(const DeformOptions& options);
 
 /// SHA-256 of a volume as sidecars give it, without reading voxels. @throws InputError
 std::string hash_volume(const InputOptions& volume, int threads);

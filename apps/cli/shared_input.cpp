@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "apps/cli/beside.h"
+#include "apps/cli/in_background.h"
 
 namespace tetwarp::apps {
 
@@ -19,7 +19,7 @@ const InputVolume& SharedInput::read(const CommonOptions& common, const Control&
   const std::lock_guard lock(mutex_);
   if (volume_) return *volume_;
   if (!header_->series)  // of a series the reader finds it
-    hash_ = beside([this] { return hash_file(options_.path); });
+    hash_ = in_background([this] { return hash_file(options_.path); });
   volume_ = read_input(options_, *header_, common, control);
   return *volume_;
 }

@@ -3,43 +3,45 @@
 
 #pragma once
 
-#include "apps/deform/further_structures.h"
-#include "apps/deform/further_volumes.h"
-#include "apps/deform/map_outputs.h"
-#include "apps/deform/points_option.h"
+#include <optional>
+
+#include "apps/cli/output.h"
+#include "apps/cli/shared_input.h"
+#include "apps/deform/along_structures.h"
+#include "apps/deform/along_volumes.h"
+#include "apps/deform/deform_request.h"
 
 namespace tetwarp::apps {
 
-/// Where the results of `deform` go while they are made.
-struct DeformOutputs {
-  bool series = false;
-  OutputSet set;
-  std::optional<MapOutputs> maps;
-  std::optional<FurtherVolumes> further;
-  FurtherStructures structures;
-  std::filesystem::path volume, sidecar, bids, field, report, preview;
-  std::vector<std::filesystem::path> points;
+/// What headers say, and small files that are read whole.
+struct DeformHeaders {
+  InputHeader input;
+  AlongHeaders along;
+  std::vector<StructuresInput> structures;
+  std::vector<PointsFile> points;
+  std::optional<Geometry> grid;    ///< of the volume that --grid names
+  std::vector<std::string> notes;  ///< for people, of INPUT and of files that are read for their grid or values
+  double seconds = 0;
 };
 
-/// Checks the options as far as that is possible before anything is read, and begins the outputs.
-/// @throws UsageError, and what OutputSet::add throws
-DeformOutputs begin_outputs(const DeformOptions& options, const PointsOption& points);
+/// Reads headers. @param outputs  learn of the slices that are read
+/// @throws UsageError for an output or background that INPUT does not go with, or an output that touches a slice;
+/// InputError for a volume that cannot be deformed, or a file that cannot be read
+DeformHeaders open_headers(const DeformRequest& request, SharedInput& input, OutputSet& outputs);
 
 /// What will be made, as far as headers tell.
 struct DeformPlan {
-  Geometry grid;                   ///< of the output; with --grid fit known only once the field is
-  std::uint64_t bytes = 0;         ///< of memory; --grid fit is taken for the input's grid
+  std::optional<Geometry> grid;    ///< of the output; none where it is known only once the field is
+  std::uint64_t bytes = 0;         ///< of memory; a grid that is not known is taken for INPUT's
   std::uint64_t output_bytes = 0;  ///< on disk, were nothing compressed
 };
 
-/// Checks the header of the input. @throws UsageError for an output or background that it does not go with, InputError
-/// for a volume that cannot be deformed, Error where more memory is needed than is allowed
-DeformPlan plan_deformation(const DeformOptions& options, DeformOutputs& outputs, const InputHeader& input);
+/// Touches the disk for a field of files alone, whose size their headers tell.
+/// @throws InputError for a field that cannot be read or a grid that does not go with the outputs, Error where more
+/// memory is needed than is allowed
+DeformPlan plan_deformation(const DeformRequest& request, const DeformHeaders& headers);
 
 /// What would be written, for --dry-run.
-std::string describe(const DeformPlan& plan, const DeformOptions& options, const DeformOutputs& outputs);
-
-/// Whether the report says what the field is like: that of a pull field does not.
-bool reports_quality(const DeformOptions& options);
+std::string describe(const DeformPlan& plan, const DeformRequest& request);
 
 }  // namespace tetwarp::apps

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "apps/deform/output_grid.h"
+#include "io/dicom_text.h"
 
 namespace tetwarp::apps {
 
@@ -28,40 +29,59 @@ json form_json(const DicomForm& form) {
   return document;
 }
 
-json canonical_options(const DeformRecord& of) {
-  json options = {{"interpolation", name_of(of.options.interpolation)},
-                  {"outside", name_of(of.options.outside)},
-                  {"background", of.background}};
-  if (of.options.preserve_mass) options["preserve"] = "mass";
-  if (!is_same_grid(of.options.grid)) options["grid"] = of.options.grid;
-  if (of.outputs.series && of.options.dicom != DicomForm()) options["dicom"] = form_json(of.options.dicom);
-  if (of.field.direction == Direction::pull) {
-    options["pull_field"] = of.options.pull_field;
-  } else if (!of.options.scenario.empty()) {
-    options["scenario"] = of.options.scenario.string();
-    if (!of.options.labels.empty()) options["labels"] = of.options.labels.string();
-  } else {
-    options["field"] = of.options.fields;
-    if (of.options.cell_size) options["cell_size"] = *of.options.cell_size;
+/// The field as it was given: the texts of the command line.
+void add_field_options(const DeformRequest& request, json& options) {
+  if (const auto* simulated = std::get_if<Simulated>(&request.field)) {
+    options["scenario"] = simulated->text.file.string();
+    if (!simulated->text.labels.empty()) options["labels"] = simulated->text.labels.string();
+    return;
   }
+  const auto& field = std::get<FieldText>(request.field);
+  if (const auto* pull = std::get_if<PullText>(&field)) {
+    options["pull_field"] = pull->field.text;
+    return;
+  }
+  const auto& forward = std::get<ForwardText>(field);
+  options["field"] = json::array();
+  for (const NamedField& one : forward.fields) options["field"].push_back(one.text);
+  if (forward.cell_size) options["cell_size"] = *forward.cell_size;
+}
+
+json canonical_options(const DeformRun& run) {
+  const DeformOptions& given = run.request.options;
+  json options = {{"interpolation", name_of(given.interpolation)},
+                  {"outside", name_of(given.outside)},
+                  {"background", run.inputs.background}};
+  if (given.preserve_mass) options["preserve"] = "mass";
+  if (!is_same_grid(given.grid)) options["grid"] = given.grid;
+  if (run.request.series && given.dicom != DicomForm()) options["dicom"] = form_json(given.dicom);
+  add_field_options(run.request, options);
   return options;
 }
 
+std::vector<std::string> set_aside(const DeformHeaders& headers) {
+  std::vector<std::string> files;
+  if (!headers.input.series) return files;
+  for (const LeftOutFile& one : headers.input.series->set_aside) files.push_back(to_string(one));
+  return files;
+}
+
 /// Of a de-identified series nothing that names its source or can be looked up.
-json input_json(const DeformRecord& of) {
+json input_json(const DeformRun& run, const DeformWritten& written) {
+  const DeformOptions& options = run.request.options;
   json document = json::object();
-  const bool is_open = !of.options.dicom.deidentification;
-  if (is_open) document = {{"path", of.options.input.path.string()}, {"sha256", of.input_sha256}};
-  if (of.options.common.nifti_frame == NiftiFrame::qform) document["nifti_frame"] = "qform";
-  if (!of.input->is_dicom()) return document;
+  const bool is_open = !options.dicom.deidentification;
+  if (is_open) document = {{"path", options.input.path.string()}, {"sha256", written.input_sha256}};
+  if (options.common.nifti_frame == NiftiFrame::qform) document["nifti_frame"] = "qform";
+  if (!run.inputs.input->is_dicom()) return document;
+  const DicomVolume& dicom = *run.inputs.input->dicom;
   if (is_open) {
-    document["series_instance_uid"] = of.input->dicom->series_uid;
-    if (!of.volume_label.empty()) document["volume"] = of.volume_label;
-    document["set_aside"] = of.set_aside;
+    document["series_instance_uid"] = dicom.series_uid;
+    if (const std::string& label = run.headers.input.series->label; !label.empty()) document["volume"] = label;
+    document["set_aside"] = set_aside(run.headers);
   }
-  document["rounded_voxels"] = of.input->dicom->rounded;
-  if (of.input->dicom->padding)
-    document["padding_hu"] = {of.input->dicom->padding->low, of.input->dicom->padding->high};
+  document["rounded_voxels"] = dicom.rounded;
+  if (dicom.padding) document["padding_hu"] = {dicom.padding->low, dicom.padding->high};
   return document;
 }
 
@@ -71,10 +91,43 @@ json simulation_json(const SimulationSource& source) {
   return document;
 }
 
+json field_json(const DeformRun& run) {
+  const DeformField& field = run.field;
+  json document = {{"sha256", field.sha256},
+                   {"direction", is_pull(field.field) ? "pull" : "forward"},
+                   {"notes", field.origin.notes},
+                   {"files", to_json(field.origin.files)}};
+  document.update(place_json(field.field));
+  if (field.simulation) document["simulation"] = simulation_json(*field.simulation);
+  if (const auto& path = run.request.options.write_field; !path.empty()) document["written"] = path.string();
+  return document;
+}
+
+json output_json(const DeformRun& run, const DeformWritten& written) {
+  json document = {{"path", run.request.options.output.string()},
+                   {"voxel_type", to_string(run.result.output.type())},
+                   {"geometry", to_json(run.result.output.geometry())}};
+  if (written.series) {
+    document["series_instance_uid"] = written.series->series_uid;
+    document["frame_of_reference_uid"] = written.series->frame_of_reference_uid;
+    document["added_empty_attributes"] = written.series->added_empty;
+  }
+  return document;
+}
+
+json counts_json(const Report& report, bool pull) {
+  json document = {{"covered", report.covered},      {"uncovered", report.uncovered}, {"clamped", report.clamped},
+                   {"padded", report.padded},        {"conflicts", report.conflicts}, {"inverted", report.inverted},
+                   {"degenerate", report.degenerate}};
+  if (!pull) document["jacobian"] = {report.jacobian_min, report.jacobian_max};
+  if (report.multiply_owned) document["multiply_owned"] = *report.multiply_owned;
+  return document;
+}
+
 /// How far the map can be trusted.
-json quality_json(const DeformRecord& of) {
-  const auto& [quality, trip] = *of.check;
-  return {{"verdict", verdict(of.report, quality, trip)},
+json quality_json(const Report& report, const FieldCheck& check) {
+  const auto& [quality, trip] = check;
+  return {{"verdict", verdict(report, quality, trip)},
           {"largest_stretch", quality.largest_stretch},
           {"jacobian_edges", FieldQuality::kEdges},
           {"jacobian_shares", quality.shares()},
@@ -85,37 +138,13 @@ json quality_json(const DeformRecord& of) {
             {"inverse_after_forward", to_json(trip.inverse_after_forward)}}}};
 }
 
-}  // namespace
-
-DicomDerivation derivation(const DeformRecord& of) {
-  const bool pull = of.field.direction == Direction::pull, deformed = pull || !of.field.forward.identity;
-  const char* what =
-      !deformed ? "Resampled by the identity" : (pull ? "Deformed by a pull field" : "Deformed by a field of vertices");
-  return {.field_sha256 = of.field_sha256,
-          .parameters =
-              std::string("outside=") + name_of(of.options.outside) + (pull ? " direction=pull" : " direction=forward"),
-          .description = what,
-          .deformed = deformed,
-          .background_hu = of.background,
-          .form = of.options.dicom};
-}
-
-DicomDerivation input_derivation(const DeformRecord& of) {
-  DicomDerivation of_input = derivation(of);
-  of_input.parameters = "interpolation=" + std::string(name_of(of.options.interpolation)) +
-                        " outside=" + name_of(of.options.outside) + " background=" + json(of.background).dump() +
-                        (of.field.direction == Direction::pull ? " direction=pull" : " direction=forward") +
-                        (of.options.preserve_mass ? " preserve=mass" : "");
-  of_input.description += std::string(", ") + name_of(of.options.interpolation) + " interpolation";
-  return of_input;
-}
-
-std::vector<std::string> deidentification_notes(const DeformRecord& of) {
-  if (!of.options.dicom.deidentification) return {};
+/// What a de-identification did not do, "note: ..." and "warning: ..."; none where there was no de-identification.
+std::vector<std::string> deidentification_notes(const DeformRequest& request, const DeformWritten& written) {
+  if (!request.options.dicom.deidentification) return {};
   std::vector<std::string> notes = {std::string("note: de-identified by ") + kConfidentialityEdition +
                                     ", Basic Profile; not looked at: text in the pixels, faces that a rendering shows, "
                                     "names and comments in files of --points"};
-  if (of.dicom_report && of.dicom_report->says_who) {
+  if (written.series && written.series->says_who) {
     notes.push_back(
         "warning: the source says that its pixels hold text (Burned In Annotation) or a face that can be recognised "
         "(Recognizable Visual Features); they are still there");
@@ -123,80 +152,100 @@ std::vector<std::string> deidentification_notes(const DeformRecord& of) {
   return notes;
 }
 
-json sidecar(const DeformRecord& of) {
+}  // namespace
+
+json sidecar(const DeformRun& run, const DeformWritten& written) {
+  const DeformOptions& options = run.request.options;
   json document = provenance("deform");
-  document["options"] = canonical_options(of);
-  document["backend"] = of.backend;
-  document["input"] = input_json(of);
-  document["field"] = {{"sha256", of.field_sha256},
-                       {"direction", of.field.direction == Direction::pull ? "pull" : "forward"},
-                       {"notes", of.field.notes},
-                       {"files", to_json(of.field.files)}};
-  document["field"].update(of.field.place());
-  if (of.field.simulation) document["field"]["simulation"] = simulation_json(*of.field.simulation);
-  if (!of.options.write_field.empty()) document["field"]["written"] = of.options.write_field.string();
-  document["output"] = {{"path", of.options.output.string()},
-                        {"voxel_type", to_string(of.output.type())},
-                        {"geometry", to_json(of.output.geometry())}};
-  if (of.dicom_report) {
-    document["output"]["series_instance_uid"] = of.dicom_report->series_uid;
-    document["output"]["frame_of_reference_uid"] = of.dicom_report->frame_of_reference_uid;
-    document["output"]["added_empty_attributes"] = of.dicom_report->added_empty;
-  }
-  if (of.options.bids) document["bids"] = bids_sidecar_of(of.options.output).string();
-  if (const json further = of.outputs.further->describe(); !further.empty()) document["with"] = further;
-  if (!of.outputs.structures.empty()) document["structures"] = of.outputs.structures.describe();
-  if (const json maps = of.outputs.maps->describe(); !maps.empty()) document["maps"] = maps;
-  if (!of.points.empty()) document["points"] = of.points.to_json();
-  document["report"] = {{"covered", of.report.covered},      {"uncovered", of.report.uncovered},
-                        {"clamped", of.report.clamped},      {"padded", of.report.padded},
-                        {"conflicts", of.report.conflicts},  {"inverted", of.report.inverted},
-                        {"degenerate", of.report.degenerate}};
-  if (of.field.direction == Direction::forward)
-    document["report"]["jacobian"] = {of.report.jacobian_min, of.report.jacobian_max};
-  if (of.report.multiply_owned) document["report"]["multiply_owned"] = *of.report.multiply_owned;
+  document["options"] = canonical_options(run);
+  document["backend"] = run.result.backend;
+  document["input"] = input_json(run, written);
+  document["field"] = field_json(run);
+  document["output"] = output_json(run, written);
+  if (options.bids) document["bids"] = bids_sidecar_of(options.output).string();
+  if (!run.request.volumes.empty())
+    document["with"] = along_json(run.headers.along.volumes, run.inputs.along, run.result.along, written.along);
+  if (!run.request.structures.empty())
+    document["structures"] = structures_json(run.headers.structures, run.result.structures, written.structures);
+  if (const json maps = maps_json(options.maps); !maps.empty()) document["maps"] = maps;
+  if (!run.request.points.empty())
+    document["points"] = points_json(run.request.points, run.headers.points, run.result.points);
+  document["report"] = counts_json(run.result.report, is_pull(run.field.field));
   return document;
 }
 
-json report_with_times(const DeformRecord& of) {
-  json document = sidecar(of);
+json report_with_times(const DeformRun& run, const DeformWritten& written) {
+  json document = sidecar(run, written);
+  const Report& report = run.result.report;
+  std::vector<std::pair<const char*, double>> stages = {{"read", run.headers.seconds + run.inputs.seconds},
+                                                        {"field", run.field.seconds},
+                                                        {"resample", run.result.seconds},
+                                                        {"write", written.seconds}};
+  if (run.result.check) stages.emplace_back("check", run.result.check_seconds);
   double total = 0;
-  for (const auto& [name, seconds] : of.stages) {
+  for (const auto& [name, seconds] : stages) {
     document["stages"][name]["seconds"] = seconds;
     total += seconds;
   }
   document["total_seconds"] = total;
-  if (of.field.direction == Direction::forward) {
-    document["paths"] = {{"gathered", of.report.paths.gathered},
-                         {"walked", of.report.paths.walked},
-                         {"claimed", of.report.paths.claimed}};
+  if (!is_pull(run.field.field)) {
+    document["paths"] = {
+        {"gathered", report.paths.gathered}, {"walked", report.paths.walked}, {"claimed", report.paths.claimed}};
   }
-  if (of.check) document["quality"] = quality_json(of);
-  document["threads"] =
-      of.options.common.threads > 0 ? of.options.common.threads : static_cast<int>(std::thread::hardware_concurrency());
+  if (run.result.check) document["quality"] = quality_json(report, *run.result.check);
+  const int threads = run.request.options.common.threads;
+  document["threads"] = threads > 0 ? threads : static_cast<int>(std::thread::hardware_concurrency());
   document["memory"] = {{"peak_bytes", peak_memory_bytes()},
-                        {"planned_bytes", of.plan.bytes},
-                        {"source_bytes", of.input->volume.size_bytes()},
-                        {"output_bytes", of.output.size_bytes()},
-                        {"field_bytes", of.field.size_bytes()}};
+                        {"planned_bytes", run.plan.bytes},
+                        {"source_bytes", run.inputs.input->volume.size_bytes()},
+                        {"output_bytes", run.result.output.size_bytes()},
+                        {"field_bytes", size_bytes(run.field.field)}};
   return document;
 }
 
-std::string summary(const DeformRecord& of) {
+std::string summary(const DeformRun& run) {
+  const Report& report = run.result.report;
   char share[32];
-  std::snprintf(
-      share, sizeof share, "%.2f %%",
-      100.0 * static_cast<double>(of.report.covered) / static_cast<double>(of.report.covered + of.report.uncovered));
-  std::string line = "wrote " + of.options.output.string() + ": " + to_string(of.output.geometry().size) + " voxels, " +
-                     share + " covered, backend " + of.backend;
-  if (of.report.inverted + of.report.degenerate > 0) {
-    line += "; the field folds: " + std::to_string(of.report.inverted) + " tetrahedra inverted, " +
-            std::to_string(of.report.degenerate) + " flat";
+  std::snprintf(share, sizeof share, "%.2f %%",
+                100.0 * static_cast<double>(report.covered) / static_cast<double>(report.covered + report.uncovered));
+  std::string line = "wrote " + run.request.options.output.string() + ": " +
+                     to_string(run.result.output.geometry().size) + " voxels, " + share + " covered, backend " +
+                     run.result.backend;
+  if (report.inverted + report.degenerate > 0) {
+    line += "; the field folds: " + std::to_string(report.inverted) + " tetrahedra inverted, " +
+            std::to_string(report.degenerate) + " flat";
   }
-  if (of.report.clamped > 0) line += "; " + std::to_string(of.report.clamped) + " values clamped";
-  if (of.report.conflicts > 0)
-    line += "; " + std::to_string(of.report.conflicts) + " voxels outside the field were moved into";
+  if (report.clamped > 0) line += "; " + std::to_string(report.clamped) + " values clamped";
+  if (report.conflicts > 0)
+    line += "; " + std::to_string(report.conflicts) + " voxels outside the field were moved into";
   return line;
+}
+
+std::vector<std::string> notes_of(const DeformRun& run, const DeformWritten& written) {
+  std::vector<std::string> notes;
+  const auto add = [&](const char* kind, const std::vector<std::string>& lines) {
+    for (const std::string& line : lines) notes.push_back(kind + line);
+  };
+  if (run.headers.input.series) add("warning: ", run.headers.input.series->warnings);
+  add("warning: ", run.field.warnings);
+  add("note: ", run.headers.notes);
+  add("note: ", run.field.origin.notes);
+  add("note: ", run.headers.along.notes);
+  add("note: ", notes_of(run.headers.along.volumes, written.along));
+  add("note: ", notes_of(run.request.points, run.headers.points, run.result.points));
+  add("note: ", notes_of(run.headers.structures, run.result.structures));
+  if (const std::size_t count = set_aside(run.headers).size(); count > 0) {
+    notes.push_back("note: " + plural(count, "file") + " of the series " +
+                    (count == 1 ? "is no slice" : "are no slices") + " of it; OUTPUT.json names them");
+  }
+  add("", deidentification_notes(run.request, written));
+  return notes;
+}
+
+std::string title_of(const DeformRequest& request) {
+  const auto* field = std::get_if<FieldText>(&request.field);
+  if (request.options.dicom.deidentification) return field ? title_without_names(*field) : "deformed";
+  return field ? title_of(*field) : "simulated " + std::get<Simulated>(request.field).text.file.filename().string();
 }
 
 }  // namespace tetwarp::apps

@@ -4,6 +4,7 @@
 #include "apps/deform/map_outputs.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <nlohmann/json.hpp>
 
@@ -13,6 +14,30 @@
 
 namespace tetwarp::apps {
 
+namespace {
+
+struct Kind {
+  const char* name;  ///< of the option, and the key of sidecars
+  MapPlace place;
+  std::filesystem::path MapOptions::*file;
+};
+/// All maps, in the order in which they are begun.
+constexpr std::array<Kind, 4> kKinds = {{{"coverage", &Maps::coverage, &MapOptions::coverage},
+                                         {"jacobian", &Maps::jacobian, &MapOptions::jacobian},
+                                         {"folds", &Maps::owners, &MapOptions::folds},
+                                         {"inverse", &Maps::inverse_mm, &MapOptions::inverse}}};
+
+std::unique_ptr<ImageWriter> create_map(const WantedMap& map, const Geometry& grid, const DerivedSeriesWriter* series) {
+  if (map.file.empty()) return nullptr;
+  if (map.place == &Maps::coverage) return create_image(map.file, grid, VoxelType::u8);
+  if (map.place == &Maps::owners) return create_image(map.file, grid, VoxelType::u16);
+  if (map.place == &Maps::jacobian) return create_image(map.file, grid, VoxelType::f32);
+  return has_registration_suffix(map.file) ? series->create_registration(map.file)
+                                           : create_field_file(map.file, grid, Direction::pull);
+}
+
+}  // namespace
+
 void require_image_suffix(const std::filesystem::path& path, const char* option) {
   if (path.empty() || has_image_suffix(path)) return;
   throw UsageError(std::string("unknown suffix of ") + option + " \"" + path.string() +
@@ -21,61 +46,47 @@ void require_image_suffix(const std::filesystem::path& path, const char* option)
 
 bool has_registration_suffix(const std::filesystem::path& path) { return lower(path.extension().string()) == ".dcm"; }
 
-MapOutputs::MapOutputs(const MapOptions& options, Direction direction, bool series, OutputSet& outputs)
-    : options_(options) {
-  require_image_suffix(options.coverage, "--coverage");
-  if (!has_registration_suffix(options.inverse)) {
-    require_image_suffix(options.inverse, "--inverse");
+std::vector<WantedMap> wanted_maps(const MapOptions& files, std::span<const MapPlace> needed) {
+  std::vector<WantedMap> maps;
+  for (const Kind& kind : kKinds) {
+    const std::filesystem::path& file = files.*kind.file;
+    if (!file.empty() || std::ranges::find(needed, kind.place) != needed.end()) maps.push_back({kind.place, file});
+  }
+  return maps;
+}
+
+void check_maps(const MapOptions& files, bool pulls, bool series) {
+  require_image_suffix(files.coverage, "--coverage");
+  if (!has_registration_suffix(files.inverse)) {
+    require_image_suffix(files.inverse, "--inverse");
   } else if (!series) {
-    throw UsageError("--inverse " + options.inverse.string() +
+    throw UsageError("--inverse " + files.inverse.string() +
                      " is a DICOM registration between INPUT and a derived DICOM series; name OUTPUT as a folder, or "
                      "the inverse .nii .nii.gz .nrrd .mha");
   }
-  require_image_suffix(options.jacobian, "--jacobian");
-  require_image_suffix(options.folds, "--folds");
-  if (direction == Direction::pull && (!options.jacobian.empty() || !options.folds.empty())) {
+  require_image_suffix(files.jacobian, "--jacobian");
+  require_image_suffix(files.folds, "--folds");
+  if (pulls && (!files.jacobian.empty() || !files.folds.empty())) {
     throw UsageError("--jacobian and --folds are of the tetrahedra of a forward field, which --pull-field has not");
   }
-  staged_.coverage = outputs.add(options.coverage);
-  staged_.inverse = outputs.add(options.inverse);
-  staged_.jacobian = outputs.add(options.jacobian);
-  staged_.folds = outputs.add(options.folds);
 }
 
-std::uint64_t MapOutputs::bytes(const Geometry& grid, bool mass) const {
-  const auto held = [&](VolumeView Maps::*map, const std::filesystem::path& path, bool needed = false) {
-    return path.empty() && !needed ? 0 : MapStream::bytes(grid, map, !path.empty());
-  };
-  return held(&Maps::coverage, staged_.coverage, mass) + held(&Maps::jacobian, staged_.jacobian, mass) +
-         held(&Maps::owners, staged_.folds) + held(&Maps::inverse_mm, staged_.inverse);
+std::uint64_t map_bytes(const std::vector<WantedMap>& maps, const Geometry& grid) {
+  std::uint64_t bytes = 0;
+  for (const WantedMap& map : maps) bytes += MapStream::bytes(grid, map.place, !map.file.empty());
+  return bytes;
 }
 
-void MapOutputs::check(const Geometry& grid) const {
-  if (has_registration_suffix(options_.inverse)) require_registration_fits(grid);
+void add_maps(const std::vector<WantedMap>& maps, const Geometry& grid, const DerivedSeriesWriter* series,
+              MapStream& stream) {
+  for (const WantedMap& map : maps) stream.add(map.place, create_map(map, grid, series));
 }
 
-void MapOutputs::add_to(MapStream& stream, const Geometry& grid, bool mass, const DerivedSeriesWriter* series) const {
-  const auto add = [&](VolumeView Maps::*map, const std::filesystem::path& path, VoxelType type, bool needed = false) {
-    if (!path.empty() || needed) stream.add(map, path.empty() ? nullptr : create_image(path, grid, type));
-  };
-  add(&Maps::coverage, staged_.coverage, VoxelType::u8, mass);
-  add(&Maps::jacobian, staged_.jacobian, VoxelType::f32, mass);
-  add(&Maps::owners, staged_.folds, VoxelType::u16);
-  if (staged_.inverse.empty()) return;
-  stream.add(&Maps::inverse_mm, has_registration_suffix(options_.inverse)
-                                    ? series->create_registration(staged_.inverse)
-                                    : create_field_file(staged_.inverse, grid, Direction::pull));
-}
-
-nlohmann::json MapOutputs::describe() const {
+nlohmann::json maps_json(const MapOptions& files) {
   nlohmann::json names = nlohmann::json::object();
-  const auto add = [&](const char* name, const std::filesystem::path& path) {
-    if (!path.empty()) names[name] = path.string();
-  };
-  add("coverage", options_.coverage);
-  add("inverse", options_.inverse);
-  add("jacobian", options_.jacobian);
-  add("folds", options_.folds);
+  for (const Kind& kind : kKinds) {
+    if (!(files.*kind.file).empty()) names[kind.name] = (files.*kind.file).string();
+  }
   return names;
 }
 

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "apps/cli/beside.h"
+#include "apps/cli/in_background.h"
 
 namespace tetwarp::apps {
 
@@ -66,7 +66,7 @@ void MapStream::run(const std::function<void(const Region&, const Maps&)>& make)
     const Maps maps = maps_of(slab, number);
     make(slab, maps);
     if (writing_.valid()) writing_.get();
-    writing_ = beside([this, maps] { write(maps); });
+    writing_ = in_background([this, maps] { write(maps); });
   }
   writing_.get();
   outputs_.write([&] {

@@ -89,7 +89,9 @@ Geometry grown(const Geometry& volume, const Bounds& bounds) {
 
 bool is_same_grid(const std::string& wanted) { return wanted == "same"; }
 
-bool names_volume(const std::string& wanted) { return !is_same_grid(wanted) && wanted != "fit"; }
+bool is_fitting_grid(const std::string& wanted) { return wanted == "fit"; }
+
+bool names_volume(const std::string& wanted) { return !is_same_grid(wanted) && !is_fitting_grid(wanted); }
 
 InputOptions grid_volume(const std::string& wanted) {
   InputOptions volume;
@@ -99,7 +101,7 @@ InputOptions grid_volume(const std::string& wanted) {
 }
 
 void check_grid(const std::string& wanted, bool pull) {
-  if (wanted == "fit" && pull) {
+  if (is_fitting_grid(wanted) && pull) {
     throw UsageError("--grid fit needs to know where vertices go, which --pull-field does not say; give --grid FILE");
   }
   if (names_volume(wanted) && !std::filesystem::exists(wanted)) {
@@ -107,12 +109,13 @@ void check_grid(const std::string& wanted, bool pull) {
   }
 }
 
-Geometry output_grid(const std::string& wanted, const Geometry& input, const VertexField& field, Outside outside,
-                     NiftiFrame frame) {
-  const Geometry volume = straightened(input);
-  if (is_same_grid(wanted)) return volume;
+Geometry grid_of_volume(const std::string& wanted, NiftiFrame frame) {
   if (has_image_suffix(wanted)) return read_image_header(wanted, frame).geometry;
-  if (names_volume(wanted)) return straightened(open_input(grid_volume(wanted), {.stop = interrupt_token()}).geometry);
+  return straightened(open_input(grid_volume(wanted), {.stop = interrupt_token()}).geometry);
+}
+
+Geometry fitting_grid(const Geometry& input, const VertexField& field, Outside outside) {
+  const Geometry volume = straightened(input);
   // What does not reach over the volume is refused.
   if (field.mesh.is_empty()) {
     make_lattice_frame(volume, view(field, outside));

@@ -7,7 +7,7 @@
 #include "apps/cli/console.h"
 #include "apps/cli/input.h"
 #include "apps/cli/output.h"
-#include "apps/deform/field_source.h"
+#include "apps/fields/read_field.h"
 #include "apps/info/info_dicom.h"
 #include "io/dicom_dose.h"
 #include "io/field_file.h"
@@ -177,7 +177,7 @@ void print_file(const json& document) {
 
 int run_info(const InfoOptions& options) {
   refuse_pipes(options.input.path);
-  const FieldSource source = field_source(options.input.path.string(), {}, options.common.nifti_frame);
+  const FieldSource source = parse_field_file(options.input.path.string(), options.common.nifti_frame);
   const bool field = is_field_file(source), mesh = !field && is_mesh_file(source.path);
   const std::filesystem::path& path = field ? source.path : options.input.path;
   const bool transform = !field && !mesh && is_transform_file(path) && !is_folder(path);

@@ -44,6 +44,8 @@ class Rendering {
   ViewCaption caption(std::size_t number) const;
 
   const RenderOptions& options_;
+  RenderFields fields_;
+  Reads reads_;
   OutputSet outputs_;
   std::vector<fs::path> staged_;
   RenderScene scene_;
@@ -56,17 +58,21 @@ class Rendering {
 };
 
 Rendering::Rendering(const RenderOptions& options)
-    : options_(options), outputs_(reads_of(options), options.common.overwrite), scene_(options) {
+    : options_(options),
+      fields_(parse_render_fields(options)),
+      reads_(reads_of(options, fields_)),
+      outputs_(reads_, options.common.overwrite),
+      scene_(options, fields_) {
   const bool film = is_movie(options.output);
   if (!film && options.output.extension() != ".png")
     throw UsageError("unknown suffix of \"" + options.output.string() + "\"; pictures are .png, films .mp4 or .gif");
-  const bool deforms = !options.fields.empty() || !options.pull_field.empty();
-  if (options.frames > 0 && !deforms) throw UsageError("--frames needs a field that grows, -f or --pull-field");
+  if (options.frames > 0 && !fields_.deforming)
+    throw UsageError("--frames needs a field that grows, -f or --pull-field");
   if (options.frames > 0 && options.turntable > 0 && options.frames != options.turntable)
     throw UsageError("--frames and --turntable together need the same number");
-  if (!options.sequence.empty() &&
-      (options.frames > 0 || (options.turntable > 0 && options.turntable != static_cast<int>(options.sequence.size()))))
-    throw UsageError("--sequence has " + std::to_string(options.sequence.size()) +
+  if (fields_.sequence &&
+      (options.frames > 0 || (options.turntable > 0 && options.turntable != static_cast<int>(pictures()))))
+    throw UsageError("--sequence has " + std::to_string(pictures()) +
                      " fields, each a picture: leave out --frames, and give --turntable the same number");
   if (options.turntable > 0 && !is_volume()) throw UsageError("--turntable goes with --view volume only");
   if (!is_volume() && !options.transfer.empty()) throw UsageError("--transfer goes with --view volume only");
@@ -91,7 +97,7 @@ Rendering::Rendering(const RenderOptions& options)
   } else {
     for (int n = 1; n <= count; ++n) staged_.push_back(outputs_.add(frame_path(options.output, n, count)));
   }
-  outputs_.add_reads(reads_of(options).slices(options.input, scene_.header()));
+  outputs_.add_reads(reads_.slices(options.input, scene_.header()));
 }
 
 std::optional<glm::dvec3> Rendering::position() const {
@@ -149,7 +155,7 @@ void Rendering::choose_style() {
 }
 
 void Rendering::show(std::size_t number) {
-  const bool still = options_.frames == 0 && options_.sequence.empty();
+  const bool still = options_.frames == 0 && !fields_.sequence;
   if (shown_ && (still || number == *shown_)) return;
   scene_.show(number);
   if (!shown_) choose_style();

@@ -72,11 +72,11 @@ void add_looks(CLI::App& command, RenderOptions& options) {
 
 void add_deformation(CLI::App& command, RenderOptions& options) {
   auto* field = command
-                    .add_option("-f,--field", options.fields,
+                    .add_option("-f,--field", options.field.forward,
                                 "Deform VOLUME first, as `deform` does: a forward field or formula. May be repeated")
                     ->allow_extra_args(false)
                     ->type_name("FIELD");
-  auto* pull = command.add_option("--pull-field", options.pull_field, "The same by a field that maps output to input")
+  auto* pull = command.add_option("--pull-field", options.field.pull, "The same by a field that maps output to input")
                    ->type_name("FILE")
                    ->excludes(field);
   command
@@ -88,7 +88,7 @@ void add_deformation(CLI::App& command, RenderOptions& options) {
       ->excludes(pull)
       ->type_name("FIELD");
   command
-      .add_option("--cell-size", options.cell_size,
+      .add_option("--cell-size", options.field.cell_size,
                   "Vertices every B voxels, for formulas and transforms only (default 1)")
       ->check(whole_number(1, 65536))
       ->type_name("B");

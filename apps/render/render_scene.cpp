@@ -52,9 +52,19 @@ void scale(std::vector<glm::vec3>& displacement, double amount) {
   for (glm::vec3& vector : displacement) vector *= static_cast<float>(amount);
 }
 
-}  // namespace
+/// A field of which only a part of each displacement is left.
+AnyField scaled(AnyField field, double amount) {
+  if (auto* pull = std::get_if<PullField>(&field)) {
+    scale(pull->displacement, amount);
+    return field;
+  }
+  auto& forward = std::get<VertexField>(field);
+  scale(forward.displacement, amount);
+  scale(forward.mesh.displacement, amount);
+  return field;
+}
 
-OverlayWish overlay_wish(const std::string& text) {
+OverlayWish parse_overlay(const std::string& text, const RenderOptions& options) {
   const std::size_t split = text.find('=');
   const std::string name = text.substr(0, split);
   const auto found = std::find_if(kKinds.begin(), kKinds.end(), [&](const auto& kind) { return name == kind.first; });
@@ -62,26 +72,56 @@ OverlayWish overlay_wish(const std::string& text) {
     throw UsageError("unknown overlay \"" + name + "\"; there are coverage, folds, jacobian and lattice");
   if (split != std::string::npos && split + 1 == text.size())
     throw UsageError("--overlay " + text + " names no file behind =");
-  return {found->second, split == std::string::npos ? "" : text.substr(split + 1)};
+  OverlayWish wish{text, found->second, {}, {}};
+  if (split == std::string::npos) return wish;
+  const std::string source = text.substr(split + 1);
+  if (wish.kind == OverlayKind::lattice)
+    wish.lattice = parse_forward_fields({source}, options.field.cell_size, options.common.nifti_frame);
+  else
+    wish.map = source;
+  return wish;
+}
+
+}  // namespace
+
+RenderFields parse_render_fields(const RenderOptions& options) {
+  RenderFields fields;
+  if (options.field.is_given()) fields.deforming = parse_field(options.field, options.common.nifti_frame);
+  if (!options.sequence.empty())
+    fields.sequence = parse_forward_fields(options.sequence, {}, options.common.nifti_frame);
+  for (const std::string& text : options.overlays) fields.overlays.push_back(parse_overlay(text, options));
+  return fields;
+}
+
+Reads reads_of(const RenderOptions& options, const RenderFields& fields) {
+  Reads reads;
+  if (fields.deforming) reads.add_field(*fields.deforming);
+  if (fields.sequence) reads.add_field(*fields.sequence);
+  if (is_transfer_file(options)) reads.add_file(options.transfer);
+  for (const OverlayWish& wish : fields.overlays) {
+    if (wish.lattice) reads.add_field(*wish.lattice);
+    if (!wish.map.empty()) reads.add_file(wish.map);
+  }
+  reads.add_volume(options.input);
+  return reads;
 }
 
 bool is_transfer_file(const RenderOptions& options) {
   return std::filesystem::path(options.transfer).extension() == ".json";
 }
 
-RenderScene::RenderScene(const RenderOptions& options) : options_(options), input_options_(options.input) {
+RenderScene::RenderScene(const RenderOptions& options, const RenderFields& fields)
+    : options_(options), fields_(fields), input_options_(options.input), deforms_(fields.deform()) {
   input_options_.hash = FileHash::left_out;
-  deforms_ = !options.fields.empty() || !options.pull_field.empty() || !options.sequence.empty();
-  for (const std::string& text : options.overlays) {
-    const OverlayWish wish = overlay_wish(text);
-    if (wish.source.empty() && !deforms_)
-      throw UsageError("--overlay " + text + " needs the field that deforms VOLUME (-f), or a file: " + text + "=FILE");
-    if (wish.kind == OverlayKind::lattice && wish.source.empty() && !options.pull_field.empty())
+  const bool pulls = fields.deforming && std::holds_alternative<PullText>(*fields.deforming);
+  for (const OverlayWish& wish : fields.overlays) {
+    if (!wish.is_of_deformation()) continue;
+    if (!deforms_)
+      throw UsageError("--overlay " + wish.text + " needs the field that deforms VOLUME (-f), or a file: " + wish.text +
+                       "=FILE");
+    if (wish.kind == OverlayKind::lattice && pulls)
       throw UsageError("--overlay lattice needs a forward field; a pull field has no lattice that moves");
-    wishes_.push_back(wish);
   }
-  if (!options.fields.empty()) check_fields(options.fields, options.cell_size);
-  if (!options.sequence.empty()) check_fields(options.sequence, {});
   header_ = open_input(input_options_, options.common);
   grid_ = straightened(header_.geometry);
   notes_ = header_.notes;
@@ -90,7 +130,7 @@ RenderScene::RenderScene(const RenderOptions& options) : options_(options), inpu
 RenderScene::~RenderScene() = default;
 
 std::size_t RenderScene::frames() const {
-  if (!options_.sequence.empty()) return options_.sequence.size();
+  if (fields_.sequence) return fields_.sequence->fields.size();
   return static_cast<std::size_t>(std::max({options_.frames, options_.turntable, 1}));
 }
 
@@ -100,77 +140,68 @@ void RenderScene::read() {
     input_ = read_input(input_options_, header_, options_.common, stage.control());
   }
   if (!deforms_ && grid_ != header_.geometry) {  // onto a straight, even grid
-    field_.direction = Direction::pull;
-    field_.pull = resting_pull_field(grid_);
+    field_ = resting_pull_field(grid_);
     notes_.push_back("the slices of VOLUME lean or lie at uneven distances: it is shown resampled onto " +
                      to_string(grid_.size) + " voxels");
     deforms_ = true;
   } else if (deforms_) {
     Stage stage(options_.common, "field");
-    read_fields(stage.control());
+    read_field(stage.control());
   }
-  for (const OverlayWish& wish : wishes_) {
-    files_.push_back(nullptr);
-    if (wish.source.empty()) continue;
-    if (wish.kind == OverlayKind::lattice) {
-      drawn_lattice_ =
-          read_forward_field({wish.source}, header_.geometry, options_.cell_size, options_.common, {}).field;
-      lattice_resampler_ = make_cpu_resampler(grid_, {.threads = options_.common.threads});
-      lattice_resampler_->set_field(view(drawn_lattice_, Outside::background), {}, {.stop = interrupt_token()});
-      continue;
-    }
-    for (std::string& note : notes_of_file(wish.source, options_.common.nifti_frame)) notes_.push_back(std::move(note));
-    auto map = std::make_shared<AnyVolume>(read_image(wish.source, options_.common.nifti_frame));
-    require(same_grid(map->geometry(), grid_, 0.01 * std::min({grid_.spacing.x, grid_.spacing.y, grid_.spacing.z})) &&
-                map->components() == 1,
-            "an overlay has one value at each voxel of VOLUME, " + to_string(grid_.size) + ", found " +
-                to_string(map->geometry().size) + ", or another place, " + wish.source);
-    files_.back() = map;
-  }
+  for (const OverlayWish& wish : wishes()) read_overlay(wish);
 }
 
-void RenderScene::read_fields(const Control& control) {
-  const Geometry& source = header_.geometry;
-  if (!options_.pull_field.empty()) {
-    field_.direction = Direction::pull;
-    field_.pull = read_pull_field(options_.pull_field, source, grid_, options_.common, control, field_);
-    for (const std::string& note : field_.notes) notes_.push_back(note);
-  } else if (options_.sequence.empty()) {
-    field_.forward = read_forward_field(options_.fields, source, options_.cell_size, options_.common, control);
-    notes_.insert(notes_.end(), field_.forward.notes.begin(), field_.forward.notes.end());
+void RenderScene::read_overlay(const OverlayWish& wish) {
+  maps_.push_back(nullptr);
+  if (wish.lattice) {
+    drawn_lattice_ = apps::read_field(*wish.lattice, header_.geometry, options_.common.threads, {}).field;
+    lattice_resampler_ = make_cpu_resampler(grid_, {.threads = options_.common.threads});
+    lattice_resampler_->set_field(view(drawn_lattice_, Outside::background), {}, {.stop = interrupt_token()});
   }
+  if (wish.map.empty()) return;
+  for (std::string& note : notes_of_file(wish.map, options_.common.nifti_frame)) notes_.push_back(std::move(note));
+  auto map = std::make_shared<AnyVolume>(read_image(wish.map, options_.common.nifti_frame));
+  require(same_grid(map->geometry(), grid_, 0.01 * std::min({grid_.spacing.x, grid_.spacing.y, grid_.spacing.z})) &&
+              map->components() == 1,
+          "an overlay has one value at each voxel of VOLUME, " + to_string(grid_.size) + ", found " +
+              to_string(map->geometry().size) + ", or another place, " + wish.map.string());
+  maps_.back() = map;
+}
+
+void RenderScene::read_field(const Control& control) {
+  if (!fields_.deforming) return;  // of a sequence each is read when it is shown
+  const Geometry& source = header_.geometry;
+  const auto take = [&](auto&& read) {
+    field_ = std::move(read.field);
+    notes_.insert(notes_.end(), read.origin.notes.begin(), read.origin.notes.end());
+  };
+  if (const auto* pull = std::get_if<PullText>(&*fields_.deforming))
+    take(apps::read_field(*pull, source, grid_, options_.common.threads, control));
+  else
+    take(apps::read_field(std::get<ForwardText>(*fields_.deforming), source, options_.common.threads, control));
 }
 
 void RenderScene::set_frame_field(double amount, const Control& control) {
-  const Limits limits{.threads = options_.common.threads};
   if (!resampler_) {
-    resampler_ = AnyResampler(chosen(options_.backend), field_.direction, grid_, options_.device, limits);
+    const Limits limits{.threads = options_.common.threads};
+    resampler_ = make_resampler_for(field_, grid_, {options_.backend, options_.device}, limits);
     backend_ = name_of(resampler_.backend());
   }
-  if (field_.direction == Direction::pull) {
-    const PullField* shown = &field_.pull;
-    if (amount != 1) {
-      frame_pull_ = field_.pull;
-      scale(frame_pull_.displacement, amount);
-      shown = &frame_pull_;
-    }
-    return resampler_.pull().set_field(view(*shown, options_.outside), control);
-  }
-  shown_field_ = &field_.forward.field;
+  shown_field_ = &field_;
   if (amount != 1) {
-    frame_field_ = field_.forward.field;
-    scale(frame_field_.displacement, amount);
-    scale(frame_field_.mesh.displacement, amount);
+    frame_field_ = scaled(field_, amount);
     shown_field_ = &frame_field_;
   }
-  resampler_.forward().set_field(view(*shown_field_, options_.outside), {}, control);
+  set_field(resampler_, *shown_field_, options_.outside, {}, control);
 }
 
 void RenderScene::show(std::size_t frame) {
   if (!deforms_) return;
   const Control control{.stop = interrupt_token()};
-  if (!options_.sequence.empty())
-    field_.forward = read_forward_field({options_.sequence[frame]}, header_.geometry, {}, options_.common, control);
+  if (fields_.sequence) {
+    const ForwardText one{{fields_.sequence->fields[frame]}, {}};
+    field_ = apps::read_field(one, header_.geometry, options_.common.threads, control).field;
+  }
   const bool grows = options_.frames > 1;
   set_frame_field(grows ? static_cast<double>(frame) / (options_.frames - 1) : 1, control);
   if (!output_.data()) output_ = AnyVolume(grid_, input_.volume.type());
@@ -185,9 +216,9 @@ void RenderScene::show(std::size_t frame) {
 ConstVolumeView RenderScene::volume() const { return deforms_ ? output_.view() : input_.volume.view(); }
 
 const VertexField* RenderScene::lattice_field() const {
-  for (const OverlayWish& wish : wishes_) {
+  for (const OverlayWish& wish : wishes()) {
     if (wish.kind != OverlayKind::lattice) continue;
-    const VertexField& field = wish.source.empty() ? *shown_field_ : drawn_lattice_;
+    const VertexField& field = wish.lattice ? drawn_lattice_ : *shown_forward_field();
     return field.lattice.size.x > 0 ? &field : nullptr;
   }
   return nullptr;
@@ -206,27 +237,27 @@ OwnedOverlay RenderScene::computed(OverlayKind kind, const Region& region) {
   const Target target{.source = std::as_const(input_.volume).view(), .output = slab_view};
   OwnedOverlay made = make_map(*resampler_, grid_, kind, region,
                                kind == OverlayKind::coverage ? std::span(&target, 1) : std::span<const Target>());
-  if (shown_field_) made.overlay.lattice = shown_field_->lattice;
+  if (const VertexField* shown = shown_forward_field()) made.overlay.lattice = shown->lattice;
   return made;
 }
 
 OwnedOverlay RenderScene::from_file(const OverlayWish& wish, const Region& region) {
-  if (wish.kind == OverlayKind::lattice) {
+  if (wish.lattice) {
     OwnedOverlay made = make_map(*lattice_resampler_, grid_, wish.kind, region, {});
     made.overlay.lattice = drawn_lattice_.lattice;
     return made;
   }
-  const auto at = static_cast<std::size_t>(&wish - wishes_.data());
-  return {{wish.kind, files_[at]->view()}, files_[at]};
+  const auto at = static_cast<std::size_t>(&wish - wishes().data());
+  return {{wish.kind, maps_[at]->view()}, maps_[at]};
 }
 
 OwnedOverlay RenderScene::overlay(const OverlayWish& wish, const Region& region) {
-  return wish.source.empty() ? computed(wish.kind, region) : from_file(wish, region);
+  return wish.is_of_deformation() ? computed(wish.kind, region) : from_file(wish, region);
 }
 
 std::string RenderScene::field_title(std::size_t frame) const {
-  if (!options_.sequence.empty()) return title_of_fields({options_.sequence[frame]}, "");
-  return title_of_fields(options_.fields, options_.pull_field);
+  if (fields_.sequence) return title_of(ForwardText{{fields_.sequence->fields[frame]}, {}});
+  return fields_.deforming ? title_of(*fields_.deforming) : "";
 }
 
 }  // namespace tetwarp::apps

@@ -10,8 +10,8 @@
 
 #include "apps/cli/input.h"
 #include "apps/cli/options.h"
-#include "apps/deform/field_source.h"
-#include "backend/factories.h"
+#include "apps/cli/reads.h"
+#include "apps/fields/read_field.h"
 #include "io/overlay.h"
 #include "io/slice_picture.h"
 
@@ -19,11 +19,26 @@ namespace tetwarp::apps {
 
 /// An overlay from the command line: "jacobian", "jacobian=FILE" or "lattice=FIELD".
 struct OverlayWish {
+  std::string text;
   OverlayKind kind = OverlayKind::coverage;
-  std::string source;  ///< empty: of the field that deforms the volume
+  std::filesystem::path map;           ///< a file; empty: of the field that deforms the volume, or a lattice
+  std::optional<ForwardText> lattice;  ///< of lattice=FIELD
+
+  /// Whether it is of the field that deforms the volume.
+  bool is_of_deformation() const { return map.empty() && !lattice; }
 };
-/// @throws UsageError
-OverlayWish overlay_wish(const std::string& text);
+
+/// The fields that a picture is made with, parsed.
+struct RenderFields {
+  std::optional<FieldText> deforming;   ///< the volume, in all pictures
+  std::optional<ForwardText> sequence;  ///< instead: each of its fields deforms one picture
+  std::vector<OverlayWish> overlays;
+
+  bool deform() const { return deforming || sequence; }
+};
+/// @throws UsageError for fields as parse_field does, and for an overlay that is not known
+RenderFields parse_render_fields(const RenderOptions& options);
+Reads reads_of(const RenderOptions& options, const RenderFields& fields);
 
 /// Whether --transfer is the name of a file.
 bool is_transfer_file(const RenderOptions& options);
@@ -38,9 +53,9 @@ struct OwnedOverlay {
 /// other.
 class RenderScene {
  public:
-  /// Opens all inputs that the options name.
-  /// @throws InputError and others, as `open_input`
-  explicit RenderScene(const RenderOptions& options);
+  /// Opens the volume. Refers to options and fields.
+  /// @throws UsageError for an overlay that lacks the field that it is of; others as `open_input`
+  RenderScene(const RenderOptions& options, const RenderFields& fields);
   ~RenderScene();
 
   void read();
@@ -53,7 +68,7 @@ class RenderScene {
   ConstVolumeView volume() const;  ///< of the frame that is shown
   const VertexField* lattice_field()
       const;  ///< that moves the volume in this frame; null: there is none with a lattice
-  const std::vector<OverlayWish>& wishes() const { return wishes_; }
+  const std::vector<OverlayWish>& wishes() const { return fields_.overlays; }
   /// What lies over a part of the volume. @param wish  one of `wishes()`
   OwnedOverlay overlay(const OverlayWish& wish, const Region& region);
   /// "wave:amplitude=8, then twist.mha", without folders; empty: nothing deforms.
@@ -62,27 +77,30 @@ class RenderScene {
   const std::vector<std::string>& notes() const { return notes_; }
 
  private:
-  void read_fields(const Control& control);
+  void read_field(const Control& control);
+  void read_overlay(const OverlayWish& wish);
+  const VertexField* shown_forward_field() const {
+    return shown_field_ ? std::get_if<VertexField>(shown_field_) : nullptr;
+  }
   void set_frame_field(double amount, const Control& control);
   OwnedOverlay computed(OverlayKind kind, const Region& region);
   OwnedOverlay from_file(const OverlayWish& wish, const Region& region);
 
   const RenderOptions& options_;
+  const RenderFields& fields_;
   InputOptions input_options_;  ///< without the hash, which is not used
-  std::vector<OverlayWish> wishes_;
   InputHeader header_;
   InputVolume input_;
   Geometry grid_;
   bool deforms_ = false;
-  AnyField field_;           ///< whole
-  VertexField frame_field_;  ///< of a frame in which it has not grown to its whole
-  PullField frame_pull_;
-  const VertexField* shown_field_ = nullptr;  ///< of the frame: that one, or the whole
-  VertexField drawn_lattice_;                 ///< of `lattice=FIELD`
+  AnyField field_;                         ///< whole
+  AnyField frame_field_;                   ///< of a frame in which it has not grown to its whole
+  const AnyField* shown_field_ = nullptr;  ///< of the frame: that one, or the whole
+  VertexField drawn_lattice_;              ///< of `lattice=FIELD`
   AnyVolume output_;
   AnyResampler resampler_;
   std::unique_ptr<ForwardResampler> lattice_resampler_;
-  std::vector<std::shared_ptr<const AnyVolume>> files_;  ///< of the wishes; null where there is none
+  std::vector<std::shared_ptr<const AnyVolume>> maps_;  ///< of the overlays; null where there is none
   std::string backend_;
   std::vector<std::string> notes_;
 };

@@ -25,13 +25,15 @@ namespace fs = std::filesystem;
 
 /// The outputs of the command, before they have their names.
 struct Outputs {
+  Reads reads;  ///< that none of them may touch
   OutputSet set;
   fs::path field, report;
   std::vector<std::pair<int, fs::path>> frames;  ///< by rising number
 };
 
 Outputs begin_outputs(const SimulateOptions& options, const Scenario& scenario) {
-  Outputs outputs{OutputSet(reads_of(options), options.common.overwrite), {}, {}, {}};
+  const Reads reads = reads_of(options);
+  Outputs outputs{reads, OutputSet(reads, options.common.overwrite), {}, {}, {}};
   outputs.field = outputs.set.add(options.output);
   const int frames = frame_count(scenario);
   for (int number = options.every; options.every > 0 && number <= frames; number += options.every)
@@ -67,12 +69,12 @@ void Simulating::read() {
   {
     Stage stage(options_.common, "read");
     const InputHeader header = open_input(options_.input, options_.common);
-    outputs_.set.add_reads(reads_of(options_).slices(options_.input, header));
+    outputs_.set.add_reads(outputs_.reads.slices(options_.input, header));
     if (header.series) warnings_ = header.series->warnings;
     notes_ = header.notes;
     volume = read_input(options_.input, header, options_.common, stage.control()).volume;
     if (!options_.labels.empty()) {
-      const InputOptions from{.path = options_.labels, .series = {}, .nifti_frame = options_.common.nifti_frame};
+      const InputOptions from = volume_named(options_.labels, options_.common.nifti_frame);
       const InputHeader labels_header = open_input(from, options_.common);
       notes_.insert(notes_.end(), labels_header.notes.begin(), labels_header.notes.end());
       labels = read_input(from, labels_header, options_.common, stage.control()).volume;

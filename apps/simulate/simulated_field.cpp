@@ -7,7 +7,6 @@
 #include "apps/simulate/simulate_report.h"
 #include "backend/factories.h"
 #include "io/mesh_writer.h"
-#include "io/scenario_file.h"
 
 namespace tetwarp::apps {
 
@@ -30,15 +29,14 @@ SimulateOptions as_simulation(const DeformOptions& options, const Worker& worker
 }
 
 AnyVolume read_labels(const DeformOptions& options, const Control& control) {
-  const InputOptions from{.path = options.labels, .series = {}, .nifti_frame = options.common.nifti_frame};
+  const InputOptions from = volume_named(options.labels, options.common.nifti_frame);
   return read_input(from, open_input(from, control), options.common, control).volume;
 }
 
 }  // namespace
 
-SimulatedField simulate_field(const DeformOptions& options, const ConstVolumeView& ct, const Worker& worker,
-                              const Control& control) {
-  const Scenario scenario = read_scenario(options.scenario);
+SimulatedField simulate_field(const DeformOptions& options, const Scenario& scenario, const ConstVolumeView& ct,
+                              const Worker& worker, const Control& control) {
   const Control quiet{.stop = control.stop};
   SimulatedField result;
   Patient patient;
@@ -71,19 +69,18 @@ SimulatedField simulate_field(const DeformOptions& options, const ConstVolumeVie
   }
   result.field = run->field();
   result.warnings = warnings_of(record);
-  result.source = {.scenario = options.scenario.string(),
-                   .scenario_sha256 = hash_file(options.scenario),
-                   .labels = options.labels.string(),
-                   .labels_sha256 = options.labels.empty()
-                                        ? ""
-                                        : hash_volume({.path = options.labels, .series = {}}, options.common.threads),
-                   .method = name_of(scenario.method),
-                   .backend = name_of(backend)};
+  result.source = {
+      .scenario = options.scenario.string(),
+      .scenario_sha256 = hash_file(options.scenario),
+      .labels = options.labels.string(),
+      .labels_sha256 = options.labels.empty() ? "" : hash_volume(volume_named(options.labels), options.common.threads),
+      .method = name_of(scenario.method),
+      .backend = name_of(backend)};
   return result;
 }
 
-std::uint64_t simulation_bytes(const std::filesystem::path& scenario, const Geometry& volume, bool labels) {
-  const glm::i64vec3 vertices = lattice_over(straightened(volume), read_scenario(scenario).cell_size).size;
+std::uint64_t simulation_bytes(const Scenario& scenario, const Geometry& volume, bool labels) {
+  const glm::i64vec3 vertices = lattice_over(straightened(volume), scenario.cell_size).size;
   return static_cast<std::uint64_t>(vertices.x * vertices.y * vertices.z) * kBytesPerVertex +
          (labels ? static_cast<std::uint64_t>(voxel_count(volume)) * sizeof(std::int32_t) : 0);
 }

@@ -14,7 +14,7 @@
 
 namespace tetwarp::apps {
 
-/// The files that a simulated field is made of, beside INPUT, with their SHA-256.
+/// The files that a simulated field is made of, other than INPUT, with their SHA-256.
 struct SimulationSource {
   std::string scenario, scenario_sha256;
   std::string labels, labels_sha256;  ///< empty: none
@@ -28,12 +28,13 @@ struct SimulatedField {
   std::vector<std::string> warnings;  ///< for people
 };
 
+/// @param options  of which file `scenario` is, and its labels
 /// @param ct  INPUT in HU. @throws InputError for a scenario that cannot be played on it, and what a simulation throws
-SimulatedField simulate_field(const DeformOptions& options, const ConstVolumeView& ct, const Worker& worker,
-                              const Control& control);
+SimulatedField simulate_field(const DeformOptions& options, const simulate::Scenario& scenario,
+                              const ConstVolumeView& ct, const Worker& worker, const Control& control);
 
-/// About what a simulation and its field hold, beside INPUT. @throws InputError for a file that is no scenario
-std::uint64_t simulation_bytes(const std::filesystem::path& scenario, const Geometry& volume, bool labels);
+/// About what a simulation and its field hold, without INPUT.
+std::uint64_t simulation_bytes(const simulate::Scenario& scenario, const Geometry& volume, bool labels);
 
 /// Only a mesh holds open cuts. @param every_phase  whether the fields on the way are written too
 /// @throws InputError for a phase whose field is written to `output`, and is divided

@@ -50,6 +50,10 @@ void append(const TetrahedralMesh& added, const Geometry& lattice, TetrahedralMe
 
 }  // namespace
 
+bool has_lattice_vertices(const VertexField& field) {
+  return !field.mesh.lattice_vertex.empty() && field.lattice.size.x != 0;
+}
+
 TetrahedralMesh mesh_of(const FieldView& field) {
   if (field.mesh) require_fitting_arrays(*field.mesh, field.lattice);
   if (field.mesh && field.replaced.empty()) return *field.mesh;
@@ -95,5 +99,10 @@ TetrahedralMesh mesh_of(const FieldView& field) {
 }
 
 TetrahedralMesh mesh_of(const VertexField& field) { return mesh_of(view(field)); }
+
+std::optional<TetrahedralMesh> mesh_of_cut(const FieldView& field) {
+  if (field.replaced.empty()) return std::nullopt;
+  return mesh_of(field);
+}
 
 }  // namespace tetwarp

@@ -3,9 +3,15 @@
 
 #pragma once
 
+#include <optional>
+
 #include "deform/vertex_field.h"
 
 namespace tetwarp {
+
+/// Whether the mesh of a field says which vertices of the field's lattice its own are
+/// (`TetrahedralMesh::lattice_vertex`).
+bool has_lattice_vertices(const VertexField& field);
 
 /// The five tetrahedra of every cell of a lattice, as a mesh with the same numbers. Tetrahedra that replace cells
 /// follow after all others. A mesh that stands alone is returned as it is.
@@ -17,5 +23,8 @@ namespace tetwarp {
 TetrahedralMesh mesh_of(const FieldView& field);
 /// The tetrahedra of a field as a mesh: `mesh_of` of its view.
 TetrahedralMesh mesh_of(const VertexField& field);
+/// The mesh that a lattice with replaced cells is made into, as `mesh_of` makes it; none of any other field, whose
+/// mesh, if it has one, serves as it is.
+std::optional<TetrahedralMesh> mesh_of_cut(const FieldView& field);
 
 }  // namespace tetwarp

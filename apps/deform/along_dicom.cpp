@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "apps/deform/further_dicom.h"
+#include "apps/deform/along_dicom.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,9 +12,7 @@
 
 namespace tetwarp::apps {
 
-bool is_object_output(const std::filesystem::path& output) { return output.extension() == ".dcm"; }
-
-DicomSegmentation open_segmentation(const FurtherOptions& options, const InputHeader& input) {
+DicomSegmentation open_segmentation(const AlongVolumeText& options, const InputHeader& input) {
   const std::string name = options.input.path.string();
   if (!is_object_output(options.output))
     throw UsageError("a SEG comes out as a SEG, " + name + "; name the output of --with .dcm");
@@ -55,14 +53,13 @@ std::optional<std::string> compare_frames(const std::filesystem::path& path, con
   return std::nullopt;
 }
 
-DicomAlong along_with(const FurtherOptions& options, const std::string& sha256, const Target& target,
-                      const DerivedOutput& series) {
+DicomAlong along_with(const AlongVolumeText& options, const std::string& sha256, Interpolation interpolation,
+                      double background, const DerivedOutput& series) {
   DicomAlong along{options.input.path, sha256, series.derivation};
-  const std::string interpolation = name_of(target.interpolation);
-  along.derivation.parameters = "interpolation=" + interpolation +
-                                " background=" + nlohmann::json(target.background).dump() +
+  const std::string name = name_of(interpolation);
+  along.derivation.parameters = "interpolation=" + name + " background=" + nlohmann::json(background).dump() +
                                 (options.own ? " grid=own " : " grid=output ") + series.derivation.parameters;
-  along.derivation.description += ", " + interpolation + " interpolation";
+  along.derivation.description += ", " + name + " interpolation";
   return along;
 }
 

@@ -8,9 +8,8 @@
 
 #include "apps/cli/input.h"
 #include "apps/cli/reads.h"
-#include "apps/deform/field_source.h"
 #include "apps/deform/map_outputs.h"
-#include "backend/factories.h"
+#include "apps/fields/read_field.h"
 #include "deform/fields/continued.h"
 #include "io/field_file.h"
 #include "io/image_file.h"
@@ -30,25 +29,25 @@ std::string text_of(const Residuals& residuals) {
 
 /// The map to invert, from wherever the lattice is to places in the grid of --like.
 struct Invertible {
-  VertexField field;
-  std::vector<std::string> notes;
-  std::vector<ReadField> files;
-  bool identity = false;
+  AnyField field;  ///< forward
+  FieldOrigin origin;
   Geometry pull_grid = {};  ///< of a pull field, before it was continued
+
+  const VertexField& forward() const { return std::get<VertexField>(field); }
 };
 
-Invertible read_invertible(const InvertOptions& options, const Geometry& like, const Control& control) {
-  if (options.pull_field.empty()) {
-    ForwardField read = read_forward_field(options.fields, like, options.cell_size, options.common, control);
-    return {std::move(read.field), std::move(read.notes), std::move(read.files), read.identity};
-  }
-  AnyField found;
+Invertible read_invertible(const ForwardText& text, const Geometry& like, int threads, const Control& control) {
+  ReadForwardField read = read_field(text, like, threads, control);
+  return {std::move(read.field), std::move(read.origin)};
+}
+
+Invertible read_invertible(const PullText& text, const Geometry& like, int threads, const Control& control) {
   const Geometry grid = straightened(like);  // of the vertices of the inverse, on which a tilted stack is not held
-  const PullField pull = read_pull_field(options.pull_field, like, grid, options.common, control, found);
+  ReadPullField read = read_field(text, like, grid, threads, control);
   try {
-    return {continued_over(pull, grid), std::move(found.notes), std::move(found.files), false, pull.grid};
+    return {continued_over(read.field, grid), std::move(read.origin), read.field.grid};
   } catch (const InputError& error) {
-    throw InputError(std::string(error.what()) + ", " + options.pull_field);
+    throw InputError(std::string(error.what()) + ", " + text.field.text);
   }
 }
 
@@ -85,22 +84,22 @@ std::uint64_t count_beyond(const VolumeView& samples, const Geometry& grid) {
 void check_forward(const InvertOptions& options, const Inversion& result, Invertible& field) {
   require(result.report.uncovered == 0, std::to_string(result.report.uncovered) + " voxels of " +
                                             options.like.path.string() + " have no place by the inverse of " +
-                                            options.pull_field + "; a forward field needs one at every vertex");
+                                            options.field.pull + "; a forward field needs one at every vertex");
   if (result.beyond == 0) return;
-  field.notes.push_back(std::to_string(result.beyond) + " of " + std::to_string(voxel_count(result.grid)) +
-                        " vertices go beyond the grid of " + options.pull_field +
-                        ", which goes on there with its outermost samples");
+  field.origin.notes.push_back(std::to_string(result.beyond) + " of " + std::to_string(voxel_count(result.grid)) +
+                               " vertices go beyond the grid of " + options.field.pull +
+                               ", which goes on there with its outermost samples");
 }
 
 json document_of(const InvertOptions& options, const Invertible& field, const Inversion& result) {
   json document = provenance("invert");
   document["backend"] = result.backend;
   document["field"] = {{"sha256", hash_field(field.field, options.common.threads)},
-                       {"notes", field.notes},
-                       {"files", to_json(field.files)}};
+                       {"notes", field.origin.notes},
+                       {"files", to_json(field.origin.files)}};
   document["field"].update(place_json(field.field));
   document["output"] = {{"path", options.output.string()},
-                        {"direction", options.pull_field.empty() ? "pull" : "forward"},
+                        {"direction", options.field.pull.empty() ? "pull" : "forward"},
                         {"geometry", to_json(result.grid)}};
   document["covered"] = result.report.covered;
   document["uncovered"] = result.report.uncovered;
@@ -115,12 +114,12 @@ json document_of(const InvertOptions& options, const Invertible& field, const In
 }
 
 void say_all(const InvertOptions& options, const Invertible& field, const Inversion& result) {
-  for (const std::string& note : field.notes) say(options.common, "tetwarp: note: " + note);
+  for (const std::string& note : field.origin.notes) say(options.common, "tetwarp: note: " + note);
   if (result.report.inverted > 0) {
     say(options.common, "tetwarp: warning: the field folds, " + std::to_string(result.report.inverted) +
                             " tetrahedra are inverted: where several places map to one, the inverse gives one of them");
   }
-  const bool forward = !options.pull_field.empty();
+  const bool forward = !options.field.pull.empty();
   say(options.common,
       "wrote " + options.output.string() + (forward ? ": forward field, " : ": inverse displacement, ") +
           to_string(result.grid.size) +
@@ -138,8 +137,8 @@ class UnwrittenSeries {
         writer_({}, straightened(like.geometry), *headers_,
                 {.field_sha256 = hash_field(field.field, options.common.threads),
                  .parameters = "direction=forward",
-                 .description = field.identity ? "The identity, inverted" : "A field of vertices, inverted",
-                 .deformed = !field.identity}) {}
+                 .description = field.origin.identity ? "The identity, inverted" : "A field of vertices, inverted",
+                 .deformed = !field.origin.identity}) {}
 
   const DerivedSeriesWriter& writer() const { return writer_; }
 
@@ -152,12 +151,11 @@ class UnwrittenSeries {
 Inversion invert(const InvertOptions& options, const Geometry& like, Invertible& field,
                  const std::filesystem::path& output, const UnwrittenSeries* series, OutputSet& outputs) {
   const Control stop{.stop = interrupt_token()};
-  const bool pulls = !options.pull_field.empty();
+  const bool pulls = !options.field.pull.empty();
   const Limits limits{.threads = options.common.threads};
-  const BackendKind backend = chosen(options.backend);
-  const auto resampler = make_forward_resampler(backend, like, options.device, limits);
-  Inversion result{.backend = name_of(backend), .grid = like, .report = {}, .there = {}, .back = {}};
-  InverseCheck check(field.field, like, limits);
+  const AnyResampler resampler = make_resampler_for(field.field, like, {options.backend, options.device}, limits);
+  Inversion result{.backend = name_of(resampler.backend()), .grid = like, .report = {}, .there = {}, .back = {}};
+  InverseCheck check(field.forward(), like, limits);
   MapStream stream(like, outputs);
   outputs.write([&] {
     stream.add(&Maps::inverse_mm, series
@@ -165,7 +163,7 @@ Inversion invert(const InvertOptions& options, const Geometry& like, Invertible&
                                       : create_field_file(output, like, pulls ? Direction::forward : Direction::pull));
   });
   Stage stage(options.common, "invert");
-  resampler->set_field(view(field.field, Outside::background), {.jacobian_range = false}, stop);
+  set_field(resampler, field.field, Outside::background, {.jacobian_range = false}, stop);
   stream.run([&](const Region& slab, const Maps& maps) {
     result.report += resample_slab(*resampler, slab, {}, maps, stage.control());
     const double begun = stage.seconds();
@@ -188,7 +186,7 @@ void check_output(const InvertOptions& options) {
     throw UsageError("unknown suffix of \"" + name +
                      "\"; a displacement field is written as .mha .nrrd .nii .nii.gz, or .dcm");
   }
-  if (!options.pull_field.empty()) {
+  if (!options.field.pull.empty()) {
     throw UsageError("the inverse of a pull field is a forward field, which a DICOM registration, " + name +
                      ", cannot hold; name it .mha .nrrd .nii .nii.gz");
   }
@@ -201,11 +199,11 @@ void check_output(const InvertOptions& options) {
 }  // namespace
 
 int run_invert(const InvertOptions& options) {
-  const bool pulls = !options.pull_field.empty();
+  const bool pulls = !options.field.pull.empty();
   check_output(options);
-  if (pulls && options.cell_size) throw UsageError("--cell-size does not go with --pull-field; leave it out");
-  if (!pulls) check_fields(options.fields, options.cell_size);
-  const Reads reads = reads_of(options);
+  if (pulls && options.field.cell_size) throw UsageError("--cell-size does not go with --pull-field; leave it out");
+  const FieldText text = parse_field(options.field, options.common.nifti_frame);
+  const Reads reads = reads_of(text, options.like);
   OutputSet outputs(reads, options.common.overwrite);
   const std::filesystem::path output = outputs.add(options.output), report_path = outputs.add(options.report);
   const InputHeader like = open_input(options.like, options.common);
@@ -219,8 +217,10 @@ int run_invert(const InvertOptions& options) {
 
   Stage field_stage(options.common, "field");
   const Geometry grid = straightened(like.geometry);
-  Invertible field = read_invertible(options, like.geometry, field_stage.control());
-  field.notes.insert(field.notes.begin(), like.notes.begin(), like.notes.end());
+  const Control control = field_stage.control();
+  Invertible field = std::visit(
+      [&](const auto& one) { return read_invertible(one, like.geometry, options.common.threads, control); }, text);
+  field.origin.notes.insert(field.origin.notes.begin(), like.notes.begin(), like.notes.end());
   const double field_seconds = field_stage.seconds();
   std::optional<UnwrittenSeries> series;
   if (registers) series.emplace(options, like, field, Control{.stop = interrupt_token()});

@@ -12,7 +12,7 @@ namespace tetwarp::apps {
 /// used.
 /// @return the future result; its destructor waits
 template <class Call>
-auto beside(Call&& call) {
+auto in_background(Call&& call) {
   return std::async(std::launch::async | std::launch::deferred, std::forward<Call>(call));
 }
 

@@ -55,7 +55,7 @@ Geometry grid_about(const glm::dvec3& middle, const glm::i64vec3& size, const gl
   return grid;
 }
 
-TEST(Further, AVolumeComesOutAsItDoesAlone) {
+TEST(Along, AVolumeComesOutAsItDoesAlone) {
   const Scratch scratch;
   expect_run(scratch, "phantom --size 40,36,24 --spacing 3,3,4 --quiet -o ct.mha");
   expect_run(scratch, "phantom --size 22,19,17 --spacing 5,6,5 --seed 7 --quiet -o pet.nrrd");

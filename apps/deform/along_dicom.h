@@ -6,20 +6,11 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "apps/cli/input.h"
-#include "apps/cli/options.h"
+#include "apps/deform/along_text.h"
 #include "io/dicom_dose.h"
 #include "io/dicom_segmentation.h"
 
 namespace tetwarp::apps {
-
-/// One --with: IN=OUT, and what follows OUT.
-struct FurtherOptions {
-  InputOptions input;
-  std::filesystem::path output;
-  std::optional<Interpolation> interpolation;  ///< none: that of INPUT; of a segmentation see usual_interpolation
-  std::optional<double> background;            ///< none: as for INPUT; of a DICOM object 0
-  bool own = false;                            ///< onto its own grid instead of the output's
-};
 
 /// OUTPUT, where it is a series: as it was written, and how it came to be.
 struct DerivedOutput {
@@ -27,12 +18,9 @@ struct DerivedOutput {
   DicomDerivation derivation;  ///< its parameters and description without what is about the voxels of INPUT
 };
 
-/// Whether an output of --with is a DICOM object: ".dcm".
-bool is_object_output(const std::filesystem::path& output);
-
 /// The header of a SEG. @throws UsageError for an output that is none, or a background; what read_segmentation_header
 /// throws
-DicomSegmentation open_segmentation(const FurtherOptions& options, const InputHeader& input);
+DicomSegmentation open_segmentation(const AlongVolumeText& options, const InputHeader& input);
 
 /// The grid that a segmentation goes back onto: that of its frames, with as many slices more as lie between those of
 /// INPUT if they are parallel, so that what is moved beyond the outermost frames is not lost.
@@ -46,9 +34,9 @@ Interpolation usual_interpolation(const DicomSegmentation& segmentation);
 std::optional<std::string> compare_frames(const std::filesystem::path& path, const std::string& frame,
                                           const InputHeader& input);
 
-/// How an object came to be. @param target  what it went through the field as
-DicomAlong along_with(const FurtherOptions& options, const std::string& sha256, const Target& target,
-                      const DerivedOutput& series);
+/// How an object came to be. @param interpolation, background  with which it went through the field
+DicomAlong along_with(const AlongVolumeText& options, const std::string& sha256, Interpolation interpolation,
+                      double background, const DerivedOutput& series);
 
 nlohmann::json to_json(const DoseReport& report);
 nlohmann::json to_json(const SegmentationReport& report, const DicomSegmentation& segmentation);

@@ -1,0 +1,157 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include "apps/fields/field_text.h"
+
+#include "deform/fields/formula.h"
+#include "io/mesh_file.h"
+#include "io/opened_file.h"
+#include "io/transform_file.h"
+
+namespace tetwarp::apps {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+/// What is wrong with a text is a mistake of the command line, not of an input.
+template <class Call>
+auto as_usage(Call&& call) {
+  try {
+    return call();
+  } catch (const InputError& error) {
+    throw UsageError(error.what());
+  }
+}
+
+/// A formula whose parameters are right on a volume of any size.
+NamedField parse_named_formula(const std::string& text) {
+  Geometry any;
+  any.size = glm::i64vec3(2);
+  NamedField formula{text, NamedFormula{}};
+  formula_map(formula, any);
+  return formula;
+}
+
+/// A file with its options, and whether it is a mesh.
+struct ParsedFile {
+  FieldSource source;
+  bool is_mesh = false;
+};
+
+ParsedFile parse_file(const std::string& text, NiftiFrame frame) {
+  ParsedFile file{as_usage([&] { return parse_field_source(text); })};
+  file.source.nifti_frame = frame;
+  file.is_mesh = is_mesh_file(file.source.path);  // a file that cannot be read is no mistake of the command line
+  as_usage([&] { file.is_mesh ? check_mesh_options(file.source) : check_field_options(file.source); });
+  return file;
+}
+
+/// Of a text that is no formula. A transform takes no options.
+NamedField named_file(const std::string& text, ParsedFile file) {
+  if (file.source.options.empty() && is_transform_file(file.source.path))
+    return {text, NamedTransform{std::move(file.source.path)}};
+  if (file.is_mesh) return {text, NamedMesh{std::move(file.source)}};
+  return {text, NamedLattice{std::move(file.source)}};
+}
+
+NamedField parse_forward_field(const std::string& text, NiftiFrame frame) {
+  if (is_formula(text)) return parse_named_formula(text);
+  ParsedFile file = parse_file(text, frame);
+  if (found_at(file.source.path) == Found::nothing)
+    throw UsageError("\"" + text + "\" is neither a formula nor a file that exists; see tetwarp deform --help");
+  return named_file(text, std::move(file));
+}
+
+/// What a field is called: a formula by its text, a file without its folder.
+std::string title_of(const NamedField& field) {
+  if (const auto* transform = std::get_if<NamedTransform>(&field.what)) return transform->file.filename().string();
+  const FieldSource* file = source_of(field);
+  return file ? file->path.filename().string() : field.text;
+}
+
+template <class Title>
+std::string joined(const std::vector<NamedField>& fields, Title&& title) {
+  std::string text;
+  for (const NamedField& field : fields) text += (text.empty() ? "" : ", then ") + title(field);
+  return text;
+}
+
+}  // namespace
+
+const FieldSource* source_of(const NamedField& field) {
+  if (const auto* lattice = std::get_if<NamedLattice>(&field.what)) return &lattice->file;
+  if (const auto* mesh = std::get_if<NamedMesh>(&field.what)) return &mesh->file;
+  return nullptr;
+}
+
+PointMap formula_map(const NamedField& formula, const Geometry& volume) {
+  return as_usage([&] { return parse_formula(formula.text, volume); });
+}
+
+std::vector<fs::path> files_of(const NamedField& field) {
+  if (const auto* transform = std::get_if<NamedTransform>(&field.what)) {
+    try {
+      return files_of_transform(transform->file);
+    } catch (const Error&) {  // whoever reads it says why, and nothing is written
+      return {transform->file};
+    }
+  }
+  const FieldSource* file = source_of(field);
+  if (!file) return {};
+  std::vector<fs::path> files = {file->path};
+  if (file->options.contains("deformed")) files.emplace_back(file->option("deformed"));
+  return files;
+}
+
+std::vector<fs::path> files_of(const FieldText& field) {
+  if (const auto* pull = std::get_if<PullText>(&field)) return files_of(pull->field);
+  std::vector<fs::path> files;
+  for (const NamedField& one : std::get<ForwardText>(field).fields) {
+    for (fs::path& file : files_of(one)) files.push_back(std::move(file));
+  }
+  return files;
+}
+
+std::string title_of(const FieldText& field) {
+  if (const auto* pull = std::get_if<PullText>(&field)) return "pull field " + title_of(pull->field);
+  return joined(std::get<ForwardText>(field).fields, [](const NamedField& one) { return title_of(one); });
+}
+
+std::string title_without_names(const FieldText& field) {
+  if (std::holds_alternative<PullText>(field)) return "deformed";
+  return joined(std::get<ForwardText>(field).fields, [](const NamedField& one) {
+    return std::holds_alternative<NamedFormula>(one.what) ? one.text : std::string("a field of a file");
+  });
+}
+
+FieldSource parse_field_file(const std::string& text, NiftiFrame frame) { return parse_file(text, frame).source; }
+
+ForwardText parse_forward_fields(const std::vector<std::string>& texts, std::optional<std::int64_t> cell_size,
+                                 NiftiFrame frame) {
+  if (texts.empty()) throw UsageError("no field; give -f FIELD or --pull-field FILE");
+  ForwardText parsed{{}, cell_size};
+  for (const std::string& text : texts) parsed.fields.push_back(parse_forward_field(text, frame));
+  for (std::size_t n = 1; n < texts.size(); ++n) {
+    if (std::holds_alternative<NamedMesh>(parsed.fields[n].what)) {
+      throw UsageError("the mesh " + texts[n] +
+                       " comes after another field, but moves its own vertices alone; let it be the first -f");
+    }
+  }
+  if (!cell_size) return parsed;
+  if (*cell_size < 1) throw UsageError("--cell-size is " + std::to_string(*cell_size) + ", expected at least 1");
+  if (source_of(parsed.fields.front()))
+    throw UsageError("--cell-size is for formulas and transforms, " + texts.front() + " has its own vertices");
+  return parsed;
+}
+
+PullText parse_pull_field(const std::string& text, NiftiFrame frame) {
+  return {named_file(text, parse_file(text, frame))};
+}
+
+FieldText parse_field(const FieldArguments& given, NiftiFrame frame) {
+  if (!given.pull.empty()) return parse_pull_field(given.pull, frame);
+  return parse_forward_fields(given.forward, given.cell_size, frame);
+}
+
+}  // namespace tetwarp::apps

@@ -1,0 +1,196 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include "apps/fields/read_field.h"
+
+#include <nlohmann/json.hpp>
+
+#include "apps/cli/console.h"
+#include "deform/core/five_tetrahedra.h"
+#include "io/transform_file.h"
+
+namespace tetwarp::apps {
+
+namespace {
+
+TransformFile read(const NamedTransform& transform) { return read_transform_file(transform.file, interrupt_token()); }
+
+/// @param volume  for which the field is meant
+FieldSource for_volume(FieldSource file, const Geometry& volume) {
+  file.grid = volume;
+  return file;
+}
+
+/// What a header has to say, and what is taken to hold where it says nothing of its direction.
+void note_header(const FieldFileHeader& header, const std::string& path, const char* assumed, FieldOrigin& origin) {
+  if (!header.direction) origin.notes.push_back(path + " does not say its direction: taken as " + assumed);
+  for (const std::string& note : header.notes) origin.notes.push_back(path + ": " + note);
+  origin.files.push_back({path, header});
+}
+
+/// What to say of a transform once it was evaluated at every vertex or voxel.
+void note_transform(const TransformFile& transform, const std::string& path, bool pulls, FieldOrigin& origin) {
+  const std::string taken = pulls ? "output to input" : "forward, each vertex x goes to T(x)";
+  if (!transform.pulls) origin.notes.push_back(path + " does not say its direction: taken as " + taken);
+  if (transform.pulls && !pulls)
+    origin.notes.push_back(path + ": transforms of " + transform.tool + " map output to input; taken as " + taken);
+  if (const std::uint64_t outside = *transform.outside; outside > 0) {
+    origin.notes.push_back(path + ": " + std::to_string(outside) + (pulls ? " voxels" : " vertices") +
+                           " lie outside its domain, " + transform.beyond);
+  }
+}
+
+FieldFileHeader field_header_of(const MeshFileHeader& mesh) {
+  FieldFileHeader header;
+  header.format = mesh.format;
+  header.direction = Direction::forward;
+  header.frame = mesh.frame;
+  header.units = mesh.units;
+  header.direction_basis = header.absolute_basis = FieldBasis::by_format;
+  header.frame_basis = mesh.frame_basis;
+  header.units_basis = mesh.units_basis;
+  return header;
+}
+
+/// Makes one field of several, in the order in which they are applied.
+class Composition {
+ public:
+  Composition(const ForwardText& text, const Geometry& volume, int threads, const Control& control)
+      : volume_(volume), cell_size_(text.cell_size.value_or(1)), limits_{.threads = threads}, control_(control) {
+    result_.origin.identity = true;
+    for (const NamedField& field : text.fields) {
+      result_.origin.identity = result_.origin.identity && field.text == "identity";
+      std::visit([&](const auto& what) { add(field, what); }, field.what);
+      is_first_ = false;
+    }
+  }
+
+  ReadForwardField result() && { return std::move(result_); }
+
+ private:
+  void add(const NamedField& field, const NamedFormula&) { add(formula_map(field, volume_)); }
+  void add(const NamedField&, const NamedTransform& named) {
+    const TransformFile transform = read(named);
+    add(transform.displacement);
+    note_transform(transform, named.file.string(), false, result_.origin);
+  }
+  void add(const NamedField&, const NamedLattice& named) {
+    const FieldSource source = for_volume(named.file, volume_);
+    note_header(read_field_header(source), source.path.string(), "forward", result_.origin);
+    VertexField next = read_forward_field(source);
+    if (is_first_)
+      result_.field = std::move(next);
+    else
+      compose(result_.field, piecewise_affine(next), limits_, control_);
+  }
+  /// The first of all, as a ForwardText has it.
+  void add(const NamedField&, const NamedMesh& named) {
+    MeshFile file = read_mesh_file(named.file);
+    const std::string path = named.file.path.string();
+    for (const std::string& note : file.header.notes) result_.origin.notes.push_back(path + ": " + note);
+    result_.origin.files.push_back({path, field_header_of(file.header), file.header});
+    result_.field.mesh = std::move(file.mesh);
+    result_.field.lattice = file.lattice;
+  }
+  void add(const PointMap& map) {
+    if (is_first_)
+      result_.field = sample_on(lattice_over(straightened(volume_), cell_size_), map, limits_, control_);
+    else
+      compose(result_.field, map, limits_, control_);
+  }
+
+  const Geometry& volume_;
+  std::int64_t cell_size_;
+  Limits limits_;
+  const Control& control_;
+  ReadForwardField result_;
+  bool is_first_ = true;
+};
+
+/// @throws InputError for a mesh, which is a forward field
+const FieldSource& pull_source(const PullText& text) {
+  const FieldSource& source = *source_of(text.field);
+  require(!std::holds_alternative<NamedMesh>(text.field.what),
+          "a mesh, " + source.path.string() + ", says where its vertices go; give it with -f");
+  return source;
+}
+
+std::uint64_t bytes_of_vectors(const glm::i64vec3& size) {
+  return static_cast<std::uint64_t>(size.x * size.y * size.z) * sizeof(glm::vec3);
+}
+
+}  // namespace
+
+ReadForwardField read_field(const ForwardText& text, const Geometry& volume, int threads, const Control& control) {
+  return Composition(text, volume, threads, control).result();
+}
+
+ReadPullField read_field(const PullText& text, const Geometry& volume, const Geometry& output, int threads,
+                         const Control& control) {
+  ReadPullField result;
+  if (const auto* named = std::get_if<NamedTransform>(&text.field.what)) {
+    const TransformFile transform = read(*named);
+    VertexField sampled = sample_on(output, transform.displacement, {.threads = threads}, control);
+    note_transform(transform, named->file.string(), true, result.origin);
+    result.field = {sampled.lattice, std::move(sampled.displacement)};
+    return result;
+  }
+  const FieldSource source = for_volume(pull_source(text), volume);
+  note_header(read_field_header(source), source.path.string(), "output to input", result.origin);
+  result.field = read_pull_field(source);
+  return result;
+}
+
+std::uint64_t field_bytes(const ForwardText& text, const Geometry& volume) {
+  for (const NamedField& field : text.fields) {
+    if (const auto* transform = std::get_if<NamedTransform>(&field.what)) read(*transform);
+  }
+  const auto& first = text.fields.front().what;
+  if (const auto* mesh = std::get_if<NamedMesh>(&first)) {
+    constexpr std::uint64_t kVertex =
+                                sizeof(glm::dvec3) + sizeof(glm::vec3) + sizeof(std::int64_t) + 2 * sizeof(Vertex),
+                            kTetrahedron = sizeof(glm::u32vec4) + 32;  // snapped twice; in lists
+    const MeshFileHeader header = read_mesh_header(mesh->file);
+    return header.vertices * kVertex + header.tetrahedra * kTetrahedron;
+  }
+  if (const auto* lattice = std::get_if<NamedLattice>(&first))
+    return bytes_of_vectors(read_field_header(lattice->file).grid.size);
+  return bytes_of_vectors(lattice_over(straightened(volume), text.cell_size.value_or(1)).size);
+}
+
+std::uint64_t field_bytes(const PullText& text, const Geometry& output) {
+  const auto* transform = std::get_if<NamedTransform>(&text.field.what);
+  if (!transform) return bytes_of_vectors(read_field_header(pull_source(text)).grid.size);
+  read(*transform);
+  return bytes_of_vectors(output.size);
+}
+
+nlohmann::json to_json(const FieldFileHeader& header) {
+  const bool known = header.direction.has_value();
+  return {{"format", header.format},
+          {"direction", known ? to_string(*header.direction) : "not stated"},
+          {"frame", header.frame},
+          {"units", header.units},
+          {"absolute", header.absolute},
+          {"known",
+           {{"direction", known ? to_string(header.direction_basis) : "not stated"},
+            {"frame", to_string(header.frame_basis)},
+            {"units", to_string(header.units_basis)},
+            {"absolute", to_string(header.absolute_basis)}}}};
+}
+
+nlohmann::json to_json(const std::vector<ReadFieldFile>& files) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const ReadFieldFile& file : files) {
+    list.push_back(to_json(file.header));
+    list.back()["path"] = file.path;
+    if (file.mesh) {
+      list.back()["vertices"] = file.mesh->vertices;
+      list.back()["tetrahedra"] = file.mesh->tetrahedra;
+      list.back()["displacement"] = file.mesh->displacement;
+    }
+  }
+  return list;
+}
+
+}  // namespace tetwarp::apps

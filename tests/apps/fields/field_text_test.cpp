@@ -1,0 +1,151 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+// What a text of -f and --pull-field is parsed into, and what the value says.
+#include <gtest/gtest.h>
+
+#include "apps/fields/read_field.h"
+#include "deform/fields/formula.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch.h"
+#include "tests/support/write_file.h"
+
+namespace {
+
+using namespace tetwarp;
+using namespace tetwarp::apps;
+
+namespace fs = std::filesystem;
+
+const Geometry kVolume{.size = {6, 5, 4}, .spacing = {2, 2, 3}};
+
+std::string translation(const std::string& initial) {
+  return "(Transform \"TranslationTransform\")\n(NumberOfParameters 3)\n(TransformParameters 1 0 0)\n"
+         "(InitialTransformParametersFileName \"" +
+         initial + "\")\n(HowToCombineTransforms \"Compose\")\n";
+}
+
+/// A tetrahedron around everything, as MSH 2.2.
+std::string tetrahedron(int x) {
+  return "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 " + std::to_string(x - 1000) +
+         " -1000 -1000\n2 3000 -1000 -1000\n3 -1000 3000 -1000\n4 -1000 -1000 3000\n$EndNodes\n"
+         "$Elements\n1\n1 4 0 1 2 3 4\n$EndElements\n";
+}
+
+ForwardText parse(const std::vector<std::string>& texts, std::optional<std::int64_t> cell_size = {}) {
+  return parse_forward_fields(texts, cell_size, NiftiFrame::sform);
+}
+
+PullText parse_pull(const std::string& text) { return parse_pull_field(text, NiftiFrame::sform); }
+
+std::string usage_error(const std::vector<std::string>& texts, std::optional<std::int64_t> cell_size = {}) {
+  try {
+    parse(texts, cell_size);
+  } catch (const UsageError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+/// A folder with a file of each kind.
+class FieldFiles : public testing::Test {
+ protected:
+  void SetUp() override {
+    write_field_file(scratch_ / "lattice.mha", twist(kVolume, 0.1, 1));
+    write_file(scratch_ / "rest.msh", tetrahedron(0));
+    write_file(scratch_ / "deformed.msh", tetrahedron(3));
+    write_file(scratch_ / "first.txt", translation("NoInitialTransform"));
+    write_file(scratch_ / "second.txt", translation((scratch_ / "first.txt").string()));
+  }
+  std::string at(const std::string& name) const { return (scratch_ / name).string(); }
+  std::string mesh() const { return at("rest.msh") + ":deformed=" + at("deformed.msh"); }
+
+  Scratch scratch_;
+};
+
+TEST(FieldText, AFormulaReadsNothingAndKeepsItsText) {
+  const ForwardText parsed = parse({"wave:amplitude=8,wavelength=64vox", "identity"}, 4);
+  ASSERT_EQ(parsed.fields.size(), 2u);
+  EXPECT_TRUE(std::holds_alternative<NamedFormula>(parsed.fields[0].what));
+  EXPECT_EQ(parsed.fields[0].text, "wave:amplitude=8,wavelength=64vox");
+  EXPECT_EQ(parsed.cell_size, 4);
+  EXPECT_TRUE(files_of(parsed).empty());
+  EXPECT_EQ(title_of(parsed), "wave:amplitude=8,wavelength=64vox, then identity");
+  EXPECT_EQ(title_without_names(parsed), title_of(parsed));
+}
+
+TEST(FieldText, WhatIsWrongWithAFormulaIsAMistakeOfTheCommandLine) {
+  EXPECT_TRUE(says(usage_error({"wave:amplitud=8,wavelength=64"}), {"amplitude is missing"}));
+  EXPECT_TRUE(says(usage_error({"twist:angle=x"}), {"angle is \"x\", expected a number"}));
+  EXPECT_TRUE(says(usage_error({"twirl:angle=3"}), {"\"twirl:angle=3\" is neither a formula nor a file that exists"}));
+  EXPECT_TRUE(says(usage_error({}), {"no field; give -f FIELD"}));
+  EXPECT_TRUE(says(usage_error({"identity"}, 0), {"--cell-size is 0"}));
+  const ForwardText fine = parse({"elastic:amplitude=1,spacing=0.0001,seed=1"});
+  const Geometry huge{.size = {1000, 1000, 1000}};
+  EXPECT_THROW(read_field(fine, huge, 1, {}), UsageError) << "parameters that do not go with the volume";
+}
+
+TEST_F(FieldFiles, AreToldApartOnce) {
+  const ForwardText parsed = parse({mesh(), at("lattice.mha"), at("second.txt")});
+  EXPECT_TRUE(std::holds_alternative<NamedMesh>(parsed.fields[0].what));
+  EXPECT_TRUE(std::holds_alternative<NamedLattice>(parsed.fields[1].what));
+  EXPECT_TRUE(std::holds_alternative<NamedTransform>(parsed.fields[2].what));
+  EXPECT_EQ(parsed.fields[0].text, mesh());
+  EXPECT_EQ(source_of(parsed.fields[0])->option("deformed"), at("deformed.msh"));
+  EXPECT_EQ(source_of(parsed.fields[2]), nullptr);
+}
+
+TEST_F(FieldFiles, AreAllNamedThatAFieldIsReadFrom) {
+  const auto files = files_of(parse({mesh(), at("lattice.mha"), at("second.txt")}));
+  const std::vector<fs::path> expected = {scratch_ / "rest.msh", scratch_ / "deformed.msh", scratch_ / "lattice.mha",
+                                          scratch_ / "second.txt", scratch_ / "first.txt"};
+  EXPECT_EQ(files, expected);
+}
+
+TEST_F(FieldFiles, AreTitledWithoutFoldersOrNotAtAll) {
+  const FieldText parsed = parse({at("lattice.mha"), "identity", at("first.txt")});
+  EXPECT_EQ(title_of(parsed), "lattice.mha, then identity, then first.txt");
+  EXPECT_EQ(title_without_names(parsed), "a field of a file, then identity, then a field of a file");
+  const FieldText pull = parse_pull(at("lattice.mha"));
+  EXPECT_EQ(title_of(pull), "pull field lattice.mha");
+  EXPECT_EQ(title_without_names(pull), "deformed");
+}
+
+TEST_F(FieldFiles, WithVerticesOfTheirOwnTakeNoCellSizeAndAMeshComesFirst) {
+  EXPECT_TRUE(says(usage_error({at("lattice.mha")}, 2), {"--cell-size is for formulas", "has its own vertices"}));
+  EXPECT_TRUE(says(usage_error({mesh()}, 2), {"has its own vertices"}));
+  EXPECT_TRUE(says(usage_error({"identity", mesh()}), {"the mesh", "comes after another field"}));
+  EXPECT_EQ(usage_error({at("first.txt"), at("lattice.mha")}, 2), "");
+  EXPECT_TRUE(says(usage_error({at("lattice.mha") + ":order=zyx"}), {"files of its format take none"}));
+  EXPECT_TRUE(says(usage_error({at("rest.msh") + ":n=1"}), {"a mesh takes displacement, step, deformed"}));
+}
+
+TEST_F(FieldFiles, OfAPullFieldNeedNotExistAndAreNoFormulas) {
+  const NamedField missing = parse_pull(at("missing.mha")).field;
+  EXPECT_TRUE(std::holds_alternative<NamedLattice>(missing.what));
+  EXPECT_EQ(files_of(missing).size(), 1u);
+  const NamedField wave = parse_pull("wave").field;
+  EXPECT_TRUE(std::holds_alternative<NamedLattice>(wave.what)) << "a file of this name";
+  EXPECT_EQ(files_of(wave).size(), 1u);
+  EXPECT_THROW(field_bytes(parse_pull(mesh()), kVolume), InputError) << "a mesh is a forward field";
+}
+
+TEST_F(FieldFiles, HaveTheSizeThatIsSaidBeforeTheyAreRead) {
+  const auto size_of = [](const ForwardText& text) { return size_bytes(read_field(text, kVolume, 1, {}).field); };
+  for (const ForwardText& text : {parse({"identity"}, 2), parse({at("lattice.mha")}), parse({at("first.txt")})})
+    EXPECT_EQ(field_bytes(text, kVolume), size_of(text)) << text.fields.front().text;
+  EXPECT_GE(field_bytes(parse({mesh()}), kVolume), size_of(parse({mesh()}))) << "and what a mesh needs for its work";
+}
+
+TEST_F(FieldFiles, AreReadAsTheyAreTitled) {
+  const ReadForwardField lattice = read_field(parse({at("lattice.mha")}), kVolume, 1, {});
+  EXPECT_EQ(hash_field(lattice.field, 1), hash_field(twist(kVolume, 0.1, 1), 1));
+  ASSERT_EQ(lattice.origin.files.size(), 1u);
+  EXPECT_EQ(lattice.origin.files[0].path, at("lattice.mha"));
+  EXPECT_FALSE(lattice.origin.identity);
+  EXPECT_TRUE(read_field(parse({"identity", "identity"}), kVolume, 1, {}).origin.identity);
+  const ReadPullField moved = read_field(parse_pull(at("second.txt")), kVolume, kVolume, 1, {});
+  EXPECT_EQ(moved.field.displacement.front(), glm::vec3(2, 0, 0)) << "both translations";
+}
+
+}  // namespace
