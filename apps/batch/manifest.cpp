@@ -15,7 +15,6 @@
 #include "apps/cli/command_line.h"
 #include "apps/cli/reads.h"
 #include "apps/deform/deform_request.h"
-#include "deform/fields/formula.h"
 #include "io/lower_case.h"
 #include "io/opened_file.h"
 #include "io/scenario_file.h"
@@ -119,18 +118,6 @@ std::string input(const std::string& text, const Places& places) {
   return path.starts_with('-') ? "./" + path : path;
 }
 
-/// A field file with its options, of which one may name a second file.
-std::string field_input(const std::string& text, const Places& places) {
-  const std::string moved = input(text, places);
-  FieldSource source = parse_field_source(moved);
-  if (!source.options.contains("deformed")) return moved;
-  source.options["deformed"] = input(source.options["deformed"], places);
-  std::string all = source.path.string();
-  for (const auto& [key, value] : source.options)
-    all.append(all.size() == source.path.string().size() ? ":" : ",").append(key).append("=").append(value);
-  return all;
-}
-
 /// A name in the case's folder. @param text  of `with` and `points` with options behind it
 std::string output(const std::string& key, const std::string& text, const Places& places) {
   const std::string name = text.substr(0, text.find(':'));
@@ -140,7 +127,7 @@ std::string output(const std::string& key, const std::string& text, const Places
 }
 
 std::string value_of(const std::string& key, const std::string& text, const Places& places) {
-  if (key == "field") return is_formula(text) ? text : field_input(text, places);
+  if (key == "field") return with_files_renamed(text, [&](const std::string& file) { return input(file, places); });
   if (key == "grid") return text == "same" || text == "fit" ? text : input(text, places);
   if (kInputs.contains(key)) return input(text, places);
   if (kOutputs.contains(key)) return output(key, text, places);

@@ -154,4 +154,16 @@ FieldText parse_field(const FieldArguments& given, NiftiFrame frame) {
   return parse_forward_fields(given.forward, given.cell_size, frame);
 }
 
+std::string with_files_renamed(const std::string& text, const std::function<std::string(const std::string&)>& renamed) {
+  if (is_formula(text)) return text;
+  const std::string other = renamed(text);
+  FieldSource source = parse_field_source(other);
+  if (!source.options.contains("deformed")) return other;
+  source.options["deformed"] = renamed(source.options["deformed"]);
+  std::string all = source.path.string();
+  for (const auto& [key, value] : source.options)
+    all.append(all.size() == source.path.string().size() ? ":" : ",").append(key).append("=").append(value);
+  return all;
+}
+
 }  // namespace tetwarp::apps

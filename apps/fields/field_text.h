@@ -4,6 +4,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <variant>
@@ -83,5 +84,10 @@ ForwardText parse_forward_fields(const std::vector<std::string>& texts, std::opt
 PullText parse_pull_field(const std::string& text, NiftiFrame frame);
 /// The one that was given. @throws UsageError for none, and as the two above
 FieldText parse_field(const FieldArguments& given, NiftiFrame frame);
+
+/// A text of -f with other names of its files, for a command that runs elsewhere; a formula stays as it is.
+/// @param renamed  gives the other name of a file
+/// @throws InputError for options that are not KEY=VALUE
+std::string with_files_renamed(const std::string& text, const std::function<std::string(const std::string&)>& renamed);
 
 }  // namespace tetwarp::apps

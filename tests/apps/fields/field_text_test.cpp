@@ -130,6 +130,15 @@ TEST_F(FieldFiles, OfAPullFieldNeedNotExistAndAreNoFormulas) {
   EXPECT_THROW(field_bytes(parse_pull(mesh()), kVolume), InputError) << "a mesh is a forward field";
 }
 
+TEST(FieldText, FilesGetOtherNamesAndFormulasStay) {
+  const auto renamed = [](const std::string& text) {
+    return with_files_renamed(text, [](const std::string& file) { return "there/" + file; });
+  };
+  EXPECT_EQ(renamed("wave:amplitude=8,wavelength=64"), "wave:amplitude=8,wavelength=64");
+  EXPECT_EQ(renamed("f.npy:units=mm,order=zyx"), "there/f.npy:units=mm,order=zyx") << "as it was given";
+  EXPECT_EQ(renamed("rest.msh:units=mm,deformed=d.msh"), "there/rest.msh:deformed=there/d.msh,units=mm");
+}
+
 TEST_F(FieldFiles, HaveTheSizeThatIsSaidBeforeTheyAreRead) {
   const auto size_of = [](const ForwardText& text) { return size_bytes(read_field(text, kVolume, 1, {}).field); };
   for (const ForwardText& text : {parse({"identity"}, 2), parse({at("lattice.mha")}), parse({at("first.txt")})})
