@@ -63,7 +63,7 @@ class Pass {
   void resample_onto_output(Resampler& resampler, const Control& control, DeformResult& result);
   void resample_onto_own_grids(DeformResult& result);
   std::vector<MovedStructures> move_structures(Resampler& resampler);
-  FieldCheck check(Resampler& resampler, const Control& progress) const;
+  FieldCheck check(ForwardResampler& resampler, const Control& progress) const;
 
   /// What --grid fit adds lies beyond the lattice; that this reaches over INPUT is known.
   Outside outside() const {
@@ -99,7 +99,7 @@ DeformResult Pass::run(AnyVolume room) {
   result.seconds = stage.seconds();
   if (!reports_quality(request_)) return result;
   Stage check_stage(options_.common, "check");
-  result.check = check(*resampler, check_stage.control());
+  result.check = check(resampler.forward(), check_stage.control());
   result.check_seconds = check_stage.seconds();
   return result;
 }
@@ -165,7 +165,7 @@ std::vector<MovedStructures> Pass::move_structures(Resampler& resampler) {
 }
 
 /// Looks at the field, and where its inverse leads. @param resampler  holds the field
-FieldCheck Pass::check(Resampler& resampler, const Control& progress) const {
+FieldCheck Pass::check(ForwardResampler& resampler, const Control& progress) const {
   const auto& field = std::get<VertexField>(field_.field);
   return {.quality = measure_quality(field, on_cpu_, progress),
           .trip = measure_round_trip(resampler, field, on_cpu_, quiet())};
