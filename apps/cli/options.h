@@ -51,7 +51,7 @@ struct InputOptions {
   }
 };
 
-/// Fields as a command line names them. They are parsed once, by parse_field (apps/fields/field_text.h); nothing else
+/// Fields as a command line names them. They are parsed once, by parse_field (apps/fields/field_choice.h); nothing else
 /// looks into the texts.
 struct FieldArguments {
   std::vector<std::string> forward;       ///< formulas and files, the first applied first

@@ -19,7 +19,7 @@ void Reads::add_volume(const InputOptions& volume) {
   paths_.push_back(volume.path);
 }
 
-void Reads::add_field(const FieldText& field) {
+void Reads::add_field(const FieldChoice& field) {
   for (const fs::path& file : files_of(field)) add_file(file);
 }
 
@@ -48,7 +48,7 @@ std::vector<std::string> Reads::digests(int threads) const {
   return digests;
 }
 
-Reads reads_of(const FieldText& field, const InputOptions& volume) {
+Reads reads_of(const FieldChoice& field, const InputOptions& volume) {
   Reads reads;
   reads.add_field(field);
   reads.add_volume(volume);

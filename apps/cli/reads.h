@@ -9,7 +9,7 @@
 
 #include "apps/cli/input.h"
 #include "apps/cli/options.h"
-#include "apps/fields/field_text.h"
+#include "apps/fields/field_choice.h"
 
 namespace tetwarp::apps {
 
@@ -21,7 +21,7 @@ class Reads {
   /// A volume file, or a DICOM series with all of its slices.
   void add_volume(const InputOptions& volume);
   /// The files of a field, as `files_of` has them.
-  void add_field(const FieldText& field);
+  void add_field(const FieldChoice& field);
 
   /// All paths, those first that options name. DICOM is not looked at: see `slices`.
   const std::vector<std::filesystem::path>& paths() const& { return paths_; }
@@ -44,7 +44,7 @@ class Reads {
 };
 
 /// Of a command that reads a field and a volume.
-Reads reads_of(const FieldText& field, const InputOptions& volume);
+Reads reads_of(const FieldChoice& field, const InputOptions& volume);
 Reads reads_of(const SimulateOptions& options);
 
 /// SHA-256 of a volume as sidecars give it, without reading voxels. @throws InputError

@@ -12,13 +12,13 @@
 
 namespace tetwarp::apps {
 
-DicomSegmentation open_segmentation(const AlongVolumeText& options, const InputHeader& input) {
-  const std::string name = options.input.path.string();
-  if (!is_object_output(options.output))
+DicomSegmentation open_segmentation(const AlongVolumeChoice& choice, const InputHeader& input) {
+  const std::string name = choice.input.path.string();
+  if (!is_object_output(choice.output))
     throw UsageError("a SEG comes out as a SEG, " + name + "; name the output of --with .dcm");
-  if (options.background)
+  if (choice.background)
     throw UsageError("background= is not for a SEG, which is empty where nothing maps, " + name + "; leave it out");
-  return read_segmentation_header(options.input.path, input.geometry.spacing.z);
+  return read_segmentation_header(choice.input.path, input.geometry.spacing.z);
 }
 
 Geometry own_grid(const DicomSegmentation& segmentation, const Geometry& input) {
@@ -53,12 +53,12 @@ std::optional<std::string> compare_frames(const std::filesystem::path& path, con
   return std::nullopt;
 }
 
-DicomAlong along_with(const AlongVolumeText& options, const std::string& sha256, Interpolation interpolation,
-                      double background, const DerivedOutput& series) {
-  DicomAlong along{options.input.path, sha256, series.derivation};
+DicomAlong dicom_along(const AlongVolumeChoice& choice, const std::string& sha256, Interpolation interpolation,
+                       double background, const DerivedOutput& series) {
+  DicomAlong along{choice.input.path, sha256, series.derivation};
   const std::string name = name_of(interpolation);
   along.derivation.parameters = "interpolation=" + name + " background=" + nlohmann::json(background).dump() +
-                                (options.own ? " grid=own " : " grid=output ") + series.derivation.parameters;
+                                (choice.own ? " grid=own " : " grid=output ") + series.derivation.parameters;
   along.derivation.description += ", " + name + " interpolation";
   return along;
 }

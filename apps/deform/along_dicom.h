@@ -6,7 +6,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "apps/cli/input.h"
-#include "apps/deform/along_text.h"
+#include "apps/deform/along_choice.h"
 #include "io/dicom_dose.h"
 #include "io/dicom_segmentation.h"
 
@@ -20,7 +20,7 @@ struct DerivedOutput {
 
 /// The header of a SEG. @throws UsageError for an output that is none, or a background; what read_segmentation_header
 /// throws
-DicomSegmentation open_segmentation(const AlongVolumeText& options, const InputHeader& input);
+DicomSegmentation open_segmentation(const AlongVolumeChoice& choice, const InputHeader& input);
 
 /// The grid that a segmentation goes back onto: that of its frames, with as many slices more as lie between those of
 /// INPUT if they are parallel, so that what is moved beyond the outermost frames is not lost.
@@ -35,8 +35,8 @@ std::optional<std::string> compare_frames(const std::filesystem::path& path, con
                                           const InputHeader& input);
 
 /// How an object came to be. @param interpolation, background  with which it went through the field
-DicomAlong along_with(const AlongVolumeText& options, const std::string& sha256, Interpolation interpolation,
-                      double background, const DerivedOutput& series);
+DicomAlong dicom_along(const AlongVolumeChoice& choice, const std::string& sha256, Interpolation interpolation,
+                       double background, const DerivedOutput& series);
 
 nlohmann::json to_json(const DoseReport& report);
 nlohmann::json to_json(const SegmentationReport& report, const DicomSegmentation& segmentation);

@@ -16,11 +16,11 @@ std::size_t count_outside(const MovedPoints& moved) {
 
 }  // namespace
 
-PointsText parse_points(const std::string& text) {
+PointsChoice parse_points(const std::string& text) {
   const auto equals = text.find('=');
   if (equals == std::string::npos || equals == 0)
     throw UsageError("--points \"" + text + "\"; expected IN=OUT, IN=OUT:lps or IN=OUT:ras");
-  PointsText parsed;
+  PointsChoice parsed;
   std::string output = text.substr(equals + 1);
   for (const auto& [suffix, frame] : {std::pair{":lps", PointFrame::lps}, std::pair{":ras", PointFrame::ras}}) {
     if (!output.ends_with(suffix)) continue;
@@ -42,9 +42,9 @@ PointsText parse_points(const std::string& text) {
   return parsed;
 }
 
-std::vector<PointsFile> read_points(const std::vector<PointsText>& texts) {
+std::vector<PointsFile> read_points(const std::vector<PointsChoice>& choices) {
   std::vector<PointsFile> files;
-  for (const PointsText& text : texts) files.emplace_back(text.input, text.told);
+  for (const PointsChoice& choice : choices) files.emplace_back(choice.input, choice.told);
   return files;
 }
 
@@ -64,12 +64,12 @@ void write_points(const std::vector<std::filesystem::path>& staged, const std::v
   for (std::size_t n = 0; n < files.size(); ++n) files[n].write(staged[n], moved[n].points, moved[n].status);
 }
 
-nlohmann::json points_json(const std::vector<PointsText>& texts, const std::vector<PointsFile>& files,
+nlohmann::json points_json(const std::vector<PointsChoice>& choices, const std::vector<PointsFile>& files,
                            const std::vector<MovedPoints>& moved) {
   nlohmann::json list = nlohmann::json::array();
-  for (std::size_t n = 0; n < texts.size(); ++n) {
-    list.push_back({{"input", texts[n].input.string()},
-                    {"output", texts[n].output.string()},
+  for (std::size_t n = 0; n < choices.size(); ++n) {
+    list.push_back({{"input", choices[n].input.string()},
+                    {"output", choices[n].output.string()},
                     {"points", moved[n].points.size()},
                     {"outside", count_outside(moved[n])},
                     {"frame", to_string(files[n].frame())}});
@@ -77,15 +77,15 @@ nlohmann::json points_json(const std::vector<PointsText>& texts, const std::vect
   return list;
 }
 
-std::vector<std::string> notes_of(const std::vector<PointsText>& texts, const std::vector<PointsFile>& files,
+std::vector<std::string> notes_of(const std::vector<PointsChoice>& choices, const std::vector<PointsFile>& files,
                                   const std::vector<MovedPoints>& moved) {
   std::vector<std::string> notes;
-  for (std::size_t n = 0; n < texts.size(); ++n) {
+  for (std::size_t n = 0; n < choices.size(); ++n) {
     notes.insert(notes.end(), files[n].notes().begin(), files[n].notes().end());
     const std::size_t outside = count_outside(moved[n]);
     if (outside == 0) continue;
     notes.push_back(std::to_string(outside) + " of " + std::to_string(moved[n].points.size()) + " points of " +
-                    texts[n].input.string() + " lie outside the field's lattice and stay where they are");
+                    choices[n].input.string() + " lie outside the field's lattice and stay where they are");
   }
   return notes;
 }

@@ -14,10 +14,10 @@
 namespace tetwarp::apps {
 
 // Landmarks and surfaces, which go where the voxels under them go. Each stage of a run has a value for each of them, in
-// the order of their texts.
+// the order of the options.
 
 /// A --points: IN=OUT[:lps|:ras].
-struct PointsText {
+struct PointsChoice {
   std::filesystem::path input, output;
   std::optional<PointFrame> told;
 };
@@ -29,10 +29,10 @@ struct MovedPoints {
 };
 
 /// @throws UsageError for a text that is not of this form, a suffix that is not known, or two that differ
-PointsText parse_points(const std::string& text);
+PointsChoice parse_points(const std::string& text);
 
 /// Reads all files. @throws InputError
-std::vector<PointsFile> read_points(const std::vector<PointsText>& texts);
+std::vector<PointsFile> read_points(const std::vector<PointsChoice>& choices);
 /// Moves what was read, by the forward map. @param output  grid of OUTPUT
 std::vector<MovedPoints> move_all_points(const std::vector<PointsFile>& files, const Geometry& output,
                                          const FieldView& field, const Limits& limits, const Control& control);
@@ -41,10 +41,10 @@ void write_points(const std::vector<std::filesystem::path>& staged, const std::v
                   const std::vector<MovedPoints>& moved);
 
 /// "points" of sidecar and report: input, output, points, outside, frame of each.
-nlohmann::json points_json(const std::vector<PointsText>& texts, const std::vector<PointsFile>& files,
+nlohmann::json points_json(const std::vector<PointsChoice>& choices, const std::vector<PointsFile>& files,
                            const std::vector<MovedPoints>& moved);
 /// For people: what was assumed, and how many points lie outside.
-std::vector<std::string> notes_of(const std::vector<PointsText>& texts, const std::vector<PointsFile>& files,
+std::vector<std::string> notes_of(const std::vector<PointsChoice>& choices, const std::vector<PointsFile>& files,
                                   const std::vector<MovedPoints>& moved);
 
 }  // namespace tetwarp::apps

@@ -76,19 +76,19 @@ void take_open(MovedRoi& roi, std::span<const Contour> contours, const PointMove
 
 }  // namespace
 
-std::vector<StructuresInput> read_structures(const std::vector<AlongStructuresText>& texts,
+std::vector<StructuresInput> read_structures(const std::vector<AlongStructuresChoice>& choices,
                                              const std::string& frame_of_reference_uid) {
   std::vector<StructuresInput> sets;
-  for (const AlongStructuresText& text : texts) {
-    const StructuresInput& set = sets.emplace_back(StructuresInput{text, {}, read_structure_set(text.input)});
-    sets.back().sha256 = hash_file(text.input);
+  for (const AlongStructuresChoice& choice : choices) {
+    const StructuresInput& set = sets.emplace_back(StructuresInput{choice, {}, read_structure_set(choice.input)});
+    sets.back().sha256 = hash_file(choice.input);
     for (const Structure& structure : set.structures.structures) {
       const std::string& frame = structure.frame_of_reference_uid;
       require(!frame.empty() && frame == frame_of_reference_uid,
               "ROI " + std::to_string(structure.number) + " lies in the frame of reference " +
                   (frame.empty() ? "(no UID)" : shown(frame)) + ", the series in " +
                   (frame_of_reference_uid.empty() ? "(no UID)" : shown(frame_of_reference_uid)) + ", " +
-                  shown(text.input) + "; give a structure set that was drawn on the series");
+                  shown(choice.input) + "; give a structure set that was drawn on the series");
     }
   }
   return sets;
@@ -243,9 +243,9 @@ nlohmann::json structures_json(const std::vector<StructuresInput>& sets, const s
     nlohmann::json rois = nlohmann::json::array();
     for (std::size_t roi = 0; roi < moved[n].size(); ++roi)
       rois.push_back(to_json(moved[n][roi], sets[n].structures.structures[roi]));
-    list.push_back({{"input", sets[n].text.input.string()},
+    list.push_back({{"input", sets[n].choice.input.string()},
                     {"sha256", sets[n].sha256},
-                    {"output", sets[n].text.output.string()},
+                    {"output", sets[n].choice.output.string()},
                     {"series_instance_uid", written[n].series_uid},
                     {"sop_instance_uid", written[n].sop_instance_uid},
                     {"rois", std::move(rois)}});
@@ -257,7 +257,7 @@ std::vector<std::string> notes_of(const std::vector<StructuresInput>& sets, cons
   std::vector<std::string> notes;
   for (std::size_t n = 0; n < sets.size(); ++n) {
     for (std::size_t roi = 0; roi < moved[n].size(); ++roi)
-      add_notes(moved[n][roi], sets[n].structures.structures[roi], sets[n].text.input, notes);
+      add_notes(moved[n][roi], sets[n].structures.structures[roi], sets[n].choice.input, notes);
   }
   return notes;
 }

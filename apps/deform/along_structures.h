@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/deform/along_text.h"
+#include "apps/deform/along_choice.h"
 #include "deform/contours/contour_mover.h"
 #include "deform/contours/reslicer.h"
 #include "io/dicom_structures.h"
@@ -16,10 +16,10 @@
 namespace tetwarp::apps {
 
 // RT Structure Sets that were drawn on INPUT, and go along with it through the field. Each stage of a run has a value
-// for each of them, in the order of their texts.
+// for each of them, in the order of the options.
 
 struct StructuresInput {
-  AlongStructuresText text;
+  AlongStructuresChoice choice;
   std::string sha256;
   StructureSet structures;
 };
@@ -42,7 +42,7 @@ struct MovedRoi {
 using MovedStructures = std::vector<MovedRoi>;
 
 /// Reads all files. @throws InputError for one that was not drawn in the frame of reference of the series
-std::vector<StructuresInput> read_structures(const std::vector<AlongStructuresText>& texts,
+std::vector<StructuresInput> read_structures(const std::vector<AlongStructuresChoice>& choices,
                                              const std::string& frame_of_reference_uid);
 
 /// Moves structures: as points where that will do, else they are drawn anew from the inverse of the field, which comes

@@ -15,8 +15,8 @@ namespace {
 /// @throws UsageError, InputError for a DICOM object that cannot be written, or lies in another space than INPUT
 /// @return a note, where INPUT does not say in which it lies
 std::optional<std::string> check_object(const AlongHeader& one, const InputHeader& input) {
-  if (!is_object_output(one.text.output)) return std::nullopt;
-  const std::filesystem::path& path = one.text.input.path;
+  if (!is_object_output(one.choice.output)) return std::nullopt;
+  const std::filesystem::path& path = one.choice.input.path;
   if (!one.segmentation && !one.header.dose) {
     throw UsageError("only an RTDOSE or a SEG can be written as a DICOM object, not " + path.string() +
                      "; name the output .nii.gz, .nii, .nrrd or .mha");
@@ -26,29 +26,30 @@ std::optional<std::string> check_object(const AlongHeader& one, const InputHeade
   return compare_frames(path, frame, input);
 }
 
-AlongHeader open_one(const AlongVolumeText& text, const InputHeader& input) {
-  AlongHeader one{text, {}, {}, {}};
-  refuse_pipes(text.input.path);
-  if (text.segmentation) {
-    one.segmentation = open_segmentation(text, input);
+AlongHeader open_one(const AlongVolumeChoice& choice, const InputHeader& input) {
+  AlongHeader one{choice, {}, {}, {}};
+  refuse_pipes(choice.input.path);
+  if (choice.segmentation) {
+    one.segmentation = open_segmentation(choice, input);
     one.header = {one.segmentation->geometry, VoxelType::u8, {}, false, 1};
   } else {
-    one.header = open_input(text.input, {.stop = interrupt_token()}, true);
+    one.header = open_input(choice.input, {.stop = interrupt_token()}, true);
   }
   one.own_grid = one.segmentation ? own_grid(*one.segmentation, input.geometry) : straightened(one.header.geometry);
-  if (text.background && !fits(one.header.type, *text.background)) {
-    throw UsageError("background=" + nlohmann::json(*text.background).dump() + " does not fit the voxels, " +
-                     to_string(one.header.type) + ", " + text.input.path.string() + "; choose a value in their range");
+  if (choice.background && !fits(one.header.type, *choice.background)) {
+    throw UsageError("background=" + nlohmann::json(*choice.background).dump() + " does not fit the voxels, " +
+                     to_string(one.header.type) + ", " + choice.input.path.string() +
+                     "; choose a value in their range");
   }
   return one;
 }
 
 }  // namespace
 
-AlongHeaders open_along(const std::vector<AlongVolumeText>& texts, const InputHeader& input) {
+AlongHeaders open_along(const std::vector<AlongVolumeChoice>& choices, const InputHeader& input) {
   AlongHeaders opened;
-  for (const AlongVolumeText& text : texts) {
-    const AlongHeader& one = opened.volumes.emplace_back(open_one(text, input));
+  for (const AlongVolumeChoice& choice : choices) {
+    const AlongHeader& one = opened.volumes.emplace_back(open_one(choice, input));
     opened.notes.insert(opened.notes.end(), one.header.notes.begin(), one.header.notes.end());
     if (const auto note = check_object(one, input)) opened.notes.push_back(*note);
   }
@@ -59,11 +60,11 @@ std::uint64_t along_bytes(const std::vector<AlongHeader>& headers, std::uint64_t
   std::uint64_t bytes = 0;
   for (const AlongHeader& one : headers) {
     const auto voxels = static_cast<std::uint64_t>(voxel_count(one.header.geometry)),
-               results = one.text.own ? static_cast<std::uint64_t>(voxel_count(one.own_grid)) : output_voxels;
+               results = one.choice.own ? static_cast<std::uint64_t>(voxel_count(one.own_grid)) : output_voxels;
     const std::uint64_t volumes = one.segmentation ? one.segmentation->segments.size() : 1;
     bytes +=
         size_bytes(one.header.type) * static_cast<std::uint64_t>(one.header.components) * volumes * (voxels + results);
-    if (is_object_output(one.text.output) && one.header.dose) bytes += sizeof(std::int32_t) * results;
+    if (is_object_output(one.choice.output) && one.header.dose) bytes += sizeof(std::int32_t) * results;
   }
   return bytes;
 }
@@ -73,17 +74,17 @@ std::vector<AlongInput> read_along(const std::vector<AlongHeader>& headers, cons
   std::vector<AlongInput> inputs;
   for (const AlongHeader& one : headers) {
     AlongInput& input = inputs.emplace_back();
-    const std::filesystem::path& path = one.text.input.path;
+    const std::filesystem::path& path = one.choice.input.path;
     std::optional<DicomVolume> dicom;
     if (one.segmentation) {
       input.sources = read_segments(path, *one.segmentation);
     } else {
-      InputVolume read = read_input(one.text.input, one.header, common, control);
+      InputVolume read = read_input(one.choice.input, one.header, common, control);
       input.sources.push_back(std::move(read.volume));
       input.background = read.background;
       dicom = std::move(read.dicom);
     }
-    if (is_object_output(one.text.output)) input.background = 0;
+    if (is_object_output(one.choice.output)) input.background = 0;
     if (dicom) input.padding = dicom->padding;
     input.sha256 = dicom ? dicom->sha256 : hash_file(path);
   }
@@ -93,7 +94,7 @@ std::vector<AlongInput> read_along(const std::vector<AlongHeader>& headers, cons
 std::vector<Geometry> own_grids_of(const std::vector<AlongHeader>& headers) {
   std::vector<Geometry> grids;
   for (const AlongHeader& one : headers) {
-    if (one.text.own && std::find(grids.begin(), grids.end(), one.own_grid) == grids.end())
+    if (one.choice.own && std::find(grids.begin(), grids.end(), one.own_grid) == grids.end())
       grids.push_back(one.own_grid);
   }
   return grids;
@@ -107,10 +108,10 @@ std::vector<AlongResult> make_along_results(const std::vector<AlongHeader>& head
     const AlongHeader& one = headers[n];
     const Interpolation usual = one.segmentation ? usual_interpolation(*one.segmentation) : otherwise;
     AlongResult& result = results.emplace_back();
-    result.interpolation = one.text.interpolation.value_or(usual);
-    result.background = one.text.background.value_or(inputs[n].background);
+    result.interpolation = one.choice.interpolation.value_or(usual);
+    result.background = one.choice.background.value_or(inputs[n].background);
     for (const AnyVolume& source : inputs[n].sources)
-      result.outputs.emplace_back(one.text.own ? one.own_grid : output, source.type(), source.components());
+      result.outputs.emplace_back(one.choice.own ? one.own_grid : output, source.type(), source.components());
   }
   return results;
 }
@@ -119,7 +120,7 @@ std::vector<Target> along_targets(const std::vector<AlongHeader>& headers, const
                                   std::vector<AlongResult>& results, const Geometry& grid, bool own) {
   std::vector<Target> targets;
   for (std::size_t n = 0; n < headers.size(); ++n) {
-    if (headers[n].text.own != own || (own && headers[n].own_grid != grid)) continue;
+    if (headers[n].choice.own != own || (own && headers[n].own_grid != grid)) continue;
     for (std::size_t part = 0; part < inputs[n].sources.size(); ++part) {
       targets.push_back({.source = inputs[n].sources[part].view(),
                          .output = results[n].outputs[part].view(),
@@ -135,7 +136,7 @@ namespace {
 
 AlongWritten write_object(const std::filesystem::path& staged, const AlongHeader& one, const AlongInput& input,
                           const AlongResult& result, const DerivedOutput& series) {
-  const DicomAlong along = along_with(one.text, input.sha256, result.interpolation, result.background, series);
+  const DicomAlong along = dicom_along(one.choice, input.sha256, result.interpolation, result.background, series);
   if (!one.segmentation) return {write_derived_dose(staged, result.outputs.front().view(), along, series.written), {}};
   std::vector<ConstVolumeView> segments;
   for (const AnyVolume& output : result.outputs) segments.push_back(output.view());
@@ -150,7 +151,7 @@ std::vector<AlongWritten> write_along(const std::vector<std::filesystem::path>& 
                                       const std::optional<DerivedOutput>& series) {
   std::vector<AlongWritten> written(headers.size());
   for (std::size_t n = 0; n < headers.size(); ++n) {
-    if (is_object_output(headers[n].text.output))
+    if (is_object_output(headers[n].choice.output))
       written[n] = write_object(staged[n], headers[n], inputs[n], results[n], series.value());
     else
       write_image(staged[n], results[n].outputs.front().view(), how);
@@ -163,10 +164,10 @@ nlohmann::json along_json(const std::vector<AlongHeader>& headers, const std::ve
   nlohmann::json list = nlohmann::json::array();
   for (std::size_t n = 0; n < headers.size(); ++n) {
     const AlongHeader& one = headers[n];
-    list.push_back({{"input", one.text.input.path.string()},
+    list.push_back({{"input", one.choice.input.path.string()},
                     {"sha256", inputs[n].sha256},
-                    {"output", one.text.output.string()},
-                    {"grid", one.text.own ? "own" : "output"},
+                    {"output", one.choice.output.string()},
+                    {"grid", one.choice.own ? "own" : "output"},
                     {"voxel_type", to_string(one.header.type)},
                     {"interpolation", name_of(results[n].interpolation)},
                     {"background", results[n].background}});
@@ -180,8 +181,8 @@ std::vector<std::string> notes_of(const std::vector<AlongHeader>& headers, const
   std::vector<std::string> notes;
   for (std::size_t n = 0; n < headers.size(); ++n) {
     if (!written[n].segmentation || !written[n].segmentation->empty) continue;
-    notes.push_back("nothing is left of the segments of " + headers[n].text.input.path.string() + ", " +
-                    headers[n].text.output.string() + " has one empty frame");
+    notes.push_back("nothing is left of the segments of " + headers[n].choice.input.path.string() + ", " +
+                    headers[n].choice.output.string() + " has one empty frame");
   }
   return notes;
 }

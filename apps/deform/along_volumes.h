@@ -13,11 +13,11 @@
 namespace tetwarp::apps {
 
 // Volumes that go along with INPUT through the field: labels, doses, other modalities. Each stage of a run has a value
-// for each of them, in the order of their texts.
+// for each of them, in the order of the options.
 
 /// What is known of one from its header.
 struct AlongHeader {
-  AlongVolumeText text;
+  AlongVolumeChoice choice;
   InputHeader header;
   std::optional<DicomSegmentation> segmentation;
   Geometry own_grid;
@@ -50,7 +50,7 @@ struct AlongWritten {
 };
 
 /// Reads headers. @throws UsageError, InputError for what does not go with its output or with INPUT
-AlongHeaders open_along(const std::vector<AlongVolumeText>& texts, const InputHeader& input);
+AlongHeaders open_along(const std::vector<AlongVolumeChoice>& choices, const InputHeader& input);
 
 /// Memory of volumes and of their outputs, the latter with `output_voxels` voxels each.
 std::uint64_t along_bytes(const std::vector<AlongHeader>& headers, std::uint64_t output_voxels);

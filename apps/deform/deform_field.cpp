@@ -30,10 +30,10 @@ DeformField field_of(const DeformRequest& request, const DeformPlan& plan, const
   if (const auto* simulated = std::get_if<Simulated>(&request.field))
     return taken(simulate_field(request.options, simulated->scenario, inputs.input->volume.view(), worker, control));
   const int threads = request.options.common.threads;
-  const auto& text = std::get<FieldText>(request.field);
-  if (const auto* pull = std::get_if<PullText>(&text))
+  const auto& choice = std::get<FieldChoice>(request.field);
+  if (const auto* pull = std::get_if<PullChoice>(&choice))
     return taken(read_field(*pull, inputs.grid(), plan.grid.value(), threads, control));
-  return taken(read_field(std::get<ForwardText>(text), inputs.grid(), threads, control));
+  return taken(read_field(std::get<ForwardChoice>(choice), inputs.grid(), threads, control));
 }
 
 /// Where INPUT's own grid is none that an output can have.

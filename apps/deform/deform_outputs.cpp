@@ -11,10 +11,10 @@ std::filesystem::path folder_of(const std::filesystem::path& file) {
   return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
 }
 
-template <class Text>
-std::vector<std::filesystem::path> add_all(const std::vector<Text>& texts, OutputSet& set) {
+template <class Choice>
+std::vector<std::filesystem::path> add_all(const std::vector<Choice>& choices, OutputSet& set) {
   std::vector<std::filesystem::path> staged;
-  for (const Text& text : texts) staged.push_back(set.add(text.output));
+  for (const Choice& choice : choices) staged.push_back(set.add(choice.output));
   return staged;
 }
 

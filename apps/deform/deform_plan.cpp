@@ -40,10 +40,10 @@ void check_input(const DeformOptions& options, bool series, const InputHeader& i
 /// @param grid  of the output
 std::uint64_t bytes_of_field(const DeformRequest& request, const Geometry& volume, const Geometry& grid) {
   if (const auto* simulated = std::get_if<Simulated>(&request.field))
-    return simulation_bytes(simulated->scenario, volume, !simulated->text.labels.empty());
-  const auto& field = std::get<FieldText>(request.field);
-  if (const auto* pull = std::get_if<PullText>(&field)) return field_bytes(*pull, grid);
-  return field_bytes(std::get<ForwardText>(field), volume);
+    return simulation_bytes(simulated->scenario, volume, !simulated->choice.labels.empty());
+  const auto& field = std::get<FieldChoice>(request.field);
+  if (const auto* pull = std::get_if<PullChoice>(&field)) return field_bytes(*pull, grid);
+  return field_bytes(std::get<ForwardChoice>(field), volume);
 }
 
 /// @param grid  of the output

@@ -32,16 +32,16 @@ json form_json(const DicomForm& form) {
 /// The field as it was given: the texts of the command line.
 void add_field_options(const DeformRequest& request, json& options) {
   if (const auto* simulated = std::get_if<Simulated>(&request.field)) {
-    options["scenario"] = simulated->text.file.string();
-    if (!simulated->text.labels.empty()) options["labels"] = simulated->text.labels.string();
+    options["scenario"] = simulated->choice.file.string();
+    if (!simulated->choice.labels.empty()) options["labels"] = simulated->choice.labels.string();
     return;
   }
-  const auto& field = std::get<FieldText>(request.field);
-  if (const auto* pull = std::get_if<PullText>(&field)) {
+  const auto& field = std::get<FieldChoice>(request.field);
+  if (const auto* pull = std::get_if<PullChoice>(&field)) {
     options["pull_field"] = pull->field.text;
     return;
   }
-  const auto& forward = std::get<ForwardText>(field);
+  const auto& forward = std::get<ForwardChoice>(field);
   options["field"] = json::array();
   for (const NamedField& one : forward.fields) options["field"].push_back(one.text);
   if (forward.cell_size) options["cell_size"] = *forward.cell_size;
@@ -243,9 +243,9 @@ std::vector<std::string> notes_of(const DeformRun& run, const DeformWritten& wri
 }
 
 std::string title_of(const DeformRequest& request) {
-  const auto* field = std::get_if<FieldText>(&request.field);
+  const auto* field = std::get_if<FieldChoice>(&request.field);
   if (request.options.dicom.deidentification) return field ? title_without_names(*field) : "deformed";
-  return field ? title_of(*field) : "simulated " + std::get<Simulated>(request.field).text.file.filename().string();
+  return field ? title_of(*field) : "simulated " + std::get<Simulated>(request.field).choice.file.filename().string();
 }
 
 }  // namespace tetwarp::apps

@@ -31,11 +31,11 @@ void check_choice_of_field(const DeformOptions& options) {
 }
 
 /// @throws UsageError for a cell size, InputError for a page that is no scenario or does not go with --write-field
-Simulated read_simulated(const DeformOptions& options, ScenarioText text) {
+Simulated read_simulated(const DeformOptions& options, ScenarioChoice choice) {
   if (options.field.cell_size) throw UsageError("--cell-size is for formulas and transforms, a scenario says its own");
-  simulate::Scenario scenario = read_scenario(text.file);
+  simulate::Scenario scenario = read_scenario(choice.file);
   if (!options.write_field.empty()) require_fitting_format(scenario, options.write_field, false);
-  return {std::move(text), std::move(scenario)};
+  return {std::move(choice), std::move(scenario)};
 }
 
 void check_pull(const DeformOptions& options) {
@@ -89,25 +89,25 @@ DeformSources parse_sources(const DeformOptions& options) {
   if (options.scenario.empty())
     sources.field = parse_field(options.field, options.common.nifti_frame);
   else
-    sources.field = ScenarioText{options.scenario, options.labels};
+    sources.field = ScenarioChoice{options.scenario, options.labels};
   for (const std::string& text : options.with) sources.along.push_back(parse_along(text, options.common.nifti_frame));
   return sources;
 }
 
 Reads other_reads_of(const DeformOptions& options, const DeformSources& sources) {
   Reads reads;
-  if (const auto* field = std::get_if<FieldText>(&sources.field)) reads.add_field(*field);
+  if (const auto* field = std::get_if<FieldChoice>(&sources.field)) reads.add_field(*field);
   if (!options.scenario.empty()) reads.add_file(options.scenario);
   if (!options.labels.empty()) reads.add_volume(volume_named(options.labels));
-  for (const AlongText& text : sources.along) {
-    const auto* volume = std::get_if<AlongVolumeText>(&text);
+  for (const AlongChoice& choice : sources.along) {
+    const auto* volume = std::get_if<AlongVolumeChoice>(&choice);
     if (volume && !volume->segmentation)
       reads.add_volume(volume_named(volume->input.path));
     else  // a DICOM object is one file
-      reads.add_file(volume ? volume->input.path : std::get<AlongStructuresText>(text).input);
+      reads.add_file(volume ? volume->input.path : std::get<AlongStructuresChoice>(choice).input);
   }
   if (names_volume(options.grid)) reads.add_volume(grid_volume(options.grid));
-  for (const PointsText& text : sources.points) reads.add_file(text.input);
+  for (const PointsChoice& points : sources.points) reads.add_file(points.input);
   if (!options.deidentify_key.empty()) reads.add_file(options.deidentify_key);
   return reads;
 }
@@ -115,21 +115,21 @@ Reads other_reads_of(const DeformOptions& options, const DeformSources& sources)
 DeformRequest request_of(const DeformOptions& options) {
   check_choice_of_field(options);
   DeformSources sources = parse_sources(options);
-  DeformRequest request{options, FieldText(), {}, {}, sources.points, is_series_output(options.output), {}, {}};
+  DeformRequest request{options, FieldChoice(), {}, {}, sources.points, is_series_output(options.output), {}, {}};
   request.others = request.reads = other_reads_of(options, sources);
   request.reads.add_volume(options.input);
-  if (auto* scenario = std::get_if<ScenarioText>(&sources.field))
+  if (auto* scenario = std::get_if<ScenarioChoice>(&sources.field))
     request.field = read_simulated(options, std::move(*scenario));
   else
-    request.field = std::get<FieldText>(std::move(sources.field));
+    request.field = std::get<FieldChoice>(std::move(sources.field));
   if (is_pull(request)) check_pull(options);
   check_grid(options.grid, is_pull(request));
   check_output(options, request.series);
   check_maps(options.maps, is_pull(request), request.series);
-  request.volumes = along_of<AlongVolumeText>(sources.along);
-  request.structures = along_of<AlongStructuresText>(sources.along);
-  for (const AlongVolumeText& volume : request.volumes) check_along(volume, request.series);
-  for (const AlongStructuresText& structures : request.structures) check_along(structures, request.series);
+  request.volumes = along_of<AlongVolumeChoice>(sources.along);
+  request.structures = along_of<AlongStructuresChoice>(sources.along);
+  for (const AlongVolumeChoice& volume : request.volumes) check_along(volume, request.series);
+  for (const AlongStructuresChoice& structures : request.structures) check_along(structures, request.series);
   return request;
 }
 
@@ -139,8 +139,8 @@ std::vector<WantedMap> wanted_maps(const DeformRequest& request, const MapOption
 }
 
 bool is_pull(const DeformRequest& request) {
-  const auto* field = std::get_if<FieldText>(&request.field);
-  return field && std::holds_alternative<PullText>(*field);
+  const auto* field = std::get_if<FieldChoice>(&request.field);
+  return field && std::holds_alternative<PullChoice>(*field);
 }
 
 bool is_simulated(const DeformRequest& request) { return std::holds_alternative<Simulated>(request.field); }

@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "apps/cli/reads.h"
+#include "apps/deform/along_choice.h"
 #include "apps/deform/along_points.h"
-#include "apps/deform/along_text.h"
 #include "apps/deform/map_outputs.h"
-#include "apps/fields/field_text.h"
+#include "apps/fields/field_choice.h"
 #include "deform/simulate/scenario.h"
 
 namespace tetwarp::apps {
@@ -22,15 +22,15 @@ namespace tetwarp::apps {
 // batch/case_run.cpp call them in this order.
 
 /// A field that is simulated, of a page of scenario.
-struct ScenarioText {
+struct ScenarioChoice {
   std::filesystem::path file, labels;  ///< labels: on the grid of INPUT; empty: none
 };
 
 /// What the texts of a command line name, parsed.
 struct DeformSources {
-  std::variant<FieldText, ScenarioText> field;
-  std::vector<AlongText> along;
-  std::vector<PointsText> points;
+  std::variant<FieldChoice, ScenarioChoice> field;
+  std::vector<AlongChoice> along;
+  std::vector<PointsChoice> points;
 };
 /// @throws UsageError for a text that cannot be taken apart, and as parse_field
 DeformSources parse_sources(const DeformOptions& options);
@@ -39,17 +39,17 @@ Reads other_reads_of(const DeformOptions& options, const DeformSources& sources)
 
 /// A scenario that was read.
 struct Simulated {
-  ScenarioText text;
+  ScenarioChoice choice;
   simulate::Scenario scenario;
 };
 
 /// What a run is to do: its options, checked as far as that is possible before headers are read.
 struct DeformRequest {
   const DeformOptions& options;
-  std::variant<FieldText, Simulated> field;
-  std::vector<AlongVolumeText> volumes;
-  std::vector<AlongStructuresText> structures;
-  std::vector<PointsText> points;
+  std::variant<FieldChoice, Simulated> field;
+  std::vector<AlongVolumeChoice> volumes;
+  std::vector<AlongStructuresChoice> structures;
+  std::vector<PointsChoice> points;
   bool series = false;  ///< OUTPUT is a DICOM series
   Reads others, reads;  ///< what is read other than INPUT, and with it
 };

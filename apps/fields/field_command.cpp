@@ -15,17 +15,17 @@ int run_field(const FieldOptions& options) {
     throw UsageError("unknown suffix of \"" + options.output.string() +
                      "\"; a field is written as .mha .nrrd .nii .nii.gz");
   }
-  const ForwardText text =
+  const ForwardChoice choice =
       parse_forward_fields(options.field.forward, options.field.cell_size, options.common.nifti_frame);
-  const Reads reads = reads_of(text, options.like);
+  const Reads reads = reads_of(choice, options.like);
   OutputSet outputs(reads, options.common.overwrite);
   const std::filesystem::path output = outputs.add(options.output);
   Stage stage(options.common, "field");
   const InputHeader like = open_input(options.like, options.common);
   outputs.add_reads(reads.slices(options.like, like));
-  const ReadForwardField source = read_field(text, like.geometry, options.common.threads, stage.control());
+  const ReadForwardField source = read_field(choice, like.geometry, options.common.threads, stage.control());
   require(source.field.mesh.is_empty(),
-          "a mesh, " + text.fields.front().text +
+          "a mesh, " + choice.fields.front().text +
               ", has no lattice that a field file could hold; give it to deform or invert");
   outputs.write([&] { write_field_file(output, source.field); });
   outputs.commit();

@@ -36,18 +36,18 @@ struct Invertible {
   const VertexField& forward() const { return std::get<VertexField>(field); }
 };
 
-Invertible read_invertible(const ForwardText& text, const Geometry& like, int threads, const Control& control) {
-  ReadForwardField read = read_field(text, like, threads, control);
+Invertible read_invertible(const ForwardChoice& choice, const Geometry& like, int threads, const Control& control) {
+  ReadForwardField read = read_field(choice, like, threads, control);
   return {std::move(read.field), std::move(read.origin)};
 }
 
-Invertible read_invertible(const PullText& text, const Geometry& like, int threads, const Control& control) {
+Invertible read_invertible(const PullChoice& choice, const Geometry& like, int threads, const Control& control) {
   const Geometry grid = straightened(like);  // of the vertices of the inverse, on which a tilted stack is not held
-  ReadPullField read = read_field(text, like, grid, threads, control);
+  ReadPullField read = read_field(choice, like, grid, threads, control);
   try {
     return {continued_over(read.field, grid), std::move(read.origin), read.field.grid};
   } catch (const InputError& error) {
-    throw InputError(std::string(error.what()) + ", " + text.field.text);
+    throw InputError(std::string(error.what()) + ", " + choice.field.text);
   }
 }
 
@@ -202,8 +202,8 @@ int run_invert(const InvertOptions& options) {
   const bool pulls = !options.field.pull.empty();
   check_output(options);
   if (pulls && options.field.cell_size) throw UsageError("--cell-size does not go with --pull-field; leave it out");
-  const FieldText text = parse_field(options.field, options.common.nifti_frame);
-  const Reads reads = reads_of(text, options.like);
+  const FieldChoice choice = parse_field(options.field, options.common.nifti_frame);
+  const Reads reads = reads_of(choice, options.like);
   OutputSet outputs(reads, options.common.overwrite);
   const std::filesystem::path output = outputs.add(options.output), report_path = outputs.add(options.report);
   const InputHeader like = open_input(options.like, options.common);
@@ -219,7 +219,7 @@ int run_invert(const InvertOptions& options) {
   const Geometry grid = straightened(like.geometry);
   const Control control = field_stage.control();
   Invertible field = std::visit(
-      [&](const auto& one) { return read_invertible(one, like.geometry, options.common.threads, control); }, text);
+      [&](const auto& one) { return read_invertible(one, like.geometry, options.common.threads, control); }, choice);
   field.origin.notes.insert(field.origin.notes.begin(), like.notes.begin(), like.notes.end());
   const double field_seconds = field_stage.seconds();
   std::optional<UnwrittenSeries> series;

@@ -55,10 +55,10 @@ FieldFileHeader field_header_of(const MeshFileHeader& mesh) {
 /// Makes one field of several, in the order in which they are applied.
 class Composition {
  public:
-  Composition(const ForwardText& text, const Geometry& volume, int threads, const Control& control)
-      : volume_(volume), cell_size_(text.cell_size.value_or(1)), limits_{.threads = threads}, control_(control) {
+  Composition(const ForwardChoice& choice, const Geometry& volume, int threads, const Control& control)
+      : volume_(volume), cell_size_(choice.cell_size.value_or(1)), limits_{.threads = threads}, control_(control) {
     result_.origin.identity = true;
-    for (const NamedField& field : text.fields) {
+    for (const NamedField& field : choice.fields) {
       result_.origin.identity = result_.origin.identity && field.text == "identity";
       std::visit([&](const auto& what) { add(field, what); }, field.what);
       is_first_ = false;
@@ -83,7 +83,7 @@ class Composition {
     else
       compose(result_.field, piecewise_affine(next), limits_, control_);
   }
-  /// The first of all, as a ForwardText has it.
+  /// The first of all, as a ForwardChoice has it.
   void add(const NamedField&, const NamedMesh& named) {
     MeshFile file = read_mesh_file(named.file);
     const std::string path = named.file.path.string();
@@ -108,9 +108,9 @@ class Composition {
 };
 
 /// @throws InputError for a mesh, which is a forward field
-const FieldSource& pull_source(const PullText& text) {
-  const FieldSource& source = *source_of(text.field);
-  require(!std::holds_alternative<NamedMesh>(text.field.what),
+const FieldSource& pull_source(const PullChoice& choice) {
+  const FieldSource& source = *source_of(choice.field);
+  require(!std::holds_alternative<NamedMesh>(choice.field.what),
           "a mesh, " + source.path.string() + ", says where its vertices go; give it with -f");
   return source;
 }
@@ -121,31 +121,31 @@ std::uint64_t bytes_of_vectors(const glm::i64vec3& size) {
 
 }  // namespace
 
-ReadForwardField read_field(const ForwardText& text, const Geometry& volume, int threads, const Control& control) {
-  return Composition(text, volume, threads, control).result();
+ReadForwardField read_field(const ForwardChoice& choice, const Geometry& volume, int threads, const Control& control) {
+  return Composition(choice, volume, threads, control).result();
 }
 
-ReadPullField read_field(const PullText& text, const Geometry& volume, const Geometry& output, int threads,
+ReadPullField read_field(const PullChoice& choice, const Geometry& volume, const Geometry& output, int threads,
                          const Control& control) {
   ReadPullField result;
-  if (const auto* named = std::get_if<NamedTransform>(&text.field.what)) {
+  if (const auto* named = std::get_if<NamedTransform>(&choice.field.what)) {
     const TransformFile transform = read(*named);
     VertexField sampled = sample_on(output, transform.displacement, {.threads = threads}, control);
     note_transform(transform, named->file.string(), true, result.origin);
     result.field = {sampled.lattice, std::move(sampled.displacement)};
     return result;
   }
-  const FieldSource source = for_volume(pull_source(text), volume);
+  const FieldSource source = for_volume(pull_source(choice), volume);
   note_header(read_field_header(source), source.path.string(), "output to input", result.origin);
   result.field = read_pull_field(source);
   return result;
 }
 
-std::uint64_t field_bytes(const ForwardText& text, const Geometry& volume) {
-  for (const NamedField& field : text.fields) {
+std::uint64_t field_bytes(const ForwardChoice& choice, const Geometry& volume) {
+  for (const NamedField& field : choice.fields) {
     if (const auto* transform = std::get_if<NamedTransform>(&field.what)) read(*transform);
   }
-  const auto& first = text.fields.front().what;
+  const auto& first = choice.fields.front().what;
   if (const auto* mesh = std::get_if<NamedMesh>(&first)) {
     constexpr std::uint64_t kVertex =
                                 sizeof(glm::dvec3) + sizeof(glm::vec3) + sizeof(std::int64_t) + 2 * sizeof(Vertex),
@@ -155,12 +155,12 @@ std::uint64_t field_bytes(const ForwardText& text, const Geometry& volume) {
   }
   if (const auto* lattice = std::get_if<NamedLattice>(&first))
     return bytes_of_vectors(read_field_header(lattice->file).grid.size);
-  return bytes_of_vectors(lattice_over(straightened(volume), text.cell_size.value_or(1)).size);
+  return bytes_of_vectors(lattice_over(straightened(volume), choice.cell_size.value_or(1)).size);
 }
 
-std::uint64_t field_bytes(const PullText& text, const Geometry& output) {
-  const auto* transform = std::get_if<NamedTransform>(&text.field.what);
-  if (!transform) return bytes_of_vectors(read_field_header(pull_source(text)).grid.size);
+std::uint64_t field_bytes(const PullChoice& choice, const Geometry& output) {
+  const auto* transform = std::get_if<NamedTransform>(&choice.field.what);
+  if (!transform) return bytes_of_vectors(read_field_header(pull_source(choice)).grid.size);
   read(*transform);
   return bytes_of_vectors(output.size);
 }

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "apps/fields/any_field.h"
-#include "apps/fields/field_text.h"
+#include "apps/fields/field_choice.h"
 #include "io/mesh_file.h"
 
 namespace tetwarp::apps {
@@ -40,16 +40,16 @@ struct ReadPullField {
 /// Fields composed vertex by vertex. The lattice is that of the first if it is a file of one, else one over `volume`
 /// with a vertex every `cell_size` voxels, 1 if that is not said. If the first is a mesh, the vertices are the mesh's.
 /// Formulas need no disk. @throws InputError for unusable files; Cancelled
-ReadForwardField read_field(const ForwardText& text, const Geometry& volume, int threads, const Control& control);
+ReadForwardField read_field(const ForwardChoice& choice, const Geometry& volume, int threads, const Control& control);
 /// The pull field of a file for `volume`, or a transform sampled at every voxel centre of `output`.
 /// @throws InputError for an unusable file; Cancelled
-ReadPullField read_field(const PullText& text, const Geometry& volume, const Geometry& output, int threads,
+ReadPullField read_field(const PullChoice& choice, const Geometry& volume, const Geometry& output, int threads,
                          const Control& control);
 
 /// Memory of the field that `read_field` will give, with what a mesh needs for its own work. Transforms and meshes are
 /// read, so that a bad one is known early.
-std::uint64_t field_bytes(const ForwardText& text, const Geometry& volume);
-std::uint64_t field_bytes(const PullText& text, const Geometry& output);
+std::uint64_t field_bytes(const ForwardChoice& choice, const Geometry& volume);
+std::uint64_t field_bytes(const PullChoice& choice, const Geometry& output);
 
 /// What a header says and how that is known, without the grid.
 nlohmann::json to_json(const FieldFileHeader& header);

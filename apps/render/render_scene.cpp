@@ -113,7 +113,7 @@ bool is_transfer_file(const RenderOptions& options) {
 RenderScene::RenderScene(const RenderOptions& options, const RenderFields& fields)
     : options_(options), fields_(fields), input_options_(options.input), deforms_(fields.deform()) {
   input_options_.hash = FileHash::left_out;
-  const bool pulls = fields.deforming && std::holds_alternative<PullText>(*fields.deforming);
+  const bool pulls = fields.deforming && std::holds_alternative<PullChoice>(*fields.deforming);
   for (const OverlayWish& wish : fields.overlays) {
     if (!wish.is_of_deformation()) continue;
     if (!deforms_)
@@ -175,10 +175,10 @@ void RenderScene::read_field(const Control& control) {
     field_ = std::move(read.field);
     notes_.insert(notes_.end(), read.origin.notes.begin(), read.origin.notes.end());
   };
-  if (const auto* pull = std::get_if<PullText>(&*fields_.deforming))
+  if (const auto* pull = std::get_if<PullChoice>(&*fields_.deforming))
     take(apps::read_field(*pull, source, grid_, options_.common.threads, control));
   else
-    take(apps::read_field(std::get<ForwardText>(*fields_.deforming), source, options_.common.threads, control));
+    take(apps::read_field(std::get<ForwardChoice>(*fields_.deforming), source, options_.common.threads, control));
 }
 
 void RenderScene::set_frame_field(double amount, const Control& control) {
@@ -199,7 +199,7 @@ void RenderScene::show(std::size_t frame) {
   if (!deforms_) return;
   const Control control{.stop = interrupt_token()};
   if (fields_.sequence) {
-    const ForwardText one{{fields_.sequence->fields[frame]}, {}};
+    const ForwardChoice one{{fields_.sequence->fields[frame]}, {}};
     field_ = apps::read_field(one, header_.geometry, options_.common.threads, control).field;
   }
   const bool grows = options_.frames > 1;
@@ -256,7 +256,7 @@ OwnedOverlay RenderScene::overlay(const OverlayWish& wish, const Region& region)
 }
 
 std::string RenderScene::field_title(std::size_t frame) const {
-  if (fields_.sequence) return title_of(ForwardText{{fields_.sequence->fields[frame]}, {}});
+  if (fields_.sequence) return title_of(ForwardChoice{{fields_.sequence->fields[frame]}, {}});
   return fields_.deforming ? title_of(*fields_.deforming) : "";
 }
 

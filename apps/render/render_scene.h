@@ -22,7 +22,7 @@ struct OverlayWish {
   std::string text;
   OverlayKind kind = OverlayKind::coverage;
   std::filesystem::path map;           ///< a file; empty: of the field that deforms the volume, or a lattice
-  std::optional<ForwardText> lattice;  ///< of lattice=FIELD
+  std::optional<ForwardChoice> lattice;  ///< of lattice=FIELD
 
   /// Whether it is of the field that deforms the volume.
   bool is_of_deformation() const { return map.empty() && !lattice; }
@@ -30,8 +30,8 @@ struct OverlayWish {
 
 /// The fields that a picture is made with, parsed.
 struct RenderFields {
-  std::optional<FieldText> deforming;   ///< the volume, in all pictures
-  std::optional<ForwardText> sequence;  ///< instead: each of its fields deforms one picture
+  std::optional<FieldChoice> deforming;   ///< the volume, in all pictures
+  std::optional<ForwardChoice> sequence;  ///< instead: each of its fields deforms one picture
   std::vector<OverlayWish> overlays;
 
   bool deform() const { return deforming || sequence; }

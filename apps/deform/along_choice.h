@@ -14,7 +14,7 @@
 namespace tetwarp::apps {
 
 /// A volume that goes along with INPUT: IN=OUT of a --with, and what follows OUT.
-struct AlongVolumeText {
+struct AlongVolumeChoice {
   InputOptions input;
   std::filesystem::path output;
   std::optional<Interpolation> interpolation;  ///< none: that of INPUT; of a segmentation see usual_interpolation
@@ -24,22 +24,22 @@ struct AlongVolumeText {
 };
 
 /// An RT Structure Set that goes along with INPUT: IN.dcm=OUT.dcm of a --with.
-struct AlongStructuresText {
+struct AlongStructuresChoice {
   std::string text;  ///< as it was given
   std::filesystem::path input, output;
 };
 
-using AlongText = std::variant<AlongVolumeText, AlongStructuresText>;
+using AlongChoice = std::variant<AlongVolumeChoice, AlongStructuresChoice>;
 
 /// Looks into a DICOM file, for what it is. @param frame  which place of a NIfTI file counts
 /// @throws UsageError for a volume's text that is not IN=OUT[:nearest|linear|cubic|vote][:background=V][:own]
-AlongText parse_along(const std::string& text, NiftiFrame frame);
-/// The texts of one kind, in their order.
-template <class Text>
-std::vector<Text> along_of(const std::vector<AlongText>& all) {
-  std::vector<Text> some;
-  for (const AlongText& one : all)
-    if (const auto* text = std::get_if<Text>(&one)) some.push_back(*text);
+AlongChoice parse_along(const std::string& text, NiftiFrame frame);
+/// Those of one kind, in their order.
+template <class Choice>
+std::vector<Choice> along_of(const std::vector<AlongChoice>& all) {
+  std::vector<Choice> some;
+  for (const AlongChoice& one : all)
+    if (const auto* choice = std::get_if<Choice>(&one)) some.push_back(*choice);
   return some;
 }
 
@@ -48,7 +48,7 @@ bool is_object_output(const std::filesystem::path& output);
 
 /// @param series  whether OUTPUT is a DICOM series, to which objects can refer
 /// @throws UsageError for what cannot be written as its output is named
-void check_along(const AlongVolumeText& volume, bool series);
-void check_along(const AlongStructuresText& structures, bool series);
+void check_along(const AlongVolumeChoice& volume, bool series);
+void check_along(const AlongStructuresChoice& structures, bool series);
 
 }  // namespace tetwarp::apps

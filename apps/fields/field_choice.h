@@ -44,18 +44,18 @@ struct NamedField {
 const FieldSource* source_of(const NamedField& field);
 
 /// Forward fields, applied one after the other: those of -f.
-struct ForwardText {
+struct ForwardChoice {
   std::vector<NamedField> fields;         ///< at least one; files exist; a mesh is the first or none
   std::optional<std::int64_t> cell_size;  ///< of a lattice over the volume; none where the first has its own vertices
 };
 
 /// A field that maps output to input: that of --pull-field. It is a file, which need not exist.
-struct PullText {
+struct PullChoice {
   NamedField field;
 };
 
 /// The field of a command, in either direction.
-using FieldText = std::variant<ForwardText, PullText>;
+using FieldChoice = std::variant<ForwardChoice, PullChoice>;
 
 /// The map of a formula on a volume, which gives its centre and the unit `vox`.
 /// @throws UsageError for parameters that do not go with the volume
@@ -65,25 +65,25 @@ PointMap formula_map(const NamedField& formula, const Geometry& volume);
 /// also the initial ones of elastix.
 std::vector<std::filesystem::path> files_of(const NamedField& field);
 /// Those of all fields, in their order.
-std::vector<std::filesystem::path> files_of(const FieldText& field);
+std::vector<std::filesystem::path> files_of(const FieldChoice& field);
 
 /// Fields by name, files without their folders: "wave:amplitude=8, then twist.mha", "pull field inverse.mha".
-std::string title_of(const FieldText& field);
+std::string title_of(const FieldChoice& field);
 /// Title for a de-identified volume: formulas, and that there was a file, but not its name; "deformed" of a pull field.
-std::string title_without_names(const FieldText& field);
+std::string title_without_names(const FieldChoice& field);
 
 /// A file with the options behind its name, `PATH` or `PATH:KEY=VALUE,...`: a field, or whatever else `info` is given.
 /// It need not exist. @throws UsageError for options that do not go with it
 FieldSource parse_field_file(const std::string& text, NiftiFrame frame);
 
 /// @throws UsageError for no text at all; one that is no formula and no file, or has wrong parameters or options; a
-/// mesh that is not the first; or a cell size that is below 1, or beside a first field with vertices of its own
-ForwardText parse_forward_fields(const std::vector<std::string>& texts, std::optional<std::int64_t> cell_size,
-                                 NiftiFrame frame);
+/// mesh that is not the first; a cell size below 1, or for a first field with vertices of its own
+ForwardChoice parse_forward_fields(const std::vector<std::string>& texts, std::optional<std::int64_t> cell_size,
+                                   NiftiFrame frame);
 /// @throws UsageError for options that do not go with the file
-PullText parse_pull_field(const std::string& text, NiftiFrame frame);
+PullChoice parse_pull_field(const std::string& text, NiftiFrame frame);
 /// The one that was given. @throws UsageError for none, and as the two above
-FieldText parse_field(const FieldArguments& given, NiftiFrame frame);
+FieldChoice parse_field(const FieldArguments& given, NiftiFrame frame);
 
 /// A text of -f with other names of its files, for a command that runs elsewhere; a formula stays as it is.
 /// @param renamed  gives the other name of a file

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "apps/fields/field_text.h"
+#include "apps/fields/field_choice.h"
 
 #include "deform/fields/formula.h"
 #include "io/mesh_file.h"
@@ -104,33 +104,33 @@ std::vector<fs::path> files_of(const NamedField& field) {
   return files;
 }
 
-std::vector<fs::path> files_of(const FieldText& field) {
-  if (const auto* pull = std::get_if<PullText>(&field)) return files_of(pull->field);
+std::vector<fs::path> files_of(const FieldChoice& field) {
+  if (const auto* pull = std::get_if<PullChoice>(&field)) return files_of(pull->field);
   std::vector<fs::path> files;
-  for (const NamedField& one : std::get<ForwardText>(field).fields) {
+  for (const NamedField& one : std::get<ForwardChoice>(field).fields) {
     for (fs::path& file : files_of(one)) files.push_back(std::move(file));
   }
   return files;
 }
 
-std::string title_of(const FieldText& field) {
-  if (const auto* pull = std::get_if<PullText>(&field)) return "pull field " + title_of(pull->field);
-  return joined(std::get<ForwardText>(field).fields, [](const NamedField& one) { return title_of(one); });
+std::string title_of(const FieldChoice& field) {
+  if (const auto* pull = std::get_if<PullChoice>(&field)) return "pull field " + title_of(pull->field);
+  return joined(std::get<ForwardChoice>(field).fields, [](const NamedField& one) { return title_of(one); });
 }
 
-std::string title_without_names(const FieldText& field) {
-  if (std::holds_alternative<PullText>(field)) return "deformed";
-  return joined(std::get<ForwardText>(field).fields, [](const NamedField& one) {
+std::string title_without_names(const FieldChoice& field) {
+  if (std::holds_alternative<PullChoice>(field)) return "deformed";
+  return joined(std::get<ForwardChoice>(field).fields, [](const NamedField& one) {
     return std::holds_alternative<NamedFormula>(one.what) ? one.text : std::string("a field of a file");
   });
 }
 
 FieldSource parse_field_file(const std::string& text, NiftiFrame frame) { return parse_file(text, frame).source; }
 
-ForwardText parse_forward_fields(const std::vector<std::string>& texts, std::optional<std::int64_t> cell_size,
-                                 NiftiFrame frame) {
+ForwardChoice parse_forward_fields(const std::vector<std::string>& texts, std::optional<std::int64_t> cell_size,
+                                   NiftiFrame frame) {
   if (texts.empty()) throw UsageError("no field; give -f FIELD or --pull-field FILE");
-  ForwardText parsed{{}, cell_size};
+  ForwardChoice parsed{{}, cell_size};
   for (const std::string& text : texts) parsed.fields.push_back(parse_forward_field(text, frame));
   for (std::size_t n = 1; n < texts.size(); ++n) {
     if (std::holds_alternative<NamedMesh>(parsed.fields[n].what)) {
@@ -145,11 +145,11 @@ ForwardText parse_forward_fields(const std::vector<std::string>& texts, std::opt
   return parsed;
 }
 
-PullText parse_pull_field(const std::string& text, NiftiFrame frame) {
+PullChoice parse_pull_field(const std::string& text, NiftiFrame frame) {
   return {named_file(text, parse_file(text, frame))};
 }
 
-FieldText parse_field(const FieldArguments& given, NiftiFrame frame) {
+FieldChoice parse_field(const FieldArguments& given, NiftiFrame frame) {
   if (!given.pull.empty()) return parse_pull_field(given.pull, frame);
   return parse_forward_fields(given.forward, given.cell_size, frame);
 }

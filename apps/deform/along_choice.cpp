@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "apps/deform/along_text.h"
+#include "apps/deform/along_choice.h"
 
 #include <algorithm>
 #include <charconv>
@@ -37,7 +37,7 @@ std::optional<double> number(std::string_view text) {
 }
 
 /// Reads one option that follows OUT. @return whether it is one
-bool read_option(std::string_view text, AlongVolumeText& options) {
+bool read_option(std::string_view text, AlongVolumeChoice& options) {
   constexpr std::string_view kBackground = "background=";
   const auto is_first = [](bool given, const char* what) {
     if (given) throw UsageError(std::string("--with has two of ") + what + "; " + kForm);
@@ -56,10 +56,10 @@ bool read_option(std::string_view text, AlongVolumeText& options) {
   return true;
 }
 
-AlongVolumeText parse_volume(const std::string& text, NiftiFrame frame) {
+AlongVolumeChoice parse_volume(const std::string& text, NiftiFrame frame) {
   const std::size_t equals = text.find('=');
   if (equals == 0 || equals == std::string::npos) throw UsageError("--with \"" + text + "\" names no output; " + kForm);
-  AlongVolumeText options;
+  AlongVolumeChoice options;
   options.input = volume_named(text.substr(0, equals), frame);
   const std::vector<std::string> parts = split(text.substr(equals + 1), ':');
   options.output = parts.front();
@@ -75,24 +75,24 @@ AlongVolumeText parse_volume(const std::string& text, NiftiFrame frame) {
 
 }  // namespace
 
-AlongText parse_along(const std::string& text, NiftiFrame frame) {
+AlongChoice parse_along(const std::string& text, NiftiFrame frame) {
   const std::filesystem::path input = text.substr(0, text.find('='));
   if (is_dicom_structure_set(input))
-    return AlongStructuresText{text, input, text.substr(std::min(text.find('='), text.size() - 1) + 1)};
-  AlongVolumeText volume = parse_volume(text, frame);
+    return AlongStructuresChoice{text, input, text.substr(std::min(text.find('='), text.size() - 1) + 1)};
+  AlongVolumeChoice volume = parse_volume(text, frame);
   volume.segmentation = is_dicom_segmentation(input);
   return volume;
 }
 
 bool is_object_output(const std::filesystem::path& output) { return output.extension() == ".dcm"; }
 
-void check_along(const AlongVolumeText& volume, bool series) {
+void check_along(const AlongVolumeChoice& volume, bool series) {
   if (series || !is_object_output(volume.output)) return;
   throw UsageError("a DICOM object refers to a DICOM series, " + volume.output.string() +
                    "; name a folder as OUTPUT, or .nii.gz, .nii, .nrrd or .mha here");
 }
 
-void check_along(const AlongStructuresText& structures, bool series) {
+void check_along(const AlongStructuresChoice& structures, bool series) {
   if (structures.output.extension() != ".dcm") {
     throw UsageError("--with \"" + structures.text +
                      "\" is an RT Structure Set, which is written as one; expected IN.dcm=OUT.dcm");

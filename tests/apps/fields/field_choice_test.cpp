@@ -32,11 +32,11 @@ std::string tetrahedron(int x) {
          "$Elements\n1\n1 4 0 1 2 3 4\n$EndElements\n";
 }
 
-ForwardText parse(const std::vector<std::string>& texts, std::optional<std::int64_t> cell_size = {}) {
+ForwardChoice parse(const std::vector<std::string>& texts, std::optional<std::int64_t> cell_size = {}) {
   return parse_forward_fields(texts, cell_size, NiftiFrame::sform);
 }
 
-PullText parse_pull(const std::string& text) { return parse_pull_field(text, NiftiFrame::sform); }
+PullChoice parse_pull(const std::string& text) { return parse_pull_field(text, NiftiFrame::sform); }
 
 std::string usage_error(const std::vector<std::string>& texts, std::optional<std::int64_t> cell_size = {}) {
   try {
@@ -63,8 +63,8 @@ class FieldFiles : public testing::Test {
   Scratch scratch_;
 };
 
-TEST(FieldText, AFormulaReadsNothingAndKeepsItsText) {
-  const ForwardText parsed = parse({"wave:amplitude=8,wavelength=64vox", "identity"}, 4);
+TEST(FieldChoice, AFormulaReadsNothingAndKeepsItsText) {
+  const ForwardChoice parsed = parse({"wave:amplitude=8,wavelength=64vox", "identity"}, 4);
   ASSERT_EQ(parsed.fields.size(), 2u);
   EXPECT_TRUE(std::holds_alternative<NamedFormula>(parsed.fields[0].what));
   EXPECT_EQ(parsed.fields[0].text, "wave:amplitude=8,wavelength=64vox");
@@ -74,19 +74,19 @@ TEST(FieldText, AFormulaReadsNothingAndKeepsItsText) {
   EXPECT_EQ(title_without_names(parsed), title_of(parsed));
 }
 
-TEST(FieldText, WhatIsWrongWithAFormulaIsAMistakeOfTheCommandLine) {
+TEST(FieldChoice, WhatIsWrongWithAFormulaIsAMistakeOfTheCommandLine) {
   EXPECT_TRUE(says(usage_error({"wave:amplitud=8,wavelength=64"}), {"amplitude is missing"}));
   EXPECT_TRUE(says(usage_error({"twist:angle=x"}), {"angle is \"x\", expected a number"}));
   EXPECT_TRUE(says(usage_error({"twirl:angle=3"}), {"\"twirl:angle=3\" is neither a formula nor a file that exists"}));
   EXPECT_TRUE(says(usage_error({}), {"no field; give -f FIELD"}));
   EXPECT_TRUE(says(usage_error({"identity"}, 0), {"--cell-size is 0"}));
-  const ForwardText fine = parse({"elastic:amplitude=1,spacing=0.0001,seed=1"});
+  const ForwardChoice fine = parse({"elastic:amplitude=1,spacing=0.0001,seed=1"});
   const Geometry huge{.size = {1000, 1000, 1000}};
   EXPECT_THROW(read_field(fine, huge, 1, {}), UsageError) << "parameters that do not go with the volume";
 }
 
 TEST_F(FieldFiles, AreToldApartOnce) {
-  const ForwardText parsed = parse({mesh(), at("lattice.mha"), at("second.txt")});
+  const ForwardChoice parsed = parse({mesh(), at("lattice.mha"), at("second.txt")});
   EXPECT_TRUE(std::holds_alternative<NamedMesh>(parsed.fields[0].what));
   EXPECT_TRUE(std::holds_alternative<NamedLattice>(parsed.fields[1].what));
   EXPECT_TRUE(std::holds_alternative<NamedTransform>(parsed.fields[2].what));
@@ -103,10 +103,10 @@ TEST_F(FieldFiles, AreAllNamedThatAFieldIsReadFrom) {
 }
 
 TEST_F(FieldFiles, AreTitledWithoutFoldersOrNotAtAll) {
-  const FieldText parsed = parse({at("lattice.mha"), "identity", at("first.txt")});
+  const FieldChoice parsed = parse({at("lattice.mha"), "identity", at("first.txt")});
   EXPECT_EQ(title_of(parsed), "lattice.mha, then identity, then first.txt");
   EXPECT_EQ(title_without_names(parsed), "a field of a file, then identity, then a field of a file");
-  const FieldText pull = parse_pull(at("lattice.mha"));
+  const FieldChoice pull = parse_pull(at("lattice.mha"));
   EXPECT_EQ(title_of(pull), "pull field lattice.mha");
   EXPECT_EQ(title_without_names(pull), "deformed");
 }
@@ -130,7 +130,7 @@ TEST_F(FieldFiles, OfAPullFieldNeedNotExistAndAreNoFormulas) {
   EXPECT_THROW(field_bytes(parse_pull(mesh()), kVolume), InputError) << "a mesh is a forward field";
 }
 
-TEST(FieldText, FilesGetOtherNamesAndFormulasStay) {
+TEST(FieldChoice, FilesGetOtherNamesAndFormulasStay) {
   const auto renamed = [](const std::string& text) {
     return with_files_renamed(text, [](const std::string& file) { return "there/" + file; });
   };
@@ -140,8 +140,8 @@ TEST(FieldText, FilesGetOtherNamesAndFormulasStay) {
 }
 
 TEST_F(FieldFiles, HaveTheSizeThatIsSaidBeforeTheyAreRead) {
-  const auto size_of = [](const ForwardText& text) { return size_bytes(read_field(text, kVolume, 1, {}).field); };
-  for (const ForwardText& text : {parse({"identity"}, 2), parse({at("lattice.mha")}), parse({at("first.txt")})})
+  const auto size_of = [](const ForwardChoice& text) { return size_bytes(read_field(text, kVolume, 1, {}).field); };
+  for (const ForwardChoice& text : {parse({"identity"}, 2), parse({at("lattice.mha")}), parse({at("first.txt")})})
     EXPECT_EQ(field_bytes(text, kVolume), size_of(text)) << text.fields.front().text;
   EXPECT_GE(field_bytes(parse({mesh()}), kVolume), size_of(parse({mesh()}))) << "and what a mesh needs for its work";
 }
