@@ -24,7 +24,7 @@ constexpr std::int64_t kMostCellSize = 65536;
 struct Commands {
   PhantomOptions phantom;
   InfoOptions info;
-  FieldOptions field;
+  FieldCommandOptions field;
   InvertOptions invert;
   DeformOptions deform;
   SimulateOptions simulate;
@@ -118,7 +118,7 @@ void add_info(CLI::App& app, InfoOptions& options) {
   command->footer("Example: tetwarp info study_folder");
 }
 
-void add_field(CLI::App& app, FieldOptions& options) {
+void add_field(CLI::App& app, FieldCommandOptions& options) {
   CLI::App* command = app.add_subcommand("field", "Write a field as a file");
   command->add_option("FIELD", options.field.forward, kFieldHelp)->required();
   command->add_option("--like", options.like.path, "The volume that the field is for")->required();

@@ -83,7 +83,7 @@ struct InfoOptions {
   bool json = false;
 };
 
-struct FieldOptions {
+struct FieldCommandOptions {
   CommonOptions common;
   FieldArguments field;  ///< forward
   InputOptions like;
@@ -185,7 +185,7 @@ int run_command_line(int argc, char** argv);
 
 int run_phantom(const PhantomOptions& options);
 int run_info(const InfoOptions& options);
-int run_field(const FieldOptions& options);
+int run_field(const FieldCommandOptions& options);
 int run_invert(const InvertOptions& options);
 int run_deform(const DeformOptions& options);
 int run_simulate(const SimulateOptions& options);

@@ -10,7 +10,7 @@
 
 namespace tetwarp::apps {
 
-int run_field(const FieldOptions& options) {
+int run_field(const FieldCommandOptions& options) {
   if (!has_image_suffix(options.output)) {
     throw UsageError("unknown suffix of \"" + options.output.string() +
                      "\"; a field is written as .mha .nrrd .nii .nii.gz");
