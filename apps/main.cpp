@@ -26,6 +26,7 @@ int fail(int status, const char* what) {
 
 int main(int argc, char** argv) {
   using namespace tetwarp;
+  apps::hold_closed_streams();
   try {
     apps::watch_interrupts();
     std::signal(SIGXFSZ, SIG_IGN);  // a file that would be larger than allowed is an error like a full disk
