@@ -15,6 +15,7 @@
 #include "deform/residuals.h"
 #include "io/image_file.h"
 #include "io/mesh_writer.h"
+#include "io/opened_file.h"
 #include "io/scenario_file.h"
 
 namespace tetwarp::apps {
@@ -156,8 +157,9 @@ DeformOutputs begin_outputs(const DeformOptions& options, const PointsOption& po
       {},     {},
       {},     {},
       {},     {}};
-  // The series of a single file is read from its folder, so a derived series must not land there.
-  if (series && !options.input.single && !std::filesystem::is_directory(options.input.path))
+  // The series of a single file is read from its folder, so a derived series must not land there. What is not there is
+  // no file: who reads it says so.
+  if (series && !options.input.single && is_file(options.input.path))
     outputs.set.add_reads({folder_of(options.input.path)});
   outputs.volume = outputs.set.add(options.output, series ? StagedOutput::Kind::folder : StagedOutput::Kind::file);
   outputs.sidecar = outputs.set.add(sidecar_of(options.output));
