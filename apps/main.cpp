@@ -26,8 +26,10 @@ int fail(int status, const char* what) {
 
 int main(int argc, char** argv) {
   using namespace tetwarp;
+  apps::hold_closed_streams();
   try {
     apps::watch_interrupts();
+    std::signal(SIGCHLD, SIG_DFL);  // how ffmpeg ended is to be known, whatever the caller ignores
     std::signal(SIGXFSZ, SIG_IGN);  // a file that would be larger than allowed is an error like a full disk
     const int status = apps::run_command_line(argc, argv);
     std::cout.flush();

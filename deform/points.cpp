@@ -14,6 +14,7 @@
 #include <glm/matrix.hpp>
 
 #include "deform/core/cell_weights.h"
+#include "deform/cpu/first_refusal.h"
 #include "deform/cpu/tiles.h"
 #include "deform/field_check.h"
 #include "deform/mesh_locator.h"
@@ -183,13 +184,17 @@ PointStatus PointMover::move(glm::dvec3& point) const { return map_->move(point)
 std::vector<PointStatus> PointMover::move(std::span<glm::dvec3> points, const Control& control) const {
   std::vector<PointStatus> status(points.size());
   cpu::Progress progress(control, static_cast<std::int64_t>(points.size()));
+  cpu::FirstRefusal refusal;
   tbb::task_arena arena = cpu::make_arena(limits_);
   arena.execute([&] {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size(), 4096), [&](const auto& range) {
-      for (std::size_t n = range.begin(); n < range.end(); ++n) status[n] = move(points[n]);
-      progress.done(static_cast<std::int64_t>(range.size()));
+      refusal.attempt(static_cast<std::int64_t>(range.begin()), [&] {
+        for (std::size_t n = range.begin(); n < range.end(); ++n) status[n] = move(points[n]);
+        progress.done(static_cast<std::int64_t>(range.size()));
+      });
     });
   });
+  refusal.rethrow();
   return status;
 }
 

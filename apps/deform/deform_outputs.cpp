@@ -3,6 +3,8 @@
 
 #include "apps/deform/deform_outputs.h"
 
+#include "io/opened_file.h"
+
 namespace tetwarp::apps {
 
 namespace {
@@ -35,8 +37,9 @@ DeformOutputs begin_outputs(const DeformRequest& request) {
                         {},
                         {}};
   OutputSet& set = outputs.set;
-  // The series of a single file is read from its folder, so a derived series must not land there.
-  if (request.series && !options.input.single && !std::filesystem::is_directory(options.input.path))
+  // The series of a single file is read from its folder, so a derived series must not land there. What is not there is
+  // no file: who reads it says so.
+  if (request.series && !options.input.single && is_file(options.input.path))
     set.add_reads({folder_of(options.input.path)});
   outputs.volume = set.add(options.output, request.series ? StagedOutput::Kind::folder : StagedOutput::Kind::file);
   outputs.sidecar = set.add(sidecar_of(options.output));

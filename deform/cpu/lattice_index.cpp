@@ -14,6 +14,8 @@
 #include <glm/geometric.hpp>
 #include <string>
 
+#include "deform/cpu/first_refusal.h"
+
 namespace tetwarp::cpu {
 
 void FieldStatistics::add_cells(const LatticeBlock& block) {
@@ -95,11 +97,15 @@ void LatticeIndex::build(const Geometry& output, const FieldView& field, const C
 
   if (steps_.cells.x != 0 && mostly_zero()) find_blocks_at_rest(control);
   tbb::enumerable_thread_specific<FieldStatistics> statistics;
+  FirstRefusal refusal;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, boxes_.size(), 64), [&](const auto& range) {
     if (control.stop.stop_requested()) throw Cancelled();
-    Block scratch;
-    for (std::size_t block = range.begin(); block < range.end(); ++block) look_at(block, scratch, statistics.local());
+    refusal.attempt(static_cast<std::int64_t>(range.begin()), [&] {
+      Block scratch;
+      for (std::size_t block = range.begin(); block < range.end(); ++block) look_at(block, scratch, statistics.local());
+    });
   });
+  refusal.rethrow();
   statistics_ = {};
   for (const FieldStatistics& part : statistics) statistics_.add(part);
   group_boxes();

@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "deform/cpu/first_refusal.h"
 #include "deform/cpu/map_writer.h"
 #include "deform/cpu/sampler.h"
 #include "deform/cpu/tiles.h"
@@ -126,15 +127,20 @@ class RowPullResampler final : public PullResampler {
 
   void check_samples(const Control& control) {
     const glm::i64vec3 size = frame_.size;
+    const auto check_slice = [&](std::int64_t z) {
+      const glm::vec3* slice = frame_.displacement + z * size.y * size.x;
+      for (std::int64_t n = 0; n < size.y * size.x; ++n) {
+        if (!frame_.is_usable(slice[n])) refuse_sample({n % size.x, n / size.x, z});
+      }
+    };
+    FirstRefusal refusal;
     arena_.execute([&] {
       tbb::parallel_for(std::int64_t{0}, size.z, [&](std::int64_t z) {
         if (control.stop.stop_requested()) throw Cancelled();
-        const glm::vec3* slice = frame_.displacement + z * size.y * size.x;
-        for (std::int64_t n = 0; n < size.y * size.x; ++n) {
-          if (!frame_.is_usable(slice[n])) refuse_sample({n % size.x, n / size.x, z});
-        }
+        refusal.attempt(z, [&] { check_slice(z); });
       });
     });
+    refusal.rethrow();
   }
 
   mutable tbb::task_arena arena_;

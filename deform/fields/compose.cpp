@@ -10,6 +10,7 @@
 #include <glm/common.hpp>
 
 #include "deform/core/cell_weights.h"
+#include "deform/cpu/first_refusal.h"
 #include "deform/cpu/tiles.h"
 #include "deform/fields/point_map.h"
 #include "deform/large_memory.h"
@@ -24,16 +25,20 @@ void for_each_vertex(VertexField& field, const Limits& limits, const Control& co
   const AffineMap point = point_from_index(field.lattice);
   const glm::i64vec3 size = field.lattice.size;
   cpu::Progress progress(control, size.z);
+  cpu::FirstRefusal refusal;
   tbb::task_arena arena = cpu::make_arena(limits);
+  const auto change_slice = [&](std::int64_t z) {
+    for (std::int64_t y = 0; y < size.y; ++y) {
+      glm::vec3* row = field.displacement.data() + (z * size.y + y) * size.x;
+      for (std::int64_t x = 0; x < size.x; ++x) row[x] = change(point(glm::dvec3(x, y, z)), row[x]);
+    }
+    progress.done(1);
+  };
   arena.execute([&] {
-    tbb::parallel_for(std::int64_t{0}, size.z, [&](std::int64_t z) {
-      for (std::int64_t y = 0; y < size.y; ++y) {
-        glm::vec3* row = field.displacement.data() + (z * size.y + y) * size.x;
-        for (std::int64_t x = 0; x < size.x; ++x) row[x] = change(point(glm::dvec3(x, y, z)), row[x]);
-      }
-      progress.done(1);
-    });
+    tbb::parallel_for(std::int64_t{0}, size.z,
+                      [&](std::int64_t z) { refusal.attempt(z * size.x * size.y, [&] { change_slice(z); }); });
   });
+  refusal.rethrow();
 }
 
 }  // namespace
@@ -52,16 +57,21 @@ namespace {
 void compose(TetrahedralMesh& mesh, const PointMap& next, const Limits& limits, const Control& control) {
   constexpr std::size_t kGrain = 4096;
   cpu::Progress progress(control, static_cast<std::int64_t>(mesh.rest.size()));
+  cpu::FirstRefusal refusal;
   tbb::task_arena arena = cpu::make_arena(limits);
+  const auto move_on = [&](const tbb::blocked_range<std::size_t>& range) {
+    for (std::size_t n = range.begin(); n < range.end(); ++n) {
+      const glm::dvec3 displacement(mesh.displacement[n]);
+      mesh.displacement[n] = glm::vec3(displacement + next(mesh.rest[n] + displacement));
+    }
+    progress.done(static_cast<std::int64_t>(range.size()));
+  };
   arena.execute([&] {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.rest.size(), kGrain), [&](const auto& range) {
-      for (std::size_t n = range.begin(); n < range.end(); ++n) {
-        const glm::dvec3 displacement(mesh.displacement[n]);
-        mesh.displacement[n] = glm::vec3(displacement + next(mesh.rest[n] + displacement));
-      }
-      progress.done(static_cast<std::int64_t>(range.size()));
+      refusal.attempt(static_cast<std::int64_t>(range.begin()), [&] { move_on(range); });
     });
   });
+  refusal.rethrow();
 }
 
 }  // namespace

@@ -5,7 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cmath>
+#include <future>
 #include <glm/geometric.hpp>
 #include <numbers>
 
@@ -161,6 +163,44 @@ TEST(Formula, MisspeltFormulasAreRefusedWithWhatIsWrong) {
       EXPECT_NE(std::string(error.what()).find(named), std::string::npos) << error.what();
     }
   }
+}
+
+/// The map refuses two vertices, and that which comes first in the field comes last in time, where there are threads.
+TEST(PointMap, OfSeveralVerticesThatAreRefusedTheFirstIsNamed) {
+  constexpr std::int64_t kFirst = 5, kLast = 35;
+  std::promise<void> refused;
+  const std::shared_future<void> is_refused = refused.get_future().share();
+  bool waits = true;
+  const PointMap map = [&](const glm::dvec3& point) {
+    if (point.x > 0 || point.y > 0) return glm::dvec3(0);
+    if (point.z == kLast) {
+      if (waits) refused.set_value();
+      throw InputError("the last");
+    }
+    if (point.z == kFirst) {
+      if (waits) is_refused.wait_for(std::chrono::seconds(2));
+      throw InputError("the first");
+    }
+    return glm::dvec3(0);
+  };
+  const auto refusal_of = [](const auto& work) -> std::string {
+    try {
+      work();
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "none";
+  };
+  const Geometry lattice = unit_grid({64, 64, 40});
+  EXPECT_EQ(refusal_of([&] { sample_on(lattice, map); }), "the first");
+  waits = false;
+  VertexField mesh{lattice, {}};
+  for (std::int64_t z = 0; z < 40; ++z) {
+    for (int n = 0; n < 4096; ++n) mesh.mesh.rest.emplace_back(n % 64, n / 64, z);
+  }
+  mesh.mesh.displacement.resize(mesh.mesh.rest.size());
+  mesh.mesh.tetrahedra = {{0, 1, 64, 4096}};
+  for (int n = 0; n < 20; ++n) EXPECT_EQ(refusal_of([&] { compose(mesh, map); }), "the first");
 }
 
 TEST(Formula, FileNamesAreNoFormulas) {

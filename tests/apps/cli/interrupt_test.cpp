@@ -92,6 +92,25 @@ TEST_F(Interrupt, AHangupThatNohupKeepsOffStopsNothing) {
   EXPECT_TRUE(fs::exists(scratch_ / "turn.0040.png"));
 }
 
+/// The first files that a program opens get the numbers of streams that are closed, and what it says goes into them.
+TEST_F(Interrupt, WhatIsSaidToAClosedStreamGoesIntoNoFile) {
+  write_file(scratch_ / "m.jsonl",
+             R"({"case": "v", "input": "ct.nrrd", "field": "identity", "cell-size": 8, "variants": 400})");
+  write_file(scratch_ / "script", "'" TETWARP_PROGRAM
+                                  "' batch m.jsonl -o out --jobs 1 --log-json <&- >&- 2>&- &\n"
+                                  "until [ -s out/results.jsonl ]; do sleep 0.05; done\n"
+                                  "sleep 0.2\nkill -KILL $!\nwait $!\n");
+  const Outcome killed = run_program(scratch_.path(), "/bin/sh", "script");
+  EXPECT_EQ(killed.status, 137) << killed.err << "it was to be killed in the middle";
+  std::istringstream results(read_text(scratch_ / "out/results.jsonl"));
+  std::size_t lines = 0;
+  for (std::string line; std::getline(results, line); ++lines)
+    EXPECT_TRUE(line.starts_with(R"({"case":"v-)") && line.find(R"("event")") == std::string::npos) << line;
+  EXPECT_GE(lines, 1u);
+  const Outcome silent = run_program(scratch_.path(), "/bin/sh", "-c '\"" TETWARP_PROGRAM "\" info ct.nrrd >&-'");
+  EXPECT_EQ(silent.status, 1) << "standard output that is closed is an error, as ever";
+}
+
 TEST_F(Interrupt, AReaderThatGoesAwayEndsAListAsOfOtherProgramsAndNoWork) {
   const Outcome listed = run_program(scratch_.path(), "/bin/bash",
                                      "-c 'set -o pipefail; " TETWARP_PROGRAM

@@ -122,6 +122,13 @@ TEST_F(Unreadable, AFileWithoutRightsIsRefusedInTheSystemsWords) {
   fs::permissions(scratch_ / "closed", fs::perms::all);
 }
 
+TEST_F(Unreadable, AnInputThatIsNotThereIsToldWhateverIsToBeWritten) {
+  for (const char* output : {"o.nii", "o"}) {
+    expect_refused("deform absent -f identity -o " + std::string(output), {"no such file or folder, absent"});
+    EXPECT_FALSE(fs::exists(scratch_ / output));
+  }
+}
+
 TEST_F(Unreadable, ANameThatIsNoTextIsShownByItsBytes) {
   const std::string name = "caf\xe9";
   expect_refused("info " + name + ".nii", {"caf\\xe9.nii"});

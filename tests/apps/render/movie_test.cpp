@@ -153,6 +153,16 @@ TEST_F(MovieProgram, AnEncoderThatFailsIsAnErrorWithItsWords) {
   EXPECT_TRUE(says(run.err, {"bin/ffmpeg cannot be started"}));
 }
 
+/// The system takes the status of a child from a process that began with SIGCHLD ignored.
+TEST_F(MovieProgram, ACallerThatIgnoresItsChildrenGetsAFilmToo) {
+  fake_ffmpeg("cat > frames\necho film > \"$film\"");
+  write_file(scratch_ / "script", "PATH=\"$PWD/bin:$PATH\" exec env --ignore-signal=CHLD '" TETWARP_PROGRAM
+                                  "' render ct.nii -o out/film.mp4 --turntable 2 --size 64,64 --quiet\n");
+  const Outcome run = run_program(scratch_.path(), "/bin/sh", "script");
+  EXPECT_EQ(run.status, 0) << run.err;
+  EXPECT_EQ(read_text(scratch_ / "out/film.mp4"), "film\n");
+}
+
 TEST_F(MovieProgram, NamesThatLookLikeProtocolsArePaths) {
   fake_ffmpeg("cat > frames\necho film > \"$film\"");
   fs::create_directories(scratch_ / "http:");
