@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <cstring>
 
-#include "cuda/lattice/lattice.h"
+#include "cuda/lattice/lattice.cuh"
 
 namespace tetwarp::cuda_detail {
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include "cuda/lattice/findings.cuh"
-#include "cuda/lattice/step_pass.h"
+#include "cuda/lattice/step_pass.cuh"
 #include "deform/core/visit_cell.h"
 #include "deform/field_check.h"
 

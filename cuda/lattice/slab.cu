@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "cuda/lattice/slab.h"
+#include "cuda/lattice/slab.cuh"
 
 #include <algorithm>
 

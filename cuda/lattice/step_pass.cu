@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "cuda/lattice/step_pass.h"
+#include "cuda/lattice/step_pass.cuh"
 
 #include <type_traits>
 

@@ -10,7 +10,7 @@
 
 #include "cuda/lattice/lattice_part.h"
 #include "cuda/output/mesh_resampler.h"
-#include "cuda/owners/gather.h"
+#include "cuda/owners/gather.cuh"
 #include "cuda/runtime/pointer_check.h"
 #include "deform/core/visit_cell.h"
 #include "deform/field_check.h"

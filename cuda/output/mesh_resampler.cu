@@ -7,8 +7,8 @@
 #include <glm/common.hpp>
 
 #include "cuda/output/resampler.h"
-#include "cuda/owners/gather.h"
-#include "cuda/owners/mesh_raster.h"
+#include "cuda/owners/gather.cuh"
+#include "cuda/owners/mesh_raster.cuh"
 #include "deform/target_check.h"
 
 namespace tetwarp::cuda_detail {

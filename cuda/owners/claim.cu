@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "cuda/owners/claim.h"
+#include "cuda/owners/claim.cuh"
 #include "deform/core/gather.h"
 
 namespace tetwarp::cuda_detail {

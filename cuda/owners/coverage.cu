@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "cuda/owners/coverage.h"
+#include "cuda/owners/coverage.cuh"
 #include "deform/core/border.h"
 #include "deform/core/gather.h"
 

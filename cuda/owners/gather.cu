@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "cuda/owners/gather.h"
+#include "cuda/owners/gather.cuh"
 
 #include <algorithm>
 

@@ -1,14 +1,14 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "cuda/owners/interval_raster.h"
+#include "cuda/owners/interval_raster.cuh"
 
 #include <algorithm>
 #include <limits>
 
 #include "cuda/output/voxel_sink.cuh"
 #include "cuda/output/weighing.cuh"
-#include "cuda/owners/gather.h"
+#include "cuda/owners/gather.cuh"
 #include "deform/core/row_interval.h"
 
 namespace tetwarp::cuda_detail {

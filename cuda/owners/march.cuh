@@ -4,7 +4,7 @@
 #pragma once
 
 #include "cuda/output/voxel_sink.cuh"
-#include "cuda/owners/gather.h"
+#include "cuda/owners/gather.cuh"
 #include "deform/core/gather.h"
 
 /// The march of a gather: seeds, what rests, and the kernel that goes along k. For gather.cu alone.

@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "cuda/owners/mesh_raster.h"
+#include "cuda/owners/mesh_raster.cuh"
 
 #include <cub/device/device_scan.cuh>
 
 #include "cuda/output/voxel_sink.cuh"
 #include "cuda/output/weighing.cuh"
-#include "cuda/owners/gather.h"
+#include "cuda/owners/gather.cuh"
 #include "deform/core/row_interval.h"
 
 namespace tetwarp::cuda_detail {

@@ -5,7 +5,7 @@
 #include <memory>
 #include <type_traits>
 
-#include "cuda/lattice/lattice.h"
+#include "cuda/lattice/lattice.cuh"
 #include "cuda/runtime/device_buffer.h"
 #include "cuda/runtime/host_copies.h"
 #include "cuda/runtime/pointer_check.h"

@@ -10,7 +10,7 @@
 #include <variant>
 #include <vector>
 
-#include "cuda/lattice/lattice.h"
+#include "cuda/lattice/lattice.cuh"
 #include "cuda/lattice/lattice_part.h"
 #include "cuda/runtime/host_copies.h"
 #include "deform/core/sample_voxel.h"
@@ -60,7 +60,7 @@ struct Mapped {
 };
 
 /// How the voxels of sources and outputs on one grid lie, and where a voxel comes from. All sinks that sample share it;
-/// `OffsetSink` (cuda/owners/gather.h) describes what a sink is.
+/// `OffsetSink` (cuda/owners/gather.cuh) describes what a sink is.
 struct SinkLayout {
   glm::ivec3 last;  ///< last voxel of the whole source grid
   /// Values from one row, and one slice, to the next, in what is buffered of the source.

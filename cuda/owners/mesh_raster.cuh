@@ -3,14 +3,14 @@
 
 #pragma once
 
-#include "cuda/lattice/slab.h"
+#include "cuda/lattice/slab.cuh"
 #include "deform/snapped_mesh.h"
 
 namespace tetwarp::cuda_detail {
 
 constexpr unsigned kNoTetrahedron = ~0u;
 
-/// Receives the owners of the voxels of a box, as `OffsetSink` (cuda/owners/gather.h) receives places.
+/// Receives the owners of the voxels of a box, as `OffsetSink` (cuda/owners/gather.cuh) receives places.
 struct OwnerSink {
   SlabBox box;
   unsigned* owner;         ///< lowest number of an owner of each voxel, or kNoTetrahedron

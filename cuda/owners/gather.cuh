@@ -5,9 +5,9 @@
 
 #include <optional>
 
-#include "cuda/owners/claim.h"
-#include "cuda/owners/coverage.h"
-#include "cuda/owners/interval_raster.h"
+#include "cuda/owners/claim.cuh"
+#include "cuda/owners/coverage.cuh"
+#include "cuda/owners/interval_raster.cuh"
 #include "cuda/runtime/stream.h"
 #include "deform/core/gather.h"
 
