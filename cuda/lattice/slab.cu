@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "cuda/runtime/pointer_check.h"
+#include "cuda/runtime/warp.cuh"
 #include "deform/target_check.h"
 
 namespace tetwarp::cuda_detail {

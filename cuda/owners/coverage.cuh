@@ -4,6 +4,7 @@
 #pragma once
 
 #include "cuda/lattice/slab.cuh"
+#include "cuda/runtime/bits.cuh"
 
 namespace tetwarp::cuda_detail {
 

@@ -86,9 +86,10 @@ class Gather {
     intervals_.forget_field();
   }
 
+  /// A voxel that the march could not settle.
   struct Entry {
-    int voxel;  ///< offset in the box
-    float x, y, z;
+    int voxel;      ///< offset in the box
+    float x, y, z;  ///< where it may come from: undeformed place, cells; perhaps not finite
   };
 
  private:

@@ -8,6 +8,7 @@
 #include "cuda/output/voxel_sink.cuh"
 #include "cuda/output/weighing.cuh"
 #include "cuda/owners/gather.cuh"
+#include "cuda/runtime/warp.cuh"
 #include "deform/core/row_interval.h"
 
 namespace tetwarp::cuda_detail {
