@@ -18,6 +18,11 @@ __host__ __device__ inline glm::i64vec3 unravel(std::int64_t n, const glm::i64ve
   return {n % size.x, n / size.x % size.y, n / (size.x * size.y)};
 }
 
+/// `unravel` in 32 bits.
+__host__ __device__ inline glm::ivec3 position_in(int n, const glm::ivec3& size) {
+  return {n % size.x, n / size.x % size.y, n / (size.x * size.y)};
+}
+
 /// A step is 2^-kStepBits voxel: `steps >> kStepBits` are whole voxels, rounded down.
 constexpr int kStepBits = 12;
 static_assert(1 << kStepBits == kStepsPerVoxel);

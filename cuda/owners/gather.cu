@@ -38,7 +38,7 @@ __global__ void queue_kernel(Task task, int walk, Sink sink) {
       if (!is_finite(place)) place = task.lattice.place(glm::vec3(voxel));
       const Trial trial = try_tetrahedron(task.lattice, tetrahedron_at(task.lattice, place), point);
       settled = trial.owns;
-      if (settled) covered += sink.write(sink.place(voxel), voxel, trial.u());
+      if (settled) covered += sink.write(sink.address(voxel), voxel, trial.u());
       place =
           n_try == 0 ? trial.place() : (place + trial.place()) * 0.5f;  // full steps may go round in circles in folds
     }
@@ -47,7 +47,7 @@ __global__ void queue_kernel(Task task, int walk, Sink sink) {
     const glm::i32vec3 steps = detail::to_steps(glm::i64vec3(voxel)), signs = task.nudge.signs(voxel);
     LatticeTetrahedron owner;
     if (walk_to_owner(task.lattice, as_lattice(tetrahedron_at(task.lattice, place)), steps, signs, walk, owner)) {
-      covered += sink.write(sink.place(voxel), voxel, interpolate_u(vertices_of(task.lattice, owner), steps, signs));
+      covered += sink.write(sink.address(voxel), voxel, interpolate_u(vertices_of(task.lattice, owner), steps, signs));
     } else {
       task.leave_to_claims(in);
     }
@@ -61,7 +61,7 @@ __global__ void queue_kernel(Task task, int walk, Sink sink) {
 ///
 /// @param several   bits of the voxels, as `BitRows`  @param words  how many words
 /// @param rank      of each word with a bit, number of its lowest one: written
-/// @param numbered  their count: 0 before  @param voxels  of each number, its `BitPlace`: written
+/// @param numbered  their count: 0 before  @param voxels  of each number, its `BitNumber`: written
 __global__ void number_kernel(const std::uint32_t* several, std::int64_t words, unsigned* rank, unsigned* numbered,
                               unsigned* voxels) {
   const std::int64_t n = thread_of_grid();
@@ -74,13 +74,13 @@ __global__ void number_kernel(const std::uint32_t* several, std::int64_t words, 
   if (bits == 0) return;
   rank[n] = first;
   for (std::uint32_t left = bits; left != 0; left &= left - 1)
-    voxels[first++] = BitPlace::of(static_cast<unsigned>(n), first_bit(left));
+    voxels[first++] = BitNumber::of(static_cast<unsigned>(n), first_bit(left));
 }
 
 /// From the owners of claimed voxels to their values; a thread a voxel.
 ///
 /// @param begin   first voxel of the box to which the words of `voxels` belong
-/// @param voxels  of each number, its `BitPlace`  @param count  how many
+/// @param voxels  of each number, its `BitNumber`  @param count  how many
 /// @param owner   of each number, the lowest number of an owner, or kNobody: from `claim_wanted_kernel`
 /// @param sink    gets all of them
 template <class Sink>
@@ -89,17 +89,17 @@ __global__ void settle_kernel(Task task, glm::ivec3 begin, const unsigned* voxel
   const unsigned n = blockIdx.x * kThreads + threadIdx.x;
   if (n >= count) return;
   const int words = task.single.words_per_row, rows = task.size().y;
-  const unsigned word = BitPlace::Word::get(voxels[n]), bit = BitPlace::Bit::get(voxels[n]);
+  const unsigned word = BitNumber::Word::get(voxels[n]), bit = BitNumber::Bit::get(voxels[n]);
   const glm::ivec3 voxel = begin + glm::ivec3(word % words * 32 + bit, word / words % rows, word / words / rows);
-  const int place = sink.place(voxel);
-  if (owner[n] == kNobody) return sink.nothing(place);
+  const int address = sink.address(voxel);
+  if (owner[n] == kNobody) return sink.nothing(address);
   const glm::ivec3& cells = task.lattice.cells;
   const unsigned long long cell = TetrahedronNumber::cell(owner[n]), row = cell / cells.x;
   const LatticeTetrahedron t = LatticeTetrahedron::of_cell(
       {static_cast<int>(cell % cells.x), static_cast<int>(row % cells.y), static_cast<int>(row / cells.y)},
       TetrahedronNumber::in_cell(owner[n]));
   warp_count(&task.counters->covered,
-             sink.write(place, voxel, offset_in(task.lattice, t, voxel, task.nudge.signs(voxel))));
+             sink.write(address, voxel, offset_in(task.lattice, t, voxel, task.nudge.signs(voxel))));
 }
 
 }  // namespace

@@ -91,7 +91,7 @@ struct March {
   /// What has no owner, or several.
   __device__ void clear(int n, int end, std::uint32_t singles) const {
     for (std::uint32_t left = ~singles & lowest_bits(end - n); left != 0; left &= left - 1)
-      sink.nothing(sink.place(voxel(n + first_bit(left))));
+      sink.nothing(sink.address(voxel(n + first_bit(left))));
   }
 
   /// From slice n to slice `end`, or until the queue holds a warp full: then n is where to go on.
@@ -101,7 +101,7 @@ struct March {
                      WarpQueue<Sink, kCoarse>& queue) const {
     glm::ivec3 at = voxel(n);
     const int out_slice = sink.per_slice();
-    int out = sink.place(at) - out_slice, failures = 0;
+    int out = sink.address(at) - out_slice, failures = 0;
     GatherPoint point = task.point(at);
     keep(point.steps.x);
     keep(point.steps.y);

@@ -45,7 +45,7 @@ struct WarpQueue {
   /// Called by the whole warp.
   /// @param votes  lanes that have one  @param word  from `word_of`  @param place  undeformed, cells
   __device__ void push(unsigned votes, int word, const glm::vec3& place) {
-    if ((votes >> lane & 1) != 0) entries[waiting + place_among(votes, lane)] = {word, place.x, place.y, place.z};
+    if ((votes >> lane & 1) != 0) entries[waiting + rank_among(votes, lane)] = {word, place.x, place.y, place.z};
     waiting += __popc(votes);
     __syncwarp();
   }
@@ -64,7 +64,7 @@ struct WarpQueue {
       const FloatTetrahedron t = tetrahedron_at(task.lattice, {entry.x, entry.y, entry.z});
       const Trial trial = try_tetrahedron(task.lattice, t, task.point(at));
       if (trial.owns || (kCoarse && trial.unsure && task.owns(t, at))) {
-        covered = sink.write(sink.place(at), at, trial.u());
+        covered = sink.write(sink.address(at), at, trial.u());
       } else if (Attempt::get(entry.voxel) < kWarpTries) {
         again = true;
         word = entry.voxel + Attempt::put(1);

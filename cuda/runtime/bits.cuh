@@ -61,7 +61,7 @@ struct BitRows {
 ///     +--------------+-------+
 ///     |     Word     |  Bit  |
 ///     +--------------+-------+
-struct BitPlace {
+struct BitNumber {
   using Bit = BitField<0, 5>;
   using Word = BitField<Bit::kEnd, 27>;
   static_assert(Word::kEnd == 32);

@@ -98,7 +98,7 @@ __device__ inline void warp_count(unsigned long long* counter, bool condition) {
 }
 
 /// Among the lanes that voted, how many come before this one: its place where the voters' things are listed.
-__device__ inline int place_among(unsigned votes, int lane) { return __popc(votes & bits_below(lane)); }
+__device__ inline int rank_among(unsigned votes, int lane) { return __popc(votes & bits_below(lane)); }
 
 /// Lists what threads of a block have, in the order of the threads, one round after another. All threads call it; what
 /// `per_warp` held may be overwritten in the next round once the block has synchronised.
@@ -111,12 +111,12 @@ __device__ inline int place_among(unsigned votes, int lane) { return __popc(vote
 /// @param listed    how many there were before this round, and then after it; the same in all threads
 /// @return the place of what this thread has
 template <int kWarps>
-__device__ unsigned place_in_block(bool has, int thread, unsigned (&per_warp)[kWarps], unsigned& listed) {
+__device__ unsigned rank_in_block(bool has, int thread, unsigned (&per_warp)[kWarps], unsigned& listed) {
   const int lane = thread & 31, warp = thread / 32;
   const unsigned votes = __ballot_sync(kAllLanes, has);
   if (lane == 0) per_warp[warp] = static_cast<unsigned>(__popc(votes));
   __syncthreads();
-  unsigned place = listed + static_cast<unsigned>(place_among(votes, lane));
+  unsigned place = listed + static_cast<unsigned>(rank_among(votes, lane));
   for (int w = 0; w < kWarps; ++w) {
     if (w < warp) place += per_warp[w];
     listed += per_warp[w];
