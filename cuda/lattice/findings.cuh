@@ -6,7 +6,8 @@
 #include <cstdint>
 #include <cstring>
 
-#include "cuda/lattice/lattice.h"
+#include "cuda/lattice/lattice.cuh"
+#include "cuda/runtime/warp.cuh"
 
 namespace tetwarp::cuda_detail {
 
@@ -22,14 +23,19 @@ struct LatticeFindings {
   unsigned long long wide;  ///< not 0 if some vertex moved further than the packing of the lattice holds
 };
 
+constexpr unsigned long long kSignBit = 1ULL << 63;  ///< of a double
+
 /// Maps a double to an integer so that order is kept. Integer atomics then find the smallest and largest double.
+///
+/// The bits of a positive double are in the order of its values: setting the sign puts them into the upper half of all
+/// integers. Those of a negative one are in the opposite order: their complement turns it round, in the lower half.
 __host__ __device__ inline unsigned long long ordered(double value) {
   unsigned long long bits;
   memcpy(&bits, &value, sizeof bits);
-  return bits >> 63 ? ~bits : bits | (1ULL << 63);
+  return (bits & kSignBit) != 0 ? ~bits : bits | kSignBit;
 }
 inline double from_ordered(unsigned long long key) {
-  const unsigned long long bits = key >> 63 ? key & ~(1ULL << 63) : ~key;
+  const unsigned long long bits = (key & kSignBit) != 0 ? key & ~kSignBit : ~key;
   double value;
   std::memcpy(&value, &bits, sizeof value);
   return value;
@@ -37,21 +43,17 @@ inline double from_ordered(unsigned long long key) {
 
 /// Adds the smallest and largest value of a warp to the findings, if they change them.
 __device__ inline void note_range(float least, float most, LatticeFindings* found) {
-  for (int step = 16; step > 0; step /= 2) {
-    least = fminf(least, __shfl_xor_sync(~0u, least, step));
-    most = fmaxf(most, __shfl_xor_sync(~0u, most, step));
-  }
-  if ((threadIdx.x & 31) != 0 || least > most) return;
+  least = warp_min(least);
+  most = warp_max(most);
+  if (lane_of_warp() != 0 || least > most) return;
   if (~ordered(least) > found->not_least) atomicMax(&found->not_least, ~ordered(least));
   if (ordered(most) > found->most) atomicMax(&found->most, ordered(most));
 }
 
+/// Adds what the threads of a warp have counted to the findings.
 __device__ inline void note_counts(unsigned inverted, unsigned degenerate, LatticeFindings* found) {
-  inverted = warp_sum(inverted);
-  degenerate = warp_sum(degenerate);
-  if ((threadIdx.x & 31) != 0) return;
-  if (inverted != 0) atomicAdd(&found->inverted, static_cast<unsigned long long>(inverted));
-  if (degenerate != 0) atomicAdd(&found->degenerate, static_cast<unsigned long long>(degenerate));
+  warp_add(&found->inverted, inverted);
+  warp_add(&found->degenerate, degenerate);
 }
 
 /// A snapped vertex. A vertex that cannot be used is added to the findings.

@@ -4,7 +4,7 @@
 #pragma once
 
 #include "cuda/lattice/findings.cuh"
-#include "cuda/lattice/step_pass.h"
+#include "cuda/lattice/step_pass.cuh"
 #include "deform/core/float_snap.h"
 
 /// From displacements to whole steps, mostly in float. For the files that pass over a field.

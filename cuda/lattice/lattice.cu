@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include "cuda/lattice/findings.cuh"
-#include "cuda/lattice/step_pass.h"
+#include "cuda/lattice/step_pass.cuh"
 #include "deform/core/visit_cell.h"
 #include "deform/field_check.h"
 
@@ -10,15 +10,21 @@ namespace tetwarp::cuda_detail {
 
 namespace {
 
+/// Snaps the vertices of any lattice; a thread a vertex.
+///
+/// @param displacement  mm, one for each vertex, i fastest  @param vertices  how many
+/// @param out           one for each vertex: written  @param found  gets the first vertex that cannot be used
 __global__ void snap_kernel(LatticeFrame frame, const glm::vec3* displacement, std::int64_t vertices, Vertex* out,
                             LatticeFindings* found) {
-  const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
+  const std::int64_t n = thread_of_grid();
   if (n < vertices) out[n] = snapped(frame, displacement[n], unravel(n, frame.cells + std::int64_t{1}), n, found);
 }
 
 /// Jacobian determinants of any lattice; a thread a cell.
+///
+/// @param field  with vertices in either form  @param found  gets counts and the range: once a warp, by atomics
 __global__ void describe_kernel(DeviceField field, LatticeFindings* found) {
-  const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
+  const std::int64_t n = thread_of_grid();
   float least = INFINITY, most = -INFINITY;
   unsigned inverted = 0, degenerate = 0;
   if (n < field.cell_count()) {
@@ -36,8 +42,13 @@ __global__ void describe_kernel(DeviceField field, LatticeFindings* found) {
   note_counts(inverted, degenerate, found);
 }
 
+/// Box around the undeformed places of the cells that may reach a region; a thread a cell.
+///
+/// @param region    half open, voxels of the output
+/// @param low_high  low and high corner, 2^-12 voxel, three numbers each: widened by atomics, after a look that mostly
+///                  shows that they need not be
 __global__ void reach_kernel(DeviceField field, Region region, int* low_high) {
-  const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
+  const std::int64_t n = thread_of_grid();
   if (n >= field.cell_count()) return;
   const Cell cell = field.cell(field.cell_at(n));
   if (is_empty(detail::candidates(field.frame.nudge, box_of(cell), region))) return;

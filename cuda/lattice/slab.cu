@@ -1,10 +1,11 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "cuda/lattice/slab.h"
+#include "cuda/lattice/slab.cuh"
 
 #include <algorithm>
 
+#include "cuda/lattice/slab_kernels.cuh"
 #include "cuda/runtime/pointer_check.h"
 #include "deform/target_check.h"
 
@@ -43,78 +44,6 @@ bool lie_alike(const View& a, const View& b) {
 std::size_t bytes_of(const ConstVolumeView& source, const Slices& slices) {
   const glm::i64vec3 held = source.buffered.end - source.buffered.begin;
   return static_cast<std::size_t>(held.x * held.y * (slices.end - slices.begin)) * voxel_bytes(source);
-}
-
-struct DeviceSlices {
-  long long *first, *last;  ///< one per output slice, or null
-};
-
-/// @param kScalars  whether there is one component
-template <class V, Interpolation kInterpolation, bool kScalars>
-__global__ void sample_kernel(SamplePlan<V> plan, int components, SlabBox slab, const std::uint8_t* mapped,
-                              const glm::vec3* offset, Destination<V> output, std::uint8_t* coverage,
-                              DeviceSlices slices, Counts* counts) {
-  const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
-  if (n >= slab.count()) return;
-  const glm::i64vec3 at = slab.voxel(n);
-  SampledVoxel<V> voxel;
-  if constexpr (kScalars) {
-    voxel = sample_voxel<V, kInterpolation>(plan, at, mapped[n] != 0, offset[n]);
-    output.voxels[output.index(at)] = voxel.value;
-  } else {
-    voxel = sample_components<V, kInterpolation>(plan, components, at, mapped[n] != 0, offset[n],
-                                                 output.voxels + output.index(at) * components);
-  }
-  if (coverage) coverage[n] = voxel.inside;
-  if (counts) {
-    warp_count(&counts->covered, voxel.inside);
-    warp_count(&counts->uncovered, !voxel.inside);
-    warp_count(&counts->clamped, voxel.saturated);
-    warp_count(&counts->padded, voxel.padded);
-  }
-  if (slices.first && voxel.inside) {
-    if (voxel.first_slice < slices.first[at.z]) atomicMin(&slices.first[at.z], voxel.first_slice);
-    if (voxel.last_slice > slices.last[at.z]) atomicMax(&slices.last[at.z], voxel.last_slice);
-  }
-}
-
-/// Where there is no target, the field alone says what is covered.
-__global__ void count_kernel(SlabBox slab, const std::uint8_t* mapped, std::uint8_t* coverage, Counts* counts) {
-  const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
-  if (n >= slab.count()) return;
-  if (coverage) coverage[n] = mapped[n];
-  warp_count(&counts->covered, mapped[n] != 0);
-  warp_count(&counts->uncovered, mapped[n] == 0);
-}
-
-__global__ void inverse_kernel(SlabBox slab, glm::dmat3 mm_from_index, const std::uint8_t* mapped,
-                               const glm::vec3* offset, glm::vec3* inverse_mm) {
-  const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
-  if (n >= slab.count()) return;
-  inverse_mm[n] = mapped[n] ? glm::vec3(mm_from_index * glm::dvec3(offset[n])) : glm::vec3(__int_as_float(0x7fc00000));
-}
-
-template <class V, Interpolation kInterpolation, class... Arguments>
-void launch_sample(cudaStream_t stream, std::int64_t voxels, const SamplePlan<V>& plan, int components,
-                   Arguments... arguments) {
-  const unsigned blocks = blocks_for(voxels);
-  if (components == 1) {
-    sample_kernel<V, kInterpolation, true><<<blocks, kThreads, 0, stream>>>(plan, components, arguments...);
-  } else {
-    sample_kernel<V, kInterpolation, false><<<blocks, kThreads, 0, stream>>>(plan, components, arguments...);
-  }
-  TETWARP_CUDA_TRY(cudaGetLastError());
-}
-
-template <class V, class... Arguments>
-void launch_sample(cudaStream_t stream, Interpolation interpolation, Arguments... arguments) {
-  switch (interpolation) {
-    case Interpolation::nearest: return launch_sample<V, Interpolation::nearest>(stream, arguments...);
-    case Interpolation::linear: return launch_sample<V, Interpolation::linear>(stream, arguments...);
-    case Interpolation::cubic: return launch_sample<V, Interpolation::cubic>(stream, arguments...);
-    case Interpolation::vote: return launch_sample<V, Interpolation::vote>(stream, arguments...);
-  }
-  throw InputError("unknown interpolation " + std::to_string(static_cast<int>(interpolation)));
 }
 
 }  // namespace

@@ -1,10 +1,11 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "cuda/lattice/step_pass.h"
+#include "cuda/lattice/step_pass.cuh"
 
 #include <type_traits>
 
+#include "cuda/lattice/cell_volumes.cuh"
 #include "cuda/lattice/float_snap.cuh"
 
 namespace tetwarp::cuda_detail {
@@ -17,161 +18,21 @@ constexpr int kRows = 8;                               ///< of a thread block, a
 constexpr int kBlocks = 2;                             ///< a multiprocessor
 constexpr int kPlanes = 40;                            ///< along k that a thread goes; whole MovingBlocks
 
-/// What is seen of tetrahedra of one kind: their volumes, the sign of the undeformed ones taken out. They share their
-/// rest volume, so the division waits.
-struct Seen {
-  float least = INFINITY, most = -INFINITY;
-  unsigned inverted = 0, degenerate = 0;
-
-  __device__ void add(float volume) {
-    least = fminf(least, volume);
-    most = fmaxf(most, volume);
-  }
-  __device__ void add(const Seen& other) {
-    least = fminf(least, other.least);
-    most = fmaxf(most, other.most);
-    inverted += other.inverted;
-    degenerate += other.degenerate;
-  }
-};
-
-/// The volume with the sign that it certainly has.
-__device__ void add_exactly(const glm::vec3& a, const glm::vec3& b, const glm::vec3& c, float turn, Seen& seen) {
-  const float volume = detail::edge_determinant(a, b, c) * turn + 0.0f;  // never -0
-  seen.add(volume);
-  seen.degenerate += volume == 0;
-  seen.inverted += volume < 0;
-}
-
-/// Three pairs of edges from a vertex, up and down.
-struct Edges {
-  glm::vec3 x[2], y[2], z[2];
-};
-
-/// The corner tetrahedra around an even vertex one by one; those that the lattice has. Out of line, with everything by
-/// value, so that nothing of it weighs on the common case.
-__device__ __noinline__ Seen around_exactly(const StepPass& pass, glm::ivec3 at, Edges edges) {
-  Seen seen;
-  const glm::ivec3& cells = pass.lattice.cells;
-#pragma unroll 1
-  for (int n = 0; n < 8; ++n) {
-    const glm::ivec3 down(n & 1, n >> 1 & 1, n >> 2), cell = at - down;
-    if (cell.x < 0 || cell.y < 0 || cell.z < 0 || cell.x >= cells.x || cell.y >= cells.y || cell.z >= cells.z) continue;
-    const float turn = ((down.x ^ down.y ^ down.z) & 1) != 0 ? -1.0f : 1.0f;
-    add_exactly(edges.x[down.x], edges.y[down.y], edges.z[down.z], turn, seen);
-  }
-  return seen;
-}
-
-/// Likewise the centre of a cell.
-__device__ __noinline__ Seen centre_exactly(glm::vec3 a, glm::vec3 b, glm::vec3 c, float turn) {
-  Seen seen;
-  add_exactly(a, b, c, turn, seen);
-  return seen;
-}
-
-constexpr float kError = 8.0f / (1 << 24);  ///< that of `detail::edge_determinant`
-
-/// Six times a signed volume, in two ways: as the Jacobian determinant is defined, and fused, where only its sign
-/// counts.
-template <bool kRange>
-struct Volume;
-template <>
-struct Volume<true> {
-  __device__ static detail::Cross cross(const glm::vec3& a, const glm::vec3& b) { return detail::cross(a, b); }
-  __device__ static float dot(const glm::vec3& a, const detail::Cross& n) { return detail::dot(a, n); }
-};
-template <>
-struct Volume<false> {
-  __device__ static detail::Cross cross(const glm::vec3& a, const glm::vec3& b) {
-    return {fmaf(a.y, b.z, -(a.z * b.y)), fmaf(a.z, b.x, -(a.x * b.z)), fmaf(a.x, b.y, -(a.y * b.x))};
-  }
-  __device__ static float dot(const glm::vec3& a, const detail::Cross& n) {
-    return fmaf(a.z, n.z, fmaf(a.y, n.y, a.x * n.x));
-  }
-};
-
-/// The eight corner tetrahedra around an even vertex.
-template <bool kRange>
-struct Around {
-  float volumes[8], least = INFINITY, bound;
-
-  __device__ explicit Around(const Edges& edges) {
-    const auto both = [](const glm::vec3(&e)[2]) { return detail::norm1(e[0]) + detail::norm1(e[1]); };
-    bound = kError * ((both(edges.x) * both(edges.y)) * both(edges.z));
-#pragma unroll
-    for (int n = 0; n < 4; ++n) {
-      const detail::Cross normal = Volume<kRange>::cross(edges.y[n & 1], edges.z[n >> 1]);
-      const float sign = (n & 1) != n >> 1 ? -1.0f : 1.0f;
-      volumes[2 * n] = sign * Volume<kRange>::dot(edges.x[0], normal);
-      volumes[2 * n + 1] = -sign * Volume<kRange>::dot(edges.x[1], normal);
-      least = fminf(least, fminf(volumes[2 * n], volumes[2 * n + 1]));
-    }
-  }
-  __device__ bool is_upright() const { return least > bound; }
-  __device__ void add_range(Seen& seen) const {
-    seen.least = fminf(seen.least, least);
-#pragma unroll
-    for (const float volume : volumes) seen.most = fmaxf(seen.most, volume);
-  }
-  /// @param has_all  whether the lattice has all of them
-  __device__ void add(const StepPass& pass, const glm::ivec3& at, bool has_all, const Edges& edges, Seen& seen) const {
-    float nearest = INFINITY;
-    unsigned inverted = 0;
-#pragma unroll
-    for (const float volume : volumes) {
-      nearest = fminf(nearest, fabsf(volume));
-      inverted += volume < 0;
-    }
-    if (!(has_all && nearest > bound)) return seen.add(around_exactly(pass, at, edges));
-    seen.inverted += inverted;
-    if (kRange) add_range(seen);
-  }
-};
-
-/// The centre of a cell: D is an even cell's last corner, and A, B, C are beside its first; in an odd one it is the
-/// other way round.
-template <bool kRange, bool kEvenCell>
-struct Centre {
-  glm::vec3 a, b, c;  ///< from D
-  float volume, bound;
-
-  /// @param a, b, c, d  how far the corners moved
-  __device__ Centre(const StepPass& pass, const glm::vec3& to_a, const glm::vec3& to_b, const glm::vec3& to_c,
-                    const glm::vec3& d)
-      : a(to_a - d), b(to_b - d), c(to_c - d) {
-    using detail::norm1;
-    const glm::vec3 to = kEvenCell ? -pass.lattice.cell : pass.lattice.cell;
-    a.y += to.y;
-    a.z += to.z;
-    b.x += to.x;
-    b.z += to.z;
-    c.x += to.x;
-    c.y += to.y;
-    const float determinant = Volume<kRange>::dot(a, Volume<kRange>::cross(b, c));
-    volume = kEvenCell ? -determinant : determinant;
-    bound = kError * ((norm1(a) * norm1(b)) * norm1(c));
-  }
-  __device__ bool is_upright() const { return volume > bound; }
-  __device__ void add(Seen& seen) const {
-    if (fabsf(volume) > bound) {
-      if (kRange) seen.add(volume);
-      seen.inverted += volume < 0;
-    } else {
-      seen.add(centre_exactly(a, b, c, kEvenCell ? -1.0f : 1.0f));
-    }
-  }
-};
-
 /// Two columns of vertices side by side: the part of a thread. Beyond the lattice its border vertices are repeated.
+///
+/// All that is asked of the columns is held in one register, two bits a question, one for each column:
+///
+///     bit  7 6      5 4    3 2     1 0
+///          Packed | Cell | Inner | Owned
 struct Pair {
-  int y, z;        ///< row, and the plane at hand
-  unsigned flags;  ///< one register for all that is asked of the columns
+  int y, z;  ///< row, and the plane at hand
+  unsigned flags;
 
-  static constexpr unsigned kOwned = 1;    ///< in the lattice and not left to a neighbouring warp
-  static constexpr unsigned kInner = 4;    ///< with neighbours along i and j
-  static constexpr unsigned kCell = 16;    ///< with cells from them on, for this warp
-  static constexpr unsigned kPacked = 64;  ///< owned, and to be packed
+  using Owned = BitField<0, 2>;            ///< in the lattice and not left to a neighbouring warp
+  using Inner = BitField<Owned::kEnd, 2>;  ///< with neighbours along i and j
+  using Cell = BitField<Inner::kEnd, 2>;   ///< with cells from them on, for this warp
+  using Packed = BitField<Cell::kEnd, 2>;  ///< owned, and to be packed
+  static_assert(Packed::kEnd == 8);
 
   __device__ static int first_column(int y) {
     return InvertedPairs::column(y, static_cast<int>(blockIdx.x), static_cast<int>(threadIdx.x));
@@ -184,13 +45,15 @@ struct Pair {
       const bool owned = x >= 0 && x <= cells.x && lane + n > 0 && lane + n < kColumns / 2;
       const bool inner = x > 0 && x < cells.x && y > 0 && y < cells.y;
       const bool cell = owned && x < cells.x && y < cells.y;
-      flags |= ((owned ? kOwned : 0) | (inner ? kInner : 0) | (cell ? kCell : 0) | (owned && pass.packed ? kPacked : 0))
-               << n;
+      flags |= (Owned::put(owned) | Inner::put(inner) | Cell::put(cell) | Packed::put(owned && pass.packed)) << n;
     }
     asm volatile("" : "+r"(flags));  // not to be computed again at every use
   }
-  /// @param column  0 or 1
-  __device__ bool is(unsigned flag, int column) const { return (flags & flag << column) != 0; }
+  /// @tparam Flag  a question  @param column  0 or 1
+  template <class Flag>
+  __device__ bool is(int column) const {
+    return (flags & Flag::put(1) << column) != 0;
+  }
 };
 
 /// How far the pair's vertices moved on one plane, in its row and the next; raised.
@@ -199,10 +62,11 @@ struct Plane {
 };
 
 __device__ glm::vec3 from_left(const glm::vec3& v) {
-  return {__shfl_up_sync(~0u, v.x, 1), __shfl_up_sync(~0u, v.y, 1), __shfl_up_sync(~0u, v.z, 1)};
+  return {__shfl_up_sync(kAllLanes, v.x, 1), __shfl_up_sync(kAllLanes, v.y, 1), __shfl_up_sync(kAllLanes, v.z, 1)};
 }
 __device__ glm::vec3 from_right(const glm::vec3& v) {
-  return {__shfl_down_sync(~0u, v.x, 1), __shfl_down_sync(~0u, v.y, 1), __shfl_down_sync(~0u, v.z, 1)};
+  return {__shfl_down_sync(kAllLanes, v.x, 1), __shfl_down_sync(kAllLanes, v.y, 1),
+          __shfl_down_sync(kAllLanes, v.z, 1)};
 }
 
 /// Corner tetrahedra around the pair's even vertex, at place kEven of the pair, and the centres of its two cells.
@@ -241,16 +105,16 @@ __device__ bool describe_pair(const StepPass& pass, const Pair& pair, const glm:
       return Centre<kRange, true>(pass, beside, here.next_row[1], above.row[1], from_right(above.next_row[0]));
     }
   }();
-  const bool sure = (around.is_upright() | !pair.is(Pair::kOwned, kEven)) &
-                    (first.is_upright() | !pair.is(Pair::kCell, 0)) & (second.is_upright() | !pair.is(Pair::kCell, 1));
-  if (!kRange && __all_sync(~0u, sure)) return false;
+  const bool sure = (around.is_upright() | !pair.is<Pair::Owned>(kEven)) &
+                    (first.is_upright() | !pair.is<Pair::Cell>(0)) & (second.is_upright() | !pair.is<Pair::Cell>(1));
+  if (!kRange && __all_sync(kAllLanes, sure)) return false;
   const unsigned inverted = corners.inverted + centres.inverted;
   const bool has_above = pair.z < pass.lattice.cells.z,
-             has_all = pair.is(Pair::kInner, kEven) && pair.z > 0 && has_above;
-  if (pair.is(Pair::kOwned, kEven))
+             has_all = pair.is<Pair::Inner>(kEven) && pair.z > 0 && has_above;
+  if (pair.is<Pair::Owned>(kEven))
     around.add(pass, {Pair::first_column(pair.y) + kEven, pair.y, pair.z}, has_all, edges, corners);
-  if (has_above && pair.is(Pair::kCell, 0)) first.add(centres);
-  if (has_above && pair.is(Pair::kCell, 1)) second.add(centres);
+  if (has_above && pair.is<Pair::Cell>(0)) first.add(centres);
+  if (has_above && pair.is<Pair::Cell>(1)) second.add(centres);
   return corners.inverted + centres.inverted != inverted;
 }
 
@@ -293,8 +157,46 @@ struct PlaneReader {
   }
 };
 
-/// A warp has 64 columns of a row and goes along k, two planes at a time. Neighbours along i are other lanes', those
-/// along j and k are read or kept. Columns begin where the first of a pair is even on planes of even k.
+/// Packs the pair's vertices on the plane at hand.
+/// @param packed  where the first column's vertex goes
+/// @param moves   gets the bits that differ from those of no displacement
+template <bool kExact>
+__device__ void pack_pair(const StepPass& pass, const Pair& pair, const PlaneReader<kExact>& reader, const Plane& here,
+                          std::uint64_t* packed, std::uint32_t& moves) {
+  const StepPacking& packing = pass.lattice.packing;
+  const glm::vec3& lift = packing.lift();
+  std::uint32_t excess = 0;
+#pragma unroll
+  for (int n = 0; n < 2; ++n) {
+    const glm::vec3& v = here.row[n];
+#pragma unroll
+    for (int axis = 0; axis < 3; ++axis) moves |= __float_as_uint(v[axis]) ^ __float_as_uint(lift[axis]);
+    if (kExact) excess |= packing.excess(v);
+    if (pair.is<Pair::Packed>(n)) packed[n != 0 ? reader.beside : 0] = packing.pack(v);
+  }
+  if (kExact && excess != 0) {  // beyond the packing, or at its very end: others saw it rounded to a half
+    pass.found->wide = 1;
+    const int number = pair.z * pass.lattice.slice + reader.row;
+    raised_slowly(pass, pass.displacement[number], number);
+    raised_slowly(pass, pass.displacement[number + reader.beside], number + reader.beside);
+  }
+}
+
+/// Snaps, packs and describes the vertices of a lattice. A warp has 64 columns of a row, two a thread, and goes kPlanes
+/// planes along k; the outer columns are its neighbours' too. Columns begin where the first of a pair is even on planes
+/// of even k. It goes two planes at a time, so that neither registers nor the parity of vertices change places:
+///
+///     plane z - 1     before      the even vertex's neighbour below along k: kept
+///     plane z         here        the pair, and the pair one row on: kept; one row back: `given_below`, a plane ahead
+///     plane z + 1     above       snapped in this step
+///     plane z + 2                 read in this step, snapped in the next
+///
+///     grid (words of a row, rows / kRows, planes / kPlanes), block (32 lanes, kRows rows)
+///
+/// @tparam kExact  whether `fast` is exact wherever the packing holds a vertex  @tparam kRange  `StepPass::wants_range`
+/// @param pass         what is read and written
+/// @param corner_rest  six times the volume of an undeformed corner tetrahedron, steps of 2^-12 voxel
+/// @param centre_rest  of an undeformed centre
 template <bool kExact, bool kRange>
 __global__ void __launch_bounds__(32 * kRows, kBlocks)
     step_pass_kernel(const __grid_constant__ StepPass pass, const __grid_constant__ FloatSnap fast, float corner_rest,
@@ -322,6 +224,7 @@ __global__ void __launch_bounds__(32 * kRows, kBlocks)
   std::uint64_t* packed = pass.packed + (pair.z * lattice.slice + reader.row);
   Seen corners, centres;
   std::uint32_t moves = 0;
+  // One plane. Not a function of its own: as a member of a struct with this state it spilled 16 to 24 bytes more.
   const auto step = [&](auto even, const glm::vec3& before, const Plane& here, Plane& above) {
     constexpr int kEven = decltype(even)::value;
     glm::vec3 below = fast.raised(given_below);
@@ -330,24 +233,9 @@ __global__ void __launch_bounds__(32 * kRows, kBlocks)
     given_below = pass.displacement[below_at(1 - kEven, pair.z + 1)];
     above = reader.raised();
     reader.read_next();
-    const glm::vec3& lift = lattice.packing.lift();
-    std::uint32_t excess = 0;
-#pragma unroll
-    for (int n = 0; n < 2; ++n) {
-      const glm::vec3& v = here.row[n];
-#pragma unroll
-      for (int axis = 0; axis < 3; ++axis) moves |= __float_as_uint(v[axis]) ^ __float_as_uint(lift[axis]);
-      if (kExact) excess |= lattice.packing.excess(v);
-      if (pair.is(Pair::kPacked, n)) packed[n != 0 ? beside : 0] = lattice.packing.pack(v);
-    }
-    if (kExact && excess != 0) {  // beyond the packing, or at its very end: others saw it rounded to a half
-      pass.found->wide = 1;
-      const int number = pair.z * lattice.slice + reader.row;
-      raised_slowly(pass, pass.displacement[number], number);
-      raised_slowly(pass, pass.displacement[number + beside], number + beside);
-    }
-    const unsigned pairs =
-        __ballot_sync(~0u, describe_pair<kRange, kEven>(pass, pair, before, below, here, above, corners, centres));
+    pack_pair(pass, pair, reader, here, packed, moves);
+    const unsigned pairs = __ballot_sync(
+        kAllLanes, describe_pair<kRange, kEven>(pass, pair, before, below, here, above, corners, centres));
     if (pairs != 0 && threadIdx.x == 0) pass.inverted.words[pass.inverted.word(pair.y, pair.z, blockIdx.x)] = pairs;
     ++pair.z;
     packed += lattice.slice;

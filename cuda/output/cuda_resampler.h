@@ -5,7 +5,7 @@
 
 #include <memory>
 
-#include "cuda/lattice/slab.h"
+#include "cuda/lattice/slab.cuh"
 #include "cuda/output/slab_plan.h"
 #include "deform/resampler.h"
 

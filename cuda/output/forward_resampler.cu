@@ -11,8 +11,9 @@
 #include "cuda/factories.h"
 #include "cuda/lattice/lattice_part.h"
 #include "cuda/output/mesh_resampler.h"
-#include "cuda/owners/gather.h"
+#include "cuda/owners/gather.cuh"
 #include "cuda/runtime/pointer_check.h"
+#include "cuda/runtime/warp.cuh"
 #include "deform/core/visit_cell.h"
 #include "deform/field_check.h"
 #include "deform/lattice_or_mesh.h"
@@ -28,18 +29,26 @@ namespace {
 /// Vertex as well.
 constexpr std::uint64_t kStepVertexBytes = sizeof(glm::vec3) + 1, kVertexBytes = kStepVertexBytes + sizeof(Vertex);
 
+/// What is written of each voxel of a box, in the order of the voxels.
 struct Settled {
-  std::uint8_t* mapped;
-  glm::vec3* offset;
-  float* jacobian;        ///< or null
-  std::uint16_t* owners;  ///< or null
+  std::uint8_t* mapped;   ///< 1 where it comes from anywhere, else 0
+  glm::vec3* offset;      ///< undeformed minus deformed place, voxels
+  float* jacobian;        ///< determinant of its owner, NaN where nobody owns it; or null
+  std::uint16_t* owners;  ///< number of owners, at most 65535; or null
 };
 
 /// From the owner of each voxel to where it comes from; voxels outside the undeformed lattice may stay where they are.
-/// @param whole  the frame of the whole lattice, of which `field` may be a part
+/// A thread a voxel.
+///
+/// @param whole         the frame of the whole lattice, of which `field` may be a part
+/// @param rest_outside  whether voxels outside the whole undeformed lattice stay
+/// @param owner         lowest number of an owner of each voxel of the box, or kNobody: from `Claims`
+/// @param owners        number of owners of each voxel, where `out.owners` is wanted; else null
+/// @param out           written, a value for each voxel of the box
+/// @param counts        conflicts and voxels with several owners are added
 __global__ void settle_kernel(DeviceField field, LatticeFrame whole, bool rest_outside, SlabBox box,
                               const unsigned long long* owner, const unsigned* owners, Settled out, Counts* counts) {
-  const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
+  const std::int64_t n = thread_of_grid();
   if (n >= box.count()) return;
   const glm::i64vec3 voxel = box.voxel(n);
   const bool owned = owner[n] != kNobody;
@@ -61,7 +70,10 @@ __global__ void settle_kernel(DeviceField field, LatticeFrame whole, bool rest_o
 
 constexpr int kReachedAtOnce = 1024;  ///< vertices of a slice that a thread block looks at
 
-/// How far the vertices of each slice reach along k of the output.
+/// How far the vertices of each slice reach along k of the output; some thread blocks a slice.
+///
+/// @param blocks_per_slice  each of which looks at kReachedAtOnce vertices, the last at what is left
+/// @param reach             one for each slice of vertices, 2^-12 voxel: widened once a warp, by atomics
 __global__ void reach_kernel(DeviceField field, unsigned blocks_per_slice, SliceReach* reach) {
   const std::int64_t slice = blockIdx.x / blocks_per_slice, row = field.frame.cells.x + 1,
                      end = row * (field.frame.cells.y + 1);
@@ -74,7 +86,7 @@ __global__ void reach_kernel(DeviceField field, unsigned blocks_per_slice, Slice
   }
   low = warp_min(low);
   high = warp_max(high);
-  if ((threadIdx.x & 31) != 0) return;
+  if (lane_of_warp() != 0) return;
   atomicMin(&reach[slice].low, low);
   atomicMax(&reach[slice].high, high);
 }

@@ -7,27 +7,31 @@
 #include <glm/common.hpp>
 
 #include "cuda/output/cuda_resampler.h"
-#include "cuda/owners/gather.h"
-#include "cuda/owners/mesh_raster.h"
+#include "cuda/owners/gather.cuh"
+#include "cuda/owners/mesh_raster.cuh"
 #include "deform/target_check.h"
 
 namespace tetwarp::cuda_detail {
 
 namespace {
 
-/// What is known of the voxels of a box, and where it goes.
+/// What is known of the voxels of a box, and where it goes; a value for each voxel, in their order.
 struct Settling {
-  const unsigned* owner;
+  const unsigned* owner;         ///< lowest number of an owner, or kNoTetrahedron
   const unsigned* at_rest;       ///< owner in the undeformed mesh; null: nothing stays outside
-  const std::uint16_t* several;  ///< null: not wanted
-  std::uint8_t* mapped;
-  glm::vec3* offset;
-  float* jacobian;  ///< null: not wanted
+  const std::uint16_t* several;  ///< number of owners; null: not wanted
+  std::uint8_t* mapped;          ///< written: 1 where it comes from anywhere, else 0
+  glm::vec3* offset;             ///< written: undeformed minus deformed place, voxels
+  float* jacobian;               ///< written: determinant of its owner, NaN where nobody owns it; null: not wanted
 };
 
-/// From the owner of each voxel to where it comes from; voxels outside the undeformed mesh may stay where they are.
+/// From the owner of each voxel to where it comes from; voxels outside the undeformed mesh may stay where they are. A
+/// thread a voxel.
+///
+/// @param of      read and written, as its members say
+/// @param counts  conflicts and voxels with several owners are added
 __global__ void settle_mesh_kernel(MeshRaster::View mesh, SlabBox box, Settling of, Counts* counts) {
-  const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
+  const std::int64_t n = thread_of_grid();
   if (n >= box.count()) return;
   const glm::i64vec3 voxel = box.voxel(n);
   const unsigned number = of.owner[n];

@@ -17,13 +17,21 @@ namespace cuda_detail {
 
 namespace {
 
+/// Where each voxel of a box comes from; a thread a voxel.
+///
+/// @param frame   its samples are in device memory
+/// @param mapped  written, one for each voxel of the box in their order: 1 where it comes from anywhere, else 0
+/// @param offset  written likewise: undeformed minus deformed place, voxels
 __global__ void pull_kernel(PullFrame frame, SlabBox box, std::uint8_t* mapped, glm::vec3* offset) {
-  const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
+  const std::int64_t n = thread_of_grid();
   if (n < box.count()) mapped[n] = frame.offset_at(box.voxel(n), offset[n]);
 }
 
+/// Finds the first sample that cannot be used; a thread a sample.
+///
+/// @param samples  how many  @param bad  the least number of such a sample, by an atomic minimum
 __global__ void check_pull_kernel(PullFrame frame, std::int64_t samples, unsigned long long* bad) {
-  const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
+  const std::int64_t n = thread_of_grid();
   if (n >= samples || frame.is_usable(frame.displacement[n])) return;
   atomicMin(bad, static_cast<unsigned long long>(n));
 }

@@ -3,7 +3,7 @@
 
 #pragma once
 
-#include "cuda/lattice/slab.h"
+#include "cuda/lattice/slab.cuh"
 
 namespace tetwarp::cuda_detail {
 
@@ -117,8 +117,8 @@ __device__ void VoxelSink<V>::begin(const Origin& origin, bool wanted, Pending& 
 }
 
 template <class V>
-__device__ void VoxelSink<V>::end(int place, const Pending& pending) const {
-  output[place] = interpolated<V>(pending.corners, pending.fraction);
+__device__ void VoxelSink<V>::end(int address, const Pending& pending) const {
+  output[address] = interpolated<V>(pending.corners, pending.fraction);
 }
 
 template <class V>
@@ -130,22 +130,22 @@ __device__ void VoxelSink<V>::start(int, const glm::ivec3& voxel, const glm::vec
 }
 
 template <class V>
-__device__ void VoxelSink<V>::finish(int place, const Pending& pending) const {
+__device__ void VoxelSink<V>::finish(int address, const Pending& pending) const {
   // A branch, so that nothing of it is moved before what is read meanwhile.
-  if (pending.any) end(place, pending);
+  if (pending.any) end(address, pending);
 }
 
 template <class V>
-__device__ bool VoxelSink<V>::write(int place, const glm::ivec3& voxel, const glm::vec3& u) const {
+__device__ bool VoxelSink<V>::write(int address, const glm::ivec3& voxel, const glm::vec3& u) const {
   Origin origin;
   if (!locate_exactly(voxel, u, origin)) {
-    nothing(place);
+    nothing(address);
     return false;
   }
   const glm::vec3& t = origin.fraction;
   int corners[8];  // neighbours without weight may be any voxels: their finite values do not count
   read_corners(source + origin.base, t.x != 0 ? 1 : 0, t.y != 0 ? row : 0, t.z != 0 ? slice : 0, corners);
-  output[place] = interpolated<V>(corners, t);
+  output[address] = interpolated<V>(corners, t);
   return true;
 }
 
@@ -187,17 +187,17 @@ __device__ void VolumesSink<V>::read(const SinkVolume& volume, const Origin& ori
 }
 
 template <class V>
-__device__ void VolumesSink<V>::put(const SinkVolume& volume, int place, int value) const {
+__device__ void VolumesSink<V>::put(const SinkVolume& volume, int address, int value) const {
   with_type(volume, [&](auto* type) {
     using T = std::remove_pointer_t<decltype(type)>;
-    static_cast<T*>(volume.output)[place] = static_cast<T>(value);
+    static_cast<T*>(volume.output)[address] = static_cast<T>(value);
   });
 }
 
 template <class V>
-__device__ void VolumesSink<V>::put(const SinkVolume& volume, int place, const int (&corners)[8],
+__device__ void VolumesSink<V>::put(const SinkVolume& volume, int address, const int (&corners)[8],
                                     const glm::vec3& t) const {
-  put(volume, place, std::is_void_v<V> && volume.votes ? voted(corners, t) : interpolated<int>(corners, t));
+  put(volume, address, std::is_void_v<V> && volume.votes ? voted(corners, t) : interpolated<int>(corners, t));
 }
 
 template <class V>
@@ -219,23 +219,23 @@ __device__ void VolumesSink<V>::start(int, const glm::ivec3& voxel, const glm::v
 }
 
 template <class V>
-__device__ void VolumesSink<V>::finish(int place, const Pending& pending) const {
+__device__ void VolumesSink<V>::finish(int address, const Pending& pending) const {
   if (!pending.any) return;
 #pragma unroll
   for (int n = 0; n < kOnTheWay; ++n)
-    if (n == 0 || n < count) put(volumes[n], place, pending.corners[n], pending.origin.fraction);
+    if (n == 0 || n < count) put(volumes[n], address, pending.corners[n], pending.origin.fraction);
   for (int n = kOnTheWay; n < count; ++n) {
     int corners[8];
     read(volumes[n], pending.origin, {1, row, slice}, corners);
-    put(volumes[n], place, corners, pending.origin.fraction);
+    put(volumes[n], address, corners, pending.origin.fraction);
   }
 }
 
 template <class V>
-__device__ bool VolumesSink<V>::write(int place, const glm::ivec3& voxel, const glm::vec3& u) const {
+__device__ bool VolumesSink<V>::write(int address, const glm::ivec3& voxel, const glm::vec3& u) const {
   Origin origin;
   if (!locate_exactly(voxel, u, origin)) {
-    nothing(place);
+    nothing(address);
     return false;
   }
   const glm::vec3& t = origin.fraction;
@@ -243,7 +243,7 @@ __device__ bool VolumesSink<V>::write(int place, const glm::ivec3& voxel, const 
   for (int n = 0; n < count; ++n) {
     int corners[8];
     read(volumes[n], origin, step, corners);
-    put(volumes[n], place, corners, t);
+    put(volumes[n], address, corners, t);
   }
   return true;
 }
@@ -263,7 +263,7 @@ __device__ void copy_column(const V* from, int from_step, V* to, int to_step, st
 template <class V>
 template <int kCount>
 __device__ void VoxelSink<V>::copy(const glm::ivec3& voxel, std::uint32_t wanted) const {
-  copy_column<kCount>(source + source_index(voxel), slice, output + place(voxel), output_slice, wanted);
+  copy_column<kCount>(source + source_index(voxel), slice, output + address(voxel), output_slice, wanted);
 }
 
 template <class V>
@@ -273,14 +273,14 @@ __device__ void VolumesSink<V>::copy(const glm::ivec3& voxel, std::uint32_t want
     with_type(volumes[n], [&](auto* type) {
       using T = std::remove_pointer_t<decltype(type)>;
       copy_column<kCount>(static_cast<const T*>(volumes[n].source) + source_index(voxel), slice,
-                          static_cast<T*>(volumes[n].output) + place(voxel), output_slice, wanted);
+                          static_cast<T*>(volumes[n].output) + address(voxel), output_slice, wanted);
     });
   }
 }
 
 template <class V>
-__device__ void VolumesSink<V>::nothing(int place) const {
-  for (int n = 0; n < count; ++n) put(volumes[n], place, volumes[n].background);
+__device__ void VolumesSink<V>::nothing(int address) const {
+  for (int n = 0; n < count; ++n) put(volumes[n], address, volumes[n].background);
 }
 
 }  // namespace tetwarp::cuda_detail

@@ -10,7 +10,14 @@
 namespace tetwarp::cuda_detail {
 
 /// What the voxels of a tetrahedron need, in the layout of shared memory: factors of their weights by Cramer's rule,
-/// and the displacement of the vertices.
+/// and the displacement of the vertices. Six groups of four floats, which a lane reads with one instruction each, and
+/// one more float, in an array of its own:
+///
+///     0   from_d.x    from_d.y    from_d.z    reciprocal
+///     1   bc.x        bc.y        bc.z        moved.x        the weight of A at r is (r . bc) reciprocal, where r is
+///     the 2   ca.x        ca.y        ca.z        moved.y        way from D; of B and C with ca and ab 3   ab.x ab.y
+///     ab.z        moved.z 4   moved_a.x   moved_a.y   moved_a.z   moved_b.x 5   moved_b.y   moved_b.z   moved_c.x
+///     moved_c.y end moved_c.z
 struct Weighing {
   float from_d[3];   ///< from D to the first voxel of the tile, 2^-12 voxel
   float reciprocal;  ///< of the determinant; NaN where float cannot compute the weights
@@ -50,11 +57,11 @@ __device__ inline void prepare_weighing(const glm::vec3& a, const glm::vec3& b, 
 struct HeldWeighing {
   float values[4 * kQuads + 1];
 
-  /// Reads the weighing at `place`, unless it is the one that is held.
-  __device__ void hold(const float4 (*prepared)[kQuads], const float* ends, unsigned place, unsigned& held) {
+  /// Reads the weighing of a slot, unless it is the one that is held.
+  __device__ void hold(const float4 (*prepared)[kQuads], const float* ends, unsigned slot, unsigned& held) {
     float(&v)[4 * kQuads + 1] = values;
-    const auto from = static_cast<unsigned>(__cvta_generic_to_shared(&prepared[place][0])),
-               end = static_cast<unsigned>(__cvta_generic_to_shared(&ends[place]));
+    const auto from = static_cast<unsigned>(__cvta_generic_to_shared(&prepared[slot][0])),
+               end = static_cast<unsigned>(__cvta_generic_to_shared(&ends[slot]));
     asm volatile(
         "{\n\t"
         ".reg .pred p;\n\t"
@@ -70,8 +77,8 @@ struct HeldWeighing {
         : "+f"(v[0]), "+f"(v[1]), "+f"(v[2]), "+f"(v[3]), "+f"(v[4]), "+f"(v[5]), "+f"(v[6]), "+f"(v[7]), "+f"(v[8]),
           "+f"(v[9]), "+f"(v[10]), "+f"(v[11]), "+f"(v[12]), "+f"(v[13]), "+f"(v[14]), "+f"(v[15]), "+f"(v[16]),
           "+f"(v[17]), "+f"(v[18]), "+f"(v[19]), "+f"(v[20]), "+f"(v[21]), "+f"(v[22]), "+f"(v[23]), "+f"(v[24])
-        : "r"(place), "r"(held), "r"(from), "r"(end));
-    held = place;
+        : "r"(slot), "r"(held), "r"(from), "r"(end));
+    held = slot;
   }
 };
 
@@ -92,8 +99,8 @@ struct Weighings {
   const float* ends;
   unsigned nobody;  ///< number that stands for no owner, as do all larger numbers
 
-  __device__ void hold(unsigned place, HeldWeighing& m, unsigned& held) const {
-    m.hold(prepared, ends, min(place, nobody), held);
+  __device__ void hold(unsigned slot, HeldWeighing& m, unsigned& held) const {
+    m.hold(prepared, ends, min(slot, nobody), held);
   }
 };
 
@@ -101,18 +108,18 @@ struct Weighings {
 ///
 /// @tparam kInside    whether all come from well inside the source
 /// @param at          the first voxel  @param from_first  the same from the first of the tile, 2^-12 voxel
-/// @param next_place  called once a voxel: its weighing
+/// @param next_slot  called once a voxel: its weighing
 /// @param finish      `finish(z)` writes a voxel that float leaves open or nobody owns, and says whether it is covered
 /// @return how many are covered
-template <bool kInside, class Sink, class NextPlace, class Finish>
+template <bool kInside, class Sink, class NextSlot, class Finish>
 __device__ unsigned sample_column(const Sink& sink, const Weighings& weighings, glm::ivec3 at, glm::vec3 from_first,
-                                  int count, NextPlace&& next_place, Finish&& finish) {
+                                  int count, NextSlot&& next_slot, Finish&& finish) {
   unsigned column = sink.column(at), held = ~0u, left = 0;
-  int out = sink.place(at);
+  int out = sink.address(at);
   HeldWeighing m{};
   typename Sink::Pending pending{};
   const auto next_moved = [&] {
-    weighings.hold(next_place(), m, held);
+    weighings.hold(next_slot(), m, held);
     const glm::vec3 moved = moved_by(m, from_first);
     from_first.z += float{kStepsPerVoxel};
     return moved;
@@ -154,13 +161,13 @@ __device__ __noinline__ bool write_out_of_line(const Sink& sink, int out, glm::i
 /// For `finish` above, of a voxel that has an owner.
 /// @param slowly  `slowly(out)` writes it with all the arithmetic there is, where its weights are not for float
 template <class Sink, class Slowly>
-__device__ bool finish_voxel(const Sink& sink, const Weighings& weighings, unsigned place, const glm::ivec3& at,
+__device__ bool finish_voxel(const Sink& sink, const Weighings& weighings, unsigned slot, const glm::ivec3& at,
                              const glm::vec3& from_first, Slowly&& slowly) {
   HeldWeighing m{};
   unsigned held = ~0u;
-  weighings.hold(place, m, held);
+  weighings.hold(slot, m, held);
   const glm::vec3 moved = moved_by(m, from_first);
-  const int out = sink.place(at);
+  const int out = sink.address(at);
   return moved.x == moved.x ? write_out_of_line(sink, out, at, detail::to_offset(moved)) : slowly(out);
 }
 

@@ -1,7 +1,9 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "cuda/owners/claim.h"
+#include "cuda/owners/claim.cuh"
+
+#include "cuda/runtime/warp.cuh"
 #include "deform/core/gather.h"
 
 namespace tetwarp::cuda_detail {
@@ -22,7 +24,10 @@ struct Blocks {
   }
 };
 
-/// One thread block a block of cells: the box of its deformed vertices.
+/// One thread block a block of cells: the box of its deformed vertices. Threads share out the vertices; each warp finds
+/// its box, and atomics in shared memory that of all.
+///
+/// @param bounds  one for each block of cells, whole voxels: written
 __global__ void bounds_kernel(DeviceField field, Blocks blocks, VoxelBounds* bounds) {
   __shared__ int low[3], high[3];
   if (threadIdx.x < 3) {
@@ -39,26 +44,27 @@ __global__ void bounds_kernel(DeviceField field, Blocks blocks, VoxelBounds* bou
     box.grow(field.vertices ? field.vertex(at).deformed : field.steps.deformed(glm::ivec3(at)));
   }
   for (int axis = 0; axis < 3; ++axis) {
-    int least = box.low[axis], most = box.high[axis];
-    for (int step = 16; step > 0; step /= 2) {
-      least = min(least, __shfl_xor_sync(~0u, least, step));
-      most = max(most, __shfl_xor_sync(~0u, most, step));
-    }
-    if ((threadIdx.x & 31) == 0) {
+    const int least = warp_min(box.low[axis]), most = warp_max(box.high[axis]);
+    if (lane_of_warp() == 0) {
       atomicMin(&low[axis], least);
       atomicMax(&high[axis], most);
     }
   }
   __syncthreads();
   if (threadIdx.x != 0) return;
-  const auto up = [](int steps) { return static_cast<int>((std::int64_t{steps} + kStepsPerVoxel - 1) >> 12); };
-  bounds[blockIdx.x] = {{low[0] >> 12, low[1] >> 12, low[2] >> 12}, {up(high[0]), up(high[1]), up(high[2])}};
+  const auto down = [](int steps) { return steps >> kStepBits; };
+  const auto up = [](int steps) { return static_cast<int>((std::int64_t{steps} + kStepsPerVoxel - 1) >> kStepBits); };
+  bounds[blockIdx.x] = {{down(low[0]), down(low[1]), down(low[2])}, {up(high[0]), up(high[1]), up(high[2])}};
 }
 
-/// Lists the blocks that may reach voxels of the slab, or those of them that `only` names.
+/// Lists the blocks that may reach voxels of the slab, or those of them that `only` names; a thread a block.
+///
+/// @param bounds  of each block, from `bounds_kernel`  @param blocks  how many
+/// @param only    a bit for each voxel of the slab, as `BitRows`; null: all
+/// @param chosen  numbers of blocks, in any order: written  @param count  their number: 0 before
 __global__ void choose_kernel(const VoxelBounds* bounds, std::int64_t blocks, SlabBox slab, const std::uint32_t* only,
                               unsigned* chosen, unsigned* count) {
-  const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
+  const std::int64_t n = thread_of_grid();
   if (n >= blocks) return;
   const glm::i64vec3 low = glm::max(glm::i64vec3(bounds[n].low) - slab.begin, glm::i64vec3(0));
   const glm::i64vec3 high = glm::min(glm::i64vec3(bounds[n].high) - slab.begin, slab.size - std::int64_t{1});
@@ -74,11 +80,11 @@ __global__ void choose_kernel(const VoxelBounds* bounds, std::int64_t blocks, Sl
   if (wanted) chosen[atomicAdd(count, 1u)] = static_cast<unsigned>(n);
 }
 
-/// The claims on all voxels of a slab.
+/// The claims on all voxels of a slab, in the order of the voxels.
 struct Slate {
   SlabBox slab;
-  unsigned long long* owner;
-  unsigned* owners;
+  unsigned long long* owner;  ///< lowest number so far; kNobody before
+  unsigned* owners;           ///< how many claimed it, 0 before; or null
 
   __device__ Region region() const { return {slab.begin, slab.begin + slab.size}; }
   __device__ void claim(const glm::i64vec3& voxel, unsigned long long number) const {
@@ -97,12 +103,16 @@ __device__ void for_each_chosen(const Blocks& blocks, const unsigned* chosen, un
       const glm::i64vec3 at =
           first + glm::i64vec3(in % Blocks::kX, in / Blocks::kX % Blocks::kY, in / (Blocks::kX * Blocks::kY));
       if (at.x >= blocks.cells.x || at.y >= blocks.cells.y || at.z >= blocks.cells.z) continue;
-      visit(at, static_cast<unsigned long long>((at.z * blocks.cells.y + at.y) * blocks.cells.x + at.x) *
-                    kTetrahedraPerCell);
+      visit(at, TetrahedronNumber::of((at.z * blocks.cells.y + at.y) * blocks.cells.x + at.x, 0));
     }
   }
 }
 
+/// Every cell of the chosen blocks claims the voxels that its tetrahedra own, by `visit_cell`. Thread blocks take block
+/// after block of cells, threads cell after cell.
+///
+/// @param chosen  numbers of blocks, from `choose_kernel`  @param count  their number, on the device
+/// @param slate   its voxels are written by atomic minima, so the order of threads does not matter
 __global__ void claim_kernel(DeviceField field, Blocks blocks, const unsigned* chosen, const unsigned* count,
                              Slate slate) {
   for_each_chosen(blocks, chosen, *count, [&](const glm::i64vec3& at, unsigned long long number) {
@@ -119,7 +129,7 @@ struct WantedSlate {
   NudgeTurns turns;
   IntBox region;
   Wanted wanted;
-  unsigned long long* owner;
+  unsigned long long* owner;  ///< of each wanted voxel, by its number: lowest so far; kNobody before
 
   __device__ std::int64_t word(const glm::ivec3& in) const {
     const int words = (region.end.x - region.begin.x + 31) / 32;
@@ -129,8 +139,7 @@ struct WantedSlate {
   __device__ bool may_claim(const glm::ivec3& cell) const {
     Box box{glm::i32vec3(INT32_MAX), glm::i32vec3(INT32_MIN)};
 #pragma unroll
-    for (int corner = 0; corner < 8; ++corner)
-      box.grow(lattice.deformed(cell + glm::ivec3(corner & 1, corner >> 1 & 1, corner >> 2)));
+    for (int corner = 0; corner < 8; ++corner) box.grow(lattice.deformed(cell + corner_of_cell(corner)));
     const IntBox voxels = candidates(turns, box.low, box.high, region);
     if (voxels.is_empty()) return false;
     const glm::ivec3 first = voxels.begin - region.begin, last = voxels.end - region.begin - 1;
@@ -145,8 +154,7 @@ struct WantedSlate {
   }
   __device__ void claim(const glm::ivec3& cell, int t) const {
     const glm::i64vec3 at(cell), cells(lattice.cells);
-    const auto number =
-        static_cast<unsigned long long>(((at.z * cells.y + at.y) * cells.x + at.x) * kTetrahedraPerCell + t);
+    const unsigned long long number = TetrahedronNumber::of((at.z * cells.y + at.y) * cells.x + at.x, t);
     visit_tetrahedron(
         lattice, LatticeTetrahedron::of_cell(cell, t), region, turns,
         [&](const glm::ivec3& voxel) {
@@ -160,8 +168,14 @@ struct WantedSlate {
   }
 };
 
-/// The same for whole steps, with a float test in front of the exact one; for the voxels that are wanted. First the
-/// cells of a block that may reach any are listed, then threads share out their tetrahedra, so that all have work.
+/// Claims for a lattice with whole steps, with a float test in front of the exact one; for the voxels that are wanted.
+/// First the cells of a block that may reach any are listed, then threads share out their tetrahedra, so that all have
+/// work.
+///
+///     shared memory: listed, 1024 x 2 bytes: which cells, as their place in the block, i fastest; found: how many
+///
+/// @param chosen  numbers of blocks, from `choose_kernel`  @param count  their number, on the device
+/// @param slate   its owners are written by atomic minima
 __global__ void claim_wanted_kernel(WantedSlate slate, Blocks blocks, const unsigned* chosen, const unsigned* count) {
   constexpr int kCells = Blocks::kX * Blocks::kY * Blocks::kZ;
   __shared__ unsigned short listed[kCells];

@@ -1,7 +1,9 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "cuda/owners/coverage.h"
+#include "cuda/owners/coverage.cuh"
+
+#include "cuda/runtime/warp.cuh"
 #include "deform/core/border.h"
 #include "deform/core/gather.h"
 
@@ -10,16 +12,27 @@ namespace tetwarp::cuda_detail {
 namespace {
 
 constexpr int kBlock = 4;  ///< rows and slices of vertices that are looked at together for what is inverted
+constexpr int kPairs = 4;  ///< pairs of a word of `InvertedPairs` that a thread looks at
+constexpr int kGroups = 32 / kPairs;
 constexpr unsigned kMostExtra = 1u << 18;
 constexpr int kNoExtra = 0, kLostExtra = -1;
 
+/// Where rows of voxels pass through the border: what `border_kernel` writes by atomics, and `wind_kernel` reads.
+///
+///     a row      voxel  0  1  2  3  4  5  6  7     the border lies before voxels 2, 3 and 6, and before the box
+///     ins               .  .  1  1  .  .  .  .     here the row enters: the winding number grows by 1
+///     outs              .  .  .  .  .  .  1  .     here it leaves
+///     start             1                          winding number at voxel 0
+///     winding           1  1  2  3  3  3  2  2
+///
+/// A second crossing of one kind before one voxel does not fit into a bit: it is chained to its row, as `extra`.
 struct Crossings {
-  std::uint32_t *ins, *outs;
-  int* start;
-  int words;
-  int* extra_of_row;  ///< first of a chain, numbered from 1
-  ExtraCrossing* extra;
-  unsigned* extra_count;
+  std::uint32_t *ins, *outs;  ///< a bit for each voxel, each row from a word on
+  int* start;                 ///< of each row
+  int words;                  ///< a row
+  int* extra_of_row;          ///< first of a chain, numbered from 1; kNoExtra, or kLostExtra where some found no room
+  ExtraCrossing* extra;       ///< room for kMostExtra
+  unsigned* extra_count;      ///< how many there are, those without room too
 
   __device__ void add_extra(std::int64_t row, int voxel, int sign) const {
     const unsigned n = atomicAdd(extra_count, 1u);
@@ -33,6 +46,8 @@ struct Crossings {
   }
 };
 
+/// Marks where the rows of a range pass through a triangle.
+/// @param low, high  first and last row: j and k of the output
 template <class Int>
 __device__ void cross_rows(const BorderTriangle& t, const Nudge& nudge, const SlabBox& box, const glm::ivec2& low,
                            const glm::ivec2& high, const Crossings& out) {
@@ -54,7 +69,7 @@ __device__ void cross_rows(const BorderTriangle& t, const Nudge& nudge, const Sl
   }
 }
 
-/// The same for large triangles, which are few: out of line, so that registers suffice for many threads.
+/// `cross_rows` for large triangles, which are few: out of line, so that registers suffice for many threads.
 template <class Int>
 __device__ __noinline__ void cross_rows_apart(BorderTriangle t, const Nudge& nudge, const SlabBox& box, glm::ivec2 low,
                                               glm::ivec2 high, const Crossings& out) {
@@ -73,12 +88,16 @@ struct Sides {
   }
 };
 
-/// One thread a triangle of the border.
+/// Marks where rows of voxels pass through the border; a thread a triangle of it.
+///
+/// @param sides  how triangles are numbered: those across i, j and k, two sides each, two triangles a face of a cell
+/// @param turns  of the same nudge  @param box  whose rows are looked at
+/// @param out    all zero before; written by atomics, whose order does not matter
 __global__ void __launch_bounds__(kThreads, 8)
     border_kernel(const __grid_constant__ StepLattice lattice, const __grid_constant__ Sides sides,
                   const __grid_constant__ Nudge nudge, const __grid_constant__ NudgeTurns turns,
                   const __grid_constant__ SlabBox box, const __grid_constant__ Crossings out) {
-  const std::int64_t number = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
+  const std::int64_t number = thread_of_grid();
   if (number >= sides.first[6]) return;
   int side = 0;
   while (number >= sides.first[side + 1]) ++side;
@@ -126,11 +145,39 @@ struct Chain {
   }
 };
 
-/// From crossings to the winding number of every voxel. Some lanes of a warp, a power of two, share a row.
+/// The winding numbers of the 32 voxels of a word: which are 1, and which neither 0 nor 1.
+struct WordWinding {
+  std::uint32_t one = 0, more = 0;
+
+  /// Goes from crossing to crossing: all bits up to the next one have the winding number so far.
+  /// @param winding  before the first voxel of the word  @param word  its number in the row
+  __device__ WordWinding(int winding, std::uint32_t ins, std::uint32_t outs, bool has_extra, const Chain& chain,
+                         int word) {
+    int from = 0;
+    for (std::uint32_t events = ins | outs; from < 32; events &= events - 1) {
+      const int next = events != 0 ? first_bit(events) : 32;
+      const std::uint32_t bits = (next == 32 ? ~0u : bits_below(next)) & (~0u << from);
+      one |= winding == 1 ? bits : 0;
+      more |= winding != 1 && winding != 0 ? bits : 0;
+      if (next < 32) winding += static_cast<int>(ins >> next & 1) - static_cast<int>(outs >> next & 1);
+      if (next < 32 && has_extra) winding += chain.sum(word * 32 + next, word * 32 + next + 1);
+      from = next;
+    }
+  }
+};
+
+/// From crossings to the winding number of every voxel. Some lanes of a warp share a row, a word each: a scan over them
+/// gives each the winding number before its word. Warps are whole: lanes beyond the last row look at it again.
+///
+/// @param rows            of the box, and how many of them a slice has  @param width  voxels of a row
+/// @param lanes           that share a row: a power of two, at most 32
+/// @param single, several a bit for each voxel, written: one owner; perhaps several, or none known
+/// @param in_slice        for each slice, how many bits of `several` are set: added
+/// @param in_box          in all: added
 __global__ void wind_kernel(Crossings in, std::int64_t rows, int rows_per_slice, int width, int lanes,
                             std::uint32_t* single, std::uint32_t* several, unsigned* in_slice,
                             unsigned long long* in_box) {
-  const std::int64_t number = (std::int64_t{blockIdx.x} * kThreads + threadIdx.x) / lanes, row = min(number, rows - 1);
+  const std::int64_t number = thread_of_grid() / lanes, row = min(number, rows - 1);
   const int lane = static_cast<int>(threadIdx.x) & (lanes - 1);
   const bool has_row = number < rows;
   const Chain chain{in.extra, in.extra_of_row[row]};
@@ -144,30 +191,19 @@ __global__ void wind_kernel(Crossings in, std::int64_t rows, int rows_per_slice,
     const std::uint32_t outs = here ? in.outs[row * in.words + word] : 0;
     int change = __popc(ins) - __popc(outs);
     if (has_extra) change += chain.sum(word * 32, word * 32 + 32);
-    const int sum = warp_scan(change, lanes);
-    int winding = carried + sum - change;
-    std::uint32_t one = 0, more = 0;
-    int from = 0;  // bits from here on have the winding number so far
-    for (std::uint32_t events = ins | outs; from < 32; events &= events - 1) {
-      const int next = events != 0 ? __ffs(static_cast<int>(events)) - 1 : 32;
-      const std::uint32_t bits = (next == 32 ? ~0u : (1u << next) - 1) & (~0u << from);
-      one |= winding == 1 ? bits : 0;
-      more |= winding != 1 && winding != 0 ? bits : 0;
-      if (next < 32) winding += static_cast<int>(ins >> next & 1) - static_cast<int>(outs >> next & 1);
-      if (next < 32 && has_extra) winding += chain.sum(word * 32 + next, word * 32 + next + 1);
-      from = next;
-    }
+    const int sum = group_scan(change, lanes);
+    const WordWinding found_here(carried + sum - change, ins, outs, has_extra, chain, word);
     const int left = width - word * 32;
-    const std::uint32_t valid = left >= 32 ? ~0u : (left > 0 ? (1u << left) - 1 : 0);
+    const std::uint32_t valid = left >= 32 ? ~0u : (left > 0 ? bits_below(left) : 0);
     if (here) {
-      more = known ? more & valid : valid;
-      single[row * in.words + word] = known ? one & valid : 0;
+      const std::uint32_t more = known ? found_here.more & valid : valid;
+      single[row * in.words + word] = known ? found_here.one & valid : 0;
       several[row * in.words + word] = more;
       found += static_cast<unsigned>(__popc(more));
     }
-    carried += __shfl_sync(~0u, sum, lanes - 1, lanes);
+    carried += __shfl_sync(kAllLanes, sum, lanes - 1, lanes);
   }
-  found = warp_sum(found, lanes);
+  found = group_sum(found, lanes);
   if (lane != 0 || found == 0) return;
   atomicAdd(&in_slice[row / rows_per_slice], found);
   atomicAdd(in_box, static_cast<unsigned long long>(found));
@@ -175,9 +211,11 @@ __global__ void wind_kernel(Crossings in, std::int64_t rows, int rows_per_slice,
 
 /// The voxels that have become `several`.
 struct SeveralMarker {
-  IntBox region;
-  int words;
+  IntBox region;  ///< of the bits
+  int words;      ///< a row
   std::uint32_t *single, *several;
+
+  /// By atomics, for words are shared with other threads.
 
   __device__ void mark(const IntBox& voxels) const {
     if (voxels.is_empty()) return;
@@ -196,7 +234,9 @@ struct SeveralMarker {
   }
 };
 
-/// How many bits each slice has: some thread blocks a slice.
+/// How many bits each slice has: some thread blocks a slice, grid (blocks of a slice, slices).
+///
+/// @param bits      row after row, slice after slice  @param in_slice, in_box  counts that are added to: 0 before
 __global__ void count_kernel(const std::uint32_t* bits, int words_per_slice, unsigned* in_slice,
                              unsigned long long* in_box) {
   unsigned found = 0;
@@ -204,27 +244,32 @@ __global__ void count_kernel(const std::uint32_t* bits, int words_per_slice, uns
   for (int n = static_cast<int>(blockIdx.x * kThreads + threadIdx.x); n < words_per_slice; n += gridDim.x * kThreads)
     found += static_cast<unsigned>(__popc(slice[n]));
   found = warp_sum(found);
-  if ((threadIdx.x & 31) != 0 || found == 0) return;
+  if (lane_of_warp() != 0 || found == 0) return;
   atomicAdd(&in_slice[blockIdx.y], found);
   atomicAdd(in_box, static_cast<unsigned long long>(found));
 }
 
-/// One thread four pairs of vertices on kBlock rows of as many slices: all voxels that the inverted tetrahedra near
-/// them may reach go to `several`.
+/// All voxels that inverted tetrahedra may reach go to `several`. A thread looks at four pairs of vertices on kBlock
+/// rows of as many slices, and mostly finds nothing:
+///
+///     a word of `InvertedPairs`, 32 pairs:   thread 0 | 1 | 2 | 3 | 4 | 5 | 6 | 7   four pairs each
+///
+/// @param inverted  which pairs, from `step_pass_kernel`
+/// @param marker    its bits are written
 __global__ void inverted_kernel(StepLattice lattice, NudgeTurns turns, InvertedPairs inverted, SeveralMarker marker) {
   constexpr int kLargeBox = 4096;  // voxels: then row by row
-  const int groups = inverted.words_per_row * 8, rows = (inverted.rows + kBlock - 1) / kBlock,
+  const int groups = inverted.words_per_row * kGroups, rows = (inverted.rows + kBlock - 1) / kBlock,
             slices = lattice.cells.z / kBlock + 1;
-  const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
+  const std::int64_t n = thread_of_grid();
   if (n >= std::int64_t{groups} * rows * slices) return;
-  const int word = static_cast<int>(n % groups) / 8, shift = static_cast<int>(n % 8) * 4;
+  const int word = static_cast<int>(n % groups) / kGroups, shift = static_cast<int>(n % kGroups) * kPairs;
   const glm::ivec2 first(n / groups % rows * kBlock, n / groups / rows * kBlock);
   const auto pairs_of = [&](int row, int slice) {
     if (row >= inverted.rows || slice > lattice.cells.z) return 0u;
-    return inverted.words[inverted.word(row, slice, word)] >> shift & 0xFu;
+    return inverted.words[inverted.word(row, slice, word)] >> shift & ((1u << kPairs) - 1);
   };
   const auto box_of = [&](unsigned pairs, const glm::ivec2& from_row, const glm::ivec2& to_row) {
-    const int low = __ffs(static_cast<int>(pairs)) - 1, high = 31 - __clz(static_cast<int>(pairs));
+    const int low = first_bit(pairs), high = last_bit(pairs);
     const glm::ivec3 from =
         glm::max(glm::ivec3(InvertedPairs::column(0, word, shift + low), from_row.x, from_row.y) - 1, glm::ivec3(0));
     const glm::ivec3 to = glm::min(
@@ -297,8 +342,8 @@ void Coverage::find(const LatticeOnDevice& lattice, const SlabBox& box, cudaStre
   if (lattice.statistics().inverted != 0) {
     const InvertedPairs& inverted = lattice.inverted();
     const IntBox region{glm::ivec3(box.begin), glm::ivec3(box.begin + box.size)};
-    const std::int64_t groups = std::int64_t{inverted.words_per_row} * 8 * ((inverted.rows + kBlock - 1) / kBlock) *
-                                (field.steps.cells.z / kBlock + 1);
+    const std::int64_t groups = std::int64_t{inverted.words_per_row} * kGroups *
+                                ((inverted.rows + kBlock - 1) / kBlock) * (field.steps.cells.z / kBlock + 1);
     inverted_kernel<<<blocks_for(groups), kThreads, 0, stream>>>(field.steps, NudgeTurns(field.frame.nudge), inverted,
                                                                  {region, words_, single, several});
     count_several(box, stream);

@@ -1,11 +1,12 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "cuda/owners/gather.h"
+#include "cuda/owners/gather.cuh"
 
 #include <algorithm>
 
 #include "cuda/owners/march.cuh"
+#include "cuda/owners/seeds.cuh"
 #include "deform/core/visit_cell.h"
 
 namespace tetwarp::cuda_detail {
@@ -16,7 +17,11 @@ constexpr int kQueueTries = 6;                 ///< in float, before the exact w
 constexpr int kWalk = 24;                      ///< tetrahedra that the exact walk may pass
 constexpr unsigned kClaimedAtOnce = 1u << 22;  ///< voxels, or those of a slice
 
-/// The voxels that no prediction settled: a few more in float, then a walk with exact integers.
+/// The voxels that no prediction settled: a few more tries in float, then a walk with exact integers. Threads take
+/// voxel after voxel of the queue.
+///
+/// @param task  what the walk does not reach either is added to `several`
+/// @param walk  tetrahedra that it may pass; 0: none  @param sink  gets the voxels that are found
 template <class Sink>
 __global__ void queue_kernel(Task task, int walk, Sink sink) {
   const unsigned count = min(task.counters->queued, kQueueSize);
@@ -33,7 +38,7 @@ __global__ void queue_kernel(Task task, int walk, Sink sink) {
       if (!is_finite(place)) place = task.lattice.place(glm::vec3(voxel));
       const Trial trial = try_tetrahedron(task.lattice, tetrahedron_at(task.lattice, place), point);
       settled = trial.owns;
-      if (settled) covered += sink.write(sink.place(voxel), voxel, trial.u());
+      if (settled) covered += sink.write(sink.address(voxel), voxel, trial.u());
       place =
           n_try == 0 ? trial.place() : (place + trial.place()) * 0.5f;  // full steps may go round in circles in folds
     }
@@ -42,7 +47,7 @@ __global__ void queue_kernel(Task task, int walk, Sink sink) {
     const glm::i32vec3 steps = detail::to_steps(glm::i64vec3(voxel)), signs = task.nudge.signs(voxel);
     LatticeTetrahedron owner;
     if (walk_to_owner(task.lattice, as_lattice(tetrahedron_at(task.lattice, place)), steps, signs, walk, owner)) {
-      covered += sink.write(sink.place(voxel), voxel, interpolate_u(vertices_of(task.lattice, owner), steps, signs));
+      covered += sink.write(sink.address(voxel), voxel, interpolate_u(vertices_of(task.lattice, owner), steps, signs));
     } else {
       task.leave_to_claims(in);
     }
@@ -50,42 +55,51 @@ __global__ void queue_kernel(Task task, int walk, Sink sink) {
   if (covered != 0) atomicAdd(&task.counters->covered, static_cast<unsigned long long>(covered));
 }
 
-/// Numbers the voxels that are to be claimed, and lists them: one thread a word.
+/// Numbers the voxels that are to be claimed, and lists them: one thread a word. A scan over each warp, and one atomic
+/// addition for all of it, give each word its numbers; which numbers a warp gets depends on the order of warps, but
+/// nothing else does.
+///
+/// @param several   bits of the voxels, as `BitRows`  @param words  how many words
+/// @param rank      of each word with a bit, number of its lowest one: written
+/// @param numbered  their count: 0 before  @param voxels  of each number, its `BitNumber`: written
 __global__ void number_kernel(const std::uint32_t* several, std::int64_t words, unsigned* rank, unsigned* numbered,
                               unsigned* voxels) {
-  const std::int64_t n = std::int64_t{blockIdx.x} * kThreads + threadIdx.x;
+  const std::int64_t n = thread_of_grid();
   const std::uint32_t bits = n < words ? several[n] : 0;
   const auto mine = static_cast<unsigned>(__popc(bits));
   const auto before = static_cast<unsigned>(warp_scan(__popc(bits)));  // of the warp, this one too
-  const int lane = static_cast<int>(threadIdx.x & 31);
   unsigned first = 0;
-  if (lane == 31 && before != 0) first = atomicAdd(numbered, before);
-  first = __shfl_sync(~0u, first, 31) + before - mine;
+  if (lane_of_warp() == 31 && before != 0) first = atomicAdd(numbered, before);
+  first = __shfl_sync(kAllLanes, first, 31) + before - mine;
   if (bits == 0) return;
   rank[n] = first;
   for (std::uint32_t left = bits; left != 0; left &= left - 1)
-    voxels[first++] = static_cast<unsigned>(n * 32 + __ffs(static_cast<int>(left)) - 1);
+    voxels[first++] = BitNumber::of(static_cast<unsigned>(n), first_bit(left));
 }
 
-/// From the owners of claimed voxels to their values.
+/// From the owners of claimed voxels to their values; a thread a voxel.
+///
+/// @param begin   first voxel of the box to which the words of `voxels` belong
+/// @param voxels  of each number, its `BitNumber`  @param count  how many
+/// @param owner   of each number, the lowest number of an owner, or kNobody: from `claim_wanted_kernel`
+/// @param sink    gets all of them
 template <class Sink>
 __global__ void settle_kernel(Task task, glm::ivec3 begin, const unsigned* voxels, unsigned count,
                               const unsigned long long* owner, Sink sink) {
   const unsigned n = blockIdx.x * kThreads + threadIdx.x;
   if (n >= count) return;
   const int words = task.single.words_per_row, rows = task.size().y;
-  const unsigned word = voxels[n] / 32;
-  const glm::ivec3 voxel =
-      begin + glm::ivec3(word % words * 32 + voxels[n] % 32, word / words % rows, word / words / rows);
-  const int place = sink.place(voxel);
-  if (owner[n] == kNobody) return sink.nothing(place);
+  const unsigned word = BitNumber::Word::get(voxels[n]), bit = BitNumber::Bit::get(voxels[n]);
+  const glm::ivec3 voxel = begin + glm::ivec3(word % words * 32 + bit, word / words % rows, word / words / rows);
+  const int address = sink.address(voxel);
+  if (owner[n] == kNobody) return sink.nothing(address);
   const glm::ivec3& cells = task.lattice.cells;
-  const unsigned long long cell = owner[n] / kTetrahedraPerCell, row = cell / cells.x;
+  const unsigned long long cell = TetrahedronNumber::cell(owner[n]), row = cell / cells.x;
   const LatticeTetrahedron t = LatticeTetrahedron::of_cell(
       {static_cast<int>(cell % cells.x), static_cast<int>(row % cells.y), static_cast<int>(row / cells.y)},
-      static_cast<int>(owner[n] % kTetrahedraPerCell));
+      TetrahedronNumber::in_cell(owner[n]));
   warp_count(&task.counters->covered,
-             sink.write(place, voxel, offset_in(task.lattice, t, voxel, task.nudge.signs(voxel))));
+             sink.write(address, voxel, offset_in(task.lattice, t, voxel, task.nudge.signs(voxel))));
 }
 
 }  // namespace

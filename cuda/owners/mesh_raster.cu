@@ -1,301 +1,16 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "cuda/owners/mesh_raster.h"
+#include "cuda/owners/mesh_raster.cuh"
 
 #include <cub/device/device_scan.cuh>
 
-#include "cuda/output/voxel_sink.cuh"
-#include "cuda/output/weighing.cuh"
-#include "cuda/owners/gather.h"
-#include "deform/core/row_interval.h"
+#include "cuda/owners/gather.cuh"
+#include "cuda/owners/mesh_sample.cuh"
 
 namespace tetwarp::cuda_detail {
 
 namespace {
-
-constexpr int kTileI = 32, kTileJ = 8, kTileK = 16;  ///< voxels of a tile
-constexpr int kTileRows = kTileJ * kTileK;
-constexpr int kTileThreads = 32 * kTileJ;  ///< a warp a column of rows
-constexpr int kTileBlocks = 4;             ///< a multiprocessor
-constexpr int kSlots = 112;                ///< tetrahedra whose arithmetic is prepared at a time
-constexpr int kRowStride = kTileI + 1;     ///< so that a column of rows lies in different banks
-static_assert(kTileI <= kMostRowTile && kTileJ <= kMostRowTile && kTileK <= kMostRowTile);
-
-/// What all kernels know.
-struct MeshTask {
-  MeshRaster::View mesh;
-  unsigned count;            ///< tetrahedra
-  glm::ivec3 size;           ///< of the output
-  glm::ivec3 origin, tiles;  ///< first voxel of the first tile; how many on each axis
-  unsigned long long* first;
-  unsigned* next;
-  unsigned* numbers;
-
-  /// The voxels of a tile that the output has.
-  __device__ IntBox voxels(const glm::ivec3& tile) const {
-    const glm::ivec3 extent(kTileI, kTileJ, kTileK), begin = origin + tile * extent;
-    return {glm::max(begin, glm::ivec3(0)), glm::min(begin + extent, size)};
-  }
-  __device__ int number_of(const glm::ivec3& tile) const { return (tile.z * tiles.y + tile.y) * tiles.x + tile.x; }
-};
-
-/// One warp a tetrahedron: counts it for every tile that it may reach, or writes its number to their lists.
-template <bool kCounts>
-__global__ void list_kernel(MeshTask task) {
-  const std::int64_t number = (std::int64_t{blockIdx.x} * kThreads + threadIdx.x) / 32;
-  if (number >= task.count) return;
-  const Tetrahedron t = task.mesh.tetrahedron(static_cast<unsigned>(number));
-  const Region reached = detail::candidates(task.mesh.nudge, box_of(t), {glm::i64vec3(0), glm::i64vec3(task.size)});
-  if (is_empty(reached)) return;
-  const glm::ivec3 extent(kTileI, kTileJ, kTileK),
-      begin = (glm::ivec3(reached.begin) - task.origin) / extent,
-      size = (glm::ivec3(reached.end) - 1 - task.origin) / extent - begin + 1;
-  const TetrahedronPlanes planes(t);
-  const std::int64_t tiles = std::int64_t{size.x} * size.y * size.z;
-  for (std::int64_t n = threadIdx.x & 31; n < tiles; n += 32) {
-    const glm::ivec3 tile = begin + glm::ivec3(unravel(n, glm::i64vec3(size)));
-    const IntBox box = task.voxels(tile);
-    if (tiles > 1 && !planes.may_reach({glm::i64vec3(box.begin), glm::i64vec3(box.end)})) continue;
-    const int place = task.number_of(tile);
-    if constexpr (kCounts) {
-      atomicAdd(&task.first[place], 1ULL);
-    } else {
-      task.numbers[task.first[place] + atomicAdd(&task.next[place], 1u)] = static_cast<unsigned>(number);
-    }
-  }
-}
-
-/// The shared memory of a tile.
-template <bool kCountsOwners>
-struct TileMemory {
-  /// A tetrahedron of the list, and the rows that it may reach.
-  struct Slot {
-    unsigned number;
-    short y_begin, y_end, z_begin, z_end;
-    short lower;  ///< of `RowFaces`; 0: exact integers must say
-  };
-  float4 prepared[kSlots + 1][kQuads];  ///< faces, and then `Weighing`, the last nobody's
-  float ends[kSlots + 1];               ///< the last float of each `Weighing`
-  Slot slots[kSlots];
-  unsigned numbers[kSlots];                ///< before they are sorted
-  unsigned owner[kTileRows * kRowStride];  ///< slot where all have one, else number; or kNoTetrahedron
-  unsigned several[kCountsOwners ? kTileRows * kRowStride : 1];
-  unsigned covered;
-
-  /// Where a row begins.
-  __device__ static int row(int y, int z) { return (z * kTileJ + y) * kRowStride; }
-};
-
-/// Rarely called, so out of line, with everything by value.
-__device__ __noinline__ RowInterval exactly(MeshRaster::View mesh, unsigned number, glm::ivec3 first,
-                                            glm::i32vec3 signs, int y, int z, int count) {
-  return exact_row(mesh.tetrahedron(number), first, signs, y, z, count);
-}
-__device__ __noinline__ glm::vec3 interpolate_exactly(MeshRaster::View mesh, unsigned number, glm::i32vec3 steps,
-                                                      glm::i32vec3 signs) {
-  return interpolate_u_exactly(mesh.tetrahedron(number), steps, signs);
-}
-template <class Sink>
-__device__ __noinline__ bool write_slowly(const MeshRaster::View& mesh, const Sink& sink, unsigned number, int out,
-                                          glm::ivec3 at, glm::i32vec3 signs) {
-  return sink.write(out, at, interpolate_u(mesh.tetrahedron(number), at * kStepsPerVoxel, signs));
-}
-
-/// A thread block at work on a tile, or the part of it that a box has.
-template <bool kCountsOwners>
-struct TileWorker {
-  using Memory = TileMemory<kCountsOwners>;
-
-  const MeshTask& task;
-  Memory& memory;
-  IntBox voxels;
-  glm::ivec3 size;
-  glm::i32vec3 signs;
-  int thread;
-
-  __device__ void clear() const {
-    for (int n = thread; n < kTileRows * kRowStride; n += kTileThreads) {
-      memory.owner[n] = kNoTetrahedron;
-      if constexpr (kCountsOwners) memory.several[n] = 0;
-    }
-    if (thread != 0) return;
-    memory.prepared[kSlots][0] = make_float4(0, 0, 0, kNoNumber);
-    memory.covered = 0;
-  }
-
-  __device__ void prepare(int slot, unsigned number) const {
-    const Tetrahedron t = task.mesh.tetrahedron(number);
-    const Region reached =
-        detail::candidates(task.mesh.nudge, box_of(t), {glm::i64vec3(voxels.begin), glm::i64vec3(voxels.end)});
-    typename Memory::Slot& to = memory.slots[slot];
-    to = {number, 0, 0, 0, 0, 0};
-    if (is_empty(reached)) return;
-    to.y_begin = static_cast<short>(reached.begin.y - voxels.begin.y);
-    to.y_end = static_cast<short>(reached.end.y - voxels.begin.y);
-    to.z_begin = static_cast<short>(reached.begin.z - voxels.begin.z);
-    to.z_end = static_cast<short>(reached.end.z - voxels.begin.z);
-    RowFaces faces;
-    if (!make_row_faces(t, voxels.begin, signs, size, faces)) return;
-    to.lower = static_cast<short>(faces.lower);
-    for (int n = 0; n < 4; ++n) {
-      const RowFace& face = faces.faces[n];
-      memory.prepared[slot][n] = make_float4(face.at, face.along_y, face.along_z, face.error);
-    }
-  }
-
-  __device__ RowFaces faces_of(int slot) const {
-    RowFaces t;
-#pragma unroll
-    for (int n = 0; n < 4; ++n) {
-      const float4 face = memory.prepared[slot][n];
-      t.faces[n] = {face.x, face.y, face.z, face.w};
-    }
-    t.lower = memory.slots[slot].lower;
-    return t;
-  }
-
-  /// @param owner  to be the voxels' owner, where it is the lowest
-  __device__ void mark(int slot, int y, int z, unsigned owner) const {
-    const auto& of = memory.slots[slot];
-    if (y < of.y_begin || y >= of.y_end || z < of.z_begin || z >= of.z_end) return;
-    bool is_certain = false;
-    RowInterval in{0, 0};
-    if (of.lower != 0) in = RowsAlongZ(faces_of(slot), y).interval(z, size.x, is_certain);
-    if (!is_certain) in = exactly(task.mesh, of.number, voxels.begin, signs, y, z, size.x);
-    const int row = memory.row(y, z);
-    for (int x = in.begin; x < in.end; ++x) {
-      atomicMin(&memory.owner[row + x], owner);
-      if constexpr (kCountsOwners) atomicAdd(&memory.several[row + x], 1u);
-    }
-  }
-
-  __device__ void mark_all(int slots, bool by_slot) const {
-    for (int item = thread; item < slots * kTileRows; item += kTileThreads) {
-      const int slot = item / kTileRows;
-      mark(slot, item % kTileJ, item % kTileRows / kTileJ,
-           by_slot ? static_cast<unsigned>(slot) : memory.slots[slot].number);
-    }
-  }
-
-  /// A list for which there is room, in the order of the numbers. @param list  of the tile's tetrahedra, in any
-  __device__ void rasterise_few(const unsigned* list, int count) const {
-    static_assert(kSlots <= kTileThreads);
-    unsigned number = kNoTetrahedron;
-    if (thread < count) memory.numbers[thread] = number = list[thread];
-    __syncthreads();
-    if (thread < count) {
-      int slot = 0;
-      for (int n = 0; n < count; ++n) slot += memory.numbers[n] < number;
-      prepare(slot, number);
-    }
-    __syncthreads();
-    mark_all(count, true);
-    __syncthreads();
-    if (thread < count) weigh(thread);
-    __syncthreads();
-  }
-
-  /// Any list, as many at a time as there is room for.
-  __device__ void rasterise_many(const unsigned* list, unsigned long long count) const {
-    for (unsigned long long from = 0; from < count; from += kSlots) {
-      const int slots = static_cast<int>(min(count - from, static_cast<unsigned long long>(kSlots)));
-      __syncthreads();
-      if (thread < slots) prepare(thread, list[from + static_cast<unsigned>(thread)]);
-      __syncthreads();
-      mark_all(slots, false);
-    }
-    __syncthreads();
-  }
-
-  /// What the voxels of a tetrahedron need, in the place of its faces.
-  __device__ void weigh(int slot) const {
-    const Tetrahedron t = task.mesh.tetrahedron(memory.slots[slot].number);
-    const glm::i32vec3& d = t.d.deformed;
-    const auto further = [&](const Vertex& v) { return glm::vec3(t.d.u - v.u); };
-    prepare_weighing(glm::vec3(t.a.deformed - d), glm::vec3(t.b.deformed - d), glm::vec3(t.c.deformed - d),
-                     glm::vec3(voxels.begin * kStepsPerVoxel - d),
-                     {glm::vec3(-t.d.u), further(t.a), further(t.b), further(t.c)}, memory.prepared[slot],
-                     memory.ends[slot]);
-    if (is_long(t)) memory.prepared[slot][0].w = kNoNumber;
-  }
-
-  /// The voxels of one lane, a column along k, where slots own. @return how many are covered
-  template <class Sink>
-  __device__ unsigned sample_few(const Sink& sink) const {
-    const int lane = thread & 31, y = thread / 32;
-    if (lane >= size.x || y >= size.y) return 0;
-    const unsigned* owner = &memory.owner[memory.row(y, 0) + lane];
-    const auto next_place = [&] {
-      const unsigned place = *owner;
-      owner += kTileJ * kRowStride;
-      return place;
-    };
-    return sample_column<false>(sink, weighings(), voxels.begin + glm::ivec3(lane, y, 0),
-                                glm::vec3(lane * kStepsPerVoxel, y * kStepsPerVoxel, 0), size.z, next_place,
-                                [&](int z) { return finish_few(sink, lane, y, z); });
-  }
-  __device__ Weighings weighings() const { return {memory.prepared, memory.ends, kSlots}; }
-  /// A voxel that `sample_few` has not written. @return whether it is covered
-  template <class Sink>
-  __device__ bool finish_few(const Sink& sink, int x, int y, int z) const {
-    const glm::ivec3 in_tile(x, y, z), at = voxels.begin + in_tile;
-    const unsigned slot = memory.owner[memory.row(y, z) + x];
-    if (slot == kNoTetrahedron) {
-      sink.nothing(sink.place(at));
-      return false;
-    }
-    return finish_voxel(sink, weighings(), slot, at, glm::vec3(in_tile * kStepsPerVoxel), [&](int out) {
-      return write_slowly(task.mesh, sink, memory.slots[slot].number, out, at, signs);
-    });
-  }
-
-  /// The same where numbers own: a tetrahedron's map is made when a column enters it.
-  template <class Sink>
-  __device__ unsigned sample_many(const Sink& sink) const {
-    unsigned covered = 0, held = kNoTetrahedron;
-    TetrahedronMap map(Tetrahedron{});
-    for_each_of_column(sink, [&](const glm::ivec3& at, int place, int out) {
-      const unsigned number = memory.owner[place];
-      if (number == kNoTetrahedron) return sink.nothing(out);
-      if (number != held) map = TetrahedronMap(task.mesh.tetrahedron(number));
-      held = number;
-      const glm::i32vec3 steps = at * kStepsPerVoxel;
-      covered +=
-          sink.write(out, at, map.u(steps, [&] { return interpolate_exactly(task.mesh, number, steps, signs); }));
-    });
-    return covered;
-  }
-
-  /// Calls `work(voxel, its place in `owner`, its place in the output)` for the voxels of one lane.
-  template <class Sink, class Work>
-  __device__ void for_each_of_column(const Sink& sink, Work&& work) const {
-    const int lane = thread & 31, y = thread / 32;
-    if (lane >= size.x || y >= size.y) return;
-    glm::ivec3 at = voxels.begin + glm::ivec3(lane, y, 0);
-    int out = sink.place(at);
-    for (int z = 0; z < size.z; ++z, ++at.z, out += sink.per_slice()) work(at, memory.row(y, z) + lane, out);
-  }
-
-  __device__ unsigned finish(const OwnerSink& sink, bool is_few) const {
-    for_each_of_column(sink, [&](const glm::ivec3&, int place, int out) {
-      const unsigned owner = memory.owner[place];
-      sink.owner[out] = is_few && owner != kNoTetrahedron ? memory.slots[owner].number : owner;
-      if constexpr (kCountsOwners) sink.several[out] = static_cast<std::uint16_t>(min(memory.several[place], 65535u));
-    });
-    return 0;
-  }
-  __device__ unsigned finish(const HoleSink& sink, bool) const {
-    for_each_of_column(sink, [&](const glm::ivec3&, int place, int out) {
-      if (memory.owner[place] == kNoTetrahedron) sink.nothing(out);
-    });
-    return 0;
-  }
-  template <class Sink>
-  __device__ unsigned finish(const Sink& sink, bool is_few) const {
-    return is_few ? sample_few(sink) : sample_many(sink);
-  }
-};
 
 template <class Sink>
 constexpr bool is_wide() {
@@ -303,36 +18,44 @@ constexpr bool is_wide() {
   return false;
 }
 
-/// A block a tile that the box reaches.
+/// Finds the owners of the voxels of a box, and gives them to a sink: a thread block a tile that the box reaches.
+///
+///     a list that fits the slots: sort it, mark slots, weigh them, sample from shared memory
+///     a longer one: mark numbers, as many tetrahedra at a time as there are slots; sample from global memory
+///
+/// @param task        the lists are read  @param box  half open, voxels of the output
+/// @param first_tile  that the box reaches, on each axis  @param sink  gets every voxel of the box
+/// @param covered     how many voxels of a sink that samples are covered: added to
 template <bool kCountsOwners, class Sink>
 __global__ void __launch_bounds__(kTileThreads, is_wide<Sink>() ? kTileBlocks - 1 : kTileBlocks)
     mesh_tile_kernel(const __grid_constant__ MeshTask task, const __grid_constant__ IntBox box,
                      const __grid_constant__ glm::ivec3 first_tile, const __grid_constant__ Sink sink,
                      unsigned long long* covered) {
   __shared__ TileMemory<kCountsOwners> memory;
-  const glm::ivec3 tile = first_tile + glm::ivec3(blockIdx.x, blockIdx.y, blockIdx.z);
-  IntBox voxels = task.voxels(tile);
+  const glm::ivec3 at = first_tile + glm::ivec3(blockIdx.x, blockIdx.y, blockIdx.z);
+  IntBox voxels = task.voxels(at);
   voxels = {glm::max(voxels.begin, box.begin), glm::min(voxels.end, box.end)};
   const glm::i64vec3 first_voxel(voxels.begin);
-  const TileWorker<kCountsOwners> worker{task,
-                                         memory,
-                                         voxels,
-                                         voxels.end - voxels.begin,
-                                         task.mesh.nudge.signs(first_voxel),
-                                         static_cast<int>(threadIdx.x)};
-  worker.clear();
-  const int number = task.number_of(tile);
+  const MeshTile<kCountsOwners> tile{task,
+                                     memory,
+                                     voxels,
+                                     voxels.end - voxels.begin,
+                                     task.mesh.nudge.signs(first_voxel),
+                                     static_cast<int>(threadIdx.x)};
+  tile.clear();
+  const int number = task.number_of(at);
   const unsigned long long first = task.first[number], count = task.first[number + 1] - first;
   const bool is_few = count <= kSlots;
   if (is_few) {
-    worker.rasterise_few(task.numbers + first, static_cast<int>(count));
+    tile.rasterise_few(task.numbers + first, static_cast<int>(count));
   } else {
-    worker.rasterise_many(task.numbers + first, count);
+    tile.rasterise_many(task.numbers + first, count);
   }
-  const unsigned found = warp_sum(worker.finish(sink, is_few));
-  if ((worker.thread & 31) == 0) atomicAdd(&memory.covered, found);
+  const MeshSampler<kCountsOwners> sampler{tile};
+  const unsigned found = group_sum(sampler.finish(sink, is_few), 32);  // as at the end of `tile_kernel`
+  if (tile.lane() == 0) atomicAdd(&memory.covered, found);
   __syncthreads();
-  if (worker.thread == 0 && memory.covered != 0) atomicAdd(covered, static_cast<unsigned long long>(memory.covered));
+  if (tile.thread == 0 && memory.covered != 0) atomicAdd(covered, static_cast<unsigned long long>(memory.covered));
 }
 
 }  // namespace

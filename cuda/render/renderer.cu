@@ -1,29 +1,20 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include <limits>
 #include <memory>
-#include <type_traits>
 
 #include "cuda/factories.h"
-#include "cuda/lattice/lattice.h"
+#include "cuda/render/ray_kernels.cuh"
 #include "cuda/runtime/device_buffer.h"
 #include "cuda/runtime/host_copies.h"
+#include "cuda/runtime/launch.cuh"
 #include "cuda/runtime/pointer_check.h"
-#include "deform/render/ray_blocks.h"
-#include "deform/render/ray_frame.h"
 
 namespace tetwarp {
 
 namespace cuda_detail {
 
 namespace {
-
-constexpr int kRangeThreads = 128, kDistanceThreads = 256;
-constexpr int kRangeBlocks = (kRangeThreads - kMostRayReach) / kRayBlock + 1;  ///< of voxels, that a thread block takes
-constexpr int kPatchWidth = 8, kPatchHeight = 4;  ///< pixels of a warp: near rays read the same voxels
-constexpr int kPatches = 4;                       ///< of a thread block
-constexpr int kCopyWidth = 32, kCopyRows = 8;     ///< words and rows of a thread block
 
 /// In the renderer's copy of a volume, rows and slices begin so many bytes further in a cache line than those before
 /// them. Rays that run along i read several rows and slices at once, and where all begin alike, as rows of 512 voxels
@@ -33,102 +24,6 @@ constexpr int kMostStride = 1 << 30;                        ///< two of them are
 
 /// The least number from `least` on that is `rest` beyond a multiple of `unit`.
 int at_least(int least, int rest, int unit) { return least + ((rest - least) % unit + unit) % unit; }
-
-/// Rows of so many words, `rows` of them a slice, to where they are `pitch` words apart, `slots` of them a slice.
-template <class Word>
-__global__ void __launch_bounds__(kCopyWidth* kCopyRows)
-    copy_kernel(const Word* from, int words, int rows, int all_rows, Word* to, int pitch, int slots) {
-  const int row = static_cast<int>(blockIdx.x) * kCopyRows + static_cast<int>(threadIdx.y);
-  if (row >= all_rows) return;
-  const Word* const source = from + ray::wide_product(row, words);
-  Word* const copy = to + ray::wide_product(row / rows * slots + row % rows, pitch);
-  for (int n = static_cast<int>(threadIdx.x); n < words; n += kCopyWidth) copy[n] = source[n];
-}
-
-/// What voxels are compared as: whole numbers as they are.
-template <class V>
-struct Extremes {
-  using Value = std::conditional_t<std::is_integral_v<V>, V, float>;
-  static constexpr Value kHighest =
-      std::is_integral_v<V> ? std::numeric_limits<Value>::max() : std::numeric_limits<Value>::infinity();
-  static constexpr Value kLowest = std::is_integral_v<V> ? std::numeric_limits<Value>::lowest() : -kHighest;
-
-  Value least = kHighest, most = kLowest;
-
-  __device__ void add(Value low, Value high) {
-    least = low < least ? low : least;
-    most = high > most ? high : most;
-  }
-};
-
-/// A thread block looks at a row of blocks of voxels along i and what is around them (`RayReach`): a thread at a column
-/// of voxels, and then at a block.
-template <class V>
-__global__ void __launch_bounds__(kRangeThreads)
-    range_kernel(const V* voxels, glm::ivec3 size, glm::ivec3 blocks, int row, BlockRange* ranges) {
-  using Value = typename Extremes<V>::Value;
-  const glm::ivec3 first(static_cast<int>(blockIdx.x) * row, blockIdx.y, blockIdx.z);
-  const int count = min(row, blocks.x - first.x), thread = static_cast<int>(threadIdx.x);
-  const int begin = RayReach(first.x, size.x).begin, end = RayReach(first.x + count - 1, size.x).end;
-  const RayReach j(first.y, size.y), k(first.z, size.z);
-  __shared__ Value all_least[kRangeThreads], all_most[kRangeThreads];
-  if (begin + thread < end) {
-    Extremes<V> found;
-    for (int z = k.begin; z < k.end; ++z) {
-      const V* const slice = voxels + ray::number_in(size, {begin + thread, 0, z});
-#pragma unroll
-      for (int n = 0; n < kMostRayReach; ++n) {  // the last row again where there are less
-        const auto value = static_cast<Value>(slice[std::int64_t{min(j.begin + n, j.end - 1)} * size.x]);
-        found.add(value, value);
-      }
-    }
-    all_least[thread] = found.least;
-    all_most[thread] = found.most;
-  }
-  __syncthreads();
-  if (thread >= count) return;
-  const RayReach i(first.x + thread, size.x);
-  Extremes<V> found;
-  for (int n = i.begin; n < i.end; ++n) found.add(all_least[n - begin], all_most[n - begin]);
-  ranges[ray::number_in(blocks, {first.x + thread, first.y, first.z})] = {static_cast<float>(found.least),
-                                                                          static_cast<float>(found.most)};
-}
-
-__global__ void empty_kernel(const BlockRange* ranges, int count, RayFrame frame, const int* opaque_before,
-                             std::uint8_t* distances) {
-  const int n = static_cast<int>(blockIdx.x) * kDistanceThreads + static_cast<int>(threadIdx.x);
-  if (n < count) distances[n] = is_empty(ranges[n], frame, opaque_before) ? kFarthestBlock : 0;
-}
-
-/// Each number becomes the least of max(|n - m|, number m) along one axis, as `block_distances` has it.
-__global__ void spread_kernel(const std::uint8_t* from, glm::ivec3 blocks, int axis, std::uint8_t* to) {
-  const int n = static_cast<int>(blockIdx.x) * kDistanceThreads + static_cast<int>(threadIdx.x);
-  if (n >= blocks.x * blocks.y * blocks.z) return;
-  const int stride = axis == 0 ? 1 : axis == 1 ? blocks.x : blocks.x * blocks.y;
-  const int at = n / stride % blocks[axis];
-  int nearest = from[n];
-  for (int apart = 1; apart < nearest; ++apart) {
-    if (at >= apart) nearest = min(nearest, max(apart, static_cast<int>(from[n - apart * stride])));
-    if (at + apart < blocks[axis]) nearest = min(nearest, max(apart, static_cast<int>(from[n + apart * stride])));
-  }
-  to[n] = static_cast<std::uint8_t>(nearest);
-}
-
-template <class V>
-__global__ void __launch_bounds__(kPatches * 32, 8)
-    ray_kernel(RayScene<V> scene, int width, int height, std::uint8_t* rgb) {
-  const int lane = static_cast<int>(threadIdx.x) % 32, patch = static_cast<int>(threadIdx.x) / 32;
-  const int x = (static_cast<int>(blockIdx.x) * kPatches + patch) * kPatchWidth + lane % kPatchWidth,
-            y = static_cast<int>(blockIdx.y) * kPatchHeight + lane / kPatchWidth;
-  if (x >= width || y >= height) return;
-  const RayColour colour = cast_ray(scene, x, y);
-  std::uint8_t* const pixel = rgb + 3 * (static_cast<std::int64_t>(y) * width + x);
-  pixel[0] = colour.red;
-  pixel[1] = colour.green;
-  pixel[2] = colour.blue;
-}
-
-unsigned blocks_of(int count, int threads) { return static_cast<unsigned>((count + threads - 1) / threads); }
 
 class CudaRenderer final : public Renderer {
  public:
@@ -198,7 +93,7 @@ void CudaRenderer::copy_volume(cudaStream_t stream) {
     using Word = decltype(word);
     const int words = size.x * bytes / static_cast<int>(sizeof(Word)),
               pitch = row * bytes / static_cast<int>(sizeof(Word));
-    copy_kernel<<<blocks_of(size.y * size.z, kCopyRows), dim3(kCopyWidth, kCopyRows), 0, stream>>>(
+    copy_kernel<<<blocks_for(size.y * size.z, kCopyRows), dim3(kCopyWidth, kCopyRows), 0, stream>>>(
         reinterpret_cast<const Word*>(volume_.voxels), words, size.y, size.y * size.z,
         reinterpret_cast<Word*>(copy_.data()), pitch, rows);
   };
@@ -264,7 +159,7 @@ void CudaRenderer::set_tints(const Tints& tints) {
 void CudaRenderer::find_distances(const RayFrame& frame, const std::vector<TransferEntry>& table, cudaStream_t stream) {
   const std::vector<int> before = opaque_before(table);
   opaque_before_.upload(before.data(), before.size(), stream);
-  const unsigned launches = blocks_of(block_count(), kDistanceThreads);
+  const unsigned launches = blocks_for(block_count(), kDistanceThreads);
   const auto count = static_cast<std::size_t>(block_count());
   std::uint8_t *from = distances_.reserve(count), *to = other_distances_.reserve(count);
   empty_kernel<<<launches, kDistanceThreads, 0, stream>>>(ranges_.data(), block_count(), frame, opaque_before_.data(),
@@ -302,7 +197,7 @@ void CudaRenderer::render(const ViewPlane& plane, std::span<std::uint8_t> rgb, c
   std::uint8_t* const pixels = on_device ? rgb.data() : picture_.reserve(rgb.size());
   const RayTables tables{ranges_.data(), distances_.data(), blocks_, table_.data(),       integrals_.data(),
                          lowest_,        highest_,          tints_,  tint_colours_.data()};
-  const dim3 grid(blocks_of(plane.width, kPatches * kPatchWidth), blocks_of(plane.height, kPatchHeight));
+  const dim3 grid(blocks_for(plane.width, kPatches * kPatchWidth), blocks_for(plane.height, kPatchHeight));
   dispatch(volume_.type, [&](auto voxel) {
     using V = decltype(voxel);
     const RayScene<V> scene{frame, tables, {reinterpret_cast<const V*>(read_), glm::ivec3(geometry_.size), strides_}};

@@ -5,7 +5,9 @@
 
 #include "cuda/factories.h"
 #include "cuda/runtime/device_buffer.h"
+#include "cuda/runtime/launch.cuh"
 #include "cuda/runtime/stream.h"
+#include "cuda/runtime/warp.cuh"
 #include "deform/simulate/device_springs.h"
 
 namespace tetwarp::simulate {
@@ -15,8 +17,13 @@ namespace {
 using cuda_detail::DeviceBuffer;
 using cuda_detail::DeviceScope;
 
-unsigned blocks_for(std::size_t nodes) { return static_cast<unsigned>((nodes + kDeviceBlock - 1) / kDeviceBlock); }
+unsigned blocks_for(std::size_t nodes) {
+  return cuda_detail::blocks_for(static_cast<std::int64_t>(nodes), kDeviceBlock);
+}
 
+/// Calls a sweep for every node; a thread a node.
+///
+/// @param sweep  `sweep(n)` writes what belongs to node n
 template <class Sweep>
 __global__ void each_kernel(Sweep sweep, std::size_t nodes) {
   if (sweep.is_idle()) return;
@@ -24,25 +31,17 @@ __global__ void each_kernel(Sweep sweep, std::size_t nodes) {
   if (n < nodes) sweep(n);
 }
 
-/// Adds up what the threads of a block hold, as a tree. @return the sum, in the first thread
-template <class T>
-__device__ T sum_of_block(const T& own) {
-  __shared__ T of_thread[kDeviceBlock];
-  of_thread[threadIdx.x] = own;
-  __syncthreads();
-  for (int half = kDeviceBlock / 2; half > 0; half /= 2) {
-    if (threadIdx.x < half) of_thread[threadIdx.x].add(of_thread[threadIdx.x + half]);
-    __syncthreads();
-  }
-  return of_thread[0];
-}
-
-/// The block that arrives last adds up what all left, in an order that does not depend on which it is.
+/// Adds up what a sweep gives for every node, a thread a node. The block that arrives last adds up what all left, in an
+/// order that does not depend on which it is.
+///
+/// @param sweep     `sweep(n)` gives what is added for node n  @param then  `then(sum)` is called by one thread
+/// @param of_block  room for the sum of each block: written, and read by the last block
+/// @param arrived   how many blocks have arrived: 0 before and after
 template <class T, class Sweep, class Then>
 __global__ void sum_kernel(Sweep sweep, Then then, std::size_t nodes, T* of_block, unsigned* arrived) {
   if (sweep.is_idle()) return;
   const std::size_t n = std::size_t{blockIdx.x} * kDeviceBlock + threadIdx.x;
-  const T sum = sum_of_block(n < nodes ? sweep(n) : T{});
+  const T sum = cuda_detail::sum_of_block<kDeviceBlock>(n < nodes ? sweep(n) : T{});
   __shared__ bool is_last;
   if (threadIdx.x == 0) {
     of_block[blockIdx.x] = sum;
@@ -54,7 +53,7 @@ __global__ void sum_kernel(Sweep sweep, Then then, std::size_t nodes, T* of_bloc
   __threadfence();
   T own{};
   for (unsigned block = threadIdx.x; block < gridDim.x; block += kDeviceBlock) own.add(of_block[block]);
-  const T total = sum_of_block(own);
+  const T total = cuda_detail::sum_of_block<kDeviceBlock>(own);
   if (threadIdx.x == 0) {
     *arrived = 0;
     then(total);

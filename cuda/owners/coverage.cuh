@@ -3,7 +3,8 @@
 
 #pragma once
 
-#include "cuda/lattice/slab.h"
+#include "cuda/lattice/slab.cuh"
+#include "cuda/runtime/bits.cuh"
 
 namespace tetwarp::cuda_detail {
 

@@ -10,7 +10,7 @@
 #include <variant>
 #include <vector>
 
-#include "cuda/lattice/lattice.h"
+#include "cuda/lattice/lattice.cuh"
 #include "cuda/lattice/lattice_part.h"
 #include "cuda/runtime/host_copies.h"
 #include "deform/core/sample_voxel.h"
@@ -60,14 +60,14 @@ struct Mapped {
 };
 
 /// How the voxels of sources and outputs on one grid lie, and where a voxel comes from. All sinks that sample share it;
-/// `OffsetSink` (cuda/owners/gather.h) describes what a sink is.
+/// `OffsetSink` (cuda/owners/gather.cuh) describes what a sink is.
 struct SinkLayout {
   glm::ivec3 last;  ///< last voxel of the whole source grid
   /// Values from one row, and one slice, to the next, in what is buffered of the source.
   int row, slice;
   int output_row, output_slice;
 
-  __device__ int place(const glm::ivec3& voxel) const {
+  __device__ int address(const glm::ivec3& voxel) const {
     return voxel.z * output_slice + voxel.y * output_row + voxel.x;
   }
   __device__ int per_slice() const { return output_slice; }
@@ -120,23 +120,23 @@ struct VoxelSink : SinkLayout {
   /// Begins to write a voxel that a tetrahedron owns, if it is `wanted` and comes from well inside the source;
   /// otherwise nothing is pending. Voxels from the border of the source are for `write`.
   /// @param moved  deformed minus undeformed place, 2^-12 voxel
-  __device__ void start(int place, const glm::ivec3& voxel, const glm::vec3& moved, bool wanted,
+  __device__ void start(int address, const glm::ivec3& voxel, const glm::vec3& moved, bool wanted,
                         Pending& pending) const;
   /// Writes the pending voxel, if there is one.
-  /// @param place  the place with which `start` was called
-  __device__ void finish(int place, const Pending& pending) const;
+  /// @param address  that with which `start` was called
+  __device__ void finish(int address, const Pending& pending) const;
   /// Begins to read the source for a voxel, if it is `wanted`.
   __device__ void begin(const Origin& origin, bool wanted, Pending& pending) const;
   /// Writes the voxel for which reading began last; an undefined value if there is none.
-  __device__ void end(int place, const Pending& pending) const;
+  __device__ void end(int address, const Pending& pending) const;
   /// Writes a voxel that a tetrahedron owns.
   /// @return whether it comes from inside the source
-  __device__ bool write(int place, const glm::ivec3& voxel, const glm::vec3& u) const;
+  __device__ bool write(int address, const glm::ivec3& voxel, const glm::vec3& u) const;
   /// Copies voxels of a column along k that stay where they are: those of the kCount voxels from `voxel` on whose bits
   /// are set.
   template <int kCount>
   __device__ void copy(const glm::ivec3& voxel, std::uint32_t wanted) const;
-  __device__ void nothing(int place) const { output[place] = background; }
+  __device__ void nothing(int address) const { output[address] = background; }
 };
 
 constexpr int kMostSinkVolumes = 8;
@@ -168,23 +168,23 @@ struct VolumesSink : SinkLayout {
     Origin origin;
     int corners[kOnTheWay][8];
   };
-  __device__ void start(int place, const glm::ivec3& voxel, const glm::vec3& moved, bool wanted,
+  __device__ void start(int address, const glm::ivec3& voxel, const glm::vec3& moved, bool wanted,
                         Pending& pending) const;
-  __device__ void finish(int place, const Pending& pending) const;
+  __device__ void finish(int address, const Pending& pending) const;
   __device__ void begin(const Origin& origin, bool wanted, Pending& pending) const;
-  __device__ void end(int place, const Pending& pending) const { finish(place, pending); }
-  __device__ bool write(int place, const glm::ivec3& voxel, const glm::vec3& u) const;
+  __device__ void end(int address, const Pending& pending) const { finish(address, pending); }
+  __device__ bool write(int address, const glm::ivec3& voxel, const glm::vec3& u) const;
   template <int kCount>
   __device__ void copy(const glm::ivec3& voxel, std::uint32_t wanted) const;
-  __device__ void nothing(int place) const;
+  __device__ void nothing(int address) const;
 
  private:
   /// Calls `work` with a null pointer to the volume's type.
   template <class Work>
   __device__ void with_type(const SinkVolume& volume, Work&& work) const;
   __device__ void read(const SinkVolume& volume, const Origin& origin, const glm::ivec3& step, int (&corners)[8]) const;
-  __device__ void put(const SinkVolume& volume, int place, int value) const;
-  __device__ void put(const SinkVolume& volume, int place, const int (&corners)[8], const glm::vec3& t) const;
+  __device__ void put(const SinkVolume& volume, int address, int value) const;
+  __device__ void put(const SinkVolume& volume, int address, const int (&corners)[8], const glm::vec3& t) const;
 };
 
 using AnyVoxelSink = std::variant<VoxelSink<std::uint8_t>, VoxelSink<std::int16_t>, VoxelSink<std::uint16_t>,

@@ -5,9 +5,9 @@
 
 #include <optional>
 
-#include "cuda/owners/claim.h"
-#include "cuda/owners/coverage.h"
-#include "cuda/owners/interval_raster.h"
+#include "cuda/owners/claim.cuh"
+#include "cuda/owners/coverage.cuh"
+#include "cuda/owners/interval_raster.cuh"
 #include "cuda/runtime/stream.h"
 #include "deform/core/gather.h"
 
@@ -16,7 +16,7 @@ namespace tetwarp::cuda_detail {
 /// Receives what a gather finds, for later sampling: for each voxel of a box, whether a tetrahedron owns it and where
 /// it comes from.
 ///
-/// Every sink of a gather has a place for each voxel, which grows by `per_slice` along k.
+/// Every sink of a gather has an address for each voxel, where it writes; it grows by `per_slice` along k.
 struct OffsetSink {
   static constexpr bool kIsWide = false;
 
@@ -24,16 +24,16 @@ struct OffsetSink {
   std::uint8_t* mapped;
   glm::vec3* offset;
 
-  __device__ int place(const glm::ivec3& voxel) const { return static_cast<int>(box.offset(glm::i64vec3(voxel))); }
+  __device__ int address(const glm::ivec3& voxel) const { return static_cast<int>(box.offset(glm::i64vec3(voxel))); }
   __device__ int per_slice() const { return static_cast<int>(box.size.x * box.size.y); }
   /// This sink reads nothing, so nothing is pending.
   struct Pending {
     bool any;
     glm::vec3 u;
   };
-  __device__ void start(int place, const glm::ivec3& voxel, const glm::vec3& moved, bool wanted,
+  __device__ void start(int address, const glm::ivec3& voxel, const glm::vec3& moved, bool wanted,
                         Pending& pending) const {
-    pending.any = wanted && write(place, voxel, detail::to_offset(moved));
+    pending.any = wanted && write(address, voxel, detail::to_offset(moved));
   }
   __device__ void finish(int, const Pending&) const {}
   struct Origin {
@@ -48,22 +48,22 @@ struct OffsetSink {
     return moved.x == moved.x;
   }
   __device__ void begin(const Origin& origin, bool, Pending& pending) const { pending.u = origin.u; }
-  __device__ void end(int place, const Pending& pending) const { write(place, {}, pending.u); }
+  __device__ void end(int address, const Pending& pending) const { write(address, {}, pending.u); }
   /// @return whether the voxel counts as covered
-  __device__ bool write(int place, const glm::ivec3&, const glm::vec3& u) const {
-    mapped[place] = 1;
-    offset[place] = u;
+  __device__ bool write(int address, const glm::ivec3&, const glm::vec3& u) const {
+    mapped[address] = 1;
+    offset[address] = u;
     return true;
   }
   /// Voxels of a column along k that stay where they are.
   template <int kCount>
   __device__ void copy(const glm::ivec3& voxel, std::uint32_t wanted) const {
-    for (int n = 0, to = place(voxel); n < kCount; ++n, to += per_slice())
+    for (int n = 0, to = address(voxel); n < kCount; ++n, to += per_slice())
       if ((wanted >> n & 1) != 0) write(to, {}, glm::vec3(0));
   }
-  __device__ void nothing(int place) const {
-    mapped[place] = 0;
-    offset[place] = glm::vec3(0);
+  __device__ void nothing(int address) const {
+    mapped[address] = 0;
+    offset[address] = glm::vec3(0);
   }
 };
 
@@ -86,9 +86,10 @@ class Gather {
     intervals_.forget_field();
   }
 
+  /// A voxel that the march could not settle.
   struct Entry {
-    int voxel;  ///< offset in the box
-    float x, y, z;
+    int voxel;      ///< offset in the box
+    float x, y, z;  ///< where it may come from: undeformed place, cells; perhaps not finite
   };
 
  private:

@@ -3,7 +3,7 @@
 
 #pragma once
 
-#include "cuda/lattice/lattice.h"
+#include "cuda/lattice/lattice.cuh"
 
 namespace tetwarp::cuda_detail {
 

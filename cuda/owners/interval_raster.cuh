@@ -3,7 +3,7 @@
 
 #pragma once
 
-#include "cuda/lattice/slab.h"
+#include "cuda/lattice/slab.cuh"
 
 namespace tetwarp::cuda_detail {
 

@@ -3,20 +3,20 @@
 
 #pragma once
 
-#include "cuda/lattice/slab.h"
+#include "cuda/lattice/slab.cuh"
 #include "deform/snapped_mesh.h"
 
 namespace tetwarp::cuda_detail {
 
 constexpr unsigned kNoTetrahedron = ~0u;
 
-/// Receives the owners of the voxels of a box, as `OffsetSink` (cuda/owners/gather.h) receives places.
+/// Receives the owners of the voxels of a box, as `OffsetSink` (cuda/owners/gather.cuh) receives places.
 struct OwnerSink {
   SlabBox box;
   unsigned* owner;         ///< lowest number of an owner of each voxel, or kNoTetrahedron
   std::uint16_t* several;  ///< number of owners of each voxel; null: not counted
 
-  __device__ int place(const glm::ivec3& voxel) const { return static_cast<int>(box.offset(glm::i64vec3(voxel))); }
+  __device__ int address(const glm::ivec3& voxel) const { return static_cast<int>(box.offset(glm::i64vec3(voxel))); }
   __device__ int per_slice() const { return static_cast<int>(box.size.x * box.size.y); }
 };
 
@@ -25,11 +25,12 @@ struct HoleSink {
   SlabBox box;
   unsigned long long* found;  ///< two numbers: how many there are, and the index of the first in the box
 
-  __device__ int place(const glm::ivec3& voxel) const { return static_cast<int>(box.offset(glm::i64vec3(voxel))); }
+  __device__ int address(const glm::ivec3& voxel) const { return static_cast<int>(box.offset(glm::i64vec3(voxel))); }
   __device__ int per_slice() const { return static_cast<int>(box.size.x * box.size.y); }
-  __device__ void nothing(int place) const {
+  __device__ void nothing(int address) const {
     atomicAdd(&found[0], 1ULL);
-    if (static_cast<unsigned long long>(place) < found[1]) atomicMin(&found[1], static_cast<unsigned long long>(place));
+    if (static_cast<unsigned long long>(address) < found[1])
+      atomicMin(&found[1], static_cast<unsigned long long>(address));
   }
 };
 

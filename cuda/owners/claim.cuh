@@ -3,7 +3,8 @@
 
 #pragma once
 
-#include "cuda/lattice/slab.h"
+#include "cuda/lattice/slab.cuh"
+#include "cuda/runtime/bits.cuh"
 
 namespace tetwarp::cuda_detail {
 
@@ -12,14 +13,17 @@ struct VoxelBounds {
   glm::ivec3 low, high;
 };
 
-/// A subset of the voxels of a box, numbered in order.
+/// A subset of the voxels of a box, numbered word by word.
+///
+///     bits   ...0110 0001   0000...   1000 0000        as `BitRows`
+///     rank           k       (any)    k + 3            number of the lowest voxel of the word
 struct Wanted {
   const std::uint32_t* bits;  ///< one bit for each voxel; each row begins at a word
-  const unsigned* rank;       ///< number of the first voxel of each word that contains any
+  const unsigned* rank;       ///< number of the first voxel of each word that contains any; from `number_kernel`
 
   __device__ bool has(std::int64_t word, int bit) const { return (bits[word] >> bit & 1) != 0; }
   __device__ unsigned number(std::int64_t word, int bit) const {
-    return rank[word] + static_cast<unsigned>(__popc(bits[word] & ((1u << bit) - 1)));
+    return rank[word] + static_cast<unsigned>(__popc(bits[word] & bits_below(bit)));
   }
 };
 
@@ -57,12 +61,23 @@ class Claims {
   DeviceBuffer<unsigned> owners_;
 };
 
+/// What stands for no owner: larger than any number, so that an atomic minimum replaces it.
 constexpr unsigned long long kNobody = ~0ULL;
+
+/// Numbers of the tetrahedra of a lattice: five a cell, cells i fastest (docs/design/definition.md). 64 bits hold them
+/// for any lattice.
+struct TetrahedronNumber {
+  __device__ static unsigned long long of(std::int64_t cell, int t) {
+    return static_cast<unsigned long long>(cell * kTetrahedraPerCell + t);
+  }
+  __device__ static unsigned long long cell(unsigned long long number) { return number / kTetrahedraPerCell; }
+  __device__ static int in_cell(unsigned long long number) { return static_cast<int>(number % kTetrahedraPerCell); }
+};
 
 /// The tetrahedron with a number.
 __device__ inline Tetrahedron tetrahedron_numbered(const DeviceField& field, unsigned long long number) {
-  const glm::i64vec3 at = field.cell_at(static_cast<std::int64_t>(number / kTetrahedraPerCell));
-  return tetrahedron_of(field.cell(at), static_cast<int>(number % kTetrahedraPerCell), DeviceField::is_odd(at));
+  const glm::i64vec3 at = field.cell_at(static_cast<std::int64_t>(TetrahedronNumber::cell(number)));
+  return tetrahedron_of(field.cell(at), TetrahedronNumber::in_cell(number), DeviceField::is_odd(at));
 }
 
 }  // namespace tetwarp::cuda_detail

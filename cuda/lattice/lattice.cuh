@@ -6,71 +6,29 @@
 #include <cmath>
 
 #include "cuda/runtime/device_buffer.h"
+#include "cuda/runtime/launch.cuh"
 #include "deform/core/lattice_vertex.h"
 #include "deform/core/step_lattice.h"
 #include "deform/vertex_field.h"
 
 namespace tetwarp::cuda_detail {
 
-constexpr int kThreads = 128;
-inline unsigned blocks_for(std::int64_t count) { return static_cast<unsigned>((count + kThreads - 1) / kThreads); }
-
-/// A box of bits, one for each element. Each row begins at a word.
-struct BitRows {
-  const std::uint32_t* words;
-  int words_per_row;
-};
-
-/// Mask of those bits of a word of a row that lie from `first` to `last` of the row, both included; the word must
-/// contain some of them.
-__device__ inline std::uint32_t bits_of_word(int word, int first, int last) {
-  std::uint32_t mask = ~0u;
-  if (word == first / 32) mask &= ~0u << (first & 31);
-  if (word == last / 32) mask &= ~0u >> (31 - (last & 31));
-  return mask;
-}
-
 /// Position of element number n in a box of this size, i fastest.
 __host__ __device__ inline glm::i64vec3 unravel(std::int64_t n, const glm::i64vec3& size) {
   return {n % size.x, n / size.x % size.y, n / (size.x * size.y)};
 }
 
-/// Sum over a warp, or over groups of `lanes` lanes (a power of two), returned in every lane.
-__device__ inline unsigned warp_sum(unsigned value, int lanes = 32) {
-  for (int step = lanes / 2; step > 0; step /= 2) value += __shfl_xor_sync(~0u, value, step);
-  return value;
+/// `unravel` in 32 bits.
+__host__ __device__ inline glm::ivec3 position_in(int n, const glm::ivec3& size) {
+  return {n % size.x, n / size.x % size.y, n / (size.x * size.y)};
 }
 
-/// The smallest, and the largest, over a whole warp, in every lane.
-template <class T>
-__device__ T warp_min(T value) {
-  for (int step = 16; step > 0; step /= 2) value = min(value, __shfl_xor_sync(~0u, value, step));
-  return value;
-}
-template <class T>
-__device__ T warp_max(T value) {
-  for (int step = 16; step > 0; step /= 2) value = max(value, __shfl_xor_sync(~0u, value, step));
-  return value;
-}
+/// A step is 2^-kStepBits voxel: `steps >> kStepBits` are whole voxels, rounded down.
+constexpr int kStepBits = 12;
+static_assert(1 << kStepBits == kStepsPerVoxel);
 
-/// Sum over the lanes of a group of `lanes` lanes (a power of two) up to and including this one.
-__device__ inline int warp_scan(int value, int lanes = 32) {
-  const int lane = static_cast<int>(threadIdx.x) & (lanes - 1);
-  for (int step = 1; step < lanes; step *= 2) {
-    const int below = __shfl_up_sync(~0u, value, step, lanes);
-    if (lane >= step) value += below;
-  }
-  return value;
-}
-
-/// Adds 1 for every thread of the warp whose condition holds.
-__device__ inline void warp_count(unsigned long long* counter, bool condition) {
-  const unsigned active = __activemask();
-  const unsigned votes = __ballot_sync(active, condition);
-  if (votes != 0 && (threadIdx.x & 31) == __ffs(static_cast<int>(active)) - 1) {
-    atomicAdd(counter, static_cast<unsigned long long>(__popc(votes)));
-  }
-}
+/// Corner c of a cell, as a step along each axis: c is x + 2 y + 4 z.
+__host__ __device__ inline glm::ivec3 corner_of_cell(int c) { return {c & 1, c >> 1 & 1, c >> 2}; }
 
 /// A field as kernels see it: snapped vertices, in one of two forms.
 struct DeviceField {
@@ -87,7 +45,7 @@ struct DeviceField {
   __device__ Cell cell(const glm::i64vec3& at) const {
     Cell cell;
 #pragma unroll
-    for (int c = 0; c < 8; ++c) cell.corner[c] = vertex(at + glm::i64vec3(c & 1, c >> 1 & 1, c >> 2));
+    for (int c = 0; c < 8; ++c) cell.corner[c] = vertex(at + glm::i64vec3(corner_of_cell(c)));
     return cell;
   }
   __host__ __device__ static bool is_odd(const glm::i64vec3& at) { return ((at.x + at.y + at.z) & 1) != 0; }
@@ -109,12 +67,18 @@ struct MovingBlocks {
 /// Pairs of vertices side by side along i near which tetrahedra are inverted: those around either that lie between it
 /// and its neighbours on every axis, or the centres of the cells from them on.
 ///
-/// A word has the pairs of 62 columns and of one more to either side; they begin one column later in odd rows.
+/// A word has the pairs of 62 columns and of one more to either side, so that the words of neighbouring warps overlap
+/// by two columns; they begin one column later in odd rows:
+///
+///     bit             0         1        2              30        31
+///     columns, n = 0  -2 -1     0  1     2  3    ...    58 59     60 61     of an even row
+///                        -1  0     1  2     3  4  ...      59 60     61 62  of an odd row
+///     n = 1           60 61    62 63    64 65    ...                        62 columns further
 struct InvertedPairs {
   static constexpr int kColumns = 62;
 
   int words_per_row = 0, rows = 0;  ///< rows of a slice
-  std::uint32_t* words = nullptr;
+  std::uint32_t* words = nullptr;   ///< row after row, slice after slice; written by `step_pass_kernel`
 
   InvertedPairs() = default;
   explicit InvertedPairs(const StepLattice& lattice)
