@@ -20,7 +20,7 @@ constexpr std::size_t kMostEntries = 1000, kMostTissues = 255;
 constexpr std::int64_t kMostFrames = 10000, kLargestCell = 512, kMostSteps = 1000000;
 constexpr NumberRange kModulus{1e-6, 1e9}, kCompression{0, 1}, kLimit{0, 100};
 
-/// `move[1] "left lip" (line 14)`: what messages call an entry when the file is read.
+/// What messages call an entry when a scenario is read: `move[1] "left lip" (line 14)`.
 std::string called(const JsonEntry& entry) {
   const std::string name = entry.has("name") ? " \"" + printable(entry.at("name").text()) + "\"" : "";
   return entry.path() + name + " (line " + std::to_string(entry.line()) + ")";

@@ -16,7 +16,7 @@ constexpr NumberRange kLengthMm{0, 1e5, true}, kLengthBody{0, 100, true}, kHu{-1
 constexpr std::size_t kMostParts = 1000, kMostPoints = 10000, kMostLabels = 10000;
 constexpr std::int64_t kLargestLabel = std::int64_t{1} << 53;
 
-/// The object's keys are `keys` and no others.
+/// Refuses an object that has other keys than `keys`.
 void only(const JsonEntry& entry, std::initializer_list<const char*> keys) { entry.only({keys.begin(), keys.size()}); }
 
 void require_true(const JsonEntry& entry) {

@@ -3,7 +3,7 @@
 
 #pragma once
 
-// Private to io/: the layout of the members of our gzip files, for the one that writes and the one that reads them.
+// Private to io/: the layout of members of gzip files, for the function that writes them and the one that reads them.
 #include <array>
 #include <cstddef>
 
@@ -12,8 +12,8 @@ namespace tetwarp {
 constexpr std::size_t kMemberHeaderBytes = 20;  // `kMemberStart`, then the size of the whole member
 constexpr std::size_t kMemberTrailerBytes = 8;  // CRC and plain size
 
-/// What comes before the size of the member (RFC 1952, 2.3): deflate, an extra field, no time, system unknown; 8 bytes
-/// of extra field, subfield "IG" of 4 bytes.
+/// The first bytes of a member (RFC 1952, 2.3), before its size: deflate, an extra field, no time, system unknown; 8
+/// bytes of extra field, subfield "IG" of 4 bytes.
 constexpr std::array<std::byte, 16> kMemberStart = {std::byte{0x1f}, std::byte{0x8b}, std::byte{8}, std::byte{4},
                                                     std::byte{0},    std::byte{0},    std::byte{0}, std::byte{0},
                                                     std::byte{0},    std::byte{0xff}, std::byte{8}, std::byte{0},
