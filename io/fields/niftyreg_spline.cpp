@@ -16,15 +16,18 @@ namespace tetwarp {
 namespace {
 
 constexpr glm::dvec3 kLpsFromRas(-1, -1, 1);
-constexpr double kFirstByte = 352;  // of a file without header extensions
-constexpr double kRounding = 1e-3;  // of a control point: the header's floats may put the border of the image outside
+constexpr double kFirstByte = 352;  // where values begin in a file without header extensions
+// Part of the distance of control points: the floats of the header may put the border of the image so far outside.
+constexpr double kRounding = 1e-3;
 
 struct ControlPoints {
   Geometry grid;
-  std::vector<glm::dvec3> displacement;  // LPS mm, i fastest; the B-spline of points at rest is the identity
+  // LPS mm, i fastest. Displacements are blended, not positions: the B-spline of positions at rest is the identity, so
+  // both give the same.
+  std::vector<glm::dvec3> displacement;
 };
 
-/// The four control points that reach a place on one axis, and their weights.
+/// The four control points on one axis that have weight at an index, and their weights.
 struct Reach {
   std::array<std::int64_t, 4> at{};
   std::array<double, 4> weight{};
@@ -59,7 +62,7 @@ glm::dvec3 displacement_at(const ControlPoints& points, const glm::dvec3& index,
 
 ControlPoints read_control_points(const std::filesystem::path& path) {
   const std::string file = path.string();
-  const auto image = open_vectors(path);  // the file holds what its header says
+  const auto image = open_vectors(path);  // also checks that the file is as long as its header says
   const NiftiHeader nifti = read_nifti_header(path);
   ControlPoints points{nifti.sform_code > 0 ? nifti.sform : nifti.qform, {}};
   const glm::i64vec3 size = points.grid.size;
