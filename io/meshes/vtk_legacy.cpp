@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Legacy VTK files, text or big-endian binary, versions 1 to 5.
+// Reads legacy VTK files, text or big-endian binary, versions 1 to 5.
 #include <algorithm>
 #include <charconv>
 #include <fstream>
@@ -26,7 +26,7 @@ std::string read_whole(const std::filesystem::path& path) {
   return bytes;
 }
 
-/// "my%20array" is "my array".
+/// A name of an array as it is meant: "my array" for "my%20array".
 std::string decoded(std::string_view text) {
   std::string result;
   for (std::size_t n = 0; n < text.size(); ++n) {
@@ -86,7 +86,7 @@ class LegacyFile final : public VtkFile {
   }
 
  protected:
-  void require_holds(const VtkArray&) const override {}  // looked at when the file was gone through
+  void require_holds(const VtkArray&) const override {}  // the constructor has checked all arrays
 
  private:
   void take_frame() {
@@ -203,10 +203,10 @@ class LegacyFile final : public VtkFile {
     return all.substr(begin_at, place_.byte - begin_at);
   }
 
-  /// Where the next word of a text is.
+  /// The place of the next word of a text array, so that reading on need not search from its beginning.
   struct Place {
     std::size_t id = SIZE_MAX;
-    std::uint64_t next = 0;  ///< number of the value
+    std::uint64_t next = 0;  ///< number of the value that comes next
     std::size_t byte = 0;
   };
 
@@ -214,7 +214,7 @@ class LegacyFile final : public VtkFile {
   std::string bytes_;
   VtkText text_;
   At at_ = At::dataset;
-  std::uint64_t tuples_ = 0;  ///< of the data that follow
+  std::uint64_t tuples_ = 0;  ///< number of tuples of the data that follow
   std::vector<VtkValues> values_;
   mutable Place place_;
 };

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Surfaces of facets: 80 bytes, a count and 50 bytes a facet (little endian), or text.
+// Reads STL surfaces: 80 bytes, a count and 50 bytes for each facet (little endian), or text.
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -19,7 +19,7 @@ static_assert(std::endian::native == std::endian::little, "STL is read and writt
 
 constexpr std::size_t kHeaderBytes = 80, kFirstFacet = 84, kFacetBytes = 50;
 
-/// By the right-hand rule; zero where the facet has no area.
+/// The unit normal of a facet by the right-hand rule; zero where the facet has no area.
 glm::dvec3 normal_of(std::span<const glm::dvec3> corners) {
   const glm::dvec3 normal = glm::cross(corners[1] - corners[0], corners[2] - corners[0]);
   const double length = glm::length(normal);
@@ -57,7 +57,7 @@ class BinaryStl : public PointsDocument {
   }
 
  private:
-  /// Of a corner; the normal of its facet lies ahead of the first.
+  /// The byte at which a corner begins. The normal of a facet precedes its first corner.
   static std::size_t offset(std::size_t corner) {
     return kFirstFacet + corner / 3 * kFacetBytes + (1 + corner % 3) * sizeof(glm::vec3);
   }
@@ -72,7 +72,7 @@ class TextStl : public PointsDocument {
  public:
   TextStl(std::string all, const std::string& name) : bytes_(std::move(all)) {
     require(bytes_.find('\0') == std::string::npos, "a byte of zero in text, " + name + "; is it an STL file?");
-    // What a line may begin with, by what stands before it; a solid may hold any number of facets.
+    // The words with which the lines of a facet begin, in order. A solid may hold any number of facets.
     constexpr const char* kFacet[] = {"facet", "outer", "vertex", "vertex", "vertex", "endloop", "endfacet"};
     Lines lines(bytes_);
     bool in_solid = false;

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Landmarks in lines: CSV, and the .fcsv of 3D Slicer (https://www.slicer.org/wiki/Modules:Fiducials-Documentation-3.6,
-// vtkMRMLMarkupsFiducialStorageNode).
+// Reads landmarks in lines: CSV, and the .fcsv of 3D Slicer
+// (https://www.slicer.org/wiki/Modules:Fiducials-Documentation-3.6, vtkMRMLMarkupsFiducialStorageNode).
 #include <algorithm>
 #include <array>
 
@@ -14,7 +14,7 @@ namespace tetwarp {
 
 namespace {
 
-/// Where a record has its coordinates, and the field that takes its status.
+/// Where in a file a record has its coordinates, and the field that takes its status.
 struct Row {
   std::array<Span, 3> xyz;
   Span status;
@@ -22,7 +22,7 @@ struct Row {
 
 const char* name_of(PointStatus status) { return status == PointStatus::moved ? "moved" : "outside"; }
 
-/// Where each of x, y, z is among the columns. @throws InputError unless each is there once
+/// Which of the columns are x, y, z. @throws InputError unless each of these is there once
 std::array<std::size_t, 3> find_xyz(const std::vector<std::string>& columns, const std::string& where) {
   std::array<std::size_t, 3> found{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -55,7 +55,7 @@ class TableDocument : public PointsDocument {
     points.push_back(point);
   }
 
-  /// Replaces the coordinates of a row that lie between two bytes.
+  /// Replaces the coordinates of a row that lie between two bytes of the file.
   void put(Patch& patch, const Row& row, const glm::dvec3& before, const glm::dvec3& point, std::size_t from,
            std::size_t to) const {
     std::array<int, 3> order{0, 1, 2};
@@ -74,7 +74,7 @@ class CsvDocument : public TableDocument {
  public:
   CsvDocument(std::string all, const std::string& name) : TableDocument(std::move(all)) {
     unsaid = Unsaid::lps_by_form;
-    const std::size_t begin = bytes.starts_with("\xEF\xBB\xBF") ? 3 : 0;  // byte order mark
+    const std::size_t begin = bytes.starts_with("\xEF\xBB\xBF") ? 3 : 0;  // length of a byte order mark
     CsvRecords record(bytes, begin, name);
     require(record.next(), "no header, " + name + "; expected x,y,z");
     header_end_ = record.end;
@@ -152,7 +152,7 @@ class FcsvDocument : public TableDocument {
   }
 
  private:
-  /// A line "# name = value".
+  /// Takes a header line, "# name = value".
   void take_header(std::string_view line, std::size_t number, const std::string& name,
                    std::vector<std::string>& columns) {
     const auto equals = line.find('=');
