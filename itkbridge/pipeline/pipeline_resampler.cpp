@@ -37,7 +37,7 @@ bool PipelineResampler::takes(const Geometry& output, const HeldField& field, co
 
 void PipelineResampler::make(const std::string& wanted, const Control& control) {
   const Direction direction = std::holds_alternative<FieldView>(field_.view) ? Direction::forward : Direction::pull;
-  backend_.resampler.reset();  // before another takes memory
+  backend_.resampler.reset();  // frees the memory of this resampler before another allocates its own
   backend_ = make_backend(wanted, direction, output_, options_.device,
                           {.threads = options_.threads, .memory = options_.device_memory});
   give_field(control);
@@ -57,7 +57,7 @@ bool PipelineResampler::set_field(itk::ProcessObject& filter, const Geometry& ou
                                   const PipelineOptions& options, ProgressShare share) {
   if (holds(output, field, options)) return false;
   if (!takes(output, field, options)) backend_ = {};
-  const HeldField before = std::exchange(field_, field);  // kept while the resampler still looks at it
+  const HeldField before = std::exchange(field_, field);  // kept until the resampler no longer points into it
   output_ = output;
   options_ = options;
   if (options.backend == "auto" && !means_cuda("auto"))
