@@ -22,9 +22,9 @@ namespace cpu {
 
 namespace {
 
-constexpr int kWalk = 64;           ///< tetrahedra that the exact walk may pass
-constexpr int kTooManyFolds = 8;    ///< where one tetrahedron in so many is inverted, all is claimed
-constexpr int kMostlyFolded = 256;  ///< where one tetrahedron in so many is inverted, walks mostly fail
+constexpr int kWalk = 64;           ///< the most tetrahedra that the exact walk passes
+constexpr int kTooManyFolds = 8;    ///< if one tetrahedron in so many is inverted, all voxels are claimed
+constexpr int kMostlyFolded = 256;  ///< if one tetrahedron in so many is inverted, most walks fail
 
 /// What is known of each voxel of a tile.
 struct Tile {
@@ -41,8 +41,9 @@ struct Tile {
   }
 };
 
-/// Tile by tile: finds for each voxel where it comes from, then samples its rows. Voxels at rest are copied; lattices
-/// at whole steps take the march, others, and what the march leaves, are claimed.
+/// Deforms volumes tile by tile: finds for each voxel where it comes from, then samples its rows. Voxels at rest are
+/// copied. If the undeformed vertices lie at whole steps, the march comes first; voxels that it leaves, and all voxels
+/// of other lattices, are claimed.
 class LatticeResampler final : public Resampler {
  public:
   LatticeResampler(Geometry output, const Limits& limits) : Resampler(output), arena_(make_arena(limits)) {}
@@ -109,9 +110,10 @@ class LatticeResampler final : public Resampler {
   }
 
  private:
-  /// Whether a box lies within the undeformed lattice, and all that may reach it rests: then each voxel is owned by a
-  /// cell at rest, and by no other. (Something must reach it: what lay there may have moved away as a whole. Where one
-  /// of its blocks rests, those beside it share vertices with it, and so on, and reach it too.)
+  /// Whether a box lies within the undeformed lattice and everything that may reach it is at rest: then each of its
+  /// voxels is owned by a cell at rest and by no other. (Something must reach the box, for what lay there may have
+  /// moved away as a whole. Where one of the lattice's blocks in the box rests, its neighbours share vertices with it
+  /// and reach the box, too, and so on.)
   bool rests(const Region& box) const {
     const StepLattice& steps = lattice_.steps();
     if (steps.cells.x == 0) return false;
@@ -128,7 +130,7 @@ class LatticeResampler final : public Resampler {
     return any && all;
   }
 
-  /// A box at rest that every target can copy.
+  /// Copies a box at rest; all targets must be able to.
   static Report copy(const Region& box, const TargetSamplers& samplers) {
     Report report;
     report.paths.gathered = static_cast<std::uint64_t>(voxel_count(box));
@@ -139,7 +141,7 @@ class LatticeResampler final : public Resampler {
     return report;
   }
 
-  /// Any tile at rest.
+  /// Samples a tile at rest where some target cannot be copied.
   static Report stay(const Region& box, Tile& tile, const TargetSamplers& samplers, const MapWriter& maps) {
     Report report;
     report.paths.gathered = static_cast<std::uint64_t>(voxel_count(box));
@@ -158,10 +160,10 @@ class LatticeResampler final : public Resampler {
     return report;
   }
 
-  /// Whether vectors of float hold all that a march computes with.
+  /// Whether vectors of float can hold everything that a march computes.
   static bool is_near(const FieldView& field, const FieldStatistics& statistics) {
     const glm::i64vec3& size = field.lattice->size;
-    constexpr std::int64_t kMostVertices = INT32_MAX / 3;  // numbers of displacements on one axis are in 32 bits
+    constexpr std::int64_t kMostVertices = INT32_MAX / 3;  // so that numbers of a displacement's components fit 32 bits
     return static_cast<float>(statistics.most_moved) <= VectorField::kMostMoved &&
            size.x * size.y * size.z <= kMostVertices;
   }
@@ -195,7 +197,8 @@ class LatticeResampler final : public Resampler {
     paths.gathered += static_cast<std::uint64_t>(voxels - several - walked);
   }
 
-  /// Seeks the owners of what the march left. @return how many are left still, and now said to have several
+  /// Seeks the owners of voxels that the march left, by a walk. @return how many voxels are still left; these are
+  /// marked as having several owners
   std::int64_t walk(const IntBox& box, const NudgeTurns& turns, Tile& tile) const {
     const FieldStatistics& statistics = lattice_.statistics();
     const glm::i64vec3& cells = lattice_.cells();
@@ -234,7 +237,7 @@ class LatticeResampler final : public Resampler {
     }
   }
 
-  /// The box around what may have several owners; there must be such voxels.
+  /// The box around the voxels that may have several owners; there must be one.
   static Region around_several(const Region& box, const Tile& tile) {
     Region around{box.end, box.begin};
     for_each_several(box, tile, [&](std::size_t, const glm::i64vec3& voxel) {
@@ -268,7 +271,7 @@ class LatticeResampler final : public Resampler {
     paths.claimed += static_cast<std::uint64_t>(voxels);
   }
 
-  /// Samples the rows of a tile whose voxels are settled.
+  /// Samples the rows of a tile whose voxels are all settled.
   void write(const Region& box, Tile& tile, const TargetSamplers& samplers, const MapWriter& maps,
              Report& report) const {
     const Claims& claims = tile.claims;
@@ -289,8 +292,8 @@ class LatticeResampler final : public Resampler {
     }
   }
 
-  /// Decides for a row which voxels come through the field; those outside the undeformed lattice may stay where they
-  /// are.
+  /// Decides for each voxel of a row whether it comes through the field. A voxel outside the undeformed lattice may
+  /// stay where it is.
   void settle(const Row& row, std::size_t first, Tile& tile, const MapWriter& maps, Report& report) const {
     const bool rest = lattice_.field().outside == Outside::rest;
     if (!rest) {

@@ -25,7 +25,7 @@ struct Tile {
   float jacobian[kTile];
 };
 
-/// Tile by tile: rasterises the tetrahedra, then samples the rows.
+/// Deforms volumes tile by tile: rasterises the tetrahedra, then samples the rows.
 class MeshResampler final : public Resampler {
  public:
   MeshResampler(const Geometry& output, const Limits& limits) : Resampler(output), arena_(make_arena(limits)) {}
@@ -39,7 +39,8 @@ class MeshResampler final : public Resampler {
   void settle(const Row& row, std::size_t first, const MapWriter& maps, Tile& tile, Report& report) const;
 
   tbb::task_arena arena_;
-  SnappedMesh mesh_, rest_;  ///< deformed; and undeformed, where it matters what lies outside
+  /// The deformed mesh; and the undeformed one, where it matters which voxels lie outside.
+  SnappedMesh mesh_, rest_;
   MeshRaster raster_, rest_raster_;
   bool ready_ = false, stays_outside_ = false;
 };
@@ -57,7 +58,7 @@ void MeshResampler::set_field(const FieldView& field, const Control& control) {
   ready_ = true;
 }
 
-/// @throws InputError unless the undeformed mesh reaches over the whole output
+/// Refuses an undeformed mesh that does not reach over the whole output. @throws InputError
 void MeshResampler::require_reach(const Control& control) {
   std::atomic<std::int64_t> voxels = 0, lowest = INT64_MAX;
   for_each_tile<MeshOwners>(
@@ -118,7 +119,7 @@ Report MeshResampler::resample(Region region, std::span<const Target> targets, c
   return report;
 }
 
-/// Decides for a row where each voxel comes from. @param first  place of the row in the tile
+/// Decides for a row where each voxel comes from. @param first  number of the row's first voxel in the tile
 void MeshResampler::settle(const Row& row, std::size_t first, const MapWriter& maps, Tile& tile, Report& report) const {
   const std::uint32_t* owner = tile.owners.owner.data() + first;
   for (int i = 0; i < row.count;) {

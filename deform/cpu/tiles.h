@@ -108,7 +108,7 @@ Report for_each_tile(tbb::task_arena& arena, const Region& region, const Control
   return total;
 }
 
-/// The same without such rows.
+/// Runs `work(box, scratch)` for all tiles of the region, each tile a piece of work, and adds up the reports.
 template <class Scratch, class Work>
 Report for_each_tile(tbb::task_arena& arena, const Region& region, const Control& control, Work&& work) {
   const auto never = [](const Region&) { return false; };
