@@ -15,8 +15,8 @@ namespace tetwarp::simulate {
 /// Threads that one device block has; sums are made block by block, as a tree over its threads, and then over blocks.
 inline constexpr int kDeviceBlock = 256;
 
-/// Mass-spring on a machine that runs sweeps over nodes. Nothing leaves the machine's memory but sums and, every
-/// kRepeats iterations, the state of conjugate gradients. A machine is
+/// Mass-spring on a machine that runs sweeps over nodes. Only sums and, every kRepeats iterations, the state of
+/// conjugate gradients leave the machine's memory. A machine is
 ///
 ///     template <class T> class Buffer;           // reserve(size), data()
 ///     scope();                                   // what it returns holds while the machine is used

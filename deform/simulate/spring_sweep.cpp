@@ -5,11 +5,11 @@
 
 #include "deform/simulate/spring_grid.h"
 
-// Compiled once for each instruction set.
+// Highway compiles this file once for each instruction set.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "deform/simulate/spring_sweep.cpp"
 #include <hwy/foreach_target.h>
-// After it, as Highway asks.
+// Highway wants this include after that one.
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
@@ -18,17 +18,17 @@ namespace tetwarp::simulate::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Every instruction set gives the same bits: vectors are of one length, and nothing is fused.
+/// All instruction sets give the same bits, for vectors have the same length and no operations are fused.
 using Doubles = hn::CappedTag<double, 8>;
 using Halves = hn::Rebind<float, Doubles>;
 using Floats = hn::CappedTag<float, 16>;
 
-/// Springs in one direction, as they are now.
+/// Springs in one direction at the present displacement.
 struct Springs {
-  hn::Vec<Doubles> x, y, z;  ///< from a node to its neighbour
+  hn::Vec<Doubles> x, y, z;  ///< unit vector from a node to its neighbour
   hn::Vec<Doubles> length, elongation;
 
-  /// As `stretched`.
+  /// Computes what `stretched` computes, with the same operations.
   HWY_INLINE Springs(const RestLink<double>& rest, const PaddedVectors<double>& u, std::size_t n,
                      std::ptrdiff_t distance) {
     const Doubles d;
@@ -50,7 +50,7 @@ struct Springs {
   }
 };
 
-/// Whether a direction leads up or down, and where the number of a link is kept: at its lower end.
+/// Whether a direction leads up or down, and at which end of a link its number is kept: the lower one.
 struct Way {
   std::size_t up;
   std::ptrdiff_t distance, kept;

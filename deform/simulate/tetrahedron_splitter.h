@@ -15,13 +15,13 @@
 
 namespace tetwarp::simulate {
 
-/// Cells of a lattice as tetrahedra that fit together face by face, split along cuts, one cut after the other.
+/// Cells of a lattice as tetrahedra that fit together face by face. They are split along cuts, one cut after the other.
 ///
-/// Where a cut goes through an edge a vertex is put; what shares the edge is split too, also where the cut ends there,
-/// so that nothing is left hanging: no gap opens where vertices are rounded later.
+/// Where a cut goes through an edge a vertex is put. All tetrahedra at the edge are split, also where the cut ends
+/// there, so that every vertex is a corner of all tetrahedra around it: no gap opens where vertices are rounded later.
 class TetrahedronSplitter {
  public:
-  /// A place as a mean of lattice vertices, all of one of the lattice's tetrahedra.
+  /// A place given as a mean of lattice vertices, all of one of the lattice's tetrahedra.
   struct Vertex {
     std::array<std::uint32_t, 4> corner{kNone, kNone, kNone, kNone};  ///< lattice vertices, rising
     std::array<double, 4> weight{};                                   ///< they add up to 1
@@ -33,20 +33,21 @@ class TetrahedronSplitter {
     std::array<std::uint32_t, 4> vertex;
     std::uint64_t cell;
   };
-  using Triangle = std::array<std::uint32_t, 3>;  ///< vertices, rising
+  using Triangle = std::array<std::uint32_t, 3>;  ///< numbers of vertices, rising
   static constexpr std::uint32_t kNone = UINT32_MAX;
 
-  /// @param cells  numbers on the lattice, rising
+  /// Makes the tetrahedra of some cells. @param cells  their numbers on the lattice, rising
   TetrahedronSplitter(const glm::i64vec3& lattice, std::span<const std::uint64_t> cells);
 
-  /// @param side      of a lattice vertex: the cut lies where it changes its sign
-  /// @param nearest   vertices whose side is nearer to 0 are moved away to there, so that no sliver is cut off
+  /// Makes a cut.
+  /// @param side        tells on which side a lattice vertex lies; the cut goes where it changes its sign
+  /// @param nearest     vertices whose side is nearer to 0 are moved away to this, so that no sliver is cut off
   /// @param is_through  whether the cut goes through a cell; elsewhere only what touches it is split
   void cut(const std::function<double(std::uint32_t)>& side, double nearest,
            const std::function<bool(std::uint64_t)>& is_through);
 
   const std::vector<Vertex>& vertices() const { return vertices_; }
-  /// Those of a cell lie together, cells rising.
+  /// All tetrahedra. Those of a cell follow each other, and cells rise.
   const std::vector<Tetrahedron>& tetrahedra() const { return tetrahedra_; }
   /// Whether a cut separates the two tetrahedra at a face.
   bool is_severed(const Triangle& face) const { return severed_.contains(face); }
@@ -71,8 +72,8 @@ class TetrahedronSplitter {
   std::vector<Vertex> vertices_;
   std::vector<Tetrahedron> tetrahedra_;
   std::unordered_set<Triangle, Hash> severed_;
-  std::vector<double> side_;  ///< of each vertex: on which side of the present cut it lies
-  /// Of an edge, as (a, b, 0): the vertex where the present cut goes through it.
+  std::vector<double> side_;  ///< by vertex: the side of the present cut on which it lies
+  /// By edge, as (a, b, 0): the vertex where the present cut goes through it.
   std::unordered_map<Triangle, std::uint32_t, Hash> on_edge_;
 };
 
