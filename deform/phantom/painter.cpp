@@ -18,12 +18,13 @@ float coverage(float d, float edge) {
 
 void blend(float& hu, float with, float share) { hu += share * (with - hu); }
 
-/// Share of a layer from `outer` inwards to `inner`, of which a coarse voxel sees just its part.
+/// How much of a voxel lies in the layer between two surfaces, given its signed distance from each: a voxel larger than
+/// the layer has only a part of it.
 float layer(float outer, float inner, float edge) {
   return std::max(coverage(outer, edge) - coverage(inner, edge), 0.0f);
 }
 
-/// The lung is denser at the back, where somebody who lies on the back has the blood.
+/// HU of the lung. It is denser at the back, where a patient who lies on the back has the blood.
 float lung_hu(Point p) { return kLung + 0.35f * (p.y + 20); }
 
 /// Distance to the nearest fissure: the oblique one of either lung, and the level one of the right lung in front of it.
@@ -35,7 +36,8 @@ float fissure(Point p) {
 
 void paint_inside(const Row& row, const Trunk& trunk, Point p, const Walls& walls, float& hu) {
   const float edge = row.edge;
-  const float beside = std::max(1 - p.y * p.y * 2.2e-4f, 0.0f);  // fat under the broad muscles of the flank
+  // thickness, 0 to 1, of the fat under the broad muscles of the flank
+  const float beside = std::max(1 - p.y * p.y * 2.2e-4f, 0.0f);
   if (p.z > -130 && p.z < 132) blend(hu, kFat + 20, layer(walls.cage - 10 - 3 * beside, walls.cage - 10, edge));
   if (walls.cage < 12) {
     const Trunk::Rib rib = trunk.rib(p, walls);
@@ -80,7 +82,7 @@ Box reach(const Organ& organ, float edge) {
 }
 
 void paint_surroundings(const Row& row) {
-  // A curved table top: hull and foam between two arcs about a line far above.
+  // The table: its top is curved, hull and foam lie between two arcs about a line far above.
   constexpr float kRadius = 520, kTop = 117, kHalfThickness = 15, kHalfWidth = 196, kHull = 2.2f;
   std::fill(row.hu.begin(), row.hu.end(), kAir);
   if (row.straight_y < kTop - 60) return;
@@ -94,7 +96,7 @@ void paint_surroundings(const Row& row) {
 }
 
 void paint_trunk(const Row& row, const Trunk& trunk) {
-  constexpr float kWidest = 182, kFront = -124, kBack = 116;  // no skin is further out
+  constexpr float kWidest = 182, kFront = -124, kBack = 116;  // mm: the skin is nowhere further out
   if (row.box.high.y < kFront - row.edge || row.box.low.y > kBack + row.edge) return;
   for (std::size_t i = 0; i < row.points.size(); ++i) {
     const Point p = row.points[i];

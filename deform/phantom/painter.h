@@ -9,26 +9,28 @@
 
 namespace tetwarp::phantom {
 
-/// One row of voxels along x, in body space. The body is a little uneven: `x`, and y and z of each voxel, are bent.
+/// One row of voxels along x, in body space. The body is a little bent, so that it looks less regular: the places of
+/// voxels are bent before the anatomy is painted.
 struct Row {
-  std::span<const float> straight_x;  ///< before bending: where the table is
+  std::span<const float> straight_x;  ///< x of each voxel before bending, for the table
   float straight_y;
-  std::span<const Point> points;  ///< bent, x rising
+  std::span<const Point> points;  ///< the bent places of voxels, x rising
   Box box;                        ///< around `points`
-  float edge;                     ///< mm over which an edge goes from one tissue to the next: about one voxel
-  std::span<float> hu;            ///< painted on
+  /// mm over which one tissue blends into the next: about one voxel.
+  float edge;
+  std::span<float> hu;  ///< HU of the voxels, over which is painted
 };
 
-/// Air and the table.
+/// Paints air and the table.
 void paint_surroundings(const Row& row);
 
-/// Skin, fat, muscles, what fills the cage, lungs, diaphragm, ribs.
+/// Paints skin, fat, muscles, what fills the cage, lungs, diaphragm and ribs.
 void paint_trunk(const Row& row, const Trunk& trunk);
 
-/// One organ over what is there. Nothing happens where the row does not meet it.
+/// Paints one organ over what is there. Where the row does not meet it, nothing changes.
 void paint_organ(const Row& row, const Organ& organ, const Trunk& trunk);
 
-/// Box outside of which the organ paints nothing, for edges of `edge` mm.
+/// The box outside of which the organ paints nothing, for edges of `edge` mm.
 Box reach(const Organ& organ, float edge);
 
 inline bool overlap(const Box& a, const Box& b) {

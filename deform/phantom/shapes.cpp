@@ -9,7 +9,7 @@ namespace tetwarp::phantom {
 
 namespace {
 
-/// Half the size of the axis-parallel box around a box that is turned.
+/// Half the size of the box along the axes that holds a turned box.
 Point turned_half_size(const glm::mat3& axes, Point half_size) {
   Point sum(0);
   for (int axis = 0; axis < 3; ++axis) sum += glm::abs(axes[axis]) * half_size[axis];

@@ -14,8 +14,9 @@
 
 namespace tetwarp::phantom {
 
-/// Solid shapes by signed distance in mm (negative inside; approximate away from the surface, which is all that
-/// blending at edges needs). Float throughout, only + - * / and square root: the same bits on every machine.
+/// Solid shapes are given by their signed distance in mm: negative inside, approximate away from the surface, which is
+/// all that blending at edges needs. They use float and only + - * / and square root, so they have the same bits on
+/// every machine.
 ///
 /// Points are in body space: LPS mm of a field of view of 410 x 410 x 300 mm with its middle at the origin.
 using Point = glm::vec3;
@@ -24,7 +25,7 @@ struct Box {
   Point low, high;
 };
 
-/// Rotation by degrees about x, then y, then z; its columns are the shape's own axes in body space.
+/// A rotation by angles in degrees about x, then y, then z. Its columns are the shape's own axes in body space.
 glm::mat3 rotation(Point degrees);
 
 struct Ellipsoid {
@@ -55,7 +56,8 @@ struct Block {
   float thickness() const { return 2 * std::min({half_size.x, half_size.y, half_size.z}); }
 };
 
-/// A rod from `a` to `b` whose radius goes from `radius_a` to `radius_b`, with round ends: vessels, processes, bowel.
+/// A rod from `a` to `b` with round ends, whose radius goes from `radius_a` to `radius_b`: vessels, bony processes,
+/// bowel.
 struct Rod {
   Point a, b;
   float radius_a = 1, radius_b = 1;
@@ -70,11 +72,11 @@ struct Rod {
   float thickness() const { return 2 * std::min(radius_a, radius_b); }
 };
 
-/// Body of a vertebra, or a disc: an elliptic cylinder along z with a waist.
+/// The body of a vertebra, or a disc: an elliptic cylinder along z with a waist.
 struct Puck {
   Point centre, half_size;
-  float waist = 0.1f;    ///< the middle is thinner by this fraction
-  float hollow = 0.16f;  ///< the ends are hollow by this fraction of half_size.z
+  float waist = 0.1f;    ///< part of the half size by which the middle is thinner
+  float hollow = 0.16f;  ///< part of half_size.z by which the ends are hollow
 
   float distance(Point p) const {
     const Point q = p - centre;
