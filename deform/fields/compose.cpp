@@ -79,7 +79,7 @@ PointMap piecewise_affine(const VertexField& field) {
   require(field.mesh.is_empty(), "a mesh says where its own vertices go alone; let it be the first field");
   const AffineMap lattice_from_point = index_from_point(field.lattice);
   return [&field, lattice_from_point](const glm::dvec3& point) {
-    constexpr double kSlack = 1e-6;  // of a cell
+    constexpr double kSlack = 1e-6;  // of a cell, by which rounding may put a point outside
     const glm::dvec3 index = lattice_from_point(point);
     const glm::i64vec3 size = field.lattice.size;
     glm::i64vec3 cell;
