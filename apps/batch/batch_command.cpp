@@ -32,7 +32,7 @@ std::vector<std::string> ids_of(const std::vector<BatchCase>& cases) {
   return ids;
 }
 
-/// What is written must not touch the manifest. @throws UsageError
+/// Refuses an OUTPUT_DIR in which the manifest would lie among what is written. @throws UsageError
 void refuse_manifest_inside(const BatchOptions& options) {
   ReadPlaces manifest;
   manifest.add(options.manifest);
@@ -62,9 +62,10 @@ class Batch {
   const BatchOptions& options_;
   Shard shard_;
   std::vector<BatchCase> cases_;
-  std::vector<const BatchCase*> mine_;                     ///< of the shard
-  std::vector<const BatchCase*> open_;                     ///< those that are not finished
-  std::map<std::string, std::vector<std::string>> again_;  ///< of these, by the reason, those that were made before
+  std::vector<const BatchCase*> mine_;  ///< cases of this shard
+  std::vector<const BatchCase*> open_;  ///< cases of this shard that are not finished
+  /// Of the cases in `open_`, by reason, the ids of those that were made before and have to be made again.
+  std::map<std::string, std::vector<std::string>> again_;
   BatchCheck found_;
 };
 
@@ -88,7 +89,7 @@ std::vector<std::string> Batch::ids() const {
   return ids;
 }
 
-/// Cases whose folder is whole are kept; others are replaced when they are made again.
+/// Keeps the cases whose folder is complete. All others are made, and what was made before is replaced.
 void Batch::find_finished(const OutputFolder& folder, Results& results) {
   folder.remove_unfinished(ids());
   const std::map<std::string, json> earlier = read_lines(folder.results());
@@ -130,7 +131,8 @@ int Batch::conclude(const Results& results, Progress& progress, const Usage& usa
   return tally.failed > 0 ? kSomeFailed : 0;
 }
 
-/// While one is resampled others are read and written, which takes longer than a CUDA device needs.
+/// How many cases to have in work at once. While one is resampled others are read and written, which takes longer than
+/// a CUDA device needs.
 std::size_t Batch::wanted_jobs(const Devices& devices, bool cuda) const {
   constexpr std::size_t kPerDevice = 8, kOnCpu = 3;
   const std::size_t usual = cuda ? kPerDevice * devices.count() : kOnCpu;
@@ -150,7 +152,7 @@ int Batch::run() {
   Progress progress(form());
   const int cuda = options_.backend == "cpu" ? 0 : cuda_device_count();
   Devices devices(options_.backend, cuda);
-  const Threads threads(wanted_jobs(devices, cuda > 0));  // before anything else needs threads
+  const Threads threads(wanted_jobs(devices, cuda > 0));  // started before anything else needs threads
   check(progress);
   if (options_.dry_run) {
     say(options_.common, "would run " + std::to_string(mine_.size()) + " cases; outputs of at most " +
@@ -159,7 +161,8 @@ int Batch::run() {
   }
   std::error_code unknown;
   const bool made_before = options_.resume && fs::exists(options_.output, unknown);
-  if (!made_before) check_space(found_, options_.output);  // before a folder is begun that another run would refuse
+  // checked before a folder is begun, for a later run would refuse to use that
+  if (!made_before) check_space(found_, options_.output);
   if (options_.backend == "cuda" && cuda == 0) make_backend("cuda", Direction::forward, Geometry(), 0, {});
   OutputFolder folder(options_.output, shard_, ids_of(cases_), hash_file(options_.manifest), options_.resume);
   Results results(folder, ids());

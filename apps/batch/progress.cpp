@@ -90,7 +90,8 @@ void Progress::ended(const CaseOutcome& outcome) {
     event["reason"] = outcome.reason;
     const std::string said = "tetwarp: case " + id + " " + name_of(outcome.status) + ": " + outcome.reason;
     print(said);
-    const bool only_here = outcome.line.document()["reason"] != outcome.reason;  // the case is de-identified
+    // then the case is de-identified, and no file names the reason
+    const bool only_here = outcome.line.document()["reason"] != outcome.reason;
     if (only_here && form_ == Form::none) std::fprintf(stderr, "%s\n", shown_lines(said).c_str());
   }
   if (!outcome.made_again.empty()) {

@@ -17,26 +17,29 @@ namespace tetwarp::apps {
 /// The files that a simulated field is made of, beside INPUT, with their SHA-256.
 struct SimulationSource {
   std::string scenario, scenario_sha256;
-  std::string labels, labels_sha256;  ///< empty: none
+  std::string labels, labels_sha256;  ///< empty: there are no labels
   std::string method, backend;
 };
 
-/// A field that `deform --scenario` makes: at the end of the last phase, as `simulate` writes it.
+/// The field that `deform --scenario` makes: that of the end of the last phase, which `simulate` would write.
 struct SimulatedField {
   VertexField field;
   SimulationSource source;
   std::vector<std::string> warnings;  ///< for people
 };
 
-/// @param ct  INPUT in HU. @throws InputError for a scenario that cannot be played on it, and what a simulation throws
+/// Simulates a scenario. @param ct  INPUT in HU. @throws InputError for a scenario that cannot be played on it, and
+/// whatever a simulation throws
 SimulatedField simulate_field(const DeformOptions& options, const ConstVolumeView& ct, const Worker& worker,
                               const Control& control);
 
-/// About what a simulation and its field hold, beside INPUT. @throws InputError for a file that is no scenario
+/// About how many bytes a simulation and its field take, beside INPUT. @throws InputError for a file that is no
+/// scenario
 std::uint64_t simulation_bytes(const std::filesystem::path& scenario, const Geometry& volume, bool labels);
 
-/// Only a mesh holds open cuts. @param every_phase  whether the fields on the way are written too
-/// @throws InputError for a phase whose field is written to `output`, and is divided
+/// Refuses a format that cannot hold the field of a phase: only a mesh can hold open cuts. @param every_phase  whether
+/// the field of every phase is written, not only the last
+/// @throws InputError for a phase whose field has divided cells and is written to `output`
 void require_fitting_format(const simulate::Scenario& scenario, const std::filesystem::path& output, bool every_phase);
 
 }  // namespace tetwarp::apps

@@ -10,12 +10,13 @@
 namespace tetwarp::apps {
 
 struct SimulationBackend {
-  std::string name;  ///< the one that runs: never "auto"
+  std::string name;  ///< the backend that runs: never "auto"
   simulate::MakeSimulation make;
 };
 
+/// Chooses the backend of a simulation. That it cannot be used shows when a simulation is made, which throws
+/// NotCompiled or DeviceError.
 /// @param wanted  auto (CUDA where a device works, else the CPU), cpu or cuda
-/// Whether a wish can be met is known when a simulation is made: that throws NotCompiled or DeviceError.
 SimulationBackend make_simulation_backend(simulate::Method method, const std::string& wanted, int device,
                                           const Limits& limits);
 
