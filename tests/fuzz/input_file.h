@@ -42,7 +42,8 @@ bool accepted(Action&& action) {
   return true;
 }
 
-/// As `accepted`, for what is asked about a file, which does not count as having read it.
+/// Runs an action that only looks at a file, and accepts the errors that `accepted` does. It does not count as having
+/// read the file.
 template <class Action>
 void asked(Action&& action) {
   try {
@@ -76,7 +77,7 @@ class InputFile {
     if (!stream) throw std::runtime_error("cannot write " + path_.string());
   }
   const std::filesystem::path& path() const { return path_; }
-  /// Where the same may be written again.
+  /// The name of a file to which what was read may be written again.
   const std::filesystem::path& written() const { return written_; }
 
  private:

@@ -66,7 +66,7 @@ typename TImage::Pointer resampled_by_core(const TImage& image, const Geometry& 
   return output;
 }
 
-/// Whether both buffer the same bytes; false for empty ones.
+/// Whether two images buffer the same bytes; false for images without pixels.
 template <class TImage>
 bool same_pixels(const TImage& a, const TImage& b) {
   const auto count = a.GetBufferedRegion().GetNumberOfPixels();

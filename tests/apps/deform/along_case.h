@@ -62,7 +62,7 @@ struct AlongCase {
     made.value = organs;
     return made;
   }
-  /// The same as fractions.
+  /// A fractional segmentation of the same segments.
   static MadeSeg fractions() {
     MadeSeg made = seg();
     made.fractional = true;

@@ -11,12 +11,12 @@ namespace tetwarp::test {
 
 /// A series or volume of the real data that can be deformed, or a slice that can as a stack of two.
 struct GoodInput {
-  std::string name;                ///< of the test
+  std::string name;                ///< name of the test
   std::filesystem::path at;        ///< folder or file below $TETWARP_TEST_DATA
   int number = 1;                  ///< what --series takes
   const char* dcm2niix = nullptr;  ///< what is said where dcm2niix disagrees with the identity; null: it agrees
   bool thinned = false;            ///< deformed are some slices of it, for the time that the whole takes
-  bool alike = false;              ///< to one before it, but for how its pixels are coded
+  bool alike = false;              ///< it differs from an earlier input only in how its pixels are coded
 };
 
 inline void PrintTo(const GoodInput& input, std::ostream* out) { *out << input.at.string() << " " << input.number; }

@@ -128,7 +128,7 @@ TEST(ImageWriter, NiftiHasOnePlaneAComponentAsItkHasIt) {
                       plain = written(scratch / "x.nii", volume, 4, {-1, {}});
     ASSERT_EQ(plain.size(), expected.size());
     EXPECT_TRUE(plain.substr(352) == expected.substr(352));
-    // The same stream in members: the header, then each plane in pieces of 1 MiB, of which the last is shorter.
+    // The stream in members: the header, then each plane in pieces of 1 MiB, the last of which is shorter.
     const std::size_t plane = (plain.size() - 352) / static_cast<std::size_t>(components);
     std::vector<std::string> pieces = {plain.substr(0, 352)};
     for (std::size_t begin = 352; begin < plain.size(); begin += plane) {
