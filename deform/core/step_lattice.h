@@ -18,7 +18,7 @@ namespace tetwarp {
 /// conversions to floats with something added ("raised"), and differences of raised numbers are exact.
 class StepPacking {
  public:
-  static constexpr int kMostBits = 23;  ///< of one axis
+  static constexpr int kMostBits = 23;  ///< the most bits of one axis
 
   /// Holds displacements from -256 to below 256 voxels along x and y, and twice that along z.
   StepPacking()
@@ -105,7 +105,7 @@ class StepPacking {
 #endif
 
   int y_at_, z_at_;                         ///< their lowest bits: 18 to 23, and 41 to 46
-  std::uint32_t x_mask_, y_mask_, z_mask_;  ///< as many bits as they have
+  std::uint32_t x_mask_, y_mask_, z_mask_;  ///< as many bits as each axis has
   std::uint32_t above_z_;                   ///< what the bits of 2^23 leave above those of z
   glm::vec3 lift_;
 };
@@ -219,7 +219,7 @@ struct LatticeTetrahedron {
 struct FloatTetrahedron {
   glm::vec3 d;   ///< vertex D
   glm::vec3 to;  ///< +1 or -1: where A, B, C lie from D
-  int offset;    ///< of D among the vertices
+  int offset;    ///< number of vertex D
   bool centre;
 };
 
