@@ -4,6 +4,14 @@
 #pragma once
 
 // Private to io/: the layout of members of gzip files, for the function that writes them and the one that reads them.
+//
+//   byte 0                      16                 20                              n - 8        n - 4           n
+//        +-----------------------+------------------+--------------------------------+------------+-------------+
+//        | kMemberStart          | n, bytes of the  | deflated data                  | CRC-32 of  | plain bytes |
+//        | (RFC 1952, 2.3)       | whole member     |                                | plain data | mod 2^32    |
+//        +-----------------------+------------------+--------------------------------+------------+-------------+
+//
+// Numbers are little endian.
 #include <array>
 #include <cstddef>
 
