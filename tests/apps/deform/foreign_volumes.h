@@ -9,7 +9,7 @@
 
 namespace tetwarp::test {
 
-/// A DICOM series of classic CT as ITK's own reader gives it: GDCMSeriesFileNames, GDCMImageIO, ImageSeriesReader.
+/// Reads a DICOM series of classic CT by ITK's own reader: GDCMSeriesFileNames, GDCMImageIO, ImageSeriesReader.
 /// @throws itk::ExceptionObject
 Volume<std::int16_t> read_with_itk(const std::filesystem::path& folder);
 
