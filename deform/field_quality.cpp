@@ -55,9 +55,9 @@ struct Characteristic {
 ///
 /// A gradient is passed over where it cannot stretch more than those before it, to within rounding. So the last bits of
 /// the largest stretch depend on the order. Parts are therefore fixed, whichever thread takes them.
-class Tally {
+class StretchTally {
  public:
-  explicit Tally(const dmat3& from_lattice)
+  explicit StretchTally(const dmat3& from_lattice)
       : inverse_(glm::inverse(from_lattice)), over_rest_(1 / glm::determinant(from_lattice)) {}
 
   /// Adds one gradient. @param gradient  of the deformed place with respect to vertex index
@@ -102,7 +102,7 @@ class Tally {
 };
 
 /// Adds the five tetrahedra of a cell. @param u  displacements of its corners
-void add_cell(const dvec3 (&u)[8], bool odd, const dmat3& from_lattice, Tally& tally) {
+void add_cell(const dvec3 (&u)[8], bool odd, const dmat3& from_lattice, StretchTally& tally) {
   for (int t = 1; t < kTetrahedraPerCell; ++t) {
     const TetrahedronCorners of = tetrahedron_corners(t, odd);
     const auto along = [&](int neighbour, int axis) {
@@ -138,10 +138,10 @@ FieldQuality quality_of(const TetrahedralMesh& mesh, const Limits& limits, const
   tbb::enumerable_thread_specific<FieldQuality> found;
   tbb::task_arena arena = cpu::make_arena(limits);
   const std::size_t count = mesh.tetrahedra.size();
-  cpu::Progress progress(control, static_cast<std::int64_t>(count));
+  cpu::WorkProgress progress(control, static_cast<std::int64_t>(count));
   arena.execute([&] {
     tbb::parallel_for(std::size_t{0}, (count + kAtOnce - 1) / kAtOnce, [&](std::size_t part) {
-      Tally tally(dmat3(1));
+      StretchTally tally(dmat3(1));
       const std::size_t begin = part * kAtOnce, end = std::min(begin + kAtOnce, count);
       for (std::size_t n = begin; n < end; ++n) {
         const glm::u32vec4& t = mesh.tetrahedra[n];
@@ -185,10 +185,10 @@ FieldQuality measure_quality(const VertexField& field, const Limits& limits, con
   const dmat3 from_lattice = point_from_index(field.lattice).linear;
   tbb::enumerable_thread_specific<FieldQuality> found;
   tbb::task_arena arena = cpu::make_arena(limits);
-  cpu::Progress progress(control, size.z - 1);
+  cpu::WorkProgress progress(control, size.z - 1);
   arena.execute([&] {
     tbb::parallel_for(std::int64_t{0}, size.z - 1, [&](std::int64_t z) {
-      Tally tally(from_lattice);
+      StretchTally tally(from_lattice);
       for (std::int64_t y = 0; y < size.y - 1; ++y) {
         const glm::vec3* rows[4];
         for (int n = 0; n < 4; ++n)

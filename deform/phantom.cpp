@@ -173,8 +173,8 @@ struct Scene {
   }
 };
 
-Box box_of(std::span<const Point> points) {
-  Box box{points[0], points[0]};
+Bounds box_of(std::span<const Point> points) {
+  Bounds box{points[0], points[0]};
   for (const Point& p : points) box = {glm::min(box.low, p), glm::max(box.high, p)};
   return box;
 }
@@ -187,7 +187,7 @@ void paint_slice(const Scene& scene, std::int64_t k, std::span<std::int16_t> sli
   const float z = scene.position(2, k);
   std::vector<const Organ*> near;
   for (const Organ& organ : scene.organs) {
-    const Box box = reach(organ, scene.edge);
+    const Bounds box = reach(organ, scene.edge);
     if (box.low.z < z + kBendingMost && box.high.z > z - kBendingMost) near.push_back(&organ);
   }
   std::vector<float> hu(columns), texture(columns), grain(columns);
@@ -197,7 +197,7 @@ void paint_slice(const Scene& scene, std::int64_t k, std::span<std::int16_t> sli
     const float y = scene.position(1, j);
     for (std::size_t i = 0; i < columns; ++i)
       points[i] = Point(scene.x[i], y, z) + scene.bending.at(static_cast<std::int64_t>(i), j, k);
-    const Row row{scene.x, y, points, box_of(points), scene.edge, hu};
+    const PaintedRow row{scene.x, y, points, box_of(points), scene.edge, hu};
     paint_surroundings(row);
     paint_trunk(row, scene.trunk);
     for (const Organ* organ : near) paint_organ(row, *organ, scene.trunk);

@@ -183,7 +183,7 @@ PointStatus PointMover::move(glm::dvec3& point) const { return map_->move(point)
 
 std::vector<PointStatus> PointMover::move(std::span<glm::dvec3> points, const Control& control) const {
   std::vector<PointStatus> status(points.size());
-  cpu::Progress progress(control, static_cast<std::int64_t>(points.size()));
+  cpu::WorkProgress progress(control, static_cast<std::int64_t>(points.size()));
   tbb::task_arena arena = cpu::make_arena(limits_);
   arena.execute([&] {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size(), 4096), [&](const auto& range) {

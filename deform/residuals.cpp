@@ -49,7 +49,7 @@ class Histogram {
 };
 
 /// Sums of one slice. They are added up slice by slice, whichever thread made them, so that the order is fixed.
-struct Slice {
+struct SliceSums {
   std::uint64_t points = 0;
   double sum = 0, largest = 0;
 };
@@ -63,10 +63,10 @@ class Distances {
   template <class Find>
   void find(std::int64_t begin, std::int64_t end, const Limits& limits, const Control& control, Find&& distances) {
     tbb::task_arena arena = cpu::make_arena(limits);
-    cpu::Progress progress(control, end - begin);
+    cpu::WorkProgress progress(control, end - begin);
     arena.execute([&] {
       tbb::parallel_for(begin, end, [&](std::int64_t k) {
-        Slice& slice = slices_[static_cast<std::size_t>(k)];
+        SliceSums& slice = slices_[static_cast<std::size_t>(k)];
         Histogram& histogram = histograms_.local();
         distances(k, [&](double distance) {
           ++slice.points;
@@ -82,7 +82,7 @@ class Distances {
   Residuals residuals() const {
     Residuals all;
     double sum = 0;
-    for (const Slice& slice : slices_) {
+    for (const SliceSums& slice : slices_) {
       all.points += slice.points;
       sum += slice.sum;
       all.largest = std::max(all.largest, slice.largest);
@@ -96,7 +96,7 @@ class Distances {
   }
 
  private:
-  std::vector<Slice> slices_;
+  std::vector<SliceSums> slices_;
   tbb::enumerable_thread_specific<Histogram> histograms_;
 };
 

@@ -51,12 +51,12 @@ class Batch {
 
  private:
   void choose();
-  void check(Progress& progress);
+  void check(BatchProgress& progress);
   void find_finished(const OutputFolder& folder, Results& results);
-  int conclude(const Results& results, Progress& progress, const Usage& usage, bool whole) const;
+  int conclude(const Results& results, BatchProgress& progress, const Usage& usage, bool whole) const;
   std::vector<std::string> ids() const;
   std::size_t wanted_jobs(const Devices& devices, bool cuda) const;
-  Progress::Form form() const;
+  BatchProgress::Form form() const;
   std::uint64_t memory_bytes() const { return options_.memory_bytes.value_or(available_memory_bytes() / 5 * 4); }
 
   const BatchOptions& options_;
@@ -69,9 +69,9 @@ class Batch {
   BatchCheck found_;
 };
 
-Progress::Form Batch::form() const {
-  if (options_.log_json) return Progress::Form::machine;
-  return options_.common.quiet ? Progress::Form::none : Progress::Form::person;
+BatchProgress::Form Batch::form() const {
+  if (options_.log_json) return BatchProgress::Form::machine;
+  return options_.common.quiet ? BatchProgress::Form::none : BatchProgress::Form::person;
 }
 
 void Batch::choose() {
@@ -111,18 +111,18 @@ void Batch::find_finished(const OutputFolder& folder, Results& results) {
   for (BatchCase& one : cases_) one.options.common.overwrite = fs::exists(folder.case_folder(one.id) / kFolderRecord);
 }
 
-void Batch::check(Progress& progress) {
+void Batch::check(BatchProgress& progress) {
   Stage stage(options_.common, "check");
   refuse_manifest_inside(options_);
   found_ = check_cases(options_.manifest, options_.output, mine_, memory_bytes(), stage.control());
   for (const std::string& forecast : found_.forecasts) progress.warn(forecast);
 }
 
-int Batch::conclude(const Results& results, Progress& progress, const Usage& usage, bool whole) const {
+int Batch::conclude(const Results& results, BatchProgress& progress, const Usage& usage, bool whole) const {
   results.finish();
   const Tally tally = results.tally();
   progress.end({{"done", tally.done}, {"failed", tally.failed}, {"not_run", tally.missing}, {"usage", usage.report()}});
-  if (form() == Progress::Form::person) {
+  if (form() == BatchProgress::Form::person) {
     std::cout << results.table(mine_.size() <= 60);
     if (const std::string sentence = usage.sentence(); !sentence.empty()) say(options_.common, sentence);
     if (!whole) say(options_.common, "tetwarp: interrupted; --resume continues");
@@ -149,7 +149,7 @@ int Batch::run() {
       std::cout << "\n";
     }
   }
-  Progress progress(form());
+  BatchProgress progress(form());
   const int cuda = options_.backend == "cpu" ? 0 : cuda_device_count();
   Devices devices(options_.backend, cuda);
   const Threads threads(wanted_jobs(devices, cuda > 0));  // started before anything else needs threads

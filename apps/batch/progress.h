@@ -17,14 +17,14 @@ namespace tetwarp::apps {
 /// What a batch tells on standard error while it runs. A person at a terminal sees a bar with cases a minute and the
 /// time left, and a line for each case that fails; a machine gets JSON Lines. Cases are named by their ids, and nothing
 /// tells of patients.
-class Progress {
+class BatchProgress {
  public:
   enum class Form { none, person, machine };
 
-  explicit Progress(Form form);
-  ~Progress();
-  Progress(const Progress&) = delete;
-  Progress& operator=(const Progress&) = delete;
+  explicit BatchProgress(Form form);
+  ~BatchProgress();
+  BatchProgress(const BatchProgress&) = delete;
+  BatchProgress& operator=(const BatchProgress&) = delete;
 
   /// Begins to tell of cases. @param cases  number of cases to run. @param finished  number that earlier runs finished
   void begin(std::size_t cases, std::size_t finished);

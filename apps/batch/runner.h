@@ -22,7 +22,7 @@ class Runner {
   struct Parts {
     Resources resources;
     Results& results;
-    Progress& progress;
+    BatchProgress& progress;
     Usage& usage;
   };
 

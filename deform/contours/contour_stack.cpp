@@ -160,7 +160,7 @@ double ContourStack::signed_distance(const glm::dvec3& point, Between between) c
   return largest;
 }
 
-ContourStack::Place ContourStack::place(const glm::dvec3& point) const {
+ContourStack::Inside ContourStack::is_inside(const glm::dvec3& point) const {
   const glm::dvec3 at = frame_from_point_ * point;
   for (const Part& part : parts_) {
     if (at.z < part.begin || at.z > part.end) continue;

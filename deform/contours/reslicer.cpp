@@ -85,8 +85,8 @@ Reslicer::Window Reslicer::window_of(const ConstVolumeView& inverse_mm, std::int
 /// The places from which samples of a window come.
 struct Reslicer::Samples {
   glm::i64vec2 size;
-  std::vector<glm::dvec3> from;             ///< LPS mm; NaN: nothing maps there
-  std::vector<ContourStack::Place> places;  ///< of the places in `from`
+  std::vector<glm::dvec3> from;                 ///< LPS mm; NaN: nothing maps there
+  std::vector<ContourStack::Inside> is_inside;  ///< whether the points in `from` lie in the solid
 };
 
 Reslicer::Samples Reslicer::sample(const ConstVolumeView& inverse_mm, std::int64_t k, const Window& window) const {
@@ -106,7 +106,7 @@ Reslicer::Samples Reslicer::sample(const ConstVolumeView& inverse_mm, std::int64
                        above = mixed(inverse(i, j + 1), inverse(i + 1, j + 1), s);
       const glm::dvec3 at(static_cast<double>(i) + s, static_cast<double>(j) + t, k);
       samples.from.push_back(point_from_output_(at) + mixed(below, above, t));
-      samples.places.push_back(solid_.place(samples.from.back()));
+      samples.is_inside.push_back(solid_.is_inside(samples.from.back()));
     }
   }
   return samples;
@@ -119,8 +119,8 @@ std::vector<double> Reslicer::depths(const Samples& samples, Between between) co
   std::vector<double> depth;
   depth.reserve(samples.from.size());
   const auto inside = [&](std::int64_t i, std::int64_t j) {
-    const ContourStack::Place& place = samples.places[static_cast<std::size_t>(j * samples.size.x + i)];
-    return between == Between::interpolated ? place.interpolated : place.nearest;
+    const ContourStack::Inside& kinds = samples.is_inside[static_cast<std::size_t>(j * samples.size.x + i)];
+    return between == Between::interpolated ? kinds.interpolated : kinds.nearest;
   };
   const auto at_border = [&](std::int64_t i, std::int64_t j) {
     for (std::int64_t n = std::max<std::int64_t>(j - 1, 0); n <= std::min(j + 1, samples.size.y - 1); ++n)

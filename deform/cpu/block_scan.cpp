@@ -47,7 +47,7 @@ HWY_INLINE Vec3 blend(FloatMask mask, const Vec3& yes, const Vec3& no) {
 }
 
 /// One plane of vertices: how far each moved, in steps.
-struct Plane {
+struct VertexPlane {
   static constexpr int kRoom = 16;  ///< lanes of the widest vectors
   static constexpr int kRow = 2 * kRoom + 1;
 
@@ -77,7 +77,7 @@ class Scanner {
         usable_(hn::Eq(hn::Zero(Floats()), hn::Zero(Floats()))) {}
 
   bool run(BlockScan& scan) {
-    Plane planes[2];
+    VertexPlane planes[2];
     with_snapping(field_, [&](auto snapping) {
       constexpr Snapping kSnapping = decltype(snapping)::value;
       read<kSnapping>(0, planes[0]);
@@ -99,7 +99,7 @@ class Scanner {
 
   /// Snaps plane k of the block.
   template <Snapping kSnapping>
-  void read(int k, Plane& plane) {
+  void read(int k, VertexPlane& plane) {
     const Floats df;
     const StepLattice& lattice = field_.lattice;
     const int count = cells_.x + 1;
@@ -108,7 +108,7 @@ class Scanner {
       const glm::ivec3 row(first_.x, first_.y + j, first_.z + k);
       const glm::vec3* given = field_.displacement + lattice.offset(row);
       prefetch(given + ahead(k));
-      glm::vec3 padded[Plane::kRoom];
+      glm::vec3 padded[VertexPlane::kRoom];
       if (count < lanes_) {  // the last vertex is repeated
         for (int n = 0; n < lanes_; ++n) padded[n] = given[std::min(n, count - 1)];
         given = padded;
@@ -151,7 +151,7 @@ class Scanner {
   }
 
   /// Looks at the cells between two planes.
-  void look_at(int k, const Plane& low, const Plane& high) {
+  void look_at(int k, const VertexPlane& low, const VertexPlane& high) {
     if (low.at_rest && high.at_rest) {
       any_rests_ = true;
       return;
@@ -162,7 +162,7 @@ class Scanner {
   }
 
   /// Looks at cells of a row, one in each lane. Mirrored along i, an odd cell becomes an even one.
-  HWY_INLINE void look_at(const glm::ivec3& in, const Plane& low, const Plane& high) {
+  HWY_INLINE void look_at(const glm::ivec3& in, const VertexPlane& low, const VertexPlane& high) {
     const Floats df;
     const Ints di;
     const glm::vec3& cell = field_.lattice.cell;

@@ -27,7 +27,7 @@ constexpr int kTooManyFolds = 8;    ///< if one tetrahedron in so many is invert
 constexpr int kMostlyFolded = 256;  ///< if one tetrahedron in so many is inverted, most walks fail
 
 /// What is known of each voxel of a tile.
-struct Tile {
+struct TileVoxels {
   LatticeBlock block;
   Claims claims;
   MarchScratch march;
@@ -88,18 +88,19 @@ class LatticeResampler final : public Resampler {
              std::all_of(samplers.begin(), samplers.end(), [&](const auto& of) { return of->can_copy(box); });
     };
     const auto is_copied = [&](const Region& box) { return can_copy(box) && rests(box); };
-    Report report = for_each_tile<Tile>(arena_, region, control, is_copied, [&](const Region& box, Tile& tile) {
-      if (!writer.wants_owners() && rests(box))
-        return can_copy(box) ? copy(box, samplers) : stay(box, tile, samplers, writer);
-      Report of_tile;
-      if (may_march && !mostly_folds(box)) {
-        gather(box, tile, writer, of_tile.paths);
-      } else {
-        claim_all(box, tile, writer, of_tile.paths);
-      }
-      write(box, tile, samplers, writer, of_tile);
-      return of_tile;
-    });
+    Report report =
+        for_each_tile<TileVoxels>(arena_, region, control, is_copied, [&](const Region& box, TileVoxels& tile) {
+          if (!writer.wants_owners() && rests(box))
+            return can_copy(box) ? copy(box, samplers) : stay(box, tile, samplers, writer);
+          Report of_tile;
+          if (may_march && !mostly_folds(box)) {
+            gather(box, tile, writer, of_tile.paths);
+          } else {
+            claim_all(box, tile, writer, of_tile.paths);
+          }
+          write(box, tile, samplers, writer, of_tile);
+          return of_tile;
+        });
     const FieldStatistics& statistics = lattice_.statistics();
     report.inverted = statistics.inverted;
     report.degenerate = statistics.degenerate;
@@ -142,7 +143,7 @@ class LatticeResampler final : public Resampler {
   }
 
   /// Samples a tile at rest where some target cannot be copied.
-  static Report stay(const Region& box, Tile& tile, const TargetSamplers& samplers, const MapWriter& maps) {
+  static Report stay(const Region& box, TileVoxels& tile, const TargetSamplers& samplers, const MapWriter& maps) {
     Report report;
     report.paths.gathered = static_cast<std::uint64_t>(voxel_count(box));
     const auto width = static_cast<int>(box.end.x - box.begin.x);
@@ -180,7 +181,7 @@ class LatticeResampler final : public Resampler {
     return 2 * folded > blocks;
   }
 
-  void gather(const Region& box, Tile& tile, const MapWriter& maps, Paths& paths) const {
+  void gather(const Region& box, TileVoxels& tile, const MapWriter& maps, Paths& paths) const {
     const std::int64_t voxels = voxel_count(box);
     tile.reset(voxels);
     std::int64_t several = coverage_.owners_of(box, tile.owners.data(), tile.block);
@@ -199,7 +200,7 @@ class LatticeResampler final : public Resampler {
 
   /// Seeks the owners of voxels that the march left, by a walk. @return how many voxels are still left; these are
   /// marked as having several owners
-  std::int64_t walk(const IntBox& box, const NudgeTurns& turns, Tile& tile) const {
+  std::int64_t walk(const IntBox& box, const NudgeTurns& turns, TileVoxels& tile) const {
     const FieldStatistics& statistics = lattice_.statistics();
     const glm::i64vec3& cells = lattice_.cells();
     const auto few = static_cast<std::uint64_t>(kTetrahedraPerCell * cells.x * cells.y * cells.z / kMostlyFolded);
@@ -227,7 +228,7 @@ class LatticeResampler final : public Resampler {
   }
 
   template <class Visit>
-  static void for_each_several(const Region& box, const Tile& tile, Visit&& visit) {
+  static void for_each_several(const Region& box, const TileVoxels& tile, Visit&& visit) {
     std::size_t n = 0;
     for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {
       for (std::int64_t y = box.begin.y; y < box.end.y; ++y) {
@@ -238,7 +239,7 @@ class LatticeResampler final : public Resampler {
   }
 
   /// The box around the voxels that may have several owners; there must be one.
-  static Region around_several(const Region& box, const Tile& tile) {
+  static Region around_several(const Region& box, const TileVoxels& tile) {
     Region around{box.end, box.begin};
     for_each_several(box, tile, [&](std::size_t, const glm::i64vec3& voxel) {
       around.begin = glm::min(around.begin, voxel);
@@ -247,7 +248,7 @@ class LatticeResampler final : public Resampler {
     return around;
   }
 
-  void claim_several(const Region& box, Tile& tile) const {
+  void claim_several(const Region& box, TileVoxels& tile) const {
     const Region around = around_several(box, tile);
     tile.claims.find(lattice_, around, false, false, tile.block);
     const glm::i64vec3 size = around.end - around.begin;
@@ -260,7 +261,7 @@ class LatticeResampler final : public Resampler {
     });
   }
 
-  void claim_all(const Region& box, Tile& tile, const MapWriter& maps, Paths& paths) const {
+  void claim_all(const Region& box, TileVoxels& tile, const MapWriter& maps, Paths& paths) const {
     const std::int64_t voxels = voxel_count(box);
     tile.reset(voxels);
     tile.claims.find(lattice_, box, maps.wants_jacobian(), maps.wants_owners(), tile.block);
@@ -272,7 +273,7 @@ class LatticeResampler final : public Resampler {
   }
 
   /// Samples the rows of a tile whose voxels are all settled.
-  void write(const Region& box, Tile& tile, const TargetSamplers& samplers, const MapWriter& maps,
+  void write(const Region& box, TileVoxels& tile, const TargetSamplers& samplers, const MapWriter& maps,
              Report& report) const {
     const Claims& claims = tile.claims;
     if (maps.wants_owners()) {
@@ -294,7 +295,7 @@ class LatticeResampler final : public Resampler {
 
   /// Decides for each voxel of a row whether it comes through the field. A voxel outside the undeformed lattice may
   /// stay where it is.
-  void settle(const Row& row, std::size_t first, Tile& tile, const MapWriter& maps, Report& report) const {
+  void settle(const Row& row, std::size_t first, TileVoxels& tile, const MapWriter& maps, Report& report) const {
     const bool rest = lattice_.field().outside == Outside::rest;
     if (!rest) {
       std::transform(tile.owners.data() + first, tile.owners.data() + first + row.count, tile.mapped,

@@ -18,7 +18,7 @@ namespace tetwarp::cpu {
 namespace {
 
 /// What is known of each voxel of a tile.
-struct Tile {
+struct TileVoxels {
   MeshOwners owners, at_rest;
   std::uint8_t mapped[kTile], coverage[kTile];
   glm::vec3 offset[kTile];
@@ -36,7 +36,7 @@ class MeshResampler final : public Resampler {
 
  private:
   void require_reach(const Control& control);
-  void settle(const Row& row, std::size_t first, const MapWriter& maps, Tile& tile, Report& report) const;
+  void settle(const Row& row, std::size_t first, const MapWriter& maps, TileVoxels& tile, Report& report) const;
 
   tbb::task_arena arena_;
   /// The deformed mesh; and the undeformed one, where it matters which voxels lie outside.
@@ -92,7 +92,7 @@ Report MeshResampler::resample(Region region, std::span<const Target> targets, c
   require(ready_, "resample needs a field: call set_field first");
   const TargetSamplers samplers = make_samplers(*this, targets, region);
   const MapWriter writer(maps, output(), region);
-  Report report = for_each_tile<Tile>(arena_, region, control, [&](const Region& box, Tile& tile) {
+  Report report = for_each_tile<TileVoxels>(arena_, region, control, [&](const Region& box, TileVoxels& tile) {
     Report of_tile;
     of_tile.paths.claimed = static_cast<std::uint64_t>(voxel_count(box));
     raster_.find(box, writer.wants_owners(), tile.owners);
@@ -120,7 +120,8 @@ Report MeshResampler::resample(Region region, std::span<const Target> targets, c
 }
 
 /// Decides for a row where each voxel comes from. @param first  number of the row's first voxel in the tile
-void MeshResampler::settle(const Row& row, std::size_t first, const MapWriter& maps, Tile& tile, Report& report) const {
+void MeshResampler::settle(const Row& row, std::size_t first, const MapWriter& maps, TileVoxels& tile,
+                           Report& report) const {
   const std::uint32_t* owner = tile.owners.owner.data() + first;
   for (int i = 0; i < row.count;) {
     int end = i + 1;

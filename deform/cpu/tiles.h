@@ -23,9 +23,9 @@ namespace tetwarp::cpu {
 constexpr std::int64_t kTile = 32;
 
 /// Reports the share of work that is done, one call at a time and rising.
-class Progress {
+class WorkProgress {
  public:
-  Progress(const Control& control, std::int64_t total) : control_(control), total_(total) {}
+  WorkProgress(const Control& control, std::int64_t total) : control_(control), total_(total) {}
 
   /// @throws Cancelled where a stop was requested
   void done(std::int64_t amount) {
@@ -80,7 +80,7 @@ Report for_each_tile(tbb::task_arena& arena, const Region& region, const Control
   Report total;
   if (is_empty(region)) return total;
   const glm::i64vec3 tiles = (region.end - region.begin + (kTile - 1)) / kTile;
-  Progress progress(control, voxel_count(region));
+  WorkProgress progress(control, voxel_count(region));
   Layers layers(control, region, tiles);
   tbb::enumerable_thread_specific<Scratch> scratch;
   tbb::enumerable_thread_specific<Report> reports;

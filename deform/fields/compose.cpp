@@ -23,7 +23,7 @@ template <class Change>
 void for_each_vertex(VertexField& field, const Limits& limits, const Control& control, Change&& change) {
   const AffineMap point = point_from_index(field.lattice);
   const glm::i64vec3 size = field.lattice.size;
-  cpu::Progress progress(control, size.z);
+  cpu::WorkProgress progress(control, size.z);
   tbb::task_arena arena = cpu::make_arena(limits);
   arena.execute([&] {
     tbb::parallel_for(std::int64_t{0}, size.z, [&](std::int64_t z) {
@@ -51,7 +51,7 @@ namespace {
 
 void compose(TetrahedralMesh& mesh, const PointMap& next, const Limits& limits, const Control& control) {
   constexpr std::size_t kGrain = 4096;
-  cpu::Progress progress(control, static_cast<std::int64_t>(mesh.rest.size()));
+  cpu::WorkProgress progress(control, static_cast<std::int64_t>(mesh.rest.size()));
   tbb::task_arena arena = cpu::make_arena(limits);
   arena.execute([&] {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.rest.size(), kGrain), [&](const auto& range) {

@@ -16,13 +16,13 @@ namespace {
 constexpr double kMostGrowth = 8;
 
 /// The box around the target's corners, in the field's index.
-struct Box {
+struct IndexBox {
   glm::dvec3 low{std::numeric_limits<double>::infinity()}, high{-std::numeric_limits<double>::infinity()};
 };
 
-Box corners_of(const Geometry& target, const Geometry& grid) {
+IndexBox corners_of(const Geometry& target, const Geometry& grid) {
   const AffineMap index = index_from_point(grid) * point_from_index(target);
-  Box box;
+  IndexBox box;
   for (int corner = 0; corner < 8; ++corner) {
     const glm::dvec3 at =
         index(glm::dvec3(corner & 1, corner >> 1 & 1, corner >> 2) * glm::dvec3(target.size - std::int64_t{1}));
@@ -38,7 +38,7 @@ struct Growth {
   glm::dvec3 before{0}, behind{0};
 };
 
-Growth growth_over(const PullField& field, const Box& target) {
+Growth growth_over(const PullField& field, const IndexBox& target) {
   const glm::i64vec3 size = field.grid.size;
   const AffineMap index = index_from_point(field.grid);
   Growth growth;

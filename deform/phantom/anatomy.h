@@ -47,7 +47,7 @@ void add_tube(std::vector<Organ>& organs, const std::vector<TubePoint>& points, 
 /// Leonardo's rule: a branch has the area of its children together.
 struct VesselTree {
   Point root;
-  Box box;
+  Bounds box;
   int count;
   float end_radius;
   float hu;

@@ -27,16 +27,16 @@ glm::mat3 rotation(Point degrees) {
   return glm::mat3(about_z * about_y * about_x);
 }
 
-Box Ellipsoid::bounds() const {
+Bounds Ellipsoid::bounds() const {
   const Point half = turned_half_size(axes, semi_axes);
   return {centre - half, centre + half};
 }
 
-Box Block::bounds() const {
+Bounds RoundedBox::bounds() const {
   const Point half = turned_half_size(axes, half_size);
   return {centre - half, centre + half};
 }
 
-Box Rod::bounds() const { return {glm::min(a - radius_a, b - radius_b), glm::max(a + radius_a, b + radius_b)}; }
+Bounds Rod::bounds() const { return {glm::min(a - radius_a, b - radius_b), glm::max(a + radius_a, b + radius_b)}; }
 
 }  // namespace tetwarp::phantom

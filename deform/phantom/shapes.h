@@ -21,7 +21,7 @@ namespace tetwarp::phantom {
 /// Points are in body space: LPS mm of a field of view of 410 x 410 x 300 mm with its middle at the origin.
 using Point = glm::vec3;
 
-struct Box {
+struct Bounds {
   Point low, high;
 };
 
@@ -37,12 +37,12 @@ struct Ellipsoid {
     const float k = std::sqrt(glm::dot(q, q)), slope = std::sqrt(glm::dot(g, g)) + 1e-9f;
     return k * (k - 1) / slope;
   }
-  Box bounds() const;
+  Bounds bounds() const;
   float thickness() const { return 2 * std::min({semi_axes.x, semi_axes.y, semi_axes.z}); }
 };
 
 /// A box with round edges.
-struct Block {
+struct RoundedBox {
   Point centre, half_size;
   glm::mat3 axes{1};
   float rounding = 1;
@@ -52,7 +52,7 @@ struct Block {
     const Point out = glm::max(q, 0.0f);
     return std::sqrt(glm::dot(out, out)) + std::min(std::max({q.x, q.y, q.z}), 0.0f) - rounding;
   }
-  Box bounds() const;
+  Bounds bounds() const;
   float thickness() const { return 2 * std::min({half_size.x, half_size.y, half_size.z}); }
 };
 
@@ -68,7 +68,7 @@ struct Rod {
     const Point off = ap - t * ab;
     return std::sqrt(glm::dot(off, off)) - (radius_a + t * (radius_b - radius_a));
   }
-  Box bounds() const;
+  Bounds bounds() const;
   float thickness() const { return 2 * std::min(radius_a, radius_b); }
 };
 
@@ -85,10 +85,10 @@ struct Puck {
     const float side = (std::sqrt(u * u + v * v) - 1) * std::min(half_size.x, half_size.y);
     return std::max(side, std::abs(q.z) - half_size.z * (1 - hollow * (1 - std::min(u * u + v * v, 1.0f))));
   }
-  Box bounds() const { return {centre - half_size, centre + half_size}; }
+  Bounds bounds() const { return {centre - half_size, centre + half_size}; }
   float thickness() const { return 2 * half_size.z; }
 };
 
-using Shape = std::variant<Ellipsoid, Block, Rod, Puck>;
+using Shape = std::variant<Ellipsoid, RoundedBox, Rod, Puck>;
 
 }  // namespace tetwarp::phantom

@@ -54,9 +54,9 @@ void add_spine(std::vector<Organ>& organs) {
 }
 
 std::vector<Shape> sternum() {
-  return {Block{{0, -62, 83}, {23, 4.8f, 19}, rotation({-27, 0, 0}), 4},
-          Block{{0, -81, 18}, {14.5f, 4.4f, 45}, rotation({-10, 0, 0}), 4},
-          Block{{0, -86, -36}, {6, 2.4f, 12}, rotation({-2, 0, 0}), 2}};
+  return {RoundedBox{{0, -62, 83}, {23, 4.8f, 19}, rotation({-27, 0, 0}), 4},
+          RoundedBox{{0, -81, 18}, {14.5f, 4.4f, 45}, rotation({-10, 0, 0}), 4},
+          RoundedBox{{0, -86, -36}, {6, 2.4f, 12}, rotation({-2, 0, 0}), 2}};
 }
 
 /// Shapes of the shoulders: blade, spine and joint on both sides, and the collar bones.
@@ -64,7 +64,7 @@ std::vector<Shape> shoulder_girdle() {
   std::vector<Shape> bones;
   for (const float side : {-1.0f, 1.0f}) {
     const auto at = [&](float x, float y, float z) { return Point(side * x, y, z); };
-    bones.push_back(Block{at(98, 62, 88), {33, 2.2f, 50}, rotation({-6, side * 7, side * -36}), 2.2f});
+    bones.push_back(RoundedBox{at(98, 62, 88), {33, 2.2f, 50}, rotation({-6, side * 7, side * -36}), 2.2f});
     bones.push_back(Rod{at(82, 72, 122), at(132, 44, 140), 3.2f, 5.2f});
     bones.push_back(Rod{at(118, 42, 118), at(128, 28, 128), 5, 9});
     bones.push_back(Ellipsoid{at(146, 14, 137), {20, 20, 22}});

@@ -93,7 +93,7 @@ class CpuSprings final : public SpringEngine {
     });
   }
 
-  void follow(const Effort& effort, std::stop_token stop) override {
+  void follow(const SolveEffort& effort, std::stop_token stop) override {
     arena_.execute([&] {
       for_blocks([&](NodeRange range, std::size_t) {
         for (std::size_t a = 0; a < 3; ++a) {
@@ -115,7 +115,7 @@ class CpuSprings final : public SpringEngine {
     });
   }
 
-  Solved solve(Stiffness kind, const Effort& effort, std::stop_token stop) override {
+  Solved solve(Stiffness kind, const SolveEffort& effort, std::stop_token stop) override {
     return arena_.execute([&] {
       for_blocks([&](NodeRange range, std::size_t) {
         for_free(range, [&](std::size_t a, std::size_t n) { r_[a][n] = static_cast<float>(force_[a][n]); });
@@ -257,7 +257,7 @@ class CpuSprings final : public SpringEngine {
   }
 
   /// Solves A x_ = r_ for free nodes, where A has the spring matrices of a kind.
-  Solved seek(Stiffness kind, const Effort& effort, const std::stop_token& stop) {
+  Solved seek(Stiffness kind, const SolveEffort& effort, const std::stop_token& stop) {
     for_blocks([&](NodeRange range, std::size_t) {
       for (std::size_t a = 0; a < 3; ++a) {
         for (std::size_t n = range.begin; n < range.end; ++n) {
@@ -280,7 +280,7 @@ class CpuSprings final : public SpringEngine {
   }
 
   /// Solves by conjugate gradients, preconditioned by the inverse of each node's own 3 x 3 block.
-  Solved conjugate_gradients(const Effort& effort, const std::stop_token& stop) {
+  Solved conjugate_gradients(const SolveEffort& effort, const std::stop_token& stop) {
     double rz = sum_blocks([&](NodeRange range) { return descend(range, 0, true); }).sum;
     const double least = kFloatRounding * rz;
     turn(0);

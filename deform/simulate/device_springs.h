@@ -91,7 +91,7 @@ class DeviceSprings final : public SpringEngine {
     machine_.each(nodes_, sweeps::Carry{{a_}, motion});
   }
 
-  void follow(const Effort& effort, std::stop_token stop) override {
+  void follow(const SolveEffort& effort, std::stop_token stop) override {
     const auto scope = machine_.scope();
     machine_.each(nodes_, sweeps::Way{{a_}});
     make_matrices(Stiffness::laplacian);
@@ -101,12 +101,12 @@ class DeviceSprings final : public SpringEngine {
     std::swap(a_.u, a_.trial);
   }
 
-  Solved solve(Stiffness kind, const Effort& effort, std::stop_token stop) override {
+  Solved solve(Stiffness kind, const SolveEffort& effort, std::stop_token stop) override {
     const auto scope = machine_.scope();
     make_matrices(kind);
     machine_.each(nodes_, sweeps::Forces{{a_}});
     const GradientState state = conjugate_gradients(effort, stop);
-    machine_.template sum<Sums>(nodes_, sweeps::Direction{{a_}}, sweeps::Keep{a_.result});
+    machine_.template sum<Sums>(nodes_, sweeps::DirectionSlope{{a_}}, sweeps::Keep{a_.result});
     const Sums sums = machine_.fetch(a_.result);
     return {.iterations = state.iterations,
             .is_indefinite = state.is_indefinite,
@@ -160,7 +160,7 @@ class DeviceSprings final : public SpringEngine {
     machine_.each(nodes_, sweeps::Inverses{{a_}});
   }
 
-  GradientState conjugate_gradients(const Effort& effort, const std::stop_token& stop) {
+  GradientState conjugate_gradients(const SolveEffort& effort, const std::stop_token& stop) {
     machine_.template sum<Sum>(nodes_, sweeps::Begin{{a_}}, sweeps::AfterBegin{a_.state, effort});
     GradientState state = machine_.fetch(a_.state);
     while (!state.is_done && !stop.stop_requested()) {

@@ -16,7 +16,7 @@ namespace tetwarp::simulate {
 
 /// The state of conjugate gradients between sweeps, in the device's memory.
 struct GradientState {
-  Effort effort;
+  SolveEffort effort;
   double rz = 0, least = 0, gained = 0;
   float length = 0, share = 0;
   int iterations = 0;
@@ -188,7 +188,7 @@ struct Begin : Sweep {
 };
 struct AfterBegin {
   GradientState* state;
-  Effort effort;
+  SolveEffort effort;
   TETWARP_HD void operator()(const Sum& rz) const {
     *state = {.effort = effort, .rz = rz.sum, .least = kFloatRounding * rz.sum, .is_done = !(rz.sum > 0)};
   }
@@ -243,7 +243,7 @@ struct Turn : GradientSweep {
 };
 
 /// Sums minus the net forces times the direction, and finds the square of its longest entry.
-struct Direction : Sweep {
+struct DirectionSlope : Sweep {
   TETWARP_HD Sums operator()(std::size_t n) const {
     const glm::dvec3 x = in_double(a.x[n]);
     return {.slope = -dot3(a.force[n], x), .most = dot3(x, x)};

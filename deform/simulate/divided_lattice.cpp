@@ -24,9 +24,9 @@ constexpr std::uint32_t kNone = TetrahedronSplitter::kNone;
 glm::i64vec3 corner_steps(std::uint32_t c) { return {c & 1, c >> 1 & 1, c >> 2}; }
 
 /// Numbers of vertices and cells of a lattice.
-class Grid {
+class LatticeNumbers {
  public:
-  explicit Grid(const Geometry& lattice) : size_(lattice.size), cells_(lattice.size - std::int64_t{1}) {}
+  explicit LatticeNumbers(const Geometry& lattice) : size_(lattice.size), cells_(lattice.size - std::int64_t{1}) {}
 
   const glm::i64vec3& size() const { return size_; }
   const glm::i64vec3& cells() const { return cells_; }
@@ -71,7 +71,7 @@ class Sets {
 };
 
 /// One cut through the lattice: the side on which each vertex lies, and the cells that the cut goes through.
-struct Division {
+struct LatticeCut {
   std::vector<double> side;
   std::vector<std::uint64_t> cells;  ///< rising
   double nearest = 0;                ///< mm: the least distance of the cut from a vertex
@@ -79,13 +79,13 @@ struct Division {
   bool is_through(std::uint64_t cell) const { return std::binary_search(cells.begin(), cells.end(), cell); }
 };
 
-Division divide_by(const Geometry& lattice, const Grid& grid, const Cut& cut) {
+LatticeCut divide_by(const Geometry& lattice, const LatticeNumbers& grid, const Cut& cut) {
   constexpr double kNearest = 1.0 / 256;  // of the shortest side of a cell
   const CutSurface surface(cut);
   const AffineMap point = point_from_index(lattice);
   const glm::dvec3& h = lattice.spacing;
   const double farthest = 0.5 * std::max({h.x, h.y, h.z});
-  Division division;
+  LatticeCut division;
   division.nearest = kNearest * std::min({h.x, h.y, h.z});
   const auto vertices = static_cast<std::uint32_t>(voxel_count(lattice));
   for (std::uint32_t v = 0; v < vertices; ++v) {
@@ -115,9 +115,9 @@ Division divide_by(const Geometry& lattice, const Grid& grid, const Cut& cut) {
 }
 
 /// The cells that cuts go through, and all cells around them.
-std::vector<std::uint64_t> with_neighbours(const Grid& grid, const std::vector<Division>& divisions) {
+std::vector<std::uint64_t> with_neighbours(const LatticeNumbers& grid, const std::vector<LatticeCut>& divisions) {
   std::vector<std::uint64_t> result;
-  for (const Division& division : divisions) {
+  for (const LatticeCut& division : divisions) {
     for (const std::uint64_t cell : division.cells) {
       const glm::i64vec3 at = grid.place_of_cell(cell);
       const glm::i64vec3 low = glm::max(at - std::int64_t{1}, glm::i64vec3(0)),
@@ -137,8 +137,8 @@ std::vector<std::uint64_t> with_neighbours(const Grid& grid, const std::vector<D
 /// Finds out which tetrahedra and corners belong together when all cuts are made, and numbers the nodes.
 class Joiner {
  public:
-  Joiner(const Geometry& lattice, const Grid& grid, const TetrahedronSplitter& split,
-         std::span<const Division> divisions)
+  Joiner(const Geometry& lattice, const LatticeNumbers& grid, const TetrahedronSplitter& split,
+         std::span<const LatticeCut> divisions)
       : lattice_(lattice), grid_(grid), split_(split), divisions_(divisions), pieces_(split.tetrahedra().size()) {
     join_tetrahedra();
     number_pieces();
@@ -254,7 +254,7 @@ class Joiner {
 
   /// For each piece, the side of a cut on which it lies. No piece within a cell that the cut goes through lies on both
   /// sides.
-  std::vector<std::int8_t> sides_of(const Division& division) const {
+  std::vector<std::int8_t> sides_of(const LatticeCut& division) const {
     std::vector<double> sum(cell_of_.size());
     const auto& tetrahedra = split_.tetrahedra();
     for (std::size_t n = 0; n < tetrahedra.size(); ++n) {
@@ -274,7 +274,7 @@ class Joiner {
     const auto& tetrahedra = split_.tetrahedra();
     for (std::size_t n = 0; n < tetrahedra.size(); ++n) volume[piece_[n]] += volume_of(tetrahedra[n]);
     std::vector<std::vector<std::int8_t>> sides;
-    for (const Division& division : divisions_) sides.push_back(sides_of(division));
+    for (const LatticeCut& division : divisions_) sides.push_back(sides_of(division));
     for (std::uint32_t first = 0, end = 0; first < cell_of_.size(); first = end) {
       while (end < cell_of_.size() && cell_of_[end] == cell_of_[first]) ++end;
       bool is_whole = end - first == 1;
@@ -328,9 +328,9 @@ class Joiner {
   }
 
   const Geometry& lattice_;
-  const Grid& grid_;
+  const LatticeNumbers& grid_;
   const TetrahedronSplitter& split_;
-  const std::span<const Division> divisions_;
+  const std::span<const LatticeCut> divisions_;
   Sets pieces_;                         ///< joins tetrahedra to pieces
   std::vector<std::uint32_t> piece_;    ///< by tetrahedron: its piece
   std::vector<std::uint64_t> cell_of_;  ///< by piece: its cell
@@ -347,11 +347,11 @@ DividedLattice divide(const Geometry& lattice, std::span<const Cut> cuts) {
   require_valid(lattice, "the lattice");
   require(voxel_count(lattice) < INT32_MAX,
           "a lattice of " + to_string(lattice.size) + " vertices is too large to cut");
-  const Grid grid(lattice);
-  std::vector<Division> divisions;
+  const LatticeNumbers grid(lattice);
+  std::vector<LatticeCut> divisions;
   for (const Cut& cut : cuts) divisions.push_back(divide_by(lattice, grid, cut));
   TetrahedronSplitter split(lattice.size, with_neighbours(grid, divisions));
-  for (const Division& division : divisions) {
+  for (const LatticeCut& division : divisions) {
     split.cut([&](std::uint32_t vertex) { return division.side[vertex]; }, division.nearest,
               [&](std::uint64_t cell) { return division.is_through(cell); });
   }
@@ -408,7 +408,7 @@ VertexField field_of(const Geometry& lattice, const DividedLattice& divided, std
   const std::size_t nodes = vertices + divided.copies_of.size();
   require(displacement.size() == nodes, "one displacement a node is expected, " + std::to_string(nodes) + "; found " +
                                             std::to_string(displacement.size()));
-  const Grid grid(lattice);
+  const LatticeNumbers grid(lattice);
   const AffineMap point = point_from_index(lattice);
   VertexField field{
       .lattice = lattice,

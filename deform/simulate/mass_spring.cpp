@@ -24,8 +24,8 @@ constexpr double kEnergyRounding = 1e-11;
 constexpr double kShortest = 1e-6, kLongest = 4;
 
 /// Effort of ordinary steps, and of those after which a simulation may count as settled.
-constexpr Effort kUsual{.share = 0.1, .least = 3}, kThorough{.share = 0.1, .least = 50};
-constexpr Effort kFollow{.share = 0.02, .least = 10, .most = 500};
+constexpr SolveEffort kUsual{.share = 0.1, .least = 3}, kThorough{.share = 0.1, .least = 50};
+constexpr SolveEffort kFollow{.share = 0.02, .least = 10, .most = 500};
 
 /// Chooses the matrix with which the next step is solved.
 class Schedule {
@@ -118,7 +118,7 @@ class MassSpring final : public Simulation {
     while (!settled.reached && settled.steps < rule.steps && !control.stop.stop_requested()) {
       const bool is_near =
           settled.steps > 0 && settled.motion_mm <= 10 * rule.motion_mm && settled.residual <= 10 * rule.residual;
-      const Effort& effort = is_near ? kThorough : kUsual;
+      const SolveEffort& effort = is_near ? kThorough : kUsual;
       Stiffness kind = schedule.kind(settled.residual);
       Solved solved = engine_->solve(kind, effort, control.stop);
       if (solved.is_indefinite) {

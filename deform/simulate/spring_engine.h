@@ -25,7 +25,7 @@ struct Strain {
 /// When conjugate gradients stop: after n iterations that lowered the quadratic model by Q in all, and by q in the last
 /// one, they stop if n q <= share Q (Nash and Sofer 1990, "Assessing a search direction within a truncated-Newton
 /// method"). Residuals say little here: those of stiff springs hide what is left to do in soft tissue.
-struct Effort {
+struct SolveEffort {
   double share = 0.1;
   int least = 3, most = 3000;
 
@@ -66,11 +66,11 @@ class SpringEngine {
   virtual void carry(const RigidMotion& motion) = 0;
   /// Moves placed nodes to where `aim` wants them, and free ones by the harmonic extension of that motion, whose
   /// Laplacian is 0.
-  virtual void follow(const Effort& effort, std::stop_token stop) = 0;
+  virtual void follow(const SolveEffort& effort, std::stop_token stop) = 0;
 
   /// Seeks the direction A^-1 f at the present displacement, for the net forces f on free nodes and a matrix A of some
   /// kind. If a request to stop ends conjugate gradients early, the energy still falls along the direction they give.
-  virtual Solved solve(Stiffness kind, const Effort& effort, std::stop_token stop) = 0;
+  virtual Solved solve(Stiffness kind, const SolveEffort& effort, std::stop_token stop) = 0;
 
   /// The strain at the displacement plus `part` of the direction. After `aim` it is first called with part 0.
   virtual Strain try_step(double part) = 0;

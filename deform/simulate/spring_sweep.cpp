@@ -51,11 +51,11 @@ struct Springs {
 };
 
 /// Whether a direction leads up or down, and at which end of a link its number is kept: the lower one.
-struct Way {
+struct LinkSide {
   std::size_t up;
   std::ptrdiff_t distance, kept;
 
-  HWY_INLINE Way(const SpringGrid& grid, int direction) {
+  HWY_INLINE LinkSide(const SpringGrid& grid, int direction) {
     const bool is_up = direction >= kUp;
     up = static_cast<std::size_t>(is_up ? direction : opposite(direction)) - kUp;
     distance = is_up ? grid.distance[up] : -grid.distance[up];
@@ -71,7 +71,7 @@ double forces(const SpringGrid& grid, NodeRange range, const PaddedVectors<doubl
   for (std::size_t n = range.begin; n < range.end; n += lanes) {
     auto fx = hn::Zero(d), fy = hn::Zero(d), fz = hn::Zero(d), energy = hn::Zero(d);
     for (int direction = 0; direction < kDirections; ++direction) {
-      const Way way(grid, direction);
+      const LinkSide way(grid, direction);
       const Springs springs(grid.rest[static_cast<std::size_t>(direction)], u, n, way.distance);
       const auto k = hn::PromoteTo(d, hn::LoadU(df, grid.stiffness[way.up].data() + n + way.kept));
       const auto pull = hn::Mul(k, springs.elongation), share = hn::Div(pull, springs.length);
@@ -120,7 +120,7 @@ void product(const SpringGrid& grid, NodeRange range, const SpringMatrices& matr
   float* const out[3] = {result[0].data(), result[1].data(), result[2].data()};
   for (float* values : out) std::fill(values + range.begin, values + range.end, 0.0f);
   for (int direction = 0; direction < kDirections; ++direction) {
-    const Way way(grid, direction);
+    const LinkSide way(grid, direction);
     const float* entry[4];
     for (std::size_t i = 0; i < 4; ++i) entry[i] = matrix.up[way.up][i].data() + way.kept;
     const float* const in[3] = {vector[0].data(), vector[1].data(), vector[2].data()};

@@ -32,7 +32,7 @@ bool CsvRecords::next() {
 
 /// Takes the next field. Leaves `next_` at the comma or line feed behind it, or at the end of the text.
 void CsvRecords::take_field() {
-  Span field{next_, 0};
+  TextSpan field{next_, 0};
   if (field.begin < text_.size() && text_[field.begin] == '"') {
     std::size_t at = field.begin + 1;
     for (; at < text_.size(); ++at) {

@@ -15,7 +15,7 @@ simulate::Place read_place(const JsonEntry& entry);
 /// Reads a length from an object that has one of two keys. @param key_mm  its value is in mm
 /// @param key_body  its value is a part of the body's size
 simulate::Length read_length(const JsonEntry& entry, const char* key_mm, const char* key_body);
-simulate::Zone read_region(const JsonEntry& entry);
+simulate::Zone read_zone(const JsonEntry& entry);
 simulate::HuRange read_hu(const JsonEntry& entry);
 std::vector<std::int64_t> read_labels(const JsonEntry& entry);
 simulate::CutPlan read_cut(const JsonEntry& entry);

@@ -28,15 +28,15 @@ struct ControlPoints {
 };
 
 /// The four control points on one axis that have weight at an index, and their weights.
-struct Reach {
+struct Support {
   std::array<std::int64_t, 4> at{};
   std::array<double, 4> weight{};
   bool inside = true;
 };
 
-Reach reach(double index, std::int64_t size) {
+Support support_of(double index, std::int64_t size) {
   const auto last = static_cast<double>(size - 1), base = std::floor(index), t = index - base, s = 1 - t;
-  Reach result;
+  Support result;
   for (std::size_t n = 0; n < 4; ++n)
     result.at[n] = static_cast<std::int64_t>(std::clamp(base - 1 + static_cast<double>(n), 0.0, last));
   result.weight = {s * s * s / 6, (3 * t * t * t - 6 * t * t + 4) / 6, (3 * s * s * s - 6 * s * s + 4) / 6,
@@ -47,7 +47,7 @@ Reach reach(double index, std::int64_t size) {
 
 glm::dvec3 displacement_at(const ControlPoints& points, const glm::dvec3& index, bool& inside) {
   const glm::i64vec3 size = points.grid.size;
-  const Reach x = reach(index.x, size.x), y = reach(index.y, size.y), z = reach(index.z, size.z);
+  const Support x = support_of(index.x, size.x), y = support_of(index.y, size.y), z = support_of(index.z, size.z);
   inside = x.inside && y.inside && z.inside;
   glm::dvec3 sum(0);
   for (std::size_t c = 0; c < 4; ++c) {

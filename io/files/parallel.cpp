@@ -37,9 +37,9 @@ class FirstFailure {
 };
 
 /// Calls Control::progress from one thread at a time, with rising numbers.
-class Progress {
+class ProgressCount {
  public:
-  Progress(const Control& control, std::size_t count) : control_(control), count_(count) {}
+  ProgressCount(const Control& control, std::size_t count) : control_(control), count_(count) {}
   void one_more() {
     if (!control_.progress) return;
     const std::lock_guard lock(mutex_);
@@ -66,7 +66,7 @@ tbb::task_arena& arena_of(int threads) {
 void for_each_index(std::size_t count, int threads, const Control& control,
                     const std::function<void(std::size_t)>& body) {
   FirstFailure failure;
-  Progress progress(control, count);
+  ProgressCount progress(control, count);
   const auto one = [&](std::size_t i) {
     if (control.stop.stop_requested() || failure.is_before(i)) return;
     try {

@@ -77,11 +77,11 @@ class LegacyFile final : public VtkFile {
         values[n] = decode(bytes_.data() + lies.span.begin + (first + n) * step);
       return;
     }
-    if (place_.id != array.id || place_.next > first) place_ = {array.id, 0, lies.span.begin};
-    for (; place_.next < first; ++place_.next) next_word();
+    if (next_word_.id != array.id || next_word_.next > first) next_word_ = {array.id, 0, lies.span.begin};
+    for (; next_word_.next < first; ++next_word_.next) next_word();
     for (double& value : values) {
       value = number_in(next_word(), where);
-      ++place_.next;
+      ++next_word_.next;
     }
   }
 
@@ -198,13 +198,13 @@ class LegacyFile final : public VtkFile {
 
   std::string_view next_word() const {
     const std::string_view all = bytes_;
-    const std::size_t begin_at = std::min(all.find_first_not_of(" \t\r\n", place_.byte), all.size());
-    place_.byte = std::min(all.find_first_of(" \t\r\n", begin_at), all.size());
-    return all.substr(begin_at, place_.byte - begin_at);
+    const std::size_t begin_at = std::min(all.find_first_not_of(" \t\r\n", next_word_.byte), all.size());
+    next_word_.byte = std::min(all.find_first_of(" \t\r\n", begin_at), all.size());
+    return all.substr(begin_at, next_word_.byte - begin_at);
   }
 
   /// The place of the next word of a text array, so that reading on need not search from its beginning.
-  struct Place {
+  struct NextWord {
     std::size_t id = SIZE_MAX;
     std::uint64_t next = 0;  ///< number of the value that comes next
     std::size_t byte = 0;
@@ -216,7 +216,7 @@ class LegacyFile final : public VtkFile {
   At at_ = At::dataset;
   std::uint64_t tuples_ = 0;  ///< number of tuples of the data that follow
   std::vector<VtkValues> values_;
-  mutable Place place_;
+  mutable NextWord next_word_;
 };
 
 }  // namespace

@@ -18,7 +18,7 @@ std::string upper(std::string_view text);
 
 /// Values of one type in a legacy file: big-endian numbers in a binary file, else words.
 struct VtkValues {
-  Span span;
+  TextSpan span;
   std::string type;  ///< in capitals: "FLOAT"
   std::uint64_t count = 0;
 };

@@ -84,8 +84,8 @@ class MarkupsDocument : public PointsDocument {
   std::string rewritten(std::span<const glm::dvec3> moved, std::span<const PointStatus> status) const override {
     Json document = document_;
     for (std::size_t n = 0; n < moved.size(); ++n) {
-      Json& control_point = document[places_[n].at];
-      const glm::dvec3 point = places_[n].turned ? turned(moved[n]) : moved[n];
+      Json& control_point = document[positions_[n].at];
+      const glm::dvec3 point = positions_[n].turned ? turned(moved[n]) : moved[n];
       if (moved[n] != points[n]) control_point["position"] = {point.x + 0.0, point.y + 0.0, point.z + 0.0};
       if (status[n] == PointStatus::outside)
         control_point["description"] = with_outside_text(control_point.value("description", ""));
@@ -94,7 +94,7 @@ class MarkupsDocument : public PointsDocument {
   }
 
  private:
-  struct Place {
+  struct Position {
     Json::json_pointer at;
     bool turned;  ///< whether its markup has the other frame than the first markup
   };
@@ -119,7 +119,7 @@ class MarkupsDocument : public PointsDocument {
     }
   }
 
-  void take_control_point(const Json& control_point, const Place& place, const std::string& where) {
+  void take_control_point(const Json& control_point, const Position& place, const std::string& where) {
     require(control_point.is_object(), "no object, " + where);
     const auto placed = control_point.find("positionStatus");
     // such a point is not placed yet, or is missing in this volume
@@ -128,11 +128,11 @@ class MarkupsDocument : public PointsDocument {
     require(description == control_point.end() || description->is_string(), "description is no text, " + where);
     const glm::dvec3 point = position_of(control_point, where);
     points.push_back(place.turned ? turned(point) : point);
-    places_.push_back(place);
+    positions_.push_back(place);
   }
 
   Json document_;
-  std::vector<Place> places_;
+  std::vector<Position> positions_;
 };
 
 }  // namespace

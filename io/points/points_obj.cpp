@@ -54,12 +54,12 @@ class ObjDocument : public PointsDocument {
 
  private:
   struct Edit {
-    Span at;
+    TextSpan at;
     std::string text;
     bool is_vertex = false;
   };
 
-  Span span_of(std::string_view first, std::string_view last) const {
+  TextSpan span_of(std::string_view first, std::string_view last) const {
     return {static_cast<std::size_t>(first.data() - bytes_.data()),
             static_cast<std::size_t>(last.data() + last.size() - bytes_.data())};
   }

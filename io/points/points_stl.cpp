@@ -97,7 +97,7 @@ class TextStl : public PointsDocument {
   std::string rewritten(std::span<const glm::dvec3> moved, std::span<const PointStatus>) const override {
     Patch patch(bytes_);
     for (std::size_t first = 0; first < moved.size(); first += 3) {
-      const Span& normal = normals_[first / 3];
+      const TextSpan& normal = normals_[first / 3];
       patch.replace(normal.begin, normal.end, text_of(normal_of(moved.subspan(first, 3))));
       for (std::size_t n = first; n < first + 3; ++n)
         patch.replace(corners_[n].begin, corners_[n].end, text_of(moved[n]));
@@ -106,7 +106,7 @@ class TextStl : public PointsDocument {
   }
 
  private:
-  Span span_of(std::string_view first, std::string_view last) const {
+  TextSpan span_of(std::string_view first, std::string_view last) const {
     return {static_cast<std::size_t>(first.data() - bytes_.data()),
             static_cast<std::size_t>(last.data() + last.size() - bytes_.data())};
   }
@@ -121,7 +121,7 @@ class TextStl : public PointsDocument {
   }
 
   std::string bytes_;
-  std::vector<Span> corners_, normals_;
+  std::vector<TextSpan> corners_, normals_;
 };
 
 }  // namespace

@@ -15,9 +15,9 @@ namespace tetwarp {
 namespace {
 
 /// Where in a file a record has its coordinates, and the field that takes its status.
-struct Row {
-  std::array<Span, 3> xyz;
-  Span status;
+struct RecordSpans {
+  std::array<TextSpan, 3> xyz;
+  TextSpan status;
 };
 
 const char* name_of(PointStatus status) { return status == PointStatus::moved ? "moved" : "outside"; }
@@ -45,7 +45,7 @@ class TableDocument : public PointsDocument {
     require(record.fields.size() == columns, std::to_string(record.fields.size()) + " fields" + where + "; expected " +
                                                  std::to_string(columns) + " as in the header");
     glm::dvec3 point;
-    Row row;
+    RecordSpans row;
     for (int axis = 0; axis < 3; ++axis) {
       point[axis] = number_of(unquoted(record.raw(xyz[axis])), where);
       row.xyz[axis] = record.fields[xyz[axis]];
@@ -56,7 +56,7 @@ class TableDocument : public PointsDocument {
   }
 
   /// Replaces the coordinates of a row that lie between two bytes of the file.
-  void put(Patch& patch, const Row& row, const glm::dvec3& before, const glm::dvec3& point, std::size_t from,
+  void put(Patch& patch, const RecordSpans& row, const glm::dvec3& before, const glm::dvec3& point, std::size_t from,
            std::size_t to) const {
     std::array<int, 3> order{0, 1, 2};
     std::sort(order.begin(), order.end(), [&](int a, int b) { return row.xyz[a].begin < row.xyz[b].begin; });
@@ -67,7 +67,7 @@ class TableDocument : public PointsDocument {
   }
 
   std::string bytes;
-  std::vector<Row> rows;
+  std::vector<RecordSpans> rows;
 };
 
 class CsvDocument : public TableDocument {
@@ -100,7 +100,7 @@ class CsvDocument : public TableDocument {
     Patch patch(bytes);
     if (!has_status_) patch.replace(header_end_, header_end_, ",status");
     for (std::size_t n = 0; n < rows.size(); ++n) {
-      const Span& at = rows[n].status;
+      const TextSpan& at = rows[n].status;
       put(patch, rows[n], points[n], moved[n], 0, at.begin);
       patch.replace(at.begin, at.end, (has_status_ ? "" : ",") + std::string(name_of(status[n])));
       put(patch, rows[n], points[n], moved[n], at.end, bytes.size());
@@ -140,7 +140,7 @@ class FcsvDocument : public TableDocument {
   std::string rewritten(std::span<const glm::dvec3> moved, std::span<const PointStatus> status) const override {
     Patch patch(bytes);
     for (std::size_t n = 0; n < rows.size(); ++n) {
-      const Span& at = rows[n].status;
+      const TextSpan& at = rows[n].status;
       put(patch, rows[n], points[n], moved[n], 0, at.begin);
       if (has_description_ && status[n] == PointStatus::outside) {
         const std::string text = unquoted(std::string_view(bytes).substr(at.begin, at.end - at.begin));

@@ -32,7 +32,7 @@ class VtkDocument : public PointsDocument {
 
   std::string rewritten(std::span<const glm::dvec3> moved, std::span<const PointStatus>) const override {
     Patch patch(bytes_);
-    for (const Span& part : edits_) {
+    for (const TextSpan& part : edits_) {
       const bool is_points = part.begin == points_at_.begin && part.end == points_at_.end;
       patch.replace(part.begin, part.end, is_points ? values_of(moved) : "");
     }
@@ -125,8 +125,8 @@ class VtkDocument : public PointsDocument {
   std::string bytes_, name_;
   VtkText text_;
   std::size_t tuples_ = 0;  ///< number of tuples of the data that follow
-  Span points_at_;
-  std::vector<Span> edits_;      ///< what is replaced: the points, and the parts that are left out
+  TextSpan points_at_;
+  std::vector<TextSpan> edits_;  ///< what is replaced: the points, and the parts that are left out
   VtkDecoder decode_ = nullptr;  ///< decodes a coordinate of a binary file
   bool double_ = false, dropped_ = false;
 };

@@ -29,9 +29,9 @@ std::string name(const itk::ProcessObject& filter) {
 
 /// Work in a thread of its own. If this object is destroyed before the work has ended, as by an exception, it stops the
 /// work and waits for its end.
-class Worker {
+class WorkThread {
  public:
-  explicit Worker(const std::function<void(const Control&)>& work)
+  explicit WorkThread(const std::function<void(const Control&)>& work)
       : thread_([this, &work](const std::stop_token& stop) { run(work, stop); }) {}
 
   /// Waits a few milliseconds. @return whether the work has ended
@@ -85,7 +85,7 @@ void run_for(itk::ProcessObject& filter, ProgressShare share, const std::functio
   };
   if (share.end > share.begin) filter.UpdateProgress(told);
   translate_errors(filter, [&] {
-    Worker worker(work);
+    WorkThread worker(work);
     while (!worker.wait()) {
       if (filter.GetAbortGenerateData())
         worker.stop();

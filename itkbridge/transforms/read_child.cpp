@@ -96,7 +96,7 @@ std::uint64_t writable_memory() {
 }
 
 /// Lowers a limit of this process to `to`, or leaves it where it is lower.
-void lower(__rlimit_resource resource, std::uint64_t to) {
+void lower_limit(__rlimit_resource resource, std::uint64_t to) {
   rlimit limit{};
   if (::getrlimit(resource, &limit) != 0) return;
   limit.rlim_cur = std::min<rlim_t>(limit.rlim_cur, to);
@@ -107,9 +107,9 @@ void lower(__rlimit_resource resource, std::uint64_t to) {
 void confine(const Request& request) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != request.parent) end(1);  // the other process has ended already
-  lower(RLIMIT_CORE, 0);
-  lower(RLIMIT_DATA, writable_memory() + request.memory_bytes);
-  lower(RLIMIT_CPU, request.cpu_seconds);
+  lower_limit(RLIMIT_CORE, 0);
+  lower_limit(RLIMIT_DATA, writable_memory() + request.memory_bytes);
+  lower_limit(RLIMIT_CPU, request.cpu_seconds);
   ::alarm(request.seconds);
 }
 

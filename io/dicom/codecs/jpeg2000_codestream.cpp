@@ -44,7 +44,7 @@ std::uint64_t number_at(Bytes bytes, std::size_t at, std::size_t size) {
 }
 
 /// Where the image and its tiles lie on the reference grid (T.800 B.2, B.3), of one component that is not subsampled.
-struct Grid {
+struct ReferenceGrid {
   std::uint64_t x0, y0, x1, y1, tile_width, tile_height, tile_x0, tile_y0, tiles_across, tiles_down;
 };
 
@@ -61,9 +61,9 @@ std::uint64_t ceil_shift(std::uint64_t value, unsigned shift) {
   return (value + (std::uint64_t{1} << shift) - 1) >> shift;
 }
 
-Grid read_size(Bytes segment, Jpeg2000Image& image) {
+ReferenceGrid read_size(Bytes segment, Jpeg2000Image& image) {
   const auto word = [&](std::size_t n) { return number_at(segment, 2 + 4 * n, 4); };
-  Grid grid{word(2), word(3), word(0), word(1), word(4), word(5), word(6), word(7), 0, 0};
+  ReferenceGrid grid{word(2), word(3), word(0), word(1), word(4), word(5), word(6), word(7), 0, 0};
   expect(
       grid.x0 < grid.x1 && grid.y0 < grid.y1 && grid.x1 - grid.x0 <= kLargestSide && grid.y1 - grid.y0 <= kLargestSide,
       "expected an image of 1 to 65535 rows and columns, found another");
@@ -133,7 +133,7 @@ void add_parts(const std::array<std::uint64_t, 4>& tile, const Style& style, Par
 
 /// Refuses more packets than there are bytes: each takes a byte at least, and each layer of each precinct has one
 /// (T.800 B.9).
-void check_parts(const Grid& grid, const Style& style, std::size_t bytes) {
+void check_parts(const ReferenceGrid& grid, const Style& style, std::size_t bytes) {
   Parts all;
   for (std::uint64_t q = 0; q < grid.tiles_down; ++q) {
     for (std::uint64_t p = 0; p < grid.tiles_across; ++p) {
@@ -242,7 +242,7 @@ Jpeg2000Image read(Bytes bytes) {
   expect(marker_at(bytes, 0).code == kStart, "expected a JPEG 2000 codestream, found something else");
   Marker marker = marker_at(bytes, 2);
   expect(marker.code == kSize, "expected the size of the image, found marker " + hex(marker.code));
-  const Grid grid = read_size(marker.segment, image);
+  const ReferenceGrid grid = read_size(marker.segment, image);
   bool has_style = false;
   std::size_t at = marker.next;
   while ((marker = marker_at(bytes, at)).code != kTilePart) {
