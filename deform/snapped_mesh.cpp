@@ -139,7 +139,7 @@ SnappedMesh snap_mesh(const Geometry& output, const FieldView& field, const Cont
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.rest.size(), kGrain), [&](const auto& range) {
     if (control.stop.stop_requested()) throw Cancelled();
     for (std::size_t n = range.begin(); n < range.end(); ++n) {
-      // marks a vertex that cannot be used
+      // Marks a vertex that cannot be used.
       if (!snapper.snap(n, snapped.vertices[n])) snapped.vertices[n].u.x = INT32_MIN;
     }
   });

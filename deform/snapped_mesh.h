@@ -23,7 +23,7 @@ namespace tetwarp {
 struct SnappedMesh {
   std::vector<Vertex> vertices;
   std::span<const glm::u32vec4> tetrahedra;  ///< those of the mesh that was given, or `made`
-  /// tetrahedra made of a lattice with replaced cells; else null
+  /// Tetrahedra made of a lattice with replaced cells; else null.
   std::shared_ptr<const std::vector<glm::u32vec4>> made;
   Nudge nudge;  ///< towards the middle of the undeformed box: the lattice's where there is one, else the mesh's
 

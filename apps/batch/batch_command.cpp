@@ -161,7 +161,7 @@ int Batch::run() {
   }
   std::error_code unknown;
   const bool made_before = options_.resume && fs::exists(options_.output, unknown);
-  // checked before a folder is begun, for a later run would refuse to use that
+  // Checked before a folder is begun, for a later run would refuse to use that.
   if (!made_before) check_space(found_, options_.output);
   if (options_.backend == "cuda" && cuda == 0) make_backend("cuda", Direction::forward, Geometry(), 0, {});
   OutputFolder folder(options_.output, shard_, ids_of(cases_), hash_file(options_.manifest), options_.resume);

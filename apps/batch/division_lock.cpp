@@ -27,7 +27,7 @@ namespace {
 using namespace std::chrono_literals;
 using nlohmann::json;
 
-/// how long to retry: a lock may be refused for a moment while other processes begin or end
+/// How long to retry: a lock may be refused for a moment while other processes begin or end.
 constexpr auto kPatience = 1500ms;
 constexpr const char* kName = "batch.lock";
 

@@ -90,7 +90,7 @@ void BatchProgress::ended(const CaseOutcome& outcome) {
     event["reason"] = outcome.reason;
     const std::string said = "tetwarp: case " + id + " " + name_of(outcome.status) + ": " + outcome.reason;
     print(said);
-    // then the case is de-identified, and no file names the reason
+    // True for a de-identified case, whose reason no file names.
     const bool only_here = outcome.line.document()["reason"] != outcome.reason;
     if (only_here && form_ == Form::none) std::fprintf(stderr, "%s\n", shown_lines(said).c_str());
   }

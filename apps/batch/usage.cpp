@@ -18,7 +18,7 @@ using nlohmann::json;
 constexpr double kBusy = 0.8;  ///< a part that is busy for this share of the time holds up the others
 /// A timing: how long a case held its device, in one stage or several.
 constexpr const char* kOnDevice = "on_device";
-/// share of the time of all jobs that is spent waiting for memory, from which memory is named
+/// Share of the time of all jobs that is spent waiting for memory, from which memory is named.
 constexpr double kWaiting = 0.25;
 
 double processor_seconds() {

@@ -112,7 +112,7 @@ void Coverage::look_at_row(int axis, bool high, int last, std::vector<CrossingIn
     }
   };
   for (int n = 0; n < lattice.cells[(axis + 1) % 3]; ++n) {
-    // so for most faces along the rows of voxels
+    // No row passes through most faces that lie along the rows of voxels.
     if (rows_through(lattice.box(static_cast<std::size_t>(n))).is_empty()) continue;
     for (int which = 0; which < 2; ++which) look_at(border_triangle(lattice, axis, high, {n, last}, which));
   }

@@ -34,7 +34,7 @@ class TypedSampler final : public TargetSampler {
     } else if (has_source_ && row.count <= kMostInRow) {
       places.find(source_.layout, row);
       sampled = places.slices;
-      // for voxels that vectors left, the loops below write it
+      // Voxels that vectors left are written below.
       if (coverage) std::fill_n(coverage, row.count, std::uint8_t{1});
       if (kInterpolation == Interpolation::vote) {
         RowState state[kMostInRow];

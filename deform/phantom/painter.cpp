@@ -36,7 +36,7 @@ float fissure(Point p) {
 
 void paint_inside(const PaintedRow& row, const Trunk& trunk, Point p, const Walls& walls, float& hu) {
   const float edge = row.edge;
-  // thickness, 0 to 1, of the fat under the broad muscles of the flank
+  // Thickness, 0 to 1, of the fat under the broad muscles of the flank.
   const float beside = std::max(1 - p.y * p.y * 2.2e-4f, 0.0f);
   if (p.z > -130 && p.z < 132) blend(hu, kFat + 20, layer(walls.cage - 10 - 3 * beside, walls.cage - 10, edge));
   if (walls.cage < 12) {

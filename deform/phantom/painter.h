@@ -16,7 +16,7 @@ struct PaintedRow {
   float straight_y;
   std::span<const Point> points;  ///< the bent places of voxels, x rising
   Bounds box;                     ///< around `points`
-  /// mm over which one tissue blends into the next: about one voxel.
+  /// Millimetres over which one tissue blends into the next: about one voxel.
   float edge;
   std::span<float> hu;  ///< HU of the voxels, over which is painted
 };

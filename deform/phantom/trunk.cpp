@@ -132,7 +132,7 @@ Trunk::Rib Trunk::rib(Point p, const Walls& walls) const {
 
 float diaphragm(Point p) {
   struct Dome {
-    // middle, height, and how far the dome falls per mm^2 sideways, forwards and backwards
+    // Middle, height, and how far the dome falls per mm^2 sideways, forwards and backwards.
     float x, y, top, across, front, back;
   };
   constexpr Dome kDomes[] = {{-66, -10, -34, 0.011f, 0.0075f, 0.0115f},

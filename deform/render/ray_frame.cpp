@@ -30,7 +30,7 @@ double mixed(double a, double b, double share) { return a + (b - a) * share; }
 
 double step_mm(const Geometry& volume, const RenderStyle& style, const ViewPlane& plane) {
   const double voxel = std::min({volume.spacing.x, volume.spacing.y, volume.spacing.z});
-  // shorter steps change a sum by one grey level at most
+  // Shorter steps change a sum by one grey level at most.
   const bool is_sum = style.transfer.projection == Projection::sum;
   return voxel * style.step_voxels.value_or(is_sum ? 1.0 : std::clamp(0.5 * plane.pixel_mm / voxel, 0.5, 1.0));
 }

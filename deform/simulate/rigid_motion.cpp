@@ -30,7 +30,7 @@ Matrix3d turned(const Matrix3d& spread, const Matrix3d& moved) {
   const Matrix3d sum = spread + moved + kOpen * spread.trace() * Matrix3d::Identity();
   const Eigen::JacobiSVD<Matrix3d> parts(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Vector3d signs(1, 1, 1);
-  // the smallest singular value is the last
+  // The smallest singular value is the last.
   if ((parts.matrixU() * parts.matrixV().transpose()).determinant() < 0) signs.z() = -1;
   return parts.matrixU() * signs.asDiagonal() * parts.matrixV().transpose() - Matrix3d::Identity();
 }

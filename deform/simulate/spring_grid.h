@@ -50,7 +50,7 @@ struct SpringGrid {
   std::size_t nodes = 0, padding = 0;
   std::array<std::ptrdiff_t, kUp> distance{};  ///< by direction kUp + d: distance of a node's neighbour in the arrays
   std::array<RestLink<double>, kDirections> rest{};  ///< by direction
-  /// by direction kUp + d: spring constant of the link, N/mm; 0 where the link is odd
+  /// By direction kUp + d: spring constant of the link, N/mm; 0 where the link is odd.
   std::array<Padded<float>, kUp> stiffness;
   std::vector<OddLink> odd;            ///< each odd link once from each of its ends, by rising node
   std::vector<std::size_t> first_odd;  ///< by block: its first odd link; and one entry more

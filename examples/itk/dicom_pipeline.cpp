@@ -136,7 +136,7 @@ void run(const std::string& folder, const std::string& scenario, const std::stri
   writer->SetFileName(output);
   writer->UseCompressionOn();
   writer->Update();
-  // needed since ITK's NIfTI writer does not throw
+  // Needed since ITK's NIfTI writer does not throw.
   tetwarp::require(std::filesystem::exists(output), "cannot write " + output);
 
   const tetwarp::Report& report = warp->GetReport();

@@ -92,7 +92,7 @@ const std::string& JsonEntry::text() const {
   expect(JsonTree::Kind::text, "a text");
   if (tree_->text.empty()) refuse("is empty; a text is expected");
   const auto characters = static_cast<std::size_t>(
-      // characters of UTF-8: bytes that do not continue one
+      // Characters of UTF-8: bytes that do not continue one.
       std::count_if(tree_->text.begin(), tree_->text.end(), [](char c) { return (c & 0xC0) != 0x80; }));
   if (characters > kLongestText)
     refuse("has " + std::to_string(characters) + " characters; a text of at most " + std::to_string(kLongestText) +

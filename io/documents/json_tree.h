@@ -19,9 +19,9 @@ struct JsonTree {
   Kind kind = Kind::null;
   std::size_t line = 0;  ///< the line in which the value begins, from 1
   bool truth = false;
-  double number = 0;      ///< of a number, finite
-  std::string text = {};  ///< of a text, in UTF-8
-  /// of a list or an object, in the order of the document; an object has no key twice
+  double number = 0;      ///< the value of a number; finite
+  std::string text = {};  ///< the value of a text, in UTF-8
+  /// The values of a list or an object, in the order of the document; an object has no key twice.
   std::vector<JsonTree> items = {};
   std::string key = {};  ///< the key under which an object has this value
   std::size_t key_line = 0;

@@ -78,7 +78,7 @@ Geometry grid_of(const Values& values) {
                             resolution = values.numbers(DCM_GridResolution, 3);
   const glm::dvec3 row(cosines[0], cosines[1], cosines[2]), column(cosines[3], cosines[4], cosines[5]);
   const bool is_rotation = std::abs(glm::length(row) - 1) <= 1e-3 && std::abs(glm::length(column) - 1) <= 1e-3 &&
-                           // cosines of three digits are round-off, as for slices
+                           // Cosines of three digits are round-off, as for slices.
                            std::abs(glm::dot(row, column)) <= 1e-3;
   require(is_rotation, tag_name(DCM_ImageOrientationPatient) + " of the grid is no rotation, " + values.file() +
                            "; expected two unit vectors at a right angle");

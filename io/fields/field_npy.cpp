@@ -190,7 +190,7 @@ class NpyReader final : public FieldReader {
     const glm::dmat3 mm =
         header_.frame == "RAS" ? glm::dmat3(-1, 0, 0, 0, -1, 0, 0, 0, 1) : point_from_index(header_.grid).linear;
     for (glm::vec3& d : displacement) {
-      // infinity times zero would give NaN, so an infinite vector stays
+      // Infinity times zero would give NaN, so an infinite vector stays.
       const bool infinite = std::isinf(d.x) || std::isinf(d.y) || std::isinf(d.z);
       if (!infinite) d = glm::vec3(mm * glm::dvec3(d) + 0.0);  // + 0.0 makes 0 of -0
     }

@@ -55,7 +55,7 @@ class ProgressCount {
 /// An arena of so many threads. It is kept: oneTBB 2021.8 loses 7 kB for each arena in which several threads worked.
 tbb::task_arena& arena_of(int threads) {
   static std::mutex mutex;
-  // never destroyed, for oneTBB may end before static objects do
+  // Never destroyed, for oneTBB may end before static objects do.
   static auto& arenas = *new std::map<int, tbb::task_arena>;
   const std::lock_guard lock(mutex);
   return arenas.try_emplace(threads, threads).first->second;

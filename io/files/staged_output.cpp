@@ -194,7 +194,7 @@ int move_to_free(const fs::path& from, const fs::path& to, StagedOutput::Kind ki
   // rename(2) refuses to replace a folder that is not empty
   if (kind == StagedOutput::Kind::folder) return move(from, to);
   if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
-  // the file system cannot do both in one step, so look first and then rename
+  // The file system cannot do both in one step, so look first and then rename.
   if (errno != EINVAL && errno != ENOSYS) return errno;
   std::error_code ignored;
   return fs::exists(to, ignored) ? EEXIST : move(from, to);

@@ -47,7 +47,7 @@ void for_each_triangle(CellShape shape, Corners corners, const Use& use) {
       if (const Triangle whole = {at(0), at(1), at(2)}; !is_flat(whole)) use(whole);
       continue;
     }
-    // the first corner of the diagonal: it begins at the vertex with the lowest number, so that neighbours agree
+    // The first corner of the diagonal: it begins at the vertex with the lowest number, so that neighbours agree.
     const std::size_t from = std::min(at(0), at(2)) < std::min(at(1), at(3)) ? 0 : 1;
     for (const std::size_t n : {from, from + 2}) {
       if (const Triangle half = {at(n % 4), at((n + 1) % 4), at((n + 2) % 4)}; !is_flat(half)) use(half);

@@ -54,14 +54,14 @@ class VtkFile {
   std::string format;  ///< "VTK StructuredGrid", "legacy VTK STRUCTURED_GRID"
   VtkDataset dataset = VtkDataset::other;
   std::optional<std::string> frame;  ///< LPS or RAS, where 3D Slicer wrote it into the title of a legacy file
-  /// index of the first point, and number of points along i, j, k; not used for meshes
+  /// Index of the first point, and number of points along i, j, k; not used for meshes.
   glm::i64vec3 begin{0}, size{0};
   glm::dvec3 origin{0}, spacing{1};     ///< of an image: at index (0, 0, 0)
   glm::dmat3 direction{1};              ///< of an image
   std::array<VtkArray, 3> coordinates;  ///< of a rectilinear grid
   VtkArray points;                      ///< of a structured grid or a mesh
   std::vector<VtkArray> point_data;     ///< arrays with one tuple for each point
-  /// arrays of the dataset as a whole; that the file holds their values is checked only when one is read
+  /// Arrays of the dataset as a whole; that the file holds their values is checked only when one is read.
   std::vector<VtkArray> field_data;
 
   /// Reads some values of an array as they are in the file, from value number `first` on. They need not be finite.

@@ -133,7 +133,7 @@ std::vector<VtkValues> VtkText::skip_cells(std::uint64_t first, std::uint64_t se
   // In a binary file of version 4 the numbers begin right here, so nothing may be skipped.
   if (!bytes_.substr(at_).starts_with("OFFSETS ")) return {skip_values(second, "int", where)};
   std::vector<VtkValues> lists;
-  // first the offsets, then the connectivity, each behind its keyword and type
+  // First the offsets, then the connectivity, each behind its keyword and type.
   for (const std::uint64_t count : {first, second}) {
     const auto words = next_words("OFFSETS or CONNECTIVITY");
     require(words.size() == 2, "no type of OFFSETS or CONNECTIVITY" + here());

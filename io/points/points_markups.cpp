@@ -122,7 +122,7 @@ class MarkupsDocument : public PointsDocument {
   void take_control_point(const Json& control_point, const Position& place, const std::string& where) {
     require(control_point.is_object(), "no object, " + where);
     const auto placed = control_point.find("positionStatus");
-    // such a point is not placed yet, or is missing in this volume
+    // Such a point is not placed yet, or is missing in this volume.
     if (placed != control_point.end() && *placed != "defined") return;
     const auto description = control_point.find("description");
     require(description == control_point.end() || description->is_string(), "description is no text, " + where);

@@ -41,7 +41,7 @@ class Actions {
       else if (n <= STDERR_FILENO)
         posix_spawn_file_actions_addopen(&actions_, n, "/dev/null", n == STDIN_FILENO ? O_RDONLY : O_WRONLY, 0);
     }
-    // closes all others: a program that uses this library may have files that exec does not close.
+    // Closes all others: a program that uses this library may have files that exec does not close.
     posix_spawn_file_actions_addclosefrom_np(&actions_, streams[kStreams - 1].number() >= 0 ? kStreams : kStreams - 1);
   }
   ~Actions() { posix_spawn_file_actions_destroy(&actions_); }

@@ -164,7 +164,7 @@ TransformFunction make_transform(const StoredTransform& stored, const std::strin
   itk::TransformFactoryBase::RegisterDefaultTransforms();
   const auto parts = std::make_shared<std::vector<Part>>();
   try {
-    // the last part is applied first
+    // The last part is applied first.
     for (auto record = stored.parts.rbegin(); record != stored.parts.rend(); ++record)
       parts->push_back(make_part(*record, file));
   } catch (const itk::ExceptionObject& error) {

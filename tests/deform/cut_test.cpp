@@ -125,7 +125,7 @@ class NearCut {
         cells_(closed.whole.lattice.size - std::int64_t{1}),
         replaced_(closed.divided.replaced.begin(), closed.divided.replaced.end()) {}
   bool operator()(const glm::dvec3& undeformed_mm) const {
-    // of a cell: points so near to a face may lie on either side, by rounding of vertices
+    // Part of a cell: points so near to a face may lie on either side, by rounding of vertices.
     constexpr double kBeside = 0.02;
     const glm::dvec3 at = from_mm_(undeformed_mm);
     for (int n = 0; n < 8; ++n) {

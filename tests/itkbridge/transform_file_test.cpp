@@ -90,7 +90,7 @@ TEST(TransformFile, EveryAffineLikeClassIsItksOwn) {
 
 TEST(TransformFile, TheBaseClassOfAntsAndOfInversesIsAnAffineTransform) {
   const Scratch scratch;
-  // the order of rotations, which files of the inverse of an Euler3DTransform have, too
+  // The order of rotations, which files of the inverse of an Euler3DTransform have, too.
   for (const char* order : {"", " 0", " 1"}) {
     write_file(
         scratch / "t.txt",

@@ -143,7 +143,7 @@ std::vector<double> places_on_axis(const glm::dvec3& step, std::int64_t vertices
   int along = 0;
   for (int axis = 0; axis < 3; ++axis) along += std::abs(step[axis]) * cells > 1e-6;
   const auto [lowest, highest] = std::minmax_element(places.begin(), places.end());
-  // up to a quarter of a step is left to snapping; a turned border needs more
+  // Up to a quarter of a step is left to snapping; a turned border needs more.
   const auto end = [&](double voxels_short) {
     if (voxels_short > 1.0 / 256) return 0.0;
     if (along == 1) return voxels_short > 0.25 / 4096 ? voxels_short / length : 0;

@@ -46,7 +46,7 @@ std::vector<std::byte> rle_segment(std::span<const std::int16_t> voxels, std::si
 std::vector<std::byte> rle_frame(std::span<const std::int16_t> voxels, std::size_t columns) {
   constexpr std::size_t kHeader = 64;
   const std::vector<std::byte> high = rle_segment(voxels, columns, 8), low = rle_segment(voxels, columns, 0);
-  // number of segments, and the byte at which each begins
+  // Number of segments, and the byte at which each begins.
   const std::size_t words[] = {2, kHeader, kHeader + high.size()};
   std::vector<std::byte> frame(kHeader + high.size() + low.size());
   for (std::size_t word = 0; word < std::size(words); ++word) {

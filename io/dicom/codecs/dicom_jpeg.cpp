@@ -32,7 +32,7 @@ std::ptrdiff_t count_of_marker(Bytes bytes, std::uint8_t marker) {
 /// Checks a stream before it is decoded: DCMTK's decoders make up what a damaged stream lacks, and write as many pixels
 /// as it states.
 JpegFrame checked_frame(Bytes bytes, const DicomFileHeader& header) {
-  // each scan takes as long to decode as an image; where there are several, ten are usual
+  // Each scan takes as long to decode as an image; where there are several, ten are usual.
   constexpr std::ptrdiff_t kMostScans = 100;
   const PixelFormat& pixels = header.pixels;
   const JpegFrame frame = jpeg_frame(bytes);

@@ -51,7 +51,7 @@ struct ReferenceGrid {
 /// What a marker of coding style says (T.800 A.6.1).
 struct Style {
   std::uint64_t layers = 0;
-  /// of a code-block's sides: 2^block_width, 2^block_height samples
+  /// Exponents of a code-block's sides, which have 2^block_width and 2^block_height samples.
   unsigned levels = 0, block_width = 0, block_height = 0;
   /// exponents of a precinct's sides by resolution: width in the low 4 bits, height in the high 4
   std::array<std::uint8_t, 33> precincts{};

@@ -17,7 +17,7 @@ struct Jpeg2000Image {
   int precision = 0;  ///< bits of a sample of the first component
   bool is_signed = false;
   std::span<const std::uint8_t> codestream;  ///< from its start to its end marker
-  /// place in `codestream` of the byte with the style of the code-blocks (T.800 Table A.19)
+  /// Place in `codestream` of the byte with the style of the code-blocks (T.800 Table A.19).
   std::size_t block_style_at = 0;
 };
 

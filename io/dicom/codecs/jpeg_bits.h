@@ -47,7 +47,7 @@ class JpegBits {
   }
   /// Goes behind the marker at which the data end. @return the marker's low byte; 0: there is no marker
   std::uint8_t next_marker() {
-    // bytes 0xff before a marker are fill bytes
+    // Bytes 0xff before a marker are fill bytes.
     while (at_ + 1 < bytes_.size() && bytes_[at_] == 0xff && bytes_[at_ + 1] == 0xff) ++at_;
     bits_ = 0;
     count_ = behind_ = 0;
@@ -117,11 +117,11 @@ class JpegCodes {
  private:
   static constexpr int kQuick = 9;
   static constexpr std::size_t kQuickSize = std::size_t{1} << kQuick;
-  /// for the next kQuick bits: length and value of a code that is no longer; 0: none is
+  /// For the next kQuick bits: length and value of a code that is no longer; 0: none is.
   std::array<std::uint16_t, kQuickSize> quick_{};
   std::array<std::uint8_t, 256> values_{};
   std::array<std::size_t, 17> first_{};  ///< by length of code: place in `values_` of the first value, less its code
-  /// by length: the code behind the last one of this length, shifted up to 16 bits
+  /// By length: the code behind the last one of this length, shifted up to 16 bits.
   std::array<std::uint32_t, 17> end_{};
 };
 

@@ -29,7 +29,7 @@ class Segments {
   bool next() {
     marker_ = 0;
     bytes_ = {};
-    // bytes 0xff before a marker are fill bytes
+    // Bytes 0xff before a marker are fill bytes.
     while (at_ + 1 < stream_.size() && stream_[at_] == 0xff && stream_[at_ + 1] == 0xff) ++at_;
     if (at_ + 4 > stream_.size() || stream_[at_] != 0xff) return false;
     const auto length = static_cast<std::size_t>(word(stream_, at_ + 2));

@@ -27,7 +27,7 @@ bool is_one_scan(const JpegFrame& frame);
 struct JpegScan {
   JpegFrame frame;
   JpegCodes dc, ac;  ///< Huffman tables; lossless frames use `dc` alone
-  /// of lossless frames: the number of the predictor, and by how many bits samples were shifted down (T.81 H.1)
+  /// For lossless frames, the number of the predictor, and by how many bits samples were shifted down (T.81 H.1).
   int predictor = 0, transform = 0;
   int restart_interval = 0;  ///< samples or blocks between two restart markers; 0: there are none
   std::span<const std::uint8_t> coded;

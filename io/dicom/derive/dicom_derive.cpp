@@ -61,13 +61,13 @@ std::string line_of(const DicomForm& form) {
 std::string series_uid(const DicomHeaders& source, const DicomDerivation& derivation, const DerivedSeries& series) {
   Sha256 hash;
   hash.add("tetwarp derived series").add(uid_or_made_up(source, DCM_SeriesInstanceUID));
-  // a part of a series is another source than the whole
+  // A part of a series is another source than the whole.
   for (const std::string& uid : series.sop_instance) hash.add(uid);
   const bool named = std::none_of(series.sop_instance.begin(), series.sop_instance.end(),
                                   [](const std::string& uid) { return uid.empty(); });
   if (!named) hash.add(uid_from_headers(source, "instances"));
   hash.add(derivation.field_sha256).add(derivation.parameters).add(version()).add(commit());
-  // a field of zeros has the same digest, but gives another frame of reference
+  // A field of zeros has the same digest, but gives another frame of reference.
   if (!derivation.deformed) hash.add("resampled");
   if (derivation.form != DicomForm()) hash.add(line_of(derivation.form));
   return uid_of(hash);

@@ -32,7 +32,7 @@ struct DerivedSeries {
   std::string source_frame_of_reference_uid;         ///< Frame of Reference UID; made up where the source has none
   std::string number, description;                   ///< Series Number and Description
   std::vector<std::string> sop_class, sop_instance;  ///< by slice of the source
-  /// by slice of the source: its number among the frames of its file, from 1; 0: the slice is a file of its own
+  /// By slice of the source: its number among the frames of its file, from 1; 0: the slice is a file of its own.
   std::vector<int> frame;
   std::vector<int> instance_number;          ///< by slice of the output; no number occurs twice
   std::vector<std::size_t> header;           ///< by slice of the output: the source slice whose header it takes over

@@ -167,7 +167,7 @@ std::string write_with_pixels(const std::filesystem::path& path, int existing, D
   drop(dataset, DCM_SOPInstanceUID);
   Sha256 hash;
   hash.add("tetwarp instance").add(encoded(dataset)).add(pixels.start).add(pixels.value).add(pixels.end);
-  // unlike compressed voxels, the bytes hashed so far do not show deflation
+  // Unlike compressed voxels, the bytes hashed so far do not show deflation.
   if (encoding == DicomEncoding::deflated) hash.add(uid_of(encoding));
   const std::string uid = uid_from_digest(hash.digest());
   put(dataset, DCM_SOPInstanceUID, uid);

@@ -72,7 +72,7 @@ void DerivedSeriesWriter::write(const ConstVolumeView& volume, std::int64_t begi
                                 std::span<const SliceRange> sampled, int threads, const Control& control) {
   State& to = *state_;
   check_volume(volume, to.geometry, sampled);
-  // all ranges are checked before a thread writes a file
+  // All ranges are checked before a thread writes a file.
   for (std::int64_t k = begin; k < end && !sampled.empty(); ++k)
     check_range(sampled[static_cast<std::size_t>(k)], to.source.slices.size());
   for_each_index(static_cast<std::size_t>(end - begin), threads, control, [&](std::size_t n) {

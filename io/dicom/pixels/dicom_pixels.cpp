@@ -73,7 +73,7 @@ bool add_offset(std::span<const std::uint16_t> words, const HuTable& table, std:
   const PixelFormat& format = table.format;
   if (!table.offset || format.high_bit + 1 != format.bits_stored) return false;
   const int sign = 1 << (format.bits_stored - 1);
-  // raised by half of the range, so that int16 can hold the words
+  // Raised by half of the range, so that int16 can hold the words.
   const bool is_raised = !format.is_signed && format.bits_stored == 16;
   const int more = *table.offset + (is_raised ? sign : 0);
   if (more != static_cast<std::int16_t>(more)) return false;

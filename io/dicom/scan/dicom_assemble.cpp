@@ -186,7 +186,7 @@ std::optional<std::string> judge(Headers& files, DicomSeries& series) {
   if (auto problem = mixed_orientations(files)) return problem;
   const auto pixels = first_problem(files, pixel_problem);
   if (auto problem = inconsistency(files)) return pixels ? pixels : problem;
-  // set even where pixels are refused, for the geometry is of use without them
+  // Set even where pixels are refused, for the geometry is of use without them.
   const auto stack = stack_slices(files, series);
   if (!pixels) warn_of_values(files, series);
   if (!pixels && !stack) warn_of_mixture(files, series);

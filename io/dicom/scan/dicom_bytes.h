@@ -60,7 +60,7 @@ std::optional<std::size_t> native_length(std::span<const std::byte> start, E_Tra
 /// The items of encapsulated Pixel Data (PS3.5 A.4).
 struct PixelItems {
   std::vector<FileRange> items;  ///< without tag and length; the first is the Basic Offset Table
-  /// the place in the file behind the delimiter; none: these are no items, or they are cut short
+  /// The place in the file behind the delimiter; none: these are no items, or they are cut short.
   std::optional<std::uint64_t> end;
 };
 /// Finds the items of encapsulated Pixel Data.

@@ -25,8 +25,8 @@ class FrameFile {
   explicit FrameFile(const std::filesystem::path& file);
 
   struct Frame {
-    /// what a file of this slice alone would hold, without Pixel Data and without attributes that count frames of this
-    /// file
+    /// What a file of this slice alone would hold, without Pixel Data and without attributes that count frames of this
+    /// file.
     std::unique_ptr<DcmDataset> data;
     DicomFileHeader header;
   };
@@ -60,7 +60,7 @@ class FrameFile {
   DicomFileHeader whole_;
   std::unique_ptr<EnhancedFrames> frames_;
   mutable std::mutex mutex_;  ///< one thread uses DCMTK's objects at a time
-  /// where in the file the first frame's pixels begin; none: they are compressed, or left to DCMTK
+  /// Where in the file the first frame's pixels begin; none: they are compressed, or left to DCMTK.
   std::optional<std::uint64_t> native_begin_;
   std::vector<FileRange> fragments_;         ///< fragments of all compressed frames
   std::vector<std::size_t> first_fragment_;  ///< by frame: its first fragment; then the number of fragments

@@ -18,7 +18,7 @@ struct DicomHeaders {
   /// For each slice, every attribute but Pixel Data, as read; frames are as EnhancedFrames makes them. Lossy Image
   /// Compression is 01 also where only the transfer syntax says so.
   std::vector<std::unique_ptr<DcmDataset>> slices;
-  /// by slice: its frame's number in the file, from 1; 0: the slice is a file of its own; empty: all slices are
+  /// By slice: its frame's number in the file, from 1; 0: the slice is a file of its own; empty: all slices are.
   std::vector<int> frames = {};
 };
 

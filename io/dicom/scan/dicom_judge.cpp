@@ -237,7 +237,7 @@ std::optional<StoredRange> stored_padding(const PixelFormat& pixels) {
   const int largest = smallest + (1 << pixels.bits_stored) - 1;
   const auto value = [&](int word) {
     if (!pixels.is_signed) return word;
-    // the word has the stored bits alone, without the sign above them
+    // The word has the stored bits alone, without the sign above them.
     if (word > largest && word < 1 << pixels.bits_stored) return word - (1 << pixels.bits_stored);
     return static_cast<int>(static_cast<std::int16_t>(word));
   };

@@ -28,7 +28,7 @@ std::string orientation_text(const std::array<double, 6>& cosines);
 struct SliceKind {
   std::vector<std::size_t> slices;  ///< indices of the slices among the files, rising
   std::string label;  ///< in what these slices differ from other kinds, "axial, 512 x 512"; empty if there is one kind
-  /// the attributes that differ: "Image Orientation (0020,0037) and Rows x Columns"
+  /// The attributes that differ: "Image Orientation (0020,0037) and Rows x Columns".
   std::string differ_by;
 };
 

@@ -70,7 +70,7 @@ struct Loading {
   const DicomSeries& series;
   std::span<std::int16_t> voxels;
   HuTableCache tables = {};
-  /// each thread reads one file at a time, however long the series
+  /// Each thread reads one file at a time, however long the series.
   tbb::enumerable_thread_specific<FileBuffer> buffers = {};
 
   std::span<std::int16_t> slice(std::size_t k) const {

@@ -210,7 +210,7 @@ class Choice {
   Choice(const Stack& stack, bool crowded) : stack_(stack), crowded_(crowded) {}
 
   void offer(const Divider& divider) {
-    // if the best one gives volumes of the same positions, it gives the fewest possible
+    // If the best one gives volumes of the same positions, it gives the fewest possible.
     if (best_ && divider.groups >= best_->groups) return;
     const Judgement judgement = judge(stack_, divider, crowded_);
     if (judgement.verdict == Verdict::no)

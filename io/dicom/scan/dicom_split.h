@@ -16,7 +16,7 @@ struct SplitVolume {
   std::vector<DicomFileHeader> files;
   std::string label = {};     ///< empty where the series is one volume
   std::string split_by = {};  ///< the attribute whose value they share
-  /// where slices lie at one position and nothing tells them apart: the attributes that were tried
+  /// Where slices lie at one position and nothing tells them apart: the attributes that were tried.
   std::string tried = {};
 };
 

@@ -46,9 +46,9 @@ std::optional<std::string> same_position(const Headers& files, const glm::dvec3&
 
 /// How far slices lie beside a line through the first one.
 struct Drift {
-  /// the slice that is farthest from the line; null: all lie on it, but for rounding
+  /// The slice that is farthest from the line; null: all lie on it, but for rounding.
   const DicomFileHeader* slice = nullptr;
-  /// of that slice: its distance from the line, and along the line from the first slice
+  /// How far `slice` lies from the line, and along the line from the first slice.
   double beside_mm = 0, distance_mm = 0;
 };
 

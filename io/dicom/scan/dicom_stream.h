@@ -18,7 +18,7 @@ namespace tetwarp {
 
 struct DicomRead {
   OFCondition result;
-  /// bytes behind the place where reading ended; if the data set is deflated, at least one if there are any
+  /// Bytes behind the place where reading ended; if the data set is deflated, at least one if there are any.
   std::size_t rest = 0;
 };
 

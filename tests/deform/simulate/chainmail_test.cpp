@@ -509,7 +509,7 @@ TEST_P(Chainmail, WhatCannotBeUsedIsRefused) {
   EXPECT_TRUE(says(refused_loads([](Loads& loads) { loads.force.resize(8); }), {"no forces", "found 8"}));
   EXPECT_TRUE(says(refused_loads([](Loads& loads) { place(loads, 5, {0, NAN, 0}); }), {"goal of node 5", "nan"}));
   EXPECT_TRUE(says(refused_loads([](Loads& loads) { place(loads, 5, {0, 5000, 0}); }), {"node 5", "5000", "4096"}));
-  // the goal of a free node is not read
+  // The goal of a free node is not read.
   EXPECT_EQ(refused_loads([](Loads& loads) { loads.goal[5] = {0, NAN, 0}; }), "");
   EXPECT_TRUE(says(refused([&] { simulation->advance(1.5, {}); }), {"1.5", "0 to 1"}));
   EXPECT_TRUE(says(refused([&] { simulation->advance(1, {.motion_mm = -1}); }), {"-1", "0 or more"}));

@@ -36,8 +36,8 @@ inline void register_encoders() {
   DcmRLEEncoderRegistration::registerCodecs();
   DJEncoderRegistration::registerCodecs();
   DJLSEncoderRegistration::registerCodecs(0, 0, 0, 0,
-                                          // takes the words as they are: with the other way DCMTK reads beyond the end
-                                          // of images of odd size
+                                          // Takes the words as they are: with the other way DCMTK reads beyond the end
+                                          // of images of odd size.
                                           OFFalse);
 }
 

@@ -156,7 +156,7 @@ struct MadeEnhanced {
     data.findAndGetUint16(DCM_BitsAllocated, allocated);
     data.findAndGetUint16(DCM_Rows, rows);
     data.findAndGetUint16(DCM_Columns, columns);
-    // a file of one slice may have a byte of padding, which is left out
+    // A file of one slice may have a byte of padding, which is left out.
     const std::size_t size = std::size_t{rows} * columns;
     std::vector<Uint8> bytes;
     std::vector<Uint16> words;

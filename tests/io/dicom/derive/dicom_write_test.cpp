@@ -202,7 +202,7 @@ TEST(DerivedSeries, SliceThicknessThatVariesIsLeftToSlicesOfTheSource) {
   EXPECT_EQ(Written(scratch / "own" / kNames[0])[DCM_SliceThickness], "2.50");
   EXPECT_EQ(Written(scratch / "own" / kNames[2])[DCM_SliceThickness], "5.0");
 
-  // equal in all slices; in the second case stated by one slice alone
+  // Equal in all slices; in the second case stated by one slice alone.
   for (const std::string thickness : {"2.50", "5.0"}) {
     DerivedSource more(5);
     more.headers.slices.resize(3);

@@ -262,7 +262,7 @@ TEST(RealSeries, LosslessEncodingsOfOneSliceAreOneImageAndLossyOnesAreOthers) {
 
 struct OddFile {
   std::string name;
-  /// words of the refusal, or of the reason for skipping; empty: the series can be read
+  /// Words of the refusal, or of the reason for skipping; empty: the series can be read.
   std::vector<std::string> words;
 };
 
