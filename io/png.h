@@ -17,7 +17,7 @@ using Colour = std::array<std::uint8_t, 3>;
 /// A picture of RGB pixels. A pixel (x, y) is counted from 0, x from the left and y from the top.
 class Picture {
  public:
-  /// Makes a picture of one colour. @param width, height  pixels
+  /// Makes a picture of one colour, width x height pixels.
   Picture(int width, int height, Colour colour = {0, 0, 0});
 
   /// Number of columns.
