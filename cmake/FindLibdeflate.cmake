@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: The Tetwarp authors
 # SPDX-License-Identifier: Apache-2.0
 
-# libdeflate, of which Debian 12 has no package config: the target Libdeflate::Libdeflate.
+# Finds libdeflate, for which Debian 12 has no package config, and defines the target Libdeflate::Libdeflate.
 find_path(Libdeflate_INCLUDE_DIR libdeflate.h)
 find_library(Libdeflate_LIBRARY deflate)
 mark_as_advanced(Libdeflate_INCLUDE_DIR Libdeflate_LIBRARY)

@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: The Tetwarp authors
 # SPDX-License-Identifier: Apache-2.0
 
-# OpenJPEG 2.5: the target OpenJP2::OpenJP2. Its own package config, as Debian 12 has it, asks for programs that are in other packages.
+# Finds OpenJPEG 2.5 and defines the target OpenJP2::OpenJP2. Debian 12 has a package config for it, which wants programs
+# that are in other packages.
 find_path(OpenJP2_INCLUDE_DIR openjpeg.h PATH_SUFFIXES openjpeg-2.5)
 find_library(OpenJP2_LIBRARY openjp2)
 mark_as_advanced(OpenJP2_INCLUDE_DIR OpenJP2_LIBRARY)

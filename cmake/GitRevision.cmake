@@ -22,7 +22,7 @@ endif()
 
 set(TETWARP_COMMIT "unknown")
 if(GIT)
-  # A source archive unpacked inside some other repository must not show that one's commit.
+  # A source archive that was unpacked inside another repository must not show the commit of that repository.
   execute_process(COMMAND "${GIT}" rev-parse --show-cdup WORKING_DIRECTORY "${SOURCE}"
                   OUTPUT_VARIABLE up RESULT_VARIABLE failed OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
   if(NOT failed AND "${up}" STREQUAL "")

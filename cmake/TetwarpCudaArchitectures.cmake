@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: The Tetwarp authors
 # SPDX-License-Identifier: Apache-2.0
 
-# tetwarp_enable_cuda(): enables CUDA and settles which architectures device code is compiled for: that is most of what
-# CUDA adds to the time of a build. CMAKE_CUDA_ARCHITECTURES (in the environment: CUDAARCHS) decides where it is given,
-# next TETWARP_CUDA_ARCHITECTURES, otherwise this machine. One line says what it came to.
+# tetwarp_enable_cuda(): enables CUDA and chooses the architectures for which device code is compiled. Their number makes
+# most of the time that CUDA adds to a build. CMAKE_CUDA_ARCHITECTURES (in the environment: CUDAARCHS) decides where it is given,
+# next TETWARP_CUDA_ARCHITECTURES, otherwise this machine. One line of output states the choice.
 macro(tetwarp_enable_cuda)
   if(TETWARP_CUDA_ARCHITECTURES AND NOT DEFINED CMAKE_CUDA_ARCHITECTURES)
     set(CMAKE_CUDA_ARCHITECTURES "${TETWARP_CUDA_ARCHITECTURES}")
@@ -24,7 +24,8 @@ macro(tetwarp_enable_cuda)
   message(STATUS "Tetwarp: CUDA architectures ${CMAKE_CUDA_ARCHITECTURES} (${tetwarp_cuda_reason})")
 endmacro()
 
-# tetwarp_choose_cuda_architectures(CHOSEN REASON DEVICES SUPPORTED): what to compile for, and why, in words.
+# tetwarp_choose_cuda_architectures(CHOSEN REASON DEVICES SUPPORTED): sets CHOSEN to the architectures to compile for, and
+# REASON to why, in words.
 # DEVICES: architectures of this machine's devices, as 90 or 90-real; empty where there is none. SUPPORTED: what
 # `nvcc --list-gpu-code` prints.
 #

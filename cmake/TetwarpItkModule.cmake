@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: The Tetwarp authors
 # SPDX-License-Identifier: Apache-2.0
 
-# tetwarp_find_itk(MODULES ...): ITK_LIBRARIES and ITK_INCLUDE_DIRS of these modules and what they depend on.
+# tetwarp_find_itk(MODULES ...): sets ITK_LIBRARIES and ITK_INCLUDE_DIRS for these modules and all that they depend on.
 macro(tetwarp_find_itk)
   if(TETWARP_ITK_MODULE AND ITK_SOURCE_DIR)
     itk_module_config(ITK ${ARGN})  # inside ITK's own build there is no package ITK yet
@@ -10,9 +10,9 @@ macro(tetwarp_find_itk)
   endif()
 endmacro()
 
-# tetwarp_itk_module(): tells ITK of the module Tetwarp; before all libraries, for ITK says where they go. Who finds ITK
-# with it is sent to the package that Tetwarp makes in any case (TetwarpPackage.cmake). ITK's macros want variables of
-# these names for each module.
+# tetwarp_itk_module(): declares Tetwarp as a module of ITK. It is called before any library is made, for ITK says where
+# libraries go. A project that finds ITK with this module is sent to the package that Tetwarp makes in any case
+# (TetwarpPackage.cmake). ITK's macros want variables of these names for each module.
 macro(tetwarp_itk_module)
   set(Tetwarp_SOURCE_DIR "${PROJECT_SOURCE_DIR}")
   set(Tetwarp_BINARY_DIR "${PROJECT_BINARY_DIR}")
@@ -24,7 +24,7 @@ macro(tetwarp_itk_module)
     itk_module_impl()
   else()
     find_package(ITK REQUIRED)
-    set(BUILD_TESTING OFF)  # there are no tests of the module's own, and with them ITK downloads its clang-format
+    set(BUILD_TESTING OFF)  # the module has no tests of its own, and for tests ITK would download its clang-format
     list(APPEND CMAKE_MODULE_PATH "${ITK_CMAKE_DIR}")
     include(ITKModuleExternal)
   endif()

@@ -16,7 +16,8 @@ function(tetwarp_install_library name)
   export(EXPORT tetwarp-${name} NAMESPACE tetwarp:: FILE "${PROJECT_BINARY_DIR}/tetwarp-${name}.cmake")
 endfunction()
 
-# tetwarp_install_package(): what find_package() reads first; after all libraries.
+# tetwarp_install_package(): makes and installs the file that find_package() reads first. It is called after all libraries
+# are made.
 function(tetwarp_install_package)
   set(tetwarp_itk_package "")
   if(TETWARP_WITH_ITK AND NOT TETWARP_ITK_MODULE)  # a module is found by ITK, and does not find ITK itself

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: The Tetwarp authors
 # SPDX-License-Identifier: Apache-2.0
 
-# tetwarp_library(NAME SOURCES ... HEADERS ...): the library target tetwarp_NAME, alias tetwarp::NAME, and the component
-# NAME of the package (TetwarpPackage.cmake). HEADERS: what its users include, and what these headers include; they are
-# installed.
+# tetwarp_library(NAME SOURCES ... HEADERS ...): makes the library target tetwarp_NAME, alias tetwarp::NAME, and the
+# component NAME of the package (TetwarpPackage.cmake). HEADERS are those that users include, and those that these include
+# in turn; they are installed.
 #
 # The flags that bits depend on are the target's own, so that every build type and every user has them: no fused
 # multiply-add unless the source spells it.
@@ -17,7 +17,7 @@ function(tetwarp_library name)
   tetwarp_install_library(${name})
 endfunction()
 
-# tetwarp_module(NAME SOURCES ...): libtetwarp_NAME.so, which io/files/module.h loads when it is needed. It is built
+# tetwarp_module(NAME SOURCES ...): makes libtetwarp_NAME.so, which io/files/module.h loads when it is needed. It is built
 # with tetwarp_io, and looked for in lib of the build and of the installation.
 function(tetwarp_module name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES")
@@ -27,7 +27,7 @@ function(tetwarp_module name)
   install(TARGETS tetwarp_${name} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 endfunction()
 
-# What every target of the project is compiled with.
+# Sets the options with which every target of the project is compiled.
 function(tetwarp_configure target)
   target_compile_features(${target} PUBLIC cxx_std_20)
   target_include_directories(${target} PUBLIC "$<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>"

@@ -5,7 +5,8 @@
 # Prints the preset for this machine: cuda where nvcc is found, else cpu.
 #
 #   cmake/preset.sh            the preset that users build
-#   cmake/preset.sh --built    the one of it and its ci- form (warnings are errors) that was built last; the user's if none was
+#   cmake/preset.sh --built    the preset that was built last: that one, or its ci- form (warnings are errors); if neither
+#                              was built, that one
 #
 # TETWARP_PRESET decides instead where it is set.
 set -euo pipefail

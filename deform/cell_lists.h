@@ -9,13 +9,14 @@
 
 namespace tetwarp {
 
-/// For each of many cells the numbers of the items (such as tetrahedra) that may reach it. The lists lie one after
+/// For each of many cells, the numbers of the items (such as tetrahedra) that may reach it. The lists lie one after
 /// another in one array.
 class CellLists {
  public:
-  /// @param for_each_pair  called twice: `for_each_pair(visit)` calls `visit(cell, number)` in the same order each
-  /// time,
-  ///                       which is that of each list
+  /// Makes the lists.
+  /// @param cells          number of cells
+  /// @param for_each_pair  called twice: `for_each_pair(visit)` calls `visit(cell, number)` for every item that may
+  /// reach a cell, both times in the same order, which is that of each list
   template <class ForEachPair>
   void build(std::size_t cells, ForEachPair&& for_each_pair) {
     first_.assign(cells + 1, 0);
@@ -31,7 +32,7 @@ class CellLists {
   const std::uint32_t* end(std::size_t cell) const { return numbers_.data() + first_[cell + 1]; }
 
  private:
-  std::vector<std::size_t> first_;  ///< of each cell, and of one more: where its list begins
+  std::vector<std::size_t> first_;  ///< by cell: where its list begins; and one entry more
   std::vector<std::uint32_t> numbers_;
 };
 

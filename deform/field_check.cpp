@@ -14,12 +14,12 @@ namespace tetwarp {
 
 namespace {
 
-constexpr double kSmallestCell = 1.0 / 1024;  ///< voxels; snapping would leave smaller cells no shape
-/// Voxels that a lattice may end short of the outermost voxel centres and still be taken to end there: what rounding a
-/// header's spacing and origin to six digits costs on 512 voxels (2.6e-3), and a little more.
+constexpr double kSmallestCell = 1.0 / 1024;  ///< in voxels; snapping would leave smaller cells without a shape
+/// How far, in voxels, a lattice may end before the outermost voxel centres and still count as reaching them: what
+/// rounding a header's spacing and origin to six digits costs on 512 voxels (2.6e-3), and a little more.
 constexpr double kBorderRounding = 1.0 / 256;
 
-/// Where the corners of an output lie in a lattice: the least and most vertex index of each axis.
+/// Where the corners of an output lie in a lattice: the lowest and highest vertex index on each axis.
 struct Reach {
   glm::dvec3 low{INFINITY}, high{-INFINITY};
 
@@ -41,17 +41,18 @@ bool is_aligned(const glm::dvec3& step, std::int64_t cells) {
   return along == 1;
 }
 
-/// How far beyond the end of an axis a lattice is drawn out, so that its snapped border loses no voxel; vertex index.
+/// How far a lattice is lengthened at the end of an axis so that its snapped border loses no voxel, in vertex index.
 /// @param missing  voxels from the lattice's end to the outermost corner of the output; negative where it overhangs
 double drawn_out(double missing, double voxels_per_cell, bool aligned) {
   constexpr double kStep = 1.0 / kStepsPerVoxel;
-  // A border in a plane of voxels snaps onto it from half a step away. An oblique one may lose a step and needs two.
+  // A border that lies in a plane of voxels, up to half a step before it, is snapped onto it. An oblique border may
+  // lose a step and is moved by two.
   const double from = aligned ? kStep / 4 : -kStep, further = aligned ? 0 : 2 * kStep;
   return missing > from && missing <= kBorderRounding ? (missing + further) / voxels_per_cell : 0;
 }
 
-/// Draws a lattice out to the border of the output where it ends within rounding of it. A lattice that reaches over the
-/// border, or ends well inside it, stays as it is.
+/// Lengthens a lattice to the border of the output where it ends within rounding of it. A lattice that reaches beyond
+/// the border, or ends well inside it, stays as it is.
 void reach_border(const Reach& reach, LatticeFrame& frame) {
   glm::dvec3 low(0), high(frame.cells);
   for (int axis = 0; axis < 3; ++axis) {
@@ -68,7 +69,7 @@ void reach_border(const Reach& reach, LatticeFrame& frame) {
   frame.lattice_from_output = AffineMap{diagonal(1.0 / scale), -low / scale} * frame.lattice_from_output;
 }
 
-/// @throws InputError for a lattice that does not reach over the output
+/// Refuses a lattice that does not reach over the output. @throws InputError
 void require_reach(const Reach& reach, const LatticeFrame& frame) {
   for (int axis = 0; axis < 3; ++axis) {
     const double slack = kBorderRounding / glm::length(frame.output_from_lattice.linear[axis]),
@@ -131,7 +132,7 @@ StepLattice make_step_lattice(const LatticeFrame& frame, const Geometry& output)
       const double meant = other == axis ? step / kStepsPerVoxel : 0;
       if (std::fabs(linear[axis][other] - meant) * static_cast<double>(frame.cells[axis]) > kNegligible) return {};
     }
-    // From the first vertex, all places of vertices and voxels must be whole numbers that float holds.
+    // Places of vertices and voxels are counted from the first vertex; float must hold all of them as whole numbers.
     const double far = step * static_cast<double>(frame.cells[axis]);
     const double grid = static_cast<double>(output.size[axis]) * kStepsPerVoxel;
     const double before = std::fabs(static_cast<double>(first[axis]));
@@ -155,7 +156,7 @@ PullFrame make_pull_frame(const Geometry& output, const PullFieldView& field) {
   require(field.grid && field.displacement, "the pull field is empty");
   require_valid(*field.grid, "pull field grid");
   PullFrame frame;
-  frame.grid_from_output = *field.grid == output  // rounding tells no grid from itself
+  frame.grid_from_output = *field.grid == output  // exact where both are the same grid, without rounding
                                ? AffineMap{glm::dmat3(1), glm::dvec3(0)}
                                : index_from_point(*field.grid) * point_from_index(output);
   frame.output_from_mm = index_from_point(output).linear;

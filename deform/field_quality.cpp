@@ -24,7 +24,7 @@ namespace {
 using glm::dmat3;
 using glm::dvec3;
 
-/// Characteristic polynomial of a symmetric matrix without negative eigenvalues.
+/// Characteristic polynomial of a symmetric 3 x 3 matrix without negative eigenvalues.
 struct Characteristic {
   double trace, minors, determinant;
 
@@ -36,9 +36,10 @@ struct Characteristic {
 
   double value(double x) const { return ((x - trace) * x + minors) * x - determinant; }
   double slope(double x) const { return (3 * x - 2 * trace) * x + minors; }
-  /// Whether no eigenvalue is above x (Budan).
+  /// Whether no eigenvalue exceeds x (Budan's theorem).
   bool is_below(double x) const { return value(x) >= 0 && slope(x) >= 0 && 3 * x >= trace; }
-  /// Newton's method from the trace, which is above. IEEE 754 fixes all it uses, so the same bits everywhere.
+  /// The largest eigenvalue, by Newton's method from the trace, which is at least as large. It uses only operations
+  /// that IEEE 754 fixes, so it has the same bits everywhere.
   double largest_root() const {
     double x = trace;
     for (int step = 0; step < 60; ++step) {
@@ -53,17 +54,17 @@ struct Characteristic {
 /// Adds up the gradients of one part of a field, in order.
 ///
 /// A gradient is passed over where it cannot stretch more than those before it, to within rounding. So the last bits of
-/// the largest stretch depend on which came before: parts are therefore fixed, whatever thread takes them.
-class Tally {
+/// the largest stretch depend on the order. Parts are therefore fixed, whichever thread takes them.
+class StretchTally {
  public:
-  explicit Tally(const dmat3& from_lattice)
+  explicit StretchTally(const dmat3& from_lattice)
       : inverse_(glm::inverse(from_lattice)), over_rest_(1 / glm::determinant(from_lattice)) {}
 
-  /// @param gradient  of the deformed place by vertex index
+  /// Adds one gradient. @param gradient  of the deformed place with respect to vertex index
   void add(const dmat3& gradient, std::uint64_t part) {
     add(gradient * inverse_, glm::determinant(gradient) * over_rest_, part);
   }
-  /// @param f  gradient of the deformed by the undeformed place
+  /// Adds one gradient. @param f  of the deformed place with respect to the undeformed place
   void add(const dmat3& f, double determinant, std::uint64_t part) {
     const auto bin = std::upper_bound(FieldQuality::kEdges.begin(), FieldQuality::kEdges.end(), determinant) -
                      FieldQuality::kEdges.begin();
@@ -86,7 +87,7 @@ class Tally {
  private:
   static constexpr double kAboveRounding = 1 + 1e-9;
 
-  /// No eigenvalue of transpose(f) f is above (Gershgorin). Most gradients need no more.
+  /// A bound on the eigenvalues of transpose(f) f (Gershgorin). For most gradients this is enough.
   static double bound(const dmat3& f) {
     const double xx = glm::dot(f[0], f[0]), yy = glm::dot(f[1], f[1]), zz = glm::dot(f[2], f[2]);
     const double xy = std::abs(glm::dot(f[0], f[1])), xz = std::abs(glm::dot(f[0], f[2])),
@@ -100,8 +101,8 @@ class Tally {
   double largest_ = 0;
 };
 
-/// The five tetrahedra of a cell. @param u  displacements of its corners
-void add_cell(const dvec3 (&u)[8], bool odd, const dmat3& from_lattice, Tally& tally) {
+/// Adds the five tetrahedra of a cell. @param u  displacements of its corners
+void add_cell(const dvec3 (&u)[8], bool odd, const dmat3& from_lattice, StretchTally& tally) {
   for (int t = 1; t < kTetrahedraPerCell; ++t) {
     const TetrahedronCorners of = tetrahedron_corners(t, odd);
     const auto along = [&](int neighbour, int axis) {
@@ -137,10 +138,10 @@ FieldQuality quality_of(const TetrahedralMesh& mesh, const Limits& limits, const
   tbb::enumerable_thread_specific<FieldQuality> found;
   tbb::task_arena arena = cpu::make_arena(limits);
   const std::size_t count = mesh.tetrahedra.size();
-  cpu::Progress progress(control, static_cast<std::int64_t>(count));
+  cpu::WorkProgress progress(control, static_cast<std::int64_t>(count));
   arena.execute([&] {
     tbb::parallel_for(std::size_t{0}, (count + kAtOnce - 1) / kAtOnce, [&](std::size_t part) {
-      Tally tally(dmat3(1));
+      StretchTally tally(dmat3(1));
       const std::size_t begin = part * kAtOnce, end = std::min(begin + kAtOnce, count);
       for (std::size_t n = begin; n < end; ++n) {
         const glm::u32vec4& t = mesh.tetrahedra[n];
@@ -184,10 +185,10 @@ FieldQuality measure_quality(const VertexField& field, const Limits& limits, con
   const dmat3 from_lattice = point_from_index(field.lattice).linear;
   tbb::enumerable_thread_specific<FieldQuality> found;
   tbb::task_arena arena = cpu::make_arena(limits);
-  cpu::Progress progress(control, size.z - 1);
+  cpu::WorkProgress progress(control, size.z - 1);
   arena.execute([&] {
     tbb::parallel_for(std::int64_t{0}, size.z - 1, [&](std::int64_t z) {
-      Tally tally(from_lattice);
+      StretchTally tally(from_lattice);
       for (std::int64_t y = 0; y < size.y - 1; ++y) {
         const glm::vec3* rows[4];
         for (int n = 0; n < 4; ++n)

@@ -85,7 +85,7 @@ bool is_sheared(const Geometry& geometry) {
 
 Geometry straightened(const Geometry& geometry) {
   if (geometry.slices.empty() && !is_sheared(geometry)) return geometry;
-  constexpr double kNearly = 1.0 / 1024;  // of a voxel: rounding adds none
+  constexpr double kNearly = 1.0 / 1024;  // voxels, so that rounding adds no voxel
   Geometry grid{geometry.size, geometry.spacing, geometry.origin, geometry.direction};
   const glm::dvec3 row = geometry.direction[0];
   const glm::dvec3 column = glm::normalize(geometry.direction[1] - glm::dot(geometry.direction[1], row) * row);

@@ -10,7 +10,7 @@ namespace tetwarp {
 
 namespace {
 
-constexpr double kAir = -1000;  ///< HU without mass
+constexpr double kAir = -1000;  ///< HU of what has no mass
 
 template <class V>
 V stored(double value, std::uint64_t& saturated) {
@@ -54,7 +54,7 @@ std::uint64_t preserve_mass(const ConstVolumeView& hu, const Maps& maps, const s
   };
   const auto* determinants = reinterpret_cast<const float*>(jacobian.voxels);
   const auto* covered = reinterpret_cast<const std::uint8_t*>(coverage.voxels);
-  const std::int64_t before = held.begin.z * slice;  // the maps' first voxel
+  const std::int64_t before = held.begin.z * slice;  // number of the maps' first voxel in the whole volume
   std::uint64_t saturated = 0;
   dispatch(output.type, [&](auto voxel) {
     using V = decltype(voxel);

@@ -13,12 +13,12 @@ namespace tetwarp {
 
 namespace {
 
-/// A weight that is negative by no more is rounding: the tetrahedron holds the point.
+/// The largest negative weight that counts as rounding: the tetrahedron holds the point.
 constexpr double kRounding = 1e-9;
-/// How far outside a point may lie by rounding of vertices and of its own, in 2^-12 voxel.
+/// How far outside a mesh a point may lie by rounding of vertices and of its own coordinates, in steps (2^-12 voxel).
 constexpr double kOutside = 1;
 
-/// Where a tetrahedron lies undeformed, 2^-12 voxel.
+/// The undeformed corners of a tetrahedron, in steps (2^-12 voxel).
 struct RestCorners {
   glm::dvec3 a, b, c, d;
 
@@ -86,7 +86,7 @@ std::optional<MeshLocator::Found> MeshLocator::find(const glm::dvec3& steps) con
     const glm::dvec3 w = weights_from_place * (steps - at.d);
     const double of_d = 1 - w.x - w.y - w.z;
     if (std::min({w.x, w.y, w.z, of_d}) >= -kRounding) return Found{*t, w};
-    const glm::dmat3 rows = glm::transpose(weights_from_place);  // how fast each weight changes
+    const glm::dmat3 rows = glm::transpose(weights_from_place);  // how fast each weight changes from place to place
     const double distance = std::min({w.x / glm::length(rows[0]), w.y / glm::length(rows[1]),
                                       w.z / glm::length(rows[2]), of_d / glm::length(rows[0] + rows[1] + rows[2])});
     if (distance <= least_outside) continue;

@@ -34,7 +34,7 @@ class MeshLocator {
   const SnappedMesh& mesh_;
   glm::dvec3 low_{0}, cell_{1};  ///< 2^-12 voxel: least corner of the grid, and size of its cells
   glm::i64vec3 cells_{0};        ///< on each axis
-  CellLists lists_;              ///< of the tetrahedra that may reach each cell, i fastest; rising
+  CellLists lists_;              ///< by cell, i fastest: numbers of the tetrahedra that may reach it, rising
 };
 
 }  // namespace tetwarp

@@ -17,10 +17,11 @@ namespace {
 
 using namespace phantom;
 
-constexpr glm::dvec3 kBodySpace(410, 410, 300);  // mm: the field of view that the anatomy is written for
+// Sides in mm of the field of view for which the anatomy is written.
+constexpr glm::dvec3 kBodySpace(410, 410, 300);
 constexpr double kPi = 3.14159265358979323846;
 
-/// Sums of two sine waves, one table for each axis of the grid: how far each axis of the body is bent there.
+/// How far each axis of the body is bent at each voxel: sums of two sine waves, in one table for each axis of the grid.
 class Bending {
  public:
   Bending(const glm::i64vec3& size, std::uint64_t seed) {
@@ -41,7 +42,7 @@ class Bending {
     for (std::int64_t i = 0; i < size; ++i) {
       const double turn = 2 * kPi * waves * (static_cast<double>(i) + 0.5) / static_cast<double>(size);
       for (int moved = 0; moved < 3; ++moved) {
-        if (moved == axis) continue;  // an axis is bent by the two others: lengths along it stay
+        if (moved == axis) continue;  // an axis is bent by the two others, so lengths along it stay
         const double strength = moved == 2 ? 0.6 : 1.0;
         tables_[axis][static_cast<std::size_t>(i)][moved] +=
             static_cast<float>(strength * amplitude_mm * sin_cos(turn + kPi * phase[moved]).sin);
@@ -52,12 +53,12 @@ class Bending {
   std::array<std::vector<Point>, 3> tables_;
 };
 
-/// Smooth random numbers, trilinear between the points of a lattice of `pitch_mm`; about -1 to 1.
+/// Smooth random numbers, about -1 to 1: trilinear between the points of a lattice with distance `pitch_mm`.
 class Texture {
  public:
   Texture(float pitch_mm, std::uint64_t seed) : pitch_mm_(pitch_mm), seed_(seed) {}
 
-  /// Adds `weight` times the texture of a row to `sum`. Rows are cut into lattice cells first.
+  /// Adds `weight` times the texture of a row to `sum`. The row is first cut into the cells of the lattice.
   void add(std::span<const float> x, float y, float z, float weight, std::span<float> sum) const {
     const Cell at_y = cell(y), at_z = cell(z);
     std::int32_t held = INT32_MIN;
@@ -76,7 +77,7 @@ class Texture {
  private:
   struct Cell {
     std::int32_t index;
-    float part;  ///< eased, so that the lattice does not show
+    float part;  ///< place in the cell, eased so that the lattice does not show
   };
   Cell cell(float position) const {
     const float scaled = position / pitch_mm_, down = std::floor(scaled), t = scaled - down;
@@ -98,17 +99,17 @@ class Texture {
   std::uint64_t seed_;
 };
 
-/// How tissue of some HU varies from place to place: `texture` is about -1 to 1.
+/// The HU of a place in tissue whose mean is `hu`. `texture`, about -1 to 1, is the random number of that place.
 float textured(float hu, float texture) {
   if (hu < -950) return hu;
   if (hu < -400) return hu + 26 * texture;                                             // lung
   if (hu < -40) return hu + 9 * texture;                                               // fat
   if (hu > 160) return hu + 55 * texture;                                              // bone
-  const float marbling = hu > 46 && hu < 58 ? std::max(texture - 0.45f, 0.0f) : 0.0f;  // muscle has fat in it
+  const float marbling = hu > 46 && hu < 58 ? std::max(texture - 0.45f, 0.0f) : 0.0f;  // fat within muscle
   return hu + 7 * texture - 110 * marbling;
 }
 
-/// Noise of a slice: white, then smoothed over three by three voxels as a reconstruction does; variance 1.
+/// Noise of a slice with variance 1: white, then smoothed over three by three voxels, as a reconstruction does.
 class GrainRows {
  public:
   GrainRows(const glm::i64vec3& size, std::int64_t slice, std::uint64_t seed) : width_(size.x), seed_(seed) {
@@ -117,7 +118,7 @@ class GrainRows {
     fill(0);
     fill(1);
   }
-  /// The next row of the slice.
+  /// Makes the next row of the slice.
   void next(std::span<float> grain) {
     fill(row_ + 2);
     const auto &above = rows_[row_ % 3], &here = rows_[(row_ + 1) % 3], &below = rows_[(row_ + 2) % 3];
@@ -126,7 +127,7 @@ class GrainRows {
   }
 
  private:
-  /// Row j of the slice, counted from one before it, smoothed along x.
+  /// Makes row j of the slice, smoothed along x only; rows are counted from one before the first.
   void fill(std::uint64_t j) {
     const std::uint64_t key = hash(seed_) + first_key_ + j * static_cast<std::uint64_t>(width_ + 2);
     float left = normal(key), here = normal(key + 1);
@@ -143,7 +144,7 @@ class GrainRows {
   std::array<std::vector<float>, 3> rows_;
 };
 
-/// All that the slices share.
+/// What all slices share.
 struct Scene {
   Geometry geometry;
   std::uint64_t seed;
@@ -151,7 +152,7 @@ struct Scene {
   std::vector<Organ> organs;
   Bending bending;
   Texture coarse, fine;
-  std::vector<float> x;  ///< body space, of each column
+  std::vector<float> x;  ///< body space, by column
   float edge;
 
   Scene(const Geometry& grid, std::uint64_t seed_)
@@ -165,15 +166,15 @@ struct Scene {
     edge = 1.4f * static_cast<float>(std::max(kBodySpace.x / static_cast<double>(grid.size.x),
                                               kBodySpace.y / static_cast<double>(grid.size.y)));
   }
-  /// Body space of a voxel's centre along one axis.
+  /// The place of a voxel's centre along one axis in body space.
   float position(int axis, std::int64_t voxel) const {
     const double size = static_cast<double>(geometry.size[axis]);
     return static_cast<float>(((static_cast<double>(voxel) + 0.5) / size - 0.5) * kBodySpace[axis]);
   }
 };
 
-Box box_of(std::span<const Point> points) {
-  Box box{points[0], points[0]};
+Bounds box_of(std::span<const Point> points) {
+  Bounds box{points[0], points[0]};
   for (const Point& p : points) box = {glm::min(box.low, p), glm::max(box.high, p)};
   return box;
 }
@@ -186,7 +187,7 @@ void paint_slice(const Scene& scene, std::int64_t k, std::span<std::int16_t> sli
   const float z = scene.position(2, k);
   std::vector<const Organ*> near;
   for (const Organ& organ : scene.organs) {
-    const Box box = reach(organ, scene.edge);
+    const Bounds box = reach(organ, scene.edge);
     if (box.low.z < z + kBendingMost && box.high.z > z - kBendingMost) near.push_back(&organ);
   }
   std::vector<float> hu(columns), texture(columns), grain(columns);
@@ -196,7 +197,7 @@ void paint_slice(const Scene& scene, std::int64_t k, std::span<std::int16_t> sli
     const float y = scene.position(1, j);
     for (std::size_t i = 0; i < columns; ++i)
       points[i] = Point(scene.x[i], y, z) + scene.bending.at(static_cast<std::int64_t>(i), j, k);
-    const Row row{scene.x, y, points, box_of(points), scene.edge, hu};
+    const PaintedRow row{scene.x, y, points, box_of(points), scene.edge, hu};
     paint_surroundings(row);
     paint_trunk(row, scene.trunk);
     for (const Organ* organ : near) paint_organ(row, *organ, scene.trunk);

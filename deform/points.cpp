@@ -23,19 +23,20 @@ namespace tetwarp {
 
 namespace {
 
-/// How far beyond the lattice a point on its border may lie by rounding, in voxels of the output.
+/// How far outside the lattice a point on its border may lie by rounding, in voxels of the output.
 constexpr double kOnBorder = 1.0 / kStepsPerVoxel;
-/// A weight that is negative by no more is rounding: the tetrahedron holds the point.
+/// The largest negative weight that counts as rounding: the tetrahedron holds the point.
 constexpr double kRounding = 1e-9;
 
 /// A tetrahedron and the weights of its corners A, B, C at a point.
 struct Holder {
   Tetrahedron tetrahedron{};
   glm::dvec3 weights{0};
-  double least = -INFINITY;  ///< of all four weights: negative outside the tetrahedron
+  /// The least of all four weights: negative where the point is outside the tetrahedron.
+  double least = -INFINITY;
 };
 
-/// How far the affine map of a tetrahedron moves what it holds; mm.
+/// By how much the affine map of a tetrahedron moves the point with these weights, LPS mm.
 glm::dvec3 moved_by(const Tetrahedron& t, const glm::dvec3& weights, const glm::dmat3& mm_from_output) {
   const glm::dvec3 d(t.d.u), &w = weights;
   const glm::dvec3 u =
@@ -43,14 +44,14 @@ glm::dvec3 moved_by(const Tetrahedron& t, const glm::dvec3& weights, const glm::
   return u == glm::dvec3(0) ? u : mm_from_output * (u * (-1.0 / kStepsPerVoxel));
 }
 
-/// Adds it, so that a point that does not move keeps its bits.
+/// Adds a motion to a point. A point that does not move keeps its bits, -0 included.
 void add_move(const glm::dvec3& by, glm::dvec3& point) {
   if (by != glm::dvec3(0)) point += by;
 }
 
 }  // namespace
 
-/// A field as points see it.
+/// The forward map of a field, for points.
 class PointMover::Map {
  public:
   virtual ~Map() = default;
@@ -82,7 +83,7 @@ class LatticeMap final : public PointMover::Map {
   const LatticeFrame frame_;
   const AffineMap output_from_point_;
   const glm::dmat3 mm_from_output_;
-  glm::dvec3 slack_{0};  ///< kOnBorder in cells
+  glm::dvec3 slack_{0};  ///< kOnBorder, in cells along each axis
 };
 
 Vertex LatticeMap::vertex(const glm::i64vec3& cell, int corner) const {
@@ -93,7 +94,7 @@ Vertex LatticeMap::vertex(const glm::i64vec3& cell, int corner) const {
   return result;
 }
 
-/// @param steps  a point of output index in 2^-12 voxel, not rounded
+/// The weights of a point in a tetrahedron. @param steps  the point in output index times 2^12, not rounded
 Holder LatticeMap::hold(const glm::i64vec3& cell, const TetrahedronCorners& corners, const glm::dvec3& steps) const {
   Holder holder;
   Tetrahedron& t = holder.tetrahedron;
@@ -106,8 +107,8 @@ Holder LatticeMap::hold(const glm::i64vec3& cell, const TetrahedronCorners& corn
   return holder;
 }
 
-/// The tetrahedron that holds a point best, of a cell and its neighbours: snapping moves the faces of undeformed
-/// tetrahedra by up to 2^-13 voxel, so the point may be beyond a face of the one that held it before.
+/// Among the tetrahedra of a cell and its neighbours, the one that holds a point best. Snapping moves the faces of
+/// undeformed tetrahedra by up to 2^-13 voxel, so a point may lie beyond a face of the tetrahedron that held it before.
 Holder LatticeMap::search_around(const glm::i64vec3& cell, const glm::dvec3& steps) const {
   const glm::i64vec3 begin = glm::max(cell - std::int64_t{1}, glm::i64vec3(0));
   const glm::i64vec3 end = glm::min(cell + std::int64_t{2}, frame_.cells);
@@ -183,7 +184,7 @@ PointStatus PointMover::move(glm::dvec3& point) const { return map_->move(point)
 
 std::vector<PointStatus> PointMover::move(std::span<glm::dvec3> points, const Control& control) const {
   std::vector<PointStatus> status(points.size());
-  cpu::Progress progress(control, static_cast<std::int64_t>(points.size()));
+  cpu::WorkProgress progress(control, static_cast<std::int64_t>(points.size()));
   cpu::FirstRefusal refusal;
   tbb::task_arena arena = cpu::make_arena(limits_);
   arena.execute([&] {

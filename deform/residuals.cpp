@@ -21,7 +21,7 @@ namespace tetwarp {
 
 namespace {
 
-/// Counts distances by the upper 16 bits of their floats: bins less than 1 % wide.
+/// Counts distances by the upper 16 bits of their floats, which gives bins less than 1 % wide.
 class Histogram {
  public:
   void add(double distance) {
@@ -31,7 +31,7 @@ class Histogram {
   void add(const Histogram& other) {
     for (std::size_t n = 0; n < counts_.size(); ++n) counts_[n] += other.counts_[n];
   }
-  /// The upper end of the bin that holds what a part of all distances do not exceed.
+  /// A distance that the part `part` of all distances does not exceed: the upper end of a bin.
   double percentile(double part, std::uint64_t all) const {
     const auto wanted = static_cast<std::uint64_t>(std::ceil(part * static_cast<double>(all)));
     std::uint64_t seen = 0;
@@ -48,13 +48,13 @@ class Histogram {
   std::vector<std::uint64_t> counts_ = std::vector<std::uint64_t>(std::size_t{1} << (31 - kDropped));
 };
 
-/// Of one slice: sums are added up slice by slice, whatever thread made them.
-struct Slice {
+/// Sums of one slice. They are added up slice by slice, whichever thread made them, so that the order is fixed.
+struct SliceSums {
   std::uint64_t points = 0;
   double sum = 0, largest = 0;
 };
 
-/// Distances found in the slices of a grid, in one call or several.
+/// Collects distances from the slices of a grid, in one call or several.
 class Distances {
  public:
   explicit Distances(std::int64_t slices) : slices_(static_cast<std::size_t>(slices)) {}
@@ -63,10 +63,10 @@ class Distances {
   template <class Find>
   void find(std::int64_t begin, std::int64_t end, const Limits& limits, const Control& control, Find&& distances) {
     tbb::task_arena arena = cpu::make_arena(limits);
-    cpu::Progress progress(control, end - begin);
+    cpu::WorkProgress progress(control, end - begin);
     arena.execute([&] {
       tbb::parallel_for(begin, end, [&](std::int64_t k) {
-        Slice& slice = slices_[static_cast<std::size_t>(k)];
+        SliceSums& slice = slices_[static_cast<std::size_t>(k)];
         Histogram& histogram = histograms_.local();
         distances(k, [&](double distance) {
           ++slice.points;
@@ -82,7 +82,7 @@ class Distances {
   Residuals residuals() const {
     Residuals all;
     double sum = 0;
-    for (const Slice& slice : slices_) {
+    for (const SliceSums& slice : slices_) {
       all.points += slice.points;
       sum += slice.sum;
       all.largest = std::max(all.largest, slice.largest);
@@ -96,14 +96,14 @@ class Distances {
   }
 
  private:
-  std::vector<Slice> slices_;
+  std::vector<SliceSums> slices_;
   tbb::enumerable_thread_specific<Histogram> histograms_;
 };
 
-/// An inverse of which some slices are at hand.
+/// An inverse field of which some slices are in memory.
 struct SlicedField {
   const Geometry& grid;
-  std::vector<const glm::vec3*> slices;  ///< one per slice of the grid; null: not at hand
+  std::vector<const glm::vec3*> slices;  ///< one per slice of the grid; null: not in memory
 
   explicit SlicedField(const Geometry& of) : grid(of), slices(static_cast<std::size_t>(of.size.z)) {}
   explicit SlicedField(const PullField& whole) : SlicedField(whole.grid) {
@@ -115,20 +115,20 @@ struct SlicedField {
   const glm::vec3* slice(std::int64_t k) const { return slices[static_cast<std::size_t>(k)]; }
 };
 
-/// Cells of a grid along k, half open.
+/// A range of cells of a grid along k, half open.
 struct Cells {
   std::int64_t begin = INT64_MIN, end = INT64_MAX;
 
   bool contains(std::int64_t k) const { return begin <= k && k < end; }
 };
 
-/// The cell along one axis that holds a place; none (-1) outside the grid.
+/// The cell along one axis that contains an index; -1 outside the grid.
 std::int64_t cell_of(double index, std::int64_t size) {
   if (!(index >= 0 && index <= static_cast<double>(size - 1))) return -1;
   return std::min(static_cast<std::int64_t>(index), std::max<std::int64_t>(size - 2, 0));
 }
 
-/// Trilinear between samples, NaN where one of them is or is not at hand.
+/// A field between its samples, trilinear; NaN where a sample that it needs is NaN or not in memory.
 glm::dvec3 sample(const SlicedField& field, const glm::dvec3& index) {
   const glm::i64vec3 size = field.grid.size;
   glm::i64vec3 cell;
@@ -152,7 +152,8 @@ glm::dvec3 sample(const SlicedField& field, const glm::dvec3& index) {
   return sum;
 }
 
-/// The vertices of a field in parts: the slices of a lattice, or as many of a mesh as one thread takes at a time.
+/// The vertices of a field in parts: the slices of a lattice, or as many vertices of a mesh as one thread takes at a
+/// time.
 class VertexParts {
  public:
   explicit VertexParts(const VertexField& field) : field_(field), point_(point_from_index(field.lattice)) {}
@@ -161,7 +162,7 @@ class VertexParts {
     return slices() + (static_cast<std::int64_t>(field_.mesh.rest.size()) + kOfMesh - 1) / kOfMesh;
   }
 
-  /// Calls `visit(rest, displacement)`, mm, for the vertices of a part.
+  /// Calls `visit(rest, displacement)` for the vertices of a part: LPS mm.
   template <class Visit>
   void for_each(std::int64_t part, Visit&& visit) const {
     if (part >= slices()) {
@@ -181,14 +182,15 @@ class VertexParts {
  private:
   static constexpr std::int64_t kOfMesh = 4096;
 
-  /// Of a lattice, unless a mesh stands alone.
+  /// Number of slices of the lattice; 0 if a mesh stands alone.
   std::int64_t slices() const { return field_.mesh.is_empty() || !field_.replaced.empty() ? field_.lattice.size.z : 0; }
 
   const VertexField& field_;
   AffineMap point_;
 };
 
-/// From the samples of the slices begin <= k < end, and forward.
+/// Measures how far a point is from itself after the inverse and then the forward map, for all samples of the slices
+/// begin <= k < end.
 void find_forward_after(const SlicedField& inverse, const PointMover& forward, std::int64_t begin, std::int64_t end,
                         const Limits& limits, const Control& control, Distances& distances) {
   const Geometry& grid = inverse.grid;
@@ -208,9 +210,11 @@ void find_forward_after(const SlicedField& inverse, const PointMover& forward, s
   });
 }
 
-/// From the vertices that come to lie in some cells of the inverse, and back.
+/// Measures how far a vertex is from itself after the forward map and then the inverse, for the vertices that come to
+/// lie in some cells of the inverse.
 ///
-/// @param reach  for each part of the vertices the cells that they come to lie in, or more; is made exact
+/// @param reach  for each part of the vertices, the cells in which they may come to lie; is replaced by those in which
+/// they do
 void find_inverse_after(const VertexField& field, const SlicedField& inverse, const Cells& cells,
                         std::vector<Cells>& reach, const Limits& limits, const Control& control, Distances& distances) {
   const VertexParts parts(field);
@@ -249,7 +253,7 @@ Residuals inverse_after(const VertexField& field, const SlicedField& inverse, co
   return distances.residuals();
 }
 
-/// Pairs of slices, evenly spread, none twice; of few slices, all as one part.
+/// Pairs of neighbouring slices, spread evenly, no slice twice; of a grid with few slices, all as one part.
 std::vector<Region> sampled_parts(const Geometry& grid) {
   constexpr std::int64_t kPairs = RoundTrip::kMostSlices / 2;
   Region part = whole(grid);
@@ -290,9 +294,10 @@ struct InverseCheck::State {
   Limits limits;
   PointMover mover;
   Distances forward, back;
-  std::vector<Cells> reach;     ///< of each part of the vertices: most slabs are reached by few
+  /// By part of the vertices: the cells in which they come to lie. Most slabs are reached by few parts.
+  std::vector<Cells> reach;
   std::vector<glm::vec3> last;  ///< the last slice that was added
-  std::int64_t next = 0;        ///< slice
+  std::int64_t next = 0;        ///< the slice that comes next
 };
 
 InverseCheck::InverseCheck(const VertexField& field, const Geometry& grid, const Limits& limits)

@@ -69,8 +69,8 @@ struct RoundTrip {
   std::uint64_t slices = 0,         ///< slices of the output that were looked at
       voxels = 0;                   ///< voxels in these slices
   double step_mm = 0;               ///< step to which vertices are rounded, mm: 2^-12 of the longest edge of a voxel
-  Residuals forward_after_inverse;  ///< of the samples in these slices
-  /// Of the vertices that come to lie in one of these slices, or between the two of a pair.
+  Residuals forward_after_inverse;  ///< residuals of the samples in these slices
+  /// Residuals of the vertices that come to lie in one of these slices, or between the two of a pair.
   Residuals inverse_after_forward;
 };
 

@@ -35,7 +35,7 @@ constexpr std::size_t kGrain = 4096;
                    "are its units and frame right?");
 }
 
-/// Turns the vertices of a mesh into snapped ones.
+/// Snaps the vertices of a mesh.
 class VertexSnapper {
  public:
   VertexSnapper(const Geometry& output, const TetrahedralMesh& mesh, const FieldView& field)
@@ -46,10 +46,10 @@ class VertexSnapper {
     size_ = field.lattice->size;
   }
 
-  /// Of the lattice that the mesh is of; empty: of none.
+  /// The frame of the lattice whose vertices the mesh names; empty: it names none.
   const std::optional<LatticeFrame>& frame() const { return frame_; }
 
-  /// @return false where a vertex is not finite or too far away
+  /// Snaps vertex n. @return false where it is not finite or too far away
   bool snap(std::size_t n, Vertex& vertex) const {
     const glm::dvec3 rest = frame_ ? frame_->output_from_lattice(lattice_index(n)) : output_from_point_(mesh_.rest[n]);
     return is_within(rest, kLargestIndex) && snap_moved(rest, output_from_point_.linear, mesh_.displacement[n], vertex);
@@ -69,11 +69,11 @@ class VertexSnapper {
   std::optional<LatticeFrame> frame_;
 };
 
-/// What some tetrahedra have in common.
+/// What a pass over some tetrahedra found.
 struct Findings {
   std::uint64_t inverted = 0, degenerate = 0;
   double least = std::numeric_limits<double>::infinity(), most = -least;
-  glm::i64vec3 low{INT64_MAX}, high{INT64_MIN};  ///< of undeformed corners
+  glm::i64vec3 low{INT64_MAX}, high{INT64_MIN};  ///< steps: the box of undeformed corners
 
   void look_at(const Tetrahedron& t) {
     for (const Vertex* v : {&t.a, &t.b, &t.c, &t.d}) {
@@ -138,7 +138,8 @@ SnappedMesh snap_mesh(const Geometry& output, const FieldView& field, const Cont
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.rest.size(), kGrain), [&](const auto& range) {
     if (control.stop.stop_requested()) throw Cancelled();
     for (std::size_t n = range.begin(); n < range.end(); ++n) {
-      if (!snapper.snap(n, snapped.vertices[n])) snapped.vertices[n].u.x = INT32_MIN;  // no u that is usable
+      // Marks a vertex that cannot be used.
+      if (!snapper.snap(n, snapped.vertices[n])) snapped.vertices[n].u.x = INT32_MIN;
     }
   });
   for (std::size_t n = 0; n < mesh.rest.size(); ++n) {
@@ -179,7 +180,7 @@ Region mesh_source_region(const SnappedMesh& mesh, bool stays_outside, const Geo
                           const Region& region) {
   constexpr double kVoxelsPerStepExactly = 1.0 / kStepsPerVoxel;
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  glm::dvec3 all_low(kInfinity), all_high(-kInfinity);  // of undeformed places, output index
+  glm::dvec3 all_low(kInfinity), all_high(-kInfinity);  // box of undeformed places, output index
   for (std::size_t n = 0; n < mesh.tetrahedra.size(); ++n) {
     const Tetrahedron t = mesh.tetrahedron(n);
     if (is_empty(detail::candidates(mesh.nudge, box_of(t), region))) continue;

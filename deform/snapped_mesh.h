@@ -22,8 +22,9 @@ namespace tetwarp {
 /// have the bits that they have in the lattice; others from their place in mm.
 struct SnappedMesh {
   std::vector<Vertex> vertices;
-  std::span<const glm::u32vec4> tetrahedra;               ///< of the mesh that was given, or `made`
-  std::shared_ptr<const std::vector<glm::u32vec4>> made;  ///< of a lattice with replaced cells; else null
+  std::span<const glm::u32vec4> tetrahedra;  ///< those of the mesh that was given, or `made`
+  /// Tetrahedra made of a lattice with replaced cells; else null.
+  std::shared_ptr<const std::vector<glm::u32vec4>> made;
   Nudge nudge;  ///< towards the middle of the undeformed box: the lattice's where there is one, else the mesh's
 
   std::uint64_t inverted = 0;    ///< tetrahedra turned inside out

@@ -10,7 +10,7 @@ namespace tetwarp {
 
 namespace {
 
-constexpr int kWidestReach = 2;  // voxels from its place that an interpolation (cubic) reads
+constexpr int kWidestReach = 2;  // voxels from its place that cubic interpolation reads
 
 std::string describe(const Region& region) {
   const auto corner = [](const glm::i64vec3& at) {
@@ -64,10 +64,10 @@ void check_map(const VolumeView& map, const std::string& name, VoxelType type, i
   require(contains(map.buffered, region), "the " + name + " map does not buffer the region asked for");
 }
 
-/// Takes away what two changes of frame leave of rounding where grids lie alike along an axis: voxels there are copied,
-/// and what lies beside them, padding above all, has no weight.
+/// Removes the rounding that two changes of frame leave, where two grids agree along an axis: voxels are then copied
+/// exactly, and those beside them, padding above all, have no weight.
 AffineMap without_rounding(AffineMap map) {
-  constexpr double kRounding = 1e-12, kNearly = 1e-9;  // of a step; voxels
+  constexpr double kRounding = 1e-12, kNearly = 1e-9;  // kRounding of a step, kNearly of a voxel
   for (int row = 0; row < 3; ++row) {
     bool whole = true;
     for (int column = 0; column < 3; ++column) {

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-// The library in one page: a volume, a field, a resampler. Needs neither ITK nor DCMTK.
+// The library in one page: a volume, a field, a resampler. It needs neither ITK nor DCMTK.
 #include <cstdio>
 
 #include "deform/fields/formula.h"

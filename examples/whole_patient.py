@@ -36,7 +36,7 @@ def make_labels(folder):
 
 
 def make_landmarks(folder, hu, affine):
-    """In every tenth slice from the middle the centre of the largest values, LPS mm."""
+    """Writes landmarks, LPS mm: the centre of the largest values in every tenth slice from the middle."""
     with open(folder / "landmarks.csv", "w", newline="") as file:
         out = csv.writer(file)
         out.writerow(["label", "x", "y", "z"])

@@ -23,7 +23,7 @@ class CsvRecords {
   /// @throws InputError for a quote that does not end, or with something else behind it
   bool next();
 
-  std::vector<Span> fields;        ///< with their quotes
+  std::vector<TextSpan> fields;    ///< with their quotes
   std::size_t begin = 0, end = 0;  ///< of the record, its line end excluded
   std::size_t line = 0;            ///< the record begins in, from 1
 

@@ -54,7 +54,7 @@ Colour mixed(const Colour& below, const Tint& tint);
 struct Overlay {
   OverlayKind kind = OverlayKind::coverage;
   ConstVolumeView map;
-  Geometry lattice = {};  ///< of lattice: its undeformed grid
+  Geometry lattice = {};  ///< for OverlayKind::lattice: the grid of its undeformed vertices
 };
 
 }  // namespace tetwarp

@@ -36,9 +36,10 @@ class ReadPlaces {
   void add_around(const std::filesystem::path& inner, std::size_t number);
 
   std::vector<std::filesystem::path> given_;
-  std::map<std::filesystem::path, std::size_t> names_;   ///< real paths, and which was given
-  std::map<Identity, std::size_t> identities_, around_;  ///< of what was given, and of every folder around it
-  std::set<std::filesystem::path> seen_around_;          ///< folders whose parents are all known
+  std::map<std::filesystem::path, std::size_t> names_;  ///< real paths, and which was given
+  /// By identity: which of the given paths it is, and which has that folder around it.
+  std::map<Identity, std::size_t> identities_, around_;
+  std::set<std::filesystem::path> seen_around_;  ///< folders whose parents are all known
   std::map<std::filesystem::path, std::filesystem::path> real_folders_;
 };
 

@@ -16,7 +16,7 @@ enum class Plane : std::uint8_t { axial, coronal, sagittal };
 struct PictureAxis {
   int grid_axis = 0;
   bool reversed = false;        ///< the index falls from left to right, or from top to bottom
-  double length_mm = 0;         ///< of all voxels, their outer halves included
+  double length_mm = 0;         ///< mm that all voxels take, their outer halves included
   char begin = ' ', end = ' ';  ///< patient directions at the left (top) and at the right (bottom)
 };
 

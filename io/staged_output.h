@@ -14,7 +14,8 @@ namespace tetwarp {
 /// Work goes to `path()`, a hidden file or folder beside the target with the same suffix (`.tetwarp-partial-PID-NAME`).
 /// It exists, empty, from the start, so that a place which cannot be written is known before the work begins; `commit`
 /// renames it. If the object is destroyed before that it is removed, and whatever has the target's name is untouched. A
-/// target that is a symbolic link stays one: the file to which it leads is written.
+/// process that is killed leaves it under its hidden name. A target that is a symbolic link stays one: the file to
+/// which it leads is written. Several objects may be used by several threads at a time, each by one of them.
 class StagedOutput {
  public:
   /// Whether the output is a file or a folder.

@@ -8,7 +8,7 @@
 namespace tetwarp {
 
 /// From `begin` up to `end`, bytes of a text.
-struct Span {
+struct TextSpan {
   std::size_t begin = 0, end = 0;
 };
 

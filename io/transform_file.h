@@ -23,7 +23,7 @@ struct TransformFile {
   std::uint64_t parameters = 0;  ///< number of parameters of all classes
   bool pulls = false;     ///< whether the tool's transforms map output to input; false for ITK, whose files do not say
   PointMap displacement;  ///< T(x) - x, LPS mm, of a point x; throws InputError where that is not finite
-  std::string beyond;     ///< for people: what happens to points outside the domain
+  std::string beyond;     ///< what happens to points outside the domain, for people
   /// How often `displacement` was called for a point outside the domain of a B-spline or displacement field.
   std::shared_ptr<std::atomic<std::uint64_t>> outside;
 };

@@ -3,7 +3,8 @@
 
 #pragma once
 
-// Private to Tetwarp: programs that run beside this one. Names nothing of ITK, and is compiled into whoever starts one.
+// Private to Tetwarp: programs that run beside this one. This header names nothing of ITK; libraries and programs that
+// start a program compile it in.
 #include <sys/types.h>
 
 #include <filesystem>
@@ -46,11 +47,11 @@ struct Pipe {
   Descriptor read, write;
 };
 
-/// @throws Error where the system gives none
+/// Makes a pipe. @throws Error where the system gives none
 Pipe make_pipe();
 
-/// What a program finds open when it starts: its descriptors 0 to 3 are copies of these, and it has no others.
-/// -1: /dev/null, but for `further`, which there is not then.
+/// What a program finds open when it starts: its descriptors 0 to 3 are copies of these, and it has no others. -1
+/// stands for /dev/null; `further` is not open at all then.
 struct ChildStreams {
   int in = -1;
   int out = -1;
@@ -59,21 +60,21 @@ struct ChildStreams {
 };
 
 /// A program that runs beside this one. It is started without a copy of this process, which may have other threads that
-/// hold locks or a device; it gets every signal, and does with each what it does by default.
+/// hold locks or a device. No signal is blocked in it, and each does what it does by default.
 ///
-/// It leads a process group of its own: Ctrl-C at the terminal reaches this program alone, which decides, and a script
-/// ends together with what it started.
+/// It leads a process group of its own. So Ctrl-C at the terminal reaches only this process, which decides what to do,
+/// and a script ends together with the programs that it started.
 class ChildProcess {
  public:
-  /// @throws Error naming the program and the system's reason where it cannot be started
+  /// Starts the program. @throws Error naming the program and the system's reason where it cannot be started
   ChildProcess(const std::filesystem::path& program, std::vector<std::string> arguments, const ChildStreams& streams);
-  /// Ends the program where it still runs.
+  /// Ends the program if it still runs.
   ~ChildProcess();
   ChildProcess(const ChildProcess&) = delete;
   ChildProcess& operator=(const ChildProcess&) = delete;
 
-  /// Ends it and its process group at once. May be called by another thread, while one waits too; a program that has
-  /// been waited for is left alone.
+  /// Ends the program and its process group at once. Another thread may call it, also while one waits. A program that
+  /// has been waited for is left alone.
   void kill();
 
   /// Waits for the end of the process.
@@ -82,7 +83,8 @@ class ChildProcess {
   std::optional<int> wait();
 
  private:
-  std::mutex mutex_;  ///< of waited_: a process id that was waited for may be another's
+  /// Guards waited_: once the process was waited for, its id may be that of another process.
+  std::mutex mutex_;
   pid_t id_ = -1;
   bool waited_ = false;
 };

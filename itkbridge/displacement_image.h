@@ -59,7 +59,7 @@ template <class TImage>
 class DisplacementHolder {
  public:
   /// The vectors of an image, LPS mm.
-  /// @throws InputError as `hold_displacements`
+  /// @throws InputError for an image that `hold_displacements` refuses
   std::shared_ptr<const HeldDisplacements> hold(const TImage& image) {
     const std::array<itk::ModifiedTimeType, 2> times{image.GetMTime(), image.GetUpdateMTime()};
     if (!held_ || pixels_ != image.GetPixelContainer() || times_ != times) {

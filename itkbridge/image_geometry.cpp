@@ -33,7 +33,8 @@ void set_geometry(itk::ImageBase<3>& image, const Geometry& geometry, const itk:
   itk::ImageBase<3>::PointType origin;
   itk::ImageBase<3>::DirectionType direction;
   const AffineMap point = point_from_index(geometry);
-  const glm::dvec3 first = point(-glm::dvec3(start[0], start[1], start[2]));  // ITK's origin is that of index 0
+  // The point of index 0, which ITK takes for the origin.
+  const glm::dvec3 first = point(-glm::dvec3(start[0], start[1], start[2]));
   for (int axis = 0; axis < 3; ++axis) {
     const auto along = static_cast<unsigned>(axis);
     whole.SetSize(along, static_cast<itk::SizeValueType>(geometry.size[axis]));

@@ -20,7 +20,7 @@ namespace tetwarp {
 template <class TImage>
 using ComponentOf = typename itk::DefaultConvertPixelTraits<typename TImage::PixelType>::ComponentType;
 
-/// The VoxelType of a component, by its kind, size and sign, so that `char` has one too.
+/// The VoxelType of a component, by its kind, size and sign, so that `char` has one, too.
 template <class Component>
 constexpr VoxelType component_type_of() {
   static_assert(std::is_arithmetic_v<Component>, "Tetwarp samples pixels of numbers");

@@ -72,7 +72,7 @@ void FieldResampleImageFilter<TInputImage, TOutputImage>::GenerateInputRequested
     return;
   }
   this->UpdateFieldInput();
-  this->SetAbortGenerateData(false);  // of an earlier run
+  this->SetAbortGenerateData(false);  // it may still be set from an earlier run
   this->PrepareField({0, 0});
   const tetwarp::Region region = this->GetResampler().source_region(
       *this, tetwarp::geometry_of(*input), tetwarp::region_of(*output, output->GetRequestedRegion()));

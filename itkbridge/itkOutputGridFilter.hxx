@@ -81,7 +81,7 @@ bool OutputGridFilter<TSuperclass>::PrepareField(tetwarp::ProgressShare share) {
 template <typename TSuperclass>
 template <typename TMake>
 void OutputGridFilter<TSuperclass>::ResampleRequestedRegion(TMake&& make) {
-  constexpr float kFieldShare = 0.25f;  // of the progress, where a field must be prepared
+  constexpr float kFieldShare = 0.25f;  // part of the progress, where a field must be prepared
   OutputImageType* const output = this->GetOutput();
   const tetwarp::Geometry grid = tetwarp::geometry_of(*output);
   const bool is_new = this->PrepareField({0, kFieldShare});

@@ -14,10 +14,10 @@
 
 namespace tetwarp {
 
-/// Who wrote a transform file.
+/// The program that wrote a transform file.
 enum class TransformTool : std::uint8_t { itk, elastix, plastimatch };
 
-/// A transform as files hold it. Several parts are composed in ITK's order: the last is applied first.
+/// A transform as a file holds it. Several parts are composed in ITK's order: the last one is applied first.
 struct StoredTransform {
   TransformTool tool = TransformTool::itk;
   std::vector<TransformRecord> parts;
@@ -32,17 +32,19 @@ struct StoredTransform {
 /// @throws InputError naming the file; Cancelled
 StoredTransform read_transform(const std::filesystem::path& path, const std::stop_token& stop = {});
 
-/// T(x), both LPS mm. Called from several threads. `outside` becomes true where a B-spline or displacement field on the
-/// way has no value at the point, which it then leaves where it is, as ITK does.
+/// Maps a point to T(point), both LPS mm. Several threads may call it at a time. `outside` becomes true where a
+/// B-spline or displacement field on the way has no value at the point; that part then leaves the point where it is, as
+/// ITK does.
 using TransformFunction = std::function<glm::dvec3(const glm::dvec3& point, bool& outside)>;
 
-/// The transform, evaluated by ITK: affine ones of all kinds, B-splines of order 3, displacement fields.
-/// @param file  for errors
+/// Makes a function that evaluates the transform by ITK: affine transforms of all kinds, B-splines of order 3,
+/// displacement fields.
+/// @param file  its name, for messages
 /// @throws InputError for an unknown class, other than 3 dimensions, a wrong number of parameters, a value that is not
-///         finite, a grid that cannot be
+/// finite, or a grid that cannot exist
 TransformFunction make_transform(const StoredTransform& stored, const std::string& file);
 
-/// A file read and made ready.
+/// A transform file that was read and can be evaluated.
 struct LoadedTransform {
   StoredTransform stored;
   TransformFunction map;
@@ -53,7 +55,7 @@ extern "C" void tetwarp_load_transform(const std::filesystem::path& path, const 
                                        LoadedTransform& loaded);
 /// Entry point of the module: the files that `read_transform` reads, which are the file itself and the initial
 /// transforms of elastix. Parameters are not checked.
-/// @throws InputError for a file that is missing, or initial transforms that form a circle
+/// @throws InputError for a file that is missing, or initial transforms that name each other in a circle
 extern "C" void tetwarp_transform_files(const std::filesystem::path& path, std::vector<std::filesystem::path>& files);
 
 }  // namespace tetwarp

@@ -3,8 +3,8 @@
 
 #pragma once
 
-// What nearly every test includes: compiled once for all test programs, which takes a third of their compile time away.
-// A test still includes what it uses.
+// Headers that nearly every test includes. They are compiled once for all test programs, which takes a third of their
+// compile time away. A test still includes what it uses.
 
 #include <gtest/gtest.h>
 

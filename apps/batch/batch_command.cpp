@@ -33,7 +33,7 @@ std::vector<std::string> ids_of(const std::vector<BatchCase>& cases) {
   return ids;
 }
 
-/// What is written must not touch the manifest. @throws UsageError
+/// Refuses an OUTPUT_DIR in which the manifest would lie among what is written. @throws UsageError
 void refuse_manifest_inside(const BatchOptions& options) {
   ReadPlaces manifest;
   manifest.add(options.manifest);
@@ -52,26 +52,27 @@ class Batch {
 
  private:
   void choose();
-  void check(Progress& progress);
+  void check(BatchProgress& progress);
   void find_finished(const OutputFolder& folder, Results& results);
-  int conclude(const Results& results, Progress& progress, const Usage& usage, bool whole) const;
+  int conclude(const Results& results, BatchProgress& progress, const Usage& usage, bool whole) const;
   std::vector<std::string> ids() const;
   std::size_t wanted_jobs(const Devices& devices, bool cuda) const;
-  Progress::Form form() const;
+  BatchProgress::Form form() const;
   std::uint64_t memory_bytes() const { return options_.memory_bytes.value_or(available_memory_bytes() / 5 * 4); }
 
   const BatchOptions& options_;
   Shard shard_;
   std::vector<BatchCase> cases_;
-  std::vector<const BatchCase*> mine_;                     ///< of the shard
-  std::vector<const BatchCase*> open_;                     ///< those that are not finished
-  std::map<std::string, std::vector<std::string>> again_;  ///< of these, by the reason, those that were made before
+  std::vector<const BatchCase*> mine_;  ///< cases of this shard
+  std::vector<const BatchCase*> open_;  ///< cases of this shard that are not finished
+  /// Of the cases in `open_`, by reason, the ids of those that were made before and have to be made again.
+  std::map<std::string, std::vector<std::string>> again_;
   BatchCheck found_;
 };
 
-Progress::Form Batch::form() const {
-  if (options_.log_json) return Progress::Form::machine;
-  return options_.common.quiet ? Progress::Form::none : Progress::Form::person;
+BatchProgress::Form Batch::form() const {
+  if (options_.log_json) return BatchProgress::Form::machine;
+  return options_.common.quiet ? BatchProgress::Form::none : BatchProgress::Form::person;
 }
 
 void Batch::choose() {
@@ -89,7 +90,7 @@ std::vector<std::string> Batch::ids() const {
   return ids;
 }
 
-/// Cases whose folder is whole are kept; others are replaced when they are made again.
+/// Keeps the cases whose folder is complete. All others are made, and what was made before is replaced.
 void Batch::find_finished(const OutputFolder& folder, Results& results) {
   folder.remove_unfinished(ids());
   const std::map<std::string, json> earlier = read_lines(folder.results());
@@ -111,18 +112,18 @@ void Batch::find_finished(const OutputFolder& folder, Results& results) {
   for (BatchCase& one : cases_) one.options.common.overwrite = fs::exists(folder.case_folder(one.id) / kFolderRecord);
 }
 
-void Batch::check(Progress& progress) {
+void Batch::check(BatchProgress& progress) {
   Stage stage(options_.common, "check");
   refuse_manifest_inside(options_);
   found_ = check_cases(options_.manifest, options_.output, mine_, memory_bytes(), stage.control());
   for (const std::string& forecast : found_.forecasts) progress.warn(forecast);
 }
 
-int Batch::conclude(const Results& results, Progress& progress, const Usage& usage, bool whole) const {
+int Batch::conclude(const Results& results, BatchProgress& progress, const Usage& usage, bool whole) const {
   results.finish();
   const Tally tally = results.tally();
   progress.end({{"done", tally.done}, {"failed", tally.failed}, {"not_run", tally.missing}, {"usage", usage.report()}});
-  if (form() == Progress::Form::person) {
+  if (form() == BatchProgress::Form::person) {
     std::cout << results.table(mine_.size() <= 60);
     if (const std::string sentence = usage.sentence(); !sentence.empty()) say(options_.common, sentence);
     if (!whole) say(options_.common, "tetwarp: interrupted; --resume continues");
@@ -131,7 +132,8 @@ int Batch::conclude(const Results& results, Progress& progress, const Usage& usa
   return tally.failed > 0 ? kSomeFailed : 0;
 }
 
-/// While one is resampled others are read and written, which takes longer than a CUDA device needs.
+/// How many cases to have in work at once. While one is resampled others are read and written, which takes longer than
+/// a CUDA device needs.
 std::size_t Batch::wanted_jobs(const Devices& devices, bool cuda) const {
   constexpr std::size_t kPerDevice = 8, kOnCpu = 3;
   const std::size_t usual = cuda ? kPerDevice * devices.count() : kOnCpu;
@@ -148,10 +150,10 @@ int Batch::run() {
       std::cout << "\n";
     }
   }
-  Progress progress(form());
+  BatchProgress progress(form());
   const int cuda = may_use_device(options_.backend) ? device_count() : 0;
   Devices devices(options_.backend, cuda);
-  const Threads threads(wanted_jobs(devices, cuda > 0));  // before anything else needs threads
+  const Threads threads(wanted_jobs(devices, cuda > 0));  // started before anything else needs threads
   check(progress);
   if (options_.dry_run) {
     say(options_.common, "would run " + std::to_string(mine_.size()) + " cases; outputs of at most " +
@@ -160,7 +162,8 @@ int Batch::run() {
   }
   std::error_code unknown;
   const bool made_before = options_.resume && fs::exists(options_.output, unknown);
-  if (!made_before) check_space(found_, options_.output);  // before a folder is begun that another run would refuse
+  // Checked before a folder is begun, for a later run would refuse to use that.
+  if (!made_before) check_space(found_, options_.output);
   if (demands_device(options_.backend) && cuda == 0) make_forward_resampler(chosen(options_.backend), Geometry());
   OutputFolder folder(options_.output, shard_, ids_of(cases_), hash_file(options_.manifest), options_.resume);
   Results results(folder, ids());

@@ -18,7 +18,7 @@ bool hides(const BatchCase& of) { return of.options.dicom.deidentification.has_v
 
 namespace {
 
-/// Files below a folder by their names in it, its record left out.
+/// The digests of the files below a folder, by their names relative to it; its record is left out.
 json files_of(const fs::path& folder) {
   json files = json::object();
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
@@ -29,7 +29,8 @@ json files_of(const fs::path& folder) {
   return files;
 }
 
-/// The outputs as a person sees them: files, and of a folder one digest of the names and digests of all it holds.
+/// The outputs of a case for the results: a digest for each file, and for each folder one digest of the names and
+/// digests of all files in it.
 json outputs_of(const json& files, const std::string& id) {
   json outputs = json::array();
   std::string folder;
@@ -85,7 +86,7 @@ json case_identity(const BatchCase& of, const std::string& input_sha256, const s
 
 namespace {
 
-/// What tells a case from the one that was recorded; empty: nothing.
+/// What differs between a case and the one that was recorded, in words; empty: nothing does.
 std::string difference(const json& now, const json& recorded) {
   if (!recorded.is_object() || recorded.value("program", json()) != now["program"]) return "another version made them";
   for (const auto& [name, what] : {std::pair("row", "the row has changed"),
@@ -96,7 +97,7 @@ std::string difference(const json& now, const json& recorded) {
   return "";
 }
 
-/// A line as it would be written now: OUTPUT_DIR and the manifest may have moved.
+/// A recorded line with the paths that it would have now, for OUTPUT_DIR and the manifest may have moved.
 json with_current_paths(json line, const BatchCase& of) {
   if (line.contains("command")) line["command"] = command_of(of);
   if (line.contains("input") && line["input"].contains("path")) line["input"]["path"] = of.options.input.path.string();
@@ -145,7 +146,7 @@ std::optional<json> finished_line(const BatchCase& of, const fs::path& folder, s
     if (why.empty() && files_of(folder) != record["files"]) why = "the outputs are not as they were written";
   } catch (const Cancelled&) {
     throw;
-  } catch (const std::exception&) {  // making it says what is wrong
+  } catch (const std::exception&) {  // left to the making of the case, which says what is wrong
     why = "what is read cannot be read now";
   }
   if (!why.empty()) return std::nullopt;

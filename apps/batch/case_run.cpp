@@ -32,9 +32,9 @@ class Clock {
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
-/// How often a case was begun anew, and what it may use from then on.
+/// How often a case was begun again, and what it may use from then on.
 struct Retry {
-  bool alone = false;  ///< on its device
+  bool alone = false;  ///< it has its device for itself
   std::optional<std::uint64_t> device_bytes;
   bool on_cpu = false;
   std::vector<std::string> reasons;
@@ -60,7 +60,7 @@ std::pair<DeformSinks, DeformResult> resample_on_device(const Prepared& of, Defo
   Clock held;
   Worker worker = lease.worker();
   timing["worker"] = name_of(worker.backend);
-  std::optional<DeviceStream> stream;  // cases on a device do not wait for each other
+  std::optional<DeviceStream> stream;  // a stream of its own, so that cases on a device do not wait for each other
   if (demands_device(worker.backend)) {
     device = worker.device;
     timing["device"] = *device;
@@ -117,14 +117,14 @@ Record attempt(const BatchCase& of, const Retry& retry, const Resources& resourc
   return line;
 }
 
-/// A case that came to nothing, and why.
+/// Makes the outcome of a case that gave no output.
 void end(CaseOutcome& outcome, const BatchCase& of, CaseStatus status, FixedReason kind, const std::string& reason) {
   outcome.status = status;
   outcome.reason = reason;
   outcome.line = failed_line(of, status == CaseStatus::refused ? "refused" : "failed", kind, reason);
 }
 
-/// Takes the next thing that may help where a device failed. @return whether there is one
+/// Chooses the next measure that may help after a device failed. @return whether there is one
 bool try_again(const BatchCase& of, const DeviceError& error, std::optional<int> device, const Resources& resources,
                Retry& retry) {
   const bool is_memory = dynamic_cast<const DeviceMemoryError*>(&error) != nullptr;
@@ -133,7 +133,7 @@ bool try_again(const BatchCase& of, const DeviceError& error, std::optional<int>
   if (!is_memory) {
     resources.devices.lose(*device);
   } else if (!retry.alone) {
-    retry.alone = true;  // others may have held what it needed
+    retry.alone = true;  // other cases may have held the memory that it needed
   } else if (!retry.device_bytes) {
     retry.device_bytes = kScarceDeviceBytes;
   } else if (resources.devices.may_fall_back(of.options.backend)) {

@@ -15,7 +15,7 @@ namespace tetwarp::apps {
 
 namespace {
 
-/// Whether all outputs of a case are written as they are.
+/// Whether all outputs of a case are written uncompressed.
 bool is_plain(const DeformOptions& options) {
   const auto is_packed = [&](const std::filesystem::path& path) { return path.extension() == ".gz"; };
   if (options.compression.value_or(0) > 0) return false;
@@ -28,7 +28,7 @@ bool is_plain(const DeformOptions& options) {
   return options.with.empty();
 }
 
-/// What one case comes to: one of the texts is empty or both are.
+/// What the check of one case found. At least one of its texts is empty.
 struct Finding {
   std::uint64_t output_bytes = 0;
   bool plain = false;
@@ -45,7 +45,7 @@ Finding look_at(const BatchCase& of, const std::filesystem::path& folder, std::u
     outputs.refuse_reads(folder);
     SharedInput input(options.input, SharedInput::Users::one);
     const DeformHeaders headers = open_headers(request, input, outputs);
-    outputs.refuse_reads(folder);  // now that slices are known
+    outputs.refuse_reads(folder);  // again, for now the files of slices are known
     const DeformPlan plan = plan_deformation(request, headers);
     finding.output_bytes = plan.output_bytes;
     finding.plain = is_plain(options);

@@ -27,10 +27,12 @@ namespace {
 using namespace std::chrono_literals;
 using nlohmann::json;
 
-constexpr auto kPatience = 1500ms;  ///< while others begin or end, a lock is refused that is free a moment later
+/// How long to retry: a lock may be refused for a moment while other processes begin or end.
+constexpr auto kPatience = 1500ms;
 constexpr const char* kName = "batch.lock";
 
-/// False where another process holds a lock that excludes it. On a file system without locks it is nobody's.
+/// Takes a lock of flock. @return false where another process holds a lock that excludes it; true on a file system
+/// without locks
 bool lock(int file, int kind) {
   while (::flock(file, kind | LOCK_NB) != 0) {
     if (errno == EWOULDBLOCK) return false;
@@ -71,10 +73,11 @@ Division division_of(std::size_t shards, const std::vector<std::string>& ids) {
   return {shards, hash.hex()};
 }
 
-/// Who holds it alone says what the division is; all others have to find theirs.
+/// Takes the lock if the division that the file states is this one. A process that holds the file alone may write its
+/// own.
 bool DivisionLock::try_to_take(const Division& division) {
   if (lock(file_, LOCK_EX)) {
-    // What follows lets go of the lock before it takes it again, so that somebody may come between.
+    // The shared lock that follows releases this one before it is taken, so another process may come between.
     write(file_, division, path_);
   }
   if (!lock(file_, LOCK_SH)) return false;

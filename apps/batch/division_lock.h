@@ -9,22 +9,23 @@
 
 namespace tetwarp::apps {
 
-/// How the cases of a batch are shared out.
+/// How the cases of a batch are divided into shards.
 struct Division {
   std::size_t shards = 1;
-  std::string cases_sha256;  ///< of the ids, in the order of the manifest
+  std::string cases_sha256;  ///< hash of the ids, in the order of the manifest
 
   friend bool operator==(const Division&, const Division&) = default;
 };
 
-/// @param ids  of all cases
+/// The division of some cases. @param ids  of all cases, in the order of the manifest
 Division division_of(std::size_t shards, const std::vector<std::string>& ids);
 
-/// A lock that processes hold side by side as long as they divide the same cases in the same way, so that no two have
-/// a case in common. It is the kernel's (flock) and ends with the process, however that ends.
+/// A lock that several processes hold at the same time as long as they divide the same cases in the same way, so that
+/// no two have a case in common. The kernel keeps it (flock) and releases it when the process ends, however that ends.
 class DivisionLock {
  public:
-  /// @param folder  OUTPUT_DIR, whose `batch.lock` says what the division is
+  /// Takes the lock.
+  /// @param folder  OUTPUT_DIR, whose `batch.lock` states the division
   /// @throws Error where processes with another division hold it, or the file cannot be written; Cancelled
   DivisionLock(const std::filesystem::path& folder, const Division& division);
   ~DivisionLock();
@@ -36,7 +37,7 @@ class DivisionLock {
 
   std::filesystem::path path_;
   int file_ = -1;
-  Division found_;  ///< of those who hold it
+  Division found_;  ///< division of the processes that hold the lock
 };
 
 }  // namespace tetwarp::apps

@@ -31,7 +31,7 @@ std::uint64_t hash_of(std::uint64_t seed, std::uint64_t variant, std::uint64_t f
   return split_mix(hash + component);
 }
 
-/// A number at the begin of a text, which is cut off. @throws InputError
+/// Takes the number with which a text begins off it. @throws InputError
 double take_number(std::string& text, const std::string& range) {
   double number = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);

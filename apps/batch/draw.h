@@ -9,10 +9,10 @@
 
 namespace tetwarp::apps {
 
-/// Whether a formula holds something that is drawn: a range, LOW..HIGH, or an `elastic` without a seed.
+/// Whether something in a formula is drawn at random: a range, LOW..HIGH, or the seed of an `elastic` that states none.
 bool is_random(const std::string& formula);
 
-/// The formula with what is random in it drawn: each LOW..HIGH (a suffix behind it, `2..8vox`, is that of the number)
+/// Replaces what is random in a formula: each LOW..HIGH (a suffix behind it, as in `2..8vox`, belongs to the number)
 /// becomes a number of at most six significant digits, uniform between them, and an `elastic` without a seed gets one.
 ///
 /// The number for component `c`, from 0 (of X/Y/Z; else 0), of a parameter is LOW + u (HIGH - LOW), u = floor(h / 2^11)
@@ -20,8 +20,9 @@ bool is_random(const std::string& formula);
 /// each byte of the parameter's name; m is `split_mix`, sums are modulo 2^64. A seed is floor(h / 2^12) of the name
 /// "seed", component 0. So a number depends on no other parameter.
 ///
-/// @param variant  of the row, from 0. @param field  its place among the fields of the case, from 0
-/// @throws InputError for a range that is none: not numbers, LOW above HIGH
+/// @param variant  number of the variant among those of the row, from 0
+/// @param field    number of the field among those of the case, from 0
+/// @throws InputError for a range whose ends are not numbers, or with LOW above HIGH
 std::string draw(const std::string& formula, std::uint64_t seed, std::uint64_t variant, std::uint64_t field);
 
 }  // namespace tetwarp::apps

@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// The narrowest folder around the files of a series.
+/// The innermost folder that contains all files of a series.
 fs::path folder_of(const DicomSeries& series) {
   fs::path folder = series.slices.front().file.parent_path();
   for (const DicomSlice& slice : series.slices) {
@@ -39,7 +39,7 @@ bool is_same(const DicomSeries& a, const DicomSeries& b) {
          a.slices.front().file.filename() == b.slices.front().file.filename();
 }
 
-/// How `--series` names one of a scan; empty where it need not.
+/// The argument of `--series` that names one series of a scan; empty where none is needed.
 std::string name_in(const DicomScan& scan, const DicomSeries& wanted) {
   const auto found = std::find_if(scan.series.begin(), scan.series.end(),
                                   [&](const DicomSeries& series) { return is_same(series, wanted); });
@@ -51,7 +51,7 @@ std::string name_in(const DicomScan& scan, const DicomSeries& wanted) {
   return count == 1 && !wanted.series_uid.empty() ? wanted.series_uid : std::to_string(index + 1);
 }
 
-/// As a manifest in `base` names it: relative where it lies in that folder.
+/// A path as a manifest in the folder `base` names it: relative if it lies in that folder.
 fs::path as_named(const fs::path& folder, const fs::path& base) {
   const fs::path from = fs::weakly_canonical(base.empty() ? fs::path(".") : base), to = fs::weakly_canonical(folder);
   const fs::path relative = to.lexically_relative(from);
@@ -69,7 +69,7 @@ std::string one_line(std::string text) {
   return text;
 }
 
-/// Why a volume can be no case; empty where it can.
+/// Why a volume cannot be a case; empty where it can.
 std::string problem_of(const DicomSeries& series) {
   if (series.refusal || series.slices.empty()) return series.refusal.value_or("no CT slices");
   const glm::i64vec3& size = series.geometry.size;
@@ -124,7 +124,7 @@ std::string Rows::text() {
   for (const DicomSeries& series : scan_.series) {
     const std::string problem = problem_of(series);
     if (problem.empty()) {
-      // Slices at uneven distances may mean that some are missing: a person has to say that they are meant.
+      // Slices at uneven distances may mean that some are missing; a person has to confirm that they are meant.
       if (series.uneven)
         rows += "# " + one_line(*series.uneven) + "; to take each slice where it is, remove the # before:\n#";
       rows += row(series);

@@ -49,7 +49,7 @@ bool is_list(const std::string& key) {
   return option && option->list;
 }
 
-/// How many letters have to be put in, taken out or changed (Levenshtein 1966).
+/// The least number of letters to insert, remove or replace to make one word from another (Levenshtein 1966).
 std::size_t distance(const std::string& a, const std::string& b) {
   std::vector<std::size_t> row(b.size() + 1);
   for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
@@ -74,7 +74,7 @@ std::string nearest_key(const std::string& key) {
                                                                              : "; see docs/reference/batch.md";
 }
 
-/// "" for an id that can be the name of a folder everywhere, else what is wrong.
+/// Why an id cannot be the name of a folder on every system; empty: it can.
 std::string problem_of_id(const std::string& id) {
   if (id.empty()) return "no case id; give each row one";
   const auto is_plain = [](char c) {
@@ -102,13 +102,14 @@ Number whole_number(const ManifestRow& row, const std::string& key, Number least
   return number;
 }
 
-/// Where the paths of a row count from.
+/// The folders to which the paths of a row are relative.
 struct Places {
   fs::path inputs;   ///< the folder of the manifest
   fs::path outputs;  ///< the folder of the case
 };
 
-/// Relative to the manifest's folder. A ".." is left to the system, which follows links first.
+/// The path of an input, which is relative to the manifest's folder. A ".." is left to the system, which follows links
+/// first.
 std::string input(const std::string& text, const Places& places) {
   fs::path plain;
   for (const fs::path& part : places.inputs / text) {
@@ -118,7 +119,8 @@ std::string input(const std::string& text, const Places& places) {
   return path.starts_with('-') ? "./" + path : path;
 }
 
-/// A name in the case's folder. @param text  of `with` and `points` with options behind it
+/// The path of an output, a name in the case's folder. @param text  the name; for `with` and `points` with options
+/// behind it
 std::string output(const std::string& key, const std::string& text, const Places& places) {
   const std::string name = text.substr(0, text.find(':'));
   require(!name.empty() && fs::path(name).filename() == name && !name.starts_with('.'),
@@ -137,7 +139,7 @@ std::string value_of(const std::string& key, const std::string& text, const Plac
   return input(text.substr(0, equals), places) + "=" + output(key, text.substr(equals + 1), places);
 }
 
-/// One manifest while it is read.
+/// Reads one manifest.
 class Reader {
  public:
   Reader(const fs::path& manifest, const fs::path& output_dir)
@@ -155,14 +157,14 @@ class Reader {
 
   fs::path base_, output_dir_;
   ManifestErrors errors_;
-  std::set<std::string> ids_;  ///< in lower case
+  std::set<std::string> ids_;  ///< ids so far, in lower case
   std::vector<BatchCase> cases_;
 };
 
 std::vector<std::string> Reader::arguments_of(const ManifestRow& row, const Places& places, std::uint64_t variant) {
   std::vector<std::string> arguments = {input(row.text("input"), places)};
   const std::uint64_t seed = row.has("seed") ? whole_number<std::uint64_t>(row, "seed", 0, UINT64_MAX) : 0;
-  for (const OptionKind& option : known_options()) {  // in one order, whatever that of the columns
+  for (const OptionKind& option : known_options()) {  // in one order, whatever the order of the columns
     std::vector<std::string> values = row.has(option.name) ? row.values.at(option.name) : std::vector<std::string>();
     if (option.name == "output" && values.empty()) values = {"deformed.nii.gz"};
     for (std::size_t n = 0; n < values.size(); ++n) {
@@ -197,7 +199,8 @@ void Reader::check_files(const DeformOptions& options) {
   for (const fs::path& path : others.paths()) exists(path);
 }
 
-/// Mass-spring has other bits on each backend: which one is the case's to say, not the machine's.
+/// Refuses a mass-spring case that does not name its backend: each backend has other bits, and the case has to decide
+/// on them, not the machine.
 void Reader::check_backend(const DeformOptions& options) {
   if (options.scenario.empty() || !leaves_open(options.backend)) return;
   require(read_scenario(options.scenario).method != simulate::Method::mass_spring,
@@ -226,7 +229,7 @@ void Reader::take_variant(const ManifestRow& row, const std::string& id, std::ui
     cases_.push_back(std::move(of));
   } catch (const Error& error) {
     errors_.add(row.line, error.what());
-  } catch (const fs::filesystem_error& error) {  // a name that is too long, a folder that may not be looked into
+  } catch (const fs::filesystem_error& error) {  // a name that is too long, or a folder that may not be looked into
     errors_.add(row.line, "cannot be looked at (" + error.code().message() + "), " + shown(error.path1()));
   }
 }

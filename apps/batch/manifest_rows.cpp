@@ -35,7 +35,7 @@ std::string read_all(const fs::path& path) {
   return all.starts_with(mark) ? all.substr(mark.size()) : all;
 }
 
-/// The parts of a cell between `;`, without blanks around them.
+/// The parts of a cell, which `;` separates, without blanks around them.
 std::vector<std::string> split_list(const std::string& cell) {
   std::vector<std::string> parts;
   std::istringstream text(cell);
@@ -54,7 +54,7 @@ std::vector<ManifestRow> csv_rows(const std::string& text, const std::string& na
   const auto next = [&] {
     try {
       return records.next();
-    } catch (const InputError& error) {  // nobody knows where the next record begins
+    } catch (const InputError& error) {  // reading ends here, for it is not known where the next record begins
       errors.add(records.line, error.what());
       return false;
     }
@@ -87,7 +87,7 @@ std::vector<ManifestRow> csv_rows(const std::string& text, const std::string& na
   return rows;
 }
 
-/// A value of JSON as text; none for null. @throws InputError for an object or a list of lists
+/// A value of JSON as texts; none for null. @throws InputError for an object or a list of lists
 std::vector<std::string> texts_of(const std::string& key, const json& value) {
   if (value.is_null()) return {};
   if (value.is_string()) return {value.get<std::string>()};

@@ -27,7 +27,7 @@ namespace {
 
 std::string reason() { return std::generic_category().message(errno); }
 
-/// Whether a batch was begun in shards.
+/// Whether a batch was begun in this folder in shards.
 bool holds_shards(const fs::path& folder) {
   std::error_code error;
   const fs::directory_iterator entries(folder, error);
@@ -35,8 +35,8 @@ bool holds_shards(const fs::path& folder) {
                      [](const auto& entry) { return shard_of(entry.path(), "batch", ".json").has_value(); });
 }
 
-/// Whether a hidden name of StagedOutput, `.tetwarp-partial-PID-NAME`, or one that was dropped, stands for one of
-/// these.
+/// Whether a file has a hidden name of StagedOutput, `.tetwarp-partial-PID-NAME`, or one that was given to it when it
+/// was dropped, that stands for one of these names.
 bool is_unfinished(const std::string& name, const std::vector<std::string>& names) {
   for (const std::string prefix : {".tetwarp-partial-", ".tetwarp-dropped-", ".tetwarp-replaced-"}) {
     if (!name.starts_with(prefix)) continue;
@@ -123,7 +123,8 @@ void OutputFolder::remove_unfinished(const std::vector<std::string>& ids) const 
     if (is_unfinished(entry.path().filename().string(), names)) partial.push_back(entry.path());
   }
   for (fs::path path : partial) {
-    // Under another name first: who still works on it can then give it no name, half emptied.
+    // It is renamed first, so that a process that still works on it cannot give it its final name when it is half
+    // removed.
     const std::string name = path.filename().string();
     const fs::path dropped = path_ / (".tetwarp-dropped-" + std::to_string(::getpid()) +
                                       name.substr(name.find('-', sizeof ".tetwarp-partial-")));

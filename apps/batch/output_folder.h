@@ -13,27 +13,28 @@
 
 namespace tetwarp::apps {
 
-/// A share of the cases: those whose number, from 0, leaves `number` - 1 when divided by `count`.
+/// A share of the cases: those whose number, from 0, leaves the remainder `number` - 1 when divided by `count`.
 struct Shard {
   std::size_t number = 1, count = 1;
 
   bool holds(std::size_t index) const { return index % count == number - 1; }
-  /// ".2-of-4", nothing of the whole: goes before the suffix of a file's name.
+  /// What a file's name has before its suffix: ".2-of-4"; empty if there is one shard.
   std::string mark() const { return count == 1 ? "" : "." + std::to_string(number) + "-of-" + std::to_string(count); }
 };
 
-/// @throws UsageError for a text that is not I/N, 1 <= I <= N
+/// Parses I/N. @throws UsageError unless 1 <= I <= N
 Shard parse_shard(const std::string& text);
 
-/// OUTPUT_DIR of a batch, for one process and one shard at a time: other shards may write into the same folder, each to
-/// files of its own.
+/// OUTPUT_DIR of a batch, for one process and one shard. Processes with other shards may write into the same folder at
+/// the same time, each to files of its own.
 class OutputFolder {
  public:
-  /// Creates it where it does not exist, and locks the shard, and the division: no other process makes these cases.
-  /// @param ids  of all cases, those of other shards too
-  /// @param manifest_sha256  for the record: a batch may go on with a manifest that was mended
-  /// @throws Error where it exists, is not empty and `resume` is false, where it holds something else, or another
-  /// process works in it that may make the same cases
+  /// Creates the folder if it does not exist, and locks the shard and the division, so that no other process makes
+  /// these cases.
+  /// @param ids              of all cases, those of other shards included
+  /// @param manifest_sha256  for the record only: a batch may be resumed with a corrected manifest
+  /// @throws Error where the folder is not empty and `resume` is false, where it holds something else than a batch, or
+  /// where another process works in it that may make the same cases
   OutputFolder(std::filesystem::path path, const Shard& shard, const std::vector<std::string>& ids,
                const std::string& manifest_sha256, bool resume);
   ~OutputFolder();
@@ -45,7 +46,7 @@ class OutputFolder {
   std::filesystem::path timings() const { return file("timings", ".jsonl"); }
   std::filesystem::path summary() const { return file("summary", ".txt"); }
   std::filesystem::path case_folder(const std::string& id) const { return path_ / id; }
-  /// Removes what killed runs left of these cases under hidden names, and what this run has not finished.
+  /// Removes what killed runs left of these cases under hidden names, and unfinished files of this run.
   void remove_unfinished(const std::vector<std::string>& ids) const;
 
  private:
@@ -61,17 +62,17 @@ class OutputFolder {
   int lock_ = -1;
 };
 
-/// I and N of a file of a shard, `NAME.I-of-N.SUFFIX`; nothing of any other.
+/// I and N of a file of a shard, `NAME.I-of-N.SUFFIX`; none for another name.
 std::optional<Shard> shard_of(const std::filesystem::path& file, const std::string& name, const std::string& suffix);
 
-/// Whether a batch, or a shard of one, has a file of its own of this name, whatever the case of its letters: some file
-/// systems tell them not apart.
+/// Whether a batch, or a shard of one, has a file of its own with this name. Upper and lower case are not told apart,
+/// since some file systems do not.
 bool is_file_of_a_batch(const std::string& name);
 
-/// Bytes that an ordinary user can still write on the file system of a folder.
+/// Bytes that an ordinary user can still write to the file system of a folder.
 std::uint64_t free_bytes(std::filesystem::path folder);
 
-/// A text under a name, whole or not at all: through StagedOutput. @throws Error
+/// Writes a text to a file whole or not at all, through StagedOutput. @throws Error
 void write_whole(const std::filesystem::path& path, const std::string& text);
 
 }  // namespace tetwarp::apps

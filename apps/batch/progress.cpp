@@ -47,41 +47,41 @@ const char* name_of(CaseStatus status) {
 
 }  // namespace
 
-Progress::Progress(Form form) : form_(form), terminal_(isatty(STDERR_FILENO) != 0) {}
+BatchProgress::BatchProgress(Form form) : form_(form), terminal_(isatty(STDERR_FILENO) != 0) {}
 
-void Progress::begin(std::size_t cases, std::size_t finished) {
+void BatchProgress::begin(std::size_t cases, std::size_t finished) {
   const std::lock_guard lock(mutex_);
   cases_ = cases;
   start_ = std::chrono::steady_clock::now();
   print({{"event", "batch"}, {"cases", cases}, {"finished_before", finished}});
 }
 
-Progress::~Progress() { clear(); }
+BatchProgress::~BatchProgress() { clear(); }
 
-void Progress::clear() {
+void BatchProgress::clear() {
   if (visible_) std::fprintf(stderr, "\r\033[K");
   visible_ = false;
 }
 
-void Progress::print(const json& event) {
+void BatchProgress::print(const json& event) {
   if (form_ != Form::machine) return;
   json timed = event;
   timed["time"] = utc_now();
   std::fprintf(stderr, "%s\n", timed.dump(-1, ' ', false, json::error_handler_t::replace).c_str());
 }
 
-void Progress::print(const std::string& line) {
+void BatchProgress::print(const std::string& line) {
   if (form_ != Form::person) return;
   clear();
   std::fprintf(stderr, "%s\n", shown_lines(line).c_str());
 }
 
-void Progress::started(const std::string& id) {
+void BatchProgress::started(const std::string& id) {
   const std::lock_guard lock(mutex_);
   print({{"event", "start"}, {"case", id}});
 }
 
-void Progress::ended(const CaseOutcome& outcome) {
+void BatchProgress::ended(const CaseOutcome& outcome) {
   const std::lock_guard lock(mutex_);
   const std::string id = outcome.line.document()["case"];
   ++(outcome.status == CaseStatus::done ? done_ : failed_);
@@ -90,7 +90,8 @@ void Progress::ended(const CaseOutcome& outcome) {
     event["reason"] = outcome.reason;
     const std::string said = "tetwarp: case " + id + " " + name_of(outcome.status) + ": " + outcome.reason;
     print(said);
-    const bool only_here = outcome.line.document()["reason"] != outcome.reason;  // the case is de-identified
+    // True for a de-identified case, whose reason no file names.
+    const bool only_here = outcome.line.document()["reason"] != outcome.reason;
     if (only_here && form_ == Form::none) std::fprintf(stderr, "%s\n", shown_lines(said).c_str());
   }
   if (!outcome.made_again.empty()) {
@@ -101,13 +102,13 @@ void Progress::ended(const CaseOutcome& outcome) {
   print(event);
 }
 
-void Progress::warn(const std::string& text) {
+void BatchProgress::warn(const std::string& text) {
   const std::lock_guard lock(mutex_);
   print("tetwarp: warning: " + text);
   print({{"event", "warning"}, {"text", text}});
 }
 
-void Progress::again(const std::string& reason, const std::vector<std::string>& ids) {
+void BatchProgress::again(const std::string& reason, const std::vector<std::string>& ids) {
   constexpr std::size_t kMostShown = 10;
   const std::lock_guard lock(mutex_);
   std::string listed;
@@ -117,7 +118,7 @@ void Progress::again(const std::string& reason, const std::vector<std::string>& 
   print({{"event", "again"}, {"cases", ids.size()}, {"reason", reason}, {"ids", ids}});
 }
 
-void Progress::draw() {
+void BatchProgress::draw() {
   const std::lock_guard lock(mutex_);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
   if (form_ != Form::person || !terminal_ || seconds < 1 || cases_ == 0) return;
@@ -138,7 +139,7 @@ void Progress::draw() {
   std::fflush(stderr);
 }
 
-void Progress::end(const json& summary) {
+void BatchProgress::end(const json& summary) {
   const std::lock_guard lock(mutex_);
   clear();
   json event = summary;

@@ -14,27 +14,28 @@
 
 namespace tetwarp::apps {
 
-/// What a batch says while it runs, on standard error: to a person on a terminal a bar with cases a minute and the time
-/// left, and a line for each case that fails; to a machine JSON Lines. Cases by their ids, nothing of patients.
-class Progress {
+/// What a batch tells on standard error while it runs. A person at a terminal sees a bar with cases a minute and the
+/// time left, and a line for each case that fails; a machine gets JSON Lines. Cases are named by their ids, and nothing
+/// tells of patients.
+class BatchProgress {
  public:
   enum class Form { none, person, machine };
 
-  explicit Progress(Form form);
-  ~Progress();
-  Progress(const Progress&) = delete;
-  Progress& operator=(const Progress&) = delete;
+  explicit BatchProgress(Form form);
+  ~BatchProgress();
+  BatchProgress(const BatchProgress&) = delete;
+  BatchProgress& operator=(const BatchProgress&) = delete;
 
-  /// @param cases  to run. @param finished  by earlier runs
+  /// Begins to tell of cases. @param cases  number of cases to run. @param finished  number that earlier runs finished
   void begin(std::size_t cases, std::size_t finished);
-  /// These may be called by several threads.
+  /// Tells that a case was started. Several threads may call `started`, `ended` and `warn` at a time.
   void started(const std::string& id);
   void ended(const CaseOutcome& outcome);
   void warn(const std::string& text);
-  /// Finished cases that are made again. @param reason  "the row has changed"
+  /// Tells of finished cases that are made again. @param reason  "the row has changed"
   void again(const std::string& reason, const std::vector<std::string>& ids);
   void draw();
-  /// The last word. @param summary  numbers of cases, for a machine
+  /// Tells the end of the batch. @param summary  numbers of cases, for a machine
   void end(const nlohmann::json& summary);
 
  private:

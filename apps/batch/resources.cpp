@@ -94,7 +94,7 @@ Devices::Lease::~Lease() { of_->give_back(worker_, places_); }
 
 namespace {
 
-/// The number in a file of one, or of the line that begins with `key`; 0 where there is none.
+/// The number in a file that holds one, or in the line that begins with `key`; 0 where there is none.
 std::uint64_t number_in(const char* path, const std::string& key = "") {
   std::ifstream file(path);
   std::string word;

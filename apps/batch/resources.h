@@ -43,7 +43,7 @@ class MemoryBudget {
 
  private:
   std::uint64_t bytes_, held_ = 0, next_ = 0, turn_ = 0;
-  std::set<std::uint64_t> given_up_;  ///< tickets of those who stopped waiting
+  std::set<std::uint64_t> given_up_;  ///< tickets of requests that were given up
   std::mutex mutex_;
   std::condition_variable_any changed_;
 };
@@ -86,8 +86,8 @@ class Devices {
   bool may_fall_back(BackendChoice wanted) const { return leaves_open(meant_by(wanted)); }
   /// Withdraws a device that failed: no case gets it any more.
   void lose(int device);
-  std::size_t count() const { return count_; }  ///< of those that there were at first, the processor as one
-  /// Cases that resample at once at most, on those that there were at first.
+  std::size_t count() const { return count_; }  ///< Number of devices at the start; the CPU counts as one
+  /// The most cases that resample at the same time, on the devices at the start.
   std::size_t places() const { return cuda_ > 0 ? count_ * kPlaces : 1; }
 
  private:
@@ -97,7 +97,7 @@ class Devices {
   void give_back(const Worker& worker, int places);
 
   BackendChoice wanted_;
-  std::vector<int> free_;  ///< places of each CUDA device
+  std::vector<int> free_;  ///< by CUDA device: its free places
   std::set<int> lost_;
   int waiting_alone_ = 0;
   bool cpu_is_free_ = true;
@@ -107,14 +107,14 @@ class Devices {
   std::condition_variable_any changed_;
 };
 
-/// What the cases in work share.
+/// What all cases in work share.
 struct Resources {
   MemoryBudget& memory;
   Devices& devices;
   SharedInputs& inputs;
 };
 
-/// What the system and its control group can still give, bytes.
+/// Bytes of memory that the system and the control group of this process can still give.
 std::uint64_t available_memory_bytes();
 
 }  // namespace tetwarp::apps

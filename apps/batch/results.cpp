@@ -34,7 +34,7 @@ std::string share_of(const json& report) {
   return text;
 }
 
-/// Columns: case, status, covered, folds, reason.
+/// A row of the table with its columns: case, status, covered, folds, reason.
 std::string row(std::size_t width, const std::string& id, const std::string& status, const std::string& covered,
                 const std::string& folds, const std::string& reason) {
   const auto padded = [](std::string text, std::size_t to) {
@@ -142,7 +142,8 @@ std::string Results::table(bool all) const {
 
 namespace {
 
-/// N of the files results.I-of-N.jsonl in a folder. @throws Error where there is none, or of several N
+/// The number N in the names of files results.I-of-N.jsonl in a folder. @throws Error where there is no such file, or N
+/// differs between them
 std::size_t shard_count(const fs::path& folder) {
   std::size_t count = 0;
   std::error_code error;

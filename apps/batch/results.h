@@ -15,8 +15,8 @@
 
 namespace tetwarp::apps {
 
-/// The lines of a file of JSON Lines by the case that they are of, the last where there are several; others, and such
-/// as a killed run has torn, are left out.
+/// The lines of a file of JSON Lines by the case to which they belong, the last one if a case has several. Other lines
+/// are left out, and so are lines that a killed run left incomplete.
 std::map<std::string, nlohmann::json> read_lines(const std::filesystem::path& path);
 
 /// Numbers of cases that are done, and that are not.
@@ -24,22 +24,22 @@ struct Tally {
   std::size_t done = 0, failed = 0, missing = 0;
 };
 
-/// What became of the cases of one OUTPUT_DIR and shard. Lines go to the files as cases end, in the order of the
-/// manifest once the batch ends.
+/// The results of the cases of one OUTPUT_DIR and shard. Lines are added to the files as cases end, and put into the
+/// order of the manifest once the batch ends.
 class Results {
  public:
-  /// @param ids  of the manifest, in its order
+  /// @param ids  of the cases, in the order of the manifest
   Results(const OutputFolder& folder, std::vector<std::string> ids);
 
-  /// A case that an earlier run finished.
+  /// Adds a case that an earlier run finished.
   void keep(const nlohmann::json& line);
-  /// May be called by several threads. @throws Error where a line cannot be written
+  /// Adds a case that has ended. Several threads may call it at a time. @throws Error where a line cannot be written
   void add(const CaseOutcome& outcome);
-  /// Writes the files anew, in order. @throws Error
+  /// Writes the files again, with lines in the order of the manifest. @throws Error
   void finish() const;
 
   Tally tally() const;
-  /// For people: one line a case, or those of cases that are not done.
+  /// A table for people with a line for each case, or for each case that is not done.
   std::string table(bool all) const;
 
  private:
@@ -50,7 +50,7 @@ class Results {
   mutable std::mutex mutex_;
 };
 
-/// Joins what the shards of a batch have recorded: `batch --merge`.
+/// Joins the records of all shards of a batch, for `batch --merge`.
 /// @throws Error where shards or cases are missing
 Tally merge_shards(const std::filesystem::path& folder, const std::vector<std::string>& ids, std::string& table);
 

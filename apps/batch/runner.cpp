@@ -8,7 +8,7 @@ namespace tetwarp::apps {
 namespace {
 
 using namespace std::chrono_literals;
-constexpr auto kPatience = 3500ms;  ///< of the 5 s in which an interrupted batch ends
+constexpr auto kPatience = 3500ms;  ///< a part of the 5 s within which an interrupted batch ends
 
 }  // namespace
 
@@ -32,7 +32,7 @@ void Runner::work() {
   ended_.notify_all();
 }
 
-/// Where the system gives fewer threads than there are jobs, those that it gives do the work.
+/// Starts threads that make cases. If the system gives fewer than there are jobs, these do all the work.
 std::vector<std::jthread> Runner::start(std::size_t jobs) {
   std::vector<std::jthread> threads;
   threads.reserve(jobs);

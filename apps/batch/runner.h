@@ -15,21 +15,21 @@
 
 namespace tetwarp::apps {
 
-/// Cases that are in work side by side: while one is read, another is resampled and a third is written. Each takes what
-/// it needs of memory and devices, in the order of the manifest.
+/// Runs cases side by side: while one is read, another is resampled and a third is written. Each takes the memory and
+/// the devices that it needs, in the order of the manifest.
 class Runner {
  public:
   struct Parts {
     Resources resources;
     Results& results;
-    Progress& progress;
+    BatchProgress& progress;
     Usage& usage;
   };
 
   Runner(std::vector<const BatchCase*> cases, const Parts& parts) : cases_(std::move(cases)), parts_(parts) {}
 
-  /// Runs all, at most `jobs` at once.
-  /// @return false where it was interrupted. Cases in work are then dropped, or finish at once; if one does neither for
+  /// Runs all cases, at most `jobs` at a time.
+  /// @return false where it was interrupted. Cases in work are then dropped, or finish soon. If one does neither for
   /// some seconds, `abandon` is called, which has to end the process.
   /// @throws Error where results cannot be written
   bool run(std::size_t jobs, const std::function<void()>& abandon);

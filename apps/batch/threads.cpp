@@ -20,11 +20,11 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr std::size_t kPerCase = 4;   ///< itself, the hash of its input, and files that are flushed
-constexpr std::size_t kOfCuda = 16;   ///< of the driver, and copies from devices
-constexpr auto kLongestStart = 50ms;  ///< that starting all of oneTBB's may take
+constexpr std::size_t kPerCase = 4;   ///< the case itself, the hash of its input, and flushing its files
+constexpr std::size_t kOfCuda = 16;   ///< threads of the driver, and of copies from devices
+constexpr auto kLongestStart = 50ms;  ///< the longest time that starting all threads of oneTBB may take
 
-/// How many of so many threads the system gives at once; they end again.
+/// How many of `wanted` threads the system gives at the same time. All of them end again.
 std::size_t threads_given(std::size_t wanted) {
   std::promise<void> end;
   const std::shared_future<void> ended = end.get_future().share();
@@ -32,7 +32,7 @@ std::size_t threads_given(std::size_t wanted) {
   threads.reserve(wanted);
   try {
     while (threads.size() < wanted) threads.emplace_back([ended] { ended.wait(); });
-  } catch (const std::system_error&) {  // no more
+  } catch (const std::system_error&) {  // the system gives no more
   }
   end.set_value();
   return threads.size();

@@ -10,9 +10,9 @@
 
 namespace tetwarp::apps {
 
-/// The threads of a batch, as many as the system gives: a limit of user or control group (`ulimit -u`, pids.max) makes
-/// it work with fewer, and not fail. oneTBB ends the process where it cannot start a thread, so its threads are started
-/// here, while it is known that they are to be had.
+/// The threads of a batch, as many as the system gives. A limit of the user or of the control group (`ulimit -u`,
+/// pids.max) lets the batch work with fewer threads instead of failing. oneTBB ends the process where it cannot start a
+/// thread, so its threads are started here, while it is known that the system gives them.
 class Threads {
  public:
   /// @param jobs  number of cases to run at once, if the system gives enough threads

@@ -15,9 +15,11 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double kBusy = 0.8;                   ///< who is busy for such a share of the time holds the others up
-constexpr const char* kOnDevice = "on_device";  ///< a timing: how long a case held its device, for one stage or several
-constexpr double kWaiting = 0.25;               ///< of the time of all who work, spent waiting for memory
+constexpr double kBusy = 0.8;  ///< a part that is busy for this share of the time holds up the others
+/// A timing: how long a case held its device, in one stage or several.
+constexpr const char* kOnDevice = "on_device";
+/// Share of the time of all jobs that is spent waiting for memory, from which memory is named.
+constexpr double kWaiting = 0.25;
 
 double processor_seconds() {
   rusage usage{};

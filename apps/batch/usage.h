@@ -11,17 +11,19 @@
 
 namespace tetwarp::apps {
 
-/// What a batch was busy with: for the sentence that says what held it up.
+/// Adds up what a batch was busy with, for the sentence that says what held it up.
 class Usage {
  public:
-  /// @param places  of cases that resample at once, on so many `devices`. @param jobs  cases in work at once
+  /// @param places   number of cases that can resample at the same time on all devices
+  /// @param devices  number of devices
+  /// @param jobs     number of cases in work at the same time
   Usage(std::size_t places, std::size_t devices, bool cuda, std::size_t jobs);
 
-  /// Seconds of a case by stage, as in timings.jsonl. May be called by several threads.
+  /// Adds the seconds of a case by stage, as timings.jsonl has them. Several threads may call it at a time.
   void add(const nlohmann::json& timing);
-  /// Shares of the time so far: of processor, devices and each stage.
+  /// Shares of the time so far for which the processor, the devices and each stage were busy.
   nlohmann::json report() const;
-  /// One line for people: "bottleneck: the processor (busy 97 %, ...)"; nothing before a case was resampled.
+  /// A line for people: "bottleneck: the processor (busy 97 %, ...)"; empty before a case was resampled.
   std::string sentence() const;
 
  private:

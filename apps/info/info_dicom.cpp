@@ -24,14 +24,14 @@ using nlohmann::json;
 
 constexpr std::size_t kNamesShown = 3;
 
-/// Files that were left out for one reason.
+/// Files, or frames of files, that were left out for one reason.
 struct ReasonGroup {
   std::string reason;
-  std::vector<std::string> files;  ///< or frames of files
+  std::vector<std::string> files;  ///< names of the files or frames
   std::string noun = "file";
 };
 
-/// In the order in which the reasons come first.
+/// The files by reason, in the order in which the reasons occur first.
 std::vector<ReasonGroup> by_reason(const std::vector<LeftOutFile>& left_out) {
   std::vector<ReasonGroup> groups;
   std::map<std::string, std::size_t> place_of;
@@ -53,7 +53,7 @@ json left_out_json(const std::vector<LeftOutFile>& left_out) {
 
 bool can_be_deformed(const DicomSeries& series) { return !series.refusal && series.slices.size() > 1; }
 
-/// A path as a shell takes it.
+/// A path in quotes where a shell needs them.
 std::string quoted(const std::filesystem::path& path) {
   const std::string text = shown(path);
   const auto is_plain = [](unsigned char c) { return std::isalnum(c) || std::strchr("_./-+,:@", c); };
@@ -63,7 +63,7 @@ std::string quoted(const std::filesystem::path& path) {
   return quotes + "'";
 }
 
-/// The command line that takes the first volume that can be deformed; empty where there is none.
+/// The command line that deforms the first volume that can be deformed; empty where there is none.
 std::string hint(const DicomScan& scan, const InputOptions& input) {
   const auto found = std::find_if(scan.series.begin(), scan.series.end(), can_be_deformed);
   if (found == scan.series.end()) return {};
@@ -73,7 +73,7 @@ std::string hint(const DicomScan& scan, const InputOptions& input) {
          (found->uneven ? " --uneven exact" : "") + " -f FIELD -o OUTPUT";
 }
 
-/// "axial; head to feet 139 mm" of the line of slices.
+/// The plane of slices, and their extent in patient directions: "axial; head to feet 139 mm".
 std::string lie_of(const Geometry& geometry) {
   const std::string plane = plane_name(geometry.direction[2]);
   const char* ways = plane.ends_with("axial")     ? "head to feet"
@@ -84,14 +84,14 @@ std::string lie_of(const Geometry& geometry) {
   return plane + "; " + ways + " " + number_text(length) + " mm";
 }
 
-/// Files that hold the slices.
+/// Number of files that hold the slices.
 std::size_t files_of(const DicomSeries& series) {
   std::set<std::filesystem::path> files;
   for (const DicomSlice& slice : series.slices) files.insert(slice.file);
   return files.size();
 }
 
-/// "140 slices"; where they are frames "140 slices in 1 file".
+/// Number of slices, "140 slices"; for frames "140 slices in 1 file".
 std::string slices_of(const DicomSeries& series) {
   const std::string slices = plural(series.slices.size(), "slice");
   const bool has_frames =
@@ -99,7 +99,7 @@ std::string slices_of(const DicomSeries& series) {
   return has_frames ? slices + " in " + plural(files_of(series), "file") : slices;
 }
 
-/// "CT, 512 x 512, 140 slices, 1 mm apart, axial; head to feet 139 mm".
+/// A line that describes a volume: "CT, 512 x 512, 140 slices, 1 mm apart, axial; head to feet 139 mm".
 std::string summary(const DicomSeries& series) {
   std::string text = series.modality.empty() ? "unknown kind" : shown(series.modality);
   const Geometry& geometry = series.geometry;
@@ -159,7 +159,7 @@ void print_set_aside(const DicomSeries& series) {
   print_left_out(series.set_aside);
 }
 
-/// What several volumes of a series have in common, before the first of them.
+/// Prints what the volumes of a series have in common, before the first of them.
 void print_series_of_several(const DicomSeries& series) {
   print_line("\n     One series" + (series.description.empty() ? "" : ", \"" + series.description + "\",") + " holds " +
              std::to_string(series.volumes) + " volumes, told apart by " + series.split_by + ":");
@@ -216,7 +216,7 @@ void print(const DicomScan& scan, const InputOptions& input) {
              (scan.series.empty()
                   ? "no DICOM image"
                   : std::to_string(usable) + " of " + std::to_string(scan.series.size()) + " entries can be deformed"));
-  std::size_t left = 0;  // volumes of a series that was begun
+  std::size_t left = 0;  // how many volumes of the present series are still to come
   for (std::size_t n = 0; n < scan.series.size(); ++n) {
     const DicomSeries& series = scan.series[n];
     if (left == 0 && series.volumes > 1) print_series_of_several(series);

@@ -10,10 +10,10 @@
 
 namespace tetwarp::apps {
 
-/// What a folder of DICOM files holds, for scripts; the keys stand in docs/reference/dicom.md.
+/// Describes for scripts what a folder of DICOM files holds; docs/reference/dicom.md lists the keys.
 nlohmann::json describe(const DicomScan& scan, const InputOptions& input);
 
-/// The same to standard output, in words for people.
+/// Prints for people, on standard output, what a folder of DICOM files holds.
 void print(const DicomScan& scan, const InputOptions& input);
 
 }  // namespace tetwarp::apps

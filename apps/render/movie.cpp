@@ -30,7 +30,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The program on PATH; empty: not there.
+/// The path of a program on PATH; empty: it is not there.
 fs::path find_program(const std::string& name) {
   const char* const path = std::getenv("PATH");
   std::istringstream folders(path ? path : "");
@@ -41,8 +41,8 @@ fs::path find_program(const std::string& name) {
   return {};
 }
 
-/// Raw pictures on the standard input, a film in `target`. The same pictures give the same bytes: one thread, no times,
-/// no name of the encoder.
+/// Arguments of ffmpeg to make the film `target` from raw pictures on the standard input. The same pictures give the
+/// same bytes: one thread, no times, no name of the encoder.
 std::vector<std::string> arguments_for(const Picture& first, const fs::path& target, bool gif, double rate) {
   const std::string size = std::to_string(first.width()) + "x" + std::to_string(first.height());
   char frames[32];
@@ -65,14 +65,14 @@ std::vector<std::string> arguments_for(const Picture& first, const fs::path& tar
   return arguments;
 }
 
-/// A file without a name, in memory.
+/// Makes a file without a name, in memory.
 Descriptor make_log() {
   Descriptor log(::memfd_create("tetwarp-film-log", MFD_CLOEXEC));
   if (log.number() < 0) throw Error(std::string("no memory for what ffmpeg says: ") + std::strerror(errno));
   return log;
 }
 
-/// The last line of the last kilobyte.
+/// The last line of a log, of which the last kilobyte is read.
 std::string last_line(const Descriptor& log) {
   struct stat state {};
   ::fstat(log.number(), &state);
@@ -83,8 +83,8 @@ std::string last_line(const Descriptor& log) {
   return text.substr(text.find_last_of("\r\n") + 1);
 }
 
-/// Writes to a pipe. @return false where nobody reads it any more; the signal for that, which would end this program,
-/// does not arrive
+/// Writes all bytes to a pipe. @return false where nothing reads the pipe any more; the signal for that, which would
+/// end this program, is held back
 bool write_all(const Descriptor& pipe, const std::uint8_t* bytes, std::size_t size) {
   sigset_t signal, before, pending;
   sigemptyset(&signal);
@@ -108,8 +108,8 @@ bool write_all(const Descriptor& pipe, const std::uint8_t* bytes, std::size_t si
   return !broken;
 }
 
-/// ffmpeg at work. It ends with this object, whatever it is doing; it ends by itself, too, where this program is
-/// killed: its pictures end then.
+/// A running ffmpeg. It ends with this object, whatever it is doing. If this program is killed it ends, too, for its
+/// pictures end.
 class Encoder {
  public:
   Encoder(const Picture& first, const fs::path& target, const fs::path& name, double rate, const std::stop_token& stop)
@@ -133,7 +133,7 @@ class Encoder {
                  {.in = pipe.read.number(), .out = log_.number(), .error = log_.number()}),
         at_once_(stop, [this] { program_.kill(); }) {}
 
-  /// Waits for the end. @param complete  whether it has all pictures
+  /// Waits until ffmpeg has ended. @param complete  whether it was given all pictures
   void finish(bool complete) {
     pictures_.close();
     const std::optional<int> status = program_.wait();

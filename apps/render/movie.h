@@ -11,15 +11,15 @@
 
 namespace tetwarp::apps {
 
-/// Whether a name means a film: .mp4 or .gif.
+/// Whether a file name stands for a film: it ends with .mp4 or .gif.
 bool is_movie(const std::filesystem::path& output);
 
-/// @throws Error where ffmpeg, which makes films, is not found
+/// Looks for ffmpeg, which makes films. @throws Error where it is not found
 void require_movie_encoder(const std::filesystem::path& output);
 
-/// Makes a film of pictures of one size. They go to ffmpeg through a pipe, and are in no file but the film.
-/// @param picture  makes the Nth, from 0
-/// @param target   where it is written; its form is that of `name`
+/// Makes a film of pictures of one size. They go to ffmpeg through a pipe; no file but the film holds them.
+/// @param picture  makes the Nth picture, from 0
+/// @param target   the file that is written; its format is that of `name`
 /// @param stop     ends ffmpeg at once
 /// @throws Error where ffmpeg fails; Cancelled
 void write_movie(const std::filesystem::path& target, const std::filesystem::path& name, std::size_t pictures,

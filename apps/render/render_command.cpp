@@ -54,7 +54,7 @@ class Rendering {
   std::string backend_;
   std::optional<Window> window_;
   std::vector<std::uint8_t> tint_numbers_;
-  std::optional<std::size_t> shown_;  ///< number of the picture that the volume is deformed for
+  std::optional<std::size_t> shown_;  ///< number of the picture for which the volume is deformed now
 };
 
 Rendering::Rendering(const RenderOptions& options)
@@ -116,7 +116,7 @@ std::vector<Slice> Rendering::slices() const {
   return slices;
 }
 
-/// Of the middle slices of the first picture, and the same for all.
+/// The window of grey levels for all pictures, chosen from the middle slices of the first one.
 Window Rendering::chosen_window() const {
   constexpr int kSamples = 256;
   std::vector<double> values;
@@ -140,7 +140,7 @@ void Rendering::choose_style() {
     throw UsageError("--window and --level go with slices and mip, not with " + style_.transfer.name);
   if (is_maximum && (named || (!window_->hounsfield && !is_transfer_file(options_)))) {
     Window window = *window_;
-    if (window_->hounsfield) {  // of the function, unless said otherwise
+    if (window_->hounsfield) {  // the window of the transfer function, unless an option gives another
       const double low = style_.transfer.points.front().value, high = style_.transfer.points.back().value;
       window.width = options_.window.value_or(high - low);
       window.level = options_.level.value_or(0.5 * (low + high));
@@ -165,7 +165,7 @@ void Rendering::show(std::size_t number) {
   tint();
 }
 
-/// The last overlay that has something to say of a voxel tints it.
+/// Tints each voxel by the last overlay that has a value for it.
 void Rendering::tint() {
   tint_numbers_.clear();
   std::optional<OverlayKind> kind;
@@ -179,7 +179,7 @@ void Rendering::tint() {
   const TintScale scale(*kind);
   const Geometry& grid = scene_.grid();
   tint_numbers_.resize(static_cast<std::size_t>(voxel_count(grid)));
-  for (std::int64_t k = 0; k < grid.size.z; k += 16) {  // slab by slab: maps are larger than numbers
+  for (std::int64_t k = 0; k < grid.size.z; k += 16) {  // slab by slab, for maps take more memory than tint numbers
     Region slab = whole(grid);
     slab.begin.z = k;
     slab.end.z = std::min(k + 16, grid.size.z);
@@ -264,7 +264,7 @@ void Rendering::run() {
   scene_.read();
   Stage stage(options_.common, "render");
   const Picture first =
-      picture(0);  // what does not go together, or a device that fails, is known before one is written
+      picture(0);  // made before any file is written, to find options that do not go together and devices that fail
   const Control control = stage.control();
   const auto next = [&](std::size_t number) {
     if (control.stop.stop_requested()) throw Cancelled();

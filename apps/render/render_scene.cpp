@@ -32,7 +32,7 @@ MapShape shape_of(OverlayKind kind) {
   }
 }
 
-/// A map of a part of a grid. Its volume has the size of the part; the view says where it lies.
+/// Fills a map of a part of a grid. Its memory holds that part alone; the view says where it lies.
 OwnedOverlay make_map(Resampler& resampler, const Geometry& grid, OverlayKind kind, const Region& region,
                       std::span<const Target> targets) {
   const MapShape shape = shape_of(kind);
@@ -139,7 +139,7 @@ void RenderScene::read() {
     Stage stage(options_.common, "read");
     input_ = read_input(input_options_, header_, options_.common, stage.control());
   }
-  if (!deforms_ && grid_ != header_.geometry) {  // onto a straight, even grid
+  if (!deforms_ && grid_ != header_.geometry) {  // then it is resampled onto a straight, even grid
     field_ = resting_pull_field(grid_);
     notes_.push_back("the slices of VOLUME lean or lie at uneven distances: it is shown resampled onto " +
                      to_string(grid_.size) + " voxels");
@@ -227,7 +227,7 @@ const VertexField* RenderScene::lattice_field() const {
 OwnedOverlay RenderScene::computed(OverlayKind kind, const Region& region) {
   if (kind != OverlayKind::lattice && kind != OverlayKind::coverage)
     return make_map(*resampler_, grid_, kind, region, {});
-  // A coverage is that of a volume: whether a value came through.
+  // Coverage needs a volume to be resampled: it tells whether a value came through.
   Geometry part = grid_;
   part.size = region.end - region.begin;
   AnyVolume slab(part, input_.volume.type());

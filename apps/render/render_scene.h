@@ -21,16 +21,16 @@ namespace tetwarp::apps {
 struct OverlayWish {
   std::string text;
   OverlayKind kind = OverlayKind::coverage;
-  std::filesystem::path map;           ///< a file; empty: of the field that deforms the volume, or a lattice
-  std::optional<ForwardChoice> lattice;  ///< of lattice=FIELD
+  std::filesystem::path map;             ///< file that gives the overlay; empty: a field gives it
+  std::optional<ForwardChoice> lattice;  ///< the field of lattice=FIELD
 
-  /// Whether it is of the field that deforms the volume.
+  /// Whether the field that deforms the volume gives the overlay.
   bool is_of_deformation() const { return map.empty() && !lattice; }
 };
 
 /// The fields that a picture is made with, parsed.
 struct RenderFields {
-  std::optional<FieldChoice> deforming;   ///< the volume, in all pictures
+  std::optional<FieldChoice> deforming;   ///< deforms the volume in all pictures
   std::optional<ForwardChoice> sequence;  ///< instead: each of its fields deforms one picture
   std::vector<OverlayWish> overlays;
 
@@ -40,38 +40,39 @@ struct RenderFields {
 RenderFields parse_render_fields(const RenderOptions& options);
 Reads reads_of(const RenderOptions& options, const RenderFields& fields);
 
-/// Whether --transfer is the name of a file.
+/// Whether the argument of --transfer is the name of a file.
 bool is_transfer_file(const RenderOptions& options);
 
-/// An overlay with the memory of its map.
+/// An overlay, and the memory that holds its map.
 struct OwnedOverlay {
   Overlay overlay;
   std::shared_ptr<const AnyVolume> map;
 };
 
-/// The volume that `render` shows, frame by frame as it is deformed: by a field that grows, or by one field after the
-/// other.
+/// The volume that `render` shows, frame by frame as it is deformed: by a field that grows from frame to frame, or by
+/// one field after the other.
 class RenderScene {
  public:
-  /// Opens the volume. Refers to options and fields.
-  /// @throws UsageError for an overlay that lacks the field that it is of; others as `open_input`
+  /// Opens the volume. Keeps references to options and fields.
+  /// @throws UsageError for an overlay that lacks the field that it is of; and whatever else `open_input`
+  /// throws
   RenderScene(const RenderOptions& options, const RenderFields& fields);
   ~RenderScene();
 
   void read();
   std::size_t frames() const;
-  /// Deforms the volume as it is in a frame.
+  /// Deforms the volume for a frame.
   void show(std::size_t frame);
 
   const InputHeader& header() const { return header_; }
   const Geometry& grid() const { return grid_; }
-  ConstVolumeView volume() const;  ///< of the frame that is shown
-  const VertexField* lattice_field()
-      const;  ///< that moves the volume in this frame; null: there is none with a lattice
+  ConstVolumeView volume() const;  ///< the volume of the frame that is shown
+  /// The lattice field that moves the volume in this frame; null: there is none.
+  const VertexField* lattice_field() const;
   const std::vector<OverlayWish>& wishes() const { return fields_.overlays; }
-  /// What lies over a part of the volume. @param wish  one of `wishes()`
+  /// An overlay for a part of the volume. @param wish  one of `wishes()`
   OwnedOverlay overlay(const OverlayWish& wish, const Region& region);
-  /// "wave:amplitude=8, then twist.mha", without folders; empty: nothing deforms.
+  /// What deforms the volume, for the title: "wave:amplitude=8, then twist.mha", without folders; empty: nothing does.
   std::string field_title(std::size_t frame) const;
   const std::string& backend() const { return backend_; }
   const std::vector<std::string>& notes() const { return notes_; }
@@ -88,19 +89,20 @@ class RenderScene {
 
   const RenderOptions& options_;
   const RenderFields& fields_;
-  InputOptions input_options_;  ///< without the hash, which is not used
+  InputOptions input_options_;  ///< with the hash off, for it is not used
   InputHeader header_;
   InputVolume input_;
   Geometry grid_;
   bool deforms_ = false;
-  AnyField field_;                         ///< whole
-  AnyField frame_field_;                   ///< of a frame in which it has not grown to its whole
-  const AnyField* shown_field_ = nullptr;  ///< of the frame: that one, or the whole
-  VertexField drawn_lattice_;              ///< of `lattice=FIELD`
+  AnyField field_;                         ///< the field at its full amount
+  AnyField frame_field_;                   ///< the field of a frame in which it has not grown to its full amount
+  const AnyField* shown_field_ = nullptr;  ///< the field of the frame: `frame_field_`, or `field_`
+  VertexField drawn_lattice_;              ///< the lattice of the overlay `lattice=FIELD`
   AnyVolume output_;
   AnyResampler resampler_;
   std::unique_ptr<ForwardResampler> lattice_resampler_;
-  std::vector<std::shared_ptr<const AnyVolume>> maps_;  ///< of the overlays; null where there is none
+  std::vector<std::shared_ptr<const AnyVolume>>
+      maps_;  ///< by overlay: the volume of its file or map; null: it has none
   std::string backend_;
   std::vector<std::string> notes_;
 };

@@ -23,7 +23,7 @@ namespace {
 using namespace simulate;
 namespace fs = std::filesystem;
 
-/// The outputs of the command, before they have their names.
+/// The outputs of the command, before they get their names.
 struct Outputs {
   Reads reads;  ///< that none of them may touch
   OutputSet set;

@@ -124,7 +124,7 @@ json document_of(const SimulateRecord& record) {
 }
 
 std::vector<std::string> warnings_of(const SimulateRecord& record) {
-  std::vector<std::string> warnings = record.run.loads(0).notes();  // of holds, which all phases have
+  std::vector<std::string> warnings = record.run.loads(0).notes();  // notes on holds, which are the same in all phases
   for (std::size_t n = 0; n < record.phases.size(); ++n) {
     const PhaseRecord& phase = record.phases[n];
     if (phase.unsettled > 0) {

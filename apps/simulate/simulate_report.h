@@ -14,17 +14,17 @@
 
 namespace tetwarp::apps {
 
-/// What became of a phase.
+/// What came of a phase.
 struct PhaseRecord {
-  int steps = 0;                                  ///< in all its frames
-  int unsettled = 0;                              ///< frames of which the steps were spent before they had settled
-  simulate::Settled last = {};                    ///< of its last frame
-  double largest_mm = 0;                          ///< displacement at its end
-  double energy_n_mm = 0;                         ///< of the springs at its end, mass-spring only
-  std::vector<simulate::BrokenLink> broken = {};  ///< at its end, chainmail only
+  int steps = 0;                                  ///< steps of all its frames together
+  int unsettled = 0;                              ///< number of frames that used up their steps before they had settled
+  simulate::Settled last = {};                    ///< how its last frame settled
+  double largest_mm = 0;                          ///< the largest displacement of a node at its end, mm
+  double energy_n_mm = 0;                         ///< energy of the springs at its end, N mm; mass-spring only
+  std::vector<simulate::BrokenLink> broken = {};  ///< links beyond their limits at its end; ChainMail only
 };
 
-/// What is known of a run, to be said and written.
+/// What is known of a run, for its messages and its report.
 struct SimulateRecord {
   const SimulateOptions& options;
   const simulate::Scenario& scenario;
@@ -35,16 +35,16 @@ struct SimulateRecord {
   std::vector<std::pair<std::string, double>> stages = {};  ///< name and seconds
 };
 
-/// Adds a frame to its phase. @param displacement  of each node, when the frame ends its phase
+/// Adds a frame to the record of its phase. @param displacement  of each node; given when the frame ends its phase
 void add_frame(SimulateRecord& record, const simulate::Frame& frame, std::span<const glm::vec3> displacement);
 
-/// "chainmail", "mass-spring".
+/// The name of a method: "chainmail", "mass-spring".
 const char* name_of(simulate::Method method);
 
 nlohmann::json document_of(const SimulateRecord& record);
-/// Lines for people: holds without vertices, phases that did not settle, links beyond their limits.
+/// Warnings for people, a line each: holds without vertices, phases that did not settle, links beyond their limits.
 std::vector<std::string> warnings_of(const SimulateRecord& record);
-/// One line: what would be simulated.
+/// A line that says what would be simulated.
 std::string describe(const SimulateRecord& record);
 
 }  // namespace tetwarp::apps

@@ -14,7 +14,8 @@ namespace {
 
 using namespace simulate;
 
-/// Model, springs or links, and their state, of a vertex: measured, 512 x 512 x 100 with cells of 8 and of 4 voxels.
+/// Bytes of model, springs or links, and state for each vertex, measured on 512 x 512 x 100 voxels with cells of 8 and
+/// of 4 voxels.
 constexpr std::uint64_t kBytesPerVertex = 600;
 
 SimulateOptions as_simulation(const DeformOptions& options, const Worker& worker) {

@@ -17,27 +17,30 @@ namespace tetwarp::apps {
 /// The files that a simulated field is made of, other than INPUT, with their SHA-256.
 struct SimulationSource {
   std::string scenario, scenario_sha256;
-  std::string labels, labels_sha256;  ///< empty: none
+  std::string labels, labels_sha256;  ///< empty: there are no labels
   std::string method, backend;
 };
 
-/// A field that `deform --scenario` makes: at the end of the last phase, as `simulate` writes it.
+/// The field that `deform --scenario` makes: that of the end of the last phase, which `simulate` would write.
 struct SimulatedField {
   VertexField field;
   SimulationSource source;
   std::vector<std::string> warnings;  ///< for people
 };
 
-/// @param options  of which file `scenario` is, and its labels
-/// @param ct  INPUT in HU. @throws InputError for a scenario that cannot be played on it, and what a simulation throws
+/// Simulates a scenario.
+/// @param options  names the file that `scenario` was read from, and its labels
+/// @param ct       INPUT in HU
+/// @throws InputError for a scenario that cannot be played on it, and whatever a simulation throws
 SimulatedField simulate_field(const DeformOptions& options, const simulate::Scenario& scenario,
                               const ConstVolumeView& ct, const Worker& worker, const Control& control);
 
-/// About what a simulation and its field hold, without INPUT.
+/// About how many bytes a simulation and its field take, beside INPUT.
 std::uint64_t simulation_bytes(const simulate::Scenario& scenario, const Geometry& volume, bool labels);
 
-/// Only a mesh holds open cuts. @param every_phase  whether the fields on the way are written too
-/// @throws InputError for a phase whose field is written to `output`, and is divided
+/// Refuses a format that cannot hold the field of a phase: only a mesh can hold open cuts. @param every_phase  whether
+/// the field of every phase is written, not only the last
+/// @throws InputError for a phase whose field has divided cells and is written to `output`
 void require_fitting_format(const simulate::Scenario& scenario, const std::filesystem::path& output, bool every_phase);
 
 }  // namespace tetwarp::apps

@@ -10,14 +10,15 @@
 
 namespace tetwarp::cuda_detail {
 
-/// A box of a view of host memory, seen as one line of bytes: its rows, one after the other.
+/// A box of voxels of a view of host memory, seen as one line of bytes: its rows, one after the other, without the gaps
+/// that lie between them in memory. Results that come from a device in pieces of any size are written through it.
 struct HostRows {
-  std::byte* first;
-  std::size_t row;  ///< bytes
-  std::size_t rows_per_slice;
-  std::size_t row_pitch, slice_pitch;  ///< bytes from one to the next
+  std::byte* first;                    ///< the first voxel of the box
+  std::size_t row;                     ///< bytes of a row
+  std::size_t rows_per_slice;          ///< rows that lie `row_pitch` apart
+  std::size_t row_pitch, slice_pitch;  ///< bytes from the begin of a row, or slice, to that of the next
 
-  /// Writes bytes `begin` to `begin + size` of the line.
+  /// Copies `size` bytes to the line, from its byte `begin` on. Parts of the line may be written by several threads.
   void write(std::size_t begin, const std::byte* from, std::size_t size) const {
     while (size > 0) {
       const std::size_t number = begin / row, in = begin % row, bytes = std::min(size, row - in);
@@ -30,7 +31,9 @@ struct HostRows {
   }
 };
 
-/// @param box  part of what the view buffers. Rows that follow each other in memory are one row.
+/// The rows of a box. Rows, and slices, that follow each other in memory without a gap become one longer row, so that
+/// fewer copies are made.
+/// @param box  a part of what the view buffers, in voxels of its grid
 inline HostRows rows_of(const VolumeView& view, const Region& box) {
   const std::size_t voxel = size_bytes(view.type) * static_cast<std::size_t>(view.components);
   const glm::i64vec3 held = view.buffered.end - view.buffered.begin, size = box.end - box.begin,

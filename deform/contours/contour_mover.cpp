@@ -13,17 +13,17 @@ namespace tetwarp {
 
 namespace {
 
-constexpr double kFollow = 0.1;            // voxel
-constexpr std::size_t kMostSamples = 256;  // of an edge
+constexpr double kFollow = 0.1;            // voxels by which a moved edge may miss its straight line
+constexpr std::size_t kMostSamples = 256;  // samples of an edge
 
 glm::dvec3 normal_of(const Geometry& grid) { return glm::normalize(glm::cross(grid.direction[0], grid.direction[1])); }
 
 double pixel_mm(const Geometry& grid) { return std::min(grid.spacing.x, grid.spacing.y); }
 
-/// Distances of the planes of slices, along the normal.
+/// Distance of the planes of neighbouring slices along their normal, mm.
 double slice_step(const Geometry& grid) { return grid.spacing.z * glm::dot(normal_of(grid), grid.direction[2]); }
 
-/// Of moved samples between two corners, those that the straight line misses, in order.
+/// Adds to `points`, in order, those samples of a moved edge that the straight line between its ends misses.
 void add_missed(std::span<const glm::dvec3> samples, double tolerance, std::vector<glm::dvec3>& points) {
   if (samples.size() < 3) return;
   std::size_t farthest = 0;
@@ -40,7 +40,8 @@ void add_missed(std::span<const glm::dvec3> samples, double tolerance, std::vect
   add_missed(samples.subspan(farthest), tolerance, points);
 }
 
-/// How far a plane is from the nearest of evenly distant ones, of which one is at 0.
+/// How far a plane is from the nearest one of a family of parallel planes, of which one is at 0 and which are `step`
+/// apart.
 double to_nearest(double at, double step) { return std::abs(at - step * std::round(at / step)); }
 
 }  // namespace

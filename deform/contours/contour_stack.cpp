@@ -15,12 +15,13 @@ namespace tetwarp {
 
 namespace {
 
-constexpr double kUsual = 1.5;   // times the usual distance: planes further apart have nothing between them
-constexpr double kNudge = 0.01;  // of the distance
+// Times the usual distance: planes further apart have nothing between them.
+constexpr double kUsual = 1.5;
+constexpr double kNudge = 0.01;  // part of the distance
 
 bool is_area(const Contour& contour) { return is_closed(contour.kind) && contour.points.size() >= 3; }
 
-/// Twice the area, along the normal (Newell).
+/// A vector along the normal whose length is twice the area of a polygon (Newell).
 glm::dvec3 area_vector(std::span<const glm::dvec3> points) {
   glm::dvec3 sum(0);
   for (std::size_t n = 0; n < points.size(); ++n)
@@ -45,7 +46,7 @@ glm::dvec3 normal_of(const Geometry& slices) {
   return glm::normalize(glm::cross(slices.direction[0], slices.direction[1]));
 }
 
-/// Places of the slices along the third axis of a frame; none if they are not perpendicular to it.
+/// Where the slices lie along the third axis of a frame; none if they are not perpendicular to it.
 std::vector<double> slice_places(const Geometry& slices, const glm::dmat3& frame_from_point) {
   const double first = (frame_from_point * slices.origin).z, step = (frame_from_point * slices.direction[2]).z;
   std::vector<double> places;
@@ -159,7 +160,7 @@ double ContourStack::signed_distance(const glm::dvec3& point, Between between) c
   return largest;
 }
 
-ContourStack::Place ContourStack::place(const glm::dvec3& point) const {
+ContourStack::Inside ContourStack::is_inside(const glm::dvec3& point) const {
   const glm::dvec3 at = frame_from_point_ * point;
   for (const Part& part : parts_) {
     if (at.z < part.begin || at.z > part.end) continue;

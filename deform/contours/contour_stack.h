@@ -41,11 +41,11 @@ class ContourStack {
   /// Signed distance from the surface, mm: positive inside; near the surface exact or smaller in size; -infinity where
   /// there is nothing.
   double signed_distance(const glm::dvec3& point, Between between) const;
-  /// Whether a place is inside, for each kind of Between. `place` is much faster than `signed_distance`.
-  struct Place {
+  /// Whether a point is inside, for each kind of Between. It is much faster than `signed_distance`.
+  struct Inside {
     bool interpolated = false, nearest = false;
   };
-  Place place(const glm::dvec3& point) const;
+  Inside is_inside(const glm::dvec3& point) const;
   /// Volume in mm3: the area in each plane times half the distance between its two neighbours.
   double volume() const;
   /// Usual (median) distance of neighbouring planes, mm.

@@ -14,10 +14,10 @@ namespace tetwarp {
 
 namespace {
 
-constexpr double kBeside = 1e-6;      // mm: how far from an edge its two sides are looked at
-constexpr std::size_t kDeepest = 64;  // halvings of a count of edges
+constexpr double kBeside = 1e-6;      // mm from an edge at which its two sides are looked at
+constexpr std::size_t kDeepest = 64;  // levels of the tree, each of which halves the edges
 
-/// Squared distance to a box; 0 inside.
+/// Squared distance of a point to a box; 0 inside.
 double to_box(const glm::dvec2& point, const glm::dvec2& low, const glm::dvec2& high) {
   const glm::dvec2 beyond = glm::max(glm::max(low - point, point - high), glm::dvec2(0));
   return glm::dot(beyond, beyond);
@@ -81,7 +81,7 @@ bool PlanarRegion::contains(const glm::dvec2& point) const {
 }
 
 double PlanarRegion::signed_distance(const glm::dvec2& point) const {
-  double nearest = kFar * kFar;  // squared
+  double nearest = kFar * kFar;  // squared distance
   std::array<std::size_t, kDeepest> waiting;
   std::size_t count = 0;
   if (!nodes_.empty()) waiting[count++] = 0;

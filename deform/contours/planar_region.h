@@ -33,8 +33,9 @@ class PlanarRegion {
   static constexpr std::size_t kLeaf = 4;
   struct Node {
     glm::dvec2 low, high;
-    std::size_t begin = 0, end = 0;  ///< edges
-    std::size_t next = 0;            ///< the node behind all that is below this one; its first child follows it
+    std::size_t begin = 0, end = 0;  ///< edges below this node
+    /// The node after all those below this one. Its first child is the node right after it.
+    std::size_t next = 0;
 
     bool is_leaf() const { return end - begin <= kLeaf; }
   };

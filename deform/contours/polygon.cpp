@@ -16,14 +16,15 @@ namespace {
 
 double cross(const glm::dvec2& a, const glm::dvec2& b) { return a.x * b.y - a.y * b.x; }
 
-/// Where the horizontal line through `point` crosses the edge from a to b, if it does; half open, as `contains`.
+/// Where the horizontal line through `point` crosses the edge from a to b, if it does. Of the ends of an edge only one
+/// counts, as in `contains`.
 bool crosses(const glm::dvec2& point, const glm::dvec2& a, const glm::dvec2& b, double& x) {
   if ((a.y > point.y) == (b.y > point.y)) return false;
   x = a.x + (point.y - a.y) / (b.y - a.y) * (b.x - a.x);
   return true;
 }
 
-/// Marks the corners between `first` and `last` (counted round the ring) that have to stay.
+/// Marks the corners between `first` and `last` (counted round the ring) that simplification must keep.
 void keep_far_corners(const Ring& ring, std::size_t first, std::size_t last, double tolerance,
                       std::vector<bool>& kept) {
   std::vector<std::pair<std::size_t, std::size_t>> open{{first, last}};
@@ -51,8 +52,8 @@ std::size_t rightmost(const Ring& ring) {
   return static_cast<std::size_t>(std::max_element(ring.begin(), ring.end(), by_x) - ring.begin());
 }
 
-/// Puts a hole into the ring around it, along the horizontal line from the hole's rightmost corner to the right.
-/// Holes further right are in it already, so nothing lies on that line before the ring.
+/// Joins a hole to the ring around it, along the horizontal line from the hole's rightmost corner to the right. Holes
+/// further to the right have been joined before, so nothing lies on that line before the ring.
 void join(Ring& border, const Ring& hole) {
   const std::size_t start = rightmost(hole);
   const glm::dvec2 from = hole[start];

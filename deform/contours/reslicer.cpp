@@ -15,20 +15,20 @@ namespace tetwarp {
 
 namespace {
 
-constexpr double kSimple = 0.01;     // voxel
-constexpr double kSmallest = 1e-3;   // area of a contour, voxels
-constexpr double kFewVoxels = 64;    // a solid this wide is sampled once a voxel
+constexpr double kSimple = 0.01;     // voxels
+constexpr double kSmallest = 1e-3;   // voxels of area, the least of a contour
+constexpr double kFewVoxels = 64;    // a solid at least this wide is sampled once a voxel
 constexpr std::int64_t kFinest = 4;  // samples a voxel
 constexpr double kMargin = 2;        // voxels
 
-/// What is not known counts only where it has weight.
+/// The mean of two samples with weights 1 - t and t. A sample that is not known counts only if it has weight.
 glm::dvec3 mixed(const glm::dvec3& a, const glm::dvec3& b, double t) { return t == 0 ? a : glm::mix(a, b, t); }
 
 double largest_step(const Geometry& grid) { return std::max({grid.spacing.x, grid.spacing.y, grid.spacing.z}); }
 
 }  // namespace
 
-/// The part of a slice that may show the solid: voxels from begin to end, inclusive.
+/// The part of a slice that may show the solid: voxels from `begin` to `end`, inclusive.
 struct Reslicer::Window {
   glm::i64vec2 begin{std::numeric_limits<std::int64_t>::max()}, end{std::numeric_limits<std::int64_t>::min()};
 
@@ -82,11 +82,11 @@ Reslicer::Window Reslicer::window_of(const ConstVolumeView& inverse_mm, std::int
   return window;
 }
 
-/// Where samples of a window come from.
+/// The places from which samples of a window come.
 struct Reslicer::Samples {
   glm::i64vec2 size;
-  std::vector<glm::dvec3> from;             ///< LPS mm; NaN: nothing maps there
-  std::vector<ContourStack::Place> places;  ///< of these
+  std::vector<glm::dvec3> from;                 ///< LPS mm; NaN: nothing maps there
+  std::vector<ContourStack::Inside> is_inside;  ///< whether the points in `from` lie in the solid
 };
 
 Reslicer::Samples Reslicer::sample(const ConstVolumeView& inverse_mm, std::int64_t k, const Window& window) const {
@@ -106,20 +106,21 @@ Reslicer::Samples Reslicer::sample(const ConstVolumeView& inverse_mm, std::int64
                        above = mixed(inverse(i, j + 1), inverse(i + 1, j + 1), s);
       const glm::dvec3 at(static_cast<double>(i) + s, static_cast<double>(j) + t, k);
       samples.from.push_back(point_from_output_(at) + mixed(below, above, t));
-      samples.places.push_back(solid_.place(samples.from.back()));
+      samples.is_inside.push_back(solid_.is_inside(samples.from.back()));
     }
   }
   return samples;
 }
 
-/// Signed distances where neighbours are on the other side of the border, elsewhere only their sign.
+/// Signed distances of the samples from the border of the solid, mm. They are computed only for samples with a
+/// neighbour on the other side; for all others only the sign is right.
 std::vector<double> Reslicer::depths(const Samples& samples, Between between) const {
-  constexpr double kSomewhere = 1;  // mm
+  constexpr double kSomewhere = 1;  // mm: the size that stands for an unknown distance
   std::vector<double> depth;
   depth.reserve(samples.from.size());
   const auto inside = [&](std::int64_t i, std::int64_t j) {
-    const ContourStack::Place& place = samples.places[static_cast<std::size_t>(j * samples.size.x + i)];
-    return between == Between::interpolated ? place.interpolated : place.nearest;
+    const ContourStack::Inside& kinds = samples.is_inside[static_cast<std::size_t>(j * samples.size.x + i)];
+    return between == Between::interpolated ? kinds.interpolated : kinds.nearest;
   };
   const auto at_border = [&](std::int64_t i, std::int64_t j) {
     for (std::int64_t n = std::max<std::int64_t>(j - 1, 0); n <= std::min(j + 1, samples.size.y - 1); ++n)

@@ -12,8 +12,8 @@ namespace tetwarp {
 
 namespace {
 
-/// Edges of the grid between neighbouring samples, and which crossing follows which. The grid has a border of unknown
-/// samples around it, so that contours are closed.
+/// The edges between neighbouring samples of a grid, and which crossing with the border follows which. The grid has an
+/// additional frame of unknown samples, so that all contours are closed.
 class Squares {
  public:
   Squares(std::span<const double> values, std::int64_t columns, std::int64_t rows)
@@ -48,7 +48,7 @@ class Squares {
     return values_[static_cast<std::size_t>(j * columns_ + i)];
   }
 
-  /// From sample (i, j) one step along i (`upwards`: along j).
+  /// Number of the edge from sample (i, j) to the next sample along i, or, if `upwards`, along j.
   std::size_t edge(std::int64_t i, std::int64_t j, bool upwards) const {
     return static_cast<std::size_t>(2 * ((j + 1) * (columns_ + 2) + i + 1)) + (upwards ? 1 : 0);
   }
@@ -64,8 +64,9 @@ class Squares {
     return glm::dvec2(i, j) + (upwards ? glm::dvec2(0, t) : glm::dvec2(t, 0));
   }
 
-  /// Joins the crossings on the sides of the square at sample (i, j), with what is inside on their left: from where
-  /// going round the square counterclockwise leads out, to where it led in.
+  /// Joins the crossings on the sides of the square at sample (i, j), so that what is inside lies on the left of the
+  /// line. A line goes from the side on which a walk counterclockwise round the square leaves the inside, to the side
+  /// on which the walk entered it.
   void link(std::int64_t i, std::int64_t j) {
     const std::array<double, 4> corners{value(i, j), value(i + 1, j), value(i + 1, j + 1), value(i, j + 1)};
     std::array<bool, 4> inside{};
@@ -75,7 +76,7 @@ class Squares {
     const std::array<std::size_t, 4> sides{edge(i, j, false), edge(i + 1, j, true), edge(i, j + 1, false),
                                            edge(i, j, true)};
     const bool joined = count == 2 && inside[0] == inside[2] &&
-                        corners[0] + corners[1] + corners[2] + corners[3] >= 0;  // false where one is unknown
+                        corners[0] + corners[1] + corners[2] + corners[3] >= 0;  // false where a corner is unknown
     for (std::size_t n = 0; n < 4; ++n) {
       if (!inside[n] || inside[(n + 1) % 4]) continue;
       std::size_t to = n;

@@ -58,7 +58,7 @@ TETWARP_HD inline float edge_determinant(const glm::vec3& a, const glm::vec3& b,
 
 /// Determinant of three edges of any length in steps, with the right sign and the right zero.
 TETWARP_HD inline float edge_determinant(const glm::i32vec3& a, const glm::i32vec3& b, const glm::i32vec3& c) {
-  constexpr int kExact = 1 << 24;  // in float
+  constexpr int kExact = 1 << 24;  // floats hold all whole numbers up to here
   for (const glm::i32vec3& edge : {a, b, c}) {
     if (edge.x <= -kExact || edge.x >= kExact || edge.y <= -kExact || edge.y >= kExact || edge.z <= -kExact ||
         edge.z >= kExact) {
@@ -226,8 +226,8 @@ class TetrahedronMap {
   glm::i32vec3 d_;
   Cramer cramer_;
   bool is_exact_;                  ///< whether float has too few digits for all voxels
-  float reciprocal_;               ///< of the determinant
-  glm::vec3 u_, u_a_, u_b_, u_c_;  ///< at D, and the differences from it at A, B, C
+  float reciprocal_;               ///< 1 / determinant
+  glm::vec3 u_, u_a_, u_b_, u_c_;  ///< u at D, and the differences from it at A, B and C, voxels
 };
 
 /// u = undeformed minus deformed place at a voxel that the tetrahedron owns, in voxels of output index.

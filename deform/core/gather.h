@@ -32,7 +32,7 @@ struct Trial {
   bool unsure;  ///< whether it may own the voxel and, tested with Effort::full, its weights need no exact arithmetic
   glm::vec3 moved;  ///< where it owns: deformed minus undeformed place, 2^-12 voxel
   FloatTetrahedron t;
-  glm::vec3 weights;   ///< of A, B and C at the nudged voxel
+  glm::vec3 weights;   ///< weights of A, B and C at the nudged voxel
   glm::vec3 slope;     ///< change of the weights along k, times the determinant
   float slope_factor;  ///< `slope` times this is the change of the weights from one voxel to the next along k
 
@@ -83,7 +83,7 @@ TETWARP_HD inline glm::vec3 to_offset(const glm::vec3& moved) {
 #endif
 }
 
-constexpr float kUnit = 1.0f / (1 << 24);  ///< of rounding
+constexpr float kUnit = 1.0f / (1 << 24);  ///< the largest relative error of rounding to float
 
 /// Bound of the rounding errors of a determinant, of the numerators of its weights and of what they leave of it.
 ///
@@ -143,7 +143,7 @@ struct LocalTetrahedron {
     moved_a = lattice.raised(t.offset + (t.centre ? sum - dx : dx)) - raised;
     moved_b = lattice.raised(t.offset + (t.centre ? sum - dy : dy)) - raised;
     moved_c = lattice.raised(t.offset + (t.centre ? sum - dz : dz)) - raised;
-    const glm::vec3 edge = t.to * lattice.cell;  // to the next vertex on each axis
+    const glm::vec3 edge = t.to * lattice.cell;  // from a vertex to the next on each axis
     const float along = t.centre ? 0.0f : 1.0f, across = t.centre ? 1.0f : 0.0f;
     const auto edge_to = [&edge](float x, float y, float z, const glm::vec3& by) {  // exact
       return glm::vec3(multiply_add(edge.x, x, by.x), multiply_add(edge.y, y, by.y), multiply_add(edge.z, z, by.z));

@@ -20,10 +20,11 @@ struct VoxelNudge {
 ///
 /// The sign of det(a - q, b - q, c - q) = (a - q) . N with N = (b - a) x (c - a), q = p + d; on an exact tie the first
 /// non-zero of -sx Nx, -sy Ny, -sz Nz, which is what an infinitesimal step from q towards the middle gives.
+///
 /// A tetrahedron (A, B, C, D) owns the voxel when its faces BCD, ADC, ABD, ACB agree (docs/design/definition.md, "Who
-/// owns a voxel"); inverted
-/// ones own like any other, and one without volume never does, for its four determinants sum to zero. Two tetrahedra
-/// that share a face call this with the same corners, and the order of the corners flips the sign exactly.
+/// owns a voxel"). Inverted ones own like any other, and one without volume never does, for its four determinants sum
+/// to zero. Two tetrahedra that share a face call this with the same corners, and the order of the corners flips the
+/// sign exactly.
 template <class Int>
 TETWARP_HD inline int side_of_face(const Relative<Int>& a, const Relative<Int>& b, const Relative<Int>& c,
                                    const VoxelNudge<Int>& nudge) {

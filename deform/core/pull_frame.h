@@ -68,7 +68,7 @@ struct PullFrame {
   }
 
   /// Interpolates trilinearly.
-  /// @tparam kGaps      as of `between`
+  /// @tparam kGaps      whether samples may be missing (NaN), as in `between`
   /// @param index      continuous index on the samples
   /// @param sample_at  `sample_at(at)` gives what `sample(at)` gives
   /// @return a missing vector where a sample that is needed is missing

@@ -34,11 +34,11 @@ constexpr int kFarthestBlock = 15;
 /// What the rays of a picture need to know besides the voxels. Positions are continuous indices of the volume.
 struct RayFrame {
   Projection projection = Projection::composite;
-  float lowest = 0, per_value = 0;                ///< of the table: entry = (value - lowest) * per_value
+  float lowest = 0, per_value = 0;                ///< value v is entry (v - lowest) * per_value of the table
   glm::vec3 first{0}, per_column{0}, per_row{0};  ///< where the ray of a pixel begins
-  glm::vec3 step{0}, per_step{0};                 ///< to the next sample, and its inverse (0 where the step is)
-  glm::mat3 to_gradient{1};                       ///< differences along i, j, k to changes a mm in patient space
-  glm::vec3 light{0}, halfway{0};                 ///< unit vectors towards the light, and halfway to the viewer
+  glm::vec3 step{0}, per_step{0};  ///< from a sample to the next, and the inverse of its components (0 for 0)
+  glm::mat3 to_gradient{1};        ///< differences along i, j, k to changes a mm in patient space
+  glm::vec3 light{0}, halfway{0};  ///< unit vectors towards the light, and halfway to the viewer
   float ambient = 0, diffuse = 0, specular = 0;
   float full_gradient = 0;  ///< change a mm from which a place is lit as a surface; 0: no light
   glm::vec3 background{0};
@@ -46,14 +46,14 @@ struct RayFrame {
 
 /// The tables that rays look up, where a backend keeps them.
 struct RayTables {
-  const BlockRange* ranges = nullptr;       ///< of each block, i fastest
+  const BlockRange* ranges = nullptr;       ///< by block, i fastest
   const std::uint8_t* distances = nullptr;  ///< blocks to the nearest one that is not empty, the largest along an axis
   glm::ivec3 blocks{0};
   const TransferEntry* entries = nullptr;
   const TransferIntegral* integrals = nullptr;   ///< kTransferEntries + 1
   TransferIntegral lowest_entry, highest_entry;  ///< what holds for each entry beyond the table's ends
-  const std::uint8_t* tints = nullptr;           ///< of each voxel, i fastest: 0 none; null: nowhere one
-  const TransferEntry* tint_colours = nullptr;   ///< 256: `opacity` of the colour is mixed to what is seen
+  const std::uint8_t* tints = nullptr;  ///< number of each voxel's colour, i fastest; 0: none; null: no voxel has one
+  const TransferEntry* tint_colours = nullptr;  ///< 256: `opacity` of the colour is mixed to what is seen
 };
 
 template <class V>
@@ -177,7 +177,7 @@ struct EntryRange {
            tables.highest_entry.*part * above;
   }
 
-  int from, to;  ///< in the integrals
+  int from, to;  ///< entries of the table between which integrals are taken
   /// Number of entries beyond the first and beyond the last entry of the table.
   float below, above;
 };

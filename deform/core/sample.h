@@ -70,9 +70,9 @@ using Working = std::conditional_t<(sizeof(V) < 4 || std::is_same_v<V, float>), 
 template <class V>
 struct SourceVoxels {
   const V* voxels;
-  glm::i64vec3 size;    ///< of the whole grid: indices are clamped to it
+  glm::i64vec3 size;    ///< size of the whole grid, to which indices are clamped
   glm::i64vec3 begin;   ///< first voxel that is buffered
-  glm::i64vec3 stride;  ///< in values
+  glm::i64vec3 stride;  ///< values from a voxel to the next along i, j, k
 
   TETWARP_HD V at(std::int64_t i, std::int64_t j, std::int64_t k) const {
     return voxels[(i - begin.x) * stride.x + (j - begin.y) * stride.y + (k - begin.z) * stride.z];
@@ -149,7 +149,7 @@ template <class W>
 struct CubicTaps {
   /// First and last tap with weight, from -1 to 2.
   int first, last;
-  W weight[4];  ///< of taps -1 .. 2
+  W weight[4];  ///< weights of taps -1 to 2
 };
 
 template <class W>

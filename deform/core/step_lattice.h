@@ -12,15 +12,20 @@
 namespace tetwarp {
 
 /// Packs the displacement of a vertex, three whole numbers of steps, into 64 bits. Each number is stored as its
-/// distance from the least number of its axis, in as many bits as its axis needs.
+/// distance from the least number of its axis, in as many bits as its axis needs; together they fill all 64 bits:
+///
+///     bit 63                     z_at_                      y_at_                    0
+///     +--------------------------+--------------------------+------------------------+
+///     |      z: 64 - z_at_       |    y: z_at_ - y_at_      |        x: y_at_        |   (by default 22, 21 and 21)
+///     +--------------------------+--------------------------+------------------------+
 ///
 /// A number below 2^23 behind the exponent bits of 2^23 is the float 2^23 + that number. So vectors unpack without
 /// conversions to floats with something added ("raised"), and differences of raised numbers are exact.
 class StepPacking {
  public:
-  static constexpr int kMostBits = 23;  ///< of one axis
+  static constexpr int kMostBits = 23;  ///< the most bits of one axis
 
-  /// Holds displacements from -256 to below 256 voxels along x and y, and twice that along z.
+  /// The default, which holds displacements from -256 to below 256 voxels along x and y, and twice that along z.
   StepPacking()
       : StepPacking({-(1 << (kDefaultBits[0] - 1)), -(1 << (kDefaultBits[1] - 1)), -(1 << (kDefaultBits[2] - 1))},
                     {kDefaultBits[0], kDefaultBits[1]}) {}
@@ -61,17 +66,20 @@ class StepPacking {
     return ((bits_of(raised.x) ^ kTwoTo23) & ~x_mask_) | ((bits_of(raised.y) ^ kTwoTo23) & ~y_mask_) |
            ((bits_of(raised.z) ^ kTwoTo23) & ~z_mask_);
   }
+  /// Packs a raised vector, of which `excess` is zero.
   TETWARP_HD std::uint64_t pack(const glm::vec3& raised) const {
     const std::uint32_t y = bits_of(raised.y) & y_mask_;
     const std::uint32_t low = (bits_of(raised.x) & x_mask_) | y << y_at_,
                         high = y >> (32 - y_at_) | bits_of(raised.z) << (z_at_ - 32);
     return std::uint64_t{high} << 32 | low;
   }
+  /// The vector that was packed, raised: each number of steps plus that of `lift`.
   TETWARP_HD glm::vec3 raised(std::uint64_t packed) const {
     const auto low = static_cast<std::uint32_t>(packed), high = static_cast<std::uint32_t>(packed >> 32);
     return {float_of((low & x_mask_) | kTwoTo23), float_of((middle(low, high) & y_mask_) | kTwoTo23),
             float_of(top(high))};
   }
+  /// The vector that was packed, in steps.
   TETWARP_HD glm::vec3 unpacked(std::uint64_t packed) const { return raised(packed) - lift_; }
 
  private:
@@ -104,8 +112,8 @@ class StepPacking {
   std::uint32_t top(std::uint32_t high) const { return high >> (z_at_ - 32) | above_z_ << (64 - z_at_); }
 #endif
 
-  int y_at_, z_at_;                         ///< their lowest bits: 18 to 23, and 41 to 46
-  std::uint32_t x_mask_, y_mask_, z_mask_;  ///< as many bits as they have
+  int y_at_, z_at_;                         ///< the lowest bits of y and z: 18 to 23, and 41 to 46
+  std::uint32_t x_mask_, y_mask_, z_mask_;  ///< as many bits as each axis has
   std::uint32_t above_z_;                   ///< what the bits of 2^23 leave above those of z
   glm::vec3 lift_;
 };
@@ -219,7 +227,7 @@ struct LatticeTetrahedron {
 struct FloatTetrahedron {
   glm::vec3 d;   ///< vertex D
   glm::vec3 to;  ///< +1 or -1: where A, B, C lie from D
-  int offset;    ///< of D among the vertices
+  int offset;    ///< number of vertex D
   bool centre;
 };
 

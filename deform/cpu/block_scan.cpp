@@ -7,11 +7,11 @@
 #include <cmath>
 #include <limits>
 
-// Compiled once for each instruction set.
+// Highway compiles this file once for each instruction set.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "deform/cpu/block_scan.cpp"
 #include <hwy/foreach_target.h>
-// After it, as Highway asks.
+// Highway wants this include after that one.
 #include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
@@ -23,7 +23,7 @@ namespace tetwarp::cpu::HWY_NAMESPACE {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-/// The least and the most that was seen, in each lane.
+/// The least and the largest value that was seen, lane by lane.
 struct Range {
   Float least, most;
 
@@ -46,8 +46,8 @@ HWY_INLINE Vec3 blend(FloatMask mask, const Vec3& yes, const Vec3& no) {
   return {hn::IfThenElse(mask, yes.x, no.x), hn::IfThenElse(mask, yes.y, no.y), hn::IfThenElse(mask, yes.z, no.z)};
 }
 
-/// One plane of vertices: how far each moved, steps.
-struct Plane {
+/// One plane of vertices: how far each moved, in steps.
+struct VertexPlane {
   static constexpr int kRoom = 16;  ///< lanes of the widest vectors
   static constexpr int kRow = 2 * kRoom + 1;
 
@@ -77,7 +77,7 @@ class Scanner {
         usable_(hn::Eq(hn::Zero(Floats()), hn::Zero(Floats()))) {}
 
   bool run(BlockScan& scan) {
-    Plane planes[2];
+    VertexPlane planes[2];
     with_snapping(field_, [&](auto snapping) {
       constexpr Snapping kSnapping = decltype(snapping)::value;
       read<kSnapping>(0, planes[0]);
@@ -90,8 +90,8 @@ class Scanner {
   }
 
  private:
-  /// Where to look ahead from a row of plane k: the same row of the next plane or, at last, of the first plane of the
-  /// block beside.
+  /// The vertices to prefetch while a row of plane k is snapped: the same row of the next plane or, at the last plane,
+  /// of the first plane of the neighbouring block.
   std::int64_t ahead(int k) const {
     const std::int64_t slice = field_.lattice.slice;
     return k < cells_.z ? slice : cells_.x - cells_.z * slice;
@@ -99,7 +99,7 @@ class Scanner {
 
   /// Snaps plane k of the block.
   template <Snapping kSnapping>
-  void read(int k, Plane& plane) {
+  void read(int k, VertexPlane& plane) {
     const Floats df;
     const StepLattice& lattice = field_.lattice;
     const int count = cells_.x + 1;
@@ -108,8 +108,8 @@ class Scanner {
       const glm::ivec3 row(first_.x, first_.y + j, first_.z + k);
       const glm::vec3* given = field_.displacement + lattice.offset(row);
       prefetch(given + ahead(k));
-      glm::vec3 padded[Plane::kRoom];
-      if (count < lanes_) {  // the last vertex again and again
+      glm::vec3 padded[VertexPlane::kRoom];
+      if (count < lanes_) {  // the last vertex is repeated
         for (int n = 0; n < lanes_; ++n) padded[n] = given[std::min(n, count - 1)];
         given = padded;
       }
@@ -133,7 +133,7 @@ class Scanner {
         moved_x_.add(moved.x);
         moved_y_.add(moved.y);
         moved_z_.add(moved.z);
-        const Float most = set(VectorField::kMostMoved);  // not by way of Min and Max: these may lose what is no number
+        const Float most = set(VectorField::kMostMoved);  // without Min and Max, which may lose a NaN
         usable_ = hn::And(usable_, hn::And(hn::Le(hn::Abs(moved.x), most),
                                            hn::And(hn::Le(hn::Abs(moved.y), most), hn::Le(hn::Abs(moved.z), most))));
       }
@@ -142,7 +142,7 @@ class Scanner {
     at_rest_ = at_rest_ && plane.at_rest;
   }
 
-  /// Asks for a row of vertices.
+  /// Prefetches a row of vertices.
   void prefetch(const glm::vec3* vertex) const {
     constexpr std::size_t kLine = 64;
     const auto* line = reinterpret_cast<const char*>(vertex);
@@ -150,8 +150,8 @@ class Scanner {
     for (std::size_t n = 0; n < bytes; n += kLine) hwy::Prefetch(line + n);
   }
 
-  /// The cells between two planes.
-  void look_at(int k, const Plane& low, const Plane& high) {
+  /// Looks at the cells between two planes.
+  void look_at(int k, const VertexPlane& low, const VertexPlane& high) {
     if (low.at_rest && high.at_rest) {
       any_rests_ = true;
       return;
@@ -161,8 +161,8 @@ class Scanner {
     }
   }
 
-  /// The cells of a row from one on, a lane each. Mirrored along i, an odd cell is an even one.
-  HWY_INLINE void look_at(const glm::ivec3& in, const Plane& low, const Plane& high) {
+  /// Looks at cells of a row, one in each lane. Mirrored along i, an odd cell becomes an even one.
+  HWY_INLINE void look_at(const glm::ivec3& in, const VertexPlane& low, const VertexPlane& high) {
     const Floats df;
     const Ints di;
     const glm::vec3& cell = field_.lattice.cell;
@@ -203,7 +203,7 @@ class Scanner {
     add(hn::IfThenElse(odd, volume, hn::Neg(volume)), here, 1);
   }
 
-  /// @param volume  positive where upright
+  /// Takes note of a volume. @param volume  positive where the tetrahedron is not inverted
   HWY_INLINE void add(Float volume, FloatMask here, int kind) {
     const Floats df;
     volumes_[kind].least = hn::Min(volumes_[kind].least, hn::IfThenElse(here, volume, set(kInfinity)));
@@ -215,14 +215,14 @@ class Scanner {
   bool report(BlockScan& scan) const {
     if (!hn::AllTrue(Floats(), usable_)) return false;
     const glm::vec3 low(x_.lowest(), y_.lowest(), z_.lowest()), high(x_.highest(), y_.highest(), z_.highest());
-    constexpr float kExact = 1 << 24;  // whole numbers up to here are floats
+    constexpr float kExact = 1 << 24;  // floats hold all whole numbers up to here
     if (std::max({high.x, high.y, high.z}) > kExact) return false;
     const glm::i32vec3 rest = glm::i32vec3(field_.lattice.first) + first_ * glm::i32vec3(field_.lattice.cell);
     scan.box = {rest + glm::i32vec3(low), rest + glm::i32vec3(high)};
     const glm::vec3 least(moved_x_.lowest(), moved_y_.lowest(), moved_z_.lowest()),
         most(moved_x_.highest(), moved_y_.highest(), moved_z_.highest());
-    // Edges are whole numbers below 2^24: cells have up to 2^22 steps. No sum norm of one is larger; the error of its
-    // determinants as in `edge_determinant`.
+    // Edges are whole numbers below 2^24, since cells have up to 2^22 steps. No edge has a larger sum norm than this;
+    // the error of determinants is that of `edge_determinant`.
     const glm::vec3 longest = field_.lattice.cell + (most - least);
     const float norm = (longest.x + longest.y) + longest.z;
     constexpr float kError = 9.0f / (1 << 24);
@@ -247,10 +247,11 @@ class Scanner {
   const VectorField& field_;
   glm::ivec3 first_, cells_;
   int lanes_;
-  Range x_, y_, z_;  ///< deformed vertices, from the block's first vertex at rest
+  /// Deformed vertices, from the block's first vertex at rest.
+  Range x_, y_, z_;
   Range moved_x_, moved_y_, moved_z_;
-  Range volumes_[2];  ///< of corners, of centres
-  Float smallest_;    ///< volume without its sign
+  Range volumes_[2];  ///< of corner tetrahedra, of centres
+  Float smallest_;    ///< the smallest volume, without its sign
   FloatMask usable_;
   std::uint64_t inverted_ = 0;
   bool at_rest_ = true, any_rests_ = false;

@@ -15,7 +15,7 @@ namespace tetwarp::cpu {
 struct Claims {
   static constexpr std::uint64_t kNobody = UINT64_MAX;
 
-  // Of each voxel of the box, i fastest.
+  // Each vector has one entry for each voxel of the box, i fastest.
   std::vector<std::uint64_t> owner;   ///< number of the lowest tetrahedron that owns it, or kNobody
   std::vector<glm::vec3> offset;      ///< undeformed minus deformed place, voxels, of voxels with an owner
   std::vector<float> jacobian;        ///< Jacobian determinant of the owner; empty unless requested

@@ -16,7 +16,7 @@ namespace tetwarp::cpu {
 
 namespace {
 
-/// Calls `visit(y, z, first, change)` for the rows of voxels that pass through a triangle.
+/// Calls `visit(y, z, first, change)` for each row of voxels that passes through a triangle of the border.
 template <class Int, class Visit>
 void cross_rows(const BorderTriangle& t, const Nudge& nudge, const IntBox& rows, Visit&& visit) {
   for (int z = rows.begin.z; z < rows.end.z; ++z) {
@@ -28,7 +28,7 @@ void cross_rows(const BorderTriangle& t, const Nudge& nudge, const IntBox& rows,
   }
 }
 
-/// The vertices of a row of faces, snapped once: all that `border_triangle` asks for.
+/// The vertices of a row of faces, snapped once, as `border_triangle` reads them.
 class RowOfFaces {
  public:
   glm::ivec3 cells;
@@ -43,7 +43,7 @@ class RowOfFaces {
     }
   }
 
-  /// Around the corners of face n of the row.
+  /// The box around the corners of face n of the row.
   Box box(std::size_t n) const {
     Box box{vertices_[0][n].deformed, vertices_[0][n].deformed};
     box.grow(vertices_[0][n + 1].deformed);
@@ -70,7 +70,7 @@ void Coverage::find(const LatticeIndex& index, const Geometry& output) {
     int axis, last;
     bool high;
   };
-  std::vector<Strip> strips;  // rows of faces
+  std::vector<Strip> strips;  // each a row of faces
   for (int side = 0; side < 6; ++side) {
     for (int n = 0; n < cells[(side / 2 + 2) % 3]; ++n) strips.push_back({side / 2, n, side % 2 == 1});
   }
@@ -84,7 +84,7 @@ void Coverage::find(const LatticeIndex& index, const Geometry& output) {
   sort_into_rows(parts);
 }
 
-/// A row of faces of one side of the lattice. @param last  their place on the second axis after `axis`
+/// Looks at a row of faces of one side of the lattice. @param last  place of the row on the second axis after `axis`
 void Coverage::look_at_row(int axis, bool high, int last, std::vector<CrossingInRow>& found) const {
   const RowOfFaces lattice(*index_, axis, high, last);
   const Nudge& nudge = index_->frame().nudge;
@@ -112,7 +112,8 @@ void Coverage::look_at_row(int axis, bool high, int last, std::vector<CrossingIn
     }
   };
   for (int n = 0; n < lattice.cells[(axis + 1) % 3]; ++n) {
-    if (rows_through(lattice.box(static_cast<std::size_t>(n))).is_empty()) continue;  // most of those along the rows
+    // No row passes through most faces that lie along the rows of voxels.
+    if (rows_through(lattice.box(static_cast<std::size_t>(n))).is_empty()) continue;
     for (int which = 0; which < 2; ++which) look_at(border_triangle(lattice, axis, high, {n, last}, which));
   }
 }
@@ -124,7 +125,7 @@ void Coverage::sort_into_rows(const std::vector<const std::vector<CrossingInRow>
     for (const CrossingInRow& crossing : *part) ++first_[static_cast<std::size_t>(crossing.row)];
   }
   std::int64_t count = 0;
-  for (std::int64_t& first : first_) first = count += first;  // where the next row begins
+  for (std::int64_t& first : first_) first = count += first;  // where the crossings of the next row begin
   crossings_.resize(static_cast<std::size_t>(count));
   for (const auto* part : found) {
     for (const CrossingInRow& crossing : *part)
@@ -163,7 +164,7 @@ std::int64_t Coverage::owners_of(const Region& box, Owners* owners, LatticeBlock
   return several + add_inverted(box, owners, block);
 }
 
-/// What inverted tetrahedra may own has several owners. @return how many voxels had not yet
+/// Marks the voxels that inverted tetrahedra may own as having several owners. @return how many were not marked before
 std::int64_t Coverage::add_inverted(const Region& box, Owners* owners, LatticeBlock& block) const {
   if (index_->statistics().inverted == 0) return 0;
   const NudgeTurns turns(index_->frame().nudge);

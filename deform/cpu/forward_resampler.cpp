@@ -22,12 +22,12 @@ namespace cpu {
 
 namespace {
 
-constexpr int kWalk = 64;           ///< tetrahedra that the exact walk may pass
-constexpr int kTooManyFolds = 8;    ///< where one tetrahedron in so many is inverted, all is claimed
-constexpr int kMostlyFolded = 256;  ///< where one tetrahedron in so many is inverted, walks mostly fail
+constexpr int kWalk = 64;           ///< the most tetrahedra that the exact walk passes
+constexpr int kTooManyFolds = 8;    ///< if one tetrahedron in so many is inverted, all voxels are claimed
+constexpr int kMostlyFolded = 256;  ///< if one tetrahedron in so many is inverted, most walks fail
 
 /// What is known of each voxel of a tile.
-struct Tile {
+struct TileVoxels {
   LatticeBlock block;
   Claims claims;
   MarchScratch march;
@@ -41,8 +41,9 @@ struct Tile {
   }
 };
 
-/// Tile by tile: finds for each voxel where it comes from, then samples its rows. Voxels at rest are copied; lattices
-/// at whole steps take the march, others, and what the march leaves, are claimed.
+/// Deforms volumes tile by tile: finds for each voxel where it comes from, then samples its rows. Voxels at rest are
+/// copied. If the undeformed vertices lie at whole steps, the march comes first; voxels that it leaves, and all voxels
+/// of other lattices, are claimed.
 class LatticeResampler final : public ForwardResampler {
  public:
   LatticeResampler(Geometry output, const Limits& limits) : ForwardResampler(output), arena_(make_arena(limits)) {}
@@ -88,8 +89,8 @@ class LatticeResampler final : public ForwardResampler {
              std::all_of(samplers.begin(), samplers.end(), [&](const auto& of) { return of->can_copy(box); });
     };
     const auto is_copied = [&](const Region& box) { return can_copy(box) && rests(box); };
-    Report report =
-        for_each_tile<Tile>(arena_, region, control, finished, is_copied, [&](const Region& box, Tile& tile) {
+    Report report = for_each_tile<TileVoxels>(
+        arena_, region, control, finished, is_copied, [&](const Region& box, TileVoxels& tile) {
           if (!writer.wants_owners() && rests(box))
             return can_copy(box) ? copy(box, samplers) : stay(box, tile, samplers, writer);
           Report of_tile;
@@ -111,9 +112,10 @@ class LatticeResampler final : public ForwardResampler {
   }
 
  private:
-  /// Whether a box lies within the undeformed lattice, and all that may reach it rests: then each voxel is owned by a
-  /// cell at rest, and by no other. (Something must reach it: what lay there may have moved away as a whole. Where one
-  /// of its blocks rests, those beside it share vertices with it, and so on, and reach it too.)
+  /// Whether a box lies within the undeformed lattice and everything that may reach it is at rest: then each of its
+  /// voxels is owned by a cell at rest and by no other. (Something must reach the box, for what lay there may have
+  /// moved away as a whole. Where one of the lattice's blocks in the box rests, its neighbours share vertices with it
+  /// and reach the box, too, and so on.)
   bool rests(const Region& box) const {
     const StepLattice& steps = lattice_.steps();
     if (steps.cells.x == 0) return false;
@@ -130,7 +132,7 @@ class LatticeResampler final : public ForwardResampler {
     return any && all;
   }
 
-  /// A box at rest that every target can copy.
+  /// Copies a box at rest; all targets must be able to.
   static Report copy(const Region& box, const TargetSamplers& samplers) {
     Report report;
     report.paths.gathered = static_cast<std::uint64_t>(voxel_count(box));
@@ -141,8 +143,8 @@ class LatticeResampler final : public ForwardResampler {
     return report;
   }
 
-  /// Any tile at rest.
-  static Report stay(const Region& box, Tile& tile, const TargetSamplers& samplers, const MapWriter& maps) {
+  /// Samples a tile at rest where some target cannot be copied.
+  static Report stay(const Region& box, TileVoxels& tile, const TargetSamplers& samplers, const MapWriter& maps) {
     Report report;
     report.paths.gathered = static_cast<std::uint64_t>(voxel_count(box));
     const auto width = static_cast<int>(box.end.x - box.begin.x);
@@ -160,10 +162,10 @@ class LatticeResampler final : public ForwardResampler {
     return report;
   }
 
-  /// Whether vectors of float hold all that a march computes with.
+  /// Whether vectors of float can hold everything that a march computes.
   static bool is_near(const FieldView& field, const FieldStatistics& statistics) {
     const glm::i64vec3& size = field.lattice->size;
-    constexpr std::int64_t kMostVertices = INT32_MAX / 3;  // numbers of displacements on one axis are in 32 bits
+    constexpr std::int64_t kMostVertices = INT32_MAX / 3;  // so that numbers of a displacement's components fit 32 bits
     return static_cast<float>(statistics.most_moved) <= VectorField::kMostMoved &&
            size.x * size.y * size.z <= kMostVertices;
   }
@@ -180,7 +182,7 @@ class LatticeResampler final : public ForwardResampler {
     return 2 * folded > blocks;
   }
 
-  void gather(const Region& box, Tile& tile, const MapWriter& maps, Paths& paths) const {
+  void gather(const Region& box, TileVoxels& tile, const MapWriter& maps, Paths& paths) const {
     const std::int64_t voxels = voxel_count(box);
     tile.reset(voxels);
     std::int64_t several = coverage_.owners_of(box, tile.owners.data(), tile.block);
@@ -197,8 +199,9 @@ class LatticeResampler final : public ForwardResampler {
     paths.gathered += static_cast<std::uint64_t>(voxels - several - walked);
   }
 
-  /// Seeks the owners of what the march left. @return how many are left still, and now said to have several
-  std::int64_t walk(const IntBox& box, const NudgeTurns& turns, Tile& tile) const {
+  /// Seeks the owners of voxels that the march left, by a walk. @return how many voxels are still left; these are
+  /// marked as having several owners
+  std::int64_t walk(const IntBox& box, const NudgeTurns& turns, TileVoxels& tile) const {
     const FieldStatistics& statistics = lattice_.statistics();
     const glm::i64vec3& cells = lattice_.cells();
     const auto few = static_cast<std::uint64_t>(kTetrahedraPerCell * cells.x * cells.y * cells.z / kMostlyFolded);
@@ -226,7 +229,7 @@ class LatticeResampler final : public ForwardResampler {
   }
 
   template <class Visit>
-  static void for_each_several(const Region& box, const Tile& tile, Visit&& visit) {
+  static void for_each_several(const Region& box, const TileVoxels& tile, Visit&& visit) {
     std::size_t n = 0;
     for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {
       for (std::int64_t y = box.begin.y; y < box.end.y; ++y) {
@@ -236,8 +239,8 @@ class LatticeResampler final : public ForwardResampler {
     }
   }
 
-  /// The box around what may have several owners; there must be such voxels.
-  static Region around_several(const Region& box, const Tile& tile) {
+  /// The box around the voxels that may have several owners; there must be one.
+  static Region around_several(const Region& box, const TileVoxels& tile) {
     Region around{box.end, box.begin};
     for_each_several(box, tile, [&](std::size_t, const glm::i64vec3& voxel) {
       around.begin = glm::min(around.begin, voxel);
@@ -246,7 +249,7 @@ class LatticeResampler final : public ForwardResampler {
     return around;
   }
 
-  void claim_several(const Region& box, Tile& tile) const {
+  void claim_several(const Region& box, TileVoxels& tile) const {
     const Region around = around_several(box, tile);
     tile.claims.find(lattice_, around, false, false, tile.block);
     const glm::i64vec3 size = around.end - around.begin;
@@ -259,7 +262,7 @@ class LatticeResampler final : public ForwardResampler {
     });
   }
 
-  void claim_all(const Region& box, Tile& tile, const MapWriter& maps, Paths& paths) const {
+  void claim_all(const Region& box, TileVoxels& tile, const MapWriter& maps, Paths& paths) const {
     const std::int64_t voxels = voxel_count(box);
     tile.reset(voxels);
     tile.claims.find(lattice_, box, maps.wants_jacobian(), maps.wants_owners(), tile.block);
@@ -270,8 +273,8 @@ class LatticeResampler final : public ForwardResampler {
     paths.claimed += static_cast<std::uint64_t>(voxels);
   }
 
-  /// Samples the rows of a tile whose voxels are settled.
-  void write(const Region& box, Tile& tile, const TargetSamplers& samplers, const MapWriter& maps,
+  /// Samples the rows of a tile whose voxels are all settled.
+  void write(const Region& box, TileVoxels& tile, const TargetSamplers& samplers, const MapWriter& maps,
              Report& report) const {
     const Claims& claims = tile.claims;
     if (maps.wants_owners()) {
@@ -291,9 +294,9 @@ class LatticeResampler final : public ForwardResampler {
     }
   }
 
-  /// Decides for a row which voxels come through the field; those outside the undeformed lattice may stay where they
-  /// are.
-  void settle(const Row& row, std::size_t first, Tile& tile, const MapWriter& maps, Report& report) const {
+  /// Decides for each voxel of a row whether it comes through the field. A voxel outside the undeformed lattice may
+  /// stay where it is.
+  void settle(const Row& row, std::size_t first, TileVoxels& tile, const MapWriter& maps, Report& report) const {
     const bool rest = lattice_.field().outside == Outside::rest;
     if (!rest) {
       std::transform(tile.owners.data() + first, tile.owners.data() + first + row.count, tile.mapped,

@@ -5,11 +5,11 @@
 
 #include <limits>
 
-// Compiled once for each instruction set.
+// Highway compiles this file once for each instruction set.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "deform/cpu/inverse_row.cpp"
 #include <hwy/foreach_target.h>
-// After it, as Highway asks.
+// Highway wants this include after that one.
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
@@ -23,7 +23,7 @@ using Floats = hn::Rebind<float, Doubles>;
 using Double = hn::Vec<Doubles>;
 using Float = hn::Vec<Floats>;
 
-/// The same sum from left to right as GLM's product.
+/// One component of a matrix times a vector, summed from left to right as GLM does.
 HWY_INLINE Float component(const glm::dmat3& m, int axis, Double x, Double y, Double z) {
   const Doubles dd;
   const Double along_x = hn::Mul(hn::Set(dd, m[0][axis]), x), along_y = hn::Mul(hn::Set(dd, m[1][axis]), y),

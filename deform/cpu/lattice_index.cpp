@@ -38,7 +38,7 @@ void FieldStatistics::add_cells(const LatticeBlock& block) {
 void FieldStatistics::add_scanned(const BlockScan& block, const StepLattice& steps) {
   inverted += block.inverted;
   most_moved = std::max(most_moved, block.most_moved);
-  for (int kind = 0; kind < 2; ++kind) {  // corners and centres
+  for (int kind = 0; kind < 2; ++kind) {  // corner tetrahedra and centres
     const float rest = rest_volume(steps, kind);
     jacobian_min = std::min(jacobian_min, double{block.least[kind] / rest});
     jacobian_max = std::max(jacobian_max, double{block.most[kind] / rest});
@@ -135,7 +135,7 @@ void LatticeIndex::look_at(std::size_t number, Block& block, FieldStatistics& st
   inverted_[number] = statistics.inverted != inverted;
 }
 
-/// Whether most of some vertices have displacements of zero.
+/// Whether most of some vertices that are looked at have no displacement.
 bool LatticeIndex::mostly_zero() const {
   constexpr std::int64_t kAsked = 4096;
   const glm::i64vec3& size = field_.lattice->size;
@@ -145,7 +145,7 @@ bool LatticeIndex::mostly_zero() const {
   return 2 * zero > vertices / step;
 }
 
-/// Reads the field from end to end, as fast as memory gives it, for blocks of which all displacements are zero.
+/// Reads the field from end to end, as fast as memory allows, to find the blocks whose displacements are all zero.
 void LatticeIndex::find_blocks_at_rest(const Control& control) {
   const glm::i64vec3& size = field_.lattice->size;
   std::fill(resting_.begin(), resting_.end(), std::uint8_t{1});
@@ -156,7 +156,8 @@ void LatticeIndex::find_blocks_at_rest(const Control& control) {
   });
 }
 
-/// @param row  of vertices  @param vertex  the first of it
+/// Marks the blocks that a vertex with a displacement belongs to. @param row  a row of vertices  @param vertex  the
+/// first of them
 void LatticeIndex::note_moving(const glm::vec3* row, const glm::i64vec3& vertex) {
   for (std::int64_t x = 0; x < blocks_.x; ++x) {
     const std::int64_t first = x * cells_per_block_.x, last = std::min(first + cells_per_block_.x, frame_.cells.x);
@@ -164,7 +165,7 @@ void LatticeIndex::note_moving(const glm::vec3* row, const glm::i64vec3& vertex)
     std::uint32_t any = 0;
     for (std::int64_t n = 0; n < 3 * (last - first + 1); ++n) any |= bits[n];
     if (any == 0) continue;
-    for (int corner = 0; corner < 4; ++corner) {  // blocks that have these vertices on their faces too
+    for (int corner = 0; corner < 4; ++corner) {  // blocks that have these vertices on a face
       const glm::i64vec3 at = glm::max((vertex - glm::i64vec3(0, corner & 1, corner >> 1)) / cells_per_block_,
                                        glm::i64vec3(0)),
                          block = glm::min(at, blocks_ - std::int64_t{1});

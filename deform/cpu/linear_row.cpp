@@ -7,11 +7,11 @@
 #include <cstring>
 #include <limits>
 
-// Compiled once for each instruction set.
+// Highway compiles this file once for each instruction set.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "deform/cpu/linear_row.cpp"
 #include <hwy/foreach_target.h>
-// After it, as Highway asks.
+// Highway wants this include after that one.
 #include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
@@ -26,7 +26,7 @@ using Ints = hn::RebindToSigned<Floats>;
 using Float = hn::Vec<Floats>;
 using Int = hn::Vec<Ints>;
 
-/// Two voxels side by side, from the 32 bits that begin with the first.
+/// Reads two neighbouring voxels from the 32 bits that begin with the first.
 template <class V>
 struct Voxels {
   static constexpr int kBits = 8 * sizeof(V);
@@ -38,7 +38,7 @@ struct Voxels {
   static HWY_INLINE Float high(Int bits) { return to_float(hn::ShiftLeft<32 - 2 * kBits>(bits)); }
 
  private:
-  /// The topmost bits, as V.
+  /// A value of type V from the topmost bits of a number.
   static HWY_INLINE Float to_float(Int up) {
     const hn::RebindToUnsigned<Ints> du;
     const Int value = std::is_signed_v<V> ? hn::ShiftRight<32 - kBits>(up)
@@ -47,7 +47,7 @@ struct Voxels {
   }
 };
 
-/// Where a voxel comes from along one axis.
+/// Where voxels come from along one axis.
 struct Axis {
   Int base;
   Float fraction;
@@ -64,13 +64,15 @@ struct Axis {
 
 HWY_INLINE Float mix(Float a, Float b, Float t) { return hn::Add(a, hn::Mul(t, hn::Sub(b, a))); }
 
-/// What a row is interpolated from.
+/// The samples between which a row is interpolated.
 template <class V>
 struct Samples {
-  /// Of each the voxel and the next along i; of the next row, the next slice, and both.
+  /// For each voxel, a sample and the next one along i: at its own place, in the next row, in the next slice, and in
+  /// both.
   HWY_ALIGN std::uint32_t pairs[4][kMostInRow];
 
-  /// One after the other: cheaper than gathers, which some processors make of many steps, and no vector waits for it.
+  /// Loads sample after sample: cheaper than gathers, which some processors make of many steps, and no vector waits for
+  /// it.
   HWY_INLINE Samples(const LinearSource& source, const LinearPlaces& places) {
     const std::int64_t row = source.layout.row, slice = source.layout.slice, steps[4] = {0, row, slice, slice + row};
     const V* voxels = static_cast<const V*>(source.voxels);
@@ -104,7 +106,7 @@ struct Samples {
       hn::StoreU(hn::DemoteTo(dv, hn::NearestInt(interpolated(places, i))), dv, output + i);
   }
 
-  /// Copies what voxels are made of that is the same all around; leaves others. @return how many are not left
+  /// Copies voxels whose samples all have the same value, and leaves the others. @return how many are not left
   int copy_uniform(int count, V* output, RowState* state) const {
     using Bits = std::make_unsigned_t<V>;
     const hn::RebindToUnsigned<Ints> du;
@@ -134,7 +136,7 @@ struct Samples {
  private:
   static constexpr int kVoxelsInLine = 64 / sizeof(V);
 
-  /// Asks for what the same voxels of the next slice will be sampled from, if they come from beside these.
+  /// Prefetches the samples that the same voxels of the next slice need, if they come from beside these.
   static HWY_INLINE void prefetch(const V* voxels) { hwy::Prefetch(voxels); }
 };
 
@@ -144,7 +146,7 @@ void find_places(const LinearLayout& layout, const Row& row, LinearPlaces& place
   const hn::Rebind<std::uint8_t, Floats> d8;
   const auto lanes = static_cast<int>(hn::Lanes(df));
   const Int stride_row = hn::Set(di, layout.row), stride_slice = hn::Set(di, layout.slice);
-  // Of the buffer's first voxel. Numbers may wrap around: their differences fit.
+  // Offset of the buffer's first voxel. Numbers may wrap around, for their differences fit.
   const auto begin = static_cast<std::int32_t>(std::int64_t{layout.begin.z} * layout.slice +
                                                std::int64_t{layout.begin.y} * layout.row + layout.begin.x);
   const glm::ivec3 first(row.voxel);
@@ -180,7 +182,7 @@ void find_places(const LinearLayout& layout, const Row& row, LinearPlaces& place
   places.slices = {hn::GetLane(hn::MinOfLanes(di, least)), hn::GetLane(hn::MaxOfLanes(di, most))};
 }
 
-/// Calls with the voxels' type as it is in the output.
+/// Calls `work` with the voxels' type.
 template <class Work>
 auto with_type(VoxelType type, void* output, Work&& work) {
   switch (type) {
@@ -226,7 +228,7 @@ void LinearPlaces::find(const LinearLayout& layout, const Row& row) {
 }
 
 void sample_linear_row(const LinearSource& source, const LinearPlaces& places, void* output) {
-  if (places.sampled == 0) return;  // and nothing that a voxel left might read instead
+  if (places.sampled == 0) return;  // there may be no voxel at all that can be read
   HWY_DYNAMIC_DISPATCH(sample_linear)(source, places, output);
 }
 

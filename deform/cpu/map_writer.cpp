@@ -13,7 +13,7 @@ namespace tetwarp::cpu {
 
 namespace {
 
-/// Where a row of the map begins.
+/// Where a row of a map begins in memory.
 template <class V>
 V* row_of(const VolumeView& map, const glm::i64vec3& voxel) {
   return reinterpret_cast<V*>(map.voxels) + buffer_index(map, voxel) * static_cast<std::size_t>(map.components);

@@ -10,22 +10,28 @@
 
 namespace tetwarp::cpu {
 
-/// Writes rows of those maps that a call asked to fill.
+/// Writes rows of the maps that a call of `Resampler::resample` fills: those of its `Maps` that have voxels. Several
+/// threads may write different rows at a time.
 class MapWriter {
  public:
-  /// @throws InputError for a map that is not on the output grid, does not buffer the region, or has the wrong type
+  /// Checks the maps. @throws InputError for a map that is not on the output grid, does not buffer the region, or has
+  /// the wrong type
   MapWriter(const Maps& maps, const Geometry& output, const Region& region);
 
+  /// Whether any map is filled.
   bool wants_any() const {
     return maps_.coverage.voxels != nullptr || maps_.inverse_mm.voxels != nullptr || wants_jacobian() || wants_owners();
   }
+  /// Whether `write` needs Jacobian determinants.
   bool wants_jacobian() const { return maps_.jacobian.voxels != nullptr; }
+  /// Whether `write` needs the number of owners of each voxel.
   bool wants_owners() const { return maps_.owners.voxels != nullptr; }
 
-  /// Writes one row.
+  /// Writes one row of each map. The inverse displacement is computed from `row.offset`.
+  /// @param row       its voxels, which the maps must buffer
   /// @param coverage  1 or 0 for each voxel of the row
   /// @param jacobian  one for each voxel, or null if that map is not filled
-  /// @param owners    one for each voxel, or null if that map is not filled
+  /// @param owners    number of owners of each voxel, or null if that map is not filled
   void write(const Row& row, const std::uint8_t* coverage, const float* jacobian, const std::uint16_t* owners) const;
 
  private:

@@ -26,12 +26,12 @@ struct Unsettled {
 
 /// Working memory of a march, reused from tile to tile.
 struct MarchScratch {
-  static constexpr int kRows = static_cast<int>(kTile), kRoom = 16;  ///< lanes of the widest vectors
-  static constexpr std::size_t kSlice = static_cast<std::size_t>(kTile * kTile);
+  static constexpr int kRows = static_cast<int>(kTile), kRoom = 16;               ///< lanes of the widest vectors
+  static constexpr std::size_t kSlice = static_cast<std::size_t>(kTile * kTile);  ///< voxels of a slice of a tile
 
   /// Undeformed place, in cells, from which the next voxel of each column is expected to come.
   float x[kSlice + kRoom], y[kSlice + kRoom], z[kSlice + kRoom];
-  /// Voxels of one slice that could not be settled at once.
+  /// Voxels of one slice that could not be settled at once: their places, in cells, and their numbers in the tile.
   struct Queue {
     float x[kSlice + kRoom], y[kSlice + kRoom], z[kSlice + kRoom];
     std::int32_t voxel[kSlice + kRoom];
@@ -43,18 +43,23 @@ struct MarchScratch {
 /// A box of up to kTile voxels on each axis. Whole vectors are read and written, so both arrays have
 /// `MarchScratch::kRoom` elements more than the box has voxels.
 struct MarchTile {
-  IntBox box;
+  IntBox box;            ///< its voxels in the output
   const Owners* owners;  ///< number of owners of each voxel, i fastest
   glm::vec3* offset;     ///< gets the undeformed minus deformed place of each voxel, voxels, i fastest
 };
 
 /// Finds the owners of those voxels of a tile that have exactly one, with the widest vectors that the processor has
-/// (Highway).
+/// (Highway). docs/design/glossary.md explains march, claim and settle, docs/design/cpu.md the method.
 ///
 /// It goes along k, as the march on a device does. Each owner is predicted from the affine map of the one
 /// before, and accepted where float arithmetic proves it (`try_tetrahedron`) or, at a second look, double arithmetic.
 /// Offsets have the bits of `interpolate_u`, for they are computed by the same operations. Voxels whose owner is not
-/// found are listed in `scratch.unsettled`. Offsets of all other voxels are undefined.
+/// found are listed in `scratch.unsettled`. Offsets of voxels that have none or several owners are undefined.
+///
+/// @param field    displacements and the lattice, which must have cells
+/// @param nudge    where the nudge changes its sign
+/// @param tile     which voxels, and how many owners each has
+/// @param scratch  working memory, one for each thread; gets the voxels that are left
 void march(const VectorField& field, const NudgeTurns& nudge, const MarchTile& tile, MarchScratch& scratch);
 
 }  // namespace tetwarp::cpu

@@ -16,7 +16,7 @@ namespace {
 constexpr std::int64_t kBin = kMostRowTile;  ///< voxels of a bin along an axis
 constexpr std::size_t kAtOnce = 1 << 16;     ///< tetrahedra between two looks at a request to stop
 
-/// Gives the voxels of a run to a tetrahedron that comes after all others.
+/// Enters a tetrahedron as the owner of the voxels of a run that have none yet: numbers rise from call to call.
 void give(std::uint32_t number, std::size_t first, int count, bool wants_count, MeshOwners& owners) {
   std::uint32_t* owner = owners.owner.data() + first;
   for (int n = 0; n < count; ++n) owner[n] = std::min(owner[n], number);
@@ -32,7 +32,7 @@ Region MeshRaster::bin(const glm::i64vec3& at) const {
   return {glm::max(begin, glm::i64vec3(0)), glm::min(begin + kBin, size_)};
 }
 
-/// Calls `visit(number)` for the bins that a tetrahedron may reach.
+/// Calls `visit(number)` for each bin that a tetrahedron may reach.
 template <class Visit>
 void MeshRaster::for_each_bin(const Tetrahedron& t, Visit&& visit) const {
   const Region voxels = detail::candidates(mesh_->nudge, box_of(t), {glm::i64vec3(0), size_});
@@ -84,7 +84,7 @@ void MeshRaster::find(const Region& box, bool wants_count, MeshOwners& owners) c
   }
 }
 
-/// @param part  of the box, within the bin
+/// Finds the owners in one bin. @param part  the part of the box within the bin
 void MeshRaster::find_in_bin(std::size_t number, const Region& part, const Region& box, bool wants_count,
                              MeshOwners& owners) const {
   const glm::i32vec3 signs = mesh_->nudge.signs(part.begin);

@@ -18,14 +18,14 @@ namespace tetwarp::cpu {
 namespace {
 
 /// What is known of each voxel of a tile.
-struct Tile {
+struct TileVoxels {
   MeshOwners owners, at_rest;
   std::uint8_t mapped[kTile], coverage[kTile];
   glm::vec3 offset[kTile];
   float jacobian[kTile];
 };
 
-/// Tile by tile: rasterises the tetrahedra, then samples the rows.
+/// Deforms volumes tile by tile: rasterises the tetrahedra, then samples the rows.
 class MeshResampler final : public ForwardResampler {
  public:
   MeshResampler(const Geometry& output, const Limits& limits) : ForwardResampler(output), arena_(make_arena(limits)) {}
@@ -37,10 +37,11 @@ class MeshResampler final : public ForwardResampler {
 
  private:
   void require_reach(const Control& control);
-  void settle(const Row& row, std::size_t first, const MapWriter& maps, Tile& tile, Report& report) const;
+  void settle(const Row& row, std::size_t first, const MapWriter& maps, TileVoxels& tile, Report& report) const;
 
   tbb::task_arena arena_;
-  SnappedMesh mesh_, rest_;  ///< deformed; and undeformed, where it matters what lies outside
+  /// The deformed mesh; and the undeformed one, where it matters which voxels lie outside.
+  SnappedMesh mesh_, rest_;
   MeshRaster raster_, rest_raster_;
   bool ready_ = false, stays_outside_ = false;
 };
@@ -58,7 +59,7 @@ void MeshResampler::set_field(const FieldView& field, const FieldOptions&, const
   ready_ = true;
 }
 
-/// @throws InputError unless the undeformed mesh reaches over the whole output
+/// Refuses an undeformed mesh that does not reach over the whole output. @throws InputError
 void MeshResampler::require_reach(const Control& control) {
   std::atomic<std::int64_t> voxels = 0, lowest = INT64_MAX;
   for_each_tile<MeshOwners>(
@@ -92,35 +93,37 @@ Report MeshResampler::resample(Region region, std::span<const Target> targets, c
   require(ready_, "resample needs a field: call set_field first");
   const TargetSamplers samplers = make_samplers(*this, targets, region);
   const MapWriter writer(maps, output(), region);
-  Report report = for_each_tile<Tile>(arena_, region, control, finished, [&](const Region& box, Tile& tile) {
-    Report of_tile;
-    of_tile.paths.claimed = static_cast<std::uint64_t>(voxel_count(box));
-    raster_.find(box, writer.wants_owners(), tile.owners);
-    if (stays_outside_) rest_raster_.find(box, false, tile.at_rest);
-    if (writer.wants_owners()) {
-      const auto& count = tile.owners.count;
-      of_tile.multiply_owned = static_cast<std::uint64_t>(
-          std::count_if(count.begin(), count.end(), [](std::uint16_t owners) { return owners > 1; }));
-    }
-    const auto width = static_cast<int>(box.end.x - box.begin.x);
-    std::size_t first = 0;
-    for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {
-      for (std::int64_t y = box.begin.y; y < box.end.y; ++y, first += static_cast<std::size_t>(width)) {
-        const Row row{{box.begin.x, y, z}, width, tile.mapped, tile.offset};
-        settle(row, first, writer, tile, of_tile);
-        sample_targets(row, samplers, tile.coverage, of_tile);
-        writer.write(row, tile.coverage, writer.wants_jacobian() ? tile.jacobian : nullptr,
-                     writer.wants_owners() ? tile.owners.count.data() + first : nullptr);
-      }
-    }
-    return of_tile;
-  });
+  Report report =
+      for_each_tile<TileVoxels>(arena_, region, control, finished, [&](const Region& box, TileVoxels& tile) {
+        Report of_tile;
+        of_tile.paths.claimed = static_cast<std::uint64_t>(voxel_count(box));
+        raster_.find(box, writer.wants_owners(), tile.owners);
+        if (stays_outside_) rest_raster_.find(box, false, tile.at_rest);
+        if (writer.wants_owners()) {
+          const auto& count = tile.owners.count;
+          of_tile.multiply_owned = static_cast<std::uint64_t>(
+              std::count_if(count.begin(), count.end(), [](std::uint16_t owners) { return owners > 1; }));
+        }
+        const auto width = static_cast<int>(box.end.x - box.begin.x);
+        std::size_t first = 0;
+        for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {
+          for (std::int64_t y = box.begin.y; y < box.end.y; ++y, first += static_cast<std::size_t>(width)) {
+            const Row row{{box.begin.x, y, z}, width, tile.mapped, tile.offset};
+            settle(row, first, writer, tile, of_tile);
+            sample_targets(row, samplers, tile.coverage, of_tile);
+            writer.write(row, tile.coverage, writer.wants_jacobian() ? tile.jacobian : nullptr,
+                         writer.wants_owners() ? tile.owners.count.data() + first : nullptr);
+          }
+        }
+        return of_tile;
+      });
   mesh_.describe(report);
   return report;
 }
 
-/// Decides for a row where each voxel comes from. @param first  place of the row in the tile
-void MeshResampler::settle(const Row& row, std::size_t first, const MapWriter& maps, Tile& tile, Report& report) const {
+/// Decides for a row where each voxel comes from. @param first  number of the row's first voxel in the tile
+void MeshResampler::settle(const Row& row, std::size_t first, const MapWriter& maps, TileVoxels& tile,
+                           Report& report) const {
   const std::uint32_t* owner = tile.owners.owner.data() + first;
   for (int i = 0; i < row.count;) {
     int end = i + 1;

@@ -20,7 +20,8 @@ namespace cpu {
 
 namespace {
 
-/// The sample of a row's first voxel, where each of its voxels lies on one and the samples run along the row.
+/// The sample on which a row's first voxel lies, if each voxel of the row lies on a sample and the row runs along the
+/// samples.
 std::optional<glm::i64vec3> find_first_sample(const PullFrame& frame, const glm::i64vec3& first, int count) {
   const glm::dmat3& map = frame.grid_from_output.linear;
   if (map[0] != glm::dvec3(1, 0, 0) || map[1].x != 0 || map[2].x != 0) return {};
@@ -32,11 +33,11 @@ std::optional<glm::i64vec3> find_first_sample(const PullFrame& frame, const glm:
   return low;
 }
 
-/// The samples around a row of voxels that runs along the first axis of the samples, converted once for all of them.
+/// The samples around a row of voxels that runs along the first axis of the samples, converted once for all voxels.
 class RowSamples {
  public:
-  /// @return false where the row runs otherwise, leaves the grid, or has its voxels as far apart as the samples are:
-  ///         then there is little to share
+  /// @return false where the row runs in another direction, leaves the grid, or has its voxels as far apart as the
+  /// samples are, so that there is little to share
   bool find(const PullFrame& frame, const glm::i64vec3& first, int count) {
     const glm::dvec3& step = frame.grid_from_output.linear[0];
     if (!(step.x > 0 && step.x < 1 && step.y == 0 && step.z == 0)) return false;
@@ -68,7 +69,7 @@ struct RowScratch {
   RowSamples samples;
 };
 
-/// Row by row: where each voxel comes from, then the samples there.
+/// Deforms volumes row by row: computes where each voxel comes from, then samples there.
 class RowPullResampler final : public PullResampler {
  public:
   RowPullResampler(Geometry output, const Limits& limits) : PullResampler(output), arena_(make_arena(limits)) {}

@@ -11,12 +11,14 @@
 namespace tetwarp::cpu {
 
 /// Snaps vertices of a lattice that lies along the axes of the grid, with undeformed vertices at whole steps, in few
-/// operations. It makes the sums and products of `LatticeFrame::snap_vertex` that are not with zero, in steps of 2^-12
-/// voxel. Scaling by a power of two changes no rounding.
+/// operations: to snap is to round the undeformed and the deformed place of a vertex to whole steps of 2^-12 voxel of
+/// the output. It gives the bits of `LatticeFrame::snap_vertex`: it leaves out sums and products with zero, which
+/// change nothing, and computes in steps instead of voxels, which changes no rounding, for a step is a power of two.
 class QuickSnap {
  public:
   QuickSnap() = default;
-  /// @param steps  a lattice without cells is never usable
+  /// @param frame  where the lattice lies in the output
+  /// @param steps  the lattice at whole steps; if it has no cells, `is_usable` is false
   QuickSnap(const LatticeFrame& frame, const StepLattice& steps) {
     constexpr double kApart = 0.02;  // steps: more than rest places differ from whole multiples of cells, by all axes
     rests_at_steps_ = steps.cells.x != 0 && frame.first_slice == 0;
@@ -37,10 +39,12 @@ class QuickSnap {
     rest_cell_ = glm::ivec3(steps.cell);
   }
 
+  /// Whether `snap` may be called: the lattice lies along the axes of the grid, and `rests_at_steps` holds.
   bool is_usable() const { return usable_; }
-  /// Whether every undeformed vertex is snapped to where the StepLattice has it, on every output grid.
+  /// Whether every undeformed vertex is snapped to where the StepLattice has it: no place is so near to the middle
+  /// between two steps that rounding decides.
   bool rests_at_steps() const { return rests_at_steps_; }
-  /// Snaps one vertex.
+  /// Snaps one vertex. @param at  its index in the lattice  @param displacement  LPS mm
   /// @return false for a vertex that is far away or not finite; then `LatticeFrame::snap_vertex` must decide
   bool snap(const glm::ivec3& at, const glm::vec3& displacement, Vertex& vertex) const {
     glm::dvec3 rounded(0);
@@ -63,8 +67,10 @@ class QuickSnap {
   static constexpr double kFar = 1 << 28;  ///< steps
 
   bool usable_ = false, rests_at_steps_ = false;
-  glm::dvec3 first_{0}, cell_{0}, scale_{0};  ///< steps; mm to steps
-  glm::ivec3 rest_{0}, rest_cell_{0};         ///< the same, snapped
+  /// The first undeformed vertex and the distance to the next on each axis, in steps; steps in a mm.
+  glm::dvec3 first_{0}, cell_{0}, scale_{0};
+  /// `first_` and `cell_`, snapped.
+  glm::ivec3 rest_{0}, rest_cell_{0};
 };
 
 }  // namespace tetwarp::cpu

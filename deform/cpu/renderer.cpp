@@ -13,7 +13,7 @@ namespace tetwarp {
 
 namespace {
 
-/// Pixels that one task casts: near rays read the same voxels.
+/// Side of the square of pixels that one task casts, for near rays read the same voxels.
 constexpr int kPatch = 16;
 
 class CpuRenderer final : public Renderer {
@@ -61,7 +61,7 @@ class CpuRenderer final : public Renderer {
   std::vector<std::uint8_t> distances_;
   const std::uint8_t* tint_numbers_ = nullptr;
   std::vector<TransferEntry> tint_colours_;
-  double table_step_ = 0;  ///< mm, that the tables are for
+  double table_step_ = 0;  ///< mm between samples, for which the tables were made
 };
 
 void CpuRenderer::prepare(const RayFrame& frame, double step) {

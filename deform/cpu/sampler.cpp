@@ -13,11 +13,11 @@ namespace tetwarp::cpu {
 
 namespace {
 
-/// The same for one type of voxel and one interpolation.
+/// A TargetSampler for one type of voxel and one interpolation.
 template <class V, Interpolation kInterpolation>
 class TypedSampler final : public TargetSampler {
  public:
-  /// @param target  checked (target_check.h)
+  /// @param target  passed check_targets (target_check.h)
   TypedSampler(const Target& target, const Geometry& output)
       : target_(target),
         slices_(uneven_slices(*target.source.geometry)),
@@ -34,7 +34,8 @@ class TypedSampler final : public TargetSampler {
     } else if (has_source_ && row.count <= kMostInRow) {
       places.find(source_.layout, row);
       sampled = places.slices;
-      if (coverage) std::fill_n(coverage, row.count, std::uint8_t{1});  // of those left, written below
+      // Voxels that vectors left are written below.
+      if (coverage) std::fill_n(coverage, row.count, std::uint8_t{1});
       if (kInterpolation == Interpolation::vote) {
         RowState state[kMostInRow];
         std::copy_n(places.state, row.count, state);
@@ -79,7 +80,7 @@ class TypedSampler final : public TargetSampler {
            buffer_index(target_.output, voxel) * static_cast<std::size_t>(components());
   }
 
-  /// What vectors did not sample. @param done  voxels that they did
+  /// Samples the voxels that vectors did not. @param done  how many voxels vectors sampled
   void sample_left(const Row& row, const RowState* state, int done, V* output, std::uint8_t* coverage, Report& counts,
                    SliceRange& sampled) const {
     counts.covered += static_cast<std::uint64_t>(done);
@@ -95,7 +96,7 @@ class TypedSampler final : public TargetSampler {
     note_voxel(voxel, coverage ? coverage + i : nullptr, counts, sampled);
   }
 
-  /// All voxels of a row, of several values each.
+  /// Samples all voxels of a row whose voxels have several values each.
   void sample_vectors(const Row& row, V* output, std::uint8_t* coverage, Report& counts, SliceRange& sampled) const {
     for (int i = 0; i < row.count; ++i, output += components()) {
       const SampledVoxel<V> voxel = sample_components<V, kInterpolation>(
@@ -127,9 +128,9 @@ class TypedSampler final : public TargetSampler {
   }
 
   Target target_;
-  std::vector<double> slices_;  ///< of an uneven source
+  std::vector<double> slices_;  ///< positions of the slices of an uneven source
   SamplePlan<V> plan_;
-  LinearSource source_{};  ///< where vectors sample it
+  LinearSource source_{};  ///< the source in the form that vector code samples
   bool has_source_ = false;
 };
 

@@ -15,9 +15,9 @@ namespace tetwarp::cpu {
 
 /// A run of output voxels along i, and what the field says of each.
 struct Row {
-  glm::i64vec3 voxel;  ///< the first voxel
+  glm::i64vec3 voxel;  ///< the first voxel of the run
   int count;
-  const std::uint8_t* mapped;  ///< 1: comes from `voxel + offset`; 0: nothing maps there
+  const std::uint8_t* mapped;  ///< 1: the voxel comes from `voxel + offset`; 0: nothing maps there
   const glm::vec3* offset;     ///< undeformed minus deformed place of each, voxels of output index
 };
 

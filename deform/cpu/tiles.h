@@ -22,12 +22,14 @@ namespace tetwarp::cpu {
 /// the second-level cache of a core.
 constexpr std::int64_t kTile = 32;
 
-/// Reports the share of work that is done, one call at a time and rising.
-class Progress {
+/// Calls `Control::progress` with the share of work that is done: one call at a time, with rising shares, from
+/// whichever thread has done some.
+class WorkProgress {
  public:
-  Progress(const Control& control, std::int64_t total) : control_(control), total_(total) {}
+  /// @param total  amount of work, in any unit
+  WorkProgress(const Control& control, std::int64_t total) : control_(control), total_(total) {}
 
-  /// @throws Cancelled where a stop was requested
+  /// Adds an amount of work that is done. @throws Cancelled if a stop was requested
   void done(std::int64_t amount) {
     if (control_.stop.stop_requested()) throw Cancelled();
     if (!control_.progress) return;
@@ -42,7 +44,8 @@ class Progress {
   std::mutex mutex_;
 };
 
-/// Reports layers of tiles (all tiles with the same range of k) whose last row of tiles is done.
+/// Calls `finished` for each layer of tiles (all tiles with the same range of k) when its last row of tiles is
+/// done. Layers may finish in any order.
 class Layers {
  public:
   Layers(const PartSink& finished, const Region& region, const glm::i64vec3& tiles)
@@ -50,6 +53,7 @@ class Layers {
     for (std::atomic<std::int64_t>& rows : rows_left_) rows = tiles.y;
   }
 
+  /// Takes note of a row of tiles that is done. Several threads may call it at a time.
   void row_done(std::int64_t layer) {
     if (!finished_ || --rows_left_[static_cast<std::size_t>(layer)] != 0) return;
     Region slices = region_;
@@ -64,6 +68,7 @@ class Layers {
   std::vector<std::atomic<std::int64_t>> rows_left_;
 };
 
+/// An arena with as many threads as the limits allow; 0: all that this process may use.
 inline tbb::task_arena make_arena(const Limits& limits) {
   require(limits.threads >= 0, "threads is " + std::to_string(limits.threads) + ", expected 0 (all) or more");
   const int most = tbb::info::default_concurrency();
@@ -81,7 +86,7 @@ Report for_each_tile(tbb::task_arena& arena, const Region& region, const Control
   Report total;
   if (is_empty(region)) return total;
   const glm::i64vec3 tiles = (region.end - region.begin + (kTile - 1)) / kTile;
-  Progress progress(control, voxel_count(region));
+  WorkProgress progress(control, voxel_count(region));
   Layers layers(finished, region, tiles);
   tbb::enumerable_thread_specific<Scratch> scratch;
   tbb::enumerable_thread_specific<Report> reports;
@@ -109,7 +114,7 @@ Report for_each_tile(tbb::task_arena& arena, const Region& region, const Control
   return total;
 }
 
-/// Does the same tile by tile: no row is one piece of work.
+/// Runs `work(box, scratch)` for all tiles of the region, each tile a piece of work, and adds up the reports.
 template <class Scratch, class Work>
 Report for_each_tile(tbb::task_arena& arena, const Region& region, const Control& control, const PartSink& finished,
                      Work&& work) {

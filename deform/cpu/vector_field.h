@@ -9,22 +9,26 @@
 
 namespace tetwarp::cpu {
 
-/// A field in the form that vector code reads: displacements, in host memory, of a lattice whose undeformed vertices
-/// lie at whole steps, and how they are snapped.
+/// A field in the form that code with vector instructions reads: displacements, in host memory, of a lattice whose
+/// undeformed vertices lie at whole steps (2^-12 voxel of the output), and how they are snapped. It keeps no copy of
+/// the displacements.
 struct VectorField {
-  /// Number that raises steps to where floats are whole numbers, for vertices that move less than 2^22 steps (1024
-  /// voxels).
+  /// A float from which on floats are whole numbers: adding it to a motion in steps rounds that to whole steps, for
+  /// vertices that move less than 2^22 steps (1024 voxels).
   static constexpr float kLift = 3.0f * (1 << 22);
+  /// The largest motion of a vertex along an axis, in steps, for which this form can be used.
   static constexpr float kMostMoved = (1 << 22) - 1;
 
-  const glm::vec3* displacement = nullptr;
-  StepLattice lattice;  ///< without packed vertices
-  FloatSnap snap;
-  AffineMap output_from_lattice;
-  glm::dmat3 output_from_mm{1};
+  const glm::vec3* displacement = nullptr;  ///< of each vertex, LPS mm, i fastest
+  StepLattice lattice;                      ///< the undeformed vertices; `StepLattice::packed` is null
+  FloatSnap snap;                           ///< turns displacements into steps, in float
+  AffineMap output_from_lattice;            ///< from vertex index to output index
+  glm::dmat3 output_from_mm{1};             ///< from a displacement to voxels of the output
 
   VectorField() = default;
-  /// @param steps  with cells, of the whole lattice
+  /// @param displacements  one for each vertex of the whole lattice; must outlive this object
+  /// @param frame          where the lattice lies in the output
+  /// @param steps          the lattice at whole steps; it must have cells, and be the whole lattice
   VectorField(const glm::vec3* displacements, const LatticeFrame& frame, const StepLattice& steps)
       : displacement(displacements),
         lattice(steps),

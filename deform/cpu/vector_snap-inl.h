@@ -22,7 +22,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 using Floats = hn::ScalableTag<float>;
 using Ints = hn::RebindToSigned<Floats>;
 #if HWY_TARGET == HWY_SCALAR
-using HalfFloats = Floats;  // one lane: there are no halves
+using HalfFloats = Floats;  // one lane has no halves
 #else
 using HalfFloats = hn::Half<Floats>;
 #endif
@@ -32,7 +32,7 @@ using Int = hn::Vec<Ints>;
 using Double = hn::Vec<Doubles>;
 using FloatMask = hn::Mask<Floats>;
 
-/// Whether `MulAdd` rounds once.
+/// Defined where `MulAdd` rounds once.
 #if HWY_ARCH_X86
 constexpr bool kFused = HWY_TARGET <= HWY_AVX2;
 #else
@@ -43,7 +43,8 @@ struct Vec3 {
   Float x, y, z;
 };
 
-/// first, first + 1, ... (Highway's Iota of what is not a constant is made lane by lane)
+/// The numbers first, first + 1, ... in rising lanes. (Highway makes Iota of a number that is not constant lane by
+/// lane.)
 HWY_INLINE Int numbers_from(int first) { return hn::Add(hn::Iota(Ints(), 0), hn::Set(Ints(), first)); }
 HWY_INLINE Float set(float value) { return hn::Set(Floats(), value); }
 HWY_INLINE Vec3 set(const glm::vec3& v) { return {set(v.x), set(v.y), set(v.z)}; }
@@ -51,11 +52,11 @@ HWY_INLINE Vec3 operator-(const Vec3& a, const Vec3& b) {
   return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
 }
 
-/// How displacements are snapped. In float only where `MulAdd` is fused and `FloatSnap` is usable.
+/// How displacements are snapped. Float serves only where `MulAdd` is fused and `FloatSnap` is usable.
 enum class Snapping {
-  float_with_ties,  ///< ties are exact: `FloatSnap::is_exact`
-  in_float,         ///< what is not certain is said
-  in_double         ///< as `LatticeFrame::snap_vertex` does; always certain
+  float_with_ties,  ///< also ties are exact: `FloatSnap::is_exact`
+  in_float,         ///< lanes where float is not certain are marked
+  in_double         ///< with the operations of `LatticeFrame::snap_vertex`; always certain
 };
 
 template <Snapping kSnapping>
@@ -79,7 +80,7 @@ HWY_INLINE DoubleVec3 promoted(hn::Vec<HalfFloats> x, hn::Vec<HalfFloats> y, hn:
   return {hn::PromoteTo(dd, x), hn::PromoteTo(dd, y), hn::PromoteTo(dd, z)};
 }
 
-/// Calls `f` with both halves of vectors, and puts together the floats that it gives.
+/// Calls `f` with the lower and with the upper halves of vectors, and joins the floats that it returns.
 template <class F, class... Vectors>
 HWY_INLINE Float in_halves(F&& f, const Vectors&... v) {
 #if HWY_TARGET == HWY_SCALAR
@@ -92,7 +93,7 @@ HWY_INLINE Float in_halves(F&& f, const Vectors&... v) {
 #endif
 }
 
-/// One axis of what `AffineMap` and `LatticeFrame::snap_vertex` compute, operation by operation; steps moved.
+/// How many steps vertices move along one axis, by the operations of `AffineMap` and `LatticeFrame::snap_vertex`.
 HWY_INLINE hn::Vec<HalfFloats> moved_in_double(const VectorField& field, int axis, const DoubleVec3& displacement,
                                                const DoubleVec3& at) {
   const Doubles dd;
@@ -110,7 +111,8 @@ HWY_INLINE hn::Vec<HalfFloats> moved_in_double(const VectorField& field, int axi
   return hn::DemoteTo(HalfFloats(), hn::Sub(deformed, from));
 }
 
-/// How many steps vertices move. @param at  vertices  @param certain  taken from lanes that are not
+/// How many steps vertices move. @param at  index of the vertices  @param certain  set to false in lanes where float
+/// cannot tell
 template <Snapping kSnapping>
 HWY_INLINE Vec3 moved_steps(const VectorField& field, const Vec3& displacement, const Vec3& at, FloatMask& certain) {
   if constexpr (kSnapping == Snapping::in_double) {

@@ -24,7 +24,7 @@ template <class Change>
 void for_each_vertex(VertexField& field, const Limits& limits, const Control& control, Change&& change) {
   const AffineMap point = point_from_index(field.lattice);
   const glm::i64vec3 size = field.lattice.size;
-  cpu::Progress progress(control, size.z);
+  cpu::WorkProgress progress(control, size.z);
   cpu::FirstRefusal refusal;
   tbb::task_arena arena = cpu::make_arena(limits);
   const auto change_slice = [&](std::int64_t z) {
@@ -56,7 +56,7 @@ namespace {
 
 void compose(TetrahedralMesh& mesh, const PointMap& next, const Limits& limits, const Control& control) {
   constexpr std::size_t kGrain = 4096;
-  cpu::Progress progress(control, static_cast<std::int64_t>(mesh.rest.size()));
+  cpu::WorkProgress progress(control, static_cast<std::int64_t>(mesh.rest.size()));
   cpu::FirstRefusal refusal;
   tbb::task_arena arena = cpu::make_arena(limits);
   const auto move_on = [&](const tbb::blocked_range<std::size_t>& range) {
@@ -89,7 +89,7 @@ PointMap piecewise_affine(const VertexField& field) {
   require(field.mesh.is_empty(), "a mesh says where its own vertices go alone; let it be the first field");
   const AffineMap lattice_from_point = index_from_point(field.lattice);
   return [&field, lattice_from_point](const glm::dvec3& point) {
-    constexpr double kSlack = 1e-6;  // of a cell
+    constexpr double kSlack = 1e-6;  // of a cell, by which rounding may put a point outside
     const glm::dvec3 index = lattice_from_point(point);
     const glm::i64vec3 size = field.lattice.size;
     glm::i64vec3 cell;

@@ -15,14 +15,14 @@ namespace {
 
 constexpr double kMostGrowth = 8;
 
-/// Box of the target's corners, in the field's index.
-struct Box {
+/// The box around the target's corners, in the field's index.
+struct IndexBox {
   glm::dvec3 low{std::numeric_limits<double>::infinity()}, high{-std::numeric_limits<double>::infinity()};
 };
 
-Box corners_of(const Geometry& target, const Geometry& grid) {
+IndexBox corners_of(const Geometry& target, const Geometry& grid) {
   const AffineMap index = index_from_point(grid) * point_from_index(target);
-  Box box;
+  IndexBox box;
   for (int corner = 0; corner < 8; ++corner) {
     const glm::dvec3 at =
         index(glm::dvec3(corner & 1, corner >> 1 & 1, corner >> 2) * glm::dvec3(target.size - std::int64_t{1}));
@@ -32,12 +32,13 @@ Box corners_of(const Geometry& target, const Geometry& grid) {
   return box;
 }
 
-/// Cells before and behind the samples, so that each face of the lattice is moved onto or beyond the target's.
+/// How many cells are added before and behind the samples on each axis, so that each face of the lattice is moved onto
+/// the target's face or beyond it.
 struct Growth {
   glm::dvec3 before{0}, behind{0};
 };
 
-Growth growth_over(const PullField& field, const Box& target) {
+Growth growth_over(const PullField& field, const IndexBox& target) {
   const glm::i64vec3 size = field.grid.size;
   const AffineMap index = index_from_point(field.grid);
   Growth growth;
@@ -52,7 +53,7 @@ Growth growth_over(const PullField& field, const Box& target) {
         const glm::i64vec3 at(i, j, k);
         const glm::dvec3 by = index.linear * glm::dvec3(d);
         for (int axis = 0; axis < 3; ++axis) {
-          // One cell more than needed: vertices are snapped.
+          // One cell more than needed, for vertices are snapped.
           const auto last = static_cast<double>(size[axis] - 1);
           if (at[axis] == 0)
             growth.before[axis] = std::max(growth.before[axis], std::ceil(by[axis] - target.low[axis]) + 1);
@@ -68,7 +69,7 @@ Growth growth_over(const PullField& field, const Box& target) {
 }  // namespace
 
 VertexField continued_over(const PullField& field, const Geometry& target) {
-  view(field);  // one displacement a sample
+  view(field);  // throws unless there is one displacement a sample
   const Growth growth = growth_over(field, corners_of(target, field.grid));
   const glm::dvec3 grown = glm::dvec3(field.grid.size) + growth.before + growth.behind;
   const double most = kMostGrowth * static_cast<double>(voxel_count(field.grid) + voxel_count(target));

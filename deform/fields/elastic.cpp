@@ -18,7 +18,7 @@ std::uint64_t split_mix(std::uint64_t state) {
 
 namespace {
 
-/// Of the control points floor(t) - 1 to floor(t) + 2, f = t - floor(t).
+/// Weights of the control points floor(t) - 1 to floor(t) + 2, where f = t - floor(t).
 std::array<double, 4> spline_weights(double f) {
   const double g = 1 - f, f2 = f * f, g2 = g * g;
   return {g2 * g / 6, (4 - 6 * f2 + 3 * f2 * f) / 6, (4 - 6 * g2 + 3 * g2 * g) / 6, f2 * f / 6};
@@ -44,7 +44,7 @@ glm::dvec3 Elastic::operator()(const glm::dvec3& point) const {
   const glm::i64vec3 first = glm::i64vec3(below) - std::int64_t{1};
   std::array<std::array<double, 4>, 3> weights;
   for (int axis = 0; axis < 3; ++axis) weights[axis] = spline_weights(t[axis] - below[axis]);
-  // As random_control, but the hash of what control points share is found once.
+  // The numbers of random_control; the part of the hash that control points share is computed once.
   const std::uint64_t start = split_mix(seed);
   glm::dvec3 sum(0);
   for (int i = 0; i < 4; ++i) {

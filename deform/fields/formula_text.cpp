@@ -32,13 +32,13 @@ std::vector<std::string_view> split(std::string_view text, char separator) {
 
 std::string_view name_of(std::string_view text) { return text.substr(0, text.find(':')); }
 
-/// A length as typed: mm, or voxels where the suffix says so.
-struct Length {
+/// A length as typed: mm, or voxels if it has the suffix `vox`.
+struct TypedLength {
   double value;
   bool in_voxels;
 };
 
-/// The parameters of one formula: each is asked for once, and none may be left over.
+/// The parameters of one formula. Each may be taken once, and none may be left over.
 class Parameters {
  public:
   Parameters(std::string_view text, const Geometry& volume) : text_(text), volume_(volume) {
@@ -75,9 +75,10 @@ class Parameters {
     return value;
   }
 
-  /// mm; one `vox` is the spacing of the grid axis nearest to patient axis `along`, or the smallest where that is -1.
+  /// A length in mm. One `vox` is the spacing of the grid axis nearest to patient axis `along`, or the smallest spacing
+  /// if that is -1.
   double length(const std::string& key, int along) {
-    const Length length = parse_length(key, take(key, false));
+    const TypedLength length = parse_length(key, take(key, false));
     return length.in_voxels ? length.value * voxel_mm(along) : length.value;
   }
 
@@ -103,10 +104,10 @@ class Parameters {
     return {parse(key, parts[0]), parse(key, parts[1]), parse(key, parts[2])};
   }
 
-  /// DX/DY/DZ mm along L, P, S; with `vox` (after the last, or after each) voxels along i, j, k.
+  /// A shift DX/DY/DZ: mm along L, P, S; with `vox` after the last number, or after each, voxels along i, j, k.
   glm::dvec3 shift(const std::string& key) {
     const std::array<std::string_view, 3> parts = three(key, take(key, false));
-    std::array<Length, 3> lengths{};
+    std::array<TypedLength, 3> lengths{};
     for (std::size_t axis = 0; axis < 3; ++axis) lengths[axis] = parse_length(key, parts[axis]);
     const glm::dvec3 by(lengths[0].value, lengths[1].value, lengths[2].value);
     const int marked = lengths[0].in_voxels + lengths[1].in_voxels + lengths[2].in_voxels;
@@ -136,7 +137,7 @@ class Parameters {
     return value;
   }
 
-  Length parse_length(const std::string& key, std::string_view text) const {
+  TypedLength parse_length(const std::string& key, std::string_view text) const {
     const bool in_voxels = text.ends_with(kVoxels);
     if (in_voxels) text.remove_suffix(kVoxels.size());
     return {parse(key, text), in_voxels};
@@ -197,7 +198,7 @@ PointMap parse_translate(Parameters& given, const Geometry&) {
 
 PointMap parse_elastic(Parameters& given, const Geometry& volume) {
   const double spacing = given.positive_length("spacing", -1);
-  constexpr double kMostControlPoints = 1e6;  // along an axis: smaller is a mistake, and would leave 64 bits some day
+  constexpr double kMostControlPoints = 1e6;  // along an axis: more are a mistake, and many more would exceed 64 bits
   for (int axis = 0; axis < 3; ++axis) {
     if (half_length(volume, axis) / spacing > kMostControlPoints) given.fail("spacing is too small for the volume");
   }

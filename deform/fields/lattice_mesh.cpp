@@ -14,7 +14,8 @@ namespace tetwarp {
 
 namespace {
 
-/// The lattice's vertex that each vertex of a mesh rests at, -1: none. Where the mesh does not say, places tell.
+/// For each vertex of a mesh, the lattice's vertex where it rests, or -1. If the mesh does not state it, it is found by
+/// place.
 std::vector<std::int64_t> lattice_vertices_of(const TetrahedralMesh& mesh, const Geometry& lattice) {
   if (!mesh.lattice_vertex.empty()) return mesh.lattice_vertex;
   const AffineMap point = point_from_index(lattice), index = index_from_point(lattice);
@@ -28,8 +29,8 @@ std::vector<std::int64_t> lattice_vertices_of(const TetrahedralMesh& mesh, const
   return numbers;
 }
 
-/// Adds a mesh to that of a lattice. Vertices that the lattice has too, at the same place and displaced alike, are not
-/// added again.
+/// Adds a mesh to the mesh of a lattice. Vertices at the place of a lattice vertex with the same displacement are that
+/// vertex and are not added again.
 void append(const TetrahedralMesh& added, const Geometry& lattice, TetrahedralMesh& mesh) {
   const std::vector<std::int64_t> of_lattice = lattice_vertices_of(added, lattice);
   std::vector<std::uint32_t> number;

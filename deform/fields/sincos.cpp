@@ -10,12 +10,12 @@ namespace tetwarp {
 
 namespace {
 
-// Pi / 2 in three parts (Cody and Waite 1980): the first two have 33 bits each, so multiples up to 2^20 of them are
-// exact.
+// Pi / 2 in three parts (Cody and Waite 1980). The first two have 33 bits each, so their products with whole numbers up
+// to 2^20 are exact.
 constexpr double kHalfPi1 = 0x1.921fb544p+0, kHalfPi2 = 0x1.0b4611a6p-34, kHalfPi3 = 0x1.3198a2e037073p-69;
 constexpr double kTwoOverPi = 0x1.45f306dc9c883p-1;
 
-/// Taylor series, |r| <= pi / 4: the first term left out is below 1e-19.
+/// Sine by its Taylor series, for |r| <= pi / 4: the first term left out is below 1e-19.
 double sine_near_zero(double r) {
   const double x = r * r;
   double sum = 1.0 / 355687428096000.0;
@@ -39,12 +39,12 @@ double cosine_near_zero(double r) {
 SinCos find_sin_cos(double angle) {
   const double quarter = std::nearbyint(angle * kTwoOverPi);
   const double high = (angle - quarter * kHalfPi1) - quarter * kHalfPi2;
-  // What the second subtraction rounded away, and the third part of pi / 2, are carried beside r.
+  // What the second subtraction rounded away, and the third part of pi / 2, are kept beside r.
   const double lost = ((angle - quarter * kHalfPi1) - high) - quarter * kHalfPi2 - quarter * kHalfPi3;
   const double r = high + lost, low = (high - r) + lost;
   const double near_sine = sine_near_zero(r), near_cosine = cosine_near_zero(r);
   const double s = near_sine + low * near_cosine, c = near_cosine - low * near_sine;
-  switch (static_cast<int>(quarter - 4 * std::floor(quarter / 4))) {  // exact, for any size
+  switch (static_cast<int>(quarter - 4 * std::floor(quarter / 4))) {  // exact for a number of any size
     case 0: return {s, c};
     case 1: return {c, -s};
     case 2: return {-s, -c};
@@ -55,10 +55,10 @@ SinCos find_sin_cos(double angle) {
 }  // namespace
 
 SinCos sin_cos(double angle) {
-  // A formula asks for one angle for a whole row of a lattice, where the row lies across its axis.
+  // The last angle is kept: a formula needs one angle for a whole row of a lattice that lies across its axis.
   thread_local double latest = 0;
   thread_local SinCos result = find_sin_cos(0);
-  if (angle != latest || angle == 0) {  // not for -0, which equals 0
+  if (angle != latest || angle == 0) {  // -0 equals 0 but has another sine
     latest = angle;
     result = find_sin_cos(angle);
   }

@@ -9,7 +9,7 @@ namespace tetwarp::phantom {
 namespace {
 
 constexpr float kLiver = 65, kSpleen = 62, kMuscle = 55, kWall = 42, kFluid = 12, kGas = -960, kFat = -95;
-constexpr float kNoGas = -1000;  // a level in front of everything
+constexpr float kNoGas = -1000;  // a level in front of everything, so no gas
 
 const Ellipsoid kRightLobe{{-68, -4, -84}, {72, 84, 78}};
 
@@ -55,7 +55,7 @@ void add_kidney(std::vector<Organ>& organs, float side) {
       {Rod{centre + axes * Point(-side * 16, 0, 0), {side * 12, 20, centre.z + 4}, 4, 4.5f}, 120, Within::abdomen});
 }
 
-/// A hollow organ: wall, fluid, and gas in front of the level.
+/// Adds a hollow organ: its wall, its fluid, and gas in front of the level.
 void add_hollow(std::vector<Organ>& organs, const Shape& shape, float wall_mm, float fluid_hu, float level_y) {
   organs.push_back({shape, kWall, Within::abdomen});
   organs.push_back({shape, fluid_hu, Within::abdomen, -wall_mm});

@@ -10,7 +10,7 @@
 
 namespace tetwarp::phantom {
 
-/// What an organ is cut by.
+/// The part of the body to which an organ is clipped.
 enum class Within : std::uint8_t {
   everything,
   chest,    ///< above the diaphragm
@@ -19,34 +19,35 @@ enum class Within : std::uint8_t {
 
 constexpr float kNoLevel = 1000;
 
-/// A shape of one HU. A later organ covers an earlier one.
+/// A shape with one HU. An organ that is painted later covers an earlier one.
 struct Organ {
   Shape shape;
   float hu = 0;
   Within within = Within::everything;
-  float grow = 0;            ///< mm that the shape is grown by: the marrow is the bone, shrunk
-  float level_y = kNoLevel;  ///< only what lies in front of this: gas above fluid in somebody who lies on the back
+  float grow = 0;  ///< mm by which the shape is grown; marrow is its bone, shrunk
+  /// y of a level: only what lies in front of it is painted, as gas above fluid in a patient who lies on the back.
+  float level_y = kNoLevel;
 };
 
-/// Everything inside the trunk's walls, in the order of painting.
+/// All organs inside the trunk's walls, in the order in which they are painted.
 std::vector<Organ> make_organs(const Trunk& trunk, std::uint64_t seed);
 
 void add_skeleton(std::vector<Organ>& organs);
 void add_chest(std::vector<Organ>& organs, const Trunk& trunk, std::uint64_t seed);
 void add_abdomen(std::vector<Organ>& organs, const Trunk& trunk, std::uint64_t seed);
 
-/// A tube along points, of one radius each.
+/// A place on the middle line of a tube, and the tube's radius there, mm.
 struct TubePoint {
   Point point;
   float radius;
 };
 void add_tube(std::vector<Organ>& organs, const std::vector<TubePoint>& points, const Organ& like);
 
-/// A tree of vessels from `root` to `count` ends spread over the box where `inside` holds; radii follow Leonardo's
-/// rule (a branch has the area of its children).
+/// A tree of vessels from `root` to `count` ends that are spread over the box, where `inside` holds. Radii follow
+/// Leonardo's rule: a branch has the area of its children together.
 struct VesselTree {
   Point root;
-  Box box;
+  Bounds box;
   int count;
   float end_radius;
   float hu;

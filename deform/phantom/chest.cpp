@@ -12,10 +12,10 @@ constexpr float kAir = -990, kFat = -95, kMuscle = 55, kWall = 40, kMyocardium =
 bool in_right_lung(const Trunk& trunk, Point p) { return p.x < 0 && trunk.lungs(p, trunk.walls(p)) < -3; }
 bool in_left_lung(const Trunk& trunk, Point p) { return p.x > 0 && trunk.lungs(p, trunk.walls(p)) < -3; }
 
-/// Fat around it, muscle, and four chambers.
+/// Adds the fat around the heart, its muscle, and its four chambers.
 void add_heart(std::vector<Organ>& organs) {
   const Ellipsoid fat = heart();
-  const auto part = [&](Point offset, Point semi_axes) {  // along the heart's own axes: apex, left-and-back, up
+  const auto part = [&](Point offset, Point semi_axes) {  // along the heart's own axes: apex, left and back, up
     return Ellipsoid{fat.centre + fat.axes * offset, semi_axes, fat.axes};
   };
   const auto add = [&](const Shape& shape, float hu, float grow = 0) {
@@ -64,7 +64,7 @@ void add_great_vessels(std::vector<Organ>& organs) {
   add_tube(organs, {{{-17, -16, 114}, 5}, {{-46, -10, 134}, 4.5f}, {{-100, -24, 138}, 4}}, artery);
 }
 
-/// Wall first, then the air in it.
+/// Adds the walls of the airways, then the air in them.
 void add_airways(std::vector<Organ>& organs) {
   const std::vector<std::vector<TubePoint>> airways = {
       {{{0, -2, 185}, 8.5f}, {{0, 4, 130}, 8.8f}, {{-3, 14, 62}, 8.5f}},
@@ -77,7 +77,7 @@ void add_airways(std::vector<Organ>& organs) {
   for (const auto& airway : airways) add_tube(organs, airway, {.shape = {}, .hu = kAir});
 }
 
-/// Muscles that lie outside the cage, and the fat between them.
+/// Adds the muscles outside the cage, and the fat between them.
 void add_chest_wall(std::vector<Organ>& organs) {
   for (const float side : {-1.0f, 1.0f}) {
     const auto at = [&](float x, float y, float z) { return Point(side * x, y, z); };

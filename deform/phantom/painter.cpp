@@ -18,12 +18,13 @@ float coverage(float d, float edge) {
 
 void blend(float& hu, float with, float share) { hu += share * (with - hu); }
 
-/// Share of a layer from `outer` inwards to `inner`, of which a coarse voxel sees just its part.
+/// How much of a voxel lies in the layer between two surfaces, given its signed distance from each: a voxel larger than
+/// the layer has only a part of it.
 float layer(float outer, float inner, float edge) {
   return std::max(coverage(outer, edge) - coverage(inner, edge), 0.0f);
 }
 
-/// The lung is denser at the back, where somebody who lies on the back has the blood.
+/// HU of the lung. It is denser at the back, where a patient who lies on the back has the blood.
 float lung_hu(Point p) { return kLung + 0.35f * (p.y + 20); }
 
 /// Distance to the nearest fissure: the oblique one of either lung, and the level one of the right lung in front of it.
@@ -33,9 +34,10 @@ float fissure(Point p) {
   return std::min(std::abs(oblique), level);
 }
 
-void paint_inside(const Row& row, const Trunk& trunk, Point p, const Walls& walls, float& hu) {
+void paint_inside(const PaintedRow& row, const Trunk& trunk, Point p, const Walls& walls, float& hu) {
   const float edge = row.edge;
-  const float beside = std::max(1 - p.y * p.y * 2.2e-4f, 0.0f);  // fat under the broad muscles of the flank
+  // Thickness, 0 to 1, of the fat under the broad muscles of the flank.
+  const float beside = std::max(1 - p.y * p.y * 2.2e-4f, 0.0f);
   if (p.z > -130 && p.z < 132) blend(hu, kFat + 20, layer(walls.cage - 10 - 3 * beside, walls.cage - 10, edge));
   if (walls.cage < 12) {
     const Trunk::Rib rib = trunk.rib(p, walls);
@@ -54,7 +56,7 @@ void paint_inside(const Row& row, const Trunk& trunk, Point p, const Walls& wall
 }
 
 template <class S>
-void paint_shape(const Row& row, const S& shape, const Organ& organ, const Box& reach, const Trunk& trunk) {
+void paint_shape(const PaintedRow& row, const S& shape, const Organ& organ, const Bounds& reach, const Trunk& trunk) {
   const float share = std::min(1.0f, (shape.thickness() + 2 * organ.grow) / row.edge), half_edge = 0.5f * row.edge;
   if (share <= 0) return;
   const auto begin = row.points.begin(), end = row.points.end();
@@ -73,14 +75,14 @@ void paint_shape(const Row& row, const S& shape, const Organ& organ, const Box& 
 
 }  // namespace
 
-Box reach(const Organ& organ, float edge) {
-  Box box = std::visit([](const auto& shape) { return shape.bounds(); }, organ.shape);
+Bounds reach(const Organ& organ, float edge) {
+  Bounds box = std::visit([](const auto& shape) { return shape.bounds(); }, organ.shape);
   const float more = std::max(organ.grow, 0.0f) + edge;
   return {box.low - more, box.high + more};
 }
 
-void paint_surroundings(const Row& row) {
-  // A curved table top: hull and foam between two arcs about a line far above.
+void paint_surroundings(const PaintedRow& row) {
+  // The table: its top is curved, hull and foam lie between two arcs about a line far above.
   constexpr float kRadius = 520, kTop = 117, kHalfThickness = 15, kHalfWidth = 196, kHull = 2.2f;
   std::fill(row.hu.begin(), row.hu.end(), kAir);
   if (row.straight_y < kTop - 60) return;
@@ -93,8 +95,8 @@ void paint_surroundings(const Row& row) {
   }
 }
 
-void paint_trunk(const Row& row, const Trunk& trunk) {
-  constexpr float kWidest = 182, kFront = -124, kBack = 116;  // no skin is further out
+void paint_trunk(const PaintedRow& row, const Trunk& trunk) {
+  constexpr float kWidest = 182, kFront = -124, kBack = 116;  // mm: the skin is nowhere further out
   if (row.box.high.y < kFront - row.edge || row.box.low.y > kBack + row.edge) return;
   for (std::size_t i = 0; i < row.points.size(); ++i) {
     const Point p = row.points[i];
@@ -109,8 +111,8 @@ void paint_trunk(const Row& row, const Trunk& trunk) {
   }
 }
 
-void paint_organ(const Row& row, const Organ& organ, const Trunk& trunk) {
-  const Box box = reach(organ, row.edge);
+void paint_organ(const PaintedRow& row, const Organ& organ, const Trunk& trunk) {
+  const Bounds box = reach(organ, row.edge);
   if (!overlap(box, row.box)) return;
   std::visit([&](const auto& shape) { paint_shape(row, shape, organ, box, trunk); }, organ.shape);
 }

@@ -9,29 +9,31 @@
 
 namespace tetwarp::phantom {
 
-/// One row of voxels along x, in body space. The body is a little uneven: `x`, and y and z of each voxel, are bent.
-struct Row {
-  std::span<const float> straight_x;  ///< before bending: where the table is
+/// One row of voxels along x, in body space. The body is a little bent, so that it looks less regular: the places of
+/// voxels are bent before the anatomy is painted.
+struct PaintedRow {
+  std::span<const float> straight_x;  ///< x of each voxel before bending, for the table
   float straight_y;
-  std::span<const Point> points;  ///< bent, x rising
-  Box box;                        ///< around `points`
-  float edge;                     ///< mm over which an edge goes from one tissue to the next: about one voxel
-  std::span<float> hu;            ///< painted on
+  std::span<const Point> points;  ///< the bent places of voxels, x rising
+  Bounds box;                     ///< around `points`
+  /// Millimetres over which one tissue blends into the next: about one voxel.
+  float edge;
+  std::span<float> hu;  ///< HU of the voxels, over which is painted
 };
 
-/// Air and the table.
-void paint_surroundings(const Row& row);
+/// Paints air and the table.
+void paint_surroundings(const PaintedRow& row);
 
-/// Skin, fat, muscles, what fills the cage, lungs, diaphragm, ribs.
-void paint_trunk(const Row& row, const Trunk& trunk);
+/// Paints skin, fat, muscles, what fills the cage, lungs, diaphragm and ribs.
+void paint_trunk(const PaintedRow& row, const Trunk& trunk);
 
-/// One organ over what is there. Nothing happens where the row does not meet it.
-void paint_organ(const Row& row, const Organ& organ, const Trunk& trunk);
+/// Paints one organ over what is there. Where the row does not meet it, nothing changes.
+void paint_organ(const PaintedRow& row, const Organ& organ, const Trunk& trunk);
 
-/// Box outside of which the organ paints nothing, for edges of `edge` mm.
-Box reach(const Organ& organ, float edge);
+/// The box outside of which the organ paints nothing, for edges of `edge` mm.
+Bounds reach(const Organ& organ, float edge);
 
-inline bool overlap(const Box& a, const Box& b) {
+inline bool overlap(const Bounds& a, const Bounds& b) {
   return a.low.x <= b.high.x && b.low.x <= a.high.x && a.low.y <= b.high.y && b.low.y <= a.high.y &&
          a.low.z <= b.high.z && b.low.z <= a.high.z;
 }

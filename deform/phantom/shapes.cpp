@@ -9,7 +9,7 @@ namespace tetwarp::phantom {
 
 namespace {
 
-/// Half the size of the axis-parallel box around a box that is turned.
+/// Half the size of the box along the axes that holds a turned box.
 Point turned_half_size(const glm::mat3& axes, Point half_size) {
   Point sum(0);
   for (int axis = 0; axis < 3; ++axis) sum += glm::abs(axes[axis]) * half_size[axis];
@@ -27,16 +27,16 @@ glm::mat3 rotation(Point degrees) {
   return glm::mat3(about_z * about_y * about_x);
 }
 
-Box Ellipsoid::bounds() const {
+Bounds Ellipsoid::bounds() const {
   const Point half = turned_half_size(axes, semi_axes);
   return {centre - half, centre + half};
 }
 
-Box Block::bounds() const {
+Bounds RoundedBox::bounds() const {
   const Point half = turned_half_size(axes, half_size);
   return {centre - half, centre + half};
 }
 
-Box Rod::bounds() const { return {glm::min(a - radius_a, b - radius_b), glm::max(a + radius_a, b + radius_b)}; }
+Bounds Rod::bounds() const { return {glm::min(a - radius_a, b - radius_b), glm::max(a + radius_a, b + radius_b)}; }
 
 }  // namespace tetwarp::phantom

@@ -9,18 +9,19 @@ namespace {
 
 constexpr float kCortical = 1100, kMarrow = 210, kDisc = 85, kCanal = 15, kCord = 38;
 
-/// Bones that touch share their marrow: all of the outsides are painted first, then all of the insides.
+/// Adds bones that touch and share their marrow: all of the outsides are painted first, then all of the insides.
 void add_bones(std::vector<Organ>& organs, const std::vector<Shape>& bones, float cortex_mm, float cortical = kCortical,
                float marrow = kMarrow) {
   for (const Shape& bone : bones) organs.push_back({bone, cortical});
   for (const Shape& bone : bones) organs.push_back({bone, marrow, Within::everything, -cortex_mm});
 }
 
-/// Body, pedicles, laminae, transverse and spinous processes; rib necks in the chest.
+/// Shapes of a vertebra: body, pedicles, laminae, transverse and spinous processes; in the chest also the necks of its
+/// ribs.
 std::vector<Shape> vertebra(int level) {
   const float size = 1 + 0.022f * static_cast<float>(level - 4), z = level_z(level), y = spine_y(z);
   const auto at = [&](float x, float dy, float dz) { return Point(x * size, y + dy * size, z + dz); };
-  const float droop = level < 11 ? -17.0f : -3.0f;  // thoracic spinous processes point down, lumbar ones back
+  const float droop = level < 11 ? -17.0f : -3.0f;  // degrees: thoracic spinous processes point down, lumbar ones back
   std::vector<Shape> bones = {Puck{at(0, 0, 0), {18 * size, 14 * size, 9.2f}, 0.11f},
                               Rod{at(0, 29, 0), at(0, 45, droop), 3.2f, 3.6f}};
   for (const float side : {-1.0f, 1.0f}) {
@@ -53,17 +54,17 @@ void add_spine(std::vector<Organ>& organs) {
 }
 
 std::vector<Shape> sternum() {
-  return {Block{{0, -62, 83}, {23, 4.8f, 19}, rotation({-27, 0, 0}), 4},
-          Block{{0, -81, 18}, {14.5f, 4.4f, 45}, rotation({-10, 0, 0}), 4},
-          Block{{0, -86, -36}, {6, 2.4f, 12}, rotation({-2, 0, 0}), 2}};
+  return {RoundedBox{{0, -62, 83}, {23, 4.8f, 19}, rotation({-27, 0, 0}), 4},
+          RoundedBox{{0, -81, 18}, {14.5f, 4.4f, 45}, rotation({-10, 0, 0}), 4},
+          RoundedBox{{0, -86, -36}, {6, 2.4f, 12}, rotation({-2, 0, 0}), 2}};
 }
 
-/// Blade, spine, and shoulder joint of both sides, with the collar bones.
+/// Shapes of the shoulders: blade, spine and joint on both sides, and the collar bones.
 std::vector<Shape> shoulder_girdle() {
   std::vector<Shape> bones;
   for (const float side : {-1.0f, 1.0f}) {
     const auto at = [&](float x, float y, float z) { return Point(side * x, y, z); };
-    bones.push_back(Block{at(98, 62, 88), {33, 2.2f, 50}, rotation({-6, side * 7, side * -36}), 2.2f});
+    bones.push_back(RoundedBox{at(98, 62, 88), {33, 2.2f, 50}, rotation({-6, side * 7, side * -36}), 2.2f});
     bones.push_back(Rod{at(82, 72, 122), at(132, 44, 140), 3.2f, 5.2f});
     bones.push_back(Rod{at(118, 42, 118), at(128, 28, 128), 5, 9});
     bones.push_back(Ellipsoid{at(146, 14, 137), {20, 20, 22}});

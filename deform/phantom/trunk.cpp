@@ -14,7 +14,8 @@ struct Section {
   Outline body, muscle, cage;
 };
 
-// Height, then half width, front and back of the skin, of the muscles and of the cage, from the waist to the neck.
+// Sections of the trunk from the waist to the neck: height, then half width, front and back of the skin, of the muscles
+// and of the cage, mm.
 constexpr Section kSections[] = {
     {-180, {158, -120, 108}, {140, -96, 94}, {122, -88, 72}}, {-150, {159, -119, 108}, {140, -96, 94}, {126, -87, 74}},
     {-100, {160, -117, 109}, {141, -96, 95}, {131, -87, 78}}, {-50, {164, -117, 111}, {146, -98, 97}, {132, -88, 80}},
@@ -24,10 +25,11 @@ constexpr Section kSections[] = {
     {150, {170, -73, 97}, {157, -64, 87}, {14, -2, 40}},      {180, {150, -60, 90}, {138, -52, 80}, {6, 4, 34}},
 };
 
-/// One number of the section: an offset into `half_width, front, back`.
+/// One of the numbers of an outline: half_width, front or back.
 using Member = float Outline::*;
 
-/// Catmull-Rom through the values at uneven heights (tangents by central differences).
+/// A number of a wall at height z: Catmull-Rom between the values at uneven heights, with tangents by central
+/// differences.
 float smooth(float z, Outline Section::*wall, Member member) {
   const std::span<const Section> rows(kSections);
   std::size_t right = 1;
@@ -54,8 +56,8 @@ Outline mix(const Outline& a, const Outline& b, float t) {
           a.back + t * (b.back - a.back), a.tilt + t * (b.tilt - a.tilt)};
 }
 
-/// (f - 1) / |grad f| for the squircle f = u^2 + v^2 - s u^2 v^2; far outside, where f would fall again, without growth
-/// of its last term.
+/// Approximate distance to an outline: (f - 1) / |grad f| for the squircle f = u^2 + v^2 - s u^2 v^2. Far outside,
+/// where f would fall again, its last term no longer grows.
 float distance(const Outline& o, Point p) {
   constexpr float kSquareness = 0.33f;
   const float a = o.half_width, b = 0.5f * (o.back - o.front);
@@ -66,7 +68,7 @@ float distance(const Outline& o, Point p) {
   return o.tilt * 0.5f * (f - 1) / (std::sqrt(du * du + dv * dv) + 1e-4f);
 }
 
-/// Half width of the mediastinum at depth y: narrow in front, wide at the hila, the spine behind.
+/// Half width of the mediastinum at depth y: narrow in front, wide at the hila, and the spine behind.
 float mediastinum(float y) {
   struct Step {
     float y, half_width;
@@ -102,7 +104,7 @@ Trunk::Layers Trunk::layers(float z) const {
 
 Walls Trunk::walls(Point p) const {
   const Layers at = layers(p.z);
-  const float apex = p.z - 143;  // the cage ends in a round top there
+  const float apex = p.z - 143;  // here the cage ends in a round top
   return {distance(at.body, p), distance(at.muscle, p), std::max(distance(at.cage, p), apex), diaphragm(p)};
 }
 
@@ -115,7 +117,7 @@ float Trunk::lungs(Point p, const Walls& walls) const {
 }
 
 Trunk::Rib Trunk::rib(Point p, const Walls& walls) const {
-  constexpr float kThickness = 3.4f, kHeight = 6.3f, kFall = 0.42f;  // half sizes, and how steeply ribs fall
+  constexpr float kThickness = 3.4f, kHeight = 6.3f, kFall = 0.42f;  // half sizes in mm, and how steeply ribs fall
   constexpr float kFrontEnds[12] = {-200, -200, -200, -200, -200, -200, -200, -84, -76, -62, -15, 30};
   const float at_spine = p.z + kFall * (70 - p.y), steps = (level_z(0) - at_spine) / kLevelPitch;
   const int level = static_cast<int>(std::clamp(steps + 0.5f, 0.0f, 11.0f));
@@ -130,7 +132,8 @@ Trunk::Rib Trunk::rib(Point p, const Walls& walls) const {
 
 float diaphragm(Point p) {
   struct Dome {
-    float x, y, top, across, front, back;  // middle, height, and fall per mm^2 sideways, forwards, backwards
+    // Middle, height, and how far the dome falls per mm^2 sideways, forwards and backwards.
+    float x, y, top, across, front, back;
   };
   constexpr Dome kDomes[] = {{-66, -10, -34, 0.011f, 0.0075f, 0.0115f},
                              {68, -8, -46, 0.011f, 0.0075f, 0.0105f},

@@ -13,11 +13,11 @@ namespace {
 struct Node {
   Point point;
   std::size_t parent;
-  float path;    ///< mm from the root along the tree
-  int ends = 0;  ///< that are fed through this node
+  float path;    ///< mm along the tree from the root
+  int ends = 0;  ///< number of ends that are fed through this node
 };
 
-/// The node from which an end is reached best: near, but not by a long detour.
+/// The node to which an end is joined: near, but without a long detour from the root.
 std::size_t best_parent(const std::vector<Node>& nodes, Point end) {
   std::size_t best = 0;
   float least = 1e9f;
@@ -59,7 +59,7 @@ void add_vessels(std::vector<Organ>& organs, const VesselTree& tree, bool (*insi
     std::size_t from = best_parent(nodes, end);
     const Point start = nodes[from].point;
     const float length = glm::distance(start, end);
-    constexpr int kPieces = 3;  // a branch of three pieces, bent a little, on which later branches may sit
+    constexpr int kPieces = 3;  // a branch has three pieces and is bent a little; later branches may begin on it
     for (int piece = 1; piece <= kPieces; ++piece) {
       Point p = glm::mix(start, end, static_cast<float>(piece) / kPieces);
       if (piece < kPieces) p += 0.09f * length * Point{random.uniform(), random.uniform(), random.uniform()};

@@ -16,7 +16,7 @@ namespace tetwarp {
 namespace {
 
 constexpr int kMostPixels = 1 << 14;
-constexpr double kMargin = 1.04;  ///< of the picture around the volume
+constexpr double kMargin = 1.04;  ///< size of the picture over that of the volume
 
 double radians(double degrees) { return degrees * std::numbers::pi / 180; }
 
@@ -45,7 +45,7 @@ ViewPlane view_plane(const Camera& camera, const Geometry& volume) {
   plane.width = camera.width;
   plane.height = camera.height;
   const AffineMap point = point_from_index(volume);
-  glm::dvec2 half(0);  // of the volume, along right and down
+  glm::dvec2 half(0);  // half the size of the volume along right and down, mm
   for (const glm::dvec3& corner :
        {glm::dvec3(1, 1, 1), glm::dvec3(-1, 1, 1), glm::dvec3(1, -1, 1), glm::dvec3(1, 1, -1)}) {
     const glm::dvec3 diagonal = point.linear * (0.5 * corner * glm::dvec3(volume.size));

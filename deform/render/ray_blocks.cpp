@@ -14,7 +14,7 @@ namespace tetwarp {
 
 namespace {
 
-/// The blocks of one row along i: columns of voxels first, so that whole rows are compared at once.
+/// Finds the ranges of the blocks of one row along i. It first compares whole rows of voxels, column by column.
 template <class V>
 void find_ranges(const V* voxels, const glm::ivec3& size, const glm::ivec3& block, BlockRange* row) {
   const auto width = static_cast<std::size_t>(size.x);
@@ -41,7 +41,8 @@ void find_ranges(const V* voxels, const glm::ivec3& size, const glm::ivec3& bloc
   }
 }
 
-/// Each number becomes the least of max(|n - m|, number m), for all m near n along one axis.
+/// Replaces each number of a line of blocks by the least of max(|n - m|, number m) over all blocks m near n, for all
+/// lines along one axis. Done for all axes, this gives distances.
 void spread(std::vector<std::uint8_t>& distances, const glm::ivec3& blocks, int axis) {
   const int count = blocks[axis];
   const int across = axis == 0 ? 1 : 0, beyond = axis == 2 ? 1 : 2;

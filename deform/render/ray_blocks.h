@@ -10,7 +10,7 @@
 
 namespace tetwarp {
 
-/// Voxels that block `n` of an axis of so many voxels knows: `BlockRange`.
+/// The voxels along one axis whose values block `n` contains: see `BlockRange`. @param size  voxels on the axis
 struct RayReach {
   TETWARP_HD RayReach(int n, int size)
       : begin(n * kRayBlock > 1 ? n * kRayBlock - 1 : 0),
@@ -22,22 +22,24 @@ constexpr int kMostRayReach = kRayBlock + 3;
 /// How many blocks a volume has.
 glm::ivec3 ray_blocks(const Geometry& volume);
 
-/// Least and largest value around each block, i fastest; of values that are no number nothing.
-/// @param volume  `require_renderable`, in host memory
+/// Least and largest value around each block, i fastest. Values that are not numbers are left out.
+/// @param volume  passed `require_renderable`; in host memory
 std::vector<BlockRange> block_ranges(const ConstVolumeView& volume, Limits limits);
 
-/// How many entries below each have opacity: kTransferEntries + 1 numbers, so that two of them tell of all in between.
+/// How many entries below each entry have opacity: kTransferEntries + 1 numbers, so that two of them tell whether any
+/// entry between has it.
 std::vector<int> opaque_before(const std::vector<TransferEntry>& table);
 
-/// Whether no value of a block has opacity; of a maximum, whether all look like the table's lowest.
+/// Whether nothing of a block can be seen: no value of it has opacity or, for Projection::maximum, none exceeds the
+/// lowest value of the table.
 TETWARP_INLINE_HD bool is_empty(const BlockRange& range, const RayFrame& frame, const int* opaque_before) {
-  if (!(range.least <= range.most)) return true;  // no value is a number
+  if (!(range.least <= range.most)) return true;  // no value of the block is a number
   if (frame.projection == Projection::maximum) return range.most <= frame.lowest;
   return opaque_before[transfer_entry(frame, range.most) + 1] == opaque_before[transfer_entry(frame, range.least)];
 }
 
-/// Of each block the distance to the nearest that is not empty, the largest along an axis, at most kFarthestBlock; 0
-/// for those (distance maps, Deakin and Knoll 2019).
+/// For each block, the distance in blocks to the nearest one that is not empty, the largest along an axis, at most
+/// kFarthestBlock; 0 for blocks that are not empty (distance maps, Deakin and Knoll 2019).
 std::vector<std::uint8_t> block_distances(const std::vector<BlockRange>& ranges, const glm::ivec3& blocks,
                                           const RayFrame& frame, const std::vector<TransferEntry>& table);
 

@@ -13,9 +13,9 @@ namespace tetwarp {
 namespace {
 
 constexpr std::size_t kTintColours = 256;
-constexpr std::int64_t kMostVoxels = (1 << 15) - 1;  ///< on an axis: places are floats, and strides ints
+constexpr std::int64_t kMostVoxels = (1 << 15) - 1;  ///< on an axis, for places are floats and strides ints
 
-/// From a plane back to where no ray has entered the volume's box yet, mm.
+/// How far, in mm, rays begin before a plane: there no ray has entered the volume's box yet.
 double back_from(const Geometry& volume, const ViewPlane& plane) {
   const AffineMap point = point_from_index(volume);
   double half = 0;
@@ -30,7 +30,8 @@ double mixed(double a, double b, double share) { return a + (b - a) * share; }
 
 double step_mm(const Geometry& volume, const RenderStyle& style, const ViewPlane& plane) {
   const double voxel = std::min({volume.spacing.x, volume.spacing.y, volume.spacing.z});
-  const bool is_sum = style.transfer.projection == Projection::sum;  // which shorter steps change by one grey level
+  // Shorter steps change a sum by one grey level at most.
+  const bool is_sum = style.transfer.projection == Projection::sum;
   return voxel * style.step_voxels.value_or(is_sum ? 1.0 : std::clamp(0.5 * plane.pixel_mm / voxel, 0.5, 1.0));
 }
 
@@ -134,7 +135,7 @@ std::vector<TransferEntry> transfer_table(const TransferFunction& transfer, doub
 }
 
 TransferIntegrals transfer_integrals(const std::vector<TransferEntry>& table, double step_mm) {
-  constexpr double kMostOpacity = 0.9999;  // of a mm: beyond, depth has no end
+  constexpr double kMostOpacity = 0.9999;  // opacity of a mm; at 1 the depth would be infinite
   TransferIntegrals integrals{{{}}, {}, {}};
   glm::dvec4 sum(0);
   const auto rounded = [](const glm::dvec4& v) {

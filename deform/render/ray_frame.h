@@ -3,7 +3,7 @@
 
 #pragma once
 
-// What every renderer makes of its style before rays are cast.
+// Private to renderers: what all of them compute from volume, style and plane before rays are cast.
 
 #include <vector>
 
@@ -12,35 +12,38 @@
 
 namespace tetwarp {
 
-/// What rays need to know of a volume and a plane, @param volume  straight or sheared, evenly spaced
+/// What rays need to know of a volume and a plane. @param volume  straight or sheared, with even slices
 RayFrame ray_frame(const Geometry& volume, const RenderStyle& style, const ViewPlane& plane);
 
-/// Millimetres between two samples of a ray.
+/// Distance of two samples of a ray, mm.
 double step_mm(const Geometry& volume, const RenderStyle& style, const ViewPlane& plane);
 
-/// @throws InputError for what a renderer cannot take
+/// Checks a volume. @throws InputError for one that a renderer cannot take
 void require_renderable(const ConstVolumeView& volume);
 void require_valid(const RenderStyle& style);
 void require_valid(const Tints& tints, const ConstVolumeView& volume);
 
-/// @throws InputError unless there are a volume and a style, and three bytes for each pixel
+/// Checks what a picture is made of. @throws InputError unless there are a volume and a style, and three bytes for each
+/// pixel
 void require_ready(const ConstVolumeView& volume, const RenderStyle& style, const ViewPlane& plane, std::size_t bytes);
 
-/// 256 entries.
+/// The colours of tints as a table of 256 entries.
 std::vector<TransferEntry> tint_table(const Tints& tints);
 
-/// What rays look up, kTransferEntries entries from the first point's value to the last one's: colour, and of `sum` the
-/// density times the step, over `white`; of composite, opacity only tells what can be seen at all.
+/// The table in which rays look up values: kTransferEntries entries from the first point's value to the last one's.
+/// Each has a colour and a number. For Projection::sum this is density times step over `white`; for the others it is
+/// the opacity of 1 mm, which only tells what can be seen at all.
 std::vector<TransferEntry> transfer_table(const TransferFunction& transfer, double step_mm);
 
-/// Sums over the entries before each, kTransferEntries + 1 of them, and those of the first and the last entry alone.
+/// Integrals of a transfer function for Projection::composite: for each entry the sum over all entries before it
+/// (kTransferEntries + 1 sums), and the first and the last entry alone.
 struct TransferIntegrals {
   std::vector<TransferIntegral> before;
   TransferIntegral lowest, highest;
 };
 
-/// The optical depth of an entry is
-/// -ln(1 - opacity) * step / 1 mm, so that a picture does not depend on the step.
+/// The integrals of a table. The optical depth of an entry is -ln(1 - opacity) * step / 1 mm, so that a picture does
+/// not depend on the step.
 TransferIntegrals transfer_integrals(const std::vector<TransferEntry>& table, double step_mm);
 
 }  // namespace tetwarp

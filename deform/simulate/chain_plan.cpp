@@ -13,8 +13,9 @@ namespace tetwarp::simulate {
 
 namespace {
 
-constexpr std::int64_t kBlockRows = 4;  ///< vertices of a block along j and k; along i it holds all
-constexpr double kOrthonormal = 1e-6;   ///< by how much products of directions may miss 0 and 1
+constexpr std::int64_t kBlockRows = 4;  ///< vertices of a block along j and k; along i it has all
+/// How far the scalar products of directions may differ from 0 and 1.
+constexpr double kOrthonormal = 1e-6;
 constexpr double kPi = 3.141592653589793;
 
 void require_orthonormal(const glm::dmat3& direction) {
@@ -30,7 +31,7 @@ void require_orthonormal(const glm::dmat3& direction) {
   }
 }
 
-/// Towards 0, so that whole numbers never allow more than the limit.
+/// Limits in whole units, rounded towards 0, so that they never allow more than in mm.
 LinkUnits to_units(const LinkLimits& limits, int axis, std::size_t node) {
   if (!(limits.shortest <= 0 && limits.longest >= 0 && limits.shear >= 0)) {
     throw InputError("the limits of the link up axis " + std::to_string(axis) + " from node " + std::to_string(node) +
@@ -142,7 +143,7 @@ void ChainPlan::weigh(const Geometry& lattice) {
       shares[static_cast<std::size_t>(3 * kind + axis)] = std::max(1, static_cast<std::int32_t>(share));
     }
   }
-  // Of the waves that the mean damps, the slowest that is common is half a sine over the longest way through the
+  // Of the common waves, the mean damps that one most slowly which is half a sine over the longest way through the
   // lattice, held at both ends. A step leaves the part `slowest` of it: 1 - share (1 - cos angle).
   double slowest = 0;
   for (int axis = 0; axis < 3; ++axis) {

@@ -35,17 +35,19 @@ class ChainPlan {
   }
   std::int32_t nodes() const { return static_cast<std::int32_t>(node_of.size()); }
 
-  /// @throws InputError where a vector is not finite or too long; `what` and the node's number in the model name it
+  /// A vector in LPS mm as units. @throws InputError where it is not finite or too long; the message names it by `what`
+  /// and by the node's number in the model
   Units to_units(const glm::vec3& lps, const char* what, std::size_t node) const;
   std::vector<Units> to_units(std::span<const glm::vec3> displacement) const;
 
-  /// The placed nodes with their goals; the starts are left to the backend. @throws InputError as set_loads
+  /// The placed nodes with their goals; the backend fills in where they start. @throws InputError for loads that
+  /// `set_loads` refuses
   std::vector<PlacedNode> read(const Loads& loads) const;
   /// Whether links lead from a node to a placed one.
   std::vector<std::uint8_t> moving(std::span<const PlacedNode> placed) const;
 
-  std::vector<std::int32_t> node_of;    ///< number in the model of each node
-  std::vector<std::int32_t> number_of;  ///< number here of each node of the model
+  std::vector<std::int32_t> node_of;    ///< by node of the plan: its number in the model
+  std::vector<std::int32_t> number_of;  ///< by node of the model: its number in the plan
   std::vector<ChainBlock> blocks;
   std::vector<std::int32_t> around;  ///< neighbours, see ChainView::around
   std::vector<LinkUnits> links;      ///< limits, see ChainView::links
@@ -63,11 +65,12 @@ class ChainPlan {
   void find_islands();
   void weigh(const Geometry& lattice);
 
-  std::vector<std::int32_t> island_;  ///< of each node: of nodes with links between them
+  std::vector<std::int32_t> island_;  ///< by node: its island, a set of nodes that links connect
   std::int32_t islands_ = 0;
 };
 
-/// @throws InputError unless the part is from 0 to 1 and the rule's numbers are not negative
+/// Checks the arguments of `advance`. @throws InputError unless the part is from 0 to 1 and the rule's numbers are not
+/// negative
 void require_valid(double part, const StoppingRule& rule);
 
 /// The length in mm of a motion whose `square_of_motion` this is.

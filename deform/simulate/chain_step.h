@@ -7,8 +7,8 @@
 
 #include "deform/core/host_device.h"
 
-/// Chainmail in whole numbers: what one node does, the same on every backend. What is solved and why the order does not
-/// matter is in chainmail.h; here are its parts.
+/// ChainMail in whole numbers: what is done for one node, the same on every backend. chainmail.h says what is solved
+/// and why the order of nodes does not matter.
 namespace tetwarp::simulate {
 
 /// Displacements are whole numbers of 2^-16 mm along the lattice's axes.
@@ -18,7 +18,7 @@ inline constexpr std::int32_t kFarthest = std::int32_t{1} << 28;
 /// A limit of this size never takes effect.
 inline constexpr std::int32_t kLongest = 2 * kFarthest;
 
-/// Displacement of a node.
+/// Displacement of a node in units of 2^-16 mm along the lattice's axes.
 struct Units {
   alignas(16) std::int32_t at[3];
 };
@@ -33,7 +33,7 @@ struct LinkUnits {
   TETWARP_HD std::int32_t below(bool own_axis) const { return own_axis ? -shortest : shear; }
 };
 
-/// Nodes and links as the backends see them, numbered as ChainPlan does.
+/// Nodes and links in the form that backends read, numbered as in ChainPlan.
 struct ChainView {
   std::int32_t nodes;
   const std::int32_t* around;  ///< at (2 * axis + is_up) * nodes + node: the neighbour; -1: no link
@@ -42,23 +42,23 @@ struct ChainView {
   const std::uint8_t* moves;   ///< whether links lead from the node to a placed one
 };
 
-/// Steps of relaxation: how far towards the mean, and how much of the last motion is kept; 2^-12.
+/// How far one step of relaxation goes towards the mean, and which part of the last motion it keeps; both times 2^12.
 struct Pace {
   std::int32_t towards_mean, kept;
 };
 inline constexpr int kPaceBits = 12, kShareBits = 16;
 
-/// The pace of each step. The first is plain; the others keep momentum, of which half is given up whenever the motion
-/// has not fallen for some time: for where limits would keep it swinging.
+/// Chooses the pace of each step. The first step is plain. The others keep momentum, half of which is given up whenever
+/// the motion has not fallen for some time, since limits can keep a chain swinging.
 struct Pacer {
-  std::int32_t full, patience;  ///< momentum, and steps
+  std::int32_t full, patience;  ///< momentum times 2^12, and patience in steps
   Pace pace{std::int32_t{1} << kPaceBits, 0};
   std::int32_t steps = 0;
   std::uint64_t least = ~std::uint64_t{0}, least_before = ~std::uint64_t{0};
 
   TETWARP_HD Pacer(std::int32_t kept, std::int32_t patient) : full(kept), patience(patient) {}
 
-  /// @param motion  square of the largest of the step that was made
+  /// Takes note of a step. @param motion  square of the largest motion in it
   TETWARP_HD void follow(std::uint64_t motion) {
     least = motion < least ? motion : least;
     if (++steps % patience == 0) {
@@ -116,13 +116,13 @@ TETWARP_HD inline bool tighten(const ChainView& chain, Units* upper, Units* lowe
   return changed;
 }
 
-/// The displacements that placed nodes leave a node: from `least` to `most`.
+/// The displacements that placed nodes leave to a node: from `least` to `most`.
 struct Span {
   Units least, most;
 };
 
-/// From the ends of `tighten`, begun at the placed nodes. Where these contradict each other the ends are crossed;
-/// both keep all limits, and so does what is larger or smaller of them.
+/// The span between the ends to which `tighten` led from the placed nodes. Where placed nodes contradict each other the
+/// ends are crossed; each of them keeps all limits, and so do their componentwise minimum and maximum.
 TETWARP_HD inline Span span_between(const Units& upper, const Units& lower) {
   Span span{};
   for (int c = 0; c < 3; ++c) {
@@ -140,9 +140,9 @@ TETWARP_HD inline Units clamped(const Units& value, const Span& span) {
   return result;
 }
 
-/// A node's place after a step towards the mean of its neighbours, before limits are looked at.
-///
-/// The products are below 2^59. @param before  where the nodes were a step ago
+/// Where a node goes in a step of relaxation towards the mean of its neighbours, before limits are applied. No product
+/// exceeds 2^59.
+/// @param before  where the nodes were one step ago
 TETWARP_HD inline Units relaxed(const ChainView& chain, const Units* now, const Units* before, const Span& span,
                                 const Pace& pace, std::int32_t node) {
   const Units own = now[node];
@@ -171,27 +171,27 @@ TETWARP_HD inline Units relaxed(const ChainView& chain, const Units* now, const 
   return result;
 }
 
-/// Halfway between two states that keep all limits, towards 0: it keeps them, too. (So do halves rounded down, D, and
-/// rounded up, U, and 0; this is max(D, min(U, 0)).)
+/// The state halfway between two states that keep all limits, rounded towards 0, which keeps them, too. (The halves
+/// rounded down, D, and rounded up, U, keep them, and so does 0; this is max(D, min(U, 0)).)
 TETWARP_HD inline Units halfway(const Units& a, const Units& b) {
   Units result{};
   for (int c = 0; c < 3; ++c) result.at[c] = (a.at[c] + b.at[c]) / 2;
   return result;
 }
 
-/// Squared length of a motion, units.
+/// Squared length of a motion, in units squared.
 TETWARP_HD inline std::uint64_t square_of_motion(const Units& from, const Units& to) {
   std::int64_t sum = 0;
   for (int c = 0; c < 3; ++c) sum += std::int64_t{to.at[c] - from.at[c]} * (to.at[c] - from.at[c]);
   return static_cast<std::uint64_t>(sum);
 }
 
-/// value rounded to nearest, halves away from 0.
+/// The whole number nearest to a value, halves away from 0.
 TETWARP_HD inline std::int32_t rounded(double value) {
   return value < 0 ? -static_cast<std::int32_t>(0.5 - value) : static_cast<std::int32_t>(value + 0.5);
 }
 
-/// A placed node and its way.
+/// A placed node, where it starts, and its goal.
 struct PlacedNode {
   std::int32_t node;
   Units start, goal;
@@ -206,7 +206,7 @@ struct PlacedNode {
   }
 };
 
-/// A displacement in LPS mm.
+/// A displacement as LPS mm.
 /// @param direction  directions of the lattice; if it is the identity, only the result is rounded
 TETWARP_HD inline glm::vec3 to_lps(const glm::dmat3& direction, const Units& units) {
   constexpr double kMm = 1 / kUnitsPerMm;

@@ -91,7 +91,7 @@ class CpuChainmail final : public Simulation {
     return settled;
   }
 
-  /// The chain stage: nodes move as far as placed ones force them to.
+  /// Makes the first step of ChainMail, the chain: nodes move as far as placed ones force them to.
   std::uint64_t follow(double part, const Control& control) {
     const auto any = [](std::int32_t mm) { return Units{{mm, mm, mm}}; };
     for_nodes([&](std::size_t n) {
@@ -107,7 +107,7 @@ class CpuChainmail final : public Simulation {
     });
   }
 
-  /// One step of relaxation.
+  /// Makes one step of relaxation.
   std::uint64_t relax(const Pace& pace, const Control& control) {
     const ChainView chain = plan_.view(moves_.data());
     for_nodes([&](std::size_t n) {
@@ -119,7 +119,7 @@ class CpuChainmail final : public Simulation {
     return finish([&](std::size_t n) { return halfway(upper_[n], lower_[n]); });
   }
 
-  /// Puts each node where `place` says. @return square of the largest motion
+  /// Moves each node to where `place` says. @return square of the largest motion
   template <class Place>
   std::uint64_t finish(Place&& place) {
     std::vector<std::uint64_t> motion(plan_.blocks.size());
@@ -137,7 +137,7 @@ class CpuChainmail final : public Simulation {
     for (std::atomic<std::uint8_t>& active : active_) active.store(1, std::memory_order_relaxed);
   }
 
-  /// Runs `tighten` in the active blocks and in those beside what changes, until nothing does.
+  /// Runs `tighten` in the active blocks, and in blocks beside one that changes, until nothing changes.
   ///
   /// Blocks of one colour run at the same time: none reads what another one writes.
   void tighten_all(const Control& control) {
@@ -159,7 +159,7 @@ class CpuChainmail final : public Simulation {
     }
   }
 
-  /// Up and down through the nodes until nothing changes. @return whether anything did
+  /// Runs `tighten` up and down through the nodes of a block until nothing changes. @return whether anything changed
   bool tighten_block(const ChainBlock& block) {
     const ChainView chain = plan_.view(moves_.data());
     bool any = false;
@@ -185,15 +185,15 @@ class CpuChainmail final : public Simulation {
 
   ChainPlan plan_;
   tbb::task_arena arena_;
-  std::vector<std::size_t> of_colour_[2];          ///< numbers of blocks
-  std::vector<std::atomic<std::uint8_t>> active_;  ///< blocks
+  std::vector<std::size_t> of_colour_[2];          ///< numbers of the blocks of each colour
+  std::vector<std::atomic<std::uint8_t>> active_;  ///< by block: whether it has to be tightened again
   std::vector<PlacedNode> placed_;
   std::vector<std::uint8_t> moves_;
   bool has_loads_ = false;
-  std::vector<Units> now_, before_;   ///< always within the limits
-  std::vector<Units> shown_;          ///< the same with placed nodes in their places
-  std::vector<Units> upper_, lower_;  ///< what `tighten` works on
-  std::vector<Span> spans_;           ///< what placed nodes leave
+  std::vector<Units> now_, before_;   ///< within the limits at all times
+  std::vector<Units> shown_;          ///< `now_` with placed nodes at their goals
+  std::vector<Units> upper_, lower_;  ///< the bounds that `tighten` narrows
+  std::vector<Span> spans_;           ///< by node: what placed nodes leave to it
   std::vector<glm::vec3> displacement_;
 };
 

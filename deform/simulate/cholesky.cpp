@@ -11,7 +11,7 @@
 namespace tetwarp::simulate {
 
 struct LaplacianFactor::Parts {
-  std::vector<std::int32_t> row;  ///< of each node; -1: not free
+  std::vector<std::int32_t> row;  ///< by node: its row; -1: it is not free
   Eigen::Index rows = 0;
   Eigen::SimplicialLLT<Eigen::SparseMatrix<double>> factor;
 };
@@ -32,7 +32,7 @@ LaplacianFactor::LaplacianFactor(const Model& model, std::span<const Role> roles
       const double k = model.stiffness[link];
       sum += k;
       const std::int32_t column = parts_->row[static_cast<std::size_t>(model.neighbour[link])];
-      if (column >= 0 && column < row) entries.emplace_back(row, column, -k);  // the lower half is read
+      if (column >= 0 && column < row) entries.emplace_back(row, column, -k);  // the lower triangle is what is read
     }
     entries.emplace_back(row, row, sum);
   }

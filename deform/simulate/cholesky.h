@@ -10,15 +10,16 @@
 
 namespace tetwarp::simulate {
 
-/// The Laplacian of the springs between free nodes, factored: L = sum of k (e_a - e_b)(e_a - e_b)^T, with the rows and
-/// columns of nodes that are not free struck out. Eigen's simplicial Cholesky, columns in approximate minimum degree
-/// order.
+/// The factored Laplacian of the springs between free nodes: L = sum of k (e_a - e_b)(e_a - e_b)^T, without the rows
+/// and columns of nodes that are not free. It is factored by Eigen's simplicial Cholesky, with columns in approximate
+/// minimum degree order.
 class LaplacianFactor {
  public:
   LaplacianFactor(const Model& model, std::span<const Role> roles);
   ~LaplacianFactor();
 
-  /// x, y and z of each node are three right-hand sides; solved in place for free nodes, others are left alone.
+  /// Solves L x = b in place, with x, y and z of each node as three right-hand sides. Values of nodes that are not free
+  /// stay.
   void solve(std::span<glm::dvec3> values) const;
 
  private:

@@ -15,7 +15,7 @@ namespace tetwarp::simulate {
 
 namespace {
 
-constexpr int kStopEvery = 16;  ///< iterations between questions whether to stop
+constexpr int kStopEvery = 16;  ///< iterations between two looks at a request to stop
 
 class CpuSprings final : public SpringEngine {
  public:
@@ -93,7 +93,7 @@ class CpuSprings final : public SpringEngine {
     });
   }
 
-  void follow(const Effort& effort, std::stop_token stop) override {
+  void follow(const SolveEffort& effort, std::stop_token stop) override {
     arena_.execute([&] {
       for_blocks([&](NodeRange range, std::size_t) {
         for (std::size_t a = 0; a < 3; ++a) {
@@ -115,7 +115,7 @@ class CpuSprings final : public SpringEngine {
     });
   }
 
-  Solved solve(Stiffness kind, const Effort& effort, std::stop_token stop) override {
+  Solved solve(Stiffness kind, const SolveEffort& effort, std::stop_token stop) override {
     return arena_.execute([&] {
       for_blocks([&](NodeRange range, std::size_t) {
         for_free(range, [&](std::size_t a, std::size_t n) { r_[a][n] = static_cast<float>(force_[a][n]); });
@@ -171,7 +171,7 @@ class CpuSprings final : public SpringEngine {
   std::span<const glm::vec3> shown() const override { return shown_; }
 
  private:
-  /// What blocks add up to, and the largest of squares.
+  /// Sums over blocks, and the largest of the squares that they saw.
   struct Sums {
     double sum = 0, slope = 0, most = 0, most_placed = 0, most_load = 0;
   };
@@ -187,11 +187,11 @@ class CpuSprings final : public SpringEngine {
       const std::size_t begin = block * SpringGrid::kBlock;
       work(NodeRange{begin, std::min(begin + SpringGrid::kBlock, grid_.nodes)}, block);
     };
-    // a thread sweeps over neighbouring blocks: what one has read is in its cache for the next
+    // A thread sweeps over neighbouring blocks: what it has read for one is in its cache for the next.
     tbb::parallel_for(std::size_t{0}, grid_.blocks(), run, tbb::static_partitioner());
   }
 
-  /// In the order of the blocks, whoever swept over them.
+  /// Adds up what blocks return, in their order, whichever thread swept over them.
   template <class Work>
   Sums sum_blocks(Work&& work) {
     for_blocks([&](NodeRange range, std::size_t block) { partial_[block] = work(range); });
@@ -256,8 +256,8 @@ class CpuSprings final : public SpringEngine {
     });
   }
 
-  /// x_ = A^-1 r_ for the blocks of a kind, on free nodes.
-  Solved seek(Stiffness kind, const Effort& effort, const std::stop_token& stop) {
+  /// Solves A x_ = r_ for free nodes, where A has the spring matrices of a kind.
+  Solved seek(Stiffness kind, const SolveEffort& effort, const std::stop_token& stop) {
     for_blocks([&](NodeRange range, std::size_t) {
       for (std::size_t a = 0; a < 3; ++a) {
         for (std::size_t n = range.begin; n < range.end; ++n) {
@@ -279,8 +279,8 @@ class CpuSprings final : public SpringEngine {
     return {.iterations = 1};
   }
 
-  /// Preconditioned by the inverse of each node's own block.
-  Solved conjugate_gradients(const Effort& effort, const std::stop_token& stop) {
+  /// Solves by conjugate gradients, preconditioned by the inverse of each node's own 3 x 3 block.
+  Solved conjugate_gradients(const SolveEffort& effort, const std::stop_token& stop) {
     double rz = sum_blocks([&](NodeRange range) { return descend(range, 0, true); }).sum;
     const double least = kFloatRounding * rz;
     turn(0);
@@ -307,7 +307,7 @@ class CpuSprings final : public SpringEngine {
     return result;
   }
 
-  /// q = A p. @return p.q over free nodes
+  /// Sets q = A p in a block. @return p.q over free nodes
   Sums bend(NodeRange range) {
     sweep_product(grid_, range, matrices_, p_, q_);
     Sums sums;
@@ -318,7 +318,7 @@ class CpuSprings final : public SpringEngine {
     return sums;
   }
 
-  /// x += length p, r -= length q, z = preconditioned r; from x = 0 where it begins. @return r.z
+  /// Sets x += length p, r -= length q, z = preconditioned r in a block. If it `begins`, x starts at 0. @return r.z
   Sums descend(NodeRange range, float length, bool begins) {
     Sums sums;
     for (std::size_t n = range.begin; n < range.end; ++n) {
@@ -337,7 +337,7 @@ class CpuSprings final : public SpringEngine {
     return sums;
   }
 
-  /// p = z + share p
+  /// Sets p = z + share p.
   void turn(float share) {
     for_blocks([&](NodeRange range, std::size_t) {
       for (std::size_t a = 0; a < 3; ++a) {
@@ -356,12 +356,12 @@ class CpuSprings final : public SpringEngine {
   std::vector<Role> roles_;
   std::unique_ptr<LaplacianFactor> factor_;
   PaddedVectors<double> u_, trial_;                   ///< displacement
-  PaddedVectors<double> start_, goal_;                ///< of placed nodes
-  PaddedVectors<double> load_, load_from_, load_to_;  ///< of free nodes
-  PaddedVectors<double> force_, trial_force_;         ///< net, of free nodes, at u_ and trial_
+  PaddedVectors<double> start_, goal_;                ///< of placed nodes: where they come from, and where they go
+  PaddedVectors<double> load_, load_from_, load_to_;  ///< on free nodes: force now, at the start, and at the goal, N
+  PaddedVectors<double> force_, trial_force_;         ///< net force on free nodes at u_ and at trial_, N
   SpringMatrices matrices_;
-  std::vector<Symmetric<float>> inverse_;   ///< of each free node's sum of blocks
-  PaddedVectors<float> x_, r_, z_, p_, q_;  ///< direction, and what conjugate gradients need
+  std::vector<Symmetric<float>> inverse_;   ///< by free node: the inverse of its sum of spring matrices
+  PaddedVectors<float> x_, r_, z_, p_, q_;  ///< the direction that is sought, and vectors of conjugate gradients
   std::vector<Sums> partial_;
   std::vector<glm::vec3> shown_;
 };

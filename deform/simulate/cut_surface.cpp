@@ -86,7 +86,7 @@ CutSurface::Nearest CutSurface::nearest_on_path(const glm::dvec3& point) const {
     const double distance = glm::dot(offset, offset);
     if (distance >= least) continue;
     least = distance;
-    // At a bend the side is that of both pieces' normals together; past an end, that of the last piece carried on.
+    // At a bend of the path the mean normal of both pieces tells the side; beyond an end, the last piece is continued.
     glm::dvec3 normal = across_[n];
     const bool at_start = before && (n > 0 || is_closed), at_end = after && (n + 1 < pieces || is_closed);
     if (at_start) normal += across_[n > 0 ? n - 1 : pieces - 1];

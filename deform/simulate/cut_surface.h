@@ -23,19 +23,19 @@ class CutSurface {
   bool reaches(const glm::dvec3& point) const;
 
  private:
-  /// The nearest place on the path, seen along the sweep.
+  /// The place on the path that is nearest to a point, seen along the sweep.
   struct Nearest {
-    double side;    ///< signed distance
-    bool is_on_it;  ///< not beyond an end
-    double height;  ///< of the path there, along the sweep
+    double side;    ///< signed distance from the point, mm
+    bool is_on_it;  ///< whether the nearest place is not an end that the point lies beyond
+    double height;  ///< mm along the sweep, of that place
   };
   Nearest nearest_on_path(const glm::dvec3& point) const;
 
   std::variant<PlaneCut, DiscCut, SweptCut> shape_;
-  glm::dvec3 up_{0};                ///< of length 1: the normal, or along the sweep
-  std::vector<glm::dvec3> flat_;    ///< the path's points seen along the sweep: their parts across it
-  std::vector<double> heights_;     ///< and along it
-  std::vector<glm::dvec3> across_;  ///< of each piece of the path: of length 1, across it and the sweep
+  glm::dvec3 up_{0};                ///< unit vector: the normal of a plane, or the direction of the sweep
+  std::vector<glm::dvec3> flat_;    ///< the path's points seen along the sweep: their parts across it, mm
+  std::vector<double> heights_;     ///< the path's points: their parts along the sweep, mm
+  std::vector<glm::dvec3> across_;  ///< by piece of the path: the unit vector across it and the sweep
 };
 
 }  // namespace tetwarp::simulate

@@ -15,8 +15,8 @@ namespace tetwarp::simulate {
 /// Threads that one device block has; sums are made block by block, as a tree over its threads, and then over blocks.
 inline constexpr int kDeviceBlock = 256;
 
-/// Mass-spring on a machine that runs sweeps over nodes. Nothing leaves the machine's memory but sums and, every
-/// kRepeats iterations, the state of conjugate gradients. A machine is
+/// Mass-spring on a machine that runs sweeps over nodes. Only sums and, every kRepeats iterations, the state of
+/// conjugate gradients leave the machine's memory. A machine is
 ///
 ///     template <class T> class Buffer;           // reserve(size), data()
 ///     scope();                                   // what it returns holds while the machine is used
@@ -91,7 +91,7 @@ class DeviceSprings final : public SpringEngine {
     machine_.each(nodes_, sweeps::Carry{{a_}, motion});
   }
 
-  void follow(const Effort& effort, std::stop_token stop) override {
+  void follow(const SolveEffort& effort, std::stop_token stop) override {
     const auto scope = machine_.scope();
     machine_.each(nodes_, sweeps::Way{{a_}});
     make_matrices(Stiffness::laplacian);
@@ -101,7 +101,7 @@ class DeviceSprings final : public SpringEngine {
     std::swap(a_.u, a_.trial);
   }
 
-  Solved solve(Stiffness kind, const Effort& effort, std::stop_token stop) override {
+  Solved solve(Stiffness kind, const SolveEffort& effort, std::stop_token stop) override {
     const auto scope = machine_.scope();
     make_matrices(kind);
     machine_.each(nodes_, sweeps::Forces{{a_}});
@@ -160,7 +160,7 @@ class DeviceSprings final : public SpringEngine {
     machine_.each(nodes_, sweeps::Inverses{{a_}});
   }
 
-  GradientState conjugate_gradients(const Effort& effort, const std::stop_token& stop) {
+  GradientState conjugate_gradients(const SolveEffort& effort, const std::stop_token& stop) {
     machine_.template sum<Sum>(nodes_, sweeps::Begin{{a_}}, sweeps::AfterBegin{a_.state, effort});
     GradientState state = machine_.fetch(a_.state);
     while (!state.is_done && !stop.stop_requested()) {

@@ -9,21 +9,21 @@
 #include "deform/simulate/spring_engine.h"
 #include "deform/simulate/spring_step.h"
 
-// What a device does for one node in each sweep of mass-spring. Every node gathers from its 26 links: no two write the
-// same place, so that no order matters but that of sums, which the machine keeps (device_springs.h).
+// What a device does for one node in each sweep of mass-spring. Every node gathers from its 26 links and writes only
+// its own values, so no order matters but that of sums, which the machine keeps (device_springs.h).
 
 namespace tetwarp::simulate {
 
-/// Conjugate gradients, between their sweeps; in the device's memory.
+/// The state of conjugate gradients between sweeps, in the device's memory.
 struct GradientState {
-  Effort effort;
+  SolveEffort effort;
   double rz = 0, least = 0, gained = 0;
   float length = 0, share = 0;
   int iterations = 0;
   bool is_indefinite = false, is_done = false;
 };
 
-/// What sweeps add up, and the largest of what they see.
+/// The sum of what a sweep returns, and the largest square that it saw.
 struct Sums {
   double sum = 0, slope = 0, most = 0, most_placed = 0, most_load = 0;
 
@@ -43,21 +43,24 @@ struct Sum {
   TETWARP_HD void add(const Sum& other) { sum += other.sum; }
 };
 
-/// All that lies in a device's memory; vectors have one entry a node.
+/// All arrays in a device's memory; vectors have one entry a node.
 struct DeviceArrays {
   std::size_t nodes;
-  const std::int32_t* neighbour;  ///< as Model's
+  const std::int32_t* neighbour;  ///< see Model::neighbour
   const float* stiffness;
   const std::uint32_t* vertex;
   const Role* role;
   RestLink<double> rest[kDirections];
   RestPlace rest_place;
-  glm::dvec3 *u, *trial, *start, *goal;    ///< displacement; of placed nodes where they come from and go
-  glm::dvec3 *load, *load_from, *load_to;  ///< of free nodes
-  glm::dvec3 *force, *trial_force;         ///< net, of free nodes, at u and trial
-  glm::vec3 *x, *r, *z, *p, *q;            ///< direction, and what conjugate gradients need
-  SpringMatrix<float>* matrix;             ///< at up * nodes + node: of the link in direction kUp + up
-  Symmetric<float>* inverse;               ///< of each free node's sum of matrices; 0 of others
+  /// Displacement, mm: now, at a trial step, and of placed nodes where they come from and go.
+  glm::dvec3 *u, *trial, *start, *goal;
+  /// Force on free nodes, N: now, at the start, and at the goal.
+  glm::dvec3 *load, *load_from, *load_to;
+  glm::dvec3 *force, *trial_force;  ///< net force on free nodes at u and at trial, N
+  glm::vec3 *x, *r, *z, *p, *q;     ///< the direction that is sought, and vectors of conjugate gradients
+  /// At up * nodes + node: the matrix of the link from the node in direction kUp + up.
+  SpringMatrix<float>* matrix;
+  Symmetric<float>* inverse;  ///< by free node: the inverse of its sum of matrices; 0 for other nodes
   glm::vec3* shown;
   GradientState* state;
   Sums* result;
@@ -66,7 +69,7 @@ struct DeviceArrays {
   TETWARP_HD std::int32_t other(int direction, std::size_t n) const {
     return neighbour[static_cast<std::size_t>(direction) * nodes + n];
   }
-  /// Of the link to a neighbour; kept at its lower end.
+  /// The matrix of the link to a neighbour. It is stored at the lower end of the link.
   TETWARP_HD const SpringMatrix<float>& of_link(int direction, std::size_t n, std::int32_t to) const {
     return direction >= kUp
                ? matrix[static_cast<std::size_t>(direction - kUp) * nodes + n]
@@ -85,7 +88,7 @@ TETWARP_HD inline glm::dvec3 on_the_way(const glm::dvec3& from, const glm::dvec3
   return part == 1 ? to : from + part * (to - from);
 }
 
-/// A sweep that always runs; those of conjugate gradients have nothing left to do once these are done.
+/// A sweep that always runs. GradientSweep is skipped once conjugate gradients are done.
 struct Sweep {
   DeviceArrays a;
   TETWARP_HD bool is_idle() const { return false; }
@@ -95,7 +98,7 @@ struct GradientSweep {
   TETWARP_HD bool is_idle() const { return a.state->is_done; }
 };
 
-/// New loads: from what is now. @param force  null: none
+/// Takes over new loads; the present ones are where they start. @param force  null: no forces
 struct TakeLoads : Sweep {
   const glm::vec3 *goals, *forces;
   TETWARP_HD void operator()(std::size_t n) const {
@@ -106,7 +109,7 @@ struct TakeLoads : Sweep {
   }
 };
 
-/// See SpringEngine::aim.
+/// Does what SpringEngine::aim says.
 struct Aim : Sweep {
   double part;
   TETWARP_HD Ways operator()(std::size_t n) const {
@@ -117,7 +120,7 @@ struct Aim : Sweep {
   }
 };
 
-/// See SpringEngine::carry.
+/// Does what SpringEngine::carry says.
 struct Carry : Sweep {
   RigidMotion motion;
   TETWARP_HD void operator()(std::size_t n) const {
@@ -127,12 +130,12 @@ struct Carry : Sweep {
   }
 };
 
-/// The way of placed nodes as p.
+/// Sets p to how far placed nodes have to go.
 struct Way : Sweep {
   TETWARP_HD void operator()(std::size_t n) const { a.p[n] = in_float(a.trial[n] - a.u[n]); }
 };
 
-/// Springs up from a node, where they are now.
+/// Computes the matrices of the links up from a node, with springs where they are now.
 struct Matrices : Sweep {
   Stiffness kind;
   TETWARP_HD void operator()(std::size_t n) const {
@@ -167,7 +170,7 @@ TETWARP_HD inline glm::vec3 product(const DeviceArrays& a, std::size_t n) {
   return sum;
 }
 
-/// What the way of placed nodes asks of the others.
+/// Sets r to the forces on free nodes if placed nodes alone went their way.
 struct Pull : Sweep {
   TETWARP_HD void operator()(std::size_t n) const { a.r[n] = a.is_free(n) ? -product(a, n) : glm::vec3(0); }
 };
@@ -175,7 +178,7 @@ struct Forces : Sweep {
   TETWARP_HD void operator()(std::size_t n) const { a.r[n] = in_float(a.force[n]); }
 };
 
-/// x = 0, z = preconditioned r.
+/// Sets x = 0, p = z = preconditioned r, and sums r.z.
 struct Begin : Sweep {
   TETWARP_HD Sum operator()(std::size_t n) const {
     a.x[n] = glm::vec3(0);
@@ -185,13 +188,13 @@ struct Begin : Sweep {
 };
 struct AfterBegin {
   GradientState* state;
-  Effort effort;
+  SolveEffort effort;
   TETWARP_HD void operator()(const Sum& rz) const {
     *state = {.effort = effort, .rz = rz.sum, .least = kFloatRounding * rz.sum, .is_done = !(rz.sum > 0)};
   }
 };
 
-/// q = A p; the curvature p.q over free nodes.
+/// Sets q = A p, and sums the curvature p.q over free nodes.
 struct Bend : GradientSweep {
   TETWARP_HD Sum operator()(std::size_t n) const {
     if (!a.is_free(n)) return {};
@@ -210,7 +213,7 @@ struct AfterBend {
   }
 };
 
-/// x += length p, r -= length q, z = preconditioned r; r.z.
+/// Sets x += length p, r -= length q, z = preconditioned r, and sums r.z.
 struct Descend : GradientSweep {
   TETWARP_HD Sum operator()(std::size_t n) const {
     if (!a.is_free(n)) return {};
@@ -234,12 +237,12 @@ struct AfterDescend {
   }
 };
 
-/// p = z + share p.
+/// Sets p = z + share p.
 struct Turn : GradientSweep {
   TETWARP_HD void operator()(std::size_t n) const { a.p[n] = a.z[n] + a.state->share * a.p[n]; }
 };
 
-/// Minus the forces times the direction, and its longest entry, squared.
+/// Sums minus the net forces times the direction, and finds the square of its longest entry.
 struct SearchDirection : Sweep {
   TETWARP_HD Sums operator()(std::size_t n) const {
     const glm::dvec3 x = in_double(a.x[n]);
@@ -247,7 +250,7 @@ struct SearchDirection : Sweep {
   }
 };
 
-/// Free nodes follow the placed ones.
+/// Adds the direction to the trial displacement, so that free nodes follow the placed ones.
 struct Follow : Sweep {
   TETWARP_HD void operator()(std::size_t n) const { a.trial[n] += in_double(a.x[n]); }
 };
@@ -258,7 +261,7 @@ struct Go : Sweep {
   }
 };
 
-/// See SpringEngine::try_step, at trial; forces squared.
+/// Computes the strain at the trial displacement, as SpringEngine::try_step does; forces are squared.
 struct StrainOf : Sweep {
   TETWARP_HD Sums operator()(std::size_t n) const {
     glm::dvec3 force = a.load[n];
@@ -283,7 +286,7 @@ struct Show : Sweep {
   TETWARP_HD void operator()(std::size_t n) const { a.shown[n] = in_float(a.u[n]); }
 };
 
-/// The result of a sum, where the host fetches it.
+/// Keeps the result of a sum where the host fetches it.
 template <class T>
 struct Keep {
   T* result;

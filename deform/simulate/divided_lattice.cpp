@@ -23,10 +23,10 @@ constexpr std::uint32_t kNone = TetrahedronSplitter::kNone;
 
 glm::i64vec3 corner_steps(std::uint32_t c) { return {c & 1, c >> 1 & 1, c >> 2}; }
 
-/// Numbers on a lattice.
-class Grid {
+/// Numbers of vertices and cells of a lattice.
+class LatticeNumbers {
  public:
-  explicit Grid(const Geometry& lattice) : size_(lattice.size), cells_(lattice.size - std::int64_t{1}) {}
+  explicit LatticeNumbers(const Geometry& lattice) : size_(lattice.size), cells_(lattice.size - std::int64_t{1}) {}
 
   const glm::i64vec3& size() const { return size_; }
   const glm::i64vec3& cells() const { return cells_; }
@@ -38,7 +38,7 @@ class Grid {
   std::uint32_t vertex(const glm::i64vec3& at) const {
     return static_cast<std::uint32_t>(at.x + size_.x * (at.y + size_.y * at.z));
   }
-  /// Of a corner of a cell.
+  /// The number of the vertex at a corner of a cell.
   std::uint32_t vertex(std::uint64_t cell, std::uint32_t corner) const {
     return vertex(place_of_cell(cell) + corner_steps(corner));
   }
@@ -52,7 +52,7 @@ class Grid {
   glm::i64vec3 size_, cells_;
 };
 
-/// Sets of things that are one; the least number stands for each.
+/// Sets of things that were joined (union-find); the least number stands for each set.
 class Sets {
  public:
   explicit Sets(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0u); }
@@ -70,22 +70,22 @@ class Sets {
   std::vector<std::uint32_t> parent_;
 };
 
-/// One cut over the lattice: its side of every vertex, and the cells that it goes through.
-struct Division {
+/// One cut through the lattice: the side on which each vertex lies, and the cells that the cut goes through.
+struct LatticeCut {
   std::vector<double> side;
   std::vector<std::uint64_t> cells;  ///< rising
-  double nearest = 0;                ///< mm, that the cut may come to a vertex
+  double nearest = 0;                ///< mm: the least distance of the cut from a vertex
 
   bool is_through(std::uint64_t cell) const { return std::binary_search(cells.begin(), cells.end(), cell); }
 };
 
-Division divide_by(const Geometry& lattice, const Grid& grid, const Cut& cut) {
-  constexpr double kNearest = 1.0 / 256;  // of a cell
+LatticeCut divide_by(const Geometry& lattice, const LatticeNumbers& grid, const Cut& cut) {
+  constexpr double kNearest = 1.0 / 256;  // of the shortest side of a cell
   const CutSurface surface(cut);
   const AffineMap point = point_from_index(lattice);
   const glm::dvec3& h = lattice.spacing;
   const double farthest = 0.5 * std::max({h.x, h.y, h.z});
-  Division division;
+  LatticeCut division;
   division.nearest = kNearest * std::min({h.x, h.y, h.z});
   const auto vertices = static_cast<std::uint32_t>(voxel_count(lattice));
   for (std::uint32_t v = 0; v < vertices; ++v) {
@@ -94,7 +94,7 @@ Division divide_by(const Geometry& lattice, const Grid& grid, const Cut& cut) {
   }
   const auto cells = static_cast<std::uint64_t>(grid.cells().x * grid.cells().y * grid.cells().z);
   for (std::uint64_t cell = 0; cell < cells; ++cell) {
-    glm::dvec3 sum(0);  // of the places where the cut goes through edges, lattice index
+    glm::dvec3 sum(0);  // sum of the places where the cut goes through edges, lattice index
     int crossings = 0;
     for (std::uint32_t a = 0; a < kCorners; ++a) {
       for (const std::uint32_t axis : {1u, 2u, 4u}) {
@@ -114,10 +114,10 @@ Division divide_by(const Geometry& lattice, const Grid& grid, const Cut& cut) {
   return division;
 }
 
-/// The cells and those round them.
-std::vector<std::uint64_t> with_neighbours(const Grid& grid, const std::vector<Division>& divisions) {
+/// The cells that cuts go through, and all cells around them.
+std::vector<std::uint64_t> with_neighbours(const LatticeNumbers& grid, const std::vector<LatticeCut>& divisions) {
   std::vector<std::uint64_t> result;
-  for (const Division& division : divisions) {
+  for (const LatticeCut& division : divisions) {
     for (const std::uint64_t cell : division.cells) {
       const glm::i64vec3 at = grid.place_of_cell(cell);
       const glm::i64vec3 low = glm::max(at - std::int64_t{1}, glm::i64vec3(0)),
@@ -134,11 +134,11 @@ std::vector<std::uint64_t> with_neighbours(const Grid& grid, const std::vector<D
   return result;
 }
 
-/// Finds out what belongs together when all cuts are made, and gives nodes to it.
+/// Finds out which tetrahedra and corners belong together when all cuts are made, and numbers the nodes.
 class Joiner {
  public:
-  Joiner(const Geometry& lattice, const Grid& grid, const TetrahedronSplitter& split,
-         std::span<const Division> divisions)
+  Joiner(const Geometry& lattice, const LatticeNumbers& grid, const TetrahedronSplitter& split,
+         std::span<const LatticeCut> divisions)
       : lattice_(lattice), grid_(grid), split_(split), divisions_(divisions), pieces_(split.tetrahedra().size()) {
     join_tetrahedra();
     number_pieces();
@@ -158,7 +158,7 @@ class Joiner {
  private:
   using Triangle = TetrahedronSplitter::Triangle;
 
-  /// Tetrahedra on both sides of every face that no cut severs.
+  /// Calls `visit` with the two tetrahedra at every face that no cut severs.
   template <class Visit>
   void for_each_joint(Visit&& visit) const {
     std::map<Triangle, std::uint32_t> open;
@@ -252,8 +252,9 @@ class Joiner {
     return std::fabs(glm::determinant(glm::dmat3(at[0] - at[3], at[1] - at[3], at[2] - at[3]))) / 6;
   }
 
-  /// Of each piece, on which side of a cut it lies. Within a cell that the cut goes through no piece is on both.
-  std::vector<std::int8_t> sides_of(const Division& division) const {
+  /// For each piece, the side of a cut on which it lies. No piece within a cell that the cut goes through lies on both
+  /// sides.
+  std::vector<std::int8_t> sides_of(const LatticeCut& division) const {
     std::vector<double> sum(cell_of_.size());
     const auto& tetrahedra = split_.tetrahedra();
     for (std::size_t n = 0; n < tetrahedra.size(); ++n) {
@@ -273,7 +274,7 @@ class Joiner {
     const auto& tetrahedra = split_.tetrahedra();
     for (std::size_t n = 0; n < tetrahedra.size(); ++n) volume[piece_[n]] += volume_of(tetrahedra[n]);
     std::vector<std::vector<std::int8_t>> sides;
-    for (const Division& division : divisions_) sides.push_back(sides_of(division));
+    for (const LatticeCut& division : divisions_) sides.push_back(sides_of(division));
     for (std::uint32_t first = 0, end = 0; first < cell_of_.size(); first = end) {
       while (end < cell_of_.size() && cell_of_[end] == cell_of_[first]) ++end;
       bool is_whole = end - first == 1;
@@ -327,15 +328,16 @@ class Joiner {
   }
 
   const Geometry& lattice_;
-  const Grid& grid_;
+  const LatticeNumbers& grid_;
   const TetrahedronSplitter& split_;
-  const std::span<const Division> divisions_;
-  Sets pieces_;                                              ///< of tetrahedra
-  std::vector<std::uint32_t> piece_;                         ///< of each tetrahedron
-  std::vector<std::uint64_t> cell_of_;                       ///< of each piece
-  Sets nodes_{0};                                            ///< of places: corners of pieces
-  std::unordered_map<std::uint32_t, std::uint32_t> holder_;  ///< a place of the piece that holds a lattice vertex
-  std::vector<std::uint32_t> node_;                          ///< of each place
+  const std::span<const LatticeCut> divisions_;
+  Sets pieces_;                         ///< joins tetrahedra to pieces
+  std::vector<std::uint32_t> piece_;    ///< by tetrahedron: its piece
+  std::vector<std::uint64_t> cell_of_;  ///< by piece: its cell
+  Sets nodes_{0};                       ///< joins places, each a corner of a piece, to nodes
+  /// By lattice vertex: the place in the piece that holds it.
+  std::unordered_map<std::uint32_t, std::uint32_t> holder_;
+  std::vector<std::uint32_t> node_;  ///< by place: its node
   std::vector<std::uint32_t> copies_of_;
 };
 
@@ -345,11 +347,11 @@ DividedLattice divide(const Geometry& lattice, std::span<const Cut> cuts) {
   require_valid(lattice, "the lattice");
   require(voxel_count(lattice) < INT32_MAX,
           "a lattice of " + to_string(lattice.size) + " vertices is too large to cut");
-  const Grid grid(lattice);
-  std::vector<Division> divisions;
+  const LatticeNumbers grid(lattice);
+  std::vector<LatticeCut> divisions;
   for (const Cut& cut : cuts) divisions.push_back(divide_by(lattice, grid, cut));
   TetrahedronSplitter split(lattice.size, with_neighbours(grid, divisions));
-  for (const Division& division : divisions) {
+  for (const LatticeCut& division : divisions) {
     split.cut([&](std::uint32_t vertex) { return division.side[vertex]; }, division.nearest,
               [&](std::uint64_t cell) { return division.is_through(cell); });
   }
@@ -360,7 +362,7 @@ DividedLattice divide(const Geometry& lattice, std::span<const Cut> cuts) {
 
 namespace {
 
-/// On how many of the cuts that two divided lattices both have two pieces lie on other sides.
+/// How many of the cuts that two divided lattices share have the two pieces on different sides.
 int other_sides(const DividedLattice& now, std::size_t piece, const DividedLattice& before, std::size_t earlier) {
   int count = 0;
   for (std::size_t cut = 0; cut < now.cuts.size(); ++cut) {
@@ -377,7 +379,7 @@ int other_sides(const DividedLattice& now, std::size_t piece, const DividedLatti
 std::vector<std::uint32_t> nodes_before(const DividedLattice& now, const DividedLattice& before,
                                         const Geometry& lattice) {
   const auto vertices = static_cast<std::uint32_t>(voxel_count(lattice));
-  std::vector<std::uint32_t> nodes = now.copies_of;  // where the cell was whole
+  std::vector<std::uint32_t> nodes = now.copies_of;  // the answer where the cell was whole before
   std::vector<bool> is_known(nodes.size());
   const auto is_before = [](const CellPiece& piece, std::uint64_t cell) { return piece.cell < cell; };
   for (std::size_t piece = 0; piece < now.pieces.size(); ++piece) {
@@ -406,7 +408,7 @@ VertexField field_of(const Geometry& lattice, const DividedLattice& divided, std
   const std::size_t nodes = vertices + divided.copies_of.size();
   require(displacement.size() == nodes, "one displacement a node is expected, " + std::to_string(nodes) + "; found " +
                                             std::to_string(displacement.size()));
-  const Grid grid(lattice);
+  const LatticeNumbers grid(lattice);
   const AffineMap point = point_from_index(lattice);
   VertexField field{
       .lattice = lattice,

@@ -31,7 +31,7 @@ struct DividedLattice {
 
   /// Lattice vertex of each copy; copies are the nodes after those of the lattice.
   std::vector<std::uint32_t> copies_of;
-  std::vector<CellPiece> pieces;  ///< of cells with several pieces or with copies, ordered by cell
+  std::vector<CellPiece> pieces;  ///< pieces of the cells that have several pieces or copies, ordered by cell
   std::vector<std::string> cuts;  ///< names of the cuts
   /// For each piece, on which side of each of `cuts` it lies: -1 or 1, or 0 where that cut does not go through its
   /// cell.

@@ -13,28 +13,28 @@ namespace tetwarp::simulate {
 
 namespace {
 
-/// A local/global step is worth the next one while it takes this share off the energy.
+/// Local/global steps go on while each lowers the energy by this share.
 constexpr double kWorthwhile = 0.2;
-/// Newton's own matrix is tried below this residual: further off it is indefinite more often than not.
+/// Newton's own matrix is tried below this residual; above it is indefinite more often than not.
 constexpr double kNearResidual = 0.1;
-/// Of the descent that the slope promises, what a step must bring (Armijo).
+/// The least share of the descent that the slope promises which a step must bring (Armijo).
 constexpr double kArmijo = 1e-4;
-/// Energies are compared down to this share of themselves; closer, slopes decide.
+/// Differences of energies below this share of them are rounding; then slopes decide.
 constexpr double kEnergyRounding = 1e-11;
 constexpr double kShortest = 1e-6, kLongest = 4;
 
-/// Ordinary steps, and those after which a simulation may count as settled.
-constexpr Effort kUsual{.share = 0.1, .least = 3}, kThorough{.share = 0.1, .least = 50};
-constexpr Effort kFollow{.share = 0.02, .least = 10, .most = 500};
+/// Effort of ordinary steps, and of those after which a simulation may count as settled.
+constexpr SolveEffort kUsual{.share = 0.1, .least = 3}, kThorough{.share = 0.1, .least = 50};
+constexpr SolveEffort kFollow{.share = 0.02, .least = 10, .most = 500};
 
-/// Chooses what a step solves.
+/// Chooses the matrix with which the next step is solved.
 class Schedule {
  public:
   Stiffness kind(double residual) const {
     if (is_local_global_) return Stiffness::laplacian;
     return residual < kNearResidual && wait_ == 0 ? Stiffness::full : Stiffness::projected;
   }
-  /// The matrix was indefinite: leaves it alone for some steps, more each time.
+  /// Takes note that Newton's matrix was indefinite: it is not tried for some steps, more each time.
   void refuse_full() {
     pause_ = std::min(2 * pause_ + 1, 7);
     wait_ = pause_;
@@ -88,7 +88,7 @@ class MassSpring final : public Simulation {
   }
 
  private:
-  /// Forces below are rounding, not loads.
+  /// The force, N, below which net forces are rounding, not loads.
   double rounding() const {
     constexpr double kSoftMm = 1e-4, kHardMm = 1e-9;
     double least = 0, most = 0;
@@ -118,7 +118,7 @@ class MassSpring final : public Simulation {
     while (!settled.reached && settled.steps < rule.steps && !control.stop.stop_requested()) {
       const bool is_near =
           settled.steps > 0 && settled.motion_mm <= 10 * rule.motion_mm && settled.residual <= 10 * rule.residual;
-      const Effort& effort = is_near ? kThorough : kUsual;
+      const SolveEffort& effort = is_near ? kThorough : kUsual;
       Stiffness kind = schedule.kind(settled.residual);
       Solved solved = engine_->solve(kind, effort, control.stop);
       if (solved.is_indefinite) {
@@ -146,8 +146,9 @@ class MassSpring final : public Simulation {
     return -slope * length <= kEnergyRounding * std::abs(from.energy) && std::abs(to.slope) <= std::abs(slope);
   }
 
-  /// Line search: halves until the energy falls enough; where the matrix is stiffer than the springs, doubles while it
-  /// falls further. @return the part of the direction that was gone, 0 where none lowers the energy
+  /// Line search along a direction: halves the step until the energy falls enough; where the matrix is stiffer than the
+  /// springs, doubles it as long as the energy keeps falling.
+  /// @return the length of the step in units of the direction; 0 where no length lowers the energy
   double step(Strain& now, const Solved& solved, Stiffness kind) {
     double length = 1;
     Strain there = engine_->try_step(length);

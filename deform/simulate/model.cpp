@@ -22,7 +22,7 @@ std::int64_t cell_count(const Geometry& lattice) {
 
 glm::ivec3 corner_steps(std::size_t corner) { return {corner & 1, corner >> 1 & 1, corner >> 2}; }
 
-/// In how many cells a link lies: 4 along an axis, 2 across a face, 1 across a cell.
+/// How many cells a link belongs to: 4 along an axis, 2 across a face, 1 across a cell.
 int cells_round(const glm::ivec3& steps) {
   const int along = std::abs(steps.x) + std::abs(steps.y) + std::abs(steps.z);
   return along == 1 ? 4 : along == 2 ? 2 : 1;
@@ -53,7 +53,8 @@ class Builder {
     model.limits.assign(3 * nodes, {});
   }
 
-  /// Adds the links of a cell or of a piece of one: between vertices of the lattice, or those of copies.
+  /// Adds the links of a cell or of a piece of one: between vertices of the lattice, or, if `of_copies`, those with a
+  /// copy at an end.
   void add(const std::array<std::uint32_t, kCorners>& node, std::uint8_t tissue, double volume, bool of_copies) {
     for (std::size_t a = 0; a < kCorners; ++a) {
       for (std::size_t b = a + 1; b < kCorners; ++b) {
@@ -104,8 +105,8 @@ class Builder {
 }  // namespace
 
 SpringConstants spring_constants(const glm::dvec3& h) {
-  constexpr double kShear = 1 / 2.5;      // of Young's modulus, at Poisson's ratio 1/4
-  constexpr double kBodyShare = 4.0 / 7;  // of it, by the body diagonals
+  constexpr double kShear = 1 / 2.5;      // part of Young's modulus, at Poisson's ratio 1/4
+  constexpr double kBodyShare = 4.0 / 7;  // part of the shear modulus that body diagonals give
   const glm::dvec3 square = h * h;
   const double volume = h.x * h.y * h.z, across_cell = square.x + square.y + square.z;
   const double largest_pair = std::max({square.x * square.y, square.y * square.z, square.x * square.z});

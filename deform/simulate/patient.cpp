@@ -21,11 +21,11 @@ namespace {
 constexpr double kPaddingHu = -1024;
 constexpr double kSameGridMm = 1e-3;
 
-/// Voxels from `begin` up to, not with, `end`.
+/// Voxels along an axis, from `begin` up to but not including `end`.
 struct Extent {
   std::int64_t begin = 0, end = 0;
 };
-/// Along each axis, the voxels of each box.
+/// For each axis, the voxels that belong to each box.
 using Boxes = std::array<std::vector<Extent>, 3>;
 
 Boxes boxes_of_cells(const glm::i64vec3& voxels, const Geometry& lattice, std::int64_t cell_size) {
@@ -52,8 +52,8 @@ Boxes boxes_of_vertices(const glm::i64vec3& voxels, const Geometry& lattice, std
   return boxes;
 }
 
-/// For each box, i fastest: `visit(box, row)` for each of its rows of voxels, then `finish(number)`; with a visitor of
-/// its own for each layer of boxes, of which several run at a time.
+/// Calls, for each box, i fastest, `visit(box, row)` for each of its rows of voxels, then `finish(number)`. Each layer
+/// of boxes along k gets a visitor of its own from `make_visitor`, and several layers run at a time.
 template <class V, class MakeVisitor>
 void for_each_box(std::span<const V> values, const glm::i64vec3& size, const Boxes& boxes, const Control& control,
                   const MakeVisitor& make_visitor) {
@@ -86,7 +86,7 @@ struct MeanVisitor {
   void add(std::span<const V> row) {
     for (const V value : row) {
       const auto hu = static_cast<double>(value);
-      sum += hu > kPaddingHu ? hu : kPaddingHu;  // NaN too
+      sum += hu > kPaddingHu ? hu : kPaddingHu;  // NaN counts as padding, too
     }
     count += row.size();
   }
@@ -160,7 +160,8 @@ void require_whole_numbers(const ConstVolumeView& labels) {
   });
 }
 
-/// Marks the cells of the largest set that is connected by faces. @param candidate  of each cell; is spent
+/// Marks the cells of the largest set that is connected by faces. @param candidate  1 for cells that may belong to a
+/// set
 std::vector<std::uint8_t> largest_part(std::vector<std::uint8_t> candidate, const glm::i64vec3& cells) {
   std::vector<std::size_t> part, largest;
   const std::int64_t steps[3] = {1, cells.x, cells.x * cells.y};

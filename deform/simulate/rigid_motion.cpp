@@ -13,22 +13,25 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// Squares of the ways that may be left.
+/// The share of the squared ways that a rigid motion may leave over.
 constexpr double kLeft = 0.25;
-/// Of the spread of points: what resists rotations that they leave open.
+/// A part of the spread of points that is added in all directions, so that rotations that points leave open are not
+/// made.
 constexpr double kOpen = 1e-8;
-/// Of the squares of points: a spread below is rounding of one point.
+/// A spread of points below this part of their squared distance from the origin is rounding of one point.
 constexpr double kOnePoint = 1e-12;
 
 Vector3d vector(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
 glm::dvec3 vector(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
-/// The best rotation less the identity. @param spread  at at^T about the mean @param moved  way at^T likewise
+/// The best rotation minus the identity. @param spread  sum of at at^T about the mean  @param moved  sum of way at^T
+/// about the mean
 Matrix3d turned(const Matrix3d& spread, const Matrix3d& moved) {
   const Matrix3d sum = spread + moved + kOpen * spread.trace() * Matrix3d::Identity();
   const Eigen::JacobiSVD<Matrix3d> parts(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Vector3d signs(1, 1, 1);
-  if ((parts.matrixU() * parts.matrixV().transpose()).determinant() < 0) signs.z() = -1;  // the smallest is last
+  // The smallest singular value is the last.
+  if ((parts.matrixU() * parts.matrixV().transpose()).determinant() < 0) signs.z() = -1;
   return parts.matrixU() * signs.asDiagonal() * parts.matrixV().transpose() - Matrix3d::Identity();
 }
 

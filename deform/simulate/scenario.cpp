@@ -22,7 +22,7 @@ std::string text_of(const glm::dvec3& point) {
   return text;
 }
 
-/// Turns a vector about a unit axis (Rodrigues), by the right hand.
+/// Turns a vector about a unit axis, by the right-hand rule (Rodrigues).
 glm::dvec3 turned(const glm::dvec3& x, const glm::dvec3& axis, double radians) {
   const double c = std::cos(radians), s = std::sin(radians);
   return c * x + s * glm::cross(axis, x) + (1 - c) * glm::dot(axis, x) * axis;

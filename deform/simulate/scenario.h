@@ -162,9 +162,9 @@ class PhaseLoads {
 
   AffineMap vertex_point_;
   glm::i64vec3 size_;
-  std::vector<Way> ways_;             ///< of the moves of the phase
+  std::vector<Way> ways_;             ///< one for each move of the phase
   std::vector<std::int32_t> way_of_;  ///< for each vertex an index into `ways_`, or kFree or kHeld
-  std::vector<glm::vec3> force_;      ///< on each vertex, N; empty: none
+  std::vector<glm::vec3> force_;      ///< force on each vertex, N; empty: none
   std::size_t held_ = 0, moved_ = 0;
   std::vector<std::string> notes_;
 };

@@ -27,7 +27,7 @@ ScenarioRun::ScenarioRun(const Scenario& scenario, const Patient& patient, MakeS
       tissue_of_cell_(tissue_of_cells(scenario, patient)) {
   for (const Phase& phase : scenario.phases) {
     loads_.emplace_back(scenario, phase, patient);
-    for (const Cut& cut : open_cuts(scenario, phase, patient)) CutSurface{cut};  // throws for those that are none
+    for (const Cut& cut : open_cuts(scenario, phase, patient)) CutSurface{cut};  // throws for a cut that is none
   }
   make_model_of(scenario.phases.front());
 }
@@ -48,8 +48,8 @@ std::vector<glm::vec3> ScenarioRun::displacement() const {
   return simulation_ ? simulation_->displacement_on_host() : std::vector<glm::vec3>(model_.nodes());
 }
 
-/// Makes the model anew. What begins where its vertex is or, of a copy, where the tissue was that it belongs to, is
-/// `start_`.
+/// Makes the model anew for the open cuts of a phase, and `start_` with it: vertices start where they are, copies where
+/// the tissue was to which they belong.
 void ScenarioRun::carry_over_to(const Phase& phase) {
   const DividedLattice before = std::move(division_);
   make_model_of(phase);
@@ -64,7 +64,7 @@ void ScenarioRun::begin_phase() {
   const bool other_cuts = phase_ > 0 && sorted(phase.closed_cuts) != sorted(scenario_.phases[phase_ - 1].closed_cuts);
   if (!simulation_ || other_cuts) {
     simulation_.reset();
-    if (other_cuts) carry_over_to(phase);  // the model of the first phase is there
+    if (other_cuts) carry_over_to(phase);  // for the first phase there is a model already
     simulation_ = make_(model_);
     simulation_->set_displacement(start_);
   }

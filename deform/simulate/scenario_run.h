@@ -75,7 +75,7 @@ class ScenarioRun {
   MakeSimulation make_;
   std::vector<std::uint8_t> tissue_of_cell_;
   std::vector<PhaseLoads> loads_;
-  DividedLattice division_;  ///< of the lattice by the open cuts
+  DividedLattice division_;  ///< the lattice as the open cuts divide it
   Model model_;
   std::unique_ptr<Simulation> simulation_;
   std::vector<glm::vec3> start_;  ///< displacement of each node when the phase began, LPS mm

@@ -9,7 +9,7 @@ namespace tetwarp::simulate {
 
 namespace {
 
-/// Calls `work(node, spring, stiffness)` for each spring from each of its ends.
+/// Calls `work(node, spring, stiffness)` for each spring, once from each of its ends.
 template <class Work>
 void for_each_spring(const Model& model, std::span<const glm::vec3> displacement, Work&& work) {
   require_springs(model);

@@ -14,20 +14,18 @@
 
 namespace tetwarp::simulate {
 
-/// What springs and loads come to at some displacement.
+/// What springs and loads add up to at some displacement.
 struct Strain {
-  double energy = 0;        ///< N mm, of springs less the work of the loads
-  double free_force = 0;    ///< N, largest net force on a free node
-  double placed_force = 0;  ///< N, largest by which a placed node is kept in its place
+  double energy = 0;        ///< N mm: energy of the springs minus the work of the loads
+  double free_force = 0;    ///< N: the largest net force on a free node
+  double placed_force = 0;  ///< N: the largest force that keeps a placed node in its place
   double slope = 0;         ///< N mm: minus the net forces on free nodes times the direction (see SpringEngine::solve)
 };
 
-/// When conjugate gradients stop.
-///
-/// After n iterations that lowered the quadratic model by Q altogether, the last by q: where n q <= share Q (Nash and
-/// Sofer 1990, "Assessing a search direction within a truncated-Newton method"). Residuals say little here: those of
-/// stiff springs hide what is left to do in soft tissue.
-struct Effort {
+/// When conjugate gradients stop: after n iterations that lowered the quadratic model by Q in all, and by q in the last
+/// one, they stop if n q <= share Q (Nash and Sofer 1990, "Assessing a search direction within a truncated-Newton
+/// method"). Residuals say little here: those of stiff springs hide what is left to do in soft tissue.
+struct SolveEffort {
   double share = 0.1;
   int least = 3, most = 3000;
 
@@ -36,19 +34,20 @@ struct Effort {
   }
 };
 
-/// Squared residuals of conjugate gradients in float, over the first, that tell nothing more.
+/// Conjugate gradients in float stop where the squared residual is this part of the first one: below it is rounding.
 inline constexpr double kFloatRounding = 1e-12;
 
-/// A direction that was found.
+/// A direction that SpringEngine::solve found.
 struct Solved {
   int iterations = 0;
-  bool is_indefinite = false;  ///< the matrix has a direction of negative curvature: the one found is of no use
-  double slope = 0;            ///< as Strain::slope, at the displacement where the system was set up
-  double longest_mm = 0;       ///< of its entries
+  /// The matrix has a direction of negative curvature, and the direction found is of no use.
+  bool is_indefinite = false;
+  double slope = 0;       ///< Strain::slope at the displacement where the system was set up
+  double longest_mm = 0;  ///< the longest of its vectors, mm
 };
 
-/// What the steps of mass-spring are made of: one for each backend. It keeps displacements in double: forces of
-/// springs that hardly stretch are not to be had from floats.
+/// The operations of which a step of mass-spring consists, implemented once for each backend. Displacements are kept in
+/// double: the forces of springs that hardly stretch cannot be computed from floats.
 class SpringEngine {
  public:
   virtual ~SpringEngine() = default;
@@ -56,30 +55,31 @@ class SpringEngine {
   /// A stream of the device (`Control::stream`) on which the next calls queue their work; null: the default stream.
   virtual void set_stream(void*) {}
 
-  /// From here on: placed nodes go from where they are to `loads.goal`, forces from what they are to `loads.force`.
+  /// Sets new loads: from now on placed nodes go from where they are to `loads.goal`, and forces from what they are to
+  /// `loads.force`.
   virtual void set_loads(const Loads& loads, std::span<const Role> roles) = 0;
   virtual void set_displacement(std::span<const glm::vec3> displacement) = 0;
 
-  /// Takes forces to a part of their way. @return how placed nodes have to go for theirs
+  /// Sets forces to a part of their way. @return how far placed nodes still have to go for theirs
   virtual Ways aim(double part) = 0;
-  /// Moves free and placed nodes from where they are; the latter still have to go where `aim` wants them.
+  /// Moves free and placed nodes from where they are. Placed ones still have to go to where `aim` wants them.
   virtual void carry(const RigidMotion& motion) = 0;
-  /// Takes placed nodes to where `aim` wants them, and free ones by the harmonic extension of that: the Laplacian of
-  /// what they do is 0.
-  virtual void follow(const Effort& effort, std::stop_token stop) = 0;
+  /// Moves placed nodes to where `aim` wants them, and free ones by the harmonic extension of that motion, whose
+  /// Laplacian is 0.
+  virtual void follow(const SolveEffort& effort, std::stop_token stop) = 0;
 
-  /// Seeks the direction A^-1 f for the net forces f on free nodes, with A of some kind, where the nodes are.
-  /// Conjugate gradients that a stop ends early still give a direction along which the energy falls.
-  virtual Solved solve(Stiffness kind, const Effort& effort, std::stop_token stop) = 0;
+  /// Seeks the direction A^-1 f at the present displacement, for the net forces f on free nodes and a matrix A of some
+  /// kind. If a request to stop ends conjugate gradients early, the energy still falls along the direction they give.
+  virtual Solved solve(Stiffness kind, const SolveEffort& effort, std::stop_token stop) = 0;
 
-  /// At the displacement plus `part` of the direction; first of all calls, with 0, after `aim`.
+  /// The strain at the displacement plus `part` of the direction. After `aim` it is first called with part 0.
   virtual Strain try_step(double part) = 0;
-  /// Goes where the last call of try_step looked.
+  /// Makes the displacement of the last call of try_step the present one.
   virtual void accept() = 0;
-  /// Makes `shown` what the displacement is.
+  /// Copies the present displacement to what `shown` returns.
   virtual void show() = 0;
   virtual std::span<const glm::vec3> shown() const = 0;
-  /// The same, copied to the host.
+  /// A copy of `shown` in host memory.
   virtual std::vector<glm::vec3> shown_on_host() {
     const std::span<const glm::vec3> from = shown();
     return {from.begin(), from.end()};
@@ -87,7 +87,7 @@ class SpringEngine {
   virtual Memory memory() const { return Memory::host; }
 };
 
-/// Steps over an engine.
+/// A simulation that takes its steps with an engine.
 std::unique_ptr<Simulation> make_mass_spring(const Model& model, std::unique_ptr<SpringEngine> engine);
 
 std::unique_ptr<SpringEngine> make_cpu_springs(const Model& model, const MassSpringOptions& options, Limits limits);

@@ -11,8 +11,8 @@
 
 namespace tetwarp::simulate {
 
-/// One number a node with zeros before and after, so that neighbours at a fixed distance may be read without asking
-/// whether they exist.
+/// One number a node, with zeros before the first and after the last, so that neighbours at a fixed distance may be
+/// read whether or not they exist.
 template <class T>
 class Padded {
  public:
@@ -28,30 +28,32 @@ class Padded {
   std::vector<T> values_;
 };
 
-/// A vector a node.
+/// One vector a node, its components apart.
 template <class T>
 using PaddedVectors = std::array<Padded<T>, 3>;
 
-/// A link that does not lead to the next vertex on the lattice, because a cut gave one of its ends a copy.
+/// A link that does not lead to the next vertex of the lattice, because a cut gave one of its ends a copy.
 struct OddLink {
   std::uint32_t node, other;
   int direction;
   float stiffness;
 };
 
-/// Springs of a model as the CPU sweeps over them: those between vertices at fixed distances, without a table of
-/// neighbours, and a list of the few others.
+/// Springs of a model in the form over which the CPU sweeps: those between vertices at fixed distances, without a table
+/// of neighbours, and a list of the few others.
 struct SpringGrid {
-  /// Nodes that one task sweeps over; sums go block by block, so that threads do not change them.
+  /// Nodes that one task sweeps over. Sums are made block by block, so that they do not depend on threads.
   static constexpr std::size_t kBlock = 1024;
-  static constexpr std::size_t kLanes = 32;  ///< sweeps may go on for so many nodes after the last
+  /// Sweeps may read and write up to so many nodes after the last.
+  static constexpr std::size_t kLanes = 32;
 
   std::size_t nodes = 0, padding = 0;
-  std::array<std::ptrdiff_t, kUp> distance{};        ///< to the neighbour in direction kUp + d
-  std::array<RestLink<double>, kDirections> rest{};  ///< of each direction
-  std::array<Padded<float>, kUp> stiffness;          ///< of the link in direction kUp + d; 0 where it is odd
-  std::vector<OddLink> odd;                          ///< from each of their ends, by rising node
-  std::vector<std::size_t> first_odd;                ///< of each block, and one more
+  std::array<std::ptrdiff_t, kUp> distance{};  ///< by direction kUp + d: distance of a node's neighbour in the arrays
+  std::array<RestLink<double>, kDirections> rest{};  ///< by direction
+  /// By direction kUp + d: spring constant of the link, N/mm; 0 where the link is odd.
+  std::array<Padded<float>, kUp> stiffness;
+  std::vector<OddLink> odd;            ///< each odd link once from each of its ends, by rising node
+  std::vector<std::size_t> first_odd;  ///< by block: its first odd link; and one entry more
 
   explicit SpringGrid(const Model& model);
   std::size_t blocks() const { return (nodes + kBlock - 1) / kBlock; }
@@ -62,24 +64,25 @@ struct SpringGrid {
   }
 };
 
-/// Nodes begin to end of a grid: a block.
+/// Nodes of a block, from `begin` up to but not including `end`.
 struct NodeRange {
   std::size_t begin, end;
 };
 
-/// Spring matrices of regular links up, and of odd ones.
+/// Spring matrices of the regular links upwards, and of the odd ones.
 struct SpringMatrices {
-  std::array<std::array<Padded<float>, 4>, kUp> up;  ///< across.x, .y, .z and even
+  std::array<std::array<Padded<float>, 4>, kUp> up;  ///< across.x, across.y, across.z and even
   std::vector<SpringMatrix<float>> odd;
 };
 
-/// Forces of springs on the nodes of a block. @return half their energies
+/// Computes the forces of springs on the nodes of a block. @return half the energy of these springs
 double sweep_forces(const SpringGrid& grid, NodeRange range, const PaddedVectors<double>& displacement,
                     PaddedVectors<double>& force);
-/// Matrices of links from the nodes of a block.
+/// Computes the matrices of the links from the nodes of a block.
 void sweep_matrices(const SpringGrid& grid, NodeRange range, const PaddedVectors<double>& displacement, Stiffness kind,
                     SpringMatrices& matrices);
-/// Of each node the sum of matrices times the node's vector less its neighbour's.
+/// Computes, for each node of a block, the sum over its links of the link's matrix times the node's vector minus the
+/// neighbour's.
 void sweep_product(const SpringGrid& grid, NodeRange range, const SpringMatrices& matrices,
                    const PaddedVectors<float>& vector, PaddedVectors<float>& product);
 

@@ -10,9 +10,9 @@
 
 namespace tetwarp::simulate {
 
-inline constexpr int kUp = kDirections / 2;  ///< first of the directions that lead to higher vertices
+inline constexpr int kUp = kDirections / 2;  ///< the first of the directions that lead to higher vertices
 
-/// A link at rest: from a node to its neighbour, mm.
+/// A link at rest: the vector from a node to its neighbour, mm.
 template <class T>
 struct RestLink {
   glm::vec<3, T> along;
@@ -24,18 +24,18 @@ TETWARP_HD T dot3(const glm::vec<3, T>& a, const glm::vec<3, T>& b) {
   return a.x * b.x + a.y * b.y + a.z * b.z;
 }
 
-/// A spring as it is now.
+/// A spring at the present displacement.
 template <class T>
 struct Stretched {
   glm::vec<3, T> unit;  ///< from the node to its neighbour
-  T elongation;         ///< mm, length minus rest length
-  T tension;            ///< elongation over length: below 1, and below 0 where compressed
+  T elongation;         ///< mm: length minus rest length
+  T tension;            ///< elongation over length: below 1, and negative where the spring is compressed
 };
 
-/// @param apart  displacement of the neighbour minus that of the node, mm
+/// The spring of a link. @param apart  displacement of the neighbour minus that of the node, mm
 ///
-/// With rest vector r and e apart, |r + e| - |r| = (2 r.e + e.e) / (|r + e| + |r|): exactly 0 where e is 0, and without
-/// the cancellation of the difference of two lengths. A spring without length pulls nowhere.
+/// With rest vector r and e = apart, |r + e| - |r| = (2 r.e + e.e) / (|r + e| + |r|): exactly 0 where e is 0, and
+/// without the cancellation in the difference of two lengths. A spring without length pulls nowhere.
 template <class T>
 TETWARP_HD Stretched<T> stretched(const RestLink<T>& rest, const glm::vec<3, T>& apart) {
   const T grown = 2 * dot3(rest.along, apart) + dot3(apart, apart);
@@ -45,11 +45,14 @@ TETWARP_HD Stretched<T> stretched(const RestLink<T>& rest, const glm::vec<3, T>&
   return {(rest.along + apart) / length, elongation, elongation / length};
 }
 
-/// What is taken for the second derivative of the energy, k [(1 - t) n n^T + t I] of each spring with direction n.
+/// Which matrix stands for the second derivative of the energy. Each spring with direction n and constant k adds k [(1
+/// - t) n n^T + t I], with t as follows.
 enum class Stiffness : std::uint8_t {
-  laplacian,  ///< t = 1: springs that keep their directions, the global step of the local/global scheme; never too soft
-  projected,  ///< t = tension, 0 where compressed: no spring gives way sideways, so never indefinite
-  full,       ///< t = tension: Newton's
+  /// t = 1: springs keep their directions. This is the global step of the local/global scheme, and never too soft.
+  laplacian,
+  /// t = tension, 0 where compressed: no spring gives way sideways, so the matrix is never indefinite.
+  projected,
+  full,  ///< t = tension: the exact second derivative, for Newton's method
 };
 
 template <class T>
@@ -69,7 +72,8 @@ struct Symmetric {
   TETWARP_HD void add(const Symmetric& o) { xx += o.xx, xy += o.xy, xz += o.xz, yy += o.yy, yz += o.yz, zz += o.zz; }
 };
 
-/// k [(1 - t) n n^T + t I] of one spring as across across^T + even I: k and 1 - t are never negative.
+/// The matrix k [(1 - t) n n^T + t I] of one spring, kept as across across^T + even I, for k and 1 - t are never
+/// negative.
 template <class T>
 struct SpringMatrix {
   glm::vec<3, T> across;
@@ -82,7 +86,7 @@ struct SpringMatrix {
   }
 };
 
-/// Second derivative of one spring's energy, computed in double, in float.
+/// Second derivative of one spring's energy, computed in double and stored in float.
 TETWARP_HD inline SpringMatrix<float> spring_matrix(const Stretched<double>& spring, double stiffness, Stiffness kind) {
   const double t = sideways(kind, spring.tension), root = std::sqrt(stiffness * (1 - t));
   const glm::dvec3 across = root * spring.unit;
@@ -90,9 +94,9 @@ TETWARP_HD inline SpringMatrix<float> spring_matrix(const Stretched<double>& spr
           static_cast<float>(stiffness * t)};
 }
 
-/// Inverse of a node's sum of spring matrices, for the preconditioner. Where springs leave the node a way to give, or
-/// more than that, it is made definite: a little of the trace is added, and if that does not do, the trace is all that
-/// is taken.
+/// Inverse of a node's sum of spring matrices, for the preconditioner. The sum is singular, or worse, where springs let
+/// the node give way in some direction. So a little of the trace is added and, if that does not make it definite, the
+/// trace alone is inverted.
 template <class T>
 TETWARP_HD Symmetric<T> inverse_block(Symmetric<T> s) {
   const T trace = s.xx + s.yy + s.zz, little = T(1e-4) * trace;

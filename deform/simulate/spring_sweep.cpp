@@ -5,11 +5,11 @@
 
 #include "deform/simulate/spring_grid.h"
 
-// Compiled once for each instruction set.
+// Highway compiles this file once for each instruction set.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "deform/simulate/spring_sweep.cpp"
 #include <hwy/foreach_target.h>
-// After it, as Highway asks.
+// Highway wants this include after that one.
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
@@ -18,17 +18,17 @@ namespace tetwarp::simulate::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Every instruction set gives the same bits: vectors are of one length, and nothing is fused.
+/// All instruction sets give the same bits, for vectors have the same length and no operations are fused.
 using Doubles = hn::CappedTag<double, 8>;
 using Halves = hn::Rebind<float, Doubles>;
 using Floats = hn::CappedTag<float, 16>;
 
-/// Springs in one direction, as they are now.
+/// Springs in one direction at the present displacement.
 struct Springs {
-  hn::Vec<Doubles> x, y, z;  ///< from a node to its neighbour
+  hn::Vec<Doubles> x, y, z;  ///< unit vector from a node to its neighbour
   hn::Vec<Doubles> length, elongation;
 
-  /// As `stretched`.
+  /// Computes what `stretched` computes, with the same operations.
   HWY_INLINE Springs(const RestLink<double>& rest, const PaddedVectors<double>& u, std::size_t n,
                      std::ptrdiff_t distance) {
     const Doubles d;
@@ -50,12 +50,12 @@ struct Springs {
   }
 };
 
-/// Whether a direction leads up or down, and where the number of a link is kept: at its lower end.
-struct Way {
+/// Whether a direction leads up or down, and at which end of a link its number is kept: the lower one.
+struct LinkSide {
   std::size_t up;
   std::ptrdiff_t distance, kept;
 
-  HWY_INLINE Way(const SpringGrid& grid, int direction) {
+  HWY_INLINE LinkSide(const SpringGrid& grid, int direction) {
     const bool is_up = direction >= kUp;
     up = static_cast<std::size_t>(is_up ? direction : opposite(direction)) - kUp;
     distance = is_up ? grid.distance[up] : -grid.distance[up];
@@ -71,7 +71,7 @@ double forces(const SpringGrid& grid, NodeRange range, const PaddedVectors<doubl
   for (std::size_t n = range.begin; n < range.end; n += lanes) {
     auto fx = hn::Zero(d), fy = hn::Zero(d), fz = hn::Zero(d), energy = hn::Zero(d);
     for (int direction = 0; direction < kDirections; ++direction) {
-      const Way way(grid, direction);
+      const LinkSide way(grid, direction);
       const Springs springs(grid.rest[static_cast<std::size_t>(direction)], u, n, way.distance);
       const auto k = hn::PromoteTo(d, hn::LoadU(df, grid.stiffness[way.up].data() + n + way.kept));
       const auto pull = hn::Mul(k, springs.elongation), share = hn::Div(pull, springs.length);
@@ -120,7 +120,7 @@ void product(const SpringGrid& grid, NodeRange range, const SpringMatrices& matr
   float* const out[3] = {result[0].data(), result[1].data(), result[2].data()};
   for (float* values : out) std::fill(values + range.begin, values + range.end, 0.0f);
   for (int direction = 0; direction < kDirections; ++direction) {
-    const Way way(grid, direction);
+    const LinkSide way(grid, direction);
     const float* entry[4];
     for (std::size_t i = 0; i < 4; ++i) entry[i] = matrix.up[way.up][i].data() + way.kept;
     const float* const in[3] = {vector[0].data(), vector[1].data(), vector[2].data()};

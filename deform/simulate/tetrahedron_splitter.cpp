@@ -23,7 +23,8 @@ Triangle sorted(std::uint32_t a, std::uint32_t b, std::uint32_t c) {
 constexpr int kFaces[4][3] = {{0, 1, 2}, {0, 1, 3}, {0, 2, 3}, {1, 2, 3}};
 constexpr int kEdges[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
 
-/// Two triangles of a quadrilateral, by the diagonal at its lowest vertex: the same seen from either side.
+/// Adds the two triangles of a quadrilateral. The diagonal begins at the lowest vertex, so that both sides choose the
+/// same.
 void add_quadrilateral(const std::array<std::uint32_t, 4>& round, std::vector<Triangle>& triangles) {
   const auto lowest = static_cast<std::size_t>(std::min_element(round.begin(), round.end()) - round.begin());
   const auto at = [&](std::size_t n) { return round[(lowest + n) % 4]; };
@@ -139,11 +140,11 @@ void TetrahedronSplitter::split(const Tetrahedron& whole, bool is_through, std::
   fill(above, whole.cell, result);
 }
 
-/// Splits a face by what is marked on its edges, the same from both its sides.
+/// Splits a face at the marks on its edges, in the same way from both of its sides.
 void TetrahedronSplitter::split_face(std::uint32_t a, std::uint32_t b, std::uint32_t c, Skin& above, Skin& below) {
   const auto skin_of = [&](std::uint32_t vertex) -> Skin& { return side_[vertex] < 0 ? below : above; };
   const std::uint32_t round[3] = {a, b, c};
-  std::uint32_t mark[3];  // on the edge after each vertex
+  std::uint32_t mark[3];  // the mark on the edge after each vertex
   int marks = 0;
   for (int n = 0; n < 3; ++n) {
     mark[n] = on_edge(round[n], round[(n + 1) % 3]);
@@ -161,7 +162,7 @@ void TetrahedronSplitter::split_face(std::uint32_t a, std::uint32_t b, std::uint
     for (int side = 0; side < 2; ++side)
       skin_of(side ? second : first).push_back(pieces[static_cast<std::size_t>(side)]);
   } else {
-    const int n = mark[0] == kNone ? 2 : mark[1] == kNone ? 0 : 1;  // the vertex between both marks
+    const int n = mark[0] == kNone ? 2 : mark[1] == kNone ? 0 : 1;  // the vertex between the two marks
     const std::uint32_t alone = round[n], next = round[(n + 1) % 3], before = round[(n + 2) % 3];
     const std::uint32_t to_next = mark[n], to_before = mark[(n + 2) % 3];
     pieces.push_back(sorted(alone, to_next, to_before));
@@ -172,7 +173,7 @@ void TetrahedronSplitter::split_face(std::uint32_t a, std::uint32_t b, std::uint
   if (is_severed(sorted(a, b, c))) severed_.insert(pieces.begin(), pieces.end());
 }
 
-/// Closes both sides along the cut.
+/// Closes both parts of a tetrahedron by the section of the cut with it.
 void TetrahedronSplitter::sever(const Tetrahedron& whole, Skin& above, Skin& below) {
   std::vector<std::uint32_t> up, down;
   for (const std::uint32_t vertex : whole.vertex) (side_[vertex] < 0 ? down : up).push_back(vertex);
@@ -192,7 +193,8 @@ void TetrahedronSplitter::sever(const Tetrahedron& whole, Skin& above, Skin& bel
   }
 }
 
-/// A part of a tetrahedron is the cone from its middle over its skin, or a tetrahedron itself.
+/// Adds the tetrahedra of a part: those between its middle and each triangle of its skin, or, if it has four corners,
+/// itself.
 void TetrahedronSplitter::fill(const Skin& skin, std::uint64_t cell, std::vector<Tetrahedron>& result) {
   std::vector<std::uint32_t> corners;
   for (const Triangle& triangle : skin) corners.insert(corners.end(), triangle.begin(), triangle.end());

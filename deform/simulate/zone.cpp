@@ -37,7 +37,7 @@ std::vector<std::uint8_t> where_point(const Patient& patient, const Inside& insi
   return result;
 }
 
-/// One overload a shape.
+/// Marks the vertices of a zone, with one overload for each kind of shape.
 struct Selector {
   const Patient& patient;
 

@@ -15,7 +15,8 @@ shift 3
 [[ $tasks =~ ^[1-9][0-9]*$ ]] || { echo "submit.sh: error: N is \"$tasks\"; expected a number of tasks" >&2; exit 2; }
 [[ $manifest != -* ]] || manifest=./$manifest  # a name that begins with a dash is no option
 [[ $out != -* ]] || out=./$out
-"${TETWARP:-tetwarp}" batch "$manifest" -o "$out" --dry-run >/dev/null  # what is wrong with it is better known now
+"${TETWARP:-tetwarp}" batch "$manifest" -o "$out" --dry-run >/dev/null  # checks the manifest before anything is submitted
 array=$(sbatch --parsable --array="1-$tasks" "$@" "$here/slurm_array.sh" "$manifest" "$out")
-# afterany: cases that failed are results too, and end their task with status 3. Names go as arguments, never as text of a shell.
+# afterany: a task with failed cases ends with status 3, and its results are joined, too. Names are passed as arguments,
+# never within the text of a shell.
 sbatch --parsable --dependency="afterany:$array" "$here/slurm_merge.sh" "$manifest" "$out"

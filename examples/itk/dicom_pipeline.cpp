@@ -33,13 +33,13 @@ namespace {
 
 using ImageType = itk::Image<short, 3>;
 
-/// The series of most slices that makes a volume.
+/// The series with the most slices among those that make a volume.
 const tetwarp::DicomSeries& choose(const tetwarp::DicomScan& scan, const std::string& folder) {
   const tetwarp::DicomSeries* chosen = nullptr;
   std::string refusal = "no DICOM series";
   for (const tetwarp::DicomSeries& series : scan.series) {
     if (series.refusal || series.uneven)
-      refusal = series.refusal ? *series.refusal : *series.uneven;  // an image of ITK has even slices
+      refusal = series.refusal ? *series.refusal : *series.uneven;  // slices of an ITK image are even
     else if (!chosen || series.slices.size() > chosen->slices.size())
       chosen = &series;
   }
@@ -47,7 +47,7 @@ const tetwarp::DicomSeries& choose(const tetwarp::DicomScan& scan, const std::st
   return *chosen;
 }
 
-/// What ITK makes of the files that it finds under a series UID.
+/// The image that ITK makes of the files that it finds under a series UID.
 ImageType::Pointer read_by_itk(const std::string& folder, const std::string& series_uid) {
   const auto names = itk::GDCMSeriesFileNames::New();
   names->SetUseSeriesDetails(false);
@@ -66,7 +66,7 @@ void print(const char* reader, const tetwarp::Geometry& grid) {
               grid.origin.y, grid.origin.z);
 }
 
-/// How far apart two grids of one size place a corner, mm.
+/// The distance of corresponding corners of two grids of one size, mm; the largest of all corners.
 double apart_mm(const tetwarp::Geometry& a, const tetwarp::Geometry& b) {
   double most = 0;
   for (int corner = 0; corner < 8; ++corner) {
@@ -77,7 +77,8 @@ double apart_mm(const tetwarp::Geometry& a, const tetwarp::Geometry& b) {
   return most;
 }
 
-/// @throws InputError unless all voxels are equal, and no corner is further apart than a nanometre
+/// Compares the voxels and the places of two volumes. @throws InputError unless all voxels are equal, and no corner is
+/// further apart than a nanometre
 void require_equal(const ImageType& by_itk, const ImageType& by_tetwarp) {
   const tetwarp::Geometry a = tetwarp::geometry_of(by_itk), b = tetwarp::geometry_of(by_tetwarp);
   print("ITK reads", a);
@@ -99,7 +100,7 @@ void require_equal(const ImageType& by_itk, const ImageType& by_tetwarp) {
   std::printf("equal: all %zu voxels, and where they lie\n", count);
 }
 
-/// Plays a scenario on a CT, to its end.
+/// Plays a scenario on a CT to its end and returns the field.
 itk::VertexField::Pointer simulate(const ImageType& ct, const std::string& scenario_file) {
   using namespace tetwarp::simulate;
   const Scenario scenario = tetwarp::read_scenario(scenario_file);
@@ -125,8 +126,8 @@ void run(const std::string& folder, const std::string& scenario, const std::stri
   const auto warp = itk::VertexFieldResampleImageFilter<ImageType>::New();
   warp->SetInput(ct);
   warp->SetVertexField(simulate(*ct, scenario));
-  warp->SetDefaultPixelValue(-1024);                                             // air, where nothing comes to lie
-  if (dicom.padding) warp->SetPadding(dicom.padding->low, dicom.padding->high);  // outside the scanner's circle
+  warp->SetDefaultPixelValue(-1024);  // air, for voxels where nothing comes to lie
+  if (dicom.padding) warp->SetPadding(dicom.padding->low, dicom.padding->high);  // values outside the scanner's circle
   const auto median = itk::MedianImageFilter<ImageType, ImageType>::New();
   median->SetInput(warp->GetOutput());
   median->SetRadius(1);
@@ -135,7 +136,8 @@ void run(const std::string& folder, const std::string& scenario, const std::stri
   writer->SetFileName(output);
   writer->UseCompressionOn();
   writer->Update();
-  tetwarp::require(std::filesystem::exists(output), "cannot write " + output);  // ITK's NIfTI writer does not throw
+  // Needed since ITK's NIfTI writer does not throw.
+  tetwarp::require(std::filesystem::exists(output), "cannot write " + output);
 
   const tetwarp::Report& report = warp->GetReport();
   std::printf(

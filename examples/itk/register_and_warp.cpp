@@ -43,8 +43,8 @@ using ImageType = itk::Image<float, 3>;
 using PullType = itk::DisplacementFieldTransform<float, 3>;
 
 constexpr float kAir = -1000;        // HU
-constexpr double kCoarseMm = 8;      // voxels to register on
-constexpr double kRoundingHu = 0.1;  // of float coordinates, 2^-16 mm, on the steepest slope of a CT
+constexpr double kCoarseMm = 8;      // voxels of this size are registered
+constexpr double kRoundingHu = 0.1;  // rounding of float coordinates, 2^-16 mm, on the steepest slope of a CT
 
 ImageType::Pointer read(const std::string& path) {
   const auto reader = itk::ImageFileReader<ImageType>::New();
@@ -69,7 +69,8 @@ ImageType::Pointer coarse(const ImageType* image) {
   return shrink->GetOutput();
 }
 
-/// A map of points of `from` to points of `to`: a displacement on each voxel of a coarse grid, smoothed in every step.
+/// Registers two images. The result maps points of `from` to points of `to`: a displacement at each voxel of a coarse
+/// grid, smoothed in every step.
 itk::Transform<double, 3, 3>::Pointer register_images(const ImageType* from, const ImageType* to) {
   using TransformType = itk::GaussianSmoothingOnUpdateDisplacementFieldTransform<double, 3>;
   using MetricType = itk::MeanSquaresImageToImageMetricv4<ImageType, ImageType>;
@@ -80,14 +81,14 @@ itk::Transform<double, 3, 3>::Pointer register_images(const ImageType* from, con
   grid->Allocate(true);
   const auto transform = TransformType::New();
   transform->SetDisplacementField(grid);
-  transform->SetGaussianSmoothingVarianceForTheUpdateField(3);  // voxels
+  transform->SetGaussianSmoothingVarianceForTheUpdateField(3);  // voxels squared
   transform->SetGaussianSmoothingVarianceForTheTotalField(0.5);
 
   const auto metric = MetricType::New();
   const auto scales = itk::RegistrationParameterScalesFromPhysicalShift<MetricType>::New();
   scales->SetMetric(metric);
   const auto optimizer = itk::GradientDescentOptimizerv4::New();
-  optimizer->SetScalesEstimator(scales);  // the first step moves no point further than a voxel
+  optimizer->SetScalesEstimator(scales);  // so that the first step moves no point further than a voxel
   optimizer->SetNumberOfIterations(50);
   optimizer->SetReturnBestParametersAndValue(true);
 
@@ -113,8 +114,8 @@ double mean_squares(const ImageType& a, const ImageType& b) {
   return sum / static_cast<double>(count);
 }
 
-/// Says how far the two warps agree. Where nothing comes to lie there is no inverse, and ITK, which interpolates it,
-/// has none beside such voxels either: these are counted, not compared.
+/// Prints how far the two warps agree. Where nothing comes to lie there is no inverse. ITK interpolates the inverse and
+/// has no value beside such voxels either. Those voxels are counted, not compared.
 /// @return whether all others agree to rounding
 bool compare(const ImageType& by_tetwarp, const ImageType& by_itk, const PullType& pull) {
   const std::size_t count = by_itk.GetPixelContainer()->Size();

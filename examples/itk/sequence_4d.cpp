@@ -32,7 +32,7 @@ namespace {
 using ImageType = itk::Image<short, 3>;
 using WarpType = itk::VertexFieldResampleImageFilter<ImageType>;
 
-/// Seconds since the last call.
+/// Measures the seconds since its last call.
 class Watch {
  public:
   double lap() {
@@ -44,7 +44,7 @@ class Watch {
   std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
 };
 
-/// The most memory that this process ever had.
+/// The largest amount of memory that this process has had, MB.
 double peak_megabytes() {
   rusage usage;
   getrusage(RUSAGE_SELF, &usage);

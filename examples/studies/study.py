@@ -44,7 +44,7 @@ def tetwarp(*arguments, good=(0,)):
 
 
 def source(options):
-    """The CT as OUTPUT/ct.nii.gz, in HU: of the series as it is, or a phantom of 400 x 400 x 320 mm."""
+    """Writes the CT as OUTPUT/ct.nii.gz, in HU: the series as it is, or a phantom of 400 x 400 x 320 mm."""
     options.output.mkdir(parents=True, exist_ok=True)
     path = options.output / "ct.nii.gz"
     if path.exists():
@@ -63,7 +63,7 @@ def read(path):
 
 
 def segment(hu):
-    """1 soft tissue, 2 lung, 3 bone: a segmentation network's place is taken by thresholds."""
+    """Labels by thresholds, which stand in for a segmentation network: 1 soft tissue, 2 lung, 3 bone."""
     labels = numpy.zeros(hu.shape, numpy.uint8)
     labels[hu > -300] = 1
     labels[(hu > -930) & (hu < -500)] = 2
@@ -72,7 +72,7 @@ def segment(hu):
 
 
 def label_map(options, ct):
-    """OUTPUT/labels.nii.gz on the grid of the CT."""
+    """Writes the labels as OUTPUT/labels.nii.gz, on the grid of the CT."""
     path = options.output / "labels.nii.gz"
     if not path.exists():
         hu, image = read(ct)
@@ -81,7 +81,7 @@ def label_map(options, ct):
 
 
 def dice(a, b):
-    """Of each label that either has, by label."""
+    """The Dice coefficient of each label that either volume has, by label."""
     scores = {}
     for label in sorted(set(numpy.unique(a)) | set(numpy.unique(b)) - {0}):
         if label:
@@ -91,7 +91,7 @@ def dice(a, b):
 
 
 def along(path, output):
-    """An entry of `with`, IN=OUT, which leaves no room for another = in IN."""
+    """An entry of `with`, IN=OUT. Refuses an IN that has a = in it, for the program could not tell where IN ends."""
     path = str(pathlib.Path(path).resolve())
     if "=" in path:
         sys.exit(f"a path with = cannot go along, {path}; rename it")

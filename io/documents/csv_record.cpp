@@ -30,9 +30,9 @@ bool CsvRecords::next() {
   return true;
 }
 
-/// Leaves `next_` at the comma or line feed behind it, or at the end of the text.
+/// Takes the next field. Leaves `next_` at the comma or line feed behind it, or at the end of the text.
 void CsvRecords::take_field() {
-  Span field{next_, 0};
+  TextSpan field{next_, 0};
   if (field.begin < text_.size() && text_[field.begin] == '"') {
     std::size_t at = field.begin + 1;
     for (; at < text_.size(); ++at) {
@@ -65,7 +65,7 @@ std::string unquoted(std::string_view field) {
   std::string value;
   for (std::size_t n = 1; n + 1 < field.size(); ++n) {
     value += field[n];
-    if (field[n] == '"') ++n;  // the second of two
+    if (field[n] == '"') ++n;  // a quotation mark within quotes is written twice
   }
   return value;
 }

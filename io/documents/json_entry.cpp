@@ -22,7 +22,7 @@ std::string text_of(double value) {
   return text;
 }
 
-/// Letters to insert, remove or replace to make one word of another (Levenshtein 1966).
+/// The least number of letters to insert, remove or replace to make one word from another (Levenshtein 1966).
 std::size_t distance(const std::string& a, const std::string& b) {
   std::vector<std::size_t> row(b.size() + 1);
   std::iota(row.begin(), row.end(), 0);
@@ -92,7 +92,8 @@ const std::string& JsonEntry::text() const {
   expect(JsonTree::Kind::text, "a text");
   if (tree_->text.empty()) refuse("is empty; a text is expected");
   const auto characters = static_cast<std::size_t>(
-      std::count_if(tree_->text.begin(), tree_->text.end(), [](char c) { return (c & 0xC0) != 0x80; }));  // of UTF-8
+      // Characters of UTF-8: bytes that do not continue one.
+      std::count_if(tree_->text.begin(), tree_->text.end(), [](char c) { return (c & 0xC0) != 0x80; }));
   if (characters > kLongestText)
     refuse("has " + std::to_string(characters) + " characters; a text of at most " + std::to_string(kLongestText) +
            " is expected");

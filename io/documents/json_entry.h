@@ -3,7 +3,7 @@
 
 #pragma once
 
-// Private to io/: values of a JSON document that is checked while it is read.
+// Private to io/: values of a JSON document, checked while they are read.
 #include <initializer_list>
 #include <span>
 #include <string>
@@ -14,16 +14,18 @@
 
 namespace tetwarp {
 
-/// The numbers that are accepted: from `low` to `high`; `low` itself unless `above` is set.
+/// Numbers that are accepted: from `low` to `high`, without `low` itself if `above` is set.
 struct NumberRange {
   double low, high;
   bool above = false;
 
   bool contains(double value) const { return value <= high && (above ? value > low : value >= low); }
-  std::string text() const;  ///< "from 0 to 1", "above 0, to 1e+06"
+  /// The range for messages: "from 0 to 1", "above 0, to 1e+06".
+  std::string text() const;
 };
 
-/// A value, what it is called ("move[1].handle.radius_mm") and where it stands. Refers to tree and file name.
+/// A value of a JSON document, what it is called ("move[1].handle.radius_mm") and where it stands. It refers to the
+/// tree and the file name, which must outlive it.
 ///
 /// Every function throws InputError, "FILE:LINE: NAME is FOUND; EXPECTED is expected", for a value that is not of its
 /// kind.
@@ -33,7 +35,7 @@ class JsonEntry {
   JsonEntry(const JsonTree& tree, std::string path, const std::string& file, const char* whole)
       : tree_(&tree), file_(&file), path_(std::move(path)), whole_(whole) {}
 
-  /// "FILE:LINE: NAME WHAT"
+  /// Throws InputError, "FILE:LINE: NAME WHAT".
   [[noreturn]] void refuse(const std::string& what) const;
   const std::string& path() const { return path_; }
   std::size_t line() const { return tree_->line; }

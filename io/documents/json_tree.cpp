@@ -17,12 +17,12 @@ namespace {
 
 constexpr std::size_t kDeepest = 64, kLongestQuote = 120, kLargestFile = std::size_t{1} << 20;
 
-/// Lines up to the byte that was taken last, and up to the one before it.
+/// The number of the line in which the byte that was taken last stands, and of the one before it.
 struct LineCount {
   std::size_t line = 1, before = 1;
 };
 
-/// Bytes for nlohmann's lexer, which says nothing of lines: they are counted as it takes them.
+/// Gives bytes to nlohmann's lexer, which says nothing of lines, and counts the lines as it takes them.
 class CountingIterator {
  public:
   using iterator_category = std::input_iterator_tag;
@@ -52,7 +52,7 @@ class CountingIterator {
   LineCount* count_;
 };
 
-/// Builds the tree of what nlohmann's parser finds.
+/// Builds the tree from the events of nlohmann's parser.
 class Builder final : public nlohmann::json_sax<nlohmann::json> {
  public:
   Builder(const std::string& name, const LineCount& count) : name_(name), count_(count) {}
@@ -67,7 +67,7 @@ class Builder final : public nlohmann::json_sax<nlohmann::json> {
   bool string(string_t& value) override {
     return add({.kind = JsonTree::Kind::text, .line = count_.line, .text = std::move(value)});
   }
-  bool binary(binary_t&) override { return false; }  // not in text
+  bool binary(binary_t&) override { return false; }  // text has no binary values
   bool start_object(std::size_t) override { return open(JsonTree::Kind::object); }
   bool start_array(std::size_t) override { return open(JsonTree::Kind::list); }
   bool end_object() override {
@@ -84,7 +84,7 @@ class Builder final : public nlohmann::json_sax<nlohmann::json> {
   bool parse_error(std::size_t, const std::string& token, const nlohmann::detail::exception& error) override {
     const std::string where = name_ + ":" + std::to_string(count_.before) + ": ";
     if (error.id == 406) throw InputError(where + "the number " + printable(token) + " is too large");
-    std::string what = error.what();  // "[json...] parse error at line 3, column 5: syntax error while ..."
+    std::string what = error.what();  // for example "[json...] parse error at line 3, column 5: syntax error while ..."
     if (const auto begin = what.find(": "); begin != std::string::npos) what.erase(0, begin + 2);
     throw InputError(where + "no JSON: " + printable(what));
   }
@@ -92,7 +92,7 @@ class Builder final : public nlohmann::json_sax<nlohmann::json> {
   JsonTree take() { return std::move(root_); }
 
  private:
-  /// A number's end is known by the byte behind it, which has been taken.
+  /// Adds a number. The lexer has already taken the byte behind it, which may have begun a new line.
   bool add_number(double value) {
     return add({.kind = JsonTree::Kind::number, .line = count_.before, .number = value});
   }

@@ -20,7 +20,7 @@ constexpr std::size_t kMostEntries = 1000, kMostTissues = 255;
 constexpr std::int64_t kMostFrames = 10000, kLargestCell = 512, kMostSteps = 1000000;
 constexpr NumberRange kModulus{1e-6, 1e9}, kCompression{0, 1}, kLimit{0, 100};
 
-/// `move[1] "left lip" (line 14)`: what messages call an entry when the file is read.
+/// What messages call an entry when a scenario is read: `move[1] "left lip" (line 14)`.
 std::string called(const JsonEntry& entry) {
   const std::string name = entry.has("name") ? " \"" + printable(entry.at("name").text()) + "\"" : "";
   return entry.path() + name + " (line " + std::to_string(entry.line()) + ")";
@@ -68,7 +68,7 @@ Move read_move(const JsonEntry& entry, Method method) {
   entry.only(kKeys);
   Move move{.what = {}, .how = {}, .entry = called(entry)};
   if (entry.one_of(std::span(kKeys).first(2)) == 0) {
-    move.what = read_region(entry.at("region"));
+    move.what = read_zone(entry.at("region"));
   } else {
     constexpr std::array<const char*, 3> kHandleKeys = {"at", "radius_mm", "radius_body"};
     const JsonEntry handle = entry.at("handle");
@@ -180,7 +180,7 @@ Scenario read_whole(const JsonEntry& entry) {
   if (entry.has("tissues")) scenario.tissues = read_tissues(entry.at("tissues"));
   if (entry.has("hold")) {
     for (const JsonEntry& item : entry.at("hold").items(0, kMostEntries))
-      scenario.hold.push_back({read_region(item), item.path() + " (line " + std::to_string(item.line()) + ")"});
+      scenario.hold.push_back({read_zone(item), item.path() + " (line " + std::to_string(item.line()) + ")"});
   }
   if (entry.has("cuts")) scenario.cuts = read_cuts(entry.at("cuts"));
   scenario.phases = read_phases(entry, scenario);

@@ -16,7 +16,7 @@ constexpr NumberRange kLengthMm{0, 1e5, true}, kLengthBody{0, 100, true}, kHu{-1
 constexpr std::size_t kMostParts = 1000, kMostPoints = 10000, kMostLabels = 10000;
 constexpr std::int64_t kLargestLabel = std::int64_t{1} << 53;
 
-/// The object's keys are `keys` and no others.
+/// Refuses an object that has other keys than `keys`.
 void only(const JsonEntry& entry, std::initializer_list<const char*> keys) { entry.only({keys.begin(), keys.size()}); }
 
 void require_true(const JsonEntry& entry) {
@@ -25,7 +25,7 @@ void require_true(const JsonEntry& entry) {
 
 std::vector<Zone> read_regions(const JsonEntry& entry) {
   std::vector<Zone> regions;
-  for (const JsonEntry& item : entry.items(1, kMostParts)) regions.push_back(read_region(item));
+  for (const JsonEntry& item : entry.items(1, kMostParts)) regions.push_back(read_zone(item));
   return regions;
 }
 
@@ -68,7 +68,7 @@ constexpr RegionReader kRegions[] = {
     {"body", read_body},
     {"all_of", [](const JsonEntry& entry) { return Zone{AllOf{read_regions(entry)}}; }},
     {"any_of", [](const JsonEntry& entry) { return Zone{AnyOf{read_regions(entry)}}; }},
-    {"not", [](const JsonEntry& entry) { return Zone{Not{{read_region(entry)}}}; }},
+    {"not", [](const JsonEntry& entry) { return Zone{Not{{read_zone(entry)}}}; }},
 };
 
 SweptCutPlan read_swept(const JsonEntry& entry) {
@@ -98,7 +98,7 @@ Length read_length(const JsonEntry& entry, const char* key_mm, const char* key_b
   return {entry.at(key_body).number(kLengthBody), Unit::body};
 }
 
-Zone read_region(const JsonEntry& entry) {
+Zone read_zone(const JsonEntry& entry) {
   std::vector<const char*> keys;
   for (const RegionReader& reader : kRegions) keys.push_back(reader.key);
   entry.only(keys);

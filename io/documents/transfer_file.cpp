@@ -32,7 +32,7 @@ Projection read_projection(const JsonEntry& entry) {
   return Projection::composite;
 }
 
-/// Each projection has the keys that it looks at, and no other.
+/// Reads a point of a transfer function. It has the keys that its projection looks at, and no others.
 TransferPoint read_point(const JsonEntry& entry, Projection projection) {
   constexpr std::array<const char*, 3> kComposite = {"value", "colour", "opacity"};
   constexpr std::array<const char*, 2> kMaximum = {"value", "colour"}, kSum = {"value", "density"};

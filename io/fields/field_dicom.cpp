@@ -29,7 +29,7 @@ class Values {
  public:
   Values(DcmItem& item, std::string file) : item_(item), file_(std::move(file)) {}
 
-  /// @throws InputError unless there are `count` finite numbers
+  /// The numbers of an attribute. @throws InputError unless there are `count` of them, all finite
   std::vector<double> numbers(const DcmTagKey& tag, unsigned long count) const {
     DcmElement* element = nullptr;
     require(item_.findAndGetElement(tag, element).good() && element != nullptr,
@@ -48,7 +48,8 @@ class Values {
   const std::string& file() const { return file_; }
 
  private:
-  /// NaN where it cannot be read. Grid Dimensions are of VR UL, which DCMTK does not give as Float64.
+  /// One number of an attribute; NaN where it cannot be read. Grid Dimensions are of VR UL, which DCMTK does not give
+  /// as Float64.
   double number(const DcmTagKey& tag, unsigned long n) const {
     double value = 0;
     if (item_.findAndGetFloat64(tag, value, n).good()) return value;
@@ -60,7 +61,7 @@ class Values {
   std::string file_;
 };
 
-/// The one item of a sequence; null: there is none. @throws InputError for several
+/// The only item of a sequence; null: it has none. @throws InputError for several items
 DcmItem* only_item(DcmItem& item, const DcmTagKey& tag, const std::string& file) {
   DcmSequenceOfItems* sequence = nullptr;
   if (item.findAndGetSequence(tag, sequence).bad() || sequence == nullptr || sequence->card() == 0) return nullptr;
@@ -69,7 +70,7 @@ DcmItem* only_item(DcmItem& item, const DcmTagKey& tag, const std::string& file)
   return sequence->getItem(0);
 }
 
-/// The grid (C.20.3.1.1): its third axis is row x column, whatever the patient's axes are.
+/// The grid of the vectors (C.20.3.1.1). Its third axis is row x column, whatever the patient's axes are.
 Geometry grid_of(const Values& values) {
   const std::vector<double> position = values.numbers(DCM_ImagePositionPatient, 3),
                             cosines = values.numbers(DCM_ImageOrientationPatient, 6),
@@ -77,7 +78,8 @@ Geometry grid_of(const Values& values) {
                             resolution = values.numbers(DCM_GridResolution, 3);
   const glm::dvec3 row(cosines[0], cosines[1], cosines[2]), column(cosines[3], cosines[4], cosines[5]);
   const bool is_rotation = std::abs(glm::length(row) - 1) <= 1e-3 && std::abs(glm::length(column) - 1) <= 1e-3 &&
-                           std::abs(glm::dot(row, column)) <= 1e-3;  // as of slices: three digits are round-off
+                           // Cosines of three digits are round-off, as for slices.
+                           std::abs(glm::dot(row, column)) <= 1e-3;
   require(is_rotation, tag_name(DCM_ImageOrientationPatient) + " of the grid is no rotation, " + values.file() +
                            "; expected two unit vectors at a right angle");
   for (const double value : size) {
@@ -95,7 +97,7 @@ Geometry grid_of(const Values& values) {
   return grid;
 }
 
-/// A Matrix Registration Sequence (C.20.2.1.1, row by row); the identity where there is none.
+/// The matrix of a Matrix Registration Sequence (C.20.2.1.1, row by row); the identity where there is none.
 AffineMap matrix_of(DcmItem& item, const DcmTagKey& sequence, const std::string& file) {
   DcmItem* only = only_item(item, sequence, file);
   if (only == nullptr) return {};
@@ -128,7 +130,7 @@ class RegistrationFile {
   DcmItem& item(std::size_t n) { return *items_->getItem(static_cast<unsigned long>(n - 1)); }
   DcmItem* grid(std::size_t n) { return only_item(item(n), DCM_DeformableRegistrationGridSequence, file_); }
 
-  /// The number of the item that is meant. @param wanted  0: the only one with a grid
+  /// The number of the item to read. @param wanted  0: the only one with a grid
   std::size_t choose(std::size_t wanted) {
     std::size_t with_grid = 0, last = 0;
     for (std::size_t n = 1; n <= count(); ++n) {
@@ -168,7 +170,7 @@ class RegistrationFile {
 
 // --- the field
 
-/// Vector Grid Data (C.20.3.1.3): three floats a vector, i fastest, as many as the grid has.
+/// Vector Grid Data (C.20.3.1.3): three floats a vector, i fastest, one vector for each vertex of the grid.
 DcmElement& vectors_of(DcmItem& grid, const Geometry& geometry, const std::string& file) {
   DcmElement* element = nullptr;
   grid.findAndGetElement(DCM_VectorGridData, element);
@@ -183,8 +185,8 @@ DcmElement& vectors_of(DcmItem& grid, const Geometry& geometry, const std::strin
   return *element;
 }
 
-/// The source point is Post(Pre(x) + offset) for a point x of the grid (C.20.3.1.1), so the displacement
-/// Post(Pre(x)) - x + Post.linear * offset.
+/// Reads the displacements of a registration. For a point x of the grid the source point is Post(Pre(x) + offset)
+/// (C.20.3.1.1), so the displacement is Post(Pre(x)) - x + Post.linear * offset.
 class RegistrationReader final : public FieldReader {
  public:
   RegistrationReader(FieldFileHeader header, std::string name, std::unique_ptr<RegistrationFile> file,
@@ -222,14 +224,14 @@ class RegistrationReader final : public FieldReader {
   std::string name_;
   std::unique_ptr<RegistrationFile> file_;  // owns `vectors_`
   DcmElement& vectors_;
-  AffineMap from_point_;    // a point of the grid to where both matrices move it, as a displacement
-  glm::dmat3 from_vector_;  // an offset to a displacement
-  bool identity_;           // the offsets are the displacements
+  AffineMap from_point_;    // from a point x of the grid to Post(Pre(x)) - x
+  glm::dmat3 from_vector_;  // from an offset to its part of the displacement: Post.linear
+  bool identity_;           // both maps are identities, so the offsets are the displacements
 };
 
 // --- the format
 
-/// 0: not given. @throws InputError for what is no number from 1 up
+/// The item that the option names; 0: the option is not given. @throws InputError for what is no number from 1 up
 std::size_t wanted_item(const FieldSource& source) {
   const auto found = source.options.find("item");
   if (found == source.options.end()) return 0;

@@ -16,13 +16,13 @@
 namespace tetwarp {
 namespace {
 
-/// False also for a name that no file can have, which std::filesystem throws at.
+/// Whether a path exists; false also for a name that no file can have, for which std::filesystem throws.
 bool is_there(const std::filesystem::path& path) {
   std::error_code ignored;
   return std::filesystem::exists(path, ignored);
 }
 
-/// The format that takes the file; null: none.
+/// The format that claims the file; null: none does.
 const FieldFormat* format_of(const std::filesystem::path& path) {
   if (!is_file(path)) return find_field_format(path, "");
   std::string first(kFirstBytes, '\0');
@@ -46,7 +46,7 @@ std::unique_ptr<FieldReader> open_field(const FieldSource& source) {
   return required_format(source.path).open(source);
 }
 
-/// @param gaps  whether a displacement may be NaN
+/// Refuses displacements that are not finite. @param gaps  whether a displacement may be NaN: the file has none there
 void require_finite(const std::vector<glm::vec3>& displacement, const Geometry& grid, bool gaps,
                     const std::string& file) {
   const auto is_good = [gaps](float value) { return std::isfinite(value) || (gaps && std::isnan(value)); };
@@ -123,7 +123,7 @@ FieldSource parse_field_source(const std::string& text) {
 
 void check_field_options(const FieldSource& source) {
   const FieldFormat* format = format_of(source.path);
-  if (format == nullptr) return;  // refused when it is read
+  if (format == nullptr) return;  // a file of no known format is refused when it is read
   if (format->check_options) return format->check_options(source);
   require(source.options.empty(), "the option \"" + (source.options.empty() ? "" : source.options.begin()->first) +
                                       "\" for " + source.path.string() + "; files of its format take none");

@@ -3,8 +3,8 @@
 
 #pragma once
 
-// Private to io/: the seam between field_file.cpp and the formats that it reads. docs/guide/new-format.md shows
-// what one more takes: a pair of files, a line of CMake, a test.
+// Private to io/: what field_file.cpp knows of the formats that it reads. docs/guide/new-format.md shows what a further
+// format takes: a pair of files, a line of CMake, a test.
 #include <filesystem>
 #include <memory>
 #include <span>
@@ -15,17 +15,18 @@
 
 namespace tetwarp {
 
-/// How much of a file is looked at to know its format: DICOM's mark is at 128.
+/// How many bytes of a file are looked at to know its format; DICOM's mark is at 128.
 inline constexpr std::size_t kFirstBytes = 132;
 
-/// A field file whose header was read and found to fit the file's length.
+/// A field file whose header was read and fits the file's length.
 class FieldReader {
  public:
   explicit FieldReader(FieldFileHeader header) : header_(std::move(header)) {}
   virtual ~FieldReader() = default;
 
   const FieldFileHeader& header() const { return header_; }
-  /// Fills one displacement a vertex of `header().grid`, i fastest: LPS mm, relative, whatever the file has.
+  /// Fills one displacement for each vertex of `header().grid`, i fastest: LPS mm and relative to the vertex, whatever
+  /// the file has.
   /// @throws InputError for a file that is truncated or damaged; numbers that are not finite pass through
   virtual void read(std::span<glm::vec3> displacement) const = 0;
 
@@ -34,19 +35,20 @@ class FieldReader {
 };
 
 struct FieldFormat {
-  /// Whether the file is of this format, by its suffix or its first bytes (up to `kFirstBytes`; fewer of a
-  /// shorter file, none where it cannot be read).
+  /// Whether a file is of this format, by its suffix or its first bytes (`kFirstBytes` of them; fewer of a shorter
+  /// file, none where it cannot be read).
   bool (*claims)(const std::filesystem::path& path, std::string_view first_bytes);
-  /// Whether a claimed file holds a field rather than a volume; null: always. @throws InputError as `open`
+  /// Whether a claimed file holds a field rather than a volume; null: it always does. @throws InputError for what
+  /// `open` refuses
   bool (*holds_field)(const FieldSource& source);
-  /// @throws InputError naming the file and what to give; null: the format takes no options
+  /// Checks the options; null: the format takes none. @throws InputError naming the file and what to give
   void (*check_options)(const FieldSource& source);
-  /// Reads and checks the header; allocates nothing that the file's length does not warrant. @throws InputError
+  /// Reads and checks the header. It allocates no more than the file's length warrants. @throws InputError
   std::unique_ptr<FieldReader> (*open)(const FieldSource& source);
 };
 
-/// Of all formats, in the order of io/CMakeLists.txt (the file is made there), the first that claims the file; null:
-/// none.
+/// The first format that claims the file, in the order of io/CMakeLists.txt, from which this function is made; null:
+/// none does.
 const FieldFormat* find_field_format(const std::filesystem::path& path, std::string_view first_bytes);
 
 }  // namespace tetwarp

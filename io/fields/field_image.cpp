@@ -11,8 +11,9 @@
 namespace tetwarp {
 namespace {
 
-/// Vectors whose frame is not the grid's LPS would be turned silently. NRRD is the format that can say so.
-/// @return  whether it says LPS
+/// Refuses vectors that the file says are in another frame than LPS, for they would be turned silently. NRRD is the
+/// only format that can say so.
+/// @return whether the file says LPS
 bool require_lps_vectors(const std::filesystem::path& path) {
   const TextHeader text = read_text_header(path, ImageFormat::nrrd);
   const std::string space = text["space"];

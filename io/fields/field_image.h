@@ -3,8 +3,8 @@
 
 #pragma once
 
-// Private to io/. Fields in volume files with three components a voxel (image_file.h): MHA and NRRD, as ITK,
-// plastimatch and Slicer write them; and what the NIfTI adapter shares with them.
+// Private to io/. Reads fields in volume files with three components a voxel (image_file.h): MHA and NRRD, as ITK,
+// plastimatch and Slicer write them. The NIfTI adapter shares its functions.
 #include <functional>
 #include <memory>
 #include <span>
@@ -19,17 +19,19 @@ inline constexpr const char* kDirectionKey = "tetwarp_direction";
 
 extern const FieldFormat kFieldFormat_image;
 
-/// @throws InputError unless it has three floats or doubles a voxel
+/// Opens a volume file. @throws InputError unless it has three floats or doubles a voxel
 std::unique_ptr<ImageReader> open_vectors(const std::filesystem::path& path, NiftiFrame frame = NiftiFrame::sform);
 
-/// The direction by `kDirectionKey` and what follows from it: Tetwarp writes the key only to LPS mm displacements.
+/// Takes the direction of the field (forward or pull) from the key `kDirectionKey`, where the file has it, and frame
+/// and units with it: Tetwarp writes the key only to displacements in LPS mm.
 /// @throws InputError for a direction that is neither
 void read_stated_direction(const ImageHeader& image, const std::string& file, FieldFileHeader& header);
 
-/// One vector a voxel, as it is.
+/// Reads one vector a voxel, unchanged.
 std::vector<glm::dvec3> read_double_vectors(const ImageReader& reader);
 
-/// Fills one vector a voxel. @param to_mm  from the vector in the file and its vertex number; empty: as it is
+/// Reads one vector a voxel. @param to_mm  maps a vector of the file and its vertex number to what is stored; empty:
+/// vectors are stored unchanged
 void read_vectors(const ImageReader& reader, std::span<glm::vec3> vectors,
                   const std::function<glm::dvec3(const glm::dvec3&, std::size_t)>& to_mm = {});
 

@@ -17,8 +17,8 @@ namespace {
 constexpr int kDisplacementVector = 1006;
 constexpr glm::dvec3 kLpsFromRas(-1, -1, 1);
 
-/// The types of NiftyReg's files (reg-lib/cpu/_reg_maths.h, NREG_TRANS_TYPE, in intent_p1), of which those with a name
-/// here cannot be read.
+/// By the type of a NiftyReg file (reg-lib/cpu/_reg_maths.h, NREG_TRANS_TYPE, which intent_p1 holds): the name of a
+/// type that cannot be read, null for one that can.
 constexpr std::array<const char*, 7> kNiftyRegRefused = {nullptr,
                                                          nullptr,
                                                          "a cubic B-spline control point grid",
@@ -60,7 +60,8 @@ class NiftiFieldReader final : public FieldReader {
     if (header_.frame == "LPS") return read_vectors(*image_, displacement);
     if (!header_.absolute) {
       return read_vectors(*image_, displacement,
-                          [](const glm::dvec3& vector, std::size_t) { return kLpsFromRas * vector + 0.0; });  // no -0
+                          // + 0.0 makes 0 of -0
+                          [](const glm::dvec3& vector, std::size_t) { return kLpsFromRas * vector + 0.0; });
     }
     const AffineMap point = point_from_index(header_.grid);
     const glm::i64vec3 size = header_.grid.size;
@@ -76,7 +77,8 @@ class NiftiFieldReader final : public FieldReader {
 
 bool claims(const std::filesystem::path& path, std::string_view) { return image_format(path) == ImageFormat::nifti; }
 
-/// NiftyReg goes by the sform where there is one, whatever its code and whoever asks.
+/// Which frame of a NIfTI file to use: NiftyReg uses the sform where there is one, whatever its code, so its files are
+/// read like this whatever the user chose.
 NiftiFrame frame_of(const FieldSource& source, const NiftiHeader& nifti) {
   return nifti.intent_name.starts_with("NREG_") ? NiftiFrame::sform : source.nifti_frame;
 }

@@ -3,7 +3,7 @@
 
 #pragma once
 
-// Private to io/. Fields in NIfTI-1 files: vectors (intent 1007) as ITK and ANTs write them, displacement vectors
+// Private to io/. Reads fields in NIfTI-1 files: vectors (intent 1007) as ITK and ANTs write them, displacement vectors
 // (1006, DISPVECT), and NiftyReg's deformation and displacement fields.
 #include "io/fields/field_format.h"
 

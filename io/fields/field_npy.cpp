@@ -18,14 +18,14 @@ namespace tetwarp {
 namespace {
 
 constexpr std::string_view kMagic = "\x93NUMPY";
-constexpr std::size_t kLongestHeader = 10'000;  // of its text; NumPy itself reads no longer one
+constexpr std::size_t kLongestHeader = 10'000;  // bytes of the header's text; NumPy itself reads no longer one
 
-/// What the header says.
+/// What the header of a file says of its array.
 struct Array {
   VoxelType type = VoxelType::f32;
   bool big_endian = false, fortran = false;
   std::array<std::int64_t, 4> shape{};
-  std::uint64_t offset = 0;  ///< of the first value
+  std::uint64_t offset = 0;  ///< byte at which the values begin
 };
 
 std::uint32_t little_endian(std::string_view bytes) {
@@ -38,7 +38,7 @@ std::string_view without_spaces(std::string_view text) {
   return text.substr(std::min(text.find_first_not_of(' '), text.size()));
 }
 
-/// What stands behind `'key':` in the header's dictionary. @throws InputError
+/// The text behind `'key':` in the header's dictionary. @throws InputError where the key is missing
 std::string_view value_of(std::string_view dictionary, const std::string& key, const std::string& file) {
   const std::size_t at = dictionary.find("'" + key + "'");
   const std::string missing = "a header without '" + key + "', " + file + "; expected a .npy file as NumPy writes it";
@@ -71,7 +71,7 @@ void parse_shape(std::string_view value, const std::string& file, Array& array) 
     require(error == std::errc() && size >= 1,
             "the shape " + text + ", " + file + "; expected at least 1 on every axis");
     rest = without_spaces(rest.substr(static_cast<std::size_t>(stop - rest.data())));
-    if (rest.starts_with('L')) rest = without_spaces(rest.substr(1));  // of Python 2
+    if (rest.starts_with('L')) rest = without_spaces(rest.substr(1));  // a long integer of Python 2, "42L"
     if (rest.starts_with(',')) rest = without_spaces(rest.substr(1));
     if (axes < 4) array.shape[axes] = size;
   }
@@ -80,7 +80,7 @@ void parse_shape(std::string_view value, const std::string& file, Array& array) 
                                                 (axes == 4 && array.shape[0] == 3 ? ": numpy.moveaxis(a, 0, -1)" : ""));
 }
 
-/// The values must end where the file does.
+/// Refuses a file that does not end where its values do.
 void require_file_fits(const Array& array, const std::filesystem::path& path) {
   double expected = static_cast<double>(size_bytes(array.type));
   for (const std::int64_t size : array.shape) expected *= static_cast<double>(size);
@@ -93,7 +93,7 @@ void require_file_fits(const Array& array, const std::filesystem::path& path) {
                                 " bytes of values, but " + text + " x " + to_string(array.type) + " are expected");
 }
 
-/// @throws InputError for all that is wrong with the file
+/// Reads and checks the header. @throws InputError for whatever is wrong with the file
 Array read_array_header(const std::filesystem::path& path) {
   require_readable_file(path);
   const std::string file = path.string();
@@ -190,13 +190,14 @@ class NpyReader final : public FieldReader {
     const glm::dmat3 mm =
         header_.frame == "RAS" ? glm::dmat3(-1, 0, 0, 0, -1, 0, 0, 0, 1) : point_from_index(header_.grid).linear;
     for (glm::vec3& d : displacement) {
-      const bool infinite = std::isinf(d.x) || std::isinf(d.y) || std::isinf(d.z);  // stays, and is not made a NaN
-      if (!infinite) d = glm::vec3(mm * glm::dvec3(d) + 0.0);                       // no -0
+      // Infinity times zero would give NaN, so an infinite vector stays.
+      const bool infinite = std::isinf(d.x) || std::isinf(d.y) || std::isinf(d.z);
+      if (!infinite) d = glm::vec3(mm * glm::dvec3(d) + 0.0);  // + 0.0 makes 0 of -0
     }
   }
 
  private:
-  /// Where axis `axis` of the array steps to in the displacements, in floats.
+  /// How many floats apart neighbours along each axis of the array lie in the displacements.
   std::array<std::size_t, 4> strides() const {
     const auto x = static_cast<std::size_t>(header_.grid.size.x), y = static_cast<std::size_t>(header_.grid.size.y);
     std::array<std::size_t, 4> steps = {3, 3 * x, 3 * x * y, 1};
@@ -204,7 +205,7 @@ class NpyReader final : public FieldReader {
     return steps;
   }
 
-  /// The file's values in its order, a plane of its two fastest axes at once, each to its place.
+  /// Reads the values in the file's order, a plane of its two fastest axes at a time, and puts each in its place.
   template <class Value, class Bits>
   void read_as(std::span<glm::vec3> displacement) const {
     std::array<std::size_t, 4> extent{}, stride = strides();
@@ -219,7 +220,7 @@ class NpyReader final : public FieldReader {
     std::vector<Bits> plane(extent[2] * extent[3]);
     auto* const values = reinterpret_cast<float*>(displacement.data());
     const bool swap = array_.big_endian != (std::endian::native == std::endian::big);
-    // Components that stand z first go backwards from 2.
+    // Components that the file has in the order z, y, x go backwards from 2.
     const auto place = [&](std::size_t axis, std::size_t i) {
       return stride[axis] * (axis == component_axis && !components_xyz_ ? 2 - i : i);
     };

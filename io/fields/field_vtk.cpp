@@ -15,8 +15,9 @@
 namespace tetwarp {
 namespace {
 
-constexpr double kOffLattice = 1e-3;  // of the smallest step: how far a vertex may lie from its place
-constexpr double kRightAngle = 1e-4;  // the largest cosine between two axes
+// How far a point may lie from its place in the lattice, as part of the smallest step.
+constexpr double kOffLattice = 1e-3;
+constexpr double kRightAngle = 1e-4;  // the largest cosine of the angle between two axes
 
 void check_options(const FieldSource& source) {
   for (const auto& [key, value] : source.options) {
@@ -28,7 +29,7 @@ void check_options(const FieldSource& source) {
   }
 }
 
-/// @throws InputError that lists the vectors of the file
+/// Chooses the vectors that are the displacement. @throws InputError that lists the vectors of the file
 VtkArray displacement_of(const VtkFile& file, const FieldSource& source) {
   std::vector<VtkArray> vectors;
   std::set<std::string> names;
@@ -57,7 +58,7 @@ VtkArray displacement_of(const VtkFile& file, const FieldSource& source) {
   return chosen[0];
 }
 
-/// Where a lattice lies: at index i the point is corner + steps * i, in the file's frame and units.
+/// A lattice in the file's frame and units: at index i the point is corner + steps * i.
 struct Lattice {
   glm::dvec3 corner{0};
   glm::dmat3 steps{1};
@@ -69,7 +70,7 @@ std::string vertex_name(std::uint64_t number, const glm::i64vec3& size) {
          std::to_string(n / (size.x * size.y)) + ")";
 }
 
-/// Steps along which a grid goes; an axis with one point has none.
+/// Refuses a grid with one point on an axis, which has no step there.
 void require_two_an_axis(const VtkFile& file) {
   require(std::min({file.size.x, file.size.y, file.size.z}) > 1,
           "a grid of " + to_string(file.size) + " points, " + file.name + "; expected at least 2 on every axis");
@@ -100,7 +101,7 @@ void require_on_lattice(const glm::dvec3& point, const glm::dvec3& place, double
                    " are allowed; an irregular grid goes as a mesh (.vtu)");
 }
 
-/// Of a structured grid, by its corners; then every point is looked at.
+/// The lattice of a structured grid, by its corners. @throws InputError where a point is not in its place
 Lattice lattice_of_points(const VtkFile& file) {
   require_two_an_axis(file);
   const glm::i64vec3 size = file.size;
@@ -176,7 +177,7 @@ Lattice lattice_of(const VtkFile& file) {
   throw InputError("no grid, " + file.name + "; expected a StructuredGrid, ImageData or a RectilinearGrid");
 }
 
-/// @param to_lps_mm  from the file's frame and units
+/// The geometry of the grid in LPS mm. @param to_lps_mm  factors that turn the file's frame and units into LPS mm
 Geometry grid_of(const VtkFile& file, const glm::dvec3& to_lps_mm) {
   const Lattice lattice = lattice_of(file);
   Geometry grid;
@@ -185,7 +186,7 @@ Geometry grid_of(const VtkFile& file, const glm::dvec3& to_lps_mm) {
   for (int axis = 0; axis < 3; ++axis) {
     const glm::dvec3 step = to_lps_mm * lattice.steps[axis];
     grid.spacing[axis] = glm::length(step);
-    grid.direction[axis] = step / grid.spacing[axis] + 0.0;  // no -0
+    grid.direction[axis] = step / grid.spacing[axis] + 0.0;  // + 0.0 makes 0 of -0
   }
   require_valid(grid, file.name);
   return grid;
@@ -205,7 +206,7 @@ class VtkFieldReader final : public FieldReader {
     file_->read_all(vectors_, [&](std::uint64_t first, std::span<const double> values) {
       for (std::uint64_t n = 0; n < values.size() / 3; ++n) {
         const glm::dvec3 vector(values[3 * n], values[3 * n + 1], values[3 * n + 2]);
-        displacement[first + n] = glm::vec3(to_lps_mm_ * vector + 0.0);  // no -0
+        displacement[first + n] = glm::vec3(to_lps_mm_ * vector + 0.0);  // + 0.0 makes 0 of -0
       }
     });
   }

@@ -16,24 +16,27 @@ namespace tetwarp {
 namespace {
 
 constexpr glm::dvec3 kLpsFromRas(-1, -1, 1);
-constexpr double kFirstByte = 352;  // of a file without header extensions
-constexpr double kRounding = 1e-3;  // of a control point: the header's floats may put the border of the image outside
+constexpr double kFirstByte = 352;  // where values begin in a file without header extensions
+// Part of the distance of control points: the floats of the header may put the border of the image so far outside.
+constexpr double kRounding = 1e-3;
 
 struct ControlPoints {
   Geometry grid;
-  std::vector<glm::dvec3> displacement;  // LPS mm, i fastest; the B-spline of points at rest is the identity
+  // LPS mm, i fastest. Displacements are blended, not positions: the B-spline of positions at rest is the identity, so
+  // both give the same.
+  std::vector<glm::dvec3> displacement;
 };
 
-/// The four control points that reach a place on one axis, and their weights.
-struct Reach {
+/// The four control points on one axis that have weight at an index, and their weights.
+struct Support {
   std::array<std::int64_t, 4> at{};
   std::array<double, 4> weight{};
   bool inside = true;
 };
 
-Reach reach(double index, std::int64_t size) {
+Support support_of(double index, std::int64_t size) {
   const auto last = static_cast<double>(size - 1), base = std::floor(index), t = index - base, s = 1 - t;
-  Reach result;
+  Support result;
   for (std::size_t n = 0; n < 4; ++n)
     result.at[n] = static_cast<std::int64_t>(std::clamp(base - 1 + static_cast<double>(n), 0.0, last));
   result.weight = {s * s * s / 6, (3 * t * t * t - 6 * t * t + 4) / 6, (3 * s * s * s - 6 * s * s + 4) / 6,
@@ -44,7 +47,7 @@ Reach reach(double index, std::int64_t size) {
 
 glm::dvec3 displacement_at(const ControlPoints& points, const glm::dvec3& index, bool& inside) {
   const glm::i64vec3 size = points.grid.size;
-  const Reach x = reach(index.x, size.x), y = reach(index.y, size.y), z = reach(index.z, size.z);
+  const Support x = support_of(index.x, size.x), y = support_of(index.y, size.y), z = support_of(index.z, size.z);
   inside = x.inside && y.inside && z.inside;
   glm::dvec3 sum(0);
   for (std::size_t c = 0; c < 4; ++c) {
@@ -59,7 +62,7 @@ glm::dvec3 displacement_at(const ControlPoints& points, const glm::dvec3& index,
 
 ControlPoints read_control_points(const std::filesystem::path& path) {
   const std::string file = path.string();
-  const auto image = open_vectors(path);  // the file holds what its header says
+  const auto image = open_vectors(path);  // also checks that the file is as long as its header says
   const NiftiHeader nifti = read_nifti_header(path);
   ControlPoints points{nifti.sform_code > 0 ? nifti.sform : nifti.qform, {}};
   const glm::i64vec3 size = points.grid.size;

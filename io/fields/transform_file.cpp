@@ -34,8 +34,9 @@ const char* name_of(TransformTool tool) {
   return tool == TransformTool::plastimatch ? "plastimatch" : "ITK";
 }
 
-/// ITK's transforms come in a module of their own: their libraries would take their time of every start.
-/// @param path  of the file that needs it
+/// A function of the module with ITK's transforms. It is a module of its own since loading ITK's libraries would slow
+/// every start of the program.
+/// @param path  the file to read, for the message where the module is missing
 template <class Function>
 Function* in_module(const char* name, const std::filesystem::path& path) {
   auto* const function = reinterpret_cast<Function*>(find_in_module(TETWARP_TRANSFORM_MODULE, name));
@@ -94,7 +95,7 @@ bool is_transform_file(const std::filesystem::path& path) {
   try {
     return is_niftyreg_spline(read_nifti_header(path));
   } catch (const InputError&) {
-    return false;  // whoever takes it for a volume or a field says why
+    return false;  // refused with a reason when it is read as a volume or a field
   }
 }
 

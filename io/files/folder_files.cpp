@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// @throws InputError in the system's words
+/// The folder without links. @throws InputError in the system's words
 fs::path real(const fs::path& folder) {
   std::error_code error;
   const fs::path path = fs::canonical(folder, error);
@@ -42,7 +42,8 @@ class Listing {
     for (const fs::directory_entry& entry : entries) add_entry(entry);
   }
 
-  /// A file behind a link counts unless it lies in a folder that was listed: there it was met as itself.
+  /// Adds files behind links and returns the list. A link does not count if it leads into a folder that was listed, for
+  /// then the file itself is listed.
   FolderFiles finish() {
     std::set<fs::path> targets;
     for (const auto& [link, target] : links_) {
@@ -85,8 +86,8 @@ class Listing {
   fs::path root_;
   bool with_sub_folders_;
   const std::stop_token& stop_;
-  std::set<fs::path> folders_;                        ///< real ones
-  std::vector<std::pair<fs::path, fs::path>> links_;  ///< to files, and where they lead
+  std::set<fs::path> folders_;                        ///< folders that were listed, without links
+  std::vector<std::pair<fs::path, fs::path>> links_;  ///< links to files, and the files that they lead to
   FolderFiles found_;
 };
 

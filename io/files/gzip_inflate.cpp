@@ -26,7 +26,7 @@
 namespace tetwarp {
 namespace {
 
-/// A file open for reading at any place, from many threads.
+/// A file that many threads may read at any place.
 class InputFile {
  public:
   explicit InputFile(const std::filesystem::path& path) : descriptor_(::open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
@@ -57,7 +57,7 @@ class InputFile {
   std::uint64_t size_ = 0;
 };
 
-/// Memory that is not filled first.
+/// Memory that is allocated but not filled with zeros.
 class Buffer {
  public:
   explicit Buffer(std::size_t size) : bytes_(std::make_unique_for_overwrite<std::byte[]>(size)), size_(size) {}
@@ -73,7 +73,8 @@ class Inflater {
   Inflater() : decompressor_(libdeflate_alloc_decompressor()) {
     if (!decompressor_) throw std::bad_alloc();
   }
-  /// Inflates the member that `packed` starts with, and moves both spans past what was read and written.
+  /// Inflates the member with which `packed` starts, and moves both spans past what was read and written.
+  /// @return whether the member is whole and fits
   bool inflate(std::span<const std::byte>& packed, std::span<std::byte>& plain) const {
     std::size_t read = 0, written = 0;
     const libdeflate_result result = libdeflate_gzip_decompress_ex(decompressor_.get(), packed.data(), packed.size(),
@@ -110,7 +111,7 @@ struct Member {
   std::size_t bytes = 0, plain_bytes = 0;
 };
 
-/// The member at `begin`, where its header says how long it is. Time, level and system (bytes 4 to 9) may be any.
+/// The member at `begin`, if its header states its length. Time, level and system (bytes 4 to 9) may have any value.
 std::optional<Member> stated_member(const InputFile& file, std::uint64_t begin, std::uint64_t plain_begin) {
   std::array<std::byte, kMemberHeaderBytes> header;
   std::array<std::byte, 4> plain_bytes;
@@ -134,8 +135,8 @@ bool ends_at(const InputFile& file, std::uint64_t begin) {
   return true;
 }
 
-/// The file's members from `begin` on, if all state their size, are as small as ours, hold `size` plain bytes and end
-/// the file.
+/// The file's members from `begin` on, if all state their size, are no larger than those that `write_gzip` makes, hold
+/// `size` plain bytes and end the file; else none.
 std::vector<Member> stated_members(const InputFile& file, std::uint64_t size, std::uint64_t begin) {
   std::vector<Member> members;
   std::uint64_t plain = 0;
@@ -149,7 +150,8 @@ std::vector<Member> stated_members(const InputFile& file, std::uint64_t size, st
   return members;
 }
 
-/// A file of stated members: nothing but their places is held.
+/// Plain bytes of a file whose members state their size: it keeps only where each member lies, and inflates it when it
+/// is read.
 class StatedMembers {
  public:
   StatedMembers(std::shared_ptr<const InputFile> file, std::vector<Member> members)
@@ -198,7 +200,8 @@ bool read_whole(const InputFile& file, std::uint64_t begin, std::span<std::byte>
   return good;
 }
 
-/// One member after the other from `begin` on, until `plain` is full and no member is left.
+/// Inflates one member after the other from `begin` on. @return whether they are undamaged, fill `plain` exactly, and
+/// nothing but zeros follows
 bool inflate_in_order(const InputFile& file, std::uint64_t begin, std::span<std::byte> plain) {
   if (begin > file.size()) return false;
   const Buffer buffer(static_cast<std::size_t>(file.size() - begin));
@@ -219,7 +222,7 @@ PlainBytes inflate_at_once(const std::filesystem::path& path, std::uint64_t size
     return StatedMembers(file, std::move(members));
   if (size > kInflateAtMost) return {};
   const auto held = std::make_shared<const Buffer>(static_cast<std::size_t>(size));
-  prepare_memory(held->bytes(), 0);  // one thread inflates
+  prepare_memory(held->bytes(), 0);  // by all threads, since only one inflates
   if (!inflate_in_order(*file, begin, held->bytes())) return {};
   return [held](std::uint64_t offset, std::span<std::byte> bytes) {
     const std::span<const std::byte> all = held->bytes();

@@ -24,7 +24,7 @@ struct FreeCompressor {
   void operator()(libdeflate_compressor* compressor) const { libdeflate_free_compressor(compressor); }
 };
 
-/// Makes one member after the other, in memory that it keeps.
+/// Makes gzip members one after the other, each in the same memory.
 class MemberMaker {
  public:
   void make(const PieceSource& piece, std::size_t i, int level) {
@@ -62,7 +62,8 @@ class MemberMaker {
 }  // namespace
 
 void write_gzip(std::ostream& out, std::size_t count, const PieceSource& piece, int level) {
-  // At most as many pieces as makers are under way, and they leave in order: no two have the same maker.
+  // At most as many pieces as there are makers are under way, and they leave in order, so no two of them have the same
+  // maker.
   std::vector<MemberMaker> makers(4 * static_cast<std::size_t>(tbb::this_task_arena::max_concurrency()));
   std::atomic<bool> failed = false;
   std::size_t next = 0;

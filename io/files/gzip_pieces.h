@@ -11,11 +11,11 @@
 
 namespace tetwarp {
 
-/// The most that one piece, and so one member of our gzip files, holds.
+/// The most plain bytes of a piece, and so of a member of the gzip files written here.
 constexpr std::size_t kGzipPieceBytes = std::size_t{1} << 20;
 
-/// The i-th piece of a stream: a view of the caller's memory, or of `scratch` after filling it. Called from many
-/// threads.
+/// Gives the i-th piece of a stream: a view of the caller's memory, or of `scratch` after filling it. Many threads may
+/// call it at a time.
 using PieceSource = std::function<std::span<const std::byte>(std::size_t i, std::vector<std::byte>& scratch)>;
 
 /// Writes the pieces 0 to `count` - 1 as a gzip file (RFC 1952) of one member a piece, compressed in parallel. The

@@ -32,7 +32,7 @@ struct GzipStream::State {
     throw InputError("truncated or damaged voxels (" + why + "), " + file + "; is the file whole?");
   }
 
-  /// What was read and not used goes to the front, and the file's next bytes behind it.
+  /// Moves bytes that were read and not used to the front of the buffer, and reads the file's next bytes behind them.
   void fill() {
     std::copy_n(zlib.next_in, zlib.avail_in, buffer.begin());
     stream.read(reinterpret_cast<char*>(buffer.data()) + zlib.avail_in,
@@ -41,7 +41,7 @@ struct GzipStream::State {
     zlib.avail_in += static_cast<uInt>(stream.gcount());
   }
 
-  /// Between members: begins the next; false at the end of the file.
+  /// Begins the next member, when the one before it has ended. @return false at the end of the file
   bool begin_member() {
     if (zlib.avail_in < 2) fill();
     const bool is_member = zlib.avail_in >= 2 && zlib.next_in[0] == Bytef{0x1f} && zlib.next_in[1] == Bytef{0x8b};
@@ -59,7 +59,7 @@ struct GzipStream::State {
     return false;
   }
 
-  /// One byte or more; none behind the last member.
+  /// Inflates one byte or more. @return how many; 0 behind the last member
   std::size_t read_some(std::span<std::byte> bytes) {
     const auto room = static_cast<uInt>(std::min<std::size_t>(bytes.size(), std::numeric_limits<uInt>::max()));
     zlib.next_out = reinterpret_cast<Bytef*>(bytes.data());
@@ -70,7 +70,7 @@ struct GzipStream::State {
       if (zlib.avail_in == 0) fail("the file ends early");
       const int status = inflate(&zlib, Z_NO_FLUSH);
       if (status == Z_STREAM_END)
-        in_member = false;  // CRC and length were right
+        in_member = false;  // zlib has compared CRC and length
       else if (status != Z_OK && status != Z_BUF_ERROR)
         fail(zlib.msg ? zlib.msg : "no gzip data");
     }

@@ -3,20 +3,22 @@
 
 #pragma once
 
-// Private to io/: functions in libraries ("modules") that are loaded when they are first called. Most runs need none of
-// them, and loading what they link would slow the start of each run.
+// Private to io/: functions in libraries ("modules") that are loaded when one of them is first called. Most runs need
+// no module, and loading the libraries that it links would slow the start of each run.
 #include <string>
 
 namespace tetwarp {
 
-/// A function of a module, which stays until the program ends. The module is looked for where the dynamic linker looks
-/// for the libraries of the program: `lib` of the build, or beside the program's folder.
+/// Finds a function of a module and loads the module, which stays until the program ends. The module is looked for
+/// where the dynamic linker looks for the libraries of the program: in `lib` of the build, or beside the program's
+/// folder.
 /// @param module    file name
 /// @param function  an extern "C" name
-/// @return  null if the module cannot be loaded, or has no such function
+/// @return null if the module cannot be loaded, or has no such function
 void* find_in_module(const char* module, const char* function);
 
-/// @param what       needs the module: "XML files of VTK"
+/// Throws the error of a file whose module is missing.
+/// @param what       what needs the module: "XML files of VTK"
 /// @param path       of the file that was to be read
 /// @param otherwise  what to do without the module, ", or ..."; empty: nothing
 /// @throws NotCompiled, always

@@ -16,7 +16,7 @@
 namespace tetwarp {
 namespace {
 
-/// The exception of the lowest index.
+/// Keeps the exception of the lowest index, so that it does not depend on threads which one is thrown.
 class FirstFailure {
  public:
   bool is_before(std::size_t index) const { return lowest_.load() < index; }
@@ -37,9 +37,9 @@ class FirstFailure {
 };
 
 /// Calls Control::progress from one thread at a time, with rising numbers.
-class Progress {
+class ProgressCount {
  public:
-  Progress(const Control& control, std::size_t count) : control_(control), count_(count) {}
+  ProgressCount(const Control& control, std::size_t count) : control_(control), count_(count) {}
   void one_more() {
     if (!control_.progress) return;
     const std::lock_guard lock(mutex_);
@@ -52,10 +52,11 @@ class Progress {
   std::mutex mutex_;
 };
 
-/// An arena of so many threads, which stays: oneTBB 2021.8 loses 7 kB for each that several threads worked in.
+/// An arena of so many threads. It is kept: oneTBB 2021.8 loses 7 kB for each arena in which several threads worked.
 tbb::task_arena& arena_of(int threads) {
   static std::mutex mutex;
-  static auto& arenas = *new std::map<int, tbb::task_arena>;  // oneTBB may end before static objects do
+  // Never destroyed, for oneTBB may end before static objects do.
+  static auto& arenas = *new std::map<int, tbb::task_arena>;
   const std::lock_guard lock(mutex);
   return arenas.try_emplace(threads, threads).first->second;
 }
@@ -65,7 +66,7 @@ tbb::task_arena& arena_of(int threads) {
 void for_each_index(std::size_t count, int threads, const Control& control,
                     const std::function<void(std::size_t)>& body) {
   FirstFailure failure;
-  Progress progress(control, count);
+  ProgressCount progress(control, count);
   const auto one = [&](std::size_t i) {
     if (control.stop.stop_requested() || failure.is_before(i)) return;
     try {
@@ -75,9 +76,9 @@ void for_each_index(std::size_t count, int threads, const Control& control,
       failure.record(i, std::current_exception());
     }
   };
-  const int usable = tbb::info::default_concurrency();  // asking for more would make oneTBB print a warning
+  const int usable = tbb::info::default_concurrency();  // a larger arena would make oneTBB print a warning
   arena_of(threads > 0 ? std::min(threads, usable) : usable).execute([&] {
-    tbb::this_task_arena::isolate(  // from other calls, which a thread that waits would take up meanwhile
+    tbb::this_task_arena::isolate(  // keeps a thread that waits from taking up work of other calls
         [&] { tbb::parallel_for(std::size_t{0}, count, one, tbb::simple_partitioner()); });
   });
   failure.rethrow();

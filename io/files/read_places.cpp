@@ -14,7 +14,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr int kMostLinks = 40;  // as the kernel
+constexpr int kMostLinks = 40;  // as many as the kernel follows
 
 fs::path folder_of(const fs::path& path) { return path.has_parent_path() ? path.parent_path() : fs::path("."); }
 
@@ -27,7 +27,7 @@ fs::path real_path(const fs::path& path) {
   for (;;) {
     const fs::path real = fs::canonical(there.empty() ? fs::path(".") : there, error);
     if (!error) return rest.empty() ? real : (real / rest).lexically_normal();
-    if (fs::is_symlink(there, error) && ++links <= kMostLinks) {  // one that leads nowhere, yet
+    if (fs::is_symlink(there, error) && ++links <= kMostLinks) {  // also a link that leads nowhere yet
       there = folder_of(there) / fs::read_symlink(there, error);
       if (!error) continue;
     }
@@ -35,7 +35,7 @@ fs::path real_path(const fs::path& path) {
     rest = rest.empty() ? there.filename() : there.filename() / rest;
     there = there.parent_path();
   }
-  return path.lexically_normal();  // the root, or the folder that the program works in, cannot be read
+  return path.lexically_normal();  // the root, or the working folder, cannot be read
 }
 
 std::optional<ReadPlaces::Identity> ReadPlaces::identity_of(const fs::path& path) {
@@ -50,8 +50,8 @@ void ReadPlaces::add_around(const fs::path& inner, std::size_t number) {
   }
 }
 
-/// The path itself, in its folder, whether or not it is a link. Of the many files of a folder the folder is resolved
-/// once.
+/// The path with its folder resolved but its own name as it is, whether or not it is a link. A folder of many files is
+/// resolved once.
 fs::path ReadPlaces::in_real_folder(const fs::path& path) {
   const fs::path plain = path.has_filename() ? path : path.parent_path(), name = plain.filename();
   if (name.empty() || name == "." || name == "..") return real_path(plain);
@@ -69,7 +69,7 @@ void ReadPlaces::add(const fs::path& path) {
   names_.emplace(real, number);
   if (const auto identity = identity_of(real)) identities_.emplace(*identity, number);
   add_around(real, number);
-  add_around(there, number);  // the folder of a link is around what is read, too
+  add_around(there, number);  // for a link, the folder in which it lies is not to be overwritten either
 }
 
 std::optional<fs::path> ReadPlaces::touched_by(const fs::path& output) const {
@@ -84,7 +84,7 @@ std::optional<fs::path> ReadPlaces::touched_by(const fs::path& output) const {
   if (const auto identity = identity_of(real)) {
     if (const auto found = around_.find(*identity); found != around_.end()) return given_[found->second];
   }
-  for (const auto& [name, number] : names_) {  // around what is not there
+  for (const auto& [name, number] : names_) {  // inputs that do not exist, which may lie below the output
     if (std::mismatch(real.begin(), real.end(), name.begin(), name.end()).first == real.end()) return given_[number];
   }
   return std::nullopt;

@@ -8,7 +8,7 @@
 namespace tetwarp {
 namespace {
 
-/// A character at the start of a text: its bytes, and its code point. No bytes: it is no UTF-8 (RFC 3629).
+/// The character with which a text begins: its bytes, and its code point. No bytes: it is no UTF-8 (RFC 3629).
 struct Character {
   std::size_t bytes = 0;
   char32_t code = 0;

@@ -31,8 +31,8 @@ namespace {
 std::string reason(int error) { return std::generic_category().message(error); }
 std::string reason(const std::error_code& error) { return error.message(); }
 
-/// The path without slashes and "." at its end; always with a last component. A ".." within it is left to the system,
-/// which follows links first: resolved in the text it may name another folder.
+/// The path without slashes and "." at its end, so that it has a last component. A ".." within it is left to the
+/// system, which follows links first: resolved in the text it may name another folder.
 fs::path named(const fs::path& target) {
   fs::path path = target;
   while (path.has_relative_path() && (!path.has_filename() || path.filename() == ".")) path = path.parent_path();
@@ -48,12 +48,12 @@ fs::path folder_of(const fs::path& path);
   throw Error(path.string() + " is no regular file; choose another name");
 }
 
-/// The path itself, or what a link of this name leads to, over any number of links. Nothing need be there yet: the
-/// links stay, and what they name is written.
+/// The path itself, or what a link of this name leads to, over any number of links. Links are kept and their targets
+/// are written; a target need not exist yet.
 fs::path followed(const fs::path& target) {
-  constexpr int kMostLinks = 40;  // as Linux has it
+  constexpr int kMostLinks = 40;  // as many as Linux follows
   std::error_code error;
-  // A pipe or terminal that a link of /proc leads to has no path of its own that could be named.
+  // A pipe or terminal to which a link in /proc leads has no path of its own that could be named.
   if (const fs::file_status status = fs::status(target, error); fs::is_other(status)) refuse_irregular(target);
   fs::path path = target;
   for (int links = 0; fs::is_symlink(fs::symlink_status(path, error)); ++links) {
@@ -61,14 +61,14 @@ fs::path followed(const fs::path& target) {
     if (!error && links == kMostLinks) error = std::make_error_code(std::errc::too_many_symbolic_link_levels);
     if (error)
       throw Error("cannot follow the link " + target.string() + ": " + reason(error) + "; choose another name");
-    path = folder_of(path) / next;  // the same as `next` where that is absolute
+    path = folder_of(path) / next;  // the same as `next` if that is absolute
   }
   return path;
 }
 
 fs::path folder_of(const fs::path& path) { return path.has_parent_path() ? path.parent_path() : fs::path("."); }
 
-/// Whether there is something under the name that would be lost. Throws where it may not be replaced at all.
+/// Whether something has this name that would be lost. @throws Error where it may not be replaced at all
 bool occupied(const fs::path& path, StagedOutput::Kind kind) {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
@@ -88,7 +88,7 @@ bool occupied(const fs::path& path, StagedOutput::Kind kind) {
   return !empty;
 }
 
-/// Everything in a folder and below, by name.
+/// Everything in a folder and below it, sorted by path.
 std::vector<fs::path> entries_of(const fs::path& folder) {
   std::vector<fs::path> entries;
   std::error_code error;
@@ -100,7 +100,8 @@ std::vector<fs::path> entries_of(const fs::path& folder) {
   return entries;
 }
 
-/// Throws unless the folder holds nothing but regular files that are ours; names the first that is not.
+/// Throws unless all regular files in the folder were written by Tetwarp and nothing but folders lies beside them;
+/// names the first file that was not.
 void require_ours(const fs::path& folder, bool (*is_ours)(const fs::path&)) {
   const std::vector<fs::path> entries = entries_of(folder);
   for_each_index(entries.size(), 0, {}, [&](std::size_t n) {
@@ -115,9 +116,9 @@ void require_ours(const fs::path& folder, bool (*is_ours)(const fs::path&)) {
   });
 }
 
-/// Creates an empty file or folder beside `target` under a hidden name that nobody has. A leftover of a killed run with
-/// the same process id (or of another machine on a shared disk) is left alone. Of a name that would be too long the
-/// front is left out.
+/// Creates an empty file or folder beside `target` under a hidden name that nothing has. A leftover of a killed run
+/// with the same process id (or of another machine on a shared disk) is left alone. A name that would be too long is
+/// cut at its front.
 fs::path create_sibling(const fs::path& target, StagedOutput::Kind kind, const std::string& word) {
   const std::string process = ".tetwarp-" + word + "-" + std::to_string(::getpid());
   for (int attempt = 0;; ++attempt) {
@@ -141,7 +142,7 @@ fs::path create_sibling(const fs::path& target, StagedOutput::Kind kind, const s
   }
 }
 
-/// Flushes one file or folder to disk; a file system that cannot flush folders (EINVAL) is no error.
+/// Flushes one file or folder to disk; that a file system cannot flush folders (EINVAL) is no error.
 void flush(const fs::path& path, const fs::path& target) {
   const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   const bool good = file >= 0 && (::fsync(file) == 0 || errno == EINVAL);
@@ -150,8 +151,9 @@ void flush(const fs::path& path, const fs::path& target) {
   if (!good) throw Error("cannot write " + target.string() + " to disk: " + reason(error) + "; free some space");
 }
 
-/// Flushes many files at once: a file system then writes its journal once for several of them. Threads that wait for
-/// the disk take no time of a processor, so their number is none of --threads. Of several failures the first file's.
+/// Flushes many files at the same time: a file system then writes its journal once for several of them. Threads that
+/// wait for the disk take no time of a processor, so --threads does not limit their number. If several fail, the first
+/// file's error is thrown.
 void flush_each(const std::vector<fs::path>& files, const fs::path& target) {
   constexpr std::size_t kMostThreads = 16;
   std::vector<std::exception_ptr> failures(files.size());
@@ -169,7 +171,7 @@ void flush_each(const std::vector<fs::path>& files, const fs::path& target) {
     std::vector<std::jthread> threads;
     try {
       while (threads.size() + 1 < std::min(kMostThreads, files.size())) threads.emplace_back(work);
-    } catch (const std::system_error&) {  // fewer threads then
+    } catch (const std::system_error&) {  // the threads that could be started suffice
     }
     work();
   }
@@ -185,17 +187,21 @@ void flush_all(const fs::path& staged, StagedOutput::Kind kind, const fs::path& 
 
 int move(const fs::path& from, const fs::path& to) { return ::rename(from.c_str(), to.c_str()) == 0 ? 0 : errno; }
 
-/// Renames where nothing (or an empty folder) has the new name, and nothing that has it meanwhile is lost. 0 or errno.
+/// Renames a file or folder if nothing, or an empty folder, has the new name. What gets that name meanwhile is not
+/// lost.
+/// @return 0 or errno
 int move_to_free(const fs::path& from, const fs::path& to, StagedOutput::Kind kind) {
-  if (kind == StagedOutput::Kind::folder) return move(from, to);  // rename(2) refuses a folder that is not empty
+  // rename(2) refuses to replace a folder that is not empty
+  if (kind == StagedOutput::Kind::folder) return move(from, to);
   if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
-  if (errno != EINVAL && errno != ENOSYS) return errno;  // else: the file system cannot, so look and then rename
+  // The file system cannot do both in one step, so look first and then rename.
+  if (errno != EINVAL && errno != ENOSYS) return errno;
   std::error_code ignored;
   return fs::exists(to, ignored) ? EEXIST : move(from, to);
 }
 
-/// Moves the old folder aside, the new one in, and removes the old one last: for file systems that cannot exchange two
-/// names at once. 0 or errno.
+/// Moves the old folder aside, then the new one to its place, and removes the old one last: for file systems that
+/// cannot exchange two names in one step. @return 0 or errno
 int replace_in_steps(const fs::path& staged, const fs::path& target) {
   const fs::path aside = create_sibling(target, StagedOutput::Kind::folder, "replaced");
   std::error_code ignored;
@@ -211,8 +217,8 @@ int replace_in_steps(const fs::path& staged, const fs::path& target) {
   return 0;
 }
 
-/// Exchanges the old folder and the new one, so that the name is never free and runs that replace one folder at once
-/// replace each other's whole; removes the old one last. 0 or errno.
+/// Exchanges the old folder and the new one in one step and then removes the old one. The name is never free, and runs
+/// that replace the same folder at the same time replace it whole. @return 0 or errno
 int replace_folder(const fs::path& staged, const fs::path& target) {
   if (::renameat2(AT_FDCWD, staged.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE) != 0)
     return errno == EINVAL || errno == ENOSYS ? replace_in_steps(staged, target) : errno;
@@ -221,7 +227,8 @@ int replace_folder(const fs::path& staged, const fs::path& target) {
   return 0;
 }
 
-/// The hidden siblings of this process that have no name yet.
+/// The hidden files and folders of this process that do not have their final name yet. They are removed if it ends
+/// early.
 class Unfinished {
  public:
   static Unfinished& all() {
@@ -237,9 +244,9 @@ class Unfinished {
     const std::lock_guard lock(mutex_);
     paths_.erase(path);
   }
-  /// Other threads may still write into a folder while it goes, so more than once.
+  /// Removes all of them, several times, since other threads may still write into a folder while it is removed.
   void remove() noexcept {
-    mutex_.lock();  // for good: nothing is created any more
+    mutex_.lock();  // never unlocked, so that nothing is created any more
     constexpr int kRounds = 3;
     std::error_code ignored;
     for (int round = 0; round < kRounds; ++round) {
@@ -298,7 +305,7 @@ void StagedOutput::commit() {
 void StagedOutput::flush_content() const { flush_all(staged_, kind_, target_); }
 
 void StagedOutput::give_name() {
-  const bool replaces = check_target();  // again: hours may have passed
+  const bool replaces = check_target();  // looked at again, for hours may have passed
   int error = 0;
   if (!replaces)
     error = move_to_free(staged_, target_, kind_);

@@ -73,7 +73,7 @@ GmshForm gmsh_form(std::string_view bytes, const GmshSection& section, const std
   form.tags_are_sizes = form.version == 4.1;
   form.binary = kind == 1;
   if (!form.binary) return form;
-  GmshSection one = section;  // a binary 1 follows the line
+  GmshSection one = section;  // a binary file has a 1 after the line
   one.begin = std::min(std::min(bytes.find('\n', section.begin), section.end - 1) + 1, section.end);
   const std::int64_t order = GmshNumbers(bytes, one, form, file).integer();
   require(order == 1 || order == 0x01000000,

@@ -14,9 +14,10 @@ namespace tetwarp {
 /// How a Gmsh file writes numbers, by its $MeshFormat.
 struct GmshForm {
   double version = 0;
-  bool binary = false, swapped = false;  ///< of the other byte order
-  std::size_t size_bytes = 8;            ///< of a size_t, in binary
-  bool tags_are_sizes = false;           ///< not ints: in MSH 4.1
+  bool binary = false, swapped = false;  ///< `swapped`: the file has the other byte order than this machine
+  std::size_t size_bytes = 8;            ///< bytes of a size_t in a binary file
+  /// In MSH 4.1 tags are size_t, in other versions int.
+  bool tags_are_sizes = false;
 };
 
 /// A section of a Gmsh file: the bytes between $NAME and $EndNAME.
@@ -25,7 +26,7 @@ struct GmshSection {
   std::size_t begin = 0, end = 0;
 };
 
-/// All sections of a file in order, the first is MeshFormat. @throws InputError where one does not end
+/// All sections of a file in their order; the first is MeshFormat. @throws InputError for a section that does not end
 std::vector<GmshSection> gmsh_sections(std::string_view bytes, const std::string& file);
 
 /// Takes the numbers of a section one by one. Every function throws InputError naming file and byte where the section
@@ -39,13 +40,20 @@ class GmshNumbers {
         form_(form),
         at_(section.begin) {}
 
-  std::int64_t integer();               ///< an int: 4 bytes in binary
-  std::uint64_t size();                 ///< a size_t
-  double real();                        ///< a double; may be NaN or infinite
-  std::uint64_t tag();                  ///< of a node or an element: a size_t or an int
-  std::string line();                   ///< the rest of the line
-  std::int64_t text_integer();          ///< written as text in a binary file, too
-  void skip_tags(std::uint64_t count);  ///< of numbers as of `tag`
+  /// Takes an int: 4 bytes in a binary file.
+  std::int64_t integer();
+  /// Takes a size_t.
+  std::uint64_t size();
+  /// Takes a double; it may be NaN or infinite.
+  double real();
+  /// Takes the tag of a node or an element: a size_t or an int.
+  std::uint64_t tag();
+  /// Takes the rest of the line.
+  std::string line();
+  /// Takes an integer that is written as text in a binary file, too.
+  std::int64_t text_integer();
+  /// Skips `count` tags.
+  void skip_tags(std::uint64_t count);
 
   /// Checks that the section has room for so many items, before memory for them is allocated.
   /// @param items  number of items
@@ -54,7 +62,7 @@ class GmshNumbers {
   void require_room(std::uint64_t items, std::uint64_t tags, std::uint64_t reals) const;
   void require_end();
   std::string here() const;
-  /// The numbers from here on, read in another form.
+  /// Reads the numbers from here on in another form.
   GmshNumbers in(const GmshForm& form) const;
 
  private:

@@ -14,13 +14,13 @@ namespace {
 using Corners = std::span<const std::uint32_t>;
 using Triangle = std::array<std::uint32_t, 3>;
 
-/// Corner numbers of a face in order, seen from outside against the clock; of a triangle the last is kNone.
+/// Corner numbers of a face in counter-clockwise order, seen from outside; the last one of a triangle is kNone.
 using Face = std::array<std::uint8_t, 4>;
 constexpr std::uint8_t kNone = 255;
 constexpr std::array<Face, 4> kTetrahedron = {{{0, 2, 1, kNone}, {0, 1, 3, kNone}, {1, 2, 3, kNone}, {2, 0, 3, kNone}}};
 constexpr std::array<Face, 5> kPyramid = {
     {{0, 3, 2, 1}, {0, 1, 4, kNone}, {1, 2, 4, kNone}, {2, 3, 4, kNone}, {3, 0, 4, kNone}}};
-constexpr std::array<Face, 5> kWedge = {  // VTK's: (0, 1, 2) looks outwards
+constexpr std::array<Face, 5> kWedge = {  // in VTK's order of corners: the triangle (0, 1, 2) looks outwards
     {{0, 1, 2, kNone}, {3, 5, 4, kNone}, {0, 3, 4, 1}, {1, 4, 5, 2}, {2, 5, 3, 0}}};
 constexpr std::array<Face, 6> kHexahedron = {
     {{0, 3, 2, 1}, {4, 5, 6, 7}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}}};
@@ -37,7 +37,8 @@ std::span<const Face> faces_of(CellShape shape) {
 
 bool is_flat(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
 
-/// Calls `use` with each triangle of a cell's surface that has three vertices.
+/// Calls `use` with each triangle of a cell's surface that has three different vertices. Quadrilaterals are cut into
+/// two.
 template <class Use>
 void for_each_triangle(CellShape shape, Corners corners, const Use& use) {
   for (const Face& face : faces_of(shape)) {
@@ -46,7 +47,8 @@ void for_each_triangle(CellShape shape, Corners corners, const Use& use) {
       if (const Triangle whole = {at(0), at(1), at(2)}; !is_flat(whole)) use(whole);
       continue;
     }
-    const std::size_t from = std::min(at(0), at(2)) < std::min(at(1), at(3)) ? 0 : 1;  // the diagonal's first corner
+    // The first corner of the diagonal: it begins at the vertex with the lowest number, so that neighbours agree.
+    const std::size_t from = std::min(at(0), at(2)) < std::min(at(1), at(3)) ? 0 : 1;
     for (const std::size_t n : {from, from + 2}) {
       if (const Triangle half = {at(n % 4), at((n + 1) % 4), at((n + 2) % 4)}; !is_flat(half)) use(half);
     }
@@ -62,7 +64,7 @@ bool has_repeated(Corners corners) {
   return false;
 }
 
-/// Whether repeated corners make two parts of the surface fall onto each other, or leave nothing of it.
+/// Whether repeated corners make two parts of the surface coincide, or leave no surface.
 bool is_folded(CellShape shape, Corners corners) {
   std::vector<Triangle> seen;
   for_each_triangle(shape, corners, [&](Triangle triangle) {

@@ -52,14 +52,14 @@ std::int64_t step_of(const FieldSource& source) {
   return step;
 }
 
-/// "U", or "U, step 3" where there are several steps.
+/// The name of an array for messages: "U", or "U, step 3" where there are several steps.
 std::string name_of(const MeshReader& reader, const MeshVectors& array) {
   const auto steps = std::count_if(reader.arrays.begin(), reader.arrays.end(),
                                    [&](const MeshVectors& other) { return other.name == array.name; });
   return array.name + (array.step && steps > 1 ? ", step " + std::to_string(*array.step) : "");
 }
 
-/// "; it has "A", "B""
+/// The names of all arrays, for the end of a message: `; it has "A", "B"`.
 std::string listed(const MeshReader& reader) {
   std::string text;
   for (const MeshVectors& array : reader.arrays)
@@ -67,8 +67,8 @@ std::string listed(const MeshReader& reader) {
   return text.empty() ? "; it has no vectors at its vertices" : text;
 }
 
-/// Which of the file's vectors are the displacement; empty: that cannot be decided. @throws InputError for an option
-/// that goes with none
+/// Chooses the vectors of the file that are the displacement; empty: that cannot be decided. @throws InputError for an
+/// option that fits no vectors
 std::optional<std::size_t> chosen_vectors(const MeshReader& reader, const FieldSource& source) {
   std::set<std::string> names;
   for (const MeshVectors& array : reader.arrays) names.insert(array.name);
@@ -100,7 +100,8 @@ std::uint64_t tag_of(const MeshReader& reader, std::size_t vertex) {
   return reader.tags.empty() ? vertex : reader.tags[vertex];
 }
 
-/// The displacement as positions of a second file. @throws InputError unless vertices and cells are the same
+/// The displacement from rest to the positions of a second file. @throws InputError unless both files have the same
+/// vertices and cells
 std::vector<glm::dvec3> from_deformed(const MeshReader& rest, const FieldSource& source, const MeshFileHeader& header) {
   const std::string path = source.option("deformed"), both = path + " and " + source.path.string();
   const auto deformed = open_mesh(path);
@@ -123,7 +124,7 @@ std::vector<glm::dvec3> from_deformed(const MeshReader& rest, const FieldSource&
   return displacement;
 }
 
-/// In the file's frame and units, one a vertex; empty: it cannot be decided.
+/// One displacement a vertex in the file's frame and units; empty: it cannot be decided which of the vectors it is.
 std::vector<glm::dvec3> displacement_of(const MeshReader& reader, const FieldSource& source, MeshFileHeader& header) {
   if (source.options.contains("deformed")) {
     header.displacement = "positions of " + source.option("deformed");
@@ -146,7 +147,7 @@ void require_finite(const glm::dvec3& value, const char* what, std::uint64_t ver
 
 constexpr std::uint32_t kUnused = UINT32_MAX;
 
-/// New numbers of the vertices, those of no tetrahedron left out.
+/// New numbers of the vertices; a vertex of no tetrahedron has none.
 std::vector<std::uint32_t> numbers_of_used(const MeshReader& reader) {
   std::vector<std::uint32_t> numbers(reader.points.size(), kUnused);
   for (const glm::u32vec4& tetrahedron : reader.cells.tetrahedra()) {
@@ -159,7 +160,7 @@ std::vector<std::uint32_t> numbers_of_used(const MeshReader& reader) {
   return numbers;
 }
 
-/// Leaves out all but the first of tetrahedra of the same vertices: MSH 2 has an element of two physical groups twice.
+/// Of tetrahedra that have the same vertices, keeps the first: MSH 2 lists an element of two physical groups twice.
 /// @return how many were left out
 std::size_t drop_repeated(std::vector<glm::u32vec4>& tetrahedra) {
   std::vector<std::pair<std::array<std::uint32_t, 4>, std::size_t>> sorted(tetrahedra.size());
@@ -177,8 +178,9 @@ std::size_t drop_repeated(std::vector<glm::u32vec4>& tetrahedra) {
   return std::erase_if(tetrahedra, [&](const glm::u32vec4&) { return repeated[t++]; });
 }
 
-/// Which of the lattice's vertices those of the mesh rest at, where the file says so and their places agree: a file of
-/// ours that another program moved or scaled is a mesh as any other. @param numbers  of `numbers_of_used`
+/// Takes from the file which vertex of the lattice each vertex of the mesh rests at, if the file says so and the places
+/// agree. A file that another program moved or scaled is a mesh like any other.
+/// @param numbers  what numbers_of_used returned
 void take_lattice(const MeshReader& reader, const std::vector<std::uint32_t>& numbers, TetrahedralMesh& mesh,
                   MeshFileHeader& header) {
   if (!reader.lattice) return;
@@ -199,7 +201,7 @@ void take_lattice(const MeshReader& reader, const std::vector<std::uint32_t>& nu
   header.lattice = lattice;
 }
 
-/// @param displacement  as of `displacement_of`
+/// Makes the mesh in LPS mm. @param displacement  what displacement_of returned
 TetrahedralMesh mesh_of(MeshReader& reader, const std::vector<glm::dvec3>& displacement, const FieldSource& source,
                         MeshFileHeader& header) {
   const std::vector<std::uint32_t> numbers = numbers_of_used(reader);
@@ -215,7 +217,7 @@ TetrahedralMesh mesh_of(MeshReader& reader, const std::vector<glm::dvec3>& displ
     require_finite(mesh.rest.back(), "a position that is", tag_of(reader, v), source);
     if (displacement.empty()) continue;
     const glm::dvec3 mm = to_mm * displacement[v];
-    mesh.displacement.emplace_back(mm + 0.0);  // no -0
+    mesh.displacement.emplace_back(mm + 0.0);  // + 0.0 makes 0 of -0
     require_finite(glm::dvec3(mesh.displacement.back()), "a displacement that is missing or", tag_of(reader, v),
                    source);
     header.largest_mm = std::max(header.largest_mm.value_or(0), glm::length(mm));

@@ -3,8 +3,8 @@
 
 #pragma once
 
-// Private to io/: the seam between mesh_file.cpp and the formats that it reads. A format is a pair of files, a word of
-// CMake and a test.
+// Private to io/: what mesh_file.cpp knows of the formats that it reads. A format is a pair of files, a word of CMake
+// and a test.
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -17,18 +17,19 @@
 
 namespace tetwarp {
 
-/// Three numbers at each vertex of a mesh file.
+/// Three numbers at each vertex of a mesh file, under a name.
 struct MeshVectors {
   std::string name;
-  std::optional<std::int64_t> step;  ///< of the time, where the format has steps
+  std::optional<std::int64_t> step;  ///< step of time, where the format has steps
 
   bool operator==(const MeshVectors&) const = default;
 };
 
-/// The lattice that a mesh was made of, as a file of ours states it.
+/// The lattice that a mesh was made of, where a file that Tetwarp wrote states it.
 struct MeshLattice {
   Geometry geometry;
-  std::vector<std::int64_t> vertex;  ///< TetrahedralMesh::lattice_vertex, one for each of the file's points
+  /// By point of the file: see TetrahedralMesh::lattice_vertex.
+  std::vector<std::int64_t> vertex;
 };
 
 /// A mesh file that was read and checked: vertices and cells, as they are in the file. mesh_file.cpp drops vertices
@@ -38,35 +39,36 @@ class MeshReader {
   explicit MeshReader(const std::filesystem::path& file) : cells(file.string()) {}
   virtual ~MeshReader() = default;
 
-  /// The vectors number `n` of `arrays`, one a vertex of `points`, in the file's frame and units; NaN where the file
-  /// has none. @throws InputError for a file that is damaged
+  /// The vectors of `arrays[n]`, one for each vertex of `points`, in the file's frame and units; NaN where the file has
+  /// none.
+  /// @throws InputError for a file that is damaged
   virtual std::vector<glm::dvec3> vectors(std::size_t n) const = 0;
 
-  std::string format;                       ///< "Gmsh MSH 4.1, binary"
-  std::vector<glm::dvec3> points;           ///< at most 2^32 - 1
-  std::vector<std::uint64_t> tags;          ///< the file's numbers of the points, rising; empty: 0, 1, 2, ...
-  MeshCells cells;                          ///< their corners are checked: below points.size()
-  std::vector<MeshVectors> arrays;          ///< only those of three components
-  std::optional<std::string> frame, units;  ///< LPS or RAS, mm or m, where this file states them
-  std::vector<std::string> notes;           ///< without the file's name: "20 triangles are left out"
-  std::optional<MeshLattice> lattice;       ///< where this file states one, as `write_mesh_file` does
+  std::string format;               ///< the format, with its version: "Gmsh MSH 4.1, binary"
+  std::vector<glm::dvec3> points;   ///< at most 2^32 - 1
+  std::vector<std::uint64_t> tags;  ///< the file's numbers of the points, rising; empty: 0, 1, 2, ...
+  MeshCells cells;                  ///< all corners are below points.size()
+  std::vector<MeshVectors> arrays;  ///< vectors at the points; arrays of other than three components are left out
+  std::optional<std::string> frame, units;  ///< LPS or RAS, mm or m, where the file states them
+  std::vector<std::string> notes;           ///< what was left out, without the file's name: "20 triangles are left out"
+  std::optional<MeshLattice> lattice;       ///< where the file states it, as `write_mesh_file` does
 };
 
 struct MeshFormat {
-  const char* suffixes;  ///< for people: ".msh"
-  /// Whether the file is of this format, by its suffix or its first bytes (up to 64; fewer where it cannot be read).
+  const char* suffixes;  ///< suffixes of files for messages: ".msh"
+  /// Whether a file is of this format, by its suffix or its first bytes (up to 64; fewer where it cannot be read).
   bool (*claims)(const std::filesystem::path& path, std::string_view first_bytes);
-  /// Whether a claimed file holds volume cells, by a quick look; null: always. Does not throw for a file that `open`
-  /// refuses.
+  /// Whether a claimed file holds volume cells, by a quick look; null: it always does. It does not throw for a file
+  /// that `open` refuses.
   bool (*holds_mesh)(const std::filesystem::path& path);
-  /// Allocates nothing that the file's length does not warrant. @throws InputError naming the file
+  /// Reads a file. It allocates no more than the file's length warrants. @throws InputError naming the file
   std::unique_ptr<MeshReader> (*open)(const std::filesystem::path& path);
 };
 
-/// Of all formats, in the order of io/CMakeLists.txt (the file is made there), the first that claims the file; null:
-/// none.
+/// The first format that claims the file, in the order of io/CMakeLists.txt, from which this function is made; null:
+/// none does.
 const MeshFormat* find_mesh_format(const std::filesystem::path& path, std::string_view first_bytes);
-/// For people: ".msh .vtu".
+/// The suffixes of all formats for messages: ".msh .vtu".
 std::string mesh_suffixes();
 
 }  // namespace tetwarp

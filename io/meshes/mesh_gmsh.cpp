@@ -19,12 +19,13 @@
 namespace tetwarp {
 namespace {
 
-/// A type of element, by its number in the manual.
+/// A type of element, by its number in Gmsh's manual.
 struct ElementType {
   std::int64_t number;
   std::size_t nodes;
-  int order = 1;                   ///< of its shape functions
-  std::optional<CellShape> shape;  ///< its corners are its first nodes; empty: it has no volume
+  int order = 1;  ///< of the element's shape functions
+  /// The solid whose corners are the first nodes of the element; empty: the element has no volume.
+  std::optional<CellShape> shape;
 };
 
 constexpr auto kTet = CellShape::tetrahedron;
@@ -42,7 +43,7 @@ constexpr std::array kElementTypes = std::to_array<ElementType>(
      {27, 5, 4, {}},        {28, 6, 5, {}},      {36, 16, 3, {}},       {37, 25, 4, {}},        {38, 36, 5, {}},
      {39, 12, 3, {}}});
 
-/// The place of the type that comes next in kElementTypes.
+/// Takes the number of a type. @return its index in kElementTypes
 std::size_t take_type(GmshNumbers& numbers) {
   const std::int64_t number = numbers.integer();
   const auto* found = std::find_if(kElementTypes.begin(), kElementTypes.end(),
@@ -54,9 +55,9 @@ std::size_t take_type(GmshNumbers& numbers) {
   return static_cast<std::size_t>(found - kElementTypes.begin());
 }
 
-/// $NodeData, the header of it.
+/// The header of a section $NodeData.
 struct NodeData {
-  GmshNumbers values;  ///< at the first of them
+  GmshNumbers values;  ///< continues at the first value
   std::uint64_t count;
 };
 
@@ -117,7 +118,7 @@ class GmshReader final : public MeshReader {
 
   bool is_4() const { return form_.version >= 4; }
 
-  /// What a section of elements or nodes begins with.
+  /// How many blocks and items a section of elements or nodes has; it begins with these.
   struct Counts {
     std::uint64_t blocks = 1, items = 0;
   };
@@ -130,14 +131,14 @@ class GmshReader final : public MeshReader {
     }
     counts.blocks = numbers.size();
     counts.items = numbers.size();
-    if (form_.version == 4.1) {  // the lowest and the highest tag
+    if (form_.version == 4.1) {  // skips the lowest and the highest tag
       numbers.size();
       numbers.size();
     }
     return counts;
   }
 
-  /// @return the dimension of the entity that a block is about
+  /// Takes what a block says of its entity. @return the dimension of the entity
   std::int64_t take_entity(GmshNumbers& numbers) const {
     const std::int64_t first = numbers.integer(), second = numbers.integer();
     return form_.version == 4.1 ? first : second;
@@ -183,7 +184,7 @@ class GmshReader final : public MeshReader {
     sort_nodes();
   }
 
-  /// By their tags, so that the numbers of the vertices do not hang on the order of the file.
+  /// Sorts the nodes by their tags, so that the numbers of vertices do not depend on the order of the file.
   void sort_nodes() {
     if (!std::is_sorted(tags.begin(), tags.end())) {
       std::vector<std::uint32_t> order(tags.size());
@@ -200,7 +201,7 @@ class GmshReader final : public MeshReader {
 
   std::uint32_t vertex_of(std::uint64_t tag, const GmshNumbers& numbers) const {
     if (!tags.empty() && tag >= tags[0] && tag - tags[0] < tags.size() && tags[tag - tags[0]] == tag)
-      return static_cast<std::uint32_t>(tag - tags[0]);  // no tag is left out up to here
+      return static_cast<std::uint32_t>(tag - tags[0]);  // no tag is missing below this one, so it gives the number
     const auto found = std::lower_bound(tags.begin(), tags.end(), tag);
     if (found == tags.end() || *found != tag)
       throw InputError("the node " + std::to_string(tag) + " is not in $Nodes, but" + numbers.here());
@@ -239,7 +240,8 @@ class GmshReader final : public MeshReader {
     note_elements();
   }
 
-  /// @param element_tags  numbers of an element that come before its nodes (physical and elementary entity)
+  /// Takes a block of elements of one type.
+  /// @param element_tags  how many tags of an element come before its nodes (physical and elementary entity)
   void take_block(GmshNumbers& numbers, std::size_t n_type, std::uint64_t elements, std::uint64_t element_tags) {
     const ElementType& type = kElementTypes[n_type];
     numbers.require_room(elements, 1 + element_tags + type.nodes, 0);
@@ -252,7 +254,7 @@ class GmshReader final : public MeshReader {
     }
   }
 
-  /// MSH 2.
+  /// Takes an element of MSH 2, which states its own type and number of tags.
   void take_text_element(GmshNumbers& numbers) {
     const std::uint64_t element = numbers.tag();
     const std::size_t n_type = take_type(numbers);
@@ -268,7 +270,7 @@ class GmshReader final : public MeshReader {
     const std::size_t count = corner_count(*type.shape);
     for (std::size_t n = 0; n < count; ++n) corners[n] = vertex_of(numbers.tag(), numbers);
     numbers.skip_tags(type.nodes - count);
-    if (type.shape == CellShape::wedge) {  // VTK's looks the other way
+    if (type.shape == CellShape::wedge) {  // Gmsh's first triangle looks inwards, VTK's outwards
       std::swap(corners[1], corners[2]);
       std::swap(corners[4], corners[5]);
     }
@@ -336,9 +338,10 @@ class GmshReader final : public MeshReader {
 
   std::string bytes_, file_;
   GmshForm form_;
-  std::array<std::uint64_t, kElementTypes.size()> seen_{};  ///< how many elements of each type
-  std::vector<std::uint64_t> element_tags_;                 ///< of those with a volume
-  std::vector<NodeData> data_;                              ///< beside `arrays`
+  /// By type of element: how many there are.
+  std::array<std::uint64_t, kElementTypes.size()> seen_{};
+  std::vector<std::uint64_t> element_tags_;  ///< tags of the elements that have a volume
+  std::vector<NodeData> data_;               ///< for each of `arrays`, where its values are
 };
 
 bool claims(const std::filesystem::path& path, std::string_view first_bytes) {

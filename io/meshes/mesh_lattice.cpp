@@ -22,7 +22,7 @@ std::vector<double> mesh_lattice_numbers(const Geometry& lattice) {
 }
 
 Geometry mesh_lattice_of(const std::vector<double>& numbers, const std::string& file) {
-  constexpr double kMost = 1 << 18;  // vertices on an axis
+  constexpr double kMost = 1 << 18;  // the most vertices on an axis
   require(numbers.size() == kMeshLatticeNumbers,
           "a lattice of " + std::to_string(numbers.size()) + " numbers, " + file);
   const auto triple = [&](std::size_t n) { return glm::dvec3(numbers[3 * n], numbers[3 * n + 1], numbers[3 * n + 2]); };

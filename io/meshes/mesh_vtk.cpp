@@ -16,12 +16,13 @@
 namespace tetwarp {
 namespace {
 
-/// What becomes of cells of a type (vtkCellType.h).
+/// How cells of a type (vtkCellType.h) are read.
 struct CellKind {
   const char* plural;
-  std::optional<CellShape> shape;  ///< empty: no solid, left out
-  std::size_t points = 0;          ///< of a solid
-  bool voxel = false;              ///< corners run as i, j, k do, not around each face
+  /// Empty: cells of this type are no solids and are left out.
+  std::optional<CellShape> shape;
+  std::size_t points = 0;  ///< how many points a solid has
+  bool voxel = false;      ///< corners are numbered along i, j, k, not around each face
 };
 
 const std::map<int, CellKind>& kinds() {
@@ -100,7 +101,7 @@ class VtkMeshReader final : public MeshReader {
     return result;
   }
 
-  /// What `write_mesh_file` says of the lattice that a mesh was made of.
+  /// Takes the lattice that a mesh was made of, where `write_mesh_file` wrote it.
   void take_lattice() {
     const auto called = [](const std::vector<VtkArray>& list, const char* title) -> const VtkArray* {
       const auto found =

@@ -3,13 +3,13 @@
 
 #pragma once
 
-// Private to io/. Unstructured grids of VTK, XML (.vtu) and legacy (.vtk), whose displacement is point data.
+// Private to io/. Reads unstructured grids of VTK, XML (.vtu) and legacy (.vtk), whose displacement is point data.
 #include "io/meshes/mesh_format.h"
 
 namespace tetwarp {
 
-/// Solid cells are taken, linear ones and by their corners those of higher order; points, lines and surfaces are left
-/// out with a note. A polyhedron and what else has no fixed shape is refused.
+/// Solid cells are read: linear ones, and those of higher order by their corners. Points, lines and surfaces are left
+/// out with a note. Polyhedra and other cells without a fixed shape are refused.
 extern const MeshFormat kMeshFormat_vtk;
 
 }  // namespace tetwarp

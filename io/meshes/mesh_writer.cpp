@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::uint8_t kVtkTetra = 10;
 
-/// A file whose failures are told with the system's reason.
+/// A file that is written; a failure is thrown with the system's reason.
 class MeshFileStream {
  public:
   explicit MeshFileStream(const std::filesystem::path& path) : path_(path), out_(path, std::ios::binary) { check(); }
@@ -29,7 +29,7 @@ class MeshFileStream {
     out_.write(text.data(), static_cast<std::streamsize>(text.size()));
     check();
   }
-  /// @param swap  whether bytes are turned round: VTK's legacy files are big endian
+  /// Writes numbers. @param swap  whether to reverse the bytes of each: VTK's legacy files are big endian
   template <class T>
   void numbers(const std::vector<T>& values, bool swap) {
     constexpr std::size_t kAtOnce = 1 << 16;
@@ -106,7 +106,7 @@ void write_legacy(MeshFileStream& out, const TetrahedralMesh& mesh, const Geomet
   out.text("\n");
 }
 
-/// Arrays follow the XML one after the other, each after its length in bytes.
+/// The values that follow the XML: one array after the other, each preceded by its length in bytes.
 class Appended {
  public:
   explicit Appended(MeshFileStream& out) : out_(out) {}

@@ -96,7 +96,7 @@ VtkCells VtkFile::cells() const {
   const auto point_limit = static_cast<double>(points.tuples);
   cells.types = whole_numbers<std::uint8_t>(types_, 256, "the type of a cell");
   if (offset_kind_ == Offsets::lengths) {
-    // A length may be larger than any number of a point; numbers of points are looked at below.
+    // A length may be larger than any number of a point; take_lengths checks the numbers of points.
     take_lengths(whole_numbers<std::uint32_t>(connectivity_, 4294967296.0, "a number in CELLS"), cells);
   } else {
     cells.offsets = whole_numbers<std::uint64_t>(offsets_, 1099511627776.0, "an offset of a cell");

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Legacy VTK files, text or big-endian binary, versions 1 to 5.
+// Reads legacy VTK files, text or big-endian binary, versions 1 to 5.
 #include <algorithm>
 #include <charconv>
 #include <fstream>
@@ -26,7 +26,7 @@ std::string read_whole(const std::filesystem::path& path) {
   return bytes;
 }
 
-/// "my%20array" is "my array".
+/// A name of an array as it is meant: "my array" for "my%20array".
 std::string decoded(std::string_view text) {
   std::string result;
   for (std::size_t n = 0; n < text.size(); ++n) {
@@ -77,16 +77,16 @@ class LegacyFile final : public VtkFile {
         values[n] = decode(bytes_.data() + lies.span.begin + (first + n) * step);
       return;
     }
-    if (place_.id != array.id || place_.next > first) place_ = {array.id, 0, lies.span.begin};
-    for (; place_.next < first; ++place_.next) next_word();
+    if (next_word_.id != array.id || next_word_.next > first) next_word_ = {array.id, 0, lies.span.begin};
+    for (; next_word_.next < first; ++next_word_.next) next_word();
     for (double& value : values) {
       value = number_in(next_word(), where);
-      ++place_.next;
+      ++next_word_.next;
     }
   }
 
  protected:
-  void require_holds(const VtkArray&) const override {}  // looked at when the file was gone through
+  void require_holds(const VtkArray&) const override {}  // the constructor has checked all arrays
 
  private:
   void take_frame() {
@@ -198,15 +198,15 @@ class LegacyFile final : public VtkFile {
 
   std::string_view next_word() const {
     const std::string_view all = bytes_;
-    const std::size_t begin_at = std::min(all.find_first_not_of(" \t\r\n", place_.byte), all.size());
-    place_.byte = std::min(all.find_first_of(" \t\r\n", begin_at), all.size());
-    return all.substr(begin_at, place_.byte - begin_at);
+    const std::size_t begin_at = std::min(all.find_first_not_of(" \t\r\n", next_word_.byte), all.size());
+    next_word_.byte = std::min(all.find_first_of(" \t\r\n", begin_at), all.size());
+    return all.substr(begin_at, next_word_.byte - begin_at);
   }
 
-  /// Where the next word of a text is.
-  struct Place {
+  /// The place of the next word of a text array, so that reading on need not search from its beginning.
+  struct NextWord {
     std::size_t id = SIZE_MAX;
-    std::uint64_t next = 0;  ///< number of the value
+    std::uint64_t next = 0;  ///< number of the value that comes next
     std::size_t byte = 0;
   };
 
@@ -214,9 +214,9 @@ class LegacyFile final : public VtkFile {
   std::string bytes_;
   VtkText text_;
   At at_ = At::dataset;
-  std::uint64_t tuples_ = 0;  ///< of the data that follow
+  std::uint64_t tuples_ = 0;  ///< number of tuples of the data that follow
   std::vector<VtkValues> values_;
-  mutable Place place_;
+  mutable NextWord next_word_;
 };
 
 }  // namespace

@@ -14,7 +14,7 @@
 namespace tetwarp {
 namespace {
 
-/// Bits of a value of a type in a binary file. @throws InputError for one of unknown length
+/// Bits of a value in a binary file. @param type  in capitals  @throws InputError for a type of unknown length
 std::size_t bits_of(std::string_view type, const std::string& where) {
   static const std::map<std::string, std::size_t> kBits = {
       {"BIT", 1},           {"CHAR", 8},           {"UNSIGNED_CHAR", 8},
@@ -28,7 +28,7 @@ std::size_t bits_of(std::string_view type, const std::string& where) {
   return found->second;
 }
 
-/// Values in a tuple.
+/// Number of values in a tuple, from the word that states it.
 std::size_t width_of(std::string_view text, const std::string& where) {
   const std::size_t width = count_of(text, where);
   require(width <= 65536, std::to_string(width) + " values in a tuple" + where);
@@ -130,10 +130,11 @@ VtkValues VtkText::skip_values(std::uint64_t count, std::string_view type, const
 }
 
 std::vector<VtkValues> VtkText::skip_cells(std::uint64_t first, std::uint64_t second, const std::string& where) {
-  // In a binary file of version 4 the numbers begin right here: nothing may be skipped.
+  // In a binary file of version 4 the numbers begin right here, so nothing may be skipped.
   if (!bytes_.substr(at_).starts_with("OFFSETS ")) return {skip_values(second, "int", where)};
   std::vector<VtkValues> lists;
-  for (const std::uint64_t count : {first, second}) {  // OFFSETS type, CONNECTIVITY type
+  // First the offsets, then the connectivity, each behind its keyword and type.
+  for (const std::uint64_t count : {first, second}) {
     const auto words = next_words("OFFSETS or CONNECTIVITY");
     require(words.size() == 2, "no type of OFFSETS or CONNECTIVITY" + here());
     lists.push_back(skip_values(count, words[1], here()));

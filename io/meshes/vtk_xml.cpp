@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-// XML files of VTK: .vts .vti .vtr .vtu. VTK's parser reads the XML, and decodes text, base64, raw and compressed
+// Reads XML files of VTK: .vts .vti .vtr .vtu. VTK's parser reads the XML, and decodes text, base64, raw and compressed
 // values into buffers whose size was compared with what the file holds.
 #include <vtkCallbackCommand.h>
 #include <vtkCommand.h>
@@ -27,7 +27,7 @@
 namespace tetwarp {
 namespace {
 
-constexpr double kMostPerByte = 1100;  // what zlib can make of a byte is 1032, LZ4 255
+constexpr double kMostPerByte = 1100;  // zlib can inflate a byte to 1032, LZ4 to 255
 
 /// A number type of VTK's files.
 struct ValueType {
@@ -51,7 +51,7 @@ ValueType type_as(int vtk) {
   return {vtk, sizeof(Value), convert<Value>};
 }
 
-/// Null: text, bits, or none that VTK has.
+/// The type that a word means; null: text, bits, or no type of VTK.
 const ValueType* value_type(const std::string& word) {
   static const std::map<std::string, ValueType> kTypes = {
       {"Float32", type_as<float>(VTK_FLOAT)},          {"Float64", type_as<double>(VTK_DOUBLE)},
@@ -63,7 +63,7 @@ const ValueType* value_type(const std::string& word) {
   return found == kTypes.end() ? nullptr : &found->second;
 }
 
-/// Without line ends, for messages are one line.
+/// An attribute of an element without line ends, for messages are one line.
 std::string attribute(vtkXMLDataElement* element, const char* key) {
   const char* text = element->GetAttribute(key);
   std::string value = text ? text : "";
@@ -71,7 +71,7 @@ std::string attribute(vtkXMLDataElement* element, const char* key) {
   return value;
 }
 
-/// A message of VTK without file, line and address.
+/// A message of VTK without its source file, line and address.
 std::string plain(const std::string& text) {
   const std::size_t at = text.rfind("): ");
   std::string rest = at == std::string::npos ? text : text.substr(at + 3);
@@ -85,7 +85,7 @@ class XmlFile final : public VtkFile {
   explicit XmlFile(const std::filesystem::path& path)
       : VtkFile(path.string()), bytes_(std::filesystem::file_size(path)), stream_(path, std::ios::binary) {
     require_end();
-    vtkNew<vtkCallbackCommand> listener;  // VTK prints what nobody listens to
+    vtkNew<vtkCallbackCommand> listener;  // without an observer VTK prints its errors
     listener->SetClientData(this);
     listener->SetCallback([](vtkObject*, unsigned long, void* self, void* text) {
       static_cast<XmlFile*>(self)->complaint_ = plain(text ? static_cast<const char*>(text) : "");
@@ -140,17 +140,17 @@ class XmlFile final : public VtkFile {
   }
 
  private:
-  /// Where the values of an array are.
+  /// Where the values of an array are in the file.
   struct Stored {
     vtkXMLDataElement* element = nullptr;
     const ValueType* type = nullptr;
     bool ascii = false;
-    vtkTypeInt64 offset = -1;  ///< of appended values
+    vtkTypeInt64 offset = -1;  ///< of appended values; -1: the values are in the element
   };
 
   bool compressed() const { return parser_->GetCompressor() != nullptr; }
 
-  /// A file that was cut off lacks this, whatever else it has.
+  /// Refuses a file that does not end with </VTKFile>: it was cut off, whatever else it has.
   void require_end() {
     const std::uint64_t length = std::min<std::uint64_t>(bytes_, 256);
     std::string tail(length, '\0');
@@ -180,7 +180,7 @@ class XmlFile final : public VtkFile {
     return static_cast<double>(head(stored, 1, what)[0]);
   }
 
-  /// Blocks that VTK can decompress: it believes these numbers. @return  bytes of the values
+  /// Checks the table of compressed blocks, which VTK believes when it decompresses them. @return bytes of the values
   double require_blocks(const Stored& stored, const std::string& what) const {
     const std::vector<std::uint64_t> first = head(stored, 3, what);
     const std::uint64_t blocks = first[0], block_bytes = first[1], last_bytes = first[2];
@@ -301,7 +301,7 @@ class XmlFile final : public VtkFile {
     require_holds(offsets_);
   }
 
-  /// The arrays of a part of a piece, one tuple for each of `count`.
+  /// The arrays of a part of a piece, each with one tuple for each of `count` items.
   std::vector<VtkArray> arrays_of(vtkXMLDataElement* piece, const char* part, std::uint64_t count) {
     std::vector<VtkArray> arrays;
     vtkXMLDataElement* parent = piece->FindNestedElementWithName(part);
@@ -349,13 +349,13 @@ class XmlFile final : public VtkFile {
   vtkNew<vtkZLibDataCompressor> zlib_;
   vtkNew<vtkLZ4DataCompressor> lz4_;
   vtkNew<VtkXmlParser> parser_;
-  std::string complaint_;  ///< VTK's last
+  std::string complaint_;  ///< the last message of VTK
   std::vector<Stored> stored_;
 };
 
 }  // namespace
 
-/// For vtk_xml_module.cpp, which owns what this returns.
+/// Called by vtk_xml_module.cpp, which owns what this returns.
 extern "C" VtkFile* tetwarp_open_vtk_xml(const char* path) { return new XmlFile(path); }
 
 }  // namespace tetwarp

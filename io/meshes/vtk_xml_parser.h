@@ -3,7 +3,7 @@
 
 #pragma once
 
-// Private to io/, in builds with VTK.
+// Private to io/, in builds with VTK: its XML parser, with bounds.
 #include <vtkInputStream.h>
 #include <vtkObjectFactory.h>
 #include <vtkXMLDataElement.h>
@@ -15,7 +15,7 @@
 
 namespace tetwarp {
 
-/// VTK's parser, which keeps no more elements than a dataset has and can tell how long a compressed array is.
+/// VTK's parser, with a limit on the number of elements that it keeps. It can also tell how long a compressed array is.
 class VtkXmlParser final : public vtkXMLDataParser {
  public:
   static VtkXmlParser* New() { VTK_STANDARD_NEW_BODY(VtkXmlParser); }
@@ -78,8 +78,8 @@ class VtkXmlParser final : public vtkXMLDataParser {
   }
 
  private:
-  static constexpr std::size_t kDeepest = 32;          // elements in each other: VTK destroys them by recursion
-  static constexpr std::size_t kMostElements = 20000;  // in a file: VTK keeps them all
+  static constexpr std::size_t kDeepest = 32;          // nesting of elements: VTK destroys them by recursion
+  static constexpr std::size_t kMostElements = 20000;  // elements of a file, all of which VTK keeps
   std::size_t elements_ = 0, skipped_ = 0;
   bool left_out_ = false;
 };

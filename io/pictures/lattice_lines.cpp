@@ -14,9 +14,9 @@ namespace tetwarp {
 namespace {
 
 constexpr Tint kLine = {{90, 220, 255}, 0.7};
-constexpr double kLineEvery = 14;  ///< pixels at least between two lines
+constexpr double kLineEvery = 14;  ///< the least distance of two lines in pixels
 
-/// One layer of vertices, where they are in the picture.
+/// The layer of vertices in the middle of the lattice that faces the viewer, with the place of each in the picture.
 class Layer {
  public:
   Layer(const ViewPlane& plane, const VertexField& field)
@@ -32,7 +32,7 @@ class Layer {
   int right() const { return normal_ == 0 ? 1 : 0; }
   int up() const { return normal_ == 2 ? 1 : 2; }
   std::int64_t size(int axis) const { return field_.lattice.size[axis]; }
-  /// Vertices from one line to the next across an axis.
+  /// How many vertices apart neighbouring lines across an axis are.
   std::int64_t every(int axis) const {
     const double apart = field_.lattice.spacing[axis] / plane_.pixel_mm;
     return std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(kLineEvery / apart)));
@@ -55,7 +55,8 @@ class Layer {
   std::int64_t middle_ = 0;
 };
 
-/// A straight line, a pixel wide; no pixel twice, so that lines that go on are not brighter where they meet.
+/// Draws a straight line, a pixel wide, up to but without its end. No pixel is drawn twice, so that a line that
+/// continues it is not brighter where they meet.
 void draw_line(Picture& picture, const glm::dvec3& from, const glm::dvec3& to) {
   const double length = std::max(std::abs(to.x - from.x), std::abs(to.y - from.y));
   if (!(length < 1e5)) return;

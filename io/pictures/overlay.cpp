@@ -13,7 +13,8 @@ namespace {
 constexpr Colour kEmpty = {0, 160, 160}, kFold = {255, 176, 0}, kInverted = {224, 0, 224}, kShrunk = {32, 96, 255},
                  kGrown = {255, 48, 32};
 
-/// Of a Jacobian: 1/2 is number 1, 1 is 127, 2 is 253.
+/// Numbers under which Jacobians are stored: 1 for a Jacobian of 1/2, 127 for 1, 253 for 2, in even steps of its
+/// logarithm; 255 for an inverted tetrahedron.
 constexpr int kNumberOfOne = 127, kNumberInverted = 255;
 constexpr double kNumbersAnOctave = 126;
 

@@ -29,7 +29,7 @@ void write_text(Picture& picture, int x, int y, std::string_view text, Colour co
 
 void frame(Picture& picture, const Rectangle& r) { picture.fill(r.x - 1, r.y - 1, r.width + 2, r.height + 2, kFrame); }
 
-/// Title, and what the slices are.
+/// Draws the title and a line that says what the slices are.
 void draw_header(Picture& picture, const PreviewLayout& layout, const Geometry& geometry, const std::string& title) {
   const int x = kLine / 2, y = kLine / 2;
   const auto fits = static_cast<std::size_t>((layout.width - 2 * x) / (kLetterWidth * kTextScale));
@@ -43,7 +43,7 @@ void draw_header(Picture& picture, const PreviewLayout& layout, const Geometry& 
   write_text(picture, x, y + kLine, voxels.substr(0, fits), kFaint);
 }
 
-/// One slice in its colours, its caption above, and the patient directions around it.
+/// Draws one slice in its colours, its caption above, and the patient directions around it.
 template <class ColourOf>
 void draw_panel(Picture& picture, const Rectangle& panel, const Slice& slice, const std::string& caption,
                 const Pixels& values, const ColourOf& colour_of) {
@@ -63,7 +63,7 @@ void draw_panel(Picture& picture, const Rectangle& panel, const Slice& slice, co
   write_text(picture, caption_x, panel.y - 2 * kLine, caption);
 }
 
-/// A bar from `high` at the top to `low` at the bottom with numbers beside it, and lines of text below.
+/// Draws a legend: a bar from `high` at the top to `low` at the bottom with numbers beside it, and lines of text below.
 template <class ColourOf>
 void draw_legend(Picture& picture, const Rectangle& place, const std::vector<double>& numbers,
                  const std::vector<std::string>& lines, const ColourOf& colour_of) {
@@ -99,7 +99,7 @@ void draw_scale_bar(Picture& picture, const PreviewLayout& layout) {
   write_text(picture, x + length + 10, y - kLine / 2 + 2, short_number(length_mm) + " mm");
 }
 
-/// What the panels show: before, after, after minus before.
+/// What the three rows of panels show: before, after, and after minus before.
 struct Samples {
   std::array<std::array<Pixels, PreviewLayout::kColumns>, PreviewLayout::kRows> rows;
   Pixels all(std::size_t row) const {

@@ -14,10 +14,10 @@ namespace {
 
 constexpr int kMostPanelWidth = 366, kMostPanelHeight = 368;
 constexpr int kLeastCellWidth = 21 * kLetterWidth * kTextScale,
-              kLeastCellHeight = 140;  // room for captions and legends
+              kLeastCellHeight = 140;  // leaves room for captions and legends
 constexpr int kLine = kLineHeight * kTextScale, kGutter = 9 * kTextScale, kMargin = 12;
-constexpr int kHeader = 2 * kLine + 2 * kMargin;   // title and voxels
-constexpr int kAbove = 2 * kLine, kBelow = kLine;  // of a panel: caption and letter, letter
+constexpr int kHeader = 2 * kLine + 2 * kMargin;   // two lines: the title, and the size in voxels
+constexpr int kAbove = 2 * kLine, kBelow = kLine;  // above a panel a caption and a letter, below it a letter
 constexpr int kLegendWidth = 12 * kLetterWidth * kTextScale;
 
 int pixels(double mm, double pixels_per_mm) { return std::max(1, static_cast<int>(std::lround(mm * pixels_per_mm))); }

@@ -9,7 +9,7 @@
 
 namespace tetwarp {
 
-/// Pixels.
+/// A rectangle of a picture, in pixels.
 struct Rectangle {
   int x = 0, y = 0, width = 0, height = 0;
 };
@@ -21,7 +21,7 @@ struct PreviewLayout {
   std::array<Slice, kColumns> slices;
   double pixels_per_mm = 1;
   int width = 0, height = 0;                                  ///< of the whole picture, at most 1400 each
-  std::array<std::array<Rectangle, kColumns>, kRows> panels;  ///< [row][column], of the voxels alone
+  std::array<std::array<Rectangle, kColumns>, kRows> panels;  ///< [row][column]: the voxels alone, without captions
   std::array<Rectangle, kRows> legends;
   int footer_y = 0;
 };

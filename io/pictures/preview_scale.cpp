@@ -48,7 +48,8 @@ Window choose_window(std::span<const double> values, VoxelType type) {
   if (rising.empty()) return {};
   const bool is_signed =
       type == VoxelType::i16 || type == VoxelType::i32 || type == VoxelType::f32 || type == VoxelType::f64;
-  constexpr double kAirAtMost = -500, kLeast = -5000, kMost = 40000;  // air is -1000; padding and metal go further
+  // HU: air is -1000, padding and metal go beyond these bounds
+  constexpr double kAirAtMost = -500, kLeast = -5000, kMost = 40000;
   if (is_signed && rising.front() <= kAirAtMost && rising.front() >= kLeast && rising.back() <= kMost)
     return {1500, -200, true};
   double low = percentile(rising, 1), high = percentile(rising, 99);
@@ -62,7 +63,7 @@ Colour DifferenceScale::operator()(double difference) const {
   constexpr Colour kNone = {0, 0, 0};
   constexpr Colour kLess = {24, 72, 224}, kLeast = {160, 240, 255}, kMore = {208, 32, 24}, kMost = {255, 236, 130};
   const double t = std::clamp(difference / range, -1.0, 1.0), size = std::abs(t);
-  constexpr double kMiddle = 0.6;  // where black has become the full colour
+  constexpr double kMiddle = 0.6;  // part of the way to the largest value at which black has become the full colour
   const Colour &full = t < 0 ? kLess : kMore, &end = t < 0 ? kLeast : kMost;
   return size < kMiddle ? mix(kNone, full, size / kMiddle) : mix(full, end, (size - kMiddle) / (1 - kMiddle));
 }

@@ -13,7 +13,8 @@ namespace {
 
 constexpr std::array<std::array<char, 2>, 3> kLetters = {{{'R', 'L'}, {'A', 'P'}, {'I', 'S'}}};
 
-/// Patient axis that points to the right and to the bottom of the picture, and across it; bottom is feet where it is S.
+/// The patient axes that point to the right and to the bottom of the picture, and the one across it. The feet are at
+/// the bottom where that axis is S.
 struct PlaneAxes {
   int right, down, normal;
 };
@@ -55,7 +56,7 @@ std::vector<Tap> taps(const Geometry& geometry, const PictureAxis& axis, int pix
   return result;
 }
 
-/// A sample without weight has no say, not even where it is NaN.
+/// The weighted mean of two samples. A sample without weight has no influence, not even if it is NaN.
 double mix(double a, double b, double weight) { return weight == 0 ? a : a + weight * (b - a); }
 
 }  // namespace

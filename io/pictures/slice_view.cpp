@@ -16,11 +16,11 @@ namespace {
 
 constexpr Colour kPaper = {16, 16, 18};
 constexpr const char* kNames[] = {"axial", "coronal", "sagittal"};
-constexpr int kLeastPixels = 16;   ///< of a slice along a side
-constexpr double kLineEvery = 12;  ///< pixels at least between two lines of the lattice
+constexpr int kLeastPixels = 16;   ///< the least pixels of a slice along a side
+constexpr double kLineEvery = 12;  ///< the least distance of two lattice lines in pixels
 constexpr Tint kLine = {{90, 220, 255}, 0.75};
 
-/// The values of a voxel of a map, NaN where it has none.
+/// The values of a voxel of a map; NaN where the map has none.
 glm::dvec3 voxel_of(const ConstVolumeView& map, const glm::i64vec3& voxel) {
   const Region& held = map.buffered;
   const glm::i64vec3 at = voxel - held.begin, size = held.end - held.begin;
@@ -40,7 +40,8 @@ glm::dvec3 voxel_of(const ConstVolumeView& map, const glm::i64vec3& voxel) {
   return values;
 }
 
-/// The same between the voxels of a slice, linear; where one of them has no number, those of the nearest voxel.
+/// The values of a map between the voxels of a slice, linearly interpolated; where a voxel has no number, the values of
+/// the nearest voxel.
 glm::dvec3 between_voxels(const ConstVolumeView& map, const Slice& slice, const glm::dvec3& index) {
   const glm::dvec3 last(map.geometry->size - std::int64_t{1}), inside = glm::clamp(index, glm::dvec3(0), last);
   const int a = slice.right.grid_axis, b = slice.down.grid_axis;
@@ -56,7 +57,7 @@ glm::dvec3 between_voxels(const ConstVolumeView& map, const Slice& slice, const 
   return std::isnan(sum.x) ? voxel_of(map, glm::i64vec3(glm::round(inside))) : sum;
 }
 
-/// A picture of one slice in a part of a larger one.
+/// The picture of one slice, in a part of a larger picture.
 class SlicePanel {
  public:
   SlicePanel(Picture& picture, const Rectangle& panel, const Geometry& grid, const Slice& slice)
@@ -95,12 +96,12 @@ class SlicePanel {
   const Slice& slice_;
 };
 
-/// Undeformed places are followed over the picture: a line is where the cell changes. Which cells the slice itself runs
-/// along in is not shown.
+/// Draws lines where the undeformed place of a pixel changes from one cell of the lattice to the next. Axes along which
+/// the slice stays within one layer of cells give no lines.
 void SlicePanel::draw_lattice(const Overlay& overlay) {
   const AffineMap point = point_from_index(grid_), lattice = index_from_point(overlay.lattice);
   const glm::dvec3 cells = glm::abs(lattice.linear * point.linear * (index_at(1, 1) - index_at(0, 0)));
-  glm::dvec3 step(1);  // cells between two lines
+  glm::dvec3 step(1);  // cells between two lines, a power of two
   for (int axis = 0; axis < 3; ++axis)
     step[axis] = std::pow(2, std::ceil(std::log2(std::max(1.0, cells[axis] * kLineEvery))));
   const auto width = static_cast<std::size_t>(panel_.width);
@@ -123,7 +124,7 @@ void SlicePanel::draw_lattice(const Overlay& overlay) {
 
 int pixels(double mm, double pixels_per_mm) { return static_cast<int>(std::lround(mm * pixels_per_mm)); }
 
-/// Panels beside each other, and the room around them.
+/// The panels of a view beside each other, and the space around them.
 struct Layout {
   std::vector<Rectangle> panels;
   double pixels_per_mm = 1;

@@ -11,7 +11,8 @@ namespace {
 
 constexpr int kGlyphsPerBand = 16, kGlyphRows = 8, kGlyphColumns = 5;
 
-// The letters as they look, sixteen to a band, in the order of ASCII; the last row is for what hangs below the line.
+// The letters as they look, sixteen in a band, in the order of ASCII; the last row of a band is for what hangs below
+// the line.
 // clang-format off
 constexpr std::array kBands = {
     //       !     "     #     $     %     &     '     (     )     *     +     ,     -     .     /

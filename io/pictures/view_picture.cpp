@@ -13,7 +13,7 @@ namespace tetwarp {
 
 std::string direction_letters(const glm::dvec3& direction) {
   constexpr std::array<const char*, 3> kLess = {"R", "A", "I"}, kMore = {"L", "P", "S"};
-  constexpr double kBetween = 0.38;  // sin 22.5 degrees: an eighth of the circle
+  constexpr double kBetween = 0.38;  // sin 22.5 degrees, so that each direction has an eighth of the circle
   std::array<std::size_t, 3> axes = {0, 1, 2};
   const auto part = [&](std::size_t axis) { return direction[static_cast<int>(axis)]; };
   std::stable_sort(axes.begin(), axes.end(),

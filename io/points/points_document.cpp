@@ -18,7 +18,7 @@ namespace {
 template <class Number>
 std::string shortest(Number value) {
   char text[32];
-  const auto end = std::to_chars(text, text + sizeof text, value + Number{0});  // -0 + 0 is 0
+  const auto end = std::to_chars(text, text + sizeof text, value + Number{0});  // -0 + 0 is 0, so no "-0" is written
   return {text, end.ptr};
 }
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-// 3D Slicer's .mrk.json: markups-schema-v1.0.3.json of Slicer, Modules/Loadable/Markups/Resources/Schema.
+// Reads 3D Slicer's .mrk.json: markups-schema-v1.0.3.json of Slicer, Modules/Loadable/Markups/Resources/Schema.
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -16,10 +16,11 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Parses, and refuses an object that has a key twice: of two positions or coordinate systems none is the right one.
+/// Parses a document, and refuses an object that has a key twice: of two positions or coordinate systems none is the
+/// right one.
 /// @throws InputError or what nlohmann throws
 Json parse_with_different_keys(const std::string& bytes, const std::string& name) {
-  std::vector<std::set<std::string>> keys;  // of the objects that are open
+  std::vector<std::set<std::string>> keys;  // the keys so far of each object that is open
   return Json::parse(bytes, [&](int, Json::parse_event_t event, const Json& parsed) {
     if (event == Json::parse_event_t::object_start) keys.emplace_back();
     if (event == Json::parse_event_t::object_end) keys.pop_back();
@@ -31,10 +32,10 @@ Json parse_with_different_keys(const std::string& bytes, const std::string& name
   });
 }
 
-/// "/markups/0/controlPoints/2, FILE".
+/// Where a value stands, for messages: "/markups/0/controlPoints/2, FILE".
 std::string place_of(const Json::json_pointer& at, const std::string& name) { return at.to_string() + ", " + name; }
 
-/// @return no frame where the markup does not say
+/// The frame that a markup states; none where it states none.
 std::optional<PointFrame> frame_of_markup(const Json& markup, const std::string& where) {
   const auto system = markup.find("coordinateSystem");
   if (system == markup.end()) return {};
@@ -45,7 +46,8 @@ std::optional<PointFrame> frame_of_markup(const Json& markup, const std::string&
 void require_mm(const Json& markup, const std::string& where) {
   const auto units = markup.find("coordinateUnits");
   if (units == markup.end()) return;
-  const Json& unit = units->is_array() && !units->empty() ? units->front() : *units;  // UCUM: [value, scheme, meaning]
+  // UCUM: a list of value, scheme, meaning
+  const Json& unit = units->is_array() && !units->empty() ? units->front() : *units;
   require(unit == "mm", "coordinates in " + unit.dump() + ", " + where + "; expected mm");
 }
 
@@ -82,8 +84,8 @@ class MarkupsDocument : public PointsDocument {
   std::string rewritten(std::span<const glm::dvec3> moved, std::span<const PointStatus> status) const override {
     Json document = document_;
     for (std::size_t n = 0; n < moved.size(); ++n) {
-      Json& control_point = document[places_[n].at];
-      const glm::dvec3 point = places_[n].turned ? turned(moved[n]) : moved[n];
+      Json& control_point = document[positions_[n].at];
+      const glm::dvec3 point = positions_[n].turned ? turned(moved[n]) : moved[n];
       if (moved[n] != points[n]) control_point["position"] = {point.x + 0.0, point.y + 0.0, point.z + 0.0};
       if (status[n] == PointStatus::outside)
         control_point["description"] = with_outside_text(control_point.value("description", ""));
@@ -92,9 +94,9 @@ class MarkupsDocument : public PointsDocument {
   }
 
  private:
-  struct Place {
+  struct Position {
     Json::json_pointer at;
-    bool turned;  ///< its markup is of the other frame than the first
+    bool turned;  ///< whether its markup has the other frame than the first markup
   };
 
   void take(const Json::json_pointer& at, bool first, const std::string& name) {
@@ -117,19 +119,20 @@ class MarkupsDocument : public PointsDocument {
     }
   }
 
-  void take_control_point(const Json& control_point, const Place& place, const std::string& where) {
+  void take_control_point(const Json& control_point, const Position& place, const std::string& where) {
     require(control_point.is_object(), "no object, " + where);
     const auto placed = control_point.find("positionStatus");
-    if (placed != control_point.end() && *placed != "defined") return;  // not placed yet, or missing in this volume
+    // Such a point is not placed yet, or is missing in this volume.
+    if (placed != control_point.end() && *placed != "defined") return;
     const auto description = control_point.find("description");
     require(description == control_point.end() || description->is_string(), "description is no text, " + where);
     const glm::dvec3 point = position_of(control_point, where);
     points.push_back(place.turned ? turned(point) : point);
-    places_.push_back(place);
+    positions_.push_back(place);
   }
 
   Json document_;
-  std::vector<Place> places_;
+  std::vector<Position> positions_;
 };
 
 }  // namespace

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Wavefront OBJ surfaces. Vertex normals do not hold after a deformation: `vn` lines and the references to them are
-// left out.
+// Reads Wavefront OBJ surfaces. Vertex normals are no longer true after a deformation, so `vn` lines and references to
+// them are left out.
 #include <charconv>
 
 #include "deform/errors.h"
@@ -54,12 +54,12 @@ class ObjDocument : public PointsDocument {
 
  private:
   struct Edit {
-    Span at;
+    TextSpan at;
     std::string text;
     bool is_vertex = false;
   };
 
-  Span span_of(std::string_view first, std::string_view last) const {
+  TextSpan span_of(std::string_view first, std::string_view last) const {
     return {static_cast<std::size_t>(first.data() - bytes_.data()),
             static_cast<std::size_t>(last.data() + last.size() - bytes_.data())};
   }
@@ -70,7 +70,8 @@ class ObjDocument : public PointsDocument {
     edits_.push_back({span_of(words[1], words[3]), {}, true});
   }
 
-  /// `f 1/2/3 ...`, `f 1//3 ...`, `f 1/2 ...` or `f 1 ...`; negative numbers count back from the last vertex.
+  /// Takes a face, `f 1/2/3 ...`, `f 1//3 ...`, `f 1/2 ...` or `f 1 ...`. Negative numbers count back from the last
+  /// vertex.
   void take_face(const std::vector<std::string_view>& words, const std::string& where) {
     for (std::size_t n = 1; n < words.size(); ++n) {
       const std::string_view word = words[n];
@@ -91,8 +92,8 @@ class ObjDocument : public PointsDocument {
   }
 
   std::string bytes_;
-  std::vector<Edit> edits_;  ///< in their order in the file
-  std::size_t largest_ = 0;  ///< number of a vertex in a face
+  std::vector<Edit> edits_;  ///< what is replaced, in the order of the file
+  std::size_t largest_ = 0;  ///< the largest number of a vertex in a face
 };
 
 }  // namespace

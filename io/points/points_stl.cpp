@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Surfaces of facets: 80 bytes, a count and 50 bytes a facet (little endian), or text.
+// Reads STL surfaces: 80 bytes, a count and 50 bytes for each facet (little endian), or text.
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -19,7 +19,7 @@ static_assert(std::endian::native == std::endian::little, "STL is read and writt
 
 constexpr std::size_t kHeaderBytes = 80, kFirstFacet = 84, kFacetBytes = 50;
 
-/// By the right-hand rule; zero where the facet has no area.
+/// The unit normal of a facet by the right-hand rule; zero where the facet has no area.
 glm::dvec3 normal_of(std::span<const glm::dvec3> corners) {
   const glm::dvec3 normal = glm::cross(corners[1] - corners[0], corners[2] - corners[0]);
   const double length = glm::length(normal);
@@ -57,7 +57,7 @@ class BinaryStl : public PointsDocument {
   }
 
  private:
-  /// Of a corner; the normal of its facet lies ahead of the first.
+  /// The byte at which a corner begins. The normal of a facet precedes its first corner.
   static std::size_t offset(std::size_t corner) {
     return kFirstFacet + corner / 3 * kFacetBytes + (1 + corner % 3) * sizeof(glm::vec3);
   }
@@ -72,7 +72,7 @@ class TextStl : public PointsDocument {
  public:
   TextStl(std::string all, const std::string& name) : bytes_(std::move(all)) {
     require(bytes_.find('\0') == std::string::npos, "a byte of zero in text, " + name + "; is it an STL file?");
-    // What a line may begin with, by what stands before it; a solid may hold any number of facets.
+    // The words with which the lines of a facet begin, in order. A solid may hold any number of facets.
     constexpr const char* kFacet[] = {"facet", "outer", "vertex", "vertex", "vertex", "endloop", "endfacet"};
     Lines lines(bytes_);
     bool in_solid = false;
@@ -97,7 +97,7 @@ class TextStl : public PointsDocument {
   std::string rewritten(std::span<const glm::dvec3> moved, std::span<const PointStatus>) const override {
     Patch patch(bytes_);
     for (std::size_t first = 0; first < moved.size(); first += 3) {
-      const Span& normal = normals_[first / 3];
+      const TextSpan& normal = normals_[first / 3];
       patch.replace(normal.begin, normal.end, text_of(normal_of(moved.subspan(first, 3))));
       for (std::size_t n = first; n < first + 3; ++n)
         patch.replace(corners_[n].begin, corners_[n].end, text_of(moved[n]));
@@ -106,7 +106,7 @@ class TextStl : public PointsDocument {
   }
 
  private:
-  Span span_of(std::string_view first, std::string_view last) const {
+  TextSpan span_of(std::string_view first, std::string_view last) const {
     return {static_cast<std::size_t>(first.data() - bytes_.data()),
             static_cast<std::size_t>(last.data() + last.size() - bytes_.data())};
   }
@@ -121,7 +121,7 @@ class TextStl : public PointsDocument {
   }
 
   std::string bytes_;
-  std::vector<Span> corners_, normals_;
+  std::vector<TextSpan> corners_, normals_;
 };
 
 }  // namespace

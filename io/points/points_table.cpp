@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Landmarks in lines: CSV, and the .fcsv of 3D Slicer (https://www.slicer.org/wiki/Modules:Fiducials-Documentation-3.6,
-// vtkMRMLMarkupsFiducialStorageNode).
+// Reads landmarks in lines: CSV, and the .fcsv of 3D Slicer
+// (https://www.slicer.org/wiki/Modules:Fiducials-Documentation-3.6, vtkMRMLMarkupsFiducialStorageNode).
 #include <algorithm>
 #include <array>
 
@@ -14,15 +14,15 @@ namespace tetwarp {
 
 namespace {
 
-/// Where a record has its coordinates, and the field that takes its status.
-struct Row {
-  std::array<Span, 3> xyz;
-  Span status;
+/// Where in a file a record has its coordinates, and the field that takes its status.
+struct RecordSpans {
+  std::array<TextSpan, 3> xyz;
+  TextSpan status;
 };
 
 const char* name_of(PointStatus status) { return status == PointStatus::moved ? "moved" : "outside"; }
 
-/// Where each of x, y, z is among the columns. @throws InputError unless each is there once
+/// Which of the columns are x, y, z. @throws InputError unless each of these is there once
 std::array<std::size_t, 3> find_xyz(const std::vector<std::string>& columns, const std::string& where) {
   std::array<std::size_t, 3> found{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -45,7 +45,7 @@ class TableDocument : public PointsDocument {
     require(record.fields.size() == columns, std::to_string(record.fields.size()) + " fields" + where + "; expected " +
                                                  std::to_string(columns) + " as in the header");
     glm::dvec3 point;
-    Row row;
+    RecordSpans row;
     for (int axis = 0; axis < 3; ++axis) {
       point[axis] = number_of(unquoted(record.raw(xyz[axis])), where);
       row.xyz[axis] = record.fields[xyz[axis]];
@@ -55,8 +55,8 @@ class TableDocument : public PointsDocument {
     points.push_back(point);
   }
 
-  /// Replaces the coordinates of a row that lie between two bytes.
-  void put(Patch& patch, const Row& row, const glm::dvec3& before, const glm::dvec3& point, std::size_t from,
+  /// Replaces the coordinates of a row that lie between two bytes of the file.
+  void put(Patch& patch, const RecordSpans& row, const glm::dvec3& before, const glm::dvec3& point, std::size_t from,
            std::size_t to) const {
     std::array<int, 3> order{0, 1, 2};
     std::sort(order.begin(), order.end(), [&](int a, int b) { return row.xyz[a].begin < row.xyz[b].begin; });
@@ -67,14 +67,14 @@ class TableDocument : public PointsDocument {
   }
 
   std::string bytes;
-  std::vector<Row> rows;
+  std::vector<RecordSpans> rows;
 };
 
 class CsvDocument : public TableDocument {
  public:
   CsvDocument(std::string all, const std::string& name) : TableDocument(std::move(all)) {
     unsaid = Unsaid::lps_by_form;
-    const std::size_t begin = bytes.starts_with("\xEF\xBB\xBF") ? 3 : 0;  // byte order mark
+    const std::size_t begin = bytes.starts_with("\xEF\xBB\xBF") ? 3 : 0;  // length of a byte order mark
     CsvRecords record(bytes, begin, name);
     require(record.next(), "no header, " + name + "; expected x,y,z");
     header_end_ = record.end;
@@ -100,7 +100,7 @@ class CsvDocument : public TableDocument {
     Patch patch(bytes);
     if (!has_status_) patch.replace(header_end_, header_end_, ",status");
     for (std::size_t n = 0; n < rows.size(); ++n) {
-      const Span& at = rows[n].status;
+      const TextSpan& at = rows[n].status;
       put(patch, rows[n], points[n], moved[n], 0, at.begin);
       patch.replace(at.begin, at.end, (has_status_ ? "" : ",") + std::string(name_of(status[n])));
       put(patch, rows[n], points[n], moved[n], at.end, bytes.size());
@@ -140,7 +140,7 @@ class FcsvDocument : public TableDocument {
   std::string rewritten(std::span<const glm::dvec3> moved, std::span<const PointStatus> status) const override {
     Patch patch(bytes);
     for (std::size_t n = 0; n < rows.size(); ++n) {
-      const Span& at = rows[n].status;
+      const TextSpan& at = rows[n].status;
       put(patch, rows[n], points[n], moved[n], 0, at.begin);
       if (has_description_ && status[n] == PointStatus::outside) {
         const std::string text = unquoted(std::string_view(bytes).substr(at.begin, at.end - at.begin));
@@ -152,7 +152,7 @@ class FcsvDocument : public TableDocument {
   }
 
  private:
-  /// A line "# name = value".
+  /// Takes a header line, "# name = value".
   void take_header(std::string_view line, std::size_t number, const std::string& name,
                    std::vector<std::string>& columns) {
     const auto equals = line.find('=');

@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Legacy VTK polydata, text or big-endian binary (https://docs.vtk.org/en/latest/design_documents/VTKFileFormats.html).
-// NORMALS do not hold after a deformation and are left out; everything else is kept byte for byte.
+// Reads legacy VTK polydata, text or big-endian binary
+// (https://docs.vtk.org/en/latest/design_documents/VTKFileFormats.html). NORMALS are no longer true after a deformation
+// and are left out; everything else is kept byte for byte.
 #include <bit>
 #include <cmath>
 
@@ -31,7 +32,7 @@ class VtkDocument : public PointsDocument {
 
   std::string rewritten(std::span<const glm::dvec3> moved, std::span<const PointStatus>) const override {
     Patch patch(bytes_);
-    for (const Span& part : edits_) {
+    for (const TextSpan& part : edits_) {
       const bool is_points = part.begin == points_at_.begin && part.end == points_at_.end;
       patch.replace(part.begin, part.end, is_points ? values_of(moved) : "");
     }
@@ -77,7 +78,7 @@ class VtkDocument : public PointsDocument {
     for (std::size_t n = 0; n < 3 * count; ++n) points[n / 3][static_cast<int>(n % 3)] = value(value_at);
   }
 
-  /// One coordinate; `at` goes on to the next.
+  /// The coordinate at byte `at`, which is moved behind it.
   double value(std::size_t& at) const {
     if (!text_.binary) {
       at = bytes_.find_first_not_of(" \t\r\n", at);
@@ -92,7 +93,7 @@ class VtkDocument : public PointsDocument {
     return number;
   }
 
-  /// The part from `begin` to here, with what is said of it.
+  /// Leaves out the part of the file from `begin` to here, with the metadata that follow it.
   void drop(std::size_t begin) {
     if (text_.next_is("METADATA")) {
       text_.line();
@@ -123,10 +124,10 @@ class VtkDocument : public PointsDocument {
 
   std::string bytes_, name_;
   VtkText text_;
-  std::size_t tuples_ = 0;  ///< of the data that follow
-  Span points_at_;
-  std::vector<Span> edits_;      ///< the points, and what is left out
-  VtkDecoder decode_ = nullptr;  ///< of a coordinate
+  std::size_t tuples_ = 0;  ///< number of tuples of the data that follow
+  TextSpan points_at_;
+  std::vector<TextSpan> edits_;  ///< what is replaced: the points, and the parts that are left out
+  VtkDecoder decode_ = nullptr;  ///< decodes a coordinate of a binary file
   bool double_ = false, dropped_ = false;
 };
 

@@ -37,7 +37,7 @@ bool PipelineResampler::takes(const Geometry& output, const HeldField& field, co
 
 void PipelineResampler::make(BackendKind backend, const Control& control) {
   const Direction direction = std::holds_alternative<FieldView>(field_.view) ? Direction::forward : Direction::pull;
-  resampler_.reset();  // before another takes memory
+  resampler_.reset();  // frees the memory of this resampler before another allocates its own
   resampler_ = AnyResampler(backend, direction, output_, options_.device,
                             {.threads = options_.threads, .memory = options_.device_memory});
   give_field(control);
@@ -61,7 +61,7 @@ bool PipelineResampler::set_field(itk::ProcessObject& filter, const Geometry& ou
                                   const PipelineOptions& options, ProgressShare share) {
   if (holds(output, field, options)) return false;
   if (!takes(output, field, options)) resampler_.reset();
-  const HeldField before = std::exchange(field_, field);  // kept while the resampler still looks at it
+  const HeldField before = std::exchange(field_, field);  // kept until the resampler no longer points into it
   output_ = output;
   options_ = options;
   if (leaves_open(options.backend) && !runs_on_device(chosen(options.backend)))

@@ -49,18 +49,18 @@ class PipelineResampler {
   /// The voxels of a source grid that an output region needs, at least one. `set_field` must have been called.
   Region source_region(const itk::ProcessObject& filter, const Geometry& source, const Region& output) const;
 
-  /// `Resampler::resample`, as a part of the filter's progress.
+  /// Calls `Resampler::resample` and reports its progress as a part of the filter's.
   /// @throws itk::ExceptionObject
   Report resample(itk::ProcessObject& filter, const Region& region, std::span<const Target> targets, const Maps& maps,
                   ProgressShare share);
 
-  /// Where the last field went, "cpu" or "cuda"; empty before the first.
+  /// The backend to which the last field went, "cpu" or "cuda"; empty before the first field.
   std::string backend() const { return resampler_ ? name_of(resampler_.backend()) : ""; }
 
  private:
   /// Whether the resampler has this field, for this output and these options.
   bool holds(const Geometry& output, const HeldField& field, const PipelineOptions& options) const;
-  /// Whether the present resampler can take the field. One that stands in for a device that failed cannot.
+  /// Whether the present resampler can take the field. A resampler that stands in for a device that failed cannot.
   bool takes(const Geometry& output, const HeldField& field, const PipelineOptions& options) const;
   void make(BackendKind backend, const Control& control);
   void give_field(const Control& control);

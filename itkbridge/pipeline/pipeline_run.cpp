@@ -19,7 +19,7 @@ namespace tetwarp {
 namespace {
 
 constexpr std::chrono::milliseconds kLookEvery{5};
-constexpr float kSmallestStep = 0.01f;  ///< of progress that observers are told
+constexpr float kSmallestStep = 0.01f;  ///< progress is told to observers in steps of at least this
 
 std::string name(const itk::ProcessObject& filter) {
   std::ostringstream text;
@@ -27,20 +27,21 @@ std::string name(const itk::ProcessObject& filter) {
   return text.str();
 }
 
-/// Work in a thread of its own. Whoever leaves early, by an exception, stops it and waits for its end.
-class Worker {
+/// Work in a thread of its own. If this object is destroyed before the work has ended, as by an exception, it stops the
+/// work and waits for its end.
+class WorkThread {
  public:
-  explicit Worker(const std::function<void(const Control&)>& work)
+  explicit WorkThread(const std::function<void(const Control&)>& work)
       : thread_([this, &work](const std::stop_token& stop) { run(work, stop); }) {}
 
-  /// Waits a little. @return whether the work has ended
+  /// Waits a few milliseconds. @return whether the work has ended
   bool wait() {
     std::unique_lock lock(mutex_);
     return changed_.wait_for(lock, kLookEvery, [&] { return ended_; });
   }
   void stop() { thread_.request_stop(); }
   double progress() const { return progress_.load(std::memory_order_relaxed); }
-  /// Throws what the work threw.
+  /// Throws the exception that the work threw, if any.
   void finish() {
     thread_.join();
     if (failure_) std::rethrow_exception(failure_);
@@ -63,7 +64,7 @@ class Worker {
   bool ended_ = false;
   std::exception_ptr failure_;
   std::atomic<double> progress_ = 0;
-  std::jthread thread_;  // the last member: it uses the others
+  std::jthread thread_;  // the last member, since it uses the others
 };
 
 [[noreturn]] void throw_aborted(const itk::ProcessObject& filter) {
@@ -84,7 +85,7 @@ void run_for(itk::ProcessObject& filter, ProgressShare share, const std::functio
   };
   if (share.end > share.begin) filter.UpdateProgress(told);
   translate_errors(filter, [&] {
-    Worker worker(work);
+    WorkThread worker(work);
     while (!worker.wait()) {
       if (filter.GetAbortGenerateData())
         worker.stop();
@@ -113,7 +114,8 @@ void translate_errors(const itk::ProcessObject& filter, const std::function<void
 }
 
 int threads_of(const itk::ProcessObject& filter) {
-  const auto* threader = const_cast<itk::ProcessObject&>(filter).GetMultiThreader();  // only the non-const one is there
+  // GetMultiThreader has no const form
+  const auto* threader = const_cast<itk::ProcessObject&>(filter).GetMultiThreader();
   const itk::ThreadIdType most = threader->GetMaximumNumberOfThreads();
   return static_cast<int>(std::min(most, filter.GetNumberOfWorkUnits()));
 }

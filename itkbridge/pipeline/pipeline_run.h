@@ -28,10 +28,10 @@ struct ProgressShare {
 ///         ended
 void run_for(itk::ProcessObject& filter, ProgressShare share, const std::function<void(const Control&)>& work);
 
-/// Issues a warning as itkWarningMacro does.
+/// Issues a warning like itkWarningMacro.
 void warn(const itk::ProcessObject& filter, const std::string& text);
 
-/// Does work, and throws a tetwarp::Error of it as an itk::ExceptionObject of the filter.
+/// Does work. A tetwarp::Error that it throws becomes an itk::ExceptionObject of the filter.
 void translate_errors(const itk::ProcessObject& filter, const std::function<void()>& work);
 
 /// Number of threads that a filter may use: its work units, but no more threads than its multi-threader has.

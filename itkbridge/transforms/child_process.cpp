@@ -21,7 +21,8 @@ constexpr int kStreams = 4;
 
 std::string reason(int error) { return std::generic_category().message(error); }
 
-/// A copy that is none of the descriptors a program is given, so that none of these is overwritten before it is copied.
+/// A copy of a descriptor with a number above those that a program is given, so that it is not overwritten before it is
+/// copied to its place.
 Descriptor raised(int number) {
   if (number < 0) return {};
   const int copy = ::fcntl(number, F_DUPFD_CLOEXEC, kStreams);
@@ -29,7 +30,7 @@ Descriptor raised(int number) {
   return Descriptor(copy);
 }
 
-/// What becomes of descriptors on the way into the program.
+/// The list of what is done to descriptors when a program starts.
 class Actions {
  public:
   explicit Actions(const Descriptor (&streams)[kStreams]) {
@@ -40,7 +41,7 @@ class Actions {
       else if (n <= STDERR_FILENO)
         posix_spawn_file_actions_addopen(&actions_, n, "/dev/null", n == STDIN_FILENO ? O_RDONLY : O_WRONLY, 0);
     }
-    // Not all files of a program that uses this library are closed by exec.
+    // Closes all others: a program that uses this library may have files that exec does not close.
     posix_spawn_file_actions_addclosefrom_np(&actions_, streams[kStreams - 1].number() >= 0 ? kStreams : kStreams - 1);
   }
   ~Actions() { posix_spawn_file_actions_destroy(&actions_); }
@@ -52,7 +53,7 @@ class Actions {
   posix_spawn_file_actions_t actions_;
 };
 
-/// Signals as a program expects them, and a process group of its own.
+/// Attributes of a program that starts: default signals, and a process group of its own.
 class Attributes {
  public:
   Attributes() {
@@ -113,7 +114,7 @@ void ChildProcess::kill() {
 }
 
 std::optional<int> ChildProcess::wait() {
-  siginfo_t ended{};  // first without taking the process id away from kill()
+  siginfo_t ended{};  // waits without freeing the process id, which kill() may still use
   while (::waitid(P_PID, static_cast<id_t>(id_), &ended, WEXITED | WNOWAIT) != 0 && errno == EINTR) continue;
   const std::lock_guard lock(mutex_);
   waited_ = true;

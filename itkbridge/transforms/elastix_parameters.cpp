@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kMostFiles = 100;
 
-/// A line without its comment: `//` outside quotes ends it.
+/// A line without its comment, which begins with `//` outside quotes.
 std::string_view content_of(std::string_view line) {
   bool quoted = false;
   for (std::size_t at = 0; at < line.size(); ++at) {
@@ -48,7 +48,7 @@ class Parameters {
   const std::string& file() const { return file_; }
   bool has(const std::string& key) const { return values_.contains(key); }
 
-  /// The one word of a key, without quotes, or `missing` where there is no such key.
+  /// The only word of a key, without quotes; `missing` if there is no such key.
   std::string word(const std::string& key, const std::string& missing) const {
     const auto found = values_.find(key);
     if (found == values_.end()) return missing;
@@ -80,8 +80,8 @@ class Parameters {
   std::map<std::string, std::string> values_;
 };
 
-/// Size, origin, spacing and direction as ITK's BSplineTransform has them. elastix counts samples from GridIndex and
-/// writes the direction column by column.
+/// Size, origin, spacing and direction in the order of ITK's BSplineTransform. elastix counts samples from GridIndex
+/// and writes the direction column by column.
 std::vector<double> grid_of(const Parameters& from) {
   const std::vector<double> size = from.numbers("GridSize", 3), index = from.numbers("GridIndex", 3),
                             spacing = from.numbers("GridSpacing", 3), origin = from.numbers("GridOrigin", 3);
@@ -127,13 +127,13 @@ TransformRecord record_of(const Parameters& from) {
   return record;
 }
 
-/// False also for a name that no file can have, which std::filesystem throws at.
+/// Whether a path is a regular file; false also for a name that no file can have, for which std::filesystem throws.
 bool is_file(const std::filesystem::path& path) {
   std::error_code ignored;
   return std::filesystem::is_regular_file(path, ignored);
 }
 
-/// The file of the initial transform, or an empty path.
+/// The path of the initial transform; empty if there is none.
 std::filesystem::path initial_of(const Parameters& from) {
   const std::string old_key = "InitialTransformParametersFileName", key = "InitialTransformParameterFileName";
   const std::string name = from.word(from.has(key) ? key : old_key, "NoInitialTransform");
@@ -143,13 +143,13 @@ std::filesystem::path initial_of(const Parameters& from) {
   for (const std::filesystem::path& path : {own.parent_path() / said, said}) {
     if (is_file(path)) return path;
   }
-  // Both were moved: the name alone, unless it is the same in another folder.
+  // If both files were moved to another folder, the name alone still fits, unless it is that of this file.
   const std::filesystem::path beside = own.parent_path() / said.filename();
   if (said.filename() != own.filename() && is_file(beside)) return beside;
   throw InputError("the initial transform " + name + " is not there, " + from.file());
 }
 
-/// Visits a file and the initial transforms behind it, each of which the one before names.
+/// Calls `visit` for a file and then for the initial transform that each file names.
 template <class Visit>
 void follow(const std::filesystem::path& path, Visit&& visit) {
   std::vector<std::filesystem::path> seen;

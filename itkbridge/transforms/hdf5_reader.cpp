@@ -55,8 +55,8 @@ class Hdf5Reader {
     return value.substr(0, value.find('\0'));
   }
 
-  /// A string of variable length, from the global heap (HDF5 file format specification, III.E). HDF5 1.10.8 reads
-  /// outside its memory where the heap is damaged, so the file is asked directly.
+  /// A string of variable length, read from the file's global heap (HDF5 file format specification, III.E) without
+  /// HDF5: version 1.10.8 reads outside its memory where the heap is damaged.
   std::string heap_text(const H5::DataSet& set, const std::string& name) const {
     const std::string damaged = name + " is damaged, " + file_;
     require(set.getStorageSize() == 16, damaged);
@@ -72,7 +72,7 @@ class Hdf5Reader {
     };
     const std::uint64_t place = set.getOffset(), length = number(place, 4), heap = number(place + 4, 8),
                         wanted = number(place + 12, 4);
-    require(length <= kLongestText && number(heap, 4) == 0x4c4f4347, damaged);  // "GCOL"
+    require(length <= kLongestText && number(heap, 4) == 0x4c4f4347, damaged);  // "GCOL", with which a heap begins
     const std::uint64_t end = heap + number(heap + 8, 8);
     for (std::uint64_t at = heap + 16; at + 16 + length <= end;) {
       const std::uint64_t index = number(at, 2), size = number(at + 8, 8);
@@ -83,19 +83,20 @@ class Hdf5Reader {
         stream.read(value.data(), static_cast<std::streamsize>(length));
         return value.substr(0, value.find('\0'));
       }
-      require(index != 0 && size < end - at, damaged);  // 0 is what is left of the heap
+      require(index != 0 && size < end - at, damaged);  // 0 is the index of the free part of the heap
       at += 16 + (size + 7) / 8 * 8;
     }
     throw InputError(damaged);
   }
 
-  /// Of IEEE 754, as ITK writes them: HDF5 can hold floating-point numbers of any layout and length.
+  /// Whether a type is float or double of IEEE 754, which ITK writes. HDF5 can hold floating-point numbers of any
+  /// layout and length.
   static bool is_float_or_double(const H5::DataType& type) {
     using Type = H5::PredType;
     return type == Type::IEEE_F64LE || type == Type::IEEE_F32LE || type == Type::IEEE_F64BE || type == Type::IEEE_F32BE;
   }
 
-  /// Values in a chunk, for which HDF5 makes room however few it is asked for; 0: there are no chunks.
+  /// Number of values in a chunk, for which HDF5 allocates memory however few of them are read; 0: there are no chunks.
   static hsize_t chunk_of(const H5::DataSet& set) {
     const H5::DSetCreatPropList layout = set.getCreatePlist();
     hsize_t chunk = 0;
@@ -105,7 +106,7 @@ class Hdf5Reader {
 
   std::vector<double> values(const std::string& group, const std::string& what) const {
     std::string name = group + "/Transform" + what;
-    if (!hdf5_.nameExists(name)) name = group + "/Tranform" + what;  // as ITK 4 and 5 write it
+    if (!hdf5_.nameExists(name)) name = group + "/Tranform" + what;  // ITK 4 and 5 misspell the name like this
     const H5::DataSet set = hdf5_.openDataSet(name);
     const H5::DataSpace space = set.getSpace();
     require(is_float_or_double(set.getDataType()) && space.isSimple() && space.getSimpleExtentNdims() == 1,

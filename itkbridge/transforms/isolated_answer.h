@@ -3,19 +3,21 @@
 
 #pragma once
 
-// Private to itkbridge/: what tetwarp-read says to whom started it, over its descriptor 3. Both run on one machine.
+// Private to itkbridge/: what tetwarp-read writes over its descriptor 3 to the process that started it. Both run on one
+// machine.
 //
 //   kReadGreeting, then one Answer:
 //     records    how many, and of each its type, its fixed parameters, its parameters
 //     refusal    the words
 //     no_memory  nothing more
 //
-// Numbers are std::uint64_t; texts and lists are how many there are, and then they.
+// Numbers are std::uint64_t; of a text or a list, first its length is written, then its elements.
 #include <string_view>
 
 namespace tetwarp {
 
-/// Changes with what follows it, and with the arguments: KIND FILE MEMORY_BYTES CPU_SECONDS SECONDS PARENT.
+/// The first bytes of an answer. The number changes with the format of answers, and with the arguments of the program:
+/// KIND FILE MEMORY_BYTES CPU_SECONDS SECONDS PARENT.
 inline constexpr std::string_view kReadGreeting = "tetwarp-read 1\n";
 inline constexpr int kReadArguments = 6;
 inline constexpr int kAnswerDescriptor = 3;

@@ -20,9 +20,9 @@
 namespace tetwarp {
 namespace {
 
-struct Broken {};  // the pipe ended, or says what cannot be
+struct Broken {};  // the pipe ended, or what it says is impossible
 
-/// What comes over the pipe. A program whose memory is damaged may say anything.
+/// Reads the answer from the pipe and checks every number: a program whose memory is damaged may write anything.
 class AnswerReader {
  public:
   /// @param room  bytes that all records together may take
@@ -91,7 +91,8 @@ std::string ending(std::optional<int> status, const IsolatedLimits& limits) {
   return std::string("crashes (") + ::strsignal(signal) + ")";
 }
 
-/// The program ended, or said something else, before it began to read: that is no fault of the file.
+/// Throws the error of a program that ended, or wrote something else, before it began to read, which is no fault of the
+/// file.
 [[noreturn]] void refuse_program(const std::filesystem::path& program, const std::string& file,
                                  std::optional<int> status) {
   std::string end = "it does not answer as this version expects";

@@ -17,8 +17,8 @@ namespace {
 
 using Header = std::map<std::string, std::vector<double>, std::less<>>;
 
-/// The values of a key: a reference into `header`. The key comes by value, for a temporary one may be given, and with a
-/// reference to it GCC 14 would suspect that it is what is returned.
+/// The values of a key: a reference into `header`. The key is passed by value, for GCC 14 would suspect that a
+/// reference to a temporary key is what is returned.
 const std::vector<double>& field(const Header& header, std::string_view key, std::size_t count,
                                  const std::string& file) {
   const auto found = header.find(key);
@@ -28,7 +28,7 @@ const std::vector<double>& field(const Header& header, std::string_view key, std
   return found->second;
 }
 
-/// Size, origin, spacing and direction of the coefficients, as ITK's BSplineTransform has them.
+/// Size, origin, spacing and direction of the grid of coefficients, in the order of ITK's BSplineTransform.
 std::vector<double> grid_of(const Header& header, const std::string& file) {
   const auto& origin = field(header, "img_origin", 3, file);
   const auto& spacing = field(header, "img_spacing", 3, file);
@@ -37,7 +37,8 @@ std::vector<double> grid_of(const Header& header, const std::string& file) {
   const auto& region = field(header, "vox_per_rgn", 3, file);
   const auto& direction = field(header, "direction_cosines", 9, file);
   std::vector<double> size(3), first(origin), step(3);
-  // plastimatch keeps the origin as float and prints six decimals. The first voxels must not fall out of the domain.
+  // plastimatch keeps the origin as float and prints six decimals. With this slack the first voxels do not fall out of
+  // the domain.
   double slack = 1e-6;
   for (const double value : origin) slack = std::max(slack, 1e-6 + 6e-8 * std::abs(value));
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -58,7 +59,7 @@ TransformRecord read_plastimatch_spline(const std::filesystem::path& path) {
   const std::string file = path.string();
   std::ifstream stream(path, std::ios::binary);
   std::string line;
-  std::getline(stream, line);  // the magic
+  std::getline(stream, line);  // skips the magic
   Header header;
   TransformRecord record{"BSplineTransform_double_3_3", {}, {}};
   for (std::int64_t number = 2; std::getline(stream, line); ++number) {

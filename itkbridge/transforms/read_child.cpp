@@ -25,10 +25,11 @@
 namespace tetwarp {
 namespace {
 
-/// Ends this process without destructors of static objects and handlers of `exit`: the reader may have left anything.
+/// Ends this process without destructors of static objects and handlers of `exit`, since the reader may have damaged
+/// anything.
 [[noreturn]] void end(int status) { ::_exit(status); }
 
-/// Writes the answer; whoever started this process reads all of it, or kills it.
+/// Writes the answer. The process that started this one reads all of it, or kills this process.
 class AnswerWriter {
  public:
   void text(std::string_view text) const { write(text.data(), text.size()); }
@@ -62,7 +63,7 @@ class AnswerWriter {
   }
 };
 
-/// What the process is asked for.
+/// What the process is told to do, from its arguments.
 struct Request {
   std::string_view kind;
   const char* file = nullptr;
@@ -86,7 +87,7 @@ bool parse(int argc, char** argv, Request& request) {
          parse(argv[5], request.seconds) && parse(argv[6], request.parent);
 }
 
-/// Bytes of memory of this process that can be written, which is what RLIMIT_DATA counts.
+/// Bytes of memory of this process that can be written: what RLIMIT_DATA counts.
 std::uint64_t writable_memory() {
   std::uint64_t pages = 0;
   std::ifstream statm("/proc/self/statm");
@@ -94,7 +95,7 @@ std::uint64_t writable_memory() {
   return pages * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
 }
 
-/// Lowers a limit of this process, or does nothing where it is lower.
+/// Lowers a limit of this process to `to`, or leaves it where it is lower.
 void limit_to(__rlimit_resource resource, std::uint64_t to) {
   rlimit limit{};
   if (::getrlimit(resource, &limit) != 0) return;
@@ -102,10 +103,10 @@ void limit_to(__rlimit_resource resource, std::uint64_t to) {
   ::setrlimit(resource, &limit);
 }
 
-/// Puts the limits upon this process, which ends with the one that started it.
+/// Sets the limits of this process, and lets the system end it together with the one that started it.
 void confine(const Request& request) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (::getppid() != request.parent) end(1);  // it ended before
+  if (::getppid() != request.parent) end(1);  // the other process has ended already
   limit_to(RLIMIT_CORE, 0);
   limit_to(RLIMIT_DATA, writable_memory() + request.memory_bytes);
   limit_to(RLIMIT_CPU, request.cpu_seconds);

@@ -3,7 +3,7 @@
 
 #pragma once
 
-// Private to itkbridge/: what tetwarp-read does.
+// Private to itkbridge/: the main function of tetwarp-read.
 #include <filesystem>
 #include <span>
 #include <string_view>
@@ -13,7 +13,7 @@
 
 namespace tetwarp {
 
-/// One of the things that the program can read.
+/// A reader of the program, and the name by which it is chosen.
 struct ChildReader {
   std::string_view kind;
   std::vector<TransformRecord> (*read)(const std::filesystem::path& path);

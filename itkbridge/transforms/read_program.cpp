@@ -23,14 +23,15 @@ bool is_program(const fs::path& path) {
   return fs::is_regular_file(path, ignored) && ::access(path.c_str(), X_OK) == 0;
 }
 
-/// Symbolic links followed: an installation may be a farm of links to where it lies. Empty: there is no such file.
+/// The path with symbolic links followed, for an installation may consist of links to the files; empty: there is no
+/// such file.
 fs::path real(const fs::path& path) {
   std::error_code error;
   const fs::path found = fs::canonical(path, error);
   return error ? fs::path() : found;
 }
 
-/// The file that this code was loaded from.
+/// The file from which this code was loaded.
 fs::path library() {
   static const char here = 0;
   Dl_info info{};

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-// The program tetwarp-read: reads a file with a library that damaged files bring down, for the process that starts it
-// (itkbridge/transforms/isolated_read.h).
+// The program tetwarp-read. It reads a file, by a library that damaged files can bring down, for the process that
+// starts it (itkbridge/transforms/isolated_read.h).
 #include "itkbridge/transforms/hdf5_reader.h"
 #include "itkbridge/transforms/read_child.h"
 

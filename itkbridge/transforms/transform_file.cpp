@@ -16,7 +16,7 @@ namespace {
 constexpr std::string_view kHdf5 = "\x89HDF\r\n\x1a\n", kText = "#Insight Transform File V1.0";
 
 std::string first_bytes(const std::filesystem::path& path) {
-  std::error_code ignored;  // a name that no file can have
+  std::error_code ignored;  // set for a name that no file can have
   require(std::filesystem::is_regular_file(path, ignored),
           "not a file, " + path.string() + "; expected a transform file");
   std::ifstream file(path, std::ios::binary);
@@ -26,7 +26,8 @@ std::string first_bytes(const std::filesystem::path& path) {
   return bytes;
 }
 
-/// ITK's text: a line `Transform: CLASS` for each, and its lines `Parameters:` and `FixedParameters:` in either order.
+/// Reads ITK's text: for each transform a line `Transform: CLASS`, and its lines `Parameters:` and `FixedParameters:`
+/// in either order.
 class TextReader {
  public:
   explicit TextReader(const std::filesystem::path& path) : file_(path.string()), stream_(path, std::ios::binary) {}
@@ -78,7 +79,7 @@ class TextReader {
   std::vector<TransformRecord> records_;
 };
 
-/// The parts of the one transform that a file of ITK holds.
+/// The parts of the transform that a file of ITK holds. @throws InputError for several transforms
 std::vector<TransformRecord> parts_of(std::vector<TransformRecord> records, const std::string& file) {
   const auto is_composite = [](const TransformRecord& record) { return record.type.starts_with("CompositeTransform"); };
   const bool composite = !records.empty() && is_composite(records.front());

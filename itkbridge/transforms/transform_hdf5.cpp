@@ -10,8 +10,9 @@
 namespace tetwarp {
 namespace {
 
-/// HDF5 1.10.8 follows what a damaged file says out of its memory, round in circles and into allocations of any size.
-/// What a whole file takes: its values as double, stored as float perhaps, twice while a chunk is inflated.
+/// Limits for reading a file of `bytes` bytes. A damaged file can lead HDF5 1.10.8 out of its memory, round in circles
+/// and into allocations of any size. An undamaged file takes its values as double, stored as float perhaps, twice while
+/// a chunk is inflated.
 IsolatedLimits limits_for(std::uint64_t bytes) {
   constexpr std::uint64_t kMemory = std::uint64_t{64} << 20, kMost = std::uint64_t{1} << 32;
   bytes = std::min(bytes, kMost);

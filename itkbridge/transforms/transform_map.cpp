@@ -25,24 +25,24 @@ using Field = itk::DisplacementFieldTransform<double, 3>;
 
 constexpr std::size_t kGridValues = 18;  // size, origin, spacing, direction
 
-/// A part ready to be evaluated. At most one of `spline` and `field` is set; both point into `transform`.
+/// A part that can be evaluated. At most one of `spline` and `field` is set; both point into `transform`.
 struct Part {
   Transform::ConstPointer transform;
   const Spline* spline = nullptr;
   const Field::InterpolatorType* field = nullptr;
 };
 
-/// `BSplineTransform` of `BSplineTransform_double_3_3`.
+/// The class in the type of a record: `BSplineTransform` of `BSplineTransform_double_3_3`.
 std::string class_of(const TransformRecord& record) { return record.type.substr(0, record.type.find('_')); }
 
-/// The type as ITK's factory has it: the program computes in double.
+/// The type for which ITK's factory makes a transform that computes in double.
 std::string double_type(const TransformRecord& record, const std::string& file) {
   const std::string name = class_of(record), rest = record.type.substr(name.size());
   require(
       rest == "_double_3_3" || rest == "_float_3_3",
       "the transform \"" + record.type.substr(0, 80) + "\", " + file +
           "; expected a class of ITK for 3 dimensions (and order 3 of B-splines), such as AffineTransform_double_3_3");
-  // ITK 5.2's factory does not make the base class, which ANTs writes. It has the numbers of an AffineTransform.
+  // The factory of ITK 5.2 does not make the base class, which ANTs writes; an AffineTransform has the same numbers.
   return (name == "MatrixOffsetTransformBase" ? "AffineTransform" : name) + "_double_3_3";
 }
 
@@ -58,8 +58,8 @@ void require_count(std::size_t found, std::size_t expected, const std::string& w
           std::to_string(found) + " " + what + ", " + file + "; expected " + std::to_string(expected));
 }
 
-/// A grid that exists, and whose values are there: asked before ITK allocates it.
-/// @param least  samples along each axis
+/// Refuses a grid that cannot exist, or whose number of values differs, before ITK allocates it.
+/// @param least  the smallest number of samples along each axis
 void require_grid(const TransformRecord& record, double least, const std::string& file) {
   const std::string name = class_of(record);
   require_count(record.fixed.size(), kGridValues, "fixed parameters of " + name, file);
@@ -93,7 +93,7 @@ Transform::Pointer create(const std::string& type, const std::string& file) {
   const itk::LightObject::Pointer made = itk::ObjectFactoryBase::CreateInstance(type.c_str());
   const Transform::Pointer transform = dynamic_cast<Transform*>(made.GetPointer());
   require(transform.IsNotNull(), "ITK knows no transform \"" + type.substr(0, 80) + "\", " + file);
-  made->UnRegister();  // what a factory makes is registered once for its caller, and once for the pointer
+  made->UnRegister();  // a factory registers its object for the caller, and the pointer registers it again
   return transform;
 }
 
@@ -112,8 +112,8 @@ Part make_part(const TransformRecord& record, const std::string& file) {
     require(transform->IsLinear(),
             "the transform \"" + type + "\", " + file + "; expected an affine one, a B-spline or a displacement field");
     const std::size_t fixed = transform->GetFixedParameters().Size();
-    // Files older than ITK 4.13 do not say in which order Euler3DTransform turns. Its inverse still says it, as a
-    // matrix, which has no order of turns.
+    // Files older than ITK 4.13 lack the fourth fixed parameter of Euler3DTransform, the order of its rotations. Files
+    // of its inverse, a MatrixOffsetTransformBase, have it, although a matrix needs no order.
     const bool has_other_count = (name == "Euler3DTransform" && record.fixed.size() == 3) ||
                                  (name == "MatrixOffsetTransformBase" && record.fixed.size() == 4);
     if (!has_other_count) require_count(record.fixed.size(), fixed, "fixed parameters of " + name, file);
@@ -125,7 +125,7 @@ Part make_part(const TransformRecord& record, const std::string& file) {
   return part;
 }
 
-constexpr std::size_t kCoefficients = 64;  // of a B-spline, that one point depends on
+constexpr std::size_t kCoefficients = 64;  // coefficients of a B-spline that one point depends on
 
 /// An array of `kCoefficients` values as ITK's B-splines take it, on the stack. ITK 5.4 has an itk::FixedArray, which
 /// holds its values; the itk::Array of ITK 5.2 would allocate them, so it is given their place.
@@ -140,8 +140,8 @@ struct StackArray<itk::Array<TValue>> {
   itk::Array<TValue> array{values.data(), kCoefficients, false};
 };
 
-/// One part at a point. ITK's methods are const and keep nothing between calls; a B-spline's working arrays are on the
-/// stack, for the leak sanitizer of GCC 12 stumbles over the thread-local ones of a library that was loaded.
+/// Applies one part to a point. ITK's methods are const and keep nothing between calls. A B-spline's working arrays are
+/// on the stack, since the leak sanitizer of GCC 12 fails on thread-local arrays of a library that is loaded later.
 Transform::OutputPointType apply(const Part& part, const Transform::InputPointType& point, bool& outside) {
   if (part.spline) {
     StackArray<Spline::WeightsType> weights;
@@ -159,12 +159,13 @@ Transform::OutputPointType apply(const Part& part, const Transform::InputPointTy
 }  // namespace
 
 TransformFunction make_transform(const StoredTransform& stored, const std::string& file) {
-  static std::mutex mutex;  // ITK 5.2 makes its factories and singletons without one
+  static std::mutex mutex;  // ITK 5.2 makes its factories and singletons without a lock
   const std::lock_guard lock(mutex);
   itk::TransformFactoryBase::RegisterDefaultTransforms();
   const auto parts = std::make_shared<std::vector<Part>>();
   try {
-    for (auto record = stored.parts.rbegin(); record != stored.parts.rend(); ++record)  // the last is applied first
+    // The last part is applied first.
+    for (auto record = stored.parts.rbegin(); record != stored.parts.rend(); ++record)
       parts->push_back(make_part(*record, file));
   } catch (const itk::ExceptionObject& error) {
     throw InputError("ITK refuses the transform, " + file + ": " + error.GetDescription());

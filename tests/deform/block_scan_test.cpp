@@ -24,7 +24,7 @@ class Blocks : public testing::Test {
   ~Blocks() override { hwy::SetSupportedTargetsForTest(0); }
 };
 
-/// The same, vertex by vertex.
+/// What a scan of a block should find, computed vertex by vertex.
 struct Expected {
   Box box{glm::i32vec3(INT32_MAX), glm::i32vec3(INT32_MIN)};
   bool at_rest = true;

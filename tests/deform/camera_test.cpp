@@ -30,9 +30,9 @@ std::vector<glm::dvec3> corners_of(const Geometry& grid) {
 
 TEST(Camera, LooksFromTheFrontAtFirstWithThePatientsRightOnTheLeftAndTheHeadUp) {
   const ViewPlane plane = view_plane({}, unit_grid({20, 30, 40}));
-  EXPECT_NEAR(glm::distance(plane.forward, glm::dvec3(0, 1, 0)), 0, 1e-12);  // to posterior
-  EXPECT_NEAR(glm::distance(plane.right, glm::dvec3(1, 0, 0)), 0, 1e-12);    // to the patient's left
-  EXPECT_NEAR(glm::distance(plane.down, glm::dvec3(0, 0, -1)), 0, 1e-12);    // to the feet
+  EXPECT_NEAR(glm::distance(plane.forward, glm::dvec3(0, 1, 0)), 0, 1e-12);  // towards posterior
+  EXPECT_NEAR(glm::distance(plane.right, glm::dvec3(1, 0, 0)), 0, 1e-12);    // towards the patient's left
+  EXPECT_NEAR(glm::distance(plane.down, glm::dvec3(0, 0, -1)), 0, 1e-12);    // towards the feet
 }
 
 TEST(Camera, GoesAroundByThePatientsLeftAndUpOverTheHead) {

@@ -182,8 +182,8 @@ TEST(ContourStack, NothingIsBetweenPlanesThatAreFarApart) {
                                   {34.6, false}}) {
     for (const Between between : {Between::interpolated, Between::nearest})
       EXPECT_EQ(stack.signed_distance({1, 2, z}, between) >= 0, inside) << z;
-    EXPECT_EQ(stack.place({1, 2, z}).interpolated, inside) << z;
-    EXPECT_EQ(stack.place({1, 2, z}).nearest, inside) << z;
+    EXPECT_EQ(stack.is_inside({1, 2, z}).interpolated, inside) << z;
+    EXPECT_EQ(stack.is_inside({1, 2, z}).nearest, inside) << z;
   }
 }
 
@@ -196,7 +196,7 @@ TEST(ContourStack, NeighboursOnUnevenSlicesHaveSomethingBetweenThem) {
   std::vector<Contour> contours;
   for (const double z : uneven.slices) contours.push_back(drawn(circle({0, 0}, 10, 60), z));
   EXPECT_EQ(ContourStack(contours, uneven).parts(), 1u);
-  EXPECT_TRUE(ContourStack(contours, uneven).place({1, 2, 10.4}).interpolated);
+  EXPECT_TRUE(ContourStack(contours, uneven).is_inside({1, 2, 10.4}).interpolated);
   contours.erase(contours.begin() + 3);
   EXPECT_EQ(ContourStack(contours, uneven).parts(), 2u);
 }
@@ -206,7 +206,7 @@ TEST(ContourStack, AnEndHalfWayToASliceBelongsToOneOfTwoSlices) {
   for (const double z : {0.0, 3.0, 6.0}) contours.push_back(drawn(circle({0, 0}, 10, 60), z));
   const ContourStack stack(contours, slices_grid());
   int inside = 0;
-  for (double z = -10.5; z < 20; z += 3) inside += stack.place({0, 0, z}).interpolated;
+  for (double z = -10.5; z < 20; z += 3) inside += stack.is_inside({0, 0, z}).interpolated;
   EXPECT_EQ(inside, 3);
 }
 
@@ -336,7 +336,7 @@ TEST(Reslicer, DrawsTheSurfaceOfTheDeformedBall) {
       ASSERT_TRUE(contour.slice.has_value());
       EXPECT_EQ(slice_of(contour.points, warp.grid), contour.slice);
       for (const glm::dvec3& point : contour.points) {
-        glm::dvec3 from = point;  // by fixed-point iteration: other mathematics than the inverse map's
+        glm::dvec3 from = point;  // found by fixed-point iteration, which is other mathematics than the inverse map's
         for (int n = 0; n < 60; ++n) from = point - map(from);
         worst = std::max(worst, std::abs(reslicer.solid().signed_distance(from, Between::interpolated)));
       }
@@ -348,7 +348,7 @@ TEST(Reslicer, DrawsTheSurfaceOfTheDeformedBall) {
       for (double y = -24; y < 24; y += h)
         for (double x = -24; x < 24; x += h) {
           const glm::dvec3 at(x + 0.1, y + 0.2, z + 0.3);
-          if (!reslicer.solid().place(at).interpolated) continue;
+          if (!reslicer.solid().is_inside(at).interpolated) continue;
           glm::dmat3 jacobian(1);
           for (int axis = 0; axis < 3; ++axis) {
             glm::dvec3 step(0);

@@ -83,7 +83,8 @@ Geometry lattice_at_ties(const Geometry& grid, std::int64_t cell) {
   return lattice;
 }
 
-/// A smooth displacement of a lattice, and the same of the nodes of its division: a copy goes where its vertex goes.
+/// A smooth displacement of a lattice's vertices, and of the nodes of its division: each copy goes where its vertex
+/// goes, so that cuts stay closed.
 struct Closed {
   VertexField whole, divided;
   DividedLattice division;
@@ -124,7 +125,8 @@ class NearCut {
         cells_(closed.whole.lattice.size - std::int64_t{1}),
         replaced_(closed.divided.replaced.begin(), closed.divided.replaced.end()) {}
   bool operator()(const glm::dvec3& undeformed_mm) const {
-    constexpr double kBeside = 0.02;  // of a cell: what rounding of vertices may turn over
+    // Part of a cell: points so near to a face may lie on either side, by rounding of vertices.
+    constexpr double kBeside = 0.02;
     const glm::dvec3 at = from_mm_(undeformed_mm);
     for (int n = 0; n < 8; ++n) {
       const glm::dvec3 to = at + kBeside * glm::dvec3(n & 1 ? 1 : -1, n & 2 ? 1 : -1, n & 4 ? 1 : -1);
@@ -188,7 +190,7 @@ TEST_P(Cuts, ClosedOnesChangeNothingAwayFromThemAndOneUnitAlongThem) {
   }
   EXPECT_GT(along, 10000u);
   EXPECT_GT(away, 10000u);
-  EXPECT_LE(beside, 5u);  // of the deformed border, where a cut meets it: its vertices there are rounded too
+  EXPECT_LE(beside, 5u);  // points near the deformed border where a cut meets it, whose vertices are rounded, too
 }
 
 TEST_P(Cuts, LatticeAndTheMeshThatItIsMadeIntoGiveTheSameBits) {

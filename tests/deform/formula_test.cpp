@@ -29,7 +29,7 @@ Geometry axial() {
 }
 const glm::dvec3 kCentre(10, -20, 30);
 
-/// The same volume stored as coronal slices: i along x, j along -z, k along y.
+/// The geometry of the volume when it is stored as coronal slices: i along x, j along -z, k along y.
 Geometry coronal() {
   Geometry grid = axial();
   grid.size = {101, 61, 81};

@@ -39,7 +39,7 @@ const glm::dvec3 kMiddle(-31.7, 12.3, 208.1);
 
 Geometry ct_grid() { return grid_about(kMiddle, {16, 15, 12}, {0.9, 1.1, 2}, glm::dmat3(1)); }
 
-/// Of another scanner: turned, coarser, not about the same middle.
+/// The grid of another scanner: turned, coarser, with another middle.
 Geometry pet_grid() {
   return grid_about(kMiddle + glm::dvec3(1.2, -0.7, 0.4), {9, 11, 13}, {2.2, 1.7, 1.3}, rotation({-1, 0.3, 2}, 1.1));
 }
@@ -68,7 +68,8 @@ const glm::dvec3 kSlope(2, -3, 1);  // a mm
 
 double plane(const glm::dvec3& point) { return glm::dot(kSlope, point - kMiddle) + 20; }
 
-/// Linear interpolation says of it what the formula says, between voxels too.
+/// A volume whose values are a linear function of the place, so that linear interpolation gives the formula between
+/// voxels, too.
 Volume<float> plane_on(const Geometry& grid) {
   Volume<float> volume{grid, {}};
   const AffineMap point = point_from_index(grid);

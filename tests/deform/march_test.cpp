@@ -20,7 +20,8 @@ class March : public testing::Test {
  protected:
   ~March() override { hwy::SetSupportedTargetsForTest(0); }
 
-  /// What the marches of a test did: the claims never march, for they are asked how many owners a voxel has.
+  /// How the marches of a test found owners. Resamplings by claims are not counted: they do not march when they also
+  /// count owners.
   Paths paths;
 
   /// Sends a volume through a field on every instruction set. @return false where the march is not for the field

@@ -103,7 +103,7 @@ TEST_P(Meshes, OwnersAreTheOracles) {
   EXPECT_GT(folded, 1000u);
 }
 
-/// Of up to 3000 voxels a side: their determinants need more than 64 bits.
+/// Tetrahedra of up to 3000 voxels a side, whose determinants need more than 64 bits.
 TEST_P(Meshes, LargeTetrahedraHaveTheOraclesOwners) {
   const std::uint64_t seed = test_seed();
   std::uint64_t owned = 0;
@@ -315,7 +315,7 @@ TEST_P(Meshes, RefuseNamesTheFirstVoxelOutside) {
   }
 }
 
-/// From a voxel to where it comes from, and forward again.
+/// Moves the centre of each voxel to where it comes from and forward again.
 TEST_P(Meshes, PointsGoWhereTheVolumeGoes) {
   const std::uint64_t seed = test_seed();
   std::uint64_t moved = 0;

@@ -51,7 +51,7 @@ TEST_P(OutsideTheLattice, RefuseAcceptsLatticesMadeOverTheVolume) {
   }
 }
 
-/// The volume alone is asked for: that is where whole tiles at rest may be copied.
+/// Only the volume is made, no maps, for then whole tiles at rest may be copied.
 TEST_P(OutsideTheLattice, PlacesThatTheLatticeHasLeftAreBackground) {
   const Geometry grid = unit_grid({130, 70, 70});
   for (const std::int64_t cell_size : {1, 8, 16}) {
@@ -90,7 +90,7 @@ TEST_P(OutsideTheLattice, ABorderWithinRoundingOfTheOutermostVoxelsLosesNone) {
     const glm::dvec3 last(grid.size - std::int64_t{1});
     Random random(test_seed(), 77);
     const auto source = random_values<float>(grid, random, -1000, 1000);
-    for (const double steps : {0.3, 0.5, 0.6, 0.9, 1.0, 1.1, 5.0, 15.9, 16.1, 30.0}) {  // of 2^-12 voxel
+    for (const double steps : {0.3, 0.5, 0.6, 0.9, 1.0, 1.1, 5.0, 15.9, 16.1, 30.0}) {  // steps of 2^-12 voxel
       SCOPED_TRACE(steps);
       for (int end = 0; end < 6; ++end) {
         glm::dvec3 low(0), high(last);

@@ -34,7 +34,7 @@ struct Statistics {
   double mean, deviation;
 };
 
-/// Of the voxels within `radius_mm` of a point in LPS mm.
+/// Statistics of the voxels within `radius_mm` of a point in LPS mm.
 Statistics around(const Volume<std::int16_t>& volume, const glm::dvec3& point, double radius_mm) {
   const Geometry& grid = volume.geometry;
   const glm::dvec3 middle = index_from_point(grid)(point), reach = radius_mm / grid.spacing;

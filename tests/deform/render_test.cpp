@@ -231,7 +231,7 @@ TEST_P(Rendered, AMaximumInAWindowIsTheMaximumThroughThatWindow) {
 /// The marker of a phantom: a bright block towards the patient's left, front and head.
 TEST_P(Rendered, LeftFrontAndHeadAreWhereTheyBelong) {
   const auto renderer = GetParam().make_renderer({});
-  // The same bodies on grids that run otherwise through them.
+  // The same bodies are rendered from grids whose axes run along other directions.
   for (const glm::dmat3& direction :
        {glm::dmat3(1), glm::dmat3({-1, 0, 0}, {0, -1, 0}, {0, 0, 1}), glm::dmat3({0, 0, 1}, {1, 0, 0}, {0, 1, 0}),
         glm::dmat3({0, 1, 0}, {0, 0, -1}, {-1, 0, 0}), test::rotation({1, 2, 3}, 0.2)}) {

@@ -19,7 +19,7 @@ using namespace test;
 
 TETWARP_BACKEND_SUITE(Vote);
 
-constexpr double kClear = 1e-5;  ///< of two sums of weights that float tells apart, the least difference
+constexpr double kClear = 1e-5;  ///< the least difference of two sums of weights that float tells apart
 
 /// Labels in lumps, single voxels of others strewn in: from the ends of the type's range and from its middle.
 template <class V>
@@ -38,8 +38,8 @@ Volume<V> label_map(const Geometry& grid, Random& random) {
   return volume;
 }
 
-/// Sends 0/1 volumes of all labels through the field, linearly in double. @return the winner of each voxel; not clear
-/// where two sums are about the same
+/// Resamples one 0/1 volume for each label, linearly in double. @return for each voxel the label with the largest sum;
+/// unclear where two sums are about the same
 template <class V>
 struct OneHot {
   std::vector<V> winner;
@@ -355,8 +355,8 @@ TEST_P(Vote, OnlyLabelsOfTheSourceComeOut) {
   });
 }
 
-/// Whole rows, their ends, single voxels, several threads, another backend: whatever way is taken, it says the same, in
-/// close votes too.
+/// Whole rows, their ends, single voxels, several threads and another backend use different code, and must agree in
+/// close votes, too.
 TEST_P(Vote, PartsAreThoseOfTheWholeOnOneThreadOfTheCpu) {
   const std::uint64_t seed = test_seed();
   SCOPED_TRACE(seed_text(seed));

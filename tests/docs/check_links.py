@@ -29,7 +29,7 @@ def without_code(text):
 
 
 def anchors(path):
-    """Of the headings of a page, as forges make them."""
+    """The anchors of the headings of a page, as forges make them."""
     found = set()
     for line in re.sub(r"^```.*?^```", "", path.read_text(), flags=re.M | re.S).splitlines():
         heading = re.match(r"#+ +(.*)", line)

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t kHeader = 8;
 
-/// As scanning finds them in a file.
+/// The header that scanning would find in a file of these bytes.
 tetwarp::DicomFileHeader header_of(const std::uint8_t* data, std::size_t size) {
   constexpr std::array kSyntaxes = {
       UID_RLELosslessTransferSyntax,          UID_JPEGProcess1TransferSyntax,     UID_JPEGProcess2_4TransferSyntax,

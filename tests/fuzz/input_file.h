@@ -14,21 +14,21 @@
 
 #include "deform/errors.h"
 
-/// What a fuzzer calls, and the replay of a corpus too: hands the bytes to a reader. Returns 0.
+/// Hands bytes to a reader. A fuzzer calls it, and so does the replay of a corpus. It returns 0.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
-/// Between the files of an input that is several.
+/// What stands between two files of an input that holds several.
 constexpr std::string_view kNextFile = "\nNEXT\n";
 
-/// How often a reader took what it was given, in this process.
+/// How many inputs a reader accepted in this process.
 inline std::uint64_t& accepted_reads() {
   static std::uint64_t count = 0;
   return count;
 }
 
-/// Runs a reader. Whatever it throws that is not an error of Tetwarp goes on, and is a crash; so is a reader that is
-/// not there, of which nothing would be tested.
-/// @return  whether it took its input
+/// Runs a reader. What it throws that is not an error of Tetwarp is not caught, and so counts as a crash. So does a
+/// reader that is not compiled in, for nothing would be tested.
+/// @return whether the reader accepted its input
 template <class Action>
 bool accepted(Action&& action) {
   try {
@@ -42,7 +42,8 @@ bool accepted(Action&& action) {
   return true;
 }
 
-/// As `accepted`, for what is asked about a file, which does not count as having read it.
+/// Runs an action that only looks at a file, and accepts the errors that `accepted` does. It does not count as having
+/// read the file.
 template <class Action>
 void asked(Action&& action) {
   try {
@@ -53,7 +54,7 @@ void asked(Action&& action) {
   }
 }
 
-/// A file for readers, which take paths: in a folder of this process's own below that of temporary files (TMPDIR).
+/// A file for readers, which take paths. It lies in a folder of this process below that of temporary files (TMPDIR).
 class InputFile {
  public:
   explicit InputFile(const std::string& suffix)
@@ -76,7 +77,7 @@ class InputFile {
     if (!stream) throw std::runtime_error("cannot write " + path_.string());
   }
   const std::filesystem::path& path() const { return path_; }
-  /// Where the same may be written again.
+  /// The name of a file to which what was read may be written again.
   const std::filesystem::path& written() const { return written_; }
 
  private:

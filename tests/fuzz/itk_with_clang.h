@@ -3,8 +3,9 @@
 
 #pragma once
 
-// Debian's ITK knows the one compiler that it was built with, and refuses clang. It knows g++ by these macros, and what
-// it wants to know of g++ 12 is true of clang 14 too. Included before everything else in the preset fuzz.
+// Debian's ITK knows the one compiler that it was built with, and refuses clang. It recognises g++ by these macros, and
+// what it assumes of g++ 12 is true of clang 14, too. In the preset fuzz this header is included before everything
+// else.
 #if __has_include(<itk_compiler_detection.h>)
 #pragma push_macro("__clang__")
 #pragma push_macro("__GNUC__")

@@ -84,7 +84,7 @@ void make_images(const fs::path& folder, const std::string& suffix) {
   write_field_file(folder / ("pull" + suffix), PullField{small_grid(), displacement});
 }
 
-/// The same vectors under the headers of other tools.
+/// Writes the same vectors under the headers of several tools.
 void make_nifti_kinds(const fs::path& folder) {
   const std::string ours = read_bytes(folder / "forward.nii");
   constexpr std::size_t kIntentP1 = 56, kIntentCode = 68, kSlope = 112, kDescrip = 148, kIntentName = 328;
@@ -367,7 +367,7 @@ void make_folders(const fs::path& folder) {
 
 /// Frames behind the header that dicom_decode_target.cpp reads.
 void make_frames(const fs::path& folder) {
-  // As numbered there; its three syntaxes of high throughput are one.
+  // In the order of numbers there; its three syntaxes of high throughput are one here.
   const std::vector<std::string> order = {"Rle",         "Jpeg1",    "Jpeg2And4",     "Jpeg6And8",
                                           "Jpeg10And12", "Jpeg14",   "Jpeg14Sv1",     "JpegLs",
                                           "JpegLsLossy", "Jpeg2000", "Jpeg2000Lossy", "HighThroughput"};

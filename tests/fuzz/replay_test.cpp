@@ -15,8 +15,8 @@
 
 namespace {
 
-constexpr double kSeconds = 5;               // of all threads, for a file and its shorter ones
-constexpr rlim_t kMemory = rlim_t{1} << 30;  // that can be written: what a reader of such files must never ask for
+constexpr double kSeconds = 5;  // of processor time of all threads, for a file and the shorter files made from it
+constexpr rlim_t kMemory = rlim_t{1} << 30;  // writable memory; a reader of such files must never need more
 
 #if defined(__SANITIZE_ADDRESS__)
 constexpr bool kSanitized = true;  // it limits allocations itself, and takes more memory for its own use

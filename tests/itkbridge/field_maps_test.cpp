@@ -83,7 +83,7 @@ TEST(JacobianDeterminant, OfAnAffineFieldIsItks) {
   EXPECT_GT(owned, 2000u);
 }
 
-/// Of any matrix and grid, vertices are rounded by up to 2^-13 voxel, so differences over a cell of B voxels by up to
+/// For any matrix and grid, vertices are rounded by up to 2^-13 voxel, so differences over a cell of B voxels by up to
 /// 2^-12 / B.
 TEST(JacobianDeterminant, OfAnAffineFieldIsRightOnAnyGrid) {
   const glm::dmat3 linear = rotation({1, -2, 1}, 0.2) * glm::dmat3(1.1, 0, 0, 0.07, 0.93, 0, 0, 0.12, 1.21);
@@ -196,7 +196,7 @@ TEST(FieldMaps, OfAFoldTellTheSheetOfTheLowestNumber) {
   });
 }
 
-/// ITK's says of the undeformed place whether it is mirrored, so the negative voxels are others.
+/// ITK's determinant tells whether the undeformed place is mirrored, so it is negative at other voxels.
 TEST(FieldMaps, OfAFoldItksSpeaksOfTheUndeformedPlace) {
   const Geometry grid = unit_grid({13, 6, 5});
   const std::vector<float> itks = pixels_of(*jacobian_by_itk(folded(grid)));

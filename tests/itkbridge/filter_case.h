@@ -14,7 +14,7 @@ namespace tetwarp::test {
 
 using ShortImage = itk::Image<short, 3>;
 
-/// A grid that no number of is round, turned about two axes.
+/// A grid turned about two axes, none of whose numbers is round.
 inline Geometry turned_grid(const glm::i64vec3& size) {
   const double a = std::cos(0.3), b = std::sin(0.3), c = std::cos(0.2), d = std::sin(0.2);
   return {.size = size,
@@ -40,14 +40,14 @@ typename TImage::Pointer noise_image(const Geometry& grid, const itk::Index<3>& 
   return image;
 }
 
-/// A twist over the whole volume: its image leaves the volume at the corners, and nothing comes to lie in others.
+/// A twist over a whole volume. It moves some corners out of the volume, and leaves others empty.
 inline itk::VertexField::Pointer twist_over(const Geometry& volume, std::int64_t cell_size, double angle = 0.4) {
   const auto field = itk::VertexField::New();
   field->SetField(twist(volume, angle, cell_size));
   return field;
 }
 
-/// What the core makes of an image, in the layout of the image.
+/// The result of the core for an image, in the layout of the image.
 template <class TImage>
 typename TImage::Pointer resampled_by_core(const TImage& image, const Geometry& grid, const FieldView& field,
                                            Target settings = {}, Report* report = nullptr) {
@@ -66,7 +66,7 @@ typename TImage::Pointer resampled_by_core(const TImage& image, const Geometry& 
   return output;
 }
 
-/// Whether both buffer the same bytes; false for empty ones.
+/// Whether two images buffer the same bytes; false for images without pixels.
 template <class TImage>
 bool same_pixels(const TImage& a, const TImage& b) {
   const auto count = a.GetBufferedRegion().GetNumberOfPixels();
@@ -76,7 +76,7 @@ bool same_pixels(const TImage& a, const TImage& b) {
          std::memcmp(a.GetBufferPointer(), b.GetBufferPointer(), count * pixel) == 0;
 }
 
-/// The description of the ITK exception that an action throws; empty when it throws none.
+/// The description of the ITK exception that an action throws; empty if it throws none.
 template <class Action>
 std::string itk_error_of(Action&& action) {
   try {

@@ -112,7 +112,8 @@ TEST(InverseDisplacementField, IsWhatTheProgramWrites) {
   EXPECT_TRUE(same_bits(expected.displacement, pixels_of(*inverse_by_filter(*image, field))));
 }
 
-/// From each voxel to where it comes from and forward again. What is left is rounding to 2^-12 voxel and to float.
+/// Moves each voxel to where it comes from and forward again. What differs then is rounding to 2^-12 voxel and to
+/// float.
 TEST(InverseDisplacementField, ForwardMapReturnsToTheVoxel) {
   const Geometry grid = volume_grid();
   const double step = glm::length(grid.spacing) / 4096;  // mm, of 2^-12 voxel on each axis
@@ -129,7 +130,7 @@ TEST(InverseDisplacementField, ForwardMapReturnsToTheVoxel) {
       if (is_nan(by[n])) return;
       const glm::dvec3 p = point_from_index(grid)(glm::dvec3(voxel));
       const itk::Point<double, 3> from = itk_point(p + glm::dvec3(by[n]));
-      if (!forward->IsInside(from)) return;  // of the border, by rounding
+      if (!forward->IsInside(from)) return;  // by rounding, at the border
       largest = std::max(largest, glm::distance(glm_of(forward->TransformPoint(from)), p));
       ++returned;
     });
@@ -259,7 +260,7 @@ TEST(InverseDisplacementField, OutsideTheLatticeItIsZeroWithRestAndNanWithBackgr
   }
 }
 
-constexpr float kNothing = -7777;  // of voxels that come from nowhere
+constexpr float kNothing = -7777;  // value of voxels that come from nowhere
 
 /// An image by a forward field.
 std::vector<float> resampled_by_us(const FloatImage& image, const VertexField& field) {

@@ -67,7 +67,7 @@ class IsolatedRead : public testing::Test {
   Variable program_{"TETWARP_READ_PROGRAM", TETWARP_TEST_READ_PROGRAM};
 };
 
-/// This process has no child, not even one that ended and was not asked for.
+/// Whether this process has no child, not even one that has ended and was not waited for.
 bool has_no_child() { return ::waitpid(-1, nullptr, WNOHANG) == -1 && errno == ECHILD; }
 
 TEST_F(IsolatedRead, ReturnsWhatWasReadWhateverItsSize) {

@@ -22,7 +22,7 @@ using FloatImage = itk::Image<float, 3>;
 using FieldImage = itk::Image<itk::Vector<float, 3>, 3>;
 using DoubleFieldImage = itk::Image<itk::Vector<double, 3>, 3>;
 
-/// Where the first voxel of an image is in tests of start indices.
+/// Index of the first voxel of an image, in tests of start indices.
 inline constexpr itk::Index<3> kFarStart{{5, -3, 11}};
 
 template <class Triple>
@@ -41,7 +41,7 @@ itk::Vector<Component, 3> itk_vector(const glm::dvec3& vector) {
   return result;
 }
 
-/// An image without pixels, which has a grid from index `start` on.
+/// An image without pixels on a grid whose first voxel has index `start`.
 template <class TImage = FloatImage>
 typename TImage::Pointer grid_image(const Geometry& grid, const itk::Index<3>& start = {{0, 0, 0}}) {
   const auto image = TImage::New();
@@ -49,7 +49,7 @@ typename TImage::Pointer grid_image(const Geometry& grid, const itk::Index<3>& s
   return image;
 }
 
-/// An image on a grid of which the pixel at a point is `pixel(point)`.
+/// An image on a grid. @param pixel  gives the pixel at a point
 template <class TImage, class Pixel>
 typename TImage::Pointer image_with(const Geometry& grid, Pixel&& pixel, const itk::Index<3>& start = {{0, 0, 0}}) {
   const auto image = grid_image<TImage>(grid, start);
@@ -65,7 +65,7 @@ typename TImage::Pointer image_with(const Geometry& grid, Pixel&& pixel, const i
   return image;
 }
 
-/// Samples of vectors as an image of them.
+/// Vectors as the pixels of an image on their grid.
 template <class Component = float>
 auto field_image(const Geometry& grid, const std::vector<glm::vec3>& vectors,
                  const itk::Index<3>& start = {{0, 0, 0}}) {
@@ -95,8 +95,8 @@ inline itk::VertexField::Pointer itk_field(VertexField field) {
   return result;
 }
 
-/// A field over a volume whose vertices are thrown about by up to a third of a cell; at the border, too, so some voxels
-/// there get nothing.
+/// A field over a volume whose vertices are moved at random by up to a third of a cell, also at the border, where some
+/// voxels get nothing.
 inline VertexField shaken(const Geometry& volume, std::int64_t cell_size, std::uint64_t seed = 1) {
   Random random(seed);
   const double most = 0.3 * static_cast<double>(cell_size);
@@ -105,7 +105,7 @@ inline VertexField shaken(const Geometry& volume, std::int64_t cell_size, std::u
   });
 }
 
-/// What an `itk::ExceptionObject` says that `action` throws; otherwise a text that says so.
+/// The description of the `itk::ExceptionObject` that `action` throws; if it throws none, a text that says so.
 template <class Action>
 std::string refusal_by_itk(Action&& action) {
   try {

@@ -58,7 +58,8 @@ FieldImage::Pointer displacement_image(const Geometry& volume, std::int64_t cell
   return image;
 }
 
-/// A filter gives the same pixels in any number of slabs as in one run, and asks for parts of its input only.
+/// Expects that a filter gives the same pixels in any number of slabs as in one run, and requests parts of its input
+/// only.
 template <class TFilter>
 void expect_streams(TFilter& filter, const ShortImage* image) {
   filter.SetInput(image);
@@ -66,7 +67,7 @@ void expect_streams(TFilter& filter, const ShortImage* image) {
   const auto whole_image = ShortImage::Pointer(filter.GetOutput());
   whole_image->DisconnectPipeline();
   for (const unsigned divisions : {1u, 2u, 3u, 7u, 100u}) {
-    const auto copy = itk::CastImageFilter<ShortImage, ShortImage>::New();  // of the region asked for
+    const auto copy = itk::CastImageFilter<ShortImage, ShortImage>::New();  // copies the region that is requested
     const auto input = itk::PipelineMonitorImageFilter<ShortImage>::New();
     const auto streamer = itk::StreamingImageFilter<ShortImage, ShortImage>::New();
     copy->SetInput(image);
@@ -141,7 +142,7 @@ TEST(Pipeline, RunsOnlyWhenSomethingChanged) {
   filter->Update();
   filter->Update();
   EXPECT_EQ(runs, 1);
-  filter->SetInterpolation(Interpolation::linear);  // as it was
+  filter->SetInterpolation(Interpolation::linear);  // the value that it has already
   filter->SetBackend("cpu");
   filter->SetDevice(0);
   filter->Update();
@@ -212,7 +213,7 @@ double ms_to_abort(Filter& filter, const std::atomic<Clock::time_point>& aborted
   return 0;
 }
 
-/// Of three runs: whatever else the machine does counts too.
+/// The shortest time of three runs, since other work of the machine counts, too.
 double best_ms_to_abort(Filter& filter, const std::atomic<Clock::time_point>& aborted) {
   double best = INFINITY;
   for (int run = 0; run < 3; ++run) {

@@ -82,7 +82,7 @@ TEST(PlastimatchSpline, RealSplineIsTheDenseFieldThatPlastimatchMadeOfIt) {
     }
   }
   RecordProperty("largest_difference_mm", std::to_string(off));
-  EXPECT_LT(off, 1.0 / 512);  // to which the dense field is rounded
+  EXPECT_LT(off, 1.0 / 512);  // the dense field is rounded to this
   EXPECT_NEAR(furthest, 22.83, 0.01);
   EXPECT_EQ(*spline.outside, 0U);
 }

@@ -21,7 +21,7 @@ namespace {
 template <class TImage = FloatImage, class TField = FieldImage>
 using PullResample = itk::PullFieldResampleImageFilter<TImage, TField>;
 
-constexpr float kNothing = -7777;  // of voxels that come from nowhere
+constexpr float kNothing = -7777;  // value of voxels that come from nowhere
 
 template <class TImage, class TField>
 auto resampled_by_us(const TImage& image, const TField& field, Outside outside = Outside::refuse) {
@@ -112,7 +112,8 @@ TEST(PullFieldResample, IsItksToTheRoundingOfVectors) {
   }
 }
 
-/// Vectors that 2^-12 voxel holds, between samples 4 voxels apart: both sample at the same places, exactly.
+/// Vectors that are multiples of 2^-12 voxel, at samples 4 voxels apart: both filters sample at exactly the same
+/// places.
 TEST(PullFieldResample, OfVectorsThatSnapExactlyIsItksToFloatRounding) {
   const Geometry grid = unit_grid({29, 25, 21}), coarse = {{8, 7, 6}, glm::dvec3(4), {0, 0, 0}, glm::dmat3(1)};
   Random random(4);
@@ -223,7 +224,7 @@ TEST(PullFieldResample, NanInTheFieldGivesTheDefaultPixelValueAsInItk) {
   }
 }
 
-/// What the core gives as the inverse of a forward field, NaN where nothing maps, on an oblique grid: the same voxels
+/// The inverse of a forward field that the core gives, on an oblique grid and NaN where nothing maps: the same voxels
 /// get a value, and places differ by the rounding of vectors.
 TEST(PullFieldResample, OfAnInverseWithGapsIsTheForwardField) {
   const Geometry grid = volume_grid();
@@ -263,7 +264,7 @@ TEST(PullFieldResample, VectorsOfDoublesAreRoundedToFloat) {
   EXPECT_TRUE(same_bits(expected, resampled_by_us(*image, *doubles)));
 }
 
-/// Of doubles: a copy of them was made.
+/// Vectors of doubles, of which a copy was made.
 TEST(PullFieldResample, SeesThatTheFieldWasChanged) {
   const auto image = volume(volume_grid());
   const std::vector<glm::vec3> vectors = smooth_vectors(field_grid(), 8), others = smooth_vectors(field_grid(), 9);
@@ -307,7 +308,7 @@ TEST(PullFieldResample, OfAnatomyDiffersFromItksByTheRoundingOfIntegers) {
   const std::vector<float> value = resampled_by_us(*of_integers, *field);
   const std::vector<short> ours = resampled_by_us(*image, *field);
   const std::vector<short> itks = resampled_by_itk(*image, *doubles, static_cast<short>(kNothing));
-  const double doubt = std::ldexp(steepness(*exact) + 3, -13) + rounding_of(2000);  // of ITK's value, beside ours
+  const double doubt = std::ldexp(steepness(*exact) + 3, -13) + rounding_of(2000);  // of ITK's value and of Tetwarp's
   std::size_t other = 0;
   for (std::size_t n = 0; n < ours.size(); ++n) {
     ASSERT_EQ(ours[n], static_cast<short>(std::nearbyint(value[n]))) << n;

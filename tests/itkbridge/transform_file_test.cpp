@@ -90,7 +90,8 @@ TEST(TransformFile, EveryAffineLikeClassIsItksOwn) {
 
 TEST(TransformFile, TheBaseClassOfAntsAndOfInversesIsAnAffineTransform) {
   const Scratch scratch;
-  for (const char* order : {"", " 0", " 1"}) {  // of the turns, which the inverse of an Euler3DTransform still states
+  // The order of rotations, which files of the inverse of an Euler3DTransform have, too.
+  for (const char* order : {"", " 0", " 1"}) {
     write_file(
         scratch / "t.txt",
         std::string("#Insight Transform File V1.0\n#Transform 0\nTransform: MatrixOffsetTransformBase_double_3_3\n"
@@ -240,7 +241,7 @@ TEST(TransformFile, AnyDamagedByteOfCompressedParametersIsRefused) {
   const Scratch scratch;
   one_bump().write(scratch / "whole.h5", true);
   const std::string bytes = read_bytes(scratch / "whole.h5");
-  std::vector<std::pair<std::size_t, std::size_t>> streams;  // of zlib, and where they end
+  std::vector<std::pair<std::size_t, std::size_t>> streams;  // streams of zlib in the file, and where each ends
   for (std::size_t at = 0; at + 2 < bytes.size(); ++at) {
     if (bytes[at] != '\x78' ||
         (static_cast<unsigned char>(bytes[at]) << 8 | static_cast<unsigned char>(bytes[at + 1])) % 31 != 0)

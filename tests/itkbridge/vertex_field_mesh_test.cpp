@@ -100,7 +100,7 @@ TEST(MeshToVertexField, DeformedMeshSaysWhatPointDataSay) {
   source->SetDeformedMesh(with_gaps(mesh, true));
   source->Update();
   expect_same_mesh(mesh, *source->GetOutput());
-  // It goes before point data, whatever these are.
+  // A deformed mesh is used rather than point data, whatever these are.
   const auto scalars = with_gaps<ScalarMesh>(mesh);
   for (std::size_t n = 0; n < mesh.rest.size(); ++n) scalars->SetPointData(point_id(n), 42);
   const auto of_scalars = itk::MeshToVertexFieldFilter<ScalarMesh, Mesh>::New();
@@ -176,7 +176,7 @@ Outcome<float> resampled(const Geometry& grid, const FieldView& field) {
   return run(*resampler, source);
 }
 
-/// A lattice as a mesh of ITK and back into a field; both resample to the same bits.
+/// Turns a lattice into a mesh of ITK and back into a field: both resample to the same bits.
 template <class TMesh>
 void expect_same_after_mesh(const Geometry& grid) {
   const VertexField field = shaken(grid, 3);

@@ -48,8 +48,8 @@ Affine::Pointer affine() {
   return transform;
 }
 
-/// From 1 mm before the volume's box to half a millimetre behind it: further out, where the last vertices of a lattice
-/// may be, it leaves points where they are.
+/// A spline from 1 mm before the volume's box to half a millimetre behind it. Further out, where the last vertices of a
+/// lattice may be, it leaves points where they are.
 Spline::Pointer spline() {
   const auto transform = Spline::New();
   const Geometry grid = volume_grid();
@@ -280,7 +280,7 @@ TEST(DisplacementFieldToVertexField, OutlivesAnImageThatReleasesItsData) {
   EXPECT_TRUE(same_bits(expected, {again.displacement, again.displacement + expected.size()}));
 }
 
-/// The image's own filter writes into the same buffer again, or lets go of it; not of an image that was disconnected.
+/// The filter that made an image writes into the same buffer again, or frees it, but not if the image was disconnected.
 TEST(DisplacementFieldToVertexField, KeepsTheFieldOfADisconnectedImage) {
   const auto transform = affine();
   const auto sampled = over_volume(*transform, 4);

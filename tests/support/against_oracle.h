@@ -28,8 +28,8 @@ inline Volume<float> smooth_source(const Geometry& geometry) {
 /// How far u, in voxels, may be from the exact one: float arithmetic with the owner's edges.
 inline double u_tolerance(const Undeformed& exact) { return 1e-7 * (exact.reach * exact.condition + 16); }
 
-/// How far a determinant may be from the exact one: volumes in float are off by 5 units of the product of their edges'
-/// sum norms, and the quotient is rounded once.
+/// How far a determinant may be from the exact one: each of its two volumes, in float, is off by 5 units of the product
+/// of its edges' sum norms, and their quotient is rounded once.
 inline double jacobian_tolerance(const Undeformed& exact) {
   constexpr double kUnit = 1.0 / (1 << 24);
   return kUnit * (5 * exact.condition + 5 * exact.rest_condition + 2) * std::abs(exact.jacobian);
@@ -40,7 +40,7 @@ inline double distance(const glm::dvec3& u, const glm::dvec3& v) {
   return std::max({d.x, d.y, d.z});
 }
 
-/// Owners, inverse, Jacobian, coverage and value of every voxel against the oracle.
+/// Compares owners, inverse, Jacobian, coverage and value of every voxel with the oracle.
 inline void expect_like_oracle(const Outcome<float>& found, const Volume<float>& source, const Oracle& oracle) {
   const Geometry& grid = found.output.geometry;
   const glm::dmat3 index_from_mm = index_from_point(grid).linear;
@@ -86,7 +86,7 @@ inline void expect_like_oracle(const Outcome<float>& found, const Volume<float>&
   EXPECT_NEAR(found.report.jacobian_max, oracle.jacobian_max, rounding);
 }
 
-/// Sends a smooth source through a field and looks at every voxel. @return  what the oracle says
+/// Sends a smooth source through a field and compares every voxel with the oracle. @return the oracle
 inline Oracle expect_oracles_result(ForwardResampler& resampler, const VertexField& field,
                                     Outside outside = Outside::refuse) {
   const Volume<float> source = smooth_source(resampler.output());

@@ -22,18 +22,18 @@ struct Backend {
   using Make = std::function<std::unique_ptr<OneResampler>(const Geometry& output, Limits limits)>;
 
   std::string name;
-  std::string cannot_run;  ///< why it cannot run here; empty: it can
-  Make<ForwardResampler> make;
-  Make<PullResampler> make_pull;  ///< null: this backend has none
+  std::string cannot_run;         ///< why it cannot run here; empty: it can
+  Make<ForwardResampler> make;    ///< for forward fields
+  Make<PullResampler> make_pull;  ///< for pull fields; null: this backend has none
   std::function<std::unique_ptr<Renderer>(Limits limits)> make_renderer;
 
   friend void PrintTo(const Backend& backend, std::ostream* stream) { *stream << backend.name; }
 };
 
-/// Every backend of this build; a new one is one more line.
+/// Every backend of this build. A new backend is one more line in backends.cpp.
 const std::vector<Backend>& backends();
 
-/// A test that runs once a backend, and is skipped, with the reason, for those that cannot run here.
+/// A test that runs once for each backend, and is skipped, with the reason, for those that cannot run here.
 class BackendTest : public testing::TestWithParam<Backend> {
  protected:
   void SetUp() override {

@@ -10,8 +10,8 @@
 
 namespace tetwarp::test {
 
-/// Net forces of displaced springs and the second derivative of their energy, from its definition: k/2 (|x_a - x_b| -
-/// r)^2.
+/// Net forces of displaced springs and the second derivative of their energy, computed from its definition: the sum of
+/// k/2 (|x_a - x_b| - r)^2.
 struct DenseSprings {
   Eigen::MatrixXd matrix;
   Eigen::VectorXd force;
@@ -36,7 +36,7 @@ struct DenseSprings {
     }
   }
 
-  /// Leaves a component of a node as it is.
+  /// Makes the solution leave a component of a node as it is.
   void fix(Eigen::Index row) {
     matrix.row(row).setZero();
     matrix.col(row).setZero();
@@ -48,7 +48,7 @@ struct DenseSprings {
   static Eigen::Index rows(const Model& model) { return static_cast<Eigen::Index>(model.nodes()); }
 };
 
-/// Newton's method with a dense matrix. @param part  of the loads
+/// Finds an equilibrium by Newton's method with a dense matrix. @param part  share of the loads, 0 to 1
 inline void find_equilibrium(const Model& model, const Loads& loads, double part, std::vector<glm::dvec3>& u) {
   for (std::size_t n = 0; n < model.nodes(); ++n) {
     if (loads.hold[n] == Hold::placed) u[n] = part * glm::dvec3(loads.goal[n].x, loads.goal[n].y, loads.goal[n].z);
@@ -72,7 +72,7 @@ inline void find_equilibrium(const Model& model, const Loads& loads, double part
   ADD_FAILURE() << "the dense solve did not converge";
 }
 
-/// From rest, in small steps of the loads.
+/// Displacements in equilibrium, reached from rest in small steps of the loads.
 inline std::vector<glm::dvec3> dense_equilibrium(const Model& model, const Loads& loads) {
   std::vector<glm::dvec3> u(model.nodes(), glm::dvec3(0));
   for (const double part : {0.25, 0.5, 0.75, 1.0}) find_equilibrium(model, loads, part, u);

@@ -38,7 +38,7 @@ VertexField uniform_field(const Geometry& lattice, const glm::vec3& mm) {
 
 namespace {
 
-/// Vertices of a lattice over a grid, in voxels of output index.
+/// A lattice over a grid whose vertices are given in voxels of output index.
 struct Net {
   glm::i64vec3 size;
   std::int64_t cell;  // voxels
@@ -66,12 +66,12 @@ struct Net {
   }
 };
 
-/// The corners of the cell's tetrahedra, as in the definition of the split.
+/// Corners of the tetrahedra of even and odd cells (docs/design/definition.md).
 constexpr int kTetrahedra[2][5][4] = {{{1, 2, 4, 7}, {0, 1, 2, 4}, {3, 2, 1, 7}, {5, 4, 7, 1}, {6, 7, 4, 2}},
                                       {{0, 3, 5, 6}, {1, 0, 3, 5}, {2, 3, 0, 6}, {4, 5, 6, 0}, {7, 6, 5, 3}}};
 
-/// Puts the vertices of every tetrahedron that is flat or turned inside out back to rest, until there is none: with
-/// dyadic coordinates of few bits the double determinant is exact.
+/// Puts the vertices of every tetrahedron that is flat or inverted back to rest, until there is none. Coordinates are
+/// dyadic and have few bits, so the determinant in double is exact.
 void unfold(Net& net) {
   const auto volume = [](const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, const glm::dvec3& d) {
     return glm::dot(a - d, glm::cross(b - d, c - d));
@@ -97,7 +97,7 @@ void unfold(Net& net) {
   }
 }
 
-/// Random displacements in multiples of `quantum`; border vertices stay within their faces.
+/// Displaces vertices at random by multiples of `quantum`. Border vertices stay within their faces.
 void shake(Net& net, Random& random, double quantum, double amplitude) {
   const double share = random.one_of<double>({0.1, 0.5, 1.0});
   const bool border_moves = random.chance(0.5);
@@ -114,7 +114,7 @@ void shake(Net& net, Random& random, double quantum, double amplitude) {
   });
 }
 
-/// An exact affine map: mirrored, turned by right angles, stretched or sheared, then shifted.
+/// A random affine map that is exact: mirrored, turned by right angles, stretched or sheared, then shifted.
 AffineMap random_exact_map(Random& random, const glm::dvec3& middle) {
   AffineMap map;
   if (random.chance(0.2)) map.linear[random.axis()] *= -1.0;
@@ -193,7 +193,7 @@ FieldCase random_folding_case(Random& random) {
       image.linear[axis][axis] = 1.0 / static_cast<double>(1 << random.integer(4, 11));
       image.offset[axis] = std::floor(middle);
       break;
-    case 3:  // half of it folded over the other half
+    case 3:  // one half of it folded over the other
       kind += ", folded over";
       Net::for_each(net.size, [&](const glm::i64vec3& vertex) {
         const double at = net.deformed(vertex)[axis];

@@ -10,14 +10,15 @@
 
 namespace tetwarp::test {
 
-/// A grid with spacing 1 at the origin: mm are voxels, exactly.
+/// A grid with spacing 1 mm at the origin, so that mm are voxels exactly.
 Geometry unit_grid(const glm::i64vec3& size);
-/// A rotated grid away from the origin, unequal spacings: no map of it is exact.
+/// A rotated grid away from the origin, with unequal spacings, so that none of its maps is exact.
 Geometry oblique_grid(const glm::i64vec3& size);
-/// Rotation matrix about an axis (any length), radians.
+/// A rotation matrix. @param axis  of any length  @param angle  radians
 glm::dmat3 rotation(const glm::dvec3& axis, double angle);
 
-/// A field on `lattice` whose displacements, in voxels of `output`, are `voxels(rest index of output)`.
+/// A field on `lattice`. @param voxels  gives the displacement, in voxels of `output`, of an undeformed place in output
+/// index
 template <class Function>
 VertexField field_in_voxels(const Geometry& output, const Geometry& lattice, Function&& voxels) {
   const AffineMap index = index_from_point(output) * point_from_index(lattice);
@@ -35,7 +36,7 @@ VertexField field_in_voxels(const Geometry& output, const Geometry& lattice, Fun
   return field;
 }
 
-/// Every vertex displaced by the same mm.
+/// A field that displaces every vertex by the same vector in mm.
 VertexField uniform_field(const Geometry& lattice, const glm::vec3& mm);
 
 /// An output grid and a field over it.
@@ -43,13 +44,14 @@ struct FieldCase {
   Geometry output;
   VertexField field;
   std::string description;
-  /// Injective fields: the undeformed box is mapped onto its image under this map of output index (each inner vertex
-  /// moved before, border vertices within their faces), so every voxel inside the image has one owner and others none.
+  /// For injective fields: a map of output index that takes the undeformed box onto the deformed one. (Each inner
+  /// vertex was moved before, border vertices within their faces.) Every voxel inside the image has one owner, and
+  /// others have none.
   AffineMap image;
 };
 
-/// A random injective field: vertices on grid points, half points or anywhere, planes kept in place or not; then the
-/// whole shifted, mirrored, turned, stretched or sheared. Cells of 1 to 16 voxels.
+/// A random injective field. Vertices lie on grid points, on half points or anywhere, and planes are kept in place or
+/// not; then the whole is shifted, mirrored, turned, stretched or sheared. Cells have 1 to 16 voxels.
 FieldCase random_injective_case(Random& random);
 
 /// A random field without regard for folds: vertices thrown about, planes collapsed, flattened slivers, mirrored

@@ -21,7 +21,8 @@ inline const bench::Floor* find_floor(const std::vector<bench::Floor>& floors, c
   return nullptr;
 }
 
-/// @param met  whether what is required is met; where nothing is, it does not count
+/// Expects a floor with these numbers. @param met  whether the requirement is met; does not count where nothing is
+/// required
 inline void expect_floor(const std::vector<bench::Floor>& floors, const std::string& ratio, const std::string& where,
                          double value, std::optional<double> required, std::optional<bool> met,
                          double tolerance = 1e-12) {

@@ -14,30 +14,31 @@
 #include "tests/support/image_samples.h"
 #include "tests/support/write_file.h"
 
-/// Runs a script of tests/support. @return  false: Python or a library of it is missing
+/// Runs a script of tests/support. @return false: Python, or a library that the script needs, is missing
 inline bool run_python(const std::string& script_and_arguments) {
   const std::string command = "'" TETWARP_PYTHON "' " + script_and_arguments + " > /dev/null";
   const int status = std::system(command.c_str());
-  if (WIFEXITED(status) && (WEXITSTATUS(status) == 77 || WEXITSTATUS(status) == 127)) return false;  // 127: no Python
+  // 77: the script lacks a library; 127: there is no Python
+  if (WIFEXITED(status) && (WEXITSTATUS(status) == 77 || WEXITSTATUS(status) == 127)) return false;
   EXPECT_EQ(status, 0) << command;
   return true;
 }
 
-/// Has Python write the field of an .mha file as another tool would (tests/support/make_field.py says which).
-/// @return  as `run_python`
+/// Lets Python write the field of an .mha file as another tool would (tests/support/make_field.py lists the kinds).
+/// @return false: Python, or a library that the script needs, is missing
 inline bool make_foreign_field(const std::string& kind, const std::filesystem::path& mha,
                                const std::filesystem::path& output) {
   return run_python("'" TETWARP_MAKE_FIELD "' '" + kind + "' '" + mha.string() + "' '" + output.string() + "'");
 }
 
-/// At rest but for the corner at the end of i, the begin of j and the end of k: (3, 5, 7) mm.
+/// Displacements that are zero except at one vertex, at the end of i, the begin of j and the end of k: (3, 5, 7) mm.
 inline std::vector<glm::vec3> corner_displacement(const tetwarp::Geometry& grid) {
   std::vector<glm::vec3> mm(static_cast<std::size_t>(voxel_count(grid)), glm::vec3(0));
   mm[static_cast<std::size_t>(grid.size.x - 1 + grid.size.x * grid.size.y * (grid.size.z - 1))] = {3, 5, 7};
   return mm;
 }
 
-/// Straight, with axes exchanged and turned, and at no right angle to anything.
+/// Grids to test with: one straight, one with axes exchanged and turned, and one at no right angle to anything.
 inline std::vector<tetwarp::Geometry> grids() {
   tetwarp::Geometry flipped = oblique_grid();
   flipped.direction[1] = -flipped.direction[1];
@@ -48,7 +49,7 @@ inline std::string error_of(const tetwarp::FieldSource& source) {
   return refusal([&] { read_pull_field(source); });
 }
 
-/// @param tolerance_mm  0: the same numbers
+/// Expects the displacements of corner_displacement. @param tolerance_mm  0: exactly the same numbers
 inline void expect_corner(const tetwarp::FieldFile& field, const tetwarp::Geometry& grid, double tolerance_mm,
                           const std::string& what) {
   const std::vector<glm::vec3> expected = corner_displacement(grid);
@@ -60,7 +61,7 @@ inline void expect_corner(const tetwarp::FieldFile& field, const tetwarp::Geomet
   }
 }
 
-/// Every byte of a header, one at a time, made another: the file is read or refused, and nothing else happens.
+/// Changes every byte of a header, one at a time: each file must be read or refused, and nothing else may happen.
 inline void expect_read_or_refused(const std::string& good, std::size_t header_bytes,
                                    const tetwarp::FieldSource& source) {
   for (std::size_t at = 0; at < header_bytes; ++at) {

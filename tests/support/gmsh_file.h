@@ -36,7 +36,7 @@ inline std::vector<GmshStyle> gmsh_styles() {
   return styles;
 }
 
-/// Numbers of a Gmsh file, one after the other.
+/// Writes numbers of a Gmsh file one after the other.
 class GmshBytes {
  public:
   explicit GmshBytes(GmshStyle style) : style_(std::move(style)) {}
@@ -47,7 +47,7 @@ class GmshBytes {
   GmshBytes& size(std::uint64_t value) {
     return style_.size_bytes == 4 && style_.binary ? number(static_cast<std::uint32_t>(value)) : number(value);
   }
-  /// Of a node or an element.
+  /// Appends the tag of a node or an element.
   GmshBytes& tag(std::uint64_t value) {
     return style_.version == "4.1" ? size(value) : integer(static_cast<std::int32_t>(value));
   }
@@ -73,9 +73,9 @@ class GmshBytes {
   std::string bytes_;
 };
 
-/// Two tetrahedra and a triangle at the nodes 20, 3, 7, 11, 1000 in this order, the first two of them on a surface with
-/// parametric coordinates; the displacement U of 20 is (3, 5, 7), all others rest. Node 5 is used by the triangle
-/// alone.
+/// A mesh of two tetrahedra and a triangle at the nodes 20, 3, 7, 11, 1000, in this order. The first two nodes lie on a
+/// surface with parametric coordinates. The displacement U of node 20 is (3, 5, 7), all others are at rest. Node 5 is
+/// used by the triangle alone.
 struct GmshSample {
   std::vector<std::uint64_t> tags = {20, 3, 7, 11, 1000, 5};
   std::vector<glm::dvec3> points = {{8, 0, 0}, {0, 0, 0}, {0, 6, 0}, {0, 0, 5}, {8, 6, 5}, {0.1, 1, 2}};
@@ -163,7 +163,7 @@ struct GmshSample {
     }
   }
 
-  /// Of MSH 2, with two tags (entities) before its nodes.
+  /// Appends an element of MSH 2, with two tags (entities) before its nodes.
   static void old_element(const GmshStyle& style, GmshBytes& out, std::uint64_t number, int type,
                           const std::vector<std::uint64_t>& nodes) {
     out.tag(number);

@@ -33,7 +33,7 @@ inline std::vector<tetwarp::Geometry> all_orientations() {
   return grids;
 }
 
-/// Turned by 0.3 about z and 0.2 about x: no number of it is round.
+/// A grid turned by 0.3 about z and 0.2 about x, none of whose numbers is round.
 inline tetwarp::Geometry oblique_grid() {
   const double a = std::cos(0.3), b = std::sin(0.3), c = std::cos(0.2), d = std::sin(0.2);
   tetwarp::Geometry grid = all_orientations().front();
@@ -41,7 +41,7 @@ inline tetwarp::Geometry oblique_grid() {
   return grid;
 }
 
-/// Every byte another than its neighbours.
+/// A volume in which every byte differs from its neighbours.
 inline tetwarp::AnyVolume numbered(const tetwarp::Geometry& grid, tetwarp::VoxelType type, int components = 1) {
   tetwarp::AnyVolume volume(grid, type, components);
   tetwarp::dispatch(type, [&](auto v) {
@@ -82,7 +82,7 @@ T get(const std::string& bytes, std::size_t offset) {
   return value;
 }
 
-/// What `action` throws, as text: "TYPE: MESSAGE"; empty when it throws nothing.
+/// What `action` throws, as text: "TYPE: MESSAGE"; empty if it throws nothing.
 template <class Action>
 std::string refusal(Action&& action) {
   try {

@@ -108,7 +108,7 @@ def write_niftyreg(vectors, affine, kind, path):
 
 
 def write_spline(kind, size, affine, path):
-    """As reg_createControlPointGrid: from one control point before the image, ceil(extent / spacing) + 3 of them."""
+    """Control points as reg_createControlPointGrid puts them: from one before the image, ceil(extent / spacing) + 3."""
     size = np.array(size)
     ras = np.diag([-1.0, -1.0, 1.0, 1.0]) @ affine
     spacing = np.linalg.norm(ras[:3, :3], axis=0)

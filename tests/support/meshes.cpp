@@ -28,13 +28,13 @@ TetrahedralMesh random_mesh(const Geometry& output, const glm::dvec3& low, const
       planes[axis].push_back(random.chance(0.3) ? glm::clamp(std::round(at), low[axis], high[axis]) : at);
     }
     std::sort(planes[axis].begin(), planes[axis].end());
-    for (std::size_t n = 1; n + 1 < planes[axis].size(); ++n)  // none upon another
+    for (std::size_t n = 1; n + 1 < planes[axis].size(); ++n)  // no plane lies upon another
       planes[axis][n] = std::min(std::max(planes[axis][n], planes[axis][n - 1] + 0.05), high[axis] - 0.05);
   }
   const AffineMap point = point_from_index(output);
   const double thrown = random.chance(0.5) ? 0.2 : 0;
   for (glm::dvec3& rest : mesh.rest) {
-    const glm::i64vec3 at(rest);  // whole, on the lattice
+    const glm::i64vec3 at(rest);  // vertices of the lattice have whole coordinates
     for (int axis = 0; axis < 3; ++axis) {
       const auto n = static_cast<std::size_t>(at[axis]);
       rest[axis] = planes[axis][n];

@@ -13,12 +13,12 @@ namespace {
 
 __extension__ typedef __int128 Int;
 
-constexpr std::int64_t kOne = 1 << 16;          // a voxel
-constexpr std::int64_t kNudge[3] = {15, 7, 4};  // d, in units of 2^-16 voxel
+constexpr std::int64_t kOne = 1 << 16;          // a voxel, in units of 2^-16 voxel
+constexpr std::int64_t kNudge[3] = {15, 7, 4};  // the nudge, in units of 2^-16 voxel
 
 int sign(Int x) { return x > 0 ? 1 : (x < 0 ? -1 : 0); }
 
-/// Nearest multiple of 2^-12 voxel, in units of 2^-16.
+/// The multiple of 2^-12 voxel nearest to an index, in units of 2^-16 voxel.
 glm::i64vec3 snapped(const glm::dvec3& index) {
   glm::i64vec3 result;
   for (int axis = 0; axis < 3; ++axis)
@@ -26,7 +26,7 @@ glm::i64vec3 snapped(const glm::dvec3& index) {
   return result;
 }
 
-/// Rows are corners in homogeneous coordinates (x, y, z, 1): the transposed matrix of Eq. 6.
+/// A 4 x 4 matrix whose rows are corners in homogeneous coordinates (x, y, z, 1): the transposed matrix of Eq. 6.
 struct Matrix {
   Int entry[4][4];
 
@@ -68,7 +68,7 @@ struct Cramer {
     return cofactor[i][0] * point.x + cofactor[i][1] * point.y + cofactor[i][2] * point.z + cofactor[i][3];
   }
 
-  /// Sign of the numerator at point + (sx e, sy e^2, sz e^3).
+  /// Sign of numerator i at point + (sx e, sy e^2, sz e^3), for an infinitesimal e > 0.
   int sign_beside(int i, const glm::i64vec3& point, const glm::i64vec3& signs) const {
     const int at_point = sign(numerator(i, point));
     if (at_point != 0) return at_point;
@@ -97,8 +97,8 @@ long double permanent(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3
   return a.x * (b.y * c.z + b.z * c.y) + a.y * (b.x * c.z + b.z * c.x) + a.z * (b.x * c.y + b.y * c.x);
 }
 
-/// The largest, over the choices of the reference corner, of what a relative rounding error of the products in Cramer's
-/// 3x3 rule is multiplied with in the weights of a point inside.
+/// The largest factor, over the choices of the reference corner, by which a relative rounding error of the products in
+/// Cramer's 3x3 rule grows in the weights of a point inside.
 double condition(const glm::i64vec3 (&corner)[4], long double determinant) {
   long double worst = 0;
   for (int reference = 0; reference < 4; ++reference) {
@@ -134,15 +134,17 @@ Oracle::Oracle(const Geometry& output, const VertexField& field, const Region& r
 
 namespace {
 
-/// Where the vertices of a lattice rest along one of its axes, as vertex index: their numbers, but for an end within
-/// rounding of the outermost voxels, which is drawn out to them.
-/// @param step   voxels from one vertex to the next  @param places  vertex index of the output's corners on the axis
+/// Where the vertices of a lattice rest along one of its axes, as vertex index: their own numbers, except where an end
+/// lies within rounding of the outermost voxels and is moved onto them.
+/// @param step    voxels from one vertex to the next
+/// @param places  vertex index of the output's corners on the axis
 std::vector<double> places_on_axis(const glm::dvec3& step, std::int64_t vertices, const std::vector<double>& places) {
   const double cells = static_cast<double>(vertices - 1), length = glm::length(step);
   int along = 0;
   for (int axis = 0; axis < 3; ++axis) along += std::abs(step[axis]) * cells > 1e-6;
   const auto [lowest, highest] = std::minmax_element(places.begin(), places.end());
-  const auto end = [&](double voxels_short) {  // a quarter of a step lies within snapping, a turned border needs more
+  // Up to a quarter of a step is left to snapping; a turned border needs more.
+  const auto end = [&](double voxels_short) {
     if (voxels_short > 1.0 / 256) return 0.0;
     if (along == 1) return voxels_short > 0.25 / 4096 ? voxels_short / length : 0;
     return voxels_short > -1.0 / 4096 ? (voxels_short + 2.0 / 4096) / length : 0;
@@ -215,7 +217,8 @@ void Oracle::corners(std::uint64_t tetrahedron, Vertex (&result)[4]) const {
   const int number = static_cast<int>(tetrahedron % 5);
   const glm::i64vec3 first(cell % cells_.x, cell / cells_.x % cells_.y, cell / (cells_.x * cells_.y));
   const bool odd = (first.x + first.y + first.z) % 2 != 0;
-  // The centre's corners; the corner tetrahedra stand at the others, which are the centre's of the other parity.
+  // Corners of the centre tetrahedron of even and odd cells. The corner tetrahedra stand at the other four corners,
+  // which are those of the centre in a cell of the other parity.
   constexpr int kCentre[2][4] = {{1, 2, 4, 7}, {0, 3, 5, 6}};
   const int apex = kCentre[odd ? 0 : 1][number == 0 ? 0 : number - 1];
   const int around[4] = {apex, apex ^ 1, apex ^ 2, apex ^ 4};
@@ -262,7 +265,7 @@ void Oracle::visit(std::uint64_t tetrahedron) {
     high = glm::max(high, point);
   }
   Region box;
-  for (int axis = 0; axis < 3; ++axis) {  // a voxel more all round: the nudge is shorter than that
+  for (int axis = 0; axis < 3; ++axis) {  // a voxel more on all sides, for the nudge is shorter than that
     box.begin[axis] = std::max(region_.begin[axis], floor_div(low[axis], kOne) - 1);
     box.end[axis] = std::min(region_.end[axis], floor_div(high[axis], kOne) + 3);
   }
@@ -299,7 +302,7 @@ Undeformed Oracle::undeformed(const glm::i64vec3& voxel) const {
     return u;
   };
   const glm::i64vec3 p = voxel * kOne, q = nudged(voxel, signs(voxel));
-  long double outside = 0;  // how far a weight at p is below 0
+  long double outside = 0;  // how far the weights at the voxel itself are below 0
   for (int n = 0; n < 4; ++n) {
     outside = std::max(outside, -static_cast<long double>(cramer.numerator(n, p)) / determinant);
   }

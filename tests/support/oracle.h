@@ -10,7 +10,7 @@
 
 namespace tetwarp::test {
 
-/// Who owns a voxel: how many tetrahedra, and the lowest of their numbers.
+/// How many tetrahedra own a voxel, and the lowest of their numbers.
 struct Owners {
   std::uint32_t count = 0;
   std::uint64_t lowest = UINT64_MAX;
@@ -23,25 +23,26 @@ struct Undeformed {
       0};                ///< another u that is as right where rounding decides between the voxel and the nudged point
   double jacobian = 0;   ///< deformed over rest volume of the owner
   double condition = 1;  ///< how much a relative rounding error of float products may grow in the weights
-  double rest_condition = 1;  ///< likewise in the owner's volume at rest
+  double rest_condition = 1;  ///< the same factor for weights in the owner's undeformed volume
   double reach = 0;           ///< largest component of the difference of u between two corners, voxels
 };
 
-/// Brute force, in other mathematics than the backends: the paper's 4x4 system (Eq. 6) solved by Cramer's rule in
-/// 128-bit integers, for every tetrahedron and every voxel whose nudged point lies in its box.
+/// Finds owners by brute force, in other mathematics than the backends: it solves the paper's 4x4 system (Eq. 6) by
+/// Cramer's rule in 128-bit integers, for every tetrahedron and every voxel whose nudged point lies in its box.
 ///
-/// Coordinates are integers in units of 2^-16 voxel of output index. The point is (q, 1), q = p + d, with the
-/// infinitesimal step carried along as a polynomial in e: each numerator is c0 + c1 e + c2 e^2 + c3 e^3, signed
-/// lexicographically. A tetrahedron owns the voxel when no numerator is zero and all have the sign of its determinant.
+/// Coordinates are integers in units of 2^-16 voxel of output index. The point is (q, 1), q = p + d, and an
+/// infinitesimal step is carried along as a polynomial in e: each numerator is c0 + c1 e + c2 e^2 + c3 e^3, whose sign
+/// is that of its first coefficient that is not zero. A tetrahedron owns the voxel when no numerator is zero and all
+/// have the sign of its determinant.
 class Oracle {
  public:
-  /// @param region  voxels to find owners of; Report values are of the whole field all the same
+  /// @param region  voxels to find owners of; counts of the report are those of the whole field all the same
   Oracle(const Geometry& output, const VertexField& field, const Region& region);
   Oracle(const Geometry& output, const VertexField& field) : Oracle(output, field, whole(output)) {}
 
-  /// @param voxel  in the region
+  /// The owners of a voxel. @param voxel  in the region
   const Owners& owners(const glm::i64vec3& voxel) const;
-  /// @param voxel  in the region, with an owner
+  /// Where a voxel comes from. @param voxel  in the region, with an owner
   Undeformed undeformed(const glm::i64vec3& voxel) const;
 
   std::uint64_t inverted = 0, degenerate = 0, multiply_owned = 0;
@@ -60,9 +61,10 @@ class Oracle {
   std::size_t offset(const glm::i64vec3& voxel) const;
 
   glm::i64vec3 vertices_{0}, cells_{0};
-  std::vector<glm::u32vec4> tetrahedra_;  ///< of a mesh
+  std::vector<glm::u32vec4> tetrahedra_;  ///< of a field with a mesh
   std::vector<Vertex> vertex_;
-  glm::i64vec3 middle_doubled_{0};  ///< of the undeformed lattice's box, 2^-17 voxel
+  /// Twice the middle of the undeformed lattice's box, 2^-16 voxel.
+  glm::i64vec3 middle_doubled_{0};
   Region region_;
   std::vector<Owners> owners_;
 };

@@ -18,7 +18,7 @@ namespace tetwarp::test {
 
 struct Run {
   int status = -1;
-  std::string output;  ///< both streams
+  std::string output;  ///< standard output and standard error together
 };
 
 inline Run run_command(const std::string& command) {
@@ -38,7 +38,7 @@ inline std::string quoted(const std::filesystem::path& path) {
 
 inline bool is_installed(const std::string& program) { return run_command("command -v " + program).status == 0; }
 
-/// Writes a volume as check_geometry.py takes it: FILE, and its voxels in FILE.raw.
+/// Writes a volume in the form that check_geometry.py reads: FILE, and its voxels in FILE.raw.
 inline void write_expected(const Volume<std::int16_t>& volume, const std::filesystem::path& file) {
   const std::string voxels = file.string() + ".raw";
   std::ofstream(voxels, std::ios::binary)
@@ -62,8 +62,8 @@ inline void write_expected(const Volume<std::int16_t>& volume, const std::filesy
   expected << "\"voxels\": " << '"' << voxels << "\"}";
 }
 
-/// Runs check_geometry.py: what pydicom, dcm2niix or nibabel (several with commas) make of a series or a NIfTI file,
-/// against a file of write_expected() or another NIfTI file.
+/// Runs check_geometry.py. It compares what pydicom, dcm2niix or nibabel (several with commas) make of a series or a
+/// NIfTI file with a file of write_expected() or another NIfTI file.
 inline Run check_geometry(const std::string& readers, const std::filesystem::path& path,
                           const std::filesystem::path& expected) {
   return run_command(TETWARP_PYTHON " " TETWARP_CHECK_GEOMETRY " " + readers + " " + quoted(path) + " " +
@@ -73,8 +73,8 @@ inline Run check_geometry(const std::string& readers, const std::filesystem::pat
 /// Whether a run of a script says that a reader is missing.
 inline bool is_missing(const Run& run) { return run.status == 77 || run.status == 127; }
 
-/// Whether pydicom or dcm2niix see every voxel of a series where and as we do. A reader that is not there skips the
-/// test.
+/// Expects that pydicom or dcm2niix see every voxel of a series where and as this project does. If the reader is not
+/// installed the test is skipped.
 inline void check_with(const std::string& reader, const std::filesystem::path& folder,
                        const Volume<std::int16_t>& volume, const std::filesystem::path& expected_file) {
   write_expected(volume, expected_file);

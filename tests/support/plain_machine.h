@@ -10,8 +10,8 @@
 
 namespace tetwarp::test {
 
-/// What runs the sweeps of DeviceSprings without a device, with sums in the order of CUDA's: so is known how they
-/// converge wherever the tests run.
+/// Runs the sweeps of DeviceSprings without a device, with sums in the order of CUDA's, so that their convergence can
+/// be tested on every machine.
 class PlainMachine {
  public:
   static constexpr Memory kMemory = Memory::host;
@@ -30,7 +30,7 @@ class PlainMachine {
   };
 
   struct Scope {
-    ~Scope() {}  // so that holding one is a use
+    ~Scope() {}  // makes holding a Scope count as a use of it
   };
   Scope scope() const { return {}; }
   void set_stream(void*) {}

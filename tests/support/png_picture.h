@@ -13,7 +13,7 @@
 
 namespace tetwarp::test {
 
-/// A PNG as libpng reads it.
+/// Reads a PNG with libpng.
 inline Picture read_png(const std::filesystem::path& path) {
   png_image image = {};
   image.version = PNG_IMAGE_VERSION;

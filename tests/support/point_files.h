@@ -11,8 +11,8 @@
 #include "io/points_file.h"
 #include "tests/support/write_file.h"
 
-/// Small files of points, each of the corners (1, 2, 3), (11, 2.5, 3), (1, 22, 3.25) in a frame that the text names.
-/// The frame is written into `SPACE` (surfaces, empty: not said) or stands as given.
+/// Small files of points, each with the corners (1, 2, 3), (11, 2.5, 3), (1, 22, 3.25). Their frame is as given, or
+/// what `space` states (for surfaces; empty: nothing is stated).
 
 inline const std::vector<glm::dvec3>& sample_points() {
   static const std::vector<glm::dvec3> kPoints = {{1, 2, 3}, {11, 2.5, 3}, {1, 22, 3.25}};
@@ -77,7 +77,7 @@ inline std::string sample_text_vtk(const std::string& space, const std::string& 
          "1\nMETADATA\nINFORMATION 0\n\nFIELD FieldData 1\nids 1 3 int\n7 8 9\n";
 }
 
-/// Of version 5.1: cells are offsets and connectivity of 64 bits. Some of the bytes of its data are blanks.
+/// A file of version 5.1, in which cells are offsets and connectivity of 64 bits. Some bytes of its data are blanks.
 inline std::string sample_binary_vtk(const std::string& space, bool doubles) {
   std::string bytes = "# vtk DataFile Version 5.1\n3D Slicer output. " + space +
                       "\nBINARY\nDATASET POLYDATA\nPOINTS 3 " + (doubles ? "double" : "float") + "\n";
@@ -103,7 +103,7 @@ inline std::string sample_binary_vtk(const std::string& space, bool doubles) {
   return bytes + "\n";
 }
 
-/// A form of points: its file in LPS or RAS.
+/// A format of points: how its file is made, in LPS or RAS.
 struct PointForm {
   std::string name, lps, ras;
 };

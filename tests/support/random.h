@@ -10,7 +10,7 @@
 
 namespace tetwarp::test {
 
-/// The seed of this run: $TETWARP_TEST_SEED, or another one each time. Random tests trace it:
+/// The seed of this run: $TETWARP_TEST_SEED, or another one each time. Random tests show it when they fail:
 /// SCOPED_TRACE(seed_text(seed)).
 inline std::uint64_t test_seed() {
   static const std::uint64_t seed = [] {
@@ -20,7 +20,8 @@ inline std::uint64_t test_seed() {
   return seed;
 }
 
-/// How many cases a random test looks at: `usual`, or $TETWARP_TEST_CASES where that is fewer (under slow tools).
+/// How many cases a random test looks at: `usual`, or $TETWARP_TEST_CASES if that is less, for tools that make tests
+/// slow.
 inline std::uint64_t test_cases(std::uint64_t usual) {
   const char* text = std::getenv("TETWARP_TEST_CASES");
   const std::uint64_t wanted = text ? std::strtoull(text, nullptr, 10) : usual;
@@ -34,7 +35,7 @@ class Random {
  public:
   explicit Random(std::uint64_t seed, std::uint64_t stream = 0) : engine_(seed * 0x9E3779B97F4A7C15u + stream) {}
 
-  /// From low to high, both included.
+  /// A whole number from low to high, both included.
   std::int64_t integer(std::int64_t low, std::int64_t high) {
     return std::uniform_int_distribution<std::int64_t>(low, high)(engine_);
   }

@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <string>
 
-/// The folder of an unpacked set of real series ($TETWARP_TEST_DATA/SET), or an empty path where it is absent.
+/// The folder of an unpacked set of real series ($TETWARP_TEST_DATA/SET); empty if it is absent.
 inline std::filesystem::path real_data(const std::string& set) {
   const char* root = std::getenv("TETWARP_TEST_DATA");
   if (!root) return {};
@@ -15,7 +15,7 @@ inline std::filesystem::path real_data(const std::string& set) {
   return std::filesystem::exists(folder) ? folder : std::filesystem::path();
 }
 
-/// Skips the test with a reason where the set is absent; defines `folder` where it is there.
+/// Defines `folder` as the folder of a set. If it is absent the test is skipped with a reason.
 #define TETWARP_REAL_DATA(folder, set)                 \
   const std::filesystem::path folder = real_data(set); \
   if (folder.empty()) GTEST_SKIP() << "no real data: " << (set) << " is not in $TETWARP_TEST_DATA"

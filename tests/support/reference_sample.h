@@ -12,11 +12,11 @@
 
 namespace tetwarp::test {
 
-/// What a source has at a place, by the formulas in double: sums of weight times voxel, not nested interpolations.
+/// The value of a source at a place by the formulas in double: sums of weight times voxel, not nested interpolations.
 struct ReferenceSample {
-  bool inside = false;  ///< within half a voxel of the outermost centres
+  bool inside = false;  ///< the place is within half a voxel of the outermost centres
   bool padded = false;
-  double value = 0;  ///< before it is rounded to the voxel type
+  double value = 0;  ///< the value before it is rounded to the voxel type
   double jump = 1;   ///< distance in voxels to the nearest place where the sample is not continuous
 };
 
@@ -36,14 +36,14 @@ inline ReferenceTaps reference_taps(double x, Interpolation interpolation) {
     case Interpolation::vote: return {low, 2, {1 - t, t}};
     case Interpolation::cubic: break;
   }
-  const auto catmull_rom = [](double s) {  // Keys 1981 with a = -1/2, distance s
+  const auto catmull_rom = [](double s) {  // the kernel of Keys 1981 with a = -1/2, at distance s
     if (s < 1) return 1.5 * s * s * s - 2.5 * s * s + 1;
     return s < 2 ? -0.5 * s * s * s + 2.5 * s * s - 4 * s + 2 : 0.0;
   };
   return {low - 1, 4, {catmull_rom(1 + t), catmull_rom(t), catmull_rom(1 - t), catmull_rom(2 - t)}};
 }
 
-/// The label of the largest sum of weights, the smallest of several, and how far the second is behind.
+/// The label with the largest sum of weights (of several the smallest label), and by how much it leads.
 struct ReferenceVote {
   double label, margin;
 };
@@ -51,7 +51,7 @@ struct ReferenceVote {
 inline ReferenceVote reference_vote(const std::map<double, double>& weight_of_label) {
   ReferenceVote vote{};
   double most = -1, second = -1;
-  for (const auto& [label, weight] : weight_of_label) {  // rising labels
+  for (const auto& [label, weight] : weight_of_label) {  // by rising label
     second = std::max(second, std::min(weight, most));
     if (weight <= most) continue;
     most = weight;
@@ -103,7 +103,7 @@ ReferenceSample reference_sample(const Volume<V>& source, glm::dvec3 x, Interpol
   if (interpolation == Interpolation::vote) {
     const ReferenceVote vote = reference_vote(weight_of_label);
     sample.value = vote.label;
-    sample.jump = std::min(sample.jump, vote.margin / 6);  // along each axis the difference of two sums falls by 2
+    sample.jump = std::min(sample.jump, vote.margin / 6);  // along each axis the lead falls by at most 2 for each voxel
   }
   if (sample.padded) sample.value = heaviest_value;
   return sample;

@@ -11,7 +11,7 @@
 
 namespace tetwarp::test {
 
-/// What one call gives.
+/// The outputs of one call of a resampler.
 template <class V>
 struct Outcome {
   Volume<V> output;
@@ -22,7 +22,8 @@ struct Outcome {
   Report report;
 };
 
-/// Bytes that no correct result consists of: a voxel that was not written shows.
+/// A byte that fills outputs before a call, so that a voxel that was not written shows: no correct result consists of
+/// it.
 template <class V>
 Volume<V> poisoned(const Geometry& geometry) {
   Volume<V> volume{geometry, std::vector<V>(static_cast<std::size_t>(voxel_count(geometry)))};
@@ -49,11 +50,11 @@ struct Options {
   Interpolation interpolation = Interpolation::linear;
   double background = -7;
   std::optional<PaddingRange> padding = {};
-  std::optional<Region> region = {};  ///< absent: all
-  bool pull = false;                  ///< the maps that pull fields do not have are left out
+  std::optional<Region> region = {};  ///< empty: all of the output
+  bool pull = false;                  ///< the field is a pull field; maps that these do not have are left out
 };
 
-/// Sends a volume through the field that the resampler was given, with every map.
+/// Sends a volume through the field that the resampler was given, and fills every map.
 template <class V>
 Outcome<V> run(Resampler& resampler, const Volume<V>& source, const Options& options = {}) {
   Outcome<V> outcome = poisoned_outcome<V>(resampler.output());
@@ -68,7 +69,7 @@ Outcome<V> run(Resampler& resampler, const Volume<V>& source, const Options& opt
   return outcome;
 }
 
-/// Whether both hold the same bytes, NaN and -0 included.
+/// Whether two lists hold the same bytes, NaN and -0 included.
 template <class T>
 testing::AssertionResult same_bits(const std::vector<T>& expected, const std::vector<T>& actual) {
   if (expected.size() != actual.size()) {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-/// Whether a message holds all of the words; shows the message where it does not.
+/// Whether a message holds all of the words; a failed test shows the message.
 inline testing::AssertionResult says(const std::string& text, const std::vector<std::string>& words) {
   for (const std::string& word : words) {
     if (text.find(word) == std::string::npos) {

@@ -16,7 +16,7 @@ namespace tetwarp::test {
 constexpr Interpolation kInterpolations[] = {Interpolation::nearest, Interpolation::linear, Interpolation::cubic,
                                              Interpolation::vote};
 
-/// A lattice of cells of one voxel that reaches two voxels further than the grid on every side.
+/// A lattice with cells of one voxel that reaches two voxels beyond the grid on every side.
 inline Geometry wide_lattice(const Geometry& grid) {
   Geometry lattice = grid;
   lattice.size += std::int64_t{4};
@@ -34,8 +34,8 @@ Volume<V> random_values(const Geometry& grid, Random& random, double low, double
   return volume;
 }
 
-/// One run through a lattice that moves as a whole, by a multiple of 2^-12 voxel: every place is voxel - shift,
-/// exactly.
+/// Runs a volume through a lattice that moves as a whole by a multiple of 2^-12 voxel, so that every voxel comes
+/// exactly from voxel - shift.
 template <class V>
 Outcome<V> run_shifted(ForwardResampler& resampler, const Volume<V>& source, const glm::dvec3& shift,
                        const Options& options) {
@@ -44,7 +44,7 @@ Outcome<V> run_shifted(ForwardResampler& resampler, const Volume<V>& source, con
   return run(resampler, source, options);
 }
 
-/// Every voxel and every count against the formulas in double.
+/// Compares every voxel and every count with the formulas in double.
 template <class V>
 void expect_like_formula(const Outcome<V>& found, const Volume<V>& source, const glm::dvec3& shift,
                          const Options& options) {

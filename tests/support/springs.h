@@ -25,7 +25,7 @@ using namespace simulate;
 
 inline constexpr StoppingRule kTight{.motion_mm = 1e-7, .residual = 1e-9, .steps = 500};
 
-/// One way to solve mass-spring; the tests run over all.
+/// One way to solve mass-spring. The tests run over all of them.
 struct Method {
   std::string name, cannot_run;
   std::function<std::unique_ptr<Simulation>(const Model&)> make;
@@ -83,7 +83,7 @@ inline glm::dvec3 rest_of(const Model& model, std::size_t node) {
   return point_from_index(model.lattice)(glm::dvec3(place_of(model, node)));
 }
 
-/// All nodes free.
+/// Loads that leave all nodes free and exert no force.
 inline Loads free_loads(const Model& model) {
   return {.hold = std::vector<Hold>(model.nodes(), Hold::free),
           .goal = std::vector<glm::vec3>(model.nodes(), glm::vec3(0)),
@@ -95,7 +95,7 @@ inline void place(Loads& loads, std::size_t node, const glm::dvec3& goal) {
   loads.goal[node] = {static_cast<float>(goal.x), static_cast<float>(goal.y), static_cast<float>(goal.z)};
 }
 
-/// The bottom layer held, a part of the top layer moved.
+/// Loads that hold the bottom layer and move a part of the top layer.
 inline Loads pressed(const Model& model, const glm::dvec3& motion) {
   Loads loads = free_loads(model);
   const glm::i64vec3& size = model.lattice.size;

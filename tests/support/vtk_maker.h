@@ -7,7 +7,8 @@
 
 #include "tests/support/foreign_field.h"
 
-/// Has VTK write a dataset (tests/support/make_vtk.py says which). @return  as `run_python`
+/// Lets VTK write a dataset (tests/support/make_vtk.py lists the kinds). @return false: Python, or a library that the
+/// script needs, is missing
 inline bool make_vtk(const std::string& kind, const std::string& encoding, const std::filesystem::path& output,
                      const tetwarp::Geometry& grid) {
   std::ostringstream numbers;

@@ -11,7 +11,7 @@ inline void write_file(const std::filesystem::path& path, const std::string& con
   std::ofstream(path, std::ios::binary) << content;
 }
 
-/// Appends the bytes of a number, little endian as this machine is.
+/// Appends the bytes of a number in the byte order of this machine, which is little endian.
 template <class T>
 void append_value(std::string& bytes, T value) {
   bytes.append(reinterpret_cast<const char*>(&value), sizeof value);

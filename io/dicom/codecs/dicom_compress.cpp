@@ -29,7 +29,7 @@ void check(const OFCondition& condition) {
   if (condition.bad()) throw Error(std::string("cannot compress a slice: ") + condition.text());
 }
 
-/// One byte of each word, row after row.
+/// An RLE segment: the byte of each word that begins at bit `shift`, row after row (PS3.5 G.3.1).
 std::vector<std::byte> rle_segment(std::span<const std::int16_t> voxels, std::size_t columns, int shift) {
   DcmRLEEncoder encoder(1);
   for (std::size_t n = 0; n < voxels.size(); ++n) {
@@ -42,11 +42,12 @@ std::vector<std::byte> rle_segment(std::span<const std::int16_t> voxels, std::si
   return segment;
 }
 
-/// The header of 16 words, then the high bytes of all words, then the low ones (PS3.5 G.4, G.5).
+/// An RLE frame: the header of 16 words, then the high bytes of all words, then the low ones (PS3.5 G.4, G.5).
 std::vector<std::byte> rle_frame(std::span<const std::int16_t> voxels, std::size_t columns) {
   constexpr std::size_t kHeader = 64;
   const std::vector<std::byte> high = rle_segment(voxels, columns, 8), low = rle_segment(voxels, columns, 0);
-  const std::size_t words[] = {2, kHeader, kHeader + high.size()};  // segments, and where they begin
+  // Number of segments, and the byte at which each begins.
+  const std::size_t words[] = {2, kHeader, kHeader + high.size()};
   std::vector<std::byte> frame(kHeader + high.size() + low.size());
   for (std::size_t word = 0; word < std::size(words); ++word) {
     for (std::size_t n = 0; n < 4; ++n) frame[4 * word + n] = static_cast<std::byte>(words[word] >> (8 * n));
@@ -56,7 +57,7 @@ std::vector<std::byte> rle_frame(std::span<const std::int16_t> voxels, std::size
   return frame;
 }
 
-/// The coder of DCMTK, without its registry: that is one for the whole process.
+/// A frame of JPEG-LS. It calls DCMTK's coder directly: DCMTK's registry of coders is one for the whole process.
 std::vector<std::byte> jpeg_ls_frame(std::span<const std::int16_t> voxels, std::size_t rows, std::size_t columns) {
   DcmDataset slice;
   check(slice.putAndInsertUint16(DCM_Rows, static_cast<Uint16>(rows)));
@@ -68,11 +69,11 @@ std::vector<std::byte> jpeg_ls_frame(std::span<const std::int16_t> voxels, std::
   check(slice.putAndInsertUint16(DCM_HighBit, 15));
   check(slice.putAndInsertUint16(DCM_PixelRepresentation, 1));
   DcmPixelData element(DCM_PixelData);
-  DcmStack stack;  // where the coder looks for the attributes
+  DcmStack stack;  // the coder looks for attributes of the image in what lies on this stack
   stack.push(&slice);
   stack.push(&element);
   const DJLSRepresentationParameter lossless(0, OFTrue);
-  const DJLSCodecParameter raw(OFFalse);  // the words as they are
+  const DJLSCodecParameter raw(OFFalse);  // the coder is to take the words as they are
   DcmPixelSequence* sequence = nullptr;
   OFBool ignored = OFFalse;
   const DcmCodec& coder = DJLSLosslessEncoder();
@@ -82,7 +83,7 @@ std::vector<std::byte> jpeg_ls_frame(std::span<const std::int16_t> voxels, std::
   const std::unique_ptr<DcmPixelSequence> fragments(sequence);
   check(done);
   std::vector<std::byte> frame;
-  for (unsigned long n = 1; n < fragments->card(); ++n) {  // after the offset table
+  for (unsigned long n = 1; n < fragments->card(); ++n) {  // fragment 0 is the offset table
     DcmPixelItem* fragment = nullptr;
     Uint8* bytes = nullptr;
     check(fragments->getItem(fragment, n));

@@ -23,15 +23,17 @@ using Bytes = std::span<const std::uint8_t>;
 constexpr std::uint8_t kLossless = 0xc3, kEnd = 0xd9, kScan = 0xda;
 
 std::ptrdiff_t count_of_marker(Bytes bytes, std::uint8_t marker) {
-  // Coded data never hold one (they stuff 0xff).
+  // Coded data hold no marker by chance: after a byte 0xff they have a zero.
   std::ptrdiff_t count = 0;
   for (std::size_t at = 1; at < bytes.size(); ++at) count += bytes[at - 1] == 0xff && bytes[at] == marker;
   return count;
 }
 
-/// The decoders fill up what a damaged stream lacks, and write what it says; so both are checked first.
+/// Checks a stream before it is decoded: DCMTK's decoders make up what a damaged stream lacks, and write as many pixels
+/// as it states.
 JpegFrame checked_frame(Bytes bytes, const DicomFileHeader& header) {
-  constexpr std::ptrdiff_t kMostScans = 100;  // each takes as long as an image; ten are usual where there are several
+  // Each scan takes as long to decode as an image; where there are several, ten are usual.
+  constexpr std::ptrdiff_t kMostScans = 100;
   const PixelFormat& pixels = header.pixels;
   const JpegFrame frame = jpeg_frame(bytes);
   if (frame.rows != pixels.rows || frame.columns != pixels.columns) {
@@ -53,7 +55,8 @@ JpegFrame checked_frame(Bytes bytes, const DicomFileHeader& header) {
 
 std::size_t count_of(const JpegFrame& frame) { return std::size_t(frame.rows) * std::size_t(frame.columns); }
 
-/// Samples as DCMTK decodes them: bytes up to a precision of 8, words above, whatever Bits Allocated says.
+/// Samples as DCMTK decodes them: one byte each up to a precision of 8 bits, a word each above, whatever Bits Allocated
+/// says.
 class Packed {
  public:
   explicit Packed(const JpegFrame& frame)
@@ -83,8 +86,8 @@ const DJCodecParameter& parameter() {
   return kept;
 }
 
-/// DCMTK's decoder of JPEG, which counts what libjpeg warns of: codes that are none, data that are missing or left
-/// over. It would fill up or skip them.
+/// DCMTK's decoder of JPEG, which also counts what libjpeg warns of: bits that are no code, data that are missing or
+/// left over. Without the count it would fill up or skip them in silence.
 template <class Decoder>
 class StrictDecoder final : public Decoder {
  public:
@@ -113,8 +116,8 @@ void decode_strictly(Bytes bytes, const DicomFileHeader& header, Packed& packed)
 
 }  // namespace
 
-// Lossless frames are decoded here, the others gone through before DCMTK decodes them: for it a code more or less is
-// nothing to speak of, and all pixels behind it lie one place off.
+// Lossless frames are decoded here. Of other frames all codes are read before DCMTK decodes them: DCMTK says nothing of
+// a code too many or too few, after which all pixels lie one place off.
 std::vector<std::uint16_t> decode_jpeg(Bytes bytes, const DicomFileHeader& header) {
   const JpegFrame frame = checked_frame(bytes, header);
   if (is_one_scan(frame)) {
@@ -136,7 +139,7 @@ std::vector<std::uint16_t> decode_jpeg(Bytes bytes, const DicomFileHeader& heade
   return words_of(std::move(packed).samples(), frame, header.pixels);
 }
 
-// DCMTK's decoder of JPEG-LS has no interface but that of its data sets.
+// DCMTK's decoder of JPEG-LS reads only from DCMTK's own data sets, so that one is made.
 std::vector<std::uint16_t> decode_jpeg_ls(Bytes bytes, const DicomFileHeader& header) {
   const JpegFrame frame = checked_frame(bytes, header);
   Packed packed(frame);
@@ -149,7 +152,7 @@ std::vector<std::uint16_t> decode_jpeg_ls(Bytes bytes, const DicomFileHeader& he
   put(DCM_BitsStored, frame.precision);
   data.putAndInsertString(DCM_PhotometricInterpretation, "MONOCHROME2");
   auto* sequence = new DcmPixelSequence(DCM_PixelSequenceTag);
-  sequence->insert(new DcmPixelItem(DCM_PixelItemTag));  // no offset table
+  sequence->insert(new DcmPixelItem(DCM_PixelItemTag));  // an empty offset table
   auto* item = new DcmPixelItem(DCM_PixelItemTag);
   item->putUint8Array(bytes.data(), static_cast<unsigned long>(bytes.size()));
   sequence->insert(item);

@@ -17,7 +17,7 @@ namespace {
 
 using Bytes = std::span<const std::uint8_t>;
 
-/// Bytes that OpenJPEG reads from.
+/// The bytes that OpenJPEG reads, and how far it is.
 struct Source {
   Bytes bytes;
   std::size_t at = 0;
@@ -46,10 +46,10 @@ OPJ_BOOL seek_source(OPJ_OFF_T at, void* data) {
   return OPJ_TRUE;
 }
 
-/// The first thing that OpenJPEG complains of. A warning counts as well: it is followed by pixels that are made up.
+/// Keeps the first thing that OpenJPEG complains of. A warning counts as an error: pixels that are made up follow it.
 void keep_first(const char* message, void* data) {
-  // How far the end of a code-block lies from where its coder stopped. Encoders differ by some bytes: those of Kakadu
-  // cut off what a decoder can do without, others flush more than they need.
+  // By how many bytes the end of a code-block may lie from where its coder stopped. Encoders differ by some bytes:
+  // those of Kakadu cut off what a decoder can do without, others flush more than they need.
   constexpr int kUsualBytes = 8;
   int bytes = 0;
   if (std::sscanf(message, "PTERM check failure: %d", &bytes) == 1 && bytes <= kUsualBytes) return;
@@ -59,18 +59,19 @@ void keep_first(const char* message, void* data) {
   first.erase(first.find_last_not_of(" \n") + 1);
 }
 
-/// The codestream, in which every code-block is said to end where its coder does ("predictable termination", T.800
-/// D.4.2). OpenJPEG decodes the same pixels and tells where that is not so. For undamaged data it is so within a few
-/// bytes, since every encoder ends like this; for damaged ones it hardly ever is, and nothing else would show.
+/// A copy of the codestream that claims "predictable termination" (T.800 D.4.2): every code-block ends where its coder
+/// does. OpenJPEG decodes the same pixels from it, and warns where the claim is false. For undamaged data it is true
+/// within a few bytes, since every encoder ends like this; for damaged ones it is hardly ever true, and nothing else
+/// would show the damage.
 std::vector<std::uint8_t> with_checked_ends(const Jpeg2000Image& image) {
   constexpr std::uint8_t kPredictable = 0x10, kHighThroughput = 0x40;
   std::vector<std::uint8_t> bytes(image.codestream.begin(), image.codestream.end());
   std::uint8_t& style = bytes[image.block_style_at];
-  if ((style & kHighThroughput) == 0) style |= kPredictable;  // that coder has another end
+  if ((style & kHighThroughput) == 0) style |= kPredictable;  // the high-throughput coder ends in another way
   return bytes;
 }
 
-// Both handles are void* to the compiler, so that the way to end them is part of the type.
+// OpenJPEG's two handles are both void* to the compiler, so each type has the function that ends it.
 using Stream = std::unique_ptr<opj_stream_t, decltype([](opj_stream_t* stream) { opj_stream_destroy(stream); })>;
 using Codec = std::unique_ptr<opj_codec_t, decltype([](opj_codec_t* codec) { opj_destroy_codec(codec); })>;
 using Image = std::unique_ptr<opj_image_t, decltype([](opj_image_t* image) { opj_image_destroy(image); })>;
@@ -87,7 +88,8 @@ Stream make_stream(Source& source) {
   return stream;
 }
 
-/// @param complaint  why there is no image
+/// Decodes a codestream.
+/// @param complaint  set to why there is no image
 Image decode(Bytes codestream, std::string& complaint) {
   Source source{codestream};
   const Stream stream = make_stream(source);
@@ -111,7 +113,7 @@ CodedSamples coded_samples(const Jpeg2000Image& image) {
   return {image.precision, image.is_signed ? CodedSamples::Sign::extended : CodedSamples::Sign::none};
 }
 
-/// What the codestream says must be what the attributes say; bits that neither mean decide nothing.
+/// Refuses an image whose codestream disagrees with the attributes. Bits that neither of them uses are not compared.
 void check(const Jpeg2000Image& image, const DicomFileHeader& header) {
   const PixelFormat& pixels = header.pixels;
   if (std::cmp_not_equal(image.rows, pixels.rows) || std::cmp_not_equal(image.columns, pixels.columns)) {

@@ -12,11 +12,11 @@ constexpr std::size_t kHeaderBytes = 64;
 
 struct Unfolded {
   std::size_t done = 0;  ///< bytes of the plane that were set
-  std::size_t used = 0;  ///< bytes of the segment that they took
-  bool beyond = false;   ///< the last run holds more than the plane
+  std::size_t used = 0;  ///< bytes of the segment that were read
+  bool beyond = false;   ///< the last run holds more than the plane has room for
 };
 
-/// Unfolds an RLE segment (PS3.5 G.3.2); the last literal run counts as far as it is there.
+/// Unfolds an RLE segment (PS3.5 G.3.2). If the last literal run is cut short, the bytes that are there count.
 Unfolded unfold(std::span<const std::uint8_t> segment, std::span<std::uint8_t> plane) {
   Unfolded all;
   std::size_t& at = all.used;
@@ -41,7 +41,7 @@ Unfolded unfold(std::span<const std::uint8_t> segment, std::span<std::uint8_t> p
 
 }  // namespace
 
-// DCMTK fills up what a segment lacks, and takes twice as long; so it is done here.
+// Decoded without DCMTK, which makes up what a segment lacks and takes twice as long.
 std::vector<std::uint16_t> decode_rle(std::span<const std::uint8_t> frame, const DicomFileHeader& header) {
   const auto word = [&](std::size_t i) {
     return frame[4 * i] | std::size_t{frame[4 * i + 1]} << 8 | std::size_t{frame[4 * i + 2]} << 16 |
@@ -55,7 +55,7 @@ std::vector<std::uint16_t> decode_rle(std::span<const std::uint8_t> frame, const
   }
   std::vector<std::uint16_t> words(expected);
   std::vector<std::uint8_t> bytes(expected);
-  for (std::size_t plane = 1; plane <= planes; ++plane) {  // the high bytes first (PS3.5 G.2)
+  for (std::size_t plane = 1; plane <= planes; ++plane) {  // the plane of the high bytes is stored first (PS3.5 G.2)
     const std::size_t begin = std::min(word(plane), frame.size());
     const std::size_t end = plane < planes ? std::clamp(word(plane + 1), begin, frame.size()) : frame.size();
     const std::span<const std::uint8_t> segment = frame.subspan(begin, end - begin);
@@ -65,7 +65,8 @@ std::vector<std::uint16_t> decode_rle(std::span<const std::uint8_t> frame, const
       refuse_pixels(header, "expected " + std::to_string(expected) + " bytes of " + name + ", found " +
                                 std::to_string(found.done));
     }
-    // A run that lost its length shows at the end. Segments are padded to an even length, some to a longer one.
+    // If a run lost the byte with its length, more than padding is left over. Segments are padded to an even length,
+    // some to a longer one.
     const auto rest = segment.subspan(std::min(found.used + 1, segment.size()));
     if (found.beyond || std::any_of(rest.begin(), rest.end(), [](std::uint8_t byte) { return byte != 0; })) {
       refuse_pixels(header, "expected " + std::to_string(expected) + " bytes of " + name + ", found more");

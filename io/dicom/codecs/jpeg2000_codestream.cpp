@@ -12,7 +12,7 @@ namespace {
 
 using Bytes = std::span<const std::uint8_t>;
 
-// What one codestream may ask for: a CT slice has one tile, or some tens, and some thousands of code-blocks.
+// The most that a codestream may state. A CT slice has one tile, or some tens, and some thousands of code-blocks.
 constexpr std::uint64_t kLargestSide = 65535, kMostTiles = 4096, kMostBlocks = 1 << 19;
 
 // Markers (T.800 Table A.2).
@@ -34,7 +34,7 @@ std::string hex(unsigned marker) {
   return text;
 }
 
-/// Big endian; what lies behind the end is a refusal.
+/// A big-endian number of `size` bytes. It is refused where the bytes end before it does.
 std::uint64_t number_at(Bytes bytes, std::size_t at, std::size_t size) {
   expect(at <= bytes.size() && size <= bytes.size() - at,
          "expected more than " + std::to_string(bytes.size()) + " bytes: the data are truncated");
@@ -43,25 +43,27 @@ std::uint64_t number_at(Bytes bytes, std::size_t at, std::size_t size) {
   return value;
 }
 
-/// The image and its tiles on the reference grid (T.800 B.2, B.3); one component that is not subsampled.
-struct Grid {
+/// Where the image and its tiles lie on the reference grid (T.800 B.2, B.3), of one component that is not subsampled.
+struct ReferenceGrid {
   std::uint64_t x0, y0, x1, y1, tile_width, tile_height, tile_x0, tile_y0, tiles_across, tiles_down;
 };
 
-/// Coding style (T.800 A.6.1).
+/// What a marker of coding style says (T.800 A.6.1).
 struct Style {
   std::uint64_t layers = 0;
-  unsigned levels = 0, block_width = 0, block_height = 0;  ///< exponents of the block
-  std::array<std::uint8_t, 33> precincts{};                ///< exponents of both sides, height in the high half
+  /// Exponents of a code-block's sides, which have 2^block_width and 2^block_height samples.
+  unsigned levels = 0, block_width = 0, block_height = 0;
+  /// exponents of a precinct's sides by resolution: width in the low 4 bits, height in the high 4
+  std::array<std::uint8_t, 33> precincts{};
 };
 
 std::uint64_t ceil_shift(std::uint64_t value, unsigned shift) {
   return (value + (std::uint64_t{1} << shift) - 1) >> shift;
 }
 
-Grid read_size(Bytes segment, Jpeg2000Image& image) {
+ReferenceGrid read_size(Bytes segment, Jpeg2000Image& image) {
   const auto word = [&](std::size_t n) { return number_at(segment, 2 + 4 * n, 4); };
-  Grid grid{word(2), word(3), word(0), word(1), word(4), word(5), word(6), word(7), 0, 0};
+  ReferenceGrid grid{word(2), word(3), word(0), word(1), word(4), word(5), word(6), word(7), 0, 0};
   expect(
       grid.x0 < grid.x1 && grid.y0 < grid.y1 && grid.x1 - grid.x0 <= kLargestSide && grid.y1 - grid.y0 <= kLargestSide,
       "expected an image of 1 to 65535 rows and columns, found another");
@@ -91,10 +93,10 @@ Style read_style(Bytes segment) {
   style.levels = static_cast<unsigned>(number_at(segment, 5, 1));
   style.block_width = static_cast<unsigned>(number_at(segment, 6, 1)) + 2;
   style.block_height = static_cast<unsigned>(number_at(segment, 7, 1)) + 2;
-  number_at(segment, 9, 1);  // whether it is there
+  number_at(segment, 9, 1);  // refuses a segment that ends before its last byte
   expect(style.layers > 0 && style.levels <= 32 && style.block_width <= 10 && style.block_height <= 10,
          "expected a coding style of T.800, found another");
-  style.precincts.fill(0xff);  // 2^15: all in one
+  style.precincts.fill(0xff);  // sides of 2^15: one precinct holds everything
   for (std::size_t level = 0; has_precincts && level <= style.levels; ++level) {
     style.precincts[level] = static_cast<std::uint8_t>(number_at(segment, 10 + level, 1));
     expect(level == 0 || (style.precincts[level] % 16 > 0 && style.precincts[level] / 16 > 0),
@@ -107,14 +109,15 @@ struct Parts {
   std::uint64_t precincts = 0, blocks = 0;
 };
 
-/// Precincts of one resolution along one axis, and at most so many blocks in each of its bands (T.800 B.6, B.7).
+/// How many precincts one resolution has along one axis, and at most how many code-blocks each of its bands has there
+/// (T.800 B.6, B.7).
 Parts parts_along(std::uint64_t begin, std::uint64_t end, unsigned precinct, unsigned block, bool is_lowest) {
   if (begin >= end) return {};
   const unsigned half = is_lowest ? 0 : 1, side = std::min(block, precinct - half);
   return {ceil_shift(end, precinct) - (begin >> precinct), (((end - begin) >> half) >> side) + 2};
 }
 
-/// Adds what the resolutions of one tile consist of.
+/// Adds the precincts and code-blocks of all resolutions of one tile to `all`.
 void add_parts(const std::array<std::uint64_t, 4>& tile, const Style& style, Parts& all) {
   for (unsigned level = 0; level <= style.levels; ++level) {
     const unsigned shift = style.levels - level;
@@ -128,8 +131,9 @@ void add_parts(const std::array<std::uint64_t, 4>& tile, const Style& style, Par
   }
 }
 
-/// Every packet takes a byte at least, and a packet there is for each layer of each precinct (T.800 B.9).
-void check_parts(const Grid& grid, const Style& style, std::size_t bytes) {
+/// Refuses more packets than there are bytes: each takes a byte at least, and each layer of each precinct has one
+/// (T.800 B.9).
+void check_parts(const ReferenceGrid& grid, const Style& style, std::size_t bytes) {
   Parts all;
   for (std::uint64_t q = 0; q < grid.tiles_down; ++q) {
     for (std::uint64_t p = 0; p < grid.tiles_across; ++p) {
@@ -144,7 +148,7 @@ void check_parts(const Grid& grid, const Style& style, std::size_t bytes) {
   }
 }
 
-/// The marker at a place and the segment that follows it, without its length.
+/// The marker at a place and the segment that follows it; the segment is without its length.
 struct Marker {
   unsigned code = 0;
   Bytes segment;
@@ -160,15 +164,16 @@ Marker marker_at(Bytes bytes, std::size_t at) {
   }
   const std::uint64_t length = number_at(bytes, at + 2, 2);
   expect(marker.code >= 0xff01 && length >= 2, "expected a marker, found " + hex(marker.code));
-  number_at(bytes, at + 4 + length - 2, 0);  // whether it is there
+  number_at(bytes, at + 4 + length - 2, 0);  // refuses a segment that ends before its length says
   marker.segment = bytes.subspan(at + 4, length - 2);
   marker.next = at + 2 + length;
   return marker;
 }
 
-/// Coded data hold no 0xff before more than 0x8f, nor at their end: bits are stuffed so that no marker occurs in them.
-/// OpenJPEG 2.5.0 asserts this of the high-throughput coder (T.814) and so ends the program at damaged data. Markers of
-/// packets (T.800 A.8) are refused with them, for nothing tells them from damage; OpenJPH writes none.
+/// Refuses coded data that were not made by a coder: bits are stuffed so that no marker occurs in them, so they have no
+/// 0xff before a byte above 0x8f, nor at their end. OpenJPEG 2.5.0 asserts this of the high-throughput coder (T.814)
+/// and so ends the program at damaged data. Markers of packets (T.800 A.8) are refused with them, for nothing tells
+/// them from damage; OpenJPH writes none.
 void check_stuffing(Bytes data) {
   const auto bad = std::adjacent_find(data.begin(), data.end(),
                                       [](std::uint8_t a, std::uint8_t b) { return a == 0xff && b > 0x8f; });
@@ -177,7 +182,7 @@ void check_stuffing(Bytes data) {
              (bad == data.end() ? "ff at their end" : hex(0xff00u | *std::next(bad))));
 }
 
-/// Follows the tile-parts (T.800 A.4.2) to the end marker. @return where that ends
+/// Follows the tile-parts (T.800 A.4.2) to the end marker. @return the place behind the end marker
 std::size_t follow_tile_parts(Bytes bytes, std::size_t at, std::uint64_t tiles, bool is_high_throughput) {
   std::vector<bool> seen(tiles);
   while (true) {
@@ -196,7 +201,7 @@ std::size_t follow_tile_parts(Bytes bytes, std::size_t at, std::uint64_t tiles, 
       in_header = marker.next;
     }
     const std::size_t data = in_header + 2;
-    if (length == 0) {  // it goes on to the end
+    if (length == 0) {  // this tile-part reaches to the end of the codestream
       constexpr std::array<std::uint8_t, 2> end_marker{0xff, 0xd9};
       const auto end = std::find_end(bytes.begin() + static_cast<std::ptrdiff_t>(in_header), bytes.end(),
                                      end_marker.begin(), end_marker.end());
@@ -205,7 +210,7 @@ std::size_t follow_tile_parts(Bytes bytes, std::size_t at, std::uint64_t tiles, 
       expect(at + length >= data, "expected a tile-part of more than " + std::to_string(length) + " bytes");
       at += length;
     }
-    number_at(bytes, at, 2);  // whether an end is there
+    number_at(bytes, at, 2);  // refuses a codestream without an end marker
     if (is_high_throughput) check_stuffing(bytes.subspan(data, std::max(at, data) - data));
   }
   const auto missing = std::find(seen.begin(), seen.end(), false);
@@ -214,9 +219,10 @@ std::size_t follow_tile_parts(Bytes bytes, std::size_t at, std::uint64_t tiles, 
   return at + 2;
 }
 
-/// The codestream in a file of JPEG 2000 (T.800 Annex I), which DICOM does not allow and some send.
+/// The codestream within a file of JPEG 2000 (T.800 Annex I). DICOM does not allow such files as Pixel Data, and some
+/// devices send them.
 Bytes without_boxes(Bytes bytes) {
-  constexpr std::uint64_t kSignature = 0x6a502020, kCodestream = 0x6a703263;  // "jP  ", "jp2c"
+  constexpr std::uint64_t kSignature = 0x6a502020, kCodestream = 0x6a703263;  // the boxes "jP  " and "jp2c"
   if (bytes.size() < 12 || number_at(bytes, 4, 4) != kSignature) return bytes;
   for (std::size_t at = 0;;) {
     std::uint64_t length = number_at(bytes, at, 4);
@@ -236,7 +242,7 @@ Jpeg2000Image read(Bytes bytes) {
   expect(marker_at(bytes, 0).code == kStart, "expected a JPEG 2000 codestream, found something else");
   Marker marker = marker_at(bytes, 2);
   expect(marker.code == kSize, "expected the size of the image, found marker " + hex(marker.code));
-  const Grid grid = read_size(marker.segment, image);
+  const ReferenceGrid grid = read_size(marker.segment, image);
   bool has_style = false;
   std::size_t at = marker.next;
   while ((marker = marker_at(bytes, at)).code != kTilePart) {

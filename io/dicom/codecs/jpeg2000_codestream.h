@@ -17,14 +17,16 @@ struct Jpeg2000Image {
   int precision = 0;  ///< bits of a sample of the first component
   bool is_signed = false;
   std::span<const std::uint8_t> codestream;  ///< from its start to its end marker
-  std::size_t block_style_at = 0;            ///< in it, the byte with the style of the code-blocks (Table A.19)
+  /// Place in `codestream` of the byte with the style of the code-blocks (T.800 Table A.19).
+  std::size_t block_style_at = 0;
 };
 
 /// Reads the headers and follows the tile-parts from one to the next; coded data are not looked at.
 ///
-/// Refused is also what would take much more memory than the image: tiles, precincts and code-blocks are counted, for a
-/// few bytes can ask for one of each in every pixel. A file of JPEG 2000 (JP2) is taken for the codestream in it.
-/// @param problem  why it cannot be decoded, "expected X, found Y"; empty: it may be
+/// A codestream that would take much more memory than its image is refused, too: tiles, precincts and code-blocks are
+/// counted, for a few bytes can state one of each in every pixel. Of a file of JPEG 2000 (JP2) the codestream within it
+/// is read.
+/// @param problem  set to why the codestream cannot be decoded, "expected X, found Y"; empty: it can
 Jpeg2000Image read_jpeg_2000(std::span<const std::uint8_t> bytes, std::string& problem);
 
 }  // namespace tetwarp

@@ -11,32 +11,33 @@
 
 namespace tetwarp {
 
-/// Entropy-coded data of a JPEG stream (ITU-T T.81 F.1.2.3), bit by bit up to a marker. Behind it come ones, which are
-/// counted: no code consists of them alone.
+/// Entropy-coded data of a JPEG stream (ITU-T T.81 F.1.2.3), bit by bit up to a marker. Beyond the marker every bit is
+/// one and is counted: no code consists of ones alone, so a code that needs them shows.
 class JpegBits {
  public:
   explicit JpegBits(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
 
-  /// The next 16 bits, which stay.
+  /// The next 16 bits. They are not taken: the next call returns them again.
   std::uint32_t peek() {
     if (count_ < 16) fill();
     return static_cast<std::uint32_t>(bits_ >> 48);
   }
-  /// @param count  at most 16, after `peek`
+  /// Takes bits that `peek` returned. @param count  at most 16
   void drop(int count) {
     bits_ <<= count;
     count_ -= count;
   }
-  /// @param count  0 to 16
+  /// Takes bits and returns them as a number. @param count  0 to 16
   std::uint32_t take(int count) {
     const std::uint32_t value = peek() >> (16 - count);
     drop(count);
     return value;
   }
 
-  /// Whether bits were taken that are not there.
+  /// Whether more bits were taken than there are.
   bool is_short() const { return count_ < behind_; }
-  /// Whether all were taken but what fills up the last byte: ones, of which some encoders add a byte, or zeros.
+  /// Whether all bits were taken, except those that fill up the last byte: ones, of which some encoders add a byte, or
+  /// zeros.
   bool is_used_up() {
     fill();
     const int rest = count_ - behind_;
@@ -44,9 +45,10 @@ class JpegBits {
     const std::uint64_t value = rest == 0 ? 0 : bits_ >> (64 - rest);
     return value == (std::uint64_t{1} << rest) - 1;
   }
-  /// Goes to the marker where the data end, and behind it. @return its low byte; 0: there is none
+  /// Goes behind the marker at which the data end. @return the marker's low byte; 0: there is no marker
   std::uint8_t next_marker() {
-    while (at_ + 1 < bytes_.size() && bytes_[at_] == 0xff && bytes_[at_ + 1] == 0xff) ++at_;  // fill bytes
+    // Bytes 0xff before a marker are fill bytes.
+    while (at_ + 1 < bytes_.size() && bytes_[at_] == 0xff && bytes_[at_ + 1] == 0xff) ++at_;
     bits_ = 0;
     count_ = behind_ = 0;
     if (at_ + 1 >= bytes_.size() || bytes_[at_] != 0xff) return 0;
@@ -72,15 +74,15 @@ class JpegBits {
 
   std::span<const std::uint8_t> bytes_;
   std::size_t at_ = 0;
-  std::uint64_t bits_ = 0;      ///< the next ones, the first on top
-  int count_ = 0, behind_ = 0;  ///< how many there are, and how many of them lie behind the end
+  std::uint64_t bits_ = 0;      ///< bits that were read and not yet taken, the next one on top
+  int count_ = 0, behind_ = 0;  ///< bits in `bits_`, and how many of them lie beyond the end of the data
 };
 
 /// A table of Huffman codes (T.81 Annex C, F.2.2.3).
 class JpegCodes {
  public:
-  /// @param counts  codes of 1 to 16 bits
-  /// @param values  of the codes, as many as these are
+  /// @param counts  how many codes there are of 1, 2, ... 16 bits
+  /// @param values  the value of each code, in the order of the codes
   JpegCodes(std::span<const std::uint8_t, 16> counts, std::span<const std::uint8_t> values) {
     std::uint32_t code = 0;
     std::size_t n = 0;
@@ -97,7 +99,7 @@ class JpegCodes {
   }
   JpegCodes() = default;
 
-  /// @return the value of the next code, -1: no code begins like this
+  /// Takes a code. @return its value; -1: no code begins like this
   int next(JpegBits& bits) const {
     const std::uint32_t ahead = bits.peek();
     if (const std::uint16_t quick = quick_[ahead >> (16 - kQuick)]) {
@@ -115,10 +117,12 @@ class JpegCodes {
  private:
   static constexpr int kQuick = 9;
   static constexpr std::size_t kQuickSize = std::size_t{1} << kQuick;
-  std::array<std::uint16_t, kQuickSize> quick_{};  ///< by the next bits: length and value of a short code; 0: none
+  /// For the next kQuick bits: length and value of a code that is no longer; 0: none is.
+  std::array<std::uint16_t, kQuickSize> quick_{};
   std::array<std::uint8_t, 256> values_{};
-  std::array<std::size_t, 17> first_{};  ///< by length: the place of the first value, less its code
-  std::array<std::uint32_t, 17> end_{};  ///< by length: behind the last code, in 16 bits
+  std::array<std::size_t, 17> first_{};  ///< by length of code: place in `values_` of the first value, less its code
+  /// By length: the code behind the last one of this length, shifted up to 16 bits.
+  std::array<std::uint32_t, 17> end_{};
 };
 
 }  // namespace tetwarp

@@ -25,11 +25,12 @@ class Segments {
  public:
   explicit Segments(Bytes stream) : stream_(stream) {}
 
-  /// Goes to the next one. @return whether there is one
+  /// Goes to the next segment. @return whether there is one
   bool next() {
     marker_ = 0;
     bytes_ = {};
-    while (at_ + 1 < stream_.size() && stream_[at_] == 0xff && stream_[at_ + 1] == 0xff) ++at_;  // fill bytes
+    // Bytes 0xff before a marker are fill bytes.
+    while (at_ + 1 < stream_.size() && stream_[at_] == 0xff && stream_[at_ + 1] == 0xff) ++at_;
     if (at_ + 4 > stream_.size() || stream_[at_] != 0xff) return false;
     const auto length = static_cast<std::size_t>(word(stream_, at_ + 2));
     if (length < 2 || length - 2 > stream_.size() - at_ - 4) return false;
@@ -39,7 +40,7 @@ class Segments {
     return true;
   }
   std::uint8_t marker() const { return marker_; }
-  /// What follows the length.
+  /// The segment without its marker and its length.
   Bytes bytes() const { return bytes_; }
   Bytes behind() const { return stream_.subspan(at_); }
 
@@ -54,7 +55,8 @@ JpegFrame frame_of(std::uint8_t marker, Bytes bytes) {
   return {word(bytes, 1), word(bytes, 3), bytes[0], bytes[5], marker};
 }
 
-/// Adds tables by class (0 DC or lossless, 1 AC) times 16 and number (T.81 B.2.4.2). @return whether they are whole
+/// Adds Huffman tables to `tables`, each under 16 times its class (0: DC or lossless, 1: AC) plus its number (T.81
+/// B.2.4.2). @return whether the tables are whole
 bool read_tables(Bytes bytes, std::map<int, JpegCodes>& tables) {
   while (!bytes.empty()) {
     if (bytes.size() < 17) return false;
@@ -76,7 +78,8 @@ std::string damaged(const std::string& unit, std::size_t n) {
   return "the coded data are damaged, which shows in " + unit + " " + std::to_string(n + 1);
 }
 
-/// The end of an interval between restart markers. @param index  how many there were before
+/// Takes the restart marker at the end of an interval. @param index  restart markers before this one
+/// @return whether it is the marker that has to come here
 bool is_restart(JpegBits& bits, std::size_t index) {
   return bits.is_used_up() && bits.next_marker() == kRestart + index % 8;
 }
@@ -87,7 +90,7 @@ std::string end_problem(JpegBits& bits) {
   return {};
 }
 
-/// The next difference (T.81 H.1.2.2). @param is_code  set to false where there is none
+/// Takes the next difference (T.81 H.1.2.2). @param is_code  set to false where the bits are no code
 int difference(const JpegScan& scan, JpegBits& bits, bool& is_code) {
   const int size = scan.dc.next(bits);
   if (size == 0) return 0;
@@ -100,7 +103,8 @@ int difference(const JpegScan& scan, JpegBits& bits, bool& is_code) {
   return value < 1 << (size - 1) ? value - (1 << size) + 1 : value;
 }
 
-/// @param a, b, c  left, above, above left (T.81 Table H.1)
+/// The value that a predictor of T.81 Table H.1 gives.
+/// @param a, b, c  samples on the left, above, and above on the left
 int predicted(int predictor, int a, int b, int c) {
   switch (predictor) {
     case 1: return a;
@@ -113,7 +117,7 @@ int predicted(int predictor, int a, int b, int c) {
   }
 }
 
-/// One row, of which the first sample was predicted.
+/// Decodes one row, whose first sample was predicted in another way and is given.
 template <int predictor>
 bool decode_row(const JpegScan& scan, JpegBits& bits, int first, const std::uint16_t* above,
                 std::span<std::uint16_t> row) {
@@ -141,7 +145,7 @@ bool decode_row(int predictor, const JpegScan& scan, JpegBits& bits, int first, 
   }
 }
 
-/// Whether all samples have at most `bits` bits, or all above these are the sign.
+/// Whether all samples have at most `bits` bits, or, with a sign, all bits above these equal the sign.
 bool fit(std::span<const std::uint16_t> samples, int bits, bool is_signed) {
   const auto beyond = static_cast<std::uint16_t>(0xffff << bits),
              sign = static_cast<std::uint16_t>(beyond | beyond >> 1);
@@ -150,7 +154,7 @@ bool fit(std::span<const std::uint16_t> samples, int bits, bool is_signed) {
   });
 }
 
-/// One block of 8 x 8 coefficients. @return whether its codes make one
+/// Reads the codes of one block of 8 x 8 coefficients. @return whether they make a block
 bool pass_block(const JpegScan& scan, JpegBits& bits) {
   const int dc_size = scan.dc.next(bits);
   if (dc_size < 0 || dc_size > 15) return false;
@@ -159,7 +163,7 @@ bool pass_block(const JpegScan& scan, JpegBits& bits) {
     const int code = scan.ac.next(bits);
     if (code < 0) return false;
     const int run = code >> 4, size = code & 15;
-    if (size == 0 && run != 15) return run == 0;  // the end of the block
+    if (size == 0 && run != 15) return run == 0;  // an end-of-block code
     k += run;
     if (k > 63) return false;
     bits.take(size);
@@ -225,7 +229,7 @@ JpegScan read_jpeg_scan(Bytes stream, std::string& problem) {
 
 std::string decode_lossless(const JpegScan& scan, bool is_signed, std::span<std::uint16_t> samples) {
   const auto columns = static_cast<std::size_t>(scan.frame.columns), rows = static_cast<std::size_t>(scan.frame.rows);
-  const auto interval = static_cast<std::size_t>(scan.restart_interval) / columns;  // rows
+  const auto interval = static_cast<std::size_t>(scan.restart_interval) / columns;  // rows between restart markers
   if (interval * columns != static_cast<std::size_t>(scan.restart_interval))
     return "expected a restart interval of whole rows, found " + std::to_string(scan.restart_interval) + " samples";
   JpegBits bits(scan.coded);

@@ -28,7 +28,7 @@ using nlohmann::json;
 struct Name {
   const char* key;
   DcmTagKey tag;
-  double unit = 1;  ///< of the DICOM attribute, in that of BIDS
+  double unit = 1;  ///< the attribute's unit in DICOM, measured in that of BIDS
 };
 
 const Name kTexts[] = {
@@ -44,7 +44,7 @@ const Name kNumbers[] = {{"SliceThickness", DCM_SliceThickness},     // mm
                          {"XRayExposure", DCM_Exposure},             // mAs
                          {"ExposureTime", DCM_ExposureTime, 1e-3}};  // DICOM: ms, BIDS: s
 
-/// The value of an attribute, if all slices have that; else empty.
+/// The value of an attribute that all slices share; empty if they differ.
 std::string common_value(const DicomHeaders& source, const DcmTagKey& tag) {
   const std::string first = text_of(*source.slices.front(), tag);
   const bool common = std::all_of(source.slices.begin(), source.slices.end(),
@@ -52,7 +52,7 @@ std::string common_value(const DicomHeaders& source, const DcmTagKey& tag) {
   return common ? first : std::string();
 }
 
-/// Each of several values.
+/// The single values of an attribute that has several.
 std::vector<std::string> values_of(const std::string& text) {
   std::vector<std::string> values;
   for (std::size_t begin = 0; begin <= text.size();) {
@@ -63,7 +63,7 @@ std::vector<std::string> values_of(const std::string& text) {
   return values;
 }
 
-/// One text, of several values too: BIDS has no list for most.
+/// Several values as one text, for BIDS allows no list for most keys.
 std::string joined(const std::vector<std::string>& values) {
   std::string text;
   for (const std::string& value : values) text += (text.empty() ? "" : ", ") + value;

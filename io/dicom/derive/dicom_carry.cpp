@@ -16,11 +16,11 @@ namespace tetwarp {
 
 namespace {
 
-/// Of groups that are carried, what is not: it would be false of the derived slice, or is set anew.
+/// Attributes that are not carried although their group is: they would be false of the derived slice, or are set anew.
 const std::set<DcmTagKey>& not_carried() {
   static const std::set<DcmTagKey> tags = {
       DCM_RETIRED_LengthToEnd,
-      DCM_InstanceCreationDate,  // of another instance, and no clock is read
+      DCM_InstanceCreationDate,  // when another instance was made; no clock is read for this one
       DCM_InstanceCreationTime,
       DCM_InstanceCreatorUID,
       DCM_SOPClassUID,
@@ -28,7 +28,7 @@ const std::set<DcmTagKey>& not_carried() {
       DCM_RelatedGeneralSOPClassUID,
       DCM_OriginalSpecializedSOPClassUID,
       DCM_SeriesDescriptionCodeSequence,
-      DCM_ReferencedSeriesSequence,  // references made by the source's pixels
+      DCM_ReferencedSeriesSequence,  // what these refer to belongs to the source's pixels
       DCM_ReferencedImageSequence,
       DCM_ReferencedInstanceSequence,
       DCM_SourceImageSequence,
@@ -52,10 +52,10 @@ const std::set<DcmTagKey>& not_carried() {
   return tags;
 }
 
-/// Of group 0028, what is carried.
+/// The attributes of group 0028 that are carried.
 const std::set<DcmTagKey>& carried_of_0028() {
   static const std::set<DcmTagKey> tags = {
-      DCM_PixelSpacing,  // replaced unless it agrees with the geometry
+      DCM_PixelSpacing,  // put_image_plane replaces it unless it agrees with the geometry
       DCM_WindowCenter,
       DCM_WindowWidth,
       DCM_WindowCenterWidthExplanation,
@@ -72,7 +72,7 @@ const std::set<DcmTagKey>& carried_of_0028() {
 }
 
 bool is_carried(const DcmTagKey& tag, const std::set<DcmTagKey>& varying) {
-  if (tag.getElement() == 0) return false;  // group lengths
+  if (tag.getElement() == 0) return false;  // a group length
   switch (tag.getGroup()) {
     case 0x0008:
     case 0x0010:
@@ -110,7 +110,7 @@ bool is_of_patient_or_study(const DcmTagKey& tag) {
                                                DCM_StudyID,
                                                DCM_PositionReferenceIndicator};
   const Uint16 group = tag.getGroup();
-  if (tag.getElement() == 0) return false;  // group lengths
+  if (tag.getElement() == 0) return false;  // a group length
   return group == 0x0010 || group == 0x0012 || group == 0x0038 || of_study.contains(tag);
 }
 
@@ -129,7 +129,7 @@ void clean(DcmSequenceOfItems& sequence) {
   }
 }
 
-/// Copies an attribute, without what is private in its items.
+/// Copies an attribute to `target`; private attributes in the items of a sequence are left out.
 void copy_element(DcmItem& target, const DcmElement& element) {
   std::unique_ptr<DcmElement> copy(dynamic_cast<DcmElement*>(element.clone()));
   if (auto* sequence = dynamic_cast<DcmSequenceOfItems*>(copy.get())) clean(*sequence);

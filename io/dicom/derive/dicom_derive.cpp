@@ -24,17 +24,17 @@ namespace tetwarp {
 
 namespace {
 
-constexpr std::size_t kLongestDescription = 64;  // characters
+constexpr std::size_t kLongestDescription = 64;  // in characters, the limit of VR LO
 
 std::string uid_of(const Sha256& hash) { return uid_from_digest(hash.digest()); }
 
-/// Stands in for a UID that the source should have and has not: a hash of all its headers, so that two sources without
-/// UIDs are not taken for one.
+/// Stands in for a UID that the source should have and does not have: a hash of all its headers, so that two sources
+/// without UIDs are not taken for one.
 std::string uid_from_headers(const DicomHeaders& source, const std::string& what) {
   Sha256 hash;
   hash.add(what);
   for (const auto& slice : source.slices) {
-    DcmDataset copy(*slice);  // encoding takes group lengths away
+    DcmDataset copy(*slice);  // a copy, since encoding removes group lengths
     hash.add(encoded(copy));
   }
   return uid_of(hash);
@@ -45,7 +45,7 @@ std::string uid_or_made_up(const DicomHeaders& source, const DcmTagKey& tag) {
   return uid.empty() ? uid_from_headers(source, tag_name(tag)) : uid;
 }
 
-/// Everything that was chosen, in one line.
+/// All choices of a form in one line, to be hashed.
 std::string line_of(const DicomForm& form) {
   std::string text = uid_of(form.encoding);
   if (form.keep_frame_of_reference) text += " frame of reference kept";
@@ -61,23 +61,26 @@ std::string line_of(const DicomForm& form) {
 std::string series_uid(const DicomHeaders& source, const DicomDerivation& derivation, const DerivedSeries& series) {
   Sha256 hash;
   hash.add("tetwarp derived series").add(uid_or_made_up(source, DCM_SeriesInstanceUID));
-  for (const std::string& uid : series.sop_instance) hash.add(uid);  // part of a series is another source
+  // A part of a series is another source than the whole.
+  for (const std::string& uid : series.sop_instance) hash.add(uid);
   const bool named = std::none_of(series.sop_instance.begin(), series.sop_instance.end(),
                                   [](const std::string& uid) { return uid.empty(); });
   if (!named) hash.add(uid_from_headers(source, "instances"));
   hash.add(derivation.field_sha256).add(derivation.parameters).add(version()).add(commit());
-  if (!derivation.deformed) hash.add("resampled");  // a field of zeros has the same digest, and another frame
+  // A field of zeros has the same digest, but gives another frame of reference.
+  if (!derivation.deformed) hash.add("resampled");
   if (derivation.form != DicomForm()) hash.add(line_of(derivation.form));
   return uid_of(hash);
 }
 
-/// @param frame  of the source
+/// Frame of Reference UID of the derived series.
+/// @param frame  Frame of Reference UID of the source
 std::string frame_uid(const std::string& frame, const DicomDerivation& derivation) {
   if (!derivation.deformed || derivation.form.keep_frame_of_reference) return frame;
   return uid_of(Sha256().add("tetwarp deformed frame of reference").add(frame).add(derivation.field_sha256));
 }
 
-/// The one that was chosen, in the character set of the source.
+/// A Series Description that the user chose, in the character set of the source.
 std::string chosen_description(const std::string& text, const std::string& character_set) {
   const std::string cannot = "the series description \"" + shown(text) + "\" ";
   require(length_of(text) <= kLongestDescription,
@@ -90,8 +93,8 @@ std::string chosen_description(const std::string& text, const std::string& chara
   return *coded;
 }
 
-/// The source's instance numbers where each is there once and is fit for a file name, else 1 to n.
-/// @param slices  of the output: others than the source's are numbered anew
+/// Instance Numbers of the output: the source's, where each occurs once and is fit for a file name, else 1 to n.
+/// @param slices  how many the output has; if the source has another number of slices, they are numbered from 1
 std::vector<int> instance_numbers(const std::vector<DicomFileHeader>& headers, std::size_t slices) {
   std::vector<int> numbers;
   for (const DicomFileHeader& header : headers) numbers.push_back(header.instance_number);
@@ -104,13 +107,13 @@ std::vector<int> instance_numbers(const std::vector<DicomFileHeader>& headers, s
   return numbers;
 }
 
-/// Of each slice of the output, the source slice whose header it takes over: its own, or the nearest along the stack.
+/// The source slice whose header each output slice takes over: its own, or the nearest along the stack.
 std::vector<std::size_t> header_slices(const std::vector<DicomFileHeader>& headers, const Geometry& geometry) {
   std::vector<std::size_t> nearest(static_cast<std::size_t>(geometry.size.z));
   std::iota(nearest.begin(), nearest.end(), std::size_t{0});
   if (headers.size() == nearest.size()) return nearest;
   const AffineMap index = index_from_point(geometry);
-  std::vector<double> places;  // of the source's slices, in slices of the output
+  std::vector<double> places;  // where the source's slices lie, as slice index of the output
   for (const DicomFileHeader& header : headers) places.push_back(index(header.position.value_or(glm::dvec3(0))).z);
   for (std::size_t& slice : nearest) {
     const auto at = static_cast<double>(slice);
@@ -135,7 +138,8 @@ bool continues_file(const DerivedSeries& series, std::size_t slice) {
          series.sop_instance[slice] == series.sop_instance[slice - 1];
 }
 
-/// Source Image Sequence, an item a file; images without a usable UID cannot be named.
+/// Puts Source Image Sequence, with an item for each file; images without a usable UID cannot be named and are left
+/// out.
 void put_references(DcmItem& target, const DerivedSeries& series, const SliceRange& sampled, bool deformed) {
   std::string frames;
   for (std::int64_t k = sampled.first; k <= sampled.last; ++k) {
@@ -159,7 +163,8 @@ void put_references(DcmItem& target, const DerivedSeries& series, const SliceRan
   }
 }
 
-/// General Image (PS3.3 C.7.6.1) and Contributing Equipment: what was done to which images, and by what.
+/// Puts attributes of General Image (PS3.3 C.7.6.1) and Contributing Equipment: what was done to which images, and by
+/// what.
 void put_derivation(DcmItem& target, DcmDataset& source, const DerivedSeries& series, const DicomDerivation& derivation,
                     const SliceRange& sampled) {
   put(target, DCM_ImageType, derived_image_type(source));
@@ -167,7 +172,7 @@ void put_derivation(DcmItem& target, DcmDataset& source, const DerivedSeries& se
   put_references(target, series, sampled, derivation.deformed);
 }
 
-/// Position along the normal, and the distance of slices: only where the source tells them.
+/// Puts Slice Location (position along the normal) and the distance of slices, each only where the source has it.
 void put_slice_place(DcmItem& target, DcmDataset& source, const Geometry& geometry, std::size_t k) {
   if (source.tagExists(DCM_SpacingBetweenSlices)) {
     put_decimals(target, DCM_SpacingBetweenSlices, std::vector{geometry.spacing.z}, 1e-6);

@@ -35,7 +35,7 @@ void check(const OFCondition& condition) {
   if (condition.bad()) throw Error(std::string("cannot encode the DICOM data set: ") + condition.text());
 }
 
-/// What DcmObject::write makes of an object, in a buffer of `size` bytes or less.
+/// The bytes that DcmObject::write makes of an object. @param size  at least as many bytes
 template <class Object>
 std::vector<std::byte> written(Object& object, std::size_t size, E_TransferSyntax syntax = kSyntax) {
   std::vector<std::byte> bytes(size + size % 2);
@@ -51,10 +51,10 @@ std::vector<std::byte> written(Object& object, std::size_t size, E_TransferSynta
   return bytes;
 }
 
-/// Pixel Data as they lie in a file.
+/// Pixel Data as they are written to a file.
 struct PixelData {
   std::vector<std::byte> start;      ///< tag, value representation and length (PS3.5 7.1.2), as `kSyntax` has them
-  std::vector<std::byte> frame;      ///< the compressed voxels, if they are
+  std::vector<std::byte> frame;      ///< the compressed voxels; empty if they are not compressed
   std::span<const std::byte> value;  ///< `frame`, or the voxels where they lie
   std::vector<std::byte> end;
 };
@@ -88,7 +88,7 @@ PixelData compressed_pixel_data(DcmDataset& dataset, std::span<const std::int16_
   data.frame = compressed_frame(voxels, rows, columns, encoding);
   data.value = data.frame;
   append_pixel_data_start(data.start, DicomWords::bytes, kUndefined);
-  append_item_start(data.start, kItem, 0);  // an empty Basic Offset Table
+  append_item_start(data.start, kItem, 0);  // Basic Offset Table, empty
   append_item_start(data.start, kItem, data.value.size());
   append_item_start(data.end, kEnd, 0);
   return data;
@@ -103,14 +103,15 @@ void write_bytes(int file, std::span<const std::byte> bytes, const std::filesyst
   }
 }
 
-/// Lets the disk begin while other slices are made; it is waited for when the series gets its name. A wish.
+/// Asks the system to start writing to the disk while other slices are made; the program waits for the disk when the
+/// series gets its name. If the system does not, nothing is lost but time.
 void begin_flush([[maybe_unused]] int file) {
 #ifdef SYNC_FILE_RANGE_WRITE
   ::sync_file_range(file, 0, 0, SYNC_FILE_RANGE_WRITE);
 #endif
 }
 
-/// @param mode  O_EXCL: the file must not be there; O_TRUNC: it may be
+/// Writes a file whole. @param mode  O_EXCL: the file must not exist; O_TRUNC: an existing file is replaced
 void write_file(const std::filesystem::path& path, int mode, std::initializer_list<std::span<const std::byte>> parts) {
   const int file = ::open(path.c_str(), O_CREAT | mode | O_WRONLY | O_CLOEXEC, 0666);
   if (file < 0) throw Error("cannot create " + path.string() + ": " + std::generic_category().message(errno));
@@ -159,14 +160,15 @@ std::vector<std::byte> encoded_meta(const std::string& sop_class, const std::str
 namespace {
 
 /// Gives the data set its UID and writes it with its pixels.
-/// @param existing  what open(2) does where there is a file: O_EXCL, O_TRUNC
+/// @param existing  what open(2) does with an existing file: O_EXCL, O_TRUNC
 std::string write_with_pixels(const std::filesystem::path& path, int existing, DcmDataset& dataset, PixelData pixels,
                               DicomEncoding encoding) {
   static_assert(std::endian::native == std::endian::little);
   drop(dataset, DCM_SOPInstanceUID);
   Sha256 hash;
   hash.add("tetwarp instance").add(encoded(dataset)).add(pixels.start).add(pixels.value).add(pixels.end);
-  if (encoding == DicomEncoding::deflated) hash.add(uid_of(encoding));  // nothing that was added shows it
+  // Unlike compressed voxels, the bytes hashed so far do not show deflation.
+  if (encoding == DicomEncoding::deflated) hash.add(uid_of(encoding));
   const std::string uid = uid_from_digest(hash.digest());
   put(dataset, DCM_SOPInstanceUID, uid);
   std::vector<std::byte> start = encoded_meta(text_of(dataset, DCM_SOPClassUID), uid, uid_of(encoding));

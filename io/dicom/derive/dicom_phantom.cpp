@@ -19,14 +19,14 @@ namespace tetwarp {
 
 namespace {
 
-/// Constants: a phantom was never scanned, and no clock is read.
+/// Date and time of every phantom: constants, since it was never scanned and no clock is read.
 constexpr char kDate[] = "20000101", kTime[] = "000000";
 
 struct PhantomUids {
   std::string study, series, frame_of_reference;
 };
 
-/// Of the whole content: another size, spacing or seed is another study.
+/// UIDs of a phantom, a hash of its whole content: another size, spacing or seed gives another study.
 PhantomUids phantom_uids(const ConstVolumeView& volume, std::uint64_t seed) {
   Sha256 hash;
   hash.add("tetwarp phantom").add(std::to_string(seed)).add(version()).add(commit());

@@ -37,7 +37,7 @@ std::string decimal_strings(std::span<const double> values) {
 
 std::string decimal_string(double value) {
   require(std::isfinite(value), "a DICOM decimal string cannot hold " + std::to_string(value) + "; check the geometry");
-  if (value == 0) return "0";  // and not "-0"
+  if (value == 0) return "0";  // minus zero is written without a sign
   constexpr std::ptrdiff_t kLongest = 16;
   char text[32];
   std::to_chars_result result = std::to_chars(text, text + sizeof text, value);
@@ -87,7 +87,7 @@ DcmItem& append_item(DcmItem& item, const DcmTagKey& sequence) {
   DcmSequenceOfItems* present = nullptr;
   if (item.findAndGetSequence(sequence, present).bad()) drop(item, sequence);
   DcmItem* appended = nullptr;
-  check(item.findOrCreateSequenceItem(sequence, appended, -2), sequence);  // -2: a new last item
+  check(item.findOrCreateSequenceItem(sequence, appended, -2), sequence);  // -2: a new item at the end
   return *appended;
 }
 

@@ -50,8 +50,8 @@ struct DerivedSeriesWriter::State {
   const DicomHeaders& source;
   DicomDerivation derivation;
   DerivedSeries series;
-  /// Of each slice of the source: where derived slices take over the same header, one after the other reads it, for
-  /// DCMTK's data sets remember where they were read last.
+  /// One mutex for each slice of the source. Where several derived slices take over one header, they read it one after
+  /// the other, for DCMTK's data sets remember where they were read last.
   std::vector<std::mutex> reading = std::vector<std::mutex>(source.slices.size());
   std::set<DcmTagKey> added = {};
   std::vector<std::string> instances = std::vector<std::string>(series.instance_number.size());
@@ -72,7 +72,8 @@ void DerivedSeriesWriter::write(const ConstVolumeView& volume, std::int64_t begi
                                 std::span<const SliceRange> sampled, int threads, const Control& control) {
   State& to = *state_;
   check_volume(volume, to.geometry, sampled);
-  for (std::int64_t k = begin; k < end && !sampled.empty(); ++k)  // all of them, before a thread writes a file
+  // All ranges are checked before a thread writes a file.
+  for (std::int64_t k = begin; k < end && !sampled.empty(); ++k)
     check_range(sampled[static_cast<std::size_t>(k)], to.source.slices.size());
   for_each_index(static_cast<std::size_t>(end - begin), threads, control, [&](std::size_t n) {
     const std::size_t k = static_cast<std::size_t>(begin) + n;
@@ -122,7 +123,8 @@ DicomWriteReport write_derived_series(const std::filesystem::path& folder, const
 bool is_tetwarp_dicom(const std::filesystem::path& file) {
   prepare_dcmtk();
   DcmFileFormat format;
-  // The attributes asked for are all before (0018,a002). Only files with a preamble: ours have one.
+  // All attributes that are looked at lie before (0018,a002). Files without a preamble are refused: this program writes
+  // one.
   if (parse_dicom(format, file, DCM_ContributionDateTime, ERM_fileOnly).result.bad()) return false;
   DcmDataset& data = *format.getDataset();
   DcmItem* last = nullptr;

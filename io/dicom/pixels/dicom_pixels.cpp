@@ -51,7 +51,7 @@ std::vector<std::uint16_t> decode_bytes(std::span<const std::uint8_t> frame, con
       header, "expected a transfer syntax with compressed frames, found " + uid_with_name(header.transfer_syntax_uid));
 }
 
-/// What is not compressed, with its bytes in order.
+/// The words of uncompressed Pixel Data, in the order of bytes of this machine.
 std::vector<std::uint16_t> native_words(DcmPixelData& pixels, DcmDataset& data, const DicomFileHeader& header) {
   const std::uint64_t needed = slice_bytes(header.pixels);
   std::vector<std::uint16_t> words((needed + 1) / 2);
@@ -66,13 +66,15 @@ std::vector<std::uint16_t> native_words(DcmPixelData& pixels, DcmDataset& data, 
   return {bytes, bytes + needed};
 }
 
-/// HU of words that all fit int16 with an offset, in 16 bits, of which a vector holds most: what does not fit shows in
-/// the signs. @return whether they do, and the format allows it; if not, `hu` holds anything
+/// Turns words into HU by adding an offset, if that is all that slope and intercept do and all results fit int16. The
+/// sums are made in 16 bits, of which a vector register holds most; what does not fit shows in the signs.
+/// @return whether it was possible; if not, `hu` holds anything
 bool add_offset(std::span<const std::uint16_t> words, const HuTable& table, std::span<std::int16_t> hu) {
   const PixelFormat& format = table.format;
   if (!table.offset || format.high_bit + 1 != format.bits_stored) return false;
   const int sign = 1 << (format.bits_stored - 1);
-  const bool is_raised = !format.is_signed && format.bits_stored == 16;  // by half the range, for int16 to hold it
+  // Raised by half of the range, so that int16 can hold the words.
+  const bool is_raised = !format.is_signed && format.bits_stored == 16;
   const int more = *table.offset + (is_raised ? sign : 0);
   if (more != static_cast<std::int16_t>(more)) return false;
   const auto mask = static_cast<std::uint16_t>(2 * sign - 1),

@@ -16,8 +16,8 @@
 
 namespace tetwarp {
 
-/// Decodes Pixel Data of an object whose header passed `pixel_problem`: of one frame, or, of several that are not
-/// compressed, that of the header.
+/// Decodes Pixel Data of an object whose header passed `pixel_problem`: the only frame, or, of several frames that are
+/// not compressed, the one that the header describes.
 /// @return one word a pixel, rows top to bottom, every bit as stored
 /// @throws InputError naming the file for data that are truncated, damaged or of another size than the header says
 std::vector<std::uint16_t> decode_pixels(DcmDataset& data, const DicomFileHeader& header);
@@ -34,19 +34,20 @@ std::vector<std::uint16_t> decode_frame(std::span<const std::span<const std::byt
 /// @throws InputError naming the file for data that are truncated, damaged or of another size than the header states
 std::vector<std::uint16_t> decode_slice(const ParsedSlice& slice);
 
-/// Words of Pixel Data to HU. Built once for slices of the same format. Every word of 16 bits has an entry, whatever
-/// Bits Allocated says, so that nothing that a decoder gives lies outside.
+/// Turns words of Pixel Data into HU. A table is built once for all slices of one format. Every word of 16 bits has an
+/// entry, whatever Bits Allocated says, so that no word that a decoder gives lies outside.
 struct HuTable {
   enum Kind : std::uint8_t { exact = 0, rounded = 1, beyond = 2, saturated_padding = 4 };
   static constexpr std::size_t kWords = std::size_t{UINT16_MAX} + 1;
   PixelFormat format;
   std::array<std::int16_t, kWords> hu{};
-  std::array<std::uint8_t, kWords> kind{};  ///< `beyond`: HU does not fit int16
-  std::optional<int> offset;  ///< HU less the stored value, where slope and intercept add a whole number only
+  std::array<std::uint8_t, kWords> kind{};  ///< a Kind; `beyond`: the HU does not fit int16
+  /// HU minus stored value, where slope and intercept only add a whole number; none elsewhere
+  std::optional<int> offset;
 };
 std::shared_ptr<const HuTable> make_hu_table(const PixelFormat& format);
 
-/// Keeps the last table for whoever needs the same next.
+/// Keeps the table that was made last, for the next slice mostly has the same format.
 class HuTableCache {
  public:
   std::shared_ptr<const HuTable> table_for(const PixelFormat& format);
@@ -57,7 +58,7 @@ class HuTableCache {
 };
 
 struct HuCount {
-  std::uint64_t rounded = 0;            ///< pixels with a fractional HU
+  std::uint64_t rounded = 0;            ///< pixels whose HU was rounded to a whole number
   std::uint64_t saturated_padding = 0;  ///< pixels of padding whose HU does not fit int16
 };
 /// Converts words of Pixel Data to HU.

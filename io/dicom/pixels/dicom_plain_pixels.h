@@ -12,9 +12,9 @@
 
 namespace tetwarp {
 
-/// Pixel Data (7FE0,0010) as they lie in the file, which hold `expected` bytes and, where that is odd, one more.
-/// @param kind  of object, for the message: "a dose"
-/// @throws InputError where they are compressed, missing, or of another length; names `path`
+/// Pixel Data (7FE0,0010) as they lie in the file: `expected` bytes, and one more where that is odd.
+/// @param kind  the kind of object, for the message: "a dose"
+/// @throws InputError naming `path` where Pixel Data are compressed, missing, or of another length
 DcmElement& plain_pixels(DcmDataset& data, const std::filesystem::path& path, std::size_t expected, const char* kind);
 
 }  // namespace tetwarp

@@ -8,7 +8,7 @@
 namespace tetwarp {
 namespace {
 
-/// Whether samples are stored values that lie higher in a word, where other bits are below them.
+/// Whether a sample is the stored value alone although in a word it lies higher, above other bits.
 bool is_value_alone(const PixelFormat& pixels, const CodedSamples& coded) {
   return coded.precision <= pixels.bits_stored && pixels.high_bit + 1 > pixels.bits_stored;
 }
@@ -39,8 +39,8 @@ std::string sample_problem(const PixelFormat& pixels, const CodedSamples& coded)
     return "expected samples of the " + std::to_string(pixels.bits_stored) +
            " Bits Stored, or of all bits up to High " + "Bit " + std::to_string(pixels.high_bit) + found + " bits";
   }
-  // Where the signs differ, the bits as they are are the stored value if there are just as many: some encoders take
-  // two's complement for numbers without a sign.
+  // Coding and header may disagree about the sign. If both have the same number of bits, the bits as they are are the
+  // stored value: some encoders take two's complement for numbers without a sign.
   const bool is_signed = coded.sign == Sign::extended;
   if (coded.sign != Sign::unsaid && is_signed != pixels.is_signed && coded.precision != pixels.bits_stored) {
     return std::string("expected ") + (pixels.is_signed ? "signed" : "unsigned") + " samples, found " +

@@ -3,7 +3,7 @@
 
 #pragma once
 
-// Private to io/: the one place where samples, as decoders and files give them, become stored values.
+// Private to io/: the one place where samples become stored values, whether a decoder or a file gave them.
 #include <cstdint>
 #include <string>
 
@@ -14,12 +14,12 @@ struct PixelFormat;
 /// Where a stored value lies in a word of Pixel Data, and how it keeps its sign (PS3.5 8.1.1).
 class StoredBits {
  public:
-  /// @param bits_stored, high_bit  1 <= bits_stored <= high_bit + 1 <= 32, as `stored_bits_problem` checks
+  /// @param bits_stored, high_bit  1 <= bits_stored <= high_bit + 1 <= 32, which `stored_bits_problem` checks
   StoredBits(int bits_stored, int high_bit, bool is_signed)
       : shift_left_(31 - high_bit), shift_right_(32 - bits_stored), is_signed_(is_signed) {}
 
-  /// The Bits Stored below High Bit, with their sign. What other bits hold (overlays, garbage, a sign that a decoder
-  /// extended beyond Bits Allocated) is no part of it.
+  /// The stored value in a word: Bits Stored bits up to High Bit, with their sign. Other bits (overlays, garbage, a
+  /// sign that a decoder extended beyond Bits Allocated) are no part of it.
   std::int64_t value(std::uint32_t word) const {
     const std::uint32_t top = word << shift_left_;
     if (is_signed_) return static_cast<std::int32_t>(top) >> shift_right_;
@@ -31,10 +31,11 @@ class StoredBits {
   bool is_signed_;
 };
 
-/// Why a value cannot lie in a word like this, "Bits Stored (0028,0101), expected X, found Y"; empty: it can.
+/// Why a value cannot lie in a word where the header says, "Bits Stored (0028,0101), expected X, found Y"; empty: it
+/// can.
 std::string stored_bits_problem(int bits_allocated, int bits_stored, int high_bit);
 
-/// What a coding says of its samples.
+/// What a compressed coding says of its samples.
 struct CodedSamples {
   enum class Sign : std::uint8_t {
     none,      ///< numbers from 0
@@ -45,14 +46,14 @@ struct CodedSamples {
   Sign sign = Sign::unsaid;
 };
 
-/// Words of 16 bits, as Pixel Data that are not compressed would hold them, of samples as a decoder gives them.
+/// Turns samples, as a decoder gives them, into words of 16 bits, as uncompressed Pixel Data would hold them.
 ///
 /// Encoders take one of two things for a sample: the whole word, or the stored value, its Bits Stored alone. The
-/// precision says which. Where the two are the same bits (High Bit is Bits Stored - 1), any precision is taken that
-/// Bits Allocated has room for.
+/// precision says which. Where the two are the same bits (High Bit is Bits Stored - 1), every precision up to Bits
+/// Allocated is accepted.
 class SampleWords {
  public:
-  /// Needs a `sample_problem` that is empty.
+  /// Only for samples for which `sample_problem` returns an empty text.
   SampleWords(const PixelFormat& pixels, const CodedSamples& coded);
   std::uint16_t operator()(std::int32_t sample) const {
     return static_cast<std::uint16_t>(static_cast<std::uint32_t>(sample) << shift_ & mask_);
@@ -63,7 +64,7 @@ class SampleWords {
   std::uint32_t mask_;
 };
 
-/// Why no stored values can be had from such samples, "expected X, found Y"; empty: they can.
+/// Why such samples cannot be turned into stored values, "expected X, found Y"; empty: they can.
 std::string sample_problem(const PixelFormat& pixels, const CodedSamples& coded);
 
 }  // namespace tetwarp

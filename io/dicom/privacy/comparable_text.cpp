@@ -25,7 +25,7 @@ bool is_ascii(std::string_view text) {
   return std::all_of(text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < 0x80; });
 }
 
-/// Folded and decomposed, marks still there.
+/// The text case-folded and decomposed; marks are still characters of their own.
 icu::UnicodeString decomposed(const icu::UnicodeString& text) {
   UErrorCode status = U_ZERO_ERROR;
   const icu::Normalizer2* fold = icu::Normalizer2::getNFKCCasefoldInstance(status);
@@ -36,7 +36,7 @@ icu::UnicodeString decomposed(const icu::UnicodeString& text) {
   return result;
 }
 
-/// Letters with marks that some languages write as two letters.
+/// Writes letters with marks that some languages spell with two letters (ä, ö, ü, å, ø) as these.
 icu::UnicodeString with_letters_for_marks(const icu::UnicodeString& text) {
   constexpr UChar32 kDiaeresis = 0x308, kRing = 0x30a, kSlashedO = 0xf8;
   icu::UnicodeString result;
@@ -56,7 +56,8 @@ icu::UnicodeString with_letters_for_marks(const icu::UnicodeString& text) {
   return result;
 }
 
-/// @param gap  what stands for characters that are neither letters nor digits; 0: nothing does
+/// Letters and digits of a text.
+/// @param gap  replaces characters that are neither letters nor digits; 0: these are left out
 icu::UnicodeString letters_and_digits(const icu::UnicodeString& text, UChar32 gap) {
   icu::UnicodeString result;
   for (std::int32_t i = 0; i < text.length(); i = text.moveIndex32(i, 1)) {
@@ -73,9 +74,9 @@ icu::UnicodeString letters_and_digits(const icu::UnicodeString& text, UChar32 ga
   return result.trim();
 }
 
-/// In the letters of ASCII, where ICU knows how.
+/// The text in Latin letters of ASCII, where ICU has a transliteration.
 icu::UnicodeString latin(icu::UnicodeString text) {
-  static std::mutex turn;  // a transliterator has a state
+  static std::mutex turn;  // a transliterator has a state, so one thread uses it at a time
   const std::lock_guard lock(turn);
   static const std::unique_ptr<icu::Transliterator> made = [] {
     UErrorCode status = U_ZERO_ERROR;
@@ -106,8 +107,8 @@ std::string ascii_words(std::string_view text) {
   return words;
 }
 
-/// Bytes of the UTF-8 character that a text begins with; 0: it is none. Surrogates and overlong forms count as UTF-8:
-/// ICU replaces them.
+/// Bytes of the UTF-8 character with which a text begins; 0: it begins with none. Surrogates and overlong forms count
+/// as UTF-8, for ICU replaces them.
 std::size_t utf8_length(std::string_view text) {
   const auto lead = static_cast<unsigned char>(text.front());
   const std::size_t length = lead < 0x80   ? 1

@@ -11,11 +11,11 @@
 
 namespace tetwarp {
 
-extern const char kConfidentialityTable[];  // dicom_confidentiality_table.cpp.in
+extern const char kConfidentialityTable[];  // made from dicom_confidentiality_table.cpp.in
 
 namespace {
 
-/// Columns of options in the table.
+/// Columns of the table that belong to options of de-identification.
 enum Column : std::size_t {
   kUids = 1,
   kDevice = 2,
@@ -32,7 +32,8 @@ std::string_view cut(std::string_view& text, char at) {
   return part;
 }
 
-/// The table by tag. Rows of a repeating group are under the tag as the table writes it.
+/// The table, sorted by tag. The row of a repeating group is found under the tag as the table writes it, with X for
+/// digits.
 class Table {
  public:
   Table() {
@@ -97,7 +98,7 @@ Confidentiality action_of(const ConfidentialityRow& row, const std::set<Confiden
   for (const auto& [option, column] : kKept) {
     if (options.contains(option) && row.options[column] == "K") return Confidentiality::keep;
   }
-  return resolved(row.basic, type);  // also for C, "clean": nobody looks into the text here
+  return resolved(row.basic, type);  // code C, "clean", counts as the basic code: no program here looks into the text
 }
 
 }  // namespace tetwarp

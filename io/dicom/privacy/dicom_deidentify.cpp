@@ -26,7 +26,7 @@ using enum ConfidentialityOption;
 
 constexpr int kMostDaysBack = 3650;
 
-/// Of attributes that have several codes in the table, those that a CT image (PS3.3 A.3) must have, maybe empty.
+/// Attributes for which the table has several codes, and that a CT image (PS3.3 A.3) must have but may have empty.
 const std::set<DcmTagKey>& type_2_of_ct_image() {
   static const std::set<DcmTagKey> tags = {DCM_ContentDate, DCM_ContentTime, DCM_PatientID, DCM_PatientSexNeutered,
                                            DCM_ContrastBolusAgent};
@@ -38,7 +38,8 @@ AttributeType type_in(bool is_ct_image, const DcmTagKey& tag) {
   return type_2_of_ct_image().contains(tag) ? AttributeType::may_be_empty : AttributeType::optional;
 }
 
-/// Of groups in which people write what they like: patient, trial, order, visit, procedure, presentation.
+/// Whether an attribute is of a group in which people write what they like: patient, trial, order, visit, procedure,
+/// presentation.
 bool may_be_told_in_text(const DcmTagKey& tag) {
   switch (tag.getGroup()) {
     case 0x0010:
@@ -51,24 +52,24 @@ bool may_be_told_in_text(const DcmTagKey& tag) {
   }
 }
 
-/// Identifiers of devices that the table leaves out.
+/// Whether an element identifies a device and the table does not list it.
 bool names_device(const DcmElement& element) {
   static const std::set<DcmTagKey> tags = {DCM_DeviceID, DCM_GridID, DCM_NTPSourceAddress};
   return element.ident() == EVR_AE || tags.contains(element.getTag().getXTag());
 }
 
-/// Codes, and where they come from (PS3.3 8.8, 8.9), of VR UC and UR.
+/// Whether an attribute of VR UC or UR is a code, or tells where a code comes from (PS3.3 8.8, 8.9).
 bool is_code(const DcmTagKey& tag) {
   static const std::set<DcmTagKey> tags = {DCM_LongCodeValue, DCM_URNCodeValue, DCM_CodingSchemeURL};
   return tags.contains(tag);
 }
 
-/// Of an element that nobody can look into, or of a tag that the dictionary does not know.
+/// Whether the VR is that of an element that nobody can look into, or of a tag that the dictionary does not know.
 bool is_unknown_vr(DcmEVR vr) { return vr == EVR_UN || vr == EVR_UNKNOWN || vr == EVR_UNKNOWN2B; }
 
 bool is_registered(const std::string& uid) { return uid.starts_with("1.2.840.10008."); }
 
-/// A value of a VR that says nothing.
+/// A valid value of a VR that tells nothing.
 std::string dummy_of(DcmEVR vr) {
   switch (vr) {
     case EVR_AS: return "000Y";
@@ -82,7 +83,7 @@ std::string dummy_of(DcmEVR vr) {
   }
 }
 
-/// A date at the beginning of DA or DT (PS3.5 6.2), in the calendar.
+/// The date with which a value of VR DA or DT begins (PS3.5 6.2); none if it is no date of the calendar.
 std::optional<std::chrono::sys_days> date_at_start(const std::string& text) {
   const auto digits = [&](std::size_t from, std::size_t count) -> std::optional<int> {
     int value = 0;
@@ -122,14 +123,14 @@ std::string joined(const std::vector<std::string>& values) {
   return text;
 }
 
-/// A number from 0 to `count` - 1, of a digest.
+/// A number from 0 to `count` - 1 that is chosen by a digest.
 int number_below(int count, const Sha256::Digest& digest) {
   std::uint64_t number = 0;
   for (std::size_t n = 0; n < 8; ++n) number = number << 8 | std::to_integer<std::uint64_t>(digest[n]);
   return static_cast<int>(number % static_cast<std::uint64_t>(count));
 }
 
-/// Code and meaning of an option (PS3.16 CID 7050).
+/// Code value and code meaning of an option (PS3.16 CID 7050).
 std::pair<const char*, const char*> code_of(ConfidentialityOption option) {
   constexpr std::pair<const char*, const char*> kCodes[] = {
       {"113106", "Retain Longitudinal Temporal Information Full Dates Option"},
@@ -141,7 +142,8 @@ std::pair<const char*, const char*> code_of(ConfidentialityOption option) {
   return kCodes[static_cast<int>(option)];
 }
 
-/// Methods that were applied before stay named, but for what they retained: it need not be there any more.
+/// Removes "retained" options of an earlier de-identification from its methods, which stay named otherwise: what was
+/// retained then need not be there any more.
 void drop_retained(DcmItem& dataset) {
   DcmSequenceOfItems* codes = nullptr;
   dataset.findAndGetSequence(DCM_DeidentificationMethodCodeSequence, codes);
@@ -160,7 +162,7 @@ void append_method(DcmItem& dataset, const std::pair<const char*, const char*>& 
   append_code(dataset, DCM_DeidentificationMethodCodeSequence, code.first, code.second);
 }
 
-/// Patient Identity Removed and its method (PS3.3 C.7.1.1), what became of dates (C.12.1).
+/// Puts Patient Identity Removed and its method (PS3.3 C.7.1.1), and what became of dates (C.12.1).
 void put_marks(DcmItem& dataset, const Deidentification& how) {
   put(dataset, DCM_PatientIdentityRemoved, "YES");
   drop_retained(dataset);
@@ -234,7 +236,7 @@ Confidentiality Deidentifier::action_on(DcmElement& element, AttributeType type)
   const DcmTagKey tag = element.getTag().getXTag();
   const DcmEVR vr = element.ident();
   const bool is_unknown = is_unknown_vr(vr);
-  if (tag.getElement() == 0) return remove;  // group lengths
+  if (tag.getElement() == 0) return remove;  // a group length
   if (const ConfidentialityRow* row = confidentiality_row(tag)) {
     const Confidentiality action = action_of(*row, how_.options, type);
     return action == keep && is_unknown ? remove : action;
@@ -314,9 +316,9 @@ void Deidentifier::replace_uids(DcmElement& element) const {
   element.putString(joined(uids).c_str());
 }
 
-/// @return whether all values were dates or times that could be shifted
+/// Shifts dates by whole days. @return whether all values were dates or times that could be shifted
 bool Deidentifier::shift(DcmElement& element) const {
-  if (element.ident() == EVR_TM) return true;  // whole days
+  if (element.ident() == EVR_TM) return true;  // times of day stay, for dates are shifted by whole days
   if (element.ident() != EVR_DA && element.ident() != EVR_DT) return false;
   std::vector<std::string> values = values_of(element);
   for (std::string& value : values) {

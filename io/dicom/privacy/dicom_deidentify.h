@@ -3,7 +3,7 @@
 
 #pragma once
 
-// Private to io/: takes from a data set what tells whom it shows.
+// Private to io/: removes from a data set what tells whom it shows.
 #include <dcmtk/config/osconfig.h>
 #include <dcmtk/dcmdata/dcdatset.h>
 
@@ -15,30 +15,32 @@
 
 namespace tetwarp {
 
-/// Applies table E.1-1 of PS3.15 to whole data sets. Stricter than the table, since no list of names is complete:
-/// - What the dictionary of DCMTK does not know goes, and what lies in an element of VR UN.
+/// Applies table E.1-1 of PS3.15 to whole data sets. It is stricter than the table, since no list of names is complete:
+/// - What the dictionary of DCMTK does not know is removed, and so is what lies in an element of VR UN.
 /// - Other free text (VR LT, ST, UT, UC, UR), persons' names (PN), application entities (AE) and bytes (OB, OW, ...)
-///   go, and all texts of the groups 0010, 0012, 0032, 0038, 0040 and 0070: of patient, trial, order, presentation.
-/// - Other dates and times (DA, DT, TM) are treated as those of the table, other UIDs are replaced unless the standard
-///   gave them.
+///   are removed, and all texts of the groups 0010, 0012, 0032, 0038, 0040 and 0070: of patient, trial, order,
+///   presentation.
+/// - Dates and times (DA, DT, TM) that the table does not list are treated as those that it lists; UIDs that it does
+///   not list are replaced unless the standard defines them.
 /// What may not be missing in an item, or may not be empty, becomes empty or a dummy instead.
 class Deidentifier {
  public:
-  /// @param patient_id, study_uid  of the source: the days that dates go back by belong to the patient; to the study
-  ///     where no patient is named
+  /// @param patient_id, study_uid  of the source. The number of days by which dates go back is chosen by the patient
+  /// ID, and by the study UID where no patient is named
   Deidentifier(Deidentification how, const std::string& patient_id, const std::string& study_uid);
 
-  /// What stands for a UID: itself if it is empty, registered in PS3.6, or UIDs are retained.
+  /// The UID that replaces one of the source; the same UID if it is empty, registered in PS3.6, or UIDs are retained.
   std::string uid(const std::string& uid) const;
-  /// What stands for a patient ID.
+  /// The patient ID that replaces one of the source.
   std::string patient(const std::string& id) const;
 
-  /// De-identifies what is there and says so in Patient Identity Removed and what belongs to it (PS3.3 C.7.1.1 and
-  /// C.12.1).
-  /// @param is_ct_image  of a CT image the types of attributes are known; otherwise what is valid for every type stays
+  /// De-identifies a data set and says so in Patient Identity Removed and the attributes that belong to it (PS3.3
+  /// C.7.1.1 and C.12.1).
+  /// @param is_ct_image  the types of attributes of a CT image are known; for another object a value is chosen that is
+  /// valid for every type
   void apply(DcmItem& dataset, bool is_ct_image) const;
 
-  /// De-identifies an item of a data set of which nothing is known: without marks.
+  /// De-identifies an item of which no type of attribute is known. It is not marked as de-identified.
   void apply(DcmItem& item) const { apply_to(item, false); }
 
  private:
@@ -54,7 +56,7 @@ class Deidentifier {
   int days_back_;
 };
 
-/// De-identifies a data set by its own Patient ID and Study Instance UID, if `how` is set.
+/// De-identifies a data set by its own Patient ID and Study Instance UID. Without `how` nothing is done.
 void deidentify(DcmItem& dataset, const std::optional<Deidentification>& how, bool is_ct_image);
 
 }  // namespace tetwarp

@@ -37,8 +37,8 @@ std::vector<std::string> split(std::string_view text, std::string_view separator
   return parts;
 }
 
-/// What the bytes may say: in the character sets of the data set, and, where that differs, as UTF-8 or Latin-1, for
-/// headers name wrong sets, or none.
+/// The texts that bytes may mean: in the character sets of the data set, and, where that differs, as UTF-8 or Latin-1,
+/// for some headers name wrong sets, or none.
 std::vector<std::string> readings_of(std::string_view bytes, const std::string& character_set) {
   std::vector<std::string> readings = {utf8_or_latin1(bytes)};
   if (const auto decoded = decoded_text(bytes, character_set); decoded && *decoded != readings.front())
@@ -46,7 +46,8 @@ std::vector<std::string> readings_of(std::string_view bytes, const std::string& 
   return readings;
 }
 
-/// Whether the text has the word with no further digit at an end of it that is a digit.
+/// Whether the text holds the word as a whole number: where the word begins or ends with a digit, no further digit
+/// stands beside it there.
 bool holds_number(std::string_view text, std::string_view word) {
   for (auto at = text.find(word); at != std::string_view::npos; at = text.find(word, at + 1)) {
     const std::size_t end = at + word.size();
@@ -57,8 +58,9 @@ bool holds_number(std::string_view text, std::string_view word) {
   return false;
 }
 
-/// @param words   a spelling
-/// @param joined  the same without spaces
+/// Whether a text holds a word of PatientNames::Secrets, by the rules of PatientNames.
+/// @param words   a spelling of the text
+/// @param joined  the same spelling without spaces
 bool holds(std::string_view words, std::string_view joined, const std::string& secret) {
   if (!is_ascii(secret) || secret.size() > 3 || (secret.size() == 3 && !has_digit(secret)))
     return joined.find(secret) != std::string_view::npos;
@@ -71,16 +73,16 @@ bool holds(std::string_view words, std::string_view joined, const std::string& s
 
 }  // namespace
 
-/// The words that no text may hold, as `spellings_of` has them, without spaces.
+/// Words that no text may hold: spellings, as `spellings_of` makes them, without spaces.
 struct PatientNames::Secrets {
-  std::string source;  ///< the values of the attributes that they are from
+  std::string source;  ///< values of the attributes from which they were made
   std::set<std::string> words;
 
   void add_name(std::string_view name, const std::string& character_set) {
     for (const std::string& reading : readings_of(name, character_set)) {
       for (const std::string& component : split(reading, "^=\\")) {
         for (const std::string& spelling : spellings_of(component)) {
-          add_word(without_spaces(spelling));  // O'Brien, de la Cruz
+          add_word(without_spaces(spelling));  // also names of several words: O'Brien, de la Cruz
           for (const std::string& word : split(spelling, " ")) add_word(word);
         }
       }
@@ -99,8 +101,8 @@ struct PatientNames::Secrets {
       }
     }
   }
-  /// Year, month and day in the orders that people write them in, with and without century and zeros, the month as a
-  /// number or an English name.
+  /// Adds a date: year, month and day in the orders in which people write them, with and without century and zeros, the
+  /// month as a number or an English name.
   void add_date(std::string date) {
     std::erase_if(date, [](char c) { return !is_digit(c); });
     if (date.size() != 8) return;
@@ -116,7 +118,7 @@ struct PatientNames::Secrets {
     for (const std::string& year : {date.substr(0, 4), date.substr(2, 2)}) {
       for (const std::string& m : months) {
         for (const std::string& d : {day, shorter(day)}) {
-          if (year.size() + m.size() + d.size() < 6) continue;  // 1150 may be anything
+          if (year.size() + m.size() + d.size() < 6) continue;  // "1150" may be anything
           words.insert({year + m + d, d + m + year, m + d + year});
         }
       }
@@ -144,7 +146,7 @@ PatientNames::PatientNames(DcmItem& data) : character_set_(text_of(data, DCM_Spe
     listed.push_back(text_of(*other, DCM_PatientID));
     source += '\0' + listed.back();
   }
-  static thread_local std::shared_ptr<const Secrets> last;  // the slices of a series have the same
+  static thread_local std::shared_ptr<const Secrets> last;  // kept, since all slices of a series name the same patient
   if (!last || last->source != source) {
     const auto made = std::make_shared<Secrets>();
     made->source = std::move(source);

@@ -22,7 +22,7 @@ namespace {
 
 using Headers = std::vector<DicomFileHeader>;
 
-/// Moves out of `files` what is by its kind no slice, one line each into `series.set_aside`.
+/// Removes from `files` what is no slice by its kind, and adds a line for each to `series.set_aside`.
 void set_other_kinds_aside(Headers& files, DicomSeries& series) {
   std::erase_if(files, [&](const DicomFileHeader& header) {
     const std::string kind = other_kind(header);
@@ -31,7 +31,7 @@ void set_other_kinds_aside(Headers& files, DicomSeries& series) {
   });
 }
 
-/// The first problem that `judge` finds, and in how many more files it finds one.
+/// The first problem that `judge` finds, and in how many further files it finds one.
 std::optional<std::string> first_problem(const Headers& files, std::string (*judge)(const DicomFileHeader&)) {
   std::optional<std::string> first;
   std::size_t more = 0;
@@ -50,13 +50,13 @@ std::optional<std::string> first_problem(const Headers& files, std::string (*jud
   return first;
 }
 
-/// Slices of one orientation.
+/// An orientation, and the slices that have it.
 struct Orientation {
   DicomFileHeader example;
   std::ptrdiff_t slices = 0;
 };
 
-/// In the order in which they come; no more than 64 of them: more are no series.
+/// The orientations of the files, in the order in which they first occur; at most 64, for more are no series.
 std::vector<Orientation> orientations_of(const Headers& files) {
   constexpr std::size_t kMost = 64;
   std::vector<Orientation> orientations;
@@ -70,8 +70,8 @@ std::vector<Orientation> orientations_of(const Headers& files) {
   return orientations;
 }
 
-/// Keeps the orientation that at least three quarters of the slices share, if there is one, and sets the others aside
-/// (a scout in the series).
+/// Keeps the orientation that at least three quarters of the slices share, if there is one, and sets the other slices
+/// aside: they are scouts that were stored in the series.
 void set_scouts_aside(Headers& files, DicomSeries& series) {
   const std::vector<Orientation> orientations = orientations_of(files);
   const auto usual = std::max_element(orientations.begin(), orientations.end(),
@@ -99,7 +99,7 @@ std::optional<std::string> mixed_orientations(const Headers& files) {
          " files); put the slices of one orientation in a folder of their own";
 }
 
-/// What must be the same in all slices. @return a refusal that names the first two files that differ
+/// Compares what must be the same in all slices. @return a refusal that names the first two files that differ
 std::optional<std::string> inconsistency(const Headers& files) {
   const DicomFileHeader& first = files.front();
   const auto differ = [&](const std::string& what, const DicomFileHeader& other, const std::string& expected,
@@ -122,7 +122,8 @@ std::optional<std::string> inconsistency(const Headers& files) {
   return std::nullopt;
 }
 
-/// Rescale Type (0028,1054) in the standard's word or spelt out; CT without it is HU (PS3.3 C.8.2.1.1.7).
+/// Whether a Rescale Type (0028,1054) means HU, in the standard's word or spelt out. CT without the attribute is in HU
+/// (PS3.3 C.8.2.1.1.7).
 bool is_hounsfield(const std::string& rescale_type) {
   return rescale_type.empty() || rescale_type == "HU" || rescale_type.starts_with("Hou") ||
          rescale_type.starts_with("HOU");
@@ -159,7 +160,7 @@ void warn_of_values(const Headers& files, DicomSeries& series) {
   series.warnings.insert(series.warnings.end(), warnings.begin(), warnings.end());
 }
 
-/// What slices of one volume may differ in, and should not.
+/// Warns of what slices of one volume may differ in but should not.
 void warn_of_mixture(const Headers& files, DicomSeries& series) {
   for (const Trait trait : {Trait::kernel, Trait::kvp}) {
     const auto other = std::find_if(files.begin(), files.end(), [&](const DicomFileHeader& header) {
@@ -173,19 +174,20 @@ void warn_of_mixture(const Headers& files, DicomSeries& series) {
   }
 }
 
-/// A refusal about kinds: nothing is left that could be a slice.
+/// The refusal of a series in which no file is left that could be a slice by its kind.
 std::string nothing_left(const DicomSeries& series) {
   const std::size_t count = series.set_aside.size();
   return "no CT slice in the series, " + to_string(series.set_aside.front()) +
          (count > 1 ? " (" + std::to_string(count) + " files)" : std::string()) + "; choose a CT series";
 }
 
-/// All steps in order; each may end in a refusal.
+/// Takes all steps of `assemble_series` for one volume, in order; each may end in a refusal.
 std::optional<std::string> judge(Headers& files, DicomSeries& series) {
   if (auto problem = mixed_orientations(files)) return problem;
   const auto pixels = first_problem(files, pixel_problem);
   if (auto problem = inconsistency(files)) return pixels ? pixels : problem;
-  const auto stack = stack_slices(files, series);  // the geometry is of use even where pixels are not
+  // Set even where pixels are refused, for the geometry is of use without them.
+  const auto stack = stack_slices(files, series);
   if (!pixels) warn_of_values(files, series);
   if (!pixels && !stack) warn_of_mixture(files, series);
   return pixels ? pixels : stack;
@@ -217,7 +219,7 @@ DicomSeries judged(SplitVolume& volume, DicomSeries series) {
   return series;
 }
 
-/// Of the Modality of files that are kept apart, or set aside: one of PS3.3 C.7.3.1.1.1; empty for any other text.
+/// The Modality of files that are kept apart or set aside, if it is one of PS3.3 C.7.3.1.1.1; empty for any other text.
 std::string shown_modality(const std::string& modality) {
   static const std::set<std::string> kModalities = {
       "ANN",    "AR",      "ASMT",       "AU",         "BDUS",  "BI",       "BMD",        "CD",       "CF",  "CP",

@@ -11,9 +11,9 @@
 
 namespace tetwarp {
 
-/// Makes a series of the files that share its UID, one volume or several: what is no CT slice is set aside, copies
-/// count once, volumes are told apart, and each is sorted along its normal and judged. Never throws for what the files
-/// hold: see DicomSeries::refusal. @throws Cancelled
+/// Makes a series, of one volume or several, from the files that share a Series Instance UID. What is no CT slice is
+/// set aside, copies count once, volumes are told apart, and the slices of each are sorted along its normal and judged.
+/// Whatever the files hold, nothing but Cancelled is thrown: see DicomSeries::refusal. @throws Cancelled
 std::vector<DicomSeries> assemble_series(std::vector<DicomFileHeader> files, const std::stop_token& stop);
 
 }  // namespace tetwarp

@@ -34,11 +34,12 @@ bool starts_with(std::span<const std::byte> bytes, std::size_t at, const std::ar
 
 constexpr std::array<unsigned, 4> kPixelData{0xe0, 0x7f, 0x10, 0x00}, kWords{'O', 'W', 0, 0}, kOctets{'O', 'B', 0, 0},
     kItem{0xfe, 0xff, 0x00, 0xe0}, kItemsEnd{0xfe, 0xff, 0xdd, 0xe0};
-/// Tag, value representation and length of Pixel Data, but of Implicit VR, where they are 8.
+/// Bytes of tag, value representation and length before the value of Pixel Data. With Implicit VR they are 8, which
+/// native_length knows.
 constexpr std::size_t kStart = 12;
 
-/// The fragments of Pixel Data that begin at `at` and end the file, without the offset table; none if it is not like
-/// this.
+/// The fragments of Pixel Data that begin at `at`, without the offset table; none if these are no fragments or do not
+/// end the file.
 std::vector<std::span<const std::byte>> fragments_at(std::span<const std::byte> bytes, std::size_t at) {
   const auto read = [&](std::uint64_t begin, std::span<std::byte> to) {
     const std::size_t count = std::min<std::size_t>(to.size(), bytes.size() - begin);
@@ -53,8 +54,10 @@ std::vector<std::span<const std::byte>> fragments_at(std::span<const std::byte> 
   return fragments;
 }
 
-/// The attributes before Pixel Data, if these end the file: words of 16 bits each, or fragments.
-/// @param limit  what the data set may inflate to, as these attributes say
+/// Parses the attributes before Pixel Data and finds Pixel Data in `bytes`, if these end the file: uncompressed words
+/// of 16 bits each, or fragments.
+/// @param limit  set to the most bytes that the data set may inflate to, by what the attributes say
+/// @return none where Pixel Data are anything else, so that DCMTK has to parse the whole file
 std::optional<ParsedSlice> parse_up_to_pixels(std::span<const std::byte> bytes, const std::filesystem::path& file,
                                               std::size_t& limit) {
   static_assert(std::endian::native == std::endian::little);

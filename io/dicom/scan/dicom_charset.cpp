@@ -22,13 +22,14 @@ bool is_japanese(const std::string& character_set) {
   return character_set.find("IR 87") != std::string::npos || character_set.find("IR 159") != std::string::npos;
 }
 
-/// Text of ISO 2022 IR 6, 13, 87 and 159 (PS3.5 6.1.2.5.3, table C.12-4 of PS3.3) in EUC-JP; none for other escape
-/// sequences. The C library does not know these sets one by one, as DCMTK asks for them, but it knows EUC-JP.
+/// Converts text of the character sets ISO 2022 IR 6, 13, 87 and 159 (PS3.5 6.1.2.5.3, table C.12-4 of PS3.3) to
+/// EUC-JP; none if it has other escape sequences. DCMTK leaves these sets to the C library, which does not know them
+/// one by one but knows EUC-JP.
 std::optional<std::string> euc_jp(std::string_view bytes) {
   struct Set {
     const char* escape;
-    std::size_t width;   ///< bytes a character
-    const char* before;  ///< in EUC-JP, whose bytes have the high bit
+    std::size_t width;   ///< bytes of a character
+    const char* before;  ///< what EUC-JP puts before each character, whose bytes have the high bit there
   };
   constexpr std::array<Set, 5> kSets = {
       {{"(B", 1, ""}, {"(J", 1, ""}, {")I", 1, ""}, {"$B", 2, ""}, {"$(D", 2, "\x8f"}}};
@@ -43,7 +44,7 @@ std::optional<std::string> euc_jp(std::string_view bytes) {
       bytes.remove_prefix(std::string_view(next->escape).size());
       set = *next;
     } else if (set.width == 1 || bytes.size() < set.width) {
-      if (bytes.front() < 0) text += '\x8e';  // a half-width katakana
+      if (bytes.front() < 0) text += '\x8e';  // EUC-JP marks a half-width katakana by this byte
       text += bytes.front();
       bytes.remove_prefix(1);
     } else {

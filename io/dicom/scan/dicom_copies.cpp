@@ -22,7 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 using Headers = std::vector<DicomFileHeader>;
 
-/// Whether two files end with the same bytes, so many of them.
+/// Whether the last `count` bytes of two files are the same.
 bool same_end(const DicomFileHeader& a, const DicomFileHeader& b, std::uint64_t count) {
   constexpr std::size_t kPiece = 1 << 20;
   OpenedFile first(a.file), second(b.file);
@@ -66,7 +66,7 @@ bool same_encoded_pixels(const DicomFileHeader& a, const DicomFileHeader& b) {
   return comparable && a.pixel_bytes && a.pixel_bytes == b.pixel_bytes && same_end(a, b, *a.pixel_bytes);
 }
 
-/// What speaks against two files of one SOP Instance UID holding the same image; empty: they do.
+/// Why two files of one SOP Instance UID do not hold the same image; empty: they do.
 std::string difference(const DicomFileHeader& a, const DicomFileHeader& b) {
   if (same_file(a, b)) return {};
   if (a.frame || b.frame) return "hold several frames and are not the same byte for byte";
@@ -80,7 +80,7 @@ std::string difference(const DicomFileHeader& a, const DicomFileHeader& b) {
   return *first == *second ? std::string() : "differ in their pixels";
 }
 
-/// A file that may be a copy of one that comes before it: indices of their first headers.
+/// A file that may be a copy of an earlier one. Each file is given by the index of its first header.
 struct Pair {
   std::size_t original, copy;
 };
@@ -90,8 +90,8 @@ bool has_shorter_name(const DicomFileHeader& a, const DicomFileHeader& b) {
   return left.size() != right.size() ? left.size() < right.size() : left < right;
 }
 
-/// Pairs of each group of files that have the same key with that of the shortest name. A file of several frames is one
-/// file; what has no key is in no pair.
+/// Pairs each file with the one of the shortest name among the files that have the same key. A file of several frames
+/// counts as one file; a file without a key is in no pair.
 template <class Key>
 std::vector<Pair> pairs_by(const Headers& files, const std::vector<std::optional<Key>>& keys) {
   std::vector<std::size_t> order;
@@ -120,7 +120,8 @@ std::vector<Pair> pairs_of_one_uid(const Headers& files) {
   return pairs_by(files, uids);
 }
 
-/// Files without a UID that are the same byte for byte. Only those of one place and size are read.
+/// Pairs of files without a UID that are the same byte for byte. Only files of one size whose slices lie at one
+/// position are read.
 std::vector<Pair> pairs_of_same_bytes(const Headers& files, const std::stop_token& stop) {
   std::vector<std::optional<std::tuple<double, double, double, std::uint64_t>>> places(files.size());
   for (std::size_t n = 0; n < files.size(); ++n) {

@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The parts of a Referenced File ID (0004,1500) as a path; none for what is no plain name: "..", "/etc", control
+/// A Referenced File ID (0004,1500) as a relative path; none if a part is no plain name: "..", "/etc", control
 /// characters.
 std::optional<fs::path> relative_path(const std::string& file_id) {
   fs::path path;
@@ -37,7 +37,8 @@ std::optional<fs::path> relative_path(const std::string& file_id) {
   return path;
 }
 
-/// Without the first parts that are also the last folders of `folder`: "S1/S20/I10" is "I10" in ".../S1/S20".
+/// Removes from `path` the first parts that are also the last folders of `folder`: "S1/S20/I10" becomes "I10" in
+/// ".../S1/S20".
 fs::path below(const fs::path& folder, const fs::path& path) {
   const std::vector<fs::path> above(folder.begin(), folder.end()), parts(path.begin(), path.end());
   auto count = std::min(std::ssize(above), std::ssize(parts) - 1);
@@ -47,7 +48,7 @@ fs::path below(const fs::path& folder, const fs::path& path) {
   return rest;
 }
 
-/// Where a file of this name is, below a folder.
+/// The file that a relative path names below a folder; none if there is none.
 std::optional<fs::path> find(const fs::path& folder, const fs::path& real_folder, const fs::path& name) {
   const fs::path shorter = below(real_folder, name);
   for (const fs::path& one : {name, shorter, fs::path(lower(name)), fs::path(lower(shorter))}) {

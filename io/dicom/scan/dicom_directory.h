@@ -3,7 +3,7 @@
 
 #pragma once
 
-// Private to io/: DICOMDIR files (PS3.10 8, PS3.3 F).
+// Private to io/: reads DICOMDIR files (PS3.10 8, PS3.3 F).
 #include <filesystem>
 #include <vector>
 
@@ -12,14 +12,14 @@
 namespace tetwarp {
 
 struct DirectoryFiles {
-  std::vector<std::filesystem::path> files;    ///< that the records name and that are there, each once, sorted
-  std::vector<std::filesystem::path> missing;  ///< where others should be
+  std::vector<std::filesystem::path> files;    ///< files that the records name and that exist, each once, sorted
+  std::vector<std::filesystem::path> missing;  ///< files that the records name and that do not exist
   std::vector<LeftOutFile> refused;            ///< names that lead out of the folder of the DICOMDIR
 };
 
-/// The files that the records of a DICOMDIR in use name. A Referenced File ID counts from the folder of the DICOMDIR;
-/// if its first parts are the last folders of the DICOMDIR's own path, then from below them (media that were copied in
-/// part). A file may bear its name in lower case, as some systems show media.
+/// Finds the files that the records of a DICOMDIR name, except records that are not in use. A Referenced File ID is
+/// relative to the folder of the DICOMDIR. If its first parts are also the last folders of that path, they count once:
+/// media that were copied in part have such IDs. A file may bear its name in lower case, as some systems show media.
 /// @throws InputError for a file that cannot be parsed
 DirectoryFiles read_directory(const std::filesystem::path& dicomdir);
 

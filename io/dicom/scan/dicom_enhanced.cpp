@@ -19,12 +19,15 @@
 namespace tetwarp {
 namespace {
 
-/// A moving organ in full resolution has some thousand frames; each takes some kilobytes when a series is listed.
+/// The most frames that a file may have. A moving organ in full resolution has some thousand; each takes some kilobytes
+/// when a series is listed.
 constexpr long kMostFrames = 100'000;
-/// Each slice has a copy of what the file says of all. Some hundred attributes are common.
+/// The most attributes of a file, and of all its slices together, for each slice has a copy of what the file says of
+/// all. Some hundred attributes are common.
 constexpr std::size_t kMostAttributes = 5'000, kMostCopies = 30'000'000;
 
-/// Of the file as a whole, or of other objects, or told of each slice by its own groups: no part of a slice.
+/// Whether an attribute is no part of a slice: it is about the file as a whole or about other objects, or the
+/// functional groups say it of each slice.
 bool is_of_file(const DcmTagKey& tag) {
   static const std::set<DcmTagKey> tags = {
       DCM_NumberOfFrames,
@@ -54,11 +57,11 @@ bool is_of_file(const DcmTagKey& tag) {
       DCM_StudiesContainingOtherReferencedInstancesSequence,
       DCM_ConversionSourceAttributesSequence,
   };
-  constexpr Uint16 kLastGroup = 0x0040;  // of those that classic CT has; private ones are of nobody knows what
+  constexpr Uint16 kLastGroup = 0x0040;  // the last group of classic CT; what private groups mean is not known
   return tag.getGroup() > kLastGroup || tag.getGroup() % 2 != 0 || tags.contains(tag);
 }
 
-/// What describes the words of Pixel Data, which all frames share (PS3.3 C.7.6.3).
+/// Whether an attribute describes the words of Pixel Data, which all frames share (PS3.3 C.7.6.3).
 bool is_of_pixels(const DcmTagKey& tag) {
   constexpr Uint16 kEnd = 0x0120;  // Pixel Padding Value
   return tag.getGroup() == 0x0028 && tag.getElement() < kEnd && tag != DCM_PixelSpacing;
@@ -69,7 +72,7 @@ void copy(const DcmObject& element, DcmItem& to) {
   if (to.insert(clone.get(), OFTrue).good()) clone.release();
 }
 
-/// The value under another name, a whole number where the standard asks for one.
+/// Copies the value of an attribute to another one, as a whole number where the standard requires one.
 void rename(DcmItem& from, const DcmTagKey& old_tag, DcmItem& to, const DcmTagKey& tag) {
   std::string value = text_of(from, old_tag);
   if (value.empty()) return;
@@ -86,7 +89,7 @@ long long_of(DcmItem& item, const DcmTagKey& tag, long otherwise) {
   return value && std::abs(*value) <= 2e9 ? static_cast<long>(*value) : otherwise;
 }
 
-/// Attributes of an item and of all within.
+/// How many attributes an item has, those of items within it included.
 std::size_t count_attributes(DcmItem& item) {
   std::size_t count = 0;
   DcmStack stack;
@@ -99,7 +102,8 @@ DcmItem* first_item(DcmItem& item, const DcmTagKey& sequence) {
   return item.findAndGetSequenceItem(sequence, found, 0).good() ? found : nullptr;
 }
 
-/// All items of a sequence: asking for one after the other would search each from the first on.
+/// All items of a sequence. DCMTK searches from the first item on whenever one is fetched by its number, so they are
+/// fetched once.
 std::vector<DcmItem*> items_of(DcmItem& item, const DcmTagKey& tag) {
   DcmSequenceOfItems* sequence = nullptr;
   std::vector<DcmItem*> items;
@@ -179,7 +183,7 @@ void EnhancedFrames::take_groups(DcmItem& groups, const DcmTagKey& unassigned, D
     for (std::size_t n = 0; macro && n < group.renamed.size(); ++n)
       rename(*macro, group.renamed[n].from, slice, group.renamed[n].to);
     if (macro && group.sequence == DCM_FrameContentSequence && macro->tagExists(DCM_FrameAcquisitionDateTime)) {
-      drop(slice, DCM_AcquisitionDate);  // of the first frame
+      drop(slice, DCM_AcquisitionDate);  // this date and time are those of the first frame
       drop(slice, DCM_AcquisitionTime);
     }
   }
@@ -187,14 +191,14 @@ void EnhancedFrames::take_groups(DcmItem& groups, const DcmTagKey& unassigned, D
 }
 
 void EnhancedFrames::take_unassigned(DcmItem& attributes, DcmItem& slice) const {
-  if (attributes.card() > kMostAttributes) return;  // nothing that a converter makes
+  if (attributes.card() > kMostAttributes) return;  // no converter makes so many
   for (DcmObject* one = attributes.nextInContainer(nullptr); one; one = attributes.nextInContainer(one)) {
     const DcmTagKey tag = one->getTag().getXTag();
     if (!is_of_file(tag) && !is_of_pixels(tag) && !top_level_.contains(tag)) copy(*one, slice);
   }
 }
 
-/// Contrast/Bolus Agent, in words: those agents that had been given when the frame was taken (PS3.3 C.7.6.4b).
+/// Puts Contrast/Bolus Agent, in words: the agents that had been given when the frame was taken (PS3.3 C.7.6.4b).
 void EnhancedFrames::put_contrast(DcmItem& groups, DcmItem& slice) const {
   std::vector<DcmItem*> usages = items_of(groups, DCM_ContrastBolusUsageSequence);
   DcmItem* shared = first_item(data_, DCM_SharedFunctionalGroupsSequence);

@@ -18,7 +18,7 @@
 namespace tetwarp {
 namespace {
 
-/// Numbers of so many bytes, the low byte first.
+/// Numbers of `width` bytes each, the low byte first.
 std::vector<std::uint64_t> numbers_in(std::span<const std::byte> bytes, std::size_t width) {
   std::vector<std::uint64_t> numbers(bytes.size() / width);
   for (std::size_t n = 0; n < width * numbers.size(); ++n)
@@ -26,7 +26,7 @@ std::vector<std::uint64_t> numbers_in(std::span<const std::byte> bytes, std::siz
   return numbers;
 }
 
-/// Extended Offset Table (PS3.3 C.7.6.3.1.8); empty where there is none.
+/// The entries of Extended Offset Table (PS3.3 C.7.6.3.1.8); empty where there is none.
 std::vector<std::uint64_t> extended_offsets(DcmDataset& data) {
   DcmElement* element = nullptr;
   Uint64* offsets = nullptr;
@@ -97,7 +97,7 @@ void FrameFile::assign_fragments(const PixelItems& found) {
     basic = numbers_in(table.read(file_, {&entries, 1}), sizeof(std::uint32_t));
   }
   if (!found.end) refuse_cut(basic);
-  if (count == frames || frames == 1) {  // one each: no frame is without a fragment
+  if (count == frames || frames == 1) {  // one fragment a frame, since no frame is without one
     for (std::size_t n = 0; n < frames; ++n) first_fragment_.push_back(n);
     first_fragment_.push_back(count);
     return;
@@ -118,7 +118,8 @@ void FrameFile::assign_fragments(const PixelItems& found) {
   first_fragment_.push_back(count);
 }
 
-/// Names the frame in which the fragments end: that of the table, else one fragment is one frame.
+/// Refuses Pixel Data whose fragments end early and names the frame in which they do. The offset table tells the frame;
+/// without one, one fragment is taken for one frame.
 void FrameFile::refuse_cut(std::span<const std::uint64_t> table) const {
   const auto frames = static_cast<std::size_t>(frames_->count());
   const std::size_t count = fragments_.size();
@@ -166,7 +167,7 @@ FrameFile::Frame FrameFile::frame(int number) const {
   }
   frame.header = frame_header(*frame.data, whole_, number);
   for (const DcmTagKey& tag : {DCM_StackID, DCM_TemporalPositionIndex, DCM_DimensionIndexValues})
-    drop(*frame.data, tag);  // they count frames of this file; `header` has them
+    drop(*frame.data, tag);  // frames of this file are counted by these; `header` keeps what is needed of them
   return frame;
 }
 

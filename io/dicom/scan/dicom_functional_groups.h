@@ -11,19 +11,19 @@
 
 namespace tetwarp {
 
-/// A macro of the Multi-frame Functional Groups Module (PS3.3 C.7.6.16.2, C.8.15.3) and what the CT Image IOD has of
-/// it.
+/// A macro of the Multi-frame Functional Groups Module (PS3.3 C.7.6.16.2, C.8.15.3), and which of its attributes the CT
+/// Image IOD has, too.
 struct FunctionalGroup {
   struct Renamed {
     DcmTagKey from, to;
   };
   DcmTagKey sequence;
-  std::vector<DcmTagKey> attributes;  ///< that have the same tag in both
+  std::vector<DcmTagKey> attributes;  ///< attributes that have the same tag in both
   std::vector<Renamed> renamed = {};
 };
 
-/// Those that tell where a frame lies, what its values mean and how it was made. References to other images are not
-/// among them.
+/// The macros that tell where a frame lies, what its values mean and how it was made. References to other images are
+/// not among them.
 const std::vector<FunctionalGroup>& functional_groups();
 
 }  // namespace tetwarp

@@ -43,7 +43,7 @@ std::vector<std::string> split(const std::string& text) {
   return values;
 }
 
-/// Digits after the point: 3 for "1.250", -1 for "5E1" (tens).
+/// How many digits a number has after the point: 3 for "1.250", -1 for "5E1" (tens).
 int decimals_of(const std::string& text) {
   const auto exponent_at = text.find_first_of("eE");
   const std::string mantissa = text.substr(0, exponent_at);
@@ -80,7 +80,7 @@ std::optional<int> integer_of(DcmItem& item, const DcmTagKey& tag) {
   return static_cast<int>(*value);
 }
 
-/// The 16 bits of a US or SS attribute, also where the file gives it another VR of numbers, words or bytes.
+/// The 16 bits of an attribute of VR US or SS, also where the file gives it another VR of numbers, words or bytes.
 std::optional<int> word_of(DcmItem& item, const DcmTagKey& tag) {
   DcmElement* element = nullptr;
   Uint16 word = 0;
@@ -133,7 +133,8 @@ void read_geometry(DcmItem& data, DicomFileHeader& header) {
   header.slice_spacing = decimal_of(data, DCM_SpacingBetweenSlices);
 }
 
-/// Whether a file of at least these bytes may be DICOM: the prefix "DICM", or a data set that starts without one.
+/// Whether a file of at least `size` bytes that starts like this may be DICOM: it has the prefix "DICM", or a data set
+/// that starts without one.
 bool looks_like_dicom(const std::array<char, 132>& start, std::size_t size) {
   if (size == start.size() && std::memcmp(start.data() + 128, "DICM", 4) == 0) return true;
   if (size < 8) return false;
@@ -143,7 +144,7 @@ bool looks_like_dicom(const std::array<char, 132>& start, std::size_t size) {
   return little || big;
 }
 
-/// Why the object is nothing that scanning has to tell apart; empty for images and for what might be one.
+/// Why an object holds no image and is left out of the scan; empty for images and for what might be one.
 std::string no_image_reason(const DicomFileHeader& header) {
   const bool is_ct = header.sop_class_uid == UID_CTImageStorage || is_enhanced_ct(header.sop_class_uid);
   if (header.sop_class_uid == UID_MediaStorageDirectoryStorage)
@@ -154,7 +155,8 @@ std::string no_image_reason(const DicomFileHeader& header) {
   return header.series_uid.empty() ? "damaged, or not DICOM: " + header.damage : std::string();
 }
 
-/// The first bytes of the file decide whether DCMTK is asked at all: it would take much for a data set without prefix.
+/// Looks at the first bytes of a file: DCMTK is given only what may be DICOM, for without the prefix it would take many
+/// other files for a data set.
 void sniff(OpenedFile& file, DicomFileHeader& header) {
   std::array<char, 132> start{};
   const std::size_t size = file.read(0, std::as_writable_bytes(std::span(start)));
@@ -171,7 +173,7 @@ void sniff(OpenedFile& file, DicomFileHeader& header) {
   header.broken = !header.skip.empty() && (blank || !file.problem().empty());
 }
 
-/// DCMTK's decoders, registered until the process ends: DCMTK frees none of them by itself.
+/// Registers DCMTK's decoders until the process ends, and then frees them: DCMTK frees none of them by itself.
 class Decoders {
  public:
   Decoders() {
@@ -194,7 +196,7 @@ void prepare_dcmtk() {
   static std::once_flag once;
   std::call_once(once, [] {
     OFLog::configure(OFLogger::OFF_LOG_LEVEL);
-    dcmEnableUnknownVRConversion.set(OFTrue);  // standard attributes written as UN are read as what they are
+    dcmEnableUnknownVRConversion.set(OFTrue);  // standard attributes that were written as VR UN get their own VR
     static const Decoders decoders;
   });
   if (!dcmDataDict.isDictionaryLoaded()) {
@@ -213,7 +215,7 @@ std::string text_of(DcmItem& item, const DcmTagKey& tag) {
   DcmElement* element = nullptr;
   OFString value;
   if (item.findAndGetElement(tag, element).bad() || element->getLengthField() > kLongestValue) return {};
-  constexpr Uint32 kLong = 4096;  // DCMTK goes through all values of a date again for each of them
+  constexpr Uint32 kLong = 4096;  // for each value of a longer list of dates DCMTK would read the whole list again
   char* whole = nullptr;
   if (element->getLengthField() > kLong && dynamic_cast<DcmByteString*>(element)) {
     if (element->getString(whole).bad() || !whole) return {};
@@ -221,14 +223,15 @@ std::string text_of(DcmItem& item, const DcmTagKey& tag) {
   } else if (element->getOFStringArray(value).bad()) {
     return {};
   }
-  std::string text(value.c_str());  // stops at a padding zero
+  std::string text(value.c_str());  // ends at a zero, which some writers use as padding
   const auto last = text.find_last_not_of(' ');
   return last == std::string::npos ? "" : text.substr(0, last + 1);
 }
 
 namespace {
 
-/// A UID. One that is far longer than the 64 characters of PS3.5 9.1 is told apart by a hash instead of kept.
+/// The value of an attribute that is a UID. A value far longer than the 64 characters of PS3.5 9.1 is replaced by a
+/// hash, which tells it apart and takes less memory.
 std::string uid_of(DcmItem& item, const DcmTagKey& tag) {
   constexpr std::size_t kLongest = 128, kKept = 32;
   const std::string uid = text_of(item, tag);
@@ -295,7 +298,7 @@ DicomFileHeader frame_header(DcmDataset& slice, const DicomFileHeader& whole, in
 
 namespace {
 
-/// Of each frame; of a file whose frames are not told apart, its own.
+/// The headers of all frames; if the frames cannot be told apart, the one of the file.
 std::vector<DicomFileHeader> headers_of_frames(DcmDataset& data, DicomFileHeader whole) {
   const EnhancedFrames frames(data);
   whole.no_frames = frames.problem();

@@ -3,7 +3,7 @@
 
 #pragma once
 
-// Private to io/: what scanning and loading need to know of one DICOM file, and where the tags are read.
+// Private to io/: what scanning and loading need to know of one DICOM file, and the functions that read its tags.
 #include <dcmtk/config/osconfig.h>
 #include <dcmtk/dcmdata/dctk.h>
 
@@ -22,11 +22,12 @@ namespace tetwarp {
 
 /// How stored values are laid out and what they mean (PS3.3 C.7.6.3.1, C.7.5.1.1.2, C.11.1).
 struct PixelFormat {
-  int rows = 0, columns = 0, samples = 1;  ///< 0: missing
-  int frames = 1;                          ///< in the file; -1: not a number
+  int rows = 0, columns = 0, samples = 1;  ///< 0: the attribute is missing
+  int frames = 1;                          ///< how many the file has; -1: not a number
   int bits_allocated = 0, bits_stored = 0, high_bit = 0;
   bool is_signed = false;
-  std::optional<int> sign_word = 0;  ///< Pixel Representation as read, from which `is_signed` was made; none: missing
+  /// Pixel Representation as read, from which `is_signed` was made; none: missing
+  std::optional<int> sign_word = 0;
   std::string photometric;
   std::optional<double> slope, intercept;
   std::string rescale_type;
@@ -36,68 +37,71 @@ struct PixelFormat {
   friend bool operator==(const PixelFormat&, const PixelFormat&) = default;
 };
 
-/// Of a file, or of one frame of a file that holds several slices.
+/// What is known of a DICOM file, or of one frame of a file that holds several slices.
 struct DicomFileHeader {
   std::filesystem::path file;
-  std::optional<int> frame;    ///< from 0; none: the file is one slice
+  std::optional<int> frame;    ///< number of the frame from 0; none: the file is one slice
   std::string skip;            ///< why the file is no DICOM object at all; empty: it is one
   bool broken = false;         ///< skipped although it may have been a slice: unreadable, empty, cut short or damaged
-  std::string damage;          ///< why the data set could not be read to its end; empty: it could
-  std::string no_frames = {};  ///< why its frames are not told apart, of a kind of file that holds several; else empty
+  std::string damage;          ///< why the data set could not be read to its end; empty: it was read to its end
+  std::string no_frames = {};  ///< for files of several frames, why these cannot be told apart; else empty
   E_TransferSyntax encoding = EXS_Unknown;
   std::string transfer_syntax_uid;  ///< as the file states it, or as found where it has no meta header
   std::string sop_class_uid, sop_instance_uid, series_uid, study_uid, frame_of_reference_uid, modality;
   std::vector<std::string> image_type;
-  std::string character_set;        ///< Specific Character Set, of the texts among `traits`
-  std::string traits;               ///< what may tell volumes of a series apart: see trait_of (dicom_traits.h)
-  std::uint32_t secret_traits = 0;  ///< those that hold the patient's name or ID and are not shown, one bit each
+  std::string character_set;        ///< Specific Character Set of the texts in `traits`
+  std::string traits;               ///< values that may tell volumes of a series apart: see trait_of (dicom_traits.h)
+  std::uint32_t secret_traits = 0;  ///< one bit a trait that holds the patient's name or ID and is not shown
   std::optional<int> series_number;
   int instance_number = 0;
   std::optional<glm::dvec3> position;                ///< Image Position (Patient), LPS mm
   std::array<int, 3> position_decimals{};            ///< digits after the point of each component as written
   std::optional<std::array<double, 6>> orientation;  ///< Image Orientation (Patient)
   std::optional<glm::dvec2> spacing;                 ///< along i (second value of Pixel Spacing), then along j, mm
-  std::optional<double> thickness, slice_spacing;    ///< (0018,0050), (0018,0088): never geometry but for one slice
-  std::string private_compression;                   ///< ELSCINT1 (07a1,xx11): vendor's own pixel coding
+  /// (0018,0050), (0018,0088); they give the geometry of a lone slice only
+  std::optional<double> thickness, slice_spacing;
+  std::string private_compression;  ///< Private attribute (07a1,xx11) of ELSCINT1: the vendor's own coding of pixels
   PixelFormat pixels;
-  std::optional<std::uint64_t> pixel_bytes;  ///< from Pixel Data's value, or its own frame if that is not compressed,
-                                             ///< to the end of the file; none: no Pixel Data
+  /// Bytes of the file from the value of Pixel Data on, or, if that is not compressed, from this frame on, up to the
+  /// end; none: no Pixel Data
+  std::optional<std::uint64_t> pixel_bytes;
   std::uint64_t file_bytes = 0;
 };
 
-/// Registers DCMTK's decoders and turns off its messages (a library does not print), once for the process.
+/// Registers DCMTK's decoders and turns off its messages (a library does not print). It does so once in a process.
 /// @throws Error without DCMTK's data dictionary
 void prepare_dcmtk();
 
-/// Fills a header from a data set that was read, wholly or up to Pixel Data.
+/// Makes a header from a file that was read, wholly or up to Pixel Data.
 DicomFileHeader header_of(DcmFileFormat& format, const std::filesystem::path& file);
-/// The same without a meta header and a name.
+/// Makes a header, without a name of a file, from a data set that has no meta header.
 DicomFileHeader header_of(DcmDataset& data);
 
-/// Reads a file up to Pixel Data: one header, or one of each frame of multi-frame CT. Never throws for what the file
-/// holds: see `skip`, `damage` and `no_frames`.
+/// Reads a file up to Pixel Data. @return one header, or one for each frame of multi-frame CT. Whatever the file holds,
+/// nothing is thrown: see `skip`, `damage` and `no_frames`.
 std::vector<DicomFileHeader> read_dicom_headers(const std::filesystem::path& file);
 
-/// Of a frame. @param slice  its attributes, as a file of this slice alone would have them (EnhancedFrames)
+/// The header of a frame.
+/// @param slice  the frame's attributes, as a file of this slice alone would have them (EnhancedFrames)
 /// @param whole  the header of the file
 DicomFileHeader frame_header(DcmDataset& slice, const DicomFileHeader& whole, int frame);
 
 inline std::string shown(const DicomFileHeader& header) { return shown(header.file, header.frame); }
 
-/// Whether the value of an attribute, if there is one, has at most so many bytes: DCMTK allocates what a damaged length
-/// asks for before it looks whether the file holds that.
+/// Whether the value of an attribute, if there is one, has at most `bytes` bytes. A damaged file may state any length,
+/// and DCMTK allocates it before it looks whether the file holds so much.
 bool is_at_most(DcmItem& item, const DcmTagKey& tag, std::uint64_t bytes);
-/// Of every attribute but Pixel Data that is read here.
+/// The most bytes of the value of an attribute that is read here, except Pixel Data.
 constexpr std::uint64_t kLongestValue = 1 << 20;
 
-/// Text of an attribute without padding, values separated by backslashes; empty if missing.
+/// Text of an attribute without padding, its values separated by backslashes; empty if it is missing.
 std::string text_of(DcmItem& item, const DcmTagKey& tag);
 
-/// Decimal strings of an attribute: exactly `count` numbers, or none.
+/// The decimal strings of an attribute as numbers: exactly `count` of them, or none.
 std::optional<std::vector<double>> numbers_of(DcmItem& item, const DcmTagKey& tag, std::size_t count);
 
-/// The name of a UID, with the UID: "JPEG 2000 (Lossless only) (1.2.840.10008.1.2.4.90)". The UID alone if it has no
-/// name.
+/// The name of a UID, followed by the UID: "JPEG 2000 (Lossless only) (1.2.840.10008.1.2.4.90)"; the UID alone if it
+/// has no name.
 std::string uid_with_name(const std::string& uid);
 
 /// A SOP Class in plain words, with its name and UID: "an MR image, MRImageStorage (1.2.840.10008.5.1.4.1.1.4)".
@@ -106,18 +110,19 @@ std::string kind_name(const std::string& sop_class_uid);
 /// Why this object is no slice of a CT volume by its kind (localizer, dose, MR, ...); empty if it may be one.
 std::string other_kind(const DicomFileHeader& header);
 
-/// Why the cosines of a row and a column (Image Orientation) are no rotation, "expected X, found Y"; empty: they are
-/// one.
+/// Why the direction cosines of a row and a column (Image Orientation) are no rotation, "expected X, found Y"; empty:
+/// they are one.
 std::string rotation_problem(std::span<const double, 6> cosines);
 
-/// Why Image Plane attributes of this slice cannot be used, "WHAT, FILE; WHAT TO DO"; empty if they can.
+/// Why the Image Plane attributes of a slice cannot be used, "WHAT, FILE; WHAT TO DO"; empty if they can.
 std::string geometry_problem(const DicomFileHeader& header);
 
-/// Why its pixels cannot be turned into HU; empty if they can, as far as the header tells.
+/// Why the pixels of a slice cannot be turned into HU; empty if they can, as far as the header tells.
 std::string pixel_problem(const DicomFileHeader& header);
 
-/// Why Pixel Data of a file that was read to their end are about an image of other rows, or more frames: a row or more
-/// is left over. Less counts as filling, which some writers add. Empty: nothing is, or they are compressed.
+/// Why Pixel Data of a file that was read to its end are of another image than the header's, with more rows or frames:
+/// at least a row is left over. A smaller remainder counts as filling, which some writers add. Empty: nothing is left
+/// over, or Pixel Data are compressed.
 std::string excess_problem(const DicomFileHeader& header);
 
 /// Padding in HU, rounded half to even and saturated to int16; none if the slice has no usable Pixel Padding Value.
@@ -127,20 +132,20 @@ std::optional<PaddingRange> padding_hu(const PixelFormat& pixels);
 struct StoredRange {
   int low = 0, high = 0;
 };
-/// Reads the padding words with the pixels' own signedness: 63536 of signed 16 bit pixels is -2000. None where the
-/// value cannot occur among the pixels.
+/// The padding of a slice as stored values. Its words are read as signed or unsigned as the pixels are: 63536 of signed
+/// 16-bit pixels is -2000. None where the value cannot occur among the pixels.
 std::optional<StoredRange> stored_padding(const PixelFormat& pixels);
 
-/// slope * stored + intercept, not rounded.
+/// The HU of a stored value, slope * stored + intercept, not rounded.
 double hu_of(const PixelFormat& pixels, int stored);
 
 /// The stored value in a word of Pixel Data: see StoredBits.
 int stored_value(const PixelFormat& pixels, unsigned word);
 
-/// Bytes of one frame, uncompressed.
+/// Bytes of one uncompressed frame.
 std::uint64_t slice_bytes(const PixelFormat& pixels);
 
-/// "512 x 512", rows first.
+/// Rows and columns for messages, "512 x 512", rows first.
 std::string size_text(const PixelFormat& pixels);
 
 }  // namespace tetwarp

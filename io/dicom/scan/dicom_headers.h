@@ -15,10 +15,11 @@
 namespace tetwarp {
 
 struct DicomHeaders {
-  /// Every attribute but Pixel Data, as read; of a frame as EnhancedFrames makes them. Lossy Image Compression is 01
-  /// also where only the transfer syntax says so.
+  /// For each slice, every attribute but Pixel Data, as read; frames are as EnhancedFrames makes them. Lossy Image
+  /// Compression is 01 also where only the transfer syntax says so.
   std::vector<std::unique_ptr<DcmDataset>> slices;
-  std::vector<int> frames = {};  ///< of each slice, its number in its file, from 1; 0: no frame; empty: none is
+  /// By slice: its frame's number in the file, from 1; 0: the slice is a file of its own; empty: all slices are.
+  std::vector<int> frames = {};
 };
 
 }  // namespace tetwarp

@@ -17,8 +17,8 @@
 namespace tetwarp {
 namespace {
 
-// A CT slice has 512 to 4096 voxels an axis; what a compressed file may unfold to is bounded before memory is asked
-// for.
+// The most rows or columns of a slice. CT has 512 to 4096 voxels an axis; the limit bounds what a compressed file may
+// unfold to before memory is allocated for it.
 constexpr int kLargestAxis = 16384;
 constexpr std::uint64_t kLargestExpansion = 1000, kSmallFile = 1 << 20;
 
@@ -94,8 +94,9 @@ std::string layout_problem(const DicomFileHeader& header) {
   return {};
 }
 
-/// Without slope and intercept HU cannot be known: 0 and -1024 are both common intercepts, so neither is assumed. Nor
-/// is it known which to take where a table stands beside them, which PS3.3 C.11.1 forbids.
+/// Why HU cannot be computed; empty if they can. Without slope and intercept they are not known: 0 and -1024 are both
+/// common intercepts, so neither is assumed. Where a table (Modality LUT) stands beside them, which PS3.3 C.11.1
+/// forbids, it is not known which to take.
 std::string rescale_problem(const DicomFileHeader& header) {
   const PixelFormat& pixels = header.pixels;
   if (pixels.has_modality_lut) {
@@ -121,7 +122,7 @@ std::string uid_with_name(const std::string& uid) {
 
 std::string kind_name(const std::string& sop_class_uid) {
   struct Word {
-    const char *start, *word;  ///< of DCMTK's name of the class
+    const char *start, *word;  ///< what DCMTK's name of the class begins with, and the words that stand for it
   };
   static constexpr Word kWords[] = {
       {"SecondaryCapture", "a picture, of a screen for example"},
@@ -193,7 +194,7 @@ std::string geometry_problem(const DicomFileHeader& header) {
 std::string rotation_problem(std::span<const double, 6> c) {
   const double row = std::hypot(c[0], c[1], c[2]), column = std::hypot(c[3], c[4], c[5]);
   const double across = c[0] * c[3] + c[1] * c[4] + c[2] * c[5];
-  // Three digits (.707) are round-off; more is no rotation.
+  // 1e-3: cosines of three digits (.707) are round-off, anything worse is no rotation.
   if (std::abs(row - 1) <= 1e-3 && std::abs(column - 1) <= 1e-3 && std::abs(across) <= 1e-3) return {};
   return "expected lengths 1, 1 and product 0, found " + number(row) + ", " + number(column) + " and " + number(across);
 }
@@ -236,7 +237,8 @@ std::optional<StoredRange> stored_padding(const PixelFormat& pixels) {
   const int largest = smallest + (1 << pixels.bits_stored) - 1;
   const auto value = [&](int word) {
     if (!pixels.is_signed) return word;
-    if (word > largest && word < 1 << pixels.bits_stored) return word - (1 << pixels.bits_stored);  // stored bits only
+    // The word has the stored bits alone, without the sign above them.
+    if (word > largest && word < 1 << pixels.bits_stored) return word - (1 << pixels.bits_stored);
     return static_cast<int>(static_cast<std::int16_t>(word));
   };
   int low = value(*pixels.padding_word);

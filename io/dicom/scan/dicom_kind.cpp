@@ -23,7 +23,7 @@ using Headers = std::vector<DicomFileHeader>;
 
 constexpr std::size_t kMostKinds = 64;
 
-/// One of the things in which kinds may differ.
+/// An attribute, or several, in which kinds of slices may differ.
 struct Aspect {
   const char* name;
   bool (*same)(const DicomFileHeader&, const DicomFileHeader&);
@@ -67,8 +67,9 @@ bool same_kind(const DicomFileHeader& a, const DicomFileHeader& b) {
   return std::all_of(aspects().begin(), aspects().end(), [&](const Aspect& aspect) { return aspect.same(a, b); });
 }
 
-/// The order of volumes that lie in one series, whatever that of the files: what is compared exactly comes first, then
-/// axial before coronal before sagittal, small pixels before large ones.
+/// Whether the kind of `a` comes before that of `b` in a series that holds both. The order depends on the values alone,
+/// not on that of the files: what is compared exactly comes first, then axial before coronal before sagittal, and small
+/// pixels before large ones.
 bool comes_before(const DicomFileHeader& a, const DicomFileHeader& b) {
   const std::string_view stack_a = a.frame ? trait_of(a, Trait::stack) : "",
                          stack_b = b.frame ? trait_of(b, Trait::stack) : "";

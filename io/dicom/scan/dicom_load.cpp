@@ -25,7 +25,7 @@
 namespace tetwarp {
 namespace {
 
-/// A file that was listed may have been replaced since.
+/// Throws if a file is no longer the slice that was listed: it may have been replaced since.
 void require_unchanged(const DicomFileHeader& header, const DicomSlice& slice, const Geometry& geometry) {
   const auto same = [&](bool is_same, const std::string& what) {
     require(is_same, what + " is not what it was when the series was listed, " + shown(slice.file, slice.frame) +
@@ -57,7 +57,7 @@ void check(const DicomFileHeader& header, const DicomSlice& slice, const Geometr
   require_unchanged(header, slice, geometry);
 }
 
-/// Keeps what is left of a slice when its voxels are read.
+/// Keeps what later steps need of a slice whose voxels were read.
 void finish(LoadedSlice& loaded, std::unique_ptr<DcmDataset> data, const DicomFileHeader& header) {
   loaded.pixels = header.pixels;
   loaded.header = std::move(data);
@@ -70,7 +70,8 @@ struct Loading {
   const DicomSeries& series;
   std::span<std::int16_t> voxels;
   HuTableCache tables = {};
-  tbb::enumerable_thread_specific<FileBuffer> buffers = {};  ///< one file a thread, however long the series
+  /// Each thread reads one file at a time, however long the series.
+  tbb::enumerable_thread_specific<FileBuffer> buffers = {};
 
   std::span<std::int16_t> slice(std::size_t k) const {
     const std::size_t size = voxels.size() / series.slices.size();
@@ -78,7 +79,7 @@ struct Loading {
   }
 };
 
-/// A file that is slice k. @param digest  receives its hash, where one is wanted
+/// Loads slice k from a file of its own. @param digest  receives the hash of the file; null: none is made
 LoadedSlice load_slice(Loading& loading, std::size_t k, Sha256::Digest* digest) {
   const DicomSlice& slice = loading.series.slices[k];
   LoadedSlice loaded;
@@ -97,7 +98,7 @@ LoadedSlice load_slice(Loading& loading, std::size_t k, Sha256::Digest* digest) 
   return loaded;
 }
 
-/// A frame that is slice k.
+/// Loads slice k, a frame of a file.
 LoadedSlice load_frame(Loading& loading, std::size_t k, const FrameFile& file) {
   const DicomSlice& slice = loading.series.slices[k];
   LoadedSlice loaded;
@@ -111,11 +112,11 @@ LoadedSlice load_frame(Loading& loading, std::size_t k, const FrameFile& file) {
   return loaded;
 }
 
-/// The file of one slice, or of several that are its frames: parsed by the first that is loaded, and let go by the
-/// last.
+/// A file that holds one slice, or several as its frames. The first slice that is loaded parses it, and the last one
+/// frees it.
 struct SourceFile {
   std::filesystem::path path;
-  std::size_t slices = 0;  ///< that are not loaded yet
+  std::size_t slices = 0;  ///< how many slices are not loaded yet
   bool has_frames = false;
   Sha256::Digest digest{};
   std::unique_ptr<std::mutex> mutex = std::make_unique<std::mutex>();
@@ -129,13 +130,13 @@ struct SourceFile {
   }
 };
 
-/// Each once, in the order of their first slices.
+/// All files of a series, each once, in the order of their first slices.
 struct SourceFiles {
   std::vector<SourceFile> files;
-  std::vector<std::size_t> of_slice;  ///< per slice
+  std::vector<std::size_t> of_slice;  ///< by slice: its file
 
   explicit SourceFiles(const DicomSeries& series) {
-    std::map<std::filesystem::path, std::size_t> numbers;  // of files of frames
+    std::map<std::filesystem::path, std::size_t> numbers;  // files of frames only
     for (const DicomSlice& slice : series.slices) {
       const auto next = slice.frame ? numbers.try_emplace(slice.file, files.size()).first->second : files.size();
       if (next == files.size()) files.push_back({.path = slice.file, .has_frames = slice.frame.has_value()});
@@ -155,7 +156,8 @@ bool same_padding(const std::optional<PaddingRange>& a, const std::optional<Padd
   return a.has_value() == b.has_value() && (!a || (a->low == b->low && a->high == b->high));
 }
 
-/// The padding of all slices, where they agree. Padding that was saturated is no data only if it is known as padding.
+/// The padding, where all slices agree. Where values of padding were saturated, all slices must agree: the saturated
+/// values would pass for data.
 std::optional<PaddingRange> common_padding(const DicomSeries& series, const std::vector<LoadedSlice>& slices) {
   const auto first = padding_hu(slices.front().pixels);
   bool agree = true;

@@ -33,11 +33,11 @@ void append(Headers& headers, Headers more) {
 
 Headers read_headers(std::vector<fs::path> files, const Control& control) {
   Headers headers(files.size());
-  std::map<std::size_t, Headers> further;  // frames of files that hold several
+  std::map<std::size_t, Headers> further;  // by file: the headers of its further frames
   std::mutex mutex;
   for_each_index(files.size(), 0, control, [&](std::size_t i) {
     Headers read = read_dicom_headers(files[i]);
-    fs::path().swap(files[i]);  // a path takes 400 bytes, and there may be 100 000
+    fs::path().swap(files[i]);  // freed here: a path takes 400 bytes, and there may be 100 000
     headers[i] = std::move(read.front());
     if (read.size() == 1) return;
     read.erase(read.begin());
@@ -48,13 +48,14 @@ Headers read_headers(std::vector<fs::path> files, const Control& control) {
   return headers;
 }
 
-/// Frames of a file count once.
+/// How many files the headers are of; the frames of a file count once.
 std::size_t files_of(const Headers& headers) {
   const auto is_file = [](const DicomFileHeader& header) { return header.frame.value_or(0) == 0; };
   return static_cast<std::size_t>(std::count_if(headers.begin(), headers.end(), is_file));
 }
 
-/// Files of one series. Where the Series Instance UID was wiped, study, series number and folder stand in for it.
+/// What files of one series have in common: Series Instance UID, or, where it was wiped, study, series number and
+/// folder.
 using SeriesKey = std::tuple<std::string, std::string, std::optional<int>, fs::path>;
 
 SeriesKey key_of(const DicomFileHeader& header) {
@@ -62,10 +63,11 @@ SeriesKey key_of(const DicomFileHeader& header) {
   return {"", header.study_uid, header.series_number, header.file.parent_path()};
 }
 
-/// Names a file that nobody can know: it lies beside slices of the series, bears their suffix, and may be one of them.
+/// A refusal that names a broken file that may be a slice of the series: it lies beside the series' files and bears
+/// their suffix. Empty: there is none.
 std::string lost_slice(const std::vector<DicomFileHeader>& broken, const DicomSeries& series) {
   if (broken.empty()) return {};
-  std::set<std::pair<fs::path, fs::path>> places;  // folder and suffix
+  std::set<std::pair<fs::path, fs::path>> places;  // folder and suffix of the slices
   for (const DicomSlice& slice : series.slices) places.emplace(slice.file.parent_path(), slice.file.extension());
   for (const DicomFileHeader& header : broken) {
     const fs::path& file = header.file;
@@ -96,7 +98,7 @@ Grouping group(const Headers& headers) {
   return groups;
 }
 
-/// Takes the headers of a series out of all of them, so that two sets of them are never there at once.
+/// Makes the volumes of a series. Its headers are moved out of `headers`, so that they are never in memory twice.
 std::vector<DicomSeries> assemble(Headers& headers, const std::vector<std::size_t>& members, const Headers& broken,
                                   const Control& control) {
   Headers files;
@@ -126,7 +128,7 @@ DicomScan scan_of(Headers headers, const Control& control) {
   return scan;
 }
 
-/// The series of the first header alone.
+/// The series of the first header; all others are left out.
 DicomScan scan_of_first(Headers headers, const Control& control) {
   Grouping groups = group(headers);
   DicomScan scan;
@@ -152,7 +154,8 @@ bool is_directory_file(const DicomFileHeader& header) {
   return header.sop_class_uid == UID_MediaStorageDirectoryStorage;
 }
 
-/// The files that a DICOMDIR names. Of these, other DICOMDIRs stand for what they name in turn.
+/// Scans the files that a DICOMDIR names. Where one of these is a DICOMDIR, the files that it names are scanned in its
+/// place.
 DicomScan scan_directory(const fs::path& dicomdir, const Control& control) {
   Headers headers;
   std::set<fs::path> seen{dicomdir}, missing;
@@ -186,7 +189,7 @@ DicomScan scan_directory(const fs::path& dicomdir, const Control& control) {
   return scan;
 }
 
-/// The series of one file, from the files beside it.
+/// The series of one file: it is looked for among the files beside it.
 DicomScan scan_beside(Headers headers, const Control& control) {
   const fs::path path = headers.front().file, folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
   std::error_code error;

@@ -29,7 +29,7 @@ constexpr std::size_t kFewestSlices = 3, kMostVolumes = 500;
 /// Slices of one kind, sorted along their normal.
 struct Stack {
   Headers files;
-  Positions positions;  ///< mm
+  Positions positions;  ///< along the normal, mm
 };
 
 Stack sorted_stack(Headers files) {
@@ -54,12 +54,12 @@ bool is_uneven(const Positions& positions) {
   return false;
 }
 
-/// Something that slices have one of several values of.
+/// A way to divide slices into groups, by something of which each slice has one value.
 struct Divider {
   std::string name;
-  std::vector<std::size_t> group_of;                      ///< per slice of a Stack
-  std::size_t groups = 0;                                 ///< in their natural order
-  std::function<std::vector<std::string>()> labels = {};  ///< one a group
+  std::vector<std::size_t> group_of;  ///< by slice of the stack: its group
+  std::size_t groups = 0;             ///< how many groups there are; they are numbered in their natural order
+  std::function<std::vector<std::string>()> labels = {};  ///< makes one label a group
 };
 
 Divider divider_of(Trait trait, const Headers& files) {
@@ -92,8 +92,8 @@ Divider divider_by_folder(const Headers& files) {
   return divider;
 }
 
-/// Instance Numbers that run through all positions in their order, then again. Numbers that count at one position first
-/// tell which came first there, not which belong together: they divide nothing.
+/// Divides slices by runs of Instance Number: numbers that run through all positions in order, then again. If numbers
+/// count first at one position, they tell which slice came first there, not which belong together, and divide nothing.
 Divider divider_by_runs(const Stack& stack) {
   const std::size_t count = stack.files.size();
   Divider divider{"Instance Number (0020,0013)", std::vector<std::size_t>(count), 1};
@@ -170,7 +170,7 @@ enum class Verdict : std::uint8_t { no, volumes, volumes_of_same_positions };
 
 struct Judgement {
   Verdict verdict = Verdict::no;
-  std::string reason = {};  ///< of a no
+  std::string reason = {};  ///< why, if the verdict is no
 };
 
 std::size_t regular_stacks(const Headers& files, const Divider& divider) {
@@ -204,13 +204,14 @@ Judgement judge(const Stack& stack, const Divider& divider, bool crowded) {
   return {Verdict::no, "gives " + std::to_string(groups.size() - regular) + " irregular volumes"};
 }
 
-/// The best of the dividers that it was offered, by the rule of `split_volumes`.
+/// Keeps the best of the dividers that are offered, by the rule of `split_volumes`.
 class Choice {
  public:
   Choice(const Stack& stack, bool crowded) : stack_(stack), crowded_(crowded) {}
 
   void offer(const Divider& divider) {
-    if (best_ && divider.groups >= best_->groups) return;  // volumes of the same positions are the fewest possible
+    // If the best one gives volumes of the same positions, it gives the fewest possible.
+    if (best_ && divider.groups >= best_->groups) return;
     const Judgement judgement = judge(stack_, divider, crowded_);
     if (judgement.verdict == Verdict::no)
       reasons_.push_back(divider.name + " " + judgement.reason);
@@ -218,7 +219,7 @@ class Choice {
       best_ = divider;
   }
   const std::optional<Divider>& best() const { return best_; }
-  /// Why the others were not taken.
+  /// Why each of the other dividers was not taken.
   const std::vector<std::string>& reasons() const { return reasons_; }
 
  private:
@@ -228,7 +229,7 @@ class Choice {
   std::vector<std::string> reasons_;
 };
 
-/// The attributes that differ among the slices, and what else may divide them.
+/// The attributes, and the folder, that have several values among the slices, as dividers.
 std::vector<Divider> dividers_of(const Stack& stack) {
   std::vector<Divider> dividers;
   for (std::size_t n = 0; n < kTraits; ++n) dividers.push_back(divider_of(static_cast<Trait>(n), stack.files));
@@ -271,7 +272,7 @@ std::vector<SplitVolume> divide(Headers files, const Divider& divider) {
   return volumes;
 }
 
-/// Of slices of one kind.
+/// The volumes of slices of one kind.
 std::vector<SplitVolume> split_stack(Headers files) {
   if (files.size() < 2) return one_volume(std::move(files));
   Stack stack = sorted_stack(std::move(files));

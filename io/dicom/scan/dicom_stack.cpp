@@ -20,7 +20,7 @@ double along(const DicomFileHeader& header, const glm::dvec3& normal) { return g
 
 std::string point_text(const glm::dvec3& p) { return number(p.x) + "\\" + number(p.y) + "\\" + number(p.z); }
 
-/// The largest set of slices at one position, if any position has several.
+/// A refusal that names the largest set of slices at one position; none if no position has several.
 std::optional<std::string> same_position(const Headers& files, const glm::dvec3& normal) {
   std::size_t crowded = 0, worst = 0, worst_count = 1;
   for (std::size_t i = 0; i < files.size();) {
@@ -44,13 +44,16 @@ std::optional<std::string> same_position(const Headers& files, const glm::dvec3&
          ", expected one: " + names + "; keep one phase or acquisition in the folder";
 }
 
-/// How far a slice lies beside a line through the first one.
+/// How far slices lie beside a line through the first one.
 struct Drift {
-  const DicomFileHeader* slice = nullptr;  ///< the worst one; null: all lie on the line, to rounding
-  double beside_mm = 0, distance_mm = 0;   ///< from the line, and along it from the first slice
+  /// The slice that is farthest from the line; null: all lie on it, but for rounding.
+  const DicomFileHeader* slice = nullptr;
+  /// How far `slice` lies from the line, and along the line from the first slice.
+  double beside_mm = 0, distance_mm = 0;
 };
 
-/// Rounding of position and orientation explains 0.01 mm and 1e-4 of the distance.
+/// Measures how far slices lie from a line through the first one. Rounding of position and orientation explains 0.01 mm
+/// and 1e-4 of the distance along the line.
 Drift drift_from(const Headers& files, const glm::dvec3& direction) {
   Drift worst;
   double worst_ratio = 1;
@@ -66,8 +69,8 @@ Drift drift_from(const Headers& files, const glm::dvec3& direction) {
   return worst;
 }
 
-/// Lets the stack lean as the positions of its slices say: a gantry tilt. @return why they are no stack, if they are
-/// none
+/// Lets the stack lean as the positions of its slices say: a gantry tilt. @return why the slices are no stack; none if
+/// they are one
 std::optional<std::string> lean(const Headers& files, DicomSeries& series) {
   Geometry& geometry = series.geometry;
   const glm::dvec3 normal = geometry.direction[2];
@@ -90,7 +93,7 @@ std::optional<std::string> lean(const Headers& files, DicomSeries& series) {
   return std::nullopt;
 }
 
-/// Last digit written of positions along the normal, mm, at most 0.01.
+/// What the last written digit of the positions means along the normal, mm, at most 0.01.
 double written_digit(const Headers& files, const glm::dvec3& normal) {
   std::array<int, 3> digits{};
   for (const DicomFileHeader& header : files) {
@@ -111,7 +114,7 @@ std::string gap_text(double gap, double usual, const DicomFileHeader& before, co
   return text;
 }
 
-/// Whether gaps differ, by the rules of `stack_slices`.
+/// What is uneven about the gaps between slices, by the rules of `stack_slices`; none if they are even.
 std::optional<std::string> unevenness(const Headers& files, const glm::dvec3& normal) {
   std::vector<double> positions;
   for (const DicomFileHeader& header : files) positions.push_back(along(header, normal));
@@ -141,7 +144,7 @@ std::optional<std::string> unevenness(const Headers& files, const glm::dvec3& no
          " mm from the first slice, found " + number(positions[*off_place] - positions.front()) + " mm";
 }
 
-/// Distance along k of a lone slice: what the header says of its neighbours, else its thickness.
+/// Distance of slices, mm, for a slice that is alone: what its header says of neighbours, else its thickness.
 double lone_spacing(const DicomFileHeader& slice, DicomSeries& series) {
   for (const auto& [value, name] : {std::pair{slice.slice_spacing, "Spacing Between Slices (0018,0088)"},
                                     std::pair{slice.thickness, "Slice Thickness (0018,0050)"}}) {
@@ -198,7 +201,7 @@ std::optional<std::string> stack_slices(Headers& files, DicomSeries& series) {
     geometry.spacing.z = lone_spacing(first, series);
   } else {
     if (auto crooked = lean(files, series)) return crooked;
-    const double leaning = glm::dot(geometry.direction[2], normal);  // cosine: 1 for a straight stack
+    const double leaning = glm::dot(geometry.direction[2], normal);  // cosine of the tilt: 1 for a straight stack
     const double length = (along(last, normal) - along(first, normal)) / leaning;
     geometry.spacing.z = length / static_cast<double>(files.size() - 1);
     series.uneven = unevenness(files, normal);

@@ -12,14 +12,14 @@
 
 namespace tetwarp {
 
-/// Image Orientation made a rotation: row direction kept, column direction made perpendicular to it, normal row x
-/// column.
+/// A rotation from the six cosines of Image Orientation: its columns are the row direction as it is, the column
+/// direction made perpendicular to it, and the normal, row x column.
 glm::dmat3 rotation_of(const std::array<double, 6>& orientation);
 
-/// Slices this close along the normal are at one position, mm.
+/// Slices whose distance along the normal is at most this, in mm, lie at one position.
 constexpr double kSamePosition = 1e-3;
 
-/// The upper median of the distances between neighbours. @param positions  rising, two or more
+/// The upper median of the gaps between neighbours. @param positions  rising, two or more
 double median_gap(const std::vector<double>& positions);
 
 /// Sorts slices of one orientation, size and spacing by position along the normal and sets the geometry of the series.

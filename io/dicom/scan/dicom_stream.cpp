@@ -20,14 +20,14 @@
 namespace tetwarp {
 namespace {
 
-/// Bytes that are there: those of a file in memory.
+/// Bytes of a file that are in memory.
 class Plain {
  public:
   explicit Plain(std::span<const std::byte> bytes) : bytes_(bytes) {}
   virtual ~Plain() = default;
-  /// All up to `end`, or as many as there are.
+  /// All bytes up to `end`, or as many as there are.
   virtual std::span<const std::byte> first(std::size_t end) { return bytes_.first(std::min(end, bytes_.size())); }
-  /// How many there are from a place on; of what is not inflated yet, some of them.
+  /// How many bytes there are from a place on. Of data that are inflated on demand, at least one if there are any.
   virtual std::size_t count_from(std::size_t at) { return bytes_.size() - at; }
   virtual bool is_whole() const { return true; }
   virtual bool is_too_large() const { return false; }
@@ -36,10 +36,11 @@ class Plain {
   std::span<const std::byte> bytes_;
 };
 
-/// What is left of a producer, inflated as far as it is asked for (PS3.5 A.5: no header of zlib).
+/// The bytes of a deflated data set, inflated as far as they are used (PS3.5 A.5: there is no header of zlib).
 class Inflated final : public Plain {
  public:
-  /// @param limit  no more bytes than these are made
+  /// @param packed  gives the deflated bytes
+  /// @param limit  no more bytes than these are inflated
   Inflated(std::unique_ptr<DcmProducer> packed, std::size_t limit)
       : Plain({}), producer_(std::move(packed)), limit_(limit), packed_(kPiece), piece_(kPiece) {
     status_ = inflateInit2(&stream_, -MAX_WBITS);
@@ -53,7 +54,7 @@ class Inflated final : public Plain {
     return std::span(plain_).first(std::min(end, plain_.size()));
   }
   std::size_t count_from(std::size_t at) override { return first(at + kPiece).size() - at; }
-  /// Whether it came to its end.
+  /// Whether the deflated data came to their end.
   bool is_whole() const override { return status_ == Z_STREAM_END; }
   bool is_too_large() const override { return is_too_large_; }
 
@@ -82,7 +83,7 @@ class Inflated final : public Plain {
   bool is_too_large_ = false;
 };
 
-/// The bytes of an open file.
+/// Gives DCMTK the bytes of an open file.
 class FileProducer final : public DcmProducer {
  public:
   explicit FileProducer(std::shared_ptr<OpenedFile> file) : file_(std::move(file)) {}
@@ -98,7 +99,7 @@ class FileProducer final : public DcmProducer {
     const offile_off_t wanted = std::min(length, avail());
     if (wanted <= 0) return 0;
     const std::size_t count = file_->read(at_, {static_cast<std::byte*>(buffer), static_cast<std::size_t>(wanted)});
-    cut_short_ = count < static_cast<std::size_t>(wanted);  // since it was opened
+    cut_short_ = count < static_cast<std::size_t>(wanted);  // the file became shorter after it was opened
     at_ += count;
     return static_cast<offile_off_t>(count);
   }
@@ -148,10 +149,11 @@ class MemoryProducer final : public DcmProducer {
   std::size_t at_;
 };
 
-/// DCMTK's stream, except that what is compressed is kept as it is inflated: what is in memory can be gone back to.
+/// DCMTK's stream, except that it keeps what it inflates: DCMTK can go back to any place in memory.
 ///
-/// DCMTK calls itself for every item within an item, as deep as the file says. Each of its calls asks for a mark where
-/// a tag begins; how many of them are under way shows in where their frames lie.
+/// It also refuses sequences that lie too deep. DCMTK calls itself for every item within an item, as deep as the file
+/// says, and each of its calls sets a mark where a tag begins. The addresses of the calls' stack frames tell how many
+/// of them are under way.
 class DicomStream final : public DcmInputStream {
  public:
   explicit DicomStream(const std::shared_ptr<OpenedFile>& file)
@@ -175,7 +177,7 @@ class DicomStream final : public DcmInputStream {
   void mark() override {
     mark_ = tell_;
     const auto frame = reinterpret_cast<std::uintptr_t>(__builtin_frame_address(0));
-    while (!frames_.empty() && frames_.back() < frame) frames_.pop_back();  // stacks grow downwards
+    while (!frames_.empty() && frames_.back() < frame) frames_.pop_back();  // the stack grows downwards
     if (frames_.empty() || frames_.back() != frame) frames_.push_back(frame);
     deepest_ = std::max(deepest_, frames_.size());
     has_long_type_ = has_long_type_ || begins_long_type();
@@ -192,20 +194,20 @@ class DicomStream final : public DcmInputStream {
   }
   DcmInputStreamFactory* newFactory() const override;
 
-  /// Whether sequences lie in sequences deeper than kDeepestSequence.
+  /// Whether sequences are nested deeper than kDeepestSequence.
   bool is_too_deep() const {
-    constexpr std::size_t kOutside = 4;                 // the data set, and what is read before it
-    return deepest_ > 2 * kDeepestSequence + kOutside;  // a call for each, and one for its items
+    constexpr std::size_t kOutside = 4;                 // calls for the data set, and for what is read before it
+    return deepest_ > 2 * kDeepestSequence + kOutside;  // a sequence takes a call for itself, and one for its items
   }
-  /// Whether a Directory Record Type (0004,1430) is longer than a CS may be, or of another VR. DCMTK 3.6.7 cuts it to
-  /// its length, and throws std::out_of_range if it has more than twice that.
+  /// Whether a Directory Record Type (0004,1430) is longer than VR CS allows, or has another VR. DCMTK 3.6.7 cuts it to
+  /// its length, and throws std::out_of_range if it is more than twice as long.
   bool has_long_type() const { return has_long_type_; }
-  /// What was compressed, if anything.
+  /// The inflated bytes; null if the data set is not deflated.
   const Plain* inflated() const { return inflated_.get(); }
 
  private:
-  /// Looks at the tag that comes next, in every way to encode it. An implicit length that spells "CS" is taken for
-  /// that.
+  /// Looks whether a Directory Record Type that DCMTK cannot cut comes next, in every encoding of tags. An implicit
+  /// length whose bytes spell "CS" is taken for that VR.
   bool begins_long_type() {
     std::array<std::uint8_t, 8> b{};
     const offile_off_t count = producer_->read(b.data(), b.size());
@@ -233,13 +235,13 @@ class DicomStream final : public DcmInputStream {
   offile_off_t tell_ = 0, mark_ = 0;
 };
 
-/// Goes back to a place in memory.
+/// Makes streams that begin at a place in memory.
 class MemoryFactory final : public DcmInputStreamFactory {
  public:
   explicit MemoryFactory(const MemoryProducer& producer) : plain_(producer.plain()), at_(producer.at()) {}
   DcmInputStream* create() const override { return new DicomStream(plain_, at_); }
   DcmInputStreamFactory* clone() const override { return new MemoryFactory(*this); }
-  /// DCMTK asks it to know whether there is a file that it can keep open.
+  /// DCMTK uses this to decide whether it has a file that it can keep open; it has none here.
   DcmInputStreamFactoryType ident() const override { return DFT_DcmInputTempFileStreamFactory; }
 
  private:
@@ -256,8 +258,8 @@ OFCondition refusal(const std::string& reason) {
   return {OFM_dcmdata, EC_CorruptedData.theCode, OF_error, reason.c_str()};
 }
 
-/// DCMTK throws no exceptions of its own, but those of strings that it cuts wrongly go through it, and it loses memory.
-/// What is known to bring that about is refused before (DicomStream::has_long_type).
+/// Reads a data set up to a tag. DCMTK throws no exceptions of its own, but those of strings that it cuts wrongly pass
+/// through it, and it loses memory. What is known to bring that about is refused before (DicomStream::has_long_type).
 OFCondition read_until(DcmFileFormat& format, DicomStream& stream, const DcmTagKey& until) {
   try {
     return format.readUntilTag(stream, EXS_Unknown, EGL_noChange, DCM_MaxReadLength, until);
@@ -304,7 +306,7 @@ DicomRead parse_dicom(DcmFileFormat& format, std::span<const std::byte> bytes, c
                       std::size_t inflated_limit) {
   DicomStream stream(std::make_shared<Plain>(bytes), 0);
   DicomRead read = load(format, stream, until, inflated_limit);
-  if (read.result.good()) read.result = format.loadAllDataIntoMemory();  // all of them lie within the file
+  if (read.result.good()) read.result = format.loadAllDataIntoMemory();  // cheap, for all of them lie within the file
   return read;
 }
 

@@ -21,8 +21,8 @@ enum class Kind : std::uint8_t { number, text, time, percentage };
 struct TraitTable {
   const char* name;
   Kind kind;
-  DcmTagKey tag, time;         ///< of a time: the dates, and the times of day
-  const char *before, *after;  ///< of the value in a label
+  DcmTagKey tag, time;         ///< for a Kind::time, tags of the date and of the time of day
+  const char *before, *after;  ///< what a label has before and after the value
 };
 
 const TraitTable& table_of(Trait trait) {
@@ -66,7 +66,7 @@ std::string shortest(double value) {
   return {text, std::to_chars(text, text + sizeof text, value == 0 ? 0.0 : value).ptr};
 }
 
-/// "50" of "Gated, 50.0%": the one percentage in a text; none where there is none, or more than one.
+/// The one percentage in a text, "50" of "Gated, 50.0%"; none where there is none, or more than one.
 std::optional<double> percentage_in(std::string_view text) {
   std::optional<double> found;
   for (auto sign = text.find('%'); sign != std::string_view::npos; sign = text.find('%', sign + 1)) {
@@ -82,8 +82,8 @@ std::optional<double> percentage_in(std::string_view text) {
   return found;
 }
 
-/// A date or a time of day, digits alone (PS3.5 6.2; ACR-NEMA wrote "1997.11.25" and "10:34:01"), without zeros behind
-/// the seconds.
+/// The digits of a date or a time of day (PS3.5 6.2; ACR-NEMA wrote "1997.11.25" and "10:34:01"), without zeros at the
+/// end of the fraction of a second.
 std::string digits_of(std::string text, char separator) {
   std::erase(text, separator);
   if (text.find('.') != std::string::npos) {
@@ -95,7 +95,7 @@ std::string digits_of(std::string text, char separator) {
 
 constexpr std::size_t kLongest = 256;
 
-/// "20180328 120703.5"; empty where neither date nor time is there.
+/// Date and time in one text, "20180328 120703.5"; empty where neither is there.
 std::string clock_value(DcmItem& data, const TraitTable& trait) {
   std::string date = text_of(data, trait.tag), time = text_of(data, trait.time);
   if (date.empty() && time.empty() && trait.tag == DCM_AcquisitionDate) {
@@ -122,7 +122,7 @@ std::string value_of(DcmItem& data, const TraitTable& trait) {
   return number ? shortest(*number) : std::string();
 }
 
-/// "2018-03-28 12:07:03.5" of "20180328 120703.5"; what looks otherwise stays.
+/// Date and time for a label, "2018-03-28 12:07:03.5" of "20180328 120703.5"; a text of another form stays.
 std::string clock_text(std::string_view value) {
   std::string text(value);
   const auto space = text.find(' ');
@@ -131,7 +131,7 @@ std::string clock_text(std::string_view value) {
   return space == 0 ? text.substr(1) : text;
 }
 
-/// By the numbers in them, then letter by letter.
+/// Whether `a` comes before `b` by the numbers in them, and where these are equal, letter by letter.
 bool is_before_naturally(std::string_view a, std::string_view b) {
   while (!a.empty() && !b.empty()) {
     const auto leading_digits = [](std::string_view text) {
@@ -173,7 +173,7 @@ bool is_secret(const DicomFileHeader& header, Trait trait) {
   return (header.secret_traits >> static_cast<unsigned>(trait) & 1) != 0;
 }
 
-/// A number, a time, a UID, or several of them.
+/// Whether a value is a number, a time, a UID, or several of these.
 bool is_numeric(std::string_view value) {
   return value.find_first_not_of("0123456789.+- \\") == std::string_view::npos;
 }

@@ -203,7 +203,7 @@ class Cases:
         check_alike(alone, of_case, "in a batch")
 
     def truth(self, case):
-        """The same with all maps, as files that are easy to read."""
+        """Runs a case with all maps, as files that are easy to read."""
         maps = {"report": case["report"], "coverage": ".mha", "inverse": ".mha"}
         if table.FIELDS[case["field"]] != "pull":
             maps |= {"jacobian": ".nrrd", "folds": ".nii",
@@ -213,7 +213,7 @@ class Cases:
         return Truth(self.world, case, place)
 
     def by_inverse(self, case, truth):
-        """The inverse as a pull field: what comes from where, to within the rounding of its samples."""
+        """Resamples by the inverse as a pull field: values must agree to within the rounding of its samples."""
         place = self.place("by inverse")
         options = {**case, **PLAIN, "field": "pull", "coverage": ".mha"}
         field = ["--pull-field", str(truth.folder / "out/i.mha")]

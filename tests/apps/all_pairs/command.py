@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: The Tetwarp authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""From a case to a command line, and to the row of a manifest."""
+"""Turns a case into a command line, and into the row of a manifest."""
 import json
 import pathlib
 
@@ -91,7 +91,7 @@ class World:
         return self.made[name]
 
     def simulated(self, case, suffix):
-        """By `simulate`, which needs a straight grid and one value a voxel."""
+        """A field made by `simulate`, which needs a straight grid and one value a voxel."""
         page, name = self.path(PAGES[case["field"]] + ".json"), case["input"]
         self.grid(name)
         volume = self.path(f"grid-{name}.nrrd") if name in self.grids else self.inputs.get(name)[0]
@@ -101,7 +101,7 @@ class World:
                          lambda path: self.run(["simulate", page, volume, "-o", path, "--quiet"]))
 
     def labels(self, case):
-        """Two halves of the grid of the input."""
+        """A label volume on the grid of the input: its two halves have labels 0 and 1."""
         def make(path):
             grid = self.grid(case["input"])
             write_nrrd(path, Volume((np.indices(grid.size)[2] > 4).astype("u1"), grid.affine))
@@ -172,7 +172,7 @@ class World:
         return OUTPUTS.get(case["output"], "v" + case["output"])
 
     def arguments(self, case, threads=0, backend=None, field=None, extra=()):
-        """Of `tetwarp`, for a run in a folder of its own in which "out" is there."""
+        """Arguments of `tetwarp`, for a run in a folder of its own in which "out" exists."""
         line = ["deform", self.input(case)[0], *(field or self.field(case)), "-o", "out/" + self.output(case)]
         for name, value in self.options(case, "out/"):
             line += ["--" + name] if value is None else ["--" + name, str(value)]
@@ -182,7 +182,7 @@ class World:
         return line + ["--threads", str(threads), *(["--backend", backend] if backend != "auto" else []), *extra]
 
     def row(self, case):
-        """Of a manifest."""
+        """The row of a manifest for a case."""
         row = {"case": "one", "input": self.input(case)[0], "output": self.output(case)}
         field = self.field(case)
         key = field[0].lstrip("-")
@@ -194,7 +194,7 @@ class World:
         return json.dumps(row)
 
     def files(self, case):
-        """What lies in the folder afterwards."""
+        """Names of the files that lie in the folder after a case has run."""
         output = self.output(case)
         names = {output, output + ".json"}
         for name, value in self.options(case, ""):

@@ -62,7 +62,7 @@ class Expected:
         corners = np.where(is_none, 0, corners)
         becomes_none = (is_none & (np.abs(weights) > little)).any(0)
         self.doubtful |= (is_none & self.may_weigh(weights) & (np.abs(weights) <= little)).any(0)
-        if interpolation == "cubic":  # of its 64 weights some are zero but for rounding, and NaN times that is NaN
+        if interpolation == "cubic":  # weights that rounding keeps from being 0 would make NaN of NaN
             self.doubtful |= is_none.any(0)
         nearest = np.floor(place + 0.5).astype(int)
         is_half = (np.abs(place + 0.5 - np.rint(place + 0.5)) < self.slack_of_place[..., None] + 1e-7).any(-1)
@@ -92,7 +92,7 @@ class Expected:
         return np.where(with_weight, at_nearest, value), np.where(with_weight, 0, slack)
 
     def may_weigh(self, weights):
-        """On one grid a weight of zero is zero; between grids it may be rounding."""
+        """Whether a weight may be other than zero: on one grid zero is exact, between grids it may be rounding."""
         return weights != 0 if self.is_same_grid else np.ones(weights.shape, bool)
 
     @staticmethod
@@ -113,7 +113,7 @@ class Expected:
         return value, close
 
     def preserve_mass(self, jacobian):
-        """Of what is covered and is no padding: (HU + 1000) / |J| - 1000."""
+        """Replaces values that are covered and no padding by (HU + 1000) / |J| - 1000."""
         size = np.abs(jacobian)[..., None]
         scales = (self.covered & ~self.padded)[..., None] & (size > 0)
         with np.errstate(divide="ignore", invalid="ignore"):

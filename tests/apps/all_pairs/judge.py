@@ -62,7 +62,7 @@ def without_times(report):
 
 
 def check_alike(one, other, how):
-    """Two runs whose command lines differ in what must not matter."""
+    """Compares two runs whose command lines differ in what must not matter."""
     check(one.keys() == other.keys(), f"other files {how}: {sorted(one.keys() ^ other.keys())}")
     for name, data in one.items():
         if name == "r.json":
@@ -176,7 +176,7 @@ class Truth:
                       grid, outside)
 
     def checks(self):
-        """One after the other, each by itself; the others need the first."""
+        """The checks, in the order in which they run. The first one makes what all others need."""
         if self.kind == "short":
             return [self.check_grid, self.check_short]
         of_forward = [] if self.is_pull else [self.check_folds, self.check_jacobian, self.check_range]
@@ -235,7 +235,7 @@ class Truth:
             check(trip["forward_after_inverse"]["points"] > 0, "no point in forward_after_inverse")
 
     def check_by_inverse(self, folder):
-        """What the inverse gives as a pull field: its samples are rounded to 2^-12 voxel."""
+        """Checks the volume that the inverse gives as a pull field, whose samples are rounded to 2^-12 voxel."""
         model = copy.copy(self.model)
         model.tolerance = model.tolerance + 2 / 4096
         padding = getattr(self.source, "padding", None)
@@ -245,7 +245,7 @@ class Truth:
         self.none(expected.differences(values), "values by the inverse", values, expected.shown())
 
     def check_short(self):
-        """It ends before the last column, but by what a header rounds away: nothing may be lost."""
+        """Checks a field that ends before the last column by less than a header rounds: no voxel may be lost."""
         if self.case["grid"] != "same" or self.case["outside"] == "background":
             return
         self.background_of_nothing = self.coverage.size - int(self.coverage.sum())

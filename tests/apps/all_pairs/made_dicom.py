@@ -12,9 +12,9 @@ CT, ENHANCED, DOSE = "1.2.840.10008.5.1.4.1.1.2", "1.2.840.10008.5.1.4.1.1.2.1",
 STRUCTURES, SEGMENTATION = "1.2.840.10008.5.1.4.1.1.481.3", "1.2.840.10008.5.1.4.1.1.66.4"
 STUDY, FRAME = "1.2.826.0.1.3680043.10.77.1", "1.2.826.0.1.3680043.10.77.2"
 SERIES = "1.2.826.0.1.3680043.10.77.3"
-# What must not be found anywhere but in derived DICOM files; of de-identified series nowhere.
+# Words that may be found in derived DICOM files only, and nowhere if these are de-identified.
 PATIENT = {"PatientName": "ZWOELFER^AENNEMARIE", "PatientID": "QX7781", "PatientBirthDate": "19440229"}
-FOLDER = "folder-of-kappelmann"  # of a path: nowhere in what is made of a de-identified case
+FOLDER = "folder-of-kappelmann"  # part of a path, which no output of a de-identified case may contain
 
 
 def item(**attributes):

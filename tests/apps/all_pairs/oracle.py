@@ -15,7 +15,7 @@ NUDGE = np.array([15, 7, 4])
 
 
 class Tetrahedra:
-    """What a forward field is: corners of all tetrahedra, in their order."""
+    """A forward field, as the corners of all its tetrahedra, in their order."""
 
     def __init__(self, rest_mm, moved_mm, corners):
         self.rest_mm, self.moved_mm, self.corners = rest_mm, moved_mm, np.array(corners)
@@ -36,7 +36,7 @@ class Tetrahedra:
 
 
 def snap(index):
-    """To 2^-12 voxel, and whether that is a matter of the last bits."""
+    """An index rounded to steps of 2^-12 voxel, and whether its last bits decide how it is rounded."""
     steps = index * 4096
     return np.rint(steps).astype(np.int64), (np.abs(np.abs(steps - np.floor(steps)) - 0.5) < 1e-6).any(-1)
 
@@ -164,7 +164,7 @@ def weights(corner, p):
 
 
 def condition(corner, volume):
-    """What a rounding error of the products in Cramer's rule is multiplied with."""
+    """The factor by which a rounding error of the products in Cramer's rule grows."""
     worst = np.zeros(len(corner))
     for reference in range(4):
         e = np.abs(corner[:, [n for n in range(4) if n != reference]] - corner[:, [reference]]).astype(float)
@@ -178,7 +178,8 @@ def condition(corner, volume):
 
 
 class Deformed:
-    """By voxel: `mapped`, `u` (undeformed minus deformed place, voxels), its `tolerance`, `jacobian`, `doubtful`."""
+    """Where voxels come from through a forward field. By voxel: `mapped`, `u` (undeformed minus deformed place,
+    voxels), its `tolerance`, `jacobian`, `doubtful`."""
 
     def __init__(self, tetrahedra, grid, outside):
         owners = Owners(tetrahedra, grid)
@@ -220,7 +221,7 @@ class Deformed:
 
 
 class Pulled:
-    """The same of a pull field."""
+    """Where voxels come from through a pull field, with the members that a forward field has."""
 
     def __init__(self, field, grid, outside):
         shape = tuple(grid.size)

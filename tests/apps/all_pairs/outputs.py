@@ -44,7 +44,7 @@ class Outputs:
         self.world, self.case, self.folder, self.truth = world, case, pathlib.Path(folder), truth
 
     def checks(self):
-        """One after the other, each by itself."""
+        """The checks, in the order in which they run. None needs another."""
         return [self.check_volume, self.check_maps, self.check_with, self.check_points, self.check_preview,
                 self.check_series]
 

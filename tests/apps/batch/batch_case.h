@@ -18,7 +18,7 @@
 
 namespace tetwarp::test {
 
-/// Volumes to be deformed in batches: `ct.nii.gz`, `ct.nrrd` and `series`, small phantoms.
+/// A folder with volumes to be deformed in batches: `ct.nii.gz`, `ct.nrrd` and `series`, small phantoms.
 class BatchCase : public testing::Test {
  protected:
   void SetUp() override {
@@ -28,7 +28,7 @@ class BatchCase : public testing::Test {
   }
 
   Outcome run(const std::string& arguments) const { return run_tetwarp(scratch_.path(), arguments); }
-  /// `tetwarp batch manifest -o OUT` of these lines of JSON.
+  /// Runs `tetwarp batch manifest -o OUT` on a manifest of these lines of JSON.
   Outcome batch(const std::string& lines, const std::string& more = "-o out --quiet") const {
     write_file(scratch_ / "m.jsonl", lines);
     return run("batch m.jsonl " + more);
@@ -42,8 +42,9 @@ class BatchCase : public testing::Test {
     }
     return lines;
   }
-  /// What makes a command that of another user, who may write into the folder; the caller's own where that is not
-  /// root's, whom no permission stops. Nothing where the program lies beyond the other's reach.
+  /// The words before a command that let another user run it, who may write into the folder. They are empty if the
+  /// caller is not root, for permissions stop the caller then; root is stopped by none. No value: the other user cannot
+  /// reach the program.
   std::optional<std::string> as_another_user(int id) const {
     std::filesystem::permissions(scratch_.path(), std::filesystem::perms::all);
     if (geteuid() != 0) return "";
@@ -52,7 +53,7 @@ class BatchCase : public testing::Test {
     if (run_program(scratch_.path(), "/bin/sh", tried).status != 0) return std::nullopt;
     return as_other;
   }
-  /// All files below a folder with their bytes; those with times in them left out.
+  /// The bytes of all files below a folder, by name. Files that hold times are left out.
   std::map<std::string, std::string> files_of(const std::string& folder) const {
     std::map<std::string, std::string> files;
     for (const auto& entry : std::filesystem::recursive_directory_iterator(scratch_ / folder)) {

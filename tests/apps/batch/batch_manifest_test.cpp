@@ -181,7 +181,7 @@ TEST_F(BatchManifest, PathsAreRelativeToTheManifest) {
   EXPECT_TRUE(std::filesystem::exists(scratch_ / "out/a/deformed.nii.gz"));
 }
 
-/// By the rule of docs/reference/batch.md, in another language.
+/// Expected numbers come from an implementation of the rule in docs/reference/batch.md in another language.
 TEST_F(BatchManifest, NumbersAreDrawnByTheRuleOfTheDocuments) {
   write_file(scratch_ / "draw.py", R"(
 M = (1 << 64) - 1

@@ -72,7 +72,7 @@ def rows_of_data(tetwarp, folder, data, full):
         if listed.returncode != 0:
             continue
         lines = (folder / "init.csv").read_text().splitlines()
-        lines = [line.removeprefix("#") for line in lines if not line.startswith("# ")]  # of uneven slices too
+        lines = [line.removeprefix("#") for line in lines if not line.startswith("# ")]  # uneven slices too
         for row in csv.DictReader(lines):
             row = {key: value for key, value in row.items() if value and key not in ("comment", "output")}
             row["input"] = str((folder / row["input"]).resolve())

@@ -16,7 +16,7 @@
 #include "tests/support/program.h"
 #include "tests/support/scratch.h"
 
-/// A made-up CT series of 12 x 10 x 6 voxels, and what may go along with it.
+/// A made-up CT series of 12 x 10 x 6 voxels, and objects that may go along with it.
 struct AlongCase {
   static constexpr int kColumns = 12, kRows = 10, kSlices = 6, kVoxels = kColumns * kRows * kSlices;
   Scratch scratch;
@@ -38,7 +38,7 @@ struct AlongCase {
     return {{kColumns, kRows, kSlices}, {0.5, 0.75, 2.5}, {-10, -20, 30}, glm::dmat3(1)};
   }
 
-  /// On the grid of the series; every voxel another dose.
+  /// A dose on the grid of the series, with another value in every voxel.
   static MadeDose dose() {
     MadeDose made{.frames = "6", .offsets = "0\\2.5\\5\\7.5\\10\\12.5", .position = "-10\\-20\\30"};
     made.columns = kColumns;
@@ -49,7 +49,7 @@ struct AlongCase {
     return made;
   }
 
-  /// Two that overlap, and leave slices out.
+  /// Two segments that overlap, and leave slices out.
   static int organs(int segment, int i, int j, int k) {
     if (segment == 0) return (i - 5) * (i - 5) + (j - 4) * (j - 4) + 3 * (k - 2) * (k - 2) < 14 ? 1 : 0;
     return k >= 2 && k != 4 && i >= 4 && i < 10 && j >= 3 && j < 8 ? 1 : 0;
@@ -62,7 +62,7 @@ struct AlongCase {
     made.value = organs;
     return made;
   }
-  /// The same as fractions.
+  /// A fractional segmentation of the same segments.
   static MadeSeg fractions() {
     MadeSeg made = seg();
     made.fractional = true;
@@ -71,7 +71,7 @@ struct AlongCase {
     return made;
   }
 
-  /// A segment of it as an image on the grid of the series.
+  /// Writes a segment of a segmentation as an image on the grid of the series.
   void write_mask(const MadeSeg& made, int segment, const std::string& name) const {
     tetwarp::Volume<std::uint8_t> mask{grid(), {}};
     for (int n = 0; n < kVoxels; ++n)
@@ -95,7 +95,7 @@ struct AlongCase {
     return nlohmann::json::parse(read_text(scratch / sidecar))["with"];
   }
 
-  /// check_along.py with `object` of `source` and the series "out"; its exit status.
+  /// Runs check_along.py with `object` of `source` and the series "out", and returns its exit status.
   int check(const std::string& object, const std::string& source, const std::string& dump) const {
     return run_program(scratch.path(), TETWARP_PYTHON,
                        "'" TETWARP_CHECK_ALONG "' out '" + object + "' '" + source + "' " + dump)
@@ -112,7 +112,7 @@ struct AlongCase {
   }
 };
 
-/// Skips the test without pydicom.
+/// Runs a check of AlongCase; the test is skipped where pydicom is missing.
 #define TETWARP_CHECK_ALONG_WITH(kase, object, source, dump)                         \
   do {                                                                               \
     const int checked = (kase).check((object), (source), (dump));                    \

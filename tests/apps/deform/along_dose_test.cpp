@@ -103,7 +103,7 @@ TEST(DoseAlong, OfErrorsKeepsTheirSign) {
   EXPECT_LE(largest_difference(source.as<float>(), found.as<float>()), quantum(kase) / 2 + 1e-6);
 }
 
-/// Of the real plan. Its one CT slice is no volume, so a made-up one stands around the dose.
+/// The real plan has one CT slice, which is no volume, so a made-up volume stands around the dose.
 TEST(DoseAlong, OfARealPlanIsReadByPlastimatchAndPydicomAsTheImageOfIt) {
   TETWARP_REAL_DATA(folder, "rt-breast");
   const AlongCase kase;

@@ -102,7 +102,7 @@ TEST(Grid, AnyVolumeMayLendItsGrid) {
   EXPECT_EQ(nlohmann::json::parse(read_text(scratch / "moved.mha.json"))["options"]["grid"], "turned.mha");
 }
 
-constexpr double kSlope = 2.2913;  ///< of `write_plane`, a mm: |(0.5, -1, 2)|
+constexpr double kSlope = 2.2913;  ///< change of `write_plane` in a mm: |(0.5, -1, 2)|
 
 double plane(const glm::dvec3& point) { return glm::dot(point, glm::dvec3(0.5, -1, 2)) + 300; }
 
@@ -199,7 +199,7 @@ TEST(Grid, FitHoldsWhateverTheFieldMovesAway) {
   EXPECT_EQ(run_tetwarp(scratch.path(), "deform out.mha -f in.mha --grid fit -o x.mha").status, 4);
 }
 
-/// Of density, HU + 1000.
+/// Sum of the density, HU + 1000, of a volume's voxels.
 double sum_of(const std::filesystem::path& path) {
   const AnyVolume volume = read_image(path);
   double sum = 0;

@@ -83,8 +83,8 @@ TEST_P(BidsOfReal, AgreesWithDcm2niix) {
   for (const char* key : {"Modality", "Manufacturer", "ManufacturersModelName", "PatientPosition", "ConvolutionKernel",
                           "ExposureTime", "ImageOrientationPatientDICOM"})
     EXPECT_TRUE(keys.contains(key)) << key;
-  // Of the derived series it says the same image type, and that this is no raw image. (It takes model and software from
-  // the item of Contributing Equipment, which is us.)
+  // For the derived series dcm2niix states the same image type, and that this is no raw image. (It takes model and
+  // software from the item of Contributing Equipment, which names Tetwarp.)
   ASSERT_EQ(run_tetwarp(scratch.path(), deform + "-o out --series-description derived").status, 0);
   const json of_derived = by_dcm2niix(scratch, scratch / "out", "derived");
   const std::set<std::string> also =

@@ -74,7 +74,7 @@ def check_common(found, source, slices):
     to_slices = 0
     for sop_class, instance, path in references(found):
         if "ReferencedRTPlanSequence" in path or path == ["SourceImageSequence"]:
-            continue  # of the source: what it was made by, and the source itself
+            continue  # the plan by which the source was made, or the source itself
         expect(known.get(instance) == sop_class, f"{path} names {instance}, which is no slice of the series")
         to_slices += instance in known
     expect(to_slices >= len(slices), "not every slice is referred to")

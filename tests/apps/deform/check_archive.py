@@ -158,7 +158,7 @@ def deform(tetwarp, source, output, syntax):
 
 
 def check_fetched(archive, name, sent):
-    """By REST, one file after the other."""
+    """Fetches the files by REST, one after the other, and compares them with what was sent."""
     back = [Instance(archive.get(f"/instances/{archive.find(one.uid)[0]}/file")) for one in sent]
     pairs = list(zip(sent, back))
     require(all(a.data == b.data for a, b in pairs), f"{name}: all {len(sent)} data sets come back byte for byte")
@@ -176,7 +176,7 @@ def check_indexed(archive, name, sent, study):
 
 
 def decoded(archive, sent):
-    """What the archive makes of the pixels: 16 bits, little endian, slice by slice."""
+    """The pixels as the archive decodes them: 16 bits, little endian, slice by slice."""
     accept = {"Accept": "image/x-portable-arbitrarymap"}
     for one in sent:
         image = archive.get(f"/instances/{archive.find(one.uid)[0]}/frames/0/image-int16", **accept)
@@ -201,7 +201,7 @@ def check_stored_again(archive, tetwarp, source, folder, series):
 
 
 def check_query(archive, folder, sent):
-    """By C-GET, which getscu takes without compression alone."""
+    """Fetches the files by C-GET, which getscu accepts only without compression."""
     (folder / "got").mkdir()
     keys = [("0008,0052", "SERIES"), ("0020,000d", sent[0].study), ("0020,000e", sent[0].series)]
     keys = [word for key, value in keys for word in ("-k", f"{key}={value}")]

@@ -111,7 +111,7 @@ def check_references(folder, out, old):
 
 
 def inside(polygon, x, y):
-    """By the parity of edges that a ray along x crosses."""
+    """Whether points are inside contours, by the parity of edges that a ray along x crosses."""
     result = np.zeros(np.broadcast(x, y).shape, bool)
     for (ax, ay), (bx, by) in zip(polygon, np.roll(polygon, -1, axis=0)):
         if ay != by:

@@ -209,7 +209,7 @@ TEST(Deform, TheReportTellsWhatHappenedAndTheSidecarHasNoClock) {
   EXPECT_EQ(read_text(scratch / "look.png").substr(1, 3), "PNG");
 }
 
-/// What --report says of a field's quality, of a volume with enough slices that only some are looked at.
+/// What --report says of a field's quality. The volume has so many slices that only some of them are looked at.
 nlohmann::json quality_of(const Scratch& scratch, const std::string& options) {
   expect_run(scratch, "deform in.mha -o out.mha --report report.json --overwrite " + options);
   return nlohmann::json::parse(read_text(scratch / "report.json"))["quality"];

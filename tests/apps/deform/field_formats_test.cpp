@@ -19,8 +19,8 @@ namespace {
 
 using namespace tetwarp;
 
-/// A phantom, and a field on a grid that is turned against it: i down along z, j to the right, k to the back. All
-/// numbers of it are the same in float.
+/// The grid of a field that is turned against the phantom's: i runs down along z, j to the right, k to the back. All of
+/// its numbers are exact in float.
 Geometry turned_grid() {
   Geometry grid;
   grid.size = {4, 3, 5};
@@ -130,7 +130,7 @@ TEST(FieldFormats, ASplineOfNiftyRegIsATransformOnItsImageAndOnOtherGrids) {
   write_field_file(scratch / "pull.mha", PullField{grid, corner_displacement(grid)});
   for (const std::string kind : {"spline:corner", "spline:random"}) {
     if (!make_foreign_field(kind, scratch / "pull.mha", scratch / "cpp.nii")) GTEST_SKIP() << "python3-nibabel";
-    // Beside them dense fields of the same positions, in float64: the last bit of a voxel may differ.
+    // Dense fields of the same positions are compared, too, in float64, where the last bit of a voxel may differ.
     const auto run = [&](const std::string& arguments, const std::string& output) {
       const Outcome outcome = run_tetwarp(scratch.path(), "deform in.mha --overwrite " + arguments + " -o " + output);
       EXPECT_EQ(outcome.status, 0) << outcome.err;

@@ -9,12 +9,12 @@
 
 namespace tetwarp::test {
 
-/// A DICOM series of classic CT as ITK's own reader gives it: GDCMSeriesFileNames, GDCMImageIO, ImageSeriesReader.
+/// Reads a DICOM series of classic CT by ITK's own reader: GDCMSeriesFileNames, GDCMImageIO, ImageSeriesReader.
 /// @throws itk::ExceptionObject
 Volume<std::int16_t> read_with_itk(const std::filesystem::path& folder);
 
-/// The same from DCMTK's data sets and PS3.3 C.7.6.2 alone: slices sorted along row x column, HU by each slice's slope
-/// and intercept. Native pixels of 16 bits only. @throws std::runtime_error
+/// Reads the volume of a series by DCMTK's data sets and PS3.3 C.7.6.2 alone: slices sorted along row x column, HU by
+/// each slice's slope and intercept. It knows uncompressed pixels of 16 bits only. @throws std::runtime_error
 Volume<std::int16_t> read_with_dcmtk(const std::filesystem::path& folder);
 
 }  // namespace tetwarp::test

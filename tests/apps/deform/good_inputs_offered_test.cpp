@@ -27,7 +27,7 @@ Names names_of(const std::vector<GoodInput>& inputs) {
   return names;
 }
 
-/// Those of the sets that are there.
+/// Names of the inputs whose data set is there.
 Names present(const std::vector<GoodInput>& inputs) {
   std::vector<GoodInput> found;
   for (const GoodInput& input : inputs) {

@@ -130,7 +130,7 @@ TEST(Invert, AShiftGivenAsAPullFieldComesBackExactlyWhereItsGridEndsToo) {
   write_field_file(scratch / "pull.mha", PullField{grid, shift});
   const Outcome run = run_tetwarp(scratch.path(), "invert --pull-field pull.mha --like in.mha -o f.mha");
   ASSERT_EQ(run.status, 0) << run.err;
-  // Those on it: i from 2 to 21, j from 0 to 14, k from 1 to 12.
+  // The voxels on the grid: i from 2 to 21, j from 0 to 14, k from 1 to 12.
   EXPECT_NE(
       run.err.find(std::to_string(40 * 36 * 24 - 20 * 15 * 12) + " of 34560 vertices go beyond the grid of pull.mha"),
       std::string::npos)

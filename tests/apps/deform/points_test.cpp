@@ -110,7 +110,7 @@ TEST(DeformPoints, TheCsvOfThePromiseGetsAStatus) {
   EXPECT_FALSE(nlohmann::json::parse(read_text(scratch / "plain.mha.json")).contains("points"));
 }
 
-/// The same places in every form and frame go to the same places.
+/// The same points, in files of every format and frame, go to the same places.
 TEST(DeformPoints, AllFormsAndFramesAgree) {
   const Scratch scratch;
   write_spot(scratch / "in.mha", grid_of_samples(), {0, 0, 0});

@@ -57,7 +57,7 @@ TEST(RealPair, OnePhaseIsWarpedOntoTheOtherByThePullFieldAndByItsInverse) {
   const Scratch scratch;
   const AnyVolume t0 = read_image(folder / "t0.mha"), t5 = read_image(folder / "t5.mha");
   const std::string field = "'" + (folder / "dvf_t5_to_t0_4mm.mha").string() + "'";
-  EXPECT_NEAR(mean(t0, t5, {}).squared, 3069.2, 0.05);  // as SOURCE.md has it
+  EXPECT_NEAR(mean(t0, t5, {}).squared, 3069.2, 0.05);  // the number in SOURCE.md
 
   // SOURCE.md has 604.2 over all voxels, with the outermost voxels of t0 going on beyond it. Where it has a value the
   // same sampling in NumPy gives 608.88; here it is rounded to int16.

@@ -49,7 +49,7 @@ Difference difference(const std::vector<std::int16_t>& a, const std::vector<std:
   return found;
 }
 
-/// What another program says of an object; skips the test where that is not there.
+/// Expects that another program finds no fault in an object; the test is skipped where the program is missing.
 void expect_check(const Scratch& scratch, const std::string& program, const std::string& arguments) {
   const Outcome run = run_program(scratch.path(), program, arguments);
   if (run.status == 77) GTEST_SKIP() << run.out;

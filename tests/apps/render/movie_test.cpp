@@ -170,7 +170,7 @@ TEST_F(MovieProgram, NamesThatLookLikeProtocolsArePaths) {
   EXPECT_EQ(read_text(scratch_ / "http:/film.mp4"), "film\n");
 }
 
-/// With the encoder itself, where it is installed.
+/// Tests with ffmpeg itself, where it is installed.
 class RealMovie : public MovieProgram {
  protected:
   void SetUp() override {

@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 using test::read_png;
 
-/// `render` of small phantoms: `ct.nii` and `series`, the same.
+/// Runs `render` on a small phantom, as the file `ct.nii` and as the series `series`.
 class RenderProgram : public testing::Test {
  protected:
   void SetUp() override {

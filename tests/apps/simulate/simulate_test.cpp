@@ -259,7 +259,7 @@ TEST_F(Simulate, AnOpenCutIsOneFieldForReportHashGridAndFile) {
   scenario["cell_size"] = 3;
   scenario["phases"].erase(1);
   write_file(scratch_ / "open.json", scenario.dump());
-  // The same cut and lips; what moves besides lies far from the cut.
+  // Cut and lips stay as they are; what else moves lies far from the cut.
   scenario["phases"][0]["move"].push_back(
       {{"name", "back"}, {"handle", {{"at", {{"body", {0.5, 0.55, 0.8}}}}, {"radius_mm", 12}}}, {"by_mm", {0, 0, 9}}});
   write_file(scratch_ / "other.json", scenario.dump());
@@ -280,7 +280,7 @@ TEST_F(Simulate, AnOpenCutIsOneFieldForReportHashGridAndFile) {
     EXPECT_GT(trip["forward_after_inverse"]["points"], 10000) << name;
     EXPECT_LT(trip["forward_after_inverse"]["largest_mm"], 0.1) << name;
   }
-  // What is of a lattice is snapped as the lattice's, so the same mesh of none is another field.
+  // A vertex of a lattice is snapped like the lattice's, so the same mesh without a lattice is another field.
   std::string plain = read_text(scratch_ / "one.vtk");
   for (auto at = plain.find("tetwarp_lattice"); at != std::string::npos; at = plain.find("tetwarp_lattice", at))
     plain.replace(at, 7, "unknown");
@@ -339,7 +339,7 @@ TEST_F(Simulate, ShippedScenariosRunOnThePhantom) {
   for (const auto& entry : std::filesystem::directory_iterator(TETWARP_SCENARIOS)) {
     const std::string name = entry.path().stem().string();
     json scenario = json::parse(read_text(entry.path()));
-    scenario["cell_size"] = 2;  // of a phantom with few voxels
+    scenario["cell_size"] = 2;  // the phantom has few voxels
     write_file(scratch_ / (name + ".json"), scenario.dump());
     const Outcome made =
         run("simulate " + name + ".json ct.mha -o " + name + ".mha --report " + name + ".report.json --backend cpu");

@@ -29,7 +29,7 @@ CpuRun make_run(const std::string& field, const glm::i64vec3& size = {512, 512, 
   return run;
 }
 
-/// With the aim as well.
+/// Expects a floor that also has an aim.
 void expect_floor(const std::vector<Floor>& floors, const std::string& ratio, const std::string& where, double value,
                   std::optional<double> required, std::optional<double> aim, bool met) {
   test::expect_floor(floors, ratio, where, value, required, met);

@@ -160,7 +160,8 @@ TEST(GpuBackward, ClampsHalfAVoxelAndGivesTheBackgroundBeyond) {
   EXPECT_EQ(sample_backward(volume, {0, 0, 1.6f}, -5), -5);
 }
 
-// The fields whose inverse has a closed form are affine within a slice, so that both are the same map.
+// Fields whose inverse has a closed form are affine within a slice, so the exact inverse and Tetwarp's are the same
+// map.
 TEST(GpuBackward, GivenTheInverseItIsTetwarpsResult) {
   const glm::i64vec3 size(48, 48, 30);
   const Volume<std::int16_t> volume = phantom(size);

@@ -211,7 +211,7 @@ TEST(BenchProgram, MeasuresFilesAndLeavesNoneBehind) {
 }
 
 TEST(BenchProgram, AJobThatMissesItsFloorFailsOnlyWhereItIsAsked) {
-  // To start the program takes longer than to deform so little.
+  // A volume so small that starting the program takes longer than deforming it.
   const Scratch scratch;
   const std::string job = std::string(kTinyIo) + "--steps job ";
   EXPECT_EQ(run_bench(scratch, job).status, 0);

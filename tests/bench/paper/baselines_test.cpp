@@ -129,7 +129,7 @@ TYPED_TEST(BenchMethod, GenericTranslationGivesTheRampWithinRounding) {
   }
 }
 
-// With one split for all cells the diagonals of a shared face would cross, and this field would open them.
+// If all cells were split alike the diagonals of a shared face would cross, and this field would open the face.
 TYPED_TEST(BenchMethod, NeighbouringCellsCloseUpUnderASmoothField) {
   const std::vector<Written> voxels = TypeParam::run(kGrid, bulge);
   int lost = 0, multiple = 0;

@@ -14,7 +14,7 @@
 using ImageType = itk::Image<short, 3>;
 using FieldImageType = itk::Image<itk::Vector<float, 3>, 3>;
 
-/// Whether both images have the same grid and voxels, and the first other voxels than the undeformed one.
+/// Whether two images have the same grid and voxels, and the first differs from the undeformed one.
 bool is_as_expected(const ImageType& warped, const ImageType& expected, const ImageType& undeformed) {
   const auto region = expected.GetLargestPossibleRegion();
   if (warped.GetLargestPossibleRegion() != region || warped.GetOrigin() != expected.GetOrigin() ||

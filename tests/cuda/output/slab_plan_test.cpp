@@ -16,7 +16,7 @@ namespace {
 
 using namespace test;
 
-/// A field that is needed from one slice before a slab to one after it, a source likewise, and 10 bytes a result.
+/// What a slab needs: one slice before and after it of the field and of the source, and 10 bytes a voxel for results.
 SlabNeeds needs_of(std::int64_t begin, std::int64_t end) {
   const auto slices = static_cast<std::uint64_t>(end - begin);
   return {100 * (slices + 2), 50 * (slices + 2), 10 * slices};

@@ -189,7 +189,7 @@ TEST_F(GatherPaths, FieldsThatMoveFar) {
   SCOPED_TRACE(seed_text(test_seed()));
   const Geometry grid = unit_grid({600, 560, 3});
   const glm::dvec3 middle(299.5, 279.5, 1);
-  const double third = 0.3 / 4096;  // of a step: ends are not whole
+  const double third = 0.3 / 4096;  // of a step, so that vertices do not end at whole steps
   const std::function<glm::dvec3(glm::dvec3)> fields[] = {
       [](const glm::dvec3&) { return glm::dvec3(-255.5, 250, 0.25); },
       [&](const glm::dvec3&) { return glm::dvec3(-256 - third, 250, 0.25); },

@@ -19,8 +19,8 @@ using namespace tetwarp;
 constexpr int kSide = 8;  // voxels of the box that each random cell is looked up in
 constexpr int kVoxels = kSide * kSide * kSide;
 
-/// What one cell says of each voxel of its box: the lowest tetrahedron that owns it (or 5), u there, and a sample at
-/// it.
+/// What is found for each voxel in the box of one cell: the lowest of the cell's tetrahedra that owns it (5: none
+/// does), u there, and a sample at that place.
 struct Answer {
   std::uint8_t owner[kVoxels];
   std::uint8_t owners[kVoxels];

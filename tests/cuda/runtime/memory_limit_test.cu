@@ -25,7 +25,7 @@ class MemoryLimit : public testing::Test {
   }
 };
 
-constexpr std::uint64_t kWorkingSpace = 128'000'000;  // that comes on top of a limit
+constexpr std::uint64_t kWorkingSpace = 128'000'000;  // memory that comes on top of a limit
 
 std::uint64_t free_bytes() {
   std::size_t free = 0, total = 0;
@@ -35,7 +35,7 @@ std::uint64_t free_bytes() {
 
 std::uint64_t field_bytes(const VertexField& field) { return field.displacement.size() * sizeof(glm::vec3); }
 
-/// What a call is asked for.
+/// The outputs that a call fills.
 struct Wanted {
   Outside outside = Outside::background;
   Interpolation interpolation = Interpolation::linear;

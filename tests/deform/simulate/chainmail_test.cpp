@@ -186,7 +186,7 @@ TEST_P(Chainmail, HandlesThatContradictEachOtherBreakOnlyTheirOwnLinks) {
   EXPECT_EQ(found[pulled], glm::vec3(10, 0, 0));
   const std::vector<BrokenLink> broken = links_beyond_limits(model, found, 0);
   EXPECT_NE(std::find(broken.begin(), broken.end(), BrokenLink{static_cast<std::uint32_t>(held), 0, 9}), broken.end());
-  std::vector<BrokenLink> expected;  // by a walk over the two nodes' links, in whole 2^-16 mm
+  std::vector<BrokenLink> expected;  // found by a walk over the two nodes' links, in whole 2^-16 mm
   for (int axis = 0; axis < 3; ++axis) {
     for (std::size_t n = 0; n < model.nodes(); ++n) {
       const std::int32_t up = model.neighbour[model.link(direction_up(axis), n)];
@@ -512,7 +512,8 @@ TEST_P(Chainmail, WhatCannotBeUsedIsRefused) {
   EXPECT_TRUE(says(refused_loads([](Loads& loads) { loads.force.resize(8); }), {"no forces", "found 8"}));
   EXPECT_TRUE(says(refused_loads([](Loads& loads) { place(loads, 5, {0, NAN, 0}); }), {"goal of node 5", "nan"}));
   EXPECT_TRUE(says(refused_loads([](Loads& loads) { place(loads, 5, {0, 5000, 0}); }), {"node 5", "5000", "4096"}));
-  EXPECT_EQ(refused_loads([](Loads& loads) { loads.goal[5] = {0, NAN, 0}; }), "");  // of a free node
+  // The goal of a free node is not read.
+  EXPECT_EQ(refused_loads([](Loads& loads) { loads.goal[5] = {0, NAN, 0}; }), "");
   EXPECT_TRUE(says(refused([&] { simulation->advance(1.5, {}); }), {"1.5", "0 to 1"}));
   EXPECT_TRUE(says(refused([&] { simulation->advance(1, {.motion_mm = -1}); }), {"-1", "0 or more"}));
   EXPECT_TRUE(says(refused([&] { simulation->advance(1, {.steps = -2}); }), {"-2", "0 or more"}));

@@ -151,7 +151,7 @@ TEST(CutRun, ACutThatStaysOpenStaysAsWideAsItIsWhileAnotherIsMadeOrClosed) {
   run.next();
   std::vector<glm::vec3> before = run.displacement();
   for (int phase = 1; phase < 3; ++phase) {
-    // As the phase begins: the same scenario, played by a puppet that starts where the true run is.
+    // At the beginning of a phase: the same scenario, played by a puppet that starts where the true run is.
     const std::vector<Cut> first = open_cuts(scenario, scenario.phases[phase - 1], patient),
                            second = open_cuts(scenario, scenario.phases[phase], patient);
     const DividedLattice earlier = divide(patient.lattice, first), now = divide(patient.lattice, second);

@@ -375,7 +375,7 @@ TEST(MassSpringOnCpu, CholeskyAndConjugateGradientsAgree) {
   EXPECT_LT(furthest(of[0], of[1]), 1e-5);
 }
 
-/// Not only the same end: the same way there, to rounding, so that one's speed of convergence is the other's.
+/// Both reach not only the same end, but take the same steps, to rounding, so that they converge equally fast.
 TEST(MassSpringOnCpu, TheCodeOfDevicesTakesTheSameSteps) {
   Random random(test_seed(), 11);
   SCOPED_TRACE(seed_text(test_seed()));

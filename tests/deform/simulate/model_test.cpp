@@ -28,7 +28,7 @@ double elasticity(const glm::dvec3& h, int i, int j, int k, int l) {
 
 TEST(LatticeModel, SpringsOfACellHaveYoungsModulusOneAndPoissonsRatioOneFourth) {
   for (const glm::dvec3& h : {glm::dvec3(1), glm::dvec3(6.4, 6.4, 8), glm::dvec3(5, 6, 7)}) {
-    constexpr double kShear = 1 / 2.5;  // and lambda is the same
+    constexpr double kShear = 1 / 2.5;  // mu and lambda are equal
     for (int a = 0; a < 3; ++a) {
       EXPECT_NEAR(elasticity(h, a, a, a, a), 3 * kShear, 1e-12);
       EXPECT_NEAR(elasticity(h, a, a, (a + 1) % 3, (a + 1) % 3), kShear, 1e-12);
@@ -81,7 +81,7 @@ TEST(LatticeModel, LimitsAreTheTightestOfTheCellsRoundALink) {
   EXPECT_FLOAT_EQ(limits(0, 0).longest, 1.2f);
   EXPECT_FLOAT_EQ(limits(0, 1).longest, 0.06f);
   EXPECT_FLOAT_EQ(limits(1, 0).shortest, -1.4f);
-  EXPECT_FLOAT_EQ(limits(1, 1).shortest, -0.35f);  // of both cells
+  EXPECT_FLOAT_EQ(limits(1, 1).shortest, -0.35f);  // the tighter limit of the two cells
   EXPECT_FLOAT_EQ(limits(2, 1).shear, 0.16f);
   EXPECT_EQ(limits(0, 2).longest, 0);  // no link
 }

@@ -95,7 +95,8 @@ TEST(Patient, LabelOfACellIsTheMostFrequentAndOfSeveralTheSmallest) {
 }
 
 TEST(Zones, SphereBoxAndHalfSpaceHoldTheirBorders) {
-  const Patient patient = uniform_patient();  // vertices at -20, -16, ... 20, likewise, and 0, 8, ... 40
+  // Vertices along x at -20, -16, ... 20, along y the same, along z at 0, 8, ... 40.
+  const Patient patient = uniform_patient();
   const auto count = [&](const Zone& zone) { return numbers_of(select(zone, patient)).size(); };
   EXPECT_EQ(count({Sphere{{{0, 0, 16}}, {4}}}), 5u);  // the middle, and four at 4 mm
   EXPECT_EQ(count({Sphere{{{0, 0, 16}}, {8}}}), 15u);

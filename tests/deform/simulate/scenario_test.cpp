@@ -165,7 +165,7 @@ TEST(Scenario, CutsArePlacedByTheBodyAndThoseClosedLeftOut) {
   EXPECT_EQ(cuts[0].name, "c");
 }
 
-/// Places what is placed, leaves the rest, and remembers what it was asked.
+/// A simulation that moves placed nodes to their goals, leaves all others, and remembers its loads.
 class Puppet final : public Simulation {
  public:
   struct Log {

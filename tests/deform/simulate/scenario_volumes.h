@@ -13,7 +13,7 @@
 
 namespace tetwarp::simulate::test {
 
-/// What an action says that must be refused; empty where it is not.
+/// The message with which an action is refused; empty where it is not.
 template <class Action>
 std::string refusal(const Action& action) {
   try {
@@ -36,17 +36,17 @@ Volume<std::int16_t> ct_of(const Geometry& geometry, const Hu& hu) {
   return ct;
 }
 
-/// 21 x 21 x 11 voxels of 2 x 2 x 4 mm from (-20, -20, 0): with cells of 2 voxels 11 x 11 x 6 vertices, of 4 x 4 x 8
-/// mm.
+/// A grid of 21 x 21 x 11 voxels of 2 x 2 x 4 mm from (-20, -20, 0). With cells of 2 voxels it has 11 x 11 x 6
+/// vertices, 4 x 4 x 8 mm apart.
 inline Geometry small_grid() { return {.size = {21, 21, 11}, .spacing = {2, 2, 4}, .origin = {-20, -20, 0}}; }
 
-/// Everywhere of one HU: the body is all of it.
+/// A patient with one HU everywhere, so that the body is the whole volume.
 inline Patient uniform_patient(double hu = 40) {
   const Volume<std::int16_t> ct = ct_of(small_grid(), [&](auto...) { return hu; });
   return examine(view(ct), nullptr, 2, -400);
 }
 
-/// Vertices of a selection.
+/// Numbers of the vertices in a selection.
 inline std::vector<std::size_t> numbers_of(const std::vector<std::uint8_t>& inside) {
   std::vector<std::size_t> numbers;
   for (std::size_t n = 0; n < inside.size(); ++n) {
@@ -67,7 +67,7 @@ inline TissueClass tissue_of(std::string name, std::optional<HuRange> hu = {}, s
   return one;
 }
 
-/// One tissue, one phase, chainmail.
+/// A scenario with one tissue and one phase, by ChainMail.
 inline Scenario scenario_of(std::vector<Held> hold, std::vector<Move> moves) {
   Scenario scenario;
   scenario.cell_size = 2;

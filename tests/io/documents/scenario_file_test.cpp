@@ -77,7 +77,7 @@ class ScenarioFile : public testing::Test {
     }
     return "taken";
   }
-  /// Of the whole scenario with a change.
+  /// The refusal of the whole scenario with one text replaced by another.
   std::string refusal(const std::string& from, const std::string& to) { return refusal(replaced(kWhole, from, to)); }
 
   Scratch scratch_;

@@ -251,7 +251,7 @@ TEST(DicomField, DamagedFilesAreRefusedByName) {
   write_registration(path, {MadeItem()});
   const std::string good = read_bytes(path);
   ASSERT_EQ(error_of(path), "");
-  const std::size_t values = good.size() - 288;  // with explicit lengths the vectors come last
+  const std::size_t values = good.size() - 288;  // the vectors come last, and lengths are explicit
   for (std::size_t n = 0; n < good.size(); ++n) {
     write_file(path, good.substr(0, n));
     const std::string text = error_of(path);

@@ -32,7 +32,7 @@ std::string noise(std::size_t size) {
   return bytes;
 }
 
-/// As `write_gzip` has it, cut into pieces of `step` bytes.
+/// The gzip file that `write_gzip` makes of a text cut into pieces of `step` bytes.
 std::string ours(const std::string& plain, std::size_t step, int level = 1) {
   std::ostringstream out;
   const auto piece = [&](std::size_t i, std::vector<std::byte>&) {

@@ -28,7 +28,7 @@ struct Kind {
   const char* name;
   const char* file;
   std::function<void(const std::filesystem::path&)> write;
-  bool checked = true;  ///< by a check sum: a flip is found
+  bool checked = true;  ///< a check sum finds a flipped bit
 };
 
 void by_itk(const std::filesystem::path& path, ItkFormat format, int level) {
@@ -91,7 +91,7 @@ class DamagedVolume : public testing::TestWithParam<Kind> {
   Scratch scratch_;
   std::filesystem::path path_;
   std::string bytes_;
-  std::size_t begin_ = 0;  ///< of the voxels
+  std::size_t begin_ = 0;  ///< byte at which the voxels begin
   AnyVolume expected_;
 };
 

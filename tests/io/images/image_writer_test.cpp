@@ -183,7 +183,7 @@ TEST(ImageWriter, GzippedNiftiIsThePlainOneInMembers) {
   for (const int components : {1, 3}) {
     const AnyVolume volume = noisy({151, 113, 40}, VoxelType::f32, components);
     const std::string plain = written(scratch / "x.nii", volume, 4, {-1, {}});
-    // The same stream in members: the header, then each plane in pieces of 1 MiB, of which the last is shorter.
+    // The stream in members: the header, then each plane in pieces of 1 MiB, the last of which is shorter.
     const std::size_t plane = (plain.size() - 352) / static_cast<std::size_t>(components);
     std::vector<std::string> pieces = {plain.substr(0, 352)};
     for (std::size_t begin = 352; begin < plain.size(); begin += plane) {

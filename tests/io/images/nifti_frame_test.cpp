@@ -22,7 +22,7 @@ namespace {
 
 constexpr std::size_t kQformCode = 252, kSformCode = 254, kPixdim = 76, kQuaternion = 256, kQoffset = 268, kSrow = 280;
 
-/// The bytes of a file whose two forms are the same.
+/// The bytes of a file whose qform and sform are equal.
 std::string even_file(const Scratch& scratch, const Geometry& grid = oblique_grid(), int components = 1) {
   const VoxelType type = components == 1 ? VoxelType::i16 : VoxelType::f32;
   write_image(scratch / "even.nii", numbered(grid, type, components).view());
@@ -194,7 +194,7 @@ TEST(NiftiFrame, RoundingOfWritersIsNoDifference) {
     Geometry one = grids[n];
     one.size = {2, 2, 2};
     std::string bytes = even_file(scratch, one);
-    const glm::i64vec3& size = grids[n].size;  // as large as the header says, in a file that takes no room
+    const glm::i64vec3& size = grids[n].size;  // the file is as large as its header says, but sparse
     for (int axis = 0; axis < 3; ++axis) put(bytes, 42 + 2 * axis, static_cast<std::int16_t>(size[axis]));
     written(scratch, "x.nii", bytes);
     std::filesystem::resize_file(scratch / "x.nii", 352 + 2 * static_cast<std::size_t>(size.x * size.y * size.z));

@@ -194,7 +194,7 @@ TEST(PointsFile, StlNormalsAreThoseOfTheMovedFacets) {
   std::string text = with(sample_text_stl(""), "0 0 1", "0 -1 0");
   text = with(with(with(text, "1 2 3", "0 4 0"), "11 2.5 3", "2 4 0"), "1 22 3.25", "0 4 3");
   EXPECT_EQ(read_text(scratch / "u.stl"), text);
-  // In RAS the same corners have the same normal turned by 180 degrees about z; a flat facet has none.
+  // Taken as RAS, the same corners have the same normal turned by 180 degrees about z; a flat facet has none.
   write_file(scratch / "r.stl", sample_text_stl("SPACE=RAS"));
   PointsFile(scratch / "r.stl").write(scratch / "s.stl", corners, std::vector(3, kMoved));
   EXPECT_NE(read_text(scratch / "s.stl").find("normal 0 1 0\n"), std::string::npos);

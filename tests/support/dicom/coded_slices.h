@@ -19,7 +19,7 @@ inline std::vector<std::uint16_t> busy_words(int count) {
   return words;
 }
 
-/// 10 rows and 12 columns of 12 bits; HU are the stored values.
+/// A slice of 10 rows and 12 columns of 12 bits; HU are the stored values.
 inline MadeSlice busy_slice() {
   MadeSlice slice;
   slice.rows = 10;
@@ -36,7 +36,9 @@ inline void register_encoders() {
   DcmRLEEncoderRegistration::registerCodecs();
   DJEncoderRegistration::registerCodecs();
   DJLSEncoderRegistration::registerCodecs(0, 0, 0, 0,
-                                          OFFalse);  // words as they are: the other way reads beyond odd images
+                                          // Takes the words as they are: with the other way DCMTK reads beyond the end
+                                          // of images of odd size.
+                                          OFFalse);
 }
 
 /// `busy_slice` in high-throughput JPEG 2000, which no library of Debian 12 but OpenJPH's own encodes: made by
@@ -55,10 +57,10 @@ inline std::string high_throughput_frame() {
   return bytes;
 }
 
-/// How `busy_slice` is compressed for a transfer syntax.
+/// How `busy_slice` is compressed in one transfer syntax.
 struct Coding {
   std::string name, uid;
-  E_TransferSyntax encoding = EXS_Unknown;  ///< of an encoder of DCMTK
+  E_TransferSyntax encoding = EXS_Unknown;  ///< encoding that an encoder of DCMTK makes
   int bits = 12;
   bool is_lossless = true;
 
@@ -72,7 +74,8 @@ struct Coding {
     return slice;
   }
   std::string frame(const std::filesystem::path& scratch) const { return frame(scratch, slice()); }
-  /// The same of a slice with other words, but for high-throughput JPEG 2000.
+  /// The compressed frame of a slice with other words. High-throughput JPEG 2000 has one frame only, that of
+  /// busy_slice.
   std::string frame(const std::filesystem::path& scratch, const MadeSlice& of) const {
     if (encoding != EXS_Unknown) return encoded_frame(scratch, of, encoding);
 #ifdef TETWARP_WITH_OPENJPEG

@@ -11,7 +11,7 @@
 #include <stdexcept>
 #include <string>
 
-/// Writes a copy of a DICOM file with its data set changed, in the transfer syntax that it has.
+/// Writes a copy of a DICOM file with its data set changed, in the transfer syntax of the file.
 inline void edit_copy(const std::filesystem::path& from, const std::filesystem::path& to,
                       const std::function<void(DcmDataset&)>& edit) {
   DcmFileFormat format;

@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-/// A tiny CT slice as a scanner might write it; tests change what they are about.
+/// A tiny CT slice as a scanner might write it. A test changes the members that it is about.
 struct MadeSlice {
   int rows = 4, columns = 6;
   int bits_allocated = 16, bits_stored = 16, high_bit = 15;
@@ -28,7 +28,7 @@ struct MadeSlice {
   int instance_number = 1, series_number = 1;
   E_TransferSyntax encoding = EXS_LittleEndianExplicit;
   const DcmRepresentationParameter* encoder_parameter = nullptr;
-  std::function<void(DcmDataset&)> edit;  ///< last word before writing
+  std::function<void(DcmDataset&)> edit;  ///< changes the data set at last, before it is written
 };
 
 inline std::vector<std::uint16_t> words_of(const MadeSlice& slice) {
@@ -47,7 +47,7 @@ inline void put_pixels(DcmDataset& data, const MadeSlice& slice) {
   }
 }
 
-/// All attributes but Pixel Data.
+/// Puts all attributes of a slice but Pixel Data.
 inline void put_attributes(DcmDataset& data, const MadeSlice& slice) {
   const auto text = [&](const DcmTagKey& tag, const std::string& value) {
     data.putAndInsertString(tag, value.c_str());
@@ -79,7 +79,7 @@ inline void put_attributes(DcmDataset& data, const MadeSlice& slice) {
   word(DCM_PixelRepresentation, slice.is_signed ? 1 : 0);
 }
 
-/// Writes the slice; its transfer syntax may be one that a registered DCMTK encoder makes.
+/// Writes the slice. Its transfer syntax may also be one that a registered encoder of DCMTK makes.
 inline void write_slice(const std::filesystem::path& path, const MadeSlice& slice) {
   DcmFileFormat format;
   DcmDataset& data = *format.getDataset();
@@ -92,7 +92,7 @@ inline void write_slice(const std::filesystem::path& path, const MadeSlice& slic
   if (result.bad()) throw std::runtime_error(result.text());
 }
 
-/// Image Position of a slice, z with six decimals.
+/// Image Position of a slice as text, z with six decimals.
 inline std::string position_text(double x, double y, double z) {
   char text[64];
   std::snprintf(text, sizeof text, "%g\\%g\\%.6f", x, y, z);

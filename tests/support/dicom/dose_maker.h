@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-/// A small RT Dose file; value n is stored as 1000 n, of 32 bits as 10 000 n.
+/// A small RT Dose file. Value n is stored as 1000 n in 16 bits, or as 10 000 n in 32 bits.
 struct MadeDose {
   int bits = 32;
   std::string frames = "3", offsets = "0\\2.5\\5", position = "-10\\20\\7", orientation = "1\\0\\0\\0\\1\\0";
@@ -22,7 +22,7 @@ struct MadeDose {
   int columns = 4, rows = 2, count = 24;  ///< voxels
   std::string spacing = "2\\3", frame = "1.2.4", study = "1.2", patient = "SECRET-ID";
   std::function<unsigned(unsigned)> stored = {};
-  std::function<void(DcmDataset&)> edit = {};  ///< last word before writing
+  std::function<void(DcmDataset&)> edit = {};  ///< changes the data set at last, before it is written
   E_TransferSyntax encoding = EXS_LittleEndianExplicit;
 
   void write(const std::filesystem::path& path) const {
@@ -86,7 +86,7 @@ struct MadeDose {
     data.putAndInsertTagKey(DCM_FrameIncrementPointer, DCM_GridFrameOffsetVector);
   }
 
-  /// The plan that it is of, its structures, and a histogram.
+  /// Puts references to the dose's plan and its structures, and a histogram.
   static void put_plan(DcmDataset& data) {
     const auto refer = [&](const DcmTagKey& sequence, const char* sop_class, const char* instance) {
       DcmItem* item = nullptr;

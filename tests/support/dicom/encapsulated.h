@@ -10,9 +10,9 @@
 #include "tests/support/dicom/dicom_maker.h"
 #include "tests/support/write_file.h"
 
-// DICOM files whose Pixel Data are written byte by byte: what no encoder of DCMTK makes.
+// DICOM files whose Pixel Data are written byte by byte, for data that no encoder of DCMTK makes.
 
-/// An attribute, Explicit VR Little Endian; `vr` of two letters, or none for an item (PS3.5 7.1.2, 7.5).
+/// Appends an attribute in Explicit VR Little Endian. @param vr  two letters, or none for an item (PS3.5 7.1.2, 7.5)
 inline void append_element(std::string& bytes, std::uint16_t group, std::uint16_t element, const std::string& vr,
                            std::uint32_t length) {
   append_value(bytes, group);
@@ -27,7 +27,7 @@ inline void append_element(std::string& bytes, std::uint16_t group, std::uint16_
   append_value(bytes, length);
 }
 
-/// Preamble and meta header (PS3.10 7.1) that name a transfer syntax, known to DCMTK or not.
+/// Preamble and meta header (PS3.10 7.1) that name a transfer syntax, whether or not DCMTK knows it.
 inline std::string file_start(std::string transfer_syntax_uid) {
   if (transfer_syntax_uid.size() % 2 != 0) transfer_syntax_uid += '\0';
   std::string meta;
@@ -39,7 +39,7 @@ inline std::string file_start(std::string transfer_syntax_uid) {
   return bytes + meta;
 }
 
-/// All attributes but Pixel Data, Explicit VR Little Endian.
+/// The bytes of all attributes of a data set but Pixel Data, in Explicit VR Little Endian.
 inline std::string attributes_of(DcmDataset& data) {
   delete data.remove(DCM_PixelData);
   std::string bytes(data.calcElementLength(EXS_LittleEndianExplicit, EET_ExplicitLength) + 1024, '\0');
@@ -55,7 +55,7 @@ inline std::string attributes_of(DcmDataset& data) {
   return bytes;
 }
 
-/// The same of a slice.
+/// The bytes of all attributes of a slice but Pixel Data, in Explicit VR Little Endian.
 inline std::string attributes_of(const MadeSlice& slice) {
   DcmDataset data;
   put_attributes(data, slice);

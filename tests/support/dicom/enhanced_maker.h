@@ -21,7 +21,7 @@ inline std::unique_ptr<DcmDataset> classic_slice(const MadeSlice& slice) {
   return data;
 }
 
-/// The slices of `write_stack`.
+/// The slices that `write_stack` writes, in memory.
 inline ClassicSlices classic_stack(
     int count, const std::function<void(int, MadeSlice&)>& change = [](int, MadeSlice&) {}) {
   ClassicSlices slices;
@@ -37,7 +37,7 @@ inline ClassicSlices classic_stack(
   return slices;
 }
 
-/// Writes them as classic files, "s000.dcm" and so on.
+/// Writes slices as classic files, "s000.dcm" and so on.
 inline void write_classic(const std::filesystem::path& folder, const ClassicSlices& slices) {
   std::filesystem::create_directories(folder);
   for (std::size_t k = 0; k < slices.size(); ++k) {
@@ -49,7 +49,7 @@ inline void write_classic(const std::filesystem::path& folder, const ClassicSlic
   }
 }
 
-/// Slices of files, not compressed.
+/// Reads the slices of files, whose Pixel Data become uncompressed.
 inline ClassicSlices classic_files(const std::vector<std::filesystem::path>& files) {
   ClassicSlices slices;
   for (const std::filesystem::path& file : files) {
@@ -62,7 +62,7 @@ inline ClassicSlices classic_files(const std::vector<std::filesystem::path>& fil
   return slices;
 }
 
-/// The item of a functional group, made if it is not there.
+/// The item of a functional group. It is made if it is not there.
 inline DcmItem& macro_of(DcmItem& groups, const DcmTagKey& sequence) {
   DcmItem* item = nullptr;
   groups.findOrCreateSequenceItem(sequence, item, 0);
@@ -76,11 +76,12 @@ inline void copy_text(DcmItem& from, const DcmTagKey& old_tag, DcmItem& to, cons
 
 struct MadeEnhanced {
   std::string sop_class = UID_EnhancedCTImageStorage, sop_instance = "1.2.3.900";
-  bool all_shared = false;                              ///< spacing and orientation, else they are each frame's own
-  std::function<void(int, DcmItem&)> edit_groups = {};  ///< of a frame
-  std::function<void(DcmDataset&)> edit = {};           ///< last word before writing
+  bool all_shared = false;  ///< spacing and orientation are shared; otherwise each frame has its own
+  std::function<void(int, DcmItem&)> edit_groups = {};  ///< changes the functional groups of a frame
+  std::function<void(DcmDataset&)> edit = {};           ///< changes the data set at last, before it is written
 
-  /// Attributes and frames as words; Pixel Data are those of the slices, one after the other.
+  /// An Enhanced CT object made of classic slices. The words of its Pixel Data are those of the slices, one after the
+  /// other.
   std::unique_ptr<DcmDataset> of(const ClassicSlices& slices) const {
     auto data = std::make_unique<DcmDataset>(*slices.front());
     const DcmTagKey moved[] = {DCM_ImagePositionPatient, DCM_ImageOrientationPatient,
@@ -155,7 +156,8 @@ struct MadeEnhanced {
     data.findAndGetUint16(DCM_BitsAllocated, allocated);
     data.findAndGetUint16(DCM_Rows, rows);
     data.findAndGetUint16(DCM_Columns, columns);
-    const std::size_t size = std::size_t{rows} * columns;  // a file of one slice has an even number of bytes
+    // A file of one slice may have a byte of padding, which is left out.
+    const std::size_t size = std::size_t{rows} * columns;
     std::vector<Uint8> bytes;
     std::vector<Uint16> words;
     for (const auto& slice : slices) {

@@ -17,7 +17,7 @@ struct MadeCodestream {
   int rows = 0, columns = 0, precision = 16;
   bool is_signed = false;
   std::vector<int> samples;
-  std::function<void(opj_cparameters_t&)> change;  ///< of what is lossless, one tile, one layer
+  std::function<void(opj_cparameters_t&)> change;  ///< changes the parameters, which are lossless, one tile, one layer
 
   std::string encode() const;
 };

@@ -8,7 +8,8 @@
 #include <string>
 #include <vector>
 
-/// Frames of one component, coded with one table in which every size has a code of 5 bits: its number.
+/// Writes JPEG frames of one component, coded with one Huffman table in which every size has a code of 5 bits that
+/// equals it.
 class JpegWriter {
  public:
   JpegWriter(std::uint8_t marker, int rows, int columns, int precision, int restart_interval = 0) {
@@ -43,7 +44,7 @@ class JpegWriter {
     bits(size, 5);
     if (size < 16) bits(value < 0 ? value + (1 << size) - 1 : value, size);
   }
-  /// Fills the last byte and writes a marker.
+  /// Fills the last byte with bits of `fill` and writes a marker.
   void marker(int code, int fill = 1) {
     while (filled_ != 0) bits(fill, 1);
     bytes_ += '\xff';

@@ -10,7 +10,7 @@
 
 namespace tetwarp {
 
-/// The one series, and volume, of a folder or a file.
+/// The series of a folder or a file, which must hold one, with one volume.
 inline DicomSeries only_series(const std::filesystem::path& path) {
   DicomScan scan = scan_dicom(path);
   if (scan.series.size() != 1)

@@ -23,9 +23,9 @@ struct MadeSeg {
   bool fractional = false;
   int largest = 255;                                  ///< Maximum Fractional Value
   std::vector<int> segments = {1, 2};                 ///< Segment Numbers
-  std::function<int(int, int, int, int)> value = {};  ///< of segment n at (i, j, k)
+  std::function<int(int, int, int, int)> value = {};  ///< value of segment n at voxel (i, j, k)
   std::string spacing_between = "2.5", frame = "1.2.4", study = "1.2", patient = "SECRET-ID";
-  std::function<void(DcmDataset&)> edit = {};  ///< last word before writing
+  std::function<void(DcmDataset&)> edit = {};  ///< changes the data set at last, before it is written
 
   void write(const std::filesystem::path& path) const {
     DcmFileFormat format;

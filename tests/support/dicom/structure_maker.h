@@ -19,11 +19,11 @@ struct MadeContour {
   std::vector<std::array<double, 3>> points;
 };
 
-/// A structure set; tests change what they are about.
+/// A structure set as a planning system writes it. A test changes the members that it is about.
 struct MadeStructures {
   std::string frame = "1.2.4", study = "1.2", series = "1.2.900", sop_instance = "1.2.900.1";
-  std::vector<std::vector<MadeContour>> rois;  ///< of ROI 1, 2, ...
-  std::function<void(DcmDataset&)> edit;       ///< last word before writing
+  std::vector<std::vector<MadeContour>> rois;  ///< contours of ROI 1, 2, ...
+  std::function<void(DcmDataset&)> edit;       ///< changes the data set at last, before it is written
 };
 
 inline DcmItem& made_item(DcmItem& item, const DcmTagKey& sequence) {

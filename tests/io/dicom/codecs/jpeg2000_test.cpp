@@ -114,7 +114,7 @@ TEST(Jpeg2000, SignAndPrecisionAreThoseOfTheCodestream) {
   // Fewer bits than Bits Stored, and more.
   EXPECT_EQ(decoded(12, true, {-2048, -1, 0, 2047}, header_of(1, 4, 16, true)), (Samples{-2048, -1, 0, 2047}));
   EXPECT_EQ(decoded(16, true, {-2048, -1, 0, 2047}, header_of(1, 4, 12, true)), (Samples{-2048, -1, 0, 2047}));
-  // As encoders leave them that take two's complement for numbers without a sign, and the other way round.
+  // Some encoders take two's complement for numbers without a sign, others numbers without a sign for two's complement.
   EXPECT_EQ(decoded(13, false, {0, 1, 4096, 8191}, header_of(1, 4, 13, true)), (Samples{0, 1, -4096, -1}));
   EXPECT_EQ(decoded(12, true, {-2048, -1, 0, 2047}, header_of(1, 4, 12, false)), (Samples{2048, 4095, 0, 2047}));
 }

@@ -95,7 +95,7 @@ def corners(affine, size):
 
 
 def turned(affine, voxels, like):
-    """The same voxels in the order of another affine: axes exchanged and flipped, nothing else."""
+    """Voxels in the order of another affine: axes are exchanged and flipped, nothing else changes."""
     steps = np.linalg.inv(like[:3, :3]) @ affine[:3, :3]
     axis_of = np.abs(steps).argmax(axis=1)
     if sorted(axis_of) != [0, 1, 2]:

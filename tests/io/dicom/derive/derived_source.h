@@ -41,7 +41,7 @@ inline unsigned long items_of(DcmItem& item, const DcmTagKey& sequence) {
   return item.findAndGetSequence(sequence, found).good() ? found->card() : 0;
 }
 
-/// A CT volume of made-up HU and headers as a scanner writes them, one a slice.
+/// A CT volume of made-up HU, and for each slice a header as a scanner writes it.
 struct DerivedSource {
   Volume<std::int16_t> volume;
   DicomHeaders headers;

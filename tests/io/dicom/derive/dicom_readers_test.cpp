@@ -106,7 +106,7 @@ TEST(DerivedFromBareSeries, HasOnlyTheErrorThatNobodyCanMend) {
   bare.description = "Deformed";
   const DicomWriteReport report = write_derived_series(scratch / "out", view(source.volume), *source.headers, bare);
   EXPECT_GT(report.added_empty.size(), 10U);
-  // Which body part it was, and so whether it has a side, is not known.
+  // It is not known which body part the images show, and so whether it has a side.
   EXPECT_EQ(dciodvfy_errors(files_in(scratch / "out")),
             std::set<std::string>{
                 "Error - Missing attribute Type 2C Conditional Element=<Laterality> Module=<GeneralSeries>"});

@@ -202,7 +202,8 @@ TEST(DerivedSeries, SliceThicknessThatVariesIsLeftToSlicesOfTheSource) {
   EXPECT_EQ(Written(scratch / "own" / kNames[0])[DCM_SliceThickness], "2.50");
   EXPECT_EQ(Written(scratch / "own" / kNames[2])[DCM_SliceThickness], "5.0");
 
-  for (const std::string thickness : {"2.50", "5.0"}) {  // the same in all slices; that of one
+  // Equal in all slices; in the second case stated by one slice alone.
+  for (const std::string thickness : {"2.50", "5.0"}) {
     DerivedSource more(5);
     more.headers.slices.resize(3);
     more.sampled.assign(5, {0, 2});

@@ -22,8 +22,10 @@ namespace fs = std::filesystem;
 
 struct Damaged {
   std::string name, file;
-  int most_turned, most_lost;  ///< of so many tries that may pass unseen
-  double worst_share = 1;      ///< of the pixels that may be wrong where a turned bit is not seen
+  /// The most damaged frames, of all that are tried, that may be decoded without an error: with a turned bit, with
+  /// bytes lost.
+  int most_turned, most_lost;
+  double worst_share = 1;  ///< the largest share of pixels that may be wrong where a turned bit is not found
   friend void PrintTo(const Damaged& damaged, std::ostream* stream) { *stream << damaged.name; }
 };
 

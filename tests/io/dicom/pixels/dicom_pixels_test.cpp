@@ -64,7 +64,7 @@ TEST(Hu, IsTheStoredValueAndTheInterceptForEveryWord) {
 TEST(Hu, OfEightBitsIsKnownForEveryWordThatADecoderMayGive) {
   for (const auto& [bits_stored, high_bit] : {std::pair{8, 7}, {7, 6}, {1, 0}, {4, 7}, {5, 5}}) {
     for (const bool is_signed : {false, true}) {
-      for (const double slope : {1.0, 2.0}) {  // by an offset, and by the table
+      for (const double slope : {1.0, 2.0}) {  // 1 is converted by an offset, 2 by the table
         PixelFormat stored = format(bits_stored, high_bit, is_signed, 3, 8);
         stored.slope = slope;
         std::vector<std::uint16_t> words(UINT16_MAX + 1);

@@ -239,7 +239,7 @@ void put_word(DcmDataset& data, const DcmTagKey& tag, DcmEVR vr, int value) {
 TEST_F(EditedSlice, PaddingIsReadWhateverItsVr) {
   struct Case {
     bool is_signed;
-    int value, limit;  // as the 16 bits
+    int value, limit;  // the 16 bits of each
     double low, high;  // HU
   };
   // The real slice's own padding, -2000, and ranges in either order; 63536 is -2000 of unsigned 16 bits.

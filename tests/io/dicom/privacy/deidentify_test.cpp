@@ -115,7 +115,7 @@ TEST(Deidentify, WhatNobodyCanLookIntoGoes) {
     ASSERT_TRUE(element->putUint8Array(reinterpret_cast<const Uint8*>("SECRET"), 6).good());
     ASSERT_TRUE(dataset.insert(element, OFTrue).good());
   };
-  insert(DCM_ConvolutionKernel);  // of an attribute that is kept otherwise
+  insert(DCM_ConvolutionKernel);  // an attribute that is kept otherwise
   insert(DcmTagKey(0x0018, 0xfff0));
   insert(DcmTagKey(0x0019, 0x1001));
   dataset.insert(new DcmLongString(DcmTag(DcmTagKey(0x0018, 0xfff2), EVR_LO)), OFTrue);

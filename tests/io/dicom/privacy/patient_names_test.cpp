@@ -68,7 +68,7 @@ TEST(PatientNames, EveryGroupOfANameIsFoundInItsOwnAlphabetAndInLatinLetters) {
       "Yamada^Tarou=\xe5\xb1\xb1\xe7\x94\xb0^\xe5\xa4\xaa\xe9\x83\x8e=\xe3\x82\x84\xe3\x81\xbe\xe3\x81\xa0", ""};
   EXPECT_TRUE(utf8.is_in("CT\xe5\xb1\xb1\xe7\x94\xb0"));
   EXPECT_TRUE(utf8.is_in("\xe3\x83\xa4\xe3\x83\x9e\xe3\x83\x80"));              // katakana
-  EXPECT_TRUE(utf8.is_in("\xef\xbe\x94\xef\xbe\x8f\xef\xbe\x80\xef\xbe\x9e"));  // of half width
+  EXPECT_TRUE(utf8.is_in("\xef\xbe\x94\xef\xbe\x8f\xef\xbe\x80\xef\xbe\x9e"));  // half-width characters
   EXPECT_TRUE(utf8.is_in("yamada"));
   EXPECT_FALSE(utf8.is_in("\xe8\x85\xb9\xe9\x83\xa8"));  // abdomen
   const Patient escapes{"Yamada^Tarou=\033$B;3ED\033(B^\033$BB@O:\033(B=\033$B$d$^$@\033(B^\033$B$?$m$&\033(B", "",

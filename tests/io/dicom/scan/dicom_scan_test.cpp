@@ -140,7 +140,8 @@ TEST(DicomScan, GantryTiltLeansTheStackAsPositionsSay) {
   const DicomSeries series = only_series(folder.path());
   EXPECT_EQ(series.refusal, std::nullopt);
   EXPECT_EQ(series.uneven, std::nullopt);
-  EXPECT_EQ(series.geometry.direction[2], glm::dvec3(0, 0, 1));  // as the table moved, not the normal
+  // The way that the table moved, which is not the normal.
+  EXPECT_EQ(series.geometry.direction[2], glm::dvec3(0, 0, 1));
   EXPECT_NEAR(series.geometry.direction[1].y, 0.9483237, 1e-7);
   EXPECT_NEAR(series.geometry.spacing.z, 2.5, 1e-12);
   ASSERT_EQ(series.warnings.size(), 1u);

@@ -68,7 +68,7 @@ testing::AssertionResult is_one_refused_volume(const Folder& folder, const std::
 
 struct Attribute {
   const char* name;
-  std::function<Edit(int)> edit;  ///< of phase 0, 1, 2; made in another order than this
+  std::function<Edit(int)> edit;  ///< changes of phase 0, 1, 2; phases are written in another order
   std::vector<std::string> labels;
   const char* split_by;
 };

@@ -162,7 +162,8 @@ TEST_F(RealEnhancedCt, VoxelsAndGeometryAreThoseOfTheClassicSeries) {
   }
 }
 
-/// Whether pydicom reads the same voxels in the same places of a multi-frame file; skips the test where it is missing.
+/// Expects that pydicom reads the same voxels in the same places of a multi-frame file; the test is skipped where
+/// pydicom is missing.
 void check_with_pydicom(const fs::path& file, const Volume<std::int16_t>& volume, const fs::path& hu) {
   const Run run = run_command(TETWARP_PYTHON " " TETWARP_READ_ENHANCED " " + quoted(file) + " " + quoted(hu));
   if (run.status == 77 || run.status == 127) GTEST_SKIP() << run.output;

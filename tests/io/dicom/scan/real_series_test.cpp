@@ -262,7 +262,8 @@ TEST(RealSeries, LosslessEncodingsOfOneSliceAreOneImageAndLossyOnesAreOthers) {
 
 struct OddFile {
   std::string name;
-  std::vector<std::string> words;  ///< of the refusal or the reason for skipping; empty: it reads
+  /// Words of the refusal, or of the reason for skipping; empty: the series can be read.
+  std::vector<std::string> words;
 };
 
 const std::vector<OddFile> kOddFiles = {
@@ -319,7 +320,7 @@ TEST(RealSeries, OddFilesReadWithTheirStatedGeometryAndValues) {
   const DicomVolume undefined_length = load_single(folder / kOddFiles.back().name);
   ASSERT_TRUE(undefined_length.padding);
   EXPECT_EQ(undefined_length.padding->low, -3024);
-  // Of HU, from pydicom and GDCM.
+  // The sum of HU that pydicom and GDCM give.
   EXPECT_EQ(sum_of(rotated), -385703173);
   EXPECT_EQ(sum_of(bare), -197319300);
   EXPECT_EQ(sum_of(undefined_length), -228407043);

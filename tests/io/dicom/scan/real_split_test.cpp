@@ -44,7 +44,7 @@ class Copies {
       });
     }
   }
-  /// The same with less to say: `count` slices from the first.
+  /// Adds a phase of `kSlices` slices from the first one.
   void add_phase(const std::string& name, const Edit& edit) { add(name, 0, kSlices, 1, edit); }
 
   fs::path folder() const { return scratch_ / "in"; }
@@ -77,7 +77,7 @@ Labels labels_of(const std::vector<DicomSeries>& series) {
 
 struct Phases {
   const char* name;
-  std::function<Edit(int)> edit;  ///< of phase 0 to 9
+  std::function<Edit(int)> edit;  ///< changes of phase 0 to 9
   std::string (*label)(int);
 };
 
