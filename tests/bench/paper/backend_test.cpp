@@ -103,7 +103,7 @@ TEST_P(BenchBackend, BothFieldSourcesAreOneField) {
 TEST_P(BenchBackend, TetwarpTimedHereIsTheCpusResult) {
   for (const std::string name : kFields) {
     backend_->set_field(formula(name), 1);
-    const std::unique_ptr<Resampler> resampler = make_cpu_resampler(volume_.geometry);
+    const std::unique_ptr<ForwardResampler> resampler = make_cpu_resampler(volume_.geometry);
     Volume<std::int16_t> expected{volume_.geometry, std::vector<std::int16_t>(volume_.voxels.size())};
     const Target target{.source = view(volume_), .output = view(expected), .background = kUntouched};
     resampler->set_field(view(backend_->field()));
