@@ -18,7 +18,7 @@ namespace {
 
 using Cells = std::vector<std::pair<std::string, std::string>>;  // of a row, with the names of their columns
 
-bool is_summary(const Json& value) { return value.is_object() && value.contains("median"); }
+bool is_summary(const Json& value) { return value.is_object() && value.contains("q1"); }
 bool is_rows(const Json& value) { return value.is_array() && !value.empty() && value[0].is_object(); }
 
 std::string ms_text(const Json& ms) {
