@@ -161,7 +161,11 @@ int Batch::run() {
   std::error_code unknown;
   const bool made_before = options_.resume && fs::exists(options_.output, unknown);
   if (!made_before) check_space(found_, options_.output);  // before a folder is begun that another run would refuse
-  if (demands_device(options_.backend) && cuda == 0) make_forward_resampler(chosen(options_.backend), Geometry());
+  if (demands_device(options_.backend) && cuda == 0) {
+    Geometry any;
+    any.size = glm::i64vec3(2);  // a grid is looked at before a device is
+    make_forward_resampler(BackendKind::cuda, any);
+  }
   OutputFolder folder(options_.output, shard_, ids_of(cases_), hash_file(options_.manifest), options_.resume);
   Results results(folder, ids());
   find_finished(folder, results);
