@@ -1,10 +1,11 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include <cmath>
+#include <sstream>
 
 #include "apps/cli/output.h"
 #include "apps/cli/reads.h"
+#include "deform/geometry.h"
 #include "deform/phantom.h"
 #include "io/image_file.h"
 
@@ -19,9 +20,10 @@ void check(const PhantomOptions& options) {
     if (options.size[axis] < 2 || options.size[axis] > kMostVoxels) {
       throw UsageError("--size has " + std::to_string(options.size[axis]) + ", expected 2 to 4096 on every axis");
     }
-    if (!(options.spacing[axis] > 0) || !std::isfinite(options.spacing[axis])) {
-      throw UsageError("--spacing has " + std::to_string(options.spacing[axis]) +
-                       ", expected millimetres greater than 0");
+    if (!(options.spacing[axis] >= kSmallestSpacing && options.spacing[axis] <= kLargestSpacing)) {
+      std::ostringstream found;
+      found << options.spacing[axis];
+      throw UsageError("--spacing has " + found.str() + ", expected millimetres from 1e-6 to 1e6");
     }
   }
 }

@@ -51,7 +51,8 @@ TEST_F(CommandLine, EveryNumberThatIsNoneIsRefusedInAShortLine) {
       expect_wrong(option + "=99999999999999999999", {name});
   }
   for (const char* values : {"--size 1,2,3", "--size nan,4,4", "--size 4,4,99999", "--size 4,4,-4", "--spacing 1,1,nan",
-                             "--spacing 0,1,1", "--spacing 1,1,inf", "--spacing 1,1,1e999"})
+                             "--spacing 0,1,1", "--spacing 1,1,inf", "--spacing 1,1,1e999", "--spacing 1e-9,1,1",
+                             "--spacing 1,9e-7,1", "--spacing 1,1,1000001"})
     expect_wrong(phantom + values, {std::string(values).substr(0, 6)});
   for (const char* values : {"--size 15,99", "--size nan,99", "--position nan/0/0", "--position 0/inf/0"})
     expect_wrong(render + values, {std::string(values).substr(0, 6)});

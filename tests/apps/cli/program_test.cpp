@@ -82,6 +82,7 @@ TEST(Program, WrongCommandLinesExitWithTwoAndWriteNothing) {
                 {"deform in.nii -f identity -o out.nii --with in.nii=b.nii:background=40000", "40000"},
                 {"phantom -o out.nii --size 1,20,16", "--size"},
                 {"phantom -o out.nii --spacing 0,1,1", "--spacing"},
+                {"phantom -o out.nii --spacing 1e-9,1,1", "--spacing has 1e-09"},
                 {"field identity --like in.nii -o out.txt", "out.txt"}};
   for (const auto& test : kCases) {
     SCOPED_TRACE(test.arguments);
