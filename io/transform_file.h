@@ -41,7 +41,7 @@ bool is_transform_file(const std::filesystem::path& path);
 /// @param path  the file
 /// @param stop  ends the reading of HDF5, which may take long
 /// @throws InputError, which names the file, for one that is no such transform
-/// @throws NotCompiled in a build without ITK
+/// @throws NotCompiled in a build without ITK, for all but those of NiftyReg
 /// @throws Error where tetwarp-read is needed and missing
 /// @throws Cancelled
 TransformFile read_transform_file(const std::filesystem::path& path, const std::stop_token& stop = {});

@@ -9,12 +9,12 @@
 #include <cmath>
 
 #include "deform/errors.h"
-#include "io/lower_case.h"
-#ifdef TETWARP_WITH_ITK
 #include "io/fields/niftyreg_spline.h"
-#include "io/files/module.h"
 #include "io/images/image_reader.h"
+#include "io/lower_case.h"
 #include "io/opened_file.h"
+#ifdef TETWARP_WITH_ITK
+#include "io/files/module.h"
 #include "itkbridge/transform_file.h"
 #endif
 
@@ -28,11 +28,7 @@ bool has_transform_suffix(const std::filesystem::path& path) {
   return std::ranges::find(kSuffixes, suffix) != kSuffixes.end();
 }
 
-}  // namespace
-
 #ifdef TETWARP_WITH_ITK
-namespace {
-
 const char* name_of(TransformTool tool) {
   if (tool == TransformTool::elastix) return "elastix";
   return tool == TransformTool::plastimatch ? "plastimatch" : "ITK";
@@ -53,27 +49,7 @@ LoadedTransform load_transform(const std::filesystem::path& path, const std::sto
   return loaded;
 }
 
-}  // namespace
-
-bool is_transform_file(const std::filesystem::path& path) {
-  if (has_transform_suffix(path)) return true;
-  if (image_format(path) != ImageFormat::nifti || !is_file(path)) return false;
-  try {
-    return is_niftyreg_spline(read_nifti_header(path));
-  } catch (const InputError&) {
-    return false;  // whoever takes it for a volume or a field says why
-  }
-}
-
-std::vector<std::filesystem::path> files_of_transform(const std::filesystem::path& path) {
-  std::vector<std::filesystem::path> files = {path};
-  if (image_format(path) != ImageFormat::nifti)
-    in_module<decltype(tetwarp_transform_files)>("tetwarp_transform_files", path)(path, files);
-  return files;
-}
-
-TransformFile read_transform_file(const std::filesystem::path& path, const std::stop_token& stop) {
-  if (image_format(path) == ImageFormat::nifti) return read_niftyreg_spline(path);
+TransformFile read_with_itk(const std::filesystem::path& path, const std::stop_token& stop) {
   LoadedTransform loaded = load_transform(path, stop);
   const StoredTransform& stored = loaded.stored;
   const std::string file = path.string();
@@ -98,14 +74,38 @@ TransformFile read_transform_file(const std::filesystem::path& path, const std::
   };
   return result;
 }
+
+void add_named_files(const std::filesystem::path& path, std::vector<std::filesystem::path>& files) {
+  in_module<decltype(tetwarp_transform_files)>("tetwarp_transform_files", path)(path, files);
+}
 #else
-bool is_transform_file(const std::filesystem::path& path) { return has_transform_suffix(path); }
-
-std::vector<std::filesystem::path> files_of_transform(const std::filesystem::path& path) { return {path}; }
-
-TransformFile read_transform_file(const std::filesystem::path& path, const std::stop_token&) {
+TransformFile read_with_itk(const std::filesystem::path& path, const std::stop_token&) {
   throw NotCompiled("transform files need ITK, which this build does not have, " + path.string());
 }
+
+void add_named_files(const std::filesystem::path&, std::vector<std::filesystem::path>&) {}
 #endif
+
+}  // namespace
+
+bool is_transform_file(const std::filesystem::path& path) {
+  if (has_transform_suffix(path)) return true;
+  if (image_format(path) != ImageFormat::nifti || !is_file(path)) return false;
+  try {
+    return is_niftyreg_spline(read_nifti_header(path));
+  } catch (const InputError&) {
+    return false;  // whoever takes it for a volume or a field says why
+  }
+}
+
+std::vector<std::filesystem::path> files_of_transform(const std::filesystem::path& path) {
+  std::vector<std::filesystem::path> files = {path};
+  if (image_format(path) != ImageFormat::nifti) add_named_files(path, files);
+  return files;
+}
+
+TransformFile read_transform_file(const std::filesystem::path& path, const std::stop_token& stop) {
+  return image_format(path) == ImageFormat::nifti ? read_niftyreg_spline(path) : read_with_itk(path, stop);
+}
 
 }  // namespace tetwarp

@@ -8,23 +8,17 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <fstream>
 #include <glm/geometric.hpp>
 #include <sstream>
 
 #include "deform/errors.h"
 #include "io/images/image_reader.h"
 #include "io/images/image_writer.h"
-#include "io/images/raw_image.h"
-#include "io/lower_case.h"
-#ifdef TETWARP_WITH_ITK
+#include "io/images/mha_header.h"
 #include "io/images/nifti_file.h"
 #include "io/images/nrrd_layout.h"
-#include "io/images/text_header.h"
-#include "io/images/value_reader.h"
+#include "io/lower_case.h"
 #include "io/opened_file.h"
-#include "itkbridge/image_io.h"
-#endif
 
 namespace tetwarp {
 namespace {
@@ -63,86 +57,29 @@ void require_file_holds(const std::filesystem::path& path, const ImageHeader& he
   throw InputError(text.str());
 }
 
-#ifdef TETWARP_WITH_ITK
-ItkFormat itk_format(ImageFormat format) { return format == ImageFormat::nrrd ? ItkFormat::nrrd : ItkFormat::meta; }
-
-/// NRRD of text or hexadecimal digits, which have no check sum.
-class TextValueReader final : public ImageReader {
- public:
-  using ImageReader::ImageReader;
-  void read(std::span<std::byte> voxels) const override { itk_read_voxels(path_, ItkFormat::nrrd, voxels); }
-};
-
-std::unique_ptr<ImageReader> open_nrrd(const std::filesystem::path& path, const TextHeader& text, ImageHeader header,
-                                       Stored stored) {
-  const auto layout = nrrd_layout(path, text, header, stored.offset);
-  if (!layout) return std::make_unique<TextValueReader>(path, std::move(header), stored);
-  stored.encoded = layout->encoding != Encoding::raw;
-  return make_value_reader(path, std::move(header), stored, *layout);
+std::unique_ptr<ImageReader> open_nrrd(const std::filesystem::path& path) {
+  const TextHeader text = read_text_header(path, ImageFormat::nrrd);
+  NrrdHeader header = parse_nrrd_header(text, path.string());
+  Stored stored{text.data_offset, size_bytes(header.image.type), header.encoding != Encoding::raw};
+  const ValueLayout layout = nrrd_layout(path, text, header, stored.offset);
+  return make_value_reader(path, std::move(header.image), stored, layout);
 }
 
-std::unique_ptr<ImageReader> open_mha(const std::filesystem::path& path, const TextHeader& text, ImageHeader header,
-                                      const Stored& stored) {
-  require_stated_sizes(path, text);
-  const bool zlib = is_zlib(text, ImageFormat::mha);
-  require(zlib || !stored.encoded, "voxels that are text, or compressed big-endian, " + path.string() +
-                                       "; expected binary, compressed only in little endian");
-  return make_value_reader(path, std::move(header), stored,
-                           {.encoding = zlib ? Encoding::zlib : Encoding::raw, .big_endian = is_big_endian(text)});
-}
-
-/// An NRRD that names none of the patient's spaces is taken as LPS, as ITK takes it.
-void note_assumed_space(const TextHeader& text, ImageHeader& header) {
-  const std::string space = nrrd_space(text);
-  if (space == "lps" || space == "ras" || space == "las") return;
-  header.notes.push_back(space.empty() ? "the file does not say its space: taken as LPS"
-                                       : "the space \"" + space + "\" is none of a patient: taken as LPS");
+std::unique_ptr<ImageReader> open_mha(const std::filesystem::path& path) {
+  const TextHeader text = read_text_header(path, ImageFormat::mha);
+  ImageHeader header = parse_mha_header(text, path.string());
+  const ValueLayout layout = mha_layout(path, text);
+  const Stored stored{text.data_offset, size_bytes(header.type), layout.encoding != Encoding::raw};
+  return make_value_reader(path, std::move(header), stored, layout);
 }
 
 std::unique_ptr<ImageReader> open_format(const std::filesystem::path& path, ImageFormat format, NiftiFrame frame) {
-  if (format == ImageFormat::nifti) return open_nifti(path, frame);
-  const TextHeader text = read_text_header(path, format);
-  if (format == ImageFormat::nrrd) require_known_steps(text, path.string());
-  ItkImageInfo info = itk_read_info(path, itk_format(format));
-  // NrrdImageIO of ITK 5.2 turns left-anterior-superior about the wrong axis.
-  if (format == ImageFormat::nrrd && nrrd_space(text) == "las") place_nrrd(info.geometry, text, path.string());
-  const Stored stored{text.data_offset, size_bytes(info.type), is_encoded(text, format)};
-  ImageHeader header{info.geometry, info.type, info.components, text.metadata};
-  if (format == ImageFormat::nrrd) note_assumed_space(text, header);
-  return format == ImageFormat::nrrd ? open_nrrd(path, text, header, stored) : open_mha(path, text, header, stored);
-}
-
-/// The header that ITK wrote into a file of its own, up to the voxels. @throws Error, about the output, where it is not
-/// whole: a full disk
-std::string written_header(const std::filesystem::path& made, const std::filesystem::path& output, ImageFormat format) {
-  try {
-    std::string text(static_cast<std::size_t>(read_text_header(made, format).data_offset), '\0');
-    std::ifstream stream(made, std::ios::binary);
-    if (stream.read(text.data(), static_cast<std::streamsize>(text.size()))) return text;
-  } catch (const InputError&) {
-    // What ITK left is no input of anybody's.
+  switch (format) {
+    case ImageFormat::nifti: return open_nifti(path, frame);
+    case ImageFormat::nrrd: return open_nrrd(path);
+    case ImageFormat::mha: return open_mha(path);
   }
-  throw Error("cannot write, " + output.string() + "; check folder, rights and free space");
-}
-
-/// ITK makes the header, of one voxel in a file of its own beside the output: ITK knows its suffixes in lower case
-/// alone, holds what it compresses, and reports success for MHA when the disk is full. Sizes are filled in here.
-std::string text_header(const std::filesystem::path& path, ImageFormat format, const Geometry& grid, VoxelType type,
-                        int components, const ImageWriteOptions& options) {
-  Geometry one = grid;
-  one.size = glm::i64vec3(1);
-  const std::vector<std::byte> zeros(static_cast<std::size_t>(components) * size_bytes(type));
-  const bool mha = format == ImageFormat::mha;
-  const TemporaryFile made(path.string() + (mha ? ".header.mha" : ".header.nrrd"));
-  itk_write(made.path(), itk_format(format), {&one, whole(one), type, components, zeros.data()}, options.compression,
-            options.metadata);
-  std::string text = written_header(made.path(), path, format);
-  const std::string size =
-      std::to_string(grid.size.x) + " " + std::to_string(grid.size.y) + " " + std::to_string(grid.size.z);
-  const bool vectors = components > 1;
-  set_text_field(text,
-                 mha ? "DimSize = " : "sizes: ", (mha || !vectors ? "" : std::to_string(components) + " ") + size);
-  return text;
+  return nullptr;
 }
 
 std::unique_ptr<ImageWriter> create_format(const std::filesystem::path& path, ImageFormat format, const Geometry& grid,
@@ -152,28 +89,11 @@ std::unique_ptr<ImageWriter> create_format(const std::filesystem::path& path, Im
     return create_nifti(path, grid, type, components, descrip == options.metadata.end() ? "" : descrip->second,
                         options.compression < 0 ? 1 : options.compression);
   }
+  const bool compressed = options.compression > 0;
+  const auto make_header = format == ImageFormat::mha ? mha_header : nrrd_header;
   return create_text_image(path, format, grid, type, components,
-                           text_header(path, format, grid, type, components, options), options.compression);
+                           make_header(grid, type, components, options.metadata, compressed), options.compression);
 }
-#else
-[[noreturn]] void no_nifti(const std::filesystem::path& path) {
-  throw NotCompiled("NIfTI needs ITK, which this build does not have, " + path.string() + "; use .nrrd or .mha");
-}
-
-std::unique_ptr<ImageReader> open_format(const std::filesystem::path& path, ImageFormat format, NiftiFrame) {
-  if (format == ImageFormat::nifti) no_nifti(path);
-  return open_raw_image(path, format);
-}
-
-std::unique_ptr<ImageWriter> create_format(const std::filesystem::path& path, ImageFormat format, const Geometry& grid,
-                                           VoxelType type, int components, const ImageWriteOptions& options) {
-  if (format == ImageFormat::nifti) no_nifti(path);
-  if (options.compression > 0)
-    throw NotCompiled("compression needs ITK, which this build does not have, " + path.string());
-  return create_text_image(path, format, grid, type, components,
-                           raw_image_header(format, grid, type, components, options.metadata), 0);
-}
-#endif
 
 ImageFormat required_format(const std::filesystem::path& path) {
   const auto format = image_format(path);

@@ -20,22 +20,6 @@ enum class ImageFormat : std::uint8_t { nifti, nrrd, mha };
 /// The format that a suffix names, in upper or lower case.
 std::optional<ImageFormat> image_format(const std::filesystem::path& path);
 
-/// A file of ours that must not outlive this object, whatever happens.
-class TemporaryFile {
- public:
-  explicit TemporaryFile(std::filesystem::path path) : path_(std::move(path)) {}
-  ~TemporaryFile() {
-    std::error_code ignored;
-    std::filesystem::remove(path_, ignored);
-  }
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
-
 /// How the voxels lie in the file.
 struct Stored {
   std::uint64_t offset = 0;     ///< of the first byte (of the decompressed stream, for NIfTI)

@@ -192,6 +192,10 @@ std::string note_of_forms(const NiftiHeader& header, NiftiFrame frame) {
 
 }  // namespace
 
+int nifti_datatype(VoxelType type) {
+  return std::ranges::find(kDatatypes, type, &std::pair<int, VoxelType>::second)->first;
+}
+
 std::unique_ptr<ImageReader> open_nifti(const std::filesystem::path& path, NiftiFrame frame) {
   const std::string file = path.string();
   NiftiHeader header = read_nifti_header(path);

@@ -3,10 +3,9 @@
 
 #pragma once
 
-// Private to io/. NIfTI-1 in one file (https://nifti.nimh.nih.gov, nifti1.h). ITK makes the header on writing. Reading
-// is done here, for what ITK 5.2.1 does: NaN and infinity read as 0, the voxels of x.nii taken for those of x.nii.gz,
-// two copies in memory, one thread and one level of gzip; and a sform of code 2 or more, or one that it takes for
-// sheared, is passed over in silence.
+// Private to io/. NIfTI-1 in one file (https://nifti.nimh.nih.gov, nifti1.h). It is read by what the standard says, and
+// not as ITK 5.2.1 reads it: there NaN and infinity are 0, the voxels of x.nii are taken for those of x.nii.gz, and a
+// sform of code 2 or more, or one that it takes for sheared, is passed over in silence.
 #include <array>
 #include <cstdint>
 #include <filesystem>
@@ -40,6 +39,9 @@ NiftiHeader read_nifti_header(const std::filesystem::path& path);
 /// @throws InputError naming the file: neither is there, or the one that decides is sheared, singular, or of another
 ///         voxel size than pixdim
 const Geometry& place_of(const NiftiHeader& header, NiftiFrame frame, const std::filesystem::path& path);
+
+/// How NIfTI calls a type: the field `datatype`.
+int nifti_datatype(VoxelType type);
 
 std::unique_ptr<ImageReader> open_nifti(const std::filesystem::path& path, NiftiFrame frame);
 

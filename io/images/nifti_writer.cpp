@@ -13,7 +13,8 @@
 #include "deform/errors.h"
 #include "io/files/gzip_pieces.h"
 #include "io/images/image_writer.h"
-#include "itkbridge/image_io.h"
+#include "io/images/nifti_file.h"
+#include "io/images/nifti_forms.h"
 
 namespace tetwarp {
 namespace {
@@ -21,23 +22,44 @@ namespace {
 constexpr std::size_t kHeaderBytes = 352;  // 348, and four zeros: no extension follows
 using Header = std::array<char, kHeaderBytes>;
 
-/// ITK makes the header, of one voxel in a file of its own beside the output; size and description are filled in here.
-Header make_header(const std::filesystem::path& path, const Geometry& grid, VoxelType type, int components,
-                   const std::string& descrip) {
-  Geometry one = grid;
-  one.size = glm::i64vec3(1);
-  constexpr std::array<std::byte, 64> kZeros{};
-  require(static_cast<std::size_t>(components) * size_bytes(type) <= kZeros.size(),
-          std::to_string(components) + " values a voxel, " + path.string() + "; NIfTI is written with 1 or 3");
-  const TemporaryFile made(path.string() + ".header.nii");
-  itk_write(made.path(), ItkFormat::nifti, {&one, whole(one), type, components, kZeros.data()}, 0, {});
+/// The number at `offset` (nifti1.h), little endian as this machine is.
+template <class T>
+void put(Header& header, std::size_t offset, T value) {
+  std::memcpy(header.data() + offset, &value, sizeof(T));
+}
+
+/// Both forms with code 1 (the scanner's), mm. Vectors have intent 1007, and the fifth axis.
+Header make_header(const Geometry& grid, VoxelType type, int components, const std::string& descrip) {
   Header header{};
-  std::ifstream(made.path(), std::ios::binary).read(header.data(), header.size());
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto size = static_cast<std::int16_t>(grid.size[axis]);
-    std::memcpy(header.data() + 42 + 2 * axis, &size, sizeof(size));
-  }
+  const auto i16 = [&](std::size_t offset, std::int64_t value) {
+    put(header, offset, static_cast<std::int16_t>(value));
+  };
+  put(header, 0, std::int32_t{348});
+  header[38] = 'r';  // the field "regular", for readers of Analyze 7.5
+  for (std::size_t n = 0; n < 8; ++n) i16(40 + 2 * n, 1);
+  i16(40, components > 1 ? 5 : 3);
+  for (int axis = 0; axis < 3; ++axis) i16(42 + 2 * static_cast<std::size_t>(axis), grid.size[axis]);
+  if (components > 1) i16(50, components);
+  constexpr int kVector = 1007;
+  i16(68, components > 1 ? kVector : 0);
+  i16(70, nifti_datatype(type));
+  i16(72, static_cast<std::int64_t>(8 * size_bytes(type)));
+  const NiftiForms forms = nifti_forms(grid);
+  put(header, 76, forms.qfac);
+  for (int axis = 0; axis < 3; ++axis)
+    put(header, 80 + 4 * static_cast<std::size_t>(axis), static_cast<float>(grid.spacing[axis]));
+  put(header, 108, static_cast<float>(kHeaderBytes));
+  put(header, 112, 1.0f);  // slope; the intercept is 0
+  header[123] = 2;         // millimetres
   descrip.copy(header.data() + 148, 79);
+  i16(252, 1);
+  i16(254, 1);
+  for (std::size_t n = 0; n < 3; ++n) {
+    put(header, 256 + 4 * n, forms.quatern[n]);
+    put(header, 268 + 4 * n, forms.offset[n]);
+    put(header, 280 + 16 * n, forms.srow[n]);
+  }
+  std::memcpy(header.data() + 344, "n+1", 4);
   return header;
 }
 
@@ -180,10 +202,13 @@ std::unique_ptr<ImageWriter> create_nifti(const std::filesystem::path& path, con
     require(grid.size[axis] <= INT16_MAX,
             "a size of " + to_string(grid.size) + ", " + file + "; NIfTI-1 holds up to 32767 an axis");
   }
+  constexpr std::size_t kMostBytes = 64;
+  require(static_cast<std::size_t>(components) * size_bytes(type) <= kMostBytes,
+          std::to_string(components) + " values a voxel, " + file + "; NIfTI is written with 1 or 3");
   require(descrip.size() <= 79,
           "a description of " + std::to_string(descrip.size()) + " characters, " + file + "; NIfTI holds 79");
   const auto begun = [&](auto writer) -> std::unique_ptr<ImageWriter> {
-    writer->begin(make_header(path, grid, type, components, descrip));
+    writer->begin(make_header(grid, type, components, descrip));
     return writer;
   };
   if (path.extension() == ".nii" || path.extension() == ".NII")

@@ -4,12 +4,12 @@
 #include "io/images/text_header.h"
 
 #include <algorithm>
-#include <cctype>
+#include <array>
 #include <fstream>
-#include <set>
-#include <sstream>
+#include <string_view>
 
 #include "deform/errors.h"
+#include "io/images/header_words.h"
 #include "io/lower_case.h"
 #include "io/shown_text.h"
 
@@ -18,57 +18,58 @@ namespace {
 
 constexpr std::size_t kLongestHeader = std::size_t{1} << 20;
 
-/// The fields of MetaIO (metaObject.cxx, metaImage.cxx), in lower case: what is left is the user's.
-const std::set<std::string>& meta_fields() {
-  static const std::set<std::string> kFields = {"objecttype",
-                                                "objectsubtype",
-                                                "transformtype",
-                                                "ndims",
-                                                "name",
-                                                "id",
-                                                "parentid",
-                                                "acquisitiondate",
-                                                "color",
-                                                "comment",
-                                                "compresseddata",
-                                                "compresseddatasize",
-                                                "compressionlevel",
-                                                "binarydata",
-                                                "binarydatabyteordermsb",
-                                                "elementbyteordermsb",
-                                                "transformmatrix",
-                                                "rotation",
-                                                "orientation",
-                                                "offset",
-                                                "position",
-                                                "origin",
-                                                "centerofrotation",
-                                                "anatomicalorientation",
-                                                "distanceunits",
-                                                "elementspacing",
-                                                "elementsize",
-                                                "dimsize",
-                                                "headersize",
-                                                "modality",
-                                                "sequenceid",
-                                                "elementmin",
-                                                "elementmax",
-                                                "elementnumberofchannels",
-                                                "elementnbits",
-                                                "elementtype",
-                                                "elementtointensityfunctionslope",
-                                                "elementtointensityfunctionoffset",
-                                                "elementdatafile"};
-  return kFields;
-}
+/// The fields of MetaIO (metaObject.cxx, metaImage.cxx): what is left is the user's.
+constexpr std::array kMetaFields = std::to_array<std::string_view>({
+    "ObjectType",
+    "ObjectSubType",
+    "TransformType",
+    "NDims",
+    "Name",
+    "ID",
+    "ParentID",
+    "AcquisitionDate",
+    "Color",
+    "Comment",
+    "CompressedData",
+    "CompressedDataSize",
+    "CompressionLevel",
+    "BinaryData",
+    "BinaryDataByteOrderMSB",
+    "ElementByteOrderMSB",
+    "TransformMatrix",
+    "Rotation",
+    "Orientation",
+    "Offset",
+    "Position",
+    "Origin",
+    "ImagePosition",
+    "CenterOfRotation",
+    "AnatomicalOrientation",
+    "DistanceUnits",
+    "ElementSpacing",
+    "ElementSize",
+    "DimSize",
+    "HeaderSize",
+    "Modality",
+    "SequenceID",
+    "ElementMin",
+    "ElementMax",
+    "ElementNumberOfChannels",
+    "ElementNBits",
+    "ElementType",
+    "ElementToIntensityFunctionSlope",
+    "ElementToIntensityFunctionOffset",
+    "ElementDataFile",
+});
 
-std::string trimmed(const std::string& text) {
-  const auto begin = text.find_first_not_of(" \t\r"), end = text.find_last_not_of(" \t\r");
-  return begin == std::string::npos ? "" : text.substr(begin, end - begin + 1);
-}
+/// MetaIO tells upper from lower case, and takes a field that is written otherwise for one of the user's. What would
+/// change the meaning of the voxels is obeyed in any case.
+constexpr std::array kMetaFieldsInAnyCase =
+    std::to_array<std::string_view>({"compresseddata", "compresseddatasize", "binarydata", "binarydatabyteordermsb",
+                                     "elementbyteordermsb", "headersize", "distanceunits"});
 
-/// Refuses what MetaIO cannot take: it copies names and values into buffers without asking for their length, counts
-/// as many numbers as NDims says, and loses memory where a header is not what it expects.
+/// Refuses lines that no writer of MHA makes, and that MetaIO, which others will read the file with, cannot take: it
+/// copies names and values into buffers without asking for their length, and counts as many numbers as NDims says.
 void check_meta_line(const std::string& line, const std::string& file) {
   constexpr std::size_t kLongestLine = 1000, kLongestName = 200, kMostDimensions = 10;
   require(line.size() <= kLongestLine && std::min(line.find_first_of("=:"), line.size()) <= kLongestName,
@@ -88,84 +89,115 @@ void check_meta_line(const std::string& line, const std::string& file) {
   require(is_number && std::stoul(value) <= kMostDimensions, "NDims = " + value + ", " + file + "; expected 3");
 }
 
-/// Fields of NRRD, definition of the format, sections 4 to 7, each as NrrdIO takes it.
-const std::set<std::string>& nrrd_fields() {
-  static const std::set<std::string> kFields = {"content",
-                                                "number",
-                                                "type",
-                                                "block size",
-                                                "blocksize",
-                                                "dimension",
-                                                "space",
-                                                "sizes",
-                                                "spacings",
-                                                "thicknesses",
-                                                "space dimension",
-                                                "axis mins",
-                                                "axismins",
-                                                "axis maxs",
-                                                "axismaxs",
-                                                "centers",
-                                                "centerings",
-                                                "labels",
-                                                "units",
-                                                "kinds",
-                                                "min",
-                                                "max",
-                                                "old min",
-                                                "oldmin",
-                                                "old max",
-                                                "oldmax",
-                                                "endian",
-                                                "encoding",
-                                                "line skip",
-                                                "lineskip",
-                                                "byte skip",
-                                                "byteskip",
-                                                "sample units",
-                                                "sampleunits",
-                                                "data file",
-                                                "datafile",
-                                                "space origin",
-                                                "space units",
-                                                "space directions",
-                                                "measurement frame"};
+/// Fields of NRRD, definition of the format, sections 4 to 7, and other spellings of them, each with the name that
+/// `TextHeader::fields` has.
+const std::map<std::string, std::string>& nrrd_fields() {
+  static const std::map<std::string, std::string> kFields = [] {
+    std::map<std::string, std::string> fields = {{"blocksize", "block size"},     {"axismins", "axis mins"},
+                                                 {"axismaxs", "axis maxs"},       {"centers", "centerings"},
+                                                 {"oldmin", "old min"},           {"oldmax", "old max"},
+                                                 {"lineskip", "line skip"},       {"byteskip", "byte skip"},
+                                                 {"sampleunits", "sample units"}, {"datafile", "data file"}};
+    for (const char* name : {"content",
+                             "number",
+                             "type",
+                             "block size",
+                             "dimension",
+                             "space",
+                             "sizes",
+                             "spacings",
+                             "thicknesses",
+                             "axis mins",
+                             "axis maxs",
+                             "centerings",
+                             "labels",
+                             "units",
+                             "kinds",
+                             "min",
+                             "max",
+                             "old min",
+                             "old max",
+                             "endian",
+                             "encoding",
+                             "line skip",
+                             "byte skip",
+                             "data file",
+                             "sample units",
+                             "space units",
+                             "space origin",
+                             "space dimension",
+                             "space directions",
+                             "measurement frame"})
+      fields.emplace(name, name);
+    return fields;
+  }();
   return kFields;
 }
 
-/// Refuses what NrrdIO cannot take: it writes lines that it does not know into a buffer without asking for their
-/// length.
-void check_nrrd_field(const std::string& line, const std::string& name, const std::string& file) {
+/// Fields that are about each axis, and those that are about the space around: the number of axes comes before the
+/// former, the space before the latter.
+constexpr std::array kNrrdFieldsOfAxes =
+    std::to_array<std::string_view>({"sizes", "spacings", "thicknesses", "axis mins", "axis maxs", "centerings",
+                                     "kinds", "labels", "units", "space directions"});
+constexpr std::array kNrrdFieldsInSpace =
+    std::to_array<std::string_view>({"space directions", "space origin", "space units", "measurement frame"});
+
+/// @throws InputError for a line that is no field, a field that comes twice, or before one that it needs
+void take_nrrd_field(const std::string& line, const std::string& file, TextHeader& header) {
   constexpr std::size_t kLongestLine = 1000;
-  require(nrrd_fields().contains(name), "a line that is no field of NRRD in the header of " + file + ", \"" +
+  const auto colon = line.find(": ");
+  const auto known = nrrd_fields().find(colon == std::string::npos ? "" : lower(line.substr(0, colon)));
+  require(known != nrrd_fields().end(), "a line that is no field of NRRD in the header of " + file + ", \"" +
                                             shown(line.substr(0, 60)) + "\"; expected FIELD: VALUE or KEY:=VALUE");
+  const std::string& name = known->second;
   require(line.size() <= kLongestLine, "a field of " + std::to_string(line.size()) + " bytes in the header of " + file +
                                            ", \"" + name + "\"; expected at most " + std::to_string(kLongestLine));
+  const auto needs = [&](bool there, const char* what) {
+    require(there, "unreadable header (the field \"" + name + "\" comes before " + what + "), " + file);
+  };
+  if (std::ranges::find(kNrrdFieldsOfAxes, name) != kNrrdFieldsOfAxes.end())
+    needs(header.fields.contains("dimension"), "the dimension");
+  if (std::ranges::find(kNrrdFieldsInSpace, name) != kNrrdFieldsInSpace.end())
+    needs(header.fields.contains("space") || header.fields.contains("space dimension"), "the space");
+  const auto value = line.find_first_not_of(" \t", colon + 1);
+  const bool is_new = header.fields.emplace(name, value == std::string::npos ? "" : line.substr(value)).second;
+  require(is_new, "unreadable header (the field \"" + name + "\" comes twice), " + file);
 }
 
-/// Takes one line of a header; true after the last.
-bool take_line(const std::string& line, ImageFormat format, const std::string& file, TextHeader& header) {
-  if (format == ImageFormat::nrrd) {
-    if (trimmed(line).empty()) return true;
-    if (line[0] == '#') return false;
-    const auto pair = line.find(":="), field = line.find(": ");
-    if (pair != std::string::npos && pair < field) {
-      header.metadata[line.substr(0, pair)] = trimmed(line.substr(pair + 2));
-    } else {
-      const std::string name = lower(line.substr(0, std::min(field, line.size())));
-      check_nrrd_field(line, field == std::string::npos ? "" : name, file);
-      header.fields[name] = trimmed(line.substr(field + 2));
-    }
-    return false;
-  }
-  const auto equals = line.find('=');
-  if (equals == std::string::npos) return false;
-  const std::string name = trimmed(line.substr(0, equals)), value = trimmed(line.substr(equals + 1));
-  if (meta_fields().contains(lower(name)))
-    header.fields[lower(name)] = value;
+/// Takes one line of a header, without its end; true after the last.
+bool take_nrrd_line(const std::string& line, const std::string& file, TextHeader& header) {
+  if (line.empty()) return true;
+  if (line[0] == '#') return false;
+  const auto pair = line.find(":="), field = line.find(": ");
+  if (pair != std::string::npos && pair < field)
+    header.metadata[line.substr(0, pair)] = trimmed(line.substr(pair + 2));
   else
-    header.metadata[name] = value;
-  return lower(name) == "elementdatafile";
+    take_nrrd_field(line, file, header);
+  return false;
+}
+
+/// The same of MHA. A name ends at the first of "=" and ":"; of a field that comes twice the last counts.
+bool take_meta_line(const std::string& line, TextHeader& header) {
+  const auto separator = line.find_first_of("=:");
+  if (separator == std::string::npos) return false;
+  const std::string name = trimmed(line.substr(0, separator)), key = lower(name);
+  const auto* const known =
+      std::ranges::find_if(kMetaFields, [&](std::string_view field) { return lower(std::string(field)) == key; });
+  if (known != kMetaFields.end()) {
+    const auto value = line.find_first_not_of("=: \t", separator);
+    if (name == *known || std::ranges::find(kMetaFieldsInAnyCase, key) != kMetaFieldsInAnyCase.end())
+      header.fields[key] = value == std::string::npos ? "" : trimmed(line.substr(value));
+    return name == "ElementDataFile";
+  }
+  if (const auto equals = line.find('='); equals != std::string::npos)
+    header.metadata[trimmed(line.substr(0, equals))] = trimmed(line.substr(equals + 1));
+  return false;
+}
+
+void require_nrrd_version(const std::string& line, const std::string& file) {
+  require(line.starts_with("NRRD000"), "not an NRRD file (it does not begin with NRRD000), " + file);
+  require(line.size() == 8 && line[7] >= '1' && line[7] <= '5',
+          "unreadable header (\"" + shown(line.substr(0, 60)) + "\"), " + file + "; expected NRRD0001 to NRRD0005");
 }
 
 }  // namespace
@@ -186,17 +218,21 @@ TextHeader read_text_header(const std::filesystem::path& path, ImageFormat forma
     for (; stream.get(c) && c != '\n' && line.size() < kLongestHeader;) line += c;
     if (!stream) break;
     header.data_offset += line.size() + 1;
-    if (format == ImageFormat::mha) check_meta_line(line, file);
-    if (first && format == ImageFormat::nrrd)
-      require(line.starts_with("NRRD000"), "not an NRRD file (it does not begin with NRRD000), " + file);
-    else
-      ended = take_line(line, format, file, header);
-    first = false;
+    if (format == ImageFormat::mha) {
+      check_meta_line(line, file);
+      ended = take_meta_line(line, header);
+    } else {
+      if (line.ends_with('\r')) line.pop_back();
+      if (first)
+        require_nrrd_version(line, file);
+      else
+        ended = take_nrrd_line(line, file, header);
+      first = false;
+    }
   }
   const char* name = format == ImageFormat::nrrd ? "NRRD" : "MHA";
   require(ended, std::string("a header that does not end, ") + file + "; is this a whole " + name + " file?");
-  const std::string elsewhere =
-      format == ImageFormat::nrrd ? header["data file"] + header["datafile"] : header["elementdatafile"];
+  const std::string elsewhere = format == ImageFormat::nrrd ? header["data file"] : header["elementdatafile"];
   require(format == ImageFormat::nrrd ? elsewhere.empty() : elsewhere == "LOCAL",
           "voxels in another file (\"" + elsewhere + "\"), " + file + "; expected them after the header");
   if (format == ImageFormat::mha) {
@@ -205,38 +241,11 @@ TextHeader read_text_header(const std::filesystem::path& path, ImageFormat forma
               std::string("no ") + field + " in the header of " + file + "; is it an MHA file?");
   }
   const std::string units = format == ImageFormat::nrrd ? header["space units"] : header["distanceunits"];
-  std::istringstream words(units);
-  for (std::string word; words >> word;) {
+  for (const std::string& word : words(units)) {
     require(word == "mm" || word == "\"mm\"" || word == "?" || word == "\"\"",
             "lengths in " + units + ", " + file + "; expected mm");
   }
   return header;
-}
-
-bool is_encoded(const TextHeader& header, ImageFormat format) {
-  if (format == ImageFormat::nrrd) return header["encoding"] != "raw";
-  return lower(header["compresseddata"]) == "true" || lower(header["binarydata"]) == "false";
-}
-
-bool is_big_endian(const TextHeader& header) {
-  return lower(header["binarydatabyteordermsb"]) == "true" || lower(header["elementbyteordermsb"]) == "true";
-}
-
-void require_stated_sizes(const std::filesystem::path& path, const TextHeader& header) {
-  const auto require_size = [&](const char* name, std::initializer_list<std::string> expected) {
-    const std::string stated = header[name];
-    require(stated.empty() || std::ranges::find(expected, stated) != expected.end(),
-            std::string(name) + " is " + stated.substr(0, 60) + ", " + path.string() + "; the file has " +
-                *expected.begin() + ", is it whole?");
-  };
-  require_size("headersize", {std::to_string(header.data_offset), "0", "-1"});
-  if (!is_zlib(header, ImageFormat::mha)) return;
-  require_size("compresseddatasize", {std::to_string(std::filesystem::file_size(path) - header.data_offset)});
-}
-
-bool is_zlib(const TextHeader& header, ImageFormat format) {
-  return format == ImageFormat::mha && lower(header["compresseddata"]) == "true" &&
-         lower(header["binarydata"]) != "false" && !is_big_endian(header);
 }
 
 }  // namespace tetwarp

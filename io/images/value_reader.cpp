@@ -12,10 +12,9 @@
 #include <vector>
 
 #include "deform/errors.h"
-#ifdef TETWARP_WITH_ITK
 #include "io/files/gzip_inflate.h"
 #include "io/files/gzip_pieces.h"
-#endif
+#include "io/images/text_values.h"
 
 namespace tetwarp {
 namespace {
@@ -29,9 +28,13 @@ class ValueReader final : public ImageReader {
     switch (layout_.encoding) {
       case Encoding::raw: read_raw(voxels); break;
       case Encoding::zlib: read_zlib(voxels); break;
-      case Encoding::gzip: read_gzip(voxels);
+      case Encoding::gzip: read_gzip(voxels); break;
+      case Encoding::text: read_text(voxels); break;
+      case Encoding::hex: read_hex(voxels); break;
+      case Encoding::bzip2:
+        throw InputError("unreadable voxels (in bzip2), " + path_.string() + "; compress them with gzip instead");
     }
-    if (layout_.big_endian) reverse_values(voxels);
+    if (layout_.big_endian && layout_.encoding != Encoding::text) reverse_values(voxels);
     if (layout_.plane_count > 1 && header_.components > 1) interleave(voxels);
   }
 
@@ -78,7 +81,16 @@ class ValueReader final : public ImageReader {
             "bytes behind the compressed voxels, " + file + "; expected none, is the file whole?");
   }
 
-#ifdef TETWARP_WITH_ITK
+  void read_text(std::span<std::byte> voxels) const {
+    std::ifstream stream = open();
+    read_decimal_values(stream, header_.type, voxels, path_.string());
+  }
+
+  void read_hex(std::span<std::byte> voxels) const {
+    std::ifstream stream = open();
+    read_hexadecimal_bytes(stream, voxels, path_.string());
+  }
+
   void read_gzip(std::span<std::byte> voxels) const {
     if (const PlainBytes plain = inflate_at_once(path_, layout_.skip + voxels.size(), stored_.offset);
         plain && read_in_parallel(plain, voxels))
@@ -107,11 +119,6 @@ class ValueReader final : public ImageReader {
     });
     return good;
   }
-#else
-  [[noreturn]] void read_gzip(std::span<std::byte>) const {
-    throw NotCompiled("gzip data need ITK, which this build does not have, " + path_.string());
-  }
-#endif
 
   void reverse_values(std::span<std::byte> voxels) const {
     const std::size_t bytes = stored_.value_bytes;

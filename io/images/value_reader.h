@@ -12,7 +12,14 @@
 
 namespace tetwarp {
 
-enum class Encoding : std::uint8_t { raw, zlib, gzip };
+enum class Encoding : std::uint8_t {
+  raw,    ///< the bytes of memory
+  zlib,   ///< the same in one stream of zlib
+  gzip,   ///< in one or more members of gzip
+  text,   ///< each value in decimal digits
+  hex,    ///< each byte in two hexadecimal digits
+  bzip2,  ///< which is known by name, and not read
+};
 
 /// How the values lie in the file, from `Stored::offset` on.
 struct ValueLayout {
@@ -22,9 +29,9 @@ struct ValueLayout {
   std::uint64_t plane_count = 1;  ///< voxels of which all first components come first, then all second ones, and so on
 };
 
-/// A zlib stream and gzip data must have right check sums, hold exactly the values, and end the file: MetaIO and NrrdIO
-/// of ITK 5.2.1 take a truncated stream for whole, leave the rest of the buffer as it was, and look at no check sum of
-/// gzip.
+/// The reader throws InputError for data that end too soon or are damaged. A zlib stream and gzip data must have right
+/// check sums, hold exactly the values, and end the file, which MetaIO and NrrdIO of ITK 5.2.1 do not ask: they take a
+/// truncated stream for whole, leave the rest of the buffer as it was, and look at no check sum of gzip.
 std::unique_ptr<ImageReader> make_value_reader(const std::filesystem::path& path, ImageHeader header,
                                                const Stored& stored, const ValueLayout& layout);
 

@@ -48,7 +48,7 @@ FRIENDS = {
     ("cuda", "deform/"): "a backend runs the arithmetic of deform/core and checks what the CPU checks",
     ("bench", "deform/core/"): "the paper's algorithms are measured on the same arithmetic",
     ("bench", "cuda/runtime/"): "the paper's kernels own memory and check errors as ours do",
-    ("io", "itkbridge/"): "ITK reads and writes some formats; no header of io/ shows it",
+    ("io", "itkbridge/"): "ITK reads transforms; no header of io/ shows it",
 }
 
 

@@ -16,11 +16,7 @@
 namespace tetwarp {
 namespace {
 
-#ifdef TETWARP_WITH_ITK
 const std::vector<std::string> kNames = {"f.mha", "f.nrrd", "f.nii", "f.nii.gz"};
-#else
-const std::vector<std::string> kNames = {"f.mha", "f.nrrd"};
-#endif
 
 /// At rest, but for one corner that says which component is which and where i, j, k lead.
 VertexField asymmetric_field(const Geometry& grid) {

@@ -259,7 +259,6 @@ TEST(NpyField, IsKnownByItsFirstBytesToo) {
   expect_corner(read_field_file(npy(scratch / "field.dat", "order=zyx,units=mm", volume_grid())), volume_grid(), 0, "");
 }
 
-#ifdef TETWARP_WITH_ITK
 // --- NIfTI
 
 TEST(NiftiField, EveryKindGivesTheSameCornerOnEveryGrid) {
@@ -378,7 +377,6 @@ TEST(NiftiField, DamagedFilesAreRefusedByName) {
               std::string::npos);
   }
 }
-#endif
 
 }  // namespace
 }  // namespace tetwarp

@@ -11,8 +11,8 @@
 #include "deform/errors.h"
 #include "io/image_file.h"
 #include "io/images/text_header.h"
-#include "itkbridge/image_io.h"
 #include "tests/support/image_samples.h"
+#include "itkbridge/image_io.h"
 #include "tests/support/scratch.h"
 #include "tests/support/write_file.h"
 

@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "io/image_file.h"
-#include "itkbridge/image_io.h"
 #include "tests/support/image_samples.h"
+#include "itkbridge/image_io.h"
 #include "tests/support/scratch.h"
 #include "tests/support/write_file.h"
 
