@@ -3,4 +3,4 @@
 
 # The modules of ITK that tetwarp::itkbridge is built on. One list for itkbridge/CMakeLists.txt, for the package, and for
 # itk-module.cmake.
-set(tetwarp_itk_modules ITKCommon ITKIOImageBase ITKIOMeta ITKIONIFTI ITKIONRRD ITKMesh ITKTransform)
+set(tetwarp_itk_modules ITKCommon ITKMesh ITKTransform)

@@ -15,7 +15,7 @@
 #include "tests/support/scratch.h"
 #include "tests/support/write_file.h"
 #ifdef TETWARP_WITH_ITK
-#include "itkbridge/image_io.h"
+#include "tests/support/itk_image_io.h"
 #endif
 
 /// Files of one format, one a line: what ITK makes of each, and what we do.
@@ -92,6 +92,7 @@ inline void expect_rows(const std::filesystem::path& path, const std::vector<Ima
 #ifdef TETWARP_WITH_ITK
     tetwarp::AnyVolume itks;
     const std::string why_itk = refusal([&] { itks = read_by_itk(path); });
+    if (row.reads != Reads::both && tetwarp::itk_version() != "5.2") continue;
     if (row.reads == Reads::we && row.counts) {
       EXPECT_FALSE(why_itk.empty() && counts_from_1(itks)) << row.what;
       continue;

@@ -12,7 +12,7 @@
 #include "io/image_file.h"
 #include "io/images/text_header.h"
 #include "tests/support/image_samples.h"
-#include "itkbridge/image_io.h"
+#include "tests/support/itk_image_io.h"
 #include "tests/support/scratch.h"
 #include "tests/support/write_file.h"
 

@@ -21,10 +21,6 @@
 #include "tests/support/scratch.h"
 #include "tests/support/write_file.h"
 
-/// ITK's NRRD reader leaks where it refuses a file.
-extern "C" const char* __lsan_default_suppressions();
-extern "C" const char* __lsan_default_suppressions() { return "leak:libITKNrrdIO\n"; }
-
 namespace tetwarp {
 namespace {
 

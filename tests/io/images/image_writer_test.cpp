@@ -17,7 +17,7 @@
 #include "tests/support/image_samples.h"
 #include "tests/support/scratch.h"
 #ifdef TETWARP_WITH_ITK
-#include "itkbridge/image_io.h"
+#include "tests/support/itk_image_io.h"
 #endif
 
 namespace tetwarp {

@@ -13,7 +13,7 @@
 #include "io/field_file.h"
 #include "io/image_file.h"
 #include "tests/support/image_samples.h"
-#include "itkbridge/image_io.h"
+#include "tests/support/itk_image_io.h"
 #include "tests/support/scratch.h"
 #include "tests/support/write_file.h"
 

@@ -1,12 +1,13 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "itkbridge/image_io.h"
+#include "tests/support/itk_image_io.h"
 
 #include <itkMetaDataObject.h>
 #include <itkMetaImageIO.h>
 #include <itkNiftiImageIO.h>
 #include <itkNrrdImageIO.h>
+#include <itkVersion.h>
 
 #include <algorithm>
 #include <cmath>
@@ -14,6 +15,10 @@
 #include <mutex>
 #include <sstream>
 #include <utility>
+
+/// ITK's NRRD reader leaks where it refuses a file.
+extern "C" const char* __lsan_default_suppressions();
+extern "C" const char* __lsan_default_suppressions() { return "leak:libITKNrrdIO\n"; }
 
 namespace tetwarp {
 namespace {
@@ -122,6 +127,10 @@ Geometry geometry(const itk::ImageIOBase& io) {
 }
 
 }  // namespace
+
+std::string itk_version() {
+  return std::to_string(itk::Version::GetITKMajorVersion()) + "." + std::to_string(itk::Version::GetITKMinorVersion());
+}
 
 ItkImageInfo itk_read_info(const std::filesystem::path& path, ItkFormat format) {
   const QuietItk quiet;

@@ -3,6 +3,7 @@
 
 #pragma once
 
+// Volumes through ITK, beside which the tests put ours.
 #include <filesystem>
 #include <map>
 #include <span>
@@ -22,12 +23,14 @@ struct ItkImageInfo {
   int components = 1;
 };
 
+/// "5.2", say.
+std::string itk_version();
+
 /// @throws InputError for what ITK cannot read, and for what is not a 3-D grid of numbers or vectors of a VoxelType
 ItkImageInfo itk_read_info(const std::filesystem::path& path, ItkFormat format);
 
 /// Lets ITK read the voxels straight into `voxels`, whose size must be that of the whole image.
-/// Not for NIfTI: NiftiImageIO of ITK 5.2 turns NaN and infinity into 0, reads the voxels of x.nii instead
-/// of x.nii.gz if both exist, and holds everything twice (io/images/nifti_file.h).
+/// Of NIfTI, ITK 5.2 turns NaN and infinity into 0, and reads the voxels of x.nii instead of x.nii.gz if both exist.
 /// @throws InputError for a truncated or damaged file
 void itk_read_voxels(const std::filesystem::path& path, ItkFormat format, std::span<std::byte> voxels);
 
