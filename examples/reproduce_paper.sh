@@ -79,6 +79,8 @@ else
     "$source_dir/examples/quickstart.sh" "$source_dir/build/first-light"
   fi
 fi
+publish=$source_dir/bench/publish/publish.py
+command -v python3 >/dev/null || refuse 1 "no python3, which makes the tables; install it"
 command -v "$tetwarp" >/dev/null || refuse 1 "no program $tetwarp; unset TETWARP_PROGRAM to build it"
 version=$("$tetwarp" --version)
 
@@ -139,15 +141,15 @@ unfinished=$(mktemp -d "$out/.unfinished.XXXXXX")
 trap 'rm -rf "$unfinished"' EXIT
 describe_machine >"$unfinished/machine.txt"
 echo "== tetwarp bench paper$(shown)"
-"$tetwarp" bench paper ${input:+"$input"} --json "$unfinished/paper.json" --csv "$unfinished/paper.csv" \
-  "${options[@]}" "${extra[@]}" >"$unfinished/paper.md"
+"$tetwarp" bench paper ${input:+"$input"} --json "$unfinished/paper.json" "${options[@]}" "${extra[@]}" >/dev/null
+"$publish" "$unfinished/paper.json" "$unfinished"/paper.{md,csv,json}
 rm -f "$out/paper.svg"  # that of an earlier run shows other numbers
 mv -f "$unfinished"/{machine.txt,paper.json,paper.csv,paper.md} "$out"
 
 drawing="not made: no python3-matplotlib"
 for python in python3 /usr/bin/python3; do
   if "$python" -c 'import matplotlib' 2>/dev/null; then
-    "$python" "$source_dir/bench/paper/plot_paper.py" "$out/paper.json" "$unfinished/paper.svg"
+    "$python" "$publish" "$out/paper.json" "$unfinished/paper.svg"
     mv -f "$unfinished/paper.svg" "$out"
     drawing=$out/paper.svg
     break

@@ -164,7 +164,11 @@ int Batch::run() {
   const bool made_before = options_.resume && fs::exists(options_.output, unknown);
   // Checked before a folder is begun, for a later run would refuse to use that.
   if (!made_before) check_space(found_, options_.output);
-  if (demands_device(options_.backend) && cuda == 0) make_forward_resampler(chosen(options_.backend), Geometry());
+  if (demands_device(options_.backend) && cuda == 0) {
+    Geometry any;
+    any.size = glm::i64vec3(2);  // a grid is looked at before a device is
+    make_forward_resampler(BackendKind::cuda, any);
+  }
   OutputFolder folder(options_.output, shard_, ids_of(cases_), hash_file(options_.manifest), options_.resume);
   Results results(folder, ids());
   find_finished(folder, results);

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "bench/cpu/cpu_methods.h"
+#include "bench/cpu/cpu.h"
 
 #include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
@@ -10,12 +10,13 @@
 
 #include <algorithm>
 #include <bit>
-#include <chrono>
 #include <cmath>
 #include <functional>
+#include <memory>
+#include <span>
 
 #include "bench/gpu/gpu_fields.h"
-#include "bench/paper/paper_cpu.h"
+#include "bench/paper/backend.h"
 #include "bench/peers/peers.h"
 #include "deform/resampler.h"
 
@@ -23,11 +24,15 @@ namespace tetwarp::bench {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
+/// Threads that oneTBB may use while it stands.
+class ThreadLimit {
+ public:
+  explicit ThreadLimit(int threads)
+      : limit_(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads)) {}
 
-double ms_between(Clock::time_point from, Clock::time_point to) {
-  return std::chrono::duration<double, std::milli>(to - from).count();
-}
+ private:
+  tbb::global_control limit_;
+};
 
 /// A field on a lattice over a volume.
 struct Scene {
@@ -78,14 +83,6 @@ Scene make_scene(const FieldOnLattice& of, const Geometry& volume) {
   return scene;
 }
 
-/// Milliseconds of each repeat.
-struct OwnSamples {
-  std::vector<double> set_field, resample, new_field;
-  std::vector<double> resting;  ///< RestingSlices, where there are such
-
-  OwnTimes summary() const { return {summarize(set_field), summarize(resample), summarize(new_field)}; }
-};
-
 /// Tetwarp on one volume.
 class Own {
  public:
@@ -97,29 +94,29 @@ class Own {
         output_{volume.geometry, std::vector<std::int16_t>(volume.voxels.size())} {}
 
   /// A new field, with one volume.
-  void run(const Scene& scene, OwnSamples& samples) {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads_));
-    const auto start = Clock::now();
+  void run(const Scene& scene, Samples& samples) {
+    const ThreadLimit limit(threads_);
+    const Stopwatch watch;
     resampler_->set_field(view(scene.field), FieldOptions{.jacobian_range = true});
-    const auto set = Clock::now();
+    const double set_ms = watch.ms();
     report_ = resample(whole(volume_.geometry));
-    const auto done = Clock::now();
-    samples.set_field.push_back(ms_between(start, set));
-    samples.resample.push_back(ms_between(set, done));
-    samples.new_field.push_back(ms_between(start, done));
+    const double all_ms = watch.ms();
+    samples["set_field_ms"].push_back(set_ms);
+    samples["resample_ms"].push_back(all_ms - set_ms);
+    samples["new_field_ms"].push_back(all_ms);
     if (scene.resting.empty()) return;
     double resting = 0;
     for (const Region& slices : scene.resting) resting += run_resting(scene.field, slices);
-    samples.resting.push_back(resting);
+    samples["resting"].push_back(resting);
   }
   /// Two volumes at once through the field that was set. @return ms
   double run_two() {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads_));
+    const ThreadLimit limit(threads_);
     if (second_.voxels.empty()) second_ = second_output_ = volume_;
     const Target targets[] = {target_of(volume_, output_), target_of(second_, second_output_)};
-    const auto start = Clock::now();
+    const Stopwatch watch;
     resampler_->resample(whole(volume_.geometry), targets);
-    return ms_between(start, Clock::now());
+    return watch.ms();
   }
   /// Of all slices.
   double resting_share(const Scene& scene) const {
@@ -154,10 +151,10 @@ class Own {
     grid.origin.z += static_cast<double>(slices.begin.z) * grid.spacing.z;
     const auto alone = make_cpu_resampler(grid, {.threads = threads_});
     const glm::vec3* vertices = field.displacement.data() + slices.begin.z * grid.size.x * grid.size.y;
-    const auto start = Clock::now();
+    const Stopwatch watch;
     resample(slices);
     alone->set_field(FieldView{&grid, vertices}, FieldOptions{.jacobian_range = true});
-    return ms_between(start, Clock::now());
+    return watch.ms();
   }
 
   Target target_of(const Volume<std::int16_t>& source, Volume<std::int16_t>& output) const {
@@ -177,135 +174,111 @@ class Own {
   Report report_;
 };
 
-class PaperLoop final : public Peer {
- public:
-  PaperLoop(const PeerInput& input, const VertexField& field, std::int64_t cell_size)
-      : input_(input), field_(field), cell_size_(cell_size), output_(input.volume.voxels.size()) {}
-
-  void run() override {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
-                                    static_cast<std::size_t>(input_.threads));
-    std::fill(output_.begin(), output_.end(), input_.background);
-    run_paper_loop(input_.volume, field_, cell_size_, output_.data());
-  }
-  std::span<const std::int16_t> output() const override { return output_; }
-
- private:
-  const PeerInput input_;
-  const VertexField& field_;
-  const std::int64_t cell_size_;
-  std::vector<std::int16_t> output_;
-};
-
-class BytesMoved final : public Peer {
- public:
-  BytesMoved(const PeerInput& input, const VertexField& field)
-      : input_(input), field_(field), output_(input.volume.voxels.size()) {}
-
-  void run() override {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
-                                    static_cast<std::size_t>(input_.threads));
-    seen_ = move_bytes(input_.volume, field_, output_);
-  }
-  std::span<const std::int16_t> output() const override { return output_; }
-
- private:
-  const PeerInput input_;
-  const VertexField& field_;
-  std::vector<std::int16_t> output_;
-  volatile std::uint32_t seen_ = 0;
-};
-
-/// A peer with its times.
-struct Entrant {
-  std::unique_ptr<Peer> peer;  ///< null: not asked for, or not in this build
-  int repeats;
-  bool runs_before;  ///< once, untimed
-  std::vector<double> ms = {};
-
-  void run(int repeat) {
-    if (!peer || repeat >= repeats || (repeat < 0 && !runs_before)) return;
-    const auto start = Clock::now();
-    peer->run();
-    if (repeat >= 0) ms.push_back(ms_between(start, Clock::now()));
-  }
-  std::optional<PeerTimes> times(const Exact& exact) const {
-    if (!peer) return {};
-    return PeerTimes{summarize(ms), differing_fraction(exact, peer->output())};
-  }
-};
-
-/// Everything that runs on one field, each made when it is asked for.
-struct Entrants {
-  Entrant bytes, paper, itk_warp, itk_invert_and_warp, vtk_probe;
-
-  void run(int repeat) {
-    for (Entrant* entrant : {&bytes, &paper, &itk_warp, &itk_invert_and_warp, &vtk_probe}) entrant->run(repeat);
-  }
-  bool any_peer() const { return paper.peer || itk_warp.peer || itk_invert_and_warp.peer || vtk_probe.peer; }
-};
-
-Entrants make_entrants(const Beside& beside, const PeerInput& input, const VertexField& field, std::int64_t cell_size,
-                       const PullField& inverse, int repeats) {
-  constexpr int kSlow = 1;
-  return {
-      .bytes = {beside.bytes ? std::make_unique<BytesMoved>(input, field) : nullptr, repeats, true},
-      .paper = {beside.paper ? std::make_unique<PaperLoop>(input, field, cell_size) : nullptr, repeats, false},
-      .itk_warp = {beside.itk_warp ? make_itk_warp(input, inverse) : nullptr, repeats, true},
-      .itk_invert_and_warp = {beside.itk_invert_and_warp ? make_itk_invert_and_warp(input, field) : nullptr, kSlow,
-                              false},
-      .vtk_probe = {beside.vtk_probe ? make_vtk_probe(input, field) : nullptr, kSlow, false},
+/// The output of a loop of our own that fills one.
+template <class Fill>
+Peer filling(const PeerInput& input, Fill fill) {
+  return [=, output = std::make_shared<std::vector<std::int16_t>>(input.volume.voxels.size())] {
+    const ThreadLimit limit(input.threads);
+    fill(*output);
+    return std::span<const std::int16_t>(*output);
   };
+}
+
+/// A peer beside Tetwarp.
+struct Entrant {
+  const char* name;
+  Peer peer;  ///< empty where it is not asked for or not in this build
+  bool warms_up = false, is_slow = false;
+  std::span<const std::int16_t> output = {};
+
+  Contender contender() {
+    if (!peer) return {name, [](Samples&) {}};
+    const auto run = [this](Samples& samples) {
+      const Stopwatch watch;
+      output = peer();
+      samples["ms"].push_back(watch.ms());
+    };
+    return {name, run, warms_up, is_slow ? 1 : std::numeric_limits<int>::max()};
+  }
+};
+
+/// Bytes first, which have no output to compare.
+std::vector<Entrant> make_entrants(const Beside& beside, const PeerInput& input, const PullField& inverse,
+                                   const VertexField& field, std::int64_t cell_size) {
+  std::vector<Entrant> all{{"bytes_ms", {}, true},
+                           {"paper", {}},
+                           {"itk_warp", {}, true},
+                           {"itk_invert_and_warp", {}, false, true},
+                           {"vtk_probe", {}, false, true}};
+  if (beside.bytes)
+    all[0].peer = filling(input, [&source = input.volume, &field](std::vector<std::int16_t>& output) {
+      [[maybe_unused]] const volatile std::uint32_t seen = move_bytes(source, field, output);
+    });
+  if (beside.paper)
+    all[1].peer = filling(input, [=, &field](std::vector<std::int16_t>& output) {
+      std::fill(output.begin(), output.end(), input.background);
+      run_paper_loop(input.volume, field, cell_size, output.data());
+    });
+  if (!inverse.displacement.empty()) all[2].peer = make_itk_warp(input, inverse);
+  if (beside.itk_invert_and_warp) all[3].peer = make_itk_invert_and_warp(input, field);
+  if (beside.vtk_probe) all[4].peer = make_vtk_probe(input, field);
+  return all;
 }
 
 }  // namespace
 
-CpuRun measure_run(const Volume<std::int16_t>& volume, const FieldOnLattice& field, const Beside& beside, int threads,
-                   int repeats) {
+Json measure_run(const Volume<std::int16_t>& volume, const FieldOnLattice& field, const Beside& beside, int threads,
+                 int repeats) {
   const Scene scene = make_scene(field, volume.geometry);
   Own own(volume, threads);
-  OwnSamples samples, untimed;
+  Samples untimed;
   own.run(scene, untimed);
   const PullField inverse = beside.itk_warp && itk_version() ? own.inverse() : PullField{};
-  Entrants others =
-      make_entrants(beside, {volume, own.background(), threads}, scene.field, field.cell_size, inverse, repeats);
-  others.run(-1);
-  if (beside.second_volume) own.run_two();
-  std::vector<double> two;
-  for (int repeat = 0; repeat < repeats; ++repeat) {
-    own.run(scene, samples);
-    if (beside.second_volume) two.push_back(own.run_two());
-    others.run(repeat);
+  std::vector<Entrant> entrants =
+      make_entrants(beside, {volume, own.background(), threads}, inverse, scene.field, field.cell_size);
+  std::vector<Contender> contenders{{"own", [&](Samples& samples) { own.run(scene, samples); }, false}};
+  if (beside.second_volume)
+    contenders.push_back({"two", [&](Samples& samples) { samples["two_volumes_ms"].push_back(own.run_two()); }});
+  const std::size_t first = contenders.size();
+  for (Entrant& one : entrants) contenders.push_back(one.contender());
+  const std::vector<Samples> times = take_turns(contenders, 1, repeats);
+
+  Json run{{"size", size_json(volume.geometry.size)},
+           {"field", field.name},
+           {"cell_size", field.cell_size},
+           {"at_rest", scene.at_rest},
+           {"covered", own.covered()}};
+  for (const char* name : {"set_field_ms", "resample_ms", "new_field_ms"}) run[name] = summary_of(times[0], name);
+  run["new_field_ns_a_voxel"] = *number(run, "/new_field_ms") * 1e6 / static_cast<double>(voxel_count(volume.geometry));
+  run["resting"] = nullptr;
+  if (!scene.resting.empty())
+    run["resting"] = {{"share", own.resting_share(scene)}, {"new_field_ms", summary_of(times[0], "resting")}};
+  run["two_volumes_ms"] = beside.second_volume ? summary_of(times[1], "two_volumes_ms") : Json(nullptr);
+  run["bytes_ms"] = summary_of(times[first], "ms");
+  std::optional<Exact> exact;
+  for (std::size_t n = 1; n < entrants.size(); ++n) {
+    const Entrant& one = entrants[n];
+    if (one.peer && !exact) exact = own.exact();
+    run[one.name] = nullptr;
+    if (one.peer)
+      run[one.name] = {{"ms", summary_of(times[first + n], "ms")},
+                       {"differing", differing_fraction(*exact, one.output)}};
   }
-  CpuRun run{.size = volume.geometry.size,
-             .field = field.name,
-             .cell_size = field.cell_size,
-             .at_rest = scene.at_rest,
-             .covered = own.covered(),
-             .ours = samples.summary()};
-  if (!scene.resting.empty()) run.resting = {own.resting_share(scene), summarize(samples.resting)};
-  if (beside.second_volume) run.two_ms = summarize(two);
-  if (others.bytes.peer) run.bytes_ms = summarize(others.bytes.ms);
-  if (!others.any_peer()) return run;
-  const Exact exact = own.exact();
-  run.paper = others.paper.times(exact);
-  run.itk_warp = others.itk_warp.times(exact);
-  run.itk_invert_and_warp = others.itk_invert_and_warp.times(exact);
-  run.vtk_probe = others.vtk_probe.times(exact);
   return run;
 }
 
-Scaling measure_scaling(const Volume<std::int16_t>& volume, const std::string& field, int threads, int repeats) {
+Json measure_scaling(const Volume<std::int16_t>& volume, const std::string& field, int threads, int repeats) {
   const Scene scene = make_scene({field}, volume.geometry);
   Own one(volume, 1), all(volume, threads);
-  OwnSamples of_one, of_all, untimed;
-  one.run(scene, untimed);
-  all.run(scene, untimed);
-  for (int repeat = 0; repeat < repeats; ++repeat) {
-    one.run(scene, of_one);
-    all.run(scene, of_all);
-  }
-  return {field, threads, of_one.summary(), of_all.summary()};
+  const std::vector<Samples> times = take_turns({{"one thread", [&](Samples& samples) { one.run(scene, samples); }},
+                                                 {"all threads", [&](Samples& samples) { all.run(scene, samples); }}},
+                                                1, repeats);
+  Json scaling{{"field", field}, {"threads", threads}};
+  for (std::size_t n = 0; n < 2; ++n)
+    for (const char* name : {"set_field_ms", "resample_ms", "new_field_ms"})
+      scaling[n == 0 ? "one" : "all"][name] = summary_of(times[n], name);
+  scaling["efficiency"] = *number(scaling, "/one/new_field_ms") / (threads * *number(scaling, "/all/new_field_ms"));
+  return scaling;
 }
 
 std::uint32_t move_bytes(const Volume<std::int16_t>& source, const VertexField& field,

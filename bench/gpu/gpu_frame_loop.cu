@@ -4,7 +4,6 @@
 // Frames per second: one resampler, field after field.
 #include <algorithm>
 #include <array>
-#include <chrono>
 
 #include "backend/factories.h"
 #include "bench/gpu/gpu_parts.h"
@@ -14,33 +13,14 @@ namespace tetwarp::bench {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+using cuda_detail::PinnedBuffer;
 
 /// Elastic fields of these amplitudes, in turn; voxels.
 constexpr std::array<float, 3> kAmplitudes{3, 4.5f, 6};
 
-/// Page-locked host memory, which the device copies from and to while the host does something else.
-template <class T>
-class PinnedBuffer {
- public:
-  explicit PinnedBuffer(std::size_t size) : size_(size) { TETWARP_CUDA_TRY(cudaMallocHost(&data_, size * sizeof(T))); }
-  ~PinnedBuffer() { cudaFreeHost(data_); }
-  PinnedBuffer(const PinnedBuffer&) = delete;
-  PinnedBuffer& operator=(const PinnedBuffer&) = delete;
-
-  T* data() { return data_; }
-  std::size_t size_bytes() const { return size_ * sizeof(T); }
-
- private:
-  std::size_t size_;
-  T* data_ = nullptr;
-};
-
 class Loop {
  public:
-  Loop(const Volume<std::int16_t>& volume, std::int64_t cell_size, const GpuOptions& options)
+  Loop(const Volume<std::int16_t>& volume, std::int64_t cell_size, const Options& options)
       : volume_(volume),
         options_(options),
         background_(*std::min_element(volume.voxels.begin(), volume.voxels.end())),
@@ -49,30 +29,27 @@ class Loop {
     for (DeviceBuffer<std::int16_t>& output : outputs_) output.reserve(volume.voxels.size());
     for (std::size_t n = 0; n < kAmplitudes.size(); ++n) {
       fields_[n].generate(make_elastic(kAmplitudes[n]), volume.geometry, cell_size, compute_);
-      host_fields_.push_back(std::make_unique<PinnedBuffer<glm::vec3>>(fields_[n].vertices()));
-      TETWARP_CUDA_TRY(cudaMemcpy(host_fields_[n]->data(), fields_[n].displacement(), fields_[n].size_bytes(),
-                                  cudaMemcpyDeviceToHost));
+      TETWARP_CUDA_TRY(cudaMemcpy(host_fields_[n].reserve(fields_[n].vertices()), fields_[n].displacement(),
+                                  fields_[n].size_bytes(), cudaMemcpyDeviceToHost));
     }
-    for (int n = 0; n < 2; ++n) {
-      host_outputs_.push_back(std::make_unique<PinnedBuffer<std::int16_t>>(volume.voxels.size()));
-    }
+    for (const int frame : {0, 1}) host_output(frame);  // allocates them
   }
 
   /// Frames per second with all data on the device.
   double run_kernels() {
     run_on_device(options_.warmup);
-    const auto start = Clock::now();
+    const Stopwatch watch;
     run_on_device(options_.frames);
-    return options_.frames / seconds_since(start);
+    return 1000 * options_.frames / watch.ms();
   }
 
   /// Frames per second with copies of the next field and the last output beside the kernels, or copies alone. The
   /// fields on the device become the buffers for the copies.
   double run_with_copies(bool kernels) {
     run_overlapped(options_.warmup, kernels);
-    const auto start = Clock::now();
+    const Stopwatch watch;
     run_overlapped(options_.frames, kernels);
-    return options_.frames / seconds_since(start);
+    return 1000 * options_.frames / watch.ms();
   }
 
   /// Frames per second as a program without CUDA calls it. The time in which it would fill its field is left out.
@@ -81,28 +58,32 @@ class Loop {
     VertexField field{fields_[0].lattice(), std::vector<glm::vec3>(fields_[0].vertices())};
     const Target target{
         .source = view(volume_), .output = view(output_), .background = static_cast<double>(background_)};
-    double seconds = 0;
+    double ms = 0;
     for (int n = -options_.warmup; n < options_.frames; ++n) {
-      const glm::vec3* const next = host_field(std::max(n, 0)).data();
+      const glm::vec3* const next = host_field(std::max(n, 0));
       std::copy(next, next + field.displacement.size(), field.displacement.begin());
-      const auto start = Clock::now();
+      const Stopwatch watch;
       resampler_->set_field(view(field));
       resampler_->resample(whole(volume_.geometry), {&target, 1});
-      if (n >= 0) seconds += seconds_since(start);
+      if (n >= 0) ms += watch.ms();
     }
-    return options_.frames / seconds;
+    return 1000 * options_.frames / ms;
   }
 
   /// The last frames of `run_with_copies` and `run_host_views`, which took the same field.
   void require_same_output() {
-    const std::int16_t* const overlapped = host_outputs_[static_cast<std::size_t>(options_.frames - 1) % 2]->data();
+    const std::int16_t* const overlapped = host_output(options_.frames - 1);
     if (std::equal(output_.voxels.begin(), output_.voxels.end(), overlapped)) return;
     throw Error("frames with copies beside them gave other voxels than frames from host memory; this is a bug");
   }
 
  private:
-  PinnedBuffer<glm::vec3>& host_field(int frame) {
-    return *host_fields_[static_cast<std::size_t>(frame) % kAmplitudes.size()];
+  const glm::vec3* host_field(int frame) {
+    const auto n = static_cast<std::size_t>(frame) % kAmplitudes.size();
+    return host_fields_[n].reserve(fields_[n].vertices());
+  }
+  std::int16_t* host_output(int frame) {
+    return host_outputs_[static_cast<std::size_t>(frame) % 2].reserve(volume_.voxels.size());
   }
 
   void run_frame(FieldOnDevice& field, DeviceBuffer<std::int16_t>& output) {
@@ -120,17 +101,15 @@ class Loop {
   /// Queues the copy of a frame's field into one of two buffers.
   void upload(int frame) {
     const auto slot = static_cast<std::size_t>(frame % 2);
-    PinnedBuffer<glm::vec3>& from = host_field(frame);
-    TETWARP_CUDA_TRY(cudaMemcpyAsync(fields_[slot].displacement(), from.data(), from.size_bytes(),
+    TETWARP_CUDA_TRY(cudaMemcpyAsync(fields_[slot].displacement(), host_field(frame), fields_[slot].size_bytes(),
                                      cudaMemcpyHostToDevice, in_.get()));
     uploaded_[slot].record(in_);
   }
 
   void download(int frame) {
     const auto slot = static_cast<std::size_t>(frame % 2);
-    PinnedBuffer<std::int16_t>& to = *host_outputs_[slot];
-    TETWARP_CUDA_TRY(
-        cudaMemcpyAsync(to.data(), outputs_[slot].data(), to.size_bytes(), cudaMemcpyDeviceToHost, out_.get()));
+    TETWARP_CUDA_TRY(cudaMemcpyAsync(host_output(frame), outputs_[slot].data(),
+                                     volume_.voxels.size() * sizeof(std::int16_t), cudaMemcpyDeviceToHost, out_.get()));
     downloaded_[slot].record(out_);
   }
 
@@ -150,24 +129,24 @@ class Loop {
   }
 
   const Volume<std::int16_t>& volume_;
-  const GpuOptions& options_;
+  const Options& options_;
   const std::int16_t background_;
   Stream compute_{cudaStreamNonBlocking}, in_{cudaStreamNonBlocking}, out_{cudaStreamNonBlocking};
   Event uploaded_[2], downloaded_[2];
   DeviceBuffer<std::int16_t> source_;
   std::array<DeviceBuffer<std::int16_t>, 2> outputs_;
   std::array<FieldOnDevice, kAmplitudes.size()> fields_;
-  std::vector<std::unique_ptr<PinnedBuffer<glm::vec3>>> host_fields_;
-  std::vector<std::unique_ptr<PinnedBuffer<std::int16_t>>> host_outputs_;
+  std::array<PinnedBuffer<glm::vec3>, kAmplitudes.size()> host_fields_;
+  std::array<PinnedBuffer<std::int16_t>, 2> host_outputs_;
   std::unique_ptr<ForwardResampler> resampler_;
   Volume<std::int16_t> output_;
 };
 
 }  // namespace
 
-FrameLoop measure_frame_loop(const Volume<std::int16_t>& volume, std::int64_t cell_size, const GpuOptions& options) {
+FrameLoop measure_frame_loop(const Volume<std::int16_t>& volume, std::int64_t cell_size, const Options& options) {
   Loop loop(volume, cell_size, options);
-  FrameLoop rates{.cell_size = cell_size};
+  FrameLoop rates;
   rates.kernels = loop.run_kernels();
   rates.copies_alone = loop.run_with_copies(false);
   rates.with_copies = loop.run_with_copies(true);

@@ -78,15 +78,13 @@ std::uint64_t watch_device_views(const Volume<std::int16_t>& volume, FieldOnDevi
 
 }  // namespace
 
-MemoryUse measure_memory(const Volume<std::int16_t>& volume, const std::string& name, const GpuOptions& options) {
+MemoryUse measure_memory(const Volume<std::int16_t>& volume, const std::string& name, const Options& options) {
   const Stream stream;
   const double background = *std::min_element(volume.voxels.begin(), volume.voxels.end());
   FieldOnDevice on_device;
   on_device.generate(make_test_field(name, volume.geometry.size), volume.geometry, 1, stream);
-  MemoryUse use{.field = name, .data = 2 * volume.voxels.size() * sizeof(std::int16_t) + on_device.size_bytes()};
-  VertexField field{on_device.lattice(), std::vector<glm::vec3>(on_device.vertices())};
-  TETWARP_CUDA_TRY(
-      cudaMemcpy(field.displacement.data(), on_device.displacement(), on_device.size_bytes(), cudaMemcpyDeviceToHost));
+  MemoryUse use{.data = 2 * volume.voxels.size() * sizeof(std::int16_t) + on_device.size_bytes()};
+  const VertexField field = on_device.on_host();
   Volume<std::int16_t> output{volume.geometry, std::vector<std::int16_t>(volume.voxels.size())};
   const Target target{.source = view(volume), .output = view(output), .background = background};
   watch_frames(view(field), target, options.device);  // the driver loads kernels with their first call

@@ -23,20 +23,9 @@ __global__ void __launch_bounds__(kThreads)
   if (n < std::int64_t{volume.nx} * volume.ny * volume.nz) output[n] = sample_backward(volume, places[n], background);
 }
 
-/// Milliseconds of each frame.
-struct Times {
-  std::vector<double> set_field, resample, new_field, two, paper, gascon, backward;
-};
-
-std::optional<Summary> summary_or_none(const std::vector<double>& ms) {
-  return ms.empty() ? std::nullopt : std::optional(summarize(ms));
-}
-
-}  // namespace
-
-class GpuMethods::State {
+class DeviceMethods final : public GpuMethods {
  public:
-  State(const Volume<std::int16_t>& volume, const GpuOptions& options)
+  DeviceMethods(const Volume<std::int16_t>& volume, const Options& options)
       : volume_(volume),
         options_(options),
         background_(*std::min_element(volume.voxels.begin(), volume.voxels.end())),
@@ -49,68 +38,45 @@ class GpuMethods::State {
     second_output_.reserve(volume.voxels.size());
   }
 
-  GpuRun measure(const std::string& name, std::int64_t cell_size, Others others) {
+  GpuMeasure measure(const std::string& name, std::int64_t cell_size, Others others) override {
     const TestField field = make_test_field(name, volume_.geometry.size);
     field_.generate(field, volume_.geometry, cell_size, stream_);
     const std::optional<TestField> inverse = inverse_of(field);
-    others.backward &= inverse.has_value();
-    if (others.backward) generate_places(*inverse, volume_.geometry, places_, stream_);
-    Times times, untimed;
-    for (int n = -options_.warmup; n < options_.frames; ++n) run_frame(others, n < 0 ? untimed : times);
-    return {.size = volume_.geometry.size,
-            .field = name,
-            .cell_size = cell_size,
-            .at_rest = field_.at_rest(),
-            .set_field_ms = summarize(times.set_field),
-            .resample_ms = summarize(times.resample),
-            .new_field_ms = summarize(times.new_field),
-            .two_ms = summarize(times.two),
-            .paper_ms = summary_or_none(times.paper),
-            .gascon_ms = summary_or_none(times.gascon),
-            .backward_ms = summary_or_none(times.backward),
-            .report = report_};
+    if (others.backward && inverse) generate_places(*inverse, volume_.geometry, places_, stream_);
+    const auto every_method = [&](Samples& times) {
+      run_tetwarp(field_.view(), times);
+      times["two_volumes_ms"].push_back(run_two());
+      if (others.paper) times["paper_ms"].push_back(run_baseline(Method::paper));
+      if (others.gascon) times["gascon_ms"].push_back(run_baseline(Method::gascon));
+      if (others.backward && inverse) times["backward_ms"].push_back(run_backward());
+    };
+    return {take_turns({{name, every_method}}, options_.warmup, options_.frames).front(), field_.at_rest(), 0, report_};
   }
 
-  MeshRun measure_mesh(const std::string& name, std::int64_t cell_size) {
+  GpuMeasure measure_mesh(const std::string& name, std::int64_t cell_size) override {
     field_.generate(make_test_field(name, volume_.geometry.size), volume_.geometry, cell_size, stream_);
-    VertexField lattice{field_.lattice(), std::vector<glm::vec3>(field_.vertices())};
-    TETWARP_CUDA_TRY(
-        cudaMemcpy(lattice.displacement.data(), field_.displacement(), field_.size_bytes(), cudaMemcpyDeviceToHost));
     VertexField mesh;
-    mesh.mesh = mesh_of(lattice);
-    MeshRun run{.field = name, .cell_size = cell_size, .tetrahedra = mesh.mesh.tetrahedra.size()};
-    Times times, untimed;
-    for (int n = -options_.warmup; n < options_.frames; ++n) {
-      Times& to = n < 0 ? untimed : times;
-      run_tetwarp(tetwarp::view(mesh, Outside::background), to);
-      to.gascon.push_back(run_baseline(Method::gascon));
-    }
-    run.set_field_ms = summarize(times.set_field);
-    run.resample_ms = summarize(times.resample);
-    run.gascon_ms = summarize(times.gascon);
-    return run;
+    mesh.mesh = mesh_of(field_.on_host());
+    const auto both = [&](Samples& times) {
+      run_tetwarp(tetwarp::view(mesh, Outside::background), times);
+      times["gascon_ms"].push_back(run_baseline(Method::gascon));
+    };
+    return {take_turns({{name, both}}, options_.warmup, options_.frames).front(), field_.at_rest(),
+            mesh.mesh.tetrahedra.size(), report_};
   }
 
  private:
-  /// Every method once; times from events on the stream.
-  void run_frame(const Others& others, Times& times) {
-    run_tetwarp(field_.view(), times);
-    times.two.push_back(run_two());
-    if (others.paper) times.paper.push_back(run_baseline(Method::paper));
-    if (others.gascon) times.gascon.push_back(run_baseline(Method::gascon));
-    if (others.backward) times.backward.push_back(run_backward());
-  }
-
-  void run_tetwarp(const FieldView& field, Times& times) {
+  /// Times from events on the stream.
+  void run_tetwarp(const FieldView& field, Samples& times) {
     const Target target = target_of(source_, output_);
     start_.record(stream_);
     resampler_->set_field(field, kWithoutRange, on_stream(stream_));
     middle_.record(stream_);
     report_ = resampler_->resample(whole(volume_.geometry), {&target, 1}, {}, on_stream(stream_));
     end_.record(stream_);
-    times.new_field.push_back(end_.ms_since(start_));
-    times.set_field.push_back(middle_.ms_since(start_));
-    times.resample.push_back(end_.ms_since(middle_));
+    times["new_field_ms"].push_back(end_.ms_since(start_));
+    times["set_field_ms"].push_back(middle_.ms_since(start_));
+    times["resample_ms"].push_back(end_.ms_since(middle_));
   }
 
   Target target_of(const DeviceBuffer<std::int16_t>& source, const DeviceBuffer<std::int16_t>& output) const {
@@ -151,7 +117,7 @@ class GpuMethods::State {
   }
 
   const Volume<std::int16_t>& volume_;
-  const GpuOptions& options_;
+  const Options& options_;
   const std::int16_t background_;
   Stream stream_;
   Event start_, middle_, end_;
@@ -163,39 +129,33 @@ class GpuMethods::State {
   Report report_;
 };
 
-GpuMethods::GpuMethods(const Volume<std::int16_t>& volume, const GpuOptions& options)
-    : state_(std::make_unique<State>(volume, options)) {}
+}  // namespace
 
-GpuMethods::~GpuMethods() = default;
-
-GpuRun GpuMethods::measure(const std::string& field, std::int64_t cell_size, const Others& others) {
-  return state_->measure(field, cell_size, others);
+std::unique_ptr<GpuMethods> make_gpu_methods(const Volume<std::int16_t>& volume, const Options& options) {
+  TETWARP_CUDA_TRY(cudaSetDevice(options.device));
+  return std::make_unique<DeviceMethods>(volume, options);
 }
 
-MeshRun GpuMethods::measure_mesh(const std::string& field, std::int64_t cell_size) {
-  return state_->measure_mesh(field, cell_size);
-}
-
-CopyTimes measure_copies(const Geometry& volume, const GpuOptions& options) {
+Samples measure_copies(const Geometry& volume, const Options& options) {
+  TETWARP_CUDA_TRY(cudaSetDevice(options.device));
   Stream stream;
   Event start, end;
   DeviceBuffer<std::byte> from, to;
-  const auto time_copies = [&](std::size_t bytes) {
-    std::vector<double> ms;
+  Samples times;
+  const auto copy = [&](const char* name, std::size_t bytes) {
     from.fill(1, bytes, stream.get());
     to.reserve(bytes);
-    for (int n = -options.warmup; n < options.frames; ++n) {
+    const auto once = [&](Samples& samples) {
       start.record(stream);
       TETWARP_CUDA_TRY(cudaMemcpyAsync(to.data(), from.data(), bytes, cudaMemcpyDeviceToDevice, stream.get()));
       end.record(stream);
-      const double copied_ms = end.ms_since(start);
-      if (n >= 0) ms.push_back(copied_ms);
-    }
-    return summarize(ms);
+      samples[name].push_back(end.ms_since(start));
+    };
+    times.merge(take_turns({{name, once}}, options.warmup, options.frames).front());
   };
-  const auto voxels = static_cast<std::size_t>(voxel_count(volume));
-  const auto vertices = static_cast<std::size_t>(voxel_count(lattice_over(volume, 1)));
-  return {time_copies(voxels * sizeof(std::int16_t)), time_copies(vertices * sizeof(glm::vec3))};
+  copy("volume_ms", static_cast<std::size_t>(voxel_count(volume)) * sizeof(std::int16_t));
+  copy("field_ms", static_cast<std::size_t>(voxel_count(lattice_over(volume, 1))) * sizeof(glm::vec3));
+  return times;
 }
 
 }  // namespace tetwarp::bench

@@ -3,6 +3,7 @@
 
 #include "bench/gpu/gpu_scene.h"
 #include "bench/paper/baseline_kernels.cuh"
+#include "bench/simulate/simulate.h"
 
 namespace tetwarp::bench {
 
@@ -35,6 +36,21 @@ __global__ void places_kernel(Grid grid, TestField inverse, glm::vec3* places) {
 
 }  // namespace
 
+FrameVolumes make_device_volumes(const Volume<std::int16_t>& volume, double background) {
+  struct Memory {
+    DeviceBuffer<std::int16_t> source, output;
+  };
+  const auto memory = std::make_shared<Memory>();
+  const Stream stream;
+  memory->source.upload(volume.voxels.data(), volume.voxels.size(), stream.get());
+  memory->output.reserve(volume.voxels.size());
+  TETWARP_CUDA_TRY(cudaDeviceSynchronize());
+  return {{.source = device_view(volume.geometry, memory->source.data()),
+           .output = device_view(volume.geometry, memory->output.data()),
+           .background = background},
+          memory};
+}
+
 void FieldOnDevice::generate(const TestField& field, const Geometry& volume, std::int64_t cell_size,
                              const Stream& stream) {
   lattice_ = lattice_over(volume, cell_size);
@@ -47,6 +63,12 @@ void FieldOnDevice::generate(const TestField& field, const Geometry& volume, std
   unsigned long long moving = 0;
   moving_.download(&moving, 1, stream.get());
   at_rest_ = 1 - static_cast<double>(moving) / static_cast<double>(count);
+}
+
+VertexField FieldOnDevice::on_host() const {
+  VertexField field{lattice_, std::vector<glm::vec3>(vertices())};
+  TETWARP_CUDA_TRY(cudaMemcpy(field.displacement.data(), displacement_.data(), size_bytes(), cudaMemcpyDeviceToHost));
+  return field;
 }
 
 void generate_places(const TestField& inverse, const Geometry& volume, DeviceBuffer<glm::vec3>& places,

@@ -27,6 +27,8 @@ class FieldOnDevice {
   std::size_t size_bytes() const { return vertices() * sizeof(glm::vec3); }
   /// Fraction of the vertices that do not move.
   double at_rest() const { return at_rest_; }
+  /// A copy.
+  VertexField on_host() const;
   FieldView view() const {
     return {.lattice = &lattice_, .displacement = displacement_.data(), .memory = Memory::device};
   }

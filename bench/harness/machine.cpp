@@ -1,13 +1,12 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "bench/harness/machine.h"
-
 #include <tbb/task_arena.h>
 
 #include <fstream>
 #include <limits>
 
+#include "bench/harness/results.h"
 #include "bench/paper/backend.h"
 
 namespace tetwarp::bench {
@@ -29,14 +28,16 @@ std::string cpu_name() {
 
 }  // namespace
 
-Machine describe_machine(int device, int threads) {
-  Machine machine{.cpu = cpu_name(), .threads = threads > 0 ? threads : tbb::this_task_arena::max_concurrency()};
+Json describe_machine(int device, int threads) {
+  Json machine{{"cpu", cpu_name()},       {"threads", threads > 0 ? threads : tbb::this_task_arena::max_concurrency()},
+               {"gpu", nullptr},          {"driver", nullptr},
+               {"cuda_runtime", nullptr}, {"compute_capability", nullptr}};
   if (device < 0) return machine;
   const CudaFacts facts = describe_cuda(device);
-  machine.gpu = facts.name;
-  machine.driver = facts.driver;
-  machine.cuda_runtime = facts.runtime;
-  machine.compute_capability = facts.compute_capability;
+  machine["gpu"] = facts.name;
+  machine["driver"] = facts.driver;
+  machine["cuda_runtime"] = facts.runtime;
+  machine["compute_capability"] = facts.compute_capability;
   return machine;
 }
 

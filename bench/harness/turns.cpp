@@ -5,22 +5,9 @@
 
 #include <sys/resource.h>
 
-#include <chrono>
-
-#include "bench/harness/markdown.h"
+#include "bench/harness/results.h"
 
 namespace tetwarp::bench {
-
-std::function<std::any()> nothing(std::function<void()> run) {
-  return [run = std::move(run)] {
-    run();
-    return std::any();
-  };
-}
-
-void Turns::add(std::string step, std::string by, std::function<std::any()> run, std::function<void()> after) {
-  contenders_.push_back({std::move(step), std::move(by), std::move(run), std::move(after)});
-}
 
 namespace {
 
@@ -40,27 +27,22 @@ double cpu_ms() {
   return sum;
 }
 
-std::vector<IoTime> Turns::run(int repeats, const std::function<void(const std::string&)>& say) const {
-  using Clock = std::chrono::steady_clock;
-  std::vector<std::vector<double>> ms(contenders_.size()), cpu(contenders_.size());
-  for (int repeat = 1; repeat <= repeats; ++repeat) {
-    for (std::size_t n = 0; n < contenders_.size(); ++n) {
-      const Contender& one = contenders_[n];
-      const double cpu_before = cpu_ms();
-      const auto start = Clock::now();
-      std::any result = one.run();
-      ms[n].push_back(std::chrono::duration<double, std::milli>(Clock::now() - start).count());
-      cpu[n].push_back(cpu_ms() - cpu_before);
-      result.reset();
-      if (one.after) one.after();
-      say(format("%d/%d  %-32s %-16s %8.1f ms, CPU %8.1f", repeat, repeats, one.step.c_str(), one.by.c_str(),
-                 ms[n].back(), cpu[n].back()));
+std::vector<Samples> take_turns(const std::vector<Contender>& contenders, int warmup, int repeats,
+                                const std::function<void(const std::string&)>& say) {
+  std::vector<Samples> kept(contenders.size()), untimed(contenders.size());
+  for (int turn = -warmup; turn < repeats; ++turn) {
+    for (std::size_t n = 0; n < contenders.size(); ++n) {
+      const Contender& one = contenders[n];
+      if (turn < 0 ? !one.warms_up : turn >= one.most_repeats) continue;
+      Samples& samples = (turn < 0 ? untimed : kept)[n];
+      one.run(samples);
+      if (!say || turn < 0) continue;
+      std::string line = format("%d/%d  %-48s", turn + 1, repeats, one.name.c_str());
+      for (const auto& [name, values] : samples) line += format("  %s %.1f", name.c_str(), values.back());
+      say(line);
     }
   }
-  std::vector<IoTime> times;
-  for (std::size_t n = 0; n < contenders_.size(); ++n)
-    times.push_back({contenders_[n].step, contenders_[n].by, summarize(ms[n]), summarize(cpu[n])});
-  return times;
+  return kept;
 }
 
 }  // namespace tetwarp::bench

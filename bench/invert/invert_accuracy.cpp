@@ -1,18 +1,14 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "bench/invert/invert_accuracy.h"
+#include "bench/invert/invert.h"
 
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
-#include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <numeric>
-#include <vector>
-
-#include "bench/harness/statistics.h"
 
 namespace tetwarp::bench {
 

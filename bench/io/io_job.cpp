@@ -1,14 +1,12 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "bench/io/io_job.h"
-
 #include <memory>
 
 #include "backend/devices.h"
 #include "backend/factories.h"
-#include "bench/harness/program.h"
-#include "bench/io/series.h"
+#include "bench/harness/files.h"
+#include "bench/io/io.h"
 #include "deform/fields/formula.h"
 #include "io/hash.h"
 #include "io/staged_output.h"
@@ -28,6 +26,12 @@ struct Job {
   AnyVolume output;
   std::vector<SliceRange> sampled;
 };
+
+DicomDerivation made_up_derivation() {
+  return {.field_sha256 = std::string(64, '0'),
+          .parameters = "interpolation=linear outside=refuse background=-1024.0 direction=forward",
+          .description = "Deformed by a field of vertices, linear interpolation"};
+}
 
 VertexField make_field(const Geometry& grid, std::int64_t cell_size, int threads) {
   return sample_on(lattice_over(grid, cell_size), parse_formula(kField, grid), {.threads = threads});
@@ -68,40 +72,61 @@ void run_with_cuda(const fs::path& series, const fs::path& folder, std::int64_t 
   staged.commit();
 }
 
-}  // namespace
-
+/// The program tetwarp beside this one; empty if there is none.
 fs::path tetwarp_program() {
   const fs::path program = fs::read_symlink("/proc/self/exe").parent_path() / "tetwarp";
   return fs::exists(program) ? program : fs::path();
 }
 
-void add_job(Turns& turns, const fs::path& series, const fs::path& scratch, std::int64_t cell_size, int threads) {
-  const std::string step = kJob + ("cells of " + std::to_string(cell_size));
+}  // namespace
+
+DicomVolume read_series(const fs::path& folder, int threads, FileHash hash) {
+  const DicomScan scan = scan_dicom(folder);
+  require(scan.series.size() == 1,
+          std::to_string(scan.series.size()) + " series in " + folder.string() + "; expected one");
+  return load_dicom(scan.series.front(), threads, {}, hash);
+}
+
+void write_series(const fs::path& folder, const DicomVolume& source, const ConstVolumeView& volume,
+                  const std::vector<SliceRange>& sampled, int threads) {
+  write_derived_series(folder, volume, *source.headers, made_up_derivation(), sampled, threads);
+}
+
+std::vector<Contender> job_contenders(const fs::path& series, const fs::path& scratch, std::int64_t cell_size,
+                                      int threads) {
+  std::vector<Contender> contenders;
   const fs::path out = scratch / "derived", sidecar = scratch / "derived.json";
   const auto remove = [=] {
     fs::remove_all(out);
     fs::remove(sidecar);
   };
   const fs::path program = tetwarp_program();
-  if (!program.empty()) {
-    const auto run_on = [=](const char* backend) {
-      run_program({program, "deform", series, "-f", kField, "--cell-size", std::to_string(cell_size), "-o", out,
-                   "--backend", backend, "--threads", std::to_string(threads), "--quiet"});
-    };
-    turns.add(step, kJobProgram, nothing([=] { run_on("cpu"); }), remove);
-    if (device_count() != 0) turns.add(step, kJobCuda, nothing([=] { run_on("cuda"); }), remove);
-  }
-  if (device_count() != 0) {
-    turns.add(step, kJobAwake, nothing([=] { run_with_cuda(series, out, cell_size, threads); }), remove);
-  }
+  const bool has_device = device_count() != 0;
+  const auto run_on = [=](const char* backend) {
+    run_program({program, "deform", series, "-f", kField, "--cell-size", std::to_string(cell_size), "-o", out,
+                 "--backend", backend, "--threads", std::to_string(threads), "--quiet"});
+  };
+  if (!program.empty())
+    contenders.push_back(timed(
+        kJobProgram, [=] { run_on("cpu"); }, remove));
+  if (!program.empty() && has_device)
+    contenders.push_back(timed(
+        kJobCuda, [=] { run_on("cuda"); }, remove));
+  if (has_device)
+    contenders.push_back(timed(
+        kJobAwake, [=] { run_with_cuda(series, out, cell_size, threads); }, remove));
   const auto job = std::make_shared<Job>();
-  turns.add(step, kJobIn, nothing([=] { job->input = read_series(series, threads); }));
-  turns.add(step, kJobField, nothing([=] { job->field = make_field(job->input.volume.geometry, cell_size, threads); }));
-  turns.add(step, kJobDeform, nothing([=] {
-              deform(*job, *make_cpu_resampler(job->input.volume.geometry, {.threads = threads}), threads);
-            }));
-  turns.add(step, kJobOut, nothing([=] { write(*job, out, threads); }), remove);
-  turns.add(step, kJobFree, nothing([=] { *job = {}; }));
+  const auto add = [&](const char* stage, auto run, std::function<void()> after = {}) {
+    contenders.push_back(timed(stage, run, after));
+  };
+  add(kJobIn, [=] { job->input = read_series(series, threads); });
+  add(kJobField, [=] { job->field = make_field(job->input.volume.geometry, cell_size, threads); });
+  add(kJobDeform,
+      [=] { deform(*job, *make_cpu_resampler(job->input.volume.geometry, {.threads = threads}), threads); });
+  add(
+      kJobOut, [=] { write(*job, out, threads); }, remove);
+  add(kJobFree, [=] { *job = {}; });
+  return contenders;
 }
 
 }  // namespace tetwarp::bench

@@ -5,7 +5,7 @@
 
 namespace tetwarp::bench {
 
-int run_io(const IoOptions&) {
+int run_io(const Options&) {
   throw NotCompiled(
       "`tetwarp bench io` compares with ITK and DCMTK, and this build lacks one of them; build with both");
 }

@@ -5,7 +5,7 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <memory>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -28,25 +28,17 @@ void recode_series(const std::filesystem::path& from, const std::filesystem::pat
 /// @throws Error for a file that DCMTK cannot read, or that is not of the size of the first
 std::vector<std::int16_t> dcmtk_read_series(const std::filesystem::path& folder, int threads);
 
-/// A volume as ITK has read it.
-class ItkVolume {
- public:
-  virtual ~ItkVolume() = default;
-  virtual std::vector<std::int16_t> voxels() const = 0;
+/// What ITK has read.
+struct ItkVolume {
+  std::function<std::vector<std::int16_t>()> voxels;
+  /// Of a series. ImageSeriesWriter with GDCM: the attributes of each slice as they were read, new instance UIDs.
+  /// @throws Error
+  std::function<void(const std::filesystem::path& folder)> write = {};
 };
-
-/// A series as ITK has read it.
-class ItkSeries : public ItkVolume {
- public:
-  /// ImageSeriesWriter with GDCM: the attributes of each slice as they were read, new instance UIDs. @throws Error
-  virtual void write(const std::filesystem::path& folder) const = 0;
-};
-
 /// GDCM lists and sorts the files of a folder, ImageSeriesReader reads them one by one. @throws Error with ITK's words
-std::shared_ptr<const ItkSeries> itk_read_series(const std::filesystem::path& folder);
-
+ItkVolume itk_read_series(const std::filesystem::path& folder);
 /// ImageFileReader and ImageFileWriter (compression on, its default level) with NiftiImageIO. @throws Error
-std::shared_ptr<const ItkVolume> itk_read_nifti(const std::filesystem::path& path);
+ItkVolume itk_read_nifti(const std::filesystem::path& path);
 void itk_write_nifti(const std::filesystem::path& path, const Volume<std::int16_t>& volume);
 
 /// Threads that ITK may use; its series reader and writer and its NIfTI use one.

@@ -58,64 +58,50 @@ Image3::Pointer image_over(const Volume<std::int16_t>& volume) {
   return image;
 }
 
-class ReadSeries final : public ItkSeries {
- public:
-  explicit ReadSeries(const std::filesystem::path& folder) {
-    auto names = itk::GDCMSeriesFileNames::New();
-    names->SetUseSeriesDetails(false);
-    names->SetDirectory(folder.string());
-    reader_->SetImageIO(io_);
-    reader_->SetFileNames(names->GetInputFileNames());
-    reader_->Update();
+std::vector<std::string> names_in(const std::filesystem::path& folder, std::size_t count) {
+  std::vector<std::string> names;
+  for (std::size_t k = 1; k <= count; ++k) {
+    char name[32];
+    std::snprintf(name, sizeof name, "IM%05zu.dcm", k);
+    names.push_back((folder / name).string());
   }
-  std::vector<std::int16_t> voxels() const override { return voxels_of(*reader_->GetOutput()); }
-  void write(const std::filesystem::path& folder) const override {
-    with_itk("write " + folder.string(), [&] {
-      auto writer = itk::ImageSeriesWriter<Image3, Image2>::New();
-      writer->SetInput(reader_->GetOutput());
-      writer->SetImageIO(io_);
-      writer->SetFileNames(names_in(folder));
-      writer->SetMetaDataDictionaryArray(reader_->GetMetaDataDictionaryArray());
-      writer->Update();
-    });
-  }
-
- private:
-  std::vector<std::string> names_in(const std::filesystem::path& folder) const {
-    std::vector<std::string> names;
-    for (std::size_t k = 1; k <= reader_->GetFileNames().size(); ++k) {
-      char name[32];
-      std::snprintf(name, sizeof name, "IM%05zu.dcm", k);
-      names.push_back((folder / name).string());
-    }
-    return names;
-  }
-
-  itk::GDCMImageIO::Pointer io_ = itk::GDCMImageIO::New();
-  itk::ImageSeriesReader<Image3>::Pointer reader_ = itk::ImageSeriesReader<Image3>::New();
-};
-
-class ReadNifti final : public ItkVolume {
- public:
-  explicit ReadNifti(const std::filesystem::path& path) {
-    reader_->SetImageIO(itk::NiftiImageIO::New());
-    reader_->SetFileName(path.string());
-    reader_->Update();
-  }
-  std::vector<std::int16_t> voxels() const override { return voxels_of(*reader_->GetOutput()); }
-
- private:
-  itk::ImageFileReader<Image3>::Pointer reader_ = itk::ImageFileReader<Image3>::New();
-};
+  return names;
+}
 
 }  // namespace
 
-std::shared_ptr<const ItkSeries> itk_read_series(const std::filesystem::path& folder) {
-  return with_itk("read " + folder.string(), [&] { return std::make_shared<ReadSeries>(folder); });
+ItkVolume itk_read_series(const std::filesystem::path& folder) {
+  const auto io = itk::GDCMImageIO::New();
+  const auto reader = itk::ImageSeriesReader<Image3>::New();
+  with_itk("read " + folder.string(), [&] {
+    auto names = itk::GDCMSeriesFileNames::New();
+    names->SetUseSeriesDetails(false);
+    names->SetDirectory(folder.string());
+    reader->SetImageIO(io);
+    reader->SetFileNames(names->GetInputFileNames());
+    reader->Update();
+  });
+  const auto write = [=](const std::filesystem::path& to) {
+    with_itk("write " + to.string(), [&] {
+      auto writer = itk::ImageSeriesWriter<Image3, Image2>::New();
+      writer->SetInput(reader->GetOutput());
+      writer->SetImageIO(io);
+      writer->SetFileNames(names_in(to, reader->GetFileNames().size()));
+      writer->SetMetaDataDictionaryArray(reader->GetMetaDataDictionaryArray());
+      writer->Update();
+    });
+  };
+  return {[=] { return voxels_of(*reader->GetOutput()); }, write};
 }
 
-std::shared_ptr<const ItkVolume> itk_read_nifti(const std::filesystem::path& path) {
-  return with_itk("read " + path.string(), [&] { return std::make_shared<ReadNifti>(path); });
+ItkVolume itk_read_nifti(const std::filesystem::path& path) {
+  const auto reader = itk::ImageFileReader<Image3>::New();
+  with_itk("read " + path.string(), [&] {
+    reader->SetImageIO(itk::NiftiImageIO::New());
+    reader->SetFileName(path.string());
+    reader->Update();
+  });
+  return {[=] { return voxels_of(*reader->GetOutput()); }};
 }
 
 void itk_write_nifti(const std::filesystem::path& path, const Volume<std::int16_t>& volume) {

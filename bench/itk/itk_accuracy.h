@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <span>
 
-#include "bench/harness/smooth_fields.h"
+#include "bench/harness/known_fields.h"
 
 namespace tetwarp::bench {
 

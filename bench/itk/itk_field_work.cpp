@@ -13,7 +13,6 @@
 #include <cmath>
 
 #include "bench/itk/itk_images.h"
-#include "io/image_file.h"
 #include "itkbridge/itkDisplacementFieldToVertexFieldFilter.h"
 #include "itkbridge/itkExactInvertDisplacementFieldImageFilter.h"
 #include "itkbridge/itkTransformToVertexFieldFilter.h"
@@ -33,15 +32,7 @@ using ToVertexField = itk::TransformToVertexFieldFilter<double>;
 using ToDisplacementField = itk::TransformToDisplacementFieldFilter<ItkField, double>;
 using Filters = std::vector<itk::ProcessObject::Pointer>;
 
-/// Calls `compare` with the true inverse of the request's field.
-template <class Compare>
-Deviation with_truth(const ItkRequest& request, const ItkFiles& files, Compare&& compare) {
-  const AnyVolume truth = read_image(files.inverse(request.field, request.cell_size));
-  const std::span vectors(reinterpret_cast<const glm::vec3*>(truth.data()), truth.size_bytes() / sizeof(glm::vec3));
-  return compare(TrueInverse{&truth.geometry(), vectors});
-}
-
-std::unique_ptr<ItkWork> make_inverse(const ItkRequest& request, const ItkFiles& files) {
+ItkWork make_inverse(const ItkRequest& request, const ItkFiles& files) {
   const ItkField::Pointer field = itk_read<ItkField>(files.forward(request.field, request.cell_size));
   Filters filters;
   if (request.method == "invert") {
@@ -55,18 +46,14 @@ std::unique_ptr<ItkWork> make_inverse(const ItkRequest& request, const ItkFiles&
     filter->SetEnforceBoundaryCondition(request.method == "itk-invert");
     filters.emplace_back(filter.GetPointer());
   }
-  return std::make_unique<ItkImageWork<ItkField>>(std::move(filters), bytes_of(*field), [=](const ItkField& found) {
-    return with_truth(request, files,
+  return image_work<ItkField>(std::move(filters), bytes_of(*field), [=](const ItkField& found) {
+    return with_truth(files.inverse(request.field, request.cell_size),
                       [&](const TrueInverse& truth) { return compare_inverse_field(vectors_of(found), truth); });
   });
 }
 
-std::span<const float> values_of(const Scalars& image) {
-  return {image.GetBufferPointer(), image.GetPixelContainer()->Size()};
-}
-
 /// Ours, at the deformed places.
-std::unique_ptr<ItkWork> make_determinant(const ItkRequest& request, const ItkFiles& files) {
+ItkWork make_determinant(const ItkRequest& request, const ItkFiles& files) {
   const ItkField::Pointer field = itk_read<ItkField>(files.forward(request.field, request.cell_size));
   const auto vertices = itk::DisplacementFieldToVertexFieldFilter<ItkField>::New();
   vertices->SetInput(field);
@@ -75,24 +62,22 @@ std::unique_ptr<ItkWork> make_determinant(const ItkRequest& request, const ItkFi
   filter->SetOutputParametersFromImage(field);
   filter->SetBackend("cpu");
   const auto deviation = [=](const Scalars& found) {
-    return with_truth(request, files, [&](const TrueInverse& truth) {
+    return with_truth(files.inverse(request.field, request.cell_size), [&](const TrueInverse& truth) {
       return compare_determinants(values_of(found), make_smooth_field(request.field, truth.grid->size), truth);
     });
   };
-  return std::make_unique<ItkImageWork<Scalars>>(Filters{vertices.GetPointer(), filter.GetPointer()}, bytes_of(*field),
-                                                 deviation);
+  return image_work<Scalars>(Filters{vertices.GetPointer(), filter.GetPointer()}, bytes_of(*field), deviation);
 }
 
 /// ITK's, where the vertices rest.
-std::unique_ptr<ItkWork> make_itk_determinant(const ItkRequest& request, const ItkFiles& files) {
+ItkWork make_itk_determinant(const ItkRequest& request, const ItkFiles& files) {
   const ItkField::Pointer field = itk_read<ItkField>(files.forward(request.field, request.cell_size));
   const auto filter = ItkDeterminant::New();
   filter->SetInput(field);
-  return std::make_unique<ItkImageWork<Scalars>>(
-      Filters{filter.GetPointer()}, bytes_of(*field), [=](const Scalars& found) {
-        const Geometry grid = geometry_of(found);
-        return compare_rest_determinants(values_of(found), make_smooth_field(request.field, grid.size), grid);
-      });
+  return image_work<Scalars>(Filters{filter.GetPointer()}, bytes_of(*field), [=](const Scalars& found) {
+    const Geometry grid = geometry_of(found);
+    return compare_rest_determinants(values_of(found), make_smooth_field(request.field, grid.size), grid);
+  });
 }
 
 /// A B-spline transform of a closed form: splines of third order are exact for squares.
@@ -149,67 +134,54 @@ struct SquareSpline {
   static constexpr double kAmplitude = 8;
 };
 
-std::unique_ptr<ItkWork> make_itk_transform(const SquareSpline& spline) {
+ItkWork make_itk_transform(const SquareSpline& spline) {
   const auto filter = ToDisplacementField::New();
   const auto grid = ItkField::New();
   set_geometry(*grid, spline.lattice);
   filter->SetTransform(spline.transform());
   filter->SetReferenceImage(grid);
   filter->UseReferenceImageOn();
-  return std::make_unique<ItkImageWork<ItkField>>(Filters{filter.GetPointer()}, 0, [=](const ItkField& found) {
+  return image_work<ItkField>(Filters{filter.GetPointer()}, 0, [=](const ItkField& found) {
     return compare_displacements(vectors_of(found), spline, spline.lattice);
   });
 }
 
-class TransformWork final : public ItkWork {
- public:
-  TransformWork(const SquareSpline& spline, ItkImage* volume, std::int64_t cell_size)
-      : spline_(spline), filter_(ToVertexField::New()) {
-    filter_->SetTransform(spline.transform());
-    filter_->SetReferenceImage(volume);
-    filter_->SetCellSize(static_cast<itk::SizeValueType>(cell_size));
-  }
-
-  void run() override { filter_->Update(); }
-  std::uint64_t input_bytes() const override { return 0; }
-  std::uint64_t output_bytes() const override { return found().size_bytes(); }
-  std::optional<Deviation> deviation() const override {
-    return compare_displacements(found(), spline_, filter_->GetOutput()->GetLattice());
-  }
-
- private:
-  std::span<const glm::vec3> found() const {
-    const FieldView field = filter_->GetOutput()->GetView();
-    return {field.displacement, static_cast<std::size_t>(voxel_count(*field.lattice))};
-  }
-
-  SquareSpline spline_;
-  ToVertexField::Pointer filter_;
-};
+ItkWork make_transform(const SquareSpline& spline, ItkImage* volume, std::int64_t cell_size) {
+  const auto filter = ToVertexField::New();
+  filter->SetTransform(spline.transform());
+  filter->SetReferenceImage(volume);
+  filter->SetCellSize(static_cast<itk::SizeValueType>(cell_size));
+  const auto found = [filter] {
+    const FieldView field = filter->GetOutput()->GetView();
+    return std::span(field.displacement, static_cast<std::size_t>(voxel_count(*field.lattice)));
+  };
+  return {[filter] { filter->Update(); }, 0, [=] { return found().size_bytes(); },
+          [=] { return compare_displacements(found(), spline, filter->GetOutput()->GetLattice()); }};
+}
 
 }  // namespace
 
-std::unique_ptr<ItkWork> make_itk_field_work(const ItkRequest& request, const ItkFiles& files) {
+ItkWork make_itk_field_work(const ItkRequest& request, const ItkFiles& files) {
   const std::string& method = request.method;
   if (method == "invert" || method == "itk-invert" || method == "itk-invert-free") return make_inverse(request, files);
   if (method == "determinant") return make_determinant(request, files);
   if (method == "itk-determinant") return make_itk_determinant(request, files);
-  if (method != "transform" && method != "itk-transform") return nullptr;
+  if (method != "transform" && method != "itk-transform") return {};
   const auto reader = itk_reader<ItkImage>(files.volume());
   reader->UpdateOutputInformation();  // the grid alone
   const ItkImage::Pointer volume = reader->GetOutput();
   const SquareSpline spline(geometry_of(*volume), request.cell_size);
   if (method == "itk-transform") return make_itk_transform(spline);
-  return std::make_unique<TransformWork>(spline, volume, request.cell_size);
+  return make_transform(spline, volume, request.cell_size);
 }
 
-std::unique_ptr<ItkWork> make_itk_work(const ItkRequest& request, const ItkFiles& files) {
+ItkWork make_itk_work(const ItkRequest& request, const ItkFiles& files) {
   const auto threads = static_cast<itk::ThreadIdType>(request.threads);
   itk::MultiThreaderBase::SetGlobalMaximumNumberOfThreads(threads);
   itk::MultiThreaderBase::SetGlobalDefaultNumberOfThreads(threads);
-  std::unique_ptr<ItkWork> work = make_itk_image_work(request, files);
-  if (!work) work = make_itk_field_work(request, files);
-  require(work != nullptr, "no method \"" + request.method + "\"");
+  ItkWork work = make_itk_image_work(request, files);
+  if (!work.run) work = make_itk_field_work(request, files);
+  require(work.run != nullptr, "no method \"" + request.method + "\"");
   return work;
 }
 

@@ -9,7 +9,6 @@
 #include <itkWarpImageFilter.h>
 
 #include "bench/itk/itk_images.h"
-#include "io/image_file.h"
 #include "itkbridge/itkDisplacementFieldToVertexFieldFilter.h"
 #include "itkbridge/itkPullFieldResampleImageFilter.h"
 #include "itkbridge/itkVertexFieldResampleImageFilter.h"
@@ -78,55 +77,29 @@ Filters itk_invert_warp(ItkImage* volume, ItkField* field) {
 /// Reads, warps and writes in as many pieces as the request says; the volume is not in memory before. Our filter asks
 /// for some slices of it for each piece, which the reader gives back behind it; WarpImageFilter asks for all of them
 /// each time, which its reader therefore keeps.
-class StreamWork final : public ItkWork {
- public:
-  StreamWork(const ItkRequest& request, const ItkFiles& files)
-      : reader_(itk_reader<ItkImage>(files.volume())), writer_(itk::ImageFileWriter<ItkImage>::New()) {
-    const bool own = request.method == "stream";
-    const auto file =
-        own ? files.forward(request.field, request.cell_size) : files.inverse(request.field, request.cell_size);
-    field_ = itk_read<ItkField>(file);
-    reader_->UpdateOutputInformation();
-    filters_ =
-        own ? forward(reader_->GetOutput(), field_) : Filters{make_warp(reader_->GetOutput(), field_).GetPointer()};
-    writer_->SetImageIO(itk::MetaImageIO::New());
-    writer_->SetFileName(files.streamed().string());
-    writer_->SetInput(dynamic_cast<ItkImage*>(filters_.back()->GetOutputs()[0].GetPointer()));
-    writer_->SetNumberOfStreamDivisions(static_cast<unsigned>(request.divisions));
-  }
-
-  void run() override { writer_->Update(); }
-  std::uint64_t input_bytes() const override { return bytes_of(*field_); }
-  std::uint64_t output_bytes() const override { return 0; }
-  std::optional<Deviation> deviation() const override { return {}; }
-
- private:
-  itk::ImageFileReader<ItkImage>::Pointer reader_;
-  itk::ImageFileWriter<ItkImage>::Pointer writer_;
-  ItkField::Pointer field_;
-  Filters filters_;
-};
-
-/// The warped volume against the source at the true places.
-std::function<Deviation(const ItkImage&)> against_truth(const ItkImage::Pointer& volume, const ItkRequest& request,
-                                                        const ItkFiles& files) {
-  return [=](const ItkImage& found) {
-    const AnyVolume truth = read_image(files.inverse(request.field, 1));
-    const std::span vectors(reinterpret_cast<const glm::vec3*>(truth.data()), truth.size_bytes() / sizeof(glm::vec3));
-    const auto voxels = [](const ItkImage& image) {
-      return std::span<const std::int16_t>(image.GetBufferPointer(), image.GetPixelContainer()->Size());
-    };
-    return compare_volume(voxels(found), voxels(*volume), {&truth.geometry(), vectors});
-  };
+ItkWork make_stream(const ItkRequest& request, const ItkFiles& files) {
+  const bool own = request.method == "stream";
+  const auto reader = itk_reader<ItkImage>(files.volume());
+  const auto writer = itk::ImageFileWriter<ItkImage>::New();
+  const ItkField::Pointer field = itk_read<ItkField>(own ? files.forward(request.field, request.cell_size)
+                                                         : files.inverse(request.field, request.cell_size));
+  reader->UpdateOutputInformation();
+  const Filters filters =
+      own ? forward(reader->GetOutput(), field) : Filters{make_warp(reader->GetOutput(), field).GetPointer()};
+  writer->SetImageIO(itk::MetaImageIO::New());
+  writer->SetFileName(files.streamed().string());
+  writer->SetInput(dynamic_cast<ItkImage*>(filters.back()->GetOutputs()[0].GetPointer()));
+  writer->SetNumberOfStreamDivisions(static_cast<unsigned>(request.divisions));
+  return {[=] { writer->Update(); }, bytes_of(*field), [reader, filters] { return std::uint64_t{0}; }};
 }
 
 }  // namespace
 
-std::unique_ptr<ItkWork> make_itk_image_work(const ItkRequest& request, const ItkFiles& files) {
+ItkWork make_itk_image_work(const ItkRequest& request, const ItkFiles& files) {
   const std::string& method = request.method;
-  if (method == "stream" || method == "itk-stream") return std::make_unique<StreamWork>(request, files);
+  if (method == "stream" || method == "itk-stream") return make_stream(request, files);
   const bool pulls = method == "pull" || method == "itk-resample" || method == "itk-warp";
-  if (!pulls && method != "forward" && method != "itk-invert-warp") return nullptr;
+  if (!pulls && method != "forward" && method != "itk-invert-warp") return {};
   const auto file =
       pulls ? files.inverse(request.field, request.cell_size) : files.forward(request.field, request.cell_size);
   const ItkImage::Pointer volume = itk_read<ItkImage>(files.volume());
@@ -137,8 +110,13 @@ std::unique_ptr<ItkWork> make_itk_image_work(const ItkRequest& request, const It
   if (method == "itk-warp") filters = {make_warp(volume, field).GetPointer()};
   if (method == "forward") filters = forward(volume, field);
   if (method == "itk-invert-warp") filters = itk_invert_warp(volume, field);
-  return std::make_unique<ItkImageWork<ItkImage>>(std::move(filters), bytes_of(*volume) + bytes_of(*field),
-                                                  against_truth(volume, request, files));
+  // The warped volume against the source at the true places.
+  const auto deviation = [=, truth = files.inverse(request.field, 1)](const ItkImage& found) {
+    return with_truth(truth, [&](const TrueInverse& inverse) {
+      return compare_volume(values_of(found), values_of(*volume), inverse);
+    });
+  };
+  return image_work<ItkImage>(std::move(filters), bytes_of(*volume) + bytes_of(*field), deviation);
 }
 
 }  // namespace tetwarp::bench

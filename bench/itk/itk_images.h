@@ -8,10 +8,10 @@
 #include <itkMetaImageIO.h>
 #include <itkVector.h>
 
-#include <functional>
 #include <vector>
 
-#include "bench/itk/itk_work.h"
+#include "bench/itk/itk.h"
+#include "io/image_file.h"
 
 namespace tetwarp::bench {
 
@@ -47,28 +47,28 @@ inline std::span<const glm::vec3> vectors_of(const ItkField& field) {
 }
 
 /// Filters whose last makes an image.
-template <class TOutput>
-class ItkImageWork final : public ItkWork {
- public:
-  /// @param filters    in the order of the pipeline: whoever comes last is updated
-  /// @param deviation  of the output; may be null
-  ItkImageWork(std::vector<itk::ProcessObject::Pointer> filters, std::uint64_t input_bytes,
-               std::function<Deviation(const TOutput&)> deviation)
-      : filters_(std::move(filters)), input_bytes_(input_bytes), deviation_(std::move(deviation)) {}
+/// @param filters    in the order of the pipeline: whoever comes last is updated
+/// @param deviation  of the output
+template <class TOutput, class Compare>
+ItkWork image_work(std::vector<itk::ProcessObject::Pointer> filters, std::uint64_t input_bytes, Compare deviation) {
+  const itk::ProcessObject::Pointer last = filters.back();
+  const auto output = [last]() -> const TOutput& { return dynamic_cast<const TOutput&>(*last->GetOutputs()[0]); };
+  return {[filters] { filters.back()->Update(); }, input_bytes, [=] { return bytes_of(output()); },
+          [=] { return deviation(output()); }};
+}
 
-  void run() override { filters_.back()->Update(); }
-  std::uint64_t input_bytes() const override { return input_bytes_; }
-  std::uint64_t output_bytes() const override { return bytes_of(output()); }
-  std::optional<Deviation> deviation() const override {
-    return deviation_ ? std::optional(deviation_(output())) : std::nullopt;
-  }
+/// Calls `compare` with the true inverse of the request's field.
+template <class Compare>
+Deviation with_truth(const std::filesystem::path& inverse, Compare&& compare) {
+  const AnyVolume truth = read_image(inverse);
+  const std::span vectors(reinterpret_cast<const glm::vec3*>(truth.data()), truth.size_bytes() / sizeof(glm::vec3));
+  return compare(TrueInverse{&truth.geometry(), vectors});
+}
 
- private:
-  const TOutput& output() const { return dynamic_cast<const TOutput&>(*filters_.back()->GetOutputs()[0]); }
-
-  std::vector<itk::ProcessObject::Pointer> filters_;
-  std::uint64_t input_bytes_;
-  std::function<Deviation(const TOutput&)> deviation_;
-};
+/// The pixels of an image in memory.
+template <class TImage>
+std::span<const typename TImage::PixelType> values_of(const TImage& image) {
+  return {image.GetBufferPointer(), image.GetPixelContainer()->Size()};
+}
 
 }  // namespace tetwarp::bench

@@ -5,7 +5,7 @@
 
 namespace tetwarp::bench {
 
-int run_itk(const ItkOptions&) {
+int run_itk(const Options&) {
   throw NotCompiled("`tetwarp bench itk` compares with ITK, which this build does not have; build with it");
 }
 

@@ -6,28 +6,17 @@
 #include <cmath>
 #include <random>
 
-#include "bench/harness/statistics.h"
-#include "bench/paper/published.h"
-
 namespace tetwarp::bench {
 
 namespace {
 
-Corners<float> in_float(const Corners<double>& t) {
-  const auto narrow = [](const Point<double>& p) {
-    return Point<float>{static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
+template <class To, class From>
+Corners<To> cast(const Corners<From>& t) {
+  const auto point = [](const Point<From>& p) {
+    return Point<To>{static_cast<To>(p.x), static_cast<To>(p.y), static_cast<To>(p.z)};
   };
-  return {narrow(t.a), narrow(t.b), narrow(t.c), narrow(t.d)};
+  return {point(t.a), point(t.b), point(t.c), point(t.d)};
 }
-
-/// The matrix n: columns A, B, C, D, the fourth row 1.
-template <class Real>
-struct Matrix {
-  Real n[4][4];
-
-  explicit Matrix(const Corners<Real>& t)
-      : n{{t.a.x, t.b.x, t.c.x, t.d.x}, {t.a.y, t.b.y, t.c.y, t.d.y}, {t.a.z, t.b.z, t.c.z, t.d.z}, {1, 1, 1, 1}} {}
-};
 
 /// Products of three, and how they are summed.
 template <class Real>
@@ -59,10 +48,9 @@ class Sum {
 /// The determinant of rows a, b, c and columns p, q, r, terms in the paper's order: its t11 is that of rows and columns
 /// 2, 3, 4. Of t12 and t14 the paper writes the first two terms the other way round, which changes no bit.
 template <class Real>
-Real minor_of(const Matrix<Real>& m, Order order, const int (&rows)[3], const int (&columns)[3]) {
+Real minor_of(const Real (&n)[4][4], Order order, const int (&rows)[3], const int (&columns)[3]) {
   const auto& [a, b, c] = rows;
   const auto& [p, q, r] = columns;
-  const auto& n = m.n;
   Sum<Real> sum(order);
   sum.add(1, n[a][q], n[b][r], n[c][p]);
   sum.add(-1, n[a][r], n[b][q], n[c][p]);
@@ -74,54 +62,6 @@ Real minor_of(const Matrix<Real>& m, Order order, const int (&rows)[3], const in
 }
 
 constexpr int kOthers[4][3] = {{1, 2, 3}, {0, 2, 3}, {0, 1, 3}, {0, 1, 2}};
-
-template <class Real>
-AppendixResult<Real> expand(const Corners<Real>& corners, Order order) {
-  const Matrix<Real> m(corners);
-  Real of_column[4], of_row[4];  // cofactors, the paper's t11 to t14 first
-  for (int n = 0; n < 4; ++n) {
-    const Real sign = n % 2 == 0 ? Real(1) : Real(-1);
-    of_column[n] = sign * minor_of(m, order, kOthers[n], kOthers[0]);
-    of_row[n] = sign * minor_of(m, order, kOthers[0], kOthers[n]);
-  }
-  const auto term = [&](int n) { return m.n[n][0] * of_column[n]; };
-  AppendixResult<Real> result;
-  if (order == Order::fused_last) {
-    result.determinant = std::fma(m.n[0][0], of_column[0], term(1)) + term(2) + term(3);
-  } else {
-    result.determinant = term(0);
-    for (int n = 1; n < 4; ++n) {
-      result.determinant =
-          order == Order::fused ? std::fma(m.n[n][0], of_column[n], result.determinant) : result.determinant + term(n);
-    }
-  }
-  for (std::size_t n = 0; n < 4; ++n) result.inverse[n] = of_row[n] / result.determinant;
-  return result;
-}
-
-std::vector<DeterminantForm> all_forms() {
-  const PublishedAppendix& paper = published_appendix();
-  const Corners<float> narrow = in_float(paper.corners);
-  const auto as_float = [&](Order order) { return static_cast<double>(expand(narrow, order).determinant); };
-  return {
-      {"4 x 4, Eq. 6, double, as printed: (r s) t, summed from the left",
-       expand(paper.corners, Order::as_printed).determinant, paper.determinant_in_double},
-      {"4 x 4, Eq. 6, float, as printed", as_float(Order::as_printed), paper.determinant_in_float},
-      {"the same, products r (s t)", as_float(Order::right_to_left), paper.determinant_in_float},
-      {"the same, products (r t) s", as_float(Order::ends_first), paper.determinant_in_float},
-      {"as printed, the first of the four last products fused with the second", as_float(Order::fused_last),
-       paper.determinant_in_float},
-      {"as printed, every product fused with its sum", as_float(Order::fused), paper.determinant_in_float},
-      {"4 x 4, Eq. 6, float, minors of differences", static_cast<double>(determinant_4x4(narrow))},
-      {"3 x 3 about D, Eq. 13, double", determinant_about_d(paper.corners)},
-      {"3 x 3 about D, Eq. 13, float", static_cast<double>(determinant_about_d(narrow))},
-  };
-}
-
-Corners<double> in_double(const Corners<float>& t) {
-  const auto wide = [](const Point<float>& p) { return Point<double>{p.x, p.y, p.z}; };
-  return {wide(t.a), wide(t.b), wide(t.c), wide(t.d)};
-}
 
 /// Uniform in [low, high), from the bits of the generator alone: distributions differ between standard libraries.
 float uniform(std::mt19937_64& random, double low, double high) {
@@ -143,7 +83,7 @@ Corners<float> random_tetrahedron(std::mt19937_64& random, double distance) {
   return {a, b, c, d};
 }
 
-DeterminantErrors measure_errors(double distance, std::int64_t tetrahedra) {
+Json measure_errors(double distance, std::int64_t tetrahedra) {
   std::mt19937_64 random(1);
   std::vector<double> of_4x4, of_3x3;
   for (std::int64_t n = 0; n < tetrahedra; ++n) {
@@ -152,33 +92,86 @@ DeterminantErrors measure_errors(double distance, std::int64_t tetrahedra) {
     of_4x4.push_back(std::abs((static_cast<double>(found.float_4x4) - exact) / exact));
     of_3x3.push_back(std::abs((static_cast<double>(found.float_3x3) - exact) / exact));
   }
-  const Summary summary_4x4 = summarize(std::move(of_4x4)), summary_3x3 = summarize(std::move(of_3x3));
-  return {distance, tetrahedra, summary_4x4.max, summary_4x4.median, summary_3x3.max, summary_3x3.median};
+  const auto largest_and_median = [](std::vector<double> errors) {
+    const Json summary = summarize(std::move(errors));
+    return Json{{"largest", summary["max"]}, {"median", summary["median"]}};
+  };
+  return {{"distance", distance},
+          {"tetrahedra", tetrahedra},
+          {"float_4x4", largest_and_median(std::move(of_4x4))},
+          {"float_3x3", largest_and_median(std::move(of_3x3))}};
+}
+
+Json all_forms() {
+  const Corners<float> narrow = cast<float>(kEquation8);
+  Json forms = Json::array();
+  const auto add = [&](const char* name, double value, const Json& printed) {
+    forms.push_back({{"form", name}, {"determinant", value}, {"printed", printed}});
+  };
+  const auto add_float = [&](const char* name, Order order) {
+    add(name, static_cast<double>(expand_by_cofactors(narrow, order).determinant), kPrintedInFloat.determinant);
+  };
+  add("4 x 4, Eq. 6, double, as printed: (r s) t, summed from the left",
+      expand_by_cofactors(kEquation8, Order::as_printed).determinant, kPrintedInDouble.determinant);
+  add_float("4 x 4, Eq. 6, float, as printed", Order::as_printed);
+  add_float("the same, products r (s t)", Order::right_to_left);
+  add_float("the same, products (r t) s", Order::ends_first);
+  add_float("as printed, the first of the four last products fused with the second", Order::fused_last);
+  add_float("as printed, every product fused with its sum", Order::fused);
+  add("4 x 4, Eq. 6, float, minors of differences", static_cast<double>(determinant_4x4(narrow)), nullptr);
+  add("3 x 3 about D, Eq. 13, double", determinant_about_d(kEquation8), nullptr);
+  add("3 x 3 about D, Eq. 13, float", static_cast<double>(determinant_about_d(narrow)), nullptr);
+  return forms;
 }
 
 }  // namespace
 
+template <class Real>
+AppendixResult<Real> expand_by_cofactors(const Corners<Real>& corners, Order order) {
+  const auto& [a, b, c, d] = corners;
+  const Real m[4][4] = {{a.x, b.x, c.x, d.x}, {a.y, b.y, c.y, d.y}, {a.z, b.z, c.z, d.z}, {1, 1, 1, 1}};
+  Real of_column[4], of_row[4];  // cofactors, the paper's t11 to t14 first
+  for (int n = 0; n < 4; ++n) {
+    const Real sign = n % 2 == 0 ? Real(1) : Real(-1);
+    of_column[n] = sign * minor_of(m, order, kOthers[n], kOthers[0]);
+    of_row[n] = sign * minor_of(m, order, kOthers[0], kOthers[n]);
+  }
+  const auto term = [&](int n) { return m[n][0] * of_column[n]; };
+  AppendixResult<Real> result;
+  if (order == Order::fused_last) {
+    result.determinant = std::fma(m[0][0], of_column[0], term(1)) + term(2) + term(3);
+  } else {
+    result.determinant = term(0);
+    for (int n = 1; n < 4; ++n) {
+      result.determinant =
+          order == Order::fused ? std::fma(m[n][0], of_column[n], result.determinant) : result.determinant + term(n);
+    }
+  }
+  for (std::size_t n = 0; n < 4; ++n) result.inverse[n] = of_row[n] / result.determinant;
+  return result;
+}
+
+template AppendixResult<double> expand_by_cofactors(const Corners<double>&, Order);
+template AppendixResult<float> expand_by_cofactors(const Corners<float>&, Order);
+
 Determinants determinants(const Corners<float>& corners) {
-  const Corners<double> wide = in_double(corners);
+  const Corners<double> wide = cast<double>(corners);
   return {determinant_4x4(wide), determinant_about_d(wide), determinant_4x4(corners), determinant_about_d(corners)};
 }
 
-AppendixResult<double> expand_by_cofactors(const Corners<double>& corners, Order order) {
-  return expand(corners, order);
-}
-
-AppendixResult<float> expand_by_cofactors(const Corners<float>& corners, Order order) { return expand(corners, order); }
-
-Appendix measure_appendix(std::int64_t tetrahedra) {
-  const Corners<double>& corners = published_appendix().corners;
-  Appendix appendix{.forms = all_forms(),
-                    .in_double = expand(corners, Order::as_printed),
-                    .in_float = expand(in_float(corners), Order::as_printed),
-                    .errors = {}};
-  for (const double distance : {32.0, 128.0, 512.0, 1024.0}) {
-    appendix.errors.push_back(measure_errors(distance, tetrahedra));
-  }
-  return appendix;
+Json measure_appendix(std::int64_t tetrahedra) {
+  const auto point = [](const Point<double>& p) { return Json{p.x, p.y, p.z}; };
+  const auto& [a, b, c, d] = kEquation8;
+  Json errors = Json::array();
+  for (const double distance : {32.0, 128.0, 512.0, 1024.0}) errors.push_back(measure_errors(distance, tetrahedra));
+  return {{"corners", {{"A", point(a)}, {"B", point(b)}, {"C", point(c)}, {"D", point(d)}}},
+          {"determinants", all_forms()},
+          {"inverse_first_column",
+           {{"double", expand_by_cofactors(kEquation8, Order::as_printed).inverse},
+            {"float", expand_by_cofactors(cast<float>(kEquation8), Order::as_printed).inverse},
+            {"printed_double", kPrintedInDouble.inverse},
+            {"printed_float", kPrintedInFloat.inverse}}},
+          {"relative_errors", errors}};
 }
 
 }  // namespace tetwarp::bench

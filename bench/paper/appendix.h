@@ -5,10 +5,8 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
-#include <string>
-#include <vector>
 
+#include "bench/harness/results.h"
 #include "bench/paper/inverse.h"
 
 namespace tetwarp::bench {
@@ -40,34 +38,20 @@ struct AppendixResult {
 };
 
 /// The determinant of the 4 x 4 matrix of Eq. 6 and the first column of its inverse, expanded along the first column by
-/// cofactors of six products of three, as the paper prints them.
-AppendixResult<double> expand_by_cofactors(const Corners<double>& corners, Order order);
-AppendixResult<float> expand_by_cofactors(const Corners<float>& corners, Order order);
+/// cofactors of six products of three, as the paper prints them. @tparam Real  double or float
+template <class Real>
+AppendixResult<Real> expand_by_cofactors(const Corners<Real>& corners, Order order);
 
-/// The determinant of the paper's Eq. 8 in one way, beside what the paper prints for it.
-struct DeterminantForm {
-  std::string name;
-  double value = 0;
-  std::optional<double> printed = {};
-};
+/// Eqs. 8 to 10 and Appendix A as the paper prints them: a tetrahedron far from the origin, the determinant of its 4 x
+/// 4 matrix, and the first four numbers of the inverse, which are its first column.
+inline constexpr Corners<double> kEquation8{
+    {255.9, 256.7, 133.1}, {256.7, 255.9, 133.4}, {256.7, 256.7, 132.3}, {255.9, 255.9, 132.3}};
+inline constexpr AppendixResult<double> kPrintedInDouble{1.216, {-0.723684, 0.526316, 0.723684, -0.526316}},
+    kPrintedInFloat{2.010187, {-0.437228, 0.318691, 0.437228, -0.318691}};
 
-/// Relative errors of the float forms against 3 x 3 in double, over random tetrahedra of about one cell.
-struct DeterminantErrors {
-  double distance = 0;  ///< their coordinates lie within a tenth below it, on all three axes
-  std::int64_t tetrahedra = 0;
-  double largest_4x4 = 0, median_4x4 = 0, largest_3x3 = 0, median_3x3 = 0;
-};
-
-/// What the paper's Appendix A is about: the determinant of Eq. 6 in float far from the origin, and of Eq. 13. The
-/// example is the paper's own (`published_appendix`).
-struct Appendix {
-  std::vector<DeterminantForm> forms;
-  AppendixResult<double> in_double;  ///< in the printed order
-  AppendixResult<float> in_float;
-  std::vector<DeterminantErrors> errors;
-};
-
-/// The same numbers on every call.
-Appendix measure_appendix(std::int64_t tetrahedra = 100000);
+/// What Appendix A is about: the determinant of Eq. 6 in float far from the origin, and of Eq. 13, in several orders
+/// beside what is printed; and relative errors of the float forms against 3 x 3 in double, over random tetrahedra of
+/// about one cell whose coordinates lie within a tenth below a distance, on all three axes. The same on every call.
+Json measure_appendix(std::int64_t tetrahedra = 100000);
 
 }  // namespace tetwarp::bench

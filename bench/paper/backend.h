@@ -6,9 +6,11 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "bench/harness/turns.h"
 #include "bench/paper/fields.h"
 #include "bench/paper/method.h"
 #include "deform/resampler.h"
@@ -20,21 +22,31 @@ struct FrameCount {
   int warmup = 3, timed = 50, end_to_end = 5;
 };
 
-/// Milliseconds of each frame. Empty: there is no such time.
-struct FrameTimes {
-  std::vector<double> kernel_ms;      ///< the method itself; all data where it computes, the output cleared before
-  std::vector<double> field_ms;       ///< tetwarp: set_field, and for FieldSource::kernel the formula before it
-  std::vector<double> total_ms;       ///< tetwarp: both of a frame
-  std::vector<double> copy_in_ms;     ///< source, and for FieldSource::memory the field, from pageable host memory
-  std::vector<double> copy_out_ms;    ///< the output, to pageable host memory
-  std::vector<double> end_to_end_ms;  ///< wall clock: copies in, clearing the output, the method, copy out
-};
-
 /// What Tetwarp makes of a volume and a field.
 struct Exact {
   std::vector<std::int16_t> output;
   std::vector<std::uint8_t> coverage;
 };
+
+/// A method's result against Tetwarp's.
+struct Tally {
+  std::uint64_t writes = 0;       ///< of any voxel, several of one counted each
+  std::uint64_t lost = 0;         ///< covered, and never written
+  std::uint64_t multiple = 0;     ///< written more than once
+  std::uint64_t spilled = 0;      ///< written, and not covered
+  std::uint64_t covered = 0;      ///< by Tetwarp
+  double largest_difference = 0;  ///< absolute, stored units, over voxels both covered and written
+  double mean_difference = 0;
+
+  friend bool operator==(const Tally&, const Tally&) = default;
+};
+
+/// @param output, writes  of the method; all of one size. @throws InputError where they are not
+Tally compare(const Exact& exact, const std::vector<std::int16_t>& output, const std::vector<std::uint32_t>& writes);
+
+/// Of the voxels that Tetwarp covers, the fraction whose value in `output` differs by more than 1, stored units: more
+/// than truncating instead of rounding explains. @throws InputError for another size, or where nothing is covered
+double differing_fraction(const Exact& exact, std::span<const std::int16_t> output);
 
 /// One place to compute: takes a volume, then field after field, and runs every method on them.
 class Backend {
@@ -50,7 +62,17 @@ class Backend {
   /// FieldSource::kernel runs, so that both sources are one field.
   void set_field(const Formula& formula, std::int64_t cell_size);
 
-  virtual FrameTimes time(Method method, FieldSource source, const FrameCount& frames) = 0;
+  /// Milliseconds of each frame, by these names; a name that is missing has no such time.
+  ///
+  /// | name | what it is |
+  /// | --- | --- |
+  /// | kernel_ms | the method itself; all data where it computes, the output cleared before |
+  /// | field_ms | tetwarp: set_field, and for FieldSource::kernel the formula before it |
+  /// | total_ms | tetwarp: both of a frame |
+  /// | copy_in_ms | source, and for FieldSource::memory the field, from pageable host memory |
+  /// | copy_out_ms | the output, to pageable host memory |
+  /// | end_to_end_ms | wall clock: copies in, clearing the output, the method, copy out |
+  virtual Samples time(Method method, FieldSource source, const FrameCount& frames) = 0;
   /// Output of the last timed frame.
   virtual const std::vector<std::int16_t>& output() = 0;
   /// How often each voxel is written, from a run of its own. Tetwarp writes what its coverage map says.
@@ -86,6 +108,15 @@ class Backend {
 std::unique_ptr<Backend> make_cpu_backend(int threads);
 /// @throws DeviceError without a device, NotCompiled in a build without CUDA
 std::unique_ptr<Backend> make_cuda_backend(int device);
+
+/// The paper's Algorithm 2 in straightforward C++, the field in memory, on the threads that oneTBB may use. Voxels that
+/// no tetrahedron contains keep what `output` holds.
+///
+/// @param volume  spacing 1, origin 0
+/// @param field   a vertex every `cell_size` voxels of the volume
+/// @param output  as many voxels as the volume
+void run_paper_loop(const Volume<std::int16_t>& volume, const VertexField& field, std::int64_t cell_size,
+                    std::int16_t* output);
 
 /// Facts of a device and the software that drives it.
 struct CudaFacts {

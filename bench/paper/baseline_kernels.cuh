@@ -106,34 +106,14 @@ void launch_cells(const Grid& grid, const Field& field, const HardwareTexture& t
 template <class Field>
 void launch(Method method, const Grid& grid, const Field& field, const HardwareTexture& texture, const SetValue& write,
             cudaStream_t stream) {
-  const std::int64_t tetrahedra =
-      std::int64_t{grid.vertices_x - 1} * (grid.vertices_y - 1) * (grid.vertices_z - 1) * kTetrahedraPerCell;
-  constexpr InverseIn kCompiled = InverseIn::loop_as_compiled, kEvery = InverseIn::every_voxel;
-  switch (method) {
-    case Method::inverse4x4_double:
-      launch_cells<Inverse4x4Double, kCompiled>(grid, field, texture, write, stream);
-      break;
-    case Method::inverse3x3_double:
-      launch_cells<Inverse3x3Double, kCompiled>(grid, field, texture, write, stream);
-      break;
-    case Method::inverse3x3_float: launch_cells<Inverse3x3Float, kCompiled>(grid, field, texture, write, stream); break;
-    case Method::paper: launch_cells<Paper, kCompiled>(grid, field, texture, write, stream); break;
-    case Method::inverse4x4_double_per_voxel:
-      launch_cells<Inverse4x4Double, kEvery>(grid, field, texture, write, stream);
-      break;
-    case Method::inverse3x3_double_per_voxel:
-      launch_cells<Inverse3x3Double, kEvery>(grid, field, texture, write, stream);
-      break;
-    case Method::inverse3x3_float_per_voxel:
-      launch_cells<Inverse3x3Float, kEvery>(grid, field, texture, write, stream);
-      break;
-    case Method::paper_per_voxel: launch_cells<Paper, kEvery>(grid, field, texture, write, stream); break;
-    case Method::gascon:
-      require(tetrahedra <= INT32_MAX, "more tetrahedra than a grid of blocks holds; use larger cells");
-      gascon_kernel<<<static_cast<unsigned>(tetrahedra), kThreadsOfTetrahedron, 0, stream>>>(grid, field, texture,
-                                                                                             write);
-      break;
-    case Method::tetwarp: throw InputError("tetwarp is not a baseline");
+  if (method == Method::gascon) {
+    const std::int64_t tetrahedra =
+        std::int64_t{grid.vertices_x - 1} * (grid.vertices_y - 1) * (grid.vertices_z - 1) * kTetrahedraPerCell;
+    require(tetrahedra <= INT32_MAX, "more tetrahedra than a grid of blocks holds; use larger cells");
+    gascon_kernel<<<static_cast<unsigned>(tetrahedra), kThreadsOfTetrahedron, 0, stream>>>(grid, field, texture, write);
+  } else {
+    with_cell_method(method,
+                     [&]<class M, InverseIn kWhen>() { launch_cells<M, kWhen>(grid, field, texture, write, stream); });
   }
   TETWARP_CUDA_TRY(cudaGetLastError());
 }

@@ -13,6 +13,7 @@
 #include "bench/paper/inverse.h"
 #include "bench/paper/method.h"
 #include "deform/core/five_tetrahedra.h"
+#include "deform/errors.h"
 #include "deform/geometry.h"
 
 namespace tetwarp::bench {
@@ -193,6 +194,23 @@ TETWARP_HD void deform_cell(const Grid& grid, int i, int j, int k, const Field& 
         }
       }
     }
+  }
+}
+
+/// Calls `run.template operator()<M, kWhen>()` with what a method of one thread a cell is made of.
+template <class Run>
+void with_cell_method(Method method, const Run& run) {
+  constexpr InverseIn kCompiled = InverseIn::loop_as_compiled, kEvery = InverseIn::every_voxel;
+  switch (method) {
+    case Method::inverse4x4_double: return run.template operator()<Inverse4x4Double, kCompiled>();
+    case Method::inverse3x3_double: return run.template operator()<Inverse3x3Double, kCompiled>();
+    case Method::inverse3x3_float: return run.template operator()<Inverse3x3Float, kCompiled>();
+    case Method::paper: return run.template operator()<Paper, kCompiled>();
+    case Method::inverse4x4_double_per_voxel: return run.template operator()<Inverse4x4Double, kEvery>();
+    case Method::inverse3x3_double_per_voxel: return run.template operator()<Inverse3x3Double, kEvery>();
+    case Method::inverse3x3_float_per_voxel: return run.template operator()<Inverse3x3Float, kEvery>();
+    case Method::paper_per_voxel: return run.template operator()<Paper, kEvery>();
+    default: throw InputError(name_of(method) + " is no baseline of one thread a cell");
   }
 }
 

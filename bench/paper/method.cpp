@@ -3,68 +3,51 @@
 
 #include "bench/paper/method.h"
 
+#include <algorithm>
+
 #include "deform/errors.h"
 
 namespace tetwarp::bench {
 
 namespace {
 
-struct Name {
-  Method method;
-  const char* name;
-};
-constexpr Name kNames[] = {
-    {Method::inverse4x4_double, "inverse4x4-double"},
-    {Method::inverse3x3_double, "inverse3x3-double"},
-    {Method::inverse3x3_float, "inverse3x3-float"},
-    {Method::paper, "paper"},
-    {Method::inverse4x4_double_per_voxel, "inverse4x4-double-per-voxel"},
-    {Method::inverse3x3_double_per_voxel, "inverse3x3-double-per-voxel"},
-    {Method::inverse3x3_float_per_voxel, "inverse3x3-float-per-voxel"},
-    {Method::paper_per_voxel, "paper-per-voxel"},
-    {Method::gascon, "gascon"},
-    {Method::tetwarp, "tetwarp"},
-};
+constexpr int kTwins = 4;  ///< the first methods, and as far behind each its form with an inverse for every voxel
 
 }  // namespace
 
-std::string name_of(Method method) { return kNames[static_cast<int>(method)].name; }
+const std::vector<std::string>& method_names() {
+  static const std::vector<std::string> kNames{"inverse4x4-double",
+                                               "inverse3x3-double",
+                                               "inverse3x3-float",
+                                               "paper",
+                                               "inverse4x4-double-per-voxel",
+                                               "inverse3x3-double-per-voxel",
+                                               "inverse3x3-float-per-voxel",
+                                               "paper-per-voxel",
+                                               "gascon",
+                                               "tetwarp"};
+  return kNames;
+}
+
+std::string name_of(Method method) { return method_names()[static_cast<std::size_t>(method)]; }
 
 std::string name_of(FieldSource source) { return source == FieldSource::kernel ? "kernel" : "memory"; }
 
-std::vector<std::string> method_names() {
-  std::vector<std::string> names;
-  for (const Name& entry : kNames) names.emplace_back(entry.name);
-  return names;
-}
-
 Method parse_method(const std::string& name) {
-  std::string known;
-  for (const Name& entry : kNames) {
-    if (name == entry.name) return entry.method;
-    known += (known.empty() ? "" : ", ") + std::string(entry.name);
-  }
-  throw InputError("no method \"" + name + "\"; choose from " + known);
+  const auto& names = method_names();
+  const auto found = std::find(names.begin(), names.end(), name);
+  require(found != names.end(), "no method \"" + name + "\"");
+  return static_cast<Method>(found - names.begin());
 }
 
 InverseIn inverse_of(Method method) {
-  switch (method) {
-    case Method::inverse4x4_double_per_voxel:
-    case Method::inverse3x3_double_per_voxel:
-    case Method::inverse3x3_float_per_voxel:
-    case Method::paper_per_voxel: return InverseIn::every_voxel;
-    default: return InverseIn::loop_as_compiled;
-  }
+  const int number = static_cast<int>(method);
+  return number >= kTwins && number < 2 * kTwins ? InverseIn::every_voxel : InverseIn::loop_as_compiled;
 }
 
 Method per_voxel(Method method) {
-  switch (method) {
-    case Method::inverse4x4_double: return Method::inverse4x4_double_per_voxel;
-    case Method::inverse3x3_double: return Method::inverse3x3_double_per_voxel;
-    case Method::inverse3x3_float: return Method::inverse3x3_float_per_voxel;
-    case Method::paper: return Method::paper_per_voxel;
-    default: throw InputError(name_of(method) + " has no form with an inverse for every voxel");
-  }
+  require(static_cast<int>(method) < kTwins, name_of(method) + " has no form with an inverse for every voxel");
+  return static_cast<Method>(static_cast<int>(method) + kTwins);
 }
 
 }  // namespace tetwarp::bench

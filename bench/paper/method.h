@@ -35,7 +35,8 @@ enum class InverseIn : std::uint8_t {
 
 std::string name_of(Method method);
 std::string name_of(FieldSource source);
-std::vector<std::string> method_names();
+/// All of them, in the order of the enumeration.
+const std::vector<std::string>& method_names();
 /// @throws InputError for a name that is none
 Method parse_method(const std::string& name);
 

@@ -1,13 +1,10 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "bench/paper/paper_cpu.h"
-
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <atomic>
-#include <chrono>
 
 #include "bench/paper/backend.h"
 #include "bench/paper/baselines.h"
@@ -15,12 +12,6 @@
 namespace tetwarp::bench {
 
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double ms_since(Clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
 
 /// What a texture unit does, in float: linear along x, y, z; clamped to the outermost voxel centres.
 struct SoftwareTexture {
@@ -89,40 +80,24 @@ void run_gascon(const Grid& grid, const Field& field, const SoftwareTexture& tex
 template <class Field>
 void run_method(Method method, const Grid& grid, const Field& field, const SoftwareTexture& texture,
                 const SetValue& write) {
-  const auto each_cell = [&]<class M, InverseIn kWhen>() {
+  if (method == Method::gascon) return run_gascon(grid, field, texture, write);
+  with_cell_method(method, [&]<class M, InverseIn kWhen>() {
     for_each_cell(grid, [&](int i, int j, int k) { deform_cell<M, kWhen>(grid, i, j, k, field, texture, write); });
-  };
-  constexpr InverseIn kCompiled = InverseIn::loop_as_compiled, kEvery = InverseIn::every_voxel;
-  switch (method) {
-    case Method::inverse4x4_double: return each_cell.template operator()<Inverse4x4Double, kCompiled>();
-    case Method::inverse3x3_double: return each_cell.template operator()<Inverse3x3Double, kCompiled>();
-    case Method::inverse3x3_float: return each_cell.template operator()<Inverse3x3Float, kCompiled>();
-    case Method::paper: return each_cell.template operator()<Paper, kCompiled>();
-    case Method::inverse4x4_double_per_voxel: return each_cell.template operator()<Inverse4x4Double, kEvery>();
-    case Method::inverse3x3_double_per_voxel: return each_cell.template operator()<Inverse3x3Double, kEvery>();
-    case Method::inverse3x3_float_per_voxel: return each_cell.template operator()<Inverse3x3Float, kEvery>();
-    case Method::paper_per_voxel: return each_cell.template operator()<Paper, kEvery>();
-    case Method::gascon: return run_gascon(grid, field, texture, write);
-    case Method::tetwarp: break;
-  }
-  throw InputError("tetwarp is not a baseline");
+  });
 }
 
 class CpuBackend final : public Backend {
  public:
   explicit CpuBackend(int threads) : Backend(threads) {}
 
-  FrameTimes time(Method method, FieldSource source, const FrameCount& frames) override {
-    FrameTimes times, untimed;
-    for (int n = -frames.warmup; n < frames.timed; ++n) {
-      FrameTimes& to = n < 0 ? untimed : times;
-      if (method == Method::tetwarp) {
-        run_tetwarp(source, to);
-      } else {
-        run_baseline(method, source, to);
-      }
-    }
-    return times;
+  Samples time(Method method, FieldSource source, const FrameCount& frames) override {
+    const auto run = [&](Samples& times) {
+      if (method == Method::tetwarp)
+        run_tetwarp(source, times);
+      else
+        run_baseline(method, source, times);
+    };
+    return take_turns({{name_of(method), run}}, frames.warmup, frames.timed).front();
   }
 
   const std::vector<std::int16_t>& output() override { return output_.voxels; }
@@ -161,28 +136,28 @@ class CpuBackend final : public Backend {
     run_method(method, grid, field, texture, write);
   }
 
-  void run_baseline(Method method, FieldSource source, FrameTimes& times) {
-    const auto start = Clock::now();
+  void run_baseline(Method method, FieldSource source, Samples& times) {
+    const Stopwatch whole_frame;
     std::fill(output_.voxels.begin(), output_.voxels.end(), background_);
-    const auto cleared = Clock::now();
+    const Stopwatch watch;
     run(method, source, output_.voxels.data(), nullptr);
-    times.kernel_ms.push_back(ms_since(cleared));
-    times.end_to_end_ms.push_back(ms_since(start));
+    times["kernel_ms"].push_back(watch.ms());
+    times["end_to_end_ms"].push_back(whole_frame.ms());
   }
 
-  void run_tetwarp(FieldSource source, FrameTimes& times) {
-    const auto start = Clock::now();
+  void run_tetwarp(FieldSource source, Samples& times) {
+    const Stopwatch watch;
     if (source == FieldSource::kernel) fill_field();
     resampler_->set_field(view(field_));
-    const double field_ms = ms_since(start);
+    const double field_ms = watch.ms();
     const Target target{
         .source = view(*volume_), .output = view(output_), .background = static_cast<double>(background_)};
     resampler_->resample(whole(volume_->geometry), {&target, 1});
-    const double total_ms = ms_since(start);
-    times.field_ms.push_back(field_ms);
-    times.kernel_ms.push_back(total_ms - field_ms);
-    times.total_ms.push_back(total_ms);
-    times.end_to_end_ms.push_back(total_ms);
+    const double total_ms = watch.ms();
+    times["field_ms"].push_back(field_ms);
+    times["kernel_ms"].push_back(total_ms - field_ms);
+    times["total_ms"].push_back(total_ms);
+    times["end_to_end_ms"].push_back(total_ms);
   }
 
   std::vector<std::uint32_t> count_baseline_writes(Method method, FieldSource source) override {

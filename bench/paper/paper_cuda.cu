@@ -3,8 +3,6 @@
 
 // The baselines on a CUDA device, and Tetwarp beside them. Compiled as anyone would compile it: multiplications and
 // additions are fused (bench/CMakeLists.txt), unlike in the project's own kernels.
-#include <chrono>
-
 #include "backend/devices.h"
 #include "backend/factories.h"
 #include "bench/harness/cuda_objects.h"
@@ -17,20 +15,15 @@ namespace tetwarp::bench {
 namespace {
 
 using cuda_detail::DeviceBuffer;
-using Clock = std::chrono::steady_clock;
-
-double ms_since(Clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
 
 class CudaBackend final : public Backend {
  public:
   explicit CudaBackend(int device) : Backend(0), device_(select(device)) {}
 
-  FrameTimes time(Method method, FieldSource source, const FrameCount& frames) override {
-    FrameTimes times, untimed;
+  Samples time(Method method, FieldSource source, const FrameCount& frames) override {
     upload_source(method);
-    for (int n = -frames.warmup; n < frames.timed; ++n) run_frame(method, source, n < 0 ? untimed : times);
+    const auto run = [&](Samples& times) { run_frame(method, source, times); };
+    Samples times = take_turns({{name_of(method), run}}, frames.warmup, frames.timed).front();
     download_output();
     for (int n = 0; n < frames.end_to_end; ++n) run_end_to_end(method, source, times);
     return times;
@@ -127,32 +120,32 @@ class CudaBackend final : public Backend {
   }
 
   /// One frame, all data on the device; its times from events on the stream.
-  void run_frame(Method method, FieldSource source, FrameTimes& times) {
+  void run_frame(Method method, FieldSource source, Samples& times) {
     if (method == Method::tetwarp) {
       start_.record(stream_);
       set_tetwarp_field(source);
       middle_.record(stream_);
       run_tetwarp();
       end_.record(stream_);
-      times.total_ms.push_back(end_.ms_since(start_));
-      times.field_ms.push_back(middle_.ms_since(start_));
-      times.kernel_ms.push_back(end_.ms_since(middle_));
+      times["total_ms"].push_back(end_.ms_since(start_));
+      times["field_ms"].push_back(middle_.ms_since(start_));
+      times["kernel_ms"].push_back(end_.ms_since(middle_));
     } else {
       clear();
       start_.record(stream_);
       run_baseline(method, source);
       end_.record(stream_);
-      times.kernel_ms.push_back(end_.ms_since(start_));
+      times["kernel_ms"].push_back(end_.ms_since(start_));
     }
   }
 
   /// One frame from the host's memory and back, by the wall clock.
-  void run_end_to_end(Method method, FieldSource source, FrameTimes& times) {
+  void run_end_to_end(Method method, FieldSource source, Samples& times) {
     TETWARP_CUDA_TRY(cudaDeviceSynchronize());
-    const auto start = Clock::now();
+    const Stopwatch watch;
     upload_source(method);
     if (source == FieldSource::memory) upload_field();
-    times.copy_in_ms.push_back(ms_since(start));
+    times["copy_in_ms"].push_back(watch.ms());
     if (method == Method::tetwarp) {
       set_tetwarp_field(source);
       run_tetwarp();
@@ -161,10 +154,10 @@ class CudaBackend final : public Backend {
       run_baseline(method, source);
     }
     TETWARP_CUDA_TRY(cudaStreamSynchronize(stream_.get()));
-    const auto computed = Clock::now();
+    const Stopwatch copy;
     download_output();
-    times.copy_out_ms.push_back(ms_since(computed));
-    times.end_to_end_ms.push_back(ms_since(start));
+    times["copy_out_ms"].push_back(copy.ms());
+    times["end_to_end_ms"].push_back(watch.ms());
   }
 
   std::vector<std::uint32_t> count_baseline_writes(Method method, FieldSource source) override {

@@ -47,85 +47,58 @@ void use_threads(Filter& filter, int threads) {
   filter.ReleaseDataBeforeUpdateFlagOff();  // the output's memory is kept from run to run
 }
 
-FieldFilter::Pointer make_filter(ItkInverter inverter) {
-  if (inverter == ItkInverter::iterative) return IterativeInverse::New().GetPointer();
-  const auto invert = Invert::New();
-  invert->SetEnforceBoundaryCondition(inverter == ItkInverter::fixed_border);
-  return invert.GetPointer();
-}
-
 FieldFilter::Pointer make_inverter(ItkInverter inverter, const VertexField& field, int threads) {
-  const FieldFilter::Pointer filter = make_filter(inverter);
+  FieldFilter::Pointer filter;
+  if (inverter == ItkInverter::iterative) {
+    filter = IterativeInverse::New().GetPointer();
+  } else {
+    const auto invert = Invert::New();
+    invert->SetEnforceBoundaryCondition(inverter == ItkInverter::fixed_border);
+    filter = invert.GetPointer();
+  }
   use_threads(*filter, threads);
   filter->SetInput(wrap<Field>(field.lattice, field.displacement));
   return filter;
 }
 
-class ItkInverse final : public InversePeer {
- public:
-  ItkInverse(ItkInverter inverter, const VertexField& field, int threads)
-      : filter_(make_inverter(inverter, field, threads)) {}
-
-  void run() override {
-    filter_->Modified();
-    filter_->Update();
-  }
-  std::span<const glm::vec3> inverse() const override {
-    const Field* field = filter_->GetOutput();
-    return {reinterpret_cast<const glm::vec3*>(field->GetBufferPointer()), field->GetPixelContainer()->Size()};
-  }
-
- private:
-  FieldFilter::Pointer filter_;
-};
-
-class ItkWarp final : public Peer {
- public:
-  ItkWarp(const PeerInput& input, const PullField& inverse) : ItkWarp(input) {
-    warp_->SetDisplacementField(wrap<Field>(inverse.grid, inverse.displacement));
-  }
-  ItkWarp(const PeerInput& input, const VertexField& field) : ItkWarp(input) {
-    invert_ = make_inverter(ItkInverter::fixed_border, field, input.threads);
-    warp_->SetDisplacementField(invert_->GetOutput());
-  }
-
-  void run() override {
-    if (invert_) invert_->Modified();
-    warp_->Modified();
-    warp_->Update();
-  }
-  std::span<const std::int16_t> output() const override {
-    const Image* image = warp_->GetOutput();
+/// @param before  runs before it; may be null
+Peer make_warp(const PeerInput& input, const Field::Pointer& inverse, const FieldFilter::Pointer& before) {
+  const auto warp = Warp::New();
+  use_threads(*warp, input.threads);
+  const Image::Pointer source = wrap<Image>(input.volume.geometry, input.volume.voxels);
+  warp->SetInput(source);
+  warp->SetDisplacementField(inverse);
+  warp->SetOutputParametersFromImage(source);
+  warp->SetEdgePaddingValue(input.background);
+  return [=]() -> std::span<const std::int16_t> {
+    if (before) before->Modified();
+    warp->Modified();
+    warp->Update();
+    const Image* image = warp->GetOutput();
     return {image->GetBufferPointer(), image->GetPixelContainer()->Size()};
-  }
-
- private:
-  explicit ItkWarp(const PeerInput& input) : warp_(Warp::New()) {
-    use_threads(*warp_, input.threads);
-    const Image::Pointer source = wrap<Image>(input.volume.geometry, input.volume.voxels);
-    warp_->SetInput(source);
-    warp_->SetOutputParametersFromImage(source);
-    warp_->SetEdgePaddingValue(input.background);
-  }
-
-  Warp::Pointer warp_;
-  FieldFilter::Pointer invert_;
-};
+  };
+}
 
 }  // namespace
 
 std::optional<std::string> itk_version() { return itk::Version::GetITKVersion(); }
 
-std::unique_ptr<Peer> make_itk_warp(const PeerInput& input, const PullField& inverse) {
-  return std::make_unique<ItkWarp>(input, inverse);
+Peer make_itk_warp(const PeerInput& input, const PullField& inverse) {
+  return make_warp(input, wrap<Field>(inverse.grid, inverse.displacement), nullptr);
 }
 
-std::unique_ptr<Peer> make_itk_invert_and_warp(const PeerInput& input, const VertexField& field) {
-  return std::make_unique<ItkWarp>(input, field);
+Peer make_itk_invert_and_warp(const PeerInput& input, const VertexField& field) {
+  const FieldFilter::Pointer invert = make_inverter(ItkInverter::fixed_border, field, input.threads);
+  return make_warp(input, invert->GetOutput(), invert);
 }
 
-std::unique_ptr<InversePeer> make_itk_inverter(ItkInverter inverter, const VertexField& field, int threads) {
-  return std::make_unique<ItkInverse>(inverter, field, threads);
+InversePeer make_itk_inverter(ItkInverter inverter, const VertexField& field, int threads) {
+  return [filter = make_inverter(inverter, field, threads)]() -> std::span<const glm::vec3> {
+    filter->Modified();
+    filter->Update();
+    const Field* inverse = filter->GetOutput();
+    return {reinterpret_cast<const glm::vec3*>(inverse->GetBufferPointer()), inverse->GetPixelContainer()->Size()};
+  };
 }
 
 }  // namespace tetwarp::bench

@@ -6,8 +6,8 @@
 namespace tetwarp::bench {
 
 std::optional<std::string> itk_version() { return {}; }
-std::unique_ptr<Peer> make_itk_warp(const PeerInput&, const PullField&) { return nullptr; }
-std::unique_ptr<Peer> make_itk_invert_and_warp(const PeerInput&, const VertexField&) { return nullptr; }
-std::unique_ptr<InversePeer> make_itk_inverter(ItkInverter, const VertexField&, int) { return nullptr; }
+Peer make_itk_warp(const PeerInput&, const PullField&) { return {}; }
+Peer make_itk_invert_and_warp(const PeerInput&, const VertexField&) { return {}; }
+InversePeer make_itk_inverter(ItkInverter, const VertexField&, int) { return {}; }
 
 }  // namespace tetwarp::bench

@@ -8,6 +8,7 @@
 #include <vtkPoints.h>
 #include <vtkProbeFilter.h>
 #include <vtkShortArray.h>
+#include <vtkSmartPointer.h>
 #include <vtkStructuredGrid.h>
 #include <vtkVersion.h>
 
@@ -39,48 +40,35 @@ vtkNew<vtkPoints> deformed_points(const VertexField& field) {
   return points;
 }
 
-class VtkProbe final : public Peer {
- public:
-  VtkProbe(const PeerInput& input, const VertexField& field) {
-    set_vtk_threads(input.threads);
-    const glm::ivec3 size(input.volume.geometry.size);
-    vtkNew<vtkShortArray> values;
-    values->SetName(kValues);
-    values->SetArray(const_cast<short*>(input.volume.voxels.data()), static_cast<vtkIdType>(input.volume.voxels.size()),
-                     /*save=*/1);
-    vtkNew<vtkStructuredGrid> grid;
-    grid->SetDimensions(size.x, size.y, size.z);
-    grid->SetPoints(deformed_points(field));
-    grid->GetPointData()->SetScalars(values);
-    vtkNew<vtkImageData> centres;
-    centres->SetDimensions(size.x, size.y, size.z);
-    probe_->SetInputData(centres);
-    probe_->SetSourceData(grid);
-  }
-
-  void run() override {
-    probe_->Modified();
-    probe_->Update();
-  }
-  std::span<const std::int16_t> output() const override {
-    vtkPointData* data = probe_->GetOutput()->GetPointData();
-    auto* values = vtkShortArray::SafeDownCast(data->GetArray(kValues));
-    if (!values) throw Error("vtkProbeFilter made no int16 values");
-    return {values->GetPointer(0), static_cast<std::size_t>(values->GetNumberOfTuples())};
-  }
-
- private:
-  vtkNew<vtkProbeFilter> probe_;
-};
-
 }  // namespace
 
 std::optional<std::string> vtk_version() {
   return std::string(vtkVersion::GetVTKVersion()) + ", threads by " + vtk_threads_backend();
 }
 
-std::unique_ptr<Peer> make_vtk_probe(const PeerInput& input, const VertexField& field) {
-  return std::make_unique<VtkProbe>(input, field);
+Peer make_vtk_probe(const PeerInput& input, const VertexField& field) {
+  set_vtk_threads(input.threads);
+  const glm::ivec3 size(input.volume.geometry.size);
+  vtkNew<vtkShortArray> values;
+  values->SetName(kValues);
+  values->SetArray(const_cast<short*>(input.volume.voxels.data()), static_cast<vtkIdType>(input.volume.voxels.size()),
+                   /*save=*/1);
+  vtkNew<vtkStructuredGrid> grid;
+  grid->SetDimensions(size.x, size.y, size.z);
+  grid->SetPoints(deformed_points(field));
+  grid->GetPointData()->SetScalars(values);
+  vtkNew<vtkImageData> centres;
+  centres->SetDimensions(size.x, size.y, size.z);
+  const vtkSmartPointer<vtkProbeFilter> probe = vtkSmartPointer<vtkProbeFilter>::New();
+  probe->SetInputData(centres);
+  probe->SetSourceData(grid);
+  return [=]() -> std::span<const std::int16_t> {
+    probe->Modified();
+    probe->Update();
+    auto* found = vtkShortArray::SafeDownCast(probe->GetOutput()->GetPointData()->GetArray(kValues));
+    if (!found) throw Error("vtkProbeFilter made no int16 values");
+    return {found->GetPointer(0), static_cast<std::size_t>(found->GetNumberOfTuples())};
+  };
 }
 
 }  // namespace tetwarp::bench

@@ -6,6 +6,6 @@
 namespace tetwarp::bench {
 
 std::optional<std::string> vtk_version() { return {}; }
-std::unique_ptr<Peer> make_vtk_probe(const PeerInput&, const VertexField&) { return nullptr; }
+Peer make_vtk_probe(const PeerInput&, const VertexField&) { return {}; }
 
 }  // namespace tetwarp::bench

@@ -38,7 +38,7 @@ __device__ bool list_tetrahedra(const IntervalTile& tile) {
   const glm::ivec3& cells = tile.cells;
   if (cells.x > kMostCells.x || cells.y > kMostCells.y || cells.z > kMostCells.z) return false;
   if (cells.x * cells.y * cells.z > kMostCellsInAll) return false;
-  const int total = cells.x * cells.y * cells.z * kTetrahedraPerCell;
+  const int total = cells.x * cells.y * cells.z * kTetrahedraPerCell, lane = tile.lane(), warp = tile.warp();
   unsigned listed = 0;
 #pragma unroll 1
   for (int from = 0; from < total; from += kTileThreads) {
@@ -47,7 +47,7 @@ __device__ bool list_tetrahedra(const IntervalTile& tile) {
     const unsigned number = TetrahedronInTile::of({row.rest, slice.rest, slice.quotient}, n % kTetrahedraPerCell);
     RowSpan span{};
     const bool reaches = n < total && may_own(tile, number, span);
-    const unsigned entry = rank_in_block(reaches, tile.thread, memory.per_warp, listed);
+    const unsigned entry = rank_in_block(reaches, lane, warp, memory.per_warp, listed);
     if (reaches && entry < kMostTetrahedra) {
       memory.numbers[entry] = number;
       memory.spans[entry] = span.word();

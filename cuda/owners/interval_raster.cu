@@ -31,17 +31,23 @@ __global__ void __launch_bounds__(kTileThreads, Sink::kIsWide ? kTileBlocks - 1 
   const IntBox voxels = task.voxels(at);
   TileCells& cells = task.cells[task.tile_number(at)];
   const int thread = static_cast<int>(threadIdx.x);
-  IntervalTile tile{task,        memory,     voxels, voxels.end - voxels.begin, task.turns.signs(voxels.begin),
-                    cells.first, cells.size, thread};
+  const glm::ivec3 size = voxels.end - voxels.begin;
+  const IntervalTile tile{task,
+                          memory,
+                          voxels,
+                          size,
+                          task.turns.signs(voxels.begin),
+                          cells.first,
+                          cells.size,
+                          thread,
+                          IntervalTile::has_room(cells.size)};
   if (cells.rests) {
-    copy_tile(tile, sink);
-    if (thread == 0)
-      atomicAdd(&task.counters->covered, static_cast<unsigned long long>(tile.size.x * tile.size.y * tile.size.z));
+    copy_tile(voxels, thread, sink);
+    if (thread == 0) atomicAdd(&task.counters->covered, static_cast<unsigned long long>(size.x * size.y * size.z));
     return;
   }
   if (thread == 0) memory.settled = 0;
   clear_marks(tile);
-  tile.at_hand = tile.has_vertices();
   if (tile.at_hand) tile.read_vertices();
   __syncthreads();
   if (!list_tetrahedra(tile)) {

@@ -13,13 +13,14 @@ namespace {
 
 /// Copies a tile at rest, a column a lane.
 template <class Sink>
-__device__ void copy_tile(const IntervalTile& tile, const Sink& sink) {
+__device__ void copy_tile(const IntBox& voxels, int thread, const Sink& sink) {
   constexpr int kAtOnce = 8;
-  const int lane = tile.lane(), y = tile.warp();
-  if (lane >= tile.size.x || y >= tile.size.y) return;
-  const glm::ivec3 at = tile.voxels.begin + glm::ivec3(lane, y, 0);
-  for (int z = 0; z < tile.size.z; z += kAtOnce)
-    sink.template copy<kAtOnce>(at + glm::ivec3(0, 0, z), ~0u >> max(32 - (tile.size.z - z), 0));
+  const glm::ivec3 size = voxels.end - voxels.begin;
+  const int lane = thread & 31, y = thread / 32;
+  if (lane >= size.x || y >= size.y) return;
+  const glm::ivec3 at = voxels.begin + glm::ivec3(lane, y, 0);
+  for (int z = 0; z < size.z; z += kAtOnce)
+    sink.template copy<kAtOnce>(at + glm::ivec3(0, 0, z), ~0u >> max(32 - (size.z - z), 0));
 }
 
 /// What the voxels of the first tetrahedra of the list need, in the place of their faces. A thread a tetrahedron;

@@ -57,8 +57,7 @@ struct TetrahedronInTile {
   static_assert(CellZ::kEnd == 32);
 
   __device__ static unsigned of(const glm::ivec3& cell, int which) {
-    return Which::put(static_cast<unsigned>(which)) | CellX::put(static_cast<unsigned>(cell.x)) |
-           CellY::put(static_cast<unsigned>(cell.y)) | CellZ::put(static_cast<unsigned>(cell.z));
+    return static_cast<unsigned>(Which::put(which) | CellX::put(cell.x) | CellY::put(cell.y) | CellZ::put(cell.z));
   }
   __device__ static glm::ivec3 cell(unsigned word) { return {CellX::get(word), CellY::get(word), CellZ::get(word)}; }
   __device__ static int which(unsigned word) { return static_cast<int>(Which::get(word)); }
@@ -93,9 +92,8 @@ struct RowSpan {
             static_cast<int>(ZEnd::get(word)), IsSmall::get(word) != 0};
   }
   __device__ unsigned word() const {
-    return YBegin::put(static_cast<unsigned>(y_begin)) | YEnd::put(static_cast<unsigned>(y_end)) |
-           ZBegin::put(static_cast<unsigned>(z_begin)) | ZEnd::put(static_cast<unsigned>(z_end)) |
-           IsSmall::put(is_small ? 1 : 0);
+    return static_cast<unsigned>(YBegin::put(y_begin) | YEnd::put(y_end) | ZBegin::put(z_begin) | ZEnd::put(z_end) |
+                                 IsSmall::put(is_small ? 1 : 0));
   }
 };
 
@@ -111,7 +109,7 @@ struct RowItem {
   static_assert(Y::kEnd == 16 && kSlots == Slot::kMost + 1);
 
   __device__ static unsigned short of(int slot, int y) {
-    return static_cast<unsigned short>(Slot::put(static_cast<unsigned>(slot)) | Y::put(static_cast<unsigned>(y)));
+    return static_cast<unsigned short>(Slot::put(slot) | Y::put(y));
   }
 };
 
@@ -128,7 +126,7 @@ struct UnsureRow {
   static_assert(Entry::kEnd == 32 && kMostTetrahedra <= Entry::kMost);
 
   __device__ static unsigned of(unsigned entry, int y, int z) {
-    return Entry::put(entry) | Z::put(static_cast<unsigned>(z)) | Y::put(static_cast<unsigned>(y));
+    return Entry::put(entry) | static_cast<unsigned>(Z::put(z) | Y::put(y));
   }
 };
 
@@ -202,7 +200,7 @@ struct IntervalTile {
   glm::i32vec3 signs;            ///< nudge of all of them
   glm::ivec3 first_cell, cells;  ///< those that may reach the tile
   int thread;
-  bool at_hand = false;  ///< whether `memory.vertices` has the vertices of these cells
+  bool at_hand;  ///< whether `memory.vertices` has the vertices of these cells
 
   __device__ int lane() const { return thread & 31; }
   __device__ int warp() const { return thread / 32; }
@@ -214,9 +212,9 @@ struct IntervalTile {
 
   /// The number of vertices of the tile's cells along an axis.
   __device__ glm::ivec3 vertex_counts() const { return cells + 1; }
-  /// Whether the vertices of all cells are at hand.
-  __device__ bool has_vertices() const {
-    const glm::ivec3 counts = vertex_counts();
+  /// Whether there is room for the vertices of so many cells on each axis.
+  __device__ static bool has_room(const glm::ivec3& cells) {
+    const glm::ivec3 counts = cells + 1;
     return counts.x * counts.y * counts.z <= kMostVertices;
   }
   /// From the first voxel of the tile to a deformed vertex, 2^-12 voxel.

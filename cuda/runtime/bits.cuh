@@ -28,8 +28,12 @@ struct BitField {
   static_assert(kBits > 0 && kEnd <= kWidth);
   static constexpr Word kMost = ((Word{1} << (kBits - 1)) - 1) + (Word{1} << (kBits - 1));  ///< the largest value
 
-  /// @param value  at most kMost
-  __host__ __device__ static constexpr Word put(Word value) { return value << kFirst; }
+  /// @param value  a whole number from 0 to kMost, of any type
+  /// @return the same type: a word is cast when it is whole, so that arithmetic with int stays arithmetic with int
+  template <class Value>
+  __host__ __device__ static constexpr auto put(Value value) {
+    return value << kFirst;
+  }
   __host__ __device__ static constexpr Word get(Word word) {
     if constexpr (kEnd == kWidth) return word >> kFirst;
     return word >> kFirst & kMost;
@@ -67,7 +71,7 @@ struct BitNumber {
   static_assert(Word::kEnd == 32);
 
   __host__ __device__ static constexpr unsigned of(unsigned word, int bit) {
-    return Word::put(word) | Bit::put(static_cast<unsigned>(bit));
+    return Word::put(word) | static_cast<unsigned>(Bit::put(bit));
   }
 };
 

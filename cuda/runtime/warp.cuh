@@ -6,21 +6,23 @@
 #include <cstdint>
 #include <cub/warp/warp_reduce.cuh>
 #include <cub/warp/warp_scan.cuh>
+#if CUB_VERSION >= 200800
 #include <cuda/functional>
+#endif
 
 #include "cuda/runtime/bits.cuh"
 
-/// What the threads of a warp, or of a block, find together: sums, least and largest values, places in a list.
+/// What the threads of a warp, or of a block, find together: sums, least and largest values, ranks in a list.
 ///
 /// Where a function asks for whole warps, all 32 lanes call it together. CUB does what costs no more with it. What is
 /// written out here was measured against CUB with nvcc 13.0 for sm_90, each in a kernel that does nothing else:
 ///
-///     | of a warp, or a block of 256       | CUB: instructions, registers | here |
-///     | sum of unsigned, least of int      | 20, 8 (one REDUX)            | 28, 12 -> CUB |
-///     | inclusive scan of int              | 21, 16                       | 31, 12 -> CUB: number_kernel keeps its 16
-///     | | least of float                     | 33, 12                       | 22, 12 -> here | | largest of unsigned
-///     long long      | 48, 16                       | 42, 16 -> here | | places of those threads that vote  | 67, 21
-///     (BlockScan)           | 57, 19 -> here |
+///     | of a warp, or of a block of 256   | CUB: instructions, registers | written out | taken |
+///     | sum of unsigned, least of int     | 20, 8 (one REDUX)            | 28, 12      | CUB   |
+///     | inclusive scan of int             | 21, 16                       | 31, 12      | CUB: number_kernel 14, was 16
+///     | | least of float                    | 33, 12                       | 22, 12      | ours  | | largest of
+///     unsigned long long     | 48, 16                       | 42, 16      | ours  | | ranks of those threads that vote
+///     | 67, 21 (BlockScan)           | 57, 19      | ours  |
 ///
 /// Sums of floats are in an order that is written out: another one would give other bits.
 namespace tetwarp::cuda_detail {
@@ -30,19 +32,30 @@ constexpr unsigned kAllLanes = ~0u;  ///< mask of a whole warp
 /// Number of this thread in its warp, where a block's warps lie along x.
 __device__ inline int lane_of_warp() { return static_cast<int>(threadIdx.x & 31); }
 
-/// CUB's reduction of a whole warp; its storage is empty there, for values stay in registers. @return in lane 0
-template <class T, class Operation>
-__device__ T reduce_warp(T value, Operation operation) {
-  typename cub::WarpReduce<T>::TempStorage nothing;
-  return cub::WarpReduce<T>(nothing).Reduce(value, operation);
-}
+// The operations that CUB knows an instruction for; toolkits before 12.9 have them under CUB's own names.
+#if CUB_VERSION >= 200800
+using LeastOf = cuda::minimum<>;
+using LargestOf = cuda::maximum<>;
+#else
+using LeastOf = cub::Min;
+using LargestOf = cub::Max;
+#endif
 
 /// Sum over a whole warp. @return in lane 0
-__device__ inline unsigned warp_sum(unsigned value) { return reduce_warp(value, cuda::std::plus<>{}); }
+__device__ inline unsigned warp_sum(unsigned value) {
+  cub::WarpReduce<unsigned>::TempStorage nothing;  // of a whole warp: values stay in registers
+  return cub::WarpReduce<unsigned>(nothing).Sum(value);
+}
 /// The least of a whole warp. @return in lane 0
-__device__ inline int warp_min(int value) { return reduce_warp(value, cuda::minimum<>{}); }
+__device__ inline int warp_min(int value) {
+  cub::WarpReduce<int>::TempStorage nothing;
+  return cub::WarpReduce<int>(nothing).Reduce(value, LeastOf{});
+}
 /// The largest of a whole warp. @return in lane 0
-__device__ inline int warp_max(int value) { return reduce_warp(value, cuda::maximum<>{}); }
+__device__ inline int warp_max(int value) {
+  cub::WarpReduce<int>::TempStorage nothing;
+  return cub::WarpReduce<int>(nothing).Reduce(value, LargestOf{});
+}
 
 /// The least of a whole warp that is a number, as `fminf` has it. @return in every lane
 __device__ inline float warp_min(float value) {
@@ -106,13 +119,12 @@ __device__ inline int rank_among(unsigned votes, int lane) { return __popc(votes
 ///     votes of warp 0   warp 1   ...     places: those of warp 0 in the order of its lanes, then those of warp 1, ...
 ///     __popc -> per_warp[0]   [1]   ...
 ///
-/// @param has       whether this thread has something
+/// @param has         whether this thread has something  @param lane, warp  of this thread
 /// @param per_warp  in shared memory, a word for each warp of the block
 /// @param listed    how many there were before this round, and then after it; the same in all threads
 /// @return the place of what this thread has
 template <int kWarps>
-__device__ unsigned rank_in_block(bool has, int thread, unsigned (&per_warp)[kWarps], unsigned& listed) {
-  const int lane = thread & 31, warp = thread / 32;
+__device__ unsigned rank_in_block(bool has, int lane, int warp, unsigned (&per_warp)[kWarps], unsigned& listed) {
   const unsigned votes = __ballot_sync(kAllLanes, has);
   if (lane == 0) per_warp[warp] = static_cast<unsigned>(__popc(votes));
   __syncthreads();

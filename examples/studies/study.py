@@ -27,10 +27,15 @@ def program():
     return str(pathlib.Path(path).resolve())
 
 
+def folder(name):
+    """As a command takes it: a name that begins with a dash is no option."""
+    return pathlib.Path(name).absolute() if name.startswith("-") else pathlib.Path(name)
+
+
 def parser(description):
     words = argparse.ArgumentParser(description=description.strip(), formatter_class=argparse.RawDescriptionHelpFormatter)
     words.add_argument("ct", nargs="?", help="a folder of DICOM or a volume file (default: a phantom)")
-    words.add_argument("-o", "--output", type=pathlib.Path, required=True, help="folder of the study; continued where it exists")
+    words.add_argument("-o", "--output", type=folder, required=True, help="folder of the study; continued where it exists")
     words.add_argument("--series", help="of a folder that holds several")
     words.add_argument("--size", default="160,160,80", help="voxels of the phantom (default: %(default)s)")
     words.add_argument("--cell-size", type=int, default=4, help="voxels between vertices of the field (default: %(default)s)")

@@ -15,6 +15,7 @@
 #include "deform/errors.h"
 #include "io/images/header_words.h"
 #include "io/lower_case.h"
+#include "io/shown_text.h"
 
 namespace tetwarp {
 namespace {
@@ -28,7 +29,7 @@ std::vector<double> numbers(const TextHeader& text, const std::string& name, std
     const double value = n < all.size() ? to_number(all[n]).value_or(NAN) : NAN;
     require(std::isfinite(value),
             "unreadable header (" +
-                (n < all.size() ? "\"" + all[n].substr(0, 60) + "\"" : std::to_string(n) + " numbers") +
+                (n < all.size() ? "\"" + shown(all[n].substr(0, 60)) + "\"" : std::to_string(n) + " numbers") +
                 " in the field " + name + "), " + file + "; expected " + std::to_string(count) +
                 (count == 1 ? " number" : " numbers"));
     values.push_back(value);

@@ -318,7 +318,8 @@ TEST_P(Pull, AnInverseThatAForwardFieldLeftDeformsLikeIt) {
     for_each_voxel(test.output, [&](const glm::i64vec3& v, std::size_t) {
       ramp.voxels.push_back(static_cast<float>(v.x + 3 * v.y - 2 * v.z));
     });
-    const auto forward = make(test.output), pull = make_pull(test.output);
+    const auto forward = make(test.output);
+    const auto pull = make_pull(test.output);
     forward->set_field(view(test.field));
     const auto expected = run(*forward, ramp);
     PullField inverse{test.output, expected.inverse_mm.voxels};

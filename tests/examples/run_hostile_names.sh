@@ -34,7 +34,7 @@ echo 1
 SBATCH
 chmod +x bin/sbatch
 export PATH=$work/bin:$PATH
-names=("it's; touch hurt; '" '$(touch hurt)`touch hurt`' '-o' '--wrap=x' $'two\nlines\n' ' blanks  ' '"quotes" & \back\' 'a=b:c,d')
+names=("it's; touch hurt; '" '$(touch hurt)`touch hurt`' '-o' '--wrap=x' $'two\nlines\n' ' blanks  ' '"quotes" & \back\' 'a=b:c,d' 'braces {out} {0}')
 
 for name in "${names[@]}"; do
   [ ! -e here ] || rm -rf here
@@ -50,13 +50,26 @@ for name in "${names[@]}"; do
   if command -v snakemake >/dev/null; then
     /usr/bin/python3 -c 'import json, sys; print(json.dumps(dict(zip(("manifest", "out", "tetwarp"), sys.argv[1:]))))' \
       "$manifest" "$out snake" "./program ${name//\//}" > ../config.json  # --config would read the names as YAML
+    status=0
     HOME=$work XDG_CACHE_HOME=$work/cache snakemake -s "$examples/cluster/Snakefile" --cores 2 --configfile ../config.json \
-      >../log 2>&1 || { cat ../log; fail "Snakefile with $name"; }
-    [ "$(grep -c '"status":"done"' "./$out snake/results.jsonl")" = 3 ] || { cat ../log; fail "not 3 cases by Snakemake, $name"; }
+      >../log 2>&1 || status=$?
+    if [[ $name == *[{}]* ]]; then
+      [ $status != 0 ] && grep -q 'Snakefile: error: braces in the name' ../log || { cat ../log; fail "braces, $name"; }
+    else
+      [ $status = 0 ] || { cat ../log; fail "Snakefile with $name"; }
+      [ "$(grep -c '"status":"done"' "./$out snake/results.jsonl")" = 3 ] || { cat ../log; fail "not 3 cases by Snakemake, $name"; }
+    fi
   fi
-  if /usr/bin/python3 -c 'import nibabel' 2>/dev/null && [[ $name != -* ]]; then
-    TETWARP=$tetwarp /usr/bin/python3 "$examples/studies/augmentation_set.py" ct.nrrd -o "$out set" --variants 1 >../log 2>&1 ||
-      [[ $name == *=* ]] || { cat ../log; fail "augmentation_set.py with $name"; }
+  if /usr/bin/python3 -c 'import nibabel' 2>/dev/null; then
+    cp ct.nrrd "./$name.nrrd"
+    status=0
+    TETWARP=$tetwarp /usr/bin/python3 "$examples/studies/augmentation_set.py" --output="$out set" --variants 1 -- "$name.nrrd" \
+      >../log 2>&1 || status=$?
+    if [[ $name == *=* ]]; then
+      [ $status = 1 ] && grep -q 'a path with = cannot go along' ../log || { cat ../log; fail "a path with =, $name"; }
+    else
+      [ $status = 0 ] && [ -s "./$out set/set.csv" ] || { cat ../log; fail "augmentation_set.py with $name"; }
+    fi
   fi
   cd ..
   [ -z "$(find . -name 'hurt*')" ] || fail "a name was run as a command: $name"

@@ -7,14 +7,12 @@
 
 #include <optional>
 #include <string>
-#include <vector>
 
-#include "bench/harness/floors.h"
+#include "bench/harness/results.h"
 
 namespace tetwarp::test {
 
-inline const bench::Floor* find_floor(const std::vector<bench::Floor>& floors, const std::string& ratio,
-                                      const std::string& where) {
+inline const bench::Floor* find_floor(const bench::Floors& floors, const std::string& ratio, const std::string& where) {
   for (const bench::Floor& floor : floors) {
     if (floor.ratio == ratio && floor.where == where) return &floor;
   }
@@ -23,9 +21,8 @@ inline const bench::Floor* find_floor(const std::vector<bench::Floor>& floors, c
 
 /// Expects a floor with these numbers. @param met  whether the requirement is met; does not count where nothing is
 /// required
-inline void expect_floor(const std::vector<bench::Floor>& floors, const std::string& ratio, const std::string& where,
-                         double value, std::optional<double> required, std::optional<bool> met,
-                         double tolerance = 1e-12) {
+inline void expect_floor(const bench::Floors& floors, const std::string& ratio, const std::string& where, double value,
+                         std::optional<double> required, std::optional<bool> met, double tolerance = 1e-12) {
   const bench::Floor* floor = find_floor(floors, ratio, where);
   ASSERT_TRUE(floor) << ratio << ", " << where;
   EXPECT_NEAR(floor->value, value, tolerance) << ratio << ", " << where;

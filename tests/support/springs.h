@@ -26,14 +26,14 @@ using namespace simulate;
 inline constexpr StoppingRule kTight{.motion_mm = 1e-7, .residual = 1e-9, .steps = 500};
 
 /// One way to solve mass-spring. The tests run over all of them.
-struct Method {
+struct SpringMethod {
   std::string name, cannot_run;
   std::function<std::unique_ptr<Simulation>(const Model&)> make;
 
-  friend void PrintTo(const Method& method, std::ostream* stream) { *stream << method.name; }
+  friend void PrintTo(const SpringMethod& method, std::ostream* stream) { *stream << method.name; }
 };
 
-inline std::vector<Method> methods() {
+inline std::vector<SpringMethod> methods() {
   const auto on_cpu = [](MassSpringOptions::Solver solver) {
     return [solver](const Model& model) { return make_cpu_mass_spring(model, {.solver = solver}, {.threads = 2}); };
   };

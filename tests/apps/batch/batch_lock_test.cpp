@@ -2,11 +2,15 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // `tetwarp batch`: processes that share a folder.
+#include <fcntl.h>
 #include <signal.h>
+#include <sys/file.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
+#include <set>
 #include <thread>
 
 #include "tests/apps/batch/batch_case.h"
@@ -63,13 +67,22 @@ class BatchLock : public BatchCase {
       if (entry.path().filename().string().starts_with(".tetwarp-partial-")) paths.push_back(entry.path());
     return paths;
   }
-  void wait_for_work() const {
-    for (int n = 0; n < 600 && unfinished().empty(); ++n) std::this_thread::sleep_for(50ms);
-    ASSERT_FALSE(unfinished().empty()) << read_text(scratch_ / "running.log");
+  /// Waits until so many cases are in work at once. Looked at a second time they may be finished.
+  void wait_for_work(std::size_t cases = 1) const {
+    std::size_t most = 0;
+    for (int n = 0; n < 1200 && most < cases; ++n) {
+      most = std::max(most, unfinished().size());
+      if (most < cases) std::this_thread::sleep_for(50ms);
+    }
+    ASSERT_GE(most, cases) << read_text(scratch_ / "running.log");
   }
-  /// Whether a second process is turned away with these words, and leaves the first one's work alone.
-  void is_turned_away(const std::string& arguments, const std::vector<std::string>& words) const {
-    const Outcome second = run("batch m.jsonl -o out --quiet --resume " + arguments);
+  /// Whether a second process is turned away with these words, and leaves the first one's work alone. One that is not
+  /// would make all cases: it is ended, with status 137.
+  void is_turned_away(const std::string& arguments, const std::vector<std::string>& words,
+                      const std::string& manifest = "m.jsonl") const {
+    const Outcome second = run_program(
+        scratch_.path(), "/usr/bin/env",
+        "timeout -s KILL 30 '" TETWARP_PROGRAM "' batch " + manifest + " -o out --quiet --resume " + arguments);
     EXPECT_EQ(second.status, 1) << arguments << second.err;
     EXPECT_TRUE(says(second.err, words)) << arguments;
   }
@@ -94,9 +107,7 @@ TEST_F(BatchLock, AnotherDivisionWaitsUntilAllOfOneHaveEnded) {
     is_turned_away("--shard 1/3", {"divided into 2 shards, not divided into 3 shards"});
     std::string sorted = R"({"case": "before", "input": "large.nrrd", "field": "identity"})";
     write_file(scratch_ / "other.jsonl", sorted + "\n" + read_text(scratch_ / "m.jsonl"));
-    const Outcome other = run("batch other.jsonl -o out --quiet --resume --shard 2/2");
-    EXPECT_EQ(other.status, 1) << other.err;
-    EXPECT_TRUE(says(other.err, {"works here on other cases, or on these in another order"}));
+    is_turned_away("--shard 2/2", {"works here on other cases, or on these in another order"}, "other.jsonl");
     EXPECT_TRUE(half.is_there());
   }
 }
@@ -105,8 +116,7 @@ TEST_F(BatchLock, ShardsOfOneDivisionRunSideBySide) {
   Running first(scratch_.path(), {"m.jsonl", "-o", "out", "--quiet", "--shard", "1/2", "--jobs", "1"});
   wait_for_work();
   Running second(scratch_.path(), {"m.jsonl", "-o", "out", "--quiet", "--shard", "2/2", "--jobs", "1"});
-  for (int n = 0; n < 600 && unfinished().size() < 2; ++n) std::this_thread::sleep_for(50ms);
-  EXPECT_GE(unfinished().size(), 2u);
+  wait_for_work(2);
   EXPECT_TRUE(first.is_there());
   EXPECT_TRUE(second.is_there());
 }
@@ -122,6 +132,43 @@ TEST_F(BatchLock, AKillLeavesNoLockBehind) {
   }
   const Outcome made = run("batch few.jsonl -o out --quiet --resume");
   EXPECT_EQ(made.status, 0) << made.err;
+}
+
+/// Who begins holds the lock alone for an instant, and one that begins at the same time finds it taken.
+TEST_F(BatchLock, ALockThatIsFreeAMomentLaterIsWaitedFor) {
+  fs::create_directory(scratch_ / "out");
+  const int file = ::open((scratch_ / "out/batch.lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+  ASSERT_EQ(::flock(file, LOCK_EX), 0);
+  std::thread other([&] {
+    std::this_thread::sleep_for(700ms);
+    ::flock(file, LOCK_UN);
+  });
+  ASSERT_EQ(run("phantom --size 16,16,8 --spacing 20,20,25 --quiet -o ct.nrrd").status, 0);
+  write_file(scratch_ / "few.jsonl", R"({"case": "v", "input": "ct.nrrd", "field": "identity"})");
+  const Outcome made = run("batch few.jsonl -o out --quiet --shard 1/2");
+  other.join();
+  ::close(file);
+  EXPECT_EQ(made.status, 0) << made.err;
+}
+
+TEST_F(BatchLock, AShardLeavesAloneWhatOthersHaveNotFinished) {
+  ASSERT_EQ(run("phantom --size 16,16,8 --spacing 20,20,25 --quiet -o ct.nrrd").status, 0);
+  write_file(scratch_ / "few.jsonl", R"({"case": "v", "input": "ct.nrrd", "field": "identity", "variants": 2})");
+  for (const char* name : {".tetwarp-partial-1-v-1", ".tetwarp-partial-1-v-2", ".tetwarp-replaced-1-v-1",
+                           ".tetwarp-dropped-1-v-2", ".tetwarp-partial-1-batch.2-of-2.json"})
+    fs::create_directories(scratch_ / "out" / name);
+  for (const char* name : {".tetwarp-partial-1-results.1-of-2.jsonl", ".tetwarp-partial-1-results.2-of-2.jsonl"})
+    write_file(scratch_ / "out" / name, "{");
+  const Outcome made = run("batch few.jsonl -o out --quiet --shard 1/2");
+  EXPECT_EQ(made.status, 0) << made.err;
+  std::set<std::string> left;
+  for (const auto& entry : fs::directory_iterator(scratch_ / "out")) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with(".tetwarp")) left.insert(name);
+  }
+  EXPECT_EQ(left,
+            (std::set<std::string>{".tetwarp-partial-1-v-2", ".tetwarp-dropped-1-v-2",
+                                   ".tetwarp-partial-1-batch.2-of-2.json", ".tetwarp-partial-1-results.2-of-2.jsonl"}));
 }
 
 TEST_F(BatchLock, AFolderOfShardsIsContinuedUndivided) {

@@ -341,4 +341,14 @@ TEST_F(BatchManifest, ABatchThatTheDiskCannotHoldLeavesNoFolder) {
   EXPECT_EQ(batch(R"({"case": "v", "input": "ct.nrrd", "field": "identity"})").status, 0) << "the folder is free";
 }
 
+TEST_F(BatchManifest, ABatchThatHasNoDeviceLeavesNoFolder) {
+  if (run("--version").out.find("cuda: usable") != std::string::npos) GTEST_SKIP() << "cuda: a device";
+  const std::string row = R"({"case": "v", "input": "ct.nrrd", "field": "identity"})";
+  const Outcome refused = batch(row, "-o out --quiet --backend cuda");
+  EXPECT_EQ(refused.status, 1) << refused.err;
+  EXPECT_TRUE(says(refused.err, {"CUDA", "use --backend cpu"}));
+  EXPECT_FALSE(std::filesystem::exists(scratch_ / "out"));
+  EXPECT_EQ(batch(row, "-o out --quiet --backend cpu").status, 0) << "the folder is free";
+}
+
 }  // namespace

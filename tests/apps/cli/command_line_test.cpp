@@ -86,9 +86,28 @@ TEST_F(CommandLine, ASizeMayHaveAFraction) {
         << size;
   for (const char* size : {"0", "-1G", "G", "2.5.1G", "2,5G", "1X", "1GG", "1Gib8", "0.0001K", "1e9G", "99999999T"})
     expect_wrong("deform ct.nrrd -f identity -o o.nii --dry-run --memory '" + std::string(size) + "'", {"--memory"});
-  const Outcome little = run("deform ct.nrrd -f identity -o o.nii --memory 0.1G");
-  EXPECT_EQ(little.status, 1);
-  EXPECT_TRUE(says(little.err, {"--memory allows 100 MB"}));
+  for (const auto& [size, shown] :
+       {std::pair("0.1G", "100 MB"), std::pair("0.1GB", "100 MB"), std::pair("0.1Gi", "107 MB"),
+        std::pair("100MiB", "105 MB"), std::pair("90000K", "90 MB"), std::pair("0.0001t", "100 MB")}) {
+    const Outcome little = run("deform ct.nrrd -f identity -o o.nii --memory " + std::string(size));
+    EXPECT_EQ(little.status, 1) << size;
+    EXPECT_TRUE(says(little.err, {"--memory allows " + std::string(shown)})) << size;
+  }
+}
+
+TEST_F(CommandLine, ABackendWithoutADeviceIsRefusedInALineThatNamesNoFolder) {
+  if (run("--version").out.find("cuda: usable") != std::string::npos) GTEST_SKIP() << "cuda: a device";
+  write_file(scratch_ / "push.json",
+             R"({"method": "mass-spring", "cell_size": 4, "tissues": [{"name": "all"}], "hold": [{"border": true}],
+                 "move": [{"name": "hand", "by_mm": [0, 5, 0], "handle": {"at": {"body": [0.5, 0.3, 0.5]}, "radius_mm": 20}}]})");
+  for (const char* command : {"deform ct.nrrd -f identity -o o.nii", "invert twist:angle=3 --like ct.nrrd -o o.mha",
+                              "simulate push.json ct.nrrd -o o.mha", "render ct.nrrd -o o.png"}) {
+    const Outcome made = run(command + std::string(" --backend cuda"));
+    EXPECT_EQ(made.status, 1) << command << made.err;
+    EXPECT_TRUE(says(made.err, {"CUDA", "use --backend cpu"})) << command;
+    EXPECT_EQ(made.err.find('/'), std::string::npos) << made.err;
+    EXPECT_EQ(std::count(made.err.begin(), made.err.end(), '\n'), 1) << made.err;
+  }
 }
 
 }  // namespace

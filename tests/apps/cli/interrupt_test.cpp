@@ -42,7 +42,7 @@ class Interrupt : public BatchCase {
       _exit(98);
     }
     const auto begun = std::chrono::steady_clock::now();
-    while (hidden().empty() && std::chrono::steady_clock::now() - begun < std::chrono::seconds(20))
+    while (hidden().empty() && std::chrono::steady_clock::now() - begun < std::chrono::seconds(60))
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     EXPECT_FALSE(hidden().empty()) << "it was ended before it began";
     return child;

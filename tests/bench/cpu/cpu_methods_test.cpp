@@ -2,11 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // What `cpu` measures beside Tetwarp does the same work: only then are times to be compared.
-#include "bench/cpu/cpu_methods.h"
+#include "bench/cpu/cpu.h"
 
 #include <gtest/gtest.h>
 
-#include "bench/paper/paper_cpu.h"
 #include "bench/peers/peers.h"
 #include "deform/phantom.h"
 
@@ -22,83 +21,82 @@ Volume<std::int16_t> make_volume() {
   return volume;
 }
 
-CpuRun measure(const std::string& field, const Beside& beside, std::int64_t cell_size = 1) {
+Json measure(const std::string& field, const Beside& beside, std::int64_t cell_size = 1) {
   return measure_run(make_volume(), {field, cell_size}, beside, 2, 2);
 }
 
 TEST(CpuMethods, OnIdentityEverybodyReturnsTheSource) {
-  const CpuRun run = measure("identity", kEverything);
-  EXPECT_EQ(run.at_rest, 1);
-  EXPECT_EQ(run.covered, 48u * 40 * 24);
-  ASSERT_TRUE(run.paper);
-  EXPECT_EQ(run.paper->differing, 0);
-  for (const std::optional<PeerTimes>& peer : {run.itk_warp, run.itk_invert_and_warp, run.vtk_probe}) {
-    if (peer) {
-      EXPECT_EQ(peer->differing, 0);
+  const Json run = measure("identity", kEverything);
+  EXPECT_EQ(run["at_rest"], 1);
+  EXPECT_EQ(run["covered"], 48u * 40 * 24);
+  EXPECT_EQ(run["paper"]["differing"], 0);
+  for (const char* peer : {"itk_warp", "itk_invert_and_warp", "vtk_probe"}) {
+    if (!run[peer].is_null()) {
+      EXPECT_EQ(run[peer]["differing"], 0) << peer;
     }
   }
 }
 
 TEST(CpuMethods, ThePapersMethodAgreesOnEveryFieldAndLattice) {
   for (const std::string field : {"wave", "twist", "bubble", "elastic", "local"}) {
-    EXPECT_LT(measure(field, {.paper = true}).paper->differing, 2e-4) << field;
+    EXPECT_LT(measure(field, {.paper = true})["paper"]["differing"], 2e-4) << field;
   }
-  EXPECT_LT(measure("elastic", {.paper = true}, 4).paper->differing, 2e-4);
+  EXPECT_LT(measure("elastic", {.paper = true}, 4)["paper"]["differing"], 2e-4);
 }
 
 TEST(CpuMethods, ItksWarpAgreesWhereItIsGivenOurInverse) {
   if (!itk_version()) GTEST_SKIP() << "ITK is not in this build";
   for (const std::string field : {"wave", "twist", "bubble", "elastic"}) {
-    const CpuRun run = measure(field, {.itk_warp = true});
-    EXPECT_LT(run.itk_warp->differing, 1e-4) << field;
+    const Json run = measure(field, {.itk_warp = true});
+    EXPECT_LT(run["itk_warp"]["differing"], 1e-4) << field;
   }
 }
 
 TEST(CpuMethods, ItksInverterAgreesAwayFromTheBorder) {
   if (!itk_version()) GTEST_SKIP() << "ITK is not in this build";
-  EXPECT_LT(measure("bubble", {.itk_invert_and_warp = true}).itk_invert_and_warp->differing, 0.05);
-  EXPECT_GT(measure("elastic", {.itk_invert_and_warp = true}).itk_invert_and_warp->differing, 0)
+  EXPECT_LT(measure("bubble", {.itk_invert_and_warp = true})["itk_invert_and_warp"]["differing"], 0.05);
+  EXPECT_GT(measure("elastic", {.itk_invert_and_warp = true})["itk_invert_and_warp"]["differing"], 0)
       << "it holds the border, which this field moves";
 }
 
 TEST(CpuMethods, VtksProbeOfTheDeformedGridAgrees) {
   if (!vtk_version()) GTEST_SKIP() << "VTK is not in this build";
-  EXPECT_LT(measure("wave", {.vtk_probe = true}).vtk_probe->differing, 1e-3);
+  EXPECT_LT(measure("wave", {.vtk_probe = true})["vtk_probe"]["differing"], 1e-3);
 }
 
 TEST(CpuMethods, SlowPeersRunOnceAndTheOthersAsOftenAsAsked) {
-  const CpuRun run = measure("wave", kEverything);
-  EXPECT_EQ(run.ours.new_field_ms.frames, 2);
-  EXPECT_EQ(run.paper->ms.frames, 2);
-  EXPECT_EQ(run.bytes_ms->frames, 2);
-  if (run.itk_warp) {
-    EXPECT_EQ(run.itk_warp->ms.frames, 2);
+  const Json run = measure("wave", kEverything);
+  EXPECT_EQ(run["new_field_ms"]["frames"], 2);
+  EXPECT_EQ(run["paper"]["ms"]["frames"], 2);
+  EXPECT_EQ(run["bytes_ms"]["frames"], 2);
+  if (!run["itk_warp"].is_null()) {
+    EXPECT_EQ(run["itk_warp"]["ms"]["frames"], 2);
   }
-  if (run.itk_invert_and_warp) {
-    EXPECT_EQ(run.itk_invert_and_warp->ms.frames, 1);
-  }
-  if (run.vtk_probe) {
-    EXPECT_EQ(run.vtk_probe->ms.frames, 1);
+  for (const char* slow : {"itk_invert_and_warp", "vtk_probe"}) {
+    if (!run[slow].is_null()) {
+      EXPECT_EQ(run[slow]["ms"]["frames"], 1) << slow;
+    }
   }
 }
 
 TEST(CpuMethods, WhatIsNotAskedForIsNotRun) {
-  const CpuRun run = measure("wave", {});
-  EXPECT_FALSE(run.bytes_ms || run.paper || run.itk_warp || run.itk_invert_and_warp || run.vtk_probe);
+  const Json run = measure("wave", {});
+  for (const char* name : {"bytes_ms", "paper", "itk_warp", "itk_invert_and_warp", "vtk_probe"})
+    EXPECT_TRUE(run[name].is_null()) << name;
 }
 
 TEST(CpuMethods, ALocalFieldRestsNearlyEverywhere) {
-  const CpuRun run = measure("local", {});
-  EXPECT_GT(run.at_rest, 0.9);
-  EXPECT_LT(run.at_rest, 1);
+  const Json run = measure("local", {});
+  EXPECT_GT(run["at_rest"], 0.9);
+  EXPECT_LT(run["at_rest"], 1);
 }
 
 TEST(CpuMethods, TheFieldOfALongerVolumeIsLaidOnTheMiddle) {
   const auto covered = [](const std::string& field, std::int64_t slices) {
-    return measure_run(make_volume(), {.name = field, .like = glm::i64vec3(48, 40, slices)}, {}, 2, 1).covered;
+    return measure_run(make_volume(), {.name = field, .like = glm::i64vec3(48, 40, slices)}, {}, 2, 1)["covered"];
   };
-  EXPECT_EQ(covered("twist", 24), measure("twist", {}).covered);
-  EXPECT_EQ(covered("bubble", 240), measure("bubble", {}).covered) << "its shape does not depend on the slices";
+  EXPECT_EQ(covered("twist", 24), measure("twist", {})["covered"]);
+  EXPECT_EQ(covered("bubble", 240), measure("bubble", {})["covered"]) << "its shape does not depend on the slices";
   EXPECT_GT(covered("twist", 240), covered("twist", 24)) << "a tenth of the angle turns less out of the volume";
 }
 
@@ -121,10 +119,11 @@ TEST(CpuMethods, MovingBytesWritesEveryVoxelAndReadsEveryVertex) {
 }
 
 TEST(CpuMethods, ScalingIsOfOneThreadAndAll) {
-  const Scaling scaling = measure_scaling(make_volume(), "wave", 2, 2);
-  EXPECT_EQ(scaling.threads, 2);
-  EXPECT_GT(scaling.one.new_field_ms.median, 0);
-  EXPECT_NEAR(scaling.efficiency(), scaling.one.new_field_ms.median / (2 * scaling.all.new_field_ms.median), 1e-12);
+  const Json scaling = measure_scaling(make_volume(), "wave", 2, 2);
+  EXPECT_EQ(scaling["threads"], 2);
+  const double one = *number(scaling, "/one/new_field_ms"), all = *number(scaling, "/all/new_field_ms");
+  EXPECT_GT(one, 0);
+  EXPECT_NEAR(*number(scaling, "/efficiency"), one / (2 * all), 1e-12);
 }
 
 }  // namespace

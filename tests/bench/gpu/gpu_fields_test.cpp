@@ -56,7 +56,7 @@ Volume<std::int16_t> phantom(const glm::i64vec3& size) {
 
 std::uint64_t inverted(const std::string& name, const glm::i64vec3& size, std::int64_t cell_size = 1) {
   Report report;
-  const std::unique_ptr<Resampler> resampler = make_cpu_resampler({.size = size});
+  const std::unique_ptr<ForwardResampler> resampler = make_cpu_resampler({.size = size});
   resample(*resampler, phantom(size), sampled(name, size, cell_size), &report);
   return report.inverted;
 }
@@ -167,7 +167,7 @@ TEST(GpuBackward, GivenTheInverseItIsTetwarpsResult) {
   const Volume<std::int16_t> volume = phantom(size);
   const PlainVolume plain{volume.voxels.data(), 48, 48, 30};
   for (const std::string name : {"identity", "wave", "twist", "rotation"}) {
-    const std::unique_ptr<Resampler> resampler = make_cpu_resampler(volume.geometry);
+    const std::unique_ptr<ForwardResampler> resampler = make_cpu_resampler(volume.geometry);
     Volume<std::int16_t> exact{volume.geometry, std::vector<std::int16_t>(volume.voxels.size())};
     const Target target{.source = view(volume), .output = view(exact), .background = kBackground};
     const VertexField field = sampled(name, size);

@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "bench/harness/machine.h"
-
 #include <gtest/gtest.h>
 #include <unistd.h>
+
+#include "bench/harness/results.h"
 
 namespace tetwarp::bench {
 namespace {
@@ -17,9 +17,9 @@ TEST(BenchMachine, AvailableMemoryIsSomeAndNotMoreThanThereIs) {
 }
 
 TEST(BenchMachine, ThreadsAreThoseAskedForOrAll) {
-  EXPECT_EQ(describe_machine(-1, 3).threads, 3);
-  EXPECT_GE(describe_machine(-1, 0).threads, 1);
-  EXPECT_FALSE(describe_machine(-1, 0).cpu.empty());
+  EXPECT_EQ(describe_machine(-1, 3)["threads"], 3);
+  EXPECT_GE(describe_machine(-1, 0)["threads"], 1);
+  EXPECT_FALSE(describe_machine(-1, 0)["cpu"].get<std::string>().empty());
 }
 
 }  // namespace

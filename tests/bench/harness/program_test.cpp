@@ -30,12 +30,32 @@ void expect_error(const Outcome& run, int status, const std::string& names) {
   EXPECT_EQ(run.out, "");
 }
 
+/// With one space where there are several.
+std::string squeezed(const std::string& text) {
+  std::string found;
+  for (const char c : text)
+    if (c != ' ' || !found.ends_with(' ')) found += c;
+  return found;
+}
+
 TEST(BenchProgram, PrintsTablesAndWritesTheNumbers) {
   const Scratch scratch;
   const Outcome run = run_bench(scratch, kTiny + std::string("--cell-sizes none --json r.json --csv r.csv"));
   ASSERT_EQ(run.status, 0) << run.err;
-  EXPECT_TRUE(says(run.out, {"# tetwarp-bench paper", "## Table 2", "12 x 12 x 9", "plain C++"}));
-  EXPECT_EQ(nlohmann::json::parse(read_text(scratch / "r.json"))["runs"].size(), 14u) << "4 of them per voxel";
+  EXPECT_TRUE(says(run.out, {"# tetwarp-bench paper", "## Runs", "12 x 12 x 9", "backend cpu"}));
+  const nlohmann::json document = nlohmann::json::parse(read_text(scratch / "r.json"));
+  EXPECT_EQ(document["runs"].size(), 14u) << "4 of them per voxel";
+  std::set<std::string> keys;
+  for (const auto& [key, value] : document.items()) keys.insert(key);
+  EXPECT_EQ(keys, (std::set<std::string>{"appendix_a", "commit", "input", "machine", "options", "program", "runs",
+                                         "version"}));
+  EXPECT_EQ(document["program"], "tetwarp-bench paper");
+  EXPECT_EQ(document["machine"].size(), 6u);
+  EXPECT_TRUE(document["machine"]["gpu"].is_null());
+  EXPECT_EQ(document["input"], (nlohmann::json{{"kind", "phantom"}, {"seed", 1}}));
+  for (const std::string key : {"frames", "warmup", "backend", "methods", "fields"}) {
+    EXPECT_TRUE(document["options"].contains(key)) << key;
+  }
   EXPECT_TRUE(
       says(read_text(scratch / "r.csv"), {"12,12,9,wave,\"wave:amplitude=0.375,wavelength=3\",1,paper,memory"}));
 }
@@ -82,7 +102,7 @@ TEST(BenchProgram, MeasuresEveryFieldOnAGpu) {
   const Scratch scratch;
   const Outcome run = run_bench(scratch, kTinyGpu);
   ASSERT_EQ(run.status, 0) << run.err;
-  EXPECT_TRUE(says(run.out, {"# tetwarp-bench gpu", "| rotation | ", "## Frames per second", "## Floors"}));
+  EXPECT_TRUE(says(run.out, {"# tetwarp-bench gpu", "rotation", "## Frame loops", "## Floors"}));
   const nlohmann::json document = nlohmann::json::parse(read_text(scratch / "r.json"));
   EXPECT_EQ(document["runs"].size(), 9u + 4u + 1u);
   EXPECT_EQ(document["frame_loops"].size(), 2u);
@@ -99,8 +119,8 @@ TEST(BenchProgram, MeasuresEveryFieldOnTheCpu) {
   const Scratch scratch;
   const Outcome run = run_bench(scratch, std::string(kTinyCpu) + "--cell-sizes 4");
   ASSERT_EQ(run.status, 0) << run.err;
-  EXPECT_TRUE(says(run.out, {"# tetwarp-bench cpu", "32 x 32 x 8", "| elastic | ", "## From small to large",
-                             "## Threads", "## Floors", "| paper / new field | wave |"}));
+  EXPECT_TRUE(says(squeezed(run.out), {"# tetwarp-bench cpu", "32 x 32 x 8", "\nelastic ", "## Growth",
+                                       "- scaling:", "## Floors", "\npaper / new field wave "}));
   const nlohmann::json document = nlohmann::json::parse(read_text(scratch / "r.json"));
   EXPECT_EQ(document["machine"]["threads"], 2);
   ASSERT_EQ(document["runs"].size(), 6u);
@@ -124,7 +144,7 @@ TEST(BenchProgram, AMissedFloorIsAFailureWhereItIsAskedFor) {
   const Outcome missed = run_bench(scratch, alone + "identity --check");
   EXPECT_EQ(missed.status, 1);
   EXPECT_TRUE(says(missed.err, {"a floor is missed"}));
-  EXPECT_TRUE(says(missed.out, {"at most 2 | missed"}));
+  EXPECT_TRUE(says(missed.out, {"at most 2, missed"}));
   EXPECT_TRUE(says(read_text(scratch / "r.json"), {"floors"}));
   EXPECT_EQ(run_bench(scratch, alone + "local --check").status, 0) << "nothing is required of it";
 }
@@ -135,8 +155,8 @@ TEST(BenchProgram, MeasuresTheInverseOfEveryFieldByEveryProgram) {
   const Scratch scratch;
   const Outcome run = run_bench(scratch, kTinyInvert);
   ASSERT_EQ(run.status, 0) << run.err;
-  EXPECT_TRUE(says(run.out, {"# tetwarp-bench invert", "64 x 64 x 12", "| folds | tetwarp |", "## Sources", "## Floors",
-                             "| written without a source | folds | 0.000 | at most 0 | met |"}));
+  EXPECT_TRUE(says(squeezed(run.out), {"# tetwarp-bench invert", "width 64; slices 12", "\nfolds tetwarp ", "## Floors",
+                                       "\nwritten without a source folds 0.000 at most 0, met"}));
   const nlohmann::json document = nlohmann::json::parse(read_text(scratch / "r.json"));
   EXPECT_EQ(document["machine"]["threads"], 2);
   ASSERT_EQ(document["runs"].size(), document["itk"].is_null() ? 4u : 16u);
@@ -158,7 +178,7 @@ TEST(BenchProgram, AnInverterThatIsMoreAccurateIsAFailureWhereItIsAskedFor) {
   if (nlohmann::json::parse(read_text(scratch / "r.json"))["itk"].is_null()) GTEST_SKIP() << "ITK is not in this build";
   EXPECT_EQ(beside.status, 1);
   EXPECT_TRUE(says(beside.err, {"a floor is missed"}));
-  EXPECT_TRUE(says(beside.out, {"| mean error / tetwarp's | wave, ITK iterative | 0.00", "at least 1 | missed"}));
+  EXPECT_TRUE(says(squeezed(beside.out), {"\nmean error / tetwarp's wave, ITK iterative 0.00", "at least 1, missed"}));
 }
 
 TEST(BenchProgram, FramesAreSimulatedResampledAndRendered) {
@@ -173,7 +193,7 @@ TEST(BenchProgram, FramesAreSimulatedResampledAndRendered) {
   const nlohmann::json frame = nlohmann::json::parse(read_text(scratch / "r.json"))["frames"][0];
   for (const char* part : {"simulate_ms", "resample_ms", "render_ms", "turn_ms"})
     EXPECT_GT(frame[part]["median"], 0) << part;
-  EXPECT_NE(run.out.find("| ms of a picture |"), std::string::npos) << run.out;
+  EXPECT_NE(run.out.find("ms of a picture"), std::string::npos) << run.out;
   ASSERT_EQ(run_bench(scratch, tiny).status, 0);
   EXPECT_FALSE(nlohmann::json::parse(read_text(scratch / "r.json"))["frames"][0].contains("turn_ms"));
   expect_error(run_bench(scratch, tiny + "--render 4,4"), 2, "--render");
@@ -186,7 +206,7 @@ TEST(BenchProgram, MeasuresFilesAndLeavesNoneBehind) {
   const Scratch scratch;
   const Outcome run = run_bench(scratch, kTinyIo);
   ASSERT_EQ(run.status, 0) << run.err;
-  EXPECT_TRUE(says(run.out, {"# tetwarp-bench io", "32 x 32 x 6", "page cache", "## Floors"}));
+  EXPECT_TRUE(says(run.out, {"# tetwarp-bench io", "32 x 32 x 6", "page_cache: yes", "## Floors"}));
   const nlohmann::json document = nlohmann::json::parse(read_text(scratch / "r.json"));
   std::set<std::string> runs, floors;
   for (const nlohmann::json& time : document["times"]) {
@@ -218,7 +238,7 @@ TEST(BenchProgram, AJobThatMissesItsFloorFailsOnlyWhereItIsAsked) {
   const Outcome checked = run_bench(scratch, job + "--check");
   EXPECT_EQ(checked.status, 1);
   EXPECT_TRUE(says(checked.err, {"a floor is missed"}));
-  EXPECT_TRUE(says(checked.out, {"| program / sum of its stages | whole job, cells of 4 |", "missed"}));
+  EXPECT_TRUE(says(squeezed(checked.out), {"\nprogram / sum of its stages whole job, cells of 4 ", "missed"}));
   EXPECT_EQ(nlohmann::json::parse(read_text(scratch / "r.json"))["floors"][0]["required"]["met"], false);
 }
 #endif
@@ -244,7 +264,8 @@ TEST(BenchProgram, ItksFiltersAndOursAreAsNearToTheTruthAsIsSaid) {
   const Scratch scratch;
   const Outcome run = run_bench(scratch, std::string(kTinyItk) + "--width 64 --slices 40 --fields elastic");
   ASSERT_EQ(run.status, 0) << run.err;
-  EXPECT_TRUE(says(run.out, {"# tetwarp-bench itk", "64 x 64 x 40", "| elastic, 4 |", "## In pieces", "## Floors"}));
+  EXPECT_TRUE(says(run.out, {"# tetwarp-bench itk", "width 64; slices 40", "VertexFieldResampleImageFilter",
+                             "## Streams", "## Floors"}));
   const nlohmann::json document = nlohmann::json::parse(read_text(scratch / "r.json"));
   EXPECT_EQ(document["runs"].size(), 2 * (3u + 2u + 3u) + 2u + 2u);
   const auto rms = [&](const std::string& filters, std::int64_t cell_size = 1) {

@@ -9,7 +9,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
-#include "bench/invert/invert_bench.h"
+#include "bench/invert/invert.h"
 #include "bench/peers/peers.h"
 
 namespace tetwarp::bench {
@@ -167,43 +167,48 @@ TEST(InvertAccuracy, AnotherNumberOfVectorsIsRefused) {
   EXPECT_THROW(compare_inverse(known, std::vector<glm::vec3>(10)), InputError);
 }
 
-InvertResults measure(const std::vector<std::string>& fields, const std::vector<std::string>& peers, int repeats = 1) {
-  return measure_invert(
-      {.fields = fields, .peers = peers, .width = 64, .slices = 38, .threads = 2, .repeats = repeats, .json = {}},
-      [](const std::string&) {});
+Json measure(const std::vector<std::string>& fields, const std::vector<std::string>& peers, int repeats = 1) {
+  Options options = default_options("invert");
+  options.input.width = 64;
+  options.input.slices = {38};
+  options.fields = fields;
+  options.peers = peers;
+  options.threads = 2;
+  options.repeats = repeats;
+  return measure_invert(options);
 }
 
 TEST(InvertBench, TetwarpsInverseIsWithinItsRoundingAndWritesNothingWithoutASource) {
-  const InvertResults results = measure({"wave", "twist", "bubble", "folds"}, {}, 2);
-  ASSERT_EQ(results.runs.size(), 4u);
-  for (const InverseRun& run : results.runs) {
-    EXPECT_EQ(run.by, "tetwarp");
-    EXPECT_EQ(run.ms.frames, 2);
-    EXPECT_EQ(run.accuracy.written, 0u) << run.field;
-    EXPECT_EQ(run.accuracy.left_out, 0u) << run.field;
-    if (run.field == "wave" || run.field == "twist") {
-      EXPECT_LT(run.accuracy.largest, 5e-4) << run.field << ": affine in each slice";
+  const Json runs = measure({"wave", "twist", "bubble", "folds"}, {}, 2);
+  ASSERT_EQ(runs.size(), 4u);
+  for (const Json& run : runs) {
+    EXPECT_EQ(run["by"], "tetwarp");
+    EXPECT_EQ(run["ms"]["frames"], 2);
+    EXPECT_EQ(run["written_without_source"], 0u) << run["field"];
+    EXPECT_EQ(run["left_out"], 0u) << run["field"];
+    if (run["field"] == "wave" || run["field"] == "twist") {
+      EXPECT_LT(*number(run, "/largest_error"), 5e-4) << run["field"] << ": affine in each slice";
     }
   }
-  EXPECT_LT(results.runs[2].accuracy.mean, 1e-2);
-  EXPECT_FALSE(results.runs[3].accuracy.is_compared());
+  EXPECT_LT(*number(runs[2], "/mean_error"), 1e-2);
+  EXPECT_TRUE(runs[3]["mean_error"].is_null());
 }
 
 TEST(InvertBench, ItksInvertersAnswerTheSameQuestion) {
   if (!itk_version()) GTEST_SKIP() << "ITK is not in this build";
-  const InvertResults results = measure({"wave"}, {"itk-invert", "itk-invert-free", "itk-iterative"});
-  ASSERT_EQ(results.runs.size(), 4u);
-  const Accuracy &fixed = results.runs[1].accuracy, &free = results.runs[2].accuracy,
-                 &iterative = results.runs[3].accuracy;
-  EXPECT_NEAR(fixed.largest, 2 * std::sin(2 * std::numbers::pi * 3.5 / 16), 1e-4) << "the border is held at 0";
-  EXPECT_LT(free.largest, 1e-3);
-  EXPECT_LT(iterative.largest, 1e-3);
-  for (const Accuracy* one : {&fixed, &free, &iterative}) {
-    EXPECT_GT(one->without_source, 0u);
-    EXPECT_EQ(one->written, one->without_source);
+  const Json runs = measure({"wave"}, {"itk-invert", "itk-invert-free", "itk-iterative"});
+  ASSERT_EQ(runs.size(), 4u);
+  const Json &fixed = runs[1], &free = runs[2], &iterative = runs[3];
+  EXPECT_NEAR(*number(fixed, "/largest_error"), 2 * std::sin(2 * std::numbers::pi * 3.5 / 16), 1e-4)
+      << "the border is held at 0";
+  EXPECT_LT(*number(free, "/largest_error"), 1e-3);
+  EXPECT_LT(*number(iterative, "/largest_error"), 1e-3);
+  for (const Json* one : {&fixed, &free, &iterative}) {
+    EXPECT_GT((*one)["without_source"], 0u);
+    EXPECT_EQ((*one)["written_without_source"], (*one)["without_source"]);
   }
-  EXPECT_GT(fixed.zero, 0u);
-  EXPECT_EQ(free.zero, 0u);
+  EXPECT_GT(fixed["zero_without_source"], 0u);
+  EXPECT_EQ(free["zero_without_source"], 0u);
 }
 
 }  // namespace

@@ -8,7 +8,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "bench/invert/invert_fields.h"
+#include "bench/harness/known_fields.h"
 #include "bench/itk/itk_accuracy.h"
 #include "deform/phantom.h"
 

@@ -7,8 +7,6 @@
 
 #include <algorithm>
 
-#include "bench/paper/published.h"
-
 namespace tetwarp::bench {
 namespace {
 
@@ -29,7 +27,7 @@ TEST(BenchAppendix, SwappingTwoCornersTurnsTheSign) {
 }
 
 Corners<float> equation_8_in_float() {
-  const Corners<double>& t = published_appendix().corners;
+  const Corners<double>& t = kEquation8;
   const auto narrow = [](const Point<double>& p) {
     return Point<float>{static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
   };
@@ -37,19 +35,18 @@ Corners<float> equation_8_in_float() {
 }
 
 TEST(BenchAppendix, ThePapersOrderGivesItsDeterminantsOfEquation8) {
-  const AppendixResult<double> exact = expand_by_cofactors(published_appendix().corners, Order::as_printed);
+  const AppendixResult<double> exact = expand_by_cofactors(kEquation8, Order::as_printed);
   EXPECT_NEAR(exact.determinant, 1.216, 1e-8);
   const AppendixResult<float> found = expand_by_cofactors(equation_8_in_float(), Order::as_printed);
   EXPECT_NEAR(found.determinant, 2.010187, 1e-4);
 }
 
 TEST(BenchAppendix, ThePapersOrderGivesTheInverseThatItPrints) {
-  const PublishedAppendix& paper = published_appendix();
-  const AppendixResult<double> exact = expand_by_cofactors(paper.corners, Order::as_printed);
+  const AppendixResult<double> exact = expand_by_cofactors(kEquation8, Order::as_printed);
   const AppendixResult<float> found = expand_by_cofactors(equation_8_in_float(), Order::as_printed);
   for (std::size_t n = 0; n < 4; ++n) {
-    EXPECT_NEAR(exact.inverse[n], paper.inverse_in_double[n], 5.1e-7) << n;
-    EXPECT_NEAR(found.inverse[n], paper.inverse_in_float[n], 5e-6) << n;
+    EXPECT_NEAR(exact.inverse[n], kPrintedInDouble.inverse[n], 5.1e-7) << n;
+    EXPECT_NEAR(found.inverse[n], kPrintedInFloat.inverse[n], 5e-6) << n;
   }
 }
 
@@ -57,7 +54,7 @@ TEST(BenchAppendix, OrdersDifferOnlyInFloat) {
   float least = 10, largest = 0;
   for (const Order order :
        {Order::as_printed, Order::right_to_left, Order::ends_first, Order::fused_last, Order::fused}) {
-    EXPECT_NEAR(expand_by_cofactors(published_appendix().corners, order).determinant, 1.216, 1e-8);
+    EXPECT_NEAR(expand_by_cofactors(kEquation8, order).determinant, 1.216, 1e-8);
     const float found = expand_by_cofactors(equation_8_in_float(), order).determinant;
     least = std::min(least, found);
     largest = std::max(largest, found);
@@ -83,15 +80,16 @@ TEST(BenchAppendix, FloatAboutDKeepsTheDeterminantOfEquation8) {
 
 TEST(BenchAppendix, EveryFormOfEquation8IsListedBesideWhatThePaperPrints) {
   int beside_double = 0, beside_float = 0, alone = 0;
-  for (const DeterminantForm& form : measure_appendix(10).forms) {
-    if (!form.printed) {
+  const Json appendix = measure_appendix(10);
+  for (const Json& form : appendix["determinants"]) {
+    if (form["printed"].is_null()) {
       ++alone;
-    } else if (form.name.find("double") != std::string::npos) {
+    } else if (form["form"].get<std::string>().find("double") != std::string::npos) {
       ++beside_double;
-      EXPECT_EQ(form.printed, 1.216);
+      EXPECT_EQ(form["printed"], 1.216);
     } else {
       ++beside_float;
-      EXPECT_EQ(form.printed, 2.010187);
+      EXPECT_EQ(form["printed"], 2.010187);
     }
   }
   EXPECT_EQ(beside_double, 1);
@@ -100,18 +98,20 @@ TEST(BenchAppendix, EveryFormOfEquation8IsListedBesideWhatThePaperPrints) {
 }
 
 TEST(BenchAppendix, FloatAboutDStaysAccurateWhereFloatByEquation6DoesNot) {
-  const Appendix appendix = measure_appendix(2000);
-  ASSERT_EQ(appendix.errors.size(), 4u);
-  for (const DeterminantErrors& errors : appendix.errors) {
-    EXPECT_EQ(errors.tetrahedra, 2000);
-    EXPECT_LT(errors.largest_3x3, 1e-6) << errors.distance;
-    EXPECT_LE(errors.median_4x4, errors.largest_4x4);
+  const Json appendix = measure_appendix(2000);
+  const Json& errors = appendix["relative_errors"];
+  ASSERT_EQ(errors.size(), 4u);
+  const auto of = [&](std::size_t n, const char* pointer) { return *number(errors[n], pointer); };
+  for (std::size_t n = 0; n < errors.size(); ++n) {
+    EXPECT_EQ(errors[n]["tetrahedra"], 2000);
+    EXPECT_LT(of(n, "/float_3x3/largest"), 1e-6) << errors[n];
+    EXPECT_LE(of(n, "/float_4x4/median"), of(n, "/float_4x4/largest"));
   }
-  for (std::size_t n = 1; n < appendix.errors.size(); ++n) {
-    EXPECT_GT(appendix.errors[n].distance, appendix.errors[n - 1].distance);
-    EXPECT_GT(appendix.errors[n].median_4x4, 3 * appendix.errors[n - 1].median_4x4);
+  for (std::size_t n = 1; n < errors.size(); ++n) {
+    EXPECT_GT(of(n, "/distance"), of(n - 1, "/distance"));
+    EXPECT_GT(of(n, "/float_4x4/median"), 3 * of(n - 1, "/float_4x4/median"));
   }
-  EXPECT_GT(appendix.errors[2].median_4x4, 1e-3);
+  EXPECT_GT(of(2, "/float_4x4/median"), 1e-3);
 }
 
 }  // namespace

@@ -10,7 +10,6 @@
 #include <algorithm>
 
 #include "backend/devices.h"
-#include "bench/paper/compare.h"
 #include "deform/fields/formula.h"
 #include "deform/phantom.h"
 #include "tests/support/run.h"
@@ -103,7 +102,7 @@ TEST_P(BenchBackend, BothFieldSourcesAreOneField) {
 TEST_P(BenchBackend, TetwarpTimedHereIsTheCpusResult) {
   for (const std::string name : kFields) {
     backend_->set_field(formula(name), 1);
-    const std::unique_ptr<Resampler> resampler = make_cpu_resampler(volume_.geometry);
+    const std::unique_ptr<ForwardResampler> resampler = make_cpu_resampler(volume_.geometry);
     Volume<std::int16_t> expected{volume_.geometry, std::vector<std::int16_t>(volume_.voxels.size())};
     const Target target{.source = view(volume_), .output = view(expected), .background = kUntouched};
     resampler->set_field(view(backend_->field()));
@@ -182,14 +181,14 @@ TEST_P(BenchBackend, GivesTheTimesThatItHas) {
   const FrameCount frames{.warmup = 1, .timed = 3, .end_to_end = 2};
   const bool copies = GetParam() == "cuda";
   for (const Method method : {Method::paper, Method::gascon, Method::tetwarp}) {
-    const FrameTimes times = backend_->time(method, FieldSource::memory, frames);
-    EXPECT_EQ(times.kernel_ms.size(), 3u);
-    EXPECT_EQ(times.field_ms.size(), method == Method::tetwarp ? 3u : 0u);
-    EXPECT_EQ(times.total_ms.size(), times.field_ms.size());
-    EXPECT_EQ(times.copy_in_ms.size(), copies ? 2u : 0u);
-    EXPECT_EQ(times.copy_out_ms.size(), copies ? 2u : 0u);
-    EXPECT_EQ(times.end_to_end_ms.size(), copies ? 2u : 3u);
-    for (const double ms : times.kernel_ms) EXPECT_GT(ms, 0);
+    Samples times = backend_->time(method, FieldSource::memory, frames);
+    EXPECT_EQ(times["kernel_ms"].size(), 3u);
+    EXPECT_EQ(times["field_ms"].size(), method == Method::tetwarp ? 3u : 0u);
+    EXPECT_EQ(times["total_ms"].size(), times["field_ms"].size());
+    EXPECT_EQ(times["copy_in_ms"].size(), copies ? 2u : 0u);
+    EXPECT_EQ(times["copy_out_ms"].size(), copies ? 2u : 0u);
+    EXPECT_EQ(times["end_to_end_ms"].size(), copies ? 2u : 3u);
+    for (const double ms : times["kernel_ms"]) EXPECT_GT(ms, 0);
   }
 }
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "bench/paper/compare.h"
+#include "bench/paper/backend.h"
 
 #include <gtest/gtest.h>
 

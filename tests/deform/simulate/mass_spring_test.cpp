@@ -17,7 +17,7 @@ namespace {
 using namespace test;
 using Solver = MassSpringOptions::Solver;
 
-class MassSpring : public testing::TestWithParam<Method> {
+class MassSpring : public testing::TestWithParam<SpringMethod> {
  protected:
   void SetUp() override {
     if (!GetParam().cannot_run.empty()) GTEST_SKIP() << GetParam().name << ": " << GetParam().cannot_run;
@@ -25,7 +25,7 @@ class MassSpring : public testing::TestWithParam<Method> {
   std::unique_ptr<Simulation> make(const Model& model) const { return GetParam().make(model); }
 };
 
-std::string method_name(const testing::TestParamInfo<Method>& method) { return method.param.name; }
+std::string method_name(const testing::TestParamInfo<SpringMethod>& method) { return method.param.name; }
 
 INSTANTIATE_TEST_SUITE_P(Methods, MassSpring, testing::ValuesIn(methods()), method_name);
 

@@ -158,7 +158,7 @@ TEST(RigidMotionOfWays, IsNoneWhereItLeavesAQuarter) {
   EXPECT_TRUE(found(0, 1));
 }
 
-class RigidHandles : public testing::TestWithParam<Method> {
+class RigidHandles : public testing::TestWithParam<SpringMethod> {
  protected:
   void SetUp() override {
     if (!GetParam().cannot_run.empty()) GTEST_SKIP() << GetParam().name << ": " << GetParam().cannot_run;
@@ -177,7 +177,7 @@ class RigidHandles : public testing::TestWithParam<Method> {
 };
 
 INSTANTIATE_TEST_SUITE_P(Methods, RigidHandles, testing::ValuesIn(methods()),
-                         [](const testing::TestParamInfo<Method>& method) { return method.param.name; });
+                         [](const testing::TestParamInfo<SpringMethod>& method) { return method.param.name; });
 
 TEST_P(RigidHandles, TakeAllNodesAlongByAnyAngle) {
   SCOPED_TRACE(seed_text(test_seed()));

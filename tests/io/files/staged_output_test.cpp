@@ -367,6 +367,34 @@ TEST(StagedOutputs, OfSeveralAllGetTheirNamesOrNoneThatWasFree) {
   EXPECT_EQ(entries(scratch.path()), 2U) << "no hidden file";
 }
 
+TEST(StagedOutputs, NoneIsReplacedBeforeAllAreOnTheDisk) {
+  const Scratch scratch;
+  write_file(scratch / "old", "old");
+  std::vector<std::unique_ptr<StagedOutput>> outputs;
+  for (const char* name : {"old", "new"}) {
+    outputs.push_back(std::make_unique<StagedOutput>(scratch / name, Kind::file, true));
+    write_file(outputs.back()->path(), "new");
+  }
+  fs::remove(outputs.back()->path());  // what is gone cannot be flushed
+  EXPECT_NE(error_of([&] { tetwarp::commit_together(outputs); }).find("cannot write"), std::string::npos);
+  EXPECT_EQ(content(scratch / "old"), "old");
+  EXPECT_FALSE(fs::exists(scratch / "new"));
+}
+
+TEST(StagedOutputs, WhatWasReplacedIsNotTakenAway) {
+  const Scratch scratch;
+  write_file(scratch / "old", "old");
+  std::vector<std::unique_ptr<StagedOutput>> outputs;
+  for (const char* name : {"old", "new"}) {
+    outputs.push_back(std::make_unique<StagedOutput>(scratch / name, Kind::file, std::string(name) == "old"));
+    write_file(outputs.back()->path(), "made");
+  }
+  write_file(scratch / "new", "somebody else's");
+  EXPECT_NE(error_of([&] { tetwarp::commit_together(outputs); }).find("new exists"), std::string::npos);
+  EXPECT_EQ(content(scratch / "old"), "made");
+  EXPECT_EQ(content(scratch / "new"), "somebody else's");
+}
+
 TEST(StagedOutput, FollowsLinksThatLeadNowhereYetAndNoCircle) {
   const Scratch scratch;
   fs::create_directory(scratch / "deep");
