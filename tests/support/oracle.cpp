@@ -115,9 +115,14 @@ double condition(const glm::i64vec3 (&corner)[4], long double determinant) {
 
 }  // namespace
 
+double jacobian_tolerance(double jacobian, double condition, double rest_condition) {
+  constexpr double kUnit = 1.0 / (1 << 24);
+  return kUnit * (5 * condition + 5 * rest_condition + 2) * std::abs(jacobian);
+}
+
 Oracle::Oracle(const Geometry& output, const VertexField& field, const Region& region)
-    : jacobian_min(std::numeric_limits<double>::infinity()),
-      jacobian_max(-std::numeric_limits<double>::infinity()),
+    : jacobian_min{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()},
+      jacobian_max{-std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()},
       region_(region),
       owners_(static_cast<std::size_t>(voxel_count(region))) {
   const bool has_mesh = !field.mesh.is_empty();
@@ -255,8 +260,16 @@ void Oracle::visit(std::uint64_t tetrahedron) {
   const auto jacobian =
       static_cast<double>(static_cast<long double>(cramer.determinant) / static_cast<long double>(rest_determinant));
   if (rest_determinant != 0) {
-    jacobian_min = std::min(jacobian_min, jacobian);
-    jacobian_max = std::max(jacobian_max, jacobian);
+    // Of a flat tetrahedron, whose condition is infinite, float finds nearly nothing.
+    double tolerance = 1e-5 * (1 + std::abs(jacobian));
+    if (cramer.determinant != 0) {
+      tolerance += jacobian_tolerance(jacobian, condition(deformed, static_cast<long double>(cramer.determinant)),
+                                      condition(rest, static_cast<long double>(rest_determinant)));
+    }
+    jacobian_min.low = std::min(jacobian_min.low, jacobian - tolerance);
+    jacobian_min.high = std::min(jacobian_min.high, jacobian + tolerance);
+    jacobian_max.low = std::max(jacobian_max.low, jacobian - tolerance);
+    jacobian_max.high = std::max(jacobian_max.high, jacobian + tolerance);
   }
 
   glm::i64vec3 low = deformed[0], high = deformed[0];

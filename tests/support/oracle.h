@@ -27,6 +27,13 @@ struct Undeformed {
   double reach = 0;           ///< largest component of the difference of u between two corners, voxels
 };
 
+/// How far a determinant may be from the exact one: each of its two volumes, in float, is off by 5 units of the product
+/// of its edges' sum norms, and their quotient is rounded once.
+/// @param jacobian        the exact determinant
+/// @param condition       of the tetrahedron as it is deformed, as `Undeformed` has it
+/// @param rest_condition  of the tetrahedron at rest, in the same sense
+double jacobian_tolerance(double jacobian, double condition, double rest_condition);
+
 /// Finds owners by brute force, in other mathematics than the backends: it solves the paper's 4x4 system (Eq. 6) by
 /// Cramer's rule in 128-bit integers, for every tetrahedron and every voxel whose nudged point lies in its box.
 ///
@@ -45,8 +52,15 @@ class Oracle {
   /// Where a voxel comes from. @param voxel  in the region, with an owner
   Undeformed undeformed(const glm::i64vec3& voxel) const;
 
+  /// An interval of real numbers.
+  struct Interval {
+    double low, high;
+  };
+
   std::uint64_t inverted = 0, degenerate = 0, multiply_owned = 0;
-  double jacobian_min, jacobian_max;
+  /// Where the smallest and the largest determinant of the tetrahedra may be found to be, since each is off by as much
+  /// as `jacobian_tolerance` says.
+  Interval jacobian_min, jacobian_max;
 
  private:
   struct Vertex {
