@@ -7,6 +7,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "tests/support/field_texts.h"
 #include "tests/support/program.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"
@@ -15,20 +16,6 @@
 namespace {
 
 namespace fs = std::filesystem;
-
-/// An elastix parameter file. @param initial  the file of its initial transform
-std::string translation(const std::string& initial) {
-  return "(Transform \"TranslationTransform\")\n(NumberOfParameters 3)\n(TransformParameters 1 0 0)\n"
-         "(InitialTransformParametersFileName \"" +
-         initial + "\")\n(HowToCombineTransforms \"Compose\")\n";
-}
-
-/// A tetrahedron around everything, as MSH 2.2.
-std::string tetrahedron(int x) {
-  return "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 " + std::to_string(x - 1000) +
-         " -1000 -1000\n2 3000 -1000 -1000\n3 -1000 3000 -1000\n4 -1000 -1000 3000\n$EndNodes\n"
-         "$Elements\n1\n1 4 0 1 2 3 4\n$EndElements\n";
-}
 
 /// Files of all kinds that commands read.
 class WhatIsRead : public testing::Test {

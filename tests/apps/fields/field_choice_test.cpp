@@ -6,6 +6,7 @@
 
 #include "apps/fields/read_field.h"
 #include "deform/fields/formula.h"
+#include "tests/support/field_texts.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"
 #include "tests/support/write_file.h"
@@ -18,19 +19,6 @@ using namespace tetwarp::apps;
 namespace fs = std::filesystem;
 
 const Geometry kVolume{.size = {6, 5, 4}, .spacing = {2, 2, 3}};
-
-std::string translation(const std::string& initial) {
-  return "(Transform \"TranslationTransform\")\n(NumberOfParameters 3)\n(TransformParameters 1 0 0)\n"
-         "(InitialTransformParametersFileName \"" +
-         initial + "\")\n(HowToCombineTransforms \"Compose\")\n";
-}
-
-/// A tetrahedron around everything, as MSH 2.2.
-std::string tetrahedron(int x) {
-  return "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 " + std::to_string(x - 1000) +
-         " -1000 -1000\n2 3000 -1000 -1000\n3 -1000 3000 -1000\n4 -1000 -1000 3000\n$EndNodes\n"
-         "$Elements\n1\n1 4 0 1 2 3 4\n$EndElements\n";
-}
 
 ForwardChoice parse(const std::vector<std::string>& texts, std::optional<std::int64_t> cell_size = {}) {
   return parse_forward_fields(texts, cell_size, NiftiFrame::sform);
