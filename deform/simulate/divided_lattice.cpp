@@ -11,8 +11,8 @@
 #include <unordered_map>
 
 #include "deform/errors.h"
-#include "deform/simulate/cut_surface.h"
-#include "deform/simulate/tetrahedron_splitter.h"
+#include "deform/simulate/cuts/cut_surface.h"
+#include "deform/simulate/cuts/tetrahedron_splitter.h"
 
 namespace tetwarp::simulate {
 
