@@ -98,37 +98,56 @@ HWY_INLINE FloatMask inside_in_double(const Vec3& a, const Vec3& b, const Vec3& 
   return hn::Gt(clear, hn::Zero(Floats()));
 }
 
+/// Tetrahedra as they are when deformed, seen from their vertices D. Steps.
+struct DeformedTetrahedra {
+  Vec3 moved;                            ///< how far D moved
+  Vec3 further_a, further_b, further_c;  ///< how much further A, B, C moved
+  Vec3 a, b, c;                          ///< from D to A, B, C
+  FloatMask certain;                     ///< where all of it is known
+
+  /// @param to  of `t`
+  template <Snapping kSnapping>
+  static HWY_INLINE DeformedTetrahedra of(const VectorField& field, const Tetrahedra& t, const Vec3& to) {
+    const StepLattice& lattice = field.lattice;
+    const Float zero = hn::Zero(Floats());
+    const auto along = [&](Float v) { return hn::IfThenZeroElse(t.centre, v); };
+    const auto across = [&](Float v) { return hn::IfThenElseZero(t.centre, v); };
+    const auto at = [&](Float x, Float y, Float z) {  // for Snapping::in_double only
+      return Vec3{hn::Add(t.d.x, x), hn::Add(t.d.y, y), hn::Add(t.d.z, z)};
+    };
+    FloatMask certain = hn::Eq(zero, zero);
+    const Vec3 moved = moved_vertices<kSnapping>(field, t.at_d, t.d, certain);
+    const Vec3 further_a =
+        moved_vertices<kSnapping>(field, t.at_a, at(along(to.x), across(to.y), across(to.z)), certain) - moved;
+    const Vec3 further_b =
+        moved_vertices<kSnapping>(field, t.at_b, at(across(to.x), along(to.y), across(to.z)), certain) - moved;
+    const Vec3 further_c =
+        moved_vertices<kSnapping>(field, t.at_c, at(across(to.x), across(to.y), along(to.z)), certain) - moved;
+    const Vec3 edge{hn::Mul(to.x, set(lattice.cell.x)), hn::Mul(to.y, set(lattice.cell.y)),
+                    hn::Mul(to.z, set(lattice.cell.z))};
+    const Vec3 edge_along{along(edge.x), along(edge.y), along(edge.z)},
+        edge_across{across(edge.x), across(edge.y), across(edge.z)};
+    return {
+        moved,
+        further_a,
+        further_b,
+        further_c,
+        {hn::Add(edge_along.x, further_a.x), hn::Add(edge_across.y, further_a.y), hn::Add(edge_across.z, further_a.z)},
+        {hn::Add(edge_across.x, further_b.x), hn::Add(edge_along.y, further_b.y), hn::Add(edge_across.z, further_b.z)},
+        {hn::Add(edge_across.x, further_c.x), hn::Add(edge_across.y, further_c.y), hn::Add(edge_along.z, further_c.z)},
+        certain};
+  }
+};
+
 /// `try_tetrahedron`, one a lane. With full effort what float leaves open is decided in double.
 /// @param steps, nudge  as of `GatherPoint`
 template <Snapping kSnapping, Effort kEffort>
 HWY_INLINE Trials try_tetrahedra(const VectorField& field, const Vec3& place, const Vec3& steps, const Vec3& nudge) {
   const StepLattice& lattice = field.lattice;
-  const Float zero = hn::Zero(Floats());
   const Tetrahedra t(lattice, place);
   const Vec3 to = t.to();
-  const auto along = [&](Float v) { return hn::IfThenZeroElse(t.centre, v); };
-  const auto across = [&](Float v) { return hn::IfThenElseZero(t.centre, v); };
-  const auto at = [&](Float x, Float y, Float z) {  // for Snapping::in_double only
-    return Vec3{hn::Add(t.d.x, x), hn::Add(t.d.y, y), hn::Add(t.d.z, z)};
-  };
-  FloatMask certain = hn::Eq(zero, zero);
-  const Vec3 moved = moved_vertices<kSnapping>(field, t.at_d, t.d, certain);
-  const Vec3 further_a =
-      moved_vertices<kSnapping>(field, t.at_a, at(along(to.x), across(to.y), across(to.z)), certain) - moved;
-  const Vec3 further_b =
-      moved_vertices<kSnapping>(field, t.at_b, at(across(to.x), along(to.y), across(to.z)), certain) - moved;
-  const Vec3 further_c =
-      moved_vertices<kSnapping>(field, t.at_c, at(across(to.x), across(to.y), along(to.z)), certain) - moved;
-  const Vec3 edge{hn::Mul(to.x, set(lattice.cell.x)), hn::Mul(to.y, set(lattice.cell.y)),
-                  hn::Mul(to.z, set(lattice.cell.z))};
-  const Vec3 edge_along{along(edge.x), along(edge.y), along(edge.z)},
-      edge_across{across(edge.x), across(edge.y), across(edge.z)};
-  const Vec3 a{hn::Add(edge_along.x, further_a.x), hn::Add(edge_across.y, further_a.y),
-               hn::Add(edge_across.z, further_a.z)};
-  const Vec3 b{hn::Add(edge_across.x, further_b.x), hn::Add(edge_along.y, further_b.y),
-               hn::Add(edge_across.z, further_b.z)};
-  const Vec3 c{hn::Add(edge_across.x, further_c.x), hn::Add(edge_across.y, further_c.y),
-               hn::Add(edge_along.z, further_c.z)};
+  const auto [moved, further_a, further_b, further_c, a, b, c, certain] =
+      DeformedTetrahedra::of<kSnapping>(field, t, to);
   const Vec3 r{hn::Sub(hn::NegMulAdd(t.d.x, set(lattice.cell.x), steps.x), moved.x),
                hn::Sub(hn::NegMulAdd(t.d.y, set(lattice.cell.y), steps.y), moved.y),
                hn::Sub(hn::NegMulAdd(t.d.z, set(lattice.cell.z), steps.z), moved.z)};
