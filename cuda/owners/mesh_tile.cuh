@@ -92,21 +92,12 @@ struct MeshTile {
     RowFaces faces;
     if (!make_row_faces(t, voxels.begin, signs, size, faces)) return;
     to.lower = static_cast<short>(faces.lower);
-    for (int n = 0; n < 4; ++n) {
-      const RowFace& face = faces.faces[n];
-      memory.prepared[slot][n] = make_float4(face.at, face.along_y, face.along_z, face.error);
-    }
+    for (int n = 0; n < 4; ++n) memory.prepared[slot][n] = in_quad(faces.faces[n]);
   }
 
+  /// Where the faces of the tetrahedron in a slot cross the rows.
   __device__ RowFaces faces_of(int slot) const {
-    RowFaces t;
-#pragma unroll
-    for (int n = 0; n < 4; ++n) {
-      const float4 face = memory.prepared[slot][n];
-      t.faces[n] = {face.x, face.y, face.z, face.w};
-    }
-    t.lower = memory.slots[slot].lower;
-    return t;
+    return faces_in_quads(memory.prepared[slot], memory.slots[slot].lower);
   }
 
   /// Marks the interval of a row. @param owner  to be the voxels' owner, where it is the lowest
