@@ -18,9 +18,8 @@ constexpr int kRowStride = kTileI + 1;  ///< so that a column of rows lies in di
 
 /// The shared memory of a tile.
 ///
-///     prepared  113 x 6 x 16      a slot for each tetrahedron at hand: first its four faces; where all of a tile's
-///     have
-///                                 slots, its `Weighing` once all rows are marked
+///     prepared  113 x 6 x 16      a slot for each tetrahedron at hand: first its four faces; where all of
+///                                 a tile's have slots, its `Weighing` once all rows are marked
 ///     ends      113 x 4           the last float of each `Weighing`
 ///     slots     112 x 16          which tetrahedron, and the rows that it may reach
 ///     numbers   112 x 4           of the list, before they are sorted
