@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <exception>
 #include <iostream>
+#include <list>
 #include <new>
 
 #include "bench/harness/options.h"
@@ -20,13 +21,24 @@ namespace {
 constexpr int kFailed = 1, kWrongCommandLine = 2, kInputRefused = 4;
 constexpr int kMost = 1000000;
 
+class Command;
+
+/// What a subcommand is made of.
+struct Family {
+  const char *name, *text, *example;
+  int (*measure)(const Options&);
+  void (*add_options)(Command&);
+};
+
 /// A subcommand, whose options are entered into `options` when the command line is read.
 class Command {
  public:
-  Command(CLI::App& app, const std::string& family, const std::string& text, const std::string& example,
-          int (*measure)(const Options&))
-      : options(default_options(family)), run_(measure), command_(*app.add_subcommand(family, text)) {
-    command_.footer("Example: tetwarp bench " + example);
+  Command(CLI::App& app, const Family& family)
+      : options(default_options(family.name)),
+        run_(family.measure),
+        command_(*app.add_subcommand(family.name, family.text)) {
+    command_.footer(std::string("Example: tetwarp bench ") + family.example);
+    family.add_options(*this);
   }
   Command(const Command&) = delete;
   Command& operator=(const Command&) = delete;
@@ -50,6 +62,8 @@ class Command {
     for (const std::int64_t size : options.cell_sizes) cells_ += (cells_.empty() ? "" : ",") + std::to_string(size);
     command_.add_option("--cell-sizes", cells_, text)->capture_default_str();
   }
+  /// Those of the fields; there is one at least.
+  void cells(const std::string& text) { list("--cell-sizes", options.cell_sizes, text, CLI::Range(1, 1000)); }
   void phantom(const std::string& what, int least_width, int most_width, int least_slices = 2,
                const std::string& slices = "Slices of the phantom") {
     add("--slices", options.input.slices.front(), slices, CLI::Range(least_slices, 100000));
@@ -179,8 +193,7 @@ void add_invert(Command& command) {
 void add_io(Command& command) {
   command.phantom("phantom", 2, 4096);
   command.names("--steps", command.options.steps, "DICOM series in and out, .nii.gz, the whole job");
-  command.list("--cell-sizes", command.options.cell_sizes, "Cells of the fields of the whole jobs, voxels",
-               CLI::Range(1, 1000));
+  command.cells("Cells of the fields of the whole jobs, voxels");
   command.threads("Threads; 0 is all");
   command.repeats("Repeats; the median counts");
   command.folder(
@@ -192,8 +205,7 @@ void add_io(Command& command) {
 void add_itk(Command& command) {
   command.names("--tasks", command.options.tasks, "Warps by pull and forward fields, inverses, and so on");
   command.names("--fields", command.options.fields, "Fields whose inverse and determinant are known");
-  command.list("--cell-sizes", command.options.cell_sizes, "Cells of the fields of pull, forward and invert, voxels",
-               CLI::Range(1, 1000));
+  command.cells("Cells of the fields of pull, forward and invert, voxels");
   command.phantom("phantom", 8, 100000, 8);
   command.threads("Threads of everything; 0 is all");
   command.repeats("Repeats; the median counts");
@@ -226,34 +238,30 @@ void add_simulate(Command& command) {
   command.results("step");
 }
 
+constexpr Family kFamilies[] = {
+    {"paper", "The tables of the paper, with Tetwarp beside its methods",
+     "paper --slices 300 --fields twist --json twist.json", run_paper, add_paper},
+    {"gpu", "What a frame costs on a GPU, and the floors that it should reach",
+     "gpu --slices 300 --fields wave,elastic --json gpu.json", run_gpu, add_gpu},
+    {"cpu", "What a deformation costs on the CPU, and the floors that it should reach",
+     "cpu --slices 100 --fields wave,elastic --threads 2 --json cpu.json", run_cpu, add_cpu},
+    {"invert", "The inverse displacement field on the CPU against ITK's inverters, and the floors to reach",
+     "invert --fields wave,bubble --repeats 1 --json invert.json", run_invert, add_invert},
+    {"io", "What files cost beside ITK and DCMTK, and the floors to reach", "io --repeats 5 --json io.json", run_io,
+     add_io},
+    {"itk", "Filters for ITK's pipelines beside ITK's own: time, memory and error, and in pieces",
+     "itk --slices 60 --repeats 1 --json itk.json", run_itk, add_itk},
+    {"simulate", "What chainmail and mass-spring cost on a phantom: until they have settled, and frame by frame",
+     "simulate examples/scenarios/diaphragm_push.json --json simulate.json", run_simulate, add_simulate},
+};
+
 int run_command_line(int argc, char** argv) {
   CLI::App app("Time Tetwarp and what it is compared with, and say what each result is worth");
   app.name("tetwarp-bench");
   app.require_subcommand(1);
   app.set_version_flag("--version", std::string("tetwarp-bench ") + version() + " (" + commit() + ")");
-  Command paper(app, "paper", "The tables of the paper, with Tetwarp beside its methods",
-                "paper --slices 300 --fields twist --json twist.json", run_paper);
-  Command gpu(app, "gpu", "What a frame costs on a GPU, and the floors that it should reach",
-              "gpu --slices 300 --fields wave,elastic --json gpu.json", run_gpu);
-  Command cpu(app, "cpu", "What a deformation costs on the CPU, and the floors that it should reach",
-              "cpu --slices 100 --fields wave,elastic --threads 2 --json cpu.json", run_cpu);
-  Command invert(app, "invert",
-                 "The inverse displacement field on the CPU against ITK's inverters, and the floors to reach",
-                 "invert --fields wave,bubble --repeats 1 --json invert.json", run_invert);
-  Command io(app, "io", "What files cost beside ITK and DCMTK, and the floors to reach",
-             "io --repeats 5 --json io.json", run_io);
-  Command itk(app, "itk", "Filters for ITK's pipelines beside ITK's own: time, memory and error, and in pieces",
-              "itk --slices 60 --repeats 1 --json itk.json", run_itk);
-  Command simulate(app, "simulate",
-                   "What chainmail and mass-spring cost on a phantom: until they have settled, and frame by frame",
-                   "simulate examples/scenarios/diaphragm_push.json --json simulate.json", run_simulate);
-  add_paper(paper);
-  add_gpu(gpu);
-  add_cpu(cpu);
-  add_invert(invert);
-  add_io(io);
-  add_itk(itk);
-  add_simulate(simulate);
+  std::list<Command> commands;
+  for (const Family& family : kFamilies) commands.emplace_back(app, family);
   // How `itk` runs this program again. In no help: it asks for what `itk` alone can write.
   std::filesystem::path alone;
   CLI::App* itk_alone = app.add_subcommand("itk-alone")->group("");
@@ -266,8 +274,8 @@ int run_command_line(int argc, char** argv) {
     throw UsageError(std::string(error.what()) + "; see tetwarp-bench --help");
   }
   if (itk_alone->parsed()) return run_itk_alone(alone);
-  for (Command* command : {&paper, &gpu, &cpu, &invert, &io, &itk, &simulate})
-    if (command->cli().parsed()) return command->run();
+  for (Command& command : commands)
+    if (command.cli().parsed()) return command.run();
   throw UsageError("no subcommand");
 }
 

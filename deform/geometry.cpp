@@ -146,9 +146,9 @@ void require_valid(const Geometry& geometry, const std::string& what) {
             what + ": size " + to_string(geometry.size) + ", expected at least 1 on every axis");
     std::ostringstream spacing;
     spacing << geometry.spacing[axis];
-    require(geometry.spacing[axis] >= kSmallestSpacing && geometry.spacing[axis] <= kLargestSpacing,
-            what + ": spacing " + spacing.str() + " mm on axis " + std::to_string(axis) +
-                ", expected a positive number from 1e-6 to 1e6");
+    require(is_spacing(geometry.spacing[axis]), what + ": spacing " + spacing.str() + " mm on axis " +
+                                                    std::to_string(axis) +
+                                                    ", expected a positive number from 1e-6 to 1e6");
     require(std::isfinite(geometry.origin[axis]), what + ": the origin is not finite");
   }
   const double determinant = glm::determinant(geometry.direction);

@@ -87,6 +87,8 @@ std::string orientation_code(const Geometry& geometry);
 
 constexpr double kSmallestSpacing = 1e-6,  ///< smallest spacing of a grid, mm; less is a mistaken unit or damage
     kLargestSpacing = 1e6;                 ///< largest spacing of a grid, mm
+/// Whether a number, mm, can be a spacing of a grid.
+inline bool is_spacing(double mm) { return mm >= kSmallestSpacing && mm <= kLargestSpacing; }
 
 /// Checks a grid.
 /// @param geometry  the grid

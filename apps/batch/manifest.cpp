@@ -15,6 +15,7 @@
 #include "apps/cli/command_line.h"
 #include "apps/cli/reads.h"
 #include "apps/deform/deform_request.h"
+#include "io/edit_distance.h"
 #include "io/lower_case.h"
 #include "io/opened_file.h"
 #include "io/scenario_file.h"
@@ -49,29 +50,13 @@ bool is_list(const std::string& key) {
   return option && option->list;
 }
 
-/// The least number of letters to insert, remove or replace to make one word from another (Levenshtein 1966).
-std::size_t distance(const std::string& a, const std::string& b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i + 1;
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t changed = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({changed, row[j] + 1, row[j + 1] + 1});
-    }
-  }
-  return row.back();
-}
-
 std::string nearest_key(const std::string& key) {
   const std::vector<std::string> keys = manifest_keys();
   const auto nearest = std::min_element(keys.begin(), keys.end(), [&](const std::string& a, const std::string& b) {
-    return distance(a, key) < distance(b, key);
+    return edit_distance(a, key) < edit_distance(b, key);
   });
-  return distance(*nearest, key) <= std::max<std::size_t>(2, key.size() / 3) ? "; is \"" + *nearest + "\" meant?"
-                                                                             : "; see docs/reference/batch.md";
+  return edit_distance(*nearest, key) <= std::max<std::size_t>(2, key.size() / 3) ? "; is \"" + *nearest + "\" meant?"
+                                                                                  : "; see docs/reference/batch.md";
 }
 
 /// Why an id cannot be the name of a folder on every system; empty: it can.

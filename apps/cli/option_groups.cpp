@@ -17,6 +17,8 @@ namespace {
 
 /// Threads, jobs, devices, pictures: more than any machine has, and few enough to be counted in 32 bits.
 constexpr std::int64_t kMostThreads = 65536, kMostDevices = 65535;
+/// A lattice with larger cells has one cell an axis, of whatever volume.
+constexpr std::int64_t kMostCellSize = 65536;
 
 template <class Number>
 std::optional<Number> number_of(std::string_view text) {
@@ -165,6 +167,14 @@ void add_backend(CLI::App& command, BackendChoice& backend, int& device, const c
       ->check(whole_number(0, kMostDevices))
       ->type_name("N")
       ->capture_default_str();
+}
+
+void add_cell_size(CLI::App& command, FieldArguments& field) {
+  command
+      .add_option("--cell-size", field.cell_size,
+                  "Vertices every B voxels, for formulas and transforms only (default 1)")
+      ->check(whole_number(1, kMostCellSize))
+      ->type_name("B");
 }
 
 void add_outside(CLI::App& command, Outside& outside) {

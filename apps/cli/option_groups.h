@@ -60,10 +60,9 @@ void add_backend_choice(CLI::App& command, BackendChoice& backend, const char* h
 /// --backend, --device.
 void add_backend(CLI::App& command, BackendChoice& backend, int& device,
                  const char* help = "auto, cuda or cpu: the bits are the same");
+/// --cell-size.
+void add_cell_size(CLI::App& command, FieldArguments& field);
 /// --outside.
 void add_outside(CLI::App& command, Outside& outside);
-
-/// The subcommand `render`.
-void add_render(CLI::App& app, RenderOptions& options);
 
 }  // namespace tetwarp::apps

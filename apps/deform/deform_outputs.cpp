@@ -25,17 +25,7 @@ std::vector<std::filesystem::path> add_all(const std::vector<Choice>& choices, O
 DeformOutputs begin_outputs(const DeformRequest& request) {
   const DeformOptions& options = request.options;
   const bool only_look = options.dry_run && !options.folder.empty();
-  DeformOutputs outputs{OutputSet(request.reads, options.common.overwrite, options.folder, only_look),
-                        {},
-                        {},
-                        {},
-                        {},
-                        {},
-                        {},
-                        {},
-                        {},
-                        {},
-                        {}};
+  DeformOutputs outputs{OutputSet(request.reads, options.common.overwrite, options.folder, only_look)};
   OutputSet& set = outputs.set;
   // The series of a single file is read from its folder, so a derived series must not land there. What is not there is
   // no file: who reads it says so.

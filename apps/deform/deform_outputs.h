@@ -15,9 +15,9 @@ namespace tetwarp::apps {
 /// They are removed with this object unless they were committed.
 struct DeformOutputs {
   OutputSet set;
-  std::filesystem::path volume, sidecar, bids, field, report, preview;
-  MapOptions maps;
-  std::vector<std::filesystem::path> volumes, structures, points;  ///< that go along, one each
+  std::filesystem::path volume = {}, sidecar = {}, bids = {}, field = {}, report = {}, preview = {};
+  MapOptions maps = {};
+  std::vector<std::filesystem::path> volumes = {}, structures = {}, points = {};  ///< that go along, one each
 };
 
 /// Begins the outputs on disk. Of a dry run into a folder the names alone are checked.

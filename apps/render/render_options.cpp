@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include "apps/cli/option_groups.h"
+#include "apps/cli/subcommands.h"
 
 namespace tetwarp::apps {
 
@@ -87,11 +88,7 @@ void add_deformation(CLI::App& command, RenderOptions& options) {
       ->excludes(field)
       ->excludes(pull)
       ->type_name("FIELD");
-  command
-      .add_option("--cell-size", options.field.cell_size,
-                  "Vertices every B voxels, for formulas and transforms only (default 1)")
-      ->check(whole_number(1, 65536))
-      ->type_name("B");
+  add_cell_size(command, options.field);
   add_outside(command, options.outside);
   command.add_option("--fill", options.fill, "Value where nothing maps (default: as --background of `deform`)")
       ->check(finite_number());

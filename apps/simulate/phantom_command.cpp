@@ -20,7 +20,7 @@ void check(const PhantomOptions& options) {
     if (options.size[axis] < 2 || options.size[axis] > kMostVoxels) {
       throw UsageError("--size has " + std::to_string(options.size[axis]) + ", expected 2 to 4096 on every axis");
     }
-    if (!(options.spacing[axis] >= kSmallestSpacing && options.spacing[axis] <= kLargestSpacing)) {
+    if (!is_spacing(options.spacing[axis])) {
       std::ostringstream found;
       found << options.spacing[axis];
       throw UsageError("--spacing has " + found.str() + ", expected millimetres from 1e-6 to 1e6");

@@ -27,12 +27,15 @@ struct FieldOnLattice {
 ///
 /// | of the row | what it is |
 /// | --- | --- |
-/// | set_field_ms, resample_ms, new_field_ms | Tetwarp; with the range of Jacobian determinants; the third is the first
-/// two | | at_rest, covered | fraction of the vertices that do not move; voxels | | resting | where part of the slices
-/// rest and have resting neighbours: their share, and a new field of them alone | | two_volumes_ms | resampling two
-/// volumes at once | | bytes_ms | reading field and source once and writing the output once | | paper | Algorithm 2,
-/// the field in memory, the output cleared first | | itk_warp | given the inverse | | itk_invert_and_warp, vtk_probe |
-/// peers that take minutes |
+/// | set_field_ms, resample_ms | Tetwarp; with the range of Jacobian determinants |
+/// | new_field_ms | both |
+/// | at_rest, covered | fraction of the vertices that do not move; voxels |
+/// | resting | where slices rest and have resting neighbours: their share, and a new field of them alone |
+/// | two_volumes_ms | resampling two volumes at once |
+/// | bytes_ms | reading field and source once and writing the output once |
+/// | paper | Algorithm 2, the field in memory, the output cleared first |
+/// | itk_warp | given the inverse |
+/// | itk_invert_and_warp, vtk_probe | peers that take minutes |
 ///
 /// A peer has its times, and `differing`: the fraction of the voxels covered by Tetwarp whose values differ by more
 /// than 1. What was not measured is null.

@@ -61,9 +61,8 @@ struct ItkRequest {
 /// | --- | --- |
 /// | ms, cpu_ms | of Update(), all threads |
 /// | input_bytes, output_bytes | pixels that were in memory before, and that were made |
-/// | peak_bytes | largest resident set of the process up to the end of Update(), less its resident set just before:
-/// what lies beyond the inputs, the output included | | error | the deviation from the truth; null where there is none
-/// |
+/// | peak_bytes | largest resident set up to the end of Update(), less that just before; the output is included |
+/// | error | the deviation from the truth; null where there is none |
 Json ask_alone(const ItkRequest& request, const ItkFiles& files);
 
 /// One filter, or several one behind the other, with their inputs in memory.

@@ -3,6 +3,7 @@
 
 #include "cuda/lattice/findings.cuh"
 #include "cuda/lattice/step_pass.cuh"
+#include "cuda/runtime/fetch.h"
 #include "deform/core/visit_cell.h"
 #include "deform/field_check.h"
 
@@ -68,12 +69,7 @@ LatticeFindings* LatticeOnDevice::clear_notes(std::size_t words, std::size_t byt
   return reinterpret_cast<LatticeFindings*>(notes_.data());
 }
 
-LatticeFindings LatticeOnDevice::read_findings(cudaStream_t stream) {
-  LatticeFindings* found = found_.reserve(1);
-  TETWARP_CUDA_TRY(cudaMemcpyAsync(found, notes_.data(), sizeof *found, cudaMemcpyDeviceToHost, stream));
-  TETWARP_CUDA_TRY(cudaStreamSynchronize(stream));
-  return *found;
-}
+LatticeFindings LatticeOnDevice::read_findings(cudaStream_t stream) { return fetch(notes_.data(), found_, stream); }
 
 /// @return whether all vertices rest at whole steps, and can be packed
 bool LatticeOnDevice::set_steps(StepLattice lattice, const glm::vec3* displacement, std::uint64_t* room,

@@ -13,11 +13,15 @@ namespace tetwarp::cuda_detail {
 /// and the displacement of the vertices. Six groups of four floats, which a lane reads with one instruction each, and
 /// one more float, in an array of its own:
 ///
-///     0   from_d.x    from_d.y    from_d.z    reciprocal
-///     1   bc.x        bc.y        bc.z        moved.x        the weight of A at r is (r . bc) reciprocal, where r is
-///     the 2   ca.x        ca.y        ca.z        moved.y        way from D; of B and C with ca and ab 3   ab.x ab.y
-///     ab.z        moved.z 4   moved_a.x   moved_a.y   moved_a.z   moved_b.x 5   moved_b.y   moved_b.z   moved_c.x
-///     moved_c.y end moved_c.z
+///     0    from_d.x    from_d.y    from_d.z    reciprocal
+///     1    bc.x        bc.y        bc.z        moved.x
+///     2    ca.x        ca.y        ca.z        moved.y
+///     3    ab.x        ab.y        ab.z        moved.z
+///     4    moved_a.x   moved_a.y   moved_a.z   moved_b.x
+///     5    moved_b.y   moved_b.z   moved_c.x   moved_c.y
+///     end  moved_c.z
+///
+/// The weight of A at r is (r . bc) reciprocal, where r is the way from D; of B and C with ca and ab.
 struct Weighing {
   float from_d[3];   ///< from D to the first voxel of the tile, 2^-12 voxel
   float reciprocal;  ///< of the determinant; NaN where float cannot compute the weights

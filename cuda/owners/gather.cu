@@ -7,6 +7,7 @@
 
 #include "cuda/owners/march.cuh"
 #include "cuda/owners/seeds.cuh"
+#include "cuda/runtime/fetch.h"
 #include "deform/core/visit_cell.h"
 
 namespace tetwarp::cuda_detail {
@@ -179,12 +180,7 @@ bool Gather::is_mostly_folded(const LatticeOnDevice& lattice) {
   return static_cast<std::int64_t>(lattice.statistics().inverted) > tetrahedra / kFew;
 }
 
-Gather::Counters Gather::counters(cudaStream_t stream) {
-  Counters* found = found_.reserve(1);
-  TETWARP_CUDA_TRY(cudaMemcpyAsync(found, coverage_.counters(), sizeof *found, cudaMemcpyDeviceToHost, stream));
-  TETWARP_CUDA_TRY(cudaStreamSynchronize(stream));
-  return *found;
-}
+Gather::Counters Gather::counters(cudaStream_t stream) { return fetch(coverage_.counters(), found_, stream); }
 
 /// So many slices at a time that memory for their claimed voxels is bounded.
 template <class Task, class Sink>

@@ -37,9 +37,8 @@ __device__ void set_faces(const IntervalTile& tile, int slot, unsigned entry) {
     const Corners at = tile.corners(memory.numbers[entry]);
     const glm::i32vec3 d = tile.vertex(at.d), a = tile.vertex(at.a) - d, b = tile.vertex(at.b) - d,
                        c = tile.vertex(at.c) - d;
-    lower = make_row_faces(a, b, c, d, tile.signs, tile.size, [faces](int n, const RowFace& face) {
-      faces[n] = make_float4(face.at, face.along_y, face.along_z, face.error);
-    });
+    lower = make_row_faces(a, b, c, d, tile.signs, tile.size,
+                           [faces](int n, const RowFace& face) { faces[n] = in_quad(face); });
     if (lower == 0 && detail::edge_determinant(a, b, c) == 0) {  // owns nothing
       span.y_end = span.y_begin;
       memory.spans[entry] = span.word();

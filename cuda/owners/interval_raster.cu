@@ -10,6 +10,7 @@
 #include "cuda/owners/interval_list.cuh"
 #include "cuda/owners/interval_marks.cuh"
 #include "cuda/owners/interval_sample.cuh"
+#include "cuda/runtime/fetch.h"
 
 namespace tetwarp::cuda_detail {
 
@@ -139,10 +140,7 @@ void IntervalRaster::run(const LatticeOnDevice& lattice, const SlabBox& box, con
 }
 
 IntervalRaster::Counters IntervalRaster::counters(cudaStream_t stream) {
-  Counters* found = found_.reserve(1);
-  TETWARP_CUDA_TRY(cudaMemcpyAsync(found, counters_.data(), sizeof *found, cudaMemcpyDeviceToHost, stream));
-  TETWARP_CUDA_TRY(cudaStreamSynchronize(stream));
-  return *found;
+  return fetch(counters_.data(), found_, stream);
 }
 
 void IntervalRaster::mark_left(const LatticeOnDevice& lattice, const SlabBox& box, std::uint32_t* several,

@@ -249,14 +249,8 @@ struct IntervalTile {
 
   /// Where the faces of the tetrahedron in a slot cross the rows.
   __device__ RowFaces faces_of(int slot) const {
-    RowFaces t;
-#pragma unroll
-    for (int n = 0; n < 4; ++n) {
-      const float4 face = memory.prepared[slot][n];
-      t.faces[n] = {face.x, face.y, face.z, face.w};
-    }
-    t.lower = __float_as_int(memory.prepared[slot][kLowerQuad].x);
-    return t;
+    const float4* const quads = memory.prepared[slot];
+    return faces_in_quads(quads, __float_as_int(quads[kLowerQuad].x));
   }
 };
 

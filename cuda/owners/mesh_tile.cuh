@@ -18,9 +18,8 @@ constexpr int kRowStride = kTileI + 1;  ///< so that a column of rows lies in di
 
 /// The shared memory of a tile.
 ///
-///     prepared  113 x 6 x 16      a slot for each tetrahedron at hand: first its four faces; where all of a tile's
-///     have
-///                                 slots, its `Weighing` once all rows are marked
+///     prepared  113 x 6 x 16      a slot for each tetrahedron at hand: first its four faces; where all of
+///                                 a tile's have slots, its `Weighing` once all rows are marked
 ///     ends      113 x 4           the last float of each `Weighing`
 ///     slots     112 x 16          which tetrahedron, and the rows that it may reach
 ///     numbers   112 x 4           of the list, before they are sorted
@@ -92,21 +91,12 @@ struct MeshTile {
     RowFaces faces;
     if (!make_row_faces(t, voxels.begin, signs, size, faces)) return;
     to.lower = static_cast<short>(faces.lower);
-    for (int n = 0; n < 4; ++n) {
-      const RowFace& face = faces.faces[n];
-      memory.prepared[slot][n] = make_float4(face.at, face.along_y, face.along_z, face.error);
-    }
+    for (int n = 0; n < 4; ++n) memory.prepared[slot][n] = in_quad(faces.faces[n]);
   }
 
+  /// Where the faces of the tetrahedron in a slot cross the rows.
   __device__ RowFaces faces_of(int slot) const {
-    RowFaces t;
-#pragma unroll
-    for (int n = 0; n < 4; ++n) {
-      const float4 face = memory.prepared[slot][n];
-      t.faces[n] = {face.x, face.y, face.z, face.w};
-    }
-    t.lower = memory.slots[slot].lower;
-    return t;
+    return faces_in_quads(memory.prepared[slot], memory.slots[slot].lower);
   }
 
   /// Marks the interval of a row. @param owner  to be the voxels' owner, where it is the lowest

@@ -28,4 +28,23 @@ constexpr int kTileThreads = 32 * kTileJ;  ///< a warp a column of rows
 constexpr int kTileBlocks = 4;             ///< a multiprocessor
 static_assert(kTileI <= kMostRowTile && kTileJ <= kMostRowTile && kTileK <= kMostRowTile);
 
+/// A face as the shared memory of a tile has it.
+__device__ inline float4 in_quad(const RowFace& face) {
+  return make_float4(face.at, face.along_y, face.along_z, face.error);
+}
+
+/// Where the faces of a tetrahedron cross the rows of a tile.
+/// @param quads  its four faces, as `in_quad` makes them
+/// @param lower  of `RowFaces`
+__device__ inline RowFaces faces_in_quads(const float4* quads, int lower) {
+  RowFaces t;
+#pragma unroll
+  for (int n = 0; n < 4; ++n) {
+    const float4 face = quads[n];
+    t.faces[n] = {face.x, face.y, face.z, face.w};
+  }
+  t.lower = lower;
+  return t;
+}
+
 }  // namespace tetwarp::cuda_detail

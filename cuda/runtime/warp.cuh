@@ -19,10 +19,12 @@
 ///
 ///     | of a warp, or of a block of 256   | CUB: instructions, registers | written out | taken |
 ///     | sum of unsigned, least of int     | 20, 8 (one REDUX)            | 28, 12      | CUB   |
-///     | inclusive scan of int             | 21, 16                       | 31, 12      | CUB: number_kernel 14, was 16
-///     | | least of float                    | 33, 12                       | 22, 12      | ours  | | largest of
-///     unsigned long long     | 48, 16                       | 42, 16      | ours  | | ranks of those threads that vote
-///     | 67, 21 (BlockScan)           | 57, 19      | ours  |
+///     | inclusive scan of int             | 21, 16                       | 31, 12      | CUB   |
+///     | least of float                    | 33, 12                       | 22, 12      | ours  |
+///     | largest of unsigned long long     | 48, 16                       | 42, 16      | ours  |
+///     | ranks of those threads that vote  | 67, 21 (BlockScan)           | 57, 19      | ours  |
+///
+/// With the scan of CUB number_kernel has 14 registers; it had 16.
 ///
 /// Sums of floats are in an order that is written out: another one would give other bits.
 namespace tetwarp::cuda_detail {

@@ -277,10 +277,7 @@ class LatticeResampler final : public ForwardResampler {
   void write(const Region& box, TileVoxels& tile, const TargetSamplers& samplers, const MapWriter& maps,
              Report& report) const {
     const Claims& claims = tile.claims;
-    if (maps.wants_owners()) {
-      report.multiply_owned = static_cast<std::uint64_t>(
-          std::count_if(claims.owners.begin(), claims.owners.end(), [](std::uint16_t owners) { return owners > 1; }));
-    }
+    if (maps.wants_owners()) report.multiply_owned = count_of_several(claims.owners);
     const auto width = static_cast<int>(box.end.x - box.begin.x);
     std::size_t first = 0;
     for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {

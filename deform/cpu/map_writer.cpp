@@ -43,4 +43,8 @@ void MapWriter::write(const Row& row, const std::uint8_t* coverage, const float*
   if (wants_owners()) std::copy_n(owners, row.count, row_of<std::uint16_t>(maps_.owners, row.voxel));
 }
 
+std::uint64_t count_of_several(std::span<const std::uint16_t> owners) {
+  return static_cast<std::uint64_t>(std::ranges::count_if(owners, [](std::uint16_t number) { return number > 1; }));
+}
+
 }  // namespace tetwarp::cpu

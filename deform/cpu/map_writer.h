@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 
 #include "deform/cpu/sampler.h"
 #include "deform/resampler.h"
@@ -38,5 +39,8 @@ class MapWriter {
   Maps maps_;
   glm::dmat3 mm_from_index_;
 };
+
+/// How many voxels have several owners, for `Report::multiply_owned`. @param owners  how many each voxel has
+std::uint64_t count_of_several(std::span<const std::uint16_t> owners);
 
 }  // namespace tetwarp::cpu

@@ -99,11 +99,7 @@ Report MeshResampler::resample(Region region, std::span<const Target> targets, c
         of_tile.paths.claimed = static_cast<std::uint64_t>(voxel_count(box));
         raster_.find(box, writer.wants_owners(), tile.owners);
         if (stays_outside_) rest_raster_.find(box, false, tile.at_rest);
-        if (writer.wants_owners()) {
-          const auto& count = tile.owners.count;
-          of_tile.multiply_owned = static_cast<std::uint64_t>(
-              std::count_if(count.begin(), count.end(), [](std::uint16_t owners) { return owners > 1; }));
-        }
+        if (writer.wants_owners()) of_tile.multiply_owned = count_of_several(tile.owners.count);
         const auto width = static_cast<int>(box.end.x - box.begin.x);
         std::size_t first = 0;
         for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {

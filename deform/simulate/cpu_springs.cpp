@@ -149,11 +149,7 @@ class CpuSprings final : public SpringEngine {
           }
         }
       });
-      const Sums sums = sum_blocks([&](NodeRange range) { return strain_of(range); });
-      return Strain{.energy = sums.sum,
-                    .free_force = std::sqrt(sums.most),
-                    .placed_force = std::sqrt(std::max(sums.most_placed, sums.most_load)),
-                    .slope = sums.slope};
+      return sum_blocks([&](NodeRange range) { return strain_of(range); }).strain();
     });
   }
 
@@ -171,11 +167,6 @@ class CpuSprings final : public SpringEngine {
   std::span<const glm::vec3> shown() const override { return shown_; }
 
  private:
-  /// Sums over blocks, and the largest of the squares that they saw.
-  struct Sums {
-    double sum = 0, slope = 0, most = 0, most_placed = 0, most_load = 0;
-  };
-
   static glm::dvec3 at(const PaddedVectors<double>& vectors, std::size_t n) {
     return {vectors[0][n], vectors[1][n], vectors[2][n]};
   }
@@ -196,13 +187,7 @@ class CpuSprings final : public SpringEngine {
   Sums sum_blocks(Work&& work) {
     for_blocks([&](NodeRange range, std::size_t block) { partial_[block] = work(range); });
     Sums result;
-    for (const Sums& block : partial_) {
-      result.sum += block.sum;
-      result.slope += block.slope;
-      result.most = std::max(result.most, block.most);
-      result.most_placed = std::max(result.most_placed, block.most_placed);
-      result.most_load = std::max(result.most_load, block.most_load);
-    }
+    for (const Sums& block : partial_) result.add(block);
     return result;
   }
 

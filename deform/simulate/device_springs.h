@@ -118,11 +118,7 @@ class DeviceSprings final : public SpringEngine {
     const auto scope = machine_.scope();
     machine_.each(nodes_, sweeps::Go{{a_}, part});
     machine_.template sum<Sums>(nodes_, sweeps::StrainOf{{a_}}, sweeps::Keep{a_.result});
-    const Sums sums = machine_.fetch(a_.result);
-    return {.energy = sums.sum,
-            .free_force = std::sqrt(sums.most),
-            .placed_force = std::sqrt(std::max(sums.most_placed, sums.most_load)),
-            .slope = sums.slope};
+    return machine_.fetch(a_.result).strain();
   }
 
   void accept() override {

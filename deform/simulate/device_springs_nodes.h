@@ -23,21 +23,7 @@ struct GradientState {
   bool is_indefinite = false, is_done = false;
 };
 
-/// The sum of what a sweep returns, and the largest square that it saw.
-struct Sums {
-  double sum = 0, slope = 0, most = 0, most_placed = 0, most_load = 0;
-
-  TETWARP_HD void add(const Sums& other) {
-    sum += other.sum;
-    slope += other.slope;
-    keep(most, other.most);
-    keep(most_placed, other.most_placed);
-    keep(most_load, other.most_load);
-  }
-  TETWARP_HD static void keep(double& most, double value) {
-    if (value > most) most = value;
-  }
-};
+/// The sum of what a sweep returns.
 struct Sum {
   double sum = 0;
   TETWARP_HD void add(const Sum& other) { sum += other.sum; }

@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "deform/errors.h"
-#include "deform/simulate/cut_surface.h"
+#include "deform/simulate/cuts/cut_surface.h"
 
 namespace tetwarp::simulate {
 

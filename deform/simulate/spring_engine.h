@@ -3,10 +3,13 @@
 
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
 #include <span>
 #include <stop_token>
 
+#include "deform/core/host_device.h"
 #include "deform/simulate/mass_spring.h"
 #include "deform/simulate/rigid_motion.h"
 #include "deform/simulate/spring_roles.h"
@@ -20,6 +23,29 @@ struct Strain {
   double free_force = 0;    ///< N: the largest net force on a free node
   double placed_force = 0;  ///< N: the largest force that keeps a placed node in its place
   double slope = 0;         ///< N mm: minus the net forces on free nodes times the direction (see SpringEngine::solve)
+};
+
+/// The sums of what a sweep returns for each node, and the largest squares that it saw.
+struct Sums {
+  double sum = 0, slope = 0, most = 0, most_placed = 0, most_load = 0;
+
+  TETWARP_HD void add(const Sums& other) {
+    sum += other.sum;
+    slope += other.slope;
+    keep(most, other.most);
+    keep(most_placed, other.most_placed);
+    keep(most_load, other.most_load);
+  }
+  TETWARP_HD static void keep(double& most, double value) {
+    if (value > most) most = value;
+  }
+  /// Of a sweep that computes the strain: energies, slopes and squares of forces.
+  Strain strain() const {
+    return {.energy = sum,
+            .free_force = std::sqrt(most),
+            .placed_force = std::sqrt(std::max(most_placed, most_load)),
+            .slope = slope};
+  }
 };
 
 /// When conjugate gradients stop: after n iterations that lowered the quadratic model by Q in all, and by q in the last

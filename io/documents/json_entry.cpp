@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <numeric>
 
 #include "deform/errors.h"
+#include "io/edit_distance.h"
 
 namespace tetwarp {
 
@@ -20,21 +20,6 @@ std::string text_of(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.9g", value);
   return text;
-}
-
-/// The least number of letters to insert, remove or replace to make one word from another (Levenshtein 1966).
-std::size_t distance(const std::string& a, const std::string& b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), 0);
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = row[0]++;
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({replaced, row[j] + 1, row[j + 1] + 1});
-    }
-  }
-  return row.back();
 }
 
 std::string list_of(std::span<const char* const> words) {
@@ -132,9 +117,10 @@ void JsonEntry::only(std::span<const char* const> known) const {
   for (const JsonTree& member : tree_->items) {
     if (std::find(known.begin(), known.end(), member.key) != known.end()) continue;
     const auto nearest = std::min_element(known.begin(), known.end(), [&](const char* a, const char* b) {
-      return distance(printable(member.key), a) < distance(printable(member.key), b);
+      return edit_distance(printable(member.key), a) < edit_distance(printable(member.key), b);
     });
-    const bool is_near = distance(printable(member.key), *nearest) <= std::max<std::size_t>(1, member.key.size() / 3);
+    const bool is_near =
+        edit_distance(printable(member.key), *nearest) <= std::max<std::size_t>(1, member.key.size() / 3);
     throw InputError(*file_ + ":" + std::to_string(member.key_line) + ": " + (path_.empty() ? "" : path_ + ": ") +
                      "the key \"" + printable(member.key) + "\" is not known; " +
                      (is_near ? std::string("did you mean \"") + *nearest + "\"?" : "known are " + list_of(known)));

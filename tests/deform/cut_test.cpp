@@ -16,7 +16,7 @@
 #include "deform/field_quality.h"
 #include "deform/fields/lattice_mesh.h"
 #include "deform/points.h"
-#include "deform/simulate/cut_surface.h"
+#include "deform/simulate/cuts/cut_surface.h"
 #include "deform/simulate/divided_lattice.h"
 #include "tests/support/backends.h"
 #include "tests/support/fields.h"

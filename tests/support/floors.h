@@ -19,6 +19,9 @@ inline const bench::Floor* find_floor(const bench::Floors& floors, const std::st
   return nullptr;
 }
 
+/// A time in a run that was the same in every frame, ms.
+inline bench::Json steady_ms(double median) { return bench::summarize({median, median, median}); }
+
 /// Expects a floor with these numbers. @param met  whether the requirement is met; does not count where nothing is
 /// required
 inline void expect_floor(const bench::Floors& floors, const std::string& ratio, const std::string& where, double value,

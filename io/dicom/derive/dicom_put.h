@@ -47,9 +47,6 @@ void put_empty_sequence(DcmItem& item, const DcmTagKey& sequence);
 /// Appends a code (PS3.3 8.8) of scheme DCM (PS3.16 annex D) to a code sequence.
 void append_code(DcmItem& item, const DcmTagKey& sequence, const std::string& value, const std::string& meaning);
 
-/// Sets a sequence without items, replacing what is there.
-void put_empty_sequence(DcmItem& item, const DcmTagKey& sequence);
-
 /// Puts Image Position (Patient) of slice k, Image Orientation (Patient) and Pixel Spacing; put_image_plane says when
 /// decimal strings stay as they are.
 void put_position(DcmItem& item, const Geometry& geometry, std::int64_t k);

@@ -12,6 +12,7 @@
 #include <map>
 
 #include "io/dicom/derive/dicom_put.h"
+#include "io/dicom/objects/dicom_along_put.h"
 #include "io/dicom/objects/dicom_structures_header.h"
 #include "io/dicom/scan/dicom_header.h"
 #include "io/dicom/scan/dicom_stream.h"
@@ -154,12 +155,7 @@ class StructureFile {
 }  // namespace
 
 bool is_dicom_structure_set(const std::filesystem::path& path) {
-  std::error_code ignored;  // a name that no file can have
-  if (!std::filesystem::is_regular_file(path, ignored)) return false;
-  prepare_dcmtk();
-  DcmFileFormat format;
-  if (parse_dicom(format, path, DCM_StudyDate).result.bad()) return false;
-  return text_of(*format.getDataset(), DCM_SOPClassUID) == UID_RTStructureSetStorage;
+  return sop_class_of(path) == UID_RTStructureSetStorage;
 }
 
 StructureSet read_structure_set(const std::filesystem::path& path) { return StructureFile(path).read(); }

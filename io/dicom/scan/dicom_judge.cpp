@@ -180,7 +180,6 @@ std::string geometry_problem(const DicomFileHeader& header) {
   if (!header.no_frames.empty()) return header.no_frames + where(header) + "; export the file again";
   if (!header.position) return missing_or_bad("Image Position (0020,0032)", header, "three numbers");
   if (!header.orientation) return missing_or_bad("Image Orientation (0020,0037)", header, "six numbers");
-  const auto is_spacing = [](double mm) { return mm >= kSmallestSpacing && mm <= kLargestSpacing; };
   if (!header.spacing || !is_spacing(header.spacing->x) || !is_spacing(header.spacing->y)) {
     return missing_or_bad("Pixel Spacing (0028,0030)", header, "two numbers from 1e-6 to 1e6 mm");
   }

@@ -3,9 +3,7 @@
 
 // Nothing that a de-identified run writes holds a word of the paths, the rows and the files that it reads: every byte
 // of every file is searched, also within gzip, whatever succeeds, is left out, refused or fails.
-#include <algorithm>
-#include <cctype>
-
+#include "io/lower_case.h"
 #include "tests/apps/batch/batch_case.h"
 
 namespace {
@@ -13,13 +11,9 @@ namespace {
 using namespace tetwarp::test;
 using nlohmann::json;
 namespace fs = std::filesystem;
+using tetwarp::lower;
 
 constexpr const char* kSecret = "mustermann";
-
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
-  return text;
-}
 
 class DeidentifiedBatch : public BatchCase {
  protected:

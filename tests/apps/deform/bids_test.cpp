@@ -4,12 +4,12 @@
 // `--bids`: a sidecar with the names of BIDS, beside dcm2niix's own of the same series.
 #include <gtest/gtest.h>
 
-#include <cctype>
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "io/lower_case.h"
 #include "tests/support/dicom/dicom_maker.h"
 #include "tests/support/program.h"
 #include "tests/support/real_data.h"
@@ -20,13 +20,9 @@ namespace {
 
 using nlohmann::json;
 namespace fs = std::filesystem;
+using tetwarp::lower;
 
 json read_json(const fs::path& path) { return json::parse(read_text(path)); }
-
-std::string lower(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
 
 /// dcm2niix shortens names of makers ("GE") and prints six digits.
 bool agree(const json& ours, const json& theirs) {

@@ -12,17 +12,17 @@ namespace tetwarp::bench {
 namespace {
 
 using test::find_floor;
+using test::steady_ms;
 
-Json ms(double median) { return summarize({median, median, median}); }
-Json peer(double median) { return {{"ms", ms(median)}, {"differing", 0.25}}; }
+Json peer(double median) { return {{"ms", steady_ms(median)}, {"differing", 0.25}}; }
 
 /// 10 ms of set_field, 30 of resample, unless told otherwise.
 Json make_run(const std::string& field, const glm::i64vec3& size = {512, 512, 300}, double new_field = 40) {
   return {{"size", size_json(size)},
           {"field", field},
-          {"set_field_ms", ms(10)},
-          {"resample_ms", ms(30)},
-          {"new_field_ms", ms(new_field)},
+          {"set_field_ms", steady_ms(10)},
+          {"resample_ms", steady_ms(30)},
+          {"new_field_ms", steady_ms(new_field)},
           {"new_field_ns_a_voxel", 1e6 * new_field / static_cast<double>(size.x * size.y * size.z)}};
 }
 
@@ -51,9 +51,9 @@ TEST(CpuFloors, AFurtherVolumeMayTakeAThirdOfTheFirstOrSoMuchAVoxel) {
   Json results;
   results["runs"] = {make_run("wave", {1000, 1000, 10}), make_run("twist", {1000, 1000, 10}),
                      make_run("identity", {1000, 1000, 100})};
-  results["runs"][0]["two_volumes_ms"] = ms(39);
-  results["runs"][1]["two_volumes_ms"] = ms(46.5);
-  results["runs"][2]["two_volumes_ms"] = ms(180);  // 1.5 ns a voxel
+  results["runs"][0]["two_volumes_ms"] = steady_ms(39);
+  results["runs"][1]["two_volumes_ms"] = steady_ms(46.5);
+  results["runs"][2]["two_volumes_ms"] = steady_ms(180);  // 1.5 ns a voxel
   const Floors floors = find_cpu_floors(results);
   expect_floor(floors, "further volume / allowed", "wave", 9 / 15.0, 1, {}, true);
   expect_floor(floors, "further volume / allowed", "twist", 16.5 / 15, 1, {}, false);
@@ -64,7 +64,7 @@ TEST(CpuFloors, SlowPeersAreHeldAgainstTheRunOnTheirOwnVolume) {
   Json results;
   results["runs"] = {make_run("twist")};
   results["slow_peers"] = {make_run("twist", {512, 512, 40})};
-  results["slow_peers"][0]["new_field_ms"] = ms(5);
+  results["slow_peers"][0]["new_field_ms"] = steady_ms(5);
   results["slow_peers"][0]["itk_invert_and_warp"] = peer(250);
   results["slow_peers"][0]["vtk_probe"] = peer(99);
   const Floors floors = find_cpu_floors(results);
@@ -85,9 +85,9 @@ TEST(CpuFloors, IdentityIsHeldAgainstTheBytesAndALocalFieldIsToldBesideThem) {
   Json results;
   for (const std::string field : {"identity", "local", "wave"}) {
     results["runs"].push_back(make_run(field));
-    results["runs"].back()["bytes_ms"] = ms(16);
+    results["runs"].back()["bytes_ms"] = steady_ms(16);
   }
-  results["runs"][1]["resting"] = {{"share", 0.25}, {"new_field_ms", ms(9)}};
+  results["runs"][1]["resting"] = {{"share", 0.25}, {"new_field_ms", steady_ms(9)}};
   const Floors floors = find_cpu_floors(results);
   expect_floor(floors, "new field / bytes", "local, slices at rest", 2.25, 2, {}, false);
   expect_floor(floors, "new field / bytes", "identity", 2.5, 2, {}, false);

@@ -13,19 +13,18 @@ namespace {
 
 using test::expect_floor;
 using test::find_floor;
-
-Json ms(double median) { return summarize({median, median, median}); }
+using test::steady_ms;
 
 Json make_run(const std::string& field, double set_field, double resample, std::optional<double> paper = {},
               std::int64_t cell_size = 1, std::int64_t slices = 300) {
   Json run{{"size", {512, 512, slices}},
            {"field", field},
            {"cell_size", cell_size},
-           {"set_field_ms", ms(set_field)},
-           {"resample_ms", ms(resample)},
-           {"new_field_ms", ms(set_field + resample)},
-           {"two_volumes_ms", ms(resample + 0.25)}};
-  if (paper) run["paper_ms"] = ms(*paper);
+           {"set_field_ms", steady_ms(set_field)},
+           {"resample_ms", steady_ms(resample)},
+           {"new_field_ms", steady_ms(set_field + resample)},
+           {"two_volumes_ms", steady_ms(resample + 0.25)}};
+  if (paper) run["paper_ms"] = steady_ms(*paper);
   return run;
 }
 
@@ -44,7 +43,7 @@ TEST(GpuFloors, BytesAreTheVolumesCopyAndHalfTheFields) {
 TEST(GpuFloors, ResampleAndNewFieldHaveEachTheirRatioToThePaper) {
   for (const std::string field : {"identity", "wave", "twist", "bubble", "elastic"}) {
     Json run = make_run(field, 1.0, 1.5, 9.6);
-    run["backward_ms"] = ms(1.2);
+    run["backward_ms"] = steady_ms(1.2);
     const Floors floors = find_gpu_floors(results_of({run}));
     expect_floor(floors, "paper / resample", field, 6.4, 6, true);
     expect_floor(floors, "paper / new field", field, 3.84, 4, false);
@@ -63,7 +62,7 @@ TEST(GpuFloors, AFurtherVolumeIsWhatTwoTakeMoreThanOne) {
 
 TEST(GpuFloors, AnAimThatIsNotReachedIsNoFailure) {
   Json run = make_run("wave", 1.0, 1.0, 12);
-  run["backward_ms"] = ms(0.5);
+  run["backward_ms"] = steady_ms(0.5);
   const Floors floors = find_gpu_floors(results_of({run}));
   EXPECT_FALSE(find_floor(floors, "backward / resample", "wave")->meets(1));
   EXPECT_FALSE(find_floor(floors, "paper / resample", "wave")->meets(15));
@@ -79,8 +78,8 @@ TEST(GpuFloors, HardFieldsAreNoSlowerThanThePaperWithSetFieldCounted) {
 
 TEST(GpuFloors, LargerCellsAreHeldAgainstTheCopyAndTheLargestAgainstGascon) {
   Json small = make_run("wave", 0.1, 0.5, 3, 4), large = make_run("wave", 0.1, 0.51, 3, 16);
-  small["gascon_ms"] = ms(20);
-  large["gascon_ms"] = ms(0.5);
+  small["gascon_ms"] = steady_ms(20);
+  large["gascon_ms"] = steady_ms(0.5);
   const Floors floors = find_gpu_floors(results_of({small, large}));
   expect_floor(floors, "new field / copy", "wave, cells of 4", 6, 6, true);
   expect_floor(floors, "new field / copy", "wave, cells of 16", 6.1, 6, false);
@@ -123,7 +122,10 @@ TEST(GpuFloors, MemoryMayBeATenthOr128MegabytesMoreThanTheData) {
 TEST(GpuFloors, MeshesAreNoSlowerThanGascon) {
   Json results = results_of({});
   const auto mesh = [](std::int64_t cell_size, double resample, double gascon) {
-    return Json{{"field", "wave"}, {"cell_size", cell_size}, {"resample_ms", ms(resample)}, {"gascon_ms", ms(gascon)}};
+    return Json{{"field", "wave"},
+                {"cell_size", cell_size},
+                {"resample_ms", steady_ms(resample)},
+                {"gascon_ms", steady_ms(gascon)}};
   };
   results["meshes"] = {mesh(16, 1, 2.5), mesh(32, 2, 1.9)};
   const Floors floors = find_gpu_floors(results);

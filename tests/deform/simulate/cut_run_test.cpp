@@ -10,7 +10,7 @@
 #include "backend/devices.h"
 #include "backend/factories.h"
 #include "deform/simulate/chainmail.h"
-#include "deform/simulate/cut_surface.h"
+#include "deform/simulate/cuts/cut_surface.h"
 #include "deform/simulate/mass_spring.h"
 #include "deform/simulate/scenario_run.h"
 #include "tests/deform/simulate/scenario_volumes.h"

@@ -14,6 +14,7 @@
 
 #include "io/files/gzip_pieces.h"
 #include "io/image_file.h"
+#include "io/lower_case.h"
 #include "tests/support/image_samples.h"
 #include "tests/support/scratch.h"
 #ifdef TETWARP_WITH_ITK
@@ -26,10 +27,7 @@ namespace {
 const std::vector<std::string> kNames = {"x.mha", "x.nrrd", "x.nii", "x.nii.gz", "X.NRRD"};
 const std::vector<int> kLevels = {-1, 0, 1, 6};
 
-bool is_nifti(std::string name) {
-  for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return name.find(".nii") != std::string::npos;
-}
+bool is_nifti(const std::string& name) { return lower(name).find(".nii") != std::string::npos; }
 
 /// Values that compress, but not to nothing, and do not repeat.
 AnyVolume noisy(const glm::i64vec3& size, VoxelType type, int components) {

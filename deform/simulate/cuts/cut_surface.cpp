@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "deform/simulate/cut_surface.h"
+#include "deform/simulate/cuts/cut_surface.h"
 
 #include <cmath>
 #include <glm/geometric.hpp>

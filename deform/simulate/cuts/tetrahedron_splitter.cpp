@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "deform/simulate/tetrahedron_splitter.h"
+#include "deform/simulate/cuts/tetrahedron_splitter.h"
 
 #include <algorithm>
 #include <cmath>
