@@ -20,7 +20,7 @@ class CpuChainmail final : public Simulation {
       : plan_(model), arena_(cpu::make_arena(limits)), active_(plan_.blocks.size()) {
     const auto count = static_cast<std::size_t>(plan_.nodes());
     for (std::vector<Units>* state : {&now_, &before_, &shown_, &upper_, &lower_}) state->resize(count);
-    spans_.resize(count);
+    ranges_.resize(count);
     moves_.resize(count);
     displacement_.resize(count);
     for (std::size_t n = 0; n < plan_.blocks.size(); ++n) of_colour_[plan_.blocks[n].colour].push_back(n);
@@ -102,8 +102,8 @@ class CpuChainmail final : public Simulation {
     activate_all();
     tighten_all(control);
     return finish([&](std::size_t n) {
-      spans_[n] = span_between(upper_[n], lower_[n]);
-      return clamped(now_[n], spans_[n]);
+      ranges_[n] = range_between(upper_[n], lower_[n]);
+      return clamped(now_[n], ranges_[n]);
     });
   }
 
@@ -112,7 +112,7 @@ class CpuChainmail final : public Simulation {
     const ChainView chain = plan_.view(moves_.data());
     for_nodes([&](std::size_t n) {
       upper_[n] = lower_[n] =
-          relaxed(chain, now_.data(), before_.data(), spans_[n], pace, static_cast<std::int32_t>(n));
+          relaxed(chain, now_.data(), before_.data(), ranges_[n], pace, static_cast<std::int32_t>(n));
     });
     activate_all();
     tighten_all(control);
@@ -190,10 +190,10 @@ class CpuChainmail final : public Simulation {
   std::vector<PlacedNode> placed_;
   std::vector<std::uint8_t> moves_;
   bool has_loads_ = false;
-  std::vector<Units> now_, before_;   ///< within the limits at all times
-  std::vector<Units> shown_;          ///< `now_` with placed nodes at their goals
-  std::vector<Units> upper_, lower_;  ///< the bounds that `tighten` narrows
-  std::vector<Span> spans_;           ///< by node: what placed nodes leave to it
+  std::vector<Units> now_, before_;        ///< within the limits at all times
+  std::vector<Units> shown_;               ///< `now_` with placed nodes at their goals
+  std::vector<Units> upper_, lower_;       ///< the bounds that `tighten` narrows
+  std::vector<DisplacementRange> ranges_;  ///< by node: what placed nodes leave to it
   std::vector<glm::vec3> displacement_;
 };
 
