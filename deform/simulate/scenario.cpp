@@ -39,7 +39,7 @@ struct CutOfPlan {
   }
   std::variant<PlaneCut, DiscCut, SweptCut> operator()(const SweptCutPlan& plan) const {
     SweptCut cut{{}, glm::normalize(plan.along) * mm_of(plan.depth, patient), plan.is_closed};
-    for (const Place& place : plan.path) cut.path.push_back(point_of(place, patient));
+    for (const ScenarioPoint& place : plan.path) cut.path.push_back(point_of(place, patient));
     return cut;
   }
 };

@@ -36,14 +36,14 @@ struct Held {
 
 /// A grip on some tissue, as of forceps.
 struct Handle {
-  Place at;       ///< middle of the grip
-  Length radius;  ///< vertices up to this far away are gripped; if there are none, the nearest vertex
+  ScenarioPoint at;  ///< middle of the grip
+  Length radius;     ///< vertices up to this far away are gripped; if there are none, the nearest vertex
 };
 /// A rotation about an axis through a place.
 struct Rotation {
-  Place about;      ///< a place on the axis
-  glm::dvec3 axis;  ///< direction of the axis in LPS, of any length
-  double degrees;   ///< angle in degrees, by the right-hand rule
+  ScenarioPoint about;  ///< a place on the axis
+  glm::dvec3 axis;      ///< direction of the axis in LPS, of any length
+  double degrees;       ///< angle in degrees, by the right-hand rule
 };
 /// A force that all moved vertices share equally.
 struct Force {
@@ -59,21 +59,21 @@ struct Move {
 
 /// A plane cut before the patient is known.
 struct PlaneCutPlan {
-  Place at;           ///< a place on the plane
+  ScenarioPoint at;   ///< a place on the plane
   glm::dvec3 normal;  ///< in LPS, of any length
 };
 /// A disc cut before the patient is known.
 struct DiscCutPlan {
-  Place at;           ///< centre of the disc
+  ScenarioPoint at;   ///< centre of the disc
   glm::dvec3 normal;  ///< in LPS, of any length
   Length radius;      ///< radius of the disc
 };
 /// A swept cut before the patient is known.
 struct SweptCutPlan {
-  std::vector<Place> path;  ///< at least two places that the blade follows
-  glm::dvec3 along;         ///< direction in which the blade cuts, in LPS, of any length
-  Length depth;             ///< how deep it cuts
-  bool is_closed = false;   ///< whether the last place is joined to the first
+  std::vector<ScenarioPoint> path;  ///< at least two places that the blade follows
+  glm::dvec3 along;                 ///< direction in which the blade cuts, in LPS, of any length
+  Length depth;                     ///< how deep it cuts
+  bool is_closed = false;           ///< whether the last place is joined to the first
 };
 /// A cut before the patient is known.
 struct CutPlan {

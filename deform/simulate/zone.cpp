@@ -115,7 +115,7 @@ struct Selector {
 
 }  // namespace
 
-glm::dvec3 point_of(const Place& place, const Patient& patient) {
+glm::dvec3 point_of(const ScenarioPoint& place, const Patient& patient) {
   if (place.unit == Unit::mm) return place.at;
   const BodyBox& box = box_of(patient);
   return box.low + place.at * (box.high - box.low);
