@@ -52,7 +52,7 @@ struct Sphere {
   Length radius;     ///< its radius
 };
 /// A box with sides along L, P, S.
-struct Box {
+struct AlignedBox {
   ScenarioPoint from,  ///< a corner
       to;              ///< the opposite corner; either may be the lower one
 };
@@ -95,7 +95,7 @@ struct Not {
 /// A set of vertices of a lattice. Scenario files call it a region.
 struct Zone {
   /// How the set is described.
-  std::variant<Sphere, Box, HalfSpace, HuRange, Labels, Border, Body, AllOf, AnyOf, Not> shape;
+  std::variant<Sphere, AlignedBox, HalfSpace, HuRange, Labels, Border, Body, AllOf, AnyOf, Not> shape;
 };
 
 /// For each vertex of the patient's lattice, i fastest: 1 if it lies in the zone, else 0.

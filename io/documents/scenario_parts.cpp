@@ -36,7 +36,7 @@ Zone read_sphere(const JsonEntry& entry) {
 
 Zone read_box(const JsonEntry& entry) {
   only(entry, {"from", "to"});
-  return {Box{read_point(entry.at("from")), read_point(entry.at("to"))}};
+  return {AlignedBox{read_point(entry.at("from")), read_point(entry.at("to"))}};
 }
 
 Zone read_half_space(const JsonEntry& entry) {
