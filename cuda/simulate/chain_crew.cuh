@@ -86,8 +86,8 @@ class Crew {
   }
 
   /// Puts each node where `place` says. @return square of the largest motion of all
-  template <class Place>
-  __device__ std::uint64_t finish(Place&& place) {
+  template <class PlaceNodes>
+  __device__ std::uint64_t finish(PlaceNodes&& place) {
     unsigned long long motion = 0;
     for_nodes([&](std::int32_t n) {
       const Units from = job_.now[n], to = place(n);

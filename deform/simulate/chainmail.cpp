@@ -120,8 +120,8 @@ class CpuChainmail final : public Simulation {
   }
 
   /// Moves each node to where `place` says. @return square of the largest motion
-  template <class Place>
-  std::uint64_t finish(Place&& place) {
+  template <class PlaceNodes>
+  std::uint64_t finish(PlaceNodes&& place) {
     std::vector<std::uint64_t> motion(plan_.blocks.size());
     for_blocks([&](std::size_t block) {
       for (std::int32_t n = plan_.blocks[block].begin; n < plan_.blocks[block].end; ++n) {
