@@ -56,9 +56,9 @@ class MassSpring final : public Simulation {
 
   void set_loads(const Loads& loads) override {
     require_loads(model_, loads);
-    if (!has_loads_ || loads.hold != hold_) {
-      hold_ = loads.hold;
-      roles_ = roles(model_, hold_);
+    if (!has_loads_ || loads.constraint != constraint_) {
+      constraint_ = loads.constraint;
+      roles_ = roles(model_, constraint_);
       least_force_ = rounding();
     }
     engine_->set_loads(loads, roles_);
@@ -93,7 +93,7 @@ class MassSpring final : public Simulation {
     constexpr double kSoftMm = 1e-4, kHardMm = 1e-9;
     double least = 0, most = 0;
     for (std::size_t n = 0; n < model_.nodes(); ++n) {
-      if (roles_[n] != Role::free) continue;
+      if (roles_[n] != SpringRole::free) continue;
       double sum = 0;
       for (int d = 0; d < kDirections; ++d) sum += double{model_.stiffness[model_.link(d, n)]};
       least = least > 0 ? std::min(least, sum) : sum;
@@ -175,8 +175,8 @@ class MassSpring final : public Simulation {
 
   const Model& model_;
   std::unique_ptr<SpringEngine> engine_;
-  std::vector<Hold> hold_;
-  std::vector<Role> roles_;
+  std::vector<Constraint> constraint_;
+  std::vector<SpringRole> roles_;
   double least_force_ = 0;
   bool has_loads_ = false;
 };

@@ -123,7 +123,7 @@ PhaseLoads::PhaseLoads(const Scenario& scenario, const Phase& phase, const Patie
 }
 
 void PhaseLoads::hold(const Scenario& scenario, const Patient& patient) {
-  for (const Held& held : scenario.hold) {
+  for (const HeldZone& held : scenario.hold) {
     const std::vector<std::uint8_t> inside = select(held.zone, patient);
     bool any = false;
     for (std::size_t vertex = 0; vertex < inside.size(); ++vertex) {
@@ -203,14 +203,15 @@ glm::dvec3 PhaseLoads::displacement(std::size_t move, const glm::dvec3& point, d
 }
 
 Loads PhaseLoads::at(double part, const Model& model, std::span<const glm::vec3> start) const {
-  Loads loads{
-      .hold = std::vector<Hold>(model.nodes(), Hold::free), .goal = std::vector<glm::vec3>(model.nodes()), .force = {}};
+  Loads loads{.constraint = std::vector<Constraint>(model.nodes(), Constraint::free),
+              .goal = std::vector<glm::vec3>(model.nodes()),
+              .force = {}};
   if (!force_.empty()) loads.force.resize(model.nodes());
   for (std::size_t vertex = 0; vertex < way_of_.size(); ++vertex) {
     if (!force_.empty()) loads.force[vertex] = static_cast<float>(part) * force_[vertex];
     const std::int32_t way = way_of_[vertex];
     if (way == kFree) continue;
-    loads.hold[vertex] = Hold::placed;
+    loads.constraint[vertex] = Constraint::placed;
     if (way == kHeld) continue;
     const auto n = static_cast<std::int64_t>(vertex);
     const glm::dvec3 x = vertex_point_(glm::dvec3(n % size_.x, n / size_.x % size_.y, n / (size_.x * size_.y)));

@@ -29,7 +29,7 @@ struct TissueClass {
 };
 
 /// Vertices that do not move in any phase.
-struct Held {
+struct HeldZone {
   Zone zone;          ///< which vertices
   std::string entry;  ///< name of the entry in messages: `hold[1] "spine"`
 };
@@ -98,7 +98,7 @@ struct Scenario {
   std::int64_t cell_size = 8;         ///< distance of lattice vertices, voxels
   double body_above_hu = -400;        ///< cells of higher mean HU can belong to the body
   std::vector<TissueClass> tissues;   ///< a cell gets the first whose conditions it meets; the last has no condition
-  std::vector<Held> hold;             ///< what does not move
+  std::vector<HeldZone> hold;         ///< what does not move
   std::vector<CutPlan> cuts;          ///< all cuts of the scenario
   std::vector<Phase> phases;          ///< what is done, in this order
   StoppingRule stop;                  ///< when a frame has settled

@@ -15,16 +15,16 @@
 namespace tetwarp::simulate {
 
 /// Who decides where a node goes.
-enum class Hold : std::uint8_t {
+enum class Constraint : std::uint8_t {
   free,    ///< its links and the force on it
   placed,  ///< its goal; held tissue has the goal of not moving, gripped tissue that of its handle
 };
 
 /// What is done to the nodes of a model. Each array has one entry a node.
 struct Loads {
-  std::vector<Hold> hold;        ///< free or placed
-  std::vector<glm::vec3> goal;   ///< displacement of placed nodes, LPS mm; entries of free nodes are not read
-  std::vector<glm::vec3> force;  ///< force on free nodes, N, LPS; empty: none. ChainMail refuses forces
+  std::vector<Constraint> constraint;  ///< free or placed
+  std::vector<glm::vec3> goal;         ///< displacement of placed nodes, LPS mm; entries of free nodes are not read
+  std::vector<glm::vec3> force;        ///< force on free nodes, N, LPS; empty: none. ChainMail refuses forces
 };
 
 /// When a simulation has settled: when both `motion_mm` and `residual` are reached, or all steps are done.

@@ -95,11 +95,13 @@ Field random_field(std::size_t nodes, Random& random, double most) {
 }
 
 Loads no_loads(const Model& model) {
-  return {.hold = std::vector<Hold>(model.nodes(), Hold::free), .goal = Field(model.nodes()), .force = {}};
+  return {.constraint = std::vector<Constraint>(model.nodes(), Constraint::free),
+          .goal = Field(model.nodes()),
+          .force = {}};
 }
 
 void place(Loads& loads, std::size_t node, const glm::vec3& goal) {
-  loads.hold[node] = Hold::placed;
+  loads.constraint[node] = Constraint::placed;
   loads.goal[node] = goal;
 }
 
@@ -130,7 +132,7 @@ TEST_P(Chainmail, AllLinksStayWithinTheirLimitsAndPlacedNodesAreAtTheirGoals) {
       const Field found = simulation->displacement_on_host();
       EXPECT_TRUE(links_beyond_limits(model, found, 0).empty()) << "after " << steps << " steps";
       for (std::size_t n = 0; n < model.nodes(); ++n) {
-        if (loads.hold[n] == Hold::placed) {
+        if (loads.constraint[n] == Constraint::placed) {
           EXPECT_EQ(found[n], loads.goal[n]);
         }
       }
@@ -344,7 +346,7 @@ TEST_P(Chainmail, AMirroredLatticeGivesTheMirroredBits) {
   const Loads loads = loads_within_limits(model, random);
   Loads other = loads;
   for (std::size_t n = 0; n < model.nodes(); ++n) {
-    other.hold[mirror(n)] = loads.hold[n];
+    other.constraint[mirror(n)] = loads.constraint[n];
     other.goal[mirror(n)] = loads.goal[n] * glm::vec3(-1, 1, 1);
   }
   const Field found = settle(*make(mirrored), other, 40), expected = settle(*make(model), loads, 40);
@@ -356,7 +358,7 @@ std::vector<glm::dvec3> harmonic(const Model& model, const Loads& loads) {
   std::vector<glm::dvec3> u(model.nodes(), glm::dvec3(0));
   for (int sweep = 0; sweep < 4000; ++sweep) {
     for (std::size_t n = 0; n < model.nodes(); ++n) {
-      if (loads.hold[n] == Hold::placed) {
+      if (loads.constraint[n] == Constraint::placed) {
         u[n] = {loads.goal[n].x, loads.goal[n].y, loads.goal[n].z};
         continue;
       }
@@ -507,7 +509,7 @@ TEST_P(Chainmail, WhatCannotBeUsedIsRefused) {
     return refused([&] { simulation->set_loads(loads); });
   };
   EXPECT_TRUE(says(refused([&] { simulation->advance(1, {}); }), {"set_loads"}));
-  EXPECT_TRUE(says(refused_loads([](Loads& loads) { loads.hold.pop_back(); }), {"hold", "8", "found 7"}));
+  EXPECT_TRUE(says(refused_loads([](Loads& loads) { loads.constraint.pop_back(); }), {"hold", "8", "found 7"}));
   EXPECT_TRUE(says(refused_loads([](Loads& loads) { loads.goal.pop_back(); }), {"goal", "8", "found 7"}));
   EXPECT_TRUE(says(refused_loads([](Loads& loads) { loads.force.resize(8); }), {"no forces", "found 8"}));
   EXPECT_TRUE(says(refused_loads([](Loads& loads) { place(loads, 5, {0, NAN, 0}); }), {"goal of node 5", "nan"}));

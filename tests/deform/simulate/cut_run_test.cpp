@@ -121,7 +121,7 @@ class Puppet final : public Simulation {
   void set_loads(const Loads& loads) override { loads_ = loads; }
   Settled advance(double part, const StoppingRule&, const Control&) override {
     for (std::size_t n = 0; n < at_.size(); ++n) {
-      if (loads_.hold[n] == Hold::placed) at_[n] = static_cast<float>(part) * loads_.goal[n];
+      if (loads_.constraint[n] == Constraint::placed) at_[n] = static_cast<float>(part) * loads_.goal[n];
     }
     return {.steps = 1, .reached = true};
   }

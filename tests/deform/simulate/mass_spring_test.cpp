@@ -178,7 +178,7 @@ TEST_P(MassSpring, ReactionsOfALoadedLatticeBearTheLoad) {
     const std::vector<glm::dvec3> force = net_forces(model, displacement(*simulation));
     reaction = glm::dvec3(0);
     for (std::size_t n = 0; n < model.nodes(); ++n) {
-      if (loads.hold[n] == Hold::placed) reaction += force[n];
+      if (loads.constraint[n] == Constraint::placed) reaction += force[n];
     }
     for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(reaction[axis], part * load[axis], 1e-3 * glm::length(load));
   }
@@ -320,7 +320,7 @@ TEST_P(MassSpring, LoadsThatDoNotFitAreRefused) {
     return std::string();
   };
   EXPECT_EQ(refused([](Loads&) {}), "");
-  EXPECT_TRUE(says(refused([](Loads& loads) { loads.hold.pop_back(); }), {"one hold a node", "27", "found 26"}));
+  EXPECT_TRUE(says(refused([](Loads& loads) { loads.constraint.pop_back(); }), {"one hold a node", "27", "found 26"}));
   EXPECT_TRUE(says(refused([](Loads& loads) { loads.goal.pop_back(); }), {"one goal a node", "27", "found 26"}));
   EXPECT_TRUE(says(refused([](Loads& loads) { loads.force.resize(3); }), {"one force a node", "27", "found 3"}));
   EXPECT_TRUE(says(refused([](Loads& loads) { loads.goal[2].y = NAN; }), {"goal of node 2", "nan"}));
@@ -331,12 +331,12 @@ TEST_P(MassSpring, LoadsThatDoNotFitAreRefused) {
                    }),
                    {"force of node 13", "inf"}));
   EXPECT_TRUE(says(refused([](Loads& loads) {
-                     loads.hold.assign(27, Hold::free);
+                     loads.constraint.assign(27, Constraint::free);
                      loads.force.assign(27, glm::vec3(0));
                      loads.force[4].x = 1;
                    }),
                    {"force on node 4", "no placed node"}));
-  EXPECT_EQ(refused([](Loads& loads) { loads.hold.assign(27, Hold::free); }), "");
+  EXPECT_EQ(refused([](Loads& loads) { loads.constraint.assign(27, Constraint::free); }), "");
   EXPECT_TRUE(simulation->advance(1, {}).reached);
   EXPECT_EQ(displacement(*simulation), std::vector<glm::vec3>(27, glm::vec3(0)));
   EXPECT_THROW(simulation->advance(1.5, {}), InputError);

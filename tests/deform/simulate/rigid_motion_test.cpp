@@ -221,7 +221,7 @@ TEST_P(RigidHandles, TakeAlongWhatIsAlreadyStrained) {
     return u + turn.way_of(rest_of(model, n) + u);
   };
   for (std::size_t n = 0; n < model.nodes(); ++n) {
-    if (loads.hold[n] == Hold::placed) place(loads, n, moved(n));
+    if (loads.constraint[n] == Constraint::placed) place(loads, n, moved(n));
   }
   simulation->set_loads(loads);
   EXPECT_TRUE(simulation->advance(1, kTight).reached);
