@@ -62,7 +62,7 @@ json phase_json(const SimulateRecord& record, std::size_t n) {
                  {"frames", record.scenario.phases[n].frames},
                  {"held", loads.held()},
                  {"moved", loads.moved()},
-                 {"pulled", loads.pulled()},
+                 {"pulled", loads.with_force()},
                  {"steps", phase.steps},
                  {"motion_mm", phase.last.motion_mm},
                  {"settled", phase.unsettled == 0},
@@ -157,7 +157,7 @@ std::string describe(const SimulateRecord& record) {
   for (std::size_t n = 0; n < record.scenario.phases.size(); ++n) {
     const PhaseLoads& loads = run.loads(n);
     text += "; " + phase_name(record, n) + std::to_string(loads.held()) + " vertices held, " +
-            std::to_string(loads.moved()) + " moved, " + std::to_string(loads.pulled()) + " pulled";
+            std::to_string(loads.moved()) + " moved, " + std::to_string(loads.with_force()) + " pulled";
   }
   return text;
 }

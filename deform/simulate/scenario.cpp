@@ -115,7 +115,7 @@ PhaseLoads::PhaseLoads(const Scenario& scenario, const Phase& phase, const Patie
                        phase.moves[static_cast<std::size_t>(way_of_[vertex])].entry +
                        " takes to a place of its own; let them be apart");
     }
-    pull(force->newton, vertices[n]);
+    add_force(force->newton, vertices[n]);
   }
   require(scenario.method == Method::chainmail || held_ + moved_ > 0,
           "nothing is held and nothing moved to a place" + (phase.name.empty() ? "" : " in \"" + phase.name + "\"") +
@@ -176,7 +176,7 @@ void PhaseLoads::place(const Phase& phase, std::size_t move, const std::vector<s
   }
 }
 
-void PhaseLoads::pull(const glm::dvec3& newton, const std::vector<std::size_t>& vertices) {
+void PhaseLoads::add_force(const glm::dvec3& newton, const std::vector<std::size_t>& vertices) {
   if (force_.empty()) force_.resize(way_of_.size());
   const glm::dvec3 share = newton / static_cast<double>(vertices.size());
   for (const std::size_t vertex : vertices) {
@@ -190,7 +190,7 @@ bool PhaseLoads::turns() const {
   return std::any_of(ways_.begin(), ways_.end(), [](const Way& way) { return way.radians != 0; });
 }
 
-std::size_t PhaseLoads::pulled() const {
+std::size_t PhaseLoads::with_force() const {
   return static_cast<std::size_t>(
       std::count_if(force_.begin(), force_.end(), [](const glm::vec3& force) { return force != glm::vec3(0); }));
 }

@@ -140,14 +140,14 @@ class PhaseLoads {
   /// Number of vertices with a goal.
   std::size_t moved() const { return moved_; }
   /// Number of vertices with a force and no goal.
-  std::size_t pulled() const;
+  std::size_t with_force() const;
   /// Remarks for people, such as a hold that holds no vertex.
   const std::vector<std::string>& notes() const { return notes_; }
 
  private:
   void hold(const Scenario& scenario, const Patient& patient);
   void place(const Phase& phase, std::size_t move, const std::vector<std::size_t>& vertices);
-  void pull(const glm::dvec3& newton, const std::vector<std::size_t>& vertices);
+  void add_force(const glm::dvec3& newton, const std::vector<std::size_t>& vertices);
   std::vector<std::size_t> free_vertices(const Move& move, const Patient& patient) const;
   glm::dvec3 displacement(std::size_t move, const glm::dvec3& point, double part) const;
 

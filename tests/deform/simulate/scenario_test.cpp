@@ -41,7 +41,7 @@ TEST(Scenario, HeldAndMovedVerticesGoToTheirGoals) {
   const PhaseLoads loads(scenario, scenario.phases[0], patient);
   EXPECT_EQ(loads.held(), kLayer);
   EXPECT_EQ(loads.moved(), kLayer);
-  EXPECT_EQ(loads.pulled(), 0u);
+  EXPECT_EQ(loads.with_force(), 0u);
   EXPECT_FALSE(loads.turns());
   const Model model = make_model(patient.lattice, tissue_of_cells(scenario, patient), std::vector<Tissue>{{}});
   std::vector<glm::vec3> start(model.nodes());
@@ -116,7 +116,7 @@ TEST(Scenario, ForceIsSharedByWhatIsPulled) {
   Scenario scenario = scenario_of({{kBottom, "hold[0]"}}, {pull, pull});
   scenario.method = Method::mass_spring;
   const PhaseLoads loads(scenario, scenario.phases[0], patient);
-  EXPECT_EQ(loads.pulled(), kLayer);
+  EXPECT_EQ(loads.with_force(), kLayer);
   EXPECT_EQ(loads.moved(), 0u);
   const Model model = make_model(patient.lattice, tissue_of_cells(scenario, patient), std::vector<Tissue>{{}});
   const Loads whole = loads.at(1, model, std::vector<glm::vec3>(model.nodes()));
