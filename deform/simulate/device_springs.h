@@ -93,9 +93,9 @@ class DeviceSprings final : public SpringEngine {
 
   void follow(const SolveEffort& effort, std::stop_token stop) override {
     const auto scope = machine_.scope();
-    machine_.each(nodes_, sweeps::Way{{a_}});
+    machine_.each(nodes_, sweeps::PlacedMotion{{a_}});
     make_matrices(Stiffness::laplacian);
-    machine_.each(nodes_, sweeps::Pull{{a_}});
+    machine_.each(nodes_, sweeps::PlacedForces{{a_}});
     conjugate_gradients(effort, stop);
     machine_.each(nodes_, sweeps::Follow{{a_}});
     std::swap(a_.u, a_.trial);
@@ -167,7 +167,7 @@ class DeviceSprings final : public SpringEngine {
       machine_.repeat(kRepeats, [&] {
         machine_.template sum<Sum>(nodes_, sweeps::Bend{{a_}}, sweeps::AfterBend{a_.state});
         machine_.template sum<Sum>(nodes_, sweeps::Descend{{a_}}, sweeps::AfterDescend{a_.state});
-        machine_.each(nodes_, sweeps::Turn{{a_}});
+        machine_.each(nodes_, sweeps::NextDirection{{a_}});
       });
       state = machine_.fetch(a_.state);
     }

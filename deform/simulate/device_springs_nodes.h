@@ -131,7 +131,7 @@ struct Carry : Sweep {
 };
 
 /// Sets p to how far placed nodes have to go.
-struct Way : Sweep {
+struct PlacedMotion : Sweep {
   TETWARP_HD void operator()(std::size_t n) const { a.p[n] = in_float(a.trial[n] - a.u[n]); }
 };
 
@@ -171,7 +171,7 @@ TETWARP_HD inline glm::vec3 product(const DeviceArrays& a, std::size_t n) {
 }
 
 /// Sets r to the forces on free nodes if placed nodes alone went their way.
-struct Pull : Sweep {
+struct PlacedForces : Sweep {
   TETWARP_HD void operator()(std::size_t n) const { a.r[n] = a.is_free(n) ? -product(a, n) : glm::vec3(0); }
 };
 struct Forces : Sweep {
@@ -238,7 +238,7 @@ struct AfterDescend {
 };
 
 /// Sets p = z + share p.
-struct Turn : GradientSweep {
+struct NextDirection : GradientSweep {
   TETWARP_HD void operator()(std::size_t n) const { a.p[n] = a.z[n] + a.state->share * a.p[n]; }
 };
 
