@@ -85,7 +85,7 @@ std::string phase_name(const SimulateRecord& record, std::size_t n) {
 
 const char* name_of(Method method) { return method == Method::chainmail ? "chainmail" : "mass-spring"; }
 
-void add_frame(SimulateRecord& record, const Frame& frame, std::span<const glm::vec3> displacement) {
+void add_frame(SimulateRecord& record, const FrameResult& frame, std::span<const glm::vec3> displacement) {
   record.phases.resize(std::max(record.phases.size(), frame.phase + 1));
   PhaseRecord& phase = record.phases[frame.phase];
   phase.steps += frame.settled.steps;

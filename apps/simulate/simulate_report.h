@@ -36,7 +36,7 @@ struct SimulateRecord {
 };
 
 /// Adds a frame to the record of its phase. @param displacement  of each node; given when the frame ends its phase
-void add_frame(SimulateRecord& record, const simulate::Frame& frame, std::span<const glm::vec3> displacement);
+void add_frame(SimulateRecord& record, const simulate::FrameResult& frame, std::span<const glm::vec3> displacement);
 
 /// The name of a method: "chainmail", "mass-spring".
 const char* name_of(simulate::Method method);

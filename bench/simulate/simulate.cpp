@@ -89,7 +89,7 @@ class Measure {
     ScenarioRun run(scenario_, patient_, factory());
     Json row = row_;
     const Stopwatch watch;
-    const Frame frame = run.next();
+    const FrameResult frame = run.next();
     row["seconds"] = watch.ms() / 1000;
     row.update(settled_json(frame.settled));
     return row;

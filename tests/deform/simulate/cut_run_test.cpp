@@ -69,7 +69,7 @@ TEST(CutRun, FramesAreResampledThroughTheirFields) {
   ScenarioRun loop(scenario, patient, cpu()), hand(scenario, patient, cpu());
   const auto resampler = make_cpu_resampler(small_grid()), other = make_cpu_resampler(small_grid());
   while (!loop.is_done()) {
-    const Frame frame = loop.next();
+    const FrameResult frame = loop.next();
     const Report of_loop = loop.resample(*resampler, {&to_loop, 1});
     hand.next();
     const VertexField field = hand.field();

@@ -210,7 +210,7 @@ TEST(ScenarioRun, PhasesGoOnFromWhereTheOneBeforeLed) {
   EXPECT_EQ(run.displacement(), std::vector<glm::vec3>(kVertices));
   const std::vector<glm::vec3> expected = {{4, 0, 0}, {8, 0, 0}, {6, 1, 0}, {4, 2, 0}, {2, 3, 0}, {0, 4, 0}};
   for (int n = 0; n < 6; ++n) {
-    const Frame frame = run.next();
+    const FrameResult frame = run.next();
     EXPECT_EQ(frame.number, n + 1);
     EXPECT_EQ(frame.phase, n < 2 ? 0u : 1u);
     EXPECT_EQ(frame.ends_phase, n == 1 || n == 5);
