@@ -120,9 +120,9 @@ std::size_t ImageReader::value_count() const {
 void require_readable_file(const std::filesystem::path& path) {
   const std::string file = path.string();
   std::error_code error;
-  const Found found = found_at(path);
-  require(found != Found::nothing, "no such file, " + file);
-  require(found == Found::file, "not a file, " + file);
+  const PathKind kind = kind_at(path);
+  require(kind != PathKind::nothing, "no such file, " + file);
+  require(kind == PathKind::file, "not a file, " + file);
   require(std::filesystem::file_size(path, error) > 0, "an empty file, " + file);
   require(::access(path.c_str(), R_OK) == 0, "a file that may not be read, " + file + "; check its rights");
 }
