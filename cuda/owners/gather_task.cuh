@@ -38,7 +38,7 @@ __host__ __device__ inline glm::ivec3 marches_of(const glm::ivec3& size) {
 }
 
 /// What all kernels of a gather know.
-struct Task {
+struct GatherTask {
   StepLattice lattice;
   NudgeTurns nudge;
   SlabBox box;
