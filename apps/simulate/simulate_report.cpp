@@ -88,9 +88,9 @@ const char* name_of(Method method) { return method == Method::chainmail ? "chain
 void add_frame(SimulateRecord& record, const FrameResult& frame, std::span<const glm::vec3> displacement) {
   record.phases.resize(std::max(record.phases.size(), frame.phase + 1));
   PhaseRecord& phase = record.phases[frame.phase];
-  phase.steps += frame.settled.steps;
-  phase.unsettled += !frame.settled.reached;
-  phase.last = frame.settled;
+  phase.steps += frame.convergence.steps;
+  phase.unsettled += !frame.convergence.reached;
+  phase.last = frame.convergence;
   if (!frame.ends_phase) return;
   for (const glm::vec3& by : displacement) phase.largest_mm = std::max(phase.largest_mm, glm::length(glm::dvec3(by)));
   if (record.scenario.method == Method::chainmail) {

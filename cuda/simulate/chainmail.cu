@@ -72,7 +72,7 @@ class CudaChainmail final : public Simulation {
     TETWARP_CUDA_TRY(cudaStreamSynchronize(nullptr));
   }
 
-  Settled advance(double part, const StoppingRule& rule, const Control& control) override {
+  Convergence advance(double part, const StoppingRule& rule, const Control& control) override {
     require(has_loads_, "advance needs loads: call set_loads first");
     require_valid(part, rule);
     if (control.stop.stop_requested()) throw Cancelled();

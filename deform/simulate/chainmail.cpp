@@ -34,12 +34,12 @@ class CpuChainmail final : public Simulation {
     has_loads_ = true;
   }
 
-  Settled advance(double part, const StoppingRule& rule, const Control& control) override {
+  Convergence advance(double part, const StoppingRule& rule, const Control& control) override {
     require(has_loads_, "advance needs loads: call set_loads first");
     require_valid(part, rule);
-    Settled settled;
-    arena_.execute([&] { settled = run(part, rule, control); });
-    return settled;
+    Convergence convergence;
+    arena_.execute([&] { convergence = run(part, rule, control); });
+    return convergence;
   }
 
   std::span<const glm::vec3> displacement() const override { return displacement_; }
@@ -70,25 +70,25 @@ class CpuChainmail final : public Simulation {
     });
   }
 
-  Settled run(double part, const StoppingRule& rule, const Control& control) {
-    Settled settled;
+  Convergence run(double part, const StoppingRule& rule, const Control& control) {
+    Convergence convergence;
     std::uint64_t motion = follow(part, control);
     Pacer pacer(plan_.momentum, plan_.patience);
     try {
-      while (settled.steps < rule.steps && !settled.reached) {
+      while (convergence.steps < rule.steps && !convergence.reached) {
         motion = relax(pacer.pace, control);
-        ++settled.steps;
-        settled.reached = motion_mm(motion) <= rule.motion_mm;
+        ++convergence.steps;
+        convergence.reached = motion_mm(motion) <= rule.motion_mm;
         pacer.follow(motion);
-        if (control.progress) control.progress(static_cast<double>(settled.steps) / rule.steps);
+        if (control.progress) control.progress(static_cast<double>(convergence.steps) / rule.steps);
       }
     } catch (const Cancelled&) {
       show(part);
       throw;
     }
-    settled.motion_mm = motion_mm(motion);
+    convergence.motion_mm = motion_mm(motion);
     show(part);
-    return settled;
+    return convergence;
   }
 
   /// Makes the first step of ChainMail, the chain: nodes move as far as placed ones force them to.

@@ -101,7 +101,7 @@ struct Scenario {
   std::vector<HeldZone> hold;         ///< what does not move
   std::vector<CutPlan> cuts;          ///< all cuts of the scenario
   std::vector<Phase> phases;          ///< what is done, in this order
-  StoppingRule stop;                  ///< when a frame has settled
+  StoppingRule stop;                  ///< when a frame has converged
 };
 
 /// Number of frames of all phases.

@@ -21,7 +21,7 @@ struct FrameResult {
   int number = 0;           ///< from 1, counted over all phases
   std::size_t phase = 0;    ///< index of its phase
   bool ends_phase = false;  ///< whether it is the last frame of its phase
-  Settled settled;          ///< how the simulation settled
+  Convergence convergence;  ///< how the simulation converged
 };
 
 /// A scenario that is played on a patient, frame by frame.

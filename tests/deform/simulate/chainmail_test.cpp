@@ -265,10 +265,10 @@ TEST_P(Chainmail, RestStaysRest) {
   for (std::size_t n = 0; n < model.nodes(); n += 17) place(loads, n, {});
   const auto simulation = make(model);
   simulation->set_loads(loads);
-  const Settled settled = simulation->advance(1, {});
-  EXPECT_EQ(settled.steps, 1);
-  EXPECT_EQ(settled.motion_mm, 0);
-  EXPECT_TRUE(settled.reached);
+  const Convergence convergence = simulation->advance(1, {});
+  EXPECT_EQ(convergence.steps, 1);
+  EXPECT_EQ(convergence.motion_mm, 0);
+  EXPECT_TRUE(convergence.reached);
   for (const glm::vec3& u : simulation->displacement_on_host()) EXPECT_EQ(u, glm::vec3(0));
 }
 
@@ -282,8 +282,8 @@ TEST_P(Chainmail, APulledVertexDragsTheOthersJustAsFarAsGibsonsRuleSays) {
   place(loads, vertex_at(grid, at.x, at.y, at.z), goal);
   const auto simulation = make(model);
   simulation->set_loads(loads);
-  const Settled settled = simulation->advance(1, {.steps = 0});
-  EXPECT_EQ(settled.steps, 0);
+  const Convergence convergence = simulation->advance(1, {.steps = 0});
+  EXPECT_EQ(convergence.steps, 0);
   const Field found = simulation->displacement_on_host();
   for (int k = 0; k < 11; ++k) {
     for (int j = 0; j < 13; ++j) {
@@ -327,7 +327,7 @@ TEST_P(Chainmail, AnyNumberOfThreadsAndAnyBackendGiveTheSameBits) {
     const auto first = make_cpu_chainmail(model, {.threads = 1}), second = make(model);
     first->set_loads(loads);
     second->set_loads(loads);
-    const Settled on_cpu = first->advance(0.7, rule), here = second->advance(0.7, rule);
+    const Convergence on_cpu = first->advance(0.7, rule), here = second->advance(0.7, rule);
     EXPECT_EQ(on_cpu.steps, here.steps);
     EXPECT_EQ(on_cpu.motion_mm, here.motion_mm);
     EXPECT_EQ(on_cpu.reached, here.reached);
@@ -391,9 +391,9 @@ TEST_P(Chainmail, WhereNoLimitBindsItEndsAtTheHarmonicState) {
   }
   const auto simulation = make(model);
   simulation->set_loads(loads);
-  const Settled settled = simulation->advance(1, {.motion_mm = 3e-4});
-  EXPECT_TRUE(settled.reached);
-  EXPECT_LT(settled.steps, 200);
+  const Convergence convergence = simulation->advance(1, {.motion_mm = 3e-4});
+  EXPECT_TRUE(convergence.reached);
+  EXPECT_LT(convergence.steps, 200);
   const std::vector<glm::dvec3> expected = harmonic(model, loads);
   const Field found = simulation->displacement_on_host();
   for (std::size_t n = 0; n < found.size(); ++n) {

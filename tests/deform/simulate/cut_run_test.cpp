@@ -119,7 +119,7 @@ class Puppet final : public Simulation {
  public:
   Puppet(const Model& model, std::vector<std::vector<glm::vec3>>& begun) : at_(model.nodes()), begun_(begun) {}
   void set_loads(const Loads& loads) override { loads_ = loads; }
-  Settled advance(double part, const StoppingRule&, const Control&) override {
+  Convergence advance(double part, const StoppingRule&, const Control&) override {
     for (std::size_t n = 0; n < at_.size(); ++n) {
       if (loads_.constraint[n] == Constraint::placed) at_[n] = static_cast<float>(part) * loads_.goal[n];
     }

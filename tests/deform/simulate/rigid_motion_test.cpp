@@ -170,8 +170,9 @@ class RigidHandles : public testing::TestWithParam<SpringMethod> {
     for (const std::size_t n : placed) place(loads, n, moved(n));
     const auto simulation = GetParam().make(model);
     simulation->set_loads(loads);
-    const Settled settled = simulation->advance(1, {});
-    EXPECT_TRUE(settled.reached) << settled.steps << " steps, " << settled.motion_mm << ", " << settled.residual;
+    const Convergence convergence = simulation->advance(1, {});
+    EXPECT_TRUE(convergence.reached) << convergence.steps << " steps, " << convergence.motion_mm << ", "
+                                     << convergence.residual;
     return furthest(displacement(*simulation), moved);
   }
 };

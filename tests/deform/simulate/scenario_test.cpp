@@ -179,7 +179,7 @@ class Puppet final : public Simulation {
     from_ = now_;
     ++log_.loads;
   }
-  Settled advance(double part, const StoppingRule&, const Control&) override {
+  Convergence advance(double part, const StoppingRule&, const Control&) override {
     log_.parts.push_back(part);
     for (std::size_t n = 0; n < now_.size(); ++n) {
       if (loads_.constraint[n] == Constraint::placed)
