@@ -46,9 +46,9 @@ struct MappedVoxels {
 /// @param owners        number of owners of each voxel, where `out.owners` is wanted; else null
 /// @param out           written, a value for each voxel of the box
 /// @param counts        conflicts and voxels with several owners are added
-__global__ void settle_kernel(DeviceField field, LatticeFrame whole, bool rest_outside, SlabBox box,
-                              const unsigned long long* owner, const unsigned* owners, MappedVoxels out,
-                              Counts* counts) {
+__global__ void map_voxels_kernel(DeviceField field, LatticeFrame whole, bool rest_outside, SlabBox box,
+                                  const unsigned long long* owner, const unsigned* owners, MappedVoxels out,
+                                  Counts* counts) {
   const std::int64_t n = thread_of_grid();
   if (n >= box.count()) return;
   const glm::i64vec3 voxel = box.voxel(n);
@@ -305,9 +305,9 @@ class LatticeResampler final : public CudaResampler<ForwardResampler> {
     }
     const DeviceField& field = lattice_->field();
     claims_.claim(field, box, writer.wants_owners(), stream_);
-    settle_kernel<<<blocks_for(box.count()), kThreads, 0, stream_>>>(field, frame_, rest_outside_, box, claims_.owner(),
-                                                                     writer.wants_owners() ? claims_.owners() : nullptr,
-                                                                     mapped, counts_.data());
+    map_voxels_kernel<<<blocks_for(box.count()), kThreads, 0, stream_>>>(
+        field, frame_, rest_outside_, box, claims_.owner(), writer.wants_owners() ? claims_.owners() : nullptr, mapped,
+        counts_.data());
     TETWARP_CUDA_TRY(cudaGetLastError());
     paths_.claimed += static_cast<std::uint64_t>(voxels);
   }

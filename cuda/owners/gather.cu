@@ -84,8 +84,8 @@ __global__ void number_kernel(const std::uint32_t* several, std::int64_t words, 
 /// @param owner   of each number, the lowest number of an owner, or kNobody: from `claim_wanted_kernel`
 /// @param sink    gets all of them
 template <class Sink>
-__global__ void settle_kernel(GatherTask task, glm::ivec3 begin, const unsigned* voxels, unsigned count,
-                              const unsigned long long* owner, Sink sink) {
+__global__ void write_claimed_kernel(GatherTask task, glm::ivec3 begin, const unsigned* voxels, unsigned count,
+                                     const unsigned long long* owner, Sink sink) {
   const unsigned n = blockIdx.x * kThreads + threadIdx.x;
   if (n >= count) return;
   const int words = task.single.words_per_row, rows = task.size().y;
@@ -211,7 +211,7 @@ void Gather::claim_several(const Task& task, const DeviceField& field, const Sin
     numbered_.fill(0, 1, stream);
     number_kernel<<<blocks_for(words), kThreads, 0, stream>>>(wanted.bits, words, rank, numbered_.data(), voxels);
     claims_.claim(field, slab, wanted, count, stream);
-    settle_kernel<<<blocks_for(static_cast<std::int64_t>(count)), kThreads, 0, stream>>>(
+    write_claimed_kernel<<<blocks_for(static_cast<std::int64_t>(count)), kThreads, 0, stream>>>(
         task, glm::ivec3(slab.begin), voxels, static_cast<unsigned>(count), claims_.owner(), sink);
     TETWARP_CUDA_TRY(cudaGetLastError());
   }
