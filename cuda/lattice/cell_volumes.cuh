@@ -75,7 +75,7 @@ __device__ __noinline__ Seen around_exactly(const StepPass& pass, glm::ivec3 at,
   return seen;
 }
 
-/// Likewise the centre of a cell.
+/// The tetrahedron in the centre of a cell, out of line as `around_exactly` is.
 __device__ __noinline__ Seen centre_exactly(glm::vec3 a, glm::vec3 b, glm::vec3 c, float turn) {
   Seen seen;
   add_exactly(a, b, c, turn, seen);
