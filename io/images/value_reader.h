@@ -31,7 +31,7 @@ struct ValueLayout {
 
 /// The reader throws InputError for data that end too soon or are damaged. A zlib stream and gzip data must have right
 /// check sums, hold exactly the values, and end the file, which MetaIO and NrrdIO of ITK 5.2.1 do not ask: they take a
-/// truncated stream for whole, leave the rest of the buffer as it was, and look at no check sum of gzip.
+/// truncated stream for whole, leave what it lacks of the buffer as it was, and look at no check sum of gzip.
 std::unique_ptr<ImageReader> make_value_reader(const std::filesystem::path& path, ImageHeader header,
                                                const StoredVoxels& stored, const ValueLayout& layout);
 
