@@ -18,7 +18,7 @@ enum class BackendKind : std::uint8_t {
 
 /// What is wished to run on. Which backend comes of it, `chosen` says.
 enum class BackendChoice : std::uint8_t {
-  automatic,  ///< a device where one works, else the CPU; the bits are the same
+  automatic,  ///< a device where one works, else the CPU; the bits are the same, but for mass-spring
   cpu,        ///< the CPU
   cuda        ///< a CUDA device; where none works, what is made there throws
 };
@@ -33,7 +33,8 @@ const char* name_of(BackendKind kind);
 /// All words that `backend_choice` takes, as help shows them.
 std::vector<std::string> backend_words();
 
-/// The backend that a choice means on this machine, now.
+/// The backend that a choice means on this machine, now. It does not throw: `cuda` stays CUDA where no device works,
+/// and what is then made for it throws.
 BackendKind chosen(BackendChoice choice);
 /// Whether a backend works on a device, which has memory of its own and may fail.
 bool runs_on_device(BackendKind kind);

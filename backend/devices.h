@@ -11,15 +11,17 @@ namespace tetwarp {
 bool has_cuda();
 /// Number of CUDA devices that this process can use; 0 without a driver, and in a build without CUDA.
 int device_count();
-/// Makes the driver do now what the first use of a device costs, a fraction of a second. Without such a device nothing
-/// happens.
+/// Makes the driver do now what the first use of a device costs, a fraction of a second, so that other work can go on
+/// meanwhile. Without such a device nothing happens.
+/// @param device  from 0, below `device_count()`: the number that CUDA gives it, after CUDA_VISIBLE_DEVICES
 void wake_device(int device);
 /// Name and memory of a device: "NVIDIA H200, 150 GB".
 /// @throws DeviceError without such a device
 /// @throws NotCompiled in a build without CUDA
 std::string describe_device(int device);
 
-/// A stream of a device, for `Control::stream`. Work queued on it waits for no other work on the device.
+/// A stream of a device, for `Control::stream`: a queue whose work runs in order and waits for no other work on the
+/// device. It must outlive the calls that it is given to.
 class DeviceStream {
  public:
   /// Makes a stream of the device with this number.

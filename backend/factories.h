@@ -42,7 +42,7 @@ class AnyResampler {
  public:
   /// No resampler.
   AnyResampler() = default;
-  /// Makes a resampler of fields of this direction; for the rest see `make_forward_resampler`.
+  /// Makes a resampler of fields of this direction; the other parameters are those of `make_forward_resampler`.
   AnyResampler(BackendKind backend, Direction direction, const Geometry& output, int device = 0,
                const Limits& limits = {});
 

@@ -68,7 +68,7 @@ std::int64_t MeshLocator::cell_on_axis(int axis, double at) const {
   return std::clamp<std::int64_t>(cell, 0, cells_[axis] - 1);
 }
 
-std::optional<MeshLocator::Found> MeshLocator::find(const glm::dvec3& steps) const {
+std::optional<MeshLocator::Location> MeshLocator::find(const glm::dvec3& steps) const {
   glm::i64vec3 cell;
   for (int axis = 0; axis < 3; ++axis) {
     const double in = (steps[axis] - low_[axis]) / cell_[axis];
@@ -76,7 +76,7 @@ std::optional<MeshLocator::Found> MeshLocator::find(const glm::dvec3& steps) con
     cell[axis] = cell_on_axis(axis, steps[axis]);
   }
   const auto number = static_cast<std::size_t>((cell.z * cells_.y + cell.y) * cells_.x + cell.x);
-  std::optional<Found> nearest;
+  std::optional<Location> nearest;
   double least_outside = -kOutside;
   for (const std::uint32_t* t = lists_.begin(number); t != lists_.end(number); ++t) {
     const RestCorners at(mesh_.tetrahedron(*t));
@@ -85,13 +85,13 @@ std::optional<MeshLocator::Found> MeshLocator::find(const glm::dvec3& steps) con
     const glm::dmat3 weights_from_place = glm::inverse(edges);
     const glm::dvec3 w = weights_from_place * (steps - at.d);
     const double of_d = 1 - w.x - w.y - w.z;
-    if (std::min({w.x, w.y, w.z, of_d}) >= -kRounding) return Found{*t, w};
+    if (std::min({w.x, w.y, w.z, of_d}) >= -kRounding) return Location{*t, w};
     const glm::dmat3 rows = glm::transpose(weights_from_place);  // how fast each weight changes from place to place
     const double distance = std::min({w.x / glm::length(rows[0]), w.y / glm::length(rows[1]),
                                       w.z / glm::length(rows[2]), of_d / glm::length(rows[0] + rows[1] + rows[2])});
     if (distance <= least_outside) continue;
     least_outside = distance;
-    nearest = Found{*t, w};
+    nearest = Location{*t, w};
   }
   return nearest;
 }

@@ -19,14 +19,14 @@ class MeshLocator {
   explicit MeshLocator(const SnappedMesh& mesh);
 
   /// A tetrahedron and the weights of its corners A, B, C at a point.
-  struct Found {
+  struct Location {
     std::uint32_t tetrahedron;
     glm::dvec3 weights;
   };
   /// The tetrahedron with the lowest number that holds the point; if there is none, the nearest that is at most 2^-12
   /// voxel away.
   /// @param steps  output index in 2^-12 voxel, not rounded
-  std::optional<Found> find(const glm::dvec3& steps) const;
+  std::optional<Location> find(const glm::dvec3& steps) const;
 
  private:
   std::int64_t cell_on_axis(int axis, double at) const;

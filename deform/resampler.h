@@ -125,7 +125,7 @@ struct FieldOptions {
   bool jacobian_range = true;
 };
 
-/// Takes each part of a region when `Resampler::resample` is done with it, so that it can be used while the rest is
+/// Takes each part of a region when `Resampler::resample` is done with it, so that it can be used while the others are
 /// made. Parts are whole slices of the region, none twice, together the whole region. Outputs in host memory, and
 /// `Target::sampled_slices`, have their last values there. Calls come from any thread, perhaps several at a time; what
 /// one throws ends `resample`.

@@ -32,8 +32,8 @@ Residuals inverse_after_forward(const VertexField& field, const PullField& inver
                                 const Control& control = {});
 
 /// Both residuals of an inverse that arrives slab by slab: only one slab and the slice before it are held. The results
-/// are those of `forward_after_inverse` and `inverse_after_forward` on the whole inverse; only the mean of the latter
-/// may round differently, depending on the split.
+/// are those of `forward_after_inverse` and `inverse_after_forward` on the whole inverse; only the mean of
+/// `inverse_after_forward` may round differently, depending on the split.
 class InverseCheck {
  public:
   /// @param field   field in host memory, which must outlive this object unchanged

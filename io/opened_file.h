@@ -14,20 +14,20 @@
 namespace tetwarp {
 
 /// What lies under a name that is to be read, links followed.
-enum class Found { nothing, file, folder };
+enum class PathKind { nothing, file, folder };
 
 /// The one place that decides what a reader is given.
 /// @throws InputError for what is neither file nor folder: a pipe, a socket or a device may never come to an end; and,
 /// in the system's words, where it does not say what is there: no right to look, a name too long, links in a circle
-Found found_at(const std::filesystem::path& path);
-inline bool is_folder(const std::filesystem::path& path) { return found_at(path) == Found::folder; }
-inline bool is_file(const std::filesystem::path& path) { return found_at(path) == Found::file; }
+PathKind kind_at(const std::filesystem::path& path);
+inline bool is_folder(const std::filesystem::path& path) { return kind_at(path) == PathKind::folder; }
+inline bool is_file(const std::filesystem::path& path) { return kind_at(path) == PathKind::file; }
 
 /// What std::filesystem threw, as a message of ours: the system's words, the path, what to do.
 std::string message_of(const std::filesystem::filesystem_error& error);
 
 /// The bytes of a file, from the first on. @throws InputError that says in the system's words why it cannot be read,
-/// and what `found_at` throws
+/// and what `kind_at` throws
 std::ifstream opened(const std::filesystem::path& path);
 
 /// A regular file, opened once. Small reads are served from one piece of 16 KiB, so that the header of a slice takes

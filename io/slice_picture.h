@@ -10,7 +10,7 @@
 
 namespace tetwarp {
 
-enum class Plane : std::uint8_t { axial, coronal, sagittal };
+enum class AnatomicalPlane : std::uint8_t { axial, coronal, sagittal };
 
 /// A grid axis along one side of a picture.
 struct PictureAxis {
@@ -27,7 +27,7 @@ struct PictureAxis {
 /// Each patient axis is shown by a grid axis of its own, the three nearest as a whole; an oblique grid is shown along
 /// its own axes, with the letters of the nearest patient directions.
 struct Slice {
-  Plane plane = Plane::axial;
+  AnatomicalPlane plane = AnatomicalPlane::axial;
   PictureAxis right, down;
   int normal_axis = 2;     ///< grid axis across the slice
   std::int64_t voxel = 0;  ///< index along it
@@ -41,7 +41,7 @@ struct Slice {
 std::array<int, 3> patient_to_grid_axes(const Geometry& geometry);
 
 /// The slice through the middle of the grid (of two middle ones the lower index).
-Slice middle_slice(const Geometry& geometry, Plane plane);
+Slice middle_slice(const Geometry& geometry, AnatomicalPlane plane);
 
 /// The slice on width x height pixels, rows from the top: linear between voxel centres, the outer ones continued.
 /// Reads just the voxels that it shows. @throws InputError unless the view has one component and holds the whole grid

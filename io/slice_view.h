@@ -28,7 +28,7 @@ struct SliceViewOptions {
 };
 
 /// The slice nearest to a point. @throws InputError for a point outside the grid
-Slice slice_through(const Geometry& geometry, Plane plane, const glm::dvec3& point);
+Slice slice_through(const Geometry& geometry, AnatomicalPlane plane, const glm::dvec3& point);
 
 /// The voxels of a slice.
 Region region_of(const Geometry& geometry, const Slice& slice);

@@ -175,7 +175,7 @@ std::vector<std::string> Reader::arguments_of(const ManifestRow& row, const Plac
 
 void Reader::check_files(const DeformOptions& options) {
   const auto exists = [](const fs::path& path) {
-    require(found_at(path) != Found::nothing,
+    require(kind_at(path) != PathKind::nothing,
             "no such file or folder, " + shown(path) + "; paths are relative to the manifest");
   };
   exists(options.input.path);

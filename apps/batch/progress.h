@@ -19,9 +19,14 @@ namespace tetwarp::apps {
 /// tells of patients.
 class BatchProgress {
  public:
-  enum class Form { none, person, machine };
+  enum class Form {
+    none,    ///< nothing but what no file of the batch says either (--quiet)
+    person,  ///< lines, and at a terminal a bar
+    machine  ///< JSON Lines (--log-json)
+  };
 
   explicit BatchProgress(Form form);
+  /// Removes the bar.
   ~BatchProgress();
   BatchProgress(const BatchProgress&) = delete;
   BatchProgress& operator=(const BatchProgress&) = delete;
@@ -30,10 +35,13 @@ class BatchProgress {
   void begin(std::size_t cases, std::size_t finished);
   /// Tells that a case was started. Several threads may call `started`, `ended` and `warn` at a time.
   void started(const std::string& id);
+  /// Tells that a case was done, failed or was refused, with the reason.
   void ended(const CaseOutcome& outcome);
+  /// Tells a warning about the batch, one line without "warning: ".
   void warn(const std::string& text);
   /// Tells of finished cases that are made again. @param reason  "the row has changed"
   void again(const std::string& reason, const std::vector<std::string>& ids);
+  /// Draws the bar anew, for a person at a terminal after the first second. The runner calls it from time to time.
   void draw();
   /// Tells the end of the batch. @param summary  numbers of cases, for a machine
   void end(const nlohmann::json& summary);

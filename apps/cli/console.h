@@ -12,7 +12,8 @@
 namespace tetwarp::apps {
 
 /// Takes the numbers of standard streams that the caller has closed, so that no file that is opened gets one: messages
-/// would go into it. To be called first. Whoever reads or writes such a stream fails, as before.
+/// would go into it. To be called first. Whoever reads or writes such a stream fails, as
+/// with a closed one.
 void hold_closed_streams();
 
 /// Turns what ends a program from outside (Ctrl-C, TERM, a hangup, Ctrl-\, a limit of time, USR1 and the like) into a

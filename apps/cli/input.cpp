@@ -124,7 +124,7 @@ std::string describe(const DicomSeries& series, std::size_t number) {
          number_text(spacing.y) + " x " + number_text(spacing.z) + " mm";
 }
 
-void refuse_pipes(const std::filesystem::path& path) { found_at(path); }
+void refuse_pipes(const std::filesystem::path& path) { kind_at(path); }
 
 InputHeader open_input(const InputOptions& options, const Control& control, bool components) {
   refuse_pipes(options.path);

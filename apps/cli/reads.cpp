@@ -31,20 +31,20 @@ std::vector<fs::path> Reads::slices(const InputOptions& opened, const InputHeade
       if (files.empty() || files.back() != slice.file) files.push_back(slice.file);
     }
   };
-  for (const One& one : all_) {
-    if (!one.is_volume) continue;
-    if (one.volume == opened)
+  for (const Input& input : all_) {
+    if (!input.is_volume) continue;
+    if (input.volume == opened)
       add(header);
-    else if (!has_image_suffix(one.volume.path))
-      add(open_input(one.volume, {.stop = interrupt_token()}, true));
+    else if (!has_image_suffix(input.volume.path))
+      add(open_input(input.volume, {.stop = interrupt_token()}, true));
   }
   return files;
 }
 
 std::vector<std::string> Reads::digests(int threads) const {
   std::vector<std::string> digests;
-  for (const One& one : all_)
-    digests.push_back(one.is_volume ? hash_volume(one.volume, threads) : hash_file(one.volume.path));
+  for (const Input& input : all_)
+    digests.push_back(input.is_volume ? hash_volume(input.volume, threads) : hash_file(input.volume.path));
   return digests;
 }
 

@@ -35,11 +35,11 @@ class Reads {
   std::vector<std::string> digests(int threads) const;
 
  private:
-  struct One {
+  struct Input {
     InputOptions volume;  ///< of a file its path alone
     bool is_volume = false;
   };
-  std::vector<One> all_;
+  std::vector<Input> all_;
   std::vector<std::filesystem::path> paths_;
 };
 

@@ -34,7 +34,7 @@ void write_preview_picture(const DeformRun& run, const std::filesystem::path& st
   const std::string title = title_of(run.request);
   if (*before.geometry == grid) return write_preview(staged, before, after, title);
   AnyVolume on_grid(grid, run.inputs.input->volume.type());
-  const PullField none = resting_pull_field(grid);
+  const PullField none = zero_pull_field(grid);
   const auto resampler = make_cpu_pull_resampler(grid, {.threads = run.request.options.common.threads});
   resampler->set_field(view(none, Outside::background));
   const Target target{

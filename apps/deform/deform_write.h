@@ -7,12 +7,23 @@
 
 namespace tetwarp::apps {
 
-/// Writes what is not written yet, under hidden names: the last are the sidecar and the report.
-/// @param sinks  which got their parts while these were made; they end here
+/// The last two stages of `tetwarp deform` and of a case of `batch`, after the pass (deform_pass.h) has made the
+/// results.
+///
+/// Writes what is not written yet: OUTPUT, volumes that go along, structure sets, and last the sidecar and the report.
+/// All files have hidden names in the folders of their outputs until `commit_outputs`, so that an output appears whole
+/// or not at all.
+/// @param run           the request, and what the stages before made
+/// @param sinks         files of maps and of a series, which got their parts while these were made; they are closed
+/// here
+/// @param outputs       where the files are put; an exception before `commit_outputs` removes them
 /// @param input_sha256  of INPUT, as sidecars give it
+/// @return  what only writing tells, for `deform_report.h`
+/// @throws Error where a file cannot be written; Cancelled
 DeformWritten write_outputs(const DeformRun& run, DeformSinks sinks, DeformOutputs& outputs, std::string input_sha256);
 
-/// Gives the outputs their names. Meanwhile what the stages hold is freed.
+/// Gives the outputs their names, replacing files that had them. Meanwhile other threads free the volumes and the field
+/// that the stages made. @throws Error where a name cannot be given
 void commit_outputs(DeformOutputs& outputs, DeformInputs inputs, DeformField field, DeformResult result);
 
 }  // namespace tetwarp::apps

@@ -16,16 +16,16 @@ namespace tetwarp::apps {
 
 namespace {
 
-struct Kind {
+struct MapKind {
   const char* name;  ///< of the option, and the key of sidecars
   MapPlace place;
   std::filesystem::path MapOptions::*file;
 };
 /// All maps, in the order in which they are begun.
-constexpr std::array<Kind, 4> kKinds = {{{"coverage", &Maps::coverage, &MapOptions::coverage},
-                                         {"jacobian", &Maps::jacobian, &MapOptions::jacobian},
-                                         {"folds", &Maps::owners, &MapOptions::folds},
-                                         {"inverse", &Maps::inverse_mm, &MapOptions::inverse}}};
+constexpr std::array<MapKind, 4> kKinds = {{{"coverage", &Maps::coverage, &MapOptions::coverage},
+                                            {"jacobian", &Maps::jacobian, &MapOptions::jacobian},
+                                            {"folds", &Maps::owners, &MapOptions::folds},
+                                            {"inverse", &Maps::inverse_mm, &MapOptions::inverse}}};
 
 std::unique_ptr<ImageWriter> create_map(const WantedMap& map, const Geometry& grid, const DerivedSeriesWriter* series) {
   if (map.file.empty()) return nullptr;
@@ -48,7 +48,7 @@ bool has_registration_suffix(const std::filesystem::path& path) { return lower(p
 
 std::vector<WantedMap> wanted_maps(const MapOptions& files, std::span<const MapPlace> needed) {
   std::vector<WantedMap> maps;
-  for (const Kind& kind : kKinds) {
+  for (const MapKind& kind : kKinds) {
     const std::filesystem::path& file = files.*kind.file;
     if (!file.empty() || std::ranges::find(needed, kind.place) != needed.end()) maps.push_back({kind.place, file});
   }
@@ -84,7 +84,7 @@ void add_maps(const std::vector<WantedMap>& maps, const Geometry& grid, const De
 
 nlohmann::json maps_json(const MapOptions& files) {
   nlohmann::json names = nlohmann::json::object();
-  for (const Kind& kind : kKinds) {
+  for (const MapKind& kind : kKinds) {
     if (!(files.*kind.file).empty()) names[kind.name] = (files.*kind.file).string();
   }
   return names;

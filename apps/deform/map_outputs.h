@@ -13,13 +13,14 @@
 
 namespace tetwarp::apps {
 
+/// Refuses a map that could not be written. @param option  that names the path, for the message
 /// @throws UsageError unless the path is empty or has the suffix of a volume file
 void require_image_suffix(const std::filesystem::path& path, const char* option);
 
 /// Whether the name of an inverse means a DICOM Deformable Spatial Registration: .dcm.
 bool has_registration_suffix(const std::filesystem::path& path);
 
-/// One of the maps of `Maps`.
+/// One of the maps of `Maps` (deform/resampler.h): coverage, Jacobian, number of owners, or inverse.
 using MapPlace = VolumeView Maps::*;
 
 /// A map that a run makes.
@@ -38,12 +39,12 @@ std::vector<WantedMap> wanted_maps(const MapOptions& files, std::span<const MapP
 /// @throws UsageError for a suffix that is not one of a volume file, and for a map that a pull field does not have
 void check_maps(const MapOptions& files, bool pulls, bool series);
 
-/// Memory of maps while they are made. @param grid  of the output
+/// Bytes of the maps while they are made. @param grid  of the output
 std::uint64_t map_bytes(const std::vector<WantedMap>& maps, const Geometry& grid);
 /// Begins their files. @param series  OUTPUT, if it is a DICOM series. @throws Error where one cannot be written
 void add_maps(const std::vector<WantedMap>& maps, const Geometry& grid, const DerivedSeriesWriter* series,
               MapStream& stream);
-/// Names of the files, by option.
+/// Names of the files that were asked for, by the name of their option, for the sidecar.
 nlohmann::json maps_json(const MapOptions& files);
 
 }  // namespace tetwarp::apps

@@ -81,7 +81,7 @@ nlohmann::json place_json(const AnyField& field) {
   return place_json(std::get<VertexField>(field));
 }
 
-PullField resting_pull_field(const Geometry& output) {
+PullField zero_pull_field(const Geometry& output) {
   Geometry corners = output;
   corners.size = glm::i64vec3(2);
   corners.spacing = output.spacing * glm::dvec3(output.size - std::int64_t{1});

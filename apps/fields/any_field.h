@@ -34,7 +34,7 @@ nlohmann::json place_json(const VertexField& field);
 nlohmann::json place_json(const AnyField& field);
 
 /// A pull field in which nothing moves: it takes a volume from its own grid onto `output`.
-PullField resting_pull_field(const Geometry& output);
+PullField zero_pull_field(const Geometry& output);
 
 /// Makes a resampler of fields of the direction of `field`. @throws what AnyResampler's constructor throws
 AnyResampler make_resampler_for(const AnyField& field, const Geometry& output, const Worker& worker,

@@ -58,7 +58,7 @@ NamedField named_file(const std::string& text, ParsedFile file) {
 NamedField parse_forward_field(const std::string& text, NiftiFrame frame) {
   if (is_formula(text)) return parse_named_formula(text);
   ParsedFile file = parse_file(text, frame);
-  if (found_at(file.source.path) == Found::nothing)
+  if (kind_at(file.source.path) == PathKind::nothing)
     throw UsageError("\"" + text + "\" is neither a formula nor a file that exists; see tetwarp deform --help");
   return named_file(text, std::move(file));
 }

@@ -107,8 +107,9 @@ std::optional<glm::dvec3> Rendering::position() const {
 
 std::vector<Slice> Rendering::slices() const {
   std::vector<Slice> slices;
-  for (const auto& [name, plane] :
-       {std::pair{"axial", Plane::axial}, {"coronal", Plane::coronal}, {"sagittal", Plane::sagittal}}) {
+  for (const auto& [name, plane] : {std::pair{"axial", AnatomicalPlane::axial},
+                                    {"coronal", AnatomicalPlane::coronal},
+                                    {"sagittal", AnatomicalPlane::sagittal}}) {
     if (options_.view != "montage" && options_.view != name) continue;
     const std::optional<glm::dvec3> point = position();
     slices.push_back(point ? slice_through(scene_.grid(), plane, *point) : middle_slice(scene_.grid(), plane));
@@ -120,7 +121,7 @@ std::vector<Slice> Rendering::slices() const {
 Window Rendering::chosen_window() const {
   constexpr int kSamples = 256;
   std::vector<double> values;
-  for (const Plane plane : {Plane::axial, Plane::coronal, Plane::sagittal}) {
+  for (const AnatomicalPlane plane : {AnatomicalPlane::axial, AnatomicalPlane::coronal, AnatomicalPlane::sagittal}) {
     const std::vector<double> of_plane =
         sample_slice(scene_.volume(), middle_slice(scene_.grid(), plane), kSamples, kSamples);
     values.insert(values.end(), of_plane.begin(), of_plane.end());

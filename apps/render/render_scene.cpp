@@ -140,7 +140,7 @@ void RenderScene::read() {
     input_ = read_input(input_options_, header_, options_.common, stage.control());
   }
   if (!deforms_ && grid_ != header_.geometry) {  // then it is resampled onto a straight, even grid
-    field_ = resting_pull_field(grid_);
+    field_ = zero_pull_field(grid_);
     notes_.push_back("the slices of VOLUME lean or lie at uneven distances: it is shown resampled onto " +
                      to_string(grid_.size) + " voxels");
     deforms_ = true;

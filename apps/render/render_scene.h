@@ -49,22 +49,26 @@ struct OwnedOverlay {
   std::shared_ptr<const AnyVolume> map;
 };
 
-/// The volume that `render` shows, frame by frame as it is deformed: by a field that grows from frame to frame, or by
-/// one field after the other.
+/// The volume that `render` shows, frame by frame as it is deformed: by a field that grows from frame to frame, from
+/// nothing in the first to its full amount in the last, or by one field after the other. With one frame the field has
+/// its full amount. Call `read` once, then for each frame `show`, and what tells of it.
 class RenderScene {
  public:
-  /// Opens the volume. Keeps references to options and fields.
-  /// @throws UsageError for an overlay that lacks the field that it is of; and whatever else `open_input`
-  /// throws
+  /// Opens the volume: afterwards `header` and `grid` are known. Keeps references to options and fields, which must
+  /// outlive this.
+  /// @throws UsageError for an overlay that lacks the field that it is of; and whatever `open_input` throws
   RenderScene(const RenderOptions& options, const RenderFields& fields);
   ~RenderScene();
 
+  /// Reads the volume, the field and the files of overlays. @throws InputError for what cannot be read
   void read();
+  /// How many frames there are: 1 without a field that grows and without a sequence.
   std::size_t frames() const;
-  /// Deforms the volume for a frame.
+  /// Deforms the volume for a frame. @param frame  from 0
   void show(std::size_t frame);
 
   const InputHeader& header() const { return header_; }
+  /// The grid that is shown: that of the volume, or a straight and even one around it.
   const Geometry& grid() const { return grid_; }
   ConstVolumeView volume() const;  ///< the volume of the frame that is shown
   /// The lattice field that moves the volume in this frame; null: there is none.
@@ -74,7 +78,9 @@ class RenderScene {
   OwnedOverlay overlay(const OverlayWish& wish, const Region& region);
   /// What deforms the volume, for the title: "wave:amplitude=8, then twist.mha", without folders; empty: nothing does.
   std::string field_title(std::size_t frame) const;
+  /// What deforms the volume, "cpu" or "cuda"; empty before the first frame, and where nothing is deformed.
   const std::string& backend() const { return backend_; }
+  /// Remarks on what was read, for people.
   const std::vector<std::string>& notes() const { return notes_; }
 
  private:

@@ -108,7 +108,7 @@ void Simulating::simulate(ScenarioRun& run, SimulateRecord& record) {
   for (int done = 0; !run.is_done(); ++done) {
     const Control control{.progress = [&](double part) { whole.progress((done + part) / run.frames()); },
                           .stop = whole.stop};
-    const Frame frame = run.next(control);
+    const FrameResult frame = run.next(control);
     const bool is_wanted = staged != outputs_.frames.end() && staged->first == frame.number;
     const std::vector<glm::vec3> displacement = frame.ends_phase ? run.displacement() : std::vector<glm::vec3>();
     add_frame(record, frame, displacement);

@@ -62,7 +62,7 @@ json phase_json(const SimulateRecord& record, std::size_t n) {
                  {"frames", record.scenario.phases[n].frames},
                  {"held", loads.held()},
                  {"moved", loads.moved()},
-                 {"pulled", loads.pulled()},
+                 {"pulled", loads.with_force()},
                  {"steps", phase.steps},
                  {"motion_mm", phase.last.motion_mm},
                  {"settled", phase.unsettled == 0},
@@ -85,12 +85,12 @@ std::string phase_name(const SimulateRecord& record, std::size_t n) {
 
 const char* name_of(Method method) { return method == Method::chainmail ? "chainmail" : "mass-spring"; }
 
-void add_frame(SimulateRecord& record, const Frame& frame, std::span<const glm::vec3> displacement) {
+void add_frame(SimulateRecord& record, const FrameResult& frame, std::span<const glm::vec3> displacement) {
   record.phases.resize(std::max(record.phases.size(), frame.phase + 1));
   PhaseRecord& phase = record.phases[frame.phase];
-  phase.steps += frame.settled.steps;
-  phase.unsettled += !frame.settled.reached;
-  phase.last = frame.settled;
+  phase.steps += frame.convergence.steps;
+  phase.unsettled += !frame.convergence.reached;
+  phase.last = frame.convergence;
   if (!frame.ends_phase) return;
   for (const glm::vec3& by : displacement) phase.largest_mm = std::max(phase.largest_mm, glm::length(glm::dvec3(by)));
   if (record.scenario.method == Method::chainmail) {
@@ -157,7 +157,7 @@ std::string describe(const SimulateRecord& record) {
   for (std::size_t n = 0; n < record.scenario.phases.size(); ++n) {
     const PhaseLoads& loads = run.loads(n);
     text += "; " + phase_name(record, n) + std::to_string(loads.held()) + " vertices held, " +
-            std::to_string(loads.moved()) + " moved, " + std::to_string(loads.pulled()) + " pulled";
+            std::to_string(loads.moved()) + " moved, " + std::to_string(loads.with_force()) + " pulled";
   }
   return text;
 }

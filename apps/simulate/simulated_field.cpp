@@ -60,12 +60,12 @@ SimulatedField simulate_field(const DeformOptions& options, const Scenario& scen
   }
   SimulateRecord record{of, scenario, patient, *run, name_of(backend)};
   for (int done = 0; !run->is_done(); ++done) {
-    const Frame frame = run->next({.progress =
-                                       [&](double part) {
-                                         if (control.progress) control.progress((done + part) / run->frames());
-                                       },
-                                   .stop = control.stop,
-                                   .stream = worker.stream});
+    const FrameResult frame = run->next({.progress =
+                                             [&](double part) {
+                                               if (control.progress) control.progress((done + part) / run->frames());
+                                             },
+                                         .stop = control.stop,
+                                         .stream = worker.stream});
     add_frame(record, frame, frame.ends_phase ? run->displacement() : std::vector<glm::vec3>());
   }
   result.field = run->field();

@@ -16,9 +16,9 @@ namespace tetwarp::apps {
 
 /// The files that a simulated field is made of, other than INPUT, with their SHA-256.
 struct SimulationSource {
-  std::string scenario, scenario_sha256;
-  std::string labels, labels_sha256;  ///< empty: there are no labels
-  std::string method, backend;
+  std::string scenario, scenario_sha256;  ///< path as it was given, and hash of the file
+  std::string labels, labels_sha256;      ///< empty: there are no labels
+  std::string method, backend;            ///< "chainmail" or "mass-spring"; "cpu" or "cuda"
 };
 
 /// The field that `deform --scenario` makes: that of the end of the last phase, which `simulate` would write.
@@ -30,12 +30,15 @@ struct SimulatedField {
 
 /// Simulates a scenario.
 /// @param options  names the file that `scenario` was read from, and its labels
-/// @param ct       INPUT in HU
+/// @param ct       INPUT in HU, whole
+/// @param worker   the device and stream to compute on
+/// @param control  progress counts frames; stopping throws Cancelled
 /// @throws InputError for a scenario that cannot be played on it, and whatever a simulation throws
 SimulatedField simulate_field(const DeformOptions& options, const simulate::Scenario& scenario,
                               const ConstVolumeView& ct, const Worker& worker, const Control& control);
 
-/// About how many bytes a simulation and its field take, beside INPUT.
+/// About how many bytes a simulation and its field take, beside INPUT. @param volume  grid of INPUT
+/// @param labels  whether a volume of labels of the same size is read too
 std::uint64_t simulation_bytes(const simulate::Scenario& scenario, const Geometry& volume, bool labels);
 
 /// Refuses a format that cannot hold the field of a phase: only a mesh can hold open cuts. @param every_phase  whether

@@ -159,7 +159,7 @@ void add_coarse(const Found& found, Floors& floors) {
     floors.at_least("gascon / mesh resample", where_of(run), number(run, "/gascon_ms"), number(run, "/resample_ms"), 1);
 }
 
-/// Twice the slices may cost 5 % more than twice the time; other lengths likewise in proportion.
+/// N times the slices may cost 5 % more than N times the time.
 void add_long(const Found& found, Floors& floors) {
   constexpr double kMore = 1.05;
   const Json& size = found.document["size"];

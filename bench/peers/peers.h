@@ -17,7 +17,8 @@ namespace tetwarp::bench {
 /// memory to an output in memory, i fastest, which it gives back; what it allocates the first time is kept. Empty where
 /// this build has no such program.
 using Peer = std::function<std::span<const std::int16_t>()>;
-/// The same of the inverse of a displacement field: undeformed minus deformed place.
+/// What people use to invert a displacement field. Like `Peer`, it runs once on what it was made for; it gives back the
+/// undeformed minus the deformed place of each voxel.
 using InversePeer = std::function<std::span<const glm::vec3>()>;
 
 /// What a peer works on. Everything must stay while the peer is used.

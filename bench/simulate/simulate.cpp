@@ -59,11 +59,11 @@ class FramePictures {
   std::vector<std::uint8_t> rgb_;
 };
 
-Json settled_json(const Settled& settled) {
-  return {{"steps", settled.steps},
-          {"motion_mm", settled.motion_mm},
-          {"residual", settled.residual},
-          {"reached", settled.reached}};
+Json convergence_json(const Convergence& convergence) {
+  return {{"steps", convergence.steps},
+          {"motion_mm", convergence.motion_mm},
+          {"residual", convergence.residual},
+          {"reached", convergence.reached}};
 }
 
 /// The first phase of a scenario by one method on one backend.
@@ -83,15 +83,15 @@ class Measure {
     scenario_.phases.resize(1);
   }
 
-  /// In one go, from rest until it has settled. The time is that of `advance` alone.
+  /// In one go, from rest until it has converged. The time is that of `advance` alone.
   Json settle() {
     scenario_.phases[0].frames = 1;
     ScenarioRun run(scenario_, patient_, factory());
     Json row = row_;
     const Stopwatch watch;
-    const Frame frame = run.next();
+    const FrameResult frame = run.next();
     row["seconds"] = watch.ms() / 1000;
-    row.update(settled_json(frame.settled));
+    row.update(convergence_json(frame.convergence));
     return row;
   }
 
@@ -108,12 +108,12 @@ class Measure {
     const Target& target = volumes.target;
     std::optional<FramePictures> pictures;
     if (!options_.render.empty()) pictures.emplace(options_, volume_.geometry, on_cuda_);
-    Settled last;
+    Convergence last;
     Stopwatch whole;
     const auto one_frame = [&](Samples& times) {
       const Stopwatch watch;
       if (times.empty()) whole = watch;
-      last = run.next().settled;
+      last = run.next().convergence;
       const double simulated = watch.ms();
       run.resample(*resampler, {&target, 1}, Outside::background, {}, {.jacobian_range = false});
       const double resampled = watch.ms();
@@ -128,7 +128,7 @@ class Measure {
     row.update({{"steps", options_.steps_a_frame}, {"frames_per_second", 1000 * options_.frames / whole.ms()}});
     if (pictures) pictures->turn(times);
     for (const auto& [name, ms] : times) row[name] = summarize(ms);
-    row["last"] = settled_json(last);
+    row["last"] = convergence_json(last);
     return row;
   }
 
@@ -149,7 +149,7 @@ class Measure {
   const bool is_chainmail_, on_cuda_;
 };
 
-/// A run that has not settled misses its floor however short it was.
+/// A run that has not converged misses its floor however short it was.
 Floors find_floors(const Json& document) {
   Floors floors;
   const auto where = [](const Json& run) {

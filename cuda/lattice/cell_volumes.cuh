@@ -75,7 +75,7 @@ __device__ __noinline__ Seen around_exactly(const StepPass& pass, glm::ivec3 at,
   return seen;
 }
 
-/// Likewise the centre of a cell.
+/// The tetrahedron in the centre of a cell, out of line as `around_exactly` is.
 __device__ __noinline__ Seen centre_exactly(glm::vec3 a, glm::vec3 b, glm::vec3 c, float turn) {
   Seen seen;
   add_exactly(a, b, c, turn, seen);
@@ -87,14 +87,14 @@ constexpr float kError = 8.0f / (1 << 24);  ///< that of `detail::edge_determina
 /// Six times a signed volume, in two ways: as the Jacobian determinant is defined, and fused, where only its sign
 /// counts.
 template <bool kRange>
-struct Volume;
+struct VolumeArithmetic;
 template <>
-struct Volume<true> {
+struct VolumeArithmetic<true> {
   __device__ static detail::Cross cross(const glm::vec3& a, const glm::vec3& b) { return detail::cross(a, b); }
   __device__ static float dot(const glm::vec3& a, const detail::Cross& n) { return detail::dot(a, n); }
 };
 template <>
-struct Volume<false> {
+struct VolumeArithmetic<false> {
   __device__ static detail::Cross cross(const glm::vec3& a, const glm::vec3& b) {
     return {fmaf(a.y, b.z, -(a.z * b.y)), fmaf(a.z, b.x, -(a.x * b.z)), fmaf(a.x, b.y, -(a.y * b.x))};
   }
@@ -113,10 +113,10 @@ struct Around {
     bound = kError * ((both(edges.x) * both(edges.y)) * both(edges.z));
 #pragma unroll
     for (int n = 0; n < 4; ++n) {
-      const detail::Cross normal = Volume<kRange>::cross(edges.y[n & 1], edges.z[n >> 1]);
+      const detail::Cross normal = VolumeArithmetic<kRange>::cross(edges.y[n & 1], edges.z[n >> 1]);
       const float sign = (n & 1) != n >> 1 ? -1.0f : 1.0f;
-      volumes[2 * n] = sign * Volume<kRange>::dot(edges.x[0], normal);
-      volumes[2 * n + 1] = -sign * Volume<kRange>::dot(edges.x[1], normal);
+      volumes[2 * n] = sign * VolumeArithmetic<kRange>::dot(edges.x[0], normal);
+      volumes[2 * n + 1] = -sign * VolumeArithmetic<kRange>::dot(edges.x[1], normal);
       least = fminf(least, fminf(volumes[2 * n], volumes[2 * n + 1]));
     }
   }
@@ -160,7 +160,7 @@ struct Centre {
     b.z += to.z;
     c.x += to.x;
     c.y += to.y;
-    const float determinant = Volume<kRange>::dot(a, Volume<kRange>::cross(b, c));
+    const float determinant = VolumeArithmetic<kRange>::dot(a, VolumeArithmetic<kRange>::cross(b, c));
     volume = kEvenCell ? -determinant : determinant;
     bound = kError * ((norm1(a) * norm1(b)) * norm1(c));
   }

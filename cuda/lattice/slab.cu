@@ -308,7 +308,7 @@ void SlabWriter::finish() {
   if (has_results_on_host()) downloads_.finish();
 }
 
-void SlabWriter::settle() noexcept {
+void SlabWriter::wait_for_all() noexcept {
   cudaStreamSynchronize(stream_);
   try {
     downloads_.finish();

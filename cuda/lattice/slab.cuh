@@ -239,7 +239,7 @@ class SlabWriter {
   /// Waits until the host has everything.
   void finish();
   /// Waits until nothing runs any more, whether or not it failed.
-  void settle() noexcept;
+  void wait_for_all() noexcept;
 
  private:
   /// A target, and what of it lies on the device.

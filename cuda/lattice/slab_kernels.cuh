@@ -25,7 +25,7 @@ struct DeviceSlices {
 /// @param plan        the source, and how it is sampled  @param components  of a voxel
 /// @param slab        the box
 /// @param mapped      for each voxel of the box, in their order: 1 where it comes from anywhere, else 0
-/// @param offset      likewise: undeformed minus deformed place, voxels
+/// @param offset      for each voxel of the box: undeformed minus deformed place, voxels
 /// @param output      written
 /// @param coverage    for each voxel, written: whether it comes from inside the source; or null
 /// @param slices      widened, or null  @param counts  added to; or null

@@ -67,7 +67,7 @@ Report CudaResampler<Base>::resample(Region region, std::span<const Target> targ
   try {
     return report_of(write_region(region, control, finished), maps);
   } catch (...) {
-    writer_->settle();
+    writer_->wait_for_all();
     throw;
   }
 }

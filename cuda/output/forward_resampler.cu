@@ -30,7 +30,7 @@ namespace {
 constexpr std::uint64_t kStepVertexBytes = sizeof(glm::vec3) + 1, kVertexBytes = kStepVertexBytes + sizeof(Vertex);
 
 /// What is written of each voxel of a box, in the order of the voxels.
-struct Settled {
+struct MappedVoxels {
   std::uint8_t* mapped;   ///< 1 where it comes from anywhere, else 0
   glm::vec3* offset;      ///< undeformed minus deformed place, voxels
   float* jacobian;        ///< determinant of its owner, NaN where nobody owns it; or null
@@ -46,8 +46,9 @@ struct Settled {
 /// @param owners        number of owners of each voxel, where `out.owners` is wanted; else null
 /// @param out           written, a value for each voxel of the box
 /// @param counts        conflicts and voxels with several owners are added
-__global__ void settle_kernel(DeviceField field, LatticeFrame whole, bool rest_outside, SlabBox box,
-                              const unsigned long long* owner, const unsigned* owners, Settled out, Counts* counts) {
+__global__ void map_voxels_kernel(DeviceField field, LatticeFrame whole, bool rest_outside, SlabBox box,
+                                  const unsigned long long* owner, const unsigned* owners, MappedVoxels out,
+                                  Counts* counts) {
   const std::int64_t n = thread_of_grid();
   if (n >= box.count()) return;
   const glm::i64vec3 voxel = box.voxel(n);
@@ -296,17 +297,17 @@ class LatticeResampler final : public CudaResampler<ForwardResampler> {
 
   void map_box(const SlabBox& box, SlabWriter& writer) override {
     const auto voxels = static_cast<std::size_t>(box.count());
-    const Settled settled{mapped_.mapped.reserve(voxels), mapped_.offset.reserve(voxels), writer.jacobian(),
-                          writer.owners()};
+    const MappedVoxels mapped{mapped_.mapped.reserve(voxels), mapped_.offset.reserve(voxels), writer.jacobian(),
+                              writer.owners()};
     if (can_map_plainly(writer)) {
-      count_paths(box, gather_.run(*lattice_, box, OffsetSink{box, settled.mapped, settled.offset}, stream_));
+      count_paths(box, gather_.run(*lattice_, box, OffsetSink{box, mapped.mapped, mapped.offset}, stream_));
       return;
     }
     const DeviceField& field = lattice_->field();
     claims_.claim(field, box, writer.wants_owners(), stream_);
-    settle_kernel<<<blocks_for(box.count()), kThreads, 0, stream_>>>(field, frame_, rest_outside_, box, claims_.owner(),
-                                                                     writer.wants_owners() ? claims_.owners() : nullptr,
-                                                                     settled, counts_.data());
+    map_voxels_kernel<<<blocks_for(box.count()), kThreads, 0, stream_>>>(
+        field, frame_, rest_outside_, box, claims_.owner(), writer.wants_owners() ? claims_.owners() : nullptr, mapped,
+        counts_.data());
     TETWARP_CUDA_TRY(cudaGetLastError());
     paths_.claimed += static_cast<std::uint64_t>(voxels);
   }

@@ -16,7 +16,7 @@ namespace tetwarp::cuda_detail {
 namespace {
 
 /// What is known of the voxels of a box, and where it goes; a value for each voxel, in their order.
-struct Settling {
+struct VoxelMapping {
   const unsigned* owner;         ///< lowest number of an owner, or kNoTetrahedron
   const unsigned* at_rest;       ///< owner in the undeformed mesh; null: nothing stays outside
   const std::uint16_t* several;  ///< number of owners; null: not wanted
@@ -30,7 +30,7 @@ struct Settling {
 ///
 /// @param of      read and written, as its members say
 /// @param counts  conflicts and voxels with several owners are added
-__global__ void settle_mesh_kernel(MeshRaster::View mesh, SlabBox box, Settling of, Counts* counts) {
+__global__ void map_mesh_voxels_kernel(MeshRaster::View mesh, SlabBox box, VoxelMapping of, Counts* counts) {
   const std::int64_t n = thread_of_grid();
   if (n >= box.count()) return;
   const glm::i64vec3 voxel = box.voxel(n);
@@ -120,10 +120,10 @@ class MeshResampler final : public CudaResampler<ForwardResampler> {
       return raster_.run(box, OffsetSink{box, mapped, offset}, stream_);
     raster_.run(box, OwnerSink{box, owner_.reserve(voxels), writer.owners()}, stream_);
     if (stays_outside_) rest_.run(box, OwnerSink{box, at_rest_.reserve(voxels), nullptr}, stream_);
-    const Settling settling{
+    const VoxelMapping mapping{
         owner_.data(), stays_outside_ ? at_rest_.data() : nullptr, writer.owners(), mapped, offset, writer.jacobian()};
-    settle_mesh_kernel<<<blocks_for(box.count()), kThreads, 0, stream_>>>(raster_.view(), box, settling,
-                                                                          counts_.data());
+    map_mesh_voxels_kernel<<<blocks_for(box.count()), kThreads, 0, stream_>>>(raster_.view(), box, mapping,
+                                                                              counts_.data());
     TETWARP_CUDA_TRY(cudaGetLastError());
   }
 

@@ -21,7 +21,7 @@ namespace {
 ///
 /// @param frame   its samples are in device memory
 /// @param mapped  written, one for each voxel of the box in their order: 1 where it comes from anywhere, else 0
-/// @param offset  written likewise: undeformed minus deformed place, voxels
+/// @param offset  written, one for each voxel of the box: undeformed minus deformed place, voxels
 __global__ void pull_kernel(PullFrame frame, SlabBox box, std::uint8_t* mapped, glm::vec3* offset) {
   const std::int64_t n = thread_of_grid();
   if (n < box.count()) mapped[n] = frame.offset_at(box.voxel(n), offset[n]);

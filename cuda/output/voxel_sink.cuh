@@ -96,7 +96,7 @@ __device__ inline bool SinkLayout::locate(const glm::ivec3& voxel, const glm::ve
   const auto is_below = [](int index, int end) { return static_cast<unsigned>(index) < static_cast<unsigned>(end); };
   origin.base = source_index(base);
   return is_below(base.x, last.x) & is_below(base.y, last.y) & is_below(base.z, last.z) &
-         (fmaxf(origin.fraction.y, origin.fraction.z) < 1.0f);  // as above
+         (fmaxf(origin.fraction.y, origin.fraction.z) < 1.0f);  // a fraction that was rounded to 1 must be carried
 }
 
 __device__ inline bool SinkLayout::locate_exactly(const glm::ivec3& voxel, const glm::vec3& u, Origin& origin) const {

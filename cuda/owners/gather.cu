@@ -24,7 +24,7 @@ constexpr unsigned kClaimedAtOnce = 1u << 22;  ///< voxels, or those of a slice
 /// @param task  what the walk does not reach either is added to `several`
 /// @param walk  tetrahedra that it may pass; 0: none  @param sink  gets the voxels that are found
 template <class Sink>
-__global__ void queue_kernel(Task task, int walk, Sink sink) {
+__global__ void queue_kernel(GatherTask task, int walk, Sink sink) {
   const unsigned count = min(task.counters->queued, kQueueSize);
   const glm::ivec3 size = task.size();
   unsigned covered = 0;
@@ -85,8 +85,8 @@ __global__ void number_kernel(const std::uint32_t* several, std::int64_t words, 
 /// @param owner   of each number, the lowest number of an owner, or kNobody: from `claim_wanted_kernel`
 /// @param sink    gets all of them
 template <class Sink>
-__global__ void settle_kernel(Task task, glm::ivec3 begin, const unsigned* voxels, unsigned count,
-                              const unsigned long long* owner, Sink sink) {
+__global__ void write_claimed_kernel(GatherTask task, glm::ivec3 begin, const unsigned* voxels, unsigned count,
+                                     const unsigned long long* owner, Sink sink) {
   const unsigned n = blockIdx.x * kThreads + threadIdx.x;
   if (n >= count) return;
   const int words = task.single.words_per_row, rows = task.size().y;
@@ -113,16 +113,16 @@ Gather::Counters Gather::run(const LatticeOnDevice& lattice, const SlabBox& box,
   coverage_.begin(box, stream);
   const glm::ivec3 size(box.size), tile(kSeedTile, kSeedTile, kMarch);
   const glm::ivec3 marches = marches_of(size);
-  Task task{field.steps,
-            NudgeTurns(field.frame.nudge),
-            box,
-            {},
-            nullptr,
-            lattice.moving_blocks(),
-            resting_.reserve(std::size_t(marches.x) * std::size_t(marches.y) * std::size_t(marches.z)),
-            (size + tile - 1) / tile,
-            queue_.reserve(kQueueSize),
-            coverage_.counters()};
+  GatherTask task{field.steps,
+                  NudgeTurns(field.frame.nudge),
+                  box,
+                  {},
+                  nullptr,
+                  lattice.moving_blocks(),
+                  resting_.reserve(std::size_t(marches.x) * std::size_t(marches.y) * std::size_t(marches.z)),
+                  (size + tile - 1) / tile,
+                  queue_.reserve(kQueueSize),
+                  coverage_.counters()};
   const std::int64_t seeds = std::int64_t{task.seeds.x} * task.seeds.y * task.seeds.z;
   glm::vec3* seeded = seeds_.reserve(static_cast<std::size_t>(seeds));
   if (!beside_) beside_.emplace();
@@ -165,7 +165,7 @@ Gather::Counters Gather::run_intervals(const LatticeOnDevice& lattice, const Sla
   coverage_.forget(box, stream);
   intervals_.mark_left(lattice, box, coverage_.several(), stream);
   coverage_.count_several(box, stream);
-  Task task{lattice.field().steps, NudgeTurns(lattice.field().frame.nudge), box};
+  GatherTask task{lattice.field().steps, NudgeTurns(lattice.field().frame.nudge), box};
   task.single = coverage_.single();
   task.counters = coverage_.counters();
   claim_several(task, lattice.field(), sink, stream);
@@ -207,7 +207,7 @@ void Gather::claim_several(const Task& task, const DeviceField& field, const Sin
     numbered_.fill(0, 1, stream);
     number_kernel<<<blocks_for(words), kThreads, 0, stream>>>(wanted.bits, words, rank, numbered_.data(), voxels);
     claims_.claim(field, slab, wanted, count, stream);
-    settle_kernel<<<blocks_for(static_cast<std::int64_t>(count)), kThreads, 0, stream>>>(
+    write_claimed_kernel<<<blocks_for(static_cast<std::int64_t>(count)), kThreads, 0, stream>>>(
         task, glm::ivec3(slab.begin), voxels, static_cast<unsigned>(count), claims_.owner(), sink);
     TETWARP_CUDA_TRY(cudaGetLastError());
   }

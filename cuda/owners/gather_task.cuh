@@ -38,12 +38,12 @@ __host__ __device__ inline glm::ivec3 marches_of(const glm::ivec3& size) {
 }
 
 /// What all kernels of a gather know.
-struct Task {
+struct GatherTask {
   StepLattice lattice;
   NudgeTurns nudge;
   SlabBox box;
   BitRows single;          ///< a bit for each voxel of the box that has one owner: from `Coverage`
-  std::uint32_t* several;  ///< a bit for each that is to be claimed, rows alike; the walk adds to them
+  std::uint32_t* several;  ///< a bit for each that is to be claimed, laid out as `single`; the walk adds to them
   MovingBlocks moving;     ///< from `step_pass_kernel`
   std::uint8_t* resting;   ///< of each march, whether all that it needs is at rest; i fastest: from `rest_kernel`
   glm::ivec3 seeds;        ///< how many on each axis

@@ -68,7 +68,7 @@ __device__ RowInterval exact(const IntervalTile& tile, unsigned entry, int y, in
 /// The bits of an interval that is not empty.
 __device__ unsigned bits_of(const RowInterval& in) { return lowest_bits(in.end - in.begin) << in.begin; }
 
-__device__ void mark(const IntervalTile& tile, const RowInterval& in, Row& row, unsigned entry) {
+__device__ void mark(const IntervalTile& tile, const RowInterval& in, IntervalRow& row, unsigned entry) {
   if (in.is_empty()) return;
   const unsigned bits = bits_of(in);
   if ((atomicOr(&row.covered, bits) & bits) != 0) {  // then this tile is done again
@@ -87,7 +87,7 @@ __device__ void mark_item(const IntervalTile& tile, unsigned batch, unsigned ite
   const unsigned entry = batch + static_cast<unsigned>(slot);
   const RowSpan span = RowSpan::of(memory.spans[entry]);
   const RowsAlongZ rows(tile.faces_of(slot), y);
-  Row* row = &memory.rows[span.z_begin * kTileJ + y];
+  IntervalRow* row = &memory.rows[span.z_begin * kTileJ + y];
 #pragma unroll 1
   for (int z = span.z_begin; z < span.z_end; ++z, row += kTileJ) {
     bool is_certain = false;
@@ -130,7 +130,7 @@ __device__ void mark_in_order(const IntervalTile& tile, unsigned batch, unsigned
   TileMemory& memory = tile.memory;
   if (tile.thread >= kTileRows) return;
   const int y = tile.thread % kTileJ, z = tile.thread / kTileJ;
-  Row& row = memory.rows[tile.thread];
+  IntervalRow& row = memory.rows[tile.thread];
   unsigned covered = row.covered;
 #pragma unroll 1
   for (int slot = 0; slot < static_cast<int>(slots); ++slot) {
@@ -174,7 +174,7 @@ __device__ void rasterise(const IntervalTile& tile, bool in_order) {
 /// Where nobody owns, an interval of nobody's starts. A thread a row.
 __device__ void mark_holes(const IntervalTile& tile) {
   if (tile.thread >= kTileRows) return;
-  Row& row = tile.memory.rows[tile.thread];
+  IntervalRow& row = tile.memory.rows[tile.thread];
   const unsigned holes = ~row.covered, starts = holes & ~(holes << 1);
   for (unsigned left = starts; left != 0; left &= left - 1) row.owner[first_bit(left)] = kNoOwner;
   row.starts |= starts;

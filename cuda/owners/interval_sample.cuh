@@ -73,10 +73,10 @@ struct ColumnSampler {
   __device__ unsigned sample() const {
     const int lane = tile.lane(), y = tile.warp();
     if (lane >= tile.size.x || y >= tile.size.y) return 0;
-    const Row* row = &tile.memory.rows[y];
+    const IntervalRow* row = &tile.memory.rows[y];
     const unsigned up_to_lane = lowest_bits(lane + 1);
     const auto next_slot = [&]() -> unsigned {
-      const Row& of = *row;
+      const IntervalRow& of = *row;
       row += kTileJ;
       return of.owner[last_bit(of.starts & up_to_lane)];
     };

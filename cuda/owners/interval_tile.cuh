@@ -141,7 +141,7 @@ constexpr unsigned short kNoOwner = 0xFFFF;  ///< an entry that no list has
 ///                                                                                        -: kNoOwner, nobody's
 ///
 /// So the owner of a voxel stands where the last interval starts that does not start behind it.
-struct Row {
+struct IntervalRow {
   unsigned short owner[kTileI];  ///< where an interval starts: entry of its tetrahedron among `numbers`, or kNoOwner
   unsigned starts;               ///< a bit where one does
   unsigned covered;              ///< a bit a voxel that has an owner
@@ -155,7 +155,7 @@ struct Row {
 ///     prepared  257 x 6 x 16   a slot for each tetrahedron of a batch: first its four faces, and in the fifth quad how
 ///                              many of them are lower; once all rows are marked, its `Weighing`
 ///     ends      257 x 4        the last float of each `Weighing`
-///     rows      128 x 72       `Row`, number z * 8 + y
+///     rows      128 x 72       `IntervalRow`, number z * 8 + y
 ///     numbers   640 x 4        the list: `TetrahedronInTile` of each entry, rising
 ///     spans     640 x 4        `RowSpan` of each entry
 ///     items     2048 x 2       `RowItem`: what threads mark
@@ -166,7 +166,7 @@ struct Row {
 struct TileMemory {
   float4 prepared[kSlots + 1][kQuads];  ///< faces, and then `Weighing`, the last nobody's
   float ends[kSlots + 1];               ///< the last float of each `Weighing`
-  Row rows[kTileRows];
+  IntervalRow rows[kTileRows];
   unsigned numbers[kMostTetrahedra];      ///< `TetrahedronInTile`, rising
   unsigned spans[kMostTetrahedra];        ///< `RowSpan` of each
   unsigned short items[kSlots * kTileJ];  ///< `RowItem`

@@ -31,7 +31,7 @@ template <class Sink, bool kCoarse>
 struct March {
   static constexpr Effort kEffort = kCoarse ? Effort::close : Effort::quick;
 
-  const Task& task;
+  const GatherTask& task;
   const Sink& sink;
   glm::ivec3 first;  ///< voxel of lane 0 in the box
   int lane, slices;
@@ -156,7 +156,7 @@ struct March {
 /// @param seeds  from `seed_kernel`  @param sink  gets every voxel but those that are left
 template <class Sink, bool kCoarse>
 __global__ void __launch_bounds__(32 * kWarps, Sink::kIsWide ? kBlocks - 1 : kBlocks)
-    march_kernel(const __grid_constant__ Task task, const glm::vec3* seeds, const __grid_constant__ Sink sink) {
+    march_kernel(const __grid_constant__ GatherTask task, const glm::vec3* seeds, const __grid_constant__ Sink sink) {
   __shared__ typename WarpQueue<Sink, kCoarse>::Entry entries[kWarps][64];
   const int lane = static_cast<int>(threadIdx.x), warp = static_cast<int>(threadIdx.y);
   const glm::ivec3 size = task.size(),

@@ -17,7 +17,7 @@ constexpr int kSeedTries = 40;  ///< from an undeformed guess
 ///
 /// @param seeds  undeformed places in cells, one for each tile of kSeedTile x kSeedTile x kMarch voxels, i fastest:
 ///               written
-__global__ void seed_kernel(Task task, glm::vec3* seeds) {
+__global__ void seed_kernel(GatherTask task, glm::vec3* seeds) {
   const std::int64_t n = thread_of_grid();
   if (n >= std::int64_t{task.seeds.x} * task.seeds.y * task.seeds.z) return;
   const glm::ivec3 at(n % task.seeds.x, n / task.seeds.x % task.seeds.y, n / (task.seeds.x * task.seeds.y));
@@ -38,7 +38,7 @@ __global__ void seed_kernel(Task task, glm::vec3* seeds) {
 /// nudges reach there is displaced. Then the owner of a voxel that has but one is a cell at rest.
 ///
 /// @param task  `resting` is written  @param marches  how many there are
-__global__ void rest_kernel(Task task, std::int64_t marches) {
+__global__ void rest_kernel(GatherTask task, std::int64_t marches) {
   const std::int64_t number = warp_of_grid();
   if (number >= marches) return;
   const StepLattice& lattice = task.lattice;

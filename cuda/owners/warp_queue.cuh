@@ -51,7 +51,7 @@ struct WarpQueue {
   }
 
   /// Tries up to 32 of them once more. @return how many of this lane are covered
-  __device__ unsigned drain(const Task& task, const Sink& sink) {
+  __device__ unsigned drain(const GatherTask& task, const Sink& sink) {
     const int taken = min(waiting, 32);
     waiting -= taken;
     bool again = false;

@@ -22,8 +22,8 @@ namespace {
 constexpr int kLine = 128, kRowShift = 16, kSliceRows = 5;  ///< a slice begins as far as so many rows
 constexpr int kMostStride = 1 << 30;                        ///< two of them are an int
 
-/// The least number from `least` on that is `rest` beyond a multiple of `unit`.
-int at_least(int least, int rest, int unit) { return least + ((rest - least) % unit + unit) % unit; }
+/// The least number from `least` on that is `beyond` more than a multiple of `unit`.
+int at_least(int least, int beyond, int unit) { return least + ((beyond - least) % unit + unit) % unit; }
 
 class CudaRenderer final : public Renderer {
  public:

@@ -17,7 +17,7 @@ namespace tetwarp::cuda_detail {
 ///     +-------------+----------+--------+        using Attempt = BitField<Slice::kEnd, 20>;
 ///                                                static_assert(Attempt::kEnd == 32);
 ///
-/// A field that takes the rest of a signed word is signed.
+/// A field that takes the highest bits of a signed word is signed.
 ///
 /// Plain shifts and masks: `cuda::bitfield_extract` and `cuda::bitfield_insert` of libcu++ prepare masks as well, and
 /// four fields of one word took 24 instructions with them and 22 so (nvcc 13.0, sm_90).

@@ -84,7 +84,7 @@ class PinnedBuffer {
   std::size_t size_ = 0;
 };
 
-/// Makes a device the current one of this thread, and the former one again at the end.
+/// Makes a device the current one of this thread, and at the end the one that was current before.
 class DeviceScope {
  public:
   explicit DeviceScope(int device) {

@@ -41,7 +41,7 @@ struct Job {
   Units *now, *before;         ///< displacement, and that of the step before
   Units* shown;                ///< displacement of the last frame that was shown
   Units *upper, *lower;        ///< limits that `tighten` narrows
-  Span* spans;                 ///< within which a node may be
+  DisplacementRange* ranges;   ///< within which a node may be
   PlacedNode* placed;          ///< `placed_count` nodes that are put somewhere
   int placed_count;
   double part, motion_mm;  ///< of the way to the goals; and below which motion is small
@@ -86,8 +86,8 @@ class Crew {
   }
 
   /// Puts each node where `place` says. @return square of the largest motion of all
-  template <class Place>
-  __device__ std::uint64_t finish(Place&& place) {
+  template <class PlaceNodes>
+  __device__ std::uint64_t finish(PlaceNodes&& place) {
     unsigned long long motion = 0;
     for_nodes([&](std::int32_t n) {
       const Units from = job_.now[n], to = place(n);
@@ -118,7 +118,7 @@ __device__ bool is_first_thread() { return blockIdx.x == 0 && threadIdx.x == 0; 
 /// The chain stage: limits from the placed nodes spread over all links, and every node is brought within its own. A
 /// cooperative launch, so that all blocks run at the same time.
 ///
-/// @param job    `upper`, `lower`, `spans`, `now`, `before` are written; `notes` are 0 before
+/// @param job    `upper`, `lower`, `ranges`, `now`, `before` are written; `notes` are 0 before
 /// @param pacer  with which relaxation begins: it goes into the notes
 __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
     follow_kernel(const __grid_constant__ Job job, Pacer pacer) {
@@ -135,8 +135,8 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
   crew.wait();
   crew.tighten_all();
   const std::uint64_t motion = crew.finish([&](std::int32_t n) {
-    job.spans[n] = span_between(job.upper[n], job.lower[n]);
-    return clamped(job.now[n], job.spans[n]);
+    job.ranges[n] = range_between(job.upper[n], job.lower[n]);
+    return clamped(job.now[n], job.ranges[n]);
   });
   if (!is_first_thread()) return;
   job.notes->pacer = pacer;
@@ -155,7 +155,7 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
   std::uint64_t motion = 0;
   while (made < steps && !reached) {
     crew.for_nodes([&](std::int32_t n) {
-      job.upper[n] = job.lower[n] = relaxed(job.chain, job.now, job.before, job.spans[n], pacer.pace, n);
+      job.upper[n] = job.lower[n] = relaxed(job.chain, job.now, job.before, job.ranges[n], pacer.pace, n);
     });
     crew.wait();
     crew.tighten_all();

@@ -46,7 +46,7 @@ class CudaChainmail final : public Simulation {
     job_.shown = zero(shown_);
     job_.upper = zero(upper_);
     job_.lower = zero(lower_);
-    job_.spans = zero(spans_);
+    job_.ranges = zero(ranges_);
     job_.notes = notes_.reserve(1);
     uploaded(node_of_, plan_.node_of);
     zero(displacement_);
@@ -72,7 +72,7 @@ class CudaChainmail final : public Simulation {
     TETWARP_CUDA_TRY(cudaStreamSynchronize(nullptr));
   }
 
-  Settled advance(double part, const StoppingRule& rule, const Control& control) override {
+  Convergence advance(double part, const StoppingRule& rule, const Control& control) override {
     require(has_loads_, "advance needs loads: call set_loads first");
     require_valid(part, rule);
     if (control.stop.stop_requested()) throw Cancelled();
@@ -169,7 +169,7 @@ class CudaChainmail final : public Simulation {
   DeviceBuffer<LinkUnits> links_;
   DeviceBuffer<std::uint8_t> moves_;
   DeviceBuffer<Units> now_, before_, shown_, upper_, lower_;
-  DeviceBuffer<Span> spans_;
+  DeviceBuffer<DisplacementRange> ranges_;
   DeviceBuffer<PlacedNode> placed_;
   DeviceBuffer<Notes> notes_;
   PinnedBuffer<Notes> host_notes_;

@@ -116,7 +116,7 @@ void ContourStack::add_planes(std::span<const Contour> contours) {
     std::vector<Ring> rings;
     const double at = one->at;
     for (; one != placed.end() && one->at - at <= 2 * kInPlane; ++one) rings.push_back(std::move(one->ring));
-    planes_.push_back({at, PlanarRegion(rings), nested_area(rings)});
+    planes_.push_back({at, PolygonInterior(rings), nested_area(rings)});
   }
 }
 
@@ -140,9 +140,9 @@ ContourStack::Neighbours ContourStack::neighbours(const Part& part, double z) co
   const auto first = planes_.begin() + static_cast<std::ptrdiff_t>(part.first),
              last = planes_.begin() + static_cast<std::ptrdiff_t>(part.last);
   const auto above = std::upper_bound(first, last, z, [](double at, const Plane& plane) { return at < plane.at; });
-  if (above == first || z >= above->at) return {&above->region, &above->region, 0};
+  if (above == first || z >= above->at) return {&above->interior, &above->interior, 0};
   const auto below = above - 1;
-  return {&below->region, &above->region, (z - below->at) / (above->at - below->at)};
+  return {&below->interior, &above->interior, (z - below->at) / (above->at - below->at)};
 }
 
 double ContourStack::signed_distance(const glm::dvec3& point, Between between) const {

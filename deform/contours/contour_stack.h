@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "deform/contours/contour.h"
-#include "deform/contours/planar_region.h"
+#include "deform/contours/polygon_interior.h"
 #include "deform/geometry.h"
 
 namespace tetwarp {
@@ -56,7 +56,7 @@ class ContourStack {
  private:
   struct Plane {
     double at;  ///< mm along the normal
-    PlanarRegion region;
+    PolygonInterior interior;
     double area;
   };
   struct Part {
@@ -69,7 +69,7 @@ class ContourStack {
   void add_parts(const Geometry& slices);
   /// The planes of a part below and above a height, and how far the height is from the lower to the upper one, 0 to 1.
   struct Neighbours {
-    const PlanarRegion *below, *above;
+    const PolygonInterior *below, *above;
     double t;
   };
   Neighbours neighbours(const Part& part, double z) const;

@@ -29,7 +29,7 @@ double largest_step(const Geometry& grid) { return std::max({grid.spacing.x, gri
 }  // namespace
 
 /// The part of a slice that may show the solid: voxels from `begin` to `end`, inclusive.
-struct Reslicer::Window {
+struct Reslicer::SliceExtent {
   glm::i64vec2 begin{std::numeric_limits<std::int64_t>::max()}, end{std::numeric_limits<std::int64_t>::min()};
 
   bool is_empty() const { return begin.x > end.x; }
@@ -59,11 +59,11 @@ Reslicer::Reslicer(std::span<const Contour> contours, const Geometry& source, co
   fineness_ = std::clamp<std::int64_t>(static_cast<std::int64_t>(std::ceil(kFewVoxels / width)), 1, kFinest);
 }
 
-Reslicer::Window Reslicer::window_of(const ConstVolumeView& inverse_mm, std::int64_t k) const {
+Reslicer::SliceExtent Reslicer::extent_of(const ConstVolumeView& inverse_mm, std::int64_t k) const {
   const Region& held = inverse_mm.buffered;
   const auto* displacement =
       reinterpret_cast<const glm::vec3*>(inverse_mm.voxels) + (k - held.begin.z) * output_.size.x * output_.size.y;
-  Window window;
+  SliceExtent extent;
   const glm::dvec3 step = point_from_output_.linear[0];
   for (std::int64_t j = 0; j < output_.size.y; ++j) {
     const glm::dvec3 row = point_from_output_(glm::dvec3(0, j, k));
@@ -72,35 +72,35 @@ Reslicer::Window Reslicer::window_of(const ConstVolumeView& inverse_mm, std::int
       const bool inside = from.x >= low_.x && from.x <= high_.x && from.y >= low_.y && from.y <= high_.y &&
                           from.z >= low_.z && from.z <= high_.z;  // false for NaN
       if (!inside) continue;
-      window.begin = glm::min(window.begin, glm::i64vec2(i, j));
-      window.end = glm::max(window.end, glm::i64vec2(i, j));
+      extent.begin = glm::min(extent.begin, glm::i64vec2(i, j));
+      extent.end = glm::max(extent.end, glm::i64vec2(i, j));
     }
   }
-  if (window.is_empty()) return window;
-  window.begin = glm::max(window.begin - std::int64_t{1}, glm::i64vec2(0));
-  window.end = glm::min(window.end + std::int64_t{1}, glm::i64vec2(output_.size) - std::int64_t{1});
-  return window;
+  if (extent.is_empty()) return extent;
+  extent.begin = glm::max(extent.begin - std::int64_t{1}, glm::i64vec2(0));
+  extent.end = glm::min(extent.end + std::int64_t{1}, glm::i64vec2(output_.size) - std::int64_t{1});
+  return extent;
 }
 
-/// The places from which samples of a window come.
+/// The places from which samples of an extent come.
 struct Reslicer::Samples {
   glm::i64vec2 size;
   std::vector<glm::dvec3> from;                 ///< LPS mm; NaN: nothing maps there
   std::vector<ContourStack::Inside> is_inside;  ///< whether the points in `from` lie in the solid
 };
 
-Reslicer::Samples Reslicer::sample(const ConstVolumeView& inverse_mm, std::int64_t k, const Window& window) const {
+Reslicer::Samples Reslicer::sample(const ConstVolumeView& inverse_mm, std::int64_t k, const SliceExtent& extent) const {
   const auto* displacement = reinterpret_cast<const glm::vec3*>(inverse_mm.voxels) +
                              (k - inverse_mm.buffered.begin.z) * output_.size.x * output_.size.y;
   const auto inverse = [&](std::int64_t i, std::int64_t j) {
     return glm::dvec3(displacement[std::min(j, output_.size.y - 1) * output_.size.x + std::min(i, output_.size.x - 1)]);
   };
   const double fine = static_cast<double>(fineness_);
-  Samples samples{(window.end - window.begin) * fineness_ + std::int64_t{1}, {}, {}};
+  Samples samples{(extent.end - extent.begin) * fineness_ + std::int64_t{1}, {}, {}};
   samples.from.reserve(static_cast<std::size_t>(samples.size.x * samples.size.y));
   for (std::int64_t n = 0; n < samples.size.y; ++n) {
     for (std::int64_t m = 0; m < samples.size.x; ++m) {
-      const std::int64_t i = window.begin.x + m / fineness_, j = window.begin.y + n / fineness_;
+      const std::int64_t i = extent.begin.x + m / fineness_, j = extent.begin.y + n / fineness_;
       const double s = static_cast<double>(m % fineness_) / fine, t = static_cast<double>(n % fineness_) / fine;
       const glm::dvec3 below = mixed(inverse(i, j), inverse(i + 1, j), s),
                        above = mixed(inverse(i, j + 1), inverse(i + 1, j + 1), s);
@@ -143,14 +143,15 @@ std::vector<double> Reslicer::depths(const Samples& samples, Between between) co
   return depth;
 }
 
-SlicedContours Reslicer::draw(const Samples& samples, const Window& window, std::int64_t k, Between between) const {
+SlicedContours Reslicer::draw(const Samples& samples, const SliceExtent& extent, std::int64_t k,
+                              Between between) const {
   SlicedContours result;
   const double fine = static_cast<double>(fineness_);
   ZeroContours zero = zero_contours(depths(samples, between), samples.size.x, samples.size.y);
   result.cut = zero.cut;
   std::vector<Ring> rings;
   for (Ring& ring : zero.rings) {
-    for (glm::dvec2& corner : ring) corner = glm::dvec2(window.begin) + corner / fine;
+    for (glm::dvec2& corner : ring) corner = glm::dvec2(extent.begin) + corner / fine;
     ring = simplified(ring, kSimple);
     const double area = signed_area(ring);
     if (ring.size() < 3 || std::abs(area) < kSmallest) continue;
@@ -166,10 +167,10 @@ SlicedContours Reslicer::draw(const Samples& samples, const Window& window, std:
 }
 
 std::array<SlicedContours, 2> Reslicer::slice(const ConstVolumeView& inverse_mm, std::int64_t k) const {
-  const Window window = window_of(inverse_mm, k);
-  if (window.is_empty()) return {};
-  const Samples samples = sample(inverse_mm, k, window);
-  return {draw(samples, window, k, Between::interpolated), draw(samples, window, k, Between::nearest)};
+  const SliceExtent extent = extent_of(inverse_mm, k);
+  if (extent.is_empty()) return {};
+  const Samples samples = sample(inverse_mm, k, extent);
+  return {draw(samples, extent, k, Between::interpolated), draw(samples, extent, k, Between::nearest)};
 }
 
 }  // namespace tetwarp

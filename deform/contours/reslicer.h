@@ -39,12 +39,12 @@ class Reslicer {
   const ContourStack& solid() const { return solid_; }
 
  private:
-  struct Window;
+  struct SliceExtent;
   struct Samples;
-  Window window_of(const ConstVolumeView& inverse_mm, std::int64_t k) const;
-  Samples sample(const ConstVolumeView& inverse_mm, std::int64_t k, const Window& window) const;
+  SliceExtent extent_of(const ConstVolumeView& inverse_mm, std::int64_t k) const;
+  Samples sample(const ConstVolumeView& inverse_mm, std::int64_t k, const SliceExtent& extent) const;
   std::vector<double> depths(const Samples& samples, Between between) const;
-  SlicedContours draw(const Samples& samples, const Window& window, std::int64_t k, Between between) const;
+  SlicedContours draw(const Samples& samples, const SliceExtent& extent, std::int64_t k, Between between) const;
 
   ContourStack solid_;
   Geometry output_;

@@ -74,7 +74,7 @@ TETWARP_INLINE_HD int transfer_entry(const RayFrame& frame, float value) {
 
 namespace ray {
 
-constexpr float kOpaque = 0.998f;  ///< opacity behind which nothing is looked for: the rest is half a grey level
+constexpr float kOpaque = 0.998f;  ///< opacity behind which nothing is looked for: 0.002 is half a grey level
 
 /// A ray within the volume, from `enter` to `leave`, in steps from its origin. Its samples lie at both ends and at all
 /// whole steps between: numbers `begin` up to, not including, `end`. Piece n lies before sample n.

@@ -80,7 +80,7 @@ struct RayVolume {
 
 /// The eight voxels around a place, and the place between them.
 template <class V>
-struct Cell {
+struct EightVoxels {
   const V* corner;  ///< the voxel of least indices
   glm::vec3 fraction;
   int next[3];    ///< values to the neighbour along an axis; 0 at the end of the volume
@@ -89,23 +89,23 @@ struct Cell {
 };
 
 template <class V>
-TETWARP_INLINE_HD Cell<V> cell_at(const RayVolume<V>& volume, const RayPlace& place) {
-  Cell<V> cell;
-  cell.corner = volume.at(place.whole);
-  cell.fraction = place.fraction;
+TETWARP_INLINE_HD EightVoxels<V> voxels_at(const RayVolume<V>& volume, const RayPlace& place) {
+  EightVoxels<V> eight;
+  eight.corner = volume.at(place.whole);
+  eight.fraction = place.fraction;
   for (int axis = 0; axis < 3; ++axis) {
     const int last = volume.size[axis] - 1, whole = place.whole[axis], stride = volume.strides[axis];
-    cell.before[axis] = whole > 0 ? stride : 0;
-    cell.next[axis] = whole < last ? stride : 0;
-    cell.beyond[axis] = whole + 1 < last ? 2 * stride : cell.next[axis];
+    eight.before[axis] = whole > 0 ? stride : 0;
+    eight.next[axis] = whole < last ? stride : 0;
+    eight.beyond[axis] = whole + 1 < last ? 2 * stride : eight.next[axis];
   }
-  return cell;
+  return eight;
 }
 
-/// The cell around a place none of whose voxels lies beyond an end of the volume. Distances along i are then constants
-/// that the compiler knows.
+/// The eight voxels around a place, none of which lies beyond an end of the volume. Distances along i are then
+/// constants that the compiler knows.
 template <class V>
-TETWARP_INLINE_HD Cell<V> inner_cell_at(const RayVolume<V>& volume, const RayPlace& place) {
+TETWARP_INLINE_HD EightVoxels<V> inner_voxels_at(const RayVolume<V>& volume, const RayPlace& place) {
   const int row = volume.strides.y, slice = volume.strides.z;
   return {volume.at(place.whole), place.fraction, {1, row, slice}, {1, row, slice}, {2, 2 * row, 2 * slice}};
 }
@@ -125,47 +125,47 @@ TETWARP_INLINE_HD float over_side(const At& at, int right, int up, float share_r
 
 /// The value at the place, linear between voxels.
 template <class V>
-TETWARP_INLINE_HD float value_in(const Cell<V>& cell) {
+TETWARP_INLINE_HD float value_in(const EightVoxels<V>& eight) {
   const auto along_i = [&](int offset) {
-    return between(cell.corner[offset], cell.corner[offset + cell.next[0]], cell.fraction.x);
+    return between(eight.corner[offset], eight.corner[offset + eight.next[0]], eight.fraction.x);
   };
-  return over_side(along_i, cell.next[1], cell.next[2], cell.fraction.y, cell.fraction.z);
+  return over_side(along_i, eight.next[1], eight.next[2], eight.fraction.y, eight.fraction.z);
 }
 
-/// `value_in` of the cell around a place.
+/// `value_in` of the eight voxels around a place.
 template <class V>
 TETWARP_INLINE_HD float value_at(const RayVolume<V>& volume, const RayPlace& place) {
   bool inner = true;
   for (int axis = 0; axis < 3; ++axis) inner = inner && place.whole[axis] < volume.size[axis] - 1;
-  return inner ? value_in(inner_cell_at(volume, place)) : value_in(cell_at(volume, place));
+  return inner ? value_in(inner_voxels_at(volume, place)) : value_in(voxels_at(volume, place));
 }
 
 /// Central differences at the place: half the difference of the values one voxel further and one voxel before, along
 /// each axis, linear between voxels.
 template <class V>
-TETWARP_INLINE_HD glm::vec3 differences_in(const Cell<V>& cell) {
+TETWARP_INLINE_HD glm::vec3 differences_in(const EightVoxels<V>& eight) {
   glm::vec3 difference;
   for (int axis = 0; axis < 3; ++axis) {
     const int right = axis == 0 ? 1 : 0, up = axis == 2 ? 1 : 2;
     const auto along = [&](int offset) {
-      const V* const v = cell.corner + offset;
-      const float here = static_cast<float>(v[cell.next[axis]]) - static_cast<float>(v[-cell.before[axis]]),
-                  there = static_cast<float>(v[cell.beyond[axis]]) - static_cast<float>(v[0]);
-      return here + (there - here) * cell.fraction[axis];
+      const V* const v = eight.corner + offset;
+      const float here = static_cast<float>(v[eight.next[axis]]) - static_cast<float>(v[-eight.before[axis]]),
+                  there = static_cast<float>(v[eight.beyond[axis]]) - static_cast<float>(v[0]);
+      return here + (there - here) * eight.fraction[axis];
     };
     difference[axis] =
-        0.5f * over_side(along, cell.next[right], cell.next[up], cell.fraction[right], cell.fraction[up]);
+        0.5f * over_side(along, eight.next[right], eight.next[up], eight.fraction[right], eight.fraction[up]);
   }
   return difference;
 }
 
-/// `differences_in` of the cell around a place.
+/// `differences_in` of the eight voxels around a place.
 template <class V>
 TETWARP_INLINE_HD glm::vec3 differences_at(const RayVolume<V>& volume, const RayPlace& place) {
   bool inner = true;
   for (int axis = 0; axis < 3; ++axis)
     inner = inner && place.whole[axis] > 0 && place.whole[axis] < volume.size[axis] - 2;
-  return inner ? differences_in(inner_cell_at(volume, place)) : differences_in(cell_at(volume, place));
+  return inner ? differences_in(inner_voxels_at(volume, place)) : differences_in(voxels_at(volume, place));
 }
 
 }  // namespace tetwarp::ray

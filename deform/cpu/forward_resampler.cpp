@@ -283,7 +283,7 @@ class LatticeResampler final : public ForwardResampler {
     for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {
       for (std::int64_t y = box.begin.y; y < box.end.y; ++y, first += static_cast<std::size_t>(width)) {
         const Row row{{box.begin.x, y, z}, width, tile.mapped, tile.offset.data() + first};
-        settle(row, first, tile, maps, report);
+        map_row(row, first, tile, maps, report);
         sample_targets(row, samplers, tile.coverage, report);
         maps.write(row, tile.coverage, maps.wants_jacobian() ? claims.jacobian.data() + first : nullptr,
                    maps.wants_owners() ? claims.owners.data() + first : nullptr);
@@ -293,7 +293,7 @@ class LatticeResampler final : public ForwardResampler {
 
   /// Decides for each voxel of a row whether it comes through the field. A voxel outside the undeformed lattice may
   /// stay where it is.
-  void settle(const Row& row, std::size_t first, TileVoxels& tile, const MapWriter& maps, Report& report) const {
+  void map_row(const Row& row, std::size_t first, TileVoxels& tile, const MapWriter& maps, Report& report) const {
     const bool rest = lattice_.field().outside == Outside::rest;
     if (!rest) {
       std::transform(tile.owners.data() + first, tile.owners.data() + first + row.count, tile.mapped,

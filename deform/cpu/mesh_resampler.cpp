@@ -37,7 +37,7 @@ class MeshResampler final : public ForwardResampler {
 
  private:
   void require_reach(const Control& control);
-  void settle(const Row& row, std::size_t first, const MapWriter& maps, TileVoxels& tile, Report& report) const;
+  void map_row(const Row& row, std::size_t first, const MapWriter& maps, TileVoxels& tile, Report& report) const;
 
   tbb::task_arena arena_;
   /// The deformed mesh; and the undeformed one, where it matters which voxels lie outside.
@@ -105,7 +105,7 @@ Report MeshResampler::resample(Region region, std::span<const Target> targets, c
         for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {
           for (std::int64_t y = box.begin.y; y < box.end.y; ++y, first += static_cast<std::size_t>(width)) {
             const Row row{{box.begin.x, y, z}, width, tile.mapped, tile.offset};
-            settle(row, first, writer, tile, of_tile);
+            map_row(row, first, writer, tile, of_tile);
             sample_targets(row, samplers, tile.coverage, of_tile);
             writer.write(row, tile.coverage, writer.wants_jacobian() ? tile.jacobian : nullptr,
                          writer.wants_owners() ? tile.owners.count.data() + first : nullptr);
@@ -118,8 +118,8 @@ Report MeshResampler::resample(Region region, std::span<const Target> targets, c
 }
 
 /// Decides for a row where each voxel comes from. @param first  number of the row's first voxel in the tile
-void MeshResampler::settle(const Row& row, std::size_t first, const MapWriter& maps, TileVoxels& tile,
-                           Report& report) const {
+void MeshResampler::map_row(const Row& row, std::size_t first, const MapWriter& maps, TileVoxels& tile,
+                            Report& report) const {
   const std::uint32_t* owner = tile.owners.owner.data() + first;
   for (int i = 0; i < row.count;) {
     int end = i + 1;

@@ -46,9 +46,9 @@ class WorkProgress {
 
 /// Calls `finished` for each layer of tiles (all tiles with the same range of k) when its last row of tiles is
 /// done. Layers may finish in any order.
-class Layers {
+class FinishedLayers {
  public:
-  Layers(const PartSink& finished, const Region& region, const glm::i64vec3& tiles)
+  FinishedLayers(const PartSink& finished, const Region& region, const glm::i64vec3& tiles)
       : finished_(finished), region_(region), rows_left_(static_cast<std::size_t>(tiles.z)) {
     for (std::atomic<std::int64_t>& rows : rows_left_) rows = tiles.y;
   }
@@ -87,7 +87,7 @@ Report for_each_tile(tbb::task_arena& arena, const Region& region, const Control
   if (is_empty(region)) return total;
   const glm::i64vec3 tiles = (region.end - region.begin + (kTile - 1)) / kTile;
   WorkProgress progress(control, voxel_count(region));
-  Layers layers(finished, region, tiles);
+  FinishedLayers layers(finished, region, tiles);
   tbb::enumerable_thread_specific<Scratch> scratch;
   tbb::enumerable_thread_specific<Report> reports;
   const auto run = [&](const Region& box) {

@@ -187,14 +187,14 @@ std::vector<PlacedNode> ChainPlan::read(const Loads& loads) const {
     require(found == node_of.size(), std::string(what) + " a node is expected, " + std::to_string(node_of.size()) +
                                          "; found " + std::to_string(found));
   };
-  check("one hold", loads.hold.size());
+  check("one hold", loads.constraint.size());
   check("one goal", loads.goal.size());
   require(loads.force.empty(), "chainmail knows no forces, found " + std::to_string(loads.force.size()) +
                                    "; place nodes, or use mass-spring");
   std::vector<PlacedNode> placed;
   for (std::size_t n = 0; n < node_of.size(); ++n) {
     const auto node = static_cast<std::size_t>(node_of[n]);
-    if (loads.hold[node] != Hold::placed) continue;
+    if (loads.constraint[node] != Constraint::placed) continue;
     placed.push_back({static_cast<std::int32_t>(n), {}, to_units(loads.goal[node], "the goal", node)});
   }
   return placed;

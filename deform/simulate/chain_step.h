@@ -117,25 +117,25 @@ TETWARP_HD inline bool tighten(const ChainView& chain, Units* upper, Units* lowe
 }
 
 /// The displacements that placed nodes leave to a node: from `least` to `most`.
-struct Span {
+struct DisplacementRange {
   Units least, most;
 };
 
-/// The span between the ends to which `tighten` led from the placed nodes. Where placed nodes contradict each other the
-/// ends are crossed; each of them keeps all limits, and so do their componentwise minimum and maximum.
-TETWARP_HD inline Span span_between(const Units& upper, const Units& lower) {
-  Span span{};
+/// The range between the ends to which `tighten` led from the placed nodes. Where placed nodes contradict each other
+/// the ends are crossed; each of them keeps all limits, and so do their componentwise minimum and maximum.
+TETWARP_HD inline DisplacementRange range_between(const Units& upper, const Units& lower) {
+  DisplacementRange range{};
   for (int c = 0; c < 3; ++c) {
-    span.least.at[c] = smaller(upper.at[c], lower.at[c]);
-    span.most.at[c] = larger(upper.at[c], lower.at[c]);
+    range.least.at[c] = smaller(upper.at[c], lower.at[c]);
+    range.most.at[c] = larger(upper.at[c], lower.at[c]);
   }
-  return span;
+  return range;
 }
 
-TETWARP_HD inline Units clamped(const Units& value, const Span& span) {
+TETWARP_HD inline Units clamped(const Units& value, const DisplacementRange& range) {
   Units result{};
   for (int c = 0; c < 3; ++c) {
-    result.at[c] = larger(span.least.at[c], smaller(value.at[c], span.most.at[c]));
+    result.at[c] = larger(range.least.at[c], smaller(value.at[c], range.most.at[c]));
   }
   return result;
 }
@@ -143,8 +143,8 @@ TETWARP_HD inline Units clamped(const Units& value, const Span& span) {
 /// Where a node goes in a step of relaxation towards the mean of its neighbours, before limits are applied. No product
 /// exceeds 2^59.
 /// @param before  where the nodes were one step ago
-TETWARP_HD inline Units relaxed(const ChainView& chain, const Units* now, const Units* before, const Span& span,
-                                const Pace& pace, std::int32_t node) {
+TETWARP_HD inline Units relaxed(const ChainView& chain, const Units* now, const Units* before,
+                                const DisplacementRange& range, const Pace& pace, std::int32_t node) {
   const Units own = now[node];
   if (!chain.moves[node]) return own;
   std::int64_t pull[3][3] = {};
@@ -165,7 +165,7 @@ TETWARP_HD inline Units relaxed(const ChainView& chain, const Units* now, const 
     const std::int64_t last = std::int64_t{own.at[c] - before[node].at[c]} * (std::int64_t{1} << kShareBits);
     const std::int64_t to =
         own.at[c] + rounded_shift(to_mean * pace.towards_mean + last * pace.kept, kShareBits + kPaceBits);
-    const std::int64_t low = span.least.at[c], high = span.most.at[c];
+    const std::int64_t low = range.least.at[c], high = range.most.at[c];
     result.at[c] = static_cast<std::int32_t>(to < low ? low : to > high ? high : to);
   }
   return result;

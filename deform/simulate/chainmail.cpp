@@ -20,7 +20,7 @@ class CpuChainmail final : public Simulation {
       : plan_(model), arena_(cpu::make_arena(limits)), active_(plan_.blocks.size()) {
     const auto count = static_cast<std::size_t>(plan_.nodes());
     for (std::vector<Units>* state : {&now_, &before_, &shown_, &upper_, &lower_}) state->resize(count);
-    spans_.resize(count);
+    ranges_.resize(count);
     moves_.resize(count);
     displacement_.resize(count);
     for (std::size_t n = 0; n < plan_.blocks.size(); ++n) of_colour_[plan_.blocks[n].colour].push_back(n);
@@ -34,12 +34,12 @@ class CpuChainmail final : public Simulation {
     has_loads_ = true;
   }
 
-  Settled advance(double part, const StoppingRule& rule, const Control& control) override {
+  Convergence advance(double part, const StoppingRule& rule, const Control& control) override {
     require(has_loads_, "advance needs loads: call set_loads first");
     require_valid(part, rule);
-    Settled settled;
-    arena_.execute([&] { settled = run(part, rule, control); });
-    return settled;
+    Convergence convergence;
+    arena_.execute([&] { convergence = run(part, rule, control); });
+    return convergence;
   }
 
   std::span<const glm::vec3> displacement() const override { return displacement_; }
@@ -70,25 +70,25 @@ class CpuChainmail final : public Simulation {
     });
   }
 
-  Settled run(double part, const StoppingRule& rule, const Control& control) {
-    Settled settled;
+  Convergence run(double part, const StoppingRule& rule, const Control& control) {
+    Convergence convergence;
     std::uint64_t motion = follow(part, control);
     Pacer pacer(plan_.momentum, plan_.patience);
     try {
-      while (settled.steps < rule.steps && !settled.reached) {
+      while (convergence.steps < rule.steps && !convergence.reached) {
         motion = relax(pacer.pace, control);
-        ++settled.steps;
-        settled.reached = motion_mm(motion) <= rule.motion_mm;
+        ++convergence.steps;
+        convergence.reached = motion_mm(motion) <= rule.motion_mm;
         pacer.follow(motion);
-        if (control.progress) control.progress(static_cast<double>(settled.steps) / rule.steps);
+        if (control.progress) control.progress(static_cast<double>(convergence.steps) / rule.steps);
       }
     } catch (const Cancelled&) {
       show(part);
       throw;
     }
-    settled.motion_mm = motion_mm(motion);
+    convergence.motion_mm = motion_mm(motion);
     show(part);
-    return settled;
+    return convergence;
   }
 
   /// Makes the first step of ChainMail, the chain: nodes move as far as placed ones force them to.
@@ -102,8 +102,8 @@ class CpuChainmail final : public Simulation {
     activate_all();
     tighten_all(control);
     return finish([&](std::size_t n) {
-      spans_[n] = span_between(upper_[n], lower_[n]);
-      return clamped(now_[n], spans_[n]);
+      ranges_[n] = range_between(upper_[n], lower_[n]);
+      return clamped(now_[n], ranges_[n]);
     });
   }
 
@@ -112,7 +112,7 @@ class CpuChainmail final : public Simulation {
     const ChainView chain = plan_.view(moves_.data());
     for_nodes([&](std::size_t n) {
       upper_[n] = lower_[n] =
-          relaxed(chain, now_.data(), before_.data(), spans_[n], pace, static_cast<std::int32_t>(n));
+          relaxed(chain, now_.data(), before_.data(), ranges_[n], pace, static_cast<std::int32_t>(n));
     });
     activate_all();
     tighten_all(control);
@@ -120,8 +120,8 @@ class CpuChainmail final : public Simulation {
   }
 
   /// Moves each node to where `place` says. @return square of the largest motion
-  template <class Place>
-  std::uint64_t finish(Place&& place) {
+  template <class PlaceNodes>
+  std::uint64_t finish(PlaceNodes&& place) {
     std::vector<std::uint64_t> motion(plan_.blocks.size());
     for_blocks([&](std::size_t block) {
       for (std::int32_t n = plan_.blocks[block].begin; n < plan_.blocks[block].end; ++n) {
@@ -190,10 +190,10 @@ class CpuChainmail final : public Simulation {
   std::vector<PlacedNode> placed_;
   std::vector<std::uint8_t> moves_;
   bool has_loads_ = false;
-  std::vector<Units> now_, before_;   ///< within the limits at all times
-  std::vector<Units> shown_;          ///< `now_` with placed nodes at their goals
-  std::vector<Units> upper_, lower_;  ///< the bounds that `tighten` narrows
-  std::vector<Span> spans_;           ///< by node: what placed nodes leave to it
+  std::vector<Units> now_, before_;        ///< within the limits at all times
+  std::vector<Units> shown_;               ///< `now_` with placed nodes at their goals
+  std::vector<Units> upper_, lower_;       ///< the bounds that `tighten` narrows
+  std::vector<DisplacementRange> ranges_;  ///< by node: what placed nodes leave to it
   std::vector<glm::vec3> displacement_;
 };
 

@@ -32,15 +32,15 @@ namespace tetwarp::simulate {
 /// 2. Relaxation. Each node moves towards the mean of its neighbours, weighted by one over the squared length of the
 ///    link, plus a part of its last motion (second-order Richardson iteration, Golub and Varga 1961: about N steps
 ///    instead of N^2 for N nodes in a row), and is kept between L and U. Weights ignore the tissue: limits tell tissues
-///    apart, and moduli that differ by a factor of a million would never settle. The outcome y is brought back within
+///    apart, and moduli that differ by a factor of a million would never converge. The outcome y is brought back within
 ///    the limits. Let V be the largest state within them that does not exceed y, and W the smallest that is not below
 ///    y, found as U and L are. Nodes go to (V + W) / 2, rounded towards 0. This is within the limits and exactly at the
 ///    goals, and equals y where y is within the limits.
 ///
 /// Every number depends on numbers of the step before alone, so any number of threads and any backend give the same
 /// bits, and a mirrored lattice gives the mirrored bits. With `StoppingRule::steps` = 0 there is only the chain, and
-/// `Settled::reached` is false. Nodes that no links tie to a placed node stay. Displacements reach up to 4096 mm along
-/// each axis. Forces are refused.
+/// `Convergence::reached` is false. Nodes that no links tie to a placed node stay. Displacements reach up to 4096 mm
+/// along each axis. Forces are refused.
 ///
 /// @param model   must outlive the simulation
 /// @param limits  number of threads

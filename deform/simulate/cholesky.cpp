@@ -16,10 +16,11 @@ struct LaplacianFactor::Parts {
   Eigen::SimplicialLLT<Eigen::SparseMatrix<double>> factor;
 };
 
-LaplacianFactor::LaplacianFactor(const Model& model, std::span<const Role> roles) : parts_(std::make_unique<Parts>()) {
+LaplacianFactor::LaplacianFactor(const Model& model, std::span<const SpringRole> roles)
+    : parts_(std::make_unique<Parts>()) {
   parts_->row.assign(model.nodes(), -1);
   for (std::size_t n = 0; n < model.nodes(); ++n) {
-    if (roles[n] == Role::free) parts_->row[n] = static_cast<std::int32_t>(parts_->rows++);
+    if (roles[n] == SpringRole::free) parts_->row[n] = static_cast<std::int32_t>(parts_->rows++);
   }
   std::vector<Eigen::Triplet<double>> entries;
   for (std::size_t n = 0; n < model.nodes(); ++n) {

@@ -15,7 +15,7 @@ namespace tetwarp::simulate {
 /// minimum degree order.
 class LaplacianFactor {
  public:
-  LaplacianFactor(const Model& model, std::span<const Role> roles);
+  LaplacianFactor(const Model& model, std::span<const SpringRole> roles);
   ~LaplacianFactor();
 
   /// Solves L x = b in place, with x, y and z of each node as three right-hand sides. Values of nodes that are not free

@@ -27,7 +27,7 @@ class CpuSprings final : public SpringEngine {
             options.solver == MassSpringOptions::Solver::cholesky ||
             (options.solver == MassSpringOptions::Solver::automatic && model.nodes() <= kMostNodesForCholesky)),
         arena_(cpu::make_arena(limits)),
-        roles_(model.nodes(), Role::kept),
+        roles_(model.nodes(), SpringRole::kept),
         inverse_(model.nodes()),
         partial_(grid_.blocks()),
         shown_(model.nodes(), glm::vec3(0)) {
@@ -39,7 +39,7 @@ class CpuSprings final : public SpringEngine {
     matrices_.odd.resize(grid_.odd.size());
   }
 
-  void set_loads(const Loads& loads, std::span<const Role> roles) override {
+  void set_loads(const Loads& loads, std::span<const SpringRole> roles) override {
     if (!std::equal(roles.begin(), roles.end(), roles_.begin())) factor_.reset();
     roles_.assign(roles.begin(), roles.end());
     if (is_factored_ && !factor_) factor_ = std::make_unique<LaplacianFactor>(model_, roles_);
@@ -48,7 +48,7 @@ class CpuSprings final : public SpringEngine {
     for (int axis = 0; axis < 3; ++axis) {
       const auto a = static_cast<std::size_t>(axis);
       for (std::size_t n = 0; n < grid_.nodes; ++n) {
-        const bool is_free = roles[n] == Role::free;
+        const bool is_free = roles[n] == SpringRole::free;
         goal_[a][n] = double{loads.goal[n][axis]};
         load_to_[a][n] = is_free && !loads.force.empty() ? double{loads.force[n][axis]} : 0;
         if (!is_free) load_from_[a][n] = 0;
@@ -67,7 +67,7 @@ class CpuSprings final : public SpringEngine {
   Ways aim(double part) override {
     Ways ways;
     for (std::size_t n = 0; n < grid_.nodes; ++n) {
-      const bool is_placed = roles_[n] == Role::placed;
+      const bool is_placed = roles_[n] == SpringRole::placed;
       for (std::size_t a = 0; a < 3; ++a) {
         load_[a][n] = on_the_way(load_from_[a][n], load_to_[a][n], part);
         trial_[a][n] = is_placed ? on_the_way(start_[a][n], goal_[a][n], part) : u_[a][n];
@@ -81,12 +81,12 @@ class CpuSprings final : public SpringEngine {
     arena_.execute([&] {
       for_blocks([&](NodeRange range, std::size_t) {
         for (std::size_t n = range.begin; n < range.end; ++n) {
-          if (roles_[n] == Role::kept) continue;
+          if (roles_[n] == SpringRole::kept) continue;
           const glm::dvec3 way = motion.way_of(rest_(model_.vertex[n]) + at(u_, n));
           for (int axis = 0; axis < 3; ++axis) {
             const auto a = static_cast<std::size_t>(axis);
             u_[a][n] += way[axis];
-            if (roles_[n] == Role::free) trial_[a][n] = u_[a][n];
+            if (roles_[n] == SpringRole::free) trial_[a][n] = u_[a][n];
           }
         }
       });
@@ -195,7 +195,7 @@ class CpuSprings final : public SpringEngine {
   void for_free(NodeRange range, Work&& work) const {
     for (std::size_t a = 0; a < 3; ++a) {
       for (std::size_t n = range.begin; n < range.end; ++n) {
-        if (roles_[n] == Role::free) work(a, n);
+        if (roles_[n] == SpringRole::free) work(a, n);
       }
     }
   }
@@ -210,11 +210,11 @@ class CpuSprings final : public SpringEngine {
         sums.sum -= load_[a][n] * trial_[a][n];
         square += force * force;
         load += load_[a][n] * load_[a][n];
-        if (roles_[n] != Role::free) force = 0;
+        if (roles_[n] != SpringRole::free) force = 0;
         sums.slope -= force * double{x_[a][n]};
       }
-      double& most = roles_[n] == Role::free ? sums.most : sums.most_placed;
-      if (roles_[n] != Role::kept) most = std::max(most, square);
+      double& most = roles_[n] == SpringRole::free ? sums.most : sums.most_placed;
+      if (roles_[n] != SpringRole::kept) most = std::max(most, square);
       sums.most_load = std::max(sums.most_load, load);
     }
     return sums;
@@ -236,7 +236,7 @@ class CpuSprings final : public SpringEngine {
             sum.add(SpringMatrix<float>{{entry(0), entry(1), entry(2)}, entry(3)}.full());
           }
         }
-        inverse_[n] = roles_[n] == Role::free ? inverse_block(sum) : Symmetric<float>{};
+        inverse_[n] = roles_[n] == SpringRole::free ? inverse_block(sum) : Symmetric<float>{};
       }
     });
   }
@@ -246,7 +246,7 @@ class CpuSprings final : public SpringEngine {
     for_blocks([&](NodeRange range, std::size_t) {
       for (std::size_t a = 0; a < 3; ++a) {
         for (std::size_t n = range.begin; n < range.end; ++n) {
-          if (roles_[n] != Role::free) r_[a][n] = 0;
+          if (roles_[n] != SpringRole::free) r_[a][n] = 0;
         }
       }
     });
@@ -307,7 +307,7 @@ class CpuSprings final : public SpringEngine {
   Sums descend(NodeRange range, float length, bool begins) {
     Sums sums;
     for (std::size_t n = range.begin; n < range.end; ++n) {
-      const bool is_free = roles_[n] == Role::free;
+      const bool is_free = roles_[n] == SpringRole::free;
       glm::vec3 r;
       for (int axis = 0; axis < 3; ++axis) {
         const auto a = static_cast<std::size_t>(axis);
@@ -338,7 +338,7 @@ class CpuSprings final : public SpringEngine {
   RestPlace rest_;
   bool is_factored_;
   tbb::task_arena arena_;
-  std::vector<Role> roles_;
+  std::vector<SpringRole> roles_;
   std::unique_ptr<LaplacianFactor> factor_;
   PaddedVectors<double> u_, trial_;                   ///< displacement
   PaddedVectors<double> start_, goal_;                ///< of placed nodes: where they come from, and where they go

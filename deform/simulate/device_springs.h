@@ -39,7 +39,7 @@ class DeviceSprings final : public SpringEngine {
     const auto scope = machine_.scope();
     a_.neighbour = hold(neighbour_, model.neighbour);
     a_.stiffness = hold(stiffness_, model.stiffness);
-    a_.role = hold(role_, std::vector<Role>(nodes_, Role::kept));
+    a_.role = hold(role_, std::vector<SpringRole>(nodes_, SpringRole::kept));
     a_.vertex = hold(vertex_, model.vertex);
     a_.rest_place = RestPlace(model.lattice);
     a_.nodes = nodes_;
@@ -63,7 +63,7 @@ class DeviceSprings final : public SpringEngine {
 
   void set_stream(void* stream) override { machine_.set_stream(stream); }
 
-  void set_loads(const Loads& loads, std::span<const Role> roles) override {
+  void set_loads(const Loads& loads, std::span<const SpringRole> roles) override {
     const auto scope = machine_.scope();
     machine_.upload(role_.data(), roles.data(), nodes_);
     const glm::vec3* goals = hold(given_goals_, loads.goal);
@@ -93,9 +93,9 @@ class DeviceSprings final : public SpringEngine {
 
   void follow(const SolveEffort& effort, std::stop_token stop) override {
     const auto scope = machine_.scope();
-    machine_.each(nodes_, sweeps::Way{{a_}});
+    machine_.each(nodes_, sweeps::PlacedMotion{{a_}});
     make_matrices(Stiffness::laplacian);
-    machine_.each(nodes_, sweeps::Pull{{a_}});
+    machine_.each(nodes_, sweeps::PlacedForces{{a_}});
     conjugate_gradients(effort, stop);
     machine_.each(nodes_, sweeps::Follow{{a_}});
     std::swap(a_.u, a_.trial);
@@ -163,7 +163,7 @@ class DeviceSprings final : public SpringEngine {
       machine_.repeat(kRepeats, [&] {
         machine_.template sum<Sum>(nodes_, sweeps::Bend{{a_}}, sweeps::AfterBend{a_.state});
         machine_.template sum<Sum>(nodes_, sweeps::Descend{{a_}}, sweeps::AfterDescend{a_.state});
-        machine_.each(nodes_, sweeps::Turn{{a_}});
+        machine_.each(nodes_, sweeps::NextDirection{{a_}});
       });
       state = machine_.fetch(a_.state);
     }
@@ -176,7 +176,7 @@ class DeviceSprings final : public SpringEngine {
   Buffer<std::int32_t> neighbour_;
   Buffer<std::uint32_t> vertex_;
   Buffer<float> stiffness_;
-  Buffer<Role> role_;
+  Buffer<SpringRole> role_;
   Buffer<glm::dvec3> doubles_[9];
   Buffer<glm::vec3> floats_[6], given_goals_, given_forces_;
   Buffer<SpringMatrix<float>> matrix_;

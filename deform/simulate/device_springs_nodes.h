@@ -35,7 +35,7 @@ struct DeviceArrays {
   const std::int32_t* neighbour;  ///< see Model::neighbour
   const float* stiffness;
   const std::uint32_t* vertex;
-  const Role* role;
+  const SpringRole* role;
   RestLink<double> rest[kDirections];
   RestPlace rest_place;
   /// Displacement, mm: now, at a trial step, and of placed nodes where they come from and go.
@@ -61,7 +61,7 @@ struct DeviceArrays {
                ? matrix[static_cast<std::size_t>(direction - kUp) * nodes + n]
                : matrix[static_cast<std::size_t>(opposite(direction) - kUp) * nodes + static_cast<std::size_t>(to)];
   }
-  TETWARP_HD bool is_free(std::size_t n) const { return role[n] == Role::free; }
+  TETWARP_HD bool is_free(std::size_t n) const { return role[n] == SpringRole::free; }
 };
 
 namespace sweeps {
@@ -100,8 +100,8 @@ struct Aim : Sweep {
   double part;
   TETWARP_HD Ways operator()(std::size_t n) const {
     a.load[n] = on_the_way(a.load_from[n], a.load_to[n], part);
-    a.trial[n] = a.role[n] == Role::placed ? on_the_way(a.start[n], a.goal[n], part) : a.u[n];
-    if (a.role[n] != Role::placed) return {};
+    a.trial[n] = a.role[n] == SpringRole::placed ? on_the_way(a.start[n], a.goal[n], part) : a.u[n];
+    if (a.role[n] != SpringRole::placed) return {};
     return Ways::of(a.rest_place(a.vertex[n]) + a.u[n], a.trial[n] - a.u[n]);
   }
 };
@@ -110,14 +110,14 @@ struct Aim : Sweep {
 struct Carry : Sweep {
   RigidMotion motion;
   TETWARP_HD void operator()(std::size_t n) const {
-    if (a.role[n] == Role::kept) return;
+    if (a.role[n] == SpringRole::kept) return;
     a.u[n] += motion.way_of(a.rest_place(a.vertex[n]) + a.u[n]);
     if (a.is_free(n)) a.trial[n] = a.u[n];
   }
 };
 
 /// Sets p to how far placed nodes have to go.
-struct Way : Sweep {
+struct PlacedMotion : Sweep {
   TETWARP_HD void operator()(std::size_t n) const { a.p[n] = in_float(a.trial[n] - a.u[n]); }
 };
 
@@ -157,7 +157,7 @@ TETWARP_HD inline glm::vec3 product(const DeviceArrays& a, std::size_t n) {
 }
 
 /// Sets r to the forces on free nodes if placed nodes alone went their way.
-struct Pull : Sweep {
+struct PlacedForces : Sweep {
   TETWARP_HD void operator()(std::size_t n) const { a.r[n] = a.is_free(n) ? -product(a, n) : glm::vec3(0); }
 };
 struct Forces : Sweep {
@@ -224,7 +224,7 @@ struct AfterDescend {
 };
 
 /// Sets p = z + share p.
-struct Turn : GradientSweep {
+struct NextDirection : GradientSweep {
   TETWARP_HD void operator()(std::size_t n) const { a.p[n] = a.z[n] + a.state->share * a.p[n]; }
 };
 
@@ -260,7 +260,7 @@ struct StrainOf : Sweep {
       sums.sum += pull * spring.elongation / 4;
       force += pull * spring.unit;
     }
-    (a.is_free(n) ? sums.most : sums.most_placed) = a.role[n] == Role::kept ? 0 : dot3(force, force);
+    (a.is_free(n) ? sums.most : sums.most_placed) = a.role[n] == SpringRole::kept ? 0 : dot3(force, force);
     sums.most_load = dot3(a.load[n], a.load[n]);
     a.trial_force[n] = a.is_free(n) ? force : glm::dvec3(0);
     sums.slope = -dot3(a.trial_force[n], in_double(a.x[n]));

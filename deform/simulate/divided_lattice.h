@@ -50,10 +50,9 @@ struct DividedLattice {
 ///         not positive
 DividedLattice divide(const Geometry& lattice, std::span<const Cut> cuts);
 
-/// For each copy of a lattice that was divided anew by other cuts: the node of the former division that held the same
-/// tissue.
-/// It is a node of the same corner and cell, of the largest piece on the same sides of the cuts that both divisions
-/// have; where the cell was whole, the lattice's vertex.
+/// For each copy of a lattice that was divided anew by other cuts: the node of the division before that held the same
+/// tissue. It is a node of the same corner and cell, of the largest piece on the same sides of the cuts that both
+/// divisions have; where the cell was whole, the lattice's vertex.
 std::vector<std::uint32_t> nodes_before(const DividedLattice& now, const DividedLattice& before,
                                         const Geometry& lattice);
 

@@ -23,7 +23,7 @@ constexpr double kArmijo = 1e-4;
 constexpr double kEnergyRounding = 1e-11;
 constexpr double kShortest = 1e-6, kLongest = 4;
 
-/// Effort of ordinary steps, and of those after which a simulation may count as settled.
+/// Effort of ordinary steps, and of those after which a simulation may count as converged.
 constexpr SolveEffort kUsual{.share = 0.1, .least = 3}, kThorough{.share = 0.1, .least = 50};
 constexpr SolveEffort kFollow{.share = 0.02, .least = 10, .most = 500};
 
@@ -56,9 +56,9 @@ class MassSpring final : public Simulation {
 
   void set_loads(const Loads& loads) override {
     require_loads(model_, loads);
-    if (!has_loads_ || loads.hold != hold_) {
-      hold_ = loads.hold;
-      roles_ = roles(model_, hold_);
+    if (!has_loads_ || loads.constraint != constraint_) {
+      constraint_ = loads.constraint;
+      roles_ = roles(model_, constraint_);
       least_force_ = rounding();
     }
     engine_->set_loads(loads, roles_);
@@ -75,16 +75,16 @@ class MassSpring final : public Simulation {
   std::vector<glm::vec3> displacement_on_host() const override { return engine_->shown_on_host(); }
   Memory memory() const override { return engine_->memory(); }
 
-  Settled advance(double part, const StoppingRule& rule, const Control& control) override {
+  Convergence advance(double part, const StoppingRule& rule, const Control& control) override {
     require(part >= 0 && part <= 1, "a part of the way is " + std::to_string(part) + "; expected 0 to 1");
     require(rule.steps > 0, "a rule allows " + std::to_string(rule.steps) + " steps; expected 1 or more");
     if (!has_loads_) return {.reached = true};
     engine_->set_stream(control.stream);
-    const Settled settled = settle(part, rule, control);
+    const Convergence convergence = converge(part, rule, control);
     engine_->show();
-    if (control.stop.stop_requested() && !settled.reached) throw Cancelled();
+    if (control.stop.stop_requested() && !convergence.reached) throw Cancelled();
     if (control.progress) control.progress(1);
-    return settled;
+    return convergence;
   }
 
  private:
@@ -93,7 +93,7 @@ class MassSpring final : public Simulation {
     constexpr double kSoftMm = 1e-4, kHardMm = 1e-9;
     double least = 0, most = 0;
     for (std::size_t n = 0; n < model_.nodes(); ++n) {
-      if (roles_[n] != Role::free) continue;
+      if (roles_[n] != SpringRole::free) continue;
       double sum = 0;
       for (int d = 0; d < kDirections; ++d) sum += double{model_.stiffness[model_.link(d, n)]};
       least = least > 0 ? std::min(least, sum) : sum;
@@ -107,19 +107,19 @@ class MassSpring final : public Simulation {
     return scale > 0 ? strain.free_force / scale : 0;
   }
 
-  Settled settle(double part, const StoppingRule& rule, const Control& control) {
+  Convergence converge(double part, const StoppingRule& rule, const Control& control) {
     const Ways ways = engine_->aim(part);
     if (const std::optional<RigidMotion> motion = rigid_motion(ways)) engine_->carry(*motion);
     if (ways.squares > 0) engine_->follow(kFollow, control.stop);
     Strain now = engine_->try_step(0);
     engine_->accept();
-    Settled settled{.residual = residual(now), .reached = now.free_force == 0};
+    Convergence convergence{.residual = residual(now), .reached = now.free_force == 0};
     Schedule schedule;
-    while (!settled.reached && settled.steps < rule.steps && !control.stop.stop_requested()) {
-      const bool is_near =
-          settled.steps > 0 && settled.motion_mm <= 10 * rule.motion_mm && settled.residual <= 10 * rule.residual;
+    while (!convergence.reached && convergence.steps < rule.steps && !control.stop.stop_requested()) {
+      const bool is_near = convergence.steps > 0 && convergence.motion_mm <= 10 * rule.motion_mm &&
+                           convergence.residual <= 10 * rule.residual;
       const SolveEffort& effort = is_near ? kThorough : kUsual;
-      Stiffness kind = schedule.kind(settled.residual);
+      Stiffness kind = schedule.kind(convergence.residual);
       Solved solved = engine_->solve(kind, effort, control.stop);
       if (solved.is_indefinite) {
         schedule.refuse_full();
@@ -129,16 +129,16 @@ class MassSpring final : public Simulation {
       if (control.stop.stop_requested()) break;
       const double before = now.energy, length = step(now, solved, kind);
       schedule.took(kind, before, now.energy);
-      ++settled.steps;
-      settled.motion_mm = length * solved.longest_mm;
-      settled.residual = residual(now);
+      ++convergence.steps;
+      convergence.motion_mm = length * solved.longest_mm;
+      convergence.residual = residual(now);
       const bool is_trusted = is_near && kind != Stiffness::laplacian && length >= 1;
       const bool is_still = now.free_force == 0 || (solved.longest_mm > 0 && length == 0);
-      settled.reached =
-          settled.motion_mm <= rule.motion_mm && settled.residual <= rule.residual && (is_trusted || is_still);
-      if (control.progress) control.progress(static_cast<double>(settled.steps) / rule.steps);
+      convergence.reached =
+          convergence.motion_mm <= rule.motion_mm && convergence.residual <= rule.residual && (is_trusted || is_still);
+      if (control.progress) control.progress(static_cast<double>(convergence.steps) / rule.steps);
     }
-    return settled;
+    return convergence;
   }
 
   static bool is_lower(const Strain& from, const Strain& to, double slope, double length) {
@@ -175,8 +175,8 @@ class MassSpring final : public Simulation {
 
   const Model& model_;
   std::unique_ptr<SpringEngine> engine_;
-  std::vector<Hold> hold_;
-  std::vector<Role> roles_;
+  std::vector<Constraint> constraint_;
+  std::vector<SpringRole> roles_;
   double least_force_ = 0;
   bool has_loads_ = false;
 };

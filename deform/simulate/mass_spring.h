@@ -36,7 +36,10 @@ inline constexpr std::size_t kMostNodesForCholesky = 20'000;
 ///
 /// Nodes that no springs tie to a placed node stay where they are, whatever force acts on them.
 ///
-/// @param model    must outlive the simulation unchanged
+/// Every run on the CPU gives the same bits, for any number of threads; a device gives others, within the stopping
+/// rule.
+///
+/// @param model    nodes, links and their moduli (model.h); must outlive the simulation unchanged
 /// @param options  choice of the solver
 /// @param limits   number of threads
 /// @throws InputError for a model whose arrays do not fit each other. The simulation's `set_loads` refuses forces where
@@ -48,7 +51,7 @@ std::unique_ptr<Simulation> make_cpu_mass_spring(const Model& model, const MassS
 /// @param model         model whose springs are summed
 /// @param displacement  LPS mm of each node
 double energy(const Model& model, std::span<const glm::vec3> displacement);
-/// Force of the springs on each node, N, LPS.
+/// Force of the springs on each node of the model, in their order: N, LPS, the way in which the springs move the node.
 /// @param model         model with the springs
 /// @param displacement  LPS mm of each node
 std::vector<glm::dvec3> net_forces(const Model& model, std::span<const glm::vec3> displacement);

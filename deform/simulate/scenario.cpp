@@ -39,7 +39,7 @@ struct CutOfPlan {
   }
   std::variant<PlaneCut, DiscCut, SweptCut> operator()(const SweptCutPlan& plan) const {
     SweptCut cut{{}, glm::normalize(plan.along) * mm_of(plan.depth, patient), plan.is_closed};
-    for (const Place& place : plan.path) cut.path.push_back(point_of(place, patient));
+    for (const ScenarioPoint& place : plan.path) cut.path.push_back(point_of(place, patient));
     return cut;
   }
 };
@@ -115,7 +115,7 @@ PhaseLoads::PhaseLoads(const Scenario& scenario, const Phase& phase, const Patie
                        phase.moves[static_cast<std::size_t>(way_of_[vertex])].entry +
                        " takes to a place of its own; let them be apart");
     }
-    pull(force->newton, vertices[n]);
+    add_force(force->newton, vertices[n]);
   }
   require(scenario.method == Method::chainmail || held_ + moved_ > 0,
           "nothing is held and nothing moved to a place" + (phase.name.empty() ? "" : " in \"" + phase.name + "\"") +
@@ -123,7 +123,7 @@ PhaseLoads::PhaseLoads(const Scenario& scenario, const Phase& phase, const Patie
 }
 
 void PhaseLoads::hold(const Scenario& scenario, const Patient& patient) {
-  for (const Held& held : scenario.hold) {
+  for (const HeldZone& held : scenario.hold) {
     const std::vector<std::uint8_t> inside = select(held.zone, patient);
     bool any = false;
     for (std::size_t vertex = 0; vertex < inside.size(); ++vertex) {
@@ -176,7 +176,7 @@ void PhaseLoads::place(const Phase& phase, std::size_t move, const std::vector<s
   }
 }
 
-void PhaseLoads::pull(const glm::dvec3& newton, const std::vector<std::size_t>& vertices) {
+void PhaseLoads::add_force(const glm::dvec3& newton, const std::vector<std::size_t>& vertices) {
   if (force_.empty()) force_.resize(way_of_.size());
   const glm::dvec3 share = newton / static_cast<double>(vertices.size());
   for (const std::size_t vertex : vertices) {
@@ -190,7 +190,7 @@ bool PhaseLoads::turns() const {
   return std::any_of(ways_.begin(), ways_.end(), [](const Way& way) { return way.radians != 0; });
 }
 
-std::size_t PhaseLoads::pulled() const {
+std::size_t PhaseLoads::with_force() const {
   return static_cast<std::size_t>(
       std::count_if(force_.begin(), force_.end(), [](const glm::vec3& force) { return force != glm::vec3(0); }));
 }
@@ -203,14 +203,15 @@ glm::dvec3 PhaseLoads::displacement(std::size_t move, const glm::dvec3& point, d
 }
 
 Loads PhaseLoads::at(double part, const Model& model, std::span<const glm::vec3> start) const {
-  Loads loads{
-      .hold = std::vector<Hold>(model.nodes(), Hold::free), .goal = std::vector<glm::vec3>(model.nodes()), .force = {}};
+  Loads loads{.constraint = std::vector<Constraint>(model.nodes(), Constraint::free),
+              .goal = std::vector<glm::vec3>(model.nodes()),
+              .force = {}};
   if (!force_.empty()) loads.force.resize(model.nodes());
   for (std::size_t vertex = 0; vertex < way_of_.size(); ++vertex) {
     if (!force_.empty()) loads.force[vertex] = static_cast<float>(part) * force_[vertex];
     const std::int32_t way = way_of_[vertex];
     if (way == kFree) continue;
-    loads.hold[vertex] = Hold::placed;
+    loads.constraint[vertex] = Constraint::placed;
     if (way == kHeld) continue;
     const auto n = static_cast<std::int64_t>(vertex);
     const glm::dvec3 x = vertex_point_(glm::dvec3(n % size_.x, n / size_.x % size_.y, n / (size_.x * size_.y)));

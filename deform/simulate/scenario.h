@@ -29,21 +29,21 @@ struct TissueClass {
 };
 
 /// Vertices that do not move in any phase.
-struct Held {
+struct HeldZone {
   Zone zone;          ///< which vertices
   std::string entry;  ///< name of the entry in messages: `hold[1] "spine"`
 };
 
 /// A grip on some tissue, as of forceps.
 struct Handle {
-  Place at;       ///< middle of the grip
-  Length radius;  ///< vertices up to this far away are gripped; if there are none, the nearest vertex
+  ScenarioPoint at;  ///< middle of the grip
+  Length radius;     ///< vertices up to this far away are gripped; if there are none, the nearest vertex
 };
 /// A rotation about an axis through a place.
 struct Rotation {
-  Place about;      ///< a place on the axis
-  glm::dvec3 axis;  ///< direction of the axis in LPS, of any length
-  double degrees;   ///< angle in degrees, by the right-hand rule
+  ScenarioPoint about;  ///< a place on the axis
+  glm::dvec3 axis;      ///< direction of the axis in LPS, of any length
+  double degrees;       ///< angle in degrees, by the right-hand rule
 };
 /// A force that all moved vertices share equally.
 struct Force {
@@ -59,21 +59,21 @@ struct Move {
 
 /// A plane cut before the patient is known.
 struct PlaneCutPlan {
-  Place at;           ///< a place on the plane
+  ScenarioPoint at;   ///< a place on the plane
   glm::dvec3 normal;  ///< in LPS, of any length
 };
 /// A disc cut before the patient is known.
 struct DiscCutPlan {
-  Place at;           ///< centre of the disc
+  ScenarioPoint at;   ///< centre of the disc
   glm::dvec3 normal;  ///< in LPS, of any length
   Length radius;      ///< radius of the disc
 };
 /// A swept cut before the patient is known.
 struct SweptCutPlan {
-  std::vector<Place> path;  ///< at least two places that the blade follows
-  glm::dvec3 along;         ///< direction in which the blade cuts, in LPS, of any length
-  Length depth;             ///< how deep it cuts
-  bool is_closed = false;   ///< whether the last place is joined to the first
+  std::vector<ScenarioPoint> path;  ///< at least two places that the blade follows
+  glm::dvec3 along;                 ///< direction in which the blade cuts, in LPS, of any length
+  Length depth;                     ///< how deep it cuts
+  bool is_closed = false;           ///< whether the last place is joined to the first
 };
 /// A cut before the patient is known.
 struct CutPlan {
@@ -98,10 +98,10 @@ struct Scenario {
   std::int64_t cell_size = 8;         ///< distance of lattice vertices, voxels
   double body_above_hu = -400;        ///< cells of higher mean HU can belong to the body
   std::vector<TissueClass> tissues;   ///< a cell gets the first whose conditions it meets; the last has no condition
-  std::vector<Held> hold;             ///< what does not move
+  std::vector<HeldZone> hold;         ///< what does not move
   std::vector<CutPlan> cuts;          ///< all cuts of the scenario
   std::vector<Phase> phases;          ///< what is done, in this order
-  StoppingRule stop;                  ///< when a frame has settled
+  StoppingRule stop;                  ///< when a frame has converged
 };
 
 /// Number of frames of all phases.
@@ -140,14 +140,14 @@ class PhaseLoads {
   /// Number of vertices with a goal.
   std::size_t moved() const { return moved_; }
   /// Number of vertices with a force and no goal.
-  std::size_t pulled() const;
+  std::size_t with_force() const;
   /// Remarks for people, such as a hold that holds no vertex.
   const std::vector<std::string>& notes() const { return notes_; }
 
  private:
   void hold(const Scenario& scenario, const Patient& patient);
   void place(const Phase& phase, std::size_t move, const std::vector<std::size_t>& vertices);
-  void pull(const glm::dvec3& newton, const std::vector<std::size_t>& vertices);
+  void add_force(const glm::dvec3& newton, const std::vector<std::size_t>& vertices);
   std::vector<std::size_t> free_vertices(const Move& move, const Patient& patient) const;
   glm::dvec3 displacement(std::size_t move, const glm::dvec3& point, double part) const;
 

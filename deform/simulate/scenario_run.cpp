@@ -71,17 +71,17 @@ void ScenarioRun::begin_phase() {
   if (!loads_[phase_].turns()) simulation_->set_loads(loads_[phase_].at(1, model_, start_));
 }
 
-Frame ScenarioRun::next(const Control& control) {
+FrameResult ScenarioRun::next(const Control& control) {
   require(!is_done(), "the scenario has no further frame");
   if (frame_in_phase_ == 0) begin_phase();
   const Phase& phase = scenario_.phases[phase_];
   const double part = static_cast<double>(frame_in_phase_ + 1) / phase.frames;
-  Frame frame{.number = done_ + 1, .phase = phase_, .settled = {}};
+  FrameResult frame{.number = done_ + 1, .phase = phase_, .convergence = {}};
   if (loads_[phase_].turns()) {
     simulation_->set_loads(loads_[phase_].at(part, model_, start_));
-    frame.settled = simulation_->advance(1, scenario_.stop, control);
+    frame.convergence = simulation_->advance(1, scenario_.stop, control);
   } else {
-    frame.settled = simulation_->advance(part, scenario_.stop, control);
+    frame.convergence = simulation_->advance(part, scenario_.stop, control);
   }
   ++done_;
   frame.ends_phase = ++frame_in_phase_ == phase.frames;

@@ -17,11 +17,11 @@ namespace tetwarp::simulate {
 using MakeSimulation = std::function<std::unique_ptr<Simulation>(const Model&)>;
 
 /// What became of a frame.
-struct Frame {
+struct FrameResult {
   int number = 0;           ///< from 1, counted over all phases
   std::size_t phase = 0;    ///< index of its phase
   bool ends_phase = false;  ///< whether it is the last frame of its phase
-  Settled settled;          ///< how the simulation settled
+  Convergence convergence;  ///< how the simulation converged
 };
 
 /// A scenario that is played on a patient, frame by frame.
@@ -43,7 +43,7 @@ class ScenarioRun {
   bool is_done() const { return done_ == frames(); }
   /// Simulates the next frame.
   /// @throws Cancelled and whatever the simulation throws
-  Frame next(const Control& control = {});
+  FrameResult next(const Control& control = {});
 
   /// Sends volumes through the field after the last frame. Calling this and `next` in turn is the loop of an
   /// interactive program. Displacements that the simulation keeps on a device stay there, unless open cuts divide

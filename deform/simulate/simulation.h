@@ -15,27 +15,27 @@
 namespace tetwarp::simulate {
 
 /// Who decides where a node goes.
-enum class Hold : std::uint8_t {
+enum class Constraint : std::uint8_t {
   free,    ///< its links and the force on it
   placed,  ///< its goal; held tissue has the goal of not moving, gripped tissue that of its handle
 };
 
 /// What is done to the nodes of a model. Each array has one entry a node.
 struct Loads {
-  std::vector<Hold> hold;        ///< free or placed
-  std::vector<glm::vec3> goal;   ///< displacement of placed nodes, LPS mm; entries of free nodes are not read
-  std::vector<glm::vec3> force;  ///< force on free nodes, N, LPS; empty: none. ChainMail refuses forces
+  std::vector<Constraint> constraint;  ///< free or placed
+  std::vector<glm::vec3> goal;         ///< displacement of placed nodes, LPS mm; entries of free nodes are not read
+  std::vector<glm::vec3> force;        ///< force on free nodes, N, LPS; empty: none. ChainMail refuses forces
 };
 
-/// When a simulation has settled: when both `motion_mm` and `residual` are reached, or all steps are done.
+/// When a simulation has converged: when both `motion_mm` and `residual` are reached, or all steps are done.
 struct StoppingRule {
   double motion_mm = 0.01;  ///< largest motion of a node in the last step, mm
-  double residual = 1e-3;   ///< largest `Settled::residual`
+  double residual = 1e-3;   ///< largest `Convergence::residual`
   int steps = 2000;         ///< largest number of steps
 };
 
-/// How a simulation settled.
-struct Settled {
+/// How a simulation converged.
+struct Convergence {
   int steps = 0;         ///< number of steps that were made
   double motion_mm = 0;  ///< largest motion of a node in the last step, mm
   /// Mass-spring: the largest net force on a free node, divided by the largest force that keeps a placed node in place
@@ -59,9 +59,9 @@ class Simulation {
   /// @throws InputError for arrays of the wrong size, or a goal or force that is not finite or too large
   virtual void set_loads(const Loads& loads) = 0;
 
-  /// Takes placed nodes and forces to `part` (0 to 1) of their way and lets the other nodes settle.
+  /// Takes placed nodes and forces to `part` (0 to 1) of their way and lets the other nodes converge.
   /// @throws Cancelled, after which the displacements are those of some step
-  virtual Settled advance(double part, const StoppingRule& rule, const Control& control = {}) = 0;
+  virtual Convergence advance(double part, const StoppingRule& rule, const Control& control = {}) = 0;
 
   /// Displacement of every node, LPS mm, deformed minus undeformed; the lattice's vertices come first, in order. The
   /// array lies in `memory()`, and the next call of `advance` changes it.

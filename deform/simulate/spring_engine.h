@@ -83,7 +83,7 @@ class SpringEngine {
 
   /// Sets new loads: from now on placed nodes go from where they are to `loads.goal`, and forces from what they are to
   /// `loads.force`.
-  virtual void set_loads(const Loads& loads, std::span<const Role> roles) = 0;
+  virtual void set_loads(const Loads& loads, std::span<const SpringRole> roles) = 0;
   virtual void set_displacement(std::span<const glm::vec3> displacement) = 0;
 
   /// Sets forces to a part of their way. @return how far placed nodes still have to go for theirs

@@ -33,12 +33,12 @@ bool is_zero(const glm::vec3& v) { return v.x == 0 && v.y == 0 && v.z == 0; }
 
 }  // namespace
 
-std::vector<Role> roles(const Model& model, std::span<const Hold> hold) {
-  std::vector<Role> result(model.nodes(), Role::kept);
+std::vector<SpringRole> roles(const Model& model, std::span<const Constraint> constraint) {
+  std::vector<SpringRole> result(model.nodes(), SpringRole::kept);
   std::vector<std::uint32_t> front;
   for (std::size_t n = 0; n < model.nodes(); ++n) {
-    if (hold[n] != Hold::placed) continue;
-    result[n] = Role::placed;
+    if (constraint[n] != Constraint::placed) continue;
+    result[n] = SpringRole::placed;
     front.push_back(static_cast<std::uint32_t>(n));
   }
   while (!front.empty()) {
@@ -48,8 +48,8 @@ std::vector<Role> roles(const Model& model, std::span<const Hold> hold) {
       const std::size_t link = model.link(d, n);
       if (model.neighbour[link] < 0 || !(model.stiffness[link] > 0)) continue;
       const auto other = static_cast<std::uint32_t>(model.neighbour[link]);
-      if (result[other] != Role::kept) continue;
-      result[other] = Role::free;
+      if (result[other] != SpringRole::kept) continue;
+      result[other] = SpringRole::free;
       front.push_back(other);
     }
   }
@@ -57,13 +57,13 @@ std::vector<Role> roles(const Model& model, std::span<const Hold> hold) {
 }
 
 void require_loads(const Model& model, const Loads& loads) {
-  require_size(loads.hold.size(), model, "hold");
+  require_size(loads.constraint.size(), model, "hold");
   require_size(loads.goal.size(), model, "goal");
   if (!loads.force.empty()) require_size(loads.force.size(), model, "force");
   bool any_placed = false;
   for (std::size_t n = 0; n < model.nodes(); ++n) {
     if (!loads.force.empty()) require_within(loads.force[n], kMostNewton, n, "force", "N");
-    if (loads.hold[n] != Hold::placed) continue;
+    if (loads.constraint[n] != Constraint::placed) continue;
     require_within(loads.goal[n], kMostMm, n, "goal", "mm");
     any_placed = true;
   }

@@ -8,14 +8,14 @@
 namespace tetwarp::simulate {
 
 /// What a solver of mass-spring does with a node.
-enum class Role : std::uint8_t {
+enum class SpringRole : std::uint8_t {
   kept,    ///< stays where it is: no springs tie it to a placed node
   free,    ///< its displacement is sought
   placed,  ///< its displacement is given
 };
 
-/// Finds the nodes that springs tie to placed ones. @param hold  one for each node
-std::vector<Role> roles(const Model& model, std::span<const Hold> hold);
+/// Finds the nodes that springs tie to placed ones. @param constraint  one for each node
+std::vector<SpringRole> roles(const Model& model, std::span<const Constraint> constraint);
 
 /// Checks loads. @throws InputError for arrays of the wrong size, a goal or force that is not finite or too large (1e6
 /// mm, 1e9 N), or forces where no node is placed

@@ -46,7 +46,7 @@ struct Selector {
     const double radius = mm_of(sphere.radius, patient);
     return where_point(patient, [&](const glm::dvec3& x) { return glm::distance(x, middle) <= radius; });
   }
-  std::vector<std::uint8_t> operator()(const Box& box) const {
+  std::vector<std::uint8_t> operator()(const AlignedBox& box) const {
     const glm::dvec3 a = point_of(box.from, patient), b = point_of(box.to, patient);
     const glm::dvec3 low = glm::min(a, b), high = glm::max(a, b);
     return where_point(patient, [&](const glm::dvec3& x) { return glm::clamp(x, low, high) == x; });
@@ -115,7 +115,7 @@ struct Selector {
 
 }  // namespace
 
-glm::dvec3 point_of(const Place& place, const Patient& patient) {
+glm::dvec3 point_of(const ScenarioPoint& place, const Patient& patient) {
   if (place.unit == Unit::mm) return place.at;
   const BodyBox& box = box_of(patient);
   return box.low + place.at * (box.high - box.low);

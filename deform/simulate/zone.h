@@ -21,7 +21,7 @@ enum class Unit : std::uint8_t {
 };
 
 /// A point: LPS mm, or parts of the body's box along L, P, S, where 0 is the right, front and lower side.
-struct Place {
+struct ScenarioPoint {
   glm::dvec3 at{0};      ///< coordinates
   Unit unit = Unit::mm;  ///< their unit
 };
@@ -38,7 +38,7 @@ struct Shift {
 
 /// A place in LPS mm.
 /// @throws InputError for parts of the body where the patient has no body
-glm::dvec3 point_of(const Place& place, const Patient& patient);
+glm::dvec3 point_of(const ScenarioPoint& place, const Patient& patient);
 /// A length in mm.
 /// @throws InputError for parts of the body where the patient has no body
 double mm_of(const Length& length, const Patient& patient);
@@ -48,17 +48,17 @@ glm::dvec3 mm_of(const Shift& shift, const Patient& patient);
 
 /// A ball.
 struct Sphere {
-  Place at;       ///< its centre
-  Length radius;  ///< its radius
+  ScenarioPoint at;  ///< its centre
+  Length radius;     ///< its radius
 };
 /// A box with sides along L, P, S.
-struct Box {
-  Place from,  ///< a corner
-      to;      ///< the opposite corner; either may be the lower one
+struct AlignedBox {
+  ScenarioPoint from,  ///< a corner
+      to;              ///< the opposite corner; either may be the lower one
 };
 /// A plane, and the side to which its normal points.
 struct HalfSpace {
-  Place at;           ///< a place on the plane
+  ScenarioPoint at;   ///< a place on the plane
   glm::dvec3 normal;  ///< in LPS, of any length
 };
 /// HU from `low` up to, but not including, `high`.
@@ -95,7 +95,7 @@ struct Not {
 /// A set of vertices of a lattice. Scenario files call it a region.
 struct Zone {
   /// How the set is described.
-  std::variant<Sphere, Box, HalfSpace, HuRange, Labels, Border, Body, AllOf, AnyOf, Not> shape;
+  std::variant<Sphere, AlignedBox, HalfSpace, HuRange, Labels, Border, Body, AllOf, AnyOf, Not> shape;
 };
 
 /// For each vertex of the patient's lattice, i fastest: 1 if it lies in the zone, else 0.

@@ -60,7 +60,7 @@ std::vector<TissueClass> read_tissues(const JsonEntry& entry) {
 Rotation read_rotation(const JsonEntry& entry) {
   constexpr std::array<const char*, 3> kKeys = {"about", "axis", "degrees"};
   entry.only(kKeys);
-  return {read_place(entry.at("about")), entry.at("axis").direction(), entry.at("degrees").number({-180, 180})};
+  return {read_point(entry.at("about")), entry.at("axis").direction(), entry.at("degrees").number({-180, 180})};
 }
 
 Move read_move(const JsonEntry& entry, Method method) {
@@ -73,7 +73,7 @@ Move read_move(const JsonEntry& entry, Method method) {
     constexpr std::array<const char*, 3> kHandleKeys = {"at", "radius_mm", "radius_body"};
     const JsonEntry handle = entry.at("handle");
     handle.only(kHandleKeys);
-    move.what = Handle{read_place(handle.at("at")), read_length(handle, "radius_mm", "radius_body")};
+    move.what = Handle{read_point(handle.at("at")), read_length(handle, "radius_mm", "radius_body")};
   }
   switch (entry.one_of(std::span(kKeys).subspan(2, 4))) {
     case 0: move.how = Shift{entry.at("by_mm").vector({-1e4, 1e4}), Unit::mm}; break;

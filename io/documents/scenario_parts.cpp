@@ -31,17 +31,17 @@ std::vector<Zone> read_regions(const JsonEntry& entry) {
 
 Zone read_sphere(const JsonEntry& entry) {
   only(entry, {"at", "radius_mm", "radius_body"});
-  return {Sphere{read_place(entry.at("at")), read_length(entry, "radius_mm", "radius_body")}};
+  return {Sphere{read_point(entry.at("at")), read_length(entry, "radius_mm", "radius_body")}};
 }
 
 Zone read_box(const JsonEntry& entry) {
   only(entry, {"from", "to"});
-  return {Box{read_place(entry.at("from")), read_place(entry.at("to"))}};
+  return {AlignedBox{read_point(entry.at("from")), read_point(entry.at("to"))}};
 }
 
 Zone read_half_space(const JsonEntry& entry) {
   only(entry, {"at", "normal"});
-  return {HalfSpace{read_place(entry.at("at")), entry.at("normal").direction()}};
+  return {HalfSpace{read_point(entry.at("at")), entry.at("normal").direction()}};
 }
 
 Zone read_border(const JsonEntry& entry) {
@@ -76,7 +76,7 @@ SweptCutPlan read_swept(const JsonEntry& entry) {
   SweptCutPlan plan;
   const bool is_closed = entry.has("closed") && entry.at("closed").truth();
   for (const JsonEntry& place : entry.at("path").items(is_closed ? 3 : 2, kMostPoints))
-    plan.path.push_back(read_place(place));
+    plan.path.push_back(read_point(place));
   plan.along = entry.at("along").direction();
   plan.depth = read_length(entry, "depth_mm", "depth_body");
   plan.is_closed = is_closed;
@@ -85,7 +85,7 @@ SweptCutPlan read_swept(const JsonEntry& entry) {
 
 }  // namespace
 
-Place read_place(const JsonEntry& entry) {
+ScenarioPoint read_point(const JsonEntry& entry) {
   constexpr std::array<const char*, 2> kKeys = {"mm", "body"};
   entry.only(kKeys);
   if (entry.one_of(kKeys) == 0) return {entry.at("mm").vector(kCoordinateMm), Unit::mm};
@@ -131,10 +131,10 @@ CutPlan read_cut(const JsonEntry& entry) {
   const JsonEntry inner = entry.at(kShapes[shape]);
   if (shape == 0) {
     only(inner, {"at", "normal"});
-    cut.shape = PlaneCutPlan{read_place(inner.at("at")), inner.at("normal").direction()};
+    cut.shape = PlaneCutPlan{read_point(inner.at("at")), inner.at("normal").direction()};
   } else if (shape == 1) {
     only(inner, {"at", "normal", "radius_mm", "radius_body"});
-    cut.shape = DiscCutPlan{read_place(inner.at("at")), inner.at("normal").direction(),
+    cut.shape = DiscCutPlan{read_point(inner.at("at")), inner.at("normal").direction(),
                             read_length(inner, "radius_mm", "radius_body")};
   } else {
     cut.shape = read_swept(inner);

@@ -11,7 +11,7 @@ namespace tetwarp {
 
 inline constexpr NumberRange kCoordinateMm{-1e6, 1e6}, kBodyParts{-100, 100};
 
-simulate::Place read_place(const JsonEntry& entry);
+simulate::ScenarioPoint read_point(const JsonEntry& entry);
 /// Reads a length from an object that has one of two keys. @param key_mm  its value is in mm
 /// @param key_body  its value is a part of the body's size
 simulate::Length read_length(const JsonEntry& entry, const char* key_mm, const char* key_body);

@@ -249,7 +249,7 @@ void check_options(const FieldSource& source) {
   wanted_item(source);
 }
 
-bool claims(const std::filesystem::path&, std::string_view first_bytes) {
+bool recognizes(const std::filesystem::path&, std::string_view first_bytes) {
   return first_bytes.substr(std::min(kMagicOffset, first_bytes.size())).starts_with(kMagic);
 }
 
@@ -282,6 +282,6 @@ std::unique_ptr<FieldReader> open(const FieldSource& source) {
 
 }  // namespace
 
-const FieldFormat kFieldFormat_dicom = {claims, holds_field, check_options, open};
+const FieldFormat kFieldFormat_dicom = {recognizes, holds_field, check_options, open};
 
 }  // namespace tetwarp

@@ -22,7 +22,7 @@ bool is_there(const std::filesystem::path& path) {
   return std::filesystem::exists(path, ignored);
 }
 
-/// The format that claims the file; null: none does.
+/// The format that recognizes the file; null: none does.
 const FieldFormat* format_of(const std::filesystem::path& path) {
   if (!is_file(path)) return find_field_format(path, "");
   std::string first(kFirstBytes, '\0');

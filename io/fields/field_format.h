@@ -37,8 +37,8 @@ class FieldReader {
 struct FieldFormat {
   /// Whether a file is of this format, by its suffix or its first bytes (`kFirstBytes` of them; fewer of a shorter
   /// file, none where it cannot be read).
-  bool (*claims)(const std::filesystem::path& path, std::string_view first_bytes);
-  /// Whether a claimed file holds a field rather than a volume; null: it always does. @throws InputError for what
+  bool (*recognizes)(const std::filesystem::path& path, std::string_view first_bytes);
+  /// Whether a recognized file holds a field rather than a volume; null: it always does. @throws InputError for what
   /// `open` refuses
   bool (*holds_field)(const FieldSource& source);
   /// Checks the options; null: the format takes none. @throws InputError naming the file and what to give
@@ -47,8 +47,8 @@ struct FieldFormat {
   std::unique_ptr<FieldReader> (*open)(const FieldSource& source);
 };
 
-/// The first format that claims the file, in the order of io/CMakeLists.txt, from which this function is made; null:
-/// none does.
+/// The first format that recognizes the file, in the order of io/CMakeLists.txt, from which this function is made;
+/// null: none does.
 const FieldFormat* find_field_format(const std::filesystem::path& path, std::string_view first_bytes);
 
 }  // namespace tetwarp

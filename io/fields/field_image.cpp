@@ -36,7 +36,7 @@ class ImageFieldReader final : public FieldReader {
   std::unique_ptr<ImageReader> image_;
 };
 
-bool claims(const std::filesystem::path& path, std::string_view) { return has_image_suffix(path); }
+bool recognizes(const std::filesystem::path& path, std::string_view) { return has_image_suffix(path); }
 
 bool holds_field(const FieldSource& source) { return read_image_header(source.path).components == 3; }
 
@@ -53,7 +53,7 @@ std::unique_ptr<FieldReader> open(const FieldSource& source) {
 
 }  // namespace
 
-const FieldFormat kFieldFormat_image = {claims, holds_field, nullptr, open};
+const FieldFormat kFieldFormat_image = {recognizes, holds_field, nullptr, open};
 
 std::unique_ptr<ImageReader> open_vectors(const std::filesystem::path& path, NiftiFrame frame) {
   auto reader = open_image(path, frame);

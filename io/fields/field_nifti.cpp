@@ -75,7 +75,9 @@ class NiftiFieldReader final : public FieldReader {
   std::unique_ptr<ImageReader> image_;
 };
 
-bool claims(const std::filesystem::path& path, std::string_view) { return image_format(path) == ImageFormat::nifti; }
+bool recognizes(const std::filesystem::path& path, std::string_view) {
+  return image_format(path) == ImageFormat::nifti;
+}
 
 /// Which frame of a NIfTI file to use: NiftyReg uses the sform where there is one, whatever its code, so its files are
 /// read like this whatever the user chose.
@@ -107,6 +109,6 @@ std::unique_ptr<FieldReader> open(const FieldSource& source) {
 
 }  // namespace
 
-const FieldFormat kFieldFormat_nifti = {claims, holds_field, nullptr, open};
+const FieldFormat kFieldFormat_nifti = {recognizes, holds_field, nullptr, open};
 
 }  // namespace tetwarp

@@ -252,7 +252,7 @@ class NpyReader final : public FieldReader {
   bool placed_, order_xyz_, components_xyz_;
 };
 
-bool claims(const std::filesystem::path& path, std::string_view first_bytes) {
+bool recognizes(const std::filesystem::path& path, std::string_view first_bytes) {
   return path.extension() == ".npy" || first_bytes.starts_with(kMagic);
 }
 
@@ -264,6 +264,6 @@ std::unique_ptr<FieldReader> open(const FieldSource& source) {
 
 }  // namespace
 
-const FieldFormat kFieldFormat_npy = {claims, nullptr, check_options, open};
+const FieldFormat kFieldFormat_npy = {recognizes, nullptr, check_options, open};
 
 }  // namespace tetwarp

@@ -217,7 +217,7 @@ class VtkFieldReader final : public FieldReader {
   glm::dvec3 to_lps_mm_;
 };
 
-bool claims(const std::filesystem::path& path, std::string_view first_bytes) {
+bool recognizes(const std::filesystem::path& path, std::string_view first_bytes) {
   return (has_vtk_suffix(path) || first_bytes.starts_with("# vtk DataFile")) &&
          vtk_dataset(path) != VtkDataset::unstructured_grid;
 }
@@ -238,6 +238,6 @@ std::unique_ptr<FieldReader> open(const FieldSource& source) {
 
 }  // namespace
 
-const FieldFormat kFieldFormat_vtk = {claims, holds_field, check_options, open};
+const FieldFormat kFieldFormat_vtk = {recognizes, holds_field, check_options, open};
 
 }  // namespace tetwarp

@@ -23,13 +23,13 @@ constexpr std::size_t kPiece = 1 << 14;
 
 }  // namespace
 
-Found found_at(const std::filesystem::path& path) {
+PathKind kind_at(const std::filesystem::path& path) {
   using std::filesystem::file_type;
   std::error_code error;
   const file_type type = std::filesystem::status(path, error).type();
-  if (type == file_type::not_found) return Found::nothing;
-  if (type == file_type::regular) return Found::file;
-  if (type == file_type::directory) return Found::folder;
+  if (type == file_type::not_found) return PathKind::nothing;
+  if (type == file_type::regular) return PathKind::file;
+  if (type == file_type::directory) return PathKind::folder;
   require(type != file_type::none,
           "cannot be read (" + error.message() + "), " + shown(path) + "; check the name and your rights to it");
   throw InputError("neither a file nor a folder, " + shown(path) + "; name one of them");

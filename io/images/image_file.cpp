@@ -39,7 +39,7 @@ void require_orthogonal(const Geometry& geometry, const std::string& file) {
 
 /// A header that promises more voxels than the file can hold is not believed: nothing is allocated for it. Nor is one
 /// that leaves bytes over, where the voxels are stored as they are: it is about another volume, or the file is damaged.
-void require_file_holds(const std::filesystem::path& path, const ImageHeader& header, const Stored& stored) {
+void require_file_holds(const std::filesystem::path& path, const ImageHeader& header, const StoredVoxels& stored) {
   constexpr double kDeflateAtMost = 1040;  // deflate cannot do better than 1032 to 1
   double expected = static_cast<double>(header.components) * static_cast<double>(stored.value_bytes);
   for (int axis = 0; axis < 3; ++axis) expected *= static_cast<double>(header.geometry.size[axis]);
@@ -60,7 +60,7 @@ void require_file_holds(const std::filesystem::path& path, const ImageHeader& he
 std::unique_ptr<ImageReader> open_nrrd(const std::filesystem::path& path) {
   const TextHeader text = read_text_header(path, ImageFormat::nrrd);
   NrrdHeader header = parse_nrrd_header(text, path.string());
-  Stored stored{text.data_offset, size_bytes(header.image.type), header.encoding != Encoding::raw};
+  StoredVoxels stored{text.data_offset, size_bytes(header.image.type), header.encoding != Encoding::raw};
   const ValueLayout layout = nrrd_layout(path, text, header, stored.offset);
   return make_value_reader(path, std::move(header.image), stored, layout);
 }
@@ -69,7 +69,7 @@ std::unique_ptr<ImageReader> open_mha(const std::filesystem::path& path) {
   const TextHeader text = read_text_header(path, ImageFormat::mha);
   ImageHeader header = parse_mha_header(text, path.string());
   const ValueLayout layout = mha_layout(path, text);
-  const Stored stored{text.data_offset, size_bytes(header.type), layout.encoding != Encoding::raw};
+  const StoredVoxels stored{text.data_offset, size_bytes(header.type), layout.encoding != Encoding::raw};
   return make_value_reader(path, std::move(header), stored, layout);
 }
 
@@ -120,9 +120,9 @@ std::size_t ImageReader::value_count() const {
 void require_readable_file(const std::filesystem::path& path) {
   const std::string file = path.string();
   std::error_code error;
-  const Found found = found_at(path);
-  require(found != Found::nothing, "no such file, " + file);
-  require(found == Found::file, "not a file, " + file);
+  const PathKind kind = kind_at(path);
+  require(kind != PathKind::nothing, "no such file, " + file);
+  require(kind == PathKind::file, "not a file, " + file);
   require(std::filesystem::file_size(path, error) > 0, "an empty file, " + file);
   require(::access(path.c_str(), R_OK) == 0, "a file that may not be read, " + file + "; check its rights");
 }

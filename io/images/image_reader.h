@@ -21,7 +21,7 @@ enum class ImageFormat : std::uint8_t { nifti, nrrd, mha };
 std::optional<ImageFormat> image_format(const std::filesystem::path& path);
 
 /// How the voxels lie in the file.
-struct Stored {
+struct StoredVoxels {
   std::uint64_t offset = 0;     ///< of the first byte (of the decompressed stream, for NIfTI)
   std::size_t value_bytes = 0;  ///< of one number
   bool encoded = false;         ///< compressed, or text
@@ -30,12 +30,12 @@ struct Stored {
 /// A volume file whose header was read; its voxels go straight into the caller's buffer.
 class ImageReader {
  public:
-  ImageReader(std::filesystem::path path, ImageHeader header, Stored stored)
+  ImageReader(std::filesystem::path path, ImageHeader header, StoredVoxels stored)
       : path_(std::move(path)), header_(std::move(header)), stored_(stored) {}
   virtual ~ImageReader() = default;
 
   const ImageHeader& header() const { return header_; }
-  const Stored& stored() const { return stored_; }
+  const StoredVoxels& stored() const { return stored_; }
   std::size_t value_count() const;  ///< voxels times components
   /// Fills the buffer of `value_count()` values of the header's type: components side by side, i fastest, native byte
   /// order. @throws InputError for a file that is truncated or damaged
@@ -44,7 +44,7 @@ class ImageReader {
  protected:
   std::filesystem::path path_;
   ImageHeader header_;
-  Stored stored_;
+  StoredVoxels stored_;
 };
 
 /// @throws InputError naming the file: missing, no regular file, empty, without the right to read it

@@ -88,7 +88,8 @@ class PlanePieces {
 
 class NiftiReader final : public ImageReader {
  public:
-  NiftiReader(const std::filesystem::path& path, ImageHeader image, Stored stored, NiftiHeader header, VoxelType disk)
+  NiftiReader(const std::filesystem::path& path, ImageHeader image, StoredVoxels stored, NiftiHeader header,
+              VoxelType disk)
       : ImageReader(path, std::move(image), stored), nifti_(std::move(header)), disk_(disk) {}
 
   void read(std::span<std::byte> voxels) const override {
@@ -218,7 +219,7 @@ std::unique_ptr<ImageReader> open_nifti(const std::filesystem::path& path, Nifti
   }
   require(header.vox_offset >= 348 && header.vox_offset < 1e9,
           "vox_offset " + std::to_string(header.vox_offset) + ", " + file + "; expected 352");
-  const Stored stored{static_cast<std::uint64_t>(header.vox_offset), size_bytes(disk), compressed};
+  const StoredVoxels stored{static_cast<std::uint64_t>(header.vox_offset), size_bytes(disk), compressed};
   return std::make_unique<NiftiReader>(path, std::move(image), stored, std::move(header), disk);
 }
 

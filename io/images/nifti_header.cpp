@@ -16,11 +16,11 @@
 namespace tetwarp {
 namespace {
 
-using Bytes = std::array<unsigned char, 348>;
+using HeaderBytes = std::array<unsigned char, 348>;
 
 /// The number at `offset` (nifti1.h), in native byte order.
 template <class T>
-T number(const Bytes& bytes, std::size_t offset, bool swapped) {
+T number(const HeaderBytes& bytes, std::size_t offset, bool swapped) {
   std::array<unsigned char, sizeof(T)> raw;
   std::copy_n(bytes.begin() + static_cast<std::ptrdiff_t>(offset), sizeof(T), raw.begin());
   if (swapped) std::reverse(raw.begin(), raw.end());
@@ -29,10 +29,10 @@ T number(const Bytes& bytes, std::size_t offset, bool swapped) {
   return value;
 }
 
-Bytes read_bytes(const std::filesystem::path& path) {
+HeaderBytes read_bytes(const std::filesystem::path& path) {
   const std::unique_ptr<gzFile_s, int (*)(gzFile)> file(gzopen(path.c_str(), "rb"), gzclose);
   require(file != nullptr, "cannot open, " + path.string());
-  Bytes bytes{};
+  HeaderBytes bytes{};
   const int read = gzread(file.get(), bytes.data(), bytes.size());
   require(read >= 0, "damaged gzip data, " + path.string() + "; copy the file again");
   require(read != 0, "an empty file, " + path.string());
@@ -61,7 +61,7 @@ struct Quaternion {
   double rounding = 0;  ///< radians by which the float32 of b, c and d may turn it: most where a is near 0
 };
 
-Quaternion quaternion(const Bytes& bytes, bool swapped) {
+Quaternion quaternion(const HeaderBytes& bytes, bool swapped) {
   const auto f = [&](std::size_t offset) { return static_cast<double>(number<float>(bytes, offset, swapped)); };
   constexpr double kRounding = 4.0 / (1 << 24);  // of b^2 + c^2 + d^2
   Quaternion q{0, f(256), f(260), f(264), 0};
@@ -77,7 +77,7 @@ Quaternion quaternion(const Bytes& bytes, bool swapped) {
 }
 
 /// Method 2 of nifti1.h: quaternion, pixdim, qfac = pixdim[0].
-Geometry qform(const Bytes& bytes, bool swapped, const Quaternion& q, const glm::i64vec3& size) {
+Geometry qform(const HeaderBytes& bytes, bool swapped, const Quaternion& q, const glm::i64vec3& size) {
   const auto f = [&](std::size_t offset) { return static_cast<double>(number<float>(bytes, offset, swapped)); };
   const auto [a, b, c, d, rounding] = q;
   const double flip = f(76) < 0 ? -1 : 1;
@@ -89,7 +89,7 @@ Geometry qform(const Bytes& bytes, bool swapped, const Quaternion& q, const glm:
 }
 
 /// Method 3 of nifti1.h: srow_x, srow_y, srow_z.
-Geometry sform(const Bytes& bytes, bool swapped, const glm::i64vec3& size) {
+Geometry sform(const HeaderBytes& bytes, bool swapped, const glm::i64vec3& size) {
   std::array<glm::dvec3, 4> columns;
   for (std::size_t column = 0; column < 4; ++column) {
     for (std::size_t row = 0; row < 3; ++row) {
@@ -194,7 +194,7 @@ const Geometry& place_of(const NiftiHeader& header, NiftiFrame frame, const std:
 
 NiftiHeader read_nifti_header(const std::filesystem::path& path) {
   const std::string file = path.string();
-  const Bytes bytes = read_bytes(path);
+  const HeaderBytes bytes = read_bytes(path);
   NiftiHeader header;
   const auto size = number<std::int32_t>(bytes, 0, false);
   require(size != 540 && size != 0x1c020000, "a NIfTI-2 file, " + file + "; expected NIfTI-1: convert it");

@@ -134,8 +134,8 @@ const std::map<std::string, std::string>& nrrd_fields() {
   return kFields;
 }
 
-/// Fields that are about each axis, and those that are about the space around: the number of axes comes before the
-/// former, the space before the latter.
+/// Fields that are about each axis, before which the number of axes comes, and fields that are about the space around,
+/// before which the space comes.
 constexpr std::array kNrrdFieldsOfAxes =
     std::to_array<std::string_view>({"sizes", "spacings", "thicknesses", "axis mins", "axis maxs", "centerings",
                                      "kinds", "labels", "units", "space directions"});
@@ -176,7 +176,8 @@ bool take_nrrd_line(const std::string& line, const std::string& file, TextHeader
   return false;
 }
 
-/// The same of MHA. A name ends at the first of "=" and ":"; of a field that comes twice the last counts.
+/// Takes one line of an MHA header; true after the last. A name ends at the first of "=" and ":"; of a field that comes
+/// twice the last counts.
 bool take_meta_line(const std::string& line, TextHeader& header) {
   const auto separator = line.find_first_of("=:");
   if (separator == std::string::npos) return false;

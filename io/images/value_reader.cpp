@@ -21,7 +21,8 @@ namespace {
 
 class ValueReader final : public ImageReader {
  public:
-  ValueReader(const std::filesystem::path& path, ImageHeader header, const Stored& stored, const ValueLayout& layout)
+  ValueReader(const std::filesystem::path& path, ImageHeader header, const StoredVoxels& stored,
+              const ValueLayout& layout)
       : ImageReader(path, std::move(header), stored), layout_(layout) {}
 
   void read(std::span<std::byte> voxels) const override {
@@ -146,7 +147,7 @@ class ValueReader final : public ImageReader {
 }  // namespace
 
 std::unique_ptr<ImageReader> make_value_reader(const std::filesystem::path& path, ImageHeader header,
-                                               const Stored& stored, const ValueLayout& layout) {
+                                               const StoredVoxels& stored, const ValueLayout& layout) {
   return std::make_unique<ValueReader>(path, std::move(header), stored, layout);
 }
 

@@ -21,7 +21,7 @@ enum class Encoding : std::uint8_t {
   bzip2,  ///< which is known by name, and not read
 };
 
-/// How the values lie in the file, from `Stored::offset` on.
+/// How the values lie in the file, from `StoredVoxels::offset` on.
 struct ValueLayout {
   Encoding encoding = Encoding::raw;
   bool big_endian = false;
@@ -31,8 +31,8 @@ struct ValueLayout {
 
 /// The reader throws InputError for data that end too soon or are damaged. A zlib stream and gzip data must have right
 /// check sums, hold exactly the values, and end the file, which MetaIO and NrrdIO of ITK 5.2.1 do not ask: they take a
-/// truncated stream for whole, leave the rest of the buffer as it was, and look at no check sum of gzip.
+/// truncated stream for whole, leave what it lacks of the buffer as it was, and look at no check sum of gzip.
 std::unique_ptr<ImageReader> make_value_reader(const std::filesystem::path& path, ImageHeader header,
-                                               const Stored& stored, const ValueLayout& layout);
+                                               const StoredVoxels& stored, const ValueLayout& layout);
 
 }  // namespace tetwarp

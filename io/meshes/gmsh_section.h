@@ -48,7 +48,7 @@ class GmshNumbers {
   double real();
   /// Takes the tag of a node or an element: a size_t or an int.
   std::uint64_t tag();
-  /// Takes the rest of the line.
+  /// Takes what is left of the line.
   std::string line();
   /// Takes an integer that is written as text in a binary file, too.
   std::int64_t text_integer();

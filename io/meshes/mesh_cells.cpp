@@ -15,17 +15,18 @@ using Corners = std::span<const std::uint32_t>;
 using Triangle = std::array<std::uint32_t, 3>;
 
 /// Corner numbers of a face in counter-clockwise order, seen from outside; the last one of a triangle is kNone.
-using Face = std::array<std::uint8_t, 4>;
+using FaceCorners = std::array<std::uint8_t, 4>;
 constexpr std::uint8_t kNone = 255;
-constexpr std::array<Face, 4> kTetrahedron = {{{0, 2, 1, kNone}, {0, 1, 3, kNone}, {1, 2, 3, kNone}, {2, 0, 3, kNone}}};
-constexpr std::array<Face, 5> kPyramid = {
+constexpr std::array<FaceCorners, 4> kTetrahedron = {
+    {{0, 2, 1, kNone}, {0, 1, 3, kNone}, {1, 2, 3, kNone}, {2, 0, 3, kNone}}};
+constexpr std::array<FaceCorners, 5> kPyramid = {
     {{0, 3, 2, 1}, {0, 1, 4, kNone}, {1, 2, 4, kNone}, {2, 3, 4, kNone}, {3, 0, 4, kNone}}};
-constexpr std::array<Face, 5> kWedge = {  // in VTK's order of corners: the triangle (0, 1, 2) looks outwards
+constexpr std::array<FaceCorners, 5> kWedge = {  // in VTK's order of corners: the triangle (0, 1, 2) looks outwards
     {{0, 1, 2, kNone}, {3, 5, 4, kNone}, {0, 3, 4, 1}, {1, 4, 5, 2}, {2, 5, 3, 0}}};
-constexpr std::array<Face, 6> kHexahedron = {
+constexpr std::array<FaceCorners, 6> kHexahedron = {
     {{0, 3, 2, 1}, {4, 5, 6, 7}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}}};
 
-std::span<const Face> faces_of(CellShape shape) {
+std::span<const FaceCorners> faces_of(CellShape shape) {
   switch (shape) {
     case CellShape::tetrahedron: return kTetrahedron;
     case CellShape::pyramid: return kPyramid;
@@ -41,7 +42,7 @@ bool is_flat(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] ==
 /// two.
 template <class Use>
 void for_each_triangle(CellShape shape, Corners corners, const Use& use) {
-  for (const Face& face : faces_of(shape)) {
+  for (const FaceCorners& face : faces_of(shape)) {
     const auto at = [&](std::size_t n) { return corners[face[n]]; };
     if (face[3] == kNone) {
       if (const Triangle whole = {at(0), at(1), at(2)}; !is_flat(whole)) use(whole);

@@ -57,16 +57,16 @@ class MeshReader {
 struct MeshFormat {
   const char* suffixes;  ///< suffixes of files for messages: ".msh"
   /// Whether a file is of this format, by its suffix or its first bytes (up to 64; fewer where it cannot be read).
-  bool (*claims)(const std::filesystem::path& path, std::string_view first_bytes);
-  /// Whether a claimed file holds volume cells, by a quick look; null: it always does. It does not throw for a file
+  bool (*recognizes)(const std::filesystem::path& path, std::string_view first_bytes);
+  /// Whether a recognized file holds volume cells, by a quick look; null: it always does. It does not throw for a file
   /// that `open` refuses.
   bool (*holds_mesh)(const std::filesystem::path& path);
   /// Reads a file. It allocates no more than the file's length warrants. @throws InputError naming the file
   std::unique_ptr<MeshReader> (*open)(const std::filesystem::path& path);
 };
 
-/// The first format that claims the file, in the order of io/CMakeLists.txt, from which this function is made; null:
-/// none does.
+/// The first format that recognizes the file, in the order of io/CMakeLists.txt, from which this function is made;
+/// null: none does.
 const MeshFormat* find_mesh_format(const std::filesystem::path& path, std::string_view first_bytes);
 /// The suffixes of all formats for messages: ".msh .vtu".
 std::string mesh_suffixes();

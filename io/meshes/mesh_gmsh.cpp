@@ -344,7 +344,7 @@ class GmshReader final : public MeshReader {
   std::vector<NodeData> data_;               ///< for each of `arrays`, where its values are
 };
 
-bool claims(const std::filesystem::path& path, std::string_view first_bytes) {
+bool recognizes(const std::filesystem::path& path, std::string_view first_bytes) {
   return path.extension() == ".msh" || first_bytes.starts_with("$MeshFormat");
 }
 
@@ -358,6 +358,6 @@ std::unique_ptr<MeshReader> open(const std::filesystem::path& path) {
 
 }  // namespace
 
-const MeshFormat kMeshFormat_gmsh = {".msh", claims, nullptr, open};
+const MeshFormat kMeshFormat_gmsh = {".msh", recognizes, nullptr, open};
 
 }  // namespace tetwarp

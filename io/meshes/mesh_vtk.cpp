@@ -159,7 +159,7 @@ class VtkMeshReader final : public MeshReader {
   std::vector<VtkArray> vectors_;
 };
 
-bool claims(const std::filesystem::path& path, std::string_view) {
+bool recognizes(const std::filesystem::path& path, std::string_view) {
   return vtk_dataset(path) == VtkDataset::unstructured_grid;
 }
 
@@ -167,6 +167,6 @@ std::unique_ptr<MeshReader> open(const std::filesystem::path& path) { return std
 
 }  // namespace
 
-const MeshFormat kMeshFormat_vtk = {".vtu .vtk", claims, nullptr, open};
+const MeshFormat kMeshFormat_vtk = {".vtu .vtk", recognizes, nullptr, open};
 
 }  // namespace tetwarp

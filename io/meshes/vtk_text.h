@@ -43,11 +43,11 @@ class VtkText {
 
   std::string here() const { return at_byte(at_, name_); }
   std::size_t at() const { return at_; }
-  /// Takes the rest of the line and returns it without its end.
+  /// Takes what is left of the line and returns it without its end.
   std::string_view line();
   /// Goes to the next word. @return false at the end of the file
   bool skip_blanks();
-  /// Takes the words of the rest of a line. @throws InputError for bytes that are no text
+  /// Takes the words that are left of a line. @throws InputError for bytes that are no text
   std::vector<std::string_view> words();
   /// Takes the words of the next line that has any. @param what  is expected there, for the message
   std::vector<std::string_view> next_words(const char* what);

@@ -109,7 +109,7 @@ class XmlFile final : public VtkFile {
   }
 
   void read(const VtkArray& array, std::uint64_t first, std::span<double> values) const override {
-    const Stored& stored = stored_[array.id];
+    const StoredArray& stored = stored_[array.id];
     std::vector<std::byte> raw(values.size() * stored.type->bytes);
     require(read_words(stored, raw.data(), first, values.size()) == values.size(),
             "truncated or damaged values of \"" + array.name + "\", " + name + "; is the file whole?");
@@ -118,7 +118,7 @@ class XmlFile final : public VtkFile {
 
  protected:
   void require_holds(const VtkArray& array) const override {
-    const Stored& stored = stored_[array.id];
+    const StoredArray& stored = stored_[array.id];
     const std::string what = " \"" + array.name + "\", " + name;
     const double length = static_cast<double>(bytes_),
                  count = static_cast<double>(array.tuples) * static_cast<double>(array.components);
@@ -141,7 +141,7 @@ class XmlFile final : public VtkFile {
 
  private:
   /// Where the values of an array are in the file.
-  struct Stored {
+  struct StoredArray {
     vtkXMLDataElement* element = nullptr;
     const ValueType* type = nullptr;
     bool ascii = false;
@@ -163,25 +163,25 @@ class XmlFile final : public VtkFile {
     stream_.seekg(0);
   }
 
-  std::size_t read_words(const Stored& stored, void* to, std::uint64_t first, std::size_t count) const {
+  std::size_t read_words(const StoredArray& stored, void* to, std::uint64_t first, std::size_t count) const {
     stream_.clear();
     if (stored.offset >= 0) return parser_->ReadAppendedData(stored.offset, to, first, count, stored.type->vtk);
     return parser_->ReadInlineData(stored.element, stored.ascii ? 1 : 0, to, first, count, stored.type->vtk);
   }
 
-  std::vector<std::uint64_t> head(const Stored& stored, std::size_t count, const std::string& what) const {
+  std::vector<std::uint64_t> head(const StoredArray& stored, std::size_t count, const std::string& what) const {
     stream_.clear();
     std::vector<std::uint64_t> words = parser_->head(stored.element, stored.offset, count);
     require(words.size() == count, "truncated values of" + what + "; is the file whole?");
     return words;
   }
 
-  double plain_length(const Stored& stored, const std::string& what) const {
+  double plain_length(const StoredArray& stored, const std::string& what) const {
     return static_cast<double>(head(stored, 1, what)[0]);
   }
 
   /// Checks the table of compressed blocks, which VTK believes when it decompresses them. @return bytes of the values
-  double require_blocks(const Stored& stored, const std::string& what) const {
+  double require_blocks(const StoredArray& stored, const std::string& what) const {
     const std::vector<std::uint64_t> first = head(stored, 3, what);
     const std::uint64_t blocks = first[0], block_bytes = first[1], last_bytes = first[2];
     const std::string bad = "damaged blocks of" + what;
@@ -308,7 +308,7 @@ class XmlFile final : public VtkFile {
     for (int n = 0; parent && n < parent->GetNumberOfNestedElements(); ++n) {
       vtkXMLDataElement* element = parent->GetNestedElement(n);
       if (attribute_name(element) != "DataArray") continue;
-      const Stored stored = stored_in(element);
+      const StoredArray stored = stored_in(element);
       const std::uint64_t components =
           element->GetAttribute("NumberOfComponents") ? whole(element, "NumberOfComponents") : 1;
       arrays.push_back({attribute(element, "Name"), stored.type ? components : 0, count, stored_.size()});
@@ -317,8 +317,8 @@ class XmlFile final : public VtkFile {
     return arrays;
   }
 
-  Stored stored_in(vtkXMLDataElement* element) const {
-    Stored stored{element, value_type(attribute(element, "type"))};
+  StoredArray stored_in(vtkXMLDataElement* element) const {
+    StoredArray stored{element, value_type(attribute(element, "type"))};
     const std::string form = attribute(element, "format"), what = " of \"" + attribute(element, "Name") + "\", " + name;
     require(form == "ascii" || form == "binary" || form == "appended",
             "the format \"" + form + "\"" + what + "; expected ascii, binary or appended");
@@ -350,7 +350,7 @@ class XmlFile final : public VtkFile {
   vtkNew<vtkLZ4DataCompressor> lz4_;
   vtkNew<VtkXmlParser> parser_;
   std::string complaint_;  ///< the last message of VTK
-  std::vector<Stored> stored_;
+  std::vector<StoredArray> stored_;
 };
 
 }  // namespace

@@ -26,7 +26,7 @@ int pixels(double mm, double pixels_per_mm) { return std::max(1, static_cast<int
 
 PreviewLayout layout_preview(const Geometry& geometry) {
   PreviewLayout layout;
-  for (const Plane plane : {Plane::axial, Plane::coronal, Plane::sagittal}) {
+  for (const AnatomicalPlane plane : {AnatomicalPlane::axial, AnatomicalPlane::coronal, AnatomicalPlane::sagittal}) {
     layout.slices[static_cast<std::size_t>(plane)] = middle_slice(geometry, plane);
   }
   layout.pixels_per_mm = INFINITY;

@@ -73,7 +73,7 @@ std::array<int, 3> patient_to_grid_axes(const Geometry& geometry) {
   return best;
 }
 
-Slice middle_slice(const Geometry& geometry, Plane plane) {
+Slice middle_slice(const Geometry& geometry, AnatomicalPlane plane) {
   const PlaneAxes& patient = kPlanes[static_cast<int>(plane)];
   const std::array<int, 3> grid = patient_to_grid_axes(geometry);
   const auto grid_axis = [&](int patient_axis) { return grid[static_cast<std::size_t>(patient_axis)]; };

@@ -176,7 +176,7 @@ void draw_letters(const Lettering& lettering, const Rectangle& panel, const Slic
 
 }  // namespace
 
-Slice slice_through(const Geometry& geometry, Plane plane, const glm::dvec3& point) {
+Slice slice_through(const Geometry& geometry, AnatomicalPlane plane, const glm::dvec3& point) {
   Slice slice = middle_slice(geometry, plane);
   const double index = index_from_point(geometry)(point)[slice.normal_axis];
   const std::int64_t voxel = std::llround(index), size = geometry.size[slice.normal_axis];

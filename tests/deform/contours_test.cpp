@@ -54,14 +54,14 @@ std::vector<Contour> ball(const Geometry& slices, const glm::dvec3& middle, doub
   return contours;
 }
 
-TEST(PlanarRegion, DistanceIsThatOfTheNearestEdge) {
+TEST(PolygonInterior, DistanceIsThatOfTheNearestEdge) {
   const std::uint64_t seed = test_seed();
   SCOPED_TRACE(seed_text(seed));
   Random random(seed);
   Ring star;  // its rays do not cross
   for (int n = 0; n < 97; ++n)
     star.push_back(random.real(3, 20) * glm::dvec2(std::cos(2 * kPi * n / 97), std::sin(2 * kPi * n / 97)));
-  const PlanarRegion region({star});
+  const PolygonInterior interior({star});
   for (int n = 0; n < 500; ++n) {
     const glm::dvec2 point(random.real(-25, 25), random.real(-25, 25));
     double nearest = INFINITY, turns = 0;
@@ -70,7 +70,7 @@ TEST(PlanarRegion, DistanceIsThatOfTheNearestEdge) {
       for (int step = 0; step <= 400; ++step) nearest = std::min(nearest, glm::length(a + (b - a) * (step / 400.0)));
       turns += std::atan2(a.x * b.y - a.y * b.x, glm::dot(a, b)) / (2 * kPi);
     }
-    const double found = region.signed_distance(point);
+    const double found = interior.signed_distance(point);
     EXPECT_NEAR(std::abs(found), nearest, 0.05);
     EXPECT_LE(std::abs(found), nearest + 1e-9);
     if (nearest < 1e-6) continue;
@@ -78,19 +78,19 @@ TEST(PlanarRegion, DistanceIsThatOfTheNearestEdge) {
   }
 }
 
-TEST(PlanarRegion, ChannelOfAKeyholeIsNoBorder) {
+TEST(PolygonInterior, ChannelOfAKeyholeIsNoBorder) {
   const std::vector<Ring> rings = joined_by_keyholes({circle({0, 0}, 20, 60), circle({1, 0.3}, 5, 40, true)});
   ASSERT_EQ(rings.size(), 1u);
-  const PlanarRegion region(rings);
-  EXPECT_NEAR(region.signed_distance({13, 0.3}), 7, 0.05);  // on the channel: to the outer circle
-  EXPECT_NEAR(region.signed_distance({13, 0.4}), 7, 0.05);
-  EXPECT_NEAR(region.signed_distance({1, 0.3}), -5, 0.05);
+  const PolygonInterior interior(rings);
+  EXPECT_NEAR(interior.signed_distance({13, 0.3}), 7, 0.05);  // on the channel: to the outer circle
+  EXPECT_NEAR(interior.signed_distance({13, 0.4}), 7, 0.05);
+  EXPECT_NEAR(interior.signed_distance({1, 0.3}), -5, 0.05);
 }
 
-TEST(PlanarRegion, TwoEqualRingsLeaveNothing) {
-  const PlanarRegion region({circle({0, 0}, 20, 60), circle({0, 0}, 20, 60)});
-  EXPECT_FALSE(region.contains({1, 2}));
-  EXPECT_EQ(region.signed_distance({1, 2}), -PlanarRegion::kFar);
+TEST(PolygonInterior, TwoEqualRingsLeaveNothing) {
+  const PolygonInterior interior({circle({0, 0}, 20, 60), circle({0, 0}, 20, 60)});
+  EXPECT_FALSE(interior.contains({1, 2}));
+  EXPECT_EQ(interior.signed_distance({1, 2}), -PolygonInterior::kFar);
 }
 
 TEST(Keyholes, EachRingAloneIsRight) {
@@ -114,8 +114,8 @@ TEST(Simplified, LeavesWhatIsWithinTheTolerance) {
   const Ring fine = circle({3, 4}, 10, 5000), simple = simplified(fine, 0.01);
   EXPECT_LT(simple.size(), 150u);
   EXPECT_GT(simple.size(), 40u);
-  const PlanarRegion region({simple});
-  for (const glm::dvec2& corner : fine) EXPECT_LE(std::abs(region.signed_distance(corner)), 0.01 + 1e-12);
+  const PolygonInterior interior({simple});
+  for (const glm::dvec2& corner : fine) EXPECT_LE(std::abs(interior.signed_distance(corner)), 0.01 + 1e-12);
   EXPECT_EQ(simplified({{0, 0}, {1, 0}, {2, 0}, {2, 2}, {0, 2}}, 0.01), (Ring{{0, 0}, {2, 0}, {2, 2}, {0, 2}}));
 }
 
@@ -285,10 +285,10 @@ TEST(ContourMover, EdgesFollowTheField) {
   for (const glm::dvec3& point : moved.contour.points) ring.emplace_back(point);
   EXPECT_GT(ring.size(), 10u);
   EXPECT_LT(ring.size(), 60u);
-  const PlanarRegion region({ring});
+  const PolygonInterior interior({ring});
   for (double x = -20; x < 20; x += 0.37) {
     const glm::dvec3 at(x, 12, 0), to = at + wave(at);
-    EXPECT_LT(std::abs(region.signed_distance(glm::dvec2(to))), 0.16) << x;  // a tenth of a voxel, and the lattice's
+    EXPECT_LT(std::abs(interior.signed_distance(glm::dvec2(to))), 0.16) << x;  // a tenth of a voxel, and the lattice's
   }
 }
 

@@ -299,7 +299,7 @@ TEST_P(Regions, AStopRequestCancels) {
   std::stop_source later;
   const Control midway{.progress = [&](double) { later.request_stop(); }, .stop = later.get_token()};
   EXPECT_THROW(resampler->resample(whole(scene.grid), {&target, 1}, {}, midway), Cancelled);
-  // and the resampler is as good as before
+  // After all that the resampler gives what a new one gives.
   const auto again = make(scene.grid);
   again->set_field(view(scene.field));
   expect_same_outcome(run(*again, scene.source), run(*resampler, scene.source));

@@ -11,7 +11,7 @@ looks after a build: `build/cpu/apps/tetwarp` is PROGRAM, and inputs that the bl
 Comments in the line before a block say what is to be known of it:
 
     <!-- not run: REASON -->          it is listed with the reason
-    <!-- needs: PROGRAM -->           likewise where that program is not installed
+    <!-- needs: PROGRAM -->           it is listed where that program is not installed, and run where it is
 
 and `<!-- blocks follow one another -->` on top of a page lets all of its blocks run in one folder.
 The exit status is 1 where a block fails. Those that were not run are listed.

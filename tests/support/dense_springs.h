@@ -51,7 +51,8 @@ struct DenseSprings {
 /// Finds an equilibrium by Newton's method with a dense matrix. @param part  share of the loads, 0 to 1
 inline void find_equilibrium(const Model& model, const Loads& loads, double part, std::vector<glm::dvec3>& u) {
   for (std::size_t n = 0; n < model.nodes(); ++n) {
-    if (loads.hold[n] == Hold::placed) u[n] = part * glm::dvec3(loads.goal[n].x, loads.goal[n].y, loads.goal[n].z);
+    if (loads.constraint[n] == Constraint::placed)
+      u[n] = part * glm::dvec3(loads.goal[n].x, loads.goal[n].y, loads.goal[n].z);
   }
   for (int step = 0; step < 60; ++step) {
     DenseSprings springs(model, u);
@@ -59,7 +60,7 @@ inline void find_equilibrium(const Model& model, const Loads& loads, double part
       for (int axis = 0; axis < 3; ++axis) {
         const auto row = static_cast<Eigen::Index>(3 * n) + axis;
         if (!loads.force.empty()) springs.force(row) += part * double{loads.force[n][axis]};
-        if (loads.hold[n] == Hold::placed || springs.matrix(row, row) == 0) springs.fix(row);
+        if (loads.constraint[n] == Constraint::placed || springs.matrix(row, row) == 0) springs.fix(row);
       }
     }
     const Eigen::VectorXd motion = springs.matrix.fullPivLu().solve(springs.force);

@@ -85,13 +85,13 @@ inline glm::dvec3 rest_of(const Model& model, std::size_t node) {
 
 /// Loads that leave all nodes free and exert no force.
 inline Loads free_loads(const Model& model) {
-  return {.hold = std::vector<Hold>(model.nodes(), Hold::free),
+  return {.constraint = std::vector<Constraint>(model.nodes(), Constraint::free),
           .goal = std::vector<glm::vec3>(model.nodes(), glm::vec3(0)),
           .force = {}};
 }
 
 inline void place(Loads& loads, std::size_t node, const glm::dvec3& goal) {
-  loads.hold[node] = Hold::placed;
+  loads.constraint[node] = Constraint::placed;
   loads.goal[node] = {static_cast<float>(goal.x), static_cast<float>(goal.y), static_cast<float>(goal.z)};
 }
 

@@ -59,10 +59,10 @@ void keep_first(const char* message, void* data) {
   first.erase(first.find_last_not_of(" \n") + 1);
 }
 
-/// A copy of the codestream that claims "predictable termination" (T.800 D.4.2): every code-block ends where its coder
-/// does. OpenJPEG decodes the same pixels from it, and warns where the claim is false. For undamaged data it is true
-/// within a few bytes, since every encoder ends like this; for damaged ones it is hardly ever true, and nothing else
-/// would show the damage.
+/// A copy of the codestream that states "predictable termination" (T.800 D.4.2): every code-block ends where its coder
+/// does. OpenJPEG decodes the same pixels from it, and warns where the statement is false. For undamaged data it is
+/// true within a few bytes, since every encoder ends like this; for damaged ones it is hardly ever true, and nothing
+/// else would show the damage.
 std::vector<std::uint8_t> with_checked_ends(const Jpeg2000Image& image) {
   constexpr std::uint8_t kPredictable = 0x10, kHighThroughput = 0x40;
   std::vector<std::uint8_t> bytes(image.codestream.begin(), image.codestream.end());

@@ -36,7 +36,7 @@ void append_item_start(std::vector<std::byte>& bytes, unsigned element, std::siz
 /// (PS3.10) with `voxels` as its Pixel Data. Every byte depends on these and the encoding alone.
 ///
 /// Uncompressed voxels are hashed and written from where they lie. DCMTK, which would copy them four times, encodes
-/// only the rest of the data set.
+/// only what else the data set has.
 /// @param dataset  with Rows and Columns; without Pixel Data (7FE0,0010) and what would follow it
 /// @return the SOP Instance UID
 /// @throws Error naming the file and the system's reason (disk full and so on)

@@ -28,7 +28,7 @@ namespace {
 constexpr std::uint64_t kVectorBytes = 12, kLargestValue = 0xfffffffe;
 constexpr char kIdentity[] = "1\\0\\0\\0\\0\\1\\0\\0\\0\\0\\1\\0\\0\\0\\0\\1";
 
-using Bytes = std::vector<std::byte>;
+using ByteBuffer = std::vector<std::byte>;
 
 /// An image, or frames of it.
 struct ReferencedImage {
@@ -192,30 +192,31 @@ DcmDataset tail_of(const DicomDerivation& derivation) {
 constexpr unsigned kItem = 0xe000, kItemEnd = 0xe00d, kSequenceEnd = 0xe0dd;
 constexpr std::uint64_t kUndefined = 0xffffffff;
 
-void append(Bytes& bytes, const Bytes& more) { bytes.insert(bytes.end(), more.begin(), more.end()); }
-void append(Bytes& bytes, DcmDataset item) { append(bytes, encoded(item)); }
+void append(ByteBuffer& bytes, const ByteBuffer& more) { bytes.insert(bytes.end(), more.begin(), more.end()); }
+void append(ByteBuffer& bytes, DcmDataset item) { append(bytes, encoded(item)); }
 
 /// Tag, value representation and a length of 32 bits (PS3.5 7.1.2).
-void append_start(Bytes& bytes, const DcmTagKey& tag, const char* representation, std::uint64_t length) {
+void append_start(ByteBuffer& bytes, const DcmTagKey& tag, const char* representation, std::uint64_t length) {
   append_number(bytes, tag.getGroup(), 2);
   append_number(bytes, tag.getElement(), 2);
   for (const char c : {representation[0], representation[1], '\0', '\0'}) bytes.push_back(static_cast<std::byte>(c));
   append_number(bytes, length, 4);
 }
 
-void open_item(Bytes& bytes, const DcmTagKey& sequence) {
+void open_item(ByteBuffer& bytes, const DcmTagKey& sequence) {
   append_start(bytes, sequence, "SQ", kUndefined);
   append_item_start(bytes, kItem, kUndefined);
 }
 
-void close_item_and_sequence(Bytes& bytes) {
+void close_item_and_sequence(ByteBuffer& bytes) {
   append_item_start(bytes, kItemEnd, 0);
   append_item_start(bytes, kSequenceEnd, 0);
 }
 
 /// The sequence from its start to the first vector. @param derived  none: the item of the derived series is left out
-Bytes registration_start(const Registration& of, const std::vector<ReferencedImage>& derived, const Geometry& grid) {
-  Bytes bytes;
+ByteBuffer registration_start(const Registration& of, const std::vector<ReferencedImage>& derived,
+                              const Geometry& grid) {
+  ByteBuffer bytes;
   append_start(bytes, DCM_DeformableRegistrationSequence, "SQ", kUndefined);
   if (!derived.empty()) {
     append_item_start(bytes, kItem, kUndefined);
@@ -230,8 +231,8 @@ Bytes registration_start(const Registration& of, const std::vector<ReferencedIma
   return bytes;
 }
 
-Bytes registration_end(const DicomDerivation& derivation) {
-  Bytes bytes;
+ByteBuffer registration_end(const DicomDerivation& derivation) {
+  ByteBuffer bytes;
   close_item_and_sequence(bytes);
   append(bytes, source_item_end());
   close_item_and_sequence(bytes);
@@ -262,8 +263,8 @@ class RegistrationWriter final : public ImageWriter {
 
   void close() override {
     const std::vector<ReferencedImage> derived = derived_images(registration_.instances());
-    const Bytes start = registration_start(registration_, derived, grid_),
-                end = registration_end(registration_.derivation);
+    const ByteBuffer start = registration_start(registration_, derived, grid_),
+                     end = registration_end(registration_.derivation);
     DcmDataset head = head_of(registration_, derived);
     const std::string uid = uid_from_digest(hash_.add(encoded(head)).add(start).add(end).digest());
     put(head, DCM_SOPInstanceUID, uid);
@@ -276,7 +277,7 @@ class RegistrationWriter final : public ImageWriter {
     if (!out_) fail();
   }
 
-  void write(const Bytes& bytes) {
+  void write(const ByteBuffer& bytes) {
     out_.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   }
 

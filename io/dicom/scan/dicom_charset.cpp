@@ -26,21 +26,21 @@ bool is_japanese(const std::string& character_set) {
 /// EUC-JP; none if it has other escape sequences. DCMTK leaves these sets to the C library, which does not know them
 /// one by one but knows EUC-JP.
 std::optional<std::string> euc_jp(std::string_view bytes) {
-  struct Set {
+  struct Charset {
     const char* escape;
     std::size_t width;   ///< bytes of a character
     const char* before;  ///< what EUC-JP puts before each character, whose bytes have the high bit there
   };
-  constexpr std::array<Set, 5> kSets = {
+  constexpr std::array<Charset, 5> kCharsets = {
       {{"(B", 1, ""}, {"(J", 1, ""}, {")I", 1, ""}, {"$B", 2, ""}, {"$(D", 2, "\x8f"}}};
   std::string text;
-  Set set = kSets[0];
+  Charset set = kCharsets[0];
   while (!bytes.empty()) {
     if (bytes.front() == kEscape) {
       bytes.remove_prefix(1);
-      const auto next =
-          std::find_if(kSets.begin(), kSets.end(), [&](const Set& s) { return bytes.starts_with(s.escape); });
-      if (next == kSets.end()) return std::nullopt;
+      const auto next = std::find_if(kCharsets.begin(), kCharsets.end(),
+                                     [&](const Charset& s) { return bytes.starts_with(s.escape); });
+      if (next == kCharsets.end()) return std::nullopt;
       bytes.remove_prefix(std::string_view(next->escape).size());
       set = *next;
     } else if (set.width == 1 || bytes.size() < set.width) {

@@ -206,9 +206,9 @@ DicomScan scan_beside(Headers headers, const Control& control) {
 }  // namespace
 
 DicomScan scan_dicom(const fs::path& path, bool single, const Control& control) {
-  const Found found = found_at(path);
-  require(found != Found::nothing, "no such file or folder, " + shown(path) + "; check the path");
-  if (found == Found::folder) return scan_folder(path, control);
+  const PathKind kind = kind_at(path);
+  require(kind != PathKind::nothing, "no such file or folder, " + shown(path) + "; check the path");
+  if (kind == PathKind::folder) return scan_folder(path, control);
   Headers headers = read_dicom_headers(path);
   if (!single && is_directory_file(headers.front())) return scan_directory(path, control);
   return single ? scan_of_first(std::move(headers), control) : scan_beside(std::move(headers), control);

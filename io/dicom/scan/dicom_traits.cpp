@@ -16,45 +16,45 @@
 namespace tetwarp {
 namespace {
 
-enum class Kind : std::uint8_t { number, text, time, percentage };
+enum class TraitKind : std::uint8_t { number, text, time, percentage };
 
 struct TraitTable {
   const char* name;
-  Kind kind;
-  DcmTagKey tag, time;         ///< for a Kind::time, tags of the date and of the time of day
+  TraitKind kind;
+  DcmTagKey tag, time;         ///< for a TraitKind::time, tags of the date and of the time of day
   const char *before, *after;  ///< what a label has before and after the value
 };
 
 const TraitTable& table_of(Trait trait) {
   const DcmTagKey none;
   static const std::array<TraitTable, kTraits> table = {{
-      {"Temporal Position Identifier", Kind::number, DCM_TemporalPositionIdentifier, none, "time point ", ""},
-      {"Temporal Position Index", Kind::number, DCM_TemporalPositionIndex, none, "time point ", ""},
-      {"Stack ID", Kind::text, DCM_StackID, none, "stack ", ""},
-      {"Nominal Percentage of Cardiac Phase", Kind::number, DCM_NominalPercentageOfCardiacPhase, none, "heart phase ",
-       " %"},
-      {"Nominal Percentage of Respiratory Phase", Kind::number, DCM_NominalPercentageOfRespiratoryPhase, none,
+      {"Temporal Position Identifier", TraitKind::number, DCM_TemporalPositionIdentifier, none, "time point ", ""},
+      {"Temporal Position Index", TraitKind::number, DCM_TemporalPositionIndex, none, "time point ", ""},
+      {"Stack ID", TraitKind::text, DCM_StackID, none, "stack ", ""},
+      {"Nominal Percentage of Cardiac Phase", TraitKind::number, DCM_NominalPercentageOfCardiacPhase, none,
+       "heart phase ", " %"},
+      {"Nominal Percentage of Respiratory Phase", TraitKind::number, DCM_NominalPercentageOfRespiratoryPhase, none,
        "breathing phase ", " %"},
-      {"Trigger Time", Kind::number, DCM_TriggerTime, none, "trigger time ", " ms"},
-      {"Nominal Cardiac Trigger Delay Time", Kind::number, DCM_NominalCardiacTriggerDelayTime, none, "trigger delay ",
-       " ms"},
-      {"Series Description", Kind::text, DCM_SeriesDescription, none, "\"", "\""},
-      {"Image Comments", Kind::percentage, DCM_ImageComments, none, "phase ", " %"},
-      {"KVP", Kind::number, DCM_KVP, none, "", " kV"},
-      {"Convolution Kernel", Kind::text, DCM_ConvolutionKernel, none, "kernel ", ""},
-      {"Slice Thickness", Kind::number, DCM_SliceThickness, none, "slices ", " mm thick"},
-      {"Image Type", Kind::text, DCM_ImageType, none, "image type ", ""},
-      {"Dimension Index Values", Kind::text, DCM_DimensionIndexValues, none, "dimension index ", ""},
-      {"Contrast/Bolus Agent", Kind::text, DCM_ContrastBolusAgent, none, "contrast agent ", ""},
-      {"Scan Options", Kind::text, DCM_ScanOptions, none, "scan options ", ""},
-      {"Filter Type", Kind::text, DCM_FilterType, none, "filter ", ""},
-      {"Protocol Name", Kind::text, DCM_ProtocolName, none, "protocol ", ""},
-      {"Acquisition Number", Kind::number, DCM_AcquisitionNumber, none, "acquisition ", ""},
-      {"Series Number", Kind::number, DCM_SeriesNumber, none, "series number ", ""},
-      {"Irradiation Event UID", Kind::text, DCM_IrradiationEventUID, none, "irradiation event ", ""},
-      {"Acquisition Date and Time", Kind::time, DCM_AcquisitionDate, DCM_AcquisitionTime, "acquired ", ""},
-      {"Content Date and Time", Kind::time, DCM_ContentDate, DCM_ContentTime, "made ", ""},
-      {"Series Date and Time", Kind::time, DCM_SeriesDate, DCM_SeriesTime, "series begun ", ""},
+      {"Trigger Time", TraitKind::number, DCM_TriggerTime, none, "trigger time ", " ms"},
+      {"Nominal Cardiac Trigger Delay Time", TraitKind::number, DCM_NominalCardiacTriggerDelayTime, none,
+       "trigger delay ", " ms"},
+      {"Series Description", TraitKind::text, DCM_SeriesDescription, none, "\"", "\""},
+      {"Image Comments", TraitKind::percentage, DCM_ImageComments, none, "phase ", " %"},
+      {"KVP", TraitKind::number, DCM_KVP, none, "", " kV"},
+      {"Convolution Kernel", TraitKind::text, DCM_ConvolutionKernel, none, "kernel ", ""},
+      {"Slice Thickness", TraitKind::number, DCM_SliceThickness, none, "slices ", " mm thick"},
+      {"Image Type", TraitKind::text, DCM_ImageType, none, "image type ", ""},
+      {"Dimension Index Values", TraitKind::text, DCM_DimensionIndexValues, none, "dimension index ", ""},
+      {"Contrast/Bolus Agent", TraitKind::text, DCM_ContrastBolusAgent, none, "contrast agent ", ""},
+      {"Scan Options", TraitKind::text, DCM_ScanOptions, none, "scan options ", ""},
+      {"Filter Type", TraitKind::text, DCM_FilterType, none, "filter ", ""},
+      {"Protocol Name", TraitKind::text, DCM_ProtocolName, none, "protocol ", ""},
+      {"Acquisition Number", TraitKind::number, DCM_AcquisitionNumber, none, "acquisition ", ""},
+      {"Series Number", TraitKind::number, DCM_SeriesNumber, none, "series number ", ""},
+      {"Irradiation Event UID", TraitKind::text, DCM_IrradiationEventUID, none, "irradiation event ", ""},
+      {"Acquisition Date and Time", TraitKind::time, DCM_AcquisitionDate, DCM_AcquisitionTime, "acquired ", ""},
+      {"Content Date and Time", TraitKind::time, DCM_ContentDate, DCM_ContentTime, "made ", ""},
+      {"Series Date and Time", TraitKind::time, DCM_SeriesDate, DCM_SeriesTime, "series begun ", ""},
   }};
   return table[static_cast<std::size_t>(trait)];
 }
@@ -112,10 +112,12 @@ std::string value_of(DcmItem& data, const TraitTable& trait) {
   text.erase(0, std::min(text.find_first_not_of(' '), text.size()));
   std::optional<double> number;
   switch (trait.kind) {
-    case Kind::text: return text;
-    case Kind::time: return clock_value(data, trait);
-    case Kind::percentage: number = percentage_in(shown_text(text, text_of(data, DCM_SpecificCharacterSet))); break;
-    case Kind::number:
+    case TraitKind::text: return text;
+    case TraitKind::time: return clock_value(data, trait);
+    case TraitKind::percentage:
+      number = percentage_in(shown_text(text, text_of(data, DCM_SpecificCharacterSet)));
+      break;
+    case TraitKind::number:
       number = decimal(text);
       if (!number) return text;
   }
@@ -162,8 +164,8 @@ std::string label_of(Trait trait, const DicomFileHeader& header) {
   const std::string_view value = trait_of(header, trait);
   std::string text;
   switch (table.kind) {
-    case Kind::text: text = shown_text(value, header.character_set); break;
-    case Kind::time: text = shown_text(clock_text(value), {}); break;
+    case TraitKind::text: text = shown_text(value, header.character_set); break;
+    case TraitKind::time: text = shown_text(clock_text(value), {}); break;
     default: text = shown_text(value, {});
   }
   return value.empty() ? std::string("no ") + table.name : table.before + text + table.after;
@@ -187,7 +189,7 @@ std::string name_of(Trait trait) {
     std::snprintf(text, sizeof text, " (%04X,%04X)", tag.getGroup(), tag.getElement());
     return std::string(text);
   };
-  return table.name + number(table.tag) + (table.kind == Kind::time ? number(table.time) : std::string());
+  return table.name + number(table.tag) + (table.kind == TraitKind::time ? number(table.time) : std::string());
 }
 
 std::string read_traits(DcmItem& data) {
@@ -209,13 +211,13 @@ std::string_view trait_of(const DicomFileHeader& header, Trait trait) {
 
 bool is_before(Trait trait, std::string_view a, std::string_view b) {
   if (a.empty() || b.empty()) return a.empty() && !b.empty();
-  const Kind kind = table_of(trait).kind;
-  if (kind == Kind::number || kind == Kind::percentage) {
+  const TraitKind kind = table_of(trait).kind;
+  if (kind == TraitKind::number || kind == TraitKind::percentage) {
     const auto left = decimal(a), right = decimal(b);
     if (left && right) return *left < *right;
     if (left || right) return left.has_value();
   }
-  return kind == Kind::time ? a < b : is_before_naturally(a, b);
+  return kind == TraitKind::time ? a < b : is_before_naturally(a, b);
 }
 
 std::vector<std::string> labels_of(Trait trait, std::span<const DicomFileHeader* const> headers) {
@@ -250,9 +252,9 @@ std::uint32_t traits_naming_patient(DcmItem& data, const std::string& traits) {
     const std::string_view value = std::string_view(traits).substr(begin, end - begin);
     begin = end + 1;
     const auto trait = static_cast<Trait>(n);
-    const Kind kind = table_of(trait).kind;
-    if (value.empty() || kind == Kind::percentage) continue;
-    const bool may_be_text = kind == Kind::text && trait != Trait::irradiation_event && trait != Trait::dimensions;
+    const TraitKind kind = table_of(trait).kind;
+    if (value.empty() || kind == TraitKind::percentage) continue;
+    const bool may_be_text = kind == TraitKind::text && trait != Trait::irradiation_event && trait != Trait::dimensions;
     if (!may_be_text && is_numeric(value)) continue;
     if (patient.are_in(value)) found |= 1u << n;
   }

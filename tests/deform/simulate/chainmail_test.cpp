@@ -95,11 +95,13 @@ Field random_field(std::size_t nodes, Random& random, double most) {
 }
 
 Loads no_loads(const Model& model) {
-  return {.hold = std::vector<Hold>(model.nodes(), Hold::free), .goal = Field(model.nodes()), .force = {}};
+  return {.constraint = std::vector<Constraint>(model.nodes(), Constraint::free),
+          .goal = Field(model.nodes()),
+          .force = {}};
 }
 
 void place(Loads& loads, std::size_t node, const glm::vec3& goal) {
-  loads.hold[node] = Hold::placed;
+  loads.constraint[node] = Constraint::placed;
   loads.goal[node] = goal;
 }
 
@@ -130,7 +132,7 @@ TEST_P(Chainmail, AllLinksStayWithinTheirLimitsAndPlacedNodesAreAtTheirGoals) {
       const Field found = simulation->displacement_on_host();
       EXPECT_TRUE(links_beyond_limits(model, found, 0).empty()) << "after " << steps << " steps";
       for (std::size_t n = 0; n < model.nodes(); ++n) {
-        if (loads.hold[n] == Hold::placed) {
+        if (loads.constraint[n] == Constraint::placed) {
           EXPECT_EQ(found[n], loads.goal[n]);
         }
       }
@@ -263,10 +265,10 @@ TEST_P(Chainmail, RestStaysRest) {
   for (std::size_t n = 0; n < model.nodes(); n += 17) place(loads, n, {});
   const auto simulation = make(model);
   simulation->set_loads(loads);
-  const Settled settled = simulation->advance(1, {});
-  EXPECT_EQ(settled.steps, 1);
-  EXPECT_EQ(settled.motion_mm, 0);
-  EXPECT_TRUE(settled.reached);
+  const Convergence convergence = simulation->advance(1, {});
+  EXPECT_EQ(convergence.steps, 1);
+  EXPECT_EQ(convergence.motion_mm, 0);
+  EXPECT_TRUE(convergence.reached);
   for (const glm::vec3& u : simulation->displacement_on_host()) EXPECT_EQ(u, glm::vec3(0));
 }
 
@@ -280,8 +282,8 @@ TEST_P(Chainmail, APulledVertexDragsTheOthersJustAsFarAsGibsonsRuleSays) {
   place(loads, vertex_at(grid, at.x, at.y, at.z), goal);
   const auto simulation = make(model);
   simulation->set_loads(loads);
-  const Settled settled = simulation->advance(1, {.steps = 0});
-  EXPECT_EQ(settled.steps, 0);
+  const Convergence convergence = simulation->advance(1, {.steps = 0});
+  EXPECT_EQ(convergence.steps, 0);
   const Field found = simulation->displacement_on_host();
   for (int k = 0; k < 11; ++k) {
     for (int j = 0; j < 13; ++j) {
@@ -325,7 +327,7 @@ TEST_P(Chainmail, AnyNumberOfThreadsAndAnyBackendGiveTheSameBits) {
     const auto first = make_cpu_chainmail(model, {.threads = 1}), second = make(model);
     first->set_loads(loads);
     second->set_loads(loads);
-    const Settled on_cpu = first->advance(0.7, rule), here = second->advance(0.7, rule);
+    const Convergence on_cpu = first->advance(0.7, rule), here = second->advance(0.7, rule);
     EXPECT_EQ(on_cpu.steps, here.steps);
     EXPECT_EQ(on_cpu.motion_mm, here.motion_mm);
     EXPECT_EQ(on_cpu.reached, here.reached);
@@ -344,7 +346,7 @@ TEST_P(Chainmail, AMirroredLatticeGivesTheMirroredBits) {
   const Loads loads = loads_within_limits(model, random);
   Loads other = loads;
   for (std::size_t n = 0; n < model.nodes(); ++n) {
-    other.hold[mirror(n)] = loads.hold[n];
+    other.constraint[mirror(n)] = loads.constraint[n];
     other.goal[mirror(n)] = loads.goal[n] * glm::vec3(-1, 1, 1);
   }
   const Field found = settle(*make(mirrored), other, 40), expected = settle(*make(model), loads, 40);
@@ -356,7 +358,7 @@ std::vector<glm::dvec3> harmonic(const Model& model, const Loads& loads) {
   std::vector<glm::dvec3> u(model.nodes(), glm::dvec3(0));
   for (int sweep = 0; sweep < 4000; ++sweep) {
     for (std::size_t n = 0; n < model.nodes(); ++n) {
-      if (loads.hold[n] == Hold::placed) {
+      if (loads.constraint[n] == Constraint::placed) {
         u[n] = {loads.goal[n].x, loads.goal[n].y, loads.goal[n].z};
         continue;
       }
@@ -389,9 +391,9 @@ TEST_P(Chainmail, WhereNoLimitBindsItEndsAtTheHarmonicState) {
   }
   const auto simulation = make(model);
   simulation->set_loads(loads);
-  const Settled settled = simulation->advance(1, {.motion_mm = 3e-4});
-  EXPECT_TRUE(settled.reached);
-  EXPECT_LT(settled.steps, 200);
+  const Convergence convergence = simulation->advance(1, {.motion_mm = 3e-4});
+  EXPECT_TRUE(convergence.reached);
+  EXPECT_LT(convergence.steps, 200);
   const std::vector<glm::dvec3> expected = harmonic(model, loads);
   const Field found = simulation->displacement_on_host();
   for (std::size_t n = 0; n < found.size(); ++n) {
@@ -507,7 +509,7 @@ TEST_P(Chainmail, WhatCannotBeUsedIsRefused) {
     return refused([&] { simulation->set_loads(loads); });
   };
   EXPECT_TRUE(says(refused([&] { simulation->advance(1, {}); }), {"set_loads"}));
-  EXPECT_TRUE(says(refused_loads([](Loads& loads) { loads.hold.pop_back(); }), {"hold", "8", "found 7"}));
+  EXPECT_TRUE(says(refused_loads([](Loads& loads) { loads.constraint.pop_back(); }), {"hold", "8", "found 7"}));
   EXPECT_TRUE(says(refused_loads([](Loads& loads) { loads.goal.pop_back(); }), {"goal", "8", "found 7"}));
   EXPECT_TRUE(says(refused_loads([](Loads& loads) { loads.force.resize(8); }), {"no forces", "found 8"}));
   EXPECT_TRUE(says(refused_loads([](Loads& loads) { place(loads, 5, {0, NAN, 0}); }), {"goal of node 5", "nan"}));

@@ -69,7 +69,7 @@ TEST(CutRun, FramesAreResampledThroughTheirFields) {
   ScenarioRun loop(scenario, patient, cpu()), hand(scenario, patient, cpu());
   const auto resampler = make_cpu_resampler(small_grid()), other = make_cpu_resampler(small_grid());
   while (!loop.is_done()) {
-    const Frame frame = loop.next();
+    const FrameResult frame = loop.next();
     const Report of_loop = loop.resample(*resampler, {&to_loop, 1});
     hand.next();
     const VertexField field = hand.field();
@@ -119,9 +119,9 @@ class Puppet final : public Simulation {
  public:
   Puppet(const Model& model, std::vector<std::vector<glm::vec3>>& begun) : at_(model.nodes()), begun_(begun) {}
   void set_loads(const Loads& loads) override { loads_ = loads; }
-  Settled advance(double part, const StoppingRule&, const Control&) override {
+  Convergence advance(double part, const StoppingRule&, const Control&) override {
     for (std::size_t n = 0; n < at_.size(); ++n) {
-      if (loads_.hold[n] == Hold::placed) at_[n] = static_cast<float>(part) * loads_.goal[n];
+      if (loads_.constraint[n] == Constraint::placed) at_[n] = static_cast<float>(part) * loads_.goal[n];
     }
     return {.steps = 1, .reached = true};
   }

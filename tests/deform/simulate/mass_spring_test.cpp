@@ -37,9 +37,9 @@ TEST_P(MassSpring, WithoutLoadNothingMovesAtAll) {
   for (std::size_t n = 0; n < 30; ++n) place(loads, n, glm::dvec3(0));
   const auto simulation = make(model);
   simulation->set_loads(loads);
-  const Settled settled = simulation->advance(1, {});
-  EXPECT_TRUE(settled.reached);
-  EXPECT_EQ(settled.residual, 0);
+  const Convergence convergence = simulation->advance(1, {});
+  EXPECT_TRUE(convergence.reached);
+  EXPECT_EQ(convergence.residual, 0);
   for (const glm::vec3& u : displacement(*simulation)) EXPECT_EQ(u, glm::vec3(0));
 }
 
@@ -64,8 +64,9 @@ TEST_P(MassSpring, RigidMotionOfHandlesIsRigidMotionOfAllNodes) {
       }
       const auto simulation = make(model);
       simulation->set_loads(loads);
-      const Settled settled = simulation->advance(1, {});
-      EXPECT_TRUE(settled.reached) << settled.steps << " steps, " << settled.motion_mm << ", " << settled.residual;
+      const Convergence convergence = simulation->advance(1, {});
+      EXPECT_TRUE(convergence.reached) << convergence.steps << " steps, " << convergence.motion_mm << ", "
+                                       << convergence.residual;
       EXPECT_LT(furthest(displacement(*simulation), moved), 1e-4) << kinds << " tissues, turns: " << turns;
     }
   }
@@ -84,10 +85,11 @@ TEST_P(MassSpring, EquilibriumIsThatOfADenseSolve) {
     loads.force.back() = {0.01f, 0.02f, -0.015f};
     const auto simulation = make(model);
     simulation->set_loads(loads);
-    const Settled settled = simulation->advance(1, kTight);
-    EXPECT_TRUE(settled.reached) << settled.steps << " steps, " << settled.motion_mm << ", " << settled.residual;
-    EXPECT_LE(settled.motion_mm, kTight.motion_mm);
-    EXPECT_LE(settled.residual, kTight.residual);
+    const Convergence convergence = simulation->advance(1, kTight);
+    EXPECT_TRUE(convergence.reached) << convergence.steps << " steps, " << convergence.motion_mm << ", "
+                                     << convergence.residual;
+    EXPECT_LE(convergence.motion_mm, kTight.motion_mm);
+    EXPECT_LE(convergence.residual, kTight.residual);
     const std::vector<glm::vec3> found = displacement(*simulation);
     const std::vector<glm::dvec3> expected = dense_equilibrium(model, loads);
     EXPECT_LT(furthest(found, [&](std::size_t n) { return expected[n]; }), 2e-6);
@@ -178,7 +180,7 @@ TEST_P(MassSpring, ReactionsOfALoadedLatticeBearTheLoad) {
     const std::vector<glm::dvec3> force = net_forces(model, displacement(*simulation));
     reaction = glm::dvec3(0);
     for (std::size_t n = 0; n < model.nodes(); ++n) {
-      if (loads.hold[n] == Hold::placed) reaction += force[n];
+      if (loads.constraint[n] == Constraint::placed) reaction += force[n];
     }
     for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(reaction[axis], part * load[axis], 1e-3 * glm::length(load));
   }
@@ -211,9 +213,9 @@ TEST_P(MassSpring, NodesThatNothingTiesStayWhereTheyAre) {
   ASSERT_EQ(model.nodes(), 28u);
   const auto simulation = make(model);
   simulation->set_loads(pressed(model, {2, 0, 1}));
-  const Settled settled = simulation->advance(1, {});
-  EXPECT_TRUE(settled.reached);
-  EXPECT_GT(settled.steps, 0);
+  const Convergence convergence = simulation->advance(1, {});
+  EXPECT_TRUE(convergence.reached);
+  EXPECT_GT(convergence.steps, 0);
   EXPECT_EQ(displacement(*simulation)[27], glm::vec3(0));
 }
 
@@ -320,7 +322,7 @@ TEST_P(MassSpring, LoadsThatDoNotFitAreRefused) {
     return std::string();
   };
   EXPECT_EQ(refused([](Loads&) {}), "");
-  EXPECT_TRUE(says(refused([](Loads& loads) { loads.hold.pop_back(); }), {"one hold a node", "27", "found 26"}));
+  EXPECT_TRUE(says(refused([](Loads& loads) { loads.constraint.pop_back(); }), {"one hold a node", "27", "found 26"}));
   EXPECT_TRUE(says(refused([](Loads& loads) { loads.goal.pop_back(); }), {"one goal a node", "27", "found 26"}));
   EXPECT_TRUE(says(refused([](Loads& loads) { loads.force.resize(3); }), {"one force a node", "27", "found 3"}));
   EXPECT_TRUE(says(refused([](Loads& loads) { loads.goal[2].y = NAN; }), {"goal of node 2", "nan"}));
@@ -331,12 +333,12 @@ TEST_P(MassSpring, LoadsThatDoNotFitAreRefused) {
                    }),
                    {"force of node 13", "inf"}));
   EXPECT_TRUE(says(refused([](Loads& loads) {
-                     loads.hold.assign(27, Hold::free);
+                     loads.constraint.assign(27, Constraint::free);
                      loads.force.assign(27, glm::vec3(0));
                      loads.force[4].x = 1;
                    }),
                    {"force on node 4", "no placed node"}));
-  EXPECT_EQ(refused([](Loads& loads) { loads.hold.assign(27, Hold::free); }), "");
+  EXPECT_EQ(refused([](Loads& loads) { loads.constraint.assign(27, Constraint::free); }), "");
   EXPECT_TRUE(simulation->advance(1, {}).reached);
   EXPECT_EQ(displacement(*simulation), std::vector<glm::vec3>(27, glm::vec3(0)));
   EXPECT_THROW(simulation->advance(1.5, {}), InputError);

@@ -100,7 +100,7 @@ TEST(Zones, SphereBoxAndHalfSpaceHoldTheirBorders) {
   const auto count = [&](const Zone& zone) { return numbers_of(select(zone, patient)).size(); };
   EXPECT_EQ(count({Sphere{{{0, 0, 16}}, {4}}}), 5u);  // the middle, and four at 4 mm
   EXPECT_EQ(count({Sphere{{{0, 0, 16}}, {8}}}), 15u);
-  EXPECT_EQ(count({Box{{{4, -4, 16}}, {{-4, 4, 8}}}}), 18u);  // corners in any order
+  EXPECT_EQ(count({AlignedBox{{{4, -4, 16}}, {{-4, 4, 8}}}}), 18u);  // corners in any order
   EXPECT_EQ(count({HalfSpace{{{0, 0, 32}}, {0, 0, 5}}}), 2u * 121);
   EXPECT_EQ(count({HalfSpace{{{0, 0, 32}}, {0, 0, -1}}}), 5u * 121);
   EXPECT_EQ(count({Border{}}), 11u * 11 * 6 - 9 * 9 * 4);

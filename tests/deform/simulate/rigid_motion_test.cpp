@@ -170,8 +170,9 @@ class RigidHandles : public testing::TestWithParam<SpringMethod> {
     for (const std::size_t n : placed) place(loads, n, moved(n));
     const auto simulation = GetParam().make(model);
     simulation->set_loads(loads);
-    const Settled settled = simulation->advance(1, {});
-    EXPECT_TRUE(settled.reached) << settled.steps << " steps, " << settled.motion_mm << ", " << settled.residual;
+    const Convergence convergence = simulation->advance(1, {});
+    EXPECT_TRUE(convergence.reached) << convergence.steps << " steps, " << convergence.motion_mm << ", "
+                                     << convergence.residual;
     return furthest(displacement(*simulation), moved);
   }
 };
@@ -221,7 +222,7 @@ TEST_P(RigidHandles, TakeAlongWhatIsAlreadyStrained) {
     return u + turn.way_of(rest_of(model, n) + u);
   };
   for (std::size_t n = 0; n < model.nodes(); ++n) {
-    if (loads.hold[n] == Hold::placed) place(loads, n, moved(n));
+    if (loads.constraint[n] == Constraint::placed) place(loads, n, moved(n));
   }
   simulation->set_loads(loads);
   EXPECT_TRUE(simulation->advance(1, kTight).reached);

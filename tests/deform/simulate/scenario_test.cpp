@@ -41,7 +41,7 @@ TEST(Scenario, HeldAndMovedVerticesGoToTheirGoals) {
   const PhaseLoads loads(scenario, scenario.phases[0], patient);
   EXPECT_EQ(loads.held(), kLayer);
   EXPECT_EQ(loads.moved(), kLayer);
-  EXPECT_EQ(loads.pulled(), 0u);
+  EXPECT_EQ(loads.with_force(), 0u);
   EXPECT_FALSE(loads.turns());
   const Model model = make_model(patient.lattice, tissue_of_cells(scenario, patient), std::vector<Tissue>{{}});
   std::vector<glm::vec3> start(model.nodes());
@@ -49,7 +49,7 @@ TEST(Scenario, HeldAndMovedVerticesGoToTheirGoals) {
   const Loads half = loads.at(0.5, model, start);
   for (std::size_t n = 0; n < kVertices; ++n) {
     const bool is_free = n >= kLayer && n < kVertices - kLayer;
-    EXPECT_EQ(half.hold[n], is_free ? Hold::free : Hold::placed);
+    EXPECT_EQ(half.constraint[n], is_free ? Constraint::free : Constraint::placed);
     if (!is_free && n + 1 < kVertices) {
       EXPECT_EQ(half.goal[n], n < kLayer ? glm::vec3(0) : glm::vec3(0.5f, 1, 1.5f)) << n;
     }
@@ -65,9 +65,9 @@ TEST(Scenario, CopiesOfVerticesAreFree) {
   Model model = make_model(patient.lattice, tissue_of_cells(scenario, patient), std::vector<Tissue>{{}});
   model.vertex.push_back(kVertices - 1);
   const Loads loads = PhaseLoads(scenario, scenario.phases[0], patient).at(1, model, std::vector<glm::vec3>(727));
-  ASSERT_EQ(loads.hold.size(), kVertices + 1);
-  EXPECT_EQ(loads.hold[kVertices - 1], Hold::placed);
-  EXPECT_EQ(loads.hold[kVertices], Hold::free);
+  ASSERT_EQ(loads.constraint.size(), kVertices + 1);
+  EXPECT_EQ(loads.constraint[kVertices - 1], Constraint::placed);
+  EXPECT_EQ(loads.constraint[kVertices], Constraint::free);
 }
 
 TEST(Scenario, HoldWinsOverMoves) {
@@ -116,14 +116,14 @@ TEST(Scenario, ForceIsSharedByWhatIsPulled) {
   Scenario scenario = scenario_of({{kBottom, "hold[0]"}}, {pull, pull});
   scenario.method = Method::mass_spring;
   const PhaseLoads loads(scenario, scenario.phases[0], patient);
-  EXPECT_EQ(loads.pulled(), kLayer);
+  EXPECT_EQ(loads.with_force(), kLayer);
   EXPECT_EQ(loads.moved(), 0u);
   const Model model = make_model(patient.lattice, tissue_of_cells(scenario, patient), std::vector<Tissue>{{}});
   const Loads whole = loads.at(1, model, std::vector<glm::vec3>(model.nodes()));
   ASSERT_EQ(whole.force.size(), kVertices);
   EXPECT_EQ(whole.force[kVertices - 1], glm::vec3(0, 0, 2));
   EXPECT_EQ(whole.force[0], glm::vec3(0));
-  EXPECT_EQ(whole.hold[kVertices - 1], Hold::free);
+  EXPECT_EQ(whole.constraint[kVertices - 1], Constraint::free);
 
   scenario.phases[0].moves.push_back(move_of(kTop, Shift{{0, 0, 4}}, "move[2]"));
   EXPECT_TRUE(says(refusal([&] { PhaseLoads(scenario, scenario.phases[0], patient); }), {"move[0]", "move[2]"}));
@@ -179,10 +179,11 @@ class Puppet final : public Simulation {
     from_ = now_;
     ++log_.loads;
   }
-  Settled advance(double part, const StoppingRule&, const Control&) override {
+  Convergence advance(double part, const StoppingRule&, const Control&) override {
     log_.parts.push_back(part);
     for (std::size_t n = 0; n < now_.size(); ++n) {
-      if (loads_.hold[n] == Hold::placed) now_[n] = from_[n] + static_cast<float>(part) * (loads_.goal[n] - from_[n]);
+      if (loads_.constraint[n] == Constraint::placed)
+        now_[n] = from_[n] + static_cast<float>(part) * (loads_.goal[n] - from_[n]);
     }
     return {.steps = 3, .motion_mm = 0.5, .reached = true};
   }
@@ -209,7 +210,7 @@ TEST(ScenarioRun, PhasesGoOnFromWhereTheOneBeforeLed) {
   EXPECT_EQ(run.displacement(), std::vector<glm::vec3>(kVertices));
   const std::vector<glm::vec3> expected = {{4, 0, 0}, {8, 0, 0}, {6, 1, 0}, {4, 2, 0}, {2, 3, 0}, {0, 4, 0}};
   for (int n = 0; n < 6; ++n) {
-    const Frame frame = run.next();
+    const FrameResult frame = run.next();
     EXPECT_EQ(frame.number, n + 1);
     EXPECT_EQ(frame.phase, n < 2 ? 0u : 1u);
     EXPECT_EQ(frame.ends_phase, n == 1 || n == 5);

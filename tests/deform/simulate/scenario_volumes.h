@@ -68,7 +68,7 @@ inline TissueClass tissue_of(std::string name, std::optional<HuRange> hu = {}, s
 }
 
 /// A scenario with one tissue and one phase, by ChainMail.
-inline Scenario scenario_of(std::vector<Held> hold, std::vector<Move> moves) {
+inline Scenario scenario_of(std::vector<HeldZone> hold, std::vector<Move> moves) {
   Scenario scenario;
   scenario.cell_size = 2;
   scenario.tissues = {tissue_of("tissue")};

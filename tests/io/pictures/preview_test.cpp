@@ -73,12 +73,12 @@ Volume<std::int16_t> right_front_upper_block(const Geometry& grid) {
 
 TEST(SlicePicture, CornersLieWhereRadiologistsExpectThemForAllOrientations) {
   struct Expected {
-    Plane plane;
+    AnatomicalPlane plane;
     glm::dvec3 right, down;
   };
-  const Expected planes[] = {{Plane::axial, {1, 0, 0}, {0, 1, 0}},
-                             {Plane::coronal, {1, 0, 0}, {0, 0, -1}},
-                             {Plane::sagittal, {0, 1, 0}, {0, 0, -1}}};
+  const Expected planes[] = {{AnatomicalPlane::axial, {1, 0, 0}, {0, 1, 0}},
+                             {AnatomicalPlane::coronal, {1, 0, 0}, {0, 0, -1}},
+                             {AnatomicalPlane::sagittal, {0, 1, 0}, {0, 0, -1}}};
   for (const glm::dmat3& direction : all_orientations()) {
     const Geometry grid = uneven_grid(direction);
     const AffineMap point = point_from_index(grid);
@@ -96,13 +96,13 @@ TEST(SlicePicture, CornersLieWhereRadiologistsExpectThemForAllOrientations) {
 TEST(SlicePicture, LettersNameThePatientDirections) {
   for (const glm::dmat3& direction : all_orientations()) {
     const Geometry grid = uneven_grid(direction);
-    const auto letters = [&](Plane plane) {
+    const auto letters = [&](AnatomicalPlane plane) {
       const Slice slice = middle_slice(grid, plane);
       return std::string{slice.right.begin, slice.right.end, slice.down.begin, slice.down.end};
     };
-    EXPECT_EQ(letters(Plane::axial), "RLAP");
-    EXPECT_EQ(letters(Plane::coronal), "RLSI");
-    EXPECT_EQ(letters(Plane::sagittal), "APSI");
+    EXPECT_EQ(letters(AnatomicalPlane::axial), "RLAP");
+    EXPECT_EQ(letters(AnatomicalPlane::coronal), "RLSI");
+    EXPECT_EQ(letters(AnatomicalPlane::sagittal), "APSI");
   }
 }
 
@@ -122,7 +122,7 @@ TEST(SlicePicture, ObliqueGridGivesEachPatientAxisAGridAxisOfItsOwn) {
 TEST(SlicePicture, BlockAtRightFrontTopIsUpperLeftForAllOrientations) {
   for (const glm::dmat3& direction : all_orientations()) {
     const auto volume = right_front_upper_block(uneven_grid(direction));
-    for (const Plane plane : {Plane::axial, Plane::coronal, Plane::sagittal}) {
+    for (const AnatomicalPlane plane : {AnatomicalPlane::axial, AnatomicalPlane::coronal, AnatomicalPlane::sagittal}) {
       const Slice slice = middle_slice(volume.geometry, plane);
       const std::vector<double> pixels = sample_slice(view(volume), slice, 4, 4);
       const std::vector<double> quarters = {pixels[0], pixels[3], pixels[12], pixels[15]};

@@ -45,7 +45,7 @@ TEST(SliceView, ASliceIsItsVoxelsInTheWindow) {
   const Geometry grid = unit_grid({40, 30, 20});
   const Volume<std::int16_t> volume =
       volume_of<std::int16_t>(grid, [](const glm::i64vec3& v) { return static_cast<double>(v.x + v.y); });
-  const SlicePart axial{middle_slice(grid, Plane::axial), {}};
+  const SlicePart axial{middle_slice(grid, AnatomicalPlane::axial), {}};
   const Picture picture = draw_slices(view(volume), {&axial, 1}, plain(grid));
   ASSERT_EQ(picture.width(), 40);
   ASSERT_EQ(picture.height(), 30);
@@ -54,11 +54,12 @@ TEST(SliceView, ASliceIsItsVoxelsInTheWindow) {
 
 TEST(SliceView, GoesThroughAPointAndRefusesOneOutside) {
   const Geometry grid = unit_grid({40, 30, 20});
-  EXPECT_EQ(slice_through(grid, Plane::axial, {3, 4, 6.4}).voxel, 6);
-  EXPECT_EQ(slice_through(grid, Plane::coronal, {3, 4.6, 6}).voxel, 5);
-  EXPECT_EQ(slice_through(grid, Plane::sagittal, {3, 4, 6}).voxel, 3);
-  EXPECT_THROW(slice_through(grid, Plane::axial, {3, 4, 20}), InputError);
-  EXPECT_EQ(region_of(grid, slice_through(grid, Plane::coronal, {3, 4, 6})), (Region{{0, 4, 0}, {40, 5, 20}}));
+  EXPECT_EQ(slice_through(grid, AnatomicalPlane::axial, {3, 4, 6.4}).voxel, 6);
+  EXPECT_EQ(slice_through(grid, AnatomicalPlane::coronal, {3, 4.6, 6}).voxel, 5);
+  EXPECT_EQ(slice_through(grid, AnatomicalPlane::sagittal, {3, 4, 6}).voxel, 3);
+  EXPECT_THROW(slice_through(grid, AnatomicalPlane::axial, {3, 4, 20}), InputError);
+  EXPECT_EQ(region_of(grid, slice_through(grid, AnatomicalPlane::coronal, {3, 4, 6})),
+            (Region{{0, 4, 0}, {40, 5, 20}}));
 }
 
 TEST(SliceView, AMontageIsThreeSlicesAtOneScale) {
@@ -66,7 +67,7 @@ TEST(SliceView, AMontageIsThreeSlicesAtOneScale) {
   grid.spacing = {1, 2, 3};
   const Volume<std::int16_t> volume = volume_of<std::int16_t>(grid, [](const glm::i64vec3&) { return 100; });
   std::vector<SlicePart> parts;
-  for (const Plane plane : {Plane::axial, Plane::coronal, Plane::sagittal})
+  for (const AnatomicalPlane plane : {AnatomicalPlane::axial, AnatomicalPlane::coronal, AnatomicalPlane::sagittal})
     parts.push_back({middle_slice(grid, plane), {}});
   SliceViewOptions options = plain(grid);
   options.width = 40 + 40 + 60;
@@ -89,7 +90,7 @@ TEST(SliceView, OverlaysTintTheVoxelsThatTheyAreAbout) {
     return v.x < 10 ? 2 : v.x < 20 ? 0.5 : v.x < 30 ? -1 : NAN;
   });
   const auto shown = [&](OverlayKind kind, const ConstVolumeView& map) {
-    const SlicePart part{middle_slice(grid, Plane::axial), {{kind, map, {}}}};
+    const SlicePart part{middle_slice(grid, AnatomicalPlane::axial), {{kind, map, {}}}};
     return draw_slices(view(volume), {&part, 1}, plain(grid));
   };
   const Picture holes = shown(OverlayKind::coverage, view(coverage)), folds = shown(OverlayKind::folds, view(owners)),
@@ -130,7 +131,8 @@ TEST(SliceView, LinesOfTheLatticeAreWhereCellsMeet) {
   std::vector<glm::vec3> inverse(static_cast<std::size_t>(voxel_count(grid)), glm::vec3(-kShift, 0, 0));
   const ConstVolumeView map{&grid,       whole(grid), VoxelType::f32, 3, std::as_bytes(std::span(inverse)).data(),
                             Memory::host};
-  const SlicePart part{middle_slice(grid, Plane::axial), {{OverlayKind::lattice, map, lattice_over(grid, 20)}}};
+  const SlicePart part{middle_slice(grid, AnatomicalPlane::axial),
+                       {{OverlayKind::lattice, map, lattice_over(grid, 20)}}};
   const Picture picture = draw_slices(view(volume), {&part, 1}, plain(grid));
   int lines = 0;
   for (int x = 1; x < 160; ++x) {

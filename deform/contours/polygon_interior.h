@@ -14,10 +14,10 @@ namespace tetwarp {
 ///
 /// Edges with the area on both sides are no border: the channel of a keyhole, and what two equal rings take away from
 /// each other. The edges lie in a tree of boxes over runs of neighbouring edges, for polygons are coherent already.
-class PlanarRegion {
+class PolygonInterior {
  public:
   /// @param rings  mm, of three corners or more; they may touch and cross
-  explicit PlanarRegion(const std::vector<Ring>& rings);
+  explicit PolygonInterior(const std::vector<Ring>& rings);
 
   static constexpr double kFar = 1e9;  ///< mm
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "deform/contours/planar_region.h"
+#include "deform/contours/polygon_interior.h"
 
 #include <algorithm>
 #include <array>
@@ -33,7 +33,7 @@ double to_edge(const glm::dvec2& point, const glm::dvec2& a, const glm::dvec2& b
 
 }  // namespace
 
-PlanarRegion::PlanarRegion(const std::vector<Ring>& rings) {
+PolygonInterior::PolygonInterior(const std::vector<Ring>& rings) {
   for (const Ring& ring : rings) {
     for (std::size_t n = 0; n < ring.size(); ++n) {
       const glm::dvec2 &a = ring[n], &b = ring[(n + 1) % ring.size()];
@@ -49,7 +49,7 @@ PlanarRegion::PlanarRegion(const std::vector<Ring>& rings) {
   }
 }
 
-void PlanarRegion::build(std::size_t begin, std::size_t end) {
+void PolygonInterior::build(std::size_t begin, std::size_t end) {
   const std::size_t at = nodes_.size();
   Node node{glm::dvec2(INFINITY), glm::dvec2(-INFINITY), begin, end};
   for (std::size_t n = begin; n < end; ++n) {
@@ -65,7 +65,7 @@ void PlanarRegion::build(std::size_t begin, std::size_t end) {
   nodes_[at].next = nodes_.size();
 }
 
-bool PlanarRegion::contains(const glm::dvec2& point) const {
+bool PolygonInterior::contains(const glm::dvec2& point) const {
   bool inside = false;
   for (std::size_t n = 0; n < nodes_.size();) {
     const Node& node = nodes_[n];
@@ -80,7 +80,7 @@ bool PlanarRegion::contains(const glm::dvec2& point) const {
   return inside;
 }
 
-double PlanarRegion::signed_distance(const glm::dvec2& point) const {
+double PolygonInterior::signed_distance(const glm::dvec2& point) const {
   double nearest = kFar * kFar;  // squared distance
   std::array<std::size_t, kDeepest> waiting;
   std::size_t count = 0;
