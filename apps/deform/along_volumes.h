@@ -52,7 +52,9 @@ struct AlongWritten {
 /// Reads headers. @throws UsageError, InputError for what does not go with its output or with INPUT
 AlongHeaders open_along(const std::vector<AlongVolumeChoice>& choices, const InputHeader& input);
 
-/// Memory of volumes and of their outputs, the latter with `output_voxels` voxels each.
+/// Memory of what comes out of one. @param output_voxels  of the grid of OUTPUT
+std::uint64_t along_result_bytes(const AlongHeader& header, std::uint64_t output_voxels);
+/// Memory of volumes and of their outputs. @param output_voxels  of the grid of OUTPUT
 std::uint64_t along_bytes(const std::vector<AlongHeader>& headers, std::uint64_t output_voxels);
 
 std::vector<AlongInput> read_along(const std::vector<AlongHeader>& headers, const CommonOptions& common,

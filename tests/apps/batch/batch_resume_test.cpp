@@ -122,4 +122,22 @@ TEST_F(BatchResume, SaysHowManyAreMadeAgainAndWhy) {
   EXPECT_EQ(run("batch m.jsonl -o out --resume --quiet").err, "");
 }
 
+TEST_F(BatchResume, NeedsRoomForTheCasesThatItMakesAndNotForThoseThatAreThere) {
+  write_file(scratch_ / "m.jsonl",
+             R"({"case": "v", "input": "ct.nrrd", "field": "identity", "output": "o.mha", "variants": 4})");
+  // Four outputs of 51 kB and what lies beside them fit on this disk; beside three there is no room for four more.
+  write_file(scratch_ / "script",
+             "mkdir disk && mount -t tmpfs -o size=360k none disk || exit 77\n"
+             "'" TETWARP_PROGRAM
+             "' batch m.jsonl -o disk/out --quiet || exit 99\n"
+             "rm -r disk/out/v-3\n"
+             "'" TETWARP_PROGRAM
+             "' batch m.jsonl -o disk/out --quiet --resume || exit\n"
+             "grep -c '\"status\":\"done\"' disk/out/results.jsonl\n");
+  const Outcome made = run_program(scratch_.path(), "/bin/sh", "-c 'unshare --map-root-user --mount sh script'");
+  if (made.status == 77 || says(made.err, {"unshare"})) GTEST_SKIP() << "no disk can be mounted: " << made.err;
+  EXPECT_EQ(made.status, 0) << made.err;
+  EXPECT_EQ(made.out, "4\n");
+}
+
 }  // namespace
