@@ -128,6 +128,18 @@ TEST(DeformPass, TheReportCountsVoxelsOfInputAloneAndEachVolumeHasItsOwnWay) {
   EXPECT_EQ(voxels_of(result.along[2].outputs[0]), input) << "the field rests there";
 }
 
+TEST(DeformPass, AVolumeOnItsOwnGridIsRefusedWhereTheFieldDoesNotReachWhateverOutputGrowsTo) {
+  DeformOptions options = options_of({"translate:by=1/0/0"});
+  options.grid = "fit";
+  options.with = {"far.mha=a.mha:own"};
+  Stages run(options);
+  Geometry far_away = kGrid;
+  far_away.origin.x += 1000;
+  run.headers.along.volumes.push_back(AlongHeader{run.request.volumes[0], {}, {}, far_away});
+  run.inputs.along.emplace_back().sources.emplace_back(ramp(far_away));
+  EXPECT_TRUE(says(failure<InputError>([&] { run.resampled(); }), {"does not reach over"}));
+}
+
 TEST(DeformPass, MassIsKeptWithoutAFileOfItsMaps) {
   DeformOptions options = options_of({"identity"});
   options.preserve_mass = true;
