@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <glm/common.hpp>
@@ -65,7 +66,7 @@ TEST(RegionBoxes, AreTheSetsOfTheirVoxels) {
   };
   int empty = 0, within = 0;
   for (int number = 0; number < 2000; ++number) {
-    const Region a = some_box(), b = random.chance(0.3) ? intersection(a, some_box()) : some_box(),
+    const Region a = some_box(), b = random.chance(0.6) ? intersection(a, some_box()) : some_box(),
                  both = intersection(a, b);
     std::int64_t in_a = 0, outside = 0, differs = 0;
     for_each_voxel(around, [&](const glm::i64vec3& voxel, std::size_t) {
@@ -83,7 +84,7 @@ TEST(RegionBoxes, AreTheSetsOfTheirVoxels) {
     within += contains(a, b) && !is_empty(b);
   }
   EXPECT_GT(empty, 200);
-  EXPECT_GT(within, 200);
+  EXPECT_GT(within, 30);
   EXPECT_EQ(whole(around), (Region{{0, 0, 0}, {8, 8, 8}}));
 }
 
@@ -124,6 +125,9 @@ TEST_P(Regions, PartsAddUpToTheWholeWhateverTheSplit) {
   const auto resampler = make(scene.grid);
   resampler->set_field(view(scene.field));
   const auto expected = run(*resampler, scene.source, kOptions);
+  const auto& owners = expected.owners.voxels;
+  EXPECT_EQ(expected.report.multiply_owned, static_cast<std::uint64_t>(std::count_if(
+                                                owners.begin(), owners.end(), [](int count) { return count > 1; })));
   for (std::uint64_t number = 0; number < 5; ++number) {
     Random random(seed, 1000 + number);
     std::vector<Region> parts;
