@@ -156,14 +156,15 @@ int Batch::run() {
   const Threads threads(wanted_jobs(devices, cuda > 0));  // started before anything else needs threads
   check(progress);
   if (options_.dry_run) {
+    const DiskBytes disk = disk_of(found_, mine_);
     say(options_.common, "would run " + std::to_string(mine_.size()) + " cases; outputs of at most " +
-                             format_bytes(found_.plain_bytes + found_.packed_bytes) + " before compression");
+                             format_bytes(disk.plain + disk.packed) + " before compression");
     return 0;
   }
   std::error_code unknown;
   const bool made_before = options_.resume && fs::exists(options_.output, unknown);
   // Checked before a folder is begun, for a later run would refuse to use that.
-  if (!made_before) check_space(found_, options_.output);
+  if (!made_before) check_space(disk_of(found_, mine_), options_.output);
   if (demands_device(options_.backend) && cuda == 0) {
     Geometry any;
     any.size = glm::i64vec3(2);  // a grid is looked at before a device is
@@ -172,7 +173,7 @@ int Batch::run() {
   OutputFolder folder(options_.output, shard_, ids_of(cases_), hash_file(options_.manifest), options_.resume);
   Results results(folder, ids());
   find_finished(folder, results);
-  const std::string scarce = check_space(found_, folder.path());
+  const std::string scarce = check_space(disk_of(found_, open_), folder.path());
   MemoryBudget memory(memory_bytes());
   const std::size_t jobs = std::clamp<std::size_t>(open_.size(), 1, threads.jobs());
   progress.begin(open_.size(), mine_.size() - open_.size());

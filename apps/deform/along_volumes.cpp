@@ -56,15 +56,31 @@ AlongHeaders open_along(const std::vector<AlongVolumeChoice>& choices, const Inp
   return opened;
 }
 
+namespace {
+
+/// Of all values of a volume, or of all segments of a segmentation.
+std::uint64_t voxel_bytes(const AlongHeader& one) {
+  const std::uint64_t volumes = one.segmentation ? one.segmentation->segments.size() : 1;
+  return size_bytes(one.header.type) * static_cast<std::uint64_t>(one.header.components) * volumes;
+}
+
+std::uint64_t result_voxels(const AlongHeader& one, std::uint64_t output_voxels) {
+  return one.choice.own ? static_cast<std::uint64_t>(voxel_count(one.own_grid)) : output_voxels;
+}
+
+}  // namespace
+
+std::uint64_t along_result_bytes(const AlongHeader& header, std::uint64_t output_voxels) {
+  return voxel_bytes(header) * result_voxels(header, output_voxels);
+}
+
 std::uint64_t along_bytes(const std::vector<AlongHeader>& headers, std::uint64_t output_voxels) {
   std::uint64_t bytes = 0;
   for (const AlongHeader& one : headers) {
-    const auto voxels = static_cast<std::uint64_t>(voxel_count(one.header.geometry)),
-               results = one.choice.own ? static_cast<std::uint64_t>(voxel_count(one.own_grid)) : output_voxels;
-    const std::uint64_t volumes = one.segmentation ? one.segmentation->segments.size() : 1;
-    bytes +=
-        size_bytes(one.header.type) * static_cast<std::uint64_t>(one.header.components) * volumes * (voxels + results);
-    if (is_object_output(one.choice.output) && one.header.dose) bytes += sizeof(std::int32_t) * results;
+    bytes += voxel_bytes(one) * static_cast<std::uint64_t>(voxel_count(one.header.geometry)) +
+             along_result_bytes(one, output_voxels);
+    if (is_object_output(one.choice.output) && one.header.dose)
+      bytes += sizeof(std::int32_t) * result_voxels(one, output_voxels);
   }
   return bytes;
 }

@@ -52,6 +52,8 @@ struct AlongWritten {
 /// Reads headers. @throws UsageError, InputError for what does not go with its output or with INPUT
 AlongHeaders open_along(const std::vector<AlongVolumeChoice>& choices, const InputHeader& input);
 
+/// Bytes of the output of one volume, which has `output_voxels` voxels unless it has a grid of its own.
+std::uint64_t along_result_bytes(const AlongHeader& header, std::uint64_t output_voxels);
 /// Bytes of volumes and of their outputs, which have `output_voxels` voxels each.
 std::uint64_t along_bytes(const std::vector<AlongHeader>& headers, std::uint64_t output_voxels);
 

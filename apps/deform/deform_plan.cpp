@@ -13,6 +13,8 @@
 #include "deform/mass.h"
 #include "deform/residuals.h"
 #include "io/image_file.h"
+#include "io/lower_case.h"
+#include "io/mesh_writer.h"
 
 namespace tetwarp::apps {
 
@@ -63,16 +65,36 @@ std::uint64_t memory_bytes(const DeformRequest& request, const DeformHeaders& he
          along_bytes(headers.along.volumes, output_voxels) + of_structures + kOverheadBytes;
 }
 
-/// What the outputs take on disk without the field, were nothing compressed.
-std::uint64_t disk_bytes(const DeformRequest& request, const DeformHeaders& headers, const Geometry& grid) {
+/// The forward field as --write-field writes it. @param in_memory  bytes of `bytes_of_field`
+std::uint64_t bytes_of_written_field(const DeformRequest& request, const Geometry& volume, std::uint64_t in_memory) {
+  const auto* simulated = std::get_if<Simulated>(&request.field);
+  if (!simulated) return in_memory;
+  const Geometry lattice = lattice_over(straightened(volume), simulated->scenario.cell_size);
+  return static_cast<std::uint64_t>(voxel_count(lattice)) * sizeof(glm::vec3);
+}
+
+/// @param grid  of the output  @param of_field  bytes of the field, were it written
+DiskBytes disk_bytes(const DeformRequest& request, const DeformHeaders& headers, const Geometry& grid,
+                     std::uint64_t of_field) {
+  const DeformOptions& options = request.options;
+  const bool compressed = options.compression.value_or(0) > 0;
   const auto voxels = static_cast<std::uint64_t>(voxel_count(grid));
-  std::uint64_t per_voxel = size_bytes(headers.input.type);
-  const MapOptions& maps = request.options.maps;
-  if (!maps.coverage.empty()) per_voxel += sizeof(std::uint8_t);
-  if (!maps.folds.empty()) per_voxel += sizeof(std::uint16_t);
-  if (!maps.jacobian.empty()) per_voxel += sizeof(float);
-  if (!maps.inverse.empty()) per_voxel += sizeof(glm::vec3);
-  return voxels * per_voxel + along_bytes(headers.along.volumes, voxels);
+  DiskBytes disk;
+  const auto add = [&](const std::filesystem::path& file, std::uint64_t bytes, bool is_packed) {
+    if (!file.empty()) (is_packed || lower(file.extension().string()) == ".gz" ? disk.packed : disk.plain) += bytes;
+  };
+  add(options.output, voxels * size_bytes(headers.input.type),
+      request.series ? options.dicom.encoding != DicomEncoding::uncompressed : compressed);
+  add(options.maps.coverage, voxels * sizeof(std::uint8_t), false);
+  add(options.maps.folds, voxels * sizeof(std::uint16_t), false);
+  add(options.maps.jacobian, voxels * sizeof(float), false);
+  add(options.maps.inverse, voxels * sizeof(glm::vec3), false);
+  add(options.write_field, of_field, has_mesh_suffix(options.write_field));
+  for (const AlongHeader& along : headers.along.volumes) {
+    const std::filesystem::path& file = along.choice.output;
+    add(file, along_result_bytes(along, voxels), compressed || is_object_output(file));
+  }
+  return disk;
 }
 
 }  // namespace
@@ -104,7 +126,7 @@ DeformPlan plan_deformation(const DeformRequest& request, const DeformHeaders& h
   const Geometry& grid = plan.grid ? *plan.grid : headers.input.geometry;
   const std::uint64_t of_field = bytes_of_field(request, headers.input.geometry, grid);
   plan.bytes = memory_bytes(request, headers, grid) + of_field;
-  plan.output_bytes = disk_bytes(request, headers, grid) + (options.write_field.empty() ? 0 : of_field);
+  plan.disk = disk_bytes(request, headers, grid, bytes_of_written_field(request, headers.input.geometry, of_field));
   if (options.memory_bytes && plan.bytes > *options.memory_bytes && !runs_on_device(chosen(options.backend))) {
     throw Error("about " + format_bytes(plan.bytes) + " of memory are needed, --memory allows " +
                 format_bytes(*options.memory_bytes) + "; a larger --cell-size needs less");

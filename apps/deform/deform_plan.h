@@ -29,11 +29,23 @@ struct DeformHeaders {
 /// InputError for a volume that cannot be deformed, or a file that cannot be read
 DeformHeaders open_headers(const DeformRequest& request, SharedInput& input, OutputSet& outputs);
 
+/// What outputs take on disk, but for what is small.
+struct DiskBytes {
+  std::uint64_t plain = 0;   ///< of outputs that are written as they are
+  std::uint64_t packed = 0;  ///< of outputs that are compressed or leave out what is empty, before that
+
+  DiskBytes& operator+=(const DiskBytes& other) {
+    plain += other.plain;
+    packed += other.packed;
+    return *this;
+  }
+};
+
 /// What will be made, as far as headers tell.
 struct DeformPlan {
-  std::optional<Geometry> grid;    ///< of the output; none where it is known only once the field is
-  std::uint64_t bytes = 0;         ///< of memory; a grid that is not known is taken for INPUT's
-  std::uint64_t output_bytes = 0;  ///< on disk, were nothing compressed
+  std::optional<Geometry> grid;  ///< of the output; none where it is known only once the field is
+  std::uint64_t bytes = 0;       ///< of memory; a grid that is not known is taken for INPUT's
+  DiskBytes disk;                ///< of all outputs; a grid that is not known is taken for INPUT's
 };
 
 /// Touches the disk for a field of files alone, whose size their headers tell.

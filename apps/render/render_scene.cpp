@@ -151,10 +151,18 @@ void RenderScene::read() {
   for (const OverlayWish& wish : wishes()) read_overlay(wish);
 }
 
+void RenderScene::add_notes(const std::vector<std::string>& notes) {
+  for (const std::string& note : notes) {
+    if (std::ranges::find(notes_, note) == notes_.end()) notes_.push_back(note);
+  }
+}
+
 void RenderScene::read_overlay(const OverlayWish& wish) {
   maps_.push_back(nullptr);
   if (wish.lattice) {
-    drawn_lattice_ = apps::read_field(*wish.lattice, header_.geometry, options_.common.threads, {}).field;
+    ReadForwardField read = apps::read_field(*wish.lattice, header_.geometry, options_.common.threads, {});
+    drawn_lattice_ = std::move(read.field);
+    add_notes(read.origin.notes);
     lattice_resampler_ = make_cpu_resampler(grid_, {.threads = options_.common.threads});
     lattice_resampler_->set_field(view(drawn_lattice_, Outside::background), {}, {.stop = interrupt_token()});
   }
@@ -173,7 +181,7 @@ void RenderScene::read_field(const Control& control) {
   const Geometry& source = header_.geometry;
   const auto take = [&](auto&& read) {
     field_ = std::move(read.field);
-    notes_.insert(notes_.end(), read.origin.notes.begin(), read.origin.notes.end());
+    add_notes(read.origin.notes);
   };
   if (const auto* pull = std::get_if<PullChoice>(&*fields_.deforming))
     take(apps::read_field(*pull, source, grid_, options_.common.threads, control));
@@ -200,7 +208,9 @@ void RenderScene::show(std::size_t frame) {
   const Control control{.stop = interrupt_token()};
   if (fields_.sequence) {
     const ForwardChoice one{{fields_.sequence->fields[frame]}, {}};
-    field_ = apps::read_field(one, header_.geometry, options_.common.threads, control).field;
+    ReadForwardField read = apps::read_field(one, header_.geometry, options_.common.threads, control);
+    field_ = std::move(read.field);
+    add_notes(read.origin.notes);
   }
   const bool grows = options_.frames > 1;
   set_frame_field(grows ? static_cast<double>(frame) / (options_.frames - 1) : 1, control);

@@ -86,6 +86,8 @@ class RenderScene {
  private:
   void read_field(const Control& control);
   void read_overlay(const OverlayWish& wish);
+  /// Takes what is to be said of a field, each once.
+  void add_notes(const std::vector<std::string>& notes);
   const VertexField* shown_forward_field() const {
     return shown_field_ ? std::get_if<VertexField>(shown_field_) : nullptr;
   }

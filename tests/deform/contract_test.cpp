@@ -108,6 +108,32 @@ TEST_P(Copies, TheRangeOfDeterminantsIsThatOfTheMap) {
   }
 }
 
+TEST_P(Copies, WhoeverDoesNotWantTheRangeOfDeterminantsGetsAllElseAsBefore) {
+  const std::uint64_t seed = test_seed();
+  for (std::uint64_t number = 0; number < 40; ++number) {
+    Random random(seed, 300 + number);
+    const FieldCase test = number % 2 == 0 ? random_injective_case(random) : random_folding_case(random);
+    SCOPED_TRACE(seed_text(seed) + ", case " + std::to_string(number) + ": " + test.description);
+    const auto source = random_volume<std::int16_t>(test.output, random);
+    const auto resampler = make(test.output);
+    resampler->set_field(view(test.field, Outside::background));
+    const auto expected = run(*resampler, source);
+    resampler->set_field(view(test.field, Outside::background), {.jacobian_range = false});
+    const auto found = run(*resampler, source);
+    Report without = expected.report;
+    without.jacobian_min = INFINITY;
+    without.jacobian_max = -INFINITY;
+    expect_same_report(without, found.report);
+    expect_same_outcome(expected, found);
+    auto alone = poisoned<std::int16_t>(test.output);
+    const Target target{.source = view(source), .output = view(alone), .background = -7};
+    const Report of_it = resampler->resample(whole(test.output), {&target, 1});
+    EXPECT_TRUE(same_bits(expected.output.voxels, alone.voxels)) << "without maps";
+    EXPECT_EQ(of_it.inverted, expected.report.inverted);
+    EXPECT_EQ(of_it.degenerate, expected.report.degenerate);
+  }
+}
+
 TEST_P(Copies, IdentityReturnsTheSourceBitForBit) {
   const std::uint64_t seed = test_seed();
   SCOPED_TRACE(seed_text(seed));

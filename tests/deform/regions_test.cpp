@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <glm/common.hpp>
@@ -42,6 +43,51 @@ struct Scene {
 const Options kOptions{
     .interpolation = Interpolation::cubic, .background = -1024, .padding = PaddingRange{-2000, -2000}};
 
+/// Whether a voxel is in a box, by the meaning of its corners.
+bool holds(const Region& region, const glm::i64vec3& voxel) {
+  bool inside = true;
+  for (int axis = 0; axis < 3; ++axis)
+    inside = inside && region.begin[axis] <= voxel[axis] && voxel[axis] < region.end[axis];
+  return inside;
+}
+
+TEST(RegionBoxes, AreTheSetsOfTheirVoxels) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE(seed_text(seed));
+  Random random(seed, 4);
+  const Geometry around = unit_grid({8, 8, 8});
+  const auto some_box = [&] {  // one in three or so is empty, and some of these end before they begin
+    Region box;
+    for (int axis = 0; axis < 3; ++axis) {
+      box.begin[axis] = random.integer(0, 7);
+      box.end[axis] = std::min<std::int64_t>(8, box.begin[axis] + random.integer(-1, 8));
+    }
+    return box;
+  };
+  int empty = 0, within = 0;
+  for (int number = 0; number < 2000; ++number) {
+    const Region a = some_box(), b = random.chance(0.6) ? intersection(a, some_box()) : some_box(),
+                 both = intersection(a, b);
+    std::int64_t in_a = 0, outside = 0, differs = 0;
+    for_each_voxel(around, [&](const glm::i64vec3& voxel, std::size_t) {
+      in_a += holds(a, voxel);
+      outside += holds(b, voxel) && !holds(a, voxel);
+      differs += holds(both, voxel) != (holds(a, voxel) && holds(b, voxel));
+    });
+    const testing::Message shown = testing::Message() << to_string(a.begin) << " to " << to_string(a.end) << " and "
+                                                      << to_string(b.begin) << " to " << to_string(b.end);
+    ASSERT_EQ(voxel_count(a), in_a) << shown;
+    ASSERT_EQ(is_empty(a), in_a == 0) << shown;
+    ASSERT_EQ(contains(a, b), outside == 0) << shown;
+    ASSERT_EQ(differs, 0) << shown;
+    empty += is_empty(b);
+    within += contains(a, b) && !is_empty(b);
+  }
+  EXPECT_GT(empty, 200);
+  EXPECT_GT(within, 30);
+  EXPECT_EQ(whole(around), (Region{{0, 0, 0}, {8, 8, 8}}));
+}
+
 TEST_P(Regions, ResultIsIndependentOfThreadCount) {
   const std::uint64_t seed = test_seed();
   SCOPED_TRACE(seed_text(seed));
@@ -79,6 +125,9 @@ TEST_P(Regions, PartsAddUpToTheWholeWhateverTheSplit) {
   const auto resampler = make(scene.grid);
   resampler->set_field(view(scene.field));
   const auto expected = run(*resampler, scene.source, kOptions);
+  const auto& owners = expected.owners.voxels;
+  EXPECT_EQ(expected.report.multiply_owned, static_cast<std::uint64_t>(std::count_if(
+                                                owners.begin(), owners.end(), [](int count) { return count > 1; })));
   for (std::uint64_t number = 0; number < 5; ++number) {
     Random random(seed, 1000 + number);
     std::vector<Region> parts;

@@ -1,164 +1,18 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-// The stages of a run of `deform`, each from values, without a disk.
-#include <gtest/gtest.h>
-
+// The stages of a run of `deform` that follow its plan, each from values, without a disk.
 #include <nlohmann/json.hpp>
 
-#include "apps/deform/deform_report.h"
 #include "deform/fields/formula.h"
+#include "tests/apps/deform/stages.h"
 #include "tests/support/says.h"
 
 namespace {
 
 using namespace tetwarp;
-using namespace tetwarp::apps;
+using namespace tetwarp::test;
 using nlohmann::json;
-
-const Geometry kGrid{.size = {7, 6, 5}, .spacing = {2, 2, 3}, .origin = {10, 20, 30}};
-
-Volume<std::int16_t> ramp(const Geometry& grid) {
-  Volume<std::int16_t> volume{grid, {}};
-  for (std::int64_t n = 0; n < voxel_count(grid); ++n) volume.voxels.push_back(static_cast<std::int16_t>(7 * n - 300));
-  return volume;
-}
-
-DeformOptions options_of(const std::vector<std::string>& fields) {
-  DeformOptions options;
-  options.common.quiet = true;
-  options.common.threads = 1;
-  options.input.path = "nowhere/in.nii.gz";
-  options.output = "nowhere/out.nii.gz";
-  options.field.forward = fields;
-  options.backend = BackendChoice::cpu;
-  return options;
-}
-
-DeformHeaders headers_of(const Geometry& grid) {
-  DeformHeaders headers;
-  headers.input.geometry = grid;
-  return headers;
-}
-
-DeformInputs inputs_of(const Geometry& grid) {
-  auto volume = std::make_shared<InputVolume>();
-  volume->volume = AnyVolume(ramp(grid));
-  volume->background = -1000;
-  return {.input = volume, .headers = nullptr, .background = volume->background, .along = {}};
-}
-
-/// The values of a run whose options outlive it.
-struct Stages {
-  explicit Stages(const DeformOptions& options, const Geometry& grid = kGrid)
-      : request(request_of(options)),
-        headers(headers_of(grid)),
-        plan(plan_deformation(request, headers)),
-        inputs(inputs_of(grid)),
-        field(make_field(request, plan, inputs, {BackendChoice::cpu, 0})) {}
-
-  /// Sends the volume through a field. @param wanted  maps that no file gets
-  DeformResult resampled(const std::vector<WantedMap>& wanted = {}) {
-    OutputSet none(Reads(), false);
-    DeformSinks sinks{nullptr, MapStream(field.grid, none), none};
-    add_maps(wanted, field.grid, nullptr, sinks.maps);
-    return resample(request, headers, inputs, field, std::move(field.room), sinks, {BackendChoice::cpu, 0});
-  }
-
-  DeformRequest request;
-  DeformHeaders headers;
-  DeformPlan plan;
-  DeformInputs inputs;
-  DeformField field;
-};
-
-std::vector<std::int16_t> voxels_of(const AnyVolume& volume) {
-  const auto values = volume.as<std::int16_t>();
-  return {values.begin(), values.end()};
-}
-
-template <class Failure>
-std::string failure(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const Failure& error) {
-    return error.what();
-  }
-  return "";
-}
-
-TEST(DeformPlan, FollowsFromHeaders) {
-  const DeformOptions options = options_of({"identity"});
-  const DeformPlan plan = plan_deformation(request_of(options), headers_of(kGrid));
-  EXPECT_EQ(plan.grid, kGrid);
-  EXPECT_EQ(plan.output_bytes, 7u * 6 * 5 * 2);
-  DeformOptions with_field = options;
-  with_field.write_field = "nowhere/field.mha";
-  with_field.maps.coverage = "nowhere/coverage.mha";
-  const DeformPlan more = plan_deformation(request_of(with_field), headers_of(kGrid));
-  EXPECT_EQ(more.output_bytes, plan.output_bytes + 7 * 6 * 5 * (1 + 12));
-  EXPECT_EQ(more.bytes, plan.bytes + 7 * 6 * 5) << "a map that is whole in one slab";
-}
-
-TEST(DeformPlan, CountsTheMapsThatMassNeedsOnce) {
-  DeformOptions options = options_of({"identity"});
-  const std::uint64_t plain = plan_deformation(request_of(options), headers_of(kGrid)).bytes;
-  options.preserve_mass = true;
-  const std::uint64_t mass = plan_deformation(request_of(options), headers_of(kGrid)).bytes;
-  EXPECT_EQ(mass - plain, 7u * 6 * 5 * (2 * 4 + 1 + 4)) << "two volumes of floats, coverage, determinants";
-  options.maps.jacobian = "nowhere/jacobian.mha";
-  EXPECT_EQ(plan_deformation(request_of(options), headers_of(kGrid)).bytes, mass);
-}
-
-TEST(DeformPlan, TakesTheGridThatOptionsName) {
-  DeformOptions options = options_of({"identity"});
-  Geometry sheared = kGrid;
-  sheared.direction[2] = glm::dvec3(0, 0.6, 0.8);
-  EXPECT_EQ(plan_deformation(request_of(options), headers_of(sheared)).grid, straightened(sheared));
-  options.grid = "fit";
-  EXPECT_FALSE(plan_deformation(request_of(options), headers_of(kGrid)).grid.has_value());
-  options.grid = "/";  // a folder that exists
-  DeformHeaders headers = headers_of(kGrid);
-  headers.grid = Geometry{.size = {3, 3, 3}};
-  EXPECT_EQ(plan_deformation(request_of(options), headers).grid, headers.grid);
-}
-
-TEST(DeformPlan, RefusesWhatTheMemoryDoesNotHold) {
-  DeformOptions options = options_of({"identity"});
-  options.memory_bytes = 1000;
-  const std::string said = failure<Error>([&] { plan_deformation(request_of(options), headers_of(kGrid)); });
-  EXPECT_TRUE(says(said, {"of memory are needed, --memory allows"}));
-}
-
-TEST(DeformRequest, RefusesWhatDoesNotGoTogether) {
-  const auto refused = [](const std::function<void(DeformOptions&)>& change) {
-    DeformOptions options = options_of({"identity"});
-    change(options);
-    return failure<UsageError>([&] { request_of(options); });
-  };
-  EXPECT_EQ(refused([](DeformOptions&) {}), "");
-  EXPECT_TRUE(says(refused([](DeformOptions& o) { o.labels = "l.mha"; }), {"--labels is for --scenario"}));
-  EXPECT_TRUE(says(refused([](DeformOptions& o) { o.scenario = "s.json"; }), {"--scenario makes the field"}));
-  EXPECT_TRUE(says(refused([](DeformOptions& o) { o.field.forward = {}; }), {"no field; give -f FIELD"}));
-  EXPECT_TRUE(
-      says(refused([](DeformOptions& o) { o.grid = "nowhere/grid.mha"; }), {"expected same, fit, or a volume"}));
-  EXPECT_TRUE(says(refused([](DeformOptions& o) { o.output = "series"; }), {"can only be derived from DICOM"}));
-  EXPECT_TRUE(says(refused([](DeformOptions& o) { o.maps.inverse = "i.dcm"; }), {"is a DICOM registration"}));
-  EXPECT_TRUE(says(refused([](DeformOptions& o) { o.with = {"a.mha"}; }), {"names no output"}));
-  EXPECT_TRUE(says(refused([](DeformOptions& o) { o.points = {"a.csv=b.stl"}; }), {"--points writes the form"}));
-  const auto pull = [&](const std::function<void(DeformOptions&)>& change) {
-    return refused([&](DeformOptions& o) {
-      o.field = {{}, "nowhere/pull.mha", {}};
-      change(o);
-    });
-  };
-  EXPECT_EQ(pull([](DeformOptions&) {}), "");
-  EXPECT_TRUE(says(pull([](DeformOptions& o) { o.preserve_mass = true; }), {"--preserve mass needs"}));
-  EXPECT_TRUE(says(pull([](DeformOptions& o) { o.field.cell_size = 2; }), {"--pull-field has its own grid"}));
-  EXPECT_TRUE(says(pull([](DeformOptions& o) { o.points = {"a.csv=b.csv"}; }), {"--points needs a forward field"}));
-  EXPECT_TRUE(says(pull([](DeformOptions& o) { o.maps.folds = "f.mha"; }), {"--jacobian and --folds"}));
-  EXPECT_TRUE(says(pull([](DeformOptions& o) { o.grid = "fit"; }), {"--grid fit needs to know"}));
-}
 
 TEST(DeformField, IsMadeOfAParsedFormula) {
   DeformOptions options = options_of({"twist:angle=10"});
@@ -187,6 +41,9 @@ TEST(DeformField, NotesAGridThatHadToBeStraightened) {
   const Stages run(options, sheared);
   ASSERT_EQ(run.field.origin.notes.size(), 1u);
   EXPECT_TRUE(says(run.field.origin.notes[0], {"INPUT's slices lean"}));
+  DeformOptions onto_another = options;
+  onto_another.grid = "fit";
+  EXPECT_TRUE(Stages(onto_another, sheared).field.origin.notes.empty()) << "another grid was asked for";
 }
 
 TEST(DeformPass, TheIdentityReturnsInput) {
@@ -208,6 +65,79 @@ TEST(DeformPass, ATranslationLeavesBackgroundBehind) {
   EXPECT_EQ(output[0], -1000);
   EXPECT_EQ(output[1], input[0]);
   EXPECT_EQ(result.report.uncovered, 6u * 5);
+}
+
+TEST(DeformPass, AGridThatFitsHoldsInputWhereverItGoes) {
+  DeformOptions options = options_of({"translate:by=-2/0/0vox"});  // refuses what does not cover INPUT: this does
+  options.grid = "fit";
+  Stages run(options);
+  const DeformResult result = run.resampled();
+  ASSERT_EQ(result.output.geometry().size, glm::i64vec3(9, 6, 5));
+  EXPECT_EQ(result.output.geometry().origin, kGrid.origin - glm::dvec3(4, 0, 0));
+  const auto output = voxels_of(result.output), input = ramp(kGrid).voxels;
+  for (std::size_t row = 0; row < 6 * 5; ++row) {
+    for (std::size_t i = 0; i < 9; ++i)
+      EXPECT_EQ(output[9 * row + i], i < 7 ? input[7 * row + i] : -1000) << row << ", " << i;
+  }
+}
+
+TEST(DeformPass, ValuesBetweenVoxelsAreThoseOfTheInterpolationAndNeverOfPadding) {
+  DeformOptions options = options_of({"translate:by=1/0/0"});  // half a voxel
+  options.outside = Outside::background;
+  options.interpolation = Interpolation::nearest;
+  Stages nearest(options);
+  const auto input = ramp(kGrid).voxels;
+  const auto chosen = voxels_of(nearest.resampled().output);
+  EXPECT_TRUE(chosen[1] == input[0] || chosen[1] == input[1]);
+  options.interpolation = Interpolation::linear;
+  Stages linear(options);
+  const DeformResult mixed = linear.resampled();
+  EXPECT_EQ(voxels_of(mixed.output)[3], -282) << "of -286 and -279, a half to even";
+  EXPECT_EQ(mixed.report.padded, 0u);
+  auto padded = std::make_shared<InputVolume>();
+  padded->volume = AnyVolume(ramp(kGrid));
+  padded->dicom.emplace().padding = PaddingRange{double(input[2]), double(input[2])};
+  linear.inputs.input = padded;
+  linear.field.room = AnyVolume(kGrid, VoxelType::i16);
+  const DeformResult kept = linear.resampled();
+  EXPECT_EQ(kept.report.padded, 2u) << "on both sides of it";
+  EXPECT_TRUE(voxels_of(kept.output)[3] == input[2] || voxels_of(kept.output)[3] == input[3]);
+}
+
+TEST(DeformPass, TheReportCountsVoxelsOfInputAloneAndEachVolumeHasItsOwnWay) {
+  DeformOptions options = options_of({"translate:by=1/0/0"});
+  options.outside = Outside::rest;
+  options.with = {"far.mha=a.mha:background=5", "near.mha=b.mha:nearest", "far.mha=c.mha:own"};
+  Stages run(options);
+  Geometry far_away = kGrid;
+  far_away.origin.x += 1000;
+  for (const AlongVolumeChoice& choice : run.request.volumes) {
+    const Geometry& grid = choice.input.path == "near.mha" ? kGrid : far_away;
+    run.headers.along.volumes.push_back(AlongHeader{choice, {}, {}, grid});
+    AlongInput& input = run.inputs.along.emplace_back();
+    input.sources.emplace_back(ramp(grid));
+    input.background = -7;
+  }
+  const DeformResult result = run.resampled();
+  EXPECT_EQ(result.report.covered, 6u * 6 * 5) << "all but the plane that is left";
+  ASSERT_EQ(result.along.size(), 3u);
+  EXPECT_EQ(voxels_of(result.along[0].outputs[0]), std::vector<std::int16_t>(7 * 6 * 5, 5)) << "it lies elsewhere";
+  const auto input = ramp(kGrid).voxels, near_by = voxels_of(result.along[1].outputs[0]);
+  EXPECT_TRUE(near_by[3] == input[2] || near_by[3] == input[3]) << near_by[3];
+  EXPECT_EQ(result.along[2].outputs[0].geometry(), far_away);
+  EXPECT_EQ(voxels_of(result.along[2].outputs[0]), input) << "the field rests there";
+}
+
+TEST(DeformPass, AVolumeOnItsOwnGridIsRefusedWhereTheFieldDoesNotReachWhateverOutputGrowsTo) {
+  DeformOptions options = options_of({"translate:by=1/0/0"});
+  options.grid = "fit";
+  options.with = {"far.mha=a.mha:own"};
+  Stages run(options);
+  Geometry far_away = kGrid;
+  far_away.origin.x += 1000;
+  run.headers.along.volumes.push_back(AlongHeader{run.request.volumes[0], {}, {}, far_away});
+  run.inputs.along.emplace_back().sources.emplace_back(ramp(far_away));
+  EXPECT_TRUE(says(failure<InputError>([&] { run.resampled(); }), {"does not reach over"}));
 }
 
 TEST(DeformPass, MassIsKeptWithoutAFileOfItsMaps) {
@@ -254,6 +184,82 @@ TEST(DeformReport, TellsOfTheRunInTheWordsOfTheCommandLine) {
   EXPECT_EQ(timed["quality"]["verdict"].is_string(), true);
   EXPECT_EQ(timed["memory"]["planned_bytes"], run.plan.bytes);
   EXPECT_EQ(timed["stages"].size(), 5u) << timed["stages"];
+}
+
+TEST(DeformReport, TellsOfTheGridAndTheBackgroundThatWereUsed) {
+  DeformOptions options = options_of({"translate:by=4/0/0"});
+  options.grid = "fit";
+  options.background = -5;
+  Stages run(options);
+  run.inputs.background = -5;
+  const DeformResult result = run.resampled();
+  const DeformRun done{run.request, run.plan, run.headers, run.inputs, run.field, result};
+  const json told = sidecar(done, {});
+  EXPECT_EQ(told["options"]["grid"], "fit");
+  EXPECT_EQ(told["options"]["background"], -5);
+  EXPECT_EQ(told["output"]["geometry"]["size"], json({9, 6, 5}));
+  EXPECT_EQ(told["report"]["uncovered"], 2 * 6 * 5);
+  EXPECT_TRUE(says(summary(done), {"9 x 6 x 5 voxels, 77.78 % covered"}));
+}
+
+TEST(DeformReport, SumsTheTimesOfTheStages) {
+  DeformOptions options = options_of({"identity"});
+  options.report = "nowhere/report.json";
+  Stages run(options);
+  DeformResult result = run.resampled();
+  run.headers.seconds = 1, run.inputs.seconds = 2, run.field.seconds = 4;
+  result.seconds = 8, result.check_seconds = 16;
+  DeformWritten written;
+  written.seconds = 32;
+  const json told = report_with_times({run.request, run.plan, run.headers, run.inputs, run.field, result}, written);
+  const auto seconds = [&](const char* stage) { return told["stages"][stage]["seconds"].get<double>(); };
+  EXPECT_EQ(seconds("read"), 3);
+  EXPECT_EQ(seconds("field"), 4);
+  EXPECT_EQ(seconds("resample"), 8);
+  EXPECT_EQ(seconds("check"), 16);
+  EXPECT_EQ(seconds("write"), 32);
+  EXPECT_EQ(told["total_seconds"], 63);
+}
+
+TEST(DeformReport, LosesNoNoteOfAnyStage) {
+  const DeformOptions options = options_of({"identity"});
+  Stages run(options);
+  run.headers.input.series.emplace();
+  run.headers.input.series->warnings = {"of the series"};
+  run.headers.input.series->set_aside = {{"odd.dcm", "is odd", {}}};
+  run.headers.notes = {"of a header", "of a grid"};
+  run.headers.along.notes = {"of a volume"};
+  run.field.warnings = {"of a simulation"};
+  run.field.origin.notes = {"of a field"};
+  DeformResult result = run.resampled();
+  const DeformRun done{run.request, run.plan, run.headers, run.inputs, run.field, result};
+  const std::vector<std::string> expected = {"warning: of the series",
+                                             "warning: of a simulation",
+                                             "note: of a header",
+                                             "note: of a grid",
+                                             "note: of a field",
+                                             "note: of a volume",
+                                             "note: 1 file of the series is no slice of it; OUTPUT.json names them"};
+  EXPECT_EQ(notes_of(done, {}), expected);
+  result.report.conflicts = 3, result.report.clamped = 2, result.report.inverted = 1, result.report.degenerate = 4;
+  EXPECT_TRUE(says(summary(done), {"the field folds: 1 tetrahedra inverted, 4 flat", "2 values clamped",
+                                   "3 voxels outside the field were moved into"}));
+}
+
+TEST(DeformReport, ADerivedSeriesSaysWhatBecameOfIt) {
+  DeformOptions options = options_of({"identity"});
+  const DeformOptions twist = options_of({"twist:angle=10"});
+  const Stages still(options), turned(twist);
+  EXPECT_FALSE(derivation_of(still.request, still.inputs, still.field).deformed);
+  const DicomDerivation of_twist = derivation_of(turned.request, turned.inputs, turned.field);
+  EXPECT_TRUE(of_twist.deformed);
+  EXPECT_EQ(of_twist.background_hu, -1000);
+  EXPECT_EQ(of_twist.field_sha256, turned.field.sha256);
+  options.interpolation = Interpolation::cubic;
+  options.outside = Outside::rest;
+  const Stages cubic(options);
+  const DicomDerivation of_input = input_derivation_of(cubic.request, cubic.inputs, cubic.field);
+  EXPECT_EQ(of_input.parameters, "interpolation=cubic outside=rest background=-1000.0 direction=forward");
 }
 
 TEST(DeformReport, OfADeidentifiedRunNamesNoInputAndNoFile) {

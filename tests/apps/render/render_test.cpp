@@ -102,6 +102,30 @@ TEST_F(RenderProgram, ASequenceTakesAFieldForEachPicture) {
   EXPECT_EQ(read_text(scratch_ / "s.0002.png"), picture("b.png", "ct.nii -f t20.mha"));
 }
 
+TEST_F(RenderProgram, WhatAFieldDoesNotSayIsNotedOfASequenceAndOfALatticeToo) {
+  for (const std::string angle : {"10", "20"}) {
+    const std::string name = "t" + angle + ".mha";
+    ASSERT_EQ(run("field twist:angle=" + angle + " --like ct.nii --cell-size 16 --quiet -o " + name).status, 0);
+    std::string text = read_text(scratch_ / name);
+    const std::size_t key = text.find("tetwarp_direction");
+    ASSERT_NE(key, std::string::npos);
+    text.erase(key, text.find('\n', key) + 1 - key);
+    write_file(scratch_ / name, text);
+  }
+  const auto expect_noted = [&](const std::string& arguments, const std::vector<std::string>& files) {
+    const Outcome made = run("render ct.nii --size 96,96 --overwrite " + arguments);
+    EXPECT_EQ(made.status, 0) << made.err;
+    for (const std::string& file : files) {
+      const std::string note = "tetwarp: note: " + file + " does not say its direction: taken as forward\n";
+      EXPECT_TRUE(says(made.err, {note})) << arguments;
+      EXPECT_EQ(made.err.find(note), made.err.rfind(note)) << "once: " << made.err;
+    }
+  };
+  expect_noted("-o p.png -f t10.mha", {"t10.mha"});
+  expect_noted("-o s.png --sequence t10.mha t20.mha t10.mha", {"t10.mha", "t20.mha"});
+  expect_noted("-o l.png --view axial --overlay lattice=t20.mha", {"t20.mha"});
+}
+
 TEST_F(RenderProgram, OverlaysOfAFieldAreThoseOfTheMapsThatDeformWrites) {
   const std::string field = " -f twist:angle=30 -f translate:by=60/0/0 --cell-size 4 --outside background";
   ASSERT_EQ(

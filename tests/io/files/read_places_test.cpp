@@ -79,6 +79,32 @@ TEST(ReadPlaces, KnowByItsNameWhatIsNotThere) {
   EXPECT_TRUE(places.touched_by(tree / "data/series/../later.nii"));
   EXPECT_TRUE(places.touched_by(tree / "data"));
   EXPECT_FALSE(places.touched_by(tree / "far/later.nii"));
+  places.add(tree / "absent/deep/later.nii");
+  EXPECT_TRUE(places.touched_by(tree / "absent")) << "nothing of it is there";
+  EXPECT_FALSE(places.touched_by(tree / "absent/deep/later.nii.json"));
+}
+
+TEST(ReadPlaces, CountTheFoldersAroundALinkAndAroundWhatItLeadsTo) {
+  const Tree tree;
+  write_file(tree / "far/deep/volume.nii", "volume");
+  fs::create_symlink(tree / "far/deep/volume.nii", tree / "data/series/link.nii");
+  ReadPlaces places;
+  places.add(tree / "data/series/link.nii");
+  for (const char* around : {"data/series", "data", "far/deep", "far"})
+    EXPECT_EQ(places.touched_by(tree / around), tree / "data/series/link.nii") << around;
+  EXPECT_FALSE(places.touched_by(tree / "data/in.nii"));
+}
+
+TEST(ReadPlaces, TellFoldersOfOneNameApart) {
+  const Tree tree;
+  ReadPlaces places;
+  for (const char* folder : {"one/deep", "two/deep"}) {
+    fs::create_directories(tree / folder);
+    write_file(tree / folder / "in.nii", "in");
+    places.add(tree / folder / "in.nii");
+  }
+  EXPECT_EQ(places.touched_by(tree / "one"), tree / "one/deep/in.nii");
+  EXPECT_EQ(places.touched_by(tree / "two"), tree / "two/deep/in.nii");
 }
 
 }  // namespace
