@@ -4,8 +4,9 @@
 
 # Runs the tests of the build that examples/quickstart.sh or .ci/run made, whichever was built last.
 #
-#   tests/run.sh [CTEST ARGUMENTS]
+#   tests/run.sh [--peers] [CTEST ARGUMENTS]
 #
+# --peers: the Python package is tested beside large libraries, too (tests/python_environment.sh).
 # TETWARP_PRESET names another build (CMakePresets.json): cpu on a machine with nvcc, or asan.
 # Real series: $TETWARP_TEST_DATA names a folder of unpacked sets; without it, sets packed in ../shared/data are unpacked
 # into the build folder. Tests that find no data skip and say so.
@@ -26,5 +27,12 @@ if [ -z "${TETWARP_TEST_DATA:-}" ] && [ -f "$packed/unpack.sh" ]; then
     touch "$TETWARP_TEST_DATA/complete"
   fi
 fi
+peers=()
+if [ "${1:-}" = --peers ]; then
+  peers=(--peers)
+  shift
+fi
+# A module with sanitizers in it is loaded by no ordinary Python.
+[ "$preset" = asan ] || "$source_dir/tests/python_environment.sh" "$preset" "${peers[@]}"
 cd "$source_dir"
 exec ctest --preset "$preset" "$@"

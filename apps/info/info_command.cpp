@@ -3,11 +3,13 @@
 
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <variant>
 
 #include "apps/cli/console.h"
 #include "apps/cli/input.h"
 #include "apps/cli/output.h"
 #include "apps/fields/read_field.h"
+#include "apps/info/info_command.h"
 #include "apps/info/info_dicom.h"
 #include "io/dicom_dose.h"
 #include "io/field_file.h"
@@ -173,40 +175,42 @@ void print_file(const json& document) {
   }
 }
 
-}  // namespace
+/// What INPUT is: a folder or file of DICOM images, or any other file, described.
+using Described = std::variant<DicomScan, json>;
 
-int run_info(const InfoOptions& options) {
+Described look_at(const InfoOptions& options) {
   refuse_pipes(options.input.path);
   const FieldSource source = parse_field_file(options.input.path.string(), options.common.nifti_frame);
   const bool field = is_field_file(source), mesh = !field && is_mesh_file(source.path);
   const std::filesystem::path& path = field ? source.path : options.input.path;
-  const bool transform = !field && !mesh && is_transform_file(path) && !is_folder(path);
-  const bool other = field || mesh || transform || has_image_suffix(path), dose = !other && is_dicom_dose(path),
-             dicom = !other && !dose;
-  const auto print_json = [](const json& document) {
+  if (field) return describe_field(source);
+  if (mesh) return describe_mesh(source);
+  if (is_transform_file(path) && !is_folder(path)) return describe_transform(path);
+  if (has_image_suffix(path)) return describe_image(path, options.common.nifti_frame);
+  if (is_dicom_dose(path)) return describe_dose(path);
+  Stage stage(options.common, "scan");
+  return scan_dicom(path, options.input.single, stage.control());
+}
+
+json document_of(const DicomScan& scan, const InfoOptions& options) { return describe(scan, options.input); }
+const json& document_of(const json& document, const InfoOptions&) { return document; }
+
+}  // namespace
+
+nlohmann::json info_document(const InfoOptions& options) {
+  return std::visit([&](const auto& what) -> json { return document_of(what, options); }, look_at(options));
+}
+
+int run_info(const InfoOptions& options) {
+  const Described described = look_at(options);
+  if (options.json) {
+    const json document = std::visit([&](const auto& what) -> json { return document_of(what, options); }, described);
     std::printf("%s\n", document.dump(2, ' ', false, json::error_handler_t::replace).c_str());
-  };
-  if (dicom) {
-    const DicomScan scan = [&] {
-      Stage stage(options.common, "scan");
-      return scan_dicom(path, options.input.single, stage.control());
-    }();
-    if (options.json)
-      print_json(describe(scan, options.input));
-    else
-      print(scan, options.input);
-    return 0;
+  } else if (const auto* scan = std::get_if<DicomScan>(&described)) {
+    print(*scan, options.input);
+  } else {
+    print_file(std::get<json>(described));
   }
-  const json document = [&] {
-    if (mesh) return describe_mesh(source);
-    if (transform) return describe_transform(path);
-    if (dose) return describe_dose(path);
-    return field ? describe_field(source) : describe_image(path, options.common.nifti_frame);
-  }();
-  if (options.json)
-    print_json(document);
-  else
-    print_file(document);
   return 0;
 }
 

@@ -35,6 +35,7 @@ BELOW = {
     "itkbridge": {"deform", "backend"},
     "io": {"deform", "itkbridge"},
     "apps": {"deform", "backend", "itkbridge", "io"},
+    "python": {"deform", "backend", "io", "apps"},
     "bench": {"deform", "backend", "itkbridge", "io"},
     "examples": {"deform", "backend", "itkbridge", "io"},
 }
@@ -48,6 +49,7 @@ OPEN_ROOMS = ("deform/contours/", "deform/fields/", "deform/phantom/", "deform/r
 FRIENDS = {
     ("apps", "deform/core/five_tetrahedra.h"): "an estimate of memory counts the bytes of a snapped vertex",
     ("cuda", "deform/"): "a backend runs the arithmetic of deform/core and checks what the CPU checks",
+    ("python", "apps/"): "Python reads, refuses and reports by the code of the program, so that both say the same",
     ("bench", "deform/core/"): "the paper's algorithms are measured on the same arithmetic",
     ("bench", "cuda/runtime/"): "the paper's kernels own memory and check errors as ours do",
     ("io", "itkbridge/"): "ITK reads transforms; no header of io/ shows it",

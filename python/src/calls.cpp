@@ -1,0 +1,132 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include "python/src/calls.h"
+
+#include <pthread.h>
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <exception>
+#include <mutex>
+#include <thread>
+
+namespace tetwarp::python {
+
+namespace {
+
+using namespace std::chrono_literals;
+
+std::atomic<bool> forked = false;
+
+unsigned long main_thread = 0;  // of Python, as PyThread_get_thread_ident has it
+
+/// Passes progress to a callable of Python, at most 20 times a second, and keeps what it raises.
+class Progress {
+ public:
+  Progress(const nb::object& callable, std::stop_source& stop) : callable_(callable), stop_(stop) {}
+
+  /// Called without the interpreter's lock.
+  void operator()(double share) {
+    const auto now = std::chrono::steady_clock::now();
+    if (error_ || (now - last_ < 50ms && share < 1)) return;
+    last_ = now;
+    const nb::gil_scoped_acquire lock;
+    try {
+      callable_(share);
+    } catch (...) {
+      error_ = std::current_exception();
+      stop_.request_stop();
+    }
+  }
+  const std::exception_ptr& error() const { return error_; }
+
+ private:
+  const nb::object& callable_;
+  std::stop_source& stop_;
+  std::chrono::steady_clock::time_point last_{};
+  std::exception_ptr error_;
+};
+
+/// Work that another thread does.
+class Watched {
+ public:
+  Watched(const std::function<void(const Control&)>& work, const Control& control)
+      : thread_([this, &work, &control] {
+          try {
+            work(control);
+          } catch (...) {
+            error_ = std::current_exception();
+          }
+          const std::lock_guard lock(mutex_);
+          done_ = true;
+          changed_.notify_all();
+        }) {}
+  /// Whether the work ended within this time.
+  bool wait_for(std::chrono::milliseconds time) {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, time, [&] { return done_; });
+  }
+  /// Waits for the end. @throws what the work threw
+  void join() {
+    thread_.join();
+    if (error_) std::rethrow_exception(error_);
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool done_ = false;
+  std::exception_ptr error_;
+  std::thread thread_;  // the last member: it uses all others
+};
+
+/// @return whether a signal's handler raised an exception, which is set then
+bool signal_raised() {
+  const nb::gil_scoped_acquire lock;
+  return PyErr_CheckSignals() != 0;
+}
+
+}  // namespace
+
+void run_call(const CallOptions& options, bool small, const std::function<void(const Control&)>& work) {
+  std::stop_source stop;
+  Progress progress(options.progress, stop);
+  Control control{.stop = stop.get_token(), .stream = reinterpret_cast<void*>(options.stream)};
+  if (!options.progress.is_none()) control.progress = std::ref(progress);
+  const bool watches = !small && !is_forked() && PyThread_get_thread_ident() == main_thread;
+  bool interrupted = false;
+  {
+    const nb::gil_scoped_release released;
+    try {
+      if (watches) {
+        Watched watched(work, control);
+        while (!watched.wait_for(20ms)) {
+          if (interrupted || !signal_raised()) continue;
+          interrupted = true;
+          stop.request_stop();
+        }
+        watched.join();
+      } else {
+        work(control);
+      }
+    } catch (...) {
+      if (!interrupted && !progress.error()) throw;
+    }
+  }
+  if (interrupted) throw nb::python_error();
+  if (progress.error()) std::rethrow_exception(progress.error());
+}
+
+int threads_of(int wished) { return is_forked() ? 1 : wished; }
+
+bool is_forked() { return forked; }
+
+void watch_process() {
+  main_thread = nb::cast<unsigned long>(nb::module_::import_("threading").attr("main_thread")().attr("ident"));
+  static const int once = pthread_atfork(nullptr, nullptr, [] { forked = true; });
+  static_cast<void>(once);
+}
+
+}  // namespace tetwarp::python

@@ -1,0 +1,41 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+
+#include "deform/resampler.h"
+
+namespace tetwarp::python {
+
+namespace nb = nanobind;
+
+/// What every call of Python that may take long is given.
+struct CallOptions {
+  nb::object progress;        ///< None, or a callable that gets the share that is done, 0 to 1
+  std::uintptr_t stream = 0;  ///< a cudaStream_t as a number; 0: the default stream
+};
+
+/// Does work without the interpreter's lock, so that other threads of Python go on.
+///
+/// Called from the main thread of Python, it looks for signals every 20 ms while the work is done by another thread: an
+/// exception of a signal's handler, such as KeyboardInterrupt, stops the work and is raised. Work that is small is done
+/// at once by the calling thread, as it is in any thread but the main one, which gets no signals. An exception of
+/// `progress` stops the work too, and is raised.
+/// @param small  whether the work surely takes less than 20 ms
+/// @throws what the work throws
+void run_call(const CallOptions& options, bool small, const std::function<void(const Control&)>& work);
+
+/// Number of threads for work: what is wished, or one in a process that was forked, whose parent's threads are gone.
+int threads_of(int wished);
+/// Whether this process was forked from one that had loaded this module.
+bool is_forked();
+/// Remembers the main thread, and watches forks from now on. To be called once, when the module is loaded.
+void watch_process();
+
+}  // namespace tetwarp::python

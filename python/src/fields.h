@@ -1,0 +1,35 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+#include <optional>
+#include <vector>
+
+#include "deform/vertex_field.h"
+#include "python/src/arrays.h"
+
+namespace tetwarp::python {
+
+/// Arrays of a mesh: rest [n, 3] of double, displacement [n, 3] of float, tetrahedra [m, 4] of uint32, and
+/// lattice_vertex [n] of int64 or None.
+struct MeshArrays {
+  ConstArray rest, displacement, tetrahedra;
+  std::optional<ConstArray> lattice_vertex;
+};
+
+/// A copy of a mesh's arrays.
+/// @throws InputError for arrays of another shape or type, or vertex numbers that are too large
+TetrahedralMesh mesh_of(const MeshArrays& arrays);
+
+/// A forward field as a tuple of Python: lattice (a Grid or None), displacement (an array or None), mesh (None or a
+/// tuple of four arrays), replaced cells (an array or None).
+nb::tuple as_tuple(VertexField&& field);
+
+/// A forward field in host memory, copied from what `as_tuple` describes.
+VertexField field_of(const std::optional<Geometry>& lattice, const std::optional<ConstArray>& displacement,
+                     const std::optional<MeshArrays>& mesh, const std::optional<ConstArray>& replaced);
+
+}  // namespace tetwarp::python

@@ -1,0 +1,84 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+
+#include <optional>
+
+#include "backend/factories.h"
+#include "deform/simulate/scenario_run.h"
+#include "io/scenario_file.h"
+#include "python/src/calls.h"
+#include "python/src/fields.h"
+#include "python/src/module.h"
+
+namespace tetwarp::python {
+
+namespace {
+
+using namespace simulate;
+
+/// A scenario that is played on a volume, frame by frame.
+class BoundRun {
+ public:
+  BoundRun(const std::filesystem::path& scenario, const ConstArray& ct, const Geometry& grid,
+           const std::optional<ConstArray>& labels, const std::string& backend, int device, int threads,
+           const CallOptions& options) {
+    const ConstVolumeView voxels = voxels_of(ct, grid, "the volume");
+    require(voxels.memory == Memory::host, "the volume lies on a device; a simulation examines it in host memory");
+    std::optional<ConstVolumeView> labelled;
+    if (labels) labelled = voxels_of(*labels, grid, "the labels");
+    const BackendChoice choice = backend_choice(backend);
+    run_call(options, false, [&](const Control& control) {
+      const BackendKind kind = is_forked() ? BackendKind::cpu : chosen(choice);
+      scenario_ = read_scenario(scenario);
+      patient_ = examine(voxels, labelled ? &*labelled : nullptr, scenario_.cell_size, scenario_.body_above_hu,
+                         {.stop = control.stop});
+      run_.emplace(scenario_, patient_,
+                   [kind, this, device, limits = Limits{.threads = threads_of(threads)}](const Model& model) {
+                     return make_simulation(kind, scenario_.method, model, device, limits);
+                   });
+      backend_ = name_of(kind);
+    });
+  }
+
+  int frames() const { return run_->frames(); }
+  bool is_done() const { return run_->is_done(); }
+  std::string backend() const { return backend_; }
+  std::string phase_name(std::size_t phase) const { return scenario_.phases.at(phase).name; }
+
+  /// Number, phase, whether it ends its phase, steps, motion in mm, residual, whether it settled.
+  nb::tuple next(const CallOptions& options) {
+    Frame frame;
+    run_call(options, false, [&](const Control& control) { frame = run_->next(control); });
+    return nb::make_tuple(frame.number, frame.phase, frame.ends_phase, frame.settled.steps, frame.settled.motion_mm,
+                          frame.settled.residual, frame.settled.reached);
+  }
+  nb::tuple field() const { return as_tuple(run_->field()); }
+
+ private:
+  Scenario scenario_;
+  Patient patient_;
+  std::optional<ScenarioRun> run_;
+  std::string backend_;
+};
+
+}  // namespace
+
+void add_simulation(nb::module_& core) {
+  nb::class_<BoundRun>(core, "Run")
+      .def(nb::init<const std::filesystem::path&, const ConstArray&, const Geometry&, const std::optional<ConstArray>&,
+                    const std::string&, int, int, const CallOptions&>(),
+           nb::arg("scenario"), nb::arg("ct"), nb::arg("grid"), nb::arg("labels").none(), nb::arg("backend"),
+           nb::arg("device"), nb::arg("threads"), nb::arg("options"))
+      .def_prop_ro("frames", &BoundRun::frames)
+      .def_prop_ro("is_done", &BoundRun::is_done)
+      .def_prop_ro("backend", &BoundRun::backend)
+      .def("phase_name", &BoundRun::phase_name, nb::arg("phase"))
+      .def("next", &BoundRun::next, nb::arg("options"))
+      .def("field", &BoundRun::field);
+}
+
+}  // namespace tetwarp::python

@@ -1,0 +1,31 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A program as users write it, for a checker of types; it is not run."""
+
+import numpy as np
+import tetwarp as tw
+
+ct: tw.Volume = tw.read("study")
+grid: tw.Geometry = ct.geometry
+size: tuple[int, int, int] = grid.size
+field: tw.VertexField = tw.fields.elastic(grid, amplitude=8, spacing=40, seed=7, cell_size=4)
+both: tw.VertexField = tw.compose(field, tw.fields.wave(grid, amplitude="2vox", wavelength=60))
+labels = tw.Volume(np.zeros(grid.shape, np.uint8), grid)
+done: tw.Deformed = tw.deform(
+    ct, both, maps=("coverage", "jacobian"), with_=[tw.Along(labels, interpolation="vote")], points=[[0, 0, 0]]
+)
+inverted: int = done.report.inverted
+jacobian: tw.Volume = done.maps["jacobian"]
+inverse: tw.PullField = tw.invert(field, grid)
+again: tw.Deformed = tw.deform(ct, pull_field=inverse, outside="background")
+moved, inside = tw.move_points(np.zeros((4, 3)), field, grid)
+warp = tw.Resampler(grid, backend="cpu", threads=2, memory="2G")
+warp.set_field(field, outside="rest")
+volumes, maps, report = warp.resample([ct, tw.Target(labels, "nearest")], maps=["folds"])
+for frame in tw.simulate("scenario.json", ct):
+    step: tw.VertexField = frame.field
+picture = tw.render(done.volume, transfer="ct-bone", angle=30)
+tw.write(done.volume, "out.nii.gz", compress=1)
+tw.write_field(field, "field.mha")
+status: int = tw.batch("manifest.csv", "out", resume=True)

@@ -1,0 +1,97 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Tetwarp: deforms medical volumes, exactly and with the same bits everywhere.
+
+    import tetwarp as tw
+
+    ct = tw.read("study_folder")
+    field = tw.fields.elastic(ct.geometry, amplitude=8, spacing=40, seed=7, cell_size=4)
+    done = tw.deform(ct, field, maps=("coverage", "jacobian"))
+    tw.write(done.volume, "deformed.nii.gz")
+
+Arrays are indexed [k, j, i], i fastest in memory; places are LPS millimetres.
+"""
+
+from __future__ import annotations
+
+import os as _os
+from typing import Any as _Any
+
+# DCMTK reads its dictionary where this says, unless the user says otherwise.
+_dictionary = _os.path.join(_os.path.dirname(__file__), "dicom.dic")
+if "DCMDICTPATH" not in _os.environ and _os.path.exists(_dictionary):
+    _os.environ["DCMDICTPATH"] = _dictionary
+
+from . import _core, adapters, fields  # noqa: E402
+from .batching import batch  # noqa: E402
+from .deforming import Along, Deformed, compose, deform, forward_of, invert, jacobian, move_points  # noqa: E402
+from .errors import Cancelled, DeviceError, Error, InputError, NotCompiled  # noqa: E402
+from .field import PullField, TetrahedralMesh, VertexField  # noqa: E402
+from .files import info, phantom, read, read_field, write, write_field  # noqa: E402
+from .geometry import Geometry  # noqa: E402
+from .rendering import render  # noqa: E402
+from .report import Report  # noqa: E402
+from .resampler import PullResampler, Resampler, Target  # noqa: E402
+from .simulation import Frame, Run, simulate  # noqa: E402
+from .volume import Volume  # noqa: E402
+
+__version__: str = _core.version()
+
+__all__ = [
+    "Along",
+    "Cancelled",
+    "Deformed",
+    "DeviceError",
+    "Error",
+    "Frame",
+    "Geometry",
+    "InputError",
+    "NotCompiled",
+    "PullField",
+    "PullResampler",
+    "Report",
+    "Resampler",
+    "Run",
+    "Target",
+    "TetrahedralMesh",
+    "VertexField",
+    "Volume",
+    "adapters",
+    "batch",
+    "compose",
+    "deform",
+    "features",
+    "fields",
+    "forward_of",
+    "info",
+    "invert",
+    "jacobian",
+    "move_points",
+    "phantom",
+    "read",
+    "read_field",
+    "render",
+    "simulate",
+    "write",
+    "write_field",
+]
+
+
+def features() -> dict[str, _Any]:
+    """What is built in, and what this machine can use.
+
+    Returns
+    -------
+    dict
+        "version", "commit"; "cuda", "dicom", "jpeg2000", "itk_transforms", "vtk_xml" as bool; "devices" as a list of
+        texts.
+
+    Examples
+    --------
+    >>> features()["dicom"]
+    True
+    """
+    built: dict[str, _Any] = dict(_core.compiled())
+    devices = [_core.describe_device(number) for number in range(_core.device_count())] if built["cuda"] else []
+    return {"version": _core.version(), "commit": _core.commit(), **built, "devices": devices}

@@ -1,0 +1,41 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Images of SimpleITK: [k, j, i], LPS, i fastest, as ours. Reading copies nothing; a result is copied into an image."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import SimpleITK as sitk  # noqa: N813
+
+from ..geometry import Geometry
+from ..volume import Volume
+
+
+def volume_of(image: Any, name: str) -> tuple[Volume, Any]:
+    if image.GetDimension() != 3:
+        raise TypeError(f"{name} has {image.GetDimension()} dimensions; expected 3")
+    direction = [image.GetDirection()[3 * row : 3 * row + 3] for row in range(3)]
+    geometry = Geometry(image.GetSize(), image.GetSpacing(), image.GetOrigin(), direction)
+    volume = Volume(sitk.GetArrayViewFromImage(image), geometry)
+    return volume, Back(image)
+
+
+class Back:
+    """Takes a volume to a SimpleITK image with the keys of the one that was given."""
+
+    copies = 1
+
+    def __init__(self, image: Any) -> None:
+        self._image = image
+
+    def __call__(self, volume: Volume) -> Any:
+        image = sitk.GetImageFromArray(volume.array, isVector=volume.array.ndim == 4)
+        geometry = volume.geometry
+        image.SetSpacing(geometry.spacing)
+        image.SetOrigin(geometry.origin)
+        image.SetDirection(geometry.direction.ravel().tolist())
+        for key in self._image.GetMetaDataKeys():
+            image.SetMetaData(key, self._image.GetMetaData(key))
+        return image
