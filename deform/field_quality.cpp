@@ -136,7 +136,7 @@ FieldQuality quality_of(const TetrahedralMesh& mesh, const Limits& limits, const
   double volume = 0;
   for (const glm::u32vec4& t : mesh.tetrahedra) volume += std::abs(glm::determinant(rest_edges(t)));
   tbb::enumerable_thread_specific<FieldQuality> found;
-  tbb::task_arena arena = cpu::make_arena(limits);
+  cpu::Arena arena(limits);
   const std::size_t count = mesh.tetrahedra.size();
   cpu::WorkProgress progress(control, static_cast<std::int64_t>(count));
   arena.execute([&] {
@@ -184,7 +184,7 @@ FieldQuality measure_quality(const VertexField& field, const Limits& limits, con
   require(std::min({size.x, size.y, size.z}) >= 2, "a field of " + to_string(size) + " vertices has no cell");
   const dmat3 from_lattice = point_from_index(field.lattice).linear;
   tbb::enumerable_thread_specific<FieldQuality> found;
-  tbb::task_arena arena = cpu::make_arena(limits);
+  cpu::Arena arena(limits);
   cpu::WorkProgress progress(control, size.z - 1);
   arena.execute([&] {
     tbb::parallel_for(std::int64_t{0}, size.z - 1, [&](std::int64_t z) {

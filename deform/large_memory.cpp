@@ -23,7 +23,7 @@ void prepare_memory([[maybe_unused]] std::span<std::byte> untouched, [[maybe_unu
     const std::size_t begin = n * kPartBytes;
     ::madvise(pages.data() + begin, std::min(kPartBytes, pages.size() - begin), MADV_POPULATE_WRITE);
   };
-  tbb::task_arena arena = cpu::make_arena({.threads = threads});
+  cpu::Arena arena({.threads = threads});
   arena.execute([&] { tbb::parallel_for(std::size_t{0}, (pages.size() + kPartBytes - 1) / kPartBytes, touch); });
 #endif
 }

@@ -5,7 +5,6 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -174,7 +173,7 @@ PointMover::PointMover(const Geometry& output, const FieldView& field, const Lim
     map_ = std::make_unique<LatticeMap>(output, field);
     return;
   }
-  tbb::task_arena arena = cpu::make_arena(limits);
+  cpu::Arena arena(limits);
   arena.execute([&] { map_ = std::make_unique<MeshMap>(output, field, control); });
 }
 
@@ -186,7 +185,7 @@ std::vector<PointStatus> PointMover::move(std::span<glm::dvec3> points, const Co
   std::vector<PointStatus> status(points.size());
   cpu::WorkProgress progress(control, static_cast<std::int64_t>(points.size()));
   cpu::FirstRefusal refusal;
-  tbb::task_arena arena = cpu::make_arena(limits_);
+  cpu::Arena arena(limits_);
   arena.execute([&] {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size(), 4096), [&](const auto& range) {
       refusal.attempt(static_cast<std::int64_t>(range.begin()), [&] {

@@ -62,7 +62,7 @@ class Distances {
   /// Calls `distances(k, tell)` for each slice of begin <= k < end, in parallel; it calls `tell(distance)`.
   template <class Find>
   void find(std::int64_t begin, std::int64_t end, const Limits& limits, const Control& control, Find&& distances) {
-    tbb::task_arena arena = cpu::make_arena(limits);
+    cpu::Arena arena(limits);
     cpu::WorkProgress progress(control, end - begin);
     arena.execute([&] {
       tbb::parallel_for(begin, end, [&](std::int64_t k) {

@@ -46,7 +46,7 @@ struct TileVoxels {
 /// of other lattices, are claimed.
 class LatticeResampler final : public ForwardResampler {
  public:
-  LatticeResampler(Geometry output, const Limits& limits) : ForwardResampler(output), arena_(make_arena(limits)) {}
+  LatticeResampler(Geometry output, const Limits& limits) : ForwardResampler(output), arena_(limits) {}
 
   void set_field(const FieldView& field, const FieldOptions& options, const Control& control) override {
     ready_ = false;
@@ -313,7 +313,7 @@ class LatticeResampler final : public ForwardResampler {
     }
   }
 
-  mutable tbb::task_arena arena_;
+  mutable Arena arena_;
   LatticeIndex lattice_;
   Coverage coverage_;
   bool ready_ = false, wants_range_ = true;

@@ -28,7 +28,7 @@ struct TileVoxels {
 /// Deforms volumes tile by tile: rasterises the tetrahedra, then samples the rows.
 class MeshResampler final : public ForwardResampler {
  public:
-  MeshResampler(const Geometry& output, const Limits& limits) : ForwardResampler(output), arena_(make_arena(limits)) {}
+  MeshResampler(const Geometry& output, const Limits& limits) : ForwardResampler(output), arena_(limits) {}
 
   void set_field(const FieldView& field, const FieldOptions& options, const Control& control) override;
   Region source_region(const Geometry& source, Region region) const override;
@@ -39,7 +39,7 @@ class MeshResampler final : public ForwardResampler {
   void require_reach(const Control& control);
   void map_row(const Row& row, std::size_t first, const MapWriter& maps, TileVoxels& tile, Report& report) const;
 
-  tbb::task_arena arena_;
+  Arena arena_;
   /// The deformed mesh; and the undeformed one, where it matters which voxels lie outside.
   SnappedMesh mesh_, rest_;
   MeshRaster raster_, rest_raster_;

@@ -72,7 +72,7 @@ struct RowScratch {
 /// Deforms volumes row by row: computes where each voxel comes from, then samples there.
 class RowPullResampler final : public PullResampler {
  public:
-  RowPullResampler(Geometry output, const Limits& limits) : PullResampler(output), arena_(make_arena(limits)) {}
+  RowPullResampler(Geometry output, const Limits& limits) : PullResampler(output), arena_(limits) {}
 
   void set_field(const PullFieldView& field, const Control& control) override {
     ready_ = false;
@@ -144,7 +144,7 @@ class RowPullResampler final : public PullResampler {
     refusal.rethrow();
   }
 
-  mutable tbb::task_arena arena_;
+  mutable Arena arena_;
   PullFrame frame_;
   Geometry grid_;
   bool ready_ = false;

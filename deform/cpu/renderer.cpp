@@ -101,7 +101,7 @@ void CpuRenderer::cast_all(const RayScene<V>& scene, const ViewPlane& plane, std
 void CpuRenderer::render(const ViewPlane& plane, std::span<std::uint8_t> rgb, const Control& control) {
   require_ready(volume_, style_, plane, rgb.size());
   const RayFrame frame = ray_frame(geometry_, style_, plane);
-  tbb::task_arena arena = cpu::make_arena(limits_);
+  cpu::Arena arena(limits_);
   arena.execute([&] {
     prepare(frame, step_mm(geometry_, style_, plane));
     const RayTables tables{ranges_.data(),           distances_.data(), ray_blocks(geometry_), table_.data(),

@@ -6,7 +6,6 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <atomic>
@@ -14,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "deform/cpu/arena.h"
 #include "deform/resampler.h"
 
 namespace tetwarp::cpu {
@@ -68,20 +68,13 @@ class FinishedLayers {
   std::vector<std::atomic<std::int64_t>> rows_left_;
 };
 
-/// An arena with as many threads as the limits allow; 0: all that this process may use.
-inline tbb::task_arena make_arena(const Limits& limits) {
-  require(limits.threads >= 0, "threads is " + std::to_string(limits.threads) + ", expected 0 (all) or more");
-  const int most = tbb::info::default_concurrency();
-  return tbb::task_arena(limits.threads > 0 ? std::min(limits.threads, most) : most);
-}
-
 /// Runs `work(box, scratch)` for all tiles of the region, each thread with a Scratch of its own, and adds up the
 /// reports. Rows of tiles are begun in rising order of k, so that slices are finished early.
 ///
 /// @param finished  gets layers of tiles that are done
 /// @param at_once   whether a row of tiles along i is one piece of work: then the box is the row
 template <class Scratch, class AtOnce, class Work>
-Report for_each_tile(tbb::task_arena& arena, const Region& region, const Control& control, const PartSink& finished,
+Report for_each_tile(Arena& arena, const Region& region, const Control& control, const PartSink& finished,
                      AtOnce&& at_once, Work&& work) {
   Report total;
   if (is_empty(region)) return total;
@@ -116,7 +109,7 @@ Report for_each_tile(tbb::task_arena& arena, const Region& region, const Control
 
 /// Runs `work(box, scratch)` for all tiles of the region, each tile a piece of work, and adds up the reports.
 template <class Scratch, class Work>
-Report for_each_tile(tbb::task_arena& arena, const Region& region, const Control& control, const PartSink& finished,
+Report for_each_tile(Arena& arena, const Region& region, const Control& control, const PartSink& finished,
                      Work&& work) {
   const auto never = [](const Region&) { return false; };
   return for_each_tile<Scratch>(arena, region, control, finished, never, std::forward<Work>(work));

@@ -3,7 +3,6 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -26,7 +25,7 @@ void for_each_vertex(VertexField& field, const Limits& limits, const Control& co
   const glm::i64vec3 size = field.lattice.size;
   cpu::WorkProgress progress(control, size.z);
   cpu::FirstRefusal refusal;
-  tbb::task_arena arena = cpu::make_arena(limits);
+  cpu::Arena arena(limits);
   const auto change_slice = [&](std::int64_t z) {
     for (std::int64_t y = 0; y < size.y; ++y) {
       glm::vec3* row = field.displacement.data() + (z * size.y + y) * size.x;
@@ -58,7 +57,7 @@ void compose(TetrahedralMesh& mesh, const PointMap& next, const Limits& limits, 
   constexpr std::size_t kGrain = 4096;
   cpu::WorkProgress progress(control, static_cast<std::int64_t>(mesh.rest.size()));
   cpu::FirstRefusal refusal;
-  tbb::task_arena arena = cpu::make_arena(limits);
+  cpu::Arena arena(limits);
   const auto move_on = [&](const tbb::blocked_range<std::size_t>& range) {
     for (std::size_t n = range.begin(); n < range.end(); ++n) {
       const glm::dvec3 displacement(mesh.displacement[n]);

@@ -79,7 +79,7 @@ std::vector<BlockRange> block_ranges(const ConstVolumeView& volume, Limits limit
   const glm::ivec3 size = volume.geometry->size, blocks = ray_blocks(*volume.geometry);
   const auto width = static_cast<std::size_t>(blocks.x);
   std::vector<BlockRange> ranges(width * static_cast<std::size_t>(blocks.y) * static_cast<std::size_t>(blocks.z));
-  tbb::task_arena arena = cpu::make_arena(limits);
+  cpu::Arena arena(limits);
   dispatch(volume.type, [&](auto voxel) {
     const auto* const voxels = reinterpret_cast<const decltype(voxel)*>(volume.voxels);
     arena.execute([&] {

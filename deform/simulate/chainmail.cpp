@@ -16,8 +16,7 @@ namespace {
 
 class CpuChainmail final : public Simulation {
  public:
-  CpuChainmail(const Model& model, const Limits& limits)
-      : plan_(model), arena_(cpu::make_arena(limits)), active_(plan_.blocks.size()) {
+  CpuChainmail(const Model& model, const Limits& limits) : plan_(model), arena_(limits), active_(plan_.blocks.size()) {
     const auto count = static_cast<std::size_t>(plan_.nodes());
     for (std::vector<Units>* state : {&now_, &before_, &shown_, &upper_, &lower_}) state->resize(count);
     ranges_.resize(count);
@@ -184,7 +183,7 @@ class CpuChainmail final : public Simulation {
   }
 
   ChainPlan plan_;
-  tbb::task_arena arena_;
+  cpu::Arena arena_;
   std::vector<std::size_t> of_colour_[2];          ///< numbers of the blocks of each colour
   std::vector<std::atomic<std::uint8_t>> active_;  ///< by block: whether it has to be tightened again
   std::vector<PlacedNode> placed_;

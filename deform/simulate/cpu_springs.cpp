@@ -26,7 +26,7 @@ class CpuSprings final : public SpringEngine {
         is_factored_(
             options.solver == MassSpringOptions::Solver::cholesky ||
             (options.solver == MassSpringOptions::Solver::automatic && model.nodes() <= kMostNodesForCholesky)),
-        arena_(cpu::make_arena(limits)),
+        arena_(limits),
         roles_(model.nodes(), SpringRole::kept),
         inverse_(model.nodes()),
         partial_(grid_.blocks()),
@@ -337,7 +337,7 @@ class CpuSprings final : public SpringEngine {
   SpringGrid grid_;
   RestPlace rest_;
   bool is_factored_;
-  tbb::task_arena arena_;
+  cpu::Arena arena_;
   std::vector<SpringRole> roles_;
   std::unique_ptr<LaplacianFactor> factor_;
   PaddedVectors<double> u_, trial_;                   ///< displacement
