@@ -74,7 +74,8 @@ void release_interrupts() {
 
 void hold_closed_streams() {
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
-    // The lowest number that is free is given, and this is it. Opened the wrong way round it is of no use to anybody.
+    // The system gives a new file the lowest free number, which is this one. A standard input that can only be written,
+    // and outputs that can only be read, fail as closed ones do.
     if (::fcntl(stream, F_GETFD) < 0) ::open("/dev/null", stream == STDIN_FILENO ? O_WRONLY : O_RDONLY);
   }
 }

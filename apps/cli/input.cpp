@@ -21,7 +21,7 @@ namespace {
 
 constexpr double kAirHu = -1024;
 
-/// Those of a UID, or all.
+/// A line for each volume of a scan, for messages. @param uid  only those of the series with this UID; none: all
 std::string list_series(const DicomScan& scan, const std::optional<std::string>& uid = {}) {
   std::string list;
   for (std::size_t n = 0; n < scan.series.size(); ++n) {
@@ -66,7 +66,8 @@ const DicomSeries& choose_series(const DicomScan& scan, const InputOptions& opti
                    list_series(scan));
 }
 
-/// What was set aside of the whole series of a volume: the first volume of its series has it.
+/// The files that were set aside of the series of a volume. Where a series has several volumes, the first of them has
+/// the list.
 const std::vector<LeftOutFile>& set_aside_with(const DicomScan& scan, const DicomSeries& volume) {
   const auto index = static_cast<std::size_t>(&volume - scan.series.data());
   std::size_t first = 0;

@@ -15,7 +15,8 @@ namespace tetwarp::apps {
 
 namespace {
 
-/// Threads, jobs, devices, pictures: more than any machine has, and few enough to be counted in 32 bits.
+/// The largest numbers that options take for threads, jobs, devices and pictures: more than any machine has, and few
+/// enough to be counted in 32 bits.
 constexpr std::int64_t kMostThreads = 65536, kMostDevices = 65535;
 /// A lattice with larger cells has one cell an axis, of whatever volume.
 constexpr std::int64_t kMostCellSize = 65536;
@@ -41,7 +42,8 @@ CLI::Validator check(const std::string& expected, std::function<bool(const std::
           ""};
 }
 
-/// Of K, M, G, T, with B or not (a thousand each), and of Ki, Mi, Gi, Ti (1024 each); no letters: 1.
+/// How many bytes a unit of sizes stands for: K, M, G, T, with B or not (powers of 1000), Ki, Mi, Gi, Ti (powers of
+/// 1024); no letters: 1. @return nothing for other letters
 std::optional<double> factor_of(std::string unit) {
   for (char& c : unit) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
   if (unit.ends_with('B')) unit.pop_back();
@@ -51,7 +53,7 @@ std::optional<double> factor_of(std::string unit) {
   return std::pow(unit.size() > 1 ? 1024.0 : 1000.0, static_cast<double>(power + 1));
 }
 
-/// @return nothing for what is no size, is none of a machine's, or less than a byte
+/// A size such as "2.5G" in bytes. @return nothing for what is no size, is more than a machine has, or less than a byte
 std::optional<std::uint64_t> bytes_of(const std::string& text) {
   constexpr double kMost = 0x1p62;
   const std::size_t end = std::min(text.find_first_not_of("0123456789."), text.size()),

@@ -37,14 +37,14 @@ std::size_t count_beyond(const std::vector<MovedContour>& contours, const Geomet
   }));
 }
 
-/// mm3; 0 where the contours are no solid.
+/// Volume inside contours in mm3; 0 where they are no solid.
 double volume_of(std::span<const Contour> contours, const Geometry& grid) try {
   return ContourStack(contours, grid).volume();
 } catch (const InputError&) {
   return 0;
 }
 
-/// Takes closed contours that stay in slices. @return whether they do
+/// Moves closed contours whose slices stay slices. @return whether they do; else nothing is taken
 bool take_moved(MovedRoi& roi, const ContourMover& mover, std::span<const Contour> contours, const Geometry& source,
                 const Geometry& output, Outside outside) {
   auto moved = mover.move_within_slices(contours, source, outside);
@@ -58,7 +58,7 @@ bool take_moved(MovedRoi& roi, const ContourMover& mover, std::span<const Contou
   return true;
 }
 
-/// Takes contours that are no closed ones, where it is known where they go.
+/// Moves contours that are not closed, those of which it is known where they go.
 void take_open(MovedRoi& roi, std::span<const Contour> contours, const PointMover* mover, const Geometry& output,
                Outside outside) {
   std::vector<MovedContour> moved;

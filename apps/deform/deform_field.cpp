@@ -36,7 +36,7 @@ DeformField field_of(const DeformRequest& request, const DeformPlan& plan, const
   return taken(read_field(std::get<ForwardChoice>(choice), inputs.grid(), threads, control));
 }
 
-/// Where INPUT's own grid is none that an output can have.
+/// The note for a run whose INPUT has a grid that no output can have.
 std::string note_of_straightening(const Geometry& input, const Geometry& output) {
   return std::string("INPUT's slices ") + (is_sheared(input) ? "lean" : "lie at uneven distances") +
          ": the output has a straight, even grid of " + to_string(output.size) +

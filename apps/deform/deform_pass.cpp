@@ -65,7 +65,7 @@ class Pass {
   std::vector<MovedStructures> move_structures(Resampler& resampler);
   FieldCheck check(ForwardResampler& resampler, const Control& progress) const;
 
-  /// What --grid fit adds lies beyond the lattice; that this reaches over INPUT is known.
+  /// What becomes of voxels beyond the lattice. What --grid fit adds to INPUT's grid lies there and is not refused.
   Outside outside() const {
     const bool grown = is_fitting_grid(options_.grid) && options_.outside == Outside::refuse;
     return grown ? Outside::background : options_.outside;
@@ -145,7 +145,7 @@ void Pass::resample_onto_own_grids(DeformResult& result) {
   }
 }
 
-/// @param resampler  holds the field
+/// Moves the structure sets that go along. @param resampler  has the field
 std::vector<MovedStructures> Pass::move_structures(Resampler& resampler) {
   if (headers_.structures.empty()) return {};
   std::optional<PointMover> mover;

@@ -39,7 +39,7 @@ void check_input(const DeformOptions& options, bool series, const InputHeader& i
   }
 }
 
-/// @param grid  of the output
+/// Memory of the field. @param volume  grid of INPUT  @param grid  of the output
 std::uint64_t bytes_of_field(const DeformRequest& request, const Geometry& volume, const Geometry& grid) {
   if (const auto* simulated = std::get_if<Simulated>(&request.field))
     return simulation_bytes(simulated->scenario, volume, !simulated->choice.labels.empty());
@@ -48,7 +48,7 @@ std::uint64_t bytes_of_field(const DeformRequest& request, const Geometry& volum
   return field_bytes(std::get<ForwardChoice>(field), volume);
 }
 
-/// @param grid  of the output
+/// Memory that a run takes at most. @param grid  of the output
 std::uint64_t memory_bytes(const DeformRequest& request, const DeformHeaders& headers, const Geometry& grid) {
   const InputHeader& input = headers.input;
   const auto voxels = static_cast<std::uint64_t>(voxel_count(input.geometry)),

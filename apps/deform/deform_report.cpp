@@ -16,7 +16,7 @@ namespace {
 
 using nlohmann::json;
 
-/// What was chosen of the series.
+/// What options chose for the derived series.
 json form_json(const DicomForm& form) {
   json document = {{"transfer_syntax", name_of(form.encoding)},
                    {"keep_frame_of_reference", form.keep_frame_of_reference}};
@@ -66,7 +66,8 @@ std::vector<std::string> set_aside(const DeformHeaders& headers) {
   return files;
 }
 
-/// Of a de-identified series nothing that names its source or can be looked up.
+/// What the sidecar says of INPUT. Where the output is de-identified it has nothing that names INPUT or can be looked
+/// up.
 json input_json(const DeformRun& run, const DeformWritten& written) {
   const DeformOptions& options = run.request.options;
   json document = json::object();

@@ -30,7 +30,8 @@ void check_choice_of_field(const DeformOptions& options) {
   }
 }
 
-/// @throws UsageError for a cell size, InputError for a page that is no scenario or does not go with --write-field
+/// Reads the scenario of --scenario. @throws UsageError for a cell size, InputError for a page that is no scenario or
+/// does not go with --write-field
 Simulated read_simulated(const DeformOptions& options, ScenarioChoice choice) {
   if (options.field.cell_size) throw UsageError("--cell-size is for formulas and transforms, a scenario says its own");
   simulate::Scenario scenario = read_scenario(choice.file);
@@ -46,7 +47,7 @@ void check_pull(const DeformOptions& options) {
   if (!options.points.empty()) throw UsageError("--points needs a forward field, --pull-field has no forward map");
 }
 
-/// What goes with a DICOM series, and what with a file.
+/// Refuses options that do not go with the kind of OUTPUT: a DICOM series, or a file.
 void check_output(const DeformOptions& options, bool series) {
   if (series && has_image_suffix(options.input.path)) {
     throw UsageError("a DICOM series can only be derived from DICOM, not from " + options.input.path.string() +

@@ -16,8 +16,9 @@ namespace tetwarp::apps {
 
 namespace {
 
+/// A map that options can ask for.
 struct MapKind {
-  const char* name;  ///< of the option, and the key of sidecars
+  const char* name;  ///< name of the option, and key of sidecars
   MapPlace place;
   std::filesystem::path MapOptions::*file;
 };

@@ -47,7 +47,7 @@ ParsedFile parse_file(const std::string& text, NiftiFrame frame) {
   return file;
 }
 
-/// Of a text that is no formula. A transform takes no options.
+/// The field that a text names which is no formula: a file. A transform takes no options.
 NamedField named_file(const std::string& text, ParsedFile file) {
   if (file.source.options.empty() && is_transform_file(file.source.path))
     return {text, NamedTransform{std::move(file.source.path)}};

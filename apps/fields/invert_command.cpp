@@ -80,7 +80,8 @@ std::uint64_t count_beyond(const VolumeView& samples, const Geometry& grid) {
   return beyond;
 }
 
-/// A forward field needs a place at every vertex. @throws InputError where there is none
+/// Refuses an inverse without a place at some vertex, where a forward field is to be written.
+/// @throws InputError where there is none
 void check_forward(const InvertOptions& options, const Inversion& result, Invertible& field) {
   require(result.report.uncovered == 0, std::to_string(result.report.uncovered) + " voxels of " +
                                             options.like.path.string() + " have no place by the inverse of " +
@@ -147,7 +148,7 @@ class UnwrittenSeries {
   DerivedSeriesWriter writer_;
 };
 
-/// Slab by slab into the file. @param series  what a registration object is beside, if the output is one
+/// Inverts slab by slab into the file. @param series  what a registration object is beside, if the output is one
 Inversion invert(const InvertOptions& options, const Geometry& like, Invertible& field,
                  const std::filesystem::path& output, const UnwrittenSeries* series, OutputSet& outputs) {
   const Control stop{.stop = interrupt_token()};

@@ -15,13 +15,14 @@ namespace {
 
 TransformFile read(const NamedTransform& transform) { return read_transform_file(transform.file, interrupt_token()); }
 
-/// @param volume  for which the field is meant
+/// How a file is read that is meant for a volume. @param volume  grid of that volume
 FieldSource for_volume(FieldSource file, const Geometry& volume) {
   file.grid = volume;
   return file;
 }
 
-/// What a header has to say, and what is taken to hold where it says nothing of its direction.
+/// Notes what the header of a field's file says for people. @param assumed  the direction that is taken where it says
+/// none
 void note_header(const FieldFileHeader& header, const std::string& path, const char* assumed, FieldOrigin& origin) {
   if (!header.direction) origin.notes.push_back(path + " does not say its direction: taken as " + assumed);
   for (const std::string& note : header.notes) origin.notes.push_back(path + ": " + note);
@@ -83,7 +84,7 @@ class Composition {
     else
       compose(result_.field, piecewise_affine(next), limits_, control_);
   }
-  /// The first of all, as a ForwardChoice has it.
+  /// Takes a mesh, which ForwardChoice lets stand first alone.
   void add(const NamedField&, const NamedMesh& named) {
     MeshFile file = read_mesh_file(named.file);
     const std::string path = named.file.path.string();
@@ -107,7 +108,7 @@ class Composition {
   bool is_first_ = true;
 };
 
-/// @throws InputError for a mesh, which is a forward field
+/// The file of a pull field. @throws InputError for a mesh, which is a forward field
 const FieldSource& pull_source(const PullChoice& choice) {
   const FieldSource& source = *source_of(choice.field);
   require(!std::holds_alternative<NamedMesh>(choice.field.what),

@@ -17,8 +17,8 @@ namespace {
 constexpr int kDisplacementVector = 1006;
 constexpr glm::dvec3 kLpsFromRas(-1, -1, 1);
 
-/// By the type of a NiftyReg file (reg-lib/cpu/_reg_maths.h, NREG_TRANS_TYPE, which intent_p1 holds): the name of a
-/// type that cannot be read, null for one that can.
+/// What is refused, by the type of a NiftyReg file (reg-lib/cpu/_reg_maths.h, NREG_TRANS_TYPE, which intent_p1 holds):
+/// the name of a type that cannot be read, null for one that can.
 constexpr std::array<const char*, 7> kNiftyRegRefused = {nullptr,
                                                          nullptr,
                                                          "a cubic B-spline control point grid",

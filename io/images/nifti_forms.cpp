@@ -9,7 +9,8 @@
 namespace tetwarp {
 namespace {
 
-/// Rows of three. Values are float32, as in niftilib; sums and products are taken in double where it takes them so.
+/// A 3 x 3 matrix by rows. Values are float32, as in niftilib; sums and products are in double where niftilib has them
+/// in double.
 using Matrix = std::array<std::array<float, 3>, 3>;
 
 Matrix transposed(const Matrix& m) {
@@ -79,7 +80,7 @@ Matrix nearest_rotation(Matrix x) {
   return x;
 }
 
-/// Each row by its length.
+/// The matrix with each row divided by its length.
 Matrix normalised(Matrix m) {
   for (auto& [a, b, c] : m) {
     const auto by = static_cast<float>(1 / std::sqrt(static_cast<double>(a * a + b * b + c * c)));

@@ -78,7 +78,7 @@ struct PlanePart {
     for (std::size_t i = 0; i < count; ++i)
       std::memcpy(bytes.data() + had + i * width, from + i * components * width, width);
   }
-  /// A view where the values lie side by side, else a copy in `scratch`.
+  /// The bytes of some values: a view where the values lie side by side, else a copy in `scratch`.
   std::span<const std::byte> bytes(std::size_t begin, std::size_t count, std::vector<std::byte>& scratch) const {
     const std::size_t width = size_bytes(slices.type);
     if (slices.components == 1) return {slices.voxels + begin * width, count * width};

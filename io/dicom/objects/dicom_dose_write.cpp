@@ -61,8 +61,9 @@ void put_frames(DcmItem& target, const Geometry& grid) {
     throw Error("cannot set attribute " + tag_name(DCM_FrameIncrementPointer));
 }
 
-/// RT Dose (PS3.3 C.8.8.3): what stays true, and the transform. Plans and records stand for how the dose came to be;
-/// structure sets, histograms and the place of normalization are those of the old anatomy.
+/// Puts the attributes of the RT Dose module (PS3.3 C.8.8.3) that stay true, and the transform. Plans and records say
+/// how the dose came to be and are kept; structure sets, histograms and the place of normalization are those of the old
+/// anatomy.
 void put_dose(DcmItem& target, DcmDataset& source, bool deformed) {
   for (const DcmTagKey& tag : {DCM_DoseUnits, DCM_DoseType, DCM_DoseSummationType, DCM_TissueHeterogeneityCorrection,
                                DCM_ReferencedRTPlanSequence, DCM_ReferencedTreatmentRecordSequence, DCM_DoseComment,

@@ -35,7 +35,7 @@ struct ReferencedImage {
   std::string sop_class, sop_instance, frames;
 };
 
-/// Each file once, in the order of its first slice; those without a usable UID cannot be named.
+/// The files of the source, each once, in the order of its first slice; those without a usable UID cannot be named.
 std::vector<ReferencedImage> source_images(const DerivedSeries& series) {
   std::vector<ReferencedImage> images;
   for (std::size_t n = 0; n < series.sop_instance.size(); ++n) {
@@ -91,13 +91,14 @@ void put_content_date(DcmItem& item, DcmDataset& source) {
   put(item, DCM_ContentTime, time);
 }
 
-/// A number beside that of the derived series, which is the source's + 1000.
+/// The Series Number of the registration object: 1000 more than that of the derived series, which is 1000 more than the
+/// source's.
 std::string registration_number(const std::string& derived) {
   const long long number = std::atoll(derived.c_str());
   return std::to_string(number > INT32_MAX - 1000 ? number : number + 1000);
 }
 
-/// All before the vectors but the SOP Instance UID.
+/// The attributes of the registration object that stand before the vectors, without SOP Instance UID.
 DcmDataset head_of(const Registration& of, const std::vector<ReferencedImage>& derived) {
   DcmDataset head, &source = *of.source.slices.front();
   carry_patient_and_study(head, source);
@@ -128,7 +129,7 @@ void put_identity(DcmItem& item, const DcmTagKey& sequence) {
   put(matrix, DCM_FrameOfReferenceTransformationMatrixType, "RIGID");
 }
 
-/// The item of the derived series: its own points.
+/// The registration item of the derived series, whose points stay where they are.
 DcmDataset registered_item(const Registration& of, const std::vector<ReferencedImage>& derived) {
   DcmDataset item;
   put_references(item, DCM_ReferencedImageSequence, derived);
@@ -139,7 +140,7 @@ DcmDataset registered_item(const Registration& of, const std::vector<ReferencedI
   return item;
 }
 
-/// What stands before the grid, and behind it.
+/// The registration item of the source: the attributes that stand before the grid of vectors, and behind it.
 DcmDataset source_item(const Registration& of) {
   DcmDataset item;
   put_references(item, DCM_ReferencedImageSequence, source_images(of.series));
