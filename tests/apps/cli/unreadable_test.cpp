@@ -10,6 +10,7 @@
 #include <cstring>
 
 #include "tests/apps/batch/batch_case.h"
+#include "tests/support/transforms.h"
 
 namespace {
 
@@ -93,7 +94,8 @@ TEST_F(Unreadable, APipeThatAFileNamesIsRefusedToo) {
              "(Transform \"TranslationTransform\")\n(NumberOfParameters 3)\n(TransformParameters 1 0 0)\n"
              "(InitialTransformParametersFileName \"p.txt\")\n(HowToCombineTransforms \"Compose\")\n"
              "(FixedImageDimension 3)\n(MovingImageDimension 3)\n");
-  EXPECT_EQ(at_once("deform ct.nrrd -o o.nii --pull-field elastix.txt").status, 4);
+  const int refused = program_reads_transforms(scratch_.path()) ? 4 : 1;
+  EXPECT_EQ(at_once("deform ct.nrrd -o o.nii --pull-field elastix.txt").status, refused);
   ASSERT_EQ(::mkfifo((scratch_ / "series/pipe").c_str(), 0600), 0);
   EXPECT_EQ(at_once("info series").status, 0) << "a folder is read without it";
 }
