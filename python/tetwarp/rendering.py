@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from . import _calls, _core, adapters
+from . import _arrays, _calls, _core, adapters
 from .errors import InputError
 
 
@@ -71,14 +71,15 @@ def render(
         None if step is None else _calls.number(step, "step"),
         colour,
     )
+    stream = _arrays.stream_of(given.array, None)
     picture = _core.render(
-        given.array,
+        _arrays.exchanged(given.array, stream),
         given.geometry._grid,
         str(transfer),
         view,
         backend,
         _calls.whole(device, "device", 0, 1024),
         _calls.threads(threads),
-        _calls.options(progress, "render"),
+        _calls.options(progress, "render", stream),
     )
     return np.asarray(picture, dtype=np.uint8)
