@@ -15,10 +15,12 @@ for program in doxygen sphinx-build; do
 done
 mkdir -p "$out/source" "$out/doxygen"
 
-# Pages as they are, and a page of the interface for each library.
+# Pages as they are, a page of the interface for each library, and one of the Python package.
 rm -rf "$out/source"
 cp -pR docs "$out/source"
+mkdir -p "$out/source/api"
 mapfile -t headers < <(python3 docs/api_pages.py "$out/source/api")
+python3 docs/python_pages.py "$out/source/api/python.md"
 
 doxygen=0
 { cat docs/Doxyfile; printf 'INPUT = %s\n' "${headers[*]}"; } | doxygen - 2> "$out/doxygen.log" || doxygen=$?
