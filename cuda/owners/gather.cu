@@ -29,11 +29,11 @@ __global__ void queue_kernel(GatherTask task, int walk, Sink sink) {
   const glm::ivec3 size = task.size();
   unsigned covered = 0;
   for (unsigned n = blockIdx.x * kThreads + threadIdx.x; n < count; n += gridDim.x * kThreads) {
-    const Gather::Entry entry = task.queue[n];
-    const glm::ivec3 in(entry.voxel % size.x, entry.voxel / size.x % size.y, entry.voxel / (size.x * size.y));
+    const Gather::QueuedVoxel queued = task.queue[n];
+    const glm::ivec3 in(queued.voxel % size.x, queued.voxel / size.x % size.y, queued.voxel / (size.x * size.y));
     const glm::ivec3 voxel = in + task.begin();
     const GatherPoint point = task.point(voxel);
-    glm::vec3 place(entry.x, entry.y, entry.z);
+    glm::vec3 place(queued.x, queued.y, queued.z);
     bool settled = false;
     for (int n_try = 0; n_try < kQueueTries && !settled; ++n_try) {
       if (!is_finite(place)) place = task.lattice.place(glm::vec3(voxel));

@@ -87,7 +87,7 @@ class Gather {
   }
 
   /// A voxel that the march could not settle.
-  struct Entry {
+  struct QueuedVoxel {
     int voxel;      ///< offset in the box
     float x, y, z;  ///< where it may come from: undeformed place, cells; perhaps not finite
   };
@@ -109,7 +109,7 @@ class Gather {
   IntervalRaster intervals_;
   DeviceBuffer<glm::vec3> seeds_;
   DeviceBuffer<std::uint8_t> resting_;
-  DeviceBuffer<Entry> queue_;
+  DeviceBuffer<QueuedVoxel> queue_;
   DeviceBuffer<unsigned> numbered_, claimed_;
   PinnedBuffer<unsigned> several_in_slice_;
   PinnedBuffer<Counters> found_;

@@ -42,12 +42,12 @@ struct GatherTask {
   StepLattice lattice;
   NudgeTurns nudge;
   SlabBox box;
-  BitRows single;          ///< a bit for each voxel of the box that has one owner: from `Coverage`
-  std::uint32_t* several;  ///< a bit for each that is to be claimed, laid out as `single`; the walk adds to them
-  MovingBlocks moving;     ///< from `step_pass_kernel`
-  std::uint8_t* resting;   ///< of each march, whether all that it needs is at rest; i fastest: from `rest_kernel`
-  glm::ivec3 seeds;        ///< how many on each axis
-  Gather::Entry* queue;    ///< room for kQueueSize; the march writes, `queue_kernel` reads
+  BitRows single;              ///< a bit for each voxel of the box that has one owner: from `Coverage`
+  std::uint32_t* several;      ///< a bit for each that is to be claimed, laid out as `single`; the walk adds to them
+  MovingBlocks moving;         ///< from `step_pass_kernel`
+  std::uint8_t* resting;       ///< of each march, whether all that it needs is at rest; i fastest: from `rest_kernel`
+  glm::ivec3 seeds;            ///< how many on each axis
+  Gather::QueuedVoxel* queue;  ///< room for kQueueSize; the march writes, `queue_kernel` reads
   Gather::Counters* counters;
 
   __device__ glm::ivec3 begin() const { return glm::ivec3(box.begin); }

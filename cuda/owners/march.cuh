@@ -150,14 +150,14 @@ struct March {
 /// Finds and samples the voxels of a box that have one owner: copied where a march is at rest, else predicted one from
 /// another along k. Grid (blocks along i, along j, marches along k), block (32 lanes, kWarps warps), a march a warp.
 ///
-///     shared memory: 64 entries of 16 bytes a warp, `WarpQueue`
+///     shared memory: 64 voxels of 16 bytes a warp, `WarpQueue`
 ///
 /// @param task   `counters->covered` is added to; voxels that are left go to the queue
 /// @param seeds  from `seed_kernel`  @param sink  gets every voxel but those that are left
 template <class Sink, bool kCoarse>
 __global__ void __launch_bounds__(32 * kWarps, Sink::kIsWide ? kBlocks - 1 : kBlocks)
     march_kernel(const __grid_constant__ GatherTask task, const glm::vec3* seeds, const __grid_constant__ Sink sink) {
-  __shared__ typename WarpQueue<Sink, kCoarse>::Entry entries[kWarps][64];
+  __shared__ typename WarpQueue<Sink, kCoarse>::WaitingVoxel voxels[kWarps][64];
   const int lane = static_cast<int>(threadIdx.x), warp = static_cast<int>(threadIdx.y);
   const glm::ivec3 size = task.size(),
                    march_at(blockIdx.x * kAcross + warp % kAcross, blockIdx.y * (kWarps / kAcross) + warp / kAcross,
@@ -173,7 +173,7 @@ __global__ void __launch_bounds__(32 * kWarps, Sink::kIsWide ? kBlocks - 1 : kBl
     const glm::ivec3 seed(inside.x / kSeedTile, inside.y / kSeedTile, blockIdx.z);
     const glm::vec3 place = seeds[(seed.z * task.seeds.y + seed.y) * task.seeds.x + seed.x] +
                             glm::vec3(begin - task.seeded(seed)) * task.lattice.voxel;
-    found = march.predict(place, {entries[warp], first, lane});
+    found = march.predict(place, {voxels[warp], first, lane});
   }
   // Not `warp_add`, that is CUB's sum: 40 to 90 instructions less and the same registers, but 8 bytes more of stack in
   // the kernel for volumes of any types.

@@ -17,7 +17,7 @@ constexpr int kWarpTries = 3;  ///< of a voxel within its warp, after the first
 /// @tparam kCoarse  cells are large, so float is often unsure: ask exact integers before another tetrahedron is tried
 template <class Sink, bool kCoarse>
 struct WarpQueue {
-  struct Entry {
+  struct WaitingVoxel {
     int voxel;      ///< packed by `word_of`
     float x, y, z;  ///< where it may come from: undeformed place, cells
   };
@@ -38,14 +38,14 @@ struct WarpQueue {
     return of_lane(Lane::get(word)) + glm::ivec3(0, 0, Slice::get(word));
   }
 
-  Entry* entries;    ///< 64, in shared memory
-  glm::ivec3 first;  ///< voxel of lane 0 at the beginning of the march
+  WaitingVoxel* voxels;  ///< 64, in shared memory
+  glm::ivec3 first;      ///< voxel of lane 0 at the beginning of the march
   int lane, waiting = 0;
 
   /// Called by the whole warp.
   /// @param votes  lanes that have one  @param word  from `word_of`  @param place  undeformed, cells
   __device__ void push(unsigned votes, int word, const glm::vec3& place) {
-    if ((votes >> lane & 1) != 0) entries[waiting + rank_among(votes, lane)] = {word, place.x, place.y, place.z};
+    if ((votes >> lane & 1) != 0) voxels[waiting + rank_among(votes, lane)] = {word, place.x, place.y, place.z};
     waiting += __popc(votes);
     __syncwarp();
   }
@@ -59,17 +59,17 @@ struct WarpQueue {
     int word = 0;
     glm::vec3 place(0);
     if (lane < taken) {
-      const Entry entry = entries[waiting + lane];
-      const glm::ivec3 in = first + voxel_of(entry.voxel), at = in + task.begin();
-      const FloatTetrahedron t = tetrahedron_at(task.lattice, {entry.x, entry.y, entry.z});
+      const WaitingVoxel queued = voxels[waiting + lane];
+      const glm::ivec3 in = first + voxel_of(queued.voxel), at = in + task.begin();
+      const FloatTetrahedron t = tetrahedron_at(task.lattice, {queued.x, queued.y, queued.z});
       const Trial trial = try_tetrahedron(task.lattice, t, task.point(at));
       if (trial.owns || (kCoarse && trial.unsure && task.owns(t, at))) {
         covered = sink.write(sink.address(at), at, trial.u());
-      } else if (Attempt::get(entry.voxel) < kWarpTries) {
+      } else if (Attempt::get(queued.voxel) < kWarpTries) {
         again = true;
-        word = entry.voxel + Attempt::put(1);
-        place = Attempt::get(entry.voxel) == 0 ? trial.place()
-                                               : (trial.place() + glm::vec3(entry.x, entry.y, entry.z)) * 0.5f;
+        word = queued.voxel + Attempt::put(1);
+        place = Attempt::get(queued.voxel) == 0 ? trial.place()
+                                                : (trial.place() + glm::vec3(queued.x, queued.y, queued.z)) * 0.5f;
       } else {
         task.put_aside(in, trial.place());
       }
