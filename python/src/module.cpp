@@ -55,6 +55,7 @@ std::map<std::string, bool> compiled() {
 NB_MODULE(_core, core) {
   using namespace tetwarp;
   using namespace tetwarp::python;
+  nanobind::set_leak_warnings(false);  // objects that live until the interpreter ends are no faults of the user
   watch_process();
   add_errors(core);
   add_geometry(core);

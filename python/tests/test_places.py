@@ -118,6 +118,21 @@ def test_nibabel_scaled_values_are_those_of_nibabel(volume, tmp_path):
     assert np.array_equal(given.array.T, np.asanyarray(loaded.dataobj))
 
 
+def test_itk_there_and_back(volume):
+    itk = pytest.importorskip("itk")
+    image = itk.image_from_array(volume.array)
+    image.SetSpacing(volume.geometry.spacing)
+    image.SetOrigin(volume.geometry.origin)
+    image.SetDirection(itk.matrix_from_array(np.array(volume.geometry.direction)))
+    given, _ = tw.adapters.volume_of(image)
+    assert np.shares_memory(given.array, itk.array_view_from_image(image))
+    assert np.allclose(list(image.TransformIndexToPhysicalPoint([2, 1, 3])), given.geometry.point([2, 1, 3]))
+    moved = shifted(volume, image).volume
+    assert type(moved) is type(image)
+    assert np.allclose(itk.array_from_matrix(moved.GetDirection()), volume.geometry.direction)
+    assert moved.GetPixel([3, 2, 1]) == image.GetPixel([2, 2, 1]) and moved.GetPixel([0, 0, 0]) == -1
+
+
 def test_monai_and_torchio_there_and_back(volume):
     torch = pytest.importorskip("torch")
     affine = volume.geometry.affine("RAS")
