@@ -20,6 +20,7 @@ using namespace std::chrono_literals;
 
 std::atomic<bool> forked = false;
 
+thread_local bool in_progress_callable = false;
 unsigned long main_thread = 0;  // of Python, as PyThread_get_thread_ident has it
 
 /// Passes progress to a callable of Python, at most 20 times a second, and keeps what it raises.
@@ -33,12 +34,14 @@ class Progress {
     if (error_ || (now - last_ < 50ms && share < 1)) return;
     last_ = now;
     const nb::gil_scoped_acquire lock;
+    in_progress_callable = true;
     try {
       callable_(share);
     } catch (...) {
       error_ = std::current_exception();
       stop_.request_stop();
     }
+    in_progress_callable = false;
   }
   const std::exception_ptr& error() const { return error_; }
 
@@ -118,6 +121,8 @@ void run_call(const CallOptions& options, bool small, const std::function<void(c
   if (interrupted) throw nb::python_error();
   if (progress.error()) std::rethrow_exception(progress.error());
 }
+
+bool is_in_progress_callable() { return in_progress_callable; }
 
 int threads_of(int wished) { return is_forked() ? 1 : wished; }
 

@@ -31,6 +31,10 @@ struct CallOptions {
 /// @throws what the work throws
 void run_call(const CallOptions& options, bool small, const std::function<void(const Control&)>& work);
 
+/// Whether this thread is within a call of `progress`: what is locked for the call that it belongs to would never be
+/// given free.
+bool is_in_progress_callable();
+
 /// Number of threads for work: what is wished, or one in a process that was forked, whose parent's threads are gone.
 int threads_of(int wished);
 /// Whether this process was forked from one that had loaded this module.

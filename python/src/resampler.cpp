@@ -193,6 +193,7 @@ class BoundResampler {
  private:
   /// Locks without the interpreter's lock, which the holder may need to end.
   std::unique_lock<std::mutex> in_use() {
+    require(!is_in_progress_callable(), "a progress callable cannot call a resampler; note the share, and return");
     const nb::gil_scoped_release released;
     return std::unique_lock(mutex_);
   }

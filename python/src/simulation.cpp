@@ -5,6 +5,7 @@
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 
+#include <mutex>
 #include <optional>
 
 #include "backend/factories.h"
@@ -49,16 +50,28 @@ class BoundRun {
   std::string backend() const { return backend_; }
   std::string phase_name(std::size_t phase) const { return scenario_.phases.at(phase).name; }
 
-  /// Number, phase, whether it ends its phase, steps, motion in mm, residual, whether it settled.
+  /// Number, phase, whether it ends its phase, steps, motion in mm, residual, whether it converged.
   nb::tuple next(const CallOptions& options) {
-    Frame frame;
+    const std::unique_lock lock = in_use();
+    FrameResult frame;
     run_call(options, false, [&](const Control& control) { frame = run_->next(control); });
-    return nb::make_tuple(frame.number, frame.phase, frame.ends_phase, frame.settled.steps, frame.settled.motion_mm,
-                          frame.settled.residual, frame.settled.reached);
+    return nb::make_tuple(frame.number, frame.phase, frame.ends_phase, frame.convergence.steps,
+                          frame.convergence.motion_mm, frame.convergence.residual, frame.convergence.reached);
   }
-  nb::tuple field() const { return as_tuple(run_->field()); }
+  nb::tuple field() {
+    const std::unique_lock lock = in_use();
+    return as_tuple(run_->field());
+  }
 
  private:
+  /// Locks without the interpreter's lock, which the holder may need to end.
+  std::unique_lock<std::mutex> in_use() {
+    require(!is_in_progress_callable(), "a progress callable cannot call its simulation; note the share, and return");
+    const nb::gil_scoped_release released;
+    return std::unique_lock(mutex_);
+  }
+
+  std::mutex mutex_;
   Scenario scenario_;
   Patient patient_;
   std::optional<ScenarioRun> run_;

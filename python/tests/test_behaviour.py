@@ -116,6 +116,27 @@ def test_what_a_progress_raises_ends_the_call(ct):
     assert len(shares) == 1 and 0 <= shares[0] <= 1
 
 
+def test_a_progress_that_calls_its_resampler_is_refused():
+    volume = tw.phantom((128, 128, 64), spacing=(3, 3, 5))
+    warp_of = tw.Resampler(volume.geometry, backend="cpu")
+    warp_of.set_field(tw.fields.identity(volume.geometry, cell_size=2), outside="background")
+    with pytest.raises(tw.InputError, match="progress"):
+        warp_of.resample([volume], progress=lambda _: warp_of.resample([volume]))
+    assert warp_of.resample([volume])[0][0].array.tobytes() == volume.array.tobytes()
+
+
+def test_out_is_an_array_that_may_be_written_and_lies_elsewhere(ct):
+    field = tw.fields.identity(ct.geometry)
+    out = np.empty_like(ct.array)
+    assert tw.deform(ct, field, out=out).volume.array is out
+    assert np.array_equal(out, ct.array)
+    out.flags.writeable = False
+    for wrong, says in ((out, "read-only"), (ct.array, "shares memory"), (np.empty((2, 2, 2), np.int16), "shape"),
+                        (np.empty(ct.array.shape, np.int32), "int32"), (ct.array.astype(">i2"), "byte order")):
+        with pytest.raises(tw.InputError, match=says):
+            tw.deform(ct, field, out=wrong)
+
+
 def test_ten_thousand_calls_leave_no_memory_behind():
     result = run_python(
         """

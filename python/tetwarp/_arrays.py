@@ -27,6 +27,11 @@ def is_on_device(array: Any) -> bool:
 def require_array(array: Any, name: str) -> Any:
     """The array as it is, or a view by NumPy of what offers the buffer protocol or DLPack on the host."""
     if isinstance(array, np.ndarray):
+        if not array.dtype.isnative:
+            raise InputError(
+                f"{name} holds {array.dtype} in the byte order of other machines; pass the copy "
+                'array.astype(array.dtype.newbyteorder("="))'
+            )
         return array
     if hasattr(array, "__dlpack__") and hasattr(array, "__dlpack_device__"):
         return array if is_on_device(array) else _on_host(array, name)
@@ -89,6 +94,22 @@ def require_dense(array: Any, name: str) -> None:
             f"{name} does not lie in memory as [k, j, i] with i fastest; pass the copy {how}, or "
             'order="ijk" for an array [i, j, k] in Fortran order'
         )
+
+
+def require_takes_result(out: Any, source: Any) -> None:
+    """Refuses an array that cannot be written, or that lies where the source lies."""
+    if isinstance(out, np.ndarray):
+        if not out.flags.writeable:
+            raise InputError("out is read-only; pass an array that may be written")
+        if isinstance(source, np.ndarray) and np.may_share_memory(out, source):
+            raise InputError("out shares memory with the volume, which is read while out is written; pass another array")
+    elif _pointer(out) is not None and _pointer(out) == _pointer(source):
+        raise InputError("out shares memory with the volume, which is read while out is written; pass another array")
+
+
+def _pointer(array: Any) -> int | None:
+    interface = getattr(array, "__cuda_array_interface__", None)
+    return None if interface is None else int(interface["data"][0])
 
 
 def library_of(array: Any) -> str:

@@ -138,6 +138,7 @@ class _Resampler:
                     out[...] = one.background
             else:
                 out = _arrays.require_array(out, "out")
+                _arrays.require_takes_result(out, array)
             result = Volume(out, self.geometry, padding=one.volume.padding)
             result.background = one.background
             result.series = one.volume.series

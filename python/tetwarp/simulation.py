@@ -28,14 +28,14 @@ class Frame:
     phase: str
     #: Whether it is the last frame of its phase.
     ends_phase: bool
-    #: Steps of the simulation until it settled.
+    #: Steps of the simulation until it converged.
     steps: int
     #: Largest motion of a node in the last step, mm.
     motion_mm: float
     #: Largest net force on a free node, relative; 0 for ChainMail.
     residual: float
-    #: Whether it settled within the rule.
-    settled: bool
+    #: Whether it converged within the rule.
+    converged: bool
     #: The field after this frame.
     field: VertexField
 
@@ -64,9 +64,9 @@ class Run:
         """Simulates the next frame. Raises StopIteration after the last."""
         if self._core.is_done:
             raise StopIteration
-        number, phase, ends, steps, motion, residual, settled = self._core.next(_calls.options(progress, "simulate"))
+        number, phase, ends, steps, motion, residual, converged = self._core.next(_calls.options(progress, "simulate"))
         return Frame(
-            number, self._core.phase_name(phase), ends, steps, motion, residual, settled, VertexField._of(self._core.field())
+            number, self._core.phase_name(phase), ends, steps, motion, residual, converged, VertexField._of(self._core.field())
         )
 
     @property
