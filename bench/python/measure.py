@@ -4,7 +4,7 @@
 
 """Times the Python package beside the program and beside other packages.
 
-    measure.py PROGRAM [--json FILE] [--repeats N] [--threads N] [--size I,J,K]
+    measure.py [PROGRAM] [--json FILE] [--repeats N] [--threads N] [--size I,J,K]
 
 Each figure is a median of interleaved repeats on random data. Packages that are not installed are left out, and said.
 Ratios are of one run on one machine.
@@ -164,6 +164,45 @@ def augmentation(threads, repeats, missing):
     return interleaved(repeats, **works)
 
 
+def augmentation_on_device(repeats, missing):
+    """The same as `augmentation` with tensors on a CUDA device. The field is made on the host, as the lattice is small."""
+    torch = module("torch", missing)
+    if not torch or not tw.features()["devices"] or not torch.cuda.is_available():
+        missing.append("a CUDA device")
+        return {}
+    grid = tw.Geometry((128, 128, 128))
+    image = torch.as_tensor(noise(grid, np.float32), device="cuda")
+    labels = torch.as_tensor((noise(grid, np.int16) % 4).astype(np.uint8), device="cuda")
+    lattice = grid.lattice(4)
+    warp = tw.Resampler(grid, backend="cuda")
+    seeds = iter(range(1000000))
+
+    def ours():
+        made = tw.fields.elastic(grid, amplitude=AMPLITUDE, spacing=CONTROL, seed=next(seeds), cell_size=4)
+        warp.set_field(
+            tw.VertexField(lattice, torch.as_tensor(made.displacement, device="cuda")), outside="background",
+            jacobian_range=False,
+        )
+        volumes = [tw.Target(tw.Volume(image, grid), background=0), tw.Target(tw.Volume(labels, grid), "vote", 0)]
+        warp.resample(volumes, maps=("inverse",))
+        torch.cuda.synchronize()
+
+    works = {"tetwarp, with the exact inverse": ours}
+    monai = module("monai.transforms", missing)
+    if monai:
+        random = monai.Rand3DElasticd(
+            keys=["image", "labels"], sigma_range=(8, 8), magnitude_range=(100, 100), prob=1.0,
+            mode=["bilinear", "nearest"], padding_mode="zeros", device=torch.device("cuda"),
+        )
+
+        def theirs():
+            random({"image": image[None], "labels": labels[None]})
+            torch.cuda.synchronize()
+
+        works["MONAI Rand3DElasticd"] = theirs
+    return {"device": torch.cuda.get_device_name(), **interleaved(repeats, **works)}
+
+
 def forward_field(threads, repeats, missing):
     """A forward field, against SimpleITK, which inverts it first; and against its resampling, the inverse given."""
     sitk = module("SimpleITK", missing)
@@ -206,7 +245,7 @@ def machine(threads):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("program")
+    parser.add_argument("program", nargs="?", help="without it nothing is compared with the program")
     parser.add_argument("--json", type=pathlib.Path)
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--threads", type=int, default=os.cpu_count())
@@ -217,11 +256,13 @@ def main():
     result = {
         "machine": machine(options.threads),
         "size": size,
-        "beside_the_program": beside_the_program(options.program, size, options.threads, options.repeats),
+        "beside_the_program": options.program
+        and beside_the_program(options.program, size, options.threads, options.repeats),
         "call_us": overhead(options.repeats),
         "peak_memory_beyond_arrays_bytes": peak_memory(size),
         "import_beyond_numpy_ms": import_time(options.repeats),
         "augmentation_128_s": augmentation(options.threads, options.repeats, missing),
+        "augmentation_128_on_device_s": augmentation_on_device(4 * options.repeats, missing),
         "forward_field_128_s": forward_field(options.threads, options.repeats, missing),
         "not_installed": missing,
         "peak_of_this_process_bytes": 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss,
