@@ -80,7 +80,7 @@ void run(const std::string& image, const std::string& scenario_file, const std::
   int buffers = 0;
   const short* buffer = nullptr;
   for (Watch watch; !breathing.is_done();) {
-    const Frame frame = breathing.next();
+    const FrameResult frame = breathing.next();
     field->SetField(breathing.field());
     const double simulated = watch.lap();
     warp->Update();
