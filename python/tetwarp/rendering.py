@@ -59,17 +59,22 @@ def render(
     (30, 40, 3)
     """
     given, _ = adapters.volume_of(volume)
-    columns, rows = (_calls.whole(value, "size", 1, 2**14) for value in size)
-    colour = [_calls.number(value, "background") for value in background]
-    if len(colour) != 3:
-        raise InputError(f"background is {background!r}; expected red, green and blue, 0 to 1")
+    try:
+        columns, rows = (_calls.whole(value, "size", 1, 2**14) for value in size)
+        red, green, blue = (_calls.number(value, "background") for value in background)
+    except (TypeError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(
+            f"size is {size!r}, background is {background!r}; expected (columns, rows) and (red, green, blue)"
+        ) from None
     view = _core.View(
         _calls.number(angle, "angle"),
         _calls.number(elevation, "elevation"),
         _calls.number(zoom, "zoom"),
         [columns, rows],
         None if step is None else _calls.number(step, "step"),
-        colour,
+        [red, green, blue],
     )
     stream = _arrays.stream_of(given.array, None)
     picture = _core.render(

@@ -12,7 +12,10 @@ import tempfile
 from collections.abc import Iterator, Mapping
 from typing import Any, Union
 
+import numpy as np
+
 from . import _calls, _core, adapters
+from .errors import InputError
 from .field import VertexField
 
 Scenario = Union[str, "os.PathLike[str]", Mapping[str, Any]]
@@ -123,6 +126,9 @@ def simulate(
     """
     ct, _ = adapters.volume_of(volume)
     labelled = None if labels is None else adapters.volume_of(labels, name="labels")[0]
+    for one, name in ((ct, "the volume"), (labelled, "the labels")):
+        if one is not None and not isinstance(one.array, np.ndarray):
+            raise InputError(f"{name} lies on a device; a simulation examines it in host memory")
     arguments = (
         ct.array,
         ct.geometry._grid,
