@@ -126,6 +126,17 @@ bool is_in_progress_callable() { return in_progress_callable; }
 
 int threads_of(int wished) { return is_forked() ? 1 : wished; }
 
+BackendKind kind_of(const std::string& backend) {
+  const BackendChoice choice = backend_choice(backend);
+  if (!is_forked()) return chosen(choice);
+  if (choice == BackendChoice::cuda) {
+    throw DeviceError(
+        "CUDA does not work in a process that was forked; start processes with the method \"spawn\" "
+        "(multiprocessing.set_start_method), or take backend=\"cpu\"");
+  }
+  return BackendKind::cpu;
+}
+
 bool is_forked() { return forked; }
 
 void watch_process() {

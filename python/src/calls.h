@@ -8,7 +8,9 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <string>
 
+#include "backend/backend.h"
 #include "deform/resampler.h"
 
 namespace tetwarp::python {
@@ -37,6 +39,9 @@ bool is_in_progress_callable();
 
 /// Number of threads for work: what is wished, or one in a process that was forked, whose parent's threads are gone.
 int threads_of(int wished);
+/// The backend that a word means in this process.
+/// @throws DeviceError for "cuda" in a process that was forked, where CUDA does not work
+BackendKind kind_of(const std::string& backend);
 /// Whether this process was forked from one that had loaded this module.
 bool is_forked();
 /// Remembers the main thread, and watches forks from now on. To be called once, when the module is loaded.

@@ -20,6 +20,7 @@
 #include "io/staged_output.h"
 #include "python/src/calls.h"
 #include "python/src/module.h"
+#include "python/src/words.h"
 
 namespace tetwarp::python {
 
@@ -140,7 +141,7 @@ nb::tuple move(const Geometry& output, const VertexField& field, const ConstArra
             "points hold a number that is not finite");
   }
   std::vector<std::uint8_t> held(moved.size());
-  const Outside beyond = outside == "refuse" ? Outside::refuse : Outside::background;
+  const Outside beyond = outside_of(outside);
   run_call(options, moved.size() < 1000 && field.displacement.size() < 100000 && field.mesh.is_empty(),
            [&](const Control& control) {
              const auto status =

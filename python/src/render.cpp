@@ -31,7 +31,6 @@ struct View {
 nb::object render(const ConstArray& array, const Geometry& grid, const std::string& transfer, const View& view,
                   const std::string& backend, int device, int threads, const CallOptions& options) {
   const ConstVolumeView volume = voxels_of(array, grid, "the volume");
-  const BackendChoice choice = backend_choice(backend);
   const Camera camera{.angle_deg = view.angle,
                       .elevation_deg = view.elevation,
                       .zoom = view.zoom,
@@ -44,7 +43,7 @@ nb::object render(const ConstArray& array, const Geometry& grid, const std::stri
     const RenderStyle style{.transfer = is_file ? read_transfer_file(transfer) : transfer_function(transfer),
                             .step_voxels = view.step,
                             .background = {view.background[0], view.background[1], view.background[2]}};
-    const BackendKind kind = is_forked() ? BackendKind::cpu : chosen(choice);
+    const BackendKind kind = kind_of(backend);
     const auto renderer = make_renderer(kind, device, {.threads = threads_of(threads)});
     renderer->set_volume(volume, control);
     renderer->set_style(style);

@@ -20,6 +20,7 @@
 #include "python/src/calls.h"
 #include "python/src/fields.h"
 #include "python/src/module.h"
+#include "python/src/words.h"
 
 namespace tetwarp::python {
 
@@ -34,13 +35,6 @@ struct TargetArrays {
   double background;
   std::optional<std::array<double, 2>> padding;
 };
-
-Outside outside_of(const std::string& word) {
-  for (const Outside one : {Outside::refuse, Outside::rest, Outside::background}) {
-    if (word == name_of(one)) return one;
-  }
-  throw InputError("outside is \"" + word + "\"; expected \"refuse\", \"rest\" or \"background\"");
-}
 
 Interpolation interpolation_of(const std::string& word) {
   const auto found = interpolation_named(word);
@@ -84,14 +78,8 @@ class BoundResampler {
   BoundResampler(const std::string& backend, bool pulls, const Geometry& output, int device, int threads,
                  std::uint64_t memory)
       : output_(output), limits_{.threads = threads_of(threads), .memory = memory} {
-    const BackendChoice choice = backend_choice(backend);
-    if (is_forked() && choice == BackendChoice::cuda) {
-      throw DeviceError(
-          "CUDA does not work in a process that was forked; start processes with the method \"spawn\" "
-          "(multiprocessing.set_start_method), or take backend=\"cpu\"");
-    }
     const nb::gil_scoped_release released;
-    const BackendKind kind = is_forked() ? BackendKind::cpu : chosen(choice);
+    const BackendKind kind = kind_of(backend);
     resampler_ = AnyResampler(kind, pulls ? Direction::pull : Direction::forward, output_, device, limits_);
   }
 
@@ -102,6 +90,7 @@ class BoundResampler {
                  const std::string& outside, bool jacobian_range, const CallOptions& options) {
     FieldView field{.outside = outside_of(outside)};
     const std::unique_lock lock = in_use();
+    is_set_ = false;  // until the field is taken: what it referred to is replaced
     if (lattice) {
       lattice_ = *lattice;
       field.lattice = &lattice_;
@@ -126,11 +115,13 @@ class BoundResampler {
     run_call(options, size < kSmall, [&](const Control& control) {
       resampler_.forward().set_field(field, {.jacobian_range = jacobian_range}, control);
     });
+    is_set_ = true;
   }
 
   void set_pull_field(const Geometry& grid, const ConstArray& displacement, const std::string& outside,
                       const CallOptions& options) {
     const std::unique_lock lock = in_use();
+    is_set_ = false;
     lattice_ = grid;
     displacement_ = displacement;
     const PullFieldView field{.grid = &lattice_,
@@ -139,6 +130,7 @@ class BoundResampler {
                               .memory = memory_of(displacement, "the displacement")};
     run_call(options, voxel_count(grid) < kSmall,
              [&](const Control& control) { resampler_.pull().set_field(field, control); });
+    is_set_ = true;
   }
 
   nb::dict resample(const std::vector<TargetArrays>& targets, const std::map<std::string, Array>& maps,
@@ -164,6 +156,8 @@ class BoundResampler {
     Maps wanted;
     for (const auto& [name, array] : maps) map_of(wanted, name) = voxels_of(array, output_, "the map \"" + name + "\"");
     const std::unique_lock lock = in_use();
+    require_set();
+    require_apart(views, wanted);
     Report report;
     run_call(options, voxel_count(part) < kSmall,
              [&](const Control& control) { report = resampler_->resample(part, views, wanted, control); });
@@ -175,6 +169,7 @@ class BoundResampler {
     FieldQuality quality;
     RoundTrip trip;
     const std::unique_lock lock = in_use();
+    require_set();
     run_call(options, false, [&](const Control& control) {
       const Limits on_cpu{.threads = limits_.threads};
       quality = measure_quality(field, on_cpu, control);
@@ -193,9 +188,55 @@ class BoundResampler {
  private:
   /// Locks without the interpreter's lock, which the holder may need to end.
   std::unique_lock<std::mutex> in_use() {
+    if (is_forked() && resampler_.backend() == BackendKind::cuda) {
+      throw DeviceError(
+          "this resampler was made before the process was forked, and CUDA does not work here; make it here");
+    }
     require(!is_in_progress_callable(), "a progress callable cannot call a resampler; note the share, and return");
     const nb::gil_scoped_release released;
     return std::unique_lock(mutex_);
+  }
+
+  void require_set() const { require(is_set_, "no field is set; call set_field first"); }
+
+  /// Bytes of an array in memory.
+  struct Extent {
+    const std::byte* begin;
+    const std::byte* end;
+    std::string name;
+    bool is_written;
+  };
+  template <class View>
+  static void add(std::vector<Extent>& extents, const View& view, const std::string& name, bool is_written) {
+    if (!view.voxels) return;
+    const auto bytes = static_cast<std::size_t>(voxel_count(view.buffered)) *
+                       static_cast<std::size_t>(view.components) * size_bytes(view.type);
+    extents.push_back({view.voxels, view.voxels + bytes, name, is_written});
+  }
+
+  /// Refuses arrays that are written where another one lies: what comes of them would depend on threads.
+  void require_apart(const std::vector<Target>& targets, const Maps& maps) const {
+    std::vector<Extent> extents;
+    for (std::size_t n = 0; n < targets.size(); ++n) {
+      const std::string number = targets.size() > 1 ? " " + std::to_string(n + 1) : "";
+      add(extents, targets[n].source, "volume" + number, false);
+      add(extents, targets[n].output, "out of volume" + number, true);
+    }
+    add(extents, maps.coverage, "the map \"coverage\"", true);
+    add(extents, maps.inverse_mm, "the map \"inverse\"", true);
+    add(extents, maps.jacobian, "the map \"jacobian\"", true);
+    add(extents, maps.owners, "the map \"folds\"", true);
+    if (displacement_) {
+      const auto* begin = static_cast<const std::byte*>(displacement_->data());
+      extents.push_back({begin, begin + displacement_->nbytes(), "the displacement", false});
+    }
+    for (std::size_t a = 0; a < extents.size(); ++a) {
+      for (std::size_t b = 0; b < a; ++b) {
+        const bool apart = extents[a].end <= extents[b].begin || extents[b].end <= extents[a].begin;
+        require(apart || (!extents[a].is_written && !extents[b].is_written),
+                extents[b].name + " shares memory with " + extents[a].name + "; pass another array");
+      }
+    }
   }
 
   static const glm::vec3* vectors_of(const ConstArray& array, const Geometry& grid) {
@@ -218,6 +259,7 @@ class BoundResampler {
   std::optional<ConstArray> displacement_;  ///< keeps the values to which the resampler refers
   TetrahedralMesh mesh_;
   std::vector<std::uint64_t> replaced_;
+  bool is_set_ = false;
   std::mutex mutex_;
 };
 

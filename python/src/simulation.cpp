@@ -25,15 +25,19 @@ using namespace simulate;
 class BoundRun {
  public:
   BoundRun(const std::filesystem::path& scenario, const ConstArray& ct, const Geometry& grid,
-           const std::optional<ConstArray>& labels, const std::string& backend, int device, int threads,
-           const CallOptions& options) {
+           const std::optional<ConstArray>& labels, const std::optional<Geometry>& labels_grid,
+           const std::string& backend, int device, int threads, const CallOptions& options) {
     const ConstVolumeView voxels = voxels_of(ct, grid, "the volume");
     require(voxels.memory == Memory::host, "the volume lies on a device; a simulation examines it in host memory");
     std::optional<ConstVolumeView> labelled;
-    if (labels) labelled = voxels_of(*labels, grid, "the labels");
-    const BackendChoice choice = backend_choice(backend);
+    if (labels) {
+      require(labels_grid.has_value(), "the labels have no grid");
+      labelled = voxels_of(*labels, *labels_grid, "the labels");
+      require(labelled->memory == Memory::host,
+              "the labels lie on a device; a simulation examines them in host memory");
+    }
     run_call(options, false, [&](const Control& control) {
-      const BackendKind kind = is_forked() ? BackendKind::cpu : chosen(choice);
+      const BackendKind kind = kind_of(backend);
       scenario_ = read_scenario(scenario);
       patient_ = examine(voxels, labelled ? &*labelled : nullptr, scenario_.cell_size, scenario_.body_above_hu,
                          {.stop = control.stop});
@@ -83,9 +87,9 @@ class BoundRun {
 void add_simulation(nb::module_& core) {
   nb::class_<BoundRun>(core, "Run")
       .def(nb::init<const std::filesystem::path&, const ConstArray&, const Geometry&, const std::optional<ConstArray>&,
-                    const std::string&, int, int, const CallOptions&>(),
-           nb::arg("scenario"), nb::arg("ct"), nb::arg("grid"), nb::arg("labels").none(), nb::arg("backend"),
-           nb::arg("device"), nb::arg("threads"), nb::arg("options"))
+                    const std::optional<Geometry>&, const std::string&, int, int, const CallOptions&>(),
+           nb::arg("scenario"), nb::arg("ct"), nb::arg("grid"), nb::arg("labels").none(), nb::arg("labels_grid").none(),
+           nb::arg("backend"), nb::arg("device"), nb::arg("threads"), nb::arg("options"))
       .def_prop_ro("frames", &BoundRun::frames)
       .def_prop_ro("is_done", &BoundRun::is_done)
       .def_prop_ro("backend", &BoundRun::backend)

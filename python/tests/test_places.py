@@ -160,6 +160,46 @@ def test_monai_and_torchio_there_and_back(volume):
         assert done.report.copies == 2
 
 
+def test_a_simpleitk_volume_keeps_its_image():
+    sitk = pytest.importorskip("SimpleITK")
+    volume = tw.adapters.volume_of(sitk.GetImageFromArray(np.full((40, 64, 64), 7, np.int16)))[0]
+    junk = [np.full((40, 64, 64), 99, np.int16) for _ in range(20)]
+    assert len(junk) == 20 and np.unique(volume.array).tolist() == [7]
+
+
+def test_a_cropped_itk_image_lies_where_itk_says():
+    itk = pytest.importorskip("itk")
+    image = itk.image_from_array(np.zeros((10, 10, 10), np.int16))
+    image.SetSpacing([2, 2, 2])
+    region = itk.ImageRegion[3]()
+    region.SetIndex([3, 0, 0])
+    region.SetSize([5, 10, 10])
+    cropped = itk.extract_image_filter(image, extraction_region=region, direction_collapse_to_strategy=1)
+    geometry = tw.adapters.volume_of(cropped)[0].geometry
+    assert geometry.origin == (6, 0, 0) and geometry.size == (5, 10, 10)
+
+
+def test_uneven_slices_lie_where_they_say():
+    grid = tw.Geometry((4, 4, 4), spacing=(1, 1, 2), slices=[0, 1, 5, 6])
+    assert grid.point([[0, 0, 2], [0, 0, 1.5]])[:, 2].tolist() == [5, 3]
+    assert grid.index([0, 0, 5]).tolist() == [0, 0, 2]
+    assert np.allclose(grid.index(grid.point([1, 2, 4.5])), [1, 2, 4.5])
+    with pytest.raises(tw.InputError, match="straightened"):
+        grid.affine("LPS")
+
+
+def test_labels_at_another_place_are_refused():
+    body = tw.phantom((32, 32, 16), spacing=(10, 10, 15))
+    labels = tw.Volume(np.zeros(body.geometry.shape, np.uint8), tw.Geometry(body.geometry.size, origin=(999, 0, 0)))
+    page = {
+        "name": "push", "method": "chainmail", "cell_size": 4,
+        "tissues": [{"name": "all", "compression": 0.2, "stretch": 0.2, "shear": 0.2}],
+        "phases": [{"move": [{"handle": {"at": {"body": [0.5, 0.5, 0.5]}, "radius_mm": 20}, "by_mm": [0, -9, 0]}]}],
+    }
+    with pytest.raises(tw.InputError, match="label"):
+        tw.simulate(page, body, labels=labels, backend="cpu")
+
+
 def test_an_array_without_a_place_is_refused(volume):
     with pytest.raises(TypeError, match="tetwarp.Volume"):
         tw.deform(volume.array, tw.fields.identity(volume.geometry))

@@ -27,6 +27,8 @@ def is_on_device(array: Any) -> bool:
 def require_array(array: Any, name: str) -> Any:
     """The array as it is, or a view by NumPy of what offers the buffer protocol or DLPack on the host."""
     if isinstance(array, np.ndarray):
+        if array.dtype.kind not in "iufcb":
+            raise InputError(f"{name} holds {array.dtype}; expected numbers")
         if not array.dtype.isnative:
             raise InputError(
                 f"{name} holds {array.dtype} in the byte order of other machines; pass the copy "
@@ -161,6 +163,15 @@ def empty_like(like: Any, shape: tuple[int, ...], dtype: Any) -> Any:
         made = jax.device_put(jax.numpy.empty(shape, dtype), next(iter(like.devices())))
         return made.block_until_ready()
     raise InputError(f"arrays of {library} on a device are not known; pass out=")
+
+
+def as_value(value: float, array: Any) -> float | int:
+    """A value as the array's type holds it: rounded and saturated for whole numbers."""
+    kind = np.dtype(str(array.dtype).rpartition(".")[2])
+    if kind.kind not in "iu":
+        return value
+    limits = np.iinfo(kind)
+    return int(min(max(round(value), limits.min), limits.max))
 
 
 def smallest(array: Any) -> float:

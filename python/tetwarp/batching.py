@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from typing import Any, Union
@@ -58,15 +59,16 @@ def batch(manifest: PathLike, output: PathLike, **options: Any) -> int:
         option = "--" + name.replace("_", "-")
         if value is True:
             words.append(option)
-        elif value not in (False, None):
+        elif value is not False and value is not None:
             words.append(f"{option}={value}")
     process = subprocess.Popen(
         [sys.executable, "-m", "tetwarp._program", *words], stderr=subprocess.PIPE, text=True, errors="replace"
     )
     try:
         _, said = process.communicate()
-    except KeyboardInterrupt:
-        process.communicate()  # it got the signal too, and ends after its cases are safe
+    except BaseException:
+        process.send_signal(signal.SIGINT)  # a second one, from a terminal, would end it at once: it then resumes
+        process.communicate()
         raise
     if process.returncode in (0, 3):
         return process.returncode

@@ -17,7 +17,7 @@ from .errors import InputError
 from .field import PullField, VertexField, require_forward, require_pull
 from .geometry import Geometry
 from .report import Report
-from .resampler import PullResampler, Resampler, Target
+from .resampler import PullResampler, Resampler, Target, names_of_maps
 from .volume import Volume
 
 
@@ -186,7 +186,7 @@ def deform(
 
     onto_output = resampler_onto(output, beyond)
     targets = [main] + [target for one, target, _ in others if not one.own]
-    wanted = dict(maps) if isinstance(maps, Mapping) else {name: None for name in maps}
+    wanted = dict(maps) if isinstance(maps, Mapping) else {name: None for name in names_of_maps(maps)}
     if preserve:
         targets[0] = _in_real_numbers(main)
         wanted.setdefault("coverage", None)
@@ -201,13 +201,21 @@ def deform(
     for one, target, way_back in others:
         if one.own:
             own = resampler_onto(target.volume.geometry.straightened(), outside)
-            gone_along.append(way_back(own.resample([target], stream=stream)[0][0]))
+            other = own.resample([target], stream=stream)[0][0]
         else:
-            gone_along.append(way_back(next(results)))
+            other = next(results)
+        if target.volume.series is not None:
+            other.derivation = _derivation(field, pull_field, target, outside, None, threads)
+        gone_along.append(way_back(other))
     result = volumes[0]
     if given.series is not None:
         result.derivation = _derivation(field, pull_field, main, outside, preserve, threads)
     report.copies = copies
+    if isinstance(grid, str) and grid == "same" and output != given.geometry:
+        report.notes.append(
+            f"the volume's slices lean or lie at uneven distances: the output has a straight, even grid of "
+            f"{' x '.join(map(str, output.size))} voxels, so that the identity resamples too"
+        )
     report.notes += given.notes
     done = Deformed(back(result), made, report, gone_along)
     if points is not None and field is not None:

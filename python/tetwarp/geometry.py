@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from . import _arrays, _core
+from . import _arrays, _calls, _core
 from .errors import InputError
 
 FloatArray = npt.NDArray[np.float64]
@@ -29,11 +29,18 @@ def _flip_of(space: str) -> FloatArray:
 def _numbers(values: Any, count: int, name: str) -> tuple[float, ...]:
     try:
         numbers = tuple(float(value) for value in values)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} is {values!r}; expected {count} numbers") from None
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{name} is no {count} numbers that a float holds") from None
     if len(numbers) != count:
         raise InputError(f"{name} has {len(numbers)} numbers; expected {count}")
     return numbers
+
+
+def _along(values: FloatArray, known: npt.NDArray[Any], mapped: npt.NDArray[Any]) -> FloatArray:
+    """Linear between the known places and beyond their ends."""
+    n = np.clip(np.searchsorted(known, values, side="right") - 1, 0, len(known) - 2)
+    share = (values - known[n]) / (known[n + 1] - known[n])
+    return np.asarray(mapped[n] + share * (mapped[n + 1] - mapped[n]), dtype=np.float64)
 
 
 class Geometry:
@@ -188,24 +195,36 @@ class Geometry:
         >>> Geometry((2, 2, 2), spacing=(1, 2, 3)).affine("LPS").diagonal()
         array([1., 2., 3., 1.])
         """
+        if self.slices:
+            raise InputError("slices at uneven distances have no affine; take that of straightened()")
+        return _flip_of(space) @ self._even_affine()
+
+    def _even_affine(self) -> FloatArray:
         matrix = np.eye(4)
         matrix[:3, :3] = self.direction * np.array(self.spacing)
         matrix[:3, 3] = self.origin
-        return _flip_of(space) @ matrix
+        return matrix
 
     def point(self, index: npt.ArrayLike) -> FloatArray:
         """LPS mm of continuous indices (i, j, k); the last axis of `index` has length 3."""
-        matrix = self.affine("LPS")
-        return np.asarray(index, dtype=np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+        matrix = self._even_affine()
+        place = np.array(_arrays.numbers(index, np.float64, "indices"))
+        if self.slices:  # the index along k counts even steps in the matrix
+            place[..., 2] = _along(place[..., 2], np.arange(len(self.slices)), np.array(self.slices) / self.spacing[2])
+        return np.asarray(place @ matrix[:3, :3].T + matrix[:3, 3])
 
     def index(self, point: npt.ArrayLike) -> FloatArray:
         """Continuous indices (i, j, k) of points in LPS mm; the last axis of `point` has length 3."""
-        matrix = self.affine("LPS")
-        return (np.asarray(point, dtype=np.float64) - matrix[:3, 3]) @ np.linalg.inv(matrix[:3, :3]).T
+        matrix = self._even_affine()
+        places = _arrays.numbers(point, np.float64, "points")
+        index = np.array((places - matrix[:3, 3]) @ np.linalg.inv(matrix[:3, :3]).T)
+        if self.slices:
+            index[..., 2] = _along(index[..., 2], np.array(self.slices) / self.spacing[2], np.arange(len(self.slices)))
+        return index
 
     def lattice(self, cell_size: int) -> Geometry:
         """The lattice with a vertex on every `cell_size`-th voxel. Its last cells may reach beyond the volume."""
-        return Geometry._of(self._grid.lattice(cell_size))
+        return Geometry._of(self._grid.lattice(_calls.whole(cell_size, "cell_size", 1, 65536)))
 
     def straightened(self) -> Geometry:
         """The straight, even grid onto which a tilted or uneven stack is resampled; any other grid itself."""

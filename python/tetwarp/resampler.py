@@ -135,7 +135,7 @@ class _Resampler:
             if out is None:
                 out = _arrays.empty_like(array, shape, array.dtype)
                 if region is not None:
-                    out[...] = one.background
+                    out[...] = _arrays.as_value(one.background, array)
             else:
                 out = _arrays.require_array(out, "out")
                 _arrays.require_takes_result(out, array)
@@ -151,7 +151,7 @@ class _Resampler:
                     source, one.volume.geometry._grid, target, one.interpolation, one.background, one.volume.padding
                 )
             )
-        given = maps if isinstance(maps, Mapping) else {name: None for name in _names(maps)}
+        given = maps if isinstance(maps, Mapping) else {name: None for name in names_of_maps(maps)}
         made: dict[str, Volume] = {}
         arrays: dict[str, Any] = {}
         for name, array in given.items():
@@ -163,21 +163,24 @@ class _Resampler:
                 array = _arrays.empty_like(first, shape, kind)
                 if region is not None:
                     array[...] = 0
+            else:
+                array = _arrays.require_array(array, f"the map {name!r}")
+                _arrays.require_takes_result(array, first)
             made[name] = Volume(array, self.geometry)
             arrays[name] = _arrays.exchanged(array, number)
         box = None
         if region is not None:
-            begin, end = region
-            most = 2**40
-            box = [[_calls.whole(value, "region", -most, most) for value in corner] for corner in (begin, end)]
-            if [len(corner) for corner in box] != [3, 3]:
+            corners = _arrays.numbers(region, np.int64, "region")
+            if corners.shape != (2, 3) or np.abs(corners).max() > 2**40:
                 raise InputError(f"region is {region!r}; expected two corners (i, j, k)")
+            box = corners.tolist()
         counts = self._core.resample(cores, arrays, box, _calls.options(progress, "resample", number))
         return volumes, made, Report(**counts, backend=self.backend)
 
 
-def _names(maps: Any) -> Sequence[str]:
-    if isinstance(maps, str) or not all(isinstance(name, str) for name in maps):
+def names_of_maps(maps: Any) -> Sequence[str]:
+    """The names of maps, if they are that."""
+    if not isinstance(maps, (list, tuple, set, frozenset)) or isinstance(maps, str) or not all(isinstance(name, str) for name in maps):
         raise TypeError(f"maps is {maps!r}; expected a sequence of names, such as (\"coverage\",)")
     return list(maps)
 

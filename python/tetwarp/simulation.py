@@ -114,15 +114,15 @@ def simulate(
     --------
     >>> import tetwarp as tw
     >>> page = {
-    ...     "tetwarp_scenario": 1, "method": "chainmail", "cell_size": 4,
-    ...     "tissues": [{"name": "all", "chainmail": {"stretch": 1.1, "shear": 0.1}}],
-    ...     "phases": [],
+    ...     "name": "push", "method": "chainmail", "cell_size": 4,
+    ...     "tissues": [{"name": "all", "compression": 0.2, "stretch": 0.2, "shear": 0.2}],
+    ...     "hold": [{"border": True}],
+    ...     "phases": [{"frames": 2, "move": [
+    ...         {"handle": {"at": {"body": [0.5, 0.5, 0.5]}, "radius_mm": 20}, "by_mm": [0, -15, 0]}]}],
     ... }
-    >>> try:
-    ...     tw.simulate(page, tw.phantom((32, 32, 16), spacing=(10, 10, 15)))
-    ... except tw.InputError as error:
-    ...     print("refused")
-    refused
+    >>> run = tw.simulate(page, tw.phantom((32, 32, 16), spacing=(10, 10, 15)), backend="cpu")
+    >>> [frame.number for frame in run]
+    [1, 2]
     """
     ct, _ = adapters.volume_of(volume)
     labelled = None if labels is None else adapters.volume_of(labels, name="labels")[0]
@@ -133,6 +133,7 @@ def simulate(
         ct.array,
         ct.geometry._grid,
         None if labelled is None else labelled.array,
+        None if labelled is None else labelled.geometry._grid,
         backend,
         _calls.whole(device, "device", 0, 1024),
         _calls.threads(threads),

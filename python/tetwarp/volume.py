@@ -67,6 +67,14 @@ class Volume:
         self.array: Any = array
         #: Where they lie.
         self.geometry: Geometry = geometry
+        if padding is not None:
+            try:
+                low, high = (_calls.number(value, "padding") for value in padding)
+            except (TypeError, ValueError):
+                raise InputError(f"padding is {padding!r}; expected the first and last value that is no data") from None
+            if low > high:
+                raise InputError(f"padding is {padding!r}; expected the smaller value first")
+            padding = (low, high)
         #: First and last of the values that are no data, or None.
         self.padding: tuple[float, float] | None = padding
         #: Value where nothing maps, unless one is given: that of what was read; None: the smallest value.

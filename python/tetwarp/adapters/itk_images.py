@@ -15,17 +15,19 @@ from ..volume import Volume
 
 
 def volume_of(image: Any, name: str) -> tuple[Volume, Any]:
+    if not hasattr(image, "GetBufferedRegion"):
+        raise TypeError(f"{name} is a {type(image).__name__} of itk; expected an image")
     if image.GetImageDimension() != 3:
         raise TypeError(f"{name} has {image.GetImageDimension()} dimensions; expected 3")
     array = itk.array_view_from_image(image)
-    i, j, k = (int(value) for value in itk.size(image))
+    region = image.GetBufferedRegion()  # which is what the array shows; its first voxel need not be that of the origin
     geometry = Geometry(
-        (i, j, k),
+        [int(value) for value in region.GetSize()],
         [float(value) for value in image.GetSpacing()],
-        [float(value) for value in image.GetOrigin()],
+        [float(value) for value in image.TransformIndexToPhysicalPoint(region.GetIndex())],
         np.asarray(itk.array_from_matrix(image.GetDirection())),
     )
-    return Volume(array, geometry), Back()
+    return Volume(array, geometry), Back(image)
 
 
 class Back:
@@ -33,8 +35,12 @@ class Back:
 
     copies = 1
 
+    def __init__(self, image: Any) -> None:
+        self._image = image
+
     def __call__(self, volume: Volume) -> Any:
-        image = itk.image_from_array(np.ascontiguousarray(volume.array), is_vector=volume.array.ndim == 4)
+        image = itk.image_from_array(np.ascontiguousarray(volume.array), ttype=type(self._image))
+        image.SetMetaDataDictionary(self._image.GetMetaDataDictionary())
         geometry = volume.geometry
         image.SetSpacing(geometry.spacing)
         image.SetOrigin(geometry.origin)

@@ -36,4 +36,4 @@ class Back:
         meta = dict(self._image.meta)
         affine = torch.as_tensor(volume.geometry.affine("RAS"))
         meta.pop("affine", None)
-        return type(self._image)(tensor_of(volume.array)[None], affine=affine, meta=meta)
+        return type(self._image)(tensor_of(volume.array)[None], affine=affine, meta=meta, applied_operations=self._image.applied_operations)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import SimpleITK as sitk  # noqa: N813
 
 from ..geometry import Geometry
@@ -14,12 +15,22 @@ from ..volume import Volume
 
 
 def volume_of(image: Any, name: str) -> tuple[Volume, Any]:
+    if not isinstance(image, sitk.Image):
+        raise TypeError(f"{name} is a {type(image).__name__} of SimpleITK; expected an image")
     if image.GetDimension() != 3:
         raise TypeError(f"{name} has {image.GetDimension()} dimensions; expected 3")
     direction = [image.GetDirection()[3 * row : 3 * row + 3] for row in range(3)]
     geometry = Geometry(image.GetSize(), image.GetSpacing(), image.GetOrigin(), direction)
-    volume = Volume(sitk.GetArrayViewFromImage(image), geometry)
-    return volume, Back(image)
+    view = np.asarray(_Held(sitk.GetArrayViewFromImage(image), image))
+    return Volume(view, geometry), Back(image)
+
+
+class _Held:
+    """Memory of an image, which it keeps: SimpleITK's own views do not, and NumPy keeps what it takes an array from."""
+
+    def __init__(self, view: Any, image: Any) -> None:
+        self.__array_interface__ = view.__array_interface__
+        self._kept = (view, image)
 
 
 class Back:
@@ -31,7 +42,7 @@ class Back:
         self._image = image
 
     def __call__(self, volume: Volume) -> Any:
-        image = sitk.GetImageFromArray(volume.array, isVector=volume.array.ndim == 4)
+        image = sitk.GetImageFromArray(volume.array, isVector=self._image.GetPixelID() >= sitk.sitkVectorUInt8)
         geometry = volume.geometry
         image.SetSpacing(geometry.spacing)
         image.SetOrigin(geometry.origin)
