@@ -30,7 +30,8 @@ field = tw.fields.elastic(ct.geometry, amplitude=16, spacing=70, seed=3, cell_si
 # %% [markdown]
 # ## Labels
 #
-# Thresholds stand in for a segmentation: 1 is soft tissue, 2 lung, 3 bone.
+# Thresholds stand in for a segmentation: 1 is soft tissue, 2 lung, 3 bone. Voxels
+# at the skin and of the table, half air and half matter, pass for lung; labels by a reader would not.
 
 # %%
 NAMES = {1: "soft tissue", 2: "lung", 3: "bone"}

@@ -17,7 +17,8 @@
 #
 # A network for segmentation learns from many deformed copies of a CT and its labels. This page makes such copies, and
 # with each a certificate: a dict that says from which seed it came, whether anything folded, how much tissue grew and
-# shrank, and how the volumes of the labels changed.
+# shrank, and how the volumes of the labels changed. Thresholds stand in for a segmentation: what is half air and half
+# matter, as the skin and the table, passes for lung.
 
 # %%
 import json

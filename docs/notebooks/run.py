@@ -35,7 +35,7 @@ def execute(path, keep, timeout_s):
             notebook, km=manager, timeout=timeout_s, resources={"metadata": {"path": scratch}}
         )
         try:
-            client.execute()
+            client.execute(cleanup_kc=True)  # the manager is ours, and would be left running
             failure = None
         except CellExecutionError as error:
             failure = error
