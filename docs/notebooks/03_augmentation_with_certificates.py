@@ -133,8 +133,8 @@ print("seed 4 again: same bits")
 # %% [markdown]
 # ## A certificate can say no
 #
-# A bubble of a strength above 3 turns its own middle inside out. The certificate says so, and the map `folds` says where:
-# it counts the tetrahedra that claim a voxel.
+# A bubble of a strength above 3 throws its middle over what lies around it, and turns a shell between them inside out. The
+# certificate says so, and the map `folds` says where: it counts the tetrahedra that claim a voxel.
 
 # %%
 bad = tw.fields.bubble(ct.geometry, radius=120, strength=8, cell_size=2)
