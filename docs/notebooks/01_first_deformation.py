@@ -39,7 +39,8 @@ print(ct.geometry, ct.array.dtype, ct.array.min(), "to", ct.array.max(), "HU")
 # ## A field
 #
 # A field says where each vertex of a lattice goes. This one is smooth and random, and its seed decides it. No component
-# of a displacement is above 20 mm. Control points lie 60 mm apart, and below 60 / 2.48 = 24 mm such a field cannot fold.
+# of a displacement is above 20 mm. Control points lie 60 mm apart, and below 60 / 2.48 = 24 mm such a field cannot
+# fold.
 
 # %%
 field = tw.fields.elastic(ct.geometry, amplitude=20, spacing=60, seed=7, cell_size=4)
@@ -100,8 +101,8 @@ plt.show()
 # %% [markdown]
 # ## The inverse undoes the map
 #
-# `invert` says for each voxel of the output where its tissue came from; NaN where nothing maps. Go there, move forward by
-# the field, and you are back at the voxel.
+# `invert` says for each voxel of the output where its tissue came from; NaN where nothing maps. Go there, move forward
+# by the field, and you are back at the voxel.
 
 # %%
 inverse = tw.invert(field, ct.geometry)

@@ -15,8 +15,8 @@
 # %% [markdown]
 # # Labels, landmarks and a dose
 #
-# A CT rarely comes alone. This page moves labels, points and a dose through the field of the CT, in one call, and checks
-# that tissue, volume and dose are still those of before.
+# A CT rarely comes alone. This page moves labels, points and a dose through the field of the CT, in one call, and
+# checks that tissue, volume and dose are still those of before.
 
 # %%
 import matplotlib.pyplot as plt
@@ -135,8 +135,9 @@ assert within.sum() >= 35 and same.mean() >= 0.95
 # %% [markdown]
 # ## Volumes of labels
 #
-# An organ grows and shrinks with the tissue. The Jacobian determinant says by how much at each voxel, so the sum of 1 / J
-# over the organ must be its volume of before. An organ that leaves the field of view loses what left; the lungs do not.
+# An organ grows and shrinks with the tissue. The Jacobian determinant says by how much at each voxel, so the sum of 1 /
+# J over the organ must be its volume of before. An organ that leaves the field of view loses what left; the lungs do
+# not.
 
 # %%
 covered = done.maps["coverage"].array > 0
@@ -153,8 +154,8 @@ assert abs(undone[2] - 1) < 0.02
 # %% [markdown]
 # ## Dose
 #
-# The dose moved with the tissue. Weighted by the tissue of before, 1 / J, its sum over the volume is what it was. The mean
-# dose of the lungs is, too, but for what voxels of 4 to 5 mm blur where the dose falls from 60 Gy to nothing.
+# The dose moved with the tissue. Weighted by the tissue of before, 1 / J, its sum over the volume is what it was. The
+# mean dose of the lungs is, too, but for what voxels of 4 to 5 mm blur where the dose falls from 60 Gy to nothing.
 
 # %%
 weight = 1 / jacobian

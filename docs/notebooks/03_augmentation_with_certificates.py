@@ -39,9 +39,9 @@ NAMES = {1: "soft tissue", 2: "lung", 3: "bone"}
 # %% [markdown]
 # ## A field from a seed
 #
-# The seed decides a twist of up to 8 degrees and a smooth random field of 4 to 16 mm. `compose` makes one field of both,
-# the twist first. The second field begins where the first one ends, so its lattice must reach farther: it is made on a
-# grid with 16 voxels more on each side.
+# The seed decides a twist of up to 8 degrees and a smooth random field of 4 to 16 mm. `compose` makes one field of
+# both, the twist first. The second field begins where the first one ends, so its lattice must reach farther: it is made
+# on a grid with 16 voxels more on each side.
 
 
 # %%
@@ -62,8 +62,8 @@ def field_of(seed):
 # %% [markdown]
 # ## A copy and its certificate
 #
-# Folds are tetrahedra that are inverted or without volume. A fold shows the same tissue twice, or nowhere: no breath does
-# that to a patient.
+# Folds are tetrahedra that are inverted or without volume. A fold shows the same tissue twice, or nowhere: no breath
+# does that to a patient.
 
 
 # %%
@@ -133,8 +133,8 @@ print("seed 4 again: same bits")
 # %% [markdown]
 # ## A certificate can say no
 #
-# A bubble of a strength above 3 throws its middle over what lies around it, and turns a shell between them inside out. The
-# certificate says so, and the map `folds` says where: it counts the tetrahedra that claim a voxel.
+# A bubble of a strength above 3 throws its middle over what lies around it, and turns a shell between them inside out.
+# The certificate says so, and the map `folds` says where: it counts the tetrahedra that claim a voxel.
 
 # %%
 bad = tw.fields.bubble(ct.geometry, radius=120, strength=8, cell_size=2)

@@ -29,8 +29,8 @@ ct = tw.phantom((96, 96, 60), spacing=(3.7, 3.7, 5))
 # %% [markdown]
 # ## The scenario
 #
-# Places are parts of the body: x from its right to its left, y from front to back, z from the feet up. The same page can
-# also be a JSON file. `chainmail` moves a vertex only when the links to its neighbours are spent.
+# Places are parts of the body: x from its right to its left, y from front to back, z from the feet up. The same page
+# can also be a JSON file. `chainmail` moves a vertex only when the links to its neighbours are spent.
 
 # %%
 scenario = {
@@ -90,8 +90,8 @@ for frame in frames:
 assert len(frames) == 4 and all(frame.settled for frame in frames)
 
 # %% [markdown]
-# Vertices along the cut are there twice, one for each lip, so the field has a mesh of tetrahedra in the place of the cells
-# that were cut.
+# Vertices along the cut are there twice, one for each lip, so the field has a mesh of tetrahedra in the place of the
+# cells that were cut.
 
 # %%
 field = frames[-1].field
@@ -101,8 +101,8 @@ assert field.mesh is not None and len(field.mesh.tetrahedra) > 0
 # %% [markdown]
 # ## Deforming by it
 #
-# The gap of the cut is nobody's: no tetrahedron covers it, and its voxels get the background, which is air. No tissue is
-# smeared over it, and nothing folds.
+# The gap of the cut is nobody's: no tetrahedron covers it, and its voxels get the background, which is air. No tissue
+# is smeared over it, and nothing folds.
 
 # %%
 opened = tw.deform(ct, field, outside="background", maps=("coverage",))
