@@ -4,6 +4,10 @@
 """What the studies share: the program, a source, labels by thresholds, and batches that may be killed and continued.
 
 Needs python3-numpy and python3-nibabel. The program is that of TETWARP, or the one that was built in build/.
+
+The studies call the program, not the package of Python. All that they deform goes through `tetwarp batch`, whose cases
+are processes and files, so that a study that was killed goes on where it was; `tetwarp.batch` starts the same program. The
+phantom or series that a batch begins with is a file for the same reason. So a study runs with the Python of the system.
 """
 import argparse
 import json
