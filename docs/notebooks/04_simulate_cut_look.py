@@ -86,8 +86,8 @@ scenario = {
 # %%
 frames = list(tw.simulate(scenario, ct))
 for frame in frames:
-    print(f"frame {frame.number}, {frame.phase}: {frame.steps} steps, settled: {frame.settled}")
-assert len(frames) == 4 and all(frame.settled for frame in frames)
+    print(f"frame {frame.number}, {frame.phase}: {frame.steps} steps, converged: {frame.converged}")
+assert len(frames) == 4 and all(frame.converged for frame in frames)
 
 # %% [markdown]
 # Vertices along the cut are there twice, one for each lip, so the field has a mesh of tetrahedra in the place of the
