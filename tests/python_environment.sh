@@ -3,7 +3,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 # Makes the virtual environment in which the tests of the Python package run, and builds the package's module in the
-# build of a preset.
+# build of a preset, with the program of the same commit, which the tests compare with.
 #
 #   tests/python_environment.sh PRESET [--peers]
 #
@@ -28,4 +28,4 @@ fi
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
 (cd "$source_dir" && cmake -B "$build" -DTETWARP_BUILD_PYTHON=ON -DPython_EXECUTABLE="$environment/bin/python" >"$log" 2>&1 &&
-  cmake --build "$build" --target tetwarp_package --parallel "${TETWARP_JOBS:-$(nproc)}" >>"$log" 2>&1) || { cat "$log"; exit 1; }
+  cmake --build "$build" --target tetwarp_package tetwarp --parallel "${TETWARP_JOBS:-$(nproc)}" >>"$log" 2>&1) || { cat "$log"; exit 1; }
