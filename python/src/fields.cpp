@@ -102,11 +102,6 @@ void write_forward(const std::filesystem::path& path, const VertexField& field, 
   output.commit();
 }
 
-PullField pull_field_of(const Geometry& grid, const ConstArray& displacement) {
-  const auto* values = values_of<float>(displacement, {grid.size.z, grid.size.y, grid.size.x, 3}, "the displacement");
-  return {grid, copied<glm::vec3>(values, static_cast<std::size_t>(voxel_count(grid)))};
-}
-
 void write_pull(const std::filesystem::path& path, const Geometry& grid, const ConstArray& displacement,
                 bool overwrite) {
   const PullField field = pull_field_of(grid, displacement);
@@ -167,6 +162,11 @@ nb::tuple continued(const Geometry& grid, const ConstArray& displacement, const 
 }
 
 }  // namespace
+
+PullField pull_field_of(const Geometry& grid, const ConstArray& displacement) {
+  const auto* values = values_of<float>(displacement, {grid.size.z, grid.size.y, grid.size.x, 3}, "the displacement");
+  return {grid, copied<glm::vec3>(values, static_cast<std::size_t>(voxel_count(grid)))};
+}
 
 TetrahedralMesh mesh_of(const MeshArrays& arrays) {
   const std::size_t vertices = arrays.rest.ndim() > 0 ? arrays.rest.shape(0) : 0;

@@ -28,6 +28,10 @@ TetrahedralMesh mesh_of(const MeshArrays& arrays);
 /// tuple of four arrays), replaced cells (an array or None).
 nb::tuple as_tuple(VertexField&& field);
 
+/// A pull field in host memory, copied from its grid and an array [k, j, i, 3] of float.
+/// @throws InputError for an array of another shape or type
+PullField pull_field_of(const Geometry& grid, const ConstArray& displacement);
+
 /// A forward field in host memory, copied from what `as_tuple` describes.
 VertexField field_of(const std::optional<Geometry>& lattice, const std::optional<ConstArray>& displacement,
                      const std::optional<MeshArrays>& mesh, const std::optional<ConstArray>& replaced);

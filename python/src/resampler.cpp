@@ -323,12 +323,9 @@ void add_resampler(nb::module_& core) {
   core.def(
       "hash_pull_field",
       [](const Geometry& grid, const ConstArray& displacement, int threads) {
-        const std::vector<std::int64_t> shape{grid.size.z, grid.size.y, grid.size.x, 3};
-        const auto* values = values_of<float>(displacement, shape, "the displacement");
-        const auto count = static_cast<std::size_t>(voxel_count(grid));
-        const auto* vectors = reinterpret_cast<const glm::vec3*>(values);
+        const PullField field = pull_field_of(grid, displacement);
         const nb::gil_scoped_release released;
-        return apps::hash_field(PullField{grid, {vectors, vectors + count}}, threads_of(threads));
+        return apps::hash_field(field, threads_of(threads));
       },
       nb::arg("grid"), nb::arg("displacement"), nb::arg("threads"));
   core.def("type_of_mass", [](const ConstArray& array, const Geometry& grid) {

@@ -98,20 +98,12 @@ def require_dense(array: Any, name: str) -> None:
         )
 
 
-def require_takes_result(out: Any, source: Any) -> None:
-    """Refuses an array that cannot be written, or that lies where the source lies."""
-    if isinstance(out, np.ndarray):
-        if not out.flags.writeable:
-            raise InputError("out is read-only; pass an array that may be written")
-        if isinstance(source, np.ndarray) and np.may_share_memory(out, source):
-            raise InputError("out shares memory with the volume, which is read while out is written; pass another array")
-    elif _pointer(out) is not None and _pointer(out) == _pointer(source):
-        raise InputError("out shares memory with the volume, which is read while out is written; pass another array")
-
-
-def _pointer(array: Any) -> int | None:
-    interface = getattr(array, "__cuda_array_interface__", None)
-    return None if interface is None else int(interface["data"][0])
+def require_result(array: Any, name: str) -> Any:
+    """An array that takes a result. That it shares no memory with others, the binding looks at."""
+    array = require_array(array, name)
+    if isinstance(array, np.ndarray) and not array.flags.writeable:
+        raise InputError(f"{name} is read-only; pass an array that may be written")
+    return array
 
 
 def library_of(array: Any) -> str:

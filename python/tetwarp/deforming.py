@@ -174,17 +174,9 @@ def deform(
         copies += adapters.copies_of(way_back)
         others.append((one, Target(other, one.interpolation or interpolation, one.background, one.out), way_back))
 
-    def resampler_onto(geometry: Geometry, where: str) -> Resampler | PullResampler:
-        kinds = {"backend": backend, "device": device, "threads": threads, "memory": memory}
-        if field is not None:
-            warp = Resampler(geometry, **kinds)  # type: ignore[arg-type]
-            warp.set_field(field, outside=where, stream=stream)
-            return warp
-        pull = PullResampler(geometry, **kinds)  # type: ignore[arg-type]
-        pull.set_field(require_pull(pull_field, ""), outside=where, stream=stream)
-        return pull
-
-    onto_output = resampler_onto(output, beyond)
+    used = require_pull(pull_field, "") if field is None else field
+    kinds = {"backend": backend, "device": device, "threads": threads, "memory": memory}
+    onto_output = _resampler_of(used, output, outside=beyond, stream=stream, **kinds)
     targets = [main] + [target for one, target, _ in others if not one.own]
     wanted = dict(maps) if isinstance(maps, Mapping) else {name: None for name in names_of_maps(maps)}
     if preserve:
@@ -196,20 +188,23 @@ def deform(
         volumes[0], clamped = _with_mass(main, volumes[0], made, out)
         report.clamped += clamped
         made = {name: made[name] for name in maps}
+    has_series = any(target.volume.series is not None for target in [main, *(target for _, target, _ in others)])
+    origin = _origin_of(used, threads) if has_series else None
     results = iter(volumes[1:])
     gone_along = []
     for one, target, way_back in others:
         if one.own:
-            own = resampler_onto(target.volume.geometry.straightened(), outside)
+            own_grid = target.volume.geometry.straightened()
+            own = _resampler_of(used, own_grid, outside=outside, stream=stream, **kinds)
             other = own.resample([target], stream=stream)[0][0]
         else:
             other = next(results)
         if target.volume.series is not None:
-            other.derivation = _derivation(field, pull_field, target, outside, None, threads)
+            other.derivation = _derivation(origin, target, outside, None)
         gone_along.append(way_back(other))
     result = volumes[0]
     if given.series is not None:
-        result.derivation = _derivation(field, pull_field, main, outside, preserve, threads)
+        result.derivation = _derivation(origin, main, outside, preserve)
     report.copies = copies
     if isinstance(grid, str) and grid == "same" and output != given.geometry:
         report.notes.append(
@@ -243,39 +238,57 @@ def _with_mass(main: Target, hu: Volume, maps: dict[str, Volume], out: Any) -> t
     return result, clamped
 
 
-def _derivation(
-    field: VertexField | None,
-    pull_field: PullField | None,
-    main: Target,
-    outside: str,
-    preserve: str | None,
-    threads: int,
-) -> Mapping[str, Any] | None:
+def _resampler_of(
+    field: VertexField | PullField, geometry: Geometry, *, outside: str, stream: Any = None, **kinds: Any
+) -> Resampler | PullResampler:
+    """A resampler onto a grid with the field set."""
+    if isinstance(field, VertexField):
+        forward = Resampler(geometry, **kinds)
+        forward.set_field(field, outside=outside, stream=stream)
+        return forward
+    pull = PullResampler(geometry, **kinds)
+    pull.set_field(field, outside=outside, stream=stream)
+    return pull
+
+
+@dataclasses.dataclass
+class _Origin:
+    """What a DICOM series says of the field that it was made by."""
+
+    sha256: str
+    direction: str
+    what: str
+    moves: bool
+
+
+def _origin_of(field: VertexField | PullField, threads: int) -> _Origin | None:
+    """That of a field; None where its values lie on a device."""
+    is_on_host = field.displacement is None or isinstance(field.displacement, np.ndarray)
+    if not is_on_host:
+        return None
+    number = _calls.threads(threads)
+    if isinstance(field, PullField):
+        sha256 = _core.hash_pull_field(field.geometry._grid, field.displacement, number)
+        return _Origin(sha256, "pull", "Deformed by a pull field", True)
+    moves = field.mesh is not None or bool(np.any(field.displacement))
+    what = "Deformed by a field of vertices" if moves else "Resampled by the identity"
+    return _Origin(_core.hash_field(field._host(), number), "forward", what, moves)
+
+
+def _derivation(origin: _Origin | None, main: Target, outside: str, preserve: str | None) -> Mapping[str, Any] | None:
     """What a DICOM series says of how it was made, as the program writes it."""
-    pull = field is None
-    if field is not None:
-        if field.displacement is not None and not isinstance(field.displacement, np.ndarray):
-            return None
-        sha256 = _core.hash_field(field._host(), _calls.threads(threads))
-        moves = field.mesh is not None or bool(np.any(field.displacement))
-    else:
-        source = require_pull(pull_field, "")
-        if not isinstance(source.displacement, np.ndarray):
-            return None
-        sha256 = _core.hash_pull_field(source.geometry._grid, source.displacement, _calls.threads(threads))
-        moves = True
-    direction = "pull" if pull else "forward"
+    if origin is None:
+        return None
     background = f"{main.background:.1f}" if main.background == int(main.background) else repr(main.background)
     parameters = (
-        f"interpolation={main.interpolation} outside={outside} background={background} direction={direction}"
+        f"interpolation={main.interpolation} outside={outside} background={background} direction={origin.direction}"
         + (" preserve=mass" if preserve else "")
     )
-    what = "Deformed by a pull field" if pull else "Deformed by a field of vertices"
     return {
-        "field_sha256": sha256,
+        "field_sha256": origin.sha256,
         "parameters": parameters,
-        "description": f"{what if moves else 'Resampled by the identity'}, {main.interpolation} interpolation",
-        "deformed": moves,
+        "description": f"{origin.what}, {main.interpolation} interpolation",
+        "deformed": origin.moves,
     }
 
 
@@ -350,8 +363,7 @@ def jacobian(
     1.0
     """
     field = require_forward(field, "the determinant is that of a forward map")
-    warp = Resampler(geometry, backend=backend, device=device, threads=threads)
-    warp.set_field(field, outside=outside)
+    warp = _resampler_of(field, geometry, outside=outside, backend=backend, device=device, threads=threads)
     return warp.resample([], maps=("jacobian",))[1]["jacobian"]
 
 

@@ -125,7 +125,6 @@ class _Resampler:
         wanted = [one if isinstance(one, Target) else Target(one) for one in targets]
         first = wanted[0].volume.array if wanted else np.empty(0)
         number = _arrays.stream_of(first, stream)
-        kept: list[Any] = []
         cores: list[_core.Target] = []
         volumes: list[Volume] = []
         for one in wanted:
@@ -137,18 +136,19 @@ class _Resampler:
                 if region is not None:
                     out[...] = _arrays.as_value(one.background, array)
             else:
-                out = _arrays.require_array(out, "out")
-                _arrays.require_takes_result(out, array)
+                out = _arrays.require_result(out, "out")
             result = Volume(out, self.geometry, padding=one.volume.padding)
             result.background = one.background
             result.series = one.volume.series
             volumes.append(result)
-            source = _arrays.exchanged(array, number)
-            target = _arrays.exchanged(out, number)
-            kept += [source, target]
             cores.append(
                 _core.Target(
-                    source, one.volume.geometry._grid, target, one.interpolation, one.background, one.volume.padding
+                    _arrays.exchanged(array, number),
+                    one.volume.geometry._grid,
+                    _arrays.exchanged(out, number),
+                    one.interpolation,
+                    one.background,
+                    one.volume.padding,
                 )
             )
         given = maps if isinstance(maps, Mapping) else {name: None for name in names_of_maps(maps)}
@@ -164,8 +164,7 @@ class _Resampler:
                 if region is not None:
                     array[...] = 0
             else:
-                array = _arrays.require_array(array, f"the map {name!r}")
-                _arrays.require_takes_result(array, first)
+                array = _arrays.require_result(array, f"the map {name!r}")
             made[name] = Volume(array, self.geometry)
             arrays[name] = _arrays.exchanged(array, number)
         box = None
@@ -180,7 +179,7 @@ class _Resampler:
 
 def names_of_maps(maps: Any) -> Sequence[str]:
     """The names of maps, if they are that."""
-    if not isinstance(maps, (list, tuple, set, frozenset)) or isinstance(maps, str) or not all(isinstance(name, str) for name in maps):
+    if not isinstance(maps, (list, tuple, set, frozenset)) or not all(isinstance(name, str) for name in maps):
         raise TypeError(f"maps is {maps!r}; expected a sequence of names, such as (\"coverage\",)")
     return list(maps)
 
