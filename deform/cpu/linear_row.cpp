@@ -26,25 +26,42 @@ using Ints = hn::RebindToSigned<Floats>;
 using Float = hn::Vec<Floats>;
 using Int = hn::Vec<Ints>;
 
-/// Reads two neighbouring voxels from the 32 bits that begin with the first.
+/// Two neighbouring voxels side by side, as they lie in memory.
 template <class V>
-struct Voxels {
+struct Pair {
+  using Bits = std::uint32_t;  ///< the pair in the low ones
+  using Value = Int;
   static constexpr int kBits = 8 * sizeof(V);
 
-  static HWY_INLINE Float low(Int bits) {
-    const Int up = hn::ShiftLeft<32 - kBits>(bits);
-    return to_float(up);
+  /// Reads pairs into a vector of first and one of second voxels.
+  static HWY_INLINE void load(const Bits* pairs, Int& low, Int& high) {
+    const Int bits = hn::BitCast(Ints(), hn::Load(hn::RebindToUnsigned<Ints>(), pairs));
+    low = from_top(hn::ShiftLeft<32 - kBits>(bits));
+    high = from_top(hn::ShiftLeft<32 - 2 * kBits>(bits));
   }
-  static HWY_INLINE Float high(Int bits) { return to_float(hn::ShiftLeft<32 - 2 * kBits>(bits)); }
+  static HWY_INLINE void store(Int value, V* output) {
+    const hn::Rebind<V, Floats> dv;
+    hn::StoreU(hn::DemoteTo(dv, value), dv, output);
+  }
 
  private:
-  /// A value of type V from the topmost bits of a number.
-  static HWY_INLINE Float to_float(Int up) {
+  /// Values of type V from the topmost bits of numbers.
+  static HWY_INLINE Int from_top(Int up) {
     const hn::RebindToUnsigned<Ints> du;
-    const Int value = std::is_signed_v<V> ? hn::ShiftRight<32 - kBits>(up)
-                                          : hn::BitCast(Ints(), hn::ShiftRight<32 - kBits>(hn::BitCast(du, up)));
-    return hn::ConvertTo(Floats(), value);
+    if constexpr (std::is_signed_v<V>) return hn::ShiftRight<32 - kBits>(up);
+    return hn::BitCast(Ints(), hn::ShiftRight<32 - kBits>(hn::BitCast(du, up)));
   }
+};
+
+template <>
+struct Pair<float> {
+  using Bits = std::uint64_t;
+  using Value = Float;
+
+  static HWY_INLINE void load(const Bits* pairs, Float& low, Float& high) {
+    hn::LoadInterleaved2(Floats(), reinterpret_cast<const float*>(pairs), low, high);
+  }
+  static HWY_INLINE void store(Float value, float* output) { hn::StoreU(value, Floats(), output); }
 };
 
 /// Where voxels come from along one axis.
@@ -64,12 +81,108 @@ struct Axis {
 
 HWY_INLINE Float mix(Float a, Float b, Float t) { return hn::Add(a, hn::Mul(t, hn::Sub(b, a))); }
 
+/// Fractions of a vector of voxels, and where they are 0.
+struct Fractions {
+  Float x, y, z;
+  hn::Mask<Floats> no_x, no_y, no_z;
+
+  HWY_INLINE Fractions(const LinearPlaces& places, int i)
+      : x(hn::Load(Floats(), places.x + i)), y(hn::Load(Floats(), places.y + i)), z(hn::Load(Floats(), places.z + i)) {
+    const Float zero = hn::Zero(Floats());
+    no_x = hn::Eq(x, zero);
+    no_y = hn::Eq(y, zero);
+    no_z = hn::Eq(z, zero);
+  }
+};
+
+/// Values of the eight voxels around a vector of places, corner c = x + 2y + 4z.
+template <class Value>
+struct Corners {
+  Value value[8];
+
+  /// Puts its neighbour, which has weight, in the place of each corner that has none.
+  HWY_INLINE void leave_out_weightless(const Fractions& at) {
+    for (int c = 1; c < 8; c += 2) value[c] = chosen(at.no_x, value[c - 1], value[c]);
+    for (const int c : {2, 3, 6, 7}) value[c] = chosen(at.no_y, value[c - 2], value[c]);
+    for (int c = 4; c < 8; ++c) value[c] = chosen(at.no_z, value[c - 4], value[c]);
+  }
+
+  static HWY_INLINE Float chosen(hn::Mask<Floats> which, Float yes, Float no) { return hn::IfThenElse(which, yes, no); }
+  static HWY_INLINE Int chosen(hn::Mask<Floats> which, Int yes, Int no) {
+    return hn::IfThenElse(hn::RebindMask(Ints(), which), yes, no);
+  }
+};
+
+/// The sample of whole numbers, to the nearest one. A corner without weight changes nothing.
+HWY_INLINE Int interpolated(const Corners<Int>& at, const Fractions& t) {
+  const auto along_x = [&](int c) {
+    return mix(hn::ConvertTo(Floats(), at.value[c]), hn::ConvertTo(Floats(), at.value[c + 1]), t.x);
+  };
+  return hn::NearestInt(mix(mix(along_x(0), along_x(2), t.y), mix(along_x(4), along_x(6), t.y), t.z));
+}
+
+/// The sample of floats: a corner without weight does not count, even if it is infinite or no number; a copy is one to
+/// the bit; and all that is no number is one and the same NaN.
+HWY_INLINE Float interpolated(const Corners<Float>& at, const Fractions& t) {
+  const Floats df;
+  const auto along_x = [&](int c) {
+    return hn::IfThenElse(t.no_x, at.value[c], mix(at.value[c], at.value[c + 1], t.x));
+  };
+  const auto along_y = [&](int c) {
+    const Float low = along_x(c);
+    return hn::IfThenElse(t.no_y, low, mix(low, along_x(c + 2), t.y));
+  };
+  const Float low = along_y(0);
+  const Float value = hn::IfThenElse(t.no_z, low, mix(low, along_y(4), t.z));
+  const Float number = hn::IfThenElse(hn::IsNaN(value), hn::Set(df, std::numeric_limits<float>::quiet_NaN()), value);
+  return hn::IfThenElse(hn::And(t.no_x, hn::And(t.no_y, t.no_z)), at.value[0], number);
+}
+
+// is_same_label and is_smaller_label of deform/core/sample.h.
+HWY_INLINE hn::Mask<Floats> same_label(Int a, Int b) { return hn::RebindMask(Floats(), hn::Eq(a, b)); }
+HWY_INLINE hn::Mask<Floats> same_label(Float a, Float b) {
+  return hn::Or(hn::Eq(a, b), hn::And(hn::IsNaN(a), hn::IsNaN(b)));
+}
+HWY_INLINE hn::Mask<Floats> smaller_label(Int a, Int b) { return hn::RebindMask(Floats(), hn::Lt(a, b)); }
+HWY_INLINE hn::Mask<Floats> smaller_label(Float a, Float b) {
+  return hn::Or(hn::Lt(a, b), hn::AndNot(hn::IsNaN(a), hn::IsNaN(b)));
+}
+
+/// The label with the largest sum of weights, by the rules of sample_vote in deform/core/sample.h.
+template <class Value>
+HWY_INLINE Value voted(Corners<Value> at, const Fractions& t) {
+  const Floats df;
+  at.leave_out_weightless(t);
+  const Value* label = at.value;
+  auto uniform = same_label(label[0], label[1]);
+  for (int c = 2; c < 8; ++c) uniform = hn::And(uniform, same_label(label[0], label[c]));
+  if (hn::AllTrue(df, uniform)) return label[0];
+  const Float one = hn::Set(df, 1.0f);
+  const Float along_x[2] = {hn::Sub(one, t.x), t.x}, along_y[2] = {hn::Sub(one, t.y), t.y},
+              along_z[2] = {hn::Sub(one, t.z), t.z};
+  Float weight[8];
+  for (int c = 0; c < 8; ++c) weight[c] = hn::Mul(hn::Mul(along_x[c & 1], along_y[c >> 1 & 1]), along_z[c >> 2]);
+  Value winner = label[0];
+  Float most = hn::Zero(df);
+  for (int c = 0; c < 8; ++c) {
+    Float sum = weight[c];
+    for (int other = c + 1; other < 8; ++other)
+      sum = hn::Add(sum, hn::IfThenElseZero(same_label(label[other], label[c]), weight[other]));
+    const auto wins = hn::Or(hn::Gt(sum, most), hn::And(hn::Eq(sum, most), smaller_label(label[c], winner)));
+    winner = Corners<Value>::chosen(wins, label[c], winner);
+    most = hn::IfThenElse(wins, sum, most);
+  }
+  return winner;
+}
+
 /// The samples between which a row is interpolated.
 template <class V>
 struct Samples {
+  using Value = typename Pair<V>::Value;
+
   /// For each voxel, a sample and the next one along i: at its own place, in the next row, in the next slice, and in
   /// both.
-  HWY_ALIGN std::uint32_t pairs[4][kMostInRow];
+  HWY_ALIGN typename Pair<V>::Bits pairs[4][kMostInRow];
 
   /// Loads sample after sample: cheaper than gathers, which some processors make of many steps, and no vector waits for
   /// it.
@@ -88,49 +201,17 @@ struct Samples {
     }
   }
 
-  HWY_INLINE Float along_x(int n, int i, Float fraction) const {
-    const Ints di;
-    const Int bits = hn::BitCast(di, hn::Load(hn::RebindToUnsigned<Ints>(), pairs[n] + i));
-    return mix(Voxels<V>::low(bits), Voxels<V>::high(bits), fraction);
-  }
-  HWY_INLINE Float interpolated(const LinearPlaces& places, int i) const {
-    const Floats df;
-    const Float fx = hn::Load(df, places.x + i), fy = hn::Load(df, places.y + i), fz = hn::Load(df, places.z + i);
-    return mix(mix(along_x(0, i, fx), along_x(1, i, fx), fy), mix(along_x(2, i, fx), along_x(3, i, fx), fy), fz);
+  HWY_INLINE Corners<Value> corners(int i) const {
+    Corners<Value> at;
+    for (int n = 0; n < 4; ++n) Pair<V>::load(pairs[n] + i, at.value[2 * n], at.value[2 * n + 1]);
+    return at;
   }
 
-  void interpolate(const LinearPlaces& places, V* output) const {
-    const hn::Rebind<V, Floats> dv;
+  /// Writes what `sample` makes of the corners and fractions of each vector of voxels.
+  template <class Sample>
+  HWY_INLINE void write(const LinearPlaces& places, V* output, Sample&& sample) const {
     const auto lanes = static_cast<int>(hn::Lanes(Floats()));
-    for (int i = 0; i < places.count; i += lanes)
-      hn::StoreU(hn::DemoteTo(dv, hn::NearestInt(interpolated(places, i))), dv, output + i);
-  }
-
-  /// Copies voxels whose samples all have the same value, and leaves the others. @return how many are not left
-  int copy_uniform(int count, V* output, RowState* state) const {
-    using Bits = std::make_unsigned_t<V>;
-    const hn::RebindToUnsigned<Ints> du;
-    const hn::Rebind<Bits, Floats> dv;
-    const hn::Rebind<std::uint8_t, Floats> d8;
-    const auto lanes = static_cast<int>(hn::Lanes(du));
-    auto* const to = reinterpret_cast<Bits*>(output);
-    auto* const states = reinterpret_cast<std::uint8_t*>(state);
-    std::size_t copied = 0;
-    for (int i = 0; i < count; i += lanes) {
-      const auto pair = hn::Load(du, pairs[0] + i);
-      const auto low = hn::And(pair, hn::Set(du, std::numeric_limits<Bits>::max()));
-      const auto other =
-          hn::Or(hn::Or(hn::Xor(pair, hn::Load(du, pairs[1] + i)), hn::Xor(pair, hn::Load(du, pairs[2] + i))),
-                 hn::Or(hn::Xor(pair, hn::Load(du, pairs[3] + i)),
-                        hn::Xor(pair, hn::Or(low, hn::ShiftLeft<Voxels<V>::kBits>(low)))));
-      const auto was = hn::PromoteTo(du, hn::LoadU(d8, states + i));
-      const auto left = hn::Set(du, static_cast<std::uint32_t>(RowState::left));
-      const auto now = hn::IfThenElse(hn::Eq(other, hn::Zero(du)), was, left);
-      copied += hn::CountTrue(du, hn::Ne(now, left));
-      hn::StoreU(hn::TruncateTo(d8, now), d8, states + i);
-      hn::StoreU(hn::TruncateTo(dv, low), dv, to + i);
-    }
-    return static_cast<int>(copied);
+    for (int i = 0; i < places.count; i += lanes) Pair<V>::store(sample(corners(i), Fractions(places, i)), output + i);
   }
 
  private:
@@ -184,11 +265,12 @@ void find_places(const LinearLayout& layout, const Row& row, LinearPlaces& place
 
 /// Calls `work` with the voxels' type.
 template <class Work>
-auto with_type(VoxelType type, void* output, Work&& work) {
+void with_type(VoxelType type, void* output, Work&& work) {
   switch (type) {
     case VoxelType::u8: return work(static_cast<std::uint8_t*>(output));
     case VoxelType::i8: return work(static_cast<std::int8_t*>(output));
     case VoxelType::u16: return work(static_cast<std::uint16_t*>(output));
+    case VoxelType::f32: return work(static_cast<float*>(output));
     default: return work(static_cast<std::int16_t*>(output));
   }
 }
@@ -196,14 +278,16 @@ auto with_type(VoxelType type, void* output, Work&& work) {
 void sample_linear(const LinearSource& source, const LinearPlaces& places, void* output) {
   with_type(source.type, output, [&](auto* to) {
     using V = std::remove_pointer_t<decltype(to)>;
-    Samples<V>(source, places).interpolate(places, to);
+    Samples<V>(source, places).write(places, to, [](const auto& at, const Fractions& t) {
+      return interpolated(at, t);
+    });
   });
 }
 
-int sample_uniform(const LinearSource& source, const LinearPlaces& places, void* output, RowState* state) {
-  return with_type(source.type, output, [&](auto* to) {
+void sample_votes(const LinearSource& source, const LinearPlaces& places, void* output) {
+  with_type(source.type, output, [&](auto* to) {
     using V = std::remove_pointer_t<decltype(to)>;
-    return Samples<V>(source, places).copy_uniform(places.count, to, state);
+    Samples<V>(source, places).write(places, to, [](const auto& at, const Fractions& t) { return voted(at, t); });
   });
 }
 
@@ -217,7 +301,7 @@ namespace tetwarp::cpu {
 
 HWY_EXPORT(find_places);
 HWY_EXPORT(sample_linear);
-HWY_EXPORT(sample_uniform);
+HWY_EXPORT(sample_votes);
 
 void LinearPlaces::find(const LinearLayout& layout, const Row& row) {
   if (found_ && layout == layout_) return;
@@ -232,9 +316,9 @@ void sample_linear_row(const LinearSource& source, const LinearPlaces& places, v
   HWY_DYNAMIC_DISPATCH(sample_linear)(source, places, output);
 }
 
-int sample_uniform_row(const LinearSource& source, const LinearPlaces& places, void* output, RowState* state) {
-  if (places.sampled == 0) return 0;
-  return HWY_DYNAMIC_DISPATCH(sample_uniform)(source, places, output, state);
+void sample_vote_row(const LinearSource& source, const LinearPlaces& places, void* output) {
+  if (places.sampled == 0) return;
+  HWY_DYNAMIC_DISPATCH(sample_votes)(source, places, output);
 }
 
 }  // namespace tetwarp::cpu

@@ -11,9 +11,9 @@
 
 namespace tetwarp::cpu {
 
-/// Voxel types that `sample_linear_row` can sample: integers of 8 and 16 bits.
+/// Voxel types that `sample_linear_row` and `sample_vote_row` can sample: integers of 8 and 16 bits, and float.
 template <class V>
-constexpr bool kHasLinearRow = std::is_integral_v<V> && sizeof(V) <= 2;
+constexpr bool kHasLinearRow = (std::is_integral_v<V> && sizeof(V) <= 2) || std::is_same_v<V, float>;
 
 /// How the voxels of a source lie that is on the grid of the output.
 struct LinearLayout {
@@ -81,10 +81,7 @@ struct LinearPlaces {
 /// @param output  gets values of the source's type
 void sample_linear_row(const LinearSource& source, const LinearPlaces& places, void* output);
 
-/// Samples by vote those voxels of a row that are not left and around which all voxels have one label.
-///
-/// @param state  state of each voxel, as `places` has it; set to `left` where there are several labels
-/// @return number of voxels that are not left
-int sample_uniform_row(const LinearSource& source, const LinearPlaces& places, void* output, RowState* state);
+/// The same with Interpolation::vote.
+void sample_vote_row(const LinearSource& source, const LinearPlaces& places, void* output);
 
 }  // namespace tetwarp::cpu

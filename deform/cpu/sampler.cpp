@@ -36,15 +36,11 @@ class TypedSampler final : public TargetSampler {
       sampled = places.slices;
       // Voxels that vectors left are written below.
       if (coverage) std::fill_n(coverage, row.count, std::uint8_t{1});
-      if (kInterpolation == Interpolation::vote) {
-        RowState state[kMostInRow];
-        std::copy_n(places.state, row.count, state);
-        const int done = sample_uniform_row(source_, places, output, state);
-        sample_left(row, state, done, output, coverage, counts, sampled);
-      } else {
+      if (kInterpolation == Interpolation::vote)
+        sample_vote_row(source_, places, output);
+      else
         sample_linear_row(source_, places, output);
-        sample_left(row, places.state, places.sampled, output, coverage, counts, sampled);
-      }
+      sample_left(row, places, output, coverage, counts, sampled);
     } else {
       for (int i = 0; i < row.count; ++i) sample_one(row, i, output, coverage, counts, sampled);
     }
@@ -80,13 +76,13 @@ class TypedSampler final : public TargetSampler {
            buffer_index(target_.output, voxel) * static_cast<std::size_t>(components());
   }
 
-  /// Samples the voxels that vectors did not. @param done  how many voxels vectors sampled
-  void sample_left(const Row& row, const RowState* state, int done, V* output, std::uint8_t* coverage, Report& counts,
+  /// Samples the voxels that vectors did not.
+  void sample_left(const Row& row, const LinearPlaces& places, V* output, std::uint8_t* coverage, Report& counts,
                    SliceRange& sampled) const {
-    counts.covered += static_cast<std::uint64_t>(done);
-    if (done == row.count) return;
+    counts.covered += static_cast<std::uint64_t>(places.sampled);
+    if (places.sampled == row.count) return;
     for (int i = 0; i < row.count; ++i)
-      if (state[i] == RowState::left) sample_one(row, i, output, coverage, counts, sampled);
+      if (places.state[i] == RowState::left) sample_one(row, i, output, coverage, counts, sampled);
   }
 
   void sample_one(const Row& row, int i, V* output, std::uint8_t* coverage, Report& counts, SliceRange& sampled) const {

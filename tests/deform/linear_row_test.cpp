@@ -7,6 +7,8 @@
 #include <gtest/gtest.h>
 
 #include <hwy/targets.h>
+#include <bit>
+#include <cstring>
 
 #include "tests/support/random.h"
 
@@ -21,8 +23,39 @@ class LinearRow : public testing::Test {
   ~LinearRow() override { hwy::SetSupportedTargetsForTest(0); }
 };
 
-using Types = testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t>;
+using Types = testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t, float>;
 TYPED_TEST_SUITE(LinearRow, Types);
+
+/// Any value of a type; of floats also both zeros, infinities, and NaN with a payload.
+template <class V>
+V random_value(Random& random) {
+  using Limits = std::numeric_limits<V>;
+  if constexpr (std::is_integral_v<V>) {
+    return static_cast<V>(random.integer(Limits::lowest(), Limits::max()));
+  } else {
+    const V rare[] = {0.0f,
+                      -0.0f,
+                      Limits::infinity(),
+                      -Limits::infinity(),
+                      Limits::max(),
+                      Limits::denorm_min(),
+                      std::bit_cast<float>(0x7fc12345u)};
+    return random.chance(0.4) ? random.one_of(rare) : static_cast<float>(random.real(-2000, 2000));
+  }
+}
+
+/// One of few labels, so that they meet; of floats also both zeros and NaN with two payloads.
+template <class V>
+V random_label(Random& random) {
+  using Limits = std::numeric_limits<V>;
+  if constexpr (std::is_integral_v<V>) {
+    const V labels[] = {Limits::lowest(), 0, 3, static_cast<V>(Limits::max() - 1), Limits::max()};
+    return random.one_of(labels);
+  } else {
+    const V labels[] = {0.0f, -0.0f, 3.0f, Limits::infinity(), std::bit_cast<float>(0x7fc12345u), Limits::quiet_NaN()};
+    return random.one_of(labels);
+  }
+}
 
 /// Offsets of all kinds: none, whole, halves, just below whole, tiny, and any; some lead out of the source.
 float random_offset(Random& random) {
@@ -37,8 +70,11 @@ float random_offset(Random& random) {
   }
 }
 
-TYPED_TEST(LinearRow, GivesTheBitsOfOneVoxelAfterTheOtherOnEveryInstructionSet) {
-  using V = TypeParam;
+/// Samples rows of a part of a source with vectors, for every instruction set, and each voxel by itself.
+/// @param value  makes a voxel of the source
+template <Interpolation kInterpolation, class V>
+void expect_same_bits(V (*value)(Random&),
+                      void (*sample)(const LinearSource& source, const LinearPlaces& places, void* output)) {
   SCOPED_TRACE(seed_text(test_seed()));
   const glm::i64vec3 size(37, 9, 11);
   const Region held{{2, 1, 3}, {37, 9, 10}};
@@ -49,8 +85,7 @@ TYPED_TEST(LinearRow, GivesTheBitsOfOneVoxelAfterTheOtherOnEveryInstructionSet) 
     ++sets;
     Random random(test_seed(), 40);
     std::vector<V> voxels(static_cast<std::size_t>(in.x * in.y * in.z));
-    for (V& voxel : voxels)
-      voxel = static_cast<V>(random.integer(std::numeric_limits<V>::lowest(), std::numeric_limits<V>::max()));
+    for (V& voxel : voxels) voxel = value(random);
     SamplePlan<V> plan{};
     plan.source = {voxels.data(), size, held.begin, glm::i64vec3(1, in.x, in.x * in.y)};
     plan.background = 77;
@@ -74,15 +109,16 @@ TYPED_TEST(LinearRow, GivesTheBitsOfOneVoxelAfterTheOtherOnEveryInstructionSet) 
       V output[kCount];
       LinearPlaces places;
       places.find(source.layout, row);
-      sample_linear_row(source, places, output);
+      sample(source, places, output);
       SliceRange expected_slices;
       for (int i = 0; i < kCount; ++i) {
         if (places.state[i] == RowState::left) continue;
         ASSERT_EQ(places.state[i], RowState::sampled);
         const SampledVoxel<V> expected =
-            sample_voxel<V, Interpolation::linear>(plan, row.voxel + glm::i64vec3(i, 0, 0), mapped[i] != 0, offset[i]);
+            sample_voxel<V, kInterpolation>(plan, row.voxel + glm::i64vec3(i, 0, 0), mapped[i] != 0, offset[i]);
         ASSERT_TRUE(expected.inside);
-        ASSERT_EQ(output[i], expected.value) << hwy::TargetName(target) << ", voxel " << i;
+        ASSERT_EQ(std::memcmp(&output[i], &expected.value, sizeof(V)), 0)
+            << hwy::TargetName(target) << ", voxel " << i << ": " << +output[i] << ", expected " << +expected.value;
         expected_slices.first = std::min(expected_slices.first, expected.first_slice);
         expected_slices.last = std::max(expected_slices.last, expected.last_slice);
         ++sampled;
@@ -92,6 +128,14 @@ TYPED_TEST(LinearRow, GivesTheBitsOfOneVoxelAfterTheOtherOnEveryInstructionSet) 
     }
   }
   EXPECT_GT(sampled, 1000 * sets) << "hardly anything is sampled with vectors";
+}
+
+TYPED_TEST(LinearRow, GivesTheBitsOfOneVoxelAfterTheOtherOnEveryInstructionSet) {
+  expect_same_bits<Interpolation::linear>(&random_value<TypeParam>, &sample_linear_row);
+}
+
+TYPED_TEST(LinearRow, VotesAsOneVoxelAfterTheOtherOnEveryInstructionSet) {
+  expect_same_bits<Interpolation::vote>(&random_label<TypeParam>, &sample_vote_row);
 }
 
 }  // namespace
