@@ -110,7 +110,7 @@ inline void write_stack(
     slice.instance_number = k + 1;
     slice.sop_instance = std::string("1.2.3.").append(std::to_string(k + 1));
     change(k, slice);
-    char name[16];
+    char name[24];
     std::snprintf(name, sizeof name, "s%02d.dcm", k);
     write_slice(folder / name, slice);
   }
