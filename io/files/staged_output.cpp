@@ -305,14 +305,21 @@ void StagedOutput::commit() {
 void StagedOutput::flush_content() const { flush_all(staged_, kind_, target_); }
 
 void StagedOutput::give_name() {
-  const bool replaces = check_target();  // looked at again, for hours may have passed
+  bool replaces = false;
   int error = 0;
-  if (!replaces)
-    error = move_to_free(staged_, target_, kind_);
-  else if (kind_ == Kind::file)
-    error = move(staged_, target_);
-  else
-    error = replace_folder(staged_, target_);
+  constexpr int kMostTries = 100;
+  for (int tries = 0; tries < kMostTries; ++tries) {
+    replaces = check_target();  // looked at again, for hours may have passed
+    if (!replaces)
+      error = move_to_free(staged_, target_, kind_);
+    else if (kind_ == Kind::file)
+      error = move(staged_, target_);
+    else
+      error = replace_folder(staged_, target_);
+    // A folder that another run replaced while it was looked at may have looked empty.
+    const bool was_taken_for_free = !replaces && (error == ENOTEMPTY || error == EEXIST);
+    if (!was_taken_for_free || !overwrite_) break;
+  }
   if (error != 0)
     throw Error("cannot give " + target_.string() + " its name: " + reason(error) + "; nothing was replaced");
   done_ = true;
