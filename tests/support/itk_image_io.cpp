@@ -16,9 +16,9 @@
 #include <sstream>
 #include <utility>
 
-/// ITK's NRRD reader leaks where it refuses a file.
+/// ITK's readers of NRRD and MHA leak where they refuse a file.
 extern "C" const char* __lsan_default_suppressions();
-extern "C" const char* __lsan_default_suppressions() { return "leak:libITKNrrdIO\n"; }
+extern "C" const char* __lsan_default_suppressions() { return "leak:libITKNrrdIO\nleak:libITKMetaIO\n"; }
 
 namespace tetwarp {
 namespace {
