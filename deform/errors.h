@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <concepts>
 #include <stdexcept>
 #include <string>
 
@@ -50,6 +51,12 @@ class Cancelled : public Error {
 /// Throws InputError with `message` unless `condition` holds.
 inline void require(bool condition, const std::string& message) {
   if (!condition) throw InputError(message);
+}
+
+/// The same for checks of every call: the message is what `make_message` returns, and is made only to be thrown.
+template <std::invocable MakeMessage>
+void require(bool condition, MakeMessage&& make_message) {
+  if (!condition) throw InputError(make_message());
 }
 
 }  // namespace tetwarp

@@ -75,12 +75,13 @@ void require_reach(const Reach& reach, const LatticeFrame& frame) {
     const double slack = kBorderRounding / glm::length(frame.output_from_lattice.linear[axis]),
                  cells = static_cast<double>(frame.cells[axis]);
     const bool below = !(reach.low[axis] >= -slack);
-    require(!below && reach.high[axis] <= cells + slack,
-            "the field's lattice of " + to_string(frame.cells + std::int64_t{1}) +
-                " vertices does not reach over the whole grid of the volume: a corner of it lies at vertex index " +
-                std::to_string(below ? reach.low[axis] : reach.high[axis]) + " of axis " + std::to_string(axis) +
-                ", expected 0 to " + std::to_string(frame.cells[axis]) +
-                "; choose rest or background for what lies outside it");
+    require(!below && reach.high[axis] <= cells + slack, [&] {
+      return "the field's lattice of " + to_string(frame.cells + std::int64_t{1}) +
+             " vertices does not reach over the whole grid of the volume: a corner of it lies at vertex index " +
+             std::to_string(below ? reach.low[axis] : reach.high[axis]) + " of axis " + std::to_string(axis) +
+             ", expected 0 to " + std::to_string(frame.cells[axis]) +
+             "; choose rest or background for what lies outside it";
+    });
   }
 }
 
@@ -100,12 +101,14 @@ LatticeFrame make_lattice_frame(const Geometry& output, const Geometry& lattice,
   frame.lattice_from_output = index_from_point(lattice) * point_from_index(output);
   frame.output_from_mm = index_from_point(output).linear;
   for (int axis = 0; axis < 3; ++axis) {
-    require(lattice.size[axis] >= 2,
-            "field lattice of " + to_string(lattice.size) + " vertices, expected at least 2 on every axis");
+    require(lattice.size[axis] >= 2, [&] {
+      return "field lattice of " + to_string(lattice.size) + " vertices, expected at least 2 on every axis";
+    });
     const double length = glm::length(frame.output_from_lattice.linear[axis]);
-    require(length >= kSmallestCell, "the field's cells are " + std::to_string(length) +
-                                         " voxels of the output along axis " + std::to_string(axis) +
-                                         ", expected at least 1/1024");
+    require(length >= kSmallestCell, [&] {
+      return "the field's cells are " + std::to_string(length) + " voxels of the output along axis " +
+             std::to_string(axis) + ", expected at least 1/1024";
+    });
   }
   const Reach reach(frame.lattice_from_output, output.size);
   if (outside == Outside::refuse) require_reach(reach, frame);
@@ -167,11 +170,12 @@ PullFrame make_pull_frame(const Geometry& output, const PullFieldView& field) {
     const glm::dvec3 at = glm::dvec3(corner & 1, corner >> 1 & 1, corner >> 2);
     const glm::dvec3 found = frame.grid_from_output(at * glm::dvec3(output.size - std::int64_t{1}));
     glm::dvec3 index = found;
-    require(frame.clamp_to_samples(index),
-            "the pull field's grid of " + to_string(frame.size) +
-                " samples does not reach over the whole grid of the volume: a corner of it lies at (" +
-                std::to_string(found.x) + ", " + std::to_string(found.y) + ", " + std::to_string(found.z) +
-                ") of it; choose rest or background for what lies outside it");
+    require(frame.clamp_to_samples(index), [&] {
+      return "the pull field's grid of " + to_string(frame.size) +
+             " samples does not reach over the whole grid of the volume: a corner of it lies at (" +
+             std::to_string(found.x) + ", " + std::to_string(found.y) + ", " + std::to_string(found.z) +
+             ") of it; choose rest or background for what lies outside it";
+    });
   }
   return frame;
 }

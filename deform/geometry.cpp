@@ -64,10 +64,11 @@ bool same_grid(const Geometry& a, const Geometry& b, double tolerance_mm) {
 }
 
 Geometry lattice_over(const Geometry& volume, std::int64_t cell_size) {
-  require(cell_size >= 1, "cell size " + std::to_string(cell_size) + ", expected at least 1 voxel");
+  require(cell_size >= 1, [&] { return "cell size " + std::to_string(cell_size) + ", expected at least 1 voxel"; });
   for (int axis = 0; axis < 3; ++axis) {
-    require(volume.size[axis] >= 2,
-            "a volume of " + to_string(volume.size) + " voxels has no cell: deforming needs at least 2 on every axis");
+    require(volume.size[axis] >= 2, [&] {
+      return "a volume of " + to_string(volume.size) + " voxels has no cell: deforming needs at least 2 on every axis";
+    });
   }
   Geometry lattice = volume;
   lattice.slices.clear();
@@ -124,18 +125,21 @@ namespace {
 
 void require_valid_slices(const Geometry& geometry, const std::string& what) {
   const std::vector<double>& slices = geometry.slices;
-  require(std::ssize(slices) == geometry.size.z && geometry.size.z >= 2,
-          what + ": " + std::to_string(slices.size()) + " places of slices, expected one for each of " +
-              std::to_string(geometry.size.z) + ", at least 2");
+  require(std::ssize(slices) == geometry.size.z && geometry.size.z >= 2, [&] {
+    return what + ": " + std::to_string(slices.size()) + " places of slices, expected one for each of " +
+           std::to_string(geometry.size.z) + ", at least 2";
+  });
   for (std::size_t k = 1; k < slices.size(); ++k) {
-    require(std::isfinite(slices[k]) && slices[k] > slices[k - 1],
-            what + ": slice " + std::to_string(k) + " lies at " + std::to_string(slices[k]) +
-                " mm, the one before at " + std::to_string(slices[k - 1]) + " mm, expected rising places");
+    require(std::isfinite(slices[k]) && slices[k] > slices[k - 1], [&] {
+      return what + ": slice " + std::to_string(k) + " lies at " + std::to_string(slices[k]) +
+             " mm, the one before at " + std::to_string(slices[k - 1]) + " mm, expected rising places";
+    });
   }
   const double last = geometry.spacing.z * static_cast<double>(geometry.size.z - 1);
-  require(slices.front() == 0 && std::abs(slices.back() - last) <= 1e-9 * last,
-          what + ": slices lie from " + std::to_string(slices.front()) + " to " + std::to_string(slices.back()) +
-              " mm, expected 0 to " + std::to_string(last) + ", by their mean distance");
+  require(slices.front() == 0 && std::abs(slices.back() - last) <= 1e-9 * last, [&] {
+    return what + ": slices lie from " + std::to_string(slices.front()) + " to " + std::to_string(slices.back()) +
+           " mm, expected 0 to " + std::to_string(last) + ", by their mean distance";
+  });
 }
 
 }  // namespace
@@ -143,17 +147,19 @@ void require_valid_slices(const Geometry& geometry, const std::string& what) {
 void require_valid(const Geometry& geometry, const std::string& what) {
   for (int axis = 0; axis < 3; ++axis) {
     require(geometry.size[axis] >= 1,
-            what + ": size " + to_string(geometry.size) + ", expected at least 1 on every axis");
-    std::ostringstream spacing;
-    spacing << geometry.spacing[axis];
-    require(is_spacing(geometry.spacing[axis]), what + ": spacing " + spacing.str() + " mm on axis " +
-                                                    std::to_string(axis) +
-                                                    ", expected a positive number from 1e-6 to 1e6");
-    require(std::isfinite(geometry.origin[axis]), what + ": the origin is not finite");
+            [&] { return what + ": size " + to_string(geometry.size) + ", expected at least 1 on every axis"; });
+    require(is_spacing(geometry.spacing[axis]), [&] {
+      std::ostringstream text;
+      text << what << ": spacing " << geometry.spacing[axis] << " mm on axis " << axis
+           << ", expected a positive number from 1e-6 to 1e6";
+      return text.str();
+    });
+    require(std::isfinite(geometry.origin[axis]), [&] { return what + ": the origin is not finite"; });
   }
   const double determinant = glm::determinant(geometry.direction);
-  require(std::isfinite(determinant) && std::abs(determinant) > 1e-6,
-          what + ": the direction's columns do not span space (determinant " + std::to_string(determinant) + ")");
+  require(std::isfinite(determinant) && std::abs(determinant) > 1e-6, [&] {
+    return what + ": the direction's columns do not span space (determinant " + std::to_string(determinant) + ")";
+  });
   if (!geometry.slices.empty()) require_valid_slices(geometry, what);
 }
 

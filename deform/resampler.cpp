@@ -11,9 +11,10 @@ namespace tetwarp {
 namespace {
 
 void require_one_each(const Geometry& grid, std::size_t vectors) {
-  require(static_cast<std::size_t>(voxel_count(grid)) == vectors,
-          "a field on " + to_string(grid.size) + " vertices needs " + std::to_string(voxel_count(grid)) +
-              " displacements, found " + std::to_string(vectors));
+  require(static_cast<std::size_t>(voxel_count(grid)) == vectors, [&] {
+    return "a field on " + to_string(grid.size) + " vertices needs " + std::to_string(voxel_count(grid)) +
+           " displacements, found " + std::to_string(vectors);
+  });
 }
 
 }  // namespace
@@ -48,10 +49,11 @@ Resampler::Resampler(Geometry output) : output_(output) {
   require_valid(output_, "output grid");
   require(output_.slices.empty(), "the output grid has uneven slices; only a source may");
   for (int axis = 0; axis < 3; ++axis) {
-    require(output_.size[axis] >= 2,
-            "output grid of " + to_string(output_.size) + " voxels: deforming needs at least 2 on every axis");
+    require(output_.size[axis] >= 2, [&] {
+      return "output grid of " + to_string(output_.size) + " voxels: deforming needs at least 2 on every axis";
+    });
     require(output_.size[axis] <= std::int64_t{1} << 18,
-            "output grid of " + to_string(output_.size) + " voxels: at most 262144 on an axis");
+            [&] { return "output grid of " + to_string(output_.size) + " voxels: at most 262144 on an axis"; });
   }
 }
 

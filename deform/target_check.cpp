@@ -21,11 +21,13 @@ std::string describe(const Region& region) {
 
 template <class View>
 void check_view(const View& view, const std::string& name) {
-  require(view.geometry && view.voxels, name + " is empty");
-  require(view.components >= 1, name + " has " + std::to_string(view.components) + " components, expected 1 or more");
-  require(contains(whole(*view.geometry), view.buffered), name + " buffers " + describe(view.buffered) +
-                                                              ", which is not part of its grid of " +
-                                                              to_string(view.geometry->size));
+  require(view.geometry && view.voxels, [&] { return name + " is empty"; });
+  require(view.components >= 1,
+          [&] { return name + " has " + std::to_string(view.components) + " components, expected 1 or more"; });
+  require(contains(whole(*view.geometry), view.buffered), [&] {
+    return name + " buffers " + describe(view.buffered) + ", which is not part of its grid of " +
+           to_string(view.geometry->size);
+  });
 }
 
 void check_target(const Target& target, const Geometry& output, const Region& region, const Region& needed) {
@@ -34,34 +36,44 @@ void check_target(const Target& target, const Geometry& output, const Region& re
   require_valid(*target.source.geometry, "source grid");
   require(target.source.geometry->slices.empty() || target.interpolation != Interpolation::cubic,
           "cubic interpolation needs even slices, those of the source are not; choose linear");
-  require(*target.output.geometry == output, "the output of " + to_string(target.output.geometry->size) +
-                                                 " voxels is not on the resampler's grid of " + to_string(output.size));
-  require(target.output.type == target.source.type, "the output holds " + to_string(target.output.type) +
-                                                        ", the source " + to_string(target.source.type) +
-                                                        ": they must be the same");
-  require(target.output.components == target.source.components,
-          "the output has " + std::to_string(target.output.components) + " components, the source " +
-              std::to_string(target.source.components) + ": they must be the same");
-  require(
-      !target.padding || target.source.components == 1,
-      "padding is for one value a voxel, the source has " + std::to_string(target.source.components) + " components");
-  require(contains(target.output.buffered, region),
-          "the output buffers " + describe(target.output.buffered) + ", the region asked for is " + describe(region));
+  require(*target.output.geometry == output, [&] {
+    return "the output of " + to_string(target.output.geometry->size) + " voxels is not on the resampler's grid of " +
+           to_string(output.size);
+  });
+  require(target.output.type == target.source.type, [&] {
+    return "the output holds " + to_string(target.output.type) + ", the source " + to_string(target.source.type) +
+           ": they must be the same";
+  });
+  require(target.output.components == target.source.components, [&] {
+    return "the output has " + std::to_string(target.output.components) + " components, the source " +
+           std::to_string(target.source.components) + ": they must be the same";
+  });
+  require(!target.padding || target.source.components == 1, [&] {
+    return "padding is for one value a voxel, the source has " + std::to_string(target.source.components) +
+           " components";
+  });
+  require(contains(target.output.buffered, region), [&] {
+    return "the output buffers " + describe(target.output.buffered) + ", the region asked for is " + describe(region);
+  });
   require(contains(target.source.buffered, needed),
-          "the source buffers " + describe(target.source.buffered) + ", needed is " + describe(needed));
+          [&] { return "the source buffers " + describe(target.source.buffered) + ", needed is " + describe(needed); });
   require(target.sampled_slices.empty() || static_cast<std::int64_t>(target.sampled_slices.size()) == output.size.z,
-          "sampled_slices has " + std::to_string(target.sampled_slices.size()) + " entries, expected one for each of " +
-              std::to_string(output.size.z) + " slices");
+          [&] {
+            return "sampled_slices has " + std::to_string(target.sampled_slices.size()) +
+                   " entries, expected one for each of " + std::to_string(output.size.z) + " slices";
+          });
 }
 
 void check_map(const VolumeView& map, const std::string& name, VoxelType type, int components, const Geometry& output,
                const Region& region) {
   if (!map.voxels) return;
-  require(map.geometry && *map.geometry == output, "the " + name + " map is not on the resampler's grid");
-  require(map.type == type && map.components == components,
-          "the " + name + " map holds " + std::to_string(map.components) + " x " + to_string(map.type) + ", expected " +
-              std::to_string(components) + " x " + to_string(type));
-  require(contains(map.buffered, region), "the " + name + " map does not buffer the region asked for");
+  require(map.geometry && *map.geometry == output,
+          [&] { return "the " + name + " map is not on the resampler's grid"; });
+  require(map.type == type && map.components == components, [&] {
+    return "the " + name + " map holds " + std::to_string(map.components) + " x " + to_string(map.type) +
+           ", expected " + std::to_string(components) + " x " + to_string(type);
+  });
+  require(contains(map.buffered, region), [&] { return "the " + name + " map does not buffer the region asked for"; });
 }
 
 /// Removes the rounding that two changes of frame leave, where two grids agree along an axis: voxels are then copied
@@ -86,7 +98,7 @@ AffineMap without_rounding(AffineMap map) {
 void check_targets(const Resampler& resampler, std::span<const Target> targets, const Region& region) {
   const Geometry& output = resampler.output();
   require(contains(whole(output), region),
-          "the region asked for is not part of the output grid of " + to_string(output.size));
+          [&] { return "the region asked for is not part of the output grid of " + to_string(output.size); });
   for (const Target& target : targets) {
     const Geometry* grid = target.source.geometry;
     const bool all = !grid || target.source.buffered == whole(*grid);
@@ -103,7 +115,7 @@ void check_maps(const Maps& maps, const Geometry& output, const Region& region) 
 
 void require_host(Memory memory, const std::string& name) {
   require(memory == Memory::host,
-          name + " is in device memory, which the CPU cannot read; use a resampler on that device");
+          [&] { return name + " is in device memory, which the CPU cannot read; use a resampler on that device"; });
 }
 
 SourceRelation relate(const Geometry& source, const Geometry& output, const double* slices) {

@@ -41,10 +41,11 @@ void require_dense(const A& array, const std::string& name) {
   std::int64_t expected = 1;
   for (std::size_t axis = array.ndim(); axis-- > 0;) {
     const auto length = static_cast<std::int64_t>(array.shape(axis));
-    require(length <= 1 || array.stride(axis) == expected,
-            name +
-                " does not lie in memory as [k, j, i] with i fastest; pass a copy, numpy.ascontiguousarray(...), or " +
-                "order=\"ijk\" for an array [i, j, k] in Fortran order");
+    require(length <= 1 || array.stride(axis) == expected, [&] {
+      return name +
+             " does not lie in memory as [k, j, i] with i fastest; pass a copy, numpy.ascontiguousarray(...), or " +
+             "order=\"ijk\" for an array [i, j, k] in Fortran order";
+    });
     expected *= std::max<std::int64_t>(length, 1);
   }
 }
@@ -78,11 +79,13 @@ View view_of(const A& array, const Geometry& grid, const std::string& name) {
   const std::vector<std::int64_t> shape = shape_of(array);
   const glm::i64vec3 size = grid.size;
   require((shape.size() == 3 || shape.size() == 4) && shape[0] == size.z && shape[1] == size.y && shape[2] == size.x,
-          name + " has the shape " + text_of(shape) + "; its geometry has " + text_of({size.z, size.y, size.x}) +
-              " (k, j, i)");
+          [&] {
+            return name + " has the shape " + text_of(shape) + "; its geometry has " +
+                   text_of({size.z, size.y, size.x}) + " (k, j, i)";
+          });
   const std::int64_t components = shape.size() == 4 ? shape[3] : 1;
   require(components >= 1 && components <= INT16_MAX,
-          name + " has " + std::to_string(components) + " values a voxel; expected 1 to 32767");
+          [&] { return name + " has " + std::to_string(components) + " values a voxel; expected 1 to 32767"; });
   require_dense(array, name);
   View view{.geometry = &grid,
             .buffered = whole(grid),
@@ -111,11 +114,13 @@ const V* values_of(const ConstArray& array, const std::vector<std::int64_t>& sha
   const std::vector<std::int64_t> found = shape_of(array);
   bool fits = found.size() == shape.size();
   for (std::size_t axis = 0; fits && axis < shape.size(); ++axis) fits = shape[axis] < 0 || shape[axis] == found[axis];
-  require(fits, name + " has the shape " + text_of(found) + "; expected " + text_of(shape));
+  require(fits, [&] { return name + " has the shape " + text_of(found) + "; expected " + text_of(shape); });
   const auto type = nb::dtype<V>();
-  require(array.dtype() == type, name + " holds " + name_of(array.dtype()) + "; expected " + name_of(type));
+  require(array.dtype() == type,
+          [&] { return name + " holds " + name_of(array.dtype()) + "; expected " + name_of(type); });
   require_dense(array, name);
-  require(may_be_on_device || where(array, name) == Memory::host, name + " lies on a device; expected host memory");
+  require(may_be_on_device || where(array, name) == Memory::host,
+          [&] { return name + " lies on a device; expected host memory"; });
   return static_cast<const V*>(array.data());
 }
 
