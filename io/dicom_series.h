@@ -73,6 +73,10 @@ struct DicomScan {
   std::size_t files = 0;             ///< number of files that were looked at
 };
 
+/// Names a file with DCMTK's data dictionary for machines without one. It is loaded with the first DICOM file where
+/// DCMTK finds none at its own place and DCMDICTPATH is not set. To be called before.
+void set_dicom_dictionary(const std::filesystem::path& path);
+
 /// Reads the headers of all files in a folder and its sub-folders; symbolic links are followed, and each real folder is
 /// read once. Pixels are read only of files with equal SOP Instance UIDs.
 /// @param path     a folder; a DICOMDIR, which names files; or a file, whose folder is searched for its series

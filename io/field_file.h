@@ -100,11 +100,13 @@ PullField read_pull_field(const FieldSource& source);
 /// not written.
 /// @throws InputError for a suffix that no volume file has, or displacements that do not fit the lattice
 /// @throws Error when the file cannot be written
-void write_field_file(const std::filesystem::path& path, const VertexField& field);
+/// @throws Cancelled when `control.stop` is set before the last slice is written
+void write_field_file(const std::filesystem::path& path, const VertexField& field, const Control& control = {});
 /// Writes a pull field with its direction. `read_pull_field` gives the same bits again.
 /// @throws InputError for a suffix that no volume file has, or displacements that do not fit the grid
 /// @throws Error when the file cannot be written
-void write_field_file(const std::filesystem::path& path, const PullField& field);
+/// @throws Cancelled when `control.stop` is set before the last slice is written
+void write_field_file(const std::filesystem::path& path, const PullField& field, const Control& control = {});
 
 /// Begins a file as `write_field_file` writes it, for displacements that come slice by slice (3 x float32, LPS mm).
 /// @throws InputError for a suffix that no volume file has

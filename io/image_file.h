@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "deform/resampler.h"
 #include "deform/volume.h"
 
 namespace tetwarp {
@@ -71,6 +72,10 @@ class ImageWriter {
   /// @throws InputError for other slices
   /// @throws Error when they cannot be written
   void write(const ConstVolumeView& slices);
+  /// Writes all slices of a volume and completes the file.
+  /// @param control  progress, and stop, which is looked at every few hundredths of a second
+  /// @throws what `write` and `finish` throw, and Cancelled
+  void write_whole(const ConstVolumeView& volume, const Control& control = {});
   /// Completes the file after the last slice.
   /// @throws InputError when slices are missing
   /// @throws Error when the file cannot be completed
@@ -81,6 +86,8 @@ class ImageWriter {
   ImageWriter(std::filesystem::path path, const Geometry& grid, VoxelType type, int components)
       : path_(std::move(path)), grid_(grid), type_(type), components_(components) {}
 
+  /// How many bytes of slices are written in a few hundredths of a second, and use all threads that can help.
+  virtual std::size_t bytes_at_once() const { return std::size_t{1} << 20; }
   /// Writes slices that were checked.
   virtual void append(const ConstVolumeView& slices) = 0;
   /// Completes the file; all slices were written.
@@ -112,7 +119,8 @@ std::unique_ptr<ImageWriter> create_image(const std::filesystem::path& path, con
 /// Writes a whole volume by `create_image`.
 /// @throws InputError for an unknown suffix, or a grid or metadata that the format cannot hold
 /// @throws Error when the file cannot be written
+/// @throws Cancelled when `control.stop` is set before the last slice is written
 void write_image(const std::filesystem::path& path, const ConstVolumeView& volume,
-                 const ImageWriteOptions& options = {});
+                 const ImageWriteOptions& options = {}, const Control& control = {});
 
 }  // namespace tetwarp

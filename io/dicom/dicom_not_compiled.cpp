@@ -17,6 +17,8 @@ namespace {
 
 }  // namespace
 
+void set_dicom_dictionary(const std::filesystem::path&) {}
+
 DicomScan scan_dicom(const std::filesystem::path&, bool, const Control&) { refuse(); }
 
 DicomVolume load_dicom(const DicomSeries&, int, const Control&, FileHash) { refuse(); }

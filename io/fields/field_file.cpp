@@ -78,13 +78,12 @@ FieldFile read_as(const FieldSource& source, std::optional<Direction> wanted) {
 }
 
 void write_as(const std::filesystem::path& path, const Geometry& grid, const std::vector<glm::vec3>& displacement,
-              Direction direction) {
+              Direction direction, const Control& control) {
   require(displacement.size() == static_cast<std::size_t>(voxel_count(grid)),
           std::to_string(displacement.size()) + " displacements for " + to_string(grid.size) + " vertices, " +
               path.string());
-  const auto writer = create_field_file(path, grid, direction);
-  writer->write({&grid, whole(grid), VoxelType::f32, 3, std::as_bytes(std::span(displacement)).data()});
-  writer->finish();
+  create_field_file(path, grid, direction)
+      ->write_whole({&grid, whole(grid), VoxelType::f32, 3, std::as_bytes(std::span(displacement)).data()}, control);
 }
 
 }  // namespace
@@ -148,12 +147,12 @@ PullField read_pull_field(const FieldSource& source) {
   return {field.grid, std::move(field.displacement)};
 }
 
-void write_field_file(const std::filesystem::path& path, const VertexField& field) {
-  write_as(path, field.lattice, field.displacement, Direction::forward);
+void write_field_file(const std::filesystem::path& path, const VertexField& field, const Control& control) {
+  write_as(path, field.lattice, field.displacement, Direction::forward, control);
 }
 
-void write_field_file(const std::filesystem::path& path, const PullField& field) {
-  write_as(path, field.grid, field.displacement, Direction::pull);
+void write_field_file(const std::filesystem::path& path, const PullField& field, const Control& control) {
+  write_as(path, field.grid, field.displacement, Direction::pull, control);
 }
 
 std::unique_ptr<ImageWriter> create_field_file(const std::filesystem::path& path, const Geometry& grid,

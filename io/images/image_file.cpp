@@ -165,6 +165,27 @@ void ImageWriter::write(const ConstVolumeView& slices) {
   written_ = end.z;
 }
 
+void ImageWriter::write_whole(const ConstVolumeView& volume, const Control& control) {
+  require(volume.geometry && volume.voxels && volume.buffered == whole(*volume.geometry),
+          "only a whole volume can be written, " + path_.string());
+  const glm::i64vec3 size = volume.geometry->size;
+  const std::size_t slice_bytes =
+      static_cast<std::size_t>(size.x * size.y) * static_cast<std::size_t>(volume.components) * size_bytes(volume.type);
+  const bool is_watched = control.stop.stop_possible() || control.progress;
+  const std::int64_t slices =
+      is_watched ? std::max<std::int64_t>(1, static_cast<std::int64_t>(bytes_at_once() / slice_bytes)) : size.z;
+  for (std::int64_t begin = 0; begin < size.z; begin += slices) {
+    if (control.stop.stop_requested()) throw Cancelled();
+    if (control.progress) control.progress(static_cast<double>(begin) / static_cast<double>(size.z));
+    ConstVolumeView part = volume;
+    part.buffered = {{0, 0, begin}, {size.x, size.y, std::min(begin + slices, size.z)}};
+    part.voxels += static_cast<std::size_t>(begin) * slice_bytes;
+    write(part);
+  }
+  finish();
+  if (control.progress) control.progress(1);
+}
+
 void ImageWriter::finish() {
   require(written_ == grid_.size.z, std::to_string(written_) + " slices were written, " + path_.string() +
                                         "; expected " + std::to_string(grid_.size.z));
@@ -193,12 +214,10 @@ std::unique_ptr<ImageWriter> create_image(const std::filesystem::path& path, con
   return create_format(path, format, grid, type, components, options);
 }
 
-void write_image(const std::filesystem::path& path, const ConstVolumeView& volume, const ImageWriteOptions& options) {
-  require(volume.geometry && volume.voxels && volume.buffered == whole(*volume.geometry),
-          "only a whole volume can be written, " + path.string());
-  const auto writer = create_image(path, *volume.geometry, volume.type, volume.components, options);
-  writer->write(volume);
-  writer->finish();
+void write_image(const std::filesystem::path& path, const ConstVolumeView& volume, const ImageWriteOptions& options,
+                 const Control& control) {
+  require(volume.geometry, "a volume without a grid, " + path.string());
+  create_image(path, *volume.geometry, volume.type, volume.components, options)->write_whole(volume, control);
 }
 
 }  // namespace tetwarp

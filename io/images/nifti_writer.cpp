@@ -1,6 +1,8 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
+#include <tbb/task_arena.h>
+
 #include <algorithm>
 #include <array>
 #include <cstring>
@@ -154,6 +156,12 @@ class GzipNiftiWriter final : public NiftiWriter {
     std::vector<std::byte> left;   ///< values that do not fill a member yet
     std::optional<Spool> waiting;  ///< members
   };
+
+  std::size_t bytes_at_once() const override {
+    constexpr int kPiecesOfThread = 2;
+    return kPiecesOfThread * kGzipPieceBytes * planes_.size() *
+           static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
+  }
 
   void append(const ConstVolumeView& slices) override {
     for (std::size_t c = 0; c < planes_.size(); ++c) {

@@ -4,13 +4,18 @@
 #include "python/src/calls.h"
 
 #include <pthread.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <exception>
 #include <mutex>
 #include <thread>
+#include <vector>
+
+#include "deform/errors.h"
 
 namespace tetwarp::python {
 
@@ -22,6 +27,64 @@ std::atomic<bool> forked = false;
 
 thread_local bool in_progress_callable = false;
 unsigned long main_thread = 0;  // of Python, as PyThread_get_thread_ident has it
+
+/// Calls that are under way, so that those of daemon threads end before the interpreter does: a thread that wants its
+/// lock later is ended by Python amid C++, which ends the process.
+class Calls {
+ public:
+  void begin(std::stop_source* stop) {
+    const std::lock_guard lock(mutex_);
+    if (closed_ && !is_main_thread()) throw Cancelled();
+    stops_.push_back(stop);
+  }
+  void end(std::stop_source* stop) {
+    const std::lock_guard lock(mutex_);
+    remove(stop);
+  }
+  /// To be called without the interpreter's lock, when the work is done: goes no further if the interpreter ends.
+  void stay_if_closed(std::stop_source* stop) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (!closed_ || is_main_thread()) return;
+      remove(stop);
+    }
+    for (;;) ::pause();
+  }
+  /// Stops all, waits until their work has ended, and lets none go on in other threads than the main one.
+  void close() {
+    std::unique_lock lock(mutex_);
+    closed_ = true;
+    for (std::stop_source* stop : stops_) stop->request_stop();
+    none_.wait_for(lock, 10s, [&] { return stops_.empty(); });
+  }
+
+ private:
+  static bool is_main_thread() { return PyThread_get_thread_ident() == main_thread; }
+  void remove(std::stop_source* stop) {
+    std::erase(stops_, stop);
+    if (stops_.empty()) none_.notify_all();
+  }
+
+  std::mutex mutex_;
+  std::condition_variable none_;
+  std::vector<std::stop_source*> stops_;
+  bool closed_ = false;
+};
+
+/// Never destroyed, for threads may outlive this module; another one after a fork, for the parent's threads are gone.
+Calls* calls = new Calls;
+
+/// A call while it is under way. Its end needs the interpreter's lock.
+class CallUnderWay {
+ public:
+  explicit CallUnderWay(std::stop_source& stop) : stop_(stop) { calls->begin(&stop_); }
+  ~CallUnderWay() { calls->end(&stop_); }
+  CallUnderWay(const CallUnderWay&) = delete;
+  CallUnderWay& operator=(const CallUnderWay&) = delete;
+
+ private:
+  std::stop_source& stop_;
+};
 
 /// Passes progress to a callable of Python, at most 20 times a second, and keeps what it raises.
 class Progress {
@@ -95,6 +158,7 @@ bool signal_raised() {
 
 void run_call(const CallOptions& options, bool small, const std::function<void(const Control&)>& work) {
   std::stop_source stop;
+  const CallUnderWay under_way(stop);
   Progress progress(options.progress, stop);
   Control control{.stop = stop.get_token(), .stream = reinterpret_cast<void*>(options.stream)};
   if (!options.progress.is_none()) control.progress = std::ref(progress);
@@ -115,11 +179,27 @@ void run_call(const CallOptions& options, bool small, const std::function<void(c
         work(control);
       }
     } catch (...) {
+      calls->stay_if_closed(&stop);
       if (!interrupted && !progress.error()) throw;
     }
+    calls->stay_if_closed(&stop);
   }
   if (interrupted) throw nb::python_error();
   if (progress.error()) std::rethrow_exception(progress.error());
+}
+
+std::unique_lock<std::timed_mutex> locked(std::timed_mutex& mutex) {
+  std::unique_lock lock(mutex, std::try_to_lock);
+  if (lock) return lock;
+  const bool watches = PyThread_get_thread_ident() == main_thread;
+  const nb::gil_scoped_release released;
+  while (!lock.try_lock_for(20ms)) {
+    if (watches && signal_raised()) {
+      const nb::gil_scoped_acquire raised;
+      throw nb::python_error();
+    }
+  }
+  return lock;
 }
 
 bool is_in_progress_callable() { return in_progress_callable; }
@@ -141,8 +221,15 @@ bool is_forked() { return forked; }
 
 void watch_process() {
   main_thread = nb::cast<unsigned long>(nb::module_::import_("threading").attr("main_thread")().attr("ident"));
-  static const int once = pthread_atfork(nullptr, nullptr, [] { forked = true; });
+  static const int once = pthread_atfork(nullptr, nullptr, [] {
+    forked = true;
+    calls = new Calls;
+  });
   static_cast<void>(once);
+  nb::module_::import_("atexit").attr("register")(nb::cpp_function([] {
+    const nb::gil_scoped_release released;
+    calls->close();
+  }));
 }
 
 }  // namespace tetwarp::python

@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <mutex>
 #include <optional>
 #include <string>
 
@@ -30,8 +31,17 @@ struct CallOptions {
 /// at once by the calling thread, as it is in any thread but the main one, which gets no signals. An exception of
 /// `progress` stops the work too, and is raised.
 /// @param small  whether the work surely takes less than 20 ms
-/// @throws what the work throws
+/// When the interpreter ends, calls of daemon threads are stopped.
+/// @throws what the work throws, and Cancelled once the interpreter ends
 void run_call(const CallOptions& options, bool small, const std::function<void(const Control&)>& work);
+
+/// A file of fewer voxels or vectors than this is surely written in less than 20 ms.
+constexpr std::int64_t kSmallFile = 10000;
+
+/// Locks what serves one call at a time. While another thread has it, the interpreter's lock is given free, which the
+/// holder may need to end, and signals are seen in the main thread.
+/// @throws the exception of a signal's handler
+std::unique_lock<std::timed_mutex> locked(std::timed_mutex& mutex);
 
 /// Whether this thread is within a call of `progress`: what is locked for the call that it belongs to would never be
 /// given free.

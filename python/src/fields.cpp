@@ -89,26 +89,29 @@ nb::tuple read_pull_file(const std::string& text, const std::string& nifti_frame
   return nb::make_tuple(grid, as_numpy(grid, std::move(field.displacement)));
 }
 
-void write_forward(const std::filesystem::path& path, const VertexField& field, bool overwrite) {
-  const nb::gil_scoped_release released;
-  StagedOutput output(path, StagedOutput::Kind::file, overwrite);
-  if (has_mesh_suffix(path)) {
-    write_mesh_file(output.path(), mesh_of(field), field.lattice);
-  } else {
-    require(field.mesh.is_empty(),
-            "the field is a mesh, which " + path.string() + " cannot hold; write it as a mesh, .vtu or .vtk");
-    write_field_file(output.path(), field);
-  }
-  output.commit();
+void write_forward(const std::filesystem::path& path, const VertexField& field, bool overwrite,
+                   const CallOptions& options) {
+  run_call(options, field.mesh.is_empty() && std::ssize(field.displacement) < kSmallFile, [&](const Control& control) {
+    StagedOutput output(path, StagedOutput::Kind::file, overwrite);
+    if (has_mesh_suffix(path)) {
+      write_mesh_file(output.path(), mesh_of(field), field.lattice);
+    } else {
+      require(field.mesh.is_empty(),
+              "the field is a mesh, which " + path.string() + " cannot hold; write it as a mesh, .vtu or .vtk");
+      write_field_file(output.path(), field, control);
+    }
+    output.commit();
+  });
 }
 
-void write_pull(const std::filesystem::path& path, const Geometry& grid, const ConstArray& displacement,
-                bool overwrite) {
+void write_pull(const std::filesystem::path& path, const Geometry& grid, const ConstArray& displacement, bool overwrite,
+                const CallOptions& options) {
   const PullField field = pull_field_of(grid, displacement);
-  const nb::gil_scoped_release released;
-  StagedOutput output(path, StagedOutput::Kind::file, overwrite);
-  write_field_file(output.path(), field);
-  output.commit();
+  run_call(options, voxel_count(grid) < kSmallFile, [&](const Control& control) {
+    StagedOutput output(path, StagedOutput::Kind::file, overwrite);
+    write_field_file(output.path(), field, control);
+    output.commit();
+  });
 }
 
 /// Several forward fields on one another, the first applied first.
@@ -253,8 +256,10 @@ void add_fields(nb::module_& core) {
            nb::arg("options"));
   core.def("read_file", &read_file, nb::arg("text"), nb::arg("nifti_frame"));
   core.def("read_pull_file", &read_pull_file, nb::arg("text"), nb::arg("nifti_frame"));
-  core.def("write_forward", &write_forward, nb::arg("path"), nb::arg("field"), nb::arg("overwrite"));
-  core.def("write_pull", &write_pull, nb::arg("path"), nb::arg("grid"), nb::arg("displacement"), nb::arg("overwrite"));
+  core.def("write_forward", &write_forward, nb::arg("path"), nb::arg("field"), nb::arg("overwrite"),
+           nb::arg("options"));
+  core.def("write_pull", &write_pull, nb::arg("path"), nb::arg("grid"), nb::arg("displacement"), nb::arg("overwrite"),
+           nb::arg("options"));
   core.def("compose", &compose_all, nb::arg("fields"), nb::arg("threads"), nb::arg("options"));
   core.def("move_points", &move, nb::arg("output"), nb::arg("field"), nb::arg("points"), nb::arg("outside"),
            nb::arg("threads"), nb::arg("options"));

@@ -78,9 +78,9 @@ void write_file(const std::filesystem::path& path, const ConstArray& array, cons
                 const std::map<std::string, std::string>& metadata, bool overwrite, const CallOptions& options) {
   const ConstVolumeView view = voxels_of(array, grid, "the volume");
   require(view.memory == Memory::host, "the volume lies on a device; copy it to the host to write it");
-  run_call(options, voxel_count(grid) < 10000, [&](const Control&) {
+  run_call(options, voxel_count(grid) < kSmallFile, [&](const Control& control) {
     StagedOutput output(path, StagedOutput::Kind::file, overwrite);
-    write_image(output.path(), view, {.compression = compression, .metadata = metadata});
+    write_image(output.path(), view, {.compression = compression, .metadata = metadata}, control);
     output.commit();
   });
 }
@@ -152,6 +152,7 @@ void add_files(nb::module_& core) {
            nb::arg("series_number").none(), nb::arg("series_description").none(), nb::arg("threads"),
            nb::arg("overwrite"), nb::arg("options"));
   core.def("info", &info, nb::arg("path"), nb::arg("single"), nb::arg("nifti_frame"));
+  core.def("set_dicom_dictionary", &set_dicom_dictionary, nb::arg("path"));
   core.def("has_image_suffix", &has_image_suffix, nb::arg("path"));
   core.def("phantom", &phantom, nb::arg("size"), nb::arg("spacing"), nb::arg("seed"), nb::arg("options"));
 }

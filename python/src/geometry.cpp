@@ -71,6 +71,9 @@ void add_geometry(nb::module_& core) {
           [](const Geometry& grid, std::int64_t cell_size) { return lattice_over(straightened(grid), cell_size); },
           nb::arg("cell_size"))
       .def("straightened", &straightened)
+      .def(
+          "__eq__", [](const Geometry& one, const Geometry& other) { return one == other; }, nb::is_operator(),
+          nb::sig("def __eq__(self, other: object, /) -> bool"))
       .def("centre", [](const Geometry& grid) { return triple(centre(grid)); })
       .def("orientation", &orientation_code);
 }

@@ -186,15 +186,13 @@ class BoundResampler {
   }
 
  private:
-  /// Locks without the interpreter's lock, which the holder may need to end.
-  std::unique_lock<std::mutex> in_use() {
+  std::unique_lock<std::timed_mutex> in_use() {
     if (is_forked() && resampler_.backend() == BackendKind::cuda) {
       throw DeviceError(
           "this resampler was made before the process was forked, and CUDA does not work here; make it here");
     }
     require(!is_in_progress_callable(), "a progress callable cannot call a resampler; note the share, and return");
-    const nb::gil_scoped_release released;
-    return std::unique_lock(mutex_);
+    return locked(mutex_);
   }
 
   void require_set() const { require(is_set_, "no field is set; call set_field first"); }
@@ -260,7 +258,7 @@ class BoundResampler {
   TetrahedralMesh mesh_;
   std::vector<std::uint64_t> replaced_;
   bool is_set_ = false;
-  std::mutex mutex_;
+  std::timed_mutex mutex_;
 };
 
 std::uint64_t keep_mass(const ConstArray& hu, const ConstArray& coverage, const ConstArray& jacobian,

@@ -68,14 +68,12 @@ class BoundRun {
   }
 
  private:
-  /// Locks without the interpreter's lock, which the holder may need to end.
-  std::unique_lock<std::mutex> in_use() {
+  std::unique_lock<std::timed_mutex> in_use() {
     require(!is_in_progress_callable(), "a progress callable cannot call its simulation; note the share, and return");
-    const nb::gil_scoped_release released;
-    return std::unique_lock(mutex_);
+    return locked(mutex_);
   }
 
-  std::mutex mutex_;
+  std::timed_mutex mutex_;
   Scenario scenario_;
   Patient patient_;
   std::optional<ScenarioRun> run_;

@@ -74,23 +74,35 @@ def test_cuda_in_a_forked_child_is_refused_by_name():
     assert result.returncode == 0, result.stderr
 
 
-def test_ctrl_c_ends_a_call_within_a_tenth_of_a_second():
+@pytest.mark.parametrize(
+    "work",
+    [
+        'tw.deform(volume, field, outside="background", backend="cpu")',
+        'tw.write(volume, "ct.nii.gz", compress=9, overwrite=True)',
+        'tw.write(volume, "ct.mha", compress=9, overwrite=True)',
+        'tw.write_field(field, "field.nii.gz", overwrite=True)',
+    ],
+)
+def test_ctrl_c_ends_a_call_within_a_tenth_of_a_second(work, tmp_path):
     code = """
     import sys, time
     import numpy as np
     import tetwarp as tw
     grid = tw.Geometry((300, 300, 300))
     field = tw.fields.elastic(grid, amplitude=8, spacing=40, seed=1, cell_size=2)
-    volume = tw.Volume(np.zeros((300, 300, 300), np.int16), grid)
+    volume = tw.Volume(np.random.default_rng(1).integers(-1000, 1000, grid.shape).astype(np.int16), grid)
     print("ready", flush=True)
     try:
         while True:
-            tw.deform(volume, field, outside="background", backend="cpu")
+            WORK
     except KeyboardInterrupt:
         print("interrupted", time.time(), flush=True)
     """
+    code = code.replace("WORK", work)
     for wait in (0.3, 0.7, 1.3):
-        process = subprocess.Popen([sys.executable, "-c", textwrap.dedent(code)], stdout=subprocess.PIPE, text=True)
+        process = subprocess.Popen(
+            [sys.executable, "-c", textwrap.dedent(code)], stdout=subprocess.PIPE, text=True, cwd=tmp_path
+        )
         assert process.stdout.readline() == "ready\n"
         time.sleep(wait)
         sent = time.time()
@@ -98,8 +110,58 @@ def test_ctrl_c_ends_a_call_within_a_tenth_of_a_second():
         word, when = process.stdout.readline().split()
         assert process.wait(timeout=60) == 0
         assert word == "interrupted"
+        assert {path.name for path in tmp_path.iterdir()} <= {"ct.nii.gz", "ct.mha", "field.nii.gz"}  # whole ones
         # A machine that is busy with other tests gives the processor late: three times the promise is allowed there.
         assert float(when) - sent < 0.1 * (3 if os.getloadavg()[0] > 0.5 * os.cpu_count() else 1)
+
+
+def test_an_interpreter_that_ends_stops_the_calls_of_daemon_threads():
+    result = run_python(
+        """
+        import threading, time
+        import numpy as np
+        import tetwarp as tw
+        grid = tw.Geometry((200, 200, 200))
+        field = tw.fields.elastic(grid, amplitude=8, spacing=40, seed=1, cell_size=2)
+        volume = tw.Volume(np.ones(grid.shape, np.float32), grid)
+        def forever():
+            while True:
+                tw.deform(volume, field, outside="background", backend="cpu", threads=1)
+        for _ in range(4):
+            threading.Thread(target=forever, daemon=True).start()
+        time.sleep(0.5)
+        """
+    )
+    assert result.returncode == 0 and result.stderr == "", (result.returncode, result.stderr)
+
+
+def test_a_call_that_waits_for_another_one_sees_ctrl_c():
+    result = run_python(
+        """
+        import os, signal, threading, time
+        import numpy as np
+        import tetwarp as tw
+        volume = tw.phantom((300, 300, 200), spacing=(1, 1, 1.5))
+        warp = tw.Resampler(volume.geometry, backend="cpu", threads=1)
+        warp.set_field(tw.fields.elastic(volume.geometry, amplitude=8, spacing=40, seed=1, cell_size=2), outside="background")
+        def again():
+            for _ in range(8):
+                warp.resample([volume])
+        other = threading.Thread(target=again)
+        other.start()
+        time.sleep(0.1)
+        threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
+        begin = time.monotonic()
+        try:
+            while True:
+                warp.resample([volume])
+        except KeyboardInterrupt:
+            waited = time.monotonic() - begin
+        other.join()
+        raise SystemExit(0 if waited < 0.8 else f"{waited} s")
+        """
+    )
+    assert result.returncode == 0, result.stderr
 
 
 def test_what_a_progress_raises_ends_the_call(ct):

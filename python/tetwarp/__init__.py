@@ -18,25 +18,23 @@ from __future__ import annotations
 import os as _os
 from typing import Any as _Any
 
-# DCMTK reads its dictionary where this says, unless the user says otherwise.
-_dictionary = _os.path.join(_os.path.dirname(__file__), "dicom.dic")
-if "DCMDICTPATH" not in _os.environ and _os.path.exists(_dictionary):
-    _os.environ["DCMDICTPATH"] = _dictionary
-
-from . import _core, adapters, fields  # noqa: E402
-from .batching import batch  # noqa: E402
-from .deforming import Along, Deformed, compose, deform, forward_of, invert, jacobian, move_points  # noqa: E402
-from .errors import Cancelled, DeviceError, Error, InputError, NotCompiled  # noqa: E402
-from .field import PullField, TetrahedralMesh, VertexField  # noqa: E402
-from .files import info, phantom, read, read_field, write, write_field  # noqa: E402
-from .geometry import Geometry  # noqa: E402
-from .rendering import render  # noqa: E402
-from .report import Report  # noqa: E402
-from .resampler import PullResampler, Resampler, Target  # noqa: E402
-from .simulation import Frame, Run, simulate  # noqa: E402
-from .volume import Volume  # noqa: E402
+from . import _core, adapters, fields
+from .batching import batch
+from .deforming import Along, Deformed, compose, deform, forward_of, invert, jacobian, move_points
+from .errors import Cancelled, DeviceError, Error, InputError, NotCompiled
+from .field import PullField, TetrahedralMesh, VertexField
+from .files import info, phantom, read, read_field, write, write_field
+from .geometry import Geometry
+from .rendering import render
+from .report import Report
+from .resampler import PullResampler, Resampler, Target
+from .simulation import Frame, Run, simulate
+from .volume import Volume
 
 __version__: str = _core.version()
+
+# A machine without DCMTK has not its data dictionary either; the package brings one.
+_core.set_dicom_dictionary(_os.path.join(_os.path.dirname(__file__), "dicom.dic"))
 
 __all__ = [
     "Along",

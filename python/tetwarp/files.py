@@ -207,10 +207,17 @@ def read_field(
         "pull": the file leads from the output back to the input. A file that says otherwise is refused.
     cell_size : int, optional
         Of a transform: a vertex on every `cell_size`-th voxel.
+    nifti_frame : "sform" or "qform"
+        Which place of a NIfTI file counts.
 
     Returns
     -------
     VertexField or PullField
+
+    Raises
+    ------
+    InputError
+        For a file that is no field, that says the other direction, or that has a value which is not finite.
 
     Examples
     --------
@@ -243,8 +250,17 @@ def read_field(
     return VertexField._of(parts, notes)
 
 
-def write_field(field: VertexField | PullField, path: PathLike, *, overwrite: bool = False) -> None:
+def write_field(
+    field: VertexField | PullField, path: PathLike, *, overwrite: bool = False, progress: _calls.Progress = False
+) -> None:
     """Writes a field, which says its direction: .mha, .nrrd, .nii, .nii.gz, or a mesh as .vtk, .vtu.
+
+    Raises
+    ------
+    InputError
+        For a field that the format cannot hold.
+    Error
+        For something that exists, a full disk, a folder that is missing.
 
     Examples
     --------
@@ -253,10 +269,11 @@ def write_field(field: VertexField | PullField, path: PathLike, *, overwrite: bo
     >>> tw.write_field(tw.fields.identity(Geometry((4, 4, 4))), os.path.join(tempfile.mkdtemp(), "field.nii.gz"))
     """
     name = _path(path)
+    options = _calls.options(progress, "write")
     if isinstance(field, VertexField):
-        _core.write_forward(name, field._host(), bool(overwrite))
+        _core.write_forward(name, field._host(), bool(overwrite), options)
     elif isinstance(field, PullField):
-        _core.write_pull(name, field.geometry._grid, field.displacement, bool(overwrite))
+        _core.write_pull(name, field.geometry._grid, field.displacement, bool(overwrite), options)
     else:
         raise TypeError(f"the field is a {type(field).__name__}; expected a VertexField or a PullField")
 

@@ -228,13 +228,14 @@ class Geometry:
 
     def straightened(self) -> Geometry:
         """The straight, even grid onto which a tilted or uneven stack is resampled; any other grid itself."""
-        return Geometry._of(self._grid.straightened())
+        straight = self._grid.straightened()
+        return self if straight == self._grid else Geometry._of(straight)
 
     def _state(self) -> tuple[Any, ...]:
         return (self.size, self.spacing, self.origin, tuple(self._grid.direction), self.slices)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Geometry) and self._state() == other._state()
+        return isinstance(other, Geometry) and (other is self or self._grid == other._grid)
 
     def __hash__(self) -> int:
         return hash(self._state())

@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <mutex>
 #include <span>
@@ -190,12 +191,28 @@ class Decoders {
   Decoders& operator=(const Decoders&) = delete;
 };
 
+std::filesystem::path& dictionary_of_ours() {
+  static std::filesystem::path path;
+  return path;
+}
+
+/// Where DCMTK found none and the user named none. What cannot be read is refused by `prepare_dcmtk`.
+void load_dictionary_of_ours() {
+  const std::filesystem::path& path = dictionary_of_ours();
+  if (path.empty() || dcmDataDict.isDictionaryLoaded() || std::getenv("DCMDICTPATH") != nullptr) return;
+  dcmDataDict.wrlock().loadDictionary(path.c_str());
+  dcmDataDict.wrunlock();
+}
+
 }  // namespace
+
+void set_dicom_dictionary(const std::filesystem::path& path) { dictionary_of_ours() = path; }
 
 void prepare_dcmtk() {
   static std::once_flag once;
   std::call_once(once, [] {
     OFLog::configure(OFLogger::OFF_LOG_LEVEL);
+    load_dictionary_of_ours();
     dcmEnableUnknownVRConversion.set(OFTrue);  // standard attributes that were written as VR UN get their own VR
     static const Decoders decoders;
   });

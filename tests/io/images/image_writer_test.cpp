@@ -87,6 +87,33 @@ TEST(ImageWriter, EverySplitGivesTheSameBytesInEveryFormatAndLevel) {
   }
 }
 
+TEST(ImageWriter, AWriteThatIsWatchedHasTheSameBytesAndStopsBetweenItsParts) {
+  const Scratch scratch;
+  const AnyVolume volume = noisy({256, 256, 40}, VoxelType::i16, 1);  // 5 MB
+  for (const std::string& name : kNames) {
+    const ImageWriteOptions options{1, {}};
+    write_image(scratch / name, volume.view(), options);
+    const std::string whole = read_bytes(scratch / name);
+    std::vector<double> shares;
+    write_image(scratch / name, volume.view(), options, {.progress = [&](double share) { shares.push_back(share); }});
+    EXPECT_TRUE(read_bytes(scratch / name) == whole) << name;
+    EXPECT_TRUE(std::ranges::is_sorted(shares) && shares.back() == 1) << name;
+    const bool is_small = name.ends_with(".gz");  // threads take it in few parts, or in one
+    EXPECT_TRUE(is_small || shares.size() >= 5) << name << " " << shares.size();
+
+    std::stop_source stop;
+    int calls = 0;
+    const auto stop_soon = [&](double) {
+      if (++calls == 1) stop.request_stop();
+    };
+    if (is_small) stop.request_stop();
+    EXPECT_THROW(write_image(scratch / name, volume.view(), options, {.progress = stop_soon, .stop = stop.get_token()}),
+                 Cancelled)
+        << name;
+    EXPECT_LE(calls, 1) << name;
+  }
+}
+
 #ifdef TETWARP_WITH_ITK
 TEST(ImageWriter, MhaAndNrrdHaveTheBytesThatItkWrites) {
   const Scratch scratch;
