@@ -205,6 +205,35 @@ def test_an_array_without_a_place_is_refused(volume):
         tw.deform(volume.array, tw.fields.identity(volume.geometry))
 
 
+def test_a_pull_field_goes_to_simpleitk_and_comes_back():
+    sitk = pytest.importorskip("SimpleITK")
+    ct = tw.phantom((40, 36, 30), spacing=(2.0, 2.5, 3.0))
+    turned = tw.Geometry(ct.geometry.size, ct.geometry.spacing, (5, -7, 9), [[0, 1, 0], [-1, 0, 0], [0, 0, 1]])
+    ct = tw.Volume(ct.array, turned)
+    field = tw.fields.bubble(turned, radius=35, strength=0.7)  # nothing moves at the border, and NaN comes of nothing
+    inverse = tw.invert(field, turned, outside="rest")
+    image = inverse.to_simpleitk()
+    again = tw.PullField.from_image(image)
+    assert again.geometry == turned and again.displacement.tobytes() == inverse.displacement.tobytes()
+    # SimpleITK, which adds the vectors to points in LPS mm, takes values from where Tetwarp takes them.
+    source = sitk.GetImageFromArray(ct.array.astype(np.float32))
+    source.CopyInformation(image)
+    theirs = sitk.GetArrayFromImage(
+        sitk.Resample(source, source, sitk.DisplacementFieldTransform(image), sitk.sitkLinear, -1000.0)
+    )
+    ours = tw.deform(tw.Volume(ct.array.astype(np.float32), turned), pull_field=again, outside="background").volume.array
+    inner = (slice(6, -6),) * 3
+    assert np.abs(theirs - ours)[inner].max() < 0.5 < np.abs(ours - ct.array)[inner].max()
+
+
+def test_images_that_say_no_axes_of_their_vectors_are_no_fields():
+    sitk = pytest.importorskip("SimpleITK")
+    with pytest.raises(tw.InputError, match="1 x int16 a voxel"):
+        tw.PullField.from_image(sitk.GetImageFromArray(np.zeros((3, 3, 3), np.int16)))
+    with pytest.raises(TypeError, match="axes of their vectors"):
+        tw.PullField.from_image(np.zeros((3, 3, 3, 3), np.float32))
+
+
 def test_directions_are_never_mistaken(volume):
     forward = tw.fields.identity(volume.geometry)
     pull = tw.invert(forward, volume.geometry)

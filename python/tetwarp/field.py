@@ -177,6 +177,45 @@ class PullField:
         #: Remarks about what was read.
         self.notes: list[str] = []
 
+    @classmethod
+    def from_image(cls, image: Any) -> PullField:
+        """The pull field of an image of vectors of SimpleITK or itk, such as registration gives.
+
+        Its vectors are x, y, z in LPS mm, from each point of the output to where its value comes from, as ITK's
+        transforms have them. Float64 is rounded to float32; float32 is not copied.
+
+        Raises
+        ------
+        TypeError
+            For images of other libraries, which do not say the axes of their vectors.
+        InputError
+            For an image that has not three real values a voxel.
+        """
+        from . import adapters
+
+        return cls(*adapters.displacement_of(image))
+
+    def to_simpleitk(self) -> Any:
+        """A copy as SimpleITK.Image of vectors of float64, which `SimpleITK.DisplacementFieldTransform` takes.
+
+        Raises
+        ------
+        ImportError
+            Where SimpleITK is not installed.
+        InputError
+            For a field on a device, or one with NaN: SimpleITK would take it for a place.
+        """
+        from .adapters import simpleitk
+
+        if not isinstance(self.displacement, np.ndarray):
+            raise InputError("the displacement lies on a device; copy it to the host first")
+        if np.isnan(self.displacement).any():
+            raise InputError(
+                "the pull field has places from which nothing comes (NaN), which SimpleITK does not know; "
+                "take a lattice that reaches over the output, or set them to what you want"
+            )
+        return simpleitk.vector_image(self.geometry, self.displacement)
+
     def __repr__(self) -> str:
         return f"<PullField on {self.geometry!r}>"
 

@@ -12,7 +12,10 @@ import importlib
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from ..errors import InputError
+from ..geometry import Geometry
 from ..volume import Volume
 
 #: Takes a deformed volume to the type of what was given.
@@ -56,6 +59,34 @@ def volume_of(value: Any, *, name: str = "the volume") -> tuple[Volume, Back]:
         f"{name} is a {type(value).__name__}; expected a tetwarp.Volume, or an image of SimpleITK, itk, nibabel, MONAI "
         "or TorchIO"
     )
+
+
+#: Libraries whose images of vectors say displacements along x, y and z in LPS mm.
+_VECTORS_IN_LPS = ("SimpleITK", "itk")
+
+
+def displacement_of(image: Any) -> tuple[Geometry, np.ndarray[Any, Any]]:
+    """Grid and displacement of an image of vectors of SimpleITK or itk, as float32; float64 is rounded.
+
+    Raises
+    ------
+    TypeError
+        For images of other libraries, which do not say along which axes their vectors lie.
+    InputError
+        For an image that has not three real values a voxel.
+    """
+    if type(image).__module__.split(".")[0] not in _VECTORS_IN_LPS:
+        raise TypeError(
+            f"the field is a {type(image).__name__}; expected an image of vectors of SimpleITK or itk, others do not say "
+            "the axes of their vectors: pass the geometry and the displacement, x, y, z in LPS mm"
+        )
+    volume, _ = volume_of(image, name="the field")
+    array = volume.array
+    if array.ndim != 4 or array.shape[3] != 3 or array.dtype.kind != "f":
+        raise InputError(
+            f"the field holds {1 if array.ndim < 4 else array.shape[3]} x {array.dtype} a voxel; expected 3 x float32 or float64"
+        )
+    return volume.geometry, array.astype(np.float32, copy=False)
 
 
 def copies_of(back: Back) -> int:

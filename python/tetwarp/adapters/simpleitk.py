@@ -25,6 +25,19 @@ def volume_of(image: Any, name: str) -> tuple[Volume, Any]:
     return Volume(view, geometry), Back(image)
 
 
+def vector_image(geometry: Geometry, displacement: Any) -> Any:
+    """An image of vectors of float64, as `SimpleITK.DisplacementFieldTransform` takes it."""
+    image = sitk.GetImageFromArray(np.asarray(displacement, np.float64), isVector=True)
+    _place(image, geometry)
+    return image
+
+
+def _place(image: Any, geometry: Geometry) -> None:
+    image.SetSpacing(geometry.spacing)
+    image.SetOrigin(geometry.origin)
+    image.SetDirection(geometry.direction.ravel().tolist())
+
+
 class _Held:
     """Memory of an image, which it keeps: SimpleITK's own views do not, and NumPy keeps what it takes an array from."""
 
@@ -43,10 +56,7 @@ class Back:
 
     def __call__(self, volume: Volume) -> Any:
         image = sitk.GetImageFromArray(volume.array, isVector=self._image.GetPixelID() >= sitk.sitkVectorUInt8)
-        geometry = volume.geometry
-        image.SetSpacing(geometry.spacing)
-        image.SetOrigin(geometry.origin)
-        image.SetDirection(geometry.direction.ravel().tolist())
+        _place(image, volume.geometry)
         for key in self._image.GetMetaDataKeys():
             image.SetMetaData(key, self._image.GetMetaData(key))
         return image
