@@ -7,7 +7,8 @@
     run.py [FILE...] [--keep FOLDER]
 
 Without FILE: all of this folder. FOLDER receives each as .ipynb with its results. Needs jupytext, nbclient, ipykernel
-and matplotlib, and the package tetwarp, in the Python that runs this script.
+and matplotlib, and the package tetwarp, in the Python that runs this script; ends with 77 where jupytext or nbclient is
+missing.
 """
 import argparse
 import os
@@ -16,11 +17,15 @@ import sys
 import tempfile
 import time
 
-import jupytext
-import nbformat
-from jupyter_client import AsyncKernelManager
-from nbclient import NotebookClient
-from nbclient.exceptions import CellExecutionError
+try:
+    import jupytext
+    import nbformat
+    from jupyter_client import AsyncKernelManager
+    from nbclient import NotebookClient
+    from nbclient.exceptions import CellExecutionError
+except ImportError as missing:
+    print(f"skipped: {missing}")
+    sys.exit(77)
 
 
 def execute(path, keep, timeout_s):

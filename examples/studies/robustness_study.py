@@ -1,4 +1,4 @@
-#!/usr/bin/python3
+#!/usr/bin/env python3
 # SPDX-FileCopyrightText: The Tetwarp authors
 # SPDX-License-Identifier: Apache-2.0
 
@@ -8,19 +8,18 @@
 
 A family of smooth random fields of growing amplitude deforms the CT and, by majority, its labels, which are the truth of the deformed
 CT. The method under test, here thresholds, segments the deformed CT; its Dice against that truth says how much of its quality is left.
-Put your own method in the place of `study.segment`. Makes FOLDER/robustness.csv and, with python3-matplotlib, FOLDER/robustness.png.
+Put your own method in the place of `study.segment`. Makes FOLDER/robustness.csv and, with matplotlib, FOLDER/robustness.png.
 """
 import csv
 
 import study
 
-from study import numpy
+import numpy
+import tetwarp
 
 
 def measure(folder, case, line, hu, labels):
-    deformed, _ = study.read(folder / case / "image.nii.gz")
-    truth, _ = study.read(folder / case / "truth.nii.gz")
-    inside, _ = study.read(folder / case / "covered.nii.gz")
+    deformed, truth, inside = (tetwarp.read(folder / case / name).array for name in ("image.nii.gz", "truth.nii.gz", "covered.nii.gz"))
     found = numpy.where(inside > 0, study.segment(deformed), 0)
     truth = numpy.where(inside > 0, truth, 0)
     kept, method = study.dice(labels, truth), study.dice(found, truth)
@@ -34,7 +33,7 @@ def plot(rows, path):
     try:
         import matplotlib
     except ImportError:
-        return print("no plot: install python3-matplotlib")
+        return print("no plot: install matplotlib")
     matplotlib.use("Agg")
     from matplotlib import pyplot
     figure, (left, right) = pyplot.subplots(1, 2, figsize=(10, 4), constrained_layout=True)
@@ -68,7 +67,7 @@ def main():
         "case": name, "input": str(ct.resolve()), "variants": options.repeats, "seed": 1, "cell-size": options.cell_size,
         "field": f"elastic:amplitude={amplitude},spacing=72", "output": "image.nii.gz", "coverage": "covered.nii.gz",
         "with": [study.along(labels_path, "truth.nii.gz:vote")]} for name, amplitude in amplitudes.items()])
-    (hu, _), (labels, _) = study.read(ct), study.read(labels_path)
+    hu, labels = tetwarp.read(ct).array, tetwarp.read(labels_path).array
     rows = [{"case": case, "amplitude_mm": amplitudes[case.split("-")[0]], **measure(options.output / "cases", case, line, hu, labels)}
             for case, line in results.items()]
     with open(options.output / "robustness.csv", "w", newline="") as file:

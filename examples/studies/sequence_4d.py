@@ -1,4 +1,4 @@
-#!/usr/bin/python3
+#!/usr/bin/env python3
 # SPDX-FileCopyrightText: The Tetwarp authors
 # SPDX-License-Identifier: Apache-2.0
 
@@ -15,7 +15,8 @@ import math
 
 import study
 
-from study import nibabel, numpy
+import nibabel
+import numpy
 
 
 def main():
@@ -31,9 +32,9 @@ def main():
         "case": name, "input": str(ct.resolve()), "cell-size": options.cell_size, "output": "phase.nii.gz", "write-field": "field.nii.gz",
         "field": f"elastic:amplitude={options.amplitude * part:.6g},spacing=80,seed={options.seed}" if part > 0 else "identity"}
         for name, part in scale.items()])
-    phases = [study.read(options.output / "cases" / case / "phase.nii.gz") for case in results]
-    image = nibabel.Nifti1Image(numpy.stack([values for values, _ in phases], axis=3), phases[0][1].affine)
-    image.header.set_zooms((*phases[0][1].header.get_zooms()[:3], options.period / options.phases))
+    phases = [nibabel.load(options.output / "cases" / case / "phase.nii.gz") for case in results]
+    image = nibabel.Nifti1Image(numpy.stack([numpy.squeeze(phase.dataobj) for phase in phases], axis=3), phases[0].affine)
+    image.header.set_zooms((*phases[0].header.get_zooms()[:3], options.period / options.phases))
     image.header.set_xyzt_units("mm", "sec")
     nibabel.save(image, options.output / "sequence.nii.gz")
     with open(options.output / "phases.csv", "w", newline="") as file:

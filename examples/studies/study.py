@@ -1,34 +1,22 @@
 # SPDX-FileCopyrightText: The Tetwarp authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the studies share: the program, a source, labels by thresholds, and batches that may be killed and continued.
+"""What the studies share: a source, labels by thresholds, and batches that may be killed and continued.
 
-Needs python3-numpy and python3-nibabel. The program is that of TETWARP, or the one that was built in build/.
-
-The studies call the program, not the package of Python. All that they deform goes through `tetwarp batch`, whose cases
-are processes and files, so that a study that was killed goes on where it was; `tetwarp.batch` starts the same program. The
-phantom or series that a batch begins with is a file for the same reason. So a study runs with the Python of the system.
+Needs the Python package (`pip install .` in a clone); some also nibabel and matplotlib. What is deformed goes through
+`tetwarp.batch`, so that a study that was killed goes on where it was.
 """
 import argparse
 import json
-import os
 import pathlib
-import subprocess
 import sys
 
+import numpy
+
 try:
-    import nibabel
-    import numpy
+    import tetwarp
 except ImportError as missing:
-    sys.exit(f"{missing}; install python3-numpy and python3-nibabel")
-
-
-def program():
-    built = sorted(pathlib.Path(__file__).resolve().parents[2].glob("build/*/apps/tetwarp"))
-    path = os.environ.get("TETWARP") or (built[0] if built else None)
-    if not path:
-        sys.exit("build Tetwarp first, or name the program in TETWARP")
-    return str(pathlib.Path(path).resolve())
+    sys.exit(f"{missing}; install the package: pip install . in a clone of Tetwarp")
 
 
 def folder(name):
@@ -40,35 +28,25 @@ def parser(description):
     words = argparse.ArgumentParser(description=description.strip(), formatter_class=argparse.RawDescriptionHelpFormatter)
     words.add_argument("ct", nargs="?", help="a folder of DICOM or a volume file (default: a phantom)")
     words.add_argument("-o", "--output", type=folder, required=True, help="folder of the study; continued where it exists")
-    words.add_argument("--series", help="of a folder that holds several")
+    words.add_argument("--series", default="", help="of a folder that holds several")
     words.add_argument("--size", default="160,160,80", help="voxels of the phantom (default: %(default)s)")
     words.add_argument("--cell-size", type=int, default=4, help="voxels between vertices of the field (default: %(default)s)")
     return words
 
 
-def tetwarp(*arguments, good=(0,)):
-    status = subprocess.run([program(), *map(str, arguments)]).returncode
-    if status not in good:
-        sys.exit(status)
-
-
 def source(options):
-    """Writes the CT as OUTPUT/ct.nii.gz, in HU: the series as it is, or a phantom of 400 x 400 x 320 mm."""
+    """Writes the CT as OUTPUT/ct.nii.gz, in HU: the series on a straight grid, or a phantom of 400 x 400 x 320 mm."""
     options.output.mkdir(parents=True, exist_ok=True)
     path = options.output / "ct.nii.gz"
     if path.exists():
         return path
     if options.ct:
-        tetwarp("deform", pathlib.Path(options.ct).resolve(), "-f", "identity", "-o", path, "--quiet", *(["--series", options.series] if options.series else []))
+        ct = tetwarp.read(options.ct, series=options.series)
+        tetwarp.write(tetwarp.deform(ct, tetwarp.fields.identity(ct.geometry)).volume, path)
     else:
-        spacing = ",".join(f"{mm / float(n):.6g}" for mm, n in zip((400, 400, 320), options.size.split(",")))
-        tetwarp("phantom", "-o", path, "--size", options.size, "--spacing", spacing, "--quiet")
+        size = [int(number) for number in options.size.split(",")]
+        tetwarp.write(tetwarp.phantom(size, spacing=[mm / number for mm, number in zip((400, 400, 320), size)]), path)
     return path
-
-
-def read(path):
-    image = nibabel.load(path)
-    return numpy.squeeze(numpy.asarray(image.dataobj)), image
 
 
 def segment(hu):
@@ -84,8 +62,8 @@ def label_map(options, ct):
     """Writes the labels as OUTPUT/labels.nii.gz, on the grid of the CT."""
     path = options.output / "labels.nii.gz"
     if not path.exists():
-        hu, image = read(ct)
-        nibabel.save(nibabel.Nifti1Image(segment(hu), image.affine), path)
+        volume = tetwarp.read(ct)
+        tetwarp.write(tetwarp.Volume(segment(volume.array), volume.geometry), path)
     return path
 
 
@@ -111,6 +89,7 @@ def batch(options, rows):
     """Runs the cases, or those that are not finished. @return the lines of results.jsonl by case"""
     manifest, out = options.output / "manifest.jsonl", options.output / "cases"
     manifest.write_text("".join(json.dumps(row) + "\n" for row in rows))
-    tetwarp("batch", manifest, "-o", out, "--resume", *([] if sys.stderr.isatty() else ["--quiet"]))
+    if (status := tetwarp.batch(manifest, out, resume=True)) != 0:
+        sys.exit(status)
     lines = [json.loads(line) for line in (out / "results.jsonl").read_text().splitlines()]
     return {line["case"]: line for line in lines}

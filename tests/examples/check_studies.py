@@ -3,7 +3,7 @@
 
 """The studies of examples/studies at a small size: what they make is what their texts say.
 
-    check_studies.py TETWARP STUDIES_FOLDER        status 77: numpy or nibabel is missing
+    check_studies.py STUDIES_FOLDER        wants the package tetwarp; status 77: nibabel is missing
 """
 import csv
 import os
@@ -12,21 +12,29 @@ import subprocess
 import sys
 import tempfile
 
+import numpy
+import tetwarp
+
 try:
     import nibabel
-    import numpy
 except ImportError as missing:
     print(f"skipped: {missing}")
     sys.exit(77)
 
-os.environ["TETWARP"] = os.path.abspath(sys.argv[1])
 os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
-studies = pathlib.Path(sys.argv[2]).resolve()
+studies = pathlib.Path(sys.argv[1]).resolve()
 SMALL = ["--size", "48,48,24"]
+# Names that a shell, or an option, would take for more than names.
+HOSTILE = ["it's; touch hurt; '", "$(touch hurt)`touch hurt`", "-o", "two\nlines\n", " blanks  ", '"quotes" & \\back\\',
+           "a=b:c,d", "braces {out} {0}"]
+
+
+def start(name, *arguments, **options):
+    return subprocess.run([sys.executable, studies / name, *map(str, arguments)], capture_output=True, text=True, **options)
 
 
 def run(name, *arguments):
-    done = subprocess.run([sys.executable, studies / name, *SMALL, *map(str, arguments)], capture_output=True, text=True)
+    done = start(name, *SMALL, *arguments)
     assert done.returncode == 0, done.stderr
 
 
@@ -97,7 +105,22 @@ def check_sequence(folder):
     assert numpy.allclose(half, farthest / 4, atol=1e-5), "fields of a sequence are one field, scaled"
 
 
+def check_hostile_names(folder):
+    ct = tetwarp.phantom((16, 16, 8), spacing=(20, 20, 25))
+    for number, name in enumerate(HOSTILE):
+        here = folder / str(number)
+        here.mkdir(parents=True)
+        tetwarp.write(ct, here / f"{name}.nrrd")
+        done = start("augmentation_set.py", f"--output={name} set", "--variants", 1, "--", f"{name}.nrrd", cwd=here)
+        if "=" in name:
+            assert done.returncode == 1 and "a path with = cannot go along" in done.stderr, done.stderr
+        else:
+            assert done.returncode == 0 and (here / f"{name} set" / "set.csv").stat().st_size > 0, done.stderr
+        assert not list(here.rglob("hurt*")), name
+
+
 with tempfile.TemporaryDirectory(prefix="tetwarp-studies-") as scratch:
-    for name, check in (("set", check_augmentation), ("robustness", check_robustness), ("sequence", check_sequence)):
+    for name, check in (("set", check_augmentation), ("robustness", check_robustness), ("sequence", check_sequence),
+                        ("names", check_hostile_names)):
         check(pathlib.Path(scratch) / name)
         print("good:", name)

@@ -60,20 +60,9 @@ for name in "${names[@]}"; do
       [ "$(grep -c '"status":"done"' "./$out snake/results.jsonl")" = 3 ] || { cat ../log; fail "not 3 cases by Snakemake, $name"; }
     fi
   fi
-  if /usr/bin/python3 -c 'import nibabel' 2>/dev/null; then
-    cp ct.nrrd "./$name.nrrd"
-    status=0
-    TETWARP=$tetwarp /usr/bin/python3 "$examples/studies/augmentation_set.py" --output="$out set" --variants 1 -- "$name.nrrd" \
-      >../log 2>&1 || status=$?
-    if [[ $name == *=* ]]; then
-      [ $status = 1 ] && grep -q 'a path with = cannot go along' ../log || { cat ../log; fail "a path with =, $name"; }
-    else
-      [ $status = 0 ] && [ -s "./$out set/set.csv" ] || { cat ../log; fail "augmentation_set.py with $name"; }
-    fi
-  fi
   cd ..
   [ -z "$(find . -name 'hurt*')" ] || fail "a name was run as a command: $name"
 done
 "$examples/cluster/submit.sh" m.jsonl out '1 --wrap=x' >log 2>&1 && fail "a number of tasks that is none"
 grep -q 'submit.sh: error: N is' log || fail "no word on the number of tasks"
-echo "${#names[@]} names went through submit.sh, Snakefile and a study as names"
+echo "${#names[@]} names went through submit.sh and Snakefile as names"
