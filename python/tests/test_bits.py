@@ -171,6 +171,20 @@ def test_an_open_cut_is_one_field_with_that_of_the_program(program, tmp_path):
     assert_same_bits(tw.deform(body, field, outside="background", backend="cpu").volume, tw.read(tmp_path / "out.mha"))
 
 
+def test_a_series_in_implicit_vr_is_read(program, tmp_path):
+    """Without DCMTK's data dictionary nothing is known of such a file but its numbers."""
+    if not tw.features()["dicom"]:
+        pytest.skip("a build without DICOM")
+    pydicom = pytest.importorskip("pydicom")
+    program("phantom", "-o", tmp_path / "explicit", "--size", "32,32,10", "--spacing", "11,11,30")
+    (tmp_path / "implicit").mkdir()
+    for path in (tmp_path / "explicit").iterdir():
+        slice_ = pydicom.dcmread(path)
+        slice_.file_meta.TransferSyntaxUID = pydicom.uid.ImplicitVRLittleEndian
+        slice_.save_as(tmp_path / "implicit" / path.name, implicit_vr=True, little_endian=True)
+    assert_same_bits(tw.read(tmp_path / "implicit"), tw.read(tmp_path / "explicit"))
+
+
 def test_a_derived_series_has_the_pixels_and_uids_of_the_program(program, ct, tmp_path):
     if not tw.features()["dicom"]:
         pytest.skip("a build without DICOM")
