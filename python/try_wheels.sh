@@ -40,7 +40,9 @@ for suite in "${suites[@]}"; do
     --abi "cp${version/./}" --abi abi3 --abi none --platform manylinux_2_28_x86_64 --platform manylinux_2_27_x86_64 \
     --platform manylinux_2_17_x86_64 --platform manylinux2014_x86_64 numpy pytest pydicom nibabel
   cp "$wheels"/*.whl "$root/try/wheels"
-  cp -r "$source_dir/python/tests" "$root/try/tests"
+  mkdir -p "$root/try/python" "$root/try/examples"
+  cp -r "$source_dir/python/tests" "$root/try/python"
+  cp -r "$source_dir/examples/scenarios" "$root/try/examples"
   chroot "$root" python3 -m venv /try/venv
   chroot "$root" /try/venv/bin/pip install -q --no-index --find-links /try/wheels tetwarp
   chroot "$root" /try/venv/bin/python -c 'import tetwarp as tw; print(tw.features())'
@@ -48,7 +50,7 @@ for suite in "${suites[@]}"; do
   mount --bind /proc "$root/proc"
   status=0
   chroot "$root" env -u DCMDICTPATH TETWARP_PROGRAM=/try/venv/bin/tetwarp PYTHONDONTWRITEBYTECODE=1 \
-    /try/venv/bin/python -m pytest -q -p no:cacheprovider /try/tests || status=$?
+    /try/venv/bin/python -m pytest -q -p no:cacheprovider /try/python/tests || status=$?
   umount "$root/proc"
   [ $status = 0 ] || exit $status
 done
