@@ -73,6 +73,7 @@ class ImageWriter {
   /// @throws Error when they cannot be written
   void write(const ConstVolumeView& slices);
   /// Writes all slices of a volume and completes the file.
+  /// @param volume   of the file's grid, type and components, in host memory
   /// @param control  progress, and stop, which is looked at every few hundredths of a second
   /// @throws what `write` and `finish` throw, and Cancelled
   void write_whole(const ConstVolumeView& volume, const Control& control = {});
