@@ -75,6 +75,8 @@ class Truth:
         self.points = centres(size)
         self.came_from = inverse(self.points, size)
         self.displacement = (forward(self.points, size) - self.points).astype(np.float32)
+        self.field = tw.VertexField(tw.Geometry((size,) * 3), self.displacement)
+        self.exact = tw.invert(self.field, self.field.lattice).displacement  # by Tetwarp
         self.labels = label_of(self.points, size)
         self.deformed = label_of(self.came_from, size)
         # Voxels near which the deformed labels change, away from the border of the volume, which the field leaves.
@@ -94,11 +96,9 @@ class Truth:
 
 
 def by_tetwarp(truth):
-    grid = tw.Geometry((truth.size,) * 3)
-    field = tw.VertexField(grid, truth.displacement)
-    back = tw.invert(field, grid).displacement
-    done = tw.deform(tw.Volume(truth.labels, grid), field, outside="background", interpolation="vote", background=0)
-    return {"Tetwarp, the exact inverse, labels by vote": truth.place(truth.points + back) | truth.wrong(done.volume.array)}
+    labels = tw.Volume(truth.labels, truth.field.lattice)
+    done = tw.deform(labels, truth.field, outside="background", interpolation="vote", background=0)
+    return {"Tetwarp, the exact inverse, labels by vote": truth.place(truth.points + truth.exact) | truth.wrong(done.volume.array)}
 
 
 def by_simpleitk(truth):
@@ -134,19 +134,16 @@ def by_monai(truth):
     return {
         "MONAI Warp, the forward field taken as it is": result(truth.displacement),
         "MONAI Warp, the field negated": result(-truth.displacement),
-        "MONAI Warp, Tetwarp's inverse given": result(np.nan_to_num(
-            tw.invert(tw.VertexField(tw.Geometry((truth.size,) * 3), truth.displacement), tw.Geometry((truth.size,) * 3)).displacement)),
+        "MONAI Warp, Tetwarp's inverse given": result(np.nan_to_num(truth.exact)),
     }
 
 
 def by_scipy(truth):
     from scipy.ndimage import map_coordinates
 
-    def labels(order):
-        came = truth.points + truth.displacement
-        return np.rint(map_coordinates(truth.labels.astype(float), [came[..., 2], came[..., 1], came[..., 0]], order=order))
-
-    return {"SciPy map_coordinates, the forward field taken as it is": truth.place(truth.points + truth.displacement) | truth.wrong(labels(0))}
+    came = truth.points + truth.displacement
+    labels = map_coordinates(truth.labels, [came[..., 2], came[..., 1], came[..., 0]], order=0)
+    return {"SciPy map_coordinates, the forward field taken as it is": truth.place(came) | truth.wrong(labels)}
 
 
 def labels_linear(truth):

@@ -95,6 +95,11 @@ std::unique_ptr<ImageWriter> create_format(const std::filesystem::path& path, Im
                            make_header(grid, type, components, options.metadata, compressed), options.compression);
 }
 
+void require_whole(const ConstVolumeView& volume, const std::filesystem::path& path) {
+  require(volume.geometry && volume.voxels && volume.buffered == whole(*volume.geometry),
+          "only a whole volume can be written, " + path.string());
+}
+
 ImageFormat required_format(const std::filesystem::path& path) {
   const auto format = image_format(path);
   require(format.has_value(), "an unknown suffix, " + path.string() + "; expected .nii, .nii.gz, .nrrd or .mha");
@@ -166,8 +171,7 @@ void ImageWriter::write(const ConstVolumeView& slices) {
 }
 
 void ImageWriter::write_whole(const ConstVolumeView& volume, const Control& control) {
-  require(volume.geometry && volume.voxels && volume.buffered == whole(*volume.geometry),
-          "only a whole volume can be written, " + path_.string());
+  require_whole(volume, path_);
   const glm::i64vec3 size = volume.geometry->size;
   const std::size_t slice_bytes =
       static_cast<std::size_t>(size.x * size.y) * static_cast<std::size_t>(volume.components) * size_bytes(volume.type);
@@ -216,7 +220,7 @@ std::unique_ptr<ImageWriter> create_image(const std::filesystem::path& path, con
 
 void write_image(const std::filesystem::path& path, const ConstVolumeView& volume, const ImageWriteOptions& options,
                  const Control& control) {
-  require(volume.geometry, "a volume without a grid, " + path.string());
+  require_whole(volume, path);  // before anything has the name
   create_image(path, *volume.geometry, volume.type, volume.components, options)->write_whole(volume, control);
 }
 

@@ -6,7 +6,6 @@
 #include <pthread.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
@@ -27,6 +26,8 @@ std::atomic<bool> forked = false;
 
 thread_local bool in_progress_callable = false;
 unsigned long main_thread = 0;  // of Python, as PyThread_get_thread_ident has it
+
+bool is_main_thread() { return PyThread_get_thread_ident() == main_thread; }
 
 /// Calls that are under way, so that those of daemon threads end before the interpreter does: a thread that wants its
 /// lock later is ended by Python amid C++, which ends the process.
@@ -59,7 +60,6 @@ class Calls {
   }
 
  private:
-  static bool is_main_thread() { return PyThread_get_thread_ident() == main_thread; }
   void remove(std::stop_source* stop) {
     std::erase(stops_, stop);
     if (stops_.empty()) none_.notify_all();
@@ -162,8 +162,9 @@ void run_call(const CallOptions& options, bool small, const std::function<void(c
   Progress progress(options.progress, stop);
   Control control{.stop = stop.get_token(), .stream = reinterpret_cast<void*>(options.stream)};
   if (!options.progress.is_none()) control.progress = std::ref(progress);
-  const bool watches = !small && !is_forked() && PyThread_get_thread_ident() == main_thread;
+  const bool watches = !small && !is_forked() && is_main_thread();
   bool interrupted = false;
+  std::exception_ptr error;
   {
     const nb::gil_scoped_release released;
     try {
@@ -179,19 +180,19 @@ void run_call(const CallOptions& options, bool small, const std::function<void(c
         work(control);
       }
     } catch (...) {
-      calls->stay_if_closed(&stop);
-      if (!interrupted && !progress.error()) throw;
+      error = std::current_exception();
     }
     calls->stay_if_closed(&stop);
   }
   if (interrupted) throw nb::python_error();
   if (progress.error()) std::rethrow_exception(progress.error());
+  if (error) std::rethrow_exception(error);
 }
 
 std::unique_lock<std::timed_mutex> locked(std::timed_mutex& mutex) {
   std::unique_lock lock(mutex, std::try_to_lock);
   if (lock) return lock;
-  const bool watches = PyThread_get_thread_ident() == main_thread;
+  const bool watches = is_main_thread();
   const nb::gil_scoped_release released;
   while (!lock.try_lock_for(20ms)) {
     if (watches && signal_raised()) {
