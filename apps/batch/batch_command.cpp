@@ -29,6 +29,7 @@ constexpr int kSomeFailed = 3, kInterrupted = 130;
 
 std::vector<std::string> ids_of(const std::vector<BatchCase>& cases) {
   std::vector<std::string> ids;
+  ids.reserve(cases.size());
   for (const BatchCase& one : cases) ids.push_back(one.id);
   return ids;
 }

@@ -122,7 +122,7 @@ void OutputFolder::remove_unfinished(const std::vector<std::string>& ids) const 
   for (const auto& entry : fs::directory_iterator(path_, ignored)) {
     if (is_unfinished(entry.path().filename().string(), names)) partial.push_back(entry.path());
   }
-  for (fs::path path : partial) {
+  for (const fs::path& path : partial) {
     // It is renamed first, so that a process that still works on it cannot give it its final name when it is half
     // removed.
     const std::string name = path.filename().string();

@@ -63,7 +63,7 @@ class Devices {
   /// A place that a case holds until this object dies.
   class Lease {
    public:
-    Lease(Devices& of, Worker worker, int places) : of_(&of), worker_(std::move(worker)), places_(places) {}
+    Lease(Devices& of, Worker worker, int places) : of_(&of), worker_(worker), places_(places) {}
     ~Lease();
     Lease(const Lease&) = delete;
     Lease& operator=(const Lease&) = delete;

@@ -65,7 +65,8 @@ void write_volumes(const DeformRun& run, const DeformSinks& sinks, const DeformO
   if (!outputs.preview.empty()) write_preview_picture(run, outputs.preview);
   if (!outputs.field.empty()) write_field(run.request, std::get<VertexField>(run.field.field), outputs.field);
   std::optional<DerivedOutput> series;
-  if (written.series) series.emplace(WrittenSeries{*run.inputs.headers, *written.series, run.field.grid}, derivation);
+  if (written.series)
+    series.emplace(DerivedOutput{WrittenSeries{*run.inputs.headers, *written.series, run.field.grid}, derivation});
   written.along =
       write_along(outputs.volumes, run.headers.along.volumes, run.inputs.along, run.result.along, how, series);
   write_points(outputs.points, run.headers.points, run.result.points);

@@ -24,7 +24,8 @@ constexpr Named kItkInverters[] = {{"itk-invert", "ITK invert", ItkInverter::fix
 
 /// As `tetwarp invert` does it.
 InversePeer make_own(const VertexField& field, int threads) {
-  const auto inverse = std::make_shared<PullField>(field.lattice, std::vector<glm::vec3>(field.displacement.size()));
+  const auto inverse =
+      std::make_shared<PullField>(PullField{field.lattice, std::vector<glm::vec3>(field.displacement.size())});
   const std::shared_ptr<ForwardResampler> resampler = make_cpu_resampler(field.lattice, {.threads = threads});
   return [=, &field]() -> std::span<const glm::vec3> {
     resampler->set_field(view(field, Outside::background), {.jacobian_range = false});

@@ -99,7 +99,7 @@ const Exact& Backend::exact() {
   const Target target{.source = view(*volume_), .output = view(output), .background = static_cast<double>(background_)};
   resampler_->set_field(view(field_));
   resampler_->resample(whole(volume_->geometry), {&target, 1}, {.coverage = view(coverage)});
-  return exact_.emplace(std::move(output.voxels), std::move(coverage.voxels));
+  return exact_.emplace(Exact{std::move(output.voxels), std::move(coverage.voxels)});
 }
 
 std::vector<std::uint32_t> Backend::count_writes(Method method, FieldSource source) {
