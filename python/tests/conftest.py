@@ -5,10 +5,15 @@
 
 import os
 import pathlib
+import signal
 import subprocess
 
 import pytest
 import tetwarp as tw
+
+
+# A shell that starts a program in the background has it ignore Ctrl-C, and so would the interpreters that tests start.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")
