@@ -92,6 +92,13 @@ LatticeFrame make_lattice_frame(const Geometry& output, const FieldView& field) 
   return make_lattice_frame(output, *field.lattice, field.outside);
 }
 
+bool is_coarse(const Geometry& output, const FieldView& field) {
+  const bool is_mesh_alone = field.mesh && field.replaced.empty();
+  if (is_mesh_alone && (!field.lattice || field.mesh->lattice_vertex.empty())) return true;
+  require(field.lattice, "the field is empty");
+  return make_lattice_frame(output, *field.lattice, Outside::background).coarse;  // whether it reaches or not
+}
+
 LatticeFrame make_lattice_frame(const Geometry& output, const Geometry& lattice, Outside outside) {
   require_valid(lattice, "field lattice");
   require(lattice.slices.empty(), "the field lattice has uneven slices; only a source may");
@@ -100,6 +107,7 @@ LatticeFrame make_lattice_frame(const Geometry& output, const Geometry& lattice,
   frame.output_from_lattice = index_from_point(output) * point_from_index(lattice);
   frame.lattice_from_output = index_from_point(lattice) * point_from_index(output);
   frame.output_from_mm = index_from_point(output).linear;
+  frame.coarse = true;
   for (int axis = 0; axis < 3; ++axis) {
     require(lattice.size[axis] >= 2, [&] {
       return "field lattice of " + to_string(lattice.size) + " vertices, expected at least 2 on every axis";
@@ -109,6 +117,7 @@ LatticeFrame make_lattice_frame(const Geometry& output, const Geometry& lattice,
       return "the field's cells are " + std::to_string(length) + " voxels of the output along axis " +
              std::to_string(axis) + ", expected at least 1/1024";
     });
+    frame.coarse = frame.coarse && length >= kCoarseStep;
   }
   const Reach reach(frame.lattice_from_output, output.size);
   if (outside == Outside::refuse) require_reach(reach, frame);

@@ -20,6 +20,9 @@ namespace tetwarp {
 /// @throws InputError for a lattice that is empty, too far, too fine, or does not reach over the output
 /// (Outside::refuse)
 LatticeFrame make_lattice_frame(const Geometry& output, const FieldView& field);
+/// Whether a forward field is coarse over an output, so that places are computed in fixed point
+/// (docs/design/definition.md, "Coarse fields"). @throws InputError as `make_lattice_frame` for any lattice
+bool is_coarse(const Geometry& output, const FieldView& field);
 /// Checks a lattice whose displacements lie elsewhere, as the other overload does.
 /// @throws InputError as that
 LatticeFrame make_lattice_frame(const Geometry& output, const Geometry& lattice, Outside outside);

@@ -143,7 +143,9 @@ SnappedMesh snap_mesh(const Geometry& output, const FieldView& field, const Cont
     }
   });
   for (std::size_t n = 0; n < mesh.rest.size(); ++n) {
-    if (snapped.vertices[n].u.x == INT32_MIN) refuse(mesh, n);
+    const glm::i32vec3& u = snapped.vertices[n].u;
+    if (u.x == INT32_MIN) refuse(mesh, n);
+    snapped.most_moved = std::max({snapped.most_moved, std::abs(u.x), std::abs(u.y), std::abs(u.z)});
   }
   const Findings found = tbb::parallel_reduce(
       tbb::blocked_range<std::size_t>(0, snapped.tetrahedra.size(), kGrain), Findings{},
@@ -154,6 +156,7 @@ SnappedMesh snap_mesh(const Geometry& output, const FieldView& field, const Cont
       },
       [](const Findings& a, const Findings& b) { return a + b; });
   snapped.nudge = snapper.frame() ? snapper.frame()->nudge : Nudge{found.low + found.high};
+  snapped.coarse = !snapper.frame() || snapper.frame()->coarse;
   snapped.inverted = found.inverted;
   snapped.degenerate = found.degenerate;
   snapped.jacobian_min = found.least;
@@ -190,7 +193,8 @@ Region mesh_source_region(const SnappedMesh& mesh, bool stays_outside, const Geo
       low = glm::min(low, rest);
       high = glm::max(high, rest);
     }
-    const glm::dvec3 beyond = 4 * kWeightSlack * (high - low);  // weights leave [0, 1] by the slack
+    const glm::dvec3 beyond = 4 * kWeightSlack * (high - low) +  // weights leave [0, 1] by the slack
+                              (mesh.coarse ? kBeyondCoarse : 0.0);
     all_low = glm::min(all_low, low - beyond);
     all_high = glm::max(all_high, high + beyond);
   }

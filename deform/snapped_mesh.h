@@ -25,7 +25,9 @@ struct SnappedMesh {
   std::span<const glm::u32vec4> tetrahedra;  ///< those of the mesh that was given, or `made`
   /// Tetrahedra made of a lattice with replaced cells; else null.
   std::shared_ptr<const std::vector<glm::u32vec4>> made;
-  Nudge nudge;  ///< towards the middle of the undeformed box: the lattice's where there is one, else the mesh's
+  Nudge nudge;         ///< towards the middle of the undeformed box: the lattice's where there is one, else the mesh's
+  bool coarse = true;  ///< whether its lattice is, where there is one
+  std::int32_t most_moved = 0;  ///< largest displacement of a vertex on an axis, 2^-12 voxel
 
   std::uint64_t inverted = 0;    ///< tetrahedra turned inside out
   std::uint64_t degenerate = 0;  ///< tetrahedra without volume, deformed or undeformed; undeformed ones may own voxels

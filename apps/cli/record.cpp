@@ -76,6 +76,7 @@ const std::map<std::string, bool (*)(const std::string&)>& places() {
       {"options/dicom/deidentified/PS3.15 2026d[]", is_word},
       {"field/sha256", is_digest},
       {"field/direction", is_word},
+      {"field/arithmetic", is_word},
       {"field/files[]/format", is_word},
       {"field/files[]/direction", is_word},
       {"field/files[]/frame", is_frame},

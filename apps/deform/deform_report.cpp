@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "apps/deform/output_grid.h"
+#include "deform/field_check.h"
 #include "io/dicom_text.h"
 
 namespace tetwarp::apps {
@@ -99,6 +100,10 @@ json field_json(const DeformRun& run) {
                    {"notes", field.origin.notes},
                    {"files", to_json(field.origin.files)}};
   document.update(place_json(field.field));
+  if (const auto* forward = std::get_if<VertexField>(&field.field)) {
+    const FieldView of = view(*forward, run.request.options.outside);
+    document["arithmetic"] = is_coarse(run.result.output.geometry(), of) ? "coarse" : "dense";
+  }
   if (field.simulation) document["simulation"] = simulation_json(*field.simulation);
   if (const auto& path = run.request.options.write_field; !path.empty()) document["written"] = path.string();
   return document;

@@ -172,24 +172,23 @@ void SlabWriter::begin_box(const SlabBox& box) {
   layout_ = layout(box.count());
 }
 
-void SlabWriter::write(const SlabBox& box, const Mapped& mapped, Counts* counts) {
+void SlabWriter::write(const SlabBox& box, const MappedVoxels& mapped, Counts* counts) {
   auto* coverage = place<std::uint8_t>(layout_.coverage);
   for (std::size_t n = 0; n < targets_.size(); ++n)
     write_target(n, box, mapped, n == 0 ? coverage : nullptr, n == 0 ? counts : nullptr);
   if (targets_.empty()) {
-    count_kernel<<<blocks_for(box.count()), kThreads, 0, stream_>>>(box, mapped.mapped.data(), coverage, counts);
+    count_kernel<<<blocks_for(box.count()), kThreads, 0, stream_>>>(box, mapped.mapped, coverage, counts);
     TETWARP_CUDA_TRY(cudaGetLastError());
   }
   if (maps_.inverse_mm.voxels) {
-    inverse_kernel<<<blocks_for(box.count()), kThreads, 0, stream_>>>(box, point_from_index(output_).linear,
-                                                                      mapped.mapped.data(), mapped.offset.data(),
+    inverse_kernel<<<blocks_for(box.count()), kThreads, 0, stream_>>>(box, point_from_index(output_).linear, mapped,
                                                                       place<glm::vec3>(layout_.inverse_mm));
     TETWARP_CUDA_TRY(cudaGetLastError());
   }
 }
 
-void SlabWriter::write_target(std::size_t number, const SlabBox& box, const Mapped& mapped, std::uint8_t* coverage,
-                              Counts* counts) {
+void SlabWriter::write_target(std::size_t number, const SlabBox& box, const MappedVoxels& mapped,
+                              std::uint8_t* coverage, Counts* counts) {
   const DeviceTarget& on_device = *targets_[number];
   const Target& target = on_device.target;
   const bool slices_wanted = !target.sampled_slices.empty();
@@ -198,10 +197,8 @@ void SlabWriter::write_target(std::size_t number, const SlabBox& box, const Mapp
   dispatch(target.source.type, [&](auto voxel) {
     using V = decltype(voxel);
     const auto plan = plan_target(target, on_device.relation, reinterpret_cast<const V*>(target.source.voxels));
-    launch_sample<V>(stream_, target.interpolation, box.count(), plan, target.source.components, box,
-                     static_cast<const std::uint8_t*>(mapped.mapped.data()),
-                     static_cast<const glm::vec3*>(mapped.offset.data()), destination<V>(number, box), coverage, slices,
-                     counts);
+    launch_sample<V>(stream_, target.interpolation, box.count(), plan, target.source.components, box, mapped,
+                     destination<V>(number, box), coverage, slices, counts);
   });
 }
 
@@ -236,9 +233,9 @@ SinkLayout SlabWriter::sink_layout(const SlabBox& box) {
           static_cast<int>(output.row), static_cast<int>(output.slice)};
 }
 
-template <class V>
-VolumesSink<V> SlabWriter::volumes_sink(const SlabBox& box) {
-  VolumesSink<V> sink{};
+template <class V, Lerp kRounding>
+VolumesSink<V, kRounding> SlabWriter::volumes_sink(const SlabBox& box) {
+  VolumesSink<V, kRounding> sink{};
   for (const auto& on_device : targets_) {
     const Target& target = on_device->target;
     dispatch_plain(target.source.type, [&](auto voxel) {
@@ -253,23 +250,27 @@ VolumesSink<V> SlabWriter::volumes_sink(const SlabBox& box) {
   return sink;
 }
 
-AnyVoxelSink SlabWriter::plain_sink(const SlabBox& box) {
+template <Lerp kRounding>
+AnyVoxelSink<kRounding> SlabWriter::plain_sink(const SlabBox& box) {
   const Target& first = targets_.front()->target;
-  const auto make = [&](auto voxel) -> AnyVoxelSink {
+  const auto make = [&](auto voxel) -> AnyVoxelSink<kRounding> {
     using V = decltype(voxel);
     const PlainVolume<V> volume = plain_volume<V>(0, box);
-    return VoxelSink<V>{sink_layout<V>(box), volume.source, volume.background, volume.output};
+    return VoxelSink<V, kRounding>{sink_layout<V>(box), volume.source, volume.background, volume.output};
   };
   const auto holds_all = [&](const auto& condition) {
     return std::all_of(targets_.begin(), targets_.end(), [&](const auto& of) { return condition(of->target); });
   };
   if (!holds_all([](const Target& target) { return target.interpolation == Interpolation::linear; }))
-    return volumes_sink<void>(box);
+    return volumes_sink<void, kRounding>(box);
   if (targets_.size() == 1) return dispatch_plain(first.source.type, make);
   if (!holds_all([](const Target& target) { return target.source.type == VoxelType::i16; }))
-    return volumes_sink<void>(box);
-  return volumes_sink<std::int16_t>(box);
+    return volumes_sink<void, kRounding>(box);
+  return volumes_sink<std::int16_t, kRounding>(box);
 }
+
+template AnyVoxelSink<Lerp::separate> SlabWriter::plain_sink(const SlabBox&);
+template AnyVoxelSink<Lerp::fused> SlabWriter::plain_sink(const SlabBox&);
 
 void SlabWriter::end_box(const SlabBox& box) {
   const bool on_host = has_results_on_host();

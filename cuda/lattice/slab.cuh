@@ -13,7 +13,9 @@
 #include "cuda/lattice/lattice.cuh"
 #include "cuda/lattice/lattice_part.h"
 #include "cuda/runtime/host_copies.h"
+#include "deform/core/coarse_map.h"
 #include "deform/core/sample_voxel.h"
+#include "deform/core/visit_cell.h"
 
 namespace tetwarp::cuda_detail {
 
@@ -51,12 +53,73 @@ struct Counts {
   unsigned long long covered, uncovered, clamped, padded, conflicts, multiply_owned;
 };
 
-/// Where each voxel of a box comes from, in the order of the voxels.
-struct Mapped {
-  static constexpr std::int64_t kBytes = sizeof(std::uint8_t) + sizeof(glm::vec3);  ///< bytes for each voxel
+/// Where each voxel of a box comes from, in the order of the voxels, as a kernel sees it. One of both kinds of offsets
+/// is null.
+struct MappedVoxels {
+  std::uint8_t* mapped;  ///< 1 where the voxel comes from anywhere, else 0
+  glm::vec3* offset;     ///< undeformed minus deformed place, voxels: of dense and pull fields
+  FixedOffset* fixed;    ///< the same of coarse fields
 
-  DeviceBuffer<std::uint8_t> mapped;  ///< 1 where the voxel comes from anywhere, else 0
-  DeviceBuffer<glm::vec3> offset;     ///< undeformed minus deformed place, voxels
+  /// @return whether a voxel comes from inside the source of a plan
+  template <class V>
+  __device__ bool source_place(const SamplePlan<V>& plan, const glm::i64vec3& voxel, std::int64_t n,
+                               Place& place) const {
+    if (mapped[n] == 0) return false;
+    return fixed ? tetwarp::source_place(plan, voxel, fixed[n], place)
+                 : tetwarp::source_place(plan, voxel, offset[n], place);
+  }
+  __device__ Lerp rounding() const { return fixed ? Lerp::fused : Lerp::separate; }
+  __device__ glm::dvec3 in_double(std::int64_t n) const {
+    return fixed ? tetwarp::in_double(fixed[n]) : tetwarp::in_double(offset[n]);
+  }
+  /// Voxels stay where they are.
+  __device__ void put_nothing(std::int64_t n) const {
+    if (fixed) {
+      fixed[n] = {glm::i32vec3(0), glm::vec3(0)};
+    } else {
+      offset[n] = glm::vec3(0);
+    }
+  }
+  /// The place of a voxel that a tetrahedron owns.
+  __device__ void put(std::int64_t n, const Tetrahedron& t, const glm::i64vec3& voxel,
+                      const glm::i32vec3& signs) const {
+    if (fixed) {
+      fixed[n] = fixed_offset(coarse_u(t, glm::ivec3(voxel), signs));
+    } else {
+      offset[n] = interpolate_u(t, detail::to_steps(voxel), signs);
+    }
+  }
+};
+
+/// The memory of `MappedVoxels`.
+class Mapped {
+ public:
+  /// Bytes for each voxel. @param coarse  whether the field is
+  static std::int64_t bytes(bool coarse) {
+    return static_cast<std::int64_t>(sizeof(std::uint8_t) + (coarse ? sizeof(FixedOffset) : sizeof(glm::vec3)));
+  }
+
+  MappedVoxels reserve(std::size_t voxels, bool coarse) {
+    voxels_ = {mapped_.reserve(voxels), coarse ? nullptr : offset_.reserve(voxels),
+               coarse ? fixed_.reserve(voxels) : nullptr};
+    return voxels_;
+  }
+  /// Those that were reserved last.
+  const MappedVoxels& voxels() const { return voxels_; }
+
+ private:
+  DeviceBuffer<std::uint8_t> mapped_;
+  DeviceBuffer<glm::vec3> offset_;
+  DeviceBuffer<FixedOffset> fixed_;
+  MappedVoxels voxels_{};
+};
+
+/// U of a voxel of a coarse field, 2^-23 voxel, as fast ways have it.
+struct FixedU {
+  glm::i32vec3 u;  ///< modulo 2^32
+  bool any;        ///< whether it is usable
+
+  __device__ FixedOffset offset() const { return fixed_offset(glm::i64vec3(u)); }
 };
 
 /// How the voxels of sources and outputs on one grid lie, and where a voxel comes from. All sinks that sample share it;
@@ -90,20 +153,31 @@ struct SinkLayout {
   /// @return whether it is well inside the source, and `moved` is not NaN
   template <bool kInside>
   __device__ bool locate(const glm::ivec3& voxel, unsigned column, const glm::vec3& moved, Origin& origin) const;
+  /// The same in a coarse field.
+  template <bool kInside>
+  __device__ bool locate(const glm::ivec3& voxel, unsigned column, const FixedU& u, Origin& origin) const;
   /// Computes where a single voxel comes from.
   /// @param moved  deformed minus undeformed place, 2^-12 voxel; may be NaN
   /// @return whether it is well inside the source, and `moved` is not NaN
   __device__ bool locate(const glm::ivec3& voxel, const glm::vec3& moved, Origin& origin) const;
+  __device__ bool locate(const glm::ivec3& voxel, const FixedU& u, Origin& origin) const;
   /// Computes where a voxel comes from, by its exact offset.
   /// @return whether that is inside the source
   __device__ bool locate_exactly(const glm::ivec3& voxel, const glm::vec3& u, Origin& origin) const;
+  __device__ bool locate_exactly(const glm::ivec3& voxel, const FixedOffset& u, Origin& origin) const;
   __device__ int source_index(const glm::ivec3& voxel) const { return voxel.z * slice + voxel.y * row + voxel.x; }
+
+ private:
+  /// Clamps a place to the source. @return whether it is inside
+  __device__ bool clamp(glm::ivec3 base, Origin& origin) const;
 };
 
 /// Samples the voxels of one volume: linear interpolation of integers that float holds, without padding, source and
 /// output on one grid. The result has the bits of `sample_voxel`.
-template <class V>
+/// @tparam kRounding  fused for coarse fields: `start` and `write` are then given `FixedU` and `FixedOffset`
+template <class V, Lerp kRounding>
 struct VoxelSink : SinkLayout {
+  static constexpr Lerp kLerp = kRounding;
   static constexpr bool kIsWide = false;  ///< whether it takes many registers
 
   const V* source;  ///< address of voxel (0, 0, 0), which need not be buffered; so is `output`
@@ -119,9 +193,9 @@ struct VoxelSink : SinkLayout {
 
   /// Begins to write a voxel that a tetrahedron owns, if it is `wanted` and comes from well inside the source;
   /// otherwise nothing is pending. Voxels from the border of the source are for `write`.
-  /// @param moved  deformed minus undeformed place, 2^-12 voxel
-  __device__ void start(int address, const glm::ivec3& voxel, const glm::vec3& moved, bool wanted,
-                        Pending& pending) const;
+  /// @param moved  deformed minus undeformed place, 2^-12 voxel; or a FixedU
+  template <class Moved>
+  __device__ void start(int address, const glm::ivec3& voxel, const Moved& moved, bool wanted, Pending& pending) const;
   /// Writes the pending voxel, if there is one.
   /// @param address  that with which `start` was called
   __device__ void finish(int address, const Pending& pending) const;
@@ -131,7 +205,8 @@ struct VoxelSink : SinkLayout {
   __device__ void end(int address, const Pending& pending) const;
   /// Writes a voxel that a tetrahedron owns.
   /// @return whether it comes from inside the source
-  __device__ bool write(int address, const glm::ivec3& voxel, const glm::vec3& u) const;
+  template <class Offset>
+  __device__ bool write(int address, const glm::ivec3& voxel, const Offset& u) const;
   /// Copies voxels of a column along k that stay where they are: those of the kCount voxels from `voxel` on whose bits
   /// are set.
   template <int kCount>
@@ -154,8 +229,9 @@ struct SinkVolume {
 /// those of VoxelSink do.
 ///
 /// @tparam V  type of all volumes, which are then linear; void: any types
-template <class V>
+template <class V, Lerp kRounding>
 struct VolumesSink : SinkLayout {
+  static constexpr Lerp kLerp = kRounding;
   static constexpr bool kIsWide = true;
 
   SinkVolume volumes[kMostSinkVolumes];
@@ -168,12 +244,13 @@ struct VolumesSink : SinkLayout {
     Origin origin;
     int corners[kOnTheWay][8];
   };
-  __device__ void start(int address, const glm::ivec3& voxel, const glm::vec3& moved, bool wanted,
-                        Pending& pending) const;
+  template <class Moved>
+  __device__ void start(int address, const glm::ivec3& voxel, const Moved& moved, bool wanted, Pending& pending) const;
   __device__ void finish(int address, const Pending& pending) const;
   __device__ void begin(const Origin& origin, bool wanted, Pending& pending) const;
   __device__ void end(int address, const Pending& pending) const { finish(address, pending); }
-  __device__ bool write(int address, const glm::ivec3& voxel, const glm::vec3& u) const;
+  template <class Offset>
+  __device__ bool write(int address, const glm::ivec3& voxel, const Offset& u) const;
   template <int kCount>
   __device__ void copy(const glm::ivec3& voxel, std::uint32_t wanted) const;
   __device__ void nothing(int address) const;
@@ -187,8 +264,10 @@ struct VolumesSink : SinkLayout {
   __device__ void put(const SinkVolume& volume, int address, const int (&corners)[8], const glm::vec3& t) const;
 };
 
-using AnyVoxelSink = std::variant<VoxelSink<std::uint8_t>, VoxelSink<std::int16_t>, VoxelSink<std::uint16_t>,
-                                  VolumesSink<std::int16_t>, VolumesSink<void>>;
+template <Lerp kRounding>
+using AnyVoxelSink = std::variant<VoxelSink<std::uint8_t, kRounding>, VoxelSink<std::int16_t, kRounding>,
+                                  VoxelSink<std::uint16_t, kRounding>, VolumesSink<std::int16_t, kRounding>,
+                                  VolumesSink<void, kRounding>>;
 
 /// Samples targets and writes maps, box after box, and copies results to the host while the next box is computed. It
 /// knows nothing of fields.
@@ -231,9 +310,11 @@ class SlabWriter {
   float* jacobian() const { return place<float>(layout_.jacobian); }
   /// The map of numbers of owners of the box; null if it is not filled.
   std::uint16_t* owners() const { return place<std::uint16_t>(layout_.owners); }
-  void write(const SlabBox& box, const Mapped& mapped, Counts* counts);
+  void write(const SlabBox& box, const MappedVoxels& mapped, Counts* counts);
   /// The sink that writes the voxels of the box, instead of `write`, if the call `is_plain`.
-  AnyVoxelSink plain_sink(const SlabBox& box);
+  /// @tparam kRounding  fused for coarse fields
+  template <Lerp kRounding>
+  AnyVoxelSink<kRounding> plain_sink(const SlabBox& box);
   /// Gives the results of the box to the views.
   void end_box(const SlabBox& box);
   /// Waits until the host has everything.
@@ -280,9 +361,9 @@ class SlabWriter {
   /// @tparam V  of the first target
   template <class V>
   SinkLayout sink_layout(const SlabBox& box);
-  template <class V>
-  VolumesSink<V> volumes_sink(const SlabBox& box);
-  void write_target(std::size_t number, const SlabBox& box, const Mapped& mapped, std::uint8_t* coverage,
+  template <class V, Lerp kRounding>
+  VolumesSink<V, kRounding> volumes_sink(const SlabBox& box);
+  void write_target(std::size_t number, const SlabBox& box, const MappedVoxels& mapped, std::uint8_t* coverage,
                     Counts* counts);
   void give(const VolumeView& view, const SlabBox& box, std::size_t offset);
   bool has_results_on_host() const;

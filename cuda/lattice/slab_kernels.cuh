@@ -24,25 +24,25 @@ struct DeviceSlices {
 /// @tparam kScalars   whether there is one component
 /// @param plan        the source, and how it is sampled  @param components  of a voxel
 /// @param slab        the box
-/// @param mapped      for each voxel of the box, in their order: 1 where it comes from anywhere, else 0
-/// @param offset      for each voxel of the box: undeformed minus deformed place, voxels
+/// @param mapped      where each voxel of the box comes from, in their order
 /// @param output      written
 /// @param coverage    for each voxel, written: whether it comes from inside the source; or null
 /// @param slices      widened, or null  @param counts  added to; or null
 template <class V, Interpolation kInterpolation, bool kScalars>
-__global__ void sample_kernel(SamplePlan<V> plan, int components, SlabBox slab, const std::uint8_t* mapped,
-                              const glm::vec3* offset, Destination<V> output, std::uint8_t* coverage,
-                              DeviceSlices slices, Counts* counts) {
+__global__ void sample_kernel(SamplePlan<V> plan, int components, SlabBox slab, MappedVoxels mapped,
+                              Destination<V> output, std::uint8_t* coverage, DeviceSlices slices, Counts* counts) {
   const std::int64_t n = thread_of_grid();
   if (n >= slab.count()) return;
   const glm::i64vec3 at = slab.voxel(n);
   SampledVoxel<V> voxel;
+  Place place;
+  const bool inside = mapped.source_place(plan, at, n, place);
   if constexpr (kScalars) {
-    voxel = sample_voxel<V, kInterpolation>(plan, at, mapped[n] != 0, offset[n]);
+    voxel = sample_at<V, kInterpolation>(plan, inside, place, mapped.rounding());
     output.voxels[output.index(at)] = voxel.value;
   } else {
-    voxel = sample_components<V, kInterpolation>(plan, components, at, mapped[n] != 0, offset[n],
-                                                 output.voxels + output.index(at) * components);
+    voxel = sample_components_at<V, kInterpolation>(plan, components, inside, place, mapped.rounding(),
+                                                    output.voxels + output.index(at) * components);
   }
   if (coverage) coverage[n] = voxel.inside;
   if (counts) {
@@ -69,14 +69,14 @@ __global__ void count_kernel(SlabBox slab, const std::uint8_t* mapped, std::uint
 /// Where each voxel of a box comes from, in mm: a thread a voxel.
 ///
 /// @param mm_from_index    directions of the output times its spacing
-/// @param mapped, offset   as of `sample_kernel`
+/// @param mapped           as of `sample_kernel`
 /// @param inverse_mm       for each voxel of the box: undeformed minus deformed place, LPS mm, NaN where it comes from
 ///                         nowhere; written
-__global__ void inverse_kernel(SlabBox slab, glm::dmat3 mm_from_index, const std::uint8_t* mapped,
-                               const glm::vec3* offset, glm::vec3* inverse_mm) {
+__global__ void inverse_kernel(SlabBox slab, glm::dmat3 mm_from_index, MappedVoxels mapped, glm::vec3* inverse_mm) {
   const std::int64_t n = thread_of_grid();
   if (n >= slab.count()) return;
-  inverse_mm[n] = mapped[n] ? glm::vec3(mm_from_index * glm::dvec3(offset[n])) : glm::vec3(__int_as_float(0x7fc00000));
+  inverse_mm[n] =
+      mapped.mapped[n] ? glm::vec3(mm_from_index * mapped.in_double(n)) : glm::vec3(__int_as_float(0x7fc00000));
 }
 
 template <class V, Interpolation kInterpolation, class... Arguments>

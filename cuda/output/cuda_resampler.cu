@@ -180,7 +180,7 @@ void CudaResampler<Base>::write_box(const SlabBox& box, bool plain) {
     if (!counted_) counts_.fill(0, 1, stream_);
     counted_ = true;
     map_box(box, *writer_);
-    writer_->write(box, mapped_, counts_.data());
+    writer_->write(box, mapped_.voxels(), counts_.data());
   }
   writer_->end_box(box);
 }

@@ -33,7 +33,7 @@ class CudaResampler : public Base {
   virtual void map_box(const SlabBox& box, SlabWriter& writer) = 0;
   virtual void describe_field(Report&) const {}
   /// Device memory for each voxel on which `map_box` works.
-  virtual std::int64_t work_bytes(const SlabWriter&) const { return Mapped::kBytes; }
+  virtual std::int64_t work_bytes(const SlabWriter&) const { return Mapped::bytes(false); }
   /// Whether `write_plainly` can find and sample voxels in one pass.
   virtual bool can_write_plainly() const { return false; }
   virtual void write_plainly(const SlabBox&, SlabWriter&) {}

@@ -30,9 +30,8 @@ namespace {
 constexpr std::uint64_t kStepVertexBytes = sizeof(glm::vec3) + 1, kVertexBytes = kStepVertexBytes + sizeof(Vertex);
 
 /// What is written of each voxel of a box, in the order of the voxels.
-struct MappedVoxels {
-  std::uint8_t* mapped;   ///< 1 where it comes from anywhere, else 0
-  glm::vec3* offset;      ///< undeformed minus deformed place, voxels
+struct VoxelMapping {
+  MappedVoxels places;
   float* jacobian;        ///< determinant of its owner, NaN where nobody owns it; or null
   std::uint16_t* owners;  ///< number of owners, at most 65535; or null
 };
@@ -47,19 +46,19 @@ struct MappedVoxels {
 /// @param out           written, a value for each voxel of the box
 /// @param counts        conflicts and voxels with several owners are added
 __global__ void map_voxels_kernel(DeviceField field, LatticeFrame whole, bool rest_outside, SlabBox box,
-                                  const unsigned long long* owner, const unsigned* owners, MappedVoxels out,
+                                  const unsigned long long* owner, const unsigned* owners, VoxelMapping out,
                                   Counts* counts) {
   const std::int64_t n = thread_of_grid();
   if (n >= box.count()) return;
   const glm::i64vec3 voxel = box.voxel(n);
   const bool owned = owner[n] != kNobody;
   const bool outside = rest_outside && !whole.holds(voxel);
-  out.mapped[n] = owned || outside;
-  out.offset[n] = glm::vec3(0);
+  out.places.mapped[n] = owned || outside;
+  out.places.put_nothing(n);
   if (out.jacobian) out.jacobian[n] = owned || !outside ? __int_as_float(0x7fc00000) : 1.0f;
   if (owned) {
     const Tetrahedron t = tetrahedron_numbered(field, owner[n]);
-    out.offset[n] = interpolate_u(t, detail::to_steps(voxel), field.frame.nudge.signs(voxel));
+    out.places.put(n, t, voxel, field.frame.nudge.signs(voxel));
     if (out.jacobian) out.jacobian[n] = forward_jacobian(t);
     if (outside) atomicAdd(&counts->conflicts, 1ULL);
   }
@@ -281,26 +280,32 @@ class LatticeResampler final : public CudaResampler<ForwardResampler> {
     return can_gather() && !writer.wants_jacobian() && !writer.wants_owners();
   }
   std::int64_t work_bytes(const SlabWriter& writer) const override {
-    return Mapped::kBytes + (can_map_plainly(writer) ? 0 : Claims::kBytes);
+    return Mapped::bytes(frame_.coarse) + (can_map_plainly(writer) ? 0 : Claims::kBytes);
   }
 
   void write_plainly(const SlabBox& box, SlabWriter& writer) override {
-    std::visit(
-        [&](const auto& sink) {
-          const Gather::Counters found = gather_.run(*lattice_, box, sink, stream_);
-          plainly_covered_ += found.covered;
-          plainly_uncovered_ += static_cast<std::uint64_t>(box.count()) - found.covered;
-          count_paths(box, found);
-        },
-        writer.plain_sink(box));
+    const auto run = [&](const auto& sink) {
+      const Gather::Counters found = gather_.run(*lattice_, box, sink, stream_);
+      plainly_covered_ += found.covered;
+      plainly_uncovered_ += static_cast<std::uint64_t>(box.count()) - found.covered;
+      count_paths(box, found);
+    };
+    if (frame_.coarse) {
+      std::visit(run, writer.plain_sink<Lerp::fused>(box));
+    } else {
+      std::visit(run, writer.plain_sink<Lerp::separate>(box));
+    }
   }
 
   void map_box(const SlabBox& box, SlabWriter& writer) override {
     const auto voxels = static_cast<std::size_t>(box.count());
-    const MappedVoxels mapped{mapped_.mapped.reserve(voxels), mapped_.offset.reserve(voxels), writer.jacobian(),
-                              writer.owners()};
+    const VoxelMapping mapped{mapped_.reserve(voxels, frame_.coarse), writer.jacobian(), writer.owners()};
     if (can_map_plainly(writer)) {
-      count_paths(box, gather_.run(*lattice_, box, OffsetSink{box, mapped.mapped, mapped.offset}, stream_));
+      const MappedVoxels& to = mapped.places;
+      count_paths(box,
+                  frame_.coarse
+                      ? gather_.run(*lattice_, box, OffsetSink<Lerp::fused>{box, to.mapped, to.fixed}, stream_)
+                      : gather_.run(*lattice_, box, OffsetSink<Lerp::separate>{box, to.mapped, to.offset}, stream_));
       return;
     }
     const DeviceField& field = lattice_->field();

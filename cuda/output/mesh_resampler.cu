@@ -20,8 +20,7 @@ struct VoxelMapping {
   const unsigned* owner;         ///< lowest number of an owner, or kNoTetrahedron
   const unsigned* at_rest;       ///< owner in the undeformed mesh; null: nothing stays outside
   const std::uint16_t* several;  ///< number of owners; null: not wanted
-  std::uint8_t* mapped;          ///< written: 1 where it comes from anywhere, else 0
-  glm::vec3* offset;             ///< written: undeformed minus deformed place, voxels
+  MappedVoxels places;           ///< written
   float* jacobian;               ///< written: determinant of its owner, NaN where nobody owns it; null: not wanted
 };
 
@@ -36,12 +35,12 @@ __global__ void map_mesh_voxels_kernel(MeshRaster::View mesh, SlabBox box, Voxel
   const glm::i64vec3 voxel = box.voxel(n);
   const unsigned number = of.owner[n];
   const bool owned = number != kNoTetrahedron, outside = of.at_rest && of.at_rest[n] == kNoTetrahedron;
-  of.mapped[n] = owned || outside;
-  of.offset[n] = glm::vec3(0);
+  of.places.mapped[n] = owned || outside;
+  of.places.put_nothing(n);
   if (of.jacobian) of.jacobian[n] = owned || !outside ? __int_as_float(0x7fc00000) : 1.0f;
   if (owned) {
     const Tetrahedron t = mesh.tetrahedron(number);
-    of.offset[n] = interpolate_u(t, detail::to_steps(voxel), mesh.nudge.signs(voxel));
+    of.places.put(n, t, voxel, mesh.nudge.signs(voxel));
     if (of.jacobian) of.jacobian[n] = forward_jacobian(t);
     if (outside) atomicAdd(&counts->conflicts, 1ULL);
   }
@@ -98,13 +97,20 @@ class MeshResampler final : public CudaResampler<ForwardResampler> {
   std::uint64_t held_field_bytes() const override { return raster_.held_bytes() + rest_.held_bytes(); }
   const char* held_of_field() const override { return "whole mesh"; }
 
-  bool can_write_plainly() const override { return !stays_outside_; }
+  /// Whether 32 bits hold what tiles compute.
+  bool fits_tiles() const { return !mesh_.coarse || mesh_.most_moved < 255 * kStepsPerVoxel; }
+  bool can_write_plainly() const override { return !stays_outside_ && fits_tiles(); }
   std::int64_t work_bytes(const SlabWriter&) const override {
-    return Mapped::kBytes + std::int64_t{2 * sizeof(unsigned)};
+    return Mapped::bytes(mesh_.coarse) + std::int64_t{2 * sizeof(unsigned)};
   }
 
   void write_plainly(const SlabBox& box, SlabWriter& writer) override {
-    std::visit([&](const auto& sink) { raster_.run(box, sink, stream_); }, writer.plain_sink(box));
+    const auto run = [&](const auto& sink) { raster_.run(box, sink, stream_); };
+    if (mesh_.coarse) {
+      std::visit(run, writer.plain_sink<Lerp::fused>(box));
+    } else {
+      std::visit(run, writer.plain_sink<Lerp::separate>(box));
+    }
     const std::uint64_t covered = raster_.covered(stream_);
     plainly_covered_ += covered;
     plainly_uncovered_ += static_cast<std::uint64_t>(box.count()) - covered;
@@ -114,14 +120,15 @@ class MeshResampler final : public CudaResampler<ForwardResampler> {
   void map_box(const SlabBox& box, SlabWriter& writer) override {
     const auto voxels = static_cast<std::size_t>(box.count());
     paths_.claimed += static_cast<std::uint64_t>(voxels);
-    std::uint8_t* mapped = mapped_.mapped.reserve(voxels);
-    glm::vec3* offset = mapped_.offset.reserve(voxels);
-    if (!stays_outside_ && !writer.wants_jacobian() && !writer.wants_owners())
-      return raster_.run(box, OffsetSink{box, mapped, offset}, stream_);
+    const MappedVoxels to = mapped_.reserve(voxels, mesh_.coarse);
+    if (!stays_outside_ && !writer.wants_jacobian() && !writer.wants_owners() && fits_tiles()) {
+      if (mesh_.coarse) return raster_.run(box, OffsetSink<Lerp::fused>{box, to.mapped, to.fixed}, stream_);
+      return raster_.run(box, OffsetSink<Lerp::separate>{box, to.mapped, to.offset}, stream_);
+    }
     raster_.run(box, OwnerSink{box, owner_.reserve(voxels), writer.owners()}, stream_);
     if (stays_outside_) rest_.run(box, OwnerSink{box, at_rest_.reserve(voxels), nullptr}, stream_);
-    const VoxelMapping mapping{
-        owner_.data(), stays_outside_ ? at_rest_.data() : nullptr, writer.owners(), mapped, offset, writer.jacobian()};
+    const VoxelMapping mapping{owner_.data(), stays_outside_ ? at_rest_.data() : nullptr, writer.owners(), to,
+                               writer.jacobian()};
     map_mesh_voxels_kernel<<<blocks_for(box.count()), kThreads, 0, stream_>>>(raster_.view(), box, mapping,
                                                                               counts_.data());
     TETWARP_CUDA_TRY(cudaGetLastError());

@@ -141,8 +141,8 @@ class SampledPullResampler final : public CudaResampler<PullResampler> {
 
   void map_box(const SlabBox& box, SlabWriter&) override {
     const auto voxels = static_cast<std::size_t>(box.count());
-    pull_kernel<<<blocks_for(box.count()), kThreads, 0, stream_>>>(frame_, box, mapped_.mapped.reserve(voxels),
-                                                                   mapped_.offset.reserve(voxels));
+    const MappedVoxels to = mapped_.reserve(voxels, false);
+    pull_kernel<<<blocks_for(box.count()), kThreads, 0, stream_>>>(frame_, box, to.mapped, to.offset);
     TETWARP_CUDA_TRY(cudaGetLastError());
   }
 

@@ -25,14 +25,11 @@ __device__ inline bool clamp_on_axis(int last, int& base, float& fraction) {
 }
 
 /// Linear interpolation along x, then y, then z.
-__device__ inline float interpolate(const float (&v)[8], const glm::vec3& t) {
-  const auto along_x = [&](int from) { return v[from] + t.x * (v[from + 1] - v[from]); };
-  const auto along_y = [&](int from) {
-    const float a = along_x(from);
-    return a + t.y * (along_x(from + 2) - a);
-  };
-  const float a = along_y(0);
-  return a + t.z * (along_y(4) - a);
+template <Lerp kRounding>
+__device__ float interpolate(const float (&v)[8], const glm::vec3& t) {
+  const auto along_x = [&](int from) { return lerp(kRounding, t.x, v[from], v[from + 1]); };
+  const auto along_y = [&](int from) { return lerp(kRounding, t.y, along_x(from), along_x(from + 2)); };
+  return lerp(kRounding, t.z, along_y(0), along_y(4));
 }
 
 /// The eight voxels from one on. As words: their conversion to float is a faster one.
@@ -46,12 +43,13 @@ __device__ void read_corners(const V* v, int dx, int dy, int dz, int (&corners)[
 /// A number to add to a float: it rounds the float to a whole number, which the lowest bits of the sum contain.
 constexpr float kToWhole = 3.0f * (1 << 22);
 
-template <class V>
+template <class V, Lerp kRounding>
 __device__ V interpolated(const int (&corners)[8], const glm::vec3& t) {
   float v[8];
 #pragma unroll
   for (int n = 0; n < 8; ++n) v[n] = static_cast<float>(corners[n]);
-  return static_cast<V>(__float_as_int(interpolate(v, t) + kToWhole));  // between the corners: never saturates
+  return static_cast<V>(
+      __float_as_int(interpolate<kRounding>(v, t) + kToWhole));  // between the corners: never saturates
 }
 
 /// The whole voxels of minus `moved`, rounded down, as bits of a float that is raised by `kToWhole`; and the fraction.
@@ -99,44 +97,82 @@ __device__ inline bool SinkLayout::locate(const glm::ivec3& voxel, const glm::ve
          (fmaxf(origin.fraction.y, origin.fraction.z) < 1.0f);  // a fraction that was rounded to 1 must be carried
 }
 
+/// The fraction of a number of 2^-23 voxel.
+__device__ inline float fraction_of(int u) {
+  constexpr int kFraction = static_cast<int>(kFixedOne - 1), kOne = 0x3F800000;  // the bits of 1.0f
+  return __int_as_float((u & kFraction) | kOne) - 1.0f;
+}
+
+template <bool kInside>
+__device__ bool SinkLayout::locate(const glm::ivec3& voxel, unsigned column, const FixedU& of, Origin& origin) const {
+  const glm::i32vec3 whole = of.u >> kFixedBits;
+  origin.fraction = {fraction_of(of.u.x), fraction_of(of.u.y), fraction_of(of.u.z)};
+  // `column` counts whole voxels that are raised by `kToWhole`.
+  const auto raised = static_cast<unsigned>(__float_as_int(kToWhole)), by_row = static_cast<unsigned>(row),
+             by_slice = static_cast<unsigned>(slice);
+  origin.base = static_cast<int>(
+      (static_cast<unsigned>(whole.z) + raised) * by_slice +
+      ((static_cast<unsigned>(whole.y) + raised) * by_row + (static_cast<unsigned>(whole.x) + raised + column)));
+  if constexpr (kInside) return of.any;
+  const auto is_below = [](int index, int end) { return static_cast<unsigned>(index) < static_cast<unsigned>(end); };
+  return of.any & is_below(voxel.x + whole.x, last.x) & is_below(voxel.y + whole.y, last.y) &
+         is_below(voxel.z + whole.z, last.z);
+}
+
+__device__ inline bool SinkLayout::locate(const glm::ivec3& voxel, const FixedU& of, Origin& origin) const {
+  return locate<false>(voxel, column(voxel), of, origin);
+}
+
+__device__ inline bool SinkLayout::locate_exactly(const glm::ivec3& voxel, const FixedOffset& u, Origin& origin) const {
+  origin.fraction = u.fraction;
+  return clamp(voxel + u.whole, origin);
+}
+
 __device__ inline bool SinkLayout::locate_exactly(const glm::ivec3& voxel, const glm::vec3& u, Origin& origin) const {
   const glm::ivec3 whole(__float2int_rd(u.x), __float2int_rd(u.y), __float2int_rd(u.z));
   glm::ivec3 base = voxel + whole;
-  glm::vec3& t = origin.fraction = u - glm::vec3(whole);
-  for (int axis = 0; axis < 3; ++axis) carry_on_axis(base[axis], t[axis]);
+  origin.fraction = u - glm::vec3(whole);
+  for (int axis = 0; axis < 3; ++axis) carry_on_axis(base[axis], origin.fraction[axis]);
+  return clamp(base, origin);
+}
+
+__device__ inline bool SinkLayout::clamp(glm::ivec3 base, Origin& origin) const {
+  glm::vec3& t = origin.fraction;
   const bool in_x = clamp_on_axis(last.x, base.x, t.x), in_y = clamp_on_axis(last.y, base.y, t.y),
              in_z = clamp_on_axis(last.z, base.z, t.z);
   origin.base = source_index(base);
   return in_x && in_y && in_z;
 }
 
-template <class V>
-__device__ void VoxelSink<V>::begin(const Origin& origin, bool wanted, Pending& pending) const {
+template <class V, Lerp kRounding>
+__device__ void VoxelSink<V, kRounding>::begin(const Origin& origin, bool wanted, Pending& pending) const {
   pending.fraction = origin.fraction;
   if (wanted) read_corners(source + origin.base, 1, row, slice, pending.corners);
 }
 
-template <class V>
-__device__ void VoxelSink<V>::end(int address, const Pending& pending) const {
-  output[address] = interpolated<V>(pending.corners, pending.fraction);
+template <class V, Lerp kRounding>
+__device__ void VoxelSink<V, kRounding>::end(int address, const Pending& pending) const {
+  output[address] = interpolated<V, kRounding>(pending.corners, pending.fraction);
 }
 
-template <class V>
-__device__ void VoxelSink<V>::start(int, const glm::ivec3& voxel, const glm::vec3& moved, bool wanted,
-                                    Pending& pending) const {
+template <class V, Lerp kRounding>
+template <class Moved>
+__device__ void VoxelSink<V, kRounding>::start(int, const glm::ivec3& voxel, const Moved& moved, bool wanted,
+                                               Pending& pending) const {
   Origin origin;
   pending.any = wanted & locate(voxel, moved, origin);
   begin(origin, pending.any, pending);
 }
 
-template <class V>
-__device__ void VoxelSink<V>::finish(int address, const Pending& pending) const {
+template <class V, Lerp kRounding>
+__device__ void VoxelSink<V, kRounding>::finish(int address, const Pending& pending) const {
   // A branch, so that nothing of it is moved before what is read meanwhile.
   if (pending.any) end(address, pending);
 }
 
-template <class V>
-__device__ bool VoxelSink<V>::write(int address, const glm::ivec3& voxel, const glm::vec3& u) const {
+template <class V, Lerp kRounding>
+template <class Offset>
+__device__ bool VoxelSink<V, kRounding>::write(int address, const glm::ivec3& voxel, const Offset& u) const {
   Origin origin;
   if (!locate_exactly(voxel, u, origin)) {
     nothing(address);
@@ -145,7 +181,7 @@ __device__ bool VoxelSink<V>::write(int address, const glm::ivec3& voxel, const 
   const glm::vec3& t = origin.fraction;
   int corners[8];  // neighbours without weight may be any voxels: their finite values do not count
   read_corners(source + origin.base, t.x != 0 ? 1 : 0, t.y != 0 ? row : 0, t.z != 0 ? slice : 0, corners);
-  output[address] = interpolated<V>(corners, t);
+  output[address] = interpolated<V, kRounding>(corners, t);
   return true;
 }
 
@@ -163,9 +199,9 @@ __device__ inline int voted(const int (&l)[8], const glm::vec3& t) {
   return uniform ? l[0] : vote_among({l[0], l[1], l[2], l[3]}, {l[4], l[5], l[6], l[7]}, t);
 }
 
-template <class V>
+template <class V, Lerp kRounding>
 template <class Work>
-__device__ void VolumesSink<V>::with_type(const SinkVolume& volume, Work&& work) const {
+__device__ void VolumesSink<V, kRounding>::with_type(const SinkVolume& volume, Work&& work) const {
   if constexpr (!std::is_void_v<V>) {
     work(static_cast<V*>(nullptr));
   } else if (volume.type == VoxelType::i16) {
@@ -177,31 +213,32 @@ __device__ void VolumesSink<V>::with_type(const SinkVolume& volume, Work&& work)
   }
 }
 
-template <class V>
-__device__ void VolumesSink<V>::read(const SinkVolume& volume, const Origin& origin, const glm::ivec3& step,
-                                     int (&corners)[8]) const {
+template <class V, Lerp kRounding>
+__device__ void VolumesSink<V, kRounding>::read(const SinkVolume& volume, const Origin& origin, const glm::ivec3& step,
+                                                int (&corners)[8]) const {
   with_type(volume, [&](auto* type) {
     using T = std::remove_pointer_t<decltype(type)>;
     read_corners(static_cast<const T*>(volume.source) + origin.base, step.x, step.y, step.z, corners);
   });
 }
 
-template <class V>
-__device__ void VolumesSink<V>::put(const SinkVolume& volume, int address, int value) const {
+template <class V, Lerp kRounding>
+__device__ void VolumesSink<V, kRounding>::put(const SinkVolume& volume, int address, int value) const {
   with_type(volume, [&](auto* type) {
     using T = std::remove_pointer_t<decltype(type)>;
     static_cast<T*>(volume.output)[address] = static_cast<T>(value);
   });
 }
 
-template <class V>
-__device__ void VolumesSink<V>::put(const SinkVolume& volume, int address, const int (&corners)[8],
-                                    const glm::vec3& t) const {
-  put(volume, address, std::is_void_v<V> && volume.votes ? voted(corners, t) : interpolated<int>(corners, t));
+template <class V, Lerp kRounding>
+__device__ void VolumesSink<V, kRounding>::put(const SinkVolume& volume, int address, const int (&corners)[8],
+                                               const glm::vec3& t) const {
+  put(volume, address,
+      std::is_void_v<V> && volume.votes ? voted(corners, t) : interpolated<int, kRounding>(corners, t));
 }
 
-template <class V>
-__device__ void VolumesSink<V>::begin(const Origin& origin, bool wanted, Pending& pending) const {
+template <class V, Lerp kRounding>
+__device__ void VolumesSink<V, kRounding>::begin(const Origin& origin, bool wanted, Pending& pending) const {
   pending.any = wanted;
   pending.origin = origin;
   if (!wanted) return;
@@ -210,16 +247,17 @@ __device__ void VolumesSink<V>::begin(const Origin& origin, bool wanted, Pending
     if (n == 0 || n < count) read(volumes[n], origin, {1, row, slice}, pending.corners[n]);
 }
 
-template <class V>
-__device__ void VolumesSink<V>::start(int, const glm::ivec3& voxel, const glm::vec3& moved, bool wanted,
-                                      Pending& pending) const {
+template <class V, Lerp kRounding>
+template <class Moved>
+__device__ void VolumesSink<V, kRounding>::start(int, const glm::ivec3& voxel, const Moved& moved, bool wanted,
+                                                 Pending& pending) const {
   Origin origin;
   const bool inside = locate(voxel, moved, origin);
   begin(origin, wanted & inside, pending);
 }
 
-template <class V>
-__device__ void VolumesSink<V>::finish(int address, const Pending& pending) const {
+template <class V, Lerp kRounding>
+__device__ void VolumesSink<V, kRounding>::finish(int address, const Pending& pending) const {
   if (!pending.any) return;
 #pragma unroll
   for (int n = 0; n < kOnTheWay; ++n)
@@ -231,8 +269,9 @@ __device__ void VolumesSink<V>::finish(int address, const Pending& pending) cons
   }
 }
 
-template <class V>
-__device__ bool VolumesSink<V>::write(int address, const glm::ivec3& voxel, const glm::vec3& u) const {
+template <class V, Lerp kRounding>
+template <class Offset>
+__device__ bool VolumesSink<V, kRounding>::write(int address, const glm::ivec3& voxel, const Offset& u) const {
   Origin origin;
   if (!locate_exactly(voxel, u, origin)) {
     nothing(address);
@@ -260,15 +299,15 @@ __device__ void copy_column(const V* from, int from_step, V* to, int to_step, st
     if ((wanted >> n & 1) != 0) to[n * to_step] = copied[n];
 }
 
-template <class V>
+template <class V, Lerp kRounding>
 template <int kCount>
-__device__ void VoxelSink<V>::copy(const glm::ivec3& voxel, std::uint32_t wanted) const {
+__device__ void VoxelSink<V, kRounding>::copy(const glm::ivec3& voxel, std::uint32_t wanted) const {
   copy_column<kCount>(source + source_index(voxel), slice, output + address(voxel), output_slice, wanted);
 }
 
-template <class V>
+template <class V, Lerp kRounding>
 template <int kCount>
-__device__ void VolumesSink<V>::copy(const glm::ivec3& voxel, std::uint32_t wanted) const {
+__device__ void VolumesSink<V, kRounding>::copy(const glm::ivec3& voxel, std::uint32_t wanted) const {
   for (int n = 0; n < count; ++n) {
     with_type(volumes[n], [&](auto* type) {
       using T = std::remove_pointer_t<decltype(type)>;
@@ -278,8 +317,8 @@ __device__ void VolumesSink<V>::copy(const glm::ivec3& voxel, std::uint32_t want
   }
 }
 
-template <class V>
-__device__ void VolumesSink<V>::nothing(int address) const {
+template <class V, Lerp kRounding>
+__device__ void VolumesSink<V, kRounding>::nothing(int address) const {
   for (int n = 0; n < count; ++n) put(volumes[n], address, volumes[n].background);
 }
 

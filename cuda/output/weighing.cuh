@@ -97,8 +97,12 @@ __device__ inline glm::vec3 moved_by(const HeldWeighing& m, const glm::vec3& fro
                {v[22], v[23], v[24]});
 }
 
-/// The weighings of the tetrahedra of a tile, in shared memory. The last one is for voxels without an owner.
+/// The weighings of the tetrahedra of a tile of a dense field, in shared memory. The last one is for voxels without an
+/// owner. `sample_column` takes them.
 struct Weighings {
+  using Held = HeldWeighing;
+  using From = glm::vec3;  ///< from the first voxel of the tile, 2^-12 voxel
+
   const float4 (*prepared)[kQuads];
   const float* ends;
   unsigned nobody;  ///< number that stands for no owner, as do all larger numbers
@@ -106,73 +110,11 @@ struct Weighings {
   __device__ void hold(unsigned slot, HeldWeighing& m, unsigned& held) const {
     m.hold(prepared, ends, min(slot, nobody), held);
   }
+  __device__ static From from(const glm::ivec3& in_tile) { return glm::vec3(in_tile * kStepsPerVoxel); }
+  __device__ static void step(From& from) { from.z += float{kStepsPerVoxel}; }
+  __device__ static glm::vec3 moved(const HeldWeighing& m, const From& from) { return moved_by(m, from); }
+  __device__ static bool is_any(const glm::vec3& moved) { return moved.x == moved.x; }
+  __device__ static glm::vec3 offset(const glm::vec3& moved) { return detail::to_offset(moved); }
 };
-
-/// Samples a column of voxels along k: while one is made, what the next is made from is on its way.
-///
-/// @tparam kInside    whether all come from well inside the source
-/// @param at          the first voxel  @param from_first  the same from the first of the tile, 2^-12 voxel
-/// @param next_slot  called once a voxel: its weighing
-/// @param finish      `finish(z)` writes a voxel that float leaves open or nobody owns, and says whether it is covered
-/// @return how many are covered
-template <bool kInside, class Sink, class NextSlot, class Finish>
-__device__ unsigned sample_column(const Sink& sink, const Weighings& weighings, glm::ivec3 at, glm::vec3 from_first,
-                                  int count, NextSlot&& next_slot, Finish&& finish) {
-  unsigned column = sink.column(at), held = ~0u, left = 0;
-  int out = sink.address(at);
-  HeldWeighing m{};
-  typename Sink::Pending pending{};
-  const auto next_moved = [&] {
-    weighings.hold(next_slot(), m, held);
-    const glm::vec3 moved = moved_by(m, from_first);
-    from_first.z += float{kStepsPerVoxel};
-    return moved;
-  };
-  const auto begin = [&](const glm::vec3& moved) {
-    typename Sink::Origin origin;
-    const bool any = sink.template locate<kInside>(at, column, moved, origin);
-    sink.begin(origin, any, pending);
-    if (!any) left |= 1;
-    column += sink.per_source_slice();
-    ++at.z;
-  };
-  begin(next_moved());
-#pragma unroll(kInside && !Sink::kIsWide ? 3 : 1)  // fewer registers are copied
-  for (int z = 1; z < count; ++z) {
-    const glm::vec3 moved = next_moved();
-    left <<= 1;
-    if (moved.x == moved.x) {  // a branch, so that nothing of it is moved before what is read meanwhile
-      sink.end(out, pending);
-    } else {
-      left |= 2;
-    }
-    out += sink.per_slice();
-    begin(moved);
-  }
-  sink.end(out, pending);
-  unsigned covered = static_cast<unsigned>(count - __popc(left));
-#pragma unroll 1
-  for (; left != 0; left &= left - 1)  // not within the loop above: calls would cost it registers
-    covered += finish(count - __ffs(static_cast<int>(left)));
-  return covered;
-}
-
-template <class Sink>
-__device__ __noinline__ bool write_out_of_line(const Sink& sink, int out, glm::ivec3 at, glm::vec3 u) {
-  return sink.write(out, at, u);
-}
-
-/// For `finish` above, of a voxel that has an owner.
-/// @param slowly  `slowly(out)` writes it with all the arithmetic there is, where its weights are not for float
-template <class Sink, class Slowly>
-__device__ bool finish_voxel(const Sink& sink, const Weighings& weighings, unsigned slot, const glm::ivec3& at,
-                             const glm::vec3& from_first, Slowly&& slowly) {
-  HeldWeighing m{};
-  unsigned held = ~0u;
-  weighings.hold(slot, m, held);
-  const glm::vec3 moved = moved_by(m, from_first);
-  const int out = sink.address(at);
-  return moved.x == moved.x ? write_out_of_line(sink, out, at, detail::to_offset(moved)) : slowly(out);
-}
 
 }  // namespace tetwarp::cuda_detail

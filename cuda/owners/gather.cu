@@ -39,7 +39,7 @@ __global__ void queue_kernel(GatherTask task, int walk, Sink sink) {
       if (!is_finite(place)) place = task.lattice.place(glm::vec3(voxel));
       const Trial trial = try_tetrahedron(task.lattice, tetrahedron_at(task.lattice, place), point);
       settled = trial.owns;
-      if (settled) covered += sink.write(sink.address(voxel), voxel, trial.u());
+      if (settled) covered += sink.write(sink.address(voxel), voxel, offset_for<Sink>(task, trial, voxel));
       place =
           n_try == 0 ? trial.place() : (place + trial.place()) * 0.5f;  // full steps may go round in circles in folds
     }
@@ -48,7 +48,12 @@ __global__ void queue_kernel(GatherTask task, int walk, Sink sink) {
     const glm::i32vec3 steps = detail::to_steps(glm::i64vec3(voxel)), signs = task.nudge.signs(voxel);
     LatticeTetrahedron owner;
     if (walk_to_owner(task.lattice, as_lattice(tetrahedron_at(task.lattice, place)), steps, signs, walk, owner)) {
-      covered += sink.write(sink.address(voxel), voxel, interpolate_u(vertices_of(task.lattice, owner), steps, signs));
+      if constexpr (kIsCoarse<Sink>) {
+        covered += sink.write(sink.address(voxel), voxel, fixed_offset_in(task.lattice, owner, voxel, signs));
+      } else {
+        covered +=
+            sink.write(sink.address(voxel), voxel, interpolate_u(vertices_of(task.lattice, owner), steps, signs));
+      }
     } else {
       task.leave_to_claims(in);
     }
@@ -100,7 +105,7 @@ __global__ void write_claimed_kernel(GatherTask task, glm::ivec3 begin, const un
       {static_cast<int>(cell % cells.x), static_cast<int>(row % cells.y), static_cast<int>(row / cells.y)},
       TetrahedronNumber::in_cell(owner[n]));
   warp_count(&task.counters->covered,
-             sink.write(address, voxel, offset_in(task.lattice, t, voxel, task.nudge.signs(voxel))));
+             sink.write(address, voxel, offset_for<Sink>(task.lattice, t, voxel, task.nudge.signs(voxel))));
 }
 
 }  // namespace
@@ -109,7 +114,9 @@ template <class Sink>
 Gather::Counters Gather::run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink,
                              cudaStream_t stream) {
   const DeviceField& field = lattice.field();
-  if (IntervalRaster::suits(field.steps, is_mostly_folded(lattice))) return run_intervals(lattice, box, sink, stream);
+  if constexpr (kIsCoarse<Sink>) {
+    if (IntervalRaster::suits(field.steps, is_mostly_folded(lattice))) return run_intervals(lattice, box, sink, stream);
+  }
   coverage_.begin(box, stream);
   const glm::ivec3 size(box.size), tile(kSeedTile, kSeedTile, kMarch);
   const glm::ivec3 marches = marches_of(size);
@@ -139,9 +146,11 @@ Gather::Counters Gather::run(const LatticeOnDevice& lattice, const SlabBox& box,
   constexpr int kBlockI = kAcross * kAlongI, kBlockJ = kWarps / kAcross * kAlongJ;  // voxels of a block
   const dim3 blocks(static_cast<unsigned>((size.x + kBlockI - 1) / kBlockI),
                     static_cast<unsigned>((size.y + kBlockJ - 1) / kBlockJ), static_cast<unsigned>(marches.z));
-  const glm::vec3& cell = field.steps.cell;
-  const bool coarse = std::max({cell.x, cell.y, cell.z}) > 2 * kStepsPerVoxel;
-  const auto march = coarse ? march_kernel<Sink, true> : march_kernel<Sink, false>;
+  auto march = march_kernel<Sink, false>;
+  if constexpr (kIsCoarse<Sink>) {
+    task.maps = maps_of(field.steps, box, stream);
+    if (task.maps) march = march_kernel<Sink, true>;
+  }
   march<<<blocks, dim3(32, kWarps), 0, stream>>>(task, seeded, sink);
   queue_kernel<<<1024, kThreads, 0, stream>>>(task, is_mostly_folded(lattice) ? 0 : kWalk, sink);
   TETWARP_CUDA_TRY(cudaGetLastError());
@@ -172,6 +181,19 @@ Gather::Counters Gather::run_intervals(const LatticeOnDevice& lattice, const Sla
   Counters found = counters(stream);
   found.covered += settled.covered;
   return found;
+}
+
+const int4* Gather::maps_of(const StepLattice& lattice, const SlabBox& box, cudaStream_t stream) {
+  constexpr std::int64_t kMostBytes = 4;  // for each voxel
+  const std::int64_t entries = entries_of(lattice);
+  if (entries * kWordsOfEntry * std::int64_t{sizeof(int)} > kMostBytes * box.count()) return nullptr;
+  int4* maps = maps_.reserve(static_cast<std::size_t>(entries * 3));
+  if (!has_maps_) {
+    map_table_kernel<<<blocks_for(entries), kThreads, 0, stream>>>(lattice, entries, maps);
+    TETWARP_CUDA_TRY(cudaGetLastError());
+    has_maps_ = true;
+  }
+  return maps;
 }
 
 bool Gather::is_mostly_folded(const LatticeOnDevice& lattice) {
@@ -213,15 +235,18 @@ void Gather::claim_several(const Task& task, const DeviceField& field, const Sin
   }
 }
 
-template Gather::Counters Gather::run(const LatticeOnDevice&, const SlabBox&, const OffsetSink&, cudaStream_t);
-template Gather::Counters Gather::run(const LatticeOnDevice&, const SlabBox&, const VolumesSink<void>&, cudaStream_t);
-template Gather::Counters Gather::run(const LatticeOnDevice&, const SlabBox&, const VolumesSink<std::int16_t>&,
-                                      cudaStream_t);
-template Gather::Counters Gather::run(const LatticeOnDevice&, const SlabBox&, const VoxelSink<std::uint8_t>&,
-                                      cudaStream_t);
-template Gather::Counters Gather::run(const LatticeOnDevice&, const SlabBox&, const VoxelSink<std::int16_t>&,
-                                      cudaStream_t);
-template Gather::Counters Gather::run(const LatticeOnDevice&, const SlabBox&, const VoxelSink<std::uint16_t>&,
-                                      cudaStream_t);
+#define TETWARP_RUN(...) \
+  template Gather::Counters Gather::run(const LatticeOnDevice&, const SlabBox&, const __VA_ARGS__&, cudaStream_t)
+#define TETWARP_RUN_ROUNDED(kRounding)               \
+  TETWARP_RUN(OffsetSink<kRounding>);                \
+  TETWARP_RUN(VolumesSink<void, kRounding>);         \
+  TETWARP_RUN(VolumesSink<std::int16_t, kRounding>); \
+  TETWARP_RUN(VoxelSink<std::uint8_t, kRounding>);   \
+  TETWARP_RUN(VoxelSink<std::int16_t, kRounding>);   \
+  TETWARP_RUN(VoxelSink<std::uint16_t, kRounding>)
+TETWARP_RUN_ROUNDED(Lerp::separate);
+TETWARP_RUN_ROUNDED(Lerp::fused);
+#undef TETWARP_RUN_ROUNDED
+#undef TETWARP_RUN
 
 }  // namespace tetwarp::cuda_detail

@@ -17,40 +17,49 @@ namespace tetwarp::cuda_detail {
 /// it comes from.
 ///
 /// Every sink of a gather has an address for each voxel, where it writes; it grows by `per_slice` along k.
+///
+/// @tparam kRounding  fused for coarse fields: places come as `FixedU` and `FixedOffset` then, else as glm::vec3
+template <Lerp kRounding>
 struct OffsetSink {
   static constexpr bool kIsWide = false;
+  static constexpr Lerp kLerp = kRounding;
+  using Offset = std::conditional_t<kRounding == Lerp::fused, FixedOffset, glm::vec3>;
+  using Moved = std::conditional_t<kRounding == Lerp::fused, FixedU, glm::vec3>;
 
   SlabBox box;
   std::uint8_t* mapped;
-  glm::vec3* offset;
+  Offset* offset;
 
   __device__ int address(const glm::ivec3& voxel) const { return static_cast<int>(box.offset(glm::i64vec3(voxel))); }
   __device__ int per_slice() const { return static_cast<int>(box.size.x * box.size.y); }
   /// This sink reads nothing, so nothing is pending.
   struct Pending {
     bool any;
-    glm::vec3 u;
+    Offset u;
   };
-  __device__ void start(int address, const glm::ivec3& voxel, const glm::vec3& moved, bool wanted,
-                        Pending& pending) const {
-    pending.any = wanted && write(address, voxel, detail::to_offset(moved));
+  __device__ static Offset offset_of(const glm::vec3& moved) { return detail::to_offset(moved); }
+  __device__ static Offset offset_of(const FixedU& u) { return u.offset(); }
+  __device__ static bool is_any(const glm::vec3& moved) { return moved.x == moved.x; }
+  __device__ static bool is_any(const FixedU& u) { return u.any; }
+  __device__ void start(int address, const glm::ivec3& voxel, const Moved& moved, bool wanted, Pending& pending) const {
+    pending.any = wanted && write(address, voxel, offset_of(moved));
   }
   __device__ void finish(int, const Pending&) const {}
   struct Origin {
-    glm::vec3 u;
+    Offset u;
   };
   __device__ bool surrounds(const glm::ivec3&, const glm::ivec3&) const { return false; }
   __device__ unsigned column(const glm::ivec3&) const { return 0; }
   __device__ unsigned per_source_slice() const { return 0; }
   template <bool kInside>
-  __device__ bool locate(const glm::ivec3&, unsigned, const glm::vec3& moved, Origin& origin) const {
-    origin.u = detail::to_offset(moved);
-    return moved.x == moved.x;
+  __device__ bool locate(const glm::ivec3&, unsigned, const Moved& moved, Origin& origin) const {
+    origin.u = offset_of(moved);
+    return is_any(moved);
   }
   __device__ void begin(const Origin& origin, bool, Pending& pending) const { pending.u = origin.u; }
   __device__ void end(int address, const Pending& pending) const { write(address, {}, pending.u); }
   /// @return whether the voxel counts as covered
-  __device__ bool write(int address, const glm::ivec3&, const glm::vec3& u) const {
+  __device__ bool write(int address, const glm::ivec3&, const Offset& u) const {
     mapped[address] = 1;
     offset[address] = u;
     return true;
@@ -59,11 +68,11 @@ struct OffsetSink {
   template <int kCount>
   __device__ void copy(const glm::ivec3& voxel, std::uint32_t wanted) const {
     for (int n = 0, to = address(voxel); n < kCount; ++n, to += per_slice())
-      if ((wanted >> n & 1) != 0) write(to, {}, glm::vec3(0));
+      if ((wanted >> n & 1) != 0) write(to, {}, Offset{});
   }
   __device__ void nothing(int address) const {
     mapped[address] = 0;
-    offset[address] = glm::vec3(0);
+    offset[address] = Offset{};
   }
 };
 
@@ -84,6 +93,7 @@ class Gather {
   void forget_field() {
     claims_.forget_field();
     intervals_.forget_field();
+    has_maps_ = false;
   }
 
   /// A voxel that the march could not settle.
@@ -103,8 +113,12 @@ class Gather {
   template <class Task, class Sink>
   void claim_several(const Task& task, const DeviceField& field, const Sink& sink, cudaStream_t stream);
   Counters counters(cudaStream_t stream);
+  /// The maps of the tetrahedra of a coarse lattice; null where they take too much memory.
+  const int4* maps_of(const StepLattice& lattice, const SlabBox& box, cudaStream_t stream);
 
   Coverage coverage_;
+  DeviceBuffer<int4> maps_;  ///< `map_table.cuh`
+  bool has_maps_ = false;    ///< whether they are those of the field
   Claims claims_;
   IntervalRaster intervals_;
   DeviceBuffer<glm::vec3> seeds_;

@@ -5,6 +5,7 @@
 
 #include "cuda/owners/gather.cuh"
 #include "cuda/runtime/warp.cuh"
+#include "deform/core/coarse_map.h"
 #include "deform/core/gather.h"
 
 /// What all kernels of a gather know, and how a box is shared out among marches. For gather.cu alone.
@@ -49,6 +50,7 @@ struct GatherTask {
   glm::ivec3 seeds;            ///< how many on each axis
   Gather::QueuedVoxel* queue;  ///< room for kQueueSize; the march writes, `queue_kernel` reads
   Gather::Counters* counters;
+  const int4* maps = nullptr;  ///< of a coarse field, where there is a table (`map_table.cuh`)
 
   __device__ glm::ivec3 begin() const { return glm::ivec3(box.begin); }
   __device__ glm::ivec3 size() const { return glm::ivec3(box.size); }
@@ -86,6 +88,37 @@ struct GatherTask {
     return (std::int64_t{in.z} * size().y + in.y) * single.words_per_row + in.x / 32;
   }
 };
+
+/// Whether a sink is one of coarse fields.
+template <class Sink>
+constexpr bool kIsCoarse = Sink::kLerp == Lerp::fused;
+
+/// Where a voxel of a coarse field comes from that a tetrahedron owns. Rarely called, so out of line.
+__device__ __noinline__ FixedOffset fixed_offset_in(const StepLattice& lattice, LatticeTetrahedron t, glm::ivec3 voxel,
+                                                    glm::i32vec3 signs) {
+  return fixed_offset(coarse_u(vertices_of(lattice, t), voxel, signs));
+}
+
+/// Where a voxel comes from that a tetrahedron owns, as a sink takes it.
+template <class Sink>
+__device__ auto offset_for(const StepLattice& lattice, const LatticeTetrahedron& t, const glm::ivec3& voxel,
+                           const glm::i32vec3& signs) {
+  if constexpr (kIsCoarse<Sink>) {
+    return fixed_offset_in(lattice, t, voxel, signs);
+  } else {
+    return offset_in(lattice, t, voxel, signs);
+  }
+}
+
+/// The same of a trial that found that it owns the voxel.
+template <class Sink>
+__device__ auto offset_for(const GatherTask& task, const Trial& trial, const glm::ivec3& voxel) {
+  if constexpr (kIsCoarse<Sink>) {
+    return fixed_offset_in(task.lattice, as_lattice(trial.t), voxel, task.nudge.signs(voxel));
+  } else {
+    return trial.u();
+  }
+}
 
 /// NaN and infinity are not.
 __device__ bool is_finite(const glm::vec3& v) { return isfinite(v.x + v.y + v.z); }

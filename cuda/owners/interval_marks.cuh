@@ -15,12 +15,12 @@ namespace tetwarp::cuda_detail {
 
 namespace {
 
-/// Before the first batch. Rows have no intervals, and the weighing of nobody is no number.
+/// Before the first batch. Rows have no intervals, and nobody has no map.
 __device__ void clear_marks(const IntervalTile& tile) {
   TileMemory& memory = tile.memory;
   if (tile.thread < kTileRows) memory.rows[tile.thread].starts = memory.rows[tile.thread].covered = 0;
   if (tile.thread == 0) {
-    memory.prepared[kSlots][0] = make_float4(0, 0, 0, kNoNumber);
+    memory.usable[kSlots] = 0;
     memory.overlaps = false;
     memory.item_count = memory.unsure_count = 0;
   }

@@ -19,7 +19,7 @@ namespace {
 /// Finds and samples the voxels of a box: a thread block a tile, grid as there are tiles on each axis.
 ///
 ///     list the tetrahedra that may reach it -> mark their intervals, again in order where they overlap
-///       -> mark holes -> weigh the tetrahedra -> sample the columns
+///       -> mark holes -> map the tetrahedra -> sample the columns
 ///
 /// @param task  `cells` are read, and `left` of a tile is written where more tetrahedra may reach it than there is room
 ///              for; `counters` are added to
@@ -47,6 +47,10 @@ __global__ void __launch_bounds__(kTileThreads, Sink::kIsWide ? kTileBlocks - 1 
     if (thread == 0) atomicAdd(&task.counters->covered, static_cast<unsigned long long>(size.x * size.y * size.z));
     return;
   }
+  if (cells.left) {
+    if (thread == 0) atomicAdd(&task.counters->left, 1u);
+    return;
+  }
   if (thread == 0) memory.settled = 0;
   clear_marks(tile);
   if (tile.at_hand) tile.read_vertices();
@@ -66,7 +70,7 @@ __global__ void __launch_bounds__(kTileThreads, Sink::kIsWide ? kTileBlocks - 1 
     clear_marks(tile);
   }
   mark_holes(tile);
-  weigh(tile);
+  map_tetrahedra(tile);
   __syncthreads();
   const ColumnSampler<Sink> sampler{tile, sink};
   const bool inside = sink.surrounds(cells.source_begin, cells.source_end);
@@ -152,13 +156,14 @@ void IntervalRaster::mark_left(const LatticeOnDevice& lattice, const SlabBox& bo
   TETWARP_CUDA_TRY(cudaGetLastError());
 }
 
-template void IntervalRaster::run(const LatticeOnDevice&, const SlabBox&, const OffsetSink&, cudaStream_t);
-template void IntervalRaster::run(const LatticeOnDevice&, const SlabBox&, const VolumesSink<void>&, cudaStream_t);
-template void IntervalRaster::run(const LatticeOnDevice&, const SlabBox&, const VolumesSink<std::int16_t>&,
-                                  cudaStream_t);
-template void IntervalRaster::run(const LatticeOnDevice&, const SlabBox&, const VoxelSink<std::uint8_t>&, cudaStream_t);
-template void IntervalRaster::run(const LatticeOnDevice&, const SlabBox&, const VoxelSink<std::int16_t>&, cudaStream_t);
-template void IntervalRaster::run(const LatticeOnDevice&, const SlabBox&, const VoxelSink<std::uint16_t>&,
-                                  cudaStream_t);
+#define TETWARP_RUN(...) \
+  template void IntervalRaster::run(const LatticeOnDevice&, const SlabBox&, const __VA_ARGS__&, cudaStream_t)
+TETWARP_RUN(OffsetSink<Lerp::fused>);
+TETWARP_RUN(VolumesSink<void, Lerp::fused>);
+TETWARP_RUN(VolumesSink<std::int16_t, Lerp::fused>);
+TETWARP_RUN(VoxelSink<std::uint8_t, Lerp::fused>);
+TETWARP_RUN(VoxelSink<std::int16_t, Lerp::fused>);
+TETWARP_RUN(VoxelSink<std::uint16_t, Lerp::fused>);
+#undef TETWARP_RUN
 
 }  // namespace tetwarp::cuda_detail

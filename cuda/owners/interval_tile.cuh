@@ -3,7 +3,7 @@
 
 #pragma once
 
-#include "cuda/output/weighing.cuh"
+#include "cuda/output/coarse_maps.cuh"
 #include "cuda/owners/interval_raster.cuh"
 #include "cuda/owners/tile.cuh"
 #include "cuda/runtime/warp.cuh"
@@ -21,6 +21,8 @@ constexpr int kMostVertices = 320;    ///< of a tile that are kept at hand
 constexpr int kMostUnsure = 256;      ///< intervals for exact integers
 constexpr int kBlockCells = 4;        ///< cells of a block along an axis
 constexpr int kLowerQuad = 4;         ///< of `TileMemory::prepared`, where faces are: `RowFaces::lower`
+constexpr int kQuads = 5;             ///< of a slot
+static_assert(kQuads > kLowerQuad && kQuads >= kMapQuads);
 
 /// What all kernels of the interval raster know.
 struct TileTask {
@@ -150,11 +152,11 @@ struct IntervalRow {
   __device__ unsigned owner_of(int x) const { return owner[last_bit(starts & lowest_bits(x + 1))]; }
 };
 
-/// The shared memory of a tile, 49 056 bytes, of which four fit a multiprocessor.
+/// The shared memory of a tile, 44 944 bytes, of which four fit a multiprocessor.
 ///
-///     prepared  257 x 6 x 16   a slot for each tetrahedron of a batch: first its four faces, and in the fifth quad how
-///                              many of them are lower; once all rows are marked, its `Weighing`
-///     ends      257 x 4        the last float of each `Weighing`
+///     prepared  257 x 5 x 16   a slot for each tetrahedron of a batch: first its four faces, and in the fifth quad how
+///                              many of them are lower; once all rows are marked, its map (`put_map`)
+///     usable    257 x 4        whether each map is
 ///     rows      128 x 72       `IntervalRow`, number z * 8 + y
 ///     numbers   640 x 4        the list: `TetrahedronInTile` of each entry, rising
 ///     spans     640 x 4        `RowSpan` of each entry
@@ -164,8 +166,8 @@ struct IntervalRow {
 ///
 /// An *entry* is an index of the list, a *slot* an index within its batch of 256: entry = first of the batch + slot.
 struct TileMemory {
-  float4 prepared[kSlots + 1][kQuads];  ///< faces, and then `Weighing`, the last nobody's
-  float ends[kSlots + 1];               ///< the last float of each `Weighing`
+  float4 prepared[kSlots + 1][kQuads];  ///< faces, and then maps, the last nobody's
+  unsigned usable[kSlots + 1];          ///< of each map, whether it is
   IntervalRow rows[kTileRows];
   unsigned numbers[kMostTetrahedra];      ///< `TetrahedronInTile`, rising
   unsigned spans[kMostTetrahedra];        ///< `RowSpan` of each

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "cuda/output/voxel_sink.cuh"
+#include "cuda/owners/map_table.cuh"
 #include "cuda/owners/warp_queue.cuh"
 
 /// The march of a gather: the kernel that goes along k. For gather.cu alone.
@@ -27,8 +28,10 @@ __device__ inline void prefetch(const StepLattice& lattice, const FloatTetrahedr
 }
 
 /// One warp at work: kAlongI voxels along i, kAlongJ along j, up to kMarch along k.
-template <class Sink, bool kCoarse>
+/// @tparam kTable  whether `GatherTask::maps` has the maps of a coarse field; else they are made voxel by voxel
+template <class Sink, bool kTable>
 struct March {
+  static constexpr bool kCoarse = kIsCoarse<Sink>;
   static constexpr Effort kEffort = kCoarse ? Effort::close : Effort::quick;
 
   const GatherTask& task;
@@ -73,7 +76,7 @@ struct March {
   }
 
   /// Predicts the owner of each voxel from that of the one before. @param place  guess for the first
-  __device__ int predict(glm::vec3 place, WarpQueue<Sink, kCoarse> queue) const {
+  __device__ int predict(glm::vec3 place, WarpQueue<Sink> queue) const {
     const int turn = task.nudge.first_down.z - voxel(0).z;  // where the nudge along k turns
     int covered = 0, rounds = 0;
     for (int n = 0; n < slices;) {  // little of a run lives on while the queue is drained
@@ -94,11 +97,22 @@ struct March {
       sink.nothing(sink.address(voxel(n + first_bit(left))));
   }
 
+  /// U of a voxel of a coarse field that a tetrahedron owns.
+  __device__ FixedU fixed_u(const FloatTetrahedron& t, const LocalTetrahedron& local, const glm::ivec3& at) const {
+    const glm::i32vec3 d = glm::i32vec3(task.lattice.first) + glm::i32vec3(t.d) * glm::i32vec3(task.lattice.cell) +
+                           glm::i32vec3(local.moved);
+    const CoarseMap map(glm::dvec3(local.a), glm::dvec3(local.b), glm::dvec3(local.c), d, glm::dvec3(-local.moved),
+                        glm::dvec3(-local.moved_a), glm::dvec3(-local.moved_b), glm::dvec3(-local.moved_c));
+    const glm::i64vec3 u = map.u(at);
+    const glm::i32vec3 low(u);
+    return {low, !map.is_thin && glm::i64vec3(low) == u};
+  }
+
   /// From slice n to slice `end`, or until the queue holds a warp full: then n is where to go on.
   /// @param singles  which voxels of this lane have one owner, from the lowest bit on
   /// @return how many of this lane are covered
   __device__ int run(int& n, int end, std::uint32_t singles, int& rounds, glm::vec3& place,
-                     WarpQueue<Sink, kCoarse>& queue) const {
+                     WarpQueue<Sink>& queue) const {
     glm::ivec3 at = voxel(n);
     const int out_slice = sink.per_slice();
     int out = sink.address(at) - out_slice, failures = 0;
@@ -114,12 +128,19 @@ struct March {
     do {
       const FloatTetrahedron t = tetrahedron_at(task.lattice, place);
       const LocalTetrahedron local(task.lattice, t, point);
+      TableMap map;
+      if constexpr (kTable) map = read_map(task.maps, t);
       if (!kCoarse) prefetch(task.lattice, t);
       sink.finish(out, pending);
       out += out_slice;
       const Trial trial = try_tetrahedron<kEffort>(t, local, point);
       const bool single = (singles & 1) != 0;
-      sink.start(out, at, trial.moved, single & trial.owns, pending);
+      if constexpr (kCoarse) {
+        const FixedU u = kTable ? map.u(at) : fixed_u(t, local, at);
+        sink.start(out, at, u, single & trial.owns & u.any, pending);
+      } else {
+        sink.start(out, at, trial.moved, single & trial.owns, pending);
+      }
       const bool again = single & !pending.any;
       const unsigned failed = __ballot_sync(kAllLanes, again);
       if (failed != 0) {
@@ -154,10 +175,10 @@ struct March {
 ///
 /// @param task   `counters->covered` is added to; voxels that are left go to the queue
 /// @param seeds  from `seed_kernel`  @param sink  gets every voxel but those that are left
-template <class Sink, bool kCoarse>
+template <class Sink, bool kTable>
 __global__ void __launch_bounds__(32 * kWarps, Sink::kIsWide ? kBlocks - 1 : kBlocks)
     march_kernel(const __grid_constant__ GatherTask task, const glm::vec3* seeds, const __grid_constant__ Sink sink) {
-  __shared__ typename WarpQueue<Sink, kCoarse>::WaitingVoxel voxels[kWarps][64];
+  __shared__ typename WarpQueue<Sink>::WaitingVoxel voxels[kWarps][64];
   const int lane = static_cast<int>(threadIdx.x), warp = static_cast<int>(threadIdx.y);
   const glm::ivec3 size = task.size(),
                    march_at(blockIdx.x * kAcross + warp % kAcross, blockIdx.y * (kWarps / kAcross) + warp / kAcross,
@@ -165,7 +186,7 @@ __global__ void __launch_bounds__(32 * kWarps, Sink::kIsWide ? kBlocks - 1 : kBl
                    first = march_at * glm::ivec3(kAlongI, kAlongJ, kMarch);
   if (first.x >= size.x || first.y >= size.y) return;  // the whole warp
   const glm::ivec3 begin = first + of_lane(lane), inside = glm::min(begin, size - 1);
-  const March<Sink, kCoarse> march{task, sink, first, lane, min(kMarch, size.z - first.z), begin == inside};
+  const March<Sink, kTable> march{task, sink, first, lane, min(kMarch, size.z - first.z), begin == inside};
   int found = 0;
   if (task.resting[task.march_number(march_at)] != 0) {
     found = march.copy();

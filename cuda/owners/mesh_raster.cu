@@ -17,6 +17,11 @@ constexpr bool is_wide() {
   if constexpr (requires { Sink::kIsWide; }) return Sink::kIsWide;
   return false;
 }
+template <class Sink>
+constexpr bool is_coarse() {
+  if constexpr (requires { Sink::kLerp; }) return Sink::kLerp == Lerp::fused;
+  return false;
+}
 
 /// Finds the owners of the voxels of a box, and gives them to a sink: a thread block a tile that the box reaches.
 ///
@@ -47,7 +52,7 @@ __global__ void __launch_bounds__(kTileThreads, is_wide<Sink>() ? kTileBlocks - 
   const unsigned long long first = task.first[number], count = task.first[number + 1] - first;
   const bool is_few = count <= kSlots;
   if (is_few) {
-    tile.rasterise_few(task.numbers + first, static_cast<int>(count));
+    tile.template rasterise_few<is_coarse<Sink>()>(task.numbers + first, static_cast<int>(count));
   } else {
     tile.rasterise_many(task.numbers + first, count);
   }
@@ -134,11 +139,17 @@ std::uint64_t MeshRaster::covered(cudaStream_t stream) const {
 
 template void MeshRaster::run(const SlabBox&, const OwnerSink&, cudaStream_t);
 template void MeshRaster::run(const SlabBox&, const HoleSink&, cudaStream_t);
-template void MeshRaster::run(const SlabBox&, const OffsetSink&, cudaStream_t);
-template void MeshRaster::run(const SlabBox&, const VolumesSink<void>&, cudaStream_t);
-template void MeshRaster::run(const SlabBox&, const VolumesSink<std::int16_t>&, cudaStream_t);
-template void MeshRaster::run(const SlabBox&, const VoxelSink<std::uint8_t>&, cudaStream_t);
-template void MeshRaster::run(const SlabBox&, const VoxelSink<std::int16_t>&, cudaStream_t);
-template void MeshRaster::run(const SlabBox&, const VoxelSink<std::uint16_t>&, cudaStream_t);
+#define TETWARP_RUN(...) template void MeshRaster::run(const SlabBox&, const __VA_ARGS__&, cudaStream_t)
+#define TETWARP_RUN_ROUNDED(kRounding)               \
+  TETWARP_RUN(OffsetSink<kRounding>);                \
+  TETWARP_RUN(VolumesSink<void, kRounding>);         \
+  TETWARP_RUN(VolumesSink<std::int16_t, kRounding>); \
+  TETWARP_RUN(VoxelSink<std::uint8_t, kRounding>);   \
+  TETWARP_RUN(VoxelSink<std::int16_t, kRounding>);   \
+  TETWARP_RUN(VoxelSink<std::uint16_t, kRounding>)
+TETWARP_RUN_ROUNDED(Lerp::separate);
+TETWARP_RUN_ROUNDED(Lerp::fused);
+#undef TETWARP_RUN_ROUNDED
+#undef TETWARP_RUN
 
 }  // namespace tetwarp::cuda_detail

@@ -3,7 +3,7 @@
 
 #pragma once
 
-#include "cuda/output/voxel_sink.cuh"
+#include "cuda/output/sample_column.cuh"
 #include "cuda/owners/mesh_tile.cuh"
 
 /// The resolve of a tile of the mesh raster: from the owners of its voxels to what a sink wants of them. For
@@ -20,7 +20,16 @@ __device__ __noinline__ glm::vec3 interpolate_exactly(MeshRaster::View mesh, uns
 template <class Sink>
 __device__ __noinline__ bool write_slowly(const MeshRaster::View& mesh, const Sink& sink, unsigned number, int out,
                                           glm::ivec3 at, glm::i32vec3 signs) {
-  return sink.write(out, at, interpolate_u(mesh.tetrahedron(number), at * kStepsPerVoxel, signs));
+  const Tetrahedron t = mesh.tetrahedron(number);
+  if constexpr (Sink::kLerp == Lerp::fused) {
+    return sink.write(out, at, fixed_offset(coarse_u(t, at, signs)));
+  } else {
+    return sink.write(out, at, interpolate_u(t, at * kStepsPerVoxel, signs));
+  }
+}
+__device__ __noinline__ glm::i64vec3 thin_u_of(MeshRaster::View mesh, unsigned number, glm::ivec3 at,
+                                               glm::i32vec3 signs) {
+  return thin_u(mesh.tetrahedron(number), at, signs);
 }
 
 /// Goes along the columns of a tile, a lane each.
@@ -39,11 +48,19 @@ struct MeshSampler {
       owner += kTileJ * kRowStride;
       return slot;
     };
-    return sample_column<false>(sink, weighings(), tile.voxels.begin + glm::ivec3(lane, y, 0),
-                                glm::vec3(lane * kStepsPerVoxel, y * kStepsPerVoxel, 0), tile.size.z, next_slot,
+    return sample_column<false>(sink, places<Sink>(), tile.voxels.begin + glm::ivec3(lane, y, 0),
+                                glm::ivec3(lane, y, 0), tile.size.z, next_slot,
                                 [&](int z) { return finish_few(sink, lane, y, z); });
   }
-  __device__ Weighings weighings() const { return {tile.memory.prepared, tile.memory.ends, kSlots}; }
+  template <class Sink>
+  __device__ auto places() const {
+    const auto& memory = tile.memory;
+    if constexpr (Sink::kLerp == Lerp::fused) {
+      return CoarseMaps<kQuads>{memory.prepared, memory.ends, kSlots};
+    } else {
+      return Weighings{memory.prepared, reinterpret_cast<const float*>(memory.ends), kSlots};
+    }
+  }
   /// A voxel that `sample_few` has not written. @return whether it is covered
   template <class Sink>
   __device__ bool finish_few(const Sink& sink, int x, int y, int z) const {
@@ -53,7 +70,7 @@ struct MeshSampler {
       sink.nothing(sink.address(at));
       return false;
     }
-    return finish_voxel(sink, weighings(), slot, at, glm::vec3(in_tile * kStepsPerVoxel), [&](int out) {
+    return finish_voxel(sink, places<Sink>(), slot, at, in_tile, [&](int out) {
       return write_slowly(tile.task.mesh, sink, tile.memory.slots[slot].number, out, at, tile.signs);
     });
   }
@@ -62,15 +79,22 @@ struct MeshSampler {
   template <class Sink>
   __device__ unsigned sample_many(const Sink& sink) const {
     unsigned covered = 0, held = kNoTetrahedron;
-    TetrahedronMap map(Tetrahedron{});
+    constexpr bool kCoarse = Sink::kLerp == Lerp::fused;
+    using Map = std::conditional_t<kCoarse, CoarseMap, TetrahedronMap>;
+    Map map(Tetrahedron{});
     for_each_of_column(sink, [&](const glm::ivec3& at, int at_tile, int out) {
       const unsigned number = tile.memory.owner[at_tile];
       if (number == kNoTetrahedron) return sink.nothing(out);
-      if (number != held) map = TetrahedronMap(tile.task.mesh.tetrahedron(number));
+      if (number != held) map = Map(tile.task.mesh.tetrahedron(number));
       held = number;
-      const glm::i32vec3 steps = at * kStepsPerVoxel;
-      covered += sink.write(
-          out, at, map.u(steps, [&] { return interpolate_exactly(tile.task.mesh, number, steps, tile.signs); }));
+      if constexpr (kCoarse) {
+        const glm::i64vec3 u = map.is_thin ? thin_u_of(tile.task.mesh, number, at, tile.signs) : map.u(at);
+        covered += sink.write(out, at, fixed_offset(u));
+      } else {
+        const glm::i32vec3 steps = at * kStepsPerVoxel;
+        covered += sink.write(
+            out, at, map.u(steps, [&] { return interpolate_exactly(tile.task.mesh, number, steps, tile.signs); }));
+      }
     });
     return covered;
   }

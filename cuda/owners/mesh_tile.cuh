@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include "cuda/output/coarse_maps.cuh"
 #include "cuda/output/weighing.cuh"
 #include "cuda/owners/mesh_list.cuh"
 #include "cuda/runtime/warp.cuh"
@@ -19,8 +20,9 @@ constexpr int kRowStride = kTileI + 1;  ///< so that a column of rows lies in di
 /// The shared memory of a tile.
 ///
 ///     prepared  113 x 6 x 16      a slot for each tetrahedron at hand: first its four faces; where all of
-///                                 a tile's have slots, its `Weighing` once all rows are marked
-///     ends      113 x 4           the last float of each `Weighing`
+///                                 a tile's have slots, its `Weighing` once all rows are marked, or its map
+///                                 (`put_map`) where the field is coarse
+///     ends      113 x 4           the last float of each `Weighing`, or whether the map is usable
 ///     slots     112 x 16          which tetrahedron, and the rows that it may reach
 ///     numbers   112 x 4           of the list, before they are sorted
 ///     owner     128 x 33 x 4      row y, z from (z * 8 + y) * 33 on: the lowest so far
@@ -33,8 +35,8 @@ struct TileMemory {
     short y_begin, y_end, z_begin, z_end;
     short lower;  ///< of `RowFaces`; 0: exact integers must say
   };
-  float4 prepared[kSlots + 1][kQuads];  ///< faces, and then `Weighing`, the last nobody's
-  float ends[kSlots + 1];               ///< the last float of each `Weighing`
+  float4 prepared[kSlots + 1][kQuads];  ///< faces, and then `Weighing` or maps, the last nobody's
+  unsigned ends[kSlots + 1];            ///< the last float of each `Weighing`, or whether the map is usable
   Slot slots[kSlots];
   unsigned numbers[kSlots];                ///< before they are sorted
   unsigned owner[kTileRows * kRowStride];  ///< slot where all have one, else number; or kNoTetrahedron
@@ -73,6 +75,7 @@ struct MeshTile {
     }
     if (thread != 0) return;
     memory.prepared[kSlots][0] = make_float4(0, 0, 0, kNoNumber);
+    memory.ends[kSlots] = 0;
     memory.covered = 0;
   }
 
@@ -125,6 +128,7 @@ struct MeshTile {
   }
 
   /// A list for which there is room, in the order of the numbers. @param list  of the tile's tetrahedra, in any
+  template <bool kCoarse>
   __device__ void rasterise_few(const unsigned* list, int count) const {
     static_assert(kSlots <= kTileThreads);
     unsigned number = kNoTetrahedron;
@@ -138,7 +142,14 @@ struct MeshTile {
     __syncthreads();
     mark_all(count, true);
     __syncthreads();
-    if (thread < count) weigh(thread);
+    if (thread < count) {
+      if constexpr (kCoarse) {
+        const CoarseMap map(task.mesh.tetrahedron(memory.slots[thread].number));
+        memory.ends[thread] = put_map(map, voxels.begin, memory.prepared[thread]) ? 1 : 0;
+      } else {
+        weigh(thread);
+      }
+    }
     __syncthreads();
   }
 
@@ -159,10 +170,11 @@ struct MeshTile {
     const Tetrahedron t = task.mesh.tetrahedron(memory.slots[slot].number);
     const glm::i32vec3& d = t.d.deformed;
     const auto further = [&](const Vertex& v) { return glm::vec3(t.d.u - v.u); };
+    float end = 0;
     prepare_weighing(glm::vec3(t.a.deformed - d), glm::vec3(t.b.deformed - d), glm::vec3(t.c.deformed - d),
                      glm::vec3(voxels.begin * kStepsPerVoxel - d),
-                     {glm::vec3(-t.d.u), further(t.a), further(t.b), further(t.c)}, memory.prepared[slot],
-                     memory.ends[slot]);
+                     {glm::vec3(-t.d.u), further(t.a), further(t.b), further(t.c)}, memory.prepared[slot], end);
+    memory.ends[slot] = __float_as_uint(end);
     if (is_long(t)) memory.prepared[slot][0].w = kNoNumber;
   }
 };

@@ -14,8 +14,9 @@ constexpr int kWarpTries = 3;  ///< of a voxel within its warp, after the first
 
 /// What a warp could not settle at once. It is tried again when a warp full has come together, so that all lanes work.
 ///
-/// @tparam kCoarse  cells are large, so float is often unsure: ask exact integers before another tetrahedron is tried
-template <class Sink, bool kCoarse>
+/// In coarse fields cells are large, so float is often unsure: exact integers are asked before another tetrahedron is
+/// tried.
+template <class Sink>
 struct WarpQueue {
   struct WaitingVoxel {
     int voxel;      ///< packed by `word_of`
@@ -63,8 +64,8 @@ struct WarpQueue {
       const glm::ivec3 in = first + voxel_of(queued.voxel), at = in + task.begin();
       const FloatTetrahedron t = tetrahedron_at(task.lattice, {queued.x, queued.y, queued.z});
       const Trial trial = try_tetrahedron(task.lattice, t, task.point(at));
-      if (trial.owns || (kCoarse && trial.unsure && task.owns(t, at))) {
-        covered = sink.write(sink.address(at), at, trial.u());
+      if (trial.owns || (kIsCoarse<Sink> && trial.unsure && task.owns(t, at))) {
+        covered = sink.write(sink.address(at), at, offset_for<Sink>(task, trial, at));
       } else if (Attempt::get(queued.voxel) < kWarpTries) {
         again = true;
         word = queued.voxel + Attempt::put(1);

@@ -143,13 +143,13 @@ TETWARP_HD inline glm::vec3 blend(const Weights& w, const glm::vec3& ud, const g
           ((ud.z + w.a * a.z) + w.b * b.z) + w.c * c.z};
 }
 
-/// u at a voxel of a thin or very small tetrahedron, in voxels, from weights about D that are exact before their
+/// u at a voxel of a thin or very small tetrahedron, 2^-12 voxel, from weights about D that are exact before their
 /// division.
 ///
 /// The owner holds the nudged point q, not p. Where the tetrahedron is so small that a weight at p leaves [0, 1] by
 /// more than kWeightSlack, the affine map would be extrapolated far beyond the tetrahedron, so it is evaluated at q.
-TETWARP_HD inline glm::vec3 interpolate_u_exactly(const Tetrahedron& t, const glm::i32vec3& steps,
-                                                  const glm::i32vec3& signs) {
+TETWARP_HD inline glm::dvec3 exact_u_in_steps(const Tetrahedron& t, const glm::i32vec3& steps,
+                                              const glm::i32vec3& signs) {
   const glm::i64vec3 origin(t.d.deformed);
   const glm::i64vec3 a = glm::i64vec3(t.a.deformed) - origin, b = glm::i64vec3(t.b.deformed) - origin;
   const glm::i64vec3 c = glm::i64vec3(t.c.deformed) - origin;
@@ -164,13 +164,18 @@ TETWARP_HD inline glm::vec3 interpolate_u_exactly(const Tetrahedron& t, const gl
     if (wa >= -kWeightSlack && wb >= -kWeightSlack && wc >= -kWeightSlack && wd >= -kWeightSlack) break;
     r += glm::i64vec3(nudge_steps(signs));
   }
-  glm::vec3 u;
+  glm::dvec3 u;
   for (int axis = 0; axis < 3; ++axis) {
     const double ud = t.d.u[axis];
-    const double value = ((ud + wa * (t.a.u[axis] - ud)) + wb * (t.b.u[axis] - ud)) + wc * (t.c.u[axis] - ud);
-    u[axis] = static_cast<float>(value * (1.0 / kStepsPerVoxel));
+    u[axis] = ((ud + wa * (t.a.u[axis] - ud)) + wb * (t.b.u[axis] - ud)) + wc * (t.c.u[axis] - ud);
   }
   return u;
+}
+
+/// The same in voxels, rounded to float.
+TETWARP_HD inline glm::vec3 interpolate_u_exactly(const Tetrahedron& t, const glm::i32vec3& steps,
+                                                  const glm::i32vec3& signs) {
+  return glm::vec3(exact_u_in_steps(t, steps, signs) * (1.0 / kStepsPerVoxel));
 }
 
 /// Whether an edge from D is so long that float may not hold the place of a voxel relative to D, in 2^-12 voxel.

@@ -34,6 +34,12 @@ TETWARP_HD inline bool snap_moved(const glm::dvec3& rest, const glm::dmat3& outp
   return true;
 }
 
+/// Length, in voxels of the output, from which on the steps of a lattice make its field a coarse one.
+constexpr double kCoarseStep = 2.5;
+/// How far, in voxels, the undeformed place of a voxel may lie outside its undeformed owner where the field is coarse:
+/// the owner holds the nudged voxel, and a place changes by less than 129 times the nudge.
+constexpr double kBeyondCoarse = 1.0 / 16;
+
 /// How a lattice lies over an output grid: the maps that turn its vertices into snapped ones.
 struct LatticeFrame {
   AffineMap output_from_lattice, lattice_from_output;
@@ -43,6 +49,9 @@ struct LatticeFrame {
   /// from there; maps and nudge are those of the whole lattice. It is even, so that cells keep their parity.
   std::int64_t first_slice = 0;
   Nudge nudge;
+  /// Whether the lattice is coarse: each of its steps is at least `kCoarseStep` voxels of the whole output long
+  /// (docs/design/definition.md, "Coarse fields").
+  bool coarse = false;
 
   /// Computes both places of a vertex in double, in output index, and snaps them. u is zero exactly where the
   /// displacement is.
@@ -60,7 +69,7 @@ struct LatticeFrame {
     for (int axis = 0; axis < 3; ++axis) {
       for (int row = 0; row < 3; ++row) reach[row] += 4 * kWeightSlack * std::fabs(m[axis][row]);
     }
-    return reach;
+    return coarse ? reach + kBeyondCoarse : reach;
   }
 
   /// Whether the nudged voxel lies inside the undeformed lattice, which must be a whole one.

@@ -31,6 +31,24 @@ TETWARP_INLINE_HD Place place_at(const glm::i64vec3& voxel, const glm::vec3& off
   return place;
 }
 
+/// An offset from a voxel in fixed point, as coarse fields have it: whole voxels, and a fraction, a multiple of 2^-23
+/// from 0 to below 1.
+struct FixedOffset {
+  glm::i32vec3 whole;
+  glm::vec3 fraction;
+};
+
+/// The offset in double, exact. @param offset  voxels
+TETWARP_HD inline glm::dvec3 in_double(const glm::vec3& offset) { return glm::dvec3(offset); }
+TETWARP_HD inline glm::dvec3 in_double(const FixedOffset& offset) {
+  return glm::dvec3(offset.whole) + glm::dvec3(offset.fraction);
+}
+
+/// The place at an offset from a voxel.
+TETWARP_INLINE_HD Place place_at(const glm::i64vec3& voxel, const FixedOffset& offset) {
+  return {voxel + glm::i64vec3(offset.whole), offset.fraction};
+}
+
 /// The place at a continuous source index.
 /// @param index  finite and within +-2^62
 TETWARP_INLINE_HD Place place_at(const glm::dvec3& index) {
@@ -120,10 +138,27 @@ TETWARP_HD Sample<V> heaviest_voxel(const SourceVoxels<V>& source, const Place& 
   return {static_cast<Working<V>>(heaviest_corner(source, place)), true};
 }
 
+/// How a + t (b - a) is rounded, in types that are computed in float.
+enum class Lerp {
+  separate,  ///< product and sum each rounded
+  fused      ///< fma(t, b - a, a): both rounded once
+};
+
+template <class W>
+TETWARP_INLINE_HD W lerp(Lerp rounding, W t, W a, W b) {
+  if constexpr (std::is_same_v<W, float>) {
+    if (rounding == Lerp::fused) return std::fma(t, b - a, a);
+  }
+  return a + t * (b - a);
+}
+
 /// Linear interpolation along x, then y, then z, each a + t (b - a). Voxels of weight zero are not read.
 template <class V>
-TETWARP_HD Sample<V> sample_linear(const SourceVoxels<V>& source, const Place& place, const Padding<V>& padding) {
+TETWARP_HD Sample<V> sample_linear(const SourceVoxels<V>& source, const Place& place, const Padding<V>& padding,
+                                   Lerp rounding = Lerp::separate) {
   using W = Working<V>;
+  const W tx = static_cast<W>(place.fraction.x), ty = static_cast<W>(place.fraction.y),
+          tz = static_cast<W>(place.fraction.z);
   const int nx = place.fraction.x != 0, ny = place.fraction.y != 0, nz = place.fraction.z != 0;
   W along_z[2] = {};
   for (int z = 0; z <= nz; ++z) {
@@ -135,12 +170,12 @@ TETWARP_HD Sample<V> sample_linear(const SourceVoxels<V>& source, const Place& p
       if (nx) {
         const V high = source.at(place.base.x + 1, place.base.y + y, place.base.z + z);
         if (padding.present && padding.holds(high)) return heaviest_voxel(source, place);
-        along_y[y] = along_y[y] + static_cast<W>(place.fraction.x) * (static_cast<W>(high) - along_y[y]);
+        along_y[y] = lerp(rounding, tx, along_y[y], static_cast<W>(high));
       }
     }
-    along_z[z] = ny ? along_y[0] + static_cast<W>(place.fraction.y) * (along_y[1] - along_y[0]) : along_y[0];
+    along_z[z] = ny ? lerp(rounding, ty, along_y[0], along_y[1]) : along_y[0];
   }
-  return {nz ? along_z[0] + static_cast<W>(place.fraction.z) * (along_z[1] - along_z[0]) : along_z[0], false};
+  return {nz ? lerp(rounding, tz, along_z[0], along_z[1]) : along_z[0], false};
 }
 
 /// Catmull-Rom weights of the voxels -1, 0, 1, 2 around a place (Keys 1981 with a = -1/2). At t = 0 only voxel 0 has

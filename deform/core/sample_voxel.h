@@ -70,20 +70,25 @@ struct SampledVoxel {
   std::int64_t first_slice, last_slice;
 };
 
+/// How linear interpolation is rounded where offsets have a type: glm::vec3 in dense and pull fields, FixedOffset in
+/// coarse ones.
+template <class Offset>
+constexpr Lerp kLerpOf = std::is_same_v<Offset, FixedOffset> ? Lerp::fused : Lerp::separate;
+
 /// Computes where an output voxel comes from, on the grid of the source.
 /// @return false if that is outside the source
-template <class V>
-TETWARP_INLINE_HD bool source_place(const SamplePlan<V>& plan, const glm::i64vec3& voxel, const glm::vec3& offset,
+template <class V, class Offset>
+TETWARP_INLINE_HD bool source_place(const SamplePlan<V>& plan, const glm::i64vec3& voxel, const Offset& offset,
                                     Place& place) {
   place = plan.relation.same_grid ? place_at(voxel, offset)
-                                  : place_at(plan.relation(glm::dvec3(voxel) + glm::dvec3(offset)));
+                                  : place_at(plan.relation(glm::dvec3(voxel) + in_double(offset)));
   return clamp_to_grid(place, plan.source.size);
 }
 
 /// The value at a place on the grid of the source.
 template <class V, Interpolation kInterpolation>
 TETWARP_INLINE_HD VoxelValue<V> sample_place(const SourceVoxels<V>& source, const Place& place,
-                                             const Padding<V>& padding) {
+                                             const Padding<V>& padding, Lerp rounding) {
   if (place.fraction.x == 0 && place.fraction.y == 0 && place.fraction.z == 0) {  // a copy, to the bit
     const V value = source.at(place.base.x, place.base.y, place.base.z);
     return {value, false, padding.present && padding.holds(value)};
@@ -96,7 +101,7 @@ TETWARP_INLINE_HD VoxelValue<V> sample_place(const SourceVoxels<V>& source, cons
     if constexpr (kInterpolation == Interpolation::nearest) {
       sample = sample_nearest(source, place, padding);
     } else if constexpr (kInterpolation == Interpolation::linear) {
-      sample = sample_linear(source, place, padding);
+      sample = sample_linear(source, place, padding, rounding);
     } else {
       sample = sample_cubic(source, place, padding);
     }
@@ -121,33 +126,39 @@ TETWARP_INLINE_HD void slices_at(const Place& place, std::int64_t slices, std::i
   }
 }
 
-/// Computes the value of one output voxel (docs/design/definition.md, "What the voxel gets").
-///
-/// @param mapped  whether the field says where the voxel comes from
-/// @param offset  undeformed minus deformed place, voxels
+/// The value of one output voxel whose place is known.
+/// @param inside  whether the place is one, inside the source
 template <class V, Interpolation kInterpolation>
-TETWARP_HD SampledVoxel<V> sample_voxel(const SamplePlan<V>& plan, const glm::i64vec3& voxel, bool mapped,
-                                        const glm::vec3& offset) {
-  Place place;
-  if (!mapped || !source_place(plan, voxel, offset, place))
-    return {plan.background, false, plan.background_saturated, false, 0, 0};
-  const VoxelValue<V> found = sample_place<V, kInterpolation>(plan.source, place, plan.padding);
+TETWARP_HD SampledVoxel<V> sample_at(const SamplePlan<V>& plan, bool inside, const Place& place, Lerp rounding) {
+  if (!inside) return {plan.background, false, plan.background_saturated, false, 0, 0};
+  const VoxelValue<V> found = sample_place<V, kInterpolation>(plan.source, place, plan.padding, rounding);
   SampledVoxel<V> sampled{found.value, true, found.saturated, found.padded, 0, 0};
   slices_at<kInterpolation>(place, plan.source.size.z, sampled.first_slice, sampled.last_slice);
   return sampled;
 }
 
-/// Computes several values of one output voxel, each interpolated alone at the same place.
+/// Computes the value of one output voxel (docs/design/definition.md, "What the voxel gets").
+///
+/// @param mapped  whether the field says where the voxel comes from
+/// @param offset  undeformed minus deformed place, voxels: a glm::vec3, or a FixedOffset of a coarse field
+template <class V, Interpolation kInterpolation, class Offset>
+TETWARP_HD SampledVoxel<V> sample_voxel(const SamplePlan<V>& plan, const glm::i64vec3& voxel, bool mapped,
+                                        const Offset& offset) {
+  Place place;
+  const bool inside = mapped && source_place(plan, voxel, offset, place);
+  return sample_at<V, kInterpolation>(plan, inside, place, kLerpOf<Offset>);
+}
+
+/// Several values of one output voxel whose place is known, each interpolated alone.
 ///
 /// @param plan    plan of the first value of each voxel, without padding
 /// @param output  gets the values, side by side
 /// @return the last value; saturated if any value was
 template <class V, Interpolation kInterpolation>
-TETWARP_HD SampledVoxel<V> sample_components(const SamplePlan<V>& plan, int components, const glm::i64vec3& voxel,
-                                             bool mapped, const glm::vec3& offset, V* output) {
+TETWARP_HD SampledVoxel<V> sample_components_at(const SamplePlan<V>& plan, int components, bool inside,
+                                                const Place& place, Lerp rounding, V* output) {
   SampledVoxel<V> sampled{plan.background, false, plan.background_saturated, false, 0, 0};
-  Place place;
-  if (!mapped || !source_place(plan, voxel, offset, place)) {
+  if (!inside) {
     for (int n = 0; n < components; ++n) output[n] = plan.background;
     return sampled;
   }
@@ -156,11 +167,20 @@ TETWARP_HD SampledVoxel<V> sample_components(const SamplePlan<V>& plan, int comp
   slices_at<kInterpolation>(place, plan.source.size.z, sampled.first_slice, sampled.last_slice);
   SourceVoxels<V> source = plan.source;
   for (int n = 0; n < components; ++n, ++source.voxels) {
-    const VoxelValue<V> found = sample_place<V, kInterpolation>(source, place, plan.padding);
+    const VoxelValue<V> found = sample_place<V, kInterpolation>(source, place, plan.padding, rounding);
     output[n] = sampled.value = found.value;
     sampled.saturated = sampled.saturated || found.saturated;
   }
   return sampled;
+}
+
+/// Computes several values of one output voxel, as `sample_voxel` and `sample_components_at` say.
+template <class V, Interpolation kInterpolation, class Offset>
+TETWARP_HD SampledVoxel<V> sample_components(const SamplePlan<V>& plan, int components, const glm::i64vec3& voxel,
+                                             bool mapped, const Offset& offset, V* output) {
+  Place place;
+  const bool inside = mapped && source_place(plan, voxel, offset, place);
+  return sample_components_at<V, kInterpolation>(plan, components, inside, place, kLerpOf<Offset>, output);
 }
 
 }  // namespace tetwarp

@@ -7,6 +7,7 @@
 
 #include "deform/cpu/claims.h"
 #include "deform/cpu/coverage.h"
+#include "deform/cpu/interval_rows.h"
 #include "deform/cpu/lattice_index.h"
 #include "deform/cpu/map_writer.h"
 #include "deform/cpu/march.h"
@@ -34,11 +35,19 @@ struct TileVoxels {
   std::vector<Owners> owners;     ///< once all are settled: none or one
   std::vector<glm::vec3> offset;  ///< undeformed minus deformed place, voxels
   std::uint8_t mapped[kTile], coverage[kTile];
+  // Of a coarse field:
+  IntervalRows rows;
+  std::vector<IntervalTile::Owner> listed;
+  std::vector<std::int32_t> fixed[3];  ///< U of each voxel, 2^-23 voxel
 
-  void reset(std::int64_t voxels) {
-    owners.resize(static_cast<std::size_t>(voxels) + MarchScratch::kRoom);
-    offset.resize(static_cast<std::size_t>(voxels) + MarchScratch::kRoom);
+  void reset(std::int64_t voxels, bool coarse) {
+    const std::size_t room = static_cast<std::size_t>(voxels) + MarchScratch::kRoom;
+    owners.resize(room);
+    if (!coarse) offset.resize(room);
+    for (std::vector<std::int32_t>& axis : fixed) axis.resize(coarse ? room : 0);
   }
+  /// U of a row that begins with voxel n.
+  FixedRow fixed_row(std::size_t n) const { return {{&fixed[0][n], &fixed[1][n], &fixed[2][n]}, {}}; }
 };
 
 /// Deforms volumes tile by tile: finds for each voxel where it comes from, then samples its rows. Voxels at rest are
@@ -57,7 +66,8 @@ class LatticeResampler final : public ForwardResampler {
     has_coverage_ = false;
     const glm::i64vec3& cells = lattice_.cells();
     const auto many = static_cast<std::uint64_t>(kTetrahedraPerCell * cells.x * cells.y * cells.z / kTooManyFolds);
-    can_march_ = lattice_.steps().cells.x != 0 && is_near(field, statistics) && statistics.inverted <= many;
+    can_march_ = lattice_.steps().cells.x != 0 && is_near(field, statistics) && statistics.inverted <= many &&
+                 !(lattice_.frame().coarse && (has_large_cells() || statistics.most_moved >= 255 * kStepsPerVoxel));
     ready_ = true;
   }
 
@@ -94,7 +104,17 @@ class LatticeResampler final : public ForwardResampler {
           if (!writer.wants_owners() && rests(box))
             return can_copy(box) ? copy(box, samplers) : stay(box, tile, samplers, writer);
           Report of_tile;
-          if (may_march && !mostly_folds(box)) {
+          const bool marches = may_march && !mostly_folds(box);
+          if (lattice_.frame().coarse) {
+            if (marches && gather_coarse(box, tile, of_tile.paths)) {
+              write(box, tile, samplers, writer, of_tile);
+            } else {
+              raster(box, tile, writer, of_tile.paths);
+              write_intervals(box, tile, samplers, writer, of_tile);
+            }
+            return of_tile;
+          }
+          if (marches) {
             gather(box, tile, writer, of_tile.paths);
           } else {
             claim_all(box, tile, writer, of_tile.paths);
@@ -144,22 +164,114 @@ class LatticeResampler final : public ForwardResampler {
   }
 
   /// Samples a tile at rest where some target cannot be copied.
-  static Report stay(const Region& box, TileVoxels& tile, const TargetSamplers& samplers, const MapWriter& maps) {
+  Report stay(const Region& box, TileVoxels& tile, const TargetSamplers& samplers, const MapWriter& maps) const {
+    const bool coarse = lattice_.frame().coarse;
     Report report;
     report.paths.gathered = static_cast<std::uint64_t>(voxel_count(box));
     const auto width = static_cast<int>(box.end.x - box.begin.x);
     const glm::vec3 offset[kTile] = {};
+    const std::int32_t none[kTile] = {};
+    const FixedRow fixed{{none, none, none}, {}};
     float jacobian[kTile];
     std::fill_n(jacobian, width, 1.0f);
     std::fill_n(tile.mapped, width, std::uint8_t{1});
     for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {
       for (std::int64_t y = box.begin.y; y < box.end.y; ++y) {
-        const Row row{{box.begin.x, y, z}, width, tile.mapped, offset};
+        const Row row{{box.begin.x, y, z}, width, tile.mapped, coarse ? nullptr : offset, coarse ? &fixed : nullptr};
         sample_targets(row, samplers, tile.coverage, report);
         maps.write(row, tile.coverage, jacobian, nullptr);
       }
     }
     return report;
+  }
+
+  /// Whether tetrahedra have so many voxels that rows of them are found faster than voxels, one after the other.
+  bool has_large_cells() const {
+    constexpr float kLarge = 6 * 6 * 6;  // voxels
+    const glm::vec3 cell = lattice_.steps().cell * kVoxelsPerStep;
+    return cell.x * cell.y * cell.z >= kLarge;
+  }
+
+  /// Finds where the voxels of a tile of a coarse field come from by a march. @return false where some may have several
+  /// owners, or the walk does not find one
+  bool gather_coarse(const Region& box, TileVoxels& tile, Paths& paths) const {
+    const std::int64_t voxels = voxel_count(box);
+    tile.reset(voxels, true);
+    if (coverage_.owners_of(box, tile.owners.data(), tile.block) != 0) return false;
+    const IntBox in{glm::ivec3(box.begin), glm::ivec3(box.end)};
+    const NudgeTurns turns(lattice_.frame().nudge);
+    march(lattice_.vectors(), turns,
+          {in, tile.owners.data(), nullptr, {tile.fixed[0].data(), tile.fixed[1].data(), tile.fixed[2].data()}},
+          tile.march);
+    if (walk(in, turns, tile) != 0) return false;
+    const auto walked = static_cast<std::int64_t>(tile.march.unsettled.size());
+    paths.walked += static_cast<std::uint64_t>(walked);
+    paths.gathered += static_cast<std::uint64_t>(voxels - walked);
+    return true;
+  }
+
+  /// Finds the owners of a tile of a coarse field, tetrahedron after tetrahedron.
+  void raster(const Region& box, TileVoxels& tile, const MapWriter& maps, Paths& paths) const {
+    IntervalTile& owners = tile.rows.tile;
+    owners.begin(box, lattice_.frame().nudge, maps.wants_owners());
+    if (enter_all(box, tile, true)) {  // someone had an owner before: the lowest number is to win
+      owners.begin(box, lattice_.frame().nudge, maps.wants_owners());
+      enter_all(box, tile, false);
+    }
+    paths.gathered += static_cast<std::uint64_t>(voxel_count(box));
+  }
+
+  /// Samples the rows of a tile of a coarse field whose owners are known.
+  void write_intervals(const Region& box, TileVoxels& tile, const TargetSamplers& samplers, const MapWriter& maps,
+                       Report& report) const {
+    const PlaceForm form(true, lattice_.statistics().most_moved);
+    const bool rest = lattice_.field().outside == Outside::rest;
+    tile.rows.write(
+        form, lattice_.frame().nudge, samplers, maps,
+        [&](std::int64_t y, std::int64_t z) {
+          std::uint32_t outside = 0;
+          for (std::int64_t x = box.begin.x; rest && x < box.end.x; ++x)
+            outside |= std::uint32_t{!lattice_.frame().holds({x, box.begin.y + y, box.begin.z + z})}
+                       << (x - box.begin.x);
+          return outside;
+        },
+        report);
+  }
+
+  /// Enters the tetrahedra that may reach a tile: as they come, or in the order of their numbers.
+  /// @return whether some voxel has several owners; then what was entered as it comes may be wrong
+  bool enter_all(const Region& box, TileVoxels& tile, bool as_they_come) const {
+    const glm::i64vec3& cells = lattice_.cells();
+    bool shared = false;
+    tile.listed.clear();
+    lattice_.find_blocks(box, [&](std::size_t number) {
+      if (shared && as_they_come) return;
+      lattice_.load(number, tile.block);
+      const LatticeBlock& block = tile.block;
+      for (int z = 0; z < block.cells.z; ++z) {
+        for (int y = 0; y < block.cells.y; ++y) {
+          for (int x = 0; x < block.cells.x; ++x) {
+            const glm::i64vec3 at = block.first_cell + glm::i64vec3(x, y, z);
+            const std::uint64_t first =
+                kTetrahedraPerCell * static_cast<std::uint64_t>((at.z * cells.y + at.y) * cells.x + at.x);
+            const Cell cell = block.cell({x, y, z});
+            const Box around = box_of(cell);
+            if (!tile.rows.tile.may_reach(around.low, around.high)) continue;
+            for (int t = 0; t < kTetrahedraPerCell; ++t) {
+              const Tetrahedron tetrahedron = tetrahedron_of(cell, t, block.is_odd({x, y, z}));
+              if (as_they_come)
+                shared = tile.rows.tile.enter(first + static_cast<std::uint64_t>(t), tetrahedron) || shared;
+              else
+                tile.listed.push_back({first + static_cast<std::uint64_t>(t), tetrahedron});
+            }
+          }
+        }
+      }
+    });
+    if (as_they_come) return shared;
+    std::sort(tile.listed.begin(), tile.listed.end(), [](const auto& a, const auto& b) { return a.number < b.number; });
+    for (const IntervalTile::Owner& of : tile.listed) tile.rows.tile.enter(of.number, of.vertices);
+    return false;
   }
 
   /// Whether vectors of float can hold everything that a march computes.
@@ -184,7 +296,7 @@ class LatticeResampler final : public ForwardResampler {
 
   void gather(const Region& box, TileVoxels& tile, const MapWriter& maps, Paths& paths) const {
     const std::int64_t voxels = voxel_count(box);
-    tile.reset(voxels);
+    tile.reset(voxels, false);
     std::int64_t several = coverage_.owners_of(box, tile.owners.data(), tile.block);
     if (several != 0 && voxel_count(around_several(box, tile)) > voxels / 2) return claim_all(box, tile, maps, paths);
     const IntBox in{glm::ivec3(box.begin), glm::ivec3(box.end)};
@@ -219,7 +331,12 @@ class LatticeResampler final : public ForwardResampler {
       const auto n = static_cast<std::size_t>((in.z * size.y + in.y) * size.x + in.x);
       LatticeTetrahedron owner;
       if (walk_to_owner(lattice, as_lattice(tetrahedron_at(lattice_.steps(), place)), steps, signs, most, owner)) {
-        tile.offset[n] = interpolate_u(vertices_of(lattice, owner), steps, signs);
+        if (lattice_.frame().coarse) {
+          const glm::i64vec3 u = coarse_u(vertices_of(lattice, owner), voxel, signs);
+          for (int axis = 0; axis < 3; ++axis) tile.fixed[axis][n] = static_cast<std::int32_t>(u[axis]);
+        } else {
+          tile.offset[n] = interpolate_u(vertices_of(lattice, owner), steps, signs);
+        }
       } else {
         tile.owners[n] = Owners::several;
         ++left;
@@ -264,7 +381,7 @@ class LatticeResampler final : public ForwardResampler {
 
   void claim_all(const Region& box, TileVoxels& tile, const MapWriter& maps, Paths& paths) const {
     const std::int64_t voxels = voxel_count(box);
-    tile.reset(voxels);
+    tile.reset(voxels, false);
     tile.claims.find(lattice_, box, maps.wants_jacobian(), maps.wants_owners(), tile.block);
     for (std::size_t n = 0; n < tile.claims.owner.size(); ++n) {
       tile.owners[n] = tile.claims.owner[n] == Claims::kNobody ? Owners::none : Owners::one;
@@ -276,13 +393,19 @@ class LatticeResampler final : public ForwardResampler {
   /// Samples the rows of a tile whose voxels are all settled.
   void write(const Region& box, TileVoxels& tile, const TargetSamplers& samplers, const MapWriter& maps,
              Report& report) const {
+    const bool coarse = lattice_.frame().coarse;
     const Claims& claims = tile.claims;
     if (maps.wants_owners()) report.multiply_owned = count_of_several(claims.owners);
     const auto width = static_cast<int>(box.end.x - box.begin.x);
     std::size_t first = 0;
     for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {
       for (std::int64_t y = box.begin.y; y < box.end.y; ++y, first += static_cast<std::size_t>(width)) {
-        const Row row{{box.begin.x, y, z}, width, tile.mapped, tile.offset.data() + first};
+        const FixedRow fixed = coarse ? tile.fixed_row(first) : FixedRow{};
+        const Row row{{box.begin.x, y, z},
+                      width,
+                      tile.mapped,
+                      coarse ? nullptr : tile.offset.data() + first,
+                      coarse ? &fixed : nullptr};
         map_row(row, first, tile, maps, report);
         sample_targets(row, samplers, tile.coverage, report);
         maps.write(row, tile.coverage, maps.wants_jacobian() ? claims.jacobian.data() + first : nullptr,
@@ -308,7 +431,10 @@ class LatticeResampler final : public ForwardResampler {
       report.conflicts += owned;
       if (owned) continue;
       tile.mapped[i] = 1;
-      tile.offset[place] = glm::vec3(0);
+      if (lattice_.frame().coarse)
+        for (std::vector<std::int32_t>& axis : tile.fixed) axis[place] = 0;
+      else
+        tile.offset[place] = glm::vec3(0);
       if (maps.wants_jacobian()) tile.claims.jacobian[place] = 1.0f;
     }
   }

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "deform/cpu/inverse_row.h"
+#include "deform/cpu/rows/inverse_row.h"
 #include "deform/target_check.h"
 
 namespace tetwarp::cpu {

@@ -11,12 +11,13 @@
 #include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
-#include "deform/cpu/vector_trials-inl.h"
+#include "deform/cpu/vector_coarse_map-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 
 namespace tetwarp::cpu::HWY_NAMESPACE {
 
+template <bool kCoarse>
 class Marcher {
  public:
   Marcher(const VectorField& field, const NudgeTurns& turns, const MarchTile& tile, MarchScratch& scratch)
@@ -90,9 +91,18 @@ class Marcher {
           const auto trials = try_tetrahedra<kSnapping, Effort::close>(field_, place, {x.steps, y.steps, z.steps},
                                                                        {x.nudge, y.nudge, z.nudge});
           prefetch(trials.t.at_d);
-          const Vec3 offset = to_offset(trials.moved);
-          hn::StoreInterleaved3(offset.x, offset.y, offset.z, df, &tile_.offset[first + i].x);
-          const IntMask failed = hn::AndNot(hn::RebindMask(di, trials.owns), wanted);
+          IntMask owns = hn::RebindMask(di, trials.owns);
+          if constexpr (kCoarse) {
+            const FixedU u = coarse_u(trials);
+            hn::StoreU(u.x, di, tile_.fixed[0] + first + i);
+            hn::StoreU(u.y, di, tile_.fixed[1] + first + i);
+            hn::StoreU(u.z, di, tile_.fixed[2] + first + i);
+            owns = hn::And(owns, u.usable);
+          } else {
+            const Vec3 offset = to_offset(trials.moved);
+            hn::StoreInterleaved3(offset.x, offset.y, offset.z, df, &tile_.offset[first + i].x);
+          }
+          const IntMask failed = hn::AndNot(owns, wanted);
           if (!hn::AllFalse(di, failed)) push(numbers_from(column + kRow * kRow * k), trials.place(), failed);
           if (kFirst && j + 1 < size_.y) store(at_x + kRow, trials.next_along_j());
           next = trials.next_along_k();
@@ -161,7 +171,8 @@ class Marcher {
                       z = axis(hn::ShiftRight<2 * kBits>(inside), 2, kNudgeZ);
       const auto trials = try_tetrahedra<Snapping::in_double, Effort::full>(field_, place, {x.steps, y.steps, z.steps},
                                                                             {x.nudge, y.nudge, z.nudge});
-      const IntMask owns = hn::And(hn::RebindMask(di, trials.owns), here);
+      IntMask owns = hn::And(hn::RebindMask(di, trials.owns), here);
+      if constexpr (kCoarse && kWrite) owns = hn::And(owns, coarse_u(trials).usable);
       if (!hn::AllFalse(di, owns)) settle<kWrite>(voxels, owns, trials);
       const Vec3 whole = trials.place();
       const Float half = set(0.5f);
@@ -178,10 +189,16 @@ class Marcher {
   void settle(Int voxels, IntMask owns, const Trials& trials) {
     const Floats df;
     const Ints di;
-    alignas(64) std::int32_t voxel[MarchScratch::kRoom], owned[MarchScratch::kRoom];
+    alignas(64) std::int32_t voxel[MarchScratch::kRoom], owned[MarchScratch::kRoom], fixed[3][MarchScratch::kRoom];
     alignas(64) float offset[3 * MarchScratch::kRoom], next[3 * MarchScratch::kRoom];
     hn::Store(voxels, di, voxel);
     hn::Store(hn::IfThenElseZero(owns, set(1)), di, owned);
+    if constexpr (kCoarse && kWrite) {
+      const FixedU u = coarse_u(trials);
+      hn::Store(u.x, di, fixed[0]);
+      hn::Store(u.y, di, fixed[1]);
+      hn::Store(u.z, di, fixed[2]);
+    }
     const Vec3 u = to_offset(trials.moved), place = kWrite ? trials.next_along_k() : trials.place();
     hn::StoreInterleaved3(u.x, u.y, u.z, df, offset);
     hn::StoreInterleaved3(place.x, place.y, place.z, df, next);
@@ -191,9 +208,13 @@ class Marcher {
       scratch_.x[column] = next[3 * n];
       scratch_.y[column] = next[3 * n + 1];
       scratch_.z[column] = next[3 * n + 2];
-      if (kWrite)
-        tile_.offset[(k * size_.y + column / kRow) * size_.x + column % kRow] = {offset[3 * n], offset[3 * n + 1],
-                                                                                 offset[3 * n + 2]};
+      if (!kWrite) continue;
+      const int to = (k * size_.y + column / kRow) * size_.x + column % kRow;
+      if constexpr (kCoarse) {
+        for (int axis = 0; axis < 3; ++axis) tile_.fixed[axis][to] = fixed[axis][n];
+      } else {
+        tile_.offset[to] = {offset[3 * n], offset[3 * n + 1], offset[3 * n + 2]};
+      }
     }
   }
 
@@ -212,7 +233,10 @@ class Marcher {
 };
 
 void march_tile(const VectorField& field, const NudgeTurns& nudge, const MarchTile& tile, MarchScratch& scratch) {
-  Marcher(field, nudge, tile, scratch).run();
+  if (tile.offset)
+    Marcher<false>(field, nudge, tile, scratch).run();
+  else
+    Marcher<true>(field, nudge, tile, scratch).run();
 }
 
 }  // namespace tetwarp::cpu::HWY_NAMESPACE

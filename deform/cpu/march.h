@@ -40,12 +40,14 @@ struct MarchScratch {
   std::vector<Unsettled> unsettled;  ///< voxels of the whole tile that were not settled
 };
 
-/// A box of up to kTile voxels on each axis. Whole vectors are read and written, so both arrays have
-/// `MarchScratch::kRoom` elements more than the box has voxels.
+/// A box of up to kTile voxels on each axis. Whole vectors are read and written, so all arrays have
+/// `MarchScratch::kRoom` elements more than the box has voxels. Either `offset` or `fixed` is null.
 struct MarchTile {
   IntBox box;            ///< its voxels in the output
   const Owners* owners;  ///< number of owners of each voxel, i fastest
   glm::vec3* offset;     ///< gets the undeformed minus deformed place of each voxel, voxels, i fastest
+  /// Of a coarse field in which no vertex moves as far as 255 voxels: get U of each voxel, 2^-23 voxel, i fastest.
+  std::int32_t* fixed[3] = {};
 };
 
 /// Finds the owners of those voxels of a tile that have exactly one, with the widest vectors that the processor has
@@ -54,7 +56,7 @@ struct MarchTile {
 /// It goes along k, as the march on a device does. Each owner is predicted from the affine map of the one
 /// before, and accepted where float arithmetic proves it (`try_tetrahedron`) or, at a second look, double arithmetic.
 /// Offsets have the bits of `interpolate_u`, for they are computed by the same operations. Voxels whose owner is not
-/// found are listed in `scratch.unsettled`. Offsets of voxels that have none or several owners are undefined.
+/// found are listed in `scratch.unsettled`. What is written of voxels that have none or several owners is undefined.
 ///
 /// @param field    displacements and the lattice, which must have cells
 /// @param nudge    where the nudge changes its sign

@@ -7,20 +7,12 @@
 #include <vector>
 
 #include "deform/cell_lists.h"
+#include "deform/cpu/interval_tile.h"
 #include "deform/snapped_mesh.h"
 
 namespace tetwarp::cpu {
 
-/// Owners of the voxels of a box.
-struct MeshOwners {
-  static constexpr std::uint32_t kNobody = UINT32_MAX;
-
-  std::vector<std::uint32_t> owner;  ///< number of the lowest tetrahedron that owns it, or kNobody; i fastest
-  std::vector<std::uint16_t> count;  ///< number of owners of each voxel, saturated; empty unless requested
-};
-
-/// Rasterises a mesh: its tetrahedra are listed by bins of voxels, and in a bin each owns an interval of every row
-/// (deform/core/row_interval.h).
+/// Finds who owns voxels of a mesh. Its tetrahedra are listed by bins of voxels.
 class MeshRaster {
  public:
   /// Makes the lists of tetrahedra.
@@ -28,22 +20,22 @@ class MeshRaster {
   /// @throws Cancelled
   void build(const SnappedMesh& mesh, const Geometry& output, const Control& control);
 
-  /// Finds the owners in a part of the output of up to 32 voxels on an axis.
-  void find(const Region& box, bool wants_count, MeshOwners& owners) const;
+  /// Finds the owners in a part of the output of up to kTile voxels on an axis.
+  /// @param counts  whether voxels are to be counted out among several owners
+  void find(const Region& box, bool counts, IntervalTile& tile) const;
 
  private:
   Region bin(const glm::i64vec3& at) const;
+  std::size_t bin_number(const glm::i64vec3& at) const {
+    return static_cast<std::size_t>((at.z * bins_.y + at.y) * bins_.x + at.x);
+  }
   template <class Visit>
   void for_each_bin(const Tetrahedron& t, Visit&& visit) const;
-  void find_in_bin(std::size_t number, const Region& part, const Region& box, bool wants_count,
-                   MeshOwners& owners) const;
 
   const SnappedMesh* mesh_ = nullptr;
   glm::i64vec3 size_{0};  ///< of the output grid
-  /// First voxel of the first bin, and number of bins on each axis. The direction of the nudge changes between bins
-  /// only.
-  glm::i64vec3 origin_{0}, bins_{0};
-  CellLists lists_;  ///< tetrahedra of each bin (bins with i fastest), with rising numbers
+  glm::i64vec3 bins_{0};  ///< on each axis
+  CellLists lists_;       ///< tetrahedra of each bin (bins with i fastest), with rising numbers
 };
 
 }  // namespace tetwarp::cpu

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <atomic>
 
-#include "deform/cpu/linear_row.h"
+#include "deform/cpu/rows/linear_row.h"
 #include "deform/target_check.h"
 
 namespace tetwarp::cpu {
@@ -76,6 +76,12 @@ class TypedSampler final : public TargetSampler {
            buffer_index(target_.output, voxel) * static_cast<std::size_t>(components());
   }
 
+  /// Calls `work` with the offset of voxel i of a row, in the type that its field has.
+  template <class Work>
+  static auto with_offset(const Row& row, int i, Work&& work) {
+    return row.fixed ? work(row.fixed->at(i)) : work(row.offset[i]);
+  }
+
   /// Samples the voxels that vectors did not.
   void sample_left(const Row& row, const LinearPlaces& places, V* output, std::uint8_t* coverage, Report& counts,
                    SliceRange& sampled) const {
@@ -86,8 +92,9 @@ class TypedSampler final : public TargetSampler {
   }
 
   void sample_one(const Row& row, int i, V* output, std::uint8_t* coverage, Report& counts, SliceRange& sampled) const {
-    const SampledVoxel<V> voxel =
-        sample_voxel<V, kInterpolation>(plan_, row.voxel + glm::i64vec3(i, 0, 0), row.mapped[i] != 0, row.offset[i]);
+    const SampledVoxel<V> voxel = with_offset(row, i, [&](const auto& offset) {
+      return sample_voxel<V, kInterpolation>(plan_, row.voxel + glm::i64vec3(i, 0, 0), row.mapped[i] != 0, offset);
+    });
     output[i] = voxel.value;
     note_voxel(voxel, coverage ? coverage + i : nullptr, counts, sampled);
   }
@@ -95,8 +102,10 @@ class TypedSampler final : public TargetSampler {
   /// Samples all voxels of a row whose voxels have several values each.
   void sample_vectors(const Row& row, V* output, std::uint8_t* coverage, Report& counts, SliceRange& sampled) const {
     for (int i = 0; i < row.count; ++i, output += components()) {
-      const SampledVoxel<V> voxel = sample_components<V, kInterpolation>(
-          plan_, components(), row.voxel + glm::i64vec3(i, 0, 0), row.mapped[i] != 0, row.offset[i], output);
+      const SampledVoxel<V> voxel = with_offset(row, i, [&](const auto& offset) {
+        return sample_components<V, kInterpolation>(plan_, components(), row.voxel + glm::i64vec3(i, 0, 0),
+                                                    row.mapped[i] != 0, offset, output);
+      });
       note_voxel(voxel, coverage ? coverage + i : nullptr, counts, sampled);
     }
   }

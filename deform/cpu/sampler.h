@@ -8,17 +8,35 @@
 #include <span>
 #include <vector>
 
+#include "deform/core/coarse_map.h"
 #include "deform/core/sample_voxel.h"
 #include "deform/target_check.h"
 
 namespace tetwarp::cpu {
+
+constexpr int kMostInRow = 64;  ///< largest number of voxels that are sampled together; tiles have shorter rows
+
+/// U of the voxels of a row of a coarse field: undeformed minus deformed place in whole numbers of 2^-23 voxel. Where
+/// they fit 32 bits they are kept in these, else in 64.
+struct FixedRow {
+  const std::int32_t* u[3] = {};     ///< along i, j, k; null where 64 bits are wanted
+  const std::int64_t* wide[3] = {};  ///< the same; null otherwise
+
+  bool is_wide() const { return u[0] == nullptr; }
+  FixedOffset at(int i) const {
+    return fixed_offset(is_wide() ? glm::i64vec3(wide[0][i], wide[1][i], wide[2][i])
+                                  : glm::i64vec3(u[0][i], u[1][i], u[2][i]));
+  }
+};
 
 /// A run of output voxels along i, and what the field says of each.
 struct Row {
   glm::i64vec3 voxel;  ///< the first voxel of the run
   int count;
   const std::uint8_t* mapped;  ///< 1: the voxel comes from `voxel + offset`; 0: nothing maps there
-  const glm::vec3* offset;     ///< undeformed minus deformed place of each, voxels of output index
+  /// Undeformed minus deformed place of each, voxels of output index; null for a coarse field.
+  const glm::vec3* offset;
+  const FixedRow* fixed = nullptr;  ///< the same of a coarse field, else null
 };
 
 struct LinearPlaces;  // linear_row.h

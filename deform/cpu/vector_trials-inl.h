@@ -37,6 +37,47 @@ HWY_INLINE Float left_of_one(const Vec3& w) { return hn::Sub(hn::Sub(hn::Sub(set
 
 HWY_INLINE Float least_of(const Vec3& w) { return hn::Min(hn::Min(w.x, w.y), hn::Min(w.z, left_of_one(w))); }
 
+/// Tetrahedra as they are when deformed, seen from their vertices D. Steps.
+struct DeformedTetrahedra {
+  Vec3 moved;                            ///< how far D moved
+  Vec3 further_a, further_b, further_c;  ///< how much further A, B, C moved
+  Vec3 a, b, c;                          ///< from D to A, B, C
+  FloatMask certain;                     ///< where all of it is known
+
+  /// @param to  of `t`
+  template <Snapping kSnapping>
+  static HWY_INLINE DeformedTetrahedra of(const VectorField& field, const Tetrahedra& t, const Vec3& to) {
+    const StepLattice& lattice = field.lattice;
+    const Float zero = hn::Zero(Floats());
+    const auto along = [&](Float v) { return hn::IfThenZeroElse(t.centre, v); };
+    const auto across = [&](Float v) { return hn::IfThenElseZero(t.centre, v); };
+    const auto at = [&](Float x, Float y, Float z) {  // for Snapping::in_double only
+      return Vec3{hn::Add(t.d.x, x), hn::Add(t.d.y, y), hn::Add(t.d.z, z)};
+    };
+    FloatMask certain = hn::Eq(zero, zero);
+    const Vec3 moved = moved_vertices<kSnapping>(field, t.at_d, t.d, certain);
+    const Vec3 further_a =
+        moved_vertices<kSnapping>(field, t.at_a, at(along(to.x), across(to.y), across(to.z)), certain) - moved;
+    const Vec3 further_b =
+        moved_vertices<kSnapping>(field, t.at_b, at(across(to.x), along(to.y), across(to.z)), certain) - moved;
+    const Vec3 further_c =
+        moved_vertices<kSnapping>(field, t.at_c, at(across(to.x), across(to.y), along(to.z)), certain) - moved;
+    const Vec3 edge{hn::Mul(to.x, set(lattice.cell.x)), hn::Mul(to.y, set(lattice.cell.y)),
+                    hn::Mul(to.z, set(lattice.cell.z))};
+    const Vec3 edge_along{along(edge.x), along(edge.y), along(edge.z)},
+        edge_across{across(edge.x), across(edge.y), across(edge.z)};
+    return {
+        moved,
+        further_a,
+        further_b,
+        further_c,
+        {hn::Add(edge_along.x, further_a.x), hn::Add(edge_across.y, further_a.y), hn::Add(edge_across.z, further_a.z)},
+        {hn::Add(edge_across.x, further_b.x), hn::Add(edge_along.y, further_b.y), hn::Add(edge_across.z, further_b.z)},
+        {hn::Add(edge_across.x, further_c.x), hn::Add(edge_across.y, further_c.y), hn::Add(edge_along.z, further_c.z)},
+        certain};
+  }
+};
+
 /// `Trial`, one a lane.
 struct Trials {
   FloatMask owns;
@@ -45,6 +86,8 @@ struct Trials {
   Vec3 to, weights;
   Cross3 bc, ca, ab;
   Float factor;  ///< from a component of these to how much a weight changes from voxel to voxel
+  DeformedTetrahedra deformed;
+  Vec3 from_d;  ///< from vertices D to voxels, steps
 
   HWY_INLINE Vec3 place_of(const Vec3& w) const {
     const Float sum = hn::Add(hn::Add(w.x, w.y), w.z);
@@ -98,47 +141,6 @@ HWY_INLINE FloatMask inside_in_double(const Vec3& a, const Vec3& b, const Vec3& 
   return hn::Gt(clear, hn::Zero(Floats()));
 }
 
-/// Tetrahedra as they are when deformed, seen from their vertices D. Steps.
-struct DeformedTetrahedra {
-  Vec3 moved;                            ///< how far D moved
-  Vec3 further_a, further_b, further_c;  ///< how much further A, B, C moved
-  Vec3 a, b, c;                          ///< from D to A, B, C
-  FloatMask certain;                     ///< where all of it is known
-
-  /// @param to  of `t`
-  template <Snapping kSnapping>
-  static HWY_INLINE DeformedTetrahedra of(const VectorField& field, const Tetrahedra& t, const Vec3& to) {
-    const StepLattice& lattice = field.lattice;
-    const Float zero = hn::Zero(Floats());
-    const auto along = [&](Float v) { return hn::IfThenZeroElse(t.centre, v); };
-    const auto across = [&](Float v) { return hn::IfThenElseZero(t.centre, v); };
-    const auto at = [&](Float x, Float y, Float z) {  // for Snapping::in_double only
-      return Vec3{hn::Add(t.d.x, x), hn::Add(t.d.y, y), hn::Add(t.d.z, z)};
-    };
-    FloatMask certain = hn::Eq(zero, zero);
-    const Vec3 moved = moved_vertices<kSnapping>(field, t.at_d, t.d, certain);
-    const Vec3 further_a =
-        moved_vertices<kSnapping>(field, t.at_a, at(along(to.x), across(to.y), across(to.z)), certain) - moved;
-    const Vec3 further_b =
-        moved_vertices<kSnapping>(field, t.at_b, at(across(to.x), along(to.y), across(to.z)), certain) - moved;
-    const Vec3 further_c =
-        moved_vertices<kSnapping>(field, t.at_c, at(across(to.x), across(to.y), along(to.z)), certain) - moved;
-    const Vec3 edge{hn::Mul(to.x, set(lattice.cell.x)), hn::Mul(to.y, set(lattice.cell.y)),
-                    hn::Mul(to.z, set(lattice.cell.z))};
-    const Vec3 edge_along{along(edge.x), along(edge.y), along(edge.z)},
-        edge_across{across(edge.x), across(edge.y), across(edge.z)};
-    return {
-        moved,
-        further_a,
-        further_b,
-        further_c,
-        {hn::Add(edge_along.x, further_a.x), hn::Add(edge_across.y, further_a.y), hn::Add(edge_across.z, further_a.z)},
-        {hn::Add(edge_across.x, further_b.x), hn::Add(edge_along.y, further_b.y), hn::Add(edge_across.z, further_b.z)},
-        {hn::Add(edge_across.x, further_c.x), hn::Add(edge_across.y, further_c.y), hn::Add(edge_along.z, further_c.z)},
-        certain};
-  }
-};
-
 /// `try_tetrahedron`, one a lane. With full effort what float leaves open is decided in double.
 /// @param steps, nudge  as of `GatherPoint`
 template <Snapping kSnapping, Effort kEffort>
@@ -146,8 +148,8 @@ HWY_INLINE Trials try_tetrahedra(const VectorField& field, const Vec3& place, co
   const StepLattice& lattice = field.lattice;
   const Tetrahedra t(lattice, place);
   const Vec3 to = t.to();
-  const auto [moved, further_a, further_b, further_c, a, b, c, certain] =
-      DeformedTetrahedra::of<kSnapping>(field, t, to);
+  const DeformedTetrahedra deformed = DeformedTetrahedra::of<kSnapping>(field, t, to);
+  const auto& [moved, further_a, further_b, further_c, a, b, c, certain] = deformed;
   const Vec3 r{hn::Sub(hn::NegMulAdd(t.d.x, set(lattice.cell.x), steps.x), moved.x),
                hn::Sub(hn::NegMulAdd(t.d.y, set(lattice.cell.y), steps.y), moved.y),
                hn::Sub(hn::NegMulAdd(t.d.z, set(lattice.cell.z), steps.z), moved.z)};
@@ -192,7 +194,9 @@ HWY_INLINE Trials try_tetrahedra(const VectorField& field, const Vec3& place, co
       bc,
       ca,
       ab,
-      hn::Mul(reciprocal, set(float{kStepsPerVoxel}))};
+      hn::Mul(reciprocal, set(float{kStepsPerVoxel})),
+      deformed,
+      r};
 }
 
 /// u in voxels: `to_offset`.

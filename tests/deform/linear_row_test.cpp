@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Rows sampled with vectors, for every instruction set that the processor has, against one voxel after the other.
-#include "deform/cpu/linear_row.h"
+#include "deform/cpu/rows/linear_row.h"
 
 #include <gtest/gtest.h>
 
@@ -70,9 +70,39 @@ float random_offset(Random& random) {
   }
 }
 
+/// Offsets of a row of a field.
+template <class Offset>
+struct RowOffsets;
+template <>
+struct RowOffsets<glm::vec3> {  // of a dense one
+  glm::vec3 offset[kMostInRow];
+
+  void fill(Random& random, int i) {
+    offset[i] = {random_offset(random), random_offset(random), random_offset(random)};
+  }
+  void put(Row& row) const { row.offset = offset; }
+  glm::vec3 at(int i) const { return offset[i]; }
+};
+template <>
+struct RowOffsets<FixedOffset> {  // of a coarse one
+  std::int32_t u[3][kMostInRow];
+  FixedRow fixed{{u[0], u[1], u[2]}, {}};
+
+  void fill(Random& random, int i) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const double voxels = random_offset(random);
+      const auto some = static_cast<std::int32_t>(std::lrint(voxels * 0x1p23));
+      u[axis][i] = random.chance(0.1) ? static_cast<std::int32_t>(random.integer(-3, 3)) : some;
+    }
+  }
+  void put(Row& row) const { row.fixed = &fixed; }
+  FixedOffset at(int i) const { return fixed.at(i); }
+};
+
 /// Samples rows of a part of a source with vectors, for every instruction set, and each voxel by itself.
+/// @tparam Offset  glm::vec3: of a dense field; FixedOffset: of a coarse one
 /// @param value  makes a voxel of the source
-template <Interpolation kInterpolation, class V>
+template <Interpolation kInterpolation, class Offset, class V>
 void expect_same_bits(V (*value)(Random&),
                       void (*sample)(const LinearSource& source, const LinearPlaces& places, void* output)) {
   SCOPED_TRACE(seed_text(test_seed()));
@@ -95,13 +125,14 @@ void expect_same_bits(V (*value)(Random&),
     for (int n = 0; n < 400; ++n) {
       constexpr int kCount = 35;
       std::uint8_t mapped[kCount];
-      glm::vec3 offset[kCount];
-      Row row{{random.integer(0, 3), random.integer(3, 6), random.integer(5, 7)}, kCount, mapped, offset};
+      RowOffsets<Offset> offsets;
+      Row row{{random.integer(0, 3), random.integer(3, 6), random.integer(5, 7)}, kCount, mapped, nullptr};
+      offsets.put(row);
       for (int i = 0; i < kCount; ++i) {
-        offset[i] = {random_offset(random), random_offset(random), random_offset(random)};
+        offsets.fill(random, i);
         const glm::i64vec3 voxel = row.voxel + glm::i64vec3(i, 0, 0);
         // What a caller promises: all that counts is buffered.
-        const Place place = place_at(voxel, offset[i]);
+        const Place place = place_at(voxel, offsets.at(i));
         const bool promised = glm::all(glm::greaterThanEqual(place.base, held.begin)) &&
                               glm::all(glm::lessThan(place.base + std::int64_t{1}, held.end));
         mapped[i] = promised && random.integer(0, 9) != 0;
@@ -115,7 +146,7 @@ void expect_same_bits(V (*value)(Random&),
         if (places.state[i] == RowState::left) continue;
         ASSERT_EQ(places.state[i], RowState::sampled);
         const SampledVoxel<V> expected =
-            sample_voxel<V, kInterpolation>(plan, row.voxel + glm::i64vec3(i, 0, 0), mapped[i] != 0, offset[i]);
+            sample_voxel<V, kInterpolation>(plan, row.voxel + glm::i64vec3(i, 0, 0), mapped[i] != 0, offsets.at(i));
         ASSERT_TRUE(expected.inside);
         ASSERT_EQ(std::memcmp(&output[i], &expected.value, sizeof(V)), 0)
             << hwy::TargetName(target) << ", voxel " << i << ": " << +output[i] << ", expected " << +expected.value;
@@ -131,11 +162,16 @@ void expect_same_bits(V (*value)(Random&),
 }
 
 TYPED_TEST(LinearRow, GivesTheBitsOfOneVoxelAfterTheOtherOnEveryInstructionSet) {
-  expect_same_bits<Interpolation::linear>(&random_value<TypeParam>, &sample_linear_row);
+  expect_same_bits<Interpolation::linear, glm::vec3>(&random_value<TypeParam>, &sample_linear_row);
+}
+
+TYPED_TEST(LinearRow, GivesTheBitsOfOneVoxelAfterTheOtherInCoarseFields) {
+  expect_same_bits<Interpolation::linear, FixedOffset>(&random_value<TypeParam>, &sample_linear_row);
 }
 
 TYPED_TEST(LinearRow, VotesAsOneVoxelAfterTheOtherOnEveryInstructionSet) {
-  expect_same_bits<Interpolation::vote>(&random_label<TypeParam>, &sample_vote_row);
+  expect_same_bits<Interpolation::vote, glm::vec3>(&random_label<TypeParam>, &sample_vote_row);
+  expect_same_bits<Interpolation::vote, FixedOffset>(&random_label<TypeParam>, &sample_vote_row);
 }
 
 }  // namespace

@@ -65,7 +65,8 @@ TEST_P(Meshes, TheTetrahedraOfALatticeGiveWhatTheLatticeGives) {
     const VertexField lattice = field_in_voxels(grid, lattice_over(grid, cell), [&](const glm::dvec3&) {
       return amplitude * glm::dvec3(random.real(-1, 1), random.real(-1, 1), random.real(-1, 1));
     });
-    const VertexField mesh = field_of(mesh_of(lattice));
+    VertexField mesh = field_of(mesh_of(lattice));
+    mesh.lattice = lattice.lattice;  // which says whether the field is coarse
     const auto source = random_values<std::int16_t>(grid, random, -1000, 2000);
     const auto resampler = make(grid);
     resampler->set_field(view(lattice, Outside::background));

@@ -25,8 +25,13 @@ inline Volume<float> smooth_source(const Geometry& geometry) {
   return source;
 }
 
-/// How far u, in voxels, may be from the exact one: float arithmetic with the owner's edges.
-inline double u_tolerance(const Undeformed& exact) { return 1e-7 * (exact.reach * exact.condition + 16); }
+/// How far u, in voxels, may be from the exact one: float arithmetic with the owner's edges; or, in a coarse field,
+/// what fixed point promises, and the rounding of the map from which u is read, to float.
+inline double u_tolerance(const Undeformed& exact) {
+  if (!exact.coarse) return 1e-7 * (exact.reach * exact.condition + 16);
+  const glm::dvec3 u = glm::abs(exact.u);
+  return 0x1p-24 * (1 + exact.from_middle) + 0x1p-30 + 0x1p-20 * (u.x + u.y + u.z);
+}
 
 inline double distance(const glm::dvec3& u, const glm::dvec3& v) {
   const glm::dvec3 d = glm::abs(u - v);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <limits>
 
 namespace tetwarp::test {
@@ -113,6 +114,37 @@ double condition(const glm::i64vec3 (&corner)[4], long double determinant) {
   return static_cast<double>(worst / std::abs(determinant));
 }
 
+/// Corners in the order A, B, C, D of `docs/design/definition.md`: edges from the reference corner D, in long double.
+struct Edges {
+  long double edge[3][3];
+
+  explicit Edges(const glm::i64vec3 (&corner)[4]) {
+    for (int n = 0; n < 3; ++n)
+      for (int axis = 0; axis < 3; ++axis) edge[n][axis] = corner[n][axis] - corner[3][axis];
+  }
+  long double norm1(int n) const { return std::abs(edge[n][0]) + std::abs(edge[n][1]) + std::abs(edge[n][2]); }
+};
+
+/// Six times the volume over the product of the sum norms of the edges from D.
+long double thickness_of(const glm::i64vec3 (&deformed)[4]) {
+  const Edges of(deformed);
+  return std::abs(static_cast<long double>(Cramer(deformed).determinant)) / of.norm1(0) / of.norm1(1) / of.norm1(2);
+}
+
+/// The largest derivative of u along an axis.
+long double steepest_of(const glm::i64vec3 (&rest)[4], const glm::i64vec3 (&deformed)[4]) {
+  const Cramer cramer(deformed);
+  long double most = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int along = 0; along < 3; ++along) {
+      Int sum = 0;
+      for (int n = 0; n < 4; ++n) sum += cramer.cofactor[n][along] * (rest[n][axis] - deformed[n][axis]);
+      most = std::max(most, std::abs(static_cast<long double>(sum) / static_cast<long double>(cramer.determinant)));
+    }
+  }
+  return most;
+}
+
 }  // namespace
 
 double jacobian_tolerance(double jacobian, double condition, double rest_condition) {
@@ -176,6 +208,7 @@ void Oracle::take_vertices(const Geometry& output, const VertexField& field) {
     }
     along[axis] = places_on_axis(index.linear[axis], vertices_[axis], places);
   }
+  for (int axis = 0; axis < 3; ++axis) coarse_ = coarse_ && glm::length(index.linear[axis]) >= 2.5;
   const glm::dmat3 linear = index_from_point(output).linear;
   vertex_.reserve(field.displacement.size());
   for (std::int64_t k = 0, n = 0; k < vertices_.z; ++k) {
@@ -228,7 +261,8 @@ void Oracle::corners(std::uint64_t tetrahedron, Vertex (&result)[4]) const {
   const int apex = kCentre[odd ? 0 : 1][number == 0 ? 0 : number - 1];
   const int around[4] = {apex, apex ^ 1, apex ^ 2, apex ^ 4};
   for (int n = 0; n < 4; ++n) {
-    const int corner = number == 0 ? kCentre[odd ? 1 : 0][n] : around[n];
+    // The corner from which edges count, D, comes last.
+    const int corner = number == 0 ? kCentre[odd ? 1 : 0][odd ? 3 - n : n] : around[3 - n];
     const glm::i64vec3 at = first + glm::i64vec3(corner & 1, corner >> 1 & 1, corner >> 2);
     result[n] = vertex_[static_cast<std::size_t>(at.x + vertices_.x * (at.y + vertices_.y * at.z))];
   }
@@ -321,8 +355,23 @@ Undeformed Oracle::undeformed(const glm::i64vec3& voxel) const {
   }
   constexpr long double kSlack = 1.0L / 64;
   Undeformed result;
-  result.u = u_at(outside > kSlack ? q : p);
-  result.alternative = std::abs(outside - kSlack) < 1e-3L ? u_at(outside > kSlack ? p : q) : result.u;
+  result.coarse = coarse_;
+  const auto take = [&](bool at_q, bool unsure) {
+    result.u = u_at(at_q ? q : p);
+    result.alternative = unsure ? u_at(at_q ? p : q) : result.u;
+  };
+  const bool outside_slack = outside > kSlack, near_slack = std::abs(outside - kSlack) < 1e-3L;
+  if (!coarse_) {
+    take(outside_slack, near_slack);
+  } else {
+    const long double thickness = thickness_of(deformed), steepest = steepest_of(rest, deformed);
+    const bool thin = !(thickness >= 0x1p-16L && steepest < 128);
+    const bool near_thin = std::abs(thickness - 0x1p-16L) < 1e-12L || std::abs(steepest - 128) < 1e-6L;
+    take(thin && outside_slack, near_thin ? outside_slack || near_slack : thin && near_slack);
+    const glm::i64vec3 sum = deformed[0] + deformed[1] + deformed[2] + deformed[3];
+    for (int axis = 0; axis < 3; ++axis)
+      result.from_middle += std::abs(static_cast<double>(voxel[axis] - floor_div(sum[axis], 4 * kOne)));
+  }
   result.jacobian = static_cast<double>(determinant / static_cast<long double>(Cramer(rest).determinant));
   result.condition = condition(deformed, determinant);
   result.rest_condition = condition(rest, static_cast<long double>(Cramer(rest).determinant));

@@ -25,6 +25,8 @@ struct Undeformed {
   double condition = 1;  ///< how much a relative rounding error of float products may grow in the weights
   double rest_condition = 1;  ///< the same factor for weights in the owner's undeformed volume
   double reach = 0;           ///< largest component of the difference of u between two corners, voxels
+  bool coarse = false;        ///< whether the field is, so that u is a number in fixed point
+  double from_middle = 0;     ///< if so: how far the voxel lies from the middle of its owner, sum norm, voxels
 };
 
 /// How far a determinant may be from the exact one: each of its two volumes, in float, is off by 5 units of the product
@@ -77,6 +79,7 @@ class Oracle {
   glm::i64vec3 vertices_{0}, cells_{0};
   std::vector<glm::u32vec4> tetrahedra_;  ///< of a field with a mesh
   std::vector<Vertex> vertex_;
+  bool coarse_ = true;  ///< whether the lattice's steps are at least 2.5 voxels long; so is a mesh
   /// Twice the middle of the undeformed lattice's box, 2^-16 voxel.
   glm::i64vec3 middle_doubled_{0};
   Region region_;

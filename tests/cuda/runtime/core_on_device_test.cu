@@ -9,6 +9,7 @@
 #include <random>
 #include <vector>
 
+#include "deform/core/coarse_map.h"
 #include "deform/core/sample.h"
 #include "deform/core/visit_cell.h"
 
@@ -26,6 +27,8 @@ struct Answer {
   std::uint8_t owners[kVoxels];
   glm::vec3 u[kVoxels];
   std::int16_t value[kVoxels];
+  glm::i64vec3 fixed[kVoxels];  ///< u as coarse fields have it
+  float fused[kVoxels];         ///< and a linear sample there
 };
 
 TETWARP_HD inline std::int16_t source_voxel(int i) { return static_cast<std::int16_t>((i * 7919) % 4001 - 2000); }
@@ -36,6 +39,8 @@ TETWARP_HD inline void answer_cell(const Cell& cell, bool odd, const std::int16_
     answer.owners[i] = 0;
     answer.u[i] = glm::vec3(0);
     answer.value[i] = 0;
+    answer.fixed[i] = glm::i64vec3(0);
+    answer.fused[i] = 0;
   }
   const Nudge nudge{glm::i64vec3(6 * kStepsPerVoxel + 100, 8 * kStepsPerVoxel, 7 * kStepsPerVoxel)};
   const SourceVoxels<std::int16_t> voxels{source, glm::i64vec3(kSide), glm::i64vec3(0),
@@ -47,6 +52,10 @@ TETWARP_HD inline void answer_cell(const Cell& cell, bool odd, const std::int16_
                if (t >= answer.owner[i]) return;
                answer.owner[i] = static_cast<std::uint8_t>(t);
                answer.u[i] = interpolate_u(tetrahedron, detail::to_steps(voxel), signs);
+               answer.fixed[i] = coarse_u(tetrahedron, glm::ivec3(voxel), signs);
+               Place coarse = place_at(voxel, fixed_offset(answer.fixed[i]));
+               if (clamp_to_grid(coarse, voxels.size))
+                 answer.fused[i] = sample_linear(voxels, coarse, Padding<std::int16_t>{}, Lerp::fused).value;
                Place place = place_at(voxel, answer.u[i]);
                bool saturated = false;
                if (!clamp_to_grid(place, voxels.size)) return;
@@ -114,6 +123,8 @@ TEST(CoreOnDevice, GivesTheSameBitsAsOnTheHost) {
     EXPECT_EQ(std::memcmp(expected.owner, answers[n].owner, sizeof expected.owner), 0) << "owner, cell " << n;
     EXPECT_EQ(std::memcmp(expected.owners, answers[n].owners, sizeof expected.owners), 0) << "owners, cell " << n;
     EXPECT_EQ(std::memcmp(expected.u, answers[n].u, sizeof expected.u), 0) << "u, cell " << n;
+    EXPECT_EQ(std::memcmp(expected.fixed, answers[n].fixed, sizeof expected.fixed), 0) << "fixed point, cell " << n;
+    EXPECT_EQ(std::memcmp(expected.fused, answers[n].fused, sizeof expected.fused), 0) << "fused, cell " << n;
     EXPECT_EQ(std::memcmp(expected.value, answers[n].value, sizeof expected.value), 0) << "value, cell " << n;
   }
   EXPECT_GT(owned, cells.size());

@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "deform/cpu/inverse_row.h"
+#include "deform/cpu/rows/inverse_row.h"
 
 #include <limits>
 
 // Highway compiles this file once for each instruction set.
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "deform/cpu/inverse_row.cpp"
+#define HWY_TARGET_INCLUDE "deform/cpu/rows/inverse_row.cpp"
 #include <hwy/foreach_target.h>
 // Highway wants this include after that one.
 #include <hwy/highway.h>
@@ -39,17 +39,32 @@ void write_row(const glm::dmat3& m, const Row& row, glm::vec3* out) {
   const hn::Rebind<std::uint8_t, Floats> d8;
   const auto lanes = static_cast<int>(hn::Lanes(dd));
   int i = 0;
-  for (; i + lanes <= row.count; i += lanes) {
-    Float ux, uy, uz;
-    hn::LoadInterleaved3(df, &row.offset[i].x, ux, uy, uz);
-    const Double x = hn::PromoteTo(dd, ux), y = hn::PromoteTo(dd, uy), z = hn::PromoteTo(dd, uz);
+  for (; i + lanes <= row.count && !(row.fixed && row.fixed->is_wide()); i += lanes) {
+    Double x, y, z;
+    if (row.fixed) {
+      const auto along = [&](int axis) {
+        return hn::Mul(hn::PromoteTo(dd, hn::LoadU(di, row.fixed->u[axis] + i)), hn::Set(dd, 0x1p-23));
+      };
+      x = along(0);
+      y = along(1);
+      z = along(2);
+    } else {
+      Float ux, uy, uz;
+      hn::LoadInterleaved3(df, &row.offset[i].x, ux, uy, uz);
+      x = hn::PromoteTo(dd, ux);
+      y = hn::PromoteTo(dd, uy);
+      z = hn::PromoteTo(dd, uz);
+    }
     const auto mapped = hn::RebindMask(df, hn::Ne(hn::PromoteTo(di, hn::LoadU(d8, row.mapped + i)), hn::Zero(di)));
     const Float nothing = hn::Set(df, kNothing);
     hn::StoreInterleaved3(hn::IfThenElse(mapped, component(m, 0, x, y, z), nothing),
                           hn::IfThenElse(mapped, component(m, 1, x, y, z), nothing),
                           hn::IfThenElse(mapped, component(m, 2, x, y, z), nothing), df, &out[i].x);
   }
-  for (; i < row.count; ++i) out[i] = row.mapped[i] ? glm::vec3(m * glm::dvec3(row.offset[i])) : glm::vec3(kNothing);
+  for (; i < row.count; ++i) {
+    const glm::dvec3 offset = row.fixed ? in_double(row.fixed->at(i)) : in_double(row.offset[i]);
+    out[i] = row.mapped[i] ? glm::vec3(m * offset) : glm::vec3(kNothing);
+  }
 }
 
 }  // namespace tetwarp::cpu::HWY_NAMESPACE

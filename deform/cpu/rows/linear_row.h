@@ -47,8 +47,6 @@ struct LinearSource {
   }
 };
 
-constexpr int kMostInRow = 64;  ///< largest number of voxels that are sampled together; tiles have shorter rows
-
 /// What was done with a voxel of a row.
 enum class RowState : std::uint8_t {
   sampled = 1,  ///< its value is written
@@ -61,9 +59,10 @@ struct LinearPlaces {
   alignas(64) float x[kMostInRow], y[kMostInRow], z[kMostInRow];  ///< fractions
   alignas(64) std::int32_t at[kMostInRow];                        ///< voxel of the buffer; 0 where it is left
   RowState state[kMostInRow];
-  int count = 0;      ///< number of voxels in whole vectors; the voxels after them are left
-  int sampled = 0;    ///< number of voxels that are not left
-  SliceRange slices;  ///< slices of the sources that have weight
+  bool fused = false;  ///< whether the field is coarse: then interpolations are fused (`Lerp`)
+  int count = 0;       ///< number of voxels in whole vectors; the voxels after them are left
+  int sampled = 0;     ///< number of voxels that are not left
+  SliceRange slices;   ///< slices of the sources that have weight
 
   /// Computes the places, once for a row.
   /// @param row  up to kMostInRow voxels, the same in all calls

@@ -1,15 +1,16 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "deform/cpu/linear_row.h"
+#include "deform/cpu/rows/linear_row.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <limits>
 
 // Highway compiles this file once for each instruction set.
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "deform/cpu/linear_row.cpp"
+#define HWY_TARGET_INCLUDE "deform/cpu/rows/linear_row.cpp"
 #include <hwy/foreach_target.h>
 // Highway wants this include after that one.
 #include <hwy/cache_control.h>
@@ -74,12 +75,71 @@ struct Axis {
     const Float whole = hn::Floor(offset);
     fraction = hn::Sub(offset, whole);
     base = hn::Add(voxel, hn::ConvertTo(Ints(), whole));
-    inside = hn::And(hn::And(hn::Gt(base, hn::Set(Ints(), -1)), hn::Lt(base, hn::Set(Ints(), last))),
-                     hn::RebindMask(Ints(), hn::Lt(fraction, hn::Set(Floats(), 1.0f))));
+    inside = hn::And(is_between(last), hn::RebindMask(Ints(), hn::Lt(fraction, hn::Set(Floats(), 1.0f))));
+  }
+
+  /// @param u  of a coarse field, 2^-23 voxel
+  HWY_INLINE Axis(Int u, Int voxel, std::int32_t last) {
+    const Int rest = hn::And(u, hn::Set(Ints(), static_cast<std::int32_t>(kFixedOne - 1)));
+    fraction = hn::Mul(hn::ConvertTo(Floats(), rest), hn::Set(Floats(), 0x1p-23f));
+    base = hn::Add(voxel, hn::ShiftRight<kFixedBits>(u));
+    inside = is_between(last);
+  }
+
+ private:
+  HWY_INLINE hn::Mask<Ints> is_between(std::int32_t last) const {
+    return hn::And(hn::Gt(base, hn::Set(Ints(), -1)), hn::Lt(base, hn::Set(Ints(), last)));
   }
 };
 
-HWY_INLINE Float mix(Float a, Float b, Float t) { return hn::Add(a, hn::Mul(t, hn::Sub(b, a))); }
+#if !HWY_NATIVE_FMA
+#if HWY_TARGET == HWY_SCALAR
+HWY_INLINE Float emulated_fma(Float x, Float y, Float z) {
+  return hn::Set(Floats(), std::fma(hn::GetLane(x), hn::GetLane(y), hn::GetLane(z)));
+}
+#else
+/// x y + z in double, with a last bit that makes the rounding to float that follows the only one: the product is exact,
+/// and a sum that is not is rounded to the neighbour whose last bit is 1 ("round to odd", Boldo and Melquiond 2008).
+template <class D, class Double = hn::Vec<D> >
+HWY_INLINE Double odd_sum(D dd, Double x, Double y, Double z) {
+  const hn::RebindToSigned<D> di;
+  const Double product = hn::Mul(x, y), sum = hn::Add(product, z), of_z = hn::Sub(sum, product);
+  const Double error = hn::Add(hn::Sub(product, hn::Sub(sum, of_z)), hn::Sub(z, of_z)), zero = hn::Zero(dd);
+  const auto bits = hn::BitCast(di, sum), one = hn::Set(di, 1);
+  const auto inexact = hn::RebindMask(di, hn::Or(hn::Lt(error, zero), hn::Gt(error, zero)));  // not where it is NaN
+  const auto even = hn::Eq(hn::And(bits, one), hn::Zero(di));
+  const auto outwards = hn::RebindMask(di, hn::Gt(hn::Mul(hn::CopySign(hn::Set(dd, 1), error), sum), zero));
+  const auto odd = hn::IfThenElse(outwards, hn::Add(bits, one), hn::Sub(bits, one));
+  return hn::BitCast(dd, hn::IfThenElse(hn::And(inexact, even), odd, bits));
+}
+
+HWY_INLINE Float emulated_fma(Float x, Float y, Float z) {
+  const hn::RepartitionToWide<Floats> dd;
+  const hn::Rebind<float, decltype(dd)> half;
+  const auto low = odd_sum(dd, hn::PromoteTo(dd, hn::LowerHalf(half, x)), hn::PromoteTo(dd, hn::LowerHalf(half, y)),
+                           hn::PromoteTo(dd, hn::LowerHalf(half, z))),
+             high = odd_sum(dd, hn::PromoteTo(dd, hn::UpperHalf(half, x)), hn::PromoteTo(dd, hn::UpperHalf(half, y)),
+                            hn::PromoteTo(dd, hn::UpperHalf(half, z)));
+  return hn::Combine(Floats(), hn::DemoteTo(half, high), hn::DemoteTo(half, low));
+}
+#endif
+#endif
+
+/// x y + z, rounded once.
+HWY_INLINE Float fused(Float x, Float y, Float z) {
+#if HWY_NATIVE_FMA
+  return hn::MulAdd(x, y, z);
+#else
+  return emulated_fma(x, y, z);
+#endif
+}
+
+/// a + t (b - a), rounded as the field has it.
+template <Lerp kLerp>
+HWY_INLINE Float mix(Float a, Float b, Float t) {
+  if constexpr (kLerp == Lerp::fused) return fused(t, hn::Sub(b, a), a);
+  return hn::Add(a, hn::Mul(t, hn::Sub(b, a)));
+}
 
 /// Fractions of a vector of voxels, and where they are 0.
 struct Fractions {
@@ -114,26 +174,29 @@ struct Corners {
 };
 
 /// The sample of whole numbers, to the nearest one. A corner without weight changes nothing.
+template <Lerp kLerp>
 HWY_INLINE Int interpolated(const Corners<Int>& at, const Fractions& t) {
   const auto along_x = [&](int c) {
-    return mix(hn::ConvertTo(Floats(), at.value[c]), hn::ConvertTo(Floats(), at.value[c + 1]), t.x);
+    return mix<kLerp>(hn::ConvertTo(Floats(), at.value[c]), hn::ConvertTo(Floats(), at.value[c + 1]), t.x);
   };
-  return hn::NearestInt(mix(mix(along_x(0), along_x(2), t.y), mix(along_x(4), along_x(6), t.y), t.z));
+  const auto along_y = [&](int c) { return mix<kLerp>(along_x(c), along_x(c + 2), t.y); };
+  return hn::NearestInt(mix<kLerp>(along_y(0), along_y(4), t.z));
 }
 
 /// The sample of floats: a corner without weight does not count, even if it is infinite or no number; a copy is one to
 /// the bit; and all that is no number is one and the same NaN.
+template <Lerp kLerp>
 HWY_INLINE Float interpolated(const Corners<Float>& at, const Fractions& t) {
   const Floats df;
   const auto along_x = [&](int c) {
-    return hn::IfThenElse(t.no_x, at.value[c], mix(at.value[c], at.value[c + 1], t.x));
+    return hn::IfThenElse(t.no_x, at.value[c], mix<kLerp>(at.value[c], at.value[c + 1], t.x));
   };
   const auto along_y = [&](int c) {
     const Float low = along_x(c);
-    return hn::IfThenElse(t.no_y, low, mix(low, along_x(c + 2), t.y));
+    return hn::IfThenElse(t.no_y, low, mix<kLerp>(low, along_x(c + 2), t.y));
   };
   const Float low = along_y(0);
-  const Float value = hn::IfThenElse(t.no_z, low, mix(low, along_y(4), t.z));
+  const Float value = hn::IfThenElse(t.no_z, low, mix<kLerp>(low, along_y(4), t.z));
   const Float number = hn::IfThenElse(hn::IsNaN(value), hn::Set(df, std::numeric_limits<float>::quiet_NaN()), value);
   return hn::IfThenElse(hn::And(t.no_x, hn::And(t.no_y, t.no_z)), at.value[0], number);
 }
@@ -221,7 +284,14 @@ struct Samples {
   static HWY_INLINE void prefetch(const V* voxels) { hwy::Prefetch(voxels); }
 };
 
-void find_places(const LinearLayout& layout, const Row& row, LinearPlaces& places) {
+struct Axes {
+  Axis x, y, z;
+};
+
+/// Computes the places of the voxels in whole vectors.
+/// @param axes_at  `axes_at(i, x, y, z)` makes the axes of a vector of voxels at x, y, z, the i-th of the row and on
+template <class AxesAt>
+HWY_INLINE void find_with(const LinearLayout& layout, const Row& row, LinearPlaces& places, AxesAt&& axes_at) {
   const Floats df;
   const Ints di;
   const hn::Rebind<std::uint8_t, Floats> d8;
@@ -236,10 +306,8 @@ void find_places(const LinearLayout& layout, const Row& row, LinearPlaces& place
   std::size_t sampled = 0;
   int count = 0;
   for (; count + lanes <= row.count; count += lanes) {
-    Float ux, uy, uz;
-    hn::LoadInterleaved3(df, &row.offset[count].x, ux, uy, uz);
-    const Axis x(ux, hn::Add(along, hn::Set(di, first.x + count)), layout.last.x),
-        y(uy, hn::Set(di, first.y), layout.last.y), z(uz, hn::Set(di, first.z), layout.last.z);
+    const auto [x, y, z] =
+        axes_at(count, hn::Add(along, hn::Set(di, first.x + count)), hn::Set(di, first.y), hn::Set(di, first.z));
     const Int at = hn::Sub(hn::Add(hn::Add(hn::Mul(z.base, stride_slice), hn::Mul(y.base, stride_row)), x.base),
                            hn::Set(di, begin));
     const auto mapped = hn::Gt(hn::PromoteTo(di, hn::LoadU(d8, row.mapped + count)), hn::Zero(di));
@@ -263,6 +331,28 @@ void find_places(const LinearLayout& layout, const Row& row, LinearPlaces& place
   places.slices = {hn::GetLane(hn::MinOfLanes(di, least)), hn::GetLane(hn::MaxOfLanes(di, most))};
 }
 
+void find_places(const LinearLayout& layout, const Row& row, LinearPlaces& places) {
+  places.fused = row.fixed != nullptr;
+  const glm::ivec3& last = layout.last;
+  if (!row.fixed) {
+    find_with(layout, row, places, [&](int i, Int x, Int y, Int z) {
+      Float ux, uy, uz;
+      hn::LoadInterleaved3(Floats(), &row.offset[i].x, ux, uy, uz);
+      return Axes{Axis(ux, x, last.x), Axis(uy, y, last.y), Axis(uz, z, last.z)};
+    });
+  } else if (!row.fixed->is_wide()) {
+    const auto& u = row.fixed->u;
+    find_with(layout, row, places, [&](int i, Int x, Int y, Int z) {
+      const Ints di;
+      return Axes{Axis(hn::LoadU(di, u[0] + i), x, last.x), Axis(hn::LoadU(di, u[1] + i), y, last.y),
+                  Axis(hn::LoadU(di, u[2] + i), z, last.z)};
+    });
+  } else {  // further than 32 bits reach
+    std::fill_n(places.state, row.count, RowState::left);
+    places.count = places.sampled = 0;
+  }
+}
+
 /// Calls `work` with the voxels' type.
 template <class Work>
 void with_type(VoxelType type, void* output, Work&& work) {
@@ -278,9 +368,11 @@ void with_type(VoxelType type, void* output, Work&& work) {
 void sample_linear(const LinearSource& source, const LinearPlaces& places, void* output) {
   with_type(source.type, output, [&](auto* to) {
     using V = std::remove_pointer_t<decltype(to)>;
-    Samples<V>(source, places).write(places, to, [](const auto& at, const Fractions& t) {
-      return interpolated(at, t);
-    });
+    const Samples<V> samples(source, places);
+    if (places.fused)
+      samples.write(places, to, [](const auto& at, const Fractions& t) { return interpolated<Lerp::fused>(at, t); });
+    else
+      samples.write(places, to, [](const auto& at, const Fractions& t) { return interpolated<Lerp::separate>(at, t); });
   });
 }
 

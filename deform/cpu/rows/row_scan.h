@@ -1,0 +1,27 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#pragma once
+
+#include <cstdint>
+
+#include "deform/core/row_interval.h"
+
+namespace tetwarp::cpu {
+
+/// What a tetrahedron owns of some rows of a box, as far as float proves it. Row y, z has number y + kMostRowTile z,
+/// counted from the first of the box.
+struct RowScan {
+  static constexpr int kMost = kMostRowTile * kMostRowTile;
+
+  int found = 0, unsure = 0;         ///< how many rows there are of both kinds
+  std::uint16_t found_rows[kMost];   ///< rows of which it owns a part
+  std::uint32_t found_bits[kMost];   ///< of each, a bit for each voxel that it owns
+  std::uint16_t unsure_rows[kMost];  ///< rows for which exact integers must decide
+};
+
+/// Scans the rows of a range of y and z with the widest vectors that the processor has (Highway).
+/// @param faces  counted from the first voxel of the box  @param width  voxels of a row, up to 32
+void scan_rows(const RowFaces& faces, int y_begin, int y_end, int z_begin, int z_end, int width, RowScan& scan);
+
+}  // namespace tetwarp::cpu
