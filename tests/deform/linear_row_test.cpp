@@ -174,5 +174,36 @@ TYPED_TEST(LinearRow, VotesAsOneVoxelAfterTheOtherOnEveryInstructionSet) {
   expect_same_bits<Interpolation::vote, FixedOffset>(&random_label<TypeParam>, &sample_vote_row);
 }
 
+/// 0.75 of the way from -2^-60 to 1 + 2^-23 lies a little below the middle of two floats. Rounded to double first it
+/// would be the middle, and then the even one, which is the larger.
+TEST(LinearRowRounding, OfCoarseFieldsIsDoneOnceOnEveryInstructionSet) {
+  constexpr int kWidth = 40, kCount = 32;
+  std::vector<float> voxels;
+  for (int n = 0; n < kWidth * 4; ++n) voxels.push_back(n % 2 == 0 ? -0x1p-60f : 1.0f + 0x1p-23f);
+  SamplePlan<float> plan{};
+  plan.source = {voxels.data(), {kWidth, 2, 2}, glm::i64vec3(0), {1, kWidth, 2 * kWidth}};
+  plan.relation.same_grid = true;
+  LinearSource source;
+  ASSERT_TRUE(LinearSource::make(plan, static_cast<std::int64_t>(voxels.size()), source));
+  std::int32_t u[3][kMostInRow] = {};
+  std::uint8_t mapped[kCount];
+  for (int i = 0; i < kCount; ++i) {
+    u[0][i] = 3 << 21;
+    mapped[i] = 1;
+  }
+  const FixedRow fixed{{u[0], u[1], u[2]}, {}};
+  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    hwy::SetSupportedTargetsForTest(target);
+    const Row row{{0, 0, 0}, kCount, mapped, nullptr, &fixed};
+    LinearPlaces places;
+    places.find(source.layout, row);
+    ASSERT_EQ(places.sampled, kCount);
+    float output[kCount];
+    sample_linear_row(source, places, output);
+    for (int i = 0; i < kCount; i += 2) EXPECT_EQ(output[i], 0.75f + 0x1p-24f) << hwy::TargetName(target);
+  }
+  hwy::SetSupportedTargetsForTest(0);
+}
+
 }  // namespace
 }  // namespace tetwarp::cpu
