@@ -25,7 +25,7 @@ namespace {
 ///              for; `counters` are added to
 /// @param sink  gets every voxel of the tiles that are not left
 template <class Sink>
-__global__ void __launch_bounds__(kTileThreads, Sink::kIsWide ? kTileBlocks - 1 : kTileBlocks)
+__global__ void __launch_bounds__(kTileThreads, kTileBlocks)
     tile_kernel(const __grid_constant__ TileTask task, const __grid_constant__ Sink sink) {
   __shared__ TileMemory memory;
   const glm::ivec3 at(blockIdx.x, blockIdx.y, blockIdx.z);

@@ -32,7 +32,7 @@ constexpr bool is_coarse() {
 /// @param first_tile  that the box reaches, on each axis  @param sink  gets every voxel of the box
 /// @param covered     how many voxels of a sink that samples are covered: added to
 template <bool kCountsOwners, class Sink>
-__global__ void __launch_bounds__(kTileThreads, is_wide<Sink>() ? kTileBlocks - 1 : kTileBlocks)
+__global__ void __launch_bounds__(kTileThreads, is_wide<Sink>() ? kTileBlocks : kTileBlocks + 1)
     mesh_tile_kernel(const __grid_constant__ MeshTask task, const __grid_constant__ IntBox box,
                      const __grid_constant__ glm::ivec3 first_tile, const __grid_constant__ Sink sink,
                      unsigned long long* covered) {
