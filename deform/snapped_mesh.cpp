@@ -156,7 +156,7 @@ SnappedMesh snap_mesh(const Geometry& output, const FieldView& field, const Cont
       },
       [](const Findings& a, const Findings& b) { return a + b; });
   snapped.nudge = snapper.frame() ? snapper.frame()->nudge : Nudge{found.low + found.high};
-  snapped.coarse = !snapper.frame() || snapper.frame()->coarse;
+  snapped.coarse = is_coarse(output, field);
   snapped.inverted = found.inverted;
   snapped.degenerate = found.degenerate;
   snapped.jacobian_min = found.least;

@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <span>
+#include <type_traits>
 #include <variant>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "cuda/lattice/lattice_part.h"
 #include "cuda/runtime/host_copies.h"
 #include "deform/core/coarse_map.h"
+#include "deform/core/gather.h"
 #include "deform/core/sample_voxel.h"
 #include "deform/core/visit_cell.h"
 
@@ -118,9 +120,25 @@ class Mapped {
 struct FixedU {
   glm::i32vec3 u;  ///< modulo 2^32
   bool any;        ///< whether it is usable
-
-  __device__ FixedOffset offset() const { return fixed_offset(glm::i64vec3(u)); }
 };
+
+/// Whether fast arithmetic gave where a voxel comes from.
+/// @param moved  deformed minus undeformed place, 2^-12 voxel, NaN where it did not; or of a coarse field
+__device__ inline bool is_any(const glm::vec3& moved) { return moved.x == moved.x; }
+__device__ inline bool is_any(const FixedU& u) { return u.any; }
+/// The same as an offset, as sinks write it.
+__device__ inline glm::vec3 offset_of(const glm::vec3& moved) { return detail::to_offset(moved); }
+__device__ inline FixedOffset offset_of(const FixedU& u) { return fixed_offset(glm::i64vec3(u.u)); }
+
+/// Calls `work` with the Lerp of a field, as a constant.
+template <class Work>
+void with_rounding(bool coarse, Work&& work) {
+  if (coarse) {
+    work(std::integral_constant<Lerp, Lerp::fused>());
+  } else {
+    work(std::integral_constant<Lerp, Lerp::separate>());
+  }
+}
 
 /// How the voxels of sources and outputs on one grid lie, and where a voxel comes from. All sinks that sample share it;
 /// `OffsetSink` (cuda/owners/gather.cuh) describes what a sink is.

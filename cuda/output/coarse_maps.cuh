@@ -9,19 +9,31 @@ namespace tetwarp::cuda_detail {
 
 constexpr int kMapQuads = 3;  ///< groups of four numbers of a map in shared memory
 
-/// Writes the map of a tetrahedron of a coarse field as shared memory has it, one group of four numbers an axis:
+/// One axis of the map of a tetrahedron of a coarse field, from some voxel on:
 ///
-///     U at the first voxel of the tile    slope along i    slope along j    slope along k      all modulo 2^32
+///     U at that voxel    slope along i    slope along j    slope along k      all modulo 2^32
 ///
-/// @param first  voxel of the tile, counted as the map's origin is
+/// @param u  `map.u` of that voxel
+__device__ inline int4 map_axis(const CoarseMap& map, const glm::i64vec3& u, int axis) {
+  return make_int4(static_cast<int>(u[axis]), map.slope[0][axis], map.slope[1][axis], map.slope[2][axis]);
+}
+/// U on an axis. @param from  from that voxel
+__device__ inline int u_on_axis(const int4& m, const glm::ivec3& from) {
+  return static_cast<int>(static_cast<unsigned>(m.x) + static_cast<unsigned>(m.y) * static_cast<unsigned>(from.x) +
+                          static_cast<unsigned>(m.z) * static_cast<unsigned>(from.y) +
+                          static_cast<unsigned>(m.w) * static_cast<unsigned>(from.z));
+}
+
+/// Writes a map as shared memory has it: an axis each group of four numbers, from the first voxel of the tile on.
+/// @param first  that voxel, counted as the map's origin is
 /// @return whether it is usable
 __device__ inline bool put_map(const CoarseMap& map, const glm::ivec3& first, float4* quads) {
   const glm::i64vec3 u = map.u(first);
-  const auto bits = [](std::int64_t n) { return __int_as_float(static_cast<int>(n)); };
 #pragma unroll
-  for (int axis = 0; axis < 3; ++axis)
-    quads[axis] =
-        make_float4(bits(u[axis]), bits(map.slope[0][axis]), bits(map.slope[1][axis]), bits(map.slope[2][axis]));
+  for (int axis = 0; axis < 3; ++axis) {
+    const int4 m = map_axis(map, u, axis);
+    quads[axis] = make_float4(__int_as_float(m.x), __int_as_float(m.y), __int_as_float(m.z), __int_as_float(m.w));
+  }
   return !map.is_thin;
 }
 
@@ -72,15 +84,12 @@ struct CoarseMaps {
     FixedU of;
 #pragma unroll
     for (int axis = 0; axis < 3; ++axis) {
-      const auto at = [&](int n) { return static_cast<unsigned>(m.values[4 * axis + n]); };
-      of.u[axis] = static_cast<int>(at(0) + at(1) * static_cast<unsigned>(from.x) +
-                                    at(2) * static_cast<unsigned>(from.y) + at(3) * static_cast<unsigned>(from.z));
+      const int* v = m.values + 4 * axis;
+      of.u[axis] = u_on_axis(make_int4(v[0], v[1], v[2], v[3]), from);
     }
     of.any = m.usable != 0;
     return of;
   }
-  __device__ static bool is_any(const FixedU& of) { return of.any; }
-  __device__ static FixedOffset offset(const FixedU& of) { return of.offset(); }
 };
 
 }  // namespace tetwarp::cuda_detail

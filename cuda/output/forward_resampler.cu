@@ -290,22 +290,18 @@ class LatticeResampler final : public CudaResampler<ForwardResampler> {
       plainly_uncovered_ += static_cast<std::uint64_t>(box.count()) - found.covered;
       count_paths(box, found);
     };
-    if (frame_.coarse) {
-      std::visit(run, writer.plain_sink<Lerp::fused>(box));
-    } else {
-      std::visit(run, writer.plain_sink<Lerp::separate>(box));
-    }
+    with_rounding(frame_.coarse,
+                  [&](auto rounding) { std::visit(run, writer.plain_sink<decltype(rounding)::value>(box)); });
   }
 
   void map_box(const SlabBox& box, SlabWriter& writer) override {
     const auto voxels = static_cast<std::size_t>(box.count());
     const VoxelMapping mapped{mapped_.reserve(voxels, frame_.coarse), writer.jacobian(), writer.owners()};
     if (can_map_plainly(writer)) {
-      const MappedVoxels& to = mapped.places;
-      count_paths(box,
-                  frame_.coarse
-                      ? gather_.run(*lattice_, box, OffsetSink<Lerp::fused>{box, to.mapped, to.fixed}, stream_)
-                      : gather_.run(*lattice_, box, OffsetSink<Lerp::separate>{box, to.mapped, to.offset}, stream_));
+      with_rounding(frame_.coarse, [&](auto rounding) {
+        count_paths(box,
+                    gather_.run(*lattice_, box, offset_sink<decltype(rounding)::value>(box, mapped.places), stream_));
+      });
       return;
     }
     const DeviceField& field = lattice_->field();

@@ -98,7 +98,7 @@ class MeshResampler final : public CudaResampler<ForwardResampler> {
   const char* held_of_field() const override { return "whole mesh"; }
 
   /// Whether 32 bits hold what tiles compute.
-  bool fits_tiles() const { return !mesh_.coarse || mesh_.most_moved < 255 * kStepsPerVoxel; }
+  bool fits_tiles() const { return !mesh_.coarse || mesh_.most_moved < kFarForInt32; }
   bool can_write_plainly() const override { return !stays_outside_ && fits_tiles(); }
   std::int64_t work_bytes(const SlabWriter&) const override {
     return Mapped::bytes(mesh_.coarse) + std::int64_t{2 * sizeof(unsigned)};
@@ -106,11 +106,8 @@ class MeshResampler final : public CudaResampler<ForwardResampler> {
 
   void write_plainly(const SlabBox& box, SlabWriter& writer) override {
     const auto run = [&](const auto& sink) { raster_.run(box, sink, stream_); };
-    if (mesh_.coarse) {
-      std::visit(run, writer.plain_sink<Lerp::fused>(box));
-    } else {
-      std::visit(run, writer.plain_sink<Lerp::separate>(box));
-    }
+    with_rounding(mesh_.coarse,
+                  [&](auto rounding) { std::visit(run, writer.plain_sink<decltype(rounding)::value>(box)); });
     const std::uint64_t covered = raster_.covered(stream_);
     plainly_covered_ += covered;
     plainly_uncovered_ += static_cast<std::uint64_t>(box.count()) - covered;
@@ -122,8 +119,9 @@ class MeshResampler final : public CudaResampler<ForwardResampler> {
     paths_.claimed += static_cast<std::uint64_t>(voxels);
     const MappedVoxels to = mapped_.reserve(voxels, mesh_.coarse);
     if (!stays_outside_ && !writer.wants_jacobian() && !writer.wants_owners() && fits_tiles()) {
-      if (mesh_.coarse) return raster_.run(box, OffsetSink<Lerp::fused>{box, to.mapped, to.fixed}, stream_);
-      return raster_.run(box, OffsetSink<Lerp::separate>{box, to.mapped, to.offset}, stream_);
+      return with_rounding(mesh_.coarse, [&](auto rounding) {
+        raster_.run(box, offset_sink<decltype(rounding)::value>(box, to), stream_);
+      });
     }
     raster_.run(box, OwnerSink{box, owner_.reserve(voxels), writer.owners()}, stream_);
     if (stays_outside_) rest_.run(box, OwnerSink{box, at_rest_.reserve(voxels), nullptr}, stream_);

@@ -13,7 +13,7 @@ namespace tetwarp::cuda_detail {
 /// @param places     `Weighings`, or `CoarseMaps` of a coarse field
 /// @param at         the first voxel  @param in_tile  the same, counted from the first of the tile
 /// @param next_slot  called once a voxel: the slot of its owner
-/// @param finish      `finish(z)` writes a voxel that float leaves open or nobody owns, and says whether it is covered
+/// @param finish     `finish(z)` writes a voxel that float leaves open or nobody owns, and says whether it is covered
 /// @return how many are covered
 template <bool kInside, class Sink, class Places, class NextSlot, class Finish>
 __device__ unsigned sample_column(const Sink& sink, const Places& places, glm::ivec3 at, const glm::ivec3& in_tile,
@@ -42,7 +42,7 @@ __device__ unsigned sample_column(const Sink& sink, const Places& places, glm::i
   for (int z = 1; z < count; ++z) {
     const auto moved = next_moved();
     left <<= 1;
-    if (places.is_any(moved)) {  // a branch, so that nothing of it is moved before what is read meanwhile
+    if (is_any(moved)) {  // a branch, so that nothing of it is moved before what is read meanwhile
       sink.end(out, pending);
     } else {
       left |= 2;
@@ -73,7 +73,7 @@ __device__ bool finish_voxel(const Sink& sink, const Places& places, unsigned sl
   places.hold(slot, m, held);
   const auto moved = places.moved(m, places.from(in_tile));
   const int out = sink.address(at);
-  return places.is_any(moved) ? write_out_of_line(sink, out, at, places.offset(moved)) : slowly(out);
+  return is_any(moved) ? write_out_of_line(sink, out, at, offset_of(moved)) : slowly(out);
 }
 
 }  // namespace tetwarp::cuda_detail

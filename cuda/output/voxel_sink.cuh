@@ -107,12 +107,12 @@ template <bool kInside>
 __device__ bool SinkLayout::locate(const glm::ivec3& voxel, unsigned column, const FixedU& of, Origin& origin) const {
   const glm::i32vec3 whole = of.u >> kFixedBits;
   origin.fraction = {fraction_of(of.u.x), fraction_of(of.u.y), fraction_of(of.u.z)};
-  // `column` counts whole voxels that are raised by `kToWhole`.
-  const auto raised = static_cast<unsigned>(__float_as_int(kToWhole)), by_row = static_cast<unsigned>(row),
-             by_slice = static_cast<unsigned>(slice);
+  // `column` is for whole voxels that are raised by `kToWhole`; what that takes is the same for all voxels.
+  const auto by_row = static_cast<unsigned>(row), by_slice = static_cast<unsigned>(slice),
+             raised = static_cast<unsigned>(__float_as_int(kToWhole)) * (by_slice + by_row + 1);
   origin.base = static_cast<int>(
-      (static_cast<unsigned>(whole.z) + raised) * by_slice +
-      ((static_cast<unsigned>(whole.y) + raised) * by_row + (static_cast<unsigned>(whole.x) + raised + column)));
+      static_cast<unsigned>(whole.z) * by_slice +
+      (static_cast<unsigned>(whole.y) * by_row + (static_cast<unsigned>(whole.x) + (column + raised))));
   if constexpr (kInside) return of.any;
   const auto is_below = [](int index, int end) { return static_cast<unsigned>(index) < static_cast<unsigned>(end); };
   return of.any & is_below(voxel.x + whole.x, last.x) & is_below(voxel.y + whole.y, last.y) &

@@ -113,8 +113,6 @@ struct Weighings {
   __device__ static From from(const glm::ivec3& in_tile) { return glm::vec3(in_tile * kStepsPerVoxel); }
   __device__ static void step(From& from) { from.z += float{kStepsPerVoxel}; }
   __device__ static glm::vec3 moved(const HeldWeighing& m, const From& from) { return moved_by(m, from); }
-  __device__ static bool is_any(const glm::vec3& moved) { return moved.x == moved.x; }
-  __device__ static glm::vec3 offset(const glm::vec3& moved) { return detail::to_offset(moved); }
 };
 
 }  // namespace tetwarp::cuda_detail

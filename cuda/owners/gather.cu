@@ -48,12 +48,7 @@ __global__ void queue_kernel(GatherTask task, int walk, Sink sink) {
     const glm::i32vec3 steps = detail::to_steps(glm::i64vec3(voxel)), signs = task.nudge.signs(voxel);
     LatticeTetrahedron owner;
     if (walk_to_owner(task.lattice, as_lattice(tetrahedron_at(task.lattice, place)), steps, signs, walk, owner)) {
-      if constexpr (kIsCoarse<Sink>) {
-        covered += sink.write(sink.address(voxel), voxel, fixed_offset_in(task.lattice, owner, voxel, signs));
-      } else {
-        covered +=
-            sink.write(sink.address(voxel), voxel, interpolate_u(vertices_of(task.lattice, owner), steps, signs));
-      }
+      covered += sink.write(sink.address(voxel), voxel, offset_for<Sink>(task.lattice, owner, voxel, signs));
     } else {
       task.leave_to_claims(in);
     }
@@ -186,8 +181,8 @@ Gather::Counters Gather::run_intervals(const LatticeOnDevice& lattice, const Sla
 const int4* Gather::maps_of(const StepLattice& lattice, const SlabBox& box, cudaStream_t stream) {
   constexpr std::int64_t kMostBytes = 4;  // for each voxel
   const std::int64_t entries = entries_of(lattice);
-  if (entries * kWordsOfEntry * std::int64_t{sizeof(int)} > kMostBytes * box.count()) return nullptr;
-  int4* maps = maps_.reserve(static_cast<std::size_t>(entries * 3));
+  if (entries * std::int64_t{kMapQuads * sizeof(int4)} > kMostBytes * box.count()) return nullptr;
+  int4* maps = maps_.reserve(static_cast<std::size_t>(entries * kMapQuads));
   if (!has_maps_) {
     map_table_kernel<<<blocks_for(entries), kThreads, 0, stream>>>(lattice, entries, maps);
     TETWARP_CUDA_TRY(cudaGetLastError());
@@ -237,16 +232,8 @@ void Gather::claim_several(const Task& task, const DeviceField& field, const Sin
 
 #define TETWARP_RUN(...) \
   template Gather::Counters Gather::run(const LatticeOnDevice&, const SlabBox&, const __VA_ARGS__&, cudaStream_t)
-#define TETWARP_RUN_ROUNDED(kRounding)               \
-  TETWARP_RUN(OffsetSink<kRounding>);                \
-  TETWARP_RUN(VolumesSink<void, kRounding>);         \
-  TETWARP_RUN(VolumesSink<std::int16_t, kRounding>); \
-  TETWARP_RUN(VoxelSink<std::uint8_t, kRounding>);   \
-  TETWARP_RUN(VoxelSink<std::int16_t, kRounding>);   \
-  TETWARP_RUN(VoxelSink<std::uint16_t, kRounding>)
-TETWARP_RUN_ROUNDED(Lerp::separate);
-TETWARP_RUN_ROUNDED(Lerp::fused);
-#undef TETWARP_RUN_ROUNDED
+TETWARP_FOR_EACH_SINK(TETWARP_RUN, Lerp::separate);
+TETWARP_FOR_EACH_SINK(TETWARP_RUN, Lerp::fused);
 #undef TETWARP_RUN
 
 }  // namespace tetwarp::cuda_detail

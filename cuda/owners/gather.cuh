@@ -37,10 +37,6 @@ struct OffsetSink {
     bool any;
     Offset u;
   };
-  __device__ static Offset offset_of(const glm::vec3& moved) { return detail::to_offset(moved); }
-  __device__ static Offset offset_of(const FixedU& u) { return u.offset(); }
-  __device__ static bool is_any(const glm::vec3& moved) { return moved.x == moved.x; }
-  __device__ static bool is_any(const FixedU& u) { return u.any; }
   __device__ void start(int address, const glm::ivec3& voxel, const Moved& moved, bool wanted, Pending& pending) const {
     pending.any = wanted && write(address, voxel, offset_of(moved));
   }
@@ -75,6 +71,25 @@ struct OffsetSink {
     offset[address] = Offset{};
   }
 };
+
+/// The sink that writes the places of a box. @param to  with offsets of the kind that `kRounding` has
+template <Lerp kRounding>
+OffsetSink<kRounding> offset_sink(const SlabBox& box, const MappedVoxels& to) {
+  if constexpr (kRounding == Lerp::fused) {
+    return {box, to.mapped, to.fixed};
+  } else {
+    return {box, to.mapped, to.offset};
+  }
+}
+
+/// RUN(type); for all sinks of places and values.
+#define TETWARP_FOR_EACH_SINK(RUN, kRounding) \
+  RUN(OffsetSink<kRounding>);                 \
+  RUN(VolumesSink<void, kRounding>);          \
+  RUN(VolumesSink<std::int16_t, kRounding>);  \
+  RUN(VoxelSink<std::uint8_t, kRounding>);    \
+  RUN(VoxelSink<std::int16_t, kRounding>);    \
+  RUN(VoxelSink<std::uint16_t, kRounding>)
 
 /// Finds the owners of voxels by marching along k and predicting each owner from the one before.
 ///

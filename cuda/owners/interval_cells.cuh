@@ -85,9 +85,9 @@ __device__ TileCells tile_cells(const IntBox& voxels, const Box& found, const Bo
              rests = moved.low == glm::i32vec3(0) && moved.high == glm::i32vec3(0) && is_inside && any;
   TileCells cells{any ? found.low : glm::ivec3(0), any ? found.high - found.low + 1 : glm::ivec3(0), {}, {}, rests, 0};
   if (!any) return cells;
-  constexpr int kMost = 255 * kStepsPerVoxel;  // where vertices go further, 32 bits do not hold U
 #pragma unroll
-  for (int axis = 0; axis < 3; ++axis) cells.left |= moved.low[axis] <= -kMost || moved.high[axis] >= kMost ? 1 : 0;
+  for (int axis = 0; axis < 3; ++axis)
+    cells.left |= moved.low[axis] <= -kFarForInt32 || moved.high[axis] >= kFarForInt32 ? 1 : 0;
   // Weights are at least -1/64, and wrong by less than 1/256: three move a voxel by less than 1/16 of the range.
   const glm::ivec3 beyond = (moved.high - moved.low) / 16 + kStepsPerVoxel;
   cells.source_begin = (voxels.begin * kStepsPerVoxel - (moved.high + beyond)) >> kStepBits;

@@ -158,12 +158,7 @@ void IntervalRaster::mark_left(const LatticeOnDevice& lattice, const SlabBox& bo
 
 #define TETWARP_RUN(...) \
   template void IntervalRaster::run(const LatticeOnDevice&, const SlabBox&, const __VA_ARGS__&, cudaStream_t)
-TETWARP_RUN(OffsetSink<Lerp::fused>);
-TETWARP_RUN(VolumesSink<void, Lerp::fused>);
-TETWARP_RUN(VolumesSink<std::int16_t, Lerp::fused>);
-TETWARP_RUN(VoxelSink<std::uint8_t, Lerp::fused>);
-TETWARP_RUN(VoxelSink<std::int16_t, Lerp::fused>);
-TETWARP_RUN(VoxelSink<std::uint16_t, Lerp::fused>);
+TETWARP_FOR_EACH_SINK(TETWARP_RUN, Lerp::fused);
 #undef TETWARP_RUN
 
 }  // namespace tetwarp::cuda_detail

@@ -3,7 +3,7 @@
 
 #pragma once
 
-#include "cuda/lattice/slab.cuh"
+#include "cuda/output/coarse_maps.cuh"
 #include "deform/core/coarse_map.h"
 #include "deform/core/step_lattice.h"
 
@@ -18,25 +18,18 @@ namespace {
 ///
 ///     entry        10 pair + 0 ... 7       the even vertex: 1 if A lies down, plus 2 if B does, plus 4 if C does
 ///                  10 pair + 8, + 9        the odd vertex: the centre down from it, and up
-///     an entry     three times four words, an axis of U each: U at voxel (0, 0, 0), and the slopes along i, j, k;
-///                  all modulo 2^32
-constexpr int kEntriesOfPair = 10, kWordsOfEntry = 12;
+///     an entry     `map_axis` of each axis, from voxel (0, 0, 0) on
+constexpr int kEntriesOfPair = 10;
 constexpr int kUnusable = INT32_MIN;  ///< the first slope of a map that is not to be used; others are smaller than 2^30
 
 /// An entry, in registers.
 struct TableMap {
-  int4 axes[3];
+  int4 axes[kMapQuads];
 
   __device__ FixedU u(const glm::ivec3& voxel) const {
     FixedU of;
 #pragma unroll
-    for (int axis = 0; axis < 3; ++axis) {
-      const int4& m = axes[axis];
-      of.u[axis] =
-          static_cast<int>(static_cast<unsigned>(m.x) + static_cast<unsigned>(m.y) * static_cast<unsigned>(voxel.x) +
-                           static_cast<unsigned>(m.z) * static_cast<unsigned>(voxel.y) +
-                           static_cast<unsigned>(m.w) * static_cast<unsigned>(voxel.z));
-    }
+    for (int axis = 0; axis < 3; ++axis) of.u[axis] = u_on_axis(axes[axis], voxel);
     of.any = axes[0].y != kUnusable;
     return of;
   }
@@ -46,7 +39,7 @@ __device__ TableMap read_map(const int4* maps, const FloatTetrahedron& t) {
   const unsigned x = __float_as_uint(t.to.x) >> 31, y = __float_as_uint(t.to.y) >> 31,
                  z = __float_as_uint(t.to.z) >> 31;
   const unsigned which = t.centre ? 9 - x : x + 2 * y + 4 * z;
-  const int4* entry = maps + (static_cast<unsigned>(t.offset >> 1) * kEntriesOfPair + which) * 3;
+  const int4* entry = maps + (static_cast<unsigned>(t.offset >> 1) * kEntriesOfPair + which) * kMapQuads;
   return {{__ldg(entry), __ldg(entry + 1), __ldg(entry + 2)}};
 }
 
@@ -59,7 +52,7 @@ inline std::int64_t entries_of(const StepLattice& lattice) {
 /// Makes the maps of a lattice: a thread an entry. Entries of tetrahedra that the lattice does not have are not
 /// written.
 ///
-/// @param entries  how many  @param maps  written, three for each
+/// @param entries  how many  @param maps  written, kMapQuads for each
 __global__ void map_table_kernel(const __grid_constant__ StepLattice lattice, std::int64_t entries, int4* maps) {
   const std::int64_t n = thread_of_grid();
   if (n >= entries) return;
@@ -79,19 +72,16 @@ __global__ void map_table_kernel(const __grid_constant__ StepLattice lattice, st
   }
   const Tetrahedron of = vertices_of(lattice, t);
   const CoarseMap map(of);
-  constexpr int kMost = 255 * kStepsPerVoxel;  // where vertices go further, 32 bits do not hold U
   bool usable = !map.is_thin;
   for (const Vertex* v : {&of.a, &of.b, &of.c, &of.d}) {
 #pragma unroll
-    for (int axis = 0; axis < 3; ++axis) usable &= v->u[axis] > -kMost && v->u[axis] < kMost;
+    for (int axis = 0; axis < 3; ++axis) usable &= v->u[axis] > -kFarForInt32 && v->u[axis] < kFarForInt32;
   }
   const glm::i64vec3 u = map.u(glm::ivec3(0));
-  int4* entry = maps + n * 3;
+  int4* entry = maps + n * kMapQuads;
 #pragma unroll
-  for (int axis = 0; axis < 3; ++axis) {
-    entry[axis] = make_int4(static_cast<int>(u[axis]), usable ? map.slope[0][axis] : kUnusable, map.slope[1][axis],
-                            map.slope[2][axis]);
-  }
+  for (int axis = 0; axis < 3; ++axis) entry[axis] = map_axis(map, u, axis);
+  if (!usable) entry[0].y = kUnusable;
 }
 
 }  // namespace

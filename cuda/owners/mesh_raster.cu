@@ -140,16 +140,8 @@ std::uint64_t MeshRaster::covered(cudaStream_t stream) const {
 template void MeshRaster::run(const SlabBox&, const OwnerSink&, cudaStream_t);
 template void MeshRaster::run(const SlabBox&, const HoleSink&, cudaStream_t);
 #define TETWARP_RUN(...) template void MeshRaster::run(const SlabBox&, const __VA_ARGS__&, cudaStream_t)
-#define TETWARP_RUN_ROUNDED(kRounding)               \
-  TETWARP_RUN(OffsetSink<kRounding>);                \
-  TETWARP_RUN(VolumesSink<void, kRounding>);         \
-  TETWARP_RUN(VolumesSink<std::int16_t, kRounding>); \
-  TETWARP_RUN(VoxelSink<std::uint8_t, kRounding>);   \
-  TETWARP_RUN(VoxelSink<std::int16_t, kRounding>);   \
-  TETWARP_RUN(VoxelSink<std::uint16_t, kRounding>)
-TETWARP_RUN_ROUNDED(Lerp::separate);
-TETWARP_RUN_ROUNDED(Lerp::fused);
-#undef TETWARP_RUN_ROUNDED
+TETWARP_FOR_EACH_SINK(TETWARP_RUN, Lerp::separate);
+TETWARP_FOR_EACH_SINK(TETWARP_RUN, Lerp::fused);
 #undef TETWARP_RUN
 
 }  // namespace tetwarp::cuda_detail

@@ -10,6 +10,8 @@ namespace tetwarp {
 
 constexpr int kFixedBits = 23;  ///< u of a coarse field is a whole number of 2^-23 voxel
 constexpr std::int64_t kFixedOne = std::int64_t{1} << kFixedBits;
+/// Where a vertex moves as far as this on an axis, 2^-12 voxel, 32 bits may not hold U.
+constexpr int kFarForInt32 = 255 * kStepsPerVoxel;
 
 /// u = undeformed minus deformed place over one tetrahedron of a coarse field, in whole numbers of 2^-23 voxel
 /// (docs/design/definition.md, "Coarse fields"):

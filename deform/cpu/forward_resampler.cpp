@@ -9,6 +9,7 @@
 #include "deform/cpu/coverage.h"
 #include "deform/cpu/interval_rows.h"
 #include "deform/cpu/lattice_index.h"
+#include "deform/cpu/lattice_raster.h"
 #include "deform/cpu/map_writer.h"
 #include "deform/cpu/march.h"
 #include "deform/cpu/mesh_resampler.h"
@@ -36,8 +37,8 @@ struct TileVoxels {
   std::vector<glm::vec3> offset;  ///< undeformed minus deformed place, voxels
   std::uint8_t mapped[kTile], coverage[kTile];
   // Of a coarse field:
+  LatticeRaster raster;
   IntervalRows rows;
-  std::vector<IntervalTile::Owner> listed;
   std::vector<std::int32_t> fixed[3];  ///< U of each voxel, 2^-23 voxel
 
   void reset(std::int64_t voxels, bool coarse) {
@@ -67,7 +68,7 @@ class LatticeResampler final : public ForwardResampler {
     const glm::i64vec3& cells = lattice_.cells();
     const auto many = static_cast<std::uint64_t>(kTetrahedraPerCell * cells.x * cells.y * cells.z / kTooManyFolds);
     can_march_ = lattice_.steps().cells.x != 0 && is_near(field, statistics) && statistics.inverted <= many &&
-                 !(lattice_.frame().coarse && (has_large_cells() || statistics.most_moved >= 255 * kStepsPerVoxel));
+                 !(lattice_.frame().coarse && (has_large_cells() || form().is_wide));
     ready_ = true;
   }
 
@@ -104,21 +105,14 @@ class LatticeResampler final : public ForwardResampler {
           if (!writer.wants_owners() && rests(box))
             return can_copy(box) ? copy(box, samplers) : stay(box, tile, samplers, writer);
           Report of_tile;
-          const bool marches = may_march && !mostly_folds(box);
-          if (lattice_.frame().coarse) {
-            if (marches && gather_coarse(box, tile, of_tile.paths)) {
-              write(box, tile, samplers, writer, of_tile);
-            } else {
-              raster(box, tile, writer, of_tile.paths);
-              write_intervals(box, tile, samplers, writer, of_tile);
-            }
+          const bool gathered = may_march && !mostly_folds(box) && gather(box, tile, of_tile.paths);
+          if (!gathered && lattice_.frame().coarse) {
+            tile.raster.find(lattice_, box, writer.wants_owners(), tile.rows.tile);
+            of_tile.paths.gathered += static_cast<std::uint64_t>(voxel_count(box));
+            write_intervals(box, tile, samplers, writer, of_tile);
             return of_tile;
           }
-          if (marches) {
-            gather(box, tile, writer, of_tile.paths);
-          } else {
-            claim_all(box, tile, writer, of_tile.paths);
-          }
+          if (!gathered) claim_all(box, tile, writer, of_tile.paths);
           write(box, tile, samplers, writer, of_tile);
           return of_tile;
         });
@@ -185,6 +179,8 @@ class LatticeResampler final : public ForwardResampler {
     return report;
   }
 
+  PlaceForm form() const { return {lattice_.frame().coarse, lattice_.statistics().most_moved}; }
+
   /// Whether tetrahedra have so many voxels that rows of them are found faster than voxels, one after the other.
   bool has_large_cells() const {
     constexpr float kLarge = 6 * 6 * 6;  // voxels
@@ -192,42 +188,12 @@ class LatticeResampler final : public ForwardResampler {
     return cell.x * cell.y * cell.z >= kLarge;
   }
 
-  /// Finds where the voxels of a tile of a coarse field come from by a march. @return false where some may have several
-  /// owners, or the walk does not find one
-  bool gather_coarse(const Region& box, TileVoxels& tile, Paths& paths) const {
-    const std::int64_t voxels = voxel_count(box);
-    tile.reset(voxels, true);
-    if (coverage_.owners_of(box, tile.owners.data(), tile.block) != 0) return false;
-    const IntBox in{glm::ivec3(box.begin), glm::ivec3(box.end)};
-    const NudgeTurns turns(lattice_.frame().nudge);
-    march(lattice_.vectors(), turns,
-          {in, tile.owners.data(), nullptr, {tile.fixed[0].data(), tile.fixed[1].data(), tile.fixed[2].data()}},
-          tile.march);
-    if (walk(in, turns, tile) != 0) return false;
-    const auto walked = static_cast<std::int64_t>(tile.march.unsettled.size());
-    paths.walked += static_cast<std::uint64_t>(walked);
-    paths.gathered += static_cast<std::uint64_t>(voxels - walked);
-    return true;
-  }
-
-  /// Finds the owners of a tile of a coarse field, tetrahedron after tetrahedron.
-  void raster(const Region& box, TileVoxels& tile, const MapWriter& maps, Paths& paths) const {
-    IntervalTile& owners = tile.rows.tile;
-    owners.begin(box, lattice_.frame().nudge, maps.wants_owners());
-    if (enter_all(box, tile, true)) {  // someone had an owner before: the lowest number is to win
-      owners.begin(box, lattice_.frame().nudge, maps.wants_owners());
-      enter_all(box, tile, false);
-    }
-    paths.gathered += static_cast<std::uint64_t>(voxel_count(box));
-  }
-
   /// Samples the rows of a tile of a coarse field whose owners are known.
   void write_intervals(const Region& box, TileVoxels& tile, const TargetSamplers& samplers, const MapWriter& maps,
                        Report& report) const {
-    const PlaceForm form(true, lattice_.statistics().most_moved);
     const bool rest = lattice_.field().outside == Outside::rest;
     tile.rows.write(
-        form, lattice_.frame().nudge, samplers, maps,
+        form(), lattice_.frame().nudge, samplers, maps,
         [&](std::int64_t y, std::int64_t z) {
           std::uint32_t outside = 0;
           for (std::int64_t x = box.begin.x; rest && x < box.end.x; ++x)
@@ -236,42 +202,6 @@ class LatticeResampler final : public ForwardResampler {
           return outside;
         },
         report);
-  }
-
-  /// Enters the tetrahedra that may reach a tile: as they come, or in the order of their numbers.
-  /// @return whether some voxel has several owners; then what was entered as it comes may be wrong
-  bool enter_all(const Region& box, TileVoxels& tile, bool as_they_come) const {
-    const glm::i64vec3& cells = lattice_.cells();
-    bool shared = false;
-    tile.listed.clear();
-    lattice_.find_blocks(box, [&](std::size_t number) {
-      if (shared && as_they_come) return;
-      lattice_.load(number, tile.block);
-      const LatticeBlock& block = tile.block;
-      for (int z = 0; z < block.cells.z; ++z) {
-        for (int y = 0; y < block.cells.y; ++y) {
-          for (int x = 0; x < block.cells.x; ++x) {
-            const glm::i64vec3 at = block.first_cell + glm::i64vec3(x, y, z);
-            const std::uint64_t first =
-                kTetrahedraPerCell * static_cast<std::uint64_t>((at.z * cells.y + at.y) * cells.x + at.x);
-            const Cell cell = block.cell({x, y, z});
-            const Box around = box_of(cell);
-            if (!tile.rows.tile.may_reach(around.low, around.high)) continue;
-            for (int t = 0; t < kTetrahedraPerCell; ++t) {
-              const Tetrahedron tetrahedron = tetrahedron_of(cell, t, block.is_odd({x, y, z}));
-              if (as_they_come)
-                shared = tile.rows.tile.enter(first + static_cast<std::uint64_t>(t), tetrahedron) || shared;
-              else
-                tile.listed.push_back({first + static_cast<std::uint64_t>(t), tetrahedron});
-            }
-          }
-        }
-      }
-    });
-    if (as_they_come) return shared;
-    std::sort(tile.listed.begin(), tile.listed.end(), [](const auto& a, const auto& b) { return a.number < b.number; });
-    for (const IntervalTile::Owner& of : tile.listed) tile.rows.tile.enter(of.number, of.vertices);
-    return false;
   }
 
   /// Whether vectors of float can hold everything that a march computes.
@@ -294,21 +224,29 @@ class LatticeResampler final : public ForwardResampler {
     return 2 * folded > blocks;
   }
 
-  void gather(const Region& box, TileVoxels& tile, const MapWriter& maps, Paths& paths) const {
+  /// Finds where the voxels of a tile come from by a march.
+  /// @return false where that is not the way: many voxels may have several owners; in a coarse field, which has no
+  /// claims, any may, or the walk does not find one
+  bool gather(const Region& box, TileVoxels& tile, Paths& paths) const {
+    const bool coarse = lattice_.frame().coarse;
     const std::int64_t voxels = voxel_count(box);
-    tile.reset(voxels, false);
+    tile.reset(voxels, coarse);
     std::int64_t several = coverage_.owners_of(box, tile.owners.data(), tile.block);
-    if (several != 0 && voxel_count(around_several(box, tile)) > voxels / 2) return claim_all(box, tile, maps, paths);
+    if (several != 0 && (coarse || voxel_count(around_several(box, tile)) > voxels / 2)) return false;
     const IntBox in{glm::ivec3(box.begin), glm::ivec3(box.end)};
     const NudgeTurns turns(lattice_.frame().nudge);
-    march(lattice_.vectors(), turns, {in, tile.owners.data(), tile.offset.data()}, tile.march);
+    MarchTile to{in, tile.owners.data(), coarse ? nullptr : tile.offset.data()};
+    for (int axis = 0; coarse && axis < 3; ++axis) to.fixed[axis] = tile.fixed[axis].data();
+    march(lattice_.vectors(), turns, to, tile.march);
     const std::int64_t left = walk(in, turns, tile);
+    if (coarse && left != 0) return false;
     several += left;
     if (several != 0) claim_several(box, tile);
     const std::int64_t walked = static_cast<std::int64_t>(tile.march.unsettled.size()) - left;
     paths.claimed += static_cast<std::uint64_t>(several);
     paths.walked += static_cast<std::uint64_t>(walked);
     paths.gathered += static_cast<std::uint64_t>(voxels - several - walked);
+    return true;
   }
 
   /// Seeks the owners of voxels that the march left, by a walk. @return how many voxels are still left; these are

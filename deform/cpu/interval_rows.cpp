@@ -18,8 +18,8 @@ void IntervalRows::prepare(const PlaceForm& form) {
     fixed_.u[axis] = form.is_wide ? nullptr : u_[axis];
     fixed_.wide[axis] = form.is_wide ? wide_[axis] : nullptr;
   }
-  for (const IntervalTile::Owner& owner : tile.owners()) {
-    maps_.emplace_back(owner.vertices);
+  for (const Tetrahedron& owner : tile.owners()) {
+    maps_.emplace_back(owner);
     tile_maps_.emplace_back(maps_.back(), glm::ivec3(tile.box().begin));
   }
 }
@@ -47,13 +47,13 @@ void IntervalRows::find_places(const PlaceForm& form, const Nudge& nudge, const 
   int count = 0, slow_count = 0;
   tile.for_each_interval(y, z, [&](int begin, int end, std::size_t owner) {
     if (!form.is_coarse) {
-      find_offsets(nudge, row, begin, end, tile.owners()[owner].vertices);
+      find_offsets(nudge, row, begin, end, tile.owners()[owner]);
     } else if (form.is_wide || maps_[owner].is_thin) {
       slow[slow_count++] = {begin, end, owner};
     } else {
       runs[count++] = {begin, end, &tile_maps_[owner]};
     }
-    if (wants_jacobian) std::fill(jacobian_ + begin, jacobian_ + end, forward_jacobian(tile.owners()[owner].vertices));
+    if (wants_jacobian) std::fill(jacobian_ + begin, jacobian_ + end, forward_jacobian(tile.owners()[owner]));
   });
   if (count != 0) fill_fixed_row(runs, count, static_cast<int>(y), static_cast<int>(z), u_);
   for (int n = 0; n < slow_count; ++n) find_one_by_one(nudge, row, slow[n].begin, slow[n].end, slow[n].owner);
@@ -78,7 +78,7 @@ void IntervalRows::find_one_by_one(const Nudge& nudge, const Row& row, int begin
   for (int i = begin; i < end; ++i) {
     const glm::ivec3 voxel = glm::ivec3(row.voxel) + glm::ivec3(i, 0, 0);
     const glm::i64vec3 u =
-        map.is_thin ? thin_u(tile.owners()[owner].vertices, voxel, nudge.signs(glm::i64vec3(voxel))) : map.u(voxel);
+        map.is_thin ? thin_u(tile.owners()[owner], voxel, nudge.signs(glm::i64vec3(voxel))) : map.u(voxel);
     for (int axis = 0; axis < 3; ++axis) {
       wide_[axis][i] = u[axis];
       u_[axis][i] = static_cast<std::int32_t>(u[axis]);

@@ -18,7 +18,7 @@ struct PlaceForm {
   bool is_wide;    ///< whether fixed point wants more than 32 bits
 
   /// @param most_moved  largest displacement of a vertex on an axis, 2^-12 voxel
-  PlaceForm(bool coarse, std::int32_t most_moved) : is_coarse(coarse), is_wide(most_moved >= 255 * kStepsPerVoxel) {}
+  PlaceForm(bool coarse, std::int32_t most_moved) : is_coarse(coarse), is_wide(most_moved >= kFarForInt32) {}
 };
 
 /// Samples the rows of a tile whose owners are known as intervals, and writes their maps.
@@ -28,9 +28,8 @@ class IntervalRows {
   IntervalTile tile;
 
   /// Works on all rows of the tile.
-  /// @param stays  `stays(y, z)` has a bit for each voxel of a row, counted from the tile, that stays where it is
-  /// unless
-  ///               it has an owner
+  /// @param stays  `stays(y, z)` has a bit for each voxel of a row that stays where it is unless it has an owner; y and
+  ///               z count from the tile
   template <class Stays>
   void write(const PlaceForm& form, const Nudge& nudge, const TargetSamplers& samplers, const MapWriter& maps,
              Stays&& stays, Report& report) {

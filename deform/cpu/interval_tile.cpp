@@ -31,9 +31,9 @@ void IntervalTile::begin(const Region& box, const Nudge& nudge, bool counts) {
   }
 }
 
-bool IntervalTile::enter(std::uint64_t number, const Tetrahedron& t) {
+bool IntervalTile::enter(const Tetrahedron& t) {
   bool shared = false;
-  for (const Part& part : parts_) shared = enter(part, number, t) || shared;
+  for (const Part& part : parts_) shared = enter(part, t) || shared;
   return shared;
 }
 
@@ -54,7 +54,7 @@ bool IntervalTile::may_reach(const glm::i32vec3& low, const glm::i32vec3& high) 
                      [&](const Part& part) { return !part.reached(low, high).is_empty(); });
 }
 
-bool IntervalTile::enter(const Part& part, std::uint64_t number, const Tetrahedron& t) {
+bool IntervalTile::enter(const Part& part, const Tetrahedron& t) {
   const Box around = box_of(t);
   const IntBox reached = part.reached(around.low, around.high);
   if (reached.is_empty()) return false;
@@ -76,7 +76,7 @@ bool IntervalTile::enter(const Part& part, std::uint64_t number, const Tetrahedr
     const int row = scan_.unsure_rows[n];
     mark(entry, row, exact_bits(t, part, row % kMostRowTile, row / kMostRowTile), any, shared);
   }
-  if (any != 0) owners_.push_back({number, t});
+  if (any != 0) owners_.push_back(t);
   return shared != 0;
 }
 

@@ -25,12 +25,6 @@ namespace tetwarp::cpu {
 /// The owner of a covered voxel stands where the last interval starts that does not start behind it.
 class IntervalTile {
  public:
-  /// A tetrahedron that owns voxels.
-  struct Owner {
-    std::uint64_t number;
-    Tetrahedron vertices;
-  };
-
   /// Begins a box of up to kTile voxels on each axis: nobody owns anything.
   /// @param counts  whether voxels are to be counted out among several owners
   void begin(const Region& box, const Nudge& nudge, bool counts);
@@ -40,11 +34,11 @@ class IntervalTile {
   /// Gives a tetrahedron those of its voxels that have no owner yet. So the lowest number wins where numbers rise from
   /// call to call.
   /// @return whether some of its voxels had an owner already
-  bool enter(std::uint64_t number, const Tetrahedron& t);
+  bool enter(const Tetrahedron& t);
 
   const Region& box() const { return box_; }
   /// The tetrahedra that own voxels.
-  const std::vector<Owner>& owners() const { return owners_; }
+  const std::vector<Tetrahedron>& owners() const { return owners_; }
   /// A bit for each voxel of a row that has an owner. @param y, z  the row, counted from the box
   std::uint32_t covered(std::int64_t y, std::int64_t z) const { return covered_[number(y, z)]; }
   /// Calls `visit(begin, end, index in owners())` for all intervals of a row, from left to right.
@@ -73,7 +67,7 @@ class IntervalTile {
   };
 
   static std::size_t number(std::int64_t y, std::int64_t z) { return static_cast<std::size_t>(z * kTile + y); }
-  bool enter(const Part& part, std::uint64_t number, const Tetrahedron& t);
+  bool enter(const Part& part, const Tetrahedron& t);
   static std::uint32_t exact_bits(const Tetrahedron& t, const Part& part, int y, int z);
   /// A tetrahedron that is entered: where the part begins in the box, and the tetrahedron's index in `owners_`.
   struct Entry {
@@ -90,7 +84,7 @@ class IntervalTile {
   // Of each row, by `number`.
   std::uint32_t starts_[kTile * kTile], covered_[kTile * kTile];
   std::uint16_t owner_[kTile * kTile][kTile];
-  std::vector<Owner> owners_;
+  std::vector<Tetrahedron> owners_;
   std::vector<std::uint16_t> counts_;
   bool wants_counts_ = false;
 };
