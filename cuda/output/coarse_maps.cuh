@@ -44,6 +44,24 @@ struct HeldMap {
 
   /// Reads the map of a slot, unless it is the one that is held.
   template <int kQuadsOfSlot>
+  __device__ void hold(const float4 (*prepared)[kQuadsOfSlot], unsigned slot, unsigned& held) {
+    int(&v)[4 * kMapQuads] = values;
+    const auto from = static_cast<unsigned>(__cvta_generic_to_shared(&prepared[slot][0]));
+    asm volatile(
+        "{\n\t"
+        ".reg .pred p;\n\t"
+        "setp.ne.u32 p, %12, %13;\n\t"
+        "@p ld.shared.v4.u32 {%0, %1, %2, %3}, [%14];\n\t"
+        "@p ld.shared.v4.u32 {%4, %5, %6, %7}, [%14+16];\n\t"
+        "@p ld.shared.v4.u32 {%8, %9, %10, %11}, [%14+32];\n\t"
+        "}"
+        : "+r"(v[0]), "+r"(v[1]), "+r"(v[2]), "+r"(v[3]), "+r"(v[4]), "+r"(v[5]), "+r"(v[6]), "+r"(v[7]), "+r"(v[8]),
+          "+r"(v[9]), "+r"(v[10]), "+r"(v[11])
+        : "r"(slot), "r"(held), "r"(from));
+    held = slot;
+  }
+  /// The same, and whether it is usable.
+  template <int kQuadsOfSlot>
   __device__ void hold(const float4 (*prepared)[kQuadsOfSlot], const unsigned* usables, unsigned slot, unsigned& held) {
     int(&v)[4 * kMapQuads] = values;
     const auto from = static_cast<unsigned>(__cvta_generic_to_shared(&prepared[slot][0])),
@@ -66,7 +84,8 @@ struct HeldMap {
 
 /// The maps of the tetrahedra of a tile of a coarse field, in shared memory. The last one is for voxels without an
 /// owner. `sample_column` takes them.
-template <int kQuadsOfSlot>
+/// @tparam kAllUsable  whether all voxels have owners with usable maps
+template <int kQuadsOfSlot, bool kAllUsable = false>
 struct CoarseMaps {
   using Held = HeldMap;
   using From = glm::ivec3;  ///< from the first voxel of the tile, voxels
@@ -76,7 +95,11 @@ struct CoarseMaps {
   unsigned nobody;  ///< number that stands for no owner, as do all larger numbers
 
   __device__ void hold(unsigned slot, HeldMap& m, unsigned& held) const {
-    m.hold(prepared, usable, min(slot, nobody), held);
+    if constexpr (kAllUsable) {
+      m.hold(prepared, slot, held);
+    } else {
+      m.hold(prepared, usable, min(slot, nobody), held);
+    }
   }
   __device__ static From from(const glm::ivec3& in_tile) { return in_tile; }
   __device__ static void step(From& from) { ++from.z; }
@@ -87,7 +110,7 @@ struct CoarseMaps {
       const int* v = m.values + 4 * axis;
       of.u[axis] = u_on_axis(make_int4(v[0], v[1], v[2], v[3]), from);
     }
-    of.any = m.usable != 0;
+    of.any = kAllUsable || m.usable != 0;
     return of;
   }
 };

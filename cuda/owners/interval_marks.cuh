@@ -3,181 +3,246 @@
 
 #pragma once
 
-#include "cuda/owners/interval_tile.cuh"
+#include "cuda/owners/interval_list.cuh"
 
 /// The walk along the rows of a tile: each tetrahedron of the list marks the intervals that it owns. For
 /// interval_raster.cu alone.
 ///
-/// Intervals of different tetrahedra mostly do not overlap. So they are marked in any order at first, an item a thread;
-/// a bit that two of them want says that they do overlap, and then the tile is done again: a thread a row, tetrahedron
-/// after tetrahedron in the order of their numbers, so that the lowest number wins.
+/// Intervals of different tetrahedra mostly do not overlap. So they are marked in any order at first, an item a thread,
+/// and nobody looks whether another one was there. Then each row is read once: where an interval starts before the last
+/// one ends, or fewer voxels are found than were marked, some do overlap, and the tile is done again: a thread a row,
+/// tetrahedron after tetrahedron in the order of their numbers, so that the lowest number wins.
 namespace tetwarp::cuda_detail {
 
 namespace {
 
-/// Before the first batch. Rows have no intervals, and nobody has no map.
+/// Before anything is marked. Rows have no intervals, and nobody has no map.
 __device__ void clear_marks(const IntervalTile& tile) {
   TileMemory& memory = tile.memory;
-  if (tile.thread < kTileRows) memory.rows[tile.thread].starts = memory.rows[tile.thread].covered = 0;
-  if (tile.thread == 0) {
-    memory.usable[kSlots] = 0;
-    memory.overlaps = false;
-    memory.item_count = memory.unsure_count = 0;
-  }
-}
-
-/// The faces of a tetrahedron; then its rows, as items.
-__device__ void set_faces(const IntervalTile& tile, int slot, unsigned entry) {
-  TileMemory& memory = tile.memory;
-  constexpr float kUnsure = 1e9f;  // the error of what is not for float
-  RowSpan span = RowSpan::of(memory.spans[entry]);
-  float4* faces = memory.prepared[slot];
-  int lower = 0;
-  if (span.is_small) {
-    const Corners at = tile.corners(memory.numbers[entry]);
-    const glm::i32vec3 d = tile.vertex(at.d), a = tile.vertex(at.a) - d, b = tile.vertex(at.b) - d,
-                       c = tile.vertex(at.c) - d;
-    lower = make_row_faces(a, b, c, d, tile.signs, tile.size,
-                           [faces](int n, const RowFace& face) { faces[n] = in_quad(face); });
-    if (lower == 0 && detail::edge_determinant(a, b, c) == 0) {  // owns nothing
-      span.y_end = span.y_begin;
-      memory.spans[entry] = span.word();
-    }
-  }
-  if (lower == 0) {  // exact integers must say
-    lower = 2;
-#pragma unroll
-    for (int n = 0; n < 4; ++n) faces[n] = make_float4(0, 0, 0, kUnsure);
-  }
-  faces[kLowerQuad].x = __int_as_float(lower);
-  unsigned item = atomicAdd(&memory.item_count, static_cast<unsigned>(span.y_end - span.y_begin));
-#pragma unroll 1
-  for (int y = span.y_begin; y < span.y_end; ++y) memory.items[item++] = RowItem::of(slot, y);
+  if (tile.thread < kTileRows) memory.starts[tile.thread] = 0;
+  if (tile.thread != 0) return;
+  memory.usable[kNobody] = 0;
+  memory.long_items = memory.short_items = memory.unsure_count = memory.steep_count = memory.covered = 0;
+  memory.balance = 0;
+  memory.is_border = memory.is_slow = false;
 }
 
 /// The interval of a row by exact integers. Rarely called, so out of line, with everything by value.
-__device__ __noinline__ RowInterval exactly(const TileTask& task, LatticeTetrahedron t, glm::ivec3 first,
-                                            glm::i32vec3 signs, int y, int z, int count) {
-  return exact_row(vertices_of(task.lattice, t), first, signs, y, z, count);
+__device__ __noinline__ RowInterval exactly(const TileTask& task, unsigned number, glm::ivec3 first, glm::i32vec3 signs,
+                                            int y, int z, int count) {
+  return exact_row(vertices_of(task.lattice, task.tetrahedron(number)), first, signs, y, z, count);
 }
-__device__ RowInterval exact(const IntervalTile& tile, unsigned entry, int y, int z) {
-  return exactly(tile.task, tile.tetrahedron(tile.memory.numbers[entry]), tile.voxels.begin, tile.signs, y, z,
-                 tile.size.x);
-}
-
-/// The bits of an interval that is not empty.
-__device__ unsigned bits_of(const RowInterval& in) { return lowest_bits(in.end - in.begin) << in.begin; }
-
-__device__ void mark(const IntervalTile& tile, const RowInterval& in, IntervalRow& row, unsigned entry) {
-  if (in.is_empty()) return;
-  const unsigned bits = bits_of(in);
-  if ((atomicOr(&row.covered, bits) & bits) != 0) {  // then this tile is done again
-    tile.memory.overlaps = true;
-    return;
-  }
-  atomicOr(&row.starts, 1u << in.begin);
-  row.owner[in.begin] = static_cast<unsigned short>(entry);
+__device__ RowInterval exact(const IntervalTile& tile, int slot, int y, int z) {
+  return exactly(tile.task, tile.memory.numbers[slot], tile.voxels.begin, tile.signs, y, z, tile.size.x);
 }
 
-/// Marks where the intervals of a tetrahedron's rows of one y start.
-/// @param batch  entry of the tetrahedron in slot 0  @param item  a `RowItem`
-__device__ void mark_item(const IntervalTile& tile, unsigned batch, unsigned item) {
+/// Whether a tetrahedron owns a voxel, by exact integers; as `exactly`.
+__device__ __noinline__ bool owns(const TileTask& task, unsigned number, glm::ivec3 voxel, glm::i32vec3 signs) {
+  int sides[4];
+  return owns_exactly(vertices_of(task.lattice, task.tetrahedron(number)), voxel * kStepsPerVoxel, signs, sides);
+}
+
+/// Marks one interval. @return how many voxels it has
+__device__ int mark(const IntervalTile& tile, const RowInterval& in, int slot, int row) {
+  if (in.is_empty()) return 0;
+  atomicOr(&tile.memory.starts[row], 1u << in.begin);
+  tile.memory.owners[row][in.begin] = RowOwner::of(static_cast<unsigned>(slot), in.end);
+  return in.end - in.begin;
+}
+
+/// Leaves a row for later: calls would cost the loops over rows registers.
+__device__ void leave(TileMemory& memory, unsigned unsure) {
+  const unsigned at = atomicAdd(&memory.unsure_count, 1u);
+  if (at + memory.steep_count < kMostUnsure) memory.unsure[at] = unsure;
+}
+
+/// Marks where the intervals of a tetrahedron's rows of one y start. @return how many voxels they have
+__device__ int mark_item(const IntervalTile& tile, unsigned item) {
   TileMemory& memory = tile.memory;
   const int slot = static_cast<int>(RowItem::Slot::get(item)), y = static_cast<int>(RowItem::Y::get(item));
-  const unsigned entry = batch + static_cast<unsigned>(slot);
-  const RowSpan span = RowSpan::of(memory.spans[entry]);
-  const RowsAlongZ rows(tile.faces_of(slot), y);
-  IntervalRow* row = &memory.rows[span.z_begin * kTileJ + y];
+  const RowSpan span = RowSpan::of(memory.spans[slot]);
+  RowLine lines[4];
+  read_lines(memory.prepared[slot], lines);
+  const LinesAlongZ rows(lines, span.lower, span.upper, span.zone, y, tile.size.x);
+  const int first = span.z_begin * kTileJ + y;
+  unsigned* starts = &memory.starts[first];
+  unsigned short* owners = memory.owners[first];
+  int marked = 0;
 #pragma unroll 1
-  for (int z = span.z_begin; z < span.z_end; ++z, row += kTileJ) {
-    bool is_certain = false;
-    const RowInterval in = rows.interval(z, tile.size.x, is_certain);
-    if (is_certain) {
-      mark(tile, in, *row, entry);
-    } else {  // later: calls would cost this loop registers
-      const unsigned at = atomicAdd(&memory.unsure_count, 1u);
-      if (at < kMostUnsure) memory.unsure[at] = UnsureRow::of(entry, y, z);
+  for (int z = span.z_begin; z < span.z_end; ++z, starts += kTileJ, owners += kTileJ * kTileI) {
+    const LinesAlongZ::Ends of = rows.ends(z);
+    if (!of.is_certain) {
+      leave(memory, UnsureRow::of(slot, z * kTileJ + y, rows.doubt(of)));
+    } else if (of.begin() < of.end()) {
+      const int begin = of.begin() & (kTileI - 1);
+      atomicOr(starts, 1u << begin);
+      owners[begin] = RowOwner::of(static_cast<unsigned>(slot), of.end() - detail::kLiftedWhole);
+      marked += of.end() - of.begin();
     }
   }
+  return marked;
 }
 
-/// Marks the intervals of all items, an item a thread; then those that float left open.
-__device__ void mark_all(const IntervalTile& tile, unsigned batch) {
+/// Marks the rows of tetrahedra of steep lines, a thread a row of each. They are few, but one thread for several rows
+/// of them would keep all others waiting. @return how many voxels
+__device__ int mark_steep(const IntervalTile& tile) {
   TileMemory& memory = tile.memory;
-  const int thread = tile.thread;
-  const unsigned items = memory.item_count;
+  const int steep = static_cast<int>(min(memory.steep_count, static_cast<unsigned>(kMostUnsure))),
+            row = tile.thread % kTileRows, y = row % kTileJ, z = row / kTileJ;
+  int marked = 0;
 #pragma unroll 1
-  for (unsigned from = static_cast<unsigned>(thread & ~31); from < items; from += kTileThreads) {
-    const unsigned n = from + static_cast<unsigned>(thread & 31);
-    if (n < items) mark_item(tile, batch, memory.items[n]);
+  for (int n = tile.thread / kTileRows; n < steep; n += kTileThreads / kTileRows) {
+    const auto slot = static_cast<int>(memory.unsure[kMostUnsure - 1 - n]);
+    const RowSpan span = RowSpan::of(memory.spans[slot]);
+    if (!span.has(y, z)) continue;
+    if (span.lower == 0) {
+      leave(memory, UnsureRow::of(slot, row));
+      continue;
+    }
+    RowLine lines[4];
+    read_lines(memory.prepared[slot], lines);
+    const int4 box = tile.task.records.box(memory.numbers[slot]);
+    const glm::ivec3 words(box.x, box.y, box.z);
+    const RowReach reach = reach_of(tile, words, candidates_in(tile, words));
+    bool is_certain = false;
+    const RowInterval in =
+        RowsAlongZ(steep_faces(lines, span.lower, span.upper, reach), y).interval(z, tile.size.x, is_certain);
+    if (is_certain) {
+      marked += mark(tile, in, slot, row);
+    } else {
+      leave(memory, UnsureRow::of(slot, row));
+    }
+  }
+  return marked;
+}
+
+/// Marks a row of which floats left the ends open. @return how many voxels
+__device__ int mark_in_doubt(const IntervalTile& tile, unsigned unsure) {
+  const int slot = static_cast<int>(UnsureRow::Slot::get(unsure)), row = static_cast<int>(UnsureRow::Row::get(unsure));
+  const RowInterval core{static_cast<int>(UnsureRow::Begin::get(unsure)),
+                         static_cast<int>(UnsureRow::End::get(unsure))};
+  const unsigned number = tile.memory.numbers[slot];
+  const RowInterval in =
+      settled(core, UnsureRow::Before::get(unsure) != 0, UnsureRow::Behind::get(unsure) != 0, [&](int x) {
+        return owns(tile.task, number, tile.voxels.begin + glm::ivec3(x, row % kTileJ, row / kTileJ), tile.signs);
+      });
+  return mark(tile, in, slot, row);
+}
+
+/// Marks a row of which nothing is known, by a warp: a lane a voxel. @return how many voxels, in one lane
+__device__ int mark_unknown(const IntervalTile& tile, unsigned unsure) {
+  const int slot = static_cast<int>(UnsureRow::Slot::get(unsure)), row = static_cast<int>(UnsureRow::Row::get(unsure));
+  const bool is = tile.lane() < tile.size.x &&
+                  owns(tile.task, tile.memory.numbers[slot],
+                       tile.voxels.begin + glm::ivec3(tile.lane(), row % kTileJ, row / kTileJ), tile.signs);
+  const unsigned owned = __ballot_sync(kAllLanes, is);
+  if (tile.lane() != 0 || owned == 0) return 0;
+  return mark(tile, {first_bit(owned), last_bit(owned) + 1}, slot, row);
+}
+
+/// Adds to the balance of a tile. To be called by whole warps.
+__device__ void add_to_balance(const IntervalTile& tile, int voxels) {
+  const int sum = __reduce_add_sync(kAllLanes, voxels);
+  if (tile.lane() == 0) atomicAdd(&tile.memory.balance, sum);
+}
+
+/// Marks the intervals of all tetrahedra in the slots, an item a thread; then what lines left open.
+__device__ void mark_all(const IntervalTile& tile) {
+  TileMemory& memory = tile.memory;
+  const unsigned long_items = memory.long_items, items = long_items + memory.short_items;
+  int marked = 0;
+#pragma unroll 1
+  for (unsigned from = static_cast<unsigned>(tile.thread & ~31); from < items; from += kTileThreads) {
+    const unsigned n = from + static_cast<unsigned>(tile.lane());
+    if (n < items) marked += mark_item(tile, memory.items[n < long_items ? n : kSlots * kTileJ - 1 - (n - long_items)]);
     __syncwarp();  // else lanes go on by themselves
   }
+  marked += mark_steep(tile);
   __syncthreads();
-  const unsigned unsure = memory.unsure_count;
-  if (unsure > kMostUnsure) memory.overlaps = true;
+  const unsigned unsure = tile.has_lost_rows() ? 0 : memory.unsure_count;
 #pragma unroll 1
-  for (unsigned n = static_cast<unsigned>(thread); n < min(unsure, static_cast<unsigned>(kMostUnsure));
-       n += kTileThreads) {
-    const unsigned row = memory.unsure[n], entry = UnsureRow::Entry::get(row);
-    const int z = static_cast<int>(UnsureRow::Z::get(row)), y = static_cast<int>(UnsureRow::Y::get(row));
-    mark(tile, exact(tile, entry, y, z), memory.rows[z * kTileJ + y], entry);
+  for (unsigned n = static_cast<unsigned>(tile.thread); n < unsure; n += kTileThreads)
+    if (UnsureRow::Unknown::get(memory.unsure[n]) == 0) marked += mark_in_doubt(tile, memory.unsure[n]);
+  __syncwarp();
+#pragma unroll 1
+  for (unsigned n = static_cast<unsigned>(tile.warp()); n < unsure; n += kTileJ)
+    if (UnsureRow::Unknown::get(memory.unsure[n]) != 0) marked += mark_unknown(tile, memory.unsure[n]);
+  add_to_balance(tile, marked);
+}
+
+/// Reads the rows, a thread each: where nobody owns, an interval of nobody's starts, and voxels that have an owner are
+/// counted.
+__device__ void read_rows(const IntervalTile& tile) {
+  constexpr int kOverlap = 1 << 16;  // more than a tile has voxels
+  TileMemory& memory = tile.memory;
+  if (tile.thread >= kTileRows) return;
+  int owned = 0, at = 0;
+  if (tile.thread % kTileJ < tile.size.y && tile.thread / kTileJ < tile.size.z) {
+    unsigned short* owners = memory.owners[tile.thread];
+    const unsigned starts = memory.starts[tile.thread];
+    unsigned holes = 0;
+    const auto put_hole = [&](int end) {
+      holes |= 1u << at;
+      owners[at] = RowOwner::of(kNobody, end);
+    };
+    for (unsigned left = starts; left != 0; left &= left - 1) {
+      const int begin = first_bit(left), end = static_cast<int>(RowOwner::End::get(owners[begin]));
+      if (begin > at) put_hole(begin);
+      if (begin < at) owned += kOverlap;
+      owned += end - begin;
+      at = end;
+    }
+    if (at < tile.size.x) put_hole(tile.size.x);
+    memory.starts[tile.thread] = starts | holes;
+  }
+  __syncwarp();
+  add_to_balance(tile, -owned);
+  const unsigned sum = __reduce_add_sync(kAllLanes, static_cast<unsigned>(owned));
+  if (tile.lane() == 0) atomicAdd(&memory.covered, sum);
+}
+
+/// Slots in the order of their tetrahedra's numbers, in the place of items.
+__device__ void sort_slots(const IntervalTile& tile) {
+  TileMemory& memory = tile.memory;
+  for (int slot = tile.thread; slot < tile.count; slot += kTileThreads) {
+    const unsigned number = memory.numbers[slot];
+    int before = 0;
+    for (int n = 0; n < tile.count; ++n) before += memory.numbers[n] < number ? 1 : 0;
+    memory.items[before] = static_cast<unsigned short>(slot);
   }
 }
 
 /// Where intervals overlap: a thread a row, tetrahedron after tetrahedron; who comes first has the voxel. Each voxel is
 /// an interval of its own then.
-__device__ void mark_in_order(const IntervalTile& tile, unsigned batch, unsigned slots) {
+__device__ void mark_in_order(const IntervalTile& tile) {
   TileMemory& memory = tile.memory;
   if (tile.thread >= kTileRows) return;
   const int y = tile.thread % kTileJ, z = tile.thread / kTileJ;
-  IntervalRow& row = memory.rows[tile.thread];
-  unsigned covered = row.covered;
+  unsigned covered = 0;
 #pragma unroll 1
-  for (int slot = 0; slot < static_cast<int>(slots); ++slot) {
-    const unsigned entry = batch + static_cast<unsigned>(slot);
-    const RowSpan span = RowSpan::of(memory.spans[entry]);
-    if (y < span.y_begin || y >= span.y_end || z < span.z_begin || z >= span.z_end) continue;
+  for (int n = 0; n < tile.count; ++n) {
+    const int slot = memory.items[n];
+    const RowSpan span = RowSpan::of(memory.spans[slot]);
+    if (!span.has(y, z)) continue;
     bool is_certain = false;
-    RowInterval in = RowsAlongZ(tile.faces_of(slot), y).interval(z, tile.size.x, is_certain);
-    if (!is_certain) in = exact(tile, entry, y, z);
+    RowInterval in{0, 0};
+    if (!span.is_steep) {
+      RowLine lines[4];
+      read_lines(memory.prepared[slot], lines);
+      const LinesAlongZ::Ends ends = LinesAlongZ(lines, span.lower, span.upper, span.zone, y, tile.size.x).ends(z);
+      is_certain = ends.is_certain;
+      if (is_certain) in = LinesAlongZ::interval(ends);
+    }
+    if (!is_certain) in = exact(tile, slot, y, z);
     if (in.is_empty()) continue;
-    const unsigned bits = bits_of(in);
-    for (unsigned left = bits & ~covered; left != 0; left &= left - 1)
-      row.owner[first_bit(left)] = static_cast<unsigned short>(entry);
+    const unsigned bits = lowest_bits(in.end - in.begin) << in.begin;
+    for (unsigned left = bits & ~covered; left != 0; left &= left - 1) {
+      const int x = first_bit(left);
+      memory.owners[tile.thread][x] = RowOwner::of(static_cast<unsigned>(slot), x + 1);
+    }
     covered |= bits;
   }
-  row.covered = row.starts = covered;
-}
-
-/// Marks all tetrahedra of the list, as many at a time as there is room for: a batch.
-__device__ void rasterise(const IntervalTile& tile, bool in_order) {
-  TileMemory& memory = tile.memory;
-  const int thread = tile.thread;
-  const unsigned count = memory.count;
-  for (unsigned batch = 0; batch < count; batch += kSlots) {
-    const unsigned slots = min(count - batch, static_cast<unsigned>(kSlots));
-    __syncthreads();
-    static_assert(kSlots <= kTileThreads);
-    if (thread < static_cast<int>(slots)) set_faces(tile, thread, batch + static_cast<unsigned>(thread));
-    __syncthreads();
-    if (in_order) {
-      mark_in_order(tile, batch, slots);
-    } else {
-      mark_all(tile, batch);
-    }
-    __syncthreads();
-    if (thread == 0) memory.item_count = memory.unsure_count = 0;
-  }
-  __syncthreads();
-}
-
-/// Where nobody owns, an interval of nobody's starts. A thread a row.
-__device__ void mark_holes(const IntervalTile& tile) {
-  if (tile.thread >= kTileRows) return;
-  IntervalRow& row = tile.memory.rows[tile.thread];
-  const unsigned holes = ~row.covered, starts = holes & ~(holes << 1);
-  for (unsigned left = starts; left != 0; left &= left - 1) row.owner[first_bit(left)] = kNoOwner;
-  row.starts |= starts;
+  memory.starts[tile.thread] = covered;
 }
 
 }  // namespace

@@ -7,22 +7,15 @@
 
 namespace tetwarp::cuda_detail {
 
-/// How far the vertices of a block of cells are displaced, 2^-12 voxel, both ends included.
-struct BlockMoves {
-  glm::ivec3 low, high;
+/// The tetrahedra that may reach a tile.
+struct TileCount {
+  unsigned all;     ///< how many; perhaps more than there is room for
+  unsigned moving;  ///< 1 if some are not at rest
 };
 
-/// Which cells may own voxels of a tile.
-struct TileCells {
-  glm::ivec3 first, size;
-  glm::ivec3 source_begin, source_end;  ///< where its voxels come from, with room to spare
-  int rests;  ///< whether the tile lies within the undeformed lattice, and all that may reach it is at rest
-  int left;   ///< whether it is left to the claims
-};
-
-/// The way for lattices with large cells at whole steps: tile by tile, the tetrahedra that may reach a tile are
-/// rasterised, each row an interval (deform/core/row_interval.h), and the lowest number wins. Nothing need be known
-/// of folds or of the border.
+/// The way for coarse lattices with large cells at whole steps. Once a field each tetrahedron gets a record: where its
+/// faces cross rows (deform/core/row_lines.h), and its map. Tile by tile, those that may reach a tile mark an interval
+/// in each row, and the lowest number wins. Nothing need be known of folds or of the border.
 class IntervalRaster {
  public:
   struct Counters {
@@ -30,8 +23,9 @@ class IntervalRaster {
     unsigned left;  ///< tiles that more tetrahedra may reach than there is room for
   };
 
-  /// Whether this is the faster way. @param is_folded  whether much is, so that others would be slow
-  static bool suits(const StepLattice& lattice, bool is_folded);
+  /// Whether this is the faster way, and one that does not take too much memory.
+  /// @param is_folded  whether much is, so that others would be slow
+  static bool suits(const StepLattice& lattice, const SlabBox& box, bool is_folded);
 
   /// Finds the voxels of `box`, save for tiles that are left. Queued on the stream.
   template <class Sink>
@@ -43,12 +37,13 @@ class IntervalRaster {
   void mark_left(const LatticeOnDevice& lattice, const SlabBox& box, std::uint32_t* several, cudaStream_t stream) const;
 
   /// To be called when the field is another one.
-  void forget_field() { has_moves_ = false; }
+  void forget_field() { has_records_ = false; }
 
  private:
-  bool has_moves_ = false;
-  DeviceBuffer<BlockMoves> moves_;  ///< of all cells, and of each block
-  DeviceBuffer<TileCells> cells_;   ///< of each tile, i fastest
+  bool has_records_ = false;
+  DeviceBuffer<int4> records_;      ///< of all tetrahedra (tetrahedron_records.cuh)
+  DeviceBuffer<TileCount> counts_;  ///< of each tile, i fastest
+  DeviceBuffer<unsigned> lists_;    ///< of each tile, the numbers of its tetrahedra
   DeviceBuffer<Counters> counters_;
   PinnedBuffer<Counters> found_;
 };

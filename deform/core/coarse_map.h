@@ -28,9 +28,9 @@ struct CoarseMap {
 
   CoarseMap() = default;
   TETWARP_HD explicit CoarseMap(const Tetrahedron& t)
-      : CoarseMap(glm::dvec3(t.a.deformed - t.d.deformed), glm::dvec3(t.b.deformed - t.d.deformed),
-                  glm::dvec3(t.c.deformed - t.d.deformed), t.d.deformed, glm::dvec3(t.d.u), glm::dvec3(t.a.u - t.d.u),
-                  glm::dvec3(t.b.u - t.d.u), glm::dvec3(t.c.u - t.d.u)) {}
+      : CoarseMap(in_double(t.a.deformed - t.d.deformed), in_double(t.b.deformed - t.d.deformed),
+                  in_double(t.c.deformed - t.d.deformed), t.d.deformed, in_double(t.d.u), in_double(t.a.u - t.d.u),
+                  in_double(t.b.u - t.d.u), in_double(t.c.u - t.d.u)) {}
 
   /// All arguments are whole numbers of steps, 2^-12 voxel.
   /// @param a, b, c         edges from D to A, B and C, deformed
@@ -45,10 +45,10 @@ struct CoarseMap {
     bool usable = std::fabs(det) >= kThinnest * ((norm1(a) * norm1(b)) * norm1(c));  // NaN is not
     glm::dvec3 e;
     for (int axis = 0; axis < 3; ++axis) {
-      const std::int64_t edges =
-          static_cast<std::int64_t>(a[axis]) + static_cast<std::int64_t>(b[axis]) + static_cast<std::int64_t>(c[axis]);
-      origin[axis] = static_cast<int>((edges + 4 * std::int64_t{d[axis]}) >> 14);  // 4 corners, 2^12 steps a voxel
-      e[axis] = static_cast<double>((std::int64_t{origin[axis]} << 12) - d[axis]);
+      const double at_d = detail::whole_in_double(d[axis]), corners = ((a[axis] + b[axis]) + c[axis]) + 4 * at_d,
+                   middle = detail::floor_to_whole(corners * 0x1p-14);  // 4 corners, 2^12 steps a voxel
+      origin[axis] = static_cast<int>(detail::nearest_whole(middle));
+      e[axis] = middle * kStepsPerVoxel - at_d;
     }
     glm::dvec3 steepness[3], beside;
     for (int axis = 0; axis < 3; ++axis) {
@@ -63,8 +63,8 @@ struct CoarseMap {
     is_thin = false;
     for (int axis = 0; axis < 3; ++axis) {
       for (int along = 0; along < 3; ++along)
-        slope[along][axis] = static_cast<std::int32_t>(std::rint(steepness[axis][along] * 0x1p23));
-      at_origin[axis] = static_cast<std::int64_t>(std::rint(beside[axis] * 0x1p11));
+        slope[along][axis] = static_cast<std::int32_t>(detail::nearest_whole(steepness[axis][along] * 0x1p23));
+      at_origin[axis] = detail::nearest_whole(beside[axis] * 0x1p11);
     }
   }
 
@@ -76,6 +76,9 @@ struct CoarseMap {
   }
 
  private:
+  TETWARP_HD static glm::dvec3 in_double(const glm::i32vec3& v) {
+    return {detail::whole_in_double(v.x), detail::whole_in_double(v.y), detail::whole_in_double(v.z)};
+  }
   TETWARP_HD static glm::dvec3 cross(const glm::dvec3& p, const glm::dvec3& q) {
     return {p.y * q.z - p.z * q.y, p.z * q.x - p.x * q.z, p.x * q.y - p.y * q.x};
   }

@@ -82,6 +82,42 @@ TETWARP_HD inline glm::i32vec3 nudge_steps(const glm::i32vec3& signs) {
 /// Wide exact integer. It holds products of three coordinates of any tetrahedron that fits the grid (below 2^100).
 __extension__ typedef __int128 Wide;
 
+namespace detail {
+
+// Whole numbers and doubles, on a device by additions: it has four times as many of them a second as conversions.
+
+#ifdef TETWARP_ON_DEVICE
+constexpr double kLiftToWhole = 3.0 * (std::int64_t{1} << 51);  // doubles from 2^52 to 2^53 are the whole numbers
+#endif
+
+/// A whole number as double.
+TETWARP_HD inline double whole_in_double(std::int32_t value) {
+#ifdef TETWARP_ON_DEVICE
+  constexpr double kLift = 4503601774854144.0;  // 2^52 + 2^31
+  return __hiloint2double(0x43300000, static_cast<int>(static_cast<unsigned>(value) ^ 0x80000000u)) - kLift;
+#else
+  return static_cast<double>(value);
+#endif
+}
+/// The largest whole number that is not above a value below 2^51, either way from 0.
+TETWARP_HD inline double floor_to_whole(double value) {
+#ifdef TETWARP_ON_DEVICE
+  return __dadd_rd(value, kLiftToWhole) - kLiftToWhole;
+#else
+  return std::floor(value);
+#endif
+}
+/// The nearest whole number, an even one between two, of a value below 2^51 either way from 0.
+TETWARP_HD inline std::int64_t nearest_whole(double value) {
+#ifdef TETWARP_ON_DEVICE
+  return __double_as_longlong(value + kLiftToWhole) - __double_as_longlong(kLiftToWhole);
+#else
+  return static_cast<std::int64_t>(std::rint(value));
+#endif
+}
+
+}  // namespace detail
+
 /// The value as double, rounded in two steps, with the same bits on host and device.
 TETWARP_HD inline double to_double(Wide value) {
   const bool negative = value < 0;

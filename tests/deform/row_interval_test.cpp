@@ -6,6 +6,9 @@
 
 #include <gtest/gtest.h>
 
+#include <bit>
+
+#include "deform/core/row_lines.h"
 #include "tests/support/random.h"
 
 namespace tetwarp {
@@ -21,6 +24,8 @@ struct Tile {
 
 struct Checked {
   int rows = 0, unsure = 0, owned = 0;
+  int by_lines = 0, unsure_by_lines = 0;  ///< rows of the box of a tetrahedron that has lines
+  int steep = 0, told_of_steep = 0;       ///< tetrahedra of steep lines, and rows of them that float tells
 };
 
 RowFaces faces_of(const Tetrahedron& t, const Tile& tile, bool& has_volume) {
@@ -37,9 +42,67 @@ RowFaces faces_of(const Tetrahedron& t, const Tile& tile, bool& has_volume) {
   return faces;
 }
 
+/// The rows that the box of a tetrahedron may reach, by its lines: where they are certain they must be right.
+void expect_lines(const Tetrahedron& t, const Tile& tile, Checked& checked) {
+  NudgeTurns turns;
+  for (int axis = 0; axis < 3; ++axis) turns.first_down[axis] = tile.signs[axis] > 0 ? INT32_MAX : INT32_MIN;
+  const Box box = box_of(t);
+  const IntBox rows = candidates(turns, box.low, box.high, {tile.first, tile.first + tile.size});
+  if (rows.is_empty()) return;
+  const glm::i32vec3 d = t.d.deformed;
+  const glm::ivec3 middle = (box.low + box.high) >> 13;
+  const RowLines of = make_row_lines(t.a.deformed - d, t.b.deformed - d, t.c.deformed - d, d, middle);
+  const int lower = std::popcount(static_cast<unsigned>(of.lower)),
+            upper = std::popcount(static_cast<unsigned>(of.upper));
+  if (lower + upper == 0) return;
+  ASSERT_TRUE(lower >= 1 && upper >= 1 && lower + upper <= 4 && (of.lower & of.upper) == 0);
+  RowLine lines[4]{};
+  for (int face = 0; face < 4; ++face)
+    if (((of.lower | of.upper) >> face & 1) != 0) lines[place_of_line(of.lower, of.upper, face)] = of.lines[face];
+  const RowReach reach{tile.first - middle, rows.begin - tile.first, rows.end - 1 - tile.first, tile.signs};
+  const int zone = shift_lines(lines, reach);
+  const bool is_steep = of.is_steep || zone > detail::kMostZone;
+  checked.steep += is_steep;
+  const RowFaces faces = steep_faces(lines, lower, upper, reach);
+  for (int y = reach.first.y; y <= reach.last.y; ++y) {
+    const LinesAlongZ along(lines, lower, upper, is_steep ? 0 : zone, y, tile.size.x);
+    const RowsAlongZ carefully(faces, y);
+    for (int z = reach.first.z; z <= reach.last.z; ++z) {
+      const RowInterval exact = exact_row(t, tile.first, tile.signs, y, z, tile.size.x);
+      const auto expect_exact = [&](const RowInterval& found, const char* what) {
+        ASSERT_EQ(found.is_empty(), exact.is_empty()) << what << " row " << y << ' ' << z << ", zone " << zone;
+        if (exact.is_empty()) return;
+        ASSERT_EQ(found.begin, exact.begin) << what << " row " << y << ' ' << z << ", zone " << zone;
+        ASSERT_EQ(found.end, exact.end) << what << " row " << y << ' ' << z << ", zone " << zone;
+      };
+      bool is_certain = false;
+      const RowInterval by_bounds = carefully.interval(z, tile.size.x, is_certain);
+      if (is_certain) {
+        ASSERT_NO_FATAL_FAILURE(expect_exact(by_bounds, "steep"));
+      }
+      checked.told_of_steep += is_steep && is_certain;
+      if (is_steep) continue;
+      const LinesAlongZ::Ends ends = along.ends(z);
+      ++checked.by_lines;
+      checked.unsure_by_lines += !ends.is_certain;
+      if (ends.is_certain) {
+        ASSERT_NO_FATAL_FAILURE(expect_exact(LinesAlongZ::interval(ends), "certain"));
+      } else {
+        const LinesAlongZ::Doubt doubt = along.doubt(ends);
+        const RowInterval found = settled(doubt.core, doubt.before, doubt.behind, [&](int x) {
+          int sides[4];
+          return owns_exactly(t, (tile.first + glm::ivec3(x, y, z)) * kStepsPerVoxel, tile.signs, sides);
+        });
+        ASSERT_NO_FATAL_FAILURE(expect_exact(found, "settled"));
+      }
+    }
+  }
+}
+
 /// Every voxel of every row: whether it is in the interval just where the tetrahedron owns it.
 void expect_intervals(const Tetrahedron& t, const Tile& tile, Checked& checked) {
   ASSERT_TRUE(has_int64_rows(t));
+  ASSERT_NO_FATAL_FAILURE(expect_lines(t, tile, checked));
   bool has_volume = false;
   const RowFaces faces = faces_of(t, tile, has_volume);
   for (int y = 0; y < tile.size.y; ++y) {
@@ -101,6 +164,10 @@ TEST(RowInterval, RandomTetrahedraOfAnySizeAndOrientation) {
   }
   EXPECT_GT(checked.owned, 20000);
   EXPECT_LT(checked.unsure, checked.rows / 20);
+  EXPECT_GT(checked.by_lines, 20000);
+  EXPECT_LT(checked.unsure_by_lines, checked.by_lines / 20);
+  EXPECT_GT(checked.steep, 10);
+  EXPECT_GT(checked.told_of_steep, 300);
 }
 
 /// Faces in the planes of voxels, and flat tetrahedra: only the nudge and the tie rule decide.
