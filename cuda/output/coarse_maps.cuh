@@ -24,19 +24,6 @@ __device__ inline int u_on_axis(const int4& m, const glm::ivec3& from) {
                           static_cast<unsigned>(m.w) * static_cast<unsigned>(from.z));
 }
 
-/// Writes a map as shared memory has it: an axis each group of four numbers, from the first voxel of the tile on.
-/// @param first  that voxel, counted as the map's origin is
-/// @return whether it is usable
-__device__ inline bool put_map(const CoarseMap& map, const glm::ivec3& first, float4* quads) {
-  const glm::i64vec3 u = map.u(first);
-#pragma unroll
-  for (int axis = 0; axis < 3; ++axis) {
-    const int4 m = map_axis(map, u, axis);
-    quads[axis] = make_float4(__int_as_float(m.x), __int_as_float(m.y), __int_as_float(m.z), __int_as_float(m.w));
-  }
-  return !map.is_thin;
-}
-
 /// The map of the tetrahedron in which the lane's voxel lies, in registers.
 struct HeldMap {
   int values[4 * kMapQuads];

@@ -163,8 +163,7 @@ Gather::Counters Gather::run(const LatticeOnDevice& lattice, const SlabBox& box,
 template <class Sink>
 Gather::Counters Gather::run_intervals(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink,
                                        cudaStream_t stream) {
-  intervals_.run(lattice, box, sink, stream);
-  const IntervalRaster::Counters settled = intervals_.counters(stream);
+  const TileCounters settled = intervals_.run(lattice, box, sink, stream);
   if (settled.left == 0) return {settled.covered, 0, 0, 0};
   coverage_.forget(box, stream);
   intervals_.mark_left(lattice, box, coverage_.several(), stream);

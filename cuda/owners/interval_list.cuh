@@ -11,18 +11,58 @@ namespace tetwarp::cuda_detail {
 
 namespace {
 
-/// Makes the records of a lattice: a thread a tetrahedron.
-__global__ void __launch_bounds__(kThreads) record_kernel(const __grid_constant__ TileTask task) {
-  const std::int64_t n = thread_of_grid();
-  if (n >= task.records.count) return;
-  put_record(task.records, n, vertices_of(task.lattice, task.tetrahedron(static_cast<unsigned>(n))));
-}
+/// The tetrahedra of a lattice, number 5 cell + which, as tiles see them.
+/// @tparam kOf  `kDepth`: kTileK, or half of it where cells are small
+template <int kOf>
+struct LatticeShape {
+  static constexpr int kDepth = kOf, kSlots = slots_of(kDepth);
 
+  StepLattice lattice;
+  TileCount* counts;      ///< of each tile, i fastest
+  unsigned* lists;        ///< of each tile, up to kSlots numbers; both from `list_kernel`
+  const TileCount* deep;  ///< of tiles of twice the depth, where those are wanted alone that had no room; or null
+  glm::ivec3 deep_tiles;  ///< how many of those on each axis
+
+  __device__ Tetrahedron tetrahedron(unsigned number) const {
+    const glm::ivec3 cell = position_in(static_cast<int>(number / kTetrahedraPerCell), lattice.cells);
+    return vertices_of(lattice, LatticeTetrahedron::of_cell(cell, static_cast<int>(number % kTetrahedraPerCell)));
+  }
+  __device__ TileList list(const glm::ivec3& at, int tile) const {
+    const TileCount of = counts[tile];
+    return {lists + std::int64_t{tile} * kSlots, of.all, of.all != 0 && of.moving == 0, is_done(at)};
+  }
+  /// Whether a tile of twice the depth had room.
+  __device__ bool is_done(const glm::ivec3& at) const {
+    return deep && deep[(at.z / 2 * deep_tiles.y + at.y) * deep_tiles.x + at.x].all <= slots_of(2 * kDepth);
+  }
+  /// They are owned where the tile lies within the undeformed lattice, and all cells that reach it there are at rest.
+  __device__ bool rests(const IntBox& voxels, const Records& records, int thread) const {
+    const glm::ivec3 size(lattice.cell), low = voxels.begin * kStepsPerVoxel - glm::ivec3(lattice.first),
+                                         high = (voxels.end - 1) * kStepsPerVoxel - glm::ivec3(lattice.first);
+    bool is = true;
+#pragma unroll
+    for (int axis = 0; axis < 3; ++axis) is = is && low[axis] >= 0 && high[axis] <= lattice.cells[axis] * size[axis];
+    if (!is) return false;
+    // Nudges are less than a step; a voxel on the border of two cells may be either's.
+    const glm::ivec3 first = glm::max(low - 1, glm::ivec3(0)) / size,
+                     count = glm::min((high + 1) / size, lattice.cells - 1) - first + 1;
+    for (int z = thread / 32; z < count.z; z += kTileJ) {
+      for (int y = 0; y < count.y; ++y) {
+        const std::int64_t row = std::int64_t{first.z + z} * lattice.cells.y + first.y + y,
+                           at = (row * lattice.cells.x + first.x) * kTetrahedraPerCell;
+        for (int n = thread & 31; n < count.x * kTetrahedraPerCell; n += 32)
+          is = is && RecordFlags::AtRest::get(static_cast<unsigned>(records.box(at + n).w)) != 0;
+      }
+    }
+    return __syncthreads_and(is ? 1 : 0) != 0;
+  }
+};
 /// Enters each tetrahedron into the lists of all tiles that its box reaches: a thread a tetrahedron. Neighbours mostly
 /// want the same tile, so a warp takes room for all of its lanes with one atomic addition a tile.
 ///
-/// @param task  `counts` are 0 before, and added to; `lists` are written
-__global__ void __launch_bounds__(kThreads) list_kernel(const __grid_constant__ TileTask task) {
+/// @param task  the shape's counts are 0 before, and added to; its lists are written
+template <class Shape>
+__global__ void __launch_bounds__(kThreads) list_kernel(const __grid_constant__ TileTask<Shape> task) {
   const std::int64_t n = thread_of_grid();
   bool any = n < task.records.count;
   glm::ivec3 begin(0), end(0);
@@ -30,7 +70,7 @@ __global__ void __launch_bounds__(kThreads) list_kernel(const __grid_constant__ 
   if (any) {
     const int4 box = task.records.box(n);
     moves = RecordFlags::AtRest::get(static_cast<unsigned>(box.w)) == 0;
-    const glm::ivec3 words(box.x, box.y, box.z), extent(kTileI, kTileJ, kTileK);
+    const glm::ivec3 words(box.x, box.y, box.z), extent(kTileI, kTileJ, Shape::kDepth);
 #pragma unroll
     for (int axis = 0; axis < 3; ++axis) {  // whichever way tiles are nudged
       const int first = max(VoxelRange::from(VoxelRange::low(words[axis]), 1), task.box.begin[axis]),
@@ -48,89 +88,18 @@ __global__ void __launch_bounds__(kThreads) list_kernel(const __grid_constant__ 
     unsigned from = 0;
     const int leader = first_bit(same);
     if (any && lane_of_warp() == leader) {
-      from = atomicAdd(&task.counts[tile].all, static_cast<unsigned>(__popc(same)));
-      if (moving != 0) task.counts[tile].moving = 1;
+      from = atomicAdd(&task.shape.counts[tile].all, static_cast<unsigned>(__popc(same)));
+      if (moving != 0) task.shape.counts[tile].moving = 1;
     }
     from = __shfl_sync(kAllLanes, from, leader);
     if (!any) continue;
     const unsigned entry = from + static_cast<unsigned>(__popc(same & bits_below(lane_of_warp())));
-    if (entry < kSlots) task.lists[std::int64_t{tile} * kSlots + entry] = static_cast<unsigned>(n);
+    if (entry < Shape::kSlots) task.shape.lists[std::int64_t{tile} * Shape::kSlots + entry] = static_cast<unsigned>(n);
     if (++at.x <= end.x) continue;
     at.x = begin.x;
     if (++at.y <= end.y) continue;
     at.y = begin.y;
     any = ++at.z <= end.z;
-  }
-}
-
-/// The part of a tile that a tetrahedron may own. @param words  `VoxelRange` of each axis
-__device__ IntBox candidates_in(const IntervalTile& tile, const glm::ivec3& words) {
-  IntBox own;
-#pragma unroll
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto from = [&](int half) { return VoxelRange::from(half, tile.signs[axis]) - tile.voxels.begin[axis]; };
-    own.begin[axis] = max(from(VoxelRange::low(words[axis])), 0);
-    own.end[axis] = min(from(VoxelRange::high(words[axis])), tile.size[axis]);
-  }
-  return own;
-}
-
-/// The rows of a tile that a tetrahedron may reach, as its lines see them. @param own  `candidates_in`
-__device__ RowReach reach_of(const IntervalTile& tile, const glm::ivec3& words, const IntBox& own) {
-  return {tile.voxels.begin - VoxelRange::middle(words), own.begin, own.end - 1, tile.signs};
-}
-
-/// Whether voxels of a tetrahedron may come from the border of the source, or beyond. A voxel may lie beside the
-/// tetrahedron by less than a step; where maps are not too steep it comes from at most 1/32 voxel beside it.
-template <class Sink>
-__device__ bool reaches_border(const TileTask& task, unsigned number, const Sink& sink) {
-  constexpr int kBeside = kStepsPerVoxel / 16;
-  const glm::i32vec3 size(task.lattice.cell), low = glm::i32vec3(task.lattice.first) + task.cell_of(number) * size;
-  return !sink.surrounds((low - kBeside) >> kStepBits, ((low + size + kBeside) >> kStepBits) + 1);
-}
-
-/// Takes the tetrahedra of the list into the slots: their lines, and their rows as items. A thread a tetrahedron.
-template <class Sink>
-__device__ void read_tetrahedra(const IntervalTile& tile, const Sink& sink) {
-  TileMemory& memory = tile.memory;
-#pragma unroll 1
-  for (int slot = tile.thread; slot < tile.count; slot += kTileThreads) {
-    const unsigned number = tile.list[slot];
-    const Records& records = tile.task.records;
-    const int4 box = records.box(number);
-    memory.numbers[slot] = number;
-    memory.spans[slot] = 0;
-    const glm::ivec3 words(box.x, box.y, box.z);
-    const IntBox own = candidates_in(tile, words);
-    if (own.is_empty()) continue;
-    const auto flags = static_cast<unsigned>(box.w);
-    RowLine lines[4];
-    read_lines(records, number, lines);
-    const int zone = shift_lines(lines, reach_of(tile, words, own));
-    const auto lower = static_cast<int>(RecordFlags::Lower::get(flags)),
-               upper = static_cast<int>(RecordFlags::Upper::get(flags));
-    auto* const ordered = reinterpret_cast<RowLine*>(memory.prepared[slot]);
-#pragma unroll
-    for (int face = 0; face < 4; ++face)
-      if (((lower | upper) >> face & 1) != 0) ordered[place_of_line(lower, upper, face)] = lines[face];
-    const bool is_steep = RecordFlags::Steep::get(flags) != 0 || zone > detail::kMostZone;
-    const RowSpan span{own.begin.y,   own.end.y,     own.begin.z,         own.end.z,
-                       __popc(lower), __popc(upper), is_steep ? 0 : zone, is_steep};
-    memory.spans[slot] = span.word();
-    if (RecordFlags::Usable::get(flags) == 0) memory.is_slow = true;
-    if (reaches_border(tile.task, number, sink)) memory.is_border = true;
-    if (is_steep) {
-      const unsigned at = atomicAdd(&memory.steep_count, 1u);
-      if (at < kMostUnsure) memory.unsure[kMostUnsure - 1 - at] = static_cast<unsigned>(slot);
-      continue;
-    }
-    // Long ones and short ones apart, so that the lanes of a warp mostly have as much to do.
-    const bool is_long = span.z_end - span.z_begin >= kTileK / 3;
-    const auto rows = static_cast<unsigned>(span.y_end - span.y_begin);
-    unsigned item = atomicAdd(is_long ? &memory.long_items : &memory.short_items, rows);
-#pragma unroll 1
-    for (int y = span.y_begin; y < span.y_end; ++y, ++item)
-      memory.items[is_long ? item : kSlots * kTileJ - 1 - item] = RowItem::of(slot, y);
   }
 }
 

@@ -3,10 +3,10 @@
 
 #pragma once
 
-#include "cuda/owners/interval_list.cuh"
+#include "cuda/owners/interval_read.cuh"
 
 /// The walk along the rows of a tile: each tetrahedron of the list marks the intervals that it owns. For
-/// interval_raster.cu alone.
+/// interval_kernel.cuh alone.
 ///
 /// Intervals of different tetrahedra mostly do not overlap. So they are marked in any order at first, an item a thread,
 /// and nobody looks whether another one was there. Then each row is read once: where an interval starts before the last
@@ -17,33 +17,38 @@ namespace tetwarp::cuda_detail {
 namespace {
 
 /// Before anything is marked. Rows have no intervals, and nobody has no map.
-__device__ void clear_marks(const IntervalTile& tile) {
-  TileMemory& memory = tile.memory;
-  if (tile.thread < kTileRows) memory.starts[tile.thread] = 0;
+template <class Shape>
+__device__ void clear_marks(const IntervalTile<Shape>& tile) {
+  auto& memory = tile.memory;
+  if (tile.thread < IntervalTile<Shape>::Memory::kRows) memory.starts[tile.thread] = 0;
   if (tile.thread != 0) return;
-  memory.usable[kNobody] = 0;
+  memory.usable[IntervalTile<Shape>::Memory::kNobody] = 0;
   memory.long_items = memory.short_items = memory.unsure_count = memory.steep_count = memory.covered = 0;
   memory.balance = 0;
   memory.is_border = memory.is_slow = false;
 }
 
 /// The interval of a row by exact integers. Rarely called, so out of line, with everything by value.
-__device__ __noinline__ RowInterval exactly(const TileTask& task, unsigned number, glm::ivec3 first, glm::i32vec3 signs,
+template <class Shape>
+__device__ __noinline__ RowInterval exactly(const Shape& shape, unsigned number, glm::ivec3 first, glm::i32vec3 signs,
                                             int y, int z, int count) {
-  return exact_row(vertices_of(task.lattice, task.tetrahedron(number)), first, signs, y, z, count);
+  return exact_row(shape.tetrahedron(number), first, signs, y, z, count);
 }
-__device__ RowInterval exact(const IntervalTile& tile, int slot, int y, int z) {
-  return exactly(tile.task, tile.memory.numbers[slot], tile.voxels.begin, tile.signs, y, z, tile.size.x);
+template <class Shape>
+__device__ RowInterval exact(const IntervalTile<Shape>& tile, int slot, int y, int z) {
+  return exactly(tile.task.shape, tile.memory.numbers[slot], tile.voxels.begin, tile.signs, y, z, tile.size.x);
 }
 
 /// Whether a tetrahedron owns a voxel, by exact integers; as `exactly`.
-__device__ __noinline__ bool owns(const TileTask& task, unsigned number, glm::ivec3 voxel, glm::i32vec3 signs) {
+template <class Shape>
+__device__ __noinline__ bool owns(const Shape& shape, unsigned number, glm::ivec3 voxel, glm::i32vec3 signs) {
   int sides[4];
-  return owns_exactly(vertices_of(task.lattice, task.tetrahedron(number)), voxel * kStepsPerVoxel, signs, sides);
+  return owns_exactly(shape.tetrahedron(number), voxel * kStepsPerVoxel, signs, sides);
 }
 
 /// Marks one interval. @return how many voxels it has
-__device__ int mark(const IntervalTile& tile, const RowInterval& in, int slot, int row) {
+template <class Shape>
+__device__ int mark(const IntervalTile<Shape>& tile, const RowInterval& in, int slot, int row) {
   if (in.is_empty()) return 0;
   atomicOr(&tile.memory.starts[row], 1u << in.begin);
   tile.memory.owners[row][in.begin] = RowOwner::of(static_cast<unsigned>(slot), in.end);
@@ -51,14 +56,16 @@ __device__ int mark(const IntervalTile& tile, const RowInterval& in, int slot, i
 }
 
 /// Leaves a row for later: calls would cost the loops over rows registers.
-__device__ void leave(TileMemory& memory, unsigned unsure) {
+template <class Memory>
+__device__ void leave(Memory& memory, unsigned unsure) {
   const unsigned at = atomicAdd(&memory.unsure_count, 1u);
   if (at + memory.steep_count < kMostUnsure) memory.unsure[at] = unsure;
 }
 
 /// Marks where the intervals of a tetrahedron's rows of one y start. @return how many voxels they have
-__device__ int mark_item(const IntervalTile& tile, unsigned item) {
-  TileMemory& memory = tile.memory;
+template <class Shape>
+__device__ int mark_item(const IntervalTile<Shape>& tile, unsigned item) {
+  auto& memory = tile.memory;
   const int slot = static_cast<int>(RowItem::Slot::get(item)), y = static_cast<int>(RowItem::Y::get(item));
   const RowSpan span = RowSpan::of(memory.spans[slot]);
   RowLine lines[4];
@@ -85,13 +92,15 @@ __device__ int mark_item(const IntervalTile& tile, unsigned item) {
 
 /// Marks the rows of tetrahedra of steep lines, a thread a row of each. They are few, but one thread for several rows
 /// of them would keep all others waiting. @return how many voxels
-__device__ int mark_steep(const IntervalTile& tile) {
-  TileMemory& memory = tile.memory;
+template <class Shape>
+__device__ int mark_steep(const IntervalTile<Shape>& tile) {
+  auto& memory = tile.memory;
+  constexpr int kRows = IntervalTile<Shape>::Memory::kRows;
   const int steep = static_cast<int>(min(memory.steep_count, static_cast<unsigned>(kMostUnsure))),
-            row = tile.thread % kTileRows, y = row % kTileJ, z = row / kTileJ;
+            row = tile.thread % kRows, y = row % kTileJ, z = row / kTileJ;
   int marked = 0;
 #pragma unroll 1
-  for (int n = tile.thread / kTileRows; n < steep; n += kTileThreads / kTileRows) {
+  for (int n = tile.thread / kRows; n < steep; n += kTileThreads / kRows) {
     const auto slot = static_cast<int>(memory.unsure[kMostUnsure - 1 - n]);
     const RowSpan span = RowSpan::of(memory.spans[slot]);
     if (!span.has(y, z)) continue;
@@ -117,23 +126,25 @@ __device__ int mark_steep(const IntervalTile& tile) {
 }
 
 /// Marks a row of which floats left the ends open. @return how many voxels
-__device__ int mark_in_doubt(const IntervalTile& tile, unsigned unsure) {
+template <class Shape>
+__device__ int mark_in_doubt(const IntervalTile<Shape>& tile, unsigned unsure) {
   const int slot = static_cast<int>(UnsureRow::Slot::get(unsure)), row = static_cast<int>(UnsureRow::Row::get(unsure));
   const RowInterval core{static_cast<int>(UnsureRow::Begin::get(unsure)),
                          static_cast<int>(UnsureRow::End::get(unsure))};
   const unsigned number = tile.memory.numbers[slot];
   const RowInterval in =
       settled(core, UnsureRow::Before::get(unsure) != 0, UnsureRow::Behind::get(unsure) != 0, [&](int x) {
-        return owns(tile.task, number, tile.voxels.begin + glm::ivec3(x, row % kTileJ, row / kTileJ), tile.signs);
+        return owns(tile.task.shape, number, tile.voxels.begin + glm::ivec3(x, row % kTileJ, row / kTileJ), tile.signs);
       });
   return mark(tile, in, slot, row);
 }
 
 /// Marks a row of which nothing is known, by a warp: a lane a voxel. @return how many voxels, in one lane
-__device__ int mark_unknown(const IntervalTile& tile, unsigned unsure) {
+template <class Shape>
+__device__ int mark_unknown(const IntervalTile<Shape>& tile, unsigned unsure) {
   const int slot = static_cast<int>(UnsureRow::Slot::get(unsure)), row = static_cast<int>(UnsureRow::Row::get(unsure));
   const bool is = tile.lane() < tile.size.x &&
-                  owns(tile.task, tile.memory.numbers[slot],
+                  owns(tile.task.shape, tile.memory.numbers[slot],
                        tile.voxels.begin + glm::ivec3(tile.lane(), row % kTileJ, row / kTileJ), tile.signs);
   const unsigned owned = __ballot_sync(kAllLanes, is);
   if (tile.lane() != 0 || owned == 0) return 0;
@@ -141,20 +152,24 @@ __device__ int mark_unknown(const IntervalTile& tile, unsigned unsure) {
 }
 
 /// Adds to the balance of a tile. To be called by whole warps.
-__device__ void add_to_balance(const IntervalTile& tile, int voxels) {
+template <class Shape>
+__device__ void add_to_balance(const IntervalTile<Shape>& tile, int voxels) {
   const int sum = __reduce_add_sync(kAllLanes, voxels);
   if (tile.lane() == 0) atomicAdd(&tile.memory.balance, sum);
 }
 
 /// Marks the intervals of all tetrahedra in the slots, an item a thread; then what lines left open.
-__device__ void mark_all(const IntervalTile& tile) {
-  TileMemory& memory = tile.memory;
+template <class Shape>
+__device__ void mark_all(const IntervalTile<Shape>& tile) {
+  auto& memory = tile.memory;
   const unsigned long_items = memory.long_items, items = long_items + memory.short_items;
   int marked = 0;
 #pragma unroll 1
   for (unsigned from = static_cast<unsigned>(tile.thread & ~31); from < items; from += kTileThreads) {
     const unsigned n = from + static_cast<unsigned>(tile.lane());
-    if (n < items) marked += mark_item(tile, memory.items[n < long_items ? n : kSlots * kTileJ - 1 - (n - long_items)]);
+    if (n < items)
+      marked += mark_item(
+          tile, memory.items[n < long_items ? n : IntervalTile<Shape>::Memory::kSlots * kTileJ - 1 - (n - long_items)]);
     __syncwarp();  // else lanes go on by themselves
   }
   marked += mark_steep(tile);
@@ -172,10 +187,11 @@ __device__ void mark_all(const IntervalTile& tile) {
 
 /// Reads the rows, a thread each: where nobody owns, an interval of nobody's starts, and voxels that have an owner are
 /// counted.
-__device__ void read_rows(const IntervalTile& tile) {
+template <class Shape>
+__device__ void read_rows(const IntervalTile<Shape>& tile) {
   constexpr int kOverlap = 1 << 16;  // more than a tile has voxels
-  TileMemory& memory = tile.memory;
-  if (tile.thread >= kTileRows) return;
+  auto& memory = tile.memory;
+  if (tile.thread >= IntervalTile<Shape>::Memory::kRows) return;
   int owned = 0, at = 0;
   if (tile.thread % kTileJ < tile.size.y && tile.thread / kTileJ < tile.size.z) {
     unsigned short* owners = memory.owners[tile.thread];
@@ -183,7 +199,7 @@ __device__ void read_rows(const IntervalTile& tile) {
     unsigned holes = 0;
     const auto put_hole = [&](int end) {
       holes |= 1u << at;
-      owners[at] = RowOwner::of(kNobody, end);
+      owners[at] = RowOwner::of(IntervalTile<Shape>::Memory::kNobody, end);
     };
     for (unsigned left = starts; left != 0; left &= left - 1) {
       const int begin = first_bit(left), end = static_cast<int>(RowOwner::End::get(owners[begin]));
@@ -202,8 +218,9 @@ __device__ void read_rows(const IntervalTile& tile) {
 }
 
 /// Slots in the order of their tetrahedra's numbers, in the place of items.
-__device__ void sort_slots(const IntervalTile& tile) {
-  TileMemory& memory = tile.memory;
+template <class Shape>
+__device__ void sort_slots(const IntervalTile<Shape>& tile) {
+  auto& memory = tile.memory;
   for (int slot = tile.thread; slot < tile.count; slot += kTileThreads) {
     const unsigned number = memory.numbers[slot];
     int before = 0;
@@ -214,9 +231,10 @@ __device__ void sort_slots(const IntervalTile& tile) {
 
 /// Where intervals overlap: a thread a row, tetrahedron after tetrahedron; who comes first has the voxel. Each voxel is
 /// an interval of its own then.
-__device__ void mark_in_order(const IntervalTile& tile) {
-  TileMemory& memory = tile.memory;
-  if (tile.thread >= kTileRows) return;
+template <class Shape>
+__device__ void mark_in_order(const IntervalTile<Shape>& tile) {
+  auto& memory = tile.memory;
+  if (tile.thread >= IntervalTile<Shape>::Memory::kRows) return;
   const int y = tile.thread % kTileJ, z = tile.thread / kTileJ;
   unsigned covered = 0;
 #pragma unroll 1

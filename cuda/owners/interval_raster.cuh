@@ -7,7 +7,13 @@
 
 namespace tetwarp::cuda_detail {
 
-/// The tetrahedra that may reach a tile.
+/// What the tiles of a box tell.
+struct TileCounters {
+  unsigned long long covered;
+  unsigned left;  ///< tiles that more tetrahedra may reach than there is room for
+};
+
+/// The tetrahedra that may reach a tile of a lattice.
 struct TileCount {
   unsigned all;     ///< how many; perhaps more than there is room for
   unsigned moving;  ///< 1 if some are not at rest
@@ -18,20 +24,13 @@ struct TileCount {
 /// in each row, and the lowest number wins. Nothing need be known of folds or of the border.
 class IntervalRaster {
  public:
-  struct Counters {
-    unsigned long long covered;
-    unsigned left;  ///< tiles that more tetrahedra may reach than there is room for
-  };
-
   /// Whether this is the faster way, and one that does not take too much memory.
   /// @param is_folded  whether much is, so that others would be slow
   static bool suits(const StepLattice& lattice, const SlabBox& box, bool is_folded);
 
-  /// Finds the voxels of `box`, save for tiles that are left. Queued on the stream.
+  /// Finds the voxels of `box`, save for tiles that are left. Waits for the stream.
   template <class Sink>
-  void run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream);
-  /// Waits for the stream.
-  Counters counters(cudaStream_t stream);
+  TileCounters run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream);
   /// Sets the bits of the voxels of tiles that were left. @param several  of the box of the last run, rows from a word
   /// on
   void mark_left(const LatticeOnDevice& lattice, const SlabBox& box, std::uint32_t* several, cudaStream_t stream) const;
@@ -40,12 +39,24 @@ class IntervalRaster {
   void forget_field() { has_records_ = false; }
 
  private:
+  /// What is needed for tiles of one depth.
+  struct Tiles {
+    DeviceBuffer<TileCount> counts;  ///< of each tile, i fastest
+    DeviceBuffer<unsigned> lists;    ///< of each tile, the numbers of its tetrahedra
+  };
+  /// Tiles of the last run as its kernels know them. @tparam kDepth  kTileK, or half of it
+  template <int kDepth>
+  auto make_task(const LatticeOnDevice& lattice, const SlabBox& box) const;
+  /// One pass over the tiles of one depth; of those without room at twice the depth, if that was tried.
+  template <int kDepth, class Sink>
+  TileCounters run_tiles(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream);
+
   bool has_records_ = false;
-  DeviceBuffer<int4> records_;      ///< of all tetrahedra (tetrahedron_records.cuh)
-  DeviceBuffer<TileCount> counts_;  ///< of each tile, i fastest
-  DeviceBuffer<unsigned> lists_;    ///< of each tile, the numbers of its tetrahedra
-  DeviceBuffer<Counters> counters_;
-  PinnedBuffer<Counters> found_;
+  bool tried_deep_ = false;     ///< whether the last run began with tiles of full depth
+  DeviceBuffer<int4> records_;  ///< of all tetrahedra (tetrahedron_records.cuh)
+  Tiles deep_, flat_;           ///< of full depth, and of half of it
+  DeviceBuffer<TileCounters> counters_;
+  PinnedBuffer<TileCounters> found_;
 };
 
 }  // namespace tetwarp::cuda_detail

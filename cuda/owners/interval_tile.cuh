@@ -7,41 +7,46 @@
 #include "cuda/owners/tetrahedron_records.cuh"
 #include "cuda/runtime/warp.cuh"
 
-/// A tile of the interval raster: what a thread block knows of it, its shared memory, and the words in it. For
-/// interval_raster.cu alone; interval_list.cuh, interval_marks.cuh and interval_sample.cuh are what is done with it, in
-/// this order.
+/// A tile of a coarse field: what a thread block knows of it, its shared memory, and the words in it. Lattices and
+/// meshes share it (interval_raster.cu, mesh_raster.cu); interval_read.cuh, interval_marks.cuh and interval_sample.cuh
+/// are what is done with it, in this order, and interval_kernel.cuh does it.
 namespace tetwarp::cuda_detail {
 
 namespace {
 
-constexpr int kSlots = 384;           ///< tetrahedra of a tile, at most
-constexpr int kMostUnsure = 256;      ///< rows for exact integers, and steep tetrahedra
-constexpr unsigned kNobody = kSlots;  ///< slot of what has no owner
+/// Tetrahedra of a tile, at most: as many as leave room for five tiles a multiprocessor, and 60 KiB of L1.
+constexpr int slots_of(int depth) { return depth == kTileK ? 384 : 432; }
+constexpr int kMostUnsure = 256;  ///< rows for exact integers, and steep tetrahedra
 
-/// What all kernels of the interval raster know.
+/// Which tetrahedra may reach a tile.
+struct TileList {
+  const unsigned* numbers;  ///< in any order
+  unsigned long long count;
+  bool may_rest;  ///< whether all of them are at rest
+  bool is_done;   ///< whether the tile is not wanted
+};
+
+/// What all kernels of tiles know.
+/// @tparam Shape  the tetrahedra: `LatticeShape` or `MeshShape`. With kDepth, the voxels of a tile along k;
+///                `tetrahedron(number)`, `list(tile, its number)` and `rests(voxels, records, thread)`, which a whole
+///                thread block calls where a list may rest: whether nothing but tetrahedra at rest owns these voxels,
+///                and all are owned
+template <class Shape>
 struct TileTask {
-  StepLattice lattice;
+  Shape shape;
   NudgeTurns turns;
-  IntBox box;         ///< voxels that are wanted
-  glm::ivec3 origin;  ///< first voxel of the first tile; the nudge turns only between tiles
-  glm::ivec3 tiles;   ///< how many on each axis
-  Records records;    ///< of all tetrahedra: from `record_kernel`
-  TileCount* counts;  ///< of each tile, i fastest
-  unsigned* lists;    ///< of each tile, up to kSlots tetrahedra, in any order; both from `list_kernel`
-  IntervalRaster::Counters* counters;
+  IntBox box;             ///< voxels that are wanted
+  glm::ivec3 origin;      ///< first voxel of the first tile; the nudge turns only between tiles
+  glm::ivec3 tiles;       ///< how many on each axis
+  glm::ivec3 first_tile;  ///< that reaches the box
+  Records records;        ///< of all tetrahedra
+  TileCounters* counters;
 
   __device__ int tile_number(const glm::ivec3& tile) const { return (tile.z * tiles.y + tile.y) * tiles.x + tile.x; }
   /// The voxels of the box that a tile has.
   __device__ IntBox voxels(const glm::ivec3& tile) const {
-    const glm::ivec3 size(kTileI, kTileJ, kTileK), first = origin + tile * size;
+    const glm::ivec3 size(kTileI, kTileJ, Shape::kDepth), first = origin + tile * size;
     return {glm::max(first, box.begin), glm::min(first + size, box.end)};
-  }
-  /// The cell of a tetrahedron. @param number  5 cell + which
-  __device__ glm::ivec3 cell_of(unsigned number) const {
-    return position_in(static_cast<int>(number / kTetrahedraPerCell), lattice.cells);
-  }
-  __device__ LatticeTetrahedron tetrahedron(unsigned number) const {
-    return LatticeTetrahedron::of_cell(cell_of(number), static_cast<int>(number % kTetrahedraPerCell));
   }
 };
 
@@ -88,7 +93,7 @@ struct RowSpan {
 struct RowItem {
   using Slot = BitField<0, 9>;
   using Y = BitField<Slot::kEnd, 3>;
-  static_assert(kSlots <= Slot::kMost && kTileJ <= Y::kMost + 1);
+  static_assert(slots_of(1) <= Slot::kMost && kTileJ <= Y::kMost + 1);
 
   __device__ static unsigned short of(int slot, int y) {
     return static_cast<unsigned short>(Slot::put(slot) | Y::put(y));
@@ -126,12 +131,12 @@ struct UnsureRow {
 ///
 ///     15   14     9 8      0
 ///     +---+--------+--------+
-///     |   |  End   |  Slot  |     Slot: kNobody where there is no owner
+///     |   |  End   |  Slot  |     Slot: `TileMemory::kNobody` where there is no owner
 ///     +---+--------+--------+
 struct RowOwner {
   using Slot = RowItem::Slot;
   using End = BitField<Slot::kEnd, 6>;
-  static_assert(kNobody <= Slot::kMost && kTileI <= End::kMost);
+  static_assert(slots_of(1) <= Slot::kMost && kTileI <= End::kMost);
 
   /// @param end  of which the bits above the field are taken off
   __device__ static unsigned short of(unsigned slot, int end) {
@@ -143,7 +148,7 @@ struct RowOwner {
 ///
 ///     prepared  385 x 3 x 16   a slot for each tetrahedron: first its lines, from the first voxel of the tile on; once
 ///     all
-///                              rows are marked, its map (`put_map`); the last for nobody's
+///                              rows are marked, its map (`read_maps`); the last for nobody's
 ///     usable    385 x 4        whether each map may be used
 ///     numbers   384 x 4        of the tetrahedra, in the order of the list
 ///     spans     384 x 4        `RowSpan` of each
@@ -159,13 +164,17 @@ struct RowOwner {
 ///     owners    a, to 5   b, to 11        nobody, to 17   c, to 32
 ///
 /// So the owner of a voxel stands where the last interval starts that does not start behind it.
+template <int kDepth>
 struct TileMemory {
+  static constexpr int kSlots = slots_of(kDepth), kRows = kTileJ * kDepth;
+  static constexpr unsigned kNobody = kSlots;  ///< slot of what has no owner
+
   float4 prepared[kSlots + 1][kLineQuads];
   unsigned numbers[kSlots];
   unsigned spans[kSlots];
-  unsigned starts[kTileRows];
+  unsigned starts[kRows];
   unsigned unsure[kMostUnsure];
-  unsigned short owners[kTileRows][kTileI];
+  unsigned short owners[kRows][kTileI];
   unsigned short items[kSlots * kTileJ];
   unsigned usable[kSlots + 1];
   unsigned long_items, short_items, unsure_count, steep_count, covered;
@@ -181,14 +190,17 @@ struct TileMemory {
 static_assert(kMapQuads == kLineQuads);
 
 /// A thread block at work on a tile.
+template <class Shape>
 struct IntervalTile {
-  const TileTask& task;
-  TileMemory& memory;
+  using Memory = TileMemory<Shape::kDepth>;
+
+  const TileTask<Shape>& task;
+  Memory& memory;
   IntBox voxels;         ///< of the box that the tile has
   glm::ivec3 size;       ///< how many, on each axis
   glm::i32vec3 signs;    ///< nudge of all of them
   const unsigned* list;  ///< of its tetrahedra
-  int count;             ///< how many, at most kSlots
+  int count;             ///< how many, at most `Memory::kSlots`
   int thread;
 
   __device__ int lane() const { return thread & 31; }

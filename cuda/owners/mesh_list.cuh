@@ -38,7 +38,7 @@ struct MeshTask {
 ///
 /// @tparam kCounts  whether it counts: `first` is added to, 0 before; else `next`, 0 before, and `numbers` are written
 template <bool kCounts>
-__global__ void list_kernel(MeshTask task) {
+__global__ void mesh_list_kernel(MeshTask task) {
   const std::int64_t number = warp_of_grid();
   if (number >= task.count) return;
   const Tetrahedron t = task.mesh.tetrahedron(static_cast<unsigned>(number));

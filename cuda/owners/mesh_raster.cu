@@ -3,10 +3,13 @@
 
 #include "cuda/owners/mesh_raster.cuh"
 
+#include <cub/device/device_reduce.cuh>
 #include <cub/device/device_scan.cuh>
 
 #include "cuda/owners/gather.cuh"
+#include "cuda/owners/interval_kernel.cuh"
 #include "cuda/owners/mesh_sample.cuh"
+#include "cuda/runtime/fetch.h"
 
 namespace tetwarp::cuda_detail {
 
@@ -23,6 +26,21 @@ constexpr bool is_coarse() {
   return false;
 }
 
+/// The tetrahedra of a mesh as tiles of interval_kernel.cuh see them.
+struct MeshShape {
+  static constexpr int kDepth = kTileK;
+
+  MeshRaster::View mesh;
+  const unsigned long long* first;  ///< of each tile, i fastest, and of one more: where its list begins
+  const unsigned* numbers;          ///< the lists
+
+  __device__ Tetrahedron tetrahedron(unsigned number) const { return mesh.tetrahedron(number); }
+  __device__ TileList list(const glm::ivec3&, int tile) const {
+    return {numbers + first[tile], first[tile + 1] - first[tile], false, false};
+  }
+  __device__ static bool rests(const IntBox&, const Records&, int) { return false; }
+};
+
 /// Finds the owners of the voxels of a box, and gives them to a sink: a thread block a tile that the box reaches.
 ///
 ///     a list that fits the slots: sort it, mark slots, weigh them, sample from shared memory
@@ -30,14 +48,18 @@ constexpr bool is_coarse() {
 ///
 /// @param task        the lists are read  @param box  half open, voxels of the output
 /// @param first_tile  that the box reaches, on each axis  @param sink  gets every voxel of the box
+/// @param done        tiles with lists up to that length are left alone
 /// @param covered     how many voxels of a sink that samples are covered: added to
 template <bool kCountsOwners, class Sink>
 __global__ void __launch_bounds__(kTileThreads, is_wide<Sink>() ? kTileBlocks : kTileBlocks + 1)
     mesh_tile_kernel(const __grid_constant__ MeshTask task, const __grid_constant__ IntBox box,
-                     const __grid_constant__ glm::ivec3 first_tile, const __grid_constant__ Sink sink,
+                     const __grid_constant__ glm::ivec3 first_tile, const __grid_constant__ Sink sink, int done,
                      unsigned long long* covered) {
-  __shared__ TileMemory<kCountsOwners> memory;
+  __shared__ MeshTileMemory<kCountsOwners> memory;
   const glm::ivec3 at = first_tile + glm::ivec3(blockIdx.x, blockIdx.y, blockIdx.z);
+  const int number = task.number_of(at);
+  const unsigned long long first = task.first[number], count = task.first[number + 1] - first;
+  if (static_cast<long long>(count) <= done) return;
   IntBox voxels = task.voxels(at);
   voxels = {glm::max(voxels.begin, box.begin), glm::min(voxels.end, box.end)};
   const glm::i64vec3 first_voxel(voxels.begin);
@@ -48,11 +70,9 @@ __global__ void __launch_bounds__(kTileThreads, is_wide<Sink>() ? kTileBlocks : 
                                      task.mesh.nudge.signs(first_voxel),
                                      static_cast<int>(threadIdx.x)};
   tile.clear();
-  const int number = task.number_of(at);
-  const unsigned long long first = task.first[number], count = task.first[number + 1] - first;
-  const bool is_few = count <= kSlots;
+  const bool is_few = !is_coarse<Sink>() && count <= kMeshSlots;
   if (is_few) {
-    tile.template rasterise_few<is_coarse<Sink>()>(task.numbers + first, static_cast<int>(count));
+    tile.rasterise_few(task.numbers + first, static_cast<int>(count));
   } else {
     tile.rasterise_many(task.numbers + first, count);
   }
@@ -71,7 +91,7 @@ std::uint64_t MeshRaster::bytes_of(const SnappedMesh& mesh) {
 
 std::uint64_t MeshRaster::held_bytes() const {
   return vertices_.capacity() * sizeof(Vertex) + tetrahedra_.capacity() * sizeof(glm::u32vec4) +
-         numbers_.capacity() * sizeof(unsigned);
+         numbers_.capacity() * sizeof(unsigned) + records_.capacity() * sizeof(int4);
 }
 
 void MeshRaster::set(const SnappedMesh& mesh, const Geometry& output, cudaStream_t stream) {
@@ -91,33 +111,67 @@ void MeshRaster::set(const SnappedMesh& mesh, const Geometry& output, cudaStream
   next_.fill(0, tiles, stream);
   MeshTask task{view(), count_, size_, origin_, tiles_, first_.data(), next_.data(), nullptr};
   const unsigned blocks = blocks_for(std::int64_t{count_} * 32);
-  list_kernel<true><<<blocks, kThreads, 0, stream>>>(task);
+  mesh_list_kernel<true><<<blocks, kThreads, 0, stream>>>(task);
   std::size_t bytes = 0;
-  const auto scan = [&](void* memory) {
+  const auto with_room = [&](auto&& work) {  // first it tells how much, then it is given
+    work(nullptr);
+    work(scan_.reserve(bytes));
+  };
+  unsigned long long* longest = longest_.reserve(1);
+  with_room([&](void* memory) {
+    TETWARP_CUDA_TRY(
+        cub::DeviceReduce::Max(memory, bytes, first_.data(), longest, static_cast<std::int64_t>(tiles), stream));
+  });
+  with_room([&](void* memory) {
     TETWARP_CUDA_TRY(cub::DeviceScan::ExclusiveSum(memory, bytes, first_.data(), first_.data(),
                                                    static_cast<std::int64_t>(tiles + 1), stream));
-  };
-  scan(nullptr);
-  scan(scan_.reserve(bytes));
-  unsigned long long pairs = 0;
+  });
+  unsigned long long pairs = 0, most = 0;
   TETWARP_CUDA_TRY(cudaMemcpyAsync(&pairs, first_.data() + tiles, sizeof pairs, cudaMemcpyDeviceToHost, stream));
+  TETWARP_CUDA_TRY(cudaMemcpyAsync(&most, longest, sizeof most, cudaMemcpyDeviceToHost, stream));
   TETWARP_CUDA_TRY(cudaStreamSynchronize(stream));
+  has_long_lists_ = most > slots_of(kTileK);
   task.numbers = numbers_.reserve(std::max<std::size_t>(pairs, 1));
-  list_kernel<false><<<blocks, kThreads, 0, stream>>>(task);
+  mesh_list_kernel<false><<<blocks, kThreads, 0, stream>>>(task);
+  const std::int64_t voxels = std::int64_t{size_.x} * size_.y * size_.z;
+  has_records_ =
+      mesh.coarse && Records::suit(count_, voxels) && std::max({size_.x, size_.y, size_.z}) <= VoxelRange::kMost;
+  if (has_records_) {
+    const Records records{records_.reserve(std::size_t{count_} * kRecordQuads), count_};
+    record_kernel<<<blocks_for(std::int64_t{count_}), kThreads, 0, stream>>>(
+        MeshShape{view(), first_.data(), numbers_.data()}, records);
+  }
   TETWARP_CUDA_TRY(cudaGetLastError());
 }
 
 template <class Sink>
 void MeshRaster::run(const SlabBox& box, const Sink& sink, cudaStream_t stream) {
-  const MeshTask task{view(), count_, size_, origin_, tiles_, first_.data(), next_.data(), numbers_.data()};
   const IntBox in{glm::ivec3(box.begin), glm::ivec3(box.begin + box.size)};
   const glm::ivec3 extent(kTileI, kTileJ, kTileK), first = (in.begin - origin_) / extent,
                                                    tiles = (in.end - 1 - origin_) / extent - first + 1;
   const dim3 grid(static_cast<unsigned>(tiles.x), static_cast<unsigned>(tiles.y), static_cast<unsigned>(tiles.z));
-  covered_.fill(0, 1, stream);
+  counters_.fill(0, 1, stream);
+  int done = -1;
+  if constexpr (is_coarse<Sink>()) {
+    if (has_records_) {
+      const TileTask<MeshShape> task{{view(), first_.data(), numbers_.data()},
+                                     NudgeTurns(nudge_),
+                                     in,
+                                     origin_,
+                                     tiles_,
+                                     first,
+                                     {records_.data(), count_},
+                                     counters_.data()};
+      tile_kernel<<<grid, kTileThreads, 0, stream>>>(task, sink);
+      TETWARP_CUDA_TRY(cudaGetLastError());
+      if (!has_long_lists_) return;
+      done = slots_of(kTileK);
+    }
+  }
+  const MeshTask task{view(), count_, size_, origin_, tiles_, first_.data(), next_.data(), numbers_.data()};
   const auto launch = [&](auto counts) {
     mesh_tile_kernel<decltype(counts)::value>
-        <<<grid, kTileThreads, 0, stream>>>(task, in, first, sink, covered_.data());
+        <<<grid, kTileThreads, 0, stream>>>(task, in, first, sink, done, &counters_.data()->covered);
   };
   if constexpr (std::is_same_v<Sink, OwnerSink>) {
     if (sink.several) {
@@ -131,11 +185,7 @@ void MeshRaster::run(const SlabBox& box, const Sink& sink, cudaStream_t stream) 
   TETWARP_CUDA_TRY(cudaGetLastError());
 }
 
-std::uint64_t MeshRaster::covered(cudaStream_t stream) const {
-  unsigned long long covered = 0;
-  covered_.download(&covered, 1, stream);
-  return covered;
-}
+std::uint64_t MeshRaster::covered(cudaStream_t stream) { return fetch(counters_.data(), found_, stream).covered; }
 
 template void MeshRaster::run(const SlabBox&, const OwnerSink&, cudaStream_t);
 template void MeshRaster::run(const SlabBox&, const HoleSink&, cudaStream_t);

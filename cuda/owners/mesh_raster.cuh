@@ -4,6 +4,7 @@
 #pragma once
 
 #include "cuda/lattice/slab.cuh"
+#include "cuda/owners/interval_raster.cuh"
 #include "deform/snapped_mesh.h"
 
 namespace tetwarp::cuda_detail {
@@ -35,7 +36,8 @@ struct HoleSink {
 };
 
 /// A mesh on the device, and lists of the tetrahedra that may reach each tile of the output. Tile by tile they are
-/// rasterised, each row an interval (deform/core/row_interval.h), and the lowest number wins.
+/// rasterised, each row an interval (deform/core/row_interval.h), and the lowest number wins. Tiles of coarse fields
+/// with short lists go the way of lattices (interval_kernel.cuh).
 class MeshRaster {
  public:
   /// Device memory of a mesh, without the lists.
@@ -47,7 +49,7 @@ class MeshRaster {
   template <class Sink>
   void run(const SlabBox& box, const Sink& sink, cudaStream_t stream);
   /// Of the last run with a sink of voxels: how many were covered. Waits for the stream.
-  std::uint64_t covered(cudaStream_t stream) const;
+  std::uint64_t covered(cudaStream_t stream);
 
   /// For a kernel: the tetrahedron with a number.
   struct View {
@@ -73,8 +75,13 @@ class MeshRaster {
   DeviceBuffer<glm::u32vec4> tetrahedra_;
   DeviceBuffer<unsigned long long> first_;  ///< of each tile, i fastest, and of one more: where its list begins
   DeviceBuffer<unsigned> next_, numbers_;
+  DeviceBuffer<unsigned long long> longest_;  ///< how many the longest list has
   DeviceBuffer<std::byte> scan_;
-  DeviceBuffer<unsigned long long> covered_;
+  DeviceBuffer<int4> records_;   ///< of all tetrahedra (tetrahedron_records.cuh), where there are any
+  bool has_records_ = false;     ///< of a coarse field whose records do not take too much memory
+  bool has_long_lists_ = false;  ///< whether some have no room in a tile of interval_kernel.cuh
+  DeviceBuffer<TileCounters> counters_;
+  PinnedBuffer<TileCounters> found_;
 };
 
 }  // namespace tetwarp::cuda_detail

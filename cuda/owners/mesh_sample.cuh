@@ -18,8 +18,8 @@ __device__ __noinline__ glm::vec3 interpolate_exactly(MeshRaster::View mesh, uns
   return interpolate_u_exactly(mesh.tetrahedron(number), steps, signs);
 }
 template <class Sink>
-__device__ __noinline__ bool write_slowly(const MeshRaster::View& mesh, const Sink& sink, unsigned number, int out,
-                                          glm::ivec3 at, glm::i32vec3 signs) {
+__device__ __noinline__ bool write_mesh_voxel(const MeshRaster::View& mesh, const Sink& sink, unsigned number, int out,
+                                              glm::ivec3 at, glm::i32vec3 signs) {
   const Tetrahedron t = mesh.tetrahedron(number);
   if constexpr (Sink::kLerp == Lerp::fused) {
     return sink.write(out, at, fixed_offset(coarse_u(t, at, signs)));
@@ -48,19 +48,10 @@ struct MeshSampler {
       owner += kTileJ * kRowStride;
       return slot;
     };
-    return sample_column<false>(sink, places<Sink>(), tile.voxels.begin + glm::ivec3(lane, y, 0),
-                                glm::ivec3(lane, y, 0), tile.size.z, next_slot,
-                                [&](int z) { return finish_few(sink, lane, y, z); });
+    return sample_column<false>(sink, places(), tile.voxels.begin + glm::ivec3(lane, y, 0), glm::ivec3(lane, y, 0),
+                                tile.size.z, next_slot, [&](int z) { return finish_few(sink, lane, y, z); });
   }
-  template <class Sink>
-  __device__ auto places() const {
-    const auto& memory = tile.memory;
-    if constexpr (Sink::kLerp == Lerp::fused) {
-      return CoarseMaps<kQuads>{memory.prepared, memory.ends, kSlots};
-    } else {
-      return Weighings{memory.prepared, reinterpret_cast<const float*>(memory.ends), kSlots};
-    }
-  }
+  __device__ Weighings places() const { return {tile.memory.prepared, tile.memory.ends, kMeshSlots}; }
   /// A voxel that `sample_few` has not written. @return whether it is covered
   template <class Sink>
   __device__ bool finish_few(const Sink& sink, int x, int y, int z) const {
@@ -70,8 +61,8 @@ struct MeshSampler {
       sink.nothing(sink.address(at));
       return false;
     }
-    return finish_voxel(sink, places<Sink>(), slot, at, in_tile, [&](int out) {
-      return write_slowly(tile.task.mesh, sink, tile.memory.slots[slot].number, out, at, tile.signs);
+    return finish_voxel(sink, places(), slot, at, in_tile, [&](int out) {
+      return write_mesh_voxel(tile.task.mesh, sink, tile.memory.slots[slot].number, out, at, tile.signs);
     });
   }
 
@@ -126,7 +117,10 @@ struct MeshSampler {
   }
   template <class Sink>
   __device__ unsigned finish(const Sink& sink, bool is_few) const {
-    return is_few ? sample_few(sink) : sample_many(sink);
+    if constexpr (Sink::kLerp == Lerp::separate) {
+      if (is_few) return sample_few(sink);
+    }
+    return sample_many(sink);
   }
 };
 

@@ -3,7 +3,6 @@
 
 #pragma once
 
-#include "cuda/output/coarse_maps.cuh"
 #include "cuda/output/weighing.cuh"
 #include "cuda/owners/mesh_list.cuh"
 #include "cuda/runtime/warp.cuh"
@@ -14,31 +13,30 @@ namespace tetwarp::cuda_detail {
 
 namespace {
 
-constexpr int kSlots = 112;             ///< tetrahedra whose arithmetic is prepared at a time
+constexpr int kMeshSlots = 112;         ///< tetrahedra whose arithmetic is prepared at a time
 constexpr int kRowStride = kTileI + 1;  ///< so that a column of rows lies in different banks
 
 /// The shared memory of a tile.
 ///
 ///     prepared  113 x 6 x 16      a slot for each tetrahedron at hand: first its four faces; where all of
-///                                 a tile's have slots, its `Weighing` once all rows are marked, or its map
-///                                 (`put_map`) where the field is coarse
-///     ends      113 x 4           the last float of each `Weighing`, or whether the map is usable
+///                                 a tile's have slots, its `Weighing` once all rows are marked
+///     ends      113 x 4           the last float of each `Weighing`
 ///     slots     112 x 16          which tetrahedron, and the rows that it may reach
 ///     numbers   112 x 4           of the list, before they are sorted
 ///     owner     128 x 33 x 4      row y, z from (z * 8 + y) * 33 on: the lowest so far
 ///     several   128 x 33 x 4      how many own it, where that is counted
 template <bool kCountsOwners>
-struct TileMemory {
+struct MeshTileMemory {
   /// A tetrahedron of the list, and the rows that it may reach.
   struct Slot {
     unsigned number;
     short y_begin, y_end, z_begin, z_end;
     short lower;  ///< of `RowFaces`; 0: exact integers must say
   };
-  float4 prepared[kSlots + 1][kQuads];  ///< faces, and then `Weighing` or maps, the last nobody's
-  unsigned ends[kSlots + 1];            ///< the last float of each `Weighing`, or whether the map is usable
-  Slot slots[kSlots];
-  unsigned numbers[kSlots];                ///< before they are sorted
+  float4 prepared[kMeshSlots + 1][kQuads];  ///< faces, and then `Weighing`, the last nobody's
+  float ends[kMeshSlots + 1];               ///< the last float of each `Weighing`
+  Slot slots[kMeshSlots];
+  unsigned numbers[kMeshSlots];            ///< before they are sorted
   unsigned owner[kTileRows * kRowStride];  ///< slot where all have one, else number; or kNoTetrahedron
   unsigned several[kCountsOwners ? kTileRows * kRowStride : 1];
   unsigned covered;
@@ -48,14 +46,14 @@ struct TileMemory {
 };
 
 /// Rarely called, so out of line, with everything by value.
-__device__ __noinline__ RowInterval exactly(MeshRaster::View mesh, unsigned number, glm::ivec3 first,
-                                            glm::i32vec3 signs, int y, int z, int count) {
+__device__ __noinline__ RowInterval exact_mesh_row(MeshRaster::View mesh, unsigned number, glm::ivec3 first,
+                                                   glm::i32vec3 signs, int y, int z, int count) {
   return exact_row(mesh.tetrahedron(number), first, signs, y, z, count);
 }
 /// A thread block at work on a tile, or the part of it that a box has.
 template <bool kCountsOwners>
 struct MeshTile {
-  using Memory = TileMemory<kCountsOwners>;
+  using Memory = MeshTileMemory<kCountsOwners>;
 
   const MeshTask& task;
   Memory& memory;
@@ -74,8 +72,8 @@ struct MeshTile {
       if constexpr (kCountsOwners) memory.several[n] = 0;
     }
     if (thread != 0) return;
-    memory.prepared[kSlots][0] = make_float4(0, 0, 0, kNoNumber);
-    memory.ends[kSlots] = 0;
+    memory.prepared[kMeshSlots][0] = make_float4(0, 0, 0, kNoNumber);
+    memory.ends[kMeshSlots] = 0;
     memory.covered = 0;
   }
 
@@ -109,7 +107,7 @@ struct MeshTile {
     bool is_certain = false;
     RowInterval in{0, 0};
     if (of.lower != 0) in = RowsAlongZ(faces_of(slot), y).interval(z, size.x, is_certain);
-    if (!is_certain) in = exactly(task.mesh, of.number, voxels.begin, signs, y, z, size.x);
+    if (!is_certain) in = exact_mesh_row(task.mesh, of.number, voxels.begin, signs, y, z, size.x);
     const int row = memory.row(y, z);
     for (int x = in.begin; x < in.end; ++x) {
       atomicMin(&memory.owner[row + x], owner);
@@ -128,9 +126,8 @@ struct MeshTile {
   }
 
   /// A list for which there is room, in the order of the numbers. @param list  of the tile's tetrahedra, in any
-  template <bool kCoarse>
   __device__ void rasterise_few(const unsigned* list, int count) const {
-    static_assert(kSlots <= kTileThreads);
+    static_assert(kMeshSlots <= kTileThreads);
     unsigned number = kNoTetrahedron;
     if (thread < count) memory.numbers[thread] = number = list[thread];
     __syncthreads();
@@ -142,21 +139,14 @@ struct MeshTile {
     __syncthreads();
     mark_all(count, true);
     __syncthreads();
-    if (thread < count) {
-      if constexpr (kCoarse) {
-        const CoarseMap map(task.mesh.tetrahedron(memory.slots[thread].number));
-        memory.ends[thread] = put_map(map, voxels.begin, memory.prepared[thread]) ? 1 : 0;
-      } else {
-        weigh(thread);
-      }
-    }
+    if (thread < count) weigh(thread);
     __syncthreads();
   }
 
   /// Any list, as many at a time as there is room for.
   __device__ void rasterise_many(const unsigned* list, unsigned long long count) const {
-    for (unsigned long long from = 0; from < count; from += kSlots) {
-      const int slots = static_cast<int>(min(count - from, static_cast<unsigned long long>(kSlots)));
+    for (unsigned long long from = 0; from < count; from += kMeshSlots) {
+      const int slots = static_cast<int>(min(count - from, static_cast<unsigned long long>(kMeshSlots)));
       __syncthreads();
       if (thread < slots) prepare(thread, list[from + static_cast<unsigned>(thread)]);
       __syncthreads();
@@ -174,7 +164,7 @@ struct MeshTile {
     prepare_weighing(glm::vec3(t.a.deformed - d), glm::vec3(t.b.deformed - d), glm::vec3(t.c.deformed - d),
                      glm::vec3(voxels.begin * kStepsPerVoxel - d),
                      {glm::vec3(-t.d.u), further(t.a), further(t.b), further(t.c)}, memory.prepared[slot], end);
-    memory.ends[slot] = __float_as_uint(end);
+    memory.ends[slot] = end;
     if (is_long(t)) memory.prepared[slot][0].w = kNoNumber;
   }
 };

@@ -8,7 +8,7 @@
 #include "deform/core/row_lines.h"
 
 /// What tiles need of a tetrahedron of a coarse field, made once a field: its box, where its faces cross rows, and its
-/// map. For interval_raster.cu alone.
+/// map. For tiles alone (interval_tile.cuh).
 namespace tetwarp::cuda_detail {
 
 namespace {
@@ -27,6 +27,7 @@ struct VoxelRange {
   static constexpr int kMost = 16000;  ///< a voxel that can be told, either way from 0
 
   __device__ static int half(int steps) {
+    steps = min(max(steps, -kMost * kStepsPerVoxel), kMost * kStepsPerVoxel);  // further away it is all the same
     return ((steps + kStepsPerVoxel - 1) >> kStepBits) * 2 + ((steps & (kStepsPerVoxel - 1)) == 0 ? 1 : 0);
   }
   __device__ static int of(int low, int high) { return (half(low) & 0xFFFF) | half(high) << 16; }
@@ -59,6 +60,12 @@ struct RecordFlags {
 struct Records {
   int4* quads;
   std::int64_t count;  ///< tetrahedra
+
+  /// Whether those of so many tetrahedra take no more memory than is worth it.
+  static bool suit(std::int64_t count, std::int64_t voxels) {
+    constexpr std::int64_t kMostBytes = 5;  // for each voxel
+    return count * kRecordQuads * std::int64_t{sizeof(int4)} <= kMostBytes * voxels;
+  }
 
   __device__ int4& box(std::int64_t n) const { return quads[n]; }
   __device__ int4& line(std::int64_t n, int quad) const { return quads[(1 + quad) * count + n]; }
