@@ -110,7 +110,8 @@ Gather::Counters Gather::run(const LatticeOnDevice& lattice, const SlabBox& box,
                              cudaStream_t stream) {
   const DeviceField& field = lattice.field();
   if constexpr (kIsCoarse<Sink>) {
-    if (IntervalRaster::suits(field.steps, box, is_mostly_folded(lattice))) return run_intervals(lattice, box, sink, stream);
+    if (IntervalRaster::suits(field.steps, box, is_mostly_folded(lattice)))
+      return run_intervals(lattice, box, sink, stream);
   }
   coverage_.begin(box, stream);
   const glm::ivec3 size(box.size), tile(kSeedTile, kSeedTile, kMarch);

@@ -50,8 +50,8 @@ __device__ __noinline__ bool owns(const Shape& shape, unsigned number, glm::ivec
 template <class Shape>
 __device__ int mark(const IntervalTile<Shape>& tile, const RowInterval& in, int slot, int row) {
   if (in.is_empty()) return 0;
-  atomicOr(&tile.memory.starts[row], 1u << in.begin);
-  tile.memory.owners[row][in.begin] = RowOwner::of(static_cast<unsigned>(slot), in.end);
+  if ((atomicOr(&tile.memory.starts[row], 1u << in.begin) >> in.begin & 1) == 0)
+    tile.memory.owners[row][in.begin] = RowOwner::of(static_cast<unsigned>(slot), in.end);
   return in.end - in.begin;
 }
 
@@ -82,8 +82,9 @@ __device__ int mark_item(const IntervalTile<Shape>& tile, unsigned item) {
       leave(memory, UnsureRow::of(slot, z * kTileJ + y, rows.doubt(of)));
     } else if (of.begin() < of.end()) {
       const int begin = of.begin() & (kTileI - 1);
-      atomicOr(starts, 1u << begin);
-      owners[begin] = RowOwner::of(static_cast<unsigned>(slot), of.end() - detail::kLiftedWhole);
+      // Where another one starts there, the rows will have fewer voxels than were marked.
+      if ((atomicOr(starts, 1u << begin) >> begin & 1) == 0)
+        owners[begin] = RowOwner::of(static_cast<unsigned>(slot), of.end() - detail::kLiftedWhole);
       marked += of.end() - of.begin();
     }
   }
