@@ -16,9 +16,8 @@ constexpr int kIntervalBlocks = 5;  ///< a multiprocessor, where few registers d
 
 /// Finds and samples the voxels of a box: a thread block a tile, grid as there are tiles that reach it on each axis.
 ///
-///     take the tetrahedra that may reach it -> mark their intervals -> read the rows: are there holes, does anything
-///     overlap?
-///       -> if it does, mark again in order -> take their maps -> sample the columns
+///     take the tetrahedra that may reach it -> mark their intervals -> read the rows, for holes and overlaps
+///       -> where there are overlaps, mark again in order -> take their maps -> sample the columns
 ///
 /// @param task  `counters` are added to; tiles that more tetrahedra may reach than there is room for are left
 /// @param sink  gets every voxel of the tiles that are not left

@@ -57,6 +57,7 @@ struct LatticeShape {
     return __syncthreads_and(is ? 1 : 0) != 0;
   }
 };
+
 /// Enters each tetrahedron into the lists of all tiles that its box reaches: a thread a tetrahedron. Neighbours mostly
 /// want the same tile, so a warp takes room for all of its lanes with one atomic addition a tile.
 ///

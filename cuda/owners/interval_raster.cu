@@ -17,8 +17,8 @@ constexpr int kFlat = kTileK / 2;  ///< depth of tiles for small cells
 
 /// Marks the voxels of tiles that were left, for the claims: a thread block a tile, a thread a row.
 ///
-/// @param task     its counts are read  @param several  a bit for each voxel of the box, as `BitRows`: written by
-/// atomics
+/// @param task     its counts are read
+/// @param several  a bit for each voxel of the box, as `BitRows`: written by atomics
 template <class Shape>
 __global__ void mark_left_kernel(const __grid_constant__ TileTask<Shape> task, std::uint32_t* several) {
   const int number = static_cast<int>(blockIdx.x);

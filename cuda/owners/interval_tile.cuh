@@ -63,8 +63,8 @@ struct RowSpan {
 
   using YBegin = BitField<0, 4>;
   using YEnd = BitField<YBegin::kEnd, 4>;
-  using ZBegin = BitField<YEnd::kEnd, 6>;
-  using ZEnd = BitField<ZBegin::kEnd, 6>;
+  using ZBegin = BitField<YEnd::kEnd, 5>;
+  using ZEnd = BitField<ZBegin::kEnd, 5>;
   using Lower = BitField<ZEnd::kEnd, 2>;
   using Upper = BitField<Lower::kEnd, 2>;
   using Zone = BitField<Upper::kEnd, 4>;
@@ -93,7 +93,7 @@ struct RowSpan {
 struct RowItem {
   using Slot = BitField<0, 9>;
   using Y = BitField<Slot::kEnd, 3>;
-  static_assert(slots_of(1) <= Slot::kMost && kTileJ <= Y::kMost + 1);
+  static_assert(slots_of(0) <= Slot::kMost && kTileJ <= Y::kMost + 1);
 
   __device__ static unsigned short of(int slot, int y) {
     return static_cast<unsigned short>(Slot::put(slot) | Y::put(y));
@@ -102,15 +102,14 @@ struct RowItem {
 
 /// A row of the tetrahedron in a slot that floats do not tell: `LinesAlongZ::Doubt`, or nothing is known.
 ///
-///     31   30   29 28   23 22     17 16    10 9     9 8      0
-///     +----+-----+--------+---------+---------+-------+--------+
-///     | U  |  A  |  End   |  Begin  |   Row   |   B   |  Slot  |    B, A: whether the voxel before Begin may be owned,
-///     and
-///     +----+-----+--------+---------+---------+-------+--------+    that at End; U: whether nothing is known
+///     30         29       28   23 22     17 16   10 9        9 8      0
+///     +---------+--------+-------+---------+-------+----------+--------+
+///     | Unknown | Behind |  End  |  Begin  |  Row  |  Before  |  Slot  |
+///     +---------+--------+-------+---------+-------+----------+--------+
 struct UnsureRow {
   using Slot = RowItem::Slot;
   using Before = BitField<Slot::kEnd, 1>;
-  using Row = BitField<Before::kEnd, 8>;  ///< z * 8 + y
+  using Row = BitField<Before::kEnd, 7>;  ///< z * 8 + y
   using Begin = BitField<Row::kEnd, 6>;
   using End = BitField<Begin::kEnd, 6>;
   using Behind = BitField<End::kEnd, 1>;
@@ -136,7 +135,7 @@ struct UnsureRow {
 struct RowOwner {
   using Slot = RowItem::Slot;
   using End = BitField<Slot::kEnd, 6>;
-  static_assert(slots_of(1) <= Slot::kMost && kTileI <= End::kMost);
+  static_assert(slots_of(0) <= Slot::kMost && kTileI <= End::kMost);
 
   /// @param end  of which the bits above the field are taken off
   __device__ static unsigned short of(unsigned slot, int end) {
@@ -144,11 +143,10 @@ struct RowOwner {
   }
 };
 
-/// The shared memory of a tile, 39 044 bytes: five fit a multiprocessor, and leave it 60 KiB of L1.
+/// The shared memory of a tile of full depth, 38 992 bytes: five fit a multiprocessor, and leave it 60 KiB of L1.
 ///
-///     prepared  385 x 3 x 16   a slot for each tetrahedron: first its lines, from the first voxel of the tile on; once
-///     all
-///                              rows are marked, its map (`read_maps`); the last for nobody's
+///     prepared  385 x 3 x 16   a slot for each tetrahedron: first its lines, from the first voxel of the tile on;
+///                              once all rows are marked, its map (`read_maps`); the last for nobody's
 ///     usable    385 x 4        whether each map may be used
 ///     numbers   384 x 4        of the tetrahedra, in the order of the list
 ///     spans     384 x 4        `RowSpan` of each
@@ -156,8 +154,8 @@ struct RowOwner {
 ///     starts    128 x 4        a bit where one does
 ///     items     3072 x 2       `RowItem`: what threads mark; long ones from the front on, short ones from the back.
 ///                              Where intervals overlap, slots in the order of their numbers
-///     unsure    256 x 4        `UnsureRow`, from the front on: what is marked later; slots of steep tetrahedra, from
-///     the back
+///     unsure    256 x 4        `UnsureRow`, from the front on: what is marked later;
+///                              from the back, slots of steep tetrahedra
 ///
 ///     voxel     0                   8                   16                        31
 ///     starts    1 . . . . 1 . .     . . . 1 . . . .     . 1 . . ...                .     an interval starts here
