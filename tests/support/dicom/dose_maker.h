@@ -88,10 +88,10 @@ struct MadeDose {
 
   /// Puts references to the dose's plan and its structures, and a histogram.
   static void put_plan(DcmDataset& data) {
-    const auto refer = [&](const DcmTagKey& sequence, const char* sop_class, const char* instance) {
+    const auto refer = [&](const DcmTagKey& sequence, const char* class_uid, const char* instance) {
       DcmItem* item = nullptr;
       if (data.findOrCreateSequenceItem(sequence, item, -2).bad()) throw std::runtime_error("no item");
-      item->putAndInsertString(DCM_ReferencedSOPClassUID, sop_class);
+      item->putAndInsertString(DCM_ReferencedSOPClassUID, class_uid);
       item->putAndInsertString(DCM_ReferencedSOPInstanceUID, instance);
     };
     refer(DCM_ReferencedRTPlanSequence, UID_RTPlanStorage, "1.2.8.1");
