@@ -278,6 +278,8 @@ struct Keep {
   T* result;
   TETWARP_HD void operator()(const T& sums) const { *result = sums; }
 };
+template <class T>
+Keep(T*) -> Keep<T>;
 
 }  // namespace sweeps
 

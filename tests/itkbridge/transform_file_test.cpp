@@ -261,7 +261,8 @@ TEST(TransformFile, AnyDamagedByteOfCompressedParametersIsRefused) {
   ASSERT_FALSE(streams.empty());
   const std::vector<glm::dvec3> points = points_around(spline_grid());
   std::size_t refused = 0, all = 0;
-  for (const auto& [begin, end] : streams) {
+  for (const auto& stream : streams) {
+    const std::size_t begin = stream.first, end = stream.second;
     const std::size_t step = std::max<std::size_t>(1, (end - begin) / 40);
     for (std::size_t at = begin; at < end; at += step) {
       std::string damaged = bytes;

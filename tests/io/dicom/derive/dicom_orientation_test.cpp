@@ -40,7 +40,7 @@ void write_on_grid(const std::filesystem::path& folder, const Geometry& grid) {
 
 TEST(DicomOrientation, GeometrySurvivesTheSeriesInAll24OrientationsOfAStack) {
   int stacks = 0;
-  for (Geometry grid : all_orientations()) {
+  for (const Geometry& grid : all_orientations()) {
     if (glm::determinant(grid.direction) < 0) continue;  // k of a series is row x column: no mirrored stack exists
     ++stacks;
     SCOPED_TRACE(orientation_code(grid));
