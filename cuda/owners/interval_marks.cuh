@@ -8,10 +8,10 @@
 /// The walk along the rows of a tile: each tetrahedron of the list marks the intervals that it owns. For
 /// interval_kernel.cuh alone.
 ///
-/// Intervals of different tetrahedra mostly do not overlap. So they are marked in any order at first, an item a thread,
-/// and nobody looks whether another one was there. Then each row is read once: where an interval starts before the last
-/// one ends, or fewer voxels are found than were marked, some do overlap, and the tile is done again: a thread a row,
-/// tetrahedron after tetrahedron in the order of their numbers, so that the lowest number wins.
+/// Intervals of different tetrahedra mostly do not overlap. So they are marked in any order at first, an item a thread;
+/// where two start at one voxel, the first to come is kept. Then each row is read once: where an interval starts before
+/// the last one ends, or fewer voxels are found than were marked, some do overlap, and the tile is done again: a thread
+/// a row, tetrahedron after tetrahedron in the order of their numbers, so that the lowest number wins.
 namespace tetwarp::cuda_detail {
 
 namespace {
