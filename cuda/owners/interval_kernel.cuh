@@ -52,7 +52,7 @@ __global__ void __launch_bounds__(kTileThreads, Sink::kIsWide ? kTileBlocks : kI
   read_rows(tile);
   read_maps(tile, sink);
   __syncthreads();
-  if (memory.balance != 0 || tile.has_lost_rows()) {
+  if (memory.covered != memory.marked || tile.has_lost_rows()) {
     __syncthreads();
     clear_marks(tile);
     __syncthreads();

@@ -23,8 +23,8 @@ __device__ void clear_marks(const IntervalTile<Shape>& tile) {
   if (tile.thread < IntervalTile<Shape>::Memory::kRows) memory.starts[tile.thread] = 0;
   if (tile.thread != 0) return;
   memory.usable[IntervalTile<Shape>::Memory::kNobody] = 0;
-  memory.long_items = memory.short_items = memory.unsure_count = memory.steep_count = memory.covered = 0;
-  memory.balance = 0;
+  memory.long_items = memory.short_items = memory.unsure_count = memory.steep_count = memory.marked = memory.covered =
+      0;
   memory.is_border = memory.is_slow = false;
 }
 
@@ -46,13 +46,17 @@ __device__ __noinline__ bool owns(const Shape& shape, unsigned number, glm::ivec
   return owns_exactly(shape.tetrahedron(number), voxel * kStepsPerVoxel, signs, sides);
 }
 
-/// Marks one interval. @return how many voxels it has
+/// Marks an interval of a row that is not empty. Where another one starts there, it is lost: the rows will have fewer
+/// voxels than were marked. @return how many it has
+__device__ int put_interval(unsigned* starts, unsigned short* owners, int slot, int begin, int end) {
+  if ((atomicOr(starts, 1u << begin) >> begin & 1) == 0) owners[begin] = RowOwner::of(static_cast<unsigned>(slot), end);
+  return end - begin;
+}
+/// Marks an interval. @return how many voxels it has
 template <class Shape>
 __device__ int mark(const IntervalTile<Shape>& tile, const RowInterval& in, int slot, int row) {
   if (in.is_empty()) return 0;
-  if ((atomicOr(&tile.memory.starts[row], 1u << in.begin) >> in.begin & 1) == 0)
-    tile.memory.owners[row][in.begin] = RowOwner::of(static_cast<unsigned>(slot), in.end);
-  return in.end - in.begin;
+  return put_interval(&tile.memory.starts[row], tile.memory.owners[row], slot, in.begin, in.end);
 }
 
 /// Leaves a row for later: calls would cost the loops over rows registers.
@@ -81,11 +85,7 @@ __device__ int mark_item(const IntervalTile<Shape>& tile, unsigned item) {
     if (!of.is_certain) {
       leave(memory, UnsureRow::of(slot, z * kTileJ + y, rows.doubt(of)));
     } else if (of.begin() < of.end()) {
-      const int begin = of.begin() & (kTileI - 1);
-      // Where another one starts there, the rows will have fewer voxels than were marked.
-      if ((atomicOr(starts, 1u << begin) >> begin & 1) == 0)
-        owners[begin] = RowOwner::of(static_cast<unsigned>(slot), of.end() - detail::kLiftedWhole);
-      marked += of.end() - of.begin();
+      marked += put_interval(starts, owners, slot, of.begin() & (kTileI - 1), of.end() - detail::kLiftedWhole);
     }
   }
   return marked;
@@ -152,11 +152,11 @@ __device__ int mark_unknown(const IntervalTile<Shape>& tile, unsigned unsure) {
   return mark(tile, {first_bit(owned), last_bit(owned) + 1}, slot, row);
 }
 
-/// Adds to the balance of a tile. To be called by whole warps.
+/// Adds what the lanes of a whole warp have to a sum of the tile.
 template <class Shape>
-__device__ void add_to_balance(const IntervalTile<Shape>& tile, int voxels) {
-  const int sum = __reduce_add_sync(kAllLanes, voxels);
-  if (tile.lane() == 0) atomicAdd(&tile.memory.balance, sum);
+__device__ void add_up(const IntervalTile<Shape>& tile, int voxels, unsigned& to) {
+  const unsigned sum = __reduce_add_sync(kAllLanes, static_cast<unsigned>(voxels));
+  if (tile.lane() == 0) atomicAdd(&to, sum);
 }
 
 /// Marks the intervals of all tetrahedra in the slots, an item a thread; then what lines left open.
@@ -183,7 +183,7 @@ __device__ void mark_all(const IntervalTile<Shape>& tile) {
 #pragma unroll 1
   for (unsigned n = static_cast<unsigned>(tile.warp()); n < unsure; n += kTileJ)
     if (UnsureRow::Unknown::get(memory.unsure[n]) != 0) marked += mark_unknown(tile, memory.unsure[n]);
-  add_to_balance(tile, marked);
+  add_up(tile, marked, memory.marked);
 }
 
 /// Reads the rows, a thread each: where nobody owns, an interval of nobody's starts, and voxels that have an owner are
@@ -213,9 +213,7 @@ __device__ void read_rows(const IntervalTile<Shape>& tile) {
     memory.starts[tile.thread] = starts | holes;
   }
   __syncwarp();
-  add_to_balance(tile, -owned);
-  const unsigned sum = __reduce_add_sync(kAllLanes, static_cast<unsigned>(owned));
-  if (tile.lane() == 0) atomicAdd(&memory.covered, sum);
+  add_up(tile, owned, memory.covered);
 }
 
 /// Slots in the order of their tetrahedra's numbers, in the place of items.

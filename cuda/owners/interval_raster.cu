@@ -60,7 +60,7 @@ bool IntervalRaster::suits(const StepLattice& lattice, const SlabBox& box, bool 
 }
 
 template <int kDepth>
-auto IntervalRaster::make_task(const LatticeOnDevice& lattice, const SlabBox& box) const {
+auto IntervalRaster::make_task(const LatticeOnDevice& lattice, const SlabBox& box) {
   const DeviceField& field = lattice.field();
   TileTask<LatticeShape<kDepth>> task{};
   task.turns = NudgeTurns(field.frame.nudge);
@@ -72,10 +72,13 @@ auto IntervalRaster::make_task(const LatticeOnDevice& lattice, const SlabBox& bo
     task.origin[axis] = origin;
     task.tiles[axis] = (task.box.end[axis] - origin + size[axis] - 1) / size[axis];
   }
-  task.records = {records_.data(), tetrahedra_of(field.steps)};
-  task.counters = counters_.data();
-  const Tiles& tiles = kDepth == kTileK ? deep_ : flat_;
-  task.shape = {field.steps, tiles.counts.data(), tiles.lists.data(), nullptr, glm::ivec3(0)};
+  const auto tetrahedra = static_cast<std::size_t>(tetrahedra_of(field.steps)),
+             tiles = static_cast<std::size_t>(count_of(task.tiles));
+  task.records = {records_.reserve(tetrahedra * kRecordQuads), static_cast<std::int64_t>(tetrahedra)};
+  task.counters = counters_.reserve(1);
+  Tiles& held = kDepth == kTileK ? deep_ : flat_;
+  task.shape = {field.steps, held.counts.reserve(tiles), held.lists.reserve(tiles * slots_of(kDepth)), nullptr,
+                glm::ivec3(0)};
   if (kDepth == kFlat && tried_deep_) {
     task.shape.deep = deep_.counts.data();
     task.shape.deep_tiles = {task.tiles.x, task.tiles.y, (task.tiles.z + 1) / 2};
@@ -86,16 +89,10 @@ auto IntervalRaster::make_task(const LatticeOnDevice& lattice, const SlabBox& bo
 template <int kDepth, class Sink>
 TileCounters IntervalRaster::run_tiles(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink,
                                        cudaStream_t stream) {
-  auto task = make_task<kDepth>(lattice, box);
-  using Shape = decltype(task.shape);
-  Tiles& tiles = kDepth == kTileK ? deep_ : flat_;
-  const auto count = static_cast<std::size_t>(count_of(task.tiles));
-  task.shape.lists = tiles.lists.reserve(count * Shape::kSlots);
-  tiles.counts.fill(0, count, stream);
-  task.shape.counts = tiles.counts.data();
+  const auto task = make_task<kDepth>(lattice, box);
+  Tiles& held = kDepth == kTileK ? deep_ : flat_;
+  held.counts.fill(0, static_cast<std::size_t>(count_of(task.tiles)), stream);
   counters_.fill(0, 1, stream);
-  task.counters = counters_.data();
-  task.records.quads = records_.reserve(static_cast<std::size_t>(task.records.count * kRecordQuads));
   if (!has_records_) {
     record_kernel<<<blocks_for(task.records.count), kThreads, 0, stream>>>(task.shape, task.records);
     has_records_ = true;
@@ -123,7 +120,7 @@ TileCounters IntervalRaster::run(const LatticeOnDevice& lattice, const SlabBox& 
 }
 
 void IntervalRaster::mark_left(const LatticeOnDevice& lattice, const SlabBox& box, std::uint32_t* several,
-                               cudaStream_t stream) const {
+                               cudaStream_t stream) {
   const auto task = make_task<kFlat>(lattice, box);
   mark_left_kernel<<<static_cast<unsigned>(count_of(task.tiles)), kTileJ * kFlat, 0, stream>>>(task, several);
   TETWARP_CUDA_TRY(cudaGetLastError());

@@ -33,7 +33,7 @@ class IntervalRaster {
   TileCounters run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream);
   /// Sets the bits of the voxels of tiles that were left. @param several  of the box of the last run, rows from a word
   /// on
-  void mark_left(const LatticeOnDevice& lattice, const SlabBox& box, std::uint32_t* several, cudaStream_t stream) const;
+  void mark_left(const LatticeOnDevice& lattice, const SlabBox& box, std::uint32_t* several, cudaStream_t stream);
 
   /// To be called when the field is another one.
   void forget_field() { has_records_ = false; }
@@ -44,9 +44,9 @@ class IntervalRaster {
     DeviceBuffer<TileCount> counts;  ///< of each tile, i fastest
     DeviceBuffer<unsigned> lists;    ///< of each tile, the numbers of its tetrahedra
   };
-  /// Tiles of the last run as its kernels know them. @tparam kDepth  kTileK, or half of it
+  /// Tiles as their kernels know them, with room for all that these write. @tparam kDepth  kTileK, or half of it
   template <int kDepth>
-  auto make_task(const LatticeOnDevice& lattice, const SlabBox& box) const;
+  auto make_task(const LatticeOnDevice& lattice, const SlabBox& box);
   /// One pass over the tiles of one depth; of those without room at twice the depth, if that was tried.
   template <int kDepth, class Sink>
   TileCounters run_tiles(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream);

@@ -57,10 +57,7 @@ __device__ void read_tetrahedra(const IntervalTile<Shape>& tile) {
     const int zone = shift_lines(lines, reach_of(tile, words, own));
     const auto lower = static_cast<int>(RecordFlags::Lower::get(flags)),
                upper = static_cast<int>(RecordFlags::Upper::get(flags));
-    auto* const ordered = reinterpret_cast<RowLine*>(memory.prepared[slot]);
-#pragma unroll
-    for (int face = 0; face < 4; ++face)
-      if (((lower | upper) >> face & 1) != 0) ordered[place_of_line(lower, upper, face)] = lines[face];
+    order_lines(lines, lower, upper, reinterpret_cast<RowLine*>(memory.prepared[slot]));
     const bool is_steep = RecordFlags::Steep::get(flags) != 0 || zone > detail::kMostZone;
     const RowSpan span{own.begin.y,   own.end.y,     own.begin.z,         own.end.z,
                        __popc(lower), __popc(upper), is_steep ? 0 : zone, is_steep};

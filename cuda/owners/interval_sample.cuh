@@ -40,7 +40,7 @@ struct ColumnSampler {
 
   template <bool kAllUsable>
   __device__ auto maps() const {
-    return CoarseMaps<kLineQuads, kAllUsable>{tile.memory.prepared, tile.memory.usable, kNobody};
+    return CoarseMaps<kAllUsable>{tile.memory.prepared, tile.memory.usable};
   }
 
   /// The column of this lane.

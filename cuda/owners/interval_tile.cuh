@@ -175,10 +175,10 @@ struct TileMemory {
   unsigned short owners[kRows][kTileI];
   unsigned short items[kSlots * kTileJ];
   unsigned usable[kSlots + 1];
-  unsigned long_items, short_items, unsure_count, steep_count, covered;
-  int balance;     ///< voxels of all marked intervals, less those of the rows as they are read
-  bool is_border;  ///< whether voxels may come from the border of the source
-  bool is_slow;    ///< whether a map may not be used
+  unsigned long_items, short_items, unsure_count, steep_count;
+  unsigned marked, covered;  ///< voxels of all marked intervals; and of those that are found as the rows are read
+  bool is_border;            ///< whether voxels may come from the border of the source
+  bool is_slow;              ///< whether a map may not be used
 
   /// The slot that owns a voxel, or kNobody.
   __device__ unsigned owner_of(int row, int x) const {

@@ -72,16 +72,10 @@ __global__ void map_table_kernel(const __grid_constant__ StepLattice lattice, st
   }
   const Tetrahedron of = vertices_of(lattice, t);
   const CoarseMap map(of);
-  bool usable = !map.is_thin;
-  for (const Vertex* v : {&of.a, &of.b, &of.c, &of.d}) {
-#pragma unroll
-    for (int axis = 0; axis < 3; ++axis) usable &= v->u[axis] > -kFarForInt32 && v->u[axis] < kFarForInt32;
-  }
-  const glm::i64vec3 u = map.u(glm::ivec3(0));
   int4* entry = maps + n * kMapQuads;
 #pragma unroll
-  for (int axis = 0; axis < 3; ++axis) entry[axis] = map_axis(map, u, axis);
-  if (!usable) entry[0].y = kUnusable;
+  for (int axis = 0; axis < 3; ++axis) entry[axis] = map_axis(map, axis);
+  if (!is_usable(map, of)) entry[0].y = kUnusable;
 }
 
 }  // namespace

@@ -20,12 +20,7 @@ __device__ __noinline__ glm::vec3 interpolate_exactly(MeshRaster::View mesh, uns
 template <class Sink>
 __device__ __noinline__ bool write_mesh_voxel(const MeshRaster::View& mesh, const Sink& sink, unsigned number, int out,
                                               glm::ivec3 at, glm::i32vec3 signs) {
-  const Tetrahedron t = mesh.tetrahedron(number);
-  if constexpr (Sink::kLerp == Lerp::fused) {
-    return sink.write(out, at, fixed_offset(coarse_u(t, at, signs)));
-  } else {
-    return sink.write(out, at, interpolate_u(t, at * kStepsPerVoxel, signs));
-  }
+  return sink.write(out, at, interpolate_u(mesh.tetrahedron(number), at * kStepsPerVoxel, signs));
 }
 __device__ __noinline__ glm::i64vec3 thin_u_of(MeshRaster::View mesh, unsigned number, glm::ivec3 at,
                                                glm::i32vec3 signs) {

@@ -82,13 +82,11 @@ __device__ void put_record(const Records& records, std::int64_t n, const Tetrahe
   RowLines rows;
   if (fits_int64(box)) rows = make_row_lines(a, b, c, d, VoxelRange::middle(ranges));
   const CoarseMap map(t);
-  bool usable = !map.is_thin, rests = true;
+  const bool usable = is_usable(map, t);
+  bool rests = true;
   for (const Vertex* v : {&t.a, &t.b, &t.c, &t.d}) {
 #pragma unroll
-    for (int axis = 0; axis < 3; ++axis) {
-      usable &= v->u[axis] > -kFarForInt32 && v->u[axis] < kFarForInt32;
-      rests &= v->u[axis] == 0;
-    }
+    for (int axis = 0; axis < 3; ++axis) rests &= v->u[axis] == 0;
   }
   const auto flag = [](bool is) { return is ? 1 : 0; };
   records.box(n) =
@@ -104,12 +102,7 @@ __device__ void put_record(const Records& records, std::int64_t n, const Tetrahe
   records.line(n, 1) = quad(l[1].along_y, l[1].along_z, l[2].at, l[2].along_y);
   records.line(n, 2) = quad(l[2].along_z, l[3].at, l[3].along_y, l[3].along_z);
 #pragma unroll
-  for (int axis = 0; axis < 3; ++axis) {
-    int4 of =
-        make_int4(static_cast<int>(map.at_origin[axis]), map.slope[0][axis], map.slope[1][axis], map.slope[2][axis]);
-    of.x = u_on_axis(of, -map.origin);
-    records.map(n, axis) = of;
-  }
+  for (int axis = 0; axis < 3; ++axis) records.map(n, axis) = map_axis(map, axis);
 }
 
 /// The lines of three quads.

@@ -21,10 +21,10 @@ struct RowLine {
 /// A face that has a whole row on one side, and all of them along y or z as well, has no line: the box of the
 /// tetrahedron says what it does.
 struct RowLines {
-  RowLine lines[4]{};        ///< of the faces opposite A, B, C and D
-  int lower = 0, upper = 0;  ///< bits of the faces through which rows enter, and through which they leave
-  bool is_steep = true;      ///< whether only bounds of the error of each line tell enough
-  // Where both are 0 nothing is known.
+  RowLine lines[4]{};  ///< of the faces opposite A, B, C and D
+  /// Bits of the faces through which rows enter, and through which they leave; where both are 0 nothing is known.
+  int lower = 0, upper = 0;
+  bool is_steep = true;  ///< whether only bounds of the error of each line tell enough
 };
 
 namespace detail {
@@ -35,6 +35,9 @@ constexpr int kLineBits = 17;
 constexpr float kLineLift = 65;
 constexpr int kLiftedWhole = (0x42820000 >> kLineBits) - 1;  ///< bits of 65.0f; minus one, for `ceil`
 static_assert(kLiftedWhole % 32 == 0 && kMostRowTile == 32);
+/// Greatest number of `zone` for which a row of one voxel may still be told.
+constexpr int kMostZone = 12;
+
 TETWARP_HD inline int count_bits(int bits) {
 #ifdef TETWARP_ON_DEVICE
   return __popc(bits);
@@ -42,9 +45,6 @@ TETWARP_HD inline int count_bits(int bits) {
   return std::popcount(static_cast<unsigned>(bits));
 #endif
 }
-/// Greatest number of `zone` for which a row of one voxel may still be told.
-constexpr int kMostZone = 12;
-
 TETWARP_HD inline int bits_of_float(float value) {
 #ifdef TETWARP_ON_DEVICE
   return __float_as_int(value);
@@ -115,6 +115,12 @@ TETWARP_HD inline RowLines make_row_lines(const glm::i32vec3& a, const glm::i32v
 TETWARP_HD inline int place_of_line(int lower, int upper, int face) {
   const int before = (1 << face) - 1;
   return (lower >> face & 1) != 0 ? detail::count_bits(lower & before) : 3 - detail::count_bits(upper & before);
+}
+
+/// Puts the lines that there are in that order. @param lines  of `RowLines`, or moved  @param ordered  four
+TETWARP_HD inline void order_lines(const RowLine (&lines)[4], int lower, int upper, RowLine* ordered) {
+  for (int face = 0; face < 4; ++face)
+    if (((lower | upper) >> face & 1) != 0) ordered[place_of_line(lower, upper, face)] = lines[face];
 }
 
 /// The rows of a tile that a tetrahedron may reach, seen from where its lines begin.
@@ -219,7 +225,7 @@ class LinesAlongZ {
  public:
   /// @param lines         as `place_of_line` orders them
   /// @param lower, upper  how many rows enter through, and leave
-  /// @param zone  of `shift_lines`, at most kMostZone  @param count  voxels of a row
+  /// @param zone          of `shift_lines`, at most kMostZone  @param count  voxels of a row
   TETWARP_HD LinesAlongZ(const RowLine (&lines)[4], int lower, int upper, int zone, int y, int count)
       : least_(detail::kLineLift - 0.5f),
         most_(detail::kLineLift - 0.5f + static_cast<float>(count)),

@@ -57,8 +57,7 @@ void expect_lines(const Tetrahedron& t, const Tile& tile, Checked& checked) {
   if (lower + upper == 0) return;
   ASSERT_TRUE(lower >= 1 && upper >= 1 && lower + upper <= 4 && (of.lower & of.upper) == 0);
   RowLine lines[4]{};
-  for (int face = 0; face < 4; ++face)
-    if (((of.lower | of.upper) >> face & 1) != 0) lines[place_of_line(of.lower, of.upper, face)] = of.lines[face];
+  order_lines(of.lines, of.lower, of.upper, lines);
   const RowReach reach{tile.first - middle, rows.begin - tile.first, rows.end - 1 - tile.first, tile.signs};
   const int zone = shift_lines(lines, reach);
   const bool is_steep = of.is_steep || zone > detail::kMostZone;
