@@ -33,10 +33,18 @@ bool is_main_thread() { return PyThread_get_thread_ident() == main_thread; }
 /// lock later is ended by Python amid C++, which ends the process.
 class Calls {
  public:
+  /// To be called with the interpreter's lock. Goes no further, without it, if the interpreter ends: an error would
+  /// only be printed by a thread that nobody waits for.
   void begin(std::stop_source* stop) {
-    const std::lock_guard lock(mutex_);
-    if (closed_ && !is_main_thread()) throw Cancelled();
-    stops_.push_back(stop);
+    {
+      const std::lock_guard lock(mutex_);
+      if (!closed_ || is_main_thread()) {
+        stops_.push_back(stop);
+        return;
+      }
+    }
+    const nb::gil_scoped_release released;
+    stay();
   }
   void end(std::stop_source* stop) {
     const std::lock_guard lock(mutex_);
@@ -49,7 +57,7 @@ class Calls {
       if (!closed_ || is_main_thread()) return;
       remove(stop);
     }
-    for (;;) ::pause();
+    stay();
   }
   /// Stops all, waits until their work has ended, and lets none go on in other threads than the main one.
   void close() {
@@ -60,6 +68,9 @@ class Calls {
   }
 
  private:
+  [[noreturn]] static void stay() {
+    for (;;) ::pause();
+  }
   void remove(std::stop_source* stop) {
     std::erase(stops_, stop);
     if (stops_.empty()) none_.notify_all();

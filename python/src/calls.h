@@ -29,9 +29,10 @@ struct CallOptions {
 /// Called from the main thread of Python, it looks for signals every 20 ms while the work is done by another thread: an
 /// exception of a signal's handler, such as KeyboardInterrupt, stops the work and is raised. Work that is small is done
 /// at once by the calling thread, as it is in any thread but the main one, which gets no signals. An exception of
-/// `progress` stops the work too, and is raised. When the interpreter ends, calls of daemon threads are stopped.
+/// `progress` stops the work too, and is raised. When the interpreter ends, calls of daemon threads are stopped
+/// and never return, nor do later ones of such threads.
 /// @param small  whether the work surely takes less than 20 ms
-/// @throws what the work throws, and Cancelled once the interpreter ends
+/// @throws what the work throws
 void run_call(const CallOptions& options, bool small, const std::function<void(const Control&)>& work);
 
 /// A file of fewer voxels or vectors than this is surely written in less than 20 ms.
