@@ -43,7 +43,7 @@ std::unique_ptr<Simulation> make_simulation(BackendKind backend, Method method, 
   const bool chainmail = method == Method::chainmail;
   if (backend == BackendKind::cuda)
     return chainmail ? make_cuda_chainmail(model, device) : make_cuda_mass_spring(model, device);
-  return chainmail ? make_cpu_chainmail(model, limits) : make_cpu_mass_spring(model, {}, limits);
+  return chainmail ? make_cpu_chainmail(model, limits) : make_cpu_mass_spring(model, limits);
 }
 
 }  // namespace simulate

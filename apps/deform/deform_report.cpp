@@ -88,7 +88,10 @@ json input_json(const DeformRun& run, const DeformWritten& written) {
 }
 
 json simulation_json(const SimulationSource& source) {
-  json document = {{"scenario_sha256", source.scenario_sha256}, {"method", source.method}, {"backend", source.backend}};
+  json document = {{"scenario_sha256", source.scenario_sha256},
+                   {"method", source.method},
+                   {"method_version", source.method_version},
+                   {"backend", source.backend}};
   if (!source.labels.empty()) document["labels_sha256"] = source.labels_sha256;
   return document;
 }

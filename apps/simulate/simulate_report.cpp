@@ -109,6 +109,7 @@ json document_of(const SimulateRecord& record) {
   document["labels"] = options.labels.empty() ? json() : json(options.labels.string());
   document["output"] = options.output.string();
   document["method"] = name_of(record.scenario.method);
+  document["method_version"] = version_of(record.scenario.method);
   document["backend"] = record.backend;
   document["cell_size"] = record.scenario.cell_size;
   document["lattice"] = to_json(record.patient.lattice);

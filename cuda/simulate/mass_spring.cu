@@ -8,7 +8,7 @@
 #include "cuda/runtime/launch.cuh"
 #include "cuda/runtime/stream.h"
 #include "cuda/runtime/warp.cuh"
-#include "deform/simulate/device_springs.h"
+#include "deform/simulate/spring_solver.h"
 
 namespace tetwarp::simulate {
 
@@ -17,9 +17,10 @@ namespace {
 using cuda_detail::DeviceBuffer;
 using cuda_detail::DeviceScope;
 
-unsigned blocks_for(std::size_t nodes) {
-  return cuda_detail::blocks_for(static_cast<std::int64_t>(nodes), kDeviceBlock);
-}
+/// Threads of a block: one a node whose sum is made with it.
+constexpr int kBlock = kSumBlock;
+
+unsigned blocks_for(std::size_t nodes) { return cuda_detail::blocks_for(static_cast<std::int64_t>(nodes), kBlock); }
 
 /// Calls a sweep for every node; a thread a node.
 ///
@@ -27,12 +28,12 @@ unsigned blocks_for(std::size_t nodes) {
 template <class Sweep>
 __global__ void each_kernel(Sweep sweep, std::size_t nodes) {
   if (sweep.is_idle()) return;
-  const std::size_t n = std::size_t{blockIdx.x} * kDeviceBlock + threadIdx.x;
+  const std::size_t n = std::size_t{blockIdx.x} * kBlock + threadIdx.x;
   if (n < nodes) sweep(n);
 }
 
-/// Adds up what a sweep gives for every node, a thread a node. The block that arrives last adds up what all left, in an
-/// order that does not depend on which it is.
+/// Adds up what a sweep gives for every node, a thread a node, in the order that kSumBlock states. The block that
+/// arrives last adds up what all left.
 ///
 /// @param sweep     `sweep(n)` gives what is added for node n  @param then  `then(sum)` is called by one thread
 /// @param of_block  room for the sum of each block: written, and read by the last block
@@ -40,8 +41,8 @@ __global__ void each_kernel(Sweep sweep, std::size_t nodes) {
 template <class T, class Sweep, class Then>
 __global__ void sum_kernel(Sweep sweep, Then then, std::size_t nodes, T* of_block, unsigned* arrived) {
   if (sweep.is_idle()) return;
-  const std::size_t n = std::size_t{blockIdx.x} * kDeviceBlock + threadIdx.x;
-  const T sum = cuda_detail::sum_of_block<kDeviceBlock>(n < nodes ? sweep(n) : T{});
+  const std::size_t n = std::size_t{blockIdx.x} * kBlock + threadIdx.x;
+  const T sum = cuda_detail::sum_of_block<kBlock>(n < nodes ? sweep(n) : T{});
   __shared__ bool is_last;
   if (threadIdx.x == 0) {
     of_block[blockIdx.x] = sum;
@@ -52,8 +53,8 @@ __global__ void sum_kernel(Sweep sweep, Then then, std::size_t nodes, T* of_bloc
   if (!is_last) return;
   __threadfence();
   T own{};
-  for (unsigned block = threadIdx.x; block < gridDim.x; block += kDeviceBlock) own.add(of_block[block]);
-  const T total = cuda_detail::sum_of_block<kDeviceBlock>(own);
+  for (unsigned block = threadIdx.x; block < gridDim.x; block += kBlock) own.add(of_block[block]);
+  const T total = cuda_detail::sum_of_block<kBlock>(own);
   if (threadIdx.x == 0) {
     *arrived = 0;
     then(total);
@@ -89,10 +90,11 @@ class Graph {
   cudaGraphExec_t graph_ = nullptr;
 };
 
-/// See DeviceSprings.
+/// See SpringSolver.
 class CudaMachine {
  public:
   static constexpr Memory kMemory = Memory::device;
+  static constexpr bool kReadsLinks = true;
   template <class T>
   using Buffer = DeviceBuffer<T>;
 
@@ -103,6 +105,7 @@ class CudaMachine {
     pinned_.reserve(1);
   }
 
+  std::size_t padding() const { return 0; }
   DeviceScope scope() const { return DeviceScope(device_); }
   void set_stream(void* stream) { stream_ = static_cast<cudaStream_t>(stream); }
   void wait() const { TETWARP_CUDA_TRY(cudaStreamSynchronize(stream_)); }
@@ -128,14 +131,14 @@ class CudaMachine {
 
   template <class Sweep>
   void each(std::size_t nodes, const Sweep& sweep) {
-    each_kernel<<<blocks_for(nodes), kDeviceBlock, 0, stream_>>>(sweep, nodes);
+    each_kernel<<<blocks_for(nodes), kBlock, 0, stream_>>>(sweep, nodes);
     TETWARP_CUDA_TRY(cudaGetLastError());
   }
   template <class T, class Sweep, class Then>
   void sum(std::size_t nodes, const Sweep& sweep, const Then& then) {
     static_assert(sizeof(T) <= sizeof(Ways));
     T* const of_block = reinterpret_cast<T*>(of_block_.data());
-    sum_kernel<T><<<blocks_for(nodes), kDeviceBlock, 0, stream_>>>(sweep, then, nodes, of_block, arrived_.data());
+    sum_kernel<T><<<blocks_for(nodes), kBlock, 0, stream_>>>(sweep, then, nodes, of_block, arrived_.data());
     TETWARP_CUDA_TRY(cudaGetLastError());
   }
   template <class Work>
@@ -167,7 +170,7 @@ class CudaMachine {
 
 std::unique_ptr<Simulation> make_cuda_mass_spring(const Model& model, int device) {
   require_springs(model);
-  return make_mass_spring(model, std::make_unique<DeviceSprings<CudaMachine>>(model, device, model.nodes()));
+  return make_mass_spring(model, std::make_unique<SpringSolver<CudaMachine>>(model, device, model.nodes()));
 }
 
 }  // namespace tetwarp::simulate

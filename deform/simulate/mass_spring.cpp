@@ -187,9 +187,9 @@ std::unique_ptr<Simulation> make_mass_spring(const Model& model, std::unique_ptr
   return std::make_unique<MassSpring>(model, std::move(engine));
 }
 
-std::unique_ptr<Simulation> make_cpu_mass_spring(const Model& model, const MassSpringOptions& options, Limits limits) {
+std::unique_ptr<Simulation> make_cpu_mass_spring(const Model& model, Limits limits) {
   require_springs(model);
-  return make_mass_spring(model, make_cpu_springs(model, options, limits));
+  return make_mass_spring(model, make_cpu_springs(model, limits));
 }
 
 }  // namespace tetwarp::simulate

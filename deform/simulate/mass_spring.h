@@ -12,19 +12,6 @@
 
 namespace tetwarp::simulate {
 
-/// How mass-spring simulations solve their linear systems.
-struct MassSpringOptions {
-  /// How the global step on the CPU solves with the Laplacian of the springs.
-  enum class Solver : std::uint8_t {
-    automatic,  ///< `cholesky` up to kMostNodesForCholesky nodes, `pcg` above
-    cholesky,   ///< factored once for each set of placed nodes; memory grows as nodes^(4/3)
-    pcg,        ///< preconditioned conjugate gradients, without a matrix
-  };
-  Solver solver = Solver::automatic;  ///< choice of the solver
-};
-/// Largest number of nodes for which Solver::automatic factors the matrix.
-inline constexpr std::size_t kMostNodesForCholesky = 20'000;
-
 /// Springs along all links of a model, without force where nothing has moved. The simulation is quasi-static: every
 /// call of `advance` goes to a minimum of the energy; mass and time play no part.
 ///
@@ -36,16 +23,13 @@ inline constexpr std::size_t kMostNodesForCholesky = 20'000;
 ///
 /// Nodes that no springs tie to a placed node stay where they are, whatever force acts on them.
 ///
-/// Every run on the CPU gives the same bits, for any number of threads; a device gives others, within the stopping
-/// rule.
+/// Every run gives the same bits, for any number of threads and on every backend.
 ///
-/// @param model    nodes, links and their moduli (model.h); must outlive the simulation unchanged
-/// @param options  choice of the solver
-/// @param limits   number of threads
+/// @param model   nodes, links and their moduli (model.h); must outlive the simulation unchanged
+/// @param limits  number of threads
 /// @throws InputError for a model whose arrays do not fit each other. The simulation's `set_loads` refuses forces where
 ///         no node is placed.
-std::unique_ptr<Simulation> make_cpu_mass_spring(const Model& model, const MassSpringOptions& options = {},
-                                                 Limits limits = {});
+std::unique_ptr<Simulation> make_cpu_mass_spring(const Model& model, Limits limits = {});
 
 /// Energy of the springs, N mm: the sum of k/2 (length - rest length)^2 over all springs.
 /// @param model         model whose springs are summed

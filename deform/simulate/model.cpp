@@ -187,4 +187,9 @@ glm::dvec3 rest_link(const Geometry& lattice, int direction) {
   return lattice.direction * (lattice.spacing * glm::dvec3(link_steps(direction)));
 }
 
+std::ptrdiff_t link_distance(const Geometry& lattice, int direction) {
+  const glm::i64vec3 steps(link_steps(direction));
+  return steps.x + lattice.size.x * (steps.y + lattice.size.y * steps.z);
+}
+
 }  // namespace tetwarp::simulate

@@ -110,5 +110,7 @@ Model make_model(const Geometry& lattice, std::span<const std::uint8_t> tissue_o
 
 /// The vector, LPS mm, from an undeformed node to its neighbour in a direction.
 glm::dvec3 rest_link(const Geometry& lattice, int direction);
+/// How far the number of a vertex is from that of its neighbour in a direction.
+std::ptrdiff_t link_distance(const Geometry& lattice, int direction);
 
 }  // namespace tetwarp::simulate

@@ -21,6 +21,9 @@ enum class Method : std::uint8_t {
   mass_spring  ///< springs in equilibrium (`make_cpu_mass_spring`)
 };
 
+/// The state of a method's arithmetic: it rises whenever the same scenario gives a field of other bits.
+constexpr int version_of(Method method) { return method == Method::mass_spring ? 2 : 1; }
+
 /// A tissue and the cells that it fills: those that meet all of its conditions.
 struct TissueClass {
   Tissue tissue;                     ///< its properties

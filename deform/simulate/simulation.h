@@ -47,8 +47,7 @@ struct Convergence {
 /// Moves the nodes of one model. Each method and backend has its own implementation. One object serves one thread at a
 /// time.
 ///
-/// The result depends on model, loads and rule alone, not on threads. ChainMail gives the same bits on every backend;
-/// mass-spring gives the same bits on every run of one backend.
+/// The result depends on model, loads and rule alone, not on threads: both methods give the same bits on every backend.
 class Simulation {
  public:
   /// Frees what the simulation holds; the model is not owned.

@@ -32,7 +32,7 @@ void for_each_spring(const Model& model, std::span<const glm::vec3> displacement
 double energy(const Model& model, std::span<const glm::vec3> displacement) {
   double sum = 0;
   for_each_spring(model, displacement, [&](std::size_t, const Stretched<double>& spring, double stiffness) {
-    sum += stiffness / 4 * spring.elongation * spring.elongation;
+    sum += Pull(spring, stiffness).energy / 4;
   });
   return sum;
 }
@@ -40,7 +40,7 @@ double energy(const Model& model, std::span<const glm::vec3> displacement) {
 std::vector<glm::dvec3> net_forces(const Model& model, std::span<const glm::vec3> displacement) {
   std::vector<glm::dvec3> result(model.nodes(), glm::dvec3(0));
   for_each_spring(model, displacement, [&](std::size_t n, const Stretched<double>& spring, double stiffness) {
-    result[n] += stiffness * spring.elongation * spring.unit;
+    result[n] += Pull(spring, stiffness).force;
   });
   return result;
 }

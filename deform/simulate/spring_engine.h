@@ -116,6 +116,6 @@ class SpringEngine {
 /// A simulation that takes its steps with an engine.
 std::unique_ptr<Simulation> make_mass_spring(const Model& model, std::unique_ptr<SpringEngine> engine);
 
-std::unique_ptr<SpringEngine> make_cpu_springs(const Model& model, const MassSpringOptions& options, Limits limits);
+std::unique_ptr<SpringEngine> make_cpu_springs(const Model& model, Limits limits);
 
 }  // namespace tetwarp::simulate

@@ -8,19 +8,14 @@
 namespace tetwarp::simulate {
 
 SpringGrid::SpringGrid(const Model& model) : nodes(model.nodes()) {
-  const glm::i64vec3& size = model.lattice.size;
   std::ptrdiff_t furthest = 0;
-  for (int d = 0; d < kDirections; ++d) {
-    const glm::dvec3 along = rest_link(model.lattice, d);
-    rest[static_cast<std::size_t>(d)] = {along, std::sqrt(dot3(along, along))};
-    if (d < kUp) continue;
-    const glm::i64vec3 steps(link_steps(d));
-    const std::ptrdiff_t far = steps.x + size.x * (steps.y + size.y * steps.z);
+  for (int d = kUp; d < kDirections; ++d) {
+    const std::ptrdiff_t far = link_distance(model.lattice, d);
     distance[static_cast<std::size_t>(d - kUp)] = far;
     furthest = std::max(furthest, far);
   }
   padding = static_cast<std::size_t>(furthest) + kLanes;
-  for (Padded<float>& values : stiffness) values = Padded<float>(nodes, padding);
+  for (std::vector<float>& values : stiffness) values.assign(nodes + 2 * padding, 0);
   for (std::size_t n = 0; n < nodes; ++n) {
     if (n % kBlock == 0) first_odd.push_back(odd.size());
     for (int d = 0; d < kDirections; ++d) {
@@ -32,11 +27,12 @@ SpringGrid::SpringGrid(const Model& model) : nodes(model.nodes()) {
       if (static_cast<std::ptrdiff_t>(n) + far != other) {
         odd.push_back({static_cast<std::uint32_t>(n), static_cast<std::uint32_t>(other), d, model.stiffness[link]});
       } else if (d >= kUp) {
-        stiffness[up][n] = model.stiffness[link];
+        stiffness[up][padding + n] = model.stiffness[link];
       }
     }
   }
   first_odd.push_back(odd.size());
+  odd_matrix.resize(odd.size());
 }
 
 }  // namespace tetwarp::simulate

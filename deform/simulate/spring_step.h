@@ -27,9 +27,12 @@ TETWARP_HD T dot3(const glm::vec<3, T>& a, const glm::vec<3, T>& b) {
 /// A spring at the present displacement.
 template <class T>
 struct Stretched {
-  glm::vec<3, T> unit;  ///< from the node to its neighbour
-  T elongation;         ///< mm: length minus rest length
-  T tension;            ///< elongation over length: below 1, and negative where the spring is compressed
+  glm::vec<3, T> along;  ///< from the node to its neighbour, mm
+  T length;              ///< mm: that of `along`, or a tiny one in its place
+  T elongation;          ///< mm: length minus rest length
+
+  /// Elongation over length: below 1, and negative where the spring is compressed.
+  TETWARP_HD T tension() const { return elongation / length; }
 };
 
 /// The spring of a link. @param apart  displacement of the neighbour minus that of the node, mm
@@ -39,11 +42,23 @@ struct Stretched {
 template <class T>
 TETWARP_HD Stretched<T> stretched(const RestLink<T>& rest, const glm::vec<3, T>& apart) {
   const T grown = 2 * dot3(rest.along, apart) + dot3(apart, apart);
-  const T square = rest.length * rest.length + grown, least = T(1e-12) * rest.length * rest.length;
+  const T at_rest = rest.length * rest.length, square = at_rest + grown, least = T(1e-12) * at_rest;
   const T length = std::sqrt(square > least ? square : least);
-  const T elongation = grown / (length + rest.length);
-  return {(rest.along + apart) / length, elongation, elongation / length};
+  return {rest.along + apart, length, grown / (length + rest.length)};
 }
+
+/// What a spring does to the node at its end.
+template <class T>
+struct Pull {
+  glm::vec<3, T> force;  ///< N
+  T energy;              ///< N mm: twice the energy of the spring
+
+  TETWARP_HD Pull(const Stretched<T>& spring, T stiffness) {
+    const T pull = stiffness * spring.elongation, share = pull / spring.length;
+    force = share * spring.along;
+    energy = pull * spring.elongation;
+  }
+};
 
 /// Which matrix stands for the second derivative of the energy. Each spring with direction n and constant k adds k [(1
 /// - t) n n^T + t I], with t as follows.
@@ -88,10 +103,11 @@ struct SpringMatrix {
 
 /// Second derivative of one spring's energy, computed in double and stored in float.
 TETWARP_HD inline SpringMatrix<float> spring_matrix(const Stretched<double>& spring, double stiffness, Stiffness kind) {
-  const double t = sideways(kind, spring.tension), root = std::sqrt(stiffness * (1 - t));
-  const glm::dvec3 across = root * spring.unit;
+  const double even = stiffness * sideways(kind, spring.tension()), rest = stiffness - even;
+  const double root = std::sqrt(rest > 0 ? rest : 0) / spring.length;
+  const glm::dvec3 across = root * spring.along;
   return {{static_cast<float>(across.x), static_cast<float>(across.y), static_cast<float>(across.z)},
-          static_cast<float>(stiffness * t)};
+          static_cast<float>(even)};
 }
 
 /// Inverse of a node's sum of spring matrices, for the preconditioner. The sum is singular, or worse, where springs let

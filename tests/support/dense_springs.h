@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <Eigen/Eigenvalues>
 #include <cmath>
 
 #include "tests/support/springs.h"
@@ -48,6 +49,21 @@ struct DenseSprings {
   static Eigen::Index rows(const Model& model) { return static_cast<Eigen::Index>(model.nodes()); }
 };
 
+/// Dense springs of which placed nodes, and components that no spring resists, stay as they are.
+/// @param part  share of the loads, 0 to 1
+inline DenseSprings dense_springs(const Model& model, const Loads& loads, double part,
+                                  const std::vector<glm::dvec3>& u) {
+  DenseSprings springs(model, u);
+  for (std::size_t n = 0; n < model.nodes(); ++n) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto row = static_cast<Eigen::Index>(3 * n) + axis;
+      if (!loads.force.empty()) springs.force(row) += part * double{loads.force[n][axis]};
+      if (loads.constraint[n] == Constraint::placed || springs.matrix(row, row) == 0) springs.fix(row);
+    }
+  }
+  return springs;
+}
+
 /// Finds an equilibrium by Newton's method with a dense matrix. @param part  share of the loads, 0 to 1
 inline void find_equilibrium(const Model& model, const Loads& loads, double part, std::vector<glm::dvec3>& u) {
   for (std::size_t n = 0; n < model.nodes(); ++n) {
@@ -55,14 +71,7 @@ inline void find_equilibrium(const Model& model, const Loads& loads, double part
       u[n] = part * glm::dvec3(loads.goal[n].x, loads.goal[n].y, loads.goal[n].z);
   }
   for (int step = 0; step < 60; ++step) {
-    DenseSprings springs(model, u);
-    for (std::size_t n = 0; n < model.nodes(); ++n) {
-      for (int axis = 0; axis < 3; ++axis) {
-        const auto row = static_cast<Eigen::Index>(3 * n) + axis;
-        if (!loads.force.empty()) springs.force(row) += part * double{loads.force[n][axis]};
-        if (loads.constraint[n] == Constraint::placed || springs.matrix(row, row) == 0) springs.fix(row);
-      }
-    }
+    const DenseSprings springs = dense_springs(model, loads, part, u);
     const Eigen::VectorXd motion = springs.matrix.fullPivLu().solve(springs.force);
     for (std::size_t n = 0; n < model.nodes(); ++n) {
       const auto row = static_cast<Eigen::Index>(3 * n);

@@ -6,15 +6,16 @@
 #include <algorithm>
 #include <vector>
 
-#include "deform/simulate/device_springs.h"
+#include "deform/simulate/spring_solver.h"
 
 namespace tetwarp::test {
 
-/// Runs the sweeps of DeviceSprings without a device, with sums in the order of CUDA's, so that their convergence can
-/// be tested on every machine.
+/// Runs the sweeps of SpringSolver one node after the other, as CUDA's threads do, with nothing but the sweeps' own
+/// code: what the CPU computes with vectors, and what CUDA computes, must have its bits.
 class PlainMachine {
  public:
   static constexpr Memory kMemory = Memory::host;
+  static constexpr bool kReadsLinks = true;
 
   template <class T>
   class Buffer {
@@ -32,6 +33,7 @@ class PlainMachine {
   struct Scope {
     ~Scope() {}  // makes holding a Scope count as a use of it
   };
+  std::size_t padding() const { return 0; }
   Scope scope() const { return {}; }
   void set_stream(void*) {}
   void wait() const {}
@@ -72,7 +74,7 @@ class PlainMachine {
   }
 
  private:
-  static constexpr std::size_t kThreads = simulate::kDeviceBlock;
+  static constexpr std::size_t kThreads = simulate::kSumBlock;
 
   template <class T>
   static T tree(std::vector<T>& of_thread) {

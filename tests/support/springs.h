@@ -34,19 +34,17 @@ struct SpringMethod {
 };
 
 inline std::vector<SpringMethod> methods() {
-  const auto on_cpu = [](MassSpringOptions::Solver solver) {
-    return [solver](const Model& model) { return make_cpu_mass_spring(model, {.solver = solver}, {.threads = 2}); };
-  };
   const std::string no_cuda =
       !has_cuda() ? "CUDA is not in this build" : (device_count() == 0 ? "no CUDA device on this machine" : "");
-  return {{.name = "cholesky", .cannot_run = "", .make = on_cpu(MassSpringOptions::Solver::cholesky)},
-          {.name = "pcg", .cannot_run = "", .make = on_cpu(MassSpringOptions::Solver::pcg)},
+  return {{.name = "cpu",
+           .cannot_run = "",
+           .make = [](const Model& model) { return make_cpu_mass_spring(model, {.threads = 2}); }},
           {.name = "device_code_on_cpu",
            .cannot_run = "",
            .make =
                [](const Model& model) {
                  require_springs(model);
-                 return make_mass_spring(model, std::make_unique<DeviceSprings<PlainMachine>>(model));
+                 return make_mass_spring(model, std::make_unique<SpringSolver<PlainMachine>>(model));
                }},
           {.name = "cuda", .cannot_run = no_cuda, .make = [](const Model& model) {
              return make_simulation(BackendKind::cuda, simulate::Method::mass_spring, model);

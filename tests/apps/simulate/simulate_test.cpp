@@ -8,6 +8,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "backend/devices.h"
 #include "io/field_file.h"
 #include "io/image_file.h"
 #include "tests/support/program.h"
@@ -90,6 +91,7 @@ TEST_F(Simulate, DeformMakesTheSameFieldByItself) {
   const json told = document("one_step.mha.json");
   EXPECT_EQ(told["field"]["sha256"], document("two_steps.mha.json")["field"]["sha256"]);
   EXPECT_EQ(told["field"]["simulation"]["method"], "chainmail");
+  EXPECT_EQ(told["field"]["simulation"]["method_version"], 1);
   EXPECT_EQ(told["options"]["scenario"], "push.json");
 }
 
@@ -112,6 +114,7 @@ TEST_F(Simulate, ReportSaysWhatWasDone) {
   const json report = document("report.json");
   EXPECT_EQ(report["command"], "simulate");
   EXPECT_EQ(report["method"], "chainmail");
+  EXPECT_EQ(report["method_version"], 1);
   EXPECT_EQ(report["backend"], "cpu");
   EXPECT_EQ(report["scenario"]["name"], "push");
   EXPECT_EQ(report["lattice"]["size"], json({25, 25, 16}));
@@ -358,6 +361,48 @@ TEST_F(Simulate, ShippedScenariosRunOnThePhantom) {
     }
     const Outcome deformed = run("deform ct.mha -f " + name + ".mha -o " + name + "_out.mha --outside background");
     EXPECT_EQ(deformed.status, 0) << deformed.err;
+  }
+}
+
+/// What a report says of a result: all but times, and where it was made.
+json result_of(json report) {
+  report.erase("stages");
+  report.erase("backend");
+  report.erase("device");
+  report.erase("output");
+  if (report.contains("field") && report["field"].contains("simulation"))
+    report["field"]["simulation"].erase("backend");
+  return report;
+}
+
+TEST_F(Simulate, ShippedScenariosHaveTheCpusBytesOnADevice) {
+  if (device_count() == 0) GTEST_SKIP() << "no CUDA device on this machine";
+  for (const auto& entry : std::filesystem::directory_iterator(TETWARP_SCENARIOS)) {
+    const std::string name = entry.path().stem().string();
+    SCOPED_TRACE(name);
+    json scenario = json::parse(read_text(entry.path()));
+    scenario["cell_size"] = 2;  // the phantom has few voxels
+    write_file(scratch_ / (name + ".json"), scenario.dump());
+    for (const std::string backend : {"cpu", "cuda"}) {
+      std::filesystem::create_directory(scratch_ / backend);
+      const std::string options = " --quiet --overwrite --backend " + backend + " -o " + backend;
+      ASSERT_EQ(
+          run("simulate " + name + ".json ct.mha --report " + backend + "/field.json" + options + "/field.mha").status,
+          0);
+      ASSERT_EQ(run("deform ct.mha --scenario " + name + ".json --outside background --report " + backend +
+                    "/volume.json" + options + "/volume.mha")
+                    .status,
+                0);
+    }
+    for (const char* file : {"/field.mha", "/volume.mha"}) {
+      EXPECT_TRUE(read_text(scratch_ / ("cpu" + std::string(file))) ==
+                  read_text(scratch_ / ("cuda" + std::string(file))))
+          << file;
+    }
+    for (const char* file : {"/field.json", "/volume.json"}) {
+      EXPECT_EQ(result_of(document("cpu" + std::string(file))), result_of(document("cuda" + std::string(file))))
+          << file;
+    }
   }
 }
 

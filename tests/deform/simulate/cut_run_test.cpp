@@ -14,6 +14,7 @@
 #include "deform/simulate/mass_spring.h"
 #include "deform/simulate/scenario_run.h"
 #include "tests/deform/simulate/scenario_volumes.h"
+#include "tests/support/springs.h"
 
 namespace tetwarp::simulate {
 namespace {
@@ -83,6 +84,26 @@ TEST(CutRun, FramesAreResampledThroughTheirFields) {
     EXPECT_EQ(of_loop.uncovered > 0, frame.phase == 0);
   }
   EXPECT_EQ(by_loop.voxels, source.voxels) << "closed again";
+}
+
+/// Where a cut ends within tissue, copies and vertices of the lattice are neighbours.
+TEST(CutRun, SpringsRoundACutHaveTheBitsOfOneNodeAfterTheOther) {
+  const Patient patient = uniform_patient();
+  const Scenario scenario = parted({"slit", DiscCutPlan{{{0, 0, 19}}, {0.1, 0, 1}, {13}}}, {2, 1, 6});
+  std::vector<std::vector<glm::vec3>> expected;
+  for (const tetwarp::test::SpringMethod& method : tetwarp::test::methods()) {
+    if (!method.cannot_run.empty()) continue;
+    ScenarioRun run(scenario, patient, method.make);
+    std::vector<std::vector<glm::vec3>> frames;
+    while (!run.is_done()) {
+      run.next();
+      frames.push_back(run.displacement());
+    }
+    EXPECT_GT(frames[0].size(), 11u * 11 * 6) << "there are copies";
+    if (expected.empty()) expected = frames;
+    EXPECT_TRUE(frames == expected) << method.name;
+  }
+  EXPECT_EQ(expected.size(), 3u);
 }
 
 TEST(CutRun, FramesOnADeviceHaveTheCpusBits) {

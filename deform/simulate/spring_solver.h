@@ -5,40 +5,63 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
 #include <vector>
 
-#include "deform/simulate/device_springs_nodes.h"
+#include "deform/simulate/spring_sweeps.h"
 
 namespace tetwarp::simulate {
 
-/// Threads that one device block has; sums are made block by block, as a tree over its threads, and then over blocks.
-inline constexpr int kDeviceBlock = 256;
+/// Nodes whose sum is made at a time. The sum of n terms is made in this order, on every machine: each block of
+/// kSumBlock terms, filled up with zeros, by `tree_sum`; then of the blocks' sums, those whose number leaves the same
+/// rest divided by kSumBlock one after the other; then these kSumBlock sums by `tree_sum`.
+inline constexpr std::size_t kSumBlock = 256;
 
-/// Mass-spring on a machine that runs sweeps over nodes. Only sums and, every kRepeats iterations, the state of
-/// conjugate gradients leave the machine's memory. A machine is
+/// Adds the upper half of terms to the lower half, until one term is left.
+template <class T>
+T tree_sum(T (&terms)[kSumBlock]) {
+  for (std::size_t half = kSumBlock / 2; half > 0; half /= 2) {
+    for (std::size_t t = 0; t < half; ++t) terms[t].add(terms[t + half]);
+  }
+  return terms[0];
+}
+
+/// Adds up what is left of blocks of kSumBlock terms.
+template <class T>
+T sum_of_blocks(std::span<const T> of_block) {
+  T terms[kSumBlock];
+  for (std::size_t block = 0; block < of_block.size(); ++block) terms[block % kSumBlock].add(of_block[block]);
+  return tree_sum(terms);
+}
+
+/// Mass-spring on a machine that runs sweeps over nodes. The same code runs on the CPU and on devices, and gives the
+/// same bits. Only sums and, every kRepeats iterations, the state of conjugate gradients leave the machine's memory. A
+/// machine is
 ///
 ///     template <class T> class Buffer;           // reserve(size), data()
+///     kReadsLinks;                               // whether it calls sweeps that read the table of links
+///     std::size_t padding();                     // numbers that vectors have before the first node and after the last
 ///     scope();                                   // what it returns holds while the machine is used
 ///     each(nodes, sweep);                        // sweep(n) for every node, unless sweep.is_idle()
-///     sum<T>(nodes, sweep, then);                // adds up what sweep(n) returns in an order of its own that never
-///                                                // changes, then calls then(total) where the sweep ran
+///     sum<T>(nodes, sweep, then);                // adds up what sweep(n) returns as kSumBlock says, then calls
+///                                                // then(total) where the sweep ran
 ///     repeat(times, work);                       // the same times and work in every call: it may be recorded
 ///     upload(place, host, size), wait();
 ///     T fetch(const T* place);                   // waits for what is queued, and brings a value to the host
-///
-/// so that the same code runs on a device and, in tests, on the CPU.
 template <class Machine>
-class DeviceSprings final : public SpringEngine {
+class SpringSolver final : public SpringEngine {
  public:
   static constexpr int kRepeats = 16;
 
   template <class... Given>
-  explicit DeviceSprings(const Model& model, Given&&... given)
+  explicit SpringSolver(const Model& model, Given&&... given)
       : machine_(std::forward<Given>(given)...), nodes_(model.nodes()) {
     const auto scope = machine_.scope();
-    a_.neighbour = hold(neighbour_, model.neighbour);
-    a_.stiffness = hold(stiffness_, model.stiffness);
+    if constexpr (Machine::kReadsLinks) {
+      a_.neighbour = hold(neighbour_, model.neighbour);
+      a_.stiffness = hold(stiffness_, model.stiffness);
+    }
     a_.role = hold(role_, std::vector<SpringRole>(nodes_, SpringRole::kept));
     a_.vertex = hold(vertex_, model.vertex);
     a_.rest_place = RestPlace(model.lattice);
@@ -46,16 +69,16 @@ class DeviceSprings final : public SpringEngine {
     for (int d = 0; d < kDirections; ++d) {
       const glm::dvec3 along = rest_link(model.lattice, d);
       a_.rest[d] = {along, std::sqrt(dot3(along, along))};
+      a_.distance[d] = static_cast<std::int32_t>(link_distance(model.lattice, d));
     }
-    const std::vector<glm::dvec3> zeros(nodes_, glm::dvec3(0));
-    glm::dvec3** const doubles[] = {&a_.u,         &a_.trial,   &a_.start, &a_.goal,       &a_.load,
-                                    &a_.load_from, &a_.load_to, &a_.force, &a_.trial_force};
-    for (std::size_t i = 0; i < std::size(doubles); ++i) *doubles[i] = hold(doubles_[i], zeros);
-    const std::vector<glm::vec3> float_zeros(nodes_, glm::vec3(0));
-    glm::vec3** const floats[] = {&a_.x, &a_.r, &a_.z, &a_.p, &a_.q, &a_.shown};
-    for (std::size_t i = 0; i < std::size(floats); ++i) *floats[i] = hold(floats_[i], float_zeros);
-    a_.matrix = matrix_.reserve(kUp * nodes_);
-    a_.inverse = inverse_.reserve(nodes_);
+    NodeVectors<double>* const doubles[] = {&a_.u,         &a_.trial,   &a_.start, &a_.goal,       &a_.load,
+                                            &a_.load_from, &a_.load_to, &a_.force, &a_.trial_force};
+    for (std::size_t i = 0; i < std::size(doubles); ++i) zeros(*doubles[i], doubles_[i], 3);
+    NodeVectors<float>* const floats[] = {&a_.x, &a_.r, &a_.z, &a_.p, &a_.q};
+    for (std::size_t i = 0; i < std::size(floats); ++i) zeros(*floats[i], floats_[i], 3);
+    zeros(a_.matrix, matrix_, LinkMatrices::kEntries * kUp);
+    zeros(a_.inverse, inverse_, 6);
+    a_.shown = hold(shown_, std::vector<glm::vec3>(nodes_, glm::vec3(0)));
     a_.state = state_.reserve(1);
     a_.result = result_.reserve(1);
     a_.ways = ways_.reserve(1);
@@ -66,7 +89,7 @@ class DeviceSprings final : public SpringEngine {
   void set_loads(const Loads& loads, std::span<const SpringRole> roles) override {
     const auto scope = machine_.scope();
     machine_.upload(role_.data(), roles.data(), nodes_);
-    const glm::vec3* goals = hold(given_goals_, loads.goal);
+    const glm::vec3* goals = hold(given_, loads.goal);
     const glm::vec3* forces = loads.force.empty() ? nullptr : hold(given_forces_, loads.force);
     machine_.each(nodes_, sweeps::TakeLoads{{a_}, goals, forces});
     machine_.wait();
@@ -74,10 +97,8 @@ class DeviceSprings final : public SpringEngine {
 
   void set_displacement(std::span<const glm::vec3> displacement) override {
     const auto scope = machine_.scope();
-    std::vector<glm::dvec3> given(nodes_);
-    std::transform(displacement.begin(), displacement.end(), given.begin(), sweeps::in_double);
-    machine_.upload(a_.u, given.data(), nodes_);
-    machine_.upload(a_.start, given.data(), nodes_);
+    machine_.each(nodes_, sweeps::Start{{a_}, hold(given_, displacement)});
+    machine_.wait();
   }
 
   Ways aim(double part) override {
@@ -144,11 +165,17 @@ class DeviceSprings final : public SpringEngine {
   template <class T>
   using Buffer = typename Machine::template Buffer<T>;
 
-  template <class T>
-  T* hold(Buffer<T>& buffer, const std::vector<T>& values) {
+  template <class T, class Values>
+  T* hold(Buffer<T>& buffer, const Values& values) {
     T* place = buffer.reserve(values.size());
     machine_.upload(place, values.data(), values.size());
     return place;
+  }
+  /// Gives numbers of nodes their place, each of some arrays of them with its padding.
+  template <class Numbers, class T>
+  void zeros(Numbers& numbers, Buffer<T>& buffer, std::size_t arrays) {
+    numbers.stride = nodes_ + 2 * machine_.padding();
+    numbers.data = hold(buffer, std::vector<T>(arrays * numbers.stride, T(0))) + machine_.padding();
   }
 
   void make_matrices(Stiffness kind) {
@@ -172,15 +199,13 @@ class DeviceSprings final : public SpringEngine {
 
   Machine machine_;
   std::size_t nodes_;
-  DeviceArrays a_{};
+  SpringArrays a_{};
   Buffer<std::int32_t> neighbour_;
   Buffer<std::uint32_t> vertex_;
-  Buffer<float> stiffness_;
+  Buffer<float> stiffness_, floats_[5], matrix_, inverse_;
   Buffer<SpringRole> role_;
-  Buffer<glm::dvec3> doubles_[9];
-  Buffer<glm::vec3> floats_[6], given_goals_, given_forces_;
-  Buffer<SpringMatrix<float>> matrix_;
-  Buffer<Symmetric<float>> inverse_;
+  Buffer<double> doubles_[9];
+  Buffer<glm::vec3> shown_, given_, given_forces_;
   Buffer<GradientState> state_;
   Buffer<Sums> result_;
   Buffer<Ways> ways_;

@@ -1,0 +1,327 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include <algorithm>
+#include <span>
+
+#include "deform/simulate/spring_grid.h"
+
+// Highway compiles this file once for each instruction set.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "deform/simulate/cpu_spring_sweeps.cpp"
+#include <hwy/foreach_target.h>
+// Highway wants this include after that one.
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+
+namespace tetwarp::simulate::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+/// All instruction sets give the same bits, for every lane is a node of its own and no operations are fused.
+using Doubles = hn::CappedTag<double, 8>;
+using Halves = hn::Rebind<float, Doubles>;
+using Floats = hn::CappedTag<float, 16>;
+
+/// Springs in one direction at some displacement.
+struct Springs {
+  hn::Vec<Doubles> x, y, z;  ///< from a node to its neighbour
+  hn::Vec<Doubles> length, elongation;
+
+  /// Computes what `stretched` computes, with the same operations.
+  HWY_INLINE Springs(const RestLink<double>& rest, const NodeVectors<double>& u, std::size_t n,
+                     std::ptrdiff_t distance) {
+    const Doubles d;
+    const auto apart = [&](std::size_t axis) HWY_ATTR {
+      const double* at = u.axis(axis) + n;
+      return hn::Sub(hn::LoadU(d, at + distance), hn::LoadU(d, at));
+    };
+    const auto ex = apart(0), ey = apart(1), ez = apart(2);
+    const auto rx = hn::Set(d, rest.along.x), ry = hn::Set(d, rest.along.y), rz = hn::Set(d, rest.along.z);
+    const auto across = hn::Add(hn::Add(hn::Mul(rx, ex), hn::Mul(ry, ey)), hn::Mul(rz, ez));
+    const auto square = hn::Add(hn::Add(hn::Mul(ex, ex), hn::Mul(ey, ey)), hn::Mul(ez, ez));
+    const auto grown = hn::Add(hn::Add(across, across), square);
+    const double at_rest = rest.length * rest.length;
+    length = hn::Sqrt(hn::Max(hn::Add(hn::Set(d, at_rest), grown), hn::Set(d, 1e-12 * at_rest)));
+    elongation = hn::Div(grown, hn::Add(length, hn::Set(d, rest.length)));
+    x = hn::Add(rx, ex);
+    y = hn::Add(ry, ey);
+    z = hn::Add(rz, ez);
+  }
+};
+
+/// Whether a direction leads up or down, and at which end of a link its number is kept: the lower one.
+struct LinkSide {
+  std::size_t up;
+  std::ptrdiff_t distance, kept;
+
+  HWY_INLINE LinkSide(const SpringGrid& grid, int direction) {
+    const bool is_up = direction >= kUp;
+    up = static_cast<std::size_t>(is_up ? direction : opposite(direction)) - kUp;
+    distance = is_up ? grid.distance[up] : -grid.distance[up];
+    kept = is_up ? 0 : distance;
+  }
+};
+
+/// Sums, over the regular links of each node, of the forces and twice the energies of StrainOf.
+void pulls(const SpringGrid& grid, NodeRange range, const SpringArrays& a, double* energies) {
+  const Doubles d;
+  const Halves df;
+  const std::size_t lanes = hn::Lanes(d);
+  for (std::size_t n = range.begin; n < range.end; n += lanes) {
+    auto fx = hn::Zero(d), fy = hn::Zero(d), fz = hn::Zero(d), energy = hn::Zero(d);
+    for (int direction = 0; direction < kDirections; ++direction) {
+      const LinkSide way(grid, direction);
+      const Springs springs(a.rest[direction], a.trial, n, way.distance);
+      const auto k = hn::PromoteTo(d, hn::LoadU(df, grid.constants(way.up) + n + way.kept));
+      const auto pull = hn::Mul(k, springs.elongation), share = hn::Div(pull, springs.length);
+      energy = hn::Add(energy, hn::Mul(pull, springs.elongation));
+      fx = hn::Add(fx, hn::Mul(share, springs.x));
+      fy = hn::Add(fy, hn::Mul(share, springs.y));
+      fz = hn::Add(fz, hn::Mul(share, springs.z));
+    }
+    hn::StoreU(fx, d, a.trial_force.axis(0) + n);
+    hn::StoreU(fy, d, a.trial_force.axis(1) + n);
+    hn::StoreU(fz, d, a.trial_force.axis(2) + n);
+    hn::StoreU(energy, d, energies + (n - range.begin));
+  }
+}
+
+void matrices(const SpringGrid& grid, NodeRange range, const SpringArrays& a, Stiffness kind) {
+  const Doubles d;
+  const Halves df;
+  for (std::size_t up = 0; up < kUp; ++up) {
+    for (std::size_t n = range.begin; n < range.end; n += hn::Lanes(d)) {
+      const Springs springs(a.rest[up + kUp], a.u, n, grid.distance[up]);
+      const auto k = hn::PromoteTo(d, hn::LoadU(df, grid.constants(up) + n));
+      auto t = hn::Div(springs.elongation, springs.length);
+      if (kind == Stiffness::laplacian) t = hn::Set(d, 1.0);
+      if (kind == Stiffness::projected) t = hn::Max(t, hn::Zero(d));
+      const auto even = hn::Mul(k, t);
+      const auto root = hn::Div(hn::Sqrt(hn::Max(hn::Sub(k, even), hn::Zero(d))), springs.length);
+      const auto store = [&](std::size_t e, hn::Vec<Doubles> value)
+                             HWY_ATTR { hn::StoreU(hn::DemoteTo(df, value), df, a.matrix.entry(up, e) + n); };
+      store(0, hn::Mul(root, springs.x));
+      store(1, hn::Mul(root, springs.y));
+      store(2, hn::Mul(root, springs.z));
+      store(3, even);
+    }
+  }
+}
+
+/// Sums, over the regular links of each node, of their matrices.
+/// @param sums  by entry of Symmetric, by node from the first of the range on
+void matrix_sums(const SpringGrid& grid, NodeRange range, const SpringArrays& a,
+                 float (*sums)[SpringGrid::kBlock + SpringGrid::kLanes]) {
+  const Floats d;
+  for (std::size_t n = range.begin; n < range.end; n += hn::Lanes(d)) {
+    auto xx = hn::Zero(d), xy = hn::Zero(d), xz = hn::Zero(d), yy = hn::Zero(d), yz = hn::Zero(d), zz = hn::Zero(d);
+    for (int direction = 0; direction < kDirections; ++direction) {
+      const LinkSide way(grid, direction);
+      const auto entry = [&](std::size_t e) HWY_ATTR { return hn::LoadU(d, a.matrix.entry(way.up, e) + n + way.kept); };
+      const auto x = entry(0), y = entry(1), z = entry(2), even = entry(3);
+      xx = hn::Add(xx, hn::Add(hn::Mul(x, x), even));
+      xy = hn::Add(xy, hn::Mul(x, y));
+      xz = hn::Add(xz, hn::Mul(x, z));
+      yy = hn::Add(yy, hn::Add(hn::Mul(y, y), even));
+      yz = hn::Add(yz, hn::Mul(y, z));
+      zz = hn::Add(zz, hn::Add(hn::Mul(z, z), even));
+    }
+    const auto store = [&](std::size_t e, hn::Vec<Floats> sum)
+                           HWY_ATTR { hn::StoreU(sum, d, sums[e] + (n - range.begin)); };
+    store(0, xx), store(1, xy), store(2, xz), store(3, yy), store(4, yz), store(5, zz);
+  }
+}
+
+/// Sums, over the regular links of each node, of the link's matrix times p of the node minus that of the neighbour.
+void product(const SpringGrid& grid, NodeRange range, const SpringArrays& a, const NodeVectors<float>& result) {
+  const Floats d;
+  for (std::size_t n = range.begin; n < range.end; n += hn::Lanes(d)) {
+    const auto own_x = hn::LoadU(d, a.p.axis(0) + n), own_y = hn::LoadU(d, a.p.axis(1) + n),
+               own_z = hn::LoadU(d, a.p.axis(2) + n);
+    auto sum_x = hn::Zero(d), sum_y = hn::Zero(d), sum_z = hn::Zero(d);
+    for (int direction = 0; direction < kDirections; ++direction) {
+      const LinkSide way(grid, direction);
+      const auto entry = [&](std::size_t e) HWY_ATTR { return hn::LoadU(d, a.matrix.entry(way.up, e) + n + way.kept); };
+      const auto x = hn::Sub(own_x, hn::LoadU(d, a.p.axis(0) + n + way.distance));
+      const auto y = hn::Sub(own_y, hn::LoadU(d, a.p.axis(1) + n + way.distance));
+      const auto z = hn::Sub(own_z, hn::LoadU(d, a.p.axis(2) + n + way.distance));
+      const auto ax = entry(0), ay = entry(1), az = entry(2), even = entry(3);
+      const auto along = hn::Add(hn::Add(hn::Mul(ax, x), hn::Mul(ay, y)), hn::Mul(az, z));
+      sum_x = hn::Add(sum_x, hn::Add(hn::Mul(ax, along), hn::Mul(even, x)));
+      sum_y = hn::Add(sum_y, hn::Add(hn::Mul(ay, along), hn::Mul(even, y)));
+      sum_z = hn::Add(sum_z, hn::Add(hn::Mul(az, along), hn::Mul(even, z)));
+    }
+    hn::StoreU(sum_x, d, result.axis(0) + n);
+    hn::StoreU(sum_y, d, result.axis(1) + n);
+    hn::StoreU(sum_z, d, result.axis(2) + n);
+  }
+}
+
+/// The products of two vectors of each node, in double.
+void dots(NodeRange range, const NodeVectors<float>& one, const NodeVectors<float>& other, double* result) {
+  const Doubles d;
+  const Halves df;
+  for (std::size_t n = range.begin; n < range.end; n += hn::Lanes(d)) {
+    const auto product = [&](std::size_t axis) HWY_ATTR {
+      const auto at = [&](const NodeVectors<float>& v)
+                          HWY_ATTR { return hn::PromoteTo(d, hn::LoadU(df, v.axis(axis) + n)); };
+      return hn::Mul(at(one), at(other));
+    };
+    hn::StoreU(hn::Add(hn::Add(product(0), product(1)), product(2)), d, result + (n - range.begin));
+  }
+}
+
+void descend(NodeRange range, const SpringArrays& a) {
+  const Floats d;
+  const hn::RebindToSigned<Floats> di;
+  const hn::Rebind<std::uint8_t, Floats> du;
+  const auto length = hn::Set(d, a.state->length);
+  const auto* role = reinterpret_cast<const std::uint8_t*>(a.role);
+  for (std::size_t n = range.begin; n < range.end; n += hn::Lanes(d)) {
+    const auto roles = hn::PromoteTo(di, hn::LoadU(du, role + n));
+    const auto is_free = hn::RebindMask(d, hn::Eq(roles, hn::Set(di, static_cast<std::int32_t>(SpringRole::free))));
+    // Where a node is not free p and r are 0, and x stays as it is.
+    const auto step = [&](std::size_t axis) HWY_ATTR {
+      const auto at = [&](const NodeVectors<float>& v) HWY_ATTR { return hn::LoadU(d, v.axis(axis) + n); };
+      hn::StoreU(hn::Add(at(a.x), hn::Mul(length, at(a.p))), d, a.x.axis(axis) + n);
+      const auto before = at(a.r);
+      const auto r = hn::IfThenElse(is_free, hn::Sub(before, hn::Mul(length, at(a.q))), before);
+      hn::StoreU(r, d, a.r.axis(axis) + n);
+      return r;
+    };
+    const auto x = step(0), y = step(1), z = step(2);
+    const auto entry = [&](std::size_t e) HWY_ATTR { return hn::LoadU(d, a.inverse.entry(e) + n); };
+    const auto row = [&](std::size_t axis, std::size_t ex, std::size_t ey, std::size_t ez) HWY_ATTR {
+      const auto sum = hn::Add(hn::Add(hn::Mul(entry(ex), x), hn::Mul(entry(ey), y)), hn::Mul(entry(ez), z));
+      hn::StoreU(sum, d, a.z.axis(axis) + n);
+    };
+    row(0, 0, 1, 2), row(1, 1, 3, 4), row(2, 2, 4, 5);
+  }
+}
+
+void next_direction(NodeRange range, const SpringArrays& a) {
+  const Floats d;
+  const auto share = hn::Set(d, a.state->share);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    float* const p = a.p.axis(axis);
+    for (std::size_t n = range.begin; n < range.end; n += hn::Lanes(d)) {
+      hn::StoreU(hn::Add(hn::LoadU(d, a.z.axis(axis) + n), hn::Mul(share, hn::LoadU(d, p + n))), d, p + n);
+    }
+  }
+}
+
+}  // namespace tetwarp::simulate::HWY_NAMESPACE
+
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+
+namespace tetwarp::simulate {
+
+HWY_EXPORT(pulls);
+HWY_EXPORT(matrices);
+HWY_EXPORT(matrix_sums);
+HWY_EXPORT(product);
+HWY_EXPORT(dots);
+HWY_EXPORT(descend);
+HWY_EXPORT(next_direction);
+
+namespace {
+
+/// Calls `visit(link, number)` for the odd links from the nodes of a block.
+template <class Visit>
+void for_odd_links(const SpringGrid& grid, NodeRange range, Visit&& visit) {
+  const std::size_t block = range.begin / SpringGrid::kBlock;
+  for (std::size_t number = grid.first_odd[block]; number < grid.first_odd[block + 1]; ++number) {
+    visit(grid.odd[number], number);
+  }
+}
+
+Stretched<double> odd_spring(const SpringArrays& a, const OddLink& link, const NodeVectors<double>& u) {
+  return stretched(a.rest[link.direction], u[link.other] - u[link.node]);
+}
+
+/// Sets `result` to the sums of Bend over all links.
+void whole_product(const SpringGrid& grid, NodeRange range, const SpringArrays& a, const NodeVectors<float>& result) {
+  HWY_DYNAMIC_DISPATCH(product)(grid, range, a, result);
+  for_odd_links(grid, range, [&](const OddLink& link, std::size_t number) {
+    const glm::vec3 share = grid.odd_matrix[number] * (a.p[link.node] - a.p[link.other]);
+    result.set(link.node, result[link.node] + share);
+  });
+}
+
+/// Gives the products of two vectors of free nodes, 0 for others.
+void give_dots(NodeRange range, const SpringArrays& a, const NodeVectors<float>& one, const NodeVectors<float>& other,
+               Sum* sums) {
+  double products[SpringGrid::kBlock];
+  HWY_DYNAMIC_DISPATCH(dots)(range, one, other, products);
+  for (std::size_t n = range.begin; n < range.end; ++n) {
+    sums[n - range.begin].sum = a.is_free(n) ? products[n - range.begin] : 0;
+  }
+}
+
+}  // namespace
+
+void sweep(SpringGrid& grid, NodeRange range, const sweeps::Matrices& matrices) {
+  HWY_DYNAMIC_DISPATCH(matrices)(grid, range, matrices.a, matrices.kind);
+  for_odd_links(grid, range, [&](const OddLink& link, std::size_t number) {
+    grid.odd_matrix[number] =
+        spring_matrix(odd_spring(matrices.a, link, matrices.a.u), double{link.stiffness}, matrices.kind);
+  });
+}
+
+void sweep(const SpringGrid& grid, NodeRange range, const sweeps::Inverses& inverses) {
+  float sums[6][SpringGrid::kBlock + SpringGrid::kLanes];
+  HWY_DYNAMIC_DISPATCH(matrix_sums)(grid, range, inverses.a, sums);
+  const auto of = [&](std::size_t node) {
+    const std::size_t n = node - range.begin;
+    return Symmetric<float>{sums[0][n], sums[1][n], sums[2][n], sums[3][n], sums[4][n], sums[5][n]};
+  };
+  for_odd_links(grid, range, [&](const OddLink& link, std::size_t number) {
+    const std::size_t n = link.node - range.begin;
+    Symmetric<float> sum = of(link.node);
+    sum.add(grid.odd_matrix[number].full());
+    sums[0][n] = sum.xx, sums[1][n] = sum.xy, sums[2][n] = sum.xz, sums[3][n] = sum.yy, sums[4][n] = sum.yz,
+    sums[5][n] = sum.zz;
+  });
+  for (std::size_t n = range.begin; n < range.end; ++n) inverses.finish(n, of(n));
+}
+
+void sweep(const SpringGrid& grid, NodeRange range, const sweeps::PlacedForces& forces) {
+  whole_product(grid, range, forces.a, forces.a.r);
+  for (std::size_t n = range.begin; n < range.end; ++n) forces.finish(n, forces.a.r[n]);
+}
+
+void sweep(const SpringGrid& grid, NodeRange range, const sweeps::Bend& bend, Sum* sums) {
+  whole_product(grid, range, bend.a, bend.a.q);
+  give_dots(range, bend.a, bend.a.p, bend.a.q, sums);
+}
+
+void sweep(const SpringGrid&, NodeRange range, const sweeps::Descend& descend, Sum* sums) {
+  HWY_DYNAMIC_DISPATCH(descend)(range, descend.a);
+  give_dots(range, descend.a, descend.a.r, descend.a.z, sums);
+}
+
+void sweep(const SpringGrid& grid, NodeRange range, const sweeps::StrainOf& strain, Sums* sums) {
+  double energies[SpringGrid::kBlock];
+  const NodeVectors<double>& force = strain.a.trial_force;
+  HWY_DYNAMIC_DISPATCH(pulls)(grid, range, strain.a, energies);
+  for_odd_links(grid, range, [&](const OddLink& link, std::size_t) {
+    const Pull<double> pull(odd_spring(strain.a, link, strain.a.trial), double{link.stiffness});
+    force.set(link.node, force[link.node] + pull.force);
+    energies[link.node - range.begin] += pull.energy;
+  });
+  for (std::size_t n = range.begin; n < range.end; ++n) {
+    sums[n - range.begin] = strain.finish(n, force[n], energies[n - range.begin]);
+  }
+}
+
+void sweep(const SpringGrid&, NodeRange range, const sweeps::NextDirection& next) {
+  HWY_DYNAMIC_DISPATCH(next_direction)(range, next.a);
+}
+
+}  // namespace tetwarp::simulate
+
+#endif  // HWY_ONCE

@@ -1,0 +1,127 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#pragma once
+
+#include <cstdint>
+
+#include "deform/simulate/rigid_motion.h"
+#include "deform/simulate/spring_engine.h"
+#include "deform/simulate/spring_step.h"
+
+namespace tetwarp::simulate {
+
+/// A vector for each node, the components apart: x of node n at data[n], y at data[stride + n], z at data[2 stride +
+/// n].
+template <class T>
+struct NodeVectors {
+  T* data = nullptr;
+  std::size_t stride = 0;
+
+  TETWARP_HD T* axis(std::size_t a) const { return data + a * stride; }
+  TETWARP_HD glm::vec<3, T> operator[](std::size_t n) const {
+    return {data[n], data[stride + n], data[2 * stride + n]};
+  }
+  TETWARP_HD void set(std::size_t n, const glm::vec<3, T>& v) const {
+    data[n] = v.x, data[stride + n] = v.y, data[2 * stride + n] = v.z;
+  }
+};
+
+/// A symmetric matrix for each node, the entries apart in the order of Symmetric.
+struct NodeMatrices {
+  float* data = nullptr;
+  std::size_t stride = 0;
+
+  TETWARP_HD float* entry(std::size_t e) const { return data + e * stride; }
+  TETWARP_HD Symmetric<float> operator[](std::size_t n) const {
+    return {entry(0)[n], entry(1)[n], entry(2)[n], entry(3)[n], entry(4)[n], entry(5)[n]};
+  }
+  TETWARP_HD void set(std::size_t n, const Symmetric<float>& s) const {
+    entry(0)[n] = s.xx, entry(1)[n] = s.xy, entry(2)[n] = s.xz, entry(3)[n] = s.yy, entry(4)[n] = s.yz,
+    entry(5)[n] = s.zz;
+  }
+};
+
+/// The matrix of the link up from each node in each direction kUp + up: the entries across.x, across.y, across.z and
+/// even apart.
+struct LinkMatrices {
+  static constexpr std::size_t kEntries = 4;
+  float* data = nullptr;
+  std::size_t stride = 0;
+
+  TETWARP_HD float* entry(std::size_t up, std::size_t e) const { return data + (kEntries * up + e) * stride; }
+  TETWARP_HD SpringMatrix<float> get(std::size_t up, std::size_t n) const {
+    return {{entry(up, 0)[n], entry(up, 1)[n], entry(up, 2)[n]}, entry(up, 3)[n]};
+  }
+  TETWARP_HD void set(std::size_t up, std::size_t n, const SpringMatrix<float>& m) const {
+    entry(up, 0)[n] = m.across.x, entry(up, 1)[n] = m.across.y, entry(up, 2)[n] = m.across.z, entry(up, 3)[n] = m.even;
+  }
+};
+
+/// The state of conjugate gradients between sweeps, in the machine's memory.
+struct GradientState {
+  SolveEffort effort;
+  double rz = 0, least = 0, gained = 0;
+  float length = 0, share = 0;
+  int iterations = 0;
+  bool is_indefinite = false, is_done = false;
+};
+
+/// All arrays of a solver in the memory of its machine.
+struct SpringArrays {
+  std::size_t nodes;
+  const std::int32_t* neighbour;  ///< see Model::neighbour
+  const float* stiffness;
+  const std::uint32_t* vertex;
+  const SpringRole* role;
+  RestLink<double> rest[kDirections];
+  std::int32_t distance[kDirections];  ///< from a node to its neighbour in a direction where no cut is near
+  RestPlace rest_place;
+  /// Displacement, mm: now, at a trial step, and of placed nodes where they come from and go.
+  NodeVectors<double> u, trial, start, goal;
+  /// Force on free nodes, N: now, at the start, and at the goal.
+  NodeVectors<double> load, load_from, load_to;
+  NodeVectors<double> force, trial_force;  ///< net force on free nodes at u and at trial, N
+  NodeVectors<float> x, r, z, p, q;        ///< the direction that is sought, and vectors of conjugate gradients
+  LinkMatrices matrix;
+  NodeMatrices inverse;  ///< by free node: the inverse of its sum of matrices; 0 for other nodes
+  glm::vec3* shown;
+  GradientState* state;
+  Sums* result;
+  Ways* ways;
+
+  TETWARP_HD bool is_free(std::size_t n) const { return role[n] == SpringRole::free; }
+  TETWARP_HD std::int32_t other(int direction, std::size_t n) const {
+    return neighbour[static_cast<std::size_t>(direction) * nodes + n];
+  }
+  TETWARP_HD double constant(int direction, std::size_t n) const {
+    return double{stiffness[static_cast<std::size_t>(direction) * nodes + n]};
+  }
+  /// The matrix of the link to a neighbour. It is kept at the lower end of the link.
+  TETWARP_HD SpringMatrix<float> of_link(int direction, std::size_t n, std::int32_t to) const {
+    return direction >= kUp
+               ? matrix.get(static_cast<std::size_t>(direction - kUp), n)
+               : matrix.get(static_cast<std::size_t>(opposite(direction) - kUp), static_cast<std::size_t>(to));
+  }
+
+  /// Calls `visit(direction, neighbour)` for each link of a node, in the order in which sums are made: first the links
+  /// whose neighbour is the next vertex of the lattice, then the odd ones, each by rising direction.
+  template <class Visit>
+  TETWARP_HD void for_links(std::size_t n, const Visit& visit) const {
+    std::uint32_t odd = 0;
+    for (int d = 0; d < kDirections; ++d) {
+      const std::int32_t to = other(d, n);
+      if (to < 0) continue;
+      if (to != static_cast<std::int32_t>(n) + distance[d]) {
+        odd |= 1u << d;
+      } else {
+        visit(d, to);
+      }
+    }
+    for (int d = 0; odd != 0; ++d, odd >>= 1) {
+      if ((odd & 1) != 0) visit(d, other(d, n));
+    }
+  }
+};
+
+}  // namespace tetwarp::simulate

@@ -1,0 +1,266 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#pragma once
+
+#include "deform/simulate/spring_arrays.h"
+
+// What mass-spring does for one node in each sweep over the nodes. Every node gathers from its links and writes only
+// its own values, so no order matters but that of sums, which the machine keeps (spring_solver.h).
+
+namespace tetwarp::simulate {
+
+/// The sum of what a sweep returns.
+struct Sum {
+  double sum = 0;
+  TETWARP_HD void add(const Sum& other) { sum += other.sum; }
+};
+
+namespace sweeps {
+
+TETWARP_HD inline glm::vec3 in_float(const glm::dvec3& v) {
+  return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
+}
+TETWARP_HD inline glm::dvec3 in_double(const glm::vec3& v) { return {double{v.x}, double{v.y}, double{v.z}}; }
+TETWARP_HD inline glm::dvec3 on_the_way(const glm::dvec3& from, const glm::dvec3& to, double part) {
+  return part == 1 ? to : from + part * (to - from);
+}
+
+/// A sweep that always runs. GradientSweep is skipped once conjugate gradients are done.
+struct Sweep {
+  SpringArrays a;
+  TETWARP_HD bool is_idle() const { return false; }
+};
+struct GradientSweep {
+  SpringArrays a;
+  TETWARP_HD bool is_idle() const { return a.state->is_done; }
+};
+
+/// Sets the displacement.
+struct Start : Sweep {
+  const glm::vec3* displacement;
+  TETWARP_HD void operator()(std::size_t n) const {
+    a.u.set(n, in_double(displacement[n]));
+    a.start.set(n, a.u[n]);
+  }
+};
+
+/// Takes over new loads; the present ones are where they start. @param force  null: no forces
+struct TakeLoads : Sweep {
+  const glm::vec3 *goals, *forces;
+  TETWARP_HD void operator()(std::size_t n) const {
+    a.start.set(n, a.u[n]);
+    a.goal.set(n, in_double(goals[n]));
+    a.load_from.set(n, a.is_free(n) ? a.load[n] : glm::dvec3(0));
+    a.load_to.set(n, a.is_free(n) && forces ? in_double(forces[n]) : glm::dvec3(0));
+  }
+};
+
+/// Does what SpringEngine::aim says.
+struct Aim : Sweep {
+  double part;
+  TETWARP_HD Ways operator()(std::size_t n) const {
+    const glm::dvec3 u = a.u[n];
+    a.load.set(n, on_the_way(a.load_from[n], a.load_to[n], part));
+    if (a.role[n] != SpringRole::placed) {
+      a.trial.set(n, u);
+      return {};
+    }
+    const glm::dvec3 to = on_the_way(a.start[n], a.goal[n], part);
+    a.trial.set(n, to);
+    return Ways::of(a.rest_place(a.vertex[n]) + u, to - u);
+  }
+};
+
+/// Does what SpringEngine::carry says.
+struct Carry : Sweep {
+  RigidMotion motion;
+  TETWARP_HD void operator()(std::size_t n) const {
+    if (a.role[n] == SpringRole::kept) return;
+    const glm::dvec3 u = a.u[n], carried = u + motion.way_of(a.rest_place(a.vertex[n]) + u);
+    a.u.set(n, carried);
+    if (a.is_free(n)) a.trial.set(n, carried);
+  }
+};
+
+/// Sets p to how far placed nodes have to go.
+struct PlacedMotion : Sweep {
+  TETWARP_HD void operator()(std::size_t n) const { a.p.set(n, in_float(a.trial[n] - a.u[n])); }
+};
+
+/// Computes the matrices of the links up from a node, with springs where they are now.
+struct Matrices : Sweep {
+  Stiffness kind;
+  TETWARP_HD void operator()(std::size_t n) const {
+    const glm::dvec3 u = a.u[n];
+    for (int d = kUp; d < kDirections; ++d) {
+      const std::int32_t to = a.other(d, n);
+      if (to < 0) continue;
+      const Stretched<double> spring = stretched(a.rest[d], a.u[static_cast<std::size_t>(to)] - u);
+      a.matrix.set(static_cast<std::size_t>(d - kUp), n, spring_matrix(spring, a.constant(d, n), kind));
+    }
+  }
+};
+
+/// Inverts each free node's sum of matrices.
+struct Inverses : Sweep {
+  TETWARP_HD void operator()(std::size_t n) const {
+    Symmetric<float> sum{};
+    if (a.is_free(n)) a.for_links(n, [&](int d, std::int32_t to) { sum.add(a.of_link(d, n, to).full()); });
+    finish(n, sum);
+  }
+  TETWARP_HD void finish(std::size_t n, const Symmetric<float>& sum) const {
+    a.inverse.set(n, a.is_free(n) ? inverse_block(sum) : Symmetric<float>{});
+  }
+};
+
+/// The sum over a node's links of the link's matrix times the node's vector p minus the neighbour's.
+TETWARP_HD inline glm::vec3 product(const SpringArrays& a, std::size_t n) {
+  const glm::vec3 own = a.p[n];
+  glm::vec3 sum(0);
+  a.for_links(n,
+              [&](int d, std::int32_t to) { sum += a.of_link(d, n, to) * (own - a.p[static_cast<std::size_t>(to)]); });
+  return sum;
+}
+
+/// Sets r to the forces on free nodes if placed nodes alone went their way.
+struct PlacedForces : Sweep {
+  TETWARP_HD void operator()(std::size_t n) const { finish(n, a.is_free(n) ? product(a, n) : glm::vec3(0)); }
+  TETWARP_HD void finish(std::size_t n, const glm::vec3& q) const { a.r.set(n, a.is_free(n) ? -q : glm::vec3(0)); }
+};
+struct Forces : Sweep {
+  TETWARP_HD void operator()(std::size_t n) const { a.r.set(n, in_float(a.force[n])); }
+};
+
+/// Sets x = 0, p = z = preconditioned r, and sums r.z.
+struct Begin : Sweep {
+  TETWARP_HD Sum operator()(std::size_t n) const {
+    const glm::vec3 r = a.r[n], z = a.inverse[n] * r;
+    a.x.set(n, glm::vec3(0));
+    a.z.set(n, z);
+    a.p.set(n, z);
+    return {dot3(in_double(r), in_double(z))};
+  }
+};
+struct AfterBegin {
+  GradientState* state;
+  SolveEffort effort;
+  TETWARP_HD void operator()(const Sum& rz) const {
+    *state = {.effort = effort, .rz = rz.sum, .least = kFloatRounding * rz.sum, .is_done = !(rz.sum > 0)};
+  }
+};
+
+/// Sets q = A p, and sums the curvature p.q over free nodes. Elsewhere p is 0, and q is not used.
+struct Bend : GradientSweep {
+  TETWARP_HD Sum operator()(std::size_t n) const {
+    if (!a.is_free(n)) return {};
+    const glm::vec3 q = product(a, n);
+    a.q.set(n, q);
+    return {dot3(in_double(a.p[n]), in_double(q))};
+  }
+};
+struct AfterBend {
+  GradientState* state;
+  TETWARP_HD void operator()(const Sum& curvature) const {
+    if (curvature.sum > 0) {
+      state->length = static_cast<float>(state->rz / curvature.sum);
+    } else {
+      state->is_indefinite = state->is_done = true;
+    }
+  }
+};
+
+/// Sets x += length p, r -= length q, z = preconditioned r, and sums r.z.
+struct Descend : GradientSweep {
+  TETWARP_HD Sum operator()(std::size_t n) const {
+    if (!a.is_free(n)) return {};
+    const float length = a.state->length;
+    a.x.set(n, a.x[n] + length * a.p[n]);
+    const glm::vec3 r = a.r[n] - length * a.q[n], z = a.inverse[n] * r;
+    a.r.set(n, r);
+    a.z.set(n, z);
+    return {dot3(in_double(r), in_double(z))};
+  }
+};
+struct AfterDescend {
+  GradientState* state;
+  TETWARP_HD void operator()(const Sum& next) const {
+    GradientState& s = *state;
+    const double gain = double{s.length} * s.rz / 2;
+    s.gained += gain;
+    ++s.iterations;
+    s.share = static_cast<float>(next.sum / s.rz);
+    s.rz = next.sum;
+    s.is_done = !(s.rz > s.least) || s.iterations >= s.effort.most || s.effort.is_enough(s.iterations, gain, s.gained);
+  }
+};
+
+/// Sets p = z + share p.
+struct NextDirection : GradientSweep {
+  TETWARP_HD void operator()(std::size_t n) const { a.p.set(n, a.z[n] + a.state->share * a.p[n]); }
+};
+
+/// Sums minus the net forces times the direction, and finds the square of its longest entry.
+struct SearchDirection : Sweep {
+  TETWARP_HD Sums operator()(std::size_t n) const {
+    const glm::dvec3 x = in_double(a.x[n]);
+    return {.slope = -dot3(a.force[n], x), .most = dot3(x, x)};
+  }
+};
+
+/// Adds the direction to the trial displacement, so that free nodes follow the placed ones.
+struct Follow : Sweep {
+  TETWARP_HD void operator()(std::size_t n) const {
+    if (a.is_free(n)) a.trial.set(n, a.trial[n] + in_double(a.x[n]));
+  }
+};
+struct Go : Sweep {
+  double part;
+  TETWARP_HD void operator()(std::size_t n) const {
+    a.trial.set(n, part == 0 ? a.u[n] : a.u[n] + part * in_double(a.x[n]));
+  }
+};
+
+/// Computes the strain at the trial displacement, as SpringEngine::try_step does; forces are squared.
+struct StrainOf : Sweep {
+  TETWARP_HD Sums operator()(std::size_t n) const {
+    const glm::dvec3 own = a.trial[n];
+    glm::dvec3 force(0);
+    double energy = 0;
+    a.for_links(n, [&](int d, std::int32_t to) {
+      const Pull<double> pull(stretched(a.rest[d], a.trial[static_cast<std::size_t>(to)] - own), a.constant(d, n));
+      force += pull.force;
+      energy += pull.energy;
+    });
+    return finish(n, force, energy);
+  }
+  /// @param force   of the node's springs  @param energy  twice the sum of their energies, of which the node has half
+  TETWARP_HD Sums finish(std::size_t n, glm::dvec3 force, double energy) const {
+    const glm::dvec3 load = a.load[n];
+    force += load;
+    Sums sums{.sum = energy / 4 - dot3(load, a.trial[n])};
+    (a.is_free(n) ? sums.most : sums.most_placed) = a.role[n] == SpringRole::kept ? 0 : dot3(force, force);
+    sums.most_load = dot3(load, load);
+    const glm::dvec3 net = a.is_free(n) ? force : glm::dvec3(0);
+    a.trial_force.set(n, net);
+    sums.slope = -dot3(net, in_double(a.x[n]));
+    return sums;
+  }
+};
+
+struct Show : Sweep {
+  TETWARP_HD void operator()(std::size_t n) const { a.shown[n] = in_float(a.u[n]); }
+};
+
+/// Keeps the result of a sum where the host fetches it.
+template <class T>
+struct Keep {
+  T* result;
+  TETWARP_HD void operator()(const T& sums) const { *result = sums; }
+};
+template <class T>
+Keep(T*) -> Keep<T>;
+
+}  // namespace sweeps
+
+}  // namespace tetwarp::simulate
