@@ -5,6 +5,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/common.hpp>
 
@@ -18,18 +19,28 @@ namespace tetwarp {
 
 namespace {
 
-/// Replaces the displacement at every vertex by `change(rest point, displacement)`.
-template <class Change>
-void for_each_vertex(VertexField& field, const Limits& limits, const Control& control, Change&& change) {
+/// Moves every vertex to where `map` takes its place. @param moved  whether vertices begin where they are displaced to;
+/// otherwise at rest, and their displacements are not read
+void move_vertices(VertexField& field, const PointMap& map, bool moved, const Limits& limits, const Control& control) {
+  constexpr std::int64_t kAtOnce = 512;
   const AffineMap point = point_from_index(field.lattice);
   const glm::i64vec3 size = field.lattice.size;
   cpu::WorkProgress progress(control, size.z);
   cpu::FirstRefusal refusal;
   cpu::Arena arena(limits);
   const auto change_slice = [&](std::int64_t z) {
+    std::array<glm::dvec3, kAtOnce> from, by;
     for (std::int64_t y = 0; y < size.y; ++y) {
-      glm::vec3* row = field.displacement.data() + (z * size.y + y) * size.x;
-      for (std::int64_t x = 0; x < size.x; ++x) row[x] = change(point(glm::dvec3(x, y, z)), row[x]);
+      for (std::int64_t begin = 0; begin < size.x; begin += kAtOnce) {
+        glm::vec3* const row = field.displacement.data() + (z * size.y + y) * size.x + begin;
+        const auto count = static_cast<std::size_t>(std::min(kAtOnce, size.x - begin));
+        for (std::size_t n = 0; n < count; ++n) {
+          from[n] = point(glm::dvec3(begin + static_cast<std::int64_t>(n), y, z));
+          if (moved) from[n] += glm::dvec3(row[n]);
+        }
+        map.of_row({from.data(), count}, by.data());
+        for (std::size_t n = 0; n < count; ++n) row[n] = glm::vec3(moved ? glm::dvec3(row[n]) + by[n] : by[n]);
+      }
     }
     progress.done(1);
   };
@@ -46,8 +57,7 @@ VertexField sample_on(const Geometry& lattice, const PointMap& map, Limits limit
   require_valid(lattice, "field lattice");
   VertexField field{lattice, {}};
   resize_large(field.displacement, static_cast<std::size_t>(voxel_count(lattice)), limits.threads);
-  for_each_vertex(field, limits, control,
-                  [&](const glm::dvec3& rest, const glm::vec3&) { return glm::vec3(map(rest)); });
+  move_vertices(field, map, false, limits, control);
   return field;
 }
 
@@ -78,10 +88,7 @@ void compose(TetrahedralMesh& mesh, const PointMap& next, const Limits& limits, 
 void compose(VertexField& field, const PointMap& next, Limits limits, const Control& control) {
   if (!field.mesh.is_empty()) compose(field.mesh, next, limits, control);
   if (!field.mesh.is_empty() && field.replaced.empty()) return;
-  for_each_vertex(field, limits, control, [&](const glm::dvec3& rest, const glm::vec3& moved) {
-    const glm::dvec3 displacement(moved);
-    return glm::vec3(displacement + next(rest + displacement));
-  });
+  move_vertices(field, next, true, limits, control);
 }
 
 PointMap piecewise_affine(const VertexField& field) {

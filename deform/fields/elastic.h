@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <span>
 
 namespace tetwarp {
 
@@ -21,6 +22,8 @@ struct Elastic {
   glm::dvec3 centre{0};  ///< place c of control point (0, 0, 0), LPS mm
   /// Displacement p' - p, LPS mm, of a point p, LPS mm.
   glm::dvec3 operator()(const glm::dvec3& point) const;
+  /// Displacements of some points: neighbours share random numbers, and sums over axes along which they do not differ.
+  void of_row(std::span<const glm::dvec3> points, glm::dvec3* displacement) const;
 };
 
 /// One step of the random generator SplitMix64 (Steele, Lea and Flood 2014) from a state: a hash of 64 bits.

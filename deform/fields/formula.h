@@ -23,6 +23,8 @@ struct Wave {
   glm::dvec3 centre{0};  ///< LPS mm
   /// Displacement p' - p, LPS mm, of a point p, LPS mm.
   glm::dvec3 operator()(const glm::dvec3& point) const;
+  /// Displacements of some points: those on one front of the wave share a sine.
+  void of_row(std::span<const glm::dvec3> points, glm::dvec3* displacement) const;
 };
 
 /// A rotation by angle * d.axis / half_length about an axis through the centre (the paper's Eq. 15), where d is p minus
@@ -34,6 +36,8 @@ struct Twist {
   glm::dvec3 centre{0};  ///< LPS mm
   /// Displacement p' - p, LPS mm, of a point p, LPS mm.
   glm::dvec3 operator()(const glm::dvec3& point) const;
+  /// Displacements of some points: those on one plane across the axis share the sine and cosine.
+  void of_row(std::span<const glm::dvec3> points, glm::dvec3* displacement) const;
 };
 
 /// A local inflation around the centre c: p' = c + (1 + a (1 - r/R)^2) d for r = |d| < R, where d = p - c. Outside that

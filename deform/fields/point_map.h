@@ -3,16 +3,66 @@
 
 #pragma once
 
-#include <functional>
+#include <concepts>
+#include <memory>
 #include <span>
+#include <type_traits>
+#include <utility>
 
 #include "deform/resampler.h"
 
 namespace tetwarp {
 
+/// A map that knows a faster way for many points than one after the other: neighbours in a row often share most of the
+/// work. `of_row` gives the same bits, and throws what the first point throws that is refused.
+template <class Map>
+concept HasRows = requires(const Map& map, std::span<const glm::dvec3> points, glm::dvec3* displacement) {
+  map.of_row(points, displacement);
+};
+
 /// Displacement (LPS mm, deformed minus undeformed) of a point (LPS mm) of the undeformed volume. It may be called from
-/// several threads at a time.
-using PointMap = std::function<glm::dvec3(const glm::dvec3& point)>;
+/// several threads at a time. Copies share the function that they were made of.
+class PointMap {
+ public:
+  /// No map: it must not be called.
+  PointMap() = default;
+  /// @param map  `map(point)` returns the displacement of a point
+  template <class Map>
+  requires(!std::same_as<Map, PointMap> && std::is_invocable_r_v<glm::dvec3, const Map&, const glm::dvec3&>)
+      PointMap(Map map)
+      : map_(std::make_shared<const Of<Map>>(std::move(map))) {}
+
+  /// The displacement of a point.
+  glm::dvec3 operator()(const glm::dvec3& point) const { return map_->at(point); }
+  /// The displacements of some points, with the same bits. @param displacement  one for each point
+  void of_row(std::span<const glm::dvec3> points, glm::dvec3* displacement) const {
+    map_->of_row(points, displacement);
+  }
+  /// Whether there is a map.
+  explicit operator bool() const { return map_ != nullptr; }
+
+ private:
+  struct Any {
+    virtual ~Any() = default;
+    virtual glm::dvec3 at(const glm::dvec3& point) const = 0;
+    virtual void of_row(std::span<const glm::dvec3> points, glm::dvec3* displacement) const = 0;
+  };
+  template <class Map>
+  struct Of final : Any {
+    explicit Of(Map given) : map(std::move(given)) {}
+    glm::dvec3 at(const glm::dvec3& point) const override { return map(point); }
+    void of_row(std::span<const glm::dvec3> points, glm::dvec3* displacement) const override {
+      if constexpr (HasRows<Map>) {
+        map.of_row(points, displacement);
+      } else {
+        for (std::size_t n = 0; n < points.size(); ++n) displacement[n] = map(points[n]);
+      }
+    }
+    Map map;
+  };
+
+  std::shared_ptr<const Any> map_;
+};
 
 /// The values of a map at the vertices of a lattice, computed in parallel.
 /// @throws Cancelled; an InputError of the map, of several that for the first vertex, whatever the threads do

@@ -36,7 +36,9 @@ double cosine_near_zero(double r) {
   return (1.0 - 0.5 * x) + x * (x * sum);
 }
 
-SinCos find_sin_cos(double angle) {
+}  // namespace
+
+SinCos sin_cos(double angle) {
   const double quarter = std::nearbyint(angle * kTwoOverPi);
   const double high = (angle - quarter * kHalfPi1) - quarter * kHalfPi2;
   // What the second subtraction rounded away, and the third part of pi / 2, are kept beside r.
@@ -50,19 +52,6 @@ SinCos find_sin_cos(double angle) {
     case 2: return {-s, -c};
     default: return {-c, s};
   }
-}
-
-}  // namespace
-
-SinCos sin_cos(double angle) {
-  // The last angle is kept: a formula needs one angle for a whole row of a lattice that lies across its axis.
-  thread_local double latest = 0;
-  thread_local SinCos result = find_sin_cos(0);
-  if (angle != latest || angle == 0) {  // -0 equals 0 but has another sine
-    latest = angle;
-    result = find_sin_cos(angle);
-  }
-  return result;
 }
 
 }  // namespace tetwarp

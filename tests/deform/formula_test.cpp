@@ -7,6 +7,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <cstring>
 #include <future>
 #include <glm/geometric.hpp>
 #include <numbers>
@@ -161,6 +162,43 @@ TEST(Formula, MisspeltFormulasAreRefusedWithWhatIsWrong) {
       ADD_FAILURE() << "accepted: " << formula;
     } catch (const InputError& error) {
       EXPECT_NE(std::string(error.what()).find(named), std::string::npos) << error.what();
+    }
+  }
+}
+
+TEST(PointMap, OfARowHasTheBitsOfOnePointAfterTheOther) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  Random random(test_seed(), 20);
+  const Geometry volume{.size = {60, 50, 40}, .spacing = {0.7, 0.8, 1.9}, .origin = {-20, 11, 3}};
+  const char* const formulas[] = {"identity",
+                                  "translate:by=1/2/3",
+                                  "wave:amplitude=4,wavelength=30,phase=20",
+                                  "wave:amplitude=4,wavelength=17,axis=y,along=x",
+                                  "twist:angle=30",
+                                  "twist:angle=-70,axis=x",
+                                  "bubble:radius=25,strength=0.7",
+                                  "bubble-paper:shift=4",
+                                  "elastic:amplitude=3,spacing=4,seed=5",
+                                  "elastic:amplitude=9,spacing=40,seed=6"};
+  for (const char* formula : formulas) {
+    SCOPED_TRACE(formula);
+    const PointMap map = parse_formula(formula, volume);
+    for (int row = 0; row < 60; ++row) {
+      // Along an axis up or down, in a general direction, or with leaps; from anywhere, the centre included.
+      glm::dvec3 step(0);
+      const int kind = static_cast<int>(random.integer(0, 3));
+      for (int axis = 0; axis < 3; ++axis) step[axis] = random.real(-1, 1);
+      if (kind < 2) step = glm::dvec3(kind == 0 ? 0.7 : -0.7, 0, 0);
+      if (kind == 3) step *= 10.0;
+      const glm::dvec3 from =
+          random.chance(0.1) ? centre(volume) : glm::dvec3(random.real(-30, 30), random.real(0, 60), 9);
+      std::vector<glm::dvec3> points, found(100);
+      for (int n = 0; n < 100; ++n) points.push_back(from + (row % 7 == 0 ? std::floor(n / 3.0) : n) * step);
+      map.of_row(points, found.data());
+      for (std::size_t n = 0; n < points.size(); ++n) {
+        const glm::dvec3 alone = map(points[n]);
+        ASSERT_EQ(std::memcmp(&found[n], &alone, sizeof alone), 0) << "point " << n << " of row " << row;
+      }
     }
   }
 }
