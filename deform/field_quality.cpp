@@ -14,6 +14,7 @@
 #include <glm/matrix.hpp>
 
 #include "deform/core/five_tetrahedra.h"
+#include "deform/cpu/rows/gradient_row.h"
 #include "deform/cpu/tiles.h"
 #include "deform/fields/lattice_mesh.h"
 
@@ -57,36 +58,47 @@ struct Characteristic {
 /// the largest stretch depend on the order. Parts are therefore fixed, whichever thread takes them.
 class StretchTally {
  public:
-  explicit StretchTally(const dmat3& from_lattice)
-      : inverse_(glm::inverse(from_lattice)), over_rest_(1 / glm::determinant(from_lattice)) {}
-
-  /// Adds one gradient. @param gradient  of the deformed place with respect to vertex index
-  void add(const dmat3& gradient, std::uint64_t part) {
-    add(gradient * inverse_, glm::determinant(gradient) * over_rest_, part);
+  /// Counts a part of the volume. @param determinant  of its gradient
+  void count(double determinant, std::uint64_t part) { parts_[bin_of(determinant)] += part; }
+  /// Counts the tetrahedra of a run of cells of a lattice.
+  void count(const cpu::RunGradients& run, std::size_t cells) {
+    const std::size_t lowest = bin_of(run.least), highest = bin_of(run.most);
+    std::uint64_t in_higher = 6 * cells;
+    for (std::size_t bin = lowest; bin < highest; ++bin) {
+      const double edge = FieldQuality::kEdges[bin];
+      std::uint64_t above = 0;
+      for (std::size_t t = 0; t < run.determinant.size(); ++t) {
+        std::uint64_t of_tetrahedron = 0;
+        for (std::size_t n = 0; n < cells; ++n) of_tetrahedron += run.determinant[t][n] >= edge;
+        above += part_of(t) * of_tetrahedron;
+      }
+      parts_[bin] += in_higher - above;
+      in_higher = above;
+    }
+    parts_[highest] += in_higher;
   }
-  /// Adds one gradient. @param f  of the deformed place with respect to the undeformed place
-  void add(const dmat3& f, double determinant, std::uint64_t part) {
-    const auto bin = std::upper_bound(FieldQuality::kEdges.begin(), FieldQuality::kEdges.end(), determinant) -
-                     FieldQuality::kEdges.begin();
-    parts_[static_cast<std::size_t>(bin)] += part;
-    if (bound(f) * kAboveRounding <= largest_) return;
+  /// Adds the stretch of one gradient. @param f  of the deformed place with respect to the undeformed place
+  void stretch(const dmat3& f) {
+    if (bound(f) <= limit()) return;
     const Characteristic of(glm::transpose(f) * f);
-    if (!of.is_below(largest_)) largest_ = std::max(largest_, of.largest_root());
+    if (!of.is_below(limit())) largest_ = std::max(largest_, of.largest_root());
   }
-  void add_at_rest(std::uint64_t part) {
-    constexpr auto kOne =
-        std::upper_bound(FieldQuality::kEdges.begin(), FieldQuality::kEdges.end(), 1.0) - FieldQuality::kEdges.begin();
-    parts_[static_cast<std::size_t>(kOne)] += part;
-    largest_ = std::max(largest_, 1.0);
-  }
+  /// Adds the stretch of what does not move.
+  void rest() { largest_ = std::max(largest_, 1.0); }
+  /// Squares of stretches up to this are no larger than the largest so far, or by rounding alone.
+  double limit() const { return largest_ * (1 + 1e-9); }
+  /// The part of a cell, in sixths, that a tetrahedron of it has.
+  static constexpr std::uint64_t part_of(std::size_t tetrahedron) { return tetrahedron == 0 ? 2 : 1; }
   void add_to(FieldQuality& quality) const {
     for (std::size_t bin = 0; bin < parts_.size(); ++bin) quality.parts[bin] += parts_[bin];
     quality.largest_stretch = std::max(quality.largest_stretch, std::sqrt(largest_));
   }
 
  private:
-  static constexpr double kAboveRounding = 1 + 1e-9;
-
+  static std::size_t bin_of(double determinant) {
+    const auto& edges = FieldQuality::kEdges;
+    return static_cast<std::size_t>(std::upper_bound(edges.begin(), edges.end(), determinant) - edges.begin());
+  }
   /// A bound on the eigenvalues of transpose(f) f (Gershgorin). For most gradients this is enough.
   static double bound(const dmat3& f) {
     const double xx = glm::dot(f[0], f[0]), yy = glm::dot(f[1], f[1]), zz = glm::dot(f[2], f[2]);
@@ -95,26 +107,88 @@ class StretchTally {
     return std::max({xx + xy + xz, yy + xy + yz, zz + xz + yz});
   }
 
-  const dmat3 inverse_;
-  const double over_rest_;
   decltype(FieldQuality::parts) parts_{};
   double largest_ = 0;
 };
 
-/// Adds the five tetrahedra of a cell. @param u  displacements of its corners
-void add_cell(const dvec3 (&u)[8], bool odd, const dmat3& from_lattice, StretchTally& tally) {
+/// Adds the stretches of the five tetrahedra of a cell. @param u  displacements of its corners
+void stretch_cell(const dvec3 (&u)[8], bool odd, const cpu::LatticeSteps& steps, StretchTally& tally) {
   for (int t = 1; t < kTetrahedraPerCell; ++t) {
     const TetrahedronCorners of = tetrahedron_corners(t, odd);
     const auto along = [&](int neighbour, int axis) {
       return ((of.d >> axis) & 1) != 0 ? u[of.d] - u[neighbour] : u[neighbour] - u[of.d];
     };
-    tally.add(from_lattice + dmat3(along(of.a, 0), along(of.b, 1), along(of.c, 2)), 1);
+    tally.stretch((steps.step + dmat3(along(of.a, 0), along(of.b, 1), along(of.c, 2))) * steps.inverse);
   }
   const TetrahedronCorners of = tetrahedron_corners(0, odd);
   const double half = of.d == 0 ? 0.5 : -0.5;
   const dvec3 a = half * (u[of.a] - u[of.d]), b = half * (u[of.b] - u[of.d]), c = half * (u[of.c] - u[of.d]);
-  tally.add(from_lattice + dmat3(b + c - a, a + c - b, a + b - c), 2);
+  tally.stretch((steps.step + dmat3(b + c - a, a + c - b, a + b - c)) * steps.inverse);
 }
+
+/// Measures the rows of cells between two planes of vertices.
+class CellRows {
+ public:
+  CellRows(const VertexField& field, const cpu::LatticeSteps& steps, StretchTally& tally)
+      : field_(field),
+        steps_(steps),
+        tally_(tally),
+        rows_(4, cpu::SplitRow(static_cast<std::size_t>(field.lattice.size.x))) {}
+
+  void measure(std::int64_t z) {
+    const glm::i64vec3& size = field_.lattice.size;
+    for (std::int64_t y = 0; y < size.y - 1; ++y) {
+      // The upper rows of vertices are the lower ones of the next row of cells.
+      std::swap(rows_[0], rows_[1]);
+      std::swap(rows_[2], rows_[3]);
+      for (std::size_t n = y == 0 ? 0 : 1; n < 4; n += y == 0 ? 1 : 2) rows_[n].set(row(n, y, z));
+      constexpr std::int64_t kCells = 2 * cpu::kGradientRun;
+      for (std::int64_t x = 0; x < size.x - 1; x += kCells) measure({x, y, z}, std::min(kCells, size.x - 1 - x));
+    }
+  }
+
+ private:
+  using Kind = cpu::RunGradients::Kind;
+
+  const glm::vec3* row(std::size_t n, std::int64_t y, std::int64_t z) const {
+    const glm::i64vec3& size = field_.lattice.size;
+    const auto up = static_cast<std::int64_t>(n);
+    return field_.displacement.data() + ((z + (up >> 1)) * size.y + y + (up & 1)) * size.x;
+  }
+  static bool is_odd(const glm::i64vec3& cell) { return ((cell.x + cell.y + cell.z) & 1) != 0; }
+
+  /// Measures some cells of a row. @param from  the first of them; its number along i is even
+  void measure(const glm::i64vec3& from, std::int64_t cells) {
+    for (std::size_t rest = 0; rest < 2; ++rest) {
+      const auto count = static_cast<std::size_t>(cells + 1 - static_cast<std::int64_t>(rest)) / 2;
+      if (count == 0) continue;
+      const cpu::GradientRun run{.rows = {&rows_[0], &rows_[1], &rows_[2], &rows_[3]},
+                                 .first = static_cast<std::size_t>(from.x / 2),
+                                 .rest = rest,
+                                 .count = count,
+                                 .odd = is_odd(from + glm::i64vec3(rest, 0, 0))};
+      cpu::measure_gradients(steps_, run, tally_.limit(), found_[rest]);
+      tally_.count(found_[rest], count);
+    }
+    for (std::int64_t n = 0; n < cells; ++n) {
+      const Kind kind = found_[n & 1].kind[static_cast<std::size_t>(n / 2)];
+      if (kind == Kind::at_rest) tally_.rest();
+      if (kind == Kind::beyond) stretch(from + glm::i64vec3(n, 0, 0));
+    }
+  }
+  void stretch(const glm::i64vec3& cell) {
+    dvec3 u[8];
+    for (std::size_t corner = 0; corner < 8; ++corner)
+      u[corner] = dvec3(row(corner >> 1, cell.y, cell.z)[cell.x + static_cast<std::int64_t>(corner & 1)]);
+    stretch_cell(u, is_odd(cell), steps_, tally_);
+  }
+
+  const VertexField& field_;
+  const cpu::LatticeSteps& steps_;
+  StretchTally& tally_;
+  std::vector<cpu::SplitRow> rows_;  ///< at (y, z), (y + 1, z), (y, z + 1), (y + 1, z + 1)
+  cpu::RunGradients found_[2];       ///< of the cells of even and of odd number along i
+};
 
 dmat3 edges_of(const dvec3& a, const dvec3& b, const dvec3& c, const dvec3& d) { return {a - d, b - d, c - d}; }
 
@@ -141,7 +215,7 @@ FieldQuality quality_of(const TetrahedralMesh& mesh, const Limits& limits, const
   cpu::WorkProgress progress(control, static_cast<std::int64_t>(count));
   arena.execute([&] {
     tbb::parallel_for(std::size_t{0}, (count + kAtOnce - 1) / kAtOnce, [&](std::size_t part) {
-      StretchTally tally(dmat3(1));
+      StretchTally tally;
       const std::size_t begin = part * kAtOnce, end = std::min(begin + kAtOnce, count);
       for (std::size_t n = begin; n < end; ++n) {
         const glm::u32vec4& t = mesh.tetrahedra[n];
@@ -150,8 +224,9 @@ FieldQuality quality_of(const TetrahedralMesh& mesh, const Limits& limits, const
         if (determinant == 0) continue;
         const auto by = [&](std::uint32_t vertex) { return dvec3(mesh.displacement[vertex]); };
         const dmat3 f = (rest + edges_of(by(t.x), by(t.y), by(t.z), by(t.w))) * glm::inverse(rest);
-        tally.add(f, glm::determinant(f),
-                  static_cast<std::uint64_t>(std::rint(std::abs(determinant) / volume * kParts)));
+        tally.count(glm::determinant(f),
+                    static_cast<std::uint64_t>(std::rint(std::abs(determinant) / volume * kParts)));
+        tally.stretch(f);
       }
       tally.add_to(found.local());
       progress.done(static_cast<std::int64_t>(end - begin));
@@ -182,32 +257,14 @@ FieldQuality measure_quality(const VertexField& field, const Limits& limits, con
   if (!field.mesh.is_empty()) return quality_of(field.mesh, limits, control);
   const glm::i64vec3 size = field.lattice.size;
   require(std::min({size.x, size.y, size.z}) >= 2, "a field of " + to_string(size) + " vertices has no cell");
-  const dmat3 from_lattice = point_from_index(field.lattice).linear;
+  const cpu::LatticeSteps steps(point_from_index(field.lattice).linear);
   tbb::enumerable_thread_specific<FieldQuality> found;
   cpu::Arena arena(limits);
   cpu::WorkProgress progress(control, size.z - 1);
   arena.execute([&] {
     tbb::parallel_for(std::int64_t{0}, size.z - 1, [&](std::int64_t z) {
-      StretchTally tally(from_lattice);
-      for (std::int64_t y = 0; y < size.y - 1; ++y) {
-        const glm::vec3* rows[4];
-        for (int n = 0; n < 4; ++n)
-          rows[n] = field.displacement.data() + ((z + (n >> 1)) * size.y + y + (n & 1)) * size.x;
-        for (std::int64_t x = 0; x < size.x - 1; ++x) {
-          dvec3 u[8];
-          bool rests = true;
-          for (int corner = 0; corner < 8; ++corner) {
-            const glm::vec3& by = rows[corner >> 1][x + (corner & 1)];
-            rests = rests && by == glm::vec3(0);
-            u[corner] = dvec3(by);
-          }
-          if (rests) {
-            tally.add_at_rest(6);
-          } else {
-            add_cell(u, ((x + y + z) & 1) != 0, from_lattice, tally);
-          }
-        }
-      }
+      StretchTally tally;
+      CellRows(field, steps, tally).measure(z);
       tally.add_to(found.local());
       progress.done(1);
     });

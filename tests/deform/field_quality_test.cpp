@@ -4,6 +4,7 @@
 #include "deform/field_quality.h"
 
 #include <gtest/gtest.h>
+#include <hwy/targets.h>
 
 #include <cmath>
 #include <glm/matrix.hpp>
@@ -125,6 +126,46 @@ TEST(FieldQuality, TheLargestStretchOfAFieldIsThatOfItsPartsEachAlone) {
     largest = std::max(largest, measure_quality(mesh, {.threads = 1}).largest_stretch);
   }
   EXPECT_EQ(whole_mesh, largest);
+}
+
+class FieldQualityByVectors : public testing::Test {
+ protected:
+  ~FieldQualityByVectors() override { hwy::SetSupportedTargetsForTest(0); }
+};
+
+/// Cells of a lattice are measured with vectors, tetrahedra of a mesh one after the other.
+TEST_F(FieldQualityByVectors, IsThatOfTheLatticeAsAMeshOnEveryInstructionSet) {
+  for (std::uint64_t number = 0; number < test_cases(24); ++number) {
+    SCOPED_TRACE(seed_text(test_seed()) + ", case " + std::to_string(number));
+    Random random(test_seed(), 50 + number);
+    // Rows of one cell, of a few, and of more than are measured at a time; axes in general directions or not.
+    const glm::i64vec3 size(number % 3 == 0 ? random.integer(2, 20) : random.integer(120, 300), random.integer(2, 5),
+                            random.integer(2, 5));
+    const Geometry grid = random.chance(0.5) ? oblique_grid(size) : Geometry{.size = size, .spacing = {0.7, 0.9, 3}};
+    const double amplitude = random.real(0, 1), moving = random.real(0, 1);
+    const bool is_smooth = random.chance(0.5);
+    const VertexField lattice = field_in_voxels(grid, grid, [&](const glm::dvec3& x) {
+      if (std::sin(0.3 * x.x) > moving) return glm::dvec3(0);
+      if (is_smooth) return amplitude * glm::dvec3(std::sin(0.4 * x.y), std::cos(0.2 * x.x), std::sin(0.1 * x.x));
+      return amplitude * glm::dvec3(random.real(-1, 1), random.real(-1, 1), random.real(-1, 1));
+    });
+    VertexField mesh;
+    mesh.mesh = mesh_of(lattice);
+    mesh.mesh.lattice_vertex.clear();
+    const FieldQuality expected = measure_quality(mesh);
+    const FieldQuality first = measure_quality(lattice);
+    for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+      SCOPED_TRACE(hwy::TargetName(target));
+      hwy::SetSupportedTargetsForTest(target);
+      const FieldQuality found = measure_quality(lattice);
+      EXPECT_EQ(found.parts, first.parts);
+      EXPECT_EQ(found.largest_stretch, first.largest_stretch);
+    }
+    hwy::SetSupportedTargetsForTest(0);
+    EXPECT_NEAR(first.largest_stretch, expected.largest_stretch, 1e-5);
+    for (std::size_t bin = 0; bin < first.parts.size(); ++bin)
+      EXPECT_NEAR(first.shares()[bin], expected.shares()[bin], 1e-9) << "bin " << bin;
+  }
 }
 
 TEST(FieldQuality, StretchOfAShearIsNotItsLongestColumn) {
