@@ -99,27 +99,25 @@ void scan(const RowFaces& faces, int y_begin, int y_end, int z_begin, int z_end,
   const Ints di;
   const auto lanes = static_cast<int>(hn::Lanes(df));
   const int rows = y_end - y_begin;
-  const Float voxels = hn::Set(df, static_cast<float>(width));
   out.found = out.unsure = 0;
-  if (rows < lanes) {
-    const Float y = hn::Iota(df, static_cast<float>(y_begin));
-    for (int z = z_begin; z < z_end; ++z)
-      scan_vector(faces, y, hn::Set(df, static_cast<float>(z)), voxels, hn::FirstN(di, static_cast<std::size_t>(rows)),
-                  out);
-    return;
-  }
+  if (rows <= 0) return;
+  const Float voxels = hn::Set(df, static_cast<float>(width));
   const Float count = hn::Set(df, static_cast<float>(rows)), past = hn::Set(df, static_cast<float>(y_end)),
-              step = hn::Set(df, static_cast<float>(lanes)), one = hn::Set(df, 1.0f);
-  Float y = hn::Iota(df, static_cast<float>(y_begin)), z = hn::Set(df, static_cast<float>(z_begin));
-  const auto wrap = [&] {
+              one = hn::Set(df, 1.0f);
+  // Lanes go on from slice to slice: a vector further is so many rows and slices, and one slice more at the end of
+  // rows.
+  const Float step_y = hn::Set(df, static_cast<float>(lanes % rows)),
+              step_z = hn::Set(df, static_cast<float>(lanes / rows));
+  const Float lane = hn::Iota(df, 0.0f), slice = hn::Floor(hn::Div(hn::Add(lane, hn::Set(df, 0.5f)), count));
+  Float y = hn::Add(hn::Sub(lane, hn::Mul(slice, count)), hn::Set(df, static_cast<float>(y_begin))),
+        z = hn::Add(slice, hn::Set(df, static_cast<float>(z_begin)));
+  for (int left = rows * (z_end - z_begin); left > 0; left -= lanes) {
+    scan_vector(faces, y, z, voxels, hn::FirstN(di, static_cast<std::size_t>(left < lanes ? left : lanes)), out);
+    y = hn::Add(y, step_y);
+    z = hn::Add(z, step_z);
     const auto next = hn::Ge(y, past);
     y = hn::IfThenElse(next, hn::Sub(y, count), y);
     z = hn::IfThenElse(next, hn::Add(z, one), z);
-  };
-  for (int left = rows * (z_end - z_begin); left > 0; left -= lanes) {
-    scan_vector(faces, y, z, voxels, hn::FirstN(di, static_cast<std::size_t>(left < lanes ? left : lanes)), out);
-    y = hn::Add(y, step);
-    wrap();
   }
 }
 
