@@ -29,8 +29,7 @@ unsigned long main_thread = 0;  // of Python, as PyThread_get_thread_ident has i
 
 bool is_main_thread() { return PyThread_get_thread_ident() == main_thread; }
 
-/// Calls that are under way, so that those of daemon threads end before the interpreter does: a thread that wants its
-/// lock later is ended by Python amid C++, which ends the process.
+/// Scopes without the interpreter's lock, so that those of daemon threads end before the interpreter does.
 class Calls {
  public:
   /// To be called with the interpreter's lock. Goes no further, without it, if the interpreter ends: an error would
@@ -84,18 +83,6 @@ class Calls {
 
 /// Never destroyed, for threads may outlive this module; another one after a fork, for the parent's threads are gone.
 Calls* calls = new Calls;
-
-/// A call while it is under way. Its end needs the interpreter's lock.
-class CallUnderWay {
- public:
-  explicit CallUnderWay(std::stop_source& stop) : stop_(stop) { calls->begin(&stop_); }
-  ~CallUnderWay() { calls->end(&stop_); }
-  CallUnderWay(const CallUnderWay&) = delete;
-  CallUnderWay& operator=(const CallUnderWay&) = delete;
-
- private:
-  std::stop_source& stop_;
-};
 
 /// Passes progress to a callable of Python, at most 20 times a second, and keeps what it raises.
 class Progress {
@@ -167,17 +154,27 @@ bool signal_raised() {
 
 }  // namespace
 
+WithoutGil::WithoutGil() {
+  calls->begin(&stop);
+  released_.emplace();
+}
+
+WithoutGil::~WithoutGil() {
+  calls->stay_if_closed(&stop);
+  released_.reset();
+  calls->end(&stop);
+}
+
 void run_call(const CallOptions& options, bool small, const std::function<void(const Control&)>& work) {
-  std::stop_source stop;
-  const CallUnderWay under_way(stop);
-  Progress progress(options.progress, stop);
-  Control control{.stop = stop.get_token(), .stream = reinterpret_cast<void*>(options.stream)};
-  if (!options.progress.is_none()) control.progress = std::ref(progress);
   const bool watches = !small && !is_forked() && is_main_thread();
   bool interrupted = false;
-  std::exception_ptr error;
+  std::exception_ptr error, error_of_progress;
   {
-    const nb::gil_scoped_release released;
+    WithoutGil released;
+    std::stop_source& stop = released.stop;
+    Progress progress(options.progress, stop);
+    Control control{.stop = stop.get_token(), .stream = reinterpret_cast<void*>(options.stream)};
+    if (!options.progress.is_none()) control.progress = std::ref(progress);
     try {
       if (watches) {
         Watched watched(work, control);
@@ -193,10 +190,10 @@ void run_call(const CallOptions& options, bool small, const std::function<void(c
     } catch (...) {
       error = std::current_exception();
     }
-    calls->stay_if_closed(&stop);
+    error_of_progress = progress.error();
   }
   if (interrupted) throw nb::python_error();
-  if (progress.error()) std::rethrow_exception(progress.error());
+  if (error_of_progress) std::rethrow_exception(error_of_progress);
   if (error) std::rethrow_exception(error);
 }
 
@@ -204,8 +201,8 @@ std::unique_lock<std::timed_mutex> locked(std::timed_mutex& mutex) {
   std::unique_lock lock(mutex, std::try_to_lock);
   if (lock) return lock;
   const bool watches = is_main_thread();
-  const nb::gil_scoped_release released;
-  while (!lock.try_lock_for(20ms)) {
+  const WithoutGil released;
+  while (!lock.try_lock_for(20ms) && !released.stop.stop_requested()) {
     if (watches && signal_raised()) {
       const nb::gil_scoped_acquire raised;
       throw nb::python_error();

@@ -9,6 +9,7 @@
 #include <functional>
 #include <mutex>
 #include <optional>
+#include <stop_token>
 #include <string>
 
 #include "backend/backend.h"
@@ -17,6 +18,25 @@
 namespace tetwarp::python {
 
 namespace nb = nanobind;
+
+/// Gives the interpreter's lock (the GIL) free for a scope, in the place of nanobind's class: a thread that takes the
+/// lock again once the interpreter ends would be ended by Python amid C++, which ends the process. Such a thread stays
+/// here.
+class WithoutGil {
+ public:
+  /// To be called with the lock. Never returns in another thread than the main one once the interpreter ends.
+  WithoutGil();
+  /// Takes the lock again.
+  ~WithoutGil();
+  WithoutGil(const WithoutGil&) = delete;
+  WithoutGil& operator=(const WithoutGil&) = delete;
+
+  /// Is asked to stop when the interpreter ends, which waits for the scope's end then; and may be asked by others.
+  std::stop_source stop;
+
+ private:
+  std::optional<nb::gil_scoped_release> released_;
+};
 
 /// What every call of Python that may take long is given.
 struct CallOptions {

@@ -66,7 +66,7 @@ nb::tuple read_pull(const std::string& text, const Geometry& volume, const std::
 nb::tuple read_file(const std::string& text, const std::string& nifti_frame) {
   VertexField field;
   {
-    const nb::gil_scoped_release released;
+    const WithoutGil released;
     const FieldSource source = apps::parse_field_file(text, frame_of(nifti_frame));
     if (is_mesh_file(source.path) && !is_field_file(source)) {
       MeshFile file = read_mesh_file(source);
@@ -82,7 +82,7 @@ nb::tuple read_file(const std::string& text, const std::string& nifti_frame) {
 nb::tuple read_pull_file(const std::string& text, const std::string& nifti_frame) {
   PullField field;
   {
-    const nb::gil_scoped_release released;
+    const WithoutGil released;
     field = read_pull_field(apps::parse_field_file(text, frame_of(nifti_frame)));
   }
   const Geometry grid = field.grid;
@@ -158,7 +158,7 @@ nb::tuple continued(const Geometry& grid, const ConstArray& displacement, const 
   const PullField field = pull_field_of(grid, displacement);
   std::optional<VertexField> forward;
   {
-    const nb::gil_scoped_release released;
+    const WithoutGil released;
     forward = continued_over(field, straightened(like));
   }
   return as_tuple(std::move(*forward));

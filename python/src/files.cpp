@@ -122,7 +122,7 @@ std::string info(const std::filesystem::path& path, bool single, const std::stri
   options.input.path = path;
   options.input.single = single;
   options.json = true;
-  const nb::gil_scoped_release released;
+  const WithoutGil released;
   return apps::info_document(options).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 

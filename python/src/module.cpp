@@ -73,7 +73,7 @@ NB_MODULE(_core, core) {
     std::vector<char*> arguments;
     for (std::string& word : words) arguments.push_back(word.data());
     arguments.push_back(nullptr);
-    const nanobind::gil_scoped_release released;
+    const WithoutGil released;
     return apps::run_program(static_cast<int>(words.size()), arguments.data());
   });
   core.def("is_forked", &is_forked);

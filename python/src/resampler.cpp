@@ -78,7 +78,7 @@ class BoundResampler {
   BoundResampler(const std::string& backend, bool pulls, const Geometry& output, int device, int threads,
                  std::uint64_t memory)
       : output_(output), limits_{.threads = threads_of(threads), .memory = memory} {
-    const nb::gil_scoped_release released;
+    const WithoutGil released;
     const BackendKind kind = kind_of(backend);
     resampler_ = AnyResampler(kind, pulls ? Direction::pull : Direction::forward, output_, device, limits_);
   }
@@ -275,7 +275,7 @@ std::uint64_t keep_mass(const ConstArray& hu, const ConstArray& coverage, const 
   const VolumeView to = voxels_of(output, grid, "the output");
   std::optional<PaddingRange> range;
   if (padding) range = PaddingRange{(*padding)[0], (*padding)[1]};
-  const nb::gil_scoped_release released;
+  const WithoutGil released;
   return preserve_mass(from, maps, range, to, whole(grid));
 }
 
@@ -307,14 +307,14 @@ void add_resampler(nb::module_& core) {
   core.def(
       "fitting_grid",
       [](const Geometry& input, const VertexField& field, const std::string& outside) {
-        const nb::gil_scoped_release released;
+        const WithoutGil released;
         return apps::fitting_grid(input, field, outside_of(outside));
       },
       nb::arg("input"), nb::arg("field"), nb::arg("outside"));
   core.def(
       "hash_field",
       [](const VertexField& field, int threads) {
-        const nb::gil_scoped_release released;
+        const WithoutGil released;
         return apps::hash_field(field, threads_of(threads));
       },
       nb::arg("field"), nb::arg("threads"));
@@ -322,7 +322,7 @@ void add_resampler(nb::module_& core) {
       "hash_pull_field",
       [](const Geometry& grid, const ConstArray& displacement, int threads) {
         const PullField field = pull_field_of(grid, displacement);
-        const nb::gil_scoped_release released;
+        const WithoutGil released;
         return apps::hash_field(field, threads_of(threads));
       },
       nb::arg("grid"), nb::arg("displacement"), nb::arg("threads"));

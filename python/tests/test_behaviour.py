@@ -115,13 +115,15 @@ def test_ctrl_c_ends_a_call_within_a_tenth_of_a_second(work, tmp_path):
         assert float(when) - sent < 0.1 * (3 if os.getloadavg()[0] > 0.5 * os.cpu_count() else 1)
 
 
-def test_an_interpreter_that_ends_stops_the_calls_of_daemon_threads():
+@pytest.mark.parametrize("size", (200, 12))
+def test_an_interpreter_that_ends_stops_the_calls_of_daemon_threads(size):
+    # Large calls are stopped; of small ones many begin and end meanwhile.
     result = run_python(
         """
         import threading, time
         import numpy as np
         import tetwarp as tw
-        grid = tw.Geometry((200, 200, 200))
+        grid = tw.Geometry((SIZE, SIZE, SIZE))
         field = tw.fields.elastic(grid, amplitude=8, spacing=40, seed=1, cell_size=2)
         volume = tw.Volume(np.ones(grid.shape, np.float32), grid)
         def forever():
@@ -130,7 +132,7 @@ def test_an_interpreter_that_ends_stops_the_calls_of_daemon_threads():
         for _ in range(4):
             threading.Thread(target=forever, daemon=True).start()
         time.sleep(0.5)
-        """
+        """.replace("SIZE", str(size))
     )
     assert result.returncode == 0 and result.stderr == "", (result.returncode, result.stderr)
 
