@@ -34,7 +34,9 @@ class PointMap {
 
   /// The displacement of a point.
   glm::dvec3 operator()(const glm::dvec3& point) const { return map_->at(point); }
-  /// The displacements of some points, with the same bits. @param displacement  one for each point
+  /// The displacements of some points, with the same bits.
+  /// @param points        LPS mm
+  /// @param displacement  LPS mm, one for each point
   void of_row(std::span<const glm::dvec3> points, glm::dvec3* displacement) const {
     map_->of_row(points, displacement);
   }
