@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <glm/common.hpp>
+#include <glm/trigonometric.hpp>
 
 #include "tests/support/against_oracle.h"
 #include "tests/support/backends.h"
