@@ -7,22 +7,16 @@
 
 #include <gtest/gtest.h>
 
-#include <hwy/targets.h>
-
 #include "deform/core/barycentric.h"
 #include "deform/cpu/lattice_index.h"
 #include "deform/field_check.h"
 #include "tests/support/fields.h"
+#include "tests/support/instruction_set.h"
 
 namespace tetwarp::cpu {
 namespace {
 
 using namespace test;
-
-class Blocks : public testing::Test {
- protected:
-  ~Blocks() override { hwy::SetSupportedTargetsForTest(0); }
-};
 
 /// What a scan of a block should find, computed vertex by vertex.
 struct Expected {
@@ -82,12 +76,11 @@ bool compare(const Geometry& output, const VertexField& field, const glm::ivec3&
   return true;
 }
 
-TEST_F(Blocks, GiveWhatTheirTetrahedraGiveOneByOneOnEveryInstructionSet) {
+TEST(Blocks, GiveWhatTheirTetrahedraGiveOneByOneOnEveryInstructionSet) {
   SCOPED_TRACE(seed_text(test_seed()));
   int asked = 0, said = 0;
   for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    SCOPED_TRACE(hwy::TargetName(target));
-    hwy::SetSupportedTargetsForTest(target);
+    const OnInstructionSet on(target);
     for (std::uint64_t n = 0; n < 200; ++n) {
       Random random(test_seed(), 700 + n);
       SCOPED_TRACE(n);
@@ -117,23 +110,21 @@ TEST_F(Blocks, GiveWhatTheirTetrahedraGiveOneByOneOnEveryInstructionSet) {
   EXPECT_GT(10 * said, 9 * asked);
 }
 
-TEST_F(Blocks, HaveBoxesThatAreExactBeyondWhatFloatHolds) {
+TEST(Blocks, HaveBoxesThatAreExactBeyondWhatFloatHolds) {
   const Geometry output = unit_grid({20, 10, 9});
   Geometry lattice = unit_grid({4, 4, 5});
   lattice.spacing = glm::dvec3(1000);
   for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    SCOPED_TRACE(hwy::TargetName(target));
-    hwy::SetSupportedTargetsForTest(target);
+    const OnInstructionSet on(target);
     const glm::ivec3 first(0), cells(3, 3, 4);
     EXPECT_TRUE(compare(output, uniform_field(lattice, glm::vec3(90 + 1 / 4096.0f)), first, cells));
     compare(output, uniform_field(lattice, glm::vec3(900 + 1 / 4096.0f)), first, cells);
   }
 }
 
-TEST_F(Blocks, LeaveWhatIsNoNumberFlatOrFarToOthers) {
+TEST(Blocks, LeaveWhatIsNoNumberFlatOrFarToOthers) {
   for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    SCOPED_TRACE(hwy::TargetName(target));
-    hwy::SetSupportedTargetsForTest(target);
+    const OnInstructionSet on(target);
     for (const double spacing : {1.0, 0.7}) {
       Geometry output = unit_grid({20, 10, 9});
       output.spacing = glm::dvec3(spacing);

@@ -4,14 +4,13 @@
 #include "deform/field_quality.h"
 
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
-
 #include <cmath>
 #include <glm/matrix.hpp>
 #include <numeric>
 
 #include "deform/fields/lattice_mesh.h"
 #include "tests/support/fields.h"
+#include "tests/support/instruction_set.h"
 #include "tests/support/run.h"
 
 namespace tetwarp {
@@ -128,13 +127,8 @@ TEST(FieldQuality, TheLargestStretchOfAFieldIsThatOfItsPartsEachAlone) {
   EXPECT_EQ(whole_mesh, largest);
 }
 
-class FieldQualityByVectors : public testing::Test {
- protected:
-  ~FieldQualityByVectors() override { hwy::SetSupportedTargetsForTest(0); }
-};
-
 /// Cells of a lattice are measured with vectors, tetrahedra of a mesh one after the other.
-TEST_F(FieldQualityByVectors, IsThatOfTheLatticeAsAMeshOnEveryInstructionSet) {
+TEST(FieldQualityByVectors, IsThatOfTheLatticeAsAMeshOnEveryInstructionSet) {
   for (std::uint64_t number = 0; number < test_cases(24); ++number) {
     SCOPED_TRACE(seed_text(test_seed()) + ", case " + std::to_string(number));
     Random random(test_seed(), 50 + number);
@@ -155,13 +149,11 @@ TEST_F(FieldQualityByVectors, IsThatOfTheLatticeAsAMeshOnEveryInstructionSet) {
     const FieldQuality expected = measure_quality(mesh);
     const FieldQuality first = measure_quality(lattice);
     for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-      SCOPED_TRACE(hwy::TargetName(target));
-      hwy::SetSupportedTargetsForTest(target);
+      const OnInstructionSet on(target);
       const FieldQuality found = measure_quality(lattice);
       EXPECT_EQ(found.parts, first.parts);
       EXPECT_EQ(found.largest_stretch, first.largest_stretch);
     }
-    hwy::SetSupportedTargetsForTest(0);
     EXPECT_NEAR(first.largest_stretch, expected.largest_stretch, 1e-5);
     for (std::size_t bin = 0; bin < first.parts.size(); ++bin)
       EXPECT_NEAR(first.shares()[bin], expected.shares()[bin], 1e-9) << "bin " << bin;

@@ -6,10 +6,10 @@
 
 #include <gtest/gtest.h>
 
-#include <hwy/targets.h>
 #include <bit>
 #include <cstring>
 
+#include "tests/support/instruction_set.h"
 #include "tests/support/random.h"
 
 namespace tetwarp::cpu {
@@ -18,10 +18,7 @@ namespace {
 using namespace test;
 
 template <class V>
-class LinearRow : public testing::Test {
- protected:
-  ~LinearRow() override { hwy::SetSupportedTargetsForTest(0); }
-};
+class LinearRow : public testing::Test {};
 
 using Types = testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t, float>;
 TYPED_TEST_SUITE(LinearRow, Types);
@@ -111,7 +108,7 @@ void expect_same_bits(V (*value)(Random&),
   const glm::i64vec3 in = held.end - held.begin;
   int sampled = 0, sets = 0;
   for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
+    const OnInstructionSet on(target);
     ++sets;
     Random random(test_seed(), 40);
     std::vector<V> voxels(static_cast<std::size_t>(in.x * in.y * in.z));
@@ -193,7 +190,7 @@ TEST(LinearRowRounding, OfCoarseFieldsIsDoneOnceOnEveryInstructionSet) {
   }
   const FixedRow fixed{{u[0], u[1], u[2]}, {}};
   for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
+    const OnInstructionSet on(target);
     const Row row{{0, 0, 0}, kCount, mapped, nullptr, &fixed};
     LinearPlaces places;
     places.find(source.layout, row);
@@ -202,7 +199,6 @@ TEST(LinearRowRounding, OfCoarseFieldsIsDoneOnceOnEveryInstructionSet) {
     sample_linear_row(source, places, output);
     for (int i = 0; i < kCount; i += 2) EXPECT_EQ(output[i], 0.75f + 0x1p-24f) << hwy::TargetName(target);
   }
-  hwy::SetSupportedTargetsForTest(0);
 }
 
 }  // namespace

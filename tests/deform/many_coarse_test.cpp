@@ -4,16 +4,14 @@
 // Many small coarse fields of every kind, by every backend, each voxel against the oracle; on a device also bit for bit
 // against the CPU. TETWARP_CHECKS is the number of fields a test looks at, and TETWARP_TEST_SEED says which.
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
-
 #include <cmath>
-#include <cstdlib>
 #include <glm/common.hpp>
 #include <glm/trigonometric.hpp>
 
 #include "tests/support/against_oracle.h"
 #include "tests/support/backends.h"
 #include "tests/support/fields.h"
+#include "tests/support/instruction_set.h"
 #include "tests/support/meshes.h"
 
 namespace tetwarp {
@@ -23,18 +21,15 @@ using namespace test;
 
 class ManyCoarseFields : public BackendTest {
  protected:
-  ~ManyCoarseFields() override { hwy::SetSupportedTargetsForTest(0); }
-
   /// Looks at `make_field(random, output)` for many seeds, on a random instruction set each.
   template <class MakeField>
   void look(std::uint64_t usual, std::uint64_t stream, const MakeField& make_field) {
-    const char* const given = std::getenv("TETWARP_CHECKS");
-    const std::uint64_t count = given ? std::strtoull(given, nullptr, 10) : test_cases(usual), seed = test_seed();
+    const std::uint64_t count = number_from("TETWARP_CHECKS", test_cases(usual)), seed = test_seed();
     const std::vector<std::int64_t> targets = hwy::SupportedAndGeneratedTargets();
     std::uint64_t covered = 0;
     for (std::uint64_t number = 0; number < count && !HasFailure(); ++number) {
       Random random(seed, stream + number);
-      hwy::SetSupportedTargetsForTest(
+      const OnInstructionSet on(
           targets[static_cast<std::size_t>(random.integer(0, static_cast<std::int64_t>(targets.size()) - 1))]);
       SCOPED_TRACE(seed_text(seed) + ", field " + std::to_string(number));
       const Geometry output = unit_grid({random.integer(2, 18), random.integer(2, 14), random.integer(2, 10)});
@@ -50,7 +45,6 @@ class ManyCoarseFields : public BackendTest {
       on_cpu->set_field(view(field, Outside::background));
       expect_same_outcome(run(*on_cpu, source), found);
     }
-    hwy::SetSupportedTargetsForTest(0);
     EXPECT_GT(covered, 50 * count) << "fields are not to miss the output";
   }
 };

@@ -6,9 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include <hwy/targets.h>
-
 #include "tests/support/fields.h"
+#include "tests/support/instruction_set.h"
 #include "tests/support/shifted.h"
 
 namespace tetwarp::cpu {
@@ -18,8 +17,6 @@ using namespace test;
 
 class March : public testing::Test {
  protected:
-  ~March() override { hwy::SetSupportedTargetsForTest(0); }
-
   /// How the marches of a test found owners. Resamplings by claims are not counted: they do not march when they also
   /// count owners.
   Paths paths;
@@ -31,8 +28,7 @@ class March : public testing::Test {
     claims->set_field(view(test.field, Outside::background));
     const Outcome<std::int16_t> expected = run(*claims, source, {.background = 7});
     for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-      SCOPED_TRACE(hwy::TargetName(target));
-      hwy::SetSupportedTargetsForTest(target);
+      const OnInstructionSet on(target);
       const auto resampler = make_cpu_resampler(test.output);
       resampler->set_field(view(test.field, Outside::background));
       Outcome<std::int16_t> found = poisoned_outcome<std::int16_t>(test.output);
@@ -51,7 +47,6 @@ class March : public testing::Test {
       ASSERT_EQ(found.report.paths.gathered + found.report.paths.walked + found.report.paths.claimed,
                 static_cast<std::uint64_t>(voxel_count(test.output)));
     }
-    hwy::SetSupportedTargetsForTest(0);
   }
 };
 

@@ -7,22 +7,17 @@
 
 #include <gtest/gtest.h>
 
-#include <hwy/targets.h>
 #include <map>
 #include <set>
 
 #include "deform/cpu/rows/fixed_row.h"
+#include "tests/support/instruction_set.h"
 #include "tests/support/random.h"
 
 namespace tetwarp::cpu {
 namespace {
 
 using namespace test;
-
-class RowScans : public testing::Test {
- protected:
-  ~RowScans() override { hwy::SetSupportedTargetsForTest(0); }
-};
 
 Tetrahedron random_tetrahedron(Random& random, std::int64_t size, std::int64_t step) {
   Tetrahedron t{};
@@ -33,10 +28,10 @@ Tetrahedron random_tetrahedron(Random& random, std::int64_t size, std::int64_t s
   return t;
 }
 
-TEST_F(RowScans, SayWhatExactIntegersSayOnEveryInstructionSet) {
+TEST(RowScans, SayWhatExactIntegersSayOnEveryInstructionSet) {
   SCOPED_TRACE(seed_text(test_seed()));
   for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
+    const OnInstructionSet on(target);
     Random random(test_seed(), 81);
     int rows = 0, unsure = 0, owned = 0;
     for (int n = 0; n < 3000; ++n) {
@@ -77,10 +72,10 @@ TEST_F(RowScans, SayWhatExactIntegersSayOnEveryInstructionSet) {
   }
 }
 
-TEST_F(RowScans, FixedRowsHaveUOfEveryVoxelOnEveryInstructionSet) {
+TEST(RowScans, FixedRowsHaveUOfEveryVoxelOnEveryInstructionSet) {
   SCOPED_TRACE(seed_text(test_seed()));
   for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
+    const OnInstructionSet on(target);
     Random random(test_seed(), 82);
     for (int n = 0; n < 2000; ++n) {
       const glm::ivec3 first(random.integer(-40, 500), random.integer(0, 500), random.integer(0, 500));

@@ -10,21 +10,23 @@
 
 namespace tetwarp::test {
 
+/// A whole number from the environment; `otherwise` if it is not there.
+inline std::uint64_t number_from(const char* variable, std::uint64_t otherwise) {
+  const char* text = std::getenv(variable);
+  return text ? std::strtoull(text, nullptr, 10) : otherwise;
+}
+
 /// The seed of this run: $TETWARP_TEST_SEED, or another one each time. Random tests show it when they fail:
 /// SCOPED_TRACE(seed_text(seed)).
 inline std::uint64_t test_seed() {
-  static const std::uint64_t seed = [] {
-    if (const char* text = std::getenv("TETWARP_TEST_SEED")) return std::strtoull(text, nullptr, 10);
-    return static_cast<unsigned long long>(std::random_device{}());
-  }();
+  static const std::uint64_t seed = [] { return number_from("TETWARP_TEST_SEED", std::random_device{}()); }();
   return seed;
 }
 
 /// How many cases a random test looks at: `usual`, or $TETWARP_TEST_CASES if that is less, for tools that make tests
 /// slow.
 inline std::uint64_t test_cases(std::uint64_t usual) {
-  const char* text = std::getenv("TETWARP_TEST_CASES");
-  const std::uint64_t wanted = text ? std::strtoull(text, nullptr, 10) : usual;
+  const std::uint64_t wanted = number_from("TETWARP_TEST_CASES", usual);
   return wanted == 0 || wanted > usual ? usual : wanted;
 }
 

@@ -43,6 +43,17 @@ class Simulate : public testing::Test {
   ]
 })");
   }
+  /// Writes the scenarios that are shipped, with small cells, for the phantom has few voxels. @return their names
+  std::vector<std::string> shipped_scenarios() const {
+    std::vector<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(TETWARP_SCENARIOS)) {
+      names.push_back(entry.path().stem().string());
+      json scenario = json::parse(read_text(entry.path()));
+      scenario["cell_size"] = 2;
+      write_file(scratch_ / (names.back() + ".json"), scenario.dump());
+    }
+    return names;
+  }
   Outcome run(const std::string& arguments) const { return run_tetwarp(scratch_.path(), arguments); }
   json document(const std::string& name) const { return json::parse(read_text(scratch_ / name)); }
   /// What lies in the folder beside the inputs and the program's own words.
@@ -339,11 +350,7 @@ TEST_F(Simulate, StepsThatAreSpentAreAWarning) {
 }
 
 TEST_F(Simulate, ShippedScenariosRunOnThePhantom) {
-  for (const auto& entry : std::filesystem::directory_iterator(TETWARP_SCENARIOS)) {
-    const std::string name = entry.path().stem().string();
-    json scenario = json::parse(read_text(entry.path()));
-    scenario["cell_size"] = 2;  // the phantom has few voxels
-    write_file(scratch_ / (name + ".json"), scenario.dump());
+  for (const std::string& name : shipped_scenarios()) {
     const Outcome made =
         run("simulate " + name + ".json ct.mha -o " + name + ".mha --report " + name + ".report.json --backend cpu");
     ASSERT_EQ(made.status, 0) << name << ": " << made.err;
@@ -377,12 +384,8 @@ json result_of(json report) {
 
 TEST_F(Simulate, ShippedScenariosHaveTheCpusBytesOnADevice) {
   if (device_count() == 0) GTEST_SKIP() << "no CUDA device on this machine";
-  for (const auto& entry : std::filesystem::directory_iterator(TETWARP_SCENARIOS)) {
-    const std::string name = entry.path().stem().string();
+  for (const std::string& name : shipped_scenarios()) {
     SCOPED_TRACE(name);
-    json scenario = json::parse(read_text(entry.path()));
-    scenario["cell_size"] = 2;  // the phantom has few voxels
-    write_file(scratch_ / (name + ".json"), scenario.dump());
     for (const std::string backend : {"cpu", "cuda"}) {
       std::filesystem::create_directory(scratch_ / backend);
       const std::string options = " --quiet --overwrite --backend " + backend + " -o " + backend;

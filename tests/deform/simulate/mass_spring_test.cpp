@@ -4,12 +4,11 @@
 #include "deform/simulate/mass_spring.h"
 
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
-
 #include <bit>
 #include <glm/geometric.hpp>
 
 #include "tests/support/dense_springs.h"
+#include "tests/support/instruction_set.h"
 #include "tests/support/says.h"
 #include "tests/support/springs.h"
 
@@ -73,11 +72,13 @@ TEST_P(MassSpring, RigidMotionOfHandlesIsRigidMotionOfAllNodes) {
   }
 }
 
-/// There may be several minima of the energy, so that a dense solve from rest may end elsewhere: one from the place
-/// that was found must stay there, and the second derivative of the energy there must have no negative direction.
+/// A dense solve from the place that was found must stay there, and the second derivative of the energy there must have
+/// no negative direction. There may be several such minima (once in some hundred fields), so that a dense solve from
+/// rest may end at another; mostly it does not.
 TEST_P(MassSpring, EndsAtAMinimumThatADenseSolveConfirms) {
-  const std::uint64_t seed = test_seed();
-  for (std::uint64_t number = 0; number < test_cases(6); ++number) {
+  const std::uint64_t seed = test_seed(), cases = test_cases(6);
+  std::uint64_t reached_from_rest = 0;
+  for (std::uint64_t number = 0; number < cases; ++number) {
     SCOPED_TRACE(seed_text(seed) + ", case " + std::to_string(number));
     Random random(seed, 100 + number);
     const int kinds = number % 2 == 0 ? 1 : 2;
@@ -98,6 +99,8 @@ TEST_P(MassSpring, EndsAtAMinimumThatADenseSolveConfirms) {
     for (const glm::vec3& u : found) expected.push_back({double{u.x}, double{u.y}, double{u.z}});
     find_equilibrium(model, loads, 1, expected);
     EXPECT_LT(furthest(found, [&](std::size_t n) { return expected[n]; }), 2e-6);
+    const std::vector<glm::dvec3> from_rest = dense_equilibrium(model, loads);
+    reached_from_rest += furthest(found, [&](std::size_t n) { return from_rest[n]; }) < 2e-6;
     const DenseSprings springs = dense_springs(model, loads, 1, expected);
     const Eigen::VectorXd curvatures =
         Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(springs.matrix, Eigen::EigenvaluesOnly).eigenvalues();
@@ -106,6 +109,7 @@ TEST_P(MassSpring, EndsAtAMinimumThatADenseSolveConfirms) {
     for (const glm::dvec3& u : expected) most = std::max(most, glm::length(u));
     EXPECT_GT(most, 0.05);
   }
+  EXPECT_GE(reached_from_rest + 2, cases) << seed_text(seed);
 }
 
 TEST_P(MassSpring, TheUsualRuleEndsCloseToTheEquilibrium) {
@@ -425,12 +429,7 @@ TEST(MassSpringSums, AreMadeInTheOrderThatIsStated) {
   EXPECT_EQ(of_blocks({{512, kLarge}, {0, 1}, {256, 1}}), kLarge + 2);
 }
 
-class MassSpringBits : public testing::Test {
- protected:
-  ~MassSpringBits() override { hwy::SetSupportedTargetsForTest(0); }
-};
-
-TEST_F(MassSpringBits, AreThoseOfOneNodeAfterTheOther) {
+TEST(MassSpringBits, AreThoseOfOneNodeAfterTheOther) {
   for (std::uint64_t number = 0; number < test_cases(4); ++number) {
     SCOPED_TRACE(seed_text(test_seed()) + ", case " + std::to_string(number));
     Random random(test_seed(), 200 + number);
@@ -447,10 +446,9 @@ TEST_F(MassSpringBits, AreThoseOfOneNodeAfterTheOther) {
         EXPECT_TRUE(played(model, *method.make(model), loads) == expected) << method.name;
       }
       for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-        hwy::SetSupportedTargetsForTest(target);
+        const OnInstructionSet on(target);
         EXPECT_TRUE(played(model, *make_cpu_mass_spring(model), loads) == expected) << hwy::TargetName(target);
       }
-      hwy::SetSupportedTargetsForTest(0);
     }
   }
 }
