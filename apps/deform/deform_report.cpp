@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "apps/deform/output_grid.h"
+#include "apps/simulate/simulate_report.h"
 #include "deform/field_check.h"
 #include "io/dicom_text.h"
 
@@ -89,8 +90,8 @@ json input_json(const DeformRun& run, const DeformWritten& written) {
 
 json simulation_json(const SimulationSource& source) {
   json document = {{"scenario_sha256", source.scenario_sha256},
-                   {"method", source.method},
-                   {"method_version", source.method_version},
+                   {"method", name_of(source.method)},
+                   {"method_version", version_of(source.method)},
                    {"backend", source.backend}};
   if (!source.labels.empty()) document["labels_sha256"] = source.labels_sha256;
   return document;

@@ -75,9 +75,8 @@ SimulatedField simulate_field(const DeformOptions& options, const Scenario& scen
       .scenario_sha256 = hash_file(options.scenario),
       .labels = options.labels.string(),
       .labels_sha256 = options.labels.empty() ? "" : hash_volume(volume_named(options.labels), options.common.threads),
-      .method = name_of(scenario.method),
-      .backend = name_of(backend),
-      .method_version = version_of(scenario.method)};
+      .method = scenario.method,
+      .backend = name_of(backend)};
   return result;
 }
 

@@ -18,8 +18,8 @@ namespace tetwarp::apps {
 struct SimulationSource {
   std::string scenario, scenario_sha256;  ///< path as it was given, and hash of the file
   std::string labels, labels_sha256;      ///< empty: there are no labels
-  std::string method, backend;            ///< "chainmail" or "mass-spring"; "cpu" or "cuda"
-  int method_version = 0;                 ///< see `simulate::version_of`
+  simulate::Method method;
+  std::string backend;  ///< "cpu" or "cuda"
 };
 
 /// The field that `deform --scenario` makes: that of the end of the last phase, which `simulate` would write.

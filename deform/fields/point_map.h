@@ -40,8 +40,6 @@ class PointMap {
   void of_row(std::span<const glm::dvec3> points, glm::dvec3* displacement) const {
     map_->of_row(points, displacement);
   }
-  /// Whether there is a map.
-  explicit operator bool() const { return map_ != nullptr; }
 
  private:
   struct Any {

@@ -56,10 +56,10 @@ struct LinkSide {
   std::size_t up;
   std::ptrdiff_t distance, kept;
 
-  HWY_INLINE LinkSide(const SpringGrid& grid, int direction) {
+  HWY_INLINE LinkSide(const SpringArrays& a, int direction) {
     const bool is_up = direction >= kUp;
     up = static_cast<std::size_t>(is_up ? direction : opposite(direction)) - kUp;
-    distance = is_up ? grid.distance[up] : -grid.distance[up];
+    distance = a.distance[direction];
     kept = is_up ? 0 : distance;
   }
 };
@@ -72,7 +72,7 @@ void pulls(const SpringGrid& grid, NodeRange range, const SpringArrays& a, doubl
   for (std::size_t n = range.begin; n < range.end; n += lanes) {
     auto fx = hn::Zero(d), fy = hn::Zero(d), fz = hn::Zero(d), energy = hn::Zero(d);
     for (int direction = 0; direction < kDirections; ++direction) {
-      const LinkSide way(grid, direction);
+      const LinkSide way(a, direction);
       const Springs springs(a.rest[direction], a.trial, n, way.distance);
       const auto k = hn::PromoteTo(d, hn::LoadU(df, grid.constants(way.up) + n + way.kept));
       const auto pull = hn::Mul(k, springs.elongation), share = hn::Div(pull, springs.length);
@@ -93,7 +93,7 @@ void matrices(const SpringGrid& grid, NodeRange range, const SpringArrays& a, St
   const Halves df;
   for (std::size_t up = 0; up < kUp; ++up) {
     for (std::size_t n = range.begin; n < range.end; n += hn::Lanes(d)) {
-      const Springs springs(a.rest[up + kUp], a.u, n, grid.distance[up]);
+      const Springs springs(a.rest[up + kUp], a.u, n, a.distance[up + kUp]);
       const auto k = hn::PromoteTo(d, hn::LoadU(df, grid.constants(up) + n));
       auto t = hn::Div(springs.elongation, springs.length);
       if (kind == Stiffness::laplacian) t = hn::Set(d, 1.0);
@@ -111,14 +111,13 @@ void matrices(const SpringGrid& grid, NodeRange range, const SpringArrays& a, St
 }
 
 /// Sums, over the regular links of each node, of their matrices.
-/// @param sums  by entry of Symmetric, by node from the first of the range on
-void matrix_sums(const SpringGrid& grid, NodeRange range, const SpringArrays& a,
-                 float (*sums)[SpringGrid::kBlock + SpringGrid::kLanes]) {
+/// @param sums  by node from the first of the range on
+void matrix_sums(NodeRange range, const SpringArrays& a, const NodeMatrices& sums) {
   const Floats d;
   for (std::size_t n = range.begin; n < range.end; n += hn::Lanes(d)) {
     auto xx = hn::Zero(d), xy = hn::Zero(d), xz = hn::Zero(d), yy = hn::Zero(d), yz = hn::Zero(d), zz = hn::Zero(d);
     for (int direction = 0; direction < kDirections; ++direction) {
-      const LinkSide way(grid, direction);
+      const LinkSide way(a, direction);
       const auto entry = [&](std::size_t e) HWY_ATTR { return hn::LoadU(d, a.matrix.entry(way.up, e) + n + way.kept); };
       const auto x = entry(0), y = entry(1), z = entry(2), even = entry(3);
       xx = hn::Add(xx, hn::Add(hn::Mul(x, x), even));
@@ -129,20 +128,20 @@ void matrix_sums(const SpringGrid& grid, NodeRange range, const SpringArrays& a,
       zz = hn::Add(zz, hn::Add(hn::Mul(z, z), even));
     }
     const auto store = [&](std::size_t e, hn::Vec<Floats> sum)
-                           HWY_ATTR { hn::StoreU(sum, d, sums[e] + (n - range.begin)); };
+                           HWY_ATTR { hn::StoreU(sum, d, sums.entry(e) + (n - range.begin)); };
     store(0, xx), store(1, xy), store(2, xz), store(3, yy), store(4, yz), store(5, zz);
   }
 }
 
 /// Sums, over the regular links of each node, of the link's matrix times p of the node minus that of the neighbour.
-void product(const SpringGrid& grid, NodeRange range, const SpringArrays& a, const NodeVectors<float>& result) {
+void product(NodeRange range, const SpringArrays& a, const NodeVectors<float>& result) {
   const Floats d;
   for (std::size_t n = range.begin; n < range.end; n += hn::Lanes(d)) {
     const auto own_x = hn::LoadU(d, a.p.axis(0) + n), own_y = hn::LoadU(d, a.p.axis(1) + n),
                own_z = hn::LoadU(d, a.p.axis(2) + n);
     auto sum_x = hn::Zero(d), sum_y = hn::Zero(d), sum_z = hn::Zero(d);
     for (int direction = 0; direction < kDirections; ++direction) {
-      const LinkSide way(grid, direction);
+      const LinkSide way(a, direction);
       const auto entry = [&](std::size_t e) HWY_ATTR { return hn::LoadU(d, a.matrix.entry(way.up, e) + n + way.kept); };
       const auto x = hn::Sub(own_x, hn::LoadU(d, a.p.axis(0) + n + way.distance));
       const auto y = hn::Sub(own_y, hn::LoadU(d, a.p.axis(1) + n + way.distance));
@@ -245,7 +244,7 @@ Stretched<double> odd_spring(const SpringArrays& a, const OddLink& link, const N
 
 /// Sets `result` to the sums of Bend over all links.
 void whole_product(const SpringGrid& grid, NodeRange range, const SpringArrays& a, const NodeVectors<float>& result) {
-  HWY_DYNAMIC_DISPATCH(product)(grid, range, a, result);
+  HWY_DYNAMIC_DISPATCH(product)(range, a, result);
   for_odd_links(grid, range, [&](const OddLink& link, std::size_t number) {
     const glm::vec3 share = grid.odd_matrix[number] * (a.p[link.node] - a.p[link.other]);
     result.set(link.node, result[link.node] + share);
@@ -273,20 +272,15 @@ void sweep(SpringGrid& grid, NodeRange range, const sweeps::Matrices& matrices) 
 }
 
 void sweep(const SpringGrid& grid, NodeRange range, const sweeps::Inverses& inverses) {
-  float sums[6][SpringGrid::kBlock + SpringGrid::kLanes];
-  HWY_DYNAMIC_DISPATCH(matrix_sums)(grid, range, inverses.a, sums);
-  const auto of = [&](std::size_t node) {
-    const std::size_t n = node - range.begin;
-    return Symmetric<float>{sums[0][n], sums[1][n], sums[2][n], sums[3][n], sums[4][n], sums[5][n]};
-  };
+  float room[NodeMatrices::kEntries * SpringGrid::kBlock];
+  const NodeMatrices sums{room, SpringGrid::kBlock};
+  HWY_DYNAMIC_DISPATCH(matrix_sums)(range, inverses.a, sums);
   for_odd_links(grid, range, [&](const OddLink& link, std::size_t number) {
-    const std::size_t n = link.node - range.begin;
-    Symmetric<float> sum = of(link.node);
+    Symmetric<float> sum = sums[link.node - range.begin];
     sum.add(grid.odd_matrix[number].full());
-    sums[0][n] = sum.xx, sums[1][n] = sum.xy, sums[2][n] = sum.xz, sums[3][n] = sum.yy, sums[4][n] = sum.yz,
-    sums[5][n] = sum.zz;
+    sums.set(link.node - range.begin, sum);
   });
-  for (std::size_t n = range.begin; n < range.end; ++n) inverses.finish(n, of(n));
+  for (std::size_t n = range.begin; n < range.end; ++n) inverses.finish(n, sums[n - range.begin]);
 }
 
 void sweep(const SpringGrid& grid, NodeRange range, const sweeps::PlacedForces& forces) {

@@ -4,9 +4,12 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <type_traits>
+#include <span>
+#include <tuple>
+#include <vector>
 
 #include "deform/cpu/arena.h"
+#include "deform/simulate/host_machine.h"
 #include "deform/simulate/spring_engine.h"
 #include "deform/simulate/spring_grid.h"
 
@@ -15,48 +18,14 @@ namespace tetwarp::simulate {
 namespace {
 
 /// Sweeps over nodes on threads of the CPU, with vectors where SpringGrid has a sweep for them. See SpringSolver.
-class CpuMachine {
+class CpuMachine : public HostMachine<SpringGrid::kLanes> {
  public:
-  static constexpr Memory kMemory = Memory::host;
   static constexpr bool kReadsLinks = false;
-
-  /// Memory of which the first numbers after the last may be read and written.
-  template <class T>
-  class Buffer {
-   public:
-    T* reserve(std::size_t size) {
-      if (values_.size() < size + SpringGrid::kLanes) values_.resize(size + SpringGrid::kLanes);
-      return values_.data();
-    }
-    T* data() { return values_.data(); }
-
-   private:
-    std::vector<T> values_;
-  };
-
-  struct Scope {
-    ~Scope() {}  // makes holding a Scope count as a use of it
-  };
 
   CpuMachine(const Model& model, Limits limits)
       : grid_(model), arena_(limits), blocks_((model.nodes() + kSumBlock - 1) / kSumBlock) {}
 
   std::size_t padding() const { return grid_.padding; }
-  Scope scope() const { return {}; }
-  void set_stream(void*) {}
-  void wait() const {}
-  template <class T>
-  void upload(T* place, const T* host, std::size_t size) const {
-    std::copy_n(host, size, place);
-  }
-  template <class T>
-  void download(T* to, const T* from, std::size_t count) const {
-    std::copy_n(from, count, to);
-  }
-  template <class T>
-  T fetch(const T* place) const {
-    return *place;
-  }
 
   template <class Sweep>
   void each(std::size_t, const Sweep& work) {

@@ -29,6 +29,7 @@ struct NodeVectors {
 
 /// A symmetric matrix for each node, the entries apart in the order of Symmetric.
 struct NodeMatrices {
+  static constexpr std::size_t kEntries = 6;
   float* data = nullptr;
   std::size_t stride = 0;
 

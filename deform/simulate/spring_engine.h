@@ -72,14 +72,14 @@ struct Solved {
   double longest_mm = 0;  ///< the longest of its vectors, mm
 };
 
-/// The operations of which a step of mass-spring consists, implemented once for each backend. Displacements are kept in
-/// double: the forces of springs that hardly stretch cannot be computed from floats.
+/// The operations of which a step of mass-spring consists; SpringSolver has them for every machine. Displacements are
+/// kept in double: the forces of springs that hardly stretch cannot be computed from floats.
 class SpringEngine {
  public:
   virtual ~SpringEngine() = default;
 
   /// A stream of the device (`Control::stream`) on which the next calls queue their work; null: the default stream.
-  virtual void set_stream(void*) {}
+  virtual void set_stream(void* stream) = 0;
 
   /// Sets new loads: from now on placed nodes go from where they are to `loads.goal`, and forces from what they are to
   /// `loads.force`.
@@ -106,11 +106,9 @@ class SpringEngine {
   virtual void show() = 0;
   virtual std::span<const glm::vec3> shown() const = 0;
   /// A copy of `shown` in host memory.
-  virtual std::vector<glm::vec3> shown_on_host() {
-    const std::span<const glm::vec3> from = shown();
-    return {from.begin(), from.end()};
-  }
-  virtual Memory memory() const { return Memory::host; }
+  virtual std::vector<glm::vec3> shown_on_host() = 0;
+  /// Where `shown` lies.
+  virtual Memory memory() const = 0;
 };
 
 /// A simulation that takes its steps with an engine.

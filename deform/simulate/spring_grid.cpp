@@ -8,12 +8,9 @@
 namespace tetwarp::simulate {
 
 SpringGrid::SpringGrid(const Model& model) : nodes(model.nodes()) {
-  std::ptrdiff_t furthest = 0;
-  for (int d = kUp; d < kDirections; ++d) {
-    const std::ptrdiff_t far = link_distance(model.lattice, d);
-    distance[static_cast<std::size_t>(d - kUp)] = far;
-    furthest = std::max(furthest, far);
-  }
+  std::array<std::ptrdiff_t, kDirections> distance;
+  for (int d = 0; d < kDirections; ++d) distance[static_cast<std::size_t>(d)] = link_distance(model.lattice, d);
+  const std::ptrdiff_t furthest = *std::max_element(distance.begin(), distance.end());
   padding = static_cast<std::size_t>(furthest) + kLanes;
   for (std::vector<float>& values : stiffness) values.assign(nodes + 2 * padding, 0);
   for (std::size_t n = 0; n < nodes; ++n) {
@@ -22,12 +19,10 @@ SpringGrid::SpringGrid(const Model& model) : nodes(model.nodes()) {
       const std::size_t link = model.link(d, n);
       const std::int32_t other = model.neighbour[link];
       if (other < 0) continue;
-      const std::size_t up = static_cast<std::size_t>(d < kUp ? opposite(d) : d) - kUp;
-      const std::ptrdiff_t far = d < kUp ? -distance[up] : distance[up];
-      if (static_cast<std::ptrdiff_t>(n) + far != other) {
+      if (static_cast<std::ptrdiff_t>(n) + distance[static_cast<std::size_t>(d)] != other) {
         odd.push_back({static_cast<std::uint32_t>(n), static_cast<std::uint32_t>(other), d, model.stiffness[link]});
       } else if (d >= kUp) {
-        stiffness[up][padding + n] = model.stiffness[link];
+        stiffness[static_cast<std::size_t>(d - kUp)][padding + n] = model.stiffness[link];
       }
     }
   }

@@ -27,7 +27,6 @@ struct SpringGrid {
   static constexpr std::size_t kLanes = 32;
 
   std::size_t nodes = 0, padding = 0;  ///< padding: how far before the first node and after the last sweeps may read
-  std::array<std::ptrdiff_t, kUp> distance{};  ///< by direction kUp + d: distance of a node's neighbour in the arrays
   /// By direction kUp + d, with padding: spring constant of the link, N/mm; 0 where the link is odd.
   std::array<std::vector<float>, kUp> stiffness;
   std::vector<OddLink> odd;            ///< each odd link once from each of its ends, by rising node, then direction

@@ -77,7 +77,7 @@ class SpringSolver final : public SpringEngine {
     NodeVectors<float>* const floats[] = {&a_.x, &a_.r, &a_.z, &a_.p, &a_.q};
     for (std::size_t i = 0; i < std::size(floats); ++i) zeros(*floats[i], floats_[i], 3);
     zeros(a_.matrix, matrix_, LinkMatrices::kEntries * kUp);
-    zeros(a_.inverse, inverse_, 6);
+    zeros(a_.inverse, inverse_, NodeMatrices::kEntries);
     a_.shown = hold(shown_, std::vector<glm::vec3>(nodes_, glm::vec3(0)));
     a_.state = state_.reserve(1);
     a_.result = result_.reserve(1);

@@ -6,49 +6,18 @@
 #include <algorithm>
 #include <vector>
 
+#include "deform/simulate/host_machine.h"
 #include "deform/simulate/spring_solver.h"
 
 namespace tetwarp::test {
 
 /// Runs the sweeps of SpringSolver one node after the other, as CUDA's threads do, with nothing but the sweeps' own
 /// code: what the CPU computes with vectors, and what CUDA computes, must have its bits.
-class PlainMachine {
+class PlainMachine : public simulate::HostMachine<0> {
  public:
-  static constexpr Memory kMemory = Memory::host;
   static constexpr bool kReadsLinks = true;
 
-  template <class T>
-  class Buffer {
-   public:
-    T* reserve(std::size_t size) {
-      values_.resize(std::max(size, values_.size()));
-      return values_.data();
-    }
-    T* data() { return values_.data(); }
-
-   private:
-    std::vector<T> values_;
-  };
-
-  struct Scope {
-    ~Scope() {}  // makes holding a Scope count as a use of it
-  };
   std::size_t padding() const { return 0; }
-  Scope scope() const { return {}; }
-  void set_stream(void*) {}
-  void wait() const {}
-  template <class T>
-  void upload(T* place, const T* host, std::size_t size) const {
-    std::copy_n(host, size, place);
-  }
-  template <class T>
-  void download(T* to, const T* from, std::size_t count) const {
-    std::copy(from, from + count, to);
-  }
-  template <class T>
-  T fetch(const T* place) const {
-    return *place;
-  }
 
   template <class Sweep>
   void each(std::size_t nodes, const Sweep& sweep) const {
