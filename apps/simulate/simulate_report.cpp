@@ -118,6 +118,7 @@ json document_of(const SimulateRecord& record) {
   document["tissues"] = tissues_json(record);
   const StoppingRule& stop = record.scenario.stop;
   document["stop"] = {{"motion_mm", stop.motion_mm}, {"residual", stop.residual}, {"steps", stop.steps}};
+  document["deadband_mm"] = record.scenario.deadband_mm;
   document["phases"] = json::array();
   for (std::size_t n = 0; n < record.phases.size(); ++n) document["phases"].push_back(phase_json(record, n));
   for (const auto& [name, seconds] : record.stages) document["stages"][name] = {{"seconds", seconds}};

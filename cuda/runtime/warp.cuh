@@ -138,21 +138,50 @@ __device__ unsigned rank_in_block(bool has, int lane, int warp, unsigned (&per_w
   return place;
 }
 
-/// Adds up what the threads of a block hold, as a tree that never changes, so that the sum's bits do not either;
-/// `cub::BlockReduce` adds in an order of its own.
+/// What another lane holds, which is so many lanes further.
+template <class T>
+__device__ T from_lane_above(const T& own, int lanes) {
+  static_assert(sizeof(T) % sizeof(unsigned) == 0);
+  union Words {
+    __device__ Words() {}
+    T value;
+    unsigned words[sizeof(T) / sizeof(unsigned)];
+  } all;
+  all.value = own;
+#pragma unroll
+  for (unsigned& word : all.words) word = __shfl_down_sync(kAllLanes, word, static_cast<unsigned>(lanes));
+  return all.value;
+}
+
+/// Term t after upper halves were added to lower halves, until kHalf terms are left of kThreads.
+template <int kHalf, int kThreads, class T>
+__device__ T after_halving(const T* terms, int t) {
+  if constexpr (kHalf == kThreads) {
+    return terms[t];
+  } else {
+    T sum = after_halving<2 * kHalf, kThreads>(terms, t);
+    sum.add(after_halving<2 * kHalf, kThreads>(terms, t + kHalf));
+    return sum;
+  }
+}
+
+/// Adds up what the threads of a block hold, as a tree that never changes, so that the sum's bits do not either: the
+/// upper half of the terms is added to the lower one, until one is left. `cub::BlockReduce` adds in an order of its
+/// own. The block waits once; all but the first warp may go on then.
+///
 /// @tparam T         has `add(const T&)`
-/// @tparam kThreads  of a block, a power of two
+/// @tparam kThreads  of a block, a power of two, 32 or more
+/// @param terms      shared memory that no thread uses any more: written
 /// @return the sum, in the first thread
 template <int kThreads, class T>
-__device__ T sum_of_block(const T& own) {
-  __shared__ T of_thread[kThreads];
-  of_thread[threadIdx.x] = own;
+__device__ T sum_of_block(const T& own, T (&terms)[kThreads]) {
+  terms[threadIdx.x] = own;
   __syncthreads();
-  for (int half = kThreads / 2; half > 0; half /= 2) {
-    if (threadIdx.x < half) of_thread[threadIdx.x].add(of_thread[threadIdx.x + half]);
-    __syncthreads();
-  }
-  return of_thread[0];
+  if (threadIdx.x >= 32) return {};
+  T sum = after_halving<32, kThreads>(terms, static_cast<int>(threadIdx.x));
+#pragma unroll
+  for (int half = 16; half > 0; half /= 2) sum.add(from_lane_above(sum, half));
+  return sum;
 }
 
 /// Transposes 32 x 32 bits, a word a lane: bit n of lane m from bit m of lane n. Each step swaps squares of half the

@@ -8,6 +8,7 @@
 #include "cuda/runtime/launch.cuh"
 #include "cuda/runtime/warp.cuh"
 #include "deform/simulate/chain_plan.h"
+#include "deform/simulate/simulation.h"
 
 /// The kernels of ChainMail. For chainmail.cu alone.
 namespace tetwarp::simulate {
@@ -15,7 +16,7 @@ namespace tetwarp::simulate {
 namespace {
 
 constexpr int kThreads = 512;
-constexpr int kBlocksPerProcessor = 2;
+constexpr int kBlocksPerProcessor = 1;  ///< so that other kernels run beside it
 
 /// What the blocks of a launch tell each other, and a launch the next one.
 ///
@@ -143,16 +144,45 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
   job.notes->motion = motion;
 }
 
+/// The paths from a set of placed nodes. A cooperative launch.
+///
+/// @param job    `upper` and `lower` are those of the set in its SetPaths: written  @param set  of `placed`
+__global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
+    path_kernel(const __grid_constant__ Job job, PlacedSet set) {
+  Crew crew(job);
+  crew.for_nodes([&](std::int32_t n) {
+    job.upper[n] = {{kNoPath, kNoPath, kNoPath}};
+    job.lower[n] = {{-kNoPath, -kNoPath, -kNoPath}};
+  });
+  crew.wait();
+  for (std::size_t n = set.begin + blockIdx.x * kThreads + threadIdx.x; n < set.end;
+       n += std::size_t{gridDim.x} * kThreads)
+    job.upper[job.placed[n].node] = job.lower[job.placed[n].node] = {{0, 0, 0}};
+  crew.wait();
+  crew.tighten_all();
+}
+
 /// Steps of relaxation, until `steps` in all are made or the motion is small. A cooperative launch.
 ///
 /// @param job    `now`, `before`, `upper`, `lower` are written; `notes` are read, and written by the first thread
+/// @param pacer  with which relaxation begins where `paths` are given; otherwise that of the notes goes on
+/// @param paths  with them the chain stage comes first, as `follow_kernel` makes it; none: it was made
 __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
-    relax_kernel(const __grid_constant__ Job job, std::int32_t steps) {
+    relax_kernel(const __grid_constant__ Job job, std::int32_t steps, Pacer pacer,
+                 const __grid_constant__ SetPaths paths) {
   Crew crew(job);
-  Pacer pacer = job.notes->pacer;
   std::int32_t made = job.notes->steps;
   bool reached = false;
   std::uint64_t motion = 0;
+  if (paths.count > 0) {
+    motion = crew.finish([&](std::int32_t n) {
+      job.ranges[n] = paths.range(n);
+      return clamped(job.now[n], job.ranges[n]);
+    });
+  } else {
+    pacer = job.notes->pacer;
+    motion = job.notes->motion;
+  }
   while (made < steps && !reached) {
     crew.for_nodes([&](std::int32_t n) {
       job.upper[n] = job.lower[n] = relaxed(job.chain, job.now, job.before, job.ranges[n], pacer.pace, n);
@@ -184,26 +214,25 @@ __global__ void start_kernel(Job job) {
   if (n < job.placed_count) job.placed[n].start = job.shown[job.placed[n].node];
 }
 
-/// Shows the displacement of all nodes. A thread a node.
-///
-/// @param direction     of the lattice  @param node_of  place of each node in `displacement`
-/// @param displacement  LPS mm, written
-__global__ void show_kernel(Job job, glm::dmat3 direction, const std::int32_t* node_of, glm::vec3* displacement) {
-  const int n = static_cast<int>(blockIdx.x * kThreads + threadIdx.x);
-  if (n >= job.chain.nodes) return;
-  job.shown[n] = job.now[n];
-  displacement[node_of[n]] = to_lps(direction, job.now[n]);
-}
-
-/// Shows placed nodes where they are put, over what `show_kernel` has shown. A thread a placed node; parameters as
-/// there.
-__global__ void show_placed_kernel(Job job, glm::dmat3 direction, const std::int32_t* node_of,
-                                   glm::vec3* displacement) {
+/// Puts placed nodes where they belong, over what is shown of all. A thread a placed node.
+__global__ void show_placed_kernel(Job job) {
   const int n = static_cast<int>(blockIdx.x * kThreads + threadIdx.x);
   if (n >= job.placed_count) return;
   const PlacedNode& one = job.placed[n];
   job.shown[one.node] = one.at(job.part);
-  displacement[node_of[one.node]] = to_lps(direction, job.shown[one.node]);
+}
+
+/// Gives the displacement of all nodes. A thread a node.
+///
+/// @param direction     of the lattice  @param node_of  place of each node in `displacement`
+/// @param square        see `shown_of`
+/// @param displacement  LPS mm, written
+__global__ void show_kernel(Job job, glm::dmat3 direction, const std::int32_t* node_of, float square,
+                            glm::vec3* displacement) {
+  const int n = static_cast<int>(blockIdx.x * kThreads + threadIdx.x);
+  if (n >= job.chain.nodes) return;
+  glm::vec3& shown = displacement[node_of[n]];
+  shown = shown_of(shown, to_lps(direction, job.shown[n]), square);
 }
 
 }  // namespace

@@ -65,6 +65,7 @@ class CudaChainmail final : public Simulation {
     job_.placed = placed_.reserve(placed.size() + 1);
     job_.placed_count = static_cast<int>(placed.size());
     has_loads_ = true;
+    advances_ = 0;
     if (placed.empty()) return;
     uploaded(placed_, placed);
     start_kernel<<<blocks_for(job_.placed_count, kThreads), kThreads>>>(job_);
@@ -82,20 +83,27 @@ class CudaChainmail final : public Simulation {
     job_.motion_mm = rule.motion_mm;
     clear_notes();
     Pacer pacer(plan_.momentum, plan_.patience);
-    launch(follow_kernel, job_, pacer);
+    SetPaths paths = follow(part, pacer);
     Notes& notes = host_notes_.reserve(1)[0];
     notes.steps = 0;
     notes.reached = false;
-    while (notes.steps < rule.steps && !notes.reached && !control.stop.stop_requested()) {
+    bool is_shown = false, is_followed = paths.count == 0;
+    while (!is_followed || (notes.steps < rule.steps && !notes.reached && !control.stop.stop_requested())) {
       clear_rounds();
       std::int32_t until = std::min(rule.steps, notes.steps + kStepsAtOnce);
-      launch(relax_kernel, job_, until);
+      launch(relax_kernel, job_, until, pacer, paths);
+      paths.count = 0;
+      is_followed = true;
+      is_shown = until == rule.steps;  // these are the last steps: what follows need not wait for the host
+      if (is_shown) show(job_.placed_count, deadband_square());
       read_notes();
       if (control.progress) control.progress(static_cast<double>(notes.steps) / rule.steps);
     }
     const bool cancelled = notes.steps < rule.steps && !notes.reached;
-    show();
-    read_notes();
+    if (!is_shown) {
+      show(job_.placed_count, deadband_square());
+      read_notes();
+    }
     if (cancelled) throw Cancelled();
     return {.steps = notes.steps, .motion_mm = motion_mm(notes.motion), .reached = notes.reached};
   }
@@ -120,13 +128,46 @@ class CudaChainmail final : public Simulation {
     uploaded(lower_, units);
     clear_notes();
     launch(project_kernel, job_);
-    Job free = job_;
-    free.placed_count = 0;
-    show(free);
+    show(0, 0);
     TETWARP_CUDA_TRY(cudaStreamSynchronize(stream_));
   }
 
  private:
+  /// Makes the chain stage. Where it is made again for the same loads, the paths of their sets are followed once.
+  /// @return paths by which it is still to be made, if any
+  SetPaths follow(double part, Pacer& pacer) {
+    if (++advances_ == 2) find_paths();
+    if (advances_ < 2 || paths_.count == 0) {
+      launch(follow_kernel, job_, pacer);
+      return {};
+    }
+    for (std::size_t set = 0; set < ways_.size(); ++set) paths_.at[set] = ways_[set].at(part);
+    return paths_;
+  }
+
+  void find_paths() {
+    paths_ = {};
+    std::vector<PlacedNode> placed(static_cast<std::size_t>(job_.placed_count));
+    placed_.download(placed.data(), placed.size(), stream_);
+    std::vector<PlacedSet> sets = plan_.sets_of(placed);
+    placed_.upload(placed.data(), placed.size(), stream_);
+    ways_.clear();
+    const auto nodes = static_cast<std::size_t>(plan_.nodes());
+    paths_.upper = path_upper_.reserve(sets.size() * nodes);
+    paths_.lower = path_lower_.reserve(sets.size() * nodes);
+    for (PlacedSet& set : sets) {
+      Job job = job_;
+      job.upper = path_upper_.data() + ways_.size() * nodes;
+      job.lower = path_lower_.data() + ways_.size() * nodes;
+      clear_rounds();
+      launch(path_kernel, job, set);
+      ways_.push_back(placed[set.begin]);
+    }
+    clear_rounds();
+    paths_.nodes = plan_.nodes();
+    paths_.count = static_cast<int>(sets.size());
+  }
+
   /// All blocks at the same time.
   template <class... Arguments>
   void launch(void (*kernel)(Arguments...), Arguments&... arguments) {
@@ -148,14 +189,16 @@ class CudaChainmail final : public Simulation {
     TETWARP_CUDA_TRY(cudaStreamSynchronize(stream_));
   }
 
-  void show() { show(job_); }
-  void show(const Job& job) {
-    show_kernel<<<blocks_for(plan_.nodes(), kThreads), kThreads, 0, stream_>>>(job, plan_.direction, node_of_.data(),
-                                                                               displacement_.data());
-    TETWARP_CUDA_TRY(cudaGetLastError());
-    if (job.placed_count == 0) return;
-    show_placed_kernel<<<blocks_for(job.placed_count, kThreads), kThreads, 0, stream_>>>(
-        job, plan_.direction, node_of_.data(), displacement_.data());
+  /// @param square  see `shown_of`
+  void show(int placed_count, float square) {
+    const auto count = static_cast<std::size_t>(plan_.nodes());
+    TETWARP_CUDA_TRY(cudaMemcpyAsync(job_.shown, job_.now, count * sizeof(Units), cudaMemcpyDeviceToDevice, stream_));
+    if (placed_count > 0) {
+      show_placed_kernel<<<blocks_for(placed_count, kThreads), kThreads, 0, stream_>>>(job_);
+      TETWARP_CUDA_TRY(cudaGetLastError());
+    }
+    show_kernel<<<blocks_for(plan_.nodes(), kThreads), kThreads, 0, stream_>>>(job_, plan_.direction, node_of_.data(),
+                                                                               square, displacement_.data());
     TETWARP_CUDA_TRY(cudaGetLastError());
   }
 
@@ -164,6 +207,10 @@ class CudaChainmail final : public Simulation {
   unsigned crew_ = 1;  ///< blocks of a launch
   cudaStream_t stream_ = nullptr;
   bool has_loads_ = false;
+  int advances_ = 0;                             ///< with these loads
+  SetPaths paths_;                               ///< of the sets of placed nodes, from the second advance on
+  std::vector<PlacedNode> ways_;                 ///< one node of each set
+  DeviceBuffer<Units> path_upper_, path_lower_;  ///< to which `paths_` refers
   Job job_{};
   DeviceBuffer<std::int32_t> around_, shares_, begins_, node_of_;
   DeviceBuffer<LinkUnits> links_;

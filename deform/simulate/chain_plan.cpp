@@ -4,6 +4,7 @@
 #include "deform/simulate/chain_plan.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 
@@ -198,6 +199,25 @@ std::vector<PlacedNode> ChainPlan::read(const Loads& loads) const {
     placed.push_back({static_cast<std::int32_t>(n), {}, to_units(loads.goal[node], "the goal", node)});
   }
   return placed;
+}
+
+std::vector<PlacedSet> ChainPlan::sets_of(std::vector<PlacedNode>& placed) const {
+  constexpr std::size_t kMostBytes = std::size_t{512} << 20;
+  const auto way = [](const PlacedNode& one) {
+    const auto& [x, y, z] = one.start.at;
+    const auto& [u, v, w] = one.goal.at;
+    return std::array{x, y, z, u, v, w};
+  };
+  std::stable_sort(placed.begin(), placed.end(),
+                   [&](const PlacedNode& a, const PlacedNode& b) { return way(a) < way(b); });
+  std::vector<PlacedSet> sets;
+  for (std::size_t n = 0; n < placed.size(); ++n) {
+    if (n == 0 || way(placed[n]) != way(placed[n - 1])) sets.push_back({n, n});
+    sets.back().end = n + 1;
+    if (sets.size() > SetPaths::kMost) return {};
+  }
+  if (sets.size() * static_cast<std::size_t>(nodes()) * 2 * sizeof(Units) > kMostBytes) return {};
+  return sets;
 }
 
 std::vector<std::uint8_t> ChainPlan::moving(std::span<const PlacedNode> placed) const {

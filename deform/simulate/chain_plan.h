@@ -19,6 +19,11 @@ struct ChainBlock {
   std::vector<std::int32_t> beside;  ///< blocks that share links with this one
 };
 
+/// Placed nodes that go the same way: `placed[begin]` up to, not with, `placed[end]`.
+struct PlacedSet {
+  std::size_t begin, end;
+};
+
 /// A model made ready for ChainMail on any backend.
 ///
 /// Nodes are numbered block by block, and within a block as in the model. A block is a few rows of vertices, on the
@@ -43,6 +48,9 @@ class ChainPlan {
   /// The placed nodes with their goals; the backend fills in where they start. @throws InputError for loads that
   /// `set_loads` refuses
   std::vector<PlacedNode> read(const Loads& loads) const;
+  /// Puts placed nodes, with their starts, in the order of the sets that go the same way. No sets where they are more
+  /// than SetPaths has, as those of a handle that turns, or where their paths would take too much memory.
+  std::vector<PlacedSet> sets_of(std::vector<PlacedNode>& placed) const;
   /// Whether links lead from a node to a placed one.
   std::vector<std::uint8_t> moving(std::span<const PlacedNode> placed) const;
 

@@ -206,6 +206,36 @@ struct PlacedNode {
   }
 };
 
+/// More than any length of a path. With the largest limit it is still less than 2^31.
+inline constexpr std::int32_t kNoPath = std::int32_t{1} << 30;
+
+/// What placed nodes that all go the same way leave to the others: their limits where these nodes do not move, and
+/// where they are now. With paths of several such sets, the chain stage need not follow paths again (chainmail.h: U is
+/// the least of u_f + d(f, v), and u_f is the same for all nodes of a set).
+struct SetPaths {
+  static constexpr int kMost = 8;
+
+  int count = 0;  ///< of sets
+  std::int32_t nodes = 0;
+  Units at[kMost];  ///< displacement of each set
+  const Units* upper =
+      nullptr;  ///< at set * nodes + node: the largest displacement; kNoPath where nothing holds the node
+  const Units* lower = nullptr;  ///< the smallest; -kNoPath where nothing holds the node
+
+  TETWARP_HD DisplacementRange range(std::int32_t node) const {
+    Units high{{kFarthest, kFarthest, kFarthest}}, low{{-kFarthest, -kFarthest, -kFarthest}};
+    for (int set = 0; set < count; ++set) {
+      const Units& above = upper[std::int64_t{set} * nodes + node];
+      const Units& below = lower[std::int64_t{set} * nodes + node];
+      for (int c = 0; c < 3; ++c) {
+        high.at[c] = smaller(high.at[c], at[set].at[c] + above.at[c]);
+        low.at[c] = larger(low.at[c], at[set].at[c] + below.at[c]);
+      }
+    }
+    return range_between(high, low);
+  }
+};
+
 /// A displacement as LPS mm.
 /// @param direction  directions of the lattice; if it is the identity, only the result is rounded
 TETWARP_HD inline glm::vec3 to_lps(const glm::dmat3& direction, const Units& units) {

@@ -30,6 +30,7 @@ class CpuChainmail final : public Simulation {
     for (PlacedNode& one : placed) one.start = shown_[at(one.node)];
     moves_ = plan_.moving(placed);
     placed_ = std::move(placed);
+    advances_ = 0;
     has_loads_ = true;
   }
 
@@ -50,7 +51,7 @@ class CpuChainmail final : public Simulation {
       activate_all();
       tighten_all({});
       for_nodes([&](std::size_t n) { now_[n] = shown_[n] = halfway(upper_[n], lower_[n]); });
-      convert();
+      convert(0);
     });
   }
 
@@ -90,20 +91,58 @@ class CpuChainmail final : public Simulation {
     return convergence;
   }
 
-  /// Makes the first step of ChainMail, the chain: nodes move as far as placed ones force them to.
+  static Units same(std::int32_t units) { return {{units, units, units}}; }
+
+  /// Makes the first step of ChainMail, the chain: nodes move as far as placed ones force them to. Where it is made
+  /// again for the same loads, the paths of their sets are followed once.
   std::uint64_t follow(double part, const Control& control) {
-    const auto any = [](std::int32_t mm) { return Units{{mm, mm, mm}}; };
-    for_nodes([&](std::size_t n) {
-      upper_[n] = any(kFarthest);
-      lower_[n] = any(-kFarthest);
+    if (++advances_ == 2) find_paths(control);
+    if (advances_ >= 2 && paths_.count > 0) {
+      for (std::size_t set = 0; set < sets_.size(); ++set) paths_.at[set] = placed_[sets_[set].begin].at(part);
+      return finish([&](std::size_t n) {
+        ranges_[n] = paths_.range(static_cast<std::int32_t>(n));
+        return clamped(now_[n], ranges_[n]);
+      });
+    }
+    spread(kFarthest, control, [&] {
+      for (const PlacedNode& one : placed_) upper_[at(one.node)] = lower_[at(one.node)] = one.at(part);
     });
-    for (const PlacedNode& one : placed_) upper_[at(one.node)] = lower_[at(one.node)] = one.at(part);
-    activate_all();
-    tighten_all(control);
     return finish([&](std::size_t n) {
       ranges_[n] = range_between(upper_[n], lower_[n]);
       return clamped(now_[n], ranges_[n]);
     });
+  }
+
+  /// Tightens all from the nodes that `place` places. @param farthest  where nothing holds a node
+  template <class Place>
+  void spread(std::int32_t farthest, const Control& control, const Place& place) {
+    for_nodes([&](std::size_t n) {
+      upper_[n] = same(farthest);
+      lower_[n] = same(-farthest);
+    });
+    place();
+    activate_all();
+    tighten_all(control);
+  }
+
+  void find_paths(const Control& control) {
+    paths_ = {};
+    sets_ = plan_.sets_of(placed_);
+    const auto nodes = static_cast<std::size_t>(plan_.nodes());
+    path_upper_.resize(sets_.size() * nodes);
+    path_lower_.resize(sets_.size() * nodes);
+    for (std::size_t set = 0; set < sets_.size(); ++set) {
+      spread(kNoPath, control, [&] {
+        for (std::size_t n = sets_[set].begin; n < sets_[set].end; ++n)
+          upper_[at(placed_[n].node)] = lower_[at(placed_[n].node)] = same(0);
+      });
+      std::copy(upper_.begin(), upper_.end(), path_upper_.begin() + static_cast<std::ptrdiff_t>(set * nodes));
+      std::copy(lower_.begin(), lower_.end(), path_lower_.begin() + static_cast<std::ptrdiff_t>(set * nodes));
+    }
+    paths_.nodes = plan_.nodes();
+    paths_.upper = path_upper_.data();
+    paths_.lower = path_lower_.data();
+    paths_.count = static_cast<int>(sets_.size());
   }
 
   /// Makes one step of relaxation.
@@ -175,11 +214,14 @@ class CpuChainmail final : public Simulation {
   void show(double part) {
     shown_ = now_;
     for (const PlacedNode& one : placed_) shown_[at(one.node)] = one.at(part);
-    convert();
+    convert(deadband_square());
   }
 
-  void convert() {
-    for_nodes([&](std::size_t n) { displacement_[at(plan_.node_of[n])] = to_lps(plan_.direction, shown_[n]); });
+  void convert(float square) {
+    for_nodes([&](std::size_t n) {
+      glm::vec3& shown = displacement_[at(plan_.node_of[n])];
+      shown = shown_of(shown, to_lps(plan_.direction, shown_[n]), square);
+    });
   }
 
   ChainPlan plan_;
@@ -189,10 +231,14 @@ class CpuChainmail final : public Simulation {
   std::vector<PlacedNode> placed_;
   std::vector<std::uint8_t> moves_;
   bool has_loads_ = false;
-  std::vector<Units> now_, before_;        ///< within the limits at all times
-  std::vector<Units> shown_;               ///< `now_` with placed nodes at their goals
-  std::vector<Units> upper_, lower_;       ///< the bounds that `tighten` narrows
-  std::vector<DisplacementRange> ranges_;  ///< by node: what placed nodes leave to it
+  int advances_ = 0;                            ///< with these loads
+  std::vector<PlacedSet> sets_;                 ///< of `placed_`
+  SetPaths paths_;                              ///< of them, from the second advance on
+  std::vector<Units> path_upper_, path_lower_;  ///< to which `paths_` refers
+  std::vector<Units> now_, before_;             ///< within the limits at all times
+  std::vector<Units> shown_;                    ///< `now_` with placed nodes at their goals
+  std::vector<Units> upper_, lower_;            ///< the bounds that `tighten` narrows
+  std::vector<DisplacementRange> ranges_;       ///< by node: what placed nodes leave to it
   std::vector<glm::vec3> displacement_;
 };
 

@@ -277,15 +277,15 @@ void sweep(const SpringGrid& grid, NodeRange range, const sweeps::Inverses& inve
   HWY_DYNAMIC_DISPATCH(matrix_sums)(range, inverses.a, sums);
   for_odd_links(grid, range, [&](const OddLink& link, std::size_t number) {
     Symmetric<float> sum = sums[link.node - range.begin];
-    sum.add(grid.odd_matrix[number].full());
+    sum = sum + grid.odd_matrix[number].full();
     sums.set(link.node - range.begin, sum);
   });
-  for (std::size_t n = range.begin; n < range.end; ++n) inverses.finish(n, sums[n - range.begin]);
+  for (std::size_t n = range.begin; n < range.end; ++n) inverses.finish(inverses.a, n, sums[n - range.begin]);
 }
 
 void sweep(const SpringGrid& grid, NodeRange range, const sweeps::PlacedForces& forces) {
   whole_product(grid, range, forces.a, forces.a.r);
-  for (std::size_t n = range.begin; n < range.end; ++n) forces.finish(n, forces.a.r[n]);
+  for (std::size_t n = range.begin; n < range.end; ++n) forces.finish(forces.a, n, forces.a.r[n]);
 }
 
 void sweep(const SpringGrid& grid, NodeRange range, const sweeps::Bend& bend, Sum* sums) {
@@ -308,7 +308,7 @@ void sweep(const SpringGrid& grid, NodeRange range, const sweeps::StrainOf& stra
     energies[link.node - range.begin] += pull.energy;
   });
   for (std::size_t n = range.begin; n < range.end; ++n) {
-    sums[n - range.begin] = strain.finish(n, force[n], energies[n - range.begin]);
+    sums[n - range.begin] = strain.finish(strain.a, n, force[n], energies[n - range.begin]);
   }
 }
 

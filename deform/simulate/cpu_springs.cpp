@@ -29,7 +29,6 @@ class CpuMachine : public HostMachine<SpringGrid::kLanes> {
 
   template <class Sweep>
   void each(std::size_t, const Sweep& work) {
-    if (work.is_idle()) return;
     for_blocks([&](std::size_t block) {
       const NodeRange range = range_of(block);
       if constexpr (requires { sweep(grid_, range, work); }) {
@@ -42,7 +41,6 @@ class CpuMachine : public HostMachine<SpringGrid::kLanes> {
 
   template <class T, class Sweep, class Then>
   void sum(std::size_t, const Sweep& work, const Then& then) {
-    if (work.is_idle()) return;
     std::vector<T>& of_block = std::get<std::vector<T>>(sums_);
     of_block.resize(blocks_);
     for_blocks([&](std::size_t block) {
@@ -58,11 +56,8 @@ class CpuMachine : public HostMachine<SpringGrid::kLanes> {
     then(sum_of_blocks(std::span<const T>(of_block)));
   }
 
-  template <class Work>
-  void repeat(int times, const Work& work) {
-    arena_.execute([&] {
-      for (int n = 0; n < times; ++n) work();
-    });
+  void solve(const SpringArrays& arrays, const SolveTask& task) {
+    arena_.execute([&] { solve_part(*this, arrays, task); });
   }
 
  private:

@@ -68,7 +68,7 @@ class MassSpring final : public Simulation {
   void set_displacement(std::span<const glm::vec3> displacement) override {
     require_displacement(model_, displacement);
     engine_->set_displacement(displacement);
-    engine_->show();
+    engine_->show(0);
   }
 
   std::span<const glm::vec3> displacement() const override { return engine_->shown(); }
@@ -81,7 +81,7 @@ class MassSpring final : public Simulation {
     if (!has_loads_) return {.reached = true};
     engine_->set_stream(control.stream);
     const Convergence convergence = converge(part, rule, control);
-    engine_->show();
+    engine_->show(deadband_square());
     if (control.stop.stop_requested() && !convergence.reached) throw Cancelled();
     if (control.progress) control.progress(1);
     return convergence;
@@ -110,8 +110,7 @@ class MassSpring final : public Simulation {
   Convergence converge(double part, const StoppingRule& rule, const Control& control) {
     const Ways ways = engine_->aim(part);
     if (const std::optional<RigidMotion> motion = rigid_motion(ways)) engine_->carry(*motion);
-    if (ways.squares > 0) engine_->follow(kFollow, control.stop);
-    Strain now = engine_->try_step(0);
+    Strain now = ways.squares > 0 ? engine_->follow(kFollow, control.stop) : engine_->try_step(0);
     engine_->accept();
     Convergence convergence{.residual = residual(now), .reached = now.free_force == 0};
     Schedule schedule;
@@ -151,7 +150,7 @@ class MassSpring final : public Simulation {
   /// @return the length of the step in units of the direction; 0 where no length lowers the energy
   double step(Strain& now, const Solved& solved, Stiffness kind) {
     double length = 1;
-    Strain there = engine_->try_step(length);
+    Strain there = solved.there;
     while (!is_lower(now, there, solved.slope, length)) {
       length /= 2;
       if (length < kShortest) return 0;

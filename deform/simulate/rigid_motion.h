@@ -50,7 +50,7 @@ struct Ways {
     squares += other.squares;
     at += other.at;
     way += other.way;
-    at_at.add(other.at_at);
+    at_at = at_at + other.at_at;
     at_by_x += other.at_by_x, at_by_y += other.at_by_y, at_by_z += other.at_by_z;
   }
 };

@@ -105,6 +105,9 @@ struct Scenario {
   std::vector<CutPlan> cuts;          ///< all cuts of the scenario
   std::vector<Phase> phases;          ///< what is done, in this order
   StoppingRule stop;                  ///< when a frame has converged
+  /// Between the frames of a phase, vertices that are not farther than this from where they were shown last stay there,
+  /// mm; the last frame of a phase shows all where they are.
+  double deadband_mm = 0;
 };
 
 /// Number of frames of all phases.

@@ -77,6 +77,7 @@ FrameResult ScenarioRun::next(const Control& control) {
   const Phase& phase = scenario_.phases[phase_];
   const double part = static_cast<double>(frame_in_phase_ + 1) / phase.frames;
   FrameResult frame{.number = done_ + 1, .phase = phase_, .convergence = {}};
+  simulation_->set_deadband(frame_in_phase_ + 1 == phase.frames ? 0 : scenario_.deadband_mm);
   if (loads_[phase_].turns()) {
     simulation_->set_loads(loads_[phase_].at(part, model_, start_));
     frame.convergence = simulation_->advance(1, scenario_.stop, control);
@@ -95,7 +96,7 @@ FrameResult ScenarioRun::next(const Control& control) {
 Report ScenarioRun::resample(ForwardResampler& resampler, std::span<const Target> targets, Outside outside,
                              const Maps& maps, const FieldOptions& options, const Control& control) {
   require(simulation_ != nullptr, "a scenario has a field after its first frame");
-  if (division_.replaced.empty()) {
+  if (!divides_cells()) {
     resampler.set_field(simulate::view(*simulation_, model_, outside), options, control);
   } else {
     field_ = field();

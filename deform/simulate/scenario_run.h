@@ -39,6 +39,8 @@ class ScenarioRun {
 
   /// Number of frames of all phases.
   int frames() const;
+  /// Number of frames that were simulated.
+  int frames_done() const { return done_; }
   /// Whether the last frame was simulated.
   bool is_done() const { return done_ == frames(); }
   /// Simulates the next frame.
@@ -56,6 +58,8 @@ class ScenarioRun {
   const PhaseLoads& loads(std::size_t phase) const { return loads_[phase]; }
   /// For each cell, i fastest, the index of its tissue in `Scenario::tissues`.
   const std::vector<std::uint8_t>& tissues() const { return tissue_of_cell_; }
+  /// Whether open cuts divide cells, so that a mesh takes their place in the field.
+  bool divides_cells() const { return !division_.replaced.empty(); }
   /// The model of the phase of the last frame.
   const Model& model() const { return model_; }
   /// The simulation after the last frame.

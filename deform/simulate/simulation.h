@@ -44,6 +44,13 @@ struct Convergence {
   bool reached = false;  ///< whether motion and residual are within the rule
 };
 
+/// What is shown of a node whose displacement was `before` and is `now`, LPS mm.
+/// @param square  of the deadband, mm2: a node stays where it is shown unless it is farther away. 0: it never stays
+TETWARP_HD inline glm::vec3 shown_of(const glm::vec3& before, const glm::vec3& now, float square) {
+  const glm::vec3 way = now - before;
+  return square == 0 || way.x * way.x + way.y * way.y + way.z * way.z > square ? now : before;
+}
+
 /// Moves the nodes of one model. Each method and backend has its own implementation. One object serves one thread at a
 /// time.
 ///
@@ -57,6 +64,10 @@ class Simulation {
   /// present values.
   /// @throws InputError for arrays of the wrong size, or a goal or force that is not finite or too large
   virtual void set_loads(const Loads& loads) = 0;
+
+  /// What the next calls of `advance` show of motions: nodes that are not farther than this from where `displacement`
+  /// has them stay there, mm. The simulation itself goes on without it. 0, as at first: nothing is held back.
+  void set_deadband(double mm) { deadband_square_ = static_cast<float>(mm * mm); }
 
   /// Takes placed nodes and forces to `part` (0 to 1) of their way and lets the other nodes converge.
   /// @throws Cancelled, after which the displacements are those of some step
@@ -77,6 +88,28 @@ class Simulation {
   /// Starts from these displacements, LPS mm, in host memory.
   /// @throws InputError for an array of the wrong size, or numbers that are not finite or too large
   virtual void set_displacement(std::span<const glm::vec3> displacement) = 0;
+
+ protected:
+  /// For `shown_of`.
+  float deadband_square() const { return deadband_square_; }
+
+ private:
+  float deadband_square_ = 0;
+};
+
+/// A copy of displacements, which no simulation changes, in the memory of a backend.
+class DisplacementCopy {
+ public:
+  virtual ~DisplacementCopy() = default;
+  /// Copies what `Simulation::displacement` gives, from the same kind of memory; done when it returns.
+  /// @param stream  see Control::stream
+  virtual void take(std::span<const glm::vec3> displacement, void* stream = nullptr) = 0;
+  /// LPS mm of every node, in `memory()`.
+  virtual std::span<glm::vec3> values() = 0;
+  /// Where the values lie.
+  virtual Memory memory() const = 0;
+  /// A copy in host memory.
+  virtual std::vector<glm::vec3> on_host() const = 0;
 };
 
 /// The displaced lattice of a simulation without cuts, in place, for `ForwardResampler::set_field`.

@@ -66,13 +66,30 @@ struct GradientState {
   float length = 0, share = 0;
   int iterations = 0;
   bool is_indefinite = false, is_done = false;
+  Sums direction = {};  ///< of SearchDirection, once conjugate gradients are done
+  Sums there = {};      ///< of StrainOf, at the displacement to which the direction leads
 };
+
+/// A system of springs that is to be solved, in one go or part by part.
+struct SolveTask {
+  Stiffness kind;
+  /// Whether free nodes follow placed ones that go their way; otherwise they follow the net forces.
+  bool follows = false;
+  SolveEffort effort{};
+  int times = 0;         ///< most iterations in this part
+  bool resumes = false;  ///< whether an earlier part began
+  bool ends = false;     ///< whether this is the last part even if it is not done
+};
+
+/// Of a node that has links to others than the next vertices of the lattice.
+inline constexpr std::uint32_t kHasOddLinks = 1u << 31;
 
 /// All arrays of a solver in the memory of its machine.
 struct SpringArrays {
   std::size_t nodes;
   const std::int32_t* neighbour;  ///< see Model::neighbour
   const float* stiffness;
+  const std::uint32_t* links;  ///< by node: bit d for a link to the next vertex in direction d, and kHasOddLinks
   const std::uint32_t* vertex;
   const SpringRole* role;
   RestLink<double> rest[kDirections];
@@ -105,23 +122,28 @@ struct SpringArrays {
                : matrix.get(static_cast<std::size_t>(opposite(direction) - kUp), static_cast<std::size_t>(to));
   }
 
-  /// Calls `visit(direction, neighbour)` for each link of a node, in the order in which sums are made: first the links
-  /// whose neighbour is the next vertex of the lattice, then the odd ones, each by rising direction.
-  template <class Visit>
-  TETWARP_HD void for_links(std::size_t n, const Visit& visit) const {
-    std::uint32_t odd = 0;
+  /// The sum of `term(direction, neighbour)` over the links of a node: first of those whose neighbour is the next
+  /// vertex of the lattice, then of the odd ones, each by rising direction. Where there is no link the term of the node
+  /// itself is computed and left out: so all are read at once, and none waits for another.
+  template <class T, class Term>
+  TETWARP_HD T sum_links(std::size_t n, const Term& term) const {
+    const std::uint32_t mask = links[n];
+    const auto own = static_cast<std::int32_t>(n);
+    T sum{};
+#ifdef TETWARP_ON_DEVICE
+#pragma unroll
+#endif
+    for (int d = 0; d < kDirections; ++d) {
+      const bool is_link = (mask >> d & 1) != 0;
+      const T more = sum + term(d, is_link ? own + distance[d] : own);
+      sum = is_link ? more : sum;
+    }
+    if ((mask & kHasOddLinks) == 0) return sum;
     for (int d = 0; d < kDirections; ++d) {
       const std::int32_t to = other(d, n);
-      if (to < 0) continue;
-      if (to != static_cast<std::int32_t>(n) + distance[d]) {
-        odd |= 1u << d;
-      } else {
-        visit(d, to);
-      }
+      if (to >= 0 && (mask >> d & 1) == 0) sum = sum + term(d, to);
     }
-    for (int d = 0; odd != 0; ++d, odd >>= 1) {
-      if ((odd & 1) != 0) visit(d, other(d, n));
-    }
+    return sum;
   }
 };
 

@@ -70,6 +70,7 @@ struct Solved {
   bool is_indefinite = false;
   double slope = 0;       ///< Strain::slope at the displacement where the system was set up
   double longest_mm = 0;  ///< the longest of its vectors, mm
+  Strain there;           ///< what SpringEngine::try_step(1) gives
 };
 
 /// The operations of which a step of mass-spring consists; SpringSolver has them for every machine. Displacements are
@@ -90,20 +91,22 @@ class SpringEngine {
   virtual Ways aim(double part) = 0;
   /// Moves free and placed nodes from where they are. Placed ones still have to go to where `aim` wants them.
   virtual void carry(const RigidMotion& motion) = 0;
-  /// Moves placed nodes to where `aim` wants them, and free ones by the harmonic extension of that motion, whose
-  /// Laplacian is 0.
-  virtual void follow(const SolveEffort& effort, std::stop_token stop) = 0;
+  /// Tries to move placed nodes to where `aim` wants them, and free ones by the harmonic extension of that motion,
+  /// whose Laplacian is 0.
+  /// @return the strain there
+  virtual Strain follow(const SolveEffort& effort, std::stop_token stop) = 0;
 
   /// Seeks the direction A^-1 f at the present displacement, for the net forces f on free nodes and a matrix A of some
-  /// kind. If a request to stop ends conjugate gradients early, the energy still falls along the direction they give.
+  /// kind, and tries it. If a request to stop ends conjugate gradients early, the energy still falls along the
+  /// direction they give.
   virtual Solved solve(Stiffness kind, const SolveEffort& effort, std::stop_token stop) = 0;
 
   /// The strain at the displacement plus `part` of the direction. After `aim` it is first called with part 0.
   virtual Strain try_step(double part) = 0;
-  /// Makes the displacement of the last call of try_step the present one.
+  /// Makes the displacement that was tried last the present one.
   virtual void accept() = 0;
-  /// Copies the present displacement to what `shown` returns.
-  virtual void show() = 0;
+  /// Copies the present displacement to what `shown` returns. @param square  see `shown_of`
+  virtual void show(float square) = 0;
   virtual std::span<const glm::vec3> shown() const = 0;
   /// A copy of `shown` in host memory.
   virtual std::vector<glm::vec3> shown_on_host() = 0;

@@ -35,24 +35,62 @@ T sum_of_blocks(std::span<const T> of_block) {
   return tree_sum(terms);
 }
 
+/// Iterations of conjugate gradients, up to so many, until they are done. For machines in host memory.
+template <class Machine>
+void iterate_gradients(Machine& machine, const SpringArrays& a, int times) {
+  for (int n = 0; n < times && !a.state->is_done; ++n) {
+    machine.template sum<Sum>(a.nodes, sweeps::Bend{{a}}, sweeps::AfterBend{a.state});
+    if (a.state->is_done) return;
+    machine.template sum<Sum>(a.nodes, sweeps::Descend{{a}}, sweeps::AfterDescend{a.state});
+    if (a.state->is_done) return;
+    machine.each(a.nodes, sweeps::NextDirection{{a}});
+  }
+}
+
+/// A part of a task: sets the system up, unless it resumes, iterates, and when that is done finds out what the
+/// direction leads to. For machines in host memory; others do the same in their own way.
+template <class Machine>
+void solve_part(Machine& machine, const SpringArrays& a, const SolveTask& task) {
+  if (!task.resumes) {
+    if (task.follows) machine.each(a.nodes, sweeps::PlacedMotion{{a}});
+    machine.each(a.nodes, sweeps::Matrices{{a}, task.kind});
+    machine.each(a.nodes, sweeps::Inverses{{a}});
+    if (task.follows) {
+      machine.each(a.nodes, sweeps::PlacedForces{{a}});
+    } else {
+      machine.each(a.nodes, sweeps::Forces{{a}});
+    }
+    machine.template sum<Sum>(a.nodes, sweeps::Begin{{a}}, sweeps::AfterBegin{a.state, task.effort});
+  }
+  iterate_gradients(machine, a, task.times);
+  if (a.state->is_indefinite || !(a.state->is_done || task.ends)) return;
+  if (task.follows) {
+    machine.each(a.nodes, sweeps::Follow{{a}});
+  } else {
+    machine.template sum<Sums>(a.nodes, sweeps::SearchDirection{{a}}, sweeps::Keep{&a.state->direction});
+    machine.each(a.nodes, sweeps::Go{{a}, 1});
+  }
+  machine.template sum<Sums>(a.nodes, sweeps::StrainOf{{a}}, sweeps::Keep{&a.state->there});
+}
+
 /// Mass-spring on a machine that runs sweeps over nodes. The same code runs on the CPU and on devices, and gives the
-/// same bits. Only sums and, every kRepeats iterations, the state of conjugate gradients leave the machine's memory. A
-/// machine is
+/// same bits. Only sums and, every kIterations iterations, the state of conjugate gradients leave the machine's memory.
+/// A machine is
 ///
 ///     template <class T> class Buffer;           // reserve(size), data()
 ///     kReadsLinks;                               // whether it calls sweeps that read the table of links
 ///     std::size_t padding();                     // numbers that vectors have before the first node and after the last
 ///     scope();                                   // what it returns holds while the machine is used
-///     each(nodes, sweep);                        // sweep(n) for every node, unless sweep.is_idle()
+///     each(nodes, sweep);                        // sweep(n) for every node
 ///     sum<T>(nodes, sweep, then);                // adds up what sweep(n) returns as kSumBlock says, then calls
 ///                                                // then(total) where the sweep ran
-///     repeat(times, work);                       // the same times and work in every call: it may be recorded
+///     solve(arrays, task);                       // what solve_part does
 ///     upload(place, host, size), wait();
 ///     T fetch(const T* place);                   // waits for what is queued, and brings a value to the host
 template <class Machine>
 class SpringSolver final : public SpringEngine {
  public:
-  static constexpr int kRepeats = 16;
+  static constexpr int kIterations = 32;  ///< between questions whether to stop
 
   template <class... Given>
   explicit SpringSolver(const Model& model, Given&&... given)
@@ -61,6 +99,7 @@ class SpringSolver final : public SpringEngine {
     if constexpr (Machine::kReadsLinks) {
       a_.neighbour = hold(neighbour_, model.neighbour);
       a_.stiffness = hold(stiffness_, model.stiffness);
+      a_.links = hold(links_, links_of(model));
     }
     a_.role = hold(role_, std::vector<SpringRole>(nodes_, SpringRole::kept));
     a_.vertex = hold(vertex_, model.vertex);
@@ -112,27 +151,17 @@ class SpringSolver final : public SpringEngine {
     machine_.each(nodes_, sweeps::Carry{{a_}, motion});
   }
 
-  void follow(const SolveEffort& effort, std::stop_token stop) override {
-    const auto scope = machine_.scope();
-    machine_.each(nodes_, sweeps::PlacedMotion{{a_}});
-    make_matrices(Stiffness::laplacian);
-    machine_.each(nodes_, sweeps::PlacedForces{{a_}});
-    conjugate_gradients(effort, stop);
-    machine_.each(nodes_, sweeps::Follow{{a_}});
-    std::swap(a_.u, a_.trial);
+  Strain follow(const SolveEffort& effort, std::stop_token stop) override {
+    return solve_all({.kind = Stiffness::laplacian, .follows = true, .effort = effort}, stop).there.strain();
   }
 
   Solved solve(Stiffness kind, const SolveEffort& effort, std::stop_token stop) override {
-    const auto scope = machine_.scope();
-    make_matrices(kind);
-    machine_.each(nodes_, sweeps::Forces{{a_}});
-    const GradientState state = conjugate_gradients(effort, stop);
-    machine_.template sum<Sums>(nodes_, sweeps::SearchDirection{{a_}}, sweeps::Keep{a_.result});
-    const Sums sums = machine_.fetch(a_.result);
+    const GradientState state = solve_all({.kind = kind, .effort = effort}, stop);
     return {.iterations = state.iterations,
             .is_indefinite = state.is_indefinite,
-            .slope = sums.slope,
-            .longest_mm = std::sqrt(sums.most)};
+            .slope = state.direction.slope,
+            .longest_mm = std::sqrt(state.direction.most),
+            .there = state.there.strain()};
   }
 
   Strain try_step(double part) override {
@@ -147,9 +176,9 @@ class SpringSolver final : public SpringEngine {
     std::swap(a_.force, a_.trial_force);
   }
 
-  void show() override {
+  void show(float square) override {
     const auto scope = machine_.scope();
-    machine_.each(nodes_, sweeps::Show{{a_}});
+    machine_.each(nodes_, sweeps::Show{{a_}, square});
     machine_.wait();
   }
   std::span<const glm::vec3> shown() const override { return {a_.shown, nodes_}; }
@@ -178,20 +207,29 @@ class SpringSolver final : public SpringEngine {
     numbers.data = hold(buffer, std::vector<T>(arrays * numbers.stride, T(0))) + machine_.padding();
   }
 
-  void make_matrices(Stiffness kind) {
-    machine_.each(nodes_, sweeps::Matrices{{a_}, kind});
-    machine_.each(nodes_, sweeps::Inverses{{a_}});
+  /// What SpringArrays::links holds.
+  static std::vector<std::uint32_t> links_of(const Model& model) {
+    std::vector<std::uint32_t> links(model.nodes(), 0);
+    for (int d = 0; d < kDirections; ++d) {
+      const std::ptrdiff_t distance = link_distance(model.lattice, d);
+      for (std::size_t n = 0; n < links.size(); ++n) {
+        const std::int32_t to = model.neighbour[model.link(d, n)];
+        if (to >= 0) links[n] |= to == static_cast<std::ptrdiff_t>(n) + distance ? 1u << d : kHasOddLinks;
+      }
+    }
+    return links;
   }
 
-  GradientState conjugate_gradients(const SolveEffort& effort, const std::stop_token& stop) {
-    machine_.template sum<Sum>(nodes_, sweeps::Begin{{a_}}, sweeps::AfterBegin{a_.state, effort});
+  GradientState solve_all(SolveTask task, const std::stop_token& stop) {
+    const auto scope = machine_.scope();
+    task.times = kIterations;
+    machine_.solve(a_, task);
     GradientState state = machine_.fetch(a_.state);
-    while (!state.is_done && !stop.stop_requested()) {
-      machine_.repeat(kRepeats, [&] {
-        machine_.template sum<Sum>(nodes_, sweeps::Bend{{a_}}, sweeps::AfterBend{a_.state});
-        machine_.template sum<Sum>(nodes_, sweeps::Descend{{a_}}, sweeps::AfterDescend{a_.state});
-        machine_.each(nodes_, sweeps::NextDirection{{a_}});
-      });
+    while (!state.is_done && !task.ends) {
+      task.resumes = true;
+      task.ends = stop.stop_requested();
+      if (task.ends) task.times = 0;
+      machine_.solve(a_, task);
       state = machine_.fetch(a_.state);
     }
     return state;
@@ -201,7 +239,7 @@ class SpringSolver final : public SpringEngine {
   std::size_t nodes_;
   SpringArrays a_{};
   Buffer<std::int32_t> neighbour_;
-  Buffer<std::uint32_t> vertex_;
+  Buffer<std::uint32_t> vertex_, links_;
   Buffer<float> stiffness_, floats_[5], matrix_, inverse_;
   Buffer<SpringRole> role_;
   Buffer<double> doubles_[9];

@@ -50,13 +50,20 @@ TETWARP_HD Stretched<T> stretched(const RestLink<T>& rest, const glm::vec<3, T>&
 /// What a spring does to the node at its end.
 template <class T>
 struct Pull {
-  glm::vec<3, T> force;  ///< N
-  T energy;              ///< N mm: twice the energy of the spring
+  glm::vec<3, T> force{0};  ///< N
+  T energy = 0;             ///< N mm: twice the energy of the spring
 
+  Pull() = default;
   TETWARP_HD Pull(const Stretched<T>& spring, T stiffness) {
     const T pull = stiffness * spring.elongation, share = pull / spring.length;
     force = share * spring.along;
     energy = pull * spring.elongation;
+  }
+  TETWARP_HD Pull operator+(const Pull& other) const {
+    Pull sum = *this;
+    sum.force += other.force;
+    sum.energy += other.energy;
+    return sum;
   }
 };
 
@@ -84,7 +91,9 @@ struct Symmetric {
   TETWARP_HD glm::vec<3, T> operator*(const glm::vec<3, T>& v) const {
     return {xx * v.x + xy * v.y + xz * v.z, xy * v.x + yy * v.y + yz * v.z, xz * v.x + yz * v.y + zz * v.z};
   }
-  TETWARP_HD void add(const Symmetric& o) { xx += o.xx, xy += o.xy, xz += o.xz, yy += o.yy, yz += o.yz, zz += o.zz; }
+  TETWARP_HD Symmetric operator+(const Symmetric& o) const {
+    return {xx + o.xx, xy + o.xy, xz + o.xz, yy + o.yy, yz + o.yz, zz + o.zz};
+  }
 };
 
 /// The matrix k [(1 - t) n n^T + t I] of one spring, kept as across across^T + even I, for k and 1 - t are never

@@ -26,14 +26,9 @@ TETWARP_HD inline glm::dvec3 on_the_way(const glm::dvec3& from, const glm::dvec3
   return part == 1 ? to : from + part * (to - from);
 }
 
-/// A sweep that always runs. GradientSweep is skipped once conjugate gradients are done.
+/// What a sweep does for one node is its function `at`, so that a kernel may do several things with the same arrays.
 struct Sweep {
   SpringArrays a;
-  TETWARP_HD bool is_idle() const { return false; }
-};
-struct GradientSweep {
-  SpringArrays a;
-  TETWARP_HD bool is_idle() const { return a.state->is_done; }
 };
 
 /// Sets the displacement.
@@ -85,13 +80,15 @@ struct Carry : Sweep {
 
 /// Sets p to how far placed nodes have to go.
 struct PlacedMotion : Sweep {
-  TETWARP_HD void operator()(std::size_t n) const { a.p.set(n, in_float(a.trial[n] - a.u[n])); }
+  TETWARP_HD static void at(const SpringArrays& a, std::size_t n) { a.p.set(n, in_float(a.trial[n] - a.u[n])); }
+  TETWARP_HD void operator()(std::size_t n) const { at(a, n); }
 };
 
 /// Computes the matrices of the links up from a node, with springs where they are now.
 struct Matrices : Sweep {
   Stiffness kind;
-  TETWARP_HD void operator()(std::size_t n) const {
+  TETWARP_HD void operator()(std::size_t n) const { at(a, kind, n); }
+  TETWARP_HD static void at(const SpringArrays& a, Stiffness kind, std::size_t n) {
     const glm::dvec3 u = a.u[n];
     for (int d = kUp; d < kDirections; ++d) {
       const std::int32_t to = a.other(d, n);
@@ -104,12 +101,14 @@ struct Matrices : Sweep {
 
 /// Inverts each free node's sum of matrices.
 struct Inverses : Sweep {
-  TETWARP_HD void operator()(std::size_t n) const {
+  TETWARP_HD void operator()(std::size_t n) const { at(a, n); }
+  TETWARP_HD static void at(const SpringArrays& a, std::size_t n) {
     Symmetric<float> sum{};
-    if (a.is_free(n)) a.for_links(n, [&](int d, std::int32_t to) { sum.add(a.of_link(d, n, to).full()); });
-    finish(n, sum);
+    if (a.is_free(n))
+      sum = a.sum_links<Symmetric<float>>(n, [&](int d, std::int32_t to) { return a.of_link(d, n, to).full(); });
+    finish(a, n, sum);
   }
-  TETWARP_HD void finish(std::size_t n, const Symmetric<float>& sum) const {
+  TETWARP_HD static void finish(const SpringArrays& a, std::size_t n, const Symmetric<float>& sum) {
     a.inverse.set(n, a.is_free(n) ? inverse_block(sum) : Symmetric<float>{});
   }
 };
@@ -117,24 +116,29 @@ struct Inverses : Sweep {
 /// The sum over a node's links of the link's matrix times the node's vector p minus the neighbour's.
 TETWARP_HD inline glm::vec3 product(const SpringArrays& a, std::size_t n) {
   const glm::vec3 own = a.p[n];
-  glm::vec3 sum(0);
-  a.for_links(n,
-              [&](int d, std::int32_t to) { sum += a.of_link(d, n, to) * (own - a.p[static_cast<std::size_t>(to)]); });
-  return sum;
+  return a.sum_links<glm::vec3>(
+      n, [&](int d, std::int32_t to) { return a.of_link(d, n, to) * (own - a.p[static_cast<std::size_t>(to)]); });
 }
 
 /// Sets r to the forces on free nodes if placed nodes alone went their way.
 struct PlacedForces : Sweep {
-  TETWARP_HD void operator()(std::size_t n) const { finish(n, a.is_free(n) ? product(a, n) : glm::vec3(0)); }
-  TETWARP_HD void finish(std::size_t n, const glm::vec3& q) const { a.r.set(n, a.is_free(n) ? -q : glm::vec3(0)); }
+  TETWARP_HD void operator()(std::size_t n) const { at(a, n); }
+  TETWARP_HD static void at(const SpringArrays& a, std::size_t n) {
+    finish(a, n, a.is_free(n) ? product(a, n) : glm::vec3(0));
+  }
+  TETWARP_HD static void finish(const SpringArrays& a, std::size_t n, const glm::vec3& q) {
+    a.r.set(n, a.is_free(n) ? -q : glm::vec3(0));
+  }
 };
 struct Forces : Sweep {
-  TETWARP_HD void operator()(std::size_t n) const { a.r.set(n, in_float(a.force[n])); }
+  TETWARP_HD void operator()(std::size_t n) const { at(a, n); }
+  TETWARP_HD static void at(const SpringArrays& a, std::size_t n) { a.r.set(n, in_float(a.force[n])); }
 };
 
 /// Sets x = 0, p = z = preconditioned r, and sums r.z.
 struct Begin : Sweep {
-  TETWARP_HD Sum operator()(std::size_t n) const {
+  TETWARP_HD Sum operator()(std::size_t n) const { return at(a, n); }
+  TETWARP_HD static Sum at(const SpringArrays& a, std::size_t n) {
     const glm::vec3 r = a.r[n], z = a.inverse[n] * r;
     a.x.set(n, glm::vec3(0));
     a.z.set(n, z);
@@ -151,8 +155,9 @@ struct AfterBegin {
 };
 
 /// Sets q = A p, and sums the curvature p.q over free nodes. Elsewhere p is 0, and q is not used.
-struct Bend : GradientSweep {
-  TETWARP_HD Sum operator()(std::size_t n) const {
+struct Bend : Sweep {
+  TETWARP_HD Sum operator()(std::size_t n) const { return at(a, n); }
+  TETWARP_HD static Sum at(const SpringArrays& a, std::size_t n) {
     if (!a.is_free(n)) return {};
     const glm::vec3 q = product(a, n);
     a.q.set(n, q);
@@ -171,10 +176,10 @@ struct AfterBend {
 };
 
 /// Sets x += length p, r -= length q, z = preconditioned r, and sums r.z.
-struct Descend : GradientSweep {
-  TETWARP_HD Sum operator()(std::size_t n) const {
+struct Descend : Sweep {
+  TETWARP_HD Sum operator()(std::size_t n) const { return at(a, a.state->length, n); }
+  TETWARP_HD static Sum at(const SpringArrays& a, float length, std::size_t n) {
     if (!a.is_free(n)) return {};
-    const float length = a.state->length;
     a.x.set(n, a.x[n] + length * a.p[n]);
     const glm::vec3 r = a.r[n] - length * a.q[n], z = a.inverse[n] * r;
     a.r.set(n, r);
@@ -196,13 +201,15 @@ struct AfterDescend {
 };
 
 /// Sets p = z + share p.
-struct NextDirection : GradientSweep {
-  TETWARP_HD void operator()(std::size_t n) const { a.p.set(n, a.z[n] + a.state->share * a.p[n]); }
+struct NextDirection : Sweep {
+  TETWARP_HD void operator()(std::size_t n) const { at(a, a.state->share, n); }
+  TETWARP_HD static void at(const SpringArrays& a, float share, std::size_t n) { a.p.set(n, a.z[n] + share * a.p[n]); }
 };
 
 /// Sums minus the net forces times the direction, and finds the square of its longest entry.
 struct SearchDirection : Sweep {
-  TETWARP_HD Sums operator()(std::size_t n) const {
+  TETWARP_HD Sums operator()(std::size_t n) const { return at(a, n); }
+  TETWARP_HD static Sums at(const SpringArrays& a, std::size_t n) {
     const glm::dvec3 x = in_double(a.x[n]);
     return {.slope = -dot3(a.force[n], x), .most = dot3(x, x)};
   }
@@ -210,32 +217,31 @@ struct SearchDirection : Sweep {
 
 /// Adds the direction to the trial displacement, so that free nodes follow the placed ones.
 struct Follow : Sweep {
-  TETWARP_HD void operator()(std::size_t n) const {
+  TETWARP_HD void operator()(std::size_t n) const { at(a, n); }
+  TETWARP_HD static void at(const SpringArrays& a, std::size_t n) {
     if (a.is_free(n)) a.trial.set(n, a.trial[n] + in_double(a.x[n]));
   }
 };
 struct Go : Sweep {
   double part;
-  TETWARP_HD void operator()(std::size_t n) const {
+  TETWARP_HD void operator()(std::size_t n) const { at(a, part, n); }
+  TETWARP_HD static void at(const SpringArrays& a, double part, std::size_t n) {
     a.trial.set(n, part == 0 ? a.u[n] : a.u[n] + part * in_double(a.x[n]));
   }
 };
 
 /// Computes the strain at the trial displacement, as SpringEngine::try_step does; forces are squared.
 struct StrainOf : Sweep {
-  TETWARP_HD Sums operator()(std::size_t n) const {
+  TETWARP_HD Sums operator()(std::size_t n) const { return at(a, n); }
+  TETWARP_HD static Sums at(const SpringArrays& a, std::size_t n) {
     const glm::dvec3 own = a.trial[n];
-    glm::dvec3 force(0);
-    double energy = 0;
-    a.for_links(n, [&](int d, std::int32_t to) {
-      const Pull<double> pull(stretched(a.rest[d], a.trial[static_cast<std::size_t>(to)] - own), a.constant(d, n));
-      force += pull.force;
-      energy += pull.energy;
+    const auto all = a.sum_links<Pull<double>>(n, [&](int d, std::int32_t to) {
+      return Pull<double>(stretched(a.rest[d], a.trial[static_cast<std::size_t>(to)] - own), a.constant(d, n));
     });
-    return finish(n, force, energy);
+    return finish(a, n, all.force, all.energy);
   }
   /// @param force   of the node's springs  @param energy  twice the sum of their energies, of which the node has half
-  TETWARP_HD Sums finish(std::size_t n, glm::dvec3 force, double energy) const {
+  TETWARP_HD static Sums finish(const SpringArrays& a, std::size_t n, glm::dvec3 force, double energy) {
     const glm::dvec3 load = a.load[n];
     force += load;
     Sums sums{.sum = energy / 4 - dot3(load, a.trial[n])};
@@ -249,7 +255,8 @@ struct StrainOf : Sweep {
 };
 
 struct Show : Sweep {
-  TETWARP_HD void operator()(std::size_t n) const { a.shown[n] = in_float(a.u[n]); }
+  float square;  ///< see `shown_of`
+  TETWARP_HD void operator()(std::size_t n) const { a.shown[n] = shown_of(a.shown[n], in_float(a.u[n]), square); }
 };
 
 /// Keeps the result of a sum where the host fetches it.

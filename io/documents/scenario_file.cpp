@@ -164,9 +164,9 @@ Method read_method(const JsonEntry& entry) {
 }
 
 Scenario read_whole(const JsonEntry& entry) {
-  constexpr std::array<const char*, 13> kKeys = {"$schema",       "name",    "description", "method", "cell_size",
-                                                 "body_above_hu", "tissues", "hold",        "move",   "cuts",
-                                                 "phases",        "frames",  "stop"};
+  constexpr std::array<const char*, 14> kKeys = {"$schema",       "name",    "description", "method",     "cell_size",
+                                                 "body_above_hu", "tissues", "hold",        "move",       "cuts",
+                                                 "phases",        "frames",  "stop",        "deadband_mm"};
   entry.only(kKeys);
   for (const char* key : {"$schema", "description"}) {
     if (entry.has(key) && !entry.at(key).is(JsonTree::Kind::text)) entry.at(key).refuse("is no text");
@@ -185,6 +185,7 @@ Scenario read_whole(const JsonEntry& entry) {
   if (entry.has("cuts")) scenario.cuts = read_cuts(entry.at("cuts"));
   scenario.phases = read_phases(entry, scenario);
   if (entry.has("stop")) scenario.stop = read_stop(entry.at("stop"));
+  if (entry.has("deadband_mm")) scenario.deadband_mm = entry.at("deadband_mm").number({0, 10});
   return scenario;
 }
 

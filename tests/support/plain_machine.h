@@ -21,12 +21,10 @@ class PlainMachine : public simulate::HostMachine<0> {
 
   template <class Sweep>
   void each(std::size_t nodes, const Sweep& sweep) const {
-    if (sweep.is_idle()) return;
     for (std::size_t n = 0; n < nodes; ++n) sweep(n);
   }
   template <class T, class Sweep, class Then>
   void sum(std::size_t nodes, const Sweep& sweep, const Then& then) const {
-    if (sweep.is_idle()) return;
     std::vector<T> of_block;
     for (std::size_t begin = 0; begin < nodes; begin += kThreads) {
       std::vector<T> of_thread(kThreads);
@@ -37,9 +35,8 @@ class PlainMachine : public simulate::HostMachine<0> {
     for (std::size_t block = 0; block < of_block.size(); ++block) of_thread[block % kThreads].add(of_block[block]);
     then(tree(of_thread));
   }
-  template <class Work>
-  void repeat(int times, const Work& work) const {
-    for (int n = 0; n < times; ++n) work();
+  void solve(const simulate::SpringArrays& arrays, const simulate::SolveTask& task) const {
+    solve_part(*this, arrays, task);
   }
 
  private:

@@ -334,6 +334,35 @@ TEST_P(Chainmail, AnyNumberOfThreadsAndAnyBackendGiveTheSameBits) {
   }
 }
 
+TEST_P(Chainmail, SecondAdvancesGoWhereTheFirstWould) {
+  // From rest, a way of no length changes nothing but that paths of sets of placed nodes are kept from then on.
+  for (std::uint64_t number = 0; number < test::test_cases(40); ++number) {
+    Random random(test::test_seed(), 4000 + number);
+    SCOPED_TRACE(test::seed_text(test::test_seed()) + ", case " + std::to_string(number));
+    const Model model = random_model(random_lattice(random), random);
+    Loads loads = no_loads(model);
+    const std::int64_t sets = random.integer(0, 10);  // of more than eight no paths are kept
+    std::vector<glm::vec3> goals;
+    for (std::int64_t n = 0; n < sets; ++n) goals.push_back(n == 0 ? glm::vec3(0) : random_field(1, random, 30)[0]);
+    for (std::size_t n = 0; n < model.nodes() && sets > 0; ++n) {
+      if (random.chance(0.1)) place(loads, n, goals[static_cast<std::size_t>(random.integer(0, sets - 1))]);
+    }
+    const StoppingRule rule{.motion_mm = 0, .steps = static_cast<int>(random.integer(0, 4))};
+    const auto first = make(model), second = make(model);
+    first->set_loads(loads);
+    second->set_loads(loads);
+    second->advance(0, {.motion_mm = 0, .steps = 0});
+    const double part = random.real(0.1, 1);
+    const Convergence one = first->advance(part, rule), other = second->advance(part, rule);
+    EXPECT_EQ(first->displacement_on_host(), second->displacement_on_host());
+    EXPECT_EQ(one.motion_mm, other.motion_mm);
+    const double further = random.real(0.1, 1);
+    first->advance(further, rule);
+    second->advance(further, rule);
+    EXPECT_EQ(first->displacement_on_host(), second->displacement_on_host());
+  }
+}
+
 TEST_P(Chainmail, AMirroredLatticeGivesTheMirroredBits) {
   Random random(test::test_seed(), 7'400'000);
   const Geometry grid = lattice({8, 7, 6}, {5, 6, 7});

@@ -50,7 +50,8 @@ constexpr const char* kWhole = R"({
     ]},
     {"closed_cuts": ["midline", "round", "slit"]}
   ],
-  "stop": {"motion_mm": 0.02, "residual": 1e-4, "steps": 500}
+  "stop": {"motion_mm": 0.02, "residual": 1e-4, "steps": 500},
+  "deadband_mm": 0.05
 }
 )";
 
@@ -89,6 +90,7 @@ TEST_F(ScenarioFile, ReadsEverything) {
   EXPECT_EQ(scenario.method, Method::mass_spring);
   EXPECT_EQ(scenario.cell_size, 4);
   EXPECT_EQ(scenario.body_above_hu, -300);
+  EXPECT_EQ(scenario.deadband_mm, 0.05);
   ASSERT_EQ(scenario.tissues.size(), 3u);
   EXPECT_EQ(scenario.tissues[0].tissue.youngs_modulus_kpa, 1e4);
   EXPECT_EQ(scenario.tissues[0].tissue.shear, 0.02);
@@ -269,6 +271,8 @@ const std::vector<std::string> kBadForms = {
     R"({"method": "chainmail", "phases": [{"move": [{"region": {"body": true}, "rotate": {"axis": [0, 0, 1], "degrees": 3}}]}]})",
     R"({"method": "chainmail", "phases": [{"move": [{"region": {"body": true}, "rotate": {"about": {"mm": [0, 0, 0]}, "axis": [0, 0, 1], "degrees": 181}}]}]})",
     R"({"method": "chainmail", "phases": [{}], "stop": {"steps": 0}})",
+    R"({"method": "chainmail", "phases": [{}], "deadband_mm": -0.1})",
+    R"({"method": "chainmail", "phases": [{}], "deadband_mm": 11})",
     R"({"method": "chainmail", "phases": [{}], "stop": {"motion": 1}})",
     R"({"method": "chainmail", "phases": [{}], "tissues": [{}]})",
     R"({"method": "chainmail", "phases": [{}], "tissues": [{"name": "a", "compression": 1.5}]})",
