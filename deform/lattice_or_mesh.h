@@ -40,9 +40,12 @@ class LatticeOrMesh final : public ForwardResampler {
                   const PartSink& finished) override {
     return held().resample(region, targets, maps, control, finished);
   }
+  Update update(std::span<const Target> targets, const Control& control) override {
+    return held().update(targets, control);
+  }
 
  private:
-  Resampler& held() const {
+  ForwardResampler& held() const {
     require(current_ != nullptr, "a resampler needs a field: call set_field first");
     return *current_;
   }

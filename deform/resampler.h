@@ -12,6 +12,7 @@
 #include <span>
 #include <stop_token>
 #include <utility>
+#include <vector>
 
 #include "deform/vertex_field.h"
 #include "deform/volume.h"
@@ -172,6 +173,12 @@ class Resampler {
   Geometry output_;
 };
 
+/// What `ForwardResampler::update` did.
+struct Update {
+  Report report;                ///< of the whole targets
+  std::vector<Region> changed;  ///< regions of the output outside which nothing was written
+};
+
 /// A resampler of forward fields.
 class ForwardResampler : public Resampler {
  public:
@@ -182,6 +189,15 @@ class ForwardResampler : public Resampler {
   /// @throws InputError for a field that is not finite, lies too far away, is too fine, or does not reach over the
   ///         output with Outside::refuse
   virtual void set_field(const FieldView& field, const FieldOptions& options = {}, const Control& control = {}) = 0;
+
+  /// Computes whole targets, as `resample` does, where their outputs hold what the last call of this function gave for
+  /// the field before, and nobody has changed sources or outputs since. So the first call computes all voxels, and the
+  /// next ones only those that the new field may change: frames of an animation. Other targets than those of the last
+  /// call, and backends that keep no track, mean all voxels again.
+  /// @throws InputError and others, as `resample`
+  virtual Update update(std::span<const Target> targets, const Control& control = {}) {
+    return {resample(whole(output()), targets, {}, control), {whole(output())}};
+  }
 
  protected:
   /// For implementations. @throws InputError as the base

@@ -91,6 +91,32 @@ __global__ void reach_kernel(DeviceField field, unsigned blocks_per_slice, Slice
   atomicMax(&reach[slice].high, high);
 }
 
+/// What must be the same of a target, so that its output holds what the last update gave.
+struct UpdatedTarget {
+  explicit UpdatedTarget(const Target& target)
+      : source(target.source.voxels),
+        output(target.output.voxels),
+        source_memory(target.source.memory),
+        output_memory(target.output.memory),
+        source_grid(*target.source.geometry),
+        source_region(target.source.buffered),
+        output_region(target.output.buffered),
+        type(target.source.type),
+        components(target.source.components),
+        interpolation(target.interpolation),
+        background(target.background) {}
+  bool operator==(const UpdatedTarget&) const = default;
+
+  const std::byte *source, *output;
+  Memory source_memory, output_memory;
+  Geometry source_grid;
+  Region source_region, output_region;
+  VoxelType type;
+  int components;
+  Interpolation interpolation;
+  double background;
+};
+
 class LatticeResampler final : public CudaResampler<ForwardResampler> {
  public:
   using CudaResampler::CudaResampler;
@@ -115,6 +141,26 @@ class LatticeResampler final : public CudaResampler<ForwardResampler> {
       scan_in_pieces(control);
     }
     ready_ = true;
+  }
+
+  Report resample(Region region, std::span<const Target> targets, const Maps& maps, const Control& control,
+                  const PartSink& finished) override {
+    updated_.clear();
+    reuse_ = Reuse::nothing;
+    return CudaResampler::resample(region, targets, maps, control, finished);
+  }
+
+  Update update(std::span<const Target> targets, const Control& control) override {
+    std::vector<UpdatedTarget> given(targets.begin(), targets.end());
+    const bool stays_here = std::all_of(targets.begin(), targets.end(), [](const Target& target) {
+      return target.output.memory == Memory::device;  // others are computed in a buffer of the resampler
+    });
+    reuse_ = !stays_here ? Reuse::nothing : given == updated_ ? Reuse::now : Reuse::later;
+    updated_.clear();
+    changed_ = {whole(output())};
+    const Report report = CudaResampler::resample(whole(output()), targets, {}, control, {});
+    updated_ = std::move(given);
+    return {report, std::move(changed_)};
   }
 
  private:
@@ -285,7 +331,8 @@ class LatticeResampler final : public CudaResampler<ForwardResampler> {
 
   void write_plainly(const SlabBox& box, SlabWriter& writer) override {
     const auto run = [&](const auto& sink) {
-      const Gather::Counters found = gather_.run(*lattice_, box, sink, stream_);
+      const Gather::Counters found = gather_.run(*lattice_, box, sink, stream_, reuse_);
+      if (reuse_ == Reuse::now && gather_.changed()) changed_ = *gather_.changed();  // then the box is all there is
       plainly_covered_ += found.covered;
       plainly_uncovered_ += static_cast<std::uint64_t>(box.count()) - found.covered;
       count_paths(box, found);
@@ -344,6 +391,9 @@ class LatticeResampler final : public CudaResampler<ForwardResampler> {
   std::optional<LatticeOnDevice> lattice_{std::in_place};
   Gather gather_;
   Claims claims_;
+  Reuse reuse_ = Reuse::nothing;        ///< of the call
+  std::vector<UpdatedTarget> updated_;  ///< what the last call updated; empty if that was none
+  std::vector<Region> changed_;         ///< by `update`
 };
 
 }  // namespace

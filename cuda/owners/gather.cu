@@ -106,13 +106,14 @@ __global__ void write_claimed_kernel(GatherTask task, glm::ivec3 begin, const un
 }  // namespace
 
 template <class Sink>
-Gather::Counters Gather::run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink,
-                             cudaStream_t stream) {
+Gather::Counters Gather::run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream,
+                             Reuse reuse) {
   const DeviceField& field = lattice.field();
   if constexpr (kIsCoarse<Sink>) {
     if (IntervalRaster::suits(field.steps, box, is_mostly_folded(lattice)))
-      return run_intervals(lattice, box, sink, stream);
+      return run_intervals(lattice, box, sink, stream, reuse);
   }
+  intervals_.forget_tiles();
   coverage_.begin(box, stream);
   const glm::ivec3 size(box.size), tile(kSeedTile, kSeedTile, kMarch);
   const glm::ivec3 marches = marches_of(size);
@@ -163,8 +164,8 @@ Gather::Counters Gather::run(const LatticeOnDevice& lattice, const SlabBox& box,
 /// Tiles that too many tetrahedra reach are claimed.
 template <class Sink>
 Gather::Counters Gather::run_intervals(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink,
-                                       cudaStream_t stream) {
-  const TileCounters settled = intervals_.run(lattice, box, sink, stream);
+                                       cudaStream_t stream, Reuse reuse) {
+  const TileCounters settled = intervals_.run(lattice, box, sink, stream, reuse);
   if (settled.left == 0) return {settled.covered, 0, 0, 0};
   coverage_.forget(box, stream);
   intervals_.mark_left(lattice, box, coverage_.several(), stream);
@@ -231,7 +232,7 @@ void Gather::claim_several(const Task& task, const DeviceField& field, const Sin
 }
 
 #define TETWARP_RUN(...) \
-  template Gather::Counters Gather::run(const LatticeOnDevice&, const SlabBox&, const __VA_ARGS__&, cudaStream_t)
+  template Gather::Counters Gather::run(const LatticeOnDevice&, const SlabBox&, const __VA_ARGS__&, cudaStream_t, Reuse)
 TETWARP_FOR_EACH_SINK(TETWARP_RUN, Lerp::separate);
 TETWARP_FOR_EACH_SINK(TETWARP_RUN, Lerp::fused);
 #undef TETWARP_RUN

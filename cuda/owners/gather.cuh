@@ -102,7 +102,11 @@ class Gather {
 
   /// Finds the voxels of `box`; waits for the stream.
   template <class Sink>
-  Counters run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream);
+  Counters run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream,
+               Reuse reuse = Reuse::nothing);
+
+  /// With Reuse::now: outside which regions the last run gave the sink nothing; none where it gave it all.
+  const std::optional<std::vector<Region>>& changed() const { return intervals_.changed(); }
 
   /// To be called when the field changes.
   void forget_field() {
@@ -123,7 +127,8 @@ class Gather {
   static bool is_mostly_folded(const LatticeOnDevice& lattice);
   /// The way for large cells.
   template <class Sink>
-  Counters run_intervals(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream);
+  Counters run_intervals(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream,
+                         Reuse reuse);
   /// Claims the voxels that the coverage calls `several`.
   template <class Task, class Sink>
   void claim_several(const Task& task, const DeviceField& field, const Sink& sink, cudaStream_t stream);

@@ -31,6 +31,10 @@ __global__ void __launch_bounds__(kTileThreads, Sink::kIsWide ? kTileBlocks : kI
   const int number = task.tile_number(at), thread = static_cast<int>(threadIdx.x);
   const TileList list = task.shape.list(at, number);
   if (list.is_done || voxels.is_empty()) return;
+  if (!task.kept.is_wanted(number)) {
+    if (thread == 0) atomicAdd(&task.counters->covered, static_cast<unsigned long long>(task.kept.covered[number]));
+    return;
+  }
   if (list.count > Memory::kSlots) {
     if (thread == 0) atomicAdd(&task.counters->left, 1u);
     return;
@@ -38,7 +42,7 @@ __global__ void __launch_bounds__(kTileThreads, Sink::kIsWide ? kTileBlocks : kI
   const glm::ivec3 size = voxels.end - voxels.begin;
   if (list.may_rest && task.shape.rests(voxels, task.records, thread)) {
     copy_tile(voxels, thread, sink);
-    if (thread == 0) atomicAdd(&task.counters->covered, static_cast<unsigned long long>(size.x * size.y * size.z));
+    if (thread == 0) task.add_covered(number, static_cast<unsigned>(size.x * size.y * size.z));
     return;
   }
   const IntervalTile<Shape> tile{
@@ -72,7 +76,7 @@ __global__ void __launch_bounds__(kTileThreads, Sink::kIsWide ? kTileBlocks : kI
   const unsigned covered = group_sum(is_full && !memory.is_border && !memory.is_slow ? sampler.template sample<true>()
                                                                                      : sampler.template sample<false>(),
                                      32);
-  if (tile.lane() == 0 && covered != 0) atomicAdd(&task.counters->covered, static_cast<unsigned long long>(covered));
+  if (tile.lane() == 0 && covered != 0) task.add_covered(number, covered);
 }
 
 }  // namespace

@@ -23,10 +23,11 @@ struct LatticeShape {
   const TileCount* deep;  ///< of tiles of twice the depth, where those are wanted alone that had no room; or null
   glm::ivec3 deep_tiles;  ///< how many of those on each axis
 
-  __device__ Tetrahedron tetrahedron(unsigned number) const {
+  __device__ LatticeTetrahedron named(unsigned number) const {
     const glm::ivec3 cell = position_in(static_cast<int>(number / kTetrahedraPerCell), lattice.cells);
-    return vertices_of(lattice, LatticeTetrahedron::of_cell(cell, static_cast<int>(number % kTetrahedraPerCell)));
+    return LatticeTetrahedron::of_cell(cell, static_cast<int>(number % kTetrahedraPerCell));
   }
+  __device__ Tetrahedron tetrahedron(unsigned number) const { return vertices_of(lattice, named(number)); }
   __device__ TileList list(const glm::ivec3& at, int tile) const {
     const TileCount of = counts[tile];
     return {lists + std::int64_t{tile} * kSlots, of.all, of.all != 0 && of.moving == 0, is_done(at)};
@@ -58,50 +59,103 @@ struct LatticeShape {
   }
 };
 
-/// Enters each tetrahedron into the lists of all tiles that its box reaches: a thread a tetrahedron. Neighbours mostly
-/// want the same tile, so a warp takes room for all of its lanes with one atomic addition a tile.
+/// The tiles that a tetrahedron may reach, whichever way they are nudged.
+struct TileRange {
+  glm::ivec3 first{0}, last{-1};
+
+  /// @param box  of a record
+  template <class Shape>
+  __device__ TileRange(const TileTask<Shape>& task, const int4& box) {
+    const glm::ivec3 words(box.x, box.y, box.z), extent(kTileI, kTileJ, Shape::kDepth);
+#pragma unroll
+    for (int axis = 0; axis < 3; ++axis) {
+      const int begin = max(VoxelRange::from(VoxelRange::low(words[axis]), 1), task.box.begin[axis]),
+                end = min(VoxelRange::from(VoxelRange::high(words[axis]), -1), task.box.end[axis]) - 1;
+      any = any && begin <= end;
+      first[axis] = (begin - task.origin[axis]) / extent[axis];
+      last[axis] = (end - task.origin[axis]) / extent[axis];
+    }
+  }
+
+  bool any = true;
+};
+
+/// Enters each tetrahedron into the lists of all wanted tiles that its box reaches: a thread a tetrahedron. Neighbours
+/// mostly want the same tile, so a warp takes room for all of its lanes with one atomic addition a tile.
 ///
 /// @param task  the shape's counts are 0 before, and added to; its lists are written
 template <class Shape>
 __global__ void __launch_bounds__(kThreads) list_kernel(const __grid_constant__ TileTask<Shape> task) {
   const std::int64_t n = thread_of_grid();
   bool any = n < task.records.count;
-  glm::ivec3 begin(0), end(0);
-  bool moves = false;
-  if (any) {
-    const int4 box = task.records.box(n);
-    moves = RecordFlags::AtRest::get(static_cast<unsigned>(box.w)) == 0;
-    const glm::ivec3 words(box.x, box.y, box.z), extent(kTileI, kTileJ, Shape::kDepth);
-#pragma unroll
-    for (int axis = 0; axis < 3; ++axis) {  // whichever way tiles are nudged
-      const int first = max(VoxelRange::from(VoxelRange::low(words[axis]), 1), task.box.begin[axis]),
-                last = min(VoxelRange::from(VoxelRange::high(words[axis]), -1), task.box.end[axis]) - 1;
-      any = any && first <= last;
-      begin[axis] = (first - task.origin[axis]) / extent[axis];
-      end[axis] = (last - task.origin[axis]) / extent[axis];
-    }
-  }
-  glm::ivec3 at = begin;
+  const int4 box = any ? task.records.box(n) : int4{};
+  const TileRange range(task, box);
+  any = any && range.any;
+  const bool moves = any && RecordFlags::AtRest::get(static_cast<unsigned>(box.w)) == 0;
+  glm::ivec3 at = range.first;
   while (__any_sync(kAllLanes, any)) {
-    const int tile = any ? task.tile_number(at) : -1;
+    const int tile = any && task.kept.is_wanted(task.tile_number(at)) ? task.tile_number(at) : -1;
     const unsigned same = __match_any_sync(kAllLanes, tile);
     const unsigned moving = __ballot_sync(kAllLanes, moves) & same;
     unsigned from = 0;
     const int leader = first_bit(same);
-    if (any && lane_of_warp() == leader) {
+    if (tile >= 0 && lane_of_warp() == leader) {
       from = atomicAdd(&task.shape.counts[tile].all, static_cast<unsigned>(__popc(same)));
       if (moving != 0) task.shape.counts[tile].moving = 1;
     }
     from = __shfl_sync(kAllLanes, from, leader);
     if (!any) continue;
     const unsigned entry = from + static_cast<unsigned>(__popc(same & bits_below(lane_of_warp())));
-    if (entry < Shape::kSlots) task.shape.lists[std::int64_t{tile} * Shape::kSlots + entry] = static_cast<unsigned>(n);
-    if (++at.x <= end.x) continue;
-    at.x = begin.x;
-    if (++at.y <= end.y) continue;
-    at.y = begin.y;
-    any = ++at.z <= end.z;
+    if (tile >= 0 && entry < Shape::kSlots)
+      task.shape.lists[std::int64_t{tile} * Shape::kSlots + entry] = static_cast<unsigned>(n);
+    if (++at.x <= range.last.x) continue;
+    at.x = range.first.x;
+    if (++at.y <= range.last.y) continue;
+    at.y = range.first.y;
+    any = ++at.z <= range.last.z;
   }
+}
+
+/// The vertices of the field before, as StepLattice has them.
+struct VerticesBefore {
+  const std::uint64_t* packed;
+  StepPacking packing;
+};
+
+/// Makes anew the records of tetrahedra of which a vertex has moved, and tells which tiles these reach now or reached
+/// before: a thread a tetrahedron.
+///
+/// @param task     its records are those of the field before, and become those of this one
+/// @param changed  of each tile: 0 before, set to 1
+template <class Shape>
+__global__ void __launch_bounds__(kThreads)
+    change_kernel(const __grid_constant__ TileTask<Shape> task, VerticesBefore before, std::uint8_t* changed) {
+  const std::int64_t n = thread_of_grid();
+  if (n >= task.records.count) return;
+  const StepLattice& lattice = task.shape.lattice;
+  const auto t = task.shape.named(static_cast<unsigned>(n));
+  bool moved = false;
+  for (const glm::ivec3& vertex : {t.a(), t.b(), t.c(), t.d}) {
+    const std::int64_t at = lattice.offset(vertex);
+    moved |= lattice.moved(at) != before.packing.unpacked(before.packed[at]);
+  }
+  if (!moved) return;
+  const auto mark = [&] {
+    const TileRange range(task, task.records.box(n));
+    if (!range.any) return;
+    for (glm::ivec3 at = range.first; at.z <= range.last.z; ++at.z) {
+      for (at.y = range.first.y; at.y <= range.last.y; ++at.y) {
+        for (at.x = range.first.x; at.x <= range.last.x; ++at.x) {
+          const int tile = task.tile_number(at);
+          changed[tile] = 1;
+          task.kept.covered[tile] = 0;
+        }
+      }
+    }
+  };
+  mark();
+  put_record(task.records, n, vertices_of(lattice, t));
+  mark();
 }
 
 }  // namespace

@@ -44,6 +44,30 @@ bool is_for_deep(const StepLattice& lattice) {
   return std::min({lattice.cell.x, lattice.cell.y, lattice.cell.z}) >= 7 * kStepsPerVoxel;
 }
 
+/// The voxels of a box that marked tiles have: a region for each run of tiles along i.
+std::vector<Region> regions_of(std::span<const std::uint8_t> marked, const glm::ivec3& tiles, const glm::ivec3& size,
+                               const glm::ivec3& origin, const SlabBox& box) {
+  const Region all{box.begin, box.begin + box.size};
+  std::vector<Region> regions;
+  std::size_t n = 0;
+  for (int z = 0; z < tiles.z; ++z) {
+    for (int y = 0; y < tiles.y; ++y) {
+      int begin = -1;
+      for (int x = 0; x <= tiles.x; ++x) {
+        const bool is_marked = x < tiles.x && marked[n + static_cast<std::size_t>(x)] != 0;
+        if (is_marked && begin < 0) begin = x;
+        if (is_marked || begin < 0) continue;
+        regions.push_back(intersection({glm::i64vec3(origin + glm::ivec3(begin, y, z) * size),
+                                        glm::i64vec3(origin + glm::ivec3(x, y + 1, z + 1) * size)},
+                                       all));
+        begin = -1;
+      }
+      n += static_cast<std::size_t>(tiles.x);
+    }
+  }
+  return regions;
+}
+
 }  // namespace
 
 bool IntervalRaster::suits(const StepLattice& lattice, const SlabBox& box, bool is_folded) {
@@ -86,36 +110,78 @@ auto IntervalRaster::make_task(const LatticeOnDevice& lattice, const SlabBox& bo
   return task;
 }
 
+bool IntervalRaster::has_kept(int depth, const StepLattice& lattice, const SlabBox& box) const {
+  return kept_depth_ == depth && kept_lattice_.cells == lattice.cells && kept_lattice_.first == lattice.first &&
+         kept_lattice_.cell == lattice.cell && kept_box_.begin == box.begin && kept_box_.size == box.size;
+}
+
+void IntervalRaster::keep(int depth, const StepLattice& lattice, const SlabBox& box, cudaStream_t stream) {
+  const auto vertices = static_cast<std::size_t>(lattice.slice) * static_cast<std::size_t>(lattice.cells.z + 1);
+  std::uint64_t* const to = kept_vertices_.reserve(vertices);
+  TETWARP_CUDA_TRY(
+      cudaMemcpyAsync(to, lattice.packed, vertices * sizeof(std::uint64_t), cudaMemcpyDeviceToDevice, stream));
+  kept_lattice_ = lattice;
+  kept_lattice_.packed = to;
+  kept_box_ = box;
+  kept_depth_ = depth;
+}
+
 template <int kDepth, class Sink>
 TileCounters IntervalRaster::run_tiles(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink,
-                                       cudaStream_t stream) {
-  const auto task = make_task<kDepth>(lattice, box);
+                                       cudaStream_t stream, Reuse reuse) {
+  auto task = make_task<kDepth>(lattice, box);
   Tiles& held = kDepth == kTileK ? deep_ : flat_;
-  held.counts.fill(0, static_cast<std::size_t>(count_of(task.tiles)), stream);
+  const auto tiles = static_cast<std::size_t>(count_of(task.tiles));
+  const StepLattice& steps = lattice.field().steps;
+  const bool only_changed = reuse == Reuse::now && !has_records_ && has_kept(kDepth, steps, box);
+  kept_depth_ = 0;
+  held.counts.fill(0, tiles, stream);
   counters_.fill(0, 1, stream);
-  if (!has_records_) {
-    record_kernel<<<blocks_for(task.records.count), kThreads, 0, stream>>>(task.shape, task.records);
-    has_records_ = true;
+  if (reuse != Reuse::nothing) task.kept.covered = kept_covered_.reserve(tiles);
+  const unsigned blocks = blocks_for(task.records.count);
+  if (only_changed) {
+    changed_.fill(0, tiles, stream);
+    task.kept.changed = changed_.data();
+    change_kernel<<<blocks, kThreads, 0, stream>>>(task, {kept_lattice_.packed, kept_lattice_.packing},
+                                                   changed_.data());
+  } else {
+    if (task.kept.covered) kept_covered_.fill(0, tiles, stream);
+    if (!has_records_) record_kernel<<<blocks, kThreads, 0, stream>>>(task.shape, task.records);
   }
-  list_kernel<<<blocks_for(task.records.count), kThreads, 0, stream>>>(task);
+  has_records_ = true;
+  list_kernel<<<blocks, kThreads, 0, stream>>>(task);
   const dim3 grid(static_cast<unsigned>(task.tiles.x), static_cast<unsigned>(task.tiles.y),
                   static_cast<unsigned>(task.tiles.z));
   tile_kernel<<<grid, kTileThreads, 0, stream>>>(task, sink);
   TETWARP_CUDA_TRY(cudaGetLastError());
-  return fetch(counters_.data(), found_, stream);
+  if (reuse != Reuse::nothing) keep(kDepth, steps, box, stream);
+  if (only_changed) {
+    TETWARP_CUDA_TRY(
+        cudaMemcpyAsync(changed_on_host_.reserve(tiles), changed_.data(), tiles, cudaMemcpyDeviceToHost, stream));
+  }
+  const TileCounters found = fetch(counters_.data(), found_, stream);
+  made_.reset();
+  if (found.left != 0) {
+    kept_depth_ = 0;
+  } else if (only_changed) {
+    made_ =
+        regions_of({changed_on_host_.reserve(tiles), tiles}, task.tiles, {kTileI, kTileJ, kDepth}, task.origin, box);
+  }
+  return found;
 }
 
 template <class Sink>
 TileCounters IntervalRaster::run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink,
-                                 cudaStream_t stream) {
+                                 cudaStream_t stream, Reuse reuse) {
   tried_deep_ = false;
   TileCounters found{};
   if (is_for_deep(lattice.field().steps)) {
-    found = run_tiles<kTileK>(lattice, box, sink, stream);
+    found = run_tiles<kTileK>(lattice, box, sink, stream, reuse);
     tried_deep_ = true;
     if (found.left == 0) return found;
+    reuse = Reuse::nothing;
   }
-  const TileCounters more = run_tiles<kFlat>(lattice, box, sink, stream);
+  const TileCounters more = run_tiles<kFlat>(lattice, box, sink, stream, reuse);
   return {found.covered + more.covered, more.left};
 }
 
@@ -126,8 +192,9 @@ void IntervalRaster::mark_left(const LatticeOnDevice& lattice, const SlabBox& bo
   TETWARP_CUDA_TRY(cudaGetLastError());
 }
 
-#define TETWARP_RUN(...) \
-  template TileCounters IntervalRaster::run(const LatticeOnDevice&, const SlabBox&, const __VA_ARGS__&, cudaStream_t)
+#define TETWARP_RUN(...)                                                                                              \
+  template TileCounters IntervalRaster::run(const LatticeOnDevice&, const SlabBox&, const __VA_ARGS__&, cudaStream_t, \
+                                            Reuse)
 TETWARP_FOR_EACH_SINK(TETWARP_RUN, Lerp::fused);
 #undef TETWARP_RUN
 

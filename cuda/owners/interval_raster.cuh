@@ -3,6 +3,9 @@
 
 #pragma once
 
+#include <optional>
+#include <vector>
+
 #include "cuda/lattice/slab.cuh"
 
 namespace tetwarp::cuda_detail {
@@ -19,6 +22,13 @@ struct TileCount {
   unsigned moving;  ///< 1 if some are not at rest
 };
 
+/// What a run does with tiles that the field before had alike, and keeps for the next run.
+enum class Reuse : std::uint8_t {
+  nothing,  ///< all tiles are made, and nothing is kept
+  later,    ///< all tiles are made, and kept
+  now       ///< the sink has what the run before gave it: only tiles that changed are made, if that run kept them
+};
+
 /// The way for coarse lattices with large cells at whole steps. Once a field each tetrahedron gets a record: where its
 /// faces cross rows (deform/core/row_lines.h), and its map. Tile by tile, those that may reach a tile mark an interval
 /// in each row, and the lowest number wins. Nothing need be known of folds or of the border.
@@ -30,13 +40,21 @@ class IntervalRaster {
 
   /// Finds the voxels of `box`, save for tiles that are left. Waits for the stream.
   template <class Sink>
-  TileCounters run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream);
+  TileCounters run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream,
+                   Reuse reuse = Reuse::nothing);
   /// Sets the bits of the voxels of tiles that were left. @param several  of the box of the last run, rows from a word
   /// on
   void mark_left(const LatticeOnDevice& lattice, const SlabBox& box, std::uint32_t* several, cudaStream_t stream);
 
   /// To be called when the field is another one.
   void forget_field() { has_records_ = false; }
+  /// To be called where the next run must not reuse what the last one kept.
+  void forget_tiles() {
+    kept_depth_ = 0;
+    made_.reset();
+  }
+  /// Outside which regions the last run gave the sink nothing; none where it gave it all, or tiles were left.
+  const std::optional<std::vector<Region>>& changed() const { return made_; }
 
  private:
   /// What is needed for tiles of one depth.
@@ -49,7 +67,11 @@ class IntervalRaster {
   auto make_task(const LatticeOnDevice& lattice, const SlabBox& box);
   /// One pass over the tiles of one depth; of those without room at twice the depth, if that was tried.
   template <int kDepth, class Sink>
-  TileCounters run_tiles(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream);
+  TileCounters run_tiles(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream,
+                         Reuse reuse);
+  /// Whether the last run kept all tiles, of this depth, of such a lattice and box.
+  bool has_kept(int depth, const StepLattice& lattice, const SlabBox& box) const;
+  void keep(int depth, const StepLattice& lattice, const SlabBox& box, cudaStream_t stream);
 
   bool has_records_ = false;
   bool tried_deep_ = false;     ///< whether the last run began with tiles of full depth
@@ -57,6 +79,14 @@ class IntervalRaster {
   Tiles deep_, flat_;           ///< of full depth, and of half of it
   DeviceBuffer<TileCounters> counters_;
   PinnedBuffer<TileCounters> found_;
+  int kept_depth_ = 0;        ///< depth of the tiles that were kept; 0: none
+  StepLattice kept_lattice_;  ///< that these are of; its vertices are those of `kept_vertices_`
+  SlabBox kept_box_{};
+  DeviceBuffer<std::uint64_t> kept_vertices_;
+  DeviceBuffer<unsigned> kept_covered_;  ///< voxels that each tile covered
+  DeviceBuffer<std::uint8_t> changed_;   ///< whether each tile has changed
+  PinnedBuffer<std::uint8_t> changed_on_host_;
+  std::optional<std::vector<Region>> made_;
 };
 
 }  // namespace tetwarp::cuda_detail

@@ -26,6 +26,14 @@ struct TileList {
   bool is_done;   ///< whether the tile is not wanted
 };
 
+/// What stays of tiles from one field to the next, an entry a tile, i fastest.
+struct KeptTiles {
+  const std::uint8_t* changed;  ///< whether a tile must be made again; null: all must
+  unsigned* covered;            ///< voxels that a tile covered, 0 before it is made again; null: not wanted
+
+  __device__ bool is_wanted(int tile) const { return !changed || changed[tile] != 0; }
+};
+
 /// What all kernels of tiles know.
 /// @tparam Shape  the tetrahedra: `LatticeShape` or `MeshShape`. With kDepth, the voxels of a tile along k;
 ///                `tetrahedron(number)`, `list(tile, its number)` and `rests(voxels, records, thread)`, which a whole
@@ -41,8 +49,13 @@ struct TileTask {
   glm::ivec3 first_tile;  ///< that reaches the box
   Records records;        ///< of all tetrahedra
   TileCounters* counters;
+  KeptTiles kept;
 
   __device__ int tile_number(const glm::ivec3& tile) const { return (tile.z * tiles.y + tile.y) * tiles.x + tile.x; }
+  __device__ void add_covered(int tile, unsigned count) const {
+    atomicAdd(&counters->covered, static_cast<unsigned long long>(count));
+    if (kept.covered) atomicAdd(&kept.covered[tile], count);
+  }
   /// The voxels of the box that a tile has.
   __device__ IntBox voxels(const glm::ivec3& tile) const {
     const glm::ivec3 size(kTileI, kTileJ, Shape::kDepth), first = origin + tile * size;

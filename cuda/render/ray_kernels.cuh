@@ -34,6 +34,25 @@ __global__ void __launch_bounds__(kCopyWidth* kCopyRows)
   for (int n = static_cast<int>(threadIdx.x); n < words; n += kCopyWidth) copy[n] = source[n];
 }
 
+/// Copies the voxels of some rows of blocks, as `copy_kernel` copies all. A thread block a row of blocks, a warp a row
+/// of voxels.
+///
+/// @param block_rows  z * blocks_y + y of each, blocks_y rows of blocks a slice  @param slices  of the volume
+template <class Word>
+__global__ void __launch_bounds__(kCopyWidth* kCopyRows)
+    copy_rows_kernel(const Word* from, int words, int rows, int slices, const int* block_rows, int blocks_y, Word* to,
+                     int pitch, int slots) {
+  const int block_row = block_rows[blockIdx.x], y = block_row % blocks_y * kRayBlock,
+            z = block_row / blocks_y * kRayBlock;
+  for (int n = static_cast<int>(threadIdx.y); n < kRayBlock * kRayBlock; n += kCopyRows) {
+    const int row = y + n % kRayBlock, slice = z + n / kRayBlock;
+    if (row >= rows || slice >= slices) continue;
+    const Word* const source = from + ray::wide_product(slice * rows + row, words);
+    Word* const copy = to + ray::wide_product(slice * slots + row, pitch);
+    for (int word = static_cast<int>(threadIdx.x); word < words; word += kCopyWidth) copy[word] = source[word];
+  }
+}
+
 /// What voxels are compared as: whole numbers as they are.
 template <class V>
 struct Extremes {
@@ -57,12 +76,15 @@ struct Extremes {
 ///     thread           0           1           2 ...      blocks: the columns that each one reaches
 ///
 /// @param voxels  i fastest  @param size  voxels on each axis  @param blocks  of voxels on each axis
-/// @param row     blocks that a thread block takes  @param ranges  of each block, i fastest: written
+/// @param row         blocks that a thread block takes
+/// @param block_rows  z * blocks.y + y of each row of blocks that is wanted, gridDim.y of them; null: all
+/// @param ranges      of each block, i fastest: written
 template <class V>
-__global__ void __launch_bounds__(kRangeThreads)
-    range_kernel(const V* voxels, glm::ivec3 size, glm::ivec3 blocks, int row, BlockRange* ranges) {
+__global__ void __launch_bounds__(kRangeThreads) range_kernel(const V* voxels, glm::ivec3 size, glm::ivec3 blocks,
+                                                              int row, const int* block_rows, BlockRange* ranges) {
   using Value = typename Extremes<V>::Value;
-  const glm::ivec3 first(static_cast<int>(blockIdx.x) * row, blockIdx.y, blockIdx.z);
+  const int block_row = block_rows ? block_rows[blockIdx.y] : static_cast<int>(blockIdx.y);
+  const glm::ivec3 first(static_cast<int>(blockIdx.x) * row, block_row % blocks.y, block_row / blocks.y);
   const int count = min(row, blocks.x - first.x), thread = static_cast<int>(threadIdx.x);
   const int begin = RayReach(first.x, size.x).begin, end = RayReach(first.x + count - 1, size.x).end;
   const RayReach j(first.y, size.y), k(first.z, size.z);

@@ -36,6 +36,7 @@ class CudaRenderer final : public Renderer {
   }
 
   void set_volume(const ConstVolumeView& volume, const Control& control) override;
+  void update_volume(std::span<const Region> changed, const Control& control) override;
   void set_style(const RenderStyle& style) override {
     require_valid(style);
     style_ = style;
@@ -47,8 +48,12 @@ class CudaRenderer final : public Renderer {
 
  private:
   void copy_volume(cudaStream_t stream);
+  /// Calls `copy(word)` with a word of the type in which rows are copied.
+  template <class Copy>
+  void in_words(const Copy& copy) const;
+  void find_ranges(const int* block_rows, int count, cudaStream_t stream);
   void prepare(const RayFrame& frame, double step, cudaStream_t stream);
-  void find_distances(const RayFrame& frame, const std::vector<TransferEntry>& table, cudaStream_t stream);
+  void find_distances(const RayFrame& frame, cudaStream_t stream);
   int block_count() const { return blocks_.x * blocks_.y * blocks_.z; }
 
   int device_;
@@ -58,7 +63,8 @@ class CudaRenderer final : public Renderer {
   ConstVolumeView volume_;  ///< on the device
   glm::ivec3 blocks_{0};
   RenderStyle style_;
-  DeviceBuffer<std::byte> voxels_;  ///< of a volume on the host
+  DeviceBuffer<std::byte> voxels_;      ///< of a volume on the host
+  const std::byte* on_host_ = nullptr;  ///< where its own voxels are; null: it lies on the device
   DeviceBuffer<std::byte> copy_;
   const std::byte* read_ = nullptr;  ///< by rays: the copy, or the volume where there is no room for one
   glm::ivec3 strides_{0};            ///< of what is read
@@ -67,8 +73,7 @@ class CudaRenderer final : public Renderer {
   DeviceBuffer<TransferEntry> table_, tint_colours_;
   DeviceBuffer<TransferIntegral> integrals_;
   TransferIntegral lowest_, highest_;  ///< entries
-  DeviceBuffer<int> opaque_before_;
-  std::vector<TransferEntry> host_table_;
+  DeviceBuffer<int> opaque_before_, block_rows_;
   const std::uint8_t* tints_ = nullptr;
   double table_step_ = 0;  ///< mm, that the tables are for
   bool distances_are_stale_ = true;
@@ -89,24 +94,80 @@ void CudaRenderer::copy_volume(cudaStream_t stream) {
   } catch (const DeviceMemoryError&) {
     return;
   }
-  const auto copy = [&](auto word) {
+  in_words([&](auto word) {
     using Word = decltype(word);
     const int words = size.x * bytes / static_cast<int>(sizeof(Word)),
               pitch = row * bytes / static_cast<int>(sizeof(Word));
     copy_kernel<<<blocks_for(size.y * size.z, kCopyRows), dim3(kCopyWidth, kCopyRows), 0, stream>>>(
         reinterpret_cast<const Word*>(volume_.voxels), words, size.y, size.y * size.z,
         reinterpret_cast<Word*>(copy_.data()), pitch, rows);
-  };
-  const bool in_quads = size.x * bytes % static_cast<int>(sizeof(uint4)) == 0 &&
-                        reinterpret_cast<std::uintptr_t>(volume_.voxels) % sizeof(uint4) == 0;
+  });
+  TETWARP_CUDA_TRY(cudaGetLastError());
+  read_ = copy_.data();
+  strides_ = {1, row, static_cast<int>(slice)};
+}
+
+template <class Copy>
+void CudaRenderer::in_words(const Copy& copy) const {
+  const auto row_bytes = static_cast<std::size_t>(geometry_.size.x) * size_bytes(volume_.type);
+  const bool in_quads =
+      row_bytes % sizeof(uint4) == 0 && reinterpret_cast<std::uintptr_t>(volume_.voxels) % sizeof(uint4) == 0;
   if (in_quads) {
     copy(uint4{});
   } else {
     dispatch(volume_.type, copy);
   }
+}
+
+/// @param block_rows  see `range_kernel`; null: all rows of blocks
+void CudaRenderer::find_ranges(const int* block_rows, int count, cudaStream_t stream) {
+  const int parts = (blocks_.x + kRangeBlocks - 1) / kRangeBlocks, row = (blocks_.x + parts - 1) / parts;
+  const dim3 grid(static_cast<unsigned>(parts), static_cast<unsigned>(count));
+  dispatch(volume_.type, [&](auto voxel) {
+    using V = decltype(voxel);
+    range_kernel<<<grid, kRangeThreads, 0, stream>>>(reinterpret_cast<const V*>(volume_.voxels),
+                                                     glm::ivec3(geometry_.size), blocks_, row, block_rows,
+                                                     ranges_.data());
+  });
   TETWARP_CUDA_TRY(cudaGetLastError());
-  read_ = copy_.data();
-  strides_ = {1, row, static_cast<int>(slice)};
+  distances_are_stale_ = true;
+}
+
+void CudaRenderer::update_volume(std::span<const Region> changed, const Control& control) {
+  require(volume_.voxels != nullptr, "no volume is set that could have changed: call set_volume first");
+  const std::vector<int> rows = block_rows_of(geometry_, changed);
+  if (rows.empty()) return;
+  const std::size_t all = static_cast<std::size_t>(blocks_.y) * static_cast<std::size_t>(blocks_.z);
+  if (on_host_ || rows.size() > all / 2) {
+    const std::uint8_t* const tints = tints_;
+    ConstVolumeView volume = volume_;
+    if (on_host_) {
+      volume.voxels = on_host_;
+      volume.memory = Memory::host;
+    }
+    const Geometry geometry = geometry_;
+    volume.geometry = &geometry;
+    set_volume(volume, control);
+    tints_ = tints;
+    return;
+  }
+  const DeviceScope scope(device_);
+  const auto stream = static_cast<cudaStream_t>(control.stream);
+  block_rows_.upload(rows.data(), rows.size(), stream);
+  const auto count = static_cast<int>(rows.size());
+  if (read_ != volume_.voxels) {
+    in_words([&](auto word) {
+      using Word = decltype(word);
+      const glm::ivec3 size(geometry_.size);
+      const auto in_bytes = [&](int voxels) { return voxels * static_cast<int>(size_bytes(volume_.type)); };
+      constexpr int kWord = sizeof(Word);
+      copy_rows_kernel<<<static_cast<unsigned>(count), dim3(kCopyWidth, kCopyRows), 0, stream>>>(
+          reinterpret_cast<const Word*>(volume_.voxels), in_bytes(size.x) / kWord, size.y, size.z, block_rows_.data(),
+          blocks_.y, reinterpret_cast<Word*>(copy_.data()), in_bytes(strides_.y) / kWord, strides_.z / strides_.y);
+    });
+    TETWARP_CUDA_TRY(cudaGetLastError());
+  }
+  find_ranges(block_rows_.data(), count, stream);
 }
 
 void CudaRenderer::set_volume(const ConstVolumeView& volume, const Control& control) {
@@ -125,17 +186,10 @@ void CudaRenderer::set_volume(const ConstVolumeView& volume, const Control& cont
   copy_volume(stream);
   blocks_ = ray_blocks(geometry_);
   ranges_.reserve(static_cast<std::size_t>(block_count()));
-  const int rows = (blocks_.x + kRangeBlocks - 1) / kRangeBlocks, row = (blocks_.x + rows - 1) / rows;
-  const dim3 grid(static_cast<unsigned>(rows), static_cast<unsigned>(blocks_.y), static_cast<unsigned>(blocks_.z));
-  dispatch(volume.type, [&](auto voxel) {
-    using V = decltype(voxel);
-    range_kernel<<<grid, kRangeThreads, 0, stream>>>(reinterpret_cast<const V*>(volume_.voxels),
-                                                     glm::ivec3(geometry_.size), blocks_, row, ranges_.data());
-  });
-  TETWARP_CUDA_TRY(cudaGetLastError());
+  find_ranges(nullptr, blocks_.y * blocks_.z, stream);
   if (volume.memory == Memory::host) TETWARP_CUDA_TRY(cudaStreamSynchronize(stream));
   volume_.memory = volume.memory;
-  distances_are_stale_ = true;
+  on_host_ = volume.memory == Memory::host ? volume.voxels : nullptr;
   tints_ = nullptr;
 }
 
@@ -156,9 +210,7 @@ void CudaRenderer::set_tints(const Tints& tints) {
   tint_colours_.upload(colours.data(), colours.size(), nullptr);
 }
 
-void CudaRenderer::find_distances(const RayFrame& frame, const std::vector<TransferEntry>& table, cudaStream_t stream) {
-  const std::vector<int> before = opaque_before(table);
-  opaque_before_.upload(before.data(), before.size(), stream);
+void CudaRenderer::find_distances(const RayFrame& frame, cudaStream_t stream) {
   const unsigned launches = blocks_for(block_count(), kDistanceThreads);
   const auto count = static_cast<std::size_t>(block_count());
   std::uint8_t *from = distances_.reserve(count), *to = other_distances_.reserve(count);
@@ -172,15 +224,17 @@ void CudaRenderer::find_distances(const RayFrame& frame, const std::vector<Trans
 
 void CudaRenderer::prepare(const RayFrame& frame, double step, cudaStream_t stream) {
   if (step != table_step_) {
-    host_table_ = transfer_table(style_.transfer, step);
-    TransferIntegrals made = transfer_integrals(host_table_, step);
+    const std::vector<TransferEntry> table = transfer_table(style_.transfer, step);
+    const TransferIntegrals made = transfer_integrals(table, step);
     lowest_ = made.lowest;
     highest_ = made.highest;
-    table_.upload(host_table_.data(), host_table_.size(), stream);
+    table_.upload(table.data(), table.size(), stream);
+    const std::vector<int> before = opaque_before(table);
+    opaque_before_.upload(before.data(), before.size(), stream);
     integrals_.upload(made.before.data(), made.before.size(), stream);
     table_step_ = step;
   }
-  if (distances_are_stale_) find_distances(frame, host_table_, stream);
+  if (distances_are_stale_) find_distances(frame, stream);
   distances_are_stale_ = false;
 }
 

@@ -31,6 +31,13 @@ class CpuRenderer final : public Renderer {
     tint_numbers_ = nullptr;
   }
 
+  void update_volume(std::span<const Region> changed, const Control&) override {
+    require(volume_.voxels != nullptr, "no volume is set that could have changed: call set_volume first");
+    if (changed.empty()) return;
+    ranges_ = block_ranges(volume_, limits_);
+    distances_.clear();
+  }
+
   void set_style(const RenderStyle& style) override {
     require_valid(style);
     style_ = style;

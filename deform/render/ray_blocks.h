@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "deform/core/ray_cast.h"
@@ -21,6 +22,9 @@ constexpr int kMostRayReach = kRayBlock + 3;
 
 /// How many blocks a volume has.
 glm::ivec3 ray_blocks(const Geometry& volume);
+
+/// The rows of blocks along i that contain values of some regions of a volume, as z * blocks.y + y, rising.
+std::vector<int> block_rows_of(const Geometry& volume, std::span<const Region> regions);
 
 /// Least and largest value around each block, i fastest. Values that are not numbers are left out.
 /// @param volume  passed `require_renderable`; in host memory

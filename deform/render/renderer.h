@@ -47,6 +47,11 @@ class Renderer {
   ///         `straightened`)
   virtual void set_volume(const ConstVolumeView& volume, const Control& control = {}) = 0;
 
+  /// Takes note that voxels of the volume that was set last have changed, within these regions of its grid and nowhere
+  /// else. Tints stay.
+  /// @throws InputError before a volume is set
+  virtual void update_volume(std::span<const Region> changed, const Control& control = {}) = 0;
+
   /// Sets the style of the next pictures.
   /// @throws InputError for a style with a number out of its range
   virtual void set_style(const RenderStyle& style) = 0;

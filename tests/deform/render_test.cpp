@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "deform/render/ray_blocks.h"
 #include "tests/support/backends.h"
 #include "tests/support/fields.h"
 
@@ -21,6 +22,31 @@ using test::test_seed;
 using test::unit_grid;
 
 TETWARP_BACKEND_SUITE(Rendered);
+
+TEST(RayBlocks, RowsOfRegionsAreThoseThatReachThem) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  Random random(test_seed(), 8100);
+  for (int n = 0; n < 200; ++n) {
+    const Geometry grid = unit_grid({20, random.integer(2, 60), random.integer(2, 60)});
+    const glm::ivec3 blocks = ray_blocks(grid);
+    Region region{{0, 0, 0}, {1, 0, 0}};
+    for (int axis = 1; axis < 3; ++axis) {
+      region.begin[axis] = random.integer(0, grid.size[axis] - 1);
+      region.end[axis] = random.integer(region.begin[axis], grid.size[axis]);
+    }
+    std::vector<int> expected;
+    for (int row = 0; row < blocks.y * blocks.z; ++row) {
+      const RayReach y(row % blocks.y, static_cast<int>(grid.size.y)), z(row / blocks.y, static_cast<int>(grid.size.z));
+      bool reaches = false;
+      for (std::int64_t j = region.begin.y; j < region.end.y; ++j) {
+        for (std::int64_t k = region.begin.z; k < region.end.z; ++k)
+          reaches = reaches || (y.begin <= j && j < y.end && z.begin <= k && k < z.end);
+      }
+      if (reaches) expected.push_back(row);
+    }
+    EXPECT_EQ(block_rows_of(grid, {&region, 1}), expected) << to_string(region.begin);
+  }
+}
 
 /// Red, green, blue of a picture.
 struct Image {
@@ -553,7 +579,45 @@ TEST_P(Rendered, AVolumeOfOneSliceIsAPicture) {
   EXPECT_NEAR(render(*renderer, view(slice), opaque_from(50, 0.5), plane).grey(10, 10), 127.5, 1);
 }
 
+Region random_region(Random& random, const glm::i64vec3& size) {
+  Region region;
+  for (int axis = 0; axis < 3; ++axis) {
+    region.begin[axis] = random.integer(0, size[axis] - 1);
+    region.end[axis] = random.integer(region.begin[axis] + 1, size[axis]);
+  }
+  return region;
+}
+
+TEST_P(Rendered, ShowsWhatWasChangedAsIfItWereSetAnew) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  Random random(test_seed(), 8200);
+  Volume<std::int16_t> volume{unit_grid({70, 61, 52}), {}};
+  volume.voxels.assign(static_cast<std::size_t>(voxel_count(volume.geometry)), -1000);
+  const ViewPlane plane = view_plane({.angle_deg = 25, .width = 80, .height = 64}, volume.geometry);
+  const RenderStyle style = opaque_from(200, 0.2);
+  const auto renderer = GetParam().make_renderer({}), anew = GetParam().make_renderer({});
+  Image found = render(*renderer, view(std::as_const(volume)), style, plane);
+  EXPECT_EQ(*std::max_element(found.rgb.begin(), found.rgb.end()), 0);
+  for (int n = 0; n < 8; ++n) {
+    std::vector<Region> changed;
+    for (int r = 0; r < n % 3; ++r) changed.push_back(random_region(random, volume.geometry.size));
+    for (const Region& region : changed) {
+      const auto value = static_cast<std::int16_t>(random.integer(-1000, 1500));
+      for (std::int64_t k = region.begin.z; k < region.end.z; ++k) {
+        for (std::int64_t j = region.begin.y; j < region.end.y; ++j) {
+          for (std::int64_t i = region.begin.x; i < region.end.x; ++i)
+            volume.voxels[static_cast<std::size_t>((k * 61 + j) * 70 + i)] = value;
+        }
+      }
+    }
+    renderer->update_volume(changed);
+    renderer->render(plane, found.rgb);
+    EXPECT_EQ(found.rgb, render(*anew, view(std::as_const(volume)), style, plane).rgb) << n;
+  }
+}
+
 TEST_P(Rendered, RefusesWhatItCannotShow) {
+  EXPECT_THROW(GetParam().make_renderer({})->update_volume({}), InputError);
   const auto renderer = GetParam().make_renderer({});
   Volume<std::int16_t> body = volume_of<std::int16_t>(unit_grid({8, 8, 8}), [](const glm::i64vec3&) { return 1; });
   const ViewPlane plane = view_plane({.width = 20, .height = 20}, body.geometry);

@@ -7,7 +7,7 @@
 
 #include "backend/devices.h"
 #include "backend/factories.h"
-#include "cuda/runtime/device_buffer.h"
+#include "tests/cuda/on_device.h"
 #include "tests/support/fields.h"
 #include "tests/support/shifted.h"
 
@@ -22,30 +22,6 @@ class DeviceMemory : public testing::Test {
     if (device_count() == 0) GTEST_SKIP() << "no CUDA device";
   }
 };
-
-/// A copy of a host vector on the device.
-template <class T>
-class OnDevice {
- public:
-  explicit OnDevice(const std::vector<T>& host) : size_(host.size()) { buffer_.upload(host.data(), size_, nullptr); }
-  T* data() const { return buffer_.data(); }
-  std::vector<T> download() const {
-    std::vector<T> host(size_);
-    buffer_.download(host.data(), size_, nullptr);
-    return host;
-  }
-
- private:
-  cuda_detail::DeviceBuffer<T> buffer_;
-  std::size_t size_;
-};
-
-template <class View>
-View on_device(View view, const void* voxels) {
-  view.voxels = static_cast<decltype(view.voxels)>(const_cast<void*>(voxels));
-  view.memory = Memory::device;
-  return view;
-}
 
 /// A field with folds, and a source on another grid.
 struct Scene {
