@@ -19,4 +19,10 @@ DeviceStream::DeviceStream(int device) : stream_(create_cuda_stream(device)) {}
 
 DeviceStream::~DeviceStream() { destroy_cuda_stream(stream_); }
 
+void DeviceStream::wait() const { wait_for_cuda_stream(stream_); }
+
+PinnedMemory::PinnedMemory(std::size_t bytes) : memory_(allocate_pinned(bytes)), bytes_(bytes) {}
+
+PinnedMemory::~PinnedMemory() { free_pinned(memory_); }
+
 }  // namespace tetwarp

@@ -3,6 +3,9 @@
 
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+#include <span>
 #include <string>
 
 namespace tetwarp {
@@ -34,9 +37,29 @@ class DeviceStream {
   DeviceStream& operator=(const DeviceStream&) = delete;
   /// The stream, a cudaStream_t.
   void* get() const { return stream_; }
+  /// Waits until all that was queued is done. @throws DeviceError for what failed
+  void wait() const;
 
  private:
   void* stream_;
+};
+
+/// Host memory that devices write at full speed, for results that are read on the host.
+class PinnedMemory {
+ public:
+  /// @throws DeviceError without a device, or where there is no room
+  /// @throws NotCompiled in a build without CUDA
+  explicit PinnedMemory(std::size_t bytes);
+  /// Frees it.
+  ~PinnedMemory();
+  PinnedMemory(const PinnedMemory&) = delete;
+  PinnedMemory& operator=(const PinnedMemory&) = delete;
+  /// The memory.
+  std::span<std::uint8_t> bytes() const { return {static_cast<std::uint8_t*>(memory_), bytes_}; }
+
+ private:
+  void* memory_;
+  std::size_t bytes_;
 };
 
 }  // namespace tetwarp

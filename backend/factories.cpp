@@ -38,12 +38,34 @@ std::unique_ptr<Renderer> make_renderer(BackendKind backend, int device, const L
 
 namespace simulate {
 
+namespace {
+
+class HostCopy final : public DisplacementCopy {
+ public:
+  void take(std::span<const glm::vec3> displacement, void*) override {
+    values_.assign(displacement.begin(), displacement.end());
+  }
+  std::span<glm::vec3> values() override { return values_; }
+  Memory memory() const override { return Memory::host; }
+  std::vector<glm::vec3> on_host() const override { return values_; }
+
+ private:
+  std::vector<glm::vec3> values_;
+};
+
+}  // namespace
+
 std::unique_ptr<Simulation> make_simulation(BackendKind backend, Method method, const Model& model, int device,
                                             const Limits& limits) {
   const bool chainmail = method == Method::chainmail;
   if (backend == BackendKind::cuda)
     return chainmail ? make_cuda_chainmail(model, device) : make_cuda_mass_spring(model, device);
   return chainmail ? make_cpu_chainmail(model, limits) : make_cpu_mass_spring(model, limits);
+}
+
+std::unique_ptr<DisplacementCopy> make_displacement_copy(BackendKind backend, int device) {
+  if (backend == BackendKind::cuda) return make_cuda_displacement_copy(device);
+  return std::make_unique<HostCopy>();
 }
 
 }  // namespace simulate

@@ -81,8 +81,7 @@ std::unique_ptr<Renderer> make_renderer(BackendKind backend, int device = 0, con
 
 namespace simulate {
 
-/// Makes a simulation. ChainMail has the same bits on every backend; mass-spring agrees to rounding, and goes by
-/// conjugate gradients on a device, where its displacements stay.
+/// Makes a simulation. Both methods have the same bits on every backend. On a device their displacements stay there.
 /// @param backend  where it runs
 /// @param method   what is simulated
 /// @param model    must outlive the simulation
@@ -91,6 +90,11 @@ namespace simulate {
 /// @throws InputError as `make_cpu_chainmail` and `make_cpu_mass_spring`
 std::unique_ptr<Simulation> make_simulation(BackendKind backend, Method method, const Model& model, int device = 0,
                                             const Limits& limits = {});
+
+/// Makes an empty copy for the displacements of simulations on a backend.
+/// @param backend  where they run
+/// @param device   number of the device
+std::unique_ptr<DisplacementCopy> make_displacement_copy(BackendKind backend, int device = 0);
 
 }  // namespace simulate
 

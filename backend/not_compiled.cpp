@@ -25,7 +25,13 @@ std::string describe_cuda_device(int) { not_compiled(); }
 
 void* create_cuda_stream(int) { not_compiled(); }
 
+void wait_for_cuda_stream(void*) { not_compiled(); }
+
 void destroy_cuda_stream(void*) {}
+
+void* allocate_pinned(std::size_t) { not_compiled(); }
+
+void free_pinned(void*) {}
 
 std::unique_ptr<ForwardResampler> make_cuda_resampler(const Geometry&, int, const Limits&) { not_compiled(); }
 
@@ -35,11 +41,11 @@ std::unique_ptr<Renderer> make_cuda_renderer(int, const Limits&) { not_compiled(
 
 namespace simulate {
 
-std::unique_ptr<Simulation> make_cuda_mass_spring(const Model&, int) {
-  throw NotCompiled("CUDA is not in this build; use --backend cpu, the methods agree to rounding");
-}
+std::unique_ptr<Simulation> make_cuda_mass_spring(const Model&, int) { not_compiled(); }
 
 std::unique_ptr<Simulation> make_cuda_chainmail(const Model&, int) { not_compiled(); }
+
+std::unique_ptr<DisplacementCopy> make_cuda_displacement_copy(int) { not_compiled(); }
 
 }  // namespace simulate
 

@@ -225,6 +225,8 @@ void add_simulate(Command& command) {
   command.phantom("phantom", 2, 100000);
   command.frames();
   command.add("--steps", options.steps_a_frame, "Steps that a frame may take", CLI::Range(0, kMost));
+  command.add("--deadband", options.deadband_mm, "Vertices that move less stay where they are shown, mm",
+              CLI::Range(0.0, 10.0));
   command.cli()
       .add_option("--render", options.render, "Make a picture of each frame, of W,H pixels")
       ->expected(2)

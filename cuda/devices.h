@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <cstddef>
 #include <string>
 
 // What backend/devices.h is made of. A build without CUDA defines it in backend/not_compiled.cpp.
@@ -20,7 +21,13 @@ std::string describe_cuda_device(int device);
 /// A cudaStream_t of a device that waits for no other work there.
 /// @throws DeviceError without such a device
 void* create_cuda_stream(int device);
+/// Waits until a stream has done what was queued. @throws DeviceError
+void wait_for_cuda_stream(void* stream);
 /// Destroys what `create_cuda_stream` made.
 void destroy_cuda_stream(void* stream);
+/// Host memory that devices read and write at full speed. @throws DeviceError
+void* allocate_pinned(std::size_t bytes);
+/// Frees what `allocate_pinned` gave.
+void free_pinned(void* memory);
 
 }  // namespace tetwarp

@@ -26,6 +26,8 @@ namespace simulate {
 std::unique_ptr<Simulation> make_cuda_chainmail(const Model& model, int device);
 /// Mass-spring.
 std::unique_ptr<Simulation> make_cuda_mass_spring(const Model& model, int device);
+/// A copy of displacements.
+std::unique_ptr<DisplacementCopy> make_cuda_displacement_copy(int device);
 
 }  // namespace simulate
 

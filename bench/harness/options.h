@@ -43,6 +43,7 @@ struct Options {
   int frames = 50, warmup = 3;    ///< timed, and before them
   int repeats = 3;
   int steps_a_frame = 2;  ///< that a simulation may take
+  double deadband_mm = 0;
   std::string backend = "auto";
   int threads = 0;  ///< 0: all
   int device = 0;   ///< of CUDA

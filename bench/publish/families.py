@@ -279,10 +279,12 @@ over the largest by which placed ones are kept in their places (mass-spring)."""
                       f"{run['residual']:.2g}", "yes" if run["reached"] else "no"] for run in document["settle"]])
     text += section("Frame by frame", """\
 The same way in equal frames, each with a few steps, then set_field and resample of the volume, then a picture of it if one is asked
-for: its empty blocks are found and its rays cast. "Turning" are pictures of a volume that stands, from all around. ms, median (q1-q3).""",
-                    ["method", "backend", "steps", "simulate", "resample", "picture", "frames a second", "turning",
+for: its empty blocks are found and its rays cast. "Turning" are pictures of a volume that stands, from all around. ms, median (q1-q3).
+With pictures, frames a second are those of a loop that works on three frames at a time; "in turn" is one part after the other.""",
+                    ["method", "backend", "steps", "simulate", "resample", "picture", "frames a second", "in turn", "turning",
                      "last motion, mm"],
                     [[run["method"], run["backend"], run["steps"], ms_cell(run["simulate_ms"]), ms_cell(run["resample_ms"]),
-                      or_empty(run, "render_ms"), fixed(run["frames_per_second"], 1), or_empty(run, "turn_ms"),
+                      or_empty(run, "render_ms"), fixed(run["frames_per_second"], 1),
+                      fixed(run["parts_per_second"], 1) if "parts_per_second" in run else "", or_empty(run, "turn_ms"),
                       f"{run['last']['motion_mm']:.2g}"] for run in document["frames"]])
     return text + floors(document)

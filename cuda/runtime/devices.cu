@@ -27,7 +27,17 @@ void* create_cuda_stream(int device) {
   return stream;
 }
 
+void wait_for_cuda_stream(void* stream) { TETWARP_CUDA_TRY(cudaStreamSynchronize(static_cast<cudaStream_t>(stream))); }
+
 void destroy_cuda_stream(void* stream) { cudaStreamDestroy(static_cast<cudaStream_t>(stream)); }
+
+void* allocate_pinned(std::size_t bytes) {
+  void* memory = nullptr;
+  TETWARP_CUDA_TRY(cudaMallocHost(&memory, bytes));
+  return memory;
+}
+
+void free_pinned(void* memory) { cudaFreeHost(memory); }
 
 std::string describe_cuda_device(int device) {
   cudaDeviceProp properties{};
