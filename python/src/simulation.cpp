@@ -5,6 +5,8 @@
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 
+#include <array>
+#include <memory>
 #include <mutex>
 #include <optional>
 
@@ -21,12 +23,53 @@ namespace {
 
 using namespace simulate;
 
+/// Displacements [k, j, i, 3] on a device, LPS mm.
+class BoundCopy {
+ public:
+  BoundCopy(const Geometry& lattice, int device, std::shared_ptr<DisplacementCopy> copy)
+      : lattice_(lattice), device_(device), copy_(std::move(copy)) {}
+
+  /// An array of DLPack that keeps the memory for as long as somebody refers to it.
+  nb::object exchanged() const {
+    auto* held = new std::shared_ptr<DisplacementCopy>(copy_);
+    const nb::capsule owner(held,
+                            [](void* one) noexcept { delete static_cast<std::shared_ptr<DisplacementCopy>*>(one); });
+    const std::array<std::size_t, 4> shape = shape_of(lattice_);
+    return nb::cast(nb::ndarray<nb::array_api, float, nb::device::cuda>(
+        copy_->values().data(), shape.size(), shape.data(), owner, nullptr, nb::dtype<float>(), nb::device::cuda::value,
+        device_));
+  }
+  nb::object on_host() const {
+    std::vector<glm::vec3> values;
+    {
+      const WithoutGil released;
+      values = copy_->on_host();
+    }
+    return as_numpy(lattice_, std::move(values));
+  }
+  nb::tuple shape() const {
+    const std::array<std::size_t, 4> shape = shape_of(lattice_);
+    return nb::make_tuple(shape[0], shape[1], shape[2], shape[3]);
+  }
+
+ private:
+  static std::array<std::size_t, 4> shape_of(const Geometry& lattice) {
+    return {static_cast<std::size_t>(lattice.size.z), static_cast<std::size_t>(lattice.size.y),
+            static_cast<std::size_t>(lattice.size.x), 3};
+  }
+
+  Geometry lattice_;
+  int device_;
+  std::shared_ptr<DisplacementCopy> copy_;
+};
+
 /// A scenario that is played on a volume, frame by frame.
 class BoundRun {
  public:
   BoundRun(const std::filesystem::path& scenario, const ConstArray& ct, const Geometry& grid,
            const std::optional<ConstArray>& labels, const std::optional<Geometry>& labels_grid,
-           const std::string& backend, int device, int threads, const CallOptions& options) {
+           const std::string& backend, int device, int threads, const CallOptions& options)
+      : device_(device) {
     const ConstVolumeView voxels = voxels_of(ct, grid, "the volume");
     require(voxels.memory == Memory::host, "the volume lies on a device; a simulation examines it in host memory");
     std::optional<ConstVolumeView> labelled;
@@ -62,8 +105,19 @@ class BoundRun {
     return nb::make_tuple(frame.number, frame.phase, frame.ends_phase, frame.convergence.steps,
                           frame.convergence.motion_mm, frame.convergence.residual, frame.convergence.reached);
   }
+  /// The field after the last frame, as `as_tuple` has it; the displacement of a simulation on a device stays there, as
+  /// a BoundCopy, unless open cuts divide cells.
   nb::tuple field() {
     const std::unique_lock lock = in_use();
+    if (run_->frames_done() > 0 && !run_->divides_cells()) {
+      const Simulation& simulation = run_->simulation();
+      if (simulation.memory() == Memory::device) {
+        std::shared_ptr<DisplacementCopy> copy = make_displacement_copy(BackendKind::cuda, device_);
+        copy->take(simulation.displacement());
+        return nb::make_tuple(patient_.lattice, BoundCopy(patient_.lattice, device_, std::move(copy)), nb::none(),
+                              nb::none());
+      }
+    }
     return as_tuple(run_->field());
   }
 
@@ -78,11 +132,16 @@ class BoundRun {
   Patient patient_;
   std::optional<ScenarioRun> run_;
   std::string backend_;
+  int device_;
 };
 
 }  // namespace
 
 void add_simulation(nb::module_& core) {
+  nb::class_<BoundCopy>(core, "DisplacementCopy")
+      .def("exchanged", &BoundCopy::exchanged)
+      .def("on_host", &BoundCopy::on_host)
+      .def_prop_ro("shape", &BoundCopy::shape);
   nb::class_<BoundRun>(core, "Run")
       .def(nb::init<const std::filesystem::path&, const ConstArray&, const Geometry&, const std::optional<ConstArray>&,
                     const std::optional<Geometry>&, const std::string&, int, int, const CallOptions&>(),

@@ -28,6 +28,9 @@ class Torch:
     def on_host(self, array):
         return array.cpu().numpy()
 
+    def taken(self, array):
+        return self.library.from_dlpack(array)
+
 
 class CuPy:
     def __init__(self):
@@ -41,6 +44,9 @@ class CuPy:
 
     def on_host(self, array):
         return self.library.asnumpy(array)
+
+    def taken(self, array):
+        return self.library.from_dlpack(array)
 
 
 class Jax:
@@ -59,6 +65,9 @@ class Jax:
 
     def on_host(self, array):
         return np.asarray(array)
+
+    def taken(self, array):
+        return self.library.dlpack.from_dlpack(array)
 
 
 @pytest.fixture(params=[Torch, CuPy, Jax])
@@ -159,3 +168,55 @@ def test_a_picture_of_what_lies_on_the_device_has_the_bytes_of_the_cpu(source):
     there = tw.Volume(torch.as_tensor(source, device="cuda"), GRID)
     picture = tw.render(volume, size=(90, 70), angle=30, backend="cpu")
     assert tw.render(there, size=(90, 70), angle=30, backend="cuda").tobytes() == picture.tobytes()
+
+
+def page(method):
+    move = {"handle": {"at": {"body": [0.5, 0.5, 0.5]}, "radius_mm": 25}, "by_mm": [3, -12, 4]}
+    return {
+        "name": "push", "method": method, "cell_size": 6,
+        "tissues": [{"name": "all", "compression": 0.2, "stretch": 0.2, "shear": 0.2, "youngs_modulus_kpa": 4}],
+        "hold": [{"border": True}],
+        "phases": [{"frames": 3, "move": [move]}],
+    }
+
+
+@pytest.fixture(scope="module", params=["chainmail", "mass-spring"])
+def played(request):
+    ct = tw.phantom((60, 52, 40), spacing=(4, 4, 5))
+    fields = {
+        backend: [frame.field for frame in tw.simulate(page(request.param), ct, backend=backend)] for backend in ("cpu", "cuda")
+    }
+    return ct, fields
+
+
+def test_a_simulation_leaves_its_field_on_the_device(arrays, played):
+    _, fields = played
+    for mine, host in zip(fields["cuda"], fields["cpu"], strict=True):
+        there = mine.displacement
+        assert not isinstance(there, np.ndarray)
+        assert there.shape == host.displacement.shape
+        assert np.asarray(there).tobytes() == host.displacement.tobytes()
+        taken = [arrays.taken(there) for _ in range(2)]
+        assert arrays.pointer(taken[0]) == arrays.pointer(taken[1])
+        assert arrays.on_host(taken[0]).tobytes() == host.displacement.tobytes()
+    assert len({np.asarray(one.displacement).tobytes() for one in fields["cuda"]}) == 3, "frames share their memory"
+
+
+def test_a_field_on_the_device_serves_every_backend_and_file(played, tmp_path):
+    ct, fields = played
+    mine, host = fields["cuda"][-1], fields["cpu"][-1]
+    expected = tw.deform(ct, host, backend="cpu", outside="background")
+    for backend in ("cpu", "cuda"):
+        done = tw.deform(ct, mine, backend=backend, outside="background")
+        assert done.volume.array.tobytes() == expected.volume.array.tobytes()
+    for name, field in (("mine.mha", mine), ("host.mha", host)):
+        tw.write_field(field, tmp_path / name)
+    assert (tmp_path / "mine.mha").read_bytes() == (tmp_path / "host.mha").read_bytes()
+    points = [(5.0, -3.0, 7.0), (0.0, 0.0, 0.0)]
+    moved = [tw.move_points(points, field, ct.geometry)[0].tobytes() for field in (mine, host)]
+    assert moved[0] == moved[1]
+
+
+def test_numpy_gets_no_view_of_a_device(played):
+    with pytest.raises(ValueError, match="device"):
+        played[1]["cuda"][0].displacement.__array__(copy=False)

@@ -10,10 +10,54 @@ from typing import Any
 
 import numpy as np
 
+from . import _core
 from .errors import InputError
 
 #: Device types of DLPack that are CUDA's: its own memory, and managed memory.
 CUDA_DEVICES = (2, 13)
+
+
+class DeviceArray:
+    """Values on a CUDA device that a simulation left there.
+
+    `torch.from_dlpack`, `cupy.from_dlpack` and `jax.dlpack.from_dlpack` take it without a copy; `numpy.asarray` copies
+    it to the host. It is complete: any stream may read it at once.
+
+    Attributes
+    ----------
+    shape : tuple of int
+    dtype : numpy.dtype
+    """
+
+    __slots__ = ("_core", "dtype", "shape")
+
+    def __init__(self, core: _core.DisplacementCopy) -> None:
+        self._core = core
+        self.shape: tuple[int, ...] = tuple(core.shape)
+        self.dtype: np.dtype[Any] = np.dtype(np.float32)
+
+    def __dlpack__(self, **options: Any) -> Any:
+        array: Any = self._core.exchanged()
+        return array.__dlpack__(**options)
+
+    def __dlpack_device__(self) -> tuple[int, int]:
+        array: Any = self._core.exchanged()
+        kind, number = array.__dlpack_device__()
+        return int(kind), int(number)
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray[Any, Any]:
+        if copy is False:
+            raise ValueError("the values lie on a device; NumPy needs a copy of them")
+        values: Any = self._core.on_host()
+        return values if dtype is None else values.astype(dtype, copy=False)
+
+    def __repr__(self) -> str:
+        return f"<DeviceArray {self.shape}, {self.dtype}>"
+
+
+def on_host(array: Any) -> Any:
+    """The array; of a simulation's values on a device, a copy by NumPy."""
+    return np.asarray(array) if isinstance(array, DeviceArray) else array
 
 
 def is_on_device(array: Any) -> bool:
@@ -90,7 +134,7 @@ def require_dense(array: Any, name: str) -> None:
         dense = array.flags.c_contiguous
         how = "cupy.ascontiguousarray(array)"
     else:
-        return  # JAX has no other layout
+        return  # JAX and a simulation have no other layout
     if not dense:
         raise InputError(
             f"{name} does not lie in memory as [k, j, i] with i fastest; pass the copy {how}, or "

@@ -263,14 +263,14 @@ class _Origin:
 
 def _origin_of(field: VertexField | PullField, threads: int) -> _Origin | None:
     """That of a field; None where its values lie on a device."""
-    is_on_host = field.displacement is None or isinstance(field.displacement, np.ndarray)
-    if not is_on_host:
+    displacement: Any = _arrays.on_host(field.displacement)
+    if displacement is not None and not isinstance(displacement, np.ndarray):
         return None
     number = _calls.threads(threads)
     if isinstance(field, PullField):
-        sha256 = _core.hash_pull_field(field.geometry._grid, field.displacement, number)
+        sha256 = _core.hash_pull_field(field.geometry._grid, displacement, number)
         return _Origin(sha256, "pull", "Deformed by a pull field", True)
-    moves = field.mesh is not None or bool(np.any(field.displacement))
+    moves = field.mesh is not None or bool(np.any(displacement))
     what = "Deformed by a field of vertices" if moves else "Resampled by the identity"
     return _Origin(_core.hash_field(field._host(), number), "forward", what, moves)
 

@@ -125,6 +125,8 @@ class VertexField:
     @classmethod
     def _of(cls, parts: Any, notes: Any = ()) -> VertexField:
         lattice, displacement, mesh, replaced = parts
+        if isinstance(displacement, _core.DisplacementCopy):
+            displacement = _arrays.DeviceArray(displacement)
         field = cls(
             None if lattice is None else Geometry._of(lattice),
             displacement,
@@ -136,7 +138,7 @@ class VertexField:
 
     def _host(self) -> _core.HostField:
         """The field as the library has it, its values copied to the host."""
-        displacement = self.displacement
+        displacement = _arrays.on_host(self.displacement)
         if displacement is not None and not isinstance(displacement, np.ndarray):
             raise InputError("the displacement lies on a device; this call takes one in host memory")
         return _core.HostField(

@@ -233,10 +233,11 @@ class Resampler(_Resampler):
             Whether reports state the range of the Jacobian determinant.
         """
         field = require_forward(field, "set it with tetwarp.PullResampler")
-        number = _arrays.stream_of(field.displacement, stream)
+        values = _arrays.on_host(field.displacement) if self.backend == "cpu" else field.displacement
+        number = _arrays.stream_of(values, stream)
         self._field = field
         self._is_set = False
-        displacement = None if field.displacement is None else _arrays.exchanged(field.displacement, number)
+        displacement = None if values is None else _arrays.exchanged(values, number)
         self._core.set_field(
             None if field.lattice is None else field.lattice._grid,
             displacement,

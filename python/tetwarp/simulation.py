@@ -39,7 +39,8 @@ class Frame:
     residual: float
     #: Whether it converged within the rule.
     converged: bool
-    #: The field after this frame.
+    #: The field after this frame, which later frames do not change. A simulation on CUDA leaves its displacement there,
+    #: unless open cuts divide cells: it gives itself by DLPack, and `numpy.asarray` copies it.
     field: VertexField
 
 
