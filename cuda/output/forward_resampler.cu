@@ -11,6 +11,7 @@
 #include "cuda/factories.h"
 #include "cuda/lattice/lattice_part.h"
 #include "cuda/output/mesh_resampler.h"
+#include "cuda/output/updated_target.h"
 #include "cuda/owners/gather.cuh"
 #include "cuda/runtime/pointer_check.h"
 #include "cuda/runtime/warp.cuh"
@@ -90,32 +91,6 @@ __global__ void reach_kernel(DeviceField field, unsigned blocks_per_slice, Slice
   atomicMin(&reach[slice].low, low);
   atomicMax(&reach[slice].high, high);
 }
-
-/// What must be the same of a target, so that its output holds what the last update gave.
-struct UpdatedTarget {
-  explicit UpdatedTarget(const Target& target)
-      : source(target.source.voxels),
-        output(target.output.voxels),
-        source_memory(target.source.memory),
-        output_memory(target.output.memory),
-        source_grid(*target.source.geometry),
-        source_region(target.source.buffered),
-        output_region(target.output.buffered),
-        type(target.source.type),
-        components(target.source.components),
-        interpolation(target.interpolation),
-        background(target.background) {}
-  bool operator==(const UpdatedTarget&) const = default;
-
-  const std::byte *source, *output;
-  Memory source_memory, output_memory;
-  Geometry source_grid;
-  Region source_region, output_region;
-  VoxelType type;
-  int components;
-  Interpolation interpolation;
-  double background;
-};
 
 class LatticeResampler final : public CudaResampler<ForwardResampler> {
  public:
