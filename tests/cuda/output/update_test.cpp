@@ -137,6 +137,17 @@ TEST_F(Updates, WriteOnlyWhatMayChange) {
   EXPECT_NEAR(static_cast<double>(report.covered), static_cast<double>(covered), 200);
 }
 
+TEST_F(Updates, ClearWhatTissueHasLeft) {
+  Geometry lattice = unit_grid({5, 4, 4});
+  lattice.spacing = glm::dvec3(8);
+  lattice.origin = {10, 12, 8};
+  for (const glm::vec3& by : {glm::vec3(0), glm::vec3(44, 20, 20), glm::vec3(0), glm::vec3(-15, 10, 0)}) {
+    SCOPED_TRACE(by.x);
+    const VertexField field = uniform_field(lattice, by);
+    expect_whole_pass(field, update(field));
+  }
+}
+
 TEST_F(Updates, MakeAllAgainAfterWhatTheyDoNotKnow) {
   VertexField field = sample_on(lattice_over(grid_, 8), Bubble{.radius = 25, .strength = 0.3, .centre = {40, 35, 30}});
   update(field);
