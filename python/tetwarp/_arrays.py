@@ -48,7 +48,7 @@ class DeviceArray:
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray[Any, Any]:
         if copy is False:
             raise ValueError("the values lie on a device; NumPy needs a copy of them")
-        values: Any = self._core.on_host()
+        values = np.asarray(self._core.on_host())
         return values if dtype is None else values.astype(dtype, copy=False)
 
     def __repr__(self) -> str:

@@ -263,12 +263,12 @@ class _Origin:
 
 def _origin_of(field: VertexField | PullField, threads: int) -> _Origin | None:
     """That of a field; None where its values lie on a device."""
-    displacement: Any = _arrays.on_host(field.displacement)
+    displacement = _arrays.on_host(field.displacement)
     if displacement is not None and not isinstance(displacement, np.ndarray):
         return None
     number = _calls.threads(threads)
     if isinstance(field, PullField):
-        sha256 = _core.hash_pull_field(field.geometry._grid, displacement, number)
+        sha256 = _core.hash_pull_field(field.geometry._grid, np.asarray(displacement), number)
         return _Origin(sha256, "pull", "Deformed by a pull field", True)
     moves = field.mesh is not None or bool(np.any(displacement))
     what = "Deformed by a field of vertices" if moves else "Resampled by the identity"
