@@ -30,13 +30,14 @@ class FrameLoop {
  public:
   /// What the loop works with. All must outlive it, and nobody else may use them meanwhile.
   struct Parts {
-    simulate::ScenarioRun& run;
-    ForwardResampler& resampler;
-    Renderer& renderer;  ///< with a style
-    Target target;       ///< whose output is drawn; in the memory of the backend, for pictures without copies
-    Outside outside = Outside::background;
+    simulate::ScenarioRun& run;   ///< what is played, from its next frame on
+    ForwardResampler& resampler;  ///< onto the grid of the target's output
+    Renderer& renderer;           ///< with a style
+    Target target;                ///< whose output is drawn; in the memory of the backend, for pictures without copies
+    Outside outside = Outside::background;  ///< what becomes of voxels outside the undeformed lattice
   };
 
+  /// @param parts    what the loop works with
   /// @param backend  where the parts work
   /// @param device   number of their device
   explicit FrameLoop(const Parts& parts, BackendKind backend, int device = 0);

@@ -44,7 +44,9 @@ struct Convergence {
   bool reached = false;  ///< whether motion and residual are within the rule
 };
 
-/// What is shown of a node whose displacement was `before` and is `now`, LPS mm.
+/// What is shown of a node, LPS mm.
+/// @param before  displacement that was shown last
+/// @param now     displacement
 /// @param square  of the deadband, mm2: a node stays where it is shown unless it is farther away. 0: it never stays
 TETWARP_HD inline glm::vec3 shown_of(const glm::vec3& before, const glm::vec3& now, float square) {
   const glm::vec3 way = now - before;
@@ -101,8 +103,9 @@ class Simulation {
 class DisplacementCopy {
  public:
   virtual ~DisplacementCopy() = default;
-  /// Copies what `Simulation::displacement` gives, from the same kind of memory; done when it returns.
-  /// @param stream  see Control::stream
+  /// Copies displacements; done when it returns.
+  /// @param displacement  what `Simulation::displacement` gives, in the same kind of memory
+  /// @param stream        see Control::stream
   virtual void take(std::span<const glm::vec3> displacement, void* stream = nullptr) = 0;
   /// LPS mm of every node, in `memory()`.
   virtual std::span<glm::vec3> values() = 0;
