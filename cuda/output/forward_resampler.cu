@@ -130,11 +130,12 @@ class LatticeResampler final : public CudaResampler<ForwardResampler> {
     const bool stays_here = std::all_of(targets.begin(), targets.end(), [](const Target& target) {
       return target.output.memory == Memory::device;  // others are computed in a buffer of the resampler
     });
-    reuse_ = !stays_here ? Reuse::nothing : given == updated_ ? Reuse::now : Reuse::later;
+    const bool may_keep = ready_ && can_write_plainly() && stays_here;
+    reuse_ = !may_keep ? Reuse::nothing : given == updated_ ? Reuse::now : Reuse::later;
     updated_.clear();
     changed_ = {whole(output())};
     const Report report = CudaResampler::resample(whole(output()), targets, {}, control, {});
-    updated_ = std::move(given);
+    if (may_keep) updated_ = std::move(given);
     return {report, std::move(changed_)};
   }
 

@@ -167,6 +167,9 @@ TEST_F(Updates, MakeAllAgainAfterWhatTheyDoNotKnow) {
   device_->set_field(view(other, Outside::background));
   device_->resample(whole(grid_), {&target, 1});
   then("a whole pass by another field");
+  device_->set_field(view(other, Outside::rest));
+  device_->update({&target, 1});
+  then("an update by claims");
   field = sample_on(lattice_over(grid_, 16), Bubble{.radius = 25, .strength = 0.3, .centre = {40, 35, 30}});
   then("another lattice");
   VertexField mesh;
