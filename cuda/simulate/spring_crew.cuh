@@ -187,7 +187,7 @@ __global__ void __launch_bounds__(kBlock, kCrewPerProcessor)
     crew.set_up(task);
   }
   crew.iterate(task.times);
-  if (!state.is_indefinite && (state.is_done || task.ends)) crew.conclude(task.follows);
+  if (state.is_done || task.ends) crew.conclude(task.follows);
   if (blockIdx.x == 0 && threadIdx.x == 0) *a.state = state;
 }
 

@@ -63,7 +63,7 @@ void solve_part(Machine& machine, const SpringArrays& a, const SolveTask& task) 
     machine.template sum<Sum>(a.nodes, sweeps::Begin{{a}}, sweeps::AfterBegin{a.state, task.effort});
   }
   iterate_gradients(machine, a, task.times);
-  if (a.state->is_indefinite || !(a.state->is_done || task.ends)) return;
+  if (!a.state->is_done && !task.ends) return;
   if (task.follows) {
     machine.each(a.nodes, sweeps::Follow{{a}});
   } else {
