@@ -20,30 +20,18 @@ constexpr int kPatchWidth = 8, kPatchHeight = 4;  ///< pixels of a warp: near ra
 constexpr int kPatches = 4;                       ///< of a thread block
 constexpr int kCopyWidth = 32, kCopyRows = 8;     ///< words and rows of a thread block
 
-/// Copies rows to where they lie further apart. A warp a row, so many words after one another; kCopyRows rows a block.
+/// Copies rows of voxels to where they lie further apart. A thread block a row of blocks, a warp a row of voxels.
 ///
-/// @param from   rows of `words` words, one after another  @param rows  of a slice  @param all_rows  of all slices
-/// @param to     written: rows are `pitch` words apart, and a slice has room for `slots` rows
+/// @param from        rows of `words` words, one after another  @param rows  of a slice  @param slices  of the volume
+/// @param block_rows  z * blocks_y + y of each row of blocks that is wanted, gridDim.x of them; null: all
+/// @param blocks_y    rows of blocks of a slice
+/// @param to          written: rows are `pitch` words apart, and a slice has room for `slots` rows
 template <class Word>
 __global__ void __launch_bounds__(kCopyWidth* kCopyRows)
-    copy_kernel(const Word* from, int words, int rows, int all_rows, Word* to, int pitch, int slots) {
-  const int row = static_cast<int>(blockIdx.x) * kCopyRows + static_cast<int>(threadIdx.y);
-  if (row >= all_rows) return;
-  const Word* const source = from + ray::wide_product(row, words);
-  Word* const copy = to + ray::wide_product(row / rows * slots + row % rows, pitch);
-  for (int n = static_cast<int>(threadIdx.x); n < words; n += kCopyWidth) copy[n] = source[n];
-}
-
-/// Copies the voxels of some rows of blocks, as `copy_kernel` copies all. A thread block a row of blocks, a warp a row
-/// of voxels.
-///
-/// @param block_rows  z * blocks_y + y of each, blocks_y rows of blocks a slice  @param slices  of the volume
-template <class Word>
-__global__ void __launch_bounds__(kCopyWidth* kCopyRows)
-    copy_rows_kernel(const Word* from, int words, int rows, int slices, const int* block_rows, int blocks_y, Word* to,
-                     int pitch, int slots) {
-  const int block_row = block_rows[blockIdx.x], y = block_row % blocks_y * kRayBlock,
-            z = block_row / blocks_y * kRayBlock;
+    copy_kernel(const Word* from, int words, int rows, int slices, const int* block_rows, int blocks_y, Word* to,
+                int pitch, int slots) {
+  const int block_row = block_rows ? block_rows[blockIdx.x] : static_cast<int>(blockIdx.x);
+  const int y = block_row % blocks_y * kRayBlock, z = block_row / blocks_y * kRayBlock;
   for (int n = static_cast<int>(threadIdx.y); n < kRayBlock * kRayBlock; n += kCopyRows) {
     const int row = y + n % kRayBlock, slice = z + n / kRayBlock;
     if (row >= rows || slice >= slices) continue;

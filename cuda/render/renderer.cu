@@ -47,11 +47,16 @@ class CudaRenderer final : public Renderer {
   void render(const ViewPlane& plane, std::span<std::uint8_t> rgb, const Control& control) override;
 
  private:
-  void copy_volume(cudaStream_t stream);
-  /// Calls `copy(word)` with a word of the type in which rows are copied.
-  template <class Copy>
-  void in_words(const Copy& copy) const;
+  void place_copy();
+  /// Reads the voxels of the volume, where it lies, into all that is made of them.
+  void read_all(cudaStream_t stream);
+  /// @param block_rows  `count` rows of blocks; null: all, of which there are `count`
+  void copy_rows(const int* block_rows, int count, cudaStream_t stream);
+  /// @param block_rows  see `copy_rows`
   void find_ranges(const int* block_rows, int count, cudaStream_t stream);
+  std::size_t volume_bytes() const {
+    return static_cast<std::size_t>(voxel_count(geometry_)) * size_bytes(volume_.type);
+  }
   void prepare(const RayFrame& frame, double step, cudaStream_t stream);
   void find_distances(const RayFrame& frame, cudaStream_t stream);
   int block_count() const { return blocks_.x * blocks_.y * blocks_.z; }
@@ -79,7 +84,8 @@ class CudaRenderer final : public Renderer {
   bool distances_are_stale_ = true;
 };
 
-void CudaRenderer::copy_volume(cudaStream_t stream) {
+/// Makes room for the copy, where there is any, and decides what rays read.
+void CudaRenderer::place_copy() {
   const glm::ivec3 size(geometry_.size);
   const int bytes = static_cast<int>(size_bytes(volume_.type));
   const int row = at_least(size.x, kRowShift / bytes, kLine / bytes),
@@ -94,32 +100,31 @@ void CudaRenderer::copy_volume(cudaStream_t stream) {
   } catch (const DeviceMemoryError&) {
     return;
   }
-  in_words([&](auto word) {
-    using Word = decltype(word);
-    const int words = size.x * bytes / static_cast<int>(sizeof(Word)),
-              pitch = row * bytes / static_cast<int>(sizeof(Word));
-    copy_kernel<<<blocks_for(size.y * size.z, kCopyRows), dim3(kCopyWidth, kCopyRows), 0, stream>>>(
-        reinterpret_cast<const Word*>(volume_.voxels), words, size.y, size.y * size.z,
-        reinterpret_cast<Word*>(copy_.data()), pitch, rows);
-  });
-  TETWARP_CUDA_TRY(cudaGetLastError());
   read_ = copy_.data();
   strides_ = {1, row, static_cast<int>(slice)};
 }
 
-template <class Copy>
-void CudaRenderer::in_words(const Copy& copy) const {
-  const auto row_bytes = static_cast<std::size_t>(geometry_.size.x) * size_bytes(volume_.type);
-  const bool in_quads =
-      row_bytes % sizeof(uint4) == 0 && reinterpret_cast<std::uintptr_t>(volume_.voxels) % sizeof(uint4) == 0;
+void CudaRenderer::copy_rows(const int* block_rows, int count, cudaStream_t stream) {
+  if (read_ == volume_.voxels) return;
+  const glm::ivec3 size(geometry_.size);
+  const int bytes = static_cast<int>(size_bytes(volume_.type));
+  const auto copy = [&](auto word) {
+    using Word = decltype(word);
+    const auto words = [&](int voxels) { return voxels * bytes / static_cast<int>(sizeof(Word)); };
+    copy_kernel<<<static_cast<unsigned>(count), dim3(kCopyWidth, kCopyRows), 0, stream>>>(
+        reinterpret_cast<const Word*>(volume_.voxels), words(size.x), size.y, size.z, block_rows, blocks_.y,
+        reinterpret_cast<Word*>(copy_.data()), words(strides_.y), strides_.z / strides_.y);
+  };
+  const bool in_quads = size.x * bytes % static_cast<int>(sizeof(uint4)) == 0 &&
+                        reinterpret_cast<std::uintptr_t>(volume_.voxels) % sizeof(uint4) == 0;
   if (in_quads) {
     copy(uint4{});
   } else {
     dispatch(volume_.type, copy);
   }
+  TETWARP_CUDA_TRY(cudaGetLastError());
 }
 
-/// @param block_rows  see `range_kernel`; null: all rows of blocks
 void CudaRenderer::find_ranges(const int* block_rows, int count, cudaStream_t stream) {
   const int parts = (blocks_.x + kRangeBlocks - 1) / kRangeBlocks, row = (blocks_.x + parts - 1) / parts;
   const dim3 grid(static_cast<unsigned>(parts), static_cast<unsigned>(count));
@@ -137,60 +142,40 @@ void CudaRenderer::update_volume(std::span<const Region> changed, const Control&
   require(volume_.voxels != nullptr, "no volume is set that could have changed: call set_volume first");
   const std::vector<int> rows = block_rows_of(geometry_, changed);
   if (rows.empty()) return;
-  const std::size_t all = static_cast<std::size_t>(blocks_.y) * static_cast<std::size_t>(blocks_.z);
-  if (on_host_ || rows.size() > all / 2) {
-    const std::uint8_t* const tints = tints_;
-    ConstVolumeView volume = volume_;
-    if (on_host_) {
-      volume.voxels = on_host_;
-      volume.memory = Memory::host;
-    }
-    const Geometry geometry = geometry_;
-    volume.geometry = &geometry;
-    set_volume(volume, control);
-    tints_ = tints;
-    return;
-  }
   const DeviceScope scope(device_);
   const auto stream = static_cast<cudaStream_t>(control.stream);
-  block_rows_.upload(rows.data(), rows.size(), stream);
   const auto count = static_cast<int>(rows.size());
-  if (read_ != volume_.voxels) {
-    in_words([&](auto word) {
-      using Word = decltype(word);
-      const glm::ivec3 size(geometry_.size);
-      const auto in_bytes = [&](int voxels) { return voxels * static_cast<int>(size_bytes(volume_.type)); };
-      constexpr int kWord = sizeof(Word);
-      copy_rows_kernel<<<static_cast<unsigned>(count), dim3(kCopyWidth, kCopyRows), 0, stream>>>(
-          reinterpret_cast<const Word*>(volume_.voxels), in_bytes(size.x) / kWord, size.y, size.z, block_rows_.data(),
-          blocks_.y, reinterpret_cast<Word*>(copy_.data()), in_bytes(strides_.y) / kWord, strides_.z / strides_.y);
-    });
-    TETWARP_CUDA_TRY(cudaGetLastError());
+  if (on_host_ || count > blocks_.y * blocks_.z / 2) {
+    read_all(stream);
+    return;
   }
+  block_rows_.upload(rows.data(), rows.size(), stream);
+  copy_rows(block_rows_.data(), count, stream);
   find_ranges(block_rows_.data(), count, stream);
 }
 
 void CudaRenderer::set_volume(const ConstVolumeView& volume, const Control& control) {
   require_renderable(volume);
   const DeviceScope scope(device_);
-  const auto stream = static_cast<cudaStream_t>(control.stream);
   require_memory(volume.voxels, volume.memory, "the volume");
   geometry_ = *volume.geometry;
   volume_ = volume;
   volume_.geometry = &geometry_;
-  if (volume.memory == Memory::host) {
-    const std::size_t bytes = static_cast<std::size_t>(voxel_count(geometry_)) * size_bytes(volume.type);
-    uploads_->copy(voxels_.reserve(bytes), volume.voxels, bytes, stream);
-    volume_.voxels = voxels_.data();
-  }
-  copy_volume(stream);
+  on_host_ = volume.memory == Memory::host ? volume.voxels : nullptr;
+  if (on_host_) volume_.voxels = voxels_.reserve(volume_bytes());
   blocks_ = ray_blocks(geometry_);
   ranges_.reserve(static_cast<std::size_t>(block_count()));
-  find_ranges(nullptr, blocks_.y * blocks_.z, stream);
-  if (volume.memory == Memory::host) TETWARP_CUDA_TRY(cudaStreamSynchronize(stream));
-  volume_.memory = volume.memory;
-  on_host_ = volume.memory == Memory::host ? volume.voxels : nullptr;
+  place_copy();
+  read_all(static_cast<cudaStream_t>(control.stream));
   tints_ = nullptr;
+}
+
+void CudaRenderer::read_all(cudaStream_t stream) {
+  if (on_host_) uploads_->copy(voxels_.data(), on_host_, volume_bytes(), stream);
+  const int rows = blocks_.y * blocks_.z;
+  copy_rows(nullptr, rows, stream);
+  find_ranges(nullptr, rows, stream);
+  if (on_host_) TETWARP_CUDA_TRY(cudaStreamSynchronize(stream));
 }
 
 void CudaRenderer::set_tints(const Tints& tints) {

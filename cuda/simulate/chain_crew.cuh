@@ -86,6 +86,33 @@ class Crew {
     }
   }
 
+  /// Tightens all from the placed nodes of a set. @param farthest  where nothing holds a node
+  /// @param where  `where(one)` is the displacement of a placed node
+  template <class Where>
+  __device__ void spread(std::int32_t farthest, const PlacedSet& set, const Where& where) {
+    for_nodes([&](std::int32_t n) {
+      job_.upper[n] = {{farthest, farthest, farthest}};
+      job_.lower[n] = {{-farthest, -farthest, -farthest}};
+    });
+    wait();
+    for (std::size_t n = set.begin + blockIdx.x * kThreads + threadIdx.x; n < set.end;
+         n += std::size_t{gridDim.x} * kThreads) {
+      const PlacedNode& one = job_.placed[n];
+      job_.upper[one.node] = job_.lower[one.node] = where(one);
+    }
+    wait();
+    tighten_all();
+  }
+
+  /// Brings each node within what placed nodes leave to it, `range(n)`. @return as `finish`
+  template <class Range>
+  __device__ std::uint64_t clamp_all(const Range& range) {
+    return finish([&](std::int32_t n) {
+      job_.ranges[n] = range(n);
+      return clamped(job_.now[n], job_.ranges[n]);
+    });
+  }
+
   /// Puts each node where `place` says. @return square of the largest motion of all
   template <class PlaceNodes>
   __device__ std::uint64_t finish(PlaceNodes&& place) {
@@ -124,21 +151,10 @@ __device__ bool is_first_thread() { return blockIdx.x == 0 && threadIdx.x == 0; 
 __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
     follow_kernel(const __grid_constant__ Job job, Pacer pacer) {
   Crew crew(job);
-  crew.for_nodes([&](std::int32_t n) {
-    job.upper[n] = {{kFarthest, kFarthest, kFarthest}};
-    job.lower[n] = {{-kFarthest, -kFarthest, -kFarthest}};
-  });
-  crew.wait();
-  for (int n = static_cast<int>(blockIdx.x * kThreads + threadIdx.x); n < job.placed_count;
-       n += static_cast<int>(gridDim.x) * kThreads) {
-    job.upper[job.placed[n].node] = job.lower[job.placed[n].node] = job.placed[n].at(job.part);
-  }
-  crew.wait();
-  crew.tighten_all();
-  const std::uint64_t motion = crew.finish([&](std::int32_t n) {
-    job.ranges[n] = range_between(job.upper[n], job.lower[n]);
-    return clamped(job.now[n], job.ranges[n]);
-  });
+  crew.spread(kFarthest, {0, static_cast<std::size_t>(job.placed_count)},
+              [&](const PlacedNode& one) { return one.at(job.part); });
+  const std::uint64_t motion =
+      crew.clamp_all([&](std::int32_t n) { return range_between(job.upper[n], job.lower[n]); });
   if (!is_first_thread()) return;
   job.notes->pacer = pacer;
   job.notes->motion = motion;
@@ -150,16 +166,7 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
 __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
     path_kernel(const __grid_constant__ Job job, PlacedSet set) {
   Crew crew(job);
-  crew.for_nodes([&](std::int32_t n) {
-    job.upper[n] = {{kNoPath, kNoPath, kNoPath}};
-    job.lower[n] = {{-kNoPath, -kNoPath, -kNoPath}};
-  });
-  crew.wait();
-  for (std::size_t n = set.begin + blockIdx.x * kThreads + threadIdx.x; n < set.end;
-       n += std::size_t{gridDim.x} * kThreads)
-    job.upper[job.placed[n].node] = job.lower[job.placed[n].node] = {{0, 0, 0}};
-  crew.wait();
-  crew.tighten_all();
+  crew.spread(kNoPath, set, [](const PlacedNode&) { return Units{{0, 0, 0}}; });
 }
 
 /// Steps of relaxation, until `steps` in all are made or the motion is small. A cooperative launch.
@@ -175,10 +182,7 @@ __global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
   bool reached = false;
   std::uint64_t motion = 0;
   if (paths.count > 0) {
-    motion = crew.finish([&](std::int32_t n) {
-      job.ranges[n] = paths.range(n);
-      return clamped(job.now[n], job.ranges[n]);
-    });
+    motion = crew.clamp_all([&](std::int32_t n) { return paths.range(n); });
   } else {
     pacer = job.notes->pacer;
     motion = job.notes->motion;

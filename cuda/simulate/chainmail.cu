@@ -66,6 +66,7 @@ class CudaChainmail final : public Simulation {
     job_.placed_count = static_cast<int>(placed.size());
     has_loads_ = true;
     advances_ = 0;
+    paths_ = {};
     if (placed.empty()) return;
     uploaded(placed_, placed);
     start_kernel<<<blocks_for(job_.placed_count, kThreads), kThreads>>>(job_);
@@ -87,13 +88,12 @@ class CudaChainmail final : public Simulation {
     Notes& notes = host_notes_.reserve(1)[0];
     notes.steps = 0;
     notes.reached = false;
-    bool is_shown = false, is_followed = paths.count == 0;
-    while (!is_followed || (notes.steps < rule.steps && !notes.reached && !control.stop.stop_requested())) {
+    bool is_shown = false;
+    while (paths.count > 0 || (notes.steps < rule.steps && !notes.reached && !control.stop.stop_requested())) {
       clear_rounds();
       std::int32_t until = std::min(rule.steps, notes.steps + kStepsAtOnce);
       launch(relax_kernel, job_, until, pacer, paths);
-      paths.count = 0;
-      is_followed = true;
+      paths.count = 0;                 // the chain stage is made
       is_shown = until == rule.steps;  // these are the last steps: what follows need not wait for the host
       if (is_shown) show(job_.placed_count, deadband_square());
       read_notes();
@@ -137,7 +137,7 @@ class CudaChainmail final : public Simulation {
   /// @return paths by which it is still to be made, if any
   SetPaths follow(double part, Pacer& pacer) {
     if (++advances_ == 2) find_paths();
-    if (advances_ < 2 || paths_.count == 0) {
+    if (paths_.count == 0) {
       launch(follow_kernel, job_, pacer);
       return {};
     }
@@ -146,7 +146,6 @@ class CudaChainmail final : public Simulation {
   }
 
   void find_paths() {
-    paths_ = {};
     std::vector<PlacedNode> placed(static_cast<std::size_t>(job_.placed_count));
     placed_.download(placed.data(), placed.size(), stream_);
     std::vector<PlacedSet> sets = plan_.sets_of(placed);

@@ -31,6 +31,12 @@ class CudaMachine {
     sums_.reserve(blocks_for(nodes));
     arrived_.fill(0, 1, nullptr);
     pinned_.reserve(1);
+    int processors = 0;
+    TETWARP_CUDA_TRY(cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, device_));
+    // All must run at the same time. As few as have no more rounds of blocks of nodes than the most would have.
+    const unsigned blocks = blocks_for(nodes), most = static_cast<unsigned>(processors * kCrewPerProcessor),
+                   rounds = (blocks + most - 1) / most;
+    crew_ = (blocks + rounds - 1) / rounds;
   }
 
   std::size_t padding() const { return 0; }
@@ -69,16 +75,13 @@ class CudaMachine {
     sum_kernel<T><<<blocks_for(nodes), kBlock, 0, stream_>>>(sweep, then, nodes, of_block, arrived_.data());
     TETWARP_CUDA_TRY(cudaGetLastError());
   }
-  /// In one launch, of as few blocks as take the shortest time: a block for each that is summed up, or for two.
   void solve(const SpringArrays& arrays, const SolveTask& task) {
-    const unsigned blocks = blocks_for(arrays.nodes), most = most_crew(), rounds = (blocks + most - 1) / most,
-                   crew = (blocks + rounds - 1) / rounds;
     SpringArrays a = arrays;
     SolveTask given = task;
     Sum *of_block = reinterpret_cast<Sum*>(of_block_.data()), *of_other = of_other_block_.data();
     Sums* sums = sums_.data();
     void* arguments[] = {&a, &given, &of_block, &of_other, &sums};
-    TETWARP_CUDA_TRY(cudaLaunchCooperativeKernel(reinterpret_cast<const void*>(solve_kernel), dim3(crew), dim3(kBlock),
+    TETWARP_CUDA_TRY(cudaLaunchCooperativeKernel(reinterpret_cast<const void*>(solve_kernel), dim3(crew_), dim3(kBlock),
                                                  arguments, 0, stream_));
   }
 
@@ -87,14 +90,8 @@ class CudaMachine {
     std::byte bytes[512];
   };
 
-  /// Blocks that may run at the same time.
-  unsigned most_crew() const {
-    int processors = 0;
-    TETWARP_CUDA_TRY(cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, device_));
-    return static_cast<unsigned>(processors * kCrewPerProcessor);
-  }
-
   int device_;
+  unsigned crew_ = 1;  ///< blocks of `solve_kernel`
   cudaStream_t stream_ = nullptr;
   DeviceBuffer<Ways> of_block_;  ///< room for the largest of sums
   DeviceBuffer<Sum> of_other_block_;

@@ -78,21 +78,20 @@ glm::ivec3 ray_blocks(const Geometry& volume) { return (glm::ivec3(volume.size) 
 std::vector<int> block_rows_of(const Geometry& volume, std::span<const Region> regions) {
   const glm::ivec3 size(volume.size), blocks = ray_blocks(volume);
   std::vector<std::uint8_t> is_of(static_cast<std::size_t>(blocks.y) * static_cast<std::size_t>(blocks.z));
-  // A block contains values of the three nearest voxels around it, so the first may lie one block lower.
-  const auto first = [](std::int64_t begin) { return std::max(static_cast<int>(begin) / kRayBlock - 1, 0); };
-  const auto reaches = [](int block, int voxels, std::int64_t begin, std::int64_t end) {
-    const RayReach reach(block, voxels);
-    return reach.begin < end && reach.end > begin;
+  const auto for_blocks = [](int count, int voxels, std::int64_t begin, std::int64_t end, const auto& work) {
+    // A block contains values of the nearest voxels around it, too, so the first may lie one block lower.
+    for (int n = std::max(static_cast<int>(begin) / kRayBlock - 1, 0); n < count; ++n) {
+      const RayReach reach(n, voxels);
+      if (reach.begin >= end) return;
+      if (reach.end > begin) work(static_cast<std::size_t>(n));
+    }
   };
   for (const Region& region : regions) {
     if (is_empty(region)) continue;
-    for (int z = first(region.begin.z); z < blocks.z && RayReach(z, size.z).begin < region.end.z; ++z) {
-      if (!reaches(z, size.z, region.begin.z, region.end.z)) continue;
-      for (int y = first(region.begin.y); y < blocks.y && RayReach(y, size.y).begin < region.end.y; ++y) {
-        if (reaches(y, size.y, region.begin.y, region.end.y))
-          is_of[static_cast<std::size_t>(z) * static_cast<std::size_t>(blocks.y) + static_cast<std::size_t>(y)] = 1;
-      }
-    }
+    for_blocks(blocks.z, size.z, region.begin.z, region.end.z, [&](std::size_t z) {
+      for_blocks(blocks.y, size.y, region.begin.y, region.end.y,
+                 [&](std::size_t y) { is_of[z * static_cast<std::size_t>(blocks.y) + y] = 1; });
+    });
   }
   std::vector<int> rows;
   for (std::size_t row = 0; row < is_of.size(); ++row) {

@@ -218,9 +218,10 @@ struct SetPaths {
   int count = 0;  ///< of sets
   std::int32_t nodes = 0;
   Units at[kMost];  ///< displacement of each set
-  const Units* upper =
-      nullptr;  ///< at set * nodes + node: the largest displacement; kNoPath where nothing holds the node
-  const Units* lower = nullptr;  ///< the smallest; -kNoPath where nothing holds the node
+  /// At set * nodes + node: the largest displacement; kNoPath where nothing holds the node.
+  const Units* upper = nullptr;
+  /// The smallest; -kNoPath where nothing holds the node.
+  const Units* lower = nullptr;
 
   TETWARP_HD DisplacementRange range(std::int32_t node) const {
     Units high{{kFarthest, kFarthest, kFarthest}}, low{{-kFarthest, -kFarthest, -kFarthest}};

@@ -31,6 +31,7 @@ class CpuChainmail final : public Simulation {
     moves_ = plan_.moving(placed);
     placed_ = std::move(placed);
     advances_ = 0;
+    paths_ = {};
     has_loads_ = true;
   }
 
@@ -97,45 +98,39 @@ class CpuChainmail final : public Simulation {
   /// again for the same loads, the paths of their sets are followed once.
   std::uint64_t follow(double part, const Control& control) {
     if (++advances_ == 2) find_paths(control);
-    if (advances_ >= 2 && paths_.count > 0) {
+    const bool has_paths = paths_.count > 0;
+    if (has_paths) {
       for (std::size_t set = 0; set < sets_.size(); ++set) paths_.at[set] = placed_[sets_[set].begin].at(part);
-      return finish([&](std::size_t n) {
-        ranges_[n] = paths_.range(static_cast<std::int32_t>(n));
-        return clamped(now_[n], ranges_[n]);
-      });
+    } else {
+      spread(kFarthest, {0, placed_.size()}, control, [&](const PlacedNode& one) { return one.at(part); });
     }
-    spread(kFarthest, control, [&] {
-      for (const PlacedNode& one : placed_) upper_[at(one.node)] = lower_[at(one.node)] = one.at(part);
-    });
     return finish([&](std::size_t n) {
-      ranges_[n] = range_between(upper_[n], lower_[n]);
+      ranges_[n] = has_paths ? paths_.range(static_cast<std::int32_t>(n)) : range_between(upper_[n], lower_[n]);
       return clamped(now_[n], ranges_[n]);
     });
   }
 
-  /// Tightens all from the nodes that `place` places. @param farthest  where nothing holds a node
-  template <class Place>
-  void spread(std::int32_t farthest, const Control& control, const Place& place) {
+  /// Tightens all from the placed nodes of a set. @param farthest  where nothing holds a node
+  /// @param where  `where(one)` is the displacement of a placed node
+  template <class Where>
+  void spread(std::int32_t farthest, const PlacedSet& set, const Control& control, const Where& where) {
     for_nodes([&](std::size_t n) {
       upper_[n] = same(farthest);
       lower_[n] = same(-farthest);
     });
-    place();
+    for (std::size_t n = set.begin; n < set.end; ++n)
+      upper_[at(placed_[n].node)] = lower_[at(placed_[n].node)] = where(placed_[n]);
     activate_all();
     tighten_all(control);
   }
 
   void find_paths(const Control& control) {
-    paths_ = {};
     sets_ = plan_.sets_of(placed_);
     const auto nodes = static_cast<std::size_t>(plan_.nodes());
     path_upper_.resize(sets_.size() * nodes);
     path_lower_.resize(sets_.size() * nodes);
     for (std::size_t set = 0; set < sets_.size(); ++set) {
-      spread(kNoPath, control, [&] {
-        for (std::size_t n = sets_[set].begin; n < sets_[set].end; ++n)
-          upper_[at(placed_[n].node)] = lower_[at(placed_[n].node)] = same(0);
-      });
+      spread(kNoPath, sets_[set], control, [](const PlacedNode&) { return same(0); });
       std::copy(upper_.begin(), upper_.end(), path_upper_.begin() + static_cast<std::ptrdiff_t>(set * nodes));
       std::copy(lower_.begin(), lower_.end(), path_lower_.begin() + static_cast<std::ptrdiff_t>(set * nodes));
     }
