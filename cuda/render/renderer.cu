@@ -78,6 +78,7 @@ class CudaRenderer final : public Renderer {
   DeviceBuffer<TransferEntry> table_, tint_colours_;
   DeviceBuffer<TransferIntegral> integrals_;
   TransferIntegral lowest_, highest_;  ///< entries
+  ClearValues clear_;
   DeviceBuffer<int> opaque_before_, block_rows_;
   const std::uint8_t* tints_ = nullptr;
   double table_step_ = 0;  ///< mm, that the tables are for
@@ -213,6 +214,7 @@ void CudaRenderer::prepare(const RayFrame& frame, double step, cudaStream_t stre
     const TransferIntegrals made = transfer_integrals(table, step);
     lowest_ = made.lowest;
     highest_ = made.highest;
+    clear_ = clear_values(table, frame);
     table_.upload(table.data(), table.size(), stream);
     const std::vector<int> before = opaque_before(table);
     opaque_before_.upload(before.data(), before.size(), stream);
@@ -234,8 +236,8 @@ void CudaRenderer::render(const ViewPlane& plane, std::span<std::uint8_t> rgb, c
   TETWARP_CUDA_TRY(cudaPointerGetAttributes(&found, rgb.data()));
   const bool on_device = found.type == cudaMemoryTypeDevice || found.type == cudaMemoryTypeManaged;
   std::uint8_t* const pixels = on_device ? rgb.data() : picture_.reserve(rgb.size());
-  const RayTables tables{ranges_.data(), distances_.data(), blocks_, table_.data(),       integrals_.data(),
-                         lowest_,        highest_,          tints_,  tint_colours_.data()};
+  const RayTables tables{ranges_.data(), distances_.data(), blocks_, table_.data(), integrals_.data(),
+                         lowest_,        highest_,          clear_,  tints_,        tint_colours_.data()};
   const dim3 grid(blocks_for(plane.width, kPatches * kPatchWidth), blocks_for(plane.height, kPatchHeight));
   dispatch(volume_.type, [&](auto voxel) {
     using V = decltype(voxel);

@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <bit>
 #include <cmath>
 #include <cstdint>
 
@@ -12,14 +13,19 @@
 namespace tetwarp {
 
 /// An entry of the table of a transfer function: the colour of a value, and what one step through it adds to a sum.
-struct TransferEntry {
+struct alignas(16) TransferEntry {
   float red = 0, green = 0, blue = 0, opacity = 0;
 };
 /// Sums over all entries below one: the optical depth of a step, and that depth times each colour.
-struct TransferIntegral {
+struct alignas(16) TransferIntegral {
   float red = 0, green = 0, blue = 0, depth = 0;
 };
 constexpr int kTransferEntries = 4096;
+
+/// Values of which nothing is seen: those below `below`, and those between `from` and `to`. There may be more.
+struct ClearValues {
+  float below = 0, from = 0, to = 0;
+};
 
 /// Volumes are divided into blocks of 8 x 8 x 8 voxels, so that rays can leap over empty ones.
 constexpr int kRayBlockBits = 3, kRayBlock = 1 << kRayBlockBits;
@@ -37,10 +43,11 @@ struct RayFrame {
   float lowest = 0, per_value = 0;                ///< value v is entry (v - lowest) * per_value of the table
   glm::vec3 first{0}, per_column{0}, per_row{0};  ///< where the ray of a pixel begins
   glm::vec3 step{0}, per_step{0};  ///< from a sample to the next, and the inverse of its components (0 for 0)
-  glm::mat3 to_gradient{1};        ///< differences along i, j, k to changes a mm in patient space
+  /// By axis of patient space: the change a mm along it, from differences over two voxels along i, j, k.
+  glm::mat3 to_gradient{1};
   glm::vec3 light{0}, halfway{0};  ///< unit vectors towards the light, and halfway to the viewer
   float ambient = 0, diffuse = 0, specular = 0;
-  float full_gradient = 0;  ///< change a mm from which a place is lit as a surface; 0: no light
+  float per_gradient = 0;  ///< one over the change a mm from which a place is lit as a surface; 0: no light
   glm::vec3 background{0};
 };
 
@@ -52,6 +59,7 @@ struct RayTables {
   const TransferEntry* entries = nullptr;
   const TransferIntegral* integrals = nullptr;   ///< kTransferEntries + 1
   TransferIntegral lowest_entry, highest_entry;  ///< what holds for each entry beyond the table's ends
+  ClearValues clear;
   const std::uint8_t* tints = nullptr;  ///< number of each voxel's colour, i fastest; 0: none; null: no voxel has one
   const TransferEntry* tint_colours = nullptr;  ///< 256: `opacity` of the colour is mixed to what is seen
 };
@@ -62,13 +70,13 @@ struct RayScene : RayFrame, RayTables, ray::RayVolume<V> {};
 /// The entry that a value would have if the table had no ends.
 TETWARP_INLINE_HD int endless_entry(const RayFrame& frame, float value) {
   constexpr float kFar = 4e6f;
-  const float entry = (value - frame.lowest) * frame.per_value + 0.5f;
+  const float entry = ray::fused(value - frame.lowest, frame.per_value, 0.5f);
   return static_cast<int>(std::floor(entry > -kFar ? (entry < kFar ? entry : kFar) : -kFar));
 }
 
 /// The entry of a value in the table.
 TETWARP_INLINE_HD int transfer_entry(const RayFrame& frame, float value) {
-  const float entry = (value - frame.lowest) * frame.per_value + 0.5f;
+  const float entry = ray::fused(value - frame.lowest, frame.per_value, 0.5f);
   return entry > 0 ? static_cast<int>(entry < kTransferEntries - 1 ? entry : kTransferEntries - 1) : 0;
 }
 
@@ -114,7 +122,9 @@ TETWARP_INLINE_HD float steps_to(const Span& span, int n) {
 
 template <class V>
 TETWARP_INLINE_HD glm::vec3 index_of(const RayScene<V>& scene, const Span& span, float steps) {
-  return span.origin + scene.step * steps;
+  glm::vec3 index;
+  for (int axis = 0; axis < 3; ++axis) index[axis] = fused(scene.step[axis], steps, span.origin[axis]);
+  return index;
 }
 
 template <class V>
@@ -145,47 +155,59 @@ TETWARP_INLINE_HD int behind(const RayScene<V>& scene, const Span& span, int n, 
   return next > n ? next : n + 1;
 }
 
-/// A colour with the light of Blinn and Phong on both sides of a surface. Where the value hardly changes there is no
-/// surface, and the colour stays as it is.
+/// 1 / sqrt(x) to 5e-6, of normal numbers above 0: two steps of Newton's method from a guess by halving the exponent.
+/// Roots and quotients would be slower on the device.
+TETWARP_INLINE_HD float inverse_root(float x) {
+  const float half = 0.5f * x;
+  float root = std::bit_cast<float>(0x5f375a86 - (std::bit_cast<int>(x) >> 1));
+  for (int step = 0; step < 2; ++step) root *= fused(-half * root, root, 1.5f);
+  return root;
+}
+
+/// What light does to a colour: it is multiplied by `factor`, and `added` is added to each channel.
+struct Shade {
+  float factor = 1, added = 0;
+};
+
+/// The light of Blinn and Phong on both sides of a surface. Where the value hardly changes there is no surface, and
+/// the colour stays as it is.
 template <class V>
-TETWARP_INLINE_HD glm::vec3 lit(const RayScene<V>& scene, const glm::vec3& colour, const glm::vec3& index) {
-  const glm::vec3 slope = scene.to_gradient * differences_at<V>(scene, place_among(scene.size, index));
-  const float steepness = std::sqrt(dot(slope, slope));
-  if (!(steepness > 0)) return colour;
-  const float inverse = 1 / steepness;
+TETWARP_INLINE_HD Shade shade_at(const RayScene<V>& scene, const glm::vec3& index) {
+  const glm::vec3 differences = differences_at<V>(scene, place_among(scene.size, index));
+  glm::vec3 slope;
+  for (int axis = 0; axis < 3; ++axis) slope[axis] = dot(scene.to_gradient[axis], differences);
+  const float square = dot(slope, slope);
+  if (!(square > 0)) return {};
+  const float inverse = inverse_root(square);
   const float towards = std::abs(dot(slope, scene.light)) * inverse;
   float shine = std::abs(dot(slope, scene.halfway)) * inverse;
   for (int doubled = 0; doubled < 5; ++doubled) shine *= shine;  // to the power of 32
-  const float surface = smaller(steepness / scene.full_gradient, 1.0f);
-  const float factor = 1 + surface * (scene.ambient + scene.diffuse * towards - 1),
-              added = surface * scene.specular * shine;
-  return {colour.x * factor + added, colour.y * factor + added, colour.z * factor + added};
+  const float surface = smaller(square * inverse * scene.per_gradient, 1.0f);
+  return {fused(surface, fused(scene.diffuse, towards, scene.ambient - 1), 1), surface * scene.specular * shine};
 }
 
-/// Entries `low` to `high` of the table, both included, with the number of those that lie beyond its ends.
-struct EntryRange {
-  TETWARP_HD EntryRange(int low, int high)
-      : from(clamped(low, 0, kTransferEntries)),
-        to(clamped(high + 1, 0, kTransferEntries)),
-        below(static_cast<float>(larger(smaller(high + 1, 0) - low, 0))),
-        above(static_cast<float>(larger(high + 1 - larger(low, kTransferEntries), 0))) {}
-
-  /// The sum over these entries.
-  /// @param part  which member of the integrals
-  TETWARP_HD float sum(const RayTables& tables, float TransferIntegral::*part) const {
-    return tables.integrals[to].*part - tables.integrals[from].*part + tables.lowest_entry.*part * below +
-           tables.highest_entry.*part * above;
-  }
-
-  int from, to;  ///< entries of the table between which integrals are taken
-  /// Number of entries beyond the first and beyond the last entry of the table.
-  float below, above;
-};
+/// The sum of the integrals over all entries from `low` to `high`, both included; entries beyond the table's ends are
+/// those at its ends.
+TETWARP_INLINE_HD TransferIntegral sum_over(const RayTables& tables, int low, int high) {
+  const TransferIntegral from = tables.integrals[clamped(low, 0, kTransferEntries)],
+                         to = tables.integrals[clamped(high + 1, 0, kTransferEntries)];
+  TransferIntegral sum{to.red - from.red, to.green - from.green, to.blue - from.blue, to.depth - from.depth};
+  const auto add = [&](const TransferIntegral& entry, int count) {
+    const auto times = static_cast<float>(count);
+    sum.red = fused(entry.red, times, sum.red);
+    sum.green = fused(entry.green, times, sum.green);
+    sum.blue = fused(entry.blue, times, sum.blue);
+    sum.depth = fused(entry.depth, times, sum.depth);
+  };
+  if (low < 0 && tables.lowest_entry.depth > 0) add(tables.lowest_entry, smaller(high + 1, 0) - low);
+  if (high >= kTransferEntries) add(tables.highest_entry, high + 1 - larger(low, kTransferEntries));
+  return sum;
+}
 
 /// exp(-depth) to 1e-4, by operations that round alike on every backend.
 TETWARP_INLINE_HD float transmitted(float depth) {
   const float t = depth * 0.125f;
-  const float e = 1 + t * (1 + t * (0.5f + t * (1.0f / 6 + t * (1.0f / 24))));
+  const float e = fused(t, fused(t, fused(t, fused(t, 1.0f / 24, 1.0f / 6), 0.5f), 1), 1);
   const float squared = e * e, fourth = squared * squared;
   return 1 / (fourth * fourth);
 }
@@ -203,45 +225,68 @@ TETWARP_INLINE_HD glm::vec3 tinted(const RayScene<V>& scene, const glm::vec3& co
   return colour + (glm::vec3(added.red, added.green, added.blue) - colour) * added.opacity;
 }
 
+/// What is known of a sample.
+enum class Known : std::uint8_t {
+  nothing,  ///< it lies in an empty block, or before the ray
+  seen,     ///< its value may be seen
+  below,    ///< its value lies below those that are seen
+  between   ///< its value lies in the gap between values that are seen
+};
+
+TETWARP_INLINE_HD Known kind_of(const ClearValues& clear, float value) {
+  if (value < clear.below) return Known::below;
+  return value > clear.from && value < clear.to ? Known::between : Known::seen;
+}
+
 /// Adds up the pieces of a ray. In a piece all values between those of its two samples count alike, so that thin layers
 /// are not stepped over (pre-integration without attenuation within a piece, Engel 2001; as differences of integrals,
 /// Lum 2004).
+///
+/// The first sample behind an empty block has no piece: it lies at most a voxel behind it, so that its value is among
+/// those of that block (`BlockRange`), and nothing is seen between it and the sample before.
 template <class V>
 TETWARP_INLINE_HD glm::vec3 composite(const RayScene<V>& scene, const Span& span) {
+  if (span.begin == span.end) return scene.background;
   glm::vec3 colour(0);
-  float through = 1;
-  constexpr int kUnknown = -(1 << 30);
-  const auto entry_at = [&](const RayPlace& place) {
-    const float value = sample(scene, place);
-    return is_number<V>(value) ? endless_entry(scene, value) : kUnknown;
-  };
-  int before = kUnknown;  // entry of the sample before
-  for (int n = span.begin; n < span.end;) {
-    const glm::vec3 index = index_of(scene, span, steps_to(span, n));
-    const RayPlace place = place_among(scene.size, index);
+  float through = 1, before = 0;                 // `before` is the value of the sample before
+  Known known = Known::nothing;                  // of it
+  for (int n = span.begin - 1; n < span.end;) {  // from where the ray enters on
+    const float to = steps_to(span, n);
+    const RayPlace place = place_among(scene.size, index_of(scene, span, to));
     const glm::ivec3 block = block_of(place);
     if (const int empty = scene.distances[number_in(scene.blocks, block)]; empty > 0) {
       n = behind(scene, span, n, block, empty - 1);
-      before = kUnknown;
+      known = Known::nothing;
       continue;
     }
-    if (before == kUnknown) before = entry_at(place_among(scene.size, index_of(scene, span, steps_to(span, n - 1))));
     ++n;
-    const int entry = entry_at(place), low = smaller(before, entry), high = larger(before, entry);
-    before = entry;
-    if (low == kUnknown) continue;
-    const EntryRange range(low, high);
-    const float depth = range.sum(scene, &TransferIntegral::depth);
-    if (!(depth > 0)) continue;
-    glm::vec3 seen = glm::vec3(range.sum(scene, &TransferIntegral::red), range.sum(scene, &TransferIntegral::green),
-                               range.sum(scene, &TransferIntegral::blue)) *
-                     (1 / depth);
-    const float to = steps_to(span, n - 1), from = steps_to(span, n - 2);
-    const glm::vec3 middle = (index_of(scene, span, from) + index) * 0.5f;
-    if (scene.tints) seen = tinted(scene, seen, middle);
-    if (scene.full_gradient > 0) seen = lit(scene, seen, middle);
-    const float left = through * transmitted(depth * (to - from) / static_cast<float>(high - low + 1));
-    colour = colour + seen * (through - left);
+    const float value = sample(scene, place), last = before;
+    const Known was = known;
+    before = value;
+    known = kind_of(scene.clear, value);
+    if (was == Known::nothing || (was == known && was != Known::seen)) continue;  // no piece, or a clear one
+    if (!is_number<V>(last) || !is_number<V>(value)) continue;
+    const int low = endless_entry(scene, smaller(last, value)), high = endless_entry(scene, larger(last, value));
+    const TransferIntegral sum = sum_over(scene, low, high);
+    if (!(sum.depth > 0)) continue;
+    const float from = steps_to(span, n - 2), count = static_cast<float>(high - low + 1),
+                inverse = 1 / (sum.depth * count);
+    const float left = through * transmitted(sum.depth * sum.depth * inverse * (to - from));
+    glm::vec3 seen(sum.red, sum.green, sum.blue);
+    float share = count * inverse;  // of the sum: its colour
+    Shade shade;
+    if (scene.tints || scene.per_gradient > 0) {
+      const glm::vec3 middle = index_of(scene, span, 0.5f * (from + to));
+      if (scene.tints) {
+        seen = tinted(scene, seen * share, middle);
+        share = 1;
+      }
+      if (scene.per_gradient > 0) shade = shade_at(scene, middle);
+    }
+    const float weight = through - left;
+    const float times = weight * shade.factor * share, added = weight * shade.added;
+    for (int channel = 0; channel < 3; ++channel)
+      colour[channel] = fused(seen[channel], times, colour[channel] + added);
     through = left;
     if (through < 1 - kOpaque) break;
   }
@@ -285,7 +330,7 @@ TETWARP_INLINE_HD glm::vec3 integral(const RayScene<V>& scene, const Span& span)
     }
     ++n;
     const float value = sample(scene, place);
-    if (is_number<V>(value)) total += look_up(scene, value).opacity * (to - from);
+    if (is_number<V>(value)) total = fused(look_up(scene, value).opacity, to - from, total);
     from = to;
   }
   return scene.background + (glm::vec3(1) - scene.background) * smaller(total, 1.0f);

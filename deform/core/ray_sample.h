@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <type_traits>
 
@@ -23,7 +24,11 @@ TETWARP_INLINE_HD float clamped(float value, float low, float high) { return sma
 TETWARP_INLINE_HD int smaller(int a, int b) { return a < b ? a : b; }
 TETWARP_INLINE_HD int larger(int a, int b) { return a > b ? a : b; }
 TETWARP_INLINE_HD int clamped(int value, int low, int high) { return smaller(larger(value, low), high); }
-TETWARP_INLINE_HD float dot(const glm::vec3& a, const glm::vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+/// a b + c, rounded once: an instruction wherever there is one, and the same bits elsewhere.
+TETWARP_INLINE_HD float fused(float a, float b, float c) { return std::fma(a, b, c); }
+TETWARP_INLINE_HD float dot(const glm::vec3& a, const glm::vec3& b) {
+  return fused(a.z, b.z, fused(a.y, b.y, a.x * b.x));
+}
 
 /// Whether what was sampled among voxels of a type is a number: among whole numbers it always is.
 template <class V>
@@ -64,6 +69,21 @@ TETWARP_INLINE_HD std::int64_t wide_product(int a, int b) {
 /// @param size  elements on each axis; a slice has fewer than 2^31
 TETWARP_INLINE_HD std::int64_t number_in(const glm::ivec3& size, const glm::ivec3& element) {
   return wide_product(element.z * size.y + element.y, size.x) + element.x;
+}
+
+/// In which voxels are subtracted: int where it holds all differences, else float.
+template <class V>
+using RayNumber = std::conditional_t<std::is_integral_v<V> && sizeof(V) <= 2, int, float>;
+
+/// A voxel as a number to be subtracted. On the device a word is converted to float faster than half of one, and
+/// compilers are kept from seeing that it is half of one.
+template <class V>
+TETWARP_INLINE_HD RayNumber<V> number_of(const V& voxel) {
+  auto number = static_cast<RayNumber<V>>(voxel);
+#ifdef TETWARP_ON_DEVICE
+  if constexpr (std::is_same_v<RayNumber<V>, int>) asm("" : "+r"(number));
+#endif
+  return number;
 }
 
 /// The voxels of a volume, i fastest.
@@ -112,15 +132,16 @@ TETWARP_INLINE_HD EightVoxels<V> inner_voxels_at(const RayVolume<V>& volume, con
 
 template <class V>
 TETWARP_INLINE_HD float between(const V& a, const V& b, float share) {
-  const float from = static_cast<float>(a);
-  return from + (static_cast<float>(b) - from) * share;
+  const RayNumber<V> from = number_of(a);
+  return fused(static_cast<float>(number_of(b) - from), share, static_cast<float>(from));
 }
 
 /// Linear between the four corners of a side; `at` gives the value of one.
 template <class At>
 TETWARP_INLINE_HD float over_side(const At& at, int right, int up, float share_right, float share_up) {
-  const float low = at(0) + (at(right) - at(0)) * share_right, high = at(up) + (at(up + right) - at(up)) * share_right;
-  return low + (high - low) * share_up;
+  const float low = fused(at(right) - at(0), share_right, at(0)),
+              high = fused(at(up + right) - at(up), share_right, at(up));
+  return fused(high - low, share_up, low);
 }
 
 /// The value at the place, linear between voxels.
@@ -140,8 +161,8 @@ TETWARP_INLINE_HD float value_at(const RayVolume<V>& volume, const RayPlace& pla
   return inner ? value_in(inner_voxels_at(volume, place)) : value_in(voxels_at(volume, place));
 }
 
-/// Central differences at the place: half the difference of the values one voxel further and one voxel before, along
-/// each axis, linear between voxels.
+/// Differences at the place: of the values one voxel further and one voxel before, along each axis, linear between
+/// voxels.
 template <class V>
 TETWARP_INLINE_HD glm::vec3 differences_in(const EightVoxels<V>& eight) {
   glm::vec3 difference;
@@ -149,12 +170,11 @@ TETWARP_INLINE_HD glm::vec3 differences_in(const EightVoxels<V>& eight) {
     const int right = axis == 0 ? 1 : 0, up = axis == 2 ? 1 : 2;
     const auto along = [&](int offset) {
       const V* const v = eight.corner + offset;
-      const float here = static_cast<float>(v[eight.next[axis]]) - static_cast<float>(v[-eight.before[axis]]),
-                  there = static_cast<float>(v[eight.beyond[axis]]) - static_cast<float>(v[0]);
-      return here + (there - here) * eight.fraction[axis];
+      const RayNumber<V> here = number_of(v[eight.next[axis]]) - number_of(v[-eight.before[axis]]),
+                         change = number_of(v[eight.beyond[axis]]) - number_of(v[0]) - here;
+      return fused(static_cast<float>(change), eight.fraction[axis], static_cast<float>(here));
     };
-    difference[axis] =
-        0.5f * over_side(along, eight.next[right], eight.next[up], eight.fraction[right], eight.fraction[up]);
+    difference[axis] = over_side(along, eight.next[right], eight.next[up], eight.fraction[right], eight.fraction[up]);
   }
   return difference;
 }

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
+#include <hwy/targets.h>
 #include <tbb/parallel_for.h>
 
 #include <atomic>
@@ -80,10 +81,35 @@ void CpuRenderer::prepare(const RayFrame& frame, double step) {
   if (distances_.empty()) distances_ = block_distances(ranges_, ray_blocks(geometry_), frame, table_);
 }
 
+/// Casts the rays of a row of pixels.
+/// @param rgb  of the first pixel
+template <class V>
+[[gnu::always_inline]] inline void cast_row(const RayScene<V>& scene, int left, int right, int y, std::uint8_t* rgb) {
+  for (int x = left; x < right; ++x, rgb += 3) {
+    const RayColour colour = cast_ray(scene, x, y);
+    rgb[0] = colour.red;
+    rgb[1] = colour.green;
+    rgb[2] = colour.blue;
+  }
+}
+
+// The same with an instruction for `fused`, where the compiler may not take it for granted.
+#if defined(__x86_64__) && !defined(__FMA__)
+constexpr bool kHasFastRow = true;
+template <class V>
+[[gnu::target("avx2,fma")]] void cast_fast_row(const RayScene<V>& scene, int left, int right, int y,
+                                               std::uint8_t* rgb) {
+  cast_row(scene, left, right, y, rgb);
+}
+#else
+constexpr bool kHasFastRow = false;
+#endif
+
 template <class V>
 void CpuRenderer::cast_all(const RayScene<V>& scene, const ViewPlane& plane, std::uint8_t* rgb,
                            const Control& control) const {
   const int columns = (plane.width + kPatch - 1) / kPatch, rows = (plane.height + kPatch - 1) / kPatch;
+  const bool is_fast = kHasFastRow && (hwy::SupportedTargets() & HWY_AVX2) != 0;
   std::atomic<bool> stopped = false;
   tbb::parallel_for(0, columns * rows, [&](int patch) {
     if (stopped || control.stop.stop_requested()) {
@@ -92,14 +118,16 @@ void CpuRenderer::cast_all(const RayScene<V>& scene, const ViewPlane& plane, std
     }
     const int left = patch % columns * kPatch, top = patch / columns * kPatch;
     for (int y = top; y < std::min(top + kPatch, plane.height); ++y) {
-      for (int x = left; x < std::min(left + kPatch, plane.width); ++x) {
-        const RayColour colour = cast_ray(scene, x, y);
-        std::uint8_t* const pixel = rgb + 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(plane.width) +
-                                               static_cast<std::size_t>(x));
-        pixel[0] = colour.red;
-        pixel[1] = colour.green;
-        pixel[2] = colour.blue;
+      const int right = std::min(left + kPatch, plane.width);
+      std::uint8_t* const pixels = rgb + 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(plane.width) +
+                                              static_cast<std::size_t>(left));
+      if constexpr (kHasFastRow) {
+        if (is_fast) {
+          cast_fast_row(scene, left, right, y, pixels);
+          continue;
+        }
       }
+      cast_row(scene, left, right, y, pixels);
     }
   });
   if (stopped) throw Cancelled();
@@ -111,9 +139,9 @@ void CpuRenderer::render(const ViewPlane& plane, std::span<std::uint8_t> rgb, co
   cpu::Arena arena(limits_);
   arena.execute([&] {
     prepare(frame, step_mm(geometry_, style_, plane));
-    const RayTables tables{ranges_.data(),           distances_.data(), ray_blocks(geometry_), table_.data(),
-                           integrals_.before.data(), integrals_.lowest, integrals_.highest,    tint_numbers_,
-                           tint_colours_.data()};
+    const RayTables tables{
+        ranges_.data(),    distances_.data(),  ray_blocks(geometry_),       table_.data(), integrals_.before.data(),
+        integrals_.lowest, integrals_.highest, clear_values(table_, frame), tint_numbers_, tint_colours_.data()};
     dispatch(volume_.type, [&](auto voxel) {
       using V = decltype(voxel);
       const auto* const voxels = reinterpret_cast<const V*>(volume_.voxels);

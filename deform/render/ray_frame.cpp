@@ -7,6 +7,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <limits>
 
 namespace tetwarp {
 
@@ -103,16 +104,39 @@ RayFrame ray_frame(const Geometry& volume, const RenderStyle& style, const ViewP
     if (!goes) frame.step[axis] = 0;
     frame.per_step[axis] = goes ? 1 / frame.step[axis] : 0;
   }
-  frame.to_gradient = glm::transpose(index.linear);
+  frame.to_gradient = index.linear * 0.5;
   const glm::dvec3 light = glm::normalize(-plane.forward - 0.35 * plane.right - 0.5 * plane.down);
   frame.light = light;
   frame.halfway = glm::normalize(light - plane.forward);
   frame.ambient = static_cast<float>(transfer.ambient);
   frame.diffuse = static_cast<float>(transfer.diffuse);
   frame.specular = static_cast<float>(transfer.specular);
-  frame.full_gradient = static_cast<float>(transfer.gradient);
+  frame.per_gradient = transfer.gradient > 0 ? static_cast<float>(1 / transfer.gradient) : 0;
   frame.background = style.background;
   return frame;
+}
+
+ClearValues clear_values(const std::vector<TransferEntry>& table, const RayFrame& frame) {
+  constexpr float kNever = std::numeric_limits<float>::infinity();
+  const auto value = [&](int entry) { return frame.lowest + static_cast<float>(entry) / frame.per_value; };
+  const auto run_from = [&](int first) {  // the end of the run of clear entries that begins there
+    int end = first;
+    while (end < kTransferEntries && table[static_cast<std::size_t>(end)].opacity == 0) ++end;
+    return end;
+  };
+  const int below = run_from(0);
+  ClearValues clear{below > 0 ? value(below - 1) : -kNever, kNever, kNever};
+  int most = 0;
+  for (int first = below; first < kTransferEntries;) {
+    const int end = run_from(first);
+    if (end - first > most) {
+      most = end - first;
+      clear.from = value(first);
+      clear.to = end == kTransferEntries ? kNever : value(end - 1);
+    }
+    first = std::max(end, first + 1);
+  }
+  return clear;
 }
 
 std::vector<TransferEntry> transfer_table(const TransferFunction& transfer, double step_mm) {

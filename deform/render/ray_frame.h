@@ -35,6 +35,10 @@ std::vector<TransferEntry> tint_table(const Tints& tints);
 /// the opacity of 1 mm, which only tells what can be seen at all.
 std::vector<TransferEntry> transfer_table(const TransferFunction& transfer, double step_mm);
 
+/// Values that have no opacity: those below all that have it, and those of the longest run of clear entries between.
+/// @param table  see `transfer_table`
+ClearValues clear_values(const std::vector<TransferEntry>& table, const RayFrame& frame);
+
 /// Integrals of a transfer function for Projection::composite: for each entry the sum over all entries before it
 /// (kTransferEntries + 1 sums), and the first and the last entry alone.
 struct TransferIntegrals {
