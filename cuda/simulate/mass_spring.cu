@@ -21,6 +21,7 @@ class CudaMachine {
  public:
   static constexpr Memory kMemory = Memory::device;
   static constexpr bool kReadsLinks = true;
+  static constexpr std::size_t kNumbersOfVector = 4;  ///< of a Quad
   template <class T>
   using Buffer = DeviceBuffer<T>;
 

@@ -16,7 +16,7 @@ namespace {
 
 /// Threads of a block: one a node whose sum is made with it.
 constexpr int kBlock = kSumBlock;
-constexpr int kCrewPerProcessor = 3;  ///< blocks of `solve_kernel`
+constexpr int kCrewPerProcessor = 4;  ///< blocks of `solve_kernel`
 
 /// Calls a sweep for every node; a thread a node.
 ///
@@ -93,9 +93,9 @@ class SpringCrew {
     });
     wait();
     each([&](std::size_t n) {
-      sweeps::Inverses::at(a_, n);
+      sweeps::Inverses::at(a_, task.kind, n);
       if (task.follows) {
-        sweeps::PlacedForces::at(a_, n);
+        sweeps::PlacedForces::at(a_, task.kind, n);
       } else {
         sweeps::Forces::at(a_, n);
       }
@@ -105,10 +105,9 @@ class SpringCrew {
     by_first([&] { sweeps::AfterBegin{&state_, task.effort}(rz); });
   }
 
-  __device__ void iterate(int times) {
-    wait();  // for p of all
+  __device__ void iterate(Stiffness kind, int times) {
     for (int n = 0; n < times && !state_.is_done; ++n) {
-      const Sum curvature = total([&](std::size_t node) { return sweeps::Bend::at(a_, node); }, of_block_);
+      const Sum curvature = total([&](std::size_t node) { return sweeps::Bend::at(a_, kind, node); }, of_block_);
       by_first([&] { sweeps::AfterBend{&state_}(curvature); });
       if (state_.is_done) return;
       const Sum next = total(
@@ -186,7 +185,7 @@ __global__ void __launch_bounds__(kBlock, kCrewPerProcessor)
   } else {
     crew.set_up(task);
   }
-  crew.iterate(task.times);
+  crew.iterate(task.kind, task.times);
   if (state.is_done || task.ends) crew.conclude(task.follows);
   if (blockIdx.x == 0 && threadIdx.x == 0) *a.state = state;
 }

@@ -88,6 +88,7 @@ void pulls(const SpringGrid& grid, NodeRange range, const SpringArrays& a, doubl
   }
 }
 
+/// @param kind  not `laplacian`, for which no matrices are kept
 void matrices(const SpringGrid& grid, NodeRange range, const SpringArrays& a, Stiffness kind) {
   const Doubles d;
   const Halves df;
@@ -96,7 +97,6 @@ void matrices(const SpringGrid& grid, NodeRange range, const SpringArrays& a, St
       const Springs springs(a.rest[up + kUp], a.u, n, a.distance[up + kUp]);
       const auto k = hn::PromoteTo(d, hn::LoadU(df, grid.constants(up) + n));
       auto t = hn::Div(springs.elongation, springs.length);
-      if (kind == Stiffness::laplacian) t = hn::Set(d, 1.0);
       if (kind == Stiffness::projected) t = hn::Max(t, hn::Zero(d));
       const auto even = hn::Mul(k, t);
       const auto root = hn::Div(hn::Sqrt(hn::Max(hn::Sub(k, even), hn::Zero(d))), springs.length);
@@ -133,6 +133,22 @@ void matrix_sums(NodeRange range, const SpringArrays& a, const NodeMatrices& sum
   }
 }
 
+/// `matrix_sums` of springs that keep their directions.
+void constant_sums(const SpringGrid& grid, NodeRange range, const SpringArrays& a, const NodeMatrices& sums) {
+  const Floats d;
+  for (std::size_t n = range.begin; n < range.end; n += hn::Lanes(d)) {
+    auto sum = hn::Zero(d);
+    for (int direction = 0; direction < kDirections; ++direction) {
+      const LinkSide way(a, direction);
+      sum = hn::Add(sum, hn::LoadU(d, grid.constants(way.up) + n + way.kept));
+    }
+    for (std::size_t e = 0; e < NodeMatrices::kEntries; ++e) {
+      const bool is_diagonal = e == 0 || e == 3 || e == 5;
+      hn::StoreU(is_diagonal ? sum : hn::Zero(d), d, sums.entry(e) + (n - range.begin));
+    }
+  }
+}
+
 /// Sums, over the regular links of each node, of the link's matrix times p of the node minus that of the neighbour.
 void product(NodeRange range, const SpringArrays& a, const NodeVectors<float>& result) {
   const Floats d;
@@ -151,6 +167,27 @@ void product(NodeRange range, const SpringArrays& a, const NodeVectors<float>& r
       sum_x = hn::Add(sum_x, hn::Add(hn::Mul(ax, along), hn::Mul(even, x)));
       sum_y = hn::Add(sum_y, hn::Add(hn::Mul(ay, along), hn::Mul(even, y)));
       sum_z = hn::Add(sum_z, hn::Add(hn::Mul(az, along), hn::Mul(even, z)));
+    }
+    hn::StoreU(sum_x, d, result.axis(0) + n);
+    hn::StoreU(sum_y, d, result.axis(1) + n);
+    hn::StoreU(sum_z, d, result.axis(2) + n);
+  }
+}
+
+/// `product` of springs that keep their directions.
+void constant_product(const SpringGrid& grid, NodeRange range, const SpringArrays& a,
+                      const NodeVectors<float>& result) {
+  const Floats d;
+  for (std::size_t n = range.begin; n < range.end; n += hn::Lanes(d)) {
+    const auto own_x = hn::LoadU(d, a.p.axis(0) + n), own_y = hn::LoadU(d, a.p.axis(1) + n),
+               own_z = hn::LoadU(d, a.p.axis(2) + n);
+    auto sum_x = hn::Zero(d), sum_y = hn::Zero(d), sum_z = hn::Zero(d);
+    for (int direction = 0; direction < kDirections; ++direction) {
+      const LinkSide way(a, direction);
+      const auto even = hn::LoadU(d, grid.constants(way.up) + n + way.kept);
+      sum_x = hn::Add(sum_x, hn::Mul(even, hn::Sub(own_x, hn::LoadU(d, a.p.axis(0) + n + way.distance))));
+      sum_y = hn::Add(sum_y, hn::Mul(even, hn::Sub(own_y, hn::LoadU(d, a.p.axis(1) + n + way.distance))));
+      sum_z = hn::Add(sum_z, hn::Mul(even, hn::Sub(own_z, hn::LoadU(d, a.p.axis(2) + n + way.distance))));
     }
     hn::StoreU(sum_x, d, result.axis(0) + n);
     hn::StoreU(sum_y, d, result.axis(1) + n);
@@ -222,7 +259,9 @@ namespace tetwarp::simulate {
 HWY_EXPORT(pulls);
 HWY_EXPORT(matrices);
 HWY_EXPORT(matrix_sums);
+HWY_EXPORT(constant_sums);
 HWY_EXPORT(product);
+HWY_EXPORT(constant_product);
 HWY_EXPORT(dots);
 HWY_EXPORT(descend);
 HWY_EXPORT(next_direction);
@@ -243,8 +282,13 @@ Stretched<double> odd_spring(const SpringArrays& a, const OddLink& link, const N
 }
 
 /// Sets `result` to the sums of Bend over all links.
-void whole_product(const SpringGrid& grid, NodeRange range, const SpringArrays& a, const NodeVectors<float>& result) {
-  HWY_DYNAMIC_DISPATCH(product)(range, a, result);
+void whole_product(const SpringGrid& grid, NodeRange range, const SpringArrays& a, Stiffness kind,
+                   const NodeVectors<float>& result) {
+  if (kind == Stiffness::laplacian) {
+    HWY_DYNAMIC_DISPATCH(constant_product)(grid, range, a, result);
+  } else {
+    HWY_DYNAMIC_DISPATCH(product)(range, a, result);
+  }
   for_odd_links(grid, range, [&](const OddLink& link, std::size_t number) {
     const glm::vec3 share = grid.odd_matrix[number] * (a.p[link.node] - a.p[link.other]);
     result.set(link.node, result[link.node] + share);
@@ -264,7 +308,7 @@ void give_dots(NodeRange range, const SpringArrays& a, const NodeVectors<float>&
 }  // namespace
 
 void sweep(SpringGrid& grid, NodeRange range, const sweeps::Matrices& matrices) {
-  HWY_DYNAMIC_DISPATCH(matrices)(grid, range, matrices.a, matrices.kind);
+  if (matrices.kind != Stiffness::laplacian) HWY_DYNAMIC_DISPATCH(matrices)(grid, range, matrices.a, matrices.kind);
   for_odd_links(grid, range, [&](const OddLink& link, std::size_t number) {
     grid.odd_matrix[number] =
         spring_matrix(odd_spring(matrices.a, link, matrices.a.u), double{link.stiffness}, matrices.kind);
@@ -274,7 +318,11 @@ void sweep(SpringGrid& grid, NodeRange range, const sweeps::Matrices& matrices) 
 void sweep(const SpringGrid& grid, NodeRange range, const sweeps::Inverses& inverses) {
   float room[NodeMatrices::kEntries * SpringGrid::kBlock];
   const NodeMatrices sums{room, SpringGrid::kBlock};
-  HWY_DYNAMIC_DISPATCH(matrix_sums)(range, inverses.a, sums);
+  if (inverses.kind == Stiffness::laplacian) {
+    HWY_DYNAMIC_DISPATCH(constant_sums)(grid, range, inverses.a, sums);
+  } else {
+    HWY_DYNAMIC_DISPATCH(matrix_sums)(range, inverses.a, sums);
+  }
   for_odd_links(grid, range, [&](const OddLink& link, std::size_t number) {
     Symmetric<float> sum = sums[link.node - range.begin];
     sum = sum + grid.odd_matrix[number].full();
@@ -284,12 +332,12 @@ void sweep(const SpringGrid& grid, NodeRange range, const sweeps::Inverses& inve
 }
 
 void sweep(const SpringGrid& grid, NodeRange range, const sweeps::PlacedForces& forces) {
-  whole_product(grid, range, forces.a, forces.a.r);
+  whole_product(grid, range, forces.a, forces.kind, forces.a.r);
   for (std::size_t n = range.begin; n < range.end; ++n) forces.finish(forces.a, n, forces.a.r[n]);
 }
 
 void sweep(const SpringGrid& grid, NodeRange range, const sweeps::Bend& bend, Sum* sums) {
-  whole_product(grid, range, bend.a, bend.a.q);
+  whole_product(grid, range, bend.a, bend.kind, bend.a.q);
   give_dots(range, bend.a, bend.a.p, bend.a.q, sums);
 }
 

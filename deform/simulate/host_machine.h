@@ -16,6 +16,7 @@ template <std::size_t kSlack>
 class HostMachine {
  public:
   static constexpr Memory kMemory = Memory::host;
+  static constexpr std::size_t kNumbersOfVector = 3;
 
   template <class T>
   class Buffer {

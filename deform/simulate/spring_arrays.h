@@ -11,13 +11,28 @@
 
 namespace tetwarp::simulate {
 
-/// A vector for each node, the components apart: x of node n at data[n], y at data[stride + n], z at data[2 stride +
-/// n].
+/// What a device reads of a node at once.
+template <class T>
+struct alignas(16) Quad {
+  T x, y, z, w;
+};
+
+/// A vector for each node. In host memory the components are apart, for the CPU's vectors: x of node n at data[n], y at
+/// data[stride + n], z at data[2 stride + n]. On a device they are the first of a Quad.
 template <class T>
 struct NodeVectors {
   T* data = nullptr;
   std::size_t stride = 0;
 
+#ifdef TETWARP_ON_DEVICE
+  TETWARP_HD glm::vec<3, T> operator[](std::size_t n) const {
+    const Quad<T> v = reinterpret_cast<const Quad<T>*>(data)[n];
+    return {v.x, v.y, v.z};
+  }
+  TETWARP_HD void set(std::size_t n, const glm::vec<3, T>& v) const {
+    reinterpret_cast<Quad<T>*>(data)[n] = {v.x, v.y, v.z, 0};
+  }
+#else
   TETWARP_HD T* axis(std::size_t a) const { return data + a * stride; }
   TETWARP_HD glm::vec<3, T> operator[](std::size_t n) const {
     return {data[n], data[stride + n], data[2 * stride + n]};
@@ -25,6 +40,7 @@ struct NodeVectors {
   TETWARP_HD void set(std::size_t n, const glm::vec<3, T>& v) const {
     data[n] = v.x, data[stride + n] = v.y, data[2 * stride + n] = v.z;
   }
+#endif
 };
 
 /// A symmetric matrix for each node, the entries apart in the order of Symmetric.
@@ -44,12 +60,21 @@ struct NodeMatrices {
 };
 
 /// The matrix of the link up from each node in each direction kUp + up: the entries across.x, across.y, across.z and
-/// even apart.
+/// even, apart in host memory, a Quad on a device.
 struct LinkMatrices {
   static constexpr std::size_t kEntries = 4;
   float* data = nullptr;
   std::size_t stride = 0;
 
+#ifdef TETWARP_ON_DEVICE
+  TETWARP_HD SpringMatrix<float> get(std::size_t up, std::size_t n) const {
+    const Quad<float> m = reinterpret_cast<const Quad<float>*>(data)[up * stride + n];
+    return {{m.x, m.y, m.z}, m.w};
+  }
+  TETWARP_HD void set(std::size_t up, std::size_t n, const SpringMatrix<float>& m) const {
+    reinterpret_cast<Quad<float>*>(data)[up * stride + n] = {m.across.x, m.across.y, m.across.z, m.even};
+  }
+#else
   TETWARP_HD float* entry(std::size_t up, std::size_t e) const { return data + (kEntries * up + e) * stride; }
   TETWARP_HD SpringMatrix<float> get(std::size_t up, std::size_t n) const {
     return {{entry(up, 0)[n], entry(up, 1)[n], entry(up, 2)[n]}, entry(up, 3)[n]};
@@ -57,6 +82,7 @@ struct LinkMatrices {
   TETWARP_HD void set(std::size_t up, std::size_t n, const SpringMatrix<float>& m) const {
     entry(up, 0)[n] = m.across.x, entry(up, 1)[n] = m.across.y, entry(up, 2)[n] = m.across.z, entry(up, 3)[n] = m.even;
   }
+#endif
 };
 
 /// The state of conjugate gradients between sweeps, in the machine's memory.
@@ -112,9 +138,10 @@ struct SpringArrays {
   TETWARP_HD std::int32_t other(int direction, std::size_t n) const {
     return neighbour[static_cast<std::size_t>(direction) * nodes + n];
   }
-  TETWARP_HD double constant(int direction, std::size_t n) const {
-    return double{stiffness[static_cast<std::size_t>(direction) * nodes + n]};
+  TETWARP_HD float stiffness_of(int direction, std::size_t n) const {
+    return stiffness[static_cast<std::size_t>(direction) * nodes + n];
   }
+  TETWARP_HD double constant(int direction, std::size_t n) const { return double{stiffness_of(direction, n)}; }
   /// The matrix of the link to a neighbour. It is kept at the lower end of the link.
   TETWARP_HD SpringMatrix<float> of_link(int direction, std::size_t n, std::int32_t to) const {
     return direction >= kUp

@@ -37,9 +37,9 @@ T sum_of_blocks(std::span<const T> of_block) {
 
 /// Iterations of conjugate gradients, up to so many, until they are done. For machines in host memory.
 template <class Machine>
-void iterate_gradients(Machine& machine, const SpringArrays& a, int times) {
+void iterate_gradients(Machine& machine, const SpringArrays& a, Stiffness kind, int times) {
   for (int n = 0; n < times && !a.state->is_done; ++n) {
-    machine.template sum<Sum>(a.nodes, sweeps::Bend{{a}}, sweeps::AfterBend{a.state});
+    machine.template sum<Sum>(a.nodes, sweeps::Bend{{a}, kind}, sweeps::AfterBend{a.state});
     if (a.state->is_done) return;
     machine.template sum<Sum>(a.nodes, sweeps::Descend{{a}}, sweeps::AfterDescend{a.state});
     if (a.state->is_done) return;
@@ -54,15 +54,15 @@ void solve_part(Machine& machine, const SpringArrays& a, const SolveTask& task) 
   if (!task.resumes) {
     if (task.follows) machine.each(a.nodes, sweeps::PlacedMotion{{a}});
     machine.each(a.nodes, sweeps::Matrices{{a}, task.kind});
-    machine.each(a.nodes, sweeps::Inverses{{a}});
+    machine.each(a.nodes, sweeps::Inverses{{a}, task.kind});
     if (task.follows) {
-      machine.each(a.nodes, sweeps::PlacedForces{{a}});
+      machine.each(a.nodes, sweeps::PlacedForces{{a}, task.kind});
     } else {
       machine.each(a.nodes, sweeps::Forces{{a}});
     }
     machine.template sum<Sum>(a.nodes, sweeps::Begin{{a}}, sweeps::AfterBegin{a.state, task.effort});
   }
-  iterate_gradients(machine, a, task.times);
+  iterate_gradients(machine, a, task.kind, task.times);
   if (!a.state->is_done && !task.ends) return;
   if (task.follows) {
     machine.each(a.nodes, sweeps::Follow{{a}});
@@ -79,6 +79,7 @@ void solve_part(Machine& machine, const SpringArrays& a, const SolveTask& task) 
 ///
 ///     template <class T> class Buffer;           // reserve(size), data()
 ///     kReadsLinks;                               // whether it calls sweeps that read the table of links
+///     kNumbersOfVector;                          // that NodeVectors has in its memory
 ///     std::size_t padding();                     // numbers that vectors have before the first node and after the last
 ///     scope();                                   // what it returns holds while the machine is used
 ///     each(nodes, sweep);                        // sweep(n) for every node
@@ -112,9 +113,9 @@ class SpringSolver final : public SpringEngine {
     }
     NodeVectors<double>* const doubles[] = {&a_.u,         &a_.trial,   &a_.start, &a_.goal,       &a_.load,
                                             &a_.load_from, &a_.load_to, &a_.force, &a_.trial_force};
-    for (std::size_t i = 0; i < std::size(doubles); ++i) zeros(*doubles[i], doubles_[i], 3);
+    for (std::size_t i = 0; i < std::size(doubles); ++i) zeros(*doubles[i], doubles_[i], Machine::kNumbersOfVector);
     NodeVectors<float>* const floats[] = {&a_.x, &a_.r, &a_.z, &a_.p, &a_.q};
-    for (std::size_t i = 0; i < std::size(floats); ++i) zeros(*floats[i], floats_[i], 3);
+    for (std::size_t i = 0; i < std::size(floats); ++i) zeros(*floats[i], floats_[i], Machine::kNumbersOfVector);
     zeros(a_.matrix, matrix_, LinkMatrices::kEntries * kUp);
     zeros(a_.inverse, inverse_, NodeMatrices::kEntries);
     a_.shown = hold(shown_, std::vector<glm::vec3>(nodes_, glm::vec3(0)));

@@ -84,11 +84,28 @@ struct PlacedMotion : Sweep {
   TETWARP_HD void operator()(std::size_t n) const { at(a, n); }
 };
 
+/// The matrix of a spring that keeps its direction, a multiple of one: a SpringMatrix with nothing across.
+struct EvenSpring {
+  float even;
+  TETWARP_HD glm::vec3 operator*(const glm::vec3& v) const { return even * v; }
+  TETWARP_HD Symmetric<float> full() const { return {even, 0, 0, even, 0, even}; }
+};
+
+/// Calls `work(matrix)`, where `matrix(d, n, to)` is that of a link. Of springs that keep their directions the constant
+/// is all there is to it, and no other matrix is kept.
+template <class Work>
+TETWARP_HD auto with_matrices(const SpringArrays& a, Stiffness kind, const Work& work) {
+  if (kind == Stiffness::laplacian)
+    return work([&](int d, std::size_t n, std::int32_t) { return EvenSpring{a.stiffness_of(d, n)}; });
+  return work([&](int d, std::size_t n, std::int32_t to) { return a.of_link(d, n, to); });
+}
+
 /// Computes the matrices of the links up from a node, with springs where they are now.
 struct Matrices : Sweep {
   Stiffness kind;
   TETWARP_HD void operator()(std::size_t n) const { at(a, kind, n); }
   TETWARP_HD static void at(const SpringArrays& a, Stiffness kind, std::size_t n) {
+    if (kind == Stiffness::laplacian) return;
     const glm::dvec3 u = a.u[n];
     for (int d = kUp; d < kDirections; ++d) {
       const std::int32_t to = a.other(d, n);
@@ -101,11 +118,15 @@ struct Matrices : Sweep {
 
 /// Inverts each free node's sum of matrices.
 struct Inverses : Sweep {
-  TETWARP_HD void operator()(std::size_t n) const { at(a, n); }
-  TETWARP_HD static void at(const SpringArrays& a, std::size_t n) {
+  Stiffness kind;
+  TETWARP_HD void operator()(std::size_t n) const { at(a, kind, n); }
+  TETWARP_HD static void at(const SpringArrays& a, Stiffness kind, std::size_t n) {
     Symmetric<float> sum{};
-    if (a.is_free(n))
-      sum = a.sum_links<Symmetric<float>>(n, [&](int d, std::int32_t to) { return a.of_link(d, n, to).full(); });
+    if (a.is_free(n)) {
+      sum = with_matrices(a, kind, [&](const auto& matrix) {
+        return a.sum_links<Symmetric<float>>(n, [&](int d, std::int32_t to) { return matrix(d, n, to).full(); });
+      });
+    }
     finish(a, n, sum);
   }
   TETWARP_HD static void finish(const SpringArrays& a, std::size_t n, const Symmetric<float>& sum) {
@@ -114,17 +135,20 @@ struct Inverses : Sweep {
 };
 
 /// The sum over a node's links of the link's matrix times the node's vector p minus the neighbour's.
-TETWARP_HD inline glm::vec3 product(const SpringArrays& a, std::size_t n) {
+TETWARP_HD inline glm::vec3 product(const SpringArrays& a, Stiffness kind, std::size_t n) {
   const glm::vec3 own = a.p[n];
-  return a.sum_links<glm::vec3>(
-      n, [&](int d, std::int32_t to) { return a.of_link(d, n, to) * (own - a.p[static_cast<std::size_t>(to)]); });
+  return with_matrices(a, kind, [&](const auto& matrix) {
+    return a.sum_links<glm::vec3>(
+        n, [&](int d, std::int32_t to) { return matrix(d, n, to) * (own - a.p[static_cast<std::size_t>(to)]); });
+  });
 }
 
 /// Sets r to the forces on free nodes if placed nodes alone went their way.
 struct PlacedForces : Sweep {
-  TETWARP_HD void operator()(std::size_t n) const { at(a, n); }
-  TETWARP_HD static void at(const SpringArrays& a, std::size_t n) {
-    finish(a, n, a.is_free(n) ? product(a, n) : glm::vec3(0));
+  Stiffness kind;
+  TETWARP_HD void operator()(std::size_t n) const { at(a, kind, n); }
+  TETWARP_HD static void at(const SpringArrays& a, Stiffness kind, std::size_t n) {
+    finish(a, n, a.is_free(n) ? product(a, kind, n) : glm::vec3(0));
   }
   TETWARP_HD static void finish(const SpringArrays& a, std::size_t n, const glm::vec3& q) {
     a.r.set(n, a.is_free(n) ? -q : glm::vec3(0));
@@ -156,10 +180,11 @@ struct AfterBegin {
 
 /// Sets q = A p, and sums the curvature p.q over free nodes. Elsewhere p is 0, and q is not used.
 struct Bend : Sweep {
-  TETWARP_HD Sum operator()(std::size_t n) const { return at(a, n); }
-  TETWARP_HD static Sum at(const SpringArrays& a, std::size_t n) {
+  Stiffness kind;
+  TETWARP_HD Sum operator()(std::size_t n) const { return at(a, kind, n); }
+  TETWARP_HD static Sum at(const SpringArrays& a, Stiffness kind, std::size_t n) {
     if (!a.is_free(n)) return {};
-    const glm::vec3 q = product(a, n);
+    const glm::vec3 q = product(a, kind, n);
     a.q.set(n, q);
     return {dot3(in_double(a.p[n]), in_double(q))};
   }
