@@ -15,7 +15,7 @@ void wake_device(int device) { wake_cuda_device(device); }
 
 std::string describe_device(int device) { return describe_cuda_device(device); }
 
-DeviceStream::DeviceStream(int device) : stream_(create_cuda_stream(device)) {}
+DeviceStream::DeviceStream(int device, Turn turn) : stream_(create_cuda_stream(device, turn == Turn::first)) {}
 
 DeviceStream::~DeviceStream() { destroy_cuda_stream(stream_); }
 

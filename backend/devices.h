@@ -27,10 +27,13 @@ std::string describe_device(int device);
 /// device. It must outlive the calls that it is given to.
 class DeviceStream {
  public:
+  /// Which kernels a device begins with where those of several streams wait.
+  enum class Turn : std::uint8_t { last, first };
+
   /// Makes a stream of the device with this number.
   /// @throws DeviceError without such a device
   /// @throws NotCompiled in a build without CUDA
-  explicit DeviceStream(int device);
+  explicit DeviceStream(int device, Turn turn = Turn::last);
   /// Destroys the stream.
   ~DeviceStream();
   DeviceStream(const DeviceStream&) = delete;

@@ -98,12 +98,13 @@ class FrameLoop::Implementation {
         deformation_(shown_, backend != BackendKind::cpu, [this](auto... given) { deform(given...); }) {
     for (Simulated& frame : simulated_) frame.displacement = simulate::make_displacement_copy(backend, device);
     if (backend == BackendKind::cpu) return;
-    simulating_.emplace(device);
-    deforming_.emplace(device);
-    drawing_.emplace(device);
+    simulating_.emplace(device, DeviceStream::Turn::first);
+    deforming_.emplace(device, DeviceStream::Turn::first);
+    drawing_.emplace(device);  // rays fill the device, and are not waited for by the frames after this
   }
   ~Implementation() {
     deformation_.request_stop();  // first: it may wait for a frame of the simulation that will not come
+    volume_was_read_.release();   // it may wait for this, too
     simulation_.request_stop();
   }
 
@@ -114,29 +115,36 @@ class FrameLoop::Implementation {
     if (!deformation_.has_begun(shown_)) deformation_.begin();
     deformation_.wait();
     ++shown_;
-    if (deformed_.failure) {
+    const Deformed frame = std::move(deformed_);
+    deformed_ = {};
+    if (frame.failure) {
       frames_ = shown_;  // the simulation cannot go on
-      std::rethrow_exception(deformed_.failure);
+      std::rethrow_exception(frame.failure);
     }
-    const simulate::FrameResult result = deformed_.result;
-    const Report report = deformed_.update.report;
+    if (deformation_.has_thread() && shown_ < frames_) deformation_.begin();
     const Control control = on(drawing_, {});
+    read_volume(frame.update.changed, control);
+    const std::span<std::uint8_t> rgb = room(3 * static_cast<std::size_t>(plane.width) * plane.height);
+    parts_.renderer.render(plane, rgb, control);
+    return {frame.result, frame.update.report, rgb};
+  }
+
+ private:
+  /// Has the renderer read what a frame changed; then the volume may be deformed for the next one, whatever is thrown.
+  void read_volume(std::span<const Region> changed, const Control& control) {
+    struct Release {
+      std::counting_semaphore<>& semaphore;
+      ~Release() { semaphore.release(); }
+    } const at_the_end{volume_was_read_};
     if (is_volume_set_) {
-      parts_.renderer.update_volume(deformed_.update.changed, control);
+      parts_.renderer.update_volume(changed, control);
     } else {
       parts_.renderer.set_volume(parts_.target.output, control);
       is_volume_set_ = true;
     }
-    if (deformation_.has_thread() && shown_ < frames_) {
-      drawing_->wait();  // the renderer has read the volume
-      deformation_.begin();
-    }
-    const std::span<std::uint8_t> rgb = room(3 * static_cast<std::size_t>(plane.width) * plane.height);
-    parts_.renderer.render(plane, rgb, control);
-    return {result, report, rgb};
+    if (drawing_) drawing_->wait();
   }
 
- private:
   static Control on(const std::optional<DeviceStream>& stream, const std::stop_token& stop) {
     return {.stop = stop, .stream = stream ? stream->get() : nullptr};
   }
@@ -167,6 +175,8 @@ class FrameLoop::Implementation {
       if (simulation_.has_thread() && number + 1 < all_frames_) simulation_.begin();
       const Control control = on(deforming_, stop);
       parts_.resampler.set_field(field_of(frame), {.jacobian_range = false}, control);
+      volume_was_read_.acquire();
+      if (stop.stop_requested()) return;
       deformed_.result = frame.result;
       deformed_.update = parts_.resampler.update({&parts_.target, 1}, control);
     } catch (...) {
@@ -195,10 +205,11 @@ class FrameLoop::Implementation {
   Parts parts_;
   Geometry lattice_;
   const int all_frames_;
-  int frames_, shown_;          ///< frames until the loop ends; and of them, shown
-  Simulated simulated_[2];      ///< frames by number: one is simulated while the volume is deformed by the other
-  Deformed deformed_;           ///< the frame that was deformed last
-  bool is_volume_set_ = false;  ///< in the renderer
+  int frames_, shown_;      ///< frames until the loop ends; and of them, shown
+  Simulated simulated_[2];  ///< frames by number: one is simulated while the volume is deformed by the other
+  Deformed deformed_;       ///< the frame that was deformed last
+  std::counting_semaphore<> volume_was_read_{1};  ///< by the renderer, so that it may be written
+  bool is_volume_set_ = false;                    ///< in the renderer
   std::vector<std::uint8_t> picture_;
   std::unique_ptr<PinnedMemory> pinned_;
   std::optional<DeviceStream> simulating_, deforming_, drawing_;

@@ -23,7 +23,7 @@ void wake_cuda_device(int) {}
 
 std::string describe_cuda_device(int) { not_compiled(); }
 
-void* create_cuda_stream(int) { not_compiled(); }
+void* create_cuda_stream(int, bool) { not_compiled(); }
 
 void wait_for_cuda_stream(void*) { not_compiled(); }
 

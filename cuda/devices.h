@@ -19,8 +19,9 @@ void wake_cuda_device(int device);
 /// @throws DeviceError without such a device
 std::string describe_cuda_device(int device);
 /// A cudaStream_t of a device that waits for no other work there.
+/// @param goes_first  whether its kernels begin before those of streams that do not, where both wait
 /// @throws DeviceError without such a device
-void* create_cuda_stream(int device);
+void* create_cuda_stream(int device, bool goes_first);
 /// Waits until a stream has done what was queued. @throws DeviceError
 void wait_for_cuda_stream(void* stream);
 /// Destroys what `create_cuda_stream` made.

@@ -16,7 +16,8 @@ constexpr int kColumns = InvertedPairs::kColumns + 2;  ///< vertices of a warp a
                                                        ///< belong to its neighbours
 constexpr int kRows = 8;                               ///< of a thread block, a warp each
 constexpr int kBlocks = 2;                             ///< a multiprocessor
-constexpr int kPlanes = 40;                            ///< along k that a thread goes; whole MovingBlocks
+constexpr unsigned kManyBlocks = 512;                  ///< fill a device
+constexpr int kPlanes = 40;                            ///< along k that a thread goes at most; whole MovingBlocks
 
 /// Two columns of vertices side by side: the part of a thread. Beyond the lattice its border vertices are repeated.
 ///
@@ -182,30 +183,31 @@ __device__ void pack_pair(const StepPass& pass, const Pair& pair, const PlaneRea
   }
 }
 
-/// Snaps, packs and describes the vertices of a lattice. A warp has 64 columns of a row, two a thread, and goes kPlanes
-/// planes along k; the outer columns are its neighbours' too. Columns begin where the first of a pair is even on planes
-/// of even k. It goes two planes at a time, so that neither registers nor the parity of vertices change places:
+/// Snaps, packs and describes the vertices of a lattice. A warp has 64 columns of a row, two a thread, and goes
+/// `planes` along k; the outer columns are its neighbours' too. Columns begin where the first of a pair is even on
+/// planes of even k. It goes two planes at a time, so that neither registers nor the parity of vertices change places:
 ///
 ///     plane z - 1     before      the even vertex's neighbour below along k: kept
 ///     plane z         here        the pair, and the pair one row on: kept; one row back: `given_below`, a plane ahead
 ///     plane z + 1     above       snapped in this step
 ///     plane z + 2                 read in this step, snapped in the next
 ///
-///     grid (words of a row, rows / kRows, planes / kPlanes), block (32 lanes, kRows rows)
+///     grid (words of a row, rows / kRows, all planes / planes), block (32 lanes, kRows rows)
 ///
 /// @tparam kExact  whether `fast` is exact wherever the packing holds a vertex  @tparam kRange  `StepPass::wants_range`
 /// @param pass         what is read and written
 /// @param corner_rest  six times the volume of an undeformed corner tetrahedron, steps of 2^-12 voxel
 /// @param centre_rest  of an undeformed centre
+/// @param planes       whole MovingBlocks
 template <bool kExact, bool kRange>
 __global__ void __launch_bounds__(32 * kRows, kBlocks)
     step_pass_kernel(const __grid_constant__ StepPass pass, const __grid_constant__ FloatSnap fast, float corner_rest,
-                     float centre_rest) {
+                     float centre_rest, int planes) {
   const StepLattice& lattice = pass.lattice;
   const glm::ivec3& cells = lattice.cells;
-  Pair pair(pass, static_cast<int>(blockIdx.y * kRows + threadIdx.y), static_cast<int>(blockIdx.z) * kPlanes);
+  Pair pair(pass, static_cast<int>(blockIdx.y * kRows + threadIdx.y), static_cast<int>(blockIdx.z) * planes);
   if (pair.y > cells.y) return;  // the whole warp
-  const int end = min(pair.z + kPlanes, cells.z + 1);
+  const int end = min(pair.z + planes, cells.z + 1);
   const int left = detail::clamp_to(Pair::first_column(pair.y), cells.x),
             beside = detail::clamp_to(Pair::first_column(pair.y) + 1, cells.x) - left;
   PlaneReader<kExact> reader{
@@ -270,14 +272,17 @@ void run_step_pass(const StepPass& pass, cudaStream_t stream) {
   const glm::vec3 &cell = pass.lattice.cell, x(cell.x, 0, 0), y(0, cell.y, 0), z(0, 0, cell.z);
   const float corner_rest = detail::edge_determinant(x, y, z),
               centre_rest = detail::edge_determinant(y + z, x + z, x + y);
-  const dim3 blocks(static_cast<unsigned>(pass.inverted.words_per_row),
-                    static_cast<unsigned>((vertices.y + kRows - 1) / kRows),
-                    static_cast<unsigned>((vertices.z + kPlanes - 1) / kPlanes));
+  dim3 blocks(static_cast<unsigned>(pass.inverted.words_per_row),
+              static_cast<unsigned>((vertices.y + kRows - 1) / kRows));
+  // Blocks read two planes beyond their own. Where they are few that costs less than to go far.
+  const auto parts = [&](int planes) { return static_cast<unsigned>((vertices.z + planes - 1) / planes); };
+  const int planes = blocks.x * blocks.y * parts(kPlanes) < kManyBlocks ? MovingBlocks::kSide : kPlanes;
+  blocks.z = parts(planes);
   const FloatSnap fast(pass.frame, pass.lattice, pass.lattice.packing.lift());
   const auto kernel = pass.wants_range
                           ? (fast.is_exact() ? step_pass_kernel<true, true> : step_pass_kernel<false, true>)
                           : (fast.is_exact() ? step_pass_kernel<true, false> : step_pass_kernel<false, false>);
-  kernel<<<blocks, dim3(32, kRows), 0, stream>>>(pass, fast, corner_rest, centre_rest);
+  kernel<<<blocks, dim3(32, kRows), 0, stream>>>(pass, fast, corner_rest, centre_rest, planes);
   TETWARP_CUDA_TRY(cudaGetLastError());
 }
 

@@ -29,12 +29,13 @@ __global__ void __launch_bounds__(kTileThreads, Sink::kIsWide ? kTileBlocks : kI
   const glm::ivec3 at = task.first_tile + glm::ivec3(blockIdx.x, blockIdx.y, blockIdx.z);
   const IntBox voxels = task.voxels(at);
   const int number = task.tile_number(at), thread = static_cast<int>(threadIdx.x);
-  const TileList list = task.shape.list(at, number);
-  if (list.is_done || voxels.is_empty()) return;
-  if (!task.kept.is_wanted(number)) {
-    if (thread == 0) atomicAdd(&task.counters->covered, static_cast<unsigned long long>(task.kept.covered[number]));
+  if (!task.kept.is_wanted(number)) {  // first, for most tiles may not be; then none is of another depth
+    if (thread == 0 && !voxels.is_empty())
+      atomicAdd(&task.counters->covered, static_cast<unsigned long long>(task.kept.covered[number]));
     return;
   }
+  const TileList list = task.shape.list(at, number);
+  if (list.is_done || voxels.is_empty()) return;
   if (list.count > Memory::kSlots) {
     if (thread == 0) atomicAdd(&task.counters->left, 1u);
     return;

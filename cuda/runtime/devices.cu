@@ -20,10 +20,12 @@ void wake_cuda_device(int device) {
   if (cudaSetDevice(device) != cudaSuccess || cudaFree(nullptr) != cudaSuccess) cudaGetLastError();  // told when used
 }
 
-void* create_cuda_stream(int device) {
+void* create_cuda_stream(int device, bool goes_first) {
   const cuda_detail::DeviceScope scope(device);
   cudaStream_t stream = nullptr;
-  TETWARP_CUDA_TRY(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking));
+  int last = 0, first = 0;
+  TETWARP_CUDA_TRY(cudaDeviceGetStreamPriorityRange(&last, &first));
+  TETWARP_CUDA_TRY(cudaStreamCreateWithPriority(&stream, cudaStreamNonBlocking, goes_first ? first : last));
   return stream;
 }
 
