@@ -9,6 +9,7 @@
 #include <semaphore>
 #include <stop_token>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "backend/devices.h"
@@ -115,8 +116,7 @@ class FrameLoop::Implementation {
     if (!deformation_.has_begun(shown_)) deformation_.begin();
     deformation_.wait();
     ++shown_;
-    const Deformed frame = std::move(deformed_);
-    deformed_ = {};
+    const Deformed frame = std::exchange(deformed_, {});
     if (frame.failure) {
       frames_ = shown_;  // the simulation cannot go on
       std::rethrow_exception(frame.failure);

@@ -66,6 +66,7 @@ class CpuRenderer final : public Renderer {
   std::vector<BlockRange> ranges_;
   std::vector<TransferEntry> table_;
   TransferIntegrals integrals_;
+  ClearValues clear_;
   std::vector<std::uint8_t> distances_;
   const std::uint8_t* tint_numbers_ = nullptr;
   std::vector<TransferEntry> tint_colours_;
@@ -76,6 +77,7 @@ void CpuRenderer::prepare(const RayFrame& frame, double step) {
   if (step != table_step_) {
     table_ = transfer_table(style_.transfer, step);
     integrals_ = transfer_integrals(table_, step);
+    clear_ = clear_values(table_, frame);
     table_step_ = step;
   }
   if (distances_.empty()) distances_ = block_distances(ranges_, ray_blocks(geometry_), frame, table_);
@@ -93,23 +95,33 @@ template <class V>
   }
 }
 
-// The same with an instruction for `fused`, where the compiler may not take it for granted.
+template <class V>
+void cast_plain_row(const RayScene<V>& scene, int left, int right, int y, std::uint8_t* rgb) {
+  cast_row(scene, left, right, y, rgb);
+}
 #if defined(__x86_64__) && !defined(__FMA__)
-constexpr bool kHasFastRow = true;
+/// With an instruction for `fused`, which the compiler may not take for granted.
 template <class V>
 [[gnu::target("avx2,fma")]] void cast_fast_row(const RayScene<V>& scene, int left, int right, int y,
                                                std::uint8_t* rgb) {
   cast_row(scene, left, right, y, rgb);
 }
-#else
-constexpr bool kHasFastRow = false;
 #endif
+
+/// `cast_row` for this processor.
+template <class V>
+auto best_row() {
+#if defined(__x86_64__) && !defined(__FMA__)
+  if ((hwy::SupportedTargets() & HWY_AVX2) != 0) return &cast_fast_row<V>;
+#endif
+  return &cast_plain_row<V>;
+}
 
 template <class V>
 void CpuRenderer::cast_all(const RayScene<V>& scene, const ViewPlane& plane, std::uint8_t* rgb,
                            const Control& control) const {
   const int columns = (plane.width + kPatch - 1) / kPatch, rows = (plane.height + kPatch - 1) / kPatch;
-  const bool is_fast = kHasFastRow && (hwy::SupportedTargets() & HWY_AVX2) != 0;
+  const auto cast = best_row<V>();
   std::atomic<bool> stopped = false;
   tbb::parallel_for(0, columns * rows, [&](int patch) {
     if (stopped || control.stop.stop_requested()) {
@@ -119,15 +131,9 @@ void CpuRenderer::cast_all(const RayScene<V>& scene, const ViewPlane& plane, std
     const int left = patch % columns * kPatch, top = patch / columns * kPatch;
     for (int y = top; y < std::min(top + kPatch, plane.height); ++y) {
       const int right = std::min(left + kPatch, plane.width);
-      std::uint8_t* const pixels = rgb + 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(plane.width) +
-                                              static_cast<std::size_t>(left));
-      if constexpr (kHasFastRow) {
-        if (is_fast) {
-          cast_fast_row(scene, left, right, y, pixels);
-          continue;
-        }
-      }
-      cast_row(scene, left, right, y, pixels);
+      cast(scene, left, right, y,
+           rgb + 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(plane.width) +
+                      static_cast<std::size_t>(left)));
     }
   });
   if (stopped) throw Cancelled();
@@ -139,9 +145,16 @@ void CpuRenderer::render(const ViewPlane& plane, std::span<std::uint8_t> rgb, co
   cpu::Arena arena(limits_);
   arena.execute([&] {
     prepare(frame, step_mm(geometry_, style_, plane));
-    const RayTables tables{
-        ranges_.data(),    distances_.data(),  ray_blocks(geometry_),       table_.data(), integrals_.before.data(),
-        integrals_.lowest, integrals_.highest, clear_values(table_, frame), tint_numbers_, tint_colours_.data()};
+    const RayTables tables{ranges_.data(),
+                           distances_.data(),
+                           ray_blocks(geometry_),
+                           table_.data(),
+                           integrals_.before.data(),
+                           integrals_.lowest,
+                           integrals_.highest,
+                           clear_,
+                           tint_numbers_,
+                           tint_colours_.data()};
     dispatch(volume_.type, [&](auto voxel) {
       using V = decltype(voxel);
       const auto* const voxels = reinterpret_cast<const V*>(volume_.voxels);

@@ -149,28 +149,41 @@ void constant_sums(const SpringGrid& grid, NodeRange range, const SpringArrays& 
   }
 }
 
+/// A float vector of each of several nodes.
+struct Vectors {
+  hn::Vec<Floats> x, y, z;
+};
+HWY_INLINE Vectors vectors_at(const NodeVectors<float>& v, std::size_t n) {
+  const Floats d;
+  return {hn::LoadU(d, v.axis(0) + n), hn::LoadU(d, v.axis(1) + n), hn::LoadU(d, v.axis(2) + n)};
+}
+HWY_INLINE Vectors difference(const Vectors& a, const Vectors& b) {
+  return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
+}
+HWY_INLINE void put(const Vectors& v, const NodeVectors<float>& to, std::size_t n) {
+  const Floats d;
+  hn::StoreU(v.x, d, to.axis(0) + n);
+  hn::StoreU(v.y, d, to.axis(1) + n);
+  hn::StoreU(v.z, d, to.axis(2) + n);
+}
+
 /// Sums, over the regular links of each node, of the link's matrix times p of the node minus that of the neighbour.
 void product(NodeRange range, const SpringArrays& a, const NodeVectors<float>& result) {
   const Floats d;
   for (std::size_t n = range.begin; n < range.end; n += hn::Lanes(d)) {
-    const auto own_x = hn::LoadU(d, a.p.axis(0) + n), own_y = hn::LoadU(d, a.p.axis(1) + n),
-               own_z = hn::LoadU(d, a.p.axis(2) + n);
-    auto sum_x = hn::Zero(d), sum_y = hn::Zero(d), sum_z = hn::Zero(d);
+    const Vectors own = vectors_at(a.p, n);
+    Vectors sum{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
     for (int direction = 0; direction < kDirections; ++direction) {
       const LinkSide way(a, direction);
       const auto entry = [&](std::size_t e) HWY_ATTR { return hn::LoadU(d, a.matrix.entry(way.up, e) + n + way.kept); };
-      const auto x = hn::Sub(own_x, hn::LoadU(d, a.p.axis(0) + n + way.distance));
-      const auto y = hn::Sub(own_y, hn::LoadU(d, a.p.axis(1) + n + way.distance));
-      const auto z = hn::Sub(own_z, hn::LoadU(d, a.p.axis(2) + n + way.distance));
+      const Vectors by = difference(own, vectors_at(a.p, n + way.distance));
       const auto ax = entry(0), ay = entry(1), az = entry(2), even = entry(3);
-      const auto along = hn::Add(hn::Add(hn::Mul(ax, x), hn::Mul(ay, y)), hn::Mul(az, z));
-      sum_x = hn::Add(sum_x, hn::Add(hn::Mul(ax, along), hn::Mul(even, x)));
-      sum_y = hn::Add(sum_y, hn::Add(hn::Mul(ay, along), hn::Mul(even, y)));
-      sum_z = hn::Add(sum_z, hn::Add(hn::Mul(az, along), hn::Mul(even, z)));
+      const auto along = hn::Add(hn::Add(hn::Mul(ax, by.x), hn::Mul(ay, by.y)), hn::Mul(az, by.z));
+      sum.x = hn::Add(sum.x, hn::Add(hn::Mul(ax, along), hn::Mul(even, by.x)));
+      sum.y = hn::Add(sum.y, hn::Add(hn::Mul(ay, along), hn::Mul(even, by.y)));
+      sum.z = hn::Add(sum.z, hn::Add(hn::Mul(az, along), hn::Mul(even, by.z)));
     }
-    hn::StoreU(sum_x, d, result.axis(0) + n);
-    hn::StoreU(sum_y, d, result.axis(1) + n);
-    hn::StoreU(sum_z, d, result.axis(2) + n);
+    put(sum, result, n);
   }
 }
 
@@ -179,19 +192,17 @@ void constant_product(const SpringGrid& grid, NodeRange range, const SpringArray
                       const NodeVectors<float>& result) {
   const Floats d;
   for (std::size_t n = range.begin; n < range.end; n += hn::Lanes(d)) {
-    const auto own_x = hn::LoadU(d, a.p.axis(0) + n), own_y = hn::LoadU(d, a.p.axis(1) + n),
-               own_z = hn::LoadU(d, a.p.axis(2) + n);
-    auto sum_x = hn::Zero(d), sum_y = hn::Zero(d), sum_z = hn::Zero(d);
+    const Vectors own = vectors_at(a.p, n);
+    Vectors sum{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
     for (int direction = 0; direction < kDirections; ++direction) {
       const LinkSide way(a, direction);
       const auto even = hn::LoadU(d, grid.constants(way.up) + n + way.kept);
-      sum_x = hn::Add(sum_x, hn::Mul(even, hn::Sub(own_x, hn::LoadU(d, a.p.axis(0) + n + way.distance))));
-      sum_y = hn::Add(sum_y, hn::Mul(even, hn::Sub(own_y, hn::LoadU(d, a.p.axis(1) + n + way.distance))));
-      sum_z = hn::Add(sum_z, hn::Mul(even, hn::Sub(own_z, hn::LoadU(d, a.p.axis(2) + n + way.distance))));
+      const Vectors by = difference(own, vectors_at(a.p, n + way.distance));
+      sum.x = hn::Add(sum.x, hn::Mul(even, by.x));
+      sum.y = hn::Add(sum.y, hn::Mul(even, by.y));
+      sum.z = hn::Add(sum.z, hn::Mul(even, by.z));
     }
-    hn::StoreU(sum_x, d, result.axis(0) + n);
-    hn::StoreU(sum_y, d, result.axis(1) + n);
-    hn::StoreU(sum_z, d, result.axis(2) + n);
+    put(sum, result, n);
   }
 }
 
