@@ -12,8 +12,7 @@ namespace tetwarp::cuda_detail {
 namespace {
 
 constexpr int kBlock = 4;  ///< rows and slices of vertices that are looked at together for what is inverted
-constexpr int kPairs = 4;  ///< pairs of a word of `InvertedPairs` that a thread looks at
-constexpr int kGroups = 32 / kPairs;
+constexpr int kPairs = 4;  ///< pairs of a word of `InvertedPairs` that a warp looks at together
 constexpr unsigned kMostExtra = 1u << 18;
 constexpr int kNoExtra = 0, kLostExtra = -1;
 
@@ -215,21 +214,18 @@ struct SeveralMarker {
   int words;      ///< a row
   std::uint32_t *single, *several;
 
-  /// By atomics, for words are shared with other threads.
-
-  __device__ void mark(const IntBox& voxels) const {
+  /// By atomics, for words are shared with other warps. The lanes of a warp share out the words.
+  __device__ void mark(const IntBox& voxels, int lane) const {
     if (voxels.is_empty()) return;
     const glm::ivec3 first = voxels.begin - region.begin, last = voxels.end - region.begin - 1;
-    for (int z = first.z; z <= last.z; ++z) {
-      for (int y = first.y; y <= last.y; ++y) {
-        const std::int64_t row = (std::int64_t{z} * (region.end.y - region.begin.y) + y) * words;
-        for (int word = first.x / 32; word <= last.x / 32; ++word) {
-          const std::uint32_t mask = bits_of_word(word, first.x, last.x);
-          if ((several[row + word] & mask) == mask) continue;
-          atomicAnd(&single[row + word], ~mask);
-          atomicOr(&several[row + word], mask);
-        }
-      }
+    const glm::ivec3 size(last.x / 32 - first.x / 32 + 1, last.y - first.y + 1, last.z - first.z + 1);
+    for (int n = lane; n < size.x * size.y * size.z; n += 32) {
+      const glm::ivec3 at = glm::ivec3(first.x / 32, first.y, first.z) + position_in(n, size);
+      const std::int64_t word = (std::int64_t{at.z} * (region.end.y - region.begin.y) + at.y) * words + at.x;
+      const std::uint32_t mask = bits_of_word(at.x, first.x, last.x);
+      if ((several[word] & mask) == mask) continue;
+      atomicAnd(&single[word], ~mask);
+      atomicOr(&several[word], mask);
     }
   }
 };
@@ -249,51 +245,65 @@ __global__ void count_kernel(const std::uint32_t* bits, int words_per_slice, uns
   atomicAdd(in_box, static_cast<unsigned long long>(found));
 }
 
-/// All voxels that inverted tetrahedra may reach go to `several`. A thread looks at four pairs of vertices on kBlock
-/// rows of as many slices, and mostly finds nothing:
+/// All voxels that inverted tetrahedra may reach go to `several`. A warp looks at a word of pairs on kBlock rows of as
+/// many slices, and mostly finds nothing. Where it does, its lanes share out the vertices around kPairs pairs at a
+/// time:
 ///
-///     a word of `InvertedPairs`, 32 pairs:   thread 0 | 1 | 2 | 3 | 4 | 5 | 6 | 7   four pairs each
+///     a word of `InvertedPairs`, 32 pairs:   step 0 | 1 | 2 | 3 | 4 | 5 | 6 | 7   four pairs each
 ///
-/// @param inverted  which pairs, from `step_pass_kernel`
+/// @param inverted  which pairs, from `step_pass_kernel`  @param warps  how many are needed
 /// @param marker    its bits are written
-__global__ void inverted_kernel(StepLattice lattice, NudgeTurns turns, InvertedPairs inverted, SeveralMarker marker) {
+__global__ void inverted_kernel(const __grid_constant__ StepLattice lattice, const __grid_constant__ NudgeTurns turns,
+                                const __grid_constant__ InvertedPairs inverted, std::int64_t warps,
+                                const __grid_constant__ SeveralMarker marker) {
   constexpr int kLargeBox = 4096;  // voxels: then row by row
-  const int groups = inverted.words_per_row * kGroups, rows = (inverted.rows + kBlock - 1) / kBlock,
-            slices = lattice.cells.z / kBlock + 1;
-  const std::int64_t n = thread_of_grid();
-  if (n >= std::int64_t{groups} * rows * slices) return;
-  const int word = static_cast<int>(n % groups) / kGroups, shift = static_cast<int>(n % kGroups) * kPairs;
-  const glm::ivec2 first(n / groups % rows * kBlock, n / groups / rows * kBlock);
-  const auto pairs_of = [&](int row, int slice) {
-    if (row >= inverted.rows || slice > lattice.cells.z) return 0u;
-    return inverted.words[inverted.word(row, slice, word)] >> shift & ((1u << kPairs) - 1);
-  };
-  const auto box_of = [&](unsigned pairs, const glm::ivec2& from_row, const glm::ivec2& to_row) {
+  constexpr int kLanesAlong = 16;  // lanes that share a row of vertices
+  static_assert(kBlock * kBlock <= 32);
+  const std::int64_t n = warp_of_grid();
+  if (n >= warps) return;
+  const int lane = lane_of_warp(), rows = (inverted.rows + kBlock - 1) / kBlock;
+  const int word = static_cast<int>(n % inverted.words_per_row);
+  const glm::ivec2 first(n / inverted.words_per_row % rows * kBlock, n / inverted.words_per_row / rows * kBlock);
+  const auto whole_box = [&](unsigned pairs, const glm::ivec2& from_row, const glm::ivec2& to_row) {
     const int low = first_bit(pairs), high = last_bit(pairs);
     const glm::ivec3 from =
-        glm::max(glm::ivec3(InvertedPairs::column(0, word, shift + low), from_row.x, from_row.y) - 1, glm::ivec3(0));
-    const glm::ivec3 to = glm::min(
-        glm::ivec3(InvertedPairs::column(1, word, shift + high) + 2, to_row.x + 1, to_row.y + 1), lattice.cells);
+        glm::max(glm::ivec3(InvertedPairs::column(0, word, low), from_row.x, from_row.y) - 1, glm::ivec3(0));
+    const glm::ivec3 to =
+        glm::min(glm::ivec3(InvertedPairs::column(1, word, high) + 2, to_row.x + 1, to_row.y + 1), lattice.cells);
+    static_assert(2 * kPairs + 4 <= kLanesAlong);  // so many columns at most
+    const int x = min(from.x + lane % kLanesAlong, to.x);
     Box box{glm::i32vec3(INT32_MAX), glm::i32vec3(INT32_MIN)};
     for (int z = from.z; z <= to.z; ++z) {
-      for (int y = from.y; y <= to.y; ++y) {
-        for (int x = from.x; x <= to.x; ++x) box.grow(lattice.deformed({x, y, z}));
-      }
+      for (int y = from.y + lane / kLanesAlong; y <= to.y; y += 32 / kLanesAlong) box.grow(lattice.deformed({x, y, z}));
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      box.low[axis] = __shfl_sync(kAllLanes, warp_min(box.low[axis]), 0);
+      box.high[axis] = __shfl_sync(kAllLanes, warp_max(box.high[axis]), 0);
     }
     return candidates(turns, box.low, box.high, marker.region);
   };
-  unsigned any = 0;
-  for (int row = 0; row < kBlock * kBlock; ++row) any |= pairs_of(first.x + row % kBlock, first.y + row / kBlock);
-  if (any == 0) return;
-  const IntBox all = box_of(any, first, first + kBlock - 1);
-  if (all.is_empty()) return;
-  const glm::ivec3 size = all.end - all.begin;
-  if (std::int64_t{size.x} * size.y * size.z <= kLargeBox) return marker.mark(all);
-  for (int row = 0; row < kBlock * kBlock; ++row) {
-    const glm::ivec2 at(first.x + row % kBlock, first.y + row / kBlock);
-    for (unsigned left = pairs_of(at.x, at.y); left != 0; left &= left - 1) {
-      const unsigned pair = left & (~left + 1);
-      marker.mark(box_of(pair, at, at));
+  const glm::ivec2 own = first + glm::ivec2(lane % kBlock, lane / kBlock % kBlock);
+  const bool here = lane < kBlock * kBlock && own.x < inverted.rows && own.y <= lattice.cells.z;
+  const unsigned pairs = here ? inverted.words[inverted.word(own.x, own.y, word)] : 0;
+  if (!__any_sync(kAllLanes, pairs != 0)) return;
+  for (int shift = 0; shift < 32; shift += kPairs) {
+    const unsigned mine = pairs & ((1u << kPairs) - 1) << shift;
+    unsigned any = 0;
+    for (unsigned bit = 1u << shift, n = 0; n < kPairs; ++n, bit <<= 1)
+      any |= __any_sync(kAllLanes, (mine & bit) != 0) ? bit : 0;
+    if (any == 0) continue;
+    const IntBox all = whole_box(any, first, first + kBlock - 1);
+    if (all.is_empty()) continue;
+    const glm::ivec3 size = all.end - all.begin;
+    if (std::int64_t{size.x} * size.y * size.z <= kLargeBox) {
+      marker.mark(all, lane);
+      continue;
+    }
+    for (unsigned holders = __ballot_sync(kAllLanes, mine != 0); holders != 0; holders &= holders - 1) {
+      const int holder = first_bit(holders);
+      const glm::ivec2 at = first + glm::ivec2(holder % kBlock, holder / kBlock);
+      for (unsigned left = __shfl_sync(kAllLanes, mine, holder); left != 0; left &= left - 1)
+        marker.mark(whole_box(left & (~left + 1), at, at), lane);
     }
   }
 }
@@ -342,10 +352,10 @@ void Coverage::find(const LatticeOnDevice& lattice, const SlabBox& box, cudaStre
   if (lattice.statistics().inverted != 0) {
     const InvertedPairs& inverted = lattice.inverted();
     const IntBox region{glm::ivec3(box.begin), glm::ivec3(box.begin + box.size)};
-    const std::int64_t groups = std::int64_t{inverted.words_per_row} * kGroups *
-                                ((inverted.rows + kBlock - 1) / kBlock) * (field.steps.cells.z / kBlock + 1);
-    inverted_kernel<<<blocks_for(groups), kThreads, 0, stream>>>(field.steps, NudgeTurns(field.frame.nudge), inverted,
-                                                                 {region, words_, single, several});
+    const std::int64_t warps = std::int64_t{inverted.words_per_row} * ((inverted.rows + kBlock - 1) / kBlock) *
+                               (field.steps.cells.z / kBlock + 1);
+    inverted_kernel<<<blocks_for(warps * 32), kThreads, 0, stream>>>(
+        field.steps, NudgeTurns(field.frame.nudge), inverted, warps, {region, words_, single, several});
     count_several(box, stream);
   }
   TETWARP_CUDA_TRY(cudaGetLastError());

@@ -81,6 +81,11 @@ class StepPacking {
   }
   /// The vector that was packed, in steps.
   TETWARP_HD glm::vec3 unpacked(std::uint64_t packed) const { return raised(packed) - lift_; }
+  /// The same as whole numbers, without conversions.
+  TETWARP_HD glm::i32vec3 steps(std::uint64_t packed) const {
+    const auto low = static_cast<std::uint32_t>(packed), high = static_cast<std::uint32_t>(packed >> 32);
+    return least_ + glm::i32vec3(low & x_mask_, middle(low, high) & y_mask_, high >> (z_at_ - 32));
+  }
 
  private:
   static constexpr std::uint32_t kTwoTo23 = 0x4B000000;  ///< the bits of 2^23
@@ -94,7 +99,8 @@ class StepPacking {
         y_mask_((1u << bits.y) - 1),
         z_mask_(~0u >> (z_at_ - 32)),
         above_z_(kTwoTo23 >> (64 - z_at_)),
-        lift_(float{1 << kMostBits} - glm::vec3(least)) {}
+        lift_(float{1 << kMostBits} - glm::vec3(least)),
+        least_(least) {}
 
 #ifdef TETWARP_ON_DEVICE
   __device__ static float float_of(std::uint32_t bits) { return __uint_as_float(bits); }
@@ -116,6 +122,7 @@ class StepPacking {
   std::uint32_t x_mask_, y_mask_, z_mask_;  ///< as many bits as each axis has
   std::uint32_t above_z_;                   ///< what the bits of 2^23 leave above those of z
   glm::vec3 lift_;
+  glm::ivec3 least_;  ///< 2^23 less than `lift_`, with the other sign
 };
 
 /// A lattice along the axes of the output grid whose undeformed vertices lie at whole steps; a gather reads it.
@@ -143,7 +150,7 @@ struct StepLattice {
   /// The deformed place of a vertex alone.
   TETWARP_HD glm::i32vec3 deformed(const glm::ivec3& at) const {
     const int n = at.z * slice + at.y * row + at.x;  // make_step_lattice: fewer than 2^31
-    return glm::i32vec3(first) + at * glm::i32vec3(cell) + glm::i32vec3(moved(n));
+    return glm::i32vec3(first) + at * glm::i32vec3(cell) + packing.steps(packed[n]);
   }
   /// The lattice index of an undeformed voxel.
   TETWARP_HD glm::vec3 place(const glm::vec3& voxel_index) const {

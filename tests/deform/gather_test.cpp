@@ -12,6 +12,7 @@
 #include <set>
 
 #include "deform/core/border.h"
+#include "deform/core/cell_faces.h"
 #include "deform/core/visit_cell.h"
 #include "deform/field_check.h"
 #include "deform/fields/formula.h"
@@ -308,6 +309,51 @@ TEST(Gather, VisitsTheVoxelsOfATetrahedronThatVisitCellReports) {
     }
     ASSERT_EQ(found, expected);
   }
+}
+
+TEST(CellFaces, FindTheOwnersThatVisitCellReports) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  std::size_t tests = 0, unsure = 0;
+  for (std::uint64_t n = 0; n < 200; ++n) {
+    Random random(test_seed(), 600 + n);
+    const FieldCase test = step_case(random, n % 2 == 0);
+    SCOPED_TRACE(test.description);
+    const Scene scene(test.output, test.field, n % 2 == 1);
+    const NudgeTurns turns(scene.frame.nudge);
+    // Of each voxel, all cells with a tetrahedron that owns it, by the lowest number of such a tetrahedron.
+    std::map<std::pair<std::size_t, std::int64_t>, int> expected;
+    const glm::ivec3 cells = scene.lattice.cells;
+    const auto number_of = [&](const glm::ivec3& cell) {
+      return (std::int64_t{cell.z} * cells.y + cell.y) * cells.x + cell.x;
+    };
+    for (const auto& [offset, owner] : owners_of(scene, test.output)) {
+      const auto [at, is_new] = expected.try_emplace({offset, number_of(owner.cell())}, owner.number());
+      if (!is_new) at->second = std::min(at->second, owner.number());
+    }
+    for (int z = 0; z < cells.z; ++z) {
+      for (int y = 0; y < cells.y; ++y) {
+        for (int x = 0; x < cells.x; ++x) {
+          const glm::ivec3 cell(x, y, z);
+          for (std::size_t offset = 0; offset < static_cast<std::size_t>(voxel_count(test.output)); ++offset) {
+            const glm::ivec3 voxel(Scene::at(static_cast<std::int64_t>(offset), test.output.size));
+            const glm::i32vec3 signs = turns.signs(voxel);
+            const CellFaces faces(scene.lattice, cell, GatherPoint(scene.lattice, voxel, signs));
+            ++tests;
+            const int owner = faces.owner([&](int number) {
+              ++unsure;
+              int sides[4];
+              return owns_exactly(vertices_of(scene.lattice, LatticeTetrahedron::of_cell(cell, number)),
+                                  voxel * kStepsPerVoxel, signs, sides);
+            });
+            const auto at = expected.find({offset, number_of(cell)});
+            ASSERT_EQ(owner, at == expected.end() ? kTetrahedraPerCell : at->second)
+                << "voxel " << offset << ", cell " << number_of(cell);
+          }
+        }
+      }
+    }
+  }
+  EXPECT_LT(unsure * 10, tests) << "float settles hardly anything";
 }
 
 TEST(Gather, WalksToTheOwnerInInjectiveFields) {
