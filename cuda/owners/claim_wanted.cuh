@@ -242,8 +242,8 @@ __global__ void __launch_bounds__(kThreads, 8)
       const IntBox voxels = candidates(slate.turns, box.low, box.high, slate.region);
       glm::ivec3 voxel = voxels.begin;
       bool more = here && !voxels.is_empty(), crowded = false;
-      while (__any_sync(kAllLanes, more)) {  // part of a row after part of a row
-        std::uint32_t bits = more ? slate.wanted_from(voxel, min(voxels.end.x - voxel.x, 32)) : 0;
+      while (__any_sync(kAllLanes, more && !crowded)) {  // part of a row after part of a row
+        std::uint32_t bits = more && !crowded ? slate.wanted_from(voxel, min(voxels.end.x - voxel.x, 32)) : 0;
         for (; __any_sync(kAllLanes, bits != 0); bits &= bits - 1) {
           const bool has = bits != 0;
           if (!found.add(has, lane, slice, voxel + glm::ivec3(has ? first_bit(bits) : 0, 0, 0), pairs)) crowded = true;
