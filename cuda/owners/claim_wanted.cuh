@@ -140,10 +140,9 @@ class CellColumn {
  private:
   /// Begins to read the four vertices of the next plane, or of the lattice's last one again.
   __device__ void read() {
-    const int first = min(vertex_, last_);
 #pragma unroll
-    for (int n = 0; n < 4; ++n) packed_[n] = lattice_.packed[first + (n & 1) + (n >> 1) * lattice_.row];
-    vertex_ += lattice_.slice;
+    for (int n = 0; n < 4; ++n) packed_[n] = lattice_.packed[vertex_ + (n & 1) + (n >> 1) * lattice_.row];
+    vertex_ += min(lattice_.slice, last_ - vertex_);  // never beyond: there may be 2^31 - 1 vertices
   }
   /// Around the four vertices that were read.
   __device__ Box box_of_plane() {

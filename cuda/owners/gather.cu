@@ -82,7 +82,7 @@ __global__ void number_kernel(const std::uint32_t* several, std::int64_t words, 
 ///
 /// @param begin   first voxel of the box to which the words of `voxels` belong
 /// @param voxels  of each number, its `BitNumber`  @param count  how many
-/// @param owner   of each number, the lowest number of an owner, or kNobody: from `claim_wanted_kernel`
+/// @param owner   of each number, the lowest number of an owner, or kNobody: from `Claims`
 /// @param sink    gets all of them
 template <class Sink>
 __global__ void write_claimed_kernel(GatherTask task, glm::ivec3 begin, const unsigned* voxels, unsigned count,
