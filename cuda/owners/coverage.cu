@@ -289,8 +289,10 @@ __global__ void inverted_kernel(const __grid_constant__ StepLattice lattice, con
   for (int shift = 0; shift < 32; shift += kPairs) {
     const unsigned mine = pairs & ((1u << kPairs) - 1) << shift;
     unsigned any = 0;
-    for (unsigned bit = 1u << shift, n = 0; n < kPairs; ++n, bit <<= 1)
+    for (int pair = 0; pair < kPairs; ++pair) {
+      const unsigned bit = 1u << (shift + pair);
       any |= __any_sync(kAllLanes, (mine & bit) != 0) ? bit : 0;
+    }
     if (any == 0) continue;
     const IntBox all = whole_box(any, first, first + kBlock - 1);
     if (all.is_empty()) continue;
