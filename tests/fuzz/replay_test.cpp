@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <ctime>
+#include <iostream>
 #include <iterator>
 #include <vector>
 
@@ -25,9 +26,11 @@ extern "C" const char* __asan_default_options() { return "max_allocation_size_mb
 constexpr bool kSanitized = false;
 #endif
 
+std::filesystem::path folder;  // of the corpus
+
 std::vector<std::filesystem::path> corpus() {
   std::vector<std::filesystem::path> files;
-  for (const auto& entry : std::filesystem::directory_iterator(TETWARP_FUZZ_CORPUS)) files.push_back(entry.path());
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) files.push_back(entry.path());
   std::ranges::sort(files);
   return files;
 }
@@ -67,3 +70,13 @@ TEST(FuzzCorpus, EveryFileIsReadOrRefusedInTime) {
 }
 
 }  // namespace
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  if (argc != 2) {
+    std::cerr << "usage: " << argv[0] << " CORPUS\n";
+    return 2;
+  }
+  folder = argv[1];
+  return RUN_ALL_TESTS();
+}
