@@ -57,12 +57,13 @@ json links_json(const SimulateRecord& record, const std::vector<BrokenLink>& bro
 
 json phase_json(const SimulateRecord& record, std::size_t n) {
   const PhaseRecord& phase = record.phases[n];
-  const PhaseLoads& loads = record.run.loads(n);
+  const PhaseCounts& counts = record.run.counts(n);
   json result = {{"name", record.scenario.phases[n].name},
                  {"frames", record.scenario.phases[n].frames},
-                 {"held", loads.held()},
-                 {"moved", loads.moved()},
-                 {"pulled", loads.with_force()},
+                 {"held", counts.held},
+                 {"pinned", counts.pinned},
+                 {"moved", counts.moved},
+                 {"pulled", counts.with_force},
                  {"steps", phase.steps},
                  {"motion_mm", phase.last.motion_mm},
                  {"settled", phase.unsettled == 0},
@@ -126,10 +127,12 @@ json document_of(const SimulateRecord& record) {
 }
 
 std::vector<std::string> warnings_of(const SimulateRecord& record) {
-  std::vector<std::string> warnings = record.run.loads(0).notes();  // notes on holds, which are the same in all phases
+  constexpr std::size_t kTold = 5;  // what a hand did has many phases, of few steps a frame
+  std::vector<std::string> warnings = record.run.notes();
+  std::size_t unsettled = 0;
   for (std::size_t n = 0; n < record.phases.size(); ++n) {
     const PhaseRecord& phase = record.phases[n];
-    if (phase.unsettled > 0) {
+    if (phase.unsettled > 0 && ++unsettled <= kTold) {
       char text[160];
       std::snprintf(text, sizeof text, "%d of %d frames had not settled after %d steps (last motion %.3g mm%s)",
                     phase.unsettled, record.scenario.phases[n].frames, record.scenario.stop.steps, phase.last.motion_mm,
@@ -143,6 +146,8 @@ std::vector<std::string> warnings_of(const SimulateRecord& record) {
                          " links are beyond their limits, where what is held and what is moved allow nothing else");
     }
   }
+  if (unsettled > kTold)
+    warnings.push_back("as many as " + std::to_string(unsettled - kTold) + " further phases had such frames");
   return warnings;
 }
 
@@ -157,9 +162,10 @@ std::string describe(const SimulateRecord& record) {
                      to_string(record.patient.lattice.size) + " vertices, " + std::to_string(run.frames()) +
                      (run.frames() == 1 ? " frame" : " frames") + "; " + tissues;
   for (std::size_t n = 0; n < record.scenario.phases.size(); ++n) {
-    const PhaseLoads& loads = run.loads(n);
-    text += "; " + phase_name(record, n) + std::to_string(loads.held()) + " vertices held, " +
-            std::to_string(loads.moved()) + " moved, " + std::to_string(loads.with_force()) + " pulled";
+    const PhaseCounts& counts = run.counts(n);
+    text += "; " + phase_name(record, n) + std::to_string(counts.held) + " vertices held, " +
+            (counts.pinned > 0 ? std::to_string(counts.pinned) + " pinned, " : "") + std::to_string(counts.moved) +
+            " moved, " + std::to_string(counts.with_force) + " pulled";
   }
   return text;
 }

@@ -15,6 +15,7 @@ namespace tetwarp::simulate {
 namespace {
 
 constexpr double kSameGoalMm = 1e-6;
+constexpr double kTouch = 0.01;  ///< of a ball's radius
 
 std::string text_of(const glm::dvec3& point) {
   char text[96];
@@ -87,20 +88,31 @@ std::vector<Cut> open_cuts(const Scenario& scenario, const Phase& phase, const P
 PhaseLoads::PhaseLoads(const Scenario& scenario, const Phase& phase, const Patient& patient)
     : vertex_point_(point_from_index(patient.lattice)),
       size_(patient.lattice.size),
-      way_of_(patient.vertex_hu.size(), kFree) {
-  hold(scenario, patient);
+      way_of_(patient.vertex_hu.size(), kFree),
+      push_(phase.push),
+      frames_(phase.frames) {
+  check_ways(phase);
+  hold(scenario.hold, patient, kHeld);
+  hold(phase.pins, patient, kPinned);
+  held_ = static_cast<std::size_t>(std::count(way_of_.begin(), way_of_.end(), kHeld));
+  pinned_ = static_cast<std::size_t>(std::count(way_of_.begin(), way_of_.end(), kPinned));
+  if (push_) {
+    require(patient.box.has_value(), "a ball pushes the body, but no cell of this volume belongs to one");
+    body_ = select(Zone{Body{}}, patient);
+  }
   std::vector<std::vector<std::size_t>> vertices;
   for (std::size_t n = 0; n < phase.moves.size(); ++n) {
     const Move& move = phase.moves[n];
     vertices.push_back(free_vertices(move, patient));
     Way way;
     if (const auto* shift = std::get_if<Shift>(&move.how)) way.by = mm_of(*shift, patient);
+    if (const auto* drag = std::get_if<Drag>(&move.how)) way.along = drag->by_mm;
     if (const auto* turn = std::get_if<Rotation>(&move.how)) {
       way.about = point_of(turn->about, patient);
       way.axis = glm::normalize(turn->axis);
       way.radians = turn->degrees * std::acos(-1.0) / 180;
     }
-    ways_.push_back(way);
+    ways_.push_back(std::move(way));
     if (!std::holds_alternative<Force>(move.how)) place(phase, n, vertices.back());
   }
   for (std::size_t n = 0; n < phase.moves.size(); ++n) {
@@ -117,23 +129,35 @@ PhaseLoads::PhaseLoads(const Scenario& scenario, const Phase& phase, const Patie
     }
     add_force(force->newton, vertices[n]);
   }
-  require(scenario.method == Method::chainmail || held_ + moved_ > 0,
+  require(scenario.method == Method::chainmail || held_ + pinned_ + moved_ > 0,
           "nothing is held and nothing moved to a place" + (phase.name.empty() ? "" : " in \"" + phase.name + "\"") +
               ", so that mass-spring has no equilibrium; hold something");
 }
 
-void PhaseLoads::hold(const Scenario& scenario, const Patient& patient) {
-  for (const HeldZone& held : scenario.hold) {
+void PhaseLoads::check_ways(const Phase& phase) const {
+  const auto check = [&](const std::string& entry, std::size_t places) {
+    require(places == static_cast<std::size_t>(phase.frames),
+            entry + " has " + std::to_string(places) + " places, and its phase " + std::to_string(phase.frames) +
+                " frames; a place a frame is expected");
+  };
+  for (const Move& move : phase.moves) {
+    if (const auto* drag = std::get_if<Drag>(&move.how)) check(move.entry, drag->by_mm.size());
+  }
+  if (phase.push) check("the ball of \"" + phase.name + "\"", phase.push->at_mm.size());
+}
+
+/// Takes what is still free of some zones.
+void PhaseLoads::hold(std::span<const HeldZone> zones, const Patient& patient, std::int32_t as) {
+  for (const HeldZone& held : zones) {
     const std::vector<std::uint8_t> inside = select(held.zone, patient);
     bool any = false;
     for (std::size_t vertex = 0; vertex < inside.size(); ++vertex) {
       if (!inside[vertex]) continue;
       any = true;
-      way_of_[vertex] = kHeld;
+      if (way_of_[vertex] == kFree) way_of_[vertex] = as;
     }
-    if (!any) notes_.push_back(held.entry + " holds no vertex");
+    if (!any) notes_.push_back(held.entry + (as == kHeld ? " holds no vertex" : " pins no vertex"));
   }
-  held_ = static_cast<std::size_t>(std::count(way_of_.begin(), way_of_.end(), kHeld));
 }
 
 std::vector<std::size_t> PhaseLoads::free_vertices(const Move& move, const Patient& patient) const {
@@ -153,9 +177,10 @@ std::vector<std::size_t> PhaseLoads::free_vertices(const Move& move, const Patie
     }
   }
   const std::size_t all = vertices.size();
-  std::erase_if(vertices, [&](std::size_t vertex) { return way_of_[vertex] == kHeld; });
+  std::erase_if(vertices, [&](std::size_t vertex) { return way_of_[vertex] == kHeld || way_of_[vertex] == kPinned; });
+  const char* how = pinned_ == 0 ? "held, and what is held stays" : "held or pinned, and stay";
   require(!vertices.empty(), move.entry + " moves nothing: " + std::to_string(all) + " of its " + std::to_string(all) +
-                                 " vertices are held, and what is held stays");
+                                 " vertices are " + how);
   return vertices;
 }
 
@@ -167,9 +192,8 @@ void PhaseLoads::place(const Phase& phase, std::size_t move, const std::vector<s
       continue;
     }
     const auto other = static_cast<std::size_t>(way_of_[vertex]);
-    const auto n = static_cast<std::int64_t>(vertex);
-    const glm::dvec3 x = vertex_point_(glm::dvec3(n % size_.x, n / size_.x % size_.y, n / (size_.x * size_.y)));
-    if (glm::distance(displacement(move, x, 1), displacement(other, x, 1)) <= kSameGoalMm) continue;
+    const glm::dvec3 x = rest_of(vertex);
+    if (is_same_way(move, other, x)) continue;
     throw InputError(phase.moves[other].entry + " and " + phase.moves[move].entry + " move the vertex at " +
                      text_of(x) + " mm to different places, " + text_of(x + displacement(other, x, 1)) + " and " +
                      text_of(x + displacement(move, x, 1)) + "; let their regions be apart");
@@ -186,23 +210,47 @@ void PhaseLoads::add_force(const glm::dvec3& newton, const std::vector<std::size
   }
 }
 
-bool PhaseLoads::turns() const {
-  return std::any_of(ways_.begin(), ways_.end(), [](const Way& way) { return way.radians != 0; });
+bool PhaseLoads::changes_by_frame() const {
+  return pushes() ||
+         std::any_of(ways_.begin(), ways_.end(), [](const Way& way) { return way.radians != 0 || !way.along.empty(); });
 }
 
-std::size_t PhaseLoads::with_force() const {
-  return static_cast<std::size_t>(
-      std::count_if(force_.begin(), force_.end(), [](const glm::vec3& force) { return force != glm::vec3(0); }));
+int PhaseLoads::frame_at(double part) const {
+  return std::clamp(static_cast<int>(std::lround(part * frames_)), 1, frames_) - 1;
+}
+
+glm::dvec3 PhaseLoads::rest_of(std::size_t vertex) const {
+  const auto n = static_cast<std::int64_t>(vertex);
+  return vertex_point_(glm::dvec3(n % size_.x, n / size_.x % size_.y, n / (size_.x * size_.y)));
+}
+
+/// Whether two moves take a vertex to the same goals: of drags in every frame.
+bool PhaseLoads::is_same_way(std::size_t move, std::size_t other, const glm::dvec3& point) const {
+  const bool drags = !ways_[move].along.empty();
+  if (drags != !ways_[other].along.empty()) return false;
+  for (int frame = drags ? 0 : frames_ - 1; frame < frames_; ++frame) {
+    const double part = static_cast<double>(frame + 1) / frames_;
+    if (glm::distance(displacement(move, point, part), displacement(other, point, part)) > kSameGoalMm) return false;
+  }
+  return true;
+}
+
+PhaseCounts PhaseLoads::counts() const {
+  const auto pulled =
+      std::count_if(force_.begin(), force_.end(), [](const glm::vec3& force) { return force != glm::vec3(0); });
+  return {held_, pinned_, moved_, static_cast<std::size_t>(pulled)};
 }
 
 glm::dvec3 PhaseLoads::displacement(std::size_t move, const glm::dvec3& point, double part) const {
   const Way& way = ways_[move];
+  if (!way.along.empty()) return way.along[static_cast<std::size_t>(frame_at(part))];
   if (way.radians == 0) return part * way.by;
   const glm::dvec3 arm = point - way.about;
   return turned(arm, way.axis, part * way.radians) - arm;
 }
 
-Loads PhaseLoads::at(double part, const Model& model, std::span<const glm::vec3> start) const {
+Loads PhaseLoads::at(double part, const Model& model, std::span<const glm::vec3> start,
+                     std::span<const glm::vec3> now) const {
   Loads loads{.constraint = std::vector<Constraint>(model.nodes(), Constraint::free),
               .goal = std::vector<glm::vec3>(model.nodes()),
               .force = {}};
@@ -213,14 +261,36 @@ Loads PhaseLoads::at(double part, const Model& model, std::span<const glm::vec3>
     if (way == kFree) continue;
     loads.constraint[vertex] = Constraint::placed;
     if (way == kHeld) continue;
-    const auto n = static_cast<std::int64_t>(vertex);
-    const glm::dvec3 x = vertex_point_(glm::dvec3(n % size_.x, n / size_.x % size_.y, n / (size_.x * size_.y)));
-    const glm::dvec3 by = displacement(static_cast<std::size_t>(way), x, part);
-    for (int axis = 0; axis < 3; ++axis) {
-      loads.goal[vertex][axis] = static_cast<float>(by[axis] + (1 - part) * static_cast<double>(start[vertex][axis]));
+    if (way == kPinned) {
+      loads.goal[vertex] = start[vertex];
+      continue;
     }
+    const glm::dvec3 by = displacement(static_cast<std::size_t>(way), rest_of(vertex), part);
+    const double kept = ways_[static_cast<std::size_t>(way)].along.empty() ? 1 - part : 1;  // a drag begins where it is
+    for (int axis = 0; axis < 3; ++axis)
+      loads.goal[vertex][axis] = static_cast<float>(by[axis] + kept * static_cast<double>(start[vertex][axis]));
   }
+  if (push_) push(frame_at(part), model, now, loads);
   return loads;
+}
+
+/// Places the free nodes that the ball meets in a frame.
+void PhaseLoads::push(int frame, const Model& model, std::span<const glm::vec3> now, Loads& loads) const {
+  const glm::dvec3& centre = push_->at_mm[static_cast<std::size_t>(frame)];
+  const double radius = push_->radius_mm, touched = radius * (1 + kTouch);
+  for (std::size_t node = 0; node < model.nodes(); ++node) {
+    const std::size_t vertex = model.vertex[node];
+    if (body_[vertex] == 0 || loads.constraint[node] == Constraint::placed) continue;
+    const glm::dvec3 rest = rest_of(vertex), from = rest + glm::dvec3(now[node]) - centre;
+    // Products and sums in this order, and a root, which every processor rounds alike.
+    const double away = std::sqrt((from.x * from.x + from.y * from.y) + from.z * from.z);
+    if (!(away < touched)) continue;
+    loads.constraint[node] = Constraint::placed;
+    loads.goal[node] = now[node];
+    if (!(away < radius)) continue;
+    const glm::dvec3 out = away > 0 ? from * (radius / away) : glm::dvec3(0, 0, radius);  // from its centre: upwards
+    loads.goal[node] = glm::vec3(centre + out - rest);
+  }
 }
 
 }  // namespace tetwarp::simulate

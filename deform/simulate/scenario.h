@@ -31,7 +31,7 @@ struct TissueClass {
   std::vector<std::int64_t> labels;  ///< labels of a cell; empty: any
 };
 
-/// Vertices that do not move in any phase.
+/// Vertices that do not move: in any phase (`Scenario::hold`), or in one (`Phase::pins`).
 struct HeldZone {
   Zone zone;          ///< which vertices
   std::string entry;  ///< name of the entry in messages: `hold[1] "spine"`
@@ -53,11 +53,26 @@ struct Force {
   glm::dvec3 newton;  ///< total force, N, in LPS
 };
 
+/// The way of a hand that holds some tissue, frame by frame.
+struct Drag {
+  /// Where the tissue is after each frame of the phase, LPS mm, from where it was when the phase began.
+  std::vector<glm::dvec3> by_mm;
+};
+
 /// One motion or force in a phase.
 struct Move {
-  std::variant<Zone, Handle> what;           ///< the vertices that are moved
-  std::variant<Shift, Rotation, Force> how;  ///< what moves them
-  std::string entry;                         ///< name of the entry in messages: `phases[0].move[1] "left lip"`
+  std::variant<Zone, Handle> what;                 ///< the vertices that are moved
+  std::variant<Shift, Rotation, Force, Drag> how;  ///< what moves them
+  std::string entry;                               ///< name of the entry in messages: `phases[0].move[1] "left lip"`
+  std::string name{};                              ///< its own name; may be empty
+};
+
+/// A rigid ball that the body gives way to. In each frame, vertices of the body's cells that it meets where the frame
+/// before left them are placed on its surface, along the line from its centre; those that it only touches, up to a
+/// hundredth of its radius away, stay in place. All others are free.
+struct Push {
+  double radius_mm = 0;           ///< radius, mm
+  std::vector<glm::dvec3> at_mm;  ///< centre in each frame of the phase, LPS mm
 };
 
 /// A plane cut before the patient is known.
@@ -86,10 +101,12 @@ struct CutPlan {
 };
 
 /// A part of a scenario. From the state in which the phase before ended, moves go to their goals in `frames` equal
-/// steps. Vertices that an earlier phase moved and this one does not are free again.
+/// steps, or where a drag takes them. Vertices that an earlier phase moved and this one does not are free again.
 struct Phase {
   std::string name;                      ///< name that messages use
   std::vector<Move> moves;               ///< what is moved
+  std::vector<HeldZone> pins{};          ///< what stays where it was when the phase began
+  std::optional<Push> push{};            ///< a ball that tissue gives way to
   std::vector<std::string> closed_cuts;  ///< names of the cuts that are closed in this phase; all others are open
   int frames = 1;                        ///< number of steps
 };
@@ -97,6 +114,7 @@ struct Phase {
 /// What is done to a patient, described so that it fits any patient.
 struct Scenario {
   std::string name;                   ///< name that messages use
+  std::string description{};          ///< what people are told of it
   Method method = Method::chainmail;  ///< how it is simulated
   std::int64_t cell_size = 8;         ///< distance of lattice vertices, voxels
   double body_above_hu = -400;        ///< cells of higher mean HU can belong to the body
@@ -123,35 +141,49 @@ std::vector<std::uint8_t> tissue_of_cells(const Scenario& scenario, const Patien
 /// @throws InputError for lengths in parts of the body where the patient has no body
 std::vector<Cut> open_cuts(const Scenario& scenario, const Phase& phase, const Patient& patient);
 
+/// How many vertices a phase holds, pins, moves to a goal, and pulls without one.
+struct PhaseCounts {
+  std::size_t held = 0, pinned = 0, moved = 0, with_force = 0;
+};
+
 /// What a phase does to which vertices.
 ///
-/// A held vertex is never moved. A vertex in several moves needs the same goal from each of them. Forces on a vertex
-/// add up, and a move with a goal excludes them.
+/// A held vertex is never moved, nor is a pinned one that is not held. A vertex in several moves needs the same goal
+/// from each of them. Forces on a vertex add up, and a move with a goal excludes them. A ball meets only vertices that
+/// are not held, pinned or moved to a goal.
 class PhaseLoads {
  public:
-  /// @throws InputError, which names the entries, for moves that disagree or move no free vertex; for forces in
-  ///         ChainMail; for a mass-spring phase in which nothing is held or moved
+  /// @throws InputError, which names the entries, for moves that disagree or move no free vertex; for drags and balls
+  ///         whose ways have another length than the phase has frames, and balls where there is no body; for forces in
+  ///         ChainMail; for a mass-spring phase in which nothing is held, pinned or moved
   PhaseLoads(const Scenario& scenario, const Phase& phase, const Patient& patient);
 
-  /// Loads of the nodes of a model when `part` (0 to 1) of the way is done. Rotations follow their arc.
+  /// Loads of the nodes of a model when `part` (0 to 1) of the way is done. Rotations follow their arc, drags and balls
+  /// are where the last frame up to there takes them.
   /// @param part   0 to 1
   /// @param model  model of the phase
   /// @param start  displacement of each node when the phase began, LPS mm
-  Loads at(double part, const Model& model, std::span<const glm::vec3> start) const;
+  /// @param now    displacement of each node after the frame before, LPS mm; read only where `pushes`
+  Loads at(double part, const Model& model, std::span<const glm::vec3> start,
+           std::span<const glm::vec3> now = {}) const;
 
-  /// Whether some vertex moves along an arc; otherwise all move along straight lines.
-  bool turns() const;
-  /// Number of held vertices.
-  std::size_t held() const { return held_; }
-  /// Number of vertices with a goal.
-  std::size_t moved() const { return moved_; }
-  /// Number of vertices with a force and no goal.
-  std::size_t with_force() const;
+  /// Whether loads must be set anew for each frame; otherwise all vertices move along straight lines, at one speed.
+  bool changes_by_frame() const;
+  /// Whether there is a ball, so that loads depend on where nodes are.
+  bool pushes() const { return push_.has_value(); }
+  /// How many vertices it does something to.
+  PhaseCounts counts() const;
   /// Remarks for people, such as a hold that holds no vertex.
   const std::vector<std::string>& notes() const { return notes_; }
 
  private:
-  void hold(const Scenario& scenario, const Patient& patient);
+  void hold(std::span<const HeldZone> zones, const Patient& patient, std::int32_t as);
+  void check_ways(const Phase& phase) const;
+  void push(int frame, const Model& model, std::span<const glm::vec3> now, Loads& loads) const;
+  bool is_same_way(std::size_t move, std::size_t other, const glm::dvec3& point) const;
+  /// Index of the frame that ends when so much of the way is done.
+  int frame_at(double part) const;
+  glm::dvec3 rest_of(std::size_t vertex) const;
   void place(const Phase& phase, std::size_t move, const std::vector<std::size_t>& vertices);
   void add_force(const glm::dvec3& newton, const std::vector<std::size_t>& vertices);
   std::vector<std::size_t> free_vertices(const Move& move, const Patient& patient) const;
@@ -162,16 +194,20 @@ class PhaseLoads {
     glm::dvec3 by{0};  ///< shift, LPS mm
     /// A point on the axis of rotation, LPS mm, and the unit vector of the axis; 0: no rotation.
     glm::dvec3 about{0}, axis{0};
-    double radians = 0;  ///< angle of the rotation
+    double radians = 0;             ///< angle of the rotation
+    std::vector<glm::dvec3> along;  ///< of a drag, after each frame, LPS mm
   };
-  static constexpr std::int32_t kFree = -1, kHeld = -2;
+  static constexpr std::int32_t kFree = -1, kHeld = -2, kPinned = -3;
 
   AffineMap vertex_point_;
   glm::i64vec3 size_;
   std::vector<Way> ways_;             ///< one for each move of the phase
-  std::vector<std::int32_t> way_of_;  ///< for each vertex an index into `ways_`, or kFree or kHeld
+  std::vector<std::int32_t> way_of_;  ///< for each vertex an index into `ways_`, or kFree, kHeld or kPinned
   std::vector<glm::vec3> force_;      ///< force on each vertex, N; empty: none
-  std::size_t held_ = 0, moved_ = 0;
+  std::optional<Push> push_;
+  std::vector<std::uint8_t> body_;  ///< for each vertex: 1 if a ball may meet it
+  int frames_ = 1;
+  std::size_t held_ = 0, pinned_ = 0, moved_ = 0;
   std::vector<std::string> notes_;
 };
 

@@ -26,7 +26,10 @@ ScenarioRun::ScenarioRun(const Scenario& scenario, const Patient& patient, MakeS
       make_(std::move(make)),
       tissue_of_cell_(tissue_of_cells(scenario, patient)) {
   for (const Phase& phase : scenario.phases) {
-    loads_.emplace_back(scenario, phase, patient);
+    const PhaseLoads loads(scenario, phase, patient);
+    counts_.push_back(loads.counts());
+    for (const std::string& note : loads.notes())
+      if (std::find(notes_.begin(), notes_.end(), note) == notes_.end()) notes_.push_back(note);
     for (const Cut& cut : open_cuts(scenario, phase, patient)) CutSurface{cut};  // throws for a cut that is none
   }
   make_model_of(scenario.phases.front());
@@ -68,7 +71,8 @@ void ScenarioRun::begin_phase() {
     simulation_ = make_(model_);
     simulation_->set_displacement(start_);
   }
-  if (!loads_[phase_].turns()) simulation_->set_loads(loads_[phase_].at(1, model_, start_));
+  loads_.emplace(scenario_, phase, patient_);
+  if (!loads_->changes_by_frame()) simulation_->set_loads(loads_->at(1, model_, start_));
 }
 
 FrameResult ScenarioRun::next(const Control& control) {
@@ -78,8 +82,9 @@ FrameResult ScenarioRun::next(const Control& control) {
   const double part = static_cast<double>(frame_in_phase_ + 1) / phase.frames;
   FrameResult frame{.number = done_ + 1, .phase = phase_, .convergence = {}};
   simulation_->set_deadband(frame_in_phase_ + 1 == phase.frames ? 0 : scenario_.deadband_mm);
-  if (loads_[phase_].turns()) {
-    simulation_->set_loads(loads_[phase_].at(part, model_, start_));
+  if (loads_->changes_by_frame()) {
+    const std::vector<glm::vec3> now = loads_->pushes() ? displacement() : std::vector<glm::vec3>{};
+    simulation_->set_loads(loads_->at(part, model_, start_, now));
     frame.convergence = simulation_->advance(1, scenario_.stop, control);
   } else {
     frame.convergence = simulation_->advance(part, scenario_.stop, control);

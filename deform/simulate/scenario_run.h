@@ -5,7 +5,9 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "deform/simulate/divided_lattice.h"
@@ -54,8 +56,10 @@ class ScenarioRun {
   Report resample(ForwardResampler& resampler, std::span<const Target> targets, Outside outside = Outside::background,
                   const Maps& maps = {}, const FieldOptions& options = {}, const Control& control = {});
 
-  /// The loads of a phase, by index.
-  const PhaseLoads& loads(std::size_t phase) const { return loads_[phase]; }
+  /// What a phase does, by index.
+  const PhaseCounts& counts(std::size_t phase) const { return counts_[phase]; }
+  /// Remarks for people on all phases, each once: such as a hold that holds no vertex.
+  const std::vector<std::string>& notes() const { return notes_; }
   /// For each cell, i fastest, the index of its tissue in `Scenario::tissues`.
   const std::vector<std::uint8_t>& tissues() const { return tissue_of_cell_; }
   /// Whether open cuts divide cells, so that a mesh takes their place in the field.
@@ -78,8 +82,10 @@ class ScenarioRun {
   const Patient& patient_;
   MakeSimulation make_;
   std::vector<std::uint8_t> tissue_of_cell_;
-  std::vector<PhaseLoads> loads_;
-  DividedLattice division_;  ///< the lattice as the open cuts divide it
+  std::vector<PhaseCounts> counts_;  ///< of each phase
+  std::vector<std::string> notes_;
+  std::optional<PhaseLoads> loads_;  ///< of the phase that has begun: of all of them they would fill the memory
+  DividedLattice division_;          ///< the lattice as the open cuts divide it
   Model model_;
   std::unique_ptr<Simulation> simulation_;
   std::vector<glm::vec3> start_;  ///< displacement of each node when the phase began, LPS mm

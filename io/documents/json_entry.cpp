@@ -85,6 +85,11 @@ const std::string& JsonEntry::text() const {
   return tree_->text;
 }
 
+const std::string& JsonEntry::any_text() const {
+  expect(JsonTree::Kind::text, "a text");
+  return tree_->text;
+}
+
 glm::dvec3 JsonEntry::vector(const NumberRange& range) const {
   const std::string expected = "a list of three numbers";
   expect(JsonTree::Kind::list, expected);

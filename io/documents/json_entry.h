@@ -46,6 +46,8 @@ class JsonEntry {
   bool truth() const;
   /// The value as a text, which is not empty and has at most 200 characters.
   const std::string& text() const;
+  /// The value as a text of any length.
+  const std::string& any_text() const;
   /// The value as three numbers in a range.
   glm::dvec3 vector(const NumberRange& range) const;
   /// The value as three numbers that are not all 0.

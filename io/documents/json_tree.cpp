@@ -15,7 +15,7 @@ namespace tetwarp {
 
 namespace {
 
-constexpr std::size_t kDeepest = 64, kLongestQuote = 120, kLargestFile = std::size_t{1} << 20;
+constexpr std::size_t kDeepest = 64, kLongestQuote = 120;
 
 /// The number of the line in which the byte that was taken last stands, and of the one before it.
 struct LineCount {
@@ -162,16 +162,16 @@ JsonTree parse_json(std::string_view bytes, const std::string& name) {
   return builder.take();
 }
 
-JsonTree read_json(const std::filesystem::path& path, const std::string& kind) {
+JsonTree read_json(const std::filesystem::path& path, const std::string& kind, std::size_t most_bytes) {
   std::error_code error;
   require(!std::filesystem::is_directory(path, error), kind + " is a file, " + path.string() + " is a folder");
   std::ifstream file = opened(path);
-  std::string bytes(kLargestFile + 1, '\0');
+  std::string bytes(most_bytes + 1, '\0');
   file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   require(!file.bad(), "cannot be read to its end, " + path.string());
   bytes.resize(static_cast<std::size_t>(file.gcount()));
-  require(bytes.size() <= kLargestFile, "more than " + std::to_string(kLargestFile) + " bytes, " + path.string() +
-                                            "; " + kind + " is a page of JSON");
+  require(bytes.size() <= most_bytes, "more than " + std::to_string(most_bytes) + " bytes, " + path.string() + "; " +
+                                          kind + " is JSON of at most that many");
   return parse_json(bytes, path.string());
 }
 

@@ -39,9 +39,11 @@ std::string printable(std::string_view text);
 /// objects nested more than 64 deep
 JsonTree parse_json(std::string_view bytes, const std::string& name);
 
-/// Parses a file of at most 1 MiB.
-/// @param kind  what messages call it: "a scenario"
+/// Parses a file.
+/// @param kind        what messages call it: "a scenario"
+/// @param most_bytes  that it may have
 /// @throws InputError for a file that cannot be read, and for what `parse_json` refuses
-JsonTree read_json(const std::filesystem::path& path, const std::string& kind);
+JsonTree read_json(const std::filesystem::path& path, const std::string& kind,
+                   std::size_t most_bytes = std::size_t{1} << 20);
 
 }  // namespace tetwarp

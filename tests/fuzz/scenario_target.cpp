@@ -41,7 +41,7 @@ void prepare(const Scenario& scenario) {
   const std::vector<glm::vec3> start(model.nodes());
   for (const Phase& phase : scenario.phases) {
     open_cuts(scenario, phase, patient());
-    const Loads loads = PhaseLoads(scenario, phase, patient()).at(0.5, model, start);
+    const Loads loads = PhaseLoads(scenario, phase, patient()).at(0.5, model, start, start);
     for (const glm::vec3& goal : loads.goal) require_finite(goal);
     for (const glm::vec3& force : loads.force) require_finite(force);
   }

@@ -39,10 +39,10 @@ TEST(Scenario, HeldAndMovedVerticesGoToTheirGoals) {
   const Patient patient = uniform_patient();
   const Scenario scenario = scenario_of({{kBottom, "hold[0]"}}, {move_of(kTop, Shift{{1, 2, 3}}, "move[0]")});
   const PhaseLoads loads(scenario, scenario.phases[0], patient);
-  EXPECT_EQ(loads.held(), kLayer);
-  EXPECT_EQ(loads.moved(), kLayer);
-  EXPECT_EQ(loads.with_force(), 0u);
-  EXPECT_FALSE(loads.turns());
+  EXPECT_EQ(loads.counts().held, kLayer);
+  EXPECT_EQ(loads.counts().moved, kLayer);
+  EXPECT_EQ(loads.counts().with_force, 0u);
+  EXPECT_FALSE(loads.changes_by_frame());
   const Model model = make_model(patient.lattice, tissue_of_cells(scenario, patient), std::vector<Tissue>{{}});
   std::vector<glm::vec3> start(model.nodes());
   start.back() = {8, 0, 0};
@@ -75,8 +75,8 @@ TEST(Scenario, HoldWinsOverMoves) {
   const Zone left{HalfSpace{{{0, 0, 0}}, {1, 0, 0}}};
   Scenario scenario = scenario_of({{left, "hold[0]"}}, {move_of(kTop, Shift{{1, 2, 3}}, "move[0]")});
   const PhaseLoads loads(scenario, scenario.phases[0], patient);
-  EXPECT_EQ(loads.held(), 6u * 11 * 6);
-  EXPECT_EQ(loads.moved(), 5u * 11);
+  EXPECT_EQ(loads.counts().held, 6u * 11 * 6);
+  EXPECT_EQ(loads.counts().moved, 5u * 11);
   scenario.hold = {{kTop, "hold[0]"}};
   EXPECT_TRUE(says(refusal([&] { PhaseLoads(scenario, scenario.phases[0], patient); }),
                    {"move[0]", "121 of its 121 vertices are held"}));
@@ -92,7 +92,7 @@ TEST(Scenario, MovesThatDisagreeAreRefusedByBothNames) {
            {"move[0] \"push\"", "move[1] \"pull\"", "(0.0, -4.0, 40.0)", "(0.0, -4.0, 44.0)", "(4.0, -4.0, 40.0)"}));
   const Move same = move_of(Handle{{{0, 0, 40}}, {5}}, Shift{{0, 0, 0.1}, Unit::body}, "move[1]");
   const Scenario agreed = scenario_of({}, {push, same});  // a tenth of 40 mm
-  EXPECT_EQ(PhaseLoads(agreed, agreed.phases[0], patient).moved(), kLayer);
+  EXPECT_EQ(PhaseLoads(agreed, agreed.phases[0], patient).counts().moved, kLayer);
 }
 
 TEST(Scenario, TurnsFollowTheirArc) {
@@ -100,7 +100,7 @@ TEST(Scenario, TurnsFollowTheirArc) {
   const Rotation turn{{{0, 0, 0}}, {0, 0, 2}, 90};
   const Scenario scenario = scenario_of({}, {move_of(kTop, turn, "move[0]")});
   const PhaseLoads loads(scenario, scenario.phases[0], patient);
-  EXPECT_TRUE(loads.turns());
+  EXPECT_TRUE(loads.changes_by_frame());
   const Model model = make_model(patient.lattice, tissue_of_cells(scenario, patient), std::vector<Tissue>{{}});
   const std::vector<glm::vec3> start(model.nodes());
   const glm::vec3 corner = loads.at(1, model, start).goal[kVertices - 1];  // (20, 20) to (-20, 20)
@@ -110,14 +110,96 @@ TEST(Scenario, TurnsFollowTheirArc) {
   EXPECT_LT(glm::distance(on_the_way, glm::vec3(-20, far - 20, 0)), 1e-4f);
 }
 
+TEST(Scenario, ADragBeginsWhereTheTissueIsAndPinsStayThere) {
+  const Patient patient = uniform_patient();
+  Scenario scenario = scenario_of({{kBottom, "hold[0]"}}, {move_of(kTop, Drag{{{1, 0, 0}, {1, 2, 0}}}, "move[0]")});
+  Phase& phase = scenario.phases[0];
+  phase.frames = 2;
+  phase.pins = {{Zone{HalfSpace{{{0, 0, 32}}, {0, 0, 1}}}, "pin[0]"}};  // the layer below the top, and the top
+  EXPECT_TRUE(says(refusal([&] { PhaseLoads(scenario, phase, patient); }), {"move[0]", "pinned"}));
+  phase.pins = {{Zone{AllOf{{Zone{HalfSpace{{{0, 0, 32}}, {0, 0, 1}}}, Zone{Not{{kTop}}}}}}, "pin[0]"}};
+  const PhaseLoads loads(scenario, phase, patient);
+  EXPECT_TRUE(loads.changes_by_frame());
+  EXPECT_FALSE(loads.pushes());
+  EXPECT_EQ(loads.counts().held, kLayer);
+  EXPECT_EQ(loads.counts().pinned, kLayer);
+  EXPECT_EQ(loads.counts().moved, kLayer);
+  const Model model = make_model(patient.lattice, tissue_of_cells(scenario, patient), std::vector<Tissue>{{}});
+  const std::vector<glm::vec3> start(model.nodes(), glm::vec3(8, 4, 2));
+  for (int frame = 0; frame < 2; ++frame) {
+    const Loads at = loads.at(0.5 * (frame + 1), model, start);
+    EXPECT_EQ(at.goal.front(), glm::vec3(0));  // held at rest
+    EXPECT_EQ(at.constraint[kVertices - 2 * kLayer], Constraint::placed);
+    EXPECT_EQ(at.goal[kVertices - 2 * kLayer], start[0]);
+    EXPECT_EQ(at.goal.back(), frame == 0 ? glm::vec3(9, 4, 2) : glm::vec3(9, 6, 2));
+    EXPECT_EQ(at.constraint[kLayer], Constraint::free);
+  }
+}
+
+TEST(Scenario, DragsThatDisagreeInAnyFrameOrLackAFrameAreRefused) {
+  const Patient patient = uniform_patient();
+  const Drag way{{{1, 0, 0}, {1, 2, 0}}}, other{{{1, 1, 0}, {1, 2, 0}}};
+  const auto with = [&](std::vector<Move> moves, int frames) {
+    Scenario scenario = scenario_of({}, std::move(moves));
+    scenario.phases[0].frames = frames;
+    return refusal([&] { PhaseLoads(scenario, scenario.phases[0], patient); });
+  };
+  EXPECT_EQ(with({move_of(kTop, way, "a"), move_of(kTop, way, "b")}, 2), "");
+  EXPECT_TRUE(says(with({move_of(kTop, way, "a"), move_of(kTop, other, "b")}, 2), {"a and b"}));
+  EXPECT_TRUE(says(with({move_of(kTop, way, "a"), move_of(kTop, Shift{{1, 2, 0}}, "b")}, 2), {"a and b"}));
+  EXPECT_TRUE(says(with({move_of(kTop, way, "a")}, 3), {"a has 2 places", "3 frames"}));
+}
+
+TEST(Scenario, ABallPlacesWhatItMeetsOnItsSurface) {
+  const Patient patient = uniform_patient();
+  Scenario scenario = scenario_of({{kBottom, "hold[0]"}}, {});
+  Phase& phase = scenario.phases[0];
+  phase.frames = 2;
+  const glm::dvec3 near(0, 0, 47), far(0, 0, 60);
+  phase.push = Push{10, {far, near}};
+  const PhaseLoads loads(scenario, phase, patient);
+  EXPECT_TRUE(loads.changes_by_frame());
+  ASSERT_TRUE(loads.pushes());
+  const Model model = make_model(patient.lattice, tissue_of_cells(scenario, patient), std::vector<Tissue>{{}});
+  const std::vector<glm::vec3> now(model.nodes());
+  const auto placed = [](const Loads& of) {
+    return std::count(of.constraint.begin(), of.constraint.end(), Constraint::placed);
+  };
+  EXPECT_EQ(placed(loads.at(0.5, model, now, now)), static_cast<std::ptrdiff_t>(kLayer));  // those that are held
+  const Loads met = loads.at(1, model, now, now);
+  std::size_t met_count = 0;
+  for (std::size_t n = kLayer; n < kVertices; ++n) {
+    const auto vertex = static_cast<std::int64_t>(n);
+    const glm::dvec3 rest(-20.0 + 4.0 * static_cast<double>(vertex % 11),
+                          -20.0 + 4.0 * static_cast<double>(vertex / 11 % 11), 8.0 * static_cast<double>(vertex / 121));
+    const double away = glm::distance(rest, near);
+    ASSERT_EQ(met.constraint[n], away < 10.1 ? Constraint::placed : Constraint::free) << n;
+    if (away >= 10.1) continue;
+    ++met_count;
+    const glm::dvec3 goal = rest + glm::dvec3(met.goal[n]);
+    EXPECT_NEAR(glm::distance(goal, near), std::max(away, 10.0), 1e-5);
+    EXPECT_LT(glm::length(glm::cross(goal - near, rest - near)), 1e-4);  // along the line from the centre
+  }
+  EXPECT_GT(met_count, 4u);
+  // Where a node is counts, not where it rests.
+  std::vector<glm::vec3> gone = now;
+  for (std::size_t n = kVertices - kLayer; n < kVertices; ++n) gone[n].z = -20;
+  EXPECT_EQ(placed(loads.at(1, model, now, gone)), static_cast<std::ptrdiff_t>(kLayer));
+  phase.push->at_mm.pop_back();
+  EXPECT_TRUE(says(refusal([&] { PhaseLoads(scenario, phase, patient); }), {"ball", "1 places", "2 frames"}));
+  phase.push = Push{10, {far, near}};
+  const Patient air = uniform_patient(-1000);
+  EXPECT_TRUE(says(refusal([&] { PhaseLoads(scenario, phase, air); }), {"ball", "body"}));
+}
+
 TEST(Scenario, ForceIsSharedByWhatIsPulled) {
   const Patient patient = uniform_patient();
   const Move pull = move_of(kTop, Force{{0, 0, 121}}, "move[0]");
   Scenario scenario = scenario_of({{kBottom, "hold[0]"}}, {pull, pull});
   scenario.method = Method::mass_spring;
   const PhaseLoads loads(scenario, scenario.phases[0], patient);
-  EXPECT_EQ(loads.with_force(), kLayer);
-  EXPECT_EQ(loads.moved(), 0u);
+  EXPECT_EQ(loads.counts().with_force, kLayer);
+  EXPECT_EQ(loads.counts().moved, 0u);
   const Model model = make_model(patient.lattice, tissue_of_cells(scenario, patient), std::vector<Tissue>{{}});
   const Loads whole = loads.at(1, model, std::vector<glm::vec3>(model.nodes()));
   ASSERT_EQ(whole.force.size(), kVertices);
@@ -236,6 +318,28 @@ TEST(ScenarioRun, TurnsAreGivenFrameByFrame) {
   EXPECT_LT(glm::distance(run.displacement().back(), glm::vec3(-40, 0, 0)), 1e-4f);
   EXPECT_EQ(log.loads, 2);
   EXPECT_EQ(log.parts, (std::vector<double>{1, 1}));
+}
+
+TEST(ScenarioRun, DragsPinsAndBallsGoOnFromWhereTissueIs) {
+  const Patient patient = uniform_patient();
+  Scenario scenario = scenario_of({}, {move_of(kTop, Shift{{8, 0, 0}}, "move[0]")});
+  scenario.phases.push_back({.name = "drag",
+                             .moves = {move_of(kTop, Drag{{{0, 1, 0}, {0, 3, 0}}}, "phases[1].move[0]")},
+                             .closed_cuts = {},
+                             .frames = 2});
+  scenario.phases.push_back({.name = "pin", .moves = {}, .pins = {{kTop, "phases[2].pin[0]"}}, .closed_cuts = {}});
+  const glm::dvec3 last_rest(20, 20, 40), last_now = last_rest + glm::dvec3(8, 3, 0);
+  scenario.phases.push_back(
+      {.name = "push", .moves = {}, .push = Push{2, {last_now + glm::dvec3(0, 0, 1)}}, .closed_cuts = {}});
+  Puppet::Log log;
+  ScenarioRun run(scenario, patient, {[&](const Model& model) { return std::make_unique<Puppet>(model, log); }});
+  const std::vector<glm::vec3> expected = {{8, 0, 0}, {8, 1, 0}, {8, 3, 0}, {8, 3, 0}, {8, 3, -1}};
+  for (const glm::vec3& there : expected) {
+    run.next();
+    EXPECT_EQ(run.displacement().back(), there);
+  }
+  EXPECT_EQ(run.displacement()[kVertices - 2], glm::vec3(8, 3, 0));  // 4 mm beside it: the ball does not reach it
+  EXPECT_EQ(log.made, 1);
 }
 
 TEST(ScenarioRun, RefusesOnePhaseBeforeTheFirstIsSimulated) {

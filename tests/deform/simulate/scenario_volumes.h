@@ -55,8 +55,9 @@ inline std::vector<std::size_t> numbers_of(const std::vector<std::uint8_t>& insi
   return numbers;
 }
 
-inline Move move_of(std::variant<Zone, Handle> what, std::variant<Shift, Rotation, Force> how, std::string entry) {
-  return {std::move(what), how, std::move(entry)};
+inline Move move_of(std::variant<Zone, Handle> what, std::variant<Shift, Rotation, Force, Drag> how,
+                    std::string entry) {
+  return {std::move(what), std::move(how), std::move(entry)};
 }
 
 inline TissueClass tissue_of(std::string name, std::optional<HuRange> hu = {}, std::vector<std::int64_t> labels = {}) {

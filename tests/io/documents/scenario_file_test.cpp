@@ -6,6 +6,9 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
 
 #include "deform/errors.h"
 #include "tests/support/says.h"
@@ -20,7 +23,7 @@ using namespace simulate;
 /// A scenario in which everything occurs, a key a line.
 constexpr const char* kWhole = R"({
   "$schema": "../../docs/scenario.schema.json",
-  "name": "everything",
+  "name": "everything", "description": "Every key",
   "method": "mass-spring",
   "cell_size": 4,
   "body_above_hu": -300,
@@ -48,7 +51,10 @@ constexpr const char* kWhole = R"({
       {"region": {"any_of": [{"box": {"from": {"mm": [1, 2, 3]}, "to": {"mm": [0, 0, 0]}}}, {"body": true}]},
        "force_n": [0, 0, 5]}
     ]},
-    {"closed_cuts": ["midline", "round", "slit"]}
+    {"closed_cuts": ["midline", "round", "slit"]},
+    {"name": "by hand", "frames": 2, "closed_cuts": ["slit"], "pin": [{"label": 9}, {"border": true}],
+     "push": {"radius_mm": 12.5, "path_mm": [[0, 0.1, 3], [1, 0, 2.5]]},
+     "move": [{"handle": {"at": {"mm": [4, 5, 6]}, "radius_mm": 7}, "drag_mm": [[0, 0, 0], [1, 0.1, -3]]}]}
   ],
   "stop": {"motion_mm": 0.02, "residual": 1e-4, "steps": 500},
   "deadband_mm": 0.05
@@ -87,6 +93,7 @@ class ScenarioFile : public testing::Test {
 TEST_F(ScenarioFile, ReadsEverything) {
   const Scenario scenario = read(kWhole);
   EXPECT_EQ(scenario.name, "everything");
+  EXPECT_EQ(scenario.description, "Every key");
   EXPECT_EQ(scenario.method, Method::mass_spring);
   EXPECT_EQ(scenario.cell_size, 4);
   EXPECT_EQ(scenario.body_above_hu, -300);
@@ -111,12 +118,13 @@ TEST_F(ScenarioFile, ReadsEverything) {
 
 TEST_F(ScenarioFile, ReadsPhasesAndMoves) {
   const Scenario scenario = read(kWhole);
-  ASSERT_EQ(scenario.phases.size(), 2u);
+  ASSERT_EQ(scenario.phases.size(), 3u);
   const Phase& open = scenario.phases[0];
   EXPECT_EQ(open.frames, 10);
   EXPECT_EQ(open.closed_cuts, std::vector<std::string>{"round"});
   ASSERT_EQ(open.moves.size(), 4u);
   EXPECT_EQ(open.moves[0].entry, "phases[0].move[0] \"lip\" (line 24)");
+  EXPECT_EQ(open.moves[0].name, "lip");
   EXPECT_EQ(std::get<Handle>(open.moves[0].what).at.at, glm::dvec3(0.4, 0, 0.5));
   EXPECT_EQ(std::get<Shift>(open.moves[0].how).by, glm::dvec3(-25, 0, 0));
   EXPECT_EQ(std::get<Shift>(open.moves[1].how).unit, Unit::body);
@@ -124,11 +132,62 @@ TEST_F(ScenarioFile, ReadsPhasesAndMoves) {
   EXPECT_EQ(std::get<Force>(open.moves[3].how).newton, glm::dvec3(0, 0, 5));
   EXPECT_EQ(scenario.phases[1].name, "phases[1]");
   EXPECT_EQ(scenario.phases[1].frames, 1);
+  const Phase& by_hand = scenario.phases[2];
+  EXPECT_EQ(by_hand.frames, 2);
+  ASSERT_EQ(by_hand.pins.size(), 2u);
+  EXPECT_EQ(by_hand.pins[0].entry, "phases[2].pin[0] (line 32)");
+  EXPECT_EQ(by_hand.push->radius_mm, 12.5);
+  EXPECT_EQ(by_hand.push->at_mm, (std::vector<glm::dvec3>{{0, 0.1, 3}, {1, 0, 2.5}}));
+  EXPECT_EQ(std::get<Drag>(by_hand.moves[0].how).by_mm, (std::vector<glm::dvec3>{{0, 0, 0}, {1, 0.1, -3}}));
   const Scenario small = read(R"({"method": "chainmail", "move": [{"region": {"body": true}, "by_mm": [1, 0, 0]}]})");
   ASSERT_EQ(small.phases.size(), 1u);
   EXPECT_EQ(small.phases[0].frames, 1);
   EXPECT_EQ(small.cell_size, 8);
   EXPECT_EQ(small.tissues.size(), 1u);
+}
+
+TEST_F(ScenarioFile, AWayHasAPlaceForEachFrameAndSaysHowManyThereAre) {
+  const auto with = [](const std::string& keys) { return "{\"method\": \"chainmail\", \"phases\": [{" + keys + "}]}"; };
+  const std::string drag = R"("move": [{"region": {"body": true}, "drag_mm": [[1, 0, 0], [2, 0, 0], [3, 0, 0]]}])",
+                    push = R"("push": {"radius_mm": 3, "path_mm": [[1, 0, 0], [2, 0, 0]]})";
+  EXPECT_EQ(read(with(drag)).phases[0].frames, 3);
+  EXPECT_EQ(read(with(push)).phases[0].frames, 2);
+  EXPECT_EQ(read("{\"method\": \"chainmail\", " + drag + "}").phases[0].frames, 3);
+  EXPECT_EQ(refusal(with(drag + ", \"frames\": 2")),
+            "s.json:1: phases[0].move[0].drag_mm has 3 places, and the phase 2 frames; a place a frame is expected");
+  EXPECT_EQ(refusal(with(drag + ", " + push)),
+            "s.json:1: phases[0].push.path_mm has 2 places, and the phase 3 frames; a place a frame is expected");
+}
+
+TEST_F(ScenarioFile, WhatIsWrittenIsReadAsTheSameAndWrittenAlike) {
+  std::vector<std::string> texts = {kWhole};
+  for (const auto& entry : std::filesystem::directory_iterator(TETWARP_SCENARIOS)) {
+    std::ifstream file(entry.path());
+    texts.emplace_back(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
+  }
+  for (const std::string& text : texts) {
+    const Scenario first = read(text);
+    const std::string written = scenario_text(first);
+    const Scenario again = read(written);
+    EXPECT_EQ(scenario_text(again), written);
+    EXPECT_EQ(again.name, first.name);
+    EXPECT_EQ(frame_count(again), frame_count(first));
+    ASSERT_EQ(again.phases.size(), first.phases.size());
+  }
+  // No key of the file in which everything occurs is lost, and no number.
+  nlohmann::json whole = nlohmann::json::parse(kWhole), again = nlohmann::json::parse(scenario_text(read(kWhole)));
+  whole.erase("$schema");
+  for (nlohmann::json& tissue : whole["tissues"])  // what may be left out is written
+    for (const auto& [key, value] :
+         {std::pair{"youngs_modulus_kpa", 10.0}, {"compression", 0.2}, {"stretch", 0.2}, {"shear", 0.2}})
+      if (!tissue.contains(key)) tissue[key] = value;
+  whole["phases"][1]["frames"] = 1;
+  for (const char* shape : {"half_space"})
+    whole["phases"][0]["move"][2]["region"][shape]["normal"] = {0, 0, -1};  // of any length
+  whole["cuts"][1]["disc"]["normal"] = {0, 0, 1};
+  for (nlohmann::json* label : {&whole["hold"][0]["all_of"][1]["not"]["label"], &whole["phases"][2]["pin"][0]["label"]})
+    *label = {*label};
+  EXPECT_EQ(again, whole) << nlohmann::json::diff(whole, again).dump(1);
 }
 
 TEST_F(ScenarioFile, RefusalsNameLineKeyAndWhatIsExpected) {
@@ -157,8 +216,9 @@ TEST_F(ScenarioFile, RefusalsNameLineKeyAndWhatIsExpected) {
 }
 
 TEST_F(ScenarioFile, RefusesWhatDoesNotGoTogether) {
-  EXPECT_EQ(refusal(", \"by_mm\": [-25, 0, 0]", ""),
-            "s.json:24: phases[0].move[0] has none of by_mm, by_body, rotate or force_n; one of them is expected");
+  EXPECT_EQ(
+      refusal(", \"by_mm\": [-25, 0, 0]", ""),
+      "s.json:24: phases[0].move[0] has none of by_mm, by_body, rotate, drag_mm or force_n; one of them is expected");
   EXPECT_EQ(refusal("\"by_mm\": [-25, 0, 0]", "\"by_mm\": [-25, 0, 0], \"force_n\": [1, 0, 0]"),
             "s.json:24: phases[0].move[0] has both by_mm and force_n; one of them is expected");
   EXPECT_EQ(refusal("\"mass-spring\"", "\"chainmail\""),
@@ -211,7 +271,7 @@ TEST_F(ScenarioFile, RefusesWhatIsTooDeepOrTooLarge) {
   std::string nested = R"({"method": "chainmail", "hold": [)";
   for (int n = 0; n < 500; ++n) nested += R"({"not":)";
   EXPECT_TRUE(says(refusal(nested), {"64 deep"}));
-  EXPECT_TRUE(says(refusal(std::string((1 << 20) + 1, ' ')), {"more than 1048576 bytes"}));
+  EXPECT_TRUE(says(refusal(std::string((8 << 20) + 1, ' ')), {"more than 8388608 bytes"}));
   std::string many = "{\"hold\": [";
   for (int n = 0; n < 1001; ++n) many += std::string(n > 0 ? "," : "") + "{\"border\":true}";
   EXPECT_TRUE(says(refusal(many + "], \"method\": \"chainmail\"}"), {"hold has 1001 parts; a list of 0 to 1000"}));
@@ -270,6 +330,14 @@ const std::vector<std::string> kBadForms = {
     R"({"method": "chainmail", "phases": [{"move": [{"region": {"body": true}, "by_mm": [0, 0, 0], "by_body": [0, 0, 0]}]}]})",
     R"({"method": "chainmail", "phases": [{"move": [{"region": {"body": true}, "rotate": {"axis": [0, 0, 1], "degrees": 3}}]}]})",
     R"({"method": "chainmail", "phases": [{"move": [{"region": {"body": true}, "rotate": {"about": {"mm": [0, 0, 0]}, "axis": [0, 0, 1], "degrees": 181}}]}]})",
+    R"({"method": "chainmail", "phases": [{"move": [{"region": {"body": true}, "drag_mm": []}]}]})",
+    R"({"method": "chainmail", "phases": [{"move": [{"region": {"body": true}, "drag_mm": [1, 0, 0]}]}]})",
+    R"({"method": "chainmail", "phases": [{"move": [{"region": {"body": true}, "drag_mm": [[0, 0, 0]], "by_mm": [0, 0, 0]}]}]})",
+    R"({"method": "chainmail", "phases": [{"pin": [{}]}]})",
+    R"({"method": "chainmail", "phases": [{}], "pin": [{"body": true}]})",
+    R"({"method": "chainmail", "phases": [{"push": {"radius_mm": 3}}]})",
+    R"({"method": "chainmail", "phases": [{"push": {"radius_mm": 0, "path_mm": [[0, 0, 0]]}}]})",
+    R"({"method": "chainmail", "phases": [{"push": {"radius_mm": 3, "path_mm": [[0, 0]]}}]})",
     R"({"method": "chainmail", "phases": [{}], "stop": {"steps": 0}})",
     R"({"method": "chainmail", "phases": [{}], "deadband_mm": -0.1})",
     R"({"method": "chainmail", "phases": [{}], "deadband_mm": 11})",
