@@ -132,6 +132,27 @@ class CudaChainmail final : public Simulation {
     TETWARP_CUDA_TRY(cudaStreamSynchronize(stream_));
   }
 
+  std::vector<std::byte> state() const override {
+    const DeviceScope scope(device_);
+    const auto count = static_cast<std::size_t>(plan_.nodes());
+    std::vector<Units> now(count), shown(count);
+    now_.download(now.data(), count, nullptr);
+    shown_.download(shown.data(), count, nullptr);
+    return state_of_chain(now, shown, displacement_on_host());
+  }
+  void set_state(std::span<const std::byte> state) override {
+    const auto count = static_cast<std::size_t>(plan_.nodes());
+    std::vector<Units> now(count), shown(count);
+    std::vector<glm::vec3> displacement(count);
+    read_chain_state(state, now, shown, displacement);
+    const DeviceScope scope(device_);
+    uploaded(now_, now);
+    uploaded(shown_, shown);
+    uploaded(displacement_, displacement);
+    job_.placed_count = 0;
+    has_loads_ = false;
+  }
+
  private:
   /// Makes the chain stage. Where it is made again for the same loads, the paths of their sets are followed once.
   /// @return paths by which it is still to be made, if any

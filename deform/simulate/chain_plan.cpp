@@ -229,6 +229,29 @@ std::vector<std::uint8_t> ChainPlan::moving(std::span<const PlacedNode> placed) 
   return result;
 }
 
+std::vector<std::byte> state_of_chain(std::span<const Units> now, std::span<const Units> shown,
+                                      std::span<const glm::vec3> displacement) {
+  std::vector<std::byte> bytes;
+  for (const std::span<const Units>& units : {now, shown}) {
+    for (const Units& of : units) put_bytes(bytes, std::span<const std::int32_t>(of.at));  // without what aligns it
+  }
+  put_bytes(bytes, displacement);
+  return bytes;
+}
+
+void read_chain_state(std::span<const std::byte> state, std::span<Units> now, std::span<Units> shown,
+                      std::span<glm::vec3> displacement) {
+  const std::size_t nodes = now.size();
+  StateBytes bytes(state, nodes * (2 * sizeof(Units::at) + sizeof(glm::vec3)));
+  for (const std::span<Units>& units : {now, shown}) {
+    const std::vector<std::int32_t> numbers = bytes.take<std::int32_t>(3 * nodes);
+    for (std::size_t n = 0; n < nodes; ++n)
+      std::copy_n(numbers.begin() + static_cast<std::ptrdiff_t>(3 * n), 3, units[n].at);
+  }
+  const std::vector<glm::vec3> shown_mm = bytes.take<glm::vec3>(nodes);
+  std::copy(shown_mm.begin(), shown_mm.end(), displacement.begin());
+}
+
 void require_valid(double part, const StoppingRule& rule) {
   require(part >= 0 && part <= 1, "the part of the way is " + std::to_string(part) + ", expected 0 to 1");
   require(rule.motion_mm >= 0, "the largest motion is " + std::to_string(rule.motion_mm) + " mm, expected 0 or more");

@@ -77,6 +77,13 @@ class ChainPlan {
   std::int32_t islands_ = 0;
 };
 
+/// `Simulation::state` of ChainMail: where nodes are, where they are shown, and that in mm.
+std::vector<std::byte> state_of_chain(std::span<const Units> now, std::span<const Units> shown,
+                                      std::span<const glm::vec3> displacement);
+/// Reads it again into arrays of the same sizes. @throws InputError for a state of another size
+void read_chain_state(std::span<const std::byte> state, std::span<Units> now, std::span<Units> shown,
+                      std::span<glm::vec3> displacement);
+
 /// Checks the arguments of `advance`. @throws InputError unless the part is from 0 to 1 and the rule's numbers are not
 /// negative
 void require_valid(double part, const StoppingRule& rule);

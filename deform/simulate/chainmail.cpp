@@ -56,6 +56,13 @@ class CpuChainmail final : public Simulation {
     });
   }
 
+  std::vector<std::byte> state() const override { return state_of_chain(now_, shown_, displacement_); }
+  void set_state(std::span<const std::byte> state) override {
+    read_chain_state(state, now_, shown_, displacement_);
+    placed_.clear();
+    has_loads_ = false;
+  }
+
  private:
   static std::size_t at(std::int32_t n) { return static_cast<std::size_t>(n); }
 

@@ -71,6 +71,12 @@ class MassSpring final : public Simulation {
     engine_->show(0);
   }
 
+  std::vector<std::byte> state() const override { return engine_->state(); }
+  void set_state(std::span<const std::byte> state) override {
+    engine_->set_state(state);
+    has_loads_ = false;
+  }
+
   std::span<const glm::vec3> displacement() const override { return engine_->shown(); }
   std::vector<glm::vec3> displacement_on_host() const override { return engine_->shown_on_host(); }
   Memory memory() const override { return engine_->memory(); }

@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -10,6 +11,7 @@
 
 #include "deform/resampler.h"
 #include "deform/simulate/model.h"
+#include "deform/simulate/state_bytes.h"
 
 /// Simulations that compute a field from what is done to a patient.
 namespace tetwarp::simulate {
@@ -90,6 +92,21 @@ class Simulation {
   /// Starts from these displacements, LPS mm, in host memory.
   /// @throws InputError for an array of the wrong size, or numbers that are not finite or too large
   virtual void set_displacement(std::span<const glm::vec3> displacement) = 0;
+
+  /// All that later calls depend on besides model, loads and rules, in host memory. It is more than `displacement`: a
+  /// method computes with more digits, and its nodes may lag behind placed ones that are shown at their goals. The same
+  /// bytes on every backend.
+  virtual std::vector<std::byte> state() const {
+    std::vector<std::byte> bytes;
+    put_bytes(bytes, std::span<const glm::vec3>(displacement_on_host()));
+    return bytes;
+  }
+  /// Goes on from a state of a simulation of the same model and method, to the same bits. Loads must be set anew.
+  /// @throws InputError for a state of another size
+  virtual void set_state(std::span<const std::byte> state) {
+    const std::size_t nodes = displacement().size();
+    set_displacement(StateBytes(state, nodes * sizeof(glm::vec3)).take<glm::vec3>(nodes));
+  }
 
  protected:
   /// For `shown_of`.

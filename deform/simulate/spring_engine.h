@@ -8,6 +8,7 @@
 #include <memory>
 #include <span>
 #include <stop_token>
+#include <vector>
 
 #include "deform/core/host_device.h"
 #include "deform/simulate/mass_spring.h"
@@ -86,6 +87,9 @@ class SpringEngine {
   /// `loads.force`.
   virtual void set_loads(const Loads& loads, std::span<const SpringRole> roles) = 0;
   virtual void set_displacement(std::span<const glm::vec3> displacement) = 0;
+  /// `Simulation::state`: displacements and forces in double, and what is shown.
+  virtual std::vector<std::byte> state() = 0;
+  virtual void set_state(std::span<const std::byte> state) = 0;
 
   /// Sets forces to a part of their way. @return how far placed nodes still have to go for theirs
   virtual Ways aim(double part) = 0;

@@ -141,6 +141,27 @@ class SpringSolver final : public SpringEngine {
     machine_.wait();
   }
 
+  std::vector<std::byte> state() override {
+    const auto scope = machine_.scope();
+    std::vector<double> kept(sweeps::WriteState::kNumbers * nodes_);
+    double* const place = kept_.reserve(kept.size());
+    machine_.each(nodes_, sweeps::WriteState{{a_}, place});
+    machine_.download(kept.data(), place, kept.size());
+    std::vector<std::byte> bytes;
+    put_bytes(bytes, std::span<const double>(kept));
+    put_bytes(bytes, std::span<const glm::vec3>(shown_on_host()));
+    return bytes;
+  }
+  void set_state(std::span<const std::byte> state) override {
+    const auto scope = machine_.scope();
+    const std::size_t numbers = sweeps::WriteState::kNumbers * nodes_;
+    StateBytes bytes(state, numbers * sizeof(double) + nodes_ * sizeof(glm::vec3));
+    machine_.each(nodes_, sweeps::ReadState{{a_}, hold(kept_, bytes.take<double>(numbers))});
+    const std::vector<glm::vec3> shown = bytes.take<glm::vec3>(nodes_);
+    machine_.upload(shown_.data(), shown.data(), nodes_);
+    machine_.wait();
+  }
+
   Ways aim(double part) override {
     const auto scope = machine_.scope();
     machine_.template sum<Ways>(nodes_, sweeps::Aim{{a_}, part}, sweeps::Keep{a_.ways});
@@ -243,7 +264,7 @@ class SpringSolver final : public SpringEngine {
   Buffer<std::uint32_t> vertex_, links_;
   Buffer<float> stiffness_, floats_[5], matrix_, inverse_;
   Buffer<SpringRole> role_;
-  Buffer<double> doubles_[9];
+  Buffer<double> doubles_[9], kept_;
   Buffer<glm::vec3> shown_, given_, given_forces_;
   Buffer<GradientState> state_;
   Buffer<Sums> result_;

@@ -40,6 +40,32 @@ struct Start : Sweep {
   }
 };
 
+/// Writes what a state has of each node: its displacement, and the force on it.
+struct WriteState : Sweep {
+  static constexpr std::size_t kNumbers = 6;
+  double* to;
+  TETWARP_HD void operator()(std::size_t n) const {
+    const glm::dvec3 u = a.u[n], load = a.load[n];
+    double* const of = to + kNumbers * n;
+    of[0] = u.x;
+    of[1] = u.y;
+    of[2] = u.z;
+    of[3] = load.x;
+    of[4] = load.y;
+    of[5] = load.z;
+  }
+};
+/// Takes over what `WriteState` wrote.
+struct ReadState : Sweep {
+  const double* from;
+  TETWARP_HD void operator()(std::size_t n) const {
+    const double* const of = from + WriteState::kNumbers * n;
+    a.u.set(n, {of[0], of[1], of[2]});
+    a.start.set(n, {of[0], of[1], of[2]});
+    a.load.set(n, {of[3], of[4], of[5]});
+  }
+};
+
 /// Takes over new loads; the present ones are where they start. @param force  null: no forces
 struct TakeLoads : Sweep {
   const glm::vec3 *goals, *forces;
