@@ -210,6 +210,14 @@ void PhaseLoads::add_force(const glm::dvec3& newton, const std::vector<std::size
   }
 }
 
+void PhaseLoads::extend(std::span<const glm::dvec3> drags, const std::optional<glm::dvec3>& ball) {
+  std::size_t drag = 0;
+  for (Way& way : ways_)
+    if (!way.along.empty()) way.along.push_back(drags[drag++]);
+  if (push_) push_->at_mm.push_back(*ball);
+  ++frames_;
+}
+
 bool PhaseLoads::changes_by_frame() const {
   return pushes() ||
          std::any_of(ways_.begin(), ways_.end(), [](const Way& way) { return way.radians != 0 || !way.along.empty(); });

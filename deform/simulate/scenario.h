@@ -167,6 +167,9 @@ class PhaseLoads {
   Loads at(double part, const Model& model, std::span<const glm::vec3> start,
            std::span<const glm::vec3> now = {}) const;
 
+  /// Gives the phase one more frame: the next place of each drag, in the order of the moves, and of the ball.
+  void extend(std::span<const glm::dvec3> drags, const std::optional<glm::dvec3>& ball);
+
   /// Whether loads must be set anew for each frame; otherwise all vertices move along straight lines, at one speed.
   bool changes_by_frame() const;
   /// Whether there is a ball, so that loads depend on where nodes are.

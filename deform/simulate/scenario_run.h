@@ -3,20 +3,13 @@
 
 #pragma once
 
-#include <functional>
-#include <memory>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "deform/simulate/divided_lattice.h"
-#include "deform/simulate/scenario.h"
+#include "deform/simulate/phase_player.h"
 
 namespace tetwarp::simulate {
-
-/// Makes the simulation of a model: one of the factories of a method and backend.
-using MakeSimulation = std::function<std::unique_ptr<Simulation>(const Model&)>;
 
 /// What became of a frame.
 struct FrameResult {
@@ -26,11 +19,7 @@ struct FrameResult {
   Convergence convergence;  ///< how the simulation converged
 };
 
-/// A scenario that is played on a patient, frame by frame.
-///
-/// Where the open cuts are not those of the phase before, the model is made anew. Vertices keep their places, and
-/// copies that a cut needs begin where their tissue was (`nodes_before`). So a cut that stays open keeps its width
-/// while another is made or closed.
+/// A scenario that is played on a patient, frame by frame (`PhasePlayer`).
 class ScenarioRun {
  public:
   /// Checks all phases before anything is simulated. Scenario and patient must outlive this object.
@@ -61,37 +50,27 @@ class ScenarioRun {
   /// Remarks for people on all phases, each once: such as a hold that holds no vertex.
   const std::vector<std::string>& notes() const { return notes_; }
   /// For each cell, i fastest, the index of its tissue in `Scenario::tissues`.
-  const std::vector<std::uint8_t>& tissues() const { return tissue_of_cell_; }
+  const std::vector<std::uint8_t>& tissues() const { return player_.tissues(); }
   /// Whether open cuts divide cells, so that a mesh takes their place in the field.
-  bool divides_cells() const { return !division_.replaced.empty(); }
+  bool divides_cells() const { return player_.divides_cells(); }
   /// The model of the phase of the last frame.
-  const Model& model() const { return model_; }
+  const Model& model() const { return player_.model(); }
   /// The simulation after the last frame.
-  const Simulation& simulation() const { return *simulation_; }
+  const Simulation& simulation() const { return *player_.simulation(); }
   /// Displacement of each node of the model, LPS mm, in host memory; 0 before the first frame.
-  std::vector<glm::vec3> displacement() const;
+  std::vector<glm::vec3> displacement() const { return player_.displacement(); }
   /// The field after the last frame. A mesh takes the place of cells that open cuts divide.
-  VertexField field() const;
+  VertexField field() const { return player_.field(); }
 
  private:
-  void begin_phase();
-  void carry_over_to(const Phase& phase);
-  void make_model_of(const Phase& phase);
-
   const Scenario& scenario_;
-  const Patient& patient_;
-  MakeSimulation make_;
-  std::vector<std::uint8_t> tissue_of_cell_;
+  PhasePlayer player_;
   std::vector<PhaseCounts> counts_;  ///< of each phase
   std::vector<std::string> notes_;
-  std::optional<PhaseLoads> loads_;  ///< of the phase that has begun: of all of them they would fill the memory
-  DividedLattice division_;          ///< the lattice as the open cuts divide it
-  Model model_;
-  std::unique_ptr<Simulation> simulation_;
-  std::vector<glm::vec3> start_;  ///< displacement of each node when the phase began, LPS mm
-  VertexField field_;             ///< field that the resampler of the last frame refers to, where cuts are open
+  VertexField field_;  ///< field that the resampler of the last frame refers to, where cuts are open
   std::size_t phase_ = 0;
-  int frame_in_phase_ = 0, done_ = 0;
+  bool has_begun_ = false;  ///< whether that phase has
+  int done_ = 0;
 };
 
 }  // namespace tetwarp::simulate

@@ -34,8 +34,9 @@ BELOW = {
     "backend": {"deform", "cuda"},
     "itkbridge": {"deform", "backend"},
     "io": {"deform", "itkbridge"},
-    "apps": {"deform", "backend", "itkbridge", "io"},
-    "python": {"deform", "backend", "io", "apps"},
+    "view": {"deform", "backend", "io"},
+    "apps": {"deform", "backend", "itkbridge", "io", "view"},
+    "python": {"deform", "backend", "io", "view", "apps"},
     "bench": {"deform", "backend", "itkbridge", "io"},
     "examples": {"deform", "backend", "itkbridge", "io"},
 }

@@ -1,0 +1,247 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include "view/session/session.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "backend/devices.h"
+#include "backend/factories.h"
+#include "deform/errors.h"
+#include "deform/simulate/chainmail.h"
+#include "deform/simulate/mass_spring.h"
+#include "deform/simulate/scenario_run.h"
+#include "io/scenario_file.h"
+#include "tests/deform/simulate/scenario_volumes.h"
+#include "tests/support/random.h"
+#include "tests/support/run.h"
+#include "tests/support/says.h"
+#include "tests/support/scratch.h"
+#include "tests/support/write_file.h"
+
+namespace tetwarp::viewer {
+namespace {
+
+using namespace simulate;
+using namespace simulate::test;
+using tetwarp::test::Random;
+using tetwarp::test::seed_text;
+using tetwarp::test::test_seed;
+
+MakeSimulation cpu(Method method, int threads = 1) {
+  return [=](const Model& model) {
+    const Limits limits{.threads = threads, .memory = 0};
+    return method == Method::chainmail ? make_cpu_chainmail(model, limits) : make_cpu_mass_spring(model, limits);
+  };
+}
+
+Scenario base(Method method) {
+  Scenario scenario = scenario_of({{Zone{HalfSpace{{{0, 0, 1}}, {0, 0, -1}}}, "hold[0]"}}, {});
+  scenario.method = method;
+  scenario.stop = {.motion_mm = 1e-4, .residual = 1e-4, .steps = 2};
+  return scenario;
+}
+
+/// What the file of a recording is read as.
+Scenario reread(const Scenario& recorded) {
+  const Scratch scratch;
+  write_file(scratch / "hand.json", scenario_text(recorded));
+  return read_scenario(scratch / "hand.json");
+}
+
+std::vector<glm::vec3> replayed(const Scenario& scenario, const Patient& patient, const MakeSimulation& make) {
+  ScenarioRun run(scenario, patient, make);
+  while (!run.is_done()) run.next();
+  return run.displacement();
+}
+
+glm::dvec3 somewhere(Random& random) { return {random.real(-18, 18), random.real(-18, 18), random.real(6, 38)}; }
+
+/// Something that a hand may do. What is refused changes nothing.
+void act_at_random(Session& session, Random& random, int number) {
+  try {
+    switch (random.integer(0, 10)) {
+      case 0: session.grip(somewhere(random), random.real(4, 9)); break;
+      case 1: session.move({random.real(-4, 4), random.real(-4, 4), random.real(-4, 4)}); break;
+      case 2: session.release(); break;
+      case 3: session.pin({Sphere{{somewhere(random)}, {random.real(3, 8)}}}); break;
+      case 4: session.unpin(); break;
+      case 5:
+        if (session.recorded().cuts.size() < 3)
+          session.cut({"cut " + std::to_string(number), DiscCutPlan{{somewhere(random)}, {0, 0.2, 1}, {10}}});
+        break;
+      case 6:
+        if (!session.recorded().cuts.empty()) session.suture(session.recorded().cuts.back().name);
+        break;
+      case 7:
+        if (!session.recorded().cuts.empty()) session.reopen(session.recorded().cuts.front().name);
+        break;
+      case 8: session.ball({random.real(-18, 18), random.real(-18, 18), random.real(42, 46)}, 6); break;
+      case 9: session.lift_ball(); break;
+      default: session.undo(); break;
+    }
+  } catch (const InputError&) {
+  }
+}
+
+class Sessions : public testing::TestWithParam<Method> {};
+
+TEST_P(Sessions, TwoHundredActionsAreRepeatedToTheSameBitsAnywhere) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  const Patient patient = uniform_patient();
+  for (std::uint64_t seed = 0; seed < 3; ++seed) {
+    Random random(test_seed(), 50 + seed);
+    Session session(base(GetParam()), patient, cpu(GetParam()), seed == 1 ? 200000 : Session::kMostSnapshotBytes);
+    for (int n = 0; n < 200; ++n) {
+      act_at_random(session, random, n);
+      for (int steps = static_cast<int>(random.integer(0, 2)); steps > 0; --steps) session.step();
+    }
+    session.step();
+    const Scenario recorded = reread(session.recorded());
+    EXPECT_EQ(frame_count(recorded), session.frames());
+    const std::vector<glm::vec3> expected = session.player().displacement();
+    EXPECT_GT(session.frames(), 50);
+    EXPECT_TRUE(std::any_of(expected.begin(), expected.end(), [](const glm::vec3& u) { return u != glm::vec3(0); }));
+    EXPECT_TRUE(replayed(recorded, patient, cpu(GetParam(), 2)) == expected);
+    if (device_count() == 0) continue;
+    const auto device = [](const Model& model) { return make_simulation(BackendKind::cuda, GetParam(), model); };
+    EXPECT_TRUE(replayed(recorded, patient, device) == expected);
+  }
+}
+
+TEST_P(Sessions, UndoAndRedoGoThroughAllStatesWhateverWasLetGoOf) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  const Patient patient = uniform_patient();
+  for (const std::size_t most : {Session::kMostSnapshotBytes, std::size_t{150000}}) {
+    Session session(base(GetParam()), patient, cpu(GetParam()), most);
+    std::vector<std::vector<glm::vec3>> states;
+    std::vector<std::string> texts;
+    const auto note = [&] {
+      states.push_back(session.player().displacement());
+      texts.push_back(scenario_text(session.recorded()));
+    };
+    const auto steps = [&](int count) {
+      for (int n = 0; n < count; ++n) session.step();
+    };
+    note();
+    session.grip({4, 4, 32}, 9);
+    for (int n = 1; n <= 3; ++n) {
+      session.move({0.5 * n, 0, 0.25 * n});
+      steps(1);
+    }
+    note();
+    session.cut({"slit", DiscCutPlan{{{0, 0, 19}}, {0, 0, 1}, {13}}});
+    steps(3);
+    note();
+    session.pin({Sphere{{{-12, -12, 24}}, {9}}});
+    steps(1);
+    note();
+    session.release();
+    steps(2);
+    note();
+    session.ball({-8, 0, 46}, 8);
+    steps(1);
+    session.ball({-8, 0, 44}, 8);
+    steps(1);
+    note();
+    session.suture("slit");
+    steps(2);
+    note();
+    const auto expect = [&](std::size_t n) {
+      EXPECT_TRUE(session.player().displacement() == states[n]) << n;
+      EXPECT_EQ(scenario_text(session.recorded()), texts[n]) << n;
+    };
+    const std::size_t last = states.size() - 1;
+    EXPECT_FALSE(session.redo());
+    for (int round = 0; round < 2; ++round) {
+      for (std::size_t n = last; n-- > 0;) {
+        ASSERT_TRUE(session.undo());
+        expect(n);
+      }
+      EXPECT_FALSE(session.undo());
+      for (std::size_t n = 1; n <= last; ++n) {
+        ASSERT_TRUE(session.redo());
+        expect(n);
+      }
+      EXPECT_FALSE(session.redo());
+    }
+    EXPECT_LE(session.snapshot_bytes(), most);
+    session.undo();
+    session.unpin();  // what is done now takes the place of what was taken back
+    EXPECT_FALSE(session.redo());
+  }
+}
+
+TEST_P(Sessions, TheHandHoldsOnWhileOtherThingsAreDone) {
+  const Patient patient = uniform_patient();
+  Session session(base(GetParam()), patient, cpu(GetParam()));
+  constexpr std::size_t kGripped = 4 * 121 + 6 * 11 + 6;  // the vertex at (4, 4, 32)
+  const auto expect_at = [&](double x) { EXPECT_NEAR(double{session.player().displacement()[kGripped].x}, x, 1e-4); };
+  session.grip({4, 4, 32}, 3);
+  for (const double x : {1.0, 1.5, 2.0}) {
+    session.move({x, 0, 0});
+    session.step();
+    expect_at(x);
+  }
+  session.pin({Sphere{{{-12, -12, 24}}, {9}}});
+  for (const double x : {2.0, 2.5, 3.0, 2.75}) {
+    session.move({x, 0, 0});
+    session.step();
+    expect_at(x);
+  }
+  session.grip({4, 4, 32}, 3);  // again, where it is now
+  session.step();
+  expect_at(2.75);
+  session.move({-1, 0, 0});
+  session.step();
+  expect_at(1.75);
+  EXPECT_EQ(session.recorded().phases.size(), 3u);
+}
+
+TEST_P(Sessions, WhatIsRefusedChangesNothing) {
+  const Patient patient = uniform_patient();
+  Session session(base(GetParam()), patient, cpu(GetParam()));
+  session.grip({4, 4, 32}, 9);
+  session.move({1, 0, 0});
+  session.step();
+  const std::string before = scenario_text(session.recorded());
+  EXPECT_TRUE(says(refusal([&] { session.grip({400, 0, 0}, 5); }), {"380", "nearest vertex"}));
+  EXPECT_TRUE(says(refusal([&] { session.grip({4, 4, 0}, 3); }), {"held"}));
+  EXPECT_TRUE(says(refusal([&] { session.suture("slit"); }), {"\"slit\""}));
+  const CutPlan slit{"slit", DiscCutPlan{{{0, 0, 19}}, {0, 0, 1}, {13}}};
+  session.cut(slit);
+  EXPECT_TRUE(says(refusal([&] { session.cut(slit); }), {"another cut"}));
+  EXPECT_TRUE(session.undo());
+  EXPECT_EQ(scenario_text(session.recorded()), before);
+  session.move({2, 0, 0});
+  session.step();  // the hand holds what it held
+  EXPECT_EQ(session.frames(), 2);
+  session.release();
+  EXPECT_TRUE(says(refusal([&] { session.move({1, 0, 0}); }), {"holds nothing"}));
+}
+
+TEST_P(Sessions, AStopLeavesAllAsItWas) {
+  const Patient patient = uniform_patient();
+  Session session(base(GetParam()), patient, cpu(GetParam())), other(base(GetParam()), patient, cpu(GetParam()));
+  std::stop_source source;
+  source.request_stop();
+  for (Session* one : {&session, &other}) {
+    one->grip({4, 4, 32}, 9);
+    one->move({1, 0, 0});
+    one->step();
+  }
+  session.move({2, 0, 0});
+  EXPECT_THROW(session.step({.stop = source.get_token()}), Cancelled);
+  EXPECT_TRUE(session.player().displacement() == other.player().displacement());
+  EXPECT_EQ(scenario_text(session.recorded()), scenario_text(other.recorded()));
+  session.step();
+  EXPECT_TRUE(replayed(reread(session.recorded()), patient, cpu(GetParam())) == session.player().displacement());
+}
+
+INSTANTIATE_TEST_SUITE_P(Methods, Sessions, testing::Values(Method::chainmail, Method::mass_spring),
+                         [](const auto& of) { return of.param == Method::chainmail ? "ChainMail" : "MassSpring"; });
+
+}  // namespace
+}  // namespace tetwarp::viewer

@@ -1,0 +1,258 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include "view/session/session.h"
+
+#include <algorithm>
+
+#include "deform/errors.h"
+#include "deform/simulate/cuts/cut_surface.h"
+
+namespace tetwarp::viewer {
+
+using namespace simulate;
+
+namespace {
+
+constexpr int kMostFrames = 10000;  // of a phase in a file
+
+Scenario without_phases(Scenario scenario) {
+  scenario.phases.clear();
+  scenario.deadband_mm = 0;
+  return scenario;
+}
+
+bool has(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+}  // namespace
+
+Session::Session(Scenario scenario, const Patient& patient, MakeSimulation make, std::size_t most_snapshot_bytes)
+    : scenario_(without_phases(std::move(scenario))),
+      patient_(patient),
+      player_(scenario_, patient, std::move(make)),
+      most_snapshot_bytes_(most_snapshot_bytes) {}
+
+/// The phase that begins with the next step, of one frame.
+Phase Session::phase_of(const Hand& hand) const {
+  Phase phase;
+  if (hand.handle) phase.moves = {{*hand.handle, Drag{{hand.by_mm - hand.done_mm}}, "the grip"}};
+  if (hand.ball_radius_mm) phase.push = Push{*hand.ball_radius_mm, {hand.ball_mm}};
+  phase.pins = hand.pins;
+  phase.closed_cuts = hand.closed_cuts;
+  return phase;
+}
+
+/// Begins an action. @param checks  whether the hand might ask for what cannot be
+/// @throws InputError, and then nothing has changed
+void Session::act(Hand hand, bool checks) {
+  if (checks) PhaseLoads(scenario_, phase_of(hand), patient_);
+  mark();
+  undone_.clear();
+  hand_ = std::move(hand);
+}
+
+/// Marks the place to which `undo` goes back.
+void Session::mark() {
+  marks_.push_back({scenario_.phases.size(), scenario_.cuts.size(), hand_, player_.state()});
+  snapshot_bytes_ += marks_.back().state->of_nodes.size();
+  thin_out();
+  begins_ = true;
+}
+
+void Session::grip(const glm::dvec3& at_mm, double radius_mm) {
+  Hand hand = hand_;
+  hand.handle = Handle{{at_mm}, {radius_mm}};
+  hand.by_mm = hand.done_mm = glm::dvec3(0);
+  act(std::move(hand), true);
+}
+
+void Session::move(const glm::dvec3& by_mm) {
+  require(hand_.handle.has_value(), "the hand holds nothing that it could move");
+  hand_.by_mm = by_mm;
+}
+
+void Session::release() {
+  if (!hand_.handle) return;
+  Hand hand = hand_;
+  hand.handle.reset();
+  act(std::move(hand), false);
+}
+
+void Session::pin(const Zone& zone) {
+  Hand hand = hand_;
+  hand.pins.push_back({zone, "pin[" + std::to_string(hand.pins.size()) + "]"});
+  act(std::move(hand), true);
+}
+
+void Session::unpin() {
+  if (hand_.pins.empty()) return;
+  Hand hand = hand_;
+  hand.pins.clear();
+  act(std::move(hand), false);
+}
+
+void Session::cut(const CutPlan& plan) {
+  for (const CutPlan& other : scenario_.cuts)
+    require(other.name != plan.name, "\"" + plan.name + "\" is the name of another cut");
+  Scenario alone;
+  alone.cuts = {plan};
+  for (const Cut& one : open_cuts(alone, Phase{}, patient_)) CutSurface{one};  // throws for a cut that is none
+  act(hand_, false);
+  add_cuts({plan});
+}
+
+/// In all that was recorded before they were made, cuts are closed.
+void Session::add_cuts(const std::vector<CutPlan>& plans) {
+  for (const CutPlan& plan : plans) {
+    scenario_.cuts.push_back(plan);
+    for (Phase& phase : scenario_.phases) phase.closed_cuts.push_back(plan.name);
+  }
+}
+
+void Session::suture(const std::string& name) {
+  find_cut(name);
+  if (has(hand_.closed_cuts, name)) return;
+  Hand hand = hand_;
+  hand.closed_cuts.push_back(name);
+  act(std::move(hand), false);
+}
+
+void Session::reopen(const std::string& name) {
+  find_cut(name);
+  if (!has(hand_.closed_cuts, name)) return;
+  Hand hand = hand_;
+  std::erase(hand.closed_cuts, name);
+  act(std::move(hand), false);
+}
+
+void Session::find_cut(const std::string& name) const {
+  for (const CutPlan& cut : scenario_.cuts)
+    if (cut.name == name) return;
+  throw InputError("no cut has the name \"" + name + "\"");
+}
+
+void Session::ball(const glm::dvec3& at_mm, double radius_mm) {
+  if (hand_.ball_radius_mm == radius_mm) {
+    hand_.ball_mm = at_mm;
+    return;
+  }
+  Hand hand = hand_;
+  hand.ball_radius_mm = radius_mm;
+  hand.ball_mm = at_mm;
+  act(std::move(hand), true);
+}
+
+void Session::lift_ball() {
+  if (!hand_.ball_radius_mm) return;
+  Hand hand = hand_;
+  hand.ball_radius_mm.reset();
+  act(std::move(hand), false);
+}
+
+Convergence Session::step(const Control& control) {
+  begins_ = begins_ || scenario_.phases.back().frames == kMostFrames;
+  try {
+    return begins_ ? first_frame(control) : further_frame(control);
+  } catch (...) {
+    go_to(marks_.size(), scenario_.phases.size());
+    throw;
+  }
+}
+
+Convergence Session::first_frame(const Control& control) {
+  const Phase phase = phase_of(hand_);
+  player_.begin(phase);
+  const Convergence convergence = player_.next(control);
+  scenario_.phases.push_back(phase);
+  phase_from_mm_ = hand_.done_mm;
+  hand_.done_mm = hand_.by_mm;
+  begins_ = !hand_.handle && !hand_.ball_radius_mm;  // nothing moves: a phase a frame
+  undone_.clear();
+  return convergence;
+}
+
+Convergence Session::further_frame(const Control& control) {
+  std::vector<glm::dvec3> drags;
+  if (hand_.handle) drags.push_back(hand_.by_mm - phase_from_mm_);
+  std::optional<glm::dvec3> ball;
+  if (hand_.ball_radius_mm) ball = hand_.ball_mm;
+  player_.extend(drags, ball);
+  const Convergence convergence = player_.next(control);
+  Phase& phase = scenario_.phases.back();
+  if (hand_.handle) std::get<Drag>(phase.moves[0].how).by_mm.push_back(drags[0]);
+  if (ball) phase.push->at_mm.push_back(*ball);
+  ++phase.frames;
+  hand_.done_mm = hand_.by_mm;
+  undone_.clear();
+  return convergence;
+}
+
+/// Plays phases that were played before.
+void Session::replay(std::size_t begin, std::size_t end) {
+  for (std::size_t n = begin; n < end; ++n) {
+    player_.begin(scenario_.phases[n]);
+    for (int frame = 0; frame < scenario_.phases[n].frames; ++frame) player_.next();
+  }
+}
+
+/// Brings the tissue to where it was after so many phases. @param marks  those before that place
+void Session::go_to(std::size_t marks, std::size_t phases) {
+  std::size_t from = marks;
+  while (from > 0 && (!marks_[from - 1].state || marks_[from - 1].phases > phases)) --from;
+  const std::size_t begin = from > 0 ? marks_[from - 1].phases : 0;
+  player_.set_state(from > 0 ? *marks_[from - 1].state : PhasePlayer::State{});
+  replay(begin, phases);
+  begins_ = true;
+}
+
+bool Session::undo() {
+  if (marks_.empty()) return false;
+  const Mark& mark = marks_.back();
+  const auto first = static_cast<std::ptrdiff_t>(mark.phases), first_cut = static_cast<std::ptrdiff_t>(mark.cuts);
+  std::vector<Phase>& phases = scenario_.phases;
+  std::vector<CutPlan>& cuts = scenario_.cuts;
+  Undone undone{{phases.begin() + first, phases.end()}, {cuts.begin() + first_cut, cuts.end()}, hand_};
+  phases.erase(phases.begin() + first, phases.end());
+  go_to(marks_.size(), mark.phases);
+  cuts.erase(cuts.begin() + first_cut, cuts.end());
+  for (const CutPlan& cut : undone.cuts)
+    for (Phase& phase : phases) std::erase(phase.closed_cuts, cut.name);
+  hand_ = mark.hand;
+  if (mark.state) snapshot_bytes_ -= mark.state->of_nodes.size();
+  marks_.pop_back();
+  undone_.push_back(std::move(undone));
+  return true;
+}
+
+bool Session::redo() {
+  if (undone_.empty()) return false;
+  const Undone undone = std::move(undone_.back());
+  undone_.pop_back();
+  mark();
+  const std::size_t begin = scenario_.phases.size();
+  add_cuts(undone.cuts);
+  scenario_.phases.insert(scenario_.phases.end(), undone.phases.begin(), undone.phases.end());
+  replay(begin, scenario_.phases.size());
+  hand_ = undone.hand;
+  return true;
+}
+
+/// Lets go of every other state, but the first and the last, while they need too much memory.
+void Session::thin_out() {
+  while (snapshot_bytes_ > most_snapshot_bytes_) {
+    bool lets_go = false, any = false;
+    for (std::size_t n = 1; n + 1 < marks_.size(); ++n) {
+      if (!marks_[n].state) continue;
+      lets_go = !lets_go;
+      if (!lets_go) continue;
+      snapshot_bytes_ -= marks_[n].state->of_nodes.size();
+      marks_[n].state.reset();
+      any = true;
+    }
+    if (!any) return;
+  }
+}
+
+}  // namespace tetwarp::viewer
