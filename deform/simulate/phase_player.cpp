@@ -12,6 +12,8 @@ PhasePlayer::PhasePlayer(const Scenario& scenario, const Patient& patient, MakeS
       patient_(patient),
       make_(std::move(make)),
       tissue_of_cell_(tissue_of_cells(scenario, patient)) {
+  for (const Phase& phase : scenario.phases)
+    for (const Move& move : phase.moves) has_forces_ = has_forces_ || std::holds_alternative<Force>(move.how);
   Phase first;  // so that there is a model before anything begins
   for (const CutPlan& cut : scenario.cuts) first.closed_cuts.push_back(cut.name);
   make_model(open_in(scenario.phases.empty() ? first : scenario.phases.front()));
@@ -72,7 +74,8 @@ void PhasePlayer::extend(std::span<const glm::dvec3> drags, const std::optional<
 
 Convergence PhasePlayer::next(const Control& control) {
   require(loads_.has_value() && frame_ < frames_, "the phase has no further frame");
-  const double part = static_cast<double>(frame_ + 1) / frames_;
+  // Where nothing is on its way, and no force is let go of, all frames are alike, however many follow.
+  const double part = loads_->is_still() && !has_forces_ ? 1 : static_cast<double>(frame_ + 1) / frames_;
   simulation_->set_deadband(frame_ + 1 == frames_ ? 0 : scenario_.deadband_mm);
   const bool changes = loads_->changes_by_frame();
   if (changes) {

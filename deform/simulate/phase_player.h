@@ -37,7 +37,8 @@ class PhasePlayer {
   /// Begins a phase where the one before led.
   /// @throws InputError for a phase that cannot be played
   void begin(const Phase& phase);
-  /// Gives the phase one more frame: the next place of each drag, in the order of the moves, and of the ball.
+  /// Gives the phase one more frame. Only for a phase in which all moves are drags, or nothing moves: the next place of
+  /// each drag, in the order of the moves, and of the ball.
   void extend(std::span<const glm::dvec3> drags, const std::optional<glm::dvec3>& ball);
   /// Simulates the next frame of the phase.
   /// @throws Cancelled and whatever the simulation throws
@@ -80,6 +81,7 @@ class PhasePlayer {
   std::vector<std::uint8_t> tissue_of_cell_;
   DividedLattice division_;  ///< the lattice as the open cuts divide it
   Model model_;
+  bool has_forces_ = false;     ///< whether the scenario has, in any phase
   std::set<std::string> open_;  ///< names of the cuts for which the model was made
   std::unique_ptr<Simulation> simulation_;
   std::vector<glm::vec3> start_;     ///< displacement of each node when the phase began, LPS mm

@@ -168,7 +168,7 @@ Convergence Session::first_frame(const Control& control) {
   scenario_.phases.push_back(phase);
   phase_from_mm_ = hand_.done_mm;
   hand_.done_mm = hand_.by_mm;
-  begins_ = !hand_.handle && !hand_.ball_radius_mm;  // nothing moves: a phase a frame
+  begins_ = false;
   undone_.clear();
   return convergence;
 }

@@ -17,8 +17,8 @@ namespace tetwarp::viewer {
 /// done is a scenario, `recorded`, that `simulate`, `deform --scenario` and `batch` repeat to the same bits, on any
 /// backend. Times in it are steps, as they were done, never a clock's.
 ///
-/// Actions take effect with the next `step`. Each of them begins a phase; while a hand or ball moves, a step is a frame
-/// of that phase, and while nothing moves a phase of its own. One object serves one thread at a time.
+/// Actions take effect with the next `step`. Each of them begins a phase, of which each step is a frame. One object
+/// serves one thread at a time.
 class Session {
  public:
   /// Memory for the states from which `undo` goes on. Where they need more, every other one is let go of, and what lies
