@@ -17,7 +17,8 @@ namespace tetwarp {
 simulate::Scenario read_scenario(const std::filesystem::path& path);
 
 /// The text of a scenario file that is read as this scenario again, to the last bit of every number: a phase a line.
-/// What a file may leave out is there, and "$schema" is not.
+/// What a file may leave out is there, and "$schema" is not. Directions should be as `scaled_direction` gives them.
+/// @throws InputError for a scenario without phases
 std::string scenario_text(const simulate::Scenario& scenario);
 
 }  // namespace tetwarp

@@ -161,12 +161,15 @@ std::string describe(const SimulateRecord& record) {
   std::string text = std::string(name_of(record.scenario.method)) + " on the " + record.backend + ", " +
                      to_string(record.patient.lattice.size) + " vertices, " + std::to_string(run.frames()) +
                      (run.frames() == 1 ? " frame" : " frames") + "; " + tissues;
-  for (std::size_t n = 0; n < record.scenario.phases.size(); ++n) {
+  constexpr std::size_t kTold = 20;
+  const std::size_t phases = record.scenario.phases.size();
+  for (std::size_t n = 0; n < std::min(phases, kTold); ++n) {
     const PhaseCounts& counts = run.counts(n);
     text += "; " + phase_name(record, n) + std::to_string(counts.held) + " vertices held, " +
             (counts.pinned > 0 ? std::to_string(counts.pinned) + " pinned, " : "") + std::to_string(counts.moved) +
             " moved, " + std::to_string(counts.with_force) + " pulled";
   }
+  if (phases > kTold) text += "; and " + std::to_string(phases - kTold) + " further phases";
   return text;
 }
 

@@ -33,8 +33,11 @@ void PhasePlayer::make_model(const std::set<std::string>& open) {
   std::vector<Tissue> tissues;
   for (const TissueClass& one : scenario_.tissues) tissues.push_back(one.tissue);
   const std::vector<Cut> cuts = open_cuts(scenario_, phase, patient_);
-  division_ = cuts.empty() ? DividedLattice{} : divide(patient_.lattice, cuts);
-  model_ = simulate::make_model(patient_.lattice, tissue_of_cell_, tissues, division_.copies_of, division_.pieces);
+  DividedLattice division = cuts.empty() ? DividedLattice{} : divide(patient_.lattice, cuts);
+  Model model = simulate::make_model(patient_.lattice, tissue_of_cell_, tissues, division.copies_of, division.pieces);
+  simulation_.reset();  // it refers to the model
+  division_ = std::move(division);
+  model_ = std::move(model);
   open_ = open;
 }
 
@@ -49,9 +52,8 @@ void PhasePlayer::begin(const Phase& phase) {
   const std::set<std::string> open = open_in(phase);
   start_ = displacement();
   if (!simulation_ || open != open_) {
-    simulation_.reset();
     if (open != open_) {  // vertices start where they are, copies where the tissue was to which they belong
-      const DividedLattice before = std::move(division_);
+      const DividedLattice before = division_;
       make_model(open);
       std::vector<glm::vec3> carried(start_.begin(), start_.begin() + voxel_count(patient_.lattice));
       for (const std::uint32_t node : nodes_before(division_, before, patient_.lattice))
@@ -68,6 +70,7 @@ void PhasePlayer::begin(const Phase& phase) {
 }
 
 void PhasePlayer::extend(std::span<const glm::dvec3> drags, const std::optional<glm::dvec3>& ball) {
+  require(loads_.has_value(), "no phase has begun that could have a further frame");
   loads_->extend(drags, ball);
   ++frames_;
 }
@@ -92,10 +95,9 @@ PhasePlayer::State PhasePlayer::state() const {
 }
 
 void PhasePlayer::set_state(const State& state) {
-  if (state.open != open_ || state.of_nodes.empty()) simulation_.reset();
-  if (state.open != open_) make_model(state.open);
   loads_.reset();
-  if (state.of_nodes.empty()) return;
+  if (state.open != open_) make_model(state.open);
+  if (state.of_nodes.empty()) return simulation_.reset();
   if (!simulation_) simulation_ = make_(model_);
   simulation_->set_state(state.of_nodes);
 }

@@ -211,6 +211,10 @@ void PhaseLoads::add_force(const glm::dvec3& newton, const std::vector<std::size
 }
 
 void PhaseLoads::extend(std::span<const glm::dvec3> drags, const std::optional<glm::dvec3>& ball) {
+  const auto has_way = [](const Way& way) { return !way.along.empty(); };
+  require(static_cast<std::size_t>(std::count_if(ways_.begin(), ways_.end(), has_way)) == drags.size() &&
+              push_.has_value() == ball.has_value(),
+          "a further frame needs a place for each drag, and one for the ball");
   std::size_t drag = 0;
   for (Way& way : ways_)
     if (!way.along.empty()) way.along.push_back(drags[drag++]);

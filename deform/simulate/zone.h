@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -45,6 +46,12 @@ double mm_of(const Length& length, const Patient& patient);
 /// A displacement in LPS mm.
 /// @throws InputError for parts of the body where the patient has no body
 glm::dvec3 mm_of(const Shift& shift, const Patient& patient);
+
+/// A direction of any length as scenario files have it: its largest component is 1 in size.
+inline glm::dvec3 scaled_direction(const glm::dvec3& v) {
+  const glm::dvec3 size = glm::abs(v);
+  return v / std::max(size.x, std::max(size.y, size.z));
+}
 
 /// A ball.
 struct Sphere {

@@ -125,9 +125,12 @@ int read_frames(const JsonEntry& entry, const Phase& phase) {
     std::size_t places;
   };
   std::vector<Way> ways;
-  for (std::size_t n = 0; n < phase.moves.size(); ++n) {
-    if (const auto* drag = std::get_if<Drag>(&phase.moves[n].how))
-      ways.push_back({entry.at("move").items(0, kMostEntries)[n].at("drag_mm"), drag->by_mm.size()});
+  if (!phase.moves.empty()) {
+    const std::vector<JsonEntry> moves = entry.at("move").items(0, kMostEntries);
+    for (std::size_t n = 0; n < moves.size(); ++n) {
+      if (const auto* drag = std::get_if<Drag>(&phase.moves[n].how))
+        ways.push_back({moves[n].at("drag_mm"), drag->by_mm.size()});
+    }
   }
   if (phase.push) ways.push_back({entry.at("push").at("path_mm"), phase.push->at_mm.size()});
   std::size_t frames = ways.empty() ? 1 : ways.front().places;
@@ -165,11 +168,13 @@ Phase read_phase(const JsonEntry& entry, const Scenario& scenario) {
   if (!entry.has("closed_cuts")) return phase;
   for (const JsonEntry& item : entry.at("closed_cuts").items(0, kMostEntries)) {
     const std::string& name = item.text();
-    std::string known;
-    for (const CutPlan& cut : scenario.cuts) known += (known.empty() ? "" : ", ") + printable(cut.name);
-    if (std::none_of(scenario.cuts.begin(), scenario.cuts.end(), [&](const CutPlan& cut) { return cut.name == name; }))
+    if (std::none_of(scenario.cuts.begin(), scenario.cuts.end(),
+                     [&](const CutPlan& cut) { return cut.name == name; })) {
+      std::string known;
+      for (const CutPlan& cut : scenario.cuts) known += (known.empty() ? "" : ", ") + printable(cut.name);
       item.refuse("is \"" + printable(name) + "\", which is no cut; " +
                   (known.empty() ? "the scenario has no cuts" : "the cuts are " + known));
+    }
     phase.closed_cuts.push_back(name);
   }
   return phase;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "deform/errors.h"
 #include "io/scenario_file.h"
 
 namespace tetwarp {
@@ -175,7 +176,10 @@ std::string scenario_text(const Scenario& scenario) {
       {{"motion_mm", scenario.stop.motion_mm}, {"residual", scenario.stop.residual}, {"steps", scenario.stop.steps}});
   put_line("deadband_mm", scenario.deadband_mm);
   std::vector<Phase> phases = scenario.phases;
-  if (phases.size() == 1 && phases[0].name.empty()) {  // of a scenario without "phases"
+  require(!phases.empty(), "a scenario without phases cannot be written");
+  const Phase& first = phases.front();
+  const bool is_plain = first.name.empty() && first.pins.empty() && !first.push && first.closed_cuts.empty();
+  if (phases.size() == 1 && is_plain && !first.moves.empty()) {  // of a scenario without "phases"
     text += "  \"frames\": " + std::to_string(phases[0].frames) + ",\n";
     return text + lines("move", phases[0].moves) + "\n}\n";
   }

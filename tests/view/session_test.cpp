@@ -57,6 +57,10 @@ std::vector<glm::vec3> replayed(const Scenario& scenario, const Patient& patient
   return run.displacement();
 }
 
+std::string text_of(const Session& session) {
+  return session.recorded().phases.empty() ? "" : scenario_text(session.recorded());
+}
+
 glm::dvec3 somewhere(Random& random) { return {random.real(-18, 18), random.real(-18, 18), random.real(6, 38)}; }
 
 /// Something that a hand may do. What is refused changes nothing.
@@ -70,7 +74,8 @@ void act_at_random(Session& session, Random& random, int number) {
       case 4: session.unpin(); break;
       case 5:
         if (session.recorded().cuts.size() < 3)
-          session.cut({"cut " + std::to_string(number), DiscCutPlan{{somewhere(random)}, {0, 0.2, 1}, {10}}});
+          session.cut({"cut " + std::to_string(number),
+                       DiscCutPlan{{somewhere(random)}, {random.real(-1, 1), 0.2, 0.7}, {10}}});
         break;
       case 6:
         if (!session.recorded().cuts.empty()) session.suture(session.recorded().cuts.back().name);
@@ -100,6 +105,7 @@ TEST_P(Sessions, TwoHundredActionsAreRepeatedToTheSameBitsAnywhere) {
     }
     session.step();
     const Scenario recorded = reread(session.recorded());
+    EXPECT_EQ(scenario_text(recorded), scenario_text(session.recorded()));  // to the last bit of every number
     EXPECT_EQ(frame_count(recorded), session.frames());
     const std::vector<glm::vec3> expected = session.player().displacement();
     EXPECT_GT(session.frames(), 50);
@@ -120,7 +126,7 @@ TEST_P(Sessions, UndoAndRedoGoThroughAllStatesWhateverWasLetGoOf) {
     std::vector<std::string> texts;
     const auto note = [&] {
       states.push_back(session.player().displacement());
-      texts.push_back(scenario_text(session.recorded()));
+      texts.push_back(text_of(session));
     };
     const auto steps = [&](int count) {
       for (int n = 0; n < count; ++n) session.step();
@@ -151,7 +157,7 @@ TEST_P(Sessions, UndoAndRedoGoThroughAllStatesWhateverWasLetGoOf) {
     note();
     const auto expect = [&](std::size_t n) {
       EXPECT_TRUE(session.player().displacement() == states[n]) << n;
-      EXPECT_EQ(scenario_text(session.recorded()), texts[n]) << n;
+      EXPECT_EQ(text_of(session), texts[n]) << n;
     };
     const std::size_t last = states.size() - 1;
     EXPECT_FALSE(session.redo());
@@ -200,6 +206,37 @@ TEST_P(Sessions, TheHandHoldsOnWhileOtherThingsAreDone) {
   EXPECT_EQ(session.recorded().phases.size(), 3u);
 }
 
+TEST_P(Sessions, ARecordingOfOnePhaseHasAllOfIt) {
+  const Patient patient = uniform_patient();
+  const auto expect_replay = [&](auto&& act) {
+    Session session(base(GetParam()), patient, cpu(GetParam()));
+    act(session);
+    session.step();
+    EXPECT_EQ(session.recorded().phases.size(), 1u);
+    EXPECT_TRUE(replayed(reread(session.recorded()), patient, cpu(GetParam())) == session.player().displacement());
+    return scenario_text(session.recorded());
+  };
+  const auto grip = [](Session& session) {
+    session.grip({4, 4, 32}, 9);
+    session.move({3, 0, 0});
+  };
+  const Zone half{HalfSpace{{{-8, 0, 0}}, {-0.3, 0.1, 0.7}}};
+  expect_replay(grip);
+  EXPECT_TRUE(says(expect_replay([&](Session& session) {
+                     session.pin({AllOf{{half, Zone{Sphere{{{-12, -12, 24}}, {9}}}}}});
+                     grip(session);
+                   }),
+                   {"\"pin\""}));
+  EXPECT_TRUE(says(expect_replay([&](Session& session) { session.ball({0, 0, 46}, 8); }), {"\"push\""}));
+  expect_replay([&](Session& session) { session.pin({Sphere{{{-12, -12, 24}}, {9}}}); });
+  EXPECT_TRUE(says(expect_replay([&](Session& session) {
+                     session.cut({"slit", DiscCutPlan{{{0, 0, 19}}, {0.3, 0.2, 0.9}, {13}}});
+                     session.suture("slit");
+                     grip(session);
+                   }),
+                   {"closed_cuts"}));
+}
+
 TEST_P(Sessions, WhatIsRefusedChangesNothing) {
   const Patient patient = uniform_patient();
   Session session(base(GetParam()), patient, cpu(GetParam()));
@@ -210,6 +247,10 @@ TEST_P(Sessions, WhatIsRefusedChangesNothing) {
   EXPECT_TRUE(says(refusal([&] { session.grip({400, 0, 0}, 5); }), {"380", "nearest vertex"}));
   EXPECT_TRUE(says(refusal([&] { session.grip({4, 4, 0}, 3); }), {"held"}));
   EXPECT_TRUE(says(refusal([&] { session.suture("slit"); }), {"\"slit\""}));
+  EXPECT_TRUE(says(refusal([&] { session.grip({4, 4, 32}, 0); }), {"radius"}));
+  EXPECT_TRUE(says(refusal([&] { session.ball({4, NAN, 32}, 5); }), {"ball"}));
+  EXPECT_TRUE(says(refusal([&] { session.move({1e9, 0, 0}); }), {"hand"}));
+  EXPECT_TRUE(says(refusal([&] { session.cut({"", PlaneCutPlan{{{0, 0, 20}}, {0, 0, 1}}}); }), {"name"}));
   const CutPlan slit{"slit", DiscCutPlan{{{0, 0, 19}}, {0, 0, 1}, {13}}};
   session.cut(slit);
   EXPECT_TRUE(says(refusal([&] { session.cut(slit); }), {"another cut"}));

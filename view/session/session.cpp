@@ -16,9 +16,39 @@ namespace {
 
 constexpr int kMostFrames = 10000;  // of a phase in a file
 
+// What a file may say (docs/scenario.schema.json), so that all that is recorded can be read.
+constexpr double kFarthestMm = 1e6, kLargestMm = 1e5, kMostShiftMm = 1e4;
+constexpr std::size_t kMostEntries = 1000, kLongestName = 200;
+
+void require_place(const glm::dvec3& mm, double most, const char* what) {
+  for (int axis = 0; axis < 3; ++axis)
+    require(mm[axis] >= -most && mm[axis] <= most, std::string(what) + " lies beyond all places, or is none");
+}
+void require_radius(double mm) {
+  require(mm > 0 && mm <= kLargestMm, "a radius of " + std::to_string(mm) + " mm; above 0 to 100000 is expected");
+}
+
+/// Directions as they are read from a file: another length may give other last bits.
+struct ScaleDirections {
+  template <class Other>
+  void operator()(Other&) const {}
+  void operator()(HalfSpace& half) const { half.normal = scaled_direction(half.normal); }
+  void operator()(AllOf& all) const { each(all.parts); }
+  void operator()(AnyOf& any) const { each(any.parts); }
+  void operator()(Not& other) const { each(other.part); }
+  void operator()(PlaneCutPlan& plane) const { plane.normal = scaled_direction(plane.normal); }
+  void operator()(DiscCutPlan& disc) const { disc.normal = scaled_direction(disc.normal); }
+  void operator()(SweptCutPlan& swept) const { swept.along = scaled_direction(swept.along); }
+  void each(std::vector<Zone>& zones) const {
+    for (Zone& zone : zones) std::visit(*this, zone.shape);
+  }
+};
+
 Scenario without_phases(Scenario scenario) {
   scenario.phases.clear();
   scenario.deadband_mm = 0;
+  for (HeldZone& held : scenario.hold) std::visit(ScaleDirections{}, held.zone.shape);
+  for (CutPlan& cut : scenario.cuts) std::visit(ScaleDirections{}, cut.shape);
   return scenario;
 }
 
@@ -62,6 +92,8 @@ void Session::mark() {
 }
 
 void Session::grip(const glm::dvec3& at_mm, double radius_mm) {
+  require_place(at_mm, kFarthestMm, "the grip");
+  require_radius(radius_mm);
   Hand hand = hand_;
   hand.handle = Handle{{at_mm}, {radius_mm}};
   hand.by_mm = hand.done_mm = glm::dvec3(0);
@@ -70,6 +102,7 @@ void Session::grip(const glm::dvec3& at_mm, double radius_mm) {
 
 void Session::move(const glm::dvec3& by_mm) {
   require(hand_.handle.has_value(), "the hand holds nothing that it could move");
+  require_place(by_mm, kMostShiftMm / 2, "the hand");  // a drag may go from one end to the other
   hand_.by_mm = by_mm;
 }
 
@@ -81,8 +114,10 @@ void Session::release() {
 }
 
 void Session::pin(const Zone& zone) {
+  require(hand_.pins.size() < kMostEntries, "more than 1000 pins; free some first");
   Hand hand = hand_;
   hand.pins.push_back({zone, "pin[" + std::to_string(hand.pins.size()) + "]"});
+  std::visit(ScaleDirections{}, hand.pins.back().zone.shape);
   act(std::move(hand), true);
 }
 
@@ -93,7 +128,10 @@ void Session::unpin() {
   act(std::move(hand), false);
 }
 
-void Session::cut(const CutPlan& plan) {
+void Session::cut(CutPlan plan) {
+  require(!plan.name.empty() && plan.name.size() <= kLongestName, "a cut needs a name of at most 200 bytes");
+  require(scenario_.cuts.size() < kMostEntries, "more than 1000 cuts");
+  std::visit(ScaleDirections{}, plan.shape);
   for (const CutPlan& other : scenario_.cuts)
     require(other.name != plan.name, "\"" + plan.name + "\" is the name of another cut");
   Scenario alone;
@@ -134,6 +172,8 @@ void Session::find_cut(const std::string& name) const {
 }
 
 void Session::ball(const glm::dvec3& at_mm, double radius_mm) {
+  require_place(at_mm, kFarthestMm, "the ball");
+  require_radius(radius_mm);
   if (hand_.ball_radius_mm == radius_mm) {
     hand_.ball_mm = at_mm;
     return;
@@ -207,6 +247,18 @@ void Session::go_to(std::size_t marks, std::size_t phases) {
   begins_ = true;
 }
 
+/// Forgets the cuts after the first few, which are closed in all that is recorded.
+void Session::drop_cuts(std::size_t keep) {
+  for (std::size_t n = keep; n < scenario_.cuts.size(); ++n)
+    for (Phase& phase : scenario_.phases) std::erase(phase.closed_cuts, scenario_.cuts[n].name);
+  scenario_.cuts.resize(keep);
+}
+
+void Session::drop_mark() {
+  if (marks_.back().state) snapshot_bytes_ -= marks_.back().state->of_nodes.size();
+  marks_.pop_back();
+}
+
 bool Session::undo() {
   if (marks_.empty()) return false;
   const Mark& mark = marks_.back();
@@ -214,28 +266,33 @@ bool Session::undo() {
   std::vector<Phase>& phases = scenario_.phases;
   std::vector<CutPlan>& cuts = scenario_.cuts;
   Undone undone{{phases.begin() + first, phases.end()}, {cuts.begin() + first_cut, cuts.end()}, hand_};
-  phases.erase(phases.begin() + first, phases.end());
   go_to(marks_.size(), mark.phases);
-  cuts.erase(cuts.begin() + first_cut, cuts.end());
-  for (const CutPlan& cut : undone.cuts)
-    for (Phase& phase : phases) std::erase(phase.closed_cuts, cut.name);
+  phases.erase(phases.begin() + first, phases.end());
+  drop_cuts(mark.cuts);
   hand_ = mark.hand;
-  if (mark.state) snapshot_bytes_ -= mark.state->of_nodes.size();
-  marks_.pop_back();
+  drop_mark();
   undone_.push_back(std::move(undone));
   return true;
 }
 
 bool Session::redo() {
   if (undone_.empty()) return false;
-  const Undone undone = std::move(undone_.back());
-  undone_.pop_back();
+  const Undone undone = undone_.back();
   mark();
-  const std::size_t begin = scenario_.phases.size();
-  add_cuts(undone.cuts);
-  scenario_.phases.insert(scenario_.phases.end(), undone.phases.begin(), undone.phases.end());
-  replay(begin, scenario_.phases.size());
+  const std::size_t begin = scenario_.phases.size(), cuts = scenario_.cuts.size();
+  try {
+    add_cuts(undone.cuts);
+    scenario_.phases.insert(scenario_.phases.end(), undone.phases.begin(), undone.phases.end());
+    replay(begin, scenario_.phases.size());
+  } catch (...) {
+    scenario_.phases.resize(begin);
+    drop_cuts(cuts);
+    go_to(marks_.size(), begin);
+    drop_mark();
+    throw;
+  }
   hand_ = undone.hand;
+  undone_.pop_back();
   return true;
 }
 

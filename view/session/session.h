@@ -49,7 +49,7 @@ class Session {
   /// Frees all that was pinned.
   void unpin();
   /// Makes a cut, which is open from now on. @throws InputError for a name that a cut has, or for a cut that is none
-  void cut(const simulate::CutPlan& plan);
+  void cut(simulate::CutPlan plan);
   /// Closes an open cut, or opens one that is closed. @throws InputError for a name that no cut has
   void suture(const std::string& name);
   void reopen(const std::string& name);
@@ -104,6 +104,8 @@ class Session {
   void act(Hand hand, bool checks);
   void mark();
   void add_cuts(const std::vector<simulate::CutPlan>& plans);
+  void drop_cuts(std::size_t keep);
+  void drop_mark();
   void find_cut(const std::string& name) const;
   simulate::Convergence first_frame(const Control& control);
   simulate::Convergence further_frame(const Control& control);
