@@ -8,6 +8,7 @@
 #include <cstdio>
 
 #include "deform/errors.h"
+#include "deform/simulate/zone.h"
 #include "io/edit_distance.h"
 
 namespace tetwarp {
@@ -99,9 +100,8 @@ glm::dvec3 JsonEntry::vector(const NumberRange& range) const {
 
 glm::dvec3 JsonEntry::direction() const {
   const glm::dvec3 result = vector({-1e6, 1e6});
-  const double largest = std::max({std::abs(result.x), std::abs(result.y), std::abs(result.z)});
-  if (largest == 0) refuse("has no length; a direction is expected");
-  return result / largest;
+  if (result == glm::dvec3(0)) refuse("has no length; a direction is expected");
+  return simulate::scaled_direction(result);
 }
 
 std::vector<JsonEntry> JsonEntry::items(std::size_t fewest, std::size_t most) const {

@@ -250,6 +250,7 @@ TEST_P(Sessions, WhatIsRefusedChangesNothing) {
   EXPECT_TRUE(says(refusal([&] { session.grip({4, 4, 32}, 0); }), {"radius"}));
   EXPECT_TRUE(says(refusal([&] { session.ball({4, NAN, 32}, 5); }), {"ball"}));
   EXPECT_TRUE(says(refusal([&] { session.move({1e9, 0, 0}); }), {"hand"}));
+  EXPECT_TRUE(says(refusal([&] { session.pin({HalfSpace{{{0, 0, 20}}, {0, 0, 0}}}); }), {"direction"}));
   EXPECT_TRUE(says(refusal([&] { session.cut({"", PlaneCutPlan{{{0, 0, 20}}, {0, 0, 1}}}); }), {"name"}));
   const CutPlan slit{"slit", DiscCutPlan{{{0, 0, 19}}, {0, 0, 1}, {13}}};
   session.cut(slit);

@@ -28,17 +28,24 @@ void require_radius(double mm) {
   require(mm > 0 && mm <= kLargestMm, "a radius of " + std::to_string(mm) + " mm; above 0 to 100000 is expected");
 }
 
-/// Directions as they are read from a file: another length may give other last bits.
+/// A direction as it is read from a file: another length may give other last bits.
+void scale(glm::dvec3& direction) {
+  require_place(direction, kFarthestMm, "a direction");
+  require(direction != glm::dvec3(0), "a direction has no length");
+  direction = scaled_direction(direction);
+}
+
+/// All directions of a zone or cut.
 struct ScaleDirections {
   template <class Other>
   void operator()(Other&) const {}
-  void operator()(HalfSpace& half) const { half.normal = scaled_direction(half.normal); }
+  void operator()(HalfSpace& half) const { scale(half.normal); }
   void operator()(AllOf& all) const { each(all.parts); }
   void operator()(AnyOf& any) const { each(any.parts); }
   void operator()(Not& other) const { each(other.part); }
-  void operator()(PlaneCutPlan& plane) const { plane.normal = scaled_direction(plane.normal); }
-  void operator()(DiscCutPlan& disc) const { disc.normal = scaled_direction(disc.normal); }
-  void operator()(SweptCutPlan& swept) const { swept.along = scaled_direction(swept.along); }
+  void operator()(PlaneCutPlan& plane) const { scale(plane.normal); }
+  void operator()(DiscCutPlan& disc) const { scale(disc.normal); }
+  void operator()(SweptCutPlan& swept) const { scale(swept.along); }
   void each(std::vector<Zone>& zones) const {
     for (Zone& zone : zones) std::visit(*this, zone.shape);
   }
