@@ -3,6 +3,8 @@
 
 #include "backend/devices.h"
 
+#include <cstring>
+
 #include "cuda/devices.h"
 
 namespace tetwarp {
@@ -24,5 +26,40 @@ void DeviceStream::wait() const { wait_for_cuda_stream(stream_); }
 PinnedMemory::PinnedMemory(std::size_t bytes) : memory_(allocate_pinned(bytes)), bytes_(bytes) {}
 
 PinnedMemory::~PinnedMemory() { free_pinned(memory_); }
+
+BackendVolume::BackendVolume(BackendKind backend, const Geometry& geometry, VoxelType type, int device)
+    : geometry_(geometry), type_(type), memory_(runs_on_device(backend) ? Memory::device : Memory::host) {
+  if (memory_ == Memory::device) {
+    voxels_ = static_cast<std::byte*>(allocate_on_device(device, bytes()));
+  } else {
+    owned_ = AnyVolume(geometry, type);
+    voxels_ = owned_.data();
+  }
+}
+
+BackendVolume::~BackendVolume() {
+  if (memory_ == Memory::device) free_on_device(voxels_);
+}
+
+void BackendVolume::take(const ConstVolumeView& from) {
+  require(from.geometry->size == geometry_.size && from.buffered == whole(*from.geometry) && from.type == type_ &&
+              from.components == 1 && from.memory == Memory::host,
+          "a volume takes the voxels of another one of its size and type in host memory alone");
+  if (memory_ == Memory::device) {
+    copy_to_device(voxels_, from.voxels, bytes());
+  } else {
+    std::memcpy(voxels_, from.voxels, bytes());
+  }
+}
+
+AnyVolume BackendVolume::on_host() const {
+  AnyVolume copy(geometry_, type_);
+  if (memory_ == Memory::device) {
+    copy_from_device(copy.data(), voxels_, bytes());
+  } else {
+    std::memcpy(copy.data(), voxels_, bytes());
+  }
+  return copy;
+}
 
 }  // namespace tetwarp

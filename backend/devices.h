@@ -8,6 +8,9 @@
 #include <span>
 #include <string>
 
+#include "backend/backend.h"
+#include "deform/volume.h"
+
 namespace tetwarp {
 
 /// Whether this build contains CUDA.
@@ -63,6 +66,36 @@ class PinnedMemory {
  private:
   void* memory_;
   std::size_t bytes_;
+};
+
+/// Voxels where a backend works: in host memory for the CPU, else in memory of its device.
+class BackendVolume {
+ public:
+  /// Uninitialised voxels of one component.
+  /// @param backend  where they are used
+  /// @param device   number of its device
+  /// @throws DeviceError without such a device, or where there is no room
+  BackendVolume(BackendKind backend, const Geometry& geometry, VoxelType type, int device = 0);
+  /// Frees them.
+  ~BackendVolume();
+  BackendVolume(const BackendVolume&) = delete;
+  BackendVolume& operator=(const BackendVolume&) = delete;
+
+  /// A view for writing of the whole volume.
+  VolumeView view() { return {&geometry_, whole(geometry_), type_, 1, voxels_, memory_}; }
+  /// Copies voxels from a whole volume of the same size and type in host memory.
+  void take(const ConstVolumeView& from);
+  /// A copy in host memory.
+  AnyVolume on_host() const;
+
+ private:
+  std::size_t bytes() const { return static_cast<std::size_t>(voxel_count(geometry_)) * size_bytes(type_); }
+
+  Geometry geometry_;
+  VoxelType type_;
+  Memory memory_;
+  AnyVolume owned_;  ///< voxels in host memory
+  std::byte* voxels_;
 };
 
 }  // namespace tetwarp

@@ -33,6 +33,14 @@ void* allocate_pinned(std::size_t) { not_compiled(); }
 
 void free_pinned(void*) {}
 
+void* allocate_on_device(int, std::size_t) { not_compiled(); }
+
+void free_on_device(void*) {}
+
+void copy_to_device(void*, const void*, std::size_t) { not_compiled(); }
+
+void copy_from_device(void*, const void*, std::size_t) { not_compiled(); }
+
 std::unique_ptr<ForwardResampler> make_cuda_resampler(const Geometry&, int, const Limits&) { not_compiled(); }
 
 std::unique_ptr<PullResampler> make_cuda_pull_resampler(const Geometry&, int, const Limits&) { not_compiled(); }

@@ -30,5 +30,12 @@ void destroy_cuda_stream(void* stream);
 void* allocate_pinned(std::size_t bytes);
 /// Frees what `allocate_pinned` gave.
 void free_pinned(void* memory);
+/// Memory of a device. @throws DeviceError without such a device, or where there is no room
+void* allocate_on_device(int device, std::size_t bytes);
+/// Frees what `allocate_on_device` gave.
+void free_on_device(void* memory);
+/// Copies from host memory to a device's, or back; done when it returns. @throws DeviceError
+void copy_to_device(void* to, const void* from, std::size_t bytes);
+void copy_from_device(void* to, const void* from, std::size_t bytes);
 
 }  // namespace tetwarp

@@ -20,6 +20,7 @@ packages=(
   libinsighttoolkit5-dev libdcmtk-dev libopenjp2-7-dev        # NIfTI, NRRD, MHA; DICOM, in JPEG 2000 too
   libfftw3-dev                                                # Debian 13's ITK asks for it when it is linked
   libdeflate-dev libicu-dev libpng-dev zlib1g-dev libssl-dev
+  libturbojpeg0-dev libboost-dev                              # the viewer
   python3-dev python3-venv                                    # the Python package
   dicom3tools dcm2niix python3-pydicom python3-gdcm python3-numpy python3-nibabel  # independent readers that the tests ask
 )
@@ -63,4 +64,5 @@ A picture of both: $out/preview.png
 Bones, deformed:   $out/bones.png
 What happened:     $out/report.json
 The program:       $tetwarp
+Take hold of it:   $tetwarp view --demo
 END

@@ -33,6 +33,10 @@ Slice slice_through(const Geometry& geometry, AnatomicalPlane plane, const glm::
 /// The voxels of a slice.
 Region region_of(const Geometry& geometry, const Slice& slice);
 
+/// Draws the cells of a lattice over a picture of one slice that it fills.
+/// @param overlay  of OverlayKind::lattice; its map holds the slice
+void draw_lattice(Picture& picture, const Geometry& grid, const Slice& slice, const Overlay& overlay);
+
 /// Slices of one volume side by side, all at the same scale, in their proportions (mm), patient directions around them.
 /// @param parts  all with overlays of the same kinds
 /// @throws InputError for a picture that is too small for them

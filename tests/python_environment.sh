@@ -13,7 +13,7 @@
 set -euo pipefail
 source_dir=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 build=$source_dir/build/$1 environment=$source_dir/build/python-venv
-packages=(nanobind numpy pytest nibabel SimpleITK pydicom mypy)
+packages=(nanobind numpy pytest nibabel SimpleITK pydicom mypy playwright axe-playwright-python)
 [ "${2:-}" != --peers ] || packages+=(itk torch torchio monai jax jupytext nbclient ipykernel matplotlib)
 skip() { echo "== no tests of the Python package: $1" >&2; exit 0; }
 python3 -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2>/dev/null || skip "python3 is missing or older than 3.10"

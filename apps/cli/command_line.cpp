@@ -26,6 +26,7 @@ struct Commands {
   SimulateOptions simulate;
   BatchOptions batch;
   RenderOptions render;
+  ViewOptions view;
 };
 
 /// Only for `tetwarp --help`: what follows `bench` is never parsed here.
@@ -124,6 +125,7 @@ int run_command_line(int argc, char** argv) {
   add_invert(app, commands.invert);
   add_simulate(app, commands.simulate);
   add_render(app, commands.render);
+  add_view(app, commands.view);
   add_batch(app, commands.batch);
   add_bench(app);
   try {
@@ -136,6 +138,7 @@ int run_command_line(int argc, char** argv) {
   if (app.got_subcommand("field")) return run(run_field, commands.field);
   if (app.got_subcommand("invert")) return run(run_invert, commands.invert);
   if (app.got_subcommand("render")) return run(run_render, commands.render);
+  if (app.got_subcommand("view")) return run(run_view, commands.view);
   if (app.got_subcommand("batch")) return run(run_batch, commands.batch);
   if (app.got_subcommand("simulate")) return run(run_simulate, commands.simulate);
   return run(run_deform, commands.deform);

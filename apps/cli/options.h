@@ -180,6 +180,23 @@ struct RenderOptions {
   double rate = 12;               ///< of them a second, in .mp4 and .gif
 };
 
+/// Size, voxels, and spacing, mm, of the phantom that the viewer shows by itself: small enough for a laptop.
+inline constexpr std::int64_t kDemoSize[] = {256, 256, 150};
+inline constexpr double kDemoSpacing[] = {1.6, 1.6, 2};
+
+struct ViewOptions {
+  CommonOptions common;
+  InputOptions input;
+  bool demo = false;  ///< the built-in phantom instead of INPUT
+  std::filesystem::path scenario, labels;
+  std::optional<std::int64_t> cell_size;          ///< empty: of the scenario, or as many voxels as is quick enough
+  std::filesystem::path output = "tetwarp-view";  ///< folder of what is saved
+  int port = 0;                                   ///< 0: one that is free
+  bool no_open = false;
+  BackendChoice backend = BackendChoice::automatic;
+  int device = 0;  ///< of CUDA
+};
+
 /// Parses the command line and runs the subcommand. @return the exit status (docs/reference/exit-status.md)
 int run_command_line(int argc, char** argv);
 
@@ -191,6 +208,7 @@ int run_deform(const DeformOptions& options);
 int run_simulate(const SimulateOptions& options);
 int run_batch(const BatchOptions& options);
 int run_render(const RenderOptions& options);
+int run_view(const ViewOptions& options);
 
 /// Becomes the program tetwarp-bench that lies beside this one; returns only by an exception.
 /// @param arguments  given to it as they are

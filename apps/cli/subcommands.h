@@ -20,6 +20,7 @@ void add_field(CLI::App& app, FieldCommandOptions& options);
 void add_invert(CLI::App& app, InvertOptions& options);
 void add_simulate(CLI::App& app, SimulateOptions& options);
 void add_render(CLI::App& app, RenderOptions& options);
+void add_view(CLI::App& app, ViewOptions& options);
 void add_batch(CLI::App& app, BatchOptions& options);
 
 }  // namespace tetwarp::apps

@@ -6,6 +6,7 @@
 #include <limits>
 #include <type_traits>
 
+#include "deform/core/ray_pick.h"
 #include "deform/render/ray_blocks.h"
 #include "deform/render/ray_frame.h"
 
@@ -144,6 +145,17 @@ __global__ void __launch_bounds__(kPatches * 32, 8)
   pixel[0] = colour.red;
   pixel[1] = colour.green;
   pixel[2] = colour.blue;
+}
+
+/// Finds what one pixel shows, by one thread.
+///
+/// @param scene  see `ray_kernel`  @param index  three numbers, the continuous index of the place, and 1 if there is
+/// one, else 0: written
+template <class V>
+__global__ void pick_kernel(RayScene<V> scene, int column, int row, float* index) {
+  glm::vec3 place(0);
+  index[3] = ray::pick(scene, column, row, place) ? 1.0f : 0.0f;
+  for (int axis = 0; axis < 3; ++axis) index[axis] = place[axis];
 }
 
 }  // namespace

@@ -45,8 +45,11 @@ class CudaRenderer final : public Renderer {
   }
   void set_tints(const Tints& tints) override;
   void render(const ViewPlane& plane, std::span<std::uint8_t> rgb, const Control& control) override;
+  std::optional<glm::dvec3> pick(const ViewPlane& plane, int column, int row, const Control& control) override;
 
  private:
+  template <class Use>
+  void with_scene(const ViewPlane& plane, cudaStream_t stream, Use&& use);
   void place_copy();
   /// Reads the voxels of the volume, where it lies, into all that is made of them.
   void read_all(cudaStream_t stream);
@@ -80,6 +83,7 @@ class CudaRenderer final : public Renderer {
   TransferIntegral lowest_, highest_;  ///< entries
   ClearValues clear_;
   DeviceBuffer<int> opaque_before_, block_rows_;
+  DeviceBuffer<float> picked_;
   const std::uint8_t* tints_ = nullptr;
   double table_step_ = 0;  ///< mm, that the tables are for
   bool distances_are_stale_ = true;
@@ -225,28 +229,47 @@ void CudaRenderer::prepare(const RayFrame& frame, double step, cudaStream_t stre
   distances_are_stale_ = false;
 }
 
+/// Calls `use` with what rays of a picture see.
+template <class Use>
+void CudaRenderer::with_scene(const ViewPlane& plane, cudaStream_t stream, Use&& use) {
+  const RayFrame frame = ray_frame(geometry_, style_, plane);
+  prepare(frame, step_mm(geometry_, style_, plane), stream);
+  const RayTables tables{ranges_.data(), distances_.data(), blocks_, table_.data(), integrals_.data(),
+                         lowest_,        highest_,          clear_,  tints_,        tint_colours_.data()};
+  dispatch(volume_.type, [&](auto voxel) {
+    using V = decltype(voxel);
+    use(RayScene<V>{frame, tables, {reinterpret_cast<const V*>(read_), glm::ivec3(geometry_.size), strides_}});
+  });
+  TETWARP_CUDA_TRY(cudaGetLastError());
+}
+
 void CudaRenderer::render(const ViewPlane& plane, std::span<std::uint8_t> rgb, const Control& control) {
   require_ready(volume_, style_, plane, rgb.size());
   if (control.stop.stop_requested()) throw Cancelled();
   const DeviceScope scope(device_);
   const auto stream = static_cast<cudaStream_t>(control.stream);
-  const RayFrame frame = ray_frame(geometry_, style_, plane);
-  prepare(frame, step_mm(geometry_, style_, plane), stream);
   cudaPointerAttributes found{};
   TETWARP_CUDA_TRY(cudaPointerGetAttributes(&found, rgb.data()));
   const bool on_device = found.type == cudaMemoryTypeDevice || found.type == cudaMemoryTypeManaged;
   std::uint8_t* const pixels = on_device ? rgb.data() : picture_.reserve(rgb.size());
-  const RayTables tables{ranges_.data(), distances_.data(), blocks_, table_.data(), integrals_.data(),
-                         lowest_,        highest_,          clear_,  tints_,        tint_colours_.data()};
-  const dim3 grid(blocks_for(plane.width, kPatches * kPatchWidth), blocks_for(plane.height, kPatchHeight));
-  dispatch(volume_.type, [&](auto voxel) {
-    using V = decltype(voxel);
-    const RayScene<V> scene{frame, tables, {reinterpret_cast<const V*>(read_), glm::ivec3(geometry_.size), strides_}};
+  with_scene(plane, stream, [&](const auto& scene) {
+    const dim3 grid(blocks_for(plane.width, kPatches * kPatchWidth), blocks_for(plane.height, kPatchHeight));
     ray_kernel<<<grid, kPatches * 32, 0, stream>>>(scene, plane.width, plane.height, pixels);
   });
-  TETWARP_CUDA_TRY(cudaGetLastError());
   if (!on_device) TETWARP_CUDA_TRY(cudaMemcpyAsync(rgb.data(), pixels, rgb.size(), cudaMemcpyDeviceToHost, stream));
   TETWARP_CUDA_TRY(cudaStreamSynchronize(stream));
+}
+
+std::optional<glm::dvec3> CudaRenderer::pick(const ViewPlane& plane, int column, int row, const Control& control) {
+  require_pixel(volume_, style_, plane, column, row);
+  const DeviceScope scope(device_);
+  const auto stream = static_cast<cudaStream_t>(control.stream);
+  float* const found = picked_.reserve(4);
+  with_scene(plane, stream, [&](const auto& scene) { pick_kernel<<<1, 1, 0, stream>>>(scene, column, row, found); });
+  glm::vec4 index;
+  picked_.download(&index.x, 4, stream);
+  if (index.w == 0) return std::nullopt;
+  return point_from_index(geometry_)(glm::dvec3(index));
 }
 
 }  // namespace

@@ -41,6 +41,23 @@ void* allocate_pinned(std::size_t bytes) {
 
 void free_pinned(void* memory) { cudaFreeHost(memory); }
 
+void* allocate_on_device(int device, std::size_t bytes) {
+  const cuda_detail::DeviceScope scope(device);
+  void* memory = nullptr;
+  TETWARP_CUDA_TRY(cudaMalloc(&memory, bytes));
+  return memory;
+}
+
+void free_on_device(void* memory) { cudaFree(memory); }
+
+void copy_to_device(void* to, const void* from, std::size_t bytes) {
+  TETWARP_CUDA_TRY(cudaMemcpy(to, from, bytes, cudaMemcpyHostToDevice));
+}
+
+void copy_from_device(void* to, const void* from, std::size_t bytes) {
+  TETWARP_CUDA_TRY(cudaMemcpy(to, from, bytes, cudaMemcpyDeviceToHost));
+}
+
 std::string describe_cuda_device(int device) {
   cudaDeviceProp properties{};
   TETWARP_CUDA_TRY(cudaGetDeviceProperties(&properties, device));

@@ -57,7 +57,8 @@ void IntervalRows::find_places(const PlaceForm& form, const Nudge& nudge, const 
   });
   if (count != 0) fill_fixed_row(runs, count, static_cast<int>(y), static_cast<int>(z), u_);
   for (int n = 0; n < slow_count; ++n) find_one_by_one(nudge, row, slow[n].begin, slow[n].end, slow[n].owner);
-  for (std::uint32_t left = ~covered; left != 0; left &= left - 1) clear(form, std::countr_zero(left));
+  const std::uint32_t in_row = ~0u >> (32 - row.count);
+  for (std::uint32_t left = ~covered & in_row; left != 0; left &= left - 1) clear(form, std::countr_zero(left));
 }
 
 /// A voxel that nobody owns: where it stays, if it does.

@@ -6,6 +6,7 @@
 
 #include <atomic>
 
+#include "deform/core/ray_pick.h"
 #include "deform/cpu/tiles.h"
 #include "deform/render/ray_blocks.h"
 #include "deform/render/ray_frame.h"
@@ -53,9 +54,12 @@ class CpuRenderer final : public Renderer {
   }
 
   void render(const ViewPlane& plane, std::span<std::uint8_t> rgb, const Control& control) override;
+  std::optional<glm::dvec3> pick(const ViewPlane& plane, int column, int row, const Control& control) override;
 
  private:
   void prepare(const RayFrame& frame, double step);
+  template <class Use>
+  void with_scene(const ViewPlane& plane, Use&& use);
   template <class V>
   void cast_all(const RayScene<V>& scene, const ViewPlane& plane, std::uint8_t* rgb, const Control& control) const;
 
@@ -139,8 +143,9 @@ void CpuRenderer::cast_all(const RayScene<V>& scene, const ViewPlane& plane, std
   if (stopped) throw Cancelled();
 }
 
-void CpuRenderer::render(const ViewPlane& plane, std::span<std::uint8_t> rgb, const Control& control) {
-  require_ready(volume_, style_, plane, rgb.size());
+/// Calls `use` with what rays of a picture see, in the arena of this renderer.
+template <class Use>
+void CpuRenderer::with_scene(const ViewPlane& plane, Use&& use) {
   const RayFrame frame = ray_frame(geometry_, style_, plane);
   cpu::Arena arena(limits_);
   arena.execute([&] {
@@ -159,9 +164,24 @@ void CpuRenderer::render(const ViewPlane& plane, std::span<std::uint8_t> rgb, co
       using V = decltype(voxel);
       const auto* const voxels = reinterpret_cast<const V*>(volume_.voxels);
       const glm::ivec3 size(geometry_.size);
-      cast_all(RayScene<V>{frame, tables, {voxels, size, {1, size.x, size.x * size.y}}}, plane, rgb.data(), control);
+      use(RayScene<V>{frame, tables, {voxels, size, {1, size.x, size.x * size.y}}});
     });
   });
+}
+
+void CpuRenderer::render(const ViewPlane& plane, std::span<std::uint8_t> rgb, const Control& control) {
+  require_ready(volume_, style_, plane, rgb.size());
+  with_scene(plane, [&](const auto& scene) { cast_all(scene, plane, rgb.data(), control); });
+}
+
+std::optional<glm::dvec3> CpuRenderer::pick(const ViewPlane& plane, int column, int row, const Control&) {
+  require_pixel(volume_, style_, plane, column, row);
+  std::optional<glm::dvec3> place;
+  with_scene(plane, [&](const auto& scene) {
+    glm::vec3 index;
+    if (ray::pick(scene, column, row, index)) place = point_from_index(geometry_)(glm::dvec3(index));
+  });
+  return place;
 }
 
 }  // namespace

@@ -78,6 +78,14 @@ void require_ready(const ConstVolumeView& volume, const RenderStyle& style, cons
               std::to_string(bytes) + " bytes, expected three a pixel");
 }
 
+void require_pixel(const ConstVolumeView& volume, const RenderStyle& style, const ViewPlane& plane, int column,
+                   int row) {
+  require_ready(volume, style, plane,
+                3 * static_cast<std::size_t>(plane.width) * static_cast<std::size_t>(plane.height));
+  require(column >= 0 && column < plane.width && row >= 0 && row < plane.height,
+          "pixel (" + std::to_string(column) + ", " + std::to_string(row) + ") lies outside the picture");
+}
+
 std::vector<TransferEntry> tint_table(const Tints& tints) {
   std::vector<TransferEntry> table;
   for (const glm::vec4& colour : tints.colours) table.push_back({colour.r, colour.g, colour.b, colour.a});

@@ -26,6 +26,9 @@ void require_valid(const Tints& tints, const ConstVolumeView& volume);
 /// Checks what a picture is made of. @throws InputError unless there are a volume and a style, and three bytes for each
 /// pixel
 void require_ready(const ConstVolumeView& volume, const RenderStyle& style, const ViewPlane& plane, std::size_t bytes);
+/// @throws InputError unless there are a volume and a style, and the pixel lies in the picture
+void require_pixel(const ConstVolumeView& volume, const RenderStyle& style, const ViewPlane& plane, int column,
+                   int row);
 
 /// The colours of tints as a table of 256 entries.
 std::vector<TransferEntry> tint_table(const Tints& tints);

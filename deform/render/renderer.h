@@ -69,6 +69,14 @@ class Renderer {
   /// @throws InputError before a volume and a style are set, or for an array of another size
   /// @throws Cancelled
   virtual void render(const ViewPlane& plane, std::span<std::uint8_t> rgb, const Control& control = {}) = 0;
+
+  /// The place in the volume that a pixel of a picture shows: where half of what its ray shows lies in front, or, for
+  /// Projection::maximum, its largest value.
+  /// @param plane   pixels and rays of the picture
+  /// @param column  of the pixel, from 0 at the left  @param row  from 0 at the top
+  /// @return LPS mm; empty where nothing is seen
+  /// @throws InputError before a volume and a style are set, or for a pixel outside the picture
+  virtual std::optional<glm::dvec3> pick(const ViewPlane& plane, int column, int row, const Control& control = {}) = 0;
 };
 
 /// A renderer on the CPU. It refuses volumes in device memory.

@@ -176,6 +176,10 @@ void draw_letters(const Lettering& lettering, const Rectangle& panel, const Slic
 
 }  // namespace
 
+void draw_lattice(Picture& picture, const Geometry& grid, const Slice& slice, const Overlay& overlay) {
+  SlicePanel(picture, {0, 0, picture.width(), picture.height()}, grid, slice).lay_over(overlay);
+}
+
 Slice slice_through(const Geometry& geometry, AnatomicalPlane plane, const glm::dvec3& point) {
   Slice slice = middle_slice(geometry, plane);
   const double index = index_from_point(geometry)(point)[slice.normal_axis];

@@ -43,8 +43,9 @@ BELOW = {
 
 LIBRARIES = ("deform", "cuda", "backend", "itkbridge", "io")
 
-# Rooms of deform/ whose headers the folders above include freely.
-OPEN_ROOMS = ("deform/contours/", "deform/fields/", "deform/phantom/", "deform/render/", "deform/simulate/")
+# Rooms whose headers the folders above include freely.
+OPEN_ROOMS = ("deform/contours/", "deform/fields/", "deform/phantom/", "deform/render/", "deform/simulate/",
+              "view/server/", "view/session/")
 
 # Headers that a folder includes though they are private, or not below it: (who, prefix of the header) and why.
 FRIENDS = {

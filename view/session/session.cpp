@@ -198,6 +198,19 @@ void Session::lift_ball() {
   act(std::move(hand), false);
 }
 
+bool Session::is_behind() const {
+  const bool ball_moved = hand_.ball_radius_mm && !scenario_.phases.empty() && scenario_.phases.back().push &&
+                          scenario_.phases.back().push->at_mm.back() != hand_.ball_mm;
+  return (begins_ && can_undo()) || hand_.by_mm != hand_.done_mm || ball_moved;
+}
+
+std::optional<glm::dvec4> Session::ball_now() const {
+  if (!hand_.ball_radius_mm) return std::nullopt;
+  return glm::dvec4(hand_.ball_mm, *hand_.ball_radius_mm);
+}
+
+bool Session::is_open(const std::string& cut) const { return !has(hand_.closed_cuts, cut); }
+
 Convergence Session::step(const Control& control) {
   begins_ = begins_ || scenario_.phases.back().frames == kMostFrames;
   try {

@@ -69,6 +69,19 @@ class Session {
 
   /// All that was done, as a scenario that repeats it. It has no phase before the first step.
   const simulate::Scenario& recorded() const { return scenario_; }
+  /// Whether there is an action to take back, or one to do again.
+  bool can_undo() const { return !marks_.empty(); }
+  bool can_redo() const { return !undone_.empty(); }
+  /// Whether the hand holds tissue.
+  bool holds() const { return hand_.handle.has_value(); }
+  /// Whether something was asked for that no step has done yet.
+  bool is_behind() const;
+  /// Number of places that are pinned.
+  std::size_t pins() const { return hand_.pins.size(); }
+  /// The centre of the ball, LPS mm, and its radius, mm; empty where there is none.
+  std::optional<glm::dvec4> ball_now() const;
+  /// Whether a cut of `recorded` is open now.
+  bool is_open(const std::string& cut) const;
   /// Number of frames that were simulated and not taken back.
   int frames() const { return simulate::frame_count(scenario_); }
   /// What is simulated: model, displacements and field.

@@ -1,0 +1,49 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+// What the viewer's server lets in. It listens on this machine alone, but every page of every browser here can reach
+// it.
+namespace tetwarp::viewer {
+
+/// A secret of 256 random bits, 64 hexadecimal digits.
+/// @throws Error where the system gives no random bits
+std::string make_token();
+
+/// Whether two texts are equal. The time does not depend on where they differ.
+bool is_same_secret(std::string_view given, std::string_view secret);
+
+/// Whether a request names this server as its host, and nothing else: no page of another name may reach it, wherever
+/// that name leads (DNS rebinding).
+bool is_own_host(std::string_view host, std::uint16_t port);
+/// Whether a page that opens a WebSocket comes from this server.
+bool is_own_origin(std::string_view origin, std::uint16_t port);
+
+/// The headers of every answer, names and values: what the page may load and who may frame it, and that nobody keeps
+/// it.
+/// @param frames  whether pages of this machine may show it in a frame
+const std::vector<std::pair<std::string, std::string>>& safety_headers(bool frames);
+
+/// Counts what a page sends, so that none can flood the server.
+class RateLimit {
+ public:
+  using Clock = std::chrono::steady_clock;
+  /// @param per_second  messages  @param burst  that may come at once
+  RateLimit(double per_second, double burst) : per_second_(per_second), burst_(burst), left_(burst) {}
+  /// @return whether one more is within the limit
+  bool take(Clock::time_point now);
+
+ private:
+  double per_second_, burst_, left_;
+  Clock::time_point last_{};
+};
+
+}  // namespace tetwarp::viewer

@@ -1,0 +1,253 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include "view/session/scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/matrix.hpp>
+#include <limits>
+
+#include "backend/devices.h"
+#include "backend/factories.h"
+#include "deform/fields/lattice_mesh.h"
+#include "view/session/coarse_volume.h"
+
+namespace tetwarp::viewer {
+
+struct Scene::Slices : SliceMaker {
+  using SliceMaker::SliceMaker;
+};
+
+/// The volumes that are drawn, and who draws them.
+struct Scene::Volumes {
+  /// A volume that is deformed as a whole.
+  struct Whole {
+    std::unique_ptr<BackendVolume> source, output;  ///< `source` only on a device
+    ConstVolumeView from;
+    std::unique_ptr<ForwardResampler> resampler;
+    std::unique_ptr<Renderer> renderer;
+    bool is_set = false;  ///< whether the renderer has the output
+  };
+  AnyVolume coarse_source;       ///< only on the CPU
+  std::optional<Whole> coarse;   ///< only on the CPU
+  std::optional<Whole> exact;    ///< on the CPU when it is asked for
+  const Whole* drawn = nullptr;  ///< the one that the last picture shows
+};
+
+namespace {
+
+/// A lattice over the grid that moves nothing.
+VertexField still_field(const Geometry& grid) {
+  VertexField field;
+  const std::int64_t longest = std::max(grid.size.x, std::max(grid.size.y, grid.size.z));
+  field.lattice = lattice_over(grid, std::max<std::int64_t>(longest - 1, 1));
+  field.displacement.assign(static_cast<std::size_t>(voxel_count(field.lattice)), glm::vec3(0));
+  return field;
+}
+
+constexpr AnatomicalPlane kPlanes[] = {AnatomicalPlane::axial, AnatomicalPlane::coronal, AnatomicalPlane::sagittal};
+
+}  // namespace
+
+Scene::Scene(const Setup& setup)
+    : setup_(setup),
+      grid_(straightened(*setup.source.geometry)),
+      index_from_point_(index_from_point(grid_)),
+      still_(still_field(grid_)),
+      volumes_(std::make_unique<Volumes>()) {
+  require(setup.source.components == 1,
+          "a volume to look at has one value a voxel, found " + std::to_string(setup.source.components));
+  field_ = view(still_, Outside::background);
+  const auto cut = [&](const Geometry& grid) {
+    return std::make_unique<Slices>(grid, target(setup_.source, {}), field_,
+                                    make_forward_resampler(setup.backend, grid, setup.device, setup.limits),
+                                    make_forward_resampler(setup.backend, grid, setup.device, setup.limits));
+  };
+  slices_ = cut(grid_);
+  if (!runs_on_device(setup.backend) && std::max(grid_.size.x, grid_.size.y) > kMostMovingVoxels)
+    moving_slices_ = cut(coarse_grid(grid_, glm::i64vec3(2, 2, grid_.size.z > kMostMovingVoxels ? 2 : 1)));
+  const auto ready = [&](Volumes::Whole& whole_volume, const Geometry& grid) {
+    whole_volume.output = std::make_unique<BackendVolume>(setup.backend, grid, setup.source.type, setup.device);
+    whole_volume.resampler = make_forward_resampler(setup.backend, grid, setup.device, setup.limits);
+    whole_volume.renderer = make_renderer(setup.backend, setup.device, setup.limits);
+  };
+  if (runs_on_device(setup.backend)) {
+    Volumes::Whole& exact = volumes_->exact.emplace();
+    exact.source =
+        std::make_unique<BackendVolume>(setup.backend, *setup.source.geometry, setup.source.type, setup.device);
+    exact.source->take(setup.source);
+    exact.from = exact.source->view();
+    ready(exact, grid_);
+  } else {
+    const glm::i64vec3 blocks = coarse_blocks(*setup.source.geometry);
+    volumes_->coarse_source = coarse_volume(setup.source, blocks);
+    Volumes::Whole& coarse = volumes_->coarse.emplace();
+    coarse.from = std::as_const(volumes_->coarse_source).view();
+    ready(coarse, coarse_grid(grid_, blocks));
+  }
+}
+
+Scene::~Scene() = default;
+
+void Scene::set_field(const FieldView& field) {
+  field_ = field;
+  slices_->set_field(field);
+  if (moving_slices_) moving_slices_->set_field(field);
+  is_shown_ = is_exact_ = false;
+}
+
+void Scene::set_field(VertexField field) {
+  kept_ = std::move(field);
+  set_field(view(kept_, Outside::background));
+}
+
+Slice Scene::slice_near(AnatomicalPlane plane, const glm::dvec3& at_mm) const {
+  Slice slice = middle_slice(grid_, plane);
+  const double index = index_from_point_(at_mm)[slice.normal_axis];
+  slice.voxel =
+      std::clamp<std::int64_t>(std::llround(std::clamp(index, -1.0, 1e6)), 0, grid_.size[slice.normal_axis] - 1);
+  return slice;
+}
+
+Target Scene::target(const ConstVolumeView& source, const VolumeView& output) const {
+  return {.source = source, .output = output, .background = setup_.background, .padding = setup_.padding};
+}
+
+PaneImage Scene::slice(const Slice& slice, const SliceLook& look) { return slices_->picture(slice, look); }
+
+PaneImage Scene::moving_slice(const Slice& slice, const SliceLook& look) {
+  if (!moving_slices_) return slices_->picture(slice, look);
+  Slice coarse = middle_slice(moving_slices_->grid(), slice.plane);
+  const std::int64_t size = grid_.size[slice.normal_axis], count = moving_slices_->grid().size[slice.normal_axis];
+  coarse.voxel = slice.voxel / ((size + count - 1) / count);
+  return moving_slices_->picture(coarse, look);
+}
+
+Window Scene::window() const {
+  std::vector<double> values;
+  for (const AnatomicalPlane plane : kPlanes) {
+    const std::vector<double> of_plane =
+        sample_slice(setup_.source, middle_slice(*setup_.source.geometry, plane), 256, 256);
+    values.insert(values.end(), of_plane.begin(), of_plane.end());
+  }
+  return choose_window(values, setup_.source.type);
+}
+
+void Scene::set_style(const RenderStyle& style) {
+  require_valid(style.transfer);
+  style_ = style;
+  if (volumes_->exact) volumes_->exact->renderer->set_style(style_);
+  if (!volumes_->coarse) return;
+  RenderStyle quick = style;  // its voxels are large, and it is seen for a moment
+  quick.step_voxels = 1;
+  volumes_->coarse->renderer->set_style(quick);
+}
+
+/// Brings the volume that is drawn up to date.
+void Scene::show_volume() {
+  Volumes& all = *volumes_;
+  if (is_exact_) {
+    all.drawn = &*all.exact;
+    return;
+  }
+  Volumes::Whole& shown = all.coarse ? *all.coarse : *all.exact;
+  all.drawn = &shown;
+  if (is_shown_) return;
+  const Target one = target(shown.from, shown.output->view());
+  shown.resampler->set_field(field_, {.jacobian_range = false});
+  const Update update = shown.resampler->update({&one, 1});
+  if (shown.is_set) {
+    shown.renderer->update_volume(update.changed);
+  } else {
+    shown.renderer->set_volume(shown.output->view());
+    shown.is_set = true;
+  }
+  is_shown_ = true;
+}
+
+PaneImage Scene::volume(const ViewPlane& plane, const Control& control) {
+  show_volume();
+  PaneImage image{plane.width, plane.height, false, {}};
+  image.pixels.resize(3 * static_cast<std::size_t>(plane.width) * static_cast<std::size_t>(plane.height));
+  volumes_->drawn->renderer->render(plane, image.pixels, control);
+  return image;
+}
+
+std::optional<glm::dvec3> Scene::pick(const ViewPlane& plane, int column, int row) {
+  show_volume();
+  return volumes_->drawn->renderer->pick(plane, column, row);
+}
+
+void Scene::make_exact(const Control& control) {
+  if (is_exact_) return;
+  Volumes& all = *volumes_;
+  if (!all.exact) {
+    Volumes::Whole& exact = all.exact.emplace();
+    exact.from = setup_.source;
+    exact.output = std::make_unique<BackendVolume>(setup_.backend, grid_, setup_.source.type, setup_.device);
+    exact.resampler = make_forward_resampler(setup_.backend, grid_, setup_.device, setup_.limits);
+    exact.renderer = make_renderer(setup_.backend, setup_.device, setup_.limits);
+    if (!style_.transfer.points.empty()) exact.renderer->set_style(style_);
+  }
+  Volumes::Whole& exact = *all.exact;
+  const Target one = target(exact.from, exact.output->view());
+  exact.resampler->set_field(field_, {}, control);
+  const Update update = exact.resampler->update({&one, 1}, control);
+  if (exact.is_set) {
+    exact.renderer->update_volume(update.changed, control);
+  } else {
+    exact.renderer->set_volume(exact.output->view(), control);
+    exact.is_set = true;
+  }
+  is_exact_ = is_shown_ = true;
+  const Report& report = update.report;
+  quality_ = {.coverage = static_cast<double>(report.covered) / static_cast<double>(voxel_count(grid_)),
+              .inverted = report.inverted,
+              .degenerate = report.degenerate,
+              .jacobian_min = report.jacobian_min};
+}
+
+std::optional<glm::i64vec3> Scene::voxel_at(const glm::dvec3& point_mm) const {
+  const glm::dvec3 index = glm::round(index_from_point_(point_mm));
+  for (int axis = 0; axis < 3; ++axis)
+    if (!(index[axis] >= 0 && index[axis] < static_cast<double>(grid_.size[axis]))) return std::nullopt;
+  return glm::i64vec3(index);
+}
+
+std::optional<Scene::Values> Scene::values_at(const glm::dvec3& point_mm) {
+  const std::optional<glm::i64vec3> voxel = voxel_at(point_mm);
+  if (!voxel) return std::nullopt;
+  return Values{slices_->value(*voxel, Slices::Which::after), slices_->value(*voxel, Slices::Which::before)};
+}
+
+std::optional<glm::dvec3> Scene::undeformed(const glm::dvec3& point_mm) {
+  const std::optional<glm::i64vec3> voxel = voxel_at(point_mm);
+  if (!voxel) return std::nullopt;
+  const glm::vec3 by = slices_->inverse_mm(*voxel);
+  if (std::isnan(by.x)) return std::nullopt;
+  return point_mm + glm::dvec3(by);
+}
+
+std::optional<glm::dvec3> worst_place(const VertexField& field) {
+  const TetrahedralMesh mesh = mesh_of(field);
+  std::optional<glm::dvec3> worst;
+  double least = std::numeric_limits<double>::infinity();
+  for (const glm::u32vec4& corners : mesh.tetrahedra) {
+    glm::dmat4x3 before, after;
+    for (int n = 0; n < 4; ++n) {
+      before[n] = mesh.rest[corners[n]];
+      after[n] = before[n] + glm::dvec3(mesh.displacement[corners[n]]);
+    }
+    const auto volume = [](const glm::dmat4x3& p) {
+      return glm::determinant(glm::dmat3(p[0] - p[3], p[1] - p[3], p[2] - p[3]));
+    };
+    const double jacobian = volume(after) / volume(before);
+    if (!(jacobian < least)) continue;
+    least = jacobian;
+    worst = 0.25 * (after[0] + after[1] + after[2] + after[3]);
+  }
+  return worst;
+}
+
+}  // namespace tetwarp::viewer

@@ -1,0 +1,159 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <thread>
+
+#include "view/session/pane_line.h"
+#include "view/session/request.h"
+#include "view/session/session.h"
+
+namespace tetwarp::viewer {
+
+/// What a page shows beside pictures.
+struct State {
+  int frames = 0;          ///< simulated so far
+  bool is_moving = false;  ///< whether further ones are to come
+  bool can_undo = false, can_redo = false, holds = false;
+  std::size_t pins = 0;
+  std::optional<glm::dvec4> ball;                  ///< centre, LPS mm, and radius, mm
+  std::vector<std::pair<std::string, bool>> cuts;  ///< name, and whether it is open
+  simulate::Method method = simulate::Method::chainmail;
+  std::optional<Quality> quality;     ///< of what is seen; empty while it is not known
+  std::optional<glm::dvec3> fold_at;  ///< LPS mm of the worst tetrahedron, where one is turned inside out or flat
+  glm::dvec3 cursor_mm{0};            ///< where all slices meet
+  SliceLook look;
+  std::string style;  ///< name of the transfer function
+};
+
+/// An answer to a request.
+struct Answer {
+  enum class Kind : std::uint8_t {
+    held,     ///< what was gripped, pinned or touched lies at `at_mm`
+    value,    ///< of a probe
+    nothing,  ///< nothing is seen there, or nobody has a value there
+    problem   ///< it could not be done; `text` says why
+  } kind = Kind::nothing;
+  std::uint32_t number = 0;  ///< of the request
+  glm::dvec3 at_mm{0};       ///< of the deformed picture
+  double after = 0, before = 0;
+  std::string text = {};
+};
+
+/// A session on a thread of its own, which takes requests in order, steps while something moves, and makes pictures as
+/// fast as they are shown. It knows no network.
+class Stage {
+ public:
+  /// Who is told of what comes out. Calls come from threads of the stage, one at a time for each function.
+  struct Listener {
+    std::function<void(Picture)> picture;
+    std::function<void(State)> state;
+    std::function<void(Answer)> answer;
+    /// Gets the text of the scenario.
+    std::function<void(const request::Save&, std::uint32_t number, std::string scenario)> save;
+  };
+  struct Setup {
+    simulate::Scenario scenario;  ///< see `Session`
+    const simulate::Patient* patient;
+    Scene* scene;
+    std::function<simulate::MakeSimulation(simulate::Method)> make;
+    bool has_device = false;  ///< so that pictures of what moves need not be small
+    std::size_t most_snapshot_bytes = Session::kMostSnapshotBytes;
+  };
+
+  /// Patient and scene must outlive the stage.
+  Stage(Setup setup, Listener listener);
+  /// Ends what is under way.
+  ~Stage();
+  Stage(const Stage&) = delete;
+  Stage& operator=(const Stage&) = delete;
+
+  /// Asks for something; comes back at once.
+  void ask(Request request);
+  /// Somebody looks from now on: everything is shown anew. Or nobody does: nothing is simulated.
+  void watch(bool somebody);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void run(const std::stop_token& stop);
+  Clock::time_point work();
+  bool take_requests();
+  void take(const Request& request);
+  void fail(std::uint32_t number, const std::exception& error);
+  void step();
+  bool is_due(const PaneLine& line) const;
+  bool show_panes();
+  void show(PaneLine& line, request::Pane pane, bool is_exact, const Control& control);
+  void rest();
+  void changed_field();
+  void tell_state();
+  void begin_session(simulate::Method method);
+  std::optional<glm::dvec3> place(const request::Pointed& pointed);
+  glm::dvec3 seen(const request::Pointed& pointed);
+  glm::dvec3 undeformed(const glm::dvec3& at_mm);
+  ViewPlane plane(const PaneLine& line, int most) const;
+  void all_stale(bool slices, bool volume);
+
+  // One for each request.
+  void on(const request::Size&);
+  void on(const request::Look&);
+  void on(const request::Turn&);
+  void on(const request::Levels&);
+  void on(const request::Style&);
+  void on(const request::Compare&);
+  void on(const request::LayOver&);
+  void on(const request::Probe&);
+  void on(const request::Shown&);
+  void on(const request::Grip&);
+  void on(const request::Move&);
+  void on(const request::Release&);
+  void on(const request::Pin&);
+  void on(const request::Unpin&);
+  void on(const request::Cut&);
+  void on(const request::Suture&);
+  void on(const request::Reopen&);
+  void on(const request::Ball&);
+  void on(const request::LiftBall&);
+  void on(const request::Undo&);
+  void on(const request::Redo&);
+  void on(const request::Reset&);
+  void on(const request::Use&);
+  void on(const request::Save&);
+
+  Setup setup_;
+  Listener listener_;
+  Scene& scene_;
+  std::unique_ptr<Session> session_;
+  simulate::Method method_;
+  glm::dvec3 cursor_mm_;
+  Camera camera_;
+  SliceLook look_;
+  std::string style_;
+  std::optional<Quality> quality_;
+  std::optional<glm::dvec3> fold_at_;
+  std::uint32_t number_ = 0;  ///< of the request that was taken last
+  int cuts_made_ = 0;         ///< for their names
+  bool is_moving_ = false;    ///< whether tissue has not come to rest
+  int resting_steps_ = 0;     ///< steps since the hand did something
+  Clock::time_point stepped_{}, changed_{};
+
+  std::mutex mutex_;  ///< of what follows
+  std::condition_variable wake_;
+  std::deque<Request> asked_;
+  bool watched_ = false, watch_changed_ = false, woken_ = false;
+  std::stop_source resting_;  ///< of what is made at rest; requests end it
+
+  Encoders encoders_;
+  std::array<std::unique_ptr<PaneLine>, request::kPanes> lines_;
+  std::jthread thread_;  ///< the last member: it uses all others
+};
+
+}  // namespace tetwarp::viewer
