@@ -28,6 +28,20 @@ using viewer::Scene;
 using viewer::Server;
 using viewer::State;
 
+/// With --verbose: what was done how often, and how long one took.
+void tell_times(const CommonOptions& common, const viewer::StageTimes& times) {
+  if (!common.verbose) return;
+  const auto tell = [&](const char* what, const viewer::Spent& spent) {
+    if (spent.count > 0)
+      say(common, std::string(what) + ": " + std::to_string(spent.count) + ", " +
+                      number_text(1e3 * spent.seconds / spent.count) + " ms each");
+  };
+  tell("steps", times.steps);
+  tell("slices", times.slices);
+  tell("pictures of the volume", times.volumes);
+  tell("exact volumes", times.rests);
+}
+
 /// One run of the command.
 class Viewing {
  public:
@@ -180,6 +194,7 @@ int Viewing::run() {
     const std::lock_guard of_stage(mutex_);
     stage = std::move(stage_);
   }
+  tell_times(options_.common, stage->times());
   stage.reset();
   server_.reset();
   return 0;

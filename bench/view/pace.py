@@ -14,6 +14,7 @@ import argparse
 import json
 import math
 import pathlib
+import signal
 import sys
 import time
 
@@ -60,7 +61,7 @@ def main():
     given = parser.parse_args()
     begun = time.perf_counter()
     what = ["--demo"] if given.input == "demo" else [given.input]
-    with Program(given.program, *what, *given.options) as program, Page(program) as page:
+    with Program(given.program, "--verbose", *what, *given.options) as program, Page(program) as page:
         page.sizes(512, 512, given.volume)
         page.listen(120, lambda p: len({about["pane"] for _, about, _ in p.pictures}) == 4)
         first = page.pictures[0][0] - begun
@@ -93,6 +94,8 @@ def main():
                 "median_ms": round(part(waits, 0.5), 1),
                 "p95_ms": round(part(waits, 0.95), 1),
             }
+        program.process.send_signal(signal.SIGINT)
+        result["stages"] = [line for line in program.process.communicate(timeout=30)[1].splitlines() if " each" in line]
         print(json.dumps(result, indent=1))
 
 

@@ -8,32 +8,11 @@
 #include <glm/matrix.hpp>
 #include <limits>
 
-#include "backend/devices.h"
 #include "backend/factories.h"
 #include "deform/fields/lattice_mesh.h"
 #include "view/session/coarse_volume.h"
 
 namespace tetwarp::viewer {
-
-struct Scene::Slices : SliceMaker {
-  using SliceMaker::SliceMaker;
-};
-
-/// The volumes that are drawn, and who draws them.
-struct Scene::Volumes {
-  /// A volume that is deformed as a whole.
-  struct Whole {
-    std::unique_ptr<BackendVolume> source, output;  ///< `source` only on a device
-    ConstVolumeView from;
-    std::unique_ptr<ForwardResampler> resampler;
-    std::unique_ptr<Renderer> renderer;
-    bool is_set = false;  ///< whether the renderer has the output
-  };
-  AnyVolume coarse_source;       ///< only on the CPU
-  std::optional<Whole> coarse;   ///< only on the CPU
-  std::optional<Whole> exact;    ///< on the CPU when it is asked for
-  const Whole* drawn = nullptr;  ///< the one that the last picture shows
-};
 
 namespace {
 
@@ -54,38 +33,40 @@ Scene::Scene(const Setup& setup)
     : setup_(setup),
       grid_(straightened(*setup.source.geometry)),
       index_from_point_(index_from_point(grid_)),
-      still_(still_field(grid_)),
-      volumes_(std::make_unique<Volumes>()) {
+      still_(still_field(grid_)) {
   require(setup.source.components == 1,
           "a volume to look at has one value a voxel, found " + std::to_string(setup.source.components));
   field_ = view(still_, Outside::background);
-  const auto cut = [&](const Geometry& grid) {
-    return std::make_unique<Slices>(grid, target(setup_.source, {}), field_,
-                                    make_forward_resampler(setup.backend, grid, setup.device, setup.limits),
-                                    make_forward_resampler(setup.backend, grid, setup.device, setup.limits));
-  };
-  slices_ = cut(grid_);
-  if (!runs_on_device(setup.backend) && std::max(grid_.size.x, grid_.size.y) > kMostMovingVoxels)
-    moving_slices_ = cut(coarse_grid(grid_, glm::i64vec3(2, 2, grid_.size.z > kMostMovingVoxels ? 2 : 1)));
-  const auto ready = [&](Volumes::Whole& whole_volume, const Geometry& grid) {
-    whole_volume.output = std::make_unique<BackendVolume>(setup.backend, grid, setup.source.type, setup.device);
-    whole_volume.resampler = make_forward_resampler(setup.backend, grid, setup.device, setup.limits);
-    whole_volume.renderer = make_renderer(setup.backend, setup.device, setup.limits);
-  };
+  source_ = setup.source;
   if (runs_on_device(setup.backend)) {
-    Volumes::Whole& exact = volumes_->exact.emplace();
-    exact.source =
+    device_source_ =
         std::make_unique<BackendVolume>(setup.backend, *setup.source.geometry, setup.source.type, setup.device);
-    exact.source->take(setup.source);
-    exact.from = exact.source->view();
-    ready(exact, grid_);
+    device_source_->take(setup.source);
+    source_ = device_source_->view();
+    exact_ = whole_volume(source_, grid_);
   } else {
     const glm::i64vec3 blocks = coarse_blocks(*setup.source.geometry);
-    volumes_->coarse_source = coarse_volume(setup.source, blocks);
-    Volumes::Whole& coarse = volumes_->coarse.emplace();
-    coarse.from = std::as_const(volumes_->coarse_source).view();
-    ready(coarse, coarse_grid(grid_, blocks));
+    coarse_source_ = coarse_volume(setup.source, blocks);
+    coarse_ = whole_volume(std::as_const(coarse_source_).view(), coarse_grid(grid_, blocks));
+    if (std::max(grid_.size.x, grid_.size.y) > kMostMovingVoxels)
+      moving_slices_ = slice_maker(coarse_grid(grid_, glm::i64vec3(2, 2, grid_.size.z > kMostMovingVoxels ? 2 : 1)));
   }
+  slices_ = slice_maker(grid_);
+}
+
+std::unique_ptr<SliceMaker> Scene::slice_maker(const Geometry& grid) const {
+  return std::make_unique<SliceMaker>(grid, target(source_, {}), view(still_, Outside::background),
+                                      make_forward_resampler(setup_.backend, grid, setup_.device, setup_.limits),
+                                      make_forward_resampler(setup_.backend, grid, setup_.device, setup_.limits));
+}
+
+Scene::Whole Scene::whole_volume(const ConstVolumeView& from, const Geometry& grid) const {
+  Whole one;
+  one.from = from;
+  one.output = std::make_unique<BackendVolume>(setup_.backend, grid, from.type, setup_.device);
+  one.resampler = make_forward_resampler(setup_.backend, grid, setup_.device, setup_.limits);
+  one.renderer = make_renderer(setup_.backend, setup_.device, setup_.limits);
+  return one;
 }
 
 Scene::~Scene() = default;
@@ -137,22 +118,21 @@ Window Scene::window() const {
 void Scene::set_style(const RenderStyle& style) {
   require_valid(style.transfer);
   style_ = style;
-  if (volumes_->exact) volumes_->exact->renderer->set_style(style_);
-  if (!volumes_->coarse) return;
+  if (exact_) exact_->renderer->set_style(style_);
+  if (!coarse_) return;
   RenderStyle quick = style;  // its voxels are large, and it is seen for a moment
   quick.step_voxels = 1;
-  volumes_->coarse->renderer->set_style(quick);
+  coarse_->renderer->set_style(quick);
 }
 
 /// Brings the volume that is drawn up to date.
 void Scene::show_volume() {
-  Volumes& all = *volumes_;
   if (is_exact_) {
-    all.drawn = &*all.exact;
+    drawn_ = &*exact_;
     return;
   }
-  Volumes::Whole& shown = all.coarse ? *all.coarse : *all.exact;
-  all.drawn = &shown;
+  Whole& shown = coarse_ ? *coarse_ : *exact_;
+  drawn_ = &shown;
   if (is_shown_) return;
   const Target one = target(shown.from, shown.output->view());
   shown.resampler->set_field(field_, {.jacobian_range = false});
@@ -170,27 +150,22 @@ PaneImage Scene::volume(const ViewPlane& plane, const Control& control) {
   show_volume();
   PaneImage image{plane.width, plane.height, false, {}};
   image.pixels.resize(3 * static_cast<std::size_t>(plane.width) * static_cast<std::size_t>(plane.height));
-  volumes_->drawn->renderer->render(plane, image.pixels, control);
+  drawn_->renderer->render(plane, image.pixels, control);
   return image;
 }
 
 std::optional<glm::dvec3> Scene::pick(const ViewPlane& plane, int column, int row) {
   show_volume();
-  return volumes_->drawn->renderer->pick(plane, column, row);
+  return drawn_->renderer->pick(plane, column, row);
 }
 
 void Scene::make_exact(const Control& control) {
   if (is_exact_) return;
-  Volumes& all = *volumes_;
-  if (!all.exact) {
-    Volumes::Whole& exact = all.exact.emplace();
-    exact.from = setup_.source;
-    exact.output = std::make_unique<BackendVolume>(setup_.backend, grid_, setup_.source.type, setup_.device);
-    exact.resampler = make_forward_resampler(setup_.backend, grid_, setup_.device, setup_.limits);
-    exact.renderer = make_renderer(setup_.backend, setup_.device, setup_.limits);
-    if (!style_.transfer.points.empty()) exact.renderer->set_style(style_);
+  if (!exact_) {
+    exact_ = whole_volume(source_, grid_);
+    if (!style_.transfer.points.empty()) exact_->renderer->set_style(style_);
   }
-  Volumes::Whole& exact = *all.exact;
+  Whole& exact = *exact_;
   const Target one = target(exact.from, exact.output->view());
   exact.resampler->set_field(field_, {}, control);
   const Update update = exact.resampler->update({&one, 1}, control);
@@ -218,7 +193,7 @@ std::optional<glm::i64vec3> Scene::voxel_at(const glm::dvec3& point_mm) const {
 std::optional<Scene::Values> Scene::values_at(const glm::dvec3& point_mm) {
   const std::optional<glm::i64vec3> voxel = voxel_at(point_mm);
   if (!voxel) return std::nullopt;
-  return Values{slices_->value(*voxel, Slices::Which::after), slices_->value(*voxel, Slices::Which::before)};
+  return Values{slices_->value(*voxel, SliceMaker::Which::after), slices_->value(*voxel, SliceMaker::Which::before)};
 }
 
 std::optional<glm::dvec3> Scene::undeformed(const glm::dvec3& point_mm) {

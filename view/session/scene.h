@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "backend/backend.h"
+#include "backend/devices.h"
 #include "deform/render/renderer.h"
 #include "deform/resampler.h"
 #include "view/session/slices.h"
@@ -89,8 +90,17 @@ class Scene {
   std::optional<glm::dvec3> undeformed(const glm::dvec3& point_mm);
 
  private:
-  struct Volumes;
-  struct Slices;
+  /// A volume that is deformed as a whole, and who draws it.
+  struct Whole {
+    ConstVolumeView from;  ///< undeformed
+    std::unique_ptr<BackendVolume> output;
+    std::unique_ptr<ForwardResampler> resampler;
+    std::unique_ptr<Renderer> renderer;
+    bool is_set = false;  ///< whether the renderer has the output
+  };
+
+  Whole whole_volume(const ConstVolumeView& from, const Geometry& grid) const;
+  std::unique_ptr<SliceMaker> slice_maker(const Geometry& grid) const;
 
   Target target(const ConstVolumeView& source, const VolumeView& output) const;
   void show_volume();
@@ -101,8 +111,13 @@ class Scene {
   AffineMap index_from_point_;
   VertexField kept_, still_;
   FieldView field_;
-  std::unique_ptr<Slices> slices_, moving_slices_;  ///< `moving_slices_` only on the CPU, of large volumes
-  std::unique_ptr<Volumes> volumes_;
+  std::unique_ptr<BackendVolume> device_source_;        ///< only on a device
+  ConstVolumeView source_;                              ///< undeformed, where the backend works
+  std::unique_ptr<SliceMaker> slices_, moving_slices_;  ///< `moving_slices_` only on the CPU, of large volumes
+  AnyVolume coarse_source_;
+  std::optional<Whole> coarse_;   ///< only on the CPU
+  std::optional<Whole> exact_;    ///< on the CPU when it is asked for
+  const Whole* drawn_ = nullptr;  ///< the one that the last picture shows
   RenderStyle style_;
   bool is_shown_ = false;  ///< whether the volume that is drawn has it
   bool is_exact_ = false;

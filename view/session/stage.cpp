@@ -49,6 +49,25 @@ bool lets_rest(const Request& request) {
 
 }  // namespace
 
+/// Adds its lifetime to what was spent.
+class Stage::Timer {
+ public:
+  Timer(Stage& stage, Spent StageTimes::*what) : stage_(stage), what_(what) {}
+  ~Timer() {
+    const std::lock_guard lock(stage_.mutex_);
+    Spent& spent = stage_.times_.*what_;
+    ++spent.count;
+    spent.seconds += std::chrono::duration<double>(Clock::now() - begun_).count();
+  }
+  Timer(const Timer&) = delete;
+  Timer& operator=(const Timer&) = delete;
+
+ private:
+  Stage& stage_;
+  Spent StageTimes::*what_;
+  Clock::time_point begun_ = Clock::now();
+};
+
 Stage::Stage(Setup setup, Listener listener)
     : setup_(std::move(setup)),
       listener_(std::move(listener)),
@@ -92,6 +111,11 @@ void Stage::watch(bool somebody) {
   watch_changed_ = woken_ = true;
   if (!somebody) resting_.request_stop();
   wake_.notify_one();
+}
+
+StageTimes Stage::times() {
+  const std::lock_guard lock(mutex_);
+  return times_;
 }
 
 void Stage::run(const std::stop_token& stop) {
@@ -169,7 +193,10 @@ void Stage::fail(std::uint32_t number, const std::exception& error) {
 void Stage::step() {
   stepped_ = Clock::now();
   const bool is_behind = session_->is_behind();
-  const simulate::Convergence convergence = session_->step();
+  const simulate::Convergence convergence = [this] {
+    const Timer timer(*this, &StageTimes::steps);
+    return session_->step();
+  }();
   resting_steps_ = is_behind ? 0 : resting_steps_ + 1;
   is_moving_ = !convergence.reached && resting_steps_ < kMostRestingSteps;
   changed_field();
@@ -195,6 +222,7 @@ bool Stage::show_panes() {
 }
 
 void Stage::show(PaneLine& line, Pane pane, bool is_exact, const Control& control) {
+  const Timer timer(*this, pane == Pane::volume ? &StageTimes::volumes : &StageTimes::slices);
   Picture about;
   about.request = number_;
   about.is_exact = is_exact;
@@ -222,7 +250,10 @@ void Stage::rest() {
     for (std::size_t n = 0; n < kSlices; ++n)
       if (!lines_[n]->is_sharp() && lines_[n]->is_free()) show(*lines_[n], static_cast<Pane>(n), true, control);
     if (control.stop.stop_requested()) return;
-    scene_.make_exact(control);
+    {
+      const Timer timer(*this, &StageTimes::rests);
+      scene_.make_exact(control);
+    }
     PaneLine& volume = *lines_[kSlices];
     if (!volume.is_sharp() && volume.is_free()) show(volume, Pane::volume, true, control);
     if (quality_) return;

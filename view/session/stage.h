@@ -47,6 +47,19 @@ struct Answer {
   std::string text = {};
 };
 
+/// How often something was done, and how long all of it took.
+struct Spent {
+  int count = 0;
+  double seconds = 0;
+};
+/// Where the time of a stage went.
+struct StageTimes {
+  Spent steps,  ///< of the simulation
+      slices,   ///< pictures of slices; the first one of a field makes it ready
+      volumes,  ///< pictures of the volume, with deforming it
+      rests;    ///< exact volumes
+};
+
 /// A session on a thread of its own, which takes requests in order, steps while something moves, and makes pictures as
 /// fast as they are shown. It knows no network.
 class Stage {
@@ -79,8 +92,11 @@ class Stage {
   void ask(Request request);
   /// Somebody looks from now on: everything is shown anew. Or nobody does: nothing is simulated.
   void watch(bool somebody);
+  /// Where the time went so far.
+  StageTimes times();
 
  private:
+  class Timer;
   using Clock = std::chrono::steady_clock;
 
   void run(const std::stop_token& stop);
@@ -150,6 +166,7 @@ class Stage {
   std::deque<Request> asked_;
   bool watched_ = false, watch_changed_ = false, woken_ = false;
   std::stop_source resting_;  ///< of what is made at rest; requests end it
+  StageTimes times_;
 
   Encoders encoders_;
   std::array<std::unique_ptr<PaneLine>, request::kPanes> lines_;
