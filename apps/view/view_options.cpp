@@ -12,7 +12,7 @@ void add_view(CLI::App& app, ViewOptions& options) {
   command->add_flag("--demo", options.demo, "The built-in phantom instead of INPUT")->excludes(input);
   command
       ->add_option("--scenario", options.scenario,
-                   "Tissues, method, what is held and cuts, of a scenario file; its phases are not played")
+                   "Tissues, method, what is held and cuts, of a scenario file, whose phases a button plays")
       ->type_name("FILE.json");
   command->add_option("--labels", options.labels, "Label volume on the grid of INPUT, for tissues and regions by label")
       ->type_name("FILE");

@@ -12,6 +12,29 @@ import socket
 import struct
 import subprocess
 import time
+import zlib
+
+
+def grey_pixels(png):
+    """The rows of a PNG of one byte a pixel, as the program writes them: filtered by the pixel on the left, or not."""
+    at, data, width = 8, b"", 0
+    while at < len(png):
+        size, kind = struct.unpack(">I4s", png[at:at + 8])
+        if kind == b"IHDR":
+            width, height, depth, colours = struct.unpack(">IIBB", png[at + 8:at + 18])
+            assert (depth, colours) == (8, 0), "the picture is not grey"
+        if kind == b"IDAT":
+            data += png[at + 8:at + 8 + size]
+        at += size + 12
+    data, rows = zlib.decompress(data), []
+    for y in range(len(data) // (width + 1)):
+        row = bytearray(data[y * (width + 1) + 1:(y + 1) * (width + 1)])
+        kind = data[y * (width + 1)]
+        assert kind in (0, 1), "another filter"
+        for x in range(1, width if kind == 1 else 0):
+            row[x] = (row[x] + row[x - 1]) & 255
+        rows.append(bytes(row))
+    return rows
 
 
 class Refused(Exception):
@@ -83,6 +106,7 @@ class Page:
         self.closed = None   # the code, once the server closes
         self.acknowledges = acknowledges
         self.buffer = b""
+        self.begun = None    # a message of which parts have come: its kind and bytes
         self.line = socket.create_connection(("127.0.0.1", program.port), timeout=30)
         self.line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         own = f"127.0.0.1:{program.port}"
@@ -138,7 +162,7 @@ class Page:
         self.ask("size", pane="volume", width=volume, height=volume)
 
     def _frame(self):
-        """The next frame that has come as a whole: (opcode, bytes), or None."""
+        """The next frame that has come as a whole: (whether it is a message's last, opcode, bytes), or None."""
         if len(self.buffer) < 2:
             return None
         size, at = self.buffer[1] & 127, 2
@@ -152,9 +176,9 @@ class Page:
             size, at = struct.unpack(">Q", self.buffer[2:10])[0], 10
         if len(self.buffer) < at + size:
             return None
-        opcode, data = self.buffer[0] & 15, self.buffer[at:at + size]
+        first, data = self.buffer[0], self.buffer[at:at + size]
         self.buffer = self.buffer[at + size:]
-        return opcode, data
+        return first & 128 != 0, first & 15, data
 
     def listen(self, seconds, until=None):
         """Takes what comes for so long, or until `until(self)` holds. @return whether it does"""
@@ -179,7 +203,13 @@ class Page:
                 self.closed = self.closed or 1006
             self.buffer += part
 
-    def _take(self, opcode, data):
+    def _take(self, is_last, opcode, data):
+        if opcode < 8:  # a part of a message
+            kind, before = self.begun or (opcode, b"")
+            self.begun = None if is_last else (kind, before + data)
+            if not is_last:
+                return
+            opcode, data = kind, before + data
         if opcode == 8:
             self.closed = struct.unpack(">H", data[:2])[0] if len(data) >= 2 else 1005
         elif opcode == 9:
@@ -203,6 +233,19 @@ class Page:
         """The answer to a request; None where there is none in time."""
         self.listen(seconds, lambda page: any(m.get("n") == number for m in page.messages))
         return next((m for m in self.messages if m.get("n") == number), None)
+
+    def exact(self, pane):
+        """Rows of the last picture of a pane, which is exact."""
+        about, png = [(about, png) for _, about, png in self.pictures if about["pane"] == pane][-1]
+        assert about["exact"], "the last picture is not exact"
+        return about, grey_pixels(png)
+
+    def save(self, name, volume, seconds=300):
+        """Saves. @return the answer"""
+        number = self.ask("save", name=name, volume=volume)
+        ends = lambda page: [m for m in page.messages if m.get("n") == number and m["say"] in ("saved", "problem")]
+        self.listen(seconds, ends)
+        return ends(self)[-1]
 
     def is_at_rest(self):
         """Whether each pane's last picture is exact, and the state says what the field is worth."""

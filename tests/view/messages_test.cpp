@@ -65,6 +65,7 @@ TEST(ViewMessages, EveryWordIsReadAsWhatItAsksFor) {
   EXPECT_EQ(one<request::Reopen>(R"({"do": "reopen", "name": "cut 1"})").name, "cut 1");
   EXPECT_EQ(one<request::Ball>(R"({"do": "ball", "at": [1, 2, 3], "radius": 15})").radius_mm, 15);
   one<request::LiftBall>(R"({"do": "lift"})");
+  one<request::Play>(R"({"do": "play"})");
   one<request::Redo>(R"({"do": "redo"})");
   one<request::Reset>(R"({"do": "reset"})");
   EXPECT_EQ(one<request::Use>(R"({"do": "use", "method": "mass-spring"})").method, simulate::Method::mass_spring);

@@ -117,6 +117,47 @@ TEST_P(Sessions, TwoHundredActionsAreRepeatedToTheSameBitsAnywhere) {
   }
 }
 
+TEST_P(Sessions, AScenarioIsPlayedAmongWhatTheHandDoes) {
+  const Patient patient = uniform_patient();
+  const Scenario scenario = base(GetParam());
+  Phase lift;
+  lift.moves = {move_of(Zone{Sphere{{{0, 0, 36}}, {9}}}, Shift{{0, 0, 3}}, "move[0]")};
+  lift.frames = 4;
+  Phase turn;
+  turn.moves = {move_of(Zone{Sphere{{{8, 8, 36}}, {9}}}, Rotation{{{8, 8, 36}}, {0, 0, 1}, 20}, "move[0]")};
+  turn.frames = 3;
+  Session session(scenario, patient, cpu(GetParam()));
+  session.grip({-8, 0, 32}, 6);
+  session.move({1, 0, 0});
+  session.step();
+  const std::vector<glm::vec3> before = session.player().displacement();
+  const std::string text_before = text_of(session);
+  session.play({lift, turn});
+  EXPECT_TRUE(session.plays());
+  EXPECT_FALSE(session.holds());
+  session.step();
+  EXPECT_THROW(session.grip({-8, 0, 32}, 6), InputError);
+  EXPECT_THROW(session.move({2, 0, 0}), InputError);
+  EXPECT_EQ(text_of(session), text_before);  // a phase is recorded as a whole
+  ASSERT_TRUE(session.undo());
+  EXPECT_FALSE(session.plays());
+  EXPECT_TRUE(session.player().displacement() == before);
+  session.play({lift, turn});
+  for (int n = 0; n < 7; ++n) {
+    EXPECT_TRUE(session.plays()) << n;
+    session.step();
+  }
+  EXPECT_FALSE(session.plays());
+  session.step();  // tissue comes to rest
+  const Scenario recorded = reread(session.recorded());
+  EXPECT_EQ(frame_count(recorded), 1 + 7 + 1);
+  EXPECT_TRUE(replayed(recorded, patient, cpu(GetParam(), 2)) == session.player().displacement());
+  Phase impossible = lift;
+  impossible.moves[0].what = Zone{Sphere{{{900, 0, 0}}, {1}}};
+  EXPECT_THROW(session.play({lift, impossible}), InputError);
+  EXPECT_FALSE(session.plays());
+}
+
 TEST_P(Sessions, UndoAndRedoGoThroughAllStatesWhateverWasLetGoOf) {
   SCOPED_TRACE(seed_text(test_seed()));
   const Patient patient = uniform_patient();

@@ -35,6 +35,7 @@ export const kKeys = [
   ['t', 'Before, or after again: blink', (view) => view.compare('before')],
   ['m', 'Show or hide the crosshair', (view) => view.toggleMarks()],
   ['f', 'Jump to a fold', (view) => view.lookAtFold()],
+  [' ', 'Play the scenario', (view) => view.play()],
   ['r', 'Reset zoom and views', (view) => view.resetViews()],
   ['s', 'Save', (view) => view.openSave()],
   ['?', 'All keys', (view) => view.openHelp()],

@@ -255,6 +255,10 @@ export class View {
     this.redraw();
   }
 
+  play() {
+    if (this.state?.playable && !this.state.plays) this.connection.ask('play');
+  }
+
   openSave() {
     this.settings.openSave();
   }
@@ -268,7 +272,7 @@ export class View {
       const row = document.createElement('tr');
       const head = document.createElement('th');
       head.scope = 'row';
-      head.textContent = key;
+      head.textContent = key === ' ' ? 'Space' : key;
       const cell = document.createElement('td');
       cell.textContent = what;
       row.append(head, cell);

@@ -68,6 +68,7 @@ export class Settings {
     element('undo').onclick = () => ask('undo');
     element('redo').onclick = () => ask('redo');
     element('reset').onclick = () => ask('reset');
+    element('play').onclick = () => ask('play');
     element('save').onclick = () => this.openSave();
     element('help').onclick = () => view.openHelp();
     element('unpin').onclick = () => ask('unpin');
@@ -136,7 +137,9 @@ export class Settings {
     enable('undo', state.undo);
     enable('redo', state.redo);
     enable('reset', state.undo);
-    enable('save', state.frames > 0);
+    element('play').hidden = !state.playable;
+    enable('play', !state.plays);
+    enable('save', state.frames > 0 && !state.plays);
     enable('unpin', state.pins > 0);
     enable('lift', state.ball !== null);
     element('held').textContent =

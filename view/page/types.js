@@ -60,6 +60,8 @@
  * @property {number} pins
  * @property {[number, number, number, number] | null} ball  centre and radius
  * @property {{name: string, open: boolean}[]} cuts
+ * @property {boolean} playable  whether there is a scenario to play
+ * @property {boolean} plays
  * @property {'chainmail' | 'mass-spring'} method
  * @property {Quality | null} quality
  * @property {Vector | null} fold

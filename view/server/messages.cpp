@@ -189,6 +189,7 @@ const std::pair<const char*, Wish (*)(Keys&)> kWishes[] = {
        return Ball{keys.pointed(), keys.number("radius", 0.01, kLargestMm)};
      }},
     {"lift", [](Keys&) -> Wish { return LiftBall{}; }},
+    {"play", [](Keys&) -> Wish { return Play{}; }},
     {"undo", [](Keys&) -> Wish { return Undo{}; }},
     {"redo", [](Keys&) -> Wish { return Redo{}; }},
     {"reset", [](Keys&) -> Wish { return Reset{}; }},
@@ -296,6 +297,8 @@ std::string message_of(const State& state) {
                   {"pins", state.pins},
                   {"ball", nullptr},
                   {"cuts", cuts},
+                  {"playable", state.can_play},
+                  {"plays", state.plays},
                   {"method", name_in(kMethodNames, state.method)},
                   {"quality", nullptr},
                   {"fold", nullptr},

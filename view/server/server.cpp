@@ -177,6 +177,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
     beast::get_lowest_layer(stream_).expires_never();
     stream_.set_option(websocket::stream_base::timeout{kHttpTimeout, kIdleTimeout, true});
     stream_.read_message_max(kMostMessageBytes);
+    stream_.auto_fragment(false);  // a picture is one frame
     stream_.async_accept(request, [self = shared_from_this()](error_code error) {
       if (!error) self->read_message_of_page();
     });

@@ -98,6 +98,8 @@ struct Ball {
 struct LiftBall {};
 struct Undo {};
 struct Redo {};
+/// Plays the phases of the scenario that the viewer was given.
+struct Play {};
 /// Takes back all.
 struct Reset {};
 /// Begins anew with another method.
@@ -119,7 +121,8 @@ struct Request {
   std::variant<request::Size, request::Look, request::Turn, request::Levels, request::Style, request::Compare,
                request::LayOver, request::Probe, request::Shown, request::Grip, request::Move, request::Release,
                request::Pin, request::Unpin, request::Cut, request::Suture, request::Reopen, request::Ball,
-               request::LiftBall, request::Undo, request::Redo, request::Reset, request::Use, request::Save>
+               request::LiftBall, request::Play, request::Undo, request::Redo, request::Reset, request::Use,
+               request::Save>
       what;
   /// By which pictures say what they show. It rises from request to request; 0 for one that nothing is to be told of.
   std::uint32_t number = 0;

@@ -81,9 +81,15 @@ Phase Session::phase_of(const Hand& hand) const {
   return phase;
 }
 
+/// @throws InputError while phases are being played, which are recorded as a whole
+void Session::require_hand() const {
+  require(to_play_.empty(), "a scenario is being played; wait for its end, or take it back");
+}
+
 /// Begins an action. @param checks  whether the hand might ask for what cannot be
 /// @throws InputError, and then nothing has changed
 void Session::act(Hand hand, bool checks) {
+  require_hand();
   if (checks) PhaseLoads(scenario_, phase_of(hand), patient_);
   mark();
   undone_.clear();
@@ -108,6 +114,7 @@ void Session::grip(const glm::dvec3& at_mm, double radius_mm) {
 }
 
 void Session::move(const glm::dvec3& by_mm) {
+  require_hand();
   require(hand_.handle.has_value(), "the hand holds nothing that it could move");
   require_place(by_mm, kMostShiftMm / 2, "the hand");  // a drag may go from one end to the other
   hand_.by_mm = by_mm;
@@ -179,6 +186,7 @@ void Session::find_cut(const std::string& name) const {
 }
 
 void Session::ball(const glm::dvec3& at_mm, double radius_mm) {
+  require_hand();
   require_place(at_mm, kFarthestMm, "the ball");
   require_radius(radius_mm);
   if (hand_.ball_radius_mm == radius_mm) {
@@ -198,10 +206,22 @@ void Session::lift_ball() {
   act(std::move(hand), false);
 }
 
+void Session::play(std::vector<Phase> phases) {
+  for (Phase& phase : phases) {
+    for (const CutPlan& cut : scenario_.cuts)  // those that the hand made are not known to the scenario
+      if (!is_open(cut.name) && !has(phase.closed_cuts, cut.name)) phase.closed_cuts.push_back(cut.name);
+    PhaseLoads(scenario_, phase, patient_);
+  }
+  Hand hand = hand_;
+  hand.handle.reset();
+  act(std::move(hand), false);
+  to_play_.assign(phases.begin(), phases.end());
+}
+
 bool Session::is_behind() const {
   const bool ball_moved = hand_.ball_radius_mm && !scenario_.phases.empty() && scenario_.phases.back().push &&
                           scenario_.phases.back().push->at_mm.back() != hand_.ball_mm;
-  return (begins_ && can_undo()) || hand_.by_mm != hand_.done_mm || ball_moved;
+  return plays() || (begins_ && can_undo()) || hand_.by_mm != hand_.done_mm || ball_moved;
 }
 
 std::optional<glm::dvec4> Session::ball_now() const {
@@ -214,11 +234,31 @@ bool Session::is_open(const std::string& cut) const { return !has(hand_.closed_c
 Convergence Session::step(const Control& control) {
   begins_ = begins_ || scenario_.phases.back().frames == kMostFrames;
   try {
+    if (plays()) return played_frame(control);
     return begins_ ? first_frame(control) : further_frame(control);
   } catch (...) {
+    to_play_.clear();
     go_to(marks_.size(), scenario_.phases.size());
     throw;
   }
+}
+
+/// The next frame of the phases that are played. A phase is recorded when it has ended.
+Convergence Session::played_frame(const Control& control) {
+  Phase& phase = to_play_.front();
+  if (begins_) player_.begin(phase);
+  begins_ = false;
+  Convergence convergence = player_.next(control);
+  if (player_.frames_done() < phase.frames) {
+    convergence.reached = false;  // there is more to come
+    return convergence;
+  }
+  scenario_.phases.push_back(std::move(phase));
+  to_play_.pop_front();
+  begins_ = true;
+  undone_.clear();
+  convergence.reached = convergence.reached && to_play_.empty();
+  return convergence;
 }
 
 Convergence Session::first_frame(const Control& control) {
@@ -281,6 +321,7 @@ void Session::drop_mark() {
 
 bool Session::undo() {
   if (marks_.empty()) return false;
+  to_play_.clear();
   const Mark& mark = marks_.back();
   const auto first = static_cast<std::ptrdiff_t>(mark.phases), first_cut = static_cast<std::ptrdiff_t>(mark.cuts);
   std::vector<Phase>& phases = scenario_.phases;

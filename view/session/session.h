@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <deque>
 #include <optional>
 #include <string>
 #include <vector>
@@ -26,7 +27,7 @@ class Session {
   static constexpr std::size_t kMostSnapshotBytes = std::size_t{1} << 30;
 
   /// @param scenario  tissues, method, what is held, cuts, which are open, and how many steps a frame may take. Its
-  ///                  phases are not played, and its `deadband_mm` is taken as 0
+  ///                  phases are left out (see `play`), and its `deadband_mm` is taken as 0
   /// @param patient   must outlive this object
   /// @throws InputError for a scenario that does not suit the patient
   Session(simulate::Scenario scenario, const simulate::Patient& patient, simulate::MakeSimulation make,
@@ -57,6 +58,12 @@ class Session {
   /// @throws InputError for a patient without a body
   void ball(const glm::dvec3& at_mm, double radius_mm);
   void lift_ball();
+  /// Plays phases of a scenario, frame by frame with each `step`, from where tissue is. What the hand held it holds no
+  /// more; its pins and ball are not there meanwhile. Until the last frame nothing else can be done but `undo`.
+  /// @throws InputError for phases that cannot be played
+  void play(std::vector<simulate::Phase> phases);
+  /// Whether phases are being played.
+  bool plays() const { return !to_play_.empty(); }
 
   /// Simulates the next frame with all that was done.
   /// @throws InputError for mass-spring where nothing is held, pinned or gripped
@@ -114,12 +121,14 @@ class Session {
   };
 
   simulate::Phase phase_of(const Hand& hand) const;
+  void require_hand() const;
   void act(Hand hand, bool checks);
   void mark();
   void add_cuts(const std::vector<simulate::CutPlan>& plans);
   void drop_cuts(std::size_t keep);
   void drop_mark();
   void find_cut(const std::string& name) const;
+  simulate::Convergence played_frame(const Control& control);
   simulate::Convergence first_frame(const Control& control);
   simulate::Convergence further_frame(const Control& control);
   void replay(std::size_t begin, std::size_t end);
@@ -130,8 +139,9 @@ class Session {
   const simulate::Patient& patient_;
   simulate::PhasePlayer player_;
   Hand hand_;
-  bool begins_ = true;           ///< whether the next step begins a phase
-  glm::dvec3 phase_from_mm_{0};  ///< how far tissue had followed the hand when the phase began
+  bool begins_ = true;                   ///< whether the next step begins a phase
+  glm::dvec3 phase_from_mm_{0};          ///< how far tissue had followed the hand when the phase began
+  std::deque<simulate::Phase> to_play_;  ///< the first one is being played
   std::size_t most_snapshot_bytes_, snapshot_bytes_ = 0;
   std::vector<Mark> marks_;
   std::vector<Undone> undone_;

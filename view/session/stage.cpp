@@ -198,7 +198,7 @@ void Stage::step() {
     return session_->step();
   }();
   resting_steps_ = is_behind ? 0 : resting_steps_ + 1;
-  is_moving_ = !convergence.reached && resting_steps_ < kMostRestingSteps;
+  is_moving_ = session_->plays() || (!convergence.reached && resting_steps_ < kMostRestingSteps);
   changed_field();
   tell_state();
 }
@@ -304,6 +304,8 @@ void Stage::tell_state() {
   state.ball = session_->ball_now();
   for (const simulate::CutPlan& cut : session_->recorded().cuts)
     state.cuts.emplace_back(cut.name, session_->is_open(cut.name));
+  state.can_play = !setup_.scenario.phases.empty();
+  state.plays = session_->plays();
   state.method = method_;
   state.quality = quality_;
   state.fold_at = fold_at_;
@@ -479,6 +481,12 @@ void Stage::on(const Ball& ball) {
 
 void Stage::on(const LiftBall&) {
   session_->lift_ball();
+  is_moving_ = true;
+}
+
+void Stage::on(const Play&) {
+  require(!setup_.scenario.phases.empty(), "there is no scenario whose phases could be played");
+  session_->play(setup_.scenario.phases);
   is_moving_ = true;
 }
 

@@ -25,6 +25,7 @@ struct State {
   std::size_t pins = 0;
   std::optional<glm::dvec4> ball;                  ///< centre, LPS mm, and radius, mm
   std::vector<std::pair<std::string, bool>> cuts;  ///< name, and whether it is open
+  bool can_play = false, plays = false;            ///< phases of the given scenario
   simulate::Method method = simulate::Method::chainmail;
   std::optional<Quality> quality;     ///< of what is seen; empty while it is not known
   std::optional<glm::dvec3> fold_at;  ///< LPS mm of the worst tetrahedron, where one is turned inside out or flat
@@ -138,6 +139,7 @@ class Stage {
   void on(const request::Reopen&);
   void on(const request::Ball&);
   void on(const request::LiftBall&);
+  void on(const request::Play&);
   void on(const request::Undo&);
   void on(const request::Redo&);
   void on(const request::Reset&);
