@@ -33,6 +33,8 @@ export class View {
     this.cursor = [0, 0, 0];
     this.marks = true;
     this.probed = true;
+    this.looked = 0;  // numbers of the last messages that moved the crosshair, and changed the window
+    this.levelled = 0;
     this.connection = new Connection({
       heard: (message) => this.hear(message),
       seen: (about, file) => void this.panes.find((pane) => pane.name === about.pane)?.take(about, file),
@@ -69,8 +71,13 @@ export class View {
         this.settings.fill(message);
         break;
       case 'state':
+        // What was asked for meanwhile counts more than what the program knew when it said this.
+        if (message.request >= this.looked) this.cursor = message.cursor;
+        if (this.state && message.request < this.levelled) {
+          message.width = this.state.width;
+          message.level = this.state.level;
+        }
         this.state = message;
-        this.cursor = message.cursor;
         this.settings.show(message);
         break;
       case 'held':
@@ -133,7 +140,7 @@ export class View {
    */
   look(at) {
     this.cursor = at;
-    this.connection.ask('look', {at});
+    this.looked = this.connection.ask('look', {at});
     this.redraw();
   }
 
@@ -205,7 +212,7 @@ export class View {
     if (!this.state) return;
     this.state.width = width;
     this.state.level = level;
-    this.connection.ask('levels', {width, level});
+    this.levelled = this.connection.ask('levels', {width, level});
   }
 
   /** @param {string} name */

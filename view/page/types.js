@@ -52,6 +52,7 @@
 
 /**
  * @typedef {object} State
+ * @property {number} request  number of the last message that it knows of
  * @property {number} frames
  * @property {boolean} moving
  * @property {boolean} undo

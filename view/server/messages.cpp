@@ -289,6 +289,7 @@ std::string message_of(const State& state) {
   json cuts = json::array();
   for (const auto& [name, is_open] : state.cuts) cuts.push_back({{"name", name}, {"open", is_open}});
   json message = {{"say", "state"},
+                  {"request", state.request},
                   {"frames", state.frames},
                   {"moving", state.is_moving},
                   {"undo", state.can_undo},

@@ -161,6 +161,7 @@ bool Stage::take_requests() {
     resting_ = {};
   }
   if (begins && watched) {
+    number_ = 0;  // of the page that was there before
     for (const auto& line : lines_) line->begin_anew();
     tell_state();
   }
@@ -295,6 +296,7 @@ void Stage::changed_field() {
 
 void Stage::tell_state() {
   State state;
+  state.request = number_;
   state.frames = session_->frames();
   state.is_moving = is_moving_;
   state.can_undo = session_->can_undo();

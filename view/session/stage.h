@@ -19,8 +19,9 @@ namespace tetwarp::viewer {
 
 /// What a page shows beside pictures.
 struct State {
-  int frames = 0;          ///< simulated so far
-  bool is_moving = false;  ///< whether further ones are to come
+  std::uint32_t request = 0;  ///< number of the last request that was taken
+  int frames = 0;             ///< simulated so far
+  bool is_moving = false;     ///< whether further ones are to come
   bool can_undo = false, can_redo = false, holds = false;
   std::size_t pins = 0;
   std::optional<glm::dvec4> ball;                  ///< centre, LPS mm, and radius, mm
