@@ -502,7 +502,7 @@ def main():
         scratch = stack.enter_context(tempfile.TemporaryDirectory())
         program = stack.enter_context(Program(str(pathlib.Path(GIVEN.program).resolve()), "--demo", cwd=scratch))
         browser = stack.enter_context(sync_playwright()).chromium.launch(
-            executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
+            executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"])
         context = browser.new_context(viewport={"width": 1280, "height": 860})
         viewer = Viewer(context.new_page(), program.address)
         viewer.address = program.address

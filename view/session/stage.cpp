@@ -18,8 +18,9 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr milliseconds kPace(16);       ///< between two steps at least: a screen shows no more
-constexpr milliseconds kUntilRest(80);  ///< without a request, before exact pictures are made
+constexpr milliseconds kPace(16);               ///< between two steps at least: a screen shows no more
+constexpr milliseconds kUntilRest(80);          ///< without a request, before exact pictures are made
+constexpr std::chrono::seconds kUntilRetry(1);  ///< after something failed that nobody asked for
 /// Steps after which tissue that still moves a little is let be, if the hand is still.
 constexpr int kMostRestingSteps = 60;
 constexpr int kMostMovingPixels = 256;  ///< on a side of the volume's picture while it moves, without a device
@@ -125,7 +126,7 @@ void Stage::run(const std::stop_token& stop) {
       next = work();
     } catch (const std::exception& error) {
       fail(number_, error);
-      continue;
+      next = Clock::now() + kUntilRetry;
     }
     std::unique_lock lock(mutex_);
     wake_.wait_until(lock, next, [&] { return woken_ || stop.stop_requested(); });
