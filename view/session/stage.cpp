@@ -162,7 +162,6 @@ bool Stage::take_requests() {
     resting_ = {};
   }
   if (begins && watched) {
-    number_ = 0;  // of the page that was there before
     for (const auto& line : lines_) line->begin_anew();
     tell_state();
   }
