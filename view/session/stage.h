@@ -171,9 +171,10 @@ class Stage {
   std::stop_source resting_;  ///< of what is made at rest; requests end it
   StageTimes times_;
 
-  Encoders encoders_;
+  // Ended in the opposite order: the thread gives work to the encoders, and these to the lines.
   std::array<std::unique_ptr<PaneLine>, request::kPanes> lines_;
-  std::jthread thread_;  ///< the last member: it uses all others
+  Encoders encoders_;
+  std::jthread thread_;
 };
 
 }  // namespace tetwarp::viewer
