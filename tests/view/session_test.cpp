@@ -158,6 +158,18 @@ TEST_P(Sessions, AScenarioIsPlayedAmongWhatTheHandDoes) {
   EXPECT_FALSE(session.plays());
 }
 
+TEST_P(Sessions, AScenarioIsPlayedBeforeAnythingWasDone) {
+  const Patient patient = uniform_patient();
+  Phase lift;
+  lift.moves = {move_of(Zone{Sphere{{{0, 0, 36}}, {9}}}, Shift{{0, 0, 3}}, "move[0]")};
+  lift.frames = 4;
+  Session session(base(GetParam()), patient, cpu(GetParam()));
+  session.play({lift});
+  for (int n = 0; n < 4; ++n) session.step();
+  EXPECT_FALSE(session.plays());
+  EXPECT_TRUE(replayed(reread(session.recorded()), patient, cpu(GetParam())) == session.player().displacement());
+}
+
 TEST_P(Sessions, UndoAndRedoGoThroughAllStatesWhateverWasLetGoOf) {
   SCOPED_TRACE(seed_text(test_seed()));
   const Patient patient = uniform_patient();

@@ -232,9 +232,9 @@ std::optional<glm::dvec4> Session::ball_now() const {
 bool Session::is_open(const std::string& cut) const { return !has(hand_.closed_cuts, cut); }
 
 Convergence Session::step(const Control& control) {
-  begins_ = begins_ || scenario_.phases.back().frames == kMostFrames;
   try {
     if (plays()) return played_frame(control);
+    begins_ = begins_ || scenario_.phases.back().frames == kMostFrames;
     return begins_ ? first_frame(control) : further_frame(control);
   } catch (...) {
     to_play_.clear();
