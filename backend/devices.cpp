@@ -52,14 +52,4 @@ void BackendVolume::take(const ConstVolumeView& from) {
   }
 }
 
-AnyVolume BackendVolume::on_host() const {
-  AnyVolume copy(geometry_, type_);
-  if (memory_ == Memory::device) {
-    copy_from_device(copy.data(), voxels_, bytes());
-  } else {
-    std::memcpy(copy.data(), voxels_, bytes());
-  }
-  return copy;
-}
-
 }  // namespace tetwarp

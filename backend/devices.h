@@ -85,8 +85,6 @@ class BackendVolume {
   VolumeView view() { return {&geometry_, whole(geometry_), type_, 1, voxels_, memory_}; }
   /// Copies voxels from a whole volume of the same size and type in host memory.
   void take(const ConstVolumeView& from);
-  /// A copy in host memory.
-  AnyVolume on_host() const;
 
  private:
   std::size_t bytes() const { return static_cast<std::size_t>(voxel_count(geometry_)) * size_bytes(type_); }

@@ -39,8 +39,6 @@ void free_on_device(void*) {}
 
 void copy_to_device(void*, const void*, std::size_t) { not_compiled(); }
 
-void copy_from_device(void*, const void*, std::size_t) { not_compiled(); }
-
 std::unique_ptr<ForwardResampler> make_cuda_resampler(const Geometry&, int, const Limits&) { not_compiled(); }
 
 std::unique_ptr<PullResampler> make_cuda_pull_resampler(const Geometry&, int, const Limits&) { not_compiled(); }

@@ -34,8 +34,7 @@ void free_pinned(void* memory);
 void* allocate_on_device(int device, std::size_t bytes);
 /// Frees what `allocate_on_device` gave.
 void free_on_device(void* memory);
-/// Copies from host memory to a device's, or back; done when it returns. @throws DeviceError
+/// Copies from host memory to a device's; done when it returns. @throws DeviceError
 void copy_to_device(void* to, const void* from, std::size_t bytes);
-void copy_from_device(void* to, const void* from, std::size_t bytes);
 
 }  // namespace tetwarp

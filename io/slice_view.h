@@ -33,6 +33,10 @@ Slice slice_through(const Geometry& geometry, AnatomicalPlane plane, const glm::
 /// The voxels of a slice.
 Region region_of(const Geometry& geometry, const Slice& slice);
 
+/// `choose_window` for the values of the three middle slices of a volume.
+/// @throws InputError unless the view has one component and holds the whole grid
+Window choose_window(const ConstVolumeView& volume);
+
 /// Draws the cells of a lattice over a picture of one slice that it fills.
 /// @param overlay  of OverlayKind::lattice; its map holds the slice
 void draw_lattice(Picture& picture, const Geometry& grid, const Slice& slice, const Overlay& overlay);

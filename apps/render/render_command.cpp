@@ -119,14 +119,7 @@ std::vector<Slice> Rendering::slices() const {
 
 /// The window of grey levels for all pictures, chosen from the middle slices of the first one.
 Window Rendering::chosen_window() const {
-  constexpr int kSamples = 256;
-  std::vector<double> values;
-  for (const AnatomicalPlane plane : {AnatomicalPlane::axial, AnatomicalPlane::coronal, AnatomicalPlane::sagittal}) {
-    const std::vector<double> of_plane =
-        sample_slice(scene_.volume(), middle_slice(scene_.grid(), plane), kSamples, kSamples);
-    values.insert(values.end(), of_plane.begin(), of_plane.end());
-  }
-  Window window = choose_window(values, scene_.volume().type);
+  Window window = choose_window(scene_.volume());
   if (options_.window) window.width = *options_.window;
   if (options_.level) window.level = *options_.level;
   return window;

@@ -112,7 +112,7 @@ viewer::About Viewing::about() const {
 }
 
 void Viewing::save(const viewer::request::Save& wish, std::uint32_t number, std::string scenario) {
-  server_->send_text(viewer::message_of_progress(number, 0));
+  server_->send_text(viewer::message_of_progress(number));
   saving_->begin({wish.name, wish.volume, std::move(scenario)}, [this, number](Saving::Result result) {
     if (result.problem.empty()) {
       server_->send_text(viewer::message_of_saved(number, result.files, result.command));

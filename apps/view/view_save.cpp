@@ -7,6 +7,8 @@
 #include <fstream>
 #include <utility>
 
+#include "apps/cli/input.h"
+#include "io/shown_text.h"
 #include "io/staged_output.h"
 
 namespace tetwarp::apps {
@@ -27,14 +29,19 @@ void require_plain(const std::string& name) {
           "a name has letters, digits, hyphens and underscores, up to 64 of them");
 }
 
-/// A word of a command line, as a shell reads it.
-std::string quoted(const fs::path& path) {
+/// A word of a command line, in quotes where it needs them.
+std::string word(const fs::path& path) {
   const std::string text = path.string();
   const auto is_safe = [](char c) { return is_plain(c) || c == '/' || c == '.'; };
-  if (!text.empty() && std::all_of(text.begin(), text.end(), is_safe)) return text;
-  std::string word = "'";
-  for (const char c : text) word += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return word + "'";
+  return !text.empty() && std::all_of(text.begin(), text.end(), is_safe) ? text : shell_quoted(text);
+}
+
+/// Three numbers of an option.
+template <class Numbers>
+std::string listed(const Numbers& numbers) {
+  std::string text;
+  for (const auto number : numbers) text += (text.empty() ? "" : ",") + number_text(static_cast<double>(number));
+  return text;
 }
 
 PhantomOptions demo_phantom(const fs::path& folder) {
@@ -118,11 +125,12 @@ Saving::Result Saving::save(const Wish& wish) const {
     deform.input.path = options_.output / kDemoFile;
     const PhantomOptions phantom = demo_phantom(options_.output);
     if (!wish.volume.empty() && !fs::exists(phantom.output)) run_phantom(phantom);
-    result.command = "tetwarp phantom -o " + quoted(phantom.output) + " --size 256,256,150 --spacing 1.6,1.6,2\n";
+    result.command = "tetwarp phantom -o " + word(phantom.output) + " --size " + listed(kDemoSize) + " --spacing " +
+                     listed(kDemoSpacing) + "\n";
   }
-  result.command += "tetwarp deform " + quoted(deform.input.path) + " --scenario " + quoted(scenario);
-  if (!options_.labels.empty()) result.command += " --labels " + quoted(options_.labels);
-  result.command += " -o " + quoted(wish.volume.empty() ? options_.output / (wish.name + ".nii.gz") : deform.output);
+  result.command += "tetwarp deform " + word(deform.input.path) + " --scenario " + word(scenario);
+  if (!options_.labels.empty()) result.command += " --labels " + word(options_.labels);
+  result.command += " -o " + word(wish.volume.empty() ? options_.output / (wish.name + ".nii.gz") : deform.output);
   if (wish.volume.empty()) return result;
   run_deform(deform);
   result.files.push_back(deform.output.string());

@@ -54,10 +54,6 @@ void copy_to_device(void* to, const void* from, std::size_t bytes) {
   TETWARP_CUDA_TRY(cudaMemcpy(to, from, bytes, cudaMemcpyHostToDevice));
 }
 
-void copy_from_device(void* to, const void* from, std::size_t bytes) {
-  TETWARP_CUDA_TRY(cudaMemcpy(to, from, bytes, cudaMemcpyDeviceToHost));
-}
-
 std::string describe_cuda_device(int device) {
   cudaDeviceProp properties{};
   TETWARP_CUDA_TRY(cudaGetDeviceProperties(&properties, device));

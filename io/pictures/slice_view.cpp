@@ -176,6 +176,17 @@ void draw_letters(const Lettering& lettering, const Rectangle& panel, const Slic
 
 }  // namespace
 
+Window choose_window(const ConstVolumeView& volume) {
+  constexpr int kSamples = 256;
+  std::vector<double> values;
+  for (const AnatomicalPlane plane : {AnatomicalPlane::axial, AnatomicalPlane::coronal, AnatomicalPlane::sagittal}) {
+    const std::vector<double> of_plane =
+        sample_slice(volume, middle_slice(*volume.geometry, plane), kSamples, kSamples);
+    values.insert(values.end(), of_plane.begin(), of_plane.end());
+  }
+  return choose_window(values, volume.type);
+}
+
 void draw_lattice(Picture& picture, const Geometry& grid, const Slice& slice, const Overlay& overlay) {
   SlicePanel(picture, {0, 0, picture.width(), picture.height()}, grid, slice).lay_over(overlay);
 }

@@ -50,7 +50,7 @@ def expect_seen(page, path):
     header, _, voxels = path.read_bytes().partition(b"ElementDataFile = LOCAL\n")
     expect(b"ElementType = MET_SHORT" in header, header)
     width, height, _ = (int(n) for n in header.split(b"DimSize = ")[1].split(b"\n")[0].split())
-    voxel = page.about["panes"]["axial"]["slices"] and about["voxel"]
+    voxel = about["voxel"]
     values = struct.unpack(f"<{width * height}h", voxels[2 * width * height * voxel:2 * width * height * (voxel + 1)])
     low = page.state["level"] - page.state["width"] / 2
     grey = [min(255, max(0, int((v - low) / page.state["width"] * 255 + 0.5))) for v in values]

@@ -10,7 +10,7 @@ import {kKeys, kMoreKeys, listenToKeys} from './keys.js';
 import {listenTo} from './pointer.js';
 import {Settings} from './settings.js';
 import {SlicePane} from './slice_pane.js';
-import {shown} from './vectors.js';
+import {kLetters, shown} from './vectors.js';
 import {VolumePane} from './volume_pane.js';
 
 /** @typedef {import('./types.js').About} About */
@@ -159,9 +159,8 @@ export class View {
     hand.point = point;
     const at = pane instanceof SlicePane && point && pane.isInside(point) ? pane.placeAt(point) : null;
     hand.hover = at;
-    const names = ['R L', 'A P', 'I S'];
     element('place').textContent = at
-        ? at.map((value, axis) => `${names[axis].split(' ')[value < 0 ? 0 : 1]} ${shown(Math.abs(value))}`).join('  ') + ' mm'
+        ? at.map((value, axis) => `${kLetters[axis][value < 0 ? 0 : 1]} ${shown(Math.abs(value))}`).join('  ') + ' mm'
         : '\u00a0';
     if (!at) element('value').textContent = '';
     else if (this.probed && this.connection.ask('probe', {at})) this.probed = false;

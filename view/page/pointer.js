@@ -87,7 +87,7 @@ export function listenTo(pane, view) {
     if (drag === 'look') lookAt(point);
     if (drag === 'levels') view.levelsBy(x, y);
     if (drag === 'pan') pane.panBy(x, y);
-    if (drag === 'zoom') zoom(Math.exp(-y / kZoomDrag), start);
+    if (drag === 'zoom') pane.zoomBy(Math.exp(-y / kZoomDrag), start);
     if (drag === 'turn' && !(pane instanceof SlicePane)) pane.turnBy(x * kTurn, y * kTurn);
     view.redraw();
   });
@@ -116,20 +116,12 @@ export function listenTo(pane, view) {
       view.hand.resize(1.05 ** -steps);
       view.showHand();
     } else if (event.ctrlKey || !(pane instanceof SlicePane)) {
-      zoom(1.05 ** -steps, pane.pointOf(event));
+      pane.zoomBy(1.05 ** -steps, pane.pointOf(event));
     } else {
       pane.goBy(-steps);
     }
     view.redraw();
   }, {passive: false});
-
-  /**
-   * @param {number} by
-   * @param {Point} around
-   */
-  function zoom(by, around) {
-    pane.zoomBy(by, around);
-  }
 
   /**
    * @param {number} id
@@ -141,7 +133,7 @@ export function listenTo(pane, view) {
     const before = fingers.get(id) ?? point;
     const apart = (/** @type {Point} */ one) => Math.max(1, Math.hypot(one.x - other.x, one.y - other.y));
     pane.panBy((point.x - before.x) / 2, (point.y - before.y) / 2);
-    zoom(apart(point) / apart(before), {x: (point.x + other.x) / 2, y: (point.y + other.y) / 2});
+    pane.zoomBy(apart(point) / apart(before), {x: (point.x + other.x) / 2, y: (point.y + other.y) / 2});
     fingers.set(id, point);
     view.redraw();
   }

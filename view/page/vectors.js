@@ -6,6 +6,9 @@
 /** @typedef {import('./types.js').Vector} Vector */
 /** @typedef {import('./types.js').SlicePlane} SlicePlane */
 
+/** Patient directions along L, P and S: where the number falls, and where it rises. */
+export const kLetters = [['R', 'L'], ['A', 'P'], ['I', 'S']];
+
 /**
  * a + s b
  * @param {Vector} a

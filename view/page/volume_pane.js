@@ -2,13 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 
 import {Pane} from './pane.js';
-import {along, dot, minus} from './vectors.js';
+import {along, dot, kLetters, minus} from './vectors.js';
 
 /** @typedef {import('./types.js').Vector} Vector */
 /** @typedef {import('./pane.js').Point} Point */
 /** @typedef {import('./main.js').View} View */
-
-const kLetters = [['R', 'L'], ['A', 'P'], ['I', 'S']];
 
 /** The pane with a picture of the volume, which the program makes. */
 export class VolumePane extends Pane {

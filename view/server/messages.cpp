@@ -342,9 +342,7 @@ std::string message_of_saved(std::uint32_t number, const std::vector<std::string
   return written({{"say", "saved"}, {"n", number}, {"files", files}, {"command", command}});
 }
 
-std::string message_of_progress(std::uint32_t number, double share) {
-  return written({{"say", "progress"}, {"n", number}, {"share", share}});
-}
+std::string message_of_progress(std::uint32_t number) { return written({{"say", "progress"}, {"n", number}}); }
 
 std::string message_of_refusal(const std::string& reason) { return written({{"say", "bye"}, {"text", reason}}); }
 

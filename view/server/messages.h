@@ -44,8 +44,8 @@ std::string message_of(const State& state);
 std::string message_of(const Answer& answer);
 /// That something was saved. @param command  that makes the same again
 std::string message_of_saved(std::uint32_t number, const std::vector<std::string>& files, const std::string& command);
-/// How far a saving is. @param share  0 to 1
-std::string message_of_progress(std::uint32_t number, double share);
+/// That something is being saved.
+std::string message_of_progress(std::uint32_t number);
 /// Why a page is sent away.
 std::string message_of_refusal(const std::string& reason);
 

@@ -46,35 +46,40 @@ struct Hub {
   std::shared_ptr<Connection> page = {};  ///< the one that looks
 };
 
-using Answer200 = http::response<http::string_body>;
+using HttpRequest = http::request<http::empty_body>;
+using HttpAnswer = http::response<http::string_body>;
 
-Answer200 answer_to(const http::request<http::empty_body>& request, const Hub& hub) {
-  Answer200 answer(http::status::ok, request.version());
+/// A refusal, after which the line is closed.
+HttpAnswer refusal(const HttpRequest& request, const Hub& hub, http::status status, const char* why) {
+  HttpAnswer answer(status, request.version());
   for (const auto& [name, value] : safety_headers(hub.setup.frames)) answer.set(name, value);
-  answer.keep_alive(request.keep_alive());
   answer.set(http::field::content_type, "text/plain; charset=utf-8");
-  const auto refuse = [&](http::status status, const char* why) {
-    answer.result(status);
-    answer.body() = why;
-    answer.keep_alive(false);
-  };
+  answer.keep_alive(false);
+  answer.body() = why;
+  answer.prepare_payload();
+  return answer;
+}
+
+HttpAnswer answer_to(const HttpRequest& request, const Hub& hub) {
   const auto text = [](beast::string_view view) { return std::string_view(view.data(), view.size()); };
   if (request.count(http::field::host) != 1 || !is_own_host(text(request[http::field::host]), hub.port)) {
-    refuse(http::status::misdirected_request, "this server answers to the name of this machine alone\n");
-  } else if (request.method() != http::verb::get && request.method() != http::verb::head) {
-    refuse(http::status::method_not_allowed, "only GET\n");
-    answer.set(http::field::allow, "GET, HEAD");
-  } else {
-    refuse(http::status::not_found, "there is no such page\n");
-    for (const PageFile& file : page_files()) {
-      if (text(request.target()) != file.path) continue;
-      answer.result(http::status::ok);
-      answer.keep_alive(request.keep_alive());
-      answer.set(http::field::content_type, beast::string_view(file.type.data(), file.type.size()));
-      answer.body() = std::string(file.bytes);
-    }
+    return refusal(request, hub, http::status::misdirected_request,
+                   "this server answers to the name of this machine alone\n");
   }
-  answer.prepare_payload();
+  HttpAnswer answer = refusal(request, hub, http::status::not_found, "there is no such page\n");
+  if (request.method() != http::verb::get && request.method() != http::verb::head) {
+    answer = refusal(request, hub, http::status::method_not_allowed, "only GET\n");
+    answer.set(http::field::allow, "GET, HEAD");
+    return answer;
+  }
+  for (const PageFile& file : page_files()) {
+    if (text(request.target()) != file.path) continue;
+    answer.result(http::status::ok);
+    answer.keep_alive(request.keep_alive());
+    answer.set(http::field::content_type, beast::string_view(file.type.data(), file.type.size()));
+    answer.body() = std::string(file.bytes);
+    answer.prepare_payload();
+  }
   if (request.method() == http::verb::head) answer.body().clear();  // the length stays
   return answer;
 }
@@ -118,7 +123,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   void drop() {
     is_closing_ = true;
     error_code ignored;
-    beast::get_lowest_layer(*socket()).socket().close(ignored);
+    beast::get_lowest_layer(stream_).socket().close(ignored);
   }
 
  private:
@@ -126,9 +131,6 @@ class Connection : public std::enable_shared_from_this<Connection> {
     std::string bytes;
     bool is_text, replaces;
   };
-  using Socket = websocket::stream<beast::tcp_stream>;
-
-  Socket* socket() { return &stream_; }
 
   void read_request() {
     parser_.emplace();
@@ -141,7 +143,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
 
   void on_request(error_code error) {
     if (error) return end();
-    const http::request<http::empty_body>& request = parser_->get();
+    const HttpRequest& request = parser_->get();
     if (websocket::is_upgrade(request)) return upgrade(request);
     answer_ = answer_to(request, hub_);
     write_answer();
@@ -160,18 +162,15 @@ class Connection : public std::enable_shared_from_this<Connection> {
     }
   }
 
-  void upgrade(const http::request<http::empty_body>& request) {
+  void upgrade(const HttpRequest& request) {
     const auto of = [&](http::field field) {
       const beast::string_view value = request[field];
       return request.count(field) == 1 ? std::string_view(value.data(), value.size()) : std::string_view();
     };
     if (!is_own_host(of(http::field::host), hub_.port) || !is_own_origin(of(http::field::origin), hub_.port) ||
         request.target() != "/talk") {
-      answer_ = Answer200(http::status::forbidden, request.version());
-      for (const auto& [name, value] : safety_headers(hub_.setup.frames)) answer_.set(name, value);
-      answer_.body() = "a page of another place may not talk with this server\n";
-      answer_.keep_alive(false);
-      answer_.prepare_payload();
+      answer_ =
+          refusal(request, hub_, http::status::forbidden, "a page of another place may not talk with this server\n");
       return write_answer();
     }
     beast::get_lowest_layer(stream_).expires_never();
@@ -254,10 +253,10 @@ class Connection : public std::enable_shared_from_this<Connection> {
   }
 
   Hub& hub_;
-  Socket stream_;
+  websocket::stream<beast::tcp_stream> stream_;
   beast::flat_buffer buffer_{kMostMessageBytes + kMostHeaderBytes};
   std::optional<http::request_parser<http::empty_body>> parser_;
-  Answer200 answer_;
+  HttpAnswer answer_;
   std::optional<http::response_serializer<http::string_body>> head_;
   RateLimit limit_;
   std::deque<Message> waiting_;  ///< the first one is being written

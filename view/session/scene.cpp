@@ -10,6 +10,7 @@
 
 #include "backend/factories.h"
 #include "deform/fields/lattice_mesh.h"
+#include "io/slice_view.h"
 #include "view/session/coarse_volume.h"
 
 namespace tetwarp::viewer {
@@ -24,8 +25,6 @@ VertexField still_field(const Geometry& grid) {
   field.displacement.assign(static_cast<std::size_t>(voxel_count(field.lattice)), glm::vec3(0));
   return field;
 }
-
-constexpr AnatomicalPlane kPlanes[] = {AnatomicalPlane::axial, AnatomicalPlane::coronal, AnatomicalPlane::sagittal};
 
 }  // namespace
 
@@ -105,15 +104,7 @@ PaneImage Scene::moving_slice(const Slice& slice, const SliceLook& look) {
   return moving_slices_->picture(coarse, look);
 }
 
-Window Scene::window() const {
-  std::vector<double> values;
-  for (const AnatomicalPlane plane : kPlanes) {
-    const std::vector<double> of_plane =
-        sample_slice(setup_.source, middle_slice(*setup_.source.geometry, plane), 256, 256);
-    values.insert(values.end(), of_plane.begin(), of_plane.end());
-  }
-  return choose_window(values, setup_.source.type);
-}
+Window Scene::window() const { return choose_window(setup_.source); }
 
 void Scene::set_style(const RenderStyle& style) {
   require_valid(style.transfer);
@@ -134,16 +125,22 @@ void Scene::show_volume() {
   Whole& shown = coarse_ ? *coarse_ : *exact_;
   drawn_ = &shown;
   if (is_shown_) return;
-  const Target one = target(shown.from, shown.output->view());
-  shown.resampler->set_field(field_, {.jacobian_range = false});
-  const Update update = shown.resampler->update({&one, 1});
-  if (shown.is_set) {
-    shown.renderer->update_volume(update.changed);
-  } else {
-    shown.renderer->set_volume(shown.output->view());
-    shown.is_set = true;
-  }
+  deform(shown, {.jacobian_range = false}, {});
   is_shown_ = true;
+}
+
+/// Deforms a volume by the field, and has its renderer see what changed.
+Report Scene::deform(Whole& one, const FieldOptions& options, const Control& control) const {
+  const Target whole = target(one.from, one.output->view());
+  one.resampler->set_field(field_, options, control);
+  const Update update = one.resampler->update({&whole, 1}, control);
+  if (one.is_set) {
+    one.renderer->update_volume(update.changed, control);
+  } else {
+    one.renderer->set_volume(one.output->view(), control);
+    one.is_set = true;
+  }
+  return update.report;
 }
 
 PaneImage Scene::volume(const ViewPlane& plane, const Control& control) {
@@ -165,18 +162,8 @@ void Scene::make_exact(const Control& control) {
     exact_ = whole_volume(source_, grid_);
     if (!style_.transfer.points.empty()) exact_->renderer->set_style(style_);
   }
-  Whole& exact = *exact_;
-  const Target one = target(exact.from, exact.output->view());
-  exact.resampler->set_field(field_, {}, control);
-  const Update update = exact.resampler->update({&one, 1}, control);
-  if (exact.is_set) {
-    exact.renderer->update_volume(update.changed, control);
-  } else {
-    exact.renderer->set_volume(exact.output->view(), control);
-    exact.is_set = true;
-  }
+  const Report report = deform(*exact_, {}, control);
   is_exact_ = is_shown_ = true;
-  const Report& report = update.report;
   quality_ = {.coverage = static_cast<double>(report.covered) / static_cast<double>(voxel_count(grid_)),
               .inverted = report.inverted,
               .degenerate = report.degenerate,

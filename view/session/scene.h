@@ -3,7 +3,6 @@
 
 #pragma once
 
-#include <array>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -28,8 +27,7 @@ struct Quality {
 ///
 /// On a device the deformed volume is made as a whole for each picture of it. On the CPU slices are made alone, with
 /// fewer pixels while something moves, and a volume picture is first one of a volume with fewer voxels; `make_exact`
-/// makes the whole one. One object serves one
-/// thread at a time.
+/// makes the whole one. One object serves one thread at a time.
 class Scene {
  public:
   /// Where and of what pictures are made.
@@ -103,6 +101,7 @@ class Scene {
   std::unique_ptr<SliceMaker> slice_maker(const Geometry& grid) const;
 
   Target target(const ConstVolumeView& source, const VolumeView& output) const;
+  Report deform(Whole& one, const FieldOptions& options, const Control& control) const;
   void show_volume();
   std::optional<glm::i64vec3> voxel_at(const glm::dvec3& point_mm) const;
 
