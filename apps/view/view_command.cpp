@@ -3,30 +3,23 @@
 
 #include <cstdio>
 #include <mutex>
+#include <optional>
 
 #include "apps/cli/input.h"
 #include "apps/cli/subcommands.h"
-#include "apps/view/browser.h"
 #include "apps/view/view_save.h"
 #include "backend/devices.h"
-#include "backend/factories.h"
 #include "deform/phantom.h"
 #include "io/scenario_file.h"
-#include "view/server/messages.h"
-#include "view/server/rules.h"
-#include "view/server/server.h"
+#include "view/server/browser.h"
+#include "view/server/viewer.h"
 #include "view/session/default_scenario.h"
-#include "view/session/stage.h"
 
 namespace tetwarp::apps {
 
 namespace {
 
-using viewer::Answer;
-using viewer::Picture;
-using viewer::Scene;
-using viewer::Server;
-using viewer::State;
+using viewer::Viewer;
 
 /// With --verbose: what was done how often, and how long one took.
 void tell_times(const CommonOptions& common, const viewer::StageTimes& times) {
@@ -50,23 +43,16 @@ class Viewing {
 
  private:
   void read();
-  void serve();
-  void told(Answer answer) { server_->send_text(message_of(answer)); }
-  void save(const viewer::request::Save& wish, std::uint32_t number, std::string scenario);
-  viewer::About about() const;
+  void prepare();
+  void tell_where() const;
 
   const ViewOptions& options_;
   BackendKind backend_;
   simulate::Scenario scenario_;
   InputVolume input_;
   simulate::Patient patient_;
-  // Made in this order, and ended in the opposite one.
-  std::unique_ptr<Saving> saving_;
-  std::unique_ptr<Scene> scene_;
-  std::unique_ptr<Server> server_;
-  std::unique_ptr<viewer::Stage> stage_;
-  std::mutex mutex_;  ///< of `stage_` and `is_watched_`, which the server's thread uses
-  bool is_watched_ = false;
+  std::unique_ptr<Saving> saving_;  ///< tells the viewer what became of a wish, so it ends before it
+  std::unique_ptr<Viewer> viewer_;
 };
 
 Viewing::Viewing(const ViewOptions& options) : options_(options), backend_(chosen(options.backend)) {
@@ -101,102 +87,53 @@ void Viewing::read() {
                                scenario_.cell_size, scenario_.body_above_hu, stage.control());
 }
 
-viewer::About Viewing::about() const {
-  return {.title = options_.demo ? "Phantom" : options_.input.path.filename().string(),
-          .grid = scene_->grid(),
-          .backend = runs_on_device(backend_) ? describe_device(options_.device) : "CPU",
-          .hounsfield = scene_->window().hounsfield,
-          .styles = transfer_function_names(),
-          .volume_suffixes = saved_volume_kinds(input_.is_dicom()),
-          .folder = options_.output.string()};
-}
-
-void Viewing::save(const viewer::request::Save& wish, std::uint32_t number, std::string scenario) {
-  server_->send_text(viewer::message_of_progress(number));
-  saving_->begin({wish.name, wish.volume, std::move(scenario)}, [this, number](Saving::Result result) {
-    if (result.problem.empty()) {
-      server_->send_text(viewer::message_of_saved(number, result.files, result.command));
-    } else {
-      told({.kind = Answer::Kind::problem, .number = number, .text = result.problem});
-    }
-  });
-}
-
-void Viewing::serve() {
-  const std::string token = viewer::make_token();
-  server_ = std::make_unique<Server>(Server::Setup{.port = static_cast<std::uint16_t>(options_.port),
-                                                   .token = token,
-                                                   .greeting = message_of(about()),
-                                                   .frames = false,
-                                                   .ask =
-                                                       [this](viewer::Request request) {
-                                                         const std::lock_guard lock(mutex_);
-                                                         if (stage_) stage_->ask(std::move(request));
-                                                       },
-                                                   .watch =
-                                                       [this](bool somebody) {
-                                                         const std::lock_guard lock(mutex_);
-                                                         is_watched_ = somebody;
-                                                         if (stage_) stage_->watch(somebody);
-                                                       }});
-  viewer::Stage::Setup setup;
-  setup.scenario = scenario_;
-  setup.patient = &patient_;
-  setup.scene = scene_.get();
-  setup.has_device = runs_on_device(backend_);
-  setup.make = [this](simulate::Method method) -> simulate::MakeSimulation {
-    return [this, method](const simulate::Model& model) {
-      return simulate::make_simulation(backend_, method, model, options_.device, {.threads = options_.common.threads});
-    };
+void Viewing::prepare() {
+  saving_ = std::make_unique<Saving>(options_);
+  Viewer::Setup setup;
+  setup.source = std::as_const(input_.volume).view();
+  setup.background = input_.background;
+  if (input_.dicom) setup.padding = input_.dicom->padding;
+  setup.patient = std::move(patient_);
+  setup.scenario = std::move(scenario_);
+  setup.backend = backend_;
+  setup.device = options_.device;
+  setup.limits = {.threads = options_.common.threads};
+  setup.title = options_.demo ? "Phantom" : options_.input.path.filename().string();
+  setup.volume_kinds = saved_volume_kinds(input_.is_dicom());
+  setup.folder = options_.output.string();
+  setup.port = static_cast<std::uint16_t>(options_.port);
+  setup.save = [this](Viewer::Wish wish, std::function<void(Viewer::Saved)> done) {
+    saving_->begin({std::move(wish.name), std::move(wish.volume), std::move(wish.scenario)},
+                   [done = std::move(done)](Saving::Result result) {
+                     done({std::move(result.files), std::move(result.command), std::move(result.problem)});
+                   });
   };
-  auto stage = std::make_unique<viewer::Stage>(
-      std::move(setup),
-      viewer::Stage::Listener{.picture = [this](const Picture& picture) { server_->send_bytes(message_of(picture)); },
-                              .state = [this](const State& state) { server_->send_text(message_of(state), true); },
-                              .answer = [this](const Answer& answer) { told(answer); },
-                              .save = [this](const auto& wish, std::uint32_t number,
-                                             std::string scenario) { save(wish, number, std::move(scenario)); }});
-  {
-    const std::lock_guard lock(mutex_);
-    stage_ = std::move(stage);
-    if (is_watched_) stage_->watch(true);  // a page may have come before
-  }
-  const std::string address = "http://127.0.0.1:" + std::to_string(server_->port()) + "/#" + token;
-  std::printf("%s\n", address.c_str());
+  const Stage stage(options_.common, "prepare");
+  viewer_ = std::make_unique<Viewer>(std::move(setup));
+}
+
+void Viewing::tell_where() const {
+  std::printf("%s\n", viewer_->address().c_str());
   std::fflush(stdout);
-  std::optional<Browser> browser;
-  if (!options_.no_open) browser.emplace(address);
-  if (const std::string command = forwarding_command(server_->port()); !command.empty())
+  if (const std::string command = viewer::forwarding_command(viewer_->port()); !command.empty())
     say(options_.common, "from your own machine: " + command + ", then open the address there");
   say(options_.common, "Ctrl-C ends it");
 }
 
 int Viewing::run() {
   read();
-  {
-    Stage stage(options_.common, "prepare");
-    scene_ = std::make_unique<Scene>(Scene::Setup{.source = std::as_const(input_.volume).view(),
-                                                  .background = input_.background,
-                                                  .padding = input_.dicom ? input_.dicom->padding : std::nullopt,
-                                                  .backend = backend_,
-                                                  .device = options_.device,
-                                                  .limits = {.threads = options_.common.threads}});
-  }
-  saving_ = std::make_unique<Saving>(options_);
-  serve();
+  prepare();
+  tell_where();
+  std::optional<viewer::Browser> browser;
+  if (!options_.no_open) browser.emplace(viewer_->address());
   std::mutex mutex;
   std::condition_variable_any ended;
   std::unique_lock lock(mutex);
   ended.wait(lock, interrupt_token(), [] { return false; });
+  viewer_->stop();
   saving_.reset();  // what is being written is finished, or has been cancelled
-  std::unique_ptr<viewer::Stage> stage;
-  {
-    const std::lock_guard of_stage(mutex_);
-    stage = std::move(stage_);
-  }
-  tell_times(options_.common, stage->times());
-  stage.reset();
-  server_.reset();
+  tell_times(options_.common, viewer_->times());
+  viewer_.reset();
   return 0;
 }
 

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <string>
 
-namespace tetwarp::apps {
+namespace tetwarp::viewer {
 
 /// A browser that is opened on an address with a secret. It is given a file that only this user can read and that leads
 /// to the address, so that no list of processes shows the secret. The file goes with this object.
@@ -29,4 +29,4 @@ class Browser {
 /// by ssh.
 std::string forwarding_command(int port);
 
-}  // namespace tetwarp::apps
+}  // namespace tetwarp::viewer

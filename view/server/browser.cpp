@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "apps/view/browser.h"
+#include "view/server/browser.h"
 
 #include <fcntl.h>
 #include <pwd.h>
@@ -15,7 +15,7 @@
 
 extern char** environ;
 
-namespace tetwarp::apps {
+namespace tetwarp::viewer {
 
 namespace fs = std::filesystem;
 
@@ -76,4 +76,4 @@ std::string forwarding_command(int port) {
          host.data();
 }
 
-}  // namespace tetwarp::apps
+}  // namespace tetwarp::viewer

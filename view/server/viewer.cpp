@@ -1,0 +1,103 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include "view/server/viewer.h"
+
+#include <utility>
+
+#include "backend/devices.h"
+#include "backend/factories.h"
+#include "view/server/rules.h"
+
+namespace tetwarp::viewer {
+
+Viewer::Viewer(Setup setup) : setup_(std::move(setup)) {
+  scene_ = std::make_unique<Scene>(Scene::Setup{.source = setup_.source,
+                                                .background = setup_.background,
+                                                .padding = setup_.padding,
+                                                .backend = setup_.backend,
+                                                .device = setup_.device,
+                                                .limits = setup_.limits});
+  const std::string token = make_token();
+  server_ = std::make_unique<Server>(Server::Setup{.port = setup_.port,
+                                                   .token = token,
+                                                   .greeting = message_of(about()),
+                                                   .frames = setup_.frames,
+                                                   .ask =
+                                                       [this](Request request) {
+                                                         const std::lock_guard lock(mutex_);
+                                                         if (stage_) stage_->ask(std::move(request));
+                                                       },
+                                                   .watch =
+                                                       [this](bool somebody) {
+                                                         const std::lock_guard lock(mutex_);
+                                                         is_watched_ = somebody;
+                                                         if (stage_) stage_->watch(somebody);
+                                                       }});
+  address_ = "http://127.0.0.1:" + std::to_string(server_->port()) + "/#" + token;
+  auto stage = std::make_unique<Stage>(stage_setup(), listener());
+  const std::lock_guard lock(mutex_);
+  stage_ = std::move(stage);
+  if (is_watched_) stage_->watch(true);  // a page may have come before
+}
+
+Viewer::~Viewer() { stop(); }
+
+void Viewer::stop() {
+  std::unique_ptr<Stage> stage;
+  {
+    const std::lock_guard lock(mutex_);
+    stage = std::move(stage_);
+    if (stage) times_ = stage->times();
+  }
+}
+
+StageTimes Viewer::times() {
+  const std::lock_guard lock(mutex_);
+  return stage_ ? stage_->times() : times_;
+}
+
+About Viewer::about() const {
+  return {.title = setup_.title,
+          .grid = scene_->grid(),
+          .backend = runs_on_device(setup_.backend) ? describe_device(setup_.device) : "CPU",
+          .hounsfield = scene_->window().hounsfield,
+          .styles = transfer_function_names(),
+          .volume_suffixes = setup_.volume_kinds,
+          .folder = setup_.folder};
+}
+
+Stage::Setup Viewer::stage_setup() {
+  Stage::Setup setup;
+  setup.scenario = setup_.scenario;
+  setup.patient = &setup_.patient;
+  setup.scene = scene_.get();
+  setup.has_device = runs_on_device(setup_.backend);
+  setup.make = [this](simulate::Method method) -> simulate::MakeSimulation {
+    return [this, method](const simulate::Model& model) {
+      return simulate::make_simulation(setup_.backend, method, model, setup_.device, setup_.limits);
+    };
+  };
+  return setup;
+}
+
+Stage::Listener Viewer::listener() {
+  return {.picture = [this](const Picture& picture) { server_->send_bytes(message_of(picture)); },
+          .state = [this](const State& state) { server_->send_text(message_of(state), true); },
+          .answer = [this](const Answer& answer) { server_->send_text(message_of(answer)); },
+          .save = [this](const request::Save& wish, std::uint32_t number,
+                         std::string scenario) { save(wish, number, std::move(scenario)); }};
+}
+
+void Viewer::save(const request::Save& wish, std::uint32_t number, std::string scenario) {
+  server_->send_text(message_of_progress(number));
+  setup_.save({wish.name, wish.volume, std::move(scenario)}, [this, number](const Saved& saved) {
+    if (saved.problem.empty()) {
+      server_->send_text(message_of_saved(number, saved.files, saved.command));
+    } else {
+      server_->send_text(message_of(Answer{.kind = Answer::Kind::problem, .number = number, .text = saved.problem}));
+    }
+  });
+}
+
+}  // namespace tetwarp::viewer
