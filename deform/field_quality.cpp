@@ -12,6 +12,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <limits>
 
 #include "deform/core/five_tetrahedra.h"
 #include "deform/cpu/rows/gradient_row.h"
@@ -235,6 +236,41 @@ FieldQuality quality_of(const TetrahedralMesh& mesh, const Limits& limits, const
   return sum_of(found);
 }
 
+/// The tetrahedron with the least Jacobian determinant of those that were looked at, the first of several.
+struct Worst {
+  double jacobian = std::numeric_limits<double>::infinity();
+  std::optional<dvec3> place;  ///< its deformed middle, LPS mm
+
+  /// @param before  undeformed corners, LPS mm  @param by  displacements
+  void add(const glm::dmat4x3& before, const glm::dmat4x3& by) {
+    const auto volume = [](const glm::dmat4x3& p) {
+      return glm::determinant(glm::dmat3(p[0] - p[3], p[1] - p[3], p[2] - p[3]));
+    };
+    const glm::dmat4x3 after = before + by;
+    const double of_this = volume(after) / volume(before);
+    if (!(of_this < jacobian)) return;
+    jacobian = of_this;
+    place = 0.25 * (after[0] + after[1] + after[2] + after[3]);
+  }
+};
+
+/// Looks at the five tetrahedra of a cell of a lattice.
+void add_cell(const VertexField& field, const AffineMap& point, const glm::i64vec3& cell, Worst& worst) {
+  const glm::i64vec3& size = field.lattice.size;
+  const bool odd = ((cell.x + cell.y + cell.z) & 1) != 0;
+  for (int t = 0; t < kTetrahedraPerCell; ++t) {
+    const TetrahedronCorners corners = tetrahedron_corners(t, odd);
+    const int corner[] = {corners.a, corners.b, corners.c, corners.d};
+    glm::dmat4x3 before, by;
+    for (int n = 0; n < 4; ++n) {
+      const glm::i64vec3 vertex = cell + glm::i64vec3(corner[n] & 1, corner[n] >> 1 & 1, corner[n] >> 2);
+      before[n] = point(glm::dvec3(vertex));
+      by[n] = field.displacement[static_cast<std::size_t>((vertex.z * size.y + vertex.y) * size.x + vertex.x)];
+    }
+    worst.add(before, by);
+  }
+}
+
 std::string format(const char* form, double value) {
   char text[96];
   std::snprintf(text, sizeof text, form, value);
@@ -270,6 +306,38 @@ FieldQuality measure_quality(const VertexField& field, const Limits& limits, con
     });
   });
   return sum_of(found);
+}
+
+std::optional<glm::dvec3> worst_place(const VertexField& field, const Limits& limits, const Control& control) {
+  Worst worst;
+  if (!field.mesh.is_empty()) {
+    const TetrahedralMesh mesh = field.replaced.empty() ? field.mesh : mesh_of(field);
+    for (const glm::u32vec4& corners : mesh.tetrahedra) {
+      glm::dmat4x3 before, by;
+      for (int n = 0; n < 4; ++n) {
+        before[n] = mesh.rest[corners[n]];
+        by[n] = mesh.displacement[corners[n]];
+      }
+      worst.add(before, by);
+    }
+    return worst.place;
+  }
+  const glm::i64vec3 size = field.lattice.size;
+  const AffineMap point = point_from_index(field.lattice);
+  std::vector<Worst> of_layer(static_cast<std::size_t>(std::max<std::int64_t>(size.z - 1, 0)));
+  cpu::Arena arena(limits);
+  arena.execute([&] {
+    tbb::parallel_for(std::int64_t{0}, size.z - 1, [&](std::int64_t k) {
+      if (control.stop.stop_requested()) return;
+      for (std::int64_t j = 0; j + 1 < size.y; ++j)
+        for (std::int64_t i = 0; i + 1 < size.x; ++i)
+          add_cell(field, point, {i, j, k}, of_layer[static_cast<std::size_t>(k)]);
+    });
+  });
+  if (control.stop.stop_requested()) throw Cancelled();
+  for (const Worst& layer : of_layer)
+    if (layer.jacobian < worst.jacobian) worst = layer;
+  return worst.place;
 }
 
 std::string verdict(const Report& report, const FieldQuality& quality, const RoundTrip& trip) {

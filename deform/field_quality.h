@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "deform/residuals.h"
@@ -35,6 +36,11 @@ struct FieldQuality {
 /// @throws InputError for a field that has no cell
 /// @throws Cancelled
 FieldQuality measure_quality(const VertexField& field, const Limits& limits = {}, const Control& control = {});
+
+/// Where a field is worst: the deformed middle of the tetrahedron with the least Jacobian determinant, the first of
+/// several, LPS mm; empty for a field without tetrahedra.
+/// @throws Cancelled
+std::optional<glm::dvec3> worst_place(const VertexField& field, const Limits& limits = {}, const Control& control = {});
 
 /// One sentence for a person that says whether the map can be trusted, and what stands against it.
 /// Two things do: folds, and an inverse whose places, taken forward again, miss their voxel by more than (1 + largest

@@ -75,6 +75,28 @@ TEST(FieldQuality, CountsWhatTheResamplerCountsAndAddsUpToTheLattice) {
             std::string::npos);
 }
 
+TEST(FieldQuality, TheWorstPlaceIsThatOfTheTetrahedronThatIsTurnedInsideOut) {
+  Random random(test_seed(), 8);
+  const Geometry lattice = oblique_grid({9, 8, 7});
+  VertexField field{lattice, {}};
+  for (std::int64_t n = 0; n < voxel_count(lattice); ++n)
+    field.displacement.emplace_back(random.real(-0.2, 0.2), random.real(-0.2, 0.2), random.real(-0.2, 0.2));
+  const glm::i64vec3 vertex(5, 3, 4);
+  const glm::dvec3 leap = 3.0 * point_from_index(lattice).linear[0];
+  field.displacement[static_cast<std::size_t>((vertex.z * 8 + vertex.y) * 9 + vertex.x)] = leap;
+  const std::optional<glm::dvec3> worst = worst_place(field);
+  ASSERT_TRUE(worst.has_value());
+  const glm::dvec3 index = index_from_point(lattice)(*worst);
+  EXPECT_LT(glm::distance(index, glm::dvec3(vertex)), 3);
+  VertexField as_mesh;
+  as_mesh.mesh = mesh_of(field);
+  EXPECT_EQ(worst_place(as_mesh), worst);
+  EXPECT_EQ(worst_place(field, {.threads = 1}), worst);
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_THROW(worst_place(field, {}, {.stop = stop.get_token()}), Cancelled);
+}
+
 TEST(FieldQuality, TheLargestStretchIsTheSameWhateverThreadTookWhichPart) {
   // Cells of one stretch to within rounding: which of them is the largest, to the last bit, is for rounding to say.
   const Geometry grid = unit_grid({40, 40, 60});
