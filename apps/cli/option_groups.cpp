@@ -171,6 +171,13 @@ void add_backend(CLI::App& command, BackendChoice& backend, int& device, const c
       ->capture_default_str();
 }
 
+CLI::Option* add_sequence(CLI::App& command, std::vector<std::string>& sequence, const char* help,
+                          std::initializer_list<CLI::Option*> excluded) {
+  CLI::Option* option = command.add_option("--sequence", sequence, help)->type_name("FIELD");
+  for (CLI::Option* other : excluded) option->excludes(other);
+  return option;
+}
+
 void add_cell_size(CLI::App& command, FieldArguments& field) {
   command
       .add_option("--cell-size", field.cell_size,

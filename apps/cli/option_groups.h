@@ -60,6 +60,9 @@ void add_backend_choice(CLI::App& command, BackendChoice& backend, const char* h
 /// --backend, --device.
 void add_backend(CLI::App& command, BackendChoice& backend, int& device,
                  const char* help = "auto, cuda or cpu: the bits are the same");
+/// --sequence, which excludes the options that give one field.
+CLI::Option* add_sequence(CLI::App& command, std::vector<std::string>& sequence, const char* help,
+                          std::initializer_list<CLI::Option*> excluded);
 /// --cell-size.
 void add_cell_size(CLI::App& command, FieldArguments& field);
 /// --outside.

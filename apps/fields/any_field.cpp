@@ -13,6 +13,10 @@ namespace tetwarp::apps {
 
 namespace {
 
+void scale(std::vector<glm::vec3>& displacement, double amount) {
+  for (glm::vec3& vector : displacement) vector *= static_cast<float>(amount);
+}
+
 void add_geometry(const Geometry& lattice, Sha256& hash) {
   const auto bytes_of = [](const auto& value) { return std::as_bytes(std::span(&value, 1)); };
   hash.add(bytes_of(lattice.size))
@@ -79,6 +83,17 @@ nlohmann::json place_json(const VertexField& field) {
 nlohmann::json place_json(const AnyField& field) {
   if (const auto* pull = std::get_if<PullField>(&field)) return {{"lattice", to_json(pull->grid)}};
   return place_json(std::get<VertexField>(field));
+}
+
+AnyField scaled(AnyField field, double amount) {
+  if (auto* pull = std::get_if<PullField>(&field)) {
+    scale(pull->displacement, amount);
+    return field;
+  }
+  auto& forward = std::get<VertexField>(field);
+  scale(forward.displacement, amount);
+  scale(forward.mesh.displacement, amount);
+  return field;
 }
 
 PullField zero_pull_field(const Geometry& output) {

@@ -33,6 +33,9 @@ std::string hash_field(const AnyField& field, int threads);
 nlohmann::json place_json(const VertexField& field);
 nlohmann::json place_json(const AnyField& field);
 
+/// A field of which only a part of each displacement is left. @param amount  0: nothing moves, 1: all of it
+AnyField scaled(AnyField field, double amount);
+
 /// A pull field in which nothing moves: it takes a volume from its own grid onto `output`.
 PullField zero_pull_field(const Geometry& output);
 

@@ -80,14 +80,10 @@ void add_deformation(CLI::App& command, RenderOptions& options) {
   auto* pull = command.add_option("--pull-field", options.field.pull, "The same by a field that maps output to input")
                    ->type_name("FILE")
                    ->excludes(field);
-  command
-      .add_option(
-          "--sequence", options.sequence,
-          "A picture for each of these fields, as `simulate --every` writes them: a name a word, up to the next "
-          "option")
-      ->excludes(field)
-      ->excludes(pull)
-      ->type_name("FIELD");
+  add_sequence(
+      command, options.sequence,
+      "A picture for each of these fields, as `simulate --every` writes them: a name a word, up to the next option",
+      {field, pull});
   add_cell_size(command, options.field);
   add_outside(command, options.outside);
   command.add_option("--fill", options.fill, "Value where nothing maps (default: as --background of `deform`)")

@@ -48,22 +48,6 @@ OwnedOverlay make_map(Resampler& resampler, const Geometry& grid, OverlayKind ki
   return {{kind, view}, map};
 }
 
-void scale(std::vector<glm::vec3>& displacement, double amount) {
-  for (glm::vec3& vector : displacement) vector *= static_cast<float>(amount);
-}
-
-/// A field of which only a part of each displacement is left.
-AnyField scaled(AnyField field, double amount) {
-  if (auto* pull = std::get_if<PullField>(&field)) {
-    scale(pull->displacement, amount);
-    return field;
-  }
-  auto& forward = std::get<VertexField>(field);
-  scale(forward.displacement, amount);
-  scale(forward.mesh.displacement, amount);
-  return field;
-}
-
 OverlayWish parse_overlay(const std::string& text, const RenderOptions& options) {
   const std::size_t split = text.find('=');
   const std::string name = text.substr(0, split);
