@@ -189,7 +189,10 @@ struct ViewOptions {
   InputOptions input;
   bool demo = false;  ///< the built-in phantom instead of INPUT
   std::filesystem::path scenario, labels;
-  std::optional<std::int64_t> cell_size;          ///< empty: of the scenario, or as many voxels as is quick enough
+  /// Shown instead of what a hand does. Its cell size is that of the simulated lattice too; empty: that of the
+  /// scenario, or as many voxels as is quick enough.
+  FieldArguments field;
+  std::vector<std::string> sequence;              ///< instead: fields, one a frame
   std::filesystem::path output = "tetwarp-view";  ///< folder of what is saved
   int port = 0;                                   ///< 0: one that is free
   bool no_open = false;

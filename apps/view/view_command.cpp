@@ -7,6 +7,7 @@
 
 #include "apps/cli/input.h"
 #include "apps/cli/subcommands.h"
+#include "apps/view/view_reel.h"
 #include "apps/view/view_save.h"
 #include "backend/devices.h"
 #include "deform/phantom.h"
@@ -43,26 +44,30 @@ class Viewing {
 
  private:
   void read();
+  AnyVolume read_labels(const Control& control) const;
   void prepare();
   void tell_where() const;
 
   const ViewOptions& options_;
   BackendKind backend_;
+  ViewFields fields_;
   simulate::Scenario scenario_;
   InputVolume input_;
+  AnyVolume labels_;
   simulate::Patient patient_;
+  std::optional<viewer::Reel> reel_;
   std::unique_ptr<Saving> saving_;  ///< tells the viewer what became of a wish, so it ends before it
   std::unique_ptr<Viewer> viewer_;
 };
 
 Viewing::Viewing(const ViewOptions& options) : options_(options), backend_(chosen(options.backend)) {
+  fields_ = parse_view_fields(options);
   if (!options.scenario.empty()) scenario_ = read_scenario(options.scenario);
   if (!options.demo && options.input.path.empty())
     throw UsageError("tetwarp view needs INPUT, a volume to look at, or --demo; see tetwarp view --help");
 }
 
 void Viewing::read() {
-  AnyVolume labels;
   Stage stage(options_.common, "read");
   if (options_.demo) {
     input_.volume = AnyVolume(make_phantom({kDemoSize[0], kDemoSize[1], kDemoSize[2]},
@@ -75,26 +80,35 @@ void Viewing::read() {
     for (const std::string& note : header.notes) say(options_.common, "tetwarp: note: " + note);
     input_ = read_input(options_.input, header, options_.common, stage.control());
   }
-  if (!options_.labels.empty()) {
-    const InputOptions from = volume_named(options_.labels, options_.common.nifti_frame);
-    labels = read_input(from, open_input(from, options_.common), options_.common, stage.control()).volume;
+  if (!options_.labels.empty()) labels_ = read_labels(stage.control());
+  if (fields_.any()) {
+    reel_ = read_reel(fields_, input_.volume.geometry(), straightened(input_.volume.geometry()),
+                      options_.common.threads, stage.control());
+    return;
   }
   if (options_.scenario.empty())
     scenario_ = viewer::default_scenario(input_.volume.geometry(), runs_on_device(backend_));
-  if (options_.cell_size) scenario_.cell_size = *options_.cell_size;
-  const ConstVolumeView labelled = std::as_const(labels).view();
+  if (options_.field.cell_size) scenario_.cell_size = *options_.field.cell_size;
+  const ConstVolumeView labelled = std::as_const(labels_).view();
   patient_ = simulate::examine(std::as_const(input_.volume).view(), options_.labels.empty() ? nullptr : &labelled,
                                scenario_.cell_size, scenario_.body_above_hu, stage.control());
+}
+
+AnyVolume Viewing::read_labels(const Control& control) const {
+  const InputOptions from = volume_named(options_.labels, options_.common.nifti_frame);
+  return read_input(from, open_input(from, options_.common), options_.common, control).volume;
 }
 
 void Viewing::prepare() {
   saving_ = std::make_unique<Saving>(options_);
   Viewer::Setup setup;
   setup.source = std::as_const(input_.volume).view();
+  if (labels_.data()) setup.labels = std::as_const(labels_).view();
   setup.background = input_.background;
   if (input_.dicom) setup.padding = input_.dicom->padding;
   setup.patient = std::move(patient_);
   setup.scenario = std::move(scenario_);
+  setup.reel = std::move(reel_);
   setup.backend = backend_;
   setup.device = options_.device;
   setup.limits = {.threads = options_.common.threads};
@@ -102,11 +116,8 @@ void Viewing::prepare() {
   setup.volume_kinds = saved_volume_kinds(input_.is_dicom());
   setup.folder = options_.output.string();
   setup.port = static_cast<std::uint16_t>(options_.port);
-  setup.save = [this](Viewer::Wish wish, std::function<void(Viewer::Saved)> done) {
-    saving_->begin({std::move(wish.name), std::move(wish.volume), std::move(wish.scenario)},
-                   [done = std::move(done)](Saving::Result result) {
-                     done({std::move(result.files), std::move(result.command), std::move(result.problem)});
-                   });
+  setup.save = [this](viewer::SaveJob job, std::function<void(Viewer::Saved)> done) {
+    saving_->begin(std::move(job), std::move(done));
   };
   const Stage stage(options_.common, "prepare");
   viewer_ = std::make_unique<Viewer>(std::move(setup));

@@ -5,9 +5,13 @@
 
 #include <algorithm>
 #include <fstream>
+#include <string_view>
 #include <utility>
 
 #include "apps/cli/input.h"
+#include "apps/cli/output.h"
+#include "apps/render/movie.h"
+#include "apps/view/view_reel.h"
 #include "io/shown_text.h"
 #include "io/staged_output.h"
 
@@ -18,6 +22,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kDemoFile = "phantom.nii.gz";
+constexpr int kMostFilmPictures = 240;
+constexpr double kFilmRate = 24;  ///< pictures a second
 
 bool is_plain(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
@@ -36,13 +42,32 @@ std::string word(const fs::path& path) {
   return !text.empty() && std::all_of(text.begin(), text.end(), is_safe) ? text : shell_quoted(text);
 }
 
-/// Three numbers of an option.
+/// Numbers of an option.
 template <class Numbers>
-std::string listed(const Numbers& numbers) {
+std::string listed(const Numbers& numbers, const char* between = ",") {
   std::string text;
-  for (const auto number : numbers) text += (text.empty() ? "" : ",") + number_text(static_cast<double>(number));
+  for (const auto number : numbers) text += (text.empty() ? "" : between) + number_text(static_cast<double>(number));
   return text;
 }
+
+/// A command line, option by option.
+class CommandText {
+ public:
+  explicit CommandText(const char* subcommand) : text_(std::string("tetwarp ") + subcommand) {}
+
+  CommandText& add(const std::string& text) {
+    text_ += " " + text;
+    return *this;
+  }
+  CommandText& add(const char* option, const fs::path& path) {
+    if (!path.empty()) text_ += std::string(" ") + option + " " + word(path);
+    return *this;
+  }
+  const std::string& text() const { return text_; }
+
+ private:
+  std::string text_;
+};
 
 PhantomOptions demo_phantom(const fs::path& folder) {
   PhantomOptions phantom;
@@ -51,6 +76,19 @@ PhantomOptions demo_phantom(const fs::path& folder) {
   phantom.spacing.assign(std::begin(kDemoSpacing), std::end(kDemoSpacing));
   phantom.common.quiet = true;
   return phantom;
+}
+
+/// Options of `simulate` for what was done.
+SimulateOptions simulate_options(const ViewOptions& view, const InputOptions& input, const fs::path& scenario) {
+  SimulateOptions simulate;
+  simulate.common = view.common;
+  simulate.common.quiet = true;
+  simulate.scenario = scenario;
+  simulate.input = input;
+  simulate.labels = view.labels;
+  simulate.backend = view.backend;
+  simulate.device = view.device;
+  return simulate;
 }
 
 }  // namespace
@@ -66,75 +104,252 @@ Saving::Saving(const ViewOptions& options)
 
 Saving::~Saving() { thread_.request_stop(); }
 
-void Saving::begin(Wish wish, std::function<void(Result)> done) {
+void Saving::begin(viewer::SaveJob job, std::function<void(Saved)> done) {
   const std::lock_guard lock(mutex_);
-  wishes_.emplace_back(std::move(wish), std::move(done));
+  jobs_.emplace_back(std::move(job), std::move(done));
   wake_.notify_one();
 }
 
-void Saving::run(const std::stop_token& stop) {
-  for (;;) {
-    std::pair<Wish, std::function<void(Result)>> next;
-    {
-      std::unique_lock lock(mutex_);
-      if (!wake_.wait(lock, stop, [this] { return !wishes_.empty(); })) return;
-      next = std::move(wishes_.front());
-      wishes_.pop_front();
-    }
-    Result result;
-    try {
-      result = save(next.first);
-    } catch (const std::exception& error) {
-      result.problem = error.what();
-    }
-    next.second(std::move(result));
+/// One job.
+class Saving::One {
+ public:
+  One(const ViewOptions& options, const viewer::SaveJob& job)
+      : options_(options), job_(job), input_(options.input), is_by_hand_(!job.scenario.empty()) {
+    if (options_.demo) input_.path = options_.output / kDemoFile;
   }
+
+  Saved save();
+
+ private:
+  fs::path file(const std::string& ending) const { return options_.output / (job_.wish.name + ending); }
+  fs::path claim(const fs::path& path) const;
+  void write_demo();
+  void write(const fs::path& path, std::string_view bytes);
+  void deform(const fs::path& output, bool runs);
+  void write_field(const fs::path& output);
+  void write_film(const fs::path& output);
+  std::vector<fs::path> write_frames();
+  RenderOptions film_options() const;
+  CommandText& add_fields(CommandText& command) const;
+  void say_command(const CommandText& command) {
+    saved_.command += (saved_.command.empty() ? "" : "\n") + command.text();
+  }
+
+  const ViewOptions& options_;
+  const viewer::SaveJob& job_;
+  InputOptions input_;
+  const bool is_by_hand_;
+  fs::path scenario_;
+  Saved saved_;
+};
+
+/// A path where something is to be written. @throws InputError where something is
+fs::path Saving::One::claim(const fs::path& path) const {
+  require(!fs::exists(path), path.string() + " exists; take another name");
+  return path;
 }
 
-void Saving::write_scenario(const fs::path& path, const std::string& text) const {
+void Saving::One::write(const fs::path& path, std::string_view bytes) {
   StagedOutput staged(path, StagedOutput::Kind::file, false);
-  std::ofstream file(staged.path(), std::ios::binary);
-  file << text;
-  file.close();
-  if (!file) throw Error("cannot write " + path.string() + "; check the free space");
+  std::ofstream out(staged.path(), std::ios::binary);
+  out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  out.close();
+  if (!out) throw Error("cannot write " + path.string() + "; check the free space");
   staged.commit();
+  saved_.files.push_back(path.string());
 }
 
-Saving::Result Saving::save(const Wish& wish) const {
+/// Writes the phantom, of which all else is made.
+void Saving::One::write_demo() {
+  const PhantomOptions phantom = demo_phantom(options_.output);
+  if (!fs::exists(phantom.output)) run_phantom(phantom);
+}
+
+Saving::Saved Saving::One::save() {
+  const auto& wish = job_.wish;
   require_plain(wish.name);
   const std::vector<std::string> kinds = saved_volume_kinds(true);
   require(wish.volume.empty() || std::find(kinds.begin(), kinds.end(), wish.volume) != kinds.end(),
           "no volume is written as that");
+  require(wish.film.empty() || wish.film == ".mp4" || wish.film == ".gif", "no film is written as that");
+  if (!wish.film.empty()) require_movie_encoder(file(wish.film));
+  require(!wish.field || is_by_hand_, "the field was given; it is there already");
   std::error_code ignored;
   fs::create_directories(options_.output, ignored);  // what cannot be written there says so
-  const fs::path scenario = options_.output / (wish.name + ".json");
   const bool is_series = wish.volume == "dicom";
+  const fs::path volume = wish.volume.empty() ? fs::path() : claim(file(is_series ? "" : wish.volume)),
+                 field = wish.field ? claim(file(job_.has_cuts ? "-field.vtu" : "-field.mha")) : fs::path(),
+                 film = wish.film.empty() ? fs::path() : claim(file(wish.film));
+  for (const auto& [pane, bytes] : job_.pictures) claim(file("-" + pane + ".png"));
+  if (is_by_hand_ && job_.frames > 0) {
+    scenario_ = file(".json");
+    write(scenario_, job_.scenario);
+  }
+  for (const auto& [pane, bytes] : job_.pictures)
+    write(file("-" + pane + ".png"), {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  if (options_.demo) {
+    if (wish.field || !volume.empty() || !film.empty()) write_demo();
+    say_command(CommandText("phantom")
+                    .add("-o", input_.path)
+                    .add("--size " + listed(kDemoSize))
+                    .add("--spacing " + listed(kDemoSpacing)));
+  }
+  if (!volume.empty() || job_.frames > 0) deform(volume.empty() ? file(".nii.gz") : volume, !volume.empty());
+  if (!field.empty()) write_field(field);
+  if (!film.empty()) write_film(film);
+  return std::move(saved_);
+}
+
+/// Adds the options that say what deforms.
+CommandText& Saving::One::add_fields(CommandText& command) const {
+  if (is_by_hand_) return command.add("--scenario", scenario_).add("--labels", options_.labels);
+  if (!options_.sequence.empty())
+    return command.add("-f", fs::path(options_.sequence[static_cast<std::size_t>(job_.frame)]));
+  for (const std::string& text : options_.field.forward) command.add("-f", fs::path(text));
+  command.add("--pull-field", fs::path(options_.field.pull));
+  if (options_.field.cell_size) command.add("--cell-size " + std::to_string(*options_.field.cell_size));
+  return command;
+}
+
+/// @param runs  whether the volume is made; else only its command is told
+void Saving::One::deform(const fs::path& output, bool runs) {
+  CommandText command("deform");
+  command.add(word(input_.path));
+  add_fields(command);
+  if (!is_by_hand_) command.add("--outside background");
+  say_command(command.add("-o", output));
+  if (!runs) return;
   DeformOptions deform;
   deform.common = options_.common;
   deform.common.quiet = true;
-  deform.input = options_.input;
-  deform.scenario = scenario;
-  deform.labels = options_.labels;
-  deform.output = options_.output / (is_series ? wish.name : wish.name + wish.volume);
+  deform.input = input_;
+  deform.scenario = scenario_;
+  if (is_by_hand_) deform.labels = options_.labels;
+  if (!is_by_hand_) {
+    deform.field = options_.field;
+    deform.outside = Outside::background;
+  }
+  if (!options_.sequence.empty()) deform.field.forward = {options_.sequence[static_cast<std::size_t>(job_.frame)]};
+  deform.output = output;
   deform.backend = options_.backend;
   deform.device = options_.device;
-  if (!wish.volume.empty()) require(!fs::exists(deform.output), deform.output.string() + " exists; take another name");
-  write_scenario(scenario, wish.scenario);
-  Result result{{scenario.string()}, {}, {}};
-  if (options_.demo) {
-    deform.input.path = options_.output / kDemoFile;
-    const PhantomOptions phantom = demo_phantom(options_.output);
-    if (!wish.volume.empty() && !fs::exists(phantom.output)) run_phantom(phantom);
-    result.command = "tetwarp phantom -o " + word(phantom.output) + " --size " + listed(kDemoSize) + " --spacing " +
-                     listed(kDemoSpacing) + "\n";
-  }
-  result.command += "tetwarp deform " + word(deform.input.path) + " --scenario " + word(scenario);
-  if (!options_.labels.empty()) result.command += " --labels " + word(options_.labels);
-  result.command += " -o " + word(wish.volume.empty() ? options_.output / (wish.name + ".nii.gz") : deform.output);
-  if (wish.volume.empty()) return result;
   run_deform(deform);
-  result.files.push_back(deform.output.string());
-  return result;
+  saved_.files.push_back(output.string());
+}
+
+void Saving::One::write_field(const fs::path& output) {
+  SimulateOptions simulate = simulate_options(options_, input_, scenario_);
+  simulate.output = output;
+  say_command(CommandText("simulate")
+                  .add(word(scenario_))
+                  .add(word(input_.path))
+                  .add("--labels", options_.labels)
+                  .add("-o", output));
+  run_simulate(simulate);
+  saved_.files.push_back(output.string());
+}
+
+/// Writes the fields that a film of a scenario shows. @return their paths
+std::vector<fs::path> Saving::One::write_frames() {
+  SimulateOptions simulate = simulate_options(options_, input_, scenario_);
+  simulate.output = file(job_.has_cuts ? "-film.vtu" : "-film.mha");
+  simulate.every = std::max(1, (job_.frames + kMostFilmPictures - 1) / kMostFilmPictures);
+  say_command(CommandText("simulate")
+                  .add(word(scenario_))
+                  .add(word(input_.path))
+                  .add("--labels", options_.labels)
+                  .add("--every " + std::to_string(simulate.every))
+                  .add("-o", simulate.output));
+  run_simulate(simulate);
+  std::vector<fs::path> frames;
+  for (int number = simulate.every; number <= job_.frames; number += simulate.every)
+    frames.push_back(frame_path(simulate.output, number, job_.frames));
+  return frames;
+}
+
+/// How a film looks: as the pane that is filmed.
+RenderOptions Saving::One::film_options() const {
+  RenderOptions render;
+  render.common = options_.common;
+  render.common.quiet = true;
+  render.input = input_;
+  render.backend = options_.backend;
+  render.device = options_.device;
+  render.outside = Outside::background;
+  render.rate = kFilmRate;
+  const auto numbers = [](const glm::dvec3& v) { return std::vector<double>{v.x, v.y, v.z}; };
+  const Window& window = job_.look.window;
+  if (job_.wish.film_of == viewer::request::Pane::volume) {
+    render.transfer = job_.style;
+    render.angle = job_.camera.angle_deg;
+    render.elevation = job_.camera.elevation_deg;
+    render.zoom = job_.camera.zoom;
+    if (job_.camera.target) render.position = numbers(*job_.camera.target);
+  } else {
+    constexpr const char* kViews[] = {"axial", "coronal", "sagittal"};
+    render.view = kViews[static_cast<int>(job_.wish.film_of)];
+    render.position = numbers(job_.cursor_mm);
+    constexpr const char* kOverlays[] = {"lattice", "jacobian", "folds", "coverage"};
+    if (job_.look.layer && static_cast<std::size_t>(*job_.look.layer) < std::size(kOverlays))
+      render.overlays = {kOverlays[static_cast<int>(*job_.look.layer)]};
+  }
+  if (render.view != "volume" || (job_.style == "mip" && !window.hounsfield)) {
+    render.window = window.width;
+    render.level = window.level;
+  }
+  return render;
+}
+
+void Saving::One::write_film(const fs::path& output) {
+  RenderOptions render = film_options();
+  CommandText command("render");
+  command.add(word(input_.path));
+  if (is_by_hand_) {
+    const std::vector<fs::path> frames = write_frames();
+    for (const fs::path& frame : frames) render.sequence.push_back(frame.string());
+    command.add("--sequence " + word(file("-film")) + ".*" + frames.front().extension().string());
+  } else if (!options_.sequence.empty()) {
+    render.sequence = options_.sequence;
+    std::string all = "--sequence";
+    for (const std::string& field : options_.sequence) all += " " + word(field);
+    command.add(all);
+  } else {
+    render.field = options_.field;
+    render.frames = kGrowthFrames;
+    add_fields(command).add("--frames " + std::to_string(render.frames));
+  }
+  render.output = output;
+  if (render.view != "volume") command.add("--view " + render.view);
+  if (!render.transfer.empty()) command.add("--transfer " + render.transfer);
+  if (render.view == "volume") {
+    command.add("--angle " + number_text(render.angle)).add("--elevation " + number_text(render.elevation));
+    command.add("--zoom " + number_text(render.zoom));
+  }
+  if (!render.position.empty()) command.add("--position " + listed(render.position, "/"));
+  if (render.window) command.add("--window " + number_text(*render.window) + " --level " + number_text(*render.level));
+  for (const std::string& overlay : render.overlays) command.add("--overlay " + overlay);
+  say_command(command.add("--outside background").add("--rate " + number_text(render.rate)).add("-o", output));
+  run_render(render);
+  saved_.files.push_back(output.string());
+}
+
+void Saving::run(const std::stop_token& stop) {
+  for (;;) {
+    std::pair<viewer::SaveJob, std::function<void(Saved)>> next;
+    {
+      std::unique_lock lock(mutex_);
+      if (!wake_.wait(lock, stop, [this] { return !jobs_.empty(); })) return;
+      next = std::move(jobs_.front());
+      jobs_.pop_front();
+    }
+    Saved saved;
+    try {
+      saved = One(options_, next.first).save();
+    } catch (const std::exception& error) {
+      saved.problem = error.what();
+    }
+    next.second(std::move(saved));
+  }
 }
 
 }  // namespace tetwarp::apps

@@ -11,9 +11,11 @@
 """
 import argparse
 import contextlib
+import math
 import os
 import pathlib
 import shutil
+import subprocess
 import sys
 import tempfile
 import time
@@ -36,6 +38,7 @@ def parse():
 
 
 GIVEN = parse()
+GIVEN.program = str(pathlib.Path(GIVEN.program).resolve())
 if GIVEN.environment:
     python = pathlib.Path(GIVEN.environment) / "bin" / "python"
     if python.exists() and pathlib.Path(sys.prefix).resolve() != pathlib.Path(GIVEN.environment).resolve():
@@ -230,9 +233,9 @@ def tissue_is_grabbed_in_the_volume(v):
 def tissue_is_pinned_and_freed(v):
     v.key("p")
     v.page.mouse.click(*v.at("axial", 0.4, 0.4))
-    v.wait_text("#held", "1 pins")
+    v.wait_text("#held", "1 pin")
     v.key("u")
-    v.page.wait_for_function("() => !document.getElementById('held').textContent.includes('pins')", timeout=PATIENCE_MS)
+    v.page.wait_for_function("() => !document.getElementById('held').textContent.includes('pin')", timeout=PATIENCE_MS)
 
 
 def a_cut_is_made_opened_and_sutured(v):
@@ -313,7 +316,7 @@ def the_keyboard_alone_does_a_whole_session(v):
         v.key(key)
     v.key("p")
     v.key("Enter")
-    v.wait_text("#held", "1 pins")
+    v.wait_text("#held", "1 pin")
     v.key("g")
     v.key("Shift+ArrowUp")
     v.key("Enter")
@@ -476,22 +479,154 @@ def a_second_page_is_told_and_may_take_over(v):
 def a_lost_line_comes_back(v):
     v.key("p")
     v.page.mouse.click(*v.at("axial", 0.4, 0.4))
-    v.wait_text("#held", "1 pins")
+    v.wait_text("#held", "1 pin")
     v.page.evaluate("() => window.tetwarp.connection.socket.close()")
     v.page.wait_for_selector("#banner", state="visible", timeout=PATIENCE_MS)
     v.picture("lost")
     v.page.wait_for_selector("#banner", state="hidden", timeout=PATIENCE_MS)
     v.rest()
-    expect("1 pins" in v.text("#held"), v.text("#held"))
+    expect("1 pin" in v.text("#held"), v.text("#held"))
 
 
 def a_page_is_loaded_again_and_has_all(v):
     v.key("p")
     v.page.mouse.click(*v.at("axial", 0.4, 0.4))
-    v.wait_text("#held", "1 pins")
+    v.wait_text("#held", "1 pin")
     v.page.reload()
     v.rest()
-    expect("1 pins" in v.text("#held"), v.text("#held"))
+    expect("1 pin" in v.text("#held"), v.text("#held"))
+
+
+@contextlib.contextmanager
+def another(v, *options):
+    """A page of another program."""
+    with tempfile.TemporaryDirectory() as scratch:
+        for words in options[0]:
+            subprocess.run([GIVEN.program, *words], check=True, cwd=scratch, capture_output=True)
+        with Program(GIVEN.program, *options[1:], cwd=scratch) as program:
+            other = Viewer(v.page.context.new_page(), program.address)
+            try:
+                yield other
+                expect(not other.problems, other.problems)
+            finally:
+                other.page.close()
+
+
+def asked(v, word):
+    """The keys of the last message of a kind that the page said since `listen`."""
+    return v.page.evaluate("w => (window.asked.filter(([what]) => what === w).pop() ?? [])[1]", word)
+
+
+def listen(v):
+    v.page.evaluate("""() => {
+      const {connection} = window.tetwarp;
+      window.asked = [];
+      const ask = Object.getPrototypeOf(connection).ask.bind(connection);
+      connection.ask = (what, keys) => { window.asked.push([what, keys]); return ask(what, keys); };
+    }""")
+
+
+def a_line_that_comes_back_is_a_lasso(v):
+    listen(v)
+    v.page.select_option("#style", "ct-skin")
+    v.rest()
+    for pane, radius in (("axial", 0.12), ("volume", 0.08)):
+        v.key("c")
+        around = [(0.5 + radius * math.cos(0.45 * n), 0.5 + radius * math.sin(0.45 * n)) for n in range(15)]
+        v.page.mouse.move(*v.at(pane, *around[0]))
+        v.page.mouse.down()
+        for point in around[1:-1]:
+            v.page.mouse.move(*v.at(pane, *point))
+        expect(not v.page.evaluate("() => window.tetwarp.hand.isClosed"), "closed before it is back")
+        v.page.mouse.move(*v.at(pane, *around[0]))
+        v.picture(f"lasso-{pane}")
+        v.page.mouse.up()
+        expect(asked(v, "cut")["closed"], "its ends are not joined")
+        v.page.wait_for_function("n => document.querySelectorAll('#cuts li').length === n", arg=1 if pane == "axial" else 2,
+                                 timeout=PATIENCE_MS)
+        v.rest()
+    v.key("c")
+    v.drag("axial", (0.3, 0.3), (0.6, 0.33))
+    expect(not asked(v, "cut")["closed"], "a straight line is closed")
+
+
+def tissues_are_changed(v):
+    listen(v)
+    v.page.click("#tissues")
+    expect(v.page.locator("#tissue-rows tr").count() == 4)
+    v.page.fill("[aria-label='bone, stretch']", "0.07")
+    v.picture("tissues")
+    v.page.fill("[aria-label='bone, compression']", "7")
+    v.page.click("#tissues-form button[value=apply]")
+    expect(v.page.locator("#tissues-dialog").is_visible(), "a number out of its range is taken")
+    v.page.fill("[aria-label='bone, compression']", "0.5")
+    v.page.click("#tissues-form button[value=apply]")
+    v.page.wait_for_function("() => window.tetwarp.state.tissues[0].stretch === 0.07", timeout=PATIENCE_MS)
+    expect(v.page.evaluate("() => window.tetwarp.state.tissues[0].compression") == 0.5)
+    v.page.click("#tissues")
+    v.page.fill("[aria-label='bone, stretch']", "0.02")
+    v.page.fill("[aria-label='bone, compression']", "0.02")
+    v.key("Enter")
+    v.page.wait_for_function("() => window.tetwarp.state.tissues[0].stretch === 0.02", timeout=PATIENCE_MS)
+
+
+def all_that_may_be_kept_is_saved(v):
+    v.key("p")
+    v.page.mouse.click(*v.at("axial", 0.4, 0.4))
+    v.wait_text("#held", "1 pin")
+    v.rest()
+    v.picture("pinned")
+    v.key("s")
+    v.page.fill("#save-name", "all")
+    v.page.select_option("#save-volume", ".nrrd")
+    v.page.check("#save-field")
+    v.page.check("#save-pictures")
+    if shutil.which("ffmpeg"):
+        v.page.select_option("#save-film", ".gif")
+        v.page.select_option("#save-of", "coronal")
+    v.picture("save")
+    v.page.click("#save-form button[value=save]")
+    v.page.wait_for_selector("#saved-dialog", state="visible", timeout=PATIENCE_MS)
+    files = v.text("#saved-files")
+    for name in ("all.json", "all.nrrd", "all-field.mha", "all-volume.png", *(("all.gif",) if shutil.which("ffmpeg") else ())):
+        expect(name in files, f"{name}: {files}")
+    v.picture("saved-all")
+    v.key("Escape")
+
+
+def a_given_field_grows_and_labels_lie_over_it(v):
+    phantom = ("phantom", "-o", "p.mha", "--size", "64,64,40", "--spacing", "6.4,6.4,7.5")
+    labels = ("deform", "p.mha", "-f", "identity", "--coverage", "labels.mha", "-o", "same.mha")
+    with another(v, [phantom, labels], "p.mha", "-f", "twist:angle=30", "--labels", "labels.mha") as one:
+        one.rest()
+        expect(not one.page.locator("#hand").is_visible() and not one.page.locator("[data-tool=grab]").is_visible())
+        expect(one.text("#frame-number") == "25 of 25", one.text("#frame-number"))
+        one.key("g")
+        one.wait_text("#message", "hands work without it")
+        whole = one.pixels("axial")
+        one.page.fill("#frame", "0")
+        one.wait_text("#frame-number", "1 of 25")
+        one.rest()
+        expect(one.pixels("axial") != whole, "nothing grows")
+        one.page.locator("body").click(position={"x": 5, "y": 5})
+        one.key(" ")
+        one.wait_text("#frame-number", "25 of 25")
+        one.rest()
+        one.picture("grown")
+        seen = set()
+        for kind in ("labels", "contours"):
+            one.page.select_option("#overlay", kind)
+            one.rest()
+            one.picture(f"overlay-{kind}")
+            seen.add(one.pixels("axial"))
+        expect(len(seen | {whole}) == 3, "labels are not seen")
+        one.key("s")
+        expect(not one.page.locator("#save-field-label").is_visible())
+        one.page.fill("#save-name", "grown")
+        one.page.select_option("#save-volume", ".mha")
+        one.page.click("#save-form button[value=save]")
+        one.page.wait_for_selector("#saved-dialog", state="visible", timeout=PATIENCE_MS)
+        expect("-f twist:angle=30" in one.text("#saved-command").replace("'", ""), one.text("#saved-command"))
 
 
 def main():
@@ -500,7 +635,7 @@ def main():
     failed = 0
     with contextlib.ExitStack() as stack:
         scratch = stack.enter_context(tempfile.TemporaryDirectory())
-        program = stack.enter_context(Program(str(pathlib.Path(GIVEN.program).resolve()), "--demo", cwd=scratch))
+        program = stack.enter_context(Program(GIVEN.program, "--demo", cwd=scratch))
         browser = stack.enter_context(sync_playwright()).chromium.launch(
             executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"])
         context = browser.new_context(viewport={"width": 1280, "height": 860})

@@ -8,8 +8,11 @@
 
 Each function whose name begins with a claim is a test; the exit status is 1 if one fails.
 """
+import glob
 import json
 import pathlib
+import shlex
+import shutil
 import socket
 import struct
 import subprocess
@@ -17,7 +20,7 @@ import sys
 import tempfile
 import time
 
-from client import Page, Program, Refused, request
+from client import Page, Program, Refused, grey_pixels, request
 
 PROGRAM = None
 
@@ -268,6 +271,119 @@ def a_scenario_is_played_beside_what_the_hand_does(_, folder):
         for name in ("lift.json", "lift.mha", "lift.mha.json", "phantom.nii.gz"):
             (folder / "played" / name).unlink(missing_ok=True)
         (folder / "played").rmdir()
+
+
+def repeat(saved, folder, renamed):
+    """Runs the commands that the page shows. @param renamed  other names of files, by those that are there"""
+    for line in saved["command"].splitlines():
+        words = shlex.split(line)
+        if words[1] == "phantom":
+            continue  # it is there already
+        words = [PROGRAM, *words[1:]]
+        for before, after in renamed.items():
+            words = [word.replace(before, after) for word in words]
+        words = [match for word in words for match in (sorted(glob.glob(word)) if "*" in word else [word])]
+        subprocess.run(words, check=True, cwd=folder.parent, capture_output=True)
+
+
+def field_pictures_and_film_are_saved_and_made_again_by_their_commands(_, folder):
+    here = folder.parent / "kept"
+    with Program(PROGRAM, "--demo", "-o", here) as program, Page(program) as page:
+        page.sizes(64, 64, 64)
+        page.rest()
+        page.ask("grip", at=page.about["middle"], radius=30)
+        page.ask("move", by=[0, -12, 4])
+        page.listen(20, lambda p: p.state["frames"] >= 6)
+        page.ask("release")
+        page.rest()
+        saved = page.save("all", "", field=True, pictures=True)
+        expect(saved["say"] == "saved", saved)
+        names = {pathlib.Path(file).name for file in saved["files"]}
+        expect(names == {"all.json", "all-field.mha", "all-axial.png", "all-coronal.png", "all-sagittal.png",
+                         "all-volume.png"}, names)
+        _, rows = page.exact("axial")
+        expect(grey_pixels((here / "all-axial.png").read_bytes()) == rows, "another picture than the page shows")
+        repeat(saved, here, {"all-field": "again-field", "all.nii.gz": "again.nii.gz"})
+        expect((here / "all-field.mha").read_bytes() == (here / "again-field.mha").read_bytes(), "another field")
+        expect("exists" in page.save("all", "", pictures=True).get("text", ""), "pictures were written over")
+        film = page.save("film", "", film=".gif", of="axial")
+        if not shutil.which("ffmpeg"):
+            expect(film["say"] == "problem" and "ffmpeg" in film["text"], film)
+            expect(not (here / "film.json").exists(), "something was written")
+            return
+        expect(film["say"] == "saved", film)
+        expect((here / "film.gif").read_bytes()[:3] == b"GIF" and len(list(here.glob("film-film.*.mha"))) > 3, film)
+        for path in (here / "film.gif", *here.glob("film-film*")):
+            path.unlink()
+        repeat(film, here, {"film.nii.gz": "film-again.nii.gz"})
+        expect((here / "film.gif").exists(), "its commands make no film")
+
+
+def a_given_field_is_shown_as_it_grows_and_saved(_, folder):
+    here = folder.parent / "grown"
+    with Program(PROGRAM, "--demo", "-f", "bubble:radius=90,strength=0.4", "--cell-size", "8", "-o", here) as program, \
+            Page(program) as page:
+        page.sizes(64, 64, 64)
+        page.rest()
+        expect(page.about["reel"] == 25 and page.about["grows"] and not page.about["pulls"], page.about)
+        expect(page.state["frame"] == 24 and page.state["quality"]["jacobian"] < 1, page.state)
+        whole = page.exact("axial")[1]
+        page.ask("frame", number=0)
+        page.listen(10, lambda p: p.state["frame"] == 0)
+        page.rest()
+        expect(page.exact("axial")[1] != whole and page.state["quality"]["jacobian"] == 1, "nothing grows")
+        answer = page.answer(page.ask("grip", at=page.about["middle"], radius=20))
+        expect(answer["say"] == "problem" and "hands work without it" in answer["text"], answer)
+        page.ask("play")
+        page.listen(20, lambda p: p.state["frame"] == 24 and not p.state["moving"])
+        page.rest()
+        expect(page.exact("axial")[1] == whole, "another whole field")
+        saved = page.save("bubble", ".mha")
+        expect(saved["say"] == "saved", saved)
+        expect_seen(page, here / "bubble.mha")
+        repeat(saved, here, {"bubble.mha": "again.mha"})
+        expect((here / "bubble.mha").read_bytes() == (here / "again.mha").read_bytes(), "other bytes")
+        if shutil.which("ffmpeg"):
+            film = page.save("film", "", film=".mp4", of="coronal")
+            expect(film["say"] == "saved" and (here / "film.mp4").stat().st_size > 1000, film)
+
+
+def sequences_and_pull_fields_are_shown(_, folder):
+    here = folder.parent / "shown"
+    here.mkdir()
+    run = lambda *words: subprocess.run([PROGRAM, *words], check=True, cwd=here, capture_output=True)
+    run("phantom", "-o", "p.mha", "--size", "64,64,40", "--spacing", "6.4,6.4,7.5")
+    for n in (1, 2, 3):
+        run("deform", "p.mha", "-f", f"translate:by={7 * n}/0/0", "--cell-size", "16", "--outside", "background",
+            "-o", f"d{n}.mha", "--write-field", f"f{n}.mha", "--inverse", f"i{n}.mha")
+    with Program(PROGRAM, "p.mha", "--sequence", "f1.mha", "f2.mha", "f3.mha", "-o", "out", cwd=here) as program, \
+            Page(program) as page:
+        page.sizes(64, 64, 64)
+        page.rest()
+        expect(page.about["reel"] == 3 and not page.about["grows"] and page.state["frame"] == 0, page.state)
+        coverage = [page.state["quality"]["coverage"]]
+        for n in (1, 2):
+            page.ask("frame", number=n)
+            page.listen(10, lambda p: p.state["frame"] == n)
+            page.rest()
+            coverage.append(page.state["quality"]["coverage"])
+        expect(coverage == sorted(coverage, reverse=True) and len(set(coverage)) == 3, coverage)
+        saved = page.save("second", ".mha")
+        expect(saved["say"] == "saved" and "-f f3.mha" in saved["command"], saved)
+    with Program(PROGRAM, "p.mha", "--pull-field", "i2.mha", cwd=here) as program, Page(program) as page:
+        page.sizes(64, 64, 64)
+        page.rest()
+        expect(page.about["pulls"] and page.state["quality"]["jacobian"] is None, page.state)
+        answer = page.answer(page.ask("overlay", kind="folds"))
+        expect("no tetrahedra" in answer.get("text", ""), answer)
+    with Program(PROGRAM, "p.mha", "--sequence", "f1.mha", "f2.mha", cwd=here) as program, Page(program) as page:
+        (here / "f2.mha").write_bytes((here / "f2.mha").read_bytes()[:300])  # cut off after it was named
+        page.sizes(64, 64, 64)
+        page.rest()
+        answer = page.answer(page.ask("frame", number=1))
+        expect(answer["say"] == "problem" and "f2.mha" in answer["text"], answer)
+        page.rest()
+        expect(page.state["frame"] == 0, "a frame that cannot be read is shown")
 
 
 def no_list_of_processes_shows_the_token(program, _):

@@ -240,9 +240,9 @@ class Page:
         assert about["exact"], "the last picture is not exact"
         return about, grey_pixels(png)
 
-    def save(self, name, volume, seconds=300):
+    def save(self, name, volume, seconds=300, **more):
         """Saves. @return the answer"""
-        number = self.ask("save", name=name, volume=volume)
+        number = self.ask("save", name=name, volume=volume, **more)
         ends = lambda page: [m for m in page.messages if m.get("n") == number and m["say"] in ("saved", "problem")]
         self.listen(seconds, ends)
         return ends(self)[-1]

@@ -46,8 +46,9 @@ TEST(ViewMessages, EveryWordIsReadAsWhatItAsksFor) {
   EXPECT_EQ(one<request::Levels>(R"({"do": "levels", "width": 400, "level": 40})").width, 400);
   EXPECT_EQ(one<request::Style>(R"({"do": "style", "name": "mip"})").name, "mip");
   EXPECT_EQ(one<request::Compare>(R"({"do": "compare", "show": "swipe", "share": 0.25})").swipe, 0.25);
-  EXPECT_EQ(one<request::LayOver>(R"({"do": "overlay", "kind": "jacobian"})").kind, OverlayKind::jacobian);
-  EXPECT_FALSE(one<request::LayOver>(R"({"do": "overlay", "kind": null})").kind.has_value());
+  EXPECT_EQ(one<request::LayOver>(R"({"do": "overlay", "kind": "jacobian"})").layer, Layer::jacobian);
+  EXPECT_EQ(one<request::LayOver>(R"({"do": "overlay", "kind": "contours"})").layer, Layer::contours);
+  EXPECT_FALSE(one<request::LayOver>(R"({"do": "overlay", "kind": null})").layer.has_value());
   EXPECT_EQ(one<request::Probe>(R"({"do": "probe", "at": [0, 0, 9]})").at_mm.z, 9);
   EXPECT_EQ(one<request::Shown>(R"({"do": "shown", "pane": "volume", "number": 7})").number, 7u);
   EXPECT_EQ(std::get<glm::dvec3>(one<request::Grip>(R"({"do": "grip", "at": [1, 2, 3], "radius": 5})").at).y, 2);
@@ -61,15 +62,31 @@ TEST(ViewMessages, EveryWordIsReadAsWhatItAsksFor) {
   EXPECT_EQ(cut.path.size(), 2u);
   EXPECT_EQ(std::get<glm::dvec3>(cut.path[1]).x, 4);
   EXPECT_TRUE(cut.is_centred);
+  EXPECT_FALSE(cut.is_closed);
+  EXPECT_TRUE(one<request::Cut>(R"({"do": "cut", "pixels": [[0, 0], [1, 0], [1, 1]], "along": [0, 0, 1], "depth": 30,
+                                    "centred": false, "closed": true})")
+                  .is_closed);
   EXPECT_EQ(one<request::Suture>(R"({"do": "suture", "name": "cut 1"})").name, "cut 1");
   EXPECT_EQ(one<request::Reopen>(R"({"do": "reopen", "name": "cut 1"})").name, "cut 1");
   EXPECT_EQ(one<request::Ball>(R"({"do": "ball", "at": [1, 2, 3], "radius": 15})").radius_mm, 15);
   one<request::LiftBall>(R"({"do": "lift"})");
   one<request::Play>(R"({"do": "play"})");
+  EXPECT_EQ(one<request::Frame>(R"({"do": "frame", "number": 24})").number, 24);
+  const auto tissues = one<request::Tissues>(
+      R"({"do": "tissues", "tissues": [{"name": "bone", "stiffness": 300, "compression": 0.1, "stretch": 0.2, "shear": 0.3}]})");
+  ASSERT_EQ(tissues.tissues.size(), 1u);
+  EXPECT_EQ(tissues.tissues[0].name, "bone");
+  EXPECT_EQ(tissues.tissues[0].youngs_modulus_kpa, 300);
+  EXPECT_EQ(tissues.tissues[0].shear, 0.3);
   one<request::Redo>(R"({"do": "redo"})");
   one<request::Reset>(R"({"do": "reset"})");
   EXPECT_EQ(one<request::Use>(R"({"do": "use", "method": "mass-spring"})").method, simulate::Method::mass_spring);
   EXPECT_EQ(one<request::Save>(R"({"do": "save", "name": "a", "volume": ".nii.gz"})").volume, ".nii.gz");
+  const auto save = one<request::Save>(
+      R"({"do": "save", "name": "a", "volume": "", "field": true, "pictures": true, "film": ".gif", "of": "coronal"})");
+  EXPECT_TRUE(save.field && save.pictures);
+  EXPECT_EQ(save.film, ".gif");
+  EXPECT_EQ(save.film_of, request::Pane::coronal);
 }
 
 TEST(ViewMessages, WhatIsNoRequestIsRefusedWithTheReason) {
@@ -88,6 +105,12 @@ TEST(ViewMessages, WhatIsNoRequestIsRefusedWithTheReason) {
   EXPECT_NE(refusal(R"({"do": "grip", "pixel": [0.5, 1.5], "radius": 2})").find("out of its range"), std::string::npos);
   EXPECT_NE(refusal(R"({"do": "use", "method": "magic"})").find("none of its words"), std::string::npos);
   EXPECT_NE(refusal(R"({"do": "size", "pane": "axial", "width": 9000, "height": 1})").find("range"), std::string::npos);
+  EXPECT_NE(refusal(R"({"do": "frame", "number": -1})").find("out of its range"), std::string::npos);
+  EXPECT_NE(refusal(R"({"do": "tissues", "tissues": [3]})").find("no list of objects"), std::string::npos);
+  EXPECT_NE(refusal(R"({"do": "tissues", "tissues": [{"name": "a", "stiffness": 1, "compression": 2, "stretch": 1,
+                                                      "shear": 1}]})")
+                .find("\"compression\" is out of its range"),
+            std::string::npos);
   EXPECT_NE(refusal(R"({"do": "undo", "n": -1})").find("out of its range"), std::string::npos);
 }
 

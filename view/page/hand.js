@@ -13,6 +13,7 @@ import {along, length} from './vectors.js';
 /** @typedef {'look' | 'levels' | 'grab' | 'pin' | 'cut' | 'ball'} Tool */
 
 const kLeastLine = 4;  // CSS pixels between two places of a line
+const kClosing = 12;   // CSS pixels between both ends of a line that closes
 
 export class Hand {
   /** @param {View} view */
@@ -51,6 +52,14 @@ export class Hand {
     this.asked = 0;  // number of the message that took hold
   }
 
+  /** Whether the line that is drawn comes back to where it began, as a lasso. */
+  get isClosed() {
+    if (!this.line || this.line.length < 4) return false;
+    const [first, last] = [this.line[0], this.line[this.line.length - 1]];
+    const reach = Math.max(...this.line.map((point) => Math.hypot(point.x - first.x, point.y - first.y)));
+    return reach > 2 * kClosing && Math.hypot(last.x - first.x, last.y - first.y) < kClosing;
+  }
+
   /** Whether the tool takes what lies within a radius. */
   get takes() {
     return this.tool === 'grab' || this.tool === 'pin' || this.tool === 'ball';
@@ -58,6 +67,10 @@ export class Hand {
 
   /** @param {Tool} tool */
   choose(tool) {
+    if (this.view.about?.reel && tool !== 'look' && tool !== 'levels') {
+      this.view.tell('A field that was made before is shown; hands work without it.');
+      return;
+    }
     if (this.at) this.end();
     this.line = null;
     this.tool = tool;
@@ -162,12 +175,13 @@ export class Hand {
   }
 
   cut() {
-    const {line, pane} = this;
+    const {line, pane, isClosed} = this;
     this.line = null;
     if (!line || !pane || line.length < 2) return;
+    if (isClosed) line.pop();  // it lies where the first one does
     const normal = pane.normal;
     const unit = along([0, 0, 0], 1 / length(normal), normal);
-    const common = {along: unit, depth: this.depth, centred: pane instanceof SlicePane};
+    const common = {along: unit, depth: this.depth, centred: pane instanceof SlicePane, closed: isClosed};
     this.asked =
         pane instanceof SlicePane
             ? this.view.connection.ask('cut', {path: line.map((point) => pane.placeAt(point)), ...common})

@@ -18,7 +18,6 @@ import {VolumePane} from './volume_pane.js';
 /** @typedef {import('./types.js').Vector} Vector */
 /** @typedef {import('./pane.js').Point} Point */
 
-const kOverlays = [null, 'lattice', 'jacobian', 'folds', 'coverage'];
 const kMessageMs = 8000;
 const kSpeedMs = 1000;
 
@@ -220,8 +219,7 @@ export class View {
   }
 
   nextOverlay() {
-    const at = kOverlays.indexOf(this.state?.overlay ?? null);
-    this.connection.ask('overlay', {kind: kOverlays[(at + 1) % kOverlays.length]});
+    this.connection.ask('overlay', {kind: this.settings.nextOverlay()});
   }
 
   /**
@@ -262,7 +260,7 @@ export class View {
   }
 
   play() {
-    if (this.state?.playable && !this.state.plays) this.connection.ask('play');
+    if (this.state?.playable && (!this.state.plays || this.about?.reel)) this.connection.ask('play');
   }
 
   openSave() {

@@ -12,6 +12,7 @@
 export const kMarks = {
   cross: {axial: '#ff6b6b', coronal: '#5ad469', sagittal: '#ffd43b'},
   hand: '#ffa94d',
+  pin: '#66d9e8',
   text: '#e9ecef',
   faint: '#adb5bd',
 };
@@ -174,15 +175,35 @@ export class Pane {
   }
 
   /**
+   * What is pinned: a thin circle with a cross in its middle.
+   * @param {CanvasRenderingContext2D} context
+   * @param {Point} at
+   * @param {number} radius
+   */
+  drawPin(context, at, radius) {
+    context.strokeStyle = kMarks.pin;
+    context.lineWidth = 1.5;
+    context.beginPath();
+    context.arc(at.x, at.y, Math.max(2, radius), 0, 2 * Math.PI);
+    context.moveTo(at.x - 4, at.y);
+    context.lineTo(at.x + 4, at.y);
+    context.moveTo(at.x, at.y - 4);
+    context.lineTo(at.x, at.y + 4);
+    context.stroke();
+  }
+
+  /**
    * A line that a cut will follow.
    * @param {CanvasRenderingContext2D} context
    * @param {Point[]} points
+   * @param {boolean} isClosed  whether its ends are joined
    */
-  drawLine(context, points) {
+  drawLine(context, points, isClosed) {
     context.strokeStyle = kMarks.hand;
     context.lineWidth = 2;
     context.beginPath();
     for (const point of points) context.lineTo(point.x, point.y);
+    if (isClosed) context.closePath();
     context.stroke();
     for (const point of points.length < 12 ? points : []) context.fillRect(point.x - 2, point.y - 2, 4, 4);
   }

@@ -4,7 +4,7 @@
 // Buttons, sliders and lists around the panes.
 
 import {element} from './dom.js';
-import {shown} from './vectors.js';
+import {counted, shown} from './vectors.js';
 
 /** @typedef {import('./types.js').About} About */
 /** @typedef {import('./types.js').State} State */
@@ -21,6 +21,32 @@ const kPresets = {
   brain: [80, 40],
   liver: [150, 60],
 };
+
+/**
+ * What may lie over slices, and what it is called.
+ * @type {[string, string][]}
+ */
+const kOverlays = [
+  ['', 'none'], ['lattice', 'lattice'], ['jacobian', 'Jacobian'], ['folds', 'folds'], ['coverage', 'coverage'],
+  ['labels', 'labels'], ['contours', 'contours'],
+];
+const kOfTetrahedra = ['lattice', 'jacobian', 'folds'];
+const kOfLabels = ['labels', 'contours'];
+
+/**
+ * Overlays that there are for what is shown.
+ * @param {About} about
+ */
+function overlaysFor(about) {
+  return kOverlays.filter(([name]) =>
+      (about.labels || !kOfLabels.includes(name)) && (!about.pulls || !kOfTetrahedra.includes(name)));
+}
+
+/**
+ * The numbers of a tissue, least and most.
+ * @type {[keyof import('./types.js').Tissue, number, number][]}
+ */
+const kTissueNumbers = [['stiffness', 1e-6, 1e9], ['compression', 0, 1], ['stretch', 0, 100], ['shear', 0, 100]];
 
 /**
  * @param {string} id
@@ -90,9 +116,27 @@ export class Settings {
     const compare = () => ask('compare', {show: list('show').value, share: Number(input('share').value)});
     list('show').onchange = compare;
     input('share').oninput = compare;
-    /** @type {HTMLFormElement} */ (element('save-form')).onsubmit = (event) => {
-      const button = /** @type {HTMLButtonElement} */ (event.submitter);
-      if (button?.value === 'save') ask('save', {name: input('save-name').value, volume: list('save-volume').value});
+    input('frame').oninput = () => ask('frame', {number: Number(input('frame').value)});
+    element('tissues').onclick = () => this.openTissues();
+    this.onSubmit('tissues-form', 'apply', () => ask('tissues', {tissues: this.readTissues()}));
+    this.onSubmit('save-form', 'save', () => ask('save', {
+      name: input('save-name').value,
+      volume: list('save-volume').value,
+      field: input('save-field').checked,
+      pictures: input('save-pictures').checked,
+      film: list('save-film').value,
+      of: list('save-of').value,
+    }));
+  }
+
+  /**
+   * @param {string} form
+   * @param {string} value   of the button that does it
+   * @param {() => void} what
+   */
+  onSubmit(form, value, what) {
+    /** @type {HTMLFormElement} */ (element(form)).onsubmit = (event) => {
+      if (/** @type {HTMLButtonElement} */ (event.submitter)?.value === value) what();
     };
   }
 
@@ -108,6 +152,13 @@ export class Settings {
     fill(list('style'), about.styles.map((name) => [name, name]));
     fill(list('preset'), [['', 'own'], ...Object.keys(kPresets).map((name) => /** @type {[string, string]} */ ([name, name]))]);
     list('preset').disabled = !about.hounsfield;
+    fill(list('overlay'), overlaysFor(about));
+    element('reel').hidden = about.reel < 2;
+    element('reel-title').textContent = about.grows ? 'The field grows' : 'Sequence';
+    input('frame').max = String(Math.max(1, about.reel - 1));
+    element('hand').hidden = element('history').hidden = element('save-field-label').hidden = about.reel > 0;
+    element('save-what').hidden = about.reel > 0;
+    for (const tool of this.tools) tool.hidden = about.reel > 0 && !['look', 'levels'].includes(tool.dataset.tool ?? '');
     fill(list('save-volume'), [['', 'none'], ...about.volumes.map((kind) => /** @type {[string, string]} */ ([kind, kind === 'dicom' ? 'DICOM series' : kind]))]);
     this.showTool();
     this.showHand();
@@ -138,12 +189,16 @@ export class Settings {
     enable('redo', state.redo);
     enable('reset', state.undo);
     element('play').hidden = !state.playable;
-    enable('play', !state.plays);
-    enable('save', state.frames > 0 && !state.plays);
-    enable('unpin', state.pins > 0);
+    const isReel = (this.view.about?.reel ?? 0) > 0;
+    enable('play', isReel || !state.plays);
+    enable('save', isReel || !state.plays);
+    input('frame').value = String(state.frame);
+    element('frame-number').textContent = `${state.frame + 1} of ${this.view.about?.reel}`;
+    enable('unpin', state.pins.length > 0);
     enable('lift', state.ball !== null);
-    element('held').textContent =
-        `${state.frames} frames${state.pins ? `, ${state.pins} pins` : ''}${state.ball ? ', a ball' : ''}`;
+    const pins = state.pins.length;
+    element('held').textContent = counted(state.frames, 'frame') + (pins ? `, ${counted(pins, 'pin')}` : '') +
+        (state.ball ? ', a ball' : '');
     list('method').value = state.method;
     list('show').value = state.show;
     element('share-label').hidden = state.show !== 'swipe';
@@ -178,12 +233,14 @@ export class Settings {
     const badge = element('badge');
     const quality = state.quality;
     const bad = quality !== null && quality.inverted + quality.degenerate > 0;
-    badge.textContent = quality === null ? (state.moving ? 'moving' : '\u2026') : bad ? 'It folds' : 'No folds';
-    badge.className = quality === null ? '' : bad ? 'bad' : 'good';
+    const known = quality !== null && quality.jacobian !== null;
+    const unknown = quality !== null ? 'A pull field: folds are not known' : state.moving ? 'moving' : '\u2026';
+    badge.textContent = !known ? unknown : bad ? 'It folds' : 'No folds';
+    badge.className = !known ? '' : bad ? 'bad' : 'good';
     element('fold').hidden = state.fold === null;
     const rows = [
-      ['Folded tetrahedra', quality ? String(quality.inverted + quality.degenerate) : '\u2026'],
-      ['Least Jacobian', quality ? shown(quality.jacobian, 3) : '\u2026'],
+      ['Folded tetrahedra', known ? String(quality.inverted + quality.degenerate) : '\u2026'],
+      ['Least Jacobian', quality?.jacobian != null ? shown(quality.jacobian, 3) : '\u2026'],
       ['Coverage', quality ? `${shown(quality.coverage * 100, 2)} %` : '\u2026'],
     ];
     element('quality').replaceChildren(...rows.flatMap(([name, value]) => {
@@ -202,8 +259,43 @@ export class Settings {
   }
 
   openSave() {
-    if (this.view.state && this.view.state.frames > 0) dialog('save-dialog').showModal();
-    else this.view.tell('Nothing has been done yet that could be saved.');
+    dialog('save-dialog').showModal();
+  }
+
+  openTissues() {
+    element('tissue-rows').replaceChildren(...(this.view.state?.tissues ?? []).map((tissue) => {
+      const row = document.createElement('tr');
+      const head = document.createElement('th');
+      head.scope = 'row';
+      head.textContent = tissue.name;
+      row.append(head, ...kTissueNumbers.map(([key, least, most]) => {
+        const cell = document.createElement('td');
+        const number = document.createElement('input');
+        Object.assign(number, {type: 'number', required: true, min: least, max: most, step: 'any', value: tissue[key]});
+        number.setAttribute('aria-label', `${tissue.name}, ${key}`);
+        cell.append(number);
+        return cell;
+      }));
+      return row;
+    }));
+    dialog('tissues-dialog').showModal();
+  }
+
+  /** @returns {object[]} */
+  readTissues() {
+    return [...element('tissue-rows').children].map((row) => {
+      const numbers = [...row.querySelectorAll('input')].map((one) => Number(one.value));
+      return Object.fromEntries([
+        ['name', row.children[0].textContent],
+        ...kTissueNumbers.map(([key], n) => [key, numbers[n]]),
+      ]);
+    });
+  }
+
+  /** What the next overlay is, of those that there are. */
+  nextOverlay() {
+    const names = [...list('overlay').options].map((option) => option.value);
+    return names[(names.indexOf(list('overlay').value) + 1) % names.length] || null;
   }
 
   /** @param {{files: string[], command: string}} message */

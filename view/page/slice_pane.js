@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 import {kMarks, Pane} from './pane.js';
-import {dot, length, pixelOf, placeOf} from './vectors.js';
+import {dot, length, middleOf, pixelOf, placeOf} from './vectors.js';
 
 /** @typedef {import('./types.js').Vector} Vector */
 /** @typedef {import('./types.js').SliceName} SliceName */
@@ -229,10 +229,14 @@ export class SlicePane extends Pane {
       if (over >= radius) return;
       this.drawCircle(context, this.pointAt(at), Math.sqrt(radius * radius - over * over) * pixelsPerMm, isFull);
     };
-    if (state?.ball) circle([state.ball[0], state.ball[1], state.ball[2]], state.ball[3], true);
+    if (state?.ball) circle(middleOf(state.ball), state.ball[3], true);
+    for (const pin of state?.pins ?? []) {
+      const over = Math.abs(this.heightOver(middleOf(pin)));
+      if (over < pin[3]) this.drawPin(context, this.pointAt(middleOf(pin)), Math.sqrt(pin[3] ** 2 - over ** 2) * pixelsPerMm);
+    }
     if (hand.at) circle(hand.at, hand.radius, true);
     else if (hand.hover && hand.takes) circle(hand.hover, hand.radius, false);
-    if (hand.line && hand.pane === this) this.drawLine(context, hand.line);
+    if (hand.line && hand.pane === this) this.drawLine(context, hand.line, hand.isClosed);
   }
 
   /** @param {CanvasRenderingContext2D} context */

@@ -39,6 +39,10 @@
  * @property {string[]} styles   names of transfer functions
  * @property {string[]} volumes  what the deformed volume may be saved as
  * @property {string} folder
+ * @property {boolean} labels  whether there are any
+ * @property {number} reel     frames of the fields that are shown; 0: hands work
+ * @property {boolean} grows   whether they are one field that grows
+ * @property {boolean} pulls   whether they are pull fields
  */
 
 /**
@@ -47,7 +51,21 @@
  * @property {number} coverage    share of the voxels that got a value
  * @property {number} inverted    tetrahedra that are turned inside out
  * @property {number} degenerate  tetrahedra without volume
- * @property {number} jacobian    least Jacobian determinant
+ * @property {number | null} jacobian  least Jacobian determinant; a pull field has none
+ */
+
+/**
+ * A centre, LPS mm, and a radius, mm.
+ * @typedef {[number, number, number, number]} Ball
+ */
+
+/**
+ * @typedef {object} Tissue
+ * @property {string} name
+ * @property {number} stiffness    Young's modulus, kPa
+ * @property {number} compression  part of its length by which a link may shrink
+ * @property {number} stretch      and grow
+ * @property {number} shear        and be sheared
  */
 
 /**
@@ -58,11 +76,13 @@
  * @property {boolean} undo
  * @property {boolean} redo
  * @property {boolean} holds
- * @property {number} pins
- * @property {[number, number, number, number] | null} ball  centre and radius
+ * @property {Ball[]} pins
+ * @property {Ball | null} ball
  * @property {{name: string, open: boolean}[]} cuts
  * @property {boolean} playable  whether there is a scenario to play
  * @property {boolean} plays
+ * @property {number} frame  of the fields that are shown
+ * @property {Tissue[]} tissues
  * @property {'chainmail' | 'mass-spring'} method
  * @property {Quality | null} quality
  * @property {Vector | null} fold

@@ -30,6 +30,14 @@ export function minus(a, b) {
 }
 
 /**
+ * @param {import('./types.js').Ball} ball
+ * @returns {Vector}
+ */
+export function middleOf(ball) {
+  return [ball[0], ball[1], ball[2]];
+}
+
+/**
  * @param {Vector} a
  * @param {Vector} b
  */
@@ -74,4 +82,13 @@ export function pixelOf(plane, place) {
  */
 export function shown(value, digits = 1) {
   return value.toFixed(digits).replace(/^-(0(\.0*)?)$/, '$1').replace('-', '\u2212');
+}
+
+/**
+ * A number of things, for people.
+ * @param {number} count
+ * @param {string} what  one of them
+ */
+export function counted(count, what) {
+  return `${count} ${what}${count === 1 ? '' : 's'}`;
 }

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 import {Pane} from './pane.js';
-import {along, dot, kLetters, minus} from './vectors.js';
+import {along, dot, kLetters, middleOf, minus} from './vectors.js';
 
 /** @typedef {import('./types.js').Vector} Vector */
 /** @typedef {import('./pane.js').Point} Point */
@@ -122,11 +122,12 @@ export class VolumePane extends Pane {
     this.drawBar(context, 1 / this.mm);
     const {hand, state} = this.view;
     if (state?.ball) {
-      this.drawCircle(context, this.pointAt([state.ball[0], state.ball[1], state.ball[2]]), state.ball[3] / this.mm, true);
+      this.drawCircle(context, this.pointAt(middleOf(state.ball)), state.ball[3] / this.mm, true);
     }
+    for (const pin of state?.pins ?? []) this.drawPin(context, this.pointAt(middleOf(pin)), pin[3] / this.mm);
     if (hand.at) this.drawCircle(context, this.pointAt(hand.at), hand.radius / this.mm, true);
     else if (hand.point && hand.pane === this && hand.takes) this.drawCircle(context, hand.point, hand.radius / this.mm, false);
-    if (hand.line && hand.pane === this) this.drawLine(context, hand.line);
+    if (hand.line && hand.pane === this) this.drawLine(context, hand.line, hand.isClosed);
   }
 
   /**

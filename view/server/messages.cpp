@@ -20,7 +20,7 @@ using nlohmann::json;
 using namespace request;
 
 constexpr double kFarthestMm = 1e6, kLargestMm = 1e4;
-constexpr std::size_t kMostPlaces = 1000, kLongestName = 200;
+constexpr std::size_t kMostPlaces = 1000, kLongestName = 200, kMostTissues = 255;
 constexpr int kDeepest = 4;  ///< levels of brackets in a message
 
 constexpr std::pair<const char*, Pane> kPaneNames[] = {
@@ -29,10 +29,9 @@ constexpr std::pair<const char*, Compared> kComparedNames[] = {{"after", Compare
                                                                {"before", Compared::before},
                                                                {"difference", Compared::difference},
                                                                {"swipe", Compared::swipe}};
-constexpr std::pair<const char*, OverlayKind> kOverlayNames[] = {{"coverage", OverlayKind::coverage},
-                                                                 {"folds", OverlayKind::folds},
-                                                                 {"jacobian", OverlayKind::jacobian},
-                                                                 {"lattice", OverlayKind::lattice}};
+constexpr std::pair<const char*, Layer> kLayerNames[] = {{"lattice", Layer::lattice}, {"jacobian", Layer::jacobian},
+                                                         {"folds", Layer::folds},     {"coverage", Layer::coverage},
+                                                         {"labels", Layer::labels},   {"contours", Layer::contours}};
 constexpr std::pair<const char*, simulate::Method> kMethodNames[] = {{"chainmail", simulate::Method::chainmail},
                                                                      {"mass-spring", simulate::Method::mass_spring}};
 
@@ -91,6 +90,18 @@ class Keys {
       places.push_back(has("pixels") ? Pointed(pixel_of(one, key)) : Pointed(numbers_of<3>(one, key, kFarthestMm)));
     return places;
   }
+  /// The objects of a list, each with its own keys.
+  template <class Read>
+  void each(const char* key, std::size_t most, Read&& read) {
+    const json& value = at(key);
+    require(value.is_array() && value.size() <= most, std::string("\"") + key + "\" is no list, or a long one");
+    for (const json& one : value) {
+      require(one.is_object(), std::string("\"") + key + "\" is no list of objects");
+      Keys keys(one);
+      read(keys);
+      keys.finish();
+    }
+  }
   /// @throws InputError for a key that nobody asked for
   void finish() const {
     for (const auto& [key, value] : object_.items())
@@ -128,6 +139,19 @@ Hello hello(Keys& keys) {
   return hello;
 }
 
+/// Properties of tissues, within what a scenario may say (docs/scenario.schema.json).
+std::vector<simulate::Tissue> tissues(Keys& keys) {
+  std::vector<simulate::Tissue> tissues;
+  keys.each("tissues", kMostTissues, [&](Keys& of_one) {
+    tissues.push_back({.name = of_one.text("name"),
+                       .youngs_modulus_kpa = of_one.number("stiffness", 1e-6, 1e9),
+                       .compression = of_one.number("compression", 0, 1),
+                       .stretch = of_one.number("stretch", 0, 100),
+                       .shear = of_one.number("shear", 0, 100)});
+  });
+  return tissues;
+}
+
 constexpr double kMostPixels = 8192;
 using Wish = decltype(Request::what);
 
@@ -158,7 +182,7 @@ const std::pair<const char*, Wish (*)(Keys&)> kWishes[] = {
     {"overlay",
      [](Keys& keys) -> Wish {
        if (keys.at("kind").is_null()) return LayOver{};
-       return LayOver{keys.choice("kind", kOverlayNames)};
+       return LayOver{keys.choice("kind", kLayerNames)};
      }},
     {"probe", [](Keys& keys) -> Wish { return Probe{keys.vector("at", kFarthestMm)}; }},
     {"shown",
@@ -180,7 +204,7 @@ const std::pair<const char*, Wish (*)(Keys&)> kWishes[] = {
     {"cut",
      [](Keys& keys) -> Wish {
        return request::Cut{keys.path(), keys.vector("along", 1), keys.number("depth", 0.01, kLargestMm),
-                           keys.flag("centred")};
+                           keys.flag("centred"), keys.has("closed") && keys.flag("closed")};
      }},
     {"suture", [](Keys& keys) -> Wish { return Suture{keys.text("name")}; }},
     {"reopen", [](Keys& keys) -> Wish { return Reopen{keys.text("name")}; }},
@@ -190,13 +214,20 @@ const std::pair<const char*, Wish (*)(Keys&)> kWishes[] = {
      }},
     {"lift", [](Keys&) -> Wish { return LiftBall{}; }},
     {"play", [](Keys&) -> Wish { return Play{}; }},
+    {"frame", [](Keys& keys) -> Wish { return Frame{static_cast<int>(keys.number("number", 0, 1e6))}; }},
     {"undo", [](Keys&) -> Wish { return Undo{}; }},
     {"redo", [](Keys&) -> Wish { return Redo{}; }},
     {"reset", [](Keys&) -> Wish { return Reset{}; }},
     {"use", [](Keys& keys) -> Wish { return Use{keys.choice("method", kMethodNames)}; }},
+    {"tissues", [](Keys& keys) -> Wish { return request::Tissues{tissues(keys)}; }},
     {"save",
      [](Keys& keys) -> Wish {
-       return request::Save{keys.text("name"), keys.text("volume")};
+       request::Save save{.name = keys.text("name"), .volume = keys.text("volume")};
+       if (keys.has("field")) save.field = keys.flag("field");
+       if (keys.has("pictures")) save.pictures = keys.flag("pictures");
+       if (keys.has("film")) save.film = keys.text("film");
+       if (keys.has("of")) save.film_of = keys.choice("of", kPaneNames);
+       return save;
      }},
 };
 
@@ -282,11 +313,22 @@ std::string message_of(const About& about) {
                   {"hounsfield", about.hounsfield},
                   {"styles", about.styles},
                   {"volumes", about.volume_suffixes},
-                  {"folder", about.folder}});
+                  {"folder", about.folder},
+                  {"labels", about.labels},
+                  {"reel", about.frames},
+                  {"grows", about.grows},
+                  {"pulls", about.pulls}});
 }
 
 std::string message_of(const State& state) {
-  json cuts = json::array();
+  json cuts = json::array(), pins = json::array(), tissues = json::array();
+  for (const glm::dvec4& pin : state.pins) pins.push_back({pin.x, pin.y, pin.z, pin.w});
+  for (const simulate::Tissue& tissue : state.tissues)
+    tissues.push_back({{"name", tissue.name},
+                       {"stiffness", tissue.youngs_modulus_kpa},
+                       {"compression", tissue.compression},
+                       {"stretch", tissue.stretch},
+                       {"shear", tissue.shear}});
   for (const auto& [name, is_open] : state.cuts) cuts.push_back({{"name", name}, {"open", is_open}});
   json message = {{"say", "state"},
                   {"request", state.request},
@@ -295,11 +337,13 @@ std::string message_of(const State& state) {
                   {"undo", state.can_undo},
                   {"redo", state.can_redo},
                   {"holds", state.holds},
-                  {"pins", state.pins},
+                  {"pins", pins},
                   {"ball", nullptr},
                   {"cuts", cuts},
                   {"playable", state.can_play},
                   {"plays", state.plays},
+                  {"frame", state.frame},
+                  {"tissues", tissues},
                   {"method", name_in(kMethodNames, state.method)},
                   {"quality", nullptr},
                   {"fold", nullptr},
@@ -315,9 +359,10 @@ std::string message_of(const State& state) {
     message["quality"] = {{"coverage", state.quality->coverage},
                           {"inverted", state.quality->inverted},
                           {"degenerate", state.quality->degenerate},
-                          {"jacobian", state.quality->jacobian_min}};
+                          {"jacobian", nullptr}};
+  if (state.quality && state.quality->jacobian_min) message["quality"]["jacobian"] = *state.quality->jacobian_min;
   if (state.fold_at) message["fold"] = numbers(*state.fold_at);
-  if (state.look.overlay) message["overlay"] = name_in(kOverlayNames, *state.look.overlay);
+  if (state.look.layer) message["overlay"] = name_in(kLayerNames, *state.look.layer);
   return written(message);
 }
 

@@ -35,6 +35,10 @@ struct About {
   std::vector<std::string> styles;           ///< names of transfer functions
   std::vector<std::string> volume_suffixes;  ///< what the deformed volume may be saved as
   std::string folder;                        ///< where files go
+  bool labels = false;                       ///< whether there are any
+  int frames = 0;                            ///< of the reel; 0: hands work
+  bool grows = false;                        ///< whether the reel is a field that grows
+  bool pulls = false;                        ///< whether it is one of pull fields
 };
 
 // The messages to a page, as JSON text.

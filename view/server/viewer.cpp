@@ -13,6 +13,7 @@ namespace tetwarp::viewer {
 
 Viewer::Viewer(Setup setup) : setup_(std::move(setup)) {
   scene_ = std::make_unique<Scene>(Scene::Setup{.source = setup_.source,
+                                                .labels = setup_.labels,
                                                 .background = setup_.background,
                                                 .padding = setup_.padding,
                                                 .backend = setup_.backend,
@@ -64,13 +65,19 @@ About Viewer::about() const {
           .hounsfield = scene_->window().hounsfield,
           .styles = transfer_function_names(),
           .volume_suffixes = setup_.volume_kinds,
-          .folder = setup_.folder};
+          .folder = setup_.folder,
+          .labels = setup_.labels.has_value(),
+          .frames = setup_.reel ? setup_.reel->frames : 0,
+          .grows = setup_.reel && setup_.reel->grows,
+          .pulls = setup_.reel && setup_.reel->pulls};
 }
 
 Stage::Setup Viewer::stage_setup() {
   Stage::Setup setup;
   setup.scenario = setup_.scenario;
   setup.patient = &setup_.patient;
+  setup.reel = setup_.reel;
+  setup.has_labels = setup_.labels.has_value();
   setup.scene = scene_.get();
   setup.has_device = runs_on_device(setup_.backend);
   setup.make = [this](simulate::Method method) -> simulate::MakeSimulation {
@@ -85,13 +92,13 @@ Stage::Listener Viewer::listener() {
   return {.picture = [this](const Picture& picture) { server_->send_bytes(message_of(picture)); },
           .state = [this](const State& state) { server_->send_text(message_of(state), true); },
           .answer = [this](const Answer& answer) { server_->send_text(message_of(answer)); },
-          .save = [this](const request::Save& wish, std::uint32_t number,
-                         std::string scenario) { save(wish, number, std::move(scenario)); }};
+          .save = [this](SaveJob job) { save(std::move(job)); }};
 }
 
-void Viewer::save(const request::Save& wish, std::uint32_t number, std::string scenario) {
+void Viewer::save(SaveJob job) {
+  const std::uint32_t number = job.number;
   server_->send_text(message_of_progress(number));
-  setup_.save({wish.name, wish.volume, std::move(scenario)}, [this, number](const Saved& saved) {
+  setup_.save(std::move(job), [this, number](const Saved& saved) {
     if (saved.problem.empty()) {
       server_->send_text(message_of_saved(number, saved.files, saved.command));
     } else {

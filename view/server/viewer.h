@@ -22,23 +22,20 @@ namespace tetwarp::viewer {
 /// It works on threads of its own from its construction to its end.
 class Viewer {
  public:
-  /// What a page wishes to be saved.
-  struct Wish {
-    std::string name, volume;  ///< see `request::Save`
-    std::string scenario;      ///< text of the file
-  };
-  /// What became of a wish.
+  /// What became of a wish to save.
   struct Saved {
     std::vector<std::string> files = {};  ///< that were written
     std::string command = {};             ///< that makes the volume again
     std::string problem = {};             ///< why it failed; empty: it did not
   };
   struct Setup {
-    ConstVolumeView source;  ///< undeformed, one component, in host memory; must outlive the viewer
-    double background = 0;   ///< value where nothing maps
+    ConstVolumeView source;                      ///< undeformed, one component, in host memory; must outlive the viewer
+    std::optional<ConstVolumeView> labels = {};  ///< that go with it; must outlive the viewer
+    double background = 0;                       ///< value where nothing maps
     std::optional<PaddingRange> padding = {};
-    simulate::Patient patient;    ///< what was examined of the source
-    simulate::Scenario scenario;  ///< see `Session`
+    simulate::Patient patient;      ///< what was examined of the source; unused where there is a reel
+    simulate::Scenario scenario;    ///< see `Session`; unused where there is a reel
+    std::optional<Reel> reel = {};  ///< fields to show instead of what a hand does
     BackendKind backend = BackendKind::cpu;
     int device = 0;
     Limits limits = {};
@@ -49,7 +46,7 @@ class Viewer {
     bool frames = false;                         ///< whether pages of this machine may show the page in a frame
     /// Is told what to save, by a thread of the stage, which it must not hold up.
     /// @param done  to be called once, from any thread, while the viewer lives
-    std::function<void(Wish, std::function<void(Saved)> done)> save;
+    std::function<void(SaveJob, std::function<void(Saved)> done)> save;
   };
 
   /// Begins to serve.
@@ -73,7 +70,7 @@ class Viewer {
   About about() const;
   Stage::Setup stage_setup();
   Stage::Listener listener();
-  void save(const request::Save& wish, std::uint32_t number, std::string scenario);
+  void save(SaveJob job);
 
   Setup setup_;
   std::string address_;

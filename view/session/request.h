@@ -18,6 +18,8 @@ namespace tetwarp::viewer::request {
 /// A pane of the page.
 enum class Pane : std::uint8_t { axial, coronal, sagittal, volume };
 constexpr int kPanes = 4;
+/// The plane of a pane of slices.
+constexpr AnatomicalPlane plane_of(Pane pane) { return static_cast<AnatomicalPlane>(pane); }
 
 /// A place that somebody points to: of the deformed picture in LPS mm, or of the volume's picture, from 0 at its left
 /// and upper edge to 1 at its right and lower one, where the thing is meant that is seen there.
@@ -51,7 +53,7 @@ struct Compare {
 };
 /// What lies over the slices, if anything.
 struct LayOver {
-  std::optional<OverlayKind> kind;
+  std::optional<Layer> layer;
 };
 /// What is the value at a place? LPS mm.
 struct Probe {
@@ -84,6 +86,7 @@ struct Cut {
   glm::dvec3 along;           ///< direction of the blade, LPS, of any length
   double depth_mm;            ///< how deep it cuts
   bool is_centred;            ///< whether it cuts half as deep to either side of the line, else from the line on
+  bool is_closed = false;     ///< whether the last place is joined to the first: a lasso
 };
 struct Suture {
   std::string name;
@@ -98,18 +101,31 @@ struct Ball {
 struct LiftBall {};
 struct Undo {};
 struct Redo {};
-/// Plays the phases of the scenario that the viewer was given.
+/// Plays the phases of the scenario that the viewer was given, or its reel from the frame that is shown, or from the
+/// first one after the last. A reel that is played stops.
 struct Play {};
+/// Shows a frame of the reel, from 0.
+struct Frame {
+  int number;
+};
 /// Takes back all.
 struct Reset {};
 /// Begins anew with another method.
 struct Use {
   simulate::Method method;
 };
+/// Begins anew with other properties of the tissues.
+struct Tissues {
+  std::vector<simulate::Tissue> tissues;  ///< all of the scenario, by their names, in its order
+};
 /// What was done is to be kept.
 struct Save {
-  std::string name;    ///< of the files, without suffix
-  std::string volume;  ///< suffix of the deformed volume, such as ".nii.gz"; "dicom" for a series; empty: none
+  std::string name;       ///< of the files, without suffix
+  std::string volume;     ///< suffix of the deformed volume, such as ".nii.gz"; "dicom" for a series; empty: none
+  bool field = false;     ///< whether the field is
+  bool pictures = false;  ///< whether what the panes show is
+  std::string film = {};  ///< suffix of a film of all that happened, ".mp4" or ".gif"; empty: none
+  Pane film_of = Pane::volume;
 };
 
 }  // namespace tetwarp::viewer::request
@@ -121,8 +137,8 @@ struct Request {
   std::variant<request::Size, request::Look, request::Turn, request::Levels, request::Style, request::Compare,
                request::LayOver, request::Probe, request::Shown, request::Grip, request::Move, request::Release,
                request::Pin, request::Unpin, request::Cut, request::Suture, request::Reopen, request::Ball,
-               request::LiftBall, request::Play, request::Undo, request::Redo, request::Reset, request::Use,
-               request::Save>
+               request::LiftBall, request::Play, request::Frame, request::Undo, request::Redo, request::Reset,
+               request::Use, request::Tissues, request::Save>
       what;
   /// By which pictures say what they show. It rises from request to request; 0 for one that nothing is to be told of.
   std::uint32_t number = 0;

@@ -5,10 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <glm/matrix.hpp>
-#include <limits>
 
-#include "backend/factories.h"
 #include "deform/fields/lattice_mesh.h"
 #include "io/slice_view.h"
 #include "view/session/coarse_volume.h"
@@ -35,13 +32,22 @@ Scene::Scene(const Setup& setup)
       still_(still_field(grid_)) {
   require(setup.source.components == 1,
           "a volume to look at has one value a voxel, found " + std::to_string(setup.source.components));
+  if (setup.labels) {
+    require(setup.labels->components == 1,
+            "labels have one value a voxel, found " + std::to_string(setup.labels->components));
+    require(setup.labels->type != VoxelType::f32 && setup.labels->type != VoxelType::f64,
+            "labels are whole numbers; these are floating-point ones");
+  }
   field_ = view(still_, Outside::background);
   source_ = setup.source;
+  labels_ = setup.labels;
   if (runs_on_device(setup.backend)) {
-    device_source_ =
-        std::make_unique<BackendVolume>(setup.backend, *setup.source.geometry, setup.source.type, setup.device);
-    device_source_->take(setup.source);
+    device_source_ = on_device(setup.source);
     source_ = device_source_->view();
+    if (labels_) {
+      device_labels_ = on_device(*setup.labels);
+      labels_ = device_labels_->view();
+    }
     exact_ = whole_volume(source_, grid_);
   } else {
     const glm::i64vec3 blocks = coarse_blocks(*setup.source.geometry);
@@ -53,33 +59,45 @@ Scene::Scene(const Setup& setup)
   slices_ = slice_maker(grid_);
 }
 
+/// A copy where the backend works.
+std::unique_ptr<BackendVolume> Scene::on_device(const ConstVolumeView& volume) const {
+  auto copy = std::make_unique<BackendVolume>(setup_.backend, *volume.geometry, volume.type, setup_.device);
+  copy->take(volume);
+  return copy;
+}
+
 std::unique_ptr<SliceMaker> Scene::slice_maker(const Geometry& grid) const {
-  return std::make_unique<SliceMaker>(grid, target(source_, {}), view(still_, Outside::background),
-                                      make_forward_resampler(setup_.backend, grid, setup_.device, setup_.limits),
-                                      make_forward_resampler(setup_.backend, grid, setup_.device, setup_.limits));
+  SliceMaker::Setup setup;
+  setup.grid = grid;
+  setup.target = target(source_, {});
+  if (labels_) setup.labels = Target{.source = *labels_, .output = {}, .interpolation = Interpolation::vote};
+  setup.still = view(still_, Outside::background);
+  setup.deformer = std::make_unique<Deformer>(setup_.backend, grid, setup_.device, setup_.limits);
+  setup.before = make_forward_resampler(setup_.backend, grid, setup_.device, setup_.limits);
+  return std::make_unique<SliceMaker>(std::move(setup));
 }
 
 Scene::Whole Scene::whole_volume(const ConstVolumeView& from, const Geometry& grid) const {
   Whole one;
   one.from = from;
   one.output = std::make_unique<BackendVolume>(setup_.backend, grid, from.type, setup_.device);
-  one.resampler = make_forward_resampler(setup_.backend, grid, setup_.device, setup_.limits);
+  one.deformer = std::make_unique<Deformer>(setup_.backend, grid, setup_.device, setup_.limits);
   one.renderer = make_renderer(setup_.backend, setup_.device, setup_.limits);
   return one;
 }
 
 Scene::~Scene() = default;
 
-void Scene::set_field(const FieldView& field) {
+void Scene::take_field(const AnyFieldView& field) {
   field_ = field;
   slices_->set_field(field);
   if (moving_slices_) moving_slices_->set_field(field);
   is_shown_ = is_exact_ = false;
 }
 
-void Scene::set_field(VertexField field) {
+void Scene::keep_field(AnyField field) {
   kept_ = std::move(field);
-  set_field(view(kept_, Outside::background));
+  take_field(view_of(kept_));
 }
 
 Slice Scene::slice_near(AnatomicalPlane plane, const glm::dvec3& at_mm) const {
@@ -132,8 +150,8 @@ void Scene::show_volume() {
 /// Deforms a volume by the field, and has its renderer see what changed.
 Report Scene::deform(Whole& one, const FieldOptions& options, const Control& control) const {
   const Target whole = target(one.from, one.output->view());
-  one.resampler->set_field(field_, options, control);
-  const Update update = one.resampler->update({&whole, 1}, control);
+  one.deformer->set_field(field_, options, control);
+  const Update update = one.deformer->update({&whole, 1}, control);
   if (one.is_set) {
     one.renderer->update_volume(update.changed, control);
   } else {
@@ -167,7 +185,8 @@ void Scene::make_exact(const Control& control) {
   quality_ = {.coverage = static_cast<double>(report.covered) / static_cast<double>(voxel_count(grid_)),
               .inverted = report.inverted,
               .degenerate = report.degenerate,
-              .jacobian_min = report.jacobian_min};
+              .jacobian_min = {}};
+  if (std::holds_alternative<FieldView>(field_)) quality_.jacobian_min = report.jacobian_min;
 }
 
 std::optional<glm::i64vec3> Scene::voxel_at(const glm::dvec3& point_mm) const {
@@ -189,27 +208,6 @@ std::optional<glm::dvec3> Scene::undeformed(const glm::dvec3& point_mm) {
   const glm::vec3 by = slices_->inverse_mm(*voxel);
   if (std::isnan(by.x)) return std::nullopt;
   return point_mm + glm::dvec3(by);
-}
-
-std::optional<glm::dvec3> worst_place(const VertexField& field) {
-  const TetrahedralMesh mesh = mesh_of(field);
-  std::optional<glm::dvec3> worst;
-  double least = std::numeric_limits<double>::infinity();
-  for (const glm::u32vec4& corners : mesh.tetrahedra) {
-    glm::dmat4x3 before, after;
-    for (int n = 0; n < 4; ++n) {
-      before[n] = mesh.rest[corners[n]];
-      after[n] = before[n] + glm::dvec3(mesh.displacement[corners[n]]);
-    }
-    const auto volume = [](const glm::dmat4x3& p) {
-      return glm::determinant(glm::dmat3(p[0] - p[3], p[1] - p[3], p[2] - p[3]));
-    };
-    const double jacobian = volume(after) / volume(before);
-    if (!(jacobian < least)) continue;
-    least = jacobian;
-    worst = 0.25 * (after[0] + after[1] + after[2] + after[3]);
-  }
-  return worst;
 }
 
 }  // namespace tetwarp::viewer

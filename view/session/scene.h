@@ -10,7 +10,6 @@
 #include "backend/backend.h"
 #include "backend/devices.h"
 #include "deform/render/renderer.h"
-#include "deform/resampler.h"
 #include "view/session/slices.h"
 
 namespace tetwarp::viewer {
@@ -20,7 +19,8 @@ struct Quality {
   double coverage = 1;           ///< share of the voxels that got a value through the field
   std::uint64_t inverted = 0;    ///< tetrahedra that are turned inside out
   std::uint64_t degenerate = 0;  ///< tetrahedra without volume
-  double jacobian_min = 1;       ///< least Jacobian determinant of a tetrahedron
+  /// Least Jacobian determinant of a tetrahedron; empty for a pull field, which has none.
+  std::optional<double> jacobian_min = 1;
 };
 
 /// What is seen of a volume and a field: exact slices, and pictures of the volume.
@@ -33,7 +33,9 @@ class Scene {
   /// Where and of what pictures are made.
   struct Setup {
     ConstVolumeView source;  ///< undeformed, one component, in host memory; must outlive the scene
-    double background = 0;   ///< value where nothing maps
+    /// Labels that go with it, one component, in host memory; must outlive the scene.
+    std::optional<ConstVolumeView> labels = {};
+    double background = 0;  ///< value where nothing maps
     std::optional<PaddingRange> padding = {};
     BackendKind backend = BackendKind::cpu;
     int device = 0;
@@ -50,9 +52,9 @@ class Scene {
   /// Grid of the deformed volume: that of the source, straightened.
   const Geometry& grid() const { return grid_; }
   /// Takes a field, of which nothing may change until the next one is taken. Voxels outside it are background.
-  void set_field(const FieldView& field);
+  void set_field(const FieldView& field) { take_field(field); }
   /// Takes a field and keeps it.
-  void set_field(VertexField field);
+  void keep_field(AnyField field);
 
   /// The slice of a plane nearest to a point. @param at_mm  LPS mm, moved into the grid
   Slice slice_near(AnatomicalPlane plane, const glm::dvec3& at_mm) const;
@@ -92,11 +94,13 @@ class Scene {
   struct Whole {
     ConstVolumeView from;  ///< undeformed
     std::unique_ptr<BackendVolume> output;
-    std::unique_ptr<ForwardResampler> resampler;
+    std::unique_ptr<Deformer> deformer;
     std::unique_ptr<Renderer> renderer;
     bool is_set = false;  ///< whether the renderer has the output
   };
 
+  void take_field(const AnyFieldView& field);
+  std::unique_ptr<BackendVolume> on_device(const ConstVolumeView& volume) const;
   Whole whole_volume(const ConstVolumeView& from, const Geometry& grid) const;
   std::unique_ptr<SliceMaker> slice_maker(const Geometry& grid) const;
 
@@ -108,10 +112,12 @@ class Scene {
   Setup setup_;
   Geometry grid_;
   AffineMap index_from_point_;
-  VertexField kept_, still_;
-  FieldView field_;
-  std::unique_ptr<BackendVolume> device_source_;        ///< only on a device
-  ConstVolumeView source_;                              ///< undeformed, where the backend works
+  VertexField still_;
+  AnyField kept_;
+  AnyFieldView field_;
+  std::unique_ptr<BackendVolume> device_source_, device_labels_;  ///< only on a device
+  ConstVolumeView source_;                                        ///< undeformed, where the backend works
+  std::optional<ConstVolumeView> labels_;
   std::unique_ptr<SliceMaker> slices_, moving_slices_;  ///< `moving_slices_` only on the CPU, of large volumes
   AnyVolume coarse_source_;
   std::optional<Whole> coarse_;   ///< only on the CPU
@@ -122,9 +128,5 @@ class Scene {
   bool is_exact_ = false;
   Quality quality_;
 };
-
-/// The deformed middle of the tetrahedron with the least Jacobian determinant, LPS mm; empty for a field without any.
-/// @param field  in host memory
-std::optional<glm::dvec3> worst_place(const VertexField& field);
 
 }  // namespace tetwarp::viewer

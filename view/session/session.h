@@ -83,8 +83,8 @@ class Session {
   bool holds() const { return hand_.handle.has_value(); }
   /// Whether something was asked for that no step has done yet.
   bool is_behind() const;
-  /// Number of places that are pinned.
-  std::size_t pins() const { return hand_.pins.size(); }
+  /// What is pinned, as it lay before anything was deformed.
+  const std::vector<simulate::HeldZone>& pins() const { return hand_.pins; }
   /// The centre of the ball, LPS mm, and its radius, mm; empty where there is none.
   std::optional<glm::dvec4> ball_now() const;
   /// Whether a cut of `recorded` is open now.

@@ -7,10 +7,10 @@
 #include <optional>
 #include <vector>
 
-#include "deform/resampler.h"
 #include "io/overlay.h"
 #include "io/preview_scale.h"
 #include "io/slice_picture.h"
+#include "view/session/deformer.h"
 #include "view/session/picture.h"
 
 namespace tetwarp::viewer {
@@ -23,12 +23,22 @@ enum class Compared : std::uint8_t {
   swipe        ///< the undeformed one at the left, the deformed one at the right
 };
 
+/// What may lie over slices.
+enum class Layer : std::uint8_t {
+  lattice,   ///< cells of the deformed lattice
+  jacobian,  ///< how much the volume grew or shrank
+  folds,     ///< where several places map to one
+  coverage,  ///< where no value came through the field
+  labels,    ///< labels, which go with the volume, as colours
+  contours   ///< and as lines around them
+};
+
 /// How slices look.
 struct SliceLook {
   Window window;
   Compared compared = Compared::after;
   double swipe = 0.5;  ///< share of the columns that show the undeformed volume, 0 to 1
-  std::optional<OverlayKind> overlay = {};
+  std::optional<Layer> layer = {};
 };
 
 /// Makes slices of a deformed volume, of which nothing else is computed.
@@ -36,16 +46,21 @@ class SliceMaker {
  public:
   enum class Which : std::uint8_t { after, before };
 
-  /// @param grid    of the deformed volume
-  /// @param target  source and how it is sampled; the output is not used. The source must outlive this object
-  /// @param still   a field that moves nothing
-  /// @param after, before  resamplers onto the grid
-  SliceMaker(const Geometry& grid, const Target& target, const FieldView& still,
-             std::unique_ptr<ForwardResampler> after, std::unique_ptr<ForwardResampler> before);
+  /// What slices are made of.
+  struct Setup {
+    Geometry grid;                       ///< of the deformed volume
+    Target target;                       ///< source and how it is sampled; the output is not used
+    std::optional<Target> labels;        ///< the same of labels
+    FieldView still;                     ///< a field that moves nothing
+    std::unique_ptr<Deformer> deformer;  ///< onto the grid
+    std::unique_ptr<ForwardResampler> before;
+  };
+  /// Sources and the field must outlive this object.
+  explicit SliceMaker(Setup setup);
 
-  const Geometry& grid() const { return grid_; }
+  const Geometry& grid() const { return setup_.grid; }
   /// Takes a field, which must not change until the next one is taken.
-  void set_field(const FieldView& field);
+  void set_field(const AnyFieldView& field);
 
   /// A picture of a slice, a pixel a voxel, as radiologists look at it.
   PaneImage picture(const Slice& slice, const SliceLook& look);
@@ -62,17 +77,16 @@ class SliceMaker {
     VolumeView view(const Geometry& grid, VoxelType type, int components = 1);
   };
 
-  ForwardResampler& resampler(Which which);
-  Part part(Which which, const Region& region);
+  Resampler& resampler(Which which);
+  Part part(const Target& target, Which which, const Region& region);
   void lay_over(PaneImage& image, const Slice& slice, OverlayKind kind);
   void lay_lattice_over(PaneImage& image, const Slice& slice);
+  void lay_labels_over(PaneImage& image, const Slice& slice, Which which, bool as_lines);
   Part map_of(const Slice& slice, OverlayKind kind);
 
-  Geometry grid_;
-  Target target_;
-  FieldView field_;
-  std::unique_ptr<ForwardResampler> after_, before_;
-  bool knows_ = false;  ///< whether `after_` has the field
+  Setup setup_;
+  AnyFieldView field_;
+  bool knows_ = false;  ///< whether the deformer has the field
 };
 
 }  // namespace tetwarp::viewer

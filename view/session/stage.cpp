@@ -5,10 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <glm/geometric.hpp>
 
 #include "deform/errors.h"
-#include "io/scenario_file.h"
+#include "deform/field_quality.h"
 
 namespace tetwarp::viewer {
 
@@ -24,10 +23,6 @@ constexpr std::chrono::seconds kUntilRetry(1);  ///< after something failed that
 /// Steps after which tissue that still moves a little is let be, if the hand is still.
 constexpr int kMostRestingSteps = 60;
 constexpr int kMostMovingPixels = 256;  ///< on a side of the volume's picture while it moves, without a device
-constexpr int kMostPixels = 1600;       ///< on a side of the volume's picture
-constexpr std::size_t kSlices = 3;
-
-AnatomicalPlane plane_of(Pane pane) { return static_cast<AnatomicalPlane>(pane); }
 
 /// Whether the second of two requests in a row makes the first one superfluous.
 bool supersedes(const Request& later, const Request& earlier) {
@@ -37,7 +32,8 @@ bool supersedes(const Request& later, const Request& earlier) {
         using One = std::decay_t<decltype(one)>;
         if constexpr (std::is_same_v<One, Ball>) return one.radius_mm == std::get<Ball>(earlier.what).radius_mm;
         return std::is_same_v<One, Look> || std::is_same_v<One, Turn> || std::is_same_v<One, Levels> ||
-               std::is_same_v<One, Compare> || std::is_same_v<One, Move> || std::is_same_v<One, Probe>;
+               std::is_same_v<One, Compare> || std::is_same_v<One, Move> || std::is_same_v<One, Probe> ||
+               std::is_same_v<One, Frame>;
       },
       later.what);
 }
@@ -86,7 +82,11 @@ Stage::Stage(Setup setup, Listener listener)
   look_.window = scene_.window();
   camera_.every_angle = true;
   on(Style{look_.window.hounsfield ? "ct-bone" : "mip"});
-  begin_session(method_);
+  if (setup_.reel) {
+    show_frame(setup_.reel->grows ? setup_.reel->frames - 1 : 0);
+  } else {
+    begin_session(method_);
+  }
   thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
 }
 
@@ -125,7 +125,8 @@ void Stage::run(const std::stop_token& stop) {
     try {
       next = work();
     } catch (const std::exception& error) {
-      fail(number_, error);
+      is_moving_ = false;
+      refuse(number_, error);
       next = Clock::now() + kUntilRetry;
     }
     std::unique_lock lock(mutex_);
@@ -180,34 +181,52 @@ void Stage::take(const Request& request) {
       tell_state();
     }
   } catch (const Error& error) {
-    fail(request.number, error);
+    refuse(request.number, error);
+    all_stale(true, true);  // so that pictures say that they know of the request
+    changed_ = Clock::now();
+    tell_state();
   }
 }
 
-/// Tells why something could not be done. The session may have gone back to an earlier state on the way.
-void Stage::fail(std::uint32_t number, const std::exception& error) {
-  is_moving_ = false;
-  changed_field();
+/// Tells why something could not be done.
+void Stage::refuse(std::uint32_t number, const std::exception& error) {
   listener_.answer({.kind = Answer::Kind::problem, .number = number, .text = error.what()});
 }
 
 void Stage::step() {
   stepped_ = Clock::now();
+  if (setup_.reel) return next_frame();
   const bool is_behind = session_->is_behind();
-  const simulate::Convergence convergence = [this] {
-    const Timer timer(*this, &StageTimes::steps);
-    return session_->step();
-  }();
-  resting_steps_ = is_behind ? 0 : resting_steps_ + 1;
-  is_moving_ = session_->plays() || (!convergence.reached && resting_steps_ < kMostRestingSteps);
-  changed_field();
+  change([&] {
+    const simulate::Convergence convergence = [this] {
+      const Timer timer(*this, &StageTimes::steps);
+      return session_->step();
+    }();
+    resting_steps_ = is_behind ? 0 : resting_steps_ + 1;
+    is_moving_ = session_->plays() || (!convergence.reached && resting_steps_ < kMostRestingSteps);
+  });
   tell_state();
+}
+
+/// Shows the next frame of the reel that is played.
+void Stage::next_frame() {
+  const Timer timer(*this, &StageTimes::steps);
+  show_frame(frame_ + 1);
+  is_moving_ = frame_ + 1 < setup_.reel->frames;
+  tell_state();
+}
+
+/// Shows a frame of the reel. Where it cannot be made, the last one stays.
+void Stage::show_frame(int frame) {
+  scene_.keep_field(setup_.reel->field(frame));
+  frame_ = frame;
+  all_is_new();
 }
 
 /// Whether a pane is to be shown before the next step. Without a device the volume, which takes longer than all slices,
 /// is shown after every second step.
 bool Stage::is_due(const PaneLine& line) const {
-  const bool waits = &line == lines_[kSlices].get() && is_moving_ && !setup_.has_device && session_->frames() % 2 != 0;
+  const bool waits = &line == lines_[kSlices].get() && is_moving_ && !setup_.has_device && frames() % 2 != 0;
   return line.is_stale() && !waits;
 }
 
@@ -260,10 +279,23 @@ void Stage::rest() {
     if (quality_) return;
     quality_ = scene_.quality();
     fold_at_.reset();
-    if (quality_->inverted + quality_->degenerate > 0) fold_at_ = worst_place(session_->player().field());
+    if (quality_->inverted + quality_->degenerate > 0)
+      fold_at_ = worst_place(std::get<VertexField>(field()), {}, control);
     tell_state();
   } catch (const Cancelled&) {
   }
+}
+
+/// Does what may change the field. Where that fails the session may have gone back to an earlier state on the way.
+void Stage::change(const std::function<void()>& how) {
+  try {
+    how();
+  } catch (...) {
+    is_moving_ = false;
+    changed_field();
+    throw;
+  }
+  changed_field();
 }
 
 /// The plane of the volume's picture. @param most  pixels on a side
@@ -275,46 +307,48 @@ ViewPlane Stage::plane(const PaneLine& line, int most) const {
   return view_plane(camera, scene_.grid());
 }
 
+/// The exact image of a pane.
+PaneImage Stage::image(Pane pane) {
+  if (pane != Pane::volume) return scene_.slice(scene_.slice_near(plane_of(pane), cursor_mm_), look_);
+  return scene_.volume(plane(*lines_[kSlices], kMostPixels));
+}
+
 void Stage::all_stale(bool slices, bool volume) {
   for (std::size_t n = 0; n < lines_.size(); ++n)
     if (n < kSlices ? slices : volume) lines_[n]->make_stale();
 }
 
-/// The field is another one.
+/// The session. @throws InputError where there is none
+Session& Stage::session() const {
+  require(session_ != nullptr, "a field that was made before is shown; hands work without it");
+  return *session_;
+}
+
+int Stage::frames() const { return setup_.reel ? frame_ : session_->frames(); }
+
+/// The field that is shown, in host memory.
+AnyField Stage::field() const {
+  if (setup_.reel) return setup_.reel->field(frame_);
+  return session_->player().field();
+}
+
+/// The session's field is another one.
 void Stage::changed_field() {
-  const simulate::PhasePlayer& player = session_->player();
-  if (player.simulation() && !player.divides_cells()) {
-    scene_.set_field(simulate::view(*player.simulation(), player.model(), Outside::background));
+  const simulate::PhasePlayer* const player = &session_->player();
+  if (player->simulation() && !player->divides_cells()) {
+    scene_.set_field(simulate::view(*player->simulation(), player->model(), Outside::background));
   } else {
-    scene_.set_field(player.field());
+    scene_.keep_field(player->field());
   }
+  all_is_new();
+}
+
+/// Nothing is known any more of the field, and no picture shows it.
+void Stage::all_is_new() {
   quality_.reset();
   fold_at_.reset();
   changed_ = Clock::now();
   all_stale(true, true);
-}
-
-void Stage::tell_state() {
-  State state;
-  state.request = number_;
-  state.frames = session_->frames();
-  state.is_moving = is_moving_;
-  state.can_undo = session_->can_undo();
-  state.can_redo = session_->can_redo();
-  state.holds = session_->holds();
-  state.pins = session_->pins();
-  state.ball = session_->ball_now();
-  for (const simulate::CutPlan& cut : session_->recorded().cuts)
-    state.cuts.emplace_back(cut.name, session_->is_open(cut.name));
-  state.can_play = !setup_.scenario.phases.empty();
-  state.plays = session_->plays();
-  state.method = method_;
-  state.quality = quality_;
-  state.fold_at = fold_at_;
-  state.cursor_mm = cursor_mm_;
-  state.look = look_;
-  state.style = style_;
-  listener_.state(std::move(state));
 }
 
 void Stage::begin_session(simulate::Method method) {
@@ -322,200 +356,11 @@ void Stage::begin_session(simulate::Method method) {
   scenario.method = method;
   auto session =
       std::make_unique<Session>(std::move(scenario), *setup_.patient, setup_.make(method), setup_.most_snapshot_bytes);
-  scene_.set_field(session->player().field());  // before the other one goes, whose field the scene reads
+  scene_.keep_field(session->player().field());  // before the other one goes, whose field the scene reads
   session_ = std::move(session);
   method_ = method;
   is_moving_ = false;
   changed_field();
-}
-
-/// What is pointed to, in the deformed picture; empty where nothing is seen.
-std::optional<glm::dvec3> Stage::place(const Pointed& pointed) {
-  if (const auto* const at = std::get_if<glm::dvec3>(&pointed)) return *at;
-  const glm::dvec2 at = std::get<glm::dvec2>(pointed);
-  const PaneLine& line = *lines_[kSlices];
-  require(line.is_seen(), "the volume's picture is not shown");
-  const ViewPlane picture = plane(line, kMostPixels);
-  const auto pixel = [](double share, int count) { return std::clamp(static_cast<int>(share * count), 0, count - 1); };
-  return scene_.pick(picture, pixel(at.x, picture.width), pixel(at.y, picture.height));
-}
-
-/// The place that is pointed to. @throws InputError where nothing is seen
-glm::dvec3 Stage::seen(const Pointed& pointed) {
-  const std::optional<glm::dvec3> at = place(pointed);
-  require(at.has_value(), "nothing is seen there");
-  listener_.answer({.kind = Answer::Kind::held, .number = number_, .at_mm = *at});
-  return *at;
-}
-
-/// Where the tissue at a place was before it was deformed. @throws InputError where there is none
-glm::dvec3 Stage::undeformed(const glm::dvec3& at_mm) {
-  const std::optional<glm::dvec3> from = scene_.undeformed(at_mm);
-  require(from.has_value(), "there is no tissue at this place");
-  return *from;
-}
-
-void Stage::on(const Size& size) { lines_[static_cast<std::size_t>(size.pane)]->set_size(size.width, size.height); }
-
-void Stage::on(const Look& look) {
-  const glm::dvec3 before = cursor_mm_;
-  cursor_mm_ = look.at_mm;
-  for (std::size_t n = 0; n < kSlices; ++n) {
-    const AnatomicalPlane plane = plane_of(static_cast<Pane>(n));
-    if (scene_.slice_near(plane, before).voxel != scene_.slice_near(plane, cursor_mm_).voxel) lines_[n]->make_stale();
-  }
-}
-
-void Stage::on(const Turn& turn) {
-  Camera camera = camera_;
-  camera.angle_deg = turn.angle_deg;
-  camera.elevation_deg = turn.elevation_deg;
-  camera.zoom = turn.zoom;
-  camera.target = turn.target_mm;
-  view_plane(camera, scene_.grid());  // throws
-  camera_ = camera;
-  all_stale(false, true);
-}
-
-void Stage::on(const Levels& levels) {
-  require(levels.width > 0, "the width of a window is above 0");
-  look_.window.width = levels.width;
-  look_.window.level = levels.level;
-  all_stale(true, false);
-}
-
-void Stage::on(const Style& style) {
-  RenderStyle chosen;
-  chosen.transfer = transfer_function(style.name);
-  if (chosen.transfer.projection == Projection::maximum && !look_.window.hounsfield) {
-    chosen.transfer.points = {{look_.window.level - 0.5 * look_.window.width, glm::dvec3(0), 0},
-                              {look_.window.level + 0.5 * look_.window.width, glm::dvec3(1), 0}};
-  }
-  scene_.set_style(chosen);
-  style_ = style.name;
-  all_stale(false, true);
-}
-
-void Stage::on(const Compare& compare) {
-  look_.compared = compare.compared;
-  look_.swipe = std::clamp(compare.swipe, 0.0, 1.0);
-  all_stale(true, false);
-}
-
-void Stage::on(const LayOver& over) {
-  look_.overlay = over.kind;
-  all_stale(true, false);
-}
-
-void Stage::on(const Probe& probe) {
-  const std::optional<Scene::Values> values = scene_.values_at(probe.at_mm);
-  Answer answer{.kind = values ? Answer::Kind::value : Answer::Kind::nothing, .number = number_, .at_mm = probe.at_mm};
-  if (values) answer.after = values->after, answer.before = values->before;
-  listener_.answer(std::move(answer));
-}
-
-void Stage::on(const Shown& shown) { lines_[static_cast<std::size_t>(shown.pane)]->shown(); }
-
-void Stage::on(const Grip& grip) {
-  const glm::dvec3 at = seen(grip.at);
-  session_->grip(undeformed(at), grip.radius_mm);
-}
-
-void Stage::on(const Move& move) {
-  session_->move(move.by_mm);
-  is_moving_ = true;
-}
-
-void Stage::on(const Release&) {
-  session_->release();
-  is_moving_ = true;
-}
-
-void Stage::on(const Pin& pin) {
-  const glm::dvec3 at = seen(pin.at);
-  session_->pin({simulate::Sphere{{undeformed(at)}, {pin.radius_mm}}});
-  is_moving_ = true;
-}
-
-void Stage::on(const Unpin&) {
-  session_->unpin();
-  is_moving_ = true;
-}
-
-void Stage::on(const request::Cut& cut) {
-  require(cut.path.size() >= 2, "a cut follows a line of at least two places");
-  const double length = glm::length(cut.along);
-  require(length > 0, "a cut needs a direction");
-  const glm::dvec3 along = cut.along / length, back = along * (cut.is_centred ? 0.5 * cut.depth_mm : 0);
-  simulate::SweptCutPlan swept;
-  for (const Pointed& pointed : cut.path) {
-    const std::optional<glm::dvec3> at = place(pointed);
-    if (!at) continue;  // a line may go beyond what is seen
-    const glm::dvec3 from = *at - back;
-    const std::optional<glm::dvec3> rest = scene_.undeformed(*at);
-    if (rest) swept.path.push_back({from + (*rest - *at)});
-  }
-  require(swept.path.size() >= 2, "the line meets no tissue");
-  swept.along = along;
-  swept.depth = {cut.depth_mm};
-  session_->cut({"cut " + std::to_string(++cuts_made_), swept});
-  is_moving_ = true;
-}
-
-void Stage::on(const Suture& suture) {
-  session_->suture(suture.name);
-  is_moving_ = true;
-}
-
-void Stage::on(const Reopen& reopen) {
-  session_->reopen(reopen.name);
-  is_moving_ = true;
-}
-
-void Stage::on(const Ball& ball) {
-  const std::optional<glm::dvec3> at = place(ball.at);
-  require(at.has_value(), "nothing is seen there");
-  const bool is_new = !session_->ball_now();
-  session_->ball(*at, ball.radius_mm);
-  if (is_new) listener_.answer({.kind = Answer::Kind::held, .number = number_, .at_mm = *at});
-  is_moving_ = true;
-}
-
-void Stage::on(const LiftBall&) {
-  session_->lift_ball();
-  is_moving_ = true;
-}
-
-void Stage::on(const Play&) {
-  require(!setup_.scenario.phases.empty(), "there is no scenario whose phases could be played");
-  session_->play(setup_.scenario.phases);
-  is_moving_ = true;
-}
-
-void Stage::on(const Undo&) {
-  if (session_->undo()) changed_field();
-  is_moving_ = false;
-}
-
-void Stage::on(const Redo&) {
-  if (session_->redo()) changed_field();
-  is_moving_ = false;
-}
-
-void Stage::on(const Reset&) {
-  bool any = false;
-  while (session_->undo()) any = true;
-  if (any) changed_field();
-  is_moving_ = false;
-}
-
-void Stage::on(const Use& use) {
-  if (use.method != method_) begin_session(use.method);
-}
-
-void Stage::on(const request::Save& save) {
-  require(session_->frames() > 0, "nothing has been done yet that could be saved");
-  listener_.save(save, number_, scenario_text(session_->recorded()));
 }
 
 }  // namespace tetwarp::viewer

@@ -23,16 +23,43 @@ struct State {
   int frames = 0;             ///< simulated so far
   bool is_moving = false;     ///< whether further ones are to come
   bool can_undo = false, can_redo = false, holds = false;
-  std::size_t pins = 0;
+  std::vector<glm::dvec4> pins;                    ///< where what is pinned lies: centre, LPS mm, and radius, mm
   std::optional<glm::dvec4> ball;                  ///< centre, LPS mm, and radius, mm
   std::vector<std::pair<std::string, bool>> cuts;  ///< name, and whether it is open
-  bool can_play = false, plays = false;            ///< phases of the given scenario
+  bool can_play = false, plays = false;            ///< phases of the given scenario, or the reel
+  int frame = 0;                                   ///< of the reel
   simulate::Method method = simulate::Method::chainmail;
+  std::vector<simulate::Tissue> tissues;
   std::optional<Quality> quality;     ///< of what is seen; empty while it is not known
   std::optional<glm::dvec3> fold_at;  ///< LPS mm of the worst tetrahedron, where one is turned inside out or flat
   glm::dvec3 cursor_mm{0};            ///< where all slices meet
   SliceLook look;
   std::string style;  ///< name of the transfer function
+};
+
+/// Fields that were made before, and are shown one by one instead of what a hand does.
+struct Reel {
+  int frames = 1;
+  bool grows = false;  ///< whether one field grows, from nothing in frame 0 to all of it in the last; else a sequence
+  bool pulls = false;  ///< whether they are pull fields
+  /// Makes the field of a frame, from 0.
+  std::function<AnyField(int)> field;
+};
+
+/// What is to be kept, as it is when it is asked for.
+struct SaveJob {
+  request::Save wish;
+  std::uint32_t number = 0;  ///< of the request
+  std::string scenario;      ///< text of what was done; empty where a reel is shown
+  int frames = 0;            ///< of the scenario
+  bool has_cuts = false;     ///< whether it has any, so that fields are meshes
+  int frame = 0;             ///< of the reel
+  Camera camera;
+  glm::dvec3 cursor_mm{0};  ///< where all slices meet
+  SliceLook look;
+  std::string style;  ///< name of the transfer function
+  /// What the panes show: their names and PNG files.
+  std::vector<std::pair<std::string, std::vector<std::byte>>> pictures;
 };
 
 /// An answer to a request.
@@ -62,8 +89,8 @@ struct StageTimes {
       rests;    ///< exact volumes
 };
 
-/// A session on a thread of its own, which takes requests in order, steps while something moves, and makes pictures as
-/// fast as they are shown. It knows no network.
+/// A session, or a reel of fields, on a thread of its own, which takes requests in order, steps while something moves,
+/// and makes pictures as fast as they are shown. It knows no network.
 class Stage {
  public:
   /// Who is told of what comes out. Calls come from threads of the stage, one at a time for each function.
@@ -71,13 +98,14 @@ class Stage {
     std::function<void(Picture)> picture;
     std::function<void(State)> state;
     std::function<void(Answer)> answer;
-    /// Gets the text of the scenario.
-    std::function<void(const request::Save&, std::uint32_t number, std::string scenario)> save;
+    std::function<void(SaveJob)> save;
   };
   struct Setup {
-    simulate::Scenario scenario;  ///< see `Session`
-    const simulate::Patient* patient;
+    simulate::Scenario scenario;       ///< see `Session`
+    const simulate::Patient* patient;  ///< null where a reel is shown
     Scene* scene;
+    std::optional<Reel> reel = {};
+    bool has_labels = false;  ///< whether the scene has
     std::function<simulate::MakeSimulation(simulate::Method)> make;
     bool has_device = false;  ///< so that pictures of what moves need not be small
     std::size_t most_snapshot_bytes = Session::kMostSnapshotBytes;
@@ -100,24 +128,35 @@ class Stage {
  private:
   class Timer;
   using Clock = std::chrono::steady_clock;
+  static constexpr std::size_t kSlices = 3;  ///< the first panes
+  static constexpr int kMostPixels = 1600;   ///< on a side of the volume's picture
 
   void run(const std::stop_token& stop);
   Clock::time_point work();
   bool take_requests();
   void take(const Request& request);
-  void fail(std::uint32_t number, const std::exception& error);
+  void refuse(std::uint32_t number, const std::exception& error);
   void step();
+  void next_frame();
+  void show_frame(int frame);
   bool is_due(const PaneLine& line) const;
   bool show_panes();
   void show(PaneLine& line, request::Pane pane, bool is_exact, const Control& control);
   void rest();
+  Session& session() const;
+  int frames() const;
+  AnyField field() const;
   void changed_field();
+  void all_is_new();
+  std::vector<glm::dvec4> pin_places();
   void tell_state();
   void begin_session(simulate::Method method);
   std::optional<glm::dvec3> place(const request::Pointed& pointed);
   glm::dvec3 seen(const request::Pointed& pointed);
   glm::dvec3 undeformed(const glm::dvec3& at_mm);
   ViewPlane plane(const PaneLine& line, int most) const;
+  PaneImage image(request::Pane pane);
+  void change(const std::function<void()>& how);
   void all_stale(bool slices, bool volume);
 
   // One for each request.
@@ -141,16 +180,20 @@ class Stage {
   void on(const request::Ball&);
   void on(const request::LiftBall&);
   void on(const request::Play&);
+  void on(const request::Frame&);
   void on(const request::Undo&);
   void on(const request::Redo&);
   void on(const request::Reset&);
   void on(const request::Use&);
+  void on(const request::Tissues&);
   void on(const request::Save&);
 
   Setup setup_;
   Listener listener_;
   Scene& scene_;
-  std::unique_ptr<Session> session_;
+  std::unique_ptr<Session> session_;         ///< null where a reel is shown
+  int frame_ = 0;                            ///< of the reel
+  std::vector<glm::dvec4> pins_, pins_now_;  ///< what is pinned: where it lay, and where it lies
   simulate::Method method_;
   glm::dvec3 cursor_mm_;
   Camera camera_;
