@@ -40,12 +40,13 @@ for suite in "${suites[@]}"; do
     --abi "cp${version/./}" --abi abi3 --abi none --platform manylinux_2_28_x86_64 --platform manylinux_2_27_x86_64 \
     --platform manylinux_2_17_x86_64 --platform manylinux2014_x86_64 numpy pytest pydicom nibabel
   cp "$wheels"/*.whl "$root/try/wheels"
-  mkdir -p "$root/try/python" "$root/try/examples"
+  mkdir -p "$root/try/python" "$root/try/examples" "$root/try/tests"
   cp -r "$source_dir/python/tests" "$root/try/python"
+  cp -r "$source_dir/tests/view" "$root/try/tests"
   cp -r "$source_dir/examples/scenarios" "$root/try/examples"
   chroot "$root" python3 -m venv /try/venv
   chroot "$root" /try/venv/bin/pip install -q --no-index --find-links /try/wheels tetwarp
-  chroot "$root" /try/venv/bin/python -c 'import tetwarp as tw; print(tw.features())'
+  chroot "$root" /try/venv/bin/python -c 'import tetwarp as tw; print(tw.features()); assert tw.features()["viewer"]'
   chroot "$root" /try/venv/bin/pip install -q --no-index --find-links /try/wheels pytest pydicom nibabel
   mount --bind /proc "$root/proc"
   status=0

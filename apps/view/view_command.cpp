@@ -126,8 +126,9 @@ void Viewing::prepare() {
 void Viewing::tell_where() const {
   std::printf("%s\n", viewer_->address().c_str());
   std::fflush(stdout);
-  if (const std::string command = viewer::forwarding_command(viewer_->port()); !command.empty())
-    say(options_.common, "from your own machine: " + command + ", then open the address there");
+  if (viewer::came_by_ssh())
+    say(options_.common,
+        "from your own machine: " + viewer::forwarding_command(viewer_->port()) + ", then open the address there");
   say(options_.common, "Ctrl-C ends it");
 }
 

@@ -41,6 +41,11 @@ std::map<std::string, bool> compiled() {
 #else
           {"itk_transforms", false},
 #endif
+#ifdef TETWARP_WITH_VIEW
+          {"viewer", true},
+#else
+          {"viewer", false},
+#endif
 #ifdef TETWARP_WITH_VTK
           {"vtk_xml", true}};
 #else
@@ -64,6 +69,7 @@ NB_MODULE(_core, core) {
   add_files(core);
   add_simulation(core);
   add_render(core);
+  add_view(core);
   core.def("version", &version);
   core.def("commit", &commit);
   core.def("compiled", &compiled);

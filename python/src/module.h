@@ -16,5 +16,6 @@ void add_resampler(nanobind::module_& core);
 void add_files(nanobind::module_& core);
 void add_simulation(nanobind::module_& core);
 void add_render(nanobind::module_& core);
+void add_view(nanobind::module_& core);
 
 }  // namespace tetwarp::python

@@ -25,6 +25,10 @@ warp.set_field(field, outside="rest")
 volumes, maps, report = warp.resample([ct, tw.Target(labels, "nearest")], maps=["folds"])
 for frame in tw.simulate("scenario.json", ct):
     step: tw.VertexField = frame.field
+with tw.view(ct, scenario={"name": "x"}, labels=labels, iframe=True) as shown:
+    now: tw.VertexField = shown.field
+    repeated = tw.simulate(shown.scenario or {}, ct)
+    where: str = shown.url
 picture = tw.render(done.volume, transfer="ct-bone", angle=30)
 tw.write(done.volume, "out.nii.gz", compress=1)
 tw.write_field(field, "field.mha")

@@ -29,6 +29,7 @@ from .rendering import render
 from .report import Report
 from .resampler import PullResampler, Resampler, Target
 from .simulation import Frame, Run, simulate
+from .viewing import View, view
 from .volume import Volume
 
 __version__: str = _core.version()
@@ -54,6 +55,7 @@ __all__ = [
     "Target",
     "TetrahedralMesh",
     "VertexField",
+    "View",
     "Volume",
     "adapters",
     "batch",
@@ -71,6 +73,7 @@ __all__ = [
     "read_field",
     "render",
     "simulate",
+    "view",
     "write",
     "write_field",
 ]
@@ -82,8 +85,8 @@ def features() -> dict[str, _Any]:
     Returns
     -------
     dict
-        "version", "commit"; "cuda", "dicom", "jpeg2000", "itk_transforms", "vtk_xml" as bool; "devices" as a list of
-        texts.
+        "version", "commit"; "cuda", "dicom", "jpeg2000", "itk_transforms", "viewer", "vtk_xml" as bool; "devices" as a
+        list of texts.
 
     Examples
     --------

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import json
 import os
@@ -81,6 +82,19 @@ class Run:
         return VertexField._of(self._core.field())
 
 
+@contextlib.contextmanager
+def scenario_file(scenario: Scenario) -> Iterator[str]:
+    """A file with a scenario, which goes with the block unless it was there before."""
+    if not isinstance(scenario, Mapping):
+        yield os.fspath(scenario)
+        return
+    with tempfile.TemporaryDirectory(prefix="tetwarp-") as folder:
+        path = os.path.join(folder, "scenario.json")
+        with open(path, "w", encoding="utf-8") as file:
+            json.dump(scenario, file, indent=1)
+        yield path
+
+
 def simulate(
     scenario: Scenario,
     volume: Any,
@@ -140,10 +154,5 @@ def simulate(
         _calls.threads(threads),
         _calls.options(progress, "examine"),
     )
-    if not isinstance(scenario, Mapping):
-        return Run(_core.Run(os.fspath(scenario), *arguments))
-    with tempfile.TemporaryDirectory(prefix="tetwarp-") as folder:
-        path = os.path.join(folder, "scenario.json")
-        with open(path, "w", encoding="utf-8") as file:
-            json.dump(scenario, file, indent=1)
+    with scenario_file(scenario) as path:
         return Run(_core.Run(path, *arguments))

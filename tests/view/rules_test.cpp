@@ -34,6 +34,41 @@ TEST(ViewRules, OnlyTheWholeSecretIsTheSecret) {
   }
 }
 
+TEST(ViewRules, ATokenThatWorksOnceIsReplacedByASecretOfItsPage) {
+  Admission admission(true);
+  const std::string first = admission.token();
+  EXPECT_TRUE(admission.may_enter(first));
+  EXPECT_TRUE(admission.may_enter(first));  // asking uses nothing up
+  for (const std::string& wrong : {std::string(), first.substr(1), first + "0", make_token()}) {
+    EXPECT_FALSE(admission.may_enter(wrong));
+    EXPECT_EQ(admission.enter(wrong), "");
+  }
+  EXPECT_EQ(admission.token(), first);
+  const std::string secret = admission.enter(first), second = admission.token();
+  EXPECT_EQ(secret.size(), 64u);
+  EXPECT_EQ((std::set<std::string>{first, secret, second}.size()), 3u);
+  EXPECT_FALSE(admission.may_enter(first));
+  EXPECT_EQ(admission.enter(first), "");
+  EXPECT_FALSE(admission.may_enter(""));
+  EXPECT_TRUE(admission.may_enter(secret));
+  EXPECT_EQ(admission.enter(secret), "");  // it stays, and uses no token up
+  EXPECT_EQ(admission.token(), second);
+  const std::string other = admission.enter(second);
+  EXPECT_TRUE(admission.may_enter(other));
+  EXPECT_FALSE(admission.may_enter(secret));
+}
+
+TEST(ViewRules, ATokenThatStaysIsTheOnlySecret) {
+  Admission admission(false);
+  const std::string token = admission.token();
+  EXPECT_FALSE(admission.may_enter(""));
+  for (int n = 0; n < 3; ++n) {
+    EXPECT_TRUE(admission.may_enter(token));
+    EXPECT_EQ(admission.enter(token), "");
+    EXPECT_EQ(admission.token(), token);
+  }
+}
+
 TEST(ViewRules, OnlyTheNamesOfThisMachineAreItsHost) {
   for (const char* own : {"127.0.0.1:8000", "localhost:8000", "[::1]:8000"}) EXPECT_TRUE(is_own_host(own, 8000)) << own;
   for (const char* other : {"", "127.0.0.1", "127.0.0.1:80", "127.0.0.1:80000", "127.0.0.1:8000.evil.org", "evil.org",
@@ -62,7 +97,9 @@ TEST(ViewRules, EveryAnswerForbidsWhatThePageDoesNotNeed) {
   EXPECT_NE(policy.find("frame-ancestors 'none'"), std::string::npos);
   EXPECT_EQ(policy.find("unsafe"), std::string::npos);
   EXPECT_EQ(policy.find('*'), std::string::npos);
-  EXPECT_EQ(value("Content-Security-Policy", true).find("frame-ancestors 'none'"), std::string::npos);
+  const std::string framed = value("Content-Security-Policy", true), who = "frame-ancestors ";
+  EXPECT_EQ(framed.substr(framed.find(who) + who.size()), "http://127.0.0.1:* http://localhost:*");
+  EXPECT_EQ(framed.substr(0, framed.find(who)), policy.substr(0, policy.find(who)));
   EXPECT_EQ(value("Cache-Control", false), "no-store");
   EXPECT_EQ(value("Referrer-Policy", false), "no-referrer");
   EXPECT_EQ(value("X-Content-Type-Options", false), "nosniff");

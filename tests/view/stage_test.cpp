@@ -310,6 +310,8 @@ class Watched {
     return pictures_;
   }
   void watch(bool somebody) { stage_->watch(somebody); }
+  std::future<void> visit(std::function<void(const Session&)> see) { return stage_->visit(std::move(see)); }
+  void end() { stage_.reset(); }
   const simulate::Patient& patient() const { return patient_; }
 
  private:
@@ -331,6 +333,42 @@ class Watched {
 };
 
 TETWARP_BACKEND_SUITE(Stages);
+
+TEST_P(Stages, AVisitSeesWhatWasAskedForBefore) {
+  Watched stage(kind_of(GetParam()));
+  ASSERT_TRUE(stage.rests());
+  std::size_t pins = 0;
+  const auto see = [&](const Session& session) { pins = session.pins(); };
+  stage.visit(see).get();
+  EXPECT_EQ(pins, 0u);
+  stage.ask(request::Pin{glm::dvec3(0, -60, 0), 25});
+  stage.visit(see).get();
+  EXPECT_EQ(pins, 1u);
+  stage.watch(false);
+  stage.ask(Unpin{});
+  stage.visit(see).get();  // though nobody looks
+  EXPECT_EQ(pins, 0u);
+  EXPECT_THROW(stage.visit([](const Session&) { throw Error("no"); }).get(), Error);
+  EXPECT_TRUE(stage.visit(see).wait_for(kPatience) == std::future_status::ready);
+}
+
+TEST_P(Stages, AVisitToAStageThatEndsEnds) {
+  Watched stage(kind_of(GetParam()));
+  ASSERT_TRUE(stage.rests());
+  std::promise<void> inside, leave;
+  std::future<void> first = stage.visit([&](const Session&) {
+    inside.set_value();
+    leave.get_future().wait_for(kPatience);
+  });
+  ASSERT_EQ(inside.get_future().wait_for(kPatience), std::future_status::ready);
+  std::future<void> second = stage.visit([](const Session&) {});
+  std::thread ending([&] { stage.end(); });
+  std::this_thread::sleep_for(50ms);
+  leave.set_value();
+  ending.join();
+  EXPECT_NO_THROW(first.get());
+  EXPECT_THROW(second.get(), std::future_error);
+}
 
 TEST_P(Stages, WhatAHandDoesIsSavedAndRepeatedToTheSameBits) {
   Watched stage(kind_of(GetParam()));

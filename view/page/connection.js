@@ -7,16 +7,18 @@
 
 const kRetryMs = 1000;
 
+/** In a frame nothing is kept: the token works once, and browsers may give frames no storage. */
+const kIsFramed = window.parent !== window;
+
 /**
  * The secret that the address had. It is taken out of the address, so that no history and no copied link holds it, and
  * kept for as long as this tab lives.
  */
 function takeToken() {
   const given = location.hash.slice(1);
-  if (given) {
-    sessionStorage.setItem('token', given);
-    history.replaceState(null, '', location.pathname);
-  }
+  if (given) history.replaceState(null, '', location.pathname);
+  if (kIsFramed) return given;
+  if (given) sessionStorage.setItem('token', given);
   return sessionStorage.getItem('token') ?? '';
 }
 
@@ -71,6 +73,11 @@ export class Connection {
     const message = JSON.parse(data);
     if (message.say === 'bye') {
       this.farewell = message.text;
+      return;
+    }
+    if (message.say === 'secret') {  // the token is used up; this one is kept in memory alone
+      this.token = message.secret;
+      if (!kIsFramed) sessionStorage.removeItem('token');
       return;
     }
     if (message.say === 'about') {

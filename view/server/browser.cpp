@@ -21,8 +21,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-bool has_desktop() { return std::getenv("DISPLAY") || std::getenv("WAYLAND_DISPLAY"); }
-
 /// Starts a program with one argument, and does not wait for it. Its output goes nowhere.
 bool start(const char* program, const std::string& argument) {
   posix_spawn_file_actions_t actions;
@@ -47,6 +45,10 @@ bool start(const char* program, const std::string& argument) {
 
 }  // namespace
 
+bool has_desktop() { return std::getenv("DISPLAY") || std::getenv("WAYLAND_DISPLAY"); }
+
+bool came_by_ssh() { return std::getenv("SSH_CONNECTION"); }
+
 Browser::Browser(const std::string& address) {
   if (!has_desktop()) return;
   std::error_code error;
@@ -67,7 +69,6 @@ Browser::~Browser() {
 }
 
 std::string forwarding_command(int port) {
-  if (!std::getenv("SSH_CONNECTION")) return {};
   std::array<char, 256> host{};
   gethostname(host.data(), host.size() - 1);
   const passwd* const user = getpwuid(geteuid());

@@ -25,8 +25,12 @@ class Browser {
   bool is_open_ = false;
 };
 
-/// How to reach a port of this machine from the one at which the user sits: the command of ssh. Empty where nobody came
-/// by ssh.
+/// Whether this machine has a desktop on which a browser could be opened.
+bool has_desktop();
+/// Whether the user sits at another machine, from which ssh leads here.
+bool came_by_ssh();
+
+/// How to reach a port of this machine from the one at which the user sits: the command of ssh.
 std::string forwarding_command(int port);
 
 }  // namespace tetwarp::viewer

@@ -389,6 +389,8 @@ std::string message_of_saved(std::uint32_t number, const std::vector<std::string
 
 std::string message_of_progress(std::uint32_t number) { return written({{"say", "progress"}, {"n", number}}); }
 
+std::string message_of_secret(const std::string& secret) { return written({{"say", "secret"}, {"secret", secret}}); }
+
 std::string message_of_refusal(const std::string& reason) { return written({{"say", "bye"}, {"text", reason}}); }
 
 std::string message_of(const Picture& picture) {

@@ -50,6 +50,8 @@ std::string message_of(const Answer& answer);
 std::string message_of_saved(std::uint32_t number, const std::vector<std::string>& files, const std::string& command);
 /// That something is being saved.
 std::string message_of_progress(std::uint32_t number);
+/// What a page must say from now on in the place of its token.
+std::string message_of_secret(const std::string& secret);
 /// Why a page is sent away.
 std::string message_of_refusal(const std::string& reason);
 

@@ -51,6 +51,26 @@ bool is_same_secret(std::string_view given, std::string_view secret) {
   return different == 0;
 }
 
+std::string Admission::token() const {
+  const std::lock_guard lock(mutex_);
+  return token_;
+}
+
+bool Admission::may_enter(std::string_view said) const {
+  const std::lock_guard lock(mutex_);
+  const bool knows_token = is_same_secret(said, token_);
+  const bool knows_secret = !secret_.empty() && is_same_secret(said, secret_);
+  return knows_token || knows_secret;
+}
+
+std::string Admission::enter(std::string_view said) {
+  const std::lock_guard lock(mutex_);
+  if (!once_ || !is_same_secret(said, token_)) return {};
+  token_ = make_token();
+  secret_ = make_token();
+  return secret_;
+}
+
 bool is_own_host(std::string_view host, std::uint16_t port) {
   return std::any_of(std::begin(kHosts), std::end(kHosts),
                      [&](std::string_view one) { return host == std::string(one) + ":" + std::to_string(port); });
@@ -63,6 +83,7 @@ bool is_own_origin(std::string_view origin, std::uint16_t port) {
 
 const std::vector<std::pair<std::string, std::string>>& safety_headers(bool frames) {
   static const auto alone = headers_for("'none'");
+  // Browsers know no address of IPv6 here.
   static const auto framed = headers_for("http://127.0.0.1:* http://localhost:*");
   return frames ? framed : alone;
 }

@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <mutex>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -20,6 +21,30 @@ std::string make_token();
 
 /// Whether two texts are equal. The time does not depend on where they differ.
 bool is_same_secret(std::string_view given, std::string_view secret);
+
+/// Which pages may enter: those that know the token, or, where each token works once, the secret that its page was
+/// told.
+class Admission {
+ public:
+  /// @param once  whether a token works once
+  explicit Admission(bool once) : once_(once), token_(make_token()) {}
+
+  /// The token for the next page. From any thread.
+  std::string token() const;
+  /// Whether a page that says this may enter.
+  bool may_enter(std::string_view said) const;
+  /// A page that says this, and may, enters.
+  /// @return  what it must say from now on, if that is something else; what the page before it had to say counts no
+  /// more
+  ///          then
+  std::string enter(std::string_view said);
+
+ private:
+  const bool once_;
+  mutable std::mutex mutex_;
+  std::string token_;
+  std::string secret_;  ///< of the page that used a token last; empty: none did
+};
 
 /// Whether a request names this server as its host, and nothing else: no page of another name may reach it, wherever
 /// that name leads (DNS rebinding).

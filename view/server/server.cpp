@@ -41,6 +41,7 @@ class Connection;
 /// What all connections share. Everything runs on one thread.
 struct Hub {
   const Server::Setup setup = {};
+  Admission admission = Admission(setup.frames);
   std::uint16_t port = 0;
   int connections = 0;
   std::shared_ptr<Connection> page = {};  ///< the one that looks
@@ -210,14 +211,20 @@ class Connection : public std::enable_shared_from_this<Connection> {
   }
 
   void greet(const Hello& hello) {
-    if (!is_same_secret(hello.token, hub_.setup.token))
-      return close(websocket::close_code::policy_error, "wrong token: open the address that the program printed");
+    if (!hub_.admission.may_enter(hello.token)) return close(websocket::close_code::policy_error, wrong_token());
     if (hub_.page.get() == this) return;
     if (hub_.page && !hello.takes) return close(websocket::close_code::try_again_later, "another page is open");
     if (hub_.page) hub_.page->close(websocket::close_code::going_away, "another page took over");
     hub_.page = shared_from_this();
+    if (const std::string secret = hub_.admission.enter(hello.token); !secret.empty())
+      send(message_of_secret(secret), true, false);
     send(hub_.setup.greeting, true, false);
     hub_.setup.watch(true);
+  }
+
+  const char* wrong_token() const {
+    return hub_.setup.frames ? "this address has been used: show the viewer again where it was shown"
+                             : "wrong token: open the address that the program printed";
   }
 
   void write_next() {
@@ -285,6 +292,7 @@ class Server::Implementation {
   }
 
   std::uint16_t port() const { return hub_.port; }
+  std::string token() const { return hub_.admission.token(); }
 
   void send(std::string bytes, bool is_text, bool replaces) {
     asio::post(context_, [this, bytes = std::move(bytes), is_text, replaces]() mutable {
@@ -330,6 +338,8 @@ Server::Server(Setup setup) : it_(std::make_unique<Implementation>(std::move(set
 Server::~Server() = default;
 
 std::uint16_t Server::port() const { return it_->port(); }
+
+std::string Server::token() const { return it_->token(); }
 
 void Server::send_text(std::string text, bool replaces) { it_->send(std::move(text), true, replaces); }
 

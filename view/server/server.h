@@ -16,13 +16,16 @@ namespace tetwarp::viewer {
 ///
 /// It listens on 127.0.0.1, and on ::1 where there is one, and answers only those who name it as their host. A page
 /// says the secret token in its first message, or is sent away. No text of a page becomes a path.
+///
+/// A token for a frame stands in the document that shows it, which may be kept. So where frames are allowed a token
+/// works once: the page that says it is told a new secret, by which alone it may come back, and the next page needs
+/// another token.
 class Server {
  public:
   struct Setup {
     std::uint16_t port = 0;  ///< 0: one that is free
-    std::string token;       ///< that a page must know
     std::string greeting;    ///< a message that each page gets first
-    bool frames = false;     ///< whether pages of this machine may show the page in a frame
+    bool frames = false;  ///< whether pages of this machine may show the page in a frame, each with a token of its own
     /// Gets what a page asks for. Calls come from the thread of the server.
     std::function<void(Request)> ask;
     /// Gets whether a page looks.
@@ -39,6 +42,8 @@ class Server {
 
   /// The port on which it listens.
   std::uint16_t port() const;
+  /// What the next page that comes must know. It changes only where frames are allowed, whenever a page has used it.
+  std::string token() const;
 
   // Messages to the page that looks, if one does. From any thread.
 

@@ -3,11 +3,13 @@
 
 #include "view/server/viewer.h"
 
+#include <future>
 #include <utility>
 
 #include "backend/devices.h"
 #include "backend/factories.h"
-#include "view/server/rules.h"
+#include "deform/errors.h"
+#include "io/scenario_file.h"
 
 namespace tetwarp::viewer {
 
@@ -19,9 +21,7 @@ Viewer::Viewer(Setup setup) : setup_(std::move(setup)) {
                                                 .backend = setup_.backend,
                                                 .device = setup_.device,
                                                 .limits = setup_.limits});
-  const std::string token = make_token();
   server_ = std::make_unique<Server>(Server::Setup{.port = setup_.port,
-                                                   .token = token,
                                                    .greeting = message_of(about()),
                                                    .frames = setup_.frames,
                                                    .ask =
@@ -35,7 +35,6 @@ Viewer::Viewer(Setup setup) : setup_(std::move(setup)) {
                                                          is_watched_ = somebody;
                                                          if (stage_) stage_->watch(somebody);
                                                        }});
-  address_ = "http://127.0.0.1:" + std::to_string(server_->port()) + "/#" + token;
   auto stage = std::make_unique<Stage>(stage_setup(), listener());
   const std::lock_guard lock(mutex_);
   stage_ = std::move(stage);
@@ -43,6 +42,30 @@ Viewer::Viewer(Setup setup) : setup_(std::move(setup)) {
 }
 
 Viewer::~Viewer() { stop(); }
+
+std::string Viewer::address() const {
+  return "http://127.0.0.1:" + std::to_string(server_->port()) + "/#" + server_->token();
+}
+
+Viewer::Done Viewer::done(bool with_field, bool with_scenario) {
+  Done done;
+  std::future<void> seen;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!stage_) throw Error("the viewer has ended");
+    seen = stage_->visit([&](const Session& session) {
+      done.frames = session.frames();
+      if (with_field) done.field = session.player().field();
+      if (with_scenario && done.frames > 0) done.scenario = scenario_text(session.recorded());
+    });
+  }
+  try {
+    seen.get();
+  } catch (const std::future_error&) {
+    throw Error("the viewer has ended");
+  }
+  return done;
+}
 
 void Viewer::stop() {
   std::unique_ptr<Stage> stage;

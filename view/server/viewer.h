@@ -59,8 +59,17 @@ class Viewer {
   Viewer& operator=(const Viewer&) = delete;
 
   std::uint16_t port() const { return server_->port(); }
-  /// Where the page is, with the secret.
-  const std::string& address() const { return address_; }
+  /// Where the page is, with the token that a page must know now; see `Server::token`.
+  std::string address() const;
+  /// What was done so far.
+  struct Done {
+    VertexField field;     ///< in host memory
+    std::string scenario;  ///< text of the file that repeats it; empty before the first frame
+    int frames = 0;
+  };
+  /// Waits for a moment of the stage. Not to be called by its own threads.
+  /// @throws Error after `stop`
+  Done done(bool with_field, bool with_scenario);
   /// Ends the stage: nothing is simulated and no wish comes from now on. The line to the page stays.
   void stop();
   /// Where the time of the stage went, up to its end.
@@ -73,7 +82,6 @@ class Viewer {
   void save(SaveJob job);
 
   Setup setup_;
-  std::string address_;
   StageTimes times_;
   // Made in this order, and ended in the opposite one.
   std::unique_ptr<Scene> scene_;

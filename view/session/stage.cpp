@@ -114,6 +114,14 @@ void Stage::watch(bool somebody) {
   wake_.notify_one();
 }
 
+std::future<void> Stage::visit(std::function<void(const Session&)> see) {
+  const std::lock_guard lock(mutex_);
+  std::future<void> seen = visits_.emplace_back(std::move(see)).get_future();
+  woken_ = true;
+  wake_.notify_one();
+  return seen;
+}
+
 StageTimes Stage::times() {
   const std::lock_guard lock(mutex_);
   return times_;
@@ -138,7 +146,9 @@ void Stage::run(const std::stop_token& stop) {
 /// Does what is to be done. @return when to look again, if nothing wakes before
 Stage::Clock::time_point Stage::work() {
   const Clock::time_point never = Clock::now() + std::chrono::hours(1);
-  if (!take_requests()) return never;
+  const bool is_watched = take_requests();
+  receive_visits();
+  if (!is_watched) return never;
   const auto is_stale = [this](const auto& line) { return is_due(*line); };
   if (is_moving_ && std::none_of(lines_.begin(), lines_.end(), is_stale)) {
     if (Clock::now() < stepped_ + kPace) return stepped_ + kPace;
@@ -171,6 +181,15 @@ bool Stage::take_requests() {
     if (n + 1 == asked.size() || !supersedes(asked[n + 1], asked[n])) take(asked[n]);
   }
   return watched;
+}
+
+void Stage::receive_visits() {
+  std::vector<std::packaged_task<void(const Session&)>> visits;
+  {
+    const std::lock_guard lock(mutex_);
+    visits.swap(visits_);
+  }
+  for (auto& visit : visits) visit(*session_);
 }
 
 void Stage::take(const Request& request) {

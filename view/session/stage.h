@@ -7,6 +7,7 @@
 #include <condition_variable>
 #include <deque>
 #include <functional>
+#include <future>
 #include <memory>
 #include <mutex>
 #include <thread>
@@ -122,6 +123,11 @@ class Stage {
   void ask(Request request);
   /// Somebody looks from now on: everything is shown anew. Or nobody does: nothing is simulated.
   void watch(bool somebody);
+  /// Lets a function see the session between two things that the stage does, after all that was asked before; comes
+  /// back at once.
+  /// @return  is ready when the function has come back, and has what it threw; or has std::future_error where the stage
+  ///          ended before
+  std::future<void> visit(std::function<void(const Session&)> see);
   /// Where the time went so far.
   StageTimes times();
 
@@ -134,6 +140,7 @@ class Stage {
   void run(const std::stop_token& stop);
   Clock::time_point work();
   bool take_requests();
+  void receive_visits();
   void take(const Request& request);
   void refuse(std::uint32_t number, const std::exception& error);
   void step();
@@ -210,6 +217,7 @@ class Stage {
   std::mutex mutex_;  ///< of what follows
   std::condition_variable wake_;
   std::deque<Request> asked_;
+  std::vector<std::packaged_task<void(const Session&)>> visits_;
   bool watched_ = false, watch_changed_ = false, woken_ = false;
   std::stop_source resting_;  ///< of what is made at rest; requests end it
   StageTimes times_;
