@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 #include <span>
+#include <string_view>
 
 namespace tetwarp {
 
@@ -67,6 +68,10 @@ class StagedOutput {
   bool overwrite_, done_ = false, replaced_ = false;
   bool (*is_ours_)(const std::filesystem::path&);
 };
+
+/// Writes a file that is not there yet. It appears when it is complete.
+/// @throws Error where it exists, or cannot be written
+void write_new_file(const std::filesystem::path& path, std::string_view bytes);
 
 /// Removes all outputs of this process that have no name yet, for a process that ends without running destructors.
 /// After this call no StagedOutput can be made or destroyed; end the process.

@@ -114,6 +114,7 @@ void Viewing::prepare() {
   setup.limits = {.threads = options_.common.threads};
   setup.title = options_.demo ? "Phantom" : options_.input.path.filename().string();
   setup.volume_kinds = saved_volume_kinds(input_.is_dicom());
+  setup.film_kinds = {".mp4", ".gif"};
   setup.folder = options_.output.string();
   setup.port = static_cast<std::uint16_t>(options_.port);
   setup.save = [this](viewer::SaveJob job, std::function<void(Viewer::Saved)> done) {

@@ -4,7 +4,6 @@
 #include "apps/view/view_save.h"
 
 #include <algorithm>
-#include <fstream>
 #include <string_view>
 #include <utility>
 
@@ -114,7 +113,7 @@ void Saving::begin(viewer::SaveJob job, std::function<void(Saved)> done) {
 class Saving::One {
  public:
   One(const ViewOptions& options, const viewer::SaveJob& job)
-      : options_(options), job_(job), input_(options.input), is_by_hand_(!job.scenario.empty()) {
+      : options_(options), job_(job), input_(options.input), is_by_hand_(job.is_by_hand) {
     if (options_.demo) input_.path = options_.output / kDemoFile;
   }
 
@@ -150,12 +149,7 @@ fs::path Saving::One::claim(const fs::path& path) const {
 }
 
 void Saving::One::write(const fs::path& path, std::string_view bytes) {
-  StagedOutput staged(path, StagedOutput::Kind::file, false);
-  std::ofstream out(staged.path(), std::ios::binary);
-  out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  out.close();
-  if (!out) throw Error("cannot write " + path.string() + "; check the free space");
-  staged.commit();
+  write_new_file(path, bytes);
   saved_.files.push_back(path.string());
 }
 
@@ -181,7 +175,7 @@ Saving::Saved Saving::One::save() {
                  field = wish.field ? claim(file(job_.has_cuts ? "-field.vtu" : "-field.mha")) : fs::path(),
                  film = wish.film.empty() ? fs::path() : claim(file(wish.film));
   for (const auto& [pane, bytes] : job_.pictures) claim(file("-" + pane + ".png"));
-  if (is_by_hand_ && job_.frames > 0) {
+  if (!job_.scenario.empty()) {
     scenario_ = file(".json");
     write(scenario_, job_.scenario);
   }

@@ -6,6 +6,7 @@
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <fstream>
 
 #include <algorithm>
 #include <atomic>
@@ -260,6 +261,15 @@ class Unfinished {
 };
 
 }  // namespace
+
+void write_new_file(const std::filesystem::path& path, std::string_view bytes) {
+  StagedOutput staged(path, StagedOutput::Kind::file, false);
+  std::ofstream file(staged.path(), std::ios::binary);
+  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  file.close();
+  if (!file) throw Error("cannot write " + path.string() + "; check the free space");
+  staged.commit();
+}
 
 void remove_unfinished_outputs() noexcept { Unfinished::all().remove(); }
 

@@ -11,11 +11,11 @@
 
 #include <condition_variable>
 #include <deque>
-#include <fstream>
 #include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <string_view>
 #include <utility>
 
 #include "io/scenario_file.h"
@@ -77,9 +77,10 @@ class BoundViewer {
     setup.folder = place.folder;
     setup.port = place.port;
     setup.frames = place.frames;
-    setup.save = [this](Viewer::Wish wish, std::function<void(Viewer::Saved)> done) {
+    setup.labels = labelled;
+    setup.save = [this](viewer::SaveJob job, std::function<void(Viewer::Saved)> done) {
       const std::lock_guard lock(mutex_);
-      wishes_.emplace_back(std::move(wish), std::move(done));
+      wishes_.emplace_back(std::move(job), std::move(done));
       wake_.notify_one();
     };
     run_call(options, false, [&](const Control& control) {
@@ -116,20 +117,24 @@ class BoundViewer {
     const nb::object field = with_field ? nb::object(as_tuple(std::move(done.field))) : nb::object(nb::none());
     return nb::make_tuple(field, done.scenario, done.frames);
   }
-  /// Waits for what a page wishes: name, kind of volume, text of the scenario. None: the viewer ends.
+  /// Waits for what a page wishes: name, kind of volume, text of the scenario, whether the field is wished, and PNG
+  /// files of panes by their names. None: the viewer ends.
   nb::object next_wish() {
-    std::optional<Viewer::Wish> wish;
+    std::optional<viewer::SaveJob> job;
     {
       WithoutGil released;
       std::unique_lock lock(mutex_);
       wake_.wait(lock, released.stop.get_token(), [this] { return ends_ || !wishes_.empty(); });
       if (!wishes_.empty()) {
-        wish = std::move(wishes_.front().first);
+        job = std::move(wishes_.front().first);
         answer_ = std::move(wishes_.front().second);
         wishes_.pop_front();
       }
     }
-    return wish ? nb::object(nb::make_tuple(wish->name, wish->volume, wish->scenario)) : nb::object(nb::none());
+    if (!job) return nb::none();
+    nb::dict pictures;
+    for (const auto& [pane, bytes] : job->pictures) pictures[pane.c_str()] = nb::bytes(bytes.data(), bytes.size());
+    return nb::make_tuple(job->wish.name, job->wish.volume, job->scenario, job->wish.field, pictures);
   }
   /// Says what became of the wish that was given last.
   void answer(std::vector<std::string> files, std::string command, std::string problem) {
@@ -168,22 +173,18 @@ class BoundViewer {
   const pid_t process_;
   std::mutex mutex_;  ///< of the next four
   std::condition_variable_any wake_;
-  std::deque<std::pair<Viewer::Wish, std::function<void(Viewer::Saved)>>> wishes_;
+  std::deque<std::pair<viewer::SaveJob, std::function<void(Viewer::Saved)>>> wishes_;
   bool ends_ = false;
   std::function<void(Viewer::Saved)> answer_;  ///< to the wish that was taken last
   std::unique_ptr<Viewer> viewer_;
   std::unique_ptr<viewer::Browser> browser_;
 };
 
-/// Writes a text to a file that is not there yet; it appears when it is complete.
-void write_text(const std::filesystem::path& path, const std::string& text) {
+/// Writes bytes to a file that is not there yet; it appears when it is complete.
+void write_bytes(const std::filesystem::path& path, const nb::bytes& bytes) {
+  const std::string_view written(bytes.c_str(), bytes.size());
   const WithoutGil released;
-  StagedOutput staged(path, StagedOutput::Kind::file, false);
-  std::ofstream file(staged.path(), std::ios::binary);
-  file << text;
-  file.close();
-  if (!file) throw Error("cannot write " + path.string() + "; check the free space");
-  staged.commit();
+  write_new_file(path, written);
 }
 
 }  // namespace
@@ -219,7 +220,7 @@ void add_view(nb::module_& core) {
       .def("stop", &BoundViewer::stop)
       .def("close", &BoundViewer::close);
   core.def("forwarding_command", &viewer::forwarding_command, nb::arg("port"));
-  core.def("write_text", &write_text, nb::arg("path"), nb::arg("text"));
+  core.def("write_bytes", &write_bytes, nb::arg("path"), nb::arg("bytes"));
   core.def("has_desktop", &viewer::has_desktop);
   core.def("came_by_ssh", &viewer::came_by_ssh);
 }

@@ -149,6 +149,26 @@ def test_the_page_saves_into_the_folder_and_nowhere_else(ct, tmp_path, monkeypat
 
 
 @viewer_only
+def test_field_and_pictures_are_saved_too(ct, tmp_path):
+    with tw.view(ct, backend="cpu", open=False, cell_size=4, folder=tmp_path / "kept") as shown, page_of(shown) as page:
+        assert page.about["films"] == []
+        page.sizes(64, 64, 64)
+        page.rest()
+        early = page.save("early", "", pictures=True)  # what is seen can be kept before anything is done
+        assert [path.split("-")[-1] for path in early["files"]] == ["axial.png", "coronal.png", "sagittal.png", "volume.png"]
+        pull(page)
+        saved = page.save("all", "", field=True, pictures=True)
+        assert saved["say"] == "saved" and len(saved["files"]) == 6, saved
+        kept = tw.read_field(tmp_path / "kept" / "all-field.mha")
+        assert np.array_equal(kept.displacement, shown.field.displacement)
+        assert "exist" in page.save("all", "", field=True)["text"]
+        (tmp_path / "kept" / "all-field.mha").unlink()
+        exec(saved["command"], {"volume": ct})
+        again = tw.read_field(tmp_path / "kept" / "all-field.mha")
+        assert np.array_equal(again.displacement, kept.displacement)
+
+
+@viewer_only
 def test_a_series_is_saved_as_a_series(ct, tmp_path, monkeypatch):
     shown = tw.view(ct, backend="cpu", open=False)
     with shown, Page(Server(shown)) as page:

@@ -22,7 +22,7 @@ from . import _arrays, _calls, _core, adapters
 from .deforming import deform
 from .errors import Error, InputError
 from .field import VertexField
-from .files import write
+from .files import write, write_field
 from .simulation import Scenario, scenario_file, simulate
 from .volume import Volume
 
@@ -42,30 +42,44 @@ class _Saving:
     device: int
     threads: int
 
-    def save(self, name: str, kind: str, scenario: str) -> tuple[list[str], str]:
-        """Writes a scenario and, if a kind is named, the volume. Returns the files, and the lines that make it again."""
+    def save(
+        self, name: str, kind: str, scenario: str, field: bool, pictures: dict[str, bytes]
+    ) -> tuple[list[str], str]:
+        """Writes a scenario, the volume if a kind is named, the field and pictures. Returns the files, and the lines that
+        make volume and field again."""
         if not re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_-]{0,63}", name):
             raise InputError("a name has letters, digits, hyphens and underscores, up to 64 of them")
         if kind and kind not in self.kinds:
             raise InputError("no volume is written as that")
-        page = os.path.join(self.folder, name + ".json")
-        output = os.path.join(self.folder, name if kind == "dicom" else name + (kind or ".nii.gz"))
-        if kind and os.path.lexists(output):
-            raise InputError(f"{output} exists; take another name")
+        stem = os.path.join(self.folder, name)
+        page = stem + ".json"
+        output = stem if kind == "dicom" else stem + (kind or ".nii.gz")
+        cuts = bool(scenario) and bool(json.loads(scenario).get("cuts"))
+        field_file = f"{stem}-field.{'vtu' if cuts else 'mha'}"
+        png = {f"{stem}-{pane}.png": picture for pane, picture in pictures.items()}
+        for path in (*([output] if kind else []), *([field_file] if field else []), *png):
+            if os.path.lexists(path):
+                raise InputError(f"{path} exists; take another name")
         os.makedirs(self.folder, exist_ok=True)
-        _core.write_text(page, scenario)
-        files = [page]
-        if kind:
-            where: dict[str, Any] = {"backend": self.backend, "device": self.device, "threads": self.threads}
-            run = simulate(page, self.volume, labels=self.labels, **where)
+        files = []
+        for path, content in ((page, scenario.encode()), *png.items()):
+            if content:
+                _core.write_bytes(path, content)
+                files.append(path)
+        if not scenario:
+            return files, ""
+        labels = "" if self.labels is None else ", labels=labels"
+        lines = ["import tetwarp as tw", f"run = tw.simulate({page!r}, volume{labels})"]
+        where: dict[str, Any] = {"backend": self.backend, "device": self.device, "threads": self.threads}
+        run = simulate(page, self.volume, labels=self.labels, **where) if kind or field else None
+        if run is not None and kind:
             write(deform(self.volume, run.field, **where).volume, output, threads=self.threads)
             files.append(output)
-        labels = "" if self.labels is None else ", labels=labels"
-        lines = [
-            "import tetwarp as tw",
-            f"run = tw.simulate({page!r}, volume{labels})",
-            f"tw.write(tw.deform(volume, run.field).volume, {output!r})",
-        ]
+        lines.append(f"tw.write(tw.deform(volume, run.field).volume, {output!r})")
+        if run is not None and field:
+            write_field(run.field, field_file)
+            files.append(field_file)
+            lines.append(f"tw.write_field(run.field, {field_file!r})")
         return files, "\n".join(lines)
 
 

@@ -159,7 +159,11 @@ export class Settings {
     element('hand').hidden = element('history').hidden = element('save-field-label').hidden = about.reel > 0;
     element('save-what').hidden = about.reel > 0;
     for (const tool of this.tools) tool.hidden = about.reel > 0 && !['look', 'levels'].includes(tool.dataset.tool ?? '');
-    fill(list('save-volume'), [['', 'none'], ...about.volumes.map((kind) => /** @type {[string, string]} */ ([kind, kind === 'dicom' ? 'DICOM series' : kind]))]);
+    const kinds = (/** @type {string[]} */ names) => /** @type {[string, string][]} */ (
+      [['', 'none'], ...names.map((name) => [name, name === 'dicom' ? 'DICOM series' : name])]);
+    fill(list('save-volume'), kinds(about.volumes));
+    fill(list('save-film'), kinds(about.films));
+    element('save-film-part').hidden = about.films.length === 0;
     this.showTool();
     this.showHand();
   }

@@ -38,6 +38,7 @@
  * @property {boolean} hounsfield
  * @property {string[]} styles   names of transfer functions
  * @property {string[]} volumes  what the deformed volume may be saved as
+ * @property {string[]} films    and films
  * @property {string} folder
  * @property {boolean} labels  whether there are any
  * @property {number} reel     frames of the fields that are shown; 0: hands work

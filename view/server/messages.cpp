@@ -313,6 +313,7 @@ std::string message_of(const About& about) {
                   {"hounsfield", about.hounsfield},
                   {"styles", about.styles},
                   {"volumes", about.volume_suffixes},
+                  {"films", about.film_suffixes},
                   {"folder", about.folder},
                   {"labels", about.labels},
                   {"reel", about.frames},

@@ -34,6 +34,7 @@ struct About {
   bool hounsfield = false;                   ///< whether values are HU
   std::vector<std::string> styles;           ///< names of transfer functions
   std::vector<std::string> volume_suffixes;  ///< what the deformed volume may be saved as
+  std::vector<std::string> film_suffixes;    ///< and films
   std::string folder;                        ///< where files go
   bool labels = false;                       ///< whether there are any
   int frames = 0;                            ///< of the reel; 0: hands work

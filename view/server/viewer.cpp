@@ -88,6 +88,7 @@ About Viewer::about() const {
           .hounsfield = scene_->window().hounsfield,
           .styles = transfer_function_names(),
           .volume_suffixes = setup_.volume_kinds,
+          .film_suffixes = setup_.film_kinds,
           .folder = setup_.folder,
           .labels = setup_.labels.has_value(),
           .frames = setup_.reel ? setup_.reel->frames : 0,

@@ -41,6 +41,7 @@ class Viewer {
     Limits limits = {};
     std::string title;                           ///< no name of a patient
     std::vector<std::string> volume_kinds = {};  ///< what the deformed volume may be saved as
+    std::vector<std::string> film_kinds = {};    ///< and films
     std::string folder;                          ///< where files go, as the page shows it
     std::uint16_t port = 0;                      ///< 0: one that is free
     bool frames = false;                         ///< whether pages of this machine may show the page in a frame

@@ -189,6 +189,7 @@ void Stage::receive_visits() {
     const std::lock_guard lock(mutex_);
     visits.swap(visits_);
   }
+  if (!session_) return;  // those who wait are told that nothing comes
   for (auto& visit : visits) visit(*session_);
 }
 

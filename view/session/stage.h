@@ -51,7 +51,8 @@ struct Reel {
 struct SaveJob {
   request::Save wish;
   std::uint32_t number = 0;  ///< of the request
-  std::string scenario;      ///< text of what was done; empty where a reel is shown
+  bool is_by_hand = true;    ///< whether hands worked; else a reel is shown
+  std::string scenario;      ///< text of what was done; empty where nothing was
   int frames = 0;            ///< of the scenario
   bool has_cuts = false;     ///< whether it has any, so that fields are meshes
   int frame = 0;             ///< of the reel

@@ -256,6 +256,7 @@ void Stage::on(const request::Save& save) {
   SaveJob job;
   job.wish = save;
   job.number = number_;
+  job.is_by_hand = session_ != nullptr;
   job.frame = frame_;
   job.camera = camera_;
   job.cursor_mm = cursor_mm_;
@@ -264,8 +265,8 @@ void Stage::on(const request::Save& save) {
   if (session_) {
     require(session_->frames() > 0 || (save.volume.empty() && !save.field && save.film.empty() && save.pictures),
             "nothing has been done yet that could be saved");
-    job.scenario = scenario_text(session_->recorded());
     job.frames = session_->frames();
+    if (job.frames > 0) job.scenario = scenario_text(session_->recorded());
     job.has_cuts = !session_->recorded().cuts.empty();
   } else {
     require(!setup_.reel->grows || save.volume.empty() || frame_ + 1 == setup_.reel->frames,
