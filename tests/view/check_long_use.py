@@ -72,7 +72,10 @@ def main():
         page.ask("move", by=[0, 0, 0])
         first = program.memory_bytes()
         problems, lost = {}, 0
+        grown_mb = []  # after each tenth of the actions
         for n in range(given.actions):
+            if n % max(1, given.actions // 10) == 0:
+                grown_mb.append(round((program.memory_bytes() - first) / 1e6))
             act(page, chance)
             page.listen(chance.choice((0, 0, 0.01, 0.03)))
             if len(page.pictures) > 200:
@@ -102,9 +105,9 @@ def main():
         saved = page.save("long", ".mha", 1200)
         expect(saved["say"] == "saved", saved)
         expect_seen(page, pathlib.Path(scratch) / "tetwarp-view" / "long.mha")
-        expect(grown < SNAPSHOTS + 200 * given.actions, f"memory grew by {grown} bytes")
+        expect(grown < SNAPSHOTS + 200 * given.actions, f"memory grew by {grown} bytes, {grown_mb} MB on the way")
         print(json.dumps({"actions": given.actions, "frames": frames, "lost_lines": lost, "minutes": round((time.time() - begun) / 60, 1),
-                          "memory_grown_mb": round(grown / 1e6), "refused": sum(problems.values())}))
+                          "memory_grown_mb": round(grown / 1e6), "on_the_way_mb": grown_mb, "refused": sum(problems.values())}))
 
 
 if __name__ == "__main__":

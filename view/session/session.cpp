@@ -98,8 +98,8 @@ void Session::act(Hand hand, bool checks) {
 
 /// Marks the place to which `undo` goes back.
 void Session::mark() {
-  marks_.push_back({scenario_.phases.size(), scenario_.cuts.size(), hand_, player_.state()});
-  snapshot_bytes_ += marks_.back().state->of_nodes.size();
+  marks_.push_back({scenario_.phases.size(), scenario_.cuts.size(), hand_, Snapshot(player_.state())});
+  snapshot_bytes_ += marks_.back().state->bytes();
   thin_out();
   begins_ = true;
 }
@@ -302,7 +302,7 @@ void Session::go_to(std::size_t marks, std::size_t phases) {
   std::size_t from = marks;
   while (from > 0 && (!marks_[from - 1].state || marks_[from - 1].phases > phases)) --from;
   const std::size_t begin = from > 0 ? marks_[from - 1].phases : 0;
-  player_.set_state(from > 0 ? *marks_[from - 1].state : PhasePlayer::State{});
+  player_.set_state(from > 0 ? marks_[from - 1].state->state() : PhasePlayer::State{});
   replay(begin, phases);
   begins_ = true;
 }
@@ -315,7 +315,7 @@ void Session::drop_cuts(std::size_t keep) {
 }
 
 void Session::drop_mark() {
-  if (marks_.back().state) snapshot_bytes_ -= marks_.back().state->of_nodes.size();
+  if (marks_.back().state) snapshot_bytes_ -= marks_.back().state->bytes();
   marks_.pop_back();
 }
 
@@ -365,7 +365,7 @@ void Session::thin_out() {
       if (!marks_[n].state) continue;
       lets_go = !lets_go;
       if (!lets_go) continue;
-      snapshot_bytes_ -= marks_[n].state->of_nodes.size();
+      snapshot_bytes_ -= marks_[n].state->bytes();
       marks_[n].state.reset();
       any = true;
     }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "deform/simulate/phase_player.h"
+#include "view/session/snapshot.h"
 
 /// What stands behind the viewer: it knows no HTTP, and no page.
 namespace tetwarp::viewer {
@@ -111,7 +112,7 @@ class Session {
   struct Mark {
     std::size_t phases, cuts;
     Hand hand;
-    std::optional<simulate::PhasePlayer::State> state;  ///< empty where it was let go of
+    std::optional<Snapshot> state;  ///< empty where it was let go of
   };
   /// What was taken back, and the hand after it.
   struct Undone {
