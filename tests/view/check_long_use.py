@@ -77,7 +77,7 @@ def main():
             if n % max(1, given.actions // 10) == 0:
                 grown_mb.append(round((program.memory_bytes() - first) / 1e6))
             act(page, chance)
-            page.listen(chance.choice((0, 0, 0.01, 0.03)))
+            page.listen(chance.choice((0, 0, 0.005, 0.025)))
             if len(page.pictures) > 200:
                 del page.pictures[:-20]
             if len(page.messages) > 500:

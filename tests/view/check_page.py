@@ -70,10 +70,13 @@ class Viewer:
         page.goto(address)
 
     def rest(self):
-        """Waits until all panes that are seen show exact pictures, and the field has been judged."""
+        """Waits until the program has done all that was asked, and all panes that are seen show exact pictures of it."""
         self.page.wait_for_function(
-            """() => [...document.querySelectorAll('.pane')].every((p) => p.clientWidth === 0 || p.dataset.exact === 'true')
-                 && /folds/.test(document.getElementById('badge').textContent)""", timeout=PATIENCE_MS)
+            """() => {
+              const {state, panes, connection} = window.tetwarp;
+              return state && !state.moving && state.quality && state.request >= connection.seen && panes.every((p) =>
+                p.width === 0 || (p.element.dataset.exact === 'true' && p.about.number === state.pictures[p.name]));
+            }""", timeout=PATIENCE_MS)
 
     def text(self, selector):
         return self.page.locator(selector).inner_text()
@@ -82,8 +85,13 @@ class Viewer:
         return int(self.text("#held").split()[0])
 
     def wait_frames(self, least):
-        self.page.wait_for_function("n => parseInt(document.getElementById('held').textContent) >= n", arg=least,
-                                    timeout=PATIENCE_MS)
+        """Waits for so many frames; or for what was asked to come to rest with fewer, as moves that follow each other
+        quickly are one."""
+        self.page.wait_for_function(
+            """n => {
+              const {state, connection} = window.tetwarp;
+              return state.frames >= n || (state.frames > 0 && !state.moving && state.request >= connection.seen);
+            }""", arg=least, timeout=PATIENCE_MS)
 
     def wait_text(self, selector, part):
         self.page.wait_for_function("([s, t]) => document.querySelector(s).textContent.includes(t)", arg=[selector, part],

@@ -97,6 +97,7 @@ class Page:
 
     def __init__(self, program, token=None, take=False, origin=None, host=None, hello=True, acknowledges=True):
         self.number = 0
+        self.seen = 0  # number of the last request that may change what is seen
         self.sent = {}       # time at which each request was sent
         self.state = None
         self.about = None
@@ -153,6 +154,8 @@ class Page:
     def ask(self, what, **keys):
         self.number += 1
         self.sent[self.number] = time.perf_counter()
+        if what not in ("probe", "save", "shown"):
+            self.seen = self.number
         self.send(json.dumps({"do": what, "n": self.number, **keys}))
         return self.number
 
@@ -248,9 +251,12 @@ class Page:
         return ends(self)[-1]
 
     def is_at_rest(self):
-        """Whether each pane's last picture is exact, and the state says what the field is worth."""
-        last = {about["pane"]: about["exact"] for _, about, _ in self.pictures}
-        return len(last) == 4 and all(last.values()) and bool(self.state) and self.state["quality"] is not None
+        """Whether the program has done all that was asked, and what it made last is here, exact."""
+        state = self.state
+        if not state or state["request"] < self.seen or state["moving"] or state["quality"] is None:
+            return False
+        last = {about["pane"]: about for _, about, _ in self.pictures}
+        return len(last) == 4 and all(one["exact"] and one["number"] == state["pictures"][pane] for pane, one in last.items())
 
     def rest(self, seconds=60):
         if not self.listen(seconds, Page.is_at_rest):

@@ -38,6 +38,7 @@ export class Connection {
     /** @type {WebSocket | null} */
     this.socket = null;
     this.number = 0;
+    this.seen = 0;  // number of the last message that may change what is seen
     this.takes = false;
     this.farewell = '';
     this.bytes = 0;
@@ -106,6 +107,7 @@ export class Connection {
   ask(what, keys = {}) {
     if (this.socket?.readyState !== WebSocket.OPEN) return 0;
     ++this.number;
+    if (what !== 'probe' && what !== 'save' && what !== 'shown') this.seen = this.number;
     this.socket.send(JSON.stringify({do: what, n: this.number, ...keys}));
     return this.number;
   }

@@ -355,6 +355,8 @@ std::string message_of(const State& state) {
                   {"share", state.look.swipe},
                   {"overlay", nullptr},
                   {"style", state.style}};
+  for (const auto& [name, pane] : kPaneNames)
+    message["pictures"][name] = state.pictures[static_cast<std::size_t>(pane)];
   if (state.ball) message["ball"] = {state.ball->x, state.ball->y, state.ball->z, state.ball->w};
   if (state.quality)
     message["quality"] = {{"coverage", state.quality->coverage},

@@ -66,6 +66,8 @@ class PaneLine {
   /// What was shown last is not what is to be seen any more.
   void make_stale() { is_stale_ = true, is_sharp_ = false; }
   bool is_stale() const { return is_stale_ && is_seen(); }
+  /// Number of the last picture that was made.
+  std::uint32_t number() const { return number_; }
   /// Whether the last picture was exact.
   bool is_sharp() const { return is_sharp_ || !is_seen(); }
   /// Whether a picture may be made now.

@@ -17,8 +17,11 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr milliseconds kPace(16);               ///< between two steps at least: a screen shows no more
-constexpr milliseconds kUntilRest(80);          ///< without a request, before exact pictures are made
+constexpr milliseconds kPace(16);  ///< between two pictures at least: a screen shows no more
+/// While tissue comes to rest, further steps begin so long after the first one of a picture.
+constexpr milliseconds kSettling(10);
+/// Without a request, before exact pictures are made.
+constexpr milliseconds kUntilRest(80), kUntilRestOnDevice(30);
 constexpr std::chrono::seconds kUntilRetry(1);  ///< after something failed that nobody asked for
 /// Steps after which tissue that still moves a little is let be, if the hand is still.
 constexpr int kMostRestingSteps = 60;
@@ -156,7 +159,8 @@ Stage::Clock::time_point Stage::work() {
   }
   if (show_panes()) return Clock::now();
   if (is_moving_ || std::any_of(lines_.begin(), lines_.end(), is_stale)) return never;  // a pane that is free wakes
-  if (Clock::now() < changed_ + kUntilRest) return changed_ + kUntilRest;
+  const Clock::time_point rests = changed_ + (setup_.has_device ? kUntilRestOnDevice : kUntilRest);
+  if (Clock::now() < rests) return rests;
   rest();
   return never;
 }
@@ -216,14 +220,17 @@ void Stage::refuse(std::uint32_t number, const std::exception& error) {
 void Stage::step() {
   stepped_ = Clock::now();
   if (setup_.reel) return next_frame();
-  const bool is_behind = session_->is_behind();
   change([&] {
-    const simulate::Convergence convergence = [this] {
-      const Timer timer(*this, &StageTimes::steps);
-      return session_->step();
-    }();
-    resting_steps_ = is_behind ? 0 : resting_steps_ + 1;
-    is_moving_ = session_->plays() || (!convergence.reached && resting_steps_ < kMostRestingSteps);
+    bool follows = false;  // whether the hand asked for something before this step
+    do {
+      follows = session_->is_behind();
+      const simulate::Convergence convergence = [this] {
+        const Timer timer(*this, &StageTimes::steps);
+        return session_->step();
+      }();
+      resting_steps_ = follows ? 0 : resting_steps_ + 1;
+      is_moving_ = session_->plays() || (!convergence.reached && resting_steps_ < kMostRestingSteps);
+    } while (is_moving_ && !follows && Clock::now() < stepped_ + kSettling);
   });
   tell_state();
 }
@@ -296,11 +303,12 @@ void Stage::rest() {
     }
     PaneLine& volume = *lines_[kSlices];
     if (!volume.is_sharp() && volume.is_free()) show(volume, Pane::volume, true, control);
-    if (quality_) return;
-    quality_ = scene_.quality();
-    fold_at_.reset();
-    if (quality_->inverted + quality_->degenerate > 0)
-      fold_at_ = worst_place(std::get<VertexField>(field()), {}, control);
+    if (!quality_) {
+      quality_ = scene_.quality();
+      fold_at_.reset();
+      if (quality_->inverted + quality_->degenerate > 0)
+        fold_at_ = worst_place(std::get<VertexField>(field()), {}, control);
+    }
     tell_state();
   } catch (const Cancelled&) {
   }

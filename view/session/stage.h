@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <condition_variable>
 #include <deque>
@@ -36,6 +37,9 @@ struct State {
   glm::dvec3 cursor_mm{0};            ///< where all slices meet
   SliceLook look;
   std::string style;  ///< name of the transfer function
+  /// Numbers of the last pictures that were made, of each pane. Where nothing moves and `quality` is known, they are
+  /// exact and show the last request.
+  std::array<std::uint32_t, request::kPanes> pictures{};
 };
 
 /// Fields that were made before, and are shown one by one instead of what a hand does.

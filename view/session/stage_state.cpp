@@ -54,6 +54,7 @@ void Stage::tell_state() {
   state.cursor_mm = cursor_mm_;
   state.look = look_;
   state.style = style_;
+  for (std::size_t n = 0; n < lines_.size(); ++n) state.pictures[n] = lines_[n]->number();
   listener_.state(std::move(state));
 }
 
