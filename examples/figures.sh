@@ -10,7 +10,8 @@
 # DATA_FOLDER has real series, unpacked, with the names of the project's test data (default: $TETWARP_TEST_DATA). What is not there is
 # left out; the phantom is drawn in any case.
 #
-# Environment: TETWARP, the program (default: found in build/), SIZE, pixels of a picture (default 512,512), BACKEND (auto, cuda or cpu).
+# Environment: TETWARP, the program (default: found in build/), SIZE, pixels of a picture (default 512,512), PHANTOM, how the phantom is
+# made (default "--size 512,512,300 --spacing 0.8,0.8,1"), BACKEND (auto, cuda or cpu).
 set -euo pipefail
 case ${1:-} in -h | --help) sed -n '5,/^set /{/^set /d;s/^# \{0,1\}//;p}' "$0"; exit 0 ;; esac
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
@@ -51,7 +52,8 @@ row() {  # NAME, VOLUME, OPTIONS...: a picture for each field
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-"$tetwarp" phantom -o "$work/phantom.nii" --size 512,512,300 --spacing 0.8,0.8,1 --quiet
+read -ra phantom <<<"${PHANTOM:---size 512,512,300 --spacing 0.8,0.8,1}"
+"$tetwarp" phantom -o "$work/phantom.nii" "${phantom[@]}" --quiet
 row phantom-bone "$work/phantom.nii" --transfer ct-bone --angle 25 --elevation 10
 row phantom-skin "$work/phantom.nii" --transfer ct-skin --angle 25 --elevation 10
 row phantom-lung "$work/phantom.nii" --transfer ct-lung

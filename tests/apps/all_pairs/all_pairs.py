@@ -3,11 +3,12 @@
 
 """Features together: cases in which every pair of choices occurs (table.py), each run and judged.
 
-    all_pairs.py PROGRAM [--part I/N] [--seed S] [--case N] [--keep FOLDER] [--list]
+    all_pairs.py PROGRAM [--part I/N] [--third T | --seed S [--case N]] [--keep FOLDER] [--list]
 
-PROGRAM is tetwarp. A case that fails is named with its number, its choices, and the command line; `--case N --keep
-FOLDER` runs it alone and leaves all its files. TETWARP_CI_FULL=1 takes three seeds, whose triples differ.
-Exit status 77: a module is missing.
+PROGRAM is tetwarp. Of the cases of a seed a third is run, of which the hash of the commit decides: in a few commits all
+have their turn, and a commit always has the same ones. TETWARP_CI_FULL=1 takes all cases of three seeds, whose triples
+differ; --seed takes all of one. A case that fails is named with its number, its choices, and the command line; `--seed S
+--case N --keep FOLDER` runs it alone and leaves all its files. Exit status 77: a module is missing.
 """
 import argparse
 import json
@@ -251,9 +252,16 @@ class Cases:
                   "field differs from --write-field")
 
 
-def choose(cases, part):
+def third_of_commit():
+    """0, 1, or 2 by the hash of the commit whose sources these are, 0 where that is not known."""
+    done = subprocess.run(["git", "-C", pathlib.Path(__file__).parent, "rev-parse", "HEAD"], capture_output=True)
+    return int(done.stdout, 16) % 3 if done.returncode == 0 else 0
+
+
+def choose(cases, third, part):
+    """The cases of a third, or of all thirds if it is None, that belong to a part, with their numbers."""
     index, count = (int(n) for n in part.split("/"))
-    return [(n, case) for n, case in enumerate(cases) if n % count == index - 1]
+    return [(n, case) for n, case in enumerate(cases) if third is None or n % 3 == third][index - 1::count]
 
 
 def describe(case):
@@ -264,6 +272,7 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("program")
     parser.add_argument("--part", default="1/1")
+    parser.add_argument("--third", type=int, choices=(0, 1, 2))
     parser.add_argument("--seed", type=int)
     parser.add_argument("--case", type=int, nargs="*")
     parser.add_argument("--keep")
@@ -271,6 +280,9 @@ def main():
     options = parser.parse_args()
     full = os.environ.get("TETWARP_CI_FULL") == "1"
     seeds = [options.seed] if options.seed is not None else [1, 2, 3] if full else [1]
+    third = options.third
+    if third is None and options.seed is None and options.case is None and not full:
+        third = third_of_commit()
     folder = pathlib.Path(options.keep or tempfile.mkdtemp(prefix="tetwarp-all-pairs-")).resolve()
     folder.mkdir(exist_ok=True)
     program = Program(str(pathlib.Path(options.program).resolve()), folder / "tmp")
@@ -283,8 +295,8 @@ def main():
         for seed in seeds:
             factors = table.FACTORS
             cases = Covering(factors, cases_of.rules, seed=seed).cases()
-            print(f"seed {seed}: {len(cases)} cases")
-            for number, case in choose(cases, options.part):
+            print(f"seed {seed}: {len(cases)} cases" + (f", of these third {third}" if third is not None else ""))
+            for number, case in choose(cases, third, options.part):
                 if options.case is not None and number not in options.case:
                     continue
                 if options.list:

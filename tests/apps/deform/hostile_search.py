@@ -20,6 +20,7 @@ PATIENT = {0x00100040, 0x00101010, 0x00101020, 0x00101030, 0x00102160, 0x001021A
 TEXTS_OF_0008 = {0x00080050, 0x00080090, 0x00080092, 0x00080094, 0x00081030, 0x0008103E, 0x00081048, 0x00081050,
                  0x00081060, 0x00081070, 0x00081080, 0x00082111, 0x00084000}
 OTHERS = {0x00200010, 0x00204000, 0x00181030, 0x00184000, 0x00180010, 0x00181400}
+NUMBERS = {0x7FE00010, 0x00640009}  # of pixels and of the grid of a registration, which hold any bytes
 OPEN = {0x00120062, 0x00120063, 0x00120064,  # how it was de-identified
         0x00120052, 0x00120053}  # time since an event, which stands for dates in studies
 
@@ -60,20 +61,23 @@ def walk(dataset, inside=False):
         if element.VR == "SQ":
             for item in element.value:
                 yield from walk(item, inside or element.tag.is_private)
-        elif element.tag != 0x7FE00010:
+        elif element.tag not in NUMBERS:
             yield element, inside
 
 
-def strings(folder, wanted):
-    found = set()
+def strings(folder, *groups):
+    """The strings of each group, which is a question to an element. What is inside a private sequence is of all groups."""
+    found = [set() for _ in groups]
     for path in files([folder]):
         try:
             dataset = pydicom.dcmread(path, stop_before_pixels=True)
         except pydicom.errors.InvalidDicomError:
             continue
         for element, in_private in walk(dataset):
-            if in_private or wanted(element):
-                found.update(text for text in texts(element) if len(text) > 3)
+            of_element = {text for text in texts(element) if len(text) > 3}
+            for of_group, wanted in zip(found, groups):
+                if in_private or wanted(element):
+                    of_group |= of_element
     return found
 
 
@@ -84,12 +88,11 @@ def files(paths):
 
 def main():
     source, options, outputs = sys.argv[1], set(sys.argv[2].split(",")), sys.argv[3:]
-    secrets = strings(source, lambda e: is_secret(e, options))
-    open_texts = strings(source, lambda e: not is_secret(e, options))
+    secrets, open_texts = strings(source, lambda e: is_secret(e, options), lambda e: not is_secret(e, options))
     secrets = {s for s in secrets - open_texts if not s.startswith("1.2.840.10008.") and s not in ("REMOVED", "NONE")}
     values = set()
     for output in outputs:
-        values |= strings(output, lambda e: True)
+        values |= strings(output, lambda e: True)[0]
     found = sorted(secrets & values)
     letters = [s for s in secrets if len(s) > 4 and re.search("[A-Za-z]", s)] + \
               [s for s in secrets if re.fullmatch(r"[0-9.]{12,}", s)]

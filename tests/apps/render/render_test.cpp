@@ -228,9 +228,10 @@ TEST_F(RenderProgram, AFullDiskLeavesNothing) {
 }
 
 TEST_F(RenderProgram, TheFiguresAreDrawnWithoutRealSeriesToo) {
-  const Outcome made =
-      run_program(scratch_.path(), "/usr/bin/env",
-                  "TETWARP='" TETWARP_PROGRAM "' SIZE=96,96 TETWARP_TEST_DATA= " TETWARP_FIGURES " figures");
+  const Outcome made = run_program(
+      scratch_.path(), "/usr/bin/env",
+      "TETWARP='" TETWARP_PROGRAM
+      "' SIZE=96,96 PHANTOM='--size 128,128,75 --spacing 3.2,3.2,4' TETWARP_TEST_DATA= " TETWARP_FIGURES " figures");
   ASSERT_EQ(made.status, 0) << made.err;
   EXPECT_TRUE(says(made.out, {"left out: colon", "left out: upper-leg", "figures/figures.html"}));
   const std::string page = read_text(scratch_ / "figures/figures.html");
