@@ -10,6 +10,9 @@
 
 namespace tetwarp {
 
+/// Most bytes of a scenario file: recordings of a hand are long.
+inline constexpr std::size_t kMostScenarioBytes = std::size_t{8} << 20;
+
 /// Reads a scenario from a JSON file; docs/reference/scenario.md and docs/scenario.schema.json describe the keys.
 ///
 /// @throws InputError for a file that is larger than 8 MiB, no JSON, or no scenario. The message names line and key:

@@ -17,7 +17,6 @@ namespace {
 using namespace simulate;
 
 constexpr std::size_t kMostEntries = 1000, kMostTissues = 255, kMostPhases = 100000;
-constexpr std::size_t kMostBytes = std::size_t{8} << 20;  // recordings of a hand are long
 constexpr std::int64_t kMostFrames = 10000, kLargestCell = 512, kMostSteps = 1000000;
 constexpr NumberRange kModulus{1e-6, 1e9}, kCompression{0, 1}, kLimit{0, 100}, kShiftMm{-1e4, 1e4};
 
@@ -241,7 +240,7 @@ Scenario read_whole(const JsonEntry& entry) {
 
 simulate::Scenario read_scenario(const std::filesystem::path& path) {
   const std::string name = path.string();
-  const JsonTree tree = read_json(path, "a scenario", kMostBytes);
+  const JsonTree tree = read_json(path, "a scenario", kMostScenarioBytes);
   return read_whole(JsonEntry(tree, "", name, "the scenario"));
 }
 

@@ -190,6 +190,15 @@ def a_value_is_shown_under_the_pointer(v):
     v.page.mouse.move(*v.at("axial", 0.5, 0.5))
     v.wait_text("#value", "HU")
     expect("mm" in v.text("#place"), v.text("#place"))
+    for n in range(12):  # faster than values come
+        v.page.mouse.move(*v.at("axial", 0.3 + 0.02 * n, 0.5))
+    time.sleep(1)
+    value = v.text("#value")
+    v.page.mouse.move(*v.at("axial", 0.1, 0.1))
+    time.sleep(1)
+    v.page.mouse.move(*v.at("axial", 0.3 + 0.02 * 11, 0.5))
+    time.sleep(1)
+    expect(v.text("#value") == value, f"{value} where {v.text('#value')} is")
 
 
 def windows_are_chosen_and_dragged(v):

@@ -31,7 +31,9 @@ export class View {
     /** @type {Vector} */
     this.cursor = [0, 0, 0];
     this.marks = true;
-    this.probed = true;
+    this.probed = true;  // whether no answer is awaited
+    /** @type {Vector | null} */
+    this.probes = null;  // the last place that was asked for
     this.looked = 0;  // numbers of the last messages that moved the crosshair, and changed the window
     this.levelled = 0;
     this.connection = new Connection({
@@ -83,12 +85,12 @@ export class View {
         this.hand.held(message.n, message.at);
         break;
       case 'value':
-        this.probed = true;
         this.showValue(message);
+        this.probeAgain();
         break;
       case 'nothing':
-        this.probed = true;
         element('value').textContent = '';
+        this.probeAgain();
         break;
       case 'progress':
         this.tell('Saving \u2026');
@@ -113,6 +115,7 @@ export class View {
     element('banner-text').textContent = why[0].toUpperCase() + why.slice(1);
     element('banner-button').hidden = !canTake;
     this.hand.at = null;
+    this.probed = true;
     this.redraw();
   }
 
@@ -162,8 +165,21 @@ export class View {
         ? at.map((value, axis) => `${kLetters[axis][value < 0 ? 0 : 1]} ${shown(Math.abs(value))}`).join('  ') + ' mm'
         : '\u00a0';
     if (!at) element('value').textContent = '';
-    else if (this.probed && this.connection.ask('probe', {at})) this.probed = false;
+    else if (this.probed) this.probe(at);
     if (hand.takes) this.redraw();
+  }
+
+  /** @param {Vector} at */
+  probe(at) {
+    this.probes = at;
+    this.probed = this.connection.ask('probe', {at}) === 0;
+  }
+
+  /** The pointer may have gone on since the place was asked for that an answer has come for. */
+  probeAgain() {
+    this.probed = true;
+    const at = this.hand.hover;
+    if (at && at !== this.probes) this.probe(at);
   }
 
   /** @param {{after: number, before: number}} value */

@@ -267,6 +267,8 @@ void Stage::on(const request::Save& save) {
             "nothing has been done yet that could be saved");
     job.frames = session_->frames();
     if (job.frames > 0) job.scenario = scenario_text(session_->recorded());
+    require(job.scenario.size() <= kMostScenarioBytes,
+            "what was done is more than a scenario file may hold, 8 MiB; take something back");
     job.has_cuts = !session_->recorded().cuts.empty();
   } else {
     require(!setup_.reel->grows || save.volume.empty() || frame_ + 1 == setup_.reel->frames,

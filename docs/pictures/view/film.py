@@ -2,11 +2,11 @@
 # SPDX-FileCopyrightText: The Tetwarp authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Makes the film of the viewer: tissue is pulled in a slice, then pinned and cut open.
+"""Makes the film and the pictures of the viewer: tissue is pulled in a slice, then cut open.
 
-    docs/pictures/view/film.py PROGRAM OUTPUT.gif
+    docs/pictures/view/film.py PROGRAM FOLDER
 
-It wants Chromium, ffmpeg and a Python with playwright.
+Writes pull.gif, grab.png and cut.png. It wants Chromium, ffmpeg and a Python with playwright.
 """
 import pathlib
 import shutil
@@ -19,6 +19,7 @@ from client import Program  # noqa: E402
 from playwright.sync_api import sync_playwright  # noqa: E402
 
 WIDTH, HEIGHT, SHOWN, RATE = 1180, 800, 680, 10
+PALETTE = "split[a][b];[a]palettegen[p];[b][p]paletteuse=dither=none"
 
 
 class Film:
@@ -32,6 +33,16 @@ class Film:
         for _ in range(times - 1):
             shutil.copy(path, f"{self.folder}/{self.count:04d}.png")
             self.count += 1
+
+    def still(self, path):
+        """A picture at rest."""
+        self.page.wait_for_function("""() => {
+          const {state, panes} = window.tetwarp;
+          return state.quality && panes.every((p) => p.about.exact && p.about.number === state.pictures[p.name]);
+        }""")
+        self.page.wait_for_timeout(200)
+        self.page.screenshot(path=f"{self.folder}/still.png")
+        subprocess.run(["ffmpeg", "-v", "error", "-y", "-i", f"{self.folder}/still.png", "-vf", PALETTE, str(path)], check=True)
 
     def settle(self):
         self.page.wait_for_function("""() => {
@@ -72,6 +83,7 @@ def main():
         film.settle()
         page.keyboard.press("g")
         film.drag("axial", line((0.5, 0.27), (0.44, 0.12), 12))
+        film.still(output / "grab.png")
         page.mouse.up()
         film.settle()
         film.take(4)
@@ -87,10 +99,11 @@ def main():
         film.drag("axial", line((0.53, 0.27), (0.64, 0.2), 10))
         film.settle()
         film.take(6)
+        film.still(output / "cut.png")
         browser.close()
-        filters = f"fps={RATE},scale={SHOWN}:-1:flags=lanczos,split[a][b];[a]palettegen=max_colors=96[p];[b][p]paletteuse=dither=none"
+        filters = f"fps={RATE},scale={SHOWN}:-1:flags=lanczos,{PALETTE.replace('palettegen', 'palettegen=max_colors=96')}"
         subprocess.run(["ffmpeg", "-v", "error", "-y", "-framerate", str(RATE), "-i", f"{scratch}/%04d.png", "-vf", filters,
-                        "-loop", "0", str(output)], check=True)
+                        "-loop", "0", str(output / "pull.gif")], check=True)
 
 
 if __name__ == "__main__":
