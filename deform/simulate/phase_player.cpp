@@ -81,7 +81,7 @@ Convergence PhasePlayer::next(const Control& control) {
   const double part = loads_->is_still() && !has_forces_ ? 1 : static_cast<double>(frame_ + 1) / frames_;
   simulation_->set_deadband(frame_ + 1 == frames_ ? 0 : scenario_.deadband_mm);
   const bool changes = loads_->changes_by_frame();
-  if (changes) {
+  if (changes && loads_->changes_in(frame_)) {
     const std::vector<glm::vec3> now = loads_->pushes() ? displacement() : std::vector<glm::vec3>{};
     simulation_->set_loads(loads_->at(part, model_, start_, now));
   }

@@ -227,6 +227,13 @@ bool PhaseLoads::changes_by_frame() const {
          std::any_of(ways_.begin(), ways_.end(), [](const Way& way) { return way.radians != 0 || !way.along.empty(); });
 }
 
+bool PhaseLoads::changes_in(int frame) const {
+  if (frame == 0 || pushes() || !force_.empty()) return true;
+  const auto now = static_cast<std::size_t>(frame);
+  return std::any_of(ways_.begin(), ways_.end(),
+                     [now](const Way& way) { return way.along.empty() || way.along[now] != way.along[now - 1]; });
+}
+
 int PhaseLoads::frame_at(double part) const {
   return std::clamp(static_cast<int>(std::lround(part * frames_)), 1, frames_) - 1;
 }

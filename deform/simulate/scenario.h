@@ -172,6 +172,9 @@ class PhaseLoads {
 
   /// Whether loads must be set anew for each frame; otherwise all vertices move along straight lines, at one speed.
   bool changes_by_frame() const;
+  /// Whether a frame of such a phase has other loads than the frame before. The first frame has.
+  /// @param frame  from 0
+  bool changes_in(int frame) const;
   /// Whether nothing is on its way anywhere: what is held or pinned stays, and no force is new.
   bool is_still() const { return ways_.empty() && !pushes(); }
   /// Whether there is a ball, so that loads depend on where nodes are.

@@ -24,12 +24,13 @@ using tetwarp::test::Random;
 using tetwarp::test::seed_text;
 using tetwarp::test::test_seed;
 
-/// A random way, a place a frame.
+/// A random way, a place a frame. Sometimes it stays where it is.
 std::vector<glm::dvec3> way(Random& random, const glm::dvec3& from, int frames) {
   std::vector<glm::dvec3> places;
   glm::dvec3 at = from;
   for (int n = 0; n < frames; ++n) {
-    for (int axis = 0; axis < 3; ++axis) at[axis] += random.real(-1.5, 1.5);
+    const bool stays = n > 0 && random.integer(0, 2) == 0;
+    for (int axis = 0; axis < 3 && !stays; ++axis) at[axis] += random.real(-1.5, 1.5);
     places.push_back(at);
   }
   return places;
@@ -140,6 +141,35 @@ std::vector<std::vector<glm::vec3>> play(const Scenario& scenario, std::size_t p
     frames.push_back(simulation.displacement_on_host());
   }
   return frames;
+}
+
+/// A run sets no loads anew where the hand stays where it is.
+TEST_P(ByHand, AHandThatStaysGivesTheBitsOfLoadsThatAreSetInEachFrame) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  Random random(test_seed(), 44);
+  const Patient patient = uniform_patient();
+  Scenario scenario = by_hand(GetParam(), random);
+  for (Phase& phase : scenario.phases) {
+    for (Move& move : phase.moves) {
+      auto& along = std::get<Drag>(move.how).by_mm;
+      along.insert(along.end(), 5, along.back());
+      phase.frames += 5;
+    }
+  }
+  const Model model =
+      make_model(patient.lattice, tissue_of_cells(scenario, patient), std::vector<Tissue>{scenario.tissues[0].tissue});
+  const auto check = [&](const MakeSimulation& make) {
+    const std::unique_ptr<Simulation> simulation = make(model);
+    Frames expected;
+    for (std::size_t phase = 0; phase < scenario.phases.size(); ++phase) {
+      const Frames frames = play(scenario, phase, patient, model, *simulation);
+      expected.insert(expected.end(), frames.begin(), frames.end());
+    }
+    EXPECT_TRUE(run_all(scenario, patient, make) == expected);
+  };
+  check(cpu(GetParam(), 2));
+  if (device_count() == 0) GTEST_SKIP() << "no CUDA device on this machine";
+  check([](const Model& of) { return make_simulation(BackendKind::cuda, GetParam(), of); });
 }
 
 /// So what was done can be taken back to the beginning of any phase, and gone on from there.
