@@ -313,6 +313,7 @@ std::optional<glm::dvec3> worst_place(const VertexField& field, const Limits& li
   if (!field.mesh.is_empty()) {
     const TetrahedralMesh mesh = field.replaced.empty() ? field.mesh : mesh_of(field);
     for (const glm::u32vec4& corners : mesh.tetrahedra) {
+      if (control.stop.stop_requested()) throw Cancelled();
       glm::dmat4x3 before, by;
       for (int n = 0; n < 4; ++n) {
         before[n] = mesh.rest[corners[n]];

@@ -145,6 +145,13 @@ ForwardChoice parse_forward_fields(const std::vector<std::string>& texts, std::o
   return parsed;
 }
 
+std::vector<ForwardChoice> parse_sequence(const std::vector<std::string>& texts, std::optional<std::int64_t> cell_size,
+                                          NiftiFrame frame) {
+  std::vector<ForwardChoice> sequence;
+  for (const std::string& text : texts) sequence.push_back(parse_forward_fields({text}, cell_size, frame));
+  return sequence;
+}
+
 PullChoice parse_pull_field(const std::string& text, NiftiFrame frame) {
   return {named_file(text, parse_file(text, frame))};
 }

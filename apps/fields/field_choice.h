@@ -80,6 +80,9 @@ FieldSource parse_field_file(const std::string& text, NiftiFrame frame);
 /// mesh that is not the first; a cell size below 1, or for a first field with vertices of its own
 ForwardChoice parse_forward_fields(const std::vector<std::string>& texts, std::optional<std::int64_t> cell_size,
                                    NiftiFrame frame);
+/// Fields one after the other, each by itself: those of --sequence. @throws UsageError as the function above
+std::vector<ForwardChoice> parse_sequence(const std::vector<std::string>& texts, std::optional<std::int64_t> cell_size,
+                                          NiftiFrame frame);
 /// @throws UsageError for options that do not go with the file
 PullChoice parse_pull_field(const std::string& text, NiftiFrame frame);
 /// The one that was given. @throws UsageError for none, and as the two above

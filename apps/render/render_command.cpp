@@ -70,7 +70,7 @@ Rendering::Rendering(const RenderOptions& options)
     throw UsageError("--frames needs a field that grows, -f or --pull-field");
   if (options.frames > 0 && options.turntable > 0 && options.frames != options.turntable)
     throw UsageError("--frames and --turntable together need the same number");
-  if (fields_.sequence &&
+  if (!fields_.sequence.empty() &&
       (options.frames > 0 || (options.turntable > 0 && options.turntable != static_cast<int>(pictures()))))
     throw UsageError("--sequence has " + std::to_string(pictures()) +
                      " fields, each a picture: leave out --frames, and give --turntable the same number");
@@ -149,7 +149,7 @@ void Rendering::choose_style() {
 }
 
 void Rendering::show(std::size_t number) {
-  const bool still = options_.frames == 0 && !fields_.sequence;
+  const bool still = options_.frames == 0 && fields_.sequence.empty();
   if (shown_ && (still || number == *shown_)) return;
   scene_.show(number);
   if (!shown_) choose_style();

@@ -71,8 +71,7 @@ OverlayWish parse_overlay(const std::string& text, const RenderOptions& options)
 RenderFields parse_render_fields(const RenderOptions& options) {
   RenderFields fields;
   if (options.field.is_given()) fields.deforming = parse_field(options.field, options.common.nifti_frame);
-  if (!options.sequence.empty())
-    fields.sequence = parse_forward_fields(options.sequence, {}, options.common.nifti_frame);
+  fields.sequence = parse_sequence(options.sequence, options.field.cell_size, options.common.nifti_frame);
   for (const std::string& text : options.overlays) fields.overlays.push_back(parse_overlay(text, options));
   return fields;
 }
@@ -80,7 +79,7 @@ RenderFields parse_render_fields(const RenderOptions& options) {
 Reads reads_of(const RenderOptions& options, const RenderFields& fields) {
   Reads reads;
   if (fields.deforming) reads.add_field(*fields.deforming);
-  if (fields.sequence) reads.add_field(*fields.sequence);
+  for (const ForwardChoice& one : fields.sequence) reads.add_field(one);
   if (is_transfer_file(options)) reads.add_file(options.transfer);
   for (const OverlayWish& wish : fields.overlays) {
     if (wish.lattice) reads.add_field(*wish.lattice);
@@ -114,7 +113,7 @@ RenderScene::RenderScene(const RenderOptions& options, const RenderFields& field
 RenderScene::~RenderScene() = default;
 
 std::size_t RenderScene::frames() const {
-  if (fields_.sequence) return fields_.sequence->fields.size();
+  if (!fields_.sequence.empty()) return fields_.sequence.size();
   return static_cast<std::size_t>(std::max({options_.frames, options_.turntable, 1}));
 }
 
@@ -190,9 +189,9 @@ void RenderScene::set_frame_field(double amount, const Control& control) {
 void RenderScene::show(std::size_t frame) {
   if (!deforms_) return;
   const Control control{.stop = interrupt_token()};
-  if (fields_.sequence) {
-    const ForwardChoice one{{fields_.sequence->fields[frame]}, {}};
-    ReadForwardField read = apps::read_field(one, header_.geometry, options_.common.threads, control);
+  if (!fields_.sequence.empty()) {
+    ReadForwardField read =
+        apps::read_field(fields_.sequence[frame], header_.geometry, options_.common.threads, control);
     field_ = std::move(read.field);
     add_notes(read.origin.notes);
   }
@@ -250,7 +249,7 @@ OwnedOverlay RenderScene::overlay(const OverlayWish& wish, const Region& region)
 }
 
 std::string RenderScene::field_title(std::size_t frame) const {
-  if (fields_.sequence) return title_of(ForwardChoice{{fields_.sequence->fields[frame]}, {}});
+  if (!fields_.sequence.empty()) return title_of(fields_.sequence[frame]);
   return fields_.deforming ? title_of(*fields_.deforming) : "";
 }
 

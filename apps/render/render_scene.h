@@ -30,11 +30,11 @@ struct OverlayWish {
 
 /// The fields that a picture is made with, parsed.
 struct RenderFields {
-  std::optional<FieldChoice> deforming;   ///< deforms the volume in all pictures
-  std::optional<ForwardChoice> sequence;  ///< instead: each of its fields deforms one picture
+  std::optional<FieldChoice> deforming;  ///< deforms the volume in all pictures
+  std::vector<ForwardChoice> sequence;   ///< instead: each deforms one picture
   std::vector<OverlayWish> overlays;
 
-  bool deform() const { return deforming || sequence; }
+  bool deform() const { return deforming || !sequence.empty(); }
 };
 /// @throws UsageError for fields as parse_field does, and for an overlay that is not known
 RenderFields parse_render_fields(const RenderOptions& options);

@@ -56,8 +56,8 @@ class Viewing {
   AnyVolume labels_;
   simulate::Patient patient_;
   std::optional<viewer::Reel> reel_;
-  std::unique_ptr<Saving> saving_;  ///< tells the viewer what became of a wish, so it ends before it
   std::unique_ptr<Viewer> viewer_;
+  std::unique_ptr<Saving> saving_;  ///< tells the viewer what became of a wish, so it ends before it
 };
 
 Viewing::Viewing(const ViewOptions& options) : options_(options), backend_(chosen(options.backend)) {

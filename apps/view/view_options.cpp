@@ -22,12 +22,13 @@ void add_view(CLI::App& app, ViewOptions& options) {
                     ->allow_extra_args(false)
                     ->excludes(scenario)
                     ->type_name("FIELD");
-  auto* pull = command->add_option("--pull-field", options.field.pull, "The same of a field that maps output to input")
-                   ->excludes(scenario)
-                   ->excludes(field)
-                   ->type_name("FILE");
+  auto* pull =
+      command->add_option("--pull-field", options.field.pull, "Shown so, too: a field that maps output to input")
+          ->excludes(scenario)
+          ->excludes(field)
+          ->type_name("FILE");
   add_sequence(*command, options.sequence,
-               "The same of fields one after the other, as `simulate --every` writes them: a name a word, up to the "
+               "Shown so, too: fields one after the other, as `simulate --every` writes them: a name a word, up to the "
                "next option",
                {scenario, field, pull});
   command

@@ -14,18 +14,17 @@ namespace tetwarp::apps {
 ViewFields parse_view_fields(const ViewOptions& options) {
   ViewFields fields;
   if (options.field.is_given()) fields.growing = parse_field(options.field, options.common.nifti_frame);
-  if (!options.sequence.empty())
-    fields.sequence = parse_forward_fields(options.sequence, options.field.cell_size, options.common.nifti_frame);
+  fields.sequence = parse_sequence(options.sequence, options.field.cell_size, options.common.nifti_frame);
   return fields;
 }
 
 viewer::Reel read_reel(const ViewFields& fields, const Geometry& volume, const Geometry& grid, int threads,
                        const Control& control) {
   viewer::Reel reel;
-  if (fields.sequence) {
-    reel.frames = static_cast<int>(fields.sequence->fields.size());
-    reel.field = [&all = *fields.sequence, volume, threads](int frame) -> AnyField {
-      const ForwardChoice one{{all.fields[static_cast<std::size_t>(frame)]}, all.cell_size};
+  if (!fields.sequence.empty()) {
+    reel.frames = static_cast<int>(fields.sequence.size());
+    reel.field = [&all = fields.sequence, volume, threads](int frame) -> AnyField {
+      const ForwardChoice& one = all[static_cast<std::size_t>(frame)];
       return apps::read_field(one, volume, threads, {.stop = interrupt_token()}).field;
     };
     return reel;

@@ -14,9 +14,9 @@ namespace tetwarp::apps {
 /// The fields that are shown instead of what a hand does, parsed.
 struct ViewFields {
   std::optional<FieldChoice> growing;
-  std::optional<ForwardChoice> sequence;
+  std::vector<ForwardChoice> sequence;  ///< instead: one a frame
 
-  bool any() const { return growing || sequence; }
+  bool any() const { return growing || !sequence.empty(); }
 };
 /// @throws UsageError for what `parse_field` refuses
 ViewFields parse_view_fields(const ViewOptions& options);

@@ -4,6 +4,7 @@
 #include "apps/view/view_save.h"
 
 #include <algorithm>
+#include <charconv>
 #include <string_view>
 #include <utility>
 
@@ -41,11 +42,17 @@ std::string word(const fs::path& path) {
   return !text.empty() && std::all_of(text.begin(), text.end(), is_safe) ? text : shell_quoted(text);
 }
 
+/// The shortest text that is read as the same number.
+std::string exact_text(double number) {
+  char text[32];
+  return {text, std::to_chars(text, text + sizeof text, number).ptr};
+}
+
 /// Numbers of an option.
 template <class Numbers>
 std::string listed(const Numbers& numbers, const char* between = ",") {
   std::string text;
-  for (const auto number : numbers) text += (text.empty() ? "" : between) + number_text(static_cast<double>(number));
+  for (const auto number : numbers) text += (text.empty() ? "" : between) + exact_text(static_cast<double>(number));
   return text;
 }
 
@@ -62,6 +69,16 @@ class CommandText {
     if (!path.empty()) text_ += std::string(" ") + option + " " + word(path);
     return *this;
   }
+  /// INPUT, and the options that say how it is read.
+  CommandText& add(const InputOptions& input) {
+    add(word(input.path));
+    if (!input.series.empty()) add("--series", fs::path(input.series));
+    if (input.single) add("--single");
+    if (input.uneven) add("--uneven exact");
+    if (input.nifti_frame == NiftiFrame::qform) add("--nifti-frame qform");
+    return *this;
+  }
+  CommandText& add(const char* option, double number) { return add(std::string(option) + " " + exact_text(number)); }
   const std::string& text() const { return text_; }
 
  private:
@@ -117,9 +134,20 @@ class Saving::One {
     if (options_.demo) input_.path = options_.output / kDemoFile;
   }
 
-  Saved save();
+  /// Does it. Where something fails, the problem names what is there already.
+  Saved saved() {
+    try {
+      save();
+    } catch (const std::exception& error) {
+      saved_.problem = error.what();
+      for (const std::string& file : saved_.files)
+        saved_.problem += (&file == &saved_.files.front() ? "; written before: " : ", ") + file;
+    }
+    return std::move(saved_);
+  }
 
  private:
+  void save();
   fs::path file(const std::string& ending) const { return options_.output / (job_.wish.name + ending); }
   fs::path claim(const fs::path& path) const;
   void write_demo();
@@ -127,6 +155,9 @@ class Saving::One {
   void deform(const fs::path& output, bool runs);
   void write_field(const fs::path& output);
   void write_film(const fs::path& output);
+  fs::path film_fields() const { return file(job_.has_cuts ? "-film.vtk" : "-film.mha"); }
+  /// Number of frames from one picture of a film to the next.
+  int film_step() const { return std::max(1, (job_.frames + kMostFilmPictures - 1) / kMostFilmPictures); }
   std::vector<fs::path> write_frames();
   RenderOptions film_options() const;
   CommandText& add_fields(CommandText& command) const;
@@ -159,7 +190,7 @@ void Saving::One::write_demo() {
   if (!fs::exists(phantom.output)) run_phantom(phantom);
 }
 
-Saving::Saved Saving::One::save() {
+void Saving::One::save() {
   const auto& wish = job_.wish;
   require_plain(wish.name);
   const std::vector<std::string> kinds = saved_volume_kinds(true);
@@ -168,13 +199,21 @@ Saving::Saved Saving::One::save() {
   require(wish.film.empty() || wish.film == ".mp4" || wish.film == ".gif", "no film is written as that");
   if (!wish.film.empty()) require_movie_encoder(file(wish.film));
   require(!wish.field || is_by_hand_, "the field was given; it is there already");
-  std::error_code ignored;
-  fs::create_directories(options_.output, ignored);  // what cannot be written there says so
+  std::error_code error;
+  fs::create_directories(options_.output, error);
+  if (error) throw Error("cannot make the folder " + options_.output.string() + ": " + error.message());
   const bool is_series = wish.volume == "dicom";
-  const fs::path volume = wish.volume.empty() ? fs::path() : claim(file(is_series ? "" : wish.volume)),
-                 field = wish.field ? claim(file(job_.has_cuts ? "-field.vtu" : "-field.mha")) : fs::path(),
+  const fs::path volume = wish.volume.empty() ? fs::path() : claim(file(is_series ? "-dicom" : wish.volume)),
+                 field = wish.field ? claim(file(job_.has_cuts ? "-field.vtk" : "-field.mha")) : fs::path(),
                  film = wish.film.empty() ? fs::path() : claim(file(wish.film));
   for (const auto& [pane, bytes] : job_.pictures) claim(file("-" + pane + ".png"));
+  if (!job_.scenario.empty()) claim(file(".json"));
+  if (!film.empty() && is_by_hand_) {
+    const fs::path fields = film_fields();
+    claim(fields);
+    for (int number = film_step(); number <= job_.frames; number += film_step())
+      claim(frame_path(fields, number, job_.frames));
+  }
   if (!job_.scenario.empty()) {
     scenario_ = file(".json");
     write(scenario_, job_.scenario);
@@ -191,16 +230,17 @@ Saving::Saved Saving::One::save() {
   if (!volume.empty() || job_.frames > 0) deform(volume.empty() ? file(".nii.gz") : volume, !volume.empty());
   if (!field.empty()) write_field(field);
   if (!film.empty()) write_film(film);
-  return std::move(saved_);
 }
 
 /// Adds the options that say what deforms.
 CommandText& Saving::One::add_fields(CommandText& command) const {
   if (is_by_hand_) return command.add("--scenario", scenario_).add("--labels", options_.labels);
-  if (!options_.sequence.empty())
-    return command.add("-f", fs::path(options_.sequence[static_cast<std::size_t>(job_.frame)]));
-  for (const std::string& text : options_.field.forward) command.add("-f", fs::path(text));
-  command.add("--pull-field", fs::path(options_.field.pull));
+  if (!options_.sequence.empty()) {
+    command.add("-f", fs::path(options_.sequence[static_cast<std::size_t>(job_.frame)]));
+  } else {
+    for (const std::string& text : options_.field.forward) command.add("-f", fs::path(text));
+    command.add("--pull-field", fs::path(options_.field.pull));
+  }
   if (options_.field.cell_size) command.add("--cell-size " + std::to_string(*options_.field.cell_size));
   return command;
 }
@@ -208,7 +248,7 @@ CommandText& Saving::One::add_fields(CommandText& command) const {
 /// @param runs  whether the volume is made; else only its command is told
 void Saving::One::deform(const fs::path& output, bool runs) {
   CommandText command("deform");
-  command.add(word(input_.path));
+  command.add(input_);
   add_fields(command);
   if (!is_by_hand_) command.add("--outside background");
   say_command(command.add("-o", output));
@@ -234,11 +274,8 @@ void Saving::One::deform(const fs::path& output, bool runs) {
 void Saving::One::write_field(const fs::path& output) {
   SimulateOptions simulate = simulate_options(options_, input_, scenario_);
   simulate.output = output;
-  say_command(CommandText("simulate")
-                  .add(word(scenario_))
-                  .add(word(input_.path))
-                  .add("--labels", options_.labels)
-                  .add("-o", output));
+  say_command(
+      CommandText("simulate").add(word(scenario_)).add(input_).add("--labels", options_.labels).add("-o", output));
   run_simulate(simulate);
   saved_.files.push_back(output.string());
 }
@@ -246,11 +283,11 @@ void Saving::One::write_field(const fs::path& output) {
 /// Writes the fields that a film of a scenario shows. @return their paths
 std::vector<fs::path> Saving::One::write_frames() {
   SimulateOptions simulate = simulate_options(options_, input_, scenario_);
-  simulate.output = file(job_.has_cuts ? "-film.vtu" : "-film.mha");
-  simulate.every = std::max(1, (job_.frames + kMostFilmPictures - 1) / kMostFilmPictures);
+  simulate.output = film_fields();
+  simulate.every = film_step();
   say_command(CommandText("simulate")
                   .add(word(scenario_))
-                  .add(word(input_.path))
+                  .add(input_)
                   .add("--labels", options_.labels)
                   .add("--every " + std::to_string(simulate.every))
                   .add("-o", simulate.output));
@@ -297,13 +334,15 @@ RenderOptions Saving::One::film_options() const {
 void Saving::One::write_film(const fs::path& output) {
   RenderOptions render = film_options();
   CommandText command("render");
-  command.add(word(input_.path));
+  command.add(input_);
   if (is_by_hand_) {
     const std::vector<fs::path> frames = write_frames();
     for (const fs::path& frame : frames) render.sequence.push_back(frame.string());
     command.add("--sequence " + word(file("-film")) + ".*" + frames.front().extension().string());
   } else if (!options_.sequence.empty()) {
     render.sequence = options_.sequence;
+    render.field.cell_size = options_.field.cell_size;
+    if (render.field.cell_size) command.add("--cell-size " + std::to_string(*render.field.cell_size));
     std::string all = "--sequence";
     for (const std::string& field : options_.sequence) all += " " + word(field);
     command.add(all);
@@ -316,13 +355,12 @@ void Saving::One::write_film(const fs::path& output) {
   if (render.view != "volume") command.add("--view " + render.view);
   if (!render.transfer.empty()) command.add("--transfer " + render.transfer);
   if (render.view == "volume") {
-    command.add("--angle " + number_text(render.angle)).add("--elevation " + number_text(render.elevation));
-    command.add("--zoom " + number_text(render.zoom));
+    command.add("--angle", render.angle).add("--elevation", render.elevation).add("--zoom", render.zoom);
   }
   if (!render.position.empty()) command.add("--position " + listed(render.position, "/"));
-  if (render.window) command.add("--window " + number_text(*render.window) + " --level " + number_text(*render.level));
+  if (render.window) command.add("--window", *render.window).add("--level", *render.level);
   for (const std::string& overlay : render.overlays) command.add("--overlay " + overlay);
-  say_command(command.add("--outside background").add("--rate " + number_text(render.rate)).add("-o", output));
+  say_command(command.add("--outside background").add("--rate", render.rate).add("-o", output));
   run_render(render);
   saved_.files.push_back(output.string());
 }
@@ -336,13 +374,7 @@ void Saving::run(const std::stop_token& stop) {
       next = std::move(jobs_.front());
       jobs_.pop_front();
     }
-    Saved saved;
-    try {
-      saved = One(options_, next.first).save();
-    } catch (const std::exception& error) {
-      saved.problem = error.what();
-    }
-    next.second(std::move(saved));
+    next.second(One(options_, next.first).saved());
   }
 }
 

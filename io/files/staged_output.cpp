@@ -6,7 +6,6 @@
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include <fstream>
 
 #include <algorithm>
 #include <atomic>
@@ -14,6 +13,7 @@
 #include <climits>
 #include <cstdio>
 #include <exception>
+#include <fstream>
 #include <mutex>
 #include <set>
 #include <system_error>

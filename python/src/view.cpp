@@ -58,14 +58,14 @@ class BoundViewer {
   BoundViewer(const ConstArray& ct, const Geometry& grid, const std::optional<ConstArray>& labels,
               const std::optional<Geometry>& labels_grid, const ViewInput& input, const ViewPlace& place,
               const std::string& backend, int device, int threads, const CallOptions& options)
-      : ct_(ct), grid_(grid), process_(getpid()) {
+      : ct_(ct), grid_(grid), labels_(labels), labels_grid_(labels_grid), process_(getpid()) {
     Viewer::Setup setup;
     setup.source = voxels_of(ct_, grid_, "the volume");
     require(setup.source.memory == Memory::host, "the volume lies on a device; the viewer takes one in host memory");
     std::optional<ConstVolumeView> labelled;
-    if (labels) {
-      require(labels_grid.has_value(), "the labels have no grid");
-      labelled = voxels_of(*labels, *labels_grid, "the labels");
+    if (labels_) {
+      require(labels_grid_.has_value(), "the labels have no grid");
+      labelled = voxels_of(*labels_, *labels_grid_, "the labels");
       require(labelled->memory == Memory::host, "the labels lie on a device; the viewer takes them in host memory");
     }
     setup.background = input.background;
@@ -170,6 +170,8 @@ class BoundViewer {
 
   const ConstArray ct_;
   const Geometry grid_;
+  const std::optional<ConstArray> labels_;
+  const std::optional<Geometry> labels_grid_;
   const pid_t process_;
   std::mutex mutex_;  ///< of the next four
   std::condition_variable_any wake_;

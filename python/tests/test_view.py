@@ -169,6 +169,22 @@ def test_field_and_pictures_are_saved_too(ct, tmp_path):
 
 
 @viewer_only
+def test_labels_lie_over_slices(ct):
+    labels = tw.Volume((ct.array > -300).astype(np.uint8), ct.geometry)
+    with tw.view(ct, labels=labels, backend="cpu", open=False, cell_size=4) as shown, page_of(shown) as page:
+        del labels  # the viewer keeps what it shows
+        assert page.about["labels"]
+        page.sizes(64, 64, 64)
+        page.rest()
+        plain = [png for _, about, png in page.pictures if about["pane"] == "axial"][-1]
+        for kind in ("labels", "contours"):
+            page.ask("overlay", kind=kind)
+            page.rest()
+            assert [png for _, about, png in page.pictures if about["pane"] == "axial"][-1] != plain
+        assert not [message for message in page.messages if message["say"] == "problem"]
+
+
+@viewer_only
 def test_a_series_is_saved_as_a_series(ct, tmp_path, monkeypatch):
     shown = tw.view(ct, backend="cpu", open=False)
     with shown, Page(Server(shown)) as page:

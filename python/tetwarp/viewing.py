@@ -53,9 +53,9 @@ class _Saving:
             raise InputError("no volume is written as that")
         stem = os.path.join(self.folder, name)
         page = stem + ".json"
-        output = stem if kind == "dicom" else stem + (kind or ".nii.gz")
+        output = stem + ("-dicom" if kind == "dicom" else kind or ".nii.gz")
         cuts = bool(scenario) and bool(json.loads(scenario).get("cuts"))
-        field_file = f"{stem}-field.{'vtu' if cuts else 'mha'}"
+        field_file = f"{stem}-field.{'vtk' if cuts else 'mha'}"
         png = {f"{stem}-{pane}.png": picture for pane, picture in pictures.items()}
         for path in (*([output] if kind else []), *([field_file] if field else []), *png):
             if os.path.lexists(path):

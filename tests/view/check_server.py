@@ -386,6 +386,45 @@ def sequences_and_pull_fields_are_shown(_, folder):
         expect(page.state["frame"] == 0, "a frame that cannot be read is shown")
 
 
+def a_series_and_a_film_of_a_cut_are_saved_and_made_again(_, folder):
+    here = folder.parent / "series"
+    here.mkdir()
+    subprocess.run([PROGRAM, "phantom", "-o", "ct", "--size", "64,64,40", "--spacing", "6.4,6.4,7.5"], check=True, cwd=here,
+                   capture_output=True)
+    with Program(PROGRAM, "ct", "--series", "1", "-o", "out", cwd=here) as program, Page(program) as page:
+        page.sizes(64, 64, 64)
+        page.rest()
+        page.ask("cut", path=[[-60, -60, 0], [60, -60, 0]], along=[0, 0, 1], depth=80, centred=True)
+        page.ask("grip", at=[0, -80, 0], radius=40)
+        page.ask("move", by=[0, -15, 0])
+        page.listen(20, lambda p: p.state["frames"] >= 2 and not p.state["moving"])
+        page.rest()
+        saved = page.save("hand", "dicom", field=True)
+        expect(saved["say"] == "saved" and "--series 1" in saved["command"], saved)
+        expect(len(list((here / "out" / "hand-dicom").glob("*"))) == 40, "not all slices")
+        expect((here / "out" / "hand-field.vtk").exists(), saved)
+        for line in saved["command"].splitlines():
+            words = [word.replace("hand-dicom", "again-dicom").replace("hand-field", "again-field") for word in shlex.split(line)]
+            subprocess.run([PROGRAM, *words[1:]], check=True, cwd=here, capture_output=True)
+        expect((here / "out" / "hand-field.vtk").read_bytes() == (here / "out" / "again-field.vtk").read_bytes(), "other field")
+        if shutil.which("ffmpeg"):
+            film = page.save("film", "", film=".gif", of="axial")
+            expect(film["say"] == "saved" and (here / "out" / "film.gif").stat().st_size > 1000, film)
+        failed = page.save("hand2", "dicom", film=".gif") if not shutil.which("ffmpeg") else None
+        expect(failed is None or (failed["say"] == "problem" and not (here / "out" / "hand2.json").exists()), failed)
+
+
+def labels_of_another_grid_are_refused(_, folder):
+    here = folder.parent / "grids"
+    here.mkdir()
+    for name, size in (("p.mha", "64,64,40"), ("small.mha", "40,40,30")):
+        subprocess.run([PROGRAM, "phantom", "-o", name, "--size", size], check=True, cwd=here, capture_output=True)
+    for more in ([], ["-f", "twist:angle=20"]):
+        done = subprocess.run([PROGRAM, "view", "p.mha", "--no-open", "--labels", "small.mha", *more], capture_output=True,
+                              text=True, timeout=60, cwd=here)
+        expect(done.returncode != 0 and "grid of the volume" in done.stderr, done)
+
+
 def no_list_of_processes_shows_the_token(program, _):
     for path in pathlib.Path("/proc").glob("[0-9]*/cmdline"):
         try:

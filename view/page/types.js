@@ -94,7 +94,7 @@
  * @property {number} share   of a swipe
  * @property {string | null} overlay
  * @property {string} style
- * @property {Record<SliceName | 'volume', number>} pictures  numbers of the last ones that were made
+ * @property {Record<SliceName | 'volume', number>} pictures  numbers of the exact ones, or of the next ones
  */
 
 /**

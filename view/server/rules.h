@@ -34,9 +34,8 @@ class Admission {
   /// Whether a page that says this may enter.
   bool may_enter(std::string_view said) const;
   /// A page that says this, and may, enters.
-  /// @return  what it must say from now on, if that is something else; what the page before it had to say counts no
-  /// more
-  ///          then
+  /// @return  what it must say from now on, if that is something else; then what the page before it had to say counts
+  ///          no more
   std::string enter(std::string_view said);
 
  private:

@@ -86,9 +86,9 @@ class Viewer {
   StageTimes times_;
   // Made in this order, and ended in the opposite one.
   std::unique_ptr<Scene> scene_;
-  std::unique_ptr<Server> server_;
   std::mutex mutex_;  ///< of `stage_` and `is_watched_`, which the server's thread uses
   bool is_watched_ = false;
+  std::unique_ptr<Server> server_;
   std::unique_ptr<Stage> stage_;
 };
 

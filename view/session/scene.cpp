@@ -35,6 +35,10 @@ Scene::Scene(const Setup& setup)
   if (setup.labels) {
     require(setup.labels->components == 1,
             "labels have one value a voxel, found " + std::to_string(setup.labels->components));
+    const Geometry &grid = *setup.source.geometry, &of_labels = *setup.labels->geometry;
+    require(same_grid(of_labels, grid, 0.01 * std::min({grid.spacing.x, grid.spacing.y, grid.spacing.z})),
+            "labels lie on the grid of the volume, " + to_string(grid.size) + " voxels, found " +
+                to_string(of_labels.size) + ", or another place");
     require(setup.labels->type != VoxelType::f32 && setup.labels->type != VoxelType::f64,
             "labels are whole numbers; these are floating-point ones");
   }

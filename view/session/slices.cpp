@@ -116,17 +116,22 @@ PaneImage SliceMaker::picture(const Slice& slice, const SliceLook& look) {
       }
     });
   });
+  // Columns from here on show the deformed volume.
+  const std::int64_t deformed_from = look.compared == Compared::before  ? image.width
+                                     : look.compared == Compared::swipe ? first_after
+                                                                        : 0;
   const bool is_label = look.layer == Layer::labels || look.layer == Layer::contours;
   if (!look.layer || (look.compared == Compared::before && !is_label)) return image;
   if (image.is_grey) image = coloured(image);
-  const Which shown = look.compared == Compared::before ? Which::before : Which::after;
   switch (*look.layer) {
     case Layer::lattice: lay_lattice_over(image, slice); break;
     case Layer::jacobian: lay_over(image, slice, OverlayKind::jacobian); break;
     case Layer::folds: lay_over(image, slice, OverlayKind::folds); break;
     case Layer::coverage: lay_over(image, slice, OverlayKind::coverage); break;
     case Layer::labels:
-    case Layer::contours: lay_labels_over(image, slice, shown, look.layer == Layer::contours);
+    case Layer::contours:
+      if (deformed_from > 0) lay_labels_over(image, slice, Which::before, look, {0, deformed_from});
+      lay_labels_over(image, slice, Which::after, look, {deformed_from, image.width});
   }
   return image;
 }
@@ -179,7 +184,10 @@ void SliceMaker::lay_over(PaneImage& image, const Slice& slice, OverlayKind kind
 }
 
 /// Labels as colours, or as lines on the inner side of their borders. 0 is no label.
-void SliceMaker::lay_labels_over(PaneImage& image, const Slice& slice, Which which, bool as_lines) {
+/// @param columns  first column, and the one behind the last
+void SliceMaker::lay_labels_over(PaneImage& image, const Slice& slice, Which which, const SliceLook& look,
+                                 const std::pair<std::int64_t, std::int64_t>& columns) {
+  const bool as_lines = look.layer == Layer::contours;
   if (!setup_.labels) return;
   const Part map = part(*setup_.labels, which, region_of(setup_.grid, slice));
   std::vector<std::int64_t> labels(image.pixels.size() / 3);
@@ -197,7 +205,7 @@ void SliceMaker::lay_labels_over(PaneImage& image, const Slice& slice, Which whi
            (y > 0 && label(x, y - 1) != own) || (y + 1 < height && label(x, y + 1) != own);
   };
   tbb::parallel_for(std::int64_t{0}, height, [&](std::int64_t y) {
-    for (std::int64_t x = 0; x < width; ++x) {
+    for (std::int64_t x = columns.first; x < columns.second; ++x) {
       if (label(x, y) == 0 || (as_lines && !is_border(x, y))) continue;
       const std::int64_t pixel = y * width + x;
       const std::uint8_t* const at = image.pixels.data() + 3 * pixel;

@@ -5,6 +5,7 @@
 
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "io/overlay.h"
@@ -50,7 +51,7 @@ class SliceMaker {
   struct Setup {
     Geometry grid;                       ///< of the deformed volume
     Target target;                       ///< source and how it is sampled; the output is not used
-    std::optional<Target> labels;        ///< the same of labels
+    std::optional<Target> labels;        ///< labels, and how they are sampled
     FieldView still;                     ///< a field that moves nothing
     std::unique_ptr<Deformer> deformer;  ///< onto the grid
     std::unique_ptr<ForwardResampler> before;
@@ -81,7 +82,8 @@ class SliceMaker {
   Part part(const Target& target, Which which, const Region& region);
   void lay_over(PaneImage& image, const Slice& slice, OverlayKind kind);
   void lay_lattice_over(PaneImage& image, const Slice& slice);
-  void lay_labels_over(PaneImage& image, const Slice& slice, Which which, bool as_lines);
+  void lay_labels_over(PaneImage& image, const Slice& slice, Which which, const SliceLook& look,
+                       const std::pair<std::int64_t, std::int64_t>& columns);
   Part map_of(const Slice& slice, OverlayKind kind);
 
   Setup setup_;

@@ -304,10 +304,10 @@ void Stage::rest() {
     PaneLine& volume = *lines_[kSlices];
     if (!volume.is_sharp() && volume.is_free()) show(volume, Pane::volume, true, control);
     if (!quality_) {
-      quality_ = scene_.quality();
-      fold_at_.reset();
-      if (quality_->inverted + quality_->degenerate > 0)
+      const Quality quality = scene_.quality();
+      if (quality.inverted + quality.degenerate > 0)
         fold_at_ = worst_place(std::get<VertexField>(field()), {}, control);
+      quality_ = quality;
     }
     tell_state();
   } catch (const Cancelled&) {

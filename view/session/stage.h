@@ -37,8 +37,7 @@ struct State {
   glm::dvec3 cursor_mm{0};            ///< where all slices meet
   SliceLook look;
   std::string style;  ///< name of the transfer function
-  /// Numbers of the last pictures that were made, of each pane. Where nothing moves and `quality` is known, they are
-  /// exact and show the last request.
+  /// Of each pane the number of its last picture, if that is exact and shows the last request; else of the next one.
   std::array<std::uint32_t, request::kPanes> pictures{};
 };
 

@@ -8,8 +8,13 @@
 
 namespace tetwarp::viewer {
 
-/// Where what is pinned lies now. It does not move while it is pinned, so it is sought once.
+/// Where what is pinned lies now. It does not move while it is pinned, so it is sought once. While phases are played
+/// nothing is pinned by hand.
 std::vector<glm::dvec4> Stage::pin_places() {
+  if (session_->plays()) {
+    pins_.clear();
+    return {};
+  }
   std::vector<glm::dvec4> pins;
   for (const simulate::HeldZone& pin : session_->pins())
     if (const auto* const ball = std::get_if<simulate::Sphere>(&pin.zone.shape))
@@ -54,7 +59,8 @@ void Stage::tell_state() {
   state.cursor_mm = cursor_mm_;
   state.look = look_;
   state.style = style_;
-  for (std::size_t n = 0; n < lines_.size(); ++n) state.pictures[n] = lines_[n]->number();
+  for (std::size_t n = 0; n < lines_.size(); ++n)
+    state.pictures[n] = lines_[n]->number() + (lines_[n]->is_sharp() ? 0 : 1);
   listener_.state(std::move(state));
 }
 
