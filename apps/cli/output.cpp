@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cctype>
 #include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "apps/cli/reads.h"
@@ -25,9 +26,9 @@ fs::path plain(fs::path path) {
   return path;
 }
 
+/// Of two real paths. A folder is inside itself.
 bool is_inside(const fs::path& inner, const fs::path& outer) {
-  const fs::path a = real_path(inner), b = real_path(outer);
-  return std::mismatch(b.begin(), b.end(), a.begin(), a.end()).first == b.end();
+  return std::mismatch(outer.begin(), outer.end(), inner.begin(), inner.end()).first == outer.end();
 }
 
 /// Whether the record of the folder that a file lies in, or of the one around it, names it.
@@ -68,6 +69,7 @@ OutputSet::OutputSet(const Reads& reads, bool overwrite, const fs::path& folder,
   for (const fs::path& path : reads.paths()) reads_.add(path);
   if (!together_) return;
   refuse_reads(folder);
+  take_place(folder / kFolderRecord);
   targets_.push_back(folder / kFolderRecord);
   if (only_look_) return;
   staged_.push_back(std::make_unique<StagedOutput>(plain(folder), StagedOutput::Kind::folder, overwrite, is_recorded));
@@ -80,15 +82,25 @@ void OutputSet::add_reads(const std::vector<fs::path>& files) {
 
 void OutputSet::refuse_reads(const fs::path& target) const { apps::refuse_reads(reads_, target); }
 
+/// Paths are ordered component by component: what lies inside a folder follows upon it, and no taken place lies inside
+/// another. So only two neighbours can be at odds with a new one.
+void OutputSet::take_place(const fs::path& target) {
+  const fs::path place = real_path(target);
+  const auto next = places_.lower_bound(place);
+  for (auto other = next == places_.begin() ? next : std::prev(next); other != places_.end(); ++other) {
+    if (is_inside(place, other->first) || is_inside(other->first, place)) {
+      throw UsageError("two outputs have the same place, " + other->second.string() + " and " + target.string() +
+                       "; choose another name for one");
+    }
+    if (other == next) break;
+  }
+  places_.emplace(place, target);
+}
+
 fs::path OutputSet::add(const fs::path& target, StagedOutput::Kind kind) {
   if (target.empty()) return {};
   refuse_reads(target);
-  for (const fs::path& other : targets_) {
-    if (is_inside(target, other) || is_inside(other, target)) {
-      throw UsageError("two outputs have the same place, " + other.string() + " and " + target.string() +
-                       "; choose another name for one");
-    }
-  }
+  take_place(target);
   targets_.push_back(target);
   if (only_look_) return target;
   if (together_) {

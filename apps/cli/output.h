@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
@@ -51,8 +52,11 @@ class OutputSet {
   void write(const std::function<void()>& write);
 
  private:
+  void take_place(const std::filesystem::path& target);
+
   ReadPlaces reads_;
   std::vector<std::filesystem::path> targets_;
+  std::map<std::filesystem::path, std::filesystem::path> places_;  // from where a target really lies to its name
   bool overwrite_, together_, only_look_;
   std::vector<std::unique_ptr<StagedOutput>> staged_;
 };
