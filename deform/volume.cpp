@@ -35,7 +35,7 @@ VolumeView AnyVolume::view() { return {&geometry_, whole(geometry_), type_, comp
 ConstVolumeView AnyVolume::view() const { return {&geometry_, whole(geometry_), type_, components_, data()}; }
 
 void AnyVolume::check(VoxelType wanted) const {
-  require(wanted == type_, "the volume holds " + to_string(type_) + ", not " + to_string(wanted));
+  require(wanted == type_, [&] { return "the volume holds " + to_string(type_) + ", not " + to_string(wanted); });
 }
 
 }  // namespace tetwarp
