@@ -9,12 +9,11 @@
 Prints a JSON object: for slices and the volume the time from the bytes of a picture to its pixels on the canvas, median
 and 95th percentile, ms, moving (JPEG) and at rest (PNG). The program has ended by then. It wants Chromium and playwright.
 """
-import argparse
 import base64
 import json
 import shutil
 
-from pace import part, pull
+from pace import arguments, part, pull
 from client import Page, Program  # pace made it known where it is
 from playwright.sync_api import sync_playwright
 
@@ -36,19 +35,11 @@ PAINT = """async ([file, type, size]) => {
 
 
 def main():
-    parser = argparse.ArgumentParser()
-    parser.add_argument("program")
-    parser.add_argument("input")
-    parser.add_argument("--seconds", type=float, default=6)
-    parser.add_argument("--volume", type=int, default=1024)
-    parser.add_argument("options", nargs="*")
-    given = parser.parse_args()
-    what = ["--demo"] if given.input == "demo" else [given.input]
-    with Program(given.program, *what, *given.options) as program, Page(program) as page:
+    given = arguments(seconds=6)
+    with Program(given.program, *given.options) as program, Page(program) as page:
         page.sizes(512, 512, given.volume)
         page.rest()
-        middle = page.about["middle"]
-        pull(page, [middle[0], middle[1] - 40, middle[2]], given.seconds)
+        pull(page, given.seconds)
         page.rest()
         recorded = [(about, file) for _, about, file in page.pictures]
     with sync_playwright() as play:

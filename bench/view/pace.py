@@ -27,9 +27,23 @@ def part(values, share):
     return ordered[min(len(ordered) - 1, int(share * len(ordered)))] if ordered else math.nan
 
 
-def pull(page, at, seconds, rate=60):
-    """Grips tissue and moves it around a circle, `rate` moves a second."""
-    page.ask("grip", at=at, radius=25)
+def arguments(seconds):
+    """What the scripts of this folder are given: program, input, seconds of the pull, size of the volume's picture."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("program")
+    parser.add_argument("input")
+    parser.add_argument("--seconds", type=float, default=seconds)
+    parser.add_argument("--volume", type=int, default=1024)
+    parser.add_argument("options", nargs="*")
+    given = parser.parse_args()
+    given.options = [*(["--demo"] if given.input == "demo" else [given.input]), *given.options]
+    return given
+
+
+def pull(page, seconds, rate=60):
+    """Grips tissue in front of the middle and moves it around a circle, `rate` moves a second."""
+    x, y, z = page.about["middle"]
+    page.ask("grip", at=[x, y - 40, z], radius=25)
     begun = time.perf_counter()
     moves = []
     while (now := time.perf_counter()) - begun < seconds:
@@ -52,25 +66,17 @@ def latencies(page, pane, moves):
 
 
 def main():
-    parser = argparse.ArgumentParser()
-    parser.add_argument("program")
-    parser.add_argument("input")
-    parser.add_argument("--seconds", type=float, default=8)
-    parser.add_argument("--volume", type=int, default=1024)
-    parser.add_argument("options", nargs="*")
-    given = parser.parse_args()
+    given = arguments(seconds=8)
     begun = time.perf_counter()
-    what = ["--demo"] if given.input == "demo" else [given.input]
-    with Program(given.program, "--verbose", *what, *given.options) as program, Page(program) as page:
+    with Program(given.program, "--verbose", *given.options) as program, Page(program) as page:
         page.sizes(512, 512, given.volume)
         page.listen(120, lambda p: len({about["pane"] for _, about, _ in p.pictures}) == 4)
         first = page.pictures[0][0] - begun
         all_panes = page.pictures[-1][0] - begun
         page.rest()
-        middle = page.about["middle"]
         page.pictures.clear()
         page.bytes = 0
-        start, moves = pull(page, [middle[0], middle[1] - 40, middle[2]], given.seconds)
+        start, moves = pull(page, given.seconds)
         stop = time.perf_counter()
         during = [about for when, about, _ in page.pictures if when <= stop]
         size = page.bytes

@@ -51,7 +51,7 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 if not CHROMIUM:
     skip("there is no Chromium")
 
-from client import Program  # noqa: E402
+from client import AT_REST, DONE, Program  # noqa: E402
 
 
 def expect(what, message=""):
@@ -71,12 +71,7 @@ class Viewer:
 
     def rest(self):
         """Waits until the program has done all that was asked, and all panes that are seen show exact pictures of it."""
-        self.page.wait_for_function(
-            """() => {
-              const {state, panes, connection} = window.tetwarp;
-              return state && !state.moving && state.quality && state.request >= connection.seen && panes.every((p) =>
-                p.width === 0 || (p.element.dataset.exact === 'true' && p.about.number === state.pictures[p.name]));
-            }""", timeout=PATIENCE_MS)
+        self.page.wait_for_function(AT_REST, timeout=PATIENCE_MS)
 
     def text(self, selector):
         return self.page.locator(selector).inner_text()
@@ -88,10 +83,8 @@ class Viewer:
         """Waits for so many frames; or for what was asked to come to rest with fewer, as moves that follow each other
         quickly are one."""
         self.page.wait_for_function(
-            """n => {
-              const {state, connection} = window.tetwarp;
-              return state.frames >= n || (state.frames > 0 && !state.moving && state.request >= connection.seen);
-            }""", arg=least, timeout=PATIENCE_MS)
+            f"n => window.tetwarp.state.frames >= n || (window.tetwarp.state.frames > 0 && ({DONE})())", arg=least,
+            timeout=PATIENCE_MS)
 
     def wait_text(self, selector, part):
         self.page.wait_for_function("([s, t]) => document.querySelector(s).textContent.includes(t)", arg=[selector, part],

@@ -37,6 +37,16 @@ def grey_pixels(png):
     return rows
 
 
+# Conditions for a browser with the page (a function of JavaScript): the program has done all that was asked, and nothing
+# moves; and all panes that are seen show exact pictures of it.
+DONE = """() => {
+  const {state, connection} = window.tetwarp;
+  return state && !state.moving && state.request >= connection.seen;
+}"""
+AT_REST = f"""() => ({DONE})() && window.tetwarp.state.quality && window.tetwarp.panes.every((p) => p.width === 0 ||
+  (p.element.dataset.exact === 'true' && p.about.number === window.tetwarp.state.pictures[p.name]))"""
+
+
 class Refused(Exception):
     """The server did not take the connection; the text is the first line of its answer."""
 

@@ -15,7 +15,7 @@ import sys
 import tempfile
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "tests" / "view"))
-from client import Program  # noqa: E402
+from client import AT_REST, DONE, Program  # noqa: E402
 from playwright.sync_api import sync_playwright  # noqa: E402
 
 WIDTH, HEIGHT, SHOWN, RATE = 1180, 800, 680, 10
@@ -36,19 +36,13 @@ class Film:
 
     def still(self, path):
         """A picture at rest."""
-        self.page.wait_for_function("""() => {
-          const {state, panes} = window.tetwarp;
-          return state.quality && panes.every((p) => p.about.exact && p.about.number === state.pictures[p.name]);
-        }""")
+        self.page.wait_for_function(AT_REST)
         self.page.wait_for_timeout(200)
         self.page.screenshot(path=f"{self.folder}/still.png")
         subprocess.run(["ffmpeg", "-v", "error", "-y", "-i", f"{self.folder}/still.png", "-vf", PALETTE, str(path)], check=True)
 
     def settle(self):
-        self.page.wait_for_function("""() => {
-          const {state, connection} = window.tetwarp;
-          return state && state.request >= connection.seen && !state.moving;
-        }""")
+        self.page.wait_for_function(DONE)
         self.page.wait_for_timeout(400)
 
     def at(self, pane, x, y):
