@@ -243,9 +243,7 @@ struct Worst {
 
   /// @param before  undeformed corners, LPS mm  @param by  displacements
   void add(const glm::dmat4x3& before, const glm::dmat4x3& by) {
-    const auto volume = [](const glm::dmat4x3& p) {
-      return glm::determinant(glm::dmat3(p[0] - p[3], p[1] - p[3], p[2] - p[3]));
-    };
+    const auto volume = [](const glm::dmat4x3& p) { return glm::determinant(edges_of(p[0], p[1], p[2], p[3])); };
     const glm::dmat4x3 after = before + by;
     const double of_this = volume(after) / volume(before);
     if (!(of_this < jacobian)) return;

@@ -114,6 +114,11 @@ std::string number_text(double value) {
   return std::string(text, end);
 }
 
+std::string exact_number_text(double value) {
+  char text[32];
+  return {text, std::to_chars(text, text + sizeof text, value).ptr};
+}
+
 std::string describe(const DicomSeries& series, std::size_t number) {
   std::string line = "  " + std::to_string(number) + "  " +
                      (series.series_uid.empty() ? "(no UID)" : shown(series.series_uid)) + "  " +

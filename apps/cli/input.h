@@ -56,6 +56,8 @@ std::optional<std::size_t> only_choice(const DicomScan& scan);
 
 /// Six significant digits.
 std::string number_text(double value);
+/// The shortest text that is read as the same number.
+std::string exact_number_text(double value);
 
 /// One line a series: number, UID, modality, what tells it from other volumes of its series, size, spacing, what is
 /// wrong.

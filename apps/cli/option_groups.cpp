@@ -9,6 +9,7 @@
 #include <map>
 #include <optional>
 
+#include "apps/cli/input.h"
 #include "io/shown_text.h"
 
 namespace tetwarp::apps {
@@ -28,11 +29,6 @@ std::optional<Number> number_of(std::string_view text) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
   if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
   return number;
-}
-
-std::string short_text(double number) {
-  char text[32];
-  return {text, std::to_chars(text, text + sizeof text, number).ptr};
 }
 
 CLI::Validator check(const std::string& expected, std::function<bool(const std::string&)> is_good) {
@@ -75,7 +71,7 @@ CLI::Validator whole_number(std::int64_t least, std::int64_t most) {
 }
 
 CLI::Validator real_number(double least, double most) {
-  return check("a number from " + short_text(least) + " to " + short_text(most), [=](const auto& text) {
+  return check("a number from " + exact_number_text(least) + " to " + exact_number_text(most), [=](const auto& text) {
     const auto number = number_of<double>(text);
     return number && *number >= least && *number <= most;
   });

@@ -4,7 +4,6 @@
 #include "apps/view/view_save.h"
 
 #include <algorithm>
-#include <charconv>
 #include <string_view>
 #include <utility>
 
@@ -25,34 +24,22 @@ constexpr const char* kDemoFile = "phantom.nii.gz";
 constexpr int kMostFilmPictures = 240;
 constexpr double kFilmRate = 24;  ///< pictures a second
 
-bool is_plain(char c) {
-  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
-}
-
-/// @throws InputError for a name that might be anything but a file of the folder
-void require_plain(const std::string& name) {
-  require(!name.empty() && name.size() <= 64 && name.front() != '-' && std::all_of(name.begin(), name.end(), is_plain),
-          "a name has letters, digits, hyphens and underscores, up to 64 of them");
-}
-
 /// A word of a command line, in quotes where it needs them.
 std::string word(const fs::path& path) {
   const std::string text = path.string();
-  const auto is_safe = [](char c) { return is_plain(c) || c == '/' || c == '.'; };
+  const auto is_safe = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_' ||
+           c == '/' || c == '.';
+  };
   return !text.empty() && std::all_of(text.begin(), text.end(), is_safe) ? text : shell_quoted(text);
-}
-
-/// The shortest text that is read as the same number.
-std::string exact_text(double number) {
-  char text[32];
-  return {text, std::to_chars(text, text + sizeof text, number).ptr};
 }
 
 /// Numbers of an option.
 template <class Numbers>
 std::string listed(const Numbers& numbers, const char* between = ",") {
   std::string text;
-  for (const auto number : numbers) text += (text.empty() ? "" : between) + exact_text(static_cast<double>(number));
+  for (const auto number : numbers)
+    text += (text.empty() ? "" : between) + exact_number_text(static_cast<double>(number));
   return text;
 }
 
@@ -78,7 +65,9 @@ class CommandText {
     if (input.nifti_frame == NiftiFrame::qform) add("--nifti-frame qform");
     return *this;
   }
-  CommandText& add(const char* option, double number) { return add(std::string(option) + " " + exact_text(number)); }
+  CommandText& add(const char* option, double number) {
+    return add(std::string(option) + " " + exact_number_text(number));
+  }
   const std::string& text() const { return text_; }
 
  private:
@@ -160,6 +149,7 @@ class Saving::One {
   int film_step() const { return std::max(1, (job_.frames + kMostFilmPictures - 1) / kMostFilmPictures); }
   std::vector<fs::path> write_frames();
   RenderOptions film_options() const;
+  FieldArguments given_field() const;
   CommandText& add_fields(CommandText& command) const;
   void say_command(const CommandText& command) {
     saved_.command += (saved_.command.empty() ? "" : "\n") + command.text();
@@ -192,11 +182,6 @@ void Saving::One::write_demo() {
 
 void Saving::One::save() {
   const auto& wish = job_.wish;
-  require_plain(wish.name);
-  const std::vector<std::string> kinds = saved_volume_kinds(true);
-  require(wish.volume.empty() || std::find(kinds.begin(), kinds.end(), wish.volume) != kinds.end(),
-          "no volume is written as that");
-  require(wish.film.empty() || wish.film == ".mp4" || wish.film == ".gif", "no film is written as that");
   if (!wish.film.empty()) require_movie_encoder(file(wish.film));
   require(!wish.field || is_by_hand_, "the field was given; it is there already");
   std::error_code error;
@@ -232,16 +217,20 @@ void Saving::One::save() {
   if (!film.empty()) write_film(film);
 }
 
+/// The field that was given, of a sequence the one that is shown.
+FieldArguments Saving::One::given_field() const {
+  FieldArguments field = options_.field;
+  if (!options_.sequence.empty()) field.forward = {options_.sequence[static_cast<std::size_t>(job_.frame)]};
+  return field;
+}
+
 /// Adds the options that say what deforms.
 CommandText& Saving::One::add_fields(CommandText& command) const {
   if (is_by_hand_) return command.add("--scenario", scenario_).add("--labels", options_.labels);
-  if (!options_.sequence.empty()) {
-    command.add("-f", fs::path(options_.sequence[static_cast<std::size_t>(job_.frame)]));
-  } else {
-    for (const std::string& text : options_.field.forward) command.add("-f", fs::path(text));
-    command.add("--pull-field", fs::path(options_.field.pull));
-  }
-  if (options_.field.cell_size) command.add("--cell-size " + std::to_string(*options_.field.cell_size));
+  const FieldArguments field = given_field();
+  for (const std::string& text : field.forward) command.add("-f", fs::path(text));
+  command.add("--pull-field", fs::path(field.pull));
+  if (field.cell_size) command.add("--cell-size " + std::to_string(*field.cell_size));
   return command;
 }
 
@@ -258,12 +247,12 @@ void Saving::One::deform(const fs::path& output, bool runs) {
   deform.common.quiet = true;
   deform.input = input_;
   deform.scenario = scenario_;
-  if (is_by_hand_) deform.labels = options_.labels;
-  if (!is_by_hand_) {
-    deform.field = options_.field;
+  if (is_by_hand_) {
+    deform.labels = options_.labels;
+  } else {
+    deform.field = given_field();
     deform.outside = Outside::background;
   }
-  if (!options_.sequence.empty()) deform.field.forward = {options_.sequence[static_cast<std::size_t>(job_.frame)]};
   deform.output = output;
   deform.backend = options_.backend;
   deform.device = options_.device;

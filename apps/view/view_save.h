@@ -19,9 +19,8 @@ namespace tetwarp::apps {
 /// What the deformed volume may be saved as: suffixes of files, and "dicom" for a series.
 std::vector<std::string> saved_volume_kinds(bool is_dicom);
 
-/// Writes what a hand did or what was shown, and what comes of it, on a thread of its own. Names come from a page, so
-/// only letters, digits, hyphens and underscores are taken, and all files go into one folder. Volumes, fields and films
-/// are made by `deform`, `simulate` and `render`, whose commands are told.
+/// Writes what a hand did or what was shown, and what comes of it, on a thread of its own, into one folder. Volumes,
+/// fields and films are made by `deform`, `simulate` and `render`, whose commands are told.
 class Saving {
  public:
   using Saved = viewer::Viewer::Saved;

@@ -10,7 +10,6 @@ import dataclasses
 import html
 import json
 import os
-import re
 import sys
 import threading
 import weakref
@@ -47,10 +46,6 @@ class _Saving:
     ) -> tuple[list[str], str]:
         """Writes a scenario, the volume if a kind is named, the field and pictures. Returns the files, and the lines that
         make volume and field again."""
-        if not re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_-]{0,63}", name):
-            raise InputError("a name has letters, digits, hyphens and underscores, up to 64 of them")
-        if kind and kind not in self.kinds:
-            raise InputError("no volume is written as that")
         stem = os.path.join(self.folder, name)
         page = stem + ".json"
         output = stem + ("-dicom" if kind == "dicom" else kind or ".nii.gz")

@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <set>
 
+#include "deform/errors.h"
+
 namespace tetwarp::viewer {
 namespace {
 
@@ -32,6 +34,16 @@ TEST(ViewRules, OnlyTheWholeSecretIsTheSecret) {
     other[n] = other[n] == '0' ? '1' : '0';
     EXPECT_FALSE(is_same_secret(other, secret)) << n;
   }
+}
+
+TEST(ViewRules, APlainNameIsThatOfAFileInTheFolder) {
+  for (const char* const name : {"a", "by-hand", "_x", "A_1-b"}) EXPECT_NO_THROW(require_plain_name(name)) << name;
+  EXPECT_NO_THROW(require_plain_name(std::string(64, 'a')));
+  using namespace std::string_view_literals;
+  for (const std::string_view name :
+       {""sv, "-a"sv, "a.b"sv, "../a"sv, "a/b"sv, "a\n"sv, "a\0b"sv, "\xc3\xa4"sv, "a b"sv})
+    EXPECT_THROW(require_plain_name(name), InputError) << name;
+  EXPECT_THROW(require_plain_name(std::string(65, 'a')), InputError);
 }
 
 TEST(ViewRules, ATokenThatWorksOnceIsReplacedByASecretOfItsPage) {

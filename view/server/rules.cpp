@@ -30,6 +30,13 @@ std::vector<std::pair<std::string, std::string>> headers_for(const std::string& 
 
 }  // namespace
 
+void require_plain_name(std::string_view name) {
+  constexpr std::string_view kPlain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_";
+  require(!name.empty() && name.size() <= 64 && name.front() != '-' &&
+              name.find_first_not_of(kPlain) == std::string_view::npos,
+          "a name has letters, digits, hyphens and underscores, up to 64 of them");
+}
+
 std::string make_token() {
   std::array<unsigned char, 32> random{};
   if (getrandom(random.data(), random.size(), 0) != static_cast<ssize_t>(random.size()))

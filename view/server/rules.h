@@ -22,6 +22,10 @@ std::string make_token();
 /// Whether two texts are equal. The time does not depend on where they differ.
 bool is_same_secret(std::string_view given, std::string_view secret);
 
+/// Refuses a name that might be anything but that of a file in one folder.
+/// @throws InputError unless it has up to 64 letters, digits, hyphens and underscores, and begins with no hyphen
+void require_plain_name(std::string_view name);
+
 /// Which pages may enter: those that know the token, or, where each token works once, the secret that its page was
 /// told.
 class Admission {

@@ -3,6 +3,7 @@
 
 #include "view/server/viewer.h"
 
+#include <algorithm>
 #include <future>
 #include <utility>
 
@@ -10,6 +11,7 @@
 #include "backend/factories.h"
 #include "deform/errors.h"
 #include "io/scenario_file.h"
+#include "view/server/rules.h"
 
 namespace tetwarp::viewer {
 
@@ -90,7 +92,7 @@ About Viewer::about() const {
           .volume_suffixes = setup_.volume_kinds,
           .film_suffixes = setup_.film_kinds,
           .folder = setup_.folder,
-          .labels = setup_.labels.has_value(),
+          .labels = scene_->has_labels(),
           .frames = setup_.reel ? setup_.reel->frames : 0,
           .grows = setup_.reel && setup_.reel->grows,
           .pulls = setup_.reel && setup_.reel->pulls};
@@ -101,7 +103,6 @@ Stage::Setup Viewer::stage_setup() {
   setup.scenario = setup_.scenario;
   setup.patient = &setup_.patient;
   setup.reel = setup_.reel;
-  setup.has_labels = setup_.labels.has_value();
   setup.scene = scene_.get();
   setup.has_device = runs_on_device(setup_.backend);
   setup.make = [this](simulate::Method method) -> simulate::MakeSimulation {
@@ -119,7 +120,14 @@ Stage::Listener Viewer::listener() {
           .save = [this](SaveJob job) { save(std::move(job)); }};
 }
 
+/// @throws InputError for a name that is no plain one, and for kinds that were not offered
 void Viewer::save(SaveJob job) {
+  const auto is_offered = [](const std::vector<std::string>& kinds, const std::string& kind) {
+    return kind.empty() || std::find(kinds.begin(), kinds.end(), kind) != kinds.end();
+  };
+  require_plain_name(job.wish.name);
+  require(is_offered(setup_.volume_kinds, job.wish.volume), "no volume is written as that");
+  require(is_offered(setup_.film_kinds, job.wish.film), "no film is written as that");
   const std::uint32_t number = job.number;
   server_->send_text(message_of_progress(number));
   setup_.save(std::move(job), [this, number](const Saved& saved) {

@@ -45,7 +45,8 @@ class Viewer {
     std::string folder;                          ///< where files go, as the page shows it
     std::uint16_t port = 0;                      ///< 0: one that is free
     bool frames = false;                         ///< whether pages of this machine may show the page in a frame
-    /// Is told what to save, by a thread of the stage, which it must not hold up.
+    /// Is told what to save, by a thread of the stage, which it must not hold up. The name is a plain one
+    /// (`require_plain_name`), and kinds are among those above.
     /// @param done  to be called once, from any thread, while the viewer lives
     std::function<void(SaveJob, std::function<void(Saved)> done)> save;
   };

@@ -55,6 +55,10 @@ class Scene {
   void set_field(const FieldView& field) { take_field(field); }
   /// Takes a field and keeps it.
   void keep_field(AnyField field);
+  /// The field that was kept last.
+  const AnyField& kept_field() const { return kept_; }
+  /// Whether there are labels.
+  bool has_labels() const { return labels_.has_value(); }
 
   /// The slice of a plane nearest to a point. @param at_mm  LPS mm, moved into the grid
   Slice slice_near(AnatomicalPlane plane, const glm::dvec3& at_mm) const;

@@ -101,8 +101,10 @@ PaneImage SliceMaker::picture(const Slice& slice, const SliceLook& look) {
   const bool is_difference = look.compared == Compared::difference;
   PaneImage image = blank(setup_.grid, slice, !is_difference);
   const DifferenceScale scale{look.window.width / 2};
-  const auto first_after =
-      static_cast<std::int64_t>(look.compared == Compared::swipe ? std::lround(look.swipe * image.width) : 0);
+  // Columns from here on show the deformed volume.
+  const std::int64_t deformed_from = look.compared == Compared::before  ? image.width
+                                     : look.compared == Compared::swipe ? std::lround(look.swipe * image.width)
+                                                                        : 0;
   dispatch(setup_.target.source.type, [&](auto zero) {
     using V = decltype(zero);
     const auto* const a = after ? reinterpret_cast<const V*>(after->bytes.data()) : nullptr;
@@ -111,15 +113,11 @@ PaneImage SliceMaker::picture(const Slice& slice, const SliceLook& look) {
       if (is_difference) {
         put(image, pixel, scale(static_cast<double>(a[voxel]) - static_cast<double>(b[voxel])));
       } else {
-        const V value = a && pixel % image.width >= first_after ? a[voxel] : b[voxel];
+        const V value = pixel % image.width >= deformed_from ? a[voxel] : b[voxel];
         image.pixels[static_cast<std::size_t>(pixel)] = look.window(static_cast<double>(value))[0];
       }
     });
   });
-  // Columns from here on show the deformed volume.
-  const std::int64_t deformed_from = look.compared == Compared::before  ? image.width
-                                     : look.compared == Compared::swipe ? first_after
-                                                                        : 0;
   const bool is_label = look.layer == Layer::labels || look.layer == Layer::contours;
   if (!look.layer || (look.compared == Compared::before && !is_label)) return image;
   if (image.is_grey) image = coloured(image);
@@ -131,7 +129,7 @@ PaneImage SliceMaker::picture(const Slice& slice, const SliceLook& look) {
     case Layer::labels:
     case Layer::contours:
       if (deformed_from > 0) lay_labels_over(image, slice, Which::before, look, {0, deformed_from});
-      lay_labels_over(image, slice, Which::after, look, {deformed_from, image.width});
+      if (deformed_from < image.width) lay_labels_over(image, slice, Which::after, look, {deformed_from, image.width});
   }
   return image;
 }
@@ -187,8 +185,8 @@ void SliceMaker::lay_over(PaneImage& image, const Slice& slice, OverlayKind kind
 /// @param columns  first column, and the one behind the last
 void SliceMaker::lay_labels_over(PaneImage& image, const Slice& slice, Which which, const SliceLook& look,
                                  const std::pair<std::int64_t, std::int64_t>& columns) {
-  const bool as_lines = look.layer == Layer::contours;
   if (!setup_.labels) return;
+  const bool as_lines = look.layer == Layer::contours;
   const Part map = part(*setup_.labels, which, region_of(setup_.grid, slice));
   std::vector<std::int64_t> labels(image.pixels.size() / 3);
   dispatch(setup_.labels->source.type, [&](auto zero) {

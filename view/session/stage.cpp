@@ -305,8 +305,7 @@ void Stage::rest() {
     if (!volume.is_sharp() && volume.is_free()) show(volume, Pane::volume, true, control);
     if (!quality_) {
       const Quality quality = scene_.quality();
-      if (quality.inverted + quality.degenerate > 0)
-        fold_at_ = worst_place(std::get<VertexField>(field()), {}, control);
+      if (quality.inverted + quality.degenerate > 0) fold_at_ = worst(control);
       quality_ = quality;
     }
     tell_state();
@@ -354,10 +353,10 @@ Session& Stage::session() const {
 
 int Stage::frames() const { return setup_.reel ? frame_ : session_->frames(); }
 
-/// The field that is shown, in host memory.
-AnyField Stage::field() const {
-  if (setup_.reel) return setup_.reel->field(frame_);
-  return session_->player().field();
+/// Where the field is worst that is shown. @throws Cancelled
+std::optional<glm::dvec3> Stage::worst(const Control& control) const {
+  if (setup_.reel) return worst_place(std::get<VertexField>(scene_.kept_field()), {}, control);
+  return worst_place(session_->player().field(), {}, control);
 }
 
 /// The session's field is another one.
@@ -382,10 +381,10 @@ void Stage::all_is_new() {
 void Stage::begin_session(simulate::Method method) {
   simulate::Scenario scenario = setup_.scenario;
   scenario.method = method;
-  auto session =
-      std::make_unique<Session>(std::move(scenario), *setup_.patient, setup_.make(method), setup_.most_snapshot_bytes);
-  scene_.keep_field(session->player().field());  // before the other one goes, whose field the scene reads
-  session_ = std::move(session);
+  // The one before lives until the scene, which reads its field, has another.
+  const std::unique_ptr<Session> before = std::exchange(
+      session_,
+      std::make_unique<Session>(std::move(scenario), *setup_.patient, setup_.make(method), setup_.most_snapshot_bytes));
   method_ = method;
   is_moving_ = false;
   changed_field();

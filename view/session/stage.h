@@ -110,7 +110,6 @@ class Stage {
     const simulate::Patient* patient;  ///< null where a reel is shown
     Scene* scene;
     std::optional<Reel> reel = {};
-    bool has_labels = false;  ///< whether the scene has
     std::function<simulate::MakeSimulation(simulate::Method)> make;
     bool has_device = false;  ///< so that pictures of what moves need not be small
     std::size_t most_snapshot_bytes = Session::kMostSnapshotBytes;
@@ -156,7 +155,7 @@ class Stage {
   void rest();
   Session& session() const;
   int frames() const;
-  AnyField field() const;
+  std::optional<glm::dvec3> worst(const Control& control) const;
   void changed_field();
   void all_is_new();
   std::vector<glm::dvec4> pin_places();

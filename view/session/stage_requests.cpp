@@ -100,7 +100,7 @@ void Stage::on(const LayOver& over) {
   require(!of_tetrahedra || !setup_.reel || !setup_.reel->pulls,
           "a pull field has no tetrahedra: no lattice, Jacobian or folds");
   const bool of_labels = over.layer == Layer::labels || over.layer == Layer::contours;
-  require(!of_labels || setup_.has_labels, "there are no labels; --labels names them");
+  require(!of_labels || scene_.has_labels(), "there are no labels; --labels names them");
   look_.layer = over.layer;
   all_stale(true, false);
 }
