@@ -18,6 +18,14 @@ glm::i64vec3 coarse_blocks(const Geometry& grid) {
   return blocks;
 }
 
+glm::i64vec3 moving_blocks(const Geometry& grid) {
+  const bool is_deep = grid.slices.empty() && grid.size.z > kMostMovingVoxels;
+  glm::i64vec3 blocks(2, 2, is_deep ? 2 : 1);
+  for (int axis = 0; axis < 2; ++axis)  // at least two voxels are left on an axis
+    if (grid.size[axis] < 4) blocks[axis] = 1;
+  return blocks;
+}
+
 Geometry coarse_grid(const Geometry& grid, const glm::i64vec3& blocks) {
   Geometry coarse = grid;
   coarse.size = (grid.size + blocks - std::int64_t{1}) / blocks;

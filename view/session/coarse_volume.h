@@ -13,6 +13,10 @@ constexpr std::int64_t kMostCoarseVoxels = 96;
 /// Larger slices are made with fewer pixels while something moves and there is no device.
 constexpr std::int64_t kMostMovingVoxels = 256;
 
+/// For each axis how many voxels become one in the volume that moving slices are made of: two where there are more than
+/// kMostMovingVoxels, in the plane of slices at uneven distances alone.
+glm::i64vec3 moving_blocks(const Geometry& grid);
+
 /// For each axis how many voxels become one, so that at most kMostCoarseVoxels are left. Slices at uneven distances
 /// stay.
 glm::i64vec3 coarse_blocks(const Geometry& grid);

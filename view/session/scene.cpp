@@ -9,6 +9,7 @@
 #include "deform/fields/lattice_mesh.h"
 #include "io/slice_view.h"
 #include "view/session/coarse_volume.h"
+#include "view/session/sampled_field.h"
 
 namespace tetwarp::viewer {
 
@@ -57,10 +58,14 @@ Scene::Scene(const Setup& setup)
     const glm::i64vec3 blocks = coarse_blocks(*setup.source.geometry);
     coarse_source_ = coarse_volume(setup.source, blocks);
     coarse_ = whole_volume(std::as_const(coarse_source_).view(), coarse_grid(grid_, blocks));
-    if (std::max(grid_.size.x, grid_.size.y) > kMostMovingVoxels)
-      moving_slices_ = slice_maker(coarse_grid(grid_, glm::i64vec3(2, 2, grid_.size.z > kMostMovingVoxels ? 2 : 1)));
+    coarse_field_.lattice = *coarse_->output->view().geometry;
+    if (std::max(grid_.size.x, grid_.size.y) > kMostMovingVoxels) {
+      const glm::i64vec3 halves = moving_blocks(*setup.source.geometry);
+      half_source_ = coarse_volume(setup.source, halves);
+      moving_slices_ = slice_maker(std::as_const(half_source_).view(), coarse_grid(grid_, halves));
+    }
   }
-  slices_ = slice_maker(grid_);
+  slices_ = slice_maker(source_, grid_);
 }
 
 /// A copy where the backend works.
@@ -70,10 +75,11 @@ std::unique_ptr<BackendVolume> Scene::on_device(const ConstVolumeView& volume) c
   return copy;
 }
 
-std::unique_ptr<SliceMaker> Scene::slice_maker(const Geometry& grid) const {
+/// @param grid  of the deformed volume; where it is that of the source, voxels are sampled with vectors
+std::unique_ptr<SliceMaker> Scene::slice_maker(const ConstVolumeView& source, const Geometry& grid) const {
   SliceMaker::Setup setup;
   setup.grid = grid;
-  setup.target = target(source_, {});
+  setup.target = target(source, {});
   if (labels_) setup.labels = Target{.source = *labels_, .output = {}, .interpolation = Interpolation::vote};
   setup.still = view(still_, Outside::background);
   setup.deformer = std::make_unique<Deformer>(setup_.backend, grid, setup_.device, setup_.limits);
@@ -121,8 +127,7 @@ PaneImage Scene::slice(const Slice& slice, const SliceLook& look) { return slice
 PaneImage Scene::moving_slice(const Slice& slice, const SliceLook& look) {
   if (!moving_slices_) return slices_->picture(slice, look);
   Slice coarse = middle_slice(moving_slices_->grid(), slice.plane);
-  const std::int64_t size = grid_.size[slice.normal_axis], count = moving_slices_->grid().size[slice.normal_axis];
-  coarse.voxel = slice.voxel / ((size + count - 1) / count);
+  coarse.voxel = slice.voxel / moving_blocks(*setup_.source.geometry)[slice.normal_axis];
   return moving_slices_->picture(coarse, look);
 }
 
@@ -152,9 +157,13 @@ void Scene::show_volume() {
 }
 
 /// Deforms a volume by the field, and has its renderer see what changed.
-Report Scene::deform(Whole& one, const FieldOptions& options, const Control& control) const {
+Report Scene::deform(Whole& one, const FieldOptions& options, const Control& control) {
   const Target whole = target(one.from, one.output->view());
-  one.deformer->set_field(field_, options, control);
+  AnyFieldView field = field_;
+  if (const auto* const forward = std::get_if<FieldView>(&field_);
+      coarse_ && &one == &*coarse_ && forward && sample_field(*forward, coarse_field_))
+    field = view(coarse_field_, forward->outside);
+  one.deformer->set_field(field, options, control);
   const Update update = one.deformer->update({&whole, 1}, control);
   if (one.is_set) {
     one.renderer->update_volume(update.changed, control);

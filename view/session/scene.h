@@ -25,9 +25,10 @@ struct Quality {
 
 /// What is seen of a volume and a field: exact slices, and pictures of the volume.
 ///
-/// On a device the deformed volume is made as a whole for each picture of it. On the CPU slices are made alone, with
-/// fewer pixels while something moves, and a volume picture is first one of a volume with fewer voxels; `make_exact`
-/// makes the whole one. One object serves one thread at a time.
+/// On a device the deformed volume is made as a whole for each picture of it. On the CPU slices are made alone, while
+/// something moves from a volume with half the voxels on an axis, and a volume picture is first one of a volume with
+/// fewer voxels, whose field is interpolated at its voxels; `make_exact` makes the whole one. One object serves one
+/// thread at a time.
 class Scene {
  public:
   /// Where and of what pictures are made.
@@ -64,8 +65,8 @@ class Scene {
   Slice slice_near(AnatomicalPlane plane, const glm::dvec3& at_mm) const;
   /// A picture of a slice, a pixel a voxel, as radiologists look at it.
   PaneImage slice(const Slice& slice, const SliceLook& look);
-  /// The same on the CPU for what moves: a pixel for four voxels of a large slice, and up to half a voxel beside it.
-  /// On a device it is the whole slice.
+  /// The same on the CPU for what moves: of a large slice a pixel is the mean of four voxels, or of eight in two
+  /// slices. On a device it is the whole slice.
   PaneImage moving_slice(const Slice& slice, const SliceLook& look);
   /// A window of grey levels that suits the volume.
   Window window() const;
@@ -106,10 +107,10 @@ class Scene {
   void take_field(const AnyFieldView& field);
   std::unique_ptr<BackendVolume> on_device(const ConstVolumeView& volume) const;
   Whole whole_volume(const ConstVolumeView& from, const Geometry& grid) const;
-  std::unique_ptr<SliceMaker> slice_maker(const Geometry& grid) const;
+  std::unique_ptr<SliceMaker> slice_maker(const ConstVolumeView& source, const Geometry& grid) const;
 
   Target target(const ConstVolumeView& source, const VolumeView& output) const;
-  Report deform(Whole& one, const FieldOptions& options, const Control& control) const;
+  Report deform(Whole& one, const FieldOptions& options, const Control& control);
   void show_volume();
   std::optional<glm::i64vec3> voxel_at(const glm::dvec3& point_mm) const;
 
@@ -123,10 +124,11 @@ class Scene {
   ConstVolumeView source_;                                        ///< undeformed, where the backend works
   std::optional<ConstVolumeView> labels_;
   std::unique_ptr<SliceMaker> slices_, moving_slices_;  ///< `moving_slices_` only on the CPU, of large volumes
-  AnyVolume coarse_source_;
-  std::optional<Whole> coarse_;   ///< only on the CPU
-  std::optional<Whole> exact_;    ///< on the CPU when it is asked for
-  const Whole* drawn_ = nullptr;  ///< the one that the last picture shows
+  AnyVolume half_source_, coarse_source_;               ///< only on the CPU; the first of large volumes
+  VertexField coarse_field_;                            ///< the field at the voxels of the coarse volume
+  std::optional<Whole> coarse_;                         ///< only on the CPU
+  std::optional<Whole> exact_;                          ///< on the CPU when it is asked for
+  const Whole* drawn_ = nullptr;                        ///< the one that the last picture shows
   RenderStyle style_;
   bool is_shown_ = false;  ///< whether the volume that is drawn has it
   bool is_exact_ = false;

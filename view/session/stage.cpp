@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "deform/errors.h"
 #include "deform/field_quality.h"
@@ -20,6 +21,8 @@ using std::chrono::milliseconds;
 constexpr milliseconds kPace(16);  ///< between two pictures at least: a screen shows no more
 /// While tissue comes to rest, further steps begin so long after the first one of a picture.
 constexpr milliseconds kSettling(10);
+/// A step with all its pictures takes no longer where what moves is seen to move smoothly: 15 pictures a second.
+constexpr milliseconds kSmooth(66);
 /// Without a request, before exact pictures are made.
 constexpr milliseconds kUntilRest(80), kUntilRestOnDevice(30);
 constexpr std::chrono::seconds kUntilRetry(1);  ///< after something failed that nobody asked for
@@ -232,6 +235,7 @@ void Stage::step() {
       is_moving_ = session_->plays() || (!convergence.reached && resting_steps_ < kMostRestingSteps);
     } while (is_moving_ && !follows && Clock::now() < stepped_ + kSettling);
   });
+  step_took_ = Clock::now() - stepped_;
   tell_state();
 }
 
@@ -240,6 +244,7 @@ void Stage::next_frame() {
   const Timer timer(*this, &StageTimes::steps);
   show_frame(frame_ + 1);
   is_moving_ = frame_ + 1 < setup_.reel->frames;
+  step_took_ = Clock::now() - stepped_;
   tell_state();
 }
 
@@ -250,12 +255,15 @@ void Stage::show_frame(int frame) {
   all_is_new();
 }
 
-/// Whether a pane is to be shown before the next step. Without a device the volume, which takes longer than all slices,
-/// is shown after every second step.
+/// Whether a pane is to be shown before the next step. Where not all can be shown smoothly, the volume, which takes
+/// longer than all slices, is shown after every second step.
 bool Stage::is_due(const PaneLine& line) const {
-  const bool waits = &line == lines_[kSlices].get() && is_moving_ && !setup_.has_device && frames() % 2 != 0;
+  const bool waits = &line == lines_[kSlices].get() && is_moving_ && frames() % 2 != 0 && !is_smooth();
   return line.is_stale() && !waits;
 }
+
+/// Whether a step and a picture of each pane took no longer than a smooth motion allows.
+bool Stage::is_smooth() const { return std::accumulate(took_.begin(), took_.end(), step_took_) <= kSmooth; }
 
 /// Shows what is due and may be shown. @return whether there was something
 bool Stage::show_panes() {
@@ -269,6 +277,7 @@ bool Stage::show_panes() {
 }
 
 void Stage::show(PaneLine& line, Pane pane, bool is_exact, const Control& control) {
+  const Clock::time_point begun = Clock::now();
   const Timer timer(*this, pane == Pane::volume ? &StageTimes::volumes : &StageTimes::slices);
   Picture about;
   about.request = number_;
@@ -284,6 +293,7 @@ void Stage::show(PaneLine& line, Pane pane, bool is_exact, const Control& contro
     const bool moves = !is_exact && is_moving_;
     line.take(moves ? scene_.moving_slice(slice, look_) : scene_.slice(slice, look_), std::move(about));
   }
+  if (!is_exact) took_[static_cast<std::size_t>(pane)] = Clock::now() - begun;
 }
 
 /// Makes exact pictures of what has come to rest. Requests end it.

@@ -150,6 +150,7 @@ class Stage {
   void next_frame();
   void show_frame(int frame);
   bool is_due(const PaneLine& line) const;
+  bool is_smooth() const;
   bool show_panes();
   void show(PaneLine& line, request::Pane pane, bool is_exact, const Control& control);
   void rest();
@@ -216,6 +217,8 @@ class Stage {
   bool is_moving_ = false;    ///< whether tissue has not come to rest
   int resting_steps_ = 0;     ///< steps since the hand did something
   Clock::time_point stepped_{}, changed_{};
+  Clock::duration step_took_{};                          ///< the last step
+  std::array<Clock::duration, request::kPanes> took_{};  ///< the last picture of each pane that was not exact
 
   std::mutex mutex_;  ///< of what follows
   std::condition_variable wake_;
