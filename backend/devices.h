@@ -72,8 +72,10 @@ class PinnedMemory {
 class BackendVolume {
  public:
   /// Uninitialised voxels of one component.
-  /// @param backend  where they are used
-  /// @param device   number of its device
+  /// @param backend   where they are used
+  /// @param geometry  their grid
+  /// @param type      of a voxel
+  /// @param device    number of its device
   /// @throws DeviceError without such a device, or where there is no room
   BackendVolume(BackendKind backend, const Geometry& geometry, VoxelType type, int device = 0);
   /// Frees them.

@@ -72,8 +72,9 @@ class Renderer {
 
   /// The place in the volume that a pixel of a picture shows: where half of what its ray shows lies in front, or, for
   /// Projection::maximum, its largest value.
-  /// @param plane   pixels and rays of the picture
-  /// @param column  of the pixel, from 0 at the left  @param row  from 0 at the top
+  /// @param plane    pixels and rays of the picture
+  /// @param column   of the pixel, from 0 at the left  @param row  from 0 at the top
+  /// @param control  stop and stream
   /// @return LPS mm; empty where nothing is seen
   /// @throws InputError before a volume and a style are set, or for a pixel outside the picture
   virtual std::optional<glm::dvec3> pick(const ViewPlane& plane, int column, int row, const Control& control = {}) = 0;

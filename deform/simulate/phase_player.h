@@ -51,6 +51,7 @@ class PhasePlayer {
     std::set<std::string> open;       ///< names of the open cuts
     std::vector<std::byte> of_nodes;  ///< `Simulation::state`; empty before the first phase
   };
+  /// The state that another player, on any backend, can go on from.
   State state() const;
   /// Goes on from a state, to the same bits. A phase begins next.
   void set_state(const State& state);
@@ -61,6 +62,7 @@ class PhasePlayer {
   const PhaseLoads& loads() const { return *loads_; }
   /// Whether open cuts divide cells, so that a mesh takes their place in the field.
   bool divides_cells() const { return !division_.replaced.empty(); }
+  /// The mesh in the place of the cells that open cuts divide.
   const DividedLattice& division() const { return division_; }
   /// The model of the phase.
   const Model& model() const { return model_; }

@@ -141,9 +141,12 @@ std::vector<std::uint8_t> tissue_of_cells(const Scenario& scenario, const Patien
 /// @throws InputError for lengths in parts of the body where the patient has no body
 std::vector<Cut> open_cuts(const Scenario& scenario, const Phase& phase, const Patient& patient);
 
-/// How many vertices a phase holds, pins, moves to a goal, and pulls without one.
+/// How many vertices a phase does something to.
 struct PhaseCounts {
-  std::size_t held = 0, pinned = 0, moved = 0, with_force = 0;
+  std::size_t held = 0,  ///< that never move
+      pinned = 0,        ///< that stay where they were when the phase began
+      moved = 0,         ///< that have a goal
+      with_force = 0;    ///< that are pulled without one
 };
 
 /// What a phase does to which vertices.

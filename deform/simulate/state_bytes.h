@@ -31,6 +31,7 @@ class StateBytes {
                                           " bytes, where one of this model has " + std::to_string(expected) +
                                           "; it is of another model or method");
   }
+  /// The next values. @param count  how many; no more than are left
   template <class T>
   std::vector<T> take(std::size_t count) {
     std::vector<T> values(count);
