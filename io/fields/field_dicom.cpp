@@ -39,8 +39,10 @@ class Values {
     std::vector<double> values(count);
     for (unsigned long n = 0; n < count; ++n) {
       values[n] = number(tag, n);
-      require(std::isfinite(values[n]), "value " + std::to_string(n + 1) + " of " + tag_name(tag) +
-                                            " is no finite number, " + file_ + "; expected one");
+      require(std::isfinite(values[n]), [&] {
+        return "value " + std::to_string(n + 1) + " of " + tag_name(tag) + " is no finite number, " + file_ +
+               "; expected one";
+      });
     }
     return values;
   }

@@ -77,9 +77,10 @@ ControlPoints read_control_points(const std::filesystem::path& path) {
     glm::dvec3& d = points.displacement[v];
     const auto n = static_cast<std::int64_t>(v);
     const glm::i64vec3 at(n % size.x, n / size.x % size.y, n / (size.x * size.y));
-    require(glm::length(d) < 1e9,  // false for NaN
-            "control point (" + std::to_string(at.x) + ", " + std::to_string(at.y) + ", " + std::to_string(at.z) +
-                ") is not finite, or beyond 1e9 mm, " + file + "; every one needs a position");
+    require(glm::length(d) < 1e9, [&] {  // false for NaN
+      return "control point (" + std::to_string(at.x) + ", " + std::to_string(at.y) + ", " + std::to_string(at.z) +
+             ") is not finite, or beyond 1e9 mm, " + file + "; every one needs a position";
+    });
     d = kLpsFromRas * d - rest(glm::dvec3(at));
   }
   return points;

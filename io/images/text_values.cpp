@@ -62,14 +62,17 @@ void read_decimal_values(std::istream& stream, VoxelType type, std::span<std::by
     std::string word;
     for (std::size_t n = 0; n < count; ++n) {
       do {
-        require(static_cast<bool>(stream >> word), "unreadable voxels (" + std::to_string(n) + " of " +
-                                                       std::to_string(count) + " numbers), " + file +
-                                                       "; is the file whole?");
+        require(static_cast<bool>(stream >> word), [&] {
+          return "unreadable voxels (" + std::to_string(n) + " of " + std::to_string(count) + " numbers), " + file +
+                 "; is the file whole?";
+        });
       } while (word == ",");
       word.erase(0, word.find_first_not_of(','));
       V value{};
-      require(parse(word, value), "unreadable voxels (\"" + shown(word.substr(0, 60)) + "\" for number " +
-                                      std::to_string(n + 1) + "), " + file + "; is the file whole?");
+      require(parse(word, value), [&] {
+        return "unreadable voxels (\"" + shown(word.substr(0, 60)) + "\" for number " + std::to_string(n + 1) + "), " +
+               file + "; is the file whole?";
+      });
       std::memcpy(values.data() + n * sizeof(V), &value, sizeof(V));
     }
   });
@@ -84,8 +87,10 @@ void read_hexadecimal_bytes(std::istream& stream, std::span<std::byte> bytes, co
   };
   for (std::size_t n = 0; n < bytes.size(); ++n) {
     const int high = next(), low = high < 0 ? -1 : next();
-    require(low >= 0, "unreadable voxels (digits of " + std::to_string(n) + " of " + std::to_string(bytes.size()) +
-                          " bytes), " + file + "; is the file whole?");
+    require(low >= 0, [&] {
+      return "unreadable voxels (digits of " + std::to_string(n) + " of " + std::to_string(bytes.size()) + " bytes), " +
+             file + "; is the file whole?";
+    });
     bytes[n] = static_cast<std::byte>(high * 16 + low);
   }
 }

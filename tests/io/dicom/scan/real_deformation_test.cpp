@@ -6,8 +6,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <string_view>
 
 #include "deform/fields/formula.h"
 #include "io/dicom_series.h"
@@ -71,8 +73,8 @@ Reference sample_in_double(const Volume<std::int16_t>& ct, const glm::dvec3& ind
 
 class RealDeformation : public testing::TestWithParam<RealCt> {
  protected:
-  /// Every voxel of a middle part: covered where its source is inside, by the value there to rounding and `error`
-  /// voxels.
+  /// Every seventh voxel of a middle part (with TETWARP_CI_FULL=1 each): covered where its source is inside, by the
+  /// value there to rounding and `error` voxels.
   static void expect_inverse(const Volume<std::int16_t>& ct, const PointMap& forward, const Inverse& inverse,
                              double error) {
     const Geometry& grid = ct.geometry;
@@ -93,9 +95,11 @@ class RealDeformation : public testing::TestWithParam<RealCt> {
     EXPECT_EQ(report.inverted + report.degenerate, 0u);
 
     const AffineMap point = point_from_index(grid), index = index_from_point(grid);
-    std::uint64_t inside = 0, holes = 0, outliers = 0;
+    const char* const full = std::getenv("TETWARP_CI_FULL");
+    const std::size_t stride = full != nullptr && full == std::string_view("1") ? 1 : 7;
+    std::uint64_t looked_at = 0, inside = 0, holes = 0, outliers = 0;
     double largest = 0;
-    for (std::size_t n = 0; n < output.size(); ++n) {
+    for (std::size_t n = 0; n < output.size(); n += stride, ++looked_at) {
       const auto i = static_cast<std::int64_t>(n);
       const glm::i64vec3 voxel = region.begin + glm::i64vec3(i % size.x, i / size.x % size.y, i / (size.x * size.y));
       const glm::dvec3 here = point(glm::dvec3(voxel)), there = inverse(here), source = index(there);
@@ -108,7 +112,7 @@ class RealDeformation : public testing::TestWithParam<RealCt> {
       const double bound = 0.5 + 1e-3 + 3 * error * (expected.high - expected.low);
       outliers += std::abs(output[n] - expected.value) > bound;
     }
-    EXPECT_GT(inside, output.size() / 2);
+    EXPECT_GT(inside, looked_at / 2);
     EXPECT_LE(largest, error);
     RecordProperty("largest_error_voxels", std::to_string(largest));
     EXPECT_EQ(holes, 0u);
