@@ -84,8 +84,9 @@ bool is_field_file(const FieldSource& source);
 FieldFileHeader read_field_header(const FieldSource& source);
 /// Reads a field file of any format; docs/reference/fields.md lists them. Doubles are rounded to float.
 /// The direction is stated by the key `tetwarp_direction` of NRRD and MHA, by the NIfTI header field descrip, as in
-/// `tetwarp_direction=forward`, or as the format has it. Pull fields may have NaN where there is no source; if the file
-/// does not state its direction only `read_pull_field` reads such a file.
+/// `tetwarp_direction=forward`, by 3D Slicer's key "displacement field type" of NRRD, or as the format has it. Pull
+/// fields may have NaN where there is no source; if the file does not state its direction only `read_pull_field` reads
+/// such a file.
 /// @throws InputError for a file that is no field, or with a value that is not finite (the first such sample is named)
 FieldFile read_field_file(const FieldSource& source);
 

@@ -158,10 +158,14 @@ void write_field_file(const std::filesystem::path& path, const PullField& field,
 std::unique_ptr<ImageWriter> create_field_file(const std::filesystem::path& path, const Geometry& grid,
                                                Direction direction) {
   ImageWriteOptions options;
-  if (image_format(path) == ImageFormat::nifti)
+  const std::optional<ImageFormat> format = image_format(path);
+  if (format == ImageFormat::nifti) {
     options.metadata["descrip"] = std::string(kDirectionKey) + "=" + to_string(direction);
-  else
+  } else {
     options.metadata[kDirectionKey] = to_string(direction);
+  }
+  if (format == ImageFormat::nrrd)
+    options.metadata[kSlicerDirectionKey] = direction == Direction::forward ? kSlicerForward : kSlicerPull;
   return create_image(path, grid, VoxelType::f32, 3, options);
 }
 

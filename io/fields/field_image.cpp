@@ -36,6 +36,17 @@ class ImageFieldReader final : public FieldReader {
   std::unique_ptr<ImageReader> image_;
 };
 
+/// Takes the direction from the key of 3D Slicer, where the file has it.
+void read_slicer_direction(const ImageHeader& image, const std::string& file, FieldFileHeader& header) {
+  const auto key = image.metadata.find(kSlicerDirectionKey);
+  if (key == image.metadata.end()) return;
+  require(key->second == kSlicerPull || key->second == kSlicerForward,
+          "the direction \"" + key->second + "\" (" + kSlicerDirectionKey + "), " + file + "; expected " + kSlicerPull +
+              " or " + kSlicerForward);
+  header.direction = key->second == kSlicerForward ? Direction::forward : Direction::pull;
+  header.direction_basis = FieldBasis::stated;
+}
+
 bool recognizes(const std::filesystem::path& path, std::string_view) { return has_image_suffix(path); }
 
 bool holds_field(const FieldSource& source) { return read_image_header(source.path).components == 3; }
@@ -72,10 +83,15 @@ void read_stated_direction(const ImageHeader& image, const std::string& file, Fi
       note != image.metadata.end() && note->second.starts_with(prefix)) {
     text = note->second.substr(prefix.size());
   }
+  read_slicer_direction(image, file, header);
   if (text.empty()) return;
   require(text == "forward" || text == "pull",
           "the direction \"" + text + "\" (" + kDirectionKey + "), " + file + "; expected forward or pull");
-  header.direction = text == "forward" ? Direction::forward : Direction::pull;
+  const Direction direction = text == "forward" ? Direction::forward : Direction::pull;
+  require(!header.direction || header.direction == direction,
+          std::string(kDirectionKey) + " and \"" + kSlicerDirectionKey + "\" contradict each other, " + file +
+              "; expected forward and modeling, or pull and resampling");
+  header.direction = direction;
   header.direction_basis = FieldBasis::stated;
   header.frame_basis = header.units_basis = header.absolute_basis = FieldBasis::by_format;
 }

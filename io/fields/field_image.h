@@ -16,6 +16,10 @@
 namespace tetwarp {
 
 inline constexpr const char* kDirectionKey = "tetwarp_direction";
+/// Key with which 3D Slicer says the direction of a field in NRRD (Slicer/Slicer#8757): `resampling`, output to input,
+/// or `modeling`, which moves points.
+inline constexpr const char* kSlicerDirectionKey = "displacement field type";
+inline constexpr const char *kSlicerPull = "resampling", *kSlicerForward = "modeling";
 
 extern const FieldFormat kFieldFormat_image;
 
@@ -23,8 +27,9 @@ extern const FieldFormat kFieldFormat_image;
 std::unique_ptr<ImageReader> open_vectors(const std::filesystem::path& path, NiftiFrame frame = NiftiFrame::sform);
 
 /// Takes the direction of the field (forward or pull) from the key `kDirectionKey`, where the file has it, and frame
-/// and units with it: Tetwarp writes the key only to displacements in LPS mm.
-/// @throws InputError for a direction that is neither
+/// and units with it: Tetwarp writes the key only to displacements in LPS mm. Else the direction alone is taken from
+/// `kSlicerDirectionKey`.
+/// @throws InputError for a direction that is neither, or where both keys contradict each other
 void read_stated_direction(const ImageHeader& image, const std::string& file, FieldFileHeader& header);
 
 /// Reads one vector a voxel, unchanged.

@@ -6,6 +6,8 @@
 #include <gtest/gtest.h>
 
 #include <bit>
+#include <fstream>
+#include <map>
 
 #include "io/image_file.h"
 #include "tests/support/image_samples.h"
@@ -77,6 +79,33 @@ TEST(FieldFile, UnstatedDirectionIsTakenEitherWay) {
               {-1, {{"tetwarp_direction", "sideways"}}});
   EXPECT_NE(refusal([&] { read_field_file(scratch / "g.nrrd"); }).find("the direction \"sideways\""),
             std::string::npos);
+}
+
+TEST(FieldFile, TheDirectionThatSlicerStatesIsTaken) {
+  const Scratch scratch;
+  const AnyVolume vectors = numbered(all_orientations()[7], VoxelType::f32, 3);
+  const auto write = [&](std::map<std::string, std::string> keys) {
+    write_image(scratch / "g.nrrd", vectors.view(), {-1, std::move(keys)});
+    return scratch / "g.nrrd";
+  };
+  const std::string key = "displacement field type";
+  EXPECT_EQ(read_field_file(write({{key, "resampling"}})).direction, Direction::pull);
+  EXPECT_NE(refusal([&] { read_forward_field(scratch / "g.nrrd"); }).find("a pull field where a forward field"),
+            std::string::npos);
+  EXPECT_EQ(read_field_file(write({{key, "modeling"}})).direction, Direction::forward);
+  EXPECT_EQ(read_field_header(scratch / "g.nrrd").units_basis, FieldBasis::assumed);
+  write({{key, "other"}});
+  EXPECT_NE(refusal([&] { read_field_file(scratch / "g.nrrd"); }).find("expected resampling or modeling"),
+            std::string::npos);
+  write({{key, "modeling"}, {"tetwarp_direction", "pull"}});
+  EXPECT_NE(refusal([&] { read_field_file(scratch / "g.nrrd"); }).find("contradict each other"), std::string::npos);
+  // What Tetwarp writes says so as well.
+  write_field_file(scratch / "own.nrrd", asymmetric_field(all_orientations()[0]));
+  std::ifstream own(scratch / "own.nrrd", std::ios::binary);
+  std::string text(4096, '\0');
+  own.read(text.data(), static_cast<std::streamsize>(text.size()));
+  EXPECT_NE(text.find(key + ":=modeling\n"), std::string::npos);
+  EXPECT_EQ(read_field_file(scratch / "own.nrrd").direction, Direction::forward);
 }
 
 TEST(FieldFile, FirstVertexThatIsNotFiniteIsNamed) {
