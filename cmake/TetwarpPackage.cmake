@@ -1,6 +1,9 @@
 # SPDX-FileCopyrightText: The Tetwarp authors
 # SPDX-License-Identifier: Apache-2.0
 
+# What is installed has a component of installations (cmake --install --component): program, development, python or
+# documentation.
+#
 # The package `tetwarp`: one component a library, each with an export file of its own. find_package() takes it from an
 # installation, or from the build (tetwarp_DIR is then the build folder).
 include(CMakePackageConfigHelpers)
@@ -9,10 +12,11 @@ set(TETWARP_PACKAGE_FOLDER "${CMAKE_INSTALL_LIBDIR}/cmake/tetwarp")
 # tetwarp_install_library(NAME): installs tetwarp_NAME and its HEADERS as the component NAME.
 function(tetwarp_install_library name)
   install(TARGETS tetwarp_${name} EXPORT tetwarp-${name}
-          ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}"
-          FILE_SET HEADERS DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/tetwarp")
+          ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}" COMPONENT development
+          FILE_SET HEADERS DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/tetwarp" COMPONENT development)
   set_target_properties(tetwarp_${name} PROPERTIES EXPORT_NAME ${name})
-  install(EXPORT tetwarp-${name} NAMESPACE tetwarp:: FILE tetwarp-${name}.cmake DESTINATION "${TETWARP_PACKAGE_FOLDER}")
+  install(EXPORT tetwarp-${name} NAMESPACE tetwarp:: FILE tetwarp-${name}.cmake DESTINATION "${TETWARP_PACKAGE_FOLDER}"
+          COMPONENT development)
   export(EXPORT tetwarp-${name} NAMESPACE tetwarp:: FILE "${PROJECT_BINARY_DIR}/tetwarp-${name}.cmake")
 endfunction()
 
@@ -32,5 +36,5 @@ function(tetwarp_install_package)
   write_basic_package_version_file("${PROJECT_BINARY_DIR}/tetwarpConfigVersion.cmake" COMPATIBILITY SameMinorVersion)
   install(FILES "${PROJECT_BINARY_DIR}/tetwarpConfig.cmake" "${PROJECT_BINARY_DIR}/tetwarpConfigVersion.cmake"
                 "${PROJECT_BINARY_DIR}/FindLibdeflate.cmake" "${PROJECT_BINARY_DIR}/FindOpenJP2.cmake"
-          DESTINATION "${TETWARP_PACKAGE_FOLDER}")
+          DESTINATION "${TETWARP_PACKAGE_FOLDER}" COMPONENT development)
 endfunction()

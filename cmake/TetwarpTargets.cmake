@@ -18,13 +18,13 @@ function(tetwarp_library name)
 endfunction()
 
 # tetwarp_module(NAME SOURCES ...): makes libtetwarp_NAME.so, which io/files/module.h loads when it is needed. It is built
-# with tetwarp_io, and looked for in lib of the build and of the installation.
+# with tetwarp_io, and looked for in lib/tetwarp of the build and of the installation.
 function(tetwarp_module name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES")
   add_library(tetwarp_${name} MODULE ${arg_SOURCES})
   tetwarp_configure(tetwarp_${name})
-  set_target_properties(tetwarp_${name} PROPERTIES LIBRARY_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/lib")
-  install(TARGETS tetwarp_${name} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  set_target_properties(tetwarp_${name} PROPERTIES LIBRARY_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/lib/tetwarp")
+  install(TARGETS tetwarp_${name} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/tetwarp COMPONENT program)
 endfunction()
 
 # Sets the options with which every target of the project is compiled.
@@ -39,4 +39,17 @@ function(tetwarp_configure target)
       "$<$<COMPILE_LANGUAGE:CUDA>:-std=c++20;--fmad=false;--expt-relaxed-constexpr;--diag-suppress=20012;-Xcompiler=-ffp-contract=off>")
     target_compile_definitions(${target} PUBLIC GLM_FORCE_CUDA)
   endif()
+endfunction()
+
+# tetwarp_precompile(TARGET [HEADER ...]): compiles what most of its sources include once, and so takes a third or more
+# of their compile time away. HEADER: as in an include directive, further headers.
+function(tetwarp_precompile target)
+  set(headers "${PROJECT_SOURCE_DIR}/cmake/precompiled.h")
+  foreach(header IN LISTS ARGN)
+    list(APPEND headers "<${header}>")
+  endforeach()
+  list(TRANSFORM headers REPLACE "(.+)" "$<$<COMPILE_LANGUAGE:CXX>:\\1>")
+  target_precompile_headers(${target} PRIVATE ${headers})
+  # GCC 12 then takes the insides of std::string for the project's own, and warns of faults that are none.
+  target_compile_options(${target} PRIVATE "$<$<COMPILE_LANG_AND_ID:CXX,GNU>:-Wno-array-bounds;-Wno-stringop-overflow;-Wno-stringop-overread>")
 endfunction()

@@ -17,7 +17,7 @@ void* find_in_module(const char* module, const char* function) {
 void refuse_without_module(const std::string& what, const std::string& module, const std::string& path,
                            const std::string& otherwise) {
   throw NotCompiled(what + " need " + module + ", which cannot be loaded, " + path +
-                    "; put it into lib beside the program's folder" + otherwise);
+                    "; put it into lib/tetwarp beside the program's folder" + otherwise);
 }
 
 }  // namespace tetwarp

@@ -10,8 +10,8 @@
 namespace tetwarp {
 
 /// Finds a function of a module and loads the module, which stays until the program ends. The module is looked for
-/// where the dynamic linker looks for the libraries of the program: in `lib` of the build, or beside the program's
-/// folder.
+/// where the dynamic linker looks for the libraries of the program: in `lib/tetwarp` of the build, or beside the
+/// folder of the program.
 /// @param module    file name
 /// @param function  an extern "C" name
 /// @return null if the module cannot be loaded, or has no such function

@@ -29,7 +29,7 @@ TEST(ReadProgram, IsLookedForBesideLibraryAndProgramAndInLibexec) {
 }
 
 /// Where the module is loaded from, in a tree of the test's own.
-const std::string kModule = TETWARP_TEST_LIBDIR "/libtetwarp_transform.so";
+const std::string kModule = TETWARP_TEST_MODULE_FOLDER "/libtetwarp_transform.so";
 
 void copy_to(const fs::path& from, const fs::path& to) {
   fs::create_directories(to.parent_path());
@@ -48,7 +48,7 @@ std::string read_by(const fs::path& module, const fs::path& file) {
 }
 
 TEST(ReadProgram, IsFoundWhereverAnInstallationWasMovedTo) {
-  for (const std::string folder : {TETWARP_TEST_LIBDIR, TETWARP_TEST_LIBEXECDIR "/tetwarp"}) {
+  for (const std::string folder : {TETWARP_TEST_MODULE_FOLDER, TETWARP_TEST_LIBEXECDIR "/tetwarp"}) {
     const Scratch scratch;
     copy_to(TETWARP_TEST_MODULE, scratch / kModule);
     copy_to(TETWARP_READ_BUILT, scratch / (folder + "/tetwarp-read"));
@@ -71,7 +71,7 @@ TEST(ReadProgram, MissingIsAnErrorThatNamesItAndEveryPlace) {
   const fs::path root = fs::canonical(scratch.path());
   EXPECT_TRUE(
       says(why, {"Error: the program tetwarp-read, which reads " + (scratch / "t.h5").string() + ", is not there",
-                 (root / TETWARP_TEST_LIBDIR "/tetwarp-read").string() + ", ",
+                 (root / TETWARP_TEST_MODULE_FOLDER "/tetwarp-read").string() + ", ",
                  (root / TETWARP_TEST_LIBEXECDIR "/tetwarp/tetwarp-read").string(), "TETWARP_READ_PROGRAM"}));
   EXPECT_EQ(why.find("InputError"), std::string::npos) << "the file is not to blame: " << why;
   ::setenv("TETWARP_READ_PROGRAM", TETWARP_READ_BUILT, 1);

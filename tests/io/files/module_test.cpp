@@ -24,7 +24,7 @@ TEST(Module, RefusalNamesModuleAndFile) {
   } catch (const NotCompiled& error) {
     words = error.what();
   }
-  EXPECT_TRUE(says(words, {"files of a kind need libx.so", "a.kind", "lib beside", ", or write another"}));
+  EXPECT_TRUE(says(words, {"files of a kind need libx.so", "a.kind", "lib/tetwarp beside", ", or write another"}));
 }
 
 }  // namespace
