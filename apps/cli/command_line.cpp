@@ -16,19 +16,6 @@ namespace tetwarp::apps {
 
 namespace {
 
-/// The options of every subcommand; one of them was given.
-struct Commands {
-  PhantomOptions phantom;
-  InfoOptions info;
-  FieldCommandOptions field;
-  InvertOptions invert;
-  DeformOptions deform;
-  SimulateOptions simulate;
-  BatchOptions batch;
-  RenderOptions render;
-  ViewOptions view;
-};
-
 /// Only for `tetwarp --help`: what follows `bench` is never parsed here.
 void add_bench(CLI::App& app) {
   app.add_subcommand("bench", "Time the paper's methods and Tetwarp (runs tetwarp-bench, see `tetwarp bench --help`)");
@@ -86,6 +73,23 @@ void parse(CLI::App& app, const std::vector<std::string>& arguments) {
 
 }  // namespace
 
+void add_commands(CLI::App& app, AllOptions& options) {
+  app.description("Deform medical volumes exactly: CT series in, deformed series out");
+  app.name("tetwarp");
+  app.require_subcommand(1);
+  app.set_version_flag("--version", version_text);
+  add_phantom(app, options.phantom);
+  add_info(app, options.info);
+  add_deform(app, options.deform);
+  add_field(app, options.field);
+  add_invert(app, options.invert);
+  add_simulate(app, options.simulate);
+  add_render(app, options.render);
+  add_view(app, options.view);
+  add_batch(app, options.batch);
+  add_bench(app);
+}
+
 std::vector<OptionKind> deform_options() {
   CLI::App app;
   DeformOptions options;
@@ -113,21 +117,9 @@ DeformOptions parse_deform(const std::vector<std::string>& arguments) {
 int run_command_line(int argc, char** argv) {
   // Ahead of CLI11, which takes words such as `--` and `--help` away even from a prefix command.
   if (argc > 1 && argv[1] == std::string_view("bench")) return run_bench({argv + 2, argv + argc});
-  CLI::App app("Deform medical volumes exactly: CT series in, deformed series out");
-  app.name("tetwarp");
-  app.require_subcommand(1);
-  app.set_version_flag("--version", version_text);
-  Commands commands;
-  add_phantom(app, commands.phantom);
-  add_info(app, commands.info);
-  add_deform(app, commands.deform);
-  add_field(app, commands.field);
-  add_invert(app, commands.invert);
-  add_simulate(app, commands.simulate);
-  add_render(app, commands.render);
-  add_view(app, commands.view);
-  add_batch(app, commands.batch);
-  add_bench(app);
+  CLI::App app;
+  AllOptions commands;
+  add_commands(app, commands);
   try {
     parse(app, {argv, argv + argc});
   } catch (const CLI::Success& help) {

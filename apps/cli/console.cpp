@@ -32,6 +32,8 @@ constexpr int kInterrupts[] = {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGXCPU, SIGUSR
 
 volatile std::sig_atomic_t reader_is_gone = 0;
 
+bool prints_filter_progress = false;
+
 bool is_ignored(int signal) {
   struct sigaction action {};
   return sigaction(signal, nullptr, &action) == 0 && action.sa_handler == SIG_IGN;
@@ -92,16 +94,28 @@ void say(const CommonOptions& common, const std::string& line) {
   if (!common.quiet) std::fprintf(stderr, "%s\n", shown_lines(line).c_str());
 }
 
+void print_filter_progress() { prints_filter_progress = true; }
+
 Stage::Stage(const CommonOptions& common, std::string name)
-    : common_(common), name_(std::move(name)), terminal_(isatty(STDERR_FILENO) != 0) {}
+    : common_(common), name_(std::move(name)), terminal_(isatty(STDERR_FILENO) != 0) {
+  if (!prints_filter_progress) return;
+  std::printf("<filter-start><filter-name>%s</filter-name></filter-start>\n", name_.c_str());
+  std::fflush(stdout);
+}
 
 Stage::~Stage() {
+  if (prints_filter_progress) {
+    std::printf("<filter-end><filter-name>%s</filter-name><filter-time>%.3f</filter-time></filter-end>\n",
+                name_.c_str(), seconds());
+    std::fflush(stdout);
+  }
   if (visible_) std::fprintf(stderr, "\r\033[K");
   if (common_.verbose) say(common_, name_ + ": " + std::to_string(seconds()) + " s");
 }
 
 Control Stage::control() {
-  return {.progress = [this](double fraction) { draw(fraction); }, .stop = interrupt_token()};
+  return {.progress = [this](double fraction) { prints_filter_progress ? print(fraction) : draw(fraction); },
+          .stop = interrupt_token()};
 }
 
 double Stage::seconds() const {
@@ -119,6 +133,15 @@ void Stage::draw(double fraction) {
                           std::string(static_cast<std::size_t>(kBarWidth - filled), '.');
   std::fprintf(stderr, "\r%-10s [%s] %3d %%", name_.c_str(), bar.c_str(), static_cast<int>(fraction * 100));
   std::fflush(stderr);
+}
+
+void Stage::print(double fraction) {
+  using namespace std::chrono_literals;
+  const auto now = std::chrono::steady_clock::now();
+  if (now - drawn_ < 100ms) return;
+  drawn_ = now;
+  std::printf("<filter-progress>%.3f</filter-progress>\n", fraction);
+  std::fflush(stdout);
 }
 
 std::string format_bytes(std::uint64_t bytes) {

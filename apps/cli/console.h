@@ -29,6 +29,10 @@ std::stop_token interrupt_token();
 /// One line to standard error, unless quiet.
 void say(const CommonOptions& common, const std::string& line);
 
+/// Stages of this process tell their progress on standard output from now on, in the elements of the Slicer Execution
+/// Model (filter-start, filter-progress, filter-end), instead of drawing bars.
+void print_filter_progress();
+
 /// A stage of a command: its time, and a progress bar on a terminal once it lasts longer than a second.
 class Stage {
  public:
@@ -43,6 +47,7 @@ class Stage {
 
  private:
   void draw(double fraction);
+  void print(double fraction);
 
   const CommonOptions& common_;
   std::string name_;

@@ -29,22 +29,22 @@ CLI::Validator finite_number();
 /// A finite number greater than 0.
 CLI::Validator positive_number();
 /// Turns a name into the value of an enumeration that it stands for, as CLI11 reads it. Any other word is refused,
-/// numbers too, which CLI11's own transformers let through.
+/// numbers too, which CLI11's own transformers let through. The check's name is the names, "a,b".
 template <class Choice>
 CLI::Validator one_of(std::initializer_list<std::pair<const char*, Choice>> choices) {
+  std::string names;
+  for (const auto& [name, value] : choices) names += (names.empty() ? "" : ",") + std::string(name);
   return CLI::Validator(
-      [choices = std::vector(choices)](std::string& text) {
-        std::string names;
-        for (const auto& [name, value] : choices) {
-          if (text == name) {
-            text = std::to_string(static_cast<int>(value));
-            return std::string();
-          }
-          names += (names.empty() ? "" : ",") + std::string(name);
-        }
-        return text + " not in {" + names + "}";
-      },
-      "");
+             [choices = std::vector(choices), names](std::string& text) {
+               for (const auto& [name, value] : choices) {
+                 if (text != name) continue;
+                 text = std::to_string(static_cast<int>(value));
+                 return std::string();
+               }
+               return text + " not in {" + names + "}";
+             },
+             "")
+      .name(names);
 }
 /// Turns a size in memory, such as 8G, 2.5G, 500M or 512MiB, into bytes.
 CLI::Validator size_in_bytes();

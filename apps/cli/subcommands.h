@@ -23,4 +23,19 @@ void add_render(CLI::App& app, RenderOptions& options);
 void add_view(CLI::App& app, ViewOptions& options);
 void add_batch(CLI::App& app, BatchOptions& options);
 
+/// The options of every subcommand; of one command line those of one subcommand are set.
+struct AllOptions {
+  PhantomOptions phantom;
+  InfoOptions info;
+  FieldCommandOptions field;
+  InvertOptions invert;
+  DeformOptions deform;
+  SimulateOptions simulate;
+  BatchOptions batch;
+  RenderOptions render;
+  ViewOptions view;
+};
+/// Describes the program: its name, its version and all its subcommands.
+void add_commands(CLI::App& app, AllOptions& options);
+
 }  // namespace tetwarp::apps

@@ -3,7 +3,9 @@
 
 #pragma once
 
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "deform/fields/point_map.h"
 
@@ -68,6 +70,9 @@ double half_length(const Geometry& volume, int axis);
 /// @param angle      radians at the largest distance from the centre
 /// @param cell_size  voxels
 VertexField twist(const Geometry& volume, double angle, std::int64_t cell_size);
+
+/// Names of all formulas.
+std::vector<std::string> formula_names();
 
 /// Whether a text begins with the name of a formula (`wave`, `wave:...`); its parameters are not looked at.
 bool is_formula(std::string_view text);

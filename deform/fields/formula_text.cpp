@@ -225,13 +225,19 @@ const Formula* find_formula(std::string_view text) {
 
 }  // namespace
 
+std::vector<std::string> formula_names() {
+  std::vector<std::string> names;
+  for (const Formula& formula : kFormulas) names.emplace_back(formula.name);
+  return names;
+}
+
 bool is_formula(std::string_view text) { return find_formula(text) != nullptr; }
 
 PointMap parse_formula(std::string_view text, const Geometry& volume) {
   const Formula* formula = find_formula(text);
   if (!formula) {
     std::string names;
-    for (const Formula& known : kFormulas) names += (names.empty() ? "" : ", ") + std::string(known.name);
+    for (const std::string& name : formula_names()) names += (names.empty() ? "" : ", ") + name;
     throw InputError("formula \"" + std::string(text) + "\" is unknown; choose one of " + names);
   }
   require_valid(volume, "volume");
