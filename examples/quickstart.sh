@@ -2,17 +2,19 @@
 # SPDX-FileCopyrightText: The Tetwarp authors
 # SPDX-License-Identifier: Apache-2.0
 
-# Installs what is missing (Debian 12 or 13), builds Tetwarp, and deforms the built-in phantom: DICOM in; DICOM, NIfTI and
-# pictures out. Safe to run again. CUDA is used where nvcc is found.
+# Installs what is missing (Debian 12 or 13; Ubuntu 24.04 has the same names in universe), builds Tetwarp, and deforms the
+# built-in phantom: DICOM in; DICOM, NIfTI and pictures out. Safe to run again. CUDA is used where nvcc is found. Who can
+# become root neither by itself nor by sudo is told what to install.
 #
 #   examples/quickstart.sh [OUTPUT_FOLDER]     default: ./first-light
+#   examples/quickstart.sh --packages          names the packages, one a line
 #
 # Environment: TETWARP_CUDA_ARCHITECTURES (default: those of this machine's devices; without one, a few that serve all
 # cards), TETWARP_JOBS (default: all cores), TETWARP_PRESET (default: cuda where nvcc is found, else cpu).
 set -euo pipefail
 source_dir=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 out=${1:-first-light}
-[[ $out != -* ]] || out=./$out  # a name that begins with a dash is no option
+[[ $out != -* || $out = --packages ]] || out=./$out  # a name that begins with a dash is no option
 
 packages=(
   g++ cmake ninja-build git ca-certificates xz-utils          # to build, and to unpack test data
@@ -24,14 +26,22 @@ packages=(
   python3-dev python3-venv                                    # the Python package
   dicom3tools dcm2niix python3-pydicom python3-gdcm python3-numpy python3-nibabel  # independent readers that the tests ask
 )
+if [ "$out" = --packages ]; then
+  printf '%s\n' "${packages[@]}"
+  exit
+fi
 missing=()
 for package in "${packages[@]}"; do
   dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'install ok installed' || missing+=("$package")
 done
 if [ ${#missing[@]} -gt 0 ]; then
-  echo "== installing: ${missing[*]}"
   as_root=()
   [ "$(id -u)" = 0 ] || as_root=(sudo)
+  if [ ${#as_root[@]} -gt 0 ] && ! command -v sudo >/dev/null; then
+    printf 'quickstart.sh: error: packages are missing; have them installed as root:\n  apt-get install %s\n' "${missing[*]}" >&2
+    exit 1
+  fi
+  echo "== installing: ${missing[*]}"
   "${as_root[@]}" apt-get update -qq
   "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
 fi
