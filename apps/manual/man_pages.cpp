@@ -31,13 +31,14 @@ std::string plain(std::string_view text) {
   return out;
 }
 
-std::string bold(std::string_view text) { return "\\fB" + plain(text).substr(text.starts_with('.') ? 2 : 0) + "\\fR"; }
+std::string bold(std::string_view text) { return "\\fB" + plain(text) + "\\fR"; }
 std::string italic(std::string_view text) { return "\\fI" + plain(text) + "\\fR"; }
 
 std::string heading(const std::string& name, const std::string& version) {
   std::string title = name;
   std::transform(title.begin(), title.end(), title.begin(), [](unsigned char c) { return std::toupper(c); });
-  return ".TH " + plain(title) + " 1 \"\" \"Tetwarp " + plain(version) + "\" \"User Commands\"\n.SH NAME\n";
+  // Without hyphenation, for hyphens would be taken for those of options.
+  return ".TH " + plain(title) + " 1 \"\" \"Tetwarp " + plain(version) + "\" \"User Commands\"\n.nh\n.SH NAME\n";
 }
 
 /// What the paragraph of an option begins with: its names, and what it takes.

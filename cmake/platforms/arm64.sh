@@ -3,9 +3,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 # Builds Tetwarp for ARM64 on another machine of Debian 12, and compares the bits that it gives under an emulator
-# (tests/bits). Without ITK, VTK and CUDA.
+# (tests/bits), of which it keeps a record (cmake/platforms/table.py). Without ITK, VTK and CUDA.
 #
-#   cmake/platforms/arm64.sh
+#   cmake/platforms/arm64.sh [OPTIONS OF tests/bits/check.py]
 #
 # Wants the Debian packages g++-aarch64-linux-gnu qemu-user-static debootstrap. The libraries of ARM64 are unpacked into
 # build/arm64-sysroot, where none of them is installed or run. TETWARP_JOBS: default all cores.
@@ -32,4 +32,17 @@ cmake --build --preset arm64 --parallel "${TETWARP_JOBS:-$(nproc)}"
 file -b build/arm64/apps/tetwarp | cut -d, -f1-2
 DCMDICTPATH=$(find "$sysroot/usr/share" -name dicom.dic | head -1)
 export DCMDICTPATH
-tests/bits/check.py build/arm64/apps/tetwarp --launcher "qemu-aarch64-static -L $sysroot"
+status=0
+bits=$(tests/bits/check.py build/arm64/apps/tetwarp --launcher "qemu-aarch64-static -L $sysroot" "$@" | tee /dev/stderr | tail -1) || status=1
+mkdir -p bench/results/platforms
+{
+  echo "system: libraries of Debian 12, aarch64 (NEON) under $(qemu-aarch64-static --version | head -1)"
+  echo "compiler: $(aarch64-linux-gnu-g++ --version | head -1)"
+  echo "options: without ITK and VTK; cross compiled"
+  echo "commit: $(git rev-parse --short=12 HEAD)"
+  echo "date: $(date -u +%Y-%m-%d)"
+  echo "tests: those of the bits alone"
+  echo "bits: $bits"
+  echo "result: $([ $status = 0 ] && echo passed || echo failed)"
+} | tee bench/results/platforms/arm64.txt
+exit $status
