@@ -59,6 +59,19 @@ TEST(SampledField, AtItsOwnVerticesIsTheField) {
   EXPECT_EQ(samples.displacement, field.displacement);
 }
 
+TEST(SampledField, IsTakenAtTheVoxelsOfEveryCoarseVolume) {
+  // The last block of an axis may have fewer voxels, and its middle then lies beyond the last vertex.
+  for (const std::int64_t size : {40, 97, 257, 300, 511, 512, 513, 768, 1024}) {
+    for (const std::int64_t cell : {4, 8, 16, 32}) {
+      const Geometry grid = grid_of({size, 512, 300}, {0.8, 0.9, 1.1});
+      const VertexField field = sampled(lattice_over(grid, cell));
+      VertexField samples{coarse_grid(grid, coarse_blocks(grid)), {}};
+      EXPECT_TRUE(sample_field(view(field), samples)) << size << " voxels, cells of " << cell;
+      EXPECT_EQ(samples.displacement.size(), static_cast<std::size_t>(voxel_count(samples.lattice)));
+    }
+  }
+}
+
 TEST(SampledField, IsRefusedWhereTheFieldIsNotALatticeOverAllPoints) {
   const Geometry lattice = grid_of({4, 5, 6}, {8, 9, 10});
   const VertexField field = sampled(lattice);
@@ -67,7 +80,7 @@ TEST(SampledField, IsRefusedWhereTheFieldIsNotALatticeOverAllPoints) {
     return !sample_field(view(one), samples) && samples.displacement.empty();
   };
   EXPECT_TRUE(refuses(field, grid_of({4, 5, 7}, {8, 9, 10})));                // beyond the last vertex
-  EXPECT_TRUE(refuses(field, grid_of({4, 5, 6}, {8, 9, 10}, {-0.1, 0, 0})));  // before the first
+  EXPECT_TRUE(refuses(field, grid_of({4, 5, 6}, {8, 9, 10}, {-4.1, 0, 0})));  // before the first
   Geometry turned = lattice;
   turned.direction = glm::dmat3(glm::dvec3(0, 1, 0), glm::dvec3(-1, 0, 0), glm::dvec3(0, 0, 1));
   EXPECT_TRUE(refuses(field, turned));

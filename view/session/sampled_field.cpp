@@ -19,15 +19,15 @@ struct Between {
   float share = 0;         ///< of the next vertex, 0 to 1
 };
 
-/// Where the points of an axis lie among `count` vertices; empty if one lies outside.
+/// Where the points of an axis lie among `count` vertices; empty if one lies more than half a step outside.
 /// @param begin, step  index of the first point, and from one to the next, in vertices
 std::optional<std::vector<Between>> places(std::int64_t points, std::int64_t count, double begin, double step) {
-  constexpr double kSlack = 1e-6;  // vertices: what rounding in the geometry may come to
+  const double slack = std::max(1e-6, 0.5 * step);  // vertices; the least is what rounding in the geometry may come to
   std::vector<Between> found;
   found.reserve(static_cast<std::size_t>(points));
   for (std::int64_t n = 0; n < points; ++n) {
     const double index = begin + static_cast<double>(n) * step;
-    if (!(index >= -kSlack && index <= static_cast<double>(count - 1) + kSlack)) return std::nullopt;
+    if (!(index >= -slack && index <= static_cast<double>(count - 1) + slack)) return std::nullopt;
     const auto first = std::clamp<std::int64_t>(static_cast<std::int64_t>(std::floor(index)), 0, count - 2);
     found.push_back({first, static_cast<float>(std::clamp(index - static_cast<double>(first), 0.0, 1.0))});
   }

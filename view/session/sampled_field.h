@@ -12,8 +12,9 @@ namespace tetwarp::viewer {
 /// prepared for a handful of voxels. Inside cells the map is another one than that of the tetrahedra.
 /// @param field    in host memory
 /// @param samples  its lattice says where to take them, and its displacements are set
-/// @return  false, and nothing is set, for a mesh, or where the axes of the lattices differ, or the field does not
-///          reach over all points
+/// @return  false, and nothing is set, for a mesh, or where the axes of the lattices differ, or a point lies more than
+///          half a step outside of the field; nearer ones, such as the last blocks of a volume have, get the nearest
+///          displacement
 bool sample_field(const FieldView& field, VertexField& samples);
 
 }  // namespace tetwarp::viewer

@@ -19,7 +19,7 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr milliseconds kPace(16);  ///< between two pictures at least: a screen shows no more
-/// While tissue comes to rest, further steps begin so long after the first one of a picture.
+/// While tissue comes to rest, further steps begin so long after the first one of a picture at least.
 constexpr milliseconds kSettling(10);
 /// A step with all its pictures takes no longer where what moves is seen to move smoothly: 15 pictures a second.
 constexpr milliseconds kSmooth(66);
@@ -223,19 +223,23 @@ void Stage::refuse(std::uint32_t number, const std::exception& error) {
 void Stage::step() {
   stepped_ = Clock::now();
   if (setup_.reel) return next_frame();
+  // Without a device pictures take longer than steps, so there are as many steps as a smooth motion leaves time for.
+  const Clock::duration settling =
+      setup_.has_device ? kSettling : std::max<Clock::duration>(kSettling, kSmooth - pictures_took());
   change([&] {
     bool follows = false;  // whether the hand asked for something before this step
     do {
       follows = session_->is_behind();
+      const Clock::time_point begun = Clock::now();
       const simulate::Convergence convergence = [this] {
         const Timer timer(*this, &StageTimes::steps);
         return session_->step();
       }();
+      step_took_ = Clock::now() - begun;
       resting_steps_ = follows ? 0 : resting_steps_ + 1;
       is_moving_ = session_->plays() || (!convergence.reached && resting_steps_ < kMostRestingSteps);
-    } while (is_moving_ && !follows && Clock::now() < stepped_ + kSettling);
+    } while (is_moving_ && !follows && Clock::now() < stepped_ + settling);
   });
-  step_took_ = Clock::now() - stepped_;
   tell_state();
 }
 
@@ -263,7 +267,12 @@ bool Stage::is_due(const PaneLine& line) const {
 }
 
 /// Whether a step and a picture of each pane took no longer than a smooth motion allows.
-bool Stage::is_smooth() const { return std::accumulate(took_.begin(), took_.end(), step_took_) <= kSmooth; }
+bool Stage::is_smooth() const { return step_took_ + pictures_took() <= kSmooth; }
+
+/// What the last pictures of all panes took that were not exact.
+Stage::Clock::duration Stage::pictures_took() const {
+  return std::accumulate(took_.begin(), took_.end(), Clock::duration{});
+}
 
 /// Shows what is due and may be shown. @return whether there was something
 bool Stage::show_panes() {

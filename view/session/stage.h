@@ -151,6 +151,7 @@ class Stage {
   void show_frame(int frame);
   bool is_due(const PaneLine& line) const;
   bool is_smooth() const;
+  Clock::duration pictures_took() const;
   bool show_panes();
   void show(PaneLine& line, request::Pane pane, bool is_exact, const Control& control);
   void rest();
