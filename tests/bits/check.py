@@ -7,7 +7,8 @@
     tests/bits/check.py PROGRAM [--launcher "COMMAND ..."] [--write] [--only TEXT] [-- OPTION ...]
 
 --launcher: what starts the program, such as an emulator of another processor. --write: writes hashes.tsv anew.
---only: cases whose name contains a text. OPTION: of each `deform` and `simulate`, such as --threads 3 or --backend cuda.
+--only: cases whose name contains a text; not with --write. OPTION: such as --threads 3 or --backend cuda; of each
+`deform` and `invert`, and --threads of all commands.
 
 Hashed are the values of voxels, vectors and maps, never files, whose headers name the version. Exit status 0: all are
 equal, 1: some differ, or a command failed.
@@ -68,8 +69,9 @@ def cases():
 class Runner:
     """Runs the program in folders of their own."""
 
-    def __init__(self, program, launcher, scratch):
+    def __init__(self, program, launcher, scratch, options):
         self.start = [*shlex.split(launcher), str(pathlib.Path(program).resolve())]
+        self.options = options
         self.scratch = scratch
         self.count = 0
 
@@ -78,7 +80,11 @@ class Runner:
         self.count += 1
         folder = self.scratch / str(self.count)
         folder.mkdir()
-        done = subprocess.run([*self.start, *arguments, "--quiet"], cwd=folder, capture_output=True, text=True)
+        options = self.options
+        if arguments[0] not in ("deform", "invert"):
+            at = options.index("--threads") if "--threads" in options else len(options)
+            options = options[at:at + 2]
+        done = subprocess.run([*self.start, *arguments, *options, "--quiet"], cwd=folder, capture_output=True, text=True)
         if done.returncode != 0:
             raise RuntimeError(f"{shlex.join(arguments)}: exit status {done.returncode}, {done.stderr.strip()[:500]}")
         return folder
@@ -118,26 +124,28 @@ def main():
     own = sys.argv[1:]
     extra = own[own.index("--") + 1:] if "--" in own else []
     given = parser.parse_args(own[:own.index("--")] if "--" in own else own)
+    if given.write and given.only:
+        parser.error("--write is for all cases")
     wanted = dict(line.rsplit("\t", 1) for line in HASHES.read_text(encoding="utf-8").splitlines()) if HASHES.exists() else {}
-    found, failed, differ = {}, 0, 0
+    found, tried, failed, differ = {}, 0, 0, 0
     with tempfile.TemporaryDirectory() as scratch:
-        run = Runner(given.program, given.launcher, pathlib.Path(scratch))
+        run = Runner(given.program, given.launcher, pathlib.Path(scratch), extra)
         files = prepare(run)
         for name, values in [("phantom", files["ct"]), ("phantom", files["wide"]), ("inverse of the formula", files["pull"])]:
             found[f"{name}\t{values.stem}"] = hashlib.sha256(values_of(values)).hexdigest()[:32]
         for name, arguments in cases():
             if given.only not in name:
                 continue
+            tried += 1
             try:
-                options = extra if arguments[0] == "deform" else []
-                folder = run([*(filled(argument, files) for argument in arguments), *options])
+                folder = run([filled(argument, files) for argument in arguments])
             except RuntimeError as error:
                 failed += 1
                 print(f"{name}: {error}")
                 continue
             for path in sorted(folder.glob("*.mha")):
                 found[f"{name}\t{path.stem}"] = hashlib.sha256(values_of(path)).hexdigest()[:32]
-    if given.write:
+    if given.write and not failed:
         HASHES.write_text("".join(f"{key}\t{value}\n" for key, value in found.items()), encoding="utf-8")
     else:
         for key, value in found.items():
@@ -149,7 +157,7 @@ def main():
             print("missing: " + key.replace("\t", ", "))
         differ += len(missing)
     print(f"{len(found)} hashes, {differ} differ, {failed} commands failed")
-    return 1 if differ or failed or not found else 0
+    return 1 if differ or failed or not tried else 0
 
 
 if __name__ == "__main__":
