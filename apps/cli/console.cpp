@@ -10,6 +10,7 @@
 
 #include <csignal>
 #include <cstdio>
+#include <exception>
 #include <thread>
 
 #include "io/shown_text.h"
@@ -105,6 +106,7 @@ Stage::Stage(const CommonOptions& common, std::string name)
 
 Stage::~Stage() {
   if (prints_filter_progress) {
+    if (std::uncaught_exceptions() == 0) std::printf("<filter-progress>1</filter-progress>\n");
     std::printf("<filter-end><filter-name>%s</filter-name><filter-time>%.3f</filter-time></filter-end>\n",
                 name_.c_str(), seconds());
     std::fflush(stdout);

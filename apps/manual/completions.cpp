@@ -18,10 +18,10 @@ Takes takes_of(const ManualOption& option) {
   if (option.value.empty()) return Takes::nothing;
   if (!option.choices.empty()) return Takes::choice;
   if (option.value == "FIELD") return Takes::field;
-  const bool is_number = option.value == "INT" || option.value == "FLOAT" || option.value == "UINT";
+  // An output that is a folder or a file has CLI11's word for any text, and is wanted in any case.
   const bool is_file = option.value.find("FILE") != std::string::npos ||
                        option.value.find("FOLDER") != std::string::npos || option.value.starts_with("IN=") ||
-                       (option.value == "TEXT" && !is_number);
+                       (option.value == "TEXT" && option.required);
   return is_file ? Takes::file : Takes::other;
 }
 
@@ -38,12 +38,15 @@ std::string quoted(std::string_view text) {
   return out + "'";
 }
 
-/// What a description begins with, as far as a line of choices has room for it.
+/// What a description begins with, as far as a line of choices has room for it: up to a mark behind which a blank or
+/// the end follows, or to a parenthesis.
 std::string short_text(const std::string& description) {
-  const std::size_t end = description.find_first_of(":;.(");
-  std::string text = description.substr(0, end);
-  while (text.ends_with(' ')) text.pop_back();
-  return text;
+  for (std::size_t n = 1; n < description.size(); ++n) {
+    const bool is_mark =
+        description.find_first_of(":;.,", n) == n && (n + 1 == description.size() || description[n + 1] == ' ');
+    if (is_mark || description.compare(n, 2, " (") == 0) return description.substr(0, n);
+  }
+  return description;
 }
 
 std::string first_line(const char* comment) {
@@ -73,9 +76,10 @@ std::string for_bash(const Manual& manual) {
   return first_line("#") +
          "_tetwarp() {\n"
          "  local current=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]} command=${COMP_WORDS[1]}\n"
-         "  local words= files= options= fields='" +
+         "  local - words= files= options= fields='" +
          fields +
          "'\n"
+         "  set -f  # names of files are no patterns\n"
          "  COMPREPLY=()\n"
          "  if [ \"$COMP_CWORD\" -le 1 ]; then\n"
          "    COMPREPLY=($(compgen -W '" +
@@ -159,7 +163,7 @@ std::string for_fish(const Manual& manual) {
     text += "complete -c tetwarp -n __fish_use_subcommand -f -a " + command.name + " -d " +
             quoted(short_text(command.description)) + "\n";
     for (const ManualOption& option : command.options) {
-      std::string line = "complete -c tetwarp -n '__fish_seen_subcommand_from " + command.name + "'";
+      std::string line = "complete -c tetwarp -n 'string match -q -- " + command.name + " (commandline -opc)[2]'";
       for (const std::string& name : option.names)
         line += name.starts_with("--") ? " -l " + name.substr(2) : " -s " + name.substr(1);
       switch (takes_of(option)) {

@@ -37,8 +37,8 @@ std::string italic(std::string_view text) { return "\\fI" + plain(text) + "\\fR"
 std::string heading(const std::string& name, const std::string& version) {
   std::string title = name;
   std::transform(title.begin(), title.end(), title.begin(), [](unsigned char c) { return std::toupper(c); });
-  // Without hyphenation, for hyphens would be taken for those of options.
-  return ".TH " + plain(title) + " 1 \"\" \"Tetwarp " + plain(version) + "\" \"User Commands\"\n.nh\n.SH NAME\n";
+  // Neither hyphenated, for hyphens would be taken for those of options, nor stretched to the right margin.
+  return ".TH " + plain(title) + " 1 \"\" \"Tetwarp " + plain(version) + "\" \"User Commands\"\n.nh\n.ad l\n.SH NAME\n";
 }
 
 /// What the paragraph of an option begins with: its names, and what it takes.

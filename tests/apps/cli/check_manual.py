@@ -100,6 +100,8 @@ def check_shells(folder, scratch):
     (scratch / "home").mkdir()
     (scratch / "work").mkdir()
     (scratch / "work" / "scan.nii.gz").touch()
+    (scratch / "work" / "x[1].nrrd").touch()
+    (scratch / "work" / "x1.nrrd").touch()
     share = {"bash": folder / "bash-completion" / "completions" / "tetwarp",
              "zsh": folder / "zsh" / "site-functions",
              "fish": folder / "fish" / "vendor_completions.d" / "tetwarp.fish"}
@@ -116,6 +118,8 @@ def check_shells(folder, scratch):
         "tetwarp invert --backend ": ["auto", "cuda", "cpu"],
         "tetwarp deform x -f ": ["wave", "bubble-paper", "scan.nii.gz"],
         "tetwarp info sc": ["scan.nii.gz"],
+        "tetwarp info x": ["x1.nrrd", "[1"],  # shells write brackets in ways of their own
+        "tetwarp info field --": ["json"],
     }
     for name, (shell, setup) in shells.items():
         if not shutil.which(name):

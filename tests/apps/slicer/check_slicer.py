@@ -112,6 +112,7 @@ def check_progress(module, done):
         if line.startswith("<filter-progress>"):
             expect(0 <= float(ET.fromstring(line).text) <= 1, f"{module}: {line!r}")
     expect(opened == 0, f"{module}: a filter is not ended")
+    expect(any(line.startswith("<filter-progress>") for line in lines), f"{module}: nothing says how far it is")
 
 
 def check_work(folder, tetwarp, scratch):
