@@ -90,7 +90,7 @@ execute_process(COMMAND "${TETWARP_GZIP}" -9nc "${PROJECT_BINARY_DIR}/debian/cha
 install(DIRECTORY "${PROJECT_SOURCE_DIR}/build/docs/html" DESTINATION "${CMAKE_INSTALL_DATADIR}/doc/tetwarp-doc"
         COMPONENT documentation OPTIONAL PATTERN .buildinfo EXCLUDE PATTERN objects.inv EXCLUDE)
 install(CODE "
-  file(GLOB pages \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_MANDIR}/man1/*.1\")
+  file(GLOB pages \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_MANDIR}/man1/tetwarp*.1\")
   foreach(page IN LISTS pages)  # as Debian wants them
     execute_process(COMMAND \"${TETWARP_GZIP}\" -9nf \"\${page}\" COMMAND_ERROR_IS_FATAL ANY)
   endforeach()" COMPONENT program)

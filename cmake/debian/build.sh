@@ -11,9 +11,9 @@
 # Their date is SOURCE_DATE_EPOCH, by default that of the last commit.
 set -euo pipefail
 [ $# = 1 ] || { sed -n '5,11p' "$0" | sed 's/^# \{0,1\}//'; exit 2; }
-cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 mkdir -p "$1"
 folder=$(cd "$1" && pwd)
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 for program in dpkg-shlibdeps lintian; do
   command -v $program >/dev/null || { echo "build.sh: error: $program is not installed; apt-get install dpkg-dev lintian" >&2; exit 1; }
 done
@@ -23,6 +23,7 @@ if command -v doxygen >/dev/null && command -v sphinx-build >/dev/null; then
   docs/build.sh
 else
   echo "build.sh: no doxygen or no sphinx-build, so there is no tetwarp-doc" >&2
+  rm -rf build/docs/html
 fi
 environment=build/debian-venv
 [ -x $environment/bin/python ] || python3 -m venv $environment
@@ -31,6 +32,7 @@ cmake --preset debian -DPython_EXECUTABLE="$PWD/$environment/bin/python"
 cmake --build --preset debian --parallel "${TETWARP_JOBS:-$(nproc)}"
 rm -rf build/debian/packages
 (cd build/debian && cpack -G DEB -B packages >cpack.log) || { cat build/debian/cpack.log; exit 1; }
+rm -f "$folder"/*tetwarp*_*.deb
 cp build/debian/packages/*.deb "$folder"
 ls -l "$folder"/*.deb
 lintian --fail-on error,warning --suppress-tags initial-upload-closes-no-bugs build/debian/packages/*.deb

@@ -11,7 +11,7 @@
 # FOLDER holds what cmake/debian/build.sh made. SUITE: bookworm, or the one that they were built on. Wants root and the
 # Debian package debootstrap. TETWARP_CHROOTS names a folder in which the bare system is kept for the next time.
 set -euo pipefail
-[ $# -ge 1 ] || { sed -n '5,13p' "$0" | sed 's/^# \{0,1\}//'; exit 2; }
+[ $# -ge 1 ] || { sed -n '5,12p' "$0" | sed 's/^# \{0,1\}//'; exit 2; }
 source_dir=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 packages=$(cd "$1" && pwd)
 suite=${2:-bookworm}
@@ -20,7 +20,7 @@ bare=${TETWARP_CHROOTS:-$scratch/chroots}/packages-$suite
 root=$scratch/root
 clean() {
   for mounted in proc dev; do mountpoint -q "$root/$mounted" && umount "$root/$mounted"; done
-  rm -rf "$scratch"
+  rm -rf --one-file-system "$scratch"
 }
 trap clean EXIT
 if [ ! -f "$bare/complete" ]; then
@@ -46,7 +46,9 @@ cp "$packages"/*.deb "$root/tmp/"
 inside apt-get update -qq
 install "/tmp/$(cd "$packages" && ls tetwarp_*.deb)"
 echo "== with tetwarp $(listed | wc -l)"
-! inside sh -c 'command -v cc g++ cmake' || { echo "try.sh: error: the package brings a compiler" >&2; exit 1; }
+for program in cc g++ cmake; do
+  ! inside sh -c "command -v $program" || { echo "try.sh: error: the package brings $program" >&2; exit 1; }
+done
 inside sh -euc '
   cd /root
   tetwarp --version
@@ -59,9 +61,17 @@ inside sh -euc '
   test -s /usr/share/bash-completion/completions/tetwarp -a -s /usr/share/man/man1/tetwarp-deform.1.gz'
 echo "== the module of Python"
 install "/tmp/$(cd "$packages" && ls python3-tetwarp_*.deb)"
+cat >"$root/root/t.tfm" <<'END'
+#Insight Transform File V1.0
+#Transform 0
+Transform: TranslationTransform_double_3_3
+Parameters: 3 0 0
+FixedParameters:
+END
 inside python3 -c '
 import tetwarp as tw
 ct = tw.read("/root/phantom")
+assert tw.features()["itk_transforms"] and tw.read_field("/root/t.tfm", like=ct.geometry) is not None
 done = tw.deform(ct, tw.fields.elastic(ct.geometry, amplitude=8, spacing=40, seed=7, cell_size=4))
 print(tw.__version__, done.volume.array.shape, tw.features())'
 if ls "$packages"/tetwarp-doc_*.deb >/dev/null 2>&1; then
