@@ -33,7 +33,7 @@ file -b build/arm64/apps/tetwarp | cut -d, -f1-2
 DCMDICTPATH=$(find "$sysroot/usr/share" -name dicom.dic | head -1)
 export DCMDICTPATH
 status=0
-bits=$(tests/bits/check.py build/arm64/apps/tetwarp --launcher "qemu-aarch64-static -L $sysroot" "$@" | tee /dev/stderr | tail -1) || status=1
+bits=$(tests/bits/check.py build/arm64/apps/tetwarp --launcher "qemu-aarch64-static -L $sysroot" "$@" | tail -1) || status=1
 mkdir -p bench/results/platforms
 {
   echo "system: libraries of Debian 12, aarch64 (NEON) under $(qemu-aarch64-static --version | head -1)"

@@ -1,0 +1,87 @@
+#!/usr/bin/env bash
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
+# Builds Tetwarp in one of several ways, runs its tests and compares its bits (tests/bits), and keeps a record, of which
+# cmake/platforms/table.py makes docs/reference/platforms.md.
+#
+#   cmake/platforms/rows.sh ROW...
+#
+# ROW: gcc12, clang14, clang19, lto, minimal (no ITK, DCMTK, VTK, CUDA, viewer) or assertions (those of libstdc++), on
+# Debian 12; debian13, as root, in a bare system of debootstrap. clang14 and clang19 want the packages clang-14 and
+# clang-19. A warning is an error in every row. All are without CUDA. TETWARP_JOBS: default all cores.
+set -euo pipefail
+[ $# -ge 1 ] || { sed -n '5,13p' "$0" | sed 's/^# \{0,1\}//'; exit 2; }
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+source_dir=$PWD
+records=$source_dir/bench/results/platforms
+jobs=${TETWARP_JOBS:-$(nproc)}
+warnings="-Wall -Wextra -Wshadow -Wconversion -Wno-sign-conversion -Wno-restrict -Werror"
+
+# record ROW COMPILER OPTIONS: builds in build/rows/ROW, tests, and writes what came out.
+record() {
+  local row=$1 compiler=$2 options=("${@:3}") build=build/rows/$1 tests bits result=passed
+  echo "== $row: $("$compiler" --version | head -1)"
+  cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DTETWARP_WITH_CUDA=OFF -DCMAKE_CXX_COMPILER="$compiler" \
+    "-DCMAKE_CXX_FLAGS=$warnings" "${options[@]}" >"$build.log" 2>&1 || { tail -20 "$build.log"; return 1; }
+  cmake --build "$build" --parallel "$jobs" >>"$build.log" 2>&1 || { tail -40 "$build.log"; return 1; }
+  ctest --test-dir "$build" -j "$jobs" --output-on-failure --no-tests=error >>"$build.log" 2>&1 || result=failed
+  tests=$(grep -o '[0-9]*% tests passed, [0-9]* tests failed out of [0-9]*' "$build.log" | tail -1 || true)
+  bits=$(tests/bits/check.py "$build/apps/tetwarp" | tail -1) || result=failed
+  mkdir -p "$records"
+  {
+    echo "system: $(. /etc/os-release && echo "$PRETTY_NAME"), $(uname -m)"
+    echo "compiler: $("$compiler" --version | head -1)"
+    echo "options: ${options[*]:-none}"
+    echo "commit: $(git rev-parse --short=12 HEAD 2>/dev/null || cat commit 2>/dev/null || echo unknown)"
+    echo "date: $(date -u +%Y-%m-%d)"
+    echo "tests: ${tests:-none}"
+    echo "bits: $bits"
+    echo "result: $result"
+  } | tee "$records/$row.txt"
+  [ $result = passed ]
+}
+
+# The row of Debian 13 is this script's row of the system's own compiler, in a bare system that gets the packages of
+# examples/quickstart.sh.
+debian13() {
+  local root=${TETWARP_CHROOTS:-$source_dir/build/chroots}/trixie
+  if [ ! -f "$root/complete" ]; then
+    mkdir -p "$root"
+    debootstrap --variant=minbase trixie "$root" >"$root.log" || { tail -20 "$root.log" >&2; return 1; }
+    touch "$root/complete"
+  fi
+  rm -rf "$root/src"
+  git clone -q "$source_dir" "$root/src"
+  [ ! -d "$source_dir/../shared" ] || cp -r "$source_dir/../shared" "$root/"
+  mount --bind /proc "$root/proc"
+  mount --bind /dev "$root/dev"
+  local status=0
+  chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive \
+    ${http_proxy:+http_proxy="$http_proxy"} ${https_proxy:+https_proxy="$https_proxy"} TETWARP_JOBS="$jobs" sh -euc '
+      cd /src
+      apt-get update -qq
+      apt-get install -y -qq --no-install-recommends $(examples/quickstart.sh --packages) >/dev/null
+      cmake/platforms/rows.sh system' || status=$?
+  umount "$root/proc" "$root/dev"
+  mkdir -p "$records"
+  cp "$root/src/bench/results/platforms/system.txt" "$records/debian13.txt" || status=1
+  return $status
+}
+
+mkdir -p build/rows
+status=0
+for row in "$@"; do
+  case $row in
+    gcc12) record $row g++-12 ;;
+    clang14) record $row clang++-14 ;;
+    clang19) record $row clang++-19 ;;
+    lto) record $row g++-12 -DCMAKE_INTERPROCEDURAL_OPTIMIZATION=ON ;;
+    minimal) record $row g++-12 -DTETWARP_WITH_ITK=OFF -DTETWARP_WITH_DCMTK=OFF -DTETWARP_WITH_VTK=OFF -DTETWARP_WITH_VIEW=OFF ;;
+    assertions) record $row g++-12 -DCMAKE_CXX_FLAGS_RELEASE="-O2 -DNDEBUG -D_GLIBCXX_ASSERTIONS" ;;
+    system) record $row g++ ;;
+    debian13) debian13 ;;
+    *) echo "rows.sh: error: no row $row" >&2; exit 2 ;;
+  esac || status=1
+done
+exit $status
