@@ -33,6 +33,9 @@ function(tetwarp_configure target)
   target_include_directories(${target} PUBLIC "$<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>"
                                               "$<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/tetwarp>")
   target_compile_options(${target} PRIVATE "$<$<COMPILE_LANGUAGE:CXX>:-ffp-contract=off>")
+  if(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")  # where char has no sign unless one says so
+    target_compile_options(${target} PRIVATE -fsigned-char)
+  endif()
   if(TETWARP_WITH_CUDA)
     # CMake 3.25 does not know the dialects of CUDA 13, so the dialect is given as an option.
     target_compile_options(${target} PRIVATE

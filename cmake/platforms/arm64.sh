@@ -7,6 +7,7 @@
 #
 #   cmake/platforms/arm64.sh [OPTIONS OF tests/bits/check.py]
 #
+# Without precompiled headers, with which Debian 12's cross compiler ends at the vectors of SVE (an internal error).
 # Wants the Debian packages g++-aarch64-linux-gnu qemu-user-static debootstrap. The libraries of ARM64 are unpacked into
 # build/arm64-sysroot, where none of them is installed or run. TETWARP_JOBS: default all cores.
 set -euo pipefail
