@@ -49,13 +49,10 @@ std::string short_text(const std::string& description) {
   return description;
 }
 
-std::string first_line(const char* comment) {
-  return std::string(comment) + " Completion for tetwarp, made from its --help.\n";
-}
+const std::string kFirstLine = "# Completion for tetwarp, made from its --help.\n";
 
 std::string for_bash(const Manual& manual) {
-  std::string commands, options, values, fields;
-  for (const std::string& name : formula_names()) fields += (fields.empty() ? "" : " ") + name;
+  std::string commands, options, values;
   for (const ManualCommand& command : manual.commands) {
     commands += (commands.empty() ? "" : " ") + command.name;
     std::string names;
@@ -73,11 +70,11 @@ std::string for_bash(const Manual& manual) {
     }
     options += "    " + command.name + ") options='" + names + "' ;;\n";
   }
-  return first_line("#") +
+  return kFirstLine +
          "_tetwarp() {\n"
          "  local current=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]} command=${COMP_WORDS[1]}\n"
          "  local - words= files= options= fields='" +
-         fields +
+         joined(formula_names()) +
          "'\n"
          "  set -f  # names of files are no patterns\n"
          "  COMPREPLY=()\n"
@@ -113,8 +110,7 @@ std::string for_arguments(const std::string& text) {
 }
 
 std::string for_zsh(const Manual& manual) {
-  std::string commands, cases, fields;
-  for (const std::string& name : formula_names()) fields += (fields.empty() ? "" : " ") + name;
+  std::string commands, cases;
   for (const ManualCommand& command : manual.commands) {
     commands += "    " + quoted(command.name + ":" + short_text(command.description)) + "\n";
     cases += "    " + command.name + ") _arguments";
@@ -133,7 +129,7 @@ std::string for_zsh(const Manual& manual) {
     }
     cases += " \\\n      '*:file:_files' ;;\n";
   }
-  return "#compdef tetwarp\n" + first_line("#") + "_tetwarp_fields() { compadd -S '' -- " + fields +
+  return "#compdef tetwarp\n" + kFirstLine + "_tetwarp_fields() { compadd -S '' -- " + joined(formula_names()) +
          "; _files }\n"
          "_tetwarp() {\n"
          "  local -a commands=(\n" +
@@ -154,7 +150,7 @@ std::string for_zsh(const Manual& manual) {
 }
 
 std::string for_fish(const Manual& manual) {
-  std::string text = first_line("#") +
+  std::string text = kFirstLine +
                      "complete -c tetwarp -n __fish_use_subcommand -f\n"
                      "complete -c tetwarp -n __fish_use_subcommand -l help -d 'Print help'\n"
                      "complete -c tetwarp -n __fish_use_subcommand -l version -d 'Print the version'\n";

@@ -33,7 +33,7 @@ record() {
     echo "system: $(. /etc/os-release && echo "$PRETTY_NAME"), $(uname -m)"
     echo "compiler: $("$compiler" --version | head -1)"
     echo "options: ${options[*]:-none}"
-    echo "commit: $(git rev-parse --short=12 HEAD 2>/dev/null || cat commit 2>/dev/null || echo unknown)"
+    echo "commit: $(git rev-parse --short=12 HEAD 2>/dev/null || echo unknown)"
     echo "date: $(date -u +%Y-%m-%d)"
     echo "tests: ${tests:-none}"
     echo "bits: $bits"

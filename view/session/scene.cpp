@@ -58,7 +58,7 @@ Scene::Scene(const Setup& setup)
     const glm::i64vec3 blocks = coarse_blocks(*setup.source.geometry);
     coarse_source_ = coarse_volume(setup.source, blocks);
     coarse_ = whole_volume(std::as_const(coarse_source_).view(), coarse_grid(grid_, blocks));
-    coarse_field_.lattice = *coarse_->output->view().geometry;
+    coarse_->samples = VertexField{*coarse_->output->view().geometry, {}};
     if (std::max(grid_.size.x, grid_.size.y) > kMostMovingVoxels) {
       const glm::i64vec3 halves = moving_blocks(*setup.source.geometry);
       half_source_ = coarse_volume(setup.source, halves);
@@ -157,12 +157,12 @@ void Scene::show_volume() {
 }
 
 /// Deforms a volume by the field, and has its renderer see what changed.
-Report Scene::deform(Whole& one, const FieldOptions& options, const Control& control) {
+Report Scene::deform(Whole& one, const FieldOptions& options, const Control& control) const {
   const Target whole = target(one.from, one.output->view());
   AnyFieldView field = field_;
   if (const auto* const forward = std::get_if<FieldView>(&field_);
-      coarse_ && &one == &*coarse_ && forward && sample_field(*forward, coarse_field_))
-    field = view(coarse_field_, forward->outside);
+      one.samples && forward && sample_field(*forward, *one.samples))
+    field = view(*one.samples, forward->outside);
   one.deformer->set_field(field, options, control);
   const Update update = one.deformer->update({&whole, 1}, control);
   if (one.is_set) {

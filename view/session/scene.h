@@ -102,6 +102,8 @@ class Scene {
     std::unique_ptr<Deformer> deformer;
     std::unique_ptr<Renderer> renderer;
     bool is_set = false;  ///< whether the renderer has the output
+    /// Whose lattice is the grid of the output, if the field is to be interpolated at its voxels first.
+    std::optional<VertexField> samples = {};
   };
 
   void take_field(const AnyFieldView& field);
@@ -110,7 +112,7 @@ class Scene {
   std::unique_ptr<SliceMaker> slice_maker(const ConstVolumeView& source, const Geometry& grid) const;
 
   Target target(const ConstVolumeView& source, const VolumeView& output) const;
-  Report deform(Whole& one, const FieldOptions& options, const Control& control);
+  Report deform(Whole& one, const FieldOptions& options, const Control& control) const;
   void show_volume();
   std::optional<glm::i64vec3> voxel_at(const glm::dvec3& point_mm) const;
 
@@ -125,7 +127,6 @@ class Scene {
   std::optional<ConstVolumeView> labels_;
   std::unique_ptr<SliceMaker> slices_, moving_slices_;  ///< `moving_slices_` only on the CPU, of large volumes
   AnyVolume half_source_, coarse_source_;               ///< only on the CPU; the first of large volumes
-  VertexField coarse_field_;                            ///< the field at the voxels of the coarse volume
   std::optional<Whole> coarse_;                         ///< only on the CPU
   std::optional<Whole> exact_;                          ///< on the CPU when it is asked for
   const Whole* drawn_ = nullptr;                        ///< the one that the last picture shows
