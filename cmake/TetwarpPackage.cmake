@@ -13,6 +13,7 @@ set(TETWARP_PACKAGE_FOLDER "${CMAKE_INSTALL_LIBDIR}/cmake/tetwarp")
 function(tetwarp_install_library name)
   install(TARGETS tetwarp_${name} EXPORT tetwarp-${name}
           ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}" COMPONENT development
+          LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}" COMPONENT program NAMELINK_COMPONENT development
           FILE_SET HEADERS DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/tetwarp" COMPONENT development)
   set_target_properties(tetwarp_${name} PROPERTIES EXPORT_NAME ${name})
   install(EXPORT tetwarp-${name} NAMESPACE tetwarp:: FILE tetwarp-${name}.cmake DESTINATION "${TETWARP_PACKAGE_FOLDER}"

@@ -3,17 +3,20 @@
 
 # tetwarp_library(NAME SOURCES ... HEADERS ...): makes the library target tetwarp_NAME, alias tetwarp::NAME, and the
 # component NAME of the package (TetwarpPackage.cmake). HEADERS are those that users include, and those that these include
-# in turn; they are installed.
+# in turn; they are installed. It is a shared library where BUILD_SHARED_LIBS says so. Its ABI is that of one minor version.
 #
 # The flags that bits depend on are the target's own, so that every build type and every user has them: no fused
 # multiply-add unless the source spells it.
 function(tetwarp_library name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;HEADERS")
-  add_library(tetwarp_${name} STATIC ${arg_SOURCES})
+  add_library(tetwarp_${name} ${arg_SOURCES})
   add_library(tetwarp::${name} ALIAS tetwarp_${name})
   target_sources(tetwarp_${name} PUBLIC FILE_SET HEADERS BASE_DIRS "${PROJECT_SOURCE_DIR}" FILES ${arg_HEADERS})
   tetwarp_configure(tetwarp_${name})
-  set_target_properties(tetwarp_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  set_target_properties(tetwarp_${name} PROPERTIES
+    POSITION_INDEPENDENT_CODE ON
+    VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR}
+    INSTALL_RPATH "$ORIGIN;$ORIGIN/tetwarp")
   tetwarp_install_library(${name})
 endfunction()
 
@@ -23,7 +26,9 @@ function(tetwarp_module name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES")
   add_library(tetwarp_${name} MODULE ${arg_SOURCES})
   tetwarp_configure(tetwarp_${name})
-  set_target_properties(tetwarp_${name} PROPERTIES LIBRARY_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/lib/tetwarp")
+  set_target_properties(tetwarp_${name} PROPERTIES
+    LIBRARY_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/lib/tetwarp"
+    INSTALL_RPATH "$<$<BOOL:${BUILD_SHARED_LIBS}>:$ORIGIN/..>")
   install(TARGETS tetwarp_${name} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/tetwarp COMPONENT program)
 endfunction()
 
