@@ -21,12 +21,8 @@ trap 'rm -rf "$scratch"' EXIT
 chroots=${TETWARP_CHROOTS:-$scratch/chroots}
 mkdir -p "$chroots"
 for suite in "${suites[@]}"; do
-  root=$chroots/$suite
-  if [ ! -f "$root/complete" ]; then
-    debootstrap --variant=minbase --include=python3,python3-venv,ca-certificates "$suite" "$root" >"$scratch/log" ||
-      { tail -20 "$scratch/log" >&2; exit 1; }
-    touch "$root/complete"
-  fi
+  root=$chroots/python-$suite
+  "$source_dir/cmake/platforms/bare_system.sh" "$root" "$suite" python3 python3-venv
   version=$(chroot "$root" python3 -c 'import sys; print("%d.%d" % sys.version_info[:2])')
   echo "== $suite, Python $version, $(chroot "$root" dpkg -l | grep -c '^ii') packages"
   if chroot "$root" dpkg -l | grep -E '^ii +(g\+\+|cmake|libdcmtk|libtbb|libhwy|libicu-dev)'; then

@@ -6,11 +6,12 @@
 #
 #   cmake/debian/build.sh FOLDER
 #
-# FOLDER receives them. Wants what examples/quickstart.sh installs, dpkg-dev and lintian; tetwarp-doc is made where
+# FOLDER receives them. In a bare system of another Debian: cmake/platforms/inside.sh trixie FOLDER --with dpkg-dev --with lintian
+# cmake/debian/build.sh /output. Wants what examples/quickstart.sh installs, dpkg-dev and lintian; tetwarp-doc is made where
 # docs/build.sh has its programs. nanobind, with which the module of Python is made, comes from the package index.
 # Their date is SOURCE_DATE_EPOCH, by default that of the last commit.
 set -euo pipefail
-[ $# = 1 ] || { sed -n '5,11p' "$0" | sed 's/^# \{0,1\}//'; exit 2; }
+[ $# = 1 ] || { sed -n '5,12p' "$0" | sed 's/^# \{0,1\}//'; exit 2; }
 mkdir -p "$1"
 folder=$(cd "$1" && pwd)
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."

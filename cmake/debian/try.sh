@@ -23,15 +23,7 @@ clean() {
   rm -rf --one-file-system "$scratch"
 }
 trap clean EXIT
-if [ ! -f "$bare/complete" ]; then
-  mkdir -p "$bare"
-  debootstrap --variant=minbase --include=ca-certificates "$suite" "$bare" >"$scratch/log" || { tail -20 "$scratch/log" >&2; exit 1; }
-  if [ -f /etc/apt/sources.list.d/debian.sources ] && grep -q "VERSION_CODENAME=$suite" /etc/os-release; then
-    cp /etc/apt/sources.list.d/debian.sources "$bare/etc/apt/sources.list.d/"  # security updates, too
-    rm -f "$bare/etc/apt/sources.list"
-  fi
-  touch "$bare/complete"
-fi
+"$source_dir/cmake/platforms/bare_system.sh" "$bare" "$suite"
 cp -a "$bare" "$root"
 mount --bind /proc "$root/proc"
 mount --bind /dev "$root/dev"

@@ -7,8 +7,8 @@
 #
 #   cmake/platforms/rows.sh ROW...
 #
-# ROW: gcc12, clang14, clang19, lto, minimal (no ITK, DCMTK, VTK, CUDA, viewer) or assertions (those of libstdc++), on
-# Debian 12; debian13, as root, in a bare system of debootstrap. clang14 and clang19 want the packages clang-14 and
+# ROW: gcc12, clang14, clang19, lto, shared (libraries), minimal (no ITK, DCMTK, VTK, CUDA, viewer) or assertions (those of
+# libstdc++), on Debian 12; debian13, as root, in a bare system (inside.sh). clang14 and clang19 want the packages clang-14 and
 # clang-19. A warning is an error in every row. All are without CUDA. TETWARP_JOBS: default all cores.
 set -euo pipefail
 [ $# -ge 1 ] || { sed -n '5,13p' "$0" | sed 's/^# \{0,1\}//'; exit 2; }
@@ -42,30 +42,15 @@ record() {
   [ $result = passed ]
 }
 
-# The row of Debian 13 is this script's row of the system's own compiler, in a bare system that gets the packages of
-# examples/quickstart.sh.
+# The row of Debian 13 is this script's row of the system's own compiler, in a bare system.
 debian13() {
-  local root=${TETWARP_CHROOTS:-$source_dir/build/chroots}/trixie
-  if [ ! -f "$root/complete" ]; then
-    mkdir -p "$root"
-    debootstrap --variant=minbase trixie "$root" >"$root.log" || { tail -20 "$root.log" >&2; return 1; }
-    touch "$root/complete"
-  fi
-  rm -rf "$root/src"
-  git clone -q "$source_dir" "$root/src"
-  [ ! -d "$source_dir/../shared" ] || cp -r "$source_dir/../shared" "$root/"
-  mount --bind /proc "$root/proc"
-  mount --bind /dev "$root/dev"
-  local status=0
-  chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive \
-    ${http_proxy:+http_proxy="$http_proxy"} ${https_proxy:+https_proxy="$https_proxy"} TETWARP_JOBS="$jobs" sh -euc '
-      cd /src
-      apt-get update -qq
-      apt-get install -y -qq --no-install-recommends $(examples/quickstart.sh --packages) >/dev/null
-      cmake/platforms/rows.sh system' || status=$?
-  umount "$root/proc" "$root/dev"
+  local made status=0
+  made=$(mktemp -d)
+  cmake/platforms/inside.sh trixie "$made" \
+    sh -c 'cmake/platforms/rows.sh system; status=$?; cp bench/results/platforms/system.txt /output; exit $status' || status=$?
   mkdir -p "$records"
-  cp "$root/src/bench/results/platforms/system.txt" "$records/debian13.txt" || status=1
+  cp "$made/system.txt" "$records/debian13.txt" || status=1
+  rm -r "$made"
   return $status
 }
 
@@ -78,6 +63,7 @@ for row in "$@"; do
     clang19) record $row clang++-19 ;;
     lto) record $row g++-12 -DCMAKE_INTERPROCEDURAL_OPTIMIZATION=ON ;;
     minimal) record $row g++-12 -DTETWARP_WITH_ITK=OFF -DTETWARP_WITH_DCMTK=OFF -DTETWARP_WITH_VTK=OFF -DTETWARP_WITH_VIEW=OFF ;;
+    shared) record $row g++-12 -DBUILD_SHARED_LIBS=ON ;;
     assertions) record $row g++-12 -DCMAKE_CXX_FLAGS_RELEASE="-O2 -DNDEBUG -D_GLIBCXX_ASSERTIONS" ;;
     system) record $row g++ ;;
     debian13) debian13 ;;
