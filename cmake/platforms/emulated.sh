@@ -1,0 +1,49 @@
+#!/usr/bin/env bash
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
+# Compares the bits of a program (tests/bits) on older x86-64 processors than this one, under an emulator, and keeps a
+# record of each (cmake/platforms/table.py).
+#
+#   cmake/platforms/emulated.sh PROGRAM [PROCESSOR...]
+#
+# PROCESSOR: qemu64 (SSE3), Nehalem (SSE4.2), Haswell (AVX2), by default all; names of qemu's -cpu. Wants qemu-x86_64-static of
+# the Debian package qemu-user-static, or what TETWARP_QEMU names. Where the emulator itself gathers wrongly (tests/bits/gather_index.cpp), what it gives for
+# a processor with AVX2 says nothing about the program: that is said, and no record is made.
+set -euo pipefail
+[ $# -ge 1 ] || { sed -n '5,13p' "$0" | sed 's/^# \{0,1\}//'; exit 2; }
+program=$(realpath "$1")
+shift
+processors=("$@")
+[ ${#processors[@]} -gt 0 ] || processors=(qemu64 Nehalem Haswell)
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+qemu=${TETWARP_QEMU:-qemu-x86_64-static}
+command -v "$qemu" >/dev/null || { echo "emulated.sh: error: $qemu is not installed; apt-get install qemu-user-static" >&2; exit 1; }
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+c++ -O1 -static tests/bits/gather_index.cpp -o "$scratch/gather_index"
+mkdir -p bench/results/platforms
+status=0
+for processor in "${processors[@]}"; do
+  if [ "$processor" = Haswell ] && ! wrong=$("$qemu" -cpu Haswell "$scratch/gather_index" 2>/dev/null | grep wrong); then
+    wrong=''
+  fi
+  if [ "$processor" = Haswell ] && [ -n "$wrong" ]; then
+    echo "emulated.sh: Haswell is left out: this emulator gathers wrongly ($wrong)" >&2
+    continue
+  fi
+  result=passed
+  bits=$(tests/bits/check.py "$program" --launcher "$qemu -cpu $processor" | tail -1) || result=failed
+  {
+    echo "system: $(. /etc/os-release && echo "$PRETTY_NAME"), x86_64 as $processor under $("$qemu" --version | head -1)"
+    echo "compiler: $(strings -a "$program" | grep -m1 '^GCC: \|clang version' || echo unknown)"
+    echo "options: none"
+    echo "commit: $("$program" --version | sed -n 's/.*commit \([0-9a-f]*\).*/\1/p' | head -1)"
+    echo "date: $(date -u +%Y-%m-%d)"
+    echo "tests: those of the bits alone"
+    echo "bits: $bits"
+    echo "result: $result"
+  } | tee "bench/results/platforms/$(tr '[:upper:]' '[:lower:]' <<<"$processor").txt"
+  [ $result = passed ] || status=1
+done
+exit $status
