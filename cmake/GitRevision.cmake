@@ -20,7 +20,12 @@ if(NOT CMAKE_SCRIPT_MODE_FILE)
   return()
 endif()
 
+# A source archive (git archive) has its commit in a file.
 set(TETWARP_COMMIT "unknown")
+file(STRINGS "${SOURCE}/cmake/archived_commit.txt" archived REGEX "^[0-9a-f]+$")
+if(archived)
+  string(SUBSTRING "${archived}" 0 12 TETWARP_COMMIT)
+endif()
 if(GIT)
   # A source archive that was unpacked inside another repository must not show the commit of that repository.
   execute_process(COMMAND "${GIT}" rev-parse --show-cdup WORKING_DIRECTORY "${SOURCE}"

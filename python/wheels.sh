@@ -25,6 +25,9 @@ scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 options=("--config-settings=cmake.define.TETWARP_WITH_VIEW=ON")
 [ -z "${TETWARP_CUDA_ARCHITECTURES:-}" ] || options+=("--config-settings=cmake.define.CMAKE_CUDA_ARCHITECTURES=$TETWARP_CUDA_ARCHITECTURES")
+# The same bytes in any folder, at the date of the commit.
+export SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git -C "$source_dir" log -1 --format=%ct)}
+export CXXFLAGS="${CXXFLAGS:-} -ffile-prefix-map=$source_dir=."
 for python in "${pythons[@]}"; do
   rm -rf "$scratch/venv" "$scratch/raw"
   "$python" -m venv "$scratch/venv"
