@@ -3,7 +3,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 # Builds Tetwarp for ARM64 on another machine of Debian 12, and compares the bits that it gives under an emulator
-# (tests/bits), of which it keeps a record (cmake/platforms/table.py). Without ITK, VTK and CUDA.
+# (tests/bits), of which it keeps a record, in docs/reference/platforms.md. Without ITK, VTK and CUDA.
 #
 #   cmake/platforms/arm64.sh [OPTIONS OF tests/bits/check.py]
 #
@@ -46,4 +46,5 @@ mkdir -p bench/results/platforms
   echo "bits: $bits"
   echo "result: $([ $status = 0 ] && echo passed || echo failed)"
 } | tee bench/results/platforms/arm64.txt
+cmake/platforms/table.py --write
 exit $status

@@ -3,7 +3,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 # Compares the bits of a program (tests/bits) on older x86-64 processors than this one, under an emulator, and keeps a
-# record of each (cmake/platforms/table.py).
+# record of each, in docs/reference/platforms.md.
 #
 #   cmake/platforms/emulated.sh PROGRAM [PROCESSOR...]
 #
@@ -44,6 +44,7 @@ for processor in "${processors[@]}"; do
     echo "bits: $bits"
     echo "result: $result"
   } | tee "bench/results/platforms/$(tr '[:upper:]' '[:lower:]' <<<"$processor").txt"
+  cmake/platforms/table.py --write
   [ $result = passed ] || status=1
 done
 exit $status
