@@ -4,8 +4,8 @@
 #pragma once
 
 // Debian's ITK knows the one compiler that it was built with, and refuses clang. It recognises g++ by these macros, and
-// what it assumes of g++ 12 is true of clang 14, too. In the preset fuzz this header is included before everything
-// else.
+// what it assumes of g++ 12 is true of clang 14 and 19, too. The preset fuzz and cmake/platforms/rows.sh include this
+// header before everything else.
 #if __has_include(<itk_compiler_detection.h>)
 #pragma push_macro("__clang__")
 #pragma push_macro("__GNUC__")
