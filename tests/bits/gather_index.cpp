@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Gathers of AVX2 with each of the sixteen registers as the index. The SIB byte of a general address takes index 4 for "no
-// index"; that of a gather does not, for its index is a vector. qemu-x86_64 7.2 takes it so all the same where the
-// register is xmm4, ymm4 (and not xmm12): then every element is read from the base. A processor prints sixteen times "right".
+// Gathers of AVX2 with each of the sixteen registers as the index. The SIB byte of a general address takes index 4 for
+// "no index"; that of a gather does not, for its index is a vector. qemu-x86_64 7.2 takes it so all the same where the
+// register is xmm4, ymm4 (and not xmm12): then every element is read from the base. A processor prints sixteen times
+// "right".
 //
 //   g++ -O1 -mavx2 gather_index.cpp -o gather_index && ./gather_index
 //   qemu-x86_64-static -cpu Haswell ./gather_index
@@ -15,16 +16,18 @@ constexpr int kTable[8] = {100, 101, 102, 103, 104, 105, 106, 107};
 constexpr int kIndices[8] = {7, 6, 5, 4, 3, 2, 1, 0};
 
 // What a gather of 32-bit elements gives with register NUMBER as the index.
-#define TETWARP_GATHER(NUMBER, RESULT, MASK)                                                             \
-  void gather_##NUMBER(int* gathered) {                                                                  \
-    asm volatile(                                                                                        \
-        "vmovdqu (%1), %%ymm" #NUMBER "\n\t"                                                             \
-        "vpcmpeqd %%ymm" #MASK ", %%ymm" #MASK ", %%ymm" #MASK "\n\t"                                    \
-        "vpgatherdd %%ymm" #MASK ", (%2,%%ymm" #NUMBER ",4), %%ymm" #RESULT "\n\t"                       \
-        "vmovdqu %%ymm" #RESULT ", (%0)"                                                                 \
-        :                                                                                                \
-        : "r"(gathered), "r"(kIndices), "r"(kTable)                                                      \
-        : "memory", "xmm" #NUMBER, "xmm" #RESULT, "xmm" #MASK);                                          \
+#define TETWARP_GATHER(NUMBER, RESULT, MASK)                                         \
+  void gather_##NUMBER(int* gathered) {                                              \
+    asm volatile("vmovdqu (%1), %%ymm" #NUMBER                                       \
+                 "\n\t"                                                              \
+                 "vpcmpeqd %%ymm" #MASK ", %%ymm" #MASK ", %%ymm" #MASK              \
+                 "\n\t"                                                              \
+                 "vpgatherdd %%ymm" #MASK ", (%2,%%ymm" #NUMBER ",4), %%ymm" #RESULT \
+                 "\n\t"                                                              \
+                 "vmovdqu %%ymm" #RESULT ", (%0)"                                    \
+                 :                                                                   \
+                 : "r"(gathered), "r"(kIndices), "r"(kTable)                         \
+                 : "memory", "xmm" #NUMBER, "xmm" #RESULT, "xmm" #MASK);             \
   }
 
 TETWARP_GATHER(0, 2, 3)
@@ -47,8 +50,9 @@ TETWARP_GATHER(15, 1, 2)
 }  // namespace
 
 int main() {
-  void (*const gathers[16])(int*) = {gather_0, gather_1, gather_2,  gather_3,  gather_4,  gather_5,  gather_6,  gather_7,
-                                     gather_8, gather_9, gather_10, gather_11, gather_12, gather_13, gather_14, gather_15};
+  void (*const gathers[16])(int*) = {gather_0,  gather_1,  gather_2,  gather_3, gather_4,  gather_5,
+                                     gather_6,  gather_7,  gather_8,  gather_9, gather_10, gather_11,
+                                     gather_12, gather_13, gather_14, gather_15};
   int wrong = 0;
   for (int number = 0; number < 16; ++number) {
     int gathered[8] = {};
