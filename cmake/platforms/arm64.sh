@@ -12,6 +12,7 @@
 # build/arm64-sysroot, where none of them is installed or run. TETWARP_JOBS: default all cores.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+source cmake/platforms/record.sh
 sysroot=$PWD/build/arm64-sysroot
 packages=libstdc++-12-dev,libtbb-dev,libhwy-dev,libeigen3-dev,libglm-dev,libgtest-dev,libcli11-dev,nlohmann-json3-dev,libdcmtk-dev,libopenjp2-7-dev,libdeflate-dev,libicu-dev,libpng-dev,zlib1g-dev,libssl-dev,libturbojpeg0-dev,libboost1.74-dev
 for program in aarch64-linux-gnu-g++ qemu-aarch64-static debootstrap; do
@@ -35,16 +36,6 @@ DCMDICTPATH=$(find "$sysroot/usr/share" -name dicom.dic | head -1)
 export DCMDICTPATH
 status=0
 bits=$(tests/bits/check.py build/arm64/apps/tetwarp --launcher "qemu-aarch64-static -L $sysroot" "$@" | tail -1) || status=1
-mkdir -p bench/results/platforms
-{
-  echo "system: libraries of Debian 12, aarch64 (NEON) under $(qemu-aarch64-static --version | head -1)"
-  echo "compiler: $(aarch64-linux-gnu-g++ --version | head -1)"
-  echo "options: without ITK and VTK; cross compiled"
-  echo "commit: $(git rev-parse --short=12 HEAD)"
-  echo "date: $(date -u +%Y-%m-%d)"
-  echo "tests: those of the bits alone"
-  echo "bits: $bits"
-  echo "result: $([ $status = 0 ] && echo passed || echo failed)"
-} | tee bench/results/platforms/arm64.txt
-cmake/platforms/table.py --write
+record_platform arm64 "libraries of Debian 12, aarch64 (NEON) under $(qemu-aarch64-static --version | head -1)" "$(aarch64-linux-gnu-g++ --version | head -1)" \
+  "without ITK and VTK; cross compiled" "$(head_commit)" "those of the bits alone" "$bits" "$([ $status = 0 ] && echo passed || echo failed)"
 exit $status

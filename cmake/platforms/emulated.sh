@@ -17,12 +17,12 @@ shift
 processors=("$@")
 [ ${#processors[@]} -gt 0 ] || processors=(qemu64 Nehalem Haswell)
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+source cmake/platforms/record.sh
 qemu=${TETWARP_QEMU:-qemu-x86_64-static}
 command -v "$qemu" >/dev/null || { echo "emulated.sh: error: $qemu is not installed; apt-get install qemu-user-static" >&2; exit 1; }
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 c++ -O1 -static tests/bits/gather_index.cpp -o "$scratch/gather_index"
-mkdir -p bench/results/platforms
 status=0
 for processor in "${processors[@]}"; do
   if [ "$processor" = Haswell ] && ! wrong=$("$qemu" -cpu Haswell "$scratch/gather_index" 2>/dev/null | grep wrong); then
@@ -34,17 +34,8 @@ for processor in "${processors[@]}"; do
   fi
   result=passed
   bits=$(tests/bits/check.py "$program" --launcher "$qemu -cpu $processor" | tail -1) || result=failed
-  {
-    echo "system: $(. /etc/os-release && echo "$PRETTY_NAME"), x86_64 as $processor under $("$qemu" --version | head -1)"
-    echo "compiler: $(strings -a "$program" | grep -m1 '^GCC: \|clang version' || echo unknown)"
-    echo "options: none"
-    echo "commit: $("$program" --version | sed -n 's/.*commit \([0-9a-f]*\).*/\1/p' | head -1)"
-    echo "date: $(date -u +%Y-%m-%d)"
-    echo "tests: those of the bits alone"
-    echo "bits: $bits"
-    echo "result: $result"
-  } | tee "bench/results/platforms/$(tr '[:upper:]' '[:lower:]' <<<"$processor").txt"
-  cmake/platforms/table.py --write
+  record_platform "$(tr '[:upper:]' '[:lower:]' <<<"$processor")" "$(system_name) as $processor under $("$qemu" --version | head -1)" \
+    "$(strings -a "$program" | grep -m1 '^GCC: \|clang version' || echo unknown)" none "$(commit_of "$program")" "those of the bits alone" "$bits" $result
   [ $result = passed ] || status=1
 done
 exit $status

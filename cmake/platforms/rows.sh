@@ -13,8 +13,8 @@
 set -euo pipefail
 [ $# -ge 1 ] || { sed -n '5,13p' "$0" | sed 's/^# \{0,1\}//'; exit 2; }
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+source cmake/platforms/record.sh
 source_dir=$PWD
-records=$source_dir/bench/results/platforms
 jobs=${TETWARP_JOBS:-$(nproc)}
 warnings="-Wall -Wextra -Wshadow -Wconversion -Wno-sign-conversion -Werror"
 
@@ -33,18 +33,7 @@ record() {
   ctest --test-dir "$build" -j "$jobs" --output-on-failure --no-tests=error >>"$build.log" 2>&1 || result=failed
   tests=$(grep -o '[0-9]*% tests passed, [0-9]* tests failed out of [0-9]*' "$build.log" | tail -1 || true)
   bits=$(tests/bits/check.py "$build/apps/tetwarp" | tail -1) || result=failed
-  mkdir -p "$records"
-  {
-    echo "system: $(. /etc/os-release && echo "$PRETTY_NAME"), $(uname -m)"
-    echo "compiler: $("$compiler" --version | head -1)"
-    echo "options: ${options[*]:-none}"
-    echo "commit: $(git rev-parse --short=12 HEAD 2>/dev/null || echo unknown)"
-    echo "date: $(date -u +%Y-%m-%d)"
-    echo "tests: ${tests:-none}"
-    echo "bits: $bits"
-    echo "result: $result"
-  } | tee "$records/$row.txt"
-  cmake/platforms/table.py --write
+  record_platform "$row" "$(system_name)" "$("$compiler" --version | head -1)" "${options[*]:-none}" "$(head_commit)" "${tests:-none}" "$bits" $result
   [ $result = passed ]
 }
 
@@ -54,8 +43,8 @@ debian13() {
   made=$(mktemp -d)
   cmake/platforms/inside.sh trixie "$made" \
     sh -c 'cmake/platforms/rows.sh system; status=$?; cp bench/results/platforms/system.txt /output; exit $status' || status=$?
-  mkdir -p "$records"
-  cp "$made/system.txt" "$records/debian13.txt" || status=1
+  mkdir -p bench/results/platforms
+  cp "$made/system.txt" bench/results/platforms/debian13.txt && cmake/platforms/table.py --write || status=1
   rm -r "$made"
   return $status
 }

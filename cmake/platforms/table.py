@@ -2,7 +2,7 @@
 # SPDX-FileCopyrightText: The Tetwarp authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Makes the table of docs/reference/platforms.md of the records that rows.sh, arm64.sh and emulated.sh keep.
+"""Makes the table of docs/reference/platforms.md of the records that rows.sh, arm64.sh, emulated.sh and device.sh keep.
 
     cmake/platforms/table.py           prints the page
     cmake/platforms/table.py --write   writes it
@@ -17,7 +17,7 @@ PAGE = SOURCE / "docs" / "reference" / "platforms.md"
 COLUMNS = ["system", "compiler", "options", "tests", "bits", "date", "commit", "result"]
 HEAD = """# Platforms
 
-Where Tetwarp was built and tested, by `cmake/platforms/rows.sh`, `arm64.sh` and `emulated.sh`. *Bits*: hashes of voxels, vectors and maps that every machine has to
+Where Tetwarp was built and tested, by `cmake/platforms/rows.sh`, `arm64.sh`, `emulated.sh` and `device.sh`. *Bits*: hashes of voxels, vectors and maps that every machine has to
 give ([tests/bits](../../tests/bits/README.md)). The records are in `bench/results/platforms`; this page is made of them by `cmake/platforms/table.py`.
 A warning of the compiler is an error in every row.
 

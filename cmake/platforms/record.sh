@@ -1,0 +1,21 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+# shellcheck shell=bash
+
+# What the scripts of this folder share; they read it with `source`, in the root of the sources.
+
+# record_platform ROW SYSTEM COMPILER OPTIONS COMMIT TESTS BITS RESULT: keeps what a row of docs/reference/platforms.md came
+# to, shows it, and writes the page anew.
+record_platform() {
+  local file=bench/results/platforms/$1.txt
+  mkdir -p bench/results/platforms
+  printf 'system: %s\ncompiler: %s\noptions: %s\ncommit: %s\ntests: %s\nbits: %s\nresult: %s\n' "${@:2}" >"$file"
+  echo "date: $(date -u +%Y-%m-%d)" >>"$file"
+  cat "$file"
+  cmake/platforms/table.py --write
+}
+
+# system_name: that of this machine. head_commit: the commit of the sources. commit_of PROGRAM: the one that it was built of.
+system_name() { echo "$(. /etc/os-release && echo "$PRETTY_NAME"), $(uname -m)"; }
+head_commit() { git rev-parse --short=12 HEAD 2>/dev/null || echo unknown; }
+commit_of() { "$1" --version | sed -n '1s/.*(\(.*\))$/\1/p'; }
