@@ -8,10 +8,11 @@
 #   cmake/platforms/emulated.sh PROGRAM [PROCESSOR...]
 #
 # PROCESSOR: qemu64 (SSE3), Nehalem (SSE4.2), Haswell (AVX2), by default all; names of qemu's -cpu. Wants qemu-x86_64-static of
-# the Debian package qemu-user-static, or what TETWARP_QEMU names. Where the emulator itself gathers wrongly (tests/bits/gather_index.cpp), what it gives for
-# a processor with AVX2 says nothing about the program: that is said, and no record is made.
+# the Debian package qemu-user-static, or what TETWARP_QEMU names. Where the emulator itself gathers wrongly (qemu 7.2 does,
+# 10.0 does not; tests/bits/gather_index.cpp), what it gives for Haswell says nothing about the program: that is said, and no
+# record is made.
 set -euo pipefail
-[ $# -ge 1 ] || { sed -n '5,13p' "$0" | sed 's/^# \{0,1\}//'; exit 2; }
+[ $# -ge 1 ] || { sed -n '5,14p' "$0" | sed 's/^# \{0,1\}//'; exit 2; }
 program=$(realpath "$1")
 shift
 processors=("$@")

@@ -3,10 +3,10 @@
 
 // Gathers of AVX2 with each of the sixteen registers as the index. The SIB byte of a general address takes index 4 for
 // "no index"; that of a gather does not, for its index is a vector. qemu-x86_64 7.2 takes it so all the same where the
-// register is xmm4, ymm4 (and not xmm12): then every element is read from the base. A processor prints sixteen times
-// "right".
+// register is xmm4, ymm4 (and not xmm12): then every element is read from the base. qemu-x86_64 10.0 and processors
+// print sixteen times "right".
 //
-//   g++ -O1 -mavx2 gather_index.cpp -o gather_index && ./gather_index
+//   g++ -O1 -static gather_index.cpp -o gather_index && ./gather_index
 //   qemu-x86_64-static -cpu Haswell ./gather_index
 #include <cstdio>
 
