@@ -4,13 +4,18 @@
 
 # Builds the wheels of the Python package, and puts the libraries that they need into them (auditwheel).
 #
-#   python/wheels.sh FOLDER [PYTHON...]
+#   python/wheels.sh [--cpu] FOLDER [PYTHON...]
 #
 # FOLDER receives them. PYTHON: by default those of python3.10, python3.11 and python3.12 that are found; the wheel of 3.12
 # serves all later ones (stable ABI). The viewer is in them, which wants libjpeg-turbo and Boost. CUDA is in them where nvcc
-# is found; TETWARP_CUDA_ARCHITECTURES narrows what it is compiled for. Each wheel runs on systems with the glibc of this one
-# or a later one, which its name says.
+# is found, unless --cpu is given; TETWARP_CUDA_ARCHITECTURES narrows what it is compiled for. Each wheel runs on systems
+# with the glibc of this one or a later one, which its name says.
 set -euo pipefail
+options=("--config-settings=cmake.define.TETWARP_WITH_VIEW=ON")
+if [ "${1:-}" = --cpu ]; then
+  options+=("--config-settings=cmake.define.TETWARP_WITH_CUDA=OFF")
+  shift
+fi
 [ $# -ge 1 ] || { sed -n '5,12p' "$0" | sed 's/^# \{0,1\}//'; exit 2; }
 source_dir=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 mkdir -p "$1"
@@ -23,7 +28,6 @@ fi
 [ ${#pythons[@]} -gt 0 ] || { echo "wheels.sh: error: no python3.10, python3.11 or python3.12; name one" >&2; exit 1; }
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
-options=("--config-settings=cmake.define.TETWARP_WITH_VIEW=ON")
 [ -z "${TETWARP_CUDA_ARCHITECTURES:-}" ] || options+=("--config-settings=cmake.define.CMAKE_CUDA_ARCHITECTURES=$TETWARP_CUDA_ARCHITECTURES")
 # The same bytes in any folder, at the date of the commit.
 export SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git -C "$source_dir" log -1 --format=%ct)}

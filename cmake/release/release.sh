@@ -67,7 +67,7 @@ make_all() {
   "$clone/cmake/debian/build.sh" "$out"
   archive_of "$clone/build/docs/html" "$name-docs" >"$out/$name-docs.tar.xz"
   echo "== wheels"
-  "$clone/python/wheels.sh" "$out" ${pythons[@]+"${pythons[@]}"}
+  "$clone/python/wheels.sh" --cpu "$out" ${pythons[@]+"${pythons[@]}"}
   echo "== bill of materials"
   "$clone/cmake/release/sbom.py" "$clone" "$out" >"$out/$name.spdx.json"
   printf '%s\n' "$changes" >"$out/$name-changes.md"

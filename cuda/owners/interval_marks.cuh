@@ -155,7 +155,7 @@ __device__ int mark_unknown(const IntervalTile<Shape>& tile, unsigned unsure) {
 /// Adds what the lanes of a whole warp have to a sum of the tile.
 template <class Shape>
 __device__ void add_up(const IntervalTile<Shape>& tile, int voxels, unsigned& to) {
-  const unsigned sum = __reduce_add_sync(kAllLanes, static_cast<unsigned>(voxels));
+  const unsigned sum = warp_sum(static_cast<unsigned>(voxels));
   if (tile.lane() == 0) atomicAdd(&to, sum);
 }
 
