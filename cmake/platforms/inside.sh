@@ -28,9 +28,9 @@ source_dir=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 root=${TETWARP_CHROOTS:-$source_dir/build/chroots}/inside-$suite
 "$source_dir/cmake/platforms/bare_system.sh" "$root" "$suite" git
 mounted=()
-clean() { for at in ${mounted[@]+"${mounted[@]}"}; do umount "$at"; done; }
+clean() { for at in ${mounted[@]+"${mounted[@]}"}; do umount "$at"; done; }  # the last one first
 trap clean EXIT
-for at in proc dev; do mount --bind "/$at" "$root/$at"; mounted+=("$root/$at"); done
+for at in proc dev dev/pts; do mount --bind "/$at" "$root/$at"; mounted=("$root/$at" ${mounted[@]+"${mounted[@]}"}); done
 inside() {
   chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive \
     ${http_proxy:+http_proxy="$http_proxy"} ${https_proxy:+https_proxy="$https_proxy"} ${TETWARP_JOBS:+TETWARP_JOBS="$TETWARP_JOBS"} \
