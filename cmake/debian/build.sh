@@ -27,7 +27,7 @@ else
   rm -rf build/docs/html
 fi
 environment=build/debian-venv
-[ -x $environment/bin/python ] || python3 -m venv $environment
+[ -x $environment/bin/python ] || /usr/bin/python3 -m venv $environment  # Debian's, for which the package is
 $environment/bin/pip install -q nanobind
 cmake --preset debian -DPython_EXECUTABLE="$PWD/$environment/bin/python"
 cmake --build --preset debian --parallel "${TETWARP_JOBS:-$(nproc)}"
