@@ -137,10 +137,10 @@ void StructureMover::reslice(const ConstVolumeView& inverse_mm) {
   for (std::vector<Roi>& set : sets_)
     for (Roi& roi : set)
       if (roi.reslicer) rois.push_back(&roi);
-  const auto [begin, end] = std::pair(inverse_mm.buffered.begin.z, inverse_mm.buffered.end.z);
+  const std::int64_t begin = inverse_mm.buffered.begin.z, end = inverse_mm.buffered.end.z;
   const auto slices = static_cast<std::size_t>(end - begin);
   std::vector<std::array<SlicedContours, 2>> sliced(rois.size() * slices);
-  for_each_index(sliced.size(), threads_, {.stop = interrupt_token()}, [&, begin = begin](std::size_t n) {
+  for_each_index(sliced.size(), threads_, {.stop = interrupt_token()}, [&](std::size_t n) {
     sliced[n] = rois[n / slices]->reslicer->slice(inverse_mm, begin + static_cast<std::int64_t>(n % slices));
   });
   for (std::size_t n = 0; n < sliced.size(); ++n) {

@@ -168,7 +168,7 @@ std::optional<double> number(const Json& row, const std::string& pointer) {
   return found.is_number() ? std::optional(found.get<double>()) : std::nullopt;
 }
 
-const Json& rows_of(const Json& document, const std::string& list) {
+const Json& rows_of(const Json& document, const char* list) {
   static const Json kNone = Json::array();
   return document.contains(list) ? document[list] : kNone;
 }

@@ -37,7 +37,7 @@ Json size_json(const glm::i64vec3& size);
 /// measured.
 std::optional<double> number(const Json& row, const std::string& pointer);
 /// A list of a document; an empty one where there is none.
-const Json& rows_of(const Json& document, const std::string& list);
+const Json& rows_of(const Json& document, const char* list);
 /// The first row of a list that has these values; null where there is none.
 const Json* find_row(const Json& rows, const Json& like);
 

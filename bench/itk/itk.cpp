@@ -287,7 +287,8 @@ int run_itk(const Options& options) {
   document["load_averages"] = loads;
   const auto place = [](const Json& run) {
     const auto& tasks = itk_tasks();
-    return std::find_if(tasks.begin(), tasks.end(), [&](const ItkTask& task) { return task.key == run["task"]; });
+    return std::find_if(tasks.begin(), tasks.end(),
+                        [&](const ItkTask& task) { return task.key == run["task"].get<std::string>(); });
   };
   std::stable_sort(document["runs"].begin(), document["runs"].end(),
                    [&](const Json& a, const Json& b) { return place(a) < place(b); });

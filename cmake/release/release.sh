@@ -74,7 +74,10 @@ make_all() {
 }
 
 scratch=$(mktemp -d)
-trap 'rm -rf "$scratch"' EXIT
+finish() {  # what was built stays where something failed
+  if [ $? = 0 ]; then rm -rf "$scratch"; else echo "release.sh: what was built is in $scratch" >&2; fi
+}
+trap finish EXIT
 make_all "$scratch/source" "$folder"
 status=0
 if [ $twice = yes ]; then

@@ -28,9 +28,9 @@ LICENCES = {
     "eigen3": "MPL-2.0", "fftw3": "GPL-2.0-or-later", "gcc": "GPL-3.0-or-later WITH GCC-exception-3.1", "glibc": "LGPL-2.1-or-later",
     "glm": "MIT", "hdf5": "BSD-3-Clause", "highway": "Apache-2.0", "icu": "ICU",
     "insighttoolkit": "Apache-2.0 AND GPL-2.0-or-later", "libaec": "BSD-2-Clause", "libdeflate": "MIT", "libjpeg-turbo": "IJG AND BSD-3-Clause AND Zlib",
-    "libpng": "Libpng", "linux": "GPL-2.0-only WITH Linux-syscall-note", "nlohmann-json": "MIT", "numpy": "BSD-3-Clause", "onetbb": "Apache-2.0",
-    "openjpeg": "BSD-2-Clause", "openssl": "Apache-2.0", "python": "PSF-2.0", "python-defaults": "PSF-2.0",
-    "vtk": "BSD-3-Clause", "zlib": "Zlib",
+    "libpng": "Libpng", "libxml": "MIT", "linux": "GPL-2.0-only WITH Linux-syscall-note", "nlohmann-json": "MIT", "numpy": "BSD-3-Clause", "onetbb": "Apache-2.0",
+    "openjpeg": "BSD-2-Clause", "openssl": "Apache-2.0", "python": "PSF-2.0", "python3-defaults": "PSF-2.0",
+    "vtk": "BSD-3-Clause", "xz-utils": "LicenseRef-public-domain", "zlib": "Zlib",
 }
 
 
@@ -100,10 +100,12 @@ class Document:
         packages = [self.packages[key] for key in sorted(self.packages)]
         relations = [{"spdxElementId": a, "relationshipType": kind, "relatedSpdxElement": b} for a, kind, b in sorted(self.relations)]
         content = json.dumps([packages, relations], sort_keys=True)
+        others = [{"licenseId": "LicenseRef-public-domain", "name": "Public domain",
+                   "extractedText": "liblzma is in the public domain; see /usr/share/doc/liblzma5/copyright of Debian."}]
         return {"spdxVersion": "SPDX-2.3", "dataLicense": "CC0-1.0", "SPDXID": "SPDXRef-DOCUMENT", "name": name,
                 "documentNamespace": f"urn:uuid:{uuid.uuid5(uuid.NAMESPACE_URL, name + content)}",
                 "creationInfo": {"created": date.strftime("%Y-%m-%dT%H:%M:%SZ"), "creators": ["Tool: tetwarp-sbom", "Organization: The Tetwarp authors"]},
-                "packages": packages, "relationships": relations}
+                "hasExtractedLicensingInfos": others, "packages": packages, "relationships": relations}
 
 
 def owners(paths):
@@ -138,7 +140,7 @@ def loaded_by_wheel(path):
     """Names of the shared libraries that auditwheel put into a wheel, without the hash that it gave them."""
     with zipfile.ZipFile(path) as wheel:
         for name in wheel.namelist():
-            if ".libs/" in name:
+            if ".libs/" in name and not name.endswith("/"):
                 yield re.sub(r"-[0-9a-f]{8}(?=\.so|-|\.)", "", pathlib.PurePosixPath(name).name)
 
 

@@ -64,7 +64,7 @@ TEST(Jpeg2000, EveryStyleOfCodingGivesBackTheSamples) {
   for (int mode = 0; mode < 64; ++mode) changes.push_back([=](auto& p) { p.mode = mode; });
   for (const int levels : {1, 2, 7}) changes.push_back([=](auto& p) { p.numresolution = levels; });
   for (const auto& [width, height] : {std::pair{4, 4}, {1024, 4}, {4, 256}, {32, 32}})
-    changes.push_back([width = width, height = height](auto& p) { p.cblockw_init = width, p.cblockh_init = height; });
+    changes.push_back([w = width, h = height](auto& p) { p.cblockw_init = w, p.cblockh_init = h; });
   for (const auto order : {OPJ_LRCP, OPJ_RLCP, OPJ_RPCL, OPJ_PCRL, OPJ_CPRL})
     changes.push_back([=](auto& p) { p.prog_order = order, p.csty = 6; });
   changes.push_back([](auto& p) { p.tile_size_on = 1, p.cp_tdx = 34, p.cp_tdy = 40; });

@@ -108,8 +108,8 @@ TEST(DicomScan, MissingSliceIsNamedWithItsNeighboursAndTheOthersArePlaced) {
 TEST(DicomScan, SlicesAreUnevenFromOneThousandthOfTheirDistance) {
   const Scratch folder;
   for (const auto& [z, is_even] : {std::pair{"35.002", true}, {"35.006", false}, {"35.1", false}}) {
-    write_stack(folder.path(), 5, [&, z = z](int k, MadeSlice& slice) {
-      if (k == 2) set_z(slice, z);
+    write_stack(folder.path(), 5, [&, at = z](int k, MadeSlice& slice) {
+      if (k == 2) set_z(slice, at);
     });
     EXPECT_EQ(uneven_of(folder.path()) == "even", is_even) << z << ": " << uneven_of(folder.path());
   }
