@@ -45,7 +45,8 @@ grep -qE "^## \[$version\] - [0-9]{4}-[0-9]{2}-[0-9]{2}\$" <<<"$changes" || fail
 for program in doxygen sphinx-build dpkg-shlibdeps lintian xz; do
   command -v $program >/dev/null || fail "$program is not installed; docs/guide/release.md names the packages"
 done
-SOURCE_DATE_EPOCH=$(git log -1 --format=%ct)
+commit=$(git rev-parse HEAD)
+SOURCE_DATE_EPOCH=$(git log -1 --format=%ct "$commit")
 export SOURCE_DATE_EPOCH
 umask 022
 
@@ -60,7 +61,7 @@ make_all() {
   local clone=$1 out=$2
   mkdir -p "$out"
   git clone -q "$source_dir" "$clone"
-  git -C "$clone" checkout -q "$(git rev-parse HEAD)"
+  git -C "$clone" checkout -q "$commit"
   echo "== source archive"
   git -C "$clone" archive --format=tar --prefix="$name/" HEAD | xz -9 -T1 >"$out/$name.tar.xz"
   echo "== packages of Debian, and the documents"
@@ -98,6 +99,6 @@ fi
 [ $status = 0 ] || exit $status
 (cd "$folder" && sha256sum -- * >SHA256SUMS && sha256sum -c --quiet SHA256SUMS && cat SHA256SUMS)
 if [ $tag = yes ]; then
-  git tag -a "v$version" -m "Tetwarp $version"
-  echo "tagged: v$version is $(git rev-parse --short=12 HEAD)"
+  git tag -a "v$version" -m "Tetwarp $version" "$commit"
+  echo "tagged: v$version is $commit"
 fi
