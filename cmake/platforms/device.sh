@@ -17,6 +17,6 @@ name=${device%,*}
 status=0
 bits=$(tests/bits/check.py "$program" -- --backend cuda | tail -1) || status=1
 record_platform "$(tr '[:upper:] ' '[:lower:]-' <<<"$name" | cut -d- -f1,2)" "$name, driver ${device##*, }; $(system_name)" \
-  "$(strings -a "$program" | grep -m1 '^GCC: ' || echo unknown), nvcc" "--backend cuda" "$(commit_of "$program")" \
+  "$(compiler_of "$program"), nvcc" "--backend cuda" "$(commit_of "$program")" \
   "those of the bits alone" "$bits" "$([ $status = 0 ] && echo passed || echo failed)"
 exit $status

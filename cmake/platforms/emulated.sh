@@ -36,7 +36,7 @@ for processor in "${processors[@]}"; do
   result=passed
   bits=$(tests/bits/check.py "$program" --launcher "$qemu -cpu $processor" | tail -1) || result=failed
   record_platform "$(tr '[:upper:]' '[:lower:]' <<<"$processor")" "$(system_name) as $processor under $("$qemu" --version | head -1)" \
-    "$(strings -a "$program" | grep -m1 '^GCC: \|clang version' || echo unknown)" none "$(commit_of "$program")" "those of the bits alone" "$bits" $result
+    "$(compiler_of "$program")" none "$(commit_of "$program")" "those of the bits alone" "$bits" $result
   [ $result = passed ] || status=1
 done
 exit $status

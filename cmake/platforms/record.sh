@@ -16,6 +16,8 @@ record_platform() {
 }
 
 # system_name: that of this machine. head_commit: the commit of the sources. commit_of PROGRAM: the one that it was built of.
+# compiler_of PROGRAM: the one that it says it was compiled with.
 system_name() { echo "$(. /etc/os-release && echo "$PRETTY_NAME"), $(uname -m)"; }
 head_commit() { git rev-parse --short=12 HEAD 2>/dev/null || echo unknown; }
+compiler_of() { strings -a "$1" | awk '(/^GCC: / || /clang version/) && !found { print; found = 1 }'; }
 commit_of() { "$1" --version | sed -n '1s/.*(\(.*\))$/\1/p'; }
