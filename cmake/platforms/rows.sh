@@ -26,6 +26,7 @@ record() {
     # Clang 19 warns of what GCC 12's std::stable_sort calls, and Debian 12's ITK is for GCC alone unless it is told otherwise.
     clang*) flags="$flags -Wno-deprecated-declarations -include $source_dir/tests/fuzz/itk_with_clang.h" ;;
   esac
+  rm -f "bench/results/platforms/$row.txt"  # a row that fails to build has no record
   echo "== $row: $("$compiler" --version | head -1)"
   cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DTETWARP_WITH_CUDA=OFF -DCMAKE_CXX_COMPILER="$compiler" \
     "-DCMAKE_CXX_FLAGS=$flags" "${options[@]}" >"$build.log" 2>&1 || { tail -20 "$build.log"; return 1; }

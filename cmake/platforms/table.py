@@ -19,7 +19,7 @@ HEAD = """# Platforms
 
 Where Tetwarp was built and tested, by `cmake/platforms/rows.sh`, `arm64.sh`, `emulated.sh` and `device.sh`. *Bits*: hashes of voxels, vectors and maps that every machine has to
 give ([tests/bits](../../tests/bits/README.md)). The records are in `bench/results/platforms`; this page is made of them by `cmake/platforms/table.py`.
-A warning of the compiler is an error in every row.
+A warning of the compiler is an error in the rows of `rows.sh` and `arm64.sh`.
 
 """
 
