@@ -5,13 +5,13 @@
 # Builds the packages of Debian for this system, and lets lintian look at them.
 #
 #   cmake/debian/build.sh FOLDER
+#   cmake/platforms/inside.sh trixie FOLDER --with dpkg-dev --with lintian cmake/debian/build.sh /output
 #
-# FOLDER receives them. In a bare system of another Debian: cmake/platforms/inside.sh trixie FOLDER --with dpkg-dev --with lintian
-# cmake/debian/build.sh /output. Wants what examples/quickstart.sh installs, dpkg-dev and lintian; tetwarp-doc is made where
-# docs/build.sh has its programs. nanobind, with which the module of Python is made, comes from the package index.
+# FOLDER receives them; the second form makes those of another Debian, in a bare system. Wants what
+# examples/quickstart.sh installs, dpkg-dev and lintian; tetwarp-doc is made where docs/build.sh has its programs. nanobind, with which the module of Python is made, comes from the package index.
 # Their date is SOURCE_DATE_EPOCH, by default that of the last commit.
 set -euo pipefail
-[ $# = 1 ] || { sed -n '5,12p' "$0" | sed 's/^# \{0,1\}//'; exit 2; }
+[ $# = 1 ] || { sed -n '5,13p' "$0" | sed 's/^# \{0,1\}//'; exit 2; }
 mkdir -p "$1"
 folder=$(cd "$1" && pwd)
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."

@@ -14,9 +14,5 @@ cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 source cmake/platforms/record.sh
 device=$(nvidia-smi --query-gpu=name,driver_version --format=csv,noheader | head -1) || { echo "device.sh: error: no device" >&2; exit 1; }
 name=${device%,*}
-status=0
-bits=$(tests/bits/check.py "$program" -- --backend cuda | tail -1) || status=1
-record_platform "$(tr '[:upper:] ' '[:lower:]-' <<<"$name" | cut -d- -f1,2)" "$name, driver ${device##*, }; $(system_name)" \
-  "$(compiler_of "$program"), nvcc" "--backend cuda" "$(commit_of "$program")" \
-  "those of the bits alone" "$bits" "$([ $status = 0 ] && echo passed || echo failed)"
-exit $status
+record_bits "$(tr '[:upper:] ' '[:lower:]-' <<<"$name" | cut -d- -f1,2)" "$name, driver ${device##*, }; $(system_name)" \
+  "$(compiler_of "$program"), nvcc" "--backend cuda" "$(commit_of "$program")" "$program" -- --backend cuda

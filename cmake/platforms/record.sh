@@ -15,6 +15,15 @@ record_platform() {
   cmake/platforms/table.py --write
 }
 
+# record_bits ROW SYSTEM COMPILER OPTIONS COMMIT PROGRAM [ARGUMENT...]: keeps what the comparison of a program's bits alone came
+# to; ARGUMENT: of tests/bits/check.py. Exit status 1: they differ.
+record_bits() {
+  local bits result=passed
+  bits=$(tests/bits/check.py "${@:6}" | tail -1) || result=failed
+  record_platform "${@:1:5}" "those of the bits alone" "$bits" $result
+  [ $result = passed ]
+}
+
 # system_name: that of this machine. head_commit: the commit of the sources. commit_of PROGRAM: the one that it was built of.
 # compiler_of PROGRAM: the one that it says it was compiled with.
 system_name() { echo "$(. /etc/os-release && echo "$PRETTY_NAME"), $(uname -m)"; }
