@@ -16,7 +16,7 @@ function(tetwarp_library name)
   set_target_properties(tetwarp_${name} PROPERTIES
     POSITION_INDEPENDENT_CODE ON
     VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR}
-    INSTALL_RPATH "$ORIGIN;$ORIGIN/tetwarp")
+    INSTALL_RPATH "$ORIGIN;$ORIGIN/tetwarp;${tetwarp_users_rpath}")
   tetwarp_install_library(${name})
 endfunction()
 
@@ -28,7 +28,7 @@ function(tetwarp_module name)
   tetwarp_configure(tetwarp_${name})
   set_target_properties(tetwarp_${name} PROPERTIES
     LIBRARY_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/lib/tetwarp"
-    INSTALL_RPATH "$<$<BOOL:${BUILD_SHARED_LIBS}>:$ORIGIN/..>")
+    INSTALL_RPATH "$<$<BOOL:${BUILD_SHARED_LIBS}>:$ORIGIN/..>;${tetwarp_users_rpath}")
   install(TARGETS tetwarp_${name} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/tetwarp COMPONENT program)
 endfunction()
 

@@ -7,8 +7,8 @@
 #
 #   cmake/platforms/emulated.sh PROGRAM [PROCESSOR...]
 #
-# PROCESSOR: qemu64 (SSE3), Nehalem (SSE4.2), Haswell (AVX2), by default all; names of qemu's -cpu. Wants qemu-x86_64-static of
-# the Debian package qemu-user-static, or what TETWARP_QEMU names. Where the emulator itself gathers wrongly (qemu 7.2 does,
+# PROCESSOR: qemu64 (SSE3), Nehalem (SSE4.2), Haswell (AVX2), by default all; names of qemu's -cpu. Wants c++, strings
+# and qemu-x86_64-static of the Debian package qemu-user-static, or what TETWARP_QEMU names. Where the emulator itself gathers wrongly (qemu 7.2 does,
 # 10.0 does not; tests/bits/gather_index.cpp), what it gives for a processor with AVX2 says nothing about the program: that is said, and no
 # record is made.
 set -euo pipefail
@@ -17,10 +17,10 @@ program=$(realpath "$1")
 shift
 processors=("$@")
 [ ${#processors[@]} -gt 0 ] || processors=(qemu64 Nehalem Haswell)
+qemu=${TETWARP_QEMU:-qemu-x86_64-static}
+qemu=$(realpath "$(command -v "$qemu")") || { echo "emulated.sh: error: $qemu is not installed; apt-get install qemu-user-static" >&2; exit 1; }
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 source cmake/platforms/record.sh
-qemu=${TETWARP_QEMU:-qemu-x86_64-static}
-command -v "$qemu" >/dev/null || { echo "emulated.sh: error: $qemu is not installed; apt-get install qemu-user-static" >&2; exit 1; }
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 c++ -O1 -static tests/bits/gather_index.cpp -o "$scratch/gather_index"

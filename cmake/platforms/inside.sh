@@ -13,6 +13,11 @@
 set -euo pipefail
 usage() { sed -n '5,12p' "$0" | sed 's/^# \{0,1\}//'; exit 2; }
 [ $# -ge 3 ] || usage
+# What is mounted is seen here alone, and is gone with this process.
+if [ -z "${TETWARP_OWN_MOUNTS:-}" ]; then
+  [ "$(id -u)" = 0 ] || { echo "inside.sh: error: this wants root" >&2; exit 1; }
+  TETWARP_OWN_MOUNTS=yes exec unshare --mount bash "${BASH_SOURCE[0]}" "$@"
+fi
 suite=$1
 mkdir -p "$2"
 output=$(cd "$2" && pwd)
@@ -26,11 +31,11 @@ done
 [ $# -ge 1 ] || usage
 source_dir=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 root=${TETWARP_CHROOTS:-$source_dir/build/chroots}/inside-$suite
+mkdir -p "$(dirname "$root")"
+exec {lock}>"$root.lock"
+flock --nonblock "$lock" || { echo "inside.sh: error: another inside.sh is in $root" >&2; exit 1; }
 "$source_dir/cmake/platforms/bare_system.sh" "$root" "$suite" git
-mounted=()
-clean() { for at in ${mounted[@]+"${mounted[@]}"}; do umount "$at"; done; }  # the last one first
-trap clean EXIT
-for at in proc dev dev/pts; do mount --bind "/$at" "$root/$at"; mounted=("$root/$at" ${mounted[@]+"${mounted[@]}"}); done
+for at in proc dev dev/pts; do mount --bind "/$at" "$root/$at"; done
 inside() {
   chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive \
     ${http_proxy:+http_proxy="$http_proxy"} ${https_proxy:+https_proxy="$https_proxy"} ${TETWARP_JOBS:+TETWARP_JOBS="$TETWARP_JOBS"} \

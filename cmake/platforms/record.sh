@@ -24,9 +24,13 @@ record_bits() {
   [ $result = passed ]
 }
 
-# system_name: that of this machine. head_commit: the commit of the sources. commit_of PROGRAM: the one that it was built of.
+# system_name: that of this machine. head_commit: the commit of the sources, with -dirty where they are not quite it (records left out). commit_of PROGRAM: the one that it was built of.
 # compiler_of PROGRAM: the one that it says it was compiled with.
 system_name() { echo "$(. /etc/os-release && echo "$PRETTY_NAME"), $(uname -m)"; }
-head_commit() { git rev-parse --short=12 HEAD 2>/dev/null || echo unknown; }
+head_commit() {
+  local changed
+  changed=$(git status --porcelain -- . ':!bench/results' ':!docs/reference/platforms.md' 2>/dev/null) || { echo unknown; return; }
+  echo "$(git rev-parse --short=12 HEAD)${changed:+-dirty}"
+}
 compiler_of() { strings -a "$1" | awk '(/^GCC: / || /clang version/) && !found { print; found = 1 }'; }
 commit_of() { "$1" --version | sed -n '1s/.*(\(.*\))$/\1/p'; }

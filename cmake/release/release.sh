@@ -42,6 +42,7 @@ grep -q "^version: $version\$" CITATION.cff || fail "CITATION.cff does not name 
 changes=$(awk -v head="## [$version]" 'index($0, "## [") == 1 { on = index($0, head) == 1 } on' CHANGELOG.md)
 grep -qE "^## \[$version\] - [0-9]{4}-[0-9]{2}-[0-9]{2}\$" <<<"$changes" || fail "CHANGELOG.md has no section '## [$version] - DATE'"
 [ $tag = no ] || ! git rev-parse -q --verify "refs/tags/v$version" >/dev/null || fail "the tag v$version is there already"
+for python in ${pythons[@]+"${pythons[@]}"}; do command -v "$python" >/dev/null || fail "$python is no program"; done
 for program in doxygen sphinx-build dpkg-shlibdeps lintian xz; do
   command -v $program >/dev/null || fail "$program is not installed; docs/guide/release.md names the packages"
 done
@@ -84,8 +85,10 @@ status=0
 if [ $twice = yes ]; then
   echo "== all a second time"
   CCACHE_DISABLE=1 make_all "$scratch/another-folder/of-the-sources" "$scratch/again"
+  diff <(ls "$folder") <(ls "$scratch/again") || { echo "release.sh: error: other files the second time" >&2; status=1; }
   for path in "$folder"/*; do
     file=$(basename "$path")
+    [ -e "$scratch/again/$file" ] || continue
     if cmp -s "$path" "$scratch/again/$file"; then
       echo "same bytes: $file"
     else

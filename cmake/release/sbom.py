@@ -7,9 +7,10 @@
     cmake/release/sbom.py SOURCE FOLDER
 
 SOURCE: a folder in which cmake/debian/build.sh and python/wheels.sh were run. FOLDER: with the files of the release.
-Nothing is listed by hand but licences: what is compiled in is every file outside of SOURCE that the compiler read (the log
-of ninja) and the package of Debian that it belongs to; what is loaded is what the packages depend on and what
-auditwheel put into the wheels. A package whose licence is not known here is an error, so that none is forgotten.
+Nothing is listed by hand but licences: what is compiled with is every file outside of SOURCE that the compiler read (the
+log of ninja, of the packages and of each wheel) and the package of Debian that it belongs to, STATIC_LINK where that has
+headers alone, so that its code is in what was compiled; what is loaded is what the packages depend on and what auditwheel
+put into the wheels. A package whose licence is not known here is an error, so that none is forgotten.
 """
 import datetime
 import hashlib
@@ -69,10 +70,10 @@ class Document:
 
     def debian(self, package):
         """A package of Debian that is installed here. Returns its id."""
-        line = output_of("dpkg-query", "-W", "-f", "${source:Package} ${Version}\n", package).splitlines()
+        line = output_of("dpkg-query", "-W", "-f", "${source:Package} ${Version} ${Architecture}\n", package).splitlines()
         if not line:
             fail(f"the package {package} is not installed, so its version is not known")
-        source, version = line[0].split()
+        source, version, architecture = line[0].split()
         licence = LICENCES.get(source) or LICENCES.get(re.sub(r"[-0-9.]+$", "", source))
         if not licence:
             fail(f"no licence is known for {package} (source {source}); look into /usr/share/doc/{package}/copyright and name it in sbom.py")
@@ -82,7 +83,7 @@ class Document:
             "downloadLocation": "NOASSERTION", "filesAnalyzed": False, "licenseConcluded": "NOASSERTION",
             "licenseDeclared": licence, "copyrightText": "NOASSERTION",
             "externalRefs": [{"referenceCategory": "PACKAGE-MANAGER", "referenceType": "purl",
-                              "referenceLocator": f"pkg:deb/debian/{package}@{version}?arch=amd64"}]}
+                              "referenceLocator": f"pkg:deb/debian/{package}@{version}?arch={architecture}"}]}
         return identifier
 
     def nanobind(self, version):
@@ -120,11 +121,35 @@ def owners(paths):
 
 
 def headers_of(build, source):
-    """Files outside of the sources that the compiler read in a build; those of the environment of Python are apart."""
-    names = {line.strip() for line in output_of("ninja", "-C", str(build), "-t", "deps").splitlines() if line.startswith("    ")}
-    outside = {name for name in names if name.startswith("/") and not name.startswith(f"{source}/")}
-    environment = {name for name in names if "/site-packages/nanobind/" in name}
-    return outside - environment, environment
+    """Files that the compiler read in a build: those outside of the sources for what is no module of Python, the same for
+    the module, and those of nanobind."""
+    log = output_of("ninja", "-C", str(build), "-t", "deps")
+    if not log:
+        fail(f"{build} has no log of ninja; run cmake/debian/build.sh and python/wheels.sh in {source}")
+    names, module = set(), set()
+    read = names
+    for line in log.splitlines():
+        if line.startswith("    "):
+            read.add(line.strip())
+        elif line:
+            read = module if line.startswith(("python/", "nanobind", "CMakeFiles/nanobind")) else names
+    bound = {name for name in module | names if "/nanobind/" in name}
+
+    def outside(read):
+        return {name for name in read - bound if name.startswith("/") and not name.startswith(f"{source}/")}
+    return outside(names), outside(module), bound
+
+
+def has_headers_alone(package):
+    """Whether a package of Debian has no library that a program could be linked with."""
+    return not re.search(r"/lib\S*\.(so|a)$", output_of("dpkg", "-L", package), re.M)
+
+
+def wheel_build(source, wheel):
+    """The folder in which a wheel was built: scikit-build-core names it after the wheel before auditwheel gave it another platform."""
+    interpreter, abi = wheel.stem.split("-")[2:4]
+    found = sorted((source / "build").glob(f"{interpreter}-{abi}-linux_*"))
+    return found[0] if len(found) == 1 else fail(f"{len(found)} folders of {source}/build are of {wheel.name}, where one should be")
 
 
 def nanobind_version(headers):
@@ -160,31 +185,34 @@ def main():
     version = re.search(r"^project\(tetwarp VERSION ([0-9.]+)", (source / "CMakeLists.txt").read_text(encoding="utf-8"), re.M).group(1)
     commit = output_of("git", "-C", str(source), "rev-parse", "HEAD").strip()
     document = Document(commit)
-    headers, environment = headers_of(source / "build" / "debian", source)
-    if not headers:
-        fail(f"{source}/build/debian has no log of ninja; run cmake/debian/build.sh there")
-    compiled = [document.debian(package) for package in owners(headers)]
-    bound = nanobind_version(environment)
-    if not bound:
-        fail("the build used no nanobind")
-    compiled_python = compiled + [document.nanobind(bound)]
+
+    def compiled_with(artifact, headers, bound=()):
+        for package in owners(headers):
+            other = document.debian(package)
+            document.relations.add((artifact, "STATIC_LINK", other) if has_headers_alone(package) else (other, "BUILD_DEPENDENCY_OF", artifact))
+        if bound:
+            bound_version = nanobind_version(bound) or fail("the build used a nanobind whose version is not known")
+            document.relations.add((artifact, "STATIC_LINK", document.nanobind(bound_version)))
+
+    headers, module_headers, bound = headers_of(source / "build" / "debian", source)
     for path in sorted(folder.iterdir()):
         if path.name.endswith(".deb"):
             fields = dict(line.split(": ", 1) for line in output_of("dpkg-deb", "-f", str(path)).splitlines() if re.match(r"\S+: ", line))
             package = fields["Package"]
             gpl = " AND GPL-2.0-or-later" if "insighttoolkit" in fields.get("Depends", "") else ""
             artifact = document.artifact(path, "Apache-2.0" + gpl, "INSTALL", version)
-            if package != "tetwarp-doc":
-                for other in compiled_python if package.startswith("python3-") else compiled:
-                    document.relations.add((artifact, "STATIC_LINK", other))
+            if package.startswith("python3-"):
+                compiled_with(artifact, headers | module_headers, bound)
+            elif package != "tetwarp-doc":
+                compiled_with(artifact, headers)
             for entry in filter(None, fields.get("Depends", "").split(", ")):
                 name = entry.split()[0]
                 if "tetwarp" not in name:
                     document.relations.add((artifact, "DEPENDS_ON", document.debian(name)))
         elif path.suffix == ".whl":
             artifact = document.artifact(path, "Apache-2.0", "LIBRARY", version)
-            for other in compiled_python:
-                document.relations.add((artifact, "STATIC_LINK", other))
+            library_headers, its_headers, its_nanobind = headers_of(wheel_build(source, path), source)
+            compiled_with(artifact, library_headers | its_headers, its_nanobind)
             for soname in loaded_by_wheel(path):
                 document.relations.add((artifact, "CONTAINS", document.debian(package_of_library(soname))))
         elif path.name == f"tetwarp-{version}.tar.xz":

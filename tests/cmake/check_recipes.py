@@ -66,7 +66,7 @@ class Recipes(unittest.TestCase):
         version = re.search(r"^project\(tetwarp VERSION ([0-9.]+)", CMAKE, re.M)[1]
         for name, pattern in [("Dockerfile", r"^ARG VERSION=(.*)$"), ("tetwarp.def", r"^ *VERSION=(.*)$"),
                               ("package.py", r'^    version\("(.*)"\)$'), ("package.py", r"tetwarp-([0-9.]+)\.tar"),
-                              ("recipe.yaml", r'^  version: "(.*)"$')]:
+                              ("recipe.yaml", r'^  version: "(.*)"$'), ("containers.md", r"dev-build tetwarp@([0-9.]+)$")]:
             self.assertEqual(re.findall(pattern, ALL[name], re.M), [version], f"{name}: {pattern}")
 
     def test_the_presets_exist(self):

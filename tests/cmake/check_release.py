@@ -25,7 +25,8 @@ import sbom  # noqa: E402
 
 
 def git(folder, *arguments):
-    return subprocess.run(["git", "-C", str(folder), "-c", "safe.directory=*", "-c", "user.name=test", "-c", "user.email=test@example.org", *arguments],
+    return subprocess.run(["git", "-C", str(folder), "-c", "safe.directory=*", "-c", "user.name=test", "-c", "user.email=test@example.org",
+                           "-c", "commit.gpgsign=false", "-c", "tag.gpgsign=false", "-c", "core.hooksPath=/dev/null", *arguments],
                           check=True, capture_output=True, text=True).stdout
 
 
@@ -52,7 +53,7 @@ class Release(unittest.TestCase):
         git(self.clone, "add", "-A")
         git(self.clone, "commit", "-q", "-m", "State")
 
-    def refused(self, text, folder="out"):
+    def refused(self, text, folder="out", arguments=()):
         """Runs the script without any program that would make something, and expects an error."""
         out = pathlib.Path(self.scratch.name) / folder
         before = sorted(out.iterdir()) if out.exists() else []
@@ -62,7 +63,7 @@ class Release(unittest.TestCase):
         for name in ["bash", "git", "sed", "awk", "grep", "ls", "mkdir", "dirname", "env"]:
             if not (tools / name).exists():
                 (tools / name).symlink_to(shutil.which(name))
-        run = subprocess.run([str(tools / "bash"), str(self.clone / "cmake/release/release.sh"), str(out)], env={"PATH": str(tools)},
+        run = subprocess.run([str(tools / "bash"), str(self.clone / "cmake/release/release.sh"), str(out), *arguments], env={"PATH": str(tools)},
                              capture_output=True, text=True, check=False)
         self.assertEqual(run.returncode, 1, run.stderr)
         self.assertIn(text, run.stderr)
@@ -96,6 +97,9 @@ class Release(unittest.TestCase):
     def test_tag_that_is_there(self):
         git(self.clone, "tag", f"v{self.version}")
         self.refused(f"the tag v{self.version} is there already")
+
+    def test_python_that_is_not_there(self):
+        self.refused("python9.9 is no program", arguments=["--python", "python9.9"])
 
     def test_folder_with_files(self):
         full = pathlib.Path(self.scratch.name) / "full"
