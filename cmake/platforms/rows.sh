@@ -24,7 +24,7 @@ record() {
   case $compiler in
     g++*) flags="$flags -Wno-restrict" ;;  # GCC 12 warns of std::string's own code
     # Clang 19 warns of what GCC 12's std::stable_sort calls, and Debian 12's ITK is for GCC alone unless it is told otherwise.
-    clang*) flags="$flags -Wno-deprecated-declarations -include $source_dir/tests/fuzz/itk_with_clang.h" ;;
+    clang*) flags="$flags -Wno-deprecated-declarations -include $source_dir/tests/fuzz/itk_with_clang.h $(itk_headers)" ;;
   esac
   rm -f "bench/results/platforms/$row.txt"  # a row that fails to build has no record
   echo "== $row: $("$compiler" --version | head -1)"
@@ -36,6 +36,13 @@ record() {
   bits=$(tests/bits/check.py "$build/apps/tetwarp" | tail -1) || result=failed
   record_platform "$row" "$(system_name)" "$("$compiler" --version | head -1)" "${options[*]:-none}" "$(head_commit)" "${tests:-none}" "$bits" $result
   [ $result = passed ]
+}
+
+# The option that makes the folder of ITK's headers known to all sources: clang reads what `-include` names once, when it makes a
+# precompiled header, which knows of no ITK by itself.
+itk_headers() {
+  local folder
+  for folder in /usr/include/ITK-*; do [ ! -d "$folder" ] || echo "-isystem $folder"; done
 }
 
 # The row of Debian 13 is this script's row of the system's own compiler, in a bare system.

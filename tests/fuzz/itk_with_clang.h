@@ -3,8 +3,8 @@
 
 // Debian's ITK knows the one compiler that it was built with, and refuses clang. It recognises g++ by these macros, and
 // what it assumes of g++ 12 is true of clang 14 and 19, too. The preset fuzz and cmake/platforms/rows.sh include this
-// header before everything else. It is included twice where a precompiled header has it that was made without ITK, so
-// it has no guard of its own.
+// header before everything else. A precompiled header that has it must be made with ITK's folder among those of
+// headers: clang does not read it again then.
 #if __has_include(<itk_compiler_detection.h>)
 #pragma push_macro("__clang__")
 #pragma push_macro("__GNUC__")
