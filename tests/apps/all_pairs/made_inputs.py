@@ -127,7 +127,7 @@ def write_points(folder):
     points[-1] = MIDDLE + 200
     points = np.round(points, 3)
     (folder / "points.csv").write_text(
-        "name,x,y,z\n" + "".join(f"p{n},{p[0]!r},{p[1]!r},{p[2]!r}\n" for n, p in enumerate(points)))
+        "name,x,y,z\n" + "".join(f"p{n}," + ",".join(repr(float(x)) for x in p) + "\n" for n, p in enumerate(points)))
     markup = {"markups": [{"type": "Fiducial", "coordinateSystem": "RAS", "controlPoints": [
         {"id": str(n), "label": f"p{n}", "position": [-p[0], -p[1], p[2]], "positionStatus": "defined"}
         for n, p in enumerate(points.tolist())]}]}

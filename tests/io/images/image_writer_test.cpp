@@ -159,6 +159,13 @@ std::string without_units(std::string nifti) {
   return nifti;
 }
 
+/// A MetaImage without the words that only repeat TransformMatrix: ITK 5.4 names the ends of axes, and ITK 5.2 their
+/// beginnings.
+std::string without_orientation(const std::string& meta) {
+  const std::size_t begin = meta.find("AnatomicalOrientation"), end = meta.find('\n', begin);
+  return meta.substr(0, begin) + meta.substr(end + 1);
+}
+
 TEST(ImageWriter, HeadersOfTurnedGridsHaveTheBytesThatItkWrites) {
   const Scratch scratch;
   std::mt19937 random(1);
@@ -173,7 +180,12 @@ TEST(ImageWriter, HeadersOfTurnedGridsHaveTheBytesThatItkWrites) {
       itk_write(scratch / name, format, volume.view(), 0, {});
       std::string expected = read_bytes(scratch / name);
       if (format == ItkFormat::nifti) expected = without_units(expected);
-      ASSERT_EQ(written(scratch / name, volume, 2, {0, {}}), expected) << name;
+      std::string found = written(scratch / name, volume, 2, {0, {}});
+      if (format == ItkFormat::meta && itk_version() != "5.2") {
+        expected = without_orientation(expected);
+        found = without_orientation(found);
+      }
+      ASSERT_EQ(found, expected) << name;
     }
   }
 }
