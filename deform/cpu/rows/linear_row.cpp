@@ -93,9 +93,17 @@ struct Axis {
 };
 
 #if !HWY_NATIVE_FMA
-#if HWY_TARGET == HWY_SCALAR
+#if HWY_TARGET == HWY_SCALAR || HWY_TARGET == HWY_EMU128
+/// One number after the other: the vectors of double that these targets have turn an infinite sum into the largest
+/// float.
 HWY_INLINE Float emulated_fma(Float x, Float y, Float z) {
-  return hn::Set(Floats(), std::fma(hn::GetLane(x), hn::GetLane(y), hn::GetLane(z)));
+  constexpr std::size_t kMost = 4;
+  float of_x[kMost], of_y[kMost], of_z[kMost];
+  hn::StoreU(x, Floats(), of_x);
+  hn::StoreU(y, Floats(), of_y);
+  hn::StoreU(z, Floats(), of_z);
+  for (std::size_t n = 0; n < hn::Lanes(Floats()); ++n) of_z[n] = std::fma(of_x[n], of_y[n], of_z[n]);
+  return hn::LoadU(Floats(), of_z);
 }
 #else
 /// x y + z in double, with a last bit that makes the rounding to float that follows the only one: the product is exact,

@@ -37,7 +37,7 @@ void expect_floor(const Floors& floors, const std::string& ratio, const std::str
 
 TEST(CpuFloors, ThePaperCountsSetFieldAndItksWarpDoesNot) {
   Json results;
-  results["runs"] = {make_run("wave")};
+  results["runs"] = Json::array({make_run("wave")});
   results["runs"][0]["paper"] = peer(236);
   results["runs"][0]["itk_warp"] = peer(36);
   const Floors floors = find_cpu_floors(results);
@@ -49,8 +49,8 @@ TEST(CpuFloors, ThePaperCountsSetFieldAndItksWarpDoesNot) {
 
 TEST(CpuFloors, AFurtherVolumeMayTakeAThirdOfTheFirstOrSoMuchAVoxel) {
   Json results;
-  results["runs"] = {make_run("wave", {1000, 1000, 10}), make_run("twist", {1000, 1000, 10}),
-                     make_run("identity", {1000, 1000, 100})};
+  results["runs"] = Json::array({make_run("wave", {1000, 1000, 10}), make_run("twist", {1000, 1000, 10}),
+                                 make_run("identity", {1000, 1000, 100})});
   results["runs"][0]["two_volumes_ms"] = steady_ms(39);
   results["runs"][1]["two_volumes_ms"] = steady_ms(46.5);
   results["runs"][2]["two_volumes_ms"] = steady_ms(180);  // 1.5 ns a voxel
@@ -62,8 +62,8 @@ TEST(CpuFloors, AFurtherVolumeMayTakeAThirdOfTheFirstOrSoMuchAVoxel) {
 
 TEST(CpuFloors, SlowPeersAreHeldAgainstTheRunOnTheirOwnVolume) {
   Json results;
-  results["runs"] = {make_run("twist")};
-  results["slow_peers"] = {make_run("twist", {512, 512, 40})};
+  results["runs"] = Json::array({make_run("twist")});
+  results["slow_peers"] = Json::array({make_run("twist", {512, 512, 40})});
   results["slow_peers"][0]["new_field_ms"] = steady_ms(5);
   results["slow_peers"][0]["itk_invert_and_warp"] = peer(250);
   results["slow_peers"][0]["vtk_probe"] = peer(99);
@@ -74,7 +74,7 @@ TEST(CpuFloors, SlowPeersAreHeldAgainstTheRunOnTheirOwnVolume) {
 
 TEST(CpuFloors, InvertingIdentityIsNoWorkAndHasNoFloor) {
   Json results;
-  results["slow_peers"] = {make_run("identity", {512, 512, 40})};
+  results["slow_peers"] = Json::array({make_run("identity", {512, 512, 40})});
   results["slow_peers"][0]["itk_invert_and_warp"] = peer(400);
   const Floors floors = find_cpu_floors(results);
   expect_floor(floors, "ITK invert and warp / new field", "identity, 40 slices", 10, {}, {}, false);
@@ -98,8 +98,9 @@ TEST(CpuFloors, IdentityIsHeldAgainstTheBytesAndALocalFieldIsToldBesideThem) {
 
 TEST(CpuFloors, AVoxelOfALargeVolumeCostsAQuarterMoreAtMost) {
   Json results;
-  results["growth"] = {make_run("wave", glm::i64vec3(100)), make_run("wave", glm::i64vec3(200), 8 * 40 * 1.25),
-                       make_run("wave", {200, 200, 400}, 16 * 40 * 1.3)};
+  results["growth"] =
+      Json::array({make_run("wave", glm::i64vec3(100)), make_run("wave", glm::i64vec3(200), 8 * 40 * 1.25),
+                   make_run("wave", {200, 200, 400}, 16 * 40 * 1.3)});
   const Floors floors = find_cpu_floors(results);
   expect_floor(floors, "new field, a voxel", "wave, 200 x 200 x 200 to 100 x 100 x 100", 1.25, 1.25, {}, true);
   expect_floor(floors, "new field, a voxel", "wave, 200 x 200 x 400 to 100 x 100 x 100", 1.3, 1.25, {}, false);
@@ -113,14 +114,14 @@ TEST(CpuFloors, EfficiencyIsToldAndHeldAgainstNothing) {
 
 TEST(CpuFloors, WhatWasNotMeasuredHasNoFloor) {
   Json results;
-  results["runs"] = {make_run("wave")};
-  results["larger_cells"] = {make_run("wave")};
+  results["runs"] = Json::array({make_run("wave")});
+  results["larger_cells"] = Json::array({make_run("wave")});
   EXPECT_TRUE(find_cpu_floors(results).empty());
 }
 
 TEST(CpuFloors, WhatCameOfThemIsWritten) {
   Json results;
-  results["runs"] = {make_run("wave")};
+  results["runs"] = Json::array({make_run("wave")});
   results["runs"][0]["paper"] = peer(200);
   const Json written = to_json(find_cpu_floors(results));
   ASSERT_EQ(written.size(), 1u);

@@ -112,8 +112,8 @@ TEST(GpuFloors, MemoryMayBeATenthOr128MegabytesMoreThanTheData) {
   EXPECT_EQ(MemoryUse{.data = 2'000'000'000}.allowed(), 2'200'000'000u);
   EXPECT_EQ(MemoryUse{.data = 1000}.allowed(), 128'001'000u);
   Json results = results_of({});
-  results["memory"] = {
-      memory_json("wave", {.data = 872'000'000, .host_views = 900'000'000, .device_views = 1'200'000'000})};
+  results["memory"] = Json::array(
+      {memory_json("wave", {.data = 872'000'000, .host_views = 900'000'000, .device_views = 1'200'000'000})});
   const Floors floors = find_gpu_floors(results);
   expect_floor(floors, "memory / allowed", "wave, host views", 0.9, 1, true);
   expect_floor(floors, "memory / allowed", "wave, device views", 1.2, 1, false);

@@ -46,10 +46,10 @@ TEST_F(PublishFamilies, OfTheCpuTheTablesSayWhatIsLeftOut) {
   run["bytes_ms"] = ms(16);
   run["paper"] = {{"ms", ms(200)}, {"differing", 0.25}};
   run["itk_warp"] = nullptr;
-  numbers["runs"] = {run};
+  numbers["runs"] = Json::array({run});
   Json slow = numbers["slow_peers"][1];
   slow["itk_invert_and_warp"]["ms"] = ms(4000);
-  numbers["slow_peers"] = {slow};
+  numbers["slow_peers"] = Json::array({slow});
   const std::string text = made_of(numbers, "md");
   EXPECT_TRUE(
       says(text, {"ITK 5.2.1", "VTK not in this build, left out", "## A vertex on every",
@@ -63,7 +63,7 @@ TEST_F(PublishFamilies, OfAGpuEveryListHasItsTable) {
   numbers["machine"]["gpu"] = "A GPU";
   Json mesh = numbers["meshes"][0];
   mesh.update({{"field", "wave"}, {"cell_size", 32}, {"tetrahedra", 77}});
-  numbers["meshes"] = {mesh};
+  numbers["meshes"] = Json::array({mesh});
   numbers["floors"] = {{{"ratio", "paper / resample"},
                         {"where", "wave"},
                         {"value", 5.0},

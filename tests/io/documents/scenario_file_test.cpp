@@ -186,7 +186,7 @@ TEST_F(ScenarioFile, WhatIsWrittenIsReadAsTheSameAndWrittenAlike) {
     whole["phases"][0]["move"][2]["region"][shape]["normal"] = {0, 0, -1};  // of any length
   whole["cuts"][1]["disc"]["normal"] = {0, 0, 1};
   for (nlohmann::json* label : {&whole["hold"][0]["all_of"][1]["not"]["label"], &whole["phases"][2]["pin"][0]["label"]})
-    *label = {*label};
+    *label = nlohmann::json::array({*label});
   EXPECT_EQ(again, whole) << nlohmann::json::diff(whole, again).dump(1);
 }
 
