@@ -55,8 +55,8 @@ def check_pages(program, folder):
         if shutil.which("groff"):
             done = subprocess.run(["groff", "-man", "-Tutf8", "-ww", str(page)], capture_output=True, text=True)
             # groff 1.23 says so where a line has no place for a break, such as a list of suffixes.
-            said = [line for line in done.stderr.splitlines() if "cannot adjust line" not in line]
-            expect(done.returncode == 0 and not said, f"{name}: groff says {said[:2]!r}")
+            warnings = [line for line in done.stderr.splitlines() if "cannot adjust line" not in line]
+            expect(done.returncode == 0 and not warnings, f"{name}: groff says {warnings[:2]!r}")
             expect(name in done.stdout, f"{name}: is in what groff prints")
         if shutil.which("mandoc"):
             done = subprocess.run(["mandoc", "-Tlint", "-Werror", str(page)], capture_output=True, text=True)
