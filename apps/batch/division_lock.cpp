@@ -29,7 +29,6 @@ using nlohmann::json;
 
 /// How long to retry: a lock may be refused for a moment while other processes begin or end.
 constexpr auto kPatience = 1500ms;
-constexpr const char* kName = "batch.lock";
 
 /// Takes a lock of flock. @return false where another process holds a lock that excludes it; true on a file system
 /// without locks
@@ -87,7 +86,8 @@ bool DivisionLock::try_to_take(const Division& division) {
   return false;
 }
 
-DivisionLock::DivisionLock(const std::filesystem::path& folder, const Division& division) : path_(folder / kName) {
+DivisionLock::DivisionLock(const std::filesystem::path& folder, const Division& division)
+    : path_(folder / kDivisionLockName) {
   file_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
   if (file_ < 0) throw Error("cannot write " + path_.string() + ": " + std::generic_category().message(errno));
   try {

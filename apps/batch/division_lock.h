@@ -20,6 +20,9 @@ struct Division {
 /// The division of some cases. @param ids  of all cases, in the order of the manifest
 Division division_of(std::size_t shards, const std::vector<std::string>& ids);
 
+/// The file of the lock below, in OUTPUT_DIR.
+constexpr const char* kDivisionLockName = "batch.lock";
+
 /// A lock that several processes hold at the same time as long as they divide the same cases in the same way, so that
 /// no two shards have a case in common. That two processes do not take the same shard is not its work. The kernel keeps
 /// it (flock) and releases it when the process ends, however that ends; on a file system without such locks it is

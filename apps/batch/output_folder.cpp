@@ -35,6 +35,14 @@ bool holds_shards(const fs::path& folder) {
                      [](const auto& entry) { return shard_of(entry.path(), "batch", ".json").has_value(); });
 }
 
+/// Whether a folder holds anything but what a batch leaves that was killed before it was begun: the lock of its
+/// division.
+bool holds_others(const fs::path& folder) {
+  const fs::directory_iterator entries(folder);
+  return std::any_of(begin(entries), end(entries),
+                     [](const auto& entry) { return entry.path().filename() != kDivisionLockName; });
+}
+
 /// Whether a file has a hidden name of StagedOutput, `.tetwarp-partial-PID-NAME`, or one that was given to it when it
 /// was dropped, that stands for one of these names.
 bool is_unfinished(const std::string& name, const std::vector<std::string>& names) {
@@ -96,7 +104,7 @@ void OutputFolder::begin(const std::vector<std::string>& ids, bool resume, const
   const bool begun = fs::exists(mark) || (shard_.count == 1 && holds_shards(path_));
   if (begun && !resume)
     throw Error("a batch was begun in " + path_.string() + "; continue it with --resume, or choose another folder");
-  if (!begun && shard_.count == 1 && !created_ && !fs::is_empty(path_))
+  if (!begun && shard_.count == 1 && !created_ && holds_others(path_))
     throw Error(path_.string() + " is not empty, and no batch was begun in it; choose another folder");
   division_.emplace(path_, division_of(shard_.count, ids));
   lock_ = ::open(mark.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);

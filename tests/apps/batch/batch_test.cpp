@@ -167,6 +167,9 @@ TEST_F(Batch, AFolderThatIsNotABatchOrInUseIsLeftAlone) {
   write_file(scratch_ / "mine/thesis.txt", "words");
   EXPECT_TRUE(says(run("batch m.jsonl -o mine --resume").err, {"mine is not empty, and no batch was begun in it"}));
   EXPECT_EQ(files_of("mine").size(), 1u);
+  fs::create_directories(scratch_ / "killed");
+  write_file(scratch_ / "killed/batch.lock", "");  // all that is there where a batch is killed in its first moment
+  EXPECT_EQ(run("batch m.jsonl -o killed --resume").status, 0);
   ASSERT_EQ(batch(kSixCases).status, 0);
   const Outcome again = run("batch m.jsonl -o out");
   EXPECT_EQ(again.status, 1);
