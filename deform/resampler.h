@@ -72,7 +72,13 @@ struct Maps {
   VolumeView jacobian = {};
   /// Type u16: number of tetrahedra that own the voxel, saturated. More than 1 is a fold.
   VolumeView owners = {};
+  /// Type u32: number of the tetrahedron that owns the voxel (docs/design/definition.md, "Five tetrahedra a cell"), the
+  /// lowest where it folds; `kNoTetrahedron` where none does.
+  VolumeView tetrahedra = {};
 };
+
+/// In `Maps::tetrahedra`: no tetrahedron owns the voxel.
+constexpr std::uint32_t kNoTetrahedron = UINT32_MAX;
 
 /// By which way a backend found the owners of the voxels of the region. The way does not change the result. All counts
 /// are 0 for pull fields.

@@ -33,9 +33,7 @@ void check_view(const View& view, const std::string& name) {
 void check_target(const Target& target, const Geometry& output, const Region& region, const Region& needed) {
   check_view(target.source, "the source");
   check_view(target.output, "the output");
-  require_valid(*target.source.geometry, "source grid");
-  require(target.source.geometry->slices.empty() || target.interpolation != Interpolation::cubic,
-          "cubic interpolation needs even slices, those of the source are not; choose linear");
+  require_source_grid(*target.source.geometry, target.interpolation);
   require(*target.output.geometry == output, [&] {
     return "the output of " + to_string(target.output.geometry->size) + " voxels is not on the resampler's grid of " +
            to_string(output.size);
@@ -111,6 +109,20 @@ void check_maps(const Maps& maps, const Geometry& output, const Region& region) 
   check_map(maps.inverse_mm, "inverse", VoxelType::f32, 3, output, region);
   check_map(maps.jacobian, "jacobian", VoxelType::f32, 1, output, region);
   check_map(maps.owners, "owners", VoxelType::u16, 1, output, region);
+  check_map(maps.tetrahedra, "tetrahedra", VoxelType::u32, 1, output, region);
+}
+
+void require_numbers(const Maps& maps, std::uint64_t tetrahedra) {
+  require(!maps.tetrahedra.voxels || tetrahedra < kNoTetrahedron, [&] {
+    return "the field has " + std::to_string(tetrahedra) + " tetrahedra; a map of their numbers holds fewer than " +
+           std::to_string(kNoTetrahedron);
+  });
+}
+
+void require_source_grid(const Geometry& source, Interpolation interpolation) {
+  require_valid(source, "source grid");
+  require(source.slices.empty() || interpolation != Interpolation::cubic,
+          "cubic interpolation needs even slices, those of the source are not; choose linear");
 }
 
 void require_host(Memory memory, const std::string& name) {

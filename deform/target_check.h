@@ -16,6 +16,11 @@ namespace tetwarp {
 /// @throws InputError naming the view, and what was expected and found
 void check_targets(const Resampler& resampler, std::span<const Target> targets, const Region& region);
 void check_maps(const Maps& maps, const Geometry& output, const Region& region);
+/// @throws InputError for a source grid that is not valid, or whose slices an interpolation cannot use
+void require_source_grid(const Geometry& source, Interpolation interpolation);
+/// @param tetrahedra  how many the field has
+/// @throws InputError where `Maps::tetrahedra` is wanted and 32 bits do not number them
+void require_numbers(const Maps& maps, std::uint64_t tetrahedra);
 
 /// Refuses device memory, for a backend that has none.
 /// @throws InputError naming the view that is on a device

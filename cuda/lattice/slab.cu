@@ -48,10 +48,14 @@ std::size_t bytes_of(const ConstVolumeView& source, const Slices& slices) {
 
 }  // namespace
 
-void SlabWriter::begin(std::span<const Target> targets, const Maps& maps, cudaStream_t stream) {
+void SlabWriter::begin(std::span<const Target> targets, const Maps& maps, const Region& region, cudaStream_t stream) {
   maps_ = maps;
+  const Region& held = maps.tetrahedra.buffered;
+  tetrahedra_in_place_ = maps.tetrahedra.voxels && maps.tetrahedra.memory == Memory::device &&
+                         held.begin.x == region.begin.x && held.end.x == region.end.x &&
+                         held.begin.y == region.begin.y && held.end.y == region.end.y;
   stream_ = stream;
-  for (const VolumeView& map : {maps.coverage, maps.inverse_mm, maps.jacobian, maps.owners})
+  for (const VolumeView& map : {maps.coverage, maps.inverse_mm, maps.jacobian, maps.owners, maps.tetrahedra})
     require_memory(map.voxels, map.memory, "a map");
   while (kept_.size() < targets.size()) kept_.push_back(std::make_unique<DeviceTarget>());
   targets_ = std::span(kept_).first(targets.size());
@@ -76,7 +80,7 @@ void SlabWriter::begin(std::span<const Target> targets, const Maps& maps, cudaSt
 }
 
 bool SlabWriter::is_plain() const {
-  const bool wants_map = maps_.coverage.voxels || maps_.inverse_mm.voxels || wants_jacobian() || wants_owners();
+  const bool wants_map = maps_.coverage.voxels || maps_.inverse_mm.voxels || wants_of_owners();
   return !wants_map && !targets_.empty() && targets_.size() <= kMostSinkVolumes && voxel_count(output_) < INT32_MAX &&
          std::all_of(targets_.begin(), targets_.end(), [&](const auto& target) { return is_plain(*target); });
 }
@@ -96,7 +100,7 @@ bool SlabWriter::is_plain(const DeviceTarget& on_device) const {
 }
 
 bool SlabWriter::has_results_on_host() const {
-  for (const VolumeView& map : {maps_.coverage, maps_.inverse_mm, maps_.jacobian, maps_.owners}) {
+  for (const VolumeView& map : {maps_.coverage, maps_.inverse_mm, maps_.jacobian, maps_.owners, maps_.tetrahedra}) {
     if (map.voxels && map.memory == Memory::host) return true;
   }
   return std::any_of(targets_.begin(), targets_.end(),
@@ -125,6 +129,7 @@ SlabWriter::Layout SlabWriter::layout(std::int64_t voxels) const {
   if (maps_.inverse_mm.voxels) layout.inverse_mm = add(sizeof(glm::vec3));
   if (maps_.jacobian.voxels) layout.jacobian = add(sizeof(float));
   if (maps_.owners.voxels) layout.owners = add(sizeof(std::uint16_t));
+  if (maps_.tetrahedra.voxels && !tetrahedra_in_place_) layout.tetrahedra = add(sizeof(std::uint32_t));
   return layout;
 }
 
@@ -164,6 +169,11 @@ void SlabWriter::hold_sources(const std::function<Slices(const ConstVolumeView& 
     held.buffered.end.z = slices.end;
     to += aligned(bytes);
   }
+}
+
+std::uint32_t* SlabWriter::tetrahedra(const SlabBox& box) const {
+  if (!tetrahedra_in_place_) return place<std::uint32_t>(layout_.tetrahedra);
+  return reinterpret_cast<std::uint32_t*>(maps_.tetrahedra.voxels) + buffer_index(maps_.tetrahedra, box.begin);
 }
 
 void SlabWriter::begin_box(const SlabBox& box) {
@@ -283,6 +293,7 @@ void SlabWriter::end_box(const SlabBox& box) {
   give(maps_.inverse_mm, box, layout_.inverse_mm);
   give(maps_.jacobian, box, layout_.jacobian);
   give(maps_.owners, box, layout_.owners);
+  give(maps_.tetrahedra, box, layout_.tetrahedra);
   if (on_host) copied_[current_].record(downloads_.stream());
 }
 

@@ -105,6 +105,11 @@ class Mapped {
                coarse ? fixed_.reserve(voxels) : nullptr};
     return voxels_;
   }
+  /// Where no offsets are wanted.
+  MappedVoxels reserve_without_offsets(std::size_t voxels) {
+    voxels_ = {mapped_.reserve(voxels), nullptr, nullptr};
+    return voxels_;
+  }
   /// Those that were reserved last.
   const MappedVoxels& voxels() const { return voxels_; }
 
@@ -124,12 +129,17 @@ class SlabWriter {
   SlabWriter(const Geometry& output, int device, Uploads& uploads)
       : output_(output), uploads_(uploads), downloads_(device) {}
 
-  /// Takes the targets and maps of a call, which were checked.
+  /// Takes the targets and maps of a call for a region, which were checked.
   /// @throws InputError for memory that is not where a view says
-  void begin(std::span<const Target> targets, const Maps& maps, cudaStream_t stream);
+  void begin(std::span<const Target> targets, const Maps& maps, const Region& region, cudaStream_t stream);
 
   bool wants_jacobian() const { return maps_.jacobian.voxels != nullptr; }
   bool wants_owners() const { return maps_.owners.voxels != nullptr; }
+  bool wants_tetrahedra() const { return maps_.tetrahedra.voxels != nullptr; }
+  /// Whether the places are wanted that voxels come from.
+  bool wants_places() const { return !targets_.empty() || maps_.inverse_mm.voxels != nullptr; }
+  /// Whether a map is filled for which owners must be known.
+  bool wants_of_owners() const { return wants_jacobian() || wants_owners() || wants_tetrahedra(); }
   /// Whether the call fills volumes that a VoxelSink or VolumesSink can sample, and no maps.
   bool is_plain() const;
 
@@ -156,6 +166,9 @@ class SlabWriter {
   float* jacobian() const { return place<float>(layout_.jacobian); }
   /// The map of numbers of owners of the box; null if it is not filled.
   std::uint16_t* owners() const { return place<std::uint16_t>(layout_.owners); }
+  /// The map of numbers of tetrahedra of the box; null if it is not filled. In device memory it is written in place
+  /// where its rows are those of the region.
+  std::uint32_t* tetrahedra(const SlabBox& box) const;
   void write(const SlabBox& box, const MappedVoxels& mapped, Counts* counts);
   /// The sink that writes the voxels of the box, instead of `write`, if the call `is_plain`.
   /// @tparam kRounding  fused for coarse fields
@@ -182,7 +195,7 @@ class SlabWriter {
     static constexpr std::size_t kNone = SIZE_MAX;
 
     std::vector<std::size_t> voxels;  ///< of each target
-    std::size_t coverage = kNone, inverse_mm = kNone, jacobian = kNone, owners = kNone;
+    std::size_t coverage = kNone, inverse_mm = kNone, jacobian = kNone, owners = kNone, tetrahedra = kNone;
     std::size_t bytes = 0;
   };
 
@@ -220,6 +233,7 @@ class SlabWriter {
   Maps maps_;
   cudaStream_t stream_ = nullptr;
   std::vector<std::unique_ptr<DeviceTarget>> kept_;
+  bool tetrahedra_in_place_ = false;                  ///< whether boxes write that map where it lies
   std::span<std::unique_ptr<DeviceTarget>> targets_;  ///< of this call, the first of `kept_`
   DeviceBuffer<std::byte> sources_, results_;
   Layout layout_;  ///< of the box

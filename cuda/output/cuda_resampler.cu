@@ -63,7 +63,7 @@ Report CudaResampler<Base>::resample(Region region, std::span<const Target> targ
   const DeviceScope scope(device_);
   stream_ = static_cast<cudaStream_t>(control.stream);
   if (control.stop.stop_requested()) throw Cancelled();
-  writer_->begin(targets, maps, stream_);
+  writer_->begin(targets, maps, region, stream_);
   try {
     return report_of(write_region(region, control, finished), maps);
   } catch (...) {

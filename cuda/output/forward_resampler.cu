@@ -33,8 +33,9 @@ constexpr std::uint64_t kStepVertexBytes = sizeof(glm::vec3) + 1, kVertexBytes =
 /// What is written of each voxel of a box, in the order of the voxels.
 struct VoxelMapping {
   MappedVoxels places;
-  float* jacobian;        ///< determinant of its owner, NaN where nobody owns it; or null
-  std::uint16_t* owners;  ///< number of owners, at most 65535; or null
+  float* jacobian;            ///< determinant of its owner, NaN where nobody owns it; or null
+  std::uint16_t* owners;      ///< number of owners, at most 65535; or null
+  std::uint32_t* tetrahedra;  ///< number of its owner in the whole lattice, or kNoTetrahedron; or null
 };
 
 /// From the owner of each voxel to where it comes from; voxels outside the undeformed lattice may stay where they are.
@@ -57,6 +58,12 @@ __global__ void map_voxels_kernel(DeviceField field, LatticeFrame whole, bool re
   out.places.mapped[n] = owned || outside;
   out.places.put_nothing(n);
   if (out.jacobian) out.jacobian[n] = owned || !outside ? __int_as_float(0x7fc00000) : 1.0f;
+  if (out.tetrahedra) {
+    const glm::i64vec3& cells = whole.cells;
+    const std::int64_t before = field.frame.first_slice * cells.y * cells.x;  // cells of the parts before
+    out.tetrahedra[n] =
+        owned ? static_cast<std::uint32_t>(owner[n] + TetrahedronNumber::of(before, 0)) : kNoTetrahedron;
+  }
   if (owned) {
     const Tetrahedron t = tetrahedron_numbered(field, owner[n]);
     out.places.put(n, t, voxel, field.frame.nudge.signs(voxel));
@@ -67,6 +74,12 @@ __global__ void map_voxels_kernel(DeviceField field, LatticeFrame whole, bool re
     out.owners[n] = static_cast<std::uint16_t>(owners[n] < 65535u ? owners[n] : 65535u);
     if (owners[n] > 1) atomicAdd(&counts->multiply_owned, 1ULL);
   }
+}
+
+/// Whether each voxel has an owner. A thread a voxel.
+__global__ void mapped_of_owners_kernel(const std::uint32_t* tetrahedra, std::int64_t count, std::uint8_t* mapped) {
+  const std::int64_t n = thread_of_grid();
+  if (n < count) mapped[n] = tetrahedra[n] != kNoTetrahedron;
 }
 
 constexpr int kReachedAtOnce = 1024;  ///< vertices of a slice that a thread block looks at
@@ -122,6 +135,9 @@ class LatticeResampler final : public CudaResampler<ForwardResampler> {
                   const PartSink& finished) override {
     updated_.clear();
     reuse_ = Reuse::nothing;
+    if (ready_)
+      require_numbers(
+          maps, static_cast<std::uint64_t>(kTetrahedraPerCell * frame_.cells.x * frame_.cells.y * frame_.cells.z));
     return CudaResampler::resample(region, targets, maps, control, finished);
   }
 
@@ -298,10 +314,15 @@ class LatticeResampler final : public CudaResampler<ForwardResampler> {
 
   bool can_gather() const { return lattice_->field().has_steps() && !rest_outside_; }
   bool can_write_plainly() const override { return can_gather(); }
-  bool can_map_plainly(const SlabWriter& writer) const {
-    return can_gather() && !writer.wants_jacobian() && !writer.wants_owners();
+  bool can_map_plainly(const SlabWriter& writer) const { return can_gather() && !writer.wants_of_owners(); }
+  /// Whether all that is wanted is who owns each voxel.
+  bool can_find_owners(const SlabWriter& writer) const {
+    return can_gather() && frame_.coarse && !streamed_ && writer.wants_tetrahedra() && !writer.wants_jacobian() &&
+           !writer.wants_owners() && !writer.wants_places();
   }
   std::int64_t work_bytes(const SlabWriter& writer) const override {
+    if (can_find_owners(writer) && gather_.can_find_owners(*lattice_, {glm::i64vec3(0), output().size}))
+      return std::int64_t{sizeof(std::uint8_t)};
     return Mapped::bytes(frame_.coarse) + (can_map_plainly(writer) ? 0 : Claims::kBytes);
   }
 
@@ -319,7 +340,16 @@ class LatticeResampler final : public CudaResampler<ForwardResampler> {
 
   void map_box(const SlabBox& box, SlabWriter& writer) override {
     const auto voxels = static_cast<std::size_t>(box.count());
-    const VoxelMapping mapped{mapped_.reserve(voxels, frame_.coarse), writer.jacobian(), writer.owners()};
+    if (can_find_owners(writer) && gather_.can_find_owners(*lattice_, box)) {
+      std::uint32_t* const owner = writer.tetrahedra(box);
+      count_paths(box, gather_.find_owners(*lattice_, box, {box, owner, nullptr}, stream_));
+      mapped_of_owners_kernel<<<blocks_for(box.count()), kThreads, 0, stream_>>>(
+          owner, box.count(), mapped_.reserve_without_offsets(voxels).mapped);
+      TETWARP_CUDA_TRY(cudaGetLastError());
+      return;
+    }
+    const VoxelMapping mapped{mapped_.reserve(voxels, frame_.coarse), writer.jacobian(), writer.owners(),
+                              writer.tetrahedra(box)};
     if (can_map_plainly(writer)) {
       with_rounding(frame_.coarse, [&](auto rounding) {
         count_paths(box,

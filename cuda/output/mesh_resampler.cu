@@ -22,6 +22,7 @@ struct VoxelMapping {
   const std::uint16_t* several;  ///< number of owners; null: not wanted
   MappedVoxels places;           ///< written
   float* jacobian;               ///< written: determinant of its owner, NaN where nobody owns it; null: not wanted
+  std::uint32_t* tetrahedra;     ///< written: `owner`; null: not wanted
 };
 
 /// From the owner of each voxel to where it comes from; voxels outside the undeformed mesh may stay where they are. A
@@ -37,6 +38,7 @@ __global__ void map_mesh_voxels_kernel(MeshRaster::View mesh, SlabBox box, Voxel
   const bool owned = number != kNoTetrahedron, outside = of.at_rest && of.at_rest[n] == kNoTetrahedron;
   of.places.mapped[n] = owned || outside;
   of.places.put_nothing(n);
+  if (of.tetrahedra) of.tetrahedra[n] = number;
   if (of.jacobian) of.jacobian[n] = owned || !outside ? __int_as_float(0x7fc00000) : 1.0f;
   if (owned) {
     const Tetrahedron t = mesh.tetrahedron(number);
@@ -118,15 +120,16 @@ class MeshResampler final : public CudaResampler<ForwardResampler> {
     const auto voxels = static_cast<std::size_t>(box.count());
     paths_.claimed += static_cast<std::uint64_t>(voxels);
     const MappedVoxels to = mapped_.reserve(voxels, mesh_.coarse);
-    if (!stays_outside_ && !writer.wants_jacobian() && !writer.wants_owners() && fits_tiles()) {
+    if (!stays_outside_ && !writer.wants_of_owners() && fits_tiles()) {
       return with_rounding(mesh_.coarse, [&](auto rounding) {
         raster_.run(box, offset_sink<decltype(rounding)::value>(box, to), stream_);
       });
     }
     raster_.run(box, OwnerSink{box, owner_.reserve(voxels), writer.owners()}, stream_);
     if (stays_outside_) rest_.run(box, OwnerSink{box, at_rest_.reserve(voxels), nullptr}, stream_);
-    const VoxelMapping mapping{owner_.data(), stays_outside_ ? at_rest_.data() : nullptr, writer.owners(), to,
-                               writer.jacobian()};
+    const VoxelMapping mapping{owner_.data(),     stays_outside_ ? at_rest_.data() : nullptr,
+                               writer.owners(),   to,
+                               writer.jacobian(), writer.tetrahedra(box)};
     map_mesh_voxels_kernel<<<blocks_for(box.count()), kThreads, 0, stream_>>>(raster_.view(), box, mapping,
                                                                               counts_.data());
     TETWARP_CUDA_TRY(cudaGetLastError());

@@ -136,7 +136,8 @@ class SampledPullResampler final : public CudaResampler<PullResampler> {
   }
 
   void check_wanted(const Maps& maps) const override {
-    require(!maps.jacobian.voxels && !maps.owners.voxels, "a pull field has no tetrahedra: no Jacobian or owners map");
+    require(!maps.jacobian.voxels && !maps.owners.voxels && !maps.tetrahedra.voxels,
+            "a pull field has no tetrahedra: no map of Jacobian determinants, owners or tetrahedra");
   }
 
   void map_box(const SlabBox& box, SlabWriter&) override {

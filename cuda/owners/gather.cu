@@ -93,14 +93,20 @@ __global__ void write_claimed_kernel(GatherTask task, glm::ivec3 begin, const un
   const unsigned word = BitNumber::Word::get(voxels[n]), bit = BitNumber::Bit::get(voxels[n]);
   const glm::ivec3 voxel = begin + glm::ivec3(word % words * 32 + bit, word / words % rows, word / words / rows);
   const int address = sink.address(voxel);
-  if (owner[n] == kNobody) return sink.nothing(address);
-  const glm::ivec3& cells = task.lattice.cells;
-  const unsigned long long cell = TetrahedronNumber::cell(owner[n]), row = cell / cells.x;
-  const LatticeTetrahedron t = LatticeTetrahedron::of_cell(
-      {static_cast<int>(cell % cells.x), static_cast<int>(row % cells.y), static_cast<int>(row / cells.y)},
-      TetrahedronNumber::in_cell(owner[n]));
-  warp_count(&task.counters->covered,
-             sink.write(address, voxel, offset_for<Sink>(task.lattice, t, voxel, task.nudge.signs(voxel))));
+  if constexpr (std::is_same_v<Sink, OwnerSink>) {
+    sink.owner[address] = owner[n] == kNobody ? kNoTetrahedron : static_cast<unsigned>(owner[n]);
+    warp_count(&task.counters->covered, owner[n] != kNobody);
+    return;
+  } else {
+    if (owner[n] == kNobody) return sink.nothing(address);
+    const glm::ivec3& cells = task.lattice.cells;
+    const unsigned long long cell = TetrahedronNumber::cell(owner[n]), row = cell / cells.x;
+    const LatticeTetrahedron t = LatticeTetrahedron::of_cell(
+        {static_cast<int>(cell % cells.x), static_cast<int>(row % cells.y), static_cast<int>(row / cells.y)},
+        TetrahedronNumber::in_cell(owner[n]));
+    warp_count(&task.counters->covered,
+               sink.write(address, voxel, offset_for<Sink>(task.lattice, t, voxel, task.nudge.signs(voxel))));
+  }
 }
 
 }  // namespace
@@ -159,6 +165,10 @@ Gather::Counters Gather::run(const LatticeOnDevice& lattice, const SlabBox& box,
   if (found.claimed == 0) return found;
   claim_several(task, field, sink, stream);
   return counters(stream);
+}
+
+bool Gather::can_find_owners(const LatticeOnDevice& lattice, const SlabBox& box) {
+  return IntervalRaster::suits(lattice.field().steps, box, is_mostly_folded(lattice));
 }
 
 /// Tiles that too many tetrahedra reach are claimed.
@@ -236,5 +246,7 @@ void Gather::claim_several(const Task& task, const DeviceField& field, const Sin
 TETWARP_FOR_EACH_SINK(TETWARP_RUN, Lerp::separate);
 TETWARP_FOR_EACH_SINK(TETWARP_RUN, Lerp::fused);
 #undef TETWARP_RUN
+template Gather::Counters Gather::run_intervals(const LatticeOnDevice&, const SlabBox&, const OwnerSink&, cudaStream_t,
+                                                Reuse);
 
 }  // namespace tetwarp::cuda_detail

@@ -105,6 +105,13 @@ class Gather {
   Counters run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream,
                Reuse reuse = Reuse::nothing);
 
+  /// Whether `find_owners` serves a box: coarse lattices with large cells.
+  static bool can_find_owners(const LatticeOnDevice& lattice, const SlabBox& box);
+  /// Finds the numbers of the owners of all voxels of `box`; waits for the stream.
+  Counters find_owners(const LatticeOnDevice& lattice, const SlabBox& box, const OwnerSink& sink, cudaStream_t stream) {
+    return run_intervals(lattice, box, sink, stream, Reuse::nothing);
+  }
+
   /// With Reuse::now: outside which regions the last run gave the sink nothing; none where it gave it all.
   const std::optional<std::vector<Region>>& changed() const { return intervals_.changed(); }
 

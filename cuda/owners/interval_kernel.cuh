@@ -41,10 +41,12 @@ __global__ void __launch_bounds__(kTileThreads, Sink::kIsWide ? kTileBlocks : kI
     return;
   }
   const glm::ivec3 size = voxels.end - voxels.begin;
-  if (list.may_rest && task.shape.rests(voxels, task.records, thread)) {
-    copy_tile(voxels, thread, sink);
-    if (thread == 0) task.add_covered(number, static_cast<unsigned>(size.x * size.y * size.z));
-    return;
+  if constexpr (!kIsOfOwners<Sink>) {
+    if (list.may_rest && task.shape.rests(voxels, task.records, thread)) {
+      copy_tile(voxels, thread, sink);
+      if (thread == 0) task.add_covered(number, static_cast<unsigned>(size.x * size.y * size.z));
+      return;
+    }
   }
   const IntervalTile<Shape> tile{
       task, memory, voxels, size, task.turns.signs(voxels.begin), list.numbers, static_cast<int>(list.count), thread};
@@ -55,7 +57,7 @@ __global__ void __launch_bounds__(kTileThreads, Sink::kIsWide ? kTileBlocks : kI
   mark_all(tile);
   __syncthreads();
   read_rows(tile);
-  read_maps(tile, sink);
+  if constexpr (!kIsOfOwners<Sink>) read_maps(tile, sink);
   __syncthreads();
   if (memory.covered != memory.marked || tile.has_lost_rows()) {
     __syncthreads();
@@ -68,16 +70,23 @@ __global__ void __launch_bounds__(kTileThreads, Sink::kIsWide ? kTileBlocks : kI
     mark_in_order(tile);
     __syncthreads();
     read_rows(tile);
-    read_maps(tile, sink);
+    if constexpr (!kIsOfOwners<Sink>) read_maps(tile, sink);
     __syncthreads();
   }
-  const ColumnSampler<Shape, Sink> sampler{tile, sink};
-  const bool is_full = memory.covered == static_cast<unsigned>(size.x * size.y * size.z);
-  // `group_sum`, not CUB's sum: that saves 8 instructions, but takes 88 more in the kernel for volumes of any types.
-  const unsigned covered = group_sum(is_full && !memory.is_border && !memory.is_slow ? sampler.template sample<true>()
-                                                                                     : sampler.template sample<false>(),
-                                     32);
-  if (tile.lane() == 0 && covered != 0) task.add_covered(number, covered);
+  if constexpr (kIsOfOwners<Sink>) {
+    write_owners(tile, sink);
+    if (thread == 0) task.add_covered(number, memory.covered);
+    return;
+  } else {
+    const ColumnSampler<Shape, Sink> sampler{tile, sink};
+    const bool is_full = memory.covered == static_cast<unsigned>(size.x * size.y * size.z);
+    // `group_sum`, not CUB's sum: that saves 8 instructions, but takes 88 more in the kernel for volumes of any types.
+    const unsigned covered =
+        group_sum(is_full && !memory.is_border && !memory.is_slow ? sampler.template sample<true>()
+                                                                  : sampler.template sample<false>(),
+                  32);
+    if (tile.lane() == 0 && covered != 0) task.add_covered(number, covered);
+  }
 }
 
 }  // namespace

@@ -196,6 +196,7 @@ void IntervalRaster::mark_left(const LatticeOnDevice& lattice, const SlabBox& bo
   template TileCounters IntervalRaster::run(const LatticeOnDevice&, const SlabBox&, const __VA_ARGS__&, cudaStream_t, \
                                             Reuse)
 TETWARP_FOR_EACH_SINK(TETWARP_RUN, Lerp::fused);
+TETWARP_RUN(OwnerSink);
 #undef TETWARP_RUN
 
 }  // namespace tetwarp::cuda_detail

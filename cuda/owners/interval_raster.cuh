@@ -10,6 +10,18 @@
 
 namespace tetwarp::cuda_detail {
 
+/// Receives the owners of the voxels of a box, as `OffsetSink` (cuda/owners/gather.cuh) receives places.
+struct OwnerSink {
+  static constexpr bool kIsWide = false;
+
+  SlabBox box;
+  unsigned* owner;         ///< lowest number of an owner of each voxel, or kNoTetrahedron
+  std::uint16_t* several;  ///< number of owners of each voxel; null: not counted
+
+  __device__ int address(const glm::ivec3& voxel) const { return static_cast<int>(box.offset(glm::i64vec3(voxel))); }
+  __device__ int per_slice() const { return static_cast<int>(box.size.x * box.size.y); }
+};
+
 /// What the tiles of a box tell.
 struct TileCounters {
   unsigned long long covered;

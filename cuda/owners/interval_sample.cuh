@@ -30,6 +30,22 @@ __device__ __noinline__ bool write_slowly(const Shape& shape, const Sink& sink, 
   return sink.write(out, at, fixed_offset(coarse_u(shape.tetrahedron(number), at, signs)));
 }
 
+/// Whether a sink gets the numbers of owners, so that no map is needed.
+template <class Sink>
+constexpr bool kIsOfOwners = std::is_same_v<Sink, OwnerSink>;
+
+/// Gives a sink the owners of the voxels of a tile; a lane a column along k.
+template <class Shape>
+__device__ void write_owners(const IntervalTile<Shape>& tile, const OwnerSink& sink) {
+  const int lane = tile.lane(), y = tile.warp();
+  if (lane >= tile.size.x || y >= tile.size.y) return;
+  int out = sink.address(tile.voxels.begin + glm::ivec3(lane, y, 0));
+  for (int z = 0; z < tile.size.z; ++z, out += sink.per_slice()) {
+    const unsigned slot = tile.memory.owner_of(z * kTileJ + y, lane);
+    sink.owner[out] = slot == IntervalTile<Shape>::Memory::kNobody ? kNoTetrahedron : tile.memory.numbers[slot];
+  }
+}
+
 /// Samples the columns of a tile along k, a lane each.
 template <class Shape, class Sink>
 struct ColumnSampler {

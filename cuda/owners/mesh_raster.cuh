@@ -9,18 +9,6 @@
 
 namespace tetwarp::cuda_detail {
 
-constexpr unsigned kNoTetrahedron = ~0u;
-
-/// Receives the owners of the voxels of a box, as `OffsetSink` (cuda/owners/gather.cuh) receives places.
-struct OwnerSink {
-  SlabBox box;
-  unsigned* owner;         ///< lowest number of an owner of each voxel, or kNoTetrahedron
-  std::uint16_t* several;  ///< number of owners of each voxel; null: not counted
-
-  __device__ int address(const glm::ivec3& voxel) const { return static_cast<int>(box.offset(glm::i64vec3(voxel))); }
-  __device__ int per_slice() const { return static_cast<int>(box.size.x * box.size.y); }
-};
-
 /// Counts the voxels that nobody owns.
 struct HoleSink {
   SlabBox box;

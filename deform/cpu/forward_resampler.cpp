@@ -89,7 +89,9 @@ class LatticeResampler final : public ForwardResampler {
     require(ready_, "resample needs a field: call set_field first");
     const TargetSamplers samplers = make_samplers(*this, targets, region);
     const MapWriter writer(maps, output(), region);
-    const bool places_only = !writer.wants_jacobian() && !writer.wants_owners();
+    const glm::i64vec3& cells = lattice_.cells();
+    require_numbers(maps, static_cast<std::uint64_t>(kTetrahedraPerCell * cells.x * cells.y * cells.z));
+    const bool places_only = !writer.wants_of_owners();
     const bool may_march = can_march_ && places_only;
     if (may_march && !has_coverage_ && !rests(region)) {
       arena_.execute([&] { coverage_.find(lattice_, output()); });
@@ -102,7 +104,7 @@ class LatticeResampler final : public ForwardResampler {
     const auto is_copied = [&](const Region& box) { return can_copy(box) && rests(box); };
     Report report = for_each_tile<TileVoxels>(
         arena_, region, control, finished, is_copied, [&](const Region& box, TileVoxels& tile) {
-          if (!writer.wants_owners() && rests(box))
+          if (!writer.wants_owners() && !writer.wants_tetrahedra() && rests(box))
             return can_copy(box) ? copy(box, samplers) : stay(box, tile, samplers, writer);
           Report of_tile;
           const bool gathered = may_march && !mostly_folds(box) && gather(box, tile, of_tile.paths);
@@ -173,7 +175,7 @@ class LatticeResampler final : public ForwardResampler {
       for (std::int64_t y = box.begin.y; y < box.end.y; ++y) {
         const Row row{{box.begin.x, y, z}, width, tile.mapped, coarse ? nullptr : offset, coarse ? &fixed : nullptr};
         sample_targets(row, samplers, tile.coverage, report);
-        maps.write(row, tile.coverage, jacobian, nullptr);
+        maps.write(row, tile.coverage, {.jacobian = jacobian});
       }
     }
     return report;
@@ -346,8 +348,14 @@ class LatticeResampler final : public ForwardResampler {
                       coarse ? &fixed : nullptr};
         map_row(row, first, tile, maps, report);
         sample_targets(row, samplers, tile.coverage, report);
-        maps.write(row, tile.coverage, maps.wants_jacobian() ? claims.jacobian.data() + first : nullptr,
-                   maps.wants_owners() ? claims.owners.data() + first : nullptr);
+        std::uint32_t tetrahedra[kTile];
+        if (maps.wants_tetrahedra()) {
+          std::transform(claims.owner.data() + first, claims.owner.data() + first + width, tetrahedra,
+                         [](std::uint64_t owner) { return static_cast<std::uint32_t>(owner); });  // kNobody, too
+        }
+        maps.write(row, tile.coverage,
+                   {maps.wants_jacobian() ? claims.jacobian.data() + first : nullptr,
+                    maps.wants_owners() ? claims.owners.data() + first : nullptr, tetrahedra});
       }
     }
   }

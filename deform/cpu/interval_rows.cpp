@@ -26,7 +26,7 @@ void IntervalRows::prepare(const PlaceForm& form) {
 
 /// Decides for a row where each voxel comes from.
 void IntervalRows::find_places(const PlaceForm& form, const Nudge& nudge, const Row& row, std::int64_t y,
-                               std::int64_t z, std::uint32_t stays, bool wants_jacobian, Report& report) {
+                               std::int64_t z, std::uint32_t stays, const MapWriter& maps, Report& report) {
   const std::uint32_t covered = tile.covered(y, z), rests = stays & ~covered;
   report.conflicts += static_cast<std::uint64_t>(std::popcount(stays & covered));
   const std::uint32_t mapped = covered | rests;
@@ -35,6 +35,8 @@ void IntervalRows::find_places(const PlaceForm& form, const Nudge& nudge, const 
   } else {
     for (int i = 0; i < row.count; ++i) mapped_[i] = static_cast<std::uint8_t>(mapped >> i & 1);
   }
+  const bool wants_jacobian = maps.wants_jacobian(), wants_tetrahedra = maps.wants_tetrahedra();
+  if (wants_tetrahedra) std::fill_n(tetrahedra_, row.count, kNoTetrahedron);
   if (wants_jacobian) {
     std::fill_n(jacobian_, row.count, NAN);
     for (std::uint32_t left = rests; left != 0; left &= left - 1) jacobian_[std::countr_zero(left)] = 1.0f;
@@ -54,6 +56,7 @@ void IntervalRows::find_places(const PlaceForm& form, const Nudge& nudge, const 
       runs[count++] = {begin, end, &tile_maps_[owner]};
     }
     if (wants_jacobian) std::fill(jacobian_ + begin, jacobian_ + end, forward_jacobian(tile.owners()[owner]));
+    if (wants_tetrahedra) std::fill(tetrahedra_ + begin, tetrahedra_ + end, tile.numbers()[owner]);
   });
   if (count != 0) fill_fixed_row(runs, count, static_cast<int>(y), static_cast<int>(z), u_);
   for (int n = 0; n < slow_count; ++n) find_one_by_one(nudge, row, slow[n].begin, slow[n].end, slow[n].owner);

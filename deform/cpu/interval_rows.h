@@ -43,10 +43,10 @@ class IntervalRows {
       for (std::int64_t y = 0; y < box.end.y - box.begin.y; ++y, first += static_cast<std::size_t>(width)) {
         const Row row{box.begin + glm::i64vec3(0, y, z), width, mapped_, form.is_coarse ? nullptr : offset_,
                       form.is_coarse ? &fixed_ : nullptr};
-        find_places(form, nudge, row, y, z, stays(y, z) & all, maps.wants_jacobian(), report);
+        find_places(form, nudge, row, y, z, stays(y, z) & all, maps, report);
         sample_targets(row, samplers, coverage_, report);
-        maps.write(row, coverage_, maps.wants_jacobian() ? jacobian_ : nullptr,
-                   maps.wants_owners() ? tile.counts().data() + first : nullptr);
+        maps.write(row, coverage_,
+                   {jacobian_, maps.wants_owners() ? tile.counts().data() + first : nullptr, tetrahedra_});
       }
     }
   }
@@ -54,7 +54,7 @@ class IntervalRows {
  private:
   void prepare(const PlaceForm& form);
   void find_places(const PlaceForm& form, const Nudge& nudge, const Row& row, std::int64_t y, std::int64_t z,
-                   std::uint32_t stays, bool wants_jacobian, Report& report);
+                   std::uint32_t stays, const MapWriter& maps, Report& report);
   void find_one_by_one(const Nudge& nudge, const Row& row, int begin, int end, std::size_t owner);
   void find_offsets(const Nudge& nudge, const Row& row, int begin, int end, const Tetrahedron& t);
   void clear(const PlaceForm& form, int i);
@@ -67,6 +67,7 @@ class IntervalRows {
   glm::vec3 offset_[kTile];
   std::uint8_t mapped_[kTile], coverage_[kTile];
   float jacobian_[kTile];
+  std::uint32_t tetrahedra_[kTile];
 };
 
 }  // namespace tetwarp::cpu

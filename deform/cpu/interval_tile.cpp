@@ -15,6 +15,7 @@ static_assert(kTile <= kMostRowTile && kTile == 32, "a row has a bit for each vo
 void IntervalTile::begin(const Region& box, const Nudge& nudge, bool counts) {
   box_ = box;
   owners_.clear();
+  numbers_.clear();
   wants_counts_ = counts;
   if (counts) counts_.assign(static_cast<std::size_t>(voxel_count(box)), 0);
   const glm::i64vec3 size = box.end - box.begin;
@@ -31,9 +32,9 @@ void IntervalTile::begin(const Region& box, const Nudge& nudge, bool counts) {
   }
 }
 
-bool IntervalTile::enter(const Tetrahedron& t) {
+bool IntervalTile::enter(std::uint64_t number, const Tetrahedron& t) {
   bool shared = false;
-  for (const Part& part : parts_) shared = enter(part, t) || shared;
+  for (const Part& part : parts_) shared = enter(part, number, t) || shared;
   return shared;
 }
 
@@ -54,7 +55,7 @@ bool IntervalTile::may_reach(const glm::i32vec3& low, const glm::i32vec3& high) 
                      [&](const Part& part) { return !part.reached(low, high).is_empty(); });
 }
 
-bool IntervalTile::enter(const Part& part, const Tetrahedron& t) {
+bool IntervalTile::enter(const Part& part, std::uint64_t number, const Tetrahedron& t) {
   const Box around = box_of(t);
   const IntBox reached = part.reached(around.low, around.high);
   if (reached.is_empty()) return false;
@@ -76,7 +77,10 @@ bool IntervalTile::enter(const Part& part, const Tetrahedron& t) {
     const int row = scan_.unsure_rows[n];
     mark(entry, row, exact_bits(t, part, row % kMostRowTile, row / kMostRowTile), any, shared);
   }
-  if (any != 0) owners_.push_back(t);
+  if (any != 0) {
+    owners_.push_back(t);
+    numbers_.push_back(static_cast<std::uint32_t>(number));
+  }
   return shared != 0;
 }
 

@@ -33,12 +33,15 @@ class IntervalTile {
   bool may_reach(const glm::i32vec3& low, const glm::i32vec3& high) const;
   /// Gives a tetrahedron those of its voxels that have no owner yet. So the lowest number wins where numbers rise from
   /// call to call.
+  /// @param number  of the tetrahedron; where there are more than 32 bits hold, nobody asks for `numbers`
   /// @return whether some of its voxels had an owner already
-  bool enter(const Tetrahedron& t);
+  bool enter(std::uint64_t number, const Tetrahedron& t);
 
   const Region& box() const { return box_; }
   /// The tetrahedra that own voxels.
   const std::vector<Tetrahedron>& owners() const { return owners_; }
+  /// Their numbers.
+  const std::vector<std::uint32_t>& numbers() const { return numbers_; }
   /// A bit for each voxel of a row that has an owner. @param y, z  the row, counted from the box
   std::uint32_t covered(std::int64_t y, std::int64_t z) const { return covered_[number(y, z)]; }
   /// Calls `visit(begin, end, index in owners())` for all intervals of a row, from left to right.
@@ -67,7 +70,7 @@ class IntervalTile {
   };
 
   static std::size_t number(std::int64_t y, std::int64_t z) { return static_cast<std::size_t>(z * kTile + y); }
-  bool enter(const Part& part, const Tetrahedron& t);
+  bool enter(const Part& part, std::uint64_t number, const Tetrahedron& t);
   static std::uint32_t exact_bits(const Tetrahedron& t, const Part& part, int y, int z);
   /// A tetrahedron that is entered: where the part begins in the box, and the tetrahedron's index in `owners_`.
   struct Entry {
@@ -85,6 +88,7 @@ class IntervalTile {
   std::uint32_t starts_[kTile * kTile], covered_[kTile * kTile];
   std::uint16_t owner_[kTile * kTile][kTile];
   std::vector<Tetrahedron> owners_;
+  std::vector<std::uint32_t> numbers_;
   std::vector<std::uint16_t> counts_;
   bool wants_counts_ = false;
 };

@@ -38,8 +38,8 @@ void LatticeRaster::find(const LatticeIndex& lattice, const Region& box, bool co
   const Nudge& nudge = lattice.frame().nudge;
   bool shared = false;
   tile.begin(box, nudge, counts);
-  for_each(lattice, box, tile, [&](std::uint64_t, const Tetrahedron& t) {
-    shared = tile.enter(t) || shared;
+  for_each(lattice, box, tile, [&](std::uint64_t number, const Tetrahedron& t) {
+    shared = tile.enter(number, t) || shared;
     return !shared;
   });
   if (!shared) return;
@@ -51,7 +51,7 @@ void LatticeRaster::find(const LatticeIndex& lattice, const Region& box, bool co
   });
   std::sort(listed_.begin(), listed_.end(), [](const Numbered& a, const Numbered& b) { return a.number < b.number; });
   tile.begin(box, nudge, counts);
-  for (const Numbered& of : listed_) tile.enter(of.tetrahedron);
+  for (const Numbered& of : listed_) tile.enter(of.number, of.tetrahedron);
 }
 
 }  // namespace tetwarp::cpu

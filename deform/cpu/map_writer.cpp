@@ -24,12 +24,11 @@ V* row_of(const VolumeView& map, const glm::i64vec3& voxel) {
 MapWriter::MapWriter(const Maps& maps, const Geometry& output, const Region& region)
     : maps_(maps), mm_from_index_(point_from_index(output).linear) {
   check_maps(maps, output, region);
-  for (const VolumeView& map : {maps.coverage, maps.inverse_mm, maps.jacobian, maps.owners})
+  for (const VolumeView& map : {maps.coverage, maps.inverse_mm, maps.jacobian, maps.owners, maps.tetrahedra})
     require_host(map.memory, "a map");
 }
 
-void MapWriter::write(const Row& row, const std::uint8_t* coverage, const float* jacobian,
-                      const std::uint16_t* owners) const {
+void MapWriter::write(const Row& row, const std::uint8_t* coverage, const OwnerRow& of_owners) const {
   constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
   if (maps_.coverage.voxels) std::copy_n(coverage, row.count, row_of<std::uint8_t>(maps_.coverage, row.voxel));
   if (maps_.inverse_mm.voxels) {
@@ -38,9 +37,11 @@ void MapWriter::write(const Row& row, const std::uint8_t* coverage, const float*
   }
   if (wants_jacobian()) {
     float* out = row_of<float>(maps_.jacobian, row.voxel);
-    for (int i = 0; i < row.count; ++i) out[i] = row.mapped[i] ? jacobian[i] : kNothing;
+    for (int i = 0; i < row.count; ++i) out[i] = row.mapped[i] ? of_owners.jacobian[i] : kNothing;
   }
-  if (wants_owners()) std::copy_n(owners, row.count, row_of<std::uint16_t>(maps_.owners, row.voxel));
+  if (wants_owners()) std::copy_n(of_owners.owners, row.count, row_of<std::uint16_t>(maps_.owners, row.voxel));
+  if (wants_tetrahedra())
+    std::copy_n(of_owners.tetrahedra, row.count, row_of<std::uint32_t>(maps_.tetrahedra, row.voxel));
 }
 
 std::uint64_t count_of_several(std::span<const std::uint16_t> owners) {

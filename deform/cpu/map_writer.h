@@ -11,6 +11,13 @@
 
 namespace tetwarp::cpu {
 
+/// What a row of voxels has of its owners: a value for each voxel, or null where that map is not filled.
+struct OwnerRow {
+  const float* jacobian = nullptr;            ///< determinants
+  const std::uint16_t* owners = nullptr;      ///< how many own it
+  const std::uint32_t* tetrahedra = nullptr;  ///< the number of the one that does
+};
+
 /// Writes rows of the maps that a call of `Resampler::resample` fills: those of its `Maps` that have voxels. Several
 /// threads may write different rows at a time.
 class MapWriter {
@@ -21,19 +28,21 @@ class MapWriter {
 
   /// Whether any map is filled.
   bool wants_any() const {
-    return maps_.coverage.voxels != nullptr || maps_.inverse_mm.voxels != nullptr || wants_jacobian() || wants_owners();
+    return maps_.coverage.voxels != nullptr || maps_.inverse_mm.voxels != nullptr || wants_of_owners();
   }
   /// Whether `write` needs Jacobian determinants.
   bool wants_jacobian() const { return maps_.jacobian.voxels != nullptr; }
   /// Whether `write` needs the number of owners of each voxel.
   bool wants_owners() const { return maps_.owners.voxels != nullptr; }
+  /// Whether `write` needs the numbers of owners.
+  bool wants_tetrahedra() const { return maps_.tetrahedra.voxels != nullptr; }
+  /// Whether `write` needs anything of `OwnerRow`.
+  bool wants_of_owners() const { return wants_jacobian() || wants_owners() || wants_tetrahedra(); }
 
   /// Writes one row of each map. The inverse displacement is computed from `row.offset`.
   /// @param row       its voxels, which the maps must buffer
   /// @param coverage  1 or 0 for each voxel of the row
-  /// @param jacobian  one for each voxel, or null if that map is not filled
-  /// @param owners    number of owners of each voxel, or null if that map is not filled
-  void write(const Row& row, const std::uint8_t* coverage, const float* jacobian, const std::uint16_t* owners) const;
+  void write(const Row& row, const std::uint8_t* coverage, const OwnerRow& of_owners = {}) const;
 
  private:
   Maps maps_;

@@ -60,7 +60,7 @@ void MeshRaster::find(const Region& box, bool counts, IntervalTile& tile) const 
   if (begin == end) {
     const std::size_t number = bin_number(begin);
     for (const std::uint32_t* n = lists_.begin(number); n != lists_.end(number); ++n)
-      tile.enter(mesh_->tetrahedron(*n));
+      tile.enter(*n, mesh_->tetrahedron(*n));
     return;
   }
   std::vector<std::uint32_t> listed;  // of several bins: numbers must rise
@@ -72,7 +72,7 @@ void MeshRaster::find(const Region& box, bool counts, IntervalTile& tile) const 
   }
   std::sort(listed.begin(), listed.end());
   listed.erase(std::unique(listed.begin(), listed.end()), listed.end());
-  for (const std::uint32_t n : listed) tile.enter(mesh_->tetrahedron(n));
+  for (const std::uint32_t n : listed) tile.enter(n, mesh_->tetrahedron(n));
 }
 
 }  // namespace tetwarp::cpu

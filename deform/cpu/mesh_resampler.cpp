@@ -88,6 +88,7 @@ Report MeshResampler::resample(Region region, std::span<const Target> targets, c
   require(ready_, "resample needs a field: call set_field first");
   const TargetSamplers samplers = make_samplers(*this, targets, region);
   const MapWriter writer(maps, output(), region);
+  require_numbers(maps, mesh_.tetrahedra.size());
   const PlaceForm form(mesh_.coarse, mesh_.most_moved);
   Report report = for_each_tile<Scratch>(arena_, region, control, finished, [&](const Region& box, Scratch& scratch) {
     Report of_tile;

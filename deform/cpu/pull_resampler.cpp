@@ -91,7 +91,8 @@ class RowPullResampler final : public PullResampler {
   Report resample(Region region, std::span<const Target> targets, const Maps& maps, const Control& control,
                   const PartSink& finished) override {
     require(ready_, "resample needs a field: call set_field first");
-    require(!maps.jacobian.voxels && !maps.owners.voxels, "a pull field has no tetrahedra: no Jacobian or owners map");
+    require(!maps.jacobian.voxels && !maps.owners.voxels && !maps.tetrahedra.voxels,
+            "a pull field has no tetrahedra: no map of Jacobian determinants, owners or tetrahedra");
     const TargetSamplers samplers = make_samplers(*this, targets, region);
     const MapWriter writer(maps, output(), region);
     return for_each_tile<RowScratch>(arena_, region, control, finished, [&](const Region& box, RowScratch& scratch) {
@@ -101,7 +102,7 @@ class RowPullResampler final : public PullResampler {
           const Row row{{box.begin.x, y, z}, static_cast<int>(box.end.x - box.begin.x), scratch.mapped, scratch.offset};
           find_offsets(row, scratch);
           sample_targets(row, samplers, scratch.coverage, report);
-          writer.write(row, scratch.coverage, nullptr, nullptr);
+          writer.write(row, scratch.coverage);
         }
       }
       return report;

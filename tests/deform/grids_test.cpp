@@ -106,7 +106,7 @@ Pair run_pair(Resampler& resampler, const Volume<float>& ct, const Volume<float>
       {.source = view(ct), .output = view(pair.ct.output), .background = -700},
       {.source = view(pet), .output = view(pair.pet), .interpolation = of_pet, .background = -800}};
   Maps maps = maps_of(pair.ct);
-  if (pull) maps.jacobian = maps.owners = {};
+  if (pull) maps.jacobian = maps.owners = maps.tetrahedra = {};
   pair.ct.report = resampler.resample(whole(grid), targets, maps);
   return pair;
 }

@@ -33,7 +33,7 @@ class March : public testing::Test {
       resampler->set_field(view(test.field, Outside::background));
       Outcome<std::int16_t> found = poisoned_outcome<std::int16_t>(test.output);
       Maps maps = maps_of(found);
-      maps.jacobian = maps.owners = {};
+      maps.jacobian = maps.owners = maps.tetrahedra = {};
       const Target of{.source = view(source), .output = view(found.output), .background = 7};
       found.report = resampler->resample(whole(test.output), {&of, 1}, maps);
       ASSERT_TRUE(same_bits(expected.output.voxels, found.output.voxels));

@@ -49,6 +49,7 @@ inline void expect_like_oracle(const Outcome<float>& found, const Volume<float>&
     SCOPED_TRACE("voxel " + to_string(voxel));
     const Owners& owners = oracle.owners(voxel);
     EXPECT_EQ(found.owners.voxels[n], owners.count);
+    EXPECT_EQ(found.tetrahedra.voxels[n], owners.count == 0 ? kNoTetrahedron : owners.lowest);
     covered += found.coverage.voxels[n];
     if (owners.count == 0) {
       EXPECT_TRUE(std::isnan(found.inverse_mm.voxels[n].x) && std::isnan(found.jacobian.voxels[n]));

@@ -19,6 +19,7 @@ struct Outcome {
   Volume<glm::vec3> inverse_mm;
   Volume<float> jacobian;
   Volume<std::uint16_t> owners;
+  Volume<std::uint32_t> tetrahedra;
   Report report;
 };
 
@@ -33,8 +34,13 @@ Volume<V> poisoned(const Geometry& geometry) {
 
 template <class V>
 Outcome<V> poisoned_outcome(const Geometry& geometry) {
-  return {poisoned<V>(geometry),     poisoned<std::uint8_t>(geometry),  poisoned<glm::vec3>(geometry),
-          poisoned<float>(geometry), poisoned<std::uint16_t>(geometry), {}};
+  return {poisoned<V>(geometry),
+          poisoned<std::uint8_t>(geometry),
+          poisoned<glm::vec3>(geometry),
+          poisoned<float>(geometry),
+          poisoned<std::uint16_t>(geometry),
+          poisoned<std::uint32_t>(geometry),
+          {}};
 }
 
 template <class V>
@@ -43,7 +49,8 @@ Maps maps_of(Outcome<V>& outcome) {
           .inverse_mm = {&outcome.inverse_mm.geometry, whole(outcome.inverse_mm.geometry), VoxelType::f32, 3,
                          std::as_writable_bytes(std::span(outcome.inverse_mm.voxels)).data()},
           .jacobian = view(outcome.jacobian),
-          .owners = view(outcome.owners)};
+          .owners = view(outcome.owners),
+          .tetrahedra = view(outcome.tetrahedra)};
 }
 
 struct Options {
@@ -64,7 +71,7 @@ Outcome<V> run(Resampler& resampler, const Volume<V>& source, const Options& opt
                       .background = options.background,
                       .padding = options.padding};
   Maps maps = maps_of(outcome);
-  if (options.pull) maps.jacobian = maps.owners = {};
+  if (options.pull) maps.jacobian = maps.owners = maps.tetrahedra = {};
   outcome.report = resampler.resample(options.region.value_or(whole(resampler.output())), {&target, 1}, maps);
   return outcome;
 }
@@ -92,6 +99,7 @@ void expect_same_outcome(const Outcome<V>& expected, const Outcome<V>& actual) {
   EXPECT_TRUE(same_bits(expected.inverse_mm.voxels, actual.inverse_mm.voxels)) << "inverse";
   EXPECT_TRUE(same_bits(expected.jacobian.voxels, actual.jacobian.voxels)) << "jacobian";
   EXPECT_TRUE(same_bits(expected.owners.voxels, actual.owners.voxels)) << "owners";
+  EXPECT_TRUE(same_bits(expected.tetrahedra.voxels, actual.tetrahedra.voxels)) << "tetrahedra";
 }
 
 inline void expect_same_report(const Report& expected, const Report& actual) {

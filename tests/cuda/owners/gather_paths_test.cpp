@@ -34,7 +34,7 @@ Outcome<V> run_on(ForwardResampler& resampler, const FieldCase& test, const Volu
   resampler.set_field(view(test.field, Outside::background), {.jacobian_range = what != Wanted::volume});
   Outcome<V> outcome = poisoned_outcome<V>(test.output);
   Maps wanted = maps_of(outcome);
-  if (what == Wanted::places) wanted.jacobian = wanted.owners = {};
+  if (what == Wanted::places) wanted.jacobian = wanted.owners = wanted.tetrahedra = {};
   if (what == Wanted::volume) wanted = {};
   const Target target{.source = view(source), .output = view(outcome.output), .background = 7};
   outcome.report = resampler.resample(region, {&target, 1}, wanted);

@@ -53,7 +53,7 @@ Result<V> run_limited(Resampler& resampler, const Volume<V>& source, const Regio
   const Geometry& grid = resampler.output();
   Result<V> result{poisoned_outcome<V>(grid), std::vector<SliceRange>(wanted.slices ? grid.size.z : 0)};
   Maps maps = maps_of(result.outcome);
-  if (!wanted.all_maps) maps.jacobian = maps.owners = {};
+  if (!wanted.all_maps) maps.jacobian = maps.owners = maps.tetrahedra = {};
   if (!wanted.maps) maps = {};
   const Target target{.source = view(source),
                       .output = view(result.outcome.output),
