@@ -21,6 +21,12 @@ std::unique_ptr<PullResampler> make_pull_resampler(BackendKind backend, const Ge
   return make_cpu_pull_resampler(output, limits);
 }
 
+std::unique_ptr<ResampleAdjoint> make_adjoint(BackendKind backend, const Geometry& output, int device,
+                                              const Limits& limits) {
+  if (backend == BackendKind::cuda) return make_cuda_adjoint(output, device, limits);
+  return make_cpu_adjoint(output, limits);
+}
+
 AnyResampler::AnyResampler(BackendKind backend, Direction direction, const Geometry& output, int device,
                            const Limits& limits)
     : backend_(backend) {

@@ -7,6 +7,7 @@
 #include <variant>
 
 #include "backend/backend.h"
+#include "deform/adjoint.h"
 #include "deform/render/renderer.h"
 #include "deform/resampler.h"
 #include "deform/simulate/scenario.h"
@@ -36,6 +37,15 @@ std::unique_ptr<ForwardResampler> make_forward_resampler(BackendKind backend, co
 /// @throws InputError for an output with fewer than two voxels, or more than 2^18, on an axis
 std::unique_ptr<PullResampler> make_pull_resampler(BackendKind backend, const Geometry& output, int device = 0,
                                                    const Limits& limits = {});
+
+/// Makes the transpose and the gradients of forward fields. Their bits are the same on every backend.
+/// @param backend  where it runs
+/// @param output   grid of the deformed volumes
+/// @param device   number of the device
+/// @param limits   threads; on a device all that it needs must fit its memory
+/// @throws InputError for an output with fewer than two voxels, or more than 2^18, on an axis
+std::unique_ptr<ResampleAdjoint> make_adjoint(BackendKind backend, const Geometry& output, int device = 0,
+                                              const Limits& limits = {});
 
 /// A resampler for where a file, an option or a pipeline decides which way its fields map, and where it runs.
 class AnyResampler {

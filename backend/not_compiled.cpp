@@ -43,6 +43,8 @@ std::unique_ptr<ForwardResampler> make_cuda_resampler(const Geometry&, int, cons
 
 std::unique_ptr<PullResampler> make_cuda_pull_resampler(const Geometry&, int, const Limits&) { not_compiled(); }
 
+std::unique_ptr<ResampleAdjoint> make_cuda_adjoint(const Geometry&, int, const Limits&) { not_compiled(); }
+
 std::unique_ptr<Renderer> make_cuda_renderer(int, const Limits&) { not_compiled(); }
 
 namespace simulate {

@@ -5,6 +5,7 @@
 
 #include <memory>
 
+#include "deform/adjoint.h"
 #include "deform/render/renderer.h"
 #include "deform/resampler.h"
 #include "deform/simulate/simulation.h"
@@ -17,6 +18,8 @@ namespace tetwarp {
 std::unique_ptr<ForwardResampler> make_cuda_resampler(const Geometry& output, int device, const Limits& limits);
 /// A resampler of pull fields.
 std::unique_ptr<PullResampler> make_cuda_pull_resampler(const Geometry& output, int device, const Limits& limits);
+/// The transpose and the gradients of forward fields.
+std::unique_ptr<ResampleAdjoint> make_cuda_adjoint(const Geometry& output, int device, const Limits& limits);
 /// A renderer.
 std::unique_ptr<Renderer> make_cuda_renderer(int device, const Limits& limits);
 

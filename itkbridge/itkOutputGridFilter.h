@@ -131,7 +131,7 @@ class ITK_TEMPLATE_EXPORT OutputGridFilter : public TSuperclass {
   std::uint64_t GetDeviceMemory() const { return m_Options.device_memory; }
 
   /** Where the last work was done, "cpu" or "cuda"; empty before. */
-  std::string GetUsedBackend() const { return m_Resampler.backend(); }
+  std::string GetUsedBackend() const { return m_UsedBackend.empty() ? m_Resampler.backend() : m_UsedBackend; }
 
   /** What happened when the output was last made: voxels covered, tetrahedra inverted and so on. Reports of regions add
    * up (`+=`). */
@@ -160,6 +160,11 @@ class ITK_TEMPLATE_EXPORT OutputGridFilter : public TSuperclass {
   template <typename TMake>
   void ResampleRequestedRegion(TMake&& make);
 
+  /** Where the work is to be done, threads included. */
+  tetwarp::PipelineOptions GetPipelineOptions() const;
+  /** For a filter that does not use the resampler. */
+  void SetUsedBackend(const std::string& backend) { m_UsedBackend = backend; }
+
   /** The resampler with the present field. */
   const tetwarp::PipelineResampler& GetResampler() const { return m_Resampler; }
 
@@ -176,6 +181,7 @@ class ITK_TEMPLATE_EXPORT OutputGridFilter : public TSuperclass {
   OutsideEnum m_Outside{OutsideEnum::refuse};
   tetwarp::PipelineOptions m_Options;
   tetwarp::PipelineResampler m_Resampler;
+  std::string m_UsedBackend;  // by other ways than the resampler; else empty
   tetwarp::Report m_Report;
 };
 }  // namespace itk

@@ -69,13 +69,19 @@ void OutputGridFilter<TSuperclass>::GenerateOutputInformation() {
 }
 
 template <typename TSuperclass>
+tetwarp::PipelineOptions OutputGridFilter<TSuperclass>::GetPipelineOptions() const {
+  tetwarp::PipelineOptions options = m_Options;
+  options.threads = tetwarp::threads_of(*this);
+  return options;
+}
+
+template <typename TSuperclass>
 bool OutputGridFilter<TSuperclass>::PrepareField(tetwarp::ProgressShare share) {
   tetwarp::HeldField field;
   tetwarp::translate_errors(*this, [&] { field = this->GetHeldField(); });
   std::visit([this](auto& view) { view.outside = m_Outside; }, field.view);
-  tetwarp::PipelineOptions options = m_Options;
-  options.threads = tetwarp::threads_of(*this);
-  return m_Resampler.set_field(*this, tetwarp::geometry_of(*this->GetOutput()), field, options, share);
+  return m_Resampler.set_field(*this, tetwarp::geometry_of(*this->GetOutput()), field, this->GetPipelineOptions(),
+                               share);
 }
 
 template <typename TSuperclass>
@@ -103,7 +109,7 @@ void OutputGridFilter<TSuperclass>::PrintSelf(std::ostream& os, Indent indent) c
   os << indent << "UseReferenceImage: " << (m_UseReferenceImage ? "On" : "Off") << std::endl;
   os << indent << "Outside: " << m_Outside << std::endl;
   os << indent << "Backend: " << this->GetBackend() << std::endl;
-  os << indent << "UsedBackend: " << (m_Resampler.backend().empty() ? "(none yet)" : m_Resampler.backend())
+  os << indent << "UsedBackend: " << (this->GetUsedBackend().empty() ? "(none yet)" : this->GetUsedBackend())
      << std::endl;
   os << indent << "Device: " << m_Options.device << std::endl;
   os << indent << "DeviceMemory: " << m_Options.device_memory << std::endl;

@@ -24,6 +24,12 @@ void warn_of_fallback(const itk::ProcessObject& filter, const std::string& reaso
          "works on the CPU, the bits are the same: " + reason + "; SetBackend(\"cpu\") says so without a warning");
 }
 
+/// Warns where the backend is left open and there is no device.
+void warn_without_device(const itk::ProcessObject& filter, BackendChoice choice) {
+  if (leaves_open(choice) && !runs_on_device(chosen(choice)))
+    warn_of_fallback(filter, has_cuda() ? "no CUDA device works on this machine" : "CUDA is not in this build");
+}
+
 }  // namespace
 
 bool PipelineResampler::holds(const Geometry& output, const HeldField& field, const PipelineOptions& options) const {
@@ -64,8 +70,7 @@ bool PipelineResampler::set_field(itk::ProcessObject& filter, const Geometry& ou
   const HeldField before = std::exchange(field_, field);  // kept until the resampler no longer points into it
   output_ = output;
   options_ = options;
-  if (leaves_open(options.backend) && !runs_on_device(chosen(options.backend)))
-    warn_of_fallback(filter, has_cuda() ? "no CUDA device works on this machine" : "CUDA is not in this build");
+  warn_without_device(filter, options.backend);
   try {
     run_for(filter, share, [&](const Control& control) {
       try {
@@ -105,6 +110,30 @@ Report PipelineResampler::resample(itk::ProcessObject& filter, const Region& reg
     }
   });
   return report;
+}
+
+std::string apply_adjoint(itk::ProcessObject& filter, const Geometry& output, const FieldView& field,
+                          const PipelineOptions& options, std::span<const AdjointTarget> targets,
+                          const DisplacementGradient& displacement) {
+  BackendKind used = chosen(options.backend);
+  warn_without_device(filter, options.backend);
+  run_for(filter, {}, [&](const Control& control) {
+    const auto work = [&] {
+      const auto adjoint =
+          make_adjoint(used, output, options.device, {.threads = options.threads, .memory = options.device_memory});
+      adjoint->set_field(field, control);
+      adjoint->apply(targets, displacement, control);
+    };
+    try {
+      work();
+    } catch (const DeviceError& error) {
+      if (!leaves_open(options.backend)) throw;
+      warn_of_fallback(filter, error.what());
+      used = BackendKind::cpu;
+      work();
+    }
+  });
+  return name_of(used);
 }
 
 }  // namespace tetwarp

@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "backend/factories.h"
+#include "deform/adjoint.h"
 #include "deform/resampler.h"
 #include "itkbridge/pipeline/pipeline_run.h"
 
@@ -73,5 +74,19 @@ class PipelineResampler {
   HeldField field_;
   PipelineOptions options_;
 };
+
+/// Makes a `ResampleAdjoint`, gives it a field and applies it, for a filter. Where the backend is left open, the CPU
+/// takes over as for a PipelineResampler.
+/// @param filter        filter that warnings and exceptions name, and whose progress is told
+/// @param output        grid of the deformed image
+/// @param field         forward field
+/// @param options       where to work
+/// @param targets       see `ResampleAdjoint::apply`
+/// @param displacement  see `ResampleAdjoint::apply`
+/// @return where the work was done, "cpu" or "cuda"
+/// @throws itk::ExceptionObject
+std::string apply_adjoint(itk::ProcessObject& filter, const Geometry& output, const FieldView& field,
+                          const PipelineOptions& options, std::span<const AdjointTarget> targets,
+                          const DisplacementGradient& displacement);
 
 }  // namespace tetwarp

@@ -22,12 +22,15 @@ const std::vector<Backend>& backends() {
        .cannot_run = "",
        .make = make_cpu_resampler,
        .make_pull = make_cpu_pull_resampler,
-       .make_renderer = [](Limits limits) { return make_cpu_renderer(limits); }},
+       .make_renderer = [](Limits limits) { return make_cpu_renderer(limits); },
+       .make_adjoint = make_cpu_adjoint},
       {.name = "cuda",
        .cannot_run = no_cuda,
        .make = on_cuda,
        .make_pull = pull_on_cuda,
-       .make_renderer = [](Limits limits) { return make_renderer(BackendKind::cuda, 0, limits); }},
+       .make_renderer = [](Limits limits) { return make_renderer(BackendKind::cuda, 0, limits); },
+       .make_adjoint = [](const Geometry& output,
+                          Limits limits) { return make_adjoint(BackendKind::cuda, output, 0, limits); }},
   };
   return all;
 }

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "deform/adjoint.h"
 #include "deform/render/renderer.h"
 #include "deform/resampler.h"
 
@@ -26,6 +27,7 @@ struct Backend {
   Make<ForwardResampler> make;    ///< for forward fields
   Make<PullResampler> make_pull;  ///< for pull fields; null: this backend has none
   std::function<std::unique_ptr<Renderer>(Limits limits)> make_renderer;
+  Make<ResampleAdjoint> make_adjoint;  ///< the transpose and the gradients
 
   friend void PrintTo(const Backend& backend, std::ostream* stream) { *stream << backend.name; }
 };

@@ -1,0 +1,562 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include "deform/adjoint.h"
+
+#include <variant>
+#include <vector>
+
+#include "cuda/factories.h"
+#include "cuda/output/coarse_maps.cuh"
+#include "cuda/runtime/device_buffer.h"
+#include "cuda/runtime/launch.cuh"
+#include "cuda/runtime/pointer_check.h"
+#include "cuda/runtime/warp.cuh"
+#include "deform/core/adjoint.h"
+#include "deform/field_check.h"
+#include "deform/snapped_mesh.h"
+#include "deform/target_check.h"
+
+namespace tetwarp {
+
+namespace cuda_detail {
+
+namespace {
+
+constexpr int kWarps = 4;    ///< of a block: rows
+constexpr int kColumn = 16;  ///< voxels along k that a thread goes
+
+/// What a pass finds out of all voxels.
+struct Found {
+  unsigned long long
+      largest;          ///< bits of the largest term, in size; those of a double that is not negative rise with it
+  unsigned not_finite;  ///< whether a term is not finite
+};
+
+/// What is known of every voxel of the output.
+struct OwnedVoxels {
+  const std::uint32_t* tetrahedron;  ///< as `Maps::tetrahedra`
+  const std::uint8_t* mapped;        ///< whether it comes from somewhere, perhaps staying; null: if it is owned
+  glm::ivec3 size;
+  Nudge nudge;
+
+  __device__ bool is_mapped(std::int64_t n) const { return mapped ? mapped[n] != 0 : tetrahedron[n] != kNoTetrahedron; }
+  __device__ std::int64_t count() const { return std::int64_t{size.x} * size.y * size.z; }
+};
+
+/// Goes along a column of voxels: a thread a column, lanes side by side along i. Calls `hold(number)` where the owner
+/// changes, `visit(n, voxel, signs)` for each voxel that is owned, and `stay(n, voxel)` for each that stays.
+template <class Hold, class Visit, class Stay>
+__device__ void for_each_of_column(const OwnedVoxels& owned, Hold&& hold, Visit&& visit, Stay&& stay) {
+  const int x = static_cast<int>(blockIdx.x * 32 + (threadIdx.x & 31)),
+            y = static_cast<int>(blockIdx.y * kWarps + threadIdx.x / 32),
+            begin = static_cast<int>(blockIdx.z) * kColumn;
+  if (x >= owned.size.x || y >= owned.size.y) return;
+  std::uint32_t held = kNoTetrahedron;
+  for (int z = begin; z < min(begin + kColumn, owned.size.z); ++z) {
+    const std::int64_t n = (std::int64_t{z} * owned.size.y + y) * owned.size.x + x;
+    const std::uint32_t owner = owned.tetrahedron[n];
+    const glm::i64vec3 voxel(x, y, z);
+    if (owner == kNoTetrahedron) {
+      if (owned.is_mapped(n)) stay(n, voxel);
+      continue;
+    }
+    if (owner != held) hold(owner);
+    held = owner;
+    visit(n, voxel, owned.nudge.signs(voxel));
+  }
+}
+
+/// Raises `found.largest` to the largest term of a warp; for whole warps.
+__device__ void raise(Found* found, double largest, bool not_finite) {
+  const unsigned long long most = warp_max(static_cast<unsigned long long>(__double_as_longlong(largest)));
+  if (lane_of_warp() == 0 && most > found->largest) atomicMax(&found->largest, most);
+  if (not_finite) found->not_finite = 1;
+}
+
+/// A tetrahedron once more. Rarely called, so out of line.
+template <class Tetrahedra>
+__device__ __noinline__ Tetrahedron again(const Tetrahedra& tetrahedra, std::uint32_t number) {
+  return tetrahedra(number).t;
+}
+
+/// The maps of tetrahedra, made where a column enters them.
+template <bool kIsCoarse, class Tetrahedra>
+struct MadeMaps {
+  static constexpr bool kCoarse = kIsCoarse;
+  using Place = PlaceMap<kCoarse>;
+  using Offset = typename Place::Offset;
+
+  Tetrahedra tetrahedra;
+
+  __device__ Place place(std::uint32_t number) const { return Place(tetrahedra(number).t); }
+  __device__ Offset offset(const Place& place, std::uint32_t number, const glm::i64vec3& voxel,
+                           const glm::i32vec3& signs) const {
+    return place.offset(voxel, signs, [&] { return again(tetrahedra, number); });
+  }
+  __device__ glm::vec3 pull_back(const Place& place, std::uint32_t, const glm::vec3& g) const {
+    return place.pull_back(g);
+  }
+  __device__ WeightMap weight(std::uint32_t number, std::uint32_t (&vertex)[4]) const {
+    const NumberedTetrahedron of = tetrahedra(number);
+    for (int corner = 0; corner < 4; ++corner) vertex[corner] = of.vertex[corner];
+    return WeightMap(of.t);
+  }
+};
+
+constexpr int kRecordQuads = kMapQuads + 5;  ///< groups of four numbers of a record
+constexpr int kUnusable = INT32_MIN;  ///< the first slope of a map that is not to be used; others are smaller than 2^30
+
+/// Where a voxel comes from whose owner has no map that may be used, and the gradient there. Rarely called.
+template <class Tetrahedra>
+__device__ __noinline__ FixedOffset slow_offset(const Tetrahedra& tetrahedra, std::uint32_t number, glm::ivec3 voxel,
+                                                glm::i32vec3 signs) {
+  return fixed_offset(coarse_u(tetrahedra(number).t, voxel, signs));
+}
+template <class Tetrahedra>
+__device__ __noinline__ glm::vec3 slow_pull_back(const Tetrahedra& tetrahedra, std::uint32_t number, glm::vec3 g) {
+  return PlaceMap<true>(tetrahedra(number).t).pull_back(g);
+}
+
+/// The maps of the tetrahedra of a coarse field, made once a field: in double they take longer than all else.
+///
+///     a record    0 ... 2   `map_axis` of each axis, from voxel (0, 0, 0) on; kUnusable in the first
+///                 3         origin of the weights                  w: not used
+///                 4 ... 6   of A, B and C: slopes, and the weight at the origin
+///                 7         numbers of the vertices A, B, C and D
+template <class Tetrahedra>
+struct MapTable {
+  static constexpr bool kCoarse = true;
+  struct Place {
+    int4 axes[kMapQuads];
+  };
+  using Offset = FixedOffset;
+
+  Tetrahedra tetrahedra;
+  int4* records;
+
+  __device__ int4* record(std::uint32_t number) const { return records + std::size_t{number} * kRecordQuads; }
+  /// Makes the record of a tetrahedron.
+  __device__ void make(std::uint32_t number) const {
+    const NumberedTetrahedron of = tetrahedra(number);
+    const CoarseMap map(of.t);
+    int4* const to = record(number);
+    for (int axis = 0; axis < kMapQuads; ++axis) to[axis] = map_axis(map, axis);
+    if (!is_usable(map, of.t)) to[0].y = kUnusable;
+    const WeightMap weight(of.t);
+    to[3] = make_int4(weight.origin.x, weight.origin.y, weight.origin.z, 0);
+    for (int n = 0; n < 3; ++n) {
+      to[4 + n] = make_int4(__float_as_int(weight.slope[n].x), __float_as_int(weight.slope[n].y),
+                            __float_as_int(weight.slope[n].z), __float_as_int(weight.at_origin[n]));
+    }
+    to[7] = make_int4(static_cast<int>(of.vertex[0]), static_cast<int>(of.vertex[1]), static_cast<int>(of.vertex[2]),
+                      static_cast<int>(of.vertex[3]));
+  }
+
+  __device__ Place place(std::uint32_t number) const {
+    const int4* const from = record(number);
+    return {{__ldg(from), __ldg(from + 1), __ldg(from + 2)}};
+  }
+  __device__ Offset offset(const Place& place, std::uint32_t number, const glm::i64vec3& voxel,
+                           const glm::i32vec3& signs) const {
+    const glm::ivec3 at(voxel);
+    if (place.axes[0].y == kUnusable) return slow_offset(tetrahedra, number, at, signs);
+    return fixed_offset({u_on_axis(place.axes[0], at), u_on_axis(place.axes[1], at), u_on_axis(place.axes[2], at)});
+  }
+  __device__ glm::vec3 pull_back(const Place& place, std::uint32_t number, const glm::vec3& g) const {
+    if (place.axes[0].y == kUnusable) return slow_pull_back(tetrahedra, number, g);
+    const auto slopes = [&](int4 axis) {
+      return glm::vec3(static_cast<float>(axis.y), static_cast<float>(axis.z), static_cast<float>(axis.w)) * 0x1p-23f;
+    };
+    const glm::vec3 i = slopes(place.axes[0]), j = slopes(place.axes[1]), k = slopes(place.axes[2]);
+    const glm::vec3 steepness[3] = {{i.x, j.x, k.x}, {i.y, j.y, k.y}, {i.z, j.z, k.z}};
+    return tetwarp::pull_back(steepness, g);
+  }
+  __device__ WeightMap weight(std::uint32_t number, std::uint32_t (&vertex)[4]) const {
+    const int4* const from = record(number);
+    WeightMap map;
+    const int4 origin = __ldg(from + 3), vertices = __ldg(from + 7);
+    map.origin = {origin.x, origin.y, origin.z};
+    for (int n = 0; n < 3; ++n) {
+      const int4 of = __ldg(from + 4 + n);
+      map.slope[n] = {__int_as_float(of.x), __int_as_float(of.y), __int_as_float(of.z)};
+      map.at_origin[n] = __int_as_float(of.w);
+    }
+    vertex[0] = static_cast<std::uint32_t>(vertices.x);
+    vertex[1] = static_cast<std::uint32_t>(vertices.y);
+    vertex[2] = static_cast<std::uint32_t>(vertices.z);
+    vertex[3] = static_cast<std::uint32_t>(vertices.w);
+    return map;
+  }
+};
+
+/// Makes a table. A thread a tetrahedron.
+template <class Tetrahedra>
+__global__ void table_kernel(const __grid_constant__ MapTable<Tetrahedra> table, std::int64_t count) {
+  const std::int64_t n = thread_of_grid();
+  if (n < count) table.make(static_cast<std::uint32_t>(n));
+}
+
+/// The gradient with respect to each owner as a whole, and its largest component. Grid: a column a thread, as
+/// `for_each_of_column`.
+///
+/// @param of_owners  a vector a voxel: written where a voxel has an owner
+template <class V, class Maps>
+__global__ void of_owners_kernel(const __grid_constant__ OwnedVoxels owned, const __grid_constant__ Maps maps,
+                                 AdjointPlans<V> plans, glm::vec3* of_owners, Found* found) {
+  typename Maps::Place map;
+  std::uint32_t held = kNoTetrahedron;
+  float largest = 0;
+  bool not_finite = false;
+  for_each_of_column(
+      owned,
+      [&](std::uint32_t number) {
+        map = maps.place(number);
+        held = number;
+      },
+      [&](std::int64_t n, const glm::i64vec3& voxel, const glm::i32vec3& signs) {
+        const auto offset = maps.offset(map, held, voxel, signs);
+        const glm::vec3 h = maps.pull_back(map, held, plans.of_place(n, voxel, offset));
+        of_owners[n] = h;
+        for (int axis = 0; axis < 3; ++axis) {
+          const float size = std::fabs(h[axis]);
+          not_finite = not_finite || size - size != 0;
+          largest = size - size == 0 && size > largest ? size : largest;
+        }
+      },
+      [](std::int64_t, const glm::i64vec3&) {});
+  raise(found, largest, not_finite);
+}
+
+/// Adds up what the vertices get, in quanta. Grid: a column a thread, as `for_each_of_column`.
+///
+/// @param of_owners  from `of_owners_kernel`  @param sums  three a vertex
+template <class Maps>
+__global__ void add_to_vertices_kernel(const __grid_constant__ OwnedVoxels owned, const __grid_constant__ Maps maps,
+                                       const glm::vec3* of_owners, const Found* found, unsigned long long* sums) {
+  const Quantum quantum(static_cast<double>(owned.count()),
+                        __longlong_as_double(static_cast<long long>(found->largest)));
+  WeightMap map;
+  std::uint32_t vertex[4] = {}, held = kNoTetrahedron;
+  std::int64_t part[4][3] = {};
+  const auto flush = [&] {
+    for (int corner = 0; corner < 4; ++corner) {
+      for (int axis = 0; axis < 3; ++axis) {
+        if (part[corner][axis] != 0)
+          atomicAdd(&sums[3 * std::size_t{vertex[corner]} + static_cast<std::size_t>(axis)],
+                    static_cast<unsigned long long>(part[corner][axis]));
+        part[corner][axis] = 0;
+      }
+    }
+  };
+  for_each_of_column(
+      owned,
+      [&](std::uint32_t number) {
+        flush();
+        map = maps.weight(number, vertex);
+        held = number;
+      },
+      [&](std::int64_t n, const glm::i64vec3& voxel, const glm::i32vec3& signs) {
+        const glm::dvec3 h(of_owners[n]);
+        float weight[4];
+        map.template weights<Maps::kCoarse>(
+            voxel, signs, [&] { return again(maps.tetrahedra, held); }, weight);
+        for (int corner = 0; corner < 4; ++corner) {
+          for (int axis = 0; axis < 3; ++axis) part[corner][axis] += quantum.steps(double{weight[corner]} * h[axis]);
+        }
+      },
+      [](std::int64_t, const glm::i64vec3&) {});
+  flush();
+}
+
+/// From sums to the gradient of the displacement, a thread a vertex.
+__global__ void finish_vertices_kernel(const std::int64_t* sums, std::int64_t vertices, double voxels,
+                                       const __grid_constant__ glm::dmat3 output_from_mm, const Found* found,
+                                       glm::vec3* gradient) {
+  const std::int64_t n = thread_of_grid();
+  if (n >= vertices) return;
+  const Quantum quantum(voxels, __longlong_as_double(static_cast<long long>(found->largest)));
+  const std::int64_t* of = sums + 3 * n;
+  gradient[n] = found->not_finite != 0
+                    ? glm::vec3(__int_as_float(0x7fc00000))
+                    : per_mm(output_from_mm, {quantum.value(of[0]), quantum.value(of[1]), quantum.value(of[2])});
+}
+
+/// The largest value that goes to a source; a thread a voxel.
+template <class V>
+__global__ void largest_given_kernel(const __grid_constant__ OwnedVoxels owned, AdjointPlans<V> plans, Found* found) {
+  const std::int64_t n = thread_of_grid();
+  const double largest = n < owned.count() && owned.is_mapped(n) ? plans.largest_given(n) : 0;
+  raise(found, largest, false);
+}
+
+/// Adds up what the sources get, in quanta. Grid: a column a thread, as `for_each_of_column`.
+template <class V, class Maps>
+__global__ void add_to_sources_kernel(const __grid_constant__ OwnedVoxels owned, const __grid_constant__ Maps maps,
+                                      AdjointPlans<V> plans, Found* found) {
+  const Quantum quantum(static_cast<double>(owned.count()),
+                        __longlong_as_double(static_cast<long long>(found->largest)));
+  const auto add = [](std::int64_t& sum, std::int64_t steps) {
+    atomicAdd(reinterpret_cast<unsigned long long*>(&sum), static_cast<unsigned long long>(steps));
+  };
+  typename Maps::Place map;
+  std::uint32_t held = kNoTetrahedron;
+  bool finite = true;
+  for_each_of_column(
+      owned,
+      [&](std::uint32_t number) {
+        map = maps.place(number);
+        held = number;
+      },
+      [&](std::int64_t n, const glm::i64vec3& voxel, const glm::i32vec3& signs) {
+        const auto offset = maps.offset(map, held, voxel, signs);
+        finite = plans.add_to_sources(n, voxel, offset, quantum, add) && finite;
+      },
+      [&](std::int64_t n, const glm::i64vec3& voxel) {
+        finite = plans.add_to_sources(n, voxel, typename Maps::Offset{}, quantum, add) && finite;
+      });
+  if (!finite) found->not_finite = 1;
+}
+
+/// From sums to the gradient of a source, a thread a value.
+template <class V>
+__global__ void finish_source_kernel(const std::int64_t* sums, std::int64_t count, double voxels, const Found* found,
+                                     V* gradient) {
+  const std::int64_t n = thread_of_grid();
+  if (n >= count) return;
+  const Quantum quantum(voxels, __longlong_as_double(static_cast<long long>(found->largest)));
+  gradient[n] =
+      found->not_finite != 0 ? static_cast<V>(__int_as_float(0x7fc00000)) : static_cast<V>(quantum.value(sums[n]));
+}
+
+class Adjoint final : public ResampleAdjoint {
+ public:
+  Adjoint(const Geometry& output, int device, const Limits& limits)
+      : ResampleAdjoint(output), device_(device), resampler_(make_cuda_resampler(output, device, limits)) {
+    require(output.size.x < INT32_MAX / 32 && (output.size.y + kWarps - 1) / kWarps < 65536 &&
+                (output.size.z + kColumn - 1) / kColumn < 65536,
+            "the output is too large for gradients on a device");
+  }
+
+  void set_field(const FieldView& field, const Control& control) override {
+    ready_ = false;
+    resampler_->set_field(field, {.jacobian_range = false}, control);
+    const DeviceScope scope(device_);
+    const auto stream = static_cast<cudaStream_t>(control.stream);
+    const auto voxels = static_cast<std::size_t>(voxel_count(output()));
+    Maps maps{.tetrahedra = map_view(owner_.reserve(voxels), VoxelType::u32)};
+    const bool rests = field.outside == Outside::rest;
+    if (rests) maps.coverage = map_view(mapped_.reserve(voxels), VoxelType::u8);
+    resampler_->resample(whole(output()), {}, maps, control);
+    owned_ = {owner_.data(), rests ? mapped_.data() : nullptr, glm::ivec3(output().size), {}};
+    vertices_ = static_cast<std::size_t>(vertex_count(field));
+    if (field.mesh) {
+      const SnappedMesh mesh = snap_mesh(output(), field, control);
+      const std::vector<glm::u32vec4>& of_mesh = field.mesh->tetrahedra;
+      vertex_.upload(mesh.vertices.data(), mesh.vertices.size(), stream);
+      tetrahedra_.upload(mesh.tetrahedra.data(), mesh.tetrahedra.size(), stream);
+      of_mesh_.upload(of_mesh.data(), of_mesh.size(), stream);
+      numbered_ = MeshTetrahedra{vertex_.data(), tetrahedra_.data(),
+                                 static_cast<std::uint32_t>(mesh.tetrahedra.size() - of_mesh.size()), of_mesh_.data(),
+                                 static_cast<std::uint32_t>(vertices_ - field.mesh->rest.size())};
+      owned_.nudge = mesh.nudge;
+      coarse_ = mesh.coarse;
+      make_table(static_cast<std::int64_t>(mesh.tetrahedra.size()), stream);
+    } else {
+      const LatticeFrame frame = make_lattice_frame(output(), field);
+      const glm::vec3* displacement = field.displacement;
+      if (field.memory == Memory::host) {
+        displacement_.upload(field.displacement, vertices_, stream);
+        displacement = displacement_.data();
+      }
+      numbered_ = LatticeTetrahedra{frame, displacement};
+      owned_.nudge = frame.nudge;
+      coarse_ = frame.coarse;
+      make_table(frame.cells.x * frame.cells.y * frame.cells.z * kTetrahedraPerCell, stream);
+    }
+    TETWARP_CUDA_TRY(cudaStreamSynchronize(stream));  // the next call may be on another stream
+    ready_ = true;
+  }
+
+  void apply(std::span<const AdjointTarget> targets, const DisplacementGradient& displacement,
+             const Control& control) override {
+    require(ready_, "apply needs a field: call set_field first");
+    check_adjoint(output(), targets, displacement.values != nullptr);
+    const DeviceScope scope(device_);
+    stream_ = static_cast<cudaStream_t>(control.stream);
+    for (const AdjointTarget& target : targets) {
+      require_memory(target.source.voxels, target.source.memory, "a source");
+      require_memory(target.output_gradient.voxels, target.output_gradient.memory, "the gradient of an output");
+      require_memory(target.source_gradient.voxels, target.source_gradient.memory, "the gradient of a source");
+    }
+    require_memory(displacement.values, displacement.memory, "the gradient of the displacement");
+    if (control.stop.stop_requested()) throw Cancelled();
+    if (!targets.empty() && targets.front().source.type == VoxelType::f64)
+      apply_to<double>(targets, displacement);
+    else
+      apply_to<float>(targets, displacement);
+    TETWARP_CUDA_TRY(cudaStreamSynchronize(stream_));
+  }
+
+ private:
+  template <class T>
+  VolumeView map_view(T* values, VoxelType type) const {
+    return {&output(), whole(output()), type, 1, reinterpret_cast<std::byte*>(values), Memory::device};
+  }
+
+  /// A device's copy of what lies on the host, in a buffer of its own; or what lies on the device.
+  template <class V, class View>
+  V* on_device(const View& view, std::vector<DeviceBuffer<std::byte>>& copies, std::size_t& next, bool reads) {
+    if (!view.voxels || view.memory == Memory::device) return reinterpret_cast<V*>(const_cast<std::byte*>(view.voxels));
+    const std::size_t bytes = static_cast<std::size_t>(voxel_count(*view.geometry) * view.components) * sizeof(V);
+    DeviceBuffer<std::byte>& copy = copies[next++];
+    if (reads)
+      copy.upload(view.voxels, bytes, stream_);
+    else
+      copy.reserve(bytes);
+    return reinterpret_cast<V*>(copy.data());
+  }
+
+  template <class V>
+  void apply_to(std::span<const AdjointTarget> targets, const DisplacementGradient& displacement) {
+    std::vector<AdjointPlan<V>> plans;
+    std::vector<V*> gradients;
+    if (copies_.size() < 3 * targets.size()) copies_ = std::vector<DeviceBuffer<std::byte>>(3 * targets.size());
+    std::vector<double> slices;
+    std::vector<std::size_t> first_slice;
+    std::size_t next = 0, values = 0;
+    bool wants_sources = false;
+    for (const AdjointTarget& target : targets) {
+      const std::vector<double> of_target = uneven_slices(*target.source.geometry);
+      first_slice.push_back(of_target.empty() ? SIZE_MAX : slices.size());
+      slices.insert(slices.end(), of_target.begin(), of_target.end());
+      wants_sources = wants_sources || target.source_gradient.voxels;
+      if (target.source_gradient.voxels)
+        values += static_cast<std::size_t>(voxel_count(*target.source.geometry) * target.source.components);
+    }
+    double* const slices_there = slices_.reserve(slices.size() + 1);
+    if (!slices.empty()) slices_.upload(slices.data(), slices.size(), stream_);
+    if (wants_sources) source_sums_.fill(0, values, stream_);
+    values = 0;
+    for (std::size_t t = 0; t < targets.size(); ++t) {
+      const AdjointTarget& target = targets[t];
+      const Geometry& grid = *target.source.geometry;
+      const glm::i64vec3& size = grid.size;
+      const int components = target.source.components;
+      const bool wanted = target.source_gradient.voxels != nullptr, moves = displacement.values != nullptr;
+      ConstVolumeView source = target.source;
+      if (!moves) source.voxels = nullptr;
+      plans.push_back({{on_device<const V>(source, copies_, next, true), size, glm::i64vec3(0),
+                        glm::i64vec3(1, size.x, size.x * size.y) * std::int64_t{components}},
+                       relate(grid, output(), first_slice[t] == SIZE_MAX ? nullptr : slices_there + first_slice[t]),
+                       components,
+                       target.interpolation,
+                       on_device<const V>(target.output_gradient, copies_, next, true),
+                       wanted ? source_sums_.data() + values : nullptr});
+      gradients.push_back(on_device<V>(target.source_gradient, copies_, next, false));
+      if (wanted) values += static_cast<std::size_t>(voxel_count(grid) * components);
+    }
+    std::byte* const there = plans_.reserve(plans.size() * sizeof(AdjointPlan<V>) + 1);
+    TETWARP_CUDA_TRY(
+        cudaMemcpyAsync(there, plans.data(), plans.size() * sizeof(AdjointPlan<V>), cudaMemcpyHostToDevice, stream_));
+    found_.fill(0, 2, stream_);
+    const AdjointPlans<V> given{reinterpret_cast<const AdjointPlan<V>*>(there), static_cast<int>(plans.size())};
+    std::visit(
+        [&](const auto& tetrahedra) {
+          using Tetrahedra = std::decay_t<decltype(tetrahedra)>;
+          if (has_table_)
+            run<V>(MapTable<Tetrahedra>{tetrahedra, table_.data()}, given, displacement, wants_sources);
+          else if (coarse_)
+            run<V>(MadeMaps<true, Tetrahedra>{tetrahedra}, given, displacement, wants_sources);
+          else
+            run<V>(MadeMaps<false, Tetrahedra>{tetrahedra}, given, displacement, wants_sources);
+        },
+        numbered_);
+    for (std::size_t t = 0; t < targets.size(); ++t) {
+      if (!gradients[t]) continue;
+      const VolumeView& view = targets[t].source_gradient;
+      const std::int64_t count = voxel_count(*view.geometry) * view.components;
+      finish_source_kernel<<<blocks_for(count), kThreads, 0, stream_>>>(
+          plans[t].sums, count, static_cast<double>(voxel_count(output())), found_.data() + 1, gradients[t]);
+      TETWARP_CUDA_TRY(cudaGetLastError());
+      if (view.memory == Memory::host) {
+        TETWARP_CUDA_TRY(cudaMemcpyAsync(view.voxels, gradients[t], static_cast<std::size_t>(count) * sizeof(V),
+                                         cudaMemcpyDeviceToHost, stream_));
+      }
+    }
+  }
+
+  /// Makes the maps of a coarse field, where they do not take too much memory.
+  void make_table(std::int64_t count, cudaStream_t stream) {
+    constexpr std::int64_t kMost = 12;  // bytes for each voxel of the output, as many as the gradients of a call take
+    has_table_ = coarse_ && count * kRecordQuads * std::int64_t{sizeof(int4)} <= kMost * voxel_count(output());
+    if (!has_table_) return table_.release();
+    int4* const records = table_.reserve(static_cast<std::size_t>(count * kRecordQuads));
+    std::visit(
+        [&](const auto& tetrahedra) {
+          using Tetrahedra = std::decay_t<decltype(tetrahedra)>;
+          table_kernel<<<blocks_for(count), kThreads, 0, stream>>>(MapTable<Tetrahedra>{tetrahedra, records}, count);
+        },
+        numbered_);
+    TETWARP_CUDA_TRY(cudaGetLastError());
+  }
+
+  template <class V, class Maps>
+  void run(const Maps& maps, const AdjointPlans<V>& plans, const DisplacementGradient& displacement,
+           bool wants_sources) {
+    const glm::ivec3& size = owned_.size;
+    const dim3 grid(static_cast<unsigned>((size.x + 31) / 32), static_cast<unsigned>((size.y + kWarps - 1) / kWarps),
+                    static_cast<unsigned>((size.z + kColumn - 1) / kColumn));
+    if (displacement.values) {
+      Found* const found = found_.data();
+      vertex_sums_.fill(0, 3 * vertices_, stream_);
+      glm::vec3* const of_owners = of_owners_.reserve(static_cast<std::size_t>(voxel_count(output())));
+      of_owners_kernel<<<grid, 32 * kWarps, 0, stream_>>>(owned_, maps, plans, of_owners, found);
+      add_to_vertices_kernel<<<grid, 32 * kWarps, 0, stream_>>>(
+          owned_, maps, of_owners, found, reinterpret_cast<unsigned long long*>(vertex_sums_.data()));
+      glm::vec3* const to =
+          displacement.memory == Memory::device ? displacement.values : vertex_gradient_.reserve(vertices_);
+      finish_vertices_kernel<<<blocks_for(static_cast<std::int64_t>(vertices_)), kThreads, 0, stream_>>>(
+          vertex_sums_.data(), static_cast<std::int64_t>(vertices_), static_cast<double>(voxel_count(output())),
+          index_from_point(output()).linear, found, to);
+      TETWARP_CUDA_TRY(cudaGetLastError());
+      if (displacement.memory == Memory::host) vertex_gradient_.download(displacement.values, vertices_, stream_);
+    }
+    if (!wants_sources) return;
+    Found* const found = found_.data() + 1;
+    largest_given_kernel<<<blocks_for(voxel_count(output())), kThreads, 0, stream_>>>(owned_, plans, found);
+    add_to_sources_kernel<<<grid, 32 * kWarps, 0, stream_>>>(owned_, maps, plans, found);
+    TETWARP_CUDA_TRY(cudaGetLastError());
+  }
+
+  int device_;
+  std::unique_ptr<ForwardResampler> resampler_;
+  cudaStream_t stream_ = nullptr;  ///< of the call
+  bool ready_ = false, coarse_ = false, has_table_ = false;
+  std::size_t vertices_ = 0;
+  OwnedVoxels owned_{};
+  std::variant<LatticeTetrahedra, MeshTetrahedra> numbered_;
+  DeviceBuffer<std::uint32_t> owner_;
+  DeviceBuffer<std::uint8_t> mapped_;
+  DeviceBuffer<glm::vec3> displacement_;  ///< of a lattice on the host
+  DeviceBuffer<Vertex> vertex_;           ///< of a mesh
+  DeviceBuffer<glm::u32vec4> tetrahedra_, of_mesh_;
+  DeviceBuffer<int4> table_;  ///< `MapTable`, where there is one
+  DeviceBuffer<std::byte> plans_;
+  DeviceBuffer<double> slices_;
+  std::vector<DeviceBuffer<std::byte>> copies_;  ///< of what lies on the host
+  DeviceBuffer<std::int64_t> source_sums_, vertex_sums_;
+  DeviceBuffer<glm::vec3> of_owners_;  ///< of a call: a vector a voxel
+  DeviceBuffer<glm::vec3> vertex_gradient_;
+  DeviceBuffer<Found> found_;  ///< of the gradient of the displacement, and of those of sources
+};
+
+}  // namespace
+
+}  // namespace cuda_detail
+
+std::unique_ptr<ResampleAdjoint> make_cuda_adjoint(const Geometry& output, int device, const Limits& limits) {
+  return std::make_unique<cuda_detail::Adjoint>(output, device, limits);
+}
+
+}  // namespace tetwarp
