@@ -42,10 +42,10 @@ struct DisplacementGradient {
 /// every run. One unit serves the source gradients of a call, another one the gradient of the displacement: they
 /// follow the largest term of all targets. A term that is not finite makes all that share its unit NaN.
 ///
-/// What holds of memory and threads for a Resampler holds here; nothing is streamed. Beside a resampler it takes 4 bytes
-/// for each voxel of the output; in a call 8 for each value of a wanted source gradient, and for the gradient of the
-/// displacement 12 for each voxel of the output and 24 for each vertex. A device keeps up to 12 bytes a voxel more of
-/// the tetrahedra of a coarse field, and copies of what lies on the host.
+/// What holds of memory and threads for a Resampler holds here; nothing is streamed. Beside a resampler it takes 4
+/// bytes for each voxel of the output; in a call 8 for each value of a wanted source gradient, and for the gradient of
+/// the displacement 12 for each voxel of the output and 24 for each vertex. A device keeps up to 12 bytes a voxel more
+/// of the tetrahedra of a coarse field, and copies of what lies on the host.
 class ResampleAdjoint {
  public:
   /// Frees what it holds; fields and volumes are not owned.
