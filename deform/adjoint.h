@@ -43,9 +43,9 @@ struct DisplacementGradient {
 /// follow the largest term of all targets. A term that is not finite makes all that share its unit NaN.
 ///
 /// What holds of memory and threads for a Resampler holds here; nothing is streamed. Beside a resampler it takes 4
-/// bytes for each voxel of the output; in a call 8 for each value of a wanted source gradient, and for the gradient of
-/// the displacement 12 for each voxel of the output and 24 for each vertex. A device keeps up to 12 bytes a voxel more
-/// of the tetrahedra of a coarse field, and copies of what lies on the host.
+/// bytes for each voxel of the output; from the first call on 8 for each value of a wanted source gradient, and for
+/// that of the displacement 12 for each voxel of the output and 24 for each vertex. A device keeps up to 12 bytes a
+/// voxel more of the tetrahedra of a coarse field, and copies of what lies on the host.
 class ResampleAdjoint {
  public:
   /// Frees what it holds; fields and volumes are not owned.

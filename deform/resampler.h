@@ -73,7 +73,8 @@ struct Maps {
   /// Type u16: number of tetrahedra that own the voxel, saturated. More than 1 is a fold.
   VolumeView owners = {};
   /// Type u32: number of the tetrahedron that owns the voxel (docs/design/definition.md, "Five tetrahedra a cell"), the
-  /// lowest where it folds; `kNoTetrahedron` where none does.
+  /// lowest where it folds; `kNoTetrahedron` where none does. For a lattice with replaced cells it is the index in
+  /// `mesh_of` of the field, which leaves those cells out.
   VolumeView tetrahedra = {};
 };
 

@@ -67,9 +67,10 @@ void VertexFieldResampleAdjointImageFilter<TImage>::GenerateData() {
   if (source) target.source = tetwarp::view_of(*source, undeformed);
   target.interpolation = m_Interpolation;
   tetwarp::FieldView field = this->GetVertexField()->GetView(this->GetOutside());
-  if (source) m_DisplacementGradient.resize(static_cast<std::size_t>(tetwarp::vertex_count(field)));
+  std::vector<glm::vec3> gradient(source ? static_cast<std::size_t>(tetwarp::vertex_count(field)) : 0);
   this->SetUsedBackend(tetwarp::apply_adjoint(*this, deformed, field, this->GetPipelineOptions(), {&target, 1},
-                                              {source ? m_DisplacementGradient.data() : nullptr}));
+                                              {source ? gradient.data() : nullptr}));
+  m_DisplacementGradient = std::move(gradient);
 }
 
 template <typename TImage>

@@ -317,12 +317,13 @@ class LatticeResampler final : public CudaResampler<ForwardResampler> {
   bool can_map_plainly(const SlabWriter& writer) const { return can_gather() && !writer.wants_of_owners(); }
   /// Whether all that is wanted is who owns each voxel.
   bool can_find_owners(const SlabWriter& writer) const {
-    return can_gather() && frame_.coarse && !streamed_ && writer.wants_tetrahedra() && !writer.wants_jacobian() &&
-           !writer.wants_owners() && !writer.wants_places();
+    // Decided for the whole output: records of tetrahedra are made once a field, however small the boxes are.
+    return can_gather() && Gather::can_find_owners(*lattice_, {glm::i64vec3(0), output().size}) && frame_.coarse &&
+           !streamed_ && writer.wants_tetrahedra() && !writer.wants_jacobian() && !writer.wants_owners() &&
+           !writer.wants_places();
   }
   std::int64_t work_bytes(const SlabWriter& writer) const override {
-    if (can_find_owners(writer) && gather_.can_find_owners(*lattice_, {glm::i64vec3(0), output().size}))
-      return std::int64_t{sizeof(std::uint8_t)};
+    if (can_find_owners(writer)) return std::int64_t{sizeof(std::uint8_t)};
     return Mapped::bytes(frame_.coarse) + (can_map_plainly(writer) ? 0 : Claims::kBytes);
   }
 
@@ -340,7 +341,7 @@ class LatticeResampler final : public CudaResampler<ForwardResampler> {
 
   void map_box(const SlabBox& box, SlabWriter& writer) override {
     const auto voxels = static_cast<std::size_t>(box.count());
-    if (can_find_owners(writer) && gather_.can_find_owners(*lattice_, box)) {
+    if (can_find_owners(writer)) {
       std::uint32_t* const owner = writer.tetrahedra(box);
       count_paths(box, gather_.find_owners(*lattice_, box, {box, owner, nullptr}, stream_));
       mapped_of_owners_kernel<<<blocks_for(box.count()), kThreads, 0, stream_>>>(

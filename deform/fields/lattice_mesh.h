@@ -13,8 +13,8 @@ namespace tetwarp {
 /// (`TetrahedralMesh::lattice_vertex`).
 bool has_lattice_vertices(const VertexField& field);
 
-/// The five tetrahedra of every cell of a lattice, as a mesh with the same numbers. Tetrahedra that replace cells
-/// follow after all others. A mesh that stands alone is returned as it is.
+/// The five tetrahedra of every cell of a lattice, as a mesh with the same numbers. Replaced cells are left out, and
+/// tetrahedra that replace them follow after all others. A mesh that stands alone is returned as it is.
 /// The mesh states which vertices are those of the lattice (`TetrahedralMesh::lattice_vertex`), so together with the
 /// lattice it gives the same deformed volumes.
 /// @throws InputError unless there is one displacement for each vertex; for a mesh with a vertex number that is too
