@@ -22,12 +22,7 @@ tetwarp::HeldField VertexFieldResampleAdjointImageFilter<TImage>::GetHeldField()
 
 template <typename TImage>
 void VertexFieldResampleAdjointImageFilter<TImage>::GenerateDefaultGrid() {
-  const ImageType* const like = this->GetSourceImage() ? this->GetSourceImage() : this->GetInput();
-  ImageType* const output = this->GetOutput();
-  output->SetLargestPossibleRegion(like->GetLargestPossibleRegion());
-  output->SetSpacing(like->GetSpacing());
-  output->SetOrigin(like->GetOrigin());
-  output->SetDirection(like->GetDirection());
+  this->GetOutput()->CopyInformation(this->GetSourceImage() ? this->GetSourceImage() : this->GetInput());
 }
 
 template <typename TImage>

@@ -7,12 +7,11 @@
 #include <vector>
 
 #include "cuda/factories.h"
-#include "cuda/output/coarse_maps.cuh"
+#include "cuda/output/adjoint_maps.cuh"
 #include "cuda/runtime/device_buffer.h"
 #include "cuda/runtime/launch.cuh"
 #include "cuda/runtime/pointer_check.h"
 #include "cuda/runtime/warp.cuh"
-#include "deform/core/adjoint.h"
 #include "deform/field_check.h"
 #include "deform/snapped_mesh.h"
 #include "deform/target_check.h"
@@ -31,6 +30,11 @@ struct Found {
   unsigned long long
       largest;          ///< bits of the largest term, in size; those of a double that is not negative rise with it
   unsigned not_finite;  ///< whether a term is not finite
+
+  /// @param voxels  of the output
+  __device__ Quantum quantum(double voxels) const {
+    return {voxels, __longlong_as_double(static_cast<long long>(largest))};
+  }
 };
 
 /// What is known of every voxel of the output.
@@ -45,7 +49,7 @@ struct OwnedVoxels {
 };
 
 /// Goes along a column of voxels: a thread a column, lanes side by side along i. Calls `hold(number)` where the owner
-/// changes, `visit(n, voxel, signs)` for each voxel that is owned, and `stay(n, voxel)` for each that stays.
+/// changes, `visit(n, voxel, signs, number)` for each voxel that is owned, and `stay(n, voxel)` for each that stays.
 template <class Hold, class Visit, class Stay>
 __device__ void for_each_of_column(const OwnedVoxels& owned, Hold&& hold, Visit&& visit, Stay&& stay) {
   const int x = static_cast<int>(blockIdx.x * 32 + (threadIdx.x & 31)),
@@ -63,7 +67,7 @@ __device__ void for_each_of_column(const OwnedVoxels& owned, Hold&& hold, Visit&
     }
     if (owner != held) hold(owner);
     held = owner;
-    visit(n, voxel, owned.nudge.signs(voxel));
+    visit(n, voxel, owned.nudge.signs(voxel), owner);
   }
 }
 
@@ -73,122 +77,6 @@ __device__ void raise(Found* found, double largest, bool not_finite) {
   if (lane_of_warp() == 0 && most > found->largest) atomicMax(&found->largest, most);
   if (not_finite) found->not_finite = 1;
 }
-
-/// A tetrahedron once more. Rarely called, so out of line.
-template <class Tetrahedra>
-__device__ __noinline__ Tetrahedron again(const Tetrahedra& tetrahedra, std::uint32_t number) {
-  return tetrahedra(number).t;
-}
-
-/// The maps of tetrahedra, made where a column enters them.
-template <bool kIsCoarse, class Tetrahedra>
-struct MadeMaps {
-  static constexpr bool kCoarse = kIsCoarse;
-  using Place = PlaceMap<kCoarse>;
-  using Offset = typename Place::Offset;
-
-  Tetrahedra tetrahedra;
-
-  __device__ Place place(std::uint32_t number) const { return Place(tetrahedra(number).t); }
-  __device__ Offset offset(const Place& place, std::uint32_t number, const glm::i64vec3& voxel,
-                           const glm::i32vec3& signs) const {
-    return place.offset(voxel, signs, [&] { return again(tetrahedra, number); });
-  }
-  __device__ glm::vec3 pull_back(const Place& place, std::uint32_t, const glm::vec3& g) const {
-    return place.pull_back(g);
-  }
-  __device__ WeightMap weight(std::uint32_t number, std::uint32_t (&vertex)[4]) const {
-    const NumberedTetrahedron of = tetrahedra(number);
-    for (int corner = 0; corner < 4; ++corner) vertex[corner] = of.vertex[corner];
-    return WeightMap(of.t);
-  }
-};
-
-constexpr int kRecordQuads = kMapQuads + 5;  ///< groups of four numbers of a record
-constexpr int kUnusable = INT32_MIN;  ///< the first slope of a map that is not to be used; others are smaller than 2^30
-
-/// Where a voxel comes from whose owner has no map that may be used, and the gradient there. Rarely called.
-template <class Tetrahedra>
-__device__ __noinline__ FixedOffset slow_offset(const Tetrahedra& tetrahedra, std::uint32_t number, glm::ivec3 voxel,
-                                                glm::i32vec3 signs) {
-  return fixed_offset(coarse_u(tetrahedra(number).t, voxel, signs));
-}
-template <class Tetrahedra>
-__device__ __noinline__ glm::vec3 slow_pull_back(const Tetrahedra& tetrahedra, std::uint32_t number, glm::vec3 g) {
-  return PlaceMap<true>(tetrahedra(number).t).pull_back(g);
-}
-
-/// The maps of the tetrahedra of a coarse field, made once a field: in double they take longer than all else.
-///
-///     a record    0 ... 2   `map_axis` of each axis, from voxel (0, 0, 0) on; kUnusable in the first
-///                 3         origin of the weights                  w: not used
-///                 4 ... 6   of A, B and C: slopes, and the weight at the origin
-///                 7         numbers of the vertices A, B, C and D
-template <class Tetrahedra>
-struct MapTable {
-  static constexpr bool kCoarse = true;
-  struct Place {
-    int4 axes[kMapQuads];
-  };
-  using Offset = FixedOffset;
-
-  Tetrahedra tetrahedra;
-  int4* records;
-
-  __device__ int4* record(std::uint32_t number) const { return records + std::size_t{number} * kRecordQuads; }
-  /// Makes the record of a tetrahedron.
-  __device__ void make(std::uint32_t number) const {
-    const NumberedTetrahedron of = tetrahedra(number);
-    const CoarseMap map(of.t);
-    int4* const to = record(number);
-    for (int axis = 0; axis < kMapQuads; ++axis) to[axis] = map_axis(map, axis);
-    if (!is_usable(map, of.t)) to[0].y = kUnusable;
-    const WeightMap weight(of.t);
-    to[3] = make_int4(weight.origin.x, weight.origin.y, weight.origin.z, 0);
-    for (int n = 0; n < 3; ++n) {
-      to[4 + n] = make_int4(__float_as_int(weight.slope[n].x), __float_as_int(weight.slope[n].y),
-                            __float_as_int(weight.slope[n].z), __float_as_int(weight.at_origin[n]));
-    }
-    to[7] = make_int4(static_cast<int>(of.vertex[0]), static_cast<int>(of.vertex[1]), static_cast<int>(of.vertex[2]),
-                      static_cast<int>(of.vertex[3]));
-  }
-
-  __device__ Place place(std::uint32_t number) const {
-    const int4* const from = record(number);
-    return {{__ldg(from), __ldg(from + 1), __ldg(from + 2)}};
-  }
-  __device__ Offset offset(const Place& place, std::uint32_t number, const glm::i64vec3& voxel,
-                           const glm::i32vec3& signs) const {
-    const glm::ivec3 at(voxel);
-    if (place.axes[0].y == kUnusable) return slow_offset(tetrahedra, number, at, signs);
-    return fixed_offset({u_on_axis(place.axes[0], at), u_on_axis(place.axes[1], at), u_on_axis(place.axes[2], at)});
-  }
-  __device__ glm::vec3 pull_back(const Place& place, std::uint32_t number, const glm::vec3& g) const {
-    if (place.axes[0].y == kUnusable) return slow_pull_back(tetrahedra, number, g);
-    const auto slopes = [&](int4 axis) {
-      return glm::vec3(static_cast<float>(axis.y), static_cast<float>(axis.z), static_cast<float>(axis.w)) * 0x1p-23f;
-    };
-    const glm::vec3 i = slopes(place.axes[0]), j = slopes(place.axes[1]), k = slopes(place.axes[2]);
-    const glm::vec3 steepness[3] = {{i.x, j.x, k.x}, {i.y, j.y, k.y}, {i.z, j.z, k.z}};
-    return tetwarp::pull_back(steepness, g);
-  }
-  __device__ WeightMap weight(std::uint32_t number, std::uint32_t (&vertex)[4]) const {
-    const int4* const from = record(number);
-    WeightMap map;
-    const int4 origin = __ldg(from + 3), vertices = __ldg(from + 7);
-    map.origin = {origin.x, origin.y, origin.z};
-    for (int n = 0; n < 3; ++n) {
-      const int4 of = __ldg(from + 4 + n);
-      map.slope[n] = {__int_as_float(of.x), __int_as_float(of.y), __int_as_float(of.z)};
-      map.at_origin[n] = __int_as_float(of.w);
-    }
-    vertex[0] = static_cast<std::uint32_t>(vertices.x);
-    vertex[1] = static_cast<std::uint32_t>(vertices.y);
-    vertex[2] = static_cast<std::uint32_t>(vertices.z);
-    vertex[3] = static_cast<std::uint32_t>(vertices.w);
-    return map;
-  }
-};
 
 /// Makes a table. A thread a tetrahedron.
 template <class Tetrahedra>
@@ -205,18 +93,13 @@ template <class V, class Maps>
 __global__ void of_owners_kernel(const __grid_constant__ OwnedVoxels owned, const __grid_constant__ Maps maps,
                                  AdjointPlans<V> plans, glm::vec3* of_owners, Found* found) {
   typename Maps::Place map;
-  std::uint32_t held = kNoTetrahedron;
   float largest = 0;
   bool not_finite = false;
   for_each_of_column(
-      owned,
-      [&](std::uint32_t number) {
-        map = maps.place(number);
-        held = number;
-      },
-      [&](std::int64_t n, const glm::i64vec3& voxel, const glm::i32vec3& signs) {
-        const auto offset = maps.offset(map, held, voxel, signs);
-        const glm::vec3 h = maps.pull_back(map, held, plans.of_place(n, voxel, offset));
+      owned, [&](std::uint32_t number) { map = maps.place(number); },
+      [&](std::int64_t n, const glm::i64vec3& voxel, const glm::i32vec3& signs, std::uint32_t number) {
+        const auto offset = maps.offset(map, number, voxel, signs);
+        const glm::vec3 h = maps.pull_back(map, number, plans.of_place(n, voxel, offset));
         of_owners[n] = h;
         for (int axis = 0; axis < 3; ++axis) {
           const float size = std::fabs(h[axis]);
@@ -234,10 +117,9 @@ __global__ void of_owners_kernel(const __grid_constant__ OwnedVoxels owned, cons
 template <class Maps>
 __global__ void add_to_vertices_kernel(const __grid_constant__ OwnedVoxels owned, const __grid_constant__ Maps maps,
                                        const glm::vec3* of_owners, const Found* found, unsigned long long* sums) {
-  const Quantum quantum(static_cast<double>(owned.count()),
-                        __longlong_as_double(static_cast<long long>(found->largest)));
+  const Quantum quantum = found->quantum(static_cast<double>(owned.count()));
   WeightMap map;
-  std::uint32_t vertex[4] = {}, held = kNoTetrahedron;
+  std::uint32_t vertex[4] = {};
   std::int64_t part[4][3] = {};
   const auto flush = [&] {
     for (int corner = 0; corner < 4; ++corner) {
@@ -254,13 +136,12 @@ __global__ void add_to_vertices_kernel(const __grid_constant__ OwnedVoxels owned
       [&](std::uint32_t number) {
         flush();
         map = maps.weight(number, vertex);
-        held = number;
       },
-      [&](std::int64_t n, const glm::i64vec3& voxel, const glm::i32vec3& signs) {
+      [&](std::int64_t n, const glm::i64vec3& voxel, const glm::i32vec3& signs, std::uint32_t number) {
         const glm::dvec3 h(of_owners[n]);
         float weight[4];
         map.template weights<Maps::kCoarse>(
-            voxel, signs, [&] { return again(maps.tetrahedra, held); }, weight);
+            voxel, signs, [&] { return again(maps.tetrahedra, number); }, weight);
         for (int corner = 0; corner < 4; ++corner) {
           for (int axis = 0; axis < 3; ++axis) part[corner][axis] += quantum.steps(double{weight[corner]} * h[axis]);
         }
@@ -275,7 +156,7 @@ __global__ void finish_vertices_kernel(const std::int64_t* sums, std::int64_t ve
                                        glm::vec3* gradient) {
   const std::int64_t n = thread_of_grid();
   if (n >= vertices) return;
-  const Quantum quantum(voxels, __longlong_as_double(static_cast<long long>(found->largest)));
+  const Quantum quantum = found->quantum(voxels);
   const std::int64_t* of = sums + 3 * n;
   gradient[n] = found->not_finite != 0
                     ? glm::vec3(__int_as_float(0x7fc00000))
@@ -294,22 +175,16 @@ __global__ void largest_given_kernel(const __grid_constant__ OwnedVoxels owned, 
 template <class V, class Maps>
 __global__ void add_to_sources_kernel(const __grid_constant__ OwnedVoxels owned, const __grid_constant__ Maps maps,
                                       AdjointPlans<V> plans, Found* found) {
-  const Quantum quantum(static_cast<double>(owned.count()),
-                        __longlong_as_double(static_cast<long long>(found->largest)));
+  const Quantum quantum = found->quantum(static_cast<double>(owned.count()));
   const auto add = [](std::int64_t& sum, std::int64_t steps) {
     atomicAdd(reinterpret_cast<unsigned long long*>(&sum), static_cast<unsigned long long>(steps));
   };
   typename Maps::Place map;
-  std::uint32_t held = kNoTetrahedron;
   bool finite = true;
   for_each_of_column(
-      owned,
-      [&](std::uint32_t number) {
-        map = maps.place(number);
-        held = number;
-      },
-      [&](std::int64_t n, const glm::i64vec3& voxel, const glm::i32vec3& signs) {
-        const auto offset = maps.offset(map, held, voxel, signs);
+      owned, [&](std::uint32_t number) { map = maps.place(number); },
+      [&](std::int64_t n, const glm::i64vec3& voxel, const glm::i32vec3& signs, std::uint32_t number) {
+        const auto offset = maps.offset(map, number, voxel, signs);
         finite = plans.add_to_sources(n, voxel, offset, quantum, add) && finite;
       },
       [&](std::int64_t n, const glm::i64vec3& voxel) {
@@ -324,7 +199,7 @@ __global__ void finish_source_kernel(const std::int64_t* sums, std::int64_t coun
                                      V* gradient) {
   const std::int64_t n = thread_of_grid();
   if (n >= count) return;
-  const Quantum quantum(voxels, __longlong_as_double(static_cast<long long>(found->largest)));
+  const Quantum quantum = found->quantum(voxels);
   gradient[n] =
       found->not_finite != 0 ? static_cast<V>(__int_as_float(0x7fc00000)) : static_cast<V>(quantum.value(sums[n]));
 }
@@ -489,9 +364,9 @@ class Adjoint final : public ResampleAdjoint {
   /// Makes the maps of a coarse field, where they do not take too much memory.
   void make_table(std::int64_t count, cudaStream_t stream) {
     constexpr std::int64_t kMost = 12;  // bytes for each voxel of the output, as many as the gradients of a call take
-    has_table_ = coarse_ && count * kRecordQuads * std::int64_t{sizeof(int4)} <= kMost * voxel_count(output());
+    has_table_ = coarse_ && count * kTableQuads * std::int64_t{sizeof(int4)} <= kMost * voxel_count(output());
     if (!has_table_) return table_.release();
-    int4* const records = table_.reserve(static_cast<std::size_t>(count * kRecordQuads));
+    int4* const records = table_.reserve(static_cast<std::size_t>(count * kTableQuads));
     std::visit(
         [&](const auto& tetrahedra) {
           using Tetrahedra = std::decay_t<decltype(tetrahedra)>;

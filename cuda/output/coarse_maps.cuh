@@ -7,7 +7,9 @@
 
 namespace tetwarp::cuda_detail {
 
-constexpr int kMapQuads = 3;  ///< groups of four numbers of a map in shared memory
+constexpr int kMapQuads = 3;  ///< groups of four numbers of a map
+/// The first slope of a map in a table that is not to be used; others are smaller than 2^30.
+constexpr int kUnusable = INT32_MIN;
 
 /// One axis of the map of a tetrahedron of a coarse field, from some voxel on:
 ///

@@ -20,7 +20,6 @@ namespace {
 ///                  10 pair + 8, + 9        the odd vertex: the centre down from it, and up
 ///     an entry     `map_axis` of each axis, from voxel (0, 0, 0) on
 constexpr int kEntriesOfPair = 10;
-constexpr int kUnusable = INT32_MIN;  ///< the first slope of a map that is not to be used; others are smaller than 2^30
 
 /// An entry, in registers.
 struct TableMap {

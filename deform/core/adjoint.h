@@ -21,11 +21,11 @@ struct Quantum {
   /// @param terms    how many terms a sum may have, at most
   /// @param largest  none is larger in size; finite
   TETWARP_HD Quantum(double terms, double largest) {
-    int above = 0;  // of the power of two that is not below the product
-    const double part = std::frexp(terms * largest, &above);
-    if (part == 0.5) --above;
-    q = 62 - above;
-    if (largest == 0 || q > 1023) q = largest == 0 ? 0 : 1023;
+    if (largest == 0) return;
+    constexpr int kMost = 1023;  // 2^q is a double
+    int above = 0;               // of the power of two that is not below the product
+    if (std::frexp(terms * largest, &above) == 0.5) --above;
+    q = 62 - above < kMost ? 62 - above : kMost;
     scale = std::ldexp(1.0, q);
   }
 
