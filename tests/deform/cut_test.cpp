@@ -185,8 +185,9 @@ TEST_P(Cuts, ClosedOnesChangeNothingAwayFromThemAndOneUnitAlongThem) {
     // All tetrahedra are counted. Splitting one keeps its determinant, but for rounding, which slivers show.
     EXPECT_LT(cut_result.report.jacobian_min, whole_result.report.jacobian_min + 0.1);
     EXPECT_GT(cut_result.report.jacobian_max, whole_result.report.jacobian_max - 0.1);
-    const bool is_alone = cuts.size() == 1;  // slivers where cuts cross may be thinner than a step
-    EXPECT_LE(cut_result.report.inverted, is_alone ? 0u : 50u);
+    // Slivers where cuts cross may be thinner than a step, a few in a hundred. One cut alone makes none.
+    const std::size_t slivers = cuts.size() == 1 ? 0 : closed.divided.mesh.tetrahedra.size() / 50;
+    EXPECT_LE(cut_result.report.inverted, slivers);
   }
   EXPECT_GT(along, 10000u);
   EXPECT_GT(away, 10000u);
