@@ -29,7 +29,13 @@ std::int64_t vertex_count(const FieldView& field) {
   return of_mesh + (field.displacement ? voxel_count(*field.lattice) : 0);
 }
 
-void check_adjoint(const Geometry& output, std::span<const AdjointTarget> targets, bool wants_displacement) {
+void check_adjoint(const Geometry& output, std::span<const AdjointTarget> targets,
+                   const DisplacementGradient& displacement, std::size_t vertices) {
+  const bool wants_displacement = !displacement.values.empty();
+  require(!wants_displacement || displacement.values.size() == vertices, [&] {
+    return "the gradient of the displacement has room for " + std::to_string(displacement.values.size()) +
+           " vertices, and the field has " + std::to_string(vertices);
+  });
   for (const AdjointTarget& target : targets) {
     const ConstVolumeView& source = target.source;
     require(source.geometry != nullptr, "a source has no geometry");

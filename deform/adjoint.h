@@ -27,8 +27,8 @@ struct AdjointTarget {
 
 /// The gradient of the displacement of each vertex: those of the lattice, i fastest, then those of the mesh.
 struct DisplacementGradient {
-  glm::vec3* values = nullptr;   ///< written: dL per mm, LPS; null: it is not wanted
-  Memory memory = Memory::host;  ///< where they lie
+  std::span<glm::vec3> values = {};  ///< written: dL per mm, LPS, `vertex_count` of them; empty: it is not wanted
+  Memory memory = Memory::host;      ///< where they lie
 };
 
 /// The transpose of a ForwardResampler, which as a function of the source is linear, and the gradient of what it gives
@@ -39,8 +39,8 @@ struct DisplacementGradient {
 /// and places counts as if there were none.
 ///
 /// Sums are those of whole numbers, so the result has the same bits on every backend, for any number of threads, on
-/// every run. One unit serves the source gradients of a call, another one the gradient of the displacement: they
-/// follow the largest term of all targets. A term that is not finite makes all that share its unit NaN.
+/// every run. Each gradient has a unit of its own, that follows its largest term; that of the displacement has the
+/// terms of all targets. A term that is not finite makes its gradient NaN, and no other.
 ///
 /// What holds of memory and threads for a Resampler holds here; nothing is streamed. Beside a resampler it takes 4
 /// bytes for each voxel of the output; from the first call on 8 for each value of a wanted source gradient, and for
@@ -63,7 +63,8 @@ class ResampleAdjoint {
   /// @param targets       volumes of one type that went through the field
   /// @param displacement  where the gradient of the displacement goes
   /// @param control       stop and stream
-  /// @throws InputError for views that do not fit, integer volumes, an interpolation that has no such gradient
+  /// @throws InputError for views and lengths that do not fit, integer volumes, an interpolation that has no such
+  ///     gradient
   /// @throws Cancelled
   virtual void apply(std::span<const AdjointTarget> targets, const DisplacementGradient& displacement,
                      const Control& control = {}) = 0;
@@ -86,8 +87,10 @@ std::unique_ptr<ResampleAdjoint> make_cpu_adjoint(const Geometry& output, Limits
 /// For implementations: checks a call.
 /// @param output   grid of the deformed volumes
 /// @param targets  volumes of the call
-/// @param wants_displacement  whether the gradient of the displacement is wanted
+/// @param displacement  of the call
+/// @param vertices      of the field
 /// @throws InputError as `ResampleAdjoint::apply`
-void check_adjoint(const Geometry& output, std::span<const AdjointTarget> targets, bool wants_displacement);
+void check_adjoint(const Geometry& output, std::span<const AdjointTarget> targets,
+                   const DisplacementGradient& displacement, std::size_t vertices);
 
 }  // namespace tetwarp

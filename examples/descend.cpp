@@ -67,7 +67,7 @@ int main() {
     if (iteration % 20 == 0) std::printf("iteration %3d: mean squared difference %.0f\n", iteration, sum / voxels);
     adjoint->set_field(view(field, Outside::background));
     const AdjointTarget differentiated{.source = view(moving), .output_gradient = view(error)};
-    adjoint->apply({&differentiated, 1}, {slope.data()});
+    adjoint->apply({&differentiated, 1}, {slope});
     const float rate = 1.5f * static_cast<float>(kIterations - iteration) / kIterations;  // mm, falling to 0
     adam.step(rate, slope, field.displacement);
   }

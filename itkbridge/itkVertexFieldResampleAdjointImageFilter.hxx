@@ -63,8 +63,8 @@ void VertexFieldResampleAdjointImageFilter<TImage>::GenerateData() {
   target.interpolation = m_Interpolation;
   tetwarp::FieldView field = this->GetVertexField()->GetView(this->GetOutside());
   std::vector<glm::vec3> gradient(source ? static_cast<std::size_t>(tetwarp::vertex_count(field)) : 0);
-  this->SetUsedBackend(tetwarp::apply_adjoint(*this, deformed, field, this->GetPipelineOptions(), {&target, 1},
-                                              {source ? gradient.data() : nullptr}));
+  this->SetUsedBackend(
+      tetwarp::apply_adjoint(*this, deformed, field, this->GetPipelineOptions(), {&target, 1}, {gradient}));
   m_DisplacementGradient = std::move(gradient);
 }
 

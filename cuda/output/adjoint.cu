@@ -3,6 +3,7 @@
 
 #include "deform/adjoint.h"
 
+#include <algorithm>
 #include <variant>
 #include <vector>
 
@@ -140,7 +141,7 @@ __global__ void add_to_vertices_kernel(const __grid_constant__ OwnedVoxels owned
       [&](std::int64_t n, const glm::i64vec3& voxel, const glm::i32vec3& signs, std::uint32_t number) {
         const glm::dvec3 h(of_owners[n]);
         float weight[4];
-        map.template weights<Maps::kCoarse>(
+        map.weights(
             voxel, signs, [&] { return again(maps.tetrahedra, number); }, weight);
         for (int corner = 0; corner < 4; ++corner) {
           for (int axis = 0; axis < 3; ++axis) part[corner][axis] += quantum.steps(double{weight[corner]} * h[axis]);
@@ -165,16 +166,17 @@ __global__ void finish_vertices_kernel(const std::int64_t* sums, std::int64_t ve
 
 /// The largest value that goes to a source; a thread a voxel.
 template <class V>
-__global__ void largest_given_kernel(const __grid_constant__ OwnedVoxels owned, AdjointPlans<V> plans, Found* found) {
+__global__ void largest_given_kernel(const __grid_constant__ OwnedVoxels owned,
+                                     const __grid_constant__ AdjointPlan<V> plan, Found* found) {
   const std::int64_t n = thread_of_grid();
-  const double largest = n < owned.count() && owned.is_mapped(n) ? plans.largest_given(n) : 0;
+  const double largest = n < owned.count() && owned.is_mapped(n) ? largest_given(plan, n) : 0;
   raise(found, largest, false);
 }
 
-/// Adds up what the sources get, in quanta. Grid: a column a thread, as `for_each_of_column`.
+/// Adds up what a source gets, in quanta. Grid: a column a thread, as `for_each_of_column`.
 template <class V, class Maps>
-__global__ void add_to_sources_kernel(const __grid_constant__ OwnedVoxels owned, const __grid_constant__ Maps maps,
-                                      AdjointPlans<V> plans, Found* found) {
+__global__ void add_to_source_kernel(const __grid_constant__ OwnedVoxels owned, const __grid_constant__ Maps maps,
+                                     const __grid_constant__ AdjointPlan<V> plan, Found* found) {
   const Quantum quantum = found->quantum(static_cast<double>(owned.count()));
   const auto add = [](std::int64_t& sum, std::int64_t steps) {
     atomicAdd(reinterpret_cast<unsigned long long*>(&sum), static_cast<unsigned long long>(steps));
@@ -185,10 +187,10 @@ __global__ void add_to_sources_kernel(const __grid_constant__ OwnedVoxels owned,
       owned, [&](std::uint32_t number) { map = maps.place(number); },
       [&](std::int64_t n, const glm::i64vec3& voxel, const glm::i32vec3& signs, std::uint32_t number) {
         const auto offset = maps.offset(map, number, voxel, signs);
-        finite = plans.add_to_sources(n, voxel, offset, quantum, add) && finite;
+        finite = add_to_source(plan, n, voxel, offset, quantum, add) && finite;
       },
       [&](std::int64_t n, const glm::i64vec3& voxel) {
-        finite = plans.add_to_sources(n, voxel, typename Maps::Offset{}, quantum, add) && finite;
+        finite = add_to_source(plan, n, voxel, typename Maps::Offset{}, quantum, add) && finite;
       });
   if (!finite) found->not_finite = 1;
 }
@@ -256,7 +258,7 @@ class Adjoint final : public ResampleAdjoint {
   void apply(std::span<const AdjointTarget> targets, const DisplacementGradient& displacement,
              const Control& control) override {
     require(ready_, "apply needs a field: call set_field first");
-    check_adjoint(output(), targets, displacement.values != nullptr);
+    check_adjoint(output(), targets, displacement, vertices_);
     const DeviceScope scope(device_);
     stream_ = static_cast<cudaStream_t>(control.stream);
     for (const AdjointTarget& target : targets) {
@@ -264,12 +266,14 @@ class Adjoint final : public ResampleAdjoint {
       require_memory(target.output_gradient.voxels, target.output_gradient.memory, "the gradient of an output");
       require_memory(target.source_gradient.voxels, target.source_gradient.memory, "the gradient of a source");
     }
-    require_memory(displacement.values, displacement.memory, "the gradient of the displacement");
+    require_memory(displacement.values.data(), displacement.memory, "the gradient of the displacement");
     if (control.stop.stop_requested()) throw Cancelled();
-    if (!targets.empty() && targets.front().source.type == VoxelType::f64)
-      apply_to<double>(targets, displacement);
-    else
+    if (targets.empty())
+      clear(displacement);
+    else if (targets.front().source.type == VoxelType::f32)
       apply_to<float>(targets, displacement);
+    else
+      apply_to<double>(targets, displacement);
     TETWARP_CUDA_TRY(cudaStreamSynchronize(stream_));
   }
 
@@ -277,6 +281,13 @@ class Adjoint final : public ResampleAdjoint {
   template <class T>
   VolumeView map_view(T* values, VoxelType type) const {
     return {&output(), whole(output()), type, 1, reinterpret_cast<std::byte*>(values), Memory::device};
+  }
+
+  void clear(const DisplacementGradient& gradient) const {
+    if (gradient.memory == Memory::host)
+      std::fill(gradient.values.begin(), gradient.values.end(), glm::vec3(0));
+    else
+      TETWARP_CUDA_TRY(cudaMemsetAsync(gradient.values.data(), 0, gradient.values.size_bytes(), stream_));
   }
 
   /// A device's copy of what lies on the host, in a buffer of its own; or what lies on the device.
@@ -300,25 +311,23 @@ class Adjoint final : public ResampleAdjoint {
     std::vector<double> slices;
     std::vector<std::size_t> first_slice;
     std::size_t next = 0, values = 0;
-    bool wants_sources = false;
     for (const AdjointTarget& target : targets) {
       const std::vector<double> of_target = uneven_slices(*target.source.geometry);
       first_slice.push_back(of_target.empty() ? SIZE_MAX : slices.size());
       slices.insert(slices.end(), of_target.begin(), of_target.end());
-      wants_sources = wants_sources || target.source_gradient.voxels;
       if (target.source_gradient.voxels)
         values += static_cast<std::size_t>(voxel_count(*target.source.geometry) * target.source.components);
     }
     double* const slices_there = slices_.reserve(slices.size() + 1);
     if (!slices.empty()) slices_.upload(slices.data(), slices.size(), stream_);
-    if (wants_sources) source_sums_.fill(0, values, stream_);
+    source_sums_.fill(0, values, stream_);
     values = 0;
     for (std::size_t t = 0; t < targets.size(); ++t) {
       const AdjointTarget& target = targets[t];
       const Geometry& grid = *target.source.geometry;
       const glm::i64vec3& size = grid.size;
       const int components = target.source.components;
-      const bool wanted = target.source_gradient.voxels != nullptr, moves = displacement.values != nullptr;
+      const bool wanted = target.source_gradient.voxels != nullptr, moves = !displacement.values.empty();
       ConstVolumeView source = target.source;
       if (!moves) source.voxels = nullptr;
       plans.push_back({{on_device<const V>(source, copies_, next, true), size, glm::i64vec3(0),
@@ -334,39 +343,39 @@ class Adjoint final : public ResampleAdjoint {
     std::byte* const there = plans_.reserve(plans.size() * sizeof(AdjointPlan<V>) + 1);
     TETWARP_CUDA_TRY(
         cudaMemcpyAsync(there, plans.data(), plans.size() * sizeof(AdjointPlan<V>), cudaMemcpyHostToDevice, stream_));
-    found_.fill(0, 2, stream_);
+    found_.fill(0, 1 + plans.size(), stream_);
     const AdjointPlans<V> given{reinterpret_cast<const AdjointPlan<V>*>(there), static_cast<int>(plans.size())};
+    const auto run = [&](const auto& maps) {
+      if (!displacement.values.empty()) find_displacement(maps, given, displacement);
+      for (std::size_t p = 0; p < plans.size(); ++p)
+        if (plans[p].sums) find_source(maps, plans[p], found_.data() + 1 + p, gradients[p]);
+    };
     std::visit(
         [&](const auto& tetrahedra) {
           using Tetrahedra = std::decay_t<decltype(tetrahedra)>;
           if (has_table_)
-            run<V>(MapTable<Tetrahedra>{tetrahedra, table_.data()}, given, displacement, wants_sources);
+            run(MapTable<Tetrahedra>{tetrahedra, table_.data()});
           else if (coarse_)
-            run<V>(MadeMaps<true, Tetrahedra>{tetrahedra}, given, displacement, wants_sources);
+            run(MadeMaps<true, Tetrahedra>{tetrahedra});
           else
-            run<V>(MadeMaps<false, Tetrahedra>{tetrahedra}, given, displacement, wants_sources);
+            run(MadeMaps<false, Tetrahedra>{tetrahedra});
         },
         numbered_);
     for (std::size_t t = 0; t < targets.size(); ++t) {
-      if (!gradients[t]) continue;
       const VolumeView& view = targets[t].source_gradient;
-      const std::int64_t count = voxel_count(*view.geometry) * view.components;
-      finish_source_kernel<<<blocks_for(count), kThreads, 0, stream_>>>(
-          plans[t].sums, count, static_cast<double>(voxel_count(output())), found_.data() + 1, gradients[t]);
-      TETWARP_CUDA_TRY(cudaGetLastError());
-      if (view.memory == Memory::host) {
-        TETWARP_CUDA_TRY(cudaMemcpyAsync(view.voxels, gradients[t], static_cast<std::size_t>(count) * sizeof(V),
-                                         cudaMemcpyDeviceToHost, stream_));
-      }
+      if (!view.voxels || view.memory == Memory::device) continue;
+      const std::size_t bytes = static_cast<std::size_t>(voxel_count(*view.geometry) * view.components) * sizeof(V);
+      TETWARP_CUDA_TRY(cudaMemcpyAsync(view.voxels, gradients[t], bytes, cudaMemcpyDeviceToHost, stream_));
     }
   }
 
   /// Makes the maps of a coarse field, where they do not take too much memory.
   void make_table(std::int64_t count, cudaStream_t stream) {
     constexpr std::int64_t kMost = 12;  // bytes for each voxel of the output, as many as the gradients of a call take
-    has_table_ = coarse_ && count * kTableQuads * std::int64_t{sizeof(int4)} <= kMost * voxel_count(output());
+    has_table_ = coarse_ && count * kTableQuads * std::int64_t{sizeof(int4)} <= kMost * voxel_count(output()) &&
+                 table_.try_reserve(static_cast<std::size_t>(count * kTableQuads));
     if (!has_table_) return table_.release();
-    int4* const records = table_.reserve(static_cast<std::size_t>(count * kTableQuads));
+    int4* const records = table_.data();
     std::visit(
         [&](const auto& tetrahedra) {
           using Tetrahedra = std::decay_t<decltype(tetrahedra)>;
@@ -376,31 +385,36 @@ class Adjoint final : public ResampleAdjoint {
     TETWARP_CUDA_TRY(cudaGetLastError());
   }
 
-  template <class V, class Maps>
-  void run(const Maps& maps, const AdjointPlans<V>& plans, const DisplacementGradient& displacement,
-           bool wants_sources) {
+  dim3 columns() const {
     const glm::ivec3& size = owned_.size;
-    const dim3 grid(static_cast<unsigned>((size.x + 31) / 32), static_cast<unsigned>((size.y + kWarps - 1) / kWarps),
-                    static_cast<unsigned>((size.z + kColumn - 1) / kColumn));
-    if (displacement.values) {
-      Found* const found = found_.data();
-      vertex_sums_.fill(0, 3 * vertices_, stream_);
-      glm::vec3* const of_owners = of_owners_.reserve(static_cast<std::size_t>(voxel_count(output())));
-      of_owners_kernel<<<grid, 32 * kWarps, 0, stream_>>>(owned_, maps, plans, of_owners, found);
-      add_to_vertices_kernel<<<grid, 32 * kWarps, 0, stream_>>>(
-          owned_, maps, of_owners, found, reinterpret_cast<unsigned long long*>(vertex_sums_.data()));
-      glm::vec3* const to =
-          displacement.memory == Memory::device ? displacement.values : vertex_gradient_.reserve(vertices_);
-      finish_vertices_kernel<<<blocks_for(static_cast<std::int64_t>(vertices_)), kThreads, 0, stream_>>>(
-          vertex_sums_.data(), static_cast<std::int64_t>(vertices_), static_cast<double>(voxel_count(output())),
-          index_from_point(output()).linear, found, to);
-      TETWARP_CUDA_TRY(cudaGetLastError());
-      if (displacement.memory == Memory::host) vertex_gradient_.download(displacement.values, vertices_, stream_);
-    }
-    if (!wants_sources) return;
-    Found* const found = found_.data() + 1;
-    largest_given_kernel<<<blocks_for(voxel_count(output())), kThreads, 0, stream_>>>(owned_, plans, found);
-    add_to_sources_kernel<<<grid, 32 * kWarps, 0, stream_>>>(owned_, maps, plans, found);
+    return {static_cast<unsigned>((size.x + 31) / 32), static_cast<unsigned>((size.y + kWarps - 1) / kWarps),
+            static_cast<unsigned>((size.z + kColumn - 1) / kColumn)};
+  }
+  double voxels() const { return static_cast<double>(voxel_count(output())); }
+
+  template <class V, class Maps>
+  void find_displacement(const Maps& maps, const AdjointPlans<V>& plans, const DisplacementGradient& displacement) {
+    Found* const found = found_.data();
+    vertex_sums_.fill(0, 3 * vertices_, stream_);
+    glm::vec3* const of_owners = of_owners_.reserve(static_cast<std::size_t>(voxel_count(output())));
+    of_owners_kernel<<<columns(), 32 * kWarps, 0, stream_>>>(owned_, maps, plans, of_owners, found);
+    add_to_vertices_kernel<<<columns(), 32 * kWarps, 0, stream_>>>(
+        owned_, maps, of_owners, found, reinterpret_cast<unsigned long long*>(vertex_sums_.data()));
+    glm::vec3* const to =
+        displacement.memory == Memory::device ? displacement.values.data() : vertex_gradient_.reserve(vertices_);
+    finish_vertices_kernel<<<blocks_for(static_cast<std::int64_t>(vertices_)), kThreads, 0, stream_>>>(
+        vertex_sums_.data(), static_cast<std::int64_t>(vertices_), voxels(), index_from_point(output()).linear, found,
+        to);
+    TETWARP_CUDA_TRY(cudaGetLastError());
+    if (displacement.memory == Memory::host) vertex_gradient_.download(displacement.values.data(), vertices_, stream_);
+  }
+
+  template <class V, class Maps>
+  void find_source(const Maps& maps, const AdjointPlan<V>& plan, Found* found, V* gradient) {
+    largest_given_kernel<<<blocks_for(voxel_count(output())), kThreads, 0, stream_>>>(owned_, plan, found);
+    add_to_source_kernel<<<columns(), 32 * kWarps, 0, stream_>>>(owned_, maps, plan, found);
+    const std::int64_t count = plan.source.size.x * plan.source.size.y * plan.source.size.z * plan.components;
+    finish_source_kernel<<<blocks_for(count), kThreads, 0, stream_>>>(plan.sums, count, voxels(), found, gradient);
     TETWARP_CUDA_TRY(cudaGetLastError());
   }
 
@@ -423,7 +437,7 @@ class Adjoint final : public ResampleAdjoint {
   DeviceBuffer<std::int64_t> source_sums_, vertex_sums_;
   DeviceBuffer<glm::vec3> of_owners_;  ///< of a call: a vector a voxel
   DeviceBuffer<glm::vec3> vertex_gradient_;
-  DeviceBuffer<Found> found_;  ///< of the gradient of the displacement, and of those of sources
+  DeviceBuffer<Found> found_;  ///< of the gradient of the displacement, and of that of each target's source
 };
 
 }  // namespace

@@ -58,7 +58,7 @@ __device__ __noinline__ glm::vec3 slow_pull_back(const Tetrahedra& tetrahedra, s
 /// The maps of the tetrahedra of a coarse field, made once a field: in double they take longer than all else.
 ///
 ///     a record    0 ... 2   `map_axis` of each axis, from voxel (0, 0, 0) on; kUnusable in the first
-///                 3         origin of the weights                  w: not used
+///                 3         origin of the weights                  w: whether float has too few digits for them
 ///                 4 ... 6   of A, B and C: slopes, and the weight at the origin
 ///                 7         numbers of the vertices A, B, C and D
 template <class Tetrahedra>
@@ -81,7 +81,7 @@ struct MapTable {
     for (int axis = 0; axis < kMapQuads; ++axis) to[axis] = map_axis(map, axis);
     if (!is_usable(map, of.t)) to[0].y = kUnusable;
     const WeightMap weight(of.t);
-    to[3] = make_int4(weight.origin.x, weight.origin.y, weight.origin.z, 0);
+    to[3] = make_int4(weight.origin.x, weight.origin.y, weight.origin.z, weight.is_thin);
     for (int n = 0; n < 3; ++n) {
       to[4 + n] = make_int4(__float_as_int(weight.slope[n].x), __float_as_int(weight.slope[n].y),
                             __float_as_int(weight.slope[n].z), __float_as_int(weight.at_origin[n]));
@@ -114,6 +114,7 @@ struct MapTable {
     WeightMap map;
     const int4 origin = __ldg(from + 3), vertices = __ldg(from + 7);
     map.origin = {origin.x, origin.y, origin.z};
+    map.is_thin = origin.w != 0;
     for (int n = 0; n < 3; ++n) {
       const int4 of = __ldg(from + 4 + n);
       map.slope[n] = {__int_as_float(of.x), __int_as_float(of.y), __int_as_float(of.z)};

@@ -31,6 +31,18 @@ class DeviceBuffer {
     }
     return data_;
   }
+  /// As `reserve`, where the device has the memory. @return whether it has
+  bool try_reserve(std::size_t size) {
+    if (size <= size_) return true;
+    release();
+    if (cudaMalloc(&data_, size * sizeof(T)) == cudaSuccess) {
+      size_ = size;
+      return true;
+    }
+    data_ = nullptr;
+    cudaGetLastError();  // an allocation that fails leaves the device as it was
+    return false;
+  }
   T* data() const { return data_; }
   /// Elements that there is room for.
   std::size_t capacity() const { return size_; }

@@ -19,17 +19,20 @@ struct Quantum {
 
   Quantum() = default;
   /// @param terms    how many terms a sum may have, at most
-  /// @param largest  none is larger in size; finite
+  /// @param largest  none is twice as large in size; finite
   TETWARP_HD Quantum(double terms, double largest) {
     if (largest == 0) return;
     constexpr int kMost = 1023;  // 2^q is a double
-    int above = 0;               // of the power of two that is not below the product
-    if (std::frexp(terms * largest, &above) == 0.5) --above;
+    int of_terms = 0, of_largest = 0;
+    const double product = std::frexp(terms, &of_terms) * std::frexp(largest, &of_largest);  // from 1/4 to 1
+    // The power of two that is not below terms times largest, which as a product might be too large for a double.
+    const int above = of_terms + of_largest - (product <= 0.5) - (product == 0.25);
     q = 62 - above < kMost ? 62 - above : kMost;
     scale = std::ldexp(1.0, q);
   }
 
-  /// A term as a whole number of quanta, to nearest, ties to even. @param term  finite, not larger than was said
+  /// A term as a whole number of quanta, to nearest, ties to even. @param term  finite, not larger than was said.
+  /// Weights of vertices are at most 1 + 3/64, so that terms exceed the largest they are made of by less than twice.
   TETWARP_HD std::int64_t steps(double term) const {
 #ifdef TETWARP_ON_DEVICE
     return __double2ll_rn(term * scale);
@@ -127,8 +130,10 @@ TETWARP_NOINLINE_HD inline FixedOffset thin_offset(Tetrahedron t, glm::ivec3 vox
 TETWARP_NOINLINE_HD inline glm::vec3 exact_offset(Tetrahedron t, glm::i32vec3 steps, glm::i32vec3 signs) {
   return interpolate_u_exactly(t, steps, signs);
 }
-/// Whether u is taken at the voxels of a tetrahedron of a coarse field, always.
-TETWARP_NOINLINE_HD inline bool is_taken_at_voxels(Tetrahedron t) { return !CoarseMap(t).is_thin; }
+/// The weights of a voxel for which float has too few digits, or which is outside but for its nudge.
+TETWARP_NOINLINE_HD inline ExactWeights exact_weights_of(Tetrahedron t, glm::ivec3 voxel, glm::i32vec3 signs) {
+  return exact_weights(t, voxel * kStepsPerVoxel, signs);
+}
 
 /// Where the voxels of a tetrahedron come from, with the derivative of that: made once for all of them.
 /// @tparam kCoarse  whether the field is coarse
@@ -177,21 +182,28 @@ class PlaceMap {
 };
 
 /// Weights of the vertices of a tetrahedron at the voxels that it owns: affine maps, made in double and rounded to
-/// float, about a voxel near the middle of the tetrahedron.
+/// float, about a voxel in the middle of the tetrahedron.
 struct WeightMap {
-  glm::ivec3 origin{0};  ///< that voxel, as `CoarseMap` has it
+  bool is_thin = true;   ///< whether float has too few digits for the maps; then `exact_weights` serves
+  glm::ivec3 origin{0};  ///< the voxel nearest to its middle
   float at_origin[3]{};  ///< the weights of A, B and C there
   glm::vec3 slope[3]{};  ///< how each changes from voxel to voxel along i, j, k
 
   /// One that is not to be used.
   WeightMap() = default;
   TETWARP_HD explicit WeightMap(const Tetrahedron& t) {
+    const glm::vec3 a = detail::to_voxels(t.a.deformed - t.d.deformed),
+                    b = detail::to_voxels(t.b.deformed - t.d.deformed),
+                    c = detail::to_voxels(t.c.deformed - t.d.deformed);
+    is_thin = tetwarp::is_thin(Cramer(a, b, c), a, b, c);
+    if (is_thin) return;
     const TetrahedronEdges edges(t);
     glm::dvec3 from;
     for (int axis = 0; axis < 3; ++axis) {
       const std::int64_t corners =
           std::int64_t{t.a.deformed[axis]} + t.b.deformed[axis] + t.c.deformed[axis] + t.d.deformed[axis];
-      origin[axis] = static_cast<int>(corners >> 14);  // four corners, 2^12 steps a voxel
+      constexpr int kHalf = 1 << 13;
+      origin[axis] = static_cast<int>((corners + kHalf) >> 14);  // four corners, 2^12 steps a voxel
       from[axis] = static_cast<double>(std::int64_t{origin[axis]} * kStepsPerVoxel - t.d.deformed[axis]);
     }
     for (int n = 0; n < 3; ++n) {
@@ -201,28 +213,25 @@ struct WeightMap {
     }
   }
 
-  /// Weights of A, B, C and D at the voxel; or at the nudged voxel, where the forward pass takes u there.
-  /// @tparam kCoarse  whether the field is coarse
+  /// Weights of A, B, C and D at the voxel; or at the nudged voxel, where one is below -kWeightSlack.
   /// @param signs  directions in which it is nudged
-  /// @param again  gives the tetrahedron, where the weights are not enough
-  template <bool kCoarse, class Again>
+  /// @param again  gives the tetrahedron, where the maps are not enough
+  template <class Again>
   TETWARP_HD void weights(const glm::i64vec3& voxel, const glm::i32vec3& signs, Again&& again,
                           float (&weight)[4]) const {
-    const glm::vec3 from(glm::ivec3(voxel) - origin);
-    weights_at(from, weight);
     constexpr float kLeast = -static_cast<float>(kWeightSlack);
-    if (weight[0] >= kLeast && weight[1] >= kLeast && weight[2] >= kLeast && weight[3] >= kLeast) return;
-    if constexpr (kCoarse) {
-      if (is_taken_at_voxels(again())) return;
+    if (!is_thin) {
+      const glm::vec3 from(glm::ivec3(voxel) - origin);
+      for (int n = 0; n < 3; ++n)
+        weight[n] = at_origin[n] + ((slope[n].x * from.x + slope[n].y * from.y) + slope[n].z * from.z);
+      weight[3] = ((1 - weight[0]) - weight[1]) - weight[2];
+      if (weight[0] >= kLeast && weight[1] >= kLeast && weight[2] >= kLeast && weight[3] >= kLeast) return;
     }
-    weights_at(from + glm::vec3(nudge_steps(signs)) * (1.0f / (kStepsPerVoxel * kNudgeSteps)), weight);
-  }
-
- private:
-  TETWARP_HD void weights_at(const glm::vec3& from, float (&weight)[4]) const {
-    for (int n = 0; n < 3; ++n)
-      weight[n] = at_origin[n] + ((slope[n].x * from.x + slope[n].y * from.y) + slope[n].z * from.z);
-    weight[3] = ((1 - weight[0]) - weight[1]) - weight[2];
+    const ExactWeights w = exact_weights_of(again(), glm::ivec3(voxel), signs);
+    weight[0] = static_cast<float>(w.a);
+    weight[1] = static_cast<float>(w.b);
+    weight[2] = static_cast<float>(w.c);
+    weight[3] = static_cast<float>(w.d());
   }
 };
 
@@ -259,18 +268,25 @@ TETWARP_HD ClampedPlace clamped_place(const AdjointPlan<V>& plan, const glm::i64
   return found;
 }
 
-/// Slope of the trilinear interpolant along an axis, in source index. Where the place is a centre on that axis it is
-/// the mean of the slopes to both sides, that beyond the outermost centre being 0.
+/// Slope of the trilinear interpolant along an axis, per step of the grid, uneven slices being as far apart as they
+/// are. Where the place is a centre on that axis it is the mean of the slopes to both sides, that beyond the outermost
+/// centre being 0.
+/// @param slices  where uneven slices lie; null: evenly
 template <int kAxis, class V>
-TETWARP_HD Working<V> slope_at(const SourceVoxels<V>& source, const Place& place) {
+TETWARP_HD Working<V> slope_at(const SourceVoxels<V>& source, const double* slices, const Place& place) {
   using W = Working<V>;
   const auto on_axis = [&](int axis, auto&& value) -> W {
     const W t = static_cast<W>(place.fraction[axis]);
     if (axis != kAxis) return t == 0 ? value(0) : lerp(Lerp::separate, t, value(0), value(1));
-    if (t != 0) return value(1) - value(0);
-    const bool has_low = place.base[axis] > 0, has_high = place.base[axis] + 1 < source.size[axis];
-    const W here = value(0);
-    return W(0.5) * ((has_high ? value(1) - here : W(0)) + (has_low ? here - value(-1) : W(0)));
+    const auto per_step = [&](W difference, std::int64_t low) {
+      if (kAxis != 2 || !slices) return difference;
+      return difference / static_cast<W>(slices[low + 1] - slices[low]);
+    };
+    const std::int64_t base = place.base[axis];
+    if (t != 0) return per_step(value(1) - value(0), base);
+    const W here = value(0), high = base + 1 < source.size[axis] ? per_step(value(1) - here, base) : W(0),
+            low = base > 0 ? per_step(here - value(-1), base - 1) : W(0);
+    return W(0.5) * (high + low);
   };
   return on_axis(2, [&](int z) {
     return on_axis(1, [&](int y) {
@@ -282,13 +298,14 @@ TETWARP_HD Working<V> slope_at(const SourceVoxels<V>& source, const Place& place
 
 /// Slopes of the trilinear interpolant along i, j and k, as `slope_at` has them.
 template <class V>
-TETWARP_HD void slopes_at(const SourceVoxels<V>& source, const Place& place, Working<V> (&slope)[3]) {
+TETWARP_HD void slopes_at(const SourceVoxels<V>& source, const double* slices, const Place& place,
+                          Working<V> (&slope)[3]) {
   using W = Working<V>;
   const W t[3] = {static_cast<W>(place.fraction.x), static_cast<W>(place.fraction.y), static_cast<W>(place.fraction.z)};
-  if (t[0] == 0 || t[1] == 0 || t[2] == 0) {
-    slope[0] = slope_at<0>(source, place);
-    slope[1] = slope_at<1>(source, place);
-    slope[2] = slope_at<2>(source, place);
+  if (slices || t[0] == 0 || t[1] == 0 || t[2] == 0) {
+    slope[0] = slope_at<0>(source, slices, place);
+    slope[1] = slope_at<1>(source, slices, place);
+    slope[2] = slope_at<2>(source, slices, place);
     return;
   }
   // Between centres on every axis eight voxels serve all three, by the same operations.
@@ -320,17 +337,12 @@ TETWARP_HD void add_place_gradient(const AdjointPlan<V>& plan, std::int64_t n, c
   for (int c = 0; c < plan.components; ++c, ++source.voxels) {
     const W given = static_cast<W>(plan.given[n * plan.components + c]);
     W slope[3];
-    slopes_at(source, at.place, slope);
+    slopes_at(source, plan.relation.slices.at, at.place, slope);
     for (int axis = 0; axis < 3; ++axis)
       if (!at.clamped[axis]) along[axis] += given * slope[axis];
   }
   glm::dvec3 g(along[0], along[1], along[2]);
   if (!plan.relation.same_grid) {
-    // Between slices that are uneven the index changes as the interval is long.
-    if (plan.relation.slices.at) {
-      const std::int64_t last = plan.source.size.z - 2, low = at.place.base.z < last ? at.place.base.z : last;
-      g.z /= plan.relation.slices.at[low + 1] - plan.relation.slices.at[low];
-    }
     const glm::dmat3& m = plan.relation.source_from_output.linear;
     g = {(m[0].x * g.x + m[0].y * g.y) + m[0].z * g.z, (m[1].x * g.x + m[1].y * g.y) + m[1].z * g.z,
          (m[2].x * g.x + m[2].y * g.y) + m[2].z * g.z};
@@ -369,16 +381,30 @@ TETWARP_HD void for_each_weight(Interpolation interpolation, const glm::i64vec3&
   }
 }
 
+/// The largest finite value of an output voxel's dL/d(output), in size.
+/// @param n  the output voxel, i fastest
+template <class V>
+TETWARP_HD double largest_given(const AdjointPlan<V>& plan, std::int64_t n) {
+  double largest = 0;
+  for (int c = 0; c < plan.components; ++c) {
+    const double size = std::fabs(static_cast<double>(plan.given[n * plan.components + c]));
+    if (size - size == 0 && size > largest) largest = size;
+  }
+  return largest;
+}
+
 /// Gives each voxel of the source its part of dL/d(output) of an output voxel.
 /// @param n    the output voxel, i fastest
 /// @param add  `add(sum, steps)` adds to a sum
 /// @return whether all parts were finite; others are not added
-template <class V, class Add>
-TETWARP_HD bool add_to_source(const AdjointPlan<V>& plan, std::int64_t n, const Place& place, const Quantum& quantum,
-                              Add&& add) {
+template <class V, class Offset, class Add>
+TETWARP_HD bool add_to_source(const AdjointPlan<V>& plan, std::int64_t n, const glm::i64vec3& output_voxel,
+                              const Offset& offset, const Quantum& quantum, Add&& add) {
+  const ClampedPlace from = clamped_place(plan, output_voxel, offset);
+  if (!from.inside) return true;
   bool all_finite = true;
   const glm::i64vec3& size = plan.source.size;
-  for_each_weight<V>(plan.interpolation, size, place, [&](const glm::i64vec3& voxel, Working<V> weight) {
+  for_each_weight<V>(plan.interpolation, size, from.place, [&](const glm::i64vec3& voxel, Working<V> weight) {
     const std::int64_t at = ((voxel.z * size.y + voxel.y) * size.x + voxel.x) * plan.components;
     for (int c = 0; c < plan.components; ++c) {
       const double part = static_cast<double>(weight * static_cast<Working<V>>(plan.given[n * plan.components + c]));
@@ -408,29 +434,6 @@ struct AdjointPlans {
       if (at.inside) add_place_gradient(plans[p], n, at, g);
     }
     return glm::vec3(g);
-  }
-  /// Gives a voxel's dL/d(output) to the sources that want it. @return whether all parts were finite
-  template <class Offset, class Add>
-  TETWARP_HD bool add_to_sources(std::int64_t n, const glm::i64vec3& voxel, const Offset& offset,
-                                 const Quantum& quantum, Add&& add) const {
-    bool all_finite = true;
-    for (int p = 0; p < count; ++p) {
-      if (!plans[p].sums) continue;
-      const ClampedPlace at = clamped_place(plans[p], voxel, offset);
-      if (at.inside) all_finite = add_to_source(plans[p], n, at.place, quantum, add) && all_finite;
-    }
-    return all_finite;
-  }
-  /// The largest finite value of a voxel's dL/d(output) that goes to a source, in size.
-  TETWARP_HD double largest_given(std::int64_t n) const {
-    double largest = 0;
-    for (int p = 0; p < count; ++p) {
-      for (int c = 0; plans[p].sums && c < plans[p].components; ++c) {
-        const double size = std::fabs(static_cast<double>(plans[p].given[n * plans[p].components + c]));
-        if (size - size == 0 && size > largest) largest = size;
-      }
-    }
-    return largest;
   }
 };
 

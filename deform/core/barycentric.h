@@ -143,31 +143,43 @@ TETWARP_HD inline glm::vec3 blend(const Weights& w, const glm::vec3& ud, const g
           ((ud.z + w.a * a.z) + w.b * b.z) + w.c * c.z};
 }
 
-/// u at a voxel of a thin or very small tetrahedron, 2^-12 voxel, from weights about D that are exact before their
-/// division.
+/// Barycentric weights in double, exact before their division.
+struct ExactWeights {
+  double a, b, c;
+
+  TETWARP_HD double d() const { return ((1 - a) - b) - c; }
+};
+
+/// Weights at a voxel of a thin or very small tetrahedron.
 ///
 /// The owner holds the nudged point q, not p. Where the tetrahedron is so small that a weight at p leaves [0, 1] by
 /// more than kWeightSlack, the affine map would be extrapolated far beyond the tetrahedron, so it is evaluated at q.
-TETWARP_HD inline glm::dvec3 exact_u_in_steps(const Tetrahedron& t, const glm::i32vec3& steps,
-                                              const glm::i32vec3& signs) {
+TETWARP_HD inline ExactWeights exact_weights(const Tetrahedron& t, const glm::i32vec3& steps,
+                                             const glm::i32vec3& signs) {
   const glm::i64vec3 origin(t.d.deformed);
   const glm::i64vec3 a = glm::i64vec3(t.a.deformed) - origin, b = glm::i64vec3(t.b.deformed) - origin;
   const glm::i64vec3 c = glm::i64vec3(t.c.deformed) - origin;
   const double volume = to_double(detail::determinant(a, b, c)) * kNudgeSteps;
   glm::i64vec3 r = (glm::i64vec3(steps) - origin) * std::int64_t{kNudgeSteps};
-  double wa = 0, wb = 0, wc = 0;
+  ExactWeights w{};
   for (int attempt = 0; attempt < 2; ++attempt) {
-    wa = to_double(detail::determinant(r, b, c)) / volume;
-    wb = to_double(detail::determinant(a, r, c)) / volume;
-    wc = to_double(detail::determinant(a, b, r)) / volume;
-    const double wd = ((1 - wa) - wb) - wc;
-    if (wa >= -kWeightSlack && wb >= -kWeightSlack && wc >= -kWeightSlack && wd >= -kWeightSlack) break;
+    w.a = to_double(detail::determinant(r, b, c)) / volume;
+    w.b = to_double(detail::determinant(a, r, c)) / volume;
+    w.c = to_double(detail::determinant(a, b, r)) / volume;
+    if (w.a >= -kWeightSlack && w.b >= -kWeightSlack && w.c >= -kWeightSlack && w.d() >= -kWeightSlack) break;
     r += glm::i64vec3(nudge_steps(signs));
   }
+  return w;
+}
+
+/// u at a voxel of a thin or very small tetrahedron, 2^-12 voxel, by `exact_weights`.
+TETWARP_HD inline glm::dvec3 exact_u_in_steps(const Tetrahedron& t, const glm::i32vec3& steps,
+                                              const glm::i32vec3& signs) {
+  const ExactWeights w = exact_weights(t, steps, signs);
   glm::dvec3 u;
   for (int axis = 0; axis < 3; ++axis) {
     const double ud = t.d.u[axis];
-    u[axis] = ((ud + wa * (t.a.u[axis] - ud)) + wb * (t.b.u[axis] - ud)) + wc * (t.c.u[axis] - ud);
+    u[axis] = ((ud + w.a * (t.a.u[axis] - ud)) + w.b * (t.b.u[axis] - ud)) + w.c * (t.c.u[axis] - ud);
   }
   return u;
 }

@@ -118,7 +118,7 @@ class Passes {
               corners.map = WeightMap(t.t);
             });
             float weight[4];
-            of.map.template weights<kCoarse>(
+            of.map.weights(
                 voxel, owned_.nudge.signs(voxel), [&] { return tetrahedra_(number).t; }, weight);
             const glm::dvec3 h(of_owners[static_cast<std::size_t>(n)]);
             for (int corner = 0; corner < 4; ++corner) {
@@ -141,15 +141,14 @@ class Passes {
     });
   }
 
-  /// dL/d(source) of the targets that want it, from `AdjointPlan::sums`.
-  /// @param gradients  one a plan; null: not wanted
-  void find_sources(std::span<V* const> gradients) {
+  /// dL/d(source) of a target, from its `AdjointPlan::sums`.
+  void find_source(const AdjointPlan<V>& plan, V* gradient) {
     std::atomic<double> largest = 0;
     std::atomic<bool> all_finite = true;
     for_each_row<Place>([&](std::int64_t first, const glm::i64vec3&, KeptTetrahedra<Place>&) {
       double most = 0;
       for (std::int64_t n = first; n < first + size_.x; ++n) {
-        if (is_mapped(n)) most = std::max(most, plans_.largest_given(n));
+        if (is_mapped(n)) most = std::max(most, largest_given(plan, n));
       }
       raise(largest, most);
     });
@@ -160,28 +159,24 @@ class Passes {
     for_each_row<Place>([&](std::int64_t first, const glm::i64vec3& at, KeptTetrahedra<Place>& kept) {
       bool finite = true;
       for_each_owned(first, at, [&](std::int64_t n, const glm::i64vec3& voxel, std::uint32_t number) {
-        finite = plans_.add_to_sources(n, voxel, offset(place_of(kept, number), voxel), quantum, add) && finite;
+        finite = add_to_source(plan, n, voxel, offset(place_of(kept, number), voxel), quantum, add) && finite;
       });
       for (std::int64_t i = 0; i < size_.x && !owned_.mapped.empty(); ++i) {  // those that stay
         const std::int64_t n = first + i;
         if (owned_.tetrahedron[static_cast<std::size_t>(n)] == kNoTetrahedron && is_mapped(n)) {
           const glm::i64vec3 voxel = at + glm::i64vec3(i, 0, 0);
-          finite = plans_.add_to_sources(n, voxel, typename PlaceMap<kCoarse>::Offset{}, quantum, add) && finite;
+          finite = add_to_source(plan, n, voxel, typename PlaceMap<kCoarse>::Offset{}, quantum, add) && finite;
         }
       }
       if (!finite) all_finite = false;
     });
-    for (std::size_t p = 0; p < gradients.size(); ++p) {
-      if (!gradients[p]) continue;
-      const AdjointPlan<V>& plan = plans_.plans[p];
-      const std::int64_t count = plan.source.size.x * plan.source.size.y * plan.source.size.z * plan.components;
-      arena_.execute([&] {
-        tbb::parallel_for(tbb::blocked_range<std::int64_t>(0, count, 16384), [&](const auto& range) {
-          for (std::int64_t n = range.begin(); n < range.end(); ++n)
-            gradients[p][n] = all_finite ? static_cast<V>(quantum.value(plan.sums[n])) : static_cast<V>(NAN);
-        });
+    const std::int64_t count = plan.source.size.x * plan.source.size.y * plan.source.size.z * plan.components;
+    arena_.execute([&] {
+      tbb::parallel_for(tbb::blocked_range<std::int64_t>(0, count, 16384), [&](const auto& range) {
+        for (std::int64_t n = range.begin(); n < range.end(); ++n)
+          gradient[n] = all_finite ? static_cast<V>(quantum.value(plan.sums[n])) : static_cast<V>(NAN);
       });
-    }
+    });
   }
 
  private:
@@ -296,7 +291,7 @@ class Adjoint final : public ResampleAdjoint {
   void apply(std::span<const AdjointTarget> targets, const DisplacementGradient& displacement,
              const Control& control) override {
     require(ready_, "apply needs a field: call set_field first");
-    check_adjoint(output(), targets, displacement.values != nullptr);
+    check_adjoint(output(), targets, displacement, vertices_);
     for (const AdjointTarget& target : targets) {
       require_host(target.source.memory, "a source");
       require_host(target.output_gradient.memory, "the gradient of an output");
@@ -304,7 +299,7 @@ class Adjoint final : public ResampleAdjoint {
     }
     require_host(displacement.memory, "the gradient of the displacement");
     if (targets.empty()) {
-      if (displacement.values) std::fill_n(displacement.values, vertices_, glm::vec3(0));
+      std::fill(displacement.values.begin(), displacement.values.end(), glm::vec3(0));
     } else if (targets.front().source.type == VoxelType::f32) {
       apply_to<float>(targets, displacement, control);
     } else {
@@ -325,7 +320,6 @@ class Adjoint final : public ResampleAdjoint {
     std::vector<std::vector<double>> slices;
     std::vector<std::vector<std::int64_t>> sums;
     std::vector<V*> gradients;
-    bool wants_sources = false;
     for (const AdjointTarget& target : targets) {
       const Geometry& grid = *target.source.geometry;
       const glm::i64vec3& size = grid.size;
@@ -333,7 +327,6 @@ class Adjoint final : public ResampleAdjoint {
       slices.push_back(uneven_slices(grid));
       gradients.push_back(reinterpret_cast<V*>(target.source_gradient.voxels));
       const bool wanted = gradients.back() != nullptr;
-      wants_sources = wants_sources || wanted;
       sums.emplace_back(wanted ? static_cast<std::size_t>(voxel_count(grid) * components) : 0);
       plans.push_back({{reinterpret_cast<const V*>(target.source.voxels), size, glm::i64vec3(0),
                         glm::i64vec3(1, size.x, size.x * size.y) * std::int64_t{components}},
@@ -346,9 +339,10 @@ class Adjoint final : public ResampleAdjoint {
     std::visit(
         [&](const auto& tetrahedra) {
           const auto run = [&](auto passes) {
-            if (displacement.values)
-              passes.find_displacement({displacement.values, vertices_}, index_from_point(output()).linear, of_owners_);
-            if (wants_sources) passes.find_sources(gradients);
+            if (!displacement.values.empty())
+              passes.find_displacement(displacement.values, index_from_point(output()).linear, of_owners_);
+            for (std::size_t p = 0; p < plans.size(); ++p)
+              if (gradients[p]) passes.find_source(plans[p], gradients[p]);
           };
           using Tetrahedra = std::decay_t<decltype(tetrahedra)>;
           if (owned_.coarse)

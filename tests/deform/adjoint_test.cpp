@@ -9,6 +9,7 @@
 #include <glm/matrix.hpp>
 
 #include "deform/adjoint.h"
+#include "deform/core/adjoint.h"
 #include "deform/fields/lattice_mesh.h"
 #include "deform/target_check.h"
 #include "tests/support/backends.h"
@@ -61,7 +62,7 @@ Gradients<V> apply(ResampleAdjoint& adjoint, const VertexField& field, const Vol
                              .output_gradient = view(given),
                              .source_gradient = view(found.source),
                              .interpolation = interpolation};
-  adjoint.apply({&target, 1}, {moves ? found.displacement.data() : nullptr});
+  adjoint.apply({&target, 1}, {moves ? std::span(found.displacement) : std::span<glm::vec3>()});
   return found;
 }
 
@@ -158,9 +159,9 @@ struct SmoothForward {
   }
 };
 
-/// Rounds displacements of a unit grid to whole steps, so that snapping changes none.
+/// Rounds displacements to whole steps of a unit grid or a turned one, so that snapping changes none.
 void snap_all(std::vector<glm::vec3>& displacement) {
-  for (glm::vec3& d : displacement) d = glm::round(d * 4096.0f) / 4096.0f;
+  for (glm::vec3& d : displacement) d = glm::round(d * 2048.0f) / 2048.0f;
 }
 
 /// Compares the gradient of the displacement with differences of the smooth forward pass.
@@ -222,15 +223,25 @@ void expect_slopes(ForwardResampler& resampler, ResampleAdjoint& adjoint, const 
   EXPECT_GT(looked_at, 10);
 }
 
+/// A grid along the axes of mm in another order, spaced by powers of two: places of whole steps stay exact.
+Geometry turned_grid(const glm::i64vec3& size) {
+  Geometry grid = unit_grid(size);
+  grid.direction = glm::dmat3(glm::dvec3(0, 1, 0), glm::dvec3(0, 0, -1), glm::dvec3(-1, 0, 0));
+  grid.spacing = {0.5, 2, 1};
+  grid.origin = {5, -3, 8};
+  return grid;
+}
+
 TEST_P(Adjoints, TheGradientOfTheDisplacementIsThatOfASmoothForwardPass) {
   const std::uint64_t seed = test_seed();
   for (std::uint64_t number = 0; number < test_cases(60); ++number) {
     SCOPED_TRACE(seed_text(seed) + ", case " + std::to_string(number));
     Random random(seed, 9000 + number);
-    const Geometry output = unit_grid({random.integer(8, 14), random.integer(8, 14), random.integer(8, 14)});
-    Geometry lattice = unit_grid(glm::i64vec3(0));
+    const glm::i64vec3 size(random.integer(8, 14), random.integer(8, 14), random.integer(8, 14));
+    const Geometry output = random.chance(0.5) ? unit_grid(size) : turned_grid(size);
+    Geometry lattice = output;
     const auto cell = static_cast<double>(random.one_of<std::int64_t>({1, 2, 3, 4, 5, 8}));
-    lattice.spacing = glm::dvec3(cell);
+    lattice.spacing = output.spacing * cell;
     for (int axis = 0; axis < 3; ++axis)
       lattice.size[axis] = static_cast<std::int64_t>(std::ceil(double(output.size[axis] - 1) / cell)) + 1;
     VertexField field = field_in_voxels(output, lattice, [&](const glm::dvec3&) {
@@ -309,29 +320,130 @@ TEST_P(Adjoints, AtTheIdentityTheSlopeIsTheMeanOfThatToBothSides) {
   }
 }
 
+TEST_P(Adjoints, BetweenUnevenSlicesEachSideHasItsOwnSlope) {
+  const Geometry output = unit_grid({5, 5, 6});
+  Geometry grid = unit_grid({5, 5, 4});
+  grid.slices = {0, 1, 3, 6};  // mm
+  grid.spacing.z = 2;
+  Volume<float> source{grid, {}}, given{output, {}};
+  for_each_voxel(grid, [&](const glm::i64vec3& v, std::size_t) {
+    const double z = grid.slices[static_cast<std::size_t>(v.z)];
+    source.voxels.push_back(static_cast<float>(z * z));
+  });
+  for_each_voxel(output, [&](const glm::i64vec3& v, std::size_t) {
+    given.voxels.push_back(v == glm::i64vec3(2, 2, 1) ? 1.0f : v == glm::i64vec3(2, 2, 2) ? 10.0f : 0.0f);
+  });
+  const VertexField field = uniform_field(unit_grid({5, 5, 6}), glm::vec3(0));
+  const auto adjoint = make_adjoint(output);
+  adjoint->set_field(view(field));
+  const Gradients<float> found = apply(*adjoint, field, source, given);
+  glm::vec3 sum(0);
+  for (const glm::vec3& g : found.displacement) sum += g;
+  // On the slice at 1: ((1 - 0) / 1 + (9 - 1) / 2) / 2 = 2.5; between those at 1 and 3: 4, by which 10 is multiplied.
+  EXPECT_EQ(sum, glm::vec3(0, 0, -2.5f - 40));
+}
+
+/// A field of any kind over a grid: a lattice with or without folds, or a mesh.
+FieldCase any_field(Random& random) {
+  if (random.chance(0.7)) return random_case(random);
+  FieldCase test;
+  test.output = random.chance(0.5) ? unit_grid({12, 15, 11}) : oblique_grid({14, 9, 12});
+  test.field = field_of(random_mesh(test.output, glm::dvec3(-1), glm::dvec3(13), 5, random));
+  const double shaken = random.real(0.1, 2);
+  shake(test.field.mesh, test.output, shaken, shaken, random);
+  test.description = "a mesh shaken by " + std::to_string(shaken);
+  return test;
+}
+
+template <class V>
+void expect_bits_of_cpu(Random& random, const FieldCase& test, const auto& make_adjoint) {
+  const Outside outside = test.field.lattice.size.x > 0 && random.chance(0.3) ? Outside::rest : Outside::background;
+  Interpolation interpolation = Interpolation::linear;
+  if (random.chance(0.3)) interpolation = random.chance(0.5) ? Interpolation::nearest : Interpolation::cubic;
+  Geometry grid = random.chance(0.5) ? test.output : other_grid(test.output, random);
+  if (interpolation == Interpolation::cubic) grid.slices.clear();
+  const Volume<V> source = noise<V>(grid, random), given = noise<V>(test.output, random);
+  const auto cpu = make_cpu_adjoint(test.output, {.threads = 1});
+  cpu->set_field(view(test.field, outside));
+  const Gradients<V> expected = apply(*cpu, test.field, source, given, interpolation);
+  for (const int threads : {1, 2, 16}) {
+    const auto adjoint = make_adjoint(test.output, threads);
+    adjoint->set_field(view(test.field, outside));
+    for (int run = 0; run < 4; ++run) {
+      const Gradients<V> found = apply(*adjoint, test.field, source, given, interpolation);
+      EXPECT_TRUE(same_bits(expected.source.voxels, found.source.voxels)) << threads << " threads, run " << run;
+      EXPECT_TRUE(same_bits(expected.displacement, found.displacement)) << threads << " threads, run " << run;
+    }
+  }
+}
+
 TEST_P(Adjoints, EveryRunAndNumberOfThreadsGivesTheBitsOfTheCpu) {
   const std::uint64_t seed = test_seed();
-  for (std::uint64_t number = 0; number < test_cases(30); ++number) {
+  const auto make = [this](const Geometry& output, int threads) { return make_adjoint(output, threads); };
+  for (std::uint64_t number = 0; number < test_cases(60) && !HasFailure(); ++number) {
     Random random(seed, 8000 + number);
-    const FieldCase test = random_case(random);
+    const FieldCase test = any_field(random);
     SCOPED_TRACE(seed_text(seed) + ", case " + std::to_string(number) + ": " + test.description);
-    const Volume<float> source =
-                            noise<float>(random.chance(0.5) ? test.output : other_grid(test.output, random), random),
-                        given = noise<float>(test.output, random);
-    const auto cpu = make_cpu_adjoint(test.output, {.threads = 1});
-    cpu->set_field(view(test.field, Outside::background));
-    const Gradients<float> expected = apply(*cpu, test.field, source, given);
-    for (const int threads : {1, 2, 16}) {
-      const auto adjoint = make_adjoint(test.output, threads);
-      adjoint->set_field(view(test.field, Outside::background));
-      for (int run = 0; run < 4; ++run) {
-        const Gradients<float> found = apply(*adjoint, test.field, source, given);
-        EXPECT_TRUE(same_bits(expected.source.voxels, found.source.voxels)) << threads << " threads, run " << run;
-        EXPECT_TRUE(same_bits(expected.displacement, found.displacement)) << threads << " threads, run " << run;
+    if (random.chance(0.5))
+      expect_bits_of_cpu<float>(random, test, make);
+    else
+      expect_bits_of_cpu<double>(random, test, make);
+  }
+}
+
+TEST_P(Adjoints, WhatElseGoesThroughTheFieldChangesNoBitOfASource) {
+  Random random(test_seed(), 6);
+  SCOPED_TRACE(seed_text(test_seed()));
+  const FieldCase test = random_injective_case(random);
+  const Volume<float> one = noise<float>(test.output, random), given = noise<float>(test.output, random),
+                      large = noise<float>(test.output, random, 1e20);
+  Volume<float> none = large;
+  for (float& value : none.voxels) value = NAN;
+  const auto adjoint = make_adjoint(test.output);
+  adjoint->set_field(view(test.field, Outside::background));
+  const Gradients<float> alone = apply(*adjoint, test.field, one, given);
+  Volume<float> gradient = poisoned<float>(test.output), of_large = gradient, of_none = gradient;
+  const AdjointTarget targets[] = {
+      {.source = view(one), .output_gradient = view(large), .source_gradient = view(of_large)},
+      {.source = view(one), .output_gradient = view(given), .source_gradient = view(gradient)},
+      {.source = view(one), .output_gradient = view(none), .source_gradient = view(of_none)}};
+  adjoint->apply(targets, {});
+  EXPECT_TRUE(same_bits(alone.source.voxels, gradient.voxels));
+  EXPECT_TRUE(std::isnan(of_none.voxels.front()) && std::isnan(of_none.voxels.back()));
+  EXPECT_FALSE(std::isnan(of_large.voxels.front()));
+}
+
+TEST(WeightMaps, OfSliversAndSpecksAreThoseOfExactDeterminants) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  Random random(test_seed(), 91);
+  int slivers = 0, specks = 0;
+  for (int n = 0; n < 20000; ++n) {
+    // Flattened along an axis, or no larger than a few steps; about the voxel (20, 20, 20).
+    const std::int64_t size = random.chance(0.5) ? random.integer(2, 60) : random.integer(4096, 8 * 4096);
+    const int flat = random.axis();
+    const std::int64_t thin = random.integer(1, 200);
+    Tetrahedron t{};
+    for (Vertex* v : {&t.a, &t.b, &t.c, &t.d}) {
+      for (int axis = 0; axis < 3; ++axis) {
+        const std::int64_t reach = axis == flat ? std::min(size, thin) : size;
+        v->deformed[axis] = static_cast<std::int32_t>(20 * kStepsPerVoxel + random.integer(-reach, reach));
       }
     }
-    if (HasFailure()) return;
+    const glm::i32vec3 signs(random.chance(0.5) ? 1 : -1, random.chance(0.5) ? 1 : -1, random.chance(0.5) ? 1 : -1);
+    const glm::i32vec3 steps(20 * kStepsPerVoxel);
+    const ExactWeights exact = exact_weights(t, steps, signs);
+    const double expected[4] = {exact.a, exact.b, exact.c, exact.d()};
+    constexpr double kInside = -1e-12;
+    if (!std::all_of(expected, expected + 4, [](double w) { return w >= kInside; })) continue;  // has another owner
+    const WeightMap map(t);
+    ++(size <= 60 ? specks : slivers);
+    float weight[4];
+    map.weights(
+        glm::i64vec3(20), signs, [&] { return t; }, weight);
+    for (int corner = 0; corner < 4; ++corner) EXPECT_NEAR(weight[corner], expected[corner], 2e-5) << "size " << size;
   }
+  EXPECT_GT(slivers, 100);
+  EXPECT_GT(specks, 100);
 }
 
 TEST_P(Adjoints, SeveralValuesAVoxelAreAddedUp) {
@@ -358,15 +470,15 @@ TEST_P(Adjoints, SeveralValuesAVoxelAreAddedUp) {
       apart = together;
   const AdjointTarget target{
       .source = view_of(both), .output_gradient = view_of(given), .source_gradient = view_of(gradient)};
-  adjoint->apply({&target, 1}, {together.data()});
+  adjoint->apply({&target, 1}, {together});
   Volume<float> gradient_one = poisoned<float>(test.output), gradient_two = gradient_one;
   const AdjointTarget targets[] = {
       {.source = view(one), .output_gradient = view(given_one), .source_gradient = view(gradient_one)},
       {.source = view(two), .output_gradient = view(given_two), .source_gradient = view(gradient_two)}};
-  adjoint->apply(targets, {apart.data()});
-  for (std::size_t n = 0; n < voxels; ++n) {
-    ASSERT_EQ(gradient[2 * n], gradient_one.voxels[n]);
-    ASSERT_EQ(gradient[2 * n + 1], gradient_two.voxels[n]);
+  adjoint->apply(targets, {apart});
+  for (std::size_t n = 0; n < voxels; ++n) {  // but for the unit of each
+    ASSERT_NEAR(gradient[2 * n], gradient_one.voxels[n], 1e-6);
+    ASSERT_NEAR(gradient[2 * n + 1], gradient_two.voxels[n], 1e-6);
   }
   float largest = 0;
   for (const glm::vec3& g : apart) largest = std::max(largest, std::fabs(g.x));
@@ -444,6 +556,30 @@ TEST_P(Adjoints, ATermThatIsNotFiniteMakesItsGradientNaN) {
   for (const glm::vec3& v : found.displacement) ASSERT_TRUE(std::isfinite(v.x));
 }
 
+TEST_P(Adjoints, HoldTermsThatOnlyDoubleHolds) {
+  const Geometry grid = unit_grid({6, 6, 6});
+  const VertexField field = uniform_field(unit_grid({7, 7, 7}), glm::vec3(0));
+  const auto adjoint = make_adjoint(grid);
+  adjoint->set_field(view(field));
+  for (const double size : {1e308, 1e-290}) {
+    const Volume<double> source{grid, std::vector<double>(216, 1.0)};
+    Volume<double> given{grid, std::vector<double>(216, 0.0)};
+    given.voxels[43] = size;
+    const Gradients<double> found = apply(*adjoint, field, source, given);
+    EXPECT_TRUE(same_bits(given.voxels, found.source.voxels)) << size;
+  }
+}
+
+TEST_P(Adjoints, OfNoVolumeIsZero) {
+  const Geometry grid = oblique_grid({6, 6, 6});
+  const VertexField field = uniform_field(grid, glm::vec3(0));
+  const auto adjoint = make_adjoint(grid);
+  adjoint->set_field(view(field));
+  std::vector<glm::vec3> found(216, glm::vec3(NAN));
+  adjoint->apply({}, {found});
+  EXPECT_TRUE(same_bits(found, std::vector<glm::vec3>(216, glm::vec3(0))));
+}
+
 TEST_P(Adjoints, RefusesWhatHasNoGradient) {
   const Geometry grid = unit_grid({6, 6, 6});
   const VertexField field = uniform_field(grid, glm::vec3(0));
@@ -454,7 +590,7 @@ TEST_P(Adjoints, RefusesWhatHasNoGradient) {
   const AdjointTarget good{.source = view(source), .output_gradient = view(given), .source_gradient = view(gradient)};
   const auto expect_refusal = [&](const AdjointTarget& target, bool moves, const std::string& word) {
     try {
-      adjoint->apply({&target, 1}, {moves ? moved.data() : nullptr});
+      adjoint->apply({&target, 1}, {moves ? std::span(moved) : std::span<glm::vec3>()});
       ADD_FAILURE() << "expected a refusal: " << word;
     } catch (const InputError& error) {
       EXPECT_TRUE(says(error.what(), {word}));
@@ -482,6 +618,8 @@ TEST_P(Adjoints, RefusesWhatHasNoGradient) {
   bad = good;
   bad.output_gradient.components = 2;
   expect_refusal(bad, false, "values");
+  moved.pop_back();
+  expect_refusal(good, true, "215 vertices, and the field has 216");
 }
 
 }  // namespace

@@ -70,7 +70,7 @@ TEST(VertexFieldAdjoint, TheGradientOfTheDisplacementHasTheBitsOfTheCore) {
   core->set_field(field->GetView());
   std::vector<glm::vec3> expected(static_cast<std::size_t>(vertex_count(field->GetView())));
   const AdjointTarget target{.source = view_of(*source, grid), .output_gradient = view_of(*given, grid)};
-  core->apply({&target, 1}, {expected.data()});
+  core->apply({&target, 1}, {expected});
   EXPECT_EQ(filter->GetDisplacementGradient(), expected);
   EXPECT_GT(std::count_if(expected.begin(), expected.end(), [](const glm::vec3& g) { return g != glm::vec3(0); }), 100);
 }

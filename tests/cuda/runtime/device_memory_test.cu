@@ -87,6 +87,44 @@ TEST_F(DeviceMemory, GivesTheBitsOfHostMemoryOnAnyStream) {
   }
 }
 
+TEST_F(DeviceMemory, GradientsToo) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  for (std::uint64_t n = 0; n < 6; ++n) {
+    Scene scene(300 + n);
+    Volume<float> source{scene.grid, {}}, given = poisoned<float>(scene.grid), gradient = given;
+    for (const std::int16_t voxel : scene.source.voxels) source.voxels.push_back(voxel);
+    for (float& value : given.voxels) value = static_cast<float>(scene.random.real(-1, 1));
+    std::vector<glm::vec3> moved(scene.field.displacement.size());
+    const auto cpu = make_cpu_adjoint(scene.grid);
+    cpu->set_field(view(scene.field));
+    const AdjointTarget host{.source = view(source), .output_gradient = view(given), .source_gradient = view(gradient)};
+    cpu->apply({&host, 1}, {moved});
+
+    const OnDevice displacement(scene.field.displacement), to_vertices(std::vector<glm::vec3>(moved.size()));
+    const OnDevice from(source.voxels), of_output(given.voxels), of_source(poisoned<float>(scene.grid).voxels);
+    cudaStream_t stream = nullptr;
+    ASSERT_EQ(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), cudaSuccess);
+    const Control control{.stream = n % 2 == 0 ? stream : nullptr};
+    FieldView field = view(scene.field);
+    field.displacement = displacement.data();
+    field.memory = Memory::device;
+    const auto cuda = make_adjoint(BackendKind::cuda, scene.grid);
+    cuda->set_field(field, control);
+    const AdjointTarget target{.source = on_device(host.source, from.data()),
+                               .output_gradient = on_device(host.output_gradient, of_output.data()),
+                               .source_gradient = on_device(host.source_gradient, of_source.data())};
+    cuda->apply({&target, 1}, {{to_vertices.data(), moved.size()}, Memory::device}, control);
+    EXPECT_EQ(cudaStreamDestroy(stream), cudaSuccess);
+    EXPECT_TRUE(same_bits(gradient.voxels, of_source.download()));
+    EXPECT_TRUE(same_bits(moved, to_vertices.download()));
+
+    AdjointTarget wrong = target;
+    wrong.source_gradient = on_device(host.source_gradient, gradient.voxels.data());
+    EXPECT_THROW(cuda->apply({&wrong, 1}, {}), InputError);
+    EXPECT_THROW(cpu->apply({&target, 1}, {}), InputError);
+  }
+}
+
 TEST_F(DeviceMemory, PullFieldsToo) {
   SCOPED_TRACE(seed_text(test_seed()));
   Scene scene(17);
