@@ -55,6 +55,8 @@ struct CallOptions {
 /// @throws what the work throws
 void run_call(const CallOptions& options, bool small, const std::function<void(const Control&)>& work);
 
+/// Work on fewer voxels or vertices than this surely takes less than 20 ms.
+constexpr std::int64_t kSmallCall = 200'000;
 /// A file of fewer voxels or vectors than this is surely written in less than 20 ms.
 constexpr std::int64_t kSmallFile = 10000;
 

@@ -166,6 +166,39 @@ nb::tuple continued(const Geometry& grid, const ConstArray& displacement, const 
 
 }  // namespace
 
+const glm::vec3* vectors_of(const ConstArray& array, const Geometry& grid) {
+  const std::vector<std::int64_t> shape{grid.size.z, grid.size.y, grid.size.x, 3};
+  return reinterpret_cast<const glm::vec3*>(values_of<float>(array, shape, "the displacement", true));
+}
+
+FieldView ForwardArrays::hold(const std::optional<Geometry>& lattice, const std::optional<ConstArray>& displacement,
+                              const std::optional<MeshArrays>& mesh, const std::optional<ConstArray>& replaced,
+                              const std::string& outside) {
+  FieldView field{.outside = outside_of(outside)};
+  lattice_ = lattice.value_or(Geometry{});
+  if (lattice) field.lattice = &lattice_;
+  if (displacement) {
+    require(lattice.has_value(), "a displacement without a lattice; pass the lattice's geometry");
+    field.displacement = vectors_of(*displacement, lattice_);
+    field.memory = memory_of(*displacement, "the displacement");
+  }
+  mesh_ = mesh ? mesh_of(*mesh) : TetrahedralMesh{};
+  if (mesh) field.mesh = &mesh_;
+  replaced_.clear();
+  if (replaced) {
+    const auto* numbers = values_of<std::uint64_t>(*replaced, {-1}, "the replaced cells");
+    replaced_.assign(numbers, numbers + replaced->shape(0));
+    field.replaced = replaced_;
+  }
+  require(field.displacement || field.mesh, "the field has neither a displacement nor a mesh");
+  displacement_ = displacement;
+  return field;
+}
+
+bool ForwardArrays::is_small() const {
+  return mesh_.is_empty() && (!displacement_ || voxel_count(lattice_) < kSmallCall);
+}
+
 PullField pull_field_of(const Geometry& grid, const ConstArray& displacement) {
   const auto* values = values_of<float>(displacement, {grid.size.z, grid.size.y, grid.size.x, 3}, "the displacement");
   return {grid, copied<glm::vec3>(values, static_cast<std::size_t>(voxel_count(grid)))};

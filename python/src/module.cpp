@@ -66,6 +66,7 @@ NB_MODULE(_core, core) {
   add_geometry(core);
   add_fields(core);
   add_resampler(core);
+  add_adjoint(core);
   add_files(core);
   add_simulation(core);
   add_render(core);

@@ -9,6 +9,7 @@ namespace tetwarp::python {
 
 // Each adds its part to the module `tetwarp._core`.
 
+void add_adjoint(nanobind::module_& core);
 void add_errors(nanobind::module_& core);
 void add_geometry(nanobind::module_& core);
 void add_fields(nanobind::module_& core);

@@ -36,13 +36,6 @@ struct TargetArrays {
   std::optional<std::array<double, 2>> padding;
 };
 
-Interpolation interpolation_of(const std::string& word) {
-  const auto found = interpolation_named(word);
-  require(found.has_value(),
-          "interpolation is \"" + word + "\"; expected \"nearest\", \"linear\", \"cubic\" or \"vote\"");
-  return *found;
-}
-
 nb::object number_or_none(double value) { return std::isfinite(value) ? nb::cast(value) : nb::none(); }
 
 nb::dict as_dict(const Report& report) {
@@ -69,9 +62,6 @@ nb::dict as_dict(const Residuals& residuals) {
   return dict;
 }
 
-/// Work of fewer voxels than this is done without looking for signals.
-constexpr std::int64_t kSmall = 200'000;
-
 /// The resampler behind `tetwarp.Resampler` and `tetwarp.PullResampler`, with what it refers to.
 class BoundResampler {
  public:
@@ -88,31 +78,10 @@ class BoundResampler {
   void set_field(const std::optional<Geometry>& lattice, const std::optional<ConstArray>& displacement,
                  const std::optional<MeshArrays>& mesh, const std::optional<ConstArray>& replaced,
                  const std::string& outside, bool jacobian_range, const CallOptions& options) {
-    FieldView field{.outside = outside_of(outside)};
     const std::unique_lock lock = in_use();
     is_set_ = false;  // until the field is taken: what it referred to is replaced
-    if (lattice) {
-      lattice_ = *lattice;
-      field.lattice = &lattice_;
-    }
-    if (displacement) {
-      require(lattice.has_value(), "a displacement without a lattice; pass the lattice's geometry");
-      field.displacement = vectors_of(*displacement, lattice_);
-      field.memory = memory_of(*displacement, "the displacement");
-    }
-    if (mesh) {
-      mesh_ = mesh_of(*mesh);
-      field.mesh = &mesh_;
-    }
-    if (replaced) {
-      const auto* numbers = values_of<std::uint64_t>(*replaced, {-1}, "the replaced cells");
-      replaced_.assign(numbers, numbers + replaced->shape(0));
-      field.replaced = replaced_;
-    }
-    require(field.displacement || field.mesh, "the field has neither a displacement nor a mesh");
-    displacement_ = displacement;
-    const std::int64_t size = (lattice ? voxel_count(lattice_) : 0) + static_cast<std::int64_t>(mesh ? kSmall : 0);
-    run_call(options, size < kSmall, [&](const Control& control) {
+    const FieldView field = forward_.hold(lattice, displacement, mesh, replaced, outside);
+    run_call(options, forward_.is_small(), [&](const Control& control) {
       resampler_.forward().set_field(field, {.jacobian_range = jacobian_range}, control);
     });
     is_set_ = true;
@@ -122,13 +91,13 @@ class BoundResampler {
                       const CallOptions& options) {
     const std::unique_lock lock = in_use();
     is_set_ = false;
-    lattice_ = grid;
-    displacement_ = displacement;
-    const PullFieldView field{.grid = &lattice_,
-                              .displacement = vectors_of(displacement, lattice_),
+    pull_grid_ = grid;
+    pulled_ = displacement;
+    const PullFieldView field{.grid = &pull_grid_,
+                              .displacement = vectors_of(displacement, pull_grid_),
                               .outside = outside_of(outside),
                               .memory = memory_of(displacement, "the displacement")};
-    run_call(options, voxel_count(grid) < kSmall,
+    run_call(options, voxel_count(grid) < kSmallCall,
              [&](const Control& control) { resampler_.pull().set_field(field, control); });
     is_set_ = true;
   }
@@ -159,7 +128,7 @@ class BoundResampler {
     require_set();
     require_apart(views, wanted);
     Report report;
-    run_call(options, voxel_count(part) < kSmall,
+    run_call(options, voxel_count(part) < kSmallCall,
              [&](const Control& control) { report = resampler_->resample(part, views, wanted, control); });
     return as_dict(report);
   }
@@ -224,9 +193,9 @@ class BoundResampler {
     add(extents, maps.inverse_mm, "the map \"inverse\"", true);
     add(extents, maps.jacobian, "the map \"jacobian\"", true);
     add(extents, maps.owners, "the map \"folds\"", true);
-    if (displacement_) {
-      const auto* begin = static_cast<const std::byte*>(displacement_->data());
-      extents.push_back({begin, begin + displacement_->nbytes(), "the displacement", false});
+    if (const auto& displacement = pulled_ ? pulled_ : forward_.displacement(); displacement) {
+      const auto* begin = static_cast<const std::byte*>(displacement->data());
+      extents.push_back({begin, begin + displacement->nbytes(), "the displacement", false});
     }
     for (std::size_t a = 0; a < extents.size(); ++a) {
       for (std::size_t b = 0; b < a; ++b) {
@@ -235,11 +204,6 @@ class BoundResampler {
                 extents[b].name + " shares memory with " + extents[a].name + "; pass another array");
       }
     }
-  }
-
-  static const glm::vec3* vectors_of(const ConstArray& array, const Geometry& grid) {
-    const std::vector<std::int64_t> shape{grid.size.z, grid.size.y, grid.size.x, 3};
-    return reinterpret_cast<const glm::vec3*>(values_of<float>(array, shape, "the displacement", true));
   }
 
   static VolumeView& map_of(Maps& maps, const std::string& name) {
@@ -251,12 +215,11 @@ class BoundResampler {
     return maps.owners;
   }
 
-  Geometry output_, lattice_;
+  Geometry output_, pull_grid_;
   Limits limits_;
   AnyResampler resampler_;
-  std::optional<ConstArray> displacement_;  ///< keeps the values to which the resampler refers
-  TetrahedralMesh mesh_;
-  std::vector<std::uint64_t> replaced_;
+  ForwardArrays forward_;
+  std::optional<ConstArray> pulled_;  ///< keeps the values of a pull field
   bool is_set_ = false;
   std::timed_mutex mutex_;
 };

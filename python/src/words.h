@@ -17,4 +17,12 @@ inline Outside outside_of(const std::string& word) {
   throw InputError("outside is \"" + word + "\"; expected \"refuse\", \"rest\" or \"background\"");
 }
 
+/// As `outside_of`.
+inline Interpolation interpolation_of(const std::string& word) {
+  const auto found = interpolation_named(word);
+  require(found.has_value(),
+          "interpolation is \"" + word + "\"; expected \"nearest\", \"linear\", \"cubic\" or \"vote\"");
+  return *found;
+}
+
 }  // namespace tetwarp::python

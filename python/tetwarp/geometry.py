@@ -75,9 +75,11 @@ class Geometry:
     array([-8.5,  0. ,  7. ])
     """
 
-    __slots__ = ("_grid",)
+    __slots__ = ("_grid", "_numbers")
 
     _grid: _core.Grid
+    #: Size, spacing, origin, rows of the direction, slices: what an operator of PyTorch takes in the place of a grid.
+    _numbers: tuple[float, ...]
 
     def __init__(
         self,
@@ -102,12 +104,17 @@ class Geometry:
             matrix.ravel().tolist(),
             _arrays.numbers(slices, np.float64, "slices").ravel().tolist(),
         )
+        self._keep(grid)
+
+    def _keep(self, grid: _core.Grid) -> None:
+        numbers = (*map(float, grid.size), *grid.spacing, *grid.origin, *grid.direction, *grid.slices)
         object.__setattr__(self, "_grid", grid)
+        object.__setattr__(self, "_numbers", numbers)
 
     @classmethod
     def _of(cls, grid: _core.Grid) -> Geometry:
         geometry = cls.__new__(cls)
-        object.__setattr__(geometry, "_grid", grid)
+        geometry._keep(grid)
         return geometry
 
     def __setattr__(self, name: str, value: object) -> None:

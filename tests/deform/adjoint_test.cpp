@@ -394,7 +394,7 @@ TEST_P(Adjoints, EveryRunAndNumberOfThreadsGivesTheBitsOfTheCpu) {
 TEST_P(Adjoints, WhatElseGoesThroughTheFieldChangesNoBitOfASource) {
   Random random(test_seed(), 6);
   SCOPED_TRACE(seed_text(test_seed()));
-  const FieldCase test = random_injective_case(random);
+  FieldCase test = {.output = unit_grid({9, 8, 7}), .field = uniform_field(unit_grid({9, 8, 7}), glm::vec3(0.3f))};
   const Volume<float> one = noise<float>(test.output, random), given = noise<float>(test.output, random),
                       large = noise<float>(test.output, random, 1e20);
   Volume<float> none = large;
