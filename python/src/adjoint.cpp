@@ -54,17 +54,18 @@ class BoundAdjoint {
              const CallOptions& options) {
     std::vector<AdjointTarget> views;
     for (const AdjointArrays& one : targets) {
-      AdjointTarget target{.output_gradient = voxels_of(one.output_gradient, output_, "the gradient of the output"),
-                           .interpolation = interpolation_of(one.interpolation)};
+      AdjointTarget target;
+      target.output_gradient = voxels_of(one.output_gradient, output_, "the gradient of the output");
+      target.interpolation = interpolation_of(one.interpolation);
       if (one.source_gradient)
         target.source_gradient = voxels_of(*one.source_gradient, one.grid, "the gradient of the volume");
       if (one.source) {
         target.source = voxels_of(*one.source, one.grid, "the volume");
       } else {
-        target.source = {.geometry = &one.grid,
-                         .buffered = whole(one.grid),
-                         .type = target.output_gradient.type,
-                         .components = target.output_gradient.components};
+        target.source = target.output_gradient;
+        target.source.geometry = &one.grid;
+        target.source.buffered = whole(one.grid);
+        target.source.voxels = nullptr;
       }
       views.push_back(target);
     }

@@ -314,8 +314,10 @@ def modules():
 
 @pytest.mark.parametrize("name", list(modules()))
 def test_examples_in_docstrings_do_what_they_say(name):
-    if name == "tetwarp.torch":
-        pytest.importorskip("torch", minversion="2.4")
+    wanted = {"tetwarp.torch": ("torch", "2.4"), "tetwarp.monai": ("monai", "1.2"), "tetwarp.torchio": ("torchio", "0.19")}
+    if name in wanted:
+        library, version = wanted[name]
+        pytest.importorskip(library, minversion=version)
     results = doctest.testmod(importlib.import_module(name), optionflags=doctest.ELLIPSIS)
     assert results.failed == 0
 

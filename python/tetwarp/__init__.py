@@ -18,7 +18,7 @@ from __future__ import annotations
 import os as _os
 from typing import Any as _Any
 
-from . import _core, adapters, fields
+from . import _core, adapters, augmentation, fields
 from .batching import batch
 from .deforming import Along, Deformed, compose, deform, forward_of, invert, jacobian, move_points
 from .errors import Cancelled, DeviceError, Error, InputError, NotCompiled
@@ -58,6 +58,7 @@ __all__ = [
     "View",
     "Volume",
     "adapters",
+    "augmentation",
     "batch",
     "compose",
     "deform",

@@ -394,15 +394,16 @@ TEST_P(Adjoints, EveryRunAndNumberOfThreadsGivesTheBitsOfTheCpu) {
 TEST_P(Adjoints, WhatElseGoesThroughTheFieldChangesNoBitOfASource) {
   Random random(test_seed(), 6);
   SCOPED_TRACE(seed_text(test_seed()));
-  FieldCase test = {.output = unit_grid({9, 8, 7}), .field = uniform_field(unit_grid({9, 8, 7}), glm::vec3(0.3f))};
-  const Volume<float> one = noise<float>(test.output, random), given = noise<float>(test.output, random),
-                      large = noise<float>(test.output, random, 1e20);
+  const Geometry grid = unit_grid({9, 8, 7});
+  const VertexField field = uniform_field(grid, glm::vec3(0.3f));
+  const Volume<float> one = noise<float>(grid, random), given = noise<float>(grid, random),
+                      large = noise<float>(grid, random, 1e20);
   Volume<float> none = large;
   for (float& value : none.voxels) value = NAN;
-  const auto adjoint = make_adjoint(test.output);
-  adjoint->set_field(view(test.field, Outside::background));
-  const Gradients<float> alone = apply(*adjoint, test.field, one, given);
-  Volume<float> gradient = poisoned<float>(test.output), of_large = gradient, of_none = gradient;
+  const auto adjoint = make_adjoint(grid);
+  adjoint->set_field(view(field, Outside::background));
+  const Gradients<float> alone = apply(*adjoint, field, one, given);
+  Volume<float> gradient = poisoned<float>(grid), of_large = gradient, of_none = gradient;
   const AdjointTarget targets[] = {
       {.source = view(one), .output_gradient = view(large), .source_gradient = view(of_large)},
       {.source = view(one), .output_gradient = view(given), .source_gradient = view(gradient)},

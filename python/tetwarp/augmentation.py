@@ -1,0 +1,471 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Random deformations for training: families of them, and with each a certificate.
+
+    family = tw.augmentation.Elastic(amplitude=(1, 5), spacing=(30, 60))
+    warp = tw.augmentation.draw(family, ct.geometry, seed=7)
+    done = warp.deform(ct, labels=[organs])     # done.certificate
+
+What `tetwarp.monai` and `tetwarp.torchio` are made of (docs/guide/learning.md).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _calls, adapters, fields
+from .deforming import Along, deform, move_points
+from .errors import InputError
+from .field import PullField, VertexField
+from .geometry import Geometry
+
+FloatArray = npt.NDArray[np.float64]
+#: Smallest and largest value of a uniform draw.
+Range = tuple[float, float]
+
+#: By how much a field that folds is shrunk, and how often at most.
+_SHRINK, _MOST_SHRINKS = 0.8, 40
+
+
+def _range(value: float | Range, name: str) -> Range:
+    low, high = value if isinstance(value, Sequence) else (value, value)
+    low, high = _calls.number(low, name), _calls.number(high, name)
+    if low > high:
+        raise InputError(f"{name} is {value!r}; expected the smaller value first")
+    return low, high
+
+
+def _places(geometry: Geometry) -> FloatArray:
+    """Place of each vertex, (k, j, i, 3), LPS mm."""
+    k, j, i = np.meshgrid(*(np.arange(n, dtype=np.float64) for n in geometry.shape), indexing="ij")
+    return geometry.point(np.stack([i, j, k], axis=-1))
+
+
+def never_folding_amplitude(geometry: Geometry, spacing: float, cell_size: int) -> float:
+    """Largest amplitude in mm with which an elastic field surely folds nowhere.
+
+    A cubic B-spline whose coefficients are at most A changes along an axis by at most 1.5 A / spacing. In each of the five
+    tetrahedra of a cell with edges h, the affine map of the differences then has a row sum of at most
+    1.5 A / spacing * (h_x + h_y + h_z) / h_min, in cells; below 1 the determinant stays above 0. A direction that is
+    turned counts with the largest sum of its cosines, squared. Rounding to 2^-12 voxel takes less than a hundredth.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Grid of the volume.
+    spacing : float
+        Distance of control points, mm.
+    cell_size : int
+
+    Examples
+    --------
+    >>> round(never_folding_amplitude(Geometry((64, 64, 64)), spacing=45, cell_size=4), 2)
+    9.9
+    """
+    edges = np.array(geometry.spacing) * cell_size
+    turned = float(np.abs(geometry.direction).sum(axis=0).max())
+    return float(0.99 * spacing * edges.min() / (1.5 * edges.sum() * turned**2))
+
+
+class Family:
+    """A kind of random deformation. It draws parameters, which are plain numbers, and makes fields of them."""
+
+    def draw(self, random: np.random.Generator, geometry: Geometry, cell_size: int) -> dict[str, Any]:
+        """Parameters of one deformation of a volume; what `json` can write."""
+        raise NotImplementedError
+
+    @staticmethod
+    def field(parameters: Mapping[str, Any], geometry: Geometry, cell_size: int) -> VertexField:
+        """The field of parameters on a lattice over a grid."""
+        raise NotImplementedError
+
+
+@dataclasses.dataclass(frozen=True)
+class Elastic(Family):
+    """Smooth random fields of cubic B-splines, as `fields.elastic`. They never fold, by construction.
+
+    Parameters
+    ----------
+    amplitude : float or (float, float)
+        Largest component of a displacement, mm, drawn from the range; at most `never_folding_amplitude`.
+    spacing : float or (float, float)
+        Distance of control points, mm.
+    may_fold : bool
+        Takes amplitudes beyond that bound, too; a field that does fold is shrunk.
+
+    Examples
+    --------
+    >>> Elastic(amplitude=(1, 4), spacing=40).amplitude
+    (1, 4)
+    """
+
+    amplitude: float | Range = (1.0, 5.0)
+    spacing: float | Range = (30.0, 60.0)
+    may_fold: bool = False
+
+    def draw(self, random: np.random.Generator, geometry: Geometry, cell_size: int) -> dict[str, Any]:
+        spacing = random.uniform(*_range(self.spacing, "spacing"))
+        amplitude = random.uniform(*_range(self.amplitude, "amplitude"))
+        if not self.may_fold:
+            amplitude = min(amplitude, never_folding_amplitude(geometry, spacing, cell_size))
+        return {"amplitude": amplitude, "spacing": spacing, "seed": int(random.integers(2**63))}
+
+    @staticmethod
+    def field(parameters: Mapping[str, Any], geometry: Geometry, cell_size: int) -> VertexField:
+        return fields.elastic(geometry, cell_size=cell_size, **parameters)
+
+
+@dataclasses.dataclass(frozen=True)
+class ElasticAffine(Family):
+    """A rotation and scaling about the middle of the volume and a shift, and on it an elastic field.
+
+    Parameters
+    ----------
+    amplitude, spacing
+        As of `Elastic`.
+    angle : float or (float, float)
+        Degrees about each of x, y and z, drawn one by one.
+    scale : float or (float, float)
+        Of each axis, drawn one by one.
+    shift : float or (float, float)
+        mm along each axis, drawn one by one.
+    """
+
+    amplitude: float | Range = (1.0, 5.0)
+    spacing: float | Range = (30.0, 60.0)
+    angle: float | Range = (-10.0, 10.0)
+    scale: float | Range = (0.9, 1.1)
+    shift: float | Range = (-5.0, 5.0)
+
+    def draw(self, random: np.random.Generator, geometry: Geometry, cell_size: int) -> dict[str, Any]:
+        elastic = Elastic(self.amplitude, self.spacing).draw(random, geometry, cell_size)
+        return {
+            **elastic,
+            "angle": random.uniform(*_range(self.angle, "angle"), 3).tolist(),
+            "scale": random.uniform(*_range(self.scale, "scale"), 3).tolist(),
+            "shift": random.uniform(*_range(self.shift, "shift"), 3).tolist(),
+            "centre": geometry.centre.tolist(),
+        }
+
+    @staticmethod
+    def field(parameters: Mapping[str, Any], geometry: Geometry, cell_size: int) -> VertexField:
+        field = Elastic.field({name: parameters[name] for name in ("amplitude", "spacing", "seed")}, geometry, cell_size)
+        assert field.lattice is not None
+        matrix = np.diag(parameters["scale"])
+        for axis, angle in enumerate(np.radians(parameters["angle"])):
+            turn, (first, second) = np.eye(3), [(1, 2), (2, 0), (0, 1)][axis]
+            turn[first, first] = turn[second, second] = np.cos(angle)
+            turn[second, first], turn[first, second] = np.sin(angle), -np.sin(angle)
+            matrix = turn @ matrix
+        places, centre = _places(field.lattice), np.array(parameters["centre"])
+        elastic = places + field.displacement - centre  # the elastic field first: it moves what the affine map then takes
+        moved = elastic @ matrix.T + centre + parameters["shift"] - places
+        return VertexField(field.lattice, np.ascontiguousarray(moved, np.float32))
+
+
+@dataclasses.dataclass(frozen=True)
+class Breathing(Family):
+    """A motion like breathing: towards the feet, most in a plane between chest and abdomen, and the belly forwards.
+
+    u_z = -A exp(-(d / w)^2 / 2), where d is the distance from that plane along z; u_y = -A r (1 - d' / D) of the same
+    profile, where d' is the distance from the front of the volume and D its depth.
+
+    Parameters
+    ----------
+    amplitude : float or (float, float)
+        A, mm.
+    width : float or (float, float)
+        w as a share of the volume's length along z.
+    level : float or (float, float)
+        Of the plane, as a share of that length, from the feet.
+    rise : float or (float, float)
+        r, how far the front goes, as a share of A.
+    """
+
+    amplitude: float | Range = (3.0, 15.0)
+    width: float | Range = (0.15, 0.3)
+    level: float | Range = (0.35, 0.65)
+    rise: float | Range = (0.1, 0.4)
+
+    def draw(self, random: np.random.Generator, geometry: Geometry, cell_size: int) -> dict[str, Any]:
+        corners = geometry.point([[i, j, k] for i in (0, geometry.size[0] - 1) for j in (0, geometry.size[1] - 1)
+                                  for k in (0, geometry.size[2] - 1)])  # fmt: skip
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        length, depth = float(high[2] - low[2]), float(high[1] - low[1])
+        return {
+            "amplitude": random.uniform(*_range(self.amplitude, "amplitude")),
+            "width": random.uniform(*_range(self.width, "width")) * length,
+            "level": float(low[2]) + random.uniform(*_range(self.level, "level")) * length,
+            "rise": random.uniform(*_range(self.rise, "rise")),
+            "front": float(low[1]),
+            "depth": depth,
+        }
+
+    @staticmethod
+    def field(parameters: Mapping[str, Any], geometry: Geometry, cell_size: int) -> VertexField:
+        lattice = geometry.lattice(cell_size)
+        places = _places(lattice)
+        profile = parameters["amplitude"] * np.exp(-(((places[..., 2] - parameters["level"]) / parameters["width"]) ** 2) / 2)
+        depth = np.clip(1 - (places[..., 1] - parameters["front"]) / parameters["depth"], 0, 1)
+        moved = np.zeros(places.shape, np.float32)
+        moved[..., 2] = -profile
+        moved[..., 1] = -parameters["rise"] * profile * depth
+        return VertexField(lattice, moved)
+
+
+@dataclasses.dataclass(frozen=True)
+class Swelling(Family):
+    """Tissue that swells or shrinks about a place, as `fields.bubble`.
+
+    Parameters
+    ----------
+    radius : float or (float, float)
+        mm.
+    strength : float or (float, float)
+        a of the formula.
+    """
+
+    radius: float | Range = (20.0, 60.0)
+    strength: float | Range = (-0.5, 1.0)
+
+    def draw(self, random: np.random.Generator, geometry: Geometry, cell_size: int) -> dict[str, Any]:
+        at = random.uniform(0.25, 0.75, 3) * (np.array(geometry.size) - 1)
+        return {
+            "radius": random.uniform(*_range(self.radius, "radius")),
+            "strength": random.uniform(*_range(self.strength, "strength")),
+            "center": geometry.point(at).tolist(),
+        }
+
+    @staticmethod
+    def field(parameters: Mapping[str, Any], geometry: Geometry, cell_size: int) -> VertexField:
+        return fields.bubble(geometry, cell_size=cell_size, **parameters)
+
+
+FAMILIES: dict[str, type[Family]] = {one.__name__: one for one in (Elastic, ElasticAffine, Breathing, Swelling)}
+
+
+@dataclasses.dataclass
+class Warped:
+    """What `Warp.deform` gives."""
+
+    #: Deformed images, in their order, each of the type of what was given.
+    images: list[Any]
+    #: Deformed labels.
+    labels: list[Any]
+    #: What was done and what came of it; what `json` can write.
+    certificate: dict[str, Any]
+
+
+@dataclasses.dataclass(frozen=True)
+class Warp:
+    """One drawn deformation. The same numbers make the same bits on every machine.
+
+    Parameters
+    ----------
+    family : str
+        Name of a class of this module.
+    parameters : dict
+        As `Family.draw` has them.
+    geometry : Geometry
+        Grid over which it was drawn.
+    cell_size : int
+        Voxels between vertices.
+    share : float
+        By which all displacements are multiplied.
+    """
+
+    family: str
+    parameters: Mapping[str, Any]
+    geometry: Geometry
+    cell_size: int = 4
+    share: float = 1.0
+
+    def field(self) -> VertexField:
+        """The forward field. Its lattice reaches so far beyond the grid that what moves in has somewhere to come from."""
+        make = FAMILIES[self.family].field
+        straight = self.geometry.straightened()
+        inner = make(self.parameters, straight, self.cell_size)
+        farthest = np.abs(inner.displacement).reshape(-1, 3).max(axis=0)
+        beyond = np.ceil(np.abs(straight.direction.T) @ farthest / np.array(straight.spacing) / self.cell_size) + 1
+        cells = np.array(beyond, np.int64) * self.cell_size
+        grown = Geometry(
+            (np.array(straight.size) + 2 * cells).tolist(), straight.spacing, straight.point(-cells).tolist(), straight.direction
+        )
+        field = make(self.parameters, grown, self.cell_size)
+        assert field.lattice is not None
+        return VertexField(field.lattice, field.displacement * np.float32(self.share))
+
+    def deform(
+        self,
+        *images: Any,
+        labels: Sequence[Any] = (),
+        interpolation: str = "linear",
+        backgrounds: Sequence[float | None] | None = None,
+        backend: str = "auto",
+        threads: int = 0,
+    ) -> Warped:
+        """Sends images and labels through the field, each on its own grid, and says what came of it.
+
+        Parameters
+        ----------
+        images : Volume, or images of other libraries, as `tetwarp.deform` takes them
+        labels : sequence
+            Go by vote.
+        interpolation : "linear" or "cubic"
+        backgrounds : sequence, optional
+            Of the images, where nothing maps; None: the smallest value.
+
+        Raises
+        ------
+        InputError
+            For a field that still folds after 40 shrinks.
+        """
+        everything = [*images, *labels]
+        if not everything:
+            raise InputError("there is nothing to deform; pass an image or labels")
+        values = list(backgrounds) if backgrounds is not None else [None] * len(images)
+        kinds: list[tuple[str, float | None]] = [(interpolation, value) for value in values]
+        kinds += [("vote", 0.0) for _ in labels]
+        # Those that share the first one's grid share its voxels' owners, too.
+        grids = [adapters.volume_of(one)[0].geometry for one in everything]
+        alone = [grid != grids[0] for grid in grids]
+        warp = self
+        for shrinks in range(_MOST_SHRINKS):
+            field = warp.field()
+            done = deform(
+                everything[0],
+                field,
+                interpolation=kinds[0][0],
+                background=kinds[0][1],
+                outside="background",
+                with_=[
+                    Along(one, kind, background, own=own)
+                    for one, own, (kind, background) in zip(everything[1:], alone[1:], kinds[1:])
+                ],
+                backend=backend,
+                threads=threads,
+            )
+            if done.report.inverted + done.report.degenerate == 0:
+                break
+            warp = dataclasses.replace(warp, share=warp.share * _SHRINK)
+        else:
+            raise InputError(f"the field folds even when it is shrunk {_MOST_SHRINKS} times; draw smaller displacements")
+        results = [done.volume, *done.volumes]
+        certificate = {
+            **warp.record(),
+            "shrunk": shrinks,
+            "inverted": done.report.inverted,
+            "degenerate": done.report.degenerate,
+            "jacobian": [done.report.jacobian_min, done.report.jacobian_max],
+            "uncovered": done.report.uncovered,
+            "labels": [
+                _volumes_of(before, after) for before, after in zip(labels, results[len(images) :])
+            ],
+        }
+        return Warped(results[: len(images)], results[len(images) :], certificate)
+
+    def undo(self, image: Any, *, interpolation: str = "linear", background: float | None = None) -> Any:
+        """An image of the deformed grid, pulled back: each voxel takes what lies where the forward map leads its centre.
+
+        Deforming and undoing interpolates twice, and what left the grid is lost.
+        """
+        volume, back = adapters.volume_of(image)
+        grid = volume.geometry.straightened()
+        places = _places(grid).reshape(-1, 3)
+        moved, inside = move_points(places, self.field(), grid)
+        moved[~inside] = np.nan
+        pull = PullField(grid, np.ascontiguousarray((moved - places).reshape(*grid.shape, 3), np.float32))
+        done = deform(volume, pull_field=pull, interpolation=interpolation, background=background, outside="background")
+        return back(done.volume)
+
+    def record(self) -> dict[str, Any]:
+        """All that makes it, for `of_record`; what `json` can write."""
+        size, spacing, origin, direction, slices = self.geometry._state()
+        grid = {"size": size, "spacing": spacing, "origin": origin, "direction": direction, "slices": slices}
+        return {
+            "family": self.family,
+            "parameters": dict(self.parameters),
+            "geometry": {name: list(numbers) for name, numbers in grid.items()},
+            "cell_size": self.cell_size,
+            "share": self.share,
+        }
+
+    @classmethod
+    def of_record(cls, record: Mapping[str, Any]) -> Warp:
+        """A warp of its record, or of a certificate: the same bits once more.
+
+        Examples
+        --------
+        >>> warp = draw(Elastic(), Geometry((32, 32, 32)), seed=3)
+        >>> Warp.of_record(json.loads(json.dumps(warp.record()))) == warp
+        True
+        """
+        grid = dict(record["geometry"])
+        direction = np.array(grid.pop("direction"), np.float64).reshape(3, 3)
+        return cls(
+            record["family"], record["parameters"], Geometry(**grid, direction=direction), record["cell_size"], record["share"]
+        )
+
+
+def draw(family: Family, geometry: Geometry, *, seed: int | np.random.Generator, cell_size: int = 4) -> Warp:
+    """Draws a deformation of a volume.
+
+    Parameters
+    ----------
+    family : Family
+    geometry : Geometry
+        Grid of the volume.
+    seed : int or numpy.random.Generator
+    cell_size : int
+        Voxels between vertices.
+
+    Examples
+    --------
+    >>> warp = draw(Swelling(radius=8, strength=0.5), Geometry((32, 32, 32)), seed=1)
+    >>> warp.family, warp.share
+    ('Swelling', 1.0)
+    """
+    random = seed if isinstance(seed, np.random.Generator) else np.random.default_rng(seed)
+    return Warp(type(family).__name__, family.draw(random, geometry, cell_size), geometry, cell_size)
+
+
+def seed_of(seed: int, epoch: int, key: Any) -> int:
+    """The seed of a sample in an epoch: the first 8 bytes of a SHA-256 of the three, whatever the worker and the order.
+
+    Examples
+    --------
+    >>> seed_of(7, 0, "case-12") == seed_of(7, 0, "case-12") != seed_of(7, 1, "case-12")
+    True
+    """
+    text = json.dumps([seed, epoch, str(key)])
+    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "little")
+
+
+def _counts(array: npt.NDArray[Any]) -> list[tuple[Any, int]]:
+    """The values of an array, and how many there are of each."""
+    if array.dtype.kind in "iu" and 0 <= array.min() and array.max() < 2**16:
+        counts = np.bincount(array.ravel())
+        return [(label, int(counts[label])) for label in np.flatnonzero(counts)]
+    return [(label, int(count)) for label, count in zip(*np.unique(array, return_counts=True))]
+
+
+def _volumes_of(before: Any, after: Any) -> dict[str, list[float]]:
+    """Volume of each label before and after, ml."""
+    volumes: dict[str, list[float]] = {}
+    for n, image in enumerate((before, after)):
+        volume = adapters.volume_of(image)[0]
+        array = np.asarray(volume.array if isinstance(volume.array, np.ndarray) else volume.array.cpu())
+        affine = volume.geometry.straightened().affine("LPS")
+        millilitres = abs(float(np.linalg.det(affine[:3, :3]))) / 1000
+        for label, count in _counts(array):
+            if label != 0:
+                volumes.setdefault(str(label), [0.0, 0.0])[n] = float(count) * millilitres
+    return volumes

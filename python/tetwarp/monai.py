@@ -1,0 +1,187 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A transform of MONAI: one random deformation for all keys of a sample, exact, with a certificate.
+
+    from tetwarp.monai import RandTetwarpd
+    RandTetwarpd(keys=["image", "label"], labels=["label"], family=tw.augmentation.Elastic(), prob=0.5)
+
+Needs MONAI 1.2 or later. Families and certificates: docs/guide/learning.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from typing import Any
+
+import torch
+from monai.data.meta_tensor import MetaTensor
+from monai.transforms.inverse import InvertibleTransform
+from monai.transforms.lazy.functional import apply_pending
+from monai.transforms.transform import MapTransform, RandomizableTransform
+
+from . import _calls
+from .adapters.tensors import array_of, tensor_of
+from .augmentation import Elastic, Family, Warp, draw, seed_of
+from .errors import InputError
+from .geometry import Geometry
+from .volume import Volume
+
+
+class RandTetwarpd(RandomizableTransform, MapTransform, InvertibleTransform):
+    """Deforms the keys of a sample by one random field, each on its own grid.
+
+    Operations that are pending on a key are applied first. `inverse` pulls each key back by the forward map, evaluated at
+    the centre of every voxel.
+
+    Parameters
+    ----------
+    keys : sequence
+        Keys of MetaTensors [c, i, j, k]. The first that a sample has decides the grid over which the field is drawn.
+    family : Family
+        What is drawn (`tetwarp.augmentation`).
+    labels : sequence
+        Keys of labels, among `keys`; they go by vote.
+    interpolation : "linear" or "cubic"
+        Of the other keys.
+    background : float, optional
+        Of the other keys, where nothing maps; None: the smallest value of each channel.
+    prob : float
+        How often a sample is deformed.
+    cell_size : int
+        Voxels between vertices.
+    seed, seed_key : int, key
+        With both, a sample is deformed by what `seed`, `epoch` and `sample[seed_key]` say: workers and order change
+        nothing. Without `seed_key` MONAI's own random state decides.
+    certificate_key : str or None
+        Where the sample gets its certificate, a dict that `json` can write; None where it was not deformed.
+
+    Attributes
+    ----------
+    epoch : int
+        To be counted on by the training loop, where `seed_key` is used.
+
+    Raises
+    ------
+    InputError
+        For words and numbers that do not fit.
+
+    Examples
+    --------
+    >>> RandTetwarpd(["image", "label"], labels=["label"], prob=1.0).prob
+    1.0
+    """
+
+    def __init__(
+        self,
+        keys: Sequence[Hashable] | Hashable,
+        family: Family | None = None,
+        *,
+        labels: Sequence[Hashable] = (),
+        interpolation: str = "linear",
+        background: float | None = None,
+        prob: float = 0.1,
+        cell_size: int = 4,
+        seed: int = 0,
+        seed_key: Hashable | None = None,
+        certificate_key: str | None = "tetwarp_certificate",
+        allow_missing_keys: bool = False,
+        threads: int = 0,
+    ) -> None:
+        MapTransform.__init__(self, keys, allow_missing_keys)
+        RandomizableTransform.__init__(self, prob)
+        _calls.word(interpolation, "interpolation", ("linear", "cubic"))
+        unknown = [key for key in labels if key not in self.keys]
+        if unknown:
+            raise InputError(f"labels names {unknown[0]!r}, which is not among keys")
+        self.family = Elastic() if family is None else family
+        self.labels = tuple(labels)
+        self.interpolation = interpolation
+        self.background = background
+        self.cell_size = _calls.whole(cell_size, "cell_size", 1, 65536)
+        self.seed = _calls.whole(seed, "seed", 0, 2**63 - 1)
+        self.seed_key = seed_key
+        self.certificate_key = certificate_key
+        self.threads = threads
+        self.epoch = 0
+
+    def randomize(self, data: Mapping[Hashable, Any]) -> int:  # type: ignore[override]
+        """Whether a sample is deformed, and the seed of its field."""
+        if self.seed_key is None:
+            super().randomize(None)
+            return int(self.R.randint(2**31))
+        if self.seed_key not in data:
+            raise InputError(f"the sample has no {self.seed_key!r}, which seed_key names")
+        seed = seed_of(self.seed, self.epoch, data[self.seed_key])
+        self._do_transform = seed / 2**64 < self.prob
+        return seed
+
+    def __call__(self, data: Mapping[Hashable, Any]) -> dict[Hashable, Any]:
+        """Deforms a sample."""
+        sample = dict(data)
+        seed = self.randomize(sample)
+        keys = [key for key in self.key_iterator(sample)]
+        certificate = None
+        if keys and self._do_transform:
+            for key in keys:
+                sample[key] = _ready(sample[key], key)
+            warp = draw(self.family, _geometry_of(sample[keys[0]]), seed=seed, cell_size=self.cell_size)
+            images = [key for key in keys if key not in self.labels]
+            volumes = {key: _volumes_of(sample[key]) for key in keys}
+            done = warp.deform(
+                *(one for key in images for one in volumes[key]),
+                labels=[one for key in keys if key in self.labels for one in volumes[key]],
+                interpolation=self.interpolation,
+                backgrounds=[self.background for key in images for _ in volumes[key]],
+                threads=self.threads,
+            )
+            certificate = {**done.certificate, "seed": seed, "epoch": self.epoch if self.seed_key is not None else None}
+            of_images, of_labels = iter(done.images), iter(done.labels)
+            for key in keys:
+                results = of_labels if key in self.labels else of_images
+                sample[key] = _tensor_like(sample[key], [next(results) for _ in volumes[key]])
+        for key in keys:
+            self.push_transform(sample[key], extra_info={"certificate": certificate})
+        if self.certificate_key is not None:
+            sample[self.certificate_key] = certificate
+        return sample
+
+    def inverse(self, data: Mapping[Hashable, Any]) -> dict[Hashable, Any]:
+        """Pulls a sample back."""
+        sample = dict(data)
+        for key in self.key_iterator(sample):
+            certificate = self.pop_transform(sample[key])["extra_info"]["certificate"]
+            if certificate is None:
+                continue
+            warp = Warp.of_record(certificate)
+            kind, background = ("vote", 0.0) if key in self.labels else (self.interpolation, self.background)
+            back = [warp.undo(one, interpolation=kind, background=background) for one in _volumes_of(sample[key])]
+            sample[key] = _tensor_like(sample[key], back)
+        return sample
+
+
+def _ready(image: Any, key: Hashable) -> Any:
+    """A MetaTensor on which nothing is pending."""
+    if not isinstance(image, MetaTensor):
+        raise TypeError(f"{key!r} is a {type(image).__name__}; expected a MetaTensor, whose affine says where voxels lie")
+    if image.pending_operations:
+        image, _ = apply_pending(image)
+    if image.dim() != 4:
+        raise TypeError(f"{key!r} has the shape {tuple(image.shape)}; expected [channel, i, j, k]")
+    return image
+
+
+def _geometry_of(image: Any) -> Geometry:
+    return Geometry.from_affine(image.affine.detach().cpu().numpy(), tuple(image.shape)[1:], space="RAS")
+
+
+def _volumes_of(image: Any) -> list[Volume]:
+    """The channels."""
+    geometry = _geometry_of(image)
+    return [Volume(array_of(channel), geometry) for channel in image.as_tensor()]
+
+
+def _tensor_like(image: Any, channels: Sequence[Volume]) -> Any:
+    """A MetaTensor of channels, with all that another one knows."""
+    tensor = torch.stack([tensor_of(channel.array) for channel in channels]).to(image.device)
+    return type(image)(tensor, meta=image.meta, applied_operations=image.applied_operations)

@@ -1,0 +1,177 @@
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Transforms of TorchIO: one deformation for all images of a subject, exact, with a certificate.
+
+    from tetwarp.torchio import RandomTetwarp
+    RandomTetwarp(tw.augmentation.ElasticAffine(), p=0.5)
+
+Needs TorchIO 0.19 or later. Families and certificates: docs/guide/learning.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import torch
+import torchio
+from torchio.transforms.augmentation import RandomTransform
+from torchio.transforms.spatial_transform import SpatialTransform
+
+from . import _calls
+from .adapters.tensors import array_of, tensor_of
+from .augmentation import Elastic, Family, Warp, draw, seed_of
+from .errors import InputError
+from .geometry import Geometry
+from .volume import Volume
+
+CERTIFICATE = "tetwarp_certificate"
+
+
+class Tetwarp(SpatialTransform):
+    """Deforms the images of a subject by one field that was drawn before, each on its own grid; label maps by vote.
+
+    The inverse pulls each image back by the forward map, evaluated at the centre of every voxel. The subject gets a
+    certificate under "tetwarp_certificate", a dict that `json` can write.
+
+    Parameters
+    ----------
+    record : dict
+        What is done: `Warp.record`, or a certificate.
+    interpolation : "linear" or "cubic"
+        Of images that are no label maps.
+    background : float, optional
+        Of those, where nothing maps; None: the smallest value of each channel.
+    """
+
+    def __init__(
+        self,
+        record: Mapping[str, Any],
+        interpolation: str = "linear",
+        background: float | None = None,
+        threads: int = 0,
+        **kwargs: Any,
+    ) -> None:
+        super().__init__(**kwargs)
+        _calls.word(interpolation, "interpolation", ("linear", "cubic"))
+        Warp.of_record(record)  # refuses what is none
+        self.record = dict(record)
+        self.interpolation = interpolation
+        self.background = background
+        self.threads = threads
+        self.invert_transform = False
+        self.args_names = ["record", "interpolation", "background", "threads"]
+
+    def apply_transform(self, subject: Any) -> Any:
+        """Deforms a subject, or pulls it back."""
+        images = list(self.get_images(subject))
+        plain = [one for one in images if not isinstance(one, torchio.LabelMap)]
+        labels = [one for one in images if isinstance(one, torchio.LabelMap)]
+        warp = Warp.of_record(self.record)
+        volumes = {id(one): _volumes_of(one) for one in images}
+        if self.invert_transform:
+            for one in images:
+                kind, background = ("vote", 0.0) if isinstance(one, torchio.LabelMap) else (self.interpolation, self.background)
+                _fill(one, [warp.undo(each, interpolation=kind, background=background) for each in volumes[id(one)]])
+            subject.pop(CERTIFICATE, None)
+            return subject
+        if not images:
+            return subject
+        done = warp.deform(
+            *(each for one in plain for each in volumes[id(one)]),
+            labels=[each for one in labels for each in volumes[id(one)]],
+            interpolation=self.interpolation,
+            backgrounds=[self.background for one in plain for _ in volumes[id(one)]],
+            threads=self.threads,
+        )
+        for some, results in ((plain, iter(done.images)), (labels, iter(done.labels))):
+            for one in some:
+                _fill(one, [next(results) for _ in volumes[id(one)]])
+        self.record = done.certificate  # with the share by which it was shrunk, for the history
+        subject[CERTIFICATE] = done.certificate
+        return subject
+
+
+class RandomTetwarp(RandomTransform, SpatialTransform):
+    """Deforms the images of a subject by one random field; `Tetwarp` stands for it in the subject's history.
+
+    Parameters
+    ----------
+    family : Family
+        What is drawn (`tetwarp.augmentation`), over the grid of the subject's first image.
+    interpolation, background
+        As of `Tetwarp`.
+    cell_size : int
+        Voxels between vertices.
+    seed, seed_key : int, key
+        With both, a subject is deformed by what `seed`, `epoch` and `subject[seed_key]` say: workers and order change
+        nothing; whether it is deformed, TorchIO's own random state decides by `p`. Without `seed_key` that decides all.
+
+    Attributes
+    ----------
+    epoch : int
+        To be counted on by the training loop, where `seed_key` is used.
+
+    Examples
+    --------
+    >>> RandomTetwarp(p=0.5).probability
+    0.5
+    """
+
+    def __init__(
+        self,
+        family: Family | None = None,
+        *,
+        interpolation: str = "linear",
+        background: float | None = None,
+        cell_size: int = 4,
+        seed: int = 0,
+        seed_key: str | None = None,
+        threads: int = 0,
+        **kwargs: Any,
+    ) -> None:
+        super().__init__(**kwargs)
+        _calls.word(interpolation, "interpolation", ("linear", "cubic"))
+        self.family = Elastic() if family is None else family
+        self.interpolation = interpolation
+        self.background = background
+        self.cell_size = _calls.whole(cell_size, "cell_size", 1, 65536)
+        self.seed = _calls.whole(seed, "seed", 0, 2**63 - 1)
+        self.seed_key = seed_key
+        self.threads = threads
+        self.epoch = 0
+
+    def apply_transform(self, subject: Any) -> Any:
+        """Draws a field, and deforms a subject by it."""
+        images = list(self.get_images(subject))
+        if not images:
+            return subject
+        if self.seed_key is None:
+            seed = int(torch.randint(2**62, (1,)))
+        elif self.seed_key in subject:
+            seed = seed_of(self.seed, self.epoch, subject[self.seed_key])
+        else:
+            raise InputError(f"the subject has no {self.seed_key!r}, which seed_key names")
+        warp = draw(self.family, _geometry_of(images[0]), seed=seed, cell_size=self.cell_size)
+        record = {**warp.record(), "seed": seed, "epoch": None if self.seed_key is None else self.epoch}
+        transform = Tetwarp(
+            record, self.interpolation, self.background, self.threads, include=self.include, exclude=self.exclude,
+            copy=False,
+        )  # fmt: skip
+        return transform(subject)
+
+
+def _geometry_of(image: Any) -> Geometry:
+    return Geometry.from_affine(image.affine, tuple(image.spatial_shape), space="RAS")
+
+
+def _volumes_of(image: Any) -> list[Volume]:
+    """The channels."""
+    data, geometry = image.data, _geometry_of(image)  # the data first: an image is read when it is touched
+    return [Volume(array_of(channel), geometry) for channel in data]
+
+
+def _fill(image: Any, channels: list[Volume]) -> None:
+    """Gives an image other channels on the same grid."""
+    image.set_data(torch.stack([tensor_of(channel.array) for channel in channels]))
