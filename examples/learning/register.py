@@ -4,13 +4,14 @@
 
 """Registration by gradient descent through the deformation: from one phase of a breath to another.
 
-    register.py MOVING FIXED -o FOLDER [--device cuda] [--cells 32,16,8] [--steps 60,60,80]
+    register.py MOVING FIXED -o FOLDER [--device cuda] [--cells 32,16,8] [--steps 40,60,60]
 
 Finds the forward field that moves MOVING onto FIXED: each vertex of a lattice takes what it holds along. Minimised is the mean
 squared difference, voxels that nothing covers counting as --background, and a smoothness term: the mean squared second differences
 of the displacement. The optimiser is Adam, coarse to fine: on volumes of half the resolution first, with larger cells.
 
-Makes FOLDER/field.mha (the forward field), FOLDER/moved.nii.gz, FOLDER/report.json and, with matplotlib, FOLDER/registration.png.
+Makes FOLDER/field.mha (the forward field), FOLDER/moved.nii.gz, FOLDER/report.json and, with matplotlib and both on one grid,
+FOLDER/registration.png.
 A device gives the same bits each time. Needs PyTorch 2.4 or later and the Python package.
 """
 import argparse
@@ -55,10 +56,20 @@ def on_lattice(displacement, known, wanted):
     return displacement.contiguous()
 
 
+def straight(path):
+    """The volume of a file or folder, on a straight, even grid."""
+    volume = tetwarp.read(path)
+    if volume.geometry != volume.geometry.straightened():
+        volume = tetwarp.deform(volume, tetwarp.fields.identity(volume.geometry, cell_size=8)).volume
+    return volume
+
+
 def roughness(displacement, spacing):
     """Mean squared second differences along each axis, per mm."""
     total = 0
     for axis, along in zip((2, 3, 4), (2, 1, 0)):
+        if displacement.shape[axis] < 3:
+            continue
         middle = displacement.narrow(axis, 1, displacement.shape[axis] - 2)
         low, high = (displacement.narrow(axis, n, displacement.shape[axis] - 2) for n in (0, 2))
         total = total + ((low - 2 * middle + high) / spacing[along]).square().mean()
@@ -136,7 +147,7 @@ def main():
     rates = [float(number) for number in options.rates.split(",")]
     if not len(cells) == len(steps) == len(rates):
         words.error("--cells, --steps and --rates differ in length")
-    moving, fixed = tetwarp.read(options.moving), tetwarp.read(options.fixed)
+    moving, fixed = straight(options.moving), straight(options.fixed)
 
     def tensor(volume):
         return torch.from_numpy(numpy.asarray(volume.array, numpy.float32))[None, None].to(options.device)

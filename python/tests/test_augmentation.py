@@ -90,6 +90,9 @@ def test_what_folds_is_shrunk_and_counted():
     certificate = warp.deform(image, labels=[labels]).certificate
     assert certificate["shrunk"] > 0 and certificate["share"] == pytest.approx(0.8 ** certificate["shrunk"])
     assert certificate["inverted"] == 0
+    done = warp.deform(image, backgrounds=[0])
+    wrong, right = (np.abs(one.undo(done.images[0], background=0).array - image.array).mean() for one in (warp, done.warp))
+    assert right < 0.3 * wrong
 
 
 @pytest.mark.parametrize("family", FAMILIES[1:3], ids=lambda one: type(one).__name__)
@@ -109,6 +112,45 @@ def test_ranges_and_words_that_do_not_fit_are_refused():
         aug.draw(aug.Elastic((5, 1)), image.geometry, seed=1)
     with pytest.raises(tw.InputError, match="nothing to deform"):
         aug.draw(aug.Elastic(), image.geometry, seed=1).deform()
+    with pytest.raises(tw.InputError, match="no less than 0"):
+        aug.draw(aug.Elastic(-5), image.geometry, seed=1)
+    with pytest.raises(tw.InputError, match="expected a number, or"):
+        aug.draw(aug.Elastic((1, 2, 3)), image.geometry, seed=1)
+    record = aug.draw(aug.Elastic(), image.geometry, seed=1).record()
+    for wrong, words in (({**record, "family": "Nope"}, "no family 'Nope'"), ({"family": "Elastic"}, "no record")):
+        with pytest.raises(tw.InputError, match=words):
+            aug.Warp.of_record(wrong)
+    with pytest.raises(tw.InputError, match="named by a ndarray"):
+        aug.seed_of(0, 0, np.zeros(3))
+
+
+def test_a_family_of_ones_own_is_known_by_its_name():
+    class Shift(aug.Family):
+        def draw(self, random, geometry, cell_size):
+            return {"by": random.uniform(1, 3)}
+
+        @staticmethod
+        def field(parameters, geometry, cell_size):
+            return tw.fields.translate(geometry, by=(0, 0, parameters["by"]), cell_size=cell_size)
+
+    image, _ = scene()
+    done = aug.draw(Shift(), image.geometry, seed=1).deform(image)
+    assert done.certificate["family"] == "Shift" and done.certificate["jacobian"] == [1, 1]
+
+
+def test_what_reaches_beyond_the_first_image_is_deformed_as_well():
+    image, _ = scene()
+    large = tw.Geometry((120, 100, 70), image.geometry.spacing, image.geometry.point([-40, -30, -20]), image.geometry.direction)
+    labels = tw.Volume(np.ones(large.shape, np.uint8), large)
+    for family in (aug.Elastic(3, 40), aug.ElasticAffine(angle=3, shift=2), aug.Swelling(30, 0.5)):
+        done = aug.draw(family, image.geometry, seed=2).deform(image, labels=[labels])
+        before, after = done.certificate["labels"][0]["1"]
+        assert 0.8 * before < after <= before
+        back = done.warp.undo(done.labels[0], interpolation="vote", background=0)
+        assert (back.array == 1).mean() > 0.8
+        # The first image is deformed as it is without the other.
+        alone = aug.draw(family, image.geometry, seed=2).deform(image)
+        assert np.abs(alone.images[0].array - done.images[0].array).max() < 1
 
 
 def test_a_seed_depends_on_all_three():
@@ -147,7 +189,7 @@ def test_monai_deforms_all_keys_by_one_field():
     transform.set_random_state(3)
     done = transform(sample)
     assert len(done["image"].applied_operations) == 1
-    certificate = done["tetwarp_certificate"]
+    certificate = json.loads(done["tetwarp_certificate"])
     expected = aug.Warp.of_record(certificate).deform(image, labels=[labels], backgrounds=[0])
     assert np.array_equal(done["image"][0].numpy(), expected.images[0].array.transpose(2, 1, 0))
     assert np.array_equal(done["label"][0].numpy(), expected.labels[0].array.transpose(2, 1, 0))
@@ -159,7 +201,7 @@ def test_monai_deforms_all_keys_by_one_field():
     assert not back["image"].applied_operations
     still = monai_transform(prob=0.0)
     untouched = still(sample)
-    assert untouched["tetwarp_certificate"] is None and (untouched["image"] == sample["image"]).all()
+    assert untouched["tetwarp_certificate"] == "" and (untouched["image"] == sample["image"]).all()
     assert (still.inverse(untouched)["image"] == sample["image"]).all()
 
 
@@ -193,6 +235,60 @@ def test_monai_gives_the_same_in_any_worker_and_order(start):
     assert not (data[2]["image"] == alone[2]).all()
     with pytest.raises(tw.InputError, match="seed_key"):
         transform(sample)
+
+
+def test_workers_that_stay_see_the_epoch():
+    sample = monai_sample(name="a")
+    from torch.utils.data import DataLoader
+
+    transform = monai_transform(seed=7, seed_key="name")
+    loader = DataLoader(Samples([sample], transform), batch_size=None, num_workers=1, persistent_workers=True)
+    seen = []
+    for transform.epoch in (0, 1):
+        seen += [one["image"] for one in loader]
+    assert not (seen[0] == seen[1]).all()
+
+
+@pytest.mark.parametrize("options", [{}, {"seed": 3, "seed_key": "name"}])
+def test_monai_makes_batches_and_inverts_predictions(options):
+    sample = monai_sample()
+    from monai.data import DataLoader
+    from monai.transforms import Compose, Invertd
+
+    transform = Compose([monai_transform(**{**options, "prob": 0.5})])
+    samples = [{**sample, "name": name} for name in "abcdef"]
+    samples[1]["label"] = samples[1]["label"] * 0
+    certificates = []
+    for batch in DataLoader(Samples(samples, transform), batch_size=3):
+        assert batch["image"].shape == (3, 2, 44, 40, 30)
+        certificates += batch["tetwarp_certificate"]
+    assert len(certificates) == 6 and any(certificates)
+    assert all(json.loads(one)["inverted"] == 0 for one in certificates if one)
+    transform = Compose([monai_transform(**options)])
+    done = transform(samples[0])
+    prediction = done["image"].clone()
+    prediction.copy_((prediction > 100).to(prediction.dtype))
+    done["pred"] = prediction
+    back = Invertd("pred", transform, "image", nearest_interp=True)(done)["pred"]
+    assert set(back.unique().tolist()) == {0, 1}
+    expected = (sample["image"] > 100).float()
+    assert (back[0] - expected[0]).abs().mean() < 0.01
+
+
+@pytest.mark.parametrize("kind", ["bool", "int64", "float16", "bfloat16", "float64"])
+def test_monai_keeps_types(kind):
+    torch = pytest.importorskip("torch")
+    sample = monai_sample()
+    key = "label" if kind in ("bool", "int64") else "image"
+    sample[key] = sample[key].to(getattr(torch, kind))
+    transform = monai_transform()
+    transform.set_random_state(1)
+    done = transform(sample)
+    assert done[key].dtype == sample[key].dtype and done[key].shape == sample[key].shape
+    done["image"].affine[0, 3] = 99
+    assert sample["image"].affine[0, 3] != 99
+    with pytest.raises(TypeError, match="MetaTensor"):
+        monai_transform(prob=0.0)({**sample, "image": sample["image"].as_tensor()})
 
 
 class Samples:
@@ -235,7 +331,7 @@ def test_torchio_deforms_replays_and_pulls_back():
     transform = pickle.loads(pickle.dumps(RandomTetwarp(aug.ElasticAffine(), background=0)))
     done = transform(subject)
     image, labels = scene()
-    expected = aug.Warp.of_record(done[CERTIFICATE]).deform(image, labels=[labels], backgrounds=[0])
+    expected = aug.Warp.of_record(json.loads(done[CERTIFICATE])).deform(image, labels=[labels], backgrounds=[0])
     assert np.array_equal(done["image"].data[0].numpy(), expected.images[0].array.transpose(2, 1, 0))
     assert np.array_equal(done["label"].data[0].numpy(), expected.labels[0].array.transpose(2, 1, 0))
     assert CERTIFICATE not in subject
@@ -246,6 +342,23 @@ def test_torchio_deforms_replays_and_pulls_back():
     assert after < 0.1 * before
     torch.manual_seed(4)
     assert torch.equal(transform(subject)["image"].data, done["image"].data)
+    before = subject["image"].data.clone()
+    assert torch.equal(done.history[0](subject)["image"].data, done["image"].data)
+    assert torch.equal(subject["image"].data, before)
+
+
+def test_torchio_makes_batches():
+    torchio = pytest.importorskip("torchio")
+
+    from tetwarp.torchio import CERTIFICATE, RandomTetwarp
+
+    subjects = [torchio_subject() for _ in range(6)]
+    data = torchio.SubjectsDataset(subjects, RandomTetwarp(aug.Elastic(80, 25, may_fold=True), p=0.5))
+    certificates = [one for batch in torchio.SubjectsLoader(data, batch_size=3) for one in batch[CERTIFICATE]]
+    assert len(certificates) == 6
+    for one in filter(None, certificates):
+        assert json.loads(one)["shrunk"] > 0 and "seed" in json.loads(one)
+    assert CERTIFICATE not in subjects[0]
 
 
 def test_torchio_takes_its_seed_from_the_subject():

@@ -103,6 +103,21 @@ def test_opcheck(device):
         )
 
 
+UNEVEN = tw.Geometry((7, 6, 4), spacing=(1, 1, 2), slices=[0, 1, 2, 6])
+
+
+def test_uneven_slices_go_onto_a_straight_grid():
+    volume = torch.rand(1, 1, *UNEVEN.shape)
+    shape = UNEVEN.straightened().shape
+    displacement = torch.zeros(1, 3, *tt.lattice_shape(shape, 4))
+    assert tuple(displacement.shape[2:]) == UNEVEN.lattice(4).shape
+    straight = list(UNEVEN.straightened()._numbers)
+    field = (None, None, None, None, [4.0], list(UNEVEN._numbers), straight, "linear", "background")
+    torch.library.opcheck(torch.ops.tetwarp.deform, (volume.requires_grad_(), displacement.requires_grad_(), *field, 0.0))
+    got = tt.deform(volume, displacement, lattice=4, geometry=UNEVEN, outside="background")
+    assert tuple(got.shape[2:]) == shape != UNEVEN.shape
+
+
 @pytest.mark.parametrize("device", DEVICES)
 def test_same_bits_on_every_run_and_beside_any_batch_mate(device):
     volume, displacement = scene(samples=3, channels=2, seed=5)
@@ -124,10 +139,13 @@ def test_compiles_without_graph_breaks(device):
     volume, displacement = scene()
     volume, displacement = volume.to(device), displacement.to(device)
     grid = tw.Geometry((11, 10, 9), spacing=(1, 1, 2))
+    lattice = tw.Geometry((11, 10, 9)).lattice(4)
+    field = tw.VertexField(lattice, np.zeros((*lattice.shape, 3), np.float32))
 
     def loss(v, d):
         moved = tt.deform(v * 1.5, d, lattice=4, geometry=grid, outside="background")
-        return moved.square().mean() + tt.deform(v, d, lattice=4, outside="rest").mean()
+        other = tt.deform(v, d, lattice=lattice, outside="rest").mean() + tt.deform(v, d, lattice=field, outside="rest").mean()
+        return moved.square().mean() + other
 
     compiled = torch.compile(loss, fullgraph=True, backend="aot_eager")
     results = []
@@ -231,12 +249,16 @@ def test_refuses_what_does_not_fit():
         (dict(outside="gone"), "outside"),
         (dict(displacement=displacement.clone().requires_grad_(), interpolation="cubic"), "cubic"),
         (dict(volume=volume.clone().requires_grad_(), interpolation="vote"), "vote"),
+        (dict(volume=volume.to(torch.int16), displacement=displacement.clone().requires_grad_()), "torch.int16"),
     ]
     for change, words in cases:
         options = dict(volume=volume, displacement=displacement, lattice=4, outside="background") | change
         with pytest.raises(tw.InputError) as error:
             tt.deform(options.pop("volume"), options.pop("displacement"), **options)
         assert words in str(error.value)
+    for lattice in (4.0, True, None):
+        with pytest.raises(TypeError, match="lattice is a"):
+            tt.deform(volume, displacement, lattice=lattice)
     folded = displacement * float("nan")
     with pytest.raises(tw.InputError, match="finite"):
         tt.deform(volume, folded, lattice=4)
@@ -315,3 +337,18 @@ def test_the_registration_example_is_as_near_as_plastimatchs_splines(device, tmp
     assert report["mean_squared_error"] <= 604  # HU squared, of plastimatch's B-spline on this pair
     assert report["inverted"] == 0
     assert report["seconds"] < (60 if device == "cuda" else 600)
+
+
+def test_a_fork_amid_another_threads_call_hangs_nobody():
+    script = """
+import os, sys, torch, tetwarp.torch as tt
+volume, moved = torch.rand(1, 1, 9, 9, 9), torch.zeros(1, 3, 3, 3, 3)
+torch.set_num_threads(1)
+tt.deform(volume, moved, lattice=4)
+tt._resamplers._lock.acquire()  # as another thread may hold it
+child = os.fork()
+if child == 0:
+    os._exit(0 if torch.equal(tt.deform(volume, moved, lattice=4), volume) else 1)
+sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+"""
+    assert subprocess.run([sys.executable, "-c", script], timeout=60, check=False).returncode == 0

@@ -15,6 +15,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+import operator
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -35,11 +36,15 @@ Range = tuple[float, float]
 _SHRINK, _MOST_SHRINKS = 0.8, 40
 
 
-def _range(value: float | Range, name: str) -> Range:
-    low, high = value if isinstance(value, Sequence) else (value, value)
-    low, high = _calls.number(low, name), _calls.number(high, name)
+def _range(value: float | Range, name: str, least: float = -np.inf) -> Range:
+    pair = value if isinstance(value, Sequence) else (value, value)
+    if isinstance(pair, str) or len(pair) != 2:
+        raise InputError(f"{name} is {value!r}; expected a number, or the smallest and the largest one")
+    low, high = (_calls.number(one, name) for one in pair)
     if low > high:
         raise InputError(f"{name} is {value!r}; expected the smaller value first")
+    if low < least:
+        raise InputError(f"{name} is {value!r}; expected no less than {least:g}")
     return low, high
 
 
@@ -70,13 +75,24 @@ def never_folding_amplitude(geometry: Geometry, spacing: float, cell_size: int) 
     >>> round(never_folding_amplitude(Geometry((64, 64, 64)), spacing=45, cell_size=4), 2)
     9.9
     """
+    geometry = geometry.straightened()
     edges = np.array(geometry.spacing) * cell_size
     turned = float(np.abs(geometry.direction).sum(axis=0).max())
     return float(0.99 * spacing * edges.min() / (1.5 * edges.sum() * turned**2))
 
 
+#: Families by their names.
+FAMILIES: dict[str, type[Family]] = {}
+
+
 class Family:
-    """A kind of random deformation. It draws parameters, which are plain numbers, and makes fields of them."""
+    """A kind of random deformation. It draws parameters, which are plain numbers, and makes fields of them.
+
+    A class of one's own is known by its name, as those here are.
+    """
+
+    def __init_subclass__(cls) -> None:
+        FAMILIES[cls.__name__] = cls
 
     def draw(self, random: np.random.Generator, geometry: Geometry, cell_size: int) -> dict[str, Any]:
         """Parameters of one deformation of a volume; what `json` can write."""
@@ -112,8 +128,8 @@ class Elastic(Family):
     may_fold: bool = False
 
     def draw(self, random: np.random.Generator, geometry: Geometry, cell_size: int) -> dict[str, Any]:
-        spacing = random.uniform(*_range(self.spacing, "spacing"))
-        amplitude = random.uniform(*_range(self.amplitude, "amplitude"))
+        spacing = random.uniform(*_range(self.spacing, "spacing", 0))
+        amplitude = random.uniform(*_range(self.amplitude, "amplitude", 0))
         if not self.may_fold:
             amplitude = min(amplitude, never_folding_amplitude(geometry, spacing, cell_size))
         return {"amplitude": amplitude, "spacing": spacing, "seed": int(random.integers(2**63))}
@@ -249,9 +265,6 @@ class Swelling(Family):
         return fields.bubble(geometry, cell_size=cell_size, **parameters)
 
 
-FAMILIES: dict[str, type[Family]] = {one.__name__: one for one in (Elastic, ElasticAffine, Breathing, Swelling)}
-
-
 @dataclasses.dataclass
 class Warped:
     """What `Warp.deform` gives."""
@@ -262,6 +275,8 @@ class Warped:
     labels: list[Any]
     #: What was done and what came of it; what `json` can write.
     certificate: dict[str, Any]
+    #: The deformation as it was done: shrunk, if it had to be. Its `undo` pulls back.
+    warp: Warp
 
 
 @dataclasses.dataclass(frozen=True)
@@ -278,28 +293,58 @@ class Warp:
         Grid over which it was drawn.
     cell_size : int
         Voxels between vertices.
-    share : float
-        By which all displacements are multiplied.
+    shrunk : int
+        How often all displacements are multiplied by 0.8.
     """
 
     family: str
     parameters: Mapping[str, Any]
     geometry: Geometry
     cell_size: int = 4
-    share: float = 1.0
+    shrunk: int = 0
 
-    def field(self) -> VertexField:
-        """The forward field. Its lattice reaches so far beyond the grid that what moves in has somewhere to come from."""
+    def __post_init__(self) -> None:
+        if self.family not in FAMILIES:
+            raise InputError(f"there is no family {self.family!r}; expected one of {', '.join(FAMILIES)}")
+        _calls.whole(self.cell_size, "cell_size", 1, 65536)
+
+    @property
+    def share(self) -> float:
+        """What is left of each displacement, 1 or less."""
+        return float(_SHRINK**self.shrunk)
+
+    def field(self, grids: Sequence[Geometry] = ()) -> VertexField:
+        """The forward field.
+
+        Its lattice holds the grid over which it was drawn and others, and reaches so far beyond them that what moves in
+        has somewhere to come from.
+
+        Parameters
+        ----------
+        grids : sequence of Geometry
+            Of other images that go through it.
+        """
         make = FAMILIES[self.family].field
         straight = self.geometry.straightened()
-        inner = make(self.parameters, straight, self.cell_size)
+
+        size = np.array(straight.size)
+
+        # Pairs of cells on either side: vertices, the tetrahedra of cells and the middle lie where they lie without them.
+        def grown(pairs: npt.NDArray[np.int64]) -> Geometry:
+            margin = 2 * self.cell_size * pairs
+            return Geometry(
+                (size + 2 * margin).tolist(), straight.spacing, straight.point(-margin).tolist(), straight.direction
+            )
+
+        beyond = np.zeros(3)
+        ends = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+        for grid in grids:
+            corners = straight.index(grid.point(ends * (np.array(grid.size) - 1)))
+            beyond = np.maximum(beyond, np.maximum(-corners.min(axis=0), corners.max(axis=0) - size + 1) - 1e-6)
+        inner = make(self.parameters, grown(_pairs(beyond, self.cell_size)), self.cell_size)
         farthest = np.abs(inner.displacement).reshape(-1, 3).max(axis=0)
-        beyond = np.ceil(np.abs(straight.direction.T) @ farthest / np.array(straight.spacing) / self.cell_size) + 1
-        cells = np.array(beyond, np.int64) * self.cell_size
-        grown = Geometry(
-            (np.array(straight.size) + 2 * cells).tolist(), straight.spacing, straight.point(-cells).tolist(), straight.direction
-        )
-        field = make(self.parameters, grown, self.cell_size)
+        beyond += np.abs(straight.direction.T) @ farthest / np.array(straight.spacing) + self.cell_size
+        field = make(self.parameters, grown(_pairs(beyond, self.cell_size)), self.cell_size)
         assert field.lattice is not None
         return VertexField(field.lattice, field.displacement * np.float32(self.share))
 
@@ -338,8 +383,8 @@ class Warp:
         grids = [adapters.volume_of(one)[0].geometry for one in everything]
         alone = [grid != grids[0] for grid in grids]
         warp = self
-        for shrinks in range(_MOST_SHRINKS):
-            field = warp.field()
+        for _ in range(_MOST_SHRINKS):
+            field = warp.field(grids)
             done = deform(
                 everything[0],
                 field,
@@ -355,13 +400,12 @@ class Warp:
             )
             if done.report.inverted + done.report.degenerate == 0:
                 break
-            warp = dataclasses.replace(warp, share=warp.share * _SHRINK)
+            warp = dataclasses.replace(warp, shrunk=warp.shrunk + 1)
         else:
             raise InputError(f"the field folds even when it is shrunk {_MOST_SHRINKS} times; draw smaller displacements")
         results = [done.volume, *done.volumes]
         certificate = {
             **warp.record(),
-            "shrunk": shrinks,
             "inverted": done.report.inverted,
             "degenerate": done.report.degenerate,
             "jacobian": [done.report.jacobian_min, done.report.jacobian_max],
@@ -370,17 +414,18 @@ class Warp:
                 _volumes_of(before, after) for before, after in zip(labels, results[len(images) :])
             ],
         }
-        return Warped(results[: len(images)], results[len(images) :], certificate)
+        return Warped(results[: len(images)], results[len(images) :], certificate, warp)
 
     def undo(self, image: Any, *, interpolation: str = "linear", background: float | None = None) -> Any:
-        """An image of the deformed grid, pulled back: each voxel takes what lies where the forward map leads its centre.
+        """An image that was deformed, pulled back: each voxel takes what lies where the forward map leads its centre.
 
-        Deforming and undoing interpolates twice, and what left the grid is lost.
+        Deforming and undoing interpolates twice, and what left the grid is lost. A field that had to be shrunk is undone
+        by `Warped.warp`.
         """
         volume, back = adapters.volume_of(image)
         grid = volume.geometry.straightened()
         places = _places(grid).reshape(-1, 3)
-        moved, inside = move_points(places, self.field(), grid)
+        moved, inside = move_points(places, self.field([grid]), grid)
         moved[~inside] = np.nan
         pull = PullField(grid, np.ascontiguousarray((moved - places).reshape(*grid.shape, 3), np.float32))
         done = deform(volume, pull_field=pull, interpolation=interpolation, background=background, outside="background")
@@ -395,6 +440,7 @@ class Warp:
             "parameters": dict(self.parameters),
             "geometry": {name: list(numbers) for name, numbers in grid.items()},
             "cell_size": self.cell_size,
+            "shrunk": self.shrunk,
             "share": self.share,
         }
 
@@ -408,11 +454,14 @@ class Warp:
         >>> Warp.of_record(json.loads(json.dumps(warp.record()))) == warp
         True
         """
-        grid = dict(record["geometry"])
-        direction = np.array(grid.pop("direction"), np.float64).reshape(3, 3)
-        return cls(
-            record["family"], record["parameters"], Geometry(**grid, direction=direction), record["cell_size"], record["share"]
-        )
+        try:
+            grid = dict(record["geometry"])
+            direction = np.array(grid.pop("direction"), np.float64).reshape(3, 3)
+            geometry = Geometry(**grid, direction=direction)
+            family, parameters, cell_size, shrunk = (record[name] for name in ("family", "parameters", "cell_size", "shrunk"))
+        except (KeyError, TypeError) as missing:
+            raise InputError(f"this is no record of a deformation: {missing}") from None
+        return cls(family, dict(parameters), geometry, cell_size, shrunk)
 
 
 def draw(family: Family, geometry: Geometry, *, seed: int | np.random.Generator, cell_size: int = 4) -> Warp:
@@ -433,20 +482,41 @@ def draw(family: Family, geometry: Geometry, *, seed: int | np.random.Generator,
     >>> warp.family, warp.share
     ('Swelling', 1.0)
     """
+    cell_size = _calls.whole(cell_size, "cell_size", 1, 65536)
     random = seed if isinstance(seed, np.random.Generator) else np.random.default_rng(seed)
     return Warp(type(family).__name__, family.draw(random, geometry, cell_size), geometry, cell_size)
 
 
 def seed_of(seed: int, epoch: int, key: Any) -> int:
-    """The seed of a sample in an epoch: the first 8 bytes of a SHA-256 of the three, whatever the worker and the order.
+    """The seed of a sample in an epoch: 63 bits of a SHA-256 of the three, whatever the worker and the order.
+
+    Parameters
+    ----------
+    key : str or int
+        Names the sample.
+
+    Raises
+    ------
+    InputError
+        For a key of another type: what a text says of it may not tell samples apart.
 
     Examples
     --------
     >>> seed_of(7, 0, "case-12") == seed_of(7, 0, "case-12") != seed_of(7, 1, "case-12")
     True
     """
+    if not isinstance(key, str):
+        try:
+            key = operator.index(key)
+        except TypeError:
+            raise InputError(f"a sample is named by a {type(key).__name__}; expected a text or a whole number") from None
     text = json.dumps([seed, epoch, str(key)])
-    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "little")
+    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "little") >> 1
+
+
+def _pairs(voxels: FloatArray, cell_size: int) -> npt.NDArray[np.int64]:
+    """How many pairs of cells reach over so many voxels on each axis."""
+    return np.ceil(voxels / (2 * cell_size)).astype(np.int64)
 
 
 def _counts(array: npt.NDArray[Any]) -> list[tuple[Any, int]]:

@@ -75,11 +75,13 @@ class Geometry:
     array([-8.5,  0. ,  7. ])
     """
 
-    __slots__ = ("_grid", "_numbers")
+    __slots__ = ("_grid", "_numbers", "_straight")
 
     _grid: _core.Grid
     #: Size, spacing, origin, rows of the direction, slices: what an operator of PyTorch takes in the place of a grid.
     _numbers: tuple[float, ...]
+    #: The same of the straightened grid.
+    _straight: tuple[float, ...]
 
     def __init__(
         self,
@@ -107,9 +109,12 @@ class Geometry:
         self._keep(grid)
 
     def _keep(self, grid: _core.Grid) -> None:
-        numbers = (*map(float, grid.size), *grid.spacing, *grid.origin, *grid.direction, *grid.slices)
+        def numbers(of: _core.Grid) -> tuple[float, ...]:
+            return (*map(float, of.size), *of.spacing, *of.origin, *of.direction, *of.slices)
+
         object.__setattr__(self, "_grid", grid)
-        object.__setattr__(self, "_numbers", numbers)
+        object.__setattr__(self, "_numbers", numbers(grid))
+        object.__setattr__(self, "_straight", numbers(grid.straightened()))
 
     @classmethod
     def _of(cls, grid: _core.Grid) -> Geometry:

@@ -11,6 +11,7 @@ Needs MONAI 1.2 or later. Families and certificates: docs/guide/learning.md.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Hashable, Mapping, Sequence
 from typing import Any
 
@@ -19,9 +20,10 @@ from monai.data.meta_tensor import MetaTensor
 from monai.transforms.inverse import InvertibleTransform
 from monai.transforms.lazy.functional import apply_pending
 from monai.transforms.transform import MapTransform, RandomizableTransform
+from monai.utils.misc import ensure_tuple
 
 from . import _calls
-from .adapters.tensors import array_of, tensor_of
+from .adapters.tensors import array_of, readable, tensor_of
 from .augmentation import Elastic, Family, Warp, draw, seed_of
 from .errors import InputError
 from .geometry import Geometry
@@ -51,15 +53,16 @@ class RandTetwarpd(RandomizableTransform, MapTransform, InvertibleTransform):
     cell_size : int
         Voxels between vertices.
     seed, seed_key : int, key
-        With both, a sample is deformed by what `seed`, `epoch` and `sample[seed_key]` say: workers and order change
-        nothing. Without `seed_key` MONAI's own random state decides.
+        With both, a sample is deformed by what `seed`, `epoch` and `sample[seed_key]`, a text or a whole number, say:
+        workers and order change nothing. Several such transforms of a pipeline want a seed each. Without `seed_key`
+        MONAI's own random state decides.
     certificate_key : str or None
-        Where the sample gets its certificate, a dict that `json` can write; None where it was not deformed.
+        Where the sample gets its certificate, as a text of JSON; an empty text where it was not deformed.
 
     Attributes
     ----------
     epoch : int
-        To be counted on by the training loop, where `seed_key` is used.
+        To be counted on by the training loop, where `seed_key` is used. Workers see it at once.
 
     Raises
     ------
@@ -77,7 +80,7 @@ class RandTetwarpd(RandomizableTransform, MapTransform, InvertibleTransform):
         keys: Sequence[Hashable] | Hashable,
         family: Family | None = None,
         *,
-        labels: Sequence[Hashable] = (),
+        labels: Sequence[Hashable] | Hashable = (),
         interpolation: str = "linear",
         background: float | None = None,
         prob: float = 0.1,
@@ -91,11 +94,11 @@ class RandTetwarpd(RandomizableTransform, MapTransform, InvertibleTransform):
         MapTransform.__init__(self, keys, allow_missing_keys)
         RandomizableTransform.__init__(self, prob)
         _calls.word(interpolation, "interpolation", ("linear", "cubic"))
-        unknown = [key for key in labels if key not in self.keys]
+        self.labels: tuple[Hashable, ...] = tuple(ensure_tuple(labels))
+        unknown = [key for key in self.labels if key not in self.keys]
         if unknown:
             raise InputError(f"labels names {unknown[0]!r}, which is not among keys")
         self.family = Elastic() if family is None else family
-        self.labels = tuple(labels)
         self.interpolation = interpolation
         self.background = background
         self.cell_size = _calls.whole(cell_size, "cell_size", 1, 65536)
@@ -103,7 +106,15 @@ class RandTetwarpd(RandomizableTransform, MapTransform, InvertibleTransform):
         self.seed_key = seed_key
         self.certificate_key = certificate_key
         self.threads = threads
-        self.epoch = 0
+        self._epoch = torch.zeros((), dtype=torch.int64).share_memory_()
+
+    @property
+    def epoch(self) -> int:
+        return int(self._epoch)
+
+    @epoch.setter
+    def epoch(self, number: int) -> None:
+        self._epoch.fill_(number)
 
     def randomize(self, data: Mapping[Hashable, Any]) -> int:  # type: ignore[override]
         """Whether a sample is deformed, and the seed of its field."""
@@ -113,21 +124,21 @@ class RandTetwarpd(RandomizableTransform, MapTransform, InvertibleTransform):
         if self.seed_key not in data:
             raise InputError(f"the sample has no {self.seed_key!r}, which seed_key names")
         seed = seed_of(self.seed, self.epoch, data[self.seed_key])
-        self._do_transform = seed / 2**64 < self.prob
+        self._do_transform = seed / 2**63 < self.prob
         return seed
 
     def __call__(self, data: Mapping[Hashable, Any]) -> dict[Hashable, Any]:
         """Deforms a sample."""
         sample = dict(data)
+        keys = list(self.key_iterator(sample))
+        for key in keys:
+            sample[key] = _ready(sample[key], key)
         seed = self.randomize(sample)
-        keys = [key for key in self.key_iterator(sample)]
-        certificate = None
+        certificate = ""
         if keys and self._do_transform:
-            for key in keys:
-                sample[key] = _ready(sample[key], key)
             warp = draw(self.family, _geometry_of(sample[keys[0]]), seed=seed, cell_size=self.cell_size)
             images = [key for key in keys if key not in self.labels]
-            volumes = {key: _volumes_of(sample[key]) for key in keys}
+            volumes = {key: _volumes_of(sample[key], key) for key in keys}
             done = warp.deform(
                 *(one for key in images for one in volumes[key]),
                 labels=[one for key in keys if key in self.labels for one in volumes[key]],
@@ -135,13 +146,15 @@ class RandTetwarpd(RandomizableTransform, MapTransform, InvertibleTransform):
                 backgrounds=[self.background for key in images for _ in volumes[key]],
                 threads=self.threads,
             )
-            certificate = {**done.certificate, "seed": seed, "epoch": self.epoch if self.seed_key is not None else None}
+            of_seed = {"seed": seed} if self.seed_key is None else {"seed": seed, "epoch": self.epoch}
+            certificate = json.dumps({**done.certificate, **of_seed})
             of_images, of_labels = iter(done.images), iter(done.labels)
             for key in keys:
                 results = of_labels if key in self.labels else of_images
                 sample[key] = _tensor_like(sample[key], [next(results) for _ in volumes[key]])
         for key in keys:
-            self.push_transform(sample[key], extra_info={"certificate": certificate})
+            mode = "nearest" if key in self.labels else "bilinear"  # as MONAI's Invertd may change it
+            self.push_transform(sample[key], extra_info={"certificate": certificate, "mode": mode})
         if self.certificate_key is not None:
             sample[self.certificate_key] = certificate
         return sample
@@ -150,12 +163,12 @@ class RandTetwarpd(RandomizableTransform, MapTransform, InvertibleTransform):
         """Pulls a sample back."""
         sample = dict(data)
         for key in self.key_iterator(sample):
-            certificate = self.pop_transform(sample[key])["extra_info"]["certificate"]
-            if certificate is None:
+            done = self.pop_transform(sample[key])["extra_info"]
+            if not done["certificate"]:
                 continue
-            warp = Warp.of_record(certificate)
-            kind, background = ("vote", 0.0) if key in self.labels else (self.interpolation, self.background)
-            back = [warp.undo(one, interpolation=kind, background=background) for one in _volumes_of(sample[key])]
+            warp = Warp.of_record(json.loads(done["certificate"]))
+            kind, background = ("vote", 0.0) if done["mode"] == "nearest" else (self.interpolation, self.background)
+            back = [warp.undo(one, interpolation=kind, background=background) for one in _volumes_of(sample[key], key)]
             sample[key] = _tensor_like(sample[key], back)
         return sample
 
@@ -175,13 +188,15 @@ def _geometry_of(image: Any) -> Geometry:
     return Geometry.from_affine(image.affine.detach().cpu().numpy(), tuple(image.shape)[1:], space="RAS")
 
 
-def _volumes_of(image: Any) -> list[Volume]:
+def _volumes_of(image: Any, key: Hashable) -> list[Volume]:
     """The channels."""
     geometry = _geometry_of(image)
-    return [Volume(array_of(channel), geometry) for channel in image.as_tensor()]
+    return [Volume(array_of(channel), geometry) for channel in readable(image.as_tensor(), repr(key))]
 
 
 def _tensor_like(image: Any, channels: Sequence[Volume]) -> Any:
     """A MetaTensor of channels, with all that another one knows."""
-    tensor = torch.stack([tensor_of(channel.array) for channel in channels]).to(image.device)
-    return type(image)(tensor, meta=image.meta, applied_operations=image.applied_operations)
+    tensor = torch.stack([tensor_of(channel.array) for channel in channels]).to(image)
+    meta = {key: value for key, value in image.meta.items() if key != "affine"}
+    operations = list(image.applied_operations)
+    return type(image)(tensor, affine=image.affine.clone(), meta=meta, applied_operations=operations)

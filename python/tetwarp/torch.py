@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import collections
 import contextlib
+import os
 import threading
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -96,7 +97,7 @@ def deform(
     geometry : Geometry, optional
         Grid of the volume; by default its spacing is 1 mm, so that mm are voxels.
     lattice : int, Geometry, TetrahedralMesh or VertexField
-        A vertex on every so many voxels of the volume (`lattice_shape`); or the grid of the vertices; or a mesh; or a
+        A vertex on every so many voxels of the volume, straightened (`lattice_shape`); or the grid of the vertices; or a mesh; or a
         lattice with replaced cells, as cuts leave it. The displacements of the last two are not read.
     output : Geometry, optional
         Grid of the result, straight and even; by default that of the volume.
@@ -136,14 +137,28 @@ def deform(
         raise InputError(f"the displacement holds {displacement.dtype}; expected float32")
     if volume.device != displacement.device:
         raise InputError(f"the volume lies on {volume.device}, the displacement on {displacement.device}")
+    of_output: list[float] = []
+    straight: Sequence[int] = volume.shape[2:]
+    if geometry is not None:
+        size = [int(one) for one in _numbers_of(geometry)[2::-1]]
+        if size != list(volume.shape[2:]):
+            raise InputError(f"the volume has the shape {tuple(volume.shape[2:])}, its geometry {tuple(size)}")
+        of_output = list(geometry._straight)
+        straight = [int(size) for size in of_output[2::-1]]
+    if output is not None:
+        of_output = _numbers_of(output)
     numbers: list[float] = []
     rest = tetrahedra = lattice_vertex = replaced = None
-    if isinstance(lattice, int):
+    if isinstance(lattice, int) and not isinstance(lattice, bool):
         numbers = [float(lattice)]
-        shape: tuple[int, ...] = lattice_shape(volume.shape[2:], lattice)
+        shape: tuple[int, ...] = lattice_shape(straight, lattice)
     elif isinstance(lattice, Geometry):
         numbers = _numbers_of(lattice)
-        shape = lattice.shape
+        shape = tuple(int(size) for size in numbers[2::-1])
+    elif not isinstance(lattice, (VertexField, TetrahedralMesh)):
+        raise TypeError(
+            f"lattice is a {type(lattice).__name__}; expected an int, a Geometry, a TetrahedralMesh or a VertexField"
+        )
     else:
         held = lattice if isinstance(lattice, VertexField) else VertexField(None, None, lattice)
         if held.mesh is None:
@@ -160,11 +175,17 @@ def deform(
     expected = (volume.shape[0], 3, *shape)
     if tuple(displacement.shape) != expected:
         raise InputError(f"the displacement has the shape {tuple(displacement.shape)}; expected {expected}")
-    if displacement.requires_grad and interpolation != "linear":
+    learns = torch.is_grad_enabled()
+    if learns and displacement.requires_grad and interpolation != "linear":
         raise InputError(
             f"there is no gradient of the displacement through {interpolation} interpolation; use linear, or detach it"
         )
-    if volume.requires_grad and interpolation == "vote":
+    if learns and displacement.requires_grad and not volume.dtype.is_floating_point:
+        raise InputError(
+            f"there is no gradient of the displacement through a volume of {volume.dtype}, whose values are rounded; "
+            "convert the volume, or detach the displacement"
+        )
+    if learns and volume.requires_grad and interpolation == "vote":
         raise InputError("there is no gradient of interpolation by vote, which chooses among labels; detach the volume")
     result: torch.Tensor = torch.ops.tetwarp.deform(
         volume,
@@ -175,7 +196,7 @@ def deform(
         replaced,
         numbers,
         [] if geometry is None else _numbers_of(geometry),
-        [] if output is None else _numbers_of(output),
+        of_output,
         interpolation,
         outside,
         float(background),
@@ -263,9 +284,18 @@ class _Pool:
         with self._lock:
             self._idle.clear()
 
+    def begin_in_child(self) -> None:
+        """Begins anew in a process that was forked: another thread of the parent may have held the lock.
+
+        What was idle is left as it is: it may hold threads or memory of a device that only the parent has.
+        """
+        self._of_parent, self._lock, self._idle = self._idle, threading.Lock(), collections.OrderedDict()
+
 
 _resamplers = _Pool(_core.Resampler)
 _adjoints = _Pool(_core.Adjoint)
+for _pool in (_resamplers, _adjoints):
+    os.register_at_fork(after_in_child=_pool.begin_in_child)
 
 
 def _exchanged(tensor: torch.Tensor, stream: int) -> Any:
@@ -324,6 +354,8 @@ class _Call:
         if self.lattice is not None:
             i, j, k = self.lattice.size
             count = i * j * k
+            if len(values) < count or (self.mesh is None and len(values) > count):
+                raise InputError(f"the displacement has {len(values)} vertices, the lattice {count}")
             of_lattice, values = values[:count].view(k, j, i, 3), values[count:]
         if self.mesh is not None:
             rest, tetrahedra, lattice_vertex = self.mesh
@@ -369,6 +401,8 @@ def _gradients(
 
     volume_gradient = gradient.new_empty((samples, channels, *shape) if of_volume else (0,))
     displacement_gradient = torch.empty_like(displacement) if of_displacement else displacement.new_empty((0,))
+    if channels == 0:
+        return volume_gradient, displacement_gradient.zero_()
     made = gradient.new_empty((*shape, channels) if channels > 1 else tuple(shape), dtype=kind) if of_volume else None
     moved = None
     if of_displacement:
@@ -395,9 +429,8 @@ def _gradients(
 
 
 def _forward_like(volume: Any, displacement: Any, *rest: Any) -> Any:
-    output, geometry = rest[6], rest[5]
-    given = output or geometry
-    shape = tuple(int(size) for size in given[2::-1]) if given else tuple(volume.shape[2:])
+    output = rest[6]
+    shape = tuple(int(size) for size in output[2::-1]) if output else tuple(volume.shape[2:])
     return volume.new_empty((*volume.shape[:2], *shape))
 
 

@@ -11,6 +11,8 @@ Needs TorchIO 0.19 or later. Families and certificates: docs/guide/learning.md.
 
 from __future__ import annotations
 
+import copy
+import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -20,7 +22,7 @@ from torchio.transforms.augmentation import RandomTransform
 from torchio.transforms.spatial_transform import SpatialTransform
 
 from . import _calls
-from .adapters.tensors import array_of, tensor_of
+from .adapters.tensors import array_of, readable, tensor_of
 from .augmentation import Elastic, Family, Warp, draw, seed_of
 from .errors import InputError
 from .geometry import Geometry
@@ -33,7 +35,8 @@ class Tetwarp(SpatialTransform):
     """Deforms the images of a subject by one field that was drawn before, each on its own grid; label maps by vote.
 
     The inverse pulls each image back by the forward map, evaluated at the centre of every voxel. The subject gets a
-    certificate under "tetwarp_certificate", a dict that `json` can write.
+    certificate under "tetwarp_certificate", as a text of JSON: that of the last such transform, empty where it was not
+    deformed or pulled back.
 
     Parameters
     ----------
@@ -65,31 +68,31 @@ class Tetwarp(SpatialTransform):
 
     def apply_transform(self, subject: Any) -> Any:
         """Deforms a subject, or pulls it back."""
-        images = list(self.get_images(subject))
-        plain = [one for one in images if not isinstance(one, torchio.LabelMap)]
-        labels = [one for one in images if isinstance(one, torchio.LabelMap)]
+        images = subject.get_images_dict(intensity_only=False, include=self.include, exclude=self.exclude)
+        labels = {name: one for name, one in images.items() if isinstance(one, torchio.LabelMap)}
+        plain = {name: one for name, one in images.items() if name not in labels}
         warp = Warp.of_record(self.record)
-        volumes = {id(one): _volumes_of(one) for one in images}
+        volumes = {name: _volumes_of(one, name) for name, one in images.items()}
         if self.invert_transform:
-            for one in images:
-                kind, background = ("vote", 0.0) if isinstance(one, torchio.LabelMap) else (self.interpolation, self.background)
-                _fill(one, [warp.undo(each, interpolation=kind, background=background) for each in volumes[id(one)]])
-            subject.pop(CERTIFICATE, None)
+            for name, one in images.items():
+                kind, background = ("vote", 0.0) if name in labels else (self.interpolation, self.background)
+                _fill(one, [warp.undo(each, interpolation=kind, background=background) for each in volumes[name]])
+            subject[CERTIFICATE] = ""
             return subject
         if not images:
             return subject
         done = warp.deform(
-            *(each for one in plain for each in volumes[id(one)]),
-            labels=[each for one in labels for each in volumes[id(one)]],
+            *(each for name in plain for each in volumes[name]),
+            labels=[each for name in labels for each in volumes[name]],
             interpolation=self.interpolation,
-            backgrounds=[self.background for one in plain for _ in volumes[id(one)]],
+            backgrounds=[self.background for name in plain for _ in volumes[name]],
             threads=self.threads,
         )
         for some, results in ((plain, iter(done.images)), (labels, iter(done.labels))):
-            for one in some:
-                _fill(one, [next(results) for _ in volumes[id(one)]])
-        self.record = done.certificate  # with the share by which it was shrunk, for the history
-        subject[CERTIFICATE] = done.certificate
+            for name, one in some.items():
+                _fill(one, [next(results) for _ in volumes[name]])
+        self.record |= done.certificate  # says how often it was shrunk, for the history
+        subject[CERTIFICATE] = json.dumps(self.record)
         return subject
 
 
@@ -105,13 +108,13 @@ class RandomTetwarp(RandomTransform, SpatialTransform):
     cell_size : int
         Voxels between vertices.
     seed, seed_key : int, key
-        With both, a subject is deformed by what `seed`, `epoch` and `subject[seed_key]` say: workers and order change
-        nothing; whether it is deformed, TorchIO's own random state decides by `p`. Without `seed_key` that decides all.
+        With both, a subject is deformed by what `seed`, `epoch` and `subject[seed_key]`, a text or a whole number, say:
+        workers and order change nothing. Several such transforms of a pipeline want a seed each; whether it is deformed, TorchIO's own random state decides by `p`. Without `seed_key` that decides all.
 
     Attributes
     ----------
     epoch : int
-        To be counted on by the training loop, where `seed_key` is used.
+        To be counted on by the training loop, where `seed_key` is used. Workers see it at once.
 
     Examples
     --------
@@ -140,7 +143,23 @@ class RandomTetwarp(RandomTransform, SpatialTransform):
         self.seed = _calls.whole(seed, "seed", 0, 2**63 - 1)
         self.seed_key = seed_key
         self.threads = threads
-        self.epoch = 0
+        self._epoch = torch.zeros((), dtype=torch.int64).share_memory_()
+
+    @property
+    def epoch(self) -> int:
+        return int(self._epoch)
+
+    @epoch.setter
+    def epoch(self, number: int) -> None:
+        self._epoch.fill_(number)
+
+    def __call__(self, data: Any) -> Any:
+        """Deforms a subject or what else TorchIO takes, or leaves it."""
+        result = super().__call__(data)
+        if isinstance(result, torchio.Subject) and CERTIFICATE not in result:  # batches want it of all subjects
+            result = copy.copy(result)
+            result[CERTIFICATE] = ""
+        return result
 
     def apply_transform(self, subject: Any) -> Any:
         """Draws a field, and deforms a subject by it."""
@@ -154,10 +173,12 @@ class RandomTetwarp(RandomTransform, SpatialTransform):
         else:
             raise InputError(f"the subject has no {self.seed_key!r}, which seed_key names")
         warp = draw(self.family, _geometry_of(images[0]), seed=seed, cell_size=self.cell_size)
-        record = {**warp.record(), "seed": seed, "epoch": None if self.seed_key is None else self.epoch}
+        record = {**warp.record(), "seed": seed}
+        if self.seed_key is not None:
+            record["epoch"] = self.epoch
         transform = Tetwarp(
             record, self.interpolation, self.background, self.threads, include=self.include, exclude=self.exclude,
-            copy=False,
+            copy=self.copy,
         )  # fmt: skip
         return transform(subject)
 
@@ -166,12 +187,12 @@ def _geometry_of(image: Any) -> Geometry:
     return Geometry.from_affine(image.affine, tuple(image.spatial_shape), space="RAS")
 
 
-def _volumes_of(image: Any) -> list[Volume]:
+def _volumes_of(image: Any, name: str) -> list[Volume]:
     """The channels."""
     data, geometry = image.data, _geometry_of(image)  # the data first: an image is read when it is touched
-    return [Volume(array_of(channel), geometry) for channel in data]
+    return [Volume(array_of(channel), geometry) for channel in readable(data, repr(name))]
 
 
 def _fill(image: Any, channels: list[Volume]) -> None:
     """Gives an image other channels on the same grid."""
-    image.set_data(torch.stack([tensor_of(channel.array) for channel in channels]))
+    image.set_data(torch.stack([tensor_of(channel.array) for channel in channels]).to(image.data.dtype))

@@ -9,6 +9,21 @@ from typing import Any
 
 import torch
 
+from ..errors import InputError
+
+
+#: Types that are read as others, which hold their values.
+_READ_AS = {torch.bool: torch.uint8, torch.float16: torch.float32, torch.bfloat16: torch.float32}
+
+
+def readable(tensor: Any, name: str) -> Any:
+    """The tensor in a type that is deformed; its own, for most."""
+    if tensor.dtype == torch.int64:
+        if tensor.numel() and (tensor.min() < -(2**31) or tensor.max() >= 2**31):
+            raise InputError(f"{name} holds whole numbers beyond 32 bits")
+        return tensor.to(torch.int32)
+    return tensor.to(_READ_AS.get(tensor.dtype, tensor.dtype))
+
 
 def array_of(tensor: Any) -> Any:
     """A copy [k, j, i], i fastest: NumPy's on the host, a tensor on a device."""
