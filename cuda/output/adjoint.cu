@@ -217,7 +217,7 @@ class Adjoint final : public ResampleAdjoint {
 
   void set_field(const FieldView& field, const Control& control) override {
     ready_ = false;
-    resampler_->set_field(field, {.jacobian_range = false}, control);
+    resampler_->set_field(field, {.jacobian_range = false}, {.stop = control.stop, .stream = control.stream});
     const DeviceScope scope(device_);
     const auto stream = static_cast<cudaStream_t>(control.stream);
     const auto voxels = static_cast<std::size_t>(voxel_count(output()));

@@ -262,7 +262,7 @@ class Adjoint final : public ResampleAdjoint {
 
   void set_field(const FieldView& field, const Control& control) override {
     ready_ = false;
-    resampler_->set_field(field, {.jacobian_range = false}, control);
+    resampler_->set_field(field, {.jacobian_range = false}, {.stop = control.stop});
     const auto voxels = static_cast<std::size_t>(voxel_count(output()));
     owned_.tetrahedron.resize(voxels);
     owned_.mapped.resize(field.outside == Outside::rest ? voxels : 0);

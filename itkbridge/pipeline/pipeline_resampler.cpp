@@ -121,7 +121,9 @@ std::string apply_adjoint(itk::ProcessObject& filter, const Geometry& output, co
     const auto work = [&] {
       const auto adjoint =
           make_adjoint(used, output, options.device, {.threads = options.threads, .memory = options.device_memory});
-      adjoint->set_field(field, control);
+      Control finding = control;
+      if (control.progress) finding.progress = [&](double done) { control.progress(done / 2); };
+      adjoint->set_field(field, finding);
       adjoint->apply(targets, displacement, control);
     };
     try {

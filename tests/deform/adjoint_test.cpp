@@ -571,6 +571,17 @@ TEST_P(Adjoints, HoldTermsThatOnlyDoubleHolds) {
   }
 }
 
+TEST_P(Adjoints, ProgressRisesToOne) {
+  const Geometry grid = unit_grid({40, 40, 40});
+  const VertexField field = uniform_field(unit_grid({41, 41, 41}), glm::vec3(0.25f));
+  std::vector<double> shares;
+  make_adjoint(grid)->set_field(view(field, Outside::background),
+                                {.progress = [&](double done) { shares.push_back(done); }});
+  ASSERT_FALSE(shares.empty());
+  EXPECT_TRUE(std::is_sorted(shares.begin(), shares.end()));
+  EXPECT_EQ(shares.back(), 1);
+}
+
 TEST_P(Adjoints, OfNoVolumeIsZero) {
   const Geometry grid = oblique_grid({6, 6, 6});
   const VertexField field = uniform_field(grid, glm::vec3(0));
