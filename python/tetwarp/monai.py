@@ -23,14 +23,14 @@ from monai.transforms.transform import MapTransform, RandomizableTransform
 from monai.utils.misc import ensure_tuple
 
 from . import _calls
-from .adapters.tensors import array_of, readable, tensor_of
+from .adapters.tensors import CountsEpochs, array_of, readable, tensor_of
 from .augmentation import Elastic, Family, Warp, draw, seed_of
 from .errors import InputError
 from .geometry import Geometry
 from .volume import Volume
 
 
-class RandTetwarpd(RandomizableTransform, MapTransform, InvertibleTransform):
+class RandTetwarpd(CountsEpochs, RandomizableTransform, MapTransform, InvertibleTransform):
     """Deforms the keys of a sample by one random field, each on its own grid.
 
     Operations that are pending on a key are applied first. `inverse` pulls each key back by the forward map, evaluated at
@@ -106,15 +106,7 @@ class RandTetwarpd(RandomizableTransform, MapTransform, InvertibleTransform):
         self.seed_key = seed_key
         self.certificate_key = certificate_key
         self.threads = threads
-        self._epoch = torch.zeros((), dtype=torch.int64).share_memory_()
-
-    @property
-    def epoch(self) -> int:
-        return int(self._epoch)
-
-    @epoch.setter
-    def epoch(self, number: int) -> None:
-        self._epoch.fill_(number)
+        self._count_epochs()
 
     def randomize(self, data: Mapping[Hashable, Any]) -> int:  # type: ignore[override]
         """Whether a sample is deformed, and the seed of its field."""

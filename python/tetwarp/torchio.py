@@ -22,7 +22,7 @@ from torchio.transforms.augmentation import RandomTransform
 from torchio.transforms.spatial_transform import SpatialTransform
 
 from . import _calls
-from .adapters.tensors import array_of, readable, tensor_of
+from .adapters.tensors import CountsEpochs, array_of, readable, tensor_of
 from .augmentation import Elastic, Family, Warp, draw, seed_of
 from .errors import InputError
 from .geometry import Geometry
@@ -96,7 +96,7 @@ class Tetwarp(SpatialTransform):
         return subject
 
 
-class RandomTetwarp(RandomTransform, SpatialTransform):
+class RandomTetwarp(CountsEpochs, RandomTransform, SpatialTransform):
     """Deforms the images of a subject by one random field; `Tetwarp` stands for it in the subject's history.
 
     Parameters
@@ -143,15 +143,7 @@ class RandomTetwarp(RandomTransform, SpatialTransform):
         self.seed = _calls.whole(seed, "seed", 0, 2**63 - 1)
         self.seed_key = seed_key
         self.threads = threads
-        self._epoch = torch.zeros((), dtype=torch.int64).share_memory_()
-
-    @property
-    def epoch(self) -> int:
-        return int(self._epoch)
-
-    @epoch.setter
-    def epoch(self, number: int) -> None:
-        self._epoch.fill_(number)
+        self._count_epochs()
 
     def __call__(self, data: Any) -> Any:
         """Deforms a subject or what else TorchIO takes, or leaves it."""

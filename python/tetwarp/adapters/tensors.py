@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: The Tetwarp authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Tensors [i, j, k] of PyTorch, k fastest, and our arrays [k, j, i]."""
+"""Tensors [i, j, k] of PyTorch, k fastest, and our arrays [k, j, i]; what transforms of tensors share."""
 
 from __future__ import annotations
 
@@ -35,3 +35,19 @@ def tensor_of(array: Any) -> Any:
     """A copy [i, j, k], k fastest, on the same device."""
     tensor = torch.as_tensor(array)
     return tensor.permute(2, 1, 0).contiguous()
+
+
+class CountsEpochs:
+    """A transform that knows the epoch. It lies in shared memory: workers that were started before see it, too."""
+
+    def _count_epochs(self) -> None:
+        self._epoch = torch.zeros((), dtype=torch.int64).share_memory_()
+
+    @property
+    def epoch(self) -> int:
+        """Number of the epoch, 0 at first."""
+        return int(self._epoch)
+
+    @epoch.setter
+    def epoch(self, number: int) -> None:
+        self._epoch.fill_(number)
