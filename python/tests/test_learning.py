@@ -339,6 +339,16 @@ def test_the_registration_example_is_as_near_as_plastimatchs_splines(device, tmp
     assert report["seconds"] < (60 if device == "cuda" else 600)
 
 
+def test_the_segmentation_example_makes_its_curves(tmp_path):
+    script = pathlib.Path(__file__).resolve().parents[2] / "examples" / "learning" / "segment.py"
+    command = [sys.executable, script, "-o", tmp_path, "--steps", "20", "--tests", "1"]
+    assert subprocess.run(command, check=False).returncode == 0
+    lines = (tmp_path / "curves.csv").read_text().splitlines()
+    assert lines[0] == "step,without deformations,with deformations"
+    first, last = ([float(value) for value in line.split(",")[1:]] for line in (lines[1], lines[-1]))
+    assert first[0] == first[1] and all(after > before for before, after in zip(first, last))
+
+
 def test_a_fork_amid_another_threads_call_hangs_nobody():
     script = """
 import os, sys, torch, tetwarp.torch as tt
