@@ -27,6 +27,7 @@ from .deforming import Along, deform, move_points
 from .errors import InputError
 from .field import PullField, VertexField
 from .geometry import Geometry
+from .volume import Volume
 
 FloatArray = npt.NDArray[np.float64]
 #: Smallest and largest value of a uniform draw.
@@ -373,14 +374,16 @@ class Warp:
         InputError
             For a field that still folds after 40 shrinks.
         """
-        everything = [*images, *labels]
+        # Each is read once, whatever library it comes from.
+        read = [adapters.volume_of(one) for one in (*images, *labels)]
+        everything = [volume for volume, _ in read]
         if not everything:
             raise InputError("there is nothing to deform; pass an image or labels")
         values = list(backgrounds) if backgrounds is not None else [None] * len(images)
         kinds: list[tuple[str, float | None]] = [(interpolation, value) for value in values]
         kinds += [("vote", 0.0) for _ in labels]
         # Those that share the first one's grid share its voxels' owners, too.
-        grids = [adapters.volume_of(one)[0].geometry for one in everything]
+        grids = [volume.geometry for volume in everything]
         alone = [grid != grids[0] for grid in grids]
         warp = self
         for _ in range(_MOST_SHRINKS):
@@ -411,10 +414,11 @@ class Warp:
             "jacobian": [done.report.jacobian_min, done.report.jacobian_max],
             "uncovered": done.report.uncovered,
             "labels": [
-                _volumes_of(before, after) for before, after in zip(labels, results[len(images) :])
+                _volumes_of(before, after) for before, after in zip(everything[len(images) :], results[len(images) :])
             ],
         }
-        return Warped(results[: len(images)], results[len(images) :], certificate, warp)
+        given_back = [back(result) for (_, back), result in zip(read, results)]
+        return Warped(given_back[: len(images)], given_back[len(images) :], certificate, warp)
 
     def undo(self, image: Any, *, interpolation: str = "linear", background: float | None = None) -> Any:
         """An image that was deformed, pulled back: each voxel takes what lies where the forward map leads its centre.
@@ -527,11 +531,10 @@ def _counts(array: npt.NDArray[Any]) -> list[tuple[Any, int]]:
     return [(label, int(count)) for label, count in zip(*np.unique(array, return_counts=True))]
 
 
-def _volumes_of(before: Any, after: Any) -> dict[str, list[float]]:
+def _volumes_of(before: Volume, after: Volume) -> dict[str, list[float]]:
     """Volume of each label before and after, ml."""
     volumes: dict[str, list[float]] = {}
-    for n, image in enumerate((before, after)):
-        volume = adapters.volume_of(image)[0]
+    for n, volume in enumerate((before, after)):
         array = np.asarray(volume.array if isinstance(volume.array, np.ndarray) else volume.array.cpu())
         affine = volume.geometry.straightened().affine("LPS")
         millilitres = abs(float(np.linalg.det(affine[:3, :3]))) / 1000

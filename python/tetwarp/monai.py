@@ -22,15 +22,14 @@ from monai.transforms.lazy.functional import apply_pending
 from monai.transforms.transform import MapTransform, RandomizableTransform
 from monai.utils.misc import ensure_tuple
 
-from . import _calls
-from .adapters.tensors import CountsEpochs, array_of, readable, tensor_of
-from .augmentation import Elastic, Family, Warp, draw, seed_of
+from .adapters.tensors import DrawsWarps, array_of, readable, tensor_of
+from .augmentation import Family, Warp, draw
 from .errors import InputError
 from .geometry import Geometry
 from .volume import Volume
 
 
-class RandTetwarpd(CountsEpochs, RandomizableTransform, MapTransform, InvertibleTransform):
+class RandTetwarpd(DrawsWarps, RandomizableTransform, MapTransform, InvertibleTransform):
     """Deforms the keys of a sample by one random field, each on its own grid.
 
     Operations that are pending on a key are applied first. `inverse` pulls each key back by the forward map, evaluated at
@@ -93,29 +92,19 @@ class RandTetwarpd(CountsEpochs, RandomizableTransform, MapTransform, Invertible
     ) -> None:
         MapTransform.__init__(self, keys, allow_missing_keys)
         RandomizableTransform.__init__(self, prob)
-        _calls.word(interpolation, "interpolation", ("linear", "cubic"))
+        self._keep(family, interpolation, background, cell_size, seed, seed_key, threads)
         self.labels: tuple[Hashable, ...] = tuple(ensure_tuple(labels))
         unknown = [key for key in self.labels if key not in self.keys]
         if unknown:
             raise InputError(f"labels names {unknown[0]!r}, which is not among keys")
-        self.family = Elastic() if family is None else family
-        self.interpolation = interpolation
-        self.background = background
-        self.cell_size = _calls.whole(cell_size, "cell_size", 1, 65536)
-        self.seed = _calls.whole(seed, "seed", 0, 2**63 - 1)
-        self.seed_key = seed_key
         self.certificate_key = certificate_key
-        self.threads = threads
-        self._count_epochs()
 
     def randomize(self, data: Mapping[Hashable, Any]) -> int:  # type: ignore[override]
         """Whether a sample is deformed, and the seed of its field."""
         if self.seed_key is None:
             super().randomize(None)
             return int(self.R.randint(2**31))
-        if self.seed_key not in data:
-            raise InputError(f"the sample has no {self.seed_key!r}, which seed_key names")
-        seed = seed_of(self.seed, self.epoch, data[self.seed_key])
+        seed = self._seed_of(data)
         self._do_transform = seed / 2**63 < self.prob
         return seed
 

@@ -149,11 +149,16 @@ def deform(
         of_output = _numbers_of(output)
     numbers: list[float] = []
     rest = tetrahedra = lattice_vertex = replaced = None
+    shape: tuple[int, ...]
     if isinstance(lattice, int) and not isinstance(lattice, bool):
         numbers = [float(lattice)]
-        shape: tuple[int, ...] = lattice_shape(straight, lattice)
+        shape = lattice_shape(straight, lattice)
     elif isinstance(lattice, Geometry):
-        numbers = _numbers_of(lattice)
+        numbers = list(lattice._numbers)
+        shape = tuple(int(size) for size in numbers[2::-1])
+    elif isinstance(lattice, VertexField) and lattice.mesh is None:
+        assert lattice.lattice is not None
+        numbers = list(lattice.lattice._numbers)
         shape = tuple(int(size) for size in numbers[2::-1])
     elif not isinstance(lattice, (VertexField, TetrahedralMesh)):
         raise TypeError(
@@ -161,12 +166,6 @@ def deform(
         )
     else:
         held = lattice if isinstance(lattice, VertexField) else VertexField(None, None, lattice)
-        if held.mesh is None:
-            assert held.lattice is not None
-            return deform(
-                volume, displacement, geometry=geometry, lattice=held.lattice, output=output,
-                interpolation=interpolation, outside=outside, background=background,
-            )  # fmt: skip
         rest, tetrahedra, lattice_vertex, replaced, vertices = _tensors_of(held)
         if held.displacement is not None:
             assert held.lattice is not None

@@ -22,9 +22,8 @@ from torchio.transforms.augmentation import RandomTransform
 from torchio.transforms.spatial_transform import SpatialTransform
 
 from . import _calls
-from .adapters.tensors import CountsEpochs, array_of, readable, tensor_of
-from .augmentation import Elastic, Family, Warp, draw, seed_of
-from .errors import InputError
+from .adapters.tensors import DrawsWarps, array_of, readable, tensor_of
+from .augmentation import Family, Warp, draw
 from .geometry import Geometry
 from .volume import Volume
 
@@ -96,7 +95,7 @@ class Tetwarp(SpatialTransform):
         return subject
 
 
-class RandomTetwarp(CountsEpochs, RandomTransform, SpatialTransform):
+class RandomTetwarp(DrawsWarps, RandomTransform, SpatialTransform):
     """Deforms the images of a subject by one random field; `Tetwarp` stands for it in the subject's history.
 
     Parameters
@@ -135,15 +134,7 @@ class RandomTetwarp(CountsEpochs, RandomTransform, SpatialTransform):
         **kwargs: Any,
     ) -> None:
         super().__init__(**kwargs)
-        _calls.word(interpolation, "interpolation", ("linear", "cubic"))
-        self.family = Elastic() if family is None else family
-        self.interpolation = interpolation
-        self.background = background
-        self.cell_size = _calls.whole(cell_size, "cell_size", 1, 65536)
-        self.seed = _calls.whole(seed, "seed", 0, 2**63 - 1)
-        self.seed_key = seed_key
-        self.threads = threads
-        self._count_epochs()
+        self._keep(family, interpolation, background, cell_size, seed, seed_key, threads)
 
     def __call__(self, data: Any) -> Any:
         """Deforms a subject or what else TorchIO takes, or leaves it."""
@@ -158,12 +149,7 @@ class RandomTetwarp(CountsEpochs, RandomTransform, SpatialTransform):
         images = list(self.get_images(subject))
         if not images:
             return subject
-        if self.seed_key is None:
-            seed = int(torch.randint(2**62, (1,)))
-        elif self.seed_key in subject:
-            seed = seed_of(self.seed, self.epoch, subject[self.seed_key])
-        else:
-            raise InputError(f"the subject has no {self.seed_key!r}, which seed_key names")
+        seed = int(torch.randint(2**62, (1,))) if self.seed_key is None else self._seed_of(subject)
         warp = draw(self.family, _geometry_of(images[0]), seed=seed, cell_size=self.cell_size)
         record = {**warp.record(), "seed": seed}
         if self.seed_key is not None:

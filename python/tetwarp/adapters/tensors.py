@@ -9,6 +9,8 @@ from typing import Any
 
 import torch
 
+from .. import _calls
+from ..augmentation import Elastic, Family, seed_of
 from ..errors import InputError
 
 
@@ -37,11 +39,38 @@ def tensor_of(array: Any) -> Any:
     return tensor.permute(2, 1, 0).contiguous()
 
 
-class CountsEpochs:
-    """A transform that knows the epoch. It lies in shared memory: workers that were started before see it, too."""
+class DrawsWarps:
+    """A transform that draws a deformation for each sample, and knows the epoch.
 
-    def _count_epochs(self) -> None:
+    The epoch lies in shared memory: workers that were started before see it, too.
+    """
+
+    def _keep(
+        self,
+        family: Family | None,
+        interpolation: str,
+        background: float | None,
+        cell_size: int,
+        seed: int,
+        seed_key: Any,
+        threads: int,
+    ) -> None:
+        """Keeps the options of a transform; refuses words and numbers that do not fit."""
+        _calls.word(interpolation, "interpolation", ("linear", "cubic"))
+        self.family = Elastic() if family is None else family
+        self.interpolation = interpolation
+        self.background = background
+        self.cell_size = _calls.whole(cell_size, "cell_size", 1, 65536)
+        self.seed = _calls.whole(seed, "seed", 0, 2**63 - 1)
+        self.seed_key = seed_key
+        self.threads = threads
         self._epoch = torch.zeros((), dtype=torch.int64).share_memory_()
+
+    def _seed_of(self, sample: Any) -> int:
+        """The seed of a sample, by its `seed_key`."""
+        if self.seed_key not in sample:
+            raise InputError(f"the sample has no {self.seed_key!r}, which seed_key names")
+        return seed_of(self.seed, self.epoch, sample[self.seed_key])
 
     @property
     def epoch(self) -> int:
