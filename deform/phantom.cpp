@@ -152,16 +152,18 @@ struct Scene {
   std::vector<Organ> organs;
   Bending bending;
   Texture coarse, fine;
+  float noise_hu;
   std::vector<float> x;  ///< body space, by column
   float edge;
 
-  Scene(const Geometry& grid, std::uint64_t seed_)
+  Scene(const Geometry& grid, std::uint64_t seed_, const PhantomLook& look)
       : geometry(grid),
         seed(seed_),
         organs(make_organs(trunk, seed_)),
         bending(grid.size, seed_ + 21),
         coarse(17, seed_ + 22),
-        fine(3.4f, seed_ + 23) {
+        fine(3.4f, seed_ + 23),
+        noise_hu(static_cast<float>(look.noise_hu)) {
     for (std::int64_t i = 0; i < grid.size.x; ++i) x.push_back(position(0, i));
     edge = 1.4f * static_cast<float>(std::max(kBodySpace.x / static_cast<double>(grid.size.x),
                                               kBodySpace.y / static_cast<double>(grid.size.y)));
@@ -181,8 +183,9 @@ Bounds box_of(std::span<const Point> points) {
 
 std::int16_t stored(float hu) { return static_cast<std::int16_t>(std::nearbyint(std::clamp(hu, -1024.0f, 3071.0f))); }
 
-void paint_slice(const Scene& scene, std::int64_t k, std::span<std::int16_t> slice) {
-  constexpr float kBendingMost = 14, kNoiseHu = 12;
+/// @param labels  those of the slice; empty: not wanted
+void paint_slice(const Scene& scene, std::int64_t k, std::span<std::int16_t> slice, std::span<std::uint8_t> labels) {
+  constexpr float kBendingMost = 14;
   const auto columns = static_cast<std::size_t>(scene.geometry.size.x);
   const float z = scene.position(2, k);
   std::vector<const Organ*> near;
@@ -192,12 +195,13 @@ void paint_slice(const Scene& scene, std::int64_t k, std::span<std::int16_t> sli
   }
   std::vector<float> hu(columns), texture(columns), grain(columns);
   std::vector<Point> points(columns);
+  std::vector<PhantomLabel> label(columns);
   GrainRows grain_rows(scene.geometry.size, k, scene.seed + 24);
   for (std::int64_t j = 0; j < scene.geometry.size.y; ++j) {
     const float y = scene.position(1, j);
     for (std::size_t i = 0; i < columns; ++i)
       points[i] = Point(scene.x[i], y, z) + scene.bending.at(static_cast<std::int64_t>(i), j, k);
-    const PaintedRow row{scene.x, y, points, box_of(points), scene.edge, hu};
+    const PaintedRow row{scene.x, y, points, box_of(points), scene.edge, hu, label};
     paint_surroundings(row);
     paint_trunk(row, scene.trunk);
     for (const Organ* organ : near) paint_organ(row, *organ, scene.trunk);
@@ -205,28 +209,55 @@ void paint_slice(const Scene& scene, std::int64_t k, std::span<std::int16_t> sli
     scene.coarse.add(scene.x, y, z, 0.8f, texture);
     scene.fine.add(scene.x, y, z, 0.9f, texture);
     grain_rows.next(grain);
-    for (std::size_t i = 0; i < columns; ++i) {
-      slice[static_cast<std::size_t>(j) * columns + i] = stored(textured(hu[i], texture[i]) + kNoiseHu * grain[i]);
-    }
+    const std::size_t begin = static_cast<std::size_t>(j) * columns;
+    for (std::size_t i = 0; i < columns; ++i)
+      slice[begin + i] = stored(textured(hu[i], texture[i]) + scene.noise_hu * grain[i]);
+    if (labels.empty()) continue;
+    for (std::size_t i = 0; i < columns; ++i) labels[begin + i] = static_cast<std::uint8_t>(label[i]);
   }
 }
 
-}  // namespace
-
-Volume<std::int16_t> make_phantom(const glm::i64vec3& size, const glm::dvec3& spacing, std::uint64_t seed) {
+/// @param labels  whether the labels are wanted
+LabelledPhantom make(const glm::i64vec3& size, const glm::dvec3& spacing, std::uint64_t seed, const PhantomLook& look,
+                     bool labels) {
   Geometry geometry{.size = size, .spacing = spacing};
   require_valid(geometry, "phantom");
   for (int axis = 0; axis < 3; ++axis) {
     require(size[axis] >= 2, "phantom: size " + to_string(size) + ", expected at least 2 voxels on every axis");
   }
+  require(look.noise_hu >= 0 && look.noise_hu <= 1000,
+          "phantom: noise of " + std::to_string(look.noise_hu) + " HU, expected 0 to 1000");
   geometry.origin = -0.5 * spacing * glm::dvec3(size - std::int64_t{1});
-  Volume<std::int16_t> volume{geometry, std::vector<std::int16_t>(static_cast<std::size_t>(voxel_count(geometry)))};
-  const Scene scene(geometry, seed);
-  const auto slice_voxels = static_cast<std::size_t>(size.x * size.y);
+  const auto voxels = static_cast<std::size_t>(voxel_count(geometry));
+  LabelledPhantom made{{geometry, std::vector<std::int16_t>(voxels)},
+                       {geometry, std::vector<std::uint8_t>(labels ? voxels : 0)}};
+  const Scene scene(geometry, seed, look);
+  const auto area = static_cast<std::size_t>(size.x * size.y);
   oneapi::tbb::parallel_for(std::int64_t{0}, size.z, [&](std::int64_t k) {
-    paint_slice(scene, k, std::span(volume.voxels).subspan(static_cast<std::size_t>(k) * slice_voxels, slice_voxels));
+    const std::size_t begin = static_cast<std::size_t>(k) * area;
+    paint_slice(scene, k, std::span(made.ct.voxels).subspan(begin, area),
+                labels ? std::span(made.labels.voxels).subspan(begin, area) : std::span<std::uint8_t>());
   });
-  return volume;
+  return made;
+}
+
+}  // namespace
+
+std::span<const std::string_view> phantom_label_names() {
+  static constexpr std::array<std::string_view, 14> kNames{"nothing", "body",    "lung",       "bone",  "heart",
+                                                           "vessel",  "airway",  "oesophagus", "liver", "spleen",
+                                                           "kidney",  "stomach", "bowel",      "cord"};
+  return kNames;
+}
+
+Volume<std::int16_t> make_phantom(const glm::i64vec3& size, const glm::dvec3& spacing, std::uint64_t seed,
+                                  const PhantomLook& look) {
+  return make(size, spacing, seed, look, false).ct;
+}
+
+LabelledPhantom make_labelled_phantom(const glm::i64vec3& size, const glm::dvec3& spacing, std::uint64_t seed,
+                                      const PhantomLook& look) {
+  return make(size, spacing, seed, look, true);
 }
 
 }  // namespace tetwarp

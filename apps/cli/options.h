@@ -67,6 +67,8 @@ struct PhantomOptions {
   std::vector<std::int64_t> size{512, 512, 300};
   std::vector<double> spacing{0.8, 0.8, 1.0};
   std::uint64_t seed = 1;
+  double noise_hu = 12;
+  std::filesystem::path labels;
 };
 
 /// A volume that is named by its path alone, such as labels.

@@ -33,21 +33,28 @@ void check(const PhantomOptions& options) {
 int run_phantom(const PhantomOptions& options) {
   check(options);
   const bool series = is_series_output(options.output);
+  if (!options.labels.empty() && is_series_output(options.labels))
+    throw UsageError("--labels " + options.labels.string() + " is no volume file; expected .nii .nii.gz .nrrd or .mha");
   OutputSet outputs(Reads(), options.common.overwrite);
   const std::filesystem::path output =
       outputs.add(options.output, series ? StagedOutput::Kind::folder : StagedOutput::Kind::file);
+  const std::filesystem::path labels = outputs.add(options.labels);
   const glm::i64vec3 size(options.size[0], options.size[1], options.size[2]);
-  const Volume<std::int16_t> phantom = [&] {
+  const glm::dvec3 spacing(options.spacing[0], options.spacing[1], options.spacing[2]);
+  const PhantomLook look{.noise_hu = options.noise_hu};
+  const LabelledPhantom phantom = [&] {
     Stage stage(options.common, "phantom");
-    return make_phantom(size, {options.spacing[0], options.spacing[1], options.spacing[2]}, options.seed);
+    if (labels.empty()) return LabelledPhantom{make_phantom(size, spacing, options.seed, look), {}};
+    return make_labelled_phantom(size, spacing, options.seed, look);
   }();
   Stage stage(options.common, "write");
   outputs.write([&] {
     if (series) {
-      write_phantom_series(output, view(phantom), options.seed, stage.control());
+      write_phantom_series(output, view(phantom.ct), options.seed, stage.control());
     } else {
-      write_image(output, view(phantom));
+      write_image(output, view(phantom.ct));
     }
+    if (!labels.empty()) write_image(labels, view(phantom.labels));
   });
   outputs.commit();
   say(options.common, "wrote " + options.output.string() + ": " + to_string(size) + " voxels");

@@ -3,8 +3,22 @@
 
 #include "apps/cli/option_groups.h"
 #include "apps/cli/subcommands.h"
+#include "deform/phantom.h"
 
 namespace tetwarp::apps {
+
+namespace {
+
+/// The labels of the phantom as help shows them: "0 nothing, 1 body, ...".
+std::string phantom_labels() {
+  std::string text;
+  int value = 0;
+  for (const std::string_view name : phantom_label_names())
+    text += (value == 0 ? "" : ", ") + std::to_string(value) + " " + std::string(name), ++value;
+  return text;
+}
+
+}  // namespace
 
 void add_phantom(CLI::App& app, PhantomOptions& options) {
   CLI::App* command = app.add_subcommand("phantom", "Make a CT of a trunk that never was");
@@ -22,6 +36,14 @@ void add_phantom(CLI::App& app, PhantomOptions& options) {
   command->add_option("--seed", options.seed, "Noise and small variations of the anatomy")
       ->check(whole_number(0, INT64_MAX))
       ->capture_default_str();
+  command->add_option("--noise", options.noise_hu, "Standard deviation of the noise, HU")
+      ->check(CLI::Range(0.0, 1000.0))
+      ->type_name("HU")
+      ->capture_default_str();
+  command
+      ->add_option("--labels", options.labels,
+                   "Write what each voxel belongs to as well: " + phantom_labels() + " (.nii .nii.gz .nrrd .mha)")
+      ->type_name("FILE");
   add_common(*command, options.common, true);
   command->footer("Example: tetwarp phantom -o phantom_dicom --size 512,512,100 --spacing 0.8,0.8,3");
 }

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "deform/phantom.h"
 #include "deform/phantom/trunk.h"
 
 namespace tetwarp::phantom {
@@ -27,7 +28,13 @@ struct Organ {
   float grow = 0;  ///< mm by which the shape is grown; marrow is its bone, shrunk
   /// y of a level: only what lies in front of it is painted, as gas above fluid in a patient who lies on the back.
   float level_y = kNoLevel;
+  PhantomLabel label = PhantomLabel::body;
 };
+
+/// Gives the organs from number `first` on a label.
+inline void label_from(std::vector<Organ>& organs, std::size_t first, PhantomLabel label) {
+  for (std::size_t n = first; n < organs.size(); ++n) organs[n].label = label;
+}
 
 /// All organs inside the trunk's walls, in the order in which they are painted.
 std::vector<Organ> make_organs(const Trunk& trunk, std::uint64_t seed);

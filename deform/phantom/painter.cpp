@@ -16,8 +16,6 @@ float coverage(float d, float edge) {
   return t * t * (3 - 2 * t);
 }
 
-void blend(float& hu, float with, float share) { hu += share * (with - hu); }
-
 /// How much of a voxel lies in the layer between two surfaces, given its signed distance from each: a voxel larger than
 /// the layer has only a part of it.
 float layer(float outer, float inner, float edge) {
@@ -34,25 +32,30 @@ float fissure(Point p) {
   return std::min(std::abs(oblique), level);
 }
 
-void paint_inside(const PaintedRow& row, const Trunk& trunk, Point p, const Walls& walls, float& hu) {
+void paint_inside(const PaintedRow& row, const Trunk& trunk, std::size_t i, const Walls& walls) {
+  const Point p = row.points[i];
   const float edge = row.edge;
   // Thickness, 0 to 1, of the fat under the broad muscles of the flank.
   const float beside = std::max(1 - p.y * p.y * 2.2e-4f, 0.0f);
-  if (p.z > -130 && p.z < 132) blend(hu, kFat + 20, layer(walls.cage - 10 - 3 * beside, walls.cage - 10, edge));
+  if (p.z > -130 && p.z < 132)
+    row.blend(i, kFat + 20, layer(walls.cage - 10 - 3 * beside, walls.cage - 10, edge), PhantomLabel::body);
   if (walls.cage < 12) {
     const Trunk::Rib rib = trunk.rib(p, walls);
-    blend(hu, rib.cartilage ? 105.0f : 850.0f, std::min(1.0f, 5 / edge) * coverage(rib.distance, edge));
-    if (!rib.cartilage) blend(hu, 230, std::min(1.0f, 3 / edge) * coverage(rib.distance + 1.3f, edge));
+    const PhantomLabel label = rib.cartilage ? PhantomLabel::body : PhantomLabel::bone;
+    row.blend(i, rib.cartilage ? 105.0f : 850.0f, std::min(1.0f, 5 / edge) * coverage(rib.distance, edge), label);
+    if (!rib.cartilage) row.blend(i, 230, std::min(1.0f, 3 / edge) * coverage(rib.distance + 1.3f, edge), label);
   }
   if (walls.cage > edge) return;
-  blend(hu, kInsideFat, coverage(walls.cage, edge));
+  row.blend(i, kInsideFat, coverage(walls.cage, edge), PhantomLabel::body);
   if (walls.diaphragm > -6) {
     const float lungs = trunk.lungs(p, walls);
-    blend(hu, kPleura, layer(lungs - 1.2f, lungs, edge));
-    blend(hu, lung_hu(p), coverage(lungs, edge));
-    blend(hu, kFissure, std::min(1.0f, 1.2f / edge) * coverage(std::max(lungs + 1, fissure(p) - 0.6f), edge));
+    row.blend(i, kPleura, layer(lungs - 1.2f, lungs, edge), PhantomLabel::body);
+    row.blend(i, lung_hu(p), coverage(lungs, edge), PhantomLabel::lung);
+    row.blend(i, kFissure, std::min(1.0f, 1.2f / edge) * coverage(std::max(lungs + 1, fissure(p) - 0.6f), edge),
+              PhantomLabel::lung);
   }
-  blend(hu, kMuscle, coverage(walls.cage + 1, edge) * layer(walls.diaphragm - 1.5f, walls.diaphragm + 1.5f, edge));
+  row.blend(i, kMuscle, coverage(walls.cage + 1, edge) * layer(walls.diaphragm - 1.5f, walls.diaphragm + 1.5f, edge),
+            PhantomLabel::body);
 }
 
 template <class S>
@@ -69,7 +72,7 @@ void paint_shape(const PaintedRow& row, const S& shape, const Organ& organ, cons
     if (organ.within == Within::chest) d = std::max(d, 2 - diaphragm(p));
     if (organ.within == Within::abdomen) d = std::max({d, diaphragm(p) + 1.3f, trunk.walls(p).cage + 1.5f});
     if (organ.level_y != kNoLevel) d = std::max(d, row.straight_y - organ.level_y);
-    blend(row.hu[i], organ.hu, share * coverage(d, row.edge));
+    row.blend(i, organ.hu, share * coverage(d, row.edge), organ.label);
   }
 }
 
@@ -85,13 +88,14 @@ void paint_surroundings(const PaintedRow& row) {
   // The table: its top is curved, hull and foam lie between two arcs about a line far above.
   constexpr float kRadius = 520, kTop = 117, kHalfThickness = 15, kHalfWidth = 196, kHull = 2.2f;
   std::fill(row.hu.begin(), row.hu.end(), kAir);
+  std::fill(row.label.begin(), row.label.end(), PhantomLabel::nothing);
   if (row.straight_y < kTop - 60) return;
   for (std::size_t i = 0; i < row.hu.size(); ++i) {
     const float x = row.straight_x[i], y = row.straight_y - (kTop - kRadius);
     const float across = std::abs(std::sqrt(x * x + y * y) - kRadius - kHalfThickness) - kHalfThickness;
     const float d = std::max(across, std::abs(x) - kHalfWidth);
-    blend(row.hu[i], -180, std::min(1.0f, 2 * kHull / row.edge) * coverage(d, row.edge));
-    blend(row.hu[i], -955, coverage(d + kHull, row.edge));
+    row.blend(i, -180, std::min(1.0f, 2 * kHull / row.edge) * coverage(d, row.edge), PhantomLabel::nothing);
+    row.blend(i, -955, coverage(d + kHull, row.edge), PhantomLabel::nothing);
   }
 }
 
@@ -103,11 +107,10 @@ void paint_trunk(const PaintedRow& row, const Trunk& trunk) {
     if (std::abs(p.x) > kWidest + row.edge) continue;
     const Walls walls = trunk.walls(p);
     if (walls.skin > row.edge) continue;
-    float& hu = row.hu[i];
-    blend(hu, kSkin, coverage(walls.skin, row.edge));
-    blend(hu, kFat, coverage(walls.skin + 2, row.edge));
-    blend(hu, kMuscle, coverage(walls.muscle, row.edge));
-    if (walls.muscle < row.edge) paint_inside(row, trunk, p, walls, hu);
+    row.blend(i, kSkin, coverage(walls.skin, row.edge), PhantomLabel::body);
+    row.blend(i, kFat, coverage(walls.skin + 2, row.edge), PhantomLabel::body);
+    row.blend(i, kMuscle, coverage(walls.muscle, row.edge), PhantomLabel::body);
+    if (walls.muscle < row.edge) paint_inside(row, trunk, i, walls);
   }
 }
 

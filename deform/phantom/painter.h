@@ -18,7 +18,14 @@ struct PaintedRow {
   Bounds box;                     ///< around `points`
   /// Millimetres over which one tissue blends into the next: about one voxel.
   float edge;
-  std::span<float> hu;  ///< HU of the voxels, over which is painted
+  std::span<float> hu;            ///< HU of the voxels, over which is painted
+  std::span<PhantomLabel> label;  ///< what the voxels belong to
+
+  /// Paints over a voxel: `share` of it, 0 to 1, is filled. Where that is half of it or more, it takes the label.
+  void blend(std::size_t i, float with, float share, PhantomLabel is) const {
+    hu[i] += share * (with - hu[i]);
+    if (share >= 0.5f) label[i] = is;
+  }
 };
 
 /// Paints air and the table.

@@ -12,8 +12,10 @@ constexpr float kCortical = 1100, kMarrow = 210, kDisc = 85, kCanal = 15, kCord 
 /// Adds bones that touch and share their marrow: all of the outsides are painted first, then all of the insides.
 void add_bones(std::vector<Organ>& organs, const std::vector<Shape>& bones, float cortex_mm, float cortical = kCortical,
                float marrow = kMarrow) {
+  const std::size_t first = organs.size();
   for (const Shape& bone : bones) organs.push_back({bone, cortical});
   for (const Shape& bone : bones) organs.push_back({bone, marrow, Within::everything, -cortex_mm});
+  label_from(organs, first, PhantomLabel::bone);
 }
 
 /// Shapes of a vertebra: body, pedicles, laminae, transverse and spinous processes; in the chest also the necks of its
@@ -49,8 +51,8 @@ void add_spine(std::vector<Organ>& organs) {
     cord.push_back({{0, y + 20.5f * size, z}, level < 12 ? 4.4f : 3.0f});
   }
   add_bones(organs, bones, 1.5f);
-  add_tube(organs, canal, {.shape = {}, .hu = kCanal});
-  add_tube(organs, cord, {.shape = {}, .hu = kCord});
+  add_tube(organs, canal, {.shape = {}, .hu = kCanal, .label = PhantomLabel::cord});
+  add_tube(organs, cord, {.shape = {}, .hu = kCord, .label = PhantomLabel::cord});
 }
 
 std::vector<Shape> sternum() {

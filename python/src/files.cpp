@@ -126,14 +126,28 @@ std::string info(const std::filesystem::path& path, bool single, const std::stri
   return apps::info_document(options).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
+/// The phantom, its grid, and its labels or None.
 nb::tuple phantom(const std::array<std::int64_t, 3>& size, const std::array<double, 3>& spacing, std::uint64_t seed,
-                  const CallOptions& options) {
-  Volume<std::int16_t> made;
+                  double noise_hu, bool labels, const CallOptions& options) {
+  LabelledPhantom made;
   run_call(options, false, [&](const Control&) {
-    made = make_phantom({size[0], size[1], size[2]}, {spacing[0], spacing[1], spacing[2]}, seed);
+    const glm::i64vec3 voxels(size[0], size[1], size[2]);
+    const glm::dvec3 mm(spacing[0], spacing[1], spacing[2]);
+    if (labels) {
+      made = make_labelled_phantom(voxels, mm, seed, {.noise_hu = noise_hu});
+    } else {
+      made.ct = make_phantom(voxels, mm, seed, {.noise_hu = noise_hu});
+    }
   });
-  const Geometry grid = made.geometry;
-  return nb::make_tuple(as_numpy(AnyVolume(std::move(made))), grid);
+  const Geometry grid = made.ct.geometry;
+  nb::object label_array = nb::none();
+  if (labels) label_array = as_numpy(AnyVolume(std::move(made.labels)));
+  return nb::make_tuple(as_numpy(AnyVolume(std::move(made.ct))), grid, label_array);
+}
+
+std::vector<std::string> phantom_labels() {
+  const auto names = phantom_label_names();
+  return {names.begin(), names.end()};
 }
 
 }  // namespace
@@ -154,7 +168,9 @@ void add_files(nb::module_& core) {
   core.def("info", &info, nb::arg("path"), nb::arg("single"), nb::arg("nifti_frame"));
   core.def("set_dicom_dictionary", &set_dicom_dictionary, nb::arg("path"));
   core.def("has_image_suffix", &has_image_suffix, nb::arg("path"));
-  core.def("phantom", &phantom, nb::arg("size"), nb::arg("spacing"), nb::arg("seed"), nb::arg("options"));
+  core.def("phantom", &phantom, nb::arg("size"), nb::arg("spacing"), nb::arg("seed"), nb::arg("noise_hu"),
+           nb::arg("labels"), nb::arg("options"));
+  core.def("phantom_labels", &phantom_labels);
 }
 
 }  // namespace tetwarp::python

@@ -14,7 +14,9 @@
 #include "apps/cli/program.h"
 #include "backend/backend.h"
 #include "backend/devices.h"
+#include "deform/value_counts.h"
 #include "deform/version.h"
+#include "python/src/arrays.h"
 #include "python/src/calls.h"
 
 namespace tetwarp::python {
@@ -53,6 +55,12 @@ std::map<std::string, bool> compiled() {
 #endif
 }
 
+std::map<double, std::uint64_t> count_values_of(const ConstArray& array, const Geometry& grid) {
+  const ConstVolumeView volume = voxels_of(array, grid, "the labels");
+  const WithoutGil released;
+  return count_values(volume, {.threads = threads_of(0)});
+}
+
 }  // namespace
 
 }  // namespace tetwarp::python
@@ -83,6 +91,7 @@ NB_MODULE(_core, core) {
     const WithoutGil released;
     return apps::run_program(static_cast<int>(words.size()), arguments.data());
   });
+  core.def("count_values", &count_values_of, nanobind::arg("array"), nanobind::arg("grid"));
   core.def("is_forked", &is_forked);
   core.def("chosen_backend", [](const std::string& backend) { return name_of(chosen(backend_choice(backend))); });
 }

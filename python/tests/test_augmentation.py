@@ -20,6 +20,7 @@ FAMILIES = [
     aug.ElasticAffine(),
     aug.Breathing((3, 30)),
     aug.Swelling((15, 60), (-0.9, 2.5)),
+    aug.Simulated((5, 25)),
 ]
 
 
@@ -48,6 +49,26 @@ def test_no_family_folds_and_certificates_say_what_came_of_it(family):
         again = aug.Warp.of_record(certificate).deform(image, labels=[labels])
         assert np.array_equal(again.images[0].array, done.images[0].array)
         assert np.array_equal(again.labels[0].array, done.labels[0].array)
+
+
+def test_what_follows_from_the_image_is_in_the_record():
+    image, labels = scene()
+    warp = aug.draw(aug.Simulated(displacement=12), image.geometry, seed=2, cell_size=4)
+    with pytest.raises(tw.InputError, match="follows from the image"):
+        warp.field()
+    with pytest.raises(tw.InputError, match="another grid"):
+        warp.deform(tw.Volume(image.array[1:].copy(), tw.Geometry((44, 40, 29), spacing=(3, 3.5, 5))))
+    done = warp.deform(image)
+    # Other tissue gives another field; the record gives the first one's, whatever it deforms.
+    stiff = tw.Volume(np.full_like(image.array, 1000), image.geometry)
+    assert not np.array_equal(warp.deform(stiff).warp.held.displacement, done.warp.held.displacement)
+    again = aug.Warp.of_record(json.loads(json.dumps(done.certificate)))
+    assert np.array_equal(again.held.displacement, done.warp.held.displacement)
+    assert np.array_equal(again.deform(labels).images[0].array, done.warp.deform(labels).images[0].array)
+    assert np.abs(done.warp.held.displacement).max() > 5
+    record = done.certificate | {"field": done.certificate["field"] | {"displacement": "AAAA"}}
+    with pytest.raises(tw.InputError, match="no record"):
+        aug.Warp.of_record(record)
 
 
 def test_elastic_fields_at_the_bound_never_fold_and_far_beyond_it_they_do():

@@ -23,7 +23,7 @@ from .batching import batch
 from .deforming import Along, Deformed, compose, deform, forward_of, invert, jacobian, move_points
 from .errors import Cancelled, DeviceError, Error, InputError, NotCompiled
 from .field import PullField, TetrahedralMesh, VertexField
-from .files import info, phantom, read, read_field, write, write_field
+from .files import PHANTOM_LABELS, info, labelled_phantom, phantom, read, read_field, write, write_field
 from .geometry import Geometry
 from .rendering import render
 from .report import Report
@@ -69,7 +69,9 @@ __all__ = [
     "invert",
     "jacobian",
     "move_points",
+    "labelled_phantom",
     "phantom",
+    "PHANTOM_LABELS",
     "read",
     "read_field",
     "render",

@@ -12,21 +12,23 @@ What `tetwarp.monai` and `tetwarp.torchio` are made of (docs/guide/learning.md).
 
 from __future__ import annotations
 
+import base64
 import dataclasses
 import hashlib
 import json
 import operator
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from . import _calls, adapters, fields
+from . import _calls, _core, adapters, fields
 from .deforming import Along, deform, move_points
 from .errors import InputError
 from .field import PullField, VertexField
 from .geometry import Geometry
+from .simulation import simulate
 from .volume import Volume
 
 FloatArray = npt.NDArray[np.float64]
@@ -92,6 +94,10 @@ class Family:
     A class of one's own is known by its name, as those here are.
     """
 
+    #: Whether the field follows from the image, too. Then `field` takes the first image as a fourth argument, and what
+    #: it gives goes into records.
+    takes_image = False
+
     def __init_subclass__(cls) -> None:
         FAMILIES[cls.__name__] = cls
 
@@ -99,10 +105,9 @@ class Family:
         """Parameters of one deformation of a volume; what `json` can write."""
         raise NotImplementedError
 
-    @staticmethod
-    def field(parameters: Mapping[str, Any], geometry: Geometry, cell_size: int) -> VertexField:
-        """The field of parameters on a lattice over a grid."""
-        raise NotImplementedError
+    # Families that take an image have one argument more.
+    field: ClassVar[Callable[..., VertexField]]
+    """The field of parameters on a lattice over a grid: `field(parameters, geometry, cell_size)`, a static method."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -266,6 +271,61 @@ class Swelling(Family):
         return fields.bubble(geometry, cell_size=cell_size, **parameters)
 
 
+@dataclasses.dataclass(frozen=True)
+class Simulated(Family):
+    """A ball of tissue is pulled aside and what hangs on it follows, by ChainMail (`tetwarp.simulate`).
+
+    The field depends on the image, a CT in HU: bone is stiff, lung and fat give way, air hardly holds. The faces of the
+    grid stay.
+
+    Parameters
+    ----------
+    displacement : float or (float, float)
+        How far the ball is pulled, mm, in a direction that is drawn evenly from the sphere.
+    radius : float or (float, float)
+        Of the ball, mm.
+    middle : float or (float, float)
+        Where the ball lies on each axis of the body's box, as a share of its side.
+    """
+
+    displacement: float | Range = (5.0, 20.0)
+    radius: float | Range = (15.0, 40.0)
+    middle: float | Range = (0.25, 0.75)
+
+    takes_image = True
+
+    def draw(self, random: np.random.Generator, geometry: Geometry, cell_size: int) -> dict[str, Any]:
+        direction = random.normal(size=3)
+        by = direction / np.linalg.norm(direction) * random.uniform(*_range(self.displacement, "displacement", 0))
+        return {
+            "at": random.uniform(*_range(self.middle, "middle"), 3).tolist(),
+            "radius": random.uniform(*_range(self.radius, "radius", 0)),
+            "by": by.tolist(),
+        }
+
+    @staticmethod
+    def field(parameters: Mapping[str, Any], geometry: Geometry, cell_size: int, image: Volume) -> VertexField:
+        page = {
+            "method": "chainmail",
+            "cell_size": cell_size,
+            "tissues": [
+                {"name": "bone", "hu": [400, None], "compression": 0, "stretch": 0, "shear": 0},
+                {"name": "air", "hu": [None, -950], "compression": 0.6, "stretch": 2, "shear": 2},
+                {"name": "lung", "hu": [-950, -400], "compression": 0.3, "stretch": 0.3, "shear": 0.3},
+                {"name": "soft tissue", "compression": 0.15, "stretch": 0.2, "shear": 0.2},
+            ],
+            "hold": [{"border": True}],
+            "move": [
+                {
+                    "handle": {"at": {"body": parameters["at"]}, "radius_mm": parameters["radius"]},
+                    "by_mm": parameters["by"],
+                }
+            ],
+        }
+        on_host = image if isinstance(image.array, np.ndarray) else Volume(image.array.cpu().numpy(), image.geometry)
+        return simulate(page, on_host, backend="cpu").field
+
+
 @dataclasses.dataclass
 class Warped:
     """What `Warp.deform` gives."""
@@ -293,16 +353,19 @@ class Warp:
     geometry : Geometry
         Grid over which it was drawn.
     cell_size : int
-        Voxels between vertices.
+        Voxels between vertices; with smaller cells the field is smoother, and takes longer.
     shrunk : int
         How often all displacements are multiplied by 0.8.
+    held : VertexField, optional
+        Of a family that takes an image: the field, before it is shrunk. `deform` finds it, and `Warped.warp` has it.
     """
 
     family: str
     parameters: Mapping[str, Any]
     geometry: Geometry
-    cell_size: int = 4
+    cell_size: int = 8
     shrunk: int = 0
+    held: VertexField | None = dataclasses.field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.family not in FAMILIES:
@@ -326,6 +389,10 @@ class Warp:
             Of other images that go through it.
         """
         make = FAMILIES[self.family].field
+        if FAMILIES[self.family].takes_image:
+            if self.held is None:
+                raise InputError(f"the field of a {self.family} follows from the image; deform one, and take Warped.warp")
+            return self._shrunk(self.held)
         straight = self.geometry.straightened()
 
         size = np.array(straight.size)
@@ -346,8 +413,20 @@ class Warp:
         farthest = np.abs(inner.displacement).reshape(-1, 3).max(axis=0)
         beyond += np.abs(straight.direction.T) @ farthest / np.array(straight.spacing) + self.cell_size
         field = make(self.parameters, grown(_pairs(beyond, self.cell_size)), self.cell_size)
+        return self._shrunk(field)
+
+    def _shrunk(self, field: VertexField) -> VertexField:
         assert field.lattice is not None
         return VertexField(field.lattice, field.displacement * np.float32(self.share))
+
+    def _with_field_of(self, image: Volume) -> Warp:
+        """This one; of a family that takes an image, with the field of that image."""
+        family = FAMILIES[self.family]
+        if not family.takes_image or self.held is not None:
+            return self
+        if image.geometry != self.geometry:
+            raise InputError(f"the first image lies on another grid than that over which the {self.family} was drawn")
+        return dataclasses.replace(self, held=family.field(self.parameters, self.geometry, self.cell_size, image))
 
     def deform(
         self,
@@ -385,7 +464,9 @@ class Warp:
         # Those that share the first one's grid share its voxels' owners, too.
         grids = [volume.geometry for volume in everything]
         alone = [grid != grids[0] for grid in grids]
-        warp = self
+        warp = self._with_field_of(everything[0])
+        # What is simulated ends with the grid, whose faces stay; other fields reach beyond it.
+        outside = "rest" if FAMILIES[self.family].takes_image else "background"
         for _ in range(_MOST_SHRINKS):
             field = warp.field(grids)
             done = deform(
@@ -393,7 +474,7 @@ class Warp:
                 field,
                 interpolation=kinds[0][0],
                 background=kinds[0][1],
-                outside="background",
+                outside=outside,
                 with_=[
                     Along(one, kind, background, own=own)
                     for one, own, (kind, background) in zip(everything[1:], alone[1:], kinds[1:])
@@ -436,17 +517,26 @@ class Warp:
         return back(done.volume)
 
     def record(self) -> dict[str, Any]:
-        """All that makes it, for `of_record`; what `json` can write."""
-        size, spacing, origin, direction, slices = self.geometry._state()
-        grid = {"size": size, "spacing": spacing, "origin": origin, "direction": direction, "slices": slices}
-        return {
+        """All that makes it, for `of_record`; what `json` can write.
+
+        A field that follows from an image is part of it: float32, x, y, z of each vertex, i fastest, as Base64.
+        """
+        record = {
             "family": self.family,
             "parameters": dict(self.parameters),
-            "geometry": {name: list(numbers) for name, numbers in grid.items()},
+            "geometry": _state_of(self.geometry),
             "cell_size": self.cell_size,
             "shrunk": self.shrunk,
             "share": self.share,
         }
+        if self.held is not None:
+            assert self.held.lattice is not None
+            values = np.ascontiguousarray(self.held.displacement, "<f4").tobytes()
+            record["field"] = {
+                "lattice": _state_of(self.held.lattice),
+                "displacement": base64.b64encode(values).decode(),
+            }
+        return record
 
     @classmethod
     def of_record(cls, record: Mapping[str, Any]) -> Warp:
@@ -459,16 +549,19 @@ class Warp:
         True
         """
         try:
-            grid = dict(record["geometry"])
-            direction = np.array(grid.pop("direction"), np.float64).reshape(3, 3)
-            geometry = Geometry(**grid, direction=direction)
+            geometry = _geometry_of_state(record["geometry"])
+            held = None
+            if "field" in record:
+                lattice = _geometry_of_state(record["field"]["lattice"])
+                values = np.frombuffer(base64.b64decode(record["field"]["displacement"], validate=True), "<f4")
+                held = VertexField(lattice, values.astype(np.float32).reshape(*lattice.shape, 3))
             family, parameters, cell_size, shrunk = (record[name] for name in ("family", "parameters", "cell_size", "shrunk"))
-        except (KeyError, TypeError) as missing:
+        except (KeyError, TypeError, ValueError) as missing:
             raise InputError(f"this is no record of a deformation: {missing}") from None
-        return cls(family, dict(parameters), geometry, cell_size, shrunk)
+        return cls(family, dict(parameters), geometry, cell_size, shrunk, held)
 
 
-def draw(family: Family, geometry: Geometry, *, seed: int | np.random.Generator, cell_size: int = 4) -> Warp:
+def draw(family: Family, geometry: Geometry, *, seed: int | np.random.Generator, cell_size: int = 8) -> Warp:
     """Draws a deformation of a volume.
 
     Parameters
@@ -478,7 +571,7 @@ def draw(family: Family, geometry: Geometry, *, seed: int | np.random.Generator,
         Grid of the volume.
     seed : int or numpy.random.Generator
     cell_size : int
-        Voxels between vertices.
+        Voxels between vertices; with smaller cells the field is smoother, and takes longer.
 
     Examples
     --------
@@ -518,27 +611,41 @@ def seed_of(seed: int, epoch: int, key: Any) -> int:
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "little") >> 1
 
 
+def _state_of(geometry: Geometry) -> dict[str, list[float]]:
+    """The numbers of a grid, by name."""
+    size, spacing, origin, direction, slices = geometry._state()
+    grid = {"size": size, "spacing": spacing, "origin": origin, "direction": direction, "slices": slices}
+    return {name: list(numbers) for name, numbers in grid.items()}
+
+
+def _geometry_of_state(state: Mapping[str, Any]) -> Geometry:
+    grid = dict(state)
+    direction = np.array(grid.pop("direction"), np.float64).reshape(3, 3)
+    return Geometry(**grid, direction=direction)
+
+
 def _pairs(voxels: FloatArray, cell_size: int) -> npt.NDArray[np.int64]:
     """How many pairs of cells reach over so many voxels on each axis."""
     return np.ceil(voxels / (2 * cell_size)).astype(np.int64)
-
-
-def _counts(array: npt.NDArray[Any]) -> list[tuple[Any, int]]:
-    """The values of an array, and how many there are of each."""
-    if array.dtype.kind in "iu" and 0 <= array.min() and array.max() < 2**16:
-        counts = np.bincount(array.ravel())
-        return [(label, int(counts[label])) for label in np.flatnonzero(counts)]
-    return [(label, int(count)) for label, count in zip(*np.unique(array, return_counts=True))]
 
 
 def _volumes_of(before: Volume, after: Volume) -> dict[str, list[float]]:
     """Volume of each label before and after, ml."""
     volumes: dict[str, list[float]] = {}
     for n, volume in enumerate((before, after)):
-        array = np.asarray(volume.array if isinstance(volume.array, np.ndarray) else volume.array.cpu())
         affine = volume.geometry.straightened().affine("LPS")
         millilitres = abs(float(np.linalg.det(affine[:3, :3]))) / 1000
-        for label, count in _counts(array):
+        for label, count in _counts(volume):
             if label != 0:
-                volumes.setdefault(str(label), [0.0, 0.0])[n] = float(count) * millilitres
+                volumes.setdefault(str(label), [0.0, 0.0])[n] = count * millilitres
     return volumes
+
+
+def _counts(volume: Volume) -> list[tuple[Any, int]]:
+    """The values of a volume, and how many voxels have each: of one on a device, counted there."""
+    array = volume.array
+    if isinstance(array, np.ndarray):
+        kind = array.dtype.type
+        return [(kind(value), count) for value, count in _core.count_values(array, volume.geometry._grid).items()]
+    values, counts = (one.cpu().numpy() for one in array.unique(return_counts=True))
+    return [(value, int(count)) for value, count in zip(values, counts)]

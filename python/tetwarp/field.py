@@ -96,7 +96,11 @@ class VertexField:
     (3, 3, 3)
     """
 
-    __slots__ = ("displacement", "lattice", "mesh", "notes", "replaced")
+    __slots__ = ("_lattice", "_numbers", "displacement", "mesh", "notes", "replaced")
+
+    _lattice: Geometry | None
+    #: Those of the lattice (`Geometry._numbers`): the compiler of PyTorch 2.4 reads a member, but no member of it.
+    _numbers: list[float] | None
 
     def __init__(
         self,
@@ -121,6 +125,16 @@ class VertexField:
         self.replaced = None if replaced is None else _arrays.numbers(replaced, np.uint64, "the replaced cells")
         #: Remarks about what was read.
         self.notes: list[str] = []
+
+    @property
+    def lattice(self) -> Geometry | None:
+        """Grid of the undeformed vertices."""
+        return self._lattice
+
+    @lattice.setter
+    def lattice(self, lattice: Geometry | None) -> None:
+        self._lattice = lattice
+        self._numbers = None if lattice is None else list(lattice._numbers)
 
     @classmethod
     def _of(cls, parts: Any, notes: Any = ()) -> VertexField:

@@ -50,7 +50,7 @@ class RandTetwarpd(DrawsWarps, RandomizableTransform, MapTransform, InvertibleTr
     prob : float
         How often a sample is deformed.
     cell_size : int
-        Voxels between vertices.
+        Voxels between vertices; with smaller cells the field is smoother, and takes longer.
     seed, seed_key : int, key
         With both, a sample is deformed by what `seed`, `epoch` and `sample[seed_key]`, a text or a whole number, say:
         workers and order change nothing. Several such transforms of a pipeline want a seed each. Without `seed_key`
@@ -83,7 +83,7 @@ class RandTetwarpd(DrawsWarps, RandomizableTransform, MapTransform, InvertibleTr
         interpolation: str = "linear",
         background: float | None = None,
         prob: float = 0.1,
-        cell_size: int = 4,
+        cell_size: int = 8,
         seed: int = 0,
         seed_key: Hashable | None = None,
         certificate_key: str | None = "tetwarp_certificate",

@@ -157,8 +157,8 @@ def deform(
         numbers = list(lattice._numbers)
         shape = tuple(int(size) for size in numbers[2::-1])
     elif isinstance(lattice, VertexField) and lattice.mesh is None:
-        assert lattice.lattice is not None
-        numbers = list(lattice.lattice._numbers)
+        assert lattice._numbers is not None
+        numbers = list(lattice._numbers)
         shape = tuple(int(size) for size in numbers[2::-1])
     elif not isinstance(lattice, (VertexField, TetrahedralMesh)):
         raise TypeError(

@@ -105,7 +105,7 @@ class RandomTetwarp(DrawsWarps, RandomTransform, SpatialTransform):
     interpolation, background
         As of `Tetwarp`.
     cell_size : int
-        Voxels between vertices.
+        Voxels between vertices; with smaller cells the field is smoother, and takes longer.
     seed, seed_key : int, key
         With both, a subject is deformed by what `seed`, `epoch` and `subject[seed_key]`, a text or a whole number, say:
         workers and order change nothing. Several such transforms of a pipeline want a seed each; whether it is deformed, TorchIO's own random state decides by `p`. Without `seed_key` that decides all.
@@ -127,7 +127,7 @@ class RandomTetwarp(DrawsWarps, RandomTransform, SpatialTransform):
         *,
         interpolation: str = "linear",
         background: float | None = None,
-        cell_size: int = 4,
+        cell_size: int = 8,
         seed: int = 0,
         seed_key: str | None = None,
         threads: int = 0,

@@ -180,5 +180,47 @@ TEST(Phantom, RefusesSizesAndSpacingsThatAreNone) {
   EXPECT_THROW(make_phantom({16, 16, 16}, {1, 1, NAN}, 1), InputError);
 }
 
+TEST(Phantom, LabelsSayWhatVoxelsBelongTo) {
+  const glm::i64vec3 size(128, 128, 75);
+  const LabelledPhantom made = make_labelled_phantom(size, kFieldOfView / glm::dvec3(size), 1);
+  EXPECT_EQ(made.ct.voxels, phantom_of(size).voxels);
+  struct Range {
+    PhantomLabel label;
+    double litres_from, litres_to, mean_from, mean_to;
+  };
+  const double litre = 1e6 / (made.ct.geometry.spacing.x * made.ct.geometry.spacing.y * made.ct.geometry.spacing.z);
+  for (const Range& range :
+       {Range{PhantomLabel::nothing, 20, 40, -1024, -900}, Range{PhantomLabel::body, 8, 16, -100, 60},
+        Range{PhantomLabel::lung, 2, 5, -880, -750}, Range{PhantomLabel::bone, 0.7, 3, 250, 900},
+        Range{PhantomLabel::heart, 0.3, 0.9, 40, 130}, Range{PhantomLabel::vessel, 0.1, 0.6, 90, 150},
+        Range{PhantomLabel::airway, 0.02, 0.15, -990, -300}, Range{PhantomLabel::oesophagus, 0.01, 0.1, -200, 60},
+        Range{PhantomLabel::liver, 0.9, 2.2, 55, 80}, Range{PhantomLabel::spleen, 0.1, 0.4, 50, 75},
+        Range{PhantomLabel::kidney, 0.07, 0.5, 60, 130}, Range{PhantomLabel::stomach, 0.1, 0.4, -700, 30},
+        Range{PhantomLabel::bowel, 0.2, 1.5, -600, 60}, Range{PhantomLabel::cord, 0.03, 0.12, 5, 60}}) {
+    double count = 0, sum = 0;
+    for (std::size_t n = 0; n < made.labels.voxels.size(); ++n) {
+      if (made.labels.voxels[n] != static_cast<std::uint8_t>(range.label)) continue;
+      count += 1, sum += made.ct.voxels[n];
+    }
+    const std::string_view name = phantom_label_names()[static_cast<std::size_t>(range.label)];
+    EXPECT_GT(count / litre, range.litres_from) << name;
+    EXPECT_LT(count / litre, range.litres_to) << name;
+    EXPECT_GT(sum / count, range.mean_from) << name;
+    EXPECT_LT(sum / count, range.mean_to) << name;
+  }
+}
+
+TEST(Phantom, NoiseIsAsWished) {
+  const glm::i64vec3 size(64, 64, 40);
+  const auto with = [&](double hu) { return make_phantom(size, kFieldOfView / glm::dvec3(size), 1, {.noise_hu = hu}); };
+  const Volume<std::int16_t> none = with(0), some = with(25);
+  double squares = 0;
+  for (std::size_t n = 0; n < none.voxels.size(); ++n) squares += std::pow(some.voxels[n] - none.voxels[n], 2);
+  // Noise below -1024 HU is cut off, in air.
+  EXPECT_NEAR(std::sqrt(squares / static_cast<double>(none.voxels.size())), 25, 2);
+  EXPECT_THROW(with(-1), InputError);
+  EXPECT_THROW(with(NAN), InputError);
+}
+
 }  // namespace
 }  // namespace tetwarp
