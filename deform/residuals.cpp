@@ -7,7 +7,6 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -15,38 +14,12 @@
 
 #include "deform/core/fixed_point.h"
 #include "deform/cpu/tiles.h"
+#include "deform/distance_histogram.h"
 #include "deform/points.h"
 
 namespace tetwarp {
 
 namespace {
-
-/// Counts distances by the upper 16 bits of their floats, which gives bins less than 1 % wide.
-class Histogram {
- public:
-  void add(double distance) {
-    const auto bits = std::bit_cast<std::uint32_t>(static_cast<float>(distance));
-    ++counts_[bits >> kDropped];
-  }
-  void add(const Histogram& other) {
-    for (std::size_t n = 0; n < counts_.size(); ++n) counts_[n] += other.counts_[n];
-  }
-  /// A distance that the part `part` of all distances does not exceed: the upper end of a bin.
-  double percentile(double part, std::uint64_t all) const {
-    const auto wanted = static_cast<std::uint64_t>(std::ceil(part * static_cast<double>(all)));
-    std::uint64_t seen = 0;
-    for (std::size_t n = 0; n < counts_.size(); ++n) {
-      seen += counts_[n];
-      if (seen >= wanted) return std::bit_cast<float>(static_cast<std::uint32_t>((n << kDropped) | kRest));
-    }
-    return 0;
-  }
-
- private:
-  static constexpr int kDropped = 16;
-  static constexpr std::uint32_t kRest = (1U << kDropped) - 1;
-  std::vector<std::uint64_t> counts_ = std::vector<std::uint64_t>(std::size_t{1} << (31 - kDropped));
-};
 
 /// Sums of one slice. They are added up slice by slice, whichever thread made them, so that the order is fixed.
 struct SliceSums {
@@ -67,7 +40,7 @@ class Distances {
     arena.execute([&] {
       tbb::parallel_for(begin, end, [&](std::int64_t k) {
         SliceSums& slice = slices_[static_cast<std::size_t>(k)];
-        Histogram& histogram = histograms_.local();
+        DistanceHistogram& histogram = histograms_.local();
         distances(k, [&](double distance) {
           ++slice.points;
           slice.sum += distance;
@@ -88,8 +61,8 @@ class Distances {
       all.largest = std::max(all.largest, slice.largest);
     }
     if (all.points == 0) return all;
-    Histogram histogram;
-    for (const Histogram& part : histograms_) histogram.add(part);
+    DistanceHistogram histogram;
+    for (const DistanceHistogram& part : histograms_) histogram.add(part);
     all.mean = sum / static_cast<double>(all.points);
     all.percentile_99 = std::min(histogram.percentile(0.99, all.points), all.largest);
     return all;
@@ -97,7 +70,7 @@ class Distances {
 
  private:
   std::vector<SliceSums> slices_;
-  tbb::enumerable_thread_specific<Histogram> histograms_;
+  tbb::enumerable_thread_specific<DistanceHistogram> histograms_;
 };
 
 /// An inverse field of which some slices are in memory.

@@ -1,0 +1,149 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "deform/errors.h"
+#include "deform/simulate/divided_lattice.h"
+#include "deform/truth/levels.h"
+#include "deform/truth/motions.h"
+#include "deform/truth/shapes.h"
+#include "deform/truth/slip_tube.h"
+
+namespace tetwarp::truth {
+
+namespace {
+
+/// Twice the area of a triangle, above 0 where a, b, c turn left.
+double turn(const glm::dvec2& a, const glm::dvec2& b, const glm::dvec2& c) {
+  return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+}
+
+/// The corners of the convex hull, turning left (Andrew's monotone chain).
+std::vector<glm::dvec2> convex_hull(std::vector<glm::dvec2> points) {
+  const auto before = [](const glm::dvec2& a, const glm::dvec2& b) { return a.x < b.x || (a.x == b.x && a.y < b.y); };
+  std::sort(points.begin(), points.end(), before);
+  points.erase(std::unique(points.begin(), points.end()), points.end());
+  if (points.size() < 3) return points;
+  std::vector<glm::dvec2> hull;
+  const auto add = [&](const glm::dvec2& point, std::size_t keep) {
+    while (hull.size() >= keep + 2 && turn(hull[hull.size() - 2], hull.back(), point) <= 0) hull.pop_back();
+    hull.push_back(point);
+  };
+  for (const glm::dvec2& point : points) add(point, 0);
+  const std::size_t lower = hull.size() - 1;
+  for (std::size_t n = points.size() - 1; n-- > 0;) add(points[n], lower);
+  hull.pop_back();
+  return hull;
+}
+
+/// On which side of the tube each node of a divided lattice lies: 1 inside, 0 outside. Copies lie where their piece
+/// does.
+std::vector<std::uint8_t> sides_of_nodes(const simulate::DividedLattice& divided, const SlipTube& tube,
+                                         const Geometry& lattice) {
+  const auto vertices = static_cast<std::size_t>(voxel_count(lattice));
+  std::vector<std::uint8_t> inside(vertices + divided.copies_of.size());
+  const std::int64_t columns = lattice.size.x * lattice.size.y;
+  for (std::size_t n = 0; n < vertices; ++n) {
+    const std::int64_t column = static_cast<std::int64_t>(n) % columns;
+    inside[n] = tube.depth_mm(glm::dvec2(column % lattice.size.x, column / lattice.size.x)) > 0;
+  }
+  // Which sign of a piece means inside: that of a piece most of whose own vertices lie there.
+  std::int64_t agree = 0;
+  for (std::size_t piece = 0; piece < divided.pieces.size(); ++piece) {
+    for (const std::uint32_t node : divided.pieces[piece].node)
+      if (node < vertices) agree += divided.sides[piece][0] * (inside[node] ? 1 : -1);
+  }
+  const int sign = agree > 0 ? 1 : -1;
+  for (std::size_t piece = 0; piece < divided.pieces.size(); ++piece) {
+    const int side = divided.sides[piece][0] * sign;
+    if (side == 0) continue;
+    for (const std::uint32_t node : divided.pieces[piece].node) inside[node] = side > 0;
+  }
+  return inside;
+}
+
+}  // namespace
+
+SlipTube::SlipTube(const Subject& subject) : lattice_(subject.lattice()) {
+  const std::vector<std::uint8_t> lung = subject.vertices("lung");
+  std::vector<glm::dvec2> columns;
+  std::size_t vertex = 0;
+  for (std::int64_t k = 0; k < lattice_.size.z; ++k) {
+    for (std::int64_t j = 0; j < lattice_.size.y; ++j) {
+      for (std::int64_t i = 0; i < lattice_.size.x; ++i, ++vertex)
+        if (lung[vertex]) columns.emplace_back(i, j);
+    }
+  }
+  corners_ = convex_hull(std::move(columns));
+  require(corners_.size() >= 3, "the lungs are too small for a tube around them");
+  require(std::abs(lattice_.direction[2].z) > 0.9,
+          "slip runs along the third axis of the grid, which has to lead from feet to head; this one is " +
+              orientation_code(lattice_));
+  // Half a cell outwards, so that the tube holds the lungs and does not go through vertices.
+  glm::dvec2 middle(0);
+  for (const glm::dvec2& corner : corners_) middle += corner / static_cast<double>(corners_.size());
+  for (glm::dvec2& corner : corners_) {
+    const glm::dvec2 from = corner - middle;
+    corner += 0.53 * from / std::sqrt(glm::dot(from, from));
+  }
+}
+
+double SlipTube::depth_mm(const glm::dvec2& at) const {
+  double nearest = 1e300;
+  bool is_inside = true;
+  const glm::dvec2 step(lattice_.spacing);
+  for (std::size_t n = 0; n < corners_.size(); ++n) {
+    const glm::dvec2 a = corners_[n] * step, b = corners_[(n + 1) % corners_.size()] * step, p = at * step;
+    const glm::dvec2 along = b - a;
+    const double part = std::clamp(glm::dot(p - a, along) / glm::dot(along, along), 0.0, 1.0);
+    const glm::dvec2 off = p - (a + part * along);
+    const double distance = std::sqrt(glm::dot(off, off));
+    if (turn(a, b, p) < 0) is_inside = false;
+    nearest = std::min(nearest, distance);
+  }
+  return is_inside ? nearest : -nearest;
+}
+
+simulate::Cut SlipTube::cut() const {
+  const AffineMap point = point_from_index(lattice_);
+  simulate::SweptCut tube{.path = {},
+                          .sweep = point.linear * glm::dvec3(0, 0, lattice_.size.z),
+                          .is_closed = true};
+  for (const glm::dvec2& corner : corners_) tube.path.push_back(point(glm::dvec3(corner, -0.5)));
+  return {"chest wall", tube};
+}
+
+VertexField slip_motion(const Subject& subject, const Values& values, const Limits& limits, const Control& control) {
+  const Geometry& lattice = subject.lattice();
+  const SlipTube tube(subject);
+  const BreathingLevels levels(subject);
+  const double amplitude = values.find("amplitude")->second;
+  // Bones deep inside, such as the spine between the lungs, stay; those beside the wall are outside, or slid along.
+  constexpr double kDeepMm = 15;
+  std::vector<std::uint8_t> held = levels.held();
+  const std::int64_t columns = lattice.size.x * lattice.size.y;
+  for (std::size_t n = 0; n < held.size(); ++n) {
+    const std::int64_t column = static_cast<std::int64_t>(n) % columns;
+    if (held[n]) held[n] = tube.depth_mm(glm::dvec2(column % lattice.size.x, column / lattice.size.x)) > kDeepMm;
+  }
+  const std::vector<double> from_held = distance_mm(lattice, held);
+  const double fade = std::max(3 * amplitude, 1.0);
+  const glm::dvec3 down = lattice.direction[2] * (lattice.direction[2].z > 0 ? -1.0 : 1.0);
+  const VertexField inner = on_vertices(lattice, limits, control, [&](std::size_t vertex, const glm::dvec3& point) {
+    return amplitude * levels.hill_at(point.z) * smooth_step(from_held[vertex] / fade) * down;
+  });
+  const simulate::Cut cut = tube.cut();
+  const simulate::DividedLattice divided = simulate::divide(lattice, {&cut, 1});
+  const std::vector<std::uint8_t> inside = sides_of_nodes(divided, tube, lattice);
+  std::vector<glm::vec3> displacement(inside.size(), glm::vec3(0));
+  for (std::size_t n = 0; n < inside.size(); ++n) {
+    const std::size_t vertex = n < inner.displacement.size() ? n : divided.copies_of[n - inner.displacement.size()];
+    if (inside[n]) displacement[n] = inner.displacement[vertex];
+  }
+  return simulate::field_of(lattice, divided, displacement);
+}
+
+}  // namespace tetwarp::truth

@@ -1,0 +1,51 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "deform/simulate/patient.h"
+
+/// Deformations of a patient whose truth is known, and what it takes to test a registration by them.
+namespace tetwarp::truth {
+
+/// Which labels of a label map play a role: {"lung": {2}, "bone": {3, 17}}.
+using Roles = std::map<std::string, std::vector<std::int64_t>>;
+
+/// The patient whom a deformation moves, as seen at the vertices of its lattice.
+class Subject {
+ public:
+  /// @param patient  of `simulate::examine`; with labels where there are roles
+  /// @throws InputError for roles without labels, or a role of which the patient has no vertex
+  Subject(simulate::Patient patient, Roles roles);
+
+  /// The lattice that is deformed.
+  const Geometry& lattice() const { return patient_.lattice; }
+  /// The patient.
+  const simulate::Patient& patient() const { return patient_; }
+  /// Whether labels play a role.
+  bool has(const std::string& role) const { return roles_.contains(role); }
+  /// The labels of a role. @pre it is had
+  const std::vector<std::int64_t>& labels(const std::string& role) const { return roles_.at(role); }
+  /// For each vertex, i fastest: 1 where its label plays the role, else 0. @pre it is had
+  std::vector<std::uint8_t> vertices(const std::string& role) const;
+  /// For each vertex: 1 where it is no corner of a cell of the body, yet of a cell with matter in it, above -900 HU:
+  /// the table. It does not move.
+  std::vector<std::uint8_t> table() const;
+
+ private:
+  simulate::Patient patient_;
+  Roles roles_;
+};
+
+/// Distance of each vertex of a lattice from the nearest marked one, mm; infinite where none is marked. Exact
+/// (Felzenszwalb and Huttenlocher, "Distance transforms of sampled functions", 2012).
+/// @param lattice  whose axes are perpendicular
+/// @param marked   not 0 for marked vertices, i fastest
+std::vector<double> distance_mm(const Geometry& lattice, const std::vector<std::uint8_t>& marked);
+
+}  // namespace tetwarp::truth
