@@ -47,5 +47,7 @@ class Picture {
 /// Writes an 8-bit RGB PNG without text or time: the same picture gives the same bytes.
 /// @throws Error naming the path and the reason; then no file of that name is left
 void write_png(const std::filesystem::path& path, const Picture& picture);
+/// The bytes of such a file. @throws Error where there is not enough memory
+std::vector<std::uint8_t> png_bytes(const Picture& picture);
 
 }  // namespace tetwarp

@@ -87,6 +87,8 @@ void add_commands(CLI::App& app, AllOptions& options) {
   add_render(app, options.render);
   add_view(app, options.view);
   add_batch(app, options.batch);
+  add_truth(app, options.truth);
+  add_score(app, options.score);
   add_bench(app);
 }
 
@@ -132,6 +134,8 @@ int run_command_line(int argc, char** argv) {
   if (app.got_subcommand("render")) return run(run_render, commands.render);
   if (app.got_subcommand("view")) return run(run_view, commands.view);
   if (app.got_subcommand("batch")) return run(run_batch, commands.batch);
+  if (app.got_subcommand("truth")) return run(run_truth, commands.truth);
+  if (app.got_subcommand("score")) return run(run_score, commands.score);
   if (app.got_subcommand("simulate")) return run(run_simulate, commands.simulate);
   return run(run_deform, commands.deform);
 }

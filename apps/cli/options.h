@@ -158,6 +158,34 @@ struct BatchOptions {
   BackendChoice backend = BackendChoice::automatic;
 };
 
+struct TruthOptions {
+  CommonOptions common;
+  InputOptions input;
+  std::filesystem::path output;    ///< folder of the set
+  std::vector<std::string> cases;  ///< KIND[:KEY=VALUE,...]
+  std::filesystem::path labels;    ///< on the grid of INPUT
+  std::vector<std::string> roles;  ///< ROLE=N,...
+  std::vector<std::string> with;   ///< files that go along
+  std::int64_t cell_size = 4;
+  double body_above_hu = -400;
+  std::int64_t landmarks = 1000;
+  double noise_hu = 0;
+  std::uint64_t seed = 1;
+  int compression = 1;
+  bool dense = false, resume = false;
+  BackendChoice backend = BackendChoice::automatic;
+  int device = 0;  ///< of CUDA
+};
+
+struct ScoreOptions {
+  CommonOptions common;
+  std::filesystem::path set;                   ///< folder of a set of known truth
+  std::vector<std::filesystem::path> results;  ///< folders, or one file for a set of one case
+  std::filesystem::path limits, json, csv, html;
+  BackendChoice backend = BackendChoice::automatic;
+  int device = 0;  ///< of CUDA
+};
+
 struct RenderOptions {
   CommonOptions common;
   InputOptions input;
@@ -214,6 +242,8 @@ int run_simulate(const SimulateOptions& options);
 int run_batch(const BatchOptions& options);
 int run_render(const RenderOptions& options);
 int run_view(const ViewOptions& options);
+int run_truth(const TruthOptions& options);
+int run_score(const ScoreOptions& options);
 
 /// Becomes the program tetwarp-bench that lies beside this one; returns only by an exception.
 /// @param arguments  given to it as they are

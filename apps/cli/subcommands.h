@@ -22,6 +22,8 @@ void add_simulate(CLI::App& app, SimulateOptions& options);
 void add_render(CLI::App& app, RenderOptions& options);
 void add_view(CLI::App& app, ViewOptions& options);
 void add_batch(CLI::App& app, BatchOptions& options);
+void add_truth(CLI::App& app, TruthOptions& options);
+void add_score(CLI::App& app, ScoreOptions& options);
 
 /// The options of every subcommand; of one command line those of one subcommand are set.
 struct AllOptions {
@@ -34,6 +36,8 @@ struct AllOptions {
   BatchOptions batch;
   RenderOptions render;
   ViewOptions view;
+  TruthOptions truth;
+  ScoreOptions score;
 };
 /// Describes the program: its name, its version and all its subcommands.
 void add_commands(CLI::App& app, AllOptions& options);

@@ -32,18 +32,40 @@ void Picture::fill(int x, int y, int width, int height, Colour colour) {
   }
 }
 
-void write_png(const std::filesystem::path& path, const Picture& picture) {
+namespace {
+
+png_image described(const Picture& picture) {
   png_image image = {};
   image.version = PNG_IMAGE_VERSION;
   image.width = static_cast<png_uint_32>(picture.width());
   image.height = static_cast<png_uint_32>(picture.height());
   image.format = PNG_FORMAT_RGB;
+  return image;
+}
+
+}  // namespace
+
+void write_png(const std::filesystem::path& path, const Picture& picture) {
+  png_image image = described(picture);
   if (!png_image_write_to_file(&image, path.c_str(), 0, picture.data(), 0, nullptr)) {
     const std::string reason = image.message;
     png_image_free(&image);
     throw Error("cannot write the picture, " + path.string() + " (" + reason +
                 "); check the folder and the free space");
   }
+}
+
+std::vector<std::uint8_t> png_bytes(const Picture& picture) {
+  png_image image = described(picture);
+  std::vector<std::uint8_t> bytes(PNG_IMAGE_PNG_SIZE_MAX(image));
+  png_alloc_size_t used = bytes.size();
+  if (!png_image_write_to_memory(&image, bytes.data(), &used, 0, picture.data(), 0, nullptr)) {
+    const std::string reason = image.message;
+    png_image_free(&image);
+    throw Error("cannot make a PNG of a picture (" + reason + ")");
+  }
+  bytes.resize(used);
+  return bytes;
 }
 
 }  // namespace tetwarp

@@ -1,0 +1,175 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include "apps/score/score_report.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <fstream>
+
+#include "apps/cli/input.h"
+#include "deform/errors.h"
+#include "io/csv_record.h"
+
+namespace tetwarp::apps {
+
+namespace {
+
+using nlohmann::json;
+
+json to_json(const score::Errors& errors) {
+  return {{"points", errors.points},
+          {"missing", errors.missing},
+          {"mean_mm", errors.mean},
+          {"median_mm", errors.median},
+          {"percentile_95_mm", errors.percentile_95},
+          {"percentile_99_mm", errors.percentile_99},
+          {"largest_mm", errors.largest},
+          {"worst_lps_mm", {errors.worst.x, errors.worst.y, errors.worst.z}}};
+}
+
+/// The value that a limit bounds; empty where it was not measured.
+std::optional<double> value_of(const CaseScore& score, const std::string& limit) {
+  if (score.landmarks && score.landmarks->points > 0) {
+    if (limit == "landmarks_mean_mm") return score.landmarks->mean;
+    if (limit == "landmarks_largest_mm") return score.landmarks->largest;
+  }
+  if (score.dense) {
+    if (limit == "folded_voxels") return static_cast<double>(score.dense->folded);
+    if (limit == "missing_voxels") return static_cast<double>(score.dense->all.missing);
+    if (limit == "mean_mm") return score.dense->all.mean;
+    if (limit == "percentile_95_mm") return score.dense->all.percentile_95;
+  }
+  return {};
+}
+
+}  // namespace
+
+std::vector<ScoreLimit> usual_limits() {
+  const std::string tg132 = "AAPM TG-132, as in Latifi et al. 2018 (PMC6036411)";
+  return {{"landmarks_mean_mm", "mean error of landmarks, mm", 2, tg132},
+          {"landmarks_largest_mm", "largest error of a landmark, mm", 5, tg132},
+          {"folded_voxels", "voxels with a Jacobian determinant of 0 or below", 0, tg132},
+          {"missing_voxels", "voxels of the body without a place", 0, "a result has to cover the body"}};
+}
+
+std::vector<ScoreLimit> read_limits(const std::filesystem::path& file) {
+  std::vector<ScoreLimit> limits = usual_limits();
+  if (file.empty()) return limits;
+  std::ifstream stream(file);
+  require(stream.good(), "the limits, " + file.string() + ", cannot be read");
+  try {
+    // What is bounded only where a file says so.
+    const std::vector<ScoreLimit> more{{"mean_mm", "mean error over the body, mm", 0, ""},
+                                       {"percentile_95_mm", "error that 95 % of the body keep, mm", 0, ""}};
+    const json document = json::parse(stream);
+    for (const auto& [name, given] : document.items()) {
+      const auto is_it = [&key = name](const ScoreLimit& one) { return one.name == key; };
+      auto found = std::find_if(limits.begin(), limits.end(), is_it);
+      if (found == limits.end()) {
+        const auto another = std::find_if(more.begin(), more.end(), is_it);
+        std::string known;
+        for (const auto& list : {usual_limits(), more})
+          for (const ScoreLimit& one : list) known += (known.empty() ? "" : ", ") + one.name;
+        require(another != more.end(), file.string() + " has a limit \"" + name + "\"; expected " + known);
+        found = limits.insert(limits.end(), *another);
+      }
+      found->most = given.at("most").get<double>();
+      found->source = given.value("source", file.string());
+    }
+  } catch (const json::exception& error) {
+    throw InputError(file.string() + " is no page of limits: " + error.what());
+  }
+  return limits;
+}
+
+bool CaseScore::passed() const {
+  return !file.empty() && !checks.empty() &&
+         std::all_of(checks.begin(), checks.end(), [](const ScoreCheck& one) { return one.passed(); });
+}
+
+std::vector<ScoreCheck> check(const CaseScore& score, const std::vector<ScoreLimit>& limits) {
+  std::vector<ScoreCheck> checks;
+  for (const ScoreLimit& limit : limits)
+    if (const std::optional<double> value = value_of(score, limit.name)) checks.push_back({limit, *value});
+  return checks;
+}
+
+json to_json(const CaseScore& score) {
+  json record{{"result", score.result}, {"case", score.name}, {"passed", score.passed()}, {"notes", score.notes}};
+  record["file"] = score.file.empty() ? json() : json(score.file.string());
+  if (score.dense) {
+    const score::DenseScore& dense = *score.dense;
+    json labels = json::object(), readings = json::object();
+    for (const auto& [label, errors] : dense.labels) labels[std::to_string(label)] = to_json(errors);
+    for (std::size_t n = 0; n < score::kReadings; ++n)
+      readings[score::to_string(static_cast<score::Reading>(n))] = dense.readings[n];
+    record["body"] = to_json(dense.all);
+    record["labels"] = labels;
+    record["mean_mm_read_as"] = readings;
+    record["jacobian"] = {{"voxels", dense.determinants},
+                          {"folded", dense.folded},
+                          {"smallest", dense.smallest_determinant},
+                          {"largest", dense.largest_determinant},
+                          {"mean_error", dense.mean_determinant_error}};
+  }
+  if (score.landmarks) record["landmarks"] = to_json(*score.landmarks);
+  if (!score.overlaps.empty()) {
+    json dice = json::object();
+    for (const auto& [label, overlap] : score.overlaps) dice[std::to_string(label)] = overlap.dice();
+    record["dice"] = dice;
+  }
+  record["checks"] = json::array();
+  for (const ScoreCheck& one : score.checks) {
+    record["checks"].push_back({{"name", one.limit.name},
+                                {"value", one.value},
+                                {"most", one.limit.most},
+                                {"source", one.limit.source},
+                                {"passed", one.passed()}});
+  }
+  return record;
+}
+
+std::string csv_of(const std::vector<CaseScore>& scores) {
+  std::string text = "result,case,part,points,missing,mean_mm,median_mm,p95_mm,p99_mm,largest_mm,dice\n";
+  const auto row = [&](const CaseScore& score, const std::string& part, const score::Errors& errors, const std::string& dice) {
+    text += quoted(score.result) + "," + score.name + "," + part + "," + std::to_string(errors.points) + "," +
+            std::to_string(errors.missing);
+    for (const double value : {errors.mean, errors.median, errors.percentile_95, errors.percentile_99, errors.largest})
+      text += "," + exact_number_text(value);
+    text += "," + dice + "\n";
+  };
+  for (const CaseScore& score : scores) {
+    if (score.dense) {
+      row(score, "body", score.dense->all, "");
+      for (const auto& [label, errors] : score.dense->labels) {
+        const auto overlap = score.overlaps.find(label);
+        row(score, "label " + std::to_string(label), errors,
+            overlap == score.overlaps.end() ? "" : exact_number_text(overlap->second.dice()));
+      }
+    }
+    if (score.landmarks) row(score, "landmarks", *score.landmarks, "");
+  }
+  return text;
+}
+
+std::string line_of(const CaseScore& score) {
+  if (score.file.empty()) return score.name + ": no result in " + score.result;
+  std::string text = score.name + ": ";
+  char part[160];
+  if (score.dense) {
+    const score::Errors& all = score.dense->all;
+    std::snprintf(part, sizeof part, "body mean %.2f, 95 %% %.2f, largest %.2f mm (%.2f without registration), ", all.mean,
+                  all.percentile_95, all.largest,
+                  score.dense->readings[static_cast<std::size_t>(score::Reading::nothing)]);
+    text += part;
+    text += std::to_string(score.dense->folded) + " folded, ";
+  }
+  if (score.landmarks) {
+    std::snprintf(part, sizeof part, "landmarks mean %.2f, largest %.2f mm, ", score.landmarks->mean, score.landmarks->largest);
+    text += part;
+  }
+  return text + (score.passed() ? "passes" : "fails");
+}
+
+}  // namespace tetwarp::apps

@@ -1,0 +1,64 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "deform/score/overlap.h"
+#include "deform/score/registration_score.h"
+
+namespace tetwarp::apps {
+
+/// A bound that a result has to keep.
+struct ScoreLimit {
+  std::string name;    ///< key of --limits
+  std::string about;   ///< what is bounded, with its unit
+  double most;         ///< largest value that passes
+  std::string source;  ///< who asks for it
+};
+/// Those that count unless a file says otherwise.
+std::vector<ScoreLimit> usual_limits();
+/// Limits of a file over the usual ones. @param file  empty: the usual ones
+/// @throws InputError for a file that cannot be read, or a limit of another name
+std::vector<ScoreLimit> read_limits(const std::filesystem::path& file);
+
+/// A limit, applied.
+struct ScoreCheck {
+  ScoreLimit limit;
+  double value = 0;
+  bool passed() const { return value <= limit.most; }
+};
+
+/// What came of one result.
+struct CaseScore {
+  std::string result,           ///< folder or file of --results, as it was given
+      name;                     ///< of the case
+  std::filesystem::path file;   ///< that was scored; empty: there was none
+  std::vector<std::string> notes;
+  std::optional<score::DenseScore> dense;   ///< of a field
+  std::optional<score::Errors> landmarks;   ///< empty: the set has none
+  std::map<std::int64_t, score::Overlap> overlaps;  ///< labels of the fixed volume and those that the field makes of the moving one's
+  std::vector<ScoreCheck> checks;
+  std::vector<std::uint8_t> picture;  ///< PNG: the slice where the error is largest
+
+  bool passed() const;
+};
+
+/// Applies limits to what was measured.
+std::vector<ScoreCheck> check(const CaseScore& score, const std::vector<ScoreLimit>& limits);
+
+nlohmann::json to_json(const CaseScore& score);
+/// A header, and a row for each case and label.
+std::string csv_of(const std::vector<CaseScore>& scores);
+/// One page of HTML with pictures in it.
+std::string page_of(const std::string& set, const std::vector<CaseScore>& scores, const std::vector<ScoreLimit>& limits);
+/// A line for a person.
+std::string line_of(const CaseScore& score);
+
+}  // namespace tetwarp::apps

@@ -1,0 +1,326 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include <algorithm>
+#include <charconv>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "apps/cli/input.h"
+#include "apps/cli/output.h"
+#include "apps/cli/reads.h"
+#include "apps/truth/truth_set.h"
+#include "deform/fields/lattice_mesh.h"
+#include "deform/truth/body.h"
+#include "deform/truth/family.h"
+#include "deform/truth/landmarks.h"
+#include "deform/truth/noise.h"
+#include "deform/value_counts.h"
+#include "io/field_file.h"
+#include "io/image_file.h"
+#include "io/mesh_writer.h"
+#include "io/staged_output.h"
+
+namespace tetwarp::apps {
+
+namespace {
+
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+/// Roles as options name them. @throws UsageError for a text that is not ROLE=N,..., or a role that no kind needs
+truth::Roles parse_roles(const std::vector<std::string>& texts) {
+  truth::Roles roles;
+  for (const std::string& text : texts) {
+    const std::size_t equals = text.find('=');
+    const std::string role = text.substr(0, equals);
+    const auto needs = [&](const truth::Family& family) {
+      return std::find(family.roles.begin(), family.roles.end(), role) != family.roles.end();
+    };
+    const auto kinds = truth::families();
+    if (equals == std::string::npos || std::none_of(kinds.begin(), kinds.end(), needs))
+      throw UsageError("--label \"" + text + "\"; expected ROLE=N,... with lung, bone, organ or lump as ROLE");
+    std::string_view numbers = std::string_view(text).substr(equals + 1);
+    while (true) {
+      const std::string_view one = numbers.substr(0, numbers.find(','));
+      std::int64_t value = 0;
+      const auto [end, error] = std::from_chars(one.data(), one.data() + one.size(), value);
+      if (error != std::errc() || end != one.data() + one.size())
+        throw UsageError("--label \"" + text + "\" holds \"" + std::string(one) + "\"; expected whole numbers");
+      roles[role].push_back(value);
+      if (one.size() == numbers.size()) break;
+      numbers.remove_prefix(one.size() + 1);
+    }
+  }
+  return roles;
+}
+
+std::vector<truth::CaseChoice> cases_of(const TruthOptions& options, const truth::Roles& roles) {
+  if (options.cases.empty()) return truth::usual_cases(roles);
+  std::vector<truth::CaseChoice> cases;
+  for (const std::string& text : options.cases) {
+    try {
+      cases.push_back(truth::parse_case(text));
+    } catch (const InputError& error) {
+      throw UsageError(error.what());
+    }
+    const auto same = [&](const truth::CaseChoice& one) { return one.name == cases.back().name; };
+    if (std::count_if(cases.begin(), cases.end(), same) > 1)
+      throw UsageError("--case " + text + " is given twice, or has the folder of another one");
+    for (const std::string_view role : cases.back().family->roles) {
+      if (!roles.contains(std::string(role)))
+        throw UsageError("--case " + text + " needs to know which labels are " + std::string(role) +
+                         "; give --labels FILE and --label " + std::string(role) + "=N");
+    }
+  }
+  return cases;
+}
+
+/// Makes the set.
+class TruthMaker {
+ public:
+  explicit TruthMaker(const TruthOptions& options)
+      : options_(options), roles_(parse_roles(options.roles)), cases_(cases_of(options, roles_)) {
+    if (options.labels.empty() && !options.roles.empty())
+      throw UsageError("--label names labels of --labels; give both");
+  }
+
+  int run() {
+    begin();
+    read();
+    write_moving();
+    for (const truth::CaseChoice& choice : cases_) make_case(choice);
+    finish();
+    return 0;
+  }
+
+ private:
+  void begin();
+  void read();
+  void write_moving();
+  void make_case(const truth::CaseChoice& choice);
+  void finish();
+
+  fs::path volume_file(const std::string& stem) const { return stem + (options_.compression == 0 ? ".nii" : ".nii.gz"); }
+  json plan() const;
+  /// Writes a file of the set unless it is there already, so that it appears complete.
+  template <class Write>
+  void place(const fs::path& path, const Write& write) {
+    if (fs::exists(path)) return;
+    StagedOutput output(path, StagedOutput::Kind::file, false);
+    write(output.path());
+    output.commit();
+  }
+  void write_volume(const fs::path& path, const ConstVolumeView& volume) {
+    place(path, [&](const fs::path& staged) {
+      ImageWriteOptions how;
+      if (options_.compression > 0) how.compression = options_.compression;
+      write_image(staged, volume, how);
+    });
+  }
+  fs::path write_field(const truth::CaseChoice& choice);
+  DeformOptions deform_options(const TruthCase& one) const;
+
+  const TruthOptions& options_;
+  truth::Roles roles_;
+  std::vector<truth::CaseChoice> cases_;
+  TruthSet set_;
+  InputHeader header_;
+  AnyVolume volume_, labels_;
+  std::optional<truth::Subject> subject_;
+  json case_records_ = json::array();
+};
+
+json TruthMaker::plan() const {
+  json cases = json::array();
+  for (const truth::CaseChoice& choice : cases_)
+    cases.push_back({{"name", choice.name}, {"kind", choice.family->name}, {"parameters", json(choice.values)}});
+  json document = provenance("truth");
+  document["input"] = {{"sha256", hash_volume(options_.input, options_.common.threads)}};
+  document["labels"] = options_.labels.empty() ? json() : json{{"sha256", hash_file(options_.labels)}, {"roles", roles_}};
+  document["options"] = {{"cell_size", options_.cell_size},   {"body_above_hu", options_.body_above_hu},
+                         {"landmarks", options_.landmarks},   {"noise_hu", options_.noise_hu},
+                         {"noise_seed", options_.seed},       {"dense", options_.dense},
+                         {"compression", options_.compression}};
+  document["cases"] = cases;
+  return document;
+}
+
+void TruthMaker::begin() {
+  set_.folder = options_.output;
+  const fs::path record = set_.folder / kSetRecord, planned = set_.folder / "plan.json";
+  const json now = plan();
+  if (fs::exists(record)) throw Error(set_.folder.string() + " holds a complete set; remove it or give another folder");
+  const bool is_there = fs::exists(set_.folder) && !(fs::is_directory(set_.folder) && fs::is_empty(set_.folder));
+  if (is_there && !options_.resume)
+    throw Error(set_.folder.string() + " is there and not empty; remove it, or go on with --resume");
+  if (is_there) {
+    std::ifstream stream(planned);
+    const json before = json::parse(stream, nullptr, false);
+    if (before != now)
+      throw Error(set_.folder.string() + " was begun with another input, other options or another version; remove it");
+    return;
+  }
+  std::error_code failed;
+  fs::create_directories(set_.folder, failed);
+  if (failed) throw Error("the folder " + set_.folder.string() + " cannot be made: " + failed.message());
+  place(planned, [&](const fs::path& staged) { write_json(staged, Record::open(now)); });
+}
+
+void TruthMaker::read() {
+  Stage stage(options_.common, "read");
+  header_ = open_input(options_.input, options_.common);
+  require(header_.geometry.slices.empty() && !is_sheared(header_.geometry),
+          options_.input.path.string() + " is tilted or has uneven slices; deform it by identity first, and take what comes "
+                                         "of that");
+  volume_ = read_input(options_.input, header_, options_.common, stage.control()).volume;
+  if (!options_.labels.empty()) {
+    const InputOptions from = volume_named(options_.labels, options_.common.nifti_frame);
+    labels_ = read_input(from, open_input(from, options_.common), options_.common, stage.control()).volume;
+  }
+  const ConstVolumeView ct = std::as_const(volume_).view(), labels = std::as_const(labels_).view();
+  simulate::Patient patient = simulate::examine(ct, options_.labels.empty() ? nullptr : &labels, options_.cell_size,
+                                                options_.body_above_hu, stage.control());
+  require(patient.box.has_value(), options_.input.path.string() + " holds no body: no cell has a mean above " +
+                                       number_text(options_.body_above_hu) + " HU");
+  subject_.emplace(std::move(patient), roles_);
+}
+
+void TruthMaker::write_moving() {
+  Stage stage(options_.common, "moving volume");
+  const fs::path folder = set_.folder / "moving";
+  fs::create_directories(folder);
+  fs::create_directories(set_.folder / "fields");
+  const ConstVolumeView ct = std::as_const(volume_).view();
+  set_.moving = folder / volume_file("moving");
+  if (options_.noise_hu > 0) {
+    AnyVolume noisy(volume_.geometry(), volume_.type());
+    truth::add_noise(ct, options_.noise_hu, truth::noise_seed(options_.seed, "moving"), noisy.view(),
+                     {.threads = options_.common.threads});
+    write_volume(set_.moving, std::as_const(noisy).view());
+  } else {
+    write_volume(set_.moving, ct);
+  }
+  const Volume<std::uint8_t> body = truth::body_mask(volume_.geometry(), subject_->patient(), options_.cell_size);
+  write_volume(folder / volume_file("body"), view(body));
+  if (!options_.labels.empty()) {
+    set_.labels = folder / volume_file("labels");
+    write_volume(set_.labels, std::as_const(labels_).view());
+  }
+  if (options_.landmarks == 0) return;
+  set_.landmarks = folder / "landmarks.csv";
+  const std::vector<glm::dvec3> landmarks =
+      truth::find_landmarks(ct, body.voxels, {.most = static_cast<std::size_t>(options_.landmarks)},
+                            {.threads = options_.common.threads}, stage.control());
+  if (landmarks.empty()) {
+    say(options_.common, "tetwarp: note: the body has no corners of texture, so there are no landmarks");
+    set_.landmarks.clear();
+    return;
+  }
+  place(set_.landmarks, [&](const fs::path& staged) {
+    std::ofstream file(staged, std::ios::binary);
+    file << "x,y,z\n";
+    for (const glm::dvec3& place : landmarks)
+      file << exact_number_text(place.x) << ',' << exact_number_text(place.y) << ',' << exact_number_text(place.z) << '\n';
+    file.close();
+    if (!file) throw Error(set_.landmarks.string() + " cannot be written");
+  });
+}
+
+fs::path TruthMaker::write_field(const truth::CaseChoice& choice) {
+  Stage stage(options_.common, choice.name + ": field");
+  const VertexField field = truth::make_field(choice, *subject_, {.threads = options_.common.threads}, stage.control());
+  const fs::path path = set_.folder / "fields" / (choice.name + (field.mesh.is_empty() ? ".mha" : ".vtk"));
+  place(path, [&](const fs::path& staged) {
+    if (field.mesh.is_empty()) {
+      write_field_file(staged, field);
+    } else {
+      write_mesh_file(staged, mesh_of(field), field.lattice);
+    }
+  });
+  return path;
+}
+
+DeformOptions TruthMaker::deform_options(const TruthCase& one) const {
+  DeformOptions deform;
+  deform.common = options_.common;
+  deform.common.quiet = true;
+  deform.input = options_.input;
+  deform.field.forward = {one.field.string()};
+  deform.folder = set_.folder / one.name;
+  deform.output = options_.noise_hu > 0 ? deform.folder / volume_file("without-noise") : one.fixed;
+  deform.backend = options_.backend;
+  deform.device = options_.device;
+  deform.outside = Outside::background;
+  if (options_.compression > 0) deform.compression = options_.compression;
+  const auto along = [&](const fs::path& from, const fs::path& to, const std::string& how) {
+    deform.with.push_back(from.string() + "=" + to.string() + how);
+  };
+  along(set_.folder / "moving" / volume_file("body"), one.body, ":vote");
+  if (!set_.labels.empty()) along(set_.labels, one.labels, ":vote");
+  for (const std::string& path : options_.with) along(path, deform.folder / fs::path(path).filename(), "");
+  if (!set_.landmarks.empty()) deform.points.push_back(set_.landmarks.string() + "=" + one.landmarks.string());
+  deform.maps.jacobian = deform.folder / volume_file("jacobian");
+  deform.maps.coverage = deform.folder / volume_file("coverage");
+  if (options_.dense) deform.maps.inverse = deform.folder / volume_file("inverse");
+  return deform;
+}
+
+void TruthMaker::make_case(const truth::CaseChoice& choice) {
+  const fs::path folder = set_.folder / choice.name;
+  TruthCase one{.name = choice.name,
+                .fixed = folder / volume_file("fixed"),
+                .field = write_field(choice),
+                .body = folder / volume_file("body"),
+                .labels = set_.labels.empty() ? fs::path() : folder / volume_file("labels"),
+                .landmarks = set_.landmarks.empty() ? fs::path() : folder / "landmarks.csv"};
+  Stage stage(options_.common, choice.name);
+  if (!fs::exists(folder)) run_deform(deform_options(one));
+  if (options_.noise_hu > 0 && !fs::exists(one.fixed)) {
+    const AnyVolume clean = read_image(folder / volume_file("without-noise"));
+    AnyVolume noisy(clean.geometry(), clean.type());
+    truth::add_noise(clean.view(), options_.noise_hu, truth::noise_seed(options_.seed, choice.name), noisy.view(),
+                     {.threads = options_.common.threads});
+    write_volume(one.fixed, std::as_const(noisy).view());
+  }
+  set_.cases.push_back(one);
+  say(options_.common, "made " + folder.string());
+}
+
+void TruthMaker::finish() {
+  json document = plan();
+  document["set"] = to_json(set_);
+  json hashes = json::object();
+  const auto hash = [&](const fs::path& path) {
+    if (!path.empty()) hashes[path.lexically_relative(set_.folder).generic_string()] = hash_file(path);
+  };
+  hash(set_.moving), hash(set_.labels), hash(set_.landmarks);
+  for (const TruthCase& one : set_.cases) {
+    for (const fs::path& path : {one.fixed, one.field, one.body, one.labels, one.landmarks}) hash(path);
+  }
+  document["sha256"] = hashes;
+  place(set_.folder / "README.txt", [&](const fs::path& staged) {
+    std::ofstream file(staged, std::ios::binary);
+    file << "A set of deformations whose truth is known, made by tetwarp truth (set.json: version, options, hashes).\n\n"
+            "moving/            the original: volume, mask of the body, labels, landmarks (LPS mm)\n"
+            "CASE/fixed         the deformed volume; register it with the moving one\n"
+            "CASE/body, labels  those of the moving volume, deformed by the same field\n"
+            "CASE/landmarks.csv where the landmarks of the moving volume come to lie, exactly\n"
+            "CASE/jacobian      determinant of the forward map at each voxel; coverage: where it leads\n"
+            "CASE/inverse       with --dense: the exact displacement from fixed to moving at each voxel, LPS mm\n"
+            "fields/CASE        the forward field itself, from moving to fixed: the truth\n\n"
+            "A registration gives a map from fixed to moving. Name its field or transform CASE.mha, CASE.nii.gz,\n"
+            "CASE.h5 or the like, or warped landmarks CASE.csv, put all into a folder, and run:\n\n"
+            "    tetwarp score SET -r FOLDER\n";
+    file.close();
+    if (!file) throw Error("README.txt of the set cannot be written");
+  });
+  place(set_.folder / kSetRecord, [&](const fs::path& staged) { write_json(staged, Record::open(document)); });
+  say(options_.common, "wrote " + set_.folder.string() + ": " + std::to_string(set_.cases.size()) + " cases");
+}
+
+}  // namespace
+
+int run_truth(const TruthOptions& options) { return TruthMaker(options).run(); }
+
+}  // namespace tetwarp::apps
