@@ -31,7 +31,8 @@ namespace fs = std::filesystem;
 fs::path result_of(const fs::path& results, const TruthSet& set, const TruthCase& one) {
   if (!fs::is_directory(results)) {
     require(fs::exists(results), "the result " + results.string() + " is not there");
-    require(set.cases.size() == 1, results.string() + " is a file, but the set has " + std::to_string(set.cases.size()) +
+    require(set.cases.size() == 1, results.string() + " is a file, but the set has " +
+                                       std::to_string(set.cases.size()) +
                                        " cases; give a folder with a result of each");
     return results;
   }
@@ -67,7 +68,8 @@ glm::dvec3 displacement_at(const PullField& field, const AffineMap& index, const
     for (int axis = 0; axis < 3; ++axis) weight *= step[axis] ? part[axis] : 1 - part[axis];
     if (weight == 0) continue;
     const glm::i64vec3 sample = low + step;
-    sum += weight * glm::dvec3(field.displacement[static_cast<std::size_t>(sample.x + size.x * (sample.y + size.y * sample.z))]);
+    sum += weight *
+           glm::dvec3(field.displacement[static_cast<std::size_t>(sample.x + size.x * (sample.y + size.y * sample.z))]);
   }
   return sum;
 }
@@ -85,10 +87,11 @@ class Scorer {
 
  private:
   void score_field(const TruthCase& one, CaseScore& score);
-  void score_landmarks(const TruthCase& one, const std::vector<glm::dvec3>& found, CaseScore& score) const;
+  void score_landmarks(const std::vector<glm::dvec3>& found, CaseScore& score) const;
   PullField sampled(const PullField& field, const Geometry& grid, const Control& control) const;
+  /// The axial slice through a place, with errors in red where voxels count.
   std::vector<std::uint8_t> picture(ForwardResampler& truth, const PullField& result, const ConstVolumeView& fixed,
-                                    const glm::dvec3& worst) const;
+                                    std::span<const std::uint8_t> counts, const glm::dvec3& worst) const;
   Limits limits() const { return {.threads = options_.common.threads}; }
 
   const ScoreOptions& options_;
@@ -98,12 +101,20 @@ class Scorer {
 };
 
 CaseScore Scorer::score(const fs::path& results, const TruthCase& one, const std::vector<ScoreLimit>& limits) {
-  CaseScore score{.result = results.string(), .name = one.name, .file = result_of(results, set_, one), .notes = {}, .dense = {},
-                  .landmarks = {}, .overlaps = {}, .checks = {}, .picture = {}};
+  CaseScore score{.result = results.string(),
+                  .name = one.name,
+                  .file = result_of(results, set_, one),
+                  .notes = {},
+                  .dense = {},
+                  .landmarks = {},
+                  .overlaps = {},
+                  .checks = {},
+                  .picture = {}};
   if (score.file.empty()) return score;
   if (!points_suffix(score.file).empty() && score.file.extension() != ".vtk") {
-    require(!one.landmarks.empty(), "the set has no landmarks, with which " + score.file.string() + " could be compared");
-    score_landmarks(one, PointsFile(score.file).points(), score);
+    require(!one.landmarks.empty(),
+            "the set has no landmarks, with which " + score.file.string() + " could be compared");
+    score_landmarks(PointsFile(score.file).points(), score);
   } else {
     score_field(one, score);
   }
@@ -120,12 +131,11 @@ PullField Scorer::sampled(const PullField& field, const Geometry& grid, const Co
   return on_grid;
 }
 
-void Scorer::score_landmarks(const TruthCase& one, const std::vector<glm::dvec3>& found, CaseScore& score) const {
+void Scorer::score_landmarks(const std::vector<glm::dvec3>& found, CaseScore& score) const {
   const std::vector<glm::dvec3> wanted = PointsFile(set_.landmarks).points();
-  require(found.size() == wanted.size(), score.file.string() + " has " + std::to_string(found.size()) + " points, the set " +
-                                             std::to_string(wanted.size()) + " landmarks");
+  require(found.size() == wanted.size(), score.file.string() + " has " + std::to_string(found.size()) +
+                                             " points, the set " + std::to_string(wanted.size()) + " landmarks");
   score.landmarks = score::score_points(found, wanted);
-  (void)one;
 }
 
 void Scorer::score_field(const TruthCase& one, CaseScore& score) {
@@ -135,8 +145,8 @@ void Scorer::score_field(const TruthCase& one, CaseScore& score) {
   AnyVolume fixed_labels;
   if (!one.labels.empty()) fixed_labels = read_image(one.labels);
 
-  const ReadPullField read = read_field(parse_pull_field(score.file.string(), options_.common.nifti_frame), moving_.geometry(),
-                                        grid, options_.common.threads, stage.control());
+  const ReadPullField read = read_field(parse_pull_field(score.file.string(), options_.common.nifti_frame),
+                                        moving_.geometry(), grid, options_.common.threads, stage.control());
   score.notes = read.origin.notes;
   const PullField result = sampled(read.field, grid, stage.control());
   const ForwardChoice choice = parse_forward_fields({one.field.string()}, {}, options_.common.nifti_frame);
@@ -156,25 +166,28 @@ void Scorer::score_field(const TruthCase& one, CaseScore& score) {
     std::vector<glm::dvec3> places = PointsFile(one.landmarks).points();
     const AffineMap index = index_from_point(grid);
     for (glm::dvec3& place : places) place += displacement_at(result, index, place);
-    score_landmarks(one, places, score);
+    score_landmarks(places, score);
   }
   if (!one.labels.empty()) {
     AnyVolume warped(grid, labels_.type());
     const auto resampler = make_pull_resampler(backend_, grid, options_.device, limits());
     resampler->set_field(view(result, Outside::background), stage.control());
-    const Target target{.source = std::as_const(labels_).view(), .output = warped.view(), .interpolation = Interpolation::vote};
+    const Target target{
+        .source = std::as_const(labels_).view(), .output = warped.view(), .interpolation = Interpolation::vote};
     resampler->resample(whole(grid), {&target, 1}, {}, stage.control());
     score.overlaps = score::compare_labels(labels, std::as_const(warped).view());
   }
-  score.picture = picture(*truth, result, fixed.view(), score.dense->all.worst);
+  score.picture = picture(*truth, result, fixed.view(), mask, score.dense->all.worst);
 }
 
-std::vector<std::uint8_t> Scorer::picture(ForwardResampler& truth, const PullField& result, const ConstVolumeView& fixed,
+std::vector<std::uint8_t> Scorer::picture(ForwardResampler& truth, const PullField& result,
+                                          const ConstVolumeView& fixed, std::span<const std::uint8_t> counts,
                                           const glm::dvec3& worst) const {
   constexpr double kMostMm = 10, kLowHu = -1000, kHighHu = 400;
   const Geometry& grid = truth.output();
   const glm::i64vec3 size = grid.size;
-  const auto k = std::clamp(static_cast<std::int64_t>(std::lround(index_from_point(grid)(worst).z)), std::int64_t{0}, size.z - 1);
+  const auto k =
+      std::clamp(static_cast<std::int64_t>(std::lround(index_from_point(grid)(worst).z)), std::int64_t{0}, size.z - 1);
   const Region slice{{0, 0, k}, {size.x, size.y, k + 1}};
   std::vector<glm::vec3> inverse(static_cast<std::size_t>(size.x * size.y));
   truth.resample(slice, {},
@@ -187,9 +200,10 @@ std::vector<std::uint8_t> Scorer::picture(ForwardResampler& truth, const PullFie
       for (std::int64_t i = 0; i < size.x; ++i) {
         const auto n = static_cast<std::size_t>(i + size.x * j);
         const double grey = std::clamp((static_cast<double>(values[n]) - kLowHu) / (kHighHu - kLowHu), 0.0, 1.0);
-        const glm::vec3 found = result.displacement[n + static_cast<std::size_t>(k * size.x * size.y)];
+        const std::size_t voxel = n + static_cast<std::size_t>(k * size.x * size.y);
+        const glm::vec3 found = result.displacement[voxel];
         double red = grey, green = grey, blue = grey;
-        if (!std::isnan(inverse[n].x)) {
+        if (counts[voxel] && !std::isnan(inverse[n].x)) {
           if (std::isnan(found.x)) {
             blue = 1;
           } else {
@@ -222,14 +236,16 @@ int run_score(const ScoreOptions& options) {
   reads.add_file(options.set / kSetRecord);
   if (!options.limits.empty()) reads.add_file(options.limits);
   OutputSet outputs(reads, options.common.overwrite);
-  const fs::path json_file = outputs.add(options.json), csv = outputs.add(options.csv), html = outputs.add(options.html);
+  const fs::path json_file = outputs.add(options.json), csv = outputs.add(options.csv),
+                 html = outputs.add(options.html);
   Scorer scorer(options, set);
   std::vector<CaseScore> scores;
   for (const TruthCase& one : set.cases) {
     for (const fs::path& results : options.results) {
       scores.push_back(scorer.score(results, one, limits));
       std::cout << (options.results.size() > 1 ? results.string() + ", " : "") << line_of(scores.back()) << "\n";
-      for (const std::string& note : scores.back().notes) say(options.common, "tetwarp: note: " + one.name + ": " + note);
+      for (const std::string& note : scores.back().notes)
+        say(options.common, "tetwarp: note: " + one.name + ": " + note);
     }
   }
   outputs.write([&] {

@@ -15,16 +15,21 @@ void add_score(CLI::App& app, ScoreOptions& options) {
                    "fixed to moving, or CASE.csv, the landmarks of the fixed volume taken to the moving one; of a set "
                    "with one case also a file. May be repeated: results side by side")
       ->required();
-  command->add_option("--limits", options.limits,
-                      "Limits to pass, as JSON: {\"landmarks_mean_mm\": {\"most\": 2, \"source\": \"...\"}, ...}; those that are "
-                      "left out keep their defaults")
+  command
+      ->add_option(
+          "--limits", options.limits,
+          "Limits to pass, as JSON: {\"landmarks_mean_mm\": {\"most\": 2, \"source\": \"...\"}, ...}; those that are "
+          "left out keep their defaults")
       ->type_name("FILE.json");
   command->add_option("--json", options.json, "All numbers")->type_name("FILE.json");
   command->add_option("--csv", options.csv, "A row for each case and label")->type_name("FILE.csv");
-  command->add_option("--html", options.html, "One page with tables and pictures, complete in itself")->type_name("FILE.html");
+  command->add_option("--html", options.html, "One page with tables and pictures, complete in itself")
+      ->type_name("FILE.html");
   add_backend(*command, options.backend, options.device);
   add_common(*command, options.common, true);
-  command->footer("Exit status 0: all cases pass; 3: some do not, or have no result.\n\nExample: tetwarp score set -r elastix --html elastix.html");
+  command->footer(
+      "Exit status 0: all cases pass; 3: some do not, or have no result.\n\nExample: tetwarp score set -r elastix "
+      "--html elastix.html");
 }
 
 }  // namespace tetwarp::apps

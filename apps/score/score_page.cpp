@@ -58,12 +58,14 @@ std::string errors_row(const std::string& part, const score::Errors& errors, con
 std::string verdict_of(bool passed) { return passed ? "<b class=\"pass\">passes</b>" : "<b class=\"fail\">fails</b>"; }
 
 std::string case_section(const CaseScore& score) {
-  std::string html = "<h2>" + escaped(score.name) + ", " + escaped(score.result) + ": " + verdict_of(score.passed()) + "</h2>\n";
+  std::string html =
+      "<h2>" + escaped(score.name) + ", " + escaped(score.result) + ": " + verdict_of(score.passed()) + "</h2>\n";
   if (score.file.empty()) return html + "<p>There is no result of this case.</p>\n";
   html += "<p class=\"file\">" + escaped(score.file.string()) + "</p>\n";
   for (const std::string& note : score.notes) html += "<p class=\"note\">" + escaped(note) + "</p>\n";
-  html += "<table><tr><th>part</th><th>points</th><th>missing</th><th>mean</th><th>median</th><th>95 %</th><th>99 "
-          "%</th><th>largest</th><th>Dice</th></tr>\n";
+  html +=
+      "<table><tr><th>part</th><th>points</th><th>missing</th><th>mean</th><th>median</th><th>95 %</th><th>99 "
+      "%</th><th>largest</th><th>Dice</th></tr>\n";
   if (score.dense) {
     html += errors_row("body", score.dense->all, "");
     for (const auto& [label, errors] : score.dense->labels) {
@@ -77,12 +79,13 @@ std::string case_section(const CaseScore& score) {
   if (score.dense) {
     const score::DenseScore& dense = *score.dense;
     html += "<p>Without registration the body is off by " +
-            number(dense.readings[static_cast<std::size_t>(score::Reading::nothing)]) + " mm in the mean. Jacobian determinants " +
-            number(dense.smallest_determinant) + " to " + number(dense.largest_determinant) + ", " +
-            std::to_string(dense.folded) + " of " + std::to_string(dense.determinants) +
-            " voxels folded; they differ from the truth's by " + number(dense.mean_determinant_error) +
-            " in the mean. The largest error lies at " + number(dense.all.worst.x) + ", " + number(dense.all.worst.y) + ", " +
-            number(dense.all.worst.z) + " (LPS mm).</p>\n";
+            number(dense.readings[static_cast<std::size_t>(score::Reading::nothing)]) +
+            " mm in the mean. Jacobian determinants " + number(dense.smallest_determinant) + " to " +
+            number(dense.largest_determinant) + ", " + std::to_string(dense.folded) + " of " +
+            std::to_string(dense.determinants) + " voxels folded; they differ from the truth's by " +
+            number(dense.mean_determinant_error) + " in the mean. The largest error lies at " +
+            number(dense.all.worst.x) + ", " + number(dense.all.worst.y) + ", " + number(dense.all.worst.z) +
+            " (LPS mm).</p>\n";
   }
   html += "<table><tr><th>limit</th><th>found</th><th>most</th><th></th><th>source</th></tr>\n";
   for (const ScoreCheck& one : score.checks)
@@ -99,8 +102,9 @@ std::string case_section(const CaseScore& score) {
 
 /// A table with a row for each case and a column for each result.
 std::string overview(const std::vector<CaseScore>& scores) {
-  std::string html = "<table><tr><th>case</th><th>result</th><th>body, mean</th><th>95 %</th><th>largest</th><th>landmarks, "
-                     "mean</th><th>largest</th><th></th></tr>\n";
+  std::string html =
+      "<table><tr><th>case</th><th>result</th><th>body, mean</th><th>95 %</th><th>largest</th><th>landmarks, "
+      "mean</th><th>largest</th><th></th></tr>\n";
   for (const CaseScore& score : scores) {
     const auto of = [&](const std::optional<score::Errors>& errors, double score::Errors::*member) {
       return errors ? number((*errors).*member) : std::string();
@@ -116,16 +120,21 @@ std::string overview(const std::vector<CaseScore>& scores) {
 
 }  // namespace
 
-std::string page_of(const std::string& set, const std::vector<CaseScore>& scores, const std::vector<ScoreLimit>& limits) {
+std::string page_of(const std::string& set, const std::vector<CaseScore>& scores,
+                    const std::vector<ScoreLimit>& limits) {
   std::string html =
-      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Errors of registrations</title>\n<style>\n"
+      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Errors of "
+      "registrations</title>\n<style>\n"
       "body{font:15px/1.45 sans-serif;max-width:64em;margin:2em auto;padding:0 1em;color:#222}\n"
-      "table{border-collapse:collapse;margin:.8em 0}td,th{border-bottom:1px solid #ccc;padding:.25em .7em;text-align:right}\n"
-      "td:first-child,th:first-child,td:last-child{text-align:left}h2{margin-top:2em;border-top:1px solid #888;padding-top:.6em}\n"
+      "table{border-collapse:collapse;margin:.8em 0}td,th{border-bottom:1px solid #ccc;padding:.25em "
+      ".7em;text-align:right}\n"
+      "td:first-child,th:first-child,td:last-child{text-align:left}h2{margin-top:2em;border-top:1px solid "
+      "#888;padding-top:.6em}\n"
       ".pass{color:#186a2b}.fail{color:#a3161a}.note{background:#fff3cd;padding:.4em .7em}.file{color:#666}\n"
       "img{max-width:100%}figcaption{color:#666}\n</style></head><body>\n<h1>Errors of registrations</h1>\n";
   html += "<p>Set: " + escaped(set) + ". Made by tetwarp " + escaped(version()) + " (" + escaped(commit()) +
-          "). All lengths are mm. The error of a voxel is the distance between the place of the moving volume where the result "
+          "). All lengths are mm. The error of a voxel is the distance between the place of the moving volume where "
+          "the result "
           "leads its centre and the place where the true deformation does; voxels of the body count onto which the "
           "deformation leads something.</p>\n";
   html += overview(scores);

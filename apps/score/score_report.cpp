@@ -132,7 +132,8 @@ json to_json(const CaseScore& score) {
 
 std::string csv_of(const std::vector<CaseScore>& scores) {
   std::string text = "result,case,part,points,missing,mean_mm,median_mm,p95_mm,p99_mm,largest_mm,dice\n";
-  const auto row = [&](const CaseScore& score, const std::string& part, const score::Errors& errors, const std::string& dice) {
+  const auto row = [&](const CaseScore& score, const std::string& part, const score::Errors& errors,
+                       const std::string& dice) {
     text += quoted(score.result) + "," + score.name + "," + part + "," + std::to_string(errors.points) + "," +
             std::to_string(errors.missing);
     for (const double value : {errors.mean, errors.median, errors.percentile_95, errors.percentile_99, errors.largest})
@@ -159,14 +160,15 @@ std::string line_of(const CaseScore& score) {
   char part[160];
   if (score.dense) {
     const score::Errors& all = score.dense->all;
-    std::snprintf(part, sizeof part, "body mean %.2f, 95 %% %.2f, largest %.2f mm (%.2f without registration), ", all.mean,
-                  all.percentile_95, all.largest,
+    std::snprintf(part, sizeof part, "body mean %.2f, 95 %% %.2f, largest %.2f mm (%.2f without registration), ",
+                  all.mean, all.percentile_95, all.largest,
                   score.dense->readings[static_cast<std::size_t>(score::Reading::nothing)]);
     text += part;
     text += std::to_string(score.dense->folded) + " folded, ";
   }
   if (score.landmarks) {
-    std::snprintf(part, sizeof part, "landmarks mean %.2f, largest %.2f mm, ", score.landmarks->mean, score.landmarks->largest);
+    std::snprintf(part, sizeof part, "landmarks mean %.2f, largest %.2f mm, ", score.landmarks->mean,
+                  score.landmarks->largest);
     text += part;
   }
   return text + (score.passed() ? "passes" : "fails");

@@ -37,13 +37,14 @@ struct ScoreCheck {
 
 /// What came of one result.
 struct CaseScore {
-  std::string result,           ///< folder or file of --results, as it was given
-      name;                     ///< of the case
-  std::filesystem::path file;   ///< that was scored; empty: there was none
+  std::string result,          ///< folder or file of --results, as it was given
+      name;                    ///< of the case
+  std::filesystem::path file;  ///< that was scored; empty: there was none
   std::vector<std::string> notes;
-  std::optional<score::DenseScore> dense;   ///< of a field
-  std::optional<score::Errors> landmarks;   ///< empty: the set has none
-  std::map<std::int64_t, score::Overlap> overlaps;  ///< labels of the fixed volume and those that the field makes of the moving one's
+  std::optional<score::DenseScore> dense;  ///< of a field
+  std::optional<score::Errors> landmarks;  ///< empty: the set has none
+  std::map<std::int64_t, score::Overlap>
+      overlaps;  ///< labels of the fixed volume and those that the field makes of the moving one's
   std::vector<ScoreCheck> checks;
   std::vector<std::uint8_t> picture;  ///< PNG: the slice where the error is largest
 
@@ -57,7 +58,8 @@ nlohmann::json to_json(const CaseScore& score);
 /// A header, and a row for each case and label.
 std::string csv_of(const std::vector<CaseScore>& scores);
 /// One page of HTML with pictures in it.
-std::string page_of(const std::string& set, const std::vector<CaseScore>& scores, const std::vector<ScoreLimit>& limits);
+std::string page_of(const std::string& set, const std::vector<CaseScore>& scores,
+                    const std::vector<ScoreLimit>& limits);
 /// A line for a person.
 std::string line_of(const CaseScore& score);
 

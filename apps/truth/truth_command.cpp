@@ -101,7 +101,9 @@ class TruthMaker {
   void make_case(const truth::CaseChoice& choice);
   void finish();
 
-  fs::path volume_file(const std::string& stem) const { return stem + (options_.compression == 0 ? ".nii" : ".nii.gz"); }
+  fs::path volume_file(const std::string& stem) const {
+    return stem + (options_.compression == 0 ? ".nii" : ".nii.gz");
+  }
   json plan() const;
   /// Writes a file of the set unless it is there already, so that it appears complete.
   template <class Write>
@@ -137,10 +139,11 @@ json TruthMaker::plan() const {
     cases.push_back({{"name", choice.name}, {"kind", choice.family->name}, {"parameters", json(choice.values)}});
   json document = provenance("truth");
   document["input"] = {{"sha256", hash_volume(options_.input, options_.common.threads)}};
-  document["labels"] = options_.labels.empty() ? json() : json{{"sha256", hash_file(options_.labels)}, {"roles", roles_}};
-  document["options"] = {{"cell_size", options_.cell_size},   {"body_above_hu", options_.body_above_hu},
-                         {"landmarks", options_.landmarks},   {"noise_hu", options_.noise_hu},
-                         {"noise_seed", options_.seed},       {"dense", options_.dense},
+  document["labels"] =
+      options_.labels.empty() ? json() : json{{"sha256", hash_file(options_.labels)}, {"roles", roles_}};
+  document["options"] = {{"cell_size", options_.cell_size},    {"body_above_hu", options_.body_above_hu},
+                         {"landmarks", options_.landmarks},    {"noise_hu", options_.noise_hu},
+                         {"noise_seed", options_.seed},        {"dense", options_.dense},
                          {"compression", options_.compression}};
   document["cases"] = cases;
   return document;
@@ -171,8 +174,9 @@ void TruthMaker::read() {
   Stage stage(options_.common, "read");
   header_ = open_input(options_.input, options_.common);
   require(header_.geometry.slices.empty() && !is_sheared(header_.geometry),
-          options_.input.path.string() + " is tilted or has uneven slices; deform it by identity first, and take what comes "
-                                         "of that");
+          options_.input.path.string() +
+              " is tilted or has uneven slices; deform it by identity first, and take what comes "
+              "of that");
   volume_ = read_input(options_.input, header_, options_.common, stage.control()).volume;
   if (!options_.labels.empty()) {
     const InputOptions from = volume_named(options_.labels, options_.common.nifti_frame);
@@ -221,7 +225,8 @@ void TruthMaker::write_moving() {
     std::ofstream file(staged, std::ios::binary);
     file << "x,y,z\n";
     for (const glm::dvec3& place : landmarks)
-      file << exact_number_text(place.x) << ',' << exact_number_text(place.y) << ',' << exact_number_text(place.z) << '\n';
+      file << exact_number_text(place.x) << ',' << exact_number_text(place.y) << ',' << exact_number_text(place.z)
+           << '\n';
     file.close();
     if (!file) throw Error(set_.landmarks.string() + " cannot be written");
   });
@@ -301,17 +306,18 @@ void TruthMaker::finish() {
   document["sha256"] = hashes;
   place(set_.folder / "README.txt", [&](const fs::path& staged) {
     std::ofstream file(staged, std::ios::binary);
-    file << "A set of deformations whose truth is known, made by tetwarp truth (set.json: version, options, hashes).\n\n"
-            "moving/            the original: volume, mask of the body, labels, landmarks (LPS mm)\n"
-            "CASE/fixed         the deformed volume; register it with the moving one\n"
-            "CASE/body, labels  those of the moving volume, deformed by the same field\n"
-            "CASE/landmarks.csv where the landmarks of the moving volume come to lie, exactly\n"
-            "CASE/jacobian      determinant of the forward map at each voxel; coverage: where it leads\n"
-            "CASE/inverse       with --dense: the exact displacement from fixed to moving at each voxel, LPS mm\n"
-            "fields/CASE        the forward field itself, from moving to fixed: the truth\n\n"
-            "A registration gives a map from fixed to moving. Name its field or transform CASE.mha, CASE.nii.gz,\n"
-            "CASE.h5 or the like, or warped landmarks CASE.csv, put all into a folder, and run:\n\n"
-            "    tetwarp score SET -r FOLDER\n";
+    file
+        << "A set of deformations whose truth is known, made by tetwarp truth (set.json: version, options, hashes).\n\n"
+           "moving/            the original: volume, mask of the body, labels, landmarks (LPS mm)\n"
+           "CASE/fixed         the deformed volume; register it with the moving one\n"
+           "CASE/body, labels  those of the moving volume, deformed by the same field\n"
+           "CASE/landmarks.csv where the landmarks of the moving volume come to lie, exactly\n"
+           "CASE/jacobian      determinant of the forward map at each voxel; coverage: where it leads\n"
+           "CASE/inverse       with --dense: the exact displacement from fixed to moving at each voxel, LPS mm\n"
+           "fields/CASE        the forward field itself, from moving to fixed: the truth\n\n"
+           "A registration gives a map from fixed to moving. Name its field or transform CASE.mha, CASE.nii.gz,\n"
+           "CASE.h5 or the like, or warped landmarks CASE.csv, put all into a folder, and run:\n\n"
+           "    tetwarp score SET -r FOLDER\n";
     file.close();
     if (!file) throw Error("README.txt of the set cannot be written");
   });

@@ -27,7 +27,8 @@ std::string kinds_text() {
 }  // namespace
 
 void add_truth(CLI::App& app, TruthOptions& options) {
-  CLI::App* command = app.add_subcommand("truth", "Make a set of deformed volumes whose truth is known, to test registrations");
+  CLI::App* command =
+      app.add_subcommand("truth", "Make a set of deformed volumes whose truth is known, to test registrations");
   command->add_option("INPUT", options.input.path, std::string(kInputHelp) + "; a CT in HU, the moving volume")
       ->required();
   command->add_option("-o,--output", options.output, "Folder of the set")->required();
@@ -37,8 +38,7 @@ void add_truth(CLI::App& app, TruthOptions& options) {
                    "each kind whose labels are known")
       ->type_name("KIND");
   command->add_option("--labels", options.labels, "Label volume on the grid of INPUT; goes along")->type_name("FILE");
-  command
-      ->add_option("--label", options.roles, "Which labels are what a kind needs, lung=1,2; may be repeated")
+  command->add_option("--label", options.roles, "Which labels are what a kind needs, lung=1,2; may be repeated")
       ->type_name("ROLE=N,...");
   command->add_option("--cell-size", options.cell_size, "Voxels between vertices of the fields")
       ->check(whole_number(1, 512))
@@ -62,9 +62,10 @@ void add_truth(CLI::App& app, TruthOptions& options) {
   command->add_option("--seed", options.seed, "Decides the noise")
       ->check(whole_number(0, INT64_MAX))
       ->capture_default_str();
-  command->add_option("--with", options.with,
-                      "What goes along: RT Dose, RT Structure Set, SEG (.dcm), or a volume file; each case gets one of "
-                      "the same name; may be repeated")
+  command
+      ->add_option("--with", options.with,
+                   "What goes along: RT Dose, RT Structure Set, SEG (.dcm), or a volume file; each case gets one of "
+                   "the same name; may be repeated")
       ->type_name("FILE");
   command->add_flag("--dense", options.dense, "Write the exact inverse at every voxel too, 12 bytes each");
   command->add_option("--compress", options.compression, "Level of .nii.gz; 0: .nii")

@@ -59,8 +59,8 @@ TruthSet read_truth_set(const fs::path& folder) {
     set.labels = member(record, "labels", folder);
     set.landmarks = member(record, "landmarks", folder);
     for (const json& one : record.at("cases")) {
-      set.cases.push_back({one.at("name").get<std::string>(), member(one, "fixed", folder), member(one, "field", folder),
-                           member(one, "body", folder), member(one, "labels", folder),
+      set.cases.push_back({one.at("name").get<std::string>(), member(one, "fixed", folder),
+                           member(one, "field", folder), member(one, "body", folder), member(one, "labels", folder),
                            member(one, "landmarks", folder)});
     }
   } catch (const json::exception& error) {

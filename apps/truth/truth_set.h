@@ -12,12 +12,12 @@ namespace tetwarp::apps {
 
 /// One case of a set of known truth. All files lie in the folder of the set.
 struct TruthCase {
-  std::string name;              ///< of its folder
-  std::filesystem::path fixed,   ///< deformed volume
-      field,                     ///< forward field: the truth
-      body,                      ///< mask of the body of the fixed volume
-      labels,                    ///< labels of the fixed volume; empty: none
-      landmarks;                 ///< where those of the moving volume come to lie; empty: none
+  std::string name;             ///< of its folder
+  std::filesystem::path fixed,  ///< deformed volume
+      field,                    ///< forward field: the truth
+      body,                     ///< mask of the body of the fixed volume
+      labels,                   ///< labels of the fixed volume; empty: none
+      landmarks;                ///< where those of the moving volume come to lie; empty: none
 };
 
 /// A set of known truth: what `truth` writes and `score` reads.

@@ -13,9 +13,9 @@ std::map<std::int64_t, Overlap> compare_labels(const ConstVolumeView& first, con
                 map->type != VoxelType::f64 && map->buffered == whole(*map->geometry),
             "labels are compared of whole volumes of whole numbers in host memory");
   }
-  require(first.geometry->size == second.geometry->size,
-          "label maps of " + to_string(first.geometry->size) + " and " + to_string(second.geometry->size) +
-              " voxels cannot be compared");
+  require(first.geometry->size == second.geometry->size, "label maps of " + to_string(first.geometry->size) + " and " +
+                                                             to_string(second.geometry->size) +
+                                                             " voxels cannot be compared");
   const auto count = static_cast<std::size_t>(voxel_count(*first.geometry));
   std::map<std::int64_t, Overlap> overlaps;
   dispatch(first.type, [&]<class A>(A) {

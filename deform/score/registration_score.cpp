@@ -216,7 +216,8 @@ DenseScore score_field(ForwardResampler& truth, const PullField& result, const s
     };
     arena.execute([&] {
       tbb::parallel_for(begin, end, [&](std::int64_t k) {
-        if (!labels.voxels) return look_at(k, [](SliceSums&, std::int64_t) { return static_cast<ErrorSums*>(nullptr); });
+        if (!labels.voxels)
+          return look_at(k, [](SliceSums&, std::int64_t) { return static_cast<ErrorSums*>(nullptr); });
         dispatch(labels.type, [&]<class V>(V) {
           const V* values = reinterpret_cast<const V*>(labels.voxels);
           look_at(k, [&](SliceSums& sums, std::int64_t voxel) {

@@ -44,16 +44,16 @@ std::string to_string(Reading reading);
 
 /// What a result is like, voxel by voxel.
 struct DenseScore {
-  Errors all;                             ///< of all voxels that count
-  std::map<std::int64_t, Errors> labels;  ///< of each label, where there are labels
+  Errors all;                                ///< of all voxels that count
+  std::map<std::int64_t, Errors> labels;     ///< of each label, where there are labels
   std::array<double, kReadings> readings{};  ///< mean error of each reading, over the voxels of `all`
   /// Determinants of the gradient of T, by central differences between neighbouring voxels, over the voxels that count
   /// and have all neighbours.
   std::uint64_t determinants = 0;
-  std::uint64_t folded = 0;                   ///< determinants that are 0 or below
-  double smallest_determinant = 0,            ///< smallest determinant
-      largest_determinant = 0;                ///< largest determinant
-  double mean_determinant_error = 0;          ///< mean of |det T - 1 / J|, where J is the owner's determinant
+  std::uint64_t folded = 0;           ///< determinants that are 0 or below
+  double smallest_determinant = 0,    ///< smallest determinant
+      largest_determinant = 0;        ///< largest determinant
+  double mean_determinant_error = 0;  ///< mean of |det T - 1 / J|, where J is the owner's determinant
 };
 
 /// The reading that fits much better than the one that was given, if there is one: its mean error is less than half of

@@ -49,8 +49,7 @@ struct Bone {
 
 }  // namespace
 
-VertexField flexion_motion(const Subject& subject, const Values& values, const Limits& limits,
-                           const Control& control) {
+VertexField flexion_motion(const Subject& subject, const Values& values, const Limits& limits, const Control& control) {
   const Geometry& lattice = subject.lattice();
   const std::vector<glm::dvec3> all = places_of(lattice, subject.vertices("bone"));
   glm::dvec3 middle(0), low(all.front()), high(low);

@@ -27,8 +27,7 @@ using Tensor = std::array<double, 6>;
 /// det S / trace adj S; 0 for a tensor without an inverse.
 double corner_strength(const Tensor& s) {
   const double a = s[1] * s[2] - s[5] * s[5], b = s[0] * s[2] - s[4] * s[4], c = s[0] * s[1] - s[3] * s[3];
-  const double determinant =
-      s[0] * a - s[3] * (s[3] * s[2] - s[5] * s[4]) + s[4] * (s[3] * s[5] - s[1] * s[4]);
+  const double determinant = s[0] * a - s[3] * (s[3] * s[2] - s[5] * s[4]) + s[4] * (s[3] * s[5] - s[1] * s[4]);
   const double trace = a + b + c;
   return trace > 0 && determinant > 0 ? determinant / trace : 0;
 }

@@ -20,7 +20,8 @@ struct LandmarkRules {
 /// The structure tensor S sums the outer products of gradients (central differences, per mm, HU cut to -1000 to 1000)
 /// over 5 x 5 x 5 voxels. A corner is a voxel with a large det S / trace adj S (Foerstner and Guelch 1987, in three
 /// dimensions), which is near the smallest eigenvalue. Of each block of 4 x 4 x 4 voxels the best one is a candidate;
-/// candidates are taken from the best downwards, unless one is near already. Fewer come out where there are not so many.
+/// candidates are taken from the best downwards, unless one is near already. Fewer come out where there are not so
+/// many.
 /// @param ct    HU, one component, the whole volume
 /// @param body  not 0 where a landmark may lie, i fastest; such as the voxels of the body
 /// @return LPS mm, from the best to the worst

@@ -55,13 +55,14 @@ VertexField radial(const Subject& subject, const Ball& ball, To to, const Limits
 
 }  // namespace
 
-VertexField elastic_motion(const Subject& subject, const Values& values, const Limits& limits,
-                           const Control& control) {
+VertexField elastic_motion(const Subject& subject, const Values& values, const Limits& limits, const Control& control) {
   const Geometry& lattice = subject.lattice();
   const double amplitude = value(values, "amplitude");
   const Elastic elastic{amplitude, value(values, "spacing"), static_cast<std::uint64_t>(value(values, "seed")),
                         centre(lattice)};
-  if (amplitude == 0) return sample_on(lattice, [](const glm::dvec3&) { return glm::dvec3(0); }, limits, control);
+  if (amplitude == 0)
+    return sample_on(
+        lattice, [](const glm::dvec3&) { return glm::dvec3(0); }, limits, control);
   // At 4 amplitudes from a face the fading adds at most 1.5 / 4 to the slope across it.
   const double fade = 4 * amplitude;
   const AffineMap index = index_from_point(lattice);
@@ -84,7 +85,8 @@ VertexField elastic_motion(const Subject& subject, const Values& values, const L
 
 VertexField shift_motion(const Subject& subject, const Values& values, const Limits& limits, const Control& control) {
   const glm::dvec3 by(value(values, "x"), value(values, "y"), value(values, "z"));
-  return sample_on(subject.lattice(), [by](const glm::dvec3&) { return by; }, limits, control);
+  return sample_on(
+      subject.lattice(), [by](const glm::dvec3&) { return by; }, limits, control);
 }
 
 VertexField rotation_motion(const Subject& subject, const Values& values, const Limits& limits,
@@ -119,8 +121,7 @@ VertexField breathing_motion(const Subject& subject, const Values& values, const
   });
 }
 
-VertexField filling_motion(const Subject& subject, const Values& values, const Limits& limits,
-                           const Control& control) {
+VertexField filling_motion(const Subject& subject, const Values& values, const Limits& limits, const Control& control) {
   const Ball ball = ball_around(subject, "organ");
   const double ratio = value(values, "ratio"), scale = cube_root(ratio), radius = ball.radius;
   const double more = (ratio - 1) * radius * radius * radius;

@@ -25,7 +25,9 @@ std::vector<float> noise_of_slice(const glm::i64vec3& size, std::int64_t slice, 
   const std::uint64_t first = phantom::hash(seed) + static_cast<std::uint64_t>(slice * columns * rows);
   std::vector<float> along(static_cast<std::size_t>(size.x * rows)), noise(static_cast<std::size_t>(size.x * size.y));
   for (std::int64_t j = 0; j < rows; ++j) {
-    const auto white = [&](std::int64_t i) { return phantom::normal(first + static_cast<std::uint64_t>(j * columns + i)); };
+    const auto white = [&](std::int64_t i) {
+      return phantom::normal(first + static_cast<std::uint64_t>(j * columns + i));
+    };
     for (std::int64_t i = 0; i < size.x; ++i)
       along[static_cast<std::size_t>(i + size.x * j)] = white(i) + 2 * white(i + 1) + white(i + 2);
   }

@@ -109,9 +109,7 @@ double SlipTube::depth_mm(const glm::dvec2& at) const {
 
 simulate::Cut SlipTube::cut() const {
   const AffineMap point = point_from_index(lattice_);
-  simulate::SweptCut tube{.path = {},
-                          .sweep = point.linear * glm::dvec3(0, 0, lattice_.size.z),
-                          .is_closed = true};
+  simulate::SweptCut tube{.path = {}, .sweep = point.linear * glm::dvec3(0, 0, lattice_.size.z), .is_closed = true};
   for (const glm::dvec2& corner : corners_) tube.path.push_back(point(glm::dvec3(corner, -0.5)));
   return {"chest wall", tube};
 }

@@ -25,6 +25,7 @@ from .errors import Cancelled, DeviceError, Error, InputError, NotCompiled
 from .field import PullField, TetrahedralMesh, VertexField
 from .files import PHANTOM_LABELS, info, labelled_phantom, phantom, read, read_field, write, write_field
 from .geometry import Geometry
+from .known_truth import score, truth
 from .rendering import render
 from .report import Report
 from .resampler import PullResampler, Resampler, Target
@@ -47,6 +48,7 @@ __all__ = [
     "Geometry",
     "InputError",
     "NotCompiled",
+    "PHANTOM_LABELS",
     "PullField",
     "PullResampler",
     "Report",
@@ -68,14 +70,15 @@ __all__ = [
     "info",
     "invert",
     "jacobian",
-    "move_points",
     "labelled_phantom",
+    "move_points",
     "phantom",
-    "PHANTOM_LABELS",
     "read",
     "read_field",
     "render",
+    "score",
     "simulate",
+    "truth",
     "view",
     "write",
     "write_field",

@@ -6,16 +6,9 @@
 from __future__ import annotations
 
 import os
-import signal
-import subprocess
-import sys
-from typing import Any, Union
+from typing import Any
 
-from .errors import Error, InputError
-
-PathLike = Union[str, "os.PathLike[str]"]
-
-_ERRORS: dict[int, type[Error]] = {2: InputError, 4: InputError}
+from ._command import PathLike, run_command
 
 
 def batch(manifest: PathLike, output: PathLike, **options: Any) -> int:
@@ -54,24 +47,4 @@ def batch(manifest: PathLike, output: PathLike, **options: Any) -> int:
     ...     print("missing.csv" in str(error))
     True
     """
-    words = ["batch", os.fspath(manifest), "-o", os.fspath(output)]
-    for name, value in options.items():
-        option = "--" + name.replace("_", "-")
-        if value is True:
-            words.append(option)
-        elif value is not False and value is not None:
-            words.append(f"{option}={value}")
-    process = subprocess.Popen(
-        [sys.executable, "-m", "tetwarp._program", *words], stderr=subprocess.PIPE, text=True, errors="replace"
-    )
-    try:
-        _, said = process.communicate()
-    except BaseException:
-        process.send_signal(signal.SIGINT)  # a second one, from a terminal, would end it at once: it then resumes
-        process.communicate()
-        raise
-    if process.returncode in (0, 3):
-        return process.returncode
-    lines = [line for line in said.splitlines() if line.startswith("tetwarp: error: ")]
-    text = lines[-1].removeprefix("tetwarp: error: ") if lines else said.strip()
-    raise _ERRORS.get(process.returncode, Error)(text)
+    return run_command(["batch", os.fspath(manifest), "-o", os.fspath(output)], options)

@@ -98,7 +98,8 @@ TEST(RegistrationScore, WhatDoesNotCountOrHasNoPlaceIsLeftOut) {
   EXPECT_EQ(score.all.points, scene.everywhere.size() - 300);
   EXPECT_EQ(score.all.largest, 0);
   // What the truth does not cover counts neither: a shift by five voxels.
-  const VertexField away = uniform_field(scene.field.lattice, glm::vec3(5.0 * scene.grid.spacing.x * scene.grid.direction[0]));
+  const VertexField away =
+      uniform_field(scene.field.lattice, glm::vec3(5.0 * scene.grid.spacing.x * scene.grid.direction[0]));
   scene.truth->set_field(view(away, Outside::background));
   const DenseScore shifted = scene.score(scene.exact());
   EXPECT_LT(shifted.all.points, scene.everywhere.size() - 300);
@@ -111,7 +112,8 @@ TEST(RegistrationScore, FoldsAreCounted) {
   for (std::size_t n = 0; n < folded.displacement.size(); ++n) {
     // Mirrored about a plane across i from index 20 on: two voxels a step backwards.
     const double i = static_cast<double>(n % 34);
-    if (i >= 20) folded.displacement[n] = glm::vec3(point_from_index(scene.grid).linear * glm::dvec3(-2 * (i - 20), 0, 0));
+    if (i >= 20)
+      folded.displacement[n] = glm::vec3(point_from_index(scene.grid).linear * glm::dvec3(-2 * (i - 20), 0, 0));
   }
   const DenseScore score = scene.score(folded);
   EXPECT_GE(score.folded, 12U * 28 * 24);
@@ -150,8 +152,7 @@ TEST(RegistrationScore, RefusesWhatDoesNotFit) {
 }
 
 TEST(RegistrationScore, PointsAreComparedOneByOne) {
-  const std::vector<glm::dvec3> wanted{{0, 0, 0}, {1, 1, 1}, {5, 5, 5}},
-      found{{0, 0, 3}, {1, 1, 1}, {NAN, 0, 0}};
+  const std::vector<glm::dvec3> wanted{{0, 0, 0}, {1, 1, 1}, {5, 5, 5}}, found{{0, 0, 3}, {1, 1, 1}, {NAN, 0, 0}};
   const Errors errors = score_points(found, wanted);
   EXPECT_EQ(errors.points, 2U);
   EXPECT_EQ(errors.missing, 1U);

@@ -59,8 +59,7 @@ Outcome outcome_of(const VertexField& field, Outside outside = Outside::backgrou
   resampler->set_field(view(field, outside));
   Volume<std::uint8_t> coverage{grid, std::vector<std::uint8_t>(static_cast<std::size_t>(voxel_count(grid)))};
   Volume<std::uint16_t> owners{grid, std::vector<std::uint16_t>(coverage.voxels.size())};
-  const Report report =
-      resampler->resample(whole(grid), {}, {.coverage = view(coverage), .owners = view(owners)});
+  const Report report = resampler->resample(whole(grid), {}, {.coverage = view(coverage), .owners = view(owners)});
   return {report, std::move(coverage.voxels)};
 }
 
@@ -133,7 +132,8 @@ TEST(TruthFamilies, SlipJumpsAtTheTubeAndOpensNothing) {
   const double all = static_cast<double>(voxel_count(body().ct.geometry));
   EXPECT_LT(static_cast<double>(outcome.report.uncovered) / all, 1e-3);
   EXPECT_LT(static_cast<double>(outcome.report.multiply_owned.value()) / all, 1e-3);
-  // Along a line that leaves the tube at the level of the diaphragm, what is inside goes down and what is outside stays.
+  // Along a line that leaves the tube at the level of the diaphragm, what is inside goes down and what is outside
+  // stays.
   const SlipTube tube(subject());
   const AffineMap index = index_from_point(subject().lattice());
   const PointMover mover(body().ct.geometry, view(field, Outside::background));
@@ -189,8 +189,7 @@ TEST(TruthFamilies, FillingAndShrinkageScaleVolumesByTheirRatio) {
     const glm::dmat3 edges(moved(field, middle + glm::dvec3(edge, 0, 0)) - origin,
                            moved(field, middle + glm::dvec3(0, edge, 0)) - origin,
                            moved(field, middle + glm::dvec3(0, 0, edge)) - origin);
-    EXPECT_NEAR(glm::dot(glm::cross(edges[0], edges[1]), edges[2]) / (edge * edge * edge), one.ratio,
-                0.03 * one.ratio)
+    EXPECT_NEAR(glm::dot(glm::cross(edges[0], edges[1]), edges[2]) / (edge * edge * edge), one.ratio, 0.03 * one.ratio)
         << one.text;
     EXPECT_LT(glm::length(field.displacement.front()), 1e-6) << one.text;
   }
@@ -201,9 +200,9 @@ TEST(TruthFamilies, TextsAreTakenApart) {
   EXPECT_EQ(choice.name, "elastic-amplitude-7.5-seed-3");
   EXPECT_EQ(choice.values.at("amplitude"), 7.5);
   EXPECT_EQ(choice.values.at("spacing"), 60);
-  for (const char* text : {"", "wobble", "elastic:", "elastic:size=3", "elastic:amplitude", "elastic:amplitude=x",
-                           "elastic:amplitude=-1", "elastic:amplitude=1,amplitude=2", "elastic:amplitude=nan",
-                           "rotation:axis=5", "elastic:amplitude=1mm"})
+  for (const char* text :
+       {"", "wobble", "elastic:", "elastic:size=3", "elastic:amplitude", "elastic:amplitude=x", "elastic:amplitude=-1",
+        "elastic:amplitude=1,amplitude=2", "elastic:amplitude=nan", "rotation:axis=5", "elastic:amplitude=1mm"})
     EXPECT_THROW(parse_case(text), InputError) << text;
   EXPECT_EQ(usual_cases({}).size(), 7U);
   EXPECT_EQ(usual_cases(Roles{{"lung", {1}}, {"bone", {2}}}).size(), 10U);

@@ -26,8 +26,7 @@ Volume<std::int16_t> block() {
 TEST(Landmarks, CornersOfABlockAreFound) {
   const Volume<std::int16_t> volume = block();
   const std::vector<std::uint8_t> everywhere(volume.voxels.size(), 1);
-  const std::vector<glm::dvec3> found =
-      find_landmarks(view(volume), everywhere, {.most = 8, .apart_mm = 10});
+  const std::vector<glm::dvec3> found = find_landmarks(view(volume), everywhere, {.most = 8, .apart_mm = 10});
   ASSERT_EQ(found.size(), 8U);
   const AffineMap point = point_from_index(volume.geometry);
   for (const double i : {12, 27}) {

@@ -1,0 +1,183 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Registers a fixed volume with a moving one by a program or library that others use, with its usual settings.
+
+    register.py METHOD MOVING FIXED RESULT.mha
+
+METHOD: plastimatch, elastix (programs); itk-elastix, simpleitk-demons, simpleitk-bspline (packages of Python).
+RESULT gets the displacement from fixed to moving at each voxel of FIXED, LPS mm, as `tetwarp score` takes it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+
+
+def run(*words: object) -> None:
+    """Runs a program; what it prints is shown where it fails."""
+    done = subprocess.run([str(word) for word in words], capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        sys.exit(f"register.py: error: {words[0]} failed\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
+
+
+def plastimatch(moving: str, fixed: str, result: str) -> None:
+    """B-splines in four stages, mean squared error: the settings that its guide names for one patient."""
+    with tempfile.TemporaryDirectory() as folder:
+        page = pathlib.Path(folder) / "parameters.txt"
+        page.write_text(
+            f"""[GLOBAL]
+fixed={fixed}
+moving={moving}
+vf_out={result}
+[STAGE]
+xform=bspline
+optim=lbfgsb
+metric=mse
+max_its=50
+grid_spac=60 60 60
+res=4 4 2
+regularization_lambda=0.02
+[STAGE]
+max_its=50
+grid_spac=40 40 40
+res=2 2 1
+[STAGE]
+max_its=50
+grid_spac=25 25 25
+res=1 1 1
+"""
+        )
+        run("plastimatch", "register", page)
+
+
+ELASTIX_MAP = """(FixedImageDimension 3)
+(MovingImageDimension 3)
+(FixedInternalImagePixelType "float")
+(MovingInternalImagePixelType "float")
+(UseDirectionCosines "true")
+(Registration "MultiResolutionRegistration")
+(Interpolator "BSplineInterpolator")
+(ResampleInterpolator "FinalBSplineInterpolator")
+(Resampler "DefaultResampler")
+(FixedImagePyramid "FixedRecursiveImagePyramid")
+(MovingImagePyramid "MovingRecursiveImagePyramid")
+(Optimizer "AdaptiveStochasticGradientDescent")
+(Transform "BSplineTransform")
+(Metric "AdvancedMattesMutualInformation")
+(FinalGridSpacingInPhysicalUnits 25)
+(GridSpacingSchedule 4 2 1 1)
+(NumberOfResolutions 4)
+(MaximumNumberOfIterations 500)
+(NumberOfHistogramBins 32)
+(NumberOfSpatialSamples 4096)
+(NewSamplesEveryIteration "true")
+(ImageSampler "RandomCoordinate")
+(BSplineInterpolationOrder 1)
+(FinalBSplineInterpolationOrder 3)
+(DefaultPixelValue -1000)
+(HowToCombineTransforms "Compose")
+(AutomaticTransformInitialization "false")
+(WriteResultImage "false")
+(ResultImageFormat "mha")
+(RandomSeed 121212)
+"""
+
+
+def elastix(moving: str, fixed: str, result: str) -> None:
+    """B-splines, mutual information, four resolutions: elastix' usual map for one patient."""
+    with tempfile.TemporaryDirectory() as folder:
+        page = pathlib.Path(folder) / "parameters.txt"
+        page.write_text(ELASTIX_MAP)
+        run("elastix", "-f", fixed, "-m", moving, "-p", page, "-out", folder)
+        run("transformix", "-def", "all", "-tp", pathlib.Path(folder) / "TransformParameters.0.txt", "-out", folder)
+        shutil.copy(pathlib.Path(folder) / "deformationField.mha", result)
+
+
+def itk_elastix(moving: str, fixed: str, result: str) -> None:
+    """The default maps of itk-elastix: rigid, affine, B-splines."""
+    import itk
+
+    images = [itk.imread(path, itk.F) for path in (fixed, moving)]
+    maps = itk.ParameterObject.New()
+    for kind in ("rigid", "affine", "bspline"):
+        maps.AddParameterMap(maps.GetDefaultParameterMap(kind))
+    _, transform = itk.elastix_registration_method(*images, parameter_object=maps, log_to_console=False)
+    itk.imwrite(itk.transformix_deformation_field(images[1], transform), result)
+
+
+def simpleitk_demons(moving: str, fixed: str, result: str) -> None:
+    """Fast symmetric forces demons in three resolutions."""
+    import SimpleITK as sitk
+
+    still, moved = (sitk.ReadImage(path, sitk.sitkFloat32) for path in (fixed, moving))
+    demons = sitk.FastSymmetricForcesDemonsRegistrationFilter()
+    demons.SetNumberOfIterations(60)
+    demons.SetStandardDeviations(1.5)
+    field = None
+    for factor in (4, 2, 1):
+        small = [
+            sitk.Shrink(sitk.DiscreteGaussian(image, (factor / 2) ** 2), [factor] * 3) if factor > 1 else image
+            for image in (still, moved)
+        ]
+        if field is None:
+            field = demons.Execute(small[0], small[1])
+        else:
+            field = demons.Execute(small[0], small[1], sitk.Resample(field, small[0]))
+    sitk.WriteImage(sitk.Cast(field, sitk.sitkVectorFloat32), result)
+
+
+def simpleitk_bspline(moving: str, fixed: str, result: str) -> None:
+    """B-splines by L-BFGS-B in three resolutions, mean squares on a tenth of the voxels."""
+    import SimpleITK as sitk
+
+    still, moved = (sitk.ReadImage(path, sitk.sitkFloat32) for path in (fixed, moving))
+    cells = [max(2, round(size * spacing / 100)) for size, spacing in zip(still.GetSize(), still.GetSpacing())]
+    method = sitk.ImageRegistrationMethod()
+    method.SetInitialTransformAsBSpline(sitk.BSplineTransformInitializer(still, cells), True, [1, 2, 4])
+    method.SetMetricAsMeanSquares()
+    method.SetMetricSamplingStrategy(method.RANDOM)
+    method.SetMetricSamplingPercentage(0.1, 1)
+    method.SetShrinkFactorsPerLevel([4, 2, 1])
+    method.SetSmoothingSigmasPerLevel([2, 1, 0])
+    method.SetOptimizerAsLBFGS2(numberOfIterations=60)
+    method.SetInterpolator(sitk.sitkLinear)
+    transform = method.Execute(still, moved)
+    field = sitk.TransformToDisplacementField(
+        transform, sitk.sitkVectorFloat64, still.GetSize(), still.GetOrigin(), still.GetSpacing(), still.GetDirection()
+    )
+    sitk.WriteImage(sitk.Cast(field, sitk.sitkVectorFloat32), result)
+
+
+METHODS: dict[str, Callable[[str, str, str], None]] = {
+    "plastimatch": plastimatch,
+    "elastix": elastix,
+    "itk-elastix": itk_elastix,
+    "simpleitk-demons": simpleitk_demons,
+    "simpleitk-bspline": simpleitk_bspline,
+}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("method", choices=METHODS)
+    parser.add_argument("moving")
+    parser.add_argument("fixed")
+    parser.add_argument("result")
+    options = parser.parse_args()
+    if not options.result.endswith(".mha"):
+        parser.error("RESULT is a .mha file")
+    unfinished = options.result[: -len(".mha")] + ".unfinished.mha"
+    METHODS[options.method](options.moving, options.fixed, unfinished)
+    pathlib.Path(unfinished).rename(options.result)
+
+
+if __name__ == "__main__":
+    main()

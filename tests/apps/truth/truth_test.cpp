@@ -1,0 +1,175 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+// `tetwarp truth` and `tetwarp score`.
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "io/field_file.h"
+#include "io/image_file.h"
+#include "tests/support/program.h"
+#include "tests/support/scratch.h"
+
+namespace {
+
+using namespace tetwarp;
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+constexpr const char* kCases = " --case elastic:amplitude=6,spacing=80 --case slip:amplitude=8 --case shift";
+constexpr const char* kRoles = " --labels labels.nii.gz --label lung=2 --label bone=3";
+
+class TruthProgram : public testing::Test {
+ protected:
+  /// Runs the program in a folder of this test. @return the exit status
+  int run(const std::string& arguments) {
+    outcome_ = run_tetwarp(scratch_.path(), arguments);
+    return outcome_.status;
+  }
+  void make_phantom() {
+    ASSERT_EQ(run("phantom -o ct.nii.gz --labels labels.nii.gz --size 64,60,48 --spacing 6.4,6.8,6.25 --noise 0"), 0);
+  }
+  /// A set of three cases with its truth as results.
+  void make_set(const std::string& more = "", const std::string& suffix = ".nii.gz") {
+    make_phantom();
+    ASSERT_EQ(run("truth ct.nii.gz -o set --dense" + std::string(kCases) + kRoles + more), 0) << outcome_.err;
+    fs::create_directories(at("exact"));
+    for (const std::string& name : names())
+      fs::copy_file(at("set/" + name + "/inverse" + suffix), at("exact/" + name + suffix));
+  }
+  std::vector<std::string> names() const {
+    return {"elastic-amplitude-6-spacing-80", "slip-amplitude-8", "shift"};
+  }
+  fs::path at(const std::string& name) const { return scratch_.path() / name; }
+  json document(const std::string& name) const { return json::parse(read_text(at(name))); }
+  const std::string& err() const { return outcome_.err; }
+  const std::string& out() const { return outcome_.out; }
+
+ private:
+  Scratch scratch_;
+  Outcome outcome_;
+};
+
+TEST_F(TruthProgram, TheTruthOfASetIsExact) {
+  make_set(" --noise 10");
+  ASSERT_EQ(run("score set -r exact --json s.json --csv s.csv --html s.html"), 0) << err() << out();
+  const json scores = document("s.json").at("scores");
+  ASSERT_EQ(scores.size(), 3U);
+  for (const json& score : scores) {
+    EXPECT_LT(score.at("body").at("largest_mm").get<double>(), 1e-4) << score;
+    // Across the surface of a slip neighbours differ by more than a gradient.
+    const bool slips = score.at("case") == "slip-amplitude-8";
+    EXPECT_TRUE(slips || score.at("jacobian").at("folded") == 0) << score;
+    EXPECT_GT(score.at("mean_mm_read_as").at("no displacement").get<double>(), 0.5);
+    for (const auto& [label, dice] : score.at("dice").items()) EXPECT_GT(dice.get<double>(), 0.99) << label;
+    EXPECT_GT(score.at("landmarks").at("points").get<int>(), 100);
+    EXPECT_TRUE(score.at("passed").get<bool>());
+  }
+  // Noise is another one in each volume.
+  const AnyVolume moving = read_image(at("set/moving/moving.nii.gz")), ct = read_image(at("ct.nii.gz"));
+  std::size_t differ = 0;
+  for (std::size_t n = 0; n < ct.as<std::int16_t>().size(); ++n)
+    differ += moving.as<std::int16_t>()[n] != ct.as<std::int16_t>()[n];
+  EXPECT_GT(differ, ct.as<std::int16_t>().size() / 2);
+  const std::string page = read_text(at("s.html")), table = read_text(at("s.csv"));
+  EXPECT_NE(page.find("data:image/png;base64,iVBOR"), std::string::npos);
+  EXPECT_NE(page.find("AAPM TG-132"), std::string::npos);
+  EXPECT_NE(table.find("exact,shift,body,"), std::string::npos);
+}
+
+TEST_F(TruthProgram, TheSameAgainAndAfterAnInterruption) {
+  make_set(" --noise 10 --compress 0", ".nii");
+  const std::string again = "truth ct.nii.gz -o again --dense" + std::string(kCases) + kRoles + " --noise 10 --compress 0";
+  ASSERT_EQ(run(again + " --threads 1"), 0) << err();
+  // As if the program had been killed after the first case.
+  fs::remove(at("again/set.json"));
+  fs::remove_all(at("again/shift"));
+  fs::remove_all(at("again/slip-amplitude-8"));
+  EXPECT_EQ(run(again), 1);
+  EXPECT_NE(err().find("--resume"), std::string::npos);
+  EXPECT_EQ(run("score again -r exact"), 4);
+  EXPECT_EQ(run(again + " --resume --noise 11"), 2) << "an option given twice";
+  ASSERT_EQ(run(again + " --resume"), 0) << err();
+  const json first = document("set/set.json"), second = document("again/set.json");
+  EXPECT_EQ(first.at("sha256"), second.at("sha256"));
+  EXPECT_GT(first.at("sha256").size(), 15U);
+  EXPECT_EQ(run(again + " --resume"), 1) << "the set is complete";
+}
+
+TEST_F(TruthProgram, AnotherInputDoesNotGoOnWithASet) {
+  make_phantom();
+  ASSERT_EQ(run("truth ct.nii.gz -o set --case shift"), 0) << err();
+  fs::remove(at("set/set.json"));
+  EXPECT_EQ(run("truth ct.nii.gz -o set --case shift:x=1 --resume"), 1);
+  EXPECT_EQ(run("truth ct.nii.gz -o set --case shift --cell-size 8 --resume"), 1);
+  EXPECT_NE(err().find("another input, other options"), std::string::npos);
+  EXPECT_EQ(run("truth ct.nii.gz -o set --case shift --resume"), 0) << err();
+}
+
+TEST_F(TruthProgram, WrongResultsAreNamed) {
+  make_set();
+  PullField field = read_pull_field({at("exact/shift.nii.gz")});
+  const auto result = [&](const std::string& folder) {
+    fs::create_directories(at(folder));
+    write_field_file(at(folder + "/shift.mha"), field);
+  };
+  for (glm::vec3& by : field.displacement) by = -by;
+  result("negative");
+  EXPECT_EQ(run("score set -r negative --json n.json"), 3);
+  EXPECT_NE(err().find("this looks like the inverse"), std::string::npos) << err();
+  EXPECT_NE(out().find("elastic-amplitude-6-spacing-80: no result in negative"), std::string::npos);
+  for (glm::vec3& by : field.displacement) by = -by + glm::vec3(0, 0, 3);
+  result("off");
+  EXPECT_EQ(run("score set -r exact -r off --json o.json"), 3);
+  for (const json& score : document("o.json").at("scores")) {
+    if (score.at("case") != "shift" || score.at("result") != "off") continue;
+    EXPECT_NEAR(score.at("body").at("mean_mm").get<double>(), 3, 1e-4);
+    EXPECT_NEAR(score.at("landmarks").at("mean_mm").get<double>(), 3, 1e-3);
+    EXPECT_FALSE(score.at("passed").get<bool>());
+  }
+  // Wider limits, and one on the whole body.
+  std::ofstream(at("limits.json")) << R"({"landmarks_mean_mm": {"most": 4, "source": "ours"}, "mean_mm": {"most": 3.5}})";
+  fs::copy_file(at("exact/slip-amplitude-8.nii.gz"), at("off/slip-amplitude-8.nii.gz"));
+  fs::copy_file(at("exact/elastic-amplitude-6-spacing-80.nii.gz"), at("off/elastic-amplitude-6-spacing-80.nii.gz"));
+  EXPECT_EQ(run("score set -r off --limits limits.json --json l.json"), 0) << out();
+  std::ofstream(at("limits.json")) << R"({"beauty": {"most": 4}})";
+  EXPECT_EQ(run("score set -r off --limits limits.json"), 4);
+}
+
+TEST_F(TruthProgram, LandmarksAreScored) {
+  make_set();
+  fs::create_directories(at("points"));
+  for (const std::string& name : names()) fs::copy_file(at("set/moving/landmarks.csv"), at("points/" + name + ".csv"));
+  EXPECT_EQ(run("score set -r points --json p.json"), 0) << out() << err();
+  for (const json& score : document("p.json").at("scores")) EXPECT_EQ(score.at("landmarks").at("largest_mm"), 0);
+  std::ofstream(at("points/shift.csv")) << "x,y,z\n1,2,3\n";
+  EXPECT_EQ(run("score set -r points"), 4);
+  fs::copy_file(at("set/shift/inverse.nii.gz"), at("points/shift.nii.gz"));
+  EXPECT_EQ(run("score set -r points"), 4) << "two results";
+}
+
+TEST_F(TruthProgram, WhatCannotBeMadeIsRefused) {
+  make_phantom();
+  EXPECT_EQ(run("truth ct.nii.gz -o set --case wobble"), 2);
+  EXPECT_EQ(run("truth ct.nii.gz -o set --case shift --case shift"), 2);
+  EXPECT_EQ(run("truth ct.nii.gz -o set --case breathing"), 2);
+  EXPECT_NE(err().find("--label lung=N"), std::string::npos);
+  EXPECT_EQ(run("truth ct.nii.gz -o set --label lung=2"), 2);
+  EXPECT_EQ(run("truth ct.nii.gz -o set --labels labels.nii.gz --label liver=8"), 2);
+  EXPECT_EQ(run("truth ct.nii.gz -o set --labels labels.nii.gz --label lung=2.5"), 2);
+  EXPECT_EQ(run("truth missing.nii.gz -o set"), 4);
+  EXPECT_FALSE(fs::exists(at("set")));
+  EXPECT_EQ(run("truth ct.nii.gz -o set --labels labels.nii.gz --label lung=99 --case elastic"), 4);
+  fs::remove_all(at("set"));
+  EXPECT_EQ(run("truth ct.nii.gz -o set --case elastic:amplitude=60,spacing=30"), 4);
+  EXPECT_NE(err().find("folds"), std::string::npos);
+  EXPECT_EQ(run("score set -r ct.nii.gz"), 4);
+  EXPECT_EQ(run("score nowhere -r ct.nii.gz"), 4);
+  std::ofstream(at("set/set.json")) << R"({"set": {"moving": "../ct.nii.gz", "cases": []}})";
+  EXPECT_EQ(run("score set -r ct.nii.gz"), 4);
+  EXPECT_NE(err().find("not in the set"), std::string::npos);
+}
+
+}  // namespace
