@@ -122,6 +122,13 @@ class TruthMaker {
   }
   fs::path write_field(const truth::CaseChoice& choice);
   DeformOptions deform_options(const TruthCase& one) const;
+  /// What deform writes: of a DICOM series a series, so that objects which go along can refer to it.
+  fs::path deformed(const TruthCase& one) const {
+    const fs::path folder = set_.folder / one.name;
+    const bool is_noisy = options_.noise_hu > 0;
+    if (header_.series) return folder / (is_noisy ? "dicom-without-noise" : "dicom");
+    return is_noisy ? folder / volume_file("without-noise") : one.fixed;
+  }
 
   const TruthOptions& options_;
   truth::Roles roles_;
@@ -253,11 +260,11 @@ DeformOptions TruthMaker::deform_options(const TruthCase& one) const {
   deform.input = options_.input;
   deform.field.forward = {one.field.string()};
   deform.folder = set_.folder / one.name;
-  deform.output = options_.noise_hu > 0 ? deform.folder / volume_file("without-noise") : one.fixed;
+  deform.output = deformed(one);
   deform.backend = options_.backend;
   deform.device = options_.device;
   deform.outside = Outside::background;
-  if (options_.compression > 0) deform.compression = options_.compression;
+  if (options_.compression > 0 && !header_.series) deform.compression = options_.compression;
   const auto along = [&](const fs::path& from, const fs::path& to, const std::string& how) {
     deform.with.push_back(from.string() + "=" + to.string() + how);
   };
@@ -281,12 +288,14 @@ void TruthMaker::make_case(const truth::CaseChoice& choice) {
                 .landmarks = set_.landmarks.empty() ? fs::path() : folder / "landmarks.csv"};
   Stage stage(options_.common, choice.name);
   if (!fs::exists(folder)) run_deform(deform_options(one));
-  if (options_.noise_hu > 0 && !fs::exists(one.fixed)) {
-    const AnyVolume clean = read_image(folder / volume_file("without-noise"));
-    AnyVolume noisy(clean.geometry(), clean.type());
-    truth::add_noise(clean.view(), options_.noise_hu, truth::noise_seed(options_.seed, choice.name), noisy.view(),
-                     {.threads = options_.common.threads});
-    write_volume(one.fixed, std::as_const(noisy).view());
+  if (!fs::exists(one.fixed)) {
+    const InputOptions made = volume_named(deformed(one));
+    AnyVolume volume = read_input(made, open_input(made, options_.common), options_.common, stage.control()).volume;
+    if (options_.noise_hu > 0) {
+      truth::add_noise(std::as_const(volume).view(), options_.noise_hu, truth::noise_seed(options_.seed, choice.name),
+                       volume.view(), {.threads = options_.common.threads});
+    }
+    write_volume(one.fixed, std::as_const(volume).view());
   }
   set_.cases.push_back(one);
   say(options_.common, "made " + folder.string());

@@ -20,7 +20,8 @@ std::uint64_t noise_seed(std::uint64_t seed, std::string_view name);
 /// @param volume     HU, one component, the whole volume
 /// @param deviation  standard deviation, HU
 /// @param seed       decides the noise
-/// @param output     gets the sum, rounded and saturated where its type is an integer type; same size and type
+/// @param output     gets the sum, rounded and saturated where its type is an integer type; same size and type, and may
+/// be the volume itself
 /// @throws InputError for views that do not fit
 void add_noise(const ConstVolumeView& volume, double deviation, std::uint64_t seed, const VolumeView& output,
                const Limits& limits = {});

@@ -4,6 +4,8 @@
 // `tetwarp truth` and `tetwarp score`.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -39,9 +41,7 @@ class TruthProgram : public testing::Test {
     for (const std::string& name : names())
       fs::copy_file(at("set/" + name + "/inverse" + suffix), at("exact/" + name + suffix));
   }
-  std::vector<std::string> names() const {
-    return {"elastic-amplitude-6-spacing-80", "slip-amplitude-8", "shift"};
-  }
+  std::vector<std::string> names() const { return {"elastic-amplitude-6-spacing-80", "slip-amplitude-8", "shift"}; }
   fs::path at(const std::string& name) const { return scratch_.path() / name; }
   json document(const std::string& name) const { return json::parse(read_text(at(name))); }
   const std::string& err() const { return outcome_.err; }
@@ -81,7 +81,8 @@ TEST_F(TruthProgram, TheTruthOfASetIsExact) {
 
 TEST_F(TruthProgram, TheSameAgainAndAfterAnInterruption) {
   make_set(" --noise 10 --compress 0", ".nii");
-  const std::string again = "truth ct.nii.gz -o again --dense" + std::string(kCases) + kRoles + " --noise 10 --compress 0";
+  const std::string again =
+      "truth ct.nii.gz -o again --dense" + std::string(kCases) + kRoles + " --noise 10 --compress 0";
   ASSERT_EQ(run(again + " --threads 1"), 0) << err();
   // As if the program had been killed after the first case.
   fs::remove(at("again/set.json"));
@@ -130,7 +131,8 @@ TEST_F(TruthProgram, WrongResultsAreNamed) {
     EXPECT_FALSE(score.at("passed").get<bool>());
   }
   // Wider limits, and one on the whole body.
-  std::ofstream(at("limits.json")) << R"({"landmarks_mean_mm": {"most": 4, "source": "ours"}, "mean_mm": {"most": 3.5}})";
+  std::ofstream(at("limits.json"))
+      << R"({"landmarks_mean_mm": {"most": 4, "source": "ours"}, "mean_mm": {"most": 3.5}})";
   fs::copy_file(at("exact/slip-amplitude-8.nii.gz"), at("off/slip-amplitude-8.nii.gz"));
   fs::copy_file(at("exact/elastic-amplitude-6-spacing-80.nii.gz"), at("off/elastic-amplitude-6-spacing-80.nii.gz"));
   EXPECT_EQ(run("score set -r off --limits limits.json --json l.json"), 0) << out();
@@ -149,6 +151,23 @@ TEST_F(TruthProgram, LandmarksAreScored) {
   fs::copy_file(at("set/shift/inverse.nii.gz"), at("points/shift.nii.gz"));
   EXPECT_EQ(run("score set -r points"), 4) << "two results";
 }
+
+#ifdef TETWARP_WITH_DCMTK
+TEST_F(TruthProgram, OfASeriesEachCaseIsASeriesToo) {
+  ASSERT_EQ(run("phantom -o ct --size 48,44,30 --spacing 8,9,10 --noise 0"), 0);
+  ASSERT_EQ(run("truth ct -o set --case elastic:amplitude=8,spacing=90 --noise 20"), 0) << err();
+  const std::string folder = "set/elastic-amplitude-8-spacing-90/";
+  ASSERT_EQ(run("deform ct -f set/fields/elastic-amplitude-8-spacing-90.mha --outside background -o again.nii.gz"), 0);
+  ASSERT_EQ(run("deform " + folder + "dicom-without-noise -f identity -o series.nii.gz"), 0) << err();
+  const AnyVolume again = read_image(at("again.nii.gz")), series = read_image(at("series.nii.gz")),
+                  fixed = read_image(at(folder + "fixed.nii.gz"));
+  const auto expected = again.as<std::int16_t>(), written = series.as<std::int16_t>(), noisy = fixed.as<std::int16_t>();
+  EXPECT_TRUE(std::equal(expected.begin(), expected.end(), written.begin(), written.end()));
+  double squares = 0;
+  for (std::size_t n = 0; n < noisy.size(); ++n) squares += std::pow(noisy[n] - expected[n], 2);
+  EXPECT_NEAR(std::sqrt(squares / static_cast<double>(noisy.size())), 20, 2);
+}
+#endif
 
 TEST_F(TruthProgram, WhatCannotBeMadeIsRefused) {
   make_phantom();
