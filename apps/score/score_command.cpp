@@ -101,15 +101,10 @@ class Scorer {
 };
 
 CaseScore Scorer::score(const fs::path& results, const TruthCase& one, const std::vector<ScoreLimit>& limits) {
-  CaseScore score{.result = results.string(),
-                  .name = one.name,
-                  .file = result_of(results, set_, one),
-                  .notes = {},
-                  .dense = {},
-                  .landmarks = {},
-                  .overlaps = {},
-                  .checks = {},
-                  .picture = {}};
+  CaseScore score;
+  score.result = results.string();
+  score.name = one.name;
+  score.file = result_of(results, set_, one);
   if (score.file.empty()) return score;
   if (!points_suffix(score.file).empty() && score.file.extension() != ".vtk") {
     require(!one.landmarks.empty(),
@@ -156,7 +151,18 @@ void Scorer::score_field(const TruthCase& one, CaseScore& score) {
 
   const auto mask = body.as<std::uint8_t>();
   const ConstVolumeView labels = one.labels.empty() ? ConstVolumeView{} : std::as_const(fixed_labels).view();
-  score.dense = score::score_field(*truth, result, {mask.begin(), mask.end()}, labels, limits(), stage.control());
+  std::vector<std::uint8_t> counts(mask.begin(), mask.end()), near(counts.size());
+  if (!one.apart.empty()) {
+    const AnyVolume marked = read_image(one.apart);
+    const auto apart = marked.as<std::uint8_t>();
+    require(apart.size() == counts.size(), one.apart.string() + " has another size than " + one.fixed.string());
+    for (std::size_t n = 0; n < counts.size(); ++n) {
+      near[n] = counts[n] && apart[n];
+      counts[n] = counts[n] && !apart[n];
+    }
+    score.apart = score::score_field(*truth, result, near, {}, limits(), stage.control()).all;
+  }
+  score.dense = score::score_field(*truth, result, counts, labels, limits(), stage.control());
   const score::Reading reading = score::suspected_reading(*score.dense);
   if (reading != score::Reading::as_given)
     score.notes.push_back("this looks like " + score::to_string(reading) + ": so read, the mean error is " +
@@ -177,7 +183,7 @@ void Scorer::score_field(const TruthCase& one, CaseScore& score) {
     resampler->resample(whole(grid), {&target, 1}, {}, stage.control());
     score.overlaps = score::compare_labels(labels, std::as_const(warped).view());
   }
-  score.picture = picture(*truth, result, fixed.view(), mask, score.dense->all.worst);
+  score.picture = picture(*truth, result, fixed.view(), counts, score.dense->all.worst);
 }
 
 std::vector<std::uint8_t> Scorer::picture(ForwardResampler& truth, const PullField& result,

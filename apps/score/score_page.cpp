@@ -74,6 +74,7 @@ std::string case_section(const CaseScore& score) {
                          overlap == score.overlaps.end() ? "" : number(overlap->second.dice()));
     }
   }
+  if (score.apart) html += errors_row("near the slip", *score.apart, "");
   if (score.landmarks) html += errors_row("landmarks", *score.landmarks, "");
   html += "</table>\n";
   if (score.dense) {

@@ -113,6 +113,7 @@ json to_json(const CaseScore& score) {
                           {"largest", dense.largest_determinant},
                           {"mean_error", dense.mean_determinant_error}};
   }
+  if (score.apart) record["near_slip"] = to_json(*score.apart);
   if (score.landmarks) record["landmarks"] = to_json(*score.landmarks);
   if (!score.overlaps.empty()) {
     json dice = json::object();
@@ -149,6 +150,7 @@ std::string csv_of(const std::vector<CaseScore>& scores) {
             overlap == score.overlaps.end() ? "" : exact_number_text(overlap->second.dice()));
       }
     }
+    if (score.apart) row(score, "near slip", *score.apart, "");
     if (score.landmarks) row(score, "landmarks", *score.landmarks, "");
   }
   return text;

@@ -42,6 +42,7 @@ struct CaseScore {
   std::filesystem::path file;  ///< that was scored; empty: there was none
   std::vector<std::string> notes;
   std::optional<score::DenseScore> dense;  ///< of a field
+  std::optional<score::Errors> apart;      ///< of what lies near a slip, and does not count in `dense`
   std::optional<score::Errors> landmarks;  ///< empty: the set has none
   std::map<std::int64_t, score::Overlap>
       overlaps;  ///< labels of the fixed volume and those that the field makes of the moving one's

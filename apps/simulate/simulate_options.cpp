@@ -65,8 +65,7 @@ void add_simulate(CLI::App& app, SimulateOptions& options) {
   command->add_option("--report", options.report, "What happened, with times, as JSON")->type_name("FILE.json");
   add_series(*command, options.input);
   add_nifti_frame(*command, options.common, options.input);
-  add_backend(*command, options.backend, options.device,
-              "auto, cuda or cpu: of chainmail the bits are the same, of mass-spring the equilibrium");
+  add_backend(*command, options.backend, options.device);
   command->add_flag("--dry-run", options.dry_run, "Check everything and say what would be done");
   add_common(*command, options.common, true);
   command->footer(

@@ -15,6 +15,7 @@
 #include "deform/truth/family.h"
 #include "deform/truth/landmarks.h"
 #include "deform/truth/noise.h"
+#include "deform/truth/slip_tube.h"
 #include "deform/value_counts.h"
 #include "io/field_file.h"
 #include "io/image_file.h"
@@ -122,6 +123,8 @@ class TruthMaker {
   }
   fs::path write_field(const truth::CaseChoice& choice);
   DeformOptions deform_options(const TruthCase& one) const;
+  /// What of the moving volume lies near the slip of a case.
+  fs::path near_slip_of(const TruthCase& one) const { return set_.folder / "moving" / volume_file("near-" + one.name); }
   /// What deform writes: of a DICOM series a series, so that objects which go along can refer to it.
   fs::path deformed(const TruthCase& one) const {
     const fs::path folder = set_.folder / one.name;
@@ -270,6 +273,7 @@ DeformOptions TruthMaker::deform_options(const TruthCase& one) const {
   };
   along(set_.folder / "moving" / volume_file("body"), one.body, ":vote");
   if (!set_.labels.empty()) along(set_.labels, one.labels, ":vote");
+  if (!one.apart.empty()) along(near_slip_of(one), one.apart, ":vote");
   for (const std::string& path : options_.with) along(path, deform.folder / fs::path(path).filename(), "");
   if (!set_.landmarks.empty()) deform.points.push_back(set_.landmarks.string() + "=" + one.landmarks.string());
   deform.maps.jacobian = deform.folder / volume_file("jacobian");
@@ -285,7 +289,12 @@ void TruthMaker::make_case(const truth::CaseChoice& choice) {
                 .field = write_field(choice),
                 .body = folder / volume_file("body"),
                 .labels = set_.labels.empty() ? fs::path() : folder / volume_file("labels"),
-                .landmarks = set_.landmarks.empty() ? fs::path() : folder / "landmarks.csv"};
+                .landmarks = set_.landmarks.empty() ? fs::path() : folder / "landmarks.csv",
+                .apart = {}};
+  if (choice.family->name == "slip") {
+    write_volume(near_slip_of(one), view(truth::near_slip(*subject_, volume_.geometry())));
+    one.apart = folder / volume_file("near-slip");
+  }
   Stage stage(options_.common, choice.name);
   if (!fs::exists(folder)) run_deform(deform_options(one));
   if (!fs::exists(one.fixed)) {
@@ -310,7 +319,7 @@ void TruthMaker::finish() {
   };
   hash(set_.moving), hash(set_.labels), hash(set_.landmarks);
   for (const TruthCase& one : set_.cases) {
-    for (const fs::path& path : {one.fixed, one.field, one.body, one.labels, one.landmarks}) hash(path);
+    for (const fs::path& path : {one.fixed, one.field, one.body, one.labels, one.landmarks, one.apart}) hash(path);
   }
   document["sha256"] = hashes;
   place(set_.folder / "README.txt", [&](const fs::path& staged) {

@@ -41,7 +41,8 @@ json to_json(const TruthSet& set) {
                                {"field", place_in(one.field, set.folder)},
                                {"body", place_in(one.body, set.folder)},
                                {"labels", place_in(one.labels, set.folder)},
-                               {"landmarks", place_in(one.landmarks, set.folder)}});
+                               {"landmarks", place_in(one.landmarks, set.folder)},
+                               {"apart", place_in(one.apart, set.folder)}});
   }
   return record;
 }
@@ -61,7 +62,7 @@ TruthSet read_truth_set(const fs::path& folder) {
     for (const json& one : record.at("cases")) {
       set.cases.push_back({one.at("name").get<std::string>(), member(one, "fixed", folder),
                            member(one, "field", folder), member(one, "body", folder), member(one, "labels", folder),
-                           member(one, "landmarks", folder)});
+                           member(one, "landmarks", folder), member(one, "apart", folder)});
     }
   } catch (const json::exception& error) {
     throw InputError(file.string() + " is damaged: " + error.what());

@@ -17,7 +17,8 @@ struct TruthCase {
       field,                    ///< forward field: the truth
       body,                     ///< mask of the body of the fixed volume
       labels,                   ///< labels of the fixed volume; empty: none
-      landmarks;                ///< where those of the moving volume come to lie; empty: none
+      landmarks,                ///< where those of the moving volume come to lie; empty: none
+      apart;                    ///< mask of what is scored by itself, near a slip; empty: nothing
 };
 
 /// A set of known truth: what `truth` writes and `score` reads.

@@ -114,6 +114,24 @@ simulate::Cut SlipTube::cut() const {
   return {"chest wall", tube};
 }
 
+Volume<std::uint8_t> near_slip(const Subject& subject, const Geometry& volume) {
+  const SlipTube tube(subject);
+  const Geometry& lattice = subject.lattice();
+  const double cell = std::sqrt(lattice.spacing.x * lattice.spacing.x + lattice.spacing.y * lattice.spacing.y);
+  const AffineMap index = index_from_point(lattice) * point_from_index(volume);
+  // The third axes of both grids are the same, so all slices are alike.
+  const auto area = static_cast<std::size_t>(volume.size.x * volume.size.y);
+  std::vector<std::uint8_t> slice(area);
+  for (std::size_t n = 0; n < area; ++n) {
+    const auto at = static_cast<std::int64_t>(n);
+    const glm::dvec3 vertex = index(glm::dvec3(at % volume.size.x, at / volume.size.x, 0));
+    slice[n] = std::abs(tube.depth_mm(glm::dvec2(vertex))) <= cell;
+  }
+  Volume<std::uint8_t> near{volume, {}};
+  for (std::int64_t k = 0; k < volume.size.z; ++k) near.voxels.insert(near.voxels.end(), slice.begin(), slice.end());
+  return near;
+}
+
 VertexField slip_motion(const Subject& subject, const Values& values, const Limits& limits, const Control& control) {
   const Geometry& lattice = subject.lattice();
   const SlipTube tube(subject);

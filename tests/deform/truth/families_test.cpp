@@ -149,6 +149,21 @@ TEST(TruthFamilies, SlipJumpsAtTheTubeAndOpensNothing) {
   EXPECT_EQ(outside, 0);
 }
 
+TEST(TruthFamilies, WhatLiesNearASlipIsMarked) {
+  const Volume<std::uint8_t> near = near_slip(subject(), body().ct.geometry);
+  const SlipTube tube(subject());
+  const AffineMap index = index_from_point(subject().lattice()) * point_from_index(body().ct.geometry);
+  std::size_t marked = 0;
+  for (std::size_t n = 0; n < near.voxels.size(); n += 37) {
+    const auto at = static_cast<std::int64_t>(n);
+    const double depth = tube.depth_mm(glm::dvec2(index(glm::dvec3(at % 112, at / 112 % 112, at / 112 / 112))));
+    marked += near.voxels[n];
+    EXPECT_TRUE(std::abs(depth) >= 14 || near.voxels[n] == 1);
+    EXPECT_TRUE(std::abs(depth) <= 21 || near.voxels[n] == 0);
+  }
+  EXPECT_GT(marked, 100U);
+}
+
 TEST(TruthFamilies, FlexionMovesBonesRigidly) {
   // Two bones of their own: blocks of label 3 and 4.
   Volume<std::uint8_t> labels{body().ct.geometry, std::vector<std::uint8_t>(body().ct.voxels.size())};
