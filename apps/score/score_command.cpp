@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <iostream>
-#include <set>
 
 #include "apps/cli/input.h"
 #include "apps/cli/output.h"
@@ -27,7 +27,12 @@ namespace {
 using nlohmann::json;
 namespace fs = std::filesystem;
 
-/// The file of a case in a folder of results: CASE and any suffix. @throws InputError for several
+/// Suffixes of results: those of fields, transforms and points.
+constexpr const char* kSuffixes[] = {".mha",  ".mhd", ".nrrd", ".nhdr", ".nii",  ".nii.gz",  ".h5",
+                                     ".hdf5", ".tfm", ".txt",  ".toml", ".mat",  ".npy",     ".vts",
+                                     ".vti",  ".vtk", ".dcm",  ".csv",  ".fcsv", ".mrk.json"};
+
+/// The file of a case in a folder of results: CASE and a suffix. @throws InputError for several
 fs::path result_of(const fs::path& results, const TruthSet& set, const TruthCase& one) {
   if (!fs::is_directory(results)) {
     require(fs::exists(results), "the result " + results.string() + " is not there");
@@ -36,19 +41,15 @@ fs::path result_of(const fs::path& results, const TruthSet& set, const TruthCase
                                        " cases; give a folder with a result of each");
     return results;
   }
-  std::set<fs::path> found;
-  for (const fs::directory_entry& entry : fs::directory_iterator(results)) {
-    const std::string name = entry.path().filename().string();
-    // Of `elastic-amplitude-2` also the file of elastic-amplitude-2.5 begins so; a suffix has no digit in front.
-    if (!name.starts_with(one.name + ".") || name.ends_with(".json")) continue;
-    const bool other = std::any_of(set.cases.begin(), set.cases.end(), [&](const TruthCase& longer) {
-      return longer.name.size() > one.name.size() && name.starts_with(longer.name + ".");
-    });
-    if (!other) found.insert(entry.path());
+  fs::path found;
+  for (const char* suffix : kSuffixes) {
+    const fs::path file = results / (one.name + suffix);
+    if (!fs::exists(file)) continue;
+    require(found.empty(), results.string() + " holds several results of " + one.name + ", " +
+                               found.filename().string() + " and " + file.filename().string() + "; keep one");
+    found = file;
   }
-  require(found.size() <= 1, results.string() + " holds several results of " + one.name + ", such as " +
-                                 (found.empty() ? "" : found.begin()->filename().string()) + "; keep one");
-  return found.empty() ? fs::path() : *found.begin();
+  return found;
 }
 
 /// T(p) - p at places that need not be voxel centres: trilinear, NaN where a sample is missing.
@@ -104,16 +105,23 @@ CaseScore Scorer::score(const fs::path& results, const TruthCase& one, const std
   CaseScore score;
   score.result = results.string();
   score.name = one.name;
-  score.file = result_of(results, set_, one);
-  if (score.file.empty()) return score;
-  if (!points_suffix(score.file).empty() && score.file.extension() != ".vtk") {
-    require(!one.landmarks.empty(),
-            "the set has no landmarks, with which " + score.file.string() + " could be compared");
-    score_landmarks(PointsFile(score.file).points(), score);
-  } else {
-    score_field(one, score);
+  try {
+    score.file = result_of(results, set_, one);
+    if (score.file.empty()) return score;
+    if (!points_suffix(score.file).empty() && score.file.extension() != ".vtk") {
+      require(!one.landmarks.empty(),
+              "the set has no landmarks, with which " + score.file.string() + " could be compared");
+      score_landmarks(PointsFile(score.file).points(), score);
+    } else {
+      score_field(one, score);
+    }
+    score.checks = check(score, limits);
+  } catch (const InputError& error) {  // one bad file does not lose what came of the others
+    score = {};
+    score.result = results.string();
+    score.name = one.name;
+    score.failure = error.what();
   }
-  score.checks = check(score, limits);
   return score;
 }
 
@@ -160,7 +168,8 @@ void Scorer::score_field(const TruthCase& one, CaseScore& score) {
       near[n] = counts[n] && apart[n];
       counts[n] = counts[n] && !apart[n];
     }
-    score.apart = score::score_field(*truth, result, near, {}, limits(), stage.control()).all;
+    if (std::find(near.begin(), near.end(), 1) != near.end())
+      score.apart = score::score_field(*truth, result, near, {}, limits(), stage.control()).all;
   }
   score.dense = score::score_field(*truth, result, counts, labels, limits(), stage.control());
   const score::Reading reading = score::suspected_reading(*score.dense);
@@ -169,10 +178,21 @@ void Scorer::score_field(const TruthCase& one, CaseScore& score) {
                           number_text(score.dense->readings[static_cast<std::size_t>(reading)]) + " mm instead of " +
                           number_text(score.dense->all.mean));
   if (!one.landmarks.empty()) {
-    std::vector<glm::dvec3> places = PointsFile(one.landmarks).points();
+    const std::vector<glm::dvec3> fixed_places = PointsFile(one.landmarks).points(),
+                                  moving_places = PointsFile(set_.landmarks).points();
+    require(fixed_places.size() == moving_places.size(), "the landmarks of " + one.name + " are not those of the set");
     const AffineMap index = index_from_point(grid);
-    for (glm::dvec3& place : places) place += displacement_at(result, index, place);
-    score_landmarks(places, score);
+    std::vector<glm::dvec3> found, wanted;
+    for (std::size_t n = 0; n < fixed_places.size(); ++n) {
+      const glm::i64vec3 voxel(glm::floor(index(fixed_places[n]) + 0.5));
+      if (glm::clamp(voxel, glm::i64vec3(0), grid.size - std::int64_t{1}) != voxel)
+        continue;  // it left the fixed volume
+      const std::int64_t at = voxel.x + grid.size.x * (voxel.y + grid.size.y * voxel.z);
+      if (near[static_cast<std::size_t>(at)]) continue;  // samples of a field say nothing there
+      found.push_back(fixed_places[n] + displacement_at(result, index, fixed_places[n]));
+      wanted.push_back(moving_places[n]);
+    }
+    score.landmarks = score::score_points(found, wanted);
   }
   if (!one.labels.empty()) {
     AnyVolume warped(grid, labels_.type());
@@ -240,6 +260,19 @@ int run_score(const ScoreOptions& options) {
   const TruthSet set = read_truth_set(options.set);
   Reads reads;
   reads.add_file(options.set / kSetRecord);
+  for (const TruthCase& one : set.cases) {
+    for (const fs::path& file : {one.fixed, one.field, one.body, one.labels, one.landmarks})
+      if (!file.empty()) reads.add_file(file);
+  }
+  for (const fs::path& results : options.results) {
+    require(fs::exists(results), "the results, " + results.string() + ", are not there");
+    if (!fs::is_directory(results)) reads.add_file(results);
+    for (const fs::path& output : {options.json, options.csv, options.html}) {
+      if (!output.empty() && fs::is_directory(results) &&
+          fs::weakly_canonical(fs::absolute(output).parent_path()) == fs::canonical(results))
+        throw UsageError(output.string() + " would lie among the results; put it elsewhere");
+    }
+  }
   if (!options.limits.empty()) reads.add_file(options.limits);
   OutputSet outputs(reads, options.common.overwrite);
   const fs::path json_file = outputs.add(options.json), csv = outputs.add(options.csv),

@@ -60,6 +60,8 @@ std::string verdict_of(bool passed) { return passed ? "<b class=\"pass\">passes<
 std::string case_section(const CaseScore& score) {
   std::string html =
       "<h2>" + escaped(score.name) + ", " + escaped(score.result) + ": " + verdict_of(score.passed()) + "</h2>\n";
+  if (!score.failure.empty())
+    return html + "<p class=\"note\">It cannot be scored: " + escaped(score.failure) + "</p>\n";
   if (score.file.empty()) return html + "<p>There is no result of this case.</p>\n";
   html += "<p class=\"file\">" + escaped(score.file.string()) + "</p>\n";
   for (const std::string& note : score.notes) html += "<p class=\"note\">" + escaped(note) + "</p>\n";
@@ -111,10 +113,11 @@ std::string overview(const std::vector<CaseScore>& scores) {
       return errors ? number((*errors).*member) : std::string();
     };
     const std::optional<score::Errors> body = score.dense ? std::optional(score.dense->all) : std::nullopt;
-    html += cells({escaped(score.name), escaped(score.result), of(body, &score::Errors::mean),
-                   of(body, &score::Errors::percentile_95), of(body, &score::Errors::largest),
-                   of(score.landmarks, &score::Errors::mean), of(score.landmarks, &score::Errors::largest),
-                   score.file.empty() ? "<b class=\"fail\">no result</b>" : verdict_of(score.passed())});
+    html += cells(
+        {escaped(score.name), escaped(score.result), of(body, &score::Errors::mean),
+         of(body, &score::Errors::percentile_95), of(body, &score::Errors::largest),
+         of(score.landmarks, &score::Errors::mean), of(score.landmarks, &score::Errors::largest),
+         score.failure.empty() && score.file.empty() ? "<b class=\"fail\">no result</b>" : verdict_of(score.passed())});
   }
   return html + "</table>\n";
 }

@@ -34,9 +34,10 @@ std::optional<double> value_of(const CaseScore& score, const std::string& limit)
     if (limit == "landmarks_mean_mm") return score.landmarks->mean;
     if (limit == "landmarks_largest_mm") return score.landmarks->largest;
   }
-  if (score.dense) {
+  if (score.dense && score.dense->all.points > 0) {
     if (limit == "folded_voxels") return static_cast<double>(score.dense->folded);
-    if (limit == "missing_voxels") return static_cast<double>(score.dense->all.missing);
+    if (limit == "missing_voxels")
+      return static_cast<double>(score.dense->all.missing + (score.apart ? score.apart->missing : 0));
     if (limit == "mean_mm") return score.dense->all.mean;
     if (limit == "percentile_95_mm") return score.dense->all.percentile_95;
   }
@@ -63,6 +64,7 @@ std::vector<ScoreLimit> read_limits(const std::filesystem::path& file) {
     const std::vector<ScoreLimit> more{{"mean_mm", "mean error over the body, mm", 0, ""},
                                        {"percentile_95_mm", "error that 95 % of the body keep, mm", 0, ""}};
     const json document = json::parse(stream);
+    require(document.is_object(), file.string() + " is no page of limits: expected {\"NAME\": {\"most\": ...}}");
     for (const auto& [name, given] : document.items()) {
       const auto is_it = [&key = name](const ScoreLimit& one) { return one.name == key; };
       auto found = std::find_if(limits.begin(), limits.end(), is_it);
@@ -84,7 +86,8 @@ std::vector<ScoreLimit> read_limits(const std::filesystem::path& file) {
 }
 
 bool CaseScore::passed() const {
-  return !file.empty() && !checks.empty() &&
+  const bool has_points = (!dense || dense->all.points > 0) && (!landmarks || landmarks->points > 0);
+  return failure.empty() && !file.empty() && has_points && !checks.empty() &&
          std::all_of(checks.begin(), checks.end(), [](const ScoreCheck& one) { return one.passed(); });
 }
 
@@ -97,6 +100,7 @@ std::vector<ScoreCheck> check(const CaseScore& score, const std::vector<ScoreLim
 
 json to_json(const CaseScore& score) {
   json record{{"result", score.result}, {"case", score.name}, {"passed", score.passed()}, {"notes", score.notes}};
+  if (!score.failure.empty()) record["failure"] = score.failure;
   record["file"] = score.file.empty() ? json() : json(score.file.string());
   if (score.dense) {
     const score::DenseScore& dense = *score.dense;
@@ -157,6 +161,7 @@ std::string csv_of(const std::vector<CaseScore>& scores) {
 }
 
 std::string line_of(const CaseScore& score) {
+  if (!score.failure.empty()) return score.name + ": cannot be scored: " + score.failure;
   if (score.file.empty()) return score.name + ": no result in " + score.result;
   std::string text = score.name + ": ";
   char part[160];
@@ -168,7 +173,7 @@ std::string line_of(const CaseScore& score) {
     text += part;
     text += std::to_string(score.dense->folded) + " folded, ";
   }
-  if (score.landmarks) {
+  if (score.landmarks && score.landmarks->points > 0) {
     std::snprintf(part, sizeof part, "landmarks mean %.2f, largest %.2f mm, ", score.landmarks->mean,
                   score.landmarks->largest);
     text += part;

@@ -40,6 +40,7 @@ struct CaseScore {
   std::string result,          ///< folder or file of --results, as it was given
       name;                    ///< of the case
   std::filesystem::path file;  ///< that was scored; empty: there was none
+  std::string failure;         ///< why it could not be scored; empty: it was
   std::vector<std::string> notes;
   std::optional<score::DenseScore> dense;  ///< of a field
   std::optional<score::Errors> apart;      ///< of what lies near a slip, and does not count in `dense`

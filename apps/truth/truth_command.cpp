@@ -48,7 +48,8 @@ truth::Roles parse_roles(const std::vector<std::string>& texts) {
       const auto [end, error] = std::from_chars(one.data(), one.data() + one.size(), value);
       if (error != std::errc() || end != one.data() + one.size())
         throw UsageError("--label \"" + text + "\" holds \"" + std::string(one) + "\"; expected whole numbers");
-      roles[role].push_back(value);
+      std::vector<std::int64_t>& labels = roles[role];
+      if (std::find(labels.begin(), labels.end(), value) == labels.end()) labels.push_back(value);
       if (one.size() == numbers.size()) break;
       numbers.remove_prefix(one.size() + 1);
     }
@@ -77,6 +78,21 @@ std::vector<truth::CaseChoice> cases_of(const TruthOptions& options, const truth
   return cases;
 }
 
+/// Labels of a floating type as int32; others as they are. @throws InputError for values that are not whole numbers
+AnyVolume in_whole_numbers(AnyVolume labels, const fs::path& file) {
+  if (labels.type() != VoxelType::f32 && labels.type() != VoxelType::f64) return labels;
+  AnyVolume whole_numbers(labels.geometry(), VoxelType::i32);
+  dispatch(labels.type(), [&]<class V>(V) {
+    const V* from = reinterpret_cast<const V*>(labels.data());
+    for (std::int32_t& to : whole_numbers.as<std::int32_t>()) {
+      const auto value = static_cast<double>(*from++);
+      to = static_cast<std::int32_t>(std::clamp(value, -2147483648.0, 2147483647.0));
+      require(static_cast<double>(to) == value, file.string() + " holds a label that is no whole number of 32 bits");
+    }
+  });
+  return whole_numbers;
+}
+
 /// Makes the set.
 class TruthMaker {
  public:
@@ -84,11 +100,15 @@ class TruthMaker {
       : options_(options), roles_(parse_roles(options.roles)), cases_(cases_of(options, roles_)) {
     if (options.labels.empty() && !options.roles.empty())
       throw UsageError("--label names labels of --labels; give both");
+    check_names();
+    set_.folder = options.output;
+    planned_ = plan();
   }
 
   int run() {
-    begin();
+    if (is_complete()) return 0;
     read();
+    begin();
     write_moving();
     for (const truth::CaseChoice& choice : cases_) make_case(choice);
     finish();
@@ -96,11 +116,17 @@ class TruthMaker {
   }
 
  private:
-  void begin();
+  /// Whether the set is there, complete and as planned. @throws Error where something else is in its place
+  bool is_complete();
   void read();
+  void begin();
   void write_moving();
   void make_case(const truth::CaseChoice& choice);
   void finish();
+  /// @throws UsageError for names that the set has for files of its own, or that IN=OUT cannot say
+  void check_names() const;
+  /// All that a case consists of, but for what --with names.
+  std::vector<fs::path> files_of(const TruthCase& one) const;
 
   fs::path volume_file(const std::string& stem) const {
     return stem + (options_.compression == 0 ? ".nii" : ".nii.gz");
@@ -140,7 +166,7 @@ class TruthMaker {
   InputHeader header_;
   AnyVolume volume_, labels_;
   std::optional<truth::Subject> subject_;
-  json case_records_ = json::array();
+  json planned_;
 };
 
 json TruthMaker::plan() const {
@@ -155,29 +181,68 @@ json TruthMaker::plan() const {
                          {"landmarks", options_.landmarks},    {"noise_hu", options_.noise_hu},
                          {"noise_seed", options_.seed},        {"dense", options_.dense},
                          {"compression", options_.compression}};
+  if (!options_.input.series.empty()) document["options"]["series"] = options_.input.series;
+  document["options"]["nifti_frame"] = options_.common.nifti_frame == NiftiFrame::sform ? "sform" : "qform";
+  document["with"] = json::array();
+  for (const std::string& path : options_.with)
+    document["with"].push_back({{"name", fs::path(path).filename().string()}, {"sha256", hash_file(path)}});
   document["cases"] = cases;
   return document;
 }
 
-void TruthMaker::begin() {
-  set_.folder = options_.output;
-  const fs::path record = set_.folder / kSetRecord, planned = set_.folder / "plan.json";
-  const json now = plan();
-  if (fs::exists(record)) throw Error(set_.folder.string() + " holds a complete set; remove it or give another folder");
-  const bool is_there = fs::exists(set_.folder) && !(fs::is_directory(set_.folder) && fs::is_empty(set_.folder));
-  if (is_there && !options_.resume)
-    throw Error(set_.folder.string() + " is there and not empty; remove it, or go on with --resume");
-  if (is_there) {
-    std::ifstream stream(planned);
-    const json before = json::parse(stream, nullptr, false);
-    if (before != now)
-      throw Error(set_.folder.string() + " was begun with another input, other options or another version; remove it");
-    return;
+void TruthMaker::check_names() const {
+  std::vector<std::string> taken;
+  for (const char* stem : {"fixed", "without-noise", "body", "labels", "near-slip", "jacobian", "coverage", "inverse"})
+    taken.push_back(volume_file(stem).string());
+  taken.insert(taken.end(), {"dicom", "dicom-without-noise", "landmarks.csv"});
+  for (const std::string& path : options_.with) {
+    const std::string name = fs::path(path).filename().string();
+    if (name.empty() || std::find(taken.begin(), taken.end(), name) != taken.end())
+      throw UsageError("--with " + path + " has a name that files of a set have, or that another one has; rename it");
+    taken.push_back(name);
   }
+  std::vector<std::string> all = options_.with;
+  all.push_back(options_.output.string());
+  for (const std::string& path : all) {
+    if (path.find_first_of("=:") != std::string::npos)
+      throw UsageError("\"" + path + "\" has \"=\" or \":\" in it; rename it, or give another folder");
+  }
+}
+
+bool TruthMaker::is_complete() {
+  const fs::path record = set_.folder / kSetRecord, plan_file = set_.folder / "plan.json";
+  if (!fs::exists(set_.folder) || (fs::is_directory(set_.folder) && fs::is_empty(set_.folder))) return false;
+  if (!options_.resume) {
+    throw Error(set_.folder.string() + (fs::exists(record)
+                                            ? " holds a complete set; remove it or give another folder"
+                                            : " is there and not empty; remove it, or go on with --resume"));
+  }
+  std::ifstream stream(plan_file);
+  const json before = json::parse(stream, nullptr, false);
+  if (before.is_discarded())
+    throw Error(set_.folder.string() + " holds no set that was begun: plan.json is missing or damaged; remove it");
+  if (!(before == planned_))
+    throw Error(set_.folder.string() + " was begun with another input, other options or another version; remove it");
+  if (!fs::exists(record)) return false;
+  say(options_.common, set_.folder.string() + " is complete");
+  return true;
+}
+
+void TruthMaker::begin() {
   std::error_code failed;
   fs::create_directories(set_.folder, failed);
   if (failed) throw Error("the folder " + set_.folder.string() + " cannot be made: " + failed.message());
-  place(planned, [&](const fs::path& staged) { write_json(staged, Record::open(now)); });
+  place(set_.folder / "plan.json", [&](const fs::path& staged) { write_json(staged, Record::open(planned_)); });
+}
+
+std::vector<fs::path> TruthMaker::files_of(const TruthCase& one) const {
+  const fs::path folder = set_.folder / one.name;
+  std::vector<fs::path> files{deformed(one), one.body, folder / volume_file("jacobian"),
+                              folder / volume_file("coverage")};
+  for (const fs::path& path : {one.labels, one.landmarks, one.apart})
+    if (!path.empty()) files.push_back(path);
+  if (options_.dense) files.push_back(folder / volume_file("inverse"));
+  return files;
 }
 
 void TruthMaker::read() {
@@ -190,14 +255,15 @@ void TruthMaker::read() {
   volume_ = read_input(options_.input, header_, options_.common, stage.control()).volume;
   if (!options_.labels.empty()) {
     const InputOptions from = volume_named(options_.labels, options_.common.nifti_frame);
-    labels_ = read_input(from, open_input(from, options_.common), options_.common, stage.control()).volume;
+    labels_ = in_whole_numbers(
+        read_input(from, open_input(from, options_.common), options_.common, stage.control()).volume, options_.labels);
   }
   const ConstVolumeView ct = std::as_const(volume_).view(), labels = std::as_const(labels_).view();
   simulate::Patient patient = simulate::examine(ct, options_.labels.empty() ? nullptr : &labels, options_.cell_size,
                                                 options_.body_above_hu, stage.control());
   require(patient.box.has_value(), options_.input.path.string() + " holds no body: no cell has a mean above " +
                                        number_text(options_.body_above_hu) + " HU");
-  subject_.emplace(std::move(patient), roles_);
+  subject_.emplace(std::move(patient), roles_, volume_.geometry());
 }
 
 void TruthMaker::write_moving() {
@@ -296,7 +362,11 @@ void TruthMaker::make_case(const truth::CaseChoice& choice) {
     one.apart = folder / volume_file("near-slip");
   }
   Stage stage(options_.common, choice.name);
-  if (!fs::exists(folder)) run_deform(deform_options(one));
+  const std::vector<fs::path> files = files_of(one);
+  if (!std::all_of(files.begin(), files.end(), [](const fs::path& file) { return fs::exists(file); })) {
+    fs::remove_all(folder);
+    run_deform(deform_options(one));
+  }
   if (!fs::exists(one.fixed)) {
     const InputOptions made = volume_named(deformed(one));
     AnyVolume volume = read_input(made, open_input(made, options_.common), options_.common, stage.control()).volume;
@@ -311,7 +381,7 @@ void TruthMaker::make_case(const truth::CaseChoice& choice) {
 }
 
 void TruthMaker::finish() {
-  json document = plan();
+  json document = planned_;
   document["set"] = to_json(set_);
   json hashes = json::object();
   const auto hash = [&](const fs::path& path) {

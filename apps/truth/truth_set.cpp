@@ -68,6 +68,10 @@ TruthSet read_truth_set(const fs::path& folder) {
     throw InputError(file.string() + " is damaged: " + error.what());
   }
   require(!set.moving.empty() && !set.cases.empty(), file.string() + " names no moving volume, or no case");
+  for (const TruthCase& one : set.cases) {
+    require(!one.fixed.empty() && !one.field.empty() && !one.body.empty(),
+            file.string() + " names no fixed volume, field or body of the case " + one.name);
+  }
   return set;
 }
 

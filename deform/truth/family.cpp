@@ -7,6 +7,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
 
 #include "deform/errors.h"
 #include "deform/field_quality.h"
@@ -25,7 +26,7 @@ const std::vector<Family>& all_families() {
        {},
        {{"amplitude", 10, 0, 200, "largest component, mm"},
         {"spacing", 60, 1, 1000, "distance of control points, mm"},
-        {"seed", 1, 0, kMostSeed, "decides the random numbers"}},
+        {"seed", 1, 0, kMostSeed, "decides the random numbers", true}},
        &elastic_motion},
       {"shift",
        "all is moved alike",
@@ -37,7 +38,7 @@ const std::vector<Family>& all_families() {
       {"rotation",
        "all is turned about the middle of the volume",
        {},
-       {{"angle", 6, -90, 90, "degrees"}, {"axis", 2, 0, 2, "0, 1, 2: about L, P, S"}},
+       {{"angle", 6, -90, 90, "degrees"}, {"axis", 2, 0, 2, "0, 1, 2: about L, P, S", true}},
        &rotation_motion},
       {"breathing",
        "lungs and diaphragm go down and the belly comes forward, while bones and the table stay",
@@ -74,14 +75,22 @@ std::string joined_names() {
   return names;
 }
 
+/// A bound as messages show it.
+std::string short_text(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", value);
+  return text;
+}
+
 double number_of(std::string_view text, std::string_view of, const Parameter& parameter) {
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  require(
-      error == std::errc() && end == text.data() + text.size() && value >= parameter.least && value <= parameter.most,
-      "case " + std::string(of) + ": " + std::string(parameter.name) + " is \"" + std::string(text) +
-          "\"; expected a number from " + std::to_string(parameter.least) + " to " + std::to_string(parameter.most) +
-          ", " + std::string(parameter.about));
+  const bool fits =
+      value >= parameter.least && value <= parameter.most && (!parameter.is_whole || value == std::floor(value));
+  require(error == std::errc() && end == text.data() + text.size() && fits,
+          "case " + std::string(of) + ": " + std::string(parameter.name) + " is \"" + std::string(text) +
+              "\"; expected a " + (parameter.is_whole ? "whole " : "") + "number from " + short_text(parameter.least) +
+              " to " + short_text(parameter.most) + ", " + std::string(parameter.about));
   return value;
 }
 
@@ -108,7 +117,8 @@ CaseChoice parse_case(std::string_view text) {
   const std::size_t colon = text.find(':');
   CaseChoice choice{folder_name(text), &family_of(text.substr(0, colon)), {}};
   std::string_view rest = colon == std::string_view::npos ? std::string_view() : text.substr(colon + 1);
-  require(colon == std::string_view::npos || !rest.empty(), "case " + std::string(text) + " ends with a colon");
+  require(colon == std::string_view::npos || (!rest.empty() && rest.back() != ','),
+          "case " + std::string(text) + " ends with nothing behind its last sign");
   while (!rest.empty()) {
     const std::string_view part = rest.substr(0, rest.find(','));
     rest = part.size() == rest.size() ? std::string_view() : rest.substr(part.size() + 1);

@@ -19,6 +19,7 @@ struct Parameter {
   double usual;            ///< its value unless another is given
   double least, most;      ///< range, both included
   std::string_view about;  ///< what it is, with its unit
+  bool is_whole = false;   ///< whether only whole numbers are taken
 };
 /// Values of all parameters of a family, by name.
 using Values = std::map<std::string, double, std::less<>>;

@@ -66,7 +66,7 @@ VertexField elastic_motion(const Subject& subject, const Values& values, const L
   // At 4 amplitudes from a face the fading adds at most 1.5 / 4 to the slope across it.
   const double fade = 4 * amplitude;
   const AffineMap index = index_from_point(lattice);
-  const glm::dvec3 spacing = lattice.spacing, last(lattice.size - std::int64_t{1});
+  const glm::dvec3 spacing = lattice.spacing, last(subject.last_inside());
   const glm::dmat3 direction = lattice.direction;
   return sample_on(
       lattice,
@@ -92,7 +92,6 @@ VertexField shift_motion(const Subject& subject, const Values& values, const Lim
 VertexField rotation_motion(const Subject& subject, const Values& values, const Limits& limits,
                             const Control& control) {
   const auto axis = static_cast<int>(value(values, "axis"));
-  require(axis == value(values, "axis"), "the axis of a rotation is 0, 1 or 2");
   const SinCos turn = sin_cos(value(values, "angle") * kPi / 180);
   const glm::dvec3 middle = centre(subject.lattice());
   const int first = (axis + 1) % 3, second = (axis + 2) % 3;

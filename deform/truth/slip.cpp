@@ -82,13 +82,22 @@ SlipTube::SlipTube(const Subject& subject) : lattice_(subject.lattice()) {
   require(std::abs(lattice_.direction[2].z) > 0.9,
           "slip runs along the third axis of the grid, which has to lead from feet to head; this one is " +
               orientation_code(lattice_));
-  // Half a cell outwards, so that the tube holds the lungs and does not go through vertices.
-  glm::dvec2 middle(0);
-  for (const glm::dvec2& corner : corners_) middle += corner / static_cast<double>(corners_.size());
-  for (glm::dvec2& corner : corners_) {
-    const glm::dvec2 from = corner - middle;
-    corner += 0.53 * from / std::sqrt(glm::dot(from, from));
+  // Each side goes outwards by half a cell, so that the tube holds the lungs: a corner goes along the middle of the
+  // normals of its two sides. A little more than half keeps sides along an axis away from vertices.
+  constexpr double kOutwards = 0.53;
+  const std::size_t count = corners_.size();
+  const auto normal = [&](const glm::dvec2& a, const glm::dvec2& b) {
+    const glm::dvec2 along = b - a;
+    return glm::dvec2(along.y, -along.x) / std::sqrt(glm::dot(along, along));
+  };
+  std::vector<glm::dvec2> moved;
+  for (std::size_t n = 0; n < count; ++n) {
+    const glm::dvec2 &before = corners_[(n + count - 1) % count], &here = corners_[n],
+                     &after = corners_[(n + 1) % count];
+    const glm::dvec2 sum = normal(before, here) + normal(here, after);
+    moved.push_back(here + 2 * kOutwards / glm::dot(sum, sum) * sum);
   }
+  corners_ = std::move(moved);
 }
 
 double SlipTube::depth_mm(const glm::dvec2& at) const {

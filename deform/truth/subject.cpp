@@ -59,7 +59,13 @@ class Line {
 
 }  // namespace
 
-Subject::Subject(simulate::Patient patient, Roles roles) : patient_(std::move(patient)), roles_(std::move(roles)) {
+Subject::Subject(simulate::Patient patient, Roles roles, const Geometry& volume)
+    : patient_(std::move(patient)), roles_(std::move(roles)) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto cell_size = std::llround(lattice().spacing[axis] / volume.spacing[axis]);
+    last_inside_[axis] =
+        std::min((volume.size[axis] - 1) / std::max<std::int64_t>(cell_size, 1), lattice().size[axis] - 1);
+  }
   for (const auto& [role, labels] : roles_) {
     require(!patient_.vertex_label.empty(), "the role " + role + " needs a label map");
     const std::vector<std::uint8_t> marked = vertices(role);

@@ -20,11 +20,15 @@ using Roles = std::map<std::string, std::vector<std::int64_t>>;
 class Subject {
  public:
   /// @param patient  of `simulate::examine`; with labels where there are roles
+  /// @param volume   grid of the CT
   /// @throws InputError for roles without labels, or a role of which the patient has no vertex
-  Subject(simulate::Patient patient, Roles roles);
+  Subject(simulate::Patient patient, Roles roles, const Geometry& volume);
 
   /// The lattice that is deformed.
   const Geometry& lattice() const { return patient_.lattice; }
+  /// Index of the last vertex on each axis that lies on a voxel: later ones lie beyond the volume, as the last cells
+  /// may.
+  const glm::i64vec3& last_inside() const { return last_inside_; }
   /// The patient.
   const simulate::Patient& patient() const { return patient_; }
   /// Whether labels play a role.
@@ -40,6 +44,7 @@ class Subject {
  private:
   simulate::Patient patient_;
   Roles roles_;
+  glm::i64vec3 last_inside_{0};
 };
 
 /// Distance of each vertex of a lattice from the nearest marked one, mm; infinite where none is marked. Exact

@@ -6,10 +6,12 @@
 from __future__ import annotations
 
 import json
+import numbers
+import operator
 import os
 import pathlib
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from ._command import PathLike, run_command
@@ -19,9 +21,9 @@ def truth(
     volume: PathLike,
     output: PathLike,
     *,
-    cases: Sequence[str] = (),
+    cases: str | Sequence[str] = (),
     labels: PathLike | None = None,
-    roles: Mapping[str, int | Sequence[int]] | None = None,
+    roles: Mapping[str, int | Iterable[int]] | None = None,
     **options: Any,
 ) -> None:
     """Makes a set of deformed volumes whose truth is known, as `tetwarp truth` does, in a process of its own.
@@ -32,7 +34,7 @@ def truth(
         A CT in HU, a file or a folder of DICOM: the moving volume.
     output : path
         Folder of the set; it must be empty or not there.
-    cases : sequence of str
+    cases : str or sequence of str
         Deformations, KIND[:KEY=VALUE,...]; by default elastic ones of five strengths, shift, rotation, and each kind whose
         labels are known (docs/guide/truth.md).
     labels : path, optional
@@ -62,10 +64,10 @@ def truth(
     [('shift-x-4', True, True)]
     """
     labelled = []
-    for role, numbers in (roles or {}).items():
-        all_numbers = numbers if isinstance(numbers, Sequence) else [numbers]
-        labelled.append(f"{role}={','.join(str(number) for number in all_numbers)}")
-    words = {"case": list(cases), "labels": labels, "label": labelled, **options}
+    for role, given in (roles or {}).items():
+        all_numbers: Iterable[Any] = [given] if isinstance(given, numbers.Integral) else given  # type: ignore[assignment]
+        labelled.append(f"{role}={','.join(str(operator.index(number)) for number in all_numbers)}")
+    words = {"case": [cases] if isinstance(cases, str) else list(cases), "labels": labels, "label": labelled, **options}
     run_command(["truth", os.fspath(volume), "-o", os.fspath(output)], words)
 
 
@@ -97,9 +99,9 @@ def score(
     InputError
         For a folder that is no set, and results that cannot be read.
     """
-    several = results if isinstance(results, Sequence) and not isinstance(results, str) else [results]
+    several = [results] if isinstance(results, (str, os.PathLike)) else list(results)
     with tempfile.TemporaryDirectory(prefix="tetwarp-") as scratch:
-        page = pathlib.Path(scratch) / "scores.json"
-        run_command(["score", os.fspath(folder)], {"results": list(several), "json": page, **options}, silent=True)
-        scores: list[dict[str, Any]] = json.loads(page.read_text())["scores"]
+        page = options.pop("json", None) or pathlib.Path(scratch) / "scores.json"
+        run_command(["score", os.fspath(folder)], {"results": several, "json": page, **options}, silent=True)
+        scores: list[dict[str, Any]] = json.loads(pathlib.Path(page).read_text())["scores"]
     return scores

@@ -174,9 +174,11 @@ def main() -> None:
     options = parser.parse_args()
     if not options.result.endswith(".mha"):
         parser.error("RESULT is a .mha file")
-    unfinished = options.result[: -len(".mha")] + ".unfinished.mha"
-    METHODS[options.method](options.moving, options.fixed, unfinished)
-    pathlib.Path(unfinished).rename(options.result)
+    result = pathlib.Path(options.result)
+    with tempfile.TemporaryDirectory(prefix=".unfinished-", dir=result.parent) as folder:
+        unfinished = pathlib.Path(folder) / "result.mha"
+        METHODS[options.method](options.moving, options.fixed, str(unfinished))
+        unfinished.rename(result)
 
 
 if __name__ == "__main__":

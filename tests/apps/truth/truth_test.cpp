@@ -101,7 +101,13 @@ TEST_F(TruthProgram, TheSameAgainAndAfterAnInterruption) {
   const json first = document("set/set.json"), second = document("again/set.json");
   EXPECT_EQ(first.at("sha256"), second.at("sha256"));
   EXPECT_GT(first.at("sha256").size(), 15U);
-  EXPECT_EQ(run(again + " --resume"), 1) << "the set is complete";
+  EXPECT_EQ(run(again + " --resume"), 0) << "the set is complete";
+  EXPECT_EQ(run(again), 1);
+  // What is missing from a case is made again.
+  fs::remove(at("again/set.json"));
+  fs::remove(at("again/shift/jacobian.nii"));
+  ASSERT_EQ(run(again + " --resume"), 0) << err();
+  EXPECT_TRUE(fs::exists(at("again/shift/jacobian.nii")));
 }
 
 TEST_F(TruthProgram, AnotherInputDoesNotGoOnWithASet) {
@@ -111,7 +117,42 @@ TEST_F(TruthProgram, AnotherInputDoesNotGoOnWithASet) {
   EXPECT_EQ(run("truth ct.nii.gz -o set --case shift:x=1 --resume"), 1);
   EXPECT_EQ(run("truth ct.nii.gz -o set --case shift --cell-size 8 --resume"), 1);
   EXPECT_NE(err().find("another input, other options"), std::string::npos);
+  EXPECT_EQ(run("truth ct.nii.gz -o set --case shift --with ct.nii.gz --resume"), 1);
   EXPECT_EQ(run("truth ct.nii.gz -o set --case shift --resume"), 0) << err();
+  fs::remove(at("set/set.json"));
+  std::ofstream(at("set/plan.json")) << "{\"cut";
+  EXPECT_EQ(run("truth ct.nii.gz -o set --case shift --resume"), 1);
+  fs::create_directories(at("foreign"));
+  std::ofstream(at("foreign/notes.txt")) << "mine";
+  EXPECT_EQ(run("truth ct.nii.gz -o foreign --case shift --resume"), 1);
+  EXPECT_FALSE(fs::exists(at("foreign/plan.json")));
+}
+
+TEST_F(TruthProgram, LabelsOfFloatAndTheExactSlipPass) {
+  make_phantom();
+  const AnyVolume labels = read_image(at("labels.nii.gz"));
+  Volume<float> real{labels.geometry(), {}};
+  for (const std::uint8_t label : labels.as<std::uint8_t>()) real.voxels.push_back(label);
+  write_image(at("real.nii.gz"), view(real));
+  ASSERT_EQ(
+      run("truth ct.nii.gz -o set --dense --case slip:amplitude=20 --labels real.nii.gz --label lung=2 --label bone=3"),
+      0)
+      << err();
+  EXPECT_EQ(run("score set -r set/slip-amplitude-20/inverse.nii.gz"), 0) << out() << err();
+  real.voxels[77] = 1.5F;
+  write_image(at("real.nii.gz"), view(real));
+  EXPECT_EQ(run("truth ct.nii.gz -o other --case shift --labels real.nii.gz"), 4);
+  EXPECT_FALSE(fs::exists(at("other")));
+}
+
+TEST_F(TruthProgram, AResultWithoutAnyPlaceFails) {
+  make_phantom();
+  ASSERT_EQ(run("truth ct.nii.gz -o set --dense --case shift"), 0) << err();
+  PullField field = read_pull_field({at("set/shift/inverse.nii.gz")});
+  for (glm::vec3& by : field.displacement) by = glm::vec3(NAN);
+  write_field_file(at("none.mha"), field);
+  std::ofstream(at("limits.json")) << R"({"missing_voxels": {"most": 1e9}, "mean_mm": {"most": 1}})";
+  EXPECT_EQ(run("score set -r none.mha --limits limits.json"), 3);
 }
 
 TEST_F(TruthProgram, WrongResultsAreNamed) {
@@ -152,9 +193,14 @@ TEST_F(TruthProgram, LandmarksAreScored) {
   EXPECT_EQ(run("score set -r points --json p.json"), 0) << out() << err();
   for (const json& score : document("p.json").at("scores")) EXPECT_EQ(score.at("landmarks").at("largest_mm"), 0);
   std::ofstream(at("points/shift.csv")) << "x,y,z\n1,2,3\n";
-  EXPECT_EQ(run("score set -r points"), 4);
+  // One that cannot be read, or two, lose nothing of the others.
+  EXPECT_EQ(run("score set -r points --json q.json"), 3);
+  EXPECT_NE(out().find("shift: cannot be scored: "), std::string::npos) << out();
+  EXPECT_TRUE(document("q.json").at("scores").at(0).at("passed").get<bool>());
   fs::copy_file(at("set/shift/inverse.nii.gz"), at("points/shift.nii.gz"));
-  EXPECT_EQ(run("score set -r points"), 4) << "two results";
+  EXPECT_EQ(run("score set -r points"), 3);
+  EXPECT_NE(out().find("several results of shift"), std::string::npos) << out();
+  EXPECT_EQ(run("score set -r points --csv points/all.csv"), 2) << "among the results";
 }
 
 #ifdef TETWARP_WITH_DCMTK
@@ -186,7 +232,9 @@ TEST_F(TruthProgram, WhatCannotBeMadeIsRefused) {
   EXPECT_EQ(run("truth missing.nii.gz -o set"), 4);
   EXPECT_FALSE(fs::exists(at("set")));
   EXPECT_EQ(run("truth ct.nii.gz -o set --labels labels.nii.gz --label lung=99 --case elastic"), 4);
-  fs::remove_all(at("set"));
+  EXPECT_EQ(run("truth ct.nii.gz -o set --case shift --with body.nii.gz"), 2);
+  EXPECT_EQ(run("truth ct.nii.gz -o 'se=t' --case shift"), 2);
+  EXPECT_FALSE(fs::exists(at("set")));
   EXPECT_EQ(run("truth ct.nii.gz -o set --case elastic:amplitude=60,spacing=30"), 4);
   EXPECT_NE(err().find("folds"), std::string::npos);
   EXPECT_EQ(run("score set -r ct.nii.gz"), 4);

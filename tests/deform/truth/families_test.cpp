@@ -43,7 +43,7 @@ const Subject& subject() {
                       {"bone", {label(PhantomLabel::bone)}},
                       {"organ", {label(PhantomLabel::stomach)}},
                       {"lump", {50}}};
-    return Subject(simulate::examine(view(body().ct), &labels, kCellSize, -400), roles);
+    return Subject(simulate::examine(view(body().ct), &labels, kCellSize, -400), roles, body().ct.geometry);
   }();
   return made;
 }
@@ -95,6 +95,27 @@ TEST(TruthFamilies, ElasticKeepsTheFacesOfTheGrid) {
   // Another seed, another field.
   EXPECT_NE(field.displacement,
             make_field(parse_case("elastic:amplitude=12,spacing=80,seed=2"), subject()).displacement);
+}
+
+TEST(TruthFamilies, ElasticKeepsFacesThatNoVertexLiesOn) {
+  // 49 voxels end on a vertex of cells of 4, 48 and 46 do not.
+  for (const glm::i64vec3& size : {glm::i64vec3(49, 48, 46), glm::i64vec3(46, 49, 47)}) {
+    const Volume<std::int16_t> water{{.size = size, .spacing = {2, 2, 2}},
+                                     std::vector<std::int16_t>(static_cast<std::size_t>(size.x * size.y * size.z), 0)};
+    const Subject flat(simulate::examine(view(water), nullptr, kCellSize, -400), {}, water.geometry);
+    const VertexField field = make_field(parse_case("elastic:amplitude=6,spacing=50"), flat);
+    const PointMover mover(water.geometry, view(field, Outside::background));
+    for (int axis = 0; axis < 3; ++axis) {
+      for (const double end : {0.0, 2.0 * static_cast<double>(size[axis] - 1)}) {
+        glm::dvec3 place(31, 37, 41);
+        place[axis] = end;
+        glm::dvec3 by = place;
+        EXPECT_EQ(mover.move(by), PointStatus::moved);
+        EXPECT_NEAR(by[axis], end, 1e-9) << axis;
+        EXPECT_NE(by, place) << axis;
+      }
+    }
+  }
 }
 
 TEST(TruthFamilies, ShiftAndRotationAreRigid) {
@@ -175,7 +196,8 @@ TEST(TruthFamilies, FlexionMovesBonesRigidly) {
   block(12, 28, 3);
   block(48, 64, 4);
   const ConstVolumeView seen = view(labels);
-  const Subject spine(simulate::examine(view(body().ct), &seen, kCellSize, -400), {{"bone", {3, 4}}});
+  const Subject spine(simulate::examine(view(body().ct), &seen, kCellSize, -400), {{"bone", {3, 4}}},
+                      body().ct.geometry);
   const VertexField field = make_field(parse_case("flexion:angle=20"), spine);
   const AffineMap point = point_from_index(body().ct.geometry);
   const auto turned = [&](const glm::dvec3& from, const glm::dvec3& to) {
@@ -215,20 +237,24 @@ TEST(TruthFamilies, TextsAreTakenApart) {
   EXPECT_EQ(choice.name, "elastic-amplitude-7.5-seed-3");
   EXPECT_EQ(choice.values.at("amplitude"), 7.5);
   EXPECT_EQ(choice.values.at("spacing"), 60);
-  for (const char* text :
-       {"", "wobble", "elastic:", "elastic:size=3", "elastic:amplitude", "elastic:amplitude=x", "elastic:amplitude=-1",
-        "elastic:amplitude=1,amplitude=2", "elastic:amplitude=nan", "rotation:axis=5", "elastic:amplitude=1mm"})
+  for (const char* text : {"", "wobble", "elastic:", "elastic:size=3", "elastic:amplitude", "elastic:amplitude=x",
+                           "elastic:amplitude=-1", "elastic:amplitude=1,amplitude=2", "elastic:amplitude=nan",
+                           "elastic:seed=1.5", "shift:x=1,", "rotation:axis=5", "elastic:amplitude=1mm"})
     EXPECT_THROW(parse_case(text), InputError) << text;
   EXPECT_EQ(usual_cases({}).size(), 7U);
   EXPECT_EQ(usual_cases(Roles{{"lung", {1}}, {"bone", {2}}}).size(), 10U);
 }
 
 TEST(TruthFamilies, WhatIsMissingIsRefused) {
-  const Subject bare(simulate::examine(view(body().ct), nullptr, kCellSize, -400), {});
+  const Subject bare(simulate::examine(view(body().ct), nullptr, kCellSize, -400), {}, body().ct.geometry);
   EXPECT_THROW(make_field(parse_case("breathing"), bare), InputError);
-  EXPECT_THROW(Subject(simulate::examine(view(body().ct), nullptr, kCellSize, -400), {{"lung", {2}}}), InputError);
+  EXPECT_THROW(
+      Subject(simulate::examine(view(body().ct), nullptr, kCellSize, -400), {{"lung", {2}}}, body().ct.geometry),
+      InputError);
   const ConstVolumeView labels = view(body().labels);
-  EXPECT_THROW(Subject(simulate::examine(view(body().ct), &labels, kCellSize, -400), {{"lung", {77}}}), InputError);
+  EXPECT_THROW(
+      Subject(simulate::examine(view(body().ct), &labels, kCellSize, -400), {{"lung", {77}}}, body().ct.geometry),
+      InputError);
   EXPECT_THROW(make_field(parse_case("elastic:amplitude=40,spacing=12"), subject()), InputError);  // folds
 }
 
