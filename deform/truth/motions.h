@@ -23,6 +23,7 @@ VertexField breathing_motion(const Subject& subject, const Values& values, const
 /// Inside a tube along the third axis of the lattice, around the convex hull of the lungs seen along that axis: a shift
 /// along it, A h m as in breathing, where m looks at bones deep inside the tube alone. Outside nothing moves. The cells
 /// through which the tube goes are divided (deform/simulate/divided_lattice.h).
+/// @throws InputError where more than a thousandth of the voxels are torn open or owned twice
 VertexField slip_motion(const Subject& subject, const Values& values, const Limits& limits, const Control& control);
 /// A bending about the axis L. Its angle grows evenly from the lowest to the highest bone; the line that keeps its
 /// length goes through the middle of the bones. Each label of the role moves rigidly, as that line does at its middle,

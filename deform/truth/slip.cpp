@@ -65,6 +65,31 @@ std::vector<std::uint8_t> sides_of_nodes(const simulate::DividedLattice& divided
   return inside;
 }
 
+/// Refuses a slip that opens or overlaps: near it more than a thousandth of all voxels of the volume have no owner or
+/// several. Slices from which tissue goes out of the volume do not count.
+void check_slip(const Subject& subject, const VertexField& field, double amplitude, const Limits& limits,
+                const Control& control) {
+  constexpr double kMost = 1e-3;
+  const Geometry& grid = subject.volume();
+  const Volume<std::uint8_t> near = near_slip(subject, grid);
+  const auto margin = static_cast<std::int64_t>(std::ceil(amplitude / grid.spacing.z)) + 1;
+  const std::int64_t area = grid.size.x * grid.size.y;
+  const auto resampler = make_cpu_resampler(grid, limits);
+  resampler->set_field(view(field, Outside::rest), {.jacobian_range = false}, {.stop = control.stop});
+  std::vector<std::uint16_t> owners(static_cast<std::size_t>(area));
+  std::int64_t bad = 0;
+  for (std::int64_t k = margin; k < grid.size.z - margin; ++k) {
+    const Region slice{{0, 0, k}, {grid.size.x, grid.size.y, k + 1}};
+    const VolumeView map{&grid, slice, VoxelType::u16, 1, std::as_writable_bytes(std::span(owners)).data()};
+    resampler->resample(slice, {}, {.owners = map}, {.stop = control.stop});
+    for (std::int64_t n = 0; n < area; ++n)
+      bad += near.voxels[static_cast<std::size_t>(k * area + n)] && owners[static_cast<std::size_t>(n)] != 1;
+  }
+  const double share = static_cast<double>(bad) / static_cast<double>(voxel_count(grid));
+  require(share <= kMost, "the slip opens or overlaps at " + std::to_string(bad) + " voxels, " +
+                              std::to_string(100 * share) + " % of all; at most 0.1 % may");
+}
+
 }  // namespace
 
 SlipTube::SlipTube(const Subject& subject) : lattice_(subject.lattice()) {
@@ -168,7 +193,9 @@ VertexField slip_motion(const Subject& subject, const Values& values, const Limi
     const std::size_t vertex = n < inner.displacement.size() ? n : divided.copies_of[n - inner.displacement.size()];
     if (inside[n]) displacement[n] = inner.displacement[vertex];
   }
-  return simulate::field_of(lattice, divided, displacement);
+  VertexField field = simulate::field_of(lattice, divided, displacement);
+  check_slip(subject, field, amplitude, limits, control);
+  return field;
 }
 
 }  // namespace tetwarp::truth

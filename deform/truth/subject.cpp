@@ -60,7 +60,7 @@ class Line {
 }  // namespace
 
 Subject::Subject(simulate::Patient patient, Roles roles, const Geometry& volume)
-    : patient_(std::move(patient)), roles_(std::move(roles)) {
+    : patient_(std::move(patient)), roles_(std::move(roles)), volume_(volume) {
   for (int axis = 0; axis < 3; ++axis) {
     const auto cell_size = std::llround(lattice().spacing[axis] / volume.spacing[axis]);
     last_inside_[axis] =

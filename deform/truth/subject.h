@@ -26,6 +26,8 @@ class Subject {
 
   /// The lattice that is deformed.
   const Geometry& lattice() const { return patient_.lattice; }
+  /// Grid of the CT.
+  const Geometry& volume() const { return volume_; }
   /// Index of the last vertex on each axis that lies on a voxel: later ones lie beyond the volume, as the last cells
   /// may.
   const glm::i64vec3& last_inside() const { return last_inside_; }
@@ -44,6 +46,7 @@ class Subject {
  private:
   simulate::Patient patient_;
   Roles roles_;
+  Geometry volume_;
   glm::i64vec3 last_inside_{0};
 };
 

@@ -1,0 +1,38 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: The Tetwarp authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Makes a table in Markdown of what the workflow measured: a row for each case and method.
+
+    table.py STUDY
+"""
+
+import argparse
+import csv
+import pathlib
+
+COLUMNS = ("mean_mm", "p95_mm", "p99_mm", "largest_mm")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("study", type=pathlib.Path)
+    study = parser.parse_args().study
+    with open(study / "scores.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    found = {(row["case"], pathlib.Path(row["result"]).name, row["part"]): row for row in rows}
+    print("| case | method | seconds | body: mean | 95 % | 99 % | largest | near the slip: mean | landmarks: mean | largest |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
+    for case, method in dict.fromkeys((case, method) for case, method, _ in found):
+        body, slip, landmarks = (found.get((case, method, part)) for part in ("body", "near slip", "landmarks"))
+        timed = study / "times" / f"{method}.{case}.txt"
+        seconds = timed.read_text().splitlines()[1].split("\t")[0] if timed.exists() else ""
+        cells = [case, method, f"{float(seconds):.0f}" if seconds else ""]
+        cells += [f"{float(body[column]):.2f}" if body else "" for column in COLUMNS]
+        cells.append(f"{float(slip['mean_mm']):.2f}" if slip else "")
+        cells += [f"{float(landmarks[column]):.2f}" if landmarks else "" for column in ("mean_mm", "largest_mm")]
+        print("| " + " | ".join(cells) + " |")
+
+
+if __name__ == "__main__":
+    main()
