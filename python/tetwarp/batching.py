@@ -41,9 +41,10 @@ def batch(manifest: PathLike, output: PathLike, **options: Any) -> int:
     Examples
     --------
     >>> import tempfile
+    >>> import tetwarp as tw
     >>> try:
     ...     batch("missing.csv", tempfile.mkdtemp() + "/out")
-    ... except Error as error:
+    ... except tw.Error as error:
     ...     print("missing.csv" in str(error))
     True
     """

@@ -92,12 +92,22 @@ def score(
     -------
     list of dict
         One for each case and result, as the program writes them as JSON (docs/guide/truth.md): "case", "result", "passed",
-        "body", "labels", "landmarks", "jacobian", "dice", "checks".
+        "body", "labels", "near_slip", "landmarks", "jacobian", "dice", "checks"; "failure" where a result cannot be read.
 
     Raises
     ------
     InputError
-        For a folder that is no set, and results that cannot be read.
+        For a folder that is no set.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import tetwarp as tw
+    >>> try:
+    ...     score(tempfile.mkdtemp(), "results")
+    ... except tw.InputError as error:
+    ...     print("no complete set" in str(error))
+    True
     """
     several = [results] if isinstance(results, (str, os.PathLike)) else list(results)
     with tempfile.TemporaryDirectory(prefix="tetwarp-") as scratch:
