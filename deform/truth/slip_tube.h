@@ -31,8 +31,8 @@ class SlipTube {
   std::vector<glm::dvec2> corners_;  ///< continuous index along i and j, turning left
 };
 
-/// Marks the voxels of a volume that lie at most one cell from the tube: inside cells that it divides it is rounded at
-/// its bends, and what samples of a field say across it is no truth.
+/// Marks the voxels of a volume that lie at most the diagonal of a cell from the tube: inside cells that it divides it
+/// is rounded at its bends, and what samples of a field say across it is no truth.
 /// @param subject  as of `SlipTube`
 /// @param volume   grid of the volume over which the subject's lattice lies
 /// @return 1 for those voxels, else 0, i fastest
