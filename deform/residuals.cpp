@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "deform/core/fixed_point.h"
+#include "deform/core/trilinear.h"
 #include "deform/cpu/tiles.h"
 #include "deform/distance_histogram.h"
 #include "deform/points.h"
@@ -95,34 +96,13 @@ struct Cells {
   bool contains(std::int64_t k) const { return begin <= k && k < end; }
 };
 
-/// The cell along one axis that contains an index; -1 outside the grid.
-std::int64_t cell_of(double index, std::int64_t size) {
-  if (!(index >= 0 && index <= static_cast<double>(size - 1))) return -1;
-  return std::min(static_cast<std::int64_t>(index), std::max<std::int64_t>(size - 2, 0));
-}
-
 /// A field between its samples, trilinear; NaN where a sample that it needs is NaN or not in memory.
 glm::dvec3 sample(const SlicedField& field, const glm::dvec3& index) {
   const glm::i64vec3 size = field.grid.size;
-  glm::i64vec3 cell;
-  for (int axis = 0; axis < 3; ++axis) {
-    cell[axis] = cell_of(index[axis], size[axis]);
-    if (cell[axis] < 0) return glm::dvec3(NAN);
-  }
-  if (!field.slice(cell.z) && !field.slice(std::min(cell.z + 1, size.z - 1))) return glm::dvec3(NAN);
-  const glm::dvec3 t = index - glm::dvec3(cell);
-  glm::dvec3 sum(0);
-  for (int corner = 0; corner < 8; ++corner) {
-    const glm::i64vec3 step(corner & 1, corner >> 1 & 1, corner >> 2);
-    const glm::dvec3 part = glm::mix(1.0 - t, t, glm::dvec3(step));
-    const double weight = part.x * part.y * part.z;
-    if (weight == 0) continue;
-    const glm::i64vec3 at = cell + step;
+  return trilinear(size, index, [&](const glm::i64vec3& at) {
     const glm::vec3* slice = field.slice(at.z);
-    if (!slice) return glm::dvec3(NAN);
-    sum += weight * glm::dvec3(slice[at.y * size.x + at.x]);
-  }
-  return sum;
+    return slice ? slice[at.y * size.x + at.x] : glm::vec3(NAN);
+  });
 }
 
 /// The vertices of a field in parts: the slices of a lattice, or as many vertices of a mesh as one thread takes at a

@@ -103,6 +103,12 @@ PullField read_pull_field(const FieldSource& source);
 /// @throws Error when the file cannot be written
 /// @throws Cancelled when `control.stop` is set before the last slice is written
 void write_field_file(const std::filesystem::path& path, const VertexField& field, const Control& control = {});
+/// Writes a forward field as the suffix of the file has it: .vtu and .vtk get its tetrahedra (io/mesh_writer.h), other
+/// files its lattice (`write_field_file`).
+/// @param named  the name that messages give the file; empty: `path`
+/// @throws InputError for a mesh in a file that holds a lattice alone; otherwise as those two
+void write_vertex_field(const std::filesystem::path& path, const VertexField& field, const Control& control = {},
+                        const std::filesystem::path& named = {});
 /// Writes a pull field with its direction. `read_pull_field` gives the same bits again.
 /// @throws InputError for a suffix that no volume file has, or displacements that do not fit the grid
 /// @throws Error when the file cannot be written

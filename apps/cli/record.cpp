@@ -160,11 +160,15 @@ std::string fixed_text(FixedReason reason) {
   return std::string(kReasons[static_cast<std::size_t>(reason)]) + kElsewhere;
 }
 
-void write_json(const std::filesystem::path& path, const Record& record) {
+void write_text(const std::filesystem::path& path, std::string_view text) {
   std::ofstream file(path, std::ios::binary | std::ios::trunc);
-  file << record.document().dump(2, ' ', false, json::error_handler_t::replace) << "\n";
+  file << text;
   file.close();
   if (!file) throw Error("cannot be written whole, " + path.string() + "; is the disk full?");
+}
+
+void write_json(const std::filesystem::path& path, const Record& record) {
+  write_text(path, record.document().dump(2, ' ', false, json::error_handler_t::replace) + "\n");
 }
 
 }  // namespace tetwarp::apps

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <string_view>
 
 namespace tetwarp::apps {
 
@@ -37,6 +38,10 @@ class Record {
 /// may name paths and quote files, goes to standard error alone.
 enum class FixedReason { input, options, memory, device, other };
 std::string fixed_text(FixedReason reason);
+
+/// Writes a file for people, such as a table or a page, in place of what is there.
+/// @throws Error when it cannot be written whole
+void write_text(const std::filesystem::path& path, std::string_view text);
 
 /// @throws Error when it cannot be written whole
 void write_json(const std::filesystem::path& path, const Record& record);

@@ -6,11 +6,10 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/cli/in_background.h"
-#include "deform/fields/lattice_mesh.h"
 #include "io/dicom_bids.h"
 #include "io/dicom_text.h"
+#include "io/field_file.h"
 #include "io/image_file.h"
-#include "io/mesh_writer.h"
 #include "io/preview.h"
 
 namespace tetwarp::apps {
@@ -18,14 +17,6 @@ namespace tetwarp::apps {
 namespace {
 
 using nlohmann::json;
-
-/// What was used: of several the composed one.
-void write_field(const DeformRequest& request, const VertexField& field, const std::filesystem::path& staged) {
-  if (has_mesh_suffix(staged)) return write_mesh_file(staged, mesh_of(field), field.lattice);
-  require(field.mesh.is_empty(), "the field is a mesh, which " + request.options.write_field.string() +
-                                     " cannot hold; write it as a mesh, .vtu or .vtk");
-  write_field_file(staged, field);
-}
 
 /// Next to an output on another grid stands INPUT as it lies there.
 void write_preview_picture(const DeformRun& run, const std::filesystem::path& staged) {
@@ -63,7 +54,8 @@ void write_volumes(const DeformRun& run, const DeformSinks& sinks, const DeformO
     write_json(outputs.bids, Record::open(json::parse(bids_sidecar(*run.inputs.headers, run.field.grid, of_input))));
   }
   if (!outputs.preview.empty()) write_preview_picture(run, outputs.preview);
-  if (!outputs.field.empty()) write_field(run.request, std::get<VertexField>(run.field.field), outputs.field);
+  if (!outputs.field.empty())
+    write_vertex_field(outputs.field, std::get<VertexField>(run.field.field), {}, run.request.options.write_field);
   std::optional<DerivedOutput> series;
   if (written.series)
     series.emplace(DerivedOutput{WrittenSeries{*run.inputs.headers, *written.series, run.field.grid}, derivation});

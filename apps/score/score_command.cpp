@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <iostream>
@@ -15,6 +14,7 @@
 #include "apps/score/score_report.h"
 #include "apps/truth/truth_set.h"
 #include "backend/factories.h"
+#include "deform/core/trilinear.h"
 #include "deform/points.h"
 #include "io/image_file.h"
 #include "io/png.h"
@@ -54,25 +54,10 @@ fs::path result_of(const fs::path& results, const TruthSet& set, const TruthCase
 
 /// T(p) - p at places that need not be voxel centres: trilinear, NaN where a sample is missing.
 glm::dvec3 displacement_at(const PullField& field, const AffineMap& index, const glm::dvec3& place) {
-  const glm::dvec3 at = index(place);
   const glm::i64vec3 size = field.grid.size;
-  glm::i64vec3 low;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (!(at[axis] >= 0 && at[axis] <= static_cast<double>(size[axis] - 1))) return glm::dvec3(NAN);
-    low[axis] = std::min(static_cast<std::int64_t>(at[axis]), size[axis] - 2);
-  }
-  const glm::dvec3 part = at - glm::dvec3(low);
-  glm::dvec3 sum(0);
-  for (int corner = 0; corner < 8; ++corner) {
-    const glm::i64vec3 step(corner & 1, corner >> 1 & 1, corner >> 2);
-    double weight = 1;
-    for (int axis = 0; axis < 3; ++axis) weight *= step[axis] ? part[axis] : 1 - part[axis];
-    if (weight == 0) continue;
-    const glm::i64vec3 sample = low + step;
-    sum += weight *
-           glm::dvec3(field.displacement[static_cast<std::size_t>(sample.x + size.x * (sample.y + size.y * sample.z))]);
-  }
-  return sum;
+  return trilinear(size, index(place), [&](const glm::i64vec3& at) {
+    return field.displacement[static_cast<std::size_t>(at.x + size.x * (at.y + size.y * at.z))];
+  });
 }
 
 /// Scores the results of a set.
@@ -244,13 +229,6 @@ std::vector<std::uint8_t> Scorer::picture(ForwardResampler& truth, const PullFie
     }
   });
   return png_bytes(picture);
-}
-
-void write_text(const fs::path& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  file.close();
-  if (!file) throw Error("cannot write " + path.string() + "; check the folder and the free space");
 }
 
 }  // namespace

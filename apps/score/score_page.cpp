@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <span>
 
+#include "apps/cli/markup.h"
 #include "apps/score/score_report.h"
 #include "deform/version.h"
 
@@ -21,20 +22,6 @@ std::string base64(std::span<const std::uint8_t> bytes) {
       text += n + digit > bytes.size() ? '=' : kDigits[group >> (18 - 6 * digit) & 63];
   }
   return text;
-}
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '<': out += "&lt;"; break;
-      case '>': out += "&gt;"; break;
-      case '&': out += "&amp;"; break;
-      case '"': out += "&quot;"; break;
-      default: out += c;
-    }
-  }
-  return out;
 }
 
 std::string number(double value) {

@@ -10,7 +10,6 @@
 #include "apps/simulate/simulate_report.h"
 #include "apps/simulate/simulated_field.h"
 #include "backend/factories.h"
-#include "deform/fields/lattice_mesh.h"
 #include "io/field_file.h"
 #include "io/image_file.h"
 #include "io/mesh_writer.h"
@@ -90,13 +89,7 @@ void Simulating::read() {
 
 void Simulating::write(const fs::path& path, const VertexField& field) {
   Stage stage(options_.common, "write");
-  outputs_.set.write([&] {
-    if (has_mesh_suffix(path)) {
-      write_mesh_file(path, mesh_of(field), field.lattice);
-    } else {
-      write_field_file(path, field);
-    }
-  });
+  outputs_.set.write([&] { write_vertex_field(path, field); });
   write_seconds_ += stage.seconds();
 }
 

@@ -5,6 +5,7 @@
 #include <iostream>
 
 #include "apps/cli/console.h"
+#include "apps/cli/markup.h"
 #include "apps/cli/options.h"
 #include "apps/cli/program.h"
 #include "apps/slicer/slicer_module.h"
@@ -13,19 +14,6 @@
 namespace tetwarp::apps {
 
 namespace {
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&': out += "&amp;"; break;
-      case '<': out += "&lt;"; break;
-      case '>': out += "&gt;"; break;
-      default: out += c;
-    }
-  }
-  return out;
-}
 
 std::string element(const std::string& name, const std::string& text) {
   return "      <" + name + ">" + escaped(text) + "</" + name + ">\n";

@@ -10,7 +10,6 @@
 #include "apps/cli/output.h"
 #include "apps/cli/reads.h"
 #include "apps/truth/truth_set.h"
-#include "deform/fields/lattice_mesh.h"
 #include "deform/truth/body.h"
 #include "deform/truth/family.h"
 #include "deform/truth/landmarks.h"
@@ -19,7 +18,6 @@
 #include "deform/value_counts.h"
 #include "io/field_file.h"
 #include "io/image_file.h"
-#include "io/mesh_writer.h"
 #include "io/staged_output.h"
 
 namespace tetwarp::apps {
@@ -298,13 +296,10 @@ void TruthMaker::write_moving() {
     return;
   }
   place(set_.landmarks, [&](const fs::path& staged) {
-    std::ofstream file(staged, std::ios::binary);
-    file << "x,y,z\n";
-    for (const glm::dvec3& place : landmarks)
-      file << exact_number_text(place.x) << ',' << exact_number_text(place.y) << ',' << exact_number_text(place.z)
-           << '\n';
-    file.close();
-    if (!file) throw Error(set_.landmarks.string() + " cannot be written");
+    std::string text = "x,y,z\n";
+    for (const glm::dvec3& at : landmarks)
+      text += exact_number_text(at.x) + ',' + exact_number_text(at.y) + ',' + exact_number_text(at.z) + '\n';
+    write_text(staged, text);
   });
 }
 
@@ -312,13 +307,7 @@ fs::path TruthMaker::write_field(const truth::CaseChoice& choice) {
   Stage stage(options_.common, choice.name + ": field");
   const VertexField field = truth::make_field(choice, *subject_, {.threads = options_.common.threads}, stage.control());
   const fs::path path = set_.folder / "fields" / (choice.name + (field.mesh.is_empty() ? ".mha" : ".vtk"));
-  place(path, [&](const fs::path& staged) {
-    if (field.mesh.is_empty()) {
-      write_field_file(staged, field);
-    } else {
-      write_mesh_file(staged, mesh_of(field), field.lattice);
-    }
-  });
+  place(path, [&](const fs::path& staged) { write_vertex_field(staged, field); });
   return path;
 }
 
@@ -393,24 +382,22 @@ void TruthMaker::finish() {
   }
   document["sha256"] = hashes;
   place(set_.folder / "README.txt", [&](const fs::path& staged) {
-    std::ofstream file(staged, std::ios::binary);
-    file
-        << "A set of deformations whose truth is known, made by tetwarp truth (set.json: version, options, hashes).\n\n"
-           "moving/            the original: volume, mask of the body, labels, landmarks (LPS mm)\n"
-           "CASE/fixed         the deformed volume; register it with the moving one\n"
-           "CASE/dicom         of a DICOM series: the same as a series; where noise was added there is instead\n"
-           "                   dicom-without-noise, or without-noise, as tetwarp deform made it\n"
-           "CASE/body, labels  those of the moving volume, deformed by the same field\n"
-           "CASE/near-slip     of a slip: what lies at most one cell from it, and is scored by itself\n"
-           "CASE/landmarks.csv where the landmarks of the moving volume come to lie, exactly\n"
-           "CASE/jacobian      determinant of the forward map at each voxel; coverage: where it leads\n"
-           "CASE/inverse       with --dense: the exact displacement from fixed to moving at each voxel, LPS mm\n"
-           "fields/CASE        the forward field itself, from moving to fixed: the truth\n\n"
-           "A registration gives a map from fixed to moving. Name its field or transform CASE.mha, CASE.nii.gz,\n"
-           "CASE.h5 or the like, or warped landmarks CASE.csv, put all into a folder, and run:\n\n"
-           "    tetwarp score SET -r FOLDER\n";
-    file.close();
-    if (!file) throw Error("README.txt of the set cannot be written");
+    write_text(
+        staged,
+        "A set of deformations whose truth is known, made by tetwarp truth (set.json: version, options, hashes).\n\n"
+        "moving/            the original: volume, mask of the body, labels, landmarks (LPS mm)\n"
+        "CASE/fixed         the deformed volume; register it with the moving one\n"
+        "CASE/dicom         of a DICOM series: the same as a series; where noise was added there is instead\n"
+        "                   dicom-without-noise, or without-noise, as tetwarp deform made it\n"
+        "CASE/body, labels  those of the moving volume, deformed by the same field\n"
+        "CASE/near-slip     of a slip: what lies at most the diagonal of a cell from it; scored by itself\n"
+        "CASE/landmarks.csv where the landmarks of the moving volume come to lie, exactly\n"
+        "CASE/jacobian      determinant of the forward map at each voxel; coverage: where it leads\n"
+        "CASE/inverse       with --dense: the exact displacement from fixed to moving at each voxel, LPS mm\n"
+        "fields/CASE        the forward field itself, from moving to fixed: the truth\n\n"
+        "A registration gives a map from fixed to moving. Name its field or transform CASE.mha, CASE.nii.gz,\n"
+        "CASE.h5 or the like, or warped landmarks CASE.csv, put all into a folder, and run:\n\n"
+        "    tetwarp score SET -r FOLDER\n");
   });
   place(set_.folder / kSetRecord, [&](const fs::path& staged) { write_json(staged, Record::open(document)); });
   say(options_.common, "wrote " + set_.folder.string() + ": " + std::to_string(set_.cases.size()) + " cases");

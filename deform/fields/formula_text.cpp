@@ -12,6 +12,7 @@
 
 #include "deform/fields/elastic.h"
 #include "deform/fields/formula.h"
+#include "deform/parameter_text.h"
 
 namespace tetwarp {
 
@@ -19,18 +20,6 @@ namespace {
 
 constexpr double kRadiansPerDegree = 0.017453292519943295769;
 constexpr std::string_view kVoxels = "vox";
-
-std::vector<std::string_view> split(std::string_view text, char separator) {
-  std::vector<std::string_view> parts;
-  for (;;) {
-    const std::size_t end = text.find(separator);
-    parts.push_back(text.substr(0, end));
-    if (end == std::string_view::npos) return parts;
-    text.remove_prefix(end + 1);
-  }
-}
-
-std::string_view name_of(std::string_view text) { return text.substr(0, text.find(':')); }
 
 /// A length as typed: mm, or voxels if it has the suffix `vox`.
 struct TypedLength {
@@ -42,20 +31,10 @@ struct TypedLength {
 class Parameters {
  public:
   Parameters(std::string_view text, const Geometry& volume) : text_(text), volume_(volume) {
-    const std::string_view name = name_of(text);
-    if (name.size() == text.size()) return;
-    for (const std::string_view part : split(text.substr(name.size() + 1), ',')) {
-      const std::size_t equals = part.find('=');
-      if (equals == std::string_view::npos) fail("\"" + std::string(part) + "\" is not of the form key=value");
-      if (!values_.emplace(part.substr(0, equals), part.substr(equals + 1)).second) {
-        fail(std::string(part.substr(0, equals)) + " is given twice");
-      }
-    }
+    for (const auto& [key, value] : parse_parameters(text, about()).values) values_.emplace(key, value);
   }
 
-  [[noreturn]] void fail(const std::string& what) const {
-    throw InputError("formula \"" + std::string(text_) + "\": " + what);
-  }
+  [[noreturn]] void fail(const std::string& what) const { throw InputError(about() + ": " + what); }
 
   void require_all_used() const {
     if (!values_.empty()) fail("unknown parameter \"" + std::string(values_.begin()->first) + "\"");
@@ -116,6 +95,8 @@ class Parameters {
   }
 
  private:
+  std::string about() const { return "formula \"" + std::string(text_) + "\""; }
+
   std::string_view take(const std::string& key, bool optional) {
     const auto found = values_.find(key);
     if (found == values_.end()) {

@@ -44,7 +44,7 @@ void add_kidney(std::vector<Organ>& organs, float side) {
     return Ellipsoid{centre + axes * (offset * Point(side, 1, 1)), semi_axes, axes};
   };
   organs.push_back({part({0, 0, 0}, {33, 29, 58}), kFat - 8, Within::abdomen});
-  const std::size_t kidney = organs.size();
+  GroupLabels kidney(organs);
   organs.push_back({part({0, 0, 0}, {26, 22, 50}), 125, Within::abdomen});
   for (const float z : {-30.0f, -15.0f, 0.0f, 15.0f, 30.0f}) {  // pyramids
     const float inner = 1 - z * z / 2500;
@@ -54,7 +54,7 @@ void add_kidney(std::vector<Organ>& organs, float side) {
   organs.push_back({part({-17, 0, 0}, {17, 9, 24}), kFat + 10, Within::abdomen});  // sinus
   organs.push_back(
       {Rod{centre + axes * Point(-side * 16, 0, 0), {side * 12, 20, centre.z + 4}, 4, 4.5f}, 120, Within::abdomen});
-  label_from(organs, kidney, PhantomLabel::kidney);
+  kidney.are(PhantomLabel::kidney);
 }
 
 /// Adds a hollow organ: its wall, its fluid, and gas in front of the level.
@@ -89,37 +89,32 @@ void add_bowel(std::vector<Organ>& organs, Random& random) {
 
 void add_abdomen(std::vector<Organ>& organs, const Trunk& trunk, std::uint64_t seed) {
   Random random(seed + 13);
-  std::size_t first = organs.size();
-  // Gives a label to the organs that were added since the last call.
-  const auto are = [&](PhantomLabel label) {
-    label_from(organs, first, label);
-    first = organs.size();
-  };
+  GroupLabels groups(organs);
   for (const float side : {-1.0f, 1.0f}) {
     organs.push_back({Rod{{side * 27, 46, -92}, {side * 44, 34, -190}, 7, 21}, kMuscle, Within::abdomen});    // psoas
     organs.push_back({Rod{{side * 10, 30, -85}, {side * 13, 30, -150}, 5.5f, 4}, kMuscle, Within::abdomen});  // crus
   }
-  are(PhantomLabel::body);
+  groups.are(PhantomLabel::body);
   add_bowel(organs, random);
-  are(PhantomLabel::bowel);
+  groups.are(PhantomLabel::bowel);
   add_kidney(organs, -1);
   add_kidney(organs, 1);
-  first = organs.size();
+  groups.keep();
   add_tube(organs, {{{-14, 22, -190}, 11}, {{-18, 18, -110}, 11.5f}, {{-21, 6, -58}, 12}, {{-22, -4, -30}, 12}},
            {.shape = {}, .hu = 95});
-  are(PhantomLabel::vessel);
+  groups.are(PhantomLabel::vessel);
   organs.push_back({Ellipsoid{{96, 38, -84}, {26, 44, 46}, rotation({10, 12, 24})}, kSpleen, Within::abdomen});
-  are(PhantomLabel::spleen);
+  groups.are(PhantomLabel::spleen);
   add_hollow(organs, Ellipsoid{{60, -22, -84}, {44, 42, 36}, rotation({0, 22, -24})}, 3.5f, kFluid, -34);
-  are(PhantomLabel::stomach);
+  groups.are(PhantomLabel::stomach);
   add_tube(organs, {{{-30, -12, -124}, 13}, {{-6, -22, -116}, 9}, {{24, -16, -108}, 9}, {{62, 12, -98}, 8}},
            {.shape = {}, .hu = 48, .within = Within::abdomen});
-  are(PhantomLabel::body);
+  groups.are(PhantomLabel::body);
   add_tube(organs, {{{2, -8, -120}, 6}, {{-16, -8, -110}, 7}, {{-34, -2, -100}, 7}},
            {.shape = {}, .hu = 105, .within = Within::abdomen});
-  are(PhantomLabel::vessel);
+  groups.are(PhantomLabel::vessel);
   add_liver(organs, trunk, seed);
-  are(PhantomLabel::liver);
+  groups.are(PhantomLabel::liver);
 }
 
 std::vector<Organ> make_organs(const Trunk& trunk, std::uint64_t seed) {

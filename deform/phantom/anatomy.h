@@ -31,10 +31,22 @@ struct Organ {
   PhantomLabel label = PhantomLabel::body;
 };
 
-/// Gives the organs from number `first` on a label.
-inline void label_from(std::vector<Organ>& organs, std::size_t first, PhantomLabel label) {
-  for (std::size_t n = first; n < organs.size(); ++n) organs[n].label = label;
-}
+/// Gives labels to organs group by group, as they are added.
+class GroupLabels {
+ public:
+  /// The first group begins with what is added from now on.
+  explicit GroupLabels(std::vector<Organ>& organs) : organs_(organs), first_(organs.size()) {}
+  /// Ends a group: the organs of it are of this label. The next group begins.
+  void are(PhantomLabel label) {
+    for (; first_ < organs_.size(); ++first_) organs_[first_].label = label;
+  }
+  /// Ends a group whose organs keep the labels that they have.
+  void keep() { first_ = organs_.size(); }
+
+ private:
+  std::vector<Organ>& organs_;
+  std::size_t first_;
+};
 
 /// All organs inside the trunk's walls, in the order in which they are painted.
 std::vector<Organ> make_organs(const Trunk& trunk, std::uint64_t seed);

@@ -94,14 +94,9 @@ void add_chest_wall(std::vector<Organ>& organs) {
 }  // namespace
 
 void add_chest(std::vector<Organ>& organs, const Trunk& trunk, std::uint64_t seed) {
-  // Gives a label to the organs that were added since the last call.
-  std::size_t first = 0;
-  const auto are = [&](PhantomLabel label) {
-    label_from(organs, first, label);
-    first = organs.size();
-  };
+  GroupLabels groups(organs);
   add_chest_wall(organs);
-  are(PhantomLabel::body);
+  groups.are(PhantomLabel::body);
   const VesselTree right{
       .root = {-42, 8, 34}, .box = {{-135, -90, -120}, {-20, 85, 142}}, .count = 900, .end_radius = 0.4f, .hu = 45};
   VesselTree left = right;
@@ -109,17 +104,17 @@ void add_chest(std::vector<Organ>& organs, const Trunk& trunk, std::uint64_t see
   left.box = {{15, -90, -120}, {135, 85, 142}};
   add_vessels(organs, right, in_right_lung, trunk, seed + 1);
   add_vessels(organs, left, in_left_lung, trunk, seed + 2);
-  are(PhantomLabel::lung);
+  groups.are(PhantomLabel::lung);
   add_heart(organs);
-  are(PhantomLabel::heart);
+  groups.are(PhantomLabel::heart);
   add_great_vessels(organs);
-  are(PhantomLabel::vessel);
+  groups.are(PhantomLabel::vessel);
   add_tube(organs, {{{5, 22, 185}, 7}, {{5, 28, 60}, 7}, {{8, 22, 0}, 7}, {{22, 8, -58}, 8}},
            {.shape = {}, .hu = kWall});
   add_tube(organs, {{{5, 21, 185}, 1.5f}, {{5, 27, 60}, 2}, {{8, 21, 0}, 1.5f}}, {.shape = {}, .hu = -600});
-  are(PhantomLabel::oesophagus);
+  groups.are(PhantomLabel::oesophagus);
   add_airways(organs);
-  are(PhantomLabel::airway);
+  groups.are(PhantomLabel::airway);
   for (const float side : {-1.0f, 1.0f}) {
     organs.push_back({Ellipsoid{{side * 17, -4, 152}, {8, 9, 22}}, 120});  // thyroid
   }

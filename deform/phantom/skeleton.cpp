@@ -12,10 +12,10 @@ constexpr float kCortical = 1100, kMarrow = 210, kDisc = 85, kCanal = 15, kCord 
 /// Adds bones that touch and share their marrow: all of the outsides are painted first, then all of the insides.
 void add_bones(std::vector<Organ>& organs, const std::vector<Shape>& bones, float cortex_mm, float cortical = kCortical,
                float marrow = kMarrow) {
-  const std::size_t first = organs.size();
+  GroupLabels groups(organs);
   for (const Shape& bone : bones) organs.push_back({bone, cortical});
   for (const Shape& bone : bones) organs.push_back({bone, marrow, Within::everything, -cortex_mm});
-  label_from(organs, first, PhantomLabel::bone);
+  groups.are(PhantomLabel::bone);
 }
 
 /// Shapes of a vertebra: body, pedicles, laminae, transverse and spinous processes; in the chest also the necks of its

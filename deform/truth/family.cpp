@@ -11,6 +11,7 @@
 
 #include "deform/errors.h"
 #include "deform/field_quality.h"
+#include "deform/parameter_text.h"
 #include "deform/truth/motions.h"
 
 namespace tetwarp::truth {
@@ -114,25 +115,17 @@ const Family& family_of(std::string_view name) {
 }
 
 CaseChoice parse_case(std::string_view text) {
-  const std::size_t colon = text.find(':');
-  CaseChoice choice{folder_name(text), &family_of(text.substr(0, colon)), {}};
-  std::string_view rest = colon == std::string_view::npos ? std::string_view() : text.substr(colon + 1);
-  require(colon == std::string_view::npos || (!rest.empty() && rest.back() != ','),
-          "case " + std::string(text) + " ends with nothing behind its last sign");
-  while (!rest.empty()) {
-    const std::string_view part = rest.substr(0, rest.find(','));
-    rest = part.size() == rest.size() ? std::string_view() : rest.substr(part.size() + 1);
-    const std::size_t equals = part.find('=');
-    const std::string_view name = part.substr(0, equals);
-    const auto& known = choice.family->parameters;
-    const auto found = std::find_if(known.begin(), known.end(), [&](const Parameter& one) { return one.name == name; });
-    require(equals != std::string_view::npos && found != known.end(), "case " + std::string(text) + ": \"" +
-                                                                          std::string(part) + "\" is no parameter of " +
-                                                                          std::string(choice.family->name));
-    const bool is_new = choice.values.emplace(name, number_of(part.substr(equals + 1), text, *found)).second;
-    require(is_new, "case " + std::string(text) + ": " + std::string(name) + " is given twice");
+  const ParameterText parsed = parse_parameters(text, "case " + std::string(text));
+  CaseChoice choice{folder_name(text), &family_of(parsed.name), {}};
+  const auto& known = choice.family->parameters;
+  for (const auto& [name, value] : parsed.values) {
+    const auto found = std::find_if(known.begin(), known.end(),
+                                    [&, wanted = name](const Parameter& one) { return one.name == wanted; });
+    require(found != known.end(), "case " + std::string(text) + ": \"" + std::string(name) + "\" is no parameter of " +
+                                      std::string(choice.family->name));
+    choice.values.emplace(name, number_of(value, text, *found));
   }
-  for (const Parameter& parameter : choice.family->parameters) choice.values.emplace(parameter.name, parameter.usual);
+  for (const Parameter& parameter : known) choice.values.emplace(parameter.name, parameter.usual);
   return choice;
 }
 

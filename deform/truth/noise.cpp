@@ -12,33 +12,11 @@
 
 #include "deform/cpu/arena.h"
 #include "deform/errors.h"
-#include "deform/phantom/random.h"
+#include "deform/phantom/grain.h"
 
 namespace tetwarp::truth {
 
 namespace {
-
-/// Noise of variance 1 of one slice.
-std::vector<float> noise_of_slice(const glm::i64vec3& size, std::int64_t slice, std::uint64_t seed) {
-  // One voxel more on each side, so that the rim is smoothed as the rest is.
-  const std::int64_t columns = size.x + 2, rows = size.y + 2;
-  const std::uint64_t first = phantom::hash(seed) + static_cast<std::uint64_t>(slice * columns * rows);
-  std::vector<float> along(static_cast<std::size_t>(size.x * rows)), noise(static_cast<std::size_t>(size.x * size.y));
-  for (std::int64_t j = 0; j < rows; ++j) {
-    const auto white = [&](std::int64_t i) {
-      return phantom::normal(first + static_cast<std::uint64_t>(j * columns + i));
-    };
-    for (std::int64_t i = 0; i < size.x; ++i)
-      along[static_cast<std::size_t>(i + size.x * j)] = white(i) + 2 * white(i + 1) + white(i + 2);
-  }
-  for (std::int64_t j = 0; j < size.y; ++j) {
-    const float* above = along.data() + j * size.x;
-    for (std::int64_t i = 0; i < size.x; ++i)
-      noise[static_cast<std::size_t>(i + size.x * j)] =
-          (above[i] + 2 * above[i + size.x] + above[i + 2 * size.x]) * (1.0f / 6);
-  }
-  return noise;
-}
 
 template <class V>
 V stored(double value) {
@@ -71,12 +49,17 @@ void add_noise(const ConstVolumeView& volume, double deviation, std::uint64_t se
     V* to = reinterpret_cast<V*>(output.voxels);
     arena.execute([&] {
       tbb::parallel_for(std::int64_t{0}, size.z, [&](std::int64_t k) {
-        const std::vector<float> noise = noise_of_slice(size, k, seed);
-        for (std::int64_t n = 0; n < area; ++n) {
-          const V value = from[k * area + n];
-          const double hu = static_cast<double>(value);
-          to[k * area + n] =
-              hu < kAirHu ? value : stored<V>(hu + deviation * static_cast<double>(noise[static_cast<std::size_t>(n)]));
+        phantom::GrainRows rows(size, k, seed);
+        std::vector<float> noise(static_cast<std::size_t>(size.x));
+        for (std::int64_t row = k * area; row < (k + 1) * area; row += size.x) {
+          rows.next(noise);
+          for (std::int64_t i = 0; i < size.x; ++i) {
+            const V value = from[row + i];
+            const double hu = static_cast<double>(value);
+            to[row + i] = hu < kAirHu
+                              ? value
+                              : stored<V>(hu + deviation * static_cast<double>(noise[static_cast<std::size_t>(i)]));
+          }
         }
       });
     });

@@ -9,8 +9,10 @@
 #include <utility>
 
 #include "deform/errors.h"
+#include "deform/fields/lattice_mesh.h"
 #include "io/fields/field_format.h"
 #include "io/fields/field_image.h"
+#include "io/mesh_writer.h"
 #include "io/opened_file.h"
 
 namespace tetwarp {
@@ -149,6 +151,14 @@ PullField read_pull_field(const FieldSource& source) {
 
 void write_field_file(const std::filesystem::path& path, const VertexField& field, const Control& control) {
   write_as(path, field.lattice, field.displacement, Direction::forward, control);
+}
+
+void write_vertex_field(const std::filesystem::path& path, const VertexField& field, const Control& control,
+                        const std::filesystem::path& named) {
+  if (has_mesh_suffix(path)) return write_mesh_file(path, mesh_of(field), field.lattice);
+  require(field.mesh.is_empty(), "the field is a mesh, which " + (named.empty() ? path : named).string() +
+                                     " cannot hold; write it as a mesh, .vtu or .vtk");
+  write_field_file(path, field, control);
 }
 
 void write_field_file(const std::filesystem::path& path, const PullField& field, const Control& control) {

@@ -16,7 +16,6 @@
 #include "deform/fields/continued.h"
 #include "deform/fields/lattice_mesh.h"
 #include "deform/points.h"
-#include "io/mesh_writer.h"
 #include "io/staged_output.h"
 #include "python/src/calls.h"
 #include "python/src/module.h"
@@ -93,13 +92,7 @@ void write_forward(const std::filesystem::path& path, const VertexField& field, 
                    const CallOptions& options) {
   run_call(options, field.mesh.is_empty() && std::ssize(field.displacement) < kSmallFile, [&](const Control& control) {
     StagedOutput output(path, StagedOutput::Kind::file, overwrite);
-    if (has_mesh_suffix(path)) {
-      write_mesh_file(output.path(), mesh_of(field), field.lattice);
-    } else {
-      require(field.mesh.is_empty(),
-              "the field is a mesh, which " + path.string() + " cannot hold; write it as a mesh, .vtu or .vtk");
-      write_field_file(output.path(), field, control);
-    }
+    write_vertex_field(output.path(), field, control, path);
     output.commit();
   });
 }
