@@ -43,6 +43,15 @@ glm::dvec3 moved_by(const Tetrahedron& t, const glm::dvec3& weights, const glm::
   return u == glm::dvec3(0) ? u : mm_from_output * (u * (-1.0 / kStepsPerVoxel));
 }
 
+/// The volume of a tetrahedron after over before.
+double determinant_of(const Tetrahedron& t) {
+  const glm::dvec3 d(t.d.deformed), e(t.d.deformed + t.d.u);
+  const auto deformed = [&](const Vertex& v) { return glm::dvec3(v.deformed) - d; };
+  const auto rest = [&](const Vertex& v) { return glm::dvec3(v.deformed + v.u) - e; };
+  return glm::determinant(glm::dmat3(deformed(t.a), deformed(t.b), deformed(t.c))) /
+         glm::determinant(glm::dmat3(rest(t.a), rest(t.b), rest(t.c)));
+}
+
 /// Adds a motion to a point. A point that does not move keeps its bits, -0 included.
 void add_move(const glm::dvec3& by, glm::dvec3& point) {
   if (by != glm::dvec3(0)) point += by;
@@ -54,7 +63,7 @@ void add_move(const glm::dvec3& by, glm::dvec3& point) {
 class PointMover::Map {
  public:
   virtual ~Map() = default;
-  virtual PointStatus move(glm::dvec3& point) const = 0;
+  virtual PointStatus move(glm::dvec3& point, double* determinant) const = 0;
 };
 
 namespace {
@@ -70,7 +79,7 @@ class LatticeMap final : public PointMover::Map {
       slack_[axis] = kOnBorder / glm::length(frame_.output_from_lattice.linear[axis]);
   }
 
-  PointStatus move(glm::dvec3& point) const override;
+  PointStatus move(glm::dvec3& point, double* determinant) const override;
 
  private:
   static bool is_odd(const glm::i64vec3& cell) { return ((cell.x + cell.y + cell.z) & 1) != 0; }
@@ -126,7 +135,7 @@ Holder LatticeMap::search_around(const glm::i64vec3& cell, const glm::dvec3& ste
   return best;
 }
 
-PointStatus LatticeMap::move(glm::dvec3& point) const {
+PointStatus LatticeMap::move(glm::dvec3& point, double* determinant) const {
   const glm::dvec3 in_output = output_from_point_(point), at = frame_.lattice_from_output(in_output);
   glm::i64vec3 cell;
   for (int axis = 0; axis < 3; ++axis) {
@@ -138,6 +147,7 @@ PointStatus LatticeMap::move(glm::dvec3& point) const {
   const CellWeights guess = weights_in_cell(glm::clamp(at - glm::dvec3(cell), 0.0, 1.0), is_odd(cell));
   Holder holder = hold(cell, guess.corners, steps);
   if (!(holder.least >= -kRounding)) holder = search_around(cell, steps);
+  if (determinant) *determinant = determinant_of(holder.tetrahedron);
   add_move(moved_by(holder.tetrahedron, holder.weights, mm_from_output_), point);
   return PointStatus::moved;
 }
@@ -150,10 +160,12 @@ class MeshMap final : public PointMover::Map {
         output_from_point_(index_from_point(output)),
         mm_from_output_(point_from_index(output).linear) {}
 
-  PointStatus move(glm::dvec3& point) const override {
+  PointStatus move(glm::dvec3& point, double* determinant) const override {
     const auto found = locator_.find(output_from_point_(point) * double{kStepsPerVoxel});
     if (!found) return PointStatus::outside;
-    add_move(moved_by(mesh_.tetrahedron(found->tetrahedron), found->weights, mm_from_output_), point);
+    const Tetrahedron tetrahedron = mesh_.tetrahedron(found->tetrahedron);
+    if (determinant) *determinant = determinant_of(tetrahedron);
+    add_move(moved_by(tetrahedron, found->weights, mm_from_output_), point);
     return PointStatus::moved;
   }
 
@@ -179,7 +191,10 @@ PointMover::PointMover(const Geometry& output, const FieldView& field, const Lim
 
 PointMover::~PointMover() = default;
 
-PointStatus PointMover::move(glm::dvec3& point) const { return map_->move(point); }
+PointStatus PointMover::move(glm::dvec3& point, double* determinant) const {
+  if (determinant) *determinant = 1;
+  return map_->move(point, determinant);
+}
 
 std::vector<PointStatus> PointMover::move(std::span<glm::dvec3> points, const Control& control) const {
   std::vector<PointStatus> status(points.size());

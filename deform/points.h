@@ -39,9 +39,11 @@ class PointMover {
 
   /// Moves one point; may be called from several threads at a time.
   /// @param point  LPS mm, moved in place. It keeps its bits where its tetrahedron does not move.
+  /// @param determinant  if not null gets the determinant of the tetrahedron's map: its volume after over before; 1
+  ///         for a point that no tetrahedron holds
   /// @return whether the field holds the point
   /// @throws InputError for a vertex near the point that is not finite
-  PointStatus move(glm::dvec3& point) const;
+  PointStatus move(glm::dvec3& point, double* determinant = nullptr) const;
   /// Moves many points in parallel, each as the other overload does.
   /// @param points   LPS mm, moved in place
   /// @param control  progress and stop

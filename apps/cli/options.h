@@ -166,10 +166,11 @@ struct TruthOptions {
   std::filesystem::path labels;    ///< on the grid of INPUT
   std::vector<std::string> roles;  ///< ROLE=N,...
   std::vector<std::string> with;   ///< files that go along
+  std::filesystem::path dose;      ///< one more, which is scored
   std::int64_t cell_size = 4;
   double body_above_hu = -400;
   std::int64_t landmarks = 1000;
-  double noise_hu = 0;
+  std::string noise = "0";  ///< standard deviation, HU, or "measured"
   std::uint64_t seed = 1;
   int compression = 1;
   bool dense = false, resume = false;
@@ -181,6 +182,9 @@ struct ScoreOptions {
   CommonOptions common;
   std::filesystem::path set;                   ///< folder of a set of known truth
   std::vector<std::filesystem::path> results;  ///< folders, or one file for a set of one case
+  bool forward = false;                        ///< results lead from moving to fixed
+  std::vector<std::filesystem::path> back;     ///< results of the other direction, as many as results, or none
+  std::filesystem::path triples;               ///< folder of results between two fixed volumes
   std::filesystem::path limits, json, csv, html;
   BackendChoice backend = BackendChoice::automatic;
   int device = 0;  ///< of CUDA

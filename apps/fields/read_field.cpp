@@ -142,6 +142,18 @@ ReadPullField read_field(const PullChoice& choice, const Geometry& volume, const
   return result;
 }
 
+ReadPullField read_point_map(const PullChoice& choice, const Geometry& volume, const Geometry& grid, bool forward,
+                             int threads, const Control& control) {
+  if (!forward || std::holds_alternative<NamedTransform>(choice.field.what))
+    return read_field(choice, volume, grid, threads, control);
+  ReadPullField result;
+  const FieldSource source = for_volume(pull_source(choice), grid);
+  note_header(read_field_header(source), source.path.string(), "moving to fixed", result.origin);
+  VertexField field = read_forward_field(source);
+  result.field = {field.lattice, std::move(field.displacement)};
+  return result;
+}
+
 std::uint64_t field_bytes(const ForwardChoice& choice, const Geometry& volume) {
   for (const NamedField& field : choice.fields) {
     if (const auto* transform = std::get_if<NamedTransform>(&field.what)) read(*transform);

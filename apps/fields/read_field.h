@@ -46,6 +46,13 @@ ReadForwardField read_field(const ForwardChoice& choice, const Geometry& volume,
 ReadPullField read_field(const PullChoice& choice, const Geometry& volume, const Geometry& output, int threads,
                          const Control& control);
 
+/// The displacement field or transform of a registration, in either direction: it leads from the points of `grid` to
+/// those of the volume with the grid `volume`. A field file that states a direction has to state this one.
+/// @param forward  whether that is the direction from the moving to the fixed volume, the forward one
+/// @throws InputError for an unusable file; Cancelled
+ReadPullField read_point_map(const PullChoice& choice, const Geometry& volume, const Geometry& grid, bool forward,
+                             int threads, const Control& control);
+
 /// Memory of the field that `read_field` will give, with what a mesh needs for its own work. Transforms and meshes are
 /// read, so that a bad one is known early.
 std::uint64_t field_bytes(const ForwardChoice& choice, const Geometry& volume);

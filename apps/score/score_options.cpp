@@ -16,6 +16,25 @@ void add_score(CLI::App& app, ScoreOptions& options) {
                    "with one case also a file. May be repeated: results side by side")
       ->required();
   command
+      ->add_option_function<std::string>(
+          "--direction", [&](const std::string& text) { options.forward = text == "forward"; },
+          "pull: results lead from fixed to moving, as registrations give them; forward: from moving to fixed, "
+          "compared "
+          "with the exact forward map at the voxels of the moving volume")
+      ->check(CLI::IsMember({"pull", "forward"}))
+      ->type_name("pull|forward")
+      ->default_str("pull");
+  command
+      ->add_option("--back", options.back,
+                   "Folder with the results of the other direction, for inverse consistency; one for each -r")
+      ->type_name("FOLDER");
+  command
+      ->add_option(
+          "--triples", options.triples,
+          "Folder with results between the fixed volumes of two cases, named CASE--CASE and a suffix, from the "
+          "first to the second, for transitivity; with one -r")
+      ->type_name("FOLDER");
+  command
       ->add_option(
           "--limits", options.limits,
           "Limits to pass, as JSON: {\"landmarks_mean_mm\": {\"most\": 2, \"source\": \"...\"}, ...}; those that are "

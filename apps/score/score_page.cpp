@@ -37,7 +37,7 @@ std::string cells(std::initializer_list<std::string> texts) {
 }
 
 std::string errors_row(const std::string& part, const score::Errors& errors, const std::string& dice) {
-  return cells({part, std::to_string(errors.points), std::to_string(errors.missing), number(errors.mean),
+  return cells({escaped(part), std::to_string(errors.points), std::to_string(errors.missing), number(errors.mean),
                 number(errors.median), number(errors.percentile_95), number(errors.percentile_99),
                 number(errors.largest), dice});
 }
@@ -55,16 +55,19 @@ std::string case_section(const CaseScore& score) {
   html +=
       "<table><tr><th>part</th><th>points</th><th>missing</th><th>mean</th><th>median</th><th>95 %</th><th>99 "
       "%</th><th>largest</th><th>Dice</th></tr>\n";
-  if (score.dense) {
-    html += errors_row("body", score.dense->all, "");
-    for (const auto& [label, errors] : score.dense->labels) {
-      const auto overlap = score.overlaps.find(label);
-      html += errors_row("label " + std::to_string(label), errors,
-                         overlap == score.overlaps.end() ? "" : number(overlap->second.dice()));
-    }
+  if (score.dense) html += errors_row("body", score.dense->all, "");
+  for (const auto& [label, errors] : score.labels) {
+    const auto overlap = score.overlaps.find(label);
+    html += errors_row(label_name(score, label), errors,
+                       overlap == score.overlaps.end() ? "" : number(overlap->second.dice()));
   }
-  if (score.apart) html += errors_row("near the slip", *score.apart, "");
+  if (score.apart) html += errors_row("near the slip, not in the body above", *score.apart, "");
+  for (const BandErrors& band : score.bands) html += errors_row(band_name(band), band.errors, "");
   if (score.landmarks) html += errors_row("landmarks", *score.landmarks, "");
+  if (score.inverse_consistency) html += errors_row("inverse consistency", *score.inverse_consistency, "");
+  for (const auto& [over, errors] : score.transitivity) html += errors_row("transitivity over " + over, errors, "");
+  for (const auto& [label, errors] : score.surfaces)
+    html += errors_row("surface of " + label_name(score, label), errors, "");
   html += "</table>\n";
   if (score.dense) {
     const score::DenseScore& dense = *score.dense;
@@ -77,6 +80,10 @@ std::string case_section(const CaseScore& score) {
             number(dense.all.worst.x) + ", " + number(dense.all.worst.y) + ", " + number(dense.all.worst.z) +
             " (LPS mm).</p>\n";
   }
+  if (score.gamma)
+    html += "<p>Dose: " + number(score.gamma->passing_percent()) + " % of " + std::to_string(score.gamma->points) +
+            " voxels pass the global gamma index of 3 %, 2 mm, above 10 % of the largest dose, " +
+            number(score.gamma->largest_dose) + ".</p>\n";
   html += "<table><tr><th>limit</th><th>found</th><th>most</th><th></th><th>source</th></tr>\n";
   for (const ScoreCheck& one : score.checks)
     html += cells({escaped(one.limit.about), number(one.value), number(one.limit.most), verdict_of(one.passed()),
@@ -131,7 +138,8 @@ std::string page_of(const std::string& set, const std::vector<CaseScore>& scores
   html += overview(scores);
   html += "<p>Limits: ";
   for (const ScoreLimit& limit : limits)
-    html += escaped(limit.about) + ": " + number(limit.most) + " (" + escaped(limit.source) + "); ";
+    html += escaped(limit.about) + ": " + (limit.is_voxel_side ? "largest side of a voxel" : number(limit.most)) +
+            " (" + escaped(limit.source) + "); ";
   html += "</p>\n";
   for (const CaseScore& score : scores) html += case_section(score);
   return html + "</body></html>\n";

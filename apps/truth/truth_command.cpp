@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -10,11 +11,11 @@
 #include "apps/cli/output.h"
 #include "apps/cli/reads.h"
 #include "apps/truth/truth_set.h"
+#include "deform/score/truth.h"
 #include "deform/truth/body.h"
 #include "deform/truth/family.h"
 #include "deform/truth/landmarks.h"
 #include "deform/truth/noise.h"
-#include "deform/truth/slip_tube.h"
 #include "deform/value_counts.h"
 #include "io/field_file.h"
 #include "io/image_file.h"
@@ -76,6 +77,19 @@ std::vector<truth::CaseChoice> cases_of(const TruthOptions& options, const truth
   return cases;
 }
 
+/// The value of --noise that asks for the noise of INPUT.
+constexpr const char* kMeasuredNoise = "measured";
+
+/// @throws UsageError for what is no number from 0 to 1000
+double parse_noise(const std::string& text) {
+  double value = -1;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !(value >= 0 && value <= 1000))
+    throw UsageError("--noise \"" + text + "\"; expected a standard deviation of 0 to 1000 HU, or \"" +
+                     std::string(kMeasuredNoise) + "\"");
+  return value;
+}
+
 /// Labels of a floating type as int32; others as they are. @throws InputError for values that are not whole numbers
 AnyVolume in_whole_numbers(AnyVolume labels, const fs::path& file) {
   if (labels.type() != VoxelType::f32 && labels.type() != VoxelType::f64) return labels;
@@ -96,6 +110,7 @@ class TruthMaker {
  public:
   explicit TruthMaker(const TruthOptions& options)
       : options_(options), roles_(parse_roles(options.roles)), cases_(cases_of(options, roles_)) {
+    if (options.noise != kMeasuredNoise) noise_ = truth::smoothed_noise(parse_noise(options.noise));
     if (options.labels.empty() && !options.roles.empty())
       throw UsageError("--label names labels of --labels; give both");
     check_names();
@@ -107,6 +122,7 @@ class TruthMaker {
     if (is_complete()) return 0;
     read();
     begin();
+    if (!options_.resume) require_room();
     write_moving();
     for (const truth::CaseChoice& choice : cases_) make_case(choice);
     finish();
@@ -145,14 +161,14 @@ class TruthMaker {
       write_image(staged, volume, how);
     });
   }
-  fs::path write_field(const truth::CaseChoice& choice);
+  void write_forward(const fs::path& path, const VertexField& field, const Control& control);
+  /// @throws Error where the disk lacks room for what a set without compression takes
+  void require_room() const;
   DeformOptions deform_options(const TruthCase& one) const;
-  /// What of the moving volume lies near the slip of a case.
-  fs::path near_slip_of(const TruthCase& one) const { return set_.folder / "moving" / volume_file("near-" + one.name); }
   /// What deform writes: of a DICOM series a series, so that objects which go along can refer to it.
   fs::path deformed(const TruthCase& one) const {
     const fs::path folder = set_.folder / one.name;
-    const bool is_noisy = options_.noise_hu > 0;
+    const bool is_noisy = noise_.deviation > 0;
     if (header_.series) return folder / (is_noisy ? "dicom-without-noise" : "dicom");
     return is_noisy ? folder / volume_file("without-noise") : one.fixed;
   }
@@ -164,6 +180,7 @@ class TruthMaker {
   InputHeader header_;
   AnyVolume volume_, labels_;
   std::optional<truth::Subject> subject_;
+  truth::Noise noise_;
   json planned_;
 };
 
@@ -176,7 +193,7 @@ json TruthMaker::plan() const {
   document["labels"] =
       options_.labels.empty() ? json() : json{{"sha256", hash_file(options_.labels)}, {"roles", roles_}};
   document["options"] = {{"cell_size", options_.cell_size},    {"body_above_hu", options_.body_above_hu},
-                         {"landmarks", options_.landmarks},    {"noise_hu", options_.noise_hu},
+                         {"landmarks", options_.landmarks},    {"noise", options_.noise},
                          {"noise_seed", options_.seed},        {"dense", options_.dense},
                          {"compression", options_.compression}};
   if (!options_.input.series.empty()) document["options"]["series"] = options_.input.series;
@@ -184,13 +201,15 @@ json TruthMaker::plan() const {
   document["with"] = json::array();
   for (const std::string& path : options_.with)
     document["with"].push_back({{"name", fs::path(path).filename().string()}, {"sha256", hash_file(path)}});
+  if (!options_.dose.empty()) document["dose"] = {{"sha256", hash_file(options_.dose)}};
   document["cases"] = cases;
   return document;
 }
 
 void TruthMaker::check_names() const {
   std::vector<std::string> taken;
-  for (const char* stem : {"fixed", "without-noise", "body", "labels", "near-slip", "jacobian", "coverage", "inverse"})
+  for (const char* stem :
+       {"fixed", "without-noise", "body", "labels", "near-slip", "dose", "jacobian", "coverage", "inverse", "forward"})
     taken.push_back(volume_file(stem).string());
   taken.insert(taken.end(), {"dicom", "dicom-without-noise", "landmarks.csv"});
   for (const std::string& path : options_.with) {
@@ -237,7 +256,7 @@ std::vector<fs::path> TruthMaker::files_of(const TruthCase& one) const {
   const fs::path folder = set_.folder / one.name;
   std::vector<fs::path> files{deformed(one), one.body, folder / volume_file("jacobian"),
                               folder / volume_file("coverage")};
-  for (const fs::path& path : {one.labels, one.landmarks, one.apart})
+  for (const fs::path& path : {one.labels, one.landmarks, one.bands, one.dose})
     if (!path.empty()) files.push_back(path);
   if (options_.dense) files.push_back(folder / volume_file("inverse"));
   return files;
@@ -264,6 +283,22 @@ void TruthMaker::read() {
   subject_.emplace(std::move(patient), roles_, volume_.geometry());
 }
 
+void TruthMaker::require_room() const {
+  if (options_.compression > 0) return;  // how far files shrink is not known
+  const auto voxels = static_cast<std::uint64_t>(voxel_count(volume_.geometry()));
+  std::uint64_t bytes_per_voxel =
+      size_bytes(volume_.type()) + 1 + sizeof(float) + 1;  // volume, body, Jacobian, coverage
+  if (labels_.data()) bytes_per_voxel += size_bytes(labels_.type());
+  if (options_.dense) bytes_per_voxel += 2 * sizeof(glm::vec3);
+  const std::uint64_t bytes = voxels * bytes_per_voxel * cases_.size();
+  std::error_code failed;
+  const fs::space_info space = fs::space(set_.folder, failed);
+  if (failed || space.available >= bytes) return;
+  throw Error("the set takes " + std::to_string(bytes >> 20) + " MiB, and " + set_.folder.string() + " has room for " +
+              std::to_string(space.available >> 20) + "; choose another disk, or fewer cases" +
+              (options_.dense ? ", or leave --dense out" : ""));
+}
+
 void TruthMaker::write_moving() {
   Stage stage(options_.common, "moving volume");
   const fs::path folder = set_.folder / "moving";
@@ -271,16 +306,30 @@ void TruthMaker::write_moving() {
   fs::create_directories(set_.folder / "fields");
   const ConstVolumeView ct = std::as_const(volume_).view();
   set_.moving = folder / volume_file("moving");
-  if (options_.noise_hu > 0) {
+  if (options_.noise == kMeasuredNoise) {
+    noise_ = truth::measure_noise(ct, {.threads = options_.common.threads}, stage.control());
+    say(options_.common, "measured noise: " + number_text(std::round(100 * noise_.deviation) / 100) + " HU");
+  }
+  if (noise_.deviation > 0) {
     AnyVolume noisy(volume_.geometry(), volume_.type());
-    truth::add_noise(ct, options_.noise_hu, truth::noise_seed(options_.seed, "moving"), noisy.view(),
+    truth::add_noise(ct, noise_, truth::noise_seed(options_.seed, "moving"), noisy.view(),
                      {.threads = options_.common.threads});
     write_volume(set_.moving, std::as_const(noisy).view());
   } else {
     write_volume(set_.moving, ct);
   }
   const Volume<std::uint8_t> body = truth::body_mask(volume_.geometry(), subject_->patient(), options_.cell_size);
-  write_volume(folder / volume_file("body"), view(body));
+  set_.body = folder / volume_file("body");
+  write_volume(set_.body, view(body));
+  for (const auto& [role, labels] : roles_)
+    for (const std::int64_t label : labels) set_.roles[label] = role;
+  if (!options_.dose.empty()) {
+    set_.dose = folder / volume_file("dose");
+    const InputOptions from = volume_named(options_.dose, options_.common.nifti_frame);
+    const AnyVolume dose =
+        read_input(from, open_input(from, options_.common, true), options_.common, stage.control()).volume;
+    write_volume(set_.dose, dose.view());
+  }
   if (!options_.labels.empty()) {
     set_.labels = folder / volume_file("labels");
     write_volume(set_.labels, std::as_const(labels_).view());
@@ -303,12 +352,22 @@ void TruthMaker::write_moving() {
   });
 }
 
-fs::path TruthMaker::write_field(const truth::CaseChoice& choice) {
-  Stage stage(options_.common, choice.name + ": field");
-  const VertexField field = truth::make_field(choice, *subject_, {.threads = options_.common.threads}, stage.control());
-  const fs::path path = set_.folder / "fields" / (choice.name + (field.mesh.is_empty() ? ".mha" : ".vtk"));
-  place(path, [&](const fs::path& staged) { write_vertex_field(staged, field); });
-  return path;
+/// Writes where the voxels of the moving volume come to lie.
+void TruthMaker::write_forward(const fs::path& path, const VertexField& field, const Control& control) {
+  place(path, [&](const fs::path& staged) {
+    const Geometry& grid = volume_.geometry();
+    const Limits limits{.threads = options_.common.threads};
+    const PointMover mover(grid, view(field, Outside::background), limits, control);
+    const auto forward = score::exact_forward(mover, grid, grid, limits);
+    const auto writer = create_field_file(staged, grid, Direction::forward);
+    constexpr std::int64_t kSlices = 8;
+    for (std::int64_t k = 0; k < grid.size.z; k += kSlices) {
+      const Region slices{{0, 0, k}, {grid.size.x, grid.size.y, std::min(k + kSlices, grid.size.z)}};
+      const score::TruthSlab slab = forward->slab(slices, control);
+      writer->write({&grid, slices, VoxelType::f32, 3, std::as_bytes(std::span(slab.displacement)).data()});
+    }
+    writer->finish();
+  });
 }
 
 DeformOptions TruthMaker::deform_options(const TruthCase& one) const {
@@ -326,9 +385,10 @@ DeformOptions TruthMaker::deform_options(const TruthCase& one) const {
   const auto along = [&](const fs::path& from, const fs::path& to, const std::string& how) {
     deform.with.push_back(from.string() + "=" + to.string() + how);
   };
-  along(set_.folder / "moving" / volume_file("body"), one.body, ":vote");
+  along(set_.body, one.body, ":vote");
   if (!set_.labels.empty()) along(set_.labels, one.labels, ":vote");
-  if (!one.apart.empty()) along(near_slip_of(one), one.apart, ":vote");
+  if (!one.bands.empty()) along(one.moving_bands, one.bands, ":vote");
+  if (!one.dose.empty()) along(set_.dose, one.dose, ":own");
   for (const std::string& path : options_.with) along(path, deform.folder / fs::path(path).filename(), "");
   if (!set_.landmarks.empty()) deform.points.push_back(set_.landmarks.string() + "=" + one.landmarks.string());
   deform.maps.jacobian = deform.folder / volume_file("jacobian");
@@ -339,18 +399,25 @@ DeformOptions TruthMaker::deform_options(const TruthCase& one) const {
 
 void TruthMaker::make_case(const truth::CaseChoice& choice) {
   const fs::path folder = set_.folder / choice.name;
+  Stage stage(options_.common, choice.name);
+  const VertexField field = truth::make_field(choice, *subject_, {.threads = options_.common.threads}, stage.control());
   TruthCase one{.name = choice.name,
                 .fixed = folder / volume_file("fixed"),
-                .field = write_field(choice),
+                .field = set_.folder / "fields" / (choice.name + (field.mesh.is_empty() ? ".mha" : ".vtk")),
                 .body = folder / volume_file("body"),
                 .labels = set_.labels.empty() ? fs::path() : folder / volume_file("labels"),
                 .landmarks = set_.landmarks.empty() ? fs::path() : folder / "landmarks.csv",
-                .apart = {}};
-  if (choice.family->name == "slip") {
-    write_volume(near_slip_of(one), view(truth::near_slip(*subject_, volume_.geometry())));
-    one.apart = folder / volume_file("near-slip");
+                .dose = set_.dose.empty() ? fs::path() : folder / volume_file("dose"),
+                .bands = {},
+                .moving_bands = {}};
+  if (choice.family->bands) {
+    const truth::Bands bands = choice.family->bands(*subject_, volume_.geometry());
+    one.bands = folder / volume_file("near-slip");
+    one.moving_bands = set_.folder / "moving" / volume_file("near-slip-" + choice.name);
+    one.bands_mm = bands.most_mm;
+    write_volume(one.moving_bands, view(bands.voxels));
   }
-  Stage stage(options_.common, choice.name);
+  place(one.field, [&](const fs::path& staged) { write_vertex_field(staged, field); });
   const std::vector<fs::path> files = files_of(one);
   if (!std::all_of(files.begin(), files.end(), [](const fs::path& file) { return fs::exists(file); })) {
     fs::remove_all(folder);
@@ -359,12 +426,13 @@ void TruthMaker::make_case(const truth::CaseChoice& choice) {
   if (!fs::exists(one.fixed)) {
     const InputOptions made = volume_named(deformed(one));
     AnyVolume volume = read_input(made, open_input(made, options_.common), options_.common, stage.control()).volume;
-    if (options_.noise_hu > 0) {
-      truth::add_noise(std::as_const(volume).view(), options_.noise_hu, truth::noise_seed(options_.seed, choice.name),
+    if (noise_.deviation > 0) {
+      truth::add_noise(std::as_const(volume).view(), noise_, truth::noise_seed(options_.seed, choice.name),
                        volume.view(), {.threads = options_.common.threads});
     }
     write_volume(one.fixed, std::as_const(volume).view());
   }
+  if (options_.dense) write_forward(folder / volume_file("forward"), field, stage.control());
   set_.cases.push_back(one);
   say(options_.common, "made " + folder.string());
 }
@@ -376,11 +444,16 @@ void TruthMaker::finish() {
   const auto hash = [&](const fs::path& path) {
     if (!path.empty()) hashes[path.lexically_relative(set_.folder).generic_string()] = hash_file(path);
   };
-  hash(set_.moving), hash(set_.labels), hash(set_.landmarks);
+  for (const fs::path& path : {set_.moving, set_.body, set_.labels, set_.landmarks, set_.dose}) hash(path);
   for (const TruthCase& one : set_.cases) {
-    for (const fs::path& path : {one.fixed, one.field, one.body, one.labels, one.landmarks, one.apart}) hash(path);
+    for (const fs::path& path : {one.fixed, one.field, one.body, one.labels, one.landmarks, one.dose, one.bands})
+      hash(path);
   }
   document["sha256"] = hashes;
+  document["noise"] = {{"standard_deviation_hu", noise_.deviation},
+                       {"measured", options_.noise == kMeasuredNoise},
+                       {"radius", noise_.radius},
+                       {"kernel", noise_.kernel}};
   place(set_.folder / "README.txt", [&](const fs::path& staged) {
     write_text(
         staged,

@@ -53,11 +53,11 @@ void add_truth(CLI::App& app, TruthOptions& options) {
       ->type_name("N")
       ->capture_default_str();
   command
-      ->add_option("--noise", options.noise_hu,
+      ->add_option("--noise", options.noise,
                    "Standard deviation of noise that is added to the moving volume and to each fixed one, of its own "
-                   "for each: noise that moves with the tissue helps registrations")
-      ->check(real_number(0, 1000))
-      ->type_name("HU")
+                   "for each, because noise that moves with the tissue helps registrations; measured: as much as INPUT "
+                   "has, with its grain, as differences of neighbouring slices show it")
+      ->type_name("HU|measured")
       ->capture_default_str();
   command->add_option("--seed", options.seed, "Decides the noise")
       ->check(whole_number(0, INT64_MAX))
@@ -67,7 +67,13 @@ void add_truth(CLI::App& app, TruthOptions& options) {
                    "What goes along: RT Dose, RT Structure Set, SEG (.dcm), or a volume file; each case gets one of "
                    "the same name; may be repeated")
       ->type_name("FILE");
-  command->add_flag("--dense", options.dense, "Write the exact inverse at every voxel too, 12 bytes each");
+  command
+      ->add_option("--dose", options.dose,
+                   "RT Dose (.dcm) or volume file of the dose; goes along, and score compares it (gamma index)")
+      ->type_name("FILE");
+  command->add_flag(
+      "--dense", options.dense,
+      "Write the exact displacements at every voxel too, 12 bytes each: fixed to moving, moving to fixed");
   command->add_option("--compress", options.compression, "Level of .nii.gz; 0: .nii")
       ->check(whole_number(0, 9))
       ->type_name("LEVEL")

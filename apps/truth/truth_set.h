@@ -4,6 +4,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -18,14 +19,19 @@ struct TruthCase {
       body,                     ///< mask of the body of the fixed volume
       labels,                   ///< labels of the fixed volume; empty: none
       landmarks,                ///< where those of the moving volume come to lie; empty: none
-      apart;                    ///< mask of what is scored by itself, near a slip; empty: nothing
+      dose,                     ///< dose that went along; empty: none
+      bands,         ///< voxels by their distance from a slip, the nearest (1) scored by themselves; or empty
+      moving_bands;  ///< the same of the moving volume
+  std::vector<double> bands_mm = {};  ///< how far the bands reach
 };
 
 /// A set of known truth: what `truth` writes and `score` reads.
 struct TruthSet {
   std::filesystem::path folder;
-  std::filesystem::path moving,  ///< the moving volume
-      labels, landmarks;         ///< of the moving volume; empty: none
+  std::filesystem::path moving,                    ///< the moving volume
+      body,                                        ///< mask of its body
+      labels, landmarks, dose;                     ///< of the moving volume; empty: none
+  std::map<std::int64_t, std::string> roles = {};  ///< what labels are, where a role says it
   std::vector<TruthCase> cases;
 };
 

@@ -3,19 +3,12 @@
 
 #include "deform/score/overlap.h"
 
-#include "deform/errors.h"
+#include "deform/score/label_map.h"
 
 namespace tetwarp::score {
 
 std::map<std::int64_t, Overlap> compare_labels(const ConstVolumeView& first, const ConstVolumeView& second) {
-  for (const ConstVolumeView* map : {&first, &second}) {
-    require(map->voxels && map->memory == Memory::host && map->components == 1 && map->type != VoxelType::f32 &&
-                map->type != VoxelType::f64 && map->buffered == whole(*map->geometry),
-            "labels are compared of whole volumes of whole numbers in host memory");
-  }
-  require(first.geometry->size == second.geometry->size, "label maps of " + to_string(first.geometry->size) + " and " +
-                                                             to_string(second.geometry->size) +
-                                                             " voxels cannot be compared");
+  require_label_maps(first, second);
   const auto count = static_cast<std::size_t>(voxel_count(*first.geometry));
   std::map<std::int64_t, Overlap> overlaps;
   dispatch(first.type, [&]<class A>(A) {

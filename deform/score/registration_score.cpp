@@ -11,9 +11,11 @@
 #include <glm/matrix.hpp>
 #include <limits>
 
+#include "deform/core/trilinear.h"
 #include "deform/cpu/tiles.h"
-#include "deform/distance_histogram.h"
 #include "deform/errors.h"
+#include "deform/score/error_sums.h"
+#include "deform/score/label_map.h"
 
 namespace tetwarp::score {
 
@@ -22,54 +24,20 @@ namespace {
 constexpr std::int64_t kSlab = 8;  // slices of the truth that are held at a time
 constexpr double kNothing = std::numeric_limits<double>::infinity();
 
-/// Collects errors. Those of slices are added up in their order, so the sums do not depend on threads.
-class ErrorSums {
- public:
-  void add(double distance, const glm::dvec3& where) {
-    ++errors_.points;
-    sum_ += distance;
-    histogram_.add(distance);
-    if (distance > errors_.largest || errors_.points == 1) errors_.largest = distance, errors_.worst = where;
-  }
-  void add_missing() { ++errors_.missing; }
-  void add(const ErrorSums& later) {
-    if (later.errors_.points > 0 && (errors_.points == 0 || later.errors_.largest > errors_.largest)) {
-      errors_.largest = later.errors_.largest;
-      errors_.worst = later.errors_.worst;
-    }
-    errors_.points += later.errors_.points;
-    errors_.missing += later.errors_.missing;
-    sum_ += later.sum_;
-    histogram_.add(later.histogram_);
-  }
-  Errors errors() const {
-    Errors all = errors_;
-    if (all.points == 0) return all;
-    all.mean = sum_ / static_cast<double>(all.points);
-    const auto percentile = [&](double part) { return std::min(histogram_.percentile(part, all.points), all.largest); };
-    all.median = percentile(0.5);
-    all.percentile_95 = percentile(0.95);
-    all.percentile_99 = percentile(0.99);
-    return all;
-  }
-
- private:
-  Errors errors_;
-  double sum_ = 0;
-  DistanceHistogram histogram_;
-};
-
 /// What is found in one slice.
 struct SliceSums {
-  ErrorSums all;
-  std::map<std::int64_t, ErrorSums> labels;
+  ErrorSums all, apart;
+  std::vector<std::map<std::int64_t, ErrorSums>> parts;
   std::array<double, kReadings> readings{};
   std::uint64_t determinants = 0, folded = 0;
   double smallest = kNothing, largest = -kNothing, determinant_error = 0;
 
   void add(const SliceSums& later) {
     all.add(later.all);
-    for (const auto& [label, sums] : later.labels) labels[label].add(sums);
+    apart.add(later.apart);
+    parts.resize(later.parts.size());
+    for (std::size_t n = 0; n < parts.size(); ++n)
+      for (const auto& [label, sums] : later.parts[n]) parts[n][label].add(sums);
     for (std::size_t n = 0; n < kReadings; ++n) readings[n] += later.readings[n];
     determinants += later.determinants;
     folded += later.folded;
@@ -116,28 +84,74 @@ class ResultMap {
 
 bool is_place(const glm::dvec3& point) { return std::isfinite(point.x + point.y + point.z); }
 
-/// Some slices of what the truth says.
-struct TruthSlab {
-  std::vector<std::uint8_t> coverage;
-  std::vector<glm::vec3> inverse;
-  std::vector<float> jacobian;
+/// Looks at the voxels of a field, slice by slice.
+class FieldScorer {
+ public:
+  FieldScorer(const PullField& result, std::span<const Counts> counts, std::span<const ConstVolumeView> parts)
+      : map_(result), size_(result.grid.size), counts_(counts), parts_(parts) {}
 
-  TruthSlab(ForwardResampler& truth, const Region& slices, const Control& control) {
-    const Geometry& grid = truth.output();
-    const auto count = static_cast<std::size_t>(voxel_count(slices));
-    coverage.resize(count);
-    inverse.resize(count);
-    jacobian.resize(count);
-    const auto map = [&](auto& values, VoxelType type, int components) {
-      return VolumeView{&grid, slices, type, components, std::as_writable_bytes(std::span(values)).data()};
-    };
-    truth.resample(slices, {},
-                   {.coverage = map(coverage, VoxelType::u8, 1),
-                    .inverse_mm = map(inverse, VoxelType::f32, 3),
-                    .jacobian = map(jacobian, VoxelType::f32, 1)},
-                   {.stop = control.stop, .stream = control.stream});
+  /// What is found in a slice. @param first  index of the slab's first slice
+  SliceSums look_at(std::int64_t k, const TruthSlab& slab, std::int64_t first) const {
+    SliceSums sums;
+    sums.parts.resize(parts_.size());
+    const std::int64_t area = size_.x * size_.y;
+    std::int64_t voxel = k * area;
+    for (std::int64_t j = 0; j < size_.y; ++j) {
+      for (std::int64_t i = 0; i < size_.x; ++i, ++voxel) {
+        const auto at = static_cast<std::size_t>(voxel - first * area);
+        if (counts_[static_cast<std::size_t>(voxel)] != Counts::no && slab.is_known[at])
+          look_at({i, j, k}, voxel, glm::dvec3(slab.displacement[at]), static_cast<double>(slab.determinant[at]), sums);
+      }
+    }
+    return sums;
   }
+
+ private:
+  void look_at(const glm::i64vec3& at, std::int64_t voxel, const glm::dvec3& wanted, double true_determinant,
+               SliceSums& sums) const {
+    const glm::dvec3 by = map_.displacement(voxel), where = map_.point(at);
+    const double distance = is_place(by) ? glm::distance(by, wanted) : NAN;
+    if (counts_[static_cast<std::size_t>(voxel)] == Counts::apart) return sums.apart.add_or_miss(distance, where);
+    sums.all.add_or_miss(distance, where);
+    for (std::size_t n = 0; n < parts_.size(); ++n)
+      sums.parts[n][label_at(parts_[n], voxel)].add_or_miss(distance, where);
+    if (std::isnan(distance)) return;
+    const auto readings = map_.readings(by);
+    for (std::size_t n = 0; n < kReadings; ++n) sums.readings[n] += glm::distance(readings[n], wanted);
+    const double determinant = map_.determinant(at, voxel);
+    if (std::isnan(determinant)) return;
+    ++sums.determinants;
+    sums.folded += determinant <= 0;
+    sums.smallest = std::min(sums.smallest, determinant);
+    sums.largest = std::max(sums.largest, determinant);
+    sums.determinant_error += std::abs(determinant - true_determinant);
+  }
+
+  ResultMap map_;
+  glm::i64vec3 size_;
+  std::span<const Counts> counts_;
+  std::span<const ConstVolumeView> parts_;
 };
+
+DenseScore score_of(const SliceSums& all) {
+  DenseScore score;
+  score.all = all.all.errors();
+  score.apart = all.apart.errors();
+  for (const auto& sums_of : all.parts) {
+    std::map<std::int64_t, Errors>& errors = score.parts.emplace_back();
+    for (const auto& [label, sums] : sums_of) errors[label] = sums.errors();
+  }
+  for (std::size_t n = 0; n < kReadings; ++n)
+    score.readings[n] = all.readings[n] / static_cast<double>(std::max<std::uint64_t>(score.all.points, 1));
+  score.determinants = all.determinants;
+  score.folded = all.folded;
+  if (all.determinants > 0) {
+    score.smallest_determinant = all.smallest;
+    score.largest_determinant = all.largest;
+    score.mean_determinant_error = all.determinant_error / static_cast<double>(all.determinants);
+  }
+  return score;
+}
 
 }  // namespace
 
@@ -162,99 +176,78 @@ Reading suspected_reading(const DenseScore& score) {
   return best;
 }
 
-DenseScore score_field(ForwardResampler& truth, const PullField& result, const std::vector<std::uint8_t>& counts,
-                       const ConstVolumeView& labels, const Limits& limits, const Control& control) {
-  const Geometry& grid = truth.output();
+DenseScore score_field(Truth& truth, const PullField& result, std::span<const Counts> counts,
+                       std::span<const ConstVolumeView> parts, const Limits& limits, const Control& control) {
+  const Geometry& grid = truth.grid();
   const glm::i64vec3 size = grid.size;
-  const std::int64_t area = size.x * size.y;
   require(result.grid.size == size && std::ssize(result.displacement) == voxel_count(grid),
-          "the result lies on a grid of " + tetwarp::to_string(result.grid.size) + ", the fixed volume on one of " +
+          "the result lies on a grid of " + tetwarp::to_string(result.grid.size) + ", the truth on one of " +
               tetwarp::to_string(size));
-  require(std::ssize(counts) == voxel_count(grid), "there has to be a mark for each voxel of the fixed volume");
-  require(!labels.voxels || (labels.buffered == whole(grid) && labels.components == 1 &&
-                             labels.type != VoxelType::f32 && labels.type != VoxelType::f64),
-          "labels have to be whole numbers on the grid of the fixed volume");
-  const ResultMap map(result);
+  require(std::ssize(counts) == voxel_count(grid), "there has to be a mark for each voxel of the truth's grid");
+  for (const ConstVolumeView& labels : parts) {
+    require_label_map(labels);
+    require(labels.geometry->size == size, "labels have to lie on the grid of the truth");
+  }
+  const FieldScorer scorer(result, counts, parts);
   SliceSums all;
+  all.parts.resize(parts.size());
   cpu::WorkProgress progress(control, size.z);
   cpu::Arena arena(limits);
   for (std::int64_t begin = 0; begin < size.z; begin += kSlab) {
     const std::int64_t end = std::min(begin + kSlab, size.z);
-    const TruthSlab slab(truth, {{0, 0, begin}, {size.x, size.y, end}}, control);
+    const TruthSlab slab = truth.slab({{0, 0, begin}, {size.x, size.y, end}}, control);
     std::vector<SliceSums> slices(static_cast<std::size_t>(end - begin));
-    const auto look_at = [&](std::int64_t k, auto&& label_of) {
-      SliceSums& sums = slices[static_cast<std::size_t>(k - begin)];
-      std::int64_t voxel = k * area;
-      for (std::int64_t j = 0; j < size.y; ++j) {
-        for (std::int64_t i = 0; i < size.x; ++i, ++voxel) {
-          const auto at = static_cast<std::size_t>(voxel - begin * area);
-          if (!counts[static_cast<std::size_t>(voxel)] || !slab.coverage[at]) continue;
-          ErrorSums* const of_label = label_of(sums, voxel);
-          const glm::dvec3 by = map.displacement(voxel);
-          if (!is_place(by)) {
-            sums.all.add_missing();
-            if (of_label) of_label->add_missing();
-            continue;
-          }
-          const glm::dvec3 wanted(slab.inverse[at]);
-          const auto readings = map.readings(by);
-          for (std::size_t n = 0; n < kReadings; ++n) sums.readings[n] += glm::distance(readings[n], wanted);
-          const double distance = glm::distance(by, wanted);
-          const glm::dvec3 where = map.point({i, j, k});
-          sums.all.add(distance, where);
-          if (of_label) of_label->add(distance, where);
-          const double determinant = map.determinant({i, j, k}, voxel);
-          if (std::isnan(determinant)) continue;
-          ++sums.determinants;
-          sums.folded += determinant <= 0;
-          sums.smallest = std::min(sums.smallest, determinant);
-          sums.largest = std::max(sums.largest, determinant);
-          sums.determinant_error += std::abs(determinant - 1 / static_cast<double>(slab.jacobian[at]));
-        }
-      }
-      progress.done(1);
-    };
     arena.execute([&] {
       tbb::parallel_for(begin, end, [&](std::int64_t k) {
-        if (!labels.voxels)
-          return look_at(k, [](SliceSums&, std::int64_t) { return static_cast<ErrorSums*>(nullptr); });
-        dispatch(labels.type, [&]<class V>(V) {
-          const V* values = reinterpret_cast<const V*>(labels.voxels);
-          look_at(k, [&](SliceSums& sums, std::int64_t voxel) {
-            return &sums.labels[static_cast<std::int64_t>(values[voxel])];
-          });
-        });
+        slices[static_cast<std::size_t>(k - begin)] = scorer.look_at(k, slab, begin);
+        progress.done(1);
       });
     });
     for (const SliceSums& slice : slices) all.add(slice);
   }
-  DenseScore score;
-  score.all = all.all.errors();
-  require(score.all.points + score.all.missing > 0, "no voxel of the fixed volume counts");
-  for (const auto& [label, sums] : all.labels) score.labels[label] = sums.errors();
-  for (std::size_t n = 0; n < kReadings; ++n)
-    score.readings[n] = all.readings[n] / static_cast<double>(std::max<std::uint64_t>(score.all.points, 1));
-  score.determinants = all.determinants;
-  score.folded = all.folded;
-  if (all.determinants > 0) {
-    score.smallest_determinant = all.smallest;
-    score.largest_determinant = all.largest;
-    score.mean_determinant_error = all.determinant_error / static_cast<double>(all.determinants);
-  }
-  return score;
+  require(all.all.count() > 0, "no voxel of the truth's grid counts");
+  return score_of(all);
+}
+
+Errors consistency(const PullField& first, const PullField& second, const PullField* whole,
+                   std::span<const Counts> counts, const Limits& limits, const Control& control) {
+  const glm::i64vec3 size = first.grid.size, further = second.grid.size;
+  require(std::ssize(counts) == voxel_count(first.grid) && std::ssize(first.displacement) == voxel_count(first.grid) &&
+              std::ssize(second.displacement) == voxel_count(second.grid) &&
+              (!whole || (whole->grid.size == size && std::ssize(whole->displacement) == voxel_count(first.grid))),
+          "fields and marks that are compared do not fit their grids");
+  const AffineMap point = point_from_index(first.grid), index = index_from_point(second.grid);
+  std::vector<ErrorSums> slices(static_cast<std::size_t>(size.z));
+  cpu::WorkProgress progress(control, size.z);
+  cpu::Arena arena(limits);
+  arena.execute([&] {
+    tbb::parallel_for(std::int64_t{0}, size.z, [&](std::int64_t k) {
+      auto voxel = static_cast<std::size_t>(k * size.x * size.y);
+      for (std::int64_t j = 0; j < size.y; ++j) {
+        for (std::int64_t i = 0; i < size.x; ++i, ++voxel) {
+          if (counts[voxel] != Counts::yes) continue;
+          const glm::dvec3 from = point(glm::dvec3(i, j, k)), between = from + glm::dvec3(first.displacement[voxel]);
+          const glm::dvec3 by = trilinear(further, index(between), [&](const glm::i64vec3& at) {
+            return second.displacement[static_cast<std::size_t>(at.x + further.x * (at.y + further.y * at.z))];
+          });
+          const glm::dvec3 wanted = whole ? from + glm::dvec3(whole->displacement[voxel]) : from;
+          slices[static_cast<std::size_t>(k)].add_or_miss(glm::distance(between + by, wanted), from);
+        }
+      }
+      progress.done(1);
+    });
+  });
+  ErrorSums all;
+  for (const ErrorSums& slice : slices) all.add(slice);
+  return all.errors();
 }
 
 Errors score_points(std::span<const glm::dvec3> found, std::span<const glm::dvec3> wanted) {
   require(found.size() == wanted.size(), "there are " + std::to_string(found.size()) + " points where " +
                                              std::to_string(wanted.size()) + " are wanted");
   ErrorSums sums;
-  for (std::size_t n = 0; n < found.size(); ++n) {
-    if (is_place(found[n])) {
-      sums.add(glm::distance(found[n], wanted[n]), wanted[n]);
-    } else {
-      sums.add_missing();
-    }
-  }
+  for (std::size_t n = 0; n < found.size(); ++n)
+    sums.add_or_miss(is_place(found[n]) ? glm::distance(found[n], wanted[n]) : NAN, wanted[n]);
   return sums.errors();
 }
 

@@ -6,15 +6,17 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "deform/resampler.h"
+#include "deform/score/truth.h"
 
 /// How far a registration is off, where the truth is known.
 ///
 /// The moving volume is the original, the fixed volume the deformed one. A registration gives a map T from fixed to
-/// moving; the truth is x0(p), the undeformed place of p. The error at a voxel centre p is |T(p) - x0(p)|.
+/// moving; the truth is x0(p), the undeformed place of p. The error at a voxel centre p is |T(p) - x0(p)|. In the other
+/// direction T leads from moving to fixed, and the truth is the forward map.
 namespace tetwarp::score {
 
 /// Distances, mm. They are the same for any number of threads and any backend.
@@ -42,18 +44,27 @@ constexpr std::size_t kReadings = 5;
 /// Words for a person: "as given", "the inverse" and others.
 std::string to_string(Reading reading);
 
+/// Whether and how a voxel is compared.
+enum class Counts : std::uint8_t {
+  no,    ///< not at all
+  yes,   ///< with the others
+  apart  ///< by itself: near a surface along which tissue slips
+};
+
 /// What a result is like, voxel by voxel.
 struct DenseScore {
-  Errors all;                                ///< of all voxels that count
-  std::map<std::int64_t, Errors> labels;     ///< of each label, where there are labels
+  Errors all;    ///< of all voxels that count with the others
+  Errors apart;  ///< of those that are compared by themselves
+  /// For each map of parts: errors of the voxels of `all`, by their value in the map.
+  std::vector<std::map<std::int64_t, Errors>> parts;
   std::array<double, kReadings> readings{};  ///< mean error of each reading, over the voxels of `all`
-  /// Determinants of the gradient of T, by central differences between neighbouring voxels, over the voxels that count
-  /// and have all neighbours.
+  /// Determinants of the gradient of T, by central differences between neighbouring voxels, over the voxels of `all`
+  /// that have all neighbours.
   std::uint64_t determinants = 0;
   std::uint64_t folded = 0;           ///< determinants that are 0 or below
   double smallest_determinant = 0,    ///< smallest determinant
       largest_determinant = 0;        ///< largest determinant
-  double mean_determinant_error = 0;  ///< mean of |det T - 1 / J|, where J is the owner's determinant
+  double mean_determinant_error = 0;  ///< mean distance of the determinant from the true map's
 };
 
 /// The reading that fits much better than the one that was given, if there is one: its mean error is less than half of
@@ -61,17 +72,29 @@ struct DenseScore {
 Reading suspected_reading(const DenseScore& score);
 
 /// Scores a displacement field.
-/// @param truth   resampler onto the grid of the fixed volume, whose field is the true one
+/// @param truth   what is true, on the grid of the result
 /// @param result  T(p) - p at each voxel of that grid, LPS mm; NaN where the registration says no place
-/// @param counts  not 0 for the voxels that count, such as those of the body, i fastest. Voxels onto which the truth
-///        maps nothing do not count
-/// @param labels  labels of the fixed volume on the same grid, or an empty view
+/// @param counts  for each voxel, i fastest. Voxels of which the truth says nothing do not count
+/// @param parts   label maps on the same grid, such as organs: errors are told for each label of each of them
 /// @param limits  number of threads
 /// @param control progress and stop
-/// @throws InputError for sizes that do not fit, labels that are not whole numbers, or no voxel that counts; and as
-///         `Resampler::resample`; Cancelled
-DenseScore score_field(ForwardResampler& truth, const PullField& result, const std::vector<std::uint8_t>& counts,
-                       const ConstVolumeView& labels, const Limits& limits = {}, const Control& control = {});
+/// @throws InputError for sizes that do not fit, labels that are not whole numbers, or no voxel that counts with the
+///         others; and as `Truth::slab`; Cancelled
+DenseScore score_field(Truth& truth, const PullField& result, std::span<const Counts> counts,
+                       std::span<const ConstVolumeView> parts = {}, const Limits& limits = {},
+                       const Control& control = {});
+
+/// How far two results are from agreeing: |second(first(p)) - whole(p)| at voxel centres p, where `second` is taken
+/// between its samples, trilinearly. With the two directions of a registration, and nothing as the whole, that is its
+/// inverse consistency; with the results between three volumes their transitivity.
+/// @param first   displacement at each voxel of the grid of `counts`, LPS mm
+/// @param second  displacement on any grid of the space to which the first leads
+/// @param whole   displacement on the grid of the first; null: none, each point should come back to itself
+/// @param counts  for each voxel of the first: those with `Counts::yes` are compared
+/// @return errors; missing are voxels of which one of them says no place
+/// @throws InputError for sizes that do not fit; Cancelled
+Errors consistency(const PullField& first, const PullField& second, const PullField* whole,
+                   std::span<const Counts> counts, const Limits& limits = {}, const Control& control = {});
 
 /// Errors of points: distances of each from where it should be.
 /// @param found   LPS mm; NaN: no place

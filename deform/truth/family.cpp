@@ -13,6 +13,7 @@
 #include "deform/field_quality.h"
 #include "deform/parameter_text.h"
 #include "deform/truth/motions.h"
+#include "deform/truth/slip_tube.h"
 
 namespace tetwarp::truth {
 
@@ -50,7 +51,8 @@ const std::vector<Family>& all_families() {
        "what lies inside the chest wall slides along it, towards the feet",
        {"lung", "bone"},
        {{"amplitude", 15, 0, 100, "mm"}},
-       &slip_motion},
+       &slip_motion,
+       &slip_bands},
       {"flexion",
        "the spine bends forward, and each bone moves rigidly",
        {"bone"},

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "deform/truth/bands.h"
 #include "deform/truth/subject.h"
 
 namespace tetwarp::truth {
@@ -33,6 +34,8 @@ struct Family {
   /// Makes the field. The same subject and values give the same bits on every machine.
   /// @throws InputError where the subject does not go with it; Cancelled
   VertexField (*make)(const Subject& subject, const Values& values, const Limits& limits, const Control& control);
+  /// If tissue slips along a surface: how far the voxels of a volume are from it. Else null.
+  Bands (*bands)(const Subject& subject, const Geometry& volume) = nullptr;
 };
 /// All families.
 std::span<const Family> families();

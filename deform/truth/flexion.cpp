@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 
+#include "deform/distance_map.h"
 #include "deform/errors.h"
 #include "deform/fields/sincos.h"
 #include "deform/truth/levels.h"
@@ -69,7 +70,7 @@ VertexField flexion_motion(const Subject& subject, const Values& values, const L
     if (places.empty()) continue;
     Bone bone;
     for (const glm::dvec3& place : places) bone.z += place.z / static_cast<double>(places.size());
-    bone.distance = distance_mm(lattice, marked);
+    bone.distance = distance_mm(lattice, marked, limits);
     bones.push_back(std::move(bone));
   }
   // Far from all bones the bending alone counts: it weighs as much as a bone at this distance.

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "deform/distance_map.h"
 #include "deform/errors.h"
 #include "deform/fields/elastic.h"
 #include "deform/fields/point_map.h"
@@ -111,7 +112,7 @@ VertexField breathing_motion(const Subject& subject, const Values& values, const
                              const Control& control) {
   const double amplitude = value(values, "amplitude"), rise = value(values, "rise");
   const BreathingLevels levels(subject);
-  const std::vector<double> from_held = distance_mm(subject.lattice(), levels.held());
+  const std::vector<double> from_held = distance_mm(subject.lattice(), levels.held(), limits);
   // The slope of what fades is at most 1.5 / 3 of the amplitude, so the belly and the diaphragm keep their sides.
   const double fade = std::max(3 * amplitude, 1.0);
   return on_vertices(subject.lattice(), limits, control, [&](std::size_t vertex, const glm::dvec3& point) {

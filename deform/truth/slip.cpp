@@ -5,6 +5,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "deform/distance_map.h"
 #include "deform/errors.h"
 #include "deform/simulate/divided_lattice.h"
 #include "deform/truth/levels.h"
@@ -39,17 +40,22 @@ std::vector<glm::dvec2> convex_hull(std::vector<glm::dvec2> points) {
   return hull;
 }
 
+/// How deep each column of a lattice lies inside the tube, mm, i fastest.
+std::vector<double> column_depths(const SlipTube& tube, const Geometry& lattice) {
+  std::vector<double> depths;
+  for (std::int64_t j = 0; j < lattice.size.y; ++j)
+    for (std::int64_t i = 0; i < lattice.size.x; ++i) depths.push_back(tube.depth_mm(glm::dvec2(i, j)));
+  return depths;
+}
+
 /// On which side of the tube each node of a divided lattice lies: 1 inside, 0 outside. Copies lie where their piece
 /// does.
-std::vector<std::uint8_t> sides_of_nodes(const simulate::DividedLattice& divided, const SlipTube& tube,
+/// @param depths  of the columns
+std::vector<std::uint8_t> sides_of_nodes(const simulate::DividedLattice& divided, const std::vector<double>& depths,
                                          const Geometry& lattice) {
   const auto vertices = static_cast<std::size_t>(voxel_count(lattice));
   std::vector<std::uint8_t> inside(vertices + divided.copies_of.size());
-  const std::int64_t columns = lattice.size.x * lattice.size.y;
-  for (std::size_t n = 0; n < vertices; ++n) {
-    const std::int64_t column = static_cast<std::int64_t>(n) % columns;
-    inside[n] = tube.depth_mm(glm::dvec2(column % lattice.size.x, column / lattice.size.x)) > 0;
-  }
+  for (std::size_t n = 0; n < vertices; ++n) inside[n] = depths[n % depths.size()] > 0;
   // Which sign of a piece means inside: that of a piece most of whose own vertices lie there.
   std::int64_t agree = 0;
   for (std::size_t piece = 0; piece < divided.pieces.size(); ++piece) {
@@ -65,13 +71,34 @@ std::vector<std::uint8_t> sides_of_nodes(const simulate::DividedLattice& divided
   return inside;
 }
 
+/// How far the bands reach, mm.
+std::vector<double> band_ends_mm(const Geometry& lattice) {
+  const double diagonal = std::sqrt(lattice.spacing.x * lattice.spacing.x + lattice.spacing.y * lattice.spacing.y);
+  return {diagonal, diagonal + 10, diagonal + 20};
+}
+
+/// Bands of one slice of a volume. The third axes of the volume and the lattice are the same, so all slices are alike.
+std::vector<std::uint8_t> bands_of_slice(const SlipTube& tube, const Geometry& lattice, const Geometry& volume) {
+  const std::vector<double> ends = band_ends_mm(lattice);
+  const AffineMap index = index_from_point(lattice) * point_from_index(volume);
+  std::vector<std::uint8_t> bands;
+  for (std::int64_t j = 0; j < volume.size.y; ++j) {
+    for (std::int64_t i = 0; i < volume.size.x; ++i) {
+      const double distance = std::abs(tube.depth_mm(glm::dvec2(index(glm::dvec3(i, j, 0)))));
+      const auto band = std::lower_bound(ends.begin(), ends.end(), distance) - ends.begin();
+      bands.push_back(band == std::ssize(ends) ? std::uint8_t{0} : static_cast<std::uint8_t>(band + 1));
+    }
+  }
+  return bands;
+}
+
 /// Refuses a slip that opens or overlaps: near it more than a thousandth of all voxels of the volume have no owner or
 /// several. Slices from which tissue goes out of the volume do not count.
-void check_slip(const Subject& subject, const VertexField& field, double amplitude, const Limits& limits,
-                const Control& control) {
+void check_slip(const Subject& subject, const SlipTube& tube, const VertexField& field, double amplitude,
+                const Limits& limits, const Control& control) {
   constexpr double kMost = 1e-3;
   const Geometry& grid = subject.volume();
-  const Volume<std::uint8_t> near = near_slip(subject, grid);
+  const std::vector<std::uint8_t> bands = bands_of_slice(tube, subject.lattice(), grid);
   const auto margin = static_cast<std::int64_t>(std::ceil(amplitude / grid.spacing.z)) + 1;
   const std::int64_t area = grid.size.x * grid.size.y;
   const auto resampler = make_cpu_resampler(grid, limits);
@@ -83,7 +110,7 @@ void check_slip(const Subject& subject, const VertexField& field, double amplitu
     const VolumeView map{&grid, slice, VoxelType::u16, 1, std::as_writable_bytes(std::span(owners)).data()};
     resampler->resample(slice, {}, {.owners = map}, {.stop = control.stop});
     for (std::int64_t n = 0; n < area; ++n)
-      bad += near.voxels[static_cast<std::size_t>(k * area + n)] && owners[static_cast<std::size_t>(n)] != 1;
+      bad += bands[static_cast<std::size_t>(n)] == 1 && owners[static_cast<std::size_t>(n)] != 1;
   }
   const double share = static_cast<double>(bad) / static_cast<double>(voxel_count(grid));
   require(share <= kMost, "the slip opens or overlaps at " + std::to_string(bad) + " voxels, " +
@@ -148,22 +175,13 @@ simulate::Cut SlipTube::cut() const {
   return {"chest wall", tube};
 }
 
-Volume<std::uint8_t> near_slip(const Subject& subject, const Geometry& volume) {
-  const SlipTube tube(subject);
-  const Geometry& lattice = subject.lattice();
-  const double cell = std::sqrt(lattice.spacing.x * lattice.spacing.x + lattice.spacing.y * lattice.spacing.y);
-  const AffineMap index = index_from_point(lattice) * point_from_index(volume);
-  // The third axes of both grids are the same, so all slices are alike.
-  const auto area = static_cast<std::size_t>(volume.size.x * volume.size.y);
-  std::vector<std::uint8_t> slice(area);
-  for (std::size_t n = 0; n < area; ++n) {
-    const auto at = static_cast<std::int64_t>(n);
-    const glm::dvec3 vertex = index(glm::dvec3(at % volume.size.x, at / volume.size.x, 0));
-    slice[n] = std::abs(tube.depth_mm(glm::dvec2(vertex))) <= cell;
-  }
-  Volume<std::uint8_t> near{volume, {}};
-  for (std::int64_t k = 0; k < volume.size.z; ++k) near.voxels.insert(near.voxels.end(), slice.begin(), slice.end());
-  return near;
+Bands slip_bands(const Subject& subject, const Geometry& volume) {
+  const std::vector<std::uint8_t> slice = bands_of_slice(SlipTube(subject), subject.lattice(), volume);
+  Bands bands{band_ends_mm(subject.lattice()), {volume, {}}};
+  std::vector<std::uint8_t>& voxels = bands.voxels.voxels;
+  voxels.reserve(static_cast<std::size_t>(voxel_count(volume)));
+  for (std::int64_t k = 0; k < volume.size.z; ++k) voxels.insert(voxels.end(), slice.begin(), slice.end());
+  return bands;
 }
 
 VertexField slip_motion(const Subject& subject, const Values& values, const Limits& limits, const Control& control) {
@@ -173,13 +191,10 @@ VertexField slip_motion(const Subject& subject, const Values& values, const Limi
   const double amplitude = values.find("amplitude")->second;
   // Bones deep inside, such as the spine between the lungs, stay; those beside the wall are outside, or slid along.
   constexpr double kDeepMm = 15;
+  const std::vector<double> depths = column_depths(tube, lattice);
   std::vector<std::uint8_t> held = levels.held();
-  const std::int64_t columns = lattice.size.x * lattice.size.y;
-  for (std::size_t n = 0; n < held.size(); ++n) {
-    const std::int64_t column = static_cast<std::int64_t>(n) % columns;
-    if (held[n]) held[n] = tube.depth_mm(glm::dvec2(column % lattice.size.x, column / lattice.size.x)) > kDeepMm;
-  }
-  const std::vector<double> from_held = distance_mm(lattice, held);
+  for (std::size_t n = 0; n < held.size(); ++n) held[n] = held[n] && depths[n % depths.size()] > kDeepMm;
+  const std::vector<double> from_held = distance_mm(lattice, held, limits);
   const double fade = std::max(3 * amplitude, 1.0);
   const glm::dvec3 down = lattice.direction[2] * (lattice.direction[2].z > 0 ? -1.0 : 1.0);
   const VertexField inner = on_vertices(lattice, limits, control, [&](std::size_t vertex, const glm::dvec3& point) {
@@ -187,14 +202,14 @@ VertexField slip_motion(const Subject& subject, const Values& values, const Limi
   });
   const simulate::Cut cut = tube.cut();
   const simulate::DividedLattice divided = simulate::divide(lattice, {&cut, 1});
-  const std::vector<std::uint8_t> inside = sides_of_nodes(divided, tube, lattice);
+  const std::vector<std::uint8_t> inside = sides_of_nodes(divided, depths, lattice);
   std::vector<glm::vec3> displacement(inside.size(), glm::vec3(0));
   for (std::size_t n = 0; n < inside.size(); ++n) {
     const std::size_t vertex = n < inner.displacement.size() ? n : divided.copies_of[n - inner.displacement.size()];
     if (inside[n]) displacement[n] = inner.displacement[vertex];
   }
   VertexField field = simulate::field_of(lattice, divided, displacement);
-  check_slip(subject, field, amplitude, limits, control);
+  check_slip(subject, tube, field, amplitude, limits, control);
   return field;
 }
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "deform/simulate/cut.h"
+#include "deform/truth/bands.h"
 #include "deform/truth/subject.h"
-#include "deform/volume.h"
 
 namespace tetwarp::truth {
 
@@ -31,11 +31,11 @@ class SlipTube {
   std::vector<glm::dvec2> corners_;  ///< continuous index along i and j, turning left
 };
 
-/// Marks the voxels of a volume that lie at most the diagonal of a cell from the tube: inside cells that it divides it
-/// is rounded at its bends, and what samples of a field say across it is no truth.
+/// The voxels of a volume by their distance from the tube. The first band reaches a cell's diagonal: inside cells that
+/// the tube divides it is rounded at its bends, and what samples of a field say across it is no truth. Two more bands
+/// reach 10 mm and 20 mm further.
 /// @param subject  as of `SlipTube`
 /// @param volume   grid of the volume over which the subject's lattice lies
-/// @return 1 for those voxels, else 0, i fastest
-Volume<std::uint8_t> near_slip(const Subject& subject, const Geometry& volume);
+Bands slip_bands(const Subject& subject, const Geometry& volume);
 
 }  // namespace tetwarp::truth

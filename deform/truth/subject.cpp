@@ -11,54 +11,6 @@
 
 namespace tetwarp::truth {
 
-namespace {
-
-constexpr double kNowhere = std::numeric_limits<double>::infinity();
-
-/// Squared distances along one line: the lower envelope of parabolas.
-class Line {
- public:
-  explicit Line(std::size_t most) : values_(most), at_(most), from_(most + 1) {}
-
-  /// @param squares  of a line, `stride` apart; replaced
-  void transform(double* squares, std::size_t count, std::size_t stride, double step) {
-    std::size_t used = 0;
-    for (std::size_t n = 0; n < count; ++n) {
-      values_[n] = squares[n * stride];
-      if (values_[n] == kNowhere) continue;
-      double meets = -kNowhere;
-      while (used > 0) {
-        meets = crossing(at_[used - 1], n, step);
-        if (meets > from_[used - 1]) break;
-        --used;
-      }
-      at_[used] = n;
-      from_[used] = used == 0 ? -kNowhere : meets;
-      ++used;
-    }
-    if (used == 0) return;
-    std::size_t piece = 0;
-    for (std::size_t n = 0; n < count; ++n) {
-      while (piece + 1 < used && from_[piece + 1] < static_cast<double>(n)) ++piece;
-      const double apart = step * (static_cast<double>(n) - static_cast<double>(at_[piece]));
-      squares[n * stride] = apart * apart + values_[at_[piece]];
-    }
-  }
-
- private:
-  /// Where the parabola of sample b begins to lie below that of sample a, in samples.
-  double crossing(std::size_t a, std::size_t b, double step) const {
-    const auto x = static_cast<double>(a), y = static_cast<double>(b);
-    return ((values_[b] - values_[a]) / (step * step) + y * y - x * x) / (2 * (y - x));
-  }
-
-  std::vector<double> values_;
-  std::vector<std::size_t> at_;
-  std::vector<double> from_;
-};
-
-}  // namespace
-
 Subject::Subject(simulate::Patient patient, Roles roles, const Geometry& volume)
     : patient_(std::move(patient)), roles_(std::move(roles)), volume_(volume) {
   for (int axis = 0; axis < 3; ++axis) {
@@ -103,24 +55,6 @@ std::vector<std::uint8_t> Subject::table() const {
   }
   for (std::size_t n = 0; n < matter.size(); ++n) matter[n] = matter[n] && !body[n];
   return matter;
-}
-
-std::vector<double> distance_mm(const Geometry& lattice, const std::vector<std::uint8_t>& marked) {
-  const glm::i64vec3 size = lattice.size;
-  const auto count = static_cast<std::size_t>(voxel_count(lattice));
-  require(marked.size() == count, "distances are measured on a lattice with one mark a vertex");
-  std::vector<double> squares(count);
-  for (std::size_t n = 0; n < count; ++n) squares[n] = marked[n] ? 0 : kNowhere;
-  Line line(static_cast<std::size_t>(std::max({size.x, size.y, size.z})));
-  std::size_t stride = 1;
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto length = static_cast<std::size_t>(size[axis]);
-    for (std::size_t n = 0; n < count; ++n)
-      if (n / stride % length == 0) line.transform(squares.data() + n, length, stride, lattice.spacing[axis]);
-    stride *= length;
-  }
-  for (double& square : squares) square = std::sqrt(square);
-  return squares;
 }
 
 }  // namespace tetwarp::truth

@@ -50,10 +50,4 @@ class Subject {
   glm::i64vec3 last_inside_{0};
 };
 
-/// Distance of each vertex of a lattice from the nearest marked one, mm; infinite where none is marked. Exact
-/// (Felzenszwalb and Huttenlocher, "Distance transforms of sampled functions", 2012).
-/// @param lattice  whose axes are perpendicular
-/// @param marked   not 0 for marked vertices, i fastest
-std::vector<double> distance_mm(const Geometry& lattice, const std::vector<std::uint8_t>& marked);
-
 }  // namespace tetwarp::truth

@@ -6,7 +6,8 @@
 
     register.py METHOD MOVING FIXED RESULT.mha
 
-METHOD: plastimatch, elastix (programs); itk-elastix, simpleitk-demons, simpleitk-bspline (packages of Python).
+METHOD: plastimatch, elastix (programs); itk-elastix, simpleitk-demons, simpleitk-bspline, ants (antspyx) (packages of Python);
+gradient (Tetwarp's own: examples/learning/register.py, wants PyTorch and the package tetwarp).
 RESULT gets the displacement from fixed to moving at each voxel of FIXED, LPS mm, as `tetwarp score` takes it.
 """
 
@@ -156,12 +157,38 @@ def simpleitk_bspline(moving: str, fixed: str, result: str) -> None:
     sitk.WriteImage(sitk.Cast(field, sitk.sitkVectorFloat32), result)
 
 
+def ants(moving: str, fixed: str, result: str) -> None:
+    """SyN of ANTs with its defaults: affine, then symmetric diffeomorphic, mutual information."""
+    import ants as package
+    import SimpleITK as sitk
+
+    still, moved = (package.image_read(path) for path in (fixed, moving))
+    with tempfile.TemporaryDirectory() as folder:
+        done = package.registration(still, moved, type_of_transform="SyN", outprefix=f"{folder}/of", random_seed=1)
+        whole = package.apply_transforms(still, moved, done["fwdtransforms"], compose=f"{folder}/whole")
+        sitk.WriteImage(sitk.Cast(sitk.ReadImage(whole), sitk.sitkVectorFloat32), result)
+
+
+def gradient(moving: str, fixed: str, result: str) -> None:
+    """Gradient descent through the forward deformation, cells of 32, 16 and 8 voxels; the result is its exact inverse."""
+    import tetwarp
+
+    example = pathlib.Path(__file__).resolve().parents[2] / "learning" / "register.py"
+    with tempfile.TemporaryDirectory() as folder:
+        run(sys.executable, example, moving, fixed, "-o", folder)
+        field = tetwarp.read_field(f"{folder}/field.mha")
+        inverse = tetwarp.invert(field, tetwarp.read(fixed).geometry, outside="background")
+        tetwarp.write_field(inverse, result)
+
+
 METHODS: dict[str, Callable[[str, str, str], None]] = {
     "plastimatch": plastimatch,
     "elastix": elastix,
     "itk-elastix": itk_elastix,
     "simpleitk-demons": simpleitk_demons,
     "simpleitk-bspline": simpleitk_bspline,
+    "ants": ants,
+    "gradient": gradient,
 }
 
 

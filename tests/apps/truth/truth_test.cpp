@@ -66,7 +66,16 @@ TEST_F(TruthProgram, TheTruthOfASetIsExact) {
     if (slips) {
       EXPECT_GT(score.at("near_slip").at("points").get<int>(), 1000);
       EXPECT_LT(score.at("near_slip").at("largest_mm").get<double>(), 1e-4);
+      const json& bands = score.at("from_slip");
+      ASSERT_EQ(bands.size(), 3U);
+      EXPECT_NEAR(bands[1].at("from_mm").get<double>() - bands[0].at("from_mm").get<double>(), 10, 1e-9);
+      EXPECT_TRUE(bands[2].at("to_mm").is_null());
+      std::uint64_t points = 0;
+      for (const json& band : bands) points += band.at("points").get<std::uint64_t>();
+      EXPECT_EQ(points, score.at("body").at("points").get<std::uint64_t>());
     }
+    for (const auto& [label, surface] : score.at("surfaces").items())
+      EXPECT_LT(surface.at("mean_mm").get<double>(), 0.1) << label;
     EXPECT_GT(score.at("mean_mm_read_as").at("no displacement").get<double>(), 0.5);
     for (const auto& [label, dice] : score.at("dice").items()) EXPECT_GT(dice.get<double>(), 0.99) << label;
     EXPECT_GT(score.at("landmarks").at("points").get<int>(), 100);
@@ -184,6 +193,88 @@ TEST_F(TruthProgram, WrongResultsAreNamed) {
   EXPECT_EQ(run("score set -r off --limits limits.json --json l.json"), 0) << out();
   std::ofstream(at("limits.json")) << R"({"beauty": {"most": 4}})";
   EXPECT_EQ(run("score set -r off --limits limits.json"), 4);
+}
+
+TEST_F(TruthProgram, BothDirectionsAreScoredAndAreConsistent) {
+  make_set();
+  fs::create_directories(at("back"));
+  for (const std::string& name : names())
+    fs::copy_file(at("set/" + name + "/forward.nii.gz"), at("back/" + name + ".nii.gz"));
+  EXPECT_EQ(run("score set -r exact --back back --json there.json"), 0) << out() << err();
+  EXPECT_EQ(run("score set -r back --direction forward --json back.json --html back.html"), 0) << out() << err();
+  for (const json& score : document("there.json").at("scores")) {
+    EXPECT_LT(score.at("inverse_consistency").at("mean_mm").get<double>(), 0.1);
+    EXPECT_GT(score.at("inverse_consistency").at("points").get<int>(), 10000);
+  }
+  for (const json& score : document("back.json").at("scores")) {
+    EXPECT_EQ(score.at("body").at("largest_mm"), 0) << score;
+    EXPECT_LT(score.at("landmarks").at("largest_mm").get<double>(), 1e-4)
+        << "landmarks are voxel centres of the moving";
+    EXPECT_GT(score.at("mean_mm_read_as").at("no displacement").get<double>(), 0.5);
+    EXPECT_FALSE(score.contains("dice"));
+  }
+  EXPECT_EQ(document("back.json").at("direction"), "forward");
+  // A field that leads the other way states it, and is refused.
+  EXPECT_EQ(run("score set -r back"), 3);
+  EXPECT_NE(out().find("cannot be scored: a forward field where a pull field is expected"), std::string::npos) << out();
+  EXPECT_EQ(run("score set -r exact -r exact --back back"), 2);
+  EXPECT_EQ(run("score set -r exact --back nowhere"), 4);
+}
+
+TEST_F(TruthProgram, ThreeResultsOfThreeVolumesAreTransitive) {
+  make_phantom();
+  ASSERT_EQ(run("truth ct.nii.gz -o set --dense --case shift:x=4,y=0,z=0 --case shift:x=0,y=-6,z=0"), 0) << err();
+  fs::create_directories(at("exact"));
+  fs::create_directories(at("between"));
+  const std::string first = "shift-x-4-y-0-z-0", second = "shift-x-0-y--6-z-0";
+  for (const std::string& name : {first, second})
+    fs::copy_file(at("set/" + name + "/inverse.nii.gz"), at("exact/" + name + ".nii.gz"));
+  PullField between = read_pull_field({at("exact/" + first + ".nii.gz")});
+  // From the first fixed volume to the second: back by the first shift, on by the second; here 2 mm too far.
+  for (glm::vec3& by : between.displacement) by = glm::vec3(-4, -6, 2);
+  write_field_file(at("between/" + first + "--" + second + ".mha"), between);
+  EXPECT_EQ(run("score set -r exact --triples between --json t.json"), 0) << out() << err();
+  const json scores = document("t.json").at("scores");
+  EXPECT_NEAR(scores[0].at("transitivity").at(second).at("mean_mm").get<double>(), 2, 1e-3);
+  EXPECT_FALSE(scores[1].contains("transitivity"));
+  std::ofstream(at("limits.json")) << R"({"transitivity_mean_mm": {"most": 1}})";
+  EXPECT_EQ(run("score set -r exact --triples between --limits limits.json"), 3);
+  EXPECT_EQ(run("score set -r exact --triples ct.nii.gz"), 4);
+  EXPECT_EQ(run("score set -r exact --triples between --direction forward"), 2);
+}
+
+TEST_F(TruthProgram, ADoseGoesAlongAndIsCompared) {
+  make_phantom();
+  Volume<float> dose{read_image(at("ct.nii.gz")).geometry(), {}};
+  dose.geometry.size /= 2;
+  dose.geometry.spacing *= 2.0;
+  for (std::int64_t n = 0; n < voxel_count(dose.geometry); ++n) {
+    const double x = static_cast<double>(n % 32 - 16), y = static_cast<double>(n / 32 % 30 - 15);
+    dose.voxels.push_back(static_cast<float>(60 * std::exp(-(x * x + y * y) / 20)));
+  }
+  write_image(at("dose.nii.gz"), view(dose));
+  ASSERT_EQ(run("truth ct.nii.gz -o set --dense --case elastic:amplitude=9 --dose dose.nii.gz"), 0) << err();
+  EXPECT_EQ(read_image(at("set/elastic-amplitude-9/dose.nii.gz")).geometry().size, dose.geometry.size);
+  EXPECT_EQ(run("score set -r set/elastic-amplitude-9/inverse.nii.gz --json exact.json"), 0) << out();
+  EXPECT_GT(document("exact.json").at("scores")[0].at("gamma").at("passing_percent").get<double>(), 99.5);
+  PullField off = read_pull_field({at("set/elastic-amplitude-9/inverse.nii.gz")});
+  for (glm::vec3& by : off.displacement) by.x += 9;
+  write_field_file(at("off.mha"), off);
+  EXPECT_EQ(run("score set -r off.mha --json off.json --html off.html"), 3);
+  EXPECT_LT(document("off.json").at("scores")[0].at("gamma").at("passing_percent").get<double>(), 80);
+  EXPECT_NE(read_text(at("off.html")).find("global gamma index of 3 %, 2 mm"), std::string::npos);
+}
+
+TEST_F(TruthProgram, NoiseIsMeasuredOfTheVolume) {
+  ASSERT_EQ(run("phantom -o ct.nii.gz --size 128,120,40 --spacing 3.2,3.4,7.5 --noise 20"), 0);
+  ASSERT_EQ(run("truth ct.nii.gz -o set --case shift --noise measured"), 0) << err();
+  const json noise = document("set/set.json").at("noise");
+  EXPECT_TRUE(noise.at("measured").get<bool>());
+  EXPECT_GT(noise.at("standard_deviation_hu").get<double>(), 19);
+  EXPECT_LT(noise.at("standard_deviation_hu").get<double>(), 30);
+  EXPECT_EQ(noise.at("kernel").size(), 81U);
+  EXPECT_EQ(run("truth ct.nii.gz -o other --case shift --noise much"), 2);
+  EXPECT_EQ(run("truth ct.nii.gz -o other --case shift --noise 2000"), 2);
 }
 
 TEST_F(TruthProgram, LandmarksAreScored) {

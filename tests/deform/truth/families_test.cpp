@@ -7,6 +7,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "deform/distance_map.h"
 #include "deform/phantom.h"
 #include "deform/points.h"
 #include "deform/truth/family.h"
@@ -170,19 +171,28 @@ TEST(TruthFamilies, SlipJumpsAtTheTubeAndOpensNothing) {
   EXPECT_EQ(outside, 0);
 }
 
-TEST(TruthFamilies, WhatLiesNearASlipIsMarked) {
-  const Volume<std::uint8_t> near = near_slip(subject(), body().ct.geometry);
+TEST(TruthFamilies, BandsSayHowFarASlipIs) {
+  const Bands bands = slip_bands(subject(), body().ct.geometry);
+  ASSERT_EQ(bands.most_mm.size(), 3U);
+  EXPECT_GT(bands.most_mm[0], 14);
+  EXPECT_LT(bands.most_mm[0], 21);
+  EXPECT_EQ(bands.most_mm[2], bands.most_mm[0] + 20);
   const SlipTube tube(subject());
   const AffineMap index = index_from_point(subject().lattice()) * point_from_index(body().ct.geometry);
-  std::size_t marked = 0;
-  for (std::size_t n = 0; n < near.voxels.size(); n += 37) {
+  std::array<std::size_t, 4> found{};
+  for (std::size_t n = 0; n < bands.voxels.voxels.size(); n += 37) {
     const auto at = static_cast<std::int64_t>(n);
-    const double depth = tube.depth_mm(glm::dvec2(index(glm::dvec3(at % 112, at / 112 % 112, at / 112 / 112))));
-    marked += near.voxels[n];
-    EXPECT_TRUE(std::abs(depth) >= 14 || near.voxels[n] == 1);
-    EXPECT_TRUE(std::abs(depth) <= 21 || near.voxels[n] == 0);
+    const double distance =
+        std::abs(tube.depth_mm(glm::dvec2(index(glm::dvec3(at % 112, at / 112 % 112, at / 112 / 112)))));
+    const std::uint8_t band = bands.voxels.voxels[n];
+    ASSERT_LE(band, 3);
+    ++found[band];
+    EXPECT_LT(distance, (band == 0 ? INFINITY : bands.most_mm[band - 1U]) + 1e-9);
+    EXPECT_GT(distance, (band == 0 ? bands.most_mm[2] : band == 1 ? -1 : bands.most_mm[band - 2U]) - 1e-9);
   }
-  EXPECT_GT(marked, 100U);
+  for (const std::size_t count : found) EXPECT_GT(count, 100U);
+  EXPECT_EQ(family_of("slip").bands, &slip_bands);
+  EXPECT_EQ(family_of("breathing").bands, nullptr);
 }
 
 TEST(TruthFamilies, FlexionMovesBonesRigidly) {

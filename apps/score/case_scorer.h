@@ -1,0 +1,60 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "apps/cli/options.h"
+#include "apps/score/score_report.h"
+#include "apps/truth/truth_set.h"
+#include "backend/factories.h"
+
+namespace tetwarp::apps {
+
+/// Scores the results of a set of known truth.
+class CaseScorer {
+ public:
+  /// @param options  outlive this object
+  /// @throws InputError for a set whose moving volume or labels cannot be read
+  CaseScorer(const ScoreOptions& options, TruthSet set);
+
+  /// Scores the result of a case. What is wrong with it is told in `CaseScore::failure`.
+  /// @param results  folder or file of --results
+  /// @param back     folder of --back; empty: none
+  CaseScore score(const std::filesystem::path& results, const std::filesystem::path& back, const TruthCase& one,
+                  const std::vector<ScoreLimit>& limits) const;
+
+ private:
+  struct Side;  // the volume whose voxels are compared
+
+  Side side_of(const TruthCase& one) const;
+  PullField read_result(const std::filesystem::path& file, const Geometry& source, const Geometry& grid,
+                        std::vector<std::string>& notes, const Control& control) const;
+  PullField sampled(const PullField& field, const Geometry& grid, const Control& control) const;
+  void score_field(const std::filesystem::path& results, const std::filesystem::path& back, const TruthCase& one,
+                   CaseScore& score) const;
+  void score_landmarks(const TruthCase& one, const Side& side, const PullField& result, CaseScore& score) const;
+  void score_points(const TruthCase& one, CaseScore& score) const;
+  void score_labels(const Side& side, const PullField& result, CaseScore& score, const Control& control) const;
+  void score_dose(const TruthCase& one, const PullField& result, CaseScore& score, const Control& control) const;
+  void score_back(const std::filesystem::path& back, const TruthCase& one, const Side& side, const PullField& result,
+                  CaseScore& score, const Control& control) const;
+  void score_triples(const std::filesystem::path& results, const TruthCase& one, const Side& side,
+                     const PullField& result, CaseScore& score, const Control& control) const;
+  /// A volume of the moving side as a result makes it, on a grid.
+  AnyVolume warped(const AnyVolume& volume, const PullField& by, const Geometry& grid, Interpolation interpolation,
+                   const Control& control) const;
+  Limits limits() const { return {.threads = options_.common.threads}; }
+
+  const ScoreOptions& options_;
+  TruthSet set_;
+  BackendKind backend_;
+  AnyVolume moving_, labels_;
+};
+
+}  // namespace tetwarp::apps
