@@ -3,6 +3,7 @@
 
 #include "deform/distance_map.h"
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -67,7 +68,6 @@ std::vector<double> distance_mm(const Geometry& grid, const std::vector<std::uin
   const auto count = static_cast<std::size_t>(voxel_count(grid));
   require(marked.size() == count, "distances are measured on a grid with one mark a sample");
   std::vector<double> squares(count);
-  for (std::size_t n = 0; n < count; ++n) squares[n] = marked[n] ? 0 : kNowhere;
   const std::int64_t area = size.x * size.y;
   const auto stride = [&](int axis) { return static_cast<std::size_t>(axis == 0 ? 1 : axis == 1 ? size.x : area); };
   // Lines along x and y by slice, those along z by row: one task looks at neighbouring lines, whose samples lie beside
@@ -81,12 +81,16 @@ std::vector<double> distance_mm(const Geometry& grid, const std::vector<std::uin
   cpu::Arena arena(limits);
   arena.execute([&] {
     tbb::parallel_for(std::int64_t{0}, size.z, [&](std::int64_t k) {
+      for (auto n = static_cast<std::size_t>(k * area); n < static_cast<std::size_t>((k + 1) * area); ++n)
+        squares[n] = marked[n] ? 0 : kNowhere;
       lines(0, k * area, size.y, size.x);
       lines(1, k * area, size.x, 1);
     });
     tbb::parallel_for(std::int64_t{0}, size.y, [&](std::int64_t j) { lines(2, j * size.x, size.x, 1); });
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count), [&](const auto& range) {
+      for (std::size_t n = range.begin(); n < range.end(); ++n) squares[n] = std::sqrt(squares[n]);
+    });
   });
-  for (double& square : squares) square = std::sqrt(square);
   return squares;
 }
 

@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::size_t kMostCases = 100000, kLongestId = 100;
+constexpr std::size_t kMostCases = 100000;
 const std::set<std::string> kOwnKeys = {"case", "input", "seed", "variants", "comment"};
 const std::set<std::string> kOfTheBatch = {"threads", "device", "memory", "overwrite", "quiet", "verbose", "dry-run"};
 const std::set<std::string> kInputs = {"pull-field", "scenario", "labels", "deidentify-key"};
@@ -62,12 +62,8 @@ std::string nearest_key(const std::string& key) {
 /// Why an id cannot be the name of a folder on every system; empty: it can.
 std::string problem_of_id(const std::string& id) {
   if (id.empty()) return "no case id; give each row one";
-  const auto is_plain = [](char c) {
-    return std::isalnum(static_cast<unsigned char>(c)) || c == '.' || c == '_' || c == '-';
-  };
-  if (id.size() > kLongestId || !std::isalnum(static_cast<unsigned char>(id.front())) ||
-      !std::all_of(id.begin(), id.end(), is_plain)) {
-    return "the case id \"" + shown(id.substr(0, kLongestId)) +
+  if (!is_plain_name(id)) {
+    return "the case id \"" + shown(id.substr(0, 100)) +
            "\" cannot be a folder's name everywhere; letters, digits, '.', '_' and '-' are allowed, at most 100, "
            "a letter or digit first";
   }

@@ -3,6 +3,8 @@
 
 #include "apps/batch/manifest_rows.h"
 
+#include <algorithm>
+#include <cctype>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
@@ -140,6 +142,14 @@ std::vector<ManifestRow> json_rows(const std::string& text, bool (*is_list)(cons
 }
 
 }  // namespace
+
+bool is_plain_name(const std::string& name) {
+  constexpr std::size_t kLongest = 100;
+  const auto is_letter = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0; };
+  return !name.empty() && name.size() <= kLongest && is_letter(name.front()) &&
+         std::all_of(name.begin(), name.end(),
+                     [&](char c) { return is_letter(c) || c == '.' || c == '_' || c == '-'; });
+}
 
 void ManifestErrors::add(std::size_t line, const std::string& what) { lines_.emplace(line, what); }
 

@@ -25,6 +25,10 @@ class ManifestErrors {
   std::multimap<std::size_t, std::string> lines_;
 };
 
+/// Whether a name can be that of a folder on every system: letters, digits, '.', '_' and '-', at most 100, a letter or
+/// digit first.
+bool is_plain_name(const std::string& name);
+
 /// A row as it is in the manifest: the keys that are given, each with one value or the values of a list.
 struct ManifestRow {
   std::size_t line = 0;

@@ -2,20 +2,19 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <fstream>
+#include <iostream>
 #include <nlohmann/json.hpp>
 
 #include "apps/cli/input.h"
 #include "apps/cli/output.h"
 #include "apps/cli/reads.h"
+#include "apps/truth/truth_request.h"
 #include "apps/truth/truth_set.h"
 #include "deform/score/truth.h"
 #include "deform/truth/body.h"
-#include "deform/truth/family.h"
 #include "deform/truth/landmarks.h"
-#include "deform/truth/noise.h"
 #include "deform/value_counts.h"
 #include "io/field_file.h"
 #include "io/image_file.h"
@@ -27,68 +26,6 @@ namespace {
 
 using nlohmann::json;
 namespace fs = std::filesystem;
-
-/// Roles as options name them. @throws UsageError for a text that is not ROLE=N,..., or a role that no kind needs
-truth::Roles parse_roles(const std::vector<std::string>& texts) {
-  truth::Roles roles;
-  for (const std::string& text : texts) {
-    const std::size_t equals = text.find('=');
-    const std::string role = text.substr(0, equals);
-    const auto needs = [&](const truth::Family& family) {
-      return std::find(family.roles.begin(), family.roles.end(), role) != family.roles.end();
-    };
-    const auto kinds = truth::families();
-    if (equals == std::string::npos || std::none_of(kinds.begin(), kinds.end(), needs))
-      throw UsageError("--label \"" + text + "\"; expected ROLE=N,... with lung, bone, organ or lump as ROLE");
-    std::string_view numbers = std::string_view(text).substr(equals + 1);
-    while (true) {
-      const std::string_view one = numbers.substr(0, numbers.find(','));
-      std::int64_t value = 0;
-      const auto [end, error] = std::from_chars(one.data(), one.data() + one.size(), value);
-      if (error != std::errc() || end != one.data() + one.size())
-        throw UsageError("--label \"" + text + "\" holds \"" + std::string(one) + "\"; expected whole numbers");
-      std::vector<std::int64_t>& labels = roles[role];
-      if (std::find(labels.begin(), labels.end(), value) == labels.end()) labels.push_back(value);
-      if (one.size() == numbers.size()) break;
-      numbers.remove_prefix(one.size() + 1);
-    }
-  }
-  return roles;
-}
-
-std::vector<truth::CaseChoice> cases_of(const TruthOptions& options, const truth::Roles& roles) {
-  if (options.cases.empty()) return truth::usual_cases(roles);
-  std::vector<truth::CaseChoice> cases;
-  for (const std::string& text : options.cases) {
-    try {
-      cases.push_back(truth::parse_case(text));
-    } catch (const InputError& error) {
-      throw UsageError(error.what());
-    }
-    const auto same = [&](const truth::CaseChoice& one) { return one.name == cases.back().name; };
-    if (std::count_if(cases.begin(), cases.end(), same) > 1)
-      throw UsageError("--case " + text + " is given twice, or has the folder of another one");
-    for (const std::string_view role : cases.back().family->roles) {
-      if (!roles.contains(std::string(role)))
-        throw UsageError("--case " + text + " needs to know which labels are " + std::string(role) +
-                         "; give --labels FILE and --label " + std::string(role) + "=N");
-    }
-  }
-  return cases;
-}
-
-/// The value of --noise that asks for the noise of INPUT.
-constexpr const char* kMeasuredNoise = "measured";
-
-/// @throws UsageError for what is no number from 0 to 1000
-double parse_noise(const std::string& text) {
-  double value = -1;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !(value >= 0 && value <= 1000))
-    throw UsageError("--noise \"" + text + "\"; expected a standard deviation of 0 to 1000 HU, or \"" +
-                     std::string(kMeasuredNoise) + "\"");
-  return value;
-}
 
 /// Labels of a floating type as int32; others as they are. @throws InputError for values that are not whole numbers
 AnyVolume in_whole_numbers(AnyVolume labels, const fs::path& file) {
@@ -105,14 +42,11 @@ AnyVolume in_whole_numbers(AnyVolume labels, const fs::path& file) {
   return whole_numbers;
 }
 
-/// Makes the set.
+/// Makes a set of one volume.
 class TruthMaker {
  public:
   explicit TruthMaker(const TruthOptions& options)
-      : options_(options), roles_(parse_roles(options.roles)), cases_(cases_of(options, roles_)) {
-    if (options.noise != kMeasuredNoise) noise_ = truth::smoothed_noise(parse_noise(options.noise));
-    if (options.labels.empty() && !options.roles.empty())
-      throw UsageError("--label names labels of --labels; give both");
+      : options_(options), request_(parse_truth(options)), noise_(request_.noise.value_or(truth::Noise{})) {
     check_names();
     set_.folder = options.output;
     planned_ = plan();
@@ -124,7 +58,7 @@ class TruthMaker {
     begin();
     if (!options_.resume) require_room();
     write_moving();
-    for (const truth::CaseChoice& choice : cases_) make_case(choice);
+    for (const truth::CaseChoice& choice : request_.cases) make_case(choice);
     finish();
     return 0;
   }
@@ -174,8 +108,7 @@ class TruthMaker {
   }
 
   const TruthOptions& options_;
-  truth::Roles roles_;
-  std::vector<truth::CaseChoice> cases_;
+  TruthRequest request_;
   TruthSet set_;
   InputHeader header_;
   AnyVolume volume_, labels_;
@@ -186,12 +119,12 @@ class TruthMaker {
 
 json TruthMaker::plan() const {
   json cases = json::array();
-  for (const truth::CaseChoice& choice : cases_)
+  for (const truth::CaseChoice& choice : request_.cases)
     cases.push_back({{"name", choice.name}, {"kind", choice.family->name}, {"parameters", json(choice.values)}});
   json document = provenance("truth");
   document["input"] = {{"sha256", hash_volume(options_.input, options_.common.threads)}};
   document["labels"] =
-      options_.labels.empty() ? json() : json{{"sha256", hash_file(options_.labels)}, {"roles", roles_}};
+      options_.labels.empty() ? json() : json{{"sha256", hash_file(options_.labels)}, {"roles", request_.roles}};
   document["options"] = {{"cell_size", options_.cell_size},    {"body_above_hu", options_.body_above_hu},
                          {"landmarks", options_.landmarks},    {"noise", options_.noise},
                          {"noise_seed", options_.seed},        {"dense", options_.dense},
@@ -280,7 +213,7 @@ void TruthMaker::read() {
                                                 options_.body_above_hu, stage.control());
   require(patient.box.has_value(), options_.input.path.string() + " holds no body: no cell has a mean above " +
                                        number_text(options_.body_above_hu) + " HU");
-  subject_.emplace(std::move(patient), roles_, volume_.geometry());
+  subject_.emplace(std::move(patient), request_.roles, volume_.geometry());
 }
 
 void TruthMaker::require_room() const {
@@ -290,7 +223,7 @@ void TruthMaker::require_room() const {
       size_bytes(volume_.type()) + 1 + sizeof(float) + 1;  // volume, body, Jacobian, coverage
   if (labels_.data()) bytes_per_voxel += size_bytes(labels_.type());
   if (options_.dense) bytes_per_voxel += 2 * sizeof(glm::vec3);
-  const std::uint64_t bytes = voxels * bytes_per_voxel * cases_.size();
+  const std::uint64_t bytes = voxels * bytes_per_voxel * request_.cases.size();
   std::error_code failed;
   const fs::space_info space = fs::space(set_.folder, failed);
   if (failed || space.available >= bytes) return;
@@ -306,7 +239,7 @@ void TruthMaker::write_moving() {
   fs::create_directories(set_.folder / "fields");
   const ConstVolumeView ct = std::as_const(volume_).view();
   set_.moving = folder / volume_file("moving");
-  if (options_.noise == kMeasuredNoise) {
+  if (!request_.noise) {
     noise_ = truth::measure_noise(ct, {.threads = options_.common.threads}, stage.control());
     say(options_.common, "measured noise: " + number_text(std::round(100 * noise_.deviation) / 100) + " HU");
   }
@@ -321,7 +254,7 @@ void TruthMaker::write_moving() {
   const Volume<std::uint8_t> body = truth::body_mask(volume_.geometry(), subject_->patient(), options_.cell_size);
   set_.body = folder / volume_file("body");
   write_volume(set_.body, view(body));
-  for (const auto& [role, labels] : roles_)
+  for (const auto& [role, labels] : request_.roles)
     for (const std::int64_t label : labels) set_.roles[label] = role;
   if (!options_.dose.empty()) {
     set_.dose = folder / volume_file("dose");
@@ -451,7 +384,7 @@ void TruthMaker::finish() {
   }
   document["sha256"] = hashes;
   document["noise"] = {{"standard_deviation_hu", noise_.deviation},
-                       {"measured", options_.noise == kMeasuredNoise},
+                       {"measured", !request_.noise},
                        {"radius", noise_.radius},
                        {"kernel", noise_.kernel}};
   place(set_.folder / "README.txt", [&](const fs::path& staged) {
@@ -463,10 +396,13 @@ void TruthMaker::finish() {
         "CASE/dicom         of a DICOM series: the same as a series; where noise was added there is instead\n"
         "                   dicom-without-noise, or without-noise, as tetwarp deform made it\n"
         "CASE/body, labels  those of the moving volume, deformed by the same field\n"
-        "CASE/near-slip     of a slip: what lies at most the diagonal of a cell from it; scored by itself\n"
+        "CASE/near-slip     of a slip: 1 up to the diagonal of a cell from it, which is scored by itself; 2 and 3\n"
+        "                   up to 10 and 20 mm farther away; 0 beyond\n"
+        "CASE/dose          with --dose: the dose, deformed as the tissue\n"
         "CASE/landmarks.csv where the landmarks of the moving volume come to lie, exactly\n"
         "CASE/jacobian      determinant of the forward map at each voxel; coverage: where it leads\n"
         "CASE/inverse       with --dense: the exact displacement from fixed to moving at each voxel, LPS mm\n"
+        "CASE/forward       with --dense: that from moving to fixed at each voxel of the moving volume\n"
         "fields/CASE        the forward field itself, from moving to fixed: the truth\n\n"
         "A registration gives a map from fixed to moving. Name its field or transform CASE.mha, CASE.nii.gz,\n"
         "CASE.h5 or the like, or warped landmarks CASE.csv, put all into a folder, and run:\n\n"
@@ -478,6 +414,22 @@ void TruthMaker::finish() {
 
 }  // namespace
 
-int run_truth(const TruthOptions& options) { return TruthMaker(options).run(); }
+int run_truth(const TruthOptions& options) {
+  if (!is_truth_manifest(options.input.path)) return TruthMaker(options).run();
+  int failed = 0;
+  const std::vector<TruthOptions> sets = read_truth_manifest(options);
+  std::error_code ignored;
+  fs::create_directories(options.output, ignored);  // what cannot be made is told by each set
+  for (const TruthOptions& set : sets) {
+    try {
+      TruthMaker(set).run();
+    } catch (const InputError& error) {  // one volume that cannot be used does not lose the others
+      ++failed;
+      std::cerr << "tetwarp: error: " << set.output.string() << ": " << error.what() << "\n";
+    }
+  }
+  if (failed > 0) std::cerr << "tetwarp: " << failed << " of " << sets.size() << " studies have no set\n";
+  return failed > 0 ? 3 : 0;
+}
 
 }  // namespace tetwarp::apps

@@ -29,7 +29,11 @@ std::string kinds_text() {
 void add_truth(CLI::App& app, TruthOptions& options) {
   CLI::App* command =
       app.add_subcommand("truth", "Make a set of deformed volumes whose truth is known, to test registrations");
-  command->add_option("INPUT", options.input.path, std::string(kInputHelp) + "; a CT in HU, the moving volume")
+  command
+      ->add_option("INPUT", options.input.path,
+                   std::string(kInputHelp) +
+                       "; a CT in HU, the moving volume. Or a manifest, .csv or .jsonl: a row for each volume, "
+                       "with the keys study, input, labels, label, case, dose, with, noise, series")
       ->required();
   command->add_option("-o,--output", options.output, "Folder of the set")->required();
   command

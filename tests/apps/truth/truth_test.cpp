@@ -265,6 +265,44 @@ TEST_F(TruthProgram, ADoseGoesAlongAndIsCompared) {
   EXPECT_NE(read_text(at("off.html")).find("global gamma index of 3 %, 2 mm"), std::string::npos);
 }
 
+TEST_F(TruthProgram, AManifestMakesASetOfEachRow) {
+  make_phantom();
+  fs::create_directories(at("cohort"));
+  fs::copy_file(at("ct.nii.gz"), at("cohort/ct.nii.gz"));
+  fs::copy_file(at("labels.nii.gz"), at("cohort/labels.nii.gz"));
+  std::ofstream(at("cohort/scans.csv")) << "study,input,labels,label,case,noise\n"
+                                           "first,ct.nii.gz,labels.nii.gz,lung=2;bone=3,breathing;shift,12\n"
+                                           "second,ct.nii.gz,,,,\n"
+                                           "third,broken.nii.gz,,,,\n";
+  std::ofstream(at("cohort/broken.nii.gz")) << "no volume";
+  EXPECT_EQ(run("truth cohort/scans.csv -o sets --case rotation --seed 4"), 3);
+  EXPECT_NE(err().find("third"), std::string::npos) << err();
+  EXPECT_NE(err().find("1 of 3 studies have no set"), std::string::npos) << err();
+  EXPECT_TRUE(fs::exists(at("sets/first/breathing/fixed.nii.gz")));
+  EXPECT_TRUE(fs::exists(at("sets/first/shift/labels.nii.gz")));
+  EXPECT_TRUE(fs::exists(at("sets/second/rotation/fixed.nii.gz")));
+  EXPECT_FALSE(fs::exists(at("sets/third/set.json")));
+  EXPECT_EQ(document("sets/first/set.json").at("options").at("noise_seed"), 4);
+  // The same as the row's own command.
+  ASSERT_EQ(run("truth ct.nii.gz -o alone --case breathing --case shift --noise 12 --seed 4 --labels labels.nii.gz "
+                "--label lung=2 --label bone=3"),
+            0);
+  EXPECT_EQ(document("alone/set.json").at("sha256"), document("sets/first/set.json").at("sha256"));
+  // All that is wrong is told at once, and nothing is made.
+  std::ofstream(at("cohort/bad.csv")) << "study,input,labels,organ\n"
+                                         "a,nothing.nii.gz,,\n"
+                                         "a,ct.nii.gz,,\n"
+                                         "../b,ct.nii.gz,,7\n"
+                                         "c,,,\n";
+  EXPECT_EQ(run("truth cohort/bad.csv -o more --case wobble"), 4);
+  for (const char* what :
+       {"bad.csv:2: no such file", "bad.csv:3: the study \"a\" is there twice", "\"../b\" is no name",
+        "unknown key \"organ\"", "bad.csv:5: no input", "no kind of deformation \"wobble\""})
+    EXPECT_NE(err().find(what), std::string::npos) << what << "\n" << err();
+  EXPECT_FALSE(fs::exists(at("more")));
+  EXPECT_EQ(run("truth cohort/scans.csv -o more --labels labels.nii.gz"), 2);
+}
+
 TEST_F(TruthProgram, NoiseIsMeasuredOfTheVolume) {
   ASSERT_EQ(run("phantom -o ct.nii.gz --size 128,120,40 --spacing 3.2,3.4,7.5 --noise 20"), 0);
   ASSERT_EQ(run("truth ct.nii.gz -o set --case shift --noise measured"), 0) << err();

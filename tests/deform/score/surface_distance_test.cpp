@@ -49,6 +49,18 @@ TEST(SurfaceDistance, AShiftedBoxIsOffByItsShiftAcrossIt) {
   EXPECT_EQ(same.at(1).percentile_95, 0);
 }
 
+TEST(SurfaceDistance, SurfacesFarFromEachOtherAreMeasuredToo) {
+  const Geometry grid{.size = {90, 12, 10}, .spacing = {1, 2, 3}};
+  Volume<std::uint8_t> first = empty(grid), second = first;
+  fill(first, {5, 4, 4}, {8, 7, 7}, 2);
+  fill(second, {65, 4, 4}, {68, 7, 7}, 2);
+  const Errors errors = surface_distances(view(first), view(second)).at(2);
+  EXPECT_EQ(errors.points, 52U);
+  EXPECT_EQ(errors.largest, 60);
+  // From each of the three columns to the nearest face: 9, 8 and 9 voxels at 58, 59 and 60 mm.
+  EXPECT_NEAR(errors.mean, (9 * 58.0 + 8 * 59.0 + 9 * 60.0) / 26, 1e-12);
+}
+
 TEST(SurfaceDistance, IsThatOfASearchOverAllPairs) {
   const Geometry grid = oblique_grid({14, 12, 10});
   Random random(5);
