@@ -10,7 +10,6 @@
 #include "apps/cli/input.h"
 #include "apps/fields/read_field.h"
 #include "apps/score/error_picture.h"
-#include "deform/core/trilinear.h"
 #include "deform/points.h"
 #include "io/image_file.h"
 #include "io/points_file.h"
@@ -61,14 +60,6 @@ std::vector<Counts> counts_of(const AnyVolume& body, const AnyVolume& bands, con
     counts[n] = mask[n] ? (is_near ? Counts::apart : Counts::yes) : Counts::no;
   }
   return counts;
-}
-
-/// T(p) - p at places that need not be voxel centres: trilinear, NaN where a sample is missing.
-glm::dvec3 displacement_at(const PullField& field, const AffineMap& index, const glm::dvec3& place) {
-  const glm::i64vec3 size = field.grid.size;
-  return trilinear(size, index(place), [&](const glm::i64vec3& at) {
-    return field.displacement[static_cast<std::size_t>(at.x + size.x * (at.y + size.y * at.z))];
-  });
 }
 
 }  // namespace
@@ -179,7 +170,7 @@ void CaseScorer::score_landmarks(const TruthCase& one, const Side& side, const P
     if (glm::clamp(voxel, glm::i64vec3(0), grid.size - std::int64_t{1}) != voxel) continue;  // it left the volume
     const std::int64_t at = voxel.x + grid.size.x * (voxel.y + grid.size.y * voxel.z);
     if (side.counts[static_cast<std::size_t>(at)] == Counts::apart) continue;  // samples of a field say nothing there
-    found.push_back(places[n] + displacement_at(result, index, places[n]));
+    found.push_back(places[n] + score::displacement_at(result, places[n]));
     wanted.push_back(true_places[n]);
   }
   score.landmarks = score::score_points(found, wanted);

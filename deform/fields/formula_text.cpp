@@ -12,7 +12,7 @@
 
 #include "deform/fields/elastic.h"
 #include "deform/fields/formula.h"
-#include "deform/parameter_text.h"
+#include "deform/fields/parameter_text.h"
 
 namespace tetwarp {
 

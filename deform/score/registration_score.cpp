@@ -84,6 +84,14 @@ class ResultMap {
 
 bool is_place(const glm::dvec3& point) { return std::isfinite(point.x + point.y + point.z); }
 
+/// A displacement between samples, trilinear. @param index  continuous index
+glm::dvec3 sample(const PullField& field, const glm::dvec3& index) {
+  const glm::i64vec3 size = field.grid.size;
+  return trilinear(size, index, [&](const glm::i64vec3& at) {
+    return field.displacement[static_cast<std::size_t>(at.x + size.x * (at.y + size.y * at.z))];
+  });
+}
+
 /// Looks at the voxels of a field, slice by slice.
 class FieldScorer {
  public:
@@ -209,9 +217,13 @@ DenseScore score_field(Truth& truth, const PullField& result, std::span<const Co
   return score_of(all);
 }
 
+glm::dvec3 displacement_at(const PullField& result, const glm::dvec3& point) {
+  return sample(result, index_from_point(result.grid)(point));
+}
+
 Errors consistency(const PullField& first, const PullField& second, const PullField* whole,
                    std::span<const Counts> counts, const Limits& limits, const Control& control) {
-  const glm::i64vec3 size = first.grid.size, further = second.grid.size;
+  const glm::i64vec3 size = first.grid.size;
   require(std::ssize(counts) == voxel_count(first.grid) && std::ssize(first.displacement) == voxel_count(first.grid) &&
               std::ssize(second.displacement) == voxel_count(second.grid) &&
               (!whole || (whole->grid.size == size && std::ssize(whole->displacement) == voxel_count(first.grid))),
@@ -227,9 +239,7 @@ Errors consistency(const PullField& first, const PullField& second, const PullFi
         for (std::int64_t i = 0; i < size.x; ++i, ++voxel) {
           if (counts[voxel] != Counts::yes) continue;
           const glm::dvec3 from = point(glm::dvec3(i, j, k)), between = from + glm::dvec3(first.displacement[voxel]);
-          const glm::dvec3 by = trilinear(further, index(between), [&](const glm::i64vec3& at) {
-            return second.displacement[static_cast<std::size_t>(at.x + further.x * (at.y + further.y * at.z))];
-          });
+          const glm::dvec3 by = sample(second, index(between));
           const glm::dvec3 wanted = whole ? from + glm::dvec3(whole->displacement[voxel]) : from;
           slices[static_cast<std::size_t>(k)].add_or_miss(glm::distance(between + by, wanted), from);
         }

@@ -84,6 +84,11 @@ DenseScore score_field(Truth& truth, const PullField& result, std::span<const Co
                        std::span<const ConstVolumeView> parts = {}, const Limits& limits = {},
                        const Control& control = {});
 
+/// What a result says of a point that need not be a voxel centre: T(p) - p, trilinear between the samples; NaN outside
+/// of them, and where one that is needed is NaN.
+/// @param point  LPS mm
+glm::dvec3 displacement_at(const PullField& result, const glm::dvec3& point);
+
 /// How far two results are from agreeing: |second(first(p)) - whole(p)| at voxel centres p, where `second` is taken
 /// between its samples, trilinearly. With the two directions of a registration, and nothing as the whole, that is its
 /// inverse consistency; with the results between three volumes their transitivity.

@@ -12,8 +12,8 @@
 #include <glm/common.hpp>
 #include <vector>
 
+#include "deform/cpu/distance_map.h"
 #include "deform/cpu/tiles.h"
-#include "deform/distance_map.h"
 #include "deform/errors.h"
 #include "deform/score/error_sums.h"
 #include "deform/score/label_map.h"

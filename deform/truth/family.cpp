@@ -11,7 +11,7 @@
 
 #include "deform/errors.h"
 #include "deform/field_quality.h"
-#include "deform/parameter_text.h"
+#include "deform/fields/parameter_text.h"
 #include "deform/truth/motions.h"
 #include "deform/truth/slip_tube.h"
 

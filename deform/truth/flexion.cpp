@@ -7,7 +7,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 
-#include "deform/distance_map.h"
+#include "deform/cpu/distance_map.h"
 #include "deform/errors.h"
 #include "deform/fields/sincos.h"
 #include "deform/truth/levels.h"

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "deform/distance_map.h"
+#include "deform/cpu/distance_map.h"
 #include "deform/errors.h"
 #include "deform/fields/elastic.h"
 #include "deform/fields/point_map.h"

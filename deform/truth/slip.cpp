@@ -5,7 +5,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "deform/distance_map.h"
+#include "deform/cpu/distance_map.h"
 #include "deform/errors.h"
 #include "deform/simulate/divided_lattice.h"
 #include "deform/truth/levels.h"

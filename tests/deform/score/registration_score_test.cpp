@@ -213,6 +213,21 @@ TEST(RegistrationScore, DeterminantsOfMovedPointsAreThoseOfTheResampler) {
   EXPECT_GT(alike, jacobian.size() * 97 / 100);
 }
 
+TEST(RegistrationScore, BetweenSamplesAResultIsTrilinear) {
+  const Scene scene;
+  PullField field = scene.exact();
+  // An affine displacement comes out exactly, anywhere inside.
+  const AffineMap point = point_from_index(scene.grid);
+  for (std::size_t n = 0; n < field.displacement.size(); ++n)
+    field.displacement[n] = glm::vec3(glm::dvec3(n % 34, n / 34 % 30, n / 34 / 30) * 0.25 + 1.0);
+  const glm::dvec3 found = displacement_at(field, point(glm::dvec3(3.25, 28.5, 24.75)));
+  EXPECT_LT(glm::distance(found, glm::dvec3(3.25, 28.5, 24.75) * 0.25 + 1.0), 1e-6);
+  EXPECT_TRUE(std::isnan(displacement_at(field, point(glm::dvec3(3, 29.01, 4))).x));
+  field.displacement[0] = glm::vec3(NAN);
+  EXPECT_TRUE(std::isnan(displacement_at(field, point(glm::dvec3(0.5, 0.5, 0.5))).x));
+  EXPECT_FALSE(std::isnan(displacement_at(field, point(glm::dvec3(1, 0.5, 0.5))).x));
+}
+
 TEST(RegistrationScore, BothDirectionsTogetherLeadBack) {
   const Scene scene;
   const PullField there = scene.exact();

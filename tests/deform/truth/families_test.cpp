@@ -7,7 +7,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "deform/distance_map.h"
+#include "deform/cpu/distance_map.h"
 #include "deform/phantom.h"
 #include "deform/points.h"
 #include "deform/truth/family.h"

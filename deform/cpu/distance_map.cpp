@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "deform/distance_map.h"
+#include "deform/cpu/distance_map.h"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>

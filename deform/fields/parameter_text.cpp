@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "deform/parameter_text.h"
+#include "deform/fields/parameter_text.h"
 
 #include <algorithm>
 
