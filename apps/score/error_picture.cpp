@@ -19,7 +19,7 @@ std::vector<std::uint8_t> error_picture(score::Truth& truth, const PullField& re
   const auto k =
       std::clamp(static_cast<std::int64_t>(std::lround(index_from_point(grid)(where).z)), std::int64_t{0}, size.z - 1);
   const score::TruthSlab slab = truth.slab({{0, 0, k}, {size.x, size.y, k + 1}}, {});
-  const int larger = size.x < 300 ? 2 : 1;
+  const int larger = std::max(1, static_cast<int>(512 / std::max(size.x, size.y)));
   Picture picture(static_cast<int>(size.x) * larger, static_cast<int>(size.y) * larger);
   dispatch(volume.type, [&]<class V>(V) {
     const V* values = reinterpret_cast<const V*>(volume.voxels) + k * size.x * size.y;

@@ -136,11 +136,12 @@ std::string page_of(const std::string& set, const std::vector<CaseScore>& scores
           "leads its centre and the place where the true deformation does; voxels of the body count onto which the "
           "deformation leads something.</p>\n";
   html += overview(scores);
-  html += "<p>Limits: ";
+  html += "<p>Limits, where it was measured:</p>\n<ul>\n";
   for (const ScoreLimit& limit : limits)
-    html += escaped(limit.about) + ": " + (limit.is_voxel_side ? "largest side of a voxel" : number(limit.most)) +
-            " (" + escaped(limit.source) + "); ";
-  html += "</p>\n";
+    html += "<li>" + escaped(limit.about) + ": " +
+            (limit.is_voxel_side ? "largest side of a voxel" : number(limit.most)) + " (" + escaped(limit.source) +
+            ")</li>\n";
+  html += "</ul>\n";
   for (const CaseScore& score : scores) html += case_section(score);
   return html + "</body></html>\n";
 }

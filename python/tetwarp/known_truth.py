@@ -31,7 +31,7 @@ def truth(
     Parameters
     ----------
     volume : path
-        A CT in HU, a file or a folder of DICOM: the moving volume.
+        A CT in HU, a file or a folder of DICOM: the moving volume. Or a manifest, which makes a set of each of its rows.
     output : path
         Folder of the set; it must be empty or not there.
     cases : str or sequence of str
@@ -42,7 +42,8 @@ def truth(
     roles : mapping, optional
         Which labels are what a kind needs: `{"lung": 2, "bone": [3, 17]}`.
     **options
-        Those of the command line with underscores: `noise=12`, `cell_size=4`, `dense=True`, `resume=True`.
+        Those of the command line with underscores: `noise=12` or `noise="measured"`, `dose="dose.dcm"`, `cell_size=4`,
+        `dense=True`, `resume=True`.
 
     Raises
     ------
@@ -86,13 +87,15 @@ def score(
         Folders with a result of each case, named CASE and a suffix: a displacement field or transform from fixed to
         moving, or CASE.csv, the landmarks of the fixed volume taken to the moving one.
     **options
-        Those of the command line with underscores: `limits="limits.json"`, `html="page.html"`, `csv="table.csv"`.
+        Those of the command line with underscores: `direction="forward"`, `back="other_direction"`, `triples="between"`,
+        `limits="limits.json"`, `html="page.html"`, `csv="table.csv"`.
 
     Returns
     -------
     list of dict
         One for each case and result, as the program writes them as JSON (docs/guide/truth.md): "case", "result", "passed",
-        "body", "labels", "near_slip", "landmarks", "jacobian", "dice", "checks"; "failure" where a result cannot be read.
+        "body", "labels", "near_slip", "from_slip", "landmarks", "jacobian", "dice", "surfaces", "gamma", "inverse_consistency",
+        "transitivity", "checks"; "failure" where a result cannot be read.
 
     Raises
     ------

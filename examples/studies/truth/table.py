@@ -4,7 +4,9 @@
 
 """Makes a table in Markdown of what the workflow measured: a row for each case and method.
 
-    table.py STUDY
+    table.py STUDY [--label 2=lung --label 3=bone]
+
+--label adds a column: the mean error of the voxels of that label.
 """
 
 import argparse
@@ -17,18 +19,26 @@ COLUMNS = ("mean_mm", "p95_mm", "p99_mm", "largest_mm")
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("study", type=pathlib.Path)
-    study = parser.parse_args().study
+    parser.add_argument("--label", action="append", default=[], metavar="N=NAME")
+    options = parser.parse_args()
+    study = options.study
+    labels = [label.split("=", 1) for label in options.label]
     with open(study / "scores.csv", newline="") as file:
         rows = list(csv.DictReader(file))
     found = {(row["case"], pathlib.Path(row["result"]).name, row["part"]): row for row in rows}
-    print("| case | method | seconds | body: mean | 95 % | 99 % | largest | near the slip: mean | landmarks: mean | largest |")
-    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
+    titles = ["case", "method", "seconds", "body: mean", "95 %", "99 %", "largest", *(f"{name}: mean" for _, name in labels)]
+    titles += ["near the slip: mean", "landmarks: mean", "largest"]
+    print("| " + " | ".join(titles) + " |")
+    print("| " + " | ".join("---" for _ in titles) + " |")
     for case, method in dict.fromkeys((case, method) for case, method, _ in found):
         body, slip, landmarks = (found.get((case, method, part)) for part in ("body", "near slip", "landmarks"))
         timed = study / "times" / f"{method}.{case}.txt"
         seconds = timed.read_text().splitlines()[1].split("\t")[0] if timed.exists() else ""
         cells = [case, method, f"{float(seconds):.0f}" if seconds else ""]
         cells += [f"{float(body[column]):.2f}" if body else "" for column in COLUMNS]
+        for number, _ in labels:
+            part = found.get((case, method, f"label {number}"))
+            cells.append(f"{float(part['mean_mm']):.2f}" if part else "")
         cells.append(f"{float(slip['mean_mm']):.2f}" if slip else "")
         cells += [f"{float(landmarks[column]):.2f}" if landmarks else "" for column in ("mean_mm", "largest_mm")]
         print("| " + " | ".join(cells) + " |")
