@@ -418,8 +418,6 @@ int run_truth(const TruthOptions& options) {
   if (!is_truth_manifest(options.input.path)) return TruthMaker(options).run();
   int failed = 0;
   const std::vector<TruthOptions> sets = read_truth_manifest(options);
-  std::error_code ignored;
-  fs::create_directories(options.output, ignored);  // what cannot be made is told by each set
   for (const TruthOptions& set : sets) {
     try {
       TruthMaker(set).run();
