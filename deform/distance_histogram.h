@@ -33,8 +33,10 @@ class DistanceHistogram {
     std::uint64_t seen = 0;
     for (std::size_t n = 0; n < counts_.size(); ++n) {
       seen += counts_[n];
-      if (seen >= wanted && first_ + n == 0) return 0;  // the bin of 0, and of what is less than any distance
-      if (seen >= wanted) return std::bit_cast<float>(static_cast<std::uint32_t>(((first_ + n) << kDropped) | kRest));
+      if (seen < wanted) continue;
+      const std::size_t bin = first_ + n;
+      if (bin == 0) return 0;  // holds 0, and what is less than any distance
+      return std::bit_cast<float>(static_cast<std::uint32_t>((bin << kDropped) | kRest));
     }
     return 0;
   }

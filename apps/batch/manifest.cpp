@@ -63,7 +63,7 @@ std::string nearest_key(const std::string& key) {
 std::string problem_of_id(const std::string& id) {
   if (id.empty()) return "no case id; give each row one";
   if (!is_plain_name(id)) {
-    return "the case id \"" + shown(id.substr(0, 100)) +
+    return "the case id \"" + shown(id.substr(0, kLongestName)) +
            "\" cannot be a folder's name everywhere; letters, digits, '.', '_' and '-' are allowed, at most 100, "
            "a letter or digit first";
   }

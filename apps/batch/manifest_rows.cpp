@@ -144,9 +144,8 @@ std::vector<ManifestRow> json_rows(const std::string& text, bool (*is_list)(cons
 }  // namespace
 
 bool is_plain_name(const std::string& name) {
-  constexpr std::size_t kLongest = 100;
   const auto is_letter = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0; };
-  return !name.empty() && name.size() <= kLongest && is_letter(name.front()) &&
+  return !name.empty() && name.size() <= kLongestName && is_letter(name.front()) &&
          std::all_of(name.begin(), name.end(),
                      [&](char c) { return is_letter(c) || c == '.' || c == '_' || c == '-'; });
 }

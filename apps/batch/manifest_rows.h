@@ -25,7 +25,9 @@ class ManifestErrors {
   std::multimap<std::size_t, std::string> lines_;
 };
 
-/// Whether a name can be that of a folder on every system: letters, digits, '.', '_' and '-', at most 100, a letter or
+/// Most letters of a name that a row gives its folder.
+inline constexpr std::size_t kLongestName = 100;
+/// Whether a name can be that of a folder on every system: letters, digits, '.', '_' and '-', not too many, a letter or
 /// digit first.
 bool is_plain_name(const std::string& name);
 

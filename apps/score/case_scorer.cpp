@@ -48,6 +48,8 @@ fs::path result_of(const fs::path& results, const TruthSet& set, const TruthCase
   return results;
 }
 
+AnyVolume read_or_none(const fs::path& path) { return path.empty() ? AnyVolume() : read_image(path); }
+
 /// Which voxels count: those of the body, the nearest to a slip by themselves.
 std::vector<Counts> counts_of(const AnyVolume& body, const AnyVolume& bands, const Geometry& grid) {
   const auto mask = body.as<std::uint8_t>();
@@ -66,17 +68,19 @@ std::vector<Counts> counts_of(const AnyVolume& body, const AnyVolume& bands, con
 
 /// Of a registration from fixed to moving this is the fixed volume, of one in the other direction the moving one.
 struct CaseScorer::Side {
-  AnyVolume volume, labels, bands;
+  Volumes volumes;
+  AnyVolume bands;
   std::vector<Counts> counts;
+  Geometry other;                       ///< grid of the other volume
   fs::path landmarks, other_landmarks;  ///< of this volume and of the other one
 
-  const Geometry& grid() const { return volume.geometry(); }
+  const Geometry& grid() const { return volumes.ct->geometry(); }
+  bool has_labels() const { return volumes.labels->data() != nullptr; }
 };
 
 CaseScorer::CaseScorer(const ScoreOptions& options, TruthSet set)
     : options_(options), set_(std::move(set)), backend_(chosen(options.backend)) {
-  moving_ = read_image(set_.moving);
-  if (!set_.labels.empty()) labels_ = read_image(set_.labels);
+  moving_ = read_volumes(set_.moving, set_.labels);
 }
 
 CaseScore CaseScorer::score(const fs::path& results, const fs::path& back, const TruthCase& one,
@@ -85,7 +89,7 @@ CaseScore CaseScorer::score(const fs::path& results, const fs::path& back, const
   score.result = results.string();
   score.name = one.name;
   score.roles = set_.roles;
-  const glm::dvec3& sides = moving_.geometry().spacing;
+  const glm::dvec3& sides = moving_.ct->geometry().spacing;
   score.voxel_side_mm = std::max({sides.x, sides.y, sides.z});
   try {
     score.file = result_of(results, set_, one);
@@ -106,19 +110,22 @@ CaseScore CaseScorer::score(const fs::path& results, const fs::path& back, const
   return score;
 }
 
+CaseScorer::Volumes CaseScorer::read_volumes(const fs::path& ct, const fs::path& labels) {
+  return {std::make_shared<const AnyVolume>(read_image(ct)), std::make_shared<const AnyVolume>(read_or_none(labels))};
+}
+
 CaseScorer::Side CaseScorer::side_of(const TruthCase& one) const {
   Side side;
-  const auto read = [](const fs::path& path) { return path.empty() ? AnyVolume() : read_image(path); };
-  side.volume = read(options_.forward ? set_.moving : one.fixed);
-  side.labels = read(options_.forward ? set_.labels : one.labels);
-  side.bands = read(options_.forward ? one.moving_bands : one.bands);
-  side.counts = counts_of(read(options_.forward ? set_.body : one.body), side.bands, side.grid());
+  side.volumes = options_.forward ? moving_ : read_volumes(one.fixed, one.labels);
+  side.other = options_.forward ? read_image_header(one.fixed).geometry : moving_.ct->geometry();
+  side.bands = read_or_none(options_.forward ? one.moving_bands : one.bands);
+  side.counts = counts_of(read_image(options_.forward ? set_.body : one.body), side.bands, side.grid());
   side.landmarks = options_.forward ? set_.landmarks : one.landmarks;
   side.other_landmarks = options_.forward ? one.landmarks : set_.landmarks;
   return side;
 }
 
-PullField CaseScorer::sampled(const PullField& field, const Geometry& grid, const Control& control) const {
+PullField CaseScorer::sampled(PullField field, const Geometry& grid, const Control& control) const {
   if (field.grid == grid) return field;
   PullField on_grid{grid, std::vector<glm::vec3>(static_cast<std::size_t>(voxel_count(grid)))};
   const auto resampler = make_pull_resampler(backend_, grid, options_.device, limits());
@@ -127,14 +134,16 @@ PullField CaseScorer::sampled(const PullField& field, const Geometry& grid, cons
   return on_grid;
 }
 
-/// @param source  grid of the volume to which the result leads
-/// @param grid    that of the volume from which it leads
-PullField CaseScorer::read_result(const fs::path& file, const Geometry& source, const Geometry& grid,
+/// A result as its file has it: on a grid of its own, or of a transform sampled at every voxel of `grid`.
+/// @param source   grid of the volume to which the result leads
+/// @param grid     that of the volume from which it leads
+/// @param forward  whether it leads from the moving volume to a fixed one
+PullField CaseScorer::read_result(const fs::path& file, const Geometry& source, const Geometry& grid, bool forward,
                                   std::vector<std::string>& notes, const Control& control) const {
-  const ReadPullField read = read_point_map(parse_pull_field(file.string(), options_.common.nifti_frame), source, grid,
-                                            options_.forward, options_.common.threads, control);
+  ReadPullField read = read_point_map(parse_pull_field(file.string(), options_.common.nifti_frame), source, grid,
+                                      forward, options_.common.threads, control);
   notes.insert(notes.end(), read.origin.notes.begin(), read.origin.notes.end());
-  return sampled(read.field, grid, control);
+  return std::move(read.field);
 }
 
 AnyVolume CaseScorer::warped(const AnyVolume& volume, const PullField& by, const Geometry& grid,
@@ -178,9 +187,9 @@ void CaseScorer::score_landmarks(const TruthCase& one, const Side& side, const P
 
 void CaseScorer::score_labels(const Side& side, const PullField& result, CaseScore& score,
                               const Control& control) const {
-  if (!side.labels.data()) return;
-  const AnyVolume moved = warped(labels_, result, side.grid(), Interpolation::vote, control);
-  const ConstVolumeView is = moved.view(), should = side.labels.view();
+  if (!side.has_labels()) return;
+  const AnyVolume moved = warped(*moving_.labels, result, side.grid(), Interpolation::vote, control);
+  const ConstVolumeView is = moved.view(), should = side.volumes.labels->view();
   score.overlaps = score::compare_labels(should, is);
   if (is_sheared(side.grid()) || !side.grid().slices.empty()) {
     score.notes.push_back("distances of surfaces are not measured on a tilted or uneven grid");
@@ -202,13 +211,8 @@ void CaseScorer::score_back(const fs::path& back, const TruthCase& one, const Si
   if (back.empty()) return;
   const fs::path file = result_of(back, set_, one);
   require(!file.empty(), "there is no result of " + one.name + " in " + back.string());
-  const AnyVolume fixed = options_.forward ? read_image(one.fixed) : AnyVolume();
-  const Geometry& other = options_.forward ? fixed.geometry() : moving_.geometry();
-  const ReadPullField read = read_point_map(parse_pull_field(file.string(), options_.common.nifti_frame), side.grid(),
-                                            other, !options_.forward, options_.common.threads, control);
-  for (const std::string& note : read.origin.notes) score.notes.push_back(note);
-  score.inverse_consistency =
-      score::consistency(result, read.field, nullptr, side.counts, limits(), {.stop = control.stop});
+  const PullField onto = read_result(file, side.grid(), side.other, !options_.forward, score.notes, control);
+  score.inverse_consistency = score::consistency(result, onto, nullptr, side.counts, limits(), {.stop = control.stop});
 }
 
 void CaseScorer::score_triples(const fs::path& results, const TruthCase& one, const Side& side, const PullField& result,
@@ -219,9 +223,10 @@ void CaseScorer::score_triples(const fs::path& results, const TruthCase& one, co
     if (between.empty()) continue;
     const fs::path onwards = result_of(results, set_, other);
     require(!onwards.empty(), between.string() + " leads to " + other.name + ", of which there is no result");
-    const AnyVolume fixed = read_image(other.fixed);
-    const PullField first = read_result(between, fixed.geometry(), side.grid(), score.notes, control),
-                    second = read_result(onwards, moving_.geometry(), fixed.geometry(), score.notes, control);
+    const Geometry fixed = read_image_header(other.fixed).geometry;
+    const PullField first = sampled(read_result(between, fixed, side.grid(), false, score.notes, control), side.grid(),
+                                    control),
+                    second = read_result(onwards, side.other, fixed, false, score.notes, control);
     score.transitivity[other.name] =
         score::consistency(first, second, &result, side.counts, limits(), {.stop = control.stop});
   }
@@ -233,9 +238,9 @@ void CaseScorer::score_field(const fs::path& results, const fs::path& back, cons
   const Control control = stage.control();
   const Side side = side_of(one);
   const Geometry& grid = side.grid();
-  const AnyVolume other = options_.forward ? read_image(one.fixed) : AnyVolume();
-  const Geometry &moving = moving_.geometry(), &fixed = options_.forward ? other.geometry() : grid;
-  const PullField result = read_result(score.file, options_.forward ? fixed : moving, grid, score.notes, control);
+  const Geometry &moving = moving_.ct->geometry(), &fixed = options_.forward ? side.other : grid;
+  const PullField result =
+      sampled(read_result(score.file, side.other, grid, options_.forward, score.notes, control), grid, control);
 
   const ForwardChoice choice = parse_forward_fields({one.field.string()}, {}, options_.common.nifti_frame);
   const VertexField field = read_field(choice, moving, options_.common.threads, control).field;
@@ -252,11 +257,11 @@ void CaseScorer::score_field(const fs::path& results, const fs::path& back, cons
   }
 
   std::vector<ConstVolumeView> parts;
-  if (side.labels.data()) parts.push_back(side.labels.view());
+  if (side.has_labels()) parts.push_back(side.volumes.labels->view());
   if (side.bands.data()) parts.push_back(side.bands.view());
   const score::DenseScore dense = score::score_field(*truth, result, side.counts, parts, limits(), control);
   if (dense.apart.points + dense.apart.missing > 0) score.apart = dense.apart;
-  if (side.labels.data()) score.labels = dense.parts.front();
+  if (side.has_labels()) score.labels = dense.parts.front();
   if (side.bands.data()) {
     double from = one.bands_mm.front();
     for (std::size_t band = 1; band <= one.bands_mm.size(); ++band) {
@@ -280,7 +285,7 @@ void CaseScorer::score_field(const fs::path& results, const fs::path& back, cons
   }
   score_back(back, one, side, result, score, control);
   score_triples(results, one, side, result, score, control);
-  score.picture = error_picture(*truth, result, side.volume.view(), side.counts, dense.all.worst);
+  score.picture = error_picture(*truth, result, side.volumes.ct->view(), side.counts, dense.all.worst);
 }
 
 }  // namespace tetwarp::apps

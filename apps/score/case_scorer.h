@@ -31,11 +31,18 @@ class CaseScorer {
 
  private:
   struct Side;  // the volume whose voxels are compared
+  /// A volume and its labels; of none the labels hold no data.
+  struct Volumes {
+    std::shared_ptr<const AnyVolume> ct, labels;
+  };
+
+  static Volumes read_volumes(const std::filesystem::path& ct, const std::filesystem::path& labels);
 
   Side side_of(const TruthCase& one) const;
-  PullField read_result(const std::filesystem::path& file, const Geometry& source, const Geometry& grid,
+  PullField read_result(const std::filesystem::path& file, const Geometry& source, const Geometry& grid, bool forward,
                         std::vector<std::string>& notes, const Control& control) const;
-  PullField sampled(const PullField& field, const Geometry& grid, const Control& control) const;
+  /// A result at every voxel of a grid.
+  PullField sampled(PullField field, const Geometry& grid, const Control& control) const;
   void score_field(const std::filesystem::path& results, const std::filesystem::path& back, const TruthCase& one,
                    CaseScore& score) const;
   void score_landmarks(const TruthCase& one, const Side& side, const PullField& result, CaseScore& score) const;
@@ -54,7 +61,7 @@ class CaseScorer {
   const ScoreOptions& options_;
   TruthSet set_;
   BackendKind backend_;
-  AnyVolume moving_, labels_;
+  Volumes moving_;
 };
 
 }  // namespace tetwarp::apps

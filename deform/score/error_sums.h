@@ -15,12 +15,6 @@ namespace tetwarp::score {
 /// Collects errors. Those of slices are added up in their order, so the sums do not depend on threads.
 class ErrorSums {
  public:
-  void add(double distance, const glm::dvec3& where) {
-    ++errors_.points;
-    sum_ += distance;
-    histogram_.add(distance);
-    if (distance > errors_.largest || errors_.points == 1) errors_.largest = distance, errors_.worst = where;
-  }
   /// Adds a distance; where it is not finite, there is no place.
   void add_or_miss(double distance, const glm::dvec3& where) {
     if (!std::isfinite(distance)) {
@@ -52,6 +46,13 @@ class ErrorSums {
   }
 
  private:
+  void add(double distance, const glm::dvec3& where) {
+    ++errors_.points;
+    sum_ += distance;
+    histogram_.add(distance);
+    if (distance > errors_.largest || errors_.points == 1) errors_.largest = distance, errors_.worst = where;
+  }
+
   Errors errors_;
   double sum_ = 0;
   DistanceHistogram histogram_;
