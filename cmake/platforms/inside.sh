@@ -54,6 +54,11 @@ inside sh -euc '
   git checkout -q --force --detach FETCH_HEAD'
 inside apt-get update -qq
 inside sh -euc 'cd /sources && apt-get install -y -qq --no-install-recommends $(examples/quickstart.sh --packages) "$@" >/dev/null' sh ${packages[@]+"${packages[@]}"}
+# Whom this machine trusts beyond the list of Debian, such as a proxy, is trusted there too.
+if compgen -G '/usr/local/share/ca-certificates/*.crt' >/dev/null; then
+  cp /usr/local/share/ca-certificates/*.crt "$root/usr/local/share/ca-certificates/"
+  inside update-ca-certificates >/dev/null
+fi
 status=0
 inside sh -c 'cd /sources && exec "$@"' sh "$@" || status=$?
 cp -r "$root/output/." "$output"
