@@ -35,6 +35,8 @@ def definition(module, name):
     for node in tree.body:
         if isinstance(node, (ast.FunctionDef, ast.ClassDef)) and node.name == name:
             return node
+        if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") == name:
+            return node
     raise SystemExit(f"python_pages.py: error: no {name} in {module}.py")
 
 
@@ -80,8 +82,24 @@ def sections(docstring):
     return "\n".join(out) + "\n"
 
 
-def described(node, name):
+def remark(module, node):
+    """The comment `#:` above a constant, which is its docstring."""
+    lines = (PACKAGE / f"{module}.py").read_text().splitlines()
+    text = []
+    for line in reversed(lines[: node.lineno - 1]):
+        if not line.startswith("#:"):
+            break
+        text.insert(0, line[2:].strip())
+    if not text:
+        raise SystemExit(f"python_pages.py: error: no comment #: above line {node.lineno} of {module}.py")
+    return " ".join(text) + "\n"
+
+
+def described(node, name, module):
     yield f"## {name}\n"
+    if isinstance(node, ast.Assign):
+        yield remark(module, node)
+        return
     if isinstance(node, ast.FunctionDef):
         yield signature(node, f"tetwarp.{name}")
         yield sections(ast.get_docstring(node))
@@ -104,11 +122,11 @@ def described(node, name):
 def main():
     page = ["# tetwarp, the package of Python\n", "The [guide](../guide/python.md) shows how it is used.\n"]
     for name, module in public_names():
-        page += described(definition(module, name), name)
+        page += described(definition(module, name), name, module)
     tree = ast.parse((PACKAGE / "fields.py").read_text())
     for node in tree.body:
         if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
-            page += described(node, f"fields.{node.name}")
+            page += described(node, f"fields.{node.name}", "fields")
     pathlib.Path(sys.argv[1]).write_text("\n".join(page))
 
 
