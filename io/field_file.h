@@ -105,7 +105,10 @@ PullField read_pull_field(const FieldSource& source);
 void write_field_file(const std::filesystem::path& path, const VertexField& field, const Control& control = {});
 /// Writes a forward field as the suffix of the file has it: .vtu and .vtk get its tetrahedra (io/mesh_writer.h), other
 /// files its lattice (`write_field_file`).
-/// @param named  the name that messages give the file; empty: `path`
+/// @param path     the file
+/// @param field    what is written
+/// @param control  progress and stop
+/// @param named    the name that messages give the file; empty: `path`
 /// @throws InputError for a mesh in a file that holds a lattice alone; otherwise as those two
 void write_vertex_field(const std::filesystem::path& path, const VertexField& field, const Control& control = {},
                         const std::filesystem::path& named = {});

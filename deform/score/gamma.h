@@ -32,6 +32,9 @@ struct GammaScore {
 /// evaluated dose is looked up between its voxels, trilinearly, at places a tenth of the distance apart.
 /// @param reference  doses, one component, the whole volume
 /// @param evaluated  doses on the same grid
+/// @param criterion  what passes
+/// @param limits     number of threads
+/// @param control    progress and stop
 /// @throws InputError for views that do not fit, a reference without a dose above 0, or criteria that are not above 0
 /// @throws Cancelled
 GammaScore gamma_score(const ConstVolumeView& reference, const ConstVolumeView& evaluated,

@@ -86,16 +86,19 @@ DenseScore score_field(Truth& truth, const PullField& result, std::span<const Co
 
 /// What a result says of a point that need not be a voxel centre: T(p) - p, trilinear between the samples; NaN outside
 /// of them, and where one that is needed is NaN.
-/// @param point  LPS mm
+/// @param result  the displacement field of a registration
+/// @param point   LPS mm
 glm::dvec3 displacement_at(const PullField& result, const glm::dvec3& point);
 
 /// How far two results are from agreeing: |second(first(p)) - whole(p)| at voxel centres p, where `second` is taken
 /// between its samples, trilinearly. With the two directions of a registration, and nothing as the whole, that is its
 /// inverse consistency; with the results between three volumes their transitivity.
-/// @param first   displacement at each voxel of the grid of `counts`, LPS mm
-/// @param second  displacement on any grid of the space to which the first leads
-/// @param whole   displacement on the grid of the first; null: none, each point should come back to itself
-/// @param counts  for each voxel of the first: those with `Counts::yes` are compared
+/// @param first    displacement at each voxel of the grid of `counts`, LPS mm
+/// @param second   displacement on any grid of the space to which the first leads
+/// @param whole    displacement on the grid of the first; null: none, each point should come back to itself
+/// @param counts   for each voxel of the first: those with `Counts::yes` are compared
+/// @param limits   number of threads
+/// @param control  progress and stop
 /// @return errors; missing are voxels of which one of them says no place
 /// @throws InputError for sizes that do not fit; Cancelled
 Errors consistency(const PullField& first, const PullField& second, const PullField* whole,

@@ -38,6 +38,7 @@ std::unique_ptr<Truth> exact_inverse(ForwardResampler& resampler);
 /// @param mover   of the true field; outlives what is returned
 /// @param moving  grid of the moving volume
 /// @param fixed   grid of the fixed volume
+/// @param limits  number of threads
 std::unique_ptr<Truth> exact_forward(const PointMover& mover, const Geometry& moving, const Geometry& fixed,
                                      const Limits& limits = {});
 

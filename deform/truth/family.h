@@ -18,7 +18,8 @@ namespace tetwarp::truth {
 struct Parameter {
   std::string_view name;   ///< as texts have it
   double usual;            ///< its value unless another is given
-  double least, most;      ///< range, both included
+  double least,            ///< smallest value that it takes
+      most;                ///< largest value that it takes
   std::string_view about;  ///< what it is, with its unit
   bool is_whole = false;   ///< whether only whole numbers are taken
 };

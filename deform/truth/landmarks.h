@@ -22,8 +22,11 @@ struct LandmarkRules {
 /// dimensions), which is near the smallest eigenvalue. Of each block of 4 x 4 x 4 voxels the best one is a candidate;
 /// candidates are taken from the best downwards, unless one is near already. Fewer come out where there are not so
 /// many.
-/// @param ct    HU, one component, the whole volume
-/// @param body  not 0 where a landmark may lie, i fastest; such as the voxels of the body
+/// @param ct       HU, one component, the whole volume
+/// @param body     not 0 where a landmark may lie, i fastest; such as the voxels of the body
+/// @param rules    how many there may be, and how near
+/// @param limits   number of threads
+/// @param control  progress and stop
 /// @return LPS mm, from the best to the worst
 /// @throws InputError for views that do not fit; Cancelled
 std::vector<glm::dvec3> find_landmarks(const ConstVolumeView& ct, const std::vector<std::uint8_t>& body,

@@ -31,8 +31,9 @@ Noise smoothed_noise(double deviation);
 /// of zero phase whose power spectrum is that of the autocovariance, tapered (Bartlett) at 5 voxels; so the noise has
 /// the measured power and grain. Differences of anatomy between slices count as noise, so there is rather more than
 /// less. At most 32 pairs of slices, spread evenly, are looked at. The result does not depend on the number of threads.
-/// @param volume  HU, one component, the whole volume
-/// @param limits  number of threads
+/// @param volume   HU, one component, the whole volume
+/// @param limits   number of threads
+/// @param control  progress and stop
 /// @throws InputError for a view that does not fit, or a volume with fewer than 1000 such voxels
 Noise measure_noise(const ConstVolumeView& volume, const Limits& limits = {}, const Control& control = {});
 
@@ -43,6 +44,7 @@ Noise measure_noise(const ConstVolumeView& volume, const Limits& limits = {}, co
 /// @param seed    decides the random numbers
 /// @param output  gets the sum, rounded and saturated where its type is an integer type; same size and type, and may be
 ///         the volume itself
+/// @param limits  number of threads
 /// @throws InputError for views that do not fit
 void add_noise(const ConstVolumeView& volume, const Noise& noise, std::uint64_t seed, const VolumeView& output,
                const Limits& limits = {});

@@ -20,6 +20,7 @@ using Roles = std::map<std::string, std::vector<std::int64_t>>;
 class Subject {
  public:
   /// @param patient  of `simulate::examine`; with labels where there are roles
+  /// @param roles    labels by the roles that families need
   /// @param volume   grid of the CT
   /// @throws InputError for roles without labels, or a role of which the patient has no vertex
   Subject(simulate::Patient patient, Roles roles, const Geometry& volume);
