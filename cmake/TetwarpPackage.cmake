@@ -31,11 +31,11 @@ function(tetwarp_install_package)
     set(tetwarp_itk_package "ITK ${tetwarp_itk_version} COMPONENTS ${modules}")
   endif()
   configure_file("${PROJECT_SOURCE_DIR}/cmake/tetwarpConfig.cmake.in" "${PROJECT_BINARY_DIR}/tetwarpConfig.cmake" @ONLY)
-  foreach(module FindLibdeflate.cmake FindOpenJP2.cmake)
+  foreach(module FindLibdeflate.cmake FindMinizip.cmake FindOpenJP2.cmake)
     configure_file("${PROJECT_SOURCE_DIR}/cmake/${module}" "${PROJECT_BINARY_DIR}/${module}" COPYONLY)
   endforeach()
   write_basic_package_version_file("${PROJECT_BINARY_DIR}/tetwarpConfigVersion.cmake" COMPATIBILITY SameMinorVersion)
   install(FILES "${PROJECT_BINARY_DIR}/tetwarpConfig.cmake" "${PROJECT_BINARY_DIR}/tetwarpConfigVersion.cmake"
-                "${PROJECT_BINARY_DIR}/FindLibdeflate.cmake" "${PROJECT_BINARY_DIR}/FindOpenJP2.cmake"
+                "${PROJECT_BINARY_DIR}/FindLibdeflate.cmake" "${PROJECT_BINARY_DIR}/FindMinizip.cmake" "${PROJECT_BINARY_DIR}/FindOpenJP2.cmake"
           DESTINATION "${TETWARP_PACKAGE_FOLDER}" COMPONENT development)
 endfunction()

@@ -21,7 +21,7 @@ packages=(
   libtbb-dev libhwy-dev libeigen3-dev libglm-dev libgtest-dev libcli11-dev nlohmann-json3-dev
   libinsighttoolkit5-dev libdcmtk-dev libopenjp2-7-dev        # NIfTI, NRRD, MHA; DICOM, in JPEG 2000 too
   libfftw3-dev                                                # Debian 13's ITK asks for it when it is linked
-  libdeflate-dev libicu-dev libpng-dev zlib1g-dev libssl-dev
+  libdeflate-dev libminizip-dev libicu-dev libpng-dev zlib1g-dev libssl-dev libtomlplusplus-dev
   libturbojpeg0-dev libboost-dev                              # the viewer
   python3-dev python3-venv                                    # the Python package
   dicom3tools dcm2niix python3-pydicom python3-gdcm python3-numpy python3-nibabel  # independent readers that the tests ask

@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -67,6 +68,9 @@ struct FieldSource {
   /// The value of an option, or `otherwise` if it was not given.
   std::string option(const std::string& key, const std::string& otherwise = "") const;
 };
+
+/// Options that name a further file: a second mesh, a table of displacements, the two images of a transform of FSL.
+inline constexpr std::array<const char*, 4> kFileOptions = {"deformed", "table", "source", "reference"};
 
 /// Parses `PATH` or `PATH:KEY=VALUE[,KEY=VALUE]`. If a file has the whole text as its name, that file is meant.
 /// @throws InputError for an option without a value, or given twice

@@ -54,9 +54,10 @@ bool is_mesh_file(const std::filesystem::path& path);
 ///
 /// Options of the source, all of them optional:
 /// - displacement=NAME: the vectors that are displacements; otherwise the only vectors, or those called displacement,
-///   Displacement, U or u
+///   Displacement, U, u or DISP
 /// - step=N: which of several time steps
 /// - deformed=FILE: a second mesh with the same vertices and cells, whose positions are the deformed ones
+/// - table=FILE: displacements by vertex number, a line each: number, ux, uy, uz
 /// - frame=lps|ras and units=mm|m: of both files; LPS and mm if neither option nor file states them
 ///
 /// @throws InputError for a file that is damaged or no mesh, a displacement that cannot be decided (the message lists

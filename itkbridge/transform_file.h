@@ -48,9 +48,10 @@ TransformFunction make_transform(const StoredTransform& stored, const std::strin
 struct LoadedTransform {
   StoredTransform stored;
   TransformFunction map;
+  bool affine = false;  ///< whether it has neither a B-spline nor a displacement field
 };
 
-/// Entry point of the module, which io/fields/transform_file.cpp loads: `read_transform`, then `make_transform`.
+/// Entry point of the module, which io/fields/transform_itk.cpp loads: `read_transform`, then `make_transform`.
 extern "C" void tetwarp_load_transform(const std::filesystem::path& path, const std::stop_token& stop,
                                        LoadedTransform& loaded);
 /// Entry point of the module: the files that `read_transform` reads, which are the file itself and the initial

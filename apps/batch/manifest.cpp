@@ -30,7 +30,7 @@ namespace {
 constexpr std::size_t kMostCases = 100000;
 const std::set<std::string> kOwnKeys = {"case", "input", "seed", "variants", "comment"};
 const std::set<std::string> kOfTheBatch = {"threads", "device", "memory", "overwrite", "quiet", "verbose", "dry-run"};
-const std::set<std::string> kInputs = {"pull-field", "scenario", "labels", "deidentify-key"};
+const std::set<std::string> kInputs = {"scenario", "labels", "deidentify-key"};
 const std::set<std::string> kOutputs = {"output", "coverage", "inverse", "jacobian",
                                         "folds",  "preview",  "report",  "write-field"};
 
@@ -110,7 +110,8 @@ std::string output(const std::string& key, const std::string& text, const Places
 }
 
 std::string value_of(const std::string& key, const std::string& text, const Places& places) {
-  if (key == "field") return with_files_renamed(text, [&](const std::string& file) { return input(file, places); });
+  if (key == "field" || key == "pull-field")
+    return with_files_renamed(text, [&](const std::string& file) { return input(file, places); });
   if (key == "grid") return text == "same" || text == "fit" ? text : input(text, places);
   if (kInputs.contains(key)) return input(text, places);
   if (kOutputs.contains(key)) return output(key, text, places);

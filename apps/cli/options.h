@@ -55,7 +55,7 @@ struct InputOptions {
 /// looks into the texts.
 struct FieldArguments {
   std::vector<std::string> forward;       ///< formulas and files, the first applied first
-  std::string pull;                       ///< instead: a field that maps output to input
+  std::vector<std::string> pull;          ///< instead: fields that map output to input, the first applied first
   std::optional<std::int64_t> cell_size;  ///< of forward ones
 
   bool is_given() const { return !forward.empty() || !pull.empty(); }

@@ -70,11 +70,13 @@ void add_deformation(CLI::App& command, DeformOptions& options) {
   auto* field =
       command.add_option("-f,--field", options.field.forward, kFieldHelp)->allow_extra_args(false)->type_name("FIELD");
   command
-      .add_option("--pull-field", options.field.pull,
-                  "A field that maps output to input, as registration tools write it (files as for -f, and a "
-                  "DICOM Deformable Spatial Registration, FILE:item=N where it has several); NaN in it: no source. Or "
-                  "a transform of ITK, elastix, plastimatch (.h5 .tfm .txt) or NiftyReg (its B-spline): "
-                  "output p comes from T(p)")
+      .add_option(
+          "--pull-field", options.field.pull,
+          "A field that maps output to input, as registration tools write it (files as for -f, and a "
+          "DICOM Deformable Spatial Registration, FILE:item=N where it has several); NaN in it: no source. Or "
+          "a transform as for -f: output p comes from T(p). Several compose in the order of antsApplyTransforms "
+          "-t: p goes through the first, and from there on")
+      ->allow_extra_args(false)
       ->type_name("FILE")
       ->excludes(field);
   command

@@ -40,7 +40,11 @@ void add_field_options(const DeformRequest& request, json& options) {
   }
   const auto& field = std::get<FieldChoice>(request.field);
   if (const auto* pull = std::get_if<PullChoice>(&field)) {
-    options["pull_field"] = pull->field.text;
+    if (pull->fields.size() == 1) {
+      options["pull_field"] = pull->fields.front().text;
+    } else {
+      for (const NamedField& one : pull->fields) options["pull_field"].push_back(one.text);
+    }
     return;
   }
   const auto& forward = std::get<ForwardChoice>(field);

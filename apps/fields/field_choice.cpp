@@ -43,14 +43,16 @@ ParsedFile parse_file(const std::string& text, NiftiFrame frame) {
   ParsedFile file{as_usage([&] { return parse_field_source(text); })};
   file.source.nifti_frame = frame;
   file.is_mesh = is_mesh_file(file.source.path);  // a file that cannot be read is no mistake of the command line
-  as_usage([&] { file.is_mesh ? check_mesh_options(file.source) : check_field_options(file.source); });
+  as_usage([&] {
+    if (file.is_mesh) return check_mesh_options(file.source);
+    is_transform_file(file.source.path) ? check_transform_options(file.source) : check_field_options(file.source);
+  });
   return file;
 }
 
-/// The field that a text names which is no formula: a file. A transform takes no options.
+/// The field that a text names which is no formula: a file.
 NamedField named_file(const std::string& text, ParsedFile file) {
-  if (file.source.options.empty() && is_transform_file(file.source.path))
-    return {text, NamedTransform{std::move(file.source.path)}};
+  if (is_transform_file(file.source.path)) return {text, NamedTransform{std::move(file.source)}};
   if (file.is_mesh) return {text, NamedMesh{std::move(file.source)}};
   return {text, NamedLattice{std::move(file.source)}};
 }
@@ -65,7 +67,7 @@ NamedField parse_forward_field(const std::string& text, NiftiFrame frame) {
 
 /// What a field is called: a formula by its text, a file without its folder.
 std::string title_of(const NamedField& field) {
-  if (const auto* transform = std::get_if<NamedTransform>(&field.what)) return transform->file.filename().string();
+  if (const auto* transform = std::get_if<NamedTransform>(&field.what)) return transform->file.path.filename().string();
   const FieldSource* file = source_of(field);
   return file ? file->path.filename().string() : field.text;
 }
@@ -94,28 +96,31 @@ std::vector<fs::path> files_of(const NamedField& field) {
     try {
       return files_of_transform(transform->file);
     } catch (const Error&) {  // whoever reads it says why, and nothing is written
-      return {transform->file};
+      return {transform->file.path};
     }
   }
   const FieldSource* file = source_of(field);
   if (!file) return {};
   std::vector<fs::path> files = {file->path};
-  if (file->options.contains("deformed")) files.emplace_back(file->option("deformed"));
+  for (const char* key : kFileOptions) {
+    if (file->options.contains(key)) files.emplace_back(file->option(key));
+  }
   return files;
 }
 
 std::vector<fs::path> files_of(const FieldChoice& field) {
-  if (const auto* pull = std::get_if<PullChoice>(&field)) return files_of(pull->field);
+  const auto* pull = std::get_if<PullChoice>(&field);
   std::vector<fs::path> files;
-  for (const NamedField& one : std::get<ForwardChoice>(field).fields) {
+  for (const NamedField& one : pull ? pull->fields : std::get<ForwardChoice>(field).fields) {
     for (fs::path& file : files_of(one)) files.push_back(std::move(file));
   }
   return files;
 }
 
 std::string title_of(const FieldChoice& field) {
-  if (const auto* pull = std::get_if<PullChoice>(&field)) return "pull field " + title_of(pull->field);
-  return joined(std::get<ForwardChoice>(field).fields, [](const NamedField& one) { return title_of(one); });
+  const auto title = [](const NamedField& one) { return title_of(one); };
+  if (const auto* pull = std::get_if<PullChoice>(&field)) return "pull field " + joined(pull->fields, title);
+  return joined(std::get<ForwardChoice>(field).fields, title);
 }
 
 std::string title_without_names(const FieldChoice& field) {
@@ -152,12 +157,23 @@ std::vector<ForwardChoice> parse_sequence(const std::vector<std::string>& texts,
   return sequence;
 }
 
-PullChoice parse_pull_field(const std::string& text, NiftiFrame frame) {
-  return {named_file(text, parse_file(text, frame))};
+std::string text_of(const PullChoice& choice) {
+  return joined(choice.fields, [](const NamedField& one) { return one.text; });
+}
+
+PullChoice parse_pull_fields(const std::vector<std::string>& texts, NiftiFrame frame) {
+  if (texts.empty()) throw UsageError("no field; give --pull-field FILE");
+  PullChoice parsed;
+  for (const std::string& text : texts) {
+    parsed.fields.push_back(named_file(text, parse_file(text, frame)));
+    if (std::holds_alternative<NamedMesh>(parsed.fields.back().what))
+      throw UsageError("a mesh, " + text + ", says where its vertices go; give it with -f");
+  }
+  return parsed;
 }
 
 FieldChoice parse_field(const FieldArguments& given, NiftiFrame frame) {
-  if (!given.pull.empty()) return parse_pull_field(given.pull, frame);
+  if (!given.pull.empty()) return parse_pull_fields(given.pull, frame);
   return parse_forward_fields(given.forward, given.cell_size, frame);
 }
 
@@ -165,8 +181,13 @@ std::string with_files_renamed(const std::string& text, const std::function<std:
   if (is_formula(text)) return text;
   const std::string other = renamed(text);
   FieldSource source = parse_field_source(other);
-  if (!source.options.contains("deformed")) return other;
-  source.options["deformed"] = renamed(source.options["deformed"]);
+  bool has_files = false;
+  for (const char* key : kFileOptions) {
+    if (!source.options.contains(key)) continue;
+    source.options[key] = renamed(source.options[key]);
+    has_files = true;
+  }
+  if (!has_files) return other;
   std::string all = source.path.string();
   for (const auto& [key, value] : source.options)
     all.append(all.size() == source.path.string().size() ? ":" : ",").append(key).append("=").append(value);

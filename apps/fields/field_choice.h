@@ -31,7 +31,7 @@ struct NamedMesh {
 };
 /// A file of a transform that another program wrote.
 struct NamedTransform {
-  std::filesystem::path file;
+  FieldSource file;
 };
 
 /// One field as the command line names it. Of a file no more is known than what tells its kind.
@@ -49,10 +49,13 @@ struct ForwardChoice {
   std::optional<std::int64_t> cell_size;  ///< of a lattice over the volume; none where the first has its own vertices
 };
 
-/// A field that maps output to input: that of --pull-field. It is a file, which need not exist.
+/// Fields that map output to input, each point going through one after the other: those of --pull-field. They are
+/// files, which need not exist.
 struct PullChoice {
-  NamedField field;
+  std::vector<NamedField> fields;  ///< at least one, no mesh
 };
+/// Their texts: "1Warp.nii.gz, then 0GenericAffine.mat".
+std::string text_of(const PullChoice& choice);
 
 /// The field of a command, in either direction.
 using FieldChoice = std::variant<ForwardChoice, PullChoice>;
@@ -83,8 +86,8 @@ ForwardChoice parse_forward_fields(const std::vector<std::string>& texts, std::o
 /// Fields one after the other, each by itself: those of --sequence. @throws UsageError as the function above
 std::vector<ForwardChoice> parse_sequence(const std::vector<std::string>& texts, std::optional<std::int64_t> cell_size,
                                           NiftiFrame frame);
-/// @throws UsageError for options that do not go with the file
-PullChoice parse_pull_field(const std::string& text, NiftiFrame frame);
+/// @throws UsageError for no text at all; options that do not go with the file; a mesh, which is a forward field
+PullChoice parse_pull_fields(const std::vector<std::string>& texts, NiftiFrame frame);
 /// The one that was given. @throws UsageError for none, and as the two above
 FieldChoice parse_field(const FieldArguments& given, NiftiFrame frame);
 

@@ -26,7 +26,8 @@ void add_invert(CLI::App& app, InvertOptions& options) {
           "--pull-field", options.field.pull,
           "Instead of FIELD: a field that maps output to input. Its inverse is a forward field, with a vertex at "
           "every voxel of --like, the volume that the field takes values from; beyond its grid the field goes on "
-          "with its outermost samples")
+          "with its outermost samples. Several compose, the first is applied first")
+      ->allow_extra_args(false)
       ->type_name("FILE")
       ->excludes(field);
   command->add_option("--like", options.like.path, "The volume on whose grid the inverse is sampled")->required();

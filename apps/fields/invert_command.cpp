@@ -31,7 +31,8 @@ std::string text_of(const Residuals& residuals) {
 struct Invertible {
   AnyField field;  ///< forward
   FieldOrigin origin;
-  Geometry pull_grid = {};  ///< of a pull field, before it was continued
+  Geometry pull_grid = {};     ///< of a pull field, before it was continued
+  std::string pull_text = {};  ///< what a pull field is called
 
   const VertexField& forward() const { return std::get<VertexField>(field); }
 };
@@ -45,9 +46,9 @@ Invertible read_invertible(const PullChoice& choice, const Geometry& like, int t
   const Geometry grid = straightened(like);  // of the vertices of the inverse, on which a tilted stack is not held
   ReadPullField read = read_field(choice, like, grid, threads, control);
   try {
-    return {continued_over(read.field, grid), std::move(read.origin), read.field.grid};
+    return {continued_over(read.field, grid), std::move(read.origin), read.field.grid, text_of(choice)};
   } catch (const InputError& error) {
-    throw InputError(std::string(error.what()) + ", " + choice.field.text);
+    throw InputError(std::string(error.what()) + ", " + text_of(choice));
   }
 }
 
@@ -85,10 +86,10 @@ std::uint64_t count_beyond(const VolumeView& samples, const Geometry& grid) {
 void check_forward(const InvertOptions& options, const Inversion& result, Invertible& field) {
   require(result.report.uncovered == 0, std::to_string(result.report.uncovered) + " voxels of " +
                                             options.like.path.string() + " have no place by the inverse of " +
-                                            options.field.pull + "; a forward field needs one at every vertex");
+                                            field.pull_text + "; a forward field needs one at every vertex");
   if (result.beyond == 0) return;
   field.origin.notes.push_back(std::to_string(result.beyond) + " of " + std::to_string(voxel_count(result.grid)) +
-                               " vertices go beyond the grid of " + options.field.pull +
+                               " vertices go beyond the grid of " + field.pull_text +
                                ", which goes on there with its outermost samples");
 }
 

@@ -3,6 +3,8 @@
 
 #include "apps/fields/read_field.h"
 
+#include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "apps/cli/console.h"
@@ -14,6 +16,17 @@ namespace tetwarp::apps {
 namespace {
 
 TransformFile read(const NamedTransform& transform) { return read_transform_file(transform.file, interrupt_token()); }
+std::string path_of(const NamedTransform& transform) { return transform.file.path.string(); }
+
+/// A transform that is to map output to input. @throws InputError for one that maps input to output
+TransformFile read_pulling(const NamedTransform& named) {
+  TransformFile transform = read(named);
+  const std::string file = path_of(named);
+  require(transform.direction != Direction::forward,
+          "a transform of " + transform.tool + " maps input to output (moving to fixed), " + file +
+              "; give it with -f, or its inverse with --pull-field " + file + ":invert=yes");
+  return transform;
+}
 
 /// How a file is read that is meant for a volume. @param volume  grid of that volume
 FieldSource for_volume(FieldSource file, const Geometry& volume) {
@@ -32,8 +45,8 @@ void note_header(const FieldFileHeader& header, const std::string& path, const c
 /// What to say of a transform once it was evaluated at every vertex or voxel.
 void note_transform(const TransformFile& transform, const std::string& path, bool pulls, FieldOrigin& origin) {
   const std::string taken = pulls ? "output to input" : "forward, each vertex x goes to T(x)";
-  if (!transform.pulls) origin.notes.push_back(path + " does not say its direction: taken as " + taken);
-  if (transform.pulls && !pulls)
+  if (!transform.direction) origin.notes.push_back(path + " does not say its direction: taken as " + taken);
+  if (transform.direction == Direction::pull && !pulls)
     origin.notes.push_back(path + ": transforms of " + transform.tool + " map output to input; taken as " + taken);
   if (const std::uint64_t outside = *transform.outside; outside > 0) {
     origin.notes.push_back(path + ": " + std::to_string(outside) + (pulls ? " voxels" : " vertices") +
@@ -73,7 +86,7 @@ class Composition {
   void add(const NamedField&, const NamedTransform& named) {
     const TransformFile transform = read(named);
     add(transform.displacement);
-    note_transform(transform, named.file.string(), false, result_.origin);
+    note_transform(transform, path_of(named), false, result_.origin);
   }
   void add(const NamedField&, const NamedLattice& named) {
     const FieldSource source = for_volume(named.file, volume_);
@@ -108,13 +121,59 @@ class Composition {
   bool is_first_ = true;
 };
 
-/// The file of a pull field. @throws InputError for a mesh, which is a forward field
-const FieldSource& pull_source(const PullChoice& choice) {
-  const FieldSource& source = *source_of(choice.field);
-  require(!std::holds_alternative<NamedMesh>(choice.field.what),
-          "a mesh, " + source.path.string() + ", says where its vertices go; give it with -f");
-  return source;
-}
+/// Makes one map of several, in the order in which a point goes through them.
+class PullComposition {
+ public:
+  /// @param volume   on which an array without a place lies
+  /// @param samples  where the map is wanted, if the first is a transform
+  PullComposition(const PullChoice& choice, const Geometry& volume, const Geometry& samples, int threads,
+                  const Control& control)
+      : volume_(volume), samples_(samples), limits_{.threads = threads}, control_(control) {
+    for (const NamedField& field : choice.fields) {
+      const auto* transform = std::get_if<NamedTransform>(&field.what);
+      transform ? add(*transform) : add(*source_of(field));
+      is_first_ = false;
+    }
+  }
+
+  ReadPullField result() && { return std::move(result_); }
+
+ private:
+  void add(const NamedTransform& named) {
+    const TransformFile transform = read_pulling(named);
+    if (is_first_) {
+      VertexField sampled = sample_on(samples_, transform.displacement, limits_, control_);
+      result_.field = {sampled.lattice, std::move(sampled.displacement)};
+    } else {
+      compose(result_.field, transform.displacement, limits_, control_);
+    }
+    note_transform(transform, path_of(named), true, result_.origin);
+  }
+  void add(const FieldSource& file) {
+    const FieldSource source = for_volume(file, volume_);
+    note_header(read_field_header(source), source.path.string(), "output to input", result_.origin);
+    PullField next = read_pull_field(source);
+    if (is_first_) {
+      result_.field = std::move(next);
+      return;
+    }
+    const std::uint64_t before = count_places(result_.field);
+    compose(result_.field, between_samples(next), limits_, control_);
+    if (const std::uint64_t lost = before - count_places(result_.field); lost > 0)
+      result_.origin.notes.push_back(source.path.string() + ": " + std::to_string(lost) +
+                                     " samples of what comes before it lead out of its grid, so they have no source");
+  }
+  static std::uint64_t count_places(const PullField& field) {
+    return static_cast<std::uint64_t>(
+        std::ranges::count_if(field.displacement, [](const glm::vec3& by) { return !std::isnan(by.x + by.y + by.z); }));
+  }
+
+  const Geometry &volume_, &samples_;
+  Limits limits_;
+  const Control& control_;
+  ReadPullField result_;
+  bool is_first_ = true;
+};
 
 std::uint64_t bytes_of_vectors(const glm::i64vec3& size) {
   return static_cast<std::uint64_t>(size.x * size.y * size.z) * sizeof(glm::vec3);
@@ -128,26 +187,15 @@ ReadForwardField read_field(const ForwardChoice& choice, const Geometry& volume,
 
 ReadPullField read_field(const PullChoice& choice, const Geometry& volume, const Geometry& output, int threads,
                          const Control& control) {
-  ReadPullField result;
-  if (const auto* named = std::get_if<NamedTransform>(&choice.field.what)) {
-    const TransformFile transform = read(*named);
-    VertexField sampled = sample_on(output, transform.displacement, {.threads = threads}, control);
-    note_transform(transform, named->file.string(), true, result.origin);
-    result.field = {sampled.lattice, std::move(sampled.displacement)};
-    return result;
-  }
-  const FieldSource source = for_volume(pull_source(choice), volume);
-  note_header(read_field_header(source), source.path.string(), "output to input", result.origin);
-  result.field = read_pull_field(source);
-  return result;
+  return PullComposition(choice, volume, output, threads, control).result();
 }
 
 ReadPullField read_point_map(const PullChoice& choice, const Geometry& volume, const Geometry& grid, bool forward,
                              int threads, const Control& control) {
-  if (!forward || std::holds_alternative<NamedTransform>(choice.field.what))
-    return read_field(choice, volume, grid, threads, control);
+  const FieldSource* file = source_of(choice.fields.front());
+  if (!forward || !file || choice.fields.size() > 1) return read_field(choice, volume, grid, threads, control);
   ReadPullField result;
-  const FieldSource source = for_volume(pull_source(choice), grid);
+  const FieldSource source = for_volume(*file, grid);
   note_header(read_field_header(source), source.path.string(), "moving to fixed", result.origin);
   VertexField field = read_forward_field(source);
   result.field = {field.lattice, std::move(field.displacement)};
@@ -172,10 +220,13 @@ std::uint64_t field_bytes(const ForwardChoice& choice, const Geometry& volume) {
 }
 
 std::uint64_t field_bytes(const PullChoice& choice, const Geometry& output) {
-  const auto* transform = std::get_if<NamedTransform>(&choice.field.what);
-  if (!transform) return bytes_of_vectors(read_field_header(pull_source(choice)).grid.size);
-  read(*transform);
-  return bytes_of_vectors(output.size);
+  std::uint64_t bytes = 0;
+  for (const NamedField& field : choice.fields) {
+    const FieldSource* file = source_of(field);
+    if (!file) read_pulling(std::get<NamedTransform>(field.what));
+    if (file || bytes == 0) bytes += bytes_of_vectors(file ? read_field_header(*file).grid.size : output.size);
+  }
+  return bytes;
 }
 
 nlohmann::json to_json(const FieldFileHeader& header) {

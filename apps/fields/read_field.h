@@ -41,7 +41,8 @@ struct ReadPullField {
 /// with a vertex every `cell_size` voxels, 1 if that is not said. If the first is a mesh, the vertices are the mesh's.
 /// Formulas need no disk. @throws InputError for unusable files; Cancelled
 ReadForwardField read_field(const ForwardChoice& choice, const Geometry& volume, int threads, const Control& control);
-/// The pull field of a file for `volume`, or a transform sampled at every voxel centre of `output`.
+/// The pull fields of files, composed sample by sample: each point goes through the first, and from there on. The grid
+/// is that of the first file of a field; if the first is a transform, `output`. Arrays without a place lie on `volume`.
 /// @throws InputError for an unusable file; Cancelled
 ReadPullField read_field(const PullChoice& choice, const Geometry& volume, const Geometry& output, int threads,
                          const Control& control);

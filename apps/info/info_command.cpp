@@ -61,17 +61,25 @@ json describe_mesh(const FieldSource& source) {
           {"notes", header.notes}};
 }
 
-json describe_transform(const std::filesystem::path& path) {
-  const TransformFile transform = read_transform_file(path, interrupt_token());
-  return {{"path", path.string()},
+json describe_transform(const FieldSource& source) {
+  const TransformFile transform = read_transform_file(source, interrupt_token());
+  const bool known = transform.direction.has_value(), pulls = transform.direction == Direction::pull;
+  return {{"path", source.path.string()},
           {"kind", "transform"},
           {"tool", transform.tool},
           {"classes", transform.classes},
           {"parameters", transform.parameters},
-          {"direction", transform.pulls ? "output to input (pull)" : "as the option says: -f or --pull-field"},
-          {"frame", "LPS"},
-          {"units", "mm"},
-          {"absolute", true}};
+          {"direction", !known  ? "as the option says: -f or --pull-field"
+                        : pulls ? "output to input (pull)"
+                                : "input to output (forward)"},
+          {"frame", transform.frame},
+          {"units", transform.frame == "index" ? "voxel" : "mm"},
+          {"absolute", true},
+          {"known",
+           {{"direction", known ? to_string(transform.basis) : "not stated"},
+            {"frame", to_string(transform.basis)},
+            {"units", to_string(transform.basis)},
+            {"absolute", to_string(FieldBasis::by_format)}}}};
 }
 
 json describe_image(const std::filesystem::path& path, NiftiFrame frame) {
@@ -185,7 +193,7 @@ Described look_at(const InfoOptions& options) {
   const std::filesystem::path& path = field ? source.path : options.input.path;
   if (field) return describe_field(source);
   if (mesh) return describe_mesh(source);
-  if (is_transform_file(path) && !is_folder(path)) return describe_transform(path);
+  if (is_transform_file(source.path)) return describe_transform(source);
   if (has_image_suffix(path)) return describe_image(path, options.common.nifti_frame);
   if (is_dicom_dose(path)) return describe_dose(path);
   Stage stage(options.common, "scan");

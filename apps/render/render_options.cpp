@@ -78,6 +78,7 @@ void add_deformation(CLI::App& command, RenderOptions& options) {
                     ->allow_extra_args(false)
                     ->type_name("FIELD");
   auto* pull = command.add_option("--pull-field", options.field.pull, "The same by a field that maps output to input")
+                   ->allow_extra_args(false)
                    ->type_name("FILE")
                    ->excludes(field);
   add_sequence(

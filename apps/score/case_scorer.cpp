@@ -140,7 +140,7 @@ PullField CaseScorer::sampled(PullField field, const Geometry& grid, const Contr
 /// @param forward  whether it leads from the moving volume to a fixed one
 PullField CaseScorer::read_result(const fs::path& file, const Geometry& source, const Geometry& grid, bool forward,
                                   std::vector<std::string>& notes, const Control& control) const {
-  ReadPullField read = read_point_map(parse_pull_field(file.string(), options_.common.nifti_frame), source, grid,
+  ReadPullField read = read_point_map(parse_pull_fields({file.string()}, options_.common.nifti_frame), source, grid,
                                       forward, options_.common.threads, control);
   notes.insert(notes.end(), read.origin.notes.begin(), read.origin.notes.end());
   return std::move(read.field);

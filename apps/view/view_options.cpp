@@ -24,6 +24,7 @@ void add_view(CLI::App& app, ViewOptions& options) {
                     ->type_name("FIELD");
   auto* pull =
       command->add_option("--pull-field", options.field.pull, "Shown so, too: a field that maps output to input")
+          ->allow_extra_args(false)
           ->excludes(scenario)
           ->excludes(field)
           ->type_name("FILE");

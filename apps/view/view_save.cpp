@@ -229,7 +229,7 @@ CommandText& Saving::One::add_fields(CommandText& command) const {
   if (is_by_hand_) return command.add("--scenario", scenario_).add("--labels", options_.labels);
   const FieldArguments field = given_field();
   for (const std::string& text : field.forward) command.add("-f", fs::path(text));
-  command.add("--pull-field", fs::path(field.pull));
+  for (const std::string& text : field.pull) command.add("--pull-field", fs::path(text));
   if (field.cell_size) command.add("--cell-size " + std::to_string(*field.cell_size));
   return command;
 }

@@ -14,7 +14,7 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 source cmake/platforms/record.sh
 sysroot=$PWD/build/arm64-sysroot
-packages=libstdc++-12-dev,libtbb-dev,libhwy-dev,libeigen3-dev,libglm-dev,libgtest-dev,libcli11-dev,nlohmann-json3-dev,libdcmtk-dev,libopenjp2-7-dev,libdeflate-dev,libicu-dev,libpng-dev,zlib1g-dev,libssl-dev,libturbojpeg0-dev,libboost1.74-dev
+packages=libstdc++-12-dev,libtbb-dev,libhwy-dev,libeigen3-dev,libglm-dev,libgtest-dev,libcli11-dev,nlohmann-json3-dev,libdcmtk-dev,libopenjp2-7-dev,libdeflate-dev,libminizip-dev,libicu-dev,libpng-dev,zlib1g-dev,libssl-dev,libturbojpeg0-dev,libboost1.74-dev
 for program in aarch64-linux-gnu-g++ qemu-aarch64-static debootstrap; do
   command -v $program >/dev/null || { echo "arm64.sh: error: $program is not installed" >&2; exit 1; }
 done

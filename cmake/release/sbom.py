@@ -30,7 +30,7 @@ LICENCES = {
     "glm": "MIT", "hdf5": "BSD-3-Clause", "highway": "Apache-2.0", "icu": "ICU",
     "insighttoolkit": "Apache-2.0 AND GPL-2.0-or-later", "libaec": "BSD-2-Clause", "libdeflate": "MIT", "libjpeg-turbo": "IJG AND BSD-3-Clause AND Zlib",
     "libpng": "Libpng", "libxml": "MIT", "linux": "GPL-2.0-only WITH Linux-syscall-note", "nlohmann-json": "MIT", "numpy": "BSD-3-Clause", "onetbb": "Apache-2.0",
-    "openjpeg": "BSD-2-Clause", "openssl": "Apache-2.0", "python": "PSF-2.0", "python3-defaults": "PSF-2.0",
+    "openjpeg": "BSD-2-Clause", "openssl": "Apache-2.0", "tomlplusplus": "MIT", "python": "PSF-2.0", "python3-defaults": "PSF-2.0",
     "vtk": "BSD-3-Clause", "xz-utils": "LicenseRef-public-domain", "zlib": "Zlib",
 }
 

@@ -8,8 +8,11 @@
 #include <array>
 #include <cmath>
 #include <glm/common.hpp>
+#include <glm/vector_relational.hpp>
 
 #include "deform/core/cell_weights.h"
+#include "deform/core/pull_frame.h"
+#include "deform/core/trilinear.h"
 #include "deform/cpu/first_refusal.h"
 #include "deform/cpu/tiles.h"
 #include "deform/fields/point_map.h"
@@ -19,27 +22,46 @@ namespace tetwarp {
 
 namespace {
 
-/// Moves every vertex to where `map` takes its place. @param moved  whether vertices begin where they are displaced to;
-/// otherwise at rest, and their displacements are not read
-void move_vertices(VertexField& field, const PointMap& map, bool moved, const Limits& limits, const Control& control) {
+/// Whether a displacement says that its place has no source.
+bool is_missing(const glm::vec3& displacement) {
+  return std::isnan(displacement.x) || std::isnan(displacement.y) || std::isnan(displacement.z);
+}
+
+/// Where the samples of a grid begin before a map moves them on.
+enum class Start : std::uint8_t {
+  at_rest,   ///< their displacements are not read
+  displaced  ///< those without a place (NaN) stay so
+};
+
+/// Moves every sample of a grid to where `map` takes its place.
+void move_samples(const Geometry& grid, std::span<glm::vec3> displacement, const PointMap& map, Start start,
+                  const Limits& limits, const Control& control) {
   constexpr std::int64_t kAtOnce = 512;
-  const AffineMap point = point_from_index(field.lattice);
-  const glm::i64vec3 size = field.lattice.size;
+  const AffineMap point = point_from_index(grid);
+  const glm::i64vec3 size = grid.size;
   cpu::WorkProgress progress(control, size.z);
   cpu::FirstRefusal refusal;
   cpu::Arena arena(limits);
   const auto change_slice = [&](std::int64_t z) {
     std::array<glm::dvec3, kAtOnce> from, by;
+    std::array<std::size_t, kAtOnce> which;
     for (std::int64_t y = 0; y < size.y; ++y) {
       for (std::int64_t begin = 0; begin < size.x; begin += kAtOnce) {
-        glm::vec3* const row = field.displacement.data() + (z * size.y + y) * size.x + begin;
-        const auto count = static_cast<std::size_t>(std::min(kAtOnce, size.x - begin));
-        for (std::size_t n = 0; n < count; ++n) {
-          from[n] = point(glm::dvec3(begin + static_cast<std::int64_t>(n), y, z));
-          if (moved) from[n] += glm::dvec3(row[n]);
+        glm::vec3* const row = displacement.data() + (z * size.y + y) * size.x + begin;
+        const auto samples = static_cast<std::size_t>(std::min(kAtOnce, size.x - begin));
+        std::size_t count = 0;
+        for (std::size_t n = 0; n < samples; ++n) {
+          if (start == Start::displaced && is_missing(row[n])) continue;
+          which[count] = n;
+          from[count] = point(glm::dvec3(begin + static_cast<std::int64_t>(n), y, z));
+          if (start == Start::displaced) from[count] += glm::dvec3(row[n]);
+          ++count;
         }
         map.of_row({from.data(), count}, by.data());
-        for (std::size_t n = 0; n < count; ++n) row[n] = glm::vec3(moved ? glm::dvec3(row[n]) + by[n] : by[n]);
+        for (std::size_t n = 0; n < count; ++n) {
+          glm::vec3& sample = row[which[n]];
+          sample = glm::vec3(start == Start::displaced ? glm::dvec3(sample) + by[n] : by[n]);
+        }
       }
     }
     progress.done(1);
@@ -57,7 +79,7 @@ VertexField sample_on(const Geometry& lattice, const PointMap& map, Limits limit
   require_valid(lattice, "field lattice");
   VertexField field{lattice, {}};
   resize_large(field.displacement, static_cast<std::size_t>(voxel_count(lattice)), limits.threads);
-  move_vertices(field, map, false, limits, control);
+  move_samples(field.lattice, field.displacement, map, Start::at_rest, limits, control);
   return field;
 }
 
@@ -88,7 +110,11 @@ void compose(TetrahedralMesh& mesh, const PointMap& next, const Limits& limits, 
 void compose(VertexField& field, const PointMap& next, Limits limits, const Control& control) {
   if (!field.mesh.is_empty()) compose(field.mesh, next, limits, control);
   if (!field.mesh.is_empty() && field.replaced.empty()) return;
-  move_vertices(field, next, true, limits, control);
+  move_samples(field.lattice, field.displacement, next, Start::displaced, limits, control);
+}
+
+void compose(PullField& field, const PointMap& next, Limits limits, const Control& control) {
+  move_samples(field.grid, field.displacement, next, Start::displaced, limits, control);
 }
 
 PointMap piecewise_affine(const VertexField& field) {
@@ -114,6 +140,20 @@ PointMap piecewise_affine(const VertexField& field) {
     };
     const glm::dvec3 d = at(w.corners.d);
     return d + w.a * (at(w.corners.a) - d) + w.b * (at(w.corners.b) - d) + w.c * (at(w.corners.c) - d);
+  };
+}
+
+PointMap between_samples(const PullField& field) {
+  const AffineMap grid_from_point = index_from_point(field.grid);
+  return [&field, grid_from_point](const glm::dvec3& point) {
+    constexpr double kBorderRounding = PullFrame::kBorderRounding;
+    const glm::i64vec3 size = field.grid.size;
+    const glm::dvec3 index = grid_from_point(point), last(size - std::int64_t{1});
+    const glm::dvec3 inside = glm::clamp(index, glm::dvec3(0), last);
+    if (glm::any(glm::greaterThan(glm::abs(index - inside), glm::dvec3(kBorderRounding)))) return glm::dvec3(NAN);
+    return trilinear(size, inside, [&](const glm::i64vec3& at) {
+      return field.displacement[static_cast<std::size_t>((at.z * size.y + at.y) * size.x + at.x)];
+    });
   };
 }
 

@@ -77,4 +77,14 @@ PointMap piecewise_affine(const VertexField& field);
 /// @throws Cancelled; an InputError of `next`, of several that for the first vertex, and the field is of no use then
 void compose(VertexField& field, const PointMap& next, Limits limits = {}, const Control& control = {});
 
+/// The map of a pull field between its samples, trilinear. The field must outlive the map. For a point outside the
+/// grid, or near a sample without a source, a call gives NaN.
+PointMap between_samples(const PullField& field);
+
+/// Appends a second map to a pull field: what an output point takes from where `field` leads, it takes from where
+/// `next` leads from there. The grid stays. Samples without a source stay so, and those become so for which `next`
+/// gives NaN.
+/// @throws Cancelled; an InputError of `next`, of several that for the first sample, and the field is of no use then
+void compose(PullField& field, const PointMap& next, Limits limits = {}, const Control& control = {});
+
 }  // namespace tetwarp

@@ -15,65 +15,14 @@
 #include "io/dicom/derive/dicom_put.h"
 #include "io/dicom/scan/dicom_header.h"
 #include "io/dicom/scan/dicom_stream.h"
+#include "io/fields/registration_item.h"
 #include "io/images/image_reader.h"
 
 namespace tetwarp {
 namespace {
 
-constexpr std::size_t kMagicOffset = 128;
-constexpr std::string_view kMagic = "DICM";
-
-// --- values of one item
-
-class Values {
- public:
-  Values(DcmItem& item, std::string file) : item_(item), file_(std::move(file)) {}
-
-  /// The numbers of an attribute. @throws InputError unless there are `count` of them, all finite
-  std::vector<double> numbers(const DcmTagKey& tag, unsigned long count) const {
-    DcmElement* element = nullptr;
-    require(item_.findAndGetElement(tag, element).good() && element != nullptr,
-            "no " + tag_name(tag) + ", " + file_ + "; is the file whole?");
-    require(element->getVM() == count, std::to_string(element->getVM()) + " values of " + tag_name(tag) + ", " + file_ +
-                                           "; expected " + std::to_string(count));
-    std::vector<double> values(count);
-    for (unsigned long n = 0; n < count; ++n) {
-      values[n] = number(tag, n);
-      require(std::isfinite(values[n]), [&] {
-        return "value " + std::to_string(n + 1) + " of " + tag_name(tag) + " is no finite number, " + file_ +
-               "; expected one";
-      });
-    }
-    return values;
-  }
-
-  const std::string& file() const { return file_; }
-
- private:
-  /// One number of an attribute; NaN where it cannot be read. Grid Dimensions are of VR UL, which DCMTK does not give
-  /// as Float64.
-  double number(const DcmTagKey& tag, unsigned long n) const {
-    double value = 0;
-    if (item_.findAndGetFloat64(tag, value, n).good()) return value;
-    Uint32 whole = 0;
-    return item_.findAndGetUint32(tag, whole, n).good() ? whole : std::numeric_limits<double>::quiet_NaN();
-  }
-
-  DcmItem& item_;
-  std::string file_;
-};
-
-/// The only item of a sequence; null: it has none. @throws InputError for several items
-DcmItem* only_item(DcmItem& item, const DcmTagKey& tag, const std::string& file) {
-  DcmSequenceOfItems* sequence = nullptr;
-  if (item.findAndGetSequence(tag, sequence).bad() || sequence == nullptr || sequence->card() == 0) return nullptr;
-  require(sequence->card() == 1,
-          std::to_string(sequence->card()) + " items of " + tag_name(tag) + ", " + file + "; expected one");
-  return sequence->getItem(0);
-}
-
 /// The grid of the vectors (C.20.3.1.1). Its third axis is row x column, whatever the patient's axes are.
-Geometry grid_of(const Values& values) {
+Geometry grid_of(const RegistrationValues& values) {
   const std::vector<double> position = values.numbers(DCM_ImagePositionPatient, 3),
                             cosines = values.numbers(DCM_ImageOrientationPatient, 6),
                             size = values.numbers(DCM_GridDimensions, 3),
@@ -97,16 +46,6 @@ Geometry grid_of(const Values& values) {
   grid.direction = glm::dmat3(row, column, glm::cross(row, column));
   require_valid(grid, "the deformation grid of " + values.file());
   return grid;
-}
-
-/// The matrix of a Matrix Registration Sequence (C.20.2.1.1, row by row); the identity where there is none.
-AffineMap matrix_of(DcmItem& item, const DcmTagKey& sequence, const std::string& file) {
-  DcmItem* only = only_item(item, sequence, file);
-  if (only == nullptr) return {};
-  const std::vector<double> m = Values(*only, file).numbers(DCM_FrameOfReferenceTransformationMatrix, 16);
-  require(m[12] == 0 && m[13] == 0 && m[14] == 0 && m[15] == 1,
-          "the last row of the matrix of " + tag_name(sequence) + " is not 0 0 0 1, " + file);
-  return {glm::dmat3(m[0], m[4], m[8], m[1], m[5], m[9], m[2], m[6], m[10]), {m[3], m[7], m[11]}};
 }
 
 bool is_identity(const AffineMap& map) { return map.linear == glm::dmat3(1) && map.offset == glm::dvec3(0); }
@@ -233,46 +172,23 @@ class RegistrationReader final : public FieldReader {
 
 // --- the format
 
-/// The item that the option names; 0: the option is not given. @throws InputError for what is no number from 1 up
-std::size_t wanted_item(const FieldSource& source) {
-  const auto found = source.options.find("item");
-  if (found == source.options.end()) return 0;
-  const std::string& text = found->second;
-  std::size_t number = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  require(error == std::errc() && end == text.data() + text.size() && number >= 1,
-          "item=" + text + ", " + source.path.string() + "; expected a whole number from 1");
-  return number;
-}
-
-void check_options(const FieldSource& source) {
-  for (const auto& [key, value] : source.options)
-    require(key == "item", "the option \"" + key + "\", " + source.path.string() + "; expected item");
-  wanted_item(source);
-}
-
-bool recognizes(const std::filesystem::path&, std::string_view first_bytes) {
-  return first_bytes.substr(std::min(kMagicOffset, first_bytes.size())).starts_with(kMagic);
-}
+bool recognizes(const std::filesystem::path&, std::string_view first_bytes) { return is_marked_dicom(first_bytes); }
 
 bool holds_field(const FieldSource& source) {
-  prepare_dcmtk();
-  DcmFileFormat format;
-  return parse_dicom(format, source.path, DCM_StudyDate).result.good() &&
-         text_of(*format.getDataset(), DCM_SOPClassUID) == UID_DeformableSpatialRegistrationStorage;
+  return is_of_class(source.path, UID_DeformableSpatialRegistrationStorage);
 }
 
 std::unique_ptr<FieldReader> open(const FieldSource& source) {
   require_readable_file(source.path);
   const std::string name = source.path.string();
   auto file = std::make_unique<RegistrationFile>(source.path);
-  const std::size_t number = file->choose(wanted_item(source));
+  const std::size_t number = file->choose(registration_item(source));
   DcmItem& item = file->item(number);
   DcmItem& grid = *file->grid(number);
-  const AffineMap pre = matrix_of(item, DCM_PreDeformationMatrixRegistrationSequence, name),
-                  post = matrix_of(item, DCM_PostDeformationMatrixRegistrationSequence, name);
+  const AffineMap pre = matrix_in(item, DCM_PreDeformationMatrixRegistrationSequence, name),
+                  post = matrix_in(item, DCM_PostDeformationMatrixRegistrationSequence, name);
   FieldFileHeader header;
-  header.grid = grid_of(Values(grid, name));
+  header.grid = grid_of(RegistrationValues(grid, name));
   header.format = "DICOM Deformable Spatial Registration";
   if (file->count() > 1) header.format += ", item " + std::to_string(number) + " of " + std::to_string(file->count());
   if (!is_identity(pre) || !is_identity(post)) header.format += ", with its matrices";
@@ -284,6 +200,6 @@ std::unique_ptr<FieldReader> open(const FieldSource& source) {
 
 }  // namespace
 
-const FieldFormat kFieldFormat_dicom = {recognizes, holds_field, check_options, open};
+const FieldFormat kFieldFormat_dicom = {recognizes, holds_field, check_registration_options, open};
 
 }  // namespace tetwarp

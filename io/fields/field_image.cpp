@@ -66,8 +66,8 @@ std::unique_ptr<FieldReader> open(const FieldSource& source) {
 
 const FieldFormat kFieldFormat_image = {recognizes, holds_field, nullptr, open};
 
-std::unique_ptr<ImageReader> open_vectors(const std::filesystem::path& path, NiftiFrame frame) {
-  auto reader = open_image(path, frame);
+std::unique_ptr<ImageReader> open_vectors(const std::filesystem::path& path, NiftiFrame frame, NiftiVectors vectors) {
+  auto reader = open_image(path, frame, vectors);
   const ImageHeader& header = reader->header();
   require(header.components == 3 && (header.type == VoxelType::f32 || header.type == VoxelType::f64),
           "not a displacement field, " + path.string() + ": " + std::to_string(header.components) + " x " +

@@ -24,7 +24,8 @@ inline constexpr const char *kSlicerPull = "resampling", *kSlicerForward = "mode
 extern const FieldFormat kFieldFormat_image;
 
 /// Opens a volume file. @throws InputError unless it has three floats or doubles a voxel
-std::unique_ptr<ImageReader> open_vectors(const std::filesystem::path& path, NiftiFrame frame = NiftiFrame::sform);
+std::unique_ptr<ImageReader> open_vectors(const std::filesystem::path& path, NiftiFrame frame = NiftiFrame::sform,
+                                          NiftiVectors vectors = NiftiVectors::fifth);
 
 /// Takes the direction of the field (forward or pull) from the key `kDirectionKey`, where the file has it, and frame
 /// and units with it: Tetwarp writes the key only to displacements in LPS mm. Else the direction alone is taken from

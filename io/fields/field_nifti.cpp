@@ -8,13 +8,14 @@
 
 #include "deform/errors.h"
 #include "io/fields/field_image.h"
-#include "io/fields/niftyreg_spline.h"
+#include "io/fields/fsl_frame.h"
+#include "io/fields/transform_niftyreg.h"
 #include "io/images/nifti_file.h"
 
 namespace tetwarp {
 namespace {
 
-constexpr int kDisplacementVector = 1006;
+constexpr int kDisplacementVector = 1006, kFslField = 2006;
 constexpr glm::dvec3 kLpsFromRas(-1, -1, 1);
 
 /// What is refused, by the type of a NiftyReg file (reg-lib/cpu/_reg_maths.h, NREG_TRANS_TYPE, which intent_p1 holds):
@@ -44,6 +45,53 @@ void describe_niftyreg(const NiftiHeader& nifti, const std::string& file, FieldF
   header.absolute_basis = FieldBasis::stated;
 }
 
+/// A deformation of SPM: positions in RAS mm (spm_dartel_norm and others, which write intent_name Mapping).
+constexpr const char* kSpmName = "Mapping";
+
+void describe_spm(FieldFileHeader& header) {
+  header.format = "NIfTI, SPM deformation";
+  header.absolute = true;
+  header.direction = Direction::pull;
+  header.frame = "RAS";
+  header.direction_basis = header.frame_basis = header.units_basis = header.absolute_basis = FieldBasis::by_format;
+}
+
+/// A field of FSL, from the coordinates of its own grid to those of the source image, in either form.
+void describe_fsl(const NiftiHeader& nifti, const FieldSource& source, FieldFileHeader& header) {
+  const std::string file = source.path.string();
+  require(nifti.intent_code == kFslField, "coefficients of fnirt (intent code " + std::to_string(nifti.intent_code) +
+                                              "), " + file + "; make a field of them with fnirtfileutils --out");
+  require(source.options.contains("source") && source.options.contains("values"),
+          "a field of FSL leads into its moving image, and does not say whether it holds displacements (relative) or "
+          "positions (absolute), " +
+              file + "; give both: " + file + ":values=displacements|positions,source=MOVING");
+  header.format = "NIfTI, FSL field (intent 2006)";
+  header.direction = Direction::pull;
+  header.frame = "FSL";
+  header.direction_basis = header.frame_basis = header.units_basis = FieldBasis::by_format;
+}
+
+/// Takes what the options say. @throws InputError where the format says otherwise
+void take_options(const FieldSource& source, FieldFileHeader& header) {
+  const std::string file = source.path.string(), values = source.option("values");
+  const bool positions = values == "positions";
+  require(values.empty() || header.absolute_basis == FieldBasis::assumed || positions == header.absolute,
+          "values=" + values + ", but " + header.format + " holds " +
+              (header.absolute ? "positions" : "displacements") + ", " + file);
+  if (!values.empty() && header.absolute_basis == FieldBasis::assumed) {
+    header.absolute = positions;
+    header.absolute_basis = FieldBasis::by_option;
+  }
+  if (!source.options.contains("frame")) return;
+  const std::string frame = source.option("frame") == "ras" ? "RAS" : "LPS";
+  require(header.frame_basis == FieldBasis::assumed || header.frame == frame,
+          "frame=" + source.option("frame") + ", but the vectors of " + header.format + " are in " + header.frame +
+              ", " + file);
+  if (header.frame_basis != FieldBasis::assumed) return;
+  header.frame = frame;
+  header.frame_basis = FieldBasis::by_option;
+}
+
 void describe_displacement_vectors(const NiftiHeader& nifti, FieldFileHeader& header) {
   header.format = "NIfTI, intent 1006 (DISPVECT)";
   header.frame = "RAS";
@@ -53,26 +101,36 @@ void describe_displacement_vectors(const NiftiHeader& nifti, FieldFileHeader& he
 
 class NiftiFieldReader final : public FieldReader {
  public:
-  NiftiFieldReader(FieldFileHeader header, std::unique_ptr<ImageReader> image)
-      : FieldReader(std::move(header)), image_(std::move(image)) {}
+  /// @param fsl_source  grid of the moving image, of a field of FSL
+  NiftiFieldReader(FieldFileHeader header, std::unique_ptr<ImageReader> image,
+                   const std::optional<Geometry>& fsl_source)
+      : FieldReader(std::move(header)), image_(std::move(image)) {
+    if (!fsl_source) return;
+    fsl_from_point_ = fsl_from_lps(header_.grid);
+    point_from_fsl_ = lps_from_fsl(*fsl_source);
+  }
 
   void read(std::span<glm::vec3> displacement) const override {
-    if (header_.frame == "LPS") return read_vectors(*image_, displacement);
-    if (!header_.absolute) {
-      return read_vectors(*image_, displacement,
-                          // + 0.0 makes 0 of -0
-                          [](const glm::dvec3& vector, std::size_t) { return kLpsFromRas * vector + 0.0; });
-    }
+    if (header_.frame == "LPS" && !header_.absolute) return read_vectors(*image_, displacement);
     const AffineMap point = point_from_index(header_.grid);
     const glm::i64vec3 size = header_.grid.size;
     read_vectors(*image_, displacement, [&](const glm::dvec3& vector, std::size_t vertex) {
       const auto n = static_cast<std::int64_t>(vertex);
-      return kLpsFromRas * vector - point(glm::dvec3(n % size.x, n / size.x % size.y, n / (size.x * size.y))) + 0.0;
+      const glm::dvec3 at = point(glm::dvec3(n % size.x, n / size.x % size.y, n / (size.x * size.y)));
+      return in_lps(vector, at) - (header_.absolute || header_.frame == "FSL" ? at : glm::dvec3(0)) + 0.0;  // no -0
     });
   }
 
  private:
+  /// A vector in LPS mm; of FSL always a position. Infinity times zero would give NaN, so an infinite one stays.
+  glm::dvec3 in_lps(const glm::dvec3& vector, const glm::dvec3& at) const {
+    if (header_.frame == "RAS") return kLpsFromRas * vector;
+    if (header_.frame == "LPS" || std::isinf(vector.x) || std::isinf(vector.y) || std::isinf(vector.z)) return vector;
+    return point_from_fsl_(header_.absolute ? vector : fsl_from_point_(at) + vector);
+  }
+
   std::unique_ptr<ImageReader> image_;
+  AffineMap fsl_from_point_, point_from_fsl_;
 };
 
 bool recognizes(const std::filesystem::path& path, std::string_view) {
@@ -85,30 +143,59 @@ NiftiFrame frame_of(const FieldSource& source, const NiftiHeader& nifti) {
   return nifti.intent_name.starts_with("NREG_") ? NiftiFrame::sform : source.nifti_frame;
 }
 
+/// A file whose vectors are volumes is taken for a field only where something says that it is one: three volumes may be
+/// three times as well.
+NiftiVectors vectors_of(const FieldSource& source) {
+  return source.options.empty() ? NiftiVectors::fifth : NiftiVectors::fourth_too;
+}
+
 bool holds_field(const FieldSource& source) {
-  const NiftiHeader nifti = read_nifti_header(source.path);
-  return read_image_header(source.path, frame_of(source, nifti)).components == 3 && !is_niftyreg_spline(nifti);
+  const NiftiHeader nifti = read_nifti_header(source.path, NiftiVectors::fourth_too);
+  if (is_fsl_intent(nifti.intent_code)) return true;
+  const ImageHeader header = open_image(source.path, frame_of(source, nifti), vectors_of(source))->header();
+  return header.components == 3 && !is_niftyreg_spline(nifti);
+}
+
+void check_options(const FieldSource& source) {
+  const std::string file = source.path.string();
+  for (const auto& [key, value] : source.options) {
+    const bool values = key == "values", frame = key == "frame";
+    require(values || frame || key == "source",
+            "the option \"" + key + "\", " + file + "; expected values, frame or source");
+    require(!values || value == "displacements" || value == "positions",
+            "values=" + value + ", " + file + "; expected displacements or positions");
+    require(!frame || value == "lps" || value == "ras", "frame=" + value + ", " + file + "; expected lps or ras");
+  }
 }
 
 std::unique_ptr<FieldReader> open(const FieldSource& source) {
   const std::string file = source.path.string();
-  const NiftiHeader nifti = read_nifti_header(source.path);
-  auto image = open_vectors(source.path, frame_of(source, nifti));
+  const NiftiHeader nifti = read_nifti_header(source.path, NiftiVectors::fourth_too);
+  const bool fsl = is_fsl_intent(nifti.intent_code);
+  require(fsl || !source.options.contains("source"), "source=, " + file + ": only the fields of FSL need that image");
   FieldFileHeader header;
+  header.format = "NIfTI, intent 1007 (VECTOR)";
+  if (fsl) describe_fsl(nifti, source, header);
+  auto image = open_vectors(source.path, frame_of(source, nifti), fsl ? NiftiVectors::fourth_too : vectors_of(source));
   header.notes = image->header().notes;
   header.grid = image->header().geometry;
-  header.format = "NIfTI, intent 1007 (VECTOR)";
   if (nifti.intent_name.starts_with("NREG_")) {
     describe_niftyreg(nifti, file, header);
-  } else {
+  } else if (nifti.intent_name == kSpmName) {
+    describe_spm(header);
+  } else if (!fsl) {
     read_stated_direction(image->header(), file, header);
     if (nifti.intent_code == kDisplacementVector) describe_displacement_vectors(nifti, header);
+    if (nifti.dim[0] == 4) header.format = "NIfTI, vectors as volumes";
   }
-  return std::make_unique<NiftiFieldReader>(std::move(header), std::move(image));
+  take_options(source, header);
+  std::optional<Geometry> fsl_source;
+  if (fsl) fsl_source = read_image_header(source.option("source"), source.nifti_frame).geometry;
+  return std::make_unique<NiftiFieldReader>(std::move(header), std::move(image), fsl_source);
 }
 
 }  // namespace
 
-const FieldFormat kFieldFormat_nifti = {recognizes, holds_field, nullptr, open};
+const FieldFormat kFieldFormat_nifti = {recognizes, holds_field, check_options, open};
 
 }  // namespace tetwarp

@@ -3,110 +3,99 @@
 
 #include "io/transform_file.h"
 
-#include <algorithm>
-#include <array>
-#include <cctype>
-#include <cmath>
+#include <fstream>
+#include <glm/matrix.hpp>
 
 #include "deform/errors.h"
-#include "io/fields/niftyreg_spline.h"
-#include "io/images/image_reader.h"
-#include "io/lower_case.h"
+#include "io/fields/field_format.h"
+#include "io/fields/transform_format.h"
 #include "io/opened_file.h"
-#ifdef TETWARP_WITH_ITK
-#include "io/files/module.h"
-#include "itkbridge/transform_file.h"
-#endif
 
 namespace tetwarp {
 
 namespace {
 
-bool has_transform_suffix(const std::filesystem::path& path) {
-  const std::string suffix = lower(path.extension().string());
-  constexpr std::array<std::string_view, 4> kSuffixes = {".h5", ".hdf5", ".tfm", ".txt"};
-  return std::ranges::find(kSuffixes, suffix) != kSuffixes.end();
-}
-
-#ifdef TETWARP_WITH_ITK
-const char* name_of(TransformTool tool) {
-  if (tool == TransformTool::elastix) return "elastix";
-  return tool == TransformTool::plastimatch ? "plastimatch" : "ITK";
-}
-
-/// A function of the module with ITK's transforms. It is a module of its own since loading ITK's libraries would slow
-/// every start of the program.
-/// @param path  the file to read, for the message where the module is missing
-template <class Function>
-Function* in_module(const char* name, const std::filesystem::path& path) {
-  auto* const function = reinterpret_cast<Function*>(find_in_module(TETWARP_TRANSFORM_MODULE, name));
-  if (!function) refuse_without_module("transform files", TETWARP_TRANSFORM_MODULE, path.string(), "");
-  return function;
-}
-
-LoadedTransform load_transform(const std::filesystem::path& path, const std::stop_token& stop) {
-  LoadedTransform loaded;
-  in_module<decltype(tetwarp_load_transform)>("tetwarp_load_transform", path)(path, stop, loaded);
-  return loaded;
-}
-
-TransformFile read_with_itk(const std::filesystem::path& path, const std::stop_token& stop) {
-  LoadedTransform loaded = load_transform(path, stop);
-  const StoredTransform& stored = loaded.stored;
-  const std::string file = path.string();
-  TransformFile result{.tool = name_of(stored.tool),
-                       .classes = {},
-                       .pulls = stored.tool != TransformTool::itk,
-                       .displacement = {},
-                       .beyond = "where ITK does not move them",
-                       .outside = std::make_shared<std::atomic<std::uint64_t>>(0)};
-  for (const TransformRecord& part : stored.parts) {
-    result.classes.push_back(part.type);
-    result.parameters += part.parameters.size();
+const TransformFormat* format_of(const std::filesystem::path& path) {
+  std::string first;
+  if (is_file(path)) {
+    first.resize(kFirstBytes);
+    std::ifstream stream(path, std::ios::binary);  // whoever reads the file says why it cannot be read
+    stream.read(first.data(), static_cast<std::streamsize>(first.size()));
+    first.resize(static_cast<std::size_t>(stream.gcount()));
   }
-  result.displacement = [transform = std::move(loaded.map), outside = result.outside, file](const glm::dvec3& point) {
-    bool is_outside = false;
-    const glm::dvec3 by = transform(point, is_outside) - point;
-    if (is_outside) outside->fetch_add(1, std::memory_order_relaxed);
-    const glm::vec3 stored_by(by);
-    require(std::isfinite(stored_by.x) && std::isfinite(stored_by.y) && std::isfinite(stored_by.z),
-            "a point is moved to infinity, " + file);
-    return by;
-  };
-  return result;
+  return find_transform_format(path, first);
 }
 
-void add_named_files(const std::filesystem::path& path, std::vector<std::filesystem::path>& files) {
-  in_module<decltype(tetwarp_transform_files)>("tetwarp_transform_files", path)(path, files);
-}
-#else
-TransformFile read_with_itk(const std::filesystem::path& path, const std::stop_token&) {
-  throw NotCompiled("transform files need ITK, which this build does not have, " + path.string());
+/// @throws InputError for a file of no format
+const TransformFormat& format_of(const FieldSource& source) {
+  const TransformFormat* format = format_of(source.path);
+  require(format != nullptr, "not a transform file, " + source.path.string());
+  return *format;
 }
 
-void add_named_files(const std::filesystem::path&, std::vector<std::filesystem::path>&) {}
-#endif
+/// The map of an affine transform. Its columns are differences over 200 mm, so that rounding stays below that of the
+/// numbers themselves.
+AffineMap map_of(const TransformFile& transform) {
+  constexpr double kStep = 100;  // mm
+  AffineMap map{glm::dmat3(1), transform.displacement(glm::dvec3(0))};
+  for (int axis = 0; axis < 3; ++axis) {
+    glm::dvec3 to(0);
+    to[axis] = kStep;
+    map.linear[axis] += (transform.displacement(to) - transform.displacement(-to)) / (2 * kStep);
+  }
+  return map;
+}
+
+/// @throws InputError for a transform that is not affine, or has no inverse
+void invert(TransformFile& transform, const std::string& file) {
+  require(transform.affine, "invert=yes, " + file +
+                                ": of the transforms only affine ones can be inverted; give the inverse that the tool "
+                                "writes, or use tetwarp invert");
+  const AffineMap map = map_of(transform);
+  require(std::abs(glm::determinant(map.linear)) > 1e-9, "invert=yes, " + file + ": the matrix has no inverse");
+  const glm::dmat3 inverse = glm::inverse(map.linear);
+  transform.displacement = affine_transform({inverse, -(inverse * map.offset)}).displacement;
+  transform.classes.insert(transform.classes.begin(), "inverse of");
+  // Whoever inverts a transform knows in which of its two volumes points begin.
+  transform.direction.reset();
+}
 
 }  // namespace
 
-bool is_transform_file(const std::filesystem::path& path) {
-  if (has_transform_suffix(path)) return true;
-  if (image_format(path) != ImageFormat::nifti || !is_file(path)) return false;
-  try {
-    return is_niftyreg_spline(read_nifti_header(path));
-  } catch (const InputError&) {
-    return false;  // refused with a reason when it is read as a volume or a field
-  }
+TransformFile affine_transform(const AffineMap& map) {
+  TransformFile result;
+  result.parameters = 12;
+  result.affine = true;
+  result.displacement = [map](const glm::dvec3& point) { return map(point) - point; };
+  result.outside = std::make_shared<std::atomic<std::uint64_t>>(0);
+  return result;
 }
 
-std::vector<std::filesystem::path> files_of_transform(const std::filesystem::path& path) {
-  std::vector<std::filesystem::path> files = {path};
-  if (image_format(path) != ImageFormat::nifti) add_named_files(path, files);
+bool is_transform_file(const std::filesystem::path& path) { return format_of(path) != nullptr; }
+
+void check_transform_options(const FieldSource& source) {
+  const std::string inverse = source.option("invert", "no"), file = source.path.string();
+  require(inverse == "yes" || inverse == "no", "invert=" + inverse + ", " + file + "; expected yes or no");
+  FieldSource others = source;
+  others.options.erase("invert");
+  const TransformFormat& format = format_of(source);
+  if (format.check_options) return format.check_options(others);
+  require(others.options.empty(), "the option \"" + (others.options.empty() ? "" : others.options.begin()->first) +
+                                      "\", " + file + "; expected invert, or none");
+}
+
+std::vector<std::filesystem::path> files_of_transform(const FieldSource& source) {
+  std::vector<std::filesystem::path> files = {source.path};
+  const TransformFormat& format = format_of(source);
+  if (format.add_files) format.add_files(source, files);
   return files;
 }
 
-TransformFile read_transform_file(const std::filesystem::path& path, const std::stop_token& stop) {
-  return image_format(path) == ImageFormat::nifti ? read_niftyreg_spline(path) : read_with_itk(path, stop);
+TransformFile read_transform_file(const FieldSource& source, const std::stop_token& stop) {
+  check_transform_options(source);
+  TransformFile transform = format_of(source).read(source, stop);
+  if (source.option("invert") == "yes") invert(transform, source.path.string());
+  return transform;
 }
 
 }  // namespace tetwarp

@@ -73,9 +73,10 @@ std::unique_ptr<ImageReader> open_mha(const std::filesystem::path& path) {
   return make_value_reader(path, std::move(header), stored, layout);
 }
 
-std::unique_ptr<ImageReader> open_format(const std::filesystem::path& path, ImageFormat format, NiftiFrame frame) {
+std::unique_ptr<ImageReader> open_format(const std::filesystem::path& path, ImageFormat format, NiftiFrame frame,
+                                         NiftiVectors vectors) {
   switch (format) {
-    case ImageFormat::nifti: return open_nifti(path, frame);
+    case ImageFormat::nifti: return open_nifti(path, frame, vectors);
     case ImageFormat::nrrd: return open_nrrd(path);
     case ImageFormat::mha: return open_mha(path);
   }
@@ -132,11 +133,11 @@ void require_readable_file(const std::filesystem::path& path) {
   require(::access(path.c_str(), R_OK) == 0, "a file that may not be read, " + file + "; check its rights");
 }
 
-std::unique_ptr<ImageReader> open_image(const std::filesystem::path& path, NiftiFrame frame) {
+std::unique_ptr<ImageReader> open_image(const std::filesystem::path& path, NiftiFrame frame, NiftiVectors vectors) {
   const std::string file = path.string();
   const ImageFormat format = required_format(path);
   require_readable_file(path);
-  auto reader = open_format(path, format, frame);
+  auto reader = open_format(path, format, frame, vectors);
   require_valid(reader->header().geometry, file);
   require_orthogonal(reader->header().geometry, file);
   require(reader->header().components >= 1,

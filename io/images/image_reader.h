@@ -20,6 +20,10 @@ enum class ImageFormat : std::uint8_t { nifti, nrrd, mha };
 /// The format that a suffix names, in upper or lower case.
 std::optional<ImageFormat> image_format(const std::filesystem::path& path);
 
+/// On which axis of a NIfTI file the components of a voxel may be. The standard has them on the fifth; MRtrix and FSL
+/// write the vectors of a field as volumes on the fourth, the axis of time.
+enum class NiftiVectors : std::uint8_t { fifth, fourth_too };
+
 /// How the voxels lie in the file.
 struct StoredVoxels {
   std::uint64_t offset = 0;     ///< of the first byte (of the decompressed stream, for NIfTI)
@@ -52,6 +56,7 @@ void require_readable_file(const std::filesystem::path& path);
 
 /// Reads and checks the header; a header that promises more than the file can hold is refused here, before anything is
 /// allocated. @throws InputError as `read_image_header`
-std::unique_ptr<ImageReader> open_image(const std::filesystem::path& path, NiftiFrame frame = NiftiFrame::sform);
+std::unique_ptr<ImageReader> open_image(const std::filesystem::path& path, NiftiFrame frame = NiftiFrame::sform,
+                                        NiftiVectors vectors = NiftiVectors::fifth);
 
 }  // namespace tetwarp

@@ -197,9 +197,9 @@ int nifti_datatype(VoxelType type) {
   return std::ranges::find(kDatatypes, type, &std::pair<int, VoxelType>::second)->first;
 }
 
-std::unique_ptr<ImageReader> open_nifti(const std::filesystem::path& path, NiftiFrame frame) {
+std::unique_ptr<ImageReader> open_nifti(const std::filesystem::path& path, NiftiFrame frame, NiftiVectors vectors) {
   const std::string file = path.string();
-  NiftiHeader header = read_nifti_header(path);
+  NiftiHeader header = read_nifti_header(path, vectors);
   const VoxelType disk = disk_type(header, file);
   require(!has_slope(header) || std::isfinite(header.scl_inter), "scl_slope " + std::to_string(header.scl_slope) +
                                                                      " beside a scl_inter that is no number, " + file +
@@ -209,7 +209,7 @@ std::unique_ptr<ImageReader> open_nifti(const std::filesystem::path& path, Nifti
   ImageHeader image;
   image.geometry = place_of(header, frame, path);
   if (header.apart_mm) image.notes.push_back(note_of_forms(header, frame));
-  image.components = header.dim[0] >= 5 ? static_cast<int>(header.dim[5]) : 1;
+  image.components = header.components;
   image.type = disk;
   image.metadata["descrip"] = header.descrip;
   if (is_scaled(header)) {

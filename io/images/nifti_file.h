@@ -21,6 +21,7 @@ namespace tetwarp {
 struct NiftiHeader {
   bool swapped = false;
   std::array<std::int64_t, 8> dim{};
+  int components = 1;  ///< values a voxel
   int intent_code = 0, datatype = 0, units = 0, qform_code = 0, sform_code = 0;
   double vox_offset = 0, scl_slope = 0, scl_inter = 0, intent_p1 = 0;
   std::string descrip, intent_name;
@@ -33,7 +34,11 @@ struct NiftiHeader {
 /// @throws InputError naming the file: no NIfTI-1 in one file, more than one time point, a vector that is neither of
 ///         intent 1006 nor 1007, a datatype that VoxelType does not have, units other than mm, no orientation, a form
 ///         that is not finite
-NiftiHeader read_nifti_header(const std::filesystem::path& path);
+NiftiHeader read_nifti_header(const std::filesystem::path& path, NiftiVectors vectors = NiftiVectors::fifth);
+
+/// Whether an intent is one of FSL's: a field of displacements, or coefficients of cubic, cosine or quadratic
+/// functions.
+inline bool is_fsl_intent(int intent_code) { return intent_code >= 2006 && intent_code <= 2009; }
 
 /// The place of the volume: by the form that `frame` names where the header has both, else by the one that it has.
 /// @throws InputError naming the file: neither is there, or the one that decides is sheared, singular, or of another
@@ -43,6 +48,7 @@ const Geometry& place_of(const NiftiHeader& header, NiftiFrame frame, const std:
 /// How NIfTI calls a type: the field `datatype`.
 int nifti_datatype(VoxelType type);
 
-std::unique_ptr<ImageReader> open_nifti(const std::filesystem::path& path, NiftiFrame frame);
+std::unique_ptr<ImageReader> open_nifti(const std::filesystem::path& path, NiftiFrame frame,
+                                        NiftiVectors vectors = NiftiVectors::fifth);
 
 }  // namespace tetwarp

@@ -104,7 +104,8 @@ std::string text(const glm::dvec3& v) {
   return std::to_string(v.x) + ", " + std::to_string(v.y) + ", " + std::to_string(v.z);
 }
 
-void require_one_volume(const NiftiHeader& header, const std::string& file) {
+/// @return the number of values a voxel
+int require_one_volume(const NiftiHeader& header, NiftiVectors vectors, const std::string& file) {
   const auto& dim = header.dim;
   std::string dims;
   for (std::size_t i = 1; i < 8 && static_cast<std::int64_t>(i) <= dim[0]; ++i)
@@ -115,19 +116,23 @@ void require_one_volume(const NiftiHeader& header, const std::string& file) {
             "a size of " + dims + ", " + file + "; expected at least 1 on every axis");
   }
   const auto beyond = [&](std::size_t i) { return static_cast<std::int64_t>(i) <= dim[0] ? dim[i] : 1; };
-  require(header.intent_code < 2006 || header.intent_code > 2009,
-          "a field or coefficients of FSL (intent code " + std::to_string(header.intent_code) + "), " + file +
-              "; their mm depend on two reference images: convert it to a displacement field of ITK");
-  require(beyond(4) == 1, std::to_string(beyond(4)) + " time points (" + dims + "), " + file +
-                              "; split the file, one volume is expected");
+  const bool on_fourth = vectors == NiftiVectors::fourth_too && beyond(4) == 3 && beyond(5) == 1;
+  require(on_fourth || !is_fsl_intent(header.intent_code), "a field or coefficients of FSL (intent code " +
+                                                               std::to_string(header.intent_code) + "), " + file +
+                                                               ", is no volume of one value a voxel");
+  require(on_fourth || beyond(4) == 1,
+          std::to_string(beyond(4)) + " time points (" + dims + "), " + file +
+              "; split the file, one volume is expected" +
+              (beyond(4) == 3 ? ", or say that they are vectors: " + file + ":values=displacements|positions" : ""));
   const bool vector = beyond(5) > 1, may_be_vector = header.intent_code == 1006 || header.intent_code == 1007;
   require(!vector || may_be_vector, std::to_string(beyond(5)) + " values a voxel with intent code " +
                                         std::to_string(header.intent_code) + ", " + file +
                                         "; expected 1 value, or vectors with intent code 1006 or 1007");
-  require(header.intent_code != 1006 || beyond(5) == 3, "displacement vectors (intent code 1006, DISPVECT) of " +
-                                                            std::to_string(beyond(5)) + " values, " + file +
-                                                            "; expected 3");
+  require(header.intent_code != 1006 || beyond(5) == 3 || on_fourth,
+          "displacement vectors (intent code 1006, DISPVECT) of " + std::to_string(beyond(5)) + " values, " + file +
+              "; expected 3");
   require(beyond(6) == 1 && beyond(7) == 1, "a size of " + dims + ", " + file + "; expected 3 axes and no more");
+  return static_cast<int>(on_fourth ? beyond(4) : beyond(5));
 }
 
 /// What both forms need. Numbers that are huge, or none, are damage: no scanner is a thousand kilometres long.
@@ -192,7 +197,7 @@ const Geometry& place_of(const NiftiHeader& header, NiftiFrame frame, const std:
   return header.sform;
 }
 
-NiftiHeader read_nifti_header(const std::filesystem::path& path) {
+NiftiHeader read_nifti_header(const std::filesystem::path& path, NiftiVectors vectors) {
   const std::string file = path.string();
   const HeaderBytes bytes = read_bytes(path);
   NiftiHeader header;
@@ -220,7 +225,7 @@ NiftiHeader read_nifti_header(const std::filesystem::path& path) {
   header.intent_name.assign(bytes.begin() + 328, std::find(bytes.begin() + 328, bytes.begin() + 344, 0));
   header.qform_code = i16(252);
   header.sform_code = i16(254);
-  require_one_volume(header, file);
+  header.components = require_one_volume(header, vectors, file);
   const glm::i64vec3 voxels(header.dim[1], header.dim[2], header.dim[3]);
   const Quaternion turn = quaternion(bytes, header.swapped);
   header.qform_rounding = turn.rounding;

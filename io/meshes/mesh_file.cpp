@@ -8,11 +8,13 @@
 #include <cmath>
 #include <fstream>
 #include <set>
+#include <sstream>
 #include <utility>
 
 #include "deform/errors.h"
 #include "io/images/image_reader.h"
 #include "io/meshes/mesh_format.h"
+#include "io/meshes/model_builder.h"
 #include "io/meshes/vector_options.h"
 #include "io/opened_file.h"
 
@@ -124,11 +126,42 @@ std::vector<glm::dvec3> from_deformed(const MeshReader& rest, const FieldSource&
   return displacement;
 }
 
+/// The displacements of a table: a line a vertex, with its number and three components; the first may be a heading.
+/// @return NaN where the table has none
+std::vector<glm::dvec3> from_table(const MeshReader& reader, const FieldSource& source) {
+  const std::filesystem::path path = source.option("table");
+  require_readable_file(path);
+  std::ifstream stream(path, std::ios::binary);
+  std::vector<glm::dvec3> displacement(reader.points.size(), glm::dvec3(NAN));
+  std::int64_t number = 0;
+  for (std::string line; std::getline(stream, line);) {
+    ++number;
+    std::ranges::replace_if(
+        line, [](char c) { return c == ',' || c == ';' || c == '\t' || c == '\r'; }, ' ');
+    std::istringstream words(line);
+    std::array<std::string, 5> word;
+    std::size_t count = 0;
+    while (count < word.size() && words >> word[count]) ++count;
+    const std::string where = " in line " + std::to_string(number) + " of " + path.string();
+    const bool heading = number == 1 && count > 0 && word[0].find_first_not_of("0123456789") != std::string::npos;
+    if (count == 0 || word[0].starts_with('#') || heading) continue;
+    require(count == 4, "more or fewer than 4 values" + where + "; expected the number of a vertex and ux, uy, uz");
+    glm::dvec3& vector = displacement[vertex_numbered(reader, whole_in(word[0], where), where)];
+    require(std::isnan(vector.x), "the vertex " + word[0] + " a second time" + where);
+    for (int axis = 0; axis < 3; ++axis) vector[axis] = real_in(word[static_cast<std::size_t>(axis) + 1], where);
+  }
+  return displacement;
+}
+
 /// One displacement a vertex in the file's frame and units; empty: it cannot be decided which of the vectors it is.
 std::vector<glm::dvec3> displacement_of(const MeshReader& reader, const FieldSource& source, MeshFileHeader& header) {
   if (source.options.contains("deformed")) {
     header.displacement = "positions of " + source.option("deformed");
     return from_deformed(reader, source, header);
+  }
+  if (source.options.contains("table")) {
+    header.displacement = "table " + source.option("table");
+    return from_table(reader, source);
   }
   const auto chosen = chosen_vectors(reader, source);
   if (!chosen) return {};
@@ -247,7 +280,7 @@ MeshFile read(const FieldSource& source, bool must_be_decided) {
   const std::vector<glm::dvec3> displacement = displacement_of(*reader, source, header);
   require(!displacement.empty() || !must_be_decided,
           "which vectors are the displacement? " + source.path.string() + listed(*reader) +
-              "; give displacement=NAME, step=N where there are several, or deformed=FILE, as in " +
+              "; give displacement=NAME, step=N where there are several, deformed=FILE, or table=FILE, as in " +
               source.path.string() + ":displacement=NAME");
   result.mesh = mesh_of(*reader, displacement, source, header);
   if (header.lattice) result.lattice = *header.lattice;
@@ -261,17 +294,20 @@ MeshFile read(const FieldSource& source, bool must_be_decided) {
 void check_mesh_options(const FieldSource& source) {
   const std::string file = source.path.string();
   for (const auto& [key, value] : source.options) {
-    const bool free = key == "displacement" || key == "step" || key == "deformed";
+    const bool free = key == "displacement" || key == "step" || key == "deformed" || key == "table";
     require(free || key == "frame" || key == "units",
-            "the option \"" + key + "\" for " + file + "; a mesh takes displacement, step, deformed, frame and units");
+            "the option \"" + key + "\" for " + file +
+                "; a mesh takes displacement, step, deformed, table, frame and units");
     require(free || (key == "frame" ? value == "lps" || value == "ras" : value == "mm" || value == "m"),
             key + "=" + value + " for " + file + "; expected " +
                 (key == "frame" ? "frame=lps or frame=ras" : "units=mm or units=m"));
   }
   if (source.options.contains("step")) step_of(source);
-  require(!source.options.contains("deformed") ||
-              (!source.options.contains("displacement") && !source.options.contains("step")),
-          "deformed= beside displacement= or step= for " + file + "; give one of them");
+  const bool array = source.options.contains("displacement") || source.options.contains("step");
+  const int ways =
+      (array ? 1 : 0) + (source.options.contains("deformed") ? 1 : 0) + (source.options.contains("table") ? 1 : 0);
+  require(ways <= 1,
+          "deformed=, table= and displacement= or step= beside one another for " + file + "; give one of them");
 }
 
 bool is_mesh_file(const std::filesystem::path& path) {

@@ -4,85 +4,18 @@
 #include "itkbridge/transforms/elastix_parameters.h"
 
 #include <algorithm>
-#include <fstream>
-#include <map>
 
 #include "deform/errors.h"
+#include "itkbridge/transforms/parameter_file.h"
 
 namespace tetwarp {
 namespace {
 
 constexpr std::size_t kMostFiles = 100;
 
-/// A line without its comment, which begins with `//` outside quotes.
-std::string_view content_of(std::string_view line) {
-  bool quoted = false;
-  for (std::size_t at = 0; at < line.size(); ++at) {
-    if (line[at] == '"') quoted = !quoted;
-    if (!quoted && line.substr(at).starts_with("//")) return trimmed(line.substr(0, at));
-  }
-  return trimmed(line);
-}
-
-/// The keys of one file, each with the text of its values.
-class Parameters {
- public:
-  explicit Parameters(const std::filesystem::path& path) : file_(path.string()) {
-    std::ifstream stream(path, std::ios::binary);
-    std::int64_t number = 0;
-    for (std::string line; std::getline(stream, line);) {
-      ++number;
-      const std::string_view text = content_of(line);
-      if (text.empty()) continue;
-      const std::string where = "line " + std::to_string(number) + " of " + file_;
-      require(text.front() == '(' && text.back() == ')',
-              "no (Key value ...) in " + where + "; the file may be truncated");
-      const std::string_view inner = trimmed(text.substr(1, text.size() - 2));
-      const auto end = std::min(inner.find_first_of(kBlank), inner.size());
-      const bool added =
-          values_.emplace(std::string(inner.substr(0, end)), std::string(trimmed(inner.substr(end)))).second;
-      require(added, "the key " + std::string(inner.substr(0, end).substr(0, 60)) + " a second time in " + where);
-    }
-  }
-
-  const std::string& file() const { return file_; }
-  bool has(const std::string& key) const { return values_.contains(key); }
-
-  /// The only word of a key, without quotes; `missing` if there is no such key.
-  std::string word(const std::string& key, const std::string& missing) const {
-    const auto found = values_.find(key);
-    if (found == values_.end()) return missing;
-    std::string text = found->second;
-    if (text.size() >= 2 && text.front() == '"' && text.back() == '"') text = text.substr(1, text.size() - 2);
-    return text;
-  }
-
-  std::vector<double> numbers(const std::string& key) const {
-    const auto found = values_.find(key);
-    require(found != values_.end(), "no " + key + " in " + file_);
-    return parse_numbers(found->second, key + " in " + file_);
-  }
-
-  std::vector<double> numbers(const std::string& key, std::size_t count) const {
-    std::vector<double> values = numbers(key);
-    require(values.size() == count, std::to_string(values.size()) + " values of " + key + " in " + file_ +
-                                        "; expected " + std::to_string(count));
-    return values;
-  }
-
-  void require_word(const std::string& key, const std::string& expected) const {
-    const std::string found = word(key, expected);
-    require(found == expected, "(" + key + " " + found + ") in " + file_ + "; expected " + expected);
-  }
-
- private:
-  std::string file_;
-  std::map<std::string, std::string> values_;
-};
-
 /// Size, origin, spacing and direction in the order of ITK's BSplineTransform. elastix counts samples from GridIndex
 /// and writes the direction column by column.
-std::vector<double> grid_of(const Parameters& from) {
+std::vector<double> grid_of(const ParameterFile& from) {
   const std::vector<double> size = from.numbers("GridSize", 3), index = from.numbers("GridIndex", 3),
                             spacing = from.numbers("GridSpacing", 3), origin = from.numbers("GridOrigin", 3);
   const std::vector<double> columns =
@@ -100,7 +33,7 @@ std::vector<double> grid_of(const Parameters& from) {
   return grid;
 }
 
-TransformRecord record_of(const Parameters& from) {
+TransformRecord record_of(const ParameterFile& from) {
   from.require_word("FixedImageDimension", "3");
   from.require_word("MovingImageDimension", "3");
   from.require_word("UseBinaryFormatForTransformationParameters", "false");
@@ -134,7 +67,7 @@ bool is_file(const std::filesystem::path& path) {
 }
 
 /// The path of the initial transform; empty if there is none.
-std::filesystem::path initial_of(const Parameters& from) {
+std::filesystem::path initial_of(const ParameterFile& from) {
   const std::string old_key = "InitialTransformParametersFileName", key = "InitialTransformParameterFileName";
   const std::string name = from.word(from.has(key) ? key : old_key, "NoInitialTransform");
   if (name == "NoInitialTransform") return {};
@@ -159,7 +92,7 @@ void follow(const std::filesystem::path& path, Visit&& visit) {
                 " lead in a circle, or there are too many: " + file.string() + " again");
     seen.push_back(std::filesystem::canonical(file));
     require(is_elastix_file(file), "not an elastix parameter file, " + file.string() + ", named by " + path.string());
-    const Parameters parameters(file);
+    const ParameterFile parameters(file);
     visit(parameters);
     file = initial_of(parameters);
   }
@@ -167,23 +100,15 @@ void follow(const std::filesystem::path& path, Visit&& visit) {
 
 }  // namespace
 
-bool is_elastix_file(const std::filesystem::path& path) {
-  std::ifstream stream(path, std::ios::binary);
-  for (std::string line; std::getline(stream, line);) {
-    if (const std::string_view text = content_of(line); !text.empty()) return text.front() == '(';
-  }
-  return false;
-}
-
 std::vector<TransformRecord> read_elastix(const std::filesystem::path& path) {
   std::vector<TransformRecord> records;
-  follow(path, [&](const Parameters& parameters) { records.push_back(record_of(parameters)); });
+  follow(path, [&](const ParameterFile& parameters) { records.push_back(record_of(parameters)); });
   return records;
 }
 
 std::vector<std::filesystem::path> elastix_files(const std::filesystem::path& path) {
   std::vector<std::filesystem::path> files;
-  follow(path, [&](const Parameters& parameters) { files.emplace_back(parameters.file()); });
+  follow(path, [&](const ParameterFile& parameters) { files.emplace_back(parameters.file()); });
   return files;
 }
 

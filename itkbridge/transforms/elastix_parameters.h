@@ -10,12 +10,9 @@
 
 namespace tetwarp {
 
-/// Whether the file is a list of `(Key value ...)`, as elastix writes it.
-bool is_elastix_file(const std::filesystem::path& path);
-
-/// Reads an elastix transform parameter file (TransformParameters.0.txt) and the initial transforms that it names, as
-/// transforms of ITK: EulerTransform, AffineTransform, TranslationTransform, SimilarityTransform, BSplineTransform and
-/// RecursiveBSplineTransform of order 3.
+/// Reads an elastix transform parameter file (TransformParameters.0.txt, or .toml of elastix 5.2 and later) and the
+/// initial transforms that it names, as transforms of ITK: EulerTransform, AffineTransform, TranslationTransform,
+/// SimilarityTransform, BSplineTransform and RecursiveBSplineTransform of order 3.
 ///
 /// elastix maps output to input: x_moving = T(x_fixed). The result is in ITK's order: its last element, the initial
 /// transform that names no further one, is applied first. A file named by InitialTransformParametersFileName is looked

@@ -41,6 +41,9 @@ std::vector<double> grid_of(const Header& header, const std::string& file) {
   // the domain.
   double slack = 1e-6;
   for (const double value : origin) slack = std::max(slack, 1e-6 + 6e-8 * std::abs(value));
+  // Cosines have six decimals too, which an oblique grid feels the farther the voxels are from its origin.
+  const bool oblique = std::ranges::any_of(direction, [](double cosine) { return cosine != std::round(cosine); });
+  for (std::size_t axis = 0; axis < 3 && oblique; ++axis) slack += 5e-7 * voxels[axis] * spacing[axis];
   for (std::size_t axis = 0; axis < 3; ++axis) {
     require(region[axis] >= 1, "vox_per_rgn " + std::to_string(region[axis]) + " in " + file + "; expected at least 1");
     size[axis] = std::ceil(voxels[axis] / region[axis]) + 3;

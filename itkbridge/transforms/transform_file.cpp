@@ -3,11 +3,14 @@
 
 #include "itkbridge/transform_file.h"
 
+#include <algorithm>
 #include <charconv>
 #include <fstream>
 
 #include "deform/errors.h"
 #include "itkbridge/transforms/elastix_parameters.h"
+#include "itkbridge/transforms/matlab_record.h"
+#include "itkbridge/transforms/parameter_file.h"
 #include "itkbridge/transforms/plastimatch_spline.h"
 
 namespace tetwarp {
@@ -120,8 +123,9 @@ StoredTransform read_transform(const std::filesystem::path& path, const std::sto
   if (magic.starts_with(kHdf5)) return {TransformTool::itk, parts_of(read_transform_hdf5(path, stop), file)};
   if (magic.starts_with(kText)) return {TransformTool::itk, parts_of(TextReader(path).read(), file)};
   if (magic.starts_with(kPlastimatchMagic)) return {TransformTool::plastimatch, {read_plastimatch_spline(path)}};
+  if (is_matlab_record(magic)) return {TransformTool::itk, parts_of(read_matlab_records(path), file)};
   require(is_elastix_file(path), "not a transform file, " + file +
-                                     "; expected ITK's HDF5 or text (#Insight Transform File V1.0), elastix's "
+                                     "; expected ITK's HDF5, text (#Insight Transform File V1.0) or .mat, elastix's "
                                      "parameters or plastimatch's B-spline");
   return {TransformTool::elastix, read_elastix(path)};
 }
@@ -129,11 +133,15 @@ StoredTransform read_transform(const std::filesystem::path& path, const std::sto
 void tetwarp_load_transform(const std::filesystem::path& path, const std::stop_token& stop, LoadedTransform& loaded) {
   loaded.stored = read_transform(path, stop);
   loaded.map = make_transform(loaded.stored, path.string());
+  loaded.affine = std::ranges::none_of(loaded.stored.parts, [](const TransformRecord& part) {
+    return part.type.starts_with("BSplineTransform") || part.type.starts_with("DisplacementFieldTransform");
+  });
 }
 
 void tetwarp_transform_files(const std::filesystem::path& path, std::vector<std::filesystem::path>& files) {
   const std::string magic = first_bytes(path);
-  const bool alone = magic.starts_with(kHdf5) || magic.starts_with(kText) || magic.starts_with(kPlastimatchMagic);
+  const bool alone = magic.starts_with(kHdf5) || magic.starts_with(kText) || magic.starts_with(kPlastimatchMagic) ||
+                     is_matlab_record(magic);
   files = alone || !is_elastix_file(path) ? std::vector<std::filesystem::path>{path} : elastix_files(path);
 }
 

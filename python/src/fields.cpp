@@ -50,11 +50,11 @@ nb::tuple read_forward(const std::vector<std::string>& texts, const Geometry& vo
   return nb::make_tuple(as_tuple(std::move(read->field)), read->origin.notes);
 }
 
-nb::tuple read_pull(const std::string& text, const Geometry& volume, const std::string& nifti_frame, int threads,
-                    const CallOptions& options) {
+nb::tuple read_pull(const std::vector<std::string>& texts, const Geometry& volume, const std::string& nifti_frame,
+                    int threads, const CallOptions& options) {
   std::optional<apps::ReadPullField> read;
   run_call(options, false, [&](const Control& control) {
-    const apps::PullChoice choice = apps::parse_pull_field(text, frame_of(nifti_frame));
+    const apps::PullChoice choice = apps::parse_pull_fields(texts, frame_of(nifti_frame));
     read = apps::read_field(choice, volume, straightened(volume), threads_of(threads), control);
   });
   const Geometry grid = read->field.grid;
@@ -278,7 +278,7 @@ void add_fields(nb::module_& core) {
            nb::arg("replaced").none());
   core.def("read_forward", &read_forward, nb::arg("texts"), nb::arg("volume"), nb::arg("cell_size").none(),
            nb::arg("nifti_frame"), nb::arg("threads"), nb::arg("options"));
-  core.def("read_pull", &read_pull, nb::arg("text"), nb::arg("volume"), nb::arg("nifti_frame"), nb::arg("threads"),
+  core.def("read_pull", &read_pull, nb::arg("texts"), nb::arg("volume"), nb::arg("nifti_frame"), nb::arg("threads"),
            nb::arg("options"));
   core.def("read_file", &read_file, nb::arg("text"), nb::arg("nifti_frame"));
   core.def("read_pull_file", &read_pull_file, nb::arg("text"), nb::arg("nifti_frame"));

@@ -187,7 +187,7 @@ def info(path: PathLike, *, single: bool = False, nifti_frame: str = "sform") ->
 
 
 def read_field(
-    path: PathLike | Sequence[str],
+    path: PathLike | Sequence[PathLike],
     *,
     like: Any = None,
     direction: str = "forward",
@@ -195,14 +195,15 @@ def read_field(
     nifti_frame: str = "sform",
     threads: int = 0,
 ) -> VertexField | PullField:
-    """Reads a field file: a lattice, a mesh, or a transform.
+    """Reads a field file: a lattice, a mesh, or a transform. Of several files the fields are composed.
 
     Parameters
     ----------
-    path : str or path
-        Options stand behind the name, as on the command line: `"field.npy:order=zyx"`.
+    path : str or path, or a list of these
+        Options stand behind the name, as on the command line: `"field.npy:order=zyx"`. Points go through the first of
+        several, and from there on: `["1Warp.nii.gz", "0GenericAffine.mat"]` as after `antsApplyTransforms -t`.
     like : Volume, image or Geometry, optional
-        The volume that the field is for. Transforms, and files without a grid of their own, need it.
+        The volume that the field is for. Transforms, files without a grid of their own, and several files need it.
     direction : "forward" or "pull"
         "pull": the file leads from the output back to the input. A file that says otherwise is refused.
     cell_size : int, optional
@@ -229,11 +230,16 @@ def read_field(
     (4, 4, 4)
     """
     _calls.word(direction, "direction", ("forward", "pull"))
-    text = _path(path) if isinstance(path, (str, os.PathLike)) else ""
-    if not text:
-        raise TypeError(f"path is {path!r}; expected a name")
+    one = isinstance(path, (str, os.PathLike))
+    names = [path] if one else list(path)
+    if not names or not all(isinstance(name, (str, os.PathLike)) and os.fspath(name) for name in names):
+        raise TypeError(f"path is {path!r}; expected a name, or a list of names")
+    texts = [_path(name) for name in names]
     number = _calls.threads(threads)
     if like is None:
+        if not one:
+            raise TypeError("like is missing; several files need the volume that the field is for")
+        text = texts[0]
         if direction == "pull":
             grid, displacement = _core.read_pull_file(text, nifti_frame)
             return PullField(Geometry._of(grid), displacement)
@@ -241,12 +247,12 @@ def read_field(
     geometry = like if isinstance(like, Geometry) else adapters.volume_of(like, name="like")[0].geometry
     options = _calls.options(False, "field")
     if direction == "pull":
-        grid, displacement, notes = _core.read_pull(text, geometry._grid, nifti_frame, number, options)
+        grid, displacement, notes = _core.read_pull(texts, geometry._grid, nifti_frame, number, options)
         field = PullField(Geometry._of(grid), displacement)
         field.notes = notes
         return field
     size = None if cell_size is None else _calls.whole(cell_size, "cell_size", 1, 65536)
-    parts, notes = _core.read_forward([text], geometry._grid, size, nifti_frame, number, options)
+    parts, notes = _core.read_forward(texts, geometry._grid, size, nifti_frame, number, options)
     return VertexField._of(parts, notes)
 
 

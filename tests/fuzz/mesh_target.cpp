@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Mesh files of one suffix: whether it is one, its header, and the whole of it, as it is and under each text of
-// TETWARP_FUZZ_OPTIONS.
+// Mesh files of one suffix: whether it is one, its header, and the whole of it, as it is, as its own deformed mesh, and
+// under each text of TETWARP_FUZZ_OPTIONS.
 #include "io/mesh_file.h"
 #include "tests/fuzz/input_file.h"
 
@@ -21,6 +21,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   file.fill(data, size);
   asked([] { tetwarp::is_mesh_file(file.path()); });
   read_mesh(file.path().string());
+  read_mesh(file.path().string() + ":deformed=" + file.path().string());
   for (const std::string options : {TETWARP_FUZZ_OPTIONS}) read_mesh(file.path().string() + options);
   return 0;
 }

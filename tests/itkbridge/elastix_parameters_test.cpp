@@ -70,7 +70,7 @@ TEST(ElastixParameters, AffineTurnsAboutItsCentre) {
   write_file(scratch / "TransformParameters.0.txt", affine());
   const TransformFile file = read_transform_file(scratch / "TransformParameters.0.txt");
   EXPECT_EQ(file.tool, "elastix");
-  EXPECT_TRUE(file.pulls);
+  EXPECT_EQ(file.direction, Direction::pull);
   for (const glm::dvec3& x : image_points())
     EXPECT_LT(glm::distance(x + file.displacement(x), sheared_about()(x)), 1e-12);
 }

@@ -38,7 +38,7 @@ TEST(PlastimatchSpline, TheMovedCoefficientIsWhereItsRegionBegins) {
   write_file(scratch / "bspline.txt", spline_text());
   const TransformFile file = read_transform_file(scratch / "bspline.txt");
   EXPECT_EQ(file.tool, "plastimatch");
-  EXPECT_TRUE(file.pulls);
+  EXPECT_EQ(file.direction, Direction::pull);
   EXPECT_EQ(file.parameters, 3U * 6 * 6 * 5);
   // Coefficient (2, 3, 2) is at voxel roi_offset + (index - 1) regions = (12, 21, 8).
   const glm::dvec3 centre =

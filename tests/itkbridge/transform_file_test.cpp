@@ -59,7 +59,7 @@ TEST(TransformFile, AffineAboutACentreIsItksOwn) {
     EXPECT_EQ(file.classes, std::vector<std::string>{"AffineTransform_double_3_3"});
     EXPECT_EQ(file.parameters, 12U);
     EXPECT_EQ(file.tool, "ITK");
-    EXPECT_FALSE(file.pulls);
+    EXPECT_FALSE(file.direction.has_value());
     EXPECT_LT(largest_difference(file, sheared_about(), points_around(oblique_grid())), 1e-12) << name;
     EXPECT_EQ(*file.outside, 0U);
   }

@@ -51,6 +51,7 @@ class Tetwarp(CMakePackage, CudaPackage):
     depends_on("highway@1.0.3:")
     depends_on("libdeflate")
     depends_on("libpng")
+    depends_on("minizip")
     depends_on("nlohmann-json@3.11:")
     depends_on("openssl@3:")
     depends_on("tbb")
@@ -61,7 +62,9 @@ class Tetwarp(CMakePackage, CudaPackage):
         depends_on("dcmtk@3.6.7:+pic")
         depends_on("icu4c")
     depends_on("openjpeg@2.5", when="+openjpeg")
-    depends_on("itk@5.2:5", when="+itk")
+    with when("+itk"):
+        depends_on("itk@5.2:5")
+        depends_on("tomlplusplus@3.3:")
     depends_on("vtk@9:", when="+vtk")
     with when("+view"):
         depends_on("boost@1.74:")  # only headers

@@ -138,7 +138,7 @@ TEST(DeformRequest, RefusesWhatDoesNotGoTogether) {
   EXPECT_TRUE(says(refused([](DeformOptions& o) { o.points = {"a.csv=b.stl"}; }), {"--points writes the form"}));
   const auto pull = [&](const std::function<void(DeformOptions&)>& change) {
     return refused([&](DeformOptions& o) {
-      o.field = {{}, "nowhere/pull.mha", {}};
+      o.field = {{}, {"nowhere/pull.mha"}, {}};
       change(o);
     });
   };
@@ -170,7 +170,7 @@ TEST(DeformRequest, KnowsWhetherTheFieldPullsAndWhatIsSaidOfIt) {
   EXPECT_FALSE(reports_quality(request_of(options)));
   options.report = "nowhere/report.json";
   EXPECT_TRUE(reports_quality(request_of(options)));
-  options.field = {{}, "nowhere/pull.mha", {}};
+  options.field = {{}, {"nowhere/pull.mha"}, {}};
   EXPECT_TRUE(is_pull(request_of(options)));
   EXPECT_FALSE(reports_quality(request_of(options)));
 }

@@ -25,7 +25,7 @@ ForwardChoice parse(const std::vector<std::string>& texts, std::optional<std::in
   return parse_forward_fields(texts, cell_size, NiftiFrame::sform);
 }
 
-PullChoice parse_pull(const std::string& text) { return parse_pull_field(text, NiftiFrame::sform); }
+PullChoice parse_pull(const std::string& text) { return parse_pull_fields({text}, NiftiFrame::sform); }
 
 std::string usage_error(const std::vector<std::string>& texts, std::optional<std::int64_t> cell_size = {}) {
   try {
@@ -51,7 +51,7 @@ class FieldFiles : public testing::Test {
   /// A build without ITK reads none.
   bool reads_transforms() const {
     try {
-      read_transform_file(at("first.txt"));
+      read_transform_file(fs::path(at("first.txt")));
       return true;
     } catch (const NotCompiled&) {
       return false;
@@ -120,13 +120,57 @@ TEST_F(FieldFiles, WithVerticesOfTheirOwnTakeNoCellSizeAndAMeshComesFirst) {
 }
 
 TEST_F(FieldFiles, OfAPullFieldNeedNotExistAndAreNoFormulas) {
-  const NamedField missing = parse_pull(at("missing.mha")).field;
+  const NamedField missing = parse_pull(at("missing.mha")).fields[0];
   EXPECT_TRUE(std::holds_alternative<NamedLattice>(missing.what));
   EXPECT_EQ(files_of(missing).size(), 1u);
-  const NamedField wave = parse_pull("wave").field;
+  const NamedField wave = parse_pull("wave").fields[0];
   EXPECT_TRUE(std::holds_alternative<NamedLattice>(wave.what)) << "a file of this name";
   EXPECT_EQ(files_of(wave).size(), 1u);
-  EXPECT_THROW(field_bytes(parse_pull(mesh()), kVolume), InputError) << "a mesh is a forward field";
+  EXPECT_THROW(parse_pull(mesh()), UsageError) << "a mesh is a forward field";
+}
+
+/// Points go through the first of several, and from there on.
+TEST_F(FieldFiles, OfSeveralPullFieldsAreComposedInTheirOrder) {
+  const Geometry wide{.size = {9, 8, 7}, .spacing = {2, 2, 3}, .origin = {-4, -4, -6}};
+  PullField sheared{wide, std::vector<glm::vec3>(static_cast<std::size_t>(voxel_count(wide)))};
+  const AffineMap point = point_from_index(wide);
+  for (std::size_t v = 0; v < sheared.displacement.size(); ++v) {
+    const auto n = static_cast<std::int64_t>(v);
+    const glm::dvec3 at = point(glm::dvec3(n % 9, n / 9 % 8, n / 72));
+    sheared.displacement[v] = {0.25 * at.y, 0, 0};
+  }
+  write_field_file(scratch_ / "sheared.mha", sheared);
+  write_file(scratch_ / "scale.mat", "1 0 0 0\n0 0.5 0 1\n0 0 1 0\n0 0 0 1\n");
+  const std::string scale = at("scale.mat") + ":tool=greedy";  // LPS: y becomes y / 2 - 1
+  const auto composed = [&](const std::vector<std::string>& texts) {
+    return read_field(parse_pull_fields(texts, NiftiFrame::sform), kVolume, kVolume, 1, {});
+  };
+  const auto moved = [&](const ReadPullField& read, const glm::i64vec3& i) {
+    const Geometry& grid = read.field.grid;
+    const auto v = static_cast<std::size_t>(i.x + grid.size.x * (i.y + grid.size.y * i.z));
+    return point_from_index(grid)(glm::dvec3(i)) + glm::dvec3(read.field.displacement[v]);
+  };
+  // The grid is that of the first, or of the output.
+  const ReadPullField field_first = composed({at("sheared.mha"), scale}),
+                      matrix_first = composed({scale, at("sheared.mha")});
+  EXPECT_EQ(field_first.field.grid.size, wide.size);
+  EXPECT_EQ(matrix_first.field.grid.size, kVolume.size);
+  EXPECT_EQ(moved(field_first, {2, 5, 1}), glm::dvec3(0 + 0.25 * 6, 6 / 2 - 1, -3));
+  EXPECT_EQ(moved(matrix_first, {2, 4, 1}), glm::dvec3(4 + 0.25 * 3, 8 / 2 - 1, 3));
+  EXPECT_EQ(moved(matrix_first, {2, 3, 1}), glm::dvec3(4 + 0.25 * 2, 6 / 2 - 1, 3)) << "between samples";
+  EXPECT_EQ(field_first.origin.files.size(), 1u);
+
+  // What leads out of the grid of a later field has no source, and is counted.
+  write_file(scratch_ / "far.mat", "1 0 0 -12\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");  // LPS: x + 12
+  const ReadPullField out = composed({at("far.mat") + ":tool=c3d", at("sheared.mha")});
+  std::size_t missing = 0;
+  for (const glm::vec3& by : out.field.displacement) missing += std::isnan(by.x) ? 1 : 0;
+  EXPECT_EQ(missing, out.field.displacement.size() - 1 * 5 * 4) << "of x, 12 alone is not beyond the grid";
+  EXPECT_TRUE(says(out.origin.notes.back(), {"sheared.mha: 100 samples", "no source"}));
+
+  // A transform that leads the other way is refused, its inverse is not.
+  EXPECT_EQ(moved(composed({scale + ",invert=yes"}), {0, 1, 0}), glm::dvec3(0, 6, 0));
+  EXPECT_EQ(text_of(parse_pull_fields({"a.mha", scale}, NiftiFrame::sform)), "a.mha, then " + scale);
 }
 
 TEST(FieldChoice, FilesGetOtherNamesAndFormulasStay) {

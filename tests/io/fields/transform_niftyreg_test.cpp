@@ -68,7 +68,7 @@ TEST(NiftyRegSpline, OneMovedControlPointMovesByTheWeightsOfTheSpline) {
     const TransformFile file = read_transform_file(scratch / "cpp.nii");
     EXPECT_EQ(file.tool, "NiftyReg");
     EXPECT_EQ(file.classes, std::vector<std::string>{"cubic B-spline of 7 x 6 x 8 control points"});
-    EXPECT_TRUE(file.pulls);
+    EXPECT_EQ(file.direction, Direction::pull);
     EXPECT_EQ(file.parameters, 3U * 7 * 6 * 8);
     const auto expect = [&](const glm::dvec3& index, double weight) {
       EXPECT_LT(glm::distance(file.displacement(point(index)), glm::dvec3(3, 5, 7) * weight), 3e-5)

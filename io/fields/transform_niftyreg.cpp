@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/fields/niftyreg_spline.h"
+#include "io/fields/transform_niftyreg.h"
 
 #include <algorithm>
 #include <array>
@@ -11,6 +11,8 @@
 
 #include "deform/errors.h"
 #include "io/fields/field_image.h"
+#include "io/images/image_reader.h"
+#include "io/opened_file.h"
 
 namespace tetwarp {
 namespace {
@@ -86,22 +88,28 @@ ControlPoints read_control_points(const std::filesystem::path& path) {
   return points;
 }
 
-}  // namespace
-
-bool is_niftyreg_spline(const NiftiHeader& header) {
-  return header.intent_name == "NREG_TRANS" && header.intent_p1 == 2;
+bool recognizes(const std::filesystem::path& path, std::string_view) {
+  return image_format(path) == ImageFormat::nifti;
 }
 
-TransformFile read_niftyreg_spline(const std::filesystem::path& path) {
-  const auto points = std::make_shared<const ControlPoints>(read_control_points(path));
+bool holds_transform(const std::filesystem::path& path) {
+  try {
+    return is_file(path) && is_niftyreg_spline(read_nifti_header(path));
+  } catch (const InputError&) {
+    return false;  // refused with a reason when it is read as a volume or a field
+  }
+}
+
+TransformFile read(const FieldSource& source, const std::stop_token&) {
+  const auto points = std::make_shared<const ControlPoints>(read_control_points(source.path));
   const AffineMap index = index_from_point(points->grid);
-  TransformFile result{.tool = "NiftyReg",
-                       .classes = {"cubic B-spline of " + to_string(points->grid.size) + " control points"},
-                       .parameters = 3 * points->displacement.size(),
-                       .pulls = true,
-                       .displacement = {},
-                       .beyond = "where its outermost control points go on",
-                       .outside = std::make_shared<std::atomic<std::uint64_t>>(0)};
+  TransformFile result;
+  result.tool = "NiftyReg";
+  result.classes = {"cubic B-spline of " + to_string(points->grid.size) + " control points"};
+  result.parameters = 3 * points->displacement.size();
+  result.direction = Direction::pull;
+  result.beyond = "where its outermost control points go on";
+  result.outside = std::make_shared<std::atomic<std::uint64_t>>(0);
   result.displacement = [points, index, outside = result.outside](const glm::dvec3& point) {
     bool inside = true;
     const glm::dvec3 by = displacement_at(*points, index(point), inside);
@@ -109,6 +117,14 @@ TransformFile read_niftyreg_spline(const std::filesystem::path& path) {
     return by;
   };
   return result;
+}
+
+}  // namespace
+
+const TransformFormat kTransformFormat_niftyreg = {recognizes, holds_transform, nullptr, read, nullptr};
+
+bool is_niftyreg_spline(const NiftiHeader& header) {
+  return header.intent_name == "NREG_TRANS" && header.intent_p1 == 2;
 }
 
 }  // namespace tetwarp

@@ -1,0 +1,129 @@
+// SPDX-FileCopyrightText: The Tetwarp authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include "itkbridge/transforms/parameter_file.h"
+
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <fstream>
+
+#include "deform/errors.h"
+#include "itkbridge/transforms/transform_record.h"
+
+namespace tetwarp {
+namespace {
+
+bool has_toml_suffix(const std::filesystem::path& path) {
+  const std::string suffix = path.extension().string();
+  return suffix == ".toml" || suffix == ".TOML";
+}
+
+/// A line without its comment, which begins with `//` outside quotes.
+std::string_view content_of(std::string_view line) {
+  bool quoted = false;
+  for (std::size_t at = 0; at < line.size(); ++at) {
+    if (line[at] == '"') quoted = !quoted;
+    if (!quoted && line.substr(at).starts_with("//")) return trimmed(line.substr(0, at));
+  }
+  return trimmed(line);
+}
+
+/// The numbers of an array of TOML; none where it has anything else.
+std::optional<std::vector<double>> numbers_of(const toml::array& array) {
+  std::vector<double> numbers;
+  numbers.reserve(array.size());
+  for (const toml::node& node : array) {
+    if (!node.is_number()) return std::nullopt;
+    numbers.push_back(*node.value<double>());
+  }
+  return numbers;
+}
+
+}  // namespace
+
+bool is_elastix_file(const std::filesystem::path& path) {
+  if (has_toml_suffix(path)) return true;
+  std::ifstream stream(path, std::ios::binary);
+  for (std::string line; std::getline(stream, line);) {
+    if (const std::string_view text = content_of(line); !text.empty()) return text.front() == '(';
+  }
+  return false;
+}
+
+ParameterFile::ParameterFile(const std::filesystem::path& path) : file_(path.string()) {
+  has_toml_suffix(path) ? read_toml(path) : read_text(path);
+}
+
+void ParameterFile::read_text(const std::filesystem::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  std::int64_t number = 0;
+  for (std::string line; std::getline(stream, line);) {
+    ++number;
+    const std::string_view text = content_of(line);
+    if (text.empty()) continue;
+    const std::string where = "line " + std::to_string(number) + " of " + file_;
+    require(text.front() == '(' && text.back() == ')',
+            "no (Key value ...) in " + where + "; the file may be truncated");
+    const std::string_view inner = trimmed(text.substr(1, text.size() - 2));
+    const auto end = std::min(inner.find_first_of(kBlank), inner.size());
+    const bool added =
+        values_.emplace(std::string(inner.substr(0, end)), Value{std::string(trimmed(inner.substr(end)))}).second;
+    require(added, "the key " + std::string(inner.substr(0, end).substr(0, 60)) + " a second time in " + where);
+  }
+}
+
+void ParameterFile::read_toml(const std::filesystem::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  toml::table table;
+  try {
+    table = toml::parse(stream, file_);
+  } catch (const toml::parse_error& error) {
+    throw InputError("line " + std::to_string(error.source().begin.line) + " of " + file_ +
+                     " is no TOML: " + std::string(error.description()) + "; the file may be truncated");
+  }
+  for (const auto& [key, node] : table) {
+    Value value;
+    if (const auto* array = node.as_array()) {
+      value.numbers = numbers_of(*array);
+    } else if (node.is_number()) {
+      value.numbers = std::vector<double>{*node.value<double>()};
+      value.text =
+          node.is_integer() ? std::to_string(*node.value<std::int64_t>()) : std::to_string(value.numbers->front());
+    } else if (const auto* boolean = node.as_boolean()) {
+      value.text = boolean->get() ? "true" : "false";
+    } else if (const auto* text = node.as_string()) {
+      value.text = '"' + text->get() + '"';
+    }
+    values_.emplace(std::string(key.str()), std::move(value));
+  }
+}
+
+std::string ParameterFile::word(const std::string& key, const std::string& missing) const {
+  const auto found = values_.find(key);
+  if (found == values_.end()) return missing;
+  std::string text = found->second.text;
+  if (text.size() >= 2 && text.front() == '"' && text.back() == '"') text = text.substr(1, text.size() - 2);
+  return text;
+}
+
+std::vector<double> ParameterFile::numbers(const std::string& key) const {
+  const auto found = values_.find(key);
+  require(found != values_.end(), "no " + key + " in " + file_);
+  if (found->second.numbers) return *found->second.numbers;
+  return parse_numbers(found->second.text, key + " in " + file_);
+}
+
+std::vector<double> ParameterFile::numbers(const std::string& key, std::size_t count) const {
+  std::vector<double> values = numbers(key);
+  require(values.size() == count,
+          std::to_string(values.size()) + " values of " + key + " in " + file_ + "; expected " + std::to_string(count));
+  return values;
+}
+
+void ParameterFile::require_word(const std::string& key, const std::string& expected) const {
+  const std::string found = word(key, expected);
+  require(found == expected, "(" + key + " " + found + ") in " + file_ + "; expected " + expected);
+}
+
+}  // namespace tetwarp
