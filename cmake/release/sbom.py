@@ -121,8 +121,8 @@ def owners(paths):
 
 
 def headers_of(build, source):
-    """Files that the compiler read in a build: those outside of the sources for what is no module of Python, the same for
-    the module, and those of nanobind."""
+    """Files that the compiler read in a build: those outside of the sources for what is no module of Python, and the same
+    for the module, without those of nanobind."""
     log = output_of("ninja", "-C", str(build), "-t", "deps")
     if not log:
         fail(f"{build} has no log of ninja; run cmake/debian/build.sh and python/wheels.sh in {source}")
@@ -137,7 +137,7 @@ def headers_of(build, source):
 
     def outside(read):
         return {name for name in read - bound if name.startswith("/") and not name.startswith(f"{source}/")}
-    return outside(names), outside(module), bound
+    return outside(names), outside(module)
 
 
 def has_headers_alone(package):
@@ -152,13 +152,10 @@ def wheel_build(source, wheel):
     return found[0] if len(found) == 1 else fail(f"{len(found)} folders of {source}/build are of {wheel.name}, where one should be")
 
 
-def nanobind_version(headers):
-    """Of the environment in which its headers lie."""
-    for header in headers:
-        folder = pathlib.Path(header.split("/nanobind/")[0])
-        for metadata in folder.glob("nanobind-*.dist-info"):
-            return metadata.name[len("nanobind-"):-len(".dist-info")]
-    return None
+def nanobind_version(build):
+    """What a build says of the nanobind that it used (python/CMakeLists.txt)."""
+    path = build / "python" / "nanobind.txt"
+    return path.read_text(encoding="utf-8").strip() if path.exists() else fail(f"{path} is missing: with which nanobind was this built?")
 
 
 def loaded_by_wheel(path):
@@ -186,15 +183,15 @@ def main():
     commit = output_of("git", "-C", str(source), "rev-parse", "HEAD").strip()
     document = Document(commit)
 
-    def compiled_with(artifact, headers, bound=()):
+    def compiled_with(artifact, headers, binds=None):
         for package in owners(headers):
             other = document.debian(package)
             document.relations.add((artifact, "STATIC_LINK", other) if has_headers_alone(package) else (other, "BUILD_DEPENDENCY_OF", artifact))
-        if bound:
-            bound_version = nanobind_version(bound) or fail("the build used a nanobind whose version is not known")
-            document.relations.add((artifact, "STATIC_LINK", document.nanobind(bound_version)))
+        if binds:
+            document.relations.add((artifact, "STATIC_LINK", document.nanobind(nanobind_version(binds))))
 
-    headers, module_headers, bound = headers_of(source / "build" / "debian", source)
+    packages_build = source / "build" / "debian"
+    headers, module_headers = headers_of(packages_build, source)
     for path in sorted(folder.iterdir()):
         if path.name.endswith(".deb"):
             fields = dict(line.split(": ", 1) for line in output_of("dpkg-deb", "-f", str(path)).splitlines() if re.match(r"\S+: ", line))
@@ -202,7 +199,7 @@ def main():
             gpl = " AND GPL-2.0-or-later" if "insighttoolkit" in fields.get("Depends", "") else ""
             artifact = document.artifact(path, "Apache-2.0" + gpl, "INSTALL", version)
             if package.startswith("python3-"):
-                compiled_with(artifact, headers | module_headers, bound)
+                compiled_with(artifact, headers | module_headers, packages_build)
             elif package != "tetwarp-doc":
                 compiled_with(artifact, headers)
             for entry in filter(None, fields.get("Depends", "").split(", ")):
@@ -211,8 +208,9 @@ def main():
                     document.relations.add((artifact, "DEPENDS_ON", document.debian(name)))
         elif path.suffix == ".whl":
             artifact = document.artifact(path, "Apache-2.0", "LIBRARY", version)
-            library_headers, its_headers, its_nanobind = headers_of(wheel_build(source, path), source)
-            compiled_with(artifact, library_headers | its_headers, its_nanobind)
+            build = wheel_build(source, path)
+            library_headers, its_headers = headers_of(build, source)
+            compiled_with(artifact, library_headers | its_headers, build)
             for soname in loaded_by_wheel(path):
                 document.relations.add((artifact, "CONTAINS", document.debian(package_of_library(soname))))
         elif path.name == f"tetwarp-{version}.tar.xz":
