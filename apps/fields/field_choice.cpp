@@ -167,7 +167,7 @@ PullChoice parse_pull_fields(const std::vector<std::string>& texts, NiftiFrame f
   for (const std::string& text : texts) {
     parsed.fields.push_back(named_file(text, parse_file(text, frame)));
     if (std::holds_alternative<NamedMesh>(parsed.fields.back().what))
-      throw UsageError("a mesh, " + text + ", says where its vertices go; give it with -f");
+      throw InputError("a mesh, " + text + ", says where its vertices go; give it with -f");
   }
   return parsed;
 }

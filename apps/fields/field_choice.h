@@ -86,7 +86,8 @@ ForwardChoice parse_forward_fields(const std::vector<std::string>& texts, std::o
 /// Fields one after the other, each by itself: those of --sequence. @throws UsageError as the function above
 std::vector<ForwardChoice> parse_sequence(const std::vector<std::string>& texts, std::optional<std::int64_t> cell_size,
                                           NiftiFrame frame);
-/// @throws UsageError for no text at all; options that do not go with the file; a mesh, which is a forward field
+/// @throws UsageError for no text at all; options that do not go with the file
+/// @throws InputError for a mesh, which is a forward field
 PullChoice parse_pull_fields(const std::vector<std::string>& texts, NiftiFrame frame);
 /// The one that was given. @throws UsageError for none, and as the two above
 FieldChoice parse_field(const FieldArguments& given, NiftiFrame frame);

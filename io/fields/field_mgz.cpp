@@ -187,7 +187,7 @@ Warp read_warp(const std::filesystem::path& path) {
   require(frames == 3 && type == kFloat, "no warp but " + std::to_string(frames) + " frames of type " +
                                              std::to_string(type) + ", " + file + "; expected 3 frames of float (3)");
   bytes.number<std::int32_t>();  // degrees of freedom
-  require(bytes.number<std::int16_t>() != 0, "no place (goodRASFlag 0), " + file);
+  require(bytes.number<std::int16_t>() > 0, "no place (goodRASFlag 0), " + file);
   const glm::dvec3 spacing = bytes.vector();
   const glm::dmat3 cosines = read_cosines(bytes);
   warp.grid = geometry_of(size, spacing, cosines, bytes.vector());

@@ -188,6 +188,9 @@ std::unique_ptr<FieldReader> open(const FieldSource& source) {
     if (nifti.intent_code == kDisplacementVector) describe_displacement_vectors(nifti, header);
     if (nifti.dim[0] == 4) header.format = "NIfTI, vectors as volumes";
   }
+  require(
+      nifti.dim[0] != 4 || source.options.contains("values"),
+      "vectors as volumes, " + file + ", do not say what they are; give " + file + ":values=displacements|positions");
   take_options(source, header);
   std::optional<Geometry> fsl_source;
   if (fsl) fsl_source = read_image_header(source.option("source"), source.nifti_frame).geometry;

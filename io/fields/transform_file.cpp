@@ -71,11 +71,15 @@ TransformFile affine_transform(const AffineMap& map) {
   return result;
 }
 
-bool is_transform_file(const std::filesystem::path& path) { return format_of(path) != nullptr; }
+bool is_transform_file(const std::filesystem::path& path) {
+  std::error_code ignored;  // set for a name that no file can have
+  return !std::filesystem::is_directory(path, ignored) && format_of(path) != nullptr;
+}
 
 void check_transform_options(const FieldSource& source) {
   const std::string inverse = source.option("invert", "no"), file = source.path.string();
   require(inverse == "yes" || inverse == "no", "invert=" + inverse + ", " + file + "; expected yes or no");
+  if (!is_file(source.path)) return;  // whoever reads it says so
   FieldSource others = source;
   others.options.erase("invert");
   const TransformFormat& format = format_of(source);

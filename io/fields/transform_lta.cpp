@@ -117,8 +117,7 @@ TransformFile read(const FieldSource& source, const std::stop_token&) {
   const std::string file = source.path.string();
   Lines lines(source.path);
   const double type = lines.values("type", 1)[0];
-  require(type == kVoxels || type == kRas, "a transform of the type " + std::to_string(static_cast<int>(type)) +
-                                               lines.here() +
+  require(type == kVoxels || type == kRas, "a transform of the type " + std::to_string(type) + lines.here() +
                                                "; expected 0 (voxels) or 1 (RAS): convert it with lta_convert");
   const double count = lines.values("nxforms", 1)[0];
   require(count == 1, "nxforms " + std::to_string(count) + lines.here() + "; expected one transform");

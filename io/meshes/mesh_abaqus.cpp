@@ -86,8 +86,8 @@ class AbaqusReader final : public MeshReader {
     std::vector<std::string> words;
     for (const std::string_view part : split_at_commas(line)) words.push_back(compact_lower(part));
     const std::string& keyword = words.front();
-    const std::array<std::string_view, 7> refused = {"*include", "*ngen",   "*nfill", "*ncopy",
-                                                     "*elgen",   "*elcopy", "*system"};
+    const std::array<std::string_view, 9> refused = {"*include", "*ngen", "*nfill",        "*ncopy", "*elgen",
+                                                     "*elcopy",  "*nmap", "*imperfection", "*system"};
     require(std::ranges::find(refused, keyword) == refused.end(),
             keyword + here() + " is not read; write a model with all nodes and elements in it");
     parts_ += keyword == "*part" ? 1 : 0;

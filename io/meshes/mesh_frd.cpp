@@ -72,13 +72,15 @@ class FrdReader final : public MeshReader {
   explicit FrdReader(const std::filesystem::path& path) : MeshReader(path), file_(path.string()), model_(file_) {
     format = "CalculiX result, text";
     Lines lines(path);
-    bool has_nodes = false, ended = false;
+    bool has_nodes = false, has_elements = false, ended = false;
     while (!ended && lines.next()) {
       if (lines.starts_with("    2C")) {
         require(!has_nodes, "a second block of nodes" + lines.here());
         has_nodes = true;
         take_nodes(lines);
       } else if (lines.starts_with("    3C")) {
+        require(!has_elements, "a second block of elements" + lines.here());
+        has_elements = true;
         take_elements(lines);
         model_.build(*this);
       } else if (lines.starts_with("  100C")) {

@@ -34,8 +34,9 @@ std::optional<std::vector<double>> numbers_of(const toml::array& array) {
   std::vector<double> numbers;
   numbers.reserve(array.size());
   for (const toml::node& node : array) {
-    if (!node.is_number()) return std::nullopt;
-    numbers.push_back(*node.value<double>());
+    const auto number = node.value<double>();  // none also of a whole number that no double is
+    if (!node.is_number() || !number) return std::nullopt;
+    numbers.push_back(*number);
   }
   return numbers;
 }
@@ -86,10 +87,9 @@ void ParameterFile::read_toml(const std::filesystem::path& path) {
     Value value;
     if (const auto* array = node.as_array()) {
       value.numbers = numbers_of(*array);
-    } else if (node.is_number()) {
-      value.numbers = std::vector<double>{*node.value<double>()};
-      value.text =
-          node.is_integer() ? std::to_string(*node.value<std::int64_t>()) : std::to_string(value.numbers->front());
+    } else if (const auto number = node.value<double>(); node.is_number() && number) {
+      value.numbers = std::vector<double>{*number};
+      value.text = node.is_integer() ? std::to_string(*node.value<std::int64_t>()) : std::to_string(*number);
     } else if (const auto* boolean = node.as_boolean()) {
       value.text = boolean->get() ? "true" : "false";
     } else if (const auto* text = node.as_string()) {

@@ -231,7 +231,7 @@ def read_field(
     """
     _calls.word(direction, "direction", ("forward", "pull"))
     one = isinstance(path, (str, os.PathLike))
-    names = [path] if one else list(path)
+    names: list[Any] = [path] if isinstance(path, (str, os.PathLike)) else list(path)
     if not names or not all(isinstance(name, (str, os.PathLike)) and os.fspath(name) for name in names):
         raise TypeError(f"path is {path!r}; expected a name, or a list of names")
     texts = [_path(name) for name in names]

@@ -126,7 +126,7 @@ TEST_F(FieldFiles, OfAPullFieldNeedNotExistAndAreNoFormulas) {
   const NamedField wave = parse_pull("wave").fields[0];
   EXPECT_TRUE(std::holds_alternative<NamedLattice>(wave.what)) << "a file of this name";
   EXPECT_EQ(files_of(wave).size(), 1u);
-  EXPECT_THROW(parse_pull(mesh()), UsageError) << "a mesh is a forward field";
+  EXPECT_THROW(parse_pull(mesh()), InputError) << "a mesh is a forward field";
 }
 
 /// Points go through the first of several, and from there on.

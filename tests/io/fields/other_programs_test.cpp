@@ -99,7 +99,7 @@ TEST(LtaFile, WhatIsTruncatedOrOfAnotherKindIsRefused) {
   std::string other = text;
   other.replace(other.find("= 1"), 3, "= 14");
   write_file(scratch / "a.lta", other);
-  EXPECT_TRUE(says(refused_transform(scratch / "a.lta"), {"type 14", "lta_convert"}));
+  EXPECT_TRUE(says(refused_transform(scratch / "a.lta"), {"type 14.000000", "lta_convert"}));
   EXPECT_EQ(read_transform_file(file).direction, Direction::forward);
 }
 

@@ -139,6 +139,9 @@ TEST(Calculix, DamagedResultsAreRefused) {
   EXPECT_TRUE(says(with(replaced("    1    0    1\n -2", "   99    0    1\n -2")), {"element of the type 99"}));
   EXPECT_TRUE(says(with(replaced(" -1         5 2.55629E-01", " -1        99 2.55629E-01")),
                    {"node 99, which does not exist"}));
+  const std::size_t elements = text.find("    3C"), behind = text.find(" -3\n", elements) + 4;
+  EXPECT_TRUE(
+      says(with(text.substr(0, behind) + text.substr(elements)), {"second block of elements in line", "a.frd"}));
   EXPECT_TRUE(says(with(replaced("2.55629E-01", "2.5562xE-01")), {"expected a number"}));
   EXPECT_TRUE(says(with(replaced("DISP ", "FORC ")), {"taken"}));  // the only vectors, whatever their name
 }
